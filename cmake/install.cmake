@@ -1,0 +1,15 @@
+# cmake --install and find_package(supertac)
+include(CMakePackageConfigHelpers)
+get_property(libraries GLOBAL PROPERTY SUPERTAC_LIBRARIES)
+install(TARGETS ${libraries} EXPORT supertac ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+foreach(folder io autograd layers data models hardware)
+  install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/supertac FILES_MATCHING PATTERN "*.h")
+endforeach()
+install(EXPORT supertac NAMESPACE supertac:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supertac
+  FILE supertacTargets.cmake)
+file(WRITE ${PROJECT_BINARY_DIR}/supertacConfig.cmake
+"include(CMakeFindDependencyMacro)\nfind_dependency(OpenMP COMPONENTS CXX)\nfind_dependency(Threads)
+include(\${CMAKE_CURRENT_LIST_DIR}/supertacTargets.cmake)\n")
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/supertacConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/supertacConfig.cmake ${PROJECT_BINARY_DIR}/supertacConfigVersion.cmake
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supertac)

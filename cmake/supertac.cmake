@@ -1,0 +1,50 @@
+# Shared rules of all targets: warnings, sanitizers, reproducible floating point.
+
+add_library(supertac_options INTERFACE)
+# -ffp-contract=off: a product and a sum are only fused where the source says so, so that every
+# instruction set gives the same bits.
+target_compile_options(supertac_options INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor
+  -ffp-contract=off -fno-math-errno $<$<BOOL:${SUPERTAC_WERROR}>:-Werror>)
+if(SUPERTAC_SANITIZE)
+  target_compile_options(supertac_options INTERFACE -fsanitize=${SUPERTAC_SANITIZE} -fno-omit-frame-pointer
+    -fno-sanitize-recover=all)
+  target_link_options(supertac_options INTERFACE -fsanitize=${SUPERTAC_SANITIZE})
+else()
+  target_compile_options(supertac_options INTERFACE $<$<CONFIG:Release>:-U_FORTIFY_SOURCE -D_FORTIFY_SOURCE=2>
+    -fstack-protector-strong)
+  target_link_options(supertac_options INTERFACE -Wl,-z,relro,-z,now)
+endif()
+
+# supertac_library(NAME SOURCES a.cpp ... [USES target ...] [PRIVATE_USES target ...])
+function(supertac_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;USES;PRIVATE_USES" ${ARGN})
+  add_library(${name} STATIC ${arg_SOURCES})
+  add_library(supertac::${name} ALIAS ${name})
+  target_include_directories(${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/supertac>)
+  target_compile_features(${name} PUBLIC cxx_std_20)
+  target_link_libraries(${name} PUBLIC ${arg_USES} PRIVATE $<BUILD_INTERFACE:supertac_options> ${arg_PRIVATE_USES})
+  set_property(GLOBAL APPEND PROPERTY SUPERTAC_LIBRARIES ${name})
+endfunction()
+
+# The same sources twice: NAME with real = float and NAME_f64 with real = double (for gradient checks).
+# USES lists plain targets, USES_BOTH targets that exist in both precisions.
+function(supertac_library_both name)
+  cmake_parse_arguments(arg "" "" "SOURCES;USES;USES_BOTH;PRIVATE_USES" ${ARGN})
+  supertac_library(${name} SOURCES ${arg_SOURCES} USES ${arg_USES} ${arg_USES_BOTH}
+    PRIVATE_USES ${arg_PRIVATE_USES})
+  list(TRANSFORM arg_USES_BOTH APPEND _f64)
+  add_library(${name}_f64 STATIC EXCLUDE_FROM_ALL ${arg_SOURCES})
+  target_include_directories(${name}_f64 PUBLIC ${PROJECT_SOURCE_DIR})
+  target_compile_definitions(${name}_f64 PUBLIC SUPERTAC_REAL_IS_DOUBLE)
+  target_link_libraries(${name}_f64 PUBLIC ${arg_USES} ${arg_USES_BOTH}
+    PRIVATE supertac_options ${arg_PRIVATE_USES})
+endfunction()
+
+# supertac_test(NAME SOURCES a_test.cpp ... USES target ...): one GoogleTest program, every case a ctest case.
+function(supertac_test name)
+  cmake_parse_arguments(arg "" "" "SOURCES;USES" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE ${arg_USES} supertac_options GTest::gtest GTest::gtest_main)
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
+endfunction()
