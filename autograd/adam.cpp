@@ -1,0 +1,68 @@
+#include "autograd/adam.h"
+
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/parallel.h"
+
+namespace supertac {
+
+Adam::Adam(std::vector<Variable> parameters, const AdamOptions& options)
+    : parameters_(std::move(parameters)), options_(options) {
+  const auto in_unit = [](double beta) { return beta >= 0 && beta < 1; };
+  if (!(options.learning_rate >= 0) || !in_unit(options.beta1) || !in_unit(options.beta2) ||
+      !(options.epsilon > 0) || !(options.clip_norm >= 0)) {
+    throw std::invalid_argument(
+        "Adam: expects learning_rate >= 0, beta1 and beta2 in [0,1), epsilon > 0, clip_norm >= 0");
+  }
+  for (Variable& p : parameters_) {
+    if (!p.requires_grad()) throw std::invalid_argument("Adam: a parameter does not require a gradient");
+    p.mutable_grad() = Tensor::zeros(p.shape());
+    m_.push_back(Tensor::zeros(p.shape()));
+    v_.push_back(Tensor::zeros(p.shape()));
+  }
+}
+
+void Adam::zero_grad() {
+  for (Variable& p : parameters_) p.mutable_grad().fill(0);
+}
+
+double Adam::step() {
+  double squares = 0;
+  for (const Variable& p : parameters_) squares += kernels::sum_of_squares(p.size(), p.grad().data());
+  const double norm = std::sqrt(squares);
+  if (!std::isfinite(norm)) return norm;
+  ++steps_;
+  const double factor = options_.clip_norm > 0 && norm > options_.clip_norm ? options_.clip_norm / norm : 1;
+  const auto clip = static_cast<real>(factor);
+  const auto b1 = static_cast<real>(options_.beta1), b2 = static_cast<real>(options_.beta2);
+  const double t = static_cast<double>(steps_);
+  const auto rate = static_cast<real>(options_.learning_rate / (1 - std::pow(options_.beta1, t)));
+  const auto correction = static_cast<real>(1 / std::sqrt(1 - std::pow(options_.beta2, t)));
+  const auto epsilon = static_cast<real>(options_.epsilon);
+  for (std::size_t k = 0; k < parameters_.size(); ++k) {
+    const real* gradient = parameters_[k].grad().data();
+    real *x = parameters_[k].mutable_value().data(), *m = m_[k].data(), *v = v_[k].data();
+    kernels::for_pieces(parameters_[k].size(), [=](Dim begin, Dim end) {
+      for (Dim i = begin; i < end; ++i) {
+        const real g = clip * gradient[i];
+        m[i] = b1 * m[i] + (1 - b1) * g;
+        v[i] = b2 * v[i] + (1 - b2) * g * g;
+        x[i] -= rate * m[i] / (std::sqrt(v[i]) * correction + epsilon);
+      }
+    });
+  }
+  return norm;
+}
+
+double Schedule::at(std::int64_t step) const {
+  if (step < warm_up) return peak * static_cast<double>(step + 1) / static_cast<double>(warm_up);
+  if (!cosine || total <= warm_up) return peak;
+  const double done =
+      std::min(1.0, static_cast<double>(step - warm_up) / static_cast<double>(total - warm_up));
+  return last + (peak - last) * (1 + std::cos(std::numbers::pi * done)) / 2;
+}
+
+}  // namespace supertac

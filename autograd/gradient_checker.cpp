@@ -1,0 +1,97 @@
+#include "autograd/gradient_checker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "autograd/ops/arithmetic.h"
+
+namespace supertac {
+namespace {
+
+Tensor weights_for(const Shape& shape) {
+  Tensor r(shape);
+  for (Dim i = 0; i < r.size(); ++i) {
+    r.data()[i] = static_cast<real>(0.5 + std::fmod(0.61803398875 * static_cast<double>(i + 1), 1.0)) *
+                  (i % 3 == 1 ? -1 : 1);
+  }
+  return r;
+}
+
+using Function = std::function<Variable(const std::vector<Variable>&)>;
+
+double weighted_sum(const Function& f, const std::vector<Variable>& inputs) {
+  const NoGrad no_grad;
+  const Variable y = f(inputs);
+  const Tensor r = weights_for(y.shape());
+  double total = 0;
+  for (Dim i = 0; i < r.size(); ++i) {
+    total += static_cast<double>(y.value().data()[i]) * static_cast<double>(r.data()[i]);
+  }
+  return total;
+}
+
+// (8 (f(+h) - f(-h)) - (f(+2h) - f(-2h))) / 12 h, exact to h^4
+double derivative(const Function& f, std::vector<Variable>& inputs, std::size_t input, Dim index,
+                  double step) {
+  real& x = inputs[input].mutable_value().data()[index];
+  const real original = x;
+  const double h = step * std::max(1.0, std::abs(static_cast<double>(original)));
+  const auto at = [&](double offset) {
+    x = static_cast<real>(static_cast<double>(original) + offset);
+    return weighted_sum(f, inputs);
+  };
+  const double slope = (8 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12 * h);
+  x = original;
+  return slope;
+}
+
+}  // namespace
+
+std::string GradientReport::text() const {
+  std::ostringstream out;
+  out.precision(10);
+  for (const GradientEntry& e : worst) {
+    out << "input " << e.input << " [" << e.index << "]: analytic " << e.analytic << ", numeric " << e.numeric
+        << ", relative error " << e.relative_error << '\n';
+  }
+  return out.str();
+}
+
+GradientReport check_gradients(const Function& f, std::vector<Tensor> tensors,
+                               const GradientCheckOptions& options) {
+  std::vector<Variable> inputs;
+  for (const Tensor& t : tensors) inputs.emplace_back(t.clone(), true);
+  const Variable y = f(inputs);
+  backward(sum(multiply(y, Variable(weights_for(y.shape())))));
+
+  GradientReport report;
+  for (std::size_t k = 0; k < inputs.size(); ++k) {
+    const Dim size = inputs[k].size(), count = std::min(size, options.max_entries_per_input);
+    std::vector<GradientEntry> entries;
+    double largest = 0;
+    for (Dim i = 0; i < count; ++i) {
+      const Dim index = i * size / count;
+      const double numeric = derivative(f, inputs, k, index, options.step);
+      const Tensor& grad = inputs[k].grad();
+      const double analytic = grad.defined() ? static_cast<double>(grad.data()[index]) : 0;
+      entries.push_back({k, index, analytic, numeric, 0});
+      largest = std::max(largest, std::abs(numeric));
+    }
+    for (GradientEntry& e : entries) {
+      const double size_of = std::max(std::abs(e.analytic), std::abs(e.numeric)) + 1e-3 * largest;
+      e.relative_error = std::abs(e.analytic - e.numeric) / std::max(size_of, 1e-10);
+      if (!std::isfinite(e.relative_error)) e.relative_error = 1e30;
+    }
+    report.entries += count;
+    report.worst.insert(report.worst.end(), entries.begin(), entries.end());
+  }
+  std::sort(report.worst.begin(), report.worst.end(), [](const GradientEntry& a, const GradientEntry& b) {
+    return a.relative_error > b.relative_error;
+  });
+  if (!report.worst.empty()) report.max_relative_error = report.worst.front().relative_error;
+  if (report.worst.size() > 10) report.worst.resize(10);
+  return report;
+}
+
+}  // namespace supertac

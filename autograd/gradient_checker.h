@@ -1,0 +1,39 @@
+// Compares the gradients of backward() with finite differences, entry by entry. Meant for the double build.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "autograd/variable.h"
+
+namespace supertac {
+
+struct GradientEntry {
+  std::size_t input;  // which of the inputs
+  Dim index;          // which of its elements
+  double analytic, numeric;
+  /// |analytic - numeric| / (max(|analytic|, |numeric|) + 1e-3 * the largest numeric gradient of that input)
+  double relative_error;
+};
+
+struct GradientReport {
+  std::vector<GradientEntry> worst;  // the largest errors first, at most ten
+  double max_relative_error = 0;
+  Dim entries = 0;
+  /// One line per entry of `worst`, for a failing test to print.
+  std::string text() const;
+};
+
+struct GradientCheckOptions {
+  double step = 1e-3;               // of the five-point stencil; relative to max(1, |x|)
+  Dim max_entries_per_input = 200;  // larger inputs are sampled evenly
+};
+
+/// `f` maps the inputs to a result of any shape, deterministically. The result is reduced to the scalar
+/// sum(y * r) with fixed weights r that differ from element to element, so that no gradient hides in a
+/// symmetry.
+GradientReport check_gradients(const std::function<Variable(const std::vector<Variable>&)>& f,
+                               std::vector<Tensor> inputs, const GradientCheckOptions& options = {});
+
+}  // namespace supertac

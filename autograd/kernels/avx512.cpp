@@ -1,0 +1,32 @@
+#ifndef SUPERTAC_REAL_IS_DOUBLE
+#include <immintrin.h>
+
+#include "autograd/kernels/isa.h"
+
+namespace supertac::kernels {
+namespace {
+
+constexpr int kTilePixels = 8;  // 8 x 2 accumulators: twice what hides FMA's latency of 4 on two ports
+
+struct Vec {
+  static constexpr Dim kLanes = 16;
+  __m512 v;
+  static __mmask16 mask(Dim n) { return static_cast<__mmask16>((1U << n) - 1U); }
+  static Vec load(const real* p) { return {_mm512_loadu_ps(p)}; }
+  static Vec load_part(const real* p, Dim n) { return {_mm512_maskz_loadu_ps(mask(n), p)}; }
+  static Vec broadcast(real x) { return {_mm512_set1_ps(x)}; }
+  static Vec add(Vec a, Vec b) { return {_mm512_add_ps(a.v, b.v)}; }
+  static Vec fma(Vec a, Vec b, Vec c) { return {_mm512_fmadd_ps(a.v, b.v, c.v)}; }
+  void store(real* p) const { _mm512_storeu_ps(p, v); }
+  void store_part(real* p, Dim n) const { _mm512_mask_storeu_ps(p, mask(n), v); }
+};
+
+#include "autograd/kernels/isa_kernels.inl"
+
+}  // namespace
+
+const IsaKernels kAvx512Kernels{"avx512", gather, gather_rows, outer};
+
+}  // namespace supertac::kernels
+
+#endif  // SUPERTAC_REAL_IS_DOUBLE

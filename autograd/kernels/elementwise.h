@@ -1,0 +1,32 @@
+// Loops over single elements, callable without a graph. Gradients are added into gx.
+#pragma once
+
+#include "autograd/tensor.h"
+
+namespace supertac::kernels {
+
+/// y = x > 0 ? x : slope * x. The gradient reads the sign of y, which is the sign of x for slope >= 0.
+void leaky_relu(Dim n, real slope, const real* x, real* y);
+void leaky_relu_grad(Dim n, real slope, const real* gy, const real* y, real* gx);
+
+/// y = 1 / (1 + e^-x);  gx += gy y (1 - y)
+void sigmoid(Dim n, const real* x, real* y);
+void sigmoid_grad(Dim n, const real* gy, const real* y, real* gx);
+
+/// y = min(max(x, low), high);  gx += gy where low <= x <= high
+void clamp(Dim n, real low, real high, const real* x, real* y);
+void clamp_grad(Dim n, real low, real high, const real* gy, const real* x, real* gx);
+
+void add(Dim n, const real* a, const real* b, real* y);
+void multiply(Dim n, const real* a, const real* b, real* y);
+void scale(Dim n, real factor, const real* x, real* y);
+/// y += factor * x
+void add_scaled(Dim n, real factor, const real* x, real* y);
+/// y += a * b
+void add_product(Dim n, const real* a, const real* b, real* y);
+
+/// The sum of all elements, and of their squares, in double precision and a fixed order.
+double sum(Dim n, const real* x);
+double sum_of_squares(Dim n, const real* x);
+
+}  // namespace supertac::kernels

@@ -1,0 +1,54 @@
+// Which input pixel meets which output pixel under which tap of a convolution.
+//
+// Convolution, transposed convolution, both of their gradients and the linear layer all compute
+//     y[n, q, :] += sum over taps t, pixels p = source(t, q):   x[n, p, :] * w[t, :, :]
+// and differ only in source(). That table is built once for each geometry and kept.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "autograd/tensor.h"
+
+namespace supertac::kernels {
+
+/// Two-dimensional; a 1-D convolution has height 1, kernel_h 1, padding_h 0, stride_h 1.
+struct ConvSettings {
+  Dim height = 1, width = 1;
+  Dim kernel_h = 1, kernel_w = 1;
+  Dim stride_h = 1, stride_w = 1;
+  Dim padding_h = 0, padding_w = 0;
+  bool transposed = false;
+  auto operator<=>(const ConvSettings&) const = default;
+
+  /// conv: (size + 2 padding - kernel) / stride + 1;  transposed: (size - 1) stride - 2 padding + kernel
+  Dim out_height() const;
+  Dim out_width() const;
+  Dim taps() const { return kernel_h * kernel_w; }
+};
+
+/// Outputs that use the same taps. A convolution has one phase; a transposed one with stride s has s*s.
+struct Phase {
+  std::vector<std::int32_t> taps;     // ascending
+  std::vector<std::int32_t> outputs;  // ascending pixel numbers
+  /// [outputs][taps]: the input pixel, or -1 where the tap reaches into the padding
+  std::vector<std::int32_t> sources;
+};
+
+/// The pairs (input pixel, output pixel) that one tap joins, in ascending output order.
+struct TapPairs {
+  std::vector<std::int32_t> inputs;
+  std::vector<std::int32_t> outputs;
+};
+
+struct Geometry {
+  Dim in_pixels = 0, out_pixels = 0, taps = 0;
+  std::vector<Phase> forward;   // outputs gather from inputs
+  std::vector<Phase> backward;  // inputs gather from outputs: the gradient of x
+  std::vector<TapPairs> pairs;  // [taps]: the gradient of w
+};
+
+/// The table of these settings, built at first use and kept for the thread's life.
+const Geometry& geometry_of(const ConvSettings& settings);
+
+}  // namespace supertac::kernels

@@ -1,0 +1,94 @@
+#include "autograd/ops/convolution.h"
+
+#include "autograd/checks.h"
+#include "autograd/kernels/conv.h"
+#include "autograd/kernels/isa.h"
+
+namespace supertac {
+namespace {
+
+using kernels::ConvSettings;
+using kernels::ConvSizes;
+
+void check_arguments(const char* op, const Variable& x, const Variable& w, const Variable& b,
+                     const ConvOptions& o, int rank) {
+  check_rank(op, "x", x, rank);
+  check_rank(op, "weight", w, rank);
+  const std::string shapes = " (x " + x.shape().text() + ", weight " + w.shape().text() + ")";
+  const Dim in = w.dim(rank - 2), out = w.dim(rank - 1);
+  if (x.dim(rank - 1) != in) {
+    refuse(op, "weight expects " + std::to_string(in) + " input channels, x has " +
+                   std::to_string(x.dim(rank - 1)) + shapes);
+  }
+  if (in < 1 || in > kernels::kMaxChannels || out < 1 || out > kernels::kMaxChannels) {
+    refuse(op, "channels must be 1 to " + std::to_string(kernels::kMaxChannels) + shapes);
+  }
+  check_shape(op, "bias", b, {out});
+  if (o.stride < 1 || o.padding < 0) {
+    refuse(op, "stride must be positive and padding not negative, got " + std::to_string(o.stride) + " and " +
+                   std::to_string(o.padding));
+  }
+}
+
+ConvSettings settings_of(const Variable& x, const Variable& w, const ConvOptions& o, bool transposed) {
+  ConvSettings s;
+  const bool flat = x.rank() == 3;
+  s.height = flat ? 1 : x.dim(1);
+  s.width = x.dim(flat ? 1 : 2);
+  s.kernel_h = flat ? 1 : w.dim(0);
+  s.kernel_w = w.dim(flat ? 0 : 1);
+  s.stride_h = flat ? 1 : o.stride;
+  s.stride_w = o.stride;
+  s.padding_h = flat ? 0 : o.padding;
+  s.padding_w = o.padding;
+  s.transposed = transposed;
+  return s;
+}
+
+// Both conv and transposed conv: only the geometry differs.
+//   gx = transpose(conv)(gy)     gw[t] = sum over pixels x^T gy     gb = sum over pixels gy
+Variable convolve(const char* op, const Variable& x, const Variable& w, const Variable& b,
+                  const ConvOptions& o, int rank, bool transposed) {
+  check_arguments(op, x, w, b, o, rank);
+  const ConvSettings s = settings_of(x, w, o, transposed);
+  const Dim too_short_h = s.height + 2 * s.padding_h - s.kernel_h,
+            too_short_w = s.width + 2 * s.padding_w - s.kernel_w;
+  const bool empty =
+      transposed ? s.out_height() < 1 || s.out_width() < 1 : too_short_h < 0 || too_short_w < 0;
+  if (empty || s.height < 1 || s.width < 1) {
+    refuse(op, "the output would be empty (x " + x.shape().text() + ", weight " + w.shape().text() +
+                   ", stride " + std::to_string(o.stride) + ", padding " + std::to_string(o.padding) + ")");
+  }
+  const kernels::Geometry& geometry = kernels::geometry_of(s);
+  const ConvSizes sizes{&geometry, x.dim(0), w.dim(rank - 2), w.dim(rank - 1)};
+  Tensor y(rank == 3 ? Shape{x.dim(0), s.out_width(), sizes.cout}
+                     : Shape{x.dim(0), s.out_height(), s.out_width(), sizes.cout});
+  kernels::conv(sizes, x.value().data(), w.value().data(), b.value().data(), y.data());
+  return record(op, y, {&x, &w, &b}, [sizes](Backward& g) {
+    const real* gy = g.gy().data();
+    if (Tensor* gx = g.grad_of(0)) kernels::conv_grad_x(sizes, gy, g.value(1).data(), gx->data());
+    if (Tensor* gw = g.grad_of(1)) kernels::conv_grad_w(sizes, g.value(0).data(), gy, gw->data());
+    if (Tensor* gb = g.grad_of(2)) {
+      kernels::bias_grad(sizes.images * sizes.geometry->out_pixels, sizes.cout, gy, gb->data());
+    }
+  });
+}
+
+}  // namespace
+
+Variable conv1d(const Variable& x, const Variable& w, const Variable& b, const ConvOptions& options) {
+  return convolve("conv1d", x, w, b, options, 3, false);
+}
+Variable conv2d(const Variable& x, const Variable& w, const Variable& b, const ConvOptions& options) {
+  return convolve("conv2d", x, w, b, options, 4, false);
+}
+Variable conv_transpose1d(const Variable& x, const Variable& w, const Variable& b,
+                          const ConvOptions& options) {
+  return convolve("conv_transpose1d", x, w, b, options, 3, true);
+}
+Variable conv_transpose2d(const Variable& x, const Variable& w, const Variable& b,
+                          const ConvOptions& options) {
+  return convolve("conv_transpose2d", x, w, b, options, 4, true);
+}
+
+}  // namespace supertac

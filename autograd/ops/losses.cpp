@@ -1,0 +1,93 @@
+#include "autograd/ops/losses.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "autograd/checks.h"
+#include "autograd/kernels/exp.h"
+#include "autograd/kernels/parallel.h"
+#include "autograd/kernels/ssim.h"
+
+namespace supertac {
+
+// gx = 2 g (x - target) / n,  gtarget = -gx
+Variable l2_loss(const Variable& x, const Variable& target) {
+  check_same_shape("l2_loss", "x", x, "target", target);
+  const Dim n = x.size();
+  if (n == 0) refuse("l2_loss", "x is empty: " + x.shape().text());
+  const real *a = x.value().data(), *t = target.value().data();
+  const double total = kernels::sum_pieces(n, [=](Dim begin, Dim end) {
+    return kernels::sum_lanes(begin, end, [=](Dim i) {
+      const double d = static_cast<double>(a[i]) - static_cast<double>(t[i]);
+      return d * d;
+    });
+  });
+  const auto value = static_cast<real>(total / static_cast<double>(n));
+  return record("l2_loss", Tensor::full({}, value), {&x, &target}, [n](Backward& b) {
+    const real g = 2 * b.gy().item() / static_cast<real>(n);
+    const real *from = b.value(0).data(), *to = b.value(1).data();
+    Tensor *gx = b.grad_of(0), *gt = b.grad_of(1);
+    real *px = gx ? gx->data() : nullptr, *pt = gt ? gt->data() : nullptr;
+    kernels::for_pieces(n, [=](Dim begin, Dim end) {
+      if (px)
+        for (Dim i = begin; i < end; ++i) px[i] += g * (from[i] - to[i]);
+      if (pt)
+        for (Dim i = begin; i < end; ++i) pt[i] -= g * (from[i] - to[i]);
+    });
+  });
+}
+
+Variable ssim(const Variable& x, const Tensor& target) {
+  check_rank("ssim", "x", x, 4);
+  if (target.shape() != x.shape()) {
+    refuse("ssim", "x and target must have the same shape, got " + x.shape().text() + " and " +
+                       target.shape().text());
+  }
+  if (x.dim(0) < 1 || x.dim(3) != 1 || std::min(x.dim(1), x.dim(2)) < kernels::kSmallestSsimImage) {
+    refuse("ssim", "x expects [N,H,W,1] with H, W >= 7, got " + x.shape().text());
+  }
+  const kernels::ImageSizes sizes{x.dim(0), x.dim(1), x.dim(2)};
+  const double value = kernels::ssim(sizes, x.value().data(), target.data());
+  return record("ssim", Tensor::full({}, static_cast<real>(value)), {&x}, [sizes, target](Backward& b) {
+    if (Tensor* gx = b.grad_of(0)) {
+      kernels::ssim_grad(sizes, b.gy().item(), b.value(0).data(), target.data(), gx->data());
+    }
+  });
+}
+
+// glogits[n,k] = g (softmax(logits[n])[k] - [k = label n]) / N
+Variable softmax_cross_entropy(const Variable& logits, std::span<const std::int32_t> labels) {
+  check_rank("softmax_cross_entropy", "logits", logits, 2);
+  const Dim rows = logits.dim(0), classes = logits.dim(1);
+  if (static_cast<Dim>(labels.size()) != rows || rows == 0) {
+    refuse("softmax_cross_entropy",
+           "labels expects " + std::to_string(rows) + " > 0 entries, got " + std::to_string(labels.size()));
+  }
+  Tensor gradient(logits.shape());  // softmax - one-hot, kept for the reverse step
+  double total = 0;
+  for (Dim n = 0; n < rows; ++n) {
+    const Dim label = labels[static_cast<std::size_t>(n)];
+    if (label < 0 || label >= classes) {
+      refuse("softmax_cross_entropy", "label " + std::to_string(label) + " of row " + std::to_string(n) +
+                                          " is not in [0," + std::to_string(classes) + ")");
+    }
+    const real* row = logits.value().data() + n * classes;
+    real* p = gradient.data() + n * classes;
+    const real largest = *std::max_element(row, row + classes);
+    double norm = 0;
+    for (Dim k = 0; k < classes; ++k)
+      norm += static_cast<double>(p[k] = kernels::exp_same_bits(row[k] - largest));
+    for (Dim k = 0; k < classes; ++k) p[k] = static_cast<real>(static_cast<double>(p[k]) / norm);
+    total += std::log(norm) - static_cast<double>(row[label] - largest);
+    p[label] -= 1;
+  }
+  const auto value = static_cast<real>(total / static_cast<double>(rows));
+  return record("softmax_cross_entropy", Tensor::full({}, value), {&logits}, [gradient, rows](Backward& b) {
+    if (Tensor* gx = b.grad_of(0)) {
+      const real g = b.gy().item() / static_cast<real>(rows);
+      for (Dim i = 0; i < gx->size(); ++i) gx->data()[i] += g * gradient.data()[i];
+    }
+  });
+}
+
+}  // namespace supertac

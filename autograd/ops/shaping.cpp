@@ -1,0 +1,132 @@
+#include "autograd/ops/shaping.h"
+
+#include <algorithm>
+#include <array>
+
+#include "autograd/checks.h"
+#include "autograd/kernels/elementwise.h"
+
+namespace supertac {
+namespace {
+
+Shape with_last(const Shape& shape, Dim last) {
+  std::array<Dim, kMaxRank> dims{};
+  for (int i = 0; i < shape.rank(); ++i) dims[static_cast<std::size_t>(i)] = shape[i];
+  dims[static_cast<std::size_t>(shape.rank() - 1)] = last;
+  return Shape(std::span<const Dim>(dims.data(), static_cast<std::size_t>(shape.rank())));
+}
+
+// to[r, to_at + i] (+)= from[r, from_at + i] for every row r and i < length
+struct Columns {
+  Dim width, at;
+};
+void copy_columns(Dim rows, Dim length, const real* from, Columns f, real* to, Columns t) {
+  for (Dim r = 0; r < rows; ++r) std::copy_n(from + r * f.width + f.at, length, to + r * t.width + t.at);
+}
+void add_columns(Dim rows, Dim length, const real* from, Columns f, real* to, Columns t) {
+  for (Dim r = 0; r < rows; ++r) {
+    for (Dim i = 0; i < length; ++i) to[r * t.width + t.at + i] += from[r * f.width + f.at + i];
+  }
+}
+
+// to[n, j, i] += from[n, i, j] (to is zero or holds a gradient)
+void add_transposed(Dim images, Dim rows, Dim columns, const real* from, real* to) {
+  for (Dim n = 0; n < images; ++n, from += rows * columns, to += rows * columns) {
+    for (Dim i = 0; i < rows; ++i) {
+      for (Dim j = 0; j < columns; ++j) to[j * rows + i] += from[i * columns + j];
+    }
+  }
+}
+
+Variable transpose_inner(const char* op, const Variable& x, Dim images, Dim rows, Dim columns,
+                         const Shape& shape) {
+  Tensor y = Tensor::zeros(shape);
+  add_transposed(images, rows, columns, x.value().data(), y.data());
+  return record(op, y, {&x}, [=](Backward& b) {
+    if (Tensor* gx = b.grad_of(0)) add_transposed(images, columns, rows, b.gy().data(), gx->data());
+  });
+}
+
+}  // namespace
+
+Variable reshape(const Variable& x, const Shape& shape) {
+  return record("reshape", x.value().reshaped(shape), {&x}, [](Backward& b) {
+    if (Tensor* gx = b.grad_of(0)) kernels::add_scaled(gx->size(), 1, b.gy().data(), gx->data());
+  });
+}
+
+Variable concat(std::span<const Variable> xs) {
+  if (xs.empty() || xs.size() > kMaxInputs) {
+    refuse("concat",
+           "takes 1 to " + std::to_string(kMaxInputs) + " inputs, got " + std::to_string(xs.size()));
+  }
+  if (xs[0].rank() < 1) refuse("concat", "x expects at least rank 1, got " + xs[0].shape().text());
+  std::array<const Variable*, kMaxInputs> inputs{};
+  Dim width = 0;
+  for (std::size_t i = 0; i < xs.size(); ++i) {
+    const Dim last = xs[i].rank() < 1 ? 0 : xs[i].dim(xs[i].rank() - 1);
+    check_shape("concat", ("x" + std::to_string(i)).c_str(), xs[i], with_last(xs[0].shape(), last));
+    inputs[i] = &xs[i];
+    width += last;
+  }
+  Tensor y(with_last(xs[0].shape(), width));
+  const Dim rows = width == 0 ? 0 : y.size() / width;
+  Dim at = 0;
+  for (const Variable& x : xs) {
+    const Dim last = x.dim(x.rank() - 1);
+    copy_columns(rows, last, x.value().data(), {last, 0}, y.data(), {width, at});
+    at += last;
+  }
+  return record("concat", y, std::span<const Variable* const>(inputs.data(), xs.size()),
+                [rows, width, count = xs.size()](Backward& b) {
+                  Dim from = 0;
+                  for (std::size_t i = 0; i < count; ++i) {
+                    const Shape& shape = b.value(i).shape();
+                    const Dim last = shape[shape.rank() - 1];
+                    if (Tensor* gx = b.grad_of(i)) {
+                      add_columns(rows, last, b.gy().data(), {width, from}, gx->data(), {last, 0});
+                    }
+                    from += last;
+                  }
+                });
+}
+
+Variable slice(const Variable& x, Dim begin, Dim length) {
+  if (x.rank() < 1) refuse("slice", "x expects at least rank 1, got " + x.shape().text());
+  const Dim width = x.dim(x.rank() - 1);
+  if (begin < 0 || length < 1 || begin > width - length) {
+    refuse("slice", "columns " + std::to_string(begin) + " to " + std::to_string(begin + length) +
+                        " leave x " + x.shape().text());
+  }
+  const Dim rows = x.size() / width;
+  Tensor y(with_last(x.shape(), length));
+  copy_columns(rows, length, x.value().data(), {width, begin}, y.data(), {length, 0});
+  return record("slice", y, {&x}, [=](Backward& b) {
+    if (Tensor* gx = b.grad_of(0)) {
+      add_columns(rows, length, b.gy().data(), {length, 0}, gx->data(), {width, begin});
+    }
+  });
+}
+
+Variable flatten_channels_first(const Variable& x) {
+  if (x.rank() < 3) refuse("flatten_channels_first", "x expects rank 3 or 4, got " + x.shape().text());
+  const Dim channels = x.dim(x.rank() - 1), images = x.dim(0);
+  const Dim pixels = x.rank() == 3 ? x.dim(1) : x.dim(1) * x.dim(2);
+  return transpose_inner("flatten_channels_first", x, images, pixels, channels, {images, channels * pixels});
+}
+
+Variable unflatten_channels_first(const Variable& x, std::span<const Dim> pixels) {
+  check_rank("unflatten_channels_first", "x", x, 2);
+  if (pixels.empty() || pixels.size() > 2) refuse("unflatten_channels_first", "pixels must be {L} or {H,W}");
+  const Dim count = pixels.size() == 1 ? pixels[0] : pixels[0] * pixels[1];
+  if (count < 1 || x.dim(1) % count != 0) {
+    refuse("unflatten_channels_first",
+           "x " + x.shape().text() + " does not divide into " + std::to_string(count) + " pixels");
+  }
+  const Dim images = x.dim(0), channels = x.dim(1) / count;
+  const Shape shape =
+      pixels.size() == 1 ? Shape{images, pixels[0], channels} : Shape{images, pixels[0], pixels[1], channels};
+  return transpose_inner("unflatten_channels_first", x, images, channels, count, shape);
+}
+
+}  // namespace supertac

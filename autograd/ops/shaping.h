@@ -1,0 +1,23 @@
+// Ops that move numbers without changing them.
+#pragma once
+
+#include <span>
+
+#include "autograd/variable.h"
+
+namespace supertac {
+
+/// The same numbers under another shape. Throws std::invalid_argument when the element counts differ.
+Variable reshape(const Variable& x, const Shape& shape);
+/// Joins along the last axis: [.., a], [.., b] -> [.., a + b]. Up to 8 inputs; all other axes must agree.
+Variable concat(std::span<const Variable> xs);
+/// y = x[..., begin : begin + length] along the last axis. Throws when the range leaves x.
+Variable slice(const Variable& x, Dim begin, Dim length);
+
+/// [N, P..., C] -> [N, C P]: the order in which PyTorch flattens [N,C,P...], so that the weights of the
+/// following linear layer mean the same there.
+Variable flatten_channels_first(const Variable& x);
+/// The inverse: [N, C P] -> [N, P..., C] with the given pixels, {L} or {H,W}.
+Variable unflatten_channels_first(const Variable& x, std::span<const Dim> pixels);
+
+}  // namespace supertac

@@ -1,0 +1,40 @@
+// Reused memory for tensors and graph nodes.
+//
+// A training step asks for the same few hundred buffers each time. Released blocks wait in a free
+// list of their size class and are handed out again, so that a warm step never calls the heap.
+// The lists belong to the calling thread: no locks, and a block may be released by another thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace supertac {
+
+/// Returns `bytes` rounded up to its size class, aligned to 64 bytes, contents undefined.
+/// Throws std::bad_alloc.
+void* pool_allocate(std::size_t bytes);
+
+/// Gives a block back; `bytes` is the number that was asked for.
+void pool_release(void* block, std::size_t bytes) noexcept;
+
+/// How many times this thread's pool has gone to the heap so far (a warm step adds none).
+std::uint64_t pool_heap_allocations();
+
+/// Scratch memory of one function: an array of trivial values from the pool, contents undefined.
+template <class T>
+class Scratch {
+ public:
+  explicit Scratch(std::size_t count)
+      : count_(count), data_(static_cast<T*>(pool_allocate(count * sizeof(T)))) {}
+  ~Scratch() { pool_release(data_, count_ * sizeof(T)); }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  T* data() { return data_; }
+  T& operator[](std::size_t i) { return data_[i]; }
+
+ private:
+  std::size_t count_;
+  T* data_;
+};
+
+}  // namespace supertac

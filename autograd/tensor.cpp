@@ -1,0 +1,120 @@
+#include "autograd/tensor.h"
+
+#include <algorithm>
+#include <new>
+#include <stdexcept>
+#include <utility>
+
+#include "autograd/pool.h"
+
+namespace supertac {
+
+namespace {
+constexpr Dim kMaxElements = Dim{1} << 40;
+constexpr std::size_t kHeader = 64;  // the buffer's header; the values start on the next cache line
+}  // namespace
+
+Shape::Shape(std::initializer_list<Dim> dims) : Shape(std::span<const Dim>(dims.begin(), dims.size())) {}
+
+Shape::Shape(std::span<const Dim> dims) {
+  if (dims.size() > kMaxRank) {
+    throw std::invalid_argument("Shape: at most 4 dimensions, got " + std::to_string(dims.size()));
+  }
+  Dim elements = 1;
+  for (const Dim dim : dims) {
+    if (dim < 0 || (dim > 0 && elements > kMaxElements / dim)) {
+      throw std::invalid_argument("Shape: dimension " + std::to_string(dim) + " is negative or too large");
+    }
+    elements *= dim;
+    dims_[static_cast<std::size_t>(rank_++)] = dim;
+  }
+}
+
+Dim Shape::elements() const {
+  Dim n = 1;
+  for (int i = 0; i < rank_; ++i) n *= (*this)[i];
+  return n;
+}
+
+std::string Shape::text() const {
+  std::string out = "[";
+  for (int i = 0; i < rank_; ++i) out += (i ? "," : "") + std::to_string((*this)[i]);
+  return out + "]";
+}
+
+Tensor::Tensor(const Shape& shape) : size_(shape.elements()), shape_(shape) {
+  const std::size_t bytes = kHeader + static_cast<std::size_t>(size_) * sizeof(real);
+  void* block = pool_allocate(bytes);
+  buffer_ = new (block) Buffer{{1}, bytes};
+  values_ = reinterpret_cast<real*>(static_cast<std::byte*>(block) + kHeader);
+}
+
+Tensor Tensor::full(const Shape& shape, real value) {
+  Tensor t(shape);
+  t.fill(value);
+  return t;
+}
+
+Tensor Tensor::of(const Shape& shape, std::span<const real> values) {
+  Tensor t(shape);
+  if (static_cast<Dim>(values.size()) != t.size()) {
+    throw std::invalid_argument("Tensor::of: shape " + shape.text() + " holds " + std::to_string(t.size()) +
+                                " values, got " + std::to_string(values.size()));
+  }
+  std::copy(values.begin(), values.end(), t.data());
+  return t;
+}
+
+Tensor::Tensor(const Tensor& other) noexcept
+    : buffer_(other.buffer_), values_(other.values_), size_(other.size_), shape_(other.shape_) {
+  if (buffer_ != nullptr) buffer_->users.fetch_add(1, std::memory_order_relaxed);
+}
+
+Tensor::Tensor(Tensor&& other) noexcept
+    : buffer_(std::exchange(other.buffer_, nullptr)),
+      values_(std::exchange(other.values_, nullptr)),
+      size_(std::exchange(other.size_, 0)),
+      shape_(std::exchange(other.shape_, Shape())) {}
+
+Tensor& Tensor::operator=(Tensor other) noexcept {
+  std::swap(buffer_, other.buffer_);
+  std::swap(values_, other.values_);
+  std::swap(size_, other.size_);
+  std::swap(shape_, other.shape_);
+  return *this;
+}
+
+Tensor::~Tensor() { release(); }
+
+void Tensor::release() noexcept {
+  if (buffer_ == nullptr) return;
+  if (buffer_->users.fetch_sub(1, std::memory_order_acq_rel) == 1) pool_release(buffer_, buffer_->bytes);
+  buffer_ = nullptr;
+}
+
+Tensor Tensor::clone() const {
+  if (!defined()) return {};
+  Tensor t(shape_);
+  std::copy_n(values_, size_, t.values_);
+  return t;
+}
+
+Tensor Tensor::reshaped(const Shape& shape) const {
+  if (shape.elements() != size_) {
+    throw std::invalid_argument("reshape: " + shape_.text() + " has " + std::to_string(size_) +
+                                " elements, the new shape " + shape.text() + " needs " +
+                                std::to_string(shape.elements()));
+  }
+  Tensor t(*this);
+  t.shape_ = shape;
+  return t;
+}
+
+void Tensor::fill(real value) { std::fill_n(values_, size_, value); }
+
+real Tensor::item() const {
+  if (size_ != 1) throw std::invalid_argument("item: expected one element, shape is " + shape_.text());
+  return values_[0];
+}
+
+}  // namespace supertac

@@ -1,0 +1,95 @@
+// Tensor: a contiguous, row-major array of at most four dimensions.
+//
+// A Tensor is a cheap handle to one buffer: copying it copies the handle, clone() the contents.
+// There are no strides and no views. Activations are channels-last, [N,L,C] or [N,H,W,C]: the
+// channels of one pixel lie side by side, which is what the convolution kernels read and write.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <initializer_list>
+#include <span>
+#include <string>
+
+namespace supertac {
+
+#ifdef SUPERTAC_REAL_IS_DOUBLE
+using real = double;  // the gradient checks compile the same sources in double precision
+#else
+using real = float;
+#endif
+
+using Dim = std::int64_t;
+inline constexpr int kMaxRank = 4;
+
+/// The sizes of a tensor's dimensions, outermost first. Rank 0 is a scalar with one element.
+class Shape {
+ public:
+  Shape() = default;
+  /// Throws std::invalid_argument for more than four dimensions, a negative one, or a product over 2^40.
+  Shape(std::initializer_list<Dim> dims);
+  explicit Shape(std::span<const Dim> dims);
+
+  int rank() const { return rank_; }
+  Dim operator[](int i) const { return dims_[static_cast<std::size_t>(i)]; }
+  Dim elements() const;
+  std::span<const Dim> dims() const { return {dims_.data(), static_cast<std::size_t>(rank_)}; }
+  /// "[4,16,16,32]"
+  std::string text() const;
+  bool operator==(const Shape& other) const { return rank_ == other.rank_ && dims_ == other.dims_; }
+
+ private:
+  std::array<Dim, kMaxRank> dims_{};
+  int rank_ = 0;
+};
+
+class Tensor {
+ public:
+  Tensor() = default;                   ///< no buffer; defined() is false
+  explicit Tensor(const Shape& shape);  ///< contents undefined
+  static Tensor full(const Shape& shape, real value);
+  static Tensor zeros(const Shape& shape) { return full(shape, 0); }
+  /// Throws std::invalid_argument unless the number of values fits the shape.
+  static Tensor of(const Shape& shape, std::span<const real> values);
+  static Tensor of(const Shape& shape, std::initializer_list<real> values) {
+    return of(shape, std::span<const real>(values.begin(), values.size()));
+  }
+
+  Tensor(const Tensor& other) noexcept;
+  Tensor(Tensor&& other) noexcept;
+  Tensor& operator=(Tensor other) noexcept;
+  ~Tensor();
+
+  bool defined() const { return buffer_ != nullptr; }
+  const Shape& shape() const { return shape_; }
+  int rank() const { return shape_.rank(); }
+  Dim dim(int i) const { return shape_[i]; }
+  Dim size() const { return size_; }
+
+  real* data() { return values_; }
+  const real* data() const { return values_; }
+  std::span<real> values() { return {values_, static_cast<std::size_t>(size_)}; }
+  std::span<const real> values() const { return {values_, static_cast<std::size_t>(size_)}; }
+
+  Tensor clone() const;
+  /// The same buffer under another shape. Throws std::invalid_argument when the element counts differ.
+  Tensor reshaped(const Shape& shape) const;
+  void fill(real value);
+  /// The only element. Throws std::invalid_argument for any other size.
+  real item() const;
+
+ private:
+  struct Buffer {
+    std::atomic<std::int32_t> users;
+    std::size_t bytes;
+  };
+  void release() noexcept;
+
+  Buffer* buffer_ = nullptr;
+  real* values_ = nullptr;
+  Dim size_ = 0;
+  Shape shape_;
+};
+
+}  // namespace supertac
