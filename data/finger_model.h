@@ -1,0 +1,109 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "data/plate.h"
+#include "data/recording.h"
+
+namespace supertac {
+
+/// What the simulated sensor does to the scene. Every term has a switch (with_...); the other numbers say how
+/// strong it is. Defaults resemble the rig's recordings; data/README.md shows what each term changes.
+struct SimulatorSettings {
+  double rate_hz = 300;
+  double indentation_mm = 0.35;  ///< how far the slide's path lies below first contact with the flat plate
+  double volts_per_load = 0.8;  ///< drop of a taxel of gain 1 under unit load; load = indentation^1.5 (mm)
+
+  bool with_mount = true;      ///< the finger gives way: a bump under one row lifts the other rows
+  double mount_stiffness = 2;  ///< unit loads per mm
+  bool with_pad = true;        ///< the elastic pad spreads a point of the surface
+  double pad_sigma_mm = 1.3;
+  bool with_edges = true;  ///< beside the plate there is nothing to touch
+  bool with_tilt = true;   ///< the finger's rear rows ride lower
+  double tilt_mm_per_mm = 0.02, tilt_spread = 0.01;
+  bool with_gains = true;      ///< taxels differ: the outer columns feel most
+  bool with_variation = true;  ///< gain and indentation differ from trial to trial and pass to pass
+  double gain_spread = 0.15, indentation_spread_mm = 0.06;
+  bool with_crosstalk = true;  ///< share of a taxel's load that its neighbours feel
+  double crosstalk = 0.06;
+  bool with_vibration = true;  ///< of the printer, in z
+  double vibration_mm = 0.01, vibration_hz = 28;
+  bool with_drift = true;  ///< of the rest voltages
+  double drift_volts_per_s = 4e-4;
+  bool with_emi = true;  ///< mains
+  double emi_volts = 1e-3, emi_hz = 50;
+  bool with_noise = true;
+  double noise_volts = 1e-3;
+
+  bool with_adc = true;     ///< 12 bit, 3.3 V
+  bool with_filter = true;  ///< moving average over 100 samples of the board
+  double filter_s = 0.0992;
+  bool with_saturation = true;  ///< recordings are cut to [2.091, 2.46] V
+  bool with_jitter = true;      ///< a sample is taken a little off the time it is stamped with
+  double jitter_s = 2e-4;
+  bool with_loss = true;
+  double lost_fraction = 0.002;
+};
+
+/// Names of the terms ("mount", "pad", ... "loss"), and the settings with one of them switched off.
+/// @throws std::invalid_argument for an unknown term, listing the known ones.
+const std::vector<std::string>& simulator_terms();
+SimulatorSettings without_term(SimulatorSettings settings, const std::string& term);
+
+/// Where the finger's centre is; z_mm = 0 is first contact with the flat plate, negative is pressed.
+struct FingerPose {
+  double x_mm = 0, y_mm = 0, z_mm = 0;
+};
+
+/// Which sensor, on which day: the same identity gives the same finger.
+struct FingerIdentity {
+  uint64_t seed = 1;
+  int trial = 1, pass = 1;
+  double speed_mm_s = 10;
+};
+
+/// The finger's 16 voltages over a plate: contact of an elastic pad on a yielding mount, then the sensor. A
+/// pure function of pose and time, used alike by the simulator and by the virtual rig.
+///
+/// For taxel k at (x_k, y_k): d_k = surface(x + x_k, y + y_k) + tilt_k - z - lift, load_k = max(d_k, 0)^1.5
+/// (Hertz), stiffness * lift = sum_k load_k, V_k = rest_k - volts_per_load * gain_k * load_k + disturbances.
+/// `surface` is the plate's height averaged by the pad.
+class FingerModel {
+ public:
+  FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& identity);
+
+  /// Voltages before ADC, filter and saturation.
+  std::array<double, kTaxels> volts(const FingerPose& pose, double time_s) const;
+
+  /// Load on every taxel (mm^1.5): what `volts` senses, without gains and disturbances.
+  std::array<double, kTaxels> loads(const FingerPose& pose) const;
+
+  /// This pass's path height during the slide: minus the indentation.
+  double slide_z_mm() const { return -indentation_mm_; }
+
+  /// Random stream of this pass, for whatever else happens to it.
+  uint64_t noise_stream() const { return noise_stream_; }
+
+  /// A voltage as the board's 12-bit converter reports it (0..4095), and back.
+  static int adc(double volts);
+  static double volts_of_adc(int code);
+
+ private:
+  double surface(double x_mm, double y_mm) const;
+  void average_surface();
+
+  SimulatorSettings settings_;
+  uint64_t noise_seed_ = 0, noise_stream_ = 0;
+  std::array<double, kTaxels> gain_{}, rest_{}, drift_{}, tilt_{};
+  double indentation_mm_ = 0, vibration_phase_ = 0, emi_phase_ = 0;
+  std::vector<double> map_;  // surface on a grid, x fastest
+};
+
+/// Position of taxel k from the finger's centre (mm): x = -4.5 + 3 (k % 4), y = -4.5 + 3 (k / 4).
+constexpr double taxel_x_mm(int k) { return -4.5 + 3.0 * (k % 4); }
+constexpr double taxel_y_mm(int k) { return -4.5 + 3.0 * (k / 4); }
+
+}  // namespace supertac
