@@ -1,0 +1,148 @@
+#include "data/images.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <numbers>
+#include <stdexcept>
+
+#include "io/file.h"
+
+#define STB_IMAGE_WRITE_STATIC
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#define STBI_WRITE_NO_STDIO
+#include <stb/stb_image_write.h>
+
+namespace supertac {
+namespace {
+
+constexpr int kMapSize = 256;
+constexpr int kFrameSide = 4;
+
+uint8_t srgb_byte(double linear) {
+  const double v = std::clamp(linear, 0.0, 1.0);
+  const double encoded = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
+  return static_cast<uint8_t>(std::lround(255 * encoded));
+}
+
+Rgb rgb_of_oklab(double lightness, double a, double b) {
+  const double l = lightness + 0.3963377774 * a + 0.2158037573 * b;
+  const double m = lightness - 0.1055613458 * a - 0.0638541728 * b;
+  const double s = lightness - 0.0894841775 * a - 1.2914855480 * b;
+  const double l3 = l * l * l, m3 = m * m * m, s3 = s * s * s;
+  return {srgb_byte(4.0767416621 * l3 - 3.3077115913 * m3 + 0.2309699292 * s3),
+          srgb_byte(-1.2684380046 * l3 + 2.6097574011 * m3 - 0.3413193965 * s3),
+          srgb_byte(-0.0041960863 * l3 - 0.7034186147 * m3 + 1.7076147010 * s3)};
+}
+
+// Hue runs from blue (285 degrees) to yellow (105); the chroma stays inside the colours a screen can show.
+std::array<Rgb, kMapSize> make_map() {
+  std::array<Rgb, kMapSize> map;
+  for (int i = 0; i < kMapSize; ++i) {
+    const double t = i / (kMapSize - 1.0);
+    const double hue = (285 - 180 * t) * std::numbers::pi / 180;
+    const double chroma = 0.10 + 0.02 * std::cos(2 * std::numbers::pi * t);
+    map[static_cast<size_t>(i)] =
+        rgb_of_oklab(0.22 + 0.74 * t, chroma * std::cos(hue), chroma * std::sin(hue));
+  }
+  return map;
+}
+
+void append(void* context, void* data, int size) {
+  auto* out = static_cast<std::vector<std::byte>*>(context);
+  const auto* bytes = static_cast<const std::byte*>(data);
+  out->insert(out->end(), bytes, bytes + size);
+}
+
+int gap_of(int side) { return std::max(1, side / 16); }
+
+void check_strips(const char* where, std::span<const Strip> strips, int size, int side) {
+  if (strips.empty()) throw std::invalid_argument(std::string(where) + ": there is no window to draw");
+  if (size < 1 || side < size)
+    throw std::invalid_argument(std::string(where) + ": size must be at least 1 and at most the side of " +
+                                std::to_string(side) + " pixels, got " + std::to_string(size));
+}
+
+// The three panels of a strip, each (step_x, step_y) further than the one before.
+void draw_strip(Picture& picture, const Strip& strip, int size, int side, int left, int top, int step_x,
+                int step_y) {
+  draw_panel(picture, left, top, side, strip.input, kFrameSide, kFrameSide);
+  draw_panel(picture, left + step_x, top + step_y, side, strip.output, size, size);
+  draw_panel(picture, left + 2 * step_x, top + 2 * step_y, side, strip.truth, size, size);
+}
+
+}  // namespace
+
+Rgb colour_of(float value) {
+  static const std::array<Rgb, kMapSize> map = make_map();
+  if (std::isnan(value)) return {255, 0, 0};
+  return map[static_cast<size_t>(std::lround(std::clamp(value, 0.0F, 1.0F) * (kMapSize - 1)))];
+}
+
+Picture::Picture(int w, int h, Rgb background) : width(w), height(h) {
+  constexpr int kMax = 65535;
+  if (w < 1 || h < 1 || w > kMax || h > kMax)
+    throw std::invalid_argument("picture: sides must be 1 to 65535 pixels, got " + std::to_string(w) + " x " +
+                                std::to_string(h) + "; draw fewer windows or smaller panels");
+  rgb.resize(static_cast<size_t>(w) * static_cast<size_t>(h) * 3);
+  for (size_t i = 0; i < rgb.size(); ++i) rgb[i] = background[i % 3];
+}
+
+Rgb Picture::at(int x, int y) const {
+  const size_t i = (static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)) * 3;
+  return {rgb.at(i), rgb.at(i + 1), rgb.at(i + 2)};
+}
+
+void Picture::set(int x, int y, Rgb colour) {
+  const size_t i = (static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)) * 3;
+  for (size_t c = 0; c < 3; ++c) rgb.at(i + c) = colour[c];
+}
+
+void draw_panel(Picture& picture, int left, int top, int side, std::span<const float> values, int rows,
+                int cols) {
+  if (rows < 1 || cols < 1 || values.size() != static_cast<size_t>(rows) * static_cast<size_t>(cols))
+    throw std::invalid_argument("draw_panel: expects " + std::to_string(rows) + " x " + std::to_string(cols) +
+                                " values, got " + std::to_string(values.size()));
+  if (side < 1 || left < 0 || top < 0 || left + side > picture.width || top + side > picture.height)
+    throw std::invalid_argument("draw_panel: a panel of " + std::to_string(side) + " pixels at (" +
+                                std::to_string(left) + ", " + std::to_string(top) +
+                                ") leaves the picture of " + std::to_string(picture.width) + " x " +
+                                std::to_string(picture.height));
+  for (int y = 0; y < side; ++y) {
+    const int row = rows - 1 - y * rows / side;
+    for (int x = 0; x < side; ++x)
+      picture.set(left + x, top + y, colour_of(values[static_cast<size_t>(row * cols + x * cols / side)]));
+  }
+}
+
+Picture strip_picture(std::span<const Strip> strips, int size, int side) {
+  check_strips("strip_picture", strips, size, side);
+  const int gap = gap_of(side), count = static_cast<int>(strips.size());
+  Picture picture(3 * side + 4 * gap, count * (side + gap) + gap);
+  for (int i = 0; i < count; ++i)
+    draw_strip(picture, strips[static_cast<size_t>(i)], size, side, gap, gap + i * (side + gap), side + gap,
+               0);
+  return picture;
+}
+
+Picture film_picture(std::span<const Strip> strips, int size, int side) {
+  check_strips("film_picture", strips, size, side);
+  const int gap = gap_of(side), count = static_cast<int>(strips.size());
+  Picture picture(count * (side + gap) + gap, 3 * side + 4 * gap);
+  for (int i = 0; i < count; ++i)
+    draw_strip(picture, strips[static_cast<size_t>(i)], size, side, gap + i * (side + gap), gap, 0,
+               side + gap);
+  return picture;
+}
+
+std::vector<std::byte> encode_png(const Picture& picture) {
+  std::vector<std::byte> out;
+  const int ok = stbi_write_png_to_func(append, &out, picture.width, picture.height, 3, picture.rgb.data(),
+                                        picture.width * 3);
+  if (ok == 0) throw std::bad_alloc();  // the encoder has no other way to fail
+  return out;
+}
+
+void write_png(const std::string& path, const Picture& picture) { write_file(path, encode_png(picture)); }
+
+}  // namespace supertac

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace supertac {
+
+using Rgb = std::array<uint8_t, 3>;
+
+/// Perceptual colour map for values 0..1 (others are clipped; not a number is red): dark blue over teal and
+/// green to pale yellow. A path in Oklab (Ottosson 2020) whose lightness grows evenly from .22 to .96, so
+/// that equal steps of height look equally large and a grey print keeps their order.
+Rgb colour_of(float value);
+
+/// 8-bit RGB pixels, rows from the top, [height][width][3].
+struct Picture {
+  int width = 0, height = 0;
+  std::vector<uint8_t> rgb;
+
+  /// A picture of one colour. @throws std::invalid_argument unless both sides are 1..65535.
+  Picture(int width, int height, Rgb background = {255, 255, 255});
+  Rgb at(int x, int y) const;
+  void set(int x, int y, Rgb colour);
+};
+
+/// Draws values [rows][cols] into the square of `side` pixels at (left, top), y upwards: row 0, the smallest
+/// y, is at the bottom. Pixels are enlarged without smoothing.
+/// @throws std::invalid_argument when values is not rows * cols or the square leaves the picture.
+void draw_panel(Picture& picture, int left, int top, int side, std::span<const float> values, int rows,
+                int cols);
+
+/// What one window looks like. 4x4 frame: taxel k is row k / 4 (grows with y), column k % 4 (grows with x).
+struct Strip {
+  std::span<const float> input;   ///< [4][4], the window's last frame
+  std::span<const float> output;  ///< [size][size]
+  std::span<const float> truth;   ///< [size][size]
+};
+
+/// One line per strip: input | output | truth. Panels of `side` pixels with gaps of side / 16 (at least 1).
+/// @throws std::invalid_argument when there is no strip or a size is wrong.
+Picture strip_picture(std::span<const Strip> strips, int size, int side = 128);
+
+/// A whole pass as a film: one column per strip, in the order given; input above output above truth.
+/// @throws as strip_picture.
+Picture film_picture(std::span<const Strip> strips, int size, int side = 64);
+
+/// The picture as a PNG file's bytes.
+std::vector<std::byte> encode_png(const Picture& picture);
+
+/// Writes a PNG atomically. @throws FileError naming the path.
+void write_png(const std::string& path, const Picture& picture);
+
+}  // namespace supertac

@@ -1,0 +1,121 @@
+#include "data/augment.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace supertac {
+namespace {
+
+constexpr size_t kFrames = 256;
+
+std::vector<float> changed(const AugmentSettings& settings, uint64_t sample, float level = 0.5F) {
+  std::vector<float> window(kFrames * 16, level);
+  augment(settings, 1, sample, window);
+  return window;
+}
+
+// Highest and lowest value over taxels and samples 0..199 of frame 0.
+std::pair<float, float> range(const AugmentSettings& settings, float level) {
+  float low = 1, high = 0;
+  for (uint64_t sample = 0; sample < 200; ++sample) {
+    const auto window = changed(settings, sample, level);
+    low = std::min(low, *std::min_element(window.begin(), window.end()));
+    high = std::max(high, *std::max_element(window.begin(), window.end()));
+  }
+  return {low, high};
+}
+
+TEST(Augment, OffChangesNothing) { EXPECT_EQ(changed({}, 3), std::vector<float>(kFrames * 16, 0.5F)); }
+
+TEST(Augment, GainIsOneFactorPerWindow) {
+  const AugmentSettings settings{.gain = 0.5};
+  const auto window = changed(settings, 3);
+  EXPECT_EQ(*std::min_element(window.begin(), window.end()), *std::max_element(window.begin(), window.end()));
+  EXPECT_NE(window, changed(settings, 4));
+  const auto [low, high] = range(settings, 0.6F);
+  EXPECT_NEAR(low, 0.6 / 1.5, 0.01);
+  EXPECT_NEAR(high, 0.9, 0.01);
+}
+
+TEST(Augment, TaxelGainAndOffsetAreConstantInTime) {
+  for (const AugmentSettings& settings :
+       {AugmentSettings{.taxel_gain = 0.2}, AugmentSettings{.offset = 0.1}}) {
+    const auto window = changed(settings, 3);
+    std::set<float> values(window.begin(), window.begin() + 16);
+    EXPECT_EQ(values.size(), 16U);
+    for (size_t i = 16; i < window.size(); ++i) ASSERT_EQ(window[i], window[i - 16]);
+  }
+  const auto [low, high] = range({.offset = 0.1}, 0.5F);
+  EXPECT_NEAR(low, 0.4, 1e-3);
+  EXPECT_NEAR(high, 0.6, 1e-3);
+}
+
+TEST(Augment, DropsNoneToAllAllowedTaxelsEquallyOften) {
+  int seen[4] = {};
+  for (uint64_t sample = 0; sample < 4000; ++sample) {
+    const auto window = changed({.dropped = 3}, sample);
+    const auto zeros = std::count(window.begin(), window.begin() + 16, 0.0F);
+    ASSERT_LE(zeros, 3);
+    ASSERT_EQ(std::count(window.begin(), window.end(), 0.0F), zeros * static_cast<long>(kFrames));
+    ++seen[zeros];
+  }
+  for (const int count : seen) EXPECT_NEAR(count, 1000, 120);
+}
+
+TEST(Augment, EveryTaxelIsDroppedEquallyOften) {
+  std::vector<int> seen(16);
+  for (uint64_t sample = 0; sample < 8000; ++sample) {
+    const auto window = changed({.dropped = 3}, sample);
+    for (size_t k = 0; k < 16; ++k) seen[k] += window[k] == 0 ? 1 : 0;
+  }
+  for (const int count : seen) EXPECT_NEAR(count, 8000 * 1.5 / 16, 120);
+}
+
+TEST(Augment, NoiseHasTheStatedDeviationAndNoMemory) {
+  const auto window = changed({.noise = 0.05}, 3);
+  double sum = 0, squares = 0, product = 0;
+  for (size_t i = 0; i < window.size(); ++i) {
+    const double v = window[i] - 0.5;
+    sum += v;
+    squares += v * v;
+    if (i >= 16) product += v * (window[i - 16] - 0.5);
+  }
+  const auto n = static_cast<double>(window.size());
+  EXPECT_NEAR(sum / n, 0, 4 * 0.05 / std::sqrt(n));
+  EXPECT_NEAR(std::sqrt(squares / n), 0.05, 0.002);
+  EXPECT_NEAR(product / squares, 0, 4 / std::sqrt(n));
+}
+
+TEST(Augment, IsAPureFunctionOfSeedAndSample) {
+  const AugmentSettings settings{.gain = 0.3, .taxel_gain = 0.1, .offset = 0.05, .noise = 0.02, .dropped = 2};
+  EXPECT_EQ(changed(settings, 3), changed(settings, 3));
+  EXPECT_NE(changed(settings, 3), changed(settings, 4));
+  std::vector<float> other(kFrames * 16, 0.5F);
+  augment(settings, 2, 3, other);
+  EXPECT_NE(other, changed(settings, 3));
+}
+
+TEST(Augment, StaysInRange) {
+  const auto [low, high] = range({.gain = 3, .taxel_gain = 1, .offset = 0.5, .noise = 1}, 0.7F);
+  EXPECT_EQ(low, 0);
+  EXPECT_EQ(high, 1);
+}
+
+TEST(Augment, RefusesNegativeMagnitudes) {
+  for (const AugmentSettings& settings :
+       {AugmentSettings{.gain = -1}, AugmentSettings{.noise = std::numeric_limits<double>::quiet_NaN()},
+        AugmentSettings{.dropped = 17}, AugmentSettings{.dropped = -1}})
+    EXPECT_THROW(check(settings), std::invalid_argument);
+  std::vector<float> window(17);
+  EXPECT_THROW(augment({.gain = 1}, 1, 1, window), std::invalid_argument);
+  EXPECT_NO_THROW(check(AugmentSettings{}));
+}
+
+}  // namespace
+}  // namespace supertac
