@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "data/recording.h"
+
+namespace supertac {
+
+/// What was found in a text recording. lines = frames + malformed() + non_finite + out_of_range + empty.
+struct ImportReport {
+  size_t lines = 0;        ///< lines in the file
+  size_t frames = 0;       ///< lines kept
+  size_t too_few = 0;      ///< lines with fewer than 16 columns (a line cut by another)
+  size_t too_many = 0;     ///< lines with more (lines glued together)
+  size_t not_numeric = 0;  ///< 16 columns, one of which is no number (two numbers run into one, letters, NUL)
+  size_t non_finite = 0;   ///< 16 numbers, one of them nan or inf
+  size_t out_of_range = 0;  ///< 16 numbers, one outside of the ADC's 0..3.3 V
+  size_t empty = 0;         ///< blank lines
+
+  size_t malformed() const { return too_few + too_many + not_numeric; }
+};
+
+/// Nominal frame rate of an imported pass (Hz): the rig's text files have some 9,400 lines for the 11.8 s
+/// that a slide of 108 mm takes at 10 mm/s, about a fifth fewer than the board's 1008 Hz.
+constexpr double kImportRateHz = 800;
+
+/// Reads a text recording: one frame per line, 16 columns of volts, taxel 0 to 15, separated by spaces, tabs
+/// or commas. Lines that are not such a frame are dropped and counted, never repaired: a short line and the
+/// rest of it on another cannot be told from halves of different frames.
+///
+/// The files have no time stamps. Frame i, counted over *all* non-blank lines so that a dropped line leaves a
+/// gap, gets i / kImportRateHz; metadata "time_base" is "nominal" until a registration replaces it. Positions
+/// are unknown. plate, trial, pass are left for the caller; source is "imported".
+/// @throws FileError when the file cannot be read, is empty or over 64 MiB, or more than a tenth of its lines
+/// are not frames: then it is another kind of file. The report is filled in that case too.
+Recording import_text_pass(const std::string& path, ImportReport& report);
+
+}  // namespace supertac

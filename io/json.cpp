@@ -1,0 +1,111 @@
+#include "io/json.h"
+
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "io/text.h"
+
+namespace supertac {
+namespace {
+
+using Tree = nlohmann::ordered_json;
+
+// Builds the tree and counts while doing so.
+class TreeBuilder : public JsonHandler {
+ public:
+  explicit TreeBuilder(const JsonLimits& limits) : limits_(limits) {}
+  Tree take() { return std::move(root_); }
+
+  bool null() override { return add(nullptr); }
+  bool boolean(bool value) override { return add(value); }
+  bool number_integer(int64_t value) override { return add(value); }
+  bool number_unsigned(uint64_t value) override { return add(value); }
+  bool number_float(double value, const std::string&) override { return add(value); }
+  bool string(std::string& value) override { return add(std::move(value)); }
+  bool start_object(size_t) override { return open(Tree::object()); }
+  bool start_array(size_t) override { return open(Tree::array()); }
+  bool end_object() override { return close(); }
+  bool end_array() override { return close(); }
+
+  bool key(std::string& name) override {
+    Level& level = levels_.back();
+    if (!level.keys.insert(name).second) return refuse("the key " + in_quotes(name) + " appears twice");
+    level.key = name;
+    return count();
+  }
+
+ private:
+  struct Level {
+    Tree* node;
+    std::string key;             // of the next value, in an object
+    std::set<std::string> keys;  // so far: ordered_json itself would search linearly for each
+  };
+
+  bool count() {
+    if (++values_ <= limits_.max_values) return true;
+    return refuse("more than " + std::to_string(limits_.max_values) + " values");
+  }
+
+  Tree* place(Tree value) {
+    if (levels_.empty()) return &(root_ = std::move(value));
+    Level& level = levels_.back();
+    if (level.node->is_array()) return &level.node->emplace_back(std::move(value));
+    // Appended to the vector behind the map, past its linear search: the key has been seen to be new.
+    Tree::object_t::Container& pairs = level.node->get_ref<Tree::object_t&>();
+    return &pairs.emplace_back(level.key, std::move(value)).second;
+  }
+
+  bool add(Tree value) {
+    place(std::move(value));
+    return count();
+  }
+
+  bool open(Tree value) {
+    if (levels_.size() == limits_.max_depth) {
+      return refuse("nested deeper than " + std::to_string(limits_.max_depth) + " levels");
+    }
+    // The pointer stays valid: the parent does not grow before this level is closed.
+    levels_.push_back({place(std::move(value)), {}, {}});
+    return count();
+  }
+
+  bool close() {
+    levels_.pop_back();
+    return true;
+  }
+
+  JsonLimits limits_;
+  Tree root_;
+  std::vector<Level> levels_;
+  size_t values_ = 0;
+};
+
+}  // namespace
+
+bool JsonHandler::refuse(const std::string& why) {
+  if (problem_.empty()) problem_ = why;
+  return false;
+}
+
+bool JsonHandler::parse_error(size_t position, const std::string&, const nlohmann::json::exception& error) {
+  if (error.id == 406) return refuse("a number is out of range");
+  return refuse("not valid JSON at byte " + std::to_string(position));
+}
+
+void parse_json(std::string_view text, JsonHandler& handler) {
+  if (text.find('\0') != std::string_view::npos) throw JsonError("not valid JSON: holds a NUL byte");
+  if (!nlohmann::json::sax_parse(text.begin(), text.end(), &handler)) throw JsonError(handler.problem());
+}
+
+nlohmann::ordered_json parse_json_limited(std::string_view text, const JsonLimits& limits) {
+  if (text.size() > limits.max_bytes) {
+    throw JsonError("has " + std::to_string(text.size()) + " bytes, expected at most " +
+                    std::to_string(limits.max_bytes));
+  }
+  TreeBuilder builder(limits);
+  parse_json(text, builder);
+  return builder.take();
+}
+
+}  // namespace supertac

@@ -1,0 +1,29 @@
+// The few operating-system calls that reading and writing files needs, in one table, so that a test can make
+// the N-th of them fail. Everything in io/ goes through this table and calls nothing else on a file.
+#pragma once
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <sys/types.h>
+
+namespace supertac {
+
+// Same arguments, results and errno as the POSIX calls of these names.
+struct SystemCalls {
+  int (*open)(const char* path, int flags, mode_t mode);
+  int (*fstat)(int file, struct stat* status);
+  ssize_t (*read)(int file, void* bytes, size_t count);
+  ssize_t (*write)(int file, const void* bytes, size_t count);
+  int (*fsync)(int file);
+  int (*close)(int file);
+  int (*rename)(const char* from, const char* to);
+  int (*unlink)(const char* path);
+};
+
+// The real calls.
+SystemCalls real_system_calls();
+
+// The table in use. Replaced by tests only; not to be changed while another thread uses files.
+SystemCalls& system_calls();
+
+}  // namespace supertac
