@@ -4,10 +4,28 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "autograd/kernels/clones.h"
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/parallel.h"
 
 namespace supertac {
+namespace {
+
+struct Update {
+  real clip, b1, b2, rate, correction, epsilon;
+};
+
+SUPERTAC_CLONES void update_loop(Dim n, Update u, const real* gradient, real* __restrict x,
+                                 real* __restrict m, real* __restrict v) {
+  for (Dim i = 0; i < n; ++i) {
+    const real g = u.clip * gradient[i];
+    m[i] = u.b1 * m[i] + (1 - u.b1) * g;
+    v[i] = u.b2 * v[i] + (1 - u.b2) * g * g;
+    x[i] -= u.rate * m[i] / (std::sqrt(v[i]) * u.correction + u.epsilon);
+  }
+}
+
+}  // namespace
 
 Adam::Adam(std::vector<Variable> parameters, const AdamOptions& options)
     : parameters_(std::move(parameters)), options_(options) {
@@ -36,23 +54,18 @@ double Adam::step() {
   if (!std::isfinite(norm)) return norm;
   ++steps_;
   const double factor = options_.clip_norm > 0 && norm > options_.clip_norm ? options_.clip_norm / norm : 1;
-  const auto clip = static_cast<real>(factor);
-  const auto b1 = static_cast<real>(options_.beta1), b2 = static_cast<real>(options_.beta2);
   const double t = static_cast<double>(steps_);
-  const auto rate = static_cast<real>(options_.learning_rate / (1 - std::pow(options_.beta1, t)));
-  const auto correction = static_cast<real>(1 / std::sqrt(1 - std::pow(options_.beta2, t)));
-  const auto epsilon = static_cast<real>(options_.epsilon);
+  const Update u{static_cast<real>(factor),
+                 static_cast<real>(options_.beta1),
+                 static_cast<real>(options_.beta2),
+                 static_cast<real>(options_.learning_rate / (1 - std::pow(options_.beta1, t))),
+                 static_cast<real>(1 / std::sqrt(1 - std::pow(options_.beta2, t))),
+                 static_cast<real>(options_.epsilon)};
   for (std::size_t k = 0; k < parameters_.size(); ++k) {
     const real* gradient = parameters_[k].grad().data();
     real *x = parameters_[k].mutable_value().data(), *m = m_[k].data(), *v = v_[k].data();
-    kernels::for_pieces(parameters_[k].size(), [=](Dim begin, Dim end) {
-      for (Dim i = begin; i < end; ++i) {
-        const real g = clip * gradient[i];
-        m[i] = b1 * m[i] + (1 - b1) * g;
-        v[i] = b2 * v[i] + (1 - b2) * g * g;
-        x[i] -= rate * m[i] / (std::sqrt(v[i]) * correction + epsilon);
-      }
-    });
+    kernels::for_pieces(parameters_[k].size(),
+                        [=](Dim i, Dim end) { update_loop(end - i, u, gradient + i, x + i, m + i, v + i); });
   }
   return norm;
 }

@@ -1,10 +1,11 @@
 # Shared rules of all targets: warnings, sanitizers, reproducible floating point.
 
 add_library(supertac_options INTERFACE)
+# -Wno-restrict: GCC 12 warns about its own std::string.
 # -ffp-contract=off: a product and a sum are only fused where the source says so, so that every
 # instruction set gives the same bits.
 target_compile_options(supertac_options INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor
-  -ffp-contract=off -fno-math-errno $<$<BOOL:${SUPERTAC_WERROR}>:-Werror>)
+  -Wno-restrict -ffp-contract=off -fno-math-errno -fno-trapping-math $<$<BOOL:${SUPERTAC_WERROR}>:-Werror>)
 if(SUPERTAC_SANITIZE)
   target_compile_options(supertac_options INTERFACE -fsanitize=${SUPERTAC_SANITIZE} -fno-omit-frame-pointer
     -fno-sanitize-recover=all)

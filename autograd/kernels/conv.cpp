@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "autograd/kernels/isa.h"
+#include "autograd/kernels/narrow.h"
 
 namespace supertac::kernels {
 namespace {
@@ -44,17 +45,20 @@ void gather_rows_batch(const GatherJob& job, Dim rows, const real* x, real* y) {
 }  // namespace
 
 void conv(const ConvSizes& s, const real* x, const real* w, const real* bias, real* y) {
+  if (is_narrow(s)) return narrow_conv(s, x, w, bias, y);
   const GatherJob job{&s.geometry->forward, w, bias, s.cin, s.cout, false};
   gather_batch(job, s.images, s.geometry->in_pixels, s.geometry->out_pixels, s.geometry->taps, x, y);
 }
 
 void conv_grad_x(const ConvSizes& s, const real* gy, const real* w, real* gx) {
+  if (is_narrow(s)) return narrow_grad_x(s, gy, w, gx);
   const Tensor wt = transposed_weights(w, s.geometry->taps, s.cin, s.cout);
   const GatherJob job{&s.geometry->backward, wt.data(), nullptr, s.cout, s.cin, true};
   gather_batch(job, s.images, s.geometry->out_pixels, s.geometry->in_pixels, s.geometry->taps, gy, gx);
 }
 
 void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, real* gw) {
+  if (is_narrow(s)) return narrow_grad_w(s, x, gy, gw);
   const auto outer = isa_kernels().outer;
   const Geometry& g = *s.geometry;
   const Dim blocks = (s.cin + kOuterRows - 1) / kOuterRows;

@@ -1,0 +1,20 @@
+// Convolutions with few outputs (the picture's single channel, a decoder's four taxels).
+//
+// The gather kernel puts output channels side by side in a vector; with one channel it would leave 15 of 16
+// lanes empty. Here taps and output channels together fill the vector:
+//   z[p, t, o] = sum over cin of x[p, :] * w[t, :, o]        one matrix product
+//   y[q, o]    = bias[o] + sum over taps t of z[source(t, q), t, o]
+#pragma once
+
+#include "autograd/kernels/conv.h"
+
+namespace supertac::kernels {
+
+/// Whether conv() and its gradients take this way: a question of shapes only, so that all processors agree.
+bool is_narrow(const ConvSizes& sizes);
+
+void narrow_conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias, real* y);
+void narrow_grad_x(const ConvSizes& sizes, const real* gy, const real* w, real* gx);
+void narrow_grad_w(const ConvSizes& sizes, const real* x, const real* gy, real* gw);
+
+}  // namespace supertac::kernels

@@ -1,0 +1,159 @@
+#include "layers/checkpoint.h"
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <stdexcept>
+
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+using Axes = std::vector<int>;
+
+// file axis i = memory axis axes[i]; pointwise is handled as linear with two axes of length 1 behind.
+Axes file_axes(const Parameter& p) {
+  const int rank = p.value.rank();
+  if (p.layout == Layout::plain) {
+    Axes same(static_cast<std::size_t>(rank));
+    for (int i = 0; i < rank; ++i) same[static_cast<std::size_t>(i)] = i;
+    return same;
+  }
+  const bool input_first = p.layout == Layout::conv_transpose;
+  Axes axes{rank - (input_first ? 2 : 1), rank - (input_first ? 1 : 2)};
+  for (int i = 0; i < rank - 2; ++i) axes.push_back(i);
+  return axes;
+}
+
+std::vector<std::uint64_t> file_shape(const Parameter& p) {
+  std::vector<std::uint64_t> shape;
+  for (const int axis : file_axes(p)) shape.push_back(static_cast<std::uint64_t>(p.value.dim(axis)));
+  if (p.layout == Layout::pointwise) shape.insert(shape.end(), {1, 1});
+  return shape;
+}
+
+// Calls f(memory offset, file offset) for every element, file offsets ascending.
+template <class F>
+void for_each_element(const Parameter& p, F f) {
+  const Axes axes = file_axes(p);
+  std::array<Dim, kMaxRank> size{1, 1, 1, 1}, stride{};
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    size[i] = p.value.dim(axes[i]);
+    stride[i] = 1;
+    for (int j = axes[i] + 1; j < p.value.rank(); ++j) stride[i] *= p.value.dim(j);
+  }
+  Dim at = 0;
+  for (Dim a = 0; a < size[0]; ++a) {
+    for (Dim b = 0; b < size[1]; ++b) {
+      for (Dim c = 0; c < size[2]; ++c) {
+        for (Dim d = 0; d < size[3]; ++d) {
+          f(a * stride[0] + b * stride[1] + c * stride[2] + d * stride[3], at++);
+        }
+      }
+    }
+  }
+}
+
+std::string text_of(const std::vector<std::uint64_t>& shape) {
+  std::string out = "[";
+  for (std::size_t i = 0; i < shape.size(); ++i) out += (i ? "," : "") + std::to_string(shape[i]);
+  return out + "]";
+}
+
+// Empty when the tensor in the file is what the parameter needs, else what is wrong with it.
+std::string mismatch(const SafetensorsFile& file, const std::string& name, const Parameter& p) {
+  const auto found = file.tensors().find(name);
+  if (found == file.tensors().end()) return "missing " + name;
+  const TensorInfo& info = found->second;
+  if (info.dtype == "F32" && info.shape == file_shape(p)) return {};
+  return name + " expected F32 " + text_of(file_shape(p)) + ", found " + info.dtype + " " +
+         text_of(info.shape);
+}
+
+Tensor to_memory(const std::vector<float>& values, const Parameter& p) {
+  Tensor t(p.value.shape());
+  for_each_element(p, [&](Dim memory, Dim at) {
+    t.data()[memory] = static_cast<real>(values[static_cast<std::size_t>(at)]);
+  });
+  return t;
+}
+
+}  // namespace
+
+StoredTensor to_stored(const Parameter& p, const Tensor& tensor, const std::string& name) {
+  StoredTensor stored{name, file_shape(p), std::vector<float>(static_cast<std::size_t>(tensor.size()))};
+  for_each_element(p, [&](Dim memory, Dim at) {
+    stored.values[static_cast<std::size_t>(at)] = static_cast<float>(tensor.data()[memory]);
+  });
+  return stored;
+}
+
+StoredTensor to_stored(const Parameter& p) { return to_stored(p, p.value.value(), p.name); }
+
+void write_checkpoint(const std::string& path, const std::vector<Parameter>& parameters,
+                      std::map<std::string, std::string> metadata, const std::vector<StoredTensor>& more) {
+  metadata["format"] = "supertac-checkpoint";
+  metadata["format_version"] = std::to_string(kCheckpointVersion);
+  std::vector<StoredTensor> stored;
+  for (const Parameter& p : parameters) stored.push_back(to_stored(p));
+  std::vector<TensorToWrite> list;
+  for (const auto* group : {&stored, &more}) {
+    for (const StoredTensor& s : *group)
+      list.push_back({s.name, "F32", s.shape, std::as_bytes(std::span(s.values))});
+  }
+  write_safetensors(path, std::move(metadata), list);
+}
+
+SafetensorsFile read_checkpoint(const std::string& path) {
+  SafetensorsFile file = SafetensorsFile::read(path);
+  const auto& metadata = file.metadata();
+  const auto format = metadata.find("format");
+  if (format == metadata.end() || format->second != "supertac-checkpoint") {
+    throw std::runtime_error(path + ": not a SuperTac checkpoint: metadata \"format\" is " +
+                             (format == metadata.end() ? "missing" : "\"" + format->second + "\"") +
+                             "; give a file that supertac-train wrote");
+  }
+  const auto version = metadata.find("format_version");
+  const std::string text = version == metadata.end() ? "" : version->second;
+  const auto number = parse_int(text);
+  if (!number || *number < 1 || *number > kCheckpointVersion) {
+    throw std::runtime_error(path + ": checkpoint version \"" + text + "\", this program reads 1 to " +
+                             std::to_string(kCheckpointVersion) + "; use a newer SuperTac");
+  }
+  return file;
+}
+
+void load_parameters(const SafetensorsFile& file, const std::string& path,
+                     const std::vector<Parameter>& parameters, const std::string& ignored_prefix) {
+  std::vector<std::string> problems;
+  std::set<std::string> known;
+  for (const Parameter& p : parameters) {
+    known.insert(p.name);
+    if (std::string problem = mismatch(file, p.name, p); !problem.empty())
+      problems.push_back(std::move(problem));
+  }
+  for (const auto& [name, info] : file.tensors()) {
+    if (!known.contains(name) && !name.starts_with(ignored_prefix)) problems.push_back("unexpected " + name);
+  }
+  if (!problems.empty()) {
+    std::string message = path + ": the tensors do not fit the model that its metadata describes: ";
+    for (std::size_t i = 0; i < problems.size(); ++i) message += (i ? "; " : "") + problems[i];
+    throw std::runtime_error(message);
+  }
+  for (const Parameter& p : parameters) {
+    Variable handle = p.value;
+    const Tensor values = to_memory(file.f32(p.name), p);
+    std::copy_n(values.data(), values.size(), handle.mutable_value().data());
+  }
+}
+
+Tensor load_like(const SafetensorsFile& file, const std::string& path, const std::string& name,
+                 const Parameter& parameter) {
+  if (std::string problem = mismatch(file, name, parameter); !problem.empty()) {
+    throw std::runtime_error(path + ": " + problem);
+  }
+  return to_memory(file.f32(name), parameter);
+}
+
+}  // namespace supertac

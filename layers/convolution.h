@@ -1,0 +1,58 @@
+// Convolution layers, channels-last: see autograd/ops/convolution.h for the formulas and what is thrown.
+#pragma once
+
+#include "layers/module.h"
+
+namespace supertac {
+
+struct ConvLayerOptions {
+  Dim kernel = 3;
+  Dim stride = 1;
+  Dim padding = 0;
+};
+
+/// x [N,L,in] -> [N, (L + 2 padding - kernel) / stride + 1, out]
+class Conv1d : public Module {
+ public:
+  Conv1d(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
+  Variable forward(const Variable& x) const;
+
+ private:
+  ConvLayerOptions options_;
+  Variable weight_, bias_;
+};
+
+/// x [N,H,W,in] -> [N,H',W',out]
+class Conv2d : public Module {
+ public:
+  Conv2d(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
+  Variable forward(const Variable& x) const;
+
+ private:
+  ConvLayerOptions options_;
+  Variable weight_, bias_;
+};
+
+/// x [N,L,in] -> [N, (L - 1) stride - 2 padding + kernel, out]
+class ConvTranspose1d : public Module {
+ public:
+  ConvTranspose1d(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
+  Variable forward(const Variable& x) const;
+
+ private:
+  ConvLayerOptions options_;
+  Variable weight_, bias_;
+};
+
+/// x [N,H,W,in] -> [N,H',W',out]
+class ConvTranspose2d : public Module {
+ public:
+  ConvTranspose2d(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
+  Variable forward(const Variable& x) const;
+
+ private:
+  ConvLayerOptions options_;
+  Variable weight_, bias_;
+};
+
+}  // namespace supertac

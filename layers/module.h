@@ -1,0 +1,62 @@
+// Module: something with named parameters. Layers are plain values made of other layers.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "autograd/variable.h"
+#include "io/random.h"
+
+namespace supertac {
+
+/// Draws numbers one after another from a counter-based stream: the same seed gives the same layers.
+class Rng {
+ public:
+  explicit Rng(std::uint64_t seed) : stream_(seed, 0) {}
+  /// Uniform in [-bound, bound).
+  real uniform(double bound) { return static_cast<real>(bound * (2 * stream_.uniform(counter_++) - 1)); }
+
+ private:
+  RandomStream stream_;
+  std::uint64_t counter_ = 0;
+};
+
+/// How a parameter lies in memory against how PyTorch names its axes (the layout of our checkpoints).
+enum class Layout {
+  plain,           ///< the same: biases
+  linear,          ///< memory [in,out], file [out,in]
+  pointwise,       ///< memory [in,out], file [out,in,1,1]: a 1x1 convolution
+  conv,            ///< memory [k...,in,out], file [out,in,k...]
+  conv_transpose,  ///< memory [k...,in,out], file [in,out,k...]
+};
+
+struct Parameter {
+  std::string name;  ///< "upsampler.rirb.0.up.weight"
+  Variable value;    ///< a handle: writing to its value changes the layer
+  Layout layout = Layout::plain;
+};
+
+class Module {
+ public:
+  /// In the order of construction, which is the order in checkpoints.
+  const std::vector<Parameter>& parameters() const { return parameters_; }
+  Dim parameter_count() const;
+
+ protected:
+  Variable add_parameter(const std::string& name, Tensor value, Layout layout);
+  /// Lists the parameters of a part of this module as "name.its_name".
+  void add(const std::string& name, const Module& part);
+
+ private:
+  std::vector<Parameter> parameters_;
+};
+
+/// The handles alone, for an optimiser.
+std::vector<Variable> values_of(const std::vector<Parameter>& parameters);
+
+/// Uniform in [-1/sqrt(fan_in), 1/sqrt(fan_in)): what PyTorch draws for convolutions and linear layers
+/// (He et al. 2015 with a = sqrt(5)).
+Tensor uniform_fan_in(const Shape& shape, Dim fan_in, Rng& rng);
+
+}  // namespace supertac

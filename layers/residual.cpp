@@ -1,0 +1,71 @@
+#include "layers/residual.h"
+
+#include <stdexcept>
+
+#include "autograd/ops/activations.h"
+#include "autograd/ops/arithmetic.h"
+#include "autograd/ops/attention.h"
+
+namespace supertac {
+namespace {
+
+Dim squeezed(Dim channels, Dim reduction) {
+  if (reduction < 1 || reduction > channels) {
+    throw std::invalid_argument("ChannelAttention: reduction must be 1 to " + std::to_string(channels) +
+                                " (the channels), got " + std::to_string(reduction));
+  }
+  return channels / reduction;
+}
+
+constexpr ConvLayerOptions kSameSize{.kernel = 3, .stride = 1, .padding = 1};
+
+std::vector<Rcab> make_blocks(const RirbOptions& options, Rng& rng) {
+  std::vector<Rcab> blocks;
+  for (Dim i = 0; i < options.blocks; ++i) blocks.emplace_back(options.channels, options.reduction, rng);
+  return blocks;
+}
+
+}  // namespace
+
+ChannelAttention::ChannelAttention(Dim channels, Dim reduction, Rng& rng)
+    : squeeze_(channels, squeezed(channels, reduction), rng, Layout::pointwise),
+      expand_(channels / reduction, channels, rng, Layout::pointwise) {
+  add("squeeze", squeeze_);
+  add("expand", expand_);
+}
+
+Variable ChannelAttention::gates(const Variable& x) const {
+  return sigmoid(expand_.forward(relu(squeeze_.forward(global_mean(x)))));
+}
+
+Variable ChannelAttention::forward(const Variable& x) const { return scale_channels(x, gates(x)); }
+
+Rcab::Rcab(Dim channels, Dim reduction, Rng& rng)
+    : first_(channels, channels, kSameSize, rng),
+      second_(channels, channels, kSameSize, rng),
+      attention_(channels, reduction, rng) {
+  add("conv.0", first_);
+  add("conv.1", second_);
+  add("attention", attention_);
+}
+
+Variable Rcab::forward(const Variable& x) const {
+  return supertac::add(x, attention_.forward(second_.forward(relu(first_.forward(x)))));
+}
+
+Rirb::Rirb(const RirbOptions& options, Rng& rng)
+    : blocks_(make_blocks(options, rng)),
+      conv_(options.channels, options.channels, kSameSize, rng),
+      up_(options.channels, options.channels, {.kernel = 4, .stride = 2, .padding = 1}, rng) {
+  for (std::size_t i = 0; i < blocks_.size(); ++i) add("rcab." + std::to_string(i), blocks_[i]);
+  add("conv", conv_);
+  add("up", up_);
+}
+
+Variable Rirb::forward(const Variable& x) const {
+  Variable h = x;
+  for (const Rcab& block : blocks_) h = block.forward(h);
+  return leaky_relu(up_.forward(supertac::add(x, conv_.forward(h))));
+}
+
+}  // namespace supertac

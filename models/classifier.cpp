@@ -1,0 +1,39 @@
+#include "models/classifier.h"
+
+#include <stdexcept>
+
+#include "autograd/ops/activations.h"
+#include "autograd/ops/max_pool.h"
+#include "autograd/ops/shaping.h"
+
+namespace supertac {
+namespace {
+
+constexpr ConvLayerOptions kSameSize{.kernel = 3, .stride = 1, .padding = 1};
+constexpr Dim kFirst = 16, kSecond = 32;
+
+Dim features(const ClassifierSettings& s) {
+  if (s.size < 4 || s.size > 256 || s.classes < 2 || s.classes > 1024) {
+    throw std::invalid_argument("TextureClassifier: expects size 4 to 256 and 2 to 1024 classes, got " +
+                                std::to_string(s.size) + " and " + std::to_string(s.classes));
+  }
+  return kSecond * (s.size / 4) * (s.size / 4);
+}
+
+}  // namespace
+
+TextureClassifier::TextureClassifier(const ClassifierSettings& s, Rng& rng)
+    : first_(1, kFirst, kSameSize, rng),
+      second_(kFirst, kSecond, kSameSize, rng),
+      out_(features(s), s.classes, rng) {
+  add("conv.0", first_);
+  add("conv.1", second_);
+  add("out", out_);
+}
+
+Variable TextureClassifier::forward(const Variable& x) const {
+  const Variable h = max_pool2d(relu(first_.forward(x)));
+  return out_.forward(flatten_channels_first(max_pool2d(relu(second_.forward(h)))));
+}
+
+}  // namespace supertac

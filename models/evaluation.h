@@ -1,0 +1,27 @@
+// Runs a model over the windows of a data set.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+
+#include "data/windows.h"
+#include "models/supertac_model.h"
+
+namespace supertac {
+
+/// A batch of results: windows [n,T,16], outputs and truths [n,S,S,1], and the first of their places in
+/// `indices`.
+struct EvaluatedBatch {
+  std::size_t first;
+  const Tensor& windows;
+  const Tensor& outputs;
+  const Tensor& truths;
+};
+
+/// Calls `use` for the given windows in order, in batches of at most 64. `use` returns false to stop early.
+/// Throws std::invalid_argument when the data set's windows do not fit the model.
+void for_each_output(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
+                     const std::function<bool(const EvaluatedBatch&)>& use);
+
+}  // namespace supertac

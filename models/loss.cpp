@@ -1,0 +1,37 @@
+#include "models/loss.h"
+
+#include <stdexcept>
+
+#include "autograd/ops/arithmetic.h"
+#include "autograd/ops/losses.h"
+#include "autograd/ops/vae.h"
+
+namespace supertac {
+
+void LossWeights::check() const {
+  if (a >= 0 && a <= 1 && beta >= 0 && lambda >= 0) return;
+  throw std::invalid_argument(
+      "loss weights: expected 0 <= a <= 1, beta >= 0, lambda >= 0, got a = " + std::to_string(a) +
+      ", beta = " + std::to_string(beta) + ", lambda = " + std::to_string(lambda));
+}
+
+Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const LossWeights& w) {
+  Loss loss;
+  for (std::size_t i = 0; i < output.decoded.size(); ++i) {
+    const Variable l2 = l2_loss(output.decoded[i], output.input[i]);
+    const Variable kld = kl_divergence(output.latent[i].mean, output.latent[i].log_var);
+    loss.reconstruction = i == 0 ? l2 : add(loss.reconstruction, l2);
+    loss.kld = i == 0 ? kld : add(loss.kld, kld);
+  }
+  loss.l2 = l2_loss(output.image, Variable(truth));
+  loss.ssim = ssim(output.image, truth);
+  const auto share = static_cast<real>(w.a), rest = static_cast<real>(1 - w.a);
+  const Variable vaes =
+      add(scale(loss.reconstruction, share), scale(loss.kld, share * static_cast<real>(w.beta)));
+  const auto lambda = static_cast<real>(w.lambda);
+  const Variable one_minus_ssim = add(Variable(Tensor::full({}, 1)), scale(loss.ssim, -1));
+  loss.total = add(vaes, scale(add(loss.l2, scale(one_minus_ssim, lambda)), rest));
+  return loss;
+}
+
+}  // namespace supertac

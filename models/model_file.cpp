@@ -1,0 +1,119 @@
+#include "models/model_file.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "io/json.h"
+
+namespace supertac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// One metadata entry that is a JSON object; every accessor names path, key and what was found.
+class JsonEntry {
+ public:
+  JsonEntry(const SafetensorsFile& file, const std::string& path, const std::string& key)
+      : where_(path + ": metadata \"" + key + "\"") {
+    const auto found = file.metadata().find(key);
+    if (found == file.metadata().end())
+      throw std::runtime_error(where_ + " is missing; the file is no SuperTac model");
+    try {
+      json_ = parse_json_limited(found->second);
+    } catch (const JsonError& error) {
+      throw std::runtime_error(where_ + ": " + error.what());
+    }
+  }
+
+  Dim integer(const char* name) const {
+    const Json& value = field(name);
+    if (!value.is_number_integer() || value < -1'000'000 || value > 1'000'000)
+      wrong(name, "a whole number", value);
+    return value.get<Dim>();
+  }
+  double number(const char* name) const {
+    const Json& value = field(name);
+    if (!value.is_number() || !std::isfinite(value.get<double>())) wrong(name, "a finite number", value);
+    return value.get<double>();
+  }
+  std::string text(const char* name) const {
+    const Json& value = field(name);
+    if (!value.is_string()) wrong(name, "a text", value);
+    return value.get<std::string>();
+  }
+  const std::string& where() const { return where_; }
+
+ private:
+  const Json& field(const char* name) const {
+    if (!json_.is_object() || !json_.contains(name))
+      throw std::runtime_error(where_ + " has no \"" + name + "\"");
+    return json_.at(name);
+  }
+  [[noreturn]] void wrong(const char* name, const char* expected, const Json& found) const {
+    throw std::runtime_error(where_ + ": \"" + name + "\" must be " + expected + ", found " +
+                             found.dump(-1, ' ', true).substr(0, 60));
+  }
+
+  std::string where_;
+  Json json_;
+};
+
+SuperTacSettings read_settings(const JsonEntry& entry) {
+  SuperTacSettings s;
+  s.preset = entry.text("preset");
+  s.timesteps = entry.integer("timesteps");
+  s.latent = entry.integer("latent");
+  s.scale = entry.integer("scale");
+  s.channels = entry.integer("channels");
+  s.rcabs = entry.integer("rcabs");
+  try {
+    s.grouping = grouping_of(entry.text("grouping"));
+    s.check();
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(entry.where() + ": " + error.what());
+  }
+  return s;
+}
+
+InputSettings read_input(const JsonEntry& entry) {
+  const InputSettings input{entry.number("rate_hz"),
+                            {entry.number("rest_volts"), entry.number("span_volts")}};
+  if (input.rate_hz < 1 || input.rate_hz > 100'000 || std::abs(input.scaling.rest_volts) > 1000 ||
+      input.scaling.span_volts <= 1e-6 || input.scaling.span_volts > 1000) {
+    throw std::runtime_error(entry.where() +
+                             ": expected rate_hz 1 to 100000, |rest_volts| <= 1000, span_volts 1e-6 to 1000");
+  }
+  return input;
+}
+
+}  // namespace
+
+std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, const InputSettings& input) {
+  const Json settings = {{"preset", s.preset}, {"timesteps", s.timesteps},        {"latent", s.latent},
+                         {"scale", s.scale},   {"grouping", name_of(s.grouping)}, {"channels", s.channels},
+                         {"rcabs", s.rcabs}};
+  const Json scaling = {{"rate_hz", input.rate_hz},
+                        {"rest_volts", input.scaling.rest_volts},
+                        {"span_volts", input.scaling.span_volts},
+                        {"formula", "clip((rest_volts - V) / span_volts, 0, 1)"}};
+  return {{"settings", settings.dump()}, {"input", scaling.dump()}};
+}
+
+ModelFile load_model(const SafetensorsFile& file, const std::string& path) {
+  const SuperTacSettings settings = read_settings({file, path, "settings"});
+  ModelFile loaded{nullptr, read_input({file, path, "input"}), file.metadata()};
+  Rng rng(0);
+  loaded.model = std::make_unique<SuperTac>(settings, rng);
+  load_parameters(file, path, loaded.model->parameters());
+  return loaded;
+}
+
+ModelFile load_model(const std::string& path) { return load_model(read_checkpoint(path), path); }
+
+void save_model(const std::string& path, const SuperTac& model, const InputSettings& input,
+                std::map<std::string, std::string> metadata) {
+  metadata.merge(model_metadata(model.settings(), input));
+  write_checkpoint(path, model.parameters(), std::move(metadata));
+}
+
+}  // namespace supertac

@@ -1,0 +1,97 @@
+// Training of SuperTac, one visible step at a time.
+//
+//   Trainer trainer(windows, split.train, settings);
+//   while (!trainer.done()) report(trainer.train_step());
+//
+// Every random choice is a function of (seed, step), so that a restored trainer continues to the same bits.
+#pragma once
+
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "autograd/adam.h"
+#include "data/augment.h"
+#include "data/batching.h"
+#include "data/windows.h"
+#include "models/loss.h"
+#include "models/model_file.h"
+
+namespace supertac {
+
+struct TrainingSettings {
+  SuperTacSettings model;
+  LossWeights loss;
+  AugmentSettings augment;
+  std::int64_t epochs = 4;
+  std::int64_t batch = 64;
+  std::uint64_t seed = 0;
+  double learning_rate = 1e-3;
+  double warm_up = 0.05;  ///< share of all steps in which the rate rises; then half a cosine to 0
+  double clip_norm = 1;   ///< 0 = never
+
+  /// Throws std::invalid_argument naming the setting.
+  void check() const;
+  /// JSON text of everything that determines the result, for metadata and to compare on resume.
+  std::string text() const;
+};
+
+struct StepReport {
+  std::int64_t step = 0;  ///< from 1
+  double total = 0, reconstruction = 0, kld = 0, l2 = 0, ssim = 0;
+  double gradient_norm = 0;  ///< before clipping
+  double learning_rate = 0;
+  /// The pictures have been flat for the last 100 steps although the truth is not: lower the learning rate.
+  bool collapsed = false;
+};
+
+/// A value was not finite: step, where, and what to do are in what().
+class TrainingStopped : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class Trainer {
+ public:
+  /// `windows` must outlive the trainer. Throws std::invalid_argument for settings out of range, windows of
+  /// another length or picture size than the model's, or no training window.
+  Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, const TrainingSettings& settings);
+
+  bool done() const { return step_ >= total_steps_; }
+  std::int64_t step() const { return step_; }
+  std::int64_t total_steps() const { return total_steps_; }
+  std::int64_t steps_per_epoch() const { return static_cast<std::int64_t>(batching_.batches_per_epoch()); }
+  const SuperTac& model() const { return model_; }
+  const TrainingSettings& settings() const { return settings_; }
+
+  /// One batch: forward, loss, backward, Adam. Throws TrainingStopped; the parameters are then still finite.
+  StepReport train_step();
+
+  /// Model and training state, a checkpoint like any other with "optimizer." tensors besides. Throws
+  /// FileError.
+  void save(const std::string& path, std::map<std::string, std::string> metadata) const;
+  /// Continues where the saved trainer stood. Throws std::runtime_error when the file holds no training
+  /// state, or was made with other settings or data (naming the difference); nothing is changed then.
+  void restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata);
+
+ private:
+  void fill_batch();
+  void draw_eps();
+  bool collapsed(const Tensor& pictures);
+  [[noreturn]] void stop(const std::string& what) const;
+
+  const WindowSet& data_;
+  TrainingSettings settings_;
+  Batching batching_;
+  SuperTac model_;
+  mutable Adam adam_;
+  Schedule schedule_;
+  std::int64_t step_ = 0, total_steps_ = 0;
+  int flat_steps_ = 0;
+  std::vector<std::uint32_t> indices_;
+  Tensor windows_, truth_;
+  std::array<Tensor, kGroups> eps_;
+};
+
+}  // namespace supertac

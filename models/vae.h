@@ -1,0 +1,50 @@
+// The variational auto-encoder that squeezes one group of taxels into a few latent numbers (Kingma & Welling
+// 2014).
+#pragma once
+
+#include <vector>
+
+#include "layers/convolution.h"
+#include "layers/linear.h"
+
+namespace supertac {
+
+struct VaeOptions {
+  Dim timesteps = 256;  ///< T, a multiple of 16
+  Dim channels = 4;     ///< taxels of the group
+  Dim latent = 10;      ///< LD
+};
+
+/// The distribution N(mean, exp(log_var)) of the latent vector, each [N,LD]; log_var is clamped to [-10,10].
+struct LatentDistribution {
+  Variable mean, log_var;
+};
+
+/// x [N,T,4] -> four strided convolutions -> [N,T/16,32] -> 64 -> mean and log variance.
+class Encoder : public Module {
+ public:
+  Encoder(const VaeOptions& options, Rng& rng);
+  LatentDistribution forward(const Variable& x) const;
+  /// The mean alone: what evaluation uses.
+  Variable mean(const Variable& x) const;
+
+ private:
+  Variable features(const Variable& x) const;
+  std::vector<Conv1d> conv_;
+  Linear fc_, mean_, log_var_;
+};
+
+/// z [N,LD] -> 64 -> [N,T/16,32] -> four transposed convolutions -> [N,T,4] in (0,1).
+class Decoder : public Module {
+ public:
+  Decoder(const VaeOptions& options, Rng& rng);
+  Variable forward(const Variable& z) const;
+
+ private:
+  Dim coarse_;  // T / 16
+  Linear widen_, unfold_;
+  std::vector<ConvTranspose1d> conv_;
+  Conv1d out_;
+};
+
+}  // namespace supertac
