@@ -1,0 +1,140 @@
+#include "data/baselines.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace supertac {
+namespace {
+
+constexpr int kSide = 4;
+
+size_t pixels_of(const WindowSet& windows) {
+  return static_cast<size_t>(windows.image_size()) * static_cast<size_t>(windows.image_size());
+}
+
+std::vector<uint32_t> spread(std::span<const uint32_t> train) {
+  if (train.empty()) throw std::invalid_argument("baseline: there is no window to fit to");
+  const size_t count = std::min(train.size(), kFitWindows);
+  std::vector<uint32_t> chosen(count);
+  for (size_t i = 0; i < count; ++i) chosen[i] = train[i * train.size() / count];
+  return chosen;
+}
+
+void check_size(const char* what, size_t got, size_t expected) {
+  if (got != expected)
+    throw std::invalid_argument("baseline: " + std::string(what) + " expects " + std::to_string(expected) +
+                                " values, got " + std::to_string(got));
+}
+
+std::span<const float> last_frame(std::span<const float> window) {
+  if (window.empty() || window.size() % kTaxels != 0)
+    throw std::invalid_argument("baseline: a window is [T][16], got " + std::to_string(window.size()) +
+                                " values");
+  return window.last(kTaxels);
+}
+
+double keys_kernel(double distance) {
+  constexpr double a = -0.5;
+  const double d = std::abs(distance);
+  if (d < 1) return ((a + 2) * d - (a + 3)) * d * d + 1;
+  if (d < 2) return ((a * d - 5 * a) * d + 8 * a) * d - 4 * a;
+  return 0;
+}
+
+}  // namespace
+
+MeanImage::MeanImage(const WindowSet& windows, std::span<const uint32_t> train) : image_(pixels_of(windows)) {
+  std::vector<double> sum(image_.size());
+  std::vector<float> truth(image_.size());
+  const std::vector<uint32_t> chosen = spread(train);
+  for (const uint32_t i : chosen) {
+    windows.truth(i, truth);
+    for (size_t p = 0; p < sum.size(); ++p) sum[p] += truth[p];
+  }
+  for (size_t p = 0; p < sum.size(); ++p)
+    image_[p] = static_cast<float>(sum[p] / static_cast<double>(chosen.size()));
+}
+
+void MeanImage::predict(std::span<const float> window, std::span<float> out) const {
+  last_frame(window);
+  check_size("the image", out.size(), image_.size());
+  std::copy(image_.begin(), image_.end(), out.begin());
+}
+
+Upsampling::Upsampling(Kind kind, int size) {
+  if (size < 1)
+    throw std::invalid_argument("upsampling: size must be at least 1, got " + std::to_string(size));
+  weights_.resize(static_cast<size_t>(size));
+  for (int p = 0; p < size; ++p) {
+    const double u = (p + 0.5) * kSide / size - 0.5;
+    const int left = static_cast<int>(std::floor(u));
+    std::array<float, 4>& row = weights_[static_cast<size_t>(p)];
+    row = {};
+    const auto inside = [](int taxel) { return static_cast<size_t>(std::clamp(taxel, 0, kSide - 1)); };
+    if (kind == Kind::nearest) {
+      row[inside(static_cast<int>(std::floor(u + 0.5)))] = 1;
+    } else {
+      for (int taxel = left - 1; taxel <= left + 2; ++taxel)
+        row[inside(taxel)] += static_cast<float>(keys_kernel(u - taxel));
+    }
+  }
+}
+
+void Upsampling::operator()(std::span<const float> frame, std::span<float> out) const {
+  const size_t size = weights_.size();
+  check_size("a frame", frame.size(), kTaxels);
+  check_size("the image", out.size(), size * size);
+  for (size_t r = 0; r < size; ++r) {
+    std::array<float, kSide> row{};  // the frame's four columns at this row of the image
+    for (size_t k = 0; k < kTaxels; ++k) row[k % kSide] += weights_[r][k / kSide] * frame[k];
+    for (size_t c = 0; c < size; ++c) {
+      float value = 0;
+      for (size_t k = 0; k < kSide; ++k) value += weights_[c][k] * row[k];
+      out[r * size + c] = value;
+    }
+  }
+}
+
+UpsampledFrame::UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows,
+                               std::span<const uint32_t> train)
+    : kind_(kind), upsampling_(kind, windows.image_size()) {
+  const size_t pixels = pixels_of(windows);
+  std::vector<float> image(pixels), truth(pixels);
+  double sx = 0, sy = 0, sxx = 0, sxy = 0;
+  const std::vector<uint32_t> chosen = spread(train);
+  for (const uint32_t i : chosen) {
+    upsampling_(windows.last_frame(i), image);
+    windows.truth(i, truth);
+    for (size_t p = 0; p < pixels; ++p) {
+      sx += image[p];
+      sy += truth[p];
+      sxx += static_cast<double>(image[p]) * image[p];
+      sxy += static_cast<double>(image[p]) * truth[p];
+    }
+  }
+  const double n = static_cast<double>(chosen.size()) * static_cast<double>(pixels);
+  const double variance = sxx - sx * sx / n;
+  slope_ = variance > 1e-12 * n ? (sxy - sx * sy / n) / variance : 0;
+  intercept_ = (sy - slope_ * sx) / n;
+}
+
+std::string UpsampledFrame::name() const {
+  return kind_ == Upsampling::Kind::nearest ? "nearest" : "bicubic";
+}
+
+void UpsampledFrame::predict(std::span<const float> window, std::span<float> out) const {
+  upsampling_(last_frame(window), out);
+  for (float& v : out) v = static_cast<float>(slope_ * v + intercept_);
+}
+
+std::vector<std::unique_ptr<Baseline>> fit_baselines(const WindowSet& windows,
+                                                     std::span<const uint32_t> train) {
+  std::vector<std::unique_ptr<Baseline>> baselines;
+  baselines.push_back(std::make_unique<MeanImage>(windows, train));
+  baselines.push_back(std::make_unique<UpsampledFrame>(Upsampling::Kind::nearest, windows, train));
+  baselines.push_back(std::make_unique<UpsampledFrame>(Upsampling::Kind::bicubic, windows, train));
+  return baselines;
+}
+
+}  // namespace supertac

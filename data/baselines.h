@@ -1,0 +1,76 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "data/windows.h"
+
+namespace supertac {
+
+/// A way to an image that does without a network, so that a reader sees what the network buys. It sees the
+/// window and nothing else.
+class Baseline {
+ public:
+  virtual ~Baseline() = default;
+  virtual std::string name() const = 0;
+  /// window [T][16], any T >= 1; out [S][S]. @throws std::invalid_argument on other sizes.
+  virtual void predict(std::span<const float> window, std::span<float> out) const = 0;
+};
+
+/// The mean truth of the training windows, whatever the window holds.
+class MeanImage : public Baseline {
+ public:
+  /// @throws std::invalid_argument when train is empty.
+  MeanImage(const WindowSet& windows, std::span<const uint32_t> train);
+  std::string name() const override { return "mean_image"; }
+  void predict(std::span<const float> window, std::span<float> out) const override;
+
+ private:
+  std::vector<float> image_;
+};
+
+/// Enlarges a 4x4 frame to [S][S]. Taxel k lies at x = -4.5 + 3 (k % 4), y = -4.5 + 3 (k / 4) mm and the
+/// pixels cover 12 mm x 12 mm, so pixel p of a row lies at u = (p + 1/2) 4 / S - 1/2 in units of taxels.
+/// Taxels beyond the edge repeat the outermost.
+///   nearest  the taxel at round(u)
+///   bicubic  cubic convolution (Keys 1981, a = -1/2, also called Catmull-Rom) along both axes
+class Upsampling {
+ public:
+  enum class Kind { nearest, bicubic };
+  /// @throws std::invalid_argument when size < 1.
+  Upsampling(Kind kind, int size);
+  /// frame [16], out [S][S]. @throws std::invalid_argument on other sizes.
+  void operator()(std::span<const float> frame, std::span<float> out) const;
+
+ private:
+  std::vector<std::array<float, 4>> weights_;  // [S][4]: of the taxels of a row on a pixel
+};
+
+/// Upsampling of the last frame, followed by a x + b: the line that fits the truth of the training windows
+/// best (least squares over all pixels). It turns voltage into height, as fairly as two numbers can.
+class UpsampledFrame : public Baseline {
+ public:
+  /// @throws std::invalid_argument when train is empty.
+  UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows, std::span<const uint32_t> train);
+  std::string name() const override;
+  void predict(std::span<const float> window, std::span<float> out) const override;
+  double slope() const { return slope_; }
+  double intercept() const { return intercept_; }
+
+ private:
+  Upsampling::Kind kind_;
+  Upsampling upsampling_;
+  double slope_ = 0, intercept_ = 0;
+};
+
+/// mean_image, nearest and bicubic, in this order. Each is fitted to at most kFitWindows training windows,
+/// evenly spread over the list. @throws std::invalid_argument when train is empty.
+constexpr size_t kFitWindows = 20000;
+std::vector<std::unique_ptr<Baseline>> fit_baselines(const WindowSet& windows,
+                                                     std::span<const uint32_t> train);
+
+}  // namespace supertac

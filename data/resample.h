@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "data/recording.h"
+
+namespace supertac {
+
+/// Scales a voltage to [0,1], 1 = pressed hard: clip((rest - V) / span, 0, 1).
+struct Scaling {
+  double rest_volts = 2.45, span_volts = 0.36;
+  float operator()(float volts) const;
+};
+
+/// A recording on an even time grid.
+struct Track {
+  std::vector<float> samples;      ///< [frames][16], scaled
+  std::vector<float> position_mm;  ///< [frames][2] (x, y), NaN where unknown
+  std::vector<uint32_t>
+      run;             ///< [frames]: frames since the pass began or since the last gap, itself included
+  size_t held = 0;     ///< frames for which no sample arrived: they repeat the one before
+  size_t gaps = 0;     ///< places where the recording is interrupted for longer than max_gap_s
+  size_t damaged = 0;  ///< recorded frames with a voltage that is not finite: taken as lost
+  size_t frames() const { return run.size(); }
+};
+
+struct ResampleSettings {
+  double rate_hz = 300;
+  double max_gap_s = 0.05;  ///< longer silence between two recorded frames is a gap, never filled
+  Scaling scaling = {};
+};
+
+/// Puts a recording onto rate_hz. Between two gaps frame j stands for the time c = t_first + j / rate:
+///   samples[j]  = scaled mean of the recorded frames in (c - 1/(2 rate), c + 1/(2 rate)], or samples[j-1]
+///   when
+///                 there is none (counted in `held`)
+///   position[j] = position at c, linear between recorded frames
+/// Causal but for half a period (1.7 ms at 300 Hz): a live reader that averages what arrived in each period
+/// gets the same samples. A recording made at rate_hz comes out as it is.
+/// @throws std::invalid_argument on settings that are not positive, std::runtime_error when the sizes of the
+/// recording's arrays disagree or its time stamps do not increase.
+Track resample(const Recording& recording, const ResampleSettings& settings);
+
+}  // namespace supertac

@@ -1,0 +1,212 @@
+#include "data/windows.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <set>
+#include <stdexcept>
+
+#include "data/hash.h"
+#include "data/metrics.h"
+#include "data/truth.h"
+
+namespace supertac {
+namespace {
+
+constexpr size_t kLargestImage = 32 * 32;
+
+void check(const WindowSettings& s) {
+  const auto fail = [](const std::string& what) { throw std::invalid_argument("windows: " + what); };
+  if (s.timesteps < 1) fail("timesteps must be at least 1, got " + std::to_string(s.timesteps));
+  if (s.scale != 2 && s.scale != 4 && s.scale != 8)
+    fail("scale must be 2, 4 or 8, got " + std::to_string(s.scale));
+  if (s.stride < 1) fail("stride must be at least 1, got " + std::to_string(s.stride));
+  if (!(s.rate_hz > 0) || !(s.max_gap_s > 0) || !(s.scaling.span_volts > 0))
+    fail("rate_hz, max_gap_s and span_volts must be positive, got " + std::to_string(s.rate_hz) + ", " +
+         std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span_volts));
+  if (!(s.min_y_mm < s.max_y_mm))
+    fail("min_y_mm must be below max_y_mm, got " + std::to_string(s.min_y_mm) + " and " +
+         std::to_string(s.max_y_mm));
+}
+
+void check_size(const char* what, size_t got, size_t expected) {
+  if (got != expected)
+    throw std::invalid_argument("windows: " + std::string(what) + " needs room for " +
+                                std::to_string(expected) + " values, got " + std::to_string(got));
+}
+
+bool is_reliable(const Recording& recording) {
+  const auto flag = recording.metadata.find("registration_reliable");
+  return flag == recording.metadata.end() || flag->second != "no";
+}
+
+// Hashes 32-bit words one after the other.
+class Hasher {
+ public:
+  void add(uint64_t word) { state_ = mix64(state_ * kGolden64 + word); }
+  void add(float value) { add(uint64_t{std::bit_cast<uint32_t>(value)}); }
+  void add(const std::string& text) {
+    add(uint64_t{text.size()});
+    for (const char c : text) add(uint64_t{static_cast<unsigned char>(c)});
+  }
+  std::string hex() const { return hex64(state_); }
+
+ private:
+  uint64_t state_ = 1;
+};
+
+}  // namespace
+
+std::string WindowCounts::summary() const {
+  const auto part = [](size_t count, const char* what) {
+    return count > 0 ? ", " + std::to_string(count) + " " + what : std::string();
+  };
+  return std::to_string(windows) + " windows from " + std::to_string(frames) + " frames of " +
+         std::to_string(recordings) + " recordings" +
+         part(unreliable, "in passes with unreliable registration") + part(no_position, "without position") +
+         part(outside, "outside the y range") +
+         part(too_early, "too close to the start of a pass or to a gap") +
+         part(off_stride, "between strides") + part(held, "held for lack of a sample") + part(gaps, "gaps") +
+         part(damaged, "damaged");
+}
+
+WindowSet WindowSet::load(const std::string& dir, const std::vector<std::string>& plates,
+                          const WindowSettings& settings) {
+  WindowSet set(settings);
+  std::set<std::string> missing(plates.begin(), plates.end());
+  for (const std::string& path : list_recordings(dir)) {
+    const Recording recording = read_recording(path);
+    if (!plates.empty() && std::find(plates.begin(), plates.end(), recording.plate) == plates.end()) continue;
+    missing.erase(recording.plate);
+    try {
+      set.add(recording);
+    } catch (const std::exception& error) {
+      throw std::runtime_error(path + ": " + error.what());
+    }
+  }
+  if (!missing.empty())
+    throw std::invalid_argument("windows: plate '" + *missing.begin() + "' has no recording in " + dir);
+  if (set.size() == 0)
+    throw std::runtime_error(dir + ": no window of " + std::to_string(settings.timesteps) +
+                             " frames: " + set.counts_.summary() + "; try fewer timesteps or longer passes");
+  return set;
+}
+
+WindowSet::WindowSet(const WindowSettings& settings) : settings_(settings) { check(settings); }
+
+size_t WindowSet::plate_index(const std::string& name) {
+  for (size_t i = 0; i < plates_.size(); ++i)
+    if (plates_[i].name() == name) return i;
+  plates_.push_back(Plate::named(name));
+  return plates_.size() - 1;
+}
+
+// Whether a window may end at this frame; counts the reason if not.
+bool WindowSet::accept(const Track& track, size_t frame, bool reliable) {
+  const float x = track.position_mm[2 * frame], y = track.position_mm[2 * frame + 1];
+  size_t* reason = nullptr;
+  if (!reliable)
+    reason = &counts_.unreliable;
+  else if (!std::isfinite(x) || !std::isfinite(y))
+    reason = &counts_.no_position;
+  else if (y < settings_.min_y_mm || y > settings_.max_y_mm)
+    reason = &counts_.outside;
+  else if (track.run[frame] < static_cast<uint32_t>(settings_.timesteps))
+    reason = &counts_.too_early;
+  else if (frame % static_cast<size_t>(settings_.stride) != 0)
+    reason = &counts_.off_stride;
+  else
+    reason = &counts_.windows;
+  ++*reason;
+  return reason == &counts_.windows;
+}
+
+void WindowSet::add(const Recording& recording) {
+  const size_t plate = plate_index(recording.plate);
+  Track track = resample(
+      recording,
+      {.rate_hz = settings_.rate_hz, .max_gap_s = settings_.max_gap_s, .scaling = settings_.scaling});
+  const bool reliable = is_reliable(recording);
+  Pass pass{.plate = recording.plate,
+            .trial = recording.trial,
+            .pass = recording.pass,
+            .speed_mm_s = recording.speed_mm_s,
+            .source = recording.source,
+            .frames = track.frames(),
+            .first_window = index_.size(),
+            .windows = 0};
+  const auto number = static_cast<uint32_t>(passes_.size());
+  for (size_t frame = 0; frame < track.frames(); ++frame)
+    if (accept(track, frame, reliable)) index_.push_back({number, static_cast<uint32_t>(frame)});
+  pass.windows = index_.size() - pass.first_window;
+  ++counts_.recordings;
+  counts_.frames += track.frames();
+  counts_.held += track.held;
+  counts_.gaps += track.gaps;
+  counts_.damaged += track.damaged;
+  track.run = {};  // has served: the index tells which windows there are
+  track.samples.shrink_to_fit();
+  track.position_mm.shrink_to_fit();
+  if (pass.windows == 0) track = {};  // nothing will read it
+  passes_.push_back(std::move(pass));
+  tracks_.push_back(std::move(track));
+  plate_of_.push_back(plate);
+}
+
+std::span<const float> WindowSet::window(size_t i) const {
+  const auto [pass, last] = index_[i];
+  const auto frames = static_cast<size_t>(settings_.timesteps);
+  return std::span(tracks_[pass].samples).subspan((last + 1 - frames) * kTaxels, frames * kTaxels);
+}
+
+void WindowSet::window(size_t i, std::span<float> out) const {
+  const std::span<const float> source = window(i);
+  check_size("a window", out.size(), source.size());
+  std::memcpy(out.data(), source.data(), source.size_bytes());
+}
+
+std::span<const float> WindowSet::last_frame(size_t i) const { return window(i).last(kTaxels); }
+
+WindowSet::Position WindowSet::position(size_t i) const {
+  const auto [pass, last] = index_[i];
+  const std::vector<float>& position = tracks_[pass].position_mm;
+  return {position[2 * size_t{last}], position[2 * size_t{last} + 1]};
+}
+
+void WindowSet::truth(size_t i, std::span<float> out) const {
+  const auto size = static_cast<size_t>(image_size());
+  check_size("a truth image", out.size(), size * size);
+  const Plate& plate = plates_[plate_of_[index_[i].pass]];
+  const auto [x, y] = position(i);
+  if (!plate.uniform_in_x()) return truth_image(plate, x, y, image_size(), out);
+  const double pixel = kWindowMm / image_size();
+  for (size_t row = 0; row < size; ++row) {
+    const double row_y = y - kWindowMm / 2 + (static_cast<double>(row) + 0.5) * pixel;
+    std::fill_n(&out[row * size], size, static_cast<float>(truth_value(plate, x, row_y)));
+  }
+}
+
+bool WindowSet::contact(size_t i) const {
+  std::array<float, kLargestImage> image;
+  const auto size = static_cast<size_t>(image_size());
+  truth(i, std::span(image).first(size * size));
+  return in_contact(std::span(image).first(size * size));
+}
+
+std::string WindowSet::fingerprint() const {
+  Hasher hash;
+  hash.add(static_cast<uint64_t>(settings_.timesteps));
+  hash.add(static_cast<uint64_t>(settings_.scale));
+  for (size_t p = 0; p < passes_.size(); ++p) {
+    hash.add(passes_[p].plate);
+    hash.add(static_cast<uint64_t>(passes_[p].trial));
+    for (const float v : tracks_[p].samples) hash.add(v);
+    for (const float v : tracks_[p].position_mm) hash.add(v);
+  }
+  for (const Entry& entry : index_) hash.add((uint64_t{entry.pass} << 32) | entry.last);
+  return hash.hex();
+}
+
+}  // namespace supertac

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "data/plate.h"
+#include "data/recording.h"
+#include "data/resample.h"
+
+namespace supertac {
+
+struct WindowSettings {
+  int timesteps = 256;   ///< T, frames per window
+  int scale = 4;         ///< 2, 4 or 8: truth images of 8, 16 or 32 pixels a side
+  double rate_hz = 300;  ///< the model's rate
+  Scaling scaling = {};  ///< volts to [0,1]
+  double min_y_mm = 28;  ///< windows whose last frame lies outside min_y..max_y are left out
+  double max_y_mm = 80;
+  int stride = 1;           ///< every stride-th frame of a pass ends a window
+  double max_gap_s = 0.05;  ///< longer silence in a recording is a gap no window crosses
+};
+
+/// Where the frames of the recordings went: frames is the sum of all that follow down to windows.
+struct WindowCounts {
+  size_t recordings = 0, frames = 0;
+  size_t unreliable = 0;   ///< of passes that registration flagged (metadata registration_reliable = no)
+  size_t no_position = 0;  ///< position unknown: no truth
+  size_t outside = 0;      ///< y outside min_y..max_y
+  size_t too_early = 0;    ///< fewer than T frames since the pass began or since a gap
+  size_t off_stride = 0;
+  size_t windows = 0;
+  // About the signals of all recordings:
+  size_t held = 0, gaps = 0, damaged = 0;  ///< as in Track
+  /// One line, for people.
+  std::string summary() const;
+};
+
+/// The windows of a set of recordings. Nothing is copied per window: a recording is resampled once onto
+/// rate_hz and kept as scaled floats, a window is the index (pass, last frame), and none crosses the edge of
+/// a pass or a gap. Memory: 72 bytes per frame and 8 per window. Reading is const and safe from many threads.
+class WindowSet {
+ public:
+  struct Pass {
+    std::string plate;
+    int trial = 0, pass = 0;
+    double speed_mm_s = 0;
+    std::string source;
+    size_t frames = 0;                     ///< on the model's rate
+    size_t first_window = 0, windows = 0;  ///< its windows are consecutive, in order of time
+  };
+  struct Position {
+    double x_mm = 0, y_mm = 0;
+  };
+
+  /// Reads the recordings of a directory, in the order of their names.
+  /// @param plates only these; all when empty.
+  /// @throws std::invalid_argument on settings out of range or a plate without recordings,
+  /// std::runtime_error when the directory holds no recording, a file is unreadable or of an unknown plate,
+  /// or no window is left (saying where the frames went).
+  static WindowSet load(const std::string& dir, const std::vector<std::string>& plates,
+                        const WindowSettings& settings);
+
+  /// An empty set, to be filled by add().
+  /// @throws std::invalid_argument on settings out of range.
+  explicit WindowSet(const WindowSettings& settings);
+  /// Appends the windows of one recording. @throws std::invalid_argument on an unknown plate, and as
+  /// resample().
+  void add(const Recording& recording);
+
+  size_t size() const { return index_.size(); }
+  int timesteps() const { return settings_.timesteps; }
+  int image_size() const { return 4 * settings_.scale; }
+  const WindowSettings& settings() const { return settings_; }
+  const WindowCounts& counts() const { return counts_; }
+  const std::vector<Pass>& passes() const { return passes_; }
+
+  // i < size() throughout, unchecked: these run for every sample of training.
+  // @throws std::invalid_argument when `out` has another size.
+  /// Window i, [T][16], oldest frame first.
+  void window(size_t i, std::span<float> out) const;
+  /// The window without copying it.
+  std::span<const float> window(size_t i) const;
+  /// Truth of its last frame, [S][S], as truth_image.
+  void truth(size_t i, std::span<float> out) const;
+  /// The last frame, [4][4].
+  std::span<const float> last_frame(size_t i) const;
+  Position position(size_t i) const;
+  /// True when the truth has a pixel above 0.
+  bool contact(size_t i) const;
+  size_t pass_of(size_t i) const { return index_[i].pass; }
+  /// Number of the last frame within its pass.
+  size_t frame_of(size_t i) const { return index_[i].last; }
+  /// The frames of a whole pass, [frames][16]; empty when no window ends in it.
+  std::span<const float> track(size_t pass) const { return tracks_[pass].samples; }
+
+  /// 16 hexadecimal digits over samples, positions, plates and index: the same data and settings, the same
+  /// text.
+  std::string fingerprint() const;
+
+ private:
+  struct Entry {
+    uint32_t pass, last;
+  };
+  size_t plate_index(const std::string& name);
+  bool accept(const Track& track, size_t frame, bool reliable);
+
+  WindowSettings settings_;
+  WindowCounts counts_;
+  std::vector<Plate> plates_;
+  std::vector<Pass> passes_;
+  std::vector<Track> tracks_;     // per pass
+  std::vector<size_t> plate_of_;  // per pass, into plates_
+  std::vector<Entry> index_;
+};
+
+}  // namespace supertac

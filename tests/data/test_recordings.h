@@ -1,0 +1,49 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "data/recording.h"
+#include "data/windows.h"
+
+namespace supertac {
+
+/// What a test wants to know of a recording: frame i of taxel k holds a voltage that tells i and k apart.
+struct PassPlan {
+  std::string plate = "bumps12";
+  int trial = 1, pass = 1;
+  size_t frames = 100;
+  double rate_hz = 300;
+  double start_y_mm = 30, speed_mm_s = 10;
+  float level = 2.0F;  ///< volts of frame 0, taxel 0
+};
+
+inline Recording make_recording(const PassPlan& plan) {
+  Recording recording;
+  recording.plate = plan.plate;
+  recording.trial = plan.trial;
+  recording.pass = plan.pass;
+  recording.speed_mm_s = plan.speed_mm_s;
+  recording.source = "simulated";
+  for (size_t i = 0; i < plan.frames; ++i) {
+    const double t = static_cast<double>(i) / plan.rate_hz;
+    recording.time_s.push_back(t);
+    for (int k = 0; k < kTaxels; ++k)
+      recording.volts.push_back(plan.level + 0.001F * static_cast<float>(i) +
+                                0.0001F * static_cast<float>(k));
+    recording.position_mm.push_back(18.0F);
+    recording.position_mm.push_back(static_cast<float>(plan.start_y_mm + plan.speed_mm_s * t));
+  }
+  return recording;
+}
+
+/// Scales so that the voltages above stay apart: x = 1 - (V - 1) / 2, roughly.
+inline WindowSettings wide_settings(int timesteps = 16) {
+  WindowSettings settings;
+  settings.timesteps = timesteps;
+  settings.scaling = {.rest_volts = 3.0, .span_volts = 2.0};
+  return settings;
+}
+
+}  // namespace supertac
