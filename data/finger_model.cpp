@@ -26,14 +26,23 @@ struct Term {
   bool SimulatorSettings::*on;
 };
 constexpr Term kTerms[] = {
-    {"mount", &SimulatorSettings::with_mount},         {"pad", &SimulatorSettings::with_pad},
-    {"edges", &SimulatorSettings::with_edges},         {"tilt", &SimulatorSettings::with_tilt},
-    {"gains", &SimulatorSettings::with_gains},         {"variation", &SimulatorSettings::with_variation},
-    {"crosstalk", &SimulatorSettings::with_crosstalk}, {"vibration", &SimulatorSettings::with_vibration},
-    {"drift", &SimulatorSettings::with_drift},         {"emi", &SimulatorSettings::with_emi},
-    {"noise", &SimulatorSettings::with_noise},         {"adc", &SimulatorSettings::with_adc},
-    {"filter", &SimulatorSettings::with_filter},       {"saturation", &SimulatorSettings::with_saturation},
-    {"jitter", &SimulatorSettings::with_jitter},       {"loss", &SimulatorSettings::with_loss},
+    {"mount", &SimulatorSettings::with_mount},
+    {"pad", &SimulatorSettings::with_pad},
+    {"dome", &SimulatorSettings::with_dome},
+    {"edges", &SimulatorSettings::with_edges},
+    {"tilt", &SimulatorSettings::with_tilt},
+    {"gains", &SimulatorSettings::with_gains},
+    {"variation", &SimulatorSettings::with_variation},
+    {"crosstalk", &SimulatorSettings::with_crosstalk},
+    {"vibration", &SimulatorSettings::with_vibration},
+    {"drift", &SimulatorSettings::with_drift},
+    {"emi", &SimulatorSettings::with_emi},
+    {"noise", &SimulatorSettings::with_noise},
+    {"adc", &SimulatorSettings::with_adc},
+    {"filter", &SimulatorSettings::with_filter},
+    {"saturation", &SimulatorSettings::with_saturation},
+    {"jitter", &SimulatorSettings::with_jitter},
+    {"loss", &SimulatorSettings::with_loss},
 };
 
 // sin(2 pi turns) to 2e-4 from products only, so that simulated bits do not depend on the C library.
@@ -167,10 +176,12 @@ double FingerModel::surface(double x_mm, double y_mm) const {
 }
 
 std::array<double, kTaxels> FingerModel::loads(const FingerPose& pose) const {
+  const double dome = settings_.with_dome ? settings_.dome : 1;
   std::array<double, kTaxels> depth{};
   for (int k = 0; k < kTaxels; ++k) {
     const auto c = static_cast<size_t>(k);
-    depth[c] = surface(pose.x_mm + taxel_x_mm(k), pose.y_mm + taxel_y_mm(k)) + tilt_[c] - pose.z_mm;
+    depth[c] =
+        surface(pose.x_mm + dome * taxel_x_mm(k), pose.y_mm + dome * taxel_y_mm(k)) + tilt_[c] - pose.z_mm;
   }
   // Balance of the mount: stiffness * lift = sum of loads. The excess load is convex and falls with the lift,
   // so Newton's steps from lift 0 approach the root from below and never pass it.

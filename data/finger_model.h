@@ -15,12 +15,14 @@ namespace supertac {
 struct SimulatorSettings {
   double rate_hz = 300;
   double indentation_mm = 0.35;  ///< how far the slide's path lies below first contact with the flat plate
-  double volts_per_load = 0.8;  ///< drop of a taxel of gain 1 under unit load; load = indentation^1.5 (mm)
+  double volts_per_load = 0.8;   ///< drop of a taxel of gain 1 under unit load; load = indentation^1.5 (mm)
 
   bool with_mount = true;      ///< the finger gives way: a bump under one row lifts the other rows
   double mount_stiffness = 2;  ///< unit loads per mm
   bool with_pad = true;        ///< the elastic pad spreads a point of the surface
   double pad_sigma_mm = 1.3;
+  bool with_dome = true;   ///< the pad is round: outer taxels meet the surface further inside
+  double dome = 0.78;      ///< contact lies at this share of the taxel's distance from the centre
   bool with_edges = true;  ///< beside the plate there is nothing to touch
   bool with_tilt = true;   ///< the finger's rear rows ride lower
   double tilt_mm_per_mm = 0.02, tilt_spread = 0.01;

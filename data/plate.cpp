@@ -166,6 +166,14 @@ double Plate::height(double x_mm, double y_mm) const {
   return z;
 }
 
+std::vector<double> Plate::crests() const {
+  std::vector<double> crests;
+  for (const Band& band : bands_)
+    for (int i = 0; i < band.count_y; ++i) crests.push_back(band.first_y + i * band.texture.pitch_mm);
+  std::sort(crests.begin(), crests.end());
+  return crests;
+}
+
 bool Plate::uniform_in_x() const {
   return std::none_of(bands_.begin(), bands_.end(),
                       [](const Band& b) { return b.texture.kind == TextureKind::blobs; });

@@ -50,6 +50,10 @@ class Plate {
   double texture_begin() const { return texture_begin_; }
   double texture_end() const { return texture_end_; }
 
+  /// Where the elements' highest lines (blobs: rows of centres) lie along y (mm), ascending; empty when
+  /// plain.
+  std::vector<double> crests() const;
+
   /// True when the height depends on y only (everything but blobs).
   bool uniform_in_x() const;
 

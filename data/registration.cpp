@@ -1,0 +1,258 @@
+#include "data/registration.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "data/contacts.h"
+#include "data/simulator.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+// Where the contact of a taxel row lies from the finger's centre. Taxel rows are 3 mm apart, but the pad is
+// round: medians over the rig's 96 passes.
+constexpr std::array<double, 4> kRowOffsetMm = {-3.5, -1.3, 1.3, 3.5};
+// The first element under the leading row and the last one under the trailing row carry the finger alone and
+// are felt further out, with slopes of different steepness: little weight.
+constexpr double kAloneShiftMm = 1.0, kAloneWeight = 0.2;
+
+constexpr double kNominalSpeed = 10;
+constexpr double kFullDepthV = 0.1;  // deeper contacts weigh no more: they saturate
+constexpr double kScanReachMm = 1.2, kFitReachMm = 1.5;
+constexpr double kMiddleReachMm = 45, kMiddleStepMm = 0.25;
+constexpr double kSlowest = 0.6, kFastest = 2.2, kRateStep = 0.01;
+constexpr double kRigFilterS = 0.0992;
+
+// When a pass is believed.
+constexpr int kMinContacts = 8;
+constexpr double kMinMatched = 0.4, kMinCoverage = 0.3, kMaxResidualMm = 0.55, kMinMargin = 0.03;
+
+// A frame-to-frame change this many times the usual one around it is a burst of lost frames.
+constexpr double kBurstVolts = 0.25;
+
+struct Event {
+  int row = 0;
+  double time = 0, weight = 0;
+};
+
+struct Line {
+  double middle_mm = 0, rate = 0;  // y at the middle of the recording, mm/s
+  double matched = 0, coverage = 0, score = -std::numeric_limits<double>::infinity();
+};
+
+struct Match {
+  size_t crest = 0;
+  double distance_mm = 0;  // crest minus contact
+  double weight = 0;
+};
+
+class Fit {
+ public:
+  Fit(const Recording& recording, const Plate& plate)
+      : crests_(plate.crests()),
+        speed_(recording.speed_mm_s > 0 ? recording.speed_mm_s : kNominalSpeed),
+        middle_s_((recording.time_s.front() + recording.time_s.back()) / 2) {
+    for (const Contact& c : find_contacts(recording, {.reach_s = 0.6 * pitch() / speed_}))
+      events_.push_back({.row = c.taxel / 4, .time = c.time_s - middle_s_, .weight = weight_of(c)});
+  }
+
+  size_t events() const { return events_.size(); }
+  double middle_s() const { return middle_s_; }
+  double speed() const { return speed_; }
+
+  // Scores every start and rate; `best` is the winner, `rival` the best that means another place or another
+  // pitch.
+  void scan(Line& best, Line& rival) const {
+    std::vector<Line> lines;
+    for (double factor = kSlowest; factor < kFastest; factor *= 1 + kRateStep)
+      for (double offset = -kMiddleReachMm; offset <= kMiddleReachMm; offset += kMiddleStepMm)
+        lines.push_back(scored(Plate::kLengthMm / 2 + offset, speed_ * factor));
+    for (const Line& line : lines)
+      if (line.score > best.score) best = line;
+    for (const Line& line : lines)
+      if (elsewhere(line, best) && line.score > rival.score) rival = line;
+  }
+
+  // Weighted least squares with Tukey's biweight, repeated until the weights have settled.
+  void refine(Line& line) const {
+    for (int repeat = 0; repeat < 20; ++repeat) {
+      double w = 0, wt = 0, wtt = 0, wd = 0, wtd = 0;
+      for (const Event& event : events_) {
+        const Match m = match(event, line);
+        w += m.weight, wt += m.weight * event.time, wtt += m.weight * event.time * event.time;
+        wd += m.weight * m.distance_mm, wtd += m.weight * m.distance_mm * event.time;
+      }
+      const double determinant = w * wtt - wt * wt;
+      if (!(determinant > 1e-9)) return;
+      line.middle_mm += (wtt * wd - wt * wtd) / determinant;
+      line.rate += (w * wtd - wt * wd) / determinant;
+    }
+    const Line again = scored(line.middle_mm, line.rate);
+    line.matched = again.matched, line.coverage = again.coverage, line.score = again.score;
+  }
+
+  Match match(const Event& event, const Line& line) const {
+    const double y = line.middle_mm + line.rate * event.time + kRowOffsetMm[static_cast<size_t>(event.row)];
+    size_t nearest = 0;
+    for (size_t j = 1; j < crests_.size(); ++j)
+      if (std::abs(crests_[j] - y) < std::abs(crests_[nearest] - y)) nearest = j;
+    Match m{.crest = nearest, .distance_mm = crests_[nearest] - y, .weight = event.weight};
+    const bool leading_alone = event.row == 3 && nearest == 0;
+    const bool trailing_alone = event.row == 0 && nearest + 1 == crests_.size();
+    if (leading_alone) m.distance_mm -= kAloneShiftMm;
+    if (trailing_alone) m.distance_mm += kAloneShiftMm;
+    if (leading_alone || trailing_alone) m.weight *= kAloneWeight;
+    const double u = m.distance_mm / kFitReachMm;
+    m.weight *= std::abs(u) < 1 ? (1 - u * u) * (1 - u * u) : 0.0;
+    return m;
+  }
+
+  // Contacts used and their weighted rms distance.
+  void judge(const Line& line, Registration& out) const {
+    double w = 0, wdd = 0;
+    for (const Event& event : events_) {
+      const Match m = match(event, line);
+      out.contacts += m.weight > 0 ? 1 : 0;
+      w += m.weight, wdd += m.weight * m.distance_mm * m.distance_mm;
+    }
+    out.residual = w > 0 ? std::sqrt(wdd / w) : 0;
+    out.matched = line.matched;
+    out.coverage = line.coverage;
+  }
+
+  bool contacts_after(double time_s, const Line& line) const {
+    return std::any_of(events_.begin(), events_.end(), [&](const Event& event) {
+      return event.time + middle_s_ > time_s && match(event, line).weight > 0;
+    });
+  }
+
+ private:
+  double pitch() const {
+    double smallest = Plate::kLengthMm;
+    for (size_t j = 1; j < crests_.size(); ++j) smallest = std::min(smallest, crests_[j] - crests_[j - 1]);
+    return std::min(smallest, 12.0);
+  }
+
+  static double weight_of(const Contact& c) { return std::sqrt(std::min(c.depth_v / kFullDepthV, 1.0)); }
+
+  // A pass covers the plate about evenly and its clock is about right: mild preference, in units of the
+  // score.
+  double preference(double middle_mm, double rate) const {
+    const double off = (middle_mm - Plate::kLengthMm / 2) / 10, fast = std::log(rate / speed_) / 0.15;
+    return -0.05 * (off * off + fast * fast);
+  }
+
+  bool elsewhere(const Line& a, const Line& b) const {
+    return std::abs(a.middle_mm - b.middle_mm) > pitch() / 2 || std::abs(std::log(a.rate / b.rate)) > 0.25;
+  }
+
+  Line scored(double middle_mm, double rate) const {
+    Line line{.middle_mm = middle_mm, .rate = rate};
+    std::vector<std::array<double, 4>> felt(crests_.size());
+    double total = 0, agree = 0;
+    for (const Event& event : events_) {
+      const double y = middle_mm + rate * event.time + kRowOffsetMm[static_cast<size_t>(event.row)];
+      size_t nearest = 0;
+      double distance = std::abs(crests_[0] - y);
+      for (size_t j = 1; j < crests_.size(); ++j)
+        if (const double d = std::abs(crests_[j] - y); d < distance) distance = d, nearest = j;
+      const double fit = std::max(0.0, 1 - distance / kScanReachMm);
+      total += event.weight, agree += event.weight * fit;
+      double& best = felt[nearest][static_cast<size_t>(event.row)];
+      best = std::max(best, fit);
+    }
+    double pairs = 0;
+    for (const auto& rows : felt)
+      for (const double f : rows) pairs += f;
+    line.matched = total > 0 ? agree / total : 0;
+    line.coverage = pairs / (4 * static_cast<double>(crests_.size()));
+    line.score = line.matched + line.coverage + preference(middle_mm, rate);
+    return line;
+  }
+
+  std::vector<double> crests_;
+  double speed_, middle_s_;
+  std::vector<Event> events_;
+};
+
+double filter_delay(const Recording& recording) {
+  const auto found = recording.metadata.find("filter_s");
+  if (found != recording.metadata.end()) return parse_double(found->second).value_or(0) / 2;
+  return recording.source == "imported" ? kRigFilterS / 2 : 0;
+}
+
+// Time of the last burst of lost frames: the moving average makes a jump of all taxels together impossible
+// otherwise. Negative when there is none.
+double last_burst(const Recording& recording) {
+  for (size_t i = recording.frames() - 1; i > 0; --i) {
+    double change = 0;
+    for (size_t k = 0; k < kTaxels; ++k)
+      change += std::abs(recording.volts[i * kTaxels + k] - recording.volts[(i - 1) * kTaxels + k]);
+    if (change > kBurstVolts) return recording.time_s[i];
+  }
+  return -1;
+}
+
+std::string judge_reason(const Registration& r) {
+  if (r.contacts < kMinContacts)
+    return "only " + std::to_string(r.contacts) + " contacts, need " + std::to_string(kMinContacts);
+  if (r.matched < kMinMatched)
+    return "only " + format(100 * r.matched, 0) + " % of the contacts agree with the plate";
+  if (r.coverage < kMinCoverage)
+    return "only " + format(100 * r.coverage, 0) + " % of the plate's elements were felt";
+  if (r.residual > kMaxResidualMm) return "contacts lie " + format(r.residual, 2) + " mm (rms) off the plate";
+  if (r.margin < kMinMargin) return "another start fits as well (off by a pitch?)";
+  return "";
+}
+
+}  // namespace
+
+Registration register_pass(const Recording& recording, const Plate& plate) {
+  Registration result;
+  const auto flagged = [&](const std::string& reason) {
+    result.reason = reason;
+    return result;
+  };
+  if (plate.crests().empty()) return flagged("a plain plate has nothing to register against");
+  if (recording.frames() < 3) return flagged("the recording is empty");
+  const Fit fit(recording, plate);
+  if (fit.events() == 0) return flagged("no taxel felt anything");
+
+  Line best, rival;
+  fit.scan(best, rival);
+  result.margin = best.score - rival.score;
+  fit.refine(best);
+  fit.judge(best, result);
+  result.rate = best.rate;
+  // Signals trail the finger: where a contact shows at t, the finger has been since t - delay.
+  result.start_mm = best.middle_mm - best.rate * fit.middle_s() + fit.speed() * filter_delay(recording);
+  result.valid_until_s = recording.time_s.back();
+  const double burst = last_burst(recording);
+  if (burst > 0 && !fit.contacts_after(burst, best)) result.valid_until_s = burst;
+  result.reason = judge_reason(result);
+  result.reliable = result.reason.empty();
+  return result;
+}
+
+void apply(const Registration& registration, Recording& recording) {
+  const size_t n = recording.frames();
+  recording.position_mm.resize(2 * n);
+  const auto x = static_cast<float>(pass_x_mm(recording.pass));
+  for (size_t i = 0; i < n; ++i) {
+    const double y = registration.start_mm + registration.rate * recording.time_s[i];
+    const bool known = recording.time_s[i] <= registration.valid_until_s;
+    recording.position_mm[2 * i] = x;
+    recording.position_mm[2 * i + 1] = known ? static_cast<float>(std::clamp(y, 0.0, Plate::kLengthMm))
+                                             : std::numeric_limits<float>::quiet_NaN();
+  }
+  recording.metadata["registration_start_mm"] = format(registration.start_mm, 3);
+  recording.metadata["registration_rate"] = format(registration.rate, 4);
+  recording.metadata["registration_residual_mm"] = format(registration.residual, 3);
+  recording.metadata["registration_reliable"] = registration.reliable ? "yes" : "no";
+  recording.metadata["registration_reason"] = registration.reason;
+}
+
+}  // namespace supertac

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "data/plate.h"
+#include "data/recording.h"
+
+namespace supertac {
+
+/// Where the finger was during a pass: y(t) = start_mm + rate * t for the recording's own clock t.
+struct Registration {
+  double start_mm = 0;  ///< y of the finger's centre at time 0
+  double rate = 0;      ///< mm per second of the recording's clock
+  double residual = 0;  ///< rms distance (mm) of the contacts used from where their element should be
+  int contacts = 0;     ///< used for the fit
+  double matched = 0;   ///< share of all contacts, by weight, that agree with the plate
+  double coverage = 0;  ///< share of (taxel row, element) pairs that were felt
+  double margin =
+      0;  ///< by how much the score (matched + coverage) beats the next best start, a pitch off, say
+  double valid_until_s =
+      0;  ///< after a burst of lost frames without further contacts the position is unknown
+  bool reliable = false;
+  std::string reason;  ///< what is wrong when it is not
+};
+
+/// Fits start and rate of a pass to its plate. Each element of the texture that passes a taxel row makes a
+/// contact (find_contacts); the fit is the line that puts the contacts of all rows onto the plate's elements:
+///   y(time of contact) + row offset = crest of the element.
+/// All starts and rates within reach are tried, scored by the contacts that agree and the elements that were
+/// felt (so a fit that is one pitch off loses the elements at one end), the best is refined by robust least
+/// squares. Row offsets are symmetric about the finger's centre, so an outline that is felt early by the
+/// leading rows and late by the trailing ones does not move the centre. The delay of the recording's moving
+/// average (metadata filter_s; 0.0992 s for imported recordings) is taken out. Never throws for a pass that
+/// does not fit: it is flagged. @throws std::invalid_argument as find_contacts does.
+Registration register_pass(const Recording& recording, const Plate& plate);
+
+/// Fills position_mm: x from the number of the pass, y from the registration, limited to the plate; NaN after
+/// valid_until_s. Writes metadata registration_start_mm, _rate, _residual_mm, _reliable (yes, no) and
+/// _reason.
+void apply(const Registration& registration, Recording& recording);
+
+}  // namespace supertac
