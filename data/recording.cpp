@@ -42,8 +42,9 @@ std::optional<std::string> problem_of(const Recording& recording) {
     return "volts are not finite at frame " + std::to_string(index / kTaxels) + ", taxel " +
            std::to_string(index % kTaxels);
   }
-  if (!std::all_of(recording.position_mm.begin(), recording.position_mm.end(), finite)) {
-    return "position_mm is not finite";
+  const auto infinite = [](float value) { return std::isinf(value); };
+  if (std::any_of(recording.position_mm.begin(), recording.position_mm.end(), infinite)) {
+    return "position_mm is infinite";
   }
   if (recording.trial < 0 || recording.pass < 0) return "trial and pass must not be negative";
   if (!std::isfinite(recording.speed_mm_s) || recording.speed_mm_s < 0) return "speed_mm_s must be 0 or more";

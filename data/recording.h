@@ -11,13 +11,14 @@ constexpr int kTaxels = 16;
 
 /// One pass of the finger over a plate, at the rate it was recorded with.
 struct Recording {
-  std::vector<double> time_s;      ///< n, strictly increasing
-  std::vector<float> volts;        ///< n x 16, taxel k fastest; pressure lowers the voltage
-  std::vector<float> position_mm;  ///< n x 2: (x, y) of the finger's centre on the plate; empty when unknown
-  std::string plate;               ///< name as Plate::named takes it
-  int trial = 0, pass = 0;         ///< from 1
-  double speed_mm_s = 0;           ///< as commanded; 0 when unknown
-  std::string source;              ///< "simulated", "imported" or "collected"
+  std::vector<double> time_s;  ///< n, strictly increasing
+  std::vector<float> volts;    ///< n x 16, taxel k fastest; pressure lowers the voltage
+  std::vector<float>
+      position_mm;    ///< n x 2: (x, y) of the finger's centre on the plate; empty, or NaN where unknown
+  std::string plate;  ///< name as Plate::named takes it
+  int trial = 0, pass = 0;                      ///< from 1
+  double speed_mm_s = 0;                        ///< as commanded; 0 when unknown
+  std::string source;                           ///< "simulated", "imported" or "collected"
   std::map<std::string, std::string> metadata;  ///< whatever else is worth keeping (filter, time base, ...)
 
   size_t frames() const { return time_s.size(); }
@@ -26,7 +27,8 @@ struct Recording {
 /// Reads a safetensors file with tensors time_s F64 [n], volts F32 [n,16] and, where known, position_mm F32
 /// [n,2].
 /// @throws FileError when the file is damaged (io/safetensors.h), is no recording, or breaks a rule of
-/// Recording: sizes that do not match, values that are not finite, time stamps that do not increase.
+/// Recording: sizes that do not match, values that are not finite (position_mm may be NaN), time stamps that
+/// do not increase.
 Recording read_recording(const std::string& path);
 
 /// Writes it atomically; the same recording gives the same bytes.
