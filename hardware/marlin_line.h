@@ -1,0 +1,60 @@
+// The text of Marlin's serial protocol, without any port: numbered lines with checksums, and what a reply
+// means.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace supertac {
+
+struct Point3 {
+  double x = 0, y = 0, z = 0;
+  bool operator==(const Point3&) const = default;
+};
+
+double distance(const Point3& a, const Point3& b);
+
+/// "X99.70 Y101.17 Z91.81"-style text for messages.
+std::string describe(const Point3& point);
+
+constexpr std::size_t kMaxLineBytes = 96;  ///< Marlin's MAX_CMD_SIZE
+
+/// XOR of all bytes.
+unsigned marlin_checksum(std::string_view text);
+
+/// `N<n> <command>*<xor>\n`. Throws std::invalid_argument when longer than 96 bytes or when the command holds
+/// a line break or '*'.
+std::string numbered_line(std::int64_t number, std::string_view command);
+
+/// Fixed decimals, never an exponent, whatever the locale. Throws std::invalid_argument unless finite.
+std::string fixed_decimals(double value, int decimals);
+
+enum class ReplyKind {
+  ok,
+  resend,           ///< Resend: number
+  line_fault,       ///< Error:... about checksum or line number; number = Last Line when it could be read
+  fatal,            ///< kill(), halt, thermal: nothing more may be sent
+  error,            ///< any other Error:
+  unknown_command,  ///< acknowledged but not run
+  busy,             ///< echo:busy: processing
+  paused,           ///< echo:busy: paused for user
+  start,            ///< the firmware restarted
+  wait,             ///< heartbeat of an idle firmware
+  position,         ///< M114
+  other
+};
+
+struct Reply {
+  ReplyKind kind = ReplyKind::other;
+  std::optional<std::int64_t> number;
+  Point3 position;
+  std::string text;
+};
+
+/// Classifies one line without its line break. Damaged text becomes `other`, or `error` when it still starts
+/// with "Error:".
+Reply parse_reply(std::string_view line);
+
+}  // namespace supertac

@@ -1,0 +1,17 @@
+// Raw terminal settings through TCSETS2, which takes any baud rate (the board's 7,372,800 has no B constant).
+// Apart from serial_port.cpp because <asm/termbits.h> and <termios.h> cannot be included together.
+#pragma once
+
+namespace supertac {
+
+/// Eight bits, no parity, no flow control, no translation, `baud` in both directions.
+/// Returns 0 or the errno of the call that failed.
+int set_raw_terminal(int descriptor, unsigned baud);
+
+/// True when a terminal answers TCGETS2 on this descriptor.
+bool is_terminal(int descriptor);
+
+/// Baud rate as the terminal reports it, 0 when it does not.
+unsigned terminal_baud(int descriptor);
+
+}  // namespace supertac

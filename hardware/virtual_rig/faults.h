@@ -1,0 +1,60 @@
+// Faults of a cable, by seed: the n-th byte of a stream meets the same fate in every run.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/random.h"
+
+namespace supertac {
+
+/// Rates of everything the virtual rig can do wrong. All 0: a perfect rig.
+struct RigFaults {
+  double byte_rate = 0;     ///< per byte and direction: dropped, flipped (one bit) or inserted, a third each
+  double lost_ok_rate = 0;  ///< per ok
+  double resend_storm_rate = 0;  ///< per line: the firmware complains several times about a good line
+  double reset_rate = 0;         ///< per line: the firmware restarts
+  double unplug_rate = 0;        ///< per line: the printer's port goes away
+  double stall_rate =
+      0;  ///< per line: the firmware answers 50 ms late; per frame: the board sends 20 ms late
+  double lost_frame_rate = 0;  ///< per frame: USB was busy, the frame vanishes
+
+  /// The mix of `--faults RATE`: bytes at `rate`, every other fault scaled so that resets and unplugs stay
+  /// rare enough for some collections to finish.
+  static RigFaults mixed(double rate);
+};
+
+/// A stream of decisions.
+class Dice {
+ public:
+  Dice(std::uint64_t seed, std::uint64_t stream) : random_(seed, stream) {}
+  /// True with probability `rate`.
+  bool hit(double rate) { return rate > 0 && random_.uniform(counter_++) < rate; }
+  double uniform() { return random_.uniform(counter_++); }
+  double normal() { return random_.normal(counter_++); }
+  std::uint32_t below(std::uint32_t limit) { return random_.bits(counter_++) % limit; }
+
+ private:
+  RandomStream random_;
+  std::uint64_t counter_ = 0;
+};
+
+/// Drops, flips and inserts bytes.
+class ByteFaults {
+ public:
+  struct Counters {
+    std::uint64_t dropped = 0, flipped = 0, inserted = 0;
+  };
+  ByteFaults(double rate, std::uint64_t seed, std::uint64_t stream) : rate_(rate), dice_(seed, stream) {}
+  std::vector<std::byte> apply(std::span<const std::byte> bytes);
+  const Counters& counters() const { return counters_; }
+
+ private:
+  double rate_;
+  Dice dice_;
+  Counters counters_;
+};
+
+}  // namespace supertac

@@ -1,0 +1,46 @@
+#include "hardware/virtual_rig/motion_queue.h"
+
+#include <algorithm>
+
+#include "hardware/motion_model.h"
+
+namespace supertac {
+
+Point3 MotionQueue::at(double t) {
+  while (!blocks_.empty() && t >= blocks_.front().end) {
+    rest_ = blocks_.front().to;
+    blocks_.pop_front();
+  }
+  if (blocks_.empty() || t <= blocks_.front().start) return rest_;
+  const Block& block = blocks_.front();
+  const double length = distance(block.from, block.to);
+  const double done = trapezoid_position(t - block.start, length, block.end - block.start, acceleration_);
+  const double part = length > 0 ? done / length : 1;
+  return {block.from.x + part * (block.to.x - block.from.x),
+          block.from.y + part * (block.to.y - block.from.y),
+          block.from.z + part * (block.to.z - block.from.z)};
+}
+
+bool MotionQueue::full(double t) {
+  (void)at(t);
+  return blocks_.size() >= kBlocks;
+}
+
+void MotionQueue::move_to(const Point3& to, double speed_mm_s, double t) {
+  rest_ = blocks_.empty() ? at(t) : rest_;
+  const Point3 from = target();
+  if (from == to) return;
+  const double true_speed = speed_mm_s * (1 - 0.0012 * std::min(speed_mm_s, 100.0));
+  const double start = blocks_.empty() ? t + kStartDelay : blocks_.back().end;
+  end_ = start + trapezoid_duration(distance(from, to), true_speed, acceleration_);
+  blocks_.push_back({from, to, start, end_});
+}
+
+Point3 MotionQueue::stop(double t) {
+  rest_ = at(t);
+  blocks_.clear();
+  end_ = t;
+  return rest_;
+}
+
+}  // namespace supertac

@@ -1,0 +1,45 @@
+// The planner of the virtual printer: straight moves with acceleration, one after the other, each stopping at
+// its end. As measured on Marlin, a move that finds the queue empty starts 126.5 ms late, and the true speed
+// is a little below the ordered one (9.88 mm/s at F600, 4.97 at F300).
+#pragma once
+
+#include <cstddef>
+#include <deque>
+
+#include "hardware/marlin_line.h"
+
+namespace supertac {
+
+class MotionQueue {
+ public:
+  static constexpr std::size_t kBlocks = 16;
+  static constexpr double kStartDelay = 0.1265;
+
+  explicit MotionQueue(const Point3& start, double acceleration = 500)
+      : rest_(start), acceleration_(acceleration) {}
+
+  /// Where the head is at time t. Forgets moves that ended before t, so t may not go backwards.
+  Point3 at(double t);
+  /// The end of the last move.
+  Point3 target() const { return blocks_.empty() ? rest_ : blocks_.back().to; }
+  /// When the last move ends; in the past when the head stands.
+  double end_time() const { return end_; }
+  /// When the move now running ends; end_time() when none runs.
+  double next_end() const { return blocks_.empty() ? end_ : blocks_.front().end; }
+  bool full(double t);
+  void move_to(const Point3& to, double speed_mm_s, double t);
+  /// Stops dead; returns where.
+  Point3 stop(double t);
+
+ private:
+  struct Block {
+    Point3 from, to;
+    double start, end;
+  };
+  Point3 rest_;
+  double acceleration_;
+  double end_ = -1;
+  std::deque<Block> blocks_;
+};
+
+}  // namespace supertac

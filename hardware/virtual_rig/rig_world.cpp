@@ -1,0 +1,61 @@
+#include "hardware/virtual_rig/rig_world.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace supertac {
+namespace {
+
+VirtualPrinterSettings printer_settings(const RigSettings& settings) {
+  VirtualPrinterSettings printer = settings.printer;
+  printer.faults = settings.faults;
+  printer.seed = settings.seed;
+  return printer;
+}
+
+VirtualBoardSettings board_settings(const RigSettings& settings) {
+  VirtualBoardSettings board = settings.board;
+  board.faults = settings.faults;
+  board.seed = settings.seed;
+  return board;
+}
+
+}  // namespace
+
+RigWorld::RigWorld(const RigSettings& settings, double t, BoardSink sink)
+    : now_(t),
+      printer_(printer_settings(settings), t, settings.printer_running),
+      board_(board_settings(settings), t),
+      sink_(std::move(sink)),
+      to_printer_bytes_(settings.faults.byte_rate, settings.seed, 11),
+      from_printer_bytes_(settings.faults.byte_rate, settings.seed, 12),
+      board_bytes_(settings.faults.byte_rate, settings.seed, 13) {}
+
+double RigWorld::next_event() const { return std::min(printer_.next_event(), board_.next_frame()); }
+
+void RigWorld::advance(double t) {
+  while (board_.next_frame() <= t) {
+    const double end = board_.next_frame();
+    const double middle = std::max(now_, end - 0.5 * board_.period());
+    printer_.advance(middle);
+    const Point3 head = printer_.head(middle);
+    printer_.advance(end);
+    now_ = end;
+    const std::vector<std::byte> bytes = board_bytes_.apply(board_.make_frame(head));
+    if (!bytes.empty() && sink_ && !sink_(bytes, end)) board_.refuse_last();
+  }
+  printer_.advance(t);
+  now_ = std::max(now_, t);
+}
+
+void RigWorld::to_printer(std::span<const std::byte> bytes) {
+  const std::vector<std::byte> damaged = to_printer_bytes_.apply(bytes);
+  printer_.receive({reinterpret_cast<const char*>(damaged.data()), damaged.size()}, now_);
+}
+
+std::vector<std::byte> RigWorld::from_printer() {
+  const std::string text = printer_.take_output();
+  return from_printer_bytes_.apply(std::as_bytes(std::span(text)));
+}
+
+}  // namespace supertac

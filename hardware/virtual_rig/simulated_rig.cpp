@@ -1,0 +1,150 @@
+#include "hardware/virtual_rig/simulated_rig.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "hardware/errors.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kByteSeconds = 10.0 / 115200;
+constexpr std::size_t kMostChunks = 4096;
+// Arrival is never exactly on time: a USB frame of 125 us and the host's wake-up.
+constexpr double kUsbLatency = 0.0002;
+
+}  // namespace
+
+class SimulatedRig::PrinterPort : public Port {
+ public:
+  explicit PrinterPort(SimulatedRig& rig) : rig_(rig) {}
+  const std::string& name() const override { return name_; }
+  double now() override { return rig_.now(); }
+
+  Received read(std::span<std::byte> buffer, double until) override {
+    std::unique_lock lock(rig_.mutex_);
+    for (;;) {
+      check();
+      const std::vector<std::byte> fresh = rig_.world_.from_printer();
+      rig_.printer_bytes_.insert(rig_.printer_bytes_.end(), fresh.begin(), fresh.end());
+      if (!rig_.printer_bytes_.empty()) break;
+      if (rig_.world_.now() >= until) return {0, rig_.world_.now()};
+      // A step at a time, so that an answer is seen when it is given.
+      const double event = rig_.world_.printer().next_event();
+      rig_.advance(lock, std::min(until, std::max(event, rig_.world_.now())));
+    }
+    const std::size_t count = std::min(buffer.size(), rig_.printer_bytes_.size());
+    std::copy_n(rig_.printer_bytes_.begin(), count, buffer.begin());
+    rig_.printer_bytes_.erase(rig_.printer_bytes_.begin(),
+                              rig_.printer_bytes_.begin() + static_cast<std::ptrdiff_t>(count));
+    return {count, rig_.world_.now()};
+  }
+
+  double write(std::span<const std::byte> bytes, double) override {
+    std::unique_lock lock(rig_.mutex_);
+    check();
+    rig_.advance(lock, rig_.world_.now() + static_cast<double>(bytes.size()) * kByteSeconds);
+    rig_.world_.to_printer(bytes);
+    return rig_.world_.now();
+  }
+
+ private:
+  void check() const {
+    if (rig_.printer_gone_ || rig_.world_.printer().unplugged()) {
+      throw PortUnplugged("port simulated printer: the device is gone; check the cable and start again");
+    }
+  }
+  SimulatedRig& rig_;
+  std::string name_ = "simulated printer";
+};
+
+class SimulatedRig::BoardPort : public Port {
+ public:
+  explicit BoardPort(SimulatedRig& rig) : rig_(rig) {
+    std::lock_guard lock(rig_.mutex_);
+    rig_.board_listens_ = true;
+  }
+  ~BoardPort() override {
+    std::lock_guard lock(rig_.mutex_);
+    rig_.board_listens_ = false;
+    rig_.board_chunks_.clear();
+    rig_.changed_.notify_all();
+  }
+  const std::string& name() const override { return name_; }
+  double now() override { return rig_.now(); }
+
+  Received read(std::span<std::byte> buffer, double until) override {
+    std::unique_lock lock(rig_.mutex_);
+    rig_.changed_.wait_for(lock, std::chrono::milliseconds(50), [&] {
+      return !rig_.board_chunks_.empty() || rig_.board_gone_ || rig_.world_.now() >= until;
+    });
+    if (rig_.board_chunks_.empty()) {
+      if (rig_.board_gone_) {
+        throw PortUnplugged("port simulated board: the device is gone; check the cable and start again");
+      }
+      return {0, rig_.world_.now()};
+    }
+    Chunk& chunk = rig_.board_chunks_.front();
+    const std::size_t count = std::min(buffer.size(), chunk.bytes.size());
+    const double time = chunk.time_s;
+    std::copy_n(chunk.bytes.begin(), count, buffer.begin());
+    chunk.bytes.erase(chunk.bytes.begin(), chunk.bytes.begin() + static_cast<std::ptrdiff_t>(count));
+    if (chunk.bytes.empty()) rig_.board_chunks_.pop_front();
+    rig_.changed_.notify_all();
+    return {count, time};
+  }
+  double write(std::span<const std::byte>, double) override { return now(); }
+
+ private:
+  SimulatedRig& rig_;
+  std::string name_ = "simulated board";
+};
+
+SimulatedRig::SimulatedRig(const RigSettings& settings)
+    : latency_(settings.seed, 303),
+      world_(settings, 1000.0,
+             [this](std::span<const std::byte> bytes, double t) { return take_board_bytes(bytes, t); }) {}
+
+SimulatedRig::~SimulatedRig() = default;
+
+std::unique_ptr<Port> SimulatedRig::printer_port() { return std::make_unique<PrinterPort>(*this); }
+std::unique_ptr<Port> SimulatedRig::board_port() { return std::make_unique<BoardPort>(*this); }
+
+bool SimulatedRig::take_board_bytes(std::span<const std::byte> bytes, double t) {
+  if (!board_listens_ || board_gone_) return true;  // nobody looks
+  board_time_ = std::max(board_time_, t + kUsbLatency * latency_.uniform());
+  board_chunks_.push_back({board_time_, {bytes.begin(), bytes.end()}});
+  return true;
+}
+
+void SimulatedRig::advance(std::unique_lock<std::mutex>& lock, double t) {
+  // The reader must not fall behind more than a real one would: simulated time waits for it.
+  changed_.wait_for(lock, std::chrono::seconds(10),
+                    [&] { return !board_listens_ || board_gone_ || board_chunks_.size() < kMostChunks; });
+  world_.advance(t);
+  changed_.notify_all();
+}
+
+void SimulatedRig::run_for(double seconds) {
+  std::unique_lock lock(mutex_);
+  const double end = world_.now() + seconds;
+  while (world_.now() < end) advance(lock, std::min(end, world_.now() + 0.1));
+}
+
+double SimulatedRig::now() {
+  std::lock_guard lock(mutex_);
+  return world_.now();
+}
+
+void SimulatedRig::unplug_board() {
+  std::lock_guard lock(mutex_);
+  board_gone_ = true;
+  changed_.notify_all();
+}
+
+void SimulatedRig::unplug_printer() {
+  std::lock_guard lock(mutex_);
+  printer_gone_ = true;
+}
+
+}  // namespace supertac

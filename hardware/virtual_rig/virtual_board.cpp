@@ -1,0 +1,63 @@
+#include "hardware/virtual_rig/virtual_board.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace supertac {
+namespace {
+
+constexpr double kRestVolts = 2.44;
+constexpr int kStallFrames = 20;
+
+}  // namespace
+
+VirtualBoard::VirtualBoard(const VirtualBoardSettings& settings, double t)
+    : settings_(settings), start_(t), dice_(settings.seed, 202) {}
+
+BoardFrame VirtualBoard::sample(const Point3& head, double t) {
+  std::array<double, 16> volts{};
+  volts.fill(kRestVolts);
+  if (settings_.signals) volts = settings_.signals(head.x, head.y, head.z, t);
+  BoardFrame frame;
+  frame.samples.fill(volts_to_adc(kRestVolts));
+  frame.slip = 2048;
+  for (std::size_t k = 0; k < 16; ++k) {
+    const double noise = settings_.noise_adc > 0 ? settings_.noise_adc * dice_.normal() : 0;
+    frame.samples[5 * k] = volts_to_adc(volts[k] + noise * (3.3 / 4096));
+  }
+  return frame;
+}
+
+std::vector<std::byte> VirtualBoard::make_frame(const Point3& head) {
+  const double middle = next_frame() - 0.5 * settings_.period_s;
+  const std::uint64_t index = counters_.made++;
+  if (stalled_frames_ == 0 && dice_.hit(settings_.faults.stall_rate)) stalled_frames_ = kStallFrames;
+  const bool stalled = stalled_frames_ > 0;
+  if (stalled && --stalled_frames_ == 0) tear_next_ = true;
+  const bool lost = stalled || dice_.hit(settings_.faults.lost_frame_rate);
+  if (truth_) truth_(index, middle, head, !lost);
+  if (lost) {
+    ++counters_.lost;
+    return {};
+  }
+  const BoardFrame fresh = sample(head, middle);
+  BoardFrame frame = fresh;
+  if (tear_next_) {  // half old, half new, behind a valid header and trailer
+    std::copy_n(previous_.samples.begin(), kFrameSamples / 2, frame.samples.begin());
+    tear_next_ = false;
+    ++counters_.torn;
+  }
+  previous_ = fresh;
+  ++counters_.sent;
+  std::vector<std::byte> bytes(kFrameBytes);
+  write_frame(frame, std::span<std::byte, kFrameBytes>(bytes));
+  return bytes;
+}
+
+void VirtualBoard::refuse_last() {
+  --counters_.sent;
+  ++counters_.lost;
+  tear_next_ = true;
+}
+
+}  // namespace supertac

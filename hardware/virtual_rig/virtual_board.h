@@ -1,0 +1,64 @@
+// A tactile board: true byte format, 1008.06 Hz, frames that vanish when USB is busy, and after a stall a
+// torn one.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "hardware/board_frame.h"
+#include "hardware/marlin_line.h"
+#include "hardware/virtual_rig/faults.h"
+
+namespace supertac {
+
+/// The 16 taxel voltages when the finger's centre is at (x, y, z) mm of the printer at time t (s).
+using FingerSignals = std::function<std::array<double, 16>(double x, double y, double z, double t)>;
+
+struct VirtualBoardSettings {
+  FingerSignals signals;           ///< empty: all taxels at rest
+  double period_s = kFramePeriod;  ///< the board's own crystal
+  double noise_adc = 0;            ///< standard deviation added to every sample
+  RigFaults faults;                ///< lost frames and stalls; bytes are the port's matter
+  std::uint64_t seed = 1;
+};
+
+class VirtualBoard {
+ public:
+  /// What happened to the frames; made = sent + lost, torn ones are among the sent.
+  struct Counters {
+    std::uint64_t made = 0, sent = 0, lost = 0, torn = 0;
+  };
+  using Truth = std::function<void(std::uint64_t index, double middle_s, const Point3& head, bool sent)>;
+
+  VirtualBoard(const VirtualBoardSettings& settings, double t);
+
+  /// End of the frame now being sampled.
+  double next_frame() const { return start_ + static_cast<double>(counters_.made + 1) * settings_.period_s; }
+  double period() const { return settings_.period_s; }
+  /// Finishes the frame that ends at next_frame(); `head` is where the finger was in its middle.
+  /// Returns the bytes to send, empty when the frame vanished.
+  std::vector<std::byte> make_frame(const Point3& head);
+  /// The host did not take the bytes: the frame vanishes, and the one after the stall is torn.
+  void refuse_last();
+
+  void on_frame(Truth truth) { truth_ = std::move(truth); }
+  const Counters& counters() const { return counters_; }
+
+ private:
+  BoardFrame sample(const Point3& head, double t);
+
+  VirtualBoardSettings settings_;
+  double start_;
+  Dice dice_;
+  Counters counters_;
+  Truth truth_;
+  BoardFrame previous_;
+  int stalled_frames_ = 0;
+  bool tear_next_ = false;
+};
+
+}  // namespace supertac

@@ -1,0 +1,117 @@
+// A printer that behaves like Marlin, as far as a host can tell: banner, line numbers, checksums, resend,
+// busy, M114 and M114 R, M400, M410, M112, motion with acceleration, soft limits that do nothing until homed
+// and clamp silently afterwards. A state machine on a time that its owner advances: no threads, no clock of
+// its own.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hardware/virtual_rig/faults.h"
+#include "hardware/virtual_rig/motion_queue.h"
+
+namespace supertac {
+
+struct VirtualPrinterSettings {
+  Point3 head{99.7, 101.17, 131.81};  ///< where the head really is at power-on; the firmware believes 0, 0, 0
+  Point3 bed{235, 235, 250};          ///< soft limits once homed: 0 ... bed
+  bool realtime_position = true;      ///< M114 R reports the head, not the end of the queue
+  bool emergency_parser = true;
+  bool keepalive = true;   ///< echo:busy every 2 s
+  bool heartbeat = false;  ///< `wait` every second when idle
+  double reply_delay_s = 0.0003;
+  double boot_s = 0.4;       ///< power-on to `start`
+  std::string boot_garbage;  ///< bytes sent before the banner
+  RigFaults faults;          ///< lost ok, storms, resets, unplug, stalls; bytes are the port's matter
+  std::uint64_t seed = 1;
+};
+
+class VirtualPrinter {
+ public:
+  /// A command that ran: what it was and when. The tests' proof that nothing runs twice.
+  struct Executed {
+    double time_s;
+    std::string command;
+  };
+
+  /// Switched on at time t. `already_running`: booted long ago, no banner, line number 357.
+  VirtualPrinter(const VirtualPrinterSettings& settings, double t, bool already_running = false);
+
+  /// Bytes from the host, arriving at time t (not before the last advance).
+  void receive(std::string_view bytes, double t);
+  /// Runs until time t.
+  void advance(double t);
+  /// Replies that have left the printer so far.
+  std::string take_output();
+  /// The next time something happens by itself; infinity when idle.
+  double next_event() const;
+
+  /// Where the head really is (plate frame of the simulator).
+  Point3 head(double t);
+  bool moving(double t) { return motion_.end_time() > t; }
+  bool halted() const { return halted_; }
+  bool unplugged() const { return unplugged_; }
+  bool homed() const { return homed_; }
+  /// Restarts the firmware at time t: the position is forgotten, moves stop where they are.
+  void reset(double t);
+  /// Called with every numbered line that is about to run, and its time; the tests' hook for planting faults.
+  void on_line(std::function<void(std::int64_t, const std::string&, double)> hook) {
+    hook_ = std::move(hook);
+  }
+  /// Puts raw text into the reply stream.
+  void inject(const std::string& text) { output_ += text; }
+
+  const std::vector<Executed>& executed() const { return executed_; }
+  std::int64_t last_line() const { return last_line_; }
+
+ private:
+  void on_character(char c, double t);
+  void watch_for_emergency(char c, double t);
+  void take_received(double t);
+  void accept_line(const std::string& line, double t);
+  bool check_numbered(const std::string& line, std::string& command);
+  void complain(const std::string& what);
+  void start_next(double t);
+  void run(const std::string& command, double t);
+  void run_g(int code, const std::string& command, double t);
+  void run_m(int code, const std::string& command, double t);
+  void move(const std::string& command, double t);
+  void home(double t);
+  void report(const Point3& physical);
+  void block_until(double time, double now);
+  void finish_block(double t);
+  void reply_ok();
+  void kill(double t);
+  void quick_stop(double t);
+  bool random_trouble(double t);
+
+  VirtualPrinterSettings settings_;
+  MotionQueue motion_;
+  Dice dice_;
+  Point3 offset_;                     // logical = physical - offset
+  std::deque<std::string> received_;  // whole lines not yet looked at
+  std::deque<std::string> queue_;     // accepted, not yet run
+  std::string partial_;
+  std::string emergency_;
+  std::string output_;
+  std::vector<Executed> executed_;
+  std::function<void(std::int64_t, const std::string&, double)> hook_;
+  double now_;
+  double boot_end_;
+  double command_due_ = -1;    // when the command at the queue's front runs; < 0: none waits
+  double blocked_until_ = -1;  // G4, M400, G28 hold the queue
+  double busy_due_ = 0;
+  double wait_due_ = 0;
+  double feed_ = 10;
+  std::int64_t last_line_ = 0;
+  bool booting_ = false, blocked_ = false, homed_ = false, halted_ = false, unplugged_ = false,
+       relative_ = false;
+  bool repeat_after_block_ = false;
+};
+
+}  // namespace supertac

@@ -1,0 +1,138 @@
+#include "hardware/serial_port.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/time.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <fstream>
+#include <thread>
+
+#include "hardware/errors.h"
+#include "hardware/serial_termios.h"
+#include "hardware/virtual_rig/pty_rig.h"
+#include "rig_support.h"
+
+namespace supertac {
+namespace {
+
+std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
+
+TEST(SerialPort, TakesTheBoardsOddBaudRateAndNoModemLines) {
+  const ScratchFolder folder;
+  const PseudoTerminal terminal(folder / "port");
+  const SerialPort port(folder / "port", {.baud = 7'372'800});  // a pty has no DTR: not an error
+  const int other = open(terminal.path().c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK);
+  // Root may still look; everybody else is refused by TIOCEXCL.
+  if (other >= 0) {
+    EXPECT_EQ(terminal_baud(other), 7'372'800U);
+    close(other);
+  }
+}
+
+TEST(SerialPort, SecondOpenerIsRefusedEvenAsRoot) {
+  const ScratchFolder folder;
+  const PseudoTerminal terminal(folder / "port");
+  {
+    const SerialPort first(folder / "port");
+    EXPECT_THROW(SerialPort second(folder / "port"), PortBusy);
+  }
+  EXPECT_NO_THROW(SerialPort third(folder / "port"));
+}
+
+TEST(SerialPort, WhatCannotBeOpenedSaysWhy) {
+  const ScratchFolder folder;
+  EXPECT_THROW(SerialPort port(folder / "nothing"), PortNotFound);
+  std::ofstream(folder / "file") << "text";
+  EXPECT_THROW(SerialPort port(folder / "file"), NotASerialPort);
+  try {
+    SerialPort port(folder / "nothing");
+  } catch (const PortNotFound& error) {
+    EXPECT_NE(std::string(error.what()).find("--list-ports"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find(folder / "nothing"), std::string::npos);
+  }
+}
+
+TEST(SerialPort, TimeOutAndEndOfFileAreDifferent) {
+  const ScratchFolder folder;
+  PseudoTerminal terminal(folder / "port");
+  SerialPort port(folder / "port");
+  std::array<std::byte, 16> buffer{};
+  EXPECT_EQ(port.read(buffer, port.now() + 0.02).count, 0U);
+  ASSERT_EQ(write(terminal.descriptor(), "last", 4), 4);
+  terminal.unplug();
+  EXPECT_THROW(
+      {
+        for (int i = 0; i < 3; ++i) (void)port.read(buffer, port.now() + 1);
+      },
+      PortUnplugged);
+  EXPECT_THROW(port.write(bytes_of("x"), port.now() + 1), PortUnplugged);
+}
+
+TEST(SerialPort, UnpluggingIsNoticedWithin100Milliseconds) {
+  double worst = 0;
+  for (int i = 0; i < 20; ++i) {
+    const ScratchFolder folder;
+    PseudoTerminal terminal(folder / "port");
+    SerialPort port(folder / "port");
+    std::atomic<double> pulled{0};
+    std::thread other([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      pulled = monotonic_seconds();
+      terminal.unplug();
+    });
+    std::array<std::byte, 16> buffer{};
+    EXPECT_THROW((void)port.read(buffer, port.now() + 10), PortUnplugged);
+    worst = std::max(worst, monotonic_seconds() - pulled);
+    other.join();
+  }
+  EXPECT_LT(worst, 0.1);
+}
+
+TEST(SerialPort, AFullDeviceIsATimeOut) {
+  const ScratchFolder folder;
+  const PseudoTerminal terminal(folder / "port");
+  SerialPort port(folder / "port");
+  const std::vector<std::byte> much(1 << 20);
+  EXPECT_THROW(port.write(much, port.now() + 0.05), PortTimeout);
+}
+
+// Partial writes, EAGAIN and EINTR: a slow reader, and a signal every 200 us without SA_RESTART.
+TEST(SerialPort, OutputIsByteExactUnderAStormOfSignals) {
+  const ScratchFolder folder;
+  const PseudoTerminal terminal(folder / "port");
+  SerialPort port(folder / "port");
+  std::vector<std::byte> sent(200'000);
+  for (std::size_t i = 0; i < sent.size(); ++i) sent[i] = static_cast<std::byte>(i * 131 >> 3);
+
+  struct sigaction quiet {};
+  quiet.sa_handler = [](int) {};
+  struct sigaction before {};
+  sigaction(SIGALRM, &quiet, &before);
+  const itimerval storm{{0, 200}, {0, 200}};
+  setitimer(ITIMER_REAL, &storm, nullptr);
+
+  std::vector<std::byte> got;
+  std::thread reader([&] {
+    std::array<std::byte, 777> buffer{};
+    const double until = monotonic_seconds() + 30;
+    while (got.size() < sent.size() && monotonic_seconds() < until) {
+      const ssize_t count = read(terminal.descriptor(), buffer.data(), buffer.size());
+      if (count > 0) got.insert(got.end(), buffer.begin(), buffer.begin() + count);
+      if (count < 0) std::this_thread::sleep_for(std::chrono::microseconds(300));
+    }
+  });
+  EXPECT_NO_THROW(port.write(sent, port.now() + 30));
+  reader.join();
+  const itimerval off{};
+  setitimer(ITIMER_REAL, &off, nullptr);
+  sigaction(SIGALRM, &before, nullptr);
+  EXPECT_EQ(got, sent);
+}
+
+}  // namespace
+}  // namespace supertac
