@@ -30,10 +30,15 @@ struct GradientCheckOptions {
   Dim max_entries_per_input = 200;  // larger inputs are sampled evenly
 };
 
-/// `f` maps the inputs to a result of any shape, deterministically. The result is reduced to the scalar
-/// sum(y * r) with fixed weights r that differ from element to element, so that no gradient hides in a
-/// symmetry.
+/// `f` computes a result of any shape from the leaves, deterministically, whenever it is called. The result
+/// is reduced to the scalar sum(y * r) with fixed weights r that differ from element to element, so that no
+/// gradient hides in a symmetry. The leaves (parameters, say) are moved and put back; their gradients are
+/// overwritten.
+GradientReport check_gradients(const std::function<Variable()>& f, std::vector<Variable> leaves,
+                               const GradientCheckOptions& options = {});
+
+/// The same for a function of inputs that are made for the check.
 GradientReport check_gradients(const std::function<Variable(const std::vector<Variable>&)>& f,
-                               std::vector<Tensor> inputs, const GradientCheckOptions& options = {});
+                               const std::vector<Tensor>& inputs, const GradientCheckOptions& options = {});
 
 }  // namespace supertac

@@ -97,11 +97,10 @@ void write_checkpoint(const std::string& path, const std::vector<Parameter>& par
   metadata["format_version"] = std::to_string(kCheckpointVersion);
   std::vector<StoredTensor> stored;
   for (const Parameter& p : parameters) stored.push_back(to_stored(p));
+  stored.insert(stored.end(), more.begin(), more.end());
   std::vector<TensorToWrite> list;
-  for (const auto* group : {&stored, &more}) {
-    for (const StoredTensor& s : *group)
-      list.push_back({s.name, "F32", s.shape, std::as_bytes(std::span(s.values))});
-  }
+  for (const StoredTensor& s : stored)
+    list.push_back({s.name, "F32", s.shape, std::as_bytes(std::span(s.values))});
   write_safetensors(path, std::move(metadata), list);
 }
 

@@ -1,0 +1,119 @@
+#include "layers/checkpoint.h"
+
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <numeric>
+
+#include "layers/convolution.h"
+#include "layers/linear.h"
+
+namespace supertac {
+namespace {
+
+class CheckpointTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    dir_ = std::filesystem::temp_directory_path() /
+           ("supertac_checkpoint_" + std::to_string(::getpid()) + "_" +
+            testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(dir_);
+  }
+  void TearDown() override { std::filesystem::remove_all(dir_); }
+  std::string path(const std::string& name) const { return (dir_ / name).string(); }
+
+  std::filesystem::path dir_;
+};
+
+// Fills a parameter with 0, 1, 2 ... in memory order.
+Parameter counting(const std::string& name, const Shape& shape, Layout layout) {
+  Tensor t(shape);
+  std::iota(t.values().begin(), t.values().end(), real(0));
+  return {name, Variable(t, true), layout};
+}
+
+TEST(Layout, ConvolutionIsStoredAsOutInKernel) {
+  const StoredTensor s = to_stored(counting("w", {3, 2, 4}, Layout::conv));  // [k,in,out]
+  EXPECT_EQ(s.shape, (std::vector<std::uint64_t>{4, 2, 3}));
+  EXPECT_EQ(s.values[0], 0);  // out 0, in 0, k 0
+  EXPECT_EQ(s.values[1], 8);  // out 0, in 0, k 1 lies one [in,out] plane further
+  EXPECT_EQ(s.values[3], 4);  // out 0, in 1, k 0
+  EXPECT_EQ(s.values[6], 1);  // out 1, in 0, k 0
+}
+
+TEST(Layout, TransposedConvolutionIsStoredAsInOutKernel) {
+  const StoredTensor s = to_stored(counting("w", {2, 2, 3, 4}, Layout::conv_transpose));  // [ky,kx,in,out]
+  EXPECT_EQ(s.shape, (std::vector<std::uint64_t>{3, 4, 2, 2}));
+  EXPECT_EQ(s.values[1], 12);  // in 0, out 0, ky 0, kx 1
+  EXPECT_EQ(s.values[2], 24);  // in 0, out 0, ky 1, kx 0
+  EXPECT_EQ(s.values[4], 1);   // in 0, out 1
+}
+
+TEST(Layout, LinearIsStoredAsOutInAndPointwiseAsAConvolution) {
+  EXPECT_EQ(to_stored(counting("w", {2, 3}, Layout::linear)).values, (std::vector<float>{0, 3, 1, 4, 2, 5}));
+  EXPECT_EQ(to_stored(counting("w", {2, 3}, Layout::pointwise)).shape,
+            (std::vector<std::uint64_t>{3, 2, 1, 1}));
+}
+
+TEST_F(CheckpointTest, ComesBackToTheBit) {
+  Rng a(1), b(2);
+  const Conv2d written(3, 5, {}, a), read(3, 5, {}, b);
+  write_checkpoint(path("c.safetensors"), written.parameters(), {{"note", "x"}});
+  const SafetensorsFile file = read_checkpoint(path("c.safetensors"));
+  EXPECT_EQ(file.metadata().at("note"), "x");
+  load_parameters(file, path("c.safetensors"), read.parameters());
+  for (std::size_t i = 0; i < 2; ++i) {
+    const auto x = written.parameters()[i].value.value().values(),
+               y = read.parameters()[i].value.value().values();
+    EXPECT_TRUE(std::equal(x.begin(), x.end(), y.begin()));
+  }
+}
+
+TEST_F(CheckpointTest, ListsEveryProblemAtOnceAndChangesNothing) {
+  write_checkpoint(path("c.safetensors"),
+                   {counting("fine", {2}, Layout::plain), counting("shape", {2, 3}, Layout::linear),
+                    counting("extra", {1}, Layout::plain), counting("optimizer.m.fine", {2}, Layout::plain)},
+                   {});
+  const std::vector<Parameter> wanted{counting("fine", {2}, Layout::plain),
+                                      counting("shape", {3, 3}, Layout::linear),
+                                      counting("absent", {1}, Layout::plain)};
+  Variable fine = wanted[0].value;
+  fine.mutable_value().fill(7);
+  try {
+    load_parameters(read_checkpoint(path("c.safetensors")), "c", wanted);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(),
+                 "c: the tensors do not fit the model that its metadata describes: "
+                 "shape expected F32 [3,3], found F32 [3,2]; missing absent; unexpected extra");
+  }
+  EXPECT_EQ(fine.value().data()[0], 7);
+}
+
+TEST_F(CheckpointTest, RefusesOtherFilesAndNewerVersions) {
+  const std::vector<float> one{1};
+  const auto write = [&](std::map<std::string, std::string> metadata) {
+    write_safetensors(path("c.safetensors"), std::move(metadata),
+                      {{"a", "F32", {1}, std::as_bytes(std::span(one))}});
+  };
+  const auto message = [&] {
+    try {
+      read_checkpoint(path("c.safetensors"));
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  write({{"format", "supertac-recording"}});
+  EXPECT_NE(message().find("not a SuperTac checkpoint"), std::string::npos) << message();
+  write({{"format", "supertac-checkpoint"}, {"format_version", "2"}});
+  EXPECT_NE(message().find("checkpoint version \"2\", this program reads 1 to 1"), std::string::npos)
+      << message();
+  write({{"format", "supertac-checkpoint"}, {"format_version", "one"}});
+  EXPECT_NE(message().find("checkpoint version"), std::string::npos) << message();
+}
+
+}  // namespace
+}  // namespace supertac
