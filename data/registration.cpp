@@ -27,11 +27,13 @@ constexpr double kSlowest = 0.6, kFastest = 2.2, kRateStep = 0.01;
 constexpr double kRigFilterS = 0.0992;
 
 // When a pass is believed.
-constexpr int kMinContacts = 8;
+constexpr int kMinContacts = 8, kMinElements = 3;
 constexpr double kMinMatched = 0.4, kMinCoverage = 0.3, kMaxResidualMm = 0.55, kMinMargin = 0.03;
 
-// A frame-to-frame change this many times the usual one around it is a burst of lost frames.
-constexpr double kBurstVolts = 0.25;
+// A change from one frame to the next, summed over the taxels, that is so large and so far above the usual
+// one around it is a burst of lost frames: a moving average does not jump.
+constexpr double kBurstVolts = 0.08, kBurstRatio = 60, kQuietVolts = 1e-4;
+constexpr size_t kBurstNeighbours = 100;
 
 struct Event {
   int row = 0;
@@ -49,19 +51,63 @@ struct Match {
   double weight = 0;
 };
 
+struct Stretch {
+  double begin_s = 0, end_s = 0;
+};
+
+// Sum of the taxels' changes before each frame.
+std::vector<double> changes(const Recording& recording) {
+  std::vector<double> change(recording.frames());
+  for (size_t i = 1; i < change.size(); ++i)
+    for (size_t k = 0; k < kTaxels; ++k) {
+      const double step = std::abs(recording.volts[i * kTaxels + k] - recording.volts[(i - 1) * kTaxels + k]);
+      if (std::isfinite(step)) change[i] += step;
+    }
+  return change;
+}
+
+// The recording cut at its bursts of lost frames.
+std::vector<Stretch> stretches(const Recording& recording) {
+  const std::vector<double> change = changes(recording);
+  std::vector<double> sum(change.size() + 1);
+  for (size_t i = 0; i < change.size(); ++i) sum[i + 1] = sum[i] + change[i];
+  std::vector<Stretch> parts = {{.begin_s = recording.time_s.front()}};
+  for (size_t i = 1; i < change.size(); ++i) {
+    if (change[i] < kBurstVolts) continue;
+    const size_t from = i > kBurstNeighbours ? i - kBurstNeighbours : 0;
+    const size_t to = std::min(i + kBurstNeighbours + 1, change.size());
+    const double usual = (sum[to] - sum[from] - change[i]) / static_cast<double>(to - from - 1);
+    if (change[i] < kBurstRatio * (usual + kQuietVolts)) continue;
+    parts.back().end_s = recording.time_s[i - 1];
+    parts.push_back({.begin_s = recording.time_s[i]});
+  }
+  parts.back().end_s = recording.time_s.back();
+  return parts;
+}
+
 class Fit {
  public:
   Fit(const Recording& recording, const Plate& plate)
       : crests_(plate.crests()),
+        troughs_(plate.min_height() < 0),
         speed_(recording.speed_mm_s > 0 ? recording.speed_mm_s : kNominalSpeed),
         middle_s_((recording.time_s.front() + recording.time_s.back()) / 2) {
-    for (const Contact& c : find_contacts(recording, {.reach_s = 0.6 * pitch() / speed_}))
-      events_.push_back({.row = c.taxel / 4, .time = c.time_s - middle_s_, .weight = weight_of(c)});
+    const std::vector<Contact> contacts = find_contacts(recording, {.reach_s = 0.6 * pitch() / speed_});
+    double most = 0;
+    for (const Stretch& stretch : stretches(recording)) {
+      double weight = 0;
+      for (const Contact& c : contacts) weight += inside(c, stretch) ? weight_of(c) : 0.0;
+      if (weight > most) most = weight, stretch_ = stretch;
+    }
+    for (const Contact& c : contacts)
+      if (inside(c, stretch_))
+        events_.push_back({.row = c.taxel / 4, .time = c.time_s - middle_s_, .weight = weight_of(c)});
   }
 
   size_t events() const { return events_.size(); }
   double middle_s() const { return middle_s_; }
   double speed() const { return speed_; }
+  const Stretch& stretch() const { return stretch_; }
 
   // Scores every start and rate; `best` is the winner, `rival` the best that means another place or another
   // pitch.
@@ -104,7 +150,9 @@ class Fit {
     const bool trailing_alone = event.row == 0 && nearest + 1 == crests_.size();
     if (leading_alone) m.distance_mm -= kAloneShiftMm;
     if (trailing_alone) m.distance_mm += kAloneShiftMm;
-    if (leading_alone || trailing_alone) m.weight *= kAloneWeight;
+    // The outermost crests of waves are lopsided: a trough inside, the flat plate outside.
+    const bool lopsided = troughs_ && (nearest == 0 || nearest + 1 == crests_.size());
+    if (leading_alone || trailing_alone || lopsided) m.weight *= kAloneWeight;
     const double u = m.distance_mm / kFitReachMm;
     m.weight *= std::abs(u) < 1 ? (1 - u * u) * (1 - u * u) : 0.0;
     return m;
@@ -113,20 +161,17 @@ class Fit {
   // Contacts used and their weighted rms distance.
   void judge(const Line& line, Registration& out) const {
     double w = 0, wdd = 0;
+    std::vector<bool> felt(crests_.size());
     for (const Event& event : events_) {
       const Match m = match(event, line);
+      if (m.weight > 0) felt[m.crest] = true;
       out.contacts += m.weight > 0 ? 1 : 0;
       w += m.weight, wdd += m.weight * m.distance_mm * m.distance_mm;
     }
     out.residual = w > 0 ? std::sqrt(wdd / w) : 0;
+    out.elements = static_cast<int>(std::count(felt.begin(), felt.end(), true));
     out.matched = line.matched;
     out.coverage = line.coverage;
-  }
-
-  bool contacts_after(double time_s, const Line& line) const {
-    return std::any_of(events_.begin(), events_.end(), [&](const Event& event) {
-      return event.time + middle_s_ > time_s && match(event, line).weight > 0;
-    });
   }
 
  private:
@@ -134,6 +179,10 @@ class Fit {
     double smallest = Plate::kLengthMm;
     for (size_t j = 1; j < crests_.size(); ++j) smallest = std::min(smallest, crests_[j] - crests_[j - 1]);
     return std::min(smallest, 12.0);
+  }
+
+  static bool inside(const Contact& c, const Stretch& s) {
+    return c.time_s >= s.begin_s && c.time_s <= s.end_s;
   }
 
   static double weight_of(const Contact& c) { return std::sqrt(std::min(c.depth_v / kFullDepthV, 1.0)); }
@@ -164,16 +213,34 @@ class Fit {
       double& best = felt[nearest][static_cast<size_t>(event.row)];
       best = std::max(best, fit);
     }
-    double pairs = 0;
-    for (const auto& rows : felt)
-      for (const double f : rows) pairs += f;
     line.matched = total > 0 ? agree / total : 0;
-    line.coverage = pairs / (4 * static_cast<double>(crests_.size()));
-    line.score = line.matched + line.coverage + preference(middle_mm, rate);
+    double elements = 0;
+    felt_shares(felt, line, elements);
+    line.score = line.matched + line.coverage + elements + preference(middle_mm, rate);
     return line;
   }
 
+  // Of the (element, row) pairs the stretch reached: share felt (line.coverage), and share of elements felt
+  // by a row.
+  void felt_shares(const std::vector<std::array<double, 4>>& felt, Line& line, double& elements) const {
+    double pairs = 0, felt_pairs = 0, reached = 0, felt_elements = 0;
+    for (size_t j = 0; j < crests_.size(); ++j) {
+      double best = -1;
+      for (size_t row = 0; row < 4; ++row) {
+        const double time = (crests_[j] - kRowOffsetMm[row] - line.middle_mm) / line.rate + middle_s_;
+        if (time < stretch_.begin_s || time > stretch_.end_s) continue;
+        pairs += 1, felt_pairs += felt[j][row];
+        best = std::max(best, felt[j][row]);
+      }
+      if (best >= 0) reached += 1, felt_elements += best;
+    }
+    line.coverage = pairs > 0 ? felt_pairs / pairs : 0;
+    elements = reached > 0 ? felt_elements / reached : 0;
+  }
+
   std::vector<double> crests_;
+  bool troughs_;
+  Stretch stretch_;
   double speed_, middle_s_;
   std::vector<Event> events_;
 };
@@ -184,21 +251,12 @@ double filter_delay(const Recording& recording) {
   return recording.source == "imported" ? kRigFilterS / 2 : 0;
 }
 
-// Time of the last burst of lost frames: the moving average makes a jump of all taxels together impossible
-// otherwise. Negative when there is none.
-double last_burst(const Recording& recording) {
-  for (size_t i = recording.frames() - 1; i > 0; --i) {
-    double change = 0;
-    for (size_t k = 0; k < kTaxels; ++k)
-      change += std::abs(recording.volts[i * kTaxels + k] - recording.volts[(i - 1) * kTaxels + k]);
-    if (change > kBurstVolts) return recording.time_s[i];
-  }
-  return -1;
-}
-
 std::string judge_reason(const Registration& r) {
   if (r.contacts < kMinContacts)
     return "only " + std::to_string(r.contacts) + " contacts, need " + std::to_string(kMinContacts);
+  if (r.elements < kMinElements)
+    return "only " + std::to_string(r.elements) + " elements of the texture, need " +
+           std::to_string(kMinElements);
   if (r.matched < kMinMatched)
     return "only " + format(100 * r.matched, 0) + " % of the contacts agree with the plate";
   if (r.coverage < kMinCoverage)
@@ -229,24 +287,31 @@ Registration register_pass(const Recording& recording, const Plate& plate) {
   result.rate = best.rate;
   // Signals trail the finger: where a contact shows at t, the finger has been since t - delay.
   result.start_mm = best.middle_mm - best.rate * fit.middle_s() + fit.speed() * filter_delay(recording);
-  result.valid_until_s = recording.time_s.back();
-  const double burst = last_burst(recording);
-  if (burst > 0 && !fit.contacts_after(burst, best)) result.valid_until_s = burst;
+  result.valid_from_s = fit.stretch().begin_s;
+  result.valid_until_s = fit.stretch().end_s;
   result.reason = judge_reason(result);
   result.reliable = result.reason.empty();
   return result;
 }
 
 void apply(const Registration& registration, Recording& recording) {
+  const auto base = recording.metadata.find("time_base");
+  const bool nominal = base != recording.metadata.end() && base->second == "nominal";
   const size_t n = recording.frames();
   recording.position_mm.resize(2 * n);
   const auto x = static_cast<float>(pass_x_mm(recording.pass));
   for (size_t i = 0; i < n; ++i) {
     const double y = registration.start_mm + registration.rate * recording.time_s[i];
-    const bool known = recording.time_s[i] <= registration.valid_until_s;
+    const bool known =
+        recording.time_s[i] >= registration.valid_from_s && recording.time_s[i] <= registration.valid_until_s;
     recording.position_mm[2 * i] = x;
     recording.position_mm[2 * i + 1] = known ? static_cast<float>(std::clamp(y, 0.0, Plate::kLengthMm))
                                              : std::numeric_limits<float>::quiet_NaN();
+  }
+  if (nominal && registration.reliable) {  // the finger's speed is known better than the rate of the lines
+    const double speed = recording.speed_mm_s > 0 ? recording.speed_mm_s : kNominalSpeed;
+    for (double& t : recording.time_s) t *= registration.rate / speed;
+    recording.metadata["time_base"] = "registered";
   }
   recording.metadata["registration_start_mm"] = format(registration.start_mm, 3);
   recording.metadata["registration_rate"] = format(registration.rate, 4);

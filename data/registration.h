@@ -10,16 +10,16 @@ namespace supertac {
 
 /// Where the finger was during a pass: y(t) = start_mm + rate * t for the recording's own clock t.
 struct Registration {
-  double start_mm = 0;  ///< y of the finger's centre at time 0
-  double rate = 0;      ///< mm per second of the recording's clock
-  double residual = 0;  ///< rms distance (mm) of the contacts used from where their element should be
-  int contacts = 0;     ///< used for the fit
-  double matched = 0;   ///< share of all contacts, by weight, that agree with the plate
-  double coverage = 0;  ///< share of (taxel row, element) pairs that were felt
-  double margin =
-      0;  ///< by how much the score (matched + coverage) beats the next best start, a pitch off, say
-  double valid_until_s =
-      0;  ///< after a burst of lost frames without further contacts the position is unknown
+  double start_mm = 0;      ///< y of the finger's centre at time 0
+  double rate = 0;          ///< mm per second of the recording's clock
+  double residual = 0;      ///< rms distance (mm) of the contacts used from where their element should be
+  int contacts = 0;         ///< used for the fit
+  int elements = 0;         ///< of the texture that they belong to
+  double matched = 0;       ///< share of all contacts, by weight, that agree with the plate
+  double coverage = 0;      ///< share of the (taxel row, element) pairs in reach that were felt
+  double margin = 0;        ///< by how much the score beats the next best start, a pitch off, say
+  double valid_from_s = 0;  ///< the stretch that was fitted: a recording is cut at bursts of lost frames
+  double valid_until_s = 0;
   bool reliable = false;
   std::string reason;  ///< what is wrong when it is not
 };
@@ -29,15 +29,18 @@ struct Registration {
 ///   y(time of contact) + row offset = crest of the element.
 /// All starts and rates within reach are tried, scored by the contacts that agree and the elements that were
 /// felt (so a fit that is one pitch off loses the elements at one end), the best is refined by robust least
-/// squares. Row offsets are symmetric about the finger's centre, so an outline that is felt early by the
-/// leading rows and late by the trailing ones does not move the centre. The delay of the recording's moving
-/// average (metadata filter_s; 0.0992 s for imported recordings) is taken out. Never throws for a pass that
-/// does not fit: it is flagged. @throws std::invalid_argument as find_contacts does.
+/// squares. Where a burst of frames was lost (a jump that the moving average makes impossible), only the
+/// stretch with most contacts is used. Row offsets are symmetric about the finger's centre, so an outline
+/// that is felt early by the leading rows and late by the trailing ones does not move the centre. The delay
+/// of the recording's moving average (metadata filter_s; 0.0992 s for imported recordings) is taken out.
+/// Never throws for a pass that does not fit: it is flagged. @throws std::invalid_argument as find_contacts
+/// does.
 Registration register_pass(const Recording& recording, const Plate& plate);
 
-/// Fills position_mm: x from the number of the pass, y from the registration, limited to the plate; NaN after
-/// valid_until_s. Writes metadata registration_start_mm, _rate, _residual_mm, _reliable (yes, no) and
-/// _reason.
+/// Fills position_mm: x from the number of the pass, y from the registration, limited to the plate; NaN
+/// outside valid_from_s..valid_until_s. Where the time stamps were only nominal (metadata time_base) and the
+/// fit is reliable, they are stretched so that the finger moves at its commanded speed. Writes metadata
+/// registration_start_mm, _rate, _residual_mm, _reliable (yes, no) and _reason.
 void apply(const Registration& registration, Recording& recording);
 
 }  // namespace supertac

@@ -1,0 +1,137 @@
+#include "data/simulator.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace supertac {
+namespace {
+
+SimulatorSettings clean() {
+  SimulatorSettings settings;
+  for (const auto& term : simulator_terms()) settings = without_term(settings, term);
+  return settings;
+}
+
+double deepest(const Recording& recording, int taxel) {
+  float lowest = 9;
+  for (size_t i = 0; i < recording.frames(); ++i)
+    lowest = std::min(lowest, recording.volts[i * kTaxels + static_cast<size_t>(taxel)]);
+  return 2.442 - lowest;
+}
+
+double rms_change(const Recording& a, const Recording& b) {
+  if (a.volts.size() != b.volts.size()) return 1;
+  double sum = 0;
+  for (size_t i = 0; i < a.volts.size(); ++i) sum += (a.volts[i] - b.volts[i]) * (a.volts[i] - b.volts[i]);
+  return std::sqrt(sum / static_cast<double>(a.volts.size()));
+}
+
+TEST(Simulator, DefaultsMakeTheRigsNumberOfFrames) {
+  double frames = 0;
+  for (const double speed : {5.0, 10.0})
+    frames +=
+        96.0 * static_cast<double>(simulate_pass(Plate::named("bumps12"), {.speed_mm_s = speed}).frames());
+  EXPECT_NEAR(frames, 466'000, 3'000);
+}
+
+TEST(Simulator, SameSeedSameRecordingOtherSeedOther) {
+  const Plate plate = Plate::named("ridges6");
+  const Recording a = simulate_pass(plate, {.pass = 3}), b = simulate_pass(plate, {.pass = 3});
+  EXPECT_EQ(a.time_s, b.time_s);
+  EXPECT_EQ(a.volts, b.volts);
+  EXPECT_NE(a.volts, simulate_pass(plate, {.pass = 3}, {}, 2).volts);
+  EXPECT_NE(a.volts, simulate_pass(plate, {.pass = 4}).volts);
+}
+
+TEST(Simulator, EachRowFeelsTheRidgeWhereItIs) {
+  const Recording r = simulate_pass(Plate("one", {{TextureKind::ridges, 40, 2.5}}), {.pass = 4}, clean());
+  const double crest = Plate("one", {{TextureKind::ridges, 40, 2.5}}).crests()[0];
+  for (int k = 0; k < kTaxels; ++k) {
+    size_t at = 0;
+    for (size_t i = 0; i < r.frames(); ++i)
+      if (r.volts[i * kTaxels + static_cast<size_t>(k)] < r.volts[at * kTaxels + static_cast<size_t>(k)])
+        at = i;
+    EXPECT_NEAR(r.position_mm[2 * at + 1] + taxel_y_mm(k), crest, 0.1) << k;
+  }
+}
+
+TEST(Simulator, FourPhases) {
+  const Recording r = simulate_pass(Plate::named("plain"), {.pass = 4}, without_term({}, "loss"));
+  const auto y = [&](size_t i) { return r.position_mm[2 * i + 1]; };
+  const size_t n = r.frames();
+  EXPECT_EQ(y(0), 28);
+  EXPECT_EQ(y(30), 28);                       // onset: comes down in place
+  EXPECT_NEAR(y(1545), 78, 1);                // slides
+  EXPECT_EQ(y(n - 1), 80);                    // release and re-position
+  EXPECT_GT(r.position_mm[2 * (n - 1)], 17);  // on its way to the next pass
+  EXPECT_GT(deepest(r, 0), 0.005);            // the flat plate is touched
+}
+
+TEST(Simulator, ResemblesTheRig) {
+  const Recording middle = simulate_pass(Plate::named("3_Bumps"), {.pass = 4});
+  EXPECT_GT(deepest(middle, 4), 0.2);
+  EXPECT_GT(deepest(middle, 15), 0.15);
+  EXPECT_LT(deepest(middle, 2), 0.15);
+  const Recording side =
+      simulate_pass(Plate::named("3_Bumps"), {.pass = 1});  // half the finger beside the plate
+  EXPECT_GT(deepest(side, 7), 4 * deepest(side, 4));
+  for (const float v : middle.volts) {
+    EXPECT_GE(v, 2.091F);
+    EXPECT_LE(v, 2.46F);
+  }
+}
+
+TEST(Simulator, EveryTermChangesSomething) {
+  const Plate plate = Plate::named("3_Bumps");
+  const PassSettings pass{.pass = 2};
+  const Recording all = simulate_pass(plate, pass);
+  for (const auto& term : simulator_terms()) {
+    const Recording without = simulate_pass(plate, pass, without_term({}, term));
+    EXPECT_GT(rms_change(all, without), 1e-6) << term;
+  }
+}
+
+TEST(Simulator, LossLeavesGapsInTheStampsNotInTheOrder) {
+  SimulatorSettings settings;
+  settings.lost_fraction = 0.3;
+  const Recording r = simulate_pass(Plate::named("bumps6"), {}, settings);
+  EXPECT_LT(r.frames(), 1300u);
+  EXPECT_EQ(r.volts.size(), r.frames() * kTaxels);
+  EXPECT_EQ(r.position_mm.size(), r.frames() * 2);
+  for (size_t i = 1; i < r.frames(); ++i) EXPECT_GT(r.time_s[i], r.time_s[i - 1]);
+}
+
+TEST(Simulator, RefusesImpossiblePasses) {
+  const Plate plate = Plate::named("plain");
+  EXPECT_THROW(simulate_pass(plate, {.speed_mm_s = 0}), std::invalid_argument);
+  EXPECT_THROW(simulate_pass(plate, {.from_mm = 80, .to_mm = 28}), std::invalid_argument);
+  EXPECT_THROW(simulate_pass(plate, {.to_mm = 120}), std::invalid_argument);
+  EXPECT_THROW(simulate_pass(plate, {.pass = 9}), std::invalid_argument);
+  EXPECT_THROW(without_term({}, "gravity"), std::invalid_argument);
+}
+
+TEST(FingerModel, TheMountLiftsTheOtherRowsOffThePlate) {
+  const Plate plate("one", {{TextureKind::bumps, 40, 2.5}});
+  SimulatorSettings yielding = clean();
+  yielding.with_mount = true;
+  const double crest = plate.crests()[0];
+  const FingerPose on_bump{.x_mm = 18, .y_mm = crest - taxel_y_mm(12), .z_mm = -0.35};  // row 3 on the bump
+  EXPECT_GT(FingerModel(plate, clean(), {}).loads(on_bump)[0], 0.1);
+  EXPECT_EQ(FingerModel(plate, yielding, {}).loads(on_bump)[0], 0);
+  EXPECT_GT(FingerModel(plate, yielding, {}).loads(on_bump)[12], 0.1);
+  EXPECT_GT(FingerModel(plate, yielding, {}).loads({.x_mm = 18, .y_mm = 20, .z_mm = -0.35})[0], 0.01);
+}
+
+TEST(FingerModel, AdcRoundTrips) {
+  EXPECT_EQ(FingerModel::adc(2.44), 3029);
+  EXPECT_EQ(FingerModel::adc(-1), 0);
+  EXPECT_EQ(FingerModel::adc(9), 4095);
+  for (const int code : {0, 1, 3028, 4095})
+    EXPECT_EQ(FingerModel::adc(FingerModel::volts_of_adc(code)), code);
+}
+
+}  // namespace
+}  // namespace supertac
