@@ -1,0 +1,88 @@
+#include "apps/evaluate/exports.h"
+
+#include <map>
+
+#include "data/images.h"
+#include "io/safetensors.h"
+#include "models/evaluation.h"
+
+namespace supertac {
+namespace {
+
+constexpr std::size_t kStrips = 12, kFilmColumns = 24;
+
+// `count` elements spread evenly over a list, or all of a shorter one.
+std::vector<std::uint32_t> spread(std::span<const std::uint32_t> list, std::size_t count) {
+  std::vector<std::uint32_t> chosen;
+  const std::size_t n = std::min(count, list.size());
+  for (std::size_t i = 0; i < n; ++i) chosen.push_back(list[i * list.size() / n]);
+  return chosen;
+}
+
+using Draw = Picture (*)(std::span<const Strip>, int, int);
+
+Picture draw(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> chosen,
+             Draw picture, int side) {
+  const int size = windows.image_size();
+  const auto pixels = static_cast<std::size_t>(size * size);
+  std::vector<float> outputs, truths;
+  for_each_output(model, windows, chosen, [&](const EvaluatedBatch& b) {
+    outputs.insert(outputs.end(), b.outputs.values().begin(), b.outputs.values().end());
+    truths.insert(truths.end(), b.truths.values().begin(), b.truths.values().end());
+    return true;
+  });
+  std::vector<Strip> strips;
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    strips.push_back({windows.last_frame(chosen[i]),
+                      std::span<const float>(outputs).subspan(i * pixels, pixels),
+                      std::span<const float>(truths).subspan(i * pixels, pixels)});
+  }
+  return picture(strips, size, side);
+}
+
+}  // namespace
+
+OutputsFile::OutputsFile(const WindowSet& windows, std::size_t count)
+    : timesteps_(static_cast<std::uint64_t>(windows.timesteps())),
+      size_(static_cast<std::uint64_t>(windows.image_size())) {
+  input_.reserve(count * timesteps_ * kTaxels);
+  output_.reserve(count * size_ * size_);
+  truth_.reserve(count * size_ * size_);
+}
+
+void OutputsFile::add(std::span<const float> window, std::span<const float> output,
+                      std::span<const float> truth) {
+  input_.insert(input_.end(), window.begin(), window.end());
+  output_.insert(output_.end(), output.begin(), output.end());
+  truth_.insert(truth_.end(), truth.begin(), truth.end());
+  ++count_;
+}
+
+void OutputsFile::write(const std::string& path) const {
+  const auto bytes = [](const std::vector<float>& v) { return std::as_bytes(std::span(v)); };
+  write_safetensors(path, {{"format", "supertac-outputs"}},
+                    {{"input", "F32", {count_, timesteps_, kTaxels}, bytes(input_)},
+                     {"output", "F32", {count_, size_, size_}, bytes(output_)},
+                     {"truth", "F32", {count_, size_, size_}, bytes(truth_)}});
+}
+
+void write_pictures(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> test,
+                    OutputFolder& folder) {
+  std::vector<std::uint32_t> touching;
+  std::map<std::size_t, std::vector<std::uint32_t>> by_pass;
+  for (const std::uint32_t i : test) {
+    if (windows.contact(i)) touching.push_back(i);
+    by_pass[windows.pass_of(i)].push_back(i);
+  }
+  const std::vector<std::uint32_t> strips = spread(touching.empty() ? test : touching, kStrips);
+  write_png(folder.add("strips.png"), draw(model, windows, strips, strip_picture, 96));
+  for (const auto& [pass, list] : by_pass) {
+    const WindowSet::Pass& p = windows.passes()[pass];
+    const std::string name = "film_" + p.plate + "_t" + std::to_string(p.trial) + "_p" +
+                             std::to_string(p.pass) + "_v" + std::to_string(static_cast<int>(p.speed_mm_s)) +
+                             ".png";
+    write_png(folder.add(name), draw(model, windows, spread(list, kFilmColumns), film_picture, 48));
+  }
+}
+
+}  // namespace supertac

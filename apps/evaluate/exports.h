@@ -1,0 +1,34 @@
+// What an evaluation shows besides its table: pictures, and the arrays behind them.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "apps/common/output_folder.h"
+#include "data/windows.h"
+#include "models/supertac_model.h"
+
+namespace supertac {
+
+/// Collects windows [N,T,16], outputs [N,S,S] and truths [N,S,S] and writes them as one safetensors file with
+/// tensors "input", "output", "truth".
+class OutputsFile {
+ public:
+  OutputsFile(const WindowSet& windows, std::size_t count);
+  void add(std::span<const float> window, std::span<const float> output, std::span<const float> truth);
+  /// Throws FileError.
+  void write(const std::string& path) const;
+
+ private:
+  std::uint64_t timesteps_, size_, count_ = 0;
+  std::vector<float> input_, output_, truth_;
+};
+
+/// strips.png: windows in contact spread over the test windows, input | output | truth; and for each test
+/// pass film_<plate>_t<trial>_p<pass>.png. Throws FileError.
+void write_pictures(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> test,
+                    OutputFolder& folder);
+
+}  // namespace supertac

@@ -1,0 +1,163 @@
+// supertac-evaluate: how good a model is on a data set, beside what does without a network.
+#include <algorithm>
+
+#include "apps/common/numerics.h"
+#include "apps/common/output_folder.h"
+#include "apps/common/program.h"
+#include "apps/common/progress.h"
+#include "apps/common/signals.h"
+#include "apps/evaluate/exports.h"
+#include "data/baselines.h"
+#include "data/metrics.h"
+#include "data/split.h"
+#include "io/file.h"
+#include "io/numbers.h"
+#include "models/evaluation.h"
+#include "models/model_file.h"
+
+namespace supertac {
+namespace {
+
+void declare(Arguments& a) {
+  a.required("model", "FILE", "a model written by supertac-train");
+  a.required("data", "DIR", "recordings to test on");
+  a.option("split", "NAME",
+           "window, pass, trial, texture or none (default: the model's own); its test side is scored");
+  a.option("seed", "N", "of the split (default: the model's own)");
+  a.option("plates", "A,B,...", "only recordings of these plates (default: the model's own)");
+  a.option("limit", "N", "score at most N windows, evenly spread; 0 = all", "0");
+  a.option("pictures", "DIR", "write PNG pictures: input | output | truth, and a film of each test pass");
+  a.option("outputs", "FILE", "write input windows, outputs and truths as safetensors");
+}
+
+std::string metadata_or(const ModelFile& file, const std::string& key, const std::string& otherwise) {
+  const auto found = file.metadata.find(key);
+  return found == file.metadata.end() ? otherwise : found->second;
+}
+
+struct Task {
+  WindowSet windows;
+  std::string split_name;
+  std::uint64_t seed;
+  std::vector<std::uint32_t> train, test;
+};
+
+std::vector<std::string> split_words(const std::string& text) {
+  std::vector<std::string> words;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t comma = std::min(text.find(',', at), text.size());
+    words.push_back(text.substr(at, comma - at));
+    at = comma + 1;
+  }
+  return words;
+}
+
+Task load_task(const Arguments& a, const ModelFile& file) {
+  WindowSettings w;
+  const SuperTacSettings& model = file.model->settings();
+  w.timesteps = static_cast<int>(model.timesteps);
+  w.scale = static_cast<int>(model.scale);
+  w.rate_hz = file.input.rate_hz;
+  w.scaling = file.input.scaling;
+  const std::vector<std::string> plates =
+      a.given("plates") ? a.list("plates") : split_words(metadata_or(file, "plates", ""));
+  const std::string name = a.given("split")
+                               ? a.choice("split", {"window", "pass", "trial", "texture", "none"})
+                               : metadata_or(file, "split", "none");
+  const std::uint64_t seed =
+      a.given("seed")
+          ? static_cast<std::uint64_t>(a.integer("seed", 0, std::numeric_limits<std::int64_t>::max()))
+          : parse_uint(metadata_or(file, "seed", "0")).value_or(0);
+  Task task{WindowSet::load(a.text("data"), plates, w), name, seed, {}, {}};
+  Split split = make_split(task.windows, split_kind(name), seed);
+  task.train = std::move(split.train);
+  task.test = std::move(split.test);
+  const auto limit =
+      static_cast<std::size_t>(a.integer("limit", 0, std::numeric_limits<std::uint32_t>::max()));
+  if (limit > 0 && limit < task.test.size()) {
+    std::vector<std::uint32_t> fewer;
+    for (std::size_t i = 0; i < limit; ++i) fewer.push_back(task.test[i * task.test.size() / limit]);
+    task.test = std::move(fewer);
+  }
+  return task;
+}
+
+std::string row(const std::string& name, const ContactMetrics& metrics) {
+  const Metrics c = metrics.contact(), all = metrics.all();
+  const auto cell = [](double value, int decimals) {
+    const std::string text = format(value, decimals);
+    return std::string(text.size() < 9 ? 9 - text.size() : 0, ' ') + text;
+  };
+  return name + std::string(name.size() < 12 ? 12 - name.size() : 0, ' ') + cell(c.ssim, 3) +
+         cell(c.psnr_mean_db, 2) + cell(c.position_error_mm, 2) + cell(all.ssim, 3) +
+         cell(all.psnr_mean_db, 2);
+}
+
+int run(Arguments& a) {
+  const std::string outputs_path = a.text("outputs");
+  if (!outputs_path.empty()) refuse_existing(outputs_path, a.force());
+  const ModelFile file = load_model(a.text("model"));
+  const Task task = load_task(a, file);
+  const int size = task.windows.image_size();
+  const auto pixels = static_cast<std::size_t>(size * size);
+
+  std::optional<OutputFolder> pictures;
+  if (a.given("pictures")) pictures.emplace(a.text("pictures"), a.force());
+  std::optional<OutputsFile> outputs;
+  if (!outputs_path.empty()) outputs.emplace(task.windows, task.test.size());
+  if (task.train.empty()) throw std::runtime_error("the split leaves no window to fit the baselines on");
+  const auto baselines = fit_baselines(task.windows, task.train);
+  ContactMetrics network(size);
+  std::vector<ContactMetrics> plain;
+  for (std::size_t k = 0; k < baselines.size(); ++k) plain.emplace_back(size);
+  std::vector<float> image(pixels);
+  Progress progress(a, "evaluating", task.test.size(), "windows");
+  for_each_output(*file.model, task.windows, task.test, [&](const EvaluatedBatch& b) {
+    for (std::size_t n = 0; n < static_cast<std::size_t>(b.outputs.dim(0)); ++n) {
+      const std::span<const float> output = b.outputs.values().subspan(n * pixels, pixels);
+      const std::span<const float> truth = b.truths.values().subspan(n * pixels, pixels);
+      const std::span<const float> window = task.windows.window(task.test[b.first + n]);
+      network.add(output, truth);
+      for (std::size_t k = 0; k < baselines.size(); ++k) {
+        baselines[k]->predict(window, image);
+        plain[k].add(image, truth);
+      }
+      if (outputs) outputs->add(window, output, truth);
+    }
+    progress.update(b.first + static_cast<std::size_t>(b.outputs.dim(0)));
+    return !interrupted();
+  });
+  stop_if_interrupted();
+
+  a.print("split " + task.split_name + ", seed " + std::to_string(task.seed) + ", " +
+          std::to_string(network.all().windows) + " windows, " + std::to_string(network.contact().windows) +
+          " in contact");
+  a.print("            |- in contact -------------| |- all ---------|");
+  a.print("                 SSIM  PSNR dB   pos mm     SSIM  PSNR dB");
+  a.print(row("network", network));
+  for (std::size_t k = 0; k < baselines.size(); ++k) a.print(row(baselines[k]->name(), plain[k]));
+
+  nlohmann::ordered_json result = network.to_json();
+  for (std::size_t k = 0; k < baselines.size(); ++k)
+    result["baselines"][baselines[k]->name()] = plain[k].to_json();
+  result["model"] = a.text("model");
+  result["data"] = task.windows.fingerprint();
+  result["split"] = task.split_name;
+  result["seed"] = task.seed;
+  if (pictures) {
+    write_pictures(*file.model, task.windows, task.test, *pictures);
+    pictures->keep();
+  }
+  if (outputs) outputs->write(outputs_path);
+  a.write_json(result);
+  return kExitOk;
+}
+
+}  // namespace
+}  // namespace supertac
+
+int main(int argc, char** argv) {
+  const supertac::Program program{"supertac-evaluate", "Scores a model and the baselines on a data set.",
+                                  supertac::declare, supertac::run, supertac::numerics_text};
+  return supertac::run_program(program, argc, argv);
+}

@@ -1,0 +1,94 @@
+#include "apps/train/run_folder.h"
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "apps/train/report.h"
+#include "io/file.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr const char* kHeader =
+    "time_s,step,total,reconstruction,kld,l2,ssim,gradient_norm,learning_rate,test_ssim,test_psnr_db\n";
+constexpr std::uint64_t kMaxLogBytes = 64 << 20;
+
+std::string csv(const LogLine& line) {
+  std::string out = format(line.time_s, 3) + "," + std::to_string(line.step);
+  for (const double v : {line.total, line.reconstruction, line.kld, line.l2, line.ssim, line.gradient_norm,
+                         line.learning_rate}) {
+    out += "," + format(v);
+  }
+  out += "," + (line.test_ssim ? format(*line.test_ssim, 5) : "");
+  out += "," + (line.test_psnr_db ? format(*line.test_psnr_db, 3) : "");
+  return out + "\n";
+}
+
+// A damaged line (the last one of a killed run) is left out.
+std::optional<LogLine> parse(const std::string& text) {
+  std::vector<std::optional<double>> v;
+  std::stringstream in(text + ",");
+  for (std::string field; std::getline(in, field, ',');) v.push_back(parse_double(field));
+  if (v.size() != 11) return std::nullopt;
+  for (std::size_t i = 0; i < 9; ++i) {
+    if (!v[i]) return std::nullopt;
+  }
+  return LogLine{
+      *v[0], static_cast<std::int64_t>(*v[1]), *v[2], *v[3], *v[4], *v[5], *v[6], *v[7], *v[8], v[9], v[10]};
+}
+
+std::vector<LogLine> read_log(const std::string& path, std::int64_t last_step) {
+  std::vector<LogLine> lines;
+  if (!std::filesystem::exists(path)) return lines;
+  std::stringstream in(read_text_file(path, kMaxLogBytes));
+  std::string text;
+  std::getline(in, text);  // the header
+  while (std::getline(in, text)) {
+    const std::optional<LogLine> line = parse(text);
+    if (line && line->step <= last_step) lines.push_back(*line);
+  }
+  return lines;
+}
+
+}  // namespace
+
+std::string RunFolder::folder_of(const std::string& model_file) {
+  return std::filesystem::path(model_file).replace_extension(".run").string();
+}
+
+RunFolder::RunFolder(const std::string& model_file, bool force, std::optional<std::int64_t> resumed_step)
+    : path_(folder_of(model_file)) {
+  const bool exists = std::filesystem::exists(path_);
+  if (exists && !force && !resumed_step) {
+    throw FileError(path_, "is the folder of an earlier run; resume it with --resume " + checkpoint_path() +
+                               ", overwrite it with --force, or choose another --out");
+  }
+  std::error_code error;
+  std::filesystem::create_directories(path_, error);
+  if (error) throw FileError(path_, "cannot create the folder: " + error.message());
+  if (resumed_step) lines_ = read_log(path_ + "/log.csv", *resumed_step);
+  std::string text = kHeader;
+  for (const LogLine& line : lines_) text += csv(line);
+  write_file(path_ + "/log.csv", text);
+}
+
+void RunFolder::write_settings(const nlohmann::ordered_json& settings) {
+  write_file(path_ + "/settings.json", settings.dump(2) + "\n");
+}
+
+bool RunFolder::log(const LogLine& line) {
+  lines_.push_back(line);
+  if (log_broken_) return true;
+  std::ofstream out(path_ + "/log.csv", std::ios::app);
+  out << csv(line) << std::flush;
+  log_broken_ = !out;
+  return !log_broken_;
+}
+
+void RunFolder::write_report(const nlohmann::ordered_json& settings) const {
+  write_file(path_ + "/report.html", report_page(settings, lines_));
+}
+
+}  // namespace supertac

@@ -1,0 +1,47 @@
+// What a training run leaves behind besides the model: settings.json, log.csv, last.safetensors, report.html.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "models/trainer.h"
+
+namespace supertac {
+
+/// One line of log.csv: means over the steps since the line before.
+struct LogLine {
+  double time_s = 0;  ///< since training began, pauses between resumed runs left out
+  std::int64_t step = 0;
+  double total = 0, reconstruction = 0, kld = 0, l2 = 0, ssim = 0, gradient_norm = 0, learning_rate = 0;
+  std::optional<double> test_ssim,
+      test_psnr_db;  ///< in contact, at the end of an epoch; nothing is chosen by them
+};
+
+class RunFolder {
+ public:
+  /// The folder of a model file: "model.safetensors" -> "model.run". A new run refuses an existing one unless
+  /// `force`; a resumed run keeps the log's lines up to `resumed_step`. Throws FileError.
+  RunFolder(const std::string& model_file, bool force, std::optional<std::int64_t> resumed_step);
+
+  std::string checkpoint_path() const { return path_ + "/last.safetensors"; }
+  const std::string& path() const { return path_; }
+  /// Seconds on the clock of the log when the run was resumed; 0 for a new run.
+  double seconds_before() const { return lines_.empty() ? 0 : lines_.back().time_s; }
+
+  void write_settings(const nlohmann::ordered_json& settings);
+  /// Appends and flushes. When the disk refuses, returns false, once; later lines are then kept in memory
+  /// only.
+  bool log(const LogLine& line);
+  /// A page with curves that needs no other file. Throws FileError.
+  void write_report(const nlohmann::ordered_json& settings) const;
+  static std::string folder_of(const std::string& model_file);
+
+ private:
+  std::string path_;
+  std::vector<LogLine> lines_;
+  bool log_broken_ = false;
+};
+
+}  // namespace supertac
