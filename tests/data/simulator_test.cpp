@@ -96,8 +96,7 @@ TEST(Simulator, EveryTermChangesSomething) {
   for (const auto& term : simulator_terms()) {
     if (term == "loss") continue;
     const double change = rms_change_mv(term);
-    std::printf("| %s | %.2f |
-", term.c_str(), change);
+    std::printf("| %s | %.2f |\n", term.c_str(), change);
     EXPECT_GT(change, 0.01) << term;
   }
 }
