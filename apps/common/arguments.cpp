@@ -1,0 +1,232 @@
+#include "apps/common/arguments.h"
+
+#include <cstdio>
+#include <cxxopts.hpp>
+#include <iostream>
+#include <set>
+
+#include "apps/common/nearest.h"
+#include "apps/common/threads.h"
+#include "io/file.h"
+#include "io/numbers.h"
+#include "io/text.h"
+
+namespace supertac {
+namespace {
+
+/// The options as cxxopts wants them; everything is text there, numbers are read locale-free afterwards.
+void add(cxxopts::Options& parser, const std::string& name, const std::string& help, const std::string& value,
+         bool is_flag, const std::string& default_value) {
+  const std::string names = name == "help" ? "h,help" : name;
+  if (is_flag) {
+    parser.add_options()(names, help);
+  } else {
+    const auto type = cxxopts::value<std::string>();
+    parser.add_options()(names, help, default_value.empty() ? type : type->default_value(default_value),
+                         value);
+  }
+}
+
+}  // namespace
+
+Arguments::Arguments(std::string program, std::string purpose)
+    : program_(std::move(program)), purpose_(std::move(purpose)) {
+  flag("help", "print this and exit");
+  flag("version", "print version, commit, compiler and exit");
+  option("json", "FILE", "also write the results as JSON; '-' is stdout");
+  flag("quiet", "no progress bar and no remarks");
+  option("threads", "N", "worker threads; default OMP_NUM_THREADS, else what the machine grants");
+  flag("force", "replace existing output");
+}
+
+void Arguments::declare(const std::string& name, Option option) {
+  if (!options_.emplace(name, std::move(option)).second) {
+    throw std::invalid_argument("Arguments: option " + name + " declared twice");
+  }
+  order_.push_back(name);
+}
+
+Arguments& Arguments::positional(const std::string& value, const std::string& help) {
+  declare(value, {.value = value, .help = help, .is_required = true});
+  positionals_.push_back(value);
+  return *this;
+}
+
+Arguments& Arguments::required(const std::string& name, const std::string& value, const std::string& help) {
+  declare(name, {.value = value, .help = help, .is_required = true});
+  return *this;
+}
+
+Arguments& Arguments::option(const std::string& name, const std::string& value, const std::string& help,
+                             const std::string& default_value) {
+  declare(name, {.value = value, .help = help, .default_value = default_value});
+  return *this;
+}
+
+Arguments& Arguments::flag(const std::string& name, const std::string& help) {
+  declare(name, {.help = help, .is_flag = true});
+  return *this;
+}
+
+std::string Arguments::help() const {
+  cxxopts::Options parser(program_, purpose_);
+  std::string usage;
+  for (const std::string& name : positionals_) usage += name + " ";
+  for (const std::string& name : order_) {
+    const Option& option = options_.at(name);
+    if (option.is_required && name != option.value) usage += "--" + name + " " + option.value + " ";
+  }
+  parser.custom_help(usage + "[options]");
+  // A program's own options first, then the six that all have.
+  constexpr size_t kCommon = 6;
+  for (size_t i = 0; i < order_.size(); ++i) {
+    const std::string& name = order_[(i + kCommon) % order_.size()];
+    const Option& option = options_.at(name);
+    if (option.is_required && name == option.value) continue;
+    add(parser, name, option.help, option.value, option.is_flag, option.default_value);
+  }
+  std::string text = parser.help();
+  for (const std::string& name : positionals_) text += "\n  " + name + ": " + options_.at(name).help;
+  return text + (positionals_.empty() ? "" : "\n");
+}
+
+/// cxxopts would name an unknown option without a hint.
+void Arguments::check_names(int argc, const char* const* argv) const {
+  std::vector<std::string> known;
+  for (const auto& [name, option] : options_) {
+    if (!option.is_required || name != option.value) known.push_back(name);
+  }
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word == "--") return;
+    if (!word.starts_with("--")) continue;
+    const std::string name(word.substr(2, word.find('=') - 2));
+    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    const std::string hint = nearest_name(name, known);
+    throw UsageError("unknown option " + in_quotes("--" + name) +
+                     (hint.empty() ? "" : "; did you mean '--" + hint + "'?"));
+  }
+}
+
+void Arguments::parse(int argc, const char* const* argv) {
+  for (int i = 0; i < argc; ++i) command_line_ += (i > 0 ? " " : "") + std::string(argv[i]);
+  check_names(argc, argv);
+  cxxopts::Options parser(program_, purpose_);
+  for (const std::string& name : order_) {
+    const Option& option = options_.at(name);
+    add(parser, name, option.help, option.value, option.is_flag, "");
+  }
+  parser.parse_positional(positionals_);
+  try {
+    const cxxopts::ParseResult result = parser.parse(argc, argv);
+    for (const std::string& name : order_) {
+      if (result.count(name) == 0) continue;
+      values_[name] = options_.at(name).is_flag ? "" : result[name].as<std::string>();
+    }
+    if (!result.unmatched().empty()) {
+      throw UsageError("unexpected argument " + in_quotes(result.unmatched().front()));
+    }
+  } catch (const cxxopts::exceptions::exception& error) {
+    throw UsageError(error.what());
+  }
+  if (!given("help") && !given("version")) check_complete();
+}
+
+void Arguments::check_complete() const {
+  for (const std::string& name : order_) {
+    const Option& option = options_.at(name);
+    if (!option.is_required || (given(name) && !values_.at(name).empty())) continue;
+    const bool positional = name == option.value;
+    throw UsageError("missing " + (positional ? name : "--" + name + " " + option.value) + ": " +
+                     option.help);
+  }
+}
+
+void Arguments::reject(const std::string& name, const std::string& expected, const std::string& found) const {
+  throw UsageError("--" + name + ": expected " + expected + ", found " + in_quotes(found));
+}
+
+bool Arguments::given(const std::string& name) const {
+  if (!options_.contains(name)) throw std::invalid_argument("Arguments: no option " + name);
+  return values_.contains(name);
+}
+
+std::string Arguments::text(const std::string& name) const {
+  return given(name) ? values_.at(name) : options_.at(name).default_value;
+}
+
+std::string Arguments::choice(const std::string& name, const std::vector<std::string>& words) const {
+  const std::string word = text(name);
+  std::string all;
+  for (const std::string& known : words) {
+    if (word == known) return word;
+    all += (all.empty() ? "" : ", ") + known;
+  }
+  const std::string hint = nearest_name(word, words);
+  throw UsageError("--" + name + ": expected one of " + all + ", found " + in_quotes(word) +
+                   (hint.empty() ? "" : "; did you mean '" + hint + "'?"));
+}
+
+int64_t Arguments::integer(const std::string& name, int64_t lowest, int64_t highest) const {
+  const auto value = parse_int(text(name));
+  if (value && *value >= lowest && *value <= highest) return *value;
+  reject(name, "a whole number from " + std::to_string(lowest) + " to " + std::to_string(highest),
+         text(name));
+}
+
+double Arguments::number(const std::string& name, double lowest, double highest) const {
+  const auto value = parse_double(text(name));
+  if (value && *value >= lowest && *value <= highest) return *value;
+  reject(name, "a number from " + format(lowest) + " to " + format(highest), text(name));
+}
+
+std::vector<std::string> Arguments::list(const std::string& name) const {
+  std::vector<std::string> elements;
+  std::set<std::string> seen;
+  const std::string value = text(name);
+  if (value.empty()) return elements;
+  for (std::string_view rest = value;; rest.remove_prefix(1)) {
+    const std::string element(rest.substr(0, rest.find(',')));
+    if (element.empty()) reject(name, "a list without empty elements", value);
+    if (!seen.insert(element).second) reject(name, "every element once", value);
+    elements.push_back(element);
+    rest.remove_prefix(element.size());
+    if (rest.empty()) return elements;
+  }
+}
+
+std::vector<double> Arguments::numbers(const std::string& name, double lowest, double highest) const {
+  std::vector<double> values;
+  for (const std::string& element : list(name)) {
+    const auto value = parse_double(element);
+    if (!value || !(*value >= lowest && *value <= highest)) {
+      reject(name, "numbers from " + format(lowest) + " to " + format(highest), element);
+    }
+    values.push_back(*value);
+  }
+  return values;
+}
+
+int Arguments::threads() const {
+  return given("threads") ? static_cast<int>(integer("threads", 1, 1024)) : default_threads();
+}
+
+void Arguments::print(std::string_view line) const {
+  if (text("json") != "-") std::cout << line << '\n';
+}
+
+void Arguments::note(std::string_view line) const {
+  if (!quiet()) std::cerr << line << '\n';
+}
+
+void Arguments::write_json(const nlohmann::ordered_json& result) const {
+  if (!given("json")) return;
+  const std::string document = result.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  if (text("json") == "-") {
+    std::cout << document;
+  } else {
+    write_file(text("json"), document);
+  }
+}
+
+}  // namespace supertac

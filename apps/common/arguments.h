@@ -1,0 +1,95 @@
+// The command line of a program: its options are declared, parsed (cxxopts), and read with range checks.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace supertac {
+
+/// The command line is wrong: exit code 2.
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Options of one program. Every program also has --help, --version, --json, --quiet, --threads and --force.
+class Arguments {
+ public:
+  Arguments(std::string program, std::string purpose);
+
+  // Declaring. `value` names what is expected, with its unit ("DIR", "N", "MM_PER_S"); help is a short
+  // clause.
+
+  /// An argument without a name, in the order of declaration; all are required.
+  Arguments& positional(const std::string& value, const std::string& help);
+  /// An option that has to be given.
+  Arguments& required(const std::string& name, const std::string& value, const std::string& help);
+  /// An option with a default; "" means not given.
+  Arguments& option(const std::string& name, const std::string& value, const std::string& help,
+                    const std::string& default_value = "");
+  Arguments& flag(const std::string& name, const std::string& help);
+
+  /// @throws UsageError: an unknown option (naming the nearest known one), a value missing, an argument too
+  /// many or too few. --help and --version may stand without what is required.
+  void parse(int argc, const char* const* argv);
+
+  // Reading; `name` is that of an option or the value name of a positional argument. All throw UsageError
+  // that names option, expected and found.
+
+  bool given(const std::string& name) const;  ///< on the command line
+  bool flag(const std::string& name) const { return given(name); }
+  std::string text(const std::string& name) const;
+  /// One of the given words.
+  std::string choice(const std::string& name, const std::vector<std::string>& words) const;
+  int64_t integer(const std::string& name, int64_t lowest, int64_t highest) const;
+  double number(const std::string& name, double lowest, double highest) const;
+  /// Comma-separated; an empty value is an empty list, an empty element is an error, and so is one given
+  /// twice.
+  std::vector<std::string> list(const std::string& name) const;
+  std::vector<double> numbers(const std::string& name, double lowest, double highest) const;
+
+  bool force() const { return flag("force"); }
+  bool quiet() const { return flag("quiet"); }
+  /// --threads, or what the machine grants (apps/common/threads.h).
+  int threads() const;
+
+  const std::string& program() const { return program_; }
+  /// The whole command line, words separated by spaces, for a run's settings.
+  const std::string& command_line() const { return command_line_; }
+  std::string help() const;
+
+  // Talking.
+
+  /// A line of the result for a reader, on stdout; nothing when the JSON goes there.
+  void print(std::string_view line) const;
+  /// A remark on stderr; nothing under --quiet.
+  void note(std::string_view line) const;
+  /// The machine-readable result, to where --json says: a file (atomically) or, for '-', stdout. Without
+  /// --json nothing. The wrapper has refused an existing file before the work began.
+  void write_json(const nlohmann::ordered_json& result) const;
+
+ private:
+  struct Option {
+    std::string value{}, help{}, default_value{};
+    bool is_flag = false, is_required = false;
+  };
+
+  void declare(const std::string& name, Option option);
+  void check_names(int argc, const char* const* argv) const;
+  void check_complete() const;
+  [[noreturn]] void reject(const std::string& name, const std::string& expected,
+                           const std::string& found) const;
+
+  std::string program_, purpose_, command_line_;
+  std::vector<std::string> order_;        // of declaration
+  std::vector<std::string> positionals_;  // value names
+  std::map<std::string, Option> options_;
+  std::map<std::string, std::string> values_;  // as given
+};
+
+}  // namespace supertac

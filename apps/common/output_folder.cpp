@@ -1,0 +1,46 @@
+#include "apps/common/output_folder.h"
+
+#include <filesystem>
+
+#include "io/file.h"
+
+namespace supertac {
+
+namespace fs = std::filesystem;
+
+OutputFolder::OutputFolder(const std::string& path, bool force) : path_(path), force_(force) {
+  std::error_code error;
+  for (fs::path folder = fs::absolute(path, error); !folder.empty() && !fs::exists(folder, error);
+       folder = folder.parent_path()) {
+    folders_.push_back(folder.string());
+    if (folder == folder.parent_path()) break;
+  }
+  try {
+    make_directories(path);
+    // Opens a temporary in the folder and removes it: the permission to write, tried.
+    AtomicFile((fs::path(path) / ".writable").string());
+  } catch (...) {
+    remove_made();
+    throw;
+  }
+}
+
+OutputFolder::~OutputFolder() {
+  if (!kept_) remove_made();
+}
+
+void OutputFolder::remove_made() {
+  std::error_code ignored;
+  for (const std::string& file : made_) fs::remove(file, ignored);
+  for (const std::string& folder : folders_) fs::remove(folder, ignored);  // only when empty
+}
+
+std::string OutputFolder::add(const std::string& name) {
+  const std::string file = (fs::path(path_) / name).string();
+  refuse_existing(file, force_);
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(file, error))) made_.push_back(file);
+  return file;
+}
+
+}  // namespace supertac

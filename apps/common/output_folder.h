@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace supertac {
+
+/// A folder that a program fills with several files, all or none: what it has made is removed again unless
+/// keep() is called. Files that were there before are never removed.
+class OutputFolder {
+ public:
+  /// Creates the folder where it is missing.
+  /// @throws FileError when it cannot be created or written to, so that a program finds out before it works.
+  OutputFolder(const std::string& path, bool force);
+  ~OutputFolder();
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+
+  /// Path of a file to be written in the folder. @throws FileError when it exists and force is false.
+  std::string add(const std::string& name);
+  void keep() { kept_ = true; }
+
+ private:
+  void remove_made();
+
+  std::string path_;
+  bool force_;
+  bool kept_ = false;
+  std::vector<std::string> made_;     // files that were not there before
+  std::vector<std::string> folders_;  // the same, innermost first
+};
+
+}  // namespace supertac

@@ -1,0 +1,80 @@
+#include "apps/common/program.h"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <iostream>
+#include <new>
+
+#include "apps/common/signals.h"
+#include "apps/common/version.h"
+#include "io/file.h"
+
+namespace supertac {
+namespace {
+
+/// One line, whatever the message holds.
+int fail(const Program& program, std::string message, int code) {
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  std::cerr << program.name << ": " << message << '\n';
+  return code;
+}
+
+int run(const Program& program, Arguments& arguments) {
+  omp_set_num_threads(arguments.threads());
+  const std::string json = arguments.text("json");
+  if (!json.empty() && json != "-") refuse_existing(json, arguments.force());
+  catch_signals();
+  const int code = program.run(arguments);
+  return interrupted() ? 128 + interrupting_signal() : code;
+}
+
+int parse_and_run(const Program& program, int argc, const char* const* argv) {
+  Arguments arguments(program.name, program.purpose);
+  program.declare(arguments);
+  arguments.parse(argc, argv);
+  if (arguments.given("help")) {
+    std::cout << arguments.help();
+  } else if (arguments.given("version")) {
+    std::cout << version_text(program);
+  } else {
+    return run(program, arguments);
+  }
+  return kExitOk;
+}
+
+int catch_all(const Program& program, int argc, const char* const* argv) {
+  try {
+    return parse_and_run(program, argc, argv);
+  } catch (const Interrupted&) {
+    return fail(program, "stopped by signal " + std::to_string(interrupting_signal()),
+                128 + interrupting_signal());
+  } catch (const UsageError& error) {
+    return fail(program, std::string(error.what()) + " (see --help)", kExitUsage);
+  } catch (const std::bad_alloc&) {
+    return fail(program, "out of memory; close other programs or ask for less", kExitFailed);
+  } catch (const std::exception& error) {
+    return fail(program, error.what(), kExitFailed);
+  }
+}
+
+}  // namespace
+
+int run_program(const Program& program, int argc, const char* const* argv) {
+  const int code = catch_all(program, argc, argv);
+  std::cout.flush();
+  if (std::cout.fail() && code == kExitOk)
+    return fail(program, "stdout: cannot write; is the disk full?", kExitFailed);
+  return code;
+}
+
+std::string version() { return SUPERTAC_VERSION; }
+
+std::string version_text(const Program& program) {
+  std::string text =
+      program.name + " " + version() + "\ncommit    " + commit() + "\ncompiler  " + __VERSION__ + "\n";
+  if (program.numerics != nullptr) text += program.numerics();
+  return text;
+}
+
+}  // namespace supertac

@@ -1,0 +1,31 @@
+// What all programs share: a program is its declaration, its options and a function run().
+#pragma once
+
+#include <string>
+
+#include "apps/common/arguments.h"
+
+namespace supertac {
+
+constexpr int kExitOk = 0, kExitFailed = 1, kExitUsage = 2;
+
+struct Program {
+  std::string name;     ///< "supertac-simulate"
+  std::string purpose;  ///< one sentence for --help
+  void (*declare)(Arguments&);
+  int (*run)(Arguments&);
+  /// Lines of --version about kernels and libraries; nullptr: none.
+  std::string (*numerics)() = nullptr;
+};
+
+/// The whole of main(): parses, handles --help and --version, sets the number of threads, catches signals,
+/// refuses an existing --json file without --force, runs, and turns every error into one line on stderr.
+/// @returns run()'s code; 1 when something failed; 2 when the command line was wrong; 128 + signal (130, 143)
+/// when interrupted.
+int run_program(const Program& program, int argc, const char* const* argv);
+
+/// "0.1.0", and the text of --version: version, commit, compiler.
+std::string version();
+std::string version_text(const Program& program);
+
+}  // namespace supertac

@@ -1,0 +1,70 @@
+#include "apps/common/progress.h"
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <iostream>
+#include <string_view>
+
+#include "apps/common/arguments.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+bool drawable_terminal() {
+  const char* terminal = std::getenv("TERM");
+  return isatty(STDERR_FILENO) == 1 && terminal != nullptr && std::string_view(terminal) != "dumb";
+}
+
+std::string clock_text(double seconds) {
+  const auto whole = static_cast<int64_t>(std::lround(std::min(seconds, 1e6)));
+  const auto two = [](int64_t number) { return (number < 10 ? "0" : "") + std::to_string(number); };
+  if (whole < 3600) return std::to_string(whole / 60) + ":" + two(whole % 60);
+  return std::to_string(whole / 3600) + ":" + two(whole / 60 % 60) + ":" + two(whole % 60);
+}
+
+}  // namespace
+
+Progress::Progress(const Arguments& arguments, std::string what, uint64_t total, std::string unit)
+    : what_(std::move(what)),
+      unit_(std::move(unit)),
+      total_(total),
+      enabled_(!arguments.quiet() && drawable_terminal()),
+      begin_(std::chrono::steady_clock::now()),
+      last_(begin_) {}
+
+Progress::~Progress() {
+  if (width_ > 0) draw("");
+}
+
+void Progress::update(uint64_t done) {
+  using namespace std::chrono_literals;
+  if (!enabled_) return;
+  const auto now = std::chrono::steady_clock::now();
+  if (now - begin_ < 2s || now - last_ < 200ms) return;
+  last_ = now;
+  draw(progress_line(what_, done, total_, unit_, std::chrono::duration<double>(now - begin_).count()));
+}
+
+void Progress::draw(const std::string& line) {
+  const std::string rest(width_ > line.size() ? width_ - line.size() : 0, ' ');
+  std::cerr << '\r' << line << rest << (line.empty() ? "\r" : "") << std::flush;
+  width_ = line.size();
+}
+
+std::string progress_line(const std::string& what, uint64_t done, uint64_t total, const std::string& unit,
+                          double seconds) {
+  constexpr int kCells = 24;
+  const double share =
+      total > 0 ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total)) : 0.0;
+  const int cells = static_cast<int>(share * kCells);
+  const double rate = seconds > 0 ? static_cast<double>(done) / seconds : 0.0;
+  std::string line = what + "  [" + std::string(cells, '#') + std::string(kCells - cells, '.') + "]  " +
+                     format(100 * share, 0) + " %  " + format(rate, rate < 10 ? 1 : 0) + " " + unit + "/s";
+  if (share > 0) line += "  " + clock_text(seconds * (1 - share) / share) + " left";
+  return line;
+}
+
+}  // namespace supertac

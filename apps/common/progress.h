@@ -1,0 +1,40 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+namespace supertac {
+
+class Arguments;
+
+/// A progress bar on stderr: share done, rate, time left. Drawn on a terminal only (not TERM=dumb, not
+/// --quiet), and only once the work has taken two seconds. It needs no colour and no escape codes. Not to be
+/// shared by threads.
+class Progress {
+ public:
+  /// @param unit what is counted, in the plural ("passes", "steps")
+  Progress(const Arguments& arguments, std::string what, uint64_t total, std::string unit);
+  /// Wipes the bar.
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// `done` of `total` so far. Cheap: draws at most five times a second.
+  void update(uint64_t done);
+
+ private:
+  void draw(const std::string& line);
+
+  std::string what_, unit_;
+  uint64_t total_;
+  bool enabled_;
+  size_t width_ = 0;  // of what is drawn
+  std::chrono::steady_clock::time_point begin_, last_;
+};
+
+/// The bar's text, e.g. "training  [#####.....]  50 %  1200 steps/s  0:41 left".
+std::string progress_line(const std::string& what, uint64_t done, uint64_t total, const std::string& unit,
+                          double seconds);
+
+}  // namespace supertac

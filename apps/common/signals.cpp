@@ -1,0 +1,37 @@
+#include "apps/common/signals.h"
+
+#include <atomic>
+#include <csignal>
+
+namespace supertac {
+namespace {
+
+std::atomic<int> signal_number{0};
+static_assert(std::atomic<int>::is_always_lock_free, "usable in a signal handler");
+
+void remember(int number) { signal_number = number; }
+
+}  // namespace
+
+void catch_signals() {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction before {};
+    sigaction(number, nullptr, &before);
+    if (before.sa_handler == SIG_IGN) continue;
+    struct sigaction action {};
+    action.sa_handler = remember;
+    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    sigemptyset(&action.sa_mask);
+    sigaction(number, &action, nullptr);
+  }
+}
+
+bool interrupted() { return signal_number != 0; }
+
+int interrupting_signal() { return signal_number; }
+
+void stop_if_interrupted() {
+  if (interrupted()) throw Interrupted();
+}
+
+}  // namespace supertac

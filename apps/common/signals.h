@@ -1,0 +1,22 @@
+#pragma once
+
+namespace supertac {
+
+/// Takes SIGINT, SIGTERM and SIGHUP as a wish to stop: the first one sets a flag that long work looks at, a
+/// second one of the same kind ends the program at once. A signal ignored by the caller (nohup) stays
+/// ignored.
+void catch_signals();
+
+/// True once such a signal came.
+bool interrupted();
+
+/// Its number, or 0. Exit code is 128 + number.
+int interrupting_signal();
+
+/// Thrown to leave long work after a signal; the wrapper of the programs turns it into the exit code.
+class Interrupted {};
+
+/// @throws Interrupted when interrupted().
+void stop_if_interrupted();
+
+}  // namespace supertac

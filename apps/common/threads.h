@@ -1,0 +1,16 @@
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+namespace supertac {
+
+/// How many threads a program takes when none are asked for: OMP_NUM_THREADS (its first number), else the
+/// processors of the affinity mask, at most the cgroup's CPU quota rounded up. At least 1.
+int default_threads();
+
+/// The quota in a cgroup's cpu.max ("200000 100000", "max 100000"), in processors rounded up; nullopt when
+/// there is none or the text cannot be read.
+std::optional<int> quota_of_cpu_max(std::string_view text);
+
+}  // namespace supertac

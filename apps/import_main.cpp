@@ -1,0 +1,190 @@
+// supertac-import: the rig's text recordings as our recordings, each registered against its plate.
+
+#include <algorithm>
+#include <filesystem>
+
+#include "apps/common/output_folder.h"
+#include "apps/common/program.h"
+#include "apps/common/progress.h"
+#include "apps/common/signals.h"
+#include "data/registration.h"
+#include "data/text_import.h"
+#include "io/file.h"
+#include "io/numbers.h"
+#include "io/text.h"
+
+namespace supertac {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct TextPass {
+  std::string path, plate;
+  int trial, pass;
+};
+
+struct Imported {
+  Recording recording;
+  ImportReport report;
+  Registration registration;
+};
+
+void declare(Arguments& arguments) {
+  arguments.positional("TEXT_DIR", "folder with <plate>/<trial>/<pass>.txt, 16 voltages a line")
+      .required("out", "DIR", "folder for the recordings, one file per pass")
+      .option("speed", "MM_PER_S", "sliding speed of the passes in mm/s", "10")
+      .flag("skip-bad", "leave out files that are no recordings instead of giving up");
+}
+
+/// Entries of a folder by name, hidden ones left out.
+std::vector<fs::path> entries_of(const fs::path& folder, bool folders) {
+  std::vector<fs::path> entries;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const bool hidden = entry->path().filename().string().starts_with(".");
+    if (!hidden && entry->is_directory() == folders) entries.push_back(entry->path());
+  }
+  if (error)
+    throw FileError(folder.string(), "cannot list the folder: " + error.message() + "; check the name");
+  std::sort(entries.begin(), entries.end());
+  return entries;
+}
+
+int number_of(const fs::path& path, const std::string& name) {
+  const auto number = parse_int(name);
+  if (number && *number >= 1 && *number <= 1'000'000) return static_cast<int>(*number);
+  throw FileError(path.string(), "expected a number from 1 as its name: TEXT_DIR/<plate>/<trial>/<pass>.txt");
+}
+
+std::vector<TextPass> find_passes(const std::string& root) {
+  std::vector<TextPass> passes;
+  for (const fs::path& plate : entries_of(root, true)) {
+    const std::string name = plate.filename().string();
+    try {
+      Plate::named(name);
+    } catch (const std::invalid_argument& error) {
+      throw FileError(plate.string(), std::string("unknown plate: ") + error.what());
+    }
+    for (const fs::path& trial : entries_of(plate, true)) {
+      const int trial_number = number_of(trial, trial.filename().string());
+      for (const fs::path& pass : entries_of(trial, false)) {
+        if (pass.extension() != ".txt") continue;
+        passes.push_back({pass.string(), name, trial_number, number_of(pass, pass.stem().string())});
+      }
+    }
+  }
+  if (passes.empty())
+    throw FileError(root, "holds no <plate>/<trial>/<pass>.txt; name the folder above the plates");
+  return passes;
+}
+
+Imported import_pass(const TextPass& pass, double speed_mm_s) {
+  Imported imported;
+  Recording& recording = imported.recording;
+  recording = import_text_pass(pass.path, imported.report);
+  recording.plate = pass.plate;
+  recording.trial = pass.trial;
+  recording.pass = pass.pass;
+  recording.speed_mm_s = speed_mm_s;
+  imported.registration = register_pass(recording, Plate::named(pass.plate));
+  apply(imported.registration, recording);
+  return imported;
+}
+
+nlohmann::ordered_json to_json(const TextPass& pass, const Imported& imported) {
+  const ImportReport& report = imported.report;
+  const Registration& registration = imported.registration;
+  return {{"file", pass.path},
+          {"plate", pass.plate},
+          {"trial", pass.trial},
+          {"pass", pass.pass},
+          {"lines", report.lines},
+          {"frames", report.frames},
+          {"malformed", report.malformed()},
+          {"too_few_columns", report.too_few},
+          {"too_many_columns", report.too_many},
+          {"not_numeric", report.not_numeric},
+          {"non_finite", report.non_finite},
+          {"out_of_range", report.out_of_range},
+          {"registration",
+           {{"start_mm", registration.start_mm},
+            {"rate_mm_s", registration.rate},
+            {"residual_mm", registration.residual},
+            {"reliable", registration.reliable},
+            {"reason", registration.reason}}}};
+}
+
+std::string to_line(const TextPass& pass, const Imported& imported) {
+  const ImportReport& report = imported.report;
+  const Registration& registration = imported.registration;
+  const size_t dropped = report.lines - report.empty - report.frames;
+  std::string line = pass.plate + "/" + std::to_string(pass.trial) + "/" + std::to_string(pass.pass) +
+                     ".txt  " + std::to_string(report.lines) + " lines, " + std::to_string(dropped) +
+                     " dropped (" + std::to_string(report.malformed()) + " malformed), residual " +
+                     format(registration.residual, 2) + " mm, ";
+  return line + (registration.reliable ? "reliable" : "not reliable: " + registration.reason);
+}
+
+/// What is wrong with a file is said and counted; without --skip-bad the first such file ends the import.
+struct Outcome {
+  nlohmann::ordered_json files = nlohmann::ordered_json::array();
+  size_t written = 0, reliable = 0, bad = 0;
+};
+
+Outcome import_all(const Arguments& arguments, const std::vector<TextPass>& passes, OutputFolder& folder) {
+  Outcome outcome;
+  Progress progress(arguments, "importing", passes.size(), "files");
+  const double speed = arguments.number("speed", 0.1, 1000);
+  for (size_t i = 0; i < passes.size(); ++i) {
+    stop_if_interrupted();
+    try {
+      const Imported imported = import_pass(passes[i], speed);
+      write_recording(folder.add(recording_file_name(imported.recording)), imported.recording);
+      outcome.files.push_back(to_json(passes[i], imported));
+      outcome.reliable += imported.registration.reliable;
+      ++outcome.written;
+      arguments.print(to_line(passes[i], imported));
+    } catch (const FileError& error) {
+      if (error.path() != passes[i].path) throw;  // not the input's fault
+      if (!arguments.flag("skip-bad")) {
+        throw std::runtime_error(std::string(error.what()) + " (--skip-bad leaves such files out)");
+      }
+      arguments.note(std::string("left out: ") + error.what());
+      ++outcome.bad;
+    }
+    progress.update(i + 1);
+  }
+  return outcome;
+}
+
+int run(Arguments& arguments) {
+  arguments.number("speed", 0.1, 1000);
+  const auto passes = find_passes(arguments.text("TEXT_DIR"));
+  OutputFolder folder(arguments.text("out"), arguments.force());
+  const Outcome outcome = import_all(arguments, passes, folder);
+  if (outcome.written == 0) {
+    throw FileError(arguments.text("TEXT_DIR"),
+                    "none of " + std::to_string(outcome.bad) + " files is a recording");
+  }
+  arguments.write_json({{"folder", arguments.text("out")},
+                        {"recordings", outcome.written},
+                        {"reliable", outcome.reliable},
+                        {"left_out", outcome.bad},
+                        {"files", outcome.files}});
+  folder.keep();
+  arguments.print(std::to_string(outcome.written) + " recordings in " + arguments.text("out") + ", " +
+                  std::to_string(outcome.reliable) + " with a reliable registration");
+  return kExitOk;
+}
+
+}  // namespace
+}  // namespace supertac
+
+int main(int argc, char** argv) {
+  using namespace supertac;
+  return run_program(
+      {"supertac-import",
+       "Imports the rig's text recordings, drops malformed lines, fits every pass to its plate.", declare,
+       run},
+      argc, argv);
+}

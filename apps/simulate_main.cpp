@@ -1,0 +1,155 @@
+// supertac-simulate: recordings as the rig would make them, without a rig.
+
+#include <omp.h>
+
+#include <exception>
+
+#include "apps/common/output_folder.h"
+#include "apps/common/program.h"
+#include "apps/common/progress.h"
+#include "apps/common/signals.h"
+#include "data/simulator.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+struct Job {
+  const Plate* plate;
+  PassSettings pass;
+  std::string path;
+};
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ",") + name;
+  return text;
+}
+
+void declare(Arguments& arguments) {
+  arguments.required("out", "DIR", "folder for the recordings, one file per pass")
+      .option("plates", "NAME,...",
+              "plates of the rig (3_Bumps, ...), plain, or kind and pitch in mm (ridges6)",
+              joined(default_plates()))
+      .option("speeds", "MM_PER_S,...", "sliding speeds in mm/s", "5,10")
+      .option("trials", "N", "trials of every plate and speed", "2")
+      .option("passes", "N", "passes of every trial, 5 mm apart in x (at most 8)", "8")
+      .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms()))
+      .option("seed", "N", "the same seed gives the same files", "1");
+}
+
+std::vector<Plate> read_plates(const Arguments& arguments) {
+  std::vector<Plate> plates;
+  for (const std::string& name : arguments.list("plates")) {
+    try {
+      plates.push_back(Plate::named(name));
+    } catch (const std::invalid_argument& error) {
+      throw UsageError(std::string("--plates: ") + error.what());
+    }
+  }
+  if (plates.empty()) throw UsageError("--plates: expected at least one plate");
+  return plates;
+}
+
+SimulatorSettings read_settings(const Arguments& arguments) {
+  SimulatorSettings settings;
+  for (const std::string& term : arguments.list("without")) {
+    try {
+      settings = without_term(settings, term);
+    } catch (const std::invalid_argument& error) {
+      throw UsageError(std::string("--without: ") + error.what());
+    }
+  }
+  return settings;
+}
+
+std::vector<Job> plan(const Arguments& arguments, const std::vector<Plate>& plates, OutputFolder& folder) {
+  std::vector<Job> jobs;
+  const auto speeds = arguments.numbers("speeds", 0.5, 50);
+  const int trials = static_cast<int>(arguments.integer("trials", 1, 1000));
+  const int passes = static_cast<int>(arguments.integer("passes", 1, 8));
+  for (const Plate& plate : plates) {
+    for (const double speed : speeds) {
+      for (int trial = 1; trial <= trials; ++trial) {
+        for (int pass = 1; pass <= passes; ++pass) {
+          Recording named;
+          named.plate = plate.name();
+          named.trial = trial;
+          named.pass = pass;
+          named.speed_mm_s = speed;
+          const PassSettings settings{.trial = trial, .pass = pass, .speed_mm_s = speed};
+          jobs.push_back({&plate, settings, folder.add(recording_file_name(named))});
+        }
+      }
+    }
+  }
+  return jobs;
+}
+
+/// Simulates and writes all passes, several at a time; each depends on its own settings and the seed only.
+/// @returns frames written
+size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& settings, uint64_t seed,
+                Progress& progress) {
+  size_t frames = 0;
+  size_t done = 0;
+  std::exception_ptr failure;
+#pragma omp parallel for schedule(dynamic)
+  for (size_t i = 0; i < jobs.size(); ++i) {
+    bool stop = interrupted();
+#pragma omp critical
+    stop = stop || failure != nullptr;
+    if (stop) continue;
+    try {
+      const Recording recording = simulate_pass(*jobs[i].plate, jobs[i].pass, settings, seed);
+      write_recording(jobs[i].path, recording);
+#pragma omp critical
+      {
+        frames += recording.frames();
+        progress.update(++done);
+      }
+    } catch (...) {
+#pragma omp critical
+      if (!failure) failure = std::current_exception();
+    }
+  }
+  if (failure) std::rethrow_exception(failure);
+  stop_if_interrupted();
+  return frames;
+}
+
+int run(Arguments& arguments) {
+  const auto plates = read_plates(arguments);
+  const auto settings = read_settings(arguments);
+  const auto seed = static_cast<uint64_t>(arguments.integer("seed", 0, INT64_MAX));
+  if (arguments.list("speeds").empty()) throw UsageError("--speeds: expected at least one speed");
+  arguments.numbers("speeds", 0.5, 50);
+  arguments.integer("trials", 1, 1000);
+  arguments.integer("passes", 1, 8);
+
+  OutputFolder folder(arguments.text("out"), arguments.force());
+  const auto jobs = plan(arguments, plates, folder);
+  size_t frames = 0;
+  {
+    Progress progress(arguments, "simulating", jobs.size(), "passes");
+    frames = simulate(jobs, settings, seed, progress);
+  }
+  arguments.write_json({{"folder", arguments.text("out")},
+                        {"recordings", jobs.size()},
+                        {"frames", frames},
+                        {"seed", seed},
+                        {"command", arguments.command_line()}});
+  folder.keep();
+  arguments.print(std::to_string(jobs.size()) + " recordings, " + std::to_string(frames) + " frames in " +
+                  arguments.text("out"));
+  return kExitOk;
+}
+
+}  // namespace
+}  // namespace supertac
+
+int main(int argc, char** argv) {
+  using namespace supertac;
+  return run_program(
+      {"supertac-simulate", "Simulates recordings of the finger sliding over plates.", declare, run}, argc,
+      argv);
+}
