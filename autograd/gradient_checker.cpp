@@ -66,6 +66,7 @@ GradientReport check_gradients(const Function& f, std::vector<Variable> inputs,
   backward(sum(multiply(y, Variable(weights_for(y.shape())))));
 
   GradientReport report;
+  double largest_of_all = 0;
   for (std::size_t k = 0; k < inputs.size(); ++k) {
     const Dim size = inputs[k].size(), count = std::min(size, options.max_entries_per_input);
     std::vector<GradientEntry> entries;
@@ -84,13 +85,16 @@ GradientReport check_gradients(const Function& f, std::vector<Variable> inputs,
       entries.push_back({k, index, analytic, numeric, 0});
       largest = std::max(largest, std::abs(numeric));
     }
-    for (GradientEntry& e : entries) {
-      const double size_of = std::max(std::abs(e.analytic), std::abs(e.numeric)) + 1e-3 * largest;
-      e.relative_error = std::abs(e.analytic - e.numeric) / std::max(size_of, 1e-10);
-      if (!std::isfinite(e.relative_error)) e.relative_error = 1e30;
-    }
+    for (GradientEntry& e : entries) e.relative_error = largest;  // until all inputs are known
+    largest_of_all = std::max(largest_of_all, largest);
     report.entries += count;
     report.worst.insert(report.worst.end(), entries.begin(), entries.end());
+  }
+  for (GradientEntry& e : report.worst) {
+    const double scale =
+        std::max(std::abs(e.analytic), std::abs(e.numeric)) + 1e-3 * e.relative_error + 1e-5 * largest_of_all;
+    e.relative_error = std::abs(e.analytic - e.numeric) / std::max(scale, 1e-10);
+    if (!std::isfinite(e.relative_error)) e.relative_error = 1e30;
   }
   std::sort(report.worst.begin(), report.worst.end(), [](const GradientEntry& a, const GradientEntry& b) {
     return a.relative_error > b.relative_error;

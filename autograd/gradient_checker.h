@@ -13,7 +13,8 @@ struct GradientEntry {
   std::size_t input;  // which of the inputs
   Dim index;          // which of its elements
   double analytic, numeric;
-  /// |analytic - numeric| / (max(|analytic|, |numeric|) + 1e-3 * the largest numeric gradient of that input)
+  /// |analytic - numeric| / (max(|analytic|, |numeric|) + 1e-3 * the largest gradient of that input
+  ///                         + 1e-5 * the largest gradient of all inputs)
   double relative_error;
 };
 

@@ -10,18 +10,21 @@ namespace {
 using kernels::ConvSettings;
 using kernels::ConvSizes;
 
+std::string shapes(const Variable& x, const Variable& w) {
+  return " (x " + x.shape().text() + ", weight " + w.shape().text() + ")";
+}
+
 void check_arguments(const char* op, const Variable& x, const Variable& w, const Variable& b,
                      const ConvOptions& o, int rank) {
   check_rank(op, "x", x, rank);
   check_rank(op, "weight", w, rank);
-  const std::string shapes = " (x " + x.shape().text() + ", weight " + w.shape().text() + ")";
   const Dim in = w.dim(rank - 2), out = w.dim(rank - 1);
   if (x.dim(rank - 1) != in) {
     refuse(op, "weight expects " + std::to_string(in) + " input channels, x has " +
-                   std::to_string(x.dim(rank - 1)) + shapes);
+                   std::to_string(x.dim(rank - 1)) + shapes(x, w));
   }
   if (in < 1 || in > kernels::kMaxChannels || out < 1 || out > kernels::kMaxChannels) {
-    refuse(op, "channels must be 1 to " + std::to_string(kernels::kMaxChannels) + shapes);
+    refuse(op, "channels must be 1 to " + std::to_string(kernels::kMaxChannels) + shapes(x, w));
   }
   check_shape(op, "bias", b, {out});
   if (o.stride < 1 || o.padding < 0) {

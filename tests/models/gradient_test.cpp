@@ -1,0 +1,61 @@
+// The whole SuperTac loss, every parameter, in double precision.
+#include <gtest/gtest.h>
+
+#include "autograd/gradient_checker.h"
+#include "models/loss.h"
+
+namespace supertac {
+namespace {
+
+Tensor uniform(const Shape& shape, std::uint64_t seed) {
+  Tensor t(shape);
+  const RandomStream random(seed, 1);
+  std::uint64_t i = 0;
+  for (real& x : t.values()) x = random.uniform(i++);
+  return t;
+}
+
+void expect_right_gradients(const SuperTacSettings& settings) {
+  Rng rng(5);
+  const SuperTac model(settings, rng);
+  // At the initial weights the deepest gradients are 1e-10 of the loss, below what a difference of doubles
+  // resolves.
+  for (Variable v : values_of(model.parameters())) {
+    if (v.rank() < 2) continue;
+    for (real& w : v.mutable_value().values()) w *= 2.2;
+  }
+  const Tensor windows = uniform({2, settings.timesteps, kWindowTaxels}, 1);
+  const Tensor truth = uniform({2, settings.image_size(), settings.image_size(), 1}, 2);
+  std::array<Tensor, kGroups> eps;
+  for (std::size_t i = 0; i < kGroups; ++i) eps[i] = uniform({2, settings.latent}, 3 + i);
+  const auto loss = [&] {
+    return supertac_loss(model.forward(windows, eps), truth, {.a = 0.5, .beta = 0.01, .lambda = 0.3}).total;
+  };
+  const GradientReport report =
+      check_gradients(loss, values_of(model.parameters()), {.max_entries_per_input = 4});
+  EXPECT_LE(report.max_relative_error, 1e-6) << report.text();
+  EXPECT_GT(report.entries, 300);
+}
+
+TEST(SuperTacGradient, PictureOfEightPixels) {
+  SuperTacSettings s;
+  s.timesteps = 32;
+  s.latent = 3;
+  s.scale = 2;
+  s.channels = 8;
+  expect_right_gradients(s);
+}
+
+TEST(SuperTacGradient, PictureOfSixteenPixelsVerticalGroups) {
+  SuperTacSettings s;
+  s.timesteps = 48;
+  s.latent = 2;
+  s.scale = 4;
+  s.channels = 8;
+  s.rcabs = 1;
+  s.grouping = Grouping::vertical;
+  expect_right_gradients(s);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,67 @@
+#include "models/model_file.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+std::string load_error(const std::string& path) {
+  try {
+    load_model(path);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(ModelFile, ComesBackWithItsSettingsInputAndPictures) {
+  const TemporaryFolder folder;
+  Rng rng(1);
+  SuperTacSettings settings = small_settings();
+  settings.grouping = Grouping::vertical;
+  const SuperTac model(settings, rng);
+  save_model(folder / "m.safetensors", model, {300, {2.5, 0.4}}, {{"split", "trial"}});
+  const ModelFile file = load_model(folder / "m.safetensors");
+  EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
+  EXPECT_EQ(file.model->settings().latent, 3);
+  EXPECT_EQ(file.input.scaling.rest_volts, 2.5);
+  EXPECT_EQ(file.metadata.at("split"), "trial");
+  const Tensor x = uniform({2, 32, 16}, 1), a = model.infer(x), b = file.model->infer(x);
+  for (Dim i = 0; i < a.size(); ++i) EXPECT_EQ(a.data()[i], b.data()[i]);
+}
+
+TEST(ModelFile, TheFileNeverSizesAnything) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "m.safetensors";
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  const auto write = [&](const std::string& settings, const std::string& input) {
+    write_checkpoint(path, model.parameters(), {{"settings", settings}, {"input", input}});
+  };
+  const std::string input = R"({"rate_hz":300,"rest_volts":2.45,"span_volts":0.36})";
+  const auto settings = [](const std::string& timesteps, const std::string& latent) {
+    return R"({"preset":"paper","timesteps":)" + timesteps + R"(,"latent":)" + latent +
+           R"(,"scale":2,"grouping":"horizontal","channels":8,"rcabs":1})";
+  };
+  write(settings("32", "3"), input);
+  EXPECT_EQ(load_error(path), "no error");
+  write(settings("1000000", "3"), input);
+  EXPECT_NE(load_error(path).find("timesteps must be 32 to 512, got 1000000"), std::string::npos)
+      << load_error(path);
+  write(settings("32", "1e300"), input);
+  EXPECT_NE(load_error(path).find("\"latent\" must be a whole number"), std::string::npos)
+      << load_error(path);
+  write(settings("32", "4"), input);
+  EXPECT_NE(load_error(path).find("encoder.0.mean.weight expected F32 [4,64], found F32 [3,64]"),
+            std::string::npos)
+      << load_error(path);
+  write("[[[[", input);
+  EXPECT_NE(load_error(path).find("metadata \"settings\""), std::string::npos) << load_error(path);
+  write(settings("32", "3"), R"({"rate_hz":300,"rest_volts":2.45,"span_volts":0})");
+  EXPECT_NE(load_error(path).find("span_volts 1e-6 to 1000"), std::string::npos) << load_error(path);
+}
+
+}  // namespace
+}  // namespace supertac

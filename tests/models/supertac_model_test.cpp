@@ -1,0 +1,125 @@
+#include "models/supertac_model.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+TEST(SuperTac, PresetPaperHasTheParametersOfTheTable) {
+  Rng rng(1);
+  const SuperTac model(SuperTacSettings::of_preset("paper"), rng);
+  EXPECT_EQ(model.parameter_count(), 537521);
+  std::set<std::string> names;
+  for (const Parameter& p : model.parameters()) names.insert(p.name);
+  EXPECT_EQ(names.size(), model.parameters().size());
+  for (const char* name :
+       {"encoder.0.conv.0.weight", "encoder.3.fc.bias", "encoder.2.mean.weight", "encoder.1.log_var.bias",
+        "decoder.0.fc.1.weight", "decoder.3.conv.3.bias", "decoder.1.out.weight", "upsampler.fc.weight",
+        "upsampler.rirb.1.rcab.2.conv.1.weight", "upsampler.rirb.0.rcab.0.attention.squeeze.weight",
+        "upsampler.rirb.1.rcab.1.attention.expand.bias", "upsampler.rirb.1.conv.weight",
+        "upsampler.rirb.0.up.weight", "upsampler.out.bias"}) {
+    EXPECT_TRUE(names.contains(name)) << name;
+  }
+}
+
+TEST(SuperTac, PicturesOfAllSizes) {
+  for (const Dim scale : {2, 4, 8}) {
+    Rng rng(1);
+    SuperTacSettings s = small_settings();
+    s.scale = scale;
+    const SuperTac model(s, rng);
+    EXPECT_EQ(model.infer(uniform({2, 32, 16}, 1)).shape(), (Shape{2, 4 * scale, 4 * scale, 1}));
+  }
+}
+
+TEST(SuperTac, DecodesTheWindowsOfItsGroups) {
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  const Tensor windows = uniform({2, 32, 16}, 2);
+  const SuperTac::Output out = model.forward(windows, normal_eps(2, 3, 1));
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    EXPECT_EQ(out.decoded[g].shape(), (Shape{2, 32, 4}));
+    for (Dim k = 0; k < 4; ++k) {  // horizontal: a row of the array
+      EXPECT_EQ(out.input[g].value().data()[k], windows.data()[4 * static_cast<Dim>(g) + k]);
+    }
+  }
+}
+
+TEST(SuperTac, VerticalGroupsAreTheColumnsOfTheArray) {
+  Rng rng(1);
+  SuperTacSettings s = small_settings();
+  s.grouping = Grouping::vertical;
+  const SuperTac model(s, rng);
+  const Tensor windows = uniform({1, 32, 16}, 2);
+  const SuperTac::Output out = model.forward(windows, normal_eps(1, 3, 1));
+  for (Dim k = 0; k < 4; ++k) EXPECT_EQ(out.input[1].value().data()[4 + k], windows.data()[16 + 1 + 4 * k]);
+}
+
+TEST(SuperTac, EvaluationIsDeterministicAndUsesTheMean) {
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  const Tensor windows = uniform({2, 32, 16}, 2);
+  std::array<Tensor, kGroups> zero;
+  for (Tensor& e : zero) e = Tensor::zeros({2, 3});
+  const Tensor a = model.infer(windows), b = model.infer(windows);
+  const Tensor c = model.forward(windows, zero).image.value();
+  for (Dim i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a.data()[i], b.data()[i]);
+    EXPECT_EQ(a.data()[i], c.data()[i]);
+  }
+}
+
+TEST(SuperTac, AWindowsPictureDoesNotDependOnItsBatch) {
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  const Tensor two = uniform({2, 32, 16}, 4);
+  const Tensor second = Tensor::of({1, 32, 16}, two.values().subspan(512));
+  const Tensor both = model.infer(two), alone = model.infer(second);
+  for (Dim i = 0; i < alone.size(); ++i) EXPECT_EQ(alone.data()[i], both.data()[alone.size() + i]);
+}
+
+TEST(SuperTac, ConstantWindowsGiveFinitePictures) {
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  for (const real level : {real(0), real(1)}) {
+    for (const real x : model.infer(Tensor::full({1, 32, 16}, level)).values()) EXPECT_TRUE(std::isfinite(x));
+  }
+}
+
+TEST(SuperTac, RefusesSettingsAndWindowsThatDoNotFit) {
+  const auto message = [](SuperTacSettings s) -> std::string {
+    try {
+      Rng rng(1);
+      SuperTac model(s, rng);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  SuperTacSettings s = small_settings();
+  s.timesteps = 40;
+  EXPECT_EQ(message(s),
+            "model settings: timesteps must be a multiple of 16 (the encoder halves four times), got 40");
+  s.timesteps = 1024;
+  EXPECT_EQ(message(s), "model settings: timesteps must be 32 to 512, got 1024");
+  s = small_settings();
+  s.scale = 3;
+  EXPECT_EQ(message(s), "model settings: scale must be 2, 4 or 8, got 3");
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  try {
+    model.infer(Tensor::zeros({1, 64, 16}));
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "SuperTac: windows expects [N,32,16], got [1,64,16]");
+  }
+  EXPECT_THROW(SuperTacSettings::of_preset("huge"), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,108 @@
+// Small models and windows for the tests of models/.
+#pragma once
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+
+#include "data/windows.h"
+#include "io/file.h"
+#include "models/trainer.h"
+
+namespace supertac {
+
+inline Tensor uniform(const Shape& shape, std::uint64_t seed) {
+  Tensor t(shape);
+  const RandomStream random(seed, 1);
+  std::uint64_t i = 0;
+  for (real& x : t.values()) x = static_cast<real>(random.uniform(i++));
+  return t;
+}
+
+inline std::array<Tensor, kGroups> normal_eps(Dim n, Dim latent, std::uint64_t seed) {
+  std::array<Tensor, kGroups> eps;
+  const RandomStream random(seed, 2);
+  std::uint64_t i = 0;
+  for (Tensor& e : eps) {
+    e = Tensor(Shape{n, latent});
+    for (real& x : e.values()) x = static_cast<real>(random.normal(i++));
+  }
+  return eps;
+}
+
+inline SuperTacSettings small_settings() {
+  SuperTacSettings s;
+  s.timesteps = 32;
+  s.latent = 3;
+  s.scale = 2;
+  s.channels = 8;
+  s.rcabs = 1;
+  return s;
+}
+
+inline TrainingSettings small_training() {
+  TrainingSettings s;
+  s.model = small_settings();
+  s.epochs = 2;
+  s.batch = 8;
+  s.seed = 3;
+  return s;
+}
+
+/// Two short passes of a bump sliding under the array: the voltage falls where the plate is high.
+inline WindowSet small_windows(const SuperTacSettings& model, std::size_t frames = 150) {
+  WindowSettings settings;
+  settings.timesteps = static_cast<int>(model.timesteps);
+  settings.scale = static_cast<int>(model.scale);
+  WindowSet windows(settings);
+  const Plate plate = Plate::named("3_Bumps");
+  for (int trial = 1; trial <= 2; ++trial) {
+    Recording r;
+    r.plate = "3_Bumps";
+    r.trial = trial;
+    r.pass = 1;
+    r.speed_mm_s = 10;
+    r.source = "simulated";
+    for (std::size_t i = 0; i < frames; ++i) {
+      const double y = 36 + 10 * static_cast<double>(i) / 300;
+      r.time_s.push_back(static_cast<double>(i) / 300);
+      r.position_mm.insert(r.position_mm.end(), {18, static_cast<float>(y)});
+      for (int k = 0; k < kTaxels; ++k) {
+        const double height = plate.height(18, y - 4.5 + 3 * (k / 4));
+        r.volts.push_back(static_cast<float>(2.44 - 0.1 * height - 0.002 * ((trial + k) % 3)));
+      }
+    }
+    windows.add(r);
+  }
+  return windows;
+}
+
+inline std::vector<std::uint32_t> all_of(const WindowSet& windows) {
+  std::vector<std::uint32_t> indices;
+  for (std::uint32_t i = 0; i < windows.size(); ++i) indices.push_back(i);
+  return indices;
+}
+
+/// A folder of its own for each test, removed at the end.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "supertac_test_XXXXXX").string();
+    path_ = ::mkdtemp(pattern.data());
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+
+ private:
+  std::string path_;
+};
+
+inline std::string file_text(const std::string& path) {
+  const std::vector<std::byte> bytes = read_file(path, 1 << 26);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+}  // namespace supertac
