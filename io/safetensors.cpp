@@ -113,6 +113,8 @@ void check_writable(const std::map<std::string, std::string>& metadata,
     if (metadata.contains(key))
       wrong("the metadata field " + in_quotes(key) + " is written by this function");
   }
+  if (metadata.size() + 2 > kMaxFields)
+    wrong(std::to_string(metadata.size()) + " metadata fields are too many");
   if (tensors.size() > kMaxTensors) {
     wrong(std::to_string(tensors.size()) + " tensors, expected at most " + std::to_string(kMaxTensors));
   }

@@ -26,11 +26,12 @@ class SafetensorsFile {
   enum class ChecksumState { ok, absent };  // a wrong one does not load
 
   // Throws FileError when the file cannot be read or breaks a rule. Rules: the header has at most 1 MiB,
-  // starts with '{' and is padded with spaces only; at most 4,096 tensors; nothing nested deeper, no key
-  // twice, no field unknown; integers without sign, fraction or overflow; each tensor's bytes are those of
-  // its shape and type; tensors follow each other without gap or overlap up to the end of the file; version
-  // and checksum are right where there are any, and a file with one of them has both. No size is believed
-  // before it has been compared with the bytes the file has. A hostile header costs less than 10 ms.
+  // starts with '{' and is padded with spaces only; at most 4,096 tensors and as many metadata fields;
+  // nothing nested deeper, no key twice, no field unknown; integers without sign, fraction or overflow; each
+  // tensor's bytes are those of its shape and type; tensors follow each other without gap or overlap up to
+  // the end of the file; version and checksum are right where there are any, and a file with one of them has
+  // both. No size is believed before it has been compared with the bytes the file has. A hostile header costs
+  // less than 10 ms.
   static SafetensorsFile read(const std::string& path);
 
   const std::string& path() const { return path_; }

@@ -36,6 +36,8 @@ class HeaderParser : public JsonHandler {
     }
     if (!fields_.insert(name).second)
       return refuse(in_quotes(name) + " appears twice in " + in_quotes(entry_));
+    if (fields_.size() > kMaxFields)
+      return refuse("more than " + std::to_string(kMaxFields) + " metadata fields");
     field_ = name;
     return true;
   }
@@ -160,8 +162,8 @@ std::optional<size_t> checksum_position(std::string_view text) {
   const size_t found = text.find(key);
   if (found == std::string_view::npos) return std::nullopt;
   const size_t digits = found + key.size();
-  if (text.size() < digits + kChecksumDigits + 1 || text[digits + kChecksumDigits] != '"')
-    return std::nullopt;
+  const size_t end = text.find_first_not_of("0123456789abcdef", digits);
+  if (end != digits + kChecksumDigits || text[end] != '"') return std::nullopt;
   return digits;
 }
 

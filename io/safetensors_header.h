@@ -14,6 +14,7 @@ namespace supertac::safetensors {
 
 constexpr uint64_t kMaxHeaderBytes = uint64_t{1} << 20;
 constexpr size_t kMaxTensors = 4096;
+constexpr size_t kMaxFields = 4096;  // of the metadata
 constexpr size_t kMaxRank = 16;
 constexpr char kMetadataKey[] = "__metadata__";
 constexpr char kFormatKey[] = "supertac_format";

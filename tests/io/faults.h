@@ -1,0 +1,80 @@
+// The N-th system call fails: a table for io/system_calls.h that counts and injects.
+#pragma once
+
+#include <cerrno>
+#include <string>
+#include <vector>
+
+#include "io/system_calls.h"
+
+namespace supertac {
+
+enum class Fault { error, short_count };
+
+class FaultInjection {
+ public:
+  /// Call number `at` (from 1) fails, with `forever` all that follow as well. unlink only fails by itself:
+  /// whoever cannot remove anything cannot clean up.
+  FaultInjection(int at, int error, bool forever, Fault fault = Fault::error) {
+    state() = {at, error, forever, fault, 0, {}};
+    auto& calls = system_calls();
+    calls.open = [](const char* path, int flags, mode_t mode) {
+      if (hit("open")) return -1;
+      return real_system_calls().open(path, flags, mode);
+    };
+    calls.fstat = [](int file, struct stat* status) {
+      return hit("fstat") ? -1 : real_system_calls().fstat(file, status);
+    };
+    calls.read = [](int file, void* bytes, size_t count) -> ssize_t {
+      const bool now = hit("read");
+      if (now && state().fault == Fault::error) return -1;
+      return real_system_calls().read(file, bytes, now ? (count + 1) / 2 : count);
+    };
+    calls.write = [](int file, const void* bytes, size_t count) -> ssize_t {
+      const bool now = hit("write");
+      if (now && state().fault == Fault::error) return -1;
+      return real_system_calls().write(file, bytes, now ? (count + 1) / 2 : count);
+    };
+    calls.fsync = [](int file) { return hit("fsync") ? -1 : real_system_calls().fsync(file); };
+    calls.close = [](int file) {
+      const int result = real_system_calls().close(file);  // the descriptor is gone in any case
+      return hit("close") ? -1 : result;
+    };
+    calls.rename = [](const char* from, const char* to) {
+      return hit("rename") ? -1 : real_system_calls().rename(from, to);
+    };
+  }
+  ~FaultInjection() { system_calls() = real_system_calls(); }
+  FaultInjection(const FaultInjection&) = delete;
+  FaultInjection& operator=(const FaultInjection&) = delete;
+
+  /// Names of the calls made, in order.
+  static const std::vector<std::string>& calls() { return state().log; }
+  static bool reached() { return state().count >= state().at; }
+
+ private:
+  struct State {
+    int at, error;
+    bool forever;
+    Fault fault;
+    int count;
+    std::vector<std::string> log;
+  };
+  static State& state() {
+    static State state{};
+    return state;
+  }
+  /// Counts a call; true when it is to fail. A short count can only befall read and write.
+  static bool hit(const char* name) {
+    State& s = state();
+    s.log.emplace_back(name);
+    ++s.count;
+    const bool now = s.count == s.at || (s.forever && s.count > s.at);
+    const std::string call = name;
+    if (!now || (s.fault == Fault::short_count && call != "read" && call != "write")) return false;
+    errno = s.error;
+    return true;
+  }
+};
+
+}  // namespace supertac
