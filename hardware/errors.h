@@ -92,7 +92,7 @@ struct BoardSilent : HardwareError {
   using HardwareError::HardwareError;
 };
 /// The operator asked to stop.
-struct Interrupted : HardwareError {
+struct OperatorStop : HardwareError {
   using HardwareError::HardwareError;
 };
 /// A replay was asked for bytes other than those recorded.

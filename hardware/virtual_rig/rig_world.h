@@ -15,10 +15,10 @@
 namespace supertac {
 
 struct RigSettings {
-  VirtualPrinterSettings printer;
-  VirtualBoardSettings board;
+  VirtualPrinterSettings printer{};
+  VirtualBoardSettings board{};
   bool printer_running = false;  ///< booted long ago
-  RigFaults faults;              ///< replaces those of printer and board
+  RigFaults faults{};            ///< replaces those of printer and board
   std::uint64_t seed = 1;        ///< replaces those of printer and board
 };
 

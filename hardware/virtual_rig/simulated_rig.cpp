@@ -9,7 +9,8 @@ namespace supertac {
 namespace {
 
 constexpr double kByteSeconds = 10.0 / 115200;
-constexpr std::size_t kMostChunks = 4096;
+// The reader's thread may be this many frames behind simulated time.
+constexpr std::size_t kMostChunks = 64;
 // Arrival is never exactly on time: a USB frame of 125 us and the host's wake-up.
 constexpr double kUsbLatency = 0.0002;
 
@@ -60,10 +61,7 @@ class SimulatedRig::PrinterPort : public Port {
 
 class SimulatedRig::BoardPort : public Port {
  public:
-  explicit BoardPort(SimulatedRig& rig) : rig_(rig) {
-    std::lock_guard lock(rig_.mutex_);
-    rig_.board_listens_ = true;
-  }
+  explicit BoardPort(SimulatedRig& rig) : rig_(rig) {}
   ~BoardPort() override {
     std::lock_guard lock(rig_.mutex_);
     rig_.board_listens_ = false;
@@ -71,7 +69,12 @@ class SimulatedRig::BoardPort : public Port {
     rig_.changed_.notify_all();
   }
   const std::string& name() const override { return name_; }
-  double now() override { return rig_.now(); }
+  /// Its first use opens the port: from here on simulated time waits for the reader.
+  double now() override {
+    std::lock_guard lock(rig_.mutex_);
+    if (!ended_) rig_.board_listens_ = true;
+    return rig_.world_.now();
+  }
 
   Received read(std::span<std::byte> buffer, double until) override {
     std::unique_lock lock(rig_.mutex_);
@@ -80,6 +83,9 @@ class SimulatedRig::BoardPort : public Port {
     });
     if (rig_.board_chunks_.empty()) {
       if (rig_.board_gone_) {
+        ended_ = true;
+        rig_.board_listens_ = false;
+        rig_.changed_.notify_all();
         throw PortUnplugged("port simulated board: the device is gone; check the cable and start again");
       }
       return {0, rig_.world_.now()};
@@ -98,6 +104,7 @@ class SimulatedRig::BoardPort : public Port {
  private:
   SimulatedRig& rig_;
   std::string name_ = "simulated board";
+  bool ended_ = false;
 };
 
 SimulatedRig::SimulatedRig(const RigSettings& settings)
@@ -119,8 +126,8 @@ bool SimulatedRig::take_board_bytes(std::span<const std::byte> bytes, double t) 
 
 void SimulatedRig::advance(std::unique_lock<std::mutex>& lock, double t) {
   // The reader must not fall behind more than a real one would: simulated time waits for it.
-  changed_.wait_for(lock, std::chrono::seconds(10),
-                    [&] { return !board_listens_ || board_gone_ || board_chunks_.size() < kMostChunks; });
+  changed_.wait_for(lock, std::chrono::seconds(2),
+                    [&] { return !board_listens_ || (!board_gone_ && board_chunks_.size() < kMostChunks); });
   world_.advance(t);
   changed_.notify_all();
 }

@@ -19,10 +19,10 @@ namespace supertac {
 using FingerSignals = std::function<std::array<double, 16>(double x, double y, double z, double t)>;
 
 struct VirtualBoardSettings {
-  FingerSignals signals;           ///< empty: all taxels at rest
+  FingerSignals signals{};         ///< empty: all taxels at rest
   double period_s = kFramePeriod;  ///< the board's own crystal
   double noise_adc = 0;            ///< standard deviation added to every sample
-  RigFaults faults;                ///< lost frames and stalls; bytes are the port's matter
+  RigFaults faults{};              ///< lost frames and stalls; bytes are the port's matter
   std::uint64_t seed = 1;
 };
 

@@ -95,8 +95,8 @@ void VirtualPrinter::watch_for_emergency(char c, double t) {
     if (emergency_.size() < kMaxLineBytes) emergency_.push_back(c);
     return;
   }
-  std::string line = std::move(emergency_);
-  emergency_.clear();
+  std::string line;
+  line.swap(emergency_);
   if (line.starts_with('N')) line.erase(0, std::min(line.find(' '), line.size() - 1) + 1);
   if (line.starts_with("M112")) kill(t);
   if (line.starts_with("M410")) quick_stop(t);

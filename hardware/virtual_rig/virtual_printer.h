@@ -25,9 +25,9 @@ struct VirtualPrinterSettings {
   bool keepalive = true;   ///< echo:busy every 2 s
   bool heartbeat = false;  ///< `wait` every second when idle
   double reply_delay_s = 0.0003;
-  double boot_s = 0.4;       ///< power-on to `start`
-  std::string boot_garbage;  ///< bytes sent before the banner
-  RigFaults faults;          ///< lost ok, storms, resets, unplug, stalls; bytes are the port's matter
+  double boot_s = 0.4;         ///< power-on to `start`
+  std::string boot_garbage{};  ///< bytes sent before the banner
+  RigFaults faults{};          ///< lost ok, storms, resets, unplug, stalls; bytes are the port's matter
   std::uint64_t seed = 1;
 };
 

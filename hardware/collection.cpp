@@ -1,0 +1,240 @@
+#include "hardware/collection.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "hardware/frame_decoder.h"
+#include "hardware/motion_model.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kStartDelay = 0.1265;
+
+std::string point_text(const Point3& p) {
+  return fixed_decimals(p.x, 4) + " " + fixed_decimals(p.y, 4) + " " + fixed_decimals(p.z, 4);
+}
+
+// The numbers behind an event's first word; nothing when there are not exactly `Count`.
+template <std::size_t Count>
+std::optional<std::array<double, Count>> numbers_of(std::string_view text) {
+  std::array<double, Count> values{};
+  std::size_t at = text.find(' ');
+  for (double& value : values) {
+    if (at == std::string_view::npos) return std::nullopt;
+    const char* last = text.data() + text.size();
+    const auto [end, error] = std::from_chars(text.data() + at + 1, last, value);
+    if (error != std::errc{} || !std::isfinite(value)) return std::nullopt;
+    at = end == last ? std::string_view::npos : static_cast<std::size_t>(end - text.data());
+  }
+  return at == std::string_view::npos ? std::optional(values) : std::nullopt;
+}
+
+struct RecordedLeg {
+  Leg leg;
+  bool ended = false;
+  std::vector<PositionSample> samples;
+};
+
+std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
+  std::vector<RecordedLeg> legs;
+  for (const JournalRecord& record : journal.of(Stream::event)) {
+    const std::string text = record.text();
+    if (text == kRunComplete) complete = true;
+    if (text.starts_with("leg ")) {
+      const auto v = numbers_of<12>(text);
+      if (!v) continue;
+      const auto& n = *v;
+      const Leg leg{static_cast<int>(n[1]),
+                    static_cast<Phase>(static_cast<int>(n[2])),
+                    {n[3], n[4], n[5]},
+                    {n[6], n[7], n[8]},
+                    n[9],
+                    n[10],
+                    n[11]};
+      if (n[0] == 0) {
+        legs.push_back({leg, false, {}});
+      } else if (!legs.empty()) {
+        legs.back().leg.ended_s = leg.ended_s;
+        legs.back().ended = true;
+      }
+    } else if (text.starts_with("at ") && !legs.empty()) {
+      if (const auto v = numbers_of<5>(text)) {
+        legs.back().samples.push_back({(*v)[0], (*v)[1], {(*v)[2], (*v)[3], (*v)[4]}});
+      }
+    }
+  }
+  return legs;
+}
+
+struct Frames {
+  std::vector<BoardFrame> frames;
+  std::vector<double> arrivals;
+  std::vector<std::uint8_t> suspect;
+};
+
+Frames frames_in(const Journal& journal, FrameDecoder::Counters& counters) {
+  Frames all;
+  FrameDecoder decoder;
+  JumpDetector jumps;
+  for (const JournalRecord& record : journal.of(Stream::board)) {
+    if (record.kind != RecordKind::received) continue;
+    decoder.push(record.bytes, [&](const BoardFrame& frame, std::uint64_t discarded) {
+      const bool late = !all.arrivals.empty() && record.time_s - all.arrivals.back() > 1.5 * kFramePeriod;
+      all.suspect.push_back(discarded > 0 || late || jumps.jump(frame) ? 1 : 0);
+      all.frames.push_back(frame);
+      all.arrivals.push_back(record.time_s);
+    });
+  }
+  counters = decoder.counters();
+  return all;
+}
+
+// How far the sample is from the leg's straight line, ends included.
+double off_leg(const Leg& leg, const Point3& p) {
+  const double length = distance(leg.from, leg.to);
+  const double along =
+      ((p.x - leg.from.x) * (leg.to.x - leg.from.x) + (p.y - leg.from.y) * (leg.to.y - leg.from.y) +
+       (p.z - leg.from.z) * (leg.to.z - leg.from.z)) /
+      std::max(length * length, 1e-12);
+  const double part = std::clamp(along, 0.0, 1.0);
+  return distance(p,
+                  {leg.from.x + part * (leg.to.x - leg.from.x), leg.from.y + part * (leg.to.y - leg.from.y),
+                   leg.from.z + part * (leg.to.z - leg.from.z)});
+}
+
+double median_round_trip(const std::vector<PositionSample>& samples) {
+  std::vector<double> trips;
+  for (const PositionSample& sample : samples) trips.push_back(sample.round_trip_s);
+  const auto middle = trips.begin() + static_cast<std::ptrdiff_t>(trips.size() / 2);
+  std::nth_element(trips.begin(), middle, trips.end());
+  return *middle;
+}
+
+CollectedPass pass_of(const Frames& all, const FrameTimeline& timeline, const PositionTrack& track) {
+  CollectedPass pass;
+  std::uint64_t first = 0, last = 0;
+  for (std::size_t i = 0; i < all.frames.size(); ++i) {
+    const double time =
+        timeline.clock.at(static_cast<double>(timeline.index[i])) - 0.5 * timeline.clock.period_s;
+    if (time < track.begin() || time > track.end()) continue;
+    if (pass.time_s.empty()) first = timeline.index[i];
+    last = timeline.index[i];
+    pass.time_s.push_back(time - track.begin());
+    const auto volts = taxel_volts(all.frames[i]);
+    pass.volts.insert(pass.volts.end(), volts.begin(), volts.end());
+    const Point3 p = track.at(time);
+    pass.position.insert(pass.position.end(), {p.x, p.y, p.z});
+    pass.suspect.push_back(all.suspect[i]);
+  }
+  if (!pass.time_s.empty()) pass.missing = last - first + 1 - pass.time_s.size();
+  return pass;
+}
+
+}  // namespace
+
+std::string event_text(const Leg& leg, bool ended) {
+  return std::string("leg ") + (ended ? "1 " : "0 ") + std::to_string(leg.pass) + " " +
+         std::to_string(static_cast<int>(leg.phase)) + " " + point_text(leg.from) + " " + point_text(leg.to) +
+         " " + fixed_decimals(leg.speed, 4) + " " + fixed_decimals(leg.accepted_s, 6) + " " +
+         fixed_decimals(leg.ended_s, 6);
+}
+
+std::string event_text(const PositionSample& sample) {
+  return "at " + fixed_decimals(sample.time_s, 6) + " " + fixed_decimals(sample.round_trip_s, 6) + " " +
+         point_text(sample.position);
+}
+
+void PositionTrack::add(double time_s, const Point3& position) {
+  if (points_.empty() || time_s > points_.back().time_s) points_.push_back({time_s, position});
+}
+
+void PositionTrack::model(const Leg& leg, double acceleration) {
+  const double length = distance(leg.from, leg.to);
+  const double start = std::min(leg.accepted_s + kStartDelay, leg.ended_s - 1e-6);
+  const double duration = leg.ended_s - start;
+  const int steps = std::clamp(static_cast<int>(duration / 0.005), 1, 100000);
+  for (int i = 0; i <= steps; ++i) {
+    const double t = duration * i / steps;
+    const double part = length > 0 ? trapezoid_position(t, length, duration, acceleration) / length : 1;
+    add(start + t, {leg.from.x + part * (leg.to.x - leg.from.x), leg.from.y + part * (leg.to.y - leg.from.y),
+                    leg.from.z + part * (leg.to.z - leg.from.z)});
+  }
+}
+
+void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& samples, double acceleration) {
+  add(leg.accepted_s, leg.from);
+  if (samples.empty() && leg.ended_s > leg.accepted_s) return model(leg, acceleration);
+  const double slowest_answer = samples.empty() ? 0 : 3 * median_round_trip(samples) + 0.001;
+  Knot before = points_.empty() ? Knot{leg.accepted_s, leg.from} : points_.back();
+  for (const PositionSample& sample : samples) {
+    const double possible = 1.5 * leg.speed * (sample.time_s - before.time_s) + 0.05;
+    const bool good = sample.round_trip_s <= slowest_answer && off_leg(leg, sample.position) < 0.05 &&
+                      distance(before.position, sample.position) < possible &&
+                      distance(leg.from, before.position) < distance(leg.from, sample.position) + 0.015;
+    if (!good) {
+      ++rejected_;
+      continue;
+    }
+    before = {sample.time_s, sample.position};
+    add(sample.time_s, sample.position);
+  }
+  if (leg.ended_s > 0) add(leg.ended_s, leg.to);
+}
+
+Point3 PositionTrack::at(double time_s) const {
+  if (points_.empty()) return {};
+  const auto after = std::lower_bound(points_.begin(), points_.end(), time_s,
+                                      [](const Knot& knot, double t) { return knot.time_s < t; });
+  if (after == points_.begin()) return points_.front().position;
+  if (after == points_.end()) return points_.back().position;
+  const Knot& a = *(after - 1);
+  const Knot& b = *after;
+  const double part = (time_s - a.time_s) / (b.time_s - a.time_s);
+  const auto mix = [part](double u, double v) { return u + part * (v - u); };
+  return {mix(a.position.x, b.position.x), mix(a.position.y, b.position.y), mix(a.position.z, b.position.z)};
+}
+
+Collection collection_of(const Journal& journal) {
+  Collection collection;
+  collection.header = journal.header;
+  collection.torn_bytes = journal.torn_bytes;
+  const std::vector<RecordedLeg> legs = legs_in(journal, collection.complete);
+  const Frames all = frames_in(journal, collection.decoder);
+  const FrameTimeline timeline = timeline_of(all.arrivals);
+  collection.frames = all.frames.size();
+  collection.missing = timeline.missing;
+  collection.clock = timeline.clock;
+  struct Parts {
+    PositionTrack track;
+    double speed = 0;
+    bool complete = false;
+    std::uint64_t positions = 0;
+  };
+  std::map<int, Parts> parts;
+  for (const RecordedLeg& recorded : legs) {
+    const Phase phase = recorded.leg.phase;
+    if (phase != Phase::onset && phase != Phase::slide && phase != Phase::release) continue;
+    Parts& part = parts[recorded.leg.pass];
+    part.track.add_leg(recorded.leg, recorded.samples);
+    part.positions += recorded.samples.size();
+    if (phase == Phase::slide) part.speed = recorded.leg.speed;
+    if (phase == Phase::release) part.complete = recorded.ended;
+  }
+  for (const auto& [number, part] : parts) {
+    CollectedPass pass = pass_of(all, timeline, part.track);
+    pass.pass = number;
+    pass.speed = part.speed;
+    pass.complete = part.complete;
+    pass.positions = part.positions;
+    pass.rejected_positions = part.track.rejected();
+    collection.passes.push_back(std::move(pass));
+  }
+  return collection;
+}
+
+}  // namespace supertac

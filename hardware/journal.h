@@ -1,0 +1,84 @@
+// The append-only journal of a running collection. Chunks of {magic, stream, length, time, CRC-32, payload},
+// at most 0.2 s apart, fdatasync each second: kill -9 loses at most 0.5 s, a power cut 1.5 s. A torn tail is
+// dropped on reading; all counts are derived from the data.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <span>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+namespace supertac {
+
+enum class Stream : std::uint32_t { header = 1, board = 2, printer = 3, event = 4 };
+
+/// What happened at a port. One record per call, so that a replay can give the same answers.
+enum class RecordKind : std::uint8_t { received = 1, timed_out = 2, sent = 3, clock = 4, text = 5 };
+
+struct JournalRecord {
+  RecordKind kind = RecordKind::text;
+  double time_s = 0;
+  std::vector<std::byte> bytes;
+  std::string text() const { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
+};
+
+class JournalWriter {
+ public:
+  /// Creates `path` (never overwrites). `header` is one line that says what is collected.
+  /// Throws JournalError.
+  JournalWriter(const std::string& path, std::string_view header);
+  /// Writes what is left; errors are lost here, call close() to see them.
+  ~JournalWriter();
+  JournalWriter(const JournalWriter&) = delete;
+  JournalWriter& operator=(const JournalWriter&) = delete;
+
+  /// Never waits for the disk.
+  void append(Stream stream, RecordKind kind, double time_s, std::span<const std::byte> bytes);
+  void event(double time_s, std::string_view text);
+  /// Throws JournalError when a write has failed: the disk is full, or gone.
+  void check();
+  /// Writes and syncs everything. Throws JournalError.
+  void close();
+  const std::string& path() const { return path_; }
+
+ private:
+  struct Pending {
+    double time_s = 0;
+    std::vector<std::byte> payload;
+  };
+  void run();
+  void flush();
+  void write_chunk(Stream stream, const Pending& pending);
+
+  std::string path_;
+  int descriptor_ = -1;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::map<Stream, Pending> pending_;
+  std::size_t pending_bytes_ = 0;
+  std::string error_;
+  bool stop_ = false;
+  std::thread thread_;
+};
+
+struct Journal {
+  std::string header;
+  std::map<Stream, std::vector<JournalRecord>> streams;
+  std::uint64_t torn_bytes = 0;  ///< at the end, dropped
+  const std::vector<JournalRecord>& of(Stream stream) const;
+};
+
+/// Reads a journal up to its first damaged chunk. Throws JournalError when the file cannot be read or does
+/// not begin like a journal.
+Journal read_journal(const std::string& path);
+
+/// The same from bytes in memory; what the fuzzer calls.
+Journal parse_journal(std::span<const std::byte> bytes, const std::string& name);
+
+}  // namespace supertac

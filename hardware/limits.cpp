@@ -1,0 +1,54 @@
+#include "hardware/limits.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "hardware/errors.h"
+
+namespace supertac {
+namespace {
+
+void check_axis(char axis, double value, double low, double high) {
+  if (std::isfinite(value) && value >= low && value <= high) return;
+  const std::string found = std::isfinite(value) ? fixed_decimals(value, 2) : "no number";
+  throw OutsideLimits(std::string("limits: ") + axis + " expected " + fixed_decimals(low, 2) + " to " +
+                      fixed_decimals(high, 2) + " mm, found " + found +
+                      "; nothing was sent, correct the plan or the limits");
+}
+
+Point3 between(const Point3& a, const Point3& b, double part) {
+  return {a.x + part * (b.x - a.x), a.y + part * (b.y - a.y), a.z + part * (b.z - a.z)};
+}
+
+}  // namespace
+
+void Limits::check_target(const Point3& target) const { check_path(target, target); }
+
+void Limits::check_path(const Point3& from, const Point3& to) const {
+  for (const Point3& end : {from, to}) {
+    check_axis('X', end.x, low.x, high.x);
+    check_axis('Y', end.y, low.y, high.y);
+    check_axis('Z', end.z, low.z, high.z);
+  }
+  if (std::min(from.z, to.z) >= clearance_z) return;
+  // The part of the line below the clearance is a line itself, and the plate a rectangle: its ends decide.
+  double first = 0, last = 1;
+  if (from.z != to.z) {
+    const double crossing = (clearance_z - from.z) / (to.z - from.z);
+    if (from.z > clearance_z) first = crossing;
+    if (to.z > clearance_z) last = crossing;
+  }
+  for (const Point3& end : {between(from, to, first), between(from, to, last)}) {
+    const bool over_plate =
+        end.x >= plate_low_x && end.x <= plate_high_x && end.y >= plate_low_y && end.y <= plate_high_y;
+    if (!over_plate) {
+      throw OutsideLimits("limits: the way from " + describe(from) + " to " + describe(to) + " passes " +
+                          describe(end) + ", below Z" + fixed_decimals(clearance_z, 2) +
+                          " and beside the plate; nothing was sent, lift first");
+    }
+  }
+}
+
+}  // namespace supertac

@@ -1,0 +1,83 @@
+// One palpation run: onset, slide, release, re-position, pass after pass, as a state machine. Every way is
+// checked before the first contact, every boundary between two phases is verified, and whatever happens in
+// contact the finger is lifted before the run gives up - unless nothing may be sent any more.
+#pragma once
+
+#include <exception>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "hardware/printer.h"
+
+namespace supertac {
+
+enum class Phase { approach, onset, slide, release, reposition };
+const char* name_of(Phase phase);
+
+/// Lengths in mm, speeds in mm/s, printer coordinates.
+struct PalpationPlan {
+  Point3 start{99.7, 101.17, 91.81};  ///< of the first slide, in contact
+  int passes = 8;
+  double slide = 108;  ///< along +y
+  double shift_x = 5;  ///< between passes
+  double lift = 5;
+  double speed = 10;  ///< of the slide
+  double speed_z = 5;
+  double travel_speed = 50;
+  double poll_interval_s = 0.01;
+};
+
+/// One straight part of a run.
+struct Leg {
+  int pass = 0;  ///< from 1
+  Phase phase = Phase::approach;
+  Point3 from, to;
+  double speed = 0;
+  double accepted_s = 0;  ///< the firmware's ok to the move
+  double ended_s = 0;     ///< the firmware's ok to M400
+};
+
+/// What a run tells while it runs. `check` may throw: the operator's Ctrl-C, a board that is gone, a full
+/// disk.
+struct PalpationObserver {
+  std::function<void(const Leg&)> leg_started = [](const Leg&) {};
+  std::function<void(const Leg&)> leg_ended = [](const Leg&) {};
+  std::function<void(const Leg&, const PositionSample&)> position = [](const Leg&, const PositionSample&) {};
+  std::function<void()> check = [] {};
+};
+
+struct PalpationOutcome {
+  enum class Finger { lifted, stopped, unknown };
+  int passes_done = 0;
+  bool complete = false;
+  bool realtime_position = true;  ///< the firmware reports where the head is (M114 R)
+  Finger finger = Finger::lifted;
+  std::string note;          ///< how it ended, when not complete
+  std::exception_ptr error;  ///< why, when not complete
+};
+
+/// All legs of the plan, from `here`. Throws std::invalid_argument for a plan that makes no sense.
+std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here);
+
+class Palpation {
+ public:
+  Palpation(Printer& printer, const PalpationPlan& plan, PalpationObserver observer = {});
+
+  /// Throws OutsideLimits, OriginUnknown or std::invalid_argument before anything moves; after that every
+  /// failure is in the outcome.
+  PalpationOutcome run();
+
+ private:
+  void run_leg(Leg& leg);
+  void follow(const Leg& leg);
+  void recover(PalpationOutcome& outcome);
+
+  Printer& printer_;
+  PalpationPlan plan_;
+  PalpationObserver observer_;
+  bool realtime_known_ = false, realtime_ = true;
+  bool in_contact_ = false;
+};
+
+}  // namespace supertac

@@ -1,0 +1,138 @@
+#include "hardware/tactile_board.h"
+
+#include <array>
+#include <chrono>
+
+#include "hardware/errors.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kReadSlice = 0.05;
+
+bool is_text(std::byte byte) {
+  const int c = std::to_integer<int>(byte);
+  return c == '\n' || c == '\r' || (c >= ' ' && c < 127);
+}
+
+}  // namespace
+
+TactileBoard::TactileBoard(std::unique_ptr<Port> port, const BoardSettings& settings)
+    : port_(std::move(port)), settings_(settings), last_arrival_(port_->now()), thread_([this] { run(); }) {}
+
+TactileBoard::~TactileBoard() { stop(); }
+
+void TactileBoard::stop() {
+  {
+    std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+void TactileBoard::run() {
+  try {
+    for (;;) {
+      {
+        std::lock_guard lock(mutex_);
+        if (stop_) break;
+      }
+      read_once(port_->now() + kReadSlice);
+    }
+    // What had arrived when the stop was asked for still counts; bounded, in case the board never pauses.
+    for (int i = 0; i < 10000; ++i) {
+      const std::uint64_t before = decoder_.counters().bytes;
+      read_once(port_->now());
+      if (decoder_.counters().bytes == before) break;
+    }
+  } catch (...) {
+    std::lock_guard lock(mutex_);
+    error_ = std::current_exception();
+  }
+  std::lock_guard lock(mutex_);
+  ended_ = true;
+  arrived_.notify_all();
+}
+
+void TactileBoard::read_once(double until) {
+  std::array<std::byte, 4096> buffer{};
+  const Received got = port_->read(buffer, until);
+  const auto bytes = std::span(buffer).first(got.count);
+  if (decoder_.counters().frames == 0) {
+    for (const std::byte byte : bytes) text_bytes_ += is_text(byte) ? 1 : 0;
+  }
+  decoder_.push(
+      bytes, [&](const BoardFrame& frame, std::uint64_t discarded) { take(frame, got.time_s, discarded); });
+  check_silence(got.time_s);
+  std::lock_guard lock(mutex_);
+  counters_.decoder = decoder_.counters();
+}
+
+void TactileBoard::check_silence(double time) {
+  if (time - last_arrival_ < settings_.silence_s) return;
+  const auto total = static_cast<double>(decoder_.counters().bytes);
+  if (decoder_.counters().frames == 0 && total >= 2 && text_bytes_ > 0.9 * total) {
+    throw WrongDevice("port " + port_->name() +
+                      ": expected a tactile board, found text, as from a printer; exchange the two ports");
+  }
+  throw BoardSilent("board " + port_->name() + ": expected 1008 frames/s, found none for " +
+                    std::to_string(settings_.silence_s) + " s; plug the board out and in again");
+}
+
+void TactileBoard::take(const BoardFrame& frame, double time, std::uint64_t discarded) {
+  StampedFrame stamped{frame, time};
+  stamped.suspect =
+      discarded > 0 || (decoder_.counters().frames > 1 && time - last_arrival_ > 1.5 * kFramePeriod);
+  stamped.jump = jumps_.jump(frame);
+  last_arrival_ = time;
+  gaps_.push(time, missing_before_);
+  undecided_.push_back(time);
+
+  std::lock_guard lock(mutex_);
+  for (const std::uint32_t missing : missing_before_) {
+    clock_index_ += missing;
+    clock_.add(clock_index_++, undecided_.front());
+    undecided_.pop_front();
+  }
+  missing_before_.clear();
+  counters_.missing = gaps_.missing();
+  counters_.suspect += stamped.suspect ? 1 : 0;
+  counters_.jumps += stamped.jump ? 1 : 0;
+  if (queue_.size() >= settings_.queue_frames) {
+    queue_.pop_front();
+    ++counters_.dropped;
+  }
+  queue_.push_back(stamped);
+  arrived_.notify_one();
+}
+
+std::optional<StampedFrame> TactileBoard::next(double wait_s) {
+  std::unique_lock lock(mutex_);
+  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return !queue_.empty() || ended_; });
+  if (!queue_.empty()) {
+    const StampedFrame frame = queue_.front();
+    queue_.pop_front();
+    return frame;
+  }
+  if (error_) std::rethrow_exception(error_);
+  return std::nullopt;
+}
+
+void TactileBoard::check() {
+  std::lock_guard lock(mutex_);
+  if (error_) std::rethrow_exception(error_);
+}
+
+void TactileBoard::wait_for_end(double wait_s) {
+  std::unique_lock lock(mutex_);
+  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return ended_; });
+}
+
+BoardCounters TactileBoard::counters() {
+  std::lock_guard lock(mutex_);
+  BoardCounters counters = counters_;
+  counters.clock = clock_.fit();
+  return counters;
+}
+
+}  // namespace supertac

@@ -1,0 +1,87 @@
+// The live board: a thread reads and decodes, a bounded queue hands frames over. The reader never waits for
+// its consumer - the terminal holds 24.8 ms - so a slow consumer loses the oldest frames, and a counter says
+// how many.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "hardware/frame_clock.h"
+#include "hardware/frame_decoder.h"
+#include "hardware/port.h"
+
+namespace supertac {
+
+struct StampedFrame {
+  BoardFrame frame;
+  double arrival_s = 0;
+  bool suspect = false;  ///< first after a pause of 1.5 periods or after discarded bytes: may be torn
+  bool jump = false;     ///< implausible change of a taxel
+};
+
+struct BoardSettings {
+  std::size_t queue_frames = 4096;
+  double silence_s = 1;  ///< without a frame for so long: BoardSilent
+};
+
+struct BoardCounters {
+  FrameDecoder::Counters decoder;
+  std::uint64_t dropped = 0;  ///< frames the consumer was too slow for
+  std::uint64_t missing = 0;  ///< frames that never arrived, counted from the gaps in time
+  std::uint64_t suspect = 0;
+  std::uint64_t jumps = 0;
+  ClockFit clock;
+};
+
+class TactileBoard {
+ public:
+  /// Starts to read `port`.
+  explicit TactileBoard(std::unique_ptr<Port> port, const BoardSettings& settings = {});
+  /// Stops reading; frames that already arrived at the port are still read.
+  ~TactileBoard();
+  void stop();
+
+  /// The next frame, oldest first; nothing after `wait_s` of wall time. Rethrows what ended the reader
+  /// (PortUnplugged, BoardSilent, WrongDevice) once the frames before it have been taken.
+  std::optional<StampedFrame> next(double wait_s);
+  /// Rethrows what ended the reader, without waiting and without taking frames.
+  void check();
+  /// Waits at most `wait_s` of wall time for the reader to end by itself.
+  void wait_for_end(double wait_s);
+  BoardCounters counters();
+
+ private:
+  void run();
+  void read_once(double until);
+  void take(const BoardFrame& frame, double time, std::uint64_t discarded);
+  void check_silence(double time);
+
+  std::unique_ptr<Port> port_;
+  BoardSettings settings_;
+  std::mutex mutex_;
+  std::condition_variable arrived_;
+  std::deque<StampedFrame> queue_;
+  std::exception_ptr error_;
+  BoardCounters counters_;
+  ClockEstimator clock_;
+  std::uint64_t clock_index_ = 0;
+  bool stop_ = false, ended_ = false;
+
+  // of the reader's thread alone
+  FrameDecoder decoder_;
+  GapCounter gaps_;
+  JumpDetector jumps_;
+  std::vector<std::uint32_t> missing_before_;
+  std::deque<double> undecided_;
+  double last_arrival_ = 0;
+  double text_bytes_ = 0;
+  std::thread thread_;
+};
+
+}  // namespace supertac

@@ -1,0 +1,148 @@
+#include "hardware/journal.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "hardware/errors.h"
+#include "hardware/serial_port.h"
+#include "io/crc32.h"
+#include "rig_support.h"
+
+namespace supertac {
+namespace {
+
+std::vector<std::byte> file_bytes(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+TEST(Journal, GivesBackWhatWasWritten) {
+  const ScratchFolder folder;
+  {
+    JournalWriter writer(folder / "j", "a header");
+    writer.append(Stream::board, RecordKind::received, 1.5, frame_bytes(random_frame(1)));
+    writer.event(2.5, "something");
+    writer.close();
+  }
+  const Journal journal = read_journal(folder / "j");
+  EXPECT_EQ(journal.header, "a header");
+  ASSERT_EQ(journal.of(Stream::board).size(), 1U);
+  EXPECT_EQ(journal.of(Stream::board)[0].time_s, 1.5);
+  EXPECT_EQ(journal.of(Stream::board)[0].bytes, frame_bytes(random_frame(1)));
+  EXPECT_EQ(journal.of(Stream::event)[0].text(), "something");
+  EXPECT_EQ(journal.torn_bytes, 0U);
+  EXPECT_TRUE(journal.of(Stream::printer).empty());
+}
+
+TEST(Journal, NeverOverwritesAndSaysWhyItCannotWrite) {
+  const ScratchFolder folder;
+  std::ofstream(folder / "j") << "precious";
+  EXPECT_THROW(JournalWriter(folder / "j", ""), JournalError);
+  EXPECT_EQ(file_bytes(folder / "j").size(), 8U);
+  EXPECT_THROW(JournalWriter(folder / "no/such/folder", ""), JournalError);
+}
+
+TEST(Journal, EveryPrefixReadsAsFarAsItIsWhole) {
+  const ScratchFolder folder;
+  {
+    JournalWriter writer(folder / "j", "h");
+    for (int i = 0; i < 20; ++i) writer.event(i, "event " + std::to_string(i));
+    writer.close();
+  }
+  const std::vector<std::byte> whole = file_bytes(folder / "j");
+  const std::size_t head = 24 + 13 + 1;
+  for (std::size_t length = 0; length <= whole.size(); ++length) {
+    const auto prefix = std::span(whole).first(length);
+    if (length < head) {
+      EXPECT_THROW(parse_journal(prefix, "j"), JournalError) << length;
+    } else {
+      const Journal journal = parse_journal(prefix, "j");
+      EXPECT_EQ(journal.torn_bytes, length == whole.size() ? 0 : length - head);
+    }
+  }
+}
+
+TEST(Journal, EveryFlippedBitIsFound) {
+  const ScratchFolder folder;
+  {
+    JournalWriter writer(folder / "j", "h");
+    writer.event(1, "first");
+    writer.close();
+  }
+  const std::vector<std::byte> whole = file_bytes(folder / "j");
+  for (std::size_t bit = 0; bit < 8 * whole.size(); ++bit) {
+    std::vector<std::byte> damaged = whole;
+    damaged[bit / 8] ^= static_cast<std::byte>(1U << (bit % 8));
+    std::string found;
+    try {
+      const Journal journal = parse_journal(damaged, "j");
+      found = journal.of(Stream::event).empty() ? "dropped" : journal.of(Stream::event)[0].text();
+    } catch (const JournalError&) {
+      found = "dropped";
+    }
+    EXPECT_EQ(found, "dropped") << "bit " << bit;
+  }
+}
+
+// ENOSPC and EFBIG look alike from here; a file size limit needs no full disk.
+TEST(Journal, AFullDiskIsReportedAndWhatWasWrittenIsKept) {
+  const ScratchFolder folder;
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{20'000, 20'000};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    int code = 1;
+    try {
+      JournalWriter writer(folder / "j", "h");
+      const double until = monotonic_seconds() + 20;
+      while (monotonic_seconds() < until) {
+        writer.append(Stream::board, RecordKind::received, 1, std::vector<std::byte>(1000));
+        usleep(10'000);
+        writer.check();
+      }
+    } catch (const JournalError& error) {
+      code = std::string(error.what()).find("make room") != std::string::npos ? 0 : 2;
+    }
+    _exit(code);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_NO_THROW(read_journal(folder / "j"));
+}
+
+TEST(Journal, KillLosesAtMostHalfASecond) {
+  const ScratchFolder folder;
+  for (int round = 0; round < 6; ++round) {
+    const std::string path = folder / ("j" + std::to_string(round));
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      JournalWriter writer(path, "h");
+      for (;;) {
+        writer.event(monotonic_seconds(), "tick");
+        usleep(1000);
+      }
+    }
+    usleep(static_cast<useconds_t>(350'000 + 70'000 * round));
+    kill(child, SIGKILL);
+    const double killed = monotonic_seconds();
+    waitpid(child, nullptr, 0);
+    const Journal journal = read_journal(path);
+    ASSERT_FALSE(journal.of(Stream::event).empty());
+    EXPECT_LT(killed - journal.of(Stream::event).back().time_s, 0.5);
+  }
+}
+
+}  // namespace
+}  // namespace supertac
