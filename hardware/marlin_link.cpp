@@ -100,7 +100,7 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
     }
   }
   finish(exchange);
-  if (exchange.proven && deadline_s > 0) {
+  if (exchange.proven && deadline_s > settings_.ok_deadline_s) {
     // Taken is not finished: the ok of a command behind it in the queue tells when a long one has ended.
     exchange.answer.answered_s = command("M400", deadline_s).answered_s;
   }
