@@ -11,16 +11,17 @@
 namespace supertac {
 namespace {
 
+// rest = 1 - beta, rounded once: 1 - 0.999f is off by 1e-5, and the bias correction would not know.
 struct Update {
-  real clip, b1, b2, rate, correction, epsilon;
+  real clip, b1, rest1, b2, rest2, rate, correction, epsilon;
 };
 
 SUPERTAC_CLONES void update_loop(Dim n, Update u, const real* gradient, real* __restrict x,
                                  real* __restrict m, real* __restrict v) {
   for (Dim i = 0; i < n; ++i) {
     const real g = u.clip * gradient[i];
-    m[i] = u.b1 * m[i] + (1 - u.b1) * g;
-    v[i] = u.b2 * v[i] + (1 - u.b2) * g * g;
+    m[i] = u.b1 * m[i] + u.rest1 * g;
+    v[i] = u.b2 * v[i] + u.rest2 * g * g;
     x[i] -= u.rate * m[i] / (std::sqrt(v[i]) * u.correction + u.epsilon);
   }
 }
@@ -57,7 +58,9 @@ double Adam::step() {
   const double t = static_cast<double>(steps_);
   const Update u{static_cast<real>(factor),
                  static_cast<real>(options_.beta1),
+                 static_cast<real>(1 - options_.beta1),
                  static_cast<real>(options_.beta2),
+                 static_cast<real>(1 - options_.beta2),
                  static_cast<real>(options_.learning_rate / (1 - std::pow(options_.beta1, t))),
                  static_cast<real>(1 / std::sqrt(1 - std::pow(options_.beta2, t))),
                  static_cast<real>(options_.epsilon)};
