@@ -50,6 +50,9 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
     add(pass, Phase::slide, {x, y + plan.slide, z}, plan.speed);
     add(pass, Phase::release, {x, y + plan.slide, high}, plan.speed_z);
   }
+  // Back to where it began: the next run's operator confirms the same place.
+  add(plan.passes, Phase::reposition, {at.x, at.y, std::max(here.z, high)}, plan.speed_z);
+  add(plan.passes, Phase::reposition, {here.x, here.y, at.z}, plan.travel_speed);
   std::erase_if(legs, [](const Leg& leg) { return leg.from == leg.to; });
   return legs;
 }

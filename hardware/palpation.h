@@ -57,7 +57,8 @@ struct PalpationOutcome {
   std::exception_ptr error;  ///< why, when not complete
 };
 
-/// All legs of the plan, from `here`. Throws std::invalid_argument for a plan that makes no sense.
+/// All legs of the plan, from `here` and back (at lifting height or above). Throws std::invalid_argument for
+/// a plan that makes no sense.
 std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here);
 
 class Palpation {

@@ -39,7 +39,11 @@ void Printer::confirm_origin(const Point3& here) {
   link_.command("M400", kHomeDeadline);
   link_.command("G92" + coordinates(here));
   target_ = here;
-  const Point3 found = queue_position();
+  Point3 found = queue_position();
+  for (int attempt = 0; attempt < 2 && distance(found, here) > settings_.tolerance_mm; ++attempt) {
+    link_.settle();
+    found = queue_position();  // the answer may have been damaged
+  }
   if (distance(found, here) > settings_.tolerance_mm) {
     throw PositionError("printer: after G92 expected " + describe(here) + ", found " + describe(found) +
                         "; confirm the origin again");

@@ -21,17 +21,19 @@ std::vector<std::string> planned_moves(const PalpationPlan& plan, const Point3& 
   return moves;
 }
 
-// Moves run once and in order; after a fault one lift (G1 Z...) may follow.
+// Moves run once and in order; after a fault one lift (G1 Z...) may follow. Two faults can cancel in the XOR:
+// such a move is noted, and what came of it is judged by where the head is.
 std::string check_moves(const std::vector<std::string>& ran, const std::vector<std::string>& planned,
-                        bool complete) {
+                        FaultVerdict& verdict) {
   std::size_t count = ran.size();
-  if (!complete && count > 0 && ran.back().starts_with("G1 Z")) --count;
-  if (count > planned.size() || (complete && count != planned.size())) {
+  if (!verdict.complete && count > 0 && ran.back().starts_with("G1 Z")) --count;
+  if (count > planned.size() || (verdict.complete && count != planned.size())) {
     return "ran " + std::to_string(count) + " moves, planned " + std::to_string(planned.size());
   }
   for (std::size_t i = 0; i < count; ++i) {
-    if (ran[i] != planned[i])
-      return "move " + std::to_string(i) + " ran as " + ran[i] + ", planned " + planned[i];
+    if (ran[i] == planned[i]) continue;
+    if (i > 0 && ran[i] == planned[i - 1]) return "move " + std::to_string(i) + " ran twice: " + ran[i];
+    verdict.altered = ran[i] + ", planned " + planned[i];
   }
   return {};
 }
@@ -90,7 +92,7 @@ FaultVerdict run_faulty_collection(const RigFaults& faults, std::uint64_t seed, 
     const Point3 head = rig.world().printer().head(rig.now());
     verdict.complete = report.outcome.complete;
     verdict.printer = report.printer;
-    verdict.broken = check_moves(moves_of(rig.world().printer()), planned, verdict.complete);
+    verdict.broken = check_moves(moves_of(rig.world().printer()), planned, verdict);
     if (verdict.complete && distance(head, legs.back().to) > 0.05) {
       verdict.broken = "false done: the head is at " + describe(head);
     }

@@ -12,6 +12,7 @@ namespace supertac {
 struct FaultVerdict {
   bool complete = false;  ///< the run says "done"
   std::string broken;     ///< the promise that was broken; empty when all held
+  std::string altered;    ///< a damaged move that Marlin's 8-bit XOR let through; no host can see it
   std::string error;      ///< of a run that was not complete
   double simulated_s = 0;
   MarlinLink::Counters printer;

@@ -24,6 +24,8 @@ int main(int argc, char** argv) {
     missing += verdict.missing;
     repeats += verdict.printer.repeats;
     if (!verdict.broken.empty()) std::cout << "seed " << seed << " BROKEN: " << verdict.broken << std::endl;
+    if (!verdict.altered.empty())
+      std::cout << "seed " << seed << " altered by two faults: " << verdict.altered << std::endl;
     if (!verdict.error.empty()) std::cout << "seed " << seed << ": " << verdict.error << std::endl;
   }
   std::cout << runs << " runs: " << complete << " complete, " << typed << " typed errors, " << broken

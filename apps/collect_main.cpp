@@ -1,0 +1,157 @@
+// supertac-collect: runs the finger over a plate and records every pass with a position for every frame.
+
+#include <unistd.h>
+
+#include <atomic>
+#include <filesystem>
+#include <iostream>
+#include <thread>
+
+#include "apps/collect/passes.h"
+#include "apps/common/program.h"
+#include "apps/common/progress.h"
+#include "apps/common/signals.h"
+#include "data/plate.h"
+#include "hardware/errors.h"
+#include "hardware/palpation_recorder.h"
+#include "hardware/port_list.h"
+#include "hardware/serial_port.h"
+#include "io/file.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+namespace fs = std::filesystem;
+
+void declare(Arguments& arguments) {
+  arguments.option("board", "PORT", "port of the tactile board; auto finds it by its USB number", "auto")
+      .option("printer", "PORT", "port of the Marlin printer")
+      .option("plate", "NAME", "plate under the finger (3_Bumps, ..., plain, or kind and pitch: ridges6)")
+      .option("out", "DIR", "folder for journal, recordings and report")
+      .option("speed", "MM_PER_S", "of the slide", "10")
+      .option("passes", "N", "slides, 5 mm apart in x (at most 8)", "8")
+      .option("trial", "N", "number of this trial, for the recordings' names", "1")
+      .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
+      .flag("home", "home the printer first instead of trusting the operator's origin")
+      .flag("confirm-origin", "after a run that was cut off: the head is back at X99.70 Y101.17 Z131.81")
+      .flag("yes", "do not ask: the plate lies as planned and the head is at X99.70 Y101.17 Z131.81")
+      .flag("list-ports", "list the serial ports and end");
+}
+
+int print_ports(const Arguments& arguments) {
+  const std::vector<PortInfo> ports = list_ports();
+  for (const PortInfo& port : ports) {
+    const std::string board = port.usb_id == kBoardUsbId ? "  <- tactile board" : "";
+    arguments.print(port.path + "  " + port.usb_id + "  " + port.product + board);
+  }
+  if (ports.empty()) arguments.print("no USB serial ports found");
+  return kExitOk;
+}
+
+std::string required_text(const Arguments& arguments, const std::string& name) {
+  if (!arguments.given(name)) throw UsageError("--" + name + ": expected a value, found none");
+  return arguments.text(name);
+}
+
+void confirm(const Arguments& arguments, const RecorderSettings& settings) {
+  const PalpationPlan& plan = settings.plan;
+  arguments.note("plan: " + std::to_string(plan.passes) + " passes of " + format(plan.slide, 0) + " mm at " +
+                 format(plan.speed, 1) + " mm/s from " + describe(plan.start) + ", lift " +
+                 format(plan.lift, 0) + " mm");
+  if (arguments.flag("yes")) return;
+  if (isatty(STDIN_FILENO) == 0) throw UsageError("--yes: needed where nobody can be asked");
+  std::cerr << (settings.home ? "Is the bed free, so that the printer can home?"
+                              : "Is the head at " + describe(settings.origin) + ", the plate below it?")
+            << " [yes/no] ";
+  std::string answer;
+  if (!std::getline(std::cin, answer) || answer != "yes")
+    throw UsageError("not confirmed; nothing was moved");
+}
+
+RecorderSettings read_settings(const Arguments& arguments, const std::string& out, const std::string& plate) {
+  RecorderSettings settings;
+  settings.plan.speed = arguments.number("speed", 0.5, 50);
+  settings.plan.passes = static_cast<int>(arguments.integer("passes", 1, 8));
+  settings.home = arguments.flag("home");
+  const int trial = static_cast<int>(arguments.integer("trial", 1, 1000));
+  settings.header = collection_header(plate, trial, settings.plan.speed);
+  settings.journal = journal_path(out, plate, trial, settings.plan.speed);
+  return settings;
+}
+
+// Present while a collection runs, and after one that did not end with the head back at its origin.
+std::string origin_mark(const std::string& out) { return out + "/origin-unknown"; }
+
+RecorderReport collect(const Arguments& arguments, RecorderSettings settings) {
+  const double speedup = arguments.number("speedup", 0.1, 100);
+  auto board = std::make_unique<SerialPort>(resolve_board_port(arguments.text("board")),
+                                            SerialSettings{kBoardBaud, speedup});
+  auto printer =
+      std::make_unique<SerialPort>(required_text(arguments, "printer"), SerialSettings{115200, speedup});
+  confirm(arguments, settings);
+  std::atomic<bool> stop{false}, ended{false};
+  settings.stop = &stop;
+  Progress progress(arguments, "collecting", static_cast<uint64_t>(settings.plan.passes) * 1000,
+                    "thousandths");
+  settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters&) {
+    const double part = leg.phase == Phase::slide ? (at.y - leg.from.y) / settings.plan.slide : 0;
+    progress.update(static_cast<uint64_t>(1000 * (leg.pass - 1 + std::min(1.0, std::max(0.0, part)))));
+  };
+  std::thread watcher([&] {
+    for (; !ended; usleep(20'000)) stop = stop || interrupted();
+  });
+  struct Joiner {
+    std::atomic<bool>& ended;
+    std::thread& thread;
+    ~Joiner() {
+      ended = true;
+      thread.join();
+    }
+  } joiner{ended, watcher};
+  return record_palpation(std::move(board), std::move(printer), settings);
+}
+
+int run(Arguments& arguments) {
+  if (arguments.flag("list-ports")) return print_ports(arguments);
+  const std::string out = required_text(arguments, "out");
+  std::string plate;
+  try {
+    plate = Plate::named(required_text(arguments, "plate")).name();
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--plate: ") + error.what());
+  }
+  make_directories(out);
+  const RecorderSettings settings = read_settings(arguments, out, plate);
+  if (fs::exists(origin_mark(out)) && !arguments.flag("home") && !arguments.flag("confirm-origin")) {
+    throw OriginUnknown(
+        "collect: the last run in " + out +
+        " was cut off, so the head's position is unknown; move it to X99.70 Y101.17 Z131.81 and add "
+        "--confirm-origin, or use --home");
+  }
+  write_file(origin_mark(out), "the head's position is unknown until a run has ended here\n");
+  const RecorderReport report = collect(arguments, settings);
+  const int frames = write_passes(arguments, settings.journal, out);
+  if (report.outcome.complete) {
+    fs::remove(origin_mark(out));
+    arguments.print(std::to_string(report.outcome.passes_done) + " passes, " + std::to_string(frames) +
+                    " frames");
+    return kExitOk;
+  }
+  arguments.note("incomplete after " + std::to_string(report.outcome.passes_done) + " passes; " +
+                 report.outcome.note);
+  stop_if_interrupted();
+  std::rethrow_exception(report.outcome.error);
+}
+
+}  // namespace
+}  // namespace supertac
+
+int main(int argc, char** argv) {
+  using namespace supertac;
+  return run_program({.name = "supertac-collect",
+                      .purpose = "Runs the finger over a plate and records every pass with positions.",
+                      .declare = declare,
+                      .run = run},
+                     argc, argv);
+}

@@ -1,0 +1,66 @@
+// supertac-rig: a virtual rig behind two pseudo-terminals, for everyone without the real one.
+
+#include <unistd.h>
+
+#include "apps/common/program.h"
+#include "apps/common/signals.h"
+#include "data/finger_model.h"
+#include "hardware/virtual_rig/pty_rig.h"
+
+namespace supertac {
+namespace {
+
+// Where the plate lies on the virtual printer's bed: its corner, and the height of the slide.
+constexpr double kPlateX = 99.2, kPlateY = 101.17, kSlideZ = 91.81;
+
+void declare(Arguments& arguments) {
+  arguments
+      .required("plate", "NAME", "plate under the finger (3_Bumps, ..., plain, or kind and pitch: ridges6)")
+      .required("board-link", "PATH", "where to link the board's pseudo-terminal")
+      .required("printer-link", "PATH", "where to link the printer's pseudo-terminal")
+      .option("speedup", "X", "time of the rig per time of the wall; give the host the same", "1")
+      .option("faults", "RATE", "faults per byte (0.002 is a bad cable), other faults in proportion", "0")
+      .option("trial", "N", "which finger: gains differ from trial to trial", "1")
+      .option("seed", "N", "the same seed gives the same finger and the same faults", "1");
+}
+
+RigSettings read_settings(const Arguments& arguments) {
+  const auto seed = static_cast<uint64_t>(arguments.integer("seed", 0, 1'000'000'000));
+  SimulatorSettings simulator;
+  simulator.with_adc = simulator.with_filter = simulator.with_saturation =
+      false;  // the board does what it does
+  const FingerIdentity identity{.seed = seed, .trial = static_cast<int>(arguments.integer("trial", 1, 1000))};
+  try {
+    const FingerModel finger(Plate::named(arguments.text("plate")), simulator, identity);
+    RigSettings settings;
+    settings.seed = seed;
+    settings.faults = RigFaults::mixed(arguments.number("faults", 0, 0.1));
+    settings.board.signals = [finger](double x, double y, double z, double t) {
+      return finger.volts({x - kPlateX, y - kPlateY, z - kSlideZ + finger.slide_z_mm()}, t);
+    };
+    return settings;
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--plate: ") + error.what());
+  }
+}
+
+int run(Arguments& arguments) {
+  const PtyRig rig(read_settings(arguments), arguments.text("board-link"), arguments.text("printer-link"),
+                   arguments.number("speedup", 0.1, 100));
+  arguments.print("ready");
+  fflush(stdout);
+  while (!interrupted()) usleep(50'000);
+  return kExitOk;
+}
+
+}  // namespace
+}  // namespace supertac
+
+int main(int argc, char** argv) {
+  using namespace supertac;
+  return run_program({.name = "supertac-rig",
+                      .purpose = "A virtual tactile board and Marlin printer behind two pseudo-terminals.",
+                      .declare = declare,
+                      .run = run},
+                     argc, argv);
+}

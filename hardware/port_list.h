@@ -1,0 +1,24 @@
+// Which USB serial ports there are, from sysfs.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace supertac {
+
+struct PortInfo {
+  std::string path;     ///< /dev/ttyACM0
+  std::string usb_id;   ///< "0483:5740", empty when not USB
+  std::string product;  ///< as the device calls itself
+};
+
+constexpr const char* kBoardUsbId = "0483:5740";
+
+/// Ports with a device behind them, by name.
+std::vector<PortInfo> list_ports();
+
+/// `path`, or for "auto" the only port with the board's VID:PID. Throws PortNotFound when there is none or
+/// more than one.
+std::string resolve_board_port(const std::string& path);
+
+}  // namespace supertac
