@@ -36,6 +36,8 @@ void declare(Arguments& arguments) {
       .flag("home", "home the printer first instead of trusting the operator's origin")
       .flag("confirm-origin", "after a run that was cut off: the head is back at X99.70 Y101.17 Z131.81")
       .flag("yes", "do not ask: the plate lies as planned and the head is at X99.70 Y101.17 Z131.81")
+      .option("recover", "JOURNAL",
+              "no collection: make the recordings of a run that was cut off, into --out")
       .flag("list-ports", "list the serial ports and end");
 }
 
@@ -115,6 +117,12 @@ RecorderReport collect(const Arguments& arguments, RecorderSettings settings) {
 int run(Arguments& arguments) {
   if (arguments.flag("list-ports")) return print_ports(arguments);
   const std::string out = required_text(arguments, "out");
+  if (arguments.given("recover")) {
+    make_directories(out);
+    arguments.print(std::to_string(write_passes(arguments, arguments.text("recover"), out)) +
+                    " frames recovered");
+    return kExitOk;
+  }
   std::string plate;
   try {
     plate = Plate::named(required_text(arguments, "plate")).name();

@@ -1,0 +1,42 @@
+// What must hold for the frame decoder on any bytes; the fuzzer and the corpus test call the same function.
+#pragma once
+
+#include <algorithm>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "hardware/frame_decoder.h"
+
+namespace supertac {
+
+/// The first byte chooses the size of the pieces, the rest is the stream. Every byte is in a frame,
+/// discarded, or still pending; pieces change nothing; every frame's samples have 12 bits. Throws
+/// std::logic_error otherwise.
+inline void check_frame_decoder(std::span<const std::byte> input) {
+  if (input.empty()) return;
+  const std::size_t piece = 1 + std::to_integer<std::size_t>(input[0]);
+  const auto stream = input.subspan(1);
+  FrameDecoder whole, pieces;
+  std::vector<BoardFrame> expected, found;
+  whole.push(stream, [&](const BoardFrame& frame, std::uint64_t) { expected.push_back(frame); });
+  for (std::size_t at = 0; at < stream.size(); at += piece) {
+    pieces.push(stream.subspan(at, std::min(piece, stream.size() - at)),
+                [&](const BoardFrame& frame, std::uint64_t) { found.push_back(frame); });
+  }
+  if (expected != found) throw std::logic_error("frame decoder: pieces give other frames than the whole");
+  for (const FrameDecoder* decoder : {&whole, &pieces}) {
+    const FrameDecoder::Counters& counters = decoder->counters();
+    if (counters.frames * kFrameBytes + counters.discarded_bytes + decoder->pending() != counters.bytes ||
+        counters.bytes != stream.size() || decoder->pending() >= kFrameBytes) {
+      throw std::logic_error("frame decoder: bytes are not accounted for");
+    }
+  }
+  for (const BoardFrame& frame : found) {
+    for (const std::uint16_t sample : frame.samples) {
+      if (sample > kAdcMax) throw std::logic_error("frame decoder: a sample has more than 12 bits");
+    }
+  }
+}
+
+}  // namespace supertac
