@@ -11,8 +11,8 @@
 
 namespace supertac {
 
-// A file could not be read or written, or holds something else than expected. what() is one line,
-// "<path>: <what was wrong, expected, found, what to do>".
+/// A file could not be read or written, or holds something else than expected. what() is one line,
+/// "<path>: <what was wrong, expected, found, what to do>".
 class FileError : public std::runtime_error {
  public:
   FileError(const std::string& path, const std::string& problem);
@@ -22,20 +22,20 @@ class FileError : public std::runtime_error {
   std::string path_;
 };
 
-// A regular file opened for reading, front to back. Reads are buffered by the caller's span, never mapped:
-// a mapped file that another program shortens would end the process with SIGBUS.
+/// A regular file opened for reading, front to back. Reads are buffered by the caller's span, never mapped:
+/// a mapped file that another program shortens would end the process with SIGBUS.
 class FileReader {
  public:
-  // Throws FileError when the file cannot be opened or is no regular file (a directory, a pipe, a device).
+  /// Throws FileError when the file cannot be opened or is no regular file (a directory, a pipe, a device).
   explicit FileReader(const std::string& path);
   ~FileReader();
   FileReader(const FileReader&) = delete;
   FileReader& operator=(const FileReader&) = delete;
 
   const std::string& path() const { return path_; }
-  // Bytes in the file when it was opened.
+  /// Bytes in the file when it was opened.
   uint64_t size() const { return size_; }
-  // Fills all of `bytes`. Throws FileError on an I/O error, or when the file ends first.
+  /// Fills all of `bytes`. Throws FileError on an I/O error, or when the file ends first.
   void read(std::span<std::byte> bytes);
 
  private:
@@ -45,29 +45,29 @@ class FileReader {
   uint64_t position_ = 0;
 };
 
-// The whole file. Throws FileError when it cannot be read or is larger than `max_bytes`; the size is checked
-// before anything is allocated.
+/// The whole file. Throws FileError when it cannot be read or is larger than `max_bytes`; the size is checked
+/// before anything is allocated.
 std::vector<std::byte> read_file(const std::string& path, uint64_t max_bytes);
 std::string read_text_file(const std::string& path, uint64_t max_bytes);
 
-// A file that appears under its name complete or not at all: written to a temporary name in the same
-// directory (O_EXCL), then commit() does fsync, close, rename and fsync of the directory. An existing file
-// stays as it is until the rename. A symbolic link stays; the file it points at is replaced.
+/// A file that appears under its name complete or not at all: written to a temporary name in the same
+/// directory (O_EXCL), then commit() does fsync, close, rename and fsync of the directory. An existing file
+/// stays as it is until the rename. A symbolic link stays; the file it points at is replaced.
 class AtomicFile {
  public:
-  // Throws FileError: no such directory, not writable, or `path` is something else than a regular file.
+  /// Throws FileError: no such directory, not writable, or `path` is something else than a regular file.
   explicit AtomicFile(const std::string& path);
-  // Removes the temporary when commit() has not succeeded.
+  /// Removes the temporary when commit() has not succeeded.
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  // Appends. Throws FileError; the old file is then intact, and the temporary goes with this object.
+  /// Appends. Throws FileError; the old file is then intact, and the temporary goes with this object.
   void write(std::span<const std::byte> bytes);
   void write(std::string_view text);
-  // Throws FileError as write() does. A failed fsync is final: the kernel may have dropped the pages, and a
-  // second fsync would report success. Only when the last step fails, the sync of the directory, the new file
-  // is already in place, complete, and may yet be lost in a power cut; the message says so.
+  /// Throws FileError as write() does. A failed fsync is final: the kernel may have dropped the pages, and a
+  /// second fsync would report success. Only when the last step fails, the sync of the directory, the new
+  /// file is already in place, complete, and may yet be lost in a power cut; the message says so.
   void commit();
 
  private:
@@ -80,14 +80,14 @@ class AtomicFile {
   int directory_ = -1;
 };
 
-// AtomicFile in one call.
+/// AtomicFile in one call.
 void write_file(const std::string& path, std::span<const std::byte> bytes);
 void write_file(const std::string& path, std::string_view text);
 
-// Throws FileError when `path` exists and `force` is false: nothing is overwritten without --force.
+/// Throws FileError when `path` exists and `force` is false: nothing is overwritten without --force.
 void refuse_existing(const std::string& path, bool force);
 
-// Creates the directory and its parents where they are missing. Throws FileError.
+/// Creates the directory and its parents where they are missing. Throws FileError.
 void make_directories(const std::string& path);
 
 }  // namespace supertac

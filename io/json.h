@@ -16,14 +16,14 @@ struct JsonLimits {
   size_t max_values = 100'000;  // of any kind, keys included
 };
 
-// The text is not JSON, has a key twice, or exceeds a limit; what() says which and at which byte.
+/// The text is not JSON, has a key twice, or exceeds a limit; what() says which and at which byte.
 class JsonError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// Base of our SAX handlers: nlohmann's interface with every value refused. A handler overrides the values it
-// takes; an override that refuses returns refuse("why").
+/// Base of our SAX handlers: nlohmann's interface with every value refused. A handler overrides the values it
+/// takes; an override that refuses returns refuse("why").
 class JsonHandler : public nlohmann::json_sax<nlohmann::json> {
  public:
   const std::string& problem() const { return problem_; }
@@ -46,18 +46,18 @@ class JsonHandler : public nlohmann::json_sax<nlohmann::json> {
                    const nlohmann::json::exception& error) override;
 
  protected:
-  // Stops the parse; the first reason is kept. Always false.
+  /// Stops the parse; the first reason is kept. Always false.
   bool refuse(const std::string& why);
 
  private:
   std::string problem_;
 };
 
-// Runs the handler over the whole text. Throws JsonError when the text is not JSON (a NUL byte is refused
-// too: the parser would take it for the end) or the handler refuses.
+/// Runs the handler over the whole text. Throws JsonError when the text is not JSON (a NUL byte is refused
+/// too: the parser would take it for the end) or the handler refuses.
 void parse_json(std::string_view text, JsonHandler& handler);
 
-// The document as a tree, keys in the order of the text. Throws JsonError.
+/// The document as a tree, keys in the order of the text. Throws JsonError.
 nlohmann::ordered_json parse_json_limited(std::string_view text, const JsonLimits& limits = {});
 
 }  // namespace supertac

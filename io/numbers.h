@@ -8,17 +8,17 @@
 
 namespace supertac {
 
-// The whole text must be the number: no spaces, no leading '+', '.' before the fraction. nullopt when it is
-// not, or when the value does not fit. "nan" and "inf" are numbers here; the caller decides whether they may
-// be.
+/// The whole text must be the number: no spaces, no leading '+', '.' before the fraction. nullopt when it is
+/// not, or when the value does not fit. "nan" and "inf" are numbers here; the caller decides whether they may
+/// be.
 std::optional<double> parse_double(std::string_view text);
 std::optional<int64_t> parse_int(std::string_view text);
 std::optional<uint64_t> parse_uint(std::string_view text);
 
-// The shortest text that reads back as the same value.
+/// The shortest text that reads back as the same value.
 std::string format(double value);
 std::string format(float value);
-// With a fixed number of decimals, for tables and messages.
+/// With a fixed number of decimals, for tables and messages.
 std::string format(double value, int decimals);
 
 }  // namespace supertac

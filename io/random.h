@@ -7,24 +7,24 @@
 
 namespace supertac {
 
-// Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC 2011): four random words
-// for every 128-bit counter and 64-bit key.
+/// Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC 2011): four random words
+/// for every 128-bit counter and 64-bit key.
 std::array<uint32_t, 4> philox(std::array<uint32_t, 4> counter, std::array<uint32_t, 2> key);
 
-// The standard normal distribution's inverse, p in (0, 1), relative error about 1e-16: algorithm AS 241,
-// PPND16 (Wichura 1988). Uses +, -, *, / and sqrt only, so that the bits do not depend on the C library.
+/// The standard normal distribution's inverse, p in (0, 1), relative error about 1e-16: algorithm AS 241,
+/// PPND16 (Wichura 1988). Uses +, -, *, / and sqrt only, so that the bits do not depend on the C library.
 double inverse_normal(double p);
 
-// A stream of random numbers: a pure function of (seed, stream, counter). The three methods draw from the
-// same words; use different counters (or streams) for numbers that have to be independent.
+/// A stream of random numbers: a pure function of (seed, stream, counter). The three methods draw from the
+/// same words; use different counters (or streams) for numbers that have to be independent.
 struct RandomStream {
   RandomStream(uint64_t seed, uint64_t stream) : seed_(seed), stream_(stream) {}
 
-  // 32 uniform bits.
+  /// 32 uniform bits.
   uint32_t bits(uint64_t counter) const;
-  // Uniform in [0, 1), a multiple of 2^-53.
+  /// Uniform in [0, 1), a multiple of 2^-53.
   double uniform(uint64_t counter) const;
-  // Normal with mean 0 and variance 1; |value| < 8.3.
+  /// Normal with mean 0 and variance 1; |value| < 8.3.
   double normal(uint64_t counter) const;
 
  private:

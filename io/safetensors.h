@@ -20,29 +20,29 @@ struct TensorInfo {
   uint64_t begin, end;          // bytes within the data
 };
 
-// A file read and checked as a whole.
+/// A file read and checked as a whole.
 class SafetensorsFile {
  public:
   enum class ChecksumState { ok, absent };  // a wrong one does not load
 
-  // Throws FileError when the file cannot be read or breaks a rule. Rules: the header has at most 1 MiB,
-  // starts with '{' and is padded with spaces only; at most 4,096 tensors and as many metadata fields;
-  // nothing nested deeper, no key twice, no field unknown; integers without sign, fraction or overflow; each
-  // tensor's bytes are those of its shape and type; tensors follow each other without gap or overlap up to
-  // the end of the file; version and checksum are right where there are any, and a file with one of them has
-  // both. No size is believed before it has been compared with the bytes the file has. A hostile header costs
-  // less than 10 ms.
+  /// Throws FileError when the file cannot be read or breaks a rule. Rules: the header has at most 1 MiB,
+  /// starts with '{' and is padded with spaces only; at most 4,096 tensors and as many metadata fields;
+  /// nothing nested deeper, no key twice, no field unknown; integers without sign, fraction or overflow; each
+  /// tensor's bytes are those of its shape and type; tensors follow each other without gap or overlap up to
+  /// the end of the file; version and checksum are right where there are any, and a file with one of them has
+  /// both. No size is believed before it has been compared with the bytes the file has. A hostile header
+  /// costs less than 10 ms.
   static SafetensorsFile read(const std::string& path);
 
   const std::string& path() const { return path_; }
-  // Without the two fields of this layer.
+  /// Without the two fields of this layer.
   const std::map<std::string, std::string>& metadata() const { return metadata_; }
   const std::map<std::string, TensorInfo>& tensors() const { return tensors_; }
-  // absent: written by another program; damage cannot be seen.
+  /// absent: written by another program; damage cannot be seen.
   ChecksumState checksum() const { return checksum_; }
 
-  // A tensor's bytes, or its elements when it has that type. Throw FileError when there is no such tensor
-  // (the message lists those there are) or it has another type.
+  /// A tensor's bytes, or its elements when it has that type. Throw FileError when there is no such tensor
+  /// (the message lists those there are) or it has another type.
   std::span<const std::byte> bytes(const std::string& name) const;
   std::vector<float> f32(const std::string& name) const;
   std::vector<double> f64(const std::string& name) const;
@@ -66,10 +66,10 @@ struct TensorToWrite {
   std::span<const std::byte> data;  // little-endian, row-major
 };
 
-// Writes the file atomically (io/file.h), with version and checksum; the same arguments give the same bytes.
-// Throws std::invalid_argument when data and shape disagree, a name appears twice or is "__metadata__", a
-// dtype is unknown, the metadata holds a field of this layer, or a cap of read() would be exceeded; FileError
-// when the file cannot be written.
+/// Writes the file atomically (io/file.h), with version and checksum; the same arguments give the same bytes.
+/// Throws std::invalid_argument when data and shape disagree, a name appears twice or is "__metadata__", a
+/// dtype is unknown, the metadata holds a field of this layer, or a cap of read() would be exceeded;
+/// FileError when the file cannot be written.
 void write_safetensors(const std::string& path, std::map<std::string, std::string> metadata,
                        const std::vector<TensorToWrite>& tensors);
 

@@ -27,17 +27,18 @@ struct Header {
   std::map<std::string, TensorInfo> tensors;
 };
 
-// The header's JSON, checked for itself. Throws JsonError.
+/// The header's JSON, checked for itself. Throws JsonError.
 Header parse_header(std::string_view text);
 
-// JSON text, padded with spaces so that the data begins at a multiple of 8 bytes.
+/// JSON text, padded with spaces so that the data begins at a multiple of 8 bytes.
 std::string header_text(const std::map<std::string, std::string>& metadata,
                         std::span<const TensorToWrite> tensors);
 
-// Size of a tensor in bytes; nullopt for an unknown dtype, a rank over kMaxRank, or a product beyond 64 bits.
+/// Size of a tensor in bytes; nullopt for an unknown dtype, a rank over kMaxRank, or a product beyond 64
+/// bits.
 std::optional<uint64_t> tensor_bytes(const std::string& dtype, const std::vector<uint64_t>& shape);
 
-// Where the digits of the checksum stand in the header's text; nullopt when there are none.
+/// Where the digits of the checksum stand in the header's text; nullopt when there are none.
 std::optional<size_t> checksum_position(std::string_view text);
 
 std::string checksum_digits(uint32_t checksum);

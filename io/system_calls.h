@@ -8,7 +8,7 @@
 
 namespace supertac {
 
-// Same arguments, results and errno as the POSIX calls of these names.
+/// Same arguments, results and errno as the POSIX calls of these names.
 struct SystemCalls {
   int (*open)(const char* path, int flags, mode_t mode);
   int (*fstat)(int file, struct stat* status);
@@ -20,10 +20,10 @@ struct SystemCalls {
   int (*unlink)(const char* path);
 };
 
-// The real calls.
+/// The real calls.
 SystemCalls real_system_calls();
 
-// The table in use. Replaced by tests only; not to be changed while another thread uses files.
+/// The table in use. Replaced by tests only; not to be changed while another thread uses files.
 SystemCalls& system_calls();
 
 }  // namespace supertac

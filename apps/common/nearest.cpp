@@ -29,10 +29,11 @@ std::string nearest_name(const std::string& name, const std::vector<std::string>
   std::string nearest;
   size_t fewest = name.size();  // a name all of whose letters differ is no hint
   constexpr size_t kLongest = 64;
-  if (name.size() > kLongest) return nearest;
+  if (name.empty() || name.size() > kLongest) return nearest;
   for (const std::string& candidate : candidates) {
     const size_t changes = distance(name, candidate);
-    if (changes >= fewest || changes > std::max<size_t>(2, candidate.size() / 3)) continue;
+    const bool nearer = changes < fewest || (changes == fewest && candidate.starts_with(name));
+    if (!nearer || changes > std::max<size_t>(2, candidate.size() / 3)) continue;
     fewest = changes;
     nearest = candidate;
   }

@@ -14,6 +14,7 @@ void remember(int number) { signal_number = number; }
 }  // namespace
 
 void catch_signals() {
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes is then an error of write(), like a full disk
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction before {};
     sigaction(number, nullptr, &before);
