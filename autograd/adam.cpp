@@ -1,12 +1,12 @@
 #include "autograd/adam.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
 
 #include "autograd/kernels/clones.h"
 #include "autograd/kernels/elementwise.h"
-#include "autograd/kernels/parallel.h"
 
 namespace supertac {
 namespace {
@@ -67,8 +67,7 @@ double Adam::step() {
   for (std::size_t k = 0; k < parameters_.size(); ++k) {
     const real* gradient = parameters_[k].grad().data();
     real *x = parameters_[k].mutable_value().data(), *m = m_[k].data(), *v = v_[k].data();
-    kernels::for_pieces(parameters_[k].size(),
-                        [=](Dim i, Dim end) { update_loop(end - i, u, gradient + i, x + i, m + i, v + i); });
+    update_loop(parameters_[k].size(), u, gradient, x, m, v);
   }
   return norm;
 }

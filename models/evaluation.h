@@ -20,7 +20,8 @@ struct EvaluatedBatch {
 };
 
 /// Calls `use` for the given windows in order, in batches of at most 64. `use` returns false to stop early.
-/// Throws std::invalid_argument when the data set's windows do not fit the model.
+/// Batches are computed on several threads, `use` runs on the caller's. Throws std::invalid_argument when the
+/// data set's windows do not fit the model.
 void for_each_output(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
                      const std::function<bool(const EvaluatedBatch&)>& use);
 

@@ -1,8 +1,11 @@
 #include "models/trainer.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "autograd/kernels/elementwise.h"
+#include "autograd/ops/arithmetic.h"
 #include "data/split.h"
 #include "io/json.h"
 #include "io/numbers.h"
@@ -12,6 +15,7 @@ namespace {
 
 // Streams of random numbers that must not meet: the seed is shared with splits and batching.
 constexpr std::uint64_t kEpsStream = 0x65707300;
+constexpr Dim kMostLanes = 4;
 constexpr int kFlatStepsToReport = 100;
 constexpr double kFlatShare = 0.02;  // of the truth's standard deviation
 
@@ -25,10 +29,8 @@ SuperTac make_model(const TrainingSettings& settings) {
   return SuperTac(settings.model, rng);
 }
 
-double standard_deviation(const Tensor& t) {
-  const double n = static_cast<double>(t.size());
-  const double mean = kernels::sum(t.size(), t.data()) / n;
-  return std::sqrt(std::max(0.0, kernels::sum_of_squares(t.size(), t.data()) / n - mean * mean));
+double standard_deviation(double sum, double squares, double n) {
+  return std::sqrt(std::max(0.0, squares / n - sum / n * (sum / n)));
 }
 
 void copy_into(Tensor& to, const Tensor& from) { std::copy_n(from.data(), from.size(), to.data()); }
@@ -86,60 +88,108 @@ Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, con
                .warm_up = static_cast<std::int64_t>(settings.warm_up * static_cast<double>(total_steps_)),
                .total = total_steps_};
   indices_.resize(batching_.batch_size());
-  const Dim n = static_cast<Dim>(indices_.size()), size = settings.model.image_size();
-  windows_ = Tensor(Shape{n, settings.model.timesteps, kWindowTaxels});
-  truth_ = Tensor(Shape{n, size, size, 1});
-  for (Tensor& eps : eps_) eps = Tensor(Shape{n, settings.model.latent});
+  const Dim n = static_cast<Dim>(indices_.size()), lanes = std::min(kMostLanes, n);
+  for (Dim i = 0; i < lanes; ++i)
+    lanes_.emplace_back(model_, i * n / lanes, (i + 1) * n / lanes - i * n / lanes);
 }
 
-void Trainer::fill_batch() {
+Trainer::Lane::Lane(const SuperTac& master, Dim first_sample, Dim count)
+    : first(first_sample), model([&] {
+        Rng rng(0);
+        return SuperTac(master.settings(), rng);
+      }()) {
+  const SuperTacSettings& s = master.settings();
+  windows = Tensor(Shape{count, s.timesteps, kWindowTaxels});
+  truth = Tensor(Shape{count, s.image_size(), s.image_size(), 1});
+  for (Tensor& e : eps) e = Tensor(Shape{count, s.latent});
+  for (std::size_t i = 0; i < master.parameters().size(); ++i) {
+    Variable own = model.parameters()[i].value;
+    own.mutable_value() = master.parameters()[i].value.value();  // the same buffer
+    own.mutable_grad() = Tensor::zeros(own.shape());
+  }
+}
+
+void Trainer::fill(Lane& lane) const {
   const auto per_epoch = static_cast<std::uint64_t>(steps_per_epoch());
-  const std::uint64_t epoch = static_cast<std::uint64_t>(step_) / per_epoch,
-                      b = static_cast<std::uint64_t>(step_) % per_epoch;
-  batching_.batch(epoch, b, indices_);
-  const std::size_t window_size = static_cast<std::size_t>(windows_.size()) / indices_.size();
-  const std::size_t truth_size = static_cast<std::size_t>(truth_.size()) / indices_.size();
-  const auto count = static_cast<std::int64_t>(indices_.size());
-#pragma omp parallel for schedule(static) if (count > 8)
-  for (std::int64_t n = 0; n < count; ++n) {
-    const auto i = static_cast<std::size_t>(n);
-    const std::span<float> window = windows_.values().subspan(i * window_size, window_size);
-    data_.window(indices_[i], window);
-    if (settings_.augment.any())
-      augment(settings_.augment, settings_.seed, batching_.sample(epoch, b, i), window);
-    data_.truth(indices_[i], truth_.values().subspan(i * truth_size, truth_size));
+  const std::uint64_t epoch = static_cast<std::uint64_t>(step_) / per_epoch;
+  const std::uint64_t b = static_cast<std::uint64_t>(step_) % per_epoch;
+  const auto count = static_cast<std::size_t>(lane.windows.dim(0));
+  const std::size_t window_size = lane.windows.values().size() / count;
+  const std::size_t truth_size = lane.truth.values().size() / count;
+  for (std::size_t n = 0; n < count; ++n) {
+    const std::size_t slot = static_cast<std::size_t>(lane.first) + n;
+    const std::span<float> window = lane.windows.values().subspan(n * window_size, window_size);
+    data_.window(indices_[slot], window);
+    if (settings_.augment.any()) {
+      augment(settings_.augment, settings_.seed, batching_.sample(epoch, b, slot), window);
+    }
+    data_.truth(indices_[slot], lane.truth.values().subspan(n * truth_size, truth_size));
   }
 }
 
-void Trainer::draw_eps() {
+// The numbers of sample i of step s do not depend on how the batch is cut.
+void Trainer::draw_eps(Lane& lane) const {
   const RandomStream random(settings_.seed, kEpsStream);
-  auto counter = static_cast<std::uint64_t>(step_) * kGroups * static_cast<std::uint64_t>(eps_[0].size());
-  for (Tensor& eps : eps_) {
-    for (real& e : eps.values()) e = static_cast<real>(random.normal(counter++));
+  const auto latent = static_cast<std::uint64_t>(settings_.model.latent);
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    real* eps = lane.eps[g].data();
+    for (Dim n = 0; n < lane.eps[g].dim(0); ++n) {
+      const std::uint64_t sample =
+          static_cast<std::uint64_t>(step_) * indices_.size() + static_cast<std::uint64_t>(lane.first + n);
+      for (std::uint64_t i = 0; i < latent; ++i) {
+        *eps++ = static_cast<real>(random.normal((sample * kGroups + g) * latent + i));
+      }
+    }
   }
+}
+
+// Forward, loss, backward of one lane, each term weighted by its share of the batch.
+void Trainer::run_lane(Lane& lane) const {
+  fill(lane);
+  draw_eps(lane);
+  for (const Parameter& p : lane.model.parameters()) Variable(p.value).mutable_grad().fill(0);
+  const SuperTac::Output output = lane.model.forward(lane.windows, lane.eps);
+  const Loss loss = supertac_loss(output, lane.truth, settings_.loss);
+  const double share = static_cast<double>(lane.windows.dim(0)) / static_cast<double>(indices_.size());
+  const Tensor& pictures = output.image.value();
+  lane.terms = {.total = share * loss.total.item(),
+                .reconstruction = share * loss.reconstruction.item(),
+                .kld = share * loss.kld.item(),
+                .l2 = share * loss.l2.item(),
+                .ssim = share * loss.ssim.item()};
+  lane.picture_sum = kernels::sum(pictures.size(), pictures.data());
+  lane.picture_squares = kernels::sum_of_squares(pictures.size(), pictures.data());
+  lane.truth_sum = kernels::sum(lane.truth.size(), lane.truth.data());
+  lane.truth_squares = kernels::sum_of_squares(lane.truth.size(), lane.truth.data());
+  if (std::isfinite(lane.terms.total)) backward(scale(loss.total, static_cast<real>(share)));
 }
 
 StepReport Trainer::train_step() {
   if (done())
     throw std::invalid_argument("train_step: all " + std::to_string(total_steps_) + " steps are done");
-  fill_batch();
-  draw_eps();
-  const SuperTac::Output output = model_.forward(windows_, eps_);
-  const Loss loss = supertac_loss(output, truth_, settings_.loss);
-  StepReport report{.step = step_ + 1,
-                    .total = loss.total.item(),
-                    .reconstruction = loss.reconstruction.item(),
-                    .kld = loss.kld.item(),
-                    .l2 = loss.l2.item(),
-                    .ssim = loss.ssim.item(),
-                    .learning_rate = schedule_.at(step_)};
-  if (!std::isfinite(report.total)) {
-    stop("the loss is " + format(report.total) + " (reconstruction " + format(report.reconstruction) +
-         ", KLD " + format(report.kld) + ", L2 " + format(report.l2) + ", SSIM " + format(report.ssim) + ")");
+  const auto per_epoch = static_cast<std::uint64_t>(steps_per_epoch());
+  batching_.batch(static_cast<std::uint64_t>(step_) / per_epoch,
+                  static_cast<std::uint64_t>(step_) % per_epoch, indices_);
+#pragma omp parallel for schedule(static, 1)
+  for (std::size_t i = 0; i < lanes_.size(); ++i) {
+    try {
+      run_lane(lanes_[i]);
+    } catch (...) {  // an exception must not leave a thread
+      lanes_[i].error = std::current_exception();
+    }
   }
-  report.collapsed = collapsed(output.image.value());
-  adam_.zero_grad();
-  backward(loss.total);
+  StepReport report{.step = step_ + 1, .learning_rate = schedule_.at(step_)};
+  for (Lane& lane : lanes_) {
+    if (lane.error) std::rethrow_exception(std::exchange(lane.error, nullptr));
+    report.total += lane.terms.total;
+    report.reconstruction += lane.terms.reconstruction;
+    report.kld += lane.terms.kld;
+    report.l2 += lane.terms.l2;
+    report.ssim += lane.terms.ssim;
+  }
+  check_finite(report);
+  report.collapsed = collapsed();
+  add_gradients();
   adam_.set_learning_rate(report.learning_rate);
   report.gradient_norm = adam_.step();
   if (!std::isfinite(report.gradient_norm)) {
@@ -155,8 +205,35 @@ StepReport Trainer::train_step() {
   return report;
 }
 
-bool Trainer::collapsed(const Tensor& pictures) {
-  const bool flat = standard_deviation(pictures) < kFlatShare * standard_deviation(truth_);
+void Trainer::add_gradients() {
+  adam_.zero_grad();
+  const std::vector<Parameter>& parameters = model_.parameters();
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    Variable parameter = parameters[i].value;
+    for (const Lane& lane : lanes_) {
+      const Tensor& part = lane.model.parameters()[i].value.grad();
+      kernels::add_scaled(part.size(), 1, part.data(), parameter.mutable_grad().data());
+    }
+  }
+}
+
+void Trainer::check_finite(const StepReport& r) const {
+  if (std::isfinite(r.total)) return;
+  stop("the loss is " + format(r.total) + " (reconstruction " + format(r.reconstruction) + ", KLD " +
+       format(r.kld) + ", L2 " + format(r.l2) + ", SSIM " + format(r.ssim) + ")");
+}
+
+bool Trainer::collapsed() {
+  double sum = 0, squares = 0, truth_sum = 0, truth_squares = 0, n = 0;
+  for (const Lane& lane : lanes_) {
+    sum += lane.picture_sum;
+    squares += lane.picture_squares;
+    truth_sum += lane.truth_sum;
+    truth_squares += lane.truth_squares;
+    n += static_cast<double>(lane.truth.size());
+  }
+  const bool flat =
+      standard_deviation(sum, squares, n) < kFlatShare * standard_deviation(truth_sum, truth_squares, n);
   flat_steps_ = flat ? flat_steps_ + 1 : 0;
   return flat_steps_ >= kFlatStepsToReport;
 }

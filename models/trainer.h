@@ -4,9 +4,14 @@
 //   while (!trainer.done()) report(trainer.train_step());
 //
 // Every random choice is a function of (seed, step), so that a restored trainer continues to the same bits.
+//
+// A batch is cut into lanes, at most four, whatever the number of threads. Each lane runs the whole forward
+// and backward pass on its share, on one thread, with gradients of its own; these are added in the order of
+// the lanes. So threads meet once per step, and which of them ran a lane changes no bit.
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -76,9 +81,22 @@ class Trainer {
   void restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata);
 
  private:
-  void fill_batch();
-  void draw_eps();
-  bool collapsed(const Tensor& pictures);
+  struct Lane {
+    Lane(const SuperTac& master, Dim first, Dim count);
+    Dim first;       // its share of the batch: samples first .. first + windows.dim(0)
+    SuperTac model;  // the master's values under gradients of its own
+    Tensor windows, truth;
+    std::array<Tensor, kGroups> eps;
+    StepReport terms;
+    double picture_sum = 0, picture_squares = 0, truth_sum = 0, truth_squares = 0;
+    std::exception_ptr error;
+  };
+  void run_lane(Lane& lane) const;
+  void fill(Lane& lane) const;
+  void draw_eps(Lane& lane) const;
+  void add_gradients();
+  bool collapsed();
+  void check_finite(const StepReport& report) const;
   [[noreturn]] void stop(const std::string& what) const;
 
   const WindowSet& data_;
@@ -89,9 +107,8 @@ class Trainer {
   Schedule schedule_;
   std::int64_t step_ = 0, total_steps_ = 0;
   int flat_steps_ = 0;
-  std::vector<std::uint32_t> indices_;
-  Tensor windows_, truth_;
-  std::array<Tensor, kGroups> eps_;
+  std::vector<std::uint32_t> indices_;  // of the batch
+  std::vector<Lane> lanes_;
 };
 
 }  // namespace supertac

@@ -8,9 +8,6 @@
 namespace supertac::kernels {
 namespace {
 
-// Below this many multiply-adds a second thread costs more than it brings.
-constexpr Dim kWorthThreads = Dim{1} << 18;
-constexpr Dim kRowsPerTask = 16;
 constexpr Dim kRowsPerPiece = 256;  // a sum over pixels runs over this many before it is added to the total
 
 // [taps][cin][cout] -> [taps][cout][cin]
@@ -25,21 +22,9 @@ Tensor transposed_weights(const real* w, Dim taps, Dim cin, Dim cout) {
   return out;
 }
 
-void gather_batch(const GatherJob& job, Dim images, Dim in_pixels, Dim out_pixels, Dim taps, const real* x,
-                  real* y) {
+void gather_batch(const GatherJob& job, Dim images, Dim in_pixels, Dim out_pixels, const real* x, real* y) {
   const auto gather = isa_kernels().gather;
-  const Dim work = images * out_pixels * taps * job.cin * job.cout;
-#pragma omp parallel for schedule(static) if (images > 1 && work > kWorthThreads)
   for (Dim n = 0; n < images; ++n) gather(job, x + n * in_pixels * job.cin, y + n * out_pixels * job.cout);
-}
-
-void gather_rows_batch(const GatherJob& job, Dim rows, const real* x, real* y) {
-  const auto gather_rows = isa_kernels().gather_rows;
-#pragma omp parallel for schedule(static) if (rows > kRowsPerTask && \
-                                              rows * job.cin * job.cout > kWorthThreads)
-  for (Dim row = 0; row < rows; row += kRowsPerTask) {
-    gather_rows(job, x + row * job.cin, y + row * job.cout, std::min(kRowsPerTask, rows - row));
-  }
 }
 
 }  // namespace
@@ -47,26 +32,22 @@ void gather_rows_batch(const GatherJob& job, Dim rows, const real* x, real* y) {
 void conv(const ConvSizes& s, const real* x, const real* w, const real* bias, real* y) {
   if (is_narrow(s)) return narrow_conv(s, x, w, bias, y);
   const GatherJob job{&s.geometry->forward, w, bias, s.cin, s.cout, false};
-  gather_batch(job, s.images, s.geometry->in_pixels, s.geometry->out_pixels, s.geometry->taps, x, y);
+  gather_batch(job, s.images, s.geometry->in_pixels, s.geometry->out_pixels, x, y);
 }
 
 void conv_grad_x(const ConvSizes& s, const real* gy, const real* w, real* gx) {
   if (is_narrow(s)) return narrow_grad_x(s, gy, w, gx);
   const Tensor wt = transposed_weights(w, s.geometry->taps, s.cin, s.cout);
   const GatherJob job{&s.geometry->backward, wt.data(), nullptr, s.cout, s.cin, true};
-  gather_batch(job, s.images, s.geometry->out_pixels, s.geometry->in_pixels, s.geometry->taps, gy, gx);
+  gather_batch(job, s.images, s.geometry->out_pixels, s.geometry->in_pixels, gy, gx);
 }
 
 void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, real* gw) {
   if (is_narrow(s)) return narrow_grad_w(s, x, gy, gw);
   const auto outer = isa_kernels().outer;
   const Geometry& g = *s.geometry;
-  const Dim blocks = (s.cin + kOuterRows - 1) / kOuterRows;
   const Dim chunk = std::max<Dim>(1, kRowsPerPiece / g.out_pixels);
-  const Dim work = s.images * g.out_pixels * g.taps * s.cin * s.cout;
-#pragma omp parallel for schedule(static) if (work > kWorthThreads)
-  for (Dim task = 0; task < g.taps * blocks; ++task) {
-    const Dim tap = task / blocks;
+  for (Dim tap = 0; tap < g.taps; ++tap) {
     const OuterJob job{&g.pairs[static_cast<std::size_t>(tap)],
                        x,
                        gy,
@@ -77,24 +58,23 @@ void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, real* gw) {
                        s.cin,
                        s.cout,
                        chunk};
-    outer(job, task % blocks * kOuterRows);
+    for (Dim row = 0; row < s.cin; row += kOuterRows) outer(job, row);
   }
 }
 
 void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real* y) {
-  gather_rows_batch({nullptr, w, bias, cin, cout, false}, rows, x, y);
+  isa_kernels().gather_rows({nullptr, w, bias, cin, cout, false}, x, y, rows);
 }
 
 void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, real* gx) {
   const Tensor wt = transposed_weights(w, 1, cin, cout);
-  gather_rows_batch({nullptr, wt.data(), nullptr, cout, cin, true}, rows, gy, gx);
+  isa_kernels().gather_rows({nullptr, wt.data(), nullptr, cout, cin, true}, gy, gx, rows);
 }
 
 void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, real* gw) {
   static const TapPairs kOnePixel{{0}, {0}};
   const auto outer = isa_kernels().outer;
   const OuterJob job{&kOnePixel, x, gy, gw, rows, 1, 1, cin, cout, kRowsPerPiece};
-#pragma omp parallel for schedule(static) if (rows * cin * cout > kWorthThreads)
   for (Dim row = 0; row < cin; row += kOuterRows) outer(job, row);
 }
 

@@ -1,6 +1,6 @@
 #include "autograd/kernels/narrow.h"
 
-#include "autograd/kernels/parallel.h"
+#include <algorithm>
 
 namespace supertac::kernels {
 namespace {
@@ -20,24 +20,17 @@ Tensor with_taps_inside(const ConvSizes& s, const real* w) {
   return out;
 }
 
-// Calls f(image, tap's offset in a row of z, input pixel, output pixel) for all pairs; images may run in
-// parallel.
+// Calls f(image, tap's offset in a row of z, input pixel, output pixel) for all pairs.
 template <class F>
 void for_each_pair(const ConvSizes& s, F f) {
   const Geometry& g = *s.geometry;
-  const Dim piece = std::max<Dim>(1, kPieceElements / (g.taps * g.out_pixels));
-  for_pieces(
-      s.images,
-      [&](Dim begin, Dim end) {
-        for (Dim n = begin; n < end; ++n) {
-          for (Dim t = 0; t < g.taps; ++t) {
-            const TapPairs& pairs = g.pairs[static_cast<std::size_t>(t)];
-            for (std::size_t i = 0; i < pairs.inputs.size(); ++i)
-              f(n, t * s.cout, pairs.inputs[i], pairs.outputs[i]);
-          }
-        }
-      },
-      piece);
+  for (Dim n = 0; n < s.images; ++n) {
+    for (Dim t = 0; t < g.taps; ++t) {
+      const TapPairs& pairs = g.pairs[static_cast<std::size_t>(t)];
+      for (std::size_t i = 0; i < pairs.inputs.size(); ++i)
+        f(n, t * s.cout, pairs.inputs[i], pairs.outputs[i]);
+    }
+  }
 }
 
 // gz[p, t, o] = gy[q, o] where tap t joins p and q, else 0
@@ -62,11 +55,9 @@ void narrow_conv(const ConvSizes& s, const real* x, const real* w, const real* b
   const Tensor inside = with_taps_inside(s, w);
   Tensor z(Shape{s.images, g.in_pixels, columns_of(s)});
   linear(s.images * g.in_pixels, s.cin, columns_of(s), x, inside.data(), nullptr, z.data());
-  for_pieces(s.images * g.out_pixels, [=](Dim begin, Dim end) {
-    for (Dim i = begin; i < end; ++i) {
-      for (Dim o = 0; o < s.cout; ++o) y[i * s.cout + o] = bias != nullptr ? bias[o] : 0;
-    }
-  });
+  for (Dim i = 0; i < s.images * g.out_pixels; ++i) {
+    for (Dim o = 0; o < s.cout; ++o) y[i * s.cout + o] = bias != nullptr ? bias[o] : 0;
+  }
   const real* from = z.data();
   for_each_pair(s, [&, from](Dim n, Dim tap, Dim p, Dim q) {
     const real* part = from + (n * g.in_pixels + p) * columns_of(s) + tap;

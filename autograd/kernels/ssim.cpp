@@ -1,9 +1,11 @@
 #include "autograd/kernels/ssim.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "autograd/kernels/parallel.h"
+#include "autograd/kernels/sums.h"
+#include "autograd/pool.h"
 
 namespace supertac::kernels {
 namespace {
@@ -86,7 +88,7 @@ class SsimImage {
 
   real centre(const real* x, real* to) const {
     const auto mean =
-        static_cast<real>(sum_lanes(0, h_ * wd_, [x](Dim i) { return static_cast<double>(x[i]); }) /
+        static_cast<real>(sum_lanes(h_ * wd_, [x](Dim i) { return static_cast<double>(x[i]); }) /
                           static_cast<double>(h_ * wd_));
     for (Dim i = 0; i < h_ * wd_; ++i) to[i] = x[i] - mean;
     return mean;
@@ -146,15 +148,9 @@ class SsimImage {
 double ssim(const ImageSizes& s, const real* x, const real* target) {
   const Window window = window_for(s.height, s.width);
   const Dim pixels = s.height * s.width;
-  const double total = sum_pieces(
-      s.images,
-      [&](Dim begin, Dim end) {
-        SsimImage image(window, s.height, s.width);
-        double part = 0;
-        for (Dim n = begin; n < end; ++n) part += image.run(x + n * pixels, target + n * pixels, 0, nullptr);
-        return part;
-      },
-      4);
+  SsimImage image(window, s.height, s.width);
+  double total = 0;
+  for (Dim n = 0; n < s.images; ++n) total += image.run(x + n * pixels, target + n * pixels, 0, nullptr);
   return total / static_cast<double>(s.images);
 }
 
@@ -162,14 +158,8 @@ void ssim_grad(const ImageSizes& s, real g, const real* x, const real* target, r
   const Window window = window_for(s.height, s.width);
   const Dim pixels = s.height * s.width;
   const real each = g / static_cast<real>(s.images);
-  for_pieces(
-      s.images,
-      [&](Dim begin, Dim end) {
-        SsimImage image(window, s.height, s.width);
-        for (Dim n = begin; n < end; ++n)
-          image.run(x + n * pixels, target + n * pixels, each, gx + n * pixels);
-      },
-      4);
+  SsimImage image(window, s.height, s.width);
+  for (Dim n = 0; n < s.images; ++n) image.run(x + n * pixels, target + n * pixels, each, gx + n * pixels);
 }
 
 }  // namespace supertac::kernels

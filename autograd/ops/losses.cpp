@@ -4,11 +4,21 @@
 #include <cmath>
 
 #include "autograd/checks.h"
+#include "autograd/kernels/clones.h"
 #include "autograd/kernels/exp.h"
-#include "autograd/kernels/parallel.h"
 #include "autograd/kernels/ssim.h"
+#include "autograd/kernels/sums.h"
 
 namespace supertac {
+namespace {
+
+// g += factor (a - b)
+SUPERTAC_CLONES void add_scaled_difference(Dim n, real factor, const real* a, const real* b,
+                                           real* __restrict g) {
+  for (Dim i = 0; i < n; ++i) g[i] += factor * (a[i] - b[i]);
+}
+
+}  // namespace
 
 // gx = 2 g (x - target) / n,  gtarget = -gx
 Variable l2_loss(const Variable& x, const Variable& target) {
@@ -16,24 +26,17 @@ Variable l2_loss(const Variable& x, const Variable& target) {
   const Dim n = x.size();
   if (n == 0) refuse("l2_loss", "x is empty: " + x.shape().text());
   const real *a = x.value().data(), *t = target.value().data();
-  const double total = kernels::sum_pieces(n, [=](Dim begin, Dim end) {
-    return kernels::sum_lanes(begin, end, [=](Dim i) {
-      const double d = static_cast<double>(a[i]) - static_cast<double>(t[i]);
-      return d * d;
-    });
+  const double total = kernels::sum_lanes(n, [=](Dim i) {
+    const double d = static_cast<double>(a[i]) - static_cast<double>(t[i]);
+    return d * d;
   });
   const auto value = static_cast<real>(total / static_cast<double>(n));
   return record("l2_loss", Tensor::full({}, value), {&x, &target}, [n](Backward& b) {
     const real g = 2 * b.gy().item() / static_cast<real>(n);
     const real *from = b.value(0).data(), *to = b.value(1).data();
     Tensor *gx = b.grad_of(0), *gt = b.grad_of(1);
-    real *px = gx ? gx->data() : nullptr, *pt = gt ? gt->data() : nullptr;
-    kernels::for_pieces(n, [=](Dim begin, Dim end) {
-      if (px)
-        for (Dim i = begin; i < end; ++i) px[i] += g * (from[i] - to[i]);
-      if (pt)
-        for (Dim i = begin; i < end; ++i) pt[i] -= g * (from[i] - to[i]);
-    });
+    if (gx) add_scaled_difference(n, g, from, to, gx->data());
+    if (gt) add_scaled_difference(n, g, to, from, gt->data());
   });
 }
 

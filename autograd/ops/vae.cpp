@@ -2,7 +2,7 @@
 
 #include "autograd/checks.h"
 #include "autograd/kernels/exp.h"
-#include "autograd/kernels/parallel.h"
+#include "autograd/kernels/sums.h"
 
 namespace supertac {
 
@@ -35,7 +35,7 @@ Variable kl_divergence(const Variable& mean, const Variable& log_var) {
   const Dim n = mean.dim(0);
   if (n == 0) refuse("kl_divergence", "mean is empty: " + mean.shape().text());
   const real *m = mean.value().data(), *lv = log_var.value().data();
-  const double total = kernels::sum_lanes(0, mean.size(), [=](Dim i) {
+  const double total = kernels::sum_lanes(mean.size(), [=](Dim i) {
     return static_cast<double>(1 + lv[i] - m[i] * m[i] - exp_same_bits(lv[i]));
   });
   const auto value = static_cast<real>(-0.5 * total / static_cast<double>(n));
