@@ -1,0 +1,154 @@
+// supertac-train and supertac-evaluate as processes: same bits, exact resume, bad input.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "io/file.h"
+#include "io/json.h"
+#include "io/safetensors.h"
+#include "tests/apps/process.h"
+
+namespace supertac {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Training : public testing::Test {
+ protected:
+  // One small simulated data set for all tests of this program.
+  static void SetUpTestSuite() {
+    std::string pattern = (fs::temp_directory_path() / "supertac_training_XXXXXX").string();
+    root_ = ::mkdtemp(pattern.data());
+    const ProcessResult made =
+        run_process("supertac-simulate",
+                    {"--out", root_ + "/data", "--plates", "3_Bumps", "--speeds", "10", "--passes", "1"});
+    ASSERT_EQ(made.code, 0) << made.error;
+  }
+  static void TearDownTestSuite() { fs::remove_all(root_); }
+
+  static std::string path(const std::string& name) { return root_ + "/" + name; }
+  static std::string bytes(const std::string& name) { return read_text_file(path(name), 1 << 26); }
+
+  static std::vector<std::string> options(const std::string& out, std::vector<std::string> more = {}) {
+    std::vector<std::string> all{"--data",   path("data"), "--out",    path(out), "--timesteps", "32",
+                                 "--latent", "3",          "--scale",  "2",       "--batch",     "8",
+                                 "--stride", "8",          "--epochs", "2"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+  static ProcessResult train(const std::string& out, std::vector<std::string> more = {}) {
+    return run_process("supertac-train", options(out, std::move(more)));
+  }
+
+  static std::string root_;
+};
+std::string Training::root_;
+
+TEST_F(Training, SameBytesForOneAndTwoThreads) {
+  ASSERT_EQ(train("one.safetensors", {"--threads", "1"}).code, 0);
+  ASSERT_EQ(train("two.safetensors", {"--threads", "2"}).code, 0);
+  EXPECT_TRUE(bytes("one.safetensors") == bytes("two.safetensors"));
+}
+
+TEST_F(Training, InterruptedAndResumedGivesTheSameBytes) {
+  const std::vector<std::string> longer{"--epochs", "12", "--threads", "1"};
+  std::vector<std::string> base{
+      "--data",  path("data"), "--timesteps", "32", "--latent",           "3", "--scale", "2",
+      "--batch", "8",          "--stride",    "8",  "--checkpoint-every", "5"};
+  const auto run = [&](const std::string& out, std::vector<std::string> more,
+                       const ProcessOptions& how = {}) {
+    std::vector<std::string> all = base;
+    all.insert(all.end(), {"--out", path(out)});
+    all.insert(all.end(), longer.begin(), longer.end());
+    all.insert(all.end(), more.begin(), more.end());
+    return run_process("supertac-train", all, how);
+  };
+  ASSERT_EQ(run("whole.safetensors", {}).code, 0);
+  for (const int signal : {SIGINT, SIGTERM, SIGKILL}) {
+    const std::string name = "cut" + std::to_string(signal);
+    const std::string state = path(name + ".run/last.safetensors");
+    const ProcessResult cut = run(name + ".safetensors", {}, {.signal = signal, .signal_when = state});
+    EXPECT_EQ(cut.code, 128 + signal) << cut.error;
+    EXPECT_FALSE(fs::exists(path(name + ".safetensors")));
+    const ProcessResult resumed = run(name + ".safetensors", {"--resume", state});
+    ASSERT_EQ(resumed.code, 0) << resumed.error;
+    EXPECT_TRUE(bytes("whole.safetensors") == bytes(name + ".safetensors")) << "signal " << signal;
+  }
+}
+
+TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
+  ASSERT_EQ(train("scored.safetensors").code, 0);
+  const ProcessResult result = run_process(
+      "supertac-evaluate",
+      {"--model", path("scored.safetensors"), "--data", path("data"), "--json", path("scores.json"),
+       "--outputs", path("outputs.safetensors"), "--limit", "40", "--pictures", path("pictures")});
+  ASSERT_EQ(result.code, 0) << result.error;
+  const auto json = parse_json_limited(bytes("scores.json"));
+  for (const auto* scores : {&json, &json["baselines"]["mean_image"], &json["baselines"]["nearest"],
+                             &json["baselines"]["bicubic"]}) {
+    for (const char* part : {"all", "contact"}) {
+      for (const char* key : {"windows", "psnr_mean_db", "psnr_pooled_db", "ssim", "phase_correlation",
+                              "phase_correlation_floor", "position_error_px", "position_error_mm"}) {
+        EXPECT_TRUE((*scores)[part].contains(key)) << part << " " << key;
+      }
+    }
+  }
+  const SafetensorsFile outputs = SafetensorsFile::read(path("outputs.safetensors"));
+  EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<std::uint64_t>{40, 32, 16}));
+  EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<std::uint64_t>{40, 8, 8}));
+  EXPECT_TRUE(fs::exists(path("pictures/strips.png")));
+}
+
+struct Bad {
+  std::vector<std::string> arguments;
+  int code;
+  std::string message;
+};
+
+TEST_F(Training, BadInputIsOneLineAndLeavesNothingBehind) {
+  ASSERT_EQ(train("good.safetensors").code, 0);
+  std::string damaged = bytes("good.safetensors");
+  damaged[damaged.size() / 2] ^= 1;
+  write_file(path("damaged.safetensors"), damaged);
+  write_file(path("cut.safetensors"), std::string_view(damaged).substr(0, 1000));
+  fs::create_directories(path("empty"));
+  const std::string data = path("data"), out = path("never.safetensors"), good = path("good.safetensors");
+  const std::vector<Bad> cases{
+      {{"supertac-train", "--data", data, "--out", out, "--timesteps", "40"}, 2, "multiple of 16"},
+      {{"supertac-train", "--data", data, "--out", out, "--timesteps", "1024"}, 2, "--timesteps"},
+      {{"supertac-train", "--data", data, "--out", out, "--scale", "3"}, 2, "--scale"},
+      {{"supertac-train", "--data", data, "--out", out, "--preset", "huge"}, 2, "--preset"},
+      {{"supertac-train", "--data", data, "--out", out, "--epoch", "3"}, 2, "--epochs"},
+      {{"supertac-train", "--data", data, "--out", out, "--split", "texture"}, 1, "texture"},
+      {{"supertac-train", "--data", path("empty"), "--out", out}, 1, path("empty")},
+      {{"supertac-train", "--data", path("absent"), "--out", out}, 1, path("absent")},
+      {{"supertac-train", "--data", data, "--out", good}, 1, "--force"},
+      {{"supertac-train", "--data", data, "--out", path("absent/x.safetensors"), "--epochs", "1", "--stride",
+        "200", "--batch", "2", "--timesteps", "32", "--plates", "6_Bumps"},
+       1,
+       "6_Bumps"},
+      {{"supertac-train", "--data", data, "--out", out, "--resume", good}, 1, "cannot resume"},
+      {{"supertac-evaluate", "--model", path("damaged.safetensors"), "--data", data},
+       1,
+       "damaged.safetensors"},
+      {{"supertac-evaluate", "--model", path("cut.safetensors"), "--data", data}, 1, "cut.safetensors"},
+      {{"supertac-evaluate", "--model", path("absent"), "--data", data}, 1, "absent"},
+      {{"supertac-evaluate", "--model", good}, 2, "--data"},
+  };
+  for (const Bad& bad : cases) {
+    const ProcessResult result = run_process(
+        bad.arguments[0], std::vector<std::string>(bad.arguments.begin() + 1, bad.arguments.end()));
+    std::string line;
+    for (const std::string& word : bad.arguments) line += word + " ";
+    EXPECT_EQ(result.code, bad.code) << line << result.error;
+    EXPECT_NE(result.error.find(bad.message), std::string::npos) << line << result.error;
+    EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << line << result.error;
+  }
+  EXPECT_FALSE(fs::exists(path("never.safetensors")));
+  EXPECT_FALSE(fs::exists(path("never.run")));
+  EXPECT_EQ(bytes("damaged.safetensors"), damaged);
+}
+
+}  // namespace
+}  // namespace supertac
