@@ -28,7 +28,7 @@ void Printer::home() {
   link_.command("G1 Z10.000 F300");  // relative: wherever z is, first away from the plate
   link_.command("G90");
   link_.command("G28", kHomeDeadline);
-  target_ = queue_position();
+  target_ = agreed_position();
   origin_ = Origin::homed;
   const double missing = settings_.limits.clearance_z - target_.z;
   if (missing > 0) lift(missing);
@@ -103,6 +103,17 @@ Point3 Printer::queue_position() {
                       ": expected a position from M114, found none in 5 answers");
 }
 
+Point3 Printer::agreed_position() {
+  Point3 before = queue_position();
+  for (int attempt = 0; attempt < 6; ++attempt) {
+    const Point3 now = queue_position();
+    if (distance(before, now) < 0.005) return now;
+    before = now;
+  }
+  throw PositionError("printer " + link_.port().name() +
+                      ": expected two equal positions in a row, found none in 7 answers; check the cable");
+}
+
 bool Printer::stands_still() {
   Point3 before;
   int same = 0;
@@ -128,7 +139,7 @@ Printer::Stop Printer::quick_stop() {
     // The position of the queue is that of the head only once nothing moves any more.
     link_.command("M400",
                   stop.ahead_of_queue ? settings_.stop_deadline_s : 1.5 * expected_seconds_ + kMoveMargin);
-    target_ = queue_position();
+    target_ = agreed_position();
     expected_seconds_ = 0;
   } catch (const PrinterHalted&) {
     stop.confirmed = true;
@@ -163,7 +174,7 @@ Printer::Stop Printer::emergency_stop() {
 }
 
 void Printer::lift(double mm, double speed_mm_s) {
-  const Point3 here = queue_position();
+  const Point3 here = agreed_position();
   Point3 above = here;
   above.z = std::min(here.z + mm, settings_.limits.high.z);
   // Not through start_move(): a lift is the way out of a position that the limits forbid.

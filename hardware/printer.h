@@ -59,6 +59,9 @@ class Printer {
   /// M114: the end of the queue, which is the head's position only after M400.
   Point3 queue_position();
 
+  /// M114 until two answers in a row agree: a lost digit must never become a target. Throws PositionError.
+  Point3 agreed_position();
+
   /// M410: stops where it is. Never throws for a firmware that does not answer; says so in the result.
   Stop quick_stop();
   /// M112: kills the firmware; afterwards only a reset helps.

@@ -130,6 +130,19 @@ TEST(Printer, SaysSoWithoutEmergencyParser) {
   EXPECT_NE(stop.text.find("no emergency parser"), std::string::npos);
 }
 
+TEST(Printer, ADamagedPositionNeverLowersTheFinger) {
+  SimulatedRig rig(running_rig());
+  Tampering port(rig.printer_port());
+  Printer printer(port);
+  printer.connect();
+  printer.confirm_origin({99.7, 101.17, 131.81});
+  port.from_printer = {{"Z:131.81", "Z:11.81"}};  // a lost digit
+  printer.lift(5);
+  EXPECT_TRUE(port.from_printer.empty());
+  EXPECT_NEAR(rig.world().printer().head(rig.now()).z, 136.81, 1e-6);
+  EXPECT_EQ(moves_of(rig.world().printer()).size(), 1U);
+}
+
 TEST(Printer, EmergencyStopIsConfirmedByTheHalt) {
   PrinterBench bench;
   bench.printer.confirm_origin(kMounted);

@@ -3,8 +3,13 @@
 
 #include <stdlib.h>
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
+#include <memory>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "hardware/board_frame.h"
@@ -51,6 +56,47 @@ inline RigSettings running_rig() {
   settings.printer_running = true;
   return settings;
 }
+
+/// Damages the bytes from or to the printer once: the first occurrence of `find` becomes `replace`.
+class Tampering : public Port {
+ public:
+  explicit Tampering(std::unique_ptr<Port> inner) : inner_(std::move(inner)) {}
+  const std::string& name() const override { return inner_->name(); }
+  double now() override { return inner_->now(); }
+  Received read(std::span<std::byte> buffer, double until) override {
+    if (held_.empty()) {
+      std::array<std::byte, 1024> raw{};
+      const Received got = inner_->read(raw, until);
+      if (got.count == 0) return got;
+      held_.assign(reinterpret_cast<const char*>(raw.data()), got.count);
+      tamper(held_, from_printer);
+      time_ = got.time_s;
+    }
+    const std::size_t count = std::min(buffer.size(), held_.size());
+    std::copy_n(std::as_bytes(std::span(held_)).begin(), count, buffer.begin());
+    held_.erase(0, count);
+    return {count, time_};
+  }
+  double write(std::span<const std::byte> bytes, double until) override {
+    std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    tamper(text, to_printer);
+    return inner_->write(std::as_bytes(std::span(text)), until);
+  }
+  using Change = std::pair<std::string, std::string>;
+  std::vector<Change> from_printer, to_printer;
+
+ private:
+  static void tamper(std::string& text, std::vector<Change>& changes) {
+    if (changes.empty()) return;
+    const std::size_t at = text.find(changes.front().first);
+    if (at == std::string::npos) return;
+    text.replace(at, changes.front().first.size(), changes.front().second);
+    changes.erase(changes.begin());
+  }
+  std::unique_ptr<Port> inner_;
+  std::string held_;
+  double time_ = 0;
+};
 
 /// Motion commands among those that ran.
 inline std::vector<std::string> moves_of(const VirtualPrinter& printer) {
