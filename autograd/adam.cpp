@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -53,8 +54,12 @@ double Adam::step() {
   for (const Variable& p : parameters_) squares += kernels::sum_of_squares(p.size(), p.grad().data());
   const double norm = std::sqrt(squares);
   if (!std::isfinite(norm)) return norm;
-  ++steps_;
   const double factor = options_.clip_norm > 0 && norm > options_.clip_norm ? options_.clip_norm / norm : 1;
+  // An infinite second moment would stop its parameter for ever.
+  if (!std::isfinite(static_cast<real>(factor * factor * squares))) {
+    return std::numeric_limits<double>::infinity();
+  }
+  ++steps_;
   const double t = static_cast<double>(steps_);
   const Update u{static_cast<real>(factor),
                  static_cast<real>(options_.beta1),

@@ -25,7 +25,8 @@ class Adam {
   /// Sets every gradient to zero; call it before backward().
   void zero_grad();
   /// m = b1 m + (1-b1) g;  v = b2 v + (1-b2) g^2;  x -= lr (m / (1-b1^t)) / (sqrt(v / (1-b2^t)) + epsilon).
-  /// Returns the gradient's norm before clipping. When it is not finite nothing is changed: check it.
+  /// Returns the gradient's norm before clipping, infinity when the square of the clipped one overflows
+  /// `real`. When it is not finite nothing is changed: check it.
   double step();
   void set_learning_rate(double rate) { options_.learning_rate = rate; }
 

@@ -74,7 +74,9 @@ void release(Node* node) noexcept {
 
 using detail::Node;
 
-Variable::Variable(Tensor value, bool requires_grad) : node_(detail::new_node()) {
+Variable::Variable(Tensor value, bool requires_grad) {
+  if (!value.defined()) throw std::invalid_argument("Variable: the tensor is undefined");
+  node_ = detail::new_node();
   node_->value = std::move(value);
   node_->requires_grad = requires_grad;
 }
@@ -113,6 +115,8 @@ Variable make_result(const char* op, Tensor y, std::span<const Variable* const> 
                                 " inputs, got " + std::to_string(inputs.size()));
   }
   node.requires_grad = true;
+  // An input may come from a thread that has counted further.
+  for (const Variable* x : inputs) detail::last_number = std::max(detail::last_number, x->node_->number);
   node.number = ++detail::last_number;
   for (const Variable* x : inputs) {
     detail::retain(x->node_);
@@ -172,8 +176,10 @@ void visit(Node& node, std::vector<Node*>& queue, Node*& dead) {
 void backward(const Variable& loss) {
   check_loss(loss);
   thread_local std::vector<Node*> queue;
-  loss.node()->grad = Tensor::full(loss.shape(), 1);
-  if (loss.node()->input_count == 0) return;  // a leaf: dL/dL = 1
+  Tensor& grad = loss.node()->grad;
+  if (!grad.defined()) grad = Tensor::zeros(loss.shape());
+  grad.data()[0] += 1;                        // dL/dL
+  if (loss.node()->input_count == 0) return;  // a leaf
   queue.clear();
   queue.push_back(loss.node());
   detail::retain(loss.node());

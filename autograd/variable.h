@@ -63,7 +63,8 @@ void release(Node* node) noexcept;
 class Variable {
  public:
   Variable() = default;
-  /// A leaf. With `requires_grad` backward() accumulates into grad().
+  /// A leaf. With `requires_grad` backward() accumulates into grad(). Throws std::invalid_argument for an
+  /// undefined tensor.
   explicit Variable(Tensor value, bool requires_grad = false);
 
   Variable(const Variable& other) noexcept : node_(other.node_) { detail::retain(node_); }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <utility>
 
 namespace supertac::kernels {
@@ -115,8 +116,10 @@ Geometry build(const ConvSettings& s) {
 }  // namespace
 
 const Geometry& geometry_of(const ConvSettings& settings) {
-  thread_local std::map<ConvSettings, std::unique_ptr<Geometry>>
-      known;  // one per thread: no lock on the hot path
+  // Never destroyed: a graph refers to its geometries and may outlive the thread that made it.
+  static auto& known = *new std::map<ConvSettings, std::unique_ptr<Geometry>>;
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);  // once for each convolution of a forward pass
   std::unique_ptr<Geometry>& geometry = known[settings];
   if (geometry == nullptr) geometry = std::make_unique<Geometry>(build(settings));
   return *geometry;

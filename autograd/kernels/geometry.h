@@ -48,7 +48,7 @@ struct Geometry {
   std::vector<TapPairs> pairs;  // [taps]: the gradient of w
 };
 
-/// The table of these settings, built at first use and kept for the thread's life.
+/// The table of these settings, built at first use and kept. Any thread may call it.
 const Geometry& geometry_of(const ConvSettings& settings);
 
 }  // namespace supertac::kernels

@@ -49,9 +49,12 @@ inline void gather_tile(const GatherJob& job, const std::int32_t* taps, Dim tap_
       }
     }
   }
+  // + 0 turns -0 into +0: a sum of -0 changes its sign where 0 * w is added for a tap in the padding, and not
+  // where the tap is skipped, which depends on how many pixels share a tile.
   for (int p = 0; p < P; ++p) {
     real* to = y + outputs[p] * job.cout + channel;
     for (int j = 0; j < J; ++j) {
+      acc[p][j] = Vec::add(acc[p][j], Vec::broadcast(0));
       if (kPartial && j == J - 1) {
         acc[p][j].store_part(to + j * Vec::kLanes, lanes);
       } else {
