@@ -1,0 +1,86 @@
+// What the tests of ops share: numbers to feed in, and one-line checks of values, gradients and messages.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <initializer_list>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "autograd/gradient_checker.h"
+#include "autograd/tensor.h"
+#include "autograd/variable.h"
+
+namespace supertac::test {
+
+/// What is left of a hand-computed value after rounding.
+inline constexpr double kRounding = sizeof(real) == 4 ? 2e-6 : 1e-14;
+
+/// Irregular numbers in [low, high), a pure function of seed and place (splitmix64).
+inline Tensor numbers(const Shape& shape, std::uint64_t seed = 1, double low = -1, double high = 1) {
+  Tensor t(shape);
+  for (Dim i = 0; i < t.size(); ++i) {
+    std::uint64_t z = (seed << 32) + static_cast<std::uint64_t>(i + 1) * 0x9E3779B97F4A7C15U;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
+    const double unit = static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
+    t.data()[i] = static_cast<real>(low + (high - low) * unit);
+  }
+  return t;
+}
+
+/// The same, but at least .1 from zero, where rectifiers have no derivative.
+inline Tensor numbers_off_zero(const Shape& shape, std::uint64_t seed = 1) {
+  Tensor t = numbers(shape, seed);
+  for (real& x : t.values()) x += static_cast<real>(x < 0 ? -0.1 : 0.1);
+  return t;
+}
+
+inline Variable constant(const Tensor& t) { return Variable(t); }
+inline Variable parameter(const Tensor& t) { return Variable(t, true); }
+
+inline void expect_values(const Tensor& found, const Shape& shape, std::initializer_list<double> expected,
+                          double tolerance = kRounding) {
+  ASSERT_EQ(found.shape().text(), shape.text());
+  ASSERT_EQ(static_cast<std::size_t>(found.size()), expected.size());
+  Dim i = 0;
+  for (const double value : expected) {
+    EXPECT_NEAR(static_cast<double>(found.data()[i]), value, tolerance * std::max(1.0, std::abs(value)))
+        << "element " << i;
+    ++i;
+  }
+}
+
+/// `action` must throw std::invalid_argument with exactly this text.
+inline void expect_refusal(const std::string& text, const std::function<void()>& action) {
+  try {
+    action();
+    ADD_FAILURE() << "accepted, expected: " << text;
+  } catch (const std::invalid_argument& error) {
+    EXPECT_EQ(error.what(), text);
+  }
+}
+
+inline double dot(const Tensor& a, const Tensor& b) {
+  double total = 0;
+  for (Dim i = 0; i < a.size(); ++i) {
+    total += static_cast<double>(a.data()[i]) * static_cast<double>(b.data()[i]);
+  }
+  return total;
+}
+
+#ifdef SUPERTAC_REAL_IS_DOUBLE
+/// The gradient of every input agrees with finite differences to 1e-6.
+inline void expect_gradients(const std::function<Variable(const std::vector<Variable>&)>& f,
+                             const std::vector<Tensor>& inputs, const GradientCheckOptions& options = {}) {
+  const GradientReport report = check_gradients(f, inputs, options);
+  EXPECT_GT(report.entries, 0);
+  EXPECT_LE(report.max_relative_error, 1e-6) << report.text();
+}
+#endif
+
+}  // namespace supertac::test

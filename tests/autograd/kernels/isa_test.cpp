@@ -1,0 +1,157 @@
+// All instruction sets give the same bytes. The tables are called directly, past the choice at run time.
+#include "autograd/kernels/isa.h"
+
+#include <cstring>
+#include <limits>
+
+#include "tests/autograd/check.h"
+
+namespace supertac::kernels {
+namespace {
+
+using test::numbers;
+
+std::vector<const IsaKernels*> available() {
+  std::vector<const IsaKernels*> sets{&kPortableKernels};
+  if (__builtin_cpu_supports("fma")) sets.push_back(&kPortableFmaKernels);
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) sets.push_back(&kAvx2Kernels);
+  if (__builtin_cpu_supports("avx512f")) sets.push_back(&kAvx512Kernels);
+  return sets;
+}
+
+bool same_bytes(const Tensor& a, const Tensor& b) {
+  return std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof(real)) == 0;
+}
+
+const ConvSettings kSettings[] = {
+    {.height = 1, .width = 17, .kernel_w = 3, .stride_w = 2, .padding_w = 1},
+    {.height = 1, .width = 5, .kernel_w = 4, .stride_w = 2, .padding_w = 1, .transposed = true},
+    {.height = 4, .width = 4, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1},
+    {.height = 9,
+     .width = 6,
+     .kernel_h = 3,
+     .kernel_w = 3,
+     .stride_h = 2,
+     .stride_w = 2,
+     .padding_h = 1,
+     .padding_w = 1},
+    {.height = 3,
+     .width = 7,
+     .kernel_h = 4,
+     .kernel_w = 4,
+     .stride_h = 2,
+     .stride_w = 2,
+     .padding_h = 1,
+     .padding_w = 1,
+     .transposed = true},
+    {.height = 1, .width = 1, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1}};
+constexpr Dim kChannels[] = {1, 3, 7, 8, 16, 17, 33, 64, 100};
+
+Tensor gather(const IsaKernels& isa, const std::vector<Phase>& phases, const Tensor& x, const Tensor& w,
+              const Tensor* bias, Tensor y, Dim cin, Dim cout) {
+  isa.gather({&phases, w.data(), bias ? bias->data() : nullptr, cin, cout, bias == nullptr}, x.data(),
+             y.data());
+  return y;
+}
+
+TEST(Isa, GatherForwardAndBackward) {
+  for (const ConvSettings& s : kSettings) {
+    const Geometry& g = geometry_of(s);
+    for (const Dim cin : kChannels) {
+      for (const Dim cout : kChannels) {
+        const Tensor x = numbers({g.in_pixels, cin}), gy = numbers({g.out_pixels, cout}, 2),
+                     bias = numbers({cout}, 3);
+        const Tensor w = numbers({g.taps, cin, cout}, 4), wt = numbers({g.taps, cout, cin}, 5);
+        const Tensor gx = numbers({g.in_pixels, cin}, 6);
+        Tensor first_y, first_gx;
+        for (const IsaKernels* isa : available()) {
+          const Tensor y = gather(*isa, g.forward, x, w, &bias, Tensor({g.out_pixels, cout}), cin, cout);
+          const Tensor grad = gather(*isa, g.backward, gy, wt, nullptr, gx.clone(), cout, cin);
+          if (!first_y.defined()) first_y = y, first_gx = grad;
+          ASSERT_TRUE(same_bytes(y, first_y)) << isa->name << " forward " << cin << " to " << cout;
+          ASSERT_TRUE(same_bytes(grad, first_gx)) << isa->name << " backward " << cin << " to " << cout;
+        }
+      }
+    }
+  }
+}
+
+TEST(Isa, GatherRows) {
+  for (const Dim rows : {1, 3, 6, 8, 16, 31}) {
+    for (const Dim cin : kChannels) {
+      for (const Dim cout : kChannels) {
+        const Tensor x = numbers({rows, cin}), w = numbers({cin, cout}, 2), bias = numbers({cout}, 3);
+        Tensor first;
+        for (const IsaKernels* isa : available()) {
+          Tensor y({rows, cout});
+          isa->gather_rows({nullptr, w.data(), bias.data(), cin, cout, false}, x.data(), y.data(), rows);
+          if (!first.defined()) first = y;
+          ASSERT_TRUE(same_bytes(y, first)) << isa->name << " rows " << rows << ", " << cin << " to " << cout;
+        }
+      }
+    }
+  }
+}
+
+TEST(Isa, Outer) {
+  constexpr Dim kImages = 5;
+  for (const ConvSettings& s : kSettings) {
+    const Geometry& g = geometry_of(s);
+    for (const Dim cin : kChannels) {
+      for (const Dim cout : kChannels) {
+        const Tensor x = numbers({kImages, g.in_pixels, cin}), gy = numbers({kImages, g.out_pixels, cout}, 2);
+        const Tensor start = numbers({cin, cout}, 3);
+        Tensor first;
+        for (const IsaKernels* isa : available()) {
+          Tensor gw = start.clone();
+          for (const TapPairs& pairs : g.pairs) {
+            const OuterJob job{&pairs,      x.data(),     gy.data(), gw.data(), kImages,
+                               g.in_pixels, g.out_pixels, cin,       cout,      2};
+            for (Dim row = 0; row < cin; row += kOuterRows) isa->outer(job, row);
+          }
+          if (!first.defined()) first = gw;
+          ASSERT_TRUE(same_bytes(gw, first)) << isa->name << ' ' << cin << " to " << cout;
+        }
+      }
+    }
+  }
+}
+
+// A sum that is -0 so far stays -0 where a tap is skipped, and becomes +0 where 0 * w is added: which of the
+// two happens depends on the tile's neighbours, hence on the instruction set.
+TEST(Isa, NegativeZeroHasTheSameSignEverywhere) {
+  for (const ConvSettings& s : kSettings) {
+    const Geometry& g = geometry_of(s);
+    for (const Dim cout : {1, 5, 16, 33}) {
+      const Dim cin = 2;
+      const Tensor x = Tensor::full({g.in_pixels, cin}, real(-0.0)), bias = Tensor::full({cout}, real(-0.0));
+      const Tensor w = Tensor::full({g.taps, cin, cout}, 1);
+      Tensor first;
+      for (const IsaKernels* isa : available()) {
+        const Tensor y = gather(*isa, g.forward, x, w, &bias, Tensor({g.out_pixels, cout}), cin, cout);
+        if (!first.defined()) first = y;
+        ASSERT_TRUE(same_bytes(y, first)) << isa->name << " to " << cout;
+      }
+    }
+  }
+}
+
+// Nothing outside [cout] may be written: the last vector is partial.
+TEST(Isa, StaysWithinItsRows) {
+  for (const IsaKernels* isa : available()) {
+    for (const Dim cout : kChannels) {
+      Tensor y = Tensor::full({cout + 40}, 7);
+      const Tensor x = numbers({3}), w = numbers({3, cout}, 2);
+      isa->gather_rows({nullptr, w.data(), nullptr, 3, cout, false}, x.data(), y.data(), 1);
+      for (Dim i = cout; i < cout + 40; ++i) ASSERT_EQ(y.data()[i], 7) << isa->name << ' ' << cout;
+    }
+  }
+}
+
+TEST(Isa, TheChosenSetIsOneOfThem) {
+  const std::string name(isa_kernels().name);
+  EXPECT_TRUE(name == "portable" || name == "avx2" || name == "avx512") << name;
+}
+
+}  // namespace
+}  // namespace supertac::kernels

@@ -1,0 +1,46 @@
+#include "autograd/ops/attention.h"
+
+#include "tests/autograd/check.h"
+
+namespace supertac {
+namespace {
+
+using namespace test;
+
+TEST(Attention, HandComputed) {
+  const Variable x(Tensor::of({1, 2, 2, 2}, {1, 10, 2, 20, 3, 30, 6, 0}));
+  expect_values(global_mean(x).value(), {1, 2}, {3, 15});
+  expect_values(scale_channels(x, Variable(Tensor::of({1, 2}, {2, -1}))).value(), {1, 2, 2, 2},
+                {2, -10, 4, -20, 6, -30, 12, 0});
+}
+
+TEST(Attention, Empty) {
+  const Variable x(Tensor::zeros({0, 2, 2, 3})), s(Tensor::zeros({0, 3}));
+  EXPECT_EQ(global_mean(x).shape().text(), "[0,3]");
+  EXPECT_EQ(scale_channels(x, s).shape().text(), "[0,2,2,3]");
+}
+
+TEST(Attention, RefusesOtherShapes) {
+  const Variable x(Tensor::zeros({2, 4, 4, 3})), flat(Tensor::zeros({2, 3}));
+  expect_refusal("global_mean: x expects rank 4, got [2,3]", [&] { global_mean(flat); });
+  expect_refusal("global_mean: x has no pixels: [2,0,4,3]", [] {
+    global_mean(Variable(Tensor::zeros({2, 0, 4, 3})));
+  });
+  expect_refusal("scale_channels: x expects rank 4, got [2,3]", [&] { scale_channels(flat, flat); });
+  expect_refusal("scale_channels: s expects [2,3], got [3,2]", [&] {
+    scale_channels(x, Variable(Tensor::zeros({3, 2})));
+  });
+}
+
+#ifdef SUPERTAC_REAL_IS_DOUBLE
+TEST(Attention, Gradients) {
+  for (const Dim channels : {1, 3, 17, 33}) {
+    const Tensor x = numbers({2, 3, 5, channels}), s = numbers({2, channels}, 2);
+    expect_gradients([](const auto& in) { return global_mean(in[0]); }, {x});
+    expect_gradients([](const auto& in) { return scale_channels(in[0], in[1]); }, {x, s});
+  }
+}
+#endif
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,44 @@
+#include "autograd/ops/linear.h"
+
+#include "tests/autograd/check.h"
+
+namespace supertac {
+namespace {
+
+using namespace test;
+
+TEST(Linear, HandComputed) {
+  const Variable x(Tensor::of({2, 2}, {1, 2, 3, 4})), w(Tensor::of({2, 3}, {1, 0, -1, 2, 1, 0}));
+  const Variable b(Tensor::of({3}, {10, 20, 30}));
+  expect_values(linear(x, w, b).value(), {2, 3}, {15, 22, 29, 21, 24, 27});
+}
+
+TEST(Linear, Empty) {
+  const Variable x(Tensor::zeros({0, 4})), w = parameter(numbers({4, 2})), b = parameter(numbers({2}));
+  EXPECT_EQ(linear(x, w, b).shape().text(), "[0,2]");
+}
+
+TEST(Linear, RefusesOtherShapes) {
+  const Variable x(Tensor::zeros({2, 3})), w(Tensor::zeros({3, 5})), b(Tensor::zeros({5}));
+  expect_refusal("linear: x expects rank 2, got [5]", [&] { linear(b, w, b); });
+  expect_refusal("linear: weight expects rank 2, got [5]", [&] { linear(x, b, b); });
+  expect_refusal("linear: weight expects 5 inputs, x has 3 (x [2,3], weight [5,3])", [&] {
+    linear(x, Variable(Tensor::zeros({5, 3})), b);
+  });
+  expect_refusal("linear: bias expects [5], got [3]", [&] { linear(x, w, Variable(Tensor::zeros({3}))); });
+}
+
+#ifdef SUPERTAC_REAL_IS_DOUBLE
+TEST(Linear, Gradients) {
+  const struct {
+    Dim rows, in, out;
+  } cases[] = {{1, 1, 1}, {2, 3, 17}, {1, 33, 3}, {19, 17, 33}, {2, 40, 512}};
+  for (const auto& c : cases) {
+    expect_gradients([](const auto& in) { return linear(in[0], in[1], in[2]); },
+                     {numbers({c.rows, c.in}), numbers({c.in, c.out}, 2), numbers({c.out}, 3)});
+  }
+}
+#endif
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,80 @@
+#include "autograd/ops/losses.h"
+
+#include <vector>
+
+#include "tests/autograd/check.h"
+
+namespace supertac {
+namespace {
+
+using namespace test;
+
+TEST(L2Loss, HandComputed) {
+  const Variable x = parameter(Tensor::of({2, 2}, {1, 2, 3, 4})),
+                 t = parameter(Tensor::of({2, 2}, {1, 0, 4, 8}));
+  const Variable loss = l2_loss(x, t);
+  EXPECT_NEAR(static_cast<double>(loss.item()), (0 + 4 + 1 + 16) / 4.0, 10 * kRounding);
+  backward(loss);
+  expect_values(x.grad(), {2, 2}, {0, 1, -0.5, -2});
+  expect_values(t.grad(), {2, 2}, {0, -1, 0.5, 2});
+}
+
+TEST(L2Loss, RefusesOtherShapes) {
+  const Variable a(Tensor::zeros({2, 3})), b(Tensor::zeros({3})), none(Tensor::zeros({0}));
+  expect_refusal("l2_loss: x and target must have the same shape, got [2,3] and [3]", [&] { l2_loss(a, b); });
+  expect_refusal("l2_loss: x is empty: [0]", [&] { l2_loss(none, none); });
+}
+
+Variable cross_entropy(const Variable& logits, const std::vector<std::int32_t>& labels) {
+  return softmax_cross_entropy(logits, labels);
+}
+
+TEST(CrossEntropy, HandComputed) {
+  const Variable logits = parameter(Tensor::of({2, 2}, {0, 0, real(std::log(3.0)), 0}));
+  const Variable loss = cross_entropy(logits, {1, 0});
+  EXPECT_NEAR(static_cast<double>(loss.item()), (std::log(2.0) + std::log(4.0 / 3)) / 2, kRounding);
+  backward(loss);
+  expect_values(logits.grad(), {2, 2}, {0.25, -0.25, -0.125, 0.125});
+}
+
+TEST(CrossEntropy, LargeLogitsStayFinite) {
+  const Variable logits = parameter(Tensor::of({2, 3}, {10000, 0, -10000, 10000, 0, -10000}));
+  const Variable loss = cross_entropy(logits, {0, 2});
+  EXPECT_NEAR(static_cast<double>(loss.item()), 10000, 0.01);  // (0 + 20000) / 2
+  backward(loss);
+  expect_values(logits.grad(), {2, 3}, {0, 0, 0, 0.5, 0, -0.5});
+}
+
+TEST(CrossEntropy, RefusesWrongLabels) {
+  const Variable logits(Tensor::zeros({2, 3}));
+  expect_refusal("softmax_cross_entropy: logits expects rank 2, got [3]",
+                 [] { cross_entropy(Variable(Tensor::zeros({3})), {0}); });
+  expect_refusal("softmax_cross_entropy: labels expects 2 > 0 entries, got 1",
+                 [&] { cross_entropy(logits, {0}); });
+  expect_refusal("softmax_cross_entropy: label 3 of row 1 is not in [0,3)", [&] {
+    cross_entropy(logits, {0, 3});
+  });
+  expect_refusal("softmax_cross_entropy: label -1 of row 0 is not in [0,3)", [&] {
+    cross_entropy(logits, {-1, 0});
+  });
+  expect_refusal("softmax_cross_entropy: labels expects 0 > 0 entries, got 0", [] {
+    cross_entropy(Variable(Tensor::zeros({0, 3})), {});
+  });
+}
+
+#ifdef SUPERTAC_REAL_IS_DOUBLE
+TEST(Losses, Gradients) {
+  for (const Shape& shape : {Shape{2, 5, 3, 1}, Shape{1}, Shape{33, 17}}) {
+    expect_gradients([](const auto& in) { return l2_loss(in[0], in[1]); },
+                     {numbers(shape), numbers(shape, 2)});
+  }
+  expect_gradients(
+      [](const auto& in) {
+        return cross_entropy(in[0], {2, 0, 6});
+      },
+      {numbers({3, 7}, 1, -3, 3)});
+}
+#endif
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,43 @@
+#include "autograd/ops/max_pool.h"
+
+#include "autograd/ops/arithmetic.h"
+#include "tests/autograd/check.h"
+
+namespace supertac {
+namespace {
+
+using namespace test;
+
+TEST(MaxPool, HandComputedAndAnOddRowIsLeftOut) {
+  const Variable x = parameter(Tensor::of({1, 3, 4, 1}, {1, 5, 2, 2, 3, 4, 2, 2, 9, 9, 9, 9}));
+  const Variable y = max_pool2d(x);
+  expect_values(y.value(), {1, 1, 2, 1}, {5, 2});
+  backward(sum(y));  // among equal values the first gets the gradient, once
+  expect_values(x.grad(), {1, 3, 4, 1}, {0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+}
+
+TEST(MaxPool, Empty) {
+  EXPECT_EQ(max_pool2d(Variable(Tensor::zeros({0, 4, 6, 2}))).shape().text(), "[0,2,3,2]");
+}
+
+TEST(MaxPool, RefusesOtherShapes) {
+  expect_refusal("max_pool2d: x expects rank 4, got [4,4]", [] {
+    max_pool2d(Variable(Tensor::zeros({4, 4})));
+  });
+  expect_refusal("max_pool2d: x must be at least 2x2, got [1,1,4,3]", [] {
+    max_pool2d(Variable(Tensor::zeros({1, 1, 4, 3})));
+  });
+}
+
+#ifdef SUPERTAC_REAL_IS_DOUBLE
+TEST(MaxPool, Gradients) {
+  for (const Dim channels : {1, 3, 17}) {
+    Tensor x({2, 5, 4, channels});  // no two values closer than the steps of the finite differences
+    for (Dim i = 0; i < x.size(); ++i) x.data()[i] = 0.05 * static_cast<double>(i * 7919 % x.size());
+    expect_gradients([](const auto& in) { return max_pool2d(in[0]); }, {x}, {.step = 1e-4});
+  }
+}
+#endif
+
+}  // namespace
+}  // namespace supertac

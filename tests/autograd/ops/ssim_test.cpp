@@ -1,0 +1,149 @@
+// SSIM's traps: flat images, opposite images, values far from zero, small images.
+#include <algorithm>
+
+#include "autograd/ops/losses.h"
+#include "tests/autograd/check.h"
+
+namespace supertac {
+namespace {
+
+using namespace test;
+
+constexpr double kC1 = 1e-4, kC2 = 9e-4;
+
+Tensor flat(Dim size, double value) { return Tensor::full({1, size, size, 1}, static_cast<real>(value)); }
+Tensor textured(Dim size, double level = 0.5, double amplitude = 0.3) {
+  Tensor t({1, size, size, 1});
+  for (Dim i = 0; i < t.size(); ++i) {
+    t.data()[i] = static_cast<real>(level + amplitude * std::sin(0.9 * static_cast<double>(i % size) +
+                                                                 0.4 * static_cast<double>(i / size)));
+  }
+  return t;
+}
+double similarity(const Tensor& x, const Tensor& y) {
+  return static_cast<double>(ssim(Variable(x), y).item());
+}
+
+// The definition, window by window, in double precision with centred moments.
+double by_definition(const Tensor& x, const Tensor& y) {
+  const Dim h = x.dim(1), w = x.dim(2), size = std::min(h, w) < 11 ? 7 : 11;
+  double total = 0;
+  for (Dim i = 0; i + size <= h; ++i) {
+    for (Dim j = 0; j + size <= w; ++j) {
+      double mass = 0, mx = 0, my = 0, vx = 0, vy = 0, cov = 0;
+      for (int pass = 0; pass < 2; ++pass) {
+        for (Dim k = 0; k < size * size; ++k) {
+          const double dy = static_cast<double>(k / size) - 5, dx = static_cast<double>(k % size) - 5;
+          const double weight = size == 7 ? 1 : std::exp(-(dx * dx + dy * dy) / 4.5);
+          const double a = static_cast<double>(x.data()[(i + k / size) * w + j + k % size]);
+          const double b = static_cast<double>(y.data()[(i + k / size) * w + j + k % size]);
+          if (pass == 0) {
+            mass += weight, mx += weight * a, my += weight * b;
+          } else {
+            vx += weight * (a - mx) * (a - mx), vy += weight * (b - my) * (b - my);
+            cov += weight * (a - mx) * (b - my);
+          }
+        }
+        if (pass == 0) mx /= mass, my /= mass;
+      }
+      vx /= mass, vy /= mass, cov /= mass;
+      total += (2 * mx * my + kC1) * (2 * cov + kC2) / ((mx * mx + my * my + kC1) * (vx + vy + kC2));
+    }
+  }
+  return total / static_cast<double>((h - size + 1) * (w - size + 1));
+}
+
+TEST(Ssim, IsItsDefinition) {
+  for (const Shape& shape : {Shape{1, 16, 16, 1}, Shape{1, 8, 8, 1}, Shape{1, 32, 32, 1}, Shape{1, 13, 20, 1},
+                             Shape{1, 7, 15, 1}, Shape{1, 11, 11, 1}}) {
+    const Tensor x = numbers(shape, 1, 0, 1), y = numbers(shape, 2, 0, 1);
+    EXPECT_NEAR(similarity(x, y), by_definition(x, y), kRounding) << shape.text();
+  }
+}
+
+TEST(Ssim, IdenticalImagesScoreOne) {
+  for (const Dim size : {7, 8, 16, 32}) {
+    EXPECT_NEAR(similarity(textured(size), textured(size)), 1, kRounding);
+    EXPECT_NEAR(similarity(flat(size, 0), flat(size, 0)), 1, kRounding);
+    EXPECT_NEAR(similarity(flat(size, 0.7), flat(size, 0.7)), 1, kRounding);
+  }
+}
+
+TEST(Ssim, FlatImages) {
+  EXPECT_NEAR(similarity(flat(16, 0), flat(16, 1)), kC1 / (1 + kC1), kRounding);
+  EXPECT_NEAR(similarity(flat(16, 0.2), flat(16, 0.6)), (2 * 0.12 + kC1) / (0.04 + 0.36 + kC1),
+              2 * kRounding);
+  EXPECT_NEAR(similarity(flat(16, 0.5), textured(16)), by_definition(flat(16, 0.5), textured(16)), kRounding);
+}
+
+TEST(Ssim, OppositeImagesScoreBelowZero) {
+  const Tensor x = textured(16, 0.5, 0.3), opposite = textured(16, 0.5, -0.3);
+  EXPECT_LT(similarity(x, opposite), -0.8);
+  EXPECT_NEAR(similarity(x, opposite), by_definition(x, opposite), 5 * kRounding);
+}
+
+// E[x^2] - E[x]^2 at level 200 has lost all digits in fp32.
+TEST(Ssim, VariancesSurviveAHighLevel) {
+  const Tensor x = textured(16, 200, 0.3), y = textured(16, 200, 0.2);
+  EXPECT_NEAR(similarity(x, y), by_definition(x, y), sizeof(real) == 4 ? 1e-4 : 1e-11);
+}
+
+TEST(Ssim, AveragesOverImages) {
+  Tensor x({2, 16, 16, 1}), y({2, 16, 16, 1});
+  const Tensor a = textured(16), b = textured(16, 0.4, 0.1), c = flat(16, 0.3);
+  std::copy_n(a.data(), 256, x.data());
+  std::copy_n(b.data(), 256, x.data() + 256);
+  std::copy_n(c.data(), 256, y.data());
+  std::copy_n(a.data(), 256, y.data() + 256);
+  EXPECT_NEAR(similarity(x, y), (similarity(a, c) + similarity(b, a)) / 2, kRounding);
+}
+
+TEST(Ssim, GradientIsFiniteEverywhere) {
+  for (const Dim size : {7, 8, 16}) {
+    for (const Tensor& x :
+         {flat(size, 0), flat(size, 1), flat(size, 200), textured(size), textured(size, 200)}) {
+      for (const Tensor& y : {flat(size, 0), flat(size, 1), textured(size), textured(size, 0.5, -0.3)}) {
+        const Variable v = parameter(x.clone());
+        backward(ssim(v, y));
+        for (const real g : v.grad().values()) ASSERT_TRUE(std::isfinite(g));
+      }
+    }
+  }
+}
+
+// The all-zero picture against a texture is where training can get stuck: the gradient must not be zero
+// there.
+TEST(Ssim, AFlatPictureIsPulledTowardsTheTexture) {
+  const Variable v = parameter(flat(16, 0));
+  const Tensor target = textured(16);
+  backward(ssim(v, target));
+  EXPECT_GT(dot(v.grad(), target), 1e-2);
+}
+
+TEST(Ssim, RefusesOtherShapes) {
+  const Variable x(Tensor::zeros({1, 16, 16, 1}));
+  expect_refusal("ssim: x expects rank 4, got [16,16]", [] {
+    ssim(Variable(Tensor::zeros({16, 16})), Tensor::zeros({16, 16}));
+  });
+  expect_refusal("ssim: x and target must have the same shape, got [1,16,16,1] and [16,16]", [&] {
+    ssim(x, Tensor::zeros({16, 16}));
+  });
+  for (const Shape& bad : {Shape{1, 6, 16, 1}, Shape{1, 16, 16, 2}, Shape{0, 16, 16, 1}}) {
+    expect_refusal("ssim: x expects [N,H,W,1] with H, W >= 7, got " + bad.text(),
+                   [&] { ssim(Variable(Tensor::zeros(bad)), Tensor::zeros(bad)); });
+  }
+}
+
+#ifdef SUPERTAC_REAL_IS_DOUBLE
+TEST(Ssim, Gradients) {
+  for (const Shape& shape : {Shape{2, 16, 13, 1}, Shape{1, 8, 9, 1}, Shape{5, 11, 11, 1}}) {
+    const Tensor target = numbers(shape, 2, 0, 1);
+    expect_gradients([&](const auto& in) { return ssim(in[0], target); }, {numbers(shape, 1, 0, 1)});
+  }
+  const Tensor texture = textured(16);
+  expect_gradients([&](const auto& in) { return ssim(in[0], texture); }, {textured(16, 0.5, -0.3)});
+}
+#endif
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,84 @@
+#include "autograd/ops/vae.h"
+
+#include "autograd/ops/activations.h"
+#include "autograd/ops/arithmetic.h"
+#include "tests/autograd/check.h"
+
+namespace supertac {
+namespace {
+
+using namespace test;
+
+TEST(SampleGaussian, HandComputed) {
+  const Variable mean(Tensor::of({1, 2}, {1, -2})), log_var(Tensor::of({1, 2}, {0, real(std::log(4.0))}));
+  const Variable z = sample_gaussian(mean, log_var, Tensor::of({1, 2}, {3, real(0.5)}));
+  expect_values(z.value(), {1, 2}, {4, -1});
+}
+
+TEST(KlDivergence, HandComputed) {
+  const auto of = [](real mean, real log_var) {
+    return static_cast<double>(
+        kl_divergence(Variable(Tensor::full({1, 1}, mean)), Variable(Tensor::full({1, 1}, log_var))).item());
+  };
+  EXPECT_NEAR(of(0, 0), 0, kRounding);
+  EXPECT_NEAR(of(3, 0), 4.5, 5 * kRounding);
+  EXPECT_NEAR(of(0, 1), 0.5 * (std::exp(1.0) - 2), kRounding);
+  // summed over latents, averaged over the batch
+  const Variable mean(Tensor::full({4, 3}, 2)), log_var(Tensor::zeros({4, 3}));
+  EXPECT_NEAR(static_cast<double>(kl_divergence(mean, log_var).item()), 6, 10 * kRounding);
+}
+
+// A collapsed posterior: the divergence is tiny, and rounding may not make it negative by more than its size.
+TEST(KlDivergence, NearTheStandardNormal) {
+  const Variable mean(Tensor::full({1, 1}, real(1e-2))), log_var(Tensor::full({1, 1}, real(-1e-2)));
+  const double exact = -0.5 * (1 - 1e-2 - 1e-4 - std::exp(-1e-2));
+  EXPECT_NEAR(static_cast<double>(kl_divergence(mean, log_var).item()), exact, 1e-7);
+}
+
+TEST(Vae, ExtremeLogVarianceStaysFinite) {
+  const Variable mean = parameter(Tensor::of({1, 3}, {0, 1, -1})),
+                 log_var = parameter(Tensor::of({1, 3}, {1000, -1000, 80}));
+  const Variable limited = clamp(log_var, -10, 10);
+  const Variable z = sample_gaussian(mean, limited, Tensor::full({1, 3}, 4));
+  backward(add(kl_divergence(mean, limited), sum(z)));
+  for (const Tensor& g : {mean.grad(), log_var.grad()}) {
+    for (const real x : g.values()) EXPECT_TRUE(std::isfinite(x));
+  }
+  expect_values(log_var.grad(), {1, 3}, {0, 0, 0});
+}
+
+TEST(Vae, Empty) {
+  const Variable x(Tensor::zeros({0, 3}));
+  EXPECT_EQ(sample_gaussian(x, x, Tensor::zeros({0, 3})).size(), 0);
+  expect_refusal("kl_divergence: mean is empty: [0,3]", [&] { kl_divergence(x, x); });
+}
+
+TEST(Vae, RefusesOtherShapes) {
+  const Variable a(Tensor::zeros({2, 3})), b(Tensor::zeros({3, 2})), c(Tensor::zeros({2}));
+  expect_refusal("sample_gaussian: mean expects rank 2, got [2]",
+                 [&] { sample_gaussian(c, c, Tensor::zeros({2})); });
+  expect_refusal("sample_gaussian: mean and log_var must have the same shape, got [2,3] and [3,2]", [&] {
+    sample_gaussian(a, b, Tensor::zeros({2, 3}));
+  });
+  expect_refusal("sample_gaussian: eps expects [2,3], got [3,2]", [&] {
+    sample_gaussian(a, a, Tensor::zeros({3, 2}));
+  });
+  expect_refusal("kl_divergence: mean expects rank 2, got [2]", [&] { kl_divergence(c, c); });
+  expect_refusal("kl_divergence: mean and log_var must have the same shape, got [2,3] and [3,2]",
+                 [&] { kl_divergence(a, b); });
+}
+
+#ifdef SUPERTAC_REAL_IS_DOUBLE
+TEST(Vae, Gradients) {
+  for (const Shape& shape : {Shape{2, 3}, Shape{1, 17}, Shape{5, 33}}) {
+    const std::vector<Tensor> inputs{numbers(shape), numbers(shape, 2)};
+    const Tensor eps = numbers(shape, 3, -2, 2);
+    expect_gradients([&](const auto& in) { return sample_gaussian(in[0], in[1], eps); }, inputs);
+    expect_gradients([](const auto& in) { return kl_divergence(in[0], in[1]); }, inputs);
+    expect_gradients([](const auto& in) { return kl_divergence(in[0], in[0]); }, {inputs[0]});
+  }
+}
+#endif
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,76 @@
+#include "autograd/pool.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <thread>
+#include <vector>
+
+#include "autograd/adam.h"
+#include "autograd/ops/activations.h"
+#include "autograd/ops/convolution.h"
+#include "autograd/ops/losses.h"
+#include "tests/autograd/check.h"
+
+namespace supertac {
+namespace {
+
+TEST(Pool, AReleasedBlockIsHandedOutAgain) {
+  void* first = pool_allocate(1000);
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(first) % 64, 0U);
+  pool_release(first, 1000);
+  const std::uint64_t before = pool_heap_allocations();
+  void* again = pool_allocate(1001);  // the same size class
+  EXPECT_EQ(again, first);
+  EXPECT_EQ(pool_heap_allocations(), before);
+  pool_release(again, 1001);
+}
+
+// A block must hold what was asked for at every size class boundary; the sanitizer build sees an overrun.
+TEST(Pool, EveryByteOfABlockIsUsable) {
+  for (std::size_t bytes = 1; bytes < 5000; bytes += bytes < 300 ? 1 : 37) {
+    auto* block = static_cast<unsigned char*>(pool_allocate(bytes));
+    block[0] = block[bytes - 1] = 1;
+    pool_release(block, bytes);
+  }
+}
+
+TEST(Pool, BlocksInUseDoNotOverlap) {
+  std::vector<Tensor> held;
+  for (int i = 0; i < 200; ++i) held.push_back(Tensor::full({1 + i % 13}, static_cast<real>(i)));
+  for (int i = 0; i < 200; ++i) {
+    for (const real x : held[static_cast<std::size_t>(i)].values()) ASSERT_EQ(x, static_cast<real>(i));
+  }
+}
+
+TEST(Pool, AWarmTrainingStepDoesNotTouchTheHeap) {
+  const Variable w = test::parameter(test::numbers({3, 3, 1, 8})), b = test::parameter(Tensor::zeros({8}));
+  const Variable w2 = test::parameter(test::numbers({3, 3, 8, 1}, 2)),
+                 b2 = test::parameter(Tensor::zeros({1}));
+  const Tensor x = test::numbers({2, 12, 12, 1}, 3), truth = test::numbers({2, 12, 12, 1}, 4, 0, 1);
+  Adam adam({w, b, w2, b2}, {});
+  const auto step = [&] {
+    const ConvOptions same{.padding = 1};
+    adam.zero_grad();
+    backward(ssim(conv2d(leaky_relu(conv2d(Variable(x), w, b, same)), w2, b2, same), truth));
+    adam.step();
+  };
+  step();
+  step();
+  const std::uint64_t warm = pool_heap_allocations();
+  for (int i = 0; i < 5; ++i) step();
+  EXPECT_EQ(pool_heap_allocations(), warm);
+}
+
+TEST(Pool, AnotherThreadMayReleaseWhatThisOneAllocated) {
+  for (int i = 0; i < 50; ++i) {
+    Tensor t = Tensor::full({1000}, 1);
+    std::thread([moved = std::move(t)]() mutable { moved = Tensor(); }).join();
+  }
+  Tensor made_elsewhere;
+  std::thread([&] { made_elsewhere = Tensor::full({3}, 5); }).join();
+  test::expect_values(made_elsewhere, {3}, {5, 5, 5});  // outlives the pool of the thread that made it
+}
+
+}  // namespace
+}  // namespace supertac

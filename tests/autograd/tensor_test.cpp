@@ -1,0 +1,83 @@
+#include "autograd/tensor.h"
+
+#include <array>
+#include <utility>
+
+#include "tests/autograd/check.h"
+
+namespace supertac {
+namespace {
+
+using test::expect_refusal;
+using test::expect_values;
+
+TEST(Shape, TextAndElements) {
+  EXPECT_EQ((Shape{4, 16, 16, 32}).text(), "[4,16,16,32]");
+  EXPECT_EQ((Shape{4, 16, 16, 32}).elements(), 32768);
+  EXPECT_EQ(Shape().text(), "[]");
+  EXPECT_EQ(Shape().elements(), 1);
+  EXPECT_EQ((Shape{3, 0, 5}).elements(), 0);
+  EXPECT_NE((Shape{2, 3}), (Shape{2, 3, 1}));
+}
+
+TEST(Shape, RefusesWhatNoTensorCanHave) {
+  expect_refusal("Shape: at most 4 dimensions, got 5", [] { Shape{1, 1, 1, 1, 1}; });
+  expect_refusal("Shape: dimension -1 is negative or too large", [] { Shape{2, -1}; });
+  expect_refusal("Shape: dimension 2097152 is negative or too large", [] { Shape{1 << 20, 1 << 21}; });
+  expect_refusal("Shape: dimension 9223372036854775807 is negative or too large", [] {
+    Shape{2, INT64_MAX};
+  });
+}
+
+TEST(Tensor, CopyIsAHandleCloneIsACopy) {
+  Tensor a = Tensor::of({2, 2}, {1, 2, 3, 4});
+  Tensor handle = a, copy = a.clone();
+  a.data()[0] = 9;
+  EXPECT_EQ(handle.data()[0], 9);
+  EXPECT_EQ(copy.data()[0], 1);
+  EXPECT_EQ(handle.data(), a.data());
+}
+
+TEST(Tensor, MoveLeavesNothingBehind) {
+  Tensor a = Tensor::full({3}, 2);
+  const Tensor b = std::move(a);
+  EXPECT_FALSE(a.defined());  // NOLINT(bugprone-use-after-move): the state after a move is what is tested
+  EXPECT_EQ(a.size(), 0);
+  expect_values(b, {3}, {2, 2, 2});
+  Tensor c = b;
+  Tensor& same = c;
+  c = same;  // to itself
+  expect_values(c, {3}, {2, 2, 2});
+}
+
+TEST(Tensor, ReshapedSharesTheBuffer) {
+  Tensor a = Tensor::of({2, 3}, {1, 2, 3, 4, 5, 6});
+  const Tensor b = a.reshaped({3, 2});
+  EXPECT_EQ(b.shape().text(), "[3,2]");
+  EXPECT_EQ(b.data(), a.data());
+  expect_refusal("reshape: [2,3] has 6 elements, the new shape [4] needs 4", [&] { (void)a.reshaped({4}); });
+}
+
+TEST(Tensor, ValuesAreAlignedForVectors) {
+  for (const Dim size : {1, 3, 17, 1000}) {
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(Tensor(Shape{size}).data()) % 64, 0U);
+  }
+}
+
+TEST(Tensor, EmptyAndUndefinedAreHarmless) {
+  const Tensor empty = Tensor::zeros({0, 4});
+  EXPECT_TRUE(empty.defined());
+  EXPECT_EQ(empty.values().size(), 0U);
+  EXPECT_EQ(empty.clone().shape().text(), "[0,4]");
+  const Tensor undefined;
+  EXPECT_FALSE(undefined.clone().defined());
+}
+
+TEST(Tensor, RefusesWrongCounts) {
+  expect_refusal("Tensor::of: shape [2,2] holds 4 values, got 3", [] { Tensor::of({2, 2}, {1, 2, 3}); });
+  expect_refusal("item: expected one element, shape is [2]", [] { Tensor::zeros({2}).item(); });
+  EXPECT_EQ(Tensor::full({1, 1}, 7).item(), 7);
+}
+
+}  // namespace
+}  // namespace supertac

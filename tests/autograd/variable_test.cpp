@@ -1,0 +1,140 @@
+#include "autograd/variable.h"
+
+#include <string>
+#include <thread>
+
+#include "autograd/ops/activations.h"
+#include "autograd/ops/arithmetic.h"
+#include "autograd/ops/shaping.h"
+#include "tests/autograd/check.h"
+
+namespace supertac {
+namespace {
+
+using test::expect_refusal;
+using test::expect_values;
+using test::parameter;
+
+TEST(Backward, AddsUpBothSidesOfADiamond) {
+  const Variable x = parameter(Tensor::of({2}, {3, -2}));
+  const Variable square = multiply(x, x);
+  backward(sum(add(multiply(square, x), scale(square, 2))));  // x^3 + 2 x^2
+  expect_values(x.grad(), {2}, {27 + 12, 12 - 8});
+}
+
+// Each level uses the one below twice: a visitor that follows paths would take 2^60 steps.
+TEST(Backward, VisitsEveryNodeOnce) {
+  const Variable x = parameter(Tensor::full({}, 1));
+  Variable y = x;
+  for (int i = 0; i < 60; ++i) y = scale(add(y, y), real(0.5));
+  backward(y);
+  EXPECT_EQ(x.grad().item(), 1);
+}
+
+TEST(Backward, ALongSkipWaitsForTheLongWay) {
+  const Variable x = parameter(Tensor::full({}, 2));
+  const Variable early = multiply(x, x);  // used at once and 50 ops later
+  Variable late = early;
+  for (int i = 0; i < 50; ++i) late = scale(late, 1);
+  backward(multiply(late, early));  // x^4
+  EXPECT_EQ(x.grad().item(), 32);
+}
+
+TEST(Backward, GradientsOfLeavesAccumulate) {
+  const Variable x = parameter(Tensor::full({}, 3));
+  backward(scale(x, 2));
+  backward(scale(x, 5));
+  EXPECT_EQ(x.grad().item(), 7);
+  backward(x);  // dx/dx = 1
+  EXPECT_EQ(x.grad().item(), 8);
+}
+
+TEST(Backward, LeavesThatNeedNoGradientGetNone) {
+  const Variable x = parameter(Tensor::full({}, 3)), constant(Tensor::full({}, 4));
+  backward(multiply(x, constant));
+  EXPECT_EQ(x.grad().item(), 4);
+  EXPECT_FALSE(constant.grad().defined());
+}
+
+TEST(Backward, FreesTheGraph) {
+  const Variable x = parameter(Tensor::full({2}, 3));
+  const Variable middle = scale(x, 2), loss = sum(middle);
+  backward(loss);
+  EXPECT_FALSE(middle.grad().defined());
+  expect_refusal(
+      "backward: the graph of this loss was freed by an earlier backward; run the forward pass again",
+      [&] { backward(loss); });
+  expect_refusal(
+      "backward: scale belongs to a graph that an earlier backward freed; run the forward pass again",
+      [&] { backward(sum(middle)); });
+  const Variable fresh = scale(x, 3);
+  backward(sum(fresh));  // a refused backward leaves nothing in the queue
+  expect_values(x.grad(), {2}, {5, 5});
+}
+
+TEST(Backward, RefusesWhatHasNoGradient) {
+  const Variable x = parameter(Tensor::full({2}, 3));
+  expect_refusal("backward: the loss must be a scalar, shape is [2]", [&] { backward(scale(x, 1)); });
+  expect_refusal("backward: the loss does not depend on any variable that requires a gradient",
+                 [&] { backward(sum(Variable(Tensor::full({2}, 3)))); });
+}
+
+TEST(Variable, RefusesToBeUsedWithoutAValue) {
+  expect_refusal("Variable: used before it was given a value", [] { sum(Variable()); });
+  expect_refusal("Variable: the tensor is undefined", [] { parameter(Tensor()); });
+  EXPECT_STREQ(Variable().op(), "none");
+  EXPECT_STREQ(parameter(Tensor::zeros({1})).op(), "leaf");
+}
+
+TEST(NoGrad, ComputesTheSameWithoutRecording) {
+  const Variable x = parameter(Tensor::full({}, 3));
+  const Variable recorded = multiply(x, x);
+  {
+    const NoGrad outer;
+    { const NoGrad inner; }
+    const Variable y = multiply(x, x);
+    EXPECT_EQ(y.item(), recorded.item());
+    EXPECT_FALSE(y.requires_grad());
+  }
+  EXPECT_TRUE(multiply(x, x).requires_grad());
+}
+
+TEST(NoGrad, HoldsForItsThreadOnly) {
+  const NoGrad here;
+  bool recorded = false;
+  std::thread([&] { recorded = scale(parameter(Tensor::full({}, 1)), 2).requires_grad(); }).join();
+  EXPECT_TRUE(recorded);
+}
+
+// 200,000 nodes in a row: neither backward nor the destructors may recurse.
+TEST(Variable, LongChainsNeedNoStack) {
+  const Variable x = parameter(Tensor::full({}, 1));
+  const auto chain = [&] {
+    Variable y = x;
+    for (int i = 0; i < 200000; ++i) y = scale(y, 1);
+    return y;
+  };
+  backward(chain());
+  EXPECT_EQ(x.grad().item(), 1);
+  { const Variable dropped = chain(); }  // never went through backward
+  std::thread([held = chain()]() mutable { held = Variable(); }).join();
+}
+
+// Creation numbers of two threads may not reverse an edge.
+TEST(Backward, AGraphMayBeContinuedOnAnotherThread) {
+  const Variable x = parameter(Tensor::full({}, 3));
+  for (int i = 0; i < 100; ++i) scale(x, 1);  // this thread's numbers run ahead of the new thread's
+  const Variable square = multiply(x, x);
+  std::thread([&] { backward(multiply(square, scale(scale(square, 1), 1))); }).join();  // x^4
+  EXPECT_EQ(x.grad().item(), 108);
+}
+
+TEST(Record, TakesAtMostEightInputs) {
+  const Variable x = parameter(Tensor::full({1}, 1));
+  const std::vector<const Variable*> inputs(9, &x);
+  expect_refusal("nine: at most 8 inputs, got 9",
+                 [&] { record("nine", Tensor::zeros({1}), inputs, [](Backward&) {}); });
+}
+
+}  // namespace
+}  // namespace supertac
