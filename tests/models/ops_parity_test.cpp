@@ -1,0 +1,144 @@
+// Single ops against PyTorch (op_cases in tests/parity/make_parity.py): y and the gradients of sum(y * r).
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "autograd/ops/arithmetic.h"
+#include "autograd/ops/convolution.h"
+#include "autograd/ops/linear.h"
+#include "autograd/ops/losses.h"
+#include "autograd/ops/vae.h"
+#include "layers/checkpoint.h"
+#include "tests/parity/parity.h"
+
+namespace supertac {
+namespace {
+
+using test::counter_numbers;
+using test::doubles;
+
+// PyTorch's order of axes against ours.
+enum class Order { same, linear_weight, conv_weight, transposed_weight, channels_last };
+
+struct Input {
+  std::string name;
+  Shape shape;  // ours
+  Order order = Order::same;
+};
+
+Layout layout_of(Order order) {
+  switch (order) {
+    case Order::linear_weight:
+      return Layout::linear;
+    case Order::conv_weight:
+      return Layout::conv;
+    case Order::transposed_weight:
+      return Layout::conv_transpose;
+    default:
+      return Layout::plain;
+  }
+}
+
+// Where element i of PyTorch's order lies in ours.
+std::vector<std::size_t> places(const Shape& shape, Order order) {
+  Tensor numbered(shape);
+  for (Dim i = 0; i < numbered.size(); ++i) numbered.data()[i] = static_cast<real>(i);
+  std::vector<std::size_t> at;
+  if (order != Order::channels_last) {
+    const Parameter p{"", Variable(numbered), layout_of(order)};
+    for (const float f : to_stored(p, numbered, "").values) at.push_back(static_cast<std::size_t>(f));
+    return at;
+  }
+  const Dim channels = shape[shape.rank() - 1], pixels = shape.elements() / shape[0] / channels;
+  for (Dim n = 0; n < shape[0]; ++n) {
+    for (Dim c = 0; c < channels; ++c) {
+      for (Dim p = 0; p < pixels; ++p)
+        at.push_back(static_cast<std::size_t>((n * pixels + p) * channels + c));
+    }
+  }
+  return at;
+}
+
+Tensor numbers(const std::string& name, const Shape& shape, Order order) {
+  Tensor t(shape);
+  const std::vector<std::size_t> at = places(shape, order);
+  const std::vector<double> values = counter_numbers(name, at.size());
+  for (std::size_t i = 0; i < at.size(); ++i) t.data()[at[i]] = static_cast<real>(values[i]);
+  return t;
+}
+
+void expect_stored(const std::string& name, const Tensor& found, Order order) {
+  static const SafetensorsFile file = SafetensorsFile::read(SUPERTAC_PARITY_DIR "/ops.safetensors");
+  std::vector<double> values;
+  for (const std::size_t at : places(found.shape(), order)) {
+    values.push_back(static_cast<double>(found.data()[at]));
+  }
+  const test::Difference d = test::difference(values, test::stored(file, name));
+  EXPECT_LE(sizeof(real) == 8 ? d.by_entry : d.by_tensor, sizeof(real) == 8 ? 1e-10 : 1e-5) << name;
+}
+
+void expect_parity(const std::string& op, const std::vector<Input>& inputs, Order y_order,
+                   const std::function<Variable(const std::vector<Variable>&)>& f) {
+  std::vector<Variable> leaves;
+  for (const Input& in : inputs) leaves.emplace_back(numbers(op + "." + in.name, in.shape, in.order), true);
+  const Variable y = f(leaves);
+  expect_stored(op + ".y", y.value(), y_order);
+  backward(sum(multiply(y, Variable(numbers(op + ".r", y.shape(), y_order)))));
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    expect_stored(op + "." + inputs[i].name + ".grad", leaves[i].grad(), inputs[i].order);
+  }
+}
+
+constexpr ConvOptions kHalving{.stride = 2, .padding = 1};
+
+TEST(OpsParity, Convolutions) {
+  expect_parity("conv1d",
+                {{"x", {2, 9, 3}, Order::channels_last}, {"w", {3, 3, 5}, Order::conv_weight}, {"b", {5}}},
+                Order::channels_last, [](const auto& in) { return conv1d(in[0], in[1], in[2], kHalving); });
+  expect_parity(
+      "conv2d",
+      {{"x", {2, 5, 7, 3}, Order::channels_last}, {"w", {3, 3, 3, 17}, Order::conv_weight}, {"b", {17}}},
+      Order::channels_last, [](const auto& in) { return conv2d(in[0], in[1], in[2], kHalving); });
+}
+
+TEST(OpsParity, TransposedConvolutions) {
+  expect_parity(
+      "conv_transpose1d",
+      {{"x", {2, 5, 3}, Order::channels_last}, {"w", {4, 3, 5}, Order::transposed_weight}, {"b", {5}}},
+      Order::channels_last, [](const auto& in) { return conv_transpose1d(in[0], in[1], in[2], kHalving); });
+  expect_parity(
+      "conv_transpose2d",
+      {{"x", {2, 4, 3, 3}, Order::channels_last}, {"w", {4, 4, 3, 5}, Order::transposed_weight}, {"b", {5}}},
+      Order::channels_last, [](const auto& in) { return conv_transpose2d(in[0], in[1], in[2], kHalving); });
+}
+
+TEST(OpsParity, Linear) {
+  expect_parity("linear", {{"x", {3, 33}}, {"w", {33, 17}, Order::linear_weight}, {"b", {17}}}, Order::same,
+                [](const auto& in) { return linear(in[0], in[1], in[2]); });
+}
+
+TEST(OpsParity, Losses) {
+  expect_parity("l2_loss", {{"x", {2, 5, 3}}, {"target", {2, 5, 3}}}, Order::same,
+                [](const auto& in) { return l2_loss(in[0], in[1]); });
+  expect_parity("kl_divergence", {{"mean", {3, 4}}, {"log_var", {3, 4}}}, Order::same,
+                [](const auto& in) { return kl_divergence(in[0], in[1]); });
+  expect_parity("softmax_cross_entropy", {{"logits", {3, 7}}}, Order::same, [](const auto& in) {
+    const std::int32_t labels[] = {2, 0, 6};
+    return softmax_cross_entropy(in[0], labels);
+  });
+}
+
+TEST(OpsParity, Ssim) {
+  const struct {
+    const char* name;
+    Shape shape;
+  } cases[] = {{"ssim", {2, 16, 13, 1}}, {"ssim8", {2, 8, 9, 1}}};
+  for (const auto& c : cases) {
+    Tensor target = numbers(std::string(c.name) + ".target", c.shape, Order::same);
+    for (real& x : target.values()) x = std::abs(x);
+    expect_parity(c.name, {{"x", c.shape}}, Order::same, [&](const auto& in) { return ssim(in[0], target); });
+  }
+}
+
+}  // namespace
+}  // namespace supertac
