@@ -69,6 +69,8 @@ TEST(Adam, ZeroGradientsForALongTimeChangeNothing) {
   for (int i = 0; i < 1000; ++i) s.step(0);
   EXPECT_EQ(s.value(), rested);
   EXPECT_TRUE(std::isfinite(rested));
+  EXPECT_EQ(s.adam.first_moments()[0].item(), 0);  // not a denormal number, which would be slow for ever
+  EXPECT_EQ(s.adam.second_moments()[0].item(), 0);
   s.step(1);
   EXPECT_NEAR(s.value(), rested - 0.1 * 0.1 / std::sqrt(1e-3), 1e-3);  // a fresh start, bias correction gone
 }
