@@ -233,7 +233,8 @@ int run(Arguments& a) {
   }
   std::map<std::string, std::string> metadata = origin(a, windows, split);
   metadata["training"] = settings.text();
-  save_model(out, trainer.model(), {windows.settings().rate_hz, windows.settings().scaling}, metadata);
+  save_model(out, trainer.model(),
+             {windows.settings().rate_hz, windows.settings().scaling, windows.filter_s()}, metadata);
   a.print(out + ": " + std::to_string(trainer.model().parameter_count()) + " parameters after " +
           std::to_string(trainer.step()) + " steps; curves in " + folder.path() + "/report.html");
   nlohmann::ordered_json result = description;

@@ -89,6 +89,7 @@ Recording import_text_pass(const std::string& path, ImportReport& report) {
   Recording recording;
   recording.source = "imported";
   recording.metadata["time_base"] = "nominal";
+  recording.metadata["filter_s"] = format(kImportFilterSeconds);
   std::array<float, kTaxels> volts{};
   for (std::string_view rest = text; !rest.empty();) {
     const std::string_view line = rest.substr(0, rest.find('\n'));

@@ -25,6 +25,9 @@ struct ImportReport {
 /// that a slide of 108 mm takes at 10 mm/s, about a fifth fewer than the board's 1008 Hz.
 constexpr double kImportRateHz = 800;
 
+/// Length of the moving average that the text files went through: 100 frames of the board's 992 us.
+constexpr double kImportFilterSeconds = 0.0992;
+
 /// Reads a text recording: one frame per line, 16 columns of volts, taxel 0 to 15, separated by spaces, tabs
 /// or commas. Lines that are not such a frame are dropped and counted, never repaired: a short line and the
 /// rest of it on another cannot be told from halves of different frames.

@@ -11,6 +11,7 @@
 #include "data/hash.h"
 #include "data/metrics.h"
 #include "data/truth.h"
+#include "io/numbers.h"
 
 namespace supertac {
 namespace {
@@ -40,6 +41,12 @@ void check_size(const char* what, size_t got, size_t expected) {
 bool is_reliable(const Recording& recording) {
   const auto flag = recording.metadata.find("registration_reliable");
   return flag == recording.metadata.end() || flag->second != "no";
+}
+
+// Length of the recording's moving average (s); 0 when its metadata names none.
+double filter_of(const Recording& recording) {
+  const auto found = recording.metadata.find("filter_s");
+  return found == recording.metadata.end() ? 0 : parse_double(found->second).value_or(0);
 }
 
 // Hashes 32-bit words one after the other.
@@ -134,6 +141,7 @@ void WindowSet::add(const Recording& recording) {
             .pass = recording.pass,
             .speed_mm_s = recording.speed_mm_s,
             .source = recording.source,
+            .filter_s = filter_of(recording),
             .frames = track.frames(),
             .first_window = index_.size(),
             .windows = 0};
@@ -193,6 +201,16 @@ bool WindowSet::contact(size_t i) const {
   const auto size = static_cast<size_t>(image_size());
   truth(i, std::span(image).first(size * size));
   return in_contact(std::span(image).first(size * size));
+}
+
+std::optional<double> WindowSet::filter_s() const {
+  std::optional<double> common;
+  for (const Pass& pass : passes_) {
+    if (pass.windows == 0) continue;
+    if (common && *common != pass.filter_s) return std::nullopt;
+    common = pass.filter_s;
+  }
+  return common;
 }
 
 std::string WindowSet::fingerprint() const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -47,6 +48,7 @@ class WindowSet {
     int trial = 0, pass = 0;
     double speed_mm_s = 0;
     std::string source;
+    double filter_s = 0;  ///< length of the moving average the signals went through; 0 = none
     size_t frames = 0;                     ///< on the model's rate
     size_t first_window = 0, windows = 0;  ///< its windows are consecutive, in order of time
   };
@@ -94,6 +96,9 @@ class WindowSet {
   size_t frame_of(size_t i) const { return index_[i].last; }
   /// The frames of a whole pass, [frames][16]; empty when no window ends in it.
   std::span<const float> track(size_t pass) const { return tracks_[pass].samples; }
+
+  /// The filter_s of all passes with windows, or nothing when they differ.
+  std::optional<double> filter_s() const;
 
   /// 16 hexadecimal digits over samples, positions, plates and index: the same data and settings, the same
   /// text.

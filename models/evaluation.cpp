@@ -18,35 +18,39 @@ struct Batch {
 
 void compute(const SuperTac& model, const WindowSet& data, std::span<const std::uint32_t> indices,
              Batch& batch) {
-  const Dim size = model.settings().image_size(), timesteps = model.settings().timesteps;
-  const auto count = static_cast<Dim>(indices.size());
-  batch.windows = Tensor(Shape{count, timesteps, kWindowTaxels});
-  batch.truths = Tensor(Shape{count, size, size, 1});
-  const auto window_size = static_cast<std::size_t>(timesteps * kWindowTaxels);
-  const auto truth_size = static_cast<std::size_t>(size * size);
+  const auto window_size = batch.windows.values().size() / indices.size();
+  const auto truth_size = batch.truths.values().size() / indices.size();
   for (std::size_t n = 0; n < indices.size(); ++n) {
     data.window(indices[n], batch.windows.values().subspan(n * window_size, window_size));
     data.truth(indices[n], batch.truths.values().subspan(n * truth_size, truth_size));
   }
-  batch.outputs = model.infer(batch.windows);
+  // Copied, so that what this thread took from its pool goes back there.
+  const Tensor outputs = model.infer(batch.windows);
+  std::copy_n(outputs.data(), outputs.size(), batch.outputs.data());
 }
 
 }  // namespace
 
 void for_each_output(const SuperTac& model, const WindowSet& data, std::span<const std::uint32_t> indices,
                      const std::function<bool(const EvaluatedBatch&)>& use) {
-  if (data.timesteps() != model.settings().timesteps || data.image_size() != model.settings().image_size()) {
+  const Dim size = model.settings().image_size(), timesteps = model.settings().timesteps;
+  if (data.timesteps() != timesteps || data.image_size() != size) {
     throw std::invalid_argument(
         "for_each_output: the windows do not have the model's length or picture size");
   }
   for (std::size_t start = 0; start < indices.size(); start += kBatch * kBatchesAtOnce) {
     std::vector<Batch> batches;
     const std::size_t end = std::min(indices.size(), start + kBatch * kBatchesAtOnce);
-    for (std::size_t first = start; first < end; first += kBatch) batches.push_back({first, {}, {}, {}, {}});
+    for (std::size_t first = start; first < end; first += kBatch) {
+      const auto count = static_cast<Dim>(std::min(kBatch, end - first));
+      const Shape pictures{count, size, size, 1};
+      batches.push_back(
+          {first, Tensor(Shape{count, timesteps, kWindowTaxels}), Tensor(pictures), Tensor(pictures), {}});
+    }
 #pragma omp parallel for schedule(static, 1)
     for (std::size_t i = 0; i < batches.size(); ++i) {
       try {
-        const std::size_t count = std::min(kBatch, indices.size() - batches[i].first);
+        const auto count = static_cast<std::size_t>(batches[i].windows.dim(0));
         compute(model, data, indices.subspan(batches[i].first, count), batches[i]);
       } catch (...) {  // an exception must not leave a thread
         batches[i].error = std::current_exception();

@@ -36,6 +36,9 @@ class JsonEntry {
     if (!value.is_number() || !std::isfinite(value.get<double>())) wrong(name, "a finite number", value);
     return value.get<double>();
   }
+  std::optional<double> number_or_null(const char* name) const {
+    return field(name).is_null() ? std::nullopt : std::optional(number(name));
+  }
   std::string text(const char* name) const {
     const Json& value = field(name);
     if (!value.is_string()) wrong(name, "a text", value);
@@ -77,11 +80,14 @@ SuperTacSettings read_settings(const JsonEntry& entry) {
 
 InputSettings read_input(const JsonEntry& entry) {
   const InputSettings input{entry.number("rate_hz"),
-                            {entry.number("rest_volts"), entry.number("span_volts")}};
+                            {entry.number("rest_volts"), entry.number("span_volts")},
+                            entry.number_or_null("filter_s")};
   if (input.rate_hz < 1 || input.rate_hz > 100'000 || std::abs(input.scaling.rest_volts) > 1000 ||
-      input.scaling.span_volts <= 1e-6 || input.scaling.span_volts > 1000) {
-    throw std::runtime_error(entry.where() +
-                             ": expected rate_hz 1 to 100000, |rest_volts| <= 1000, span_volts 1e-6 to 1000");
+      input.scaling.span_volts <= 1e-6 || input.scaling.span_volts > 1000 || input.filter_s.value_or(0) < 0 ||
+      input.filter_s.value_or(0) > 10) {
+    throw std::runtime_error(
+        entry.where() +
+        ": expected rate_hz 1 to 100000, |rest_volts| <= 1000, span_volts 1e-6 to 1000, filter_s 0 to 10");
   }
   return input;
 }
@@ -95,6 +101,7 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
   const Json scaling = {{"rate_hz", input.rate_hz},
                         {"rest_volts", input.scaling.rest_volts},
                         {"span_volts", input.scaling.span_volts},
+                        {"filter_s", input.filter_s ? Json(*input.filter_s) : Json(nullptr)},
                         {"formula", "clip((rest_volts - V) / span_volts, 0, 1)"}};
   return {{"settings", settings.dump()}, {"input", scaling.dump()}};
 }

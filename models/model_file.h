@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "data/resample.h"
@@ -15,6 +16,9 @@ namespace supertac {
 struct InputSettings {
   double rate_hz = 300;
   Scaling scaling;
+  /// Length of the moving average (s) that the training signals went through, 0 = none; nothing when they
+  /// differed.
+  std::optional<double> filter_s = 0.0;
 };
 
 /// The metadata keys "settings" and "input", JSON texts.

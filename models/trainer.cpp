@@ -251,7 +251,8 @@ void Trainer::save(const std::string& path, std::map<std::string, std::string> m
     state.push_back(to_stored(parameters[i], adam_.first_moments()[i], "optimizer.m." + parameters[i].name));
     state.push_back(to_stored(parameters[i], adam_.second_moments()[i], "optimizer.v." + parameters[i].name));
   }
-  metadata.merge(model_metadata(settings_.model, {data_.settings().rate_hz, data_.settings().scaling}));
+  metadata.merge(model_metadata(settings_.model,
+                                {data_.settings().rate_hz, data_.settings().scaling, data_.filter_s()}));
   metadata["training"] = settings_.text();
   metadata["step"] = std::to_string(step_);
   metadata["flat_steps"] = std::to_string(flat_steps_);
@@ -261,7 +262,8 @@ void Trainer::save(const std::string& path, std::map<std::string, std::string> m
 void Trainer::restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata) {
   const SafetensorsFile file = read_checkpoint(path);
   auto expected = expected_metadata;
-  expected.merge(model_metadata(settings_.model, {data_.settings().rate_hz, data_.settings().scaling}));
+  expected.merge(model_metadata(settings_.model,
+                                {data_.settings().rate_hz, data_.settings().scaling, data_.filter_s()}));
   expected["training"] = settings_.text();
   for (const auto& [key, value] : expected) {
     const auto found = file.metadata().find(key);

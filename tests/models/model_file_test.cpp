@@ -22,11 +22,12 @@ TEST(ModelFile, ComesBackWithItsSettingsInputAndPictures) {
   SuperTacSettings settings = small_settings();
   settings.grouping = Grouping::vertical;
   const SuperTac model(settings, rng);
-  save_model(folder / "m.safetensors", model, {300, {2.5, 0.4}}, {{"split", "trial"}});
+  save_model(folder / "m.safetensors", model, {300, {2.5, 0.4}, 0.0992}, {{"split", "trial"}});
   const ModelFile file = load_model(folder / "m.safetensors");
   EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
   EXPECT_EQ(file.model->settings().latent, 3);
   EXPECT_EQ(file.input.scaling.rest_volts, 2.5);
+  EXPECT_EQ(file.input.filter_s, 0.0992);
   EXPECT_EQ(file.metadata.at("split"), "trial");
   const Tensor x = uniform({2, 32, 16}, 1), a = model.infer(x), b = file.model->infer(x);
   for (Dim i = 0; i < a.size(); ++i) EXPECT_EQ(a.data()[i], b.data()[i]);
@@ -40,7 +41,7 @@ TEST(ModelFile, TheFileNeverSizesAnything) {
   const auto write = [&](const std::string& settings, const std::string& input) {
     write_checkpoint(path, model.parameters(), {{"settings", settings}, {"input", input}});
   };
-  const std::string input = R"({"rate_hz":300,"rest_volts":2.45,"span_volts":0.36})";
+  const std::string input = R"({"rate_hz":300,"rest_volts":2.45,"span_volts":0.36,"filter_s":0})";
   const auto settings = [](const std::string& timesteps, const std::string& latent) {
     return R"({"preset":"paper","timesteps":)" + timesteps + R"(,"latent":)" + latent +
            R"(,"scale":2,"grouping":"horizontal","channels":8,"rcabs":1})";
@@ -59,8 +60,8 @@ TEST(ModelFile, TheFileNeverSizesAnything) {
       << load_error(path);
   write("[[[[", input);
   EXPECT_NE(load_error(path).find("metadata \"settings\""), std::string::npos) << load_error(path);
-  write(settings("32", "3"), R"({"rate_hz":300,"rest_volts":2.45,"span_volts":0})");
-  EXPECT_NE(load_error(path).find("span_volts 1e-6 to 1000"), std::string::npos) << load_error(path);
+  write(settings("32", "3"), R"({"rate_hz":300,"rest_volts":2.45,"span_volts":0,"filter_s":null})");
+  EXPECT_NE(load_error(path).find("span_volts 1e-6 to 1000, filter_s 0 to 10"), std::string::npos) << load_error(path);
 }
 
 }  // namespace
