@@ -85,13 +85,14 @@ RecorderSettings read_settings(const Arguments& arguments, const std::string& ou
 // Present while a collection runs, and after one that did not end with the head back at its origin.
 std::string origin_mark(const std::string& out) { return out + "/origin-unknown"; }
 
-RecorderReport collect(const Arguments& arguments, RecorderSettings settings) {
+RecorderReport collect(const Arguments& arguments, RecorderSettings settings, const std::string& out) {
   const double speedup = arguments.number("speedup", 0.1, 100);
   auto board = std::make_unique<SerialPort>(resolve_board_port(arguments.text("board")),
                                             SerialSettings{kBoardBaud, speedup});
   auto printer =
       std::make_unique<SerialPort>(required_text(arguments, "printer"), SerialSettings{115200, speedup});
   confirm(arguments, settings);
+  write_file(origin_mark(out), "the head's position is unknown until a run has ended here\n");
   std::atomic<bool> stop{false}, ended{false};
   settings.stop = &stop;
   Progress progress(arguments, "collecting", static_cast<uint64_t>(settings.plan.passes) * 1000,
@@ -137,8 +138,7 @@ int run(Arguments& arguments) {
         " was cut off, so the head's position is unknown; move it to X99.70 Y101.17 Z131.81 and add "
         "--confirm-origin, or use --home");
   }
-  write_file(origin_mark(out), "the head's position is unknown until a run has ended here\n");
-  const RecorderReport report = collect(arguments, settings);
+  const RecorderReport report = collect(arguments, settings, out);
   const int frames = write_passes(arguments, settings.journal, out);
   if (report.outcome.complete) {
     fs::remove(origin_mark(out));

@@ -11,48 +11,40 @@ struct ConvLayerOptions {
   Dim padding = 0;
 };
 
+/// What the four layers share: a weight [kernel..., in, out] and a bias [out].
+class ConvLayer : public Module {
+ protected:
+  ConvLayer(int dimensions, Dim in, Dim out, const ConvLayerOptions& options, Layout layout, Rng& rng);
+  ConvLayerOptions options_;
+  Variable weight_, bias_;
+};
+
 /// x [N,L,in] -> [N, (L + 2 padding - kernel) / stride + 1, out]
-class Conv1d : public Module {
+class Conv1d : public ConvLayer {
  public:
   Conv1d(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
   Variable forward(const Variable& x) const;
-
- private:
-  ConvLayerOptions options_;
-  Variable weight_, bias_;
 };
 
 /// x [N,H,W,in] -> [N,H',W',out]
-class Conv2d : public Module {
+class Conv2d : public ConvLayer {
  public:
   Conv2d(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
   Variable forward(const Variable& x) const;
-
- private:
-  ConvLayerOptions options_;
-  Variable weight_, bias_;
 };
 
 /// x [N,L,in] -> [N, (L - 1) stride - 2 padding + kernel, out]
-class ConvTranspose1d : public Module {
+class ConvTranspose1d : public ConvLayer {
  public:
   ConvTranspose1d(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
   Variable forward(const Variable& x) const;
-
- private:
-  ConvLayerOptions options_;
-  Variable weight_, bias_;
 };
 
 /// x [N,H,W,in] -> [N,H',W',out]
-class ConvTranspose2d : public Module {
+class ConvTranspose2d : public ConvLayer {
  public:
   ConvTranspose2d(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
   Variable forward(const Variable& x) const;
-
- private:
-  ConvLayerOptions options_;
-  Variable weight_, bias_;
 };
 
 }  // namespace supertac

@@ -33,6 +33,18 @@ TEST(ModelFile, ComesBackWithItsSettingsInputAndPictures) {
   for (Dim i = 0; i < a.size(); ++i) EXPECT_EQ(a.data()[i], b.data()[i]);
 }
 
+// A file of version 1, to be read for ever: settings, names, layouts and what they compute.
+TEST(ModelFile, ReadsTheGoldenFileOfVersion1) {
+  const ModelFile file = load_model(std::string(SUPERTAC_GOLDEN_DIR) + "/model_v1.safetensors");
+  EXPECT_EQ(file.model->settings().channels, 4);
+  EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
+  const Tensor picture = file.model->infer(uniform({1, 32, 16}, 1));
+  EXPECT_NEAR(picture.data()[0], 0.116217159, 1e-6);
+  EXPECT_NEAR(picture.data()[9], 0.15846996, 1e-6);
+  EXPECT_NEAR(picture.data()[27], 0.122343943, 1e-6);
+  EXPECT_NEAR(picture.data()[63], 0.103620872, 1e-6);
+}
+
 TEST(ModelFile, TheFileNeverSizesAnything) {
   const TemporaryFolder folder;
   const std::string path = folder / "m.safetensors";
@@ -61,7 +73,8 @@ TEST(ModelFile, TheFileNeverSizesAnything) {
   write("[[[[", input);
   EXPECT_NE(load_error(path).find("metadata \"settings\""), std::string::npos) << load_error(path);
   write(settings("32", "3"), R"({"rate_hz":300,"rest_volts":2.45,"span_volts":0,"filter_s":null})");
-  EXPECT_NE(load_error(path).find("span_volts 1e-6 to 1000, filter_s 0 to 10"), std::string::npos) << load_error(path);
+  EXPECT_NE(load_error(path).find("span_volts 1e-6 to 1000, filter_s 0 to 10"), std::string::npos)
+      << load_error(path);
 }
 
 }  // namespace
