@@ -49,7 +49,7 @@ class WindowSet {
     double speed_mm_s = 0;
     std::string source;
     double filter_s = 0;  ///< length of the moving average the signals went through; 0 = none
-    size_t frames = 0;                     ///< on the model's rate
+    size_t frames = 0;    ///< on the model's rate
     size_t first_window = 0, windows = 0;  ///< its windows are consecutive, in order of time
   };
   struct Position {
