@@ -71,8 +71,12 @@ TEST_F(Training, InterruptedAndResumedGivesTheSameBytes) {
     const ProcessResult cut = run(name + ".safetensors", {}, {.signal = signal, .signal_when = state});
     EXPECT_EQ(cut.code, 128 + signal) << cut.error;
     EXPECT_FALSE(fs::exists(path(name + ".safetensors")));
+    write_file(path(name + ".run/last.safetensors.tmp-1-1"), "what a kill -9 in mid-write leaves");
     const ProcessResult resumed = run(name + ".safetensors", {"--resume", state});
     ASSERT_EQ(resumed.code, 0) << resumed.error;
+    for (const auto& entry : fs::directory_iterator(path(name + ".run"))) {
+      EXPECT_EQ(entry.path().string().find(".tmp-"), std::string::npos) << entry.path();
+    }
     EXPECT_TRUE(bytes("whole.safetensors") == bytes(name + ".safetensors")) << "signal " << signal;
   }
 }
