@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 
 #include "io/file.h"
@@ -49,6 +50,21 @@ TEST_F(Training, SameBytesForOneAndTwoThreads) {
   ASSERT_EQ(train("one.safetensors", {"--threads", "1"}).code, 0);
   ASSERT_EQ(train("two.safetensors", {"--threads", "2"}).code, 0);
   EXPECT_TRUE(bytes("one.safetensors") == bytes("two.safetensors"));
+}
+
+// The best instruction set of this processor against plain scalar code, through the whole training.
+TEST_F(Training, SameBytesForPortableKernels) {
+  ASSERT_EQ(train("best.safetensors").code, 0);
+  ASSERT_EQ(::setenv("SUPERTAC_ISA", "portable", 1), 0);
+  const ProcessResult portable = train("portable.safetensors");
+  ::setenv("SUPERTAC_ISA", "sparc", 1);
+  const ProcessResult unknown = train("unknown.safetensors");
+  ::unsetenv("SUPERTAC_ISA");
+  ASSERT_EQ(portable.code, 0) << portable.error;
+  EXPECT_TRUE(bytes("best.safetensors") == bytes("portable.safetensors"));
+  EXPECT_EQ(unknown.code, 1);
+  EXPECT_NE(unknown.error.find("SUPERTAC_ISA=sparc: not a known instruction set"), std::string::npos)
+      << unknown.error;
 }
 
 TEST_F(Training, InterruptedAndResumedGivesTheSameBytes) {
