@@ -1,14 +1,14 @@
 // supertac-train and supertac-evaluate as processes: same bits, exact resume, bad input.
 #include <gtest/gtest.h>
-#include <unistd.h>
-
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
 
 #include "io/file.h"
 #include "io/json.h"
 #include "io/safetensors.h"
 #include "tests/apps/process.h"
+#include "tests/io/temporary_folder.h"
 
 namespace supertac {
 namespace {
@@ -19,16 +19,14 @@ class Training : public testing::Test {
  protected:
   // One small simulated data set for all tests of this program.
   static void SetUpTestSuite() {
-    std::string pattern = (fs::temp_directory_path() / "supertac_training_XXXXXX").string();
-    root_ = ::mkdtemp(pattern.data());
-    const ProcessResult made =
-        run_process("supertac-simulate",
-                    {"--out", root_ + "/data", "--plates", "3_Bumps", "--speeds", "10", "--passes", "1"});
+    folder_ = std::make_unique<TemporaryFolder>();
+    const ProcessResult made = run_process("supertac-simulate", {"--out", path("data"), "--plates", "3_Bumps",
+                                                                 "--speeds", "10", "--passes", "1"});
     ASSERT_EQ(made.code, 0) << made.error;
   }
-  static void TearDownTestSuite() { fs::remove_all(root_); }
+  static void TearDownTestSuite() { folder_.reset(); }
 
-  static std::string path(const std::string& name) { return root_ + "/" + name; }
+  static std::string path(const std::string& name) { return *folder_ / name; }
   static std::string bytes(const std::string& name) { return read_text_file(path(name), 1 << 26); }
 
   static std::vector<std::string> options(const std::string& out, std::vector<std::string> more = {}) {
@@ -42,9 +40,9 @@ class Training : public testing::Test {
     return run_process("supertac-train", options(out, std::move(more)));
   }
 
-  static std::string root_;
+  static std::unique_ptr<TemporaryFolder> folder_;
 };
-std::string Training::root_;
+std::unique_ptr<TemporaryFolder> Training::folder_;
 
 TEST_F(Training, SameBytesForOneAndTwoThreads) {
   ASSERT_EQ(train("one.safetensors", {"--threads", "1"}).code, 0);

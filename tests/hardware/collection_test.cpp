@@ -47,7 +47,7 @@ struct CollectionBench {
     return std::sqrt(squares / static_cast<double>(pass.time_s.size()));
   }
 
-  ScratchFolder folder;
+  TemporaryFolder folder;
   SimulatedRig rig;
   RecorderSettings settings;
   std::vector<TruthOfFrame> truth;

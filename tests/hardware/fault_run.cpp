@@ -76,7 +76,7 @@ std::string check_finger(const PalpationOutcome& outcome, SimulatedRig& rig, con
 
 FaultVerdict run_faulty_collection(const RigFaults& faults, std::uint64_t seed, int passes) {
   FaultVerdict verdict;
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   RigSettings rig_settings = running_rig();
   rig_settings.faults = faults;
   rig_settings.seed = seed;

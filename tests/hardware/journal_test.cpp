@@ -25,7 +25,7 @@ std::vector<std::byte> file_bytes(const std::string& path) {
 }
 
 TEST(Journal, GivesBackWhatWasWritten) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   {
     JournalWriter writer(folder / "j", "a header");
     writer.append(Stream::board, RecordKind::received, 1.5, frame_bytes(random_frame(1)));
@@ -43,7 +43,7 @@ TEST(Journal, GivesBackWhatWasWritten) {
 }
 
 TEST(Journal, NeverOverwritesAndSaysWhyItCannotWrite) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   std::ofstream(folder / "j") << "precious";
   EXPECT_THROW(JournalWriter(folder / "j", ""), JournalError);
   EXPECT_EQ(file_bytes(folder / "j").size(), 8U);
@@ -51,7 +51,7 @@ TEST(Journal, NeverOverwritesAndSaysWhyItCannotWrite) {
 }
 
 TEST(Journal, EveryPrefixReadsAsFarAsItIsWhole) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   {
     JournalWriter writer(folder / "j", "h");
     for (int i = 0; i < 20; ++i) writer.event(i, "event " + std::to_string(i));
@@ -71,7 +71,7 @@ TEST(Journal, EveryPrefixReadsAsFarAsItIsWhole) {
 }
 
 TEST(Journal, EveryFlippedBitIsFound) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   {
     JournalWriter writer(folder / "j", "h");
     writer.event(1, "first");
@@ -94,7 +94,7 @@ TEST(Journal, EveryFlippedBitIsFound) {
 
 // ENOSPC and EFBIG look alike from here; a file size limit needs no full disk.
 TEST(Journal, AFullDiskIsReportedAndWhatWasWrittenIsKept) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
@@ -122,7 +122,7 @@ TEST(Journal, AFullDiskIsReportedAndWhatWasWrittenIsKept) {
 }
 
 TEST(Journal, KillLosesAtMostHalfASecond) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   for (int round = 0; round < 6; ++round) {
     const std::string path = folder / ("j" + std::to_string(round));
     const pid_t child = fork();

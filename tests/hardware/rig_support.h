@@ -15,26 +15,9 @@
 #include "hardware/board_frame.h"
 #include "hardware/virtual_rig/simulated_rig.h"
 #include "io/random.h"
+#include "tests/io/temporary_folder.h"
 
 namespace supertac {
-
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "supertac-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no scratch folder");
-    path_ = name;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
 
 inline BoardFrame random_frame(std::uint64_t index, std::uint64_t seed = 7) {
   const RandomStream random(seed, index);

@@ -23,7 +23,7 @@ namespace {
 std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
 
 TEST(SerialPort, TakesTheBoardsOddBaudRateAndNoModemLines) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const PseudoTerminal terminal(folder / "port");
   const SerialPort port(folder / "port", {.baud = 7'372'800});  // a pty has no DTR: not an error
   const int other = open(terminal.path().c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK);
@@ -35,7 +35,7 @@ TEST(SerialPort, TakesTheBoardsOddBaudRateAndNoModemLines) {
 }
 
 TEST(SerialPort, SecondOpenerIsRefusedEvenAsRoot) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const PseudoTerminal terminal(folder / "port");
   {
     const SerialPort first(folder / "port");
@@ -45,7 +45,7 @@ TEST(SerialPort, SecondOpenerIsRefusedEvenAsRoot) {
 }
 
 TEST(SerialPort, WhatCannotBeOpenedSaysWhy) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   EXPECT_THROW(SerialPort port(folder / "nothing"), PortNotFound);
   std::ofstream(folder / "file") << "text";
   EXPECT_THROW(SerialPort port(folder / "file"), NotASerialPort);
@@ -58,7 +58,7 @@ TEST(SerialPort, WhatCannotBeOpenedSaysWhy) {
 }
 
 TEST(SerialPort, TimeOutAndEndOfFileAreDifferent) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   PseudoTerminal terminal(folder / "port");
   SerialPort port(folder / "port");
   std::array<std::byte, 16> buffer{};
@@ -76,7 +76,7 @@ TEST(SerialPort, TimeOutAndEndOfFileAreDifferent) {
 TEST(SerialPort, UnpluggingIsNoticedWithin100Milliseconds) {
   double worst = 0;
   for (int i = 0; i < 20; ++i) {
-    const ScratchFolder folder;
+    const TemporaryFolder folder;
     PseudoTerminal terminal(folder / "port");
     SerialPort port(folder / "port");
     std::atomic<double> pulled{0};
@@ -94,7 +94,7 @@ TEST(SerialPort, UnpluggingIsNoticedWithin100Milliseconds) {
 }
 
 TEST(SerialPort, AFullDeviceIsATimeOut) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const PseudoTerminal terminal(folder / "port");
   SerialPort port(folder / "port");
   const std::vector<std::byte> much(1 << 20);
@@ -103,7 +103,7 @@ TEST(SerialPort, AFullDeviceIsATimeOut) {
 
 // Partial writes, EAGAIN and EINTR: a slow reader, and a signal every 200 us without SA_RESTART.
 TEST(SerialPort, OutputIsByteExactUnderAStormOfSignals) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const PseudoTerminal terminal(folder / "port");
   SerialPort port(folder / "port");
   std::vector<std::byte> sent(200'000);

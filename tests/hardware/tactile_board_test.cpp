@@ -92,7 +92,7 @@ TEST(TactileBoard, UnpluggingIsATypedErrorAfterTheLastFrame) {
 }
 
 TEST(TactileBoard, OverAPseudoTerminalAtTenTimesTheSpeed) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   PtyRig rig(running_rig(), folder / "board", folder / "printer", 10);
   TactileBoard board(std::make_unique<SerialPort>(folder / "board", SerialSettings{kBoardBaud, 10}));
   std::uint64_t frames = 0;
@@ -109,7 +109,7 @@ TEST(TactileBoard, OverAPseudoTerminalAtTenTimesTheSpeed) {
 }
 
 TEST(TactileBoard, APrinterAtTheBoardsPortIsRecognised) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   RigSettings settings;
   settings.printer.boot_s = 0.01;
   settings.printer.heartbeat = true;
@@ -120,7 +120,7 @@ TEST(TactileBoard, APrinterAtTheBoardsPortIsRecognised) {
 }
 
 TEST(TactileBoard, ABoardAtThePrintersPortIsRecognised) {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   PtyRig rig(running_rig(), folder / "board", folder / "printer", 5);
   SerialPort port(folder / "board", {.speedup = 5});
   MarlinLink link(port);

@@ -2,29 +2,19 @@
 
 #include <gtest/gtest.h>
 
-#include <unistd.h>
-
-#include <filesystem>
 #include <numeric>
 
 #include "layers/convolution.h"
 #include "layers/linear.h"
+#include "tests/io/temporary_folder.h"
 
 namespace supertac {
 namespace {
 
 class CheckpointTest : public testing::Test {
  protected:
-  void SetUp() override {
-    dir_ = std::filesystem::temp_directory_path() /
-           ("supertac_checkpoint_" + std::to_string(::getpid()) + "_" +
-            testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::create_directories(dir_);
-  }
-  void TearDown() override { std::filesystem::remove_all(dir_); }
-  std::string path(const std::string& name) const { return (dir_ / name).string(); }
-
-  std::filesystem::path dir_;
+  std::string path(const std::string& name) const { return folder_ / name; }
+  TemporaryFolder folder_;
 };
 
 // Fills a parameter with 0, 1, 2 ... in memory order.

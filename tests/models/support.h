@@ -1,14 +1,12 @@
 // Small models and windows for the tests of models/.
 #pragma once
 
-#include <unistd.h>
-
-#include <filesystem>
 #include <string>
 
 #include "data/windows.h"
 #include "io/file.h"
 #include "models/trainer.h"
+#include "tests/io/temporary_folder.h"
 
 namespace supertac {
 
@@ -83,22 +81,6 @@ inline std::vector<std::uint32_t> all_of(const WindowSet& windows) {
   for (std::uint32_t i = 0; i < windows.size(); ++i) indices.push_back(i);
   return indices;
 }
-
-/// A folder of its own for each test, removed at the end.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "supertac_test_XXXXXX").string();
-    path_ = ::mkdtemp(pattern.data());
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
 
 inline std::string file_text(const std::string& path) {
   const std::vector<std::byte> bytes = read_file(path, 1 << 26);
