@@ -1,6 +1,7 @@
 #include "layers/module.h"
 
 #include <cmath>
+#include <stdexcept>
 
 namespace supertac {
 
@@ -26,6 +27,11 @@ std::vector<Variable> values_of(const std::vector<Parameter>& parameters) {
 }
 
 Tensor uniform_fan_in(const Shape& shape, Dim fan_in, Rng& rng) {
+  if (fan_in < 1) {
+    throw std::invalid_argument(
+        "uniform_fan_in: expects at least one input (and a kernel of at least 1), got " + shape.text() +
+        " with a fan-in of " + std::to_string(fan_in));
+  }
   Tensor t(shape);
   const double bound = 1 / std::sqrt(static_cast<double>(fan_in));
   for (real& x : t.values()) x = rng.uniform(bound);

@@ -56,7 +56,8 @@ class Module {
 std::vector<Variable> values_of(const std::vector<Parameter>& parameters);
 
 /// Uniform in [-1/sqrt(fan_in), 1/sqrt(fan_in)): what PyTorch draws for convolutions and linear layers
-/// (He et al. 2015 with a = sqrt(5)).
+/// (He et al. 2015 with a = sqrt(5)). Throws std::invalid_argument when fan_in < 1: a layer without inputs or
+/// with a kernel of 0.
 Tensor uniform_fan_in(const Shape& shape, Dim fan_in, Rng& rng);
 
 }  // namespace supertac

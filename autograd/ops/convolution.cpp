@@ -26,6 +26,7 @@ void check_arguments(const char* op, const Variable& x, const Variable& w, const
   if (in < 1 || in > kernels::kMaxChannels || out < 1 || out > kernels::kMaxChannels) {
     refuse(op, "channels must be 1 to " + std::to_string(kernels::kMaxChannels) + shapes(x, w));
   }
+  if (w.dim(0) < 1 || w.dim(rank - 3) < 1) refuse(op, "the kernel must be at least 1 wide" + shapes(x, w));
   check_shape(op, "bias", b, {out});
   if (o.stride < 1 || o.padding < 0) {
     refuse(op, "stride must be positive and padding not negative, got " + std::to_string(o.stride) + " and " +

@@ -1,17 +1,19 @@
 #include "autograd/ops/max_pool.h"
 
+#include <cmath>
+
 #include "autograd/checks.h"
 
 namespace supertac {
 namespace {
 
-// The offset in x of the largest of the four elements of block (i, j), channel c.
+// The offset in x of the largest of the four elements of block (i, j), channel c; of a NaN if there is one.
 Dim argmax(const Tensor& x, Dim n, Dim i, Dim j, Dim c) {
   const Dim width = x.dim(2), channels = x.dim(3);
   const Dim corner = ((n * x.dim(1) + 2 * i) * width + 2 * j) * channels + c;
   Dim best = corner;
   for (const Dim at : {corner + channels, corner + width * channels, corner + (width + 1) * channels}) {
-    if (x.data()[at] > x.data()[best]) best = at;
+    if (x.data()[at] > x.data()[best] || std::isnan(x.data()[at])) best = at;
   }
   return best;
 }

@@ -60,6 +60,19 @@ TEST(Module, InitialisationHasTheVarianceItStates) {
   EXPECT_GT(largest, real(0.199));
 }
 
+TEST(Module, RefusesALayerWithoutInputs) {
+  Rng rng(1);
+  try {
+    Conv2d(3, 8, {.kernel = 0}, rng);
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(
+        error.what(),
+        "uniform_fan_in: expects at least one input (and a kernel of at least 1), got [0,0,3,8] with a "
+        "fan-in of 0");
+  }
+}
+
 TEST(Module, CountsItsParameters) {
   Rng rng(1);
   EXPECT_EQ(Linear(3, 5, rng).parameter_count(), 20);

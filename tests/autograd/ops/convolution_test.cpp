@@ -140,6 +140,9 @@ TEST(Conv, RefusesWithNames) {
   expect_refusal("conv2d: channels must be 1 to 4096 (x [1,3,3,0], weight [3,3,0,2])", [&] {
     conv2d(Variable(Tensor::zeros({1, 3, 3, 0})), Variable(Tensor::zeros({3, 3, 0, 2})), b, {});
   });
+  expect_refusal("conv2d: the kernel must be at least 1 wide (x [4,40,40,3], weight [3,0,3,16])", [&] {
+    conv2d(x, Variable(Tensor::zeros({3, 0, 3, 16})), b, {.padding = 1});
+  });
   expect_refusal("conv2d: bias expects [16], got [2,3]", [&] { conv2d(x, w3, flat, {}); });
   expect_refusal("conv2d: stride must be positive and padding not negative, got 0 and 0",
                  [&] { conv2d(x, w3, b, {.stride = 0}); });

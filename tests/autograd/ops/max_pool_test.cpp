@@ -1,5 +1,8 @@
 #include "autograd/ops/max_pool.h"
 
+#include <cmath>
+#include <limits>
+
 #include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
 
@@ -14,6 +17,14 @@ TEST(MaxPool, HandComputedAndAnOddRowIsLeftOut) {
   expect_values(y.value(), {1, 1, 2, 1}, {5, 2});
   backward(sum(y));  // among equal values the first gets the gradient, once
   expect_values(x.grad(), {1, 3, 4, 1}, {0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+}
+
+TEST(MaxPool, ANanComesOutWhereverItLies) {
+  for (Dim at = 0; at < 4; ++at) {
+    Tensor x = Tensor::of({1, 2, 2, 1}, {1, 5, 2, 7});
+    x.data()[at] = std::numeric_limits<real>::quiet_NaN();
+    EXPECT_TRUE(std::isnan(max_pool2d(Variable(x)).item())) << "element " << at;
+  }
 }
 
 TEST(MaxPool, Empty) {
