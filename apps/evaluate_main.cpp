@@ -74,11 +74,7 @@ Task load_task(const Arguments& a, const ModelFile& file) {
   task.test = std::move(split.test);
   const auto limit =
       static_cast<std::size_t>(a.integer("limit", 0, std::numeric_limits<std::uint32_t>::max()));
-  if (limit > 0 && limit < task.test.size()) {
-    std::vector<std::uint32_t> fewer;
-    for (std::size_t i = 0; i < limit; ++i) fewer.push_back(task.test[i * task.test.size() / limit]);
-    task.test = std::move(fewer);
-  }
+  if (limit > 0) task.test = spread(task.test, limit);
   return task;
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "data/split.h"
+
 namespace supertac {
 namespace {
 
@@ -13,12 +15,9 @@ size_t pixels_of(const WindowSet& windows) {
   return static_cast<size_t>(windows.image_size()) * static_cast<size_t>(windows.image_size());
 }
 
-std::vector<uint32_t> spread(std::span<const uint32_t> train) {
+std::vector<uint32_t> fitted_on(std::span<const uint32_t> train) {
   if (train.empty()) throw std::invalid_argument("baseline: there is no window to fit to");
-  const size_t count = std::min(train.size(), kFitWindows);
-  std::vector<uint32_t> chosen(count);
-  for (size_t i = 0; i < count; ++i) chosen[i] = train[i * train.size() / count];
-  return chosen;
+  return spread(train, kFitWindows);
 }
 
 void check_size(const char* what, size_t got, size_t expected) {
@@ -47,7 +46,7 @@ double keys_kernel(double distance) {
 MeanImage::MeanImage(const WindowSet& windows, std::span<const uint32_t> train) : image_(pixels_of(windows)) {
   std::vector<double> sum(image_.size());
   std::vector<float> truth(image_.size());
-  const std::vector<uint32_t> chosen = spread(train);
+  const std::vector<uint32_t> chosen = fitted_on(train);
   for (const uint32_t i : chosen) {
     windows.truth(i, truth);
     for (size_t p = 0; p < sum.size(); ++p) sum[p] += truth[p];
@@ -102,7 +101,7 @@ UpsampledFrame::UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows,
   const size_t pixels = pixels_of(windows);
   std::vector<float> image(pixels), truth(pixels);
   double sx = 0, sy = 0, sxx = 0, sxy = 0;
-  const std::vector<uint32_t> chosen = spread(train);
+  const std::vector<uint32_t> chosen = fitted_on(train);
   for (const uint32_t i : chosen) {
     upsampling_(windows.last_frame(i), image);
     windows.truth(i, truth);

@@ -220,4 +220,10 @@ std::string fingerprint(const Split& split) {
   return hex64(state);
 }
 
+std::vector<uint32_t> spread(std::span<const uint32_t> list, size_t count) {
+  std::vector<uint32_t> chosen(std::min(count, list.size()));
+  for (size_t i = 0; i < chosen.size(); ++i) chosen[i] = list[i * list.size() / chosen.size()];
+  return chosen;
+}
+
 }  // namespace supertac

@@ -49,4 +49,7 @@ Leakage find_leakage(const WindowSet& windows, const Split& split);
 /// 16 hexadecimal digits over both index lists.
 std::string fingerprint(const Split& split);
 
+/// `count` elements spread evenly over the list, in its order; the whole list when it is not longer.
+std::vector<uint32_t> spread(std::span<const uint32_t> list, size_t count);
+
 }  // namespace supertac

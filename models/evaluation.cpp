@@ -63,4 +63,19 @@ void for_each_output(const SuperTac& model, const WindowSet& data, std::span<con
   }
 }
 
+ContactMetrics score(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
+                     bool (*stop)()) {
+  const int size = windows.image_size();
+  const auto pixels = static_cast<std::size_t>(size * size);
+  ContactMetrics metrics(size);
+  for_each_output(model, windows, indices, [&](const EvaluatedBatch& b) {
+    for (std::size_t n = 0; n < static_cast<std::size_t>(b.outputs.dim(0)); ++n) {
+      metrics.add(b.outputs.values().subspan(n * pixels, pixels),
+                  b.truths.values().subspan(n * pixels, pixels));
+    }
+    return stop == nullptr || !stop();
+  });
+  return metrics;
+}
+
 }  // namespace supertac

@@ -5,6 +5,7 @@
 #include <functional>
 #include <span>
 
+#include "data/metrics.h"
 #include "data/windows.h"
 #include "models/supertac_model.h"
 
@@ -24,5 +25,10 @@ struct EvaluatedBatch {
 /// data set's windows do not fit the model.
 void for_each_output(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
                      const std::function<bool(const EvaluatedBatch&)>& use);
+
+/// The metrics of the model's pictures of the given windows. `stop`, if given, is asked between batches; once
+/// it says true, the windows so far are what was measured. Throws as for_each_output.
+ContactMetrics score(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
+                     bool (*stop)() = nullptr);
 
 }  // namespace supertac

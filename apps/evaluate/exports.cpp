@@ -3,6 +3,7 @@
 #include <map>
 
 #include "data/images.h"
+#include "data/split.h"
 #include "io/safetensors.h"
 #include "models/evaluation.h"
 
@@ -10,14 +11,6 @@ namespace supertac {
 namespace {
 
 constexpr std::size_t kStrips = 12, kFilmColumns = 24;
-
-// `count` elements spread evenly over a list, or all of a shorter one.
-std::vector<std::uint32_t> spread(std::span<const std::uint32_t> list, std::size_t count) {
-  std::vector<std::uint32_t> chosen;
-  const std::size_t n = std::min(count, list.size());
-  for (std::size_t i = 0; i < n; ++i) chosen.push_back(list[i * list.size() / n]);
-  return chosen;
-}
 
 using Draw = Picture (*)(std::span<const Strip>, int, int);
 

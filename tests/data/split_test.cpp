@@ -177,5 +177,13 @@ TEST(Leakage, RestIsNoDuplicate) {
   EXPECT_TRUE(find_leakage(set, make_split(set, SplitKind::trial, 1)).none());
 }
 
+TEST(Split, SpreadTakesEvenlyOrAll) {
+  const std::vector<uint32_t> list{2, 3, 5, 7, 11, 13, 17};
+  EXPECT_EQ(spread(list, 3), (std::vector<uint32_t>{2, 5, 11}));
+  EXPECT_EQ(spread(list, 7), list);
+  EXPECT_EQ(spread(list, 100), list);
+  EXPECT_TRUE(spread({}, 3).empty());
+}
+
 }  // namespace
 }  // namespace supertac

@@ -1,0 +1,46 @@
+#include "apps/train/training_options.h"
+
+namespace supertac {
+
+void declare_training(Arguments& a) {
+  a.option("grouping", "NAME", "taxels of one VAE: horizontal (rows) or vertical (columns)", "horizontal");
+  a.option("split", "NAME", "what is kept for testing: window, pass, trial, texture or none", "trial");
+  a.option("epochs", "N", "passes over the training windows", "6");
+  a.option("batch", "N", "windows per step", "64");
+  a.option("stride", "N", "take every N-th window of a pass", "1");
+  a.option("learning-rate", "X", "peak of Adam's rate, after warm-up and before the cosine", "0.001");
+  a.option("augment", "NAME",
+           "standard: random gains, offsets, noise and dropped taxels, for unseen trials; none", "standard");
+  a.option("loss-a", "X", "share of the VAEs in the loss, 0 to 1", "0.2");
+  a.option("beta", "X", "weight of the KL divergence", "0.001");
+  a.option("lambda", "X", "weight of 1 - SSIM", "0.1");
+  a.option("plates", "A,B,...", "only recordings of these plates (default: all)");
+  a.option("checkpoint-every", "STEPS", "how often the state is saved", "500");
+}
+
+TrainingSettings training_settings(const Arguments& a) {
+  TrainingSettings s;
+  s.model.grouping = grouping_of(a.choice("grouping", {"horizontal", "vertical"}));
+  s.epochs = a.integer("epochs", 1, 100'000);
+  s.batch = a.integer("batch", 1, 4096);
+  s.learning_rate = a.number("learning-rate", 1e-9, 1);
+  s.loss = {a.number("loss-a", 0, 1), a.number("beta", 0, 1e6), a.number("lambda", 0, 1e6)};
+  if (a.choice("augment", {"standard", "none"}) == "standard") {
+    s.augment = {.gain = 0.5, .taxel_gain = 0.3, .offset = 0.05, .noise = 0.02, .dropped = 2};
+  }
+  return s;
+}
+
+SplitKind training_split(const Arguments& a) {
+  return split_kind(a.choice("split", {"window", "pass", "trial", "texture", "none"}));
+}
+
+WindowSet training_windows(const Arguments& a, const SuperTacSettings& model) {
+  WindowSettings w;
+  w.timesteps = static_cast<int>(model.timesteps);
+  w.scale = static_cast<int>(model.scale);
+  w.stride = static_cast<int>(a.integer("stride", 1, 100'000));
+  return WindowSet::load(a.text("data"), a.list("plates"), w);
+}
+
+}  // namespace supertac

@@ -1,0 +1,22 @@
+// The options that programs which train have in common, and what they mean.
+#pragma once
+
+#include "apps/common/arguments.h"
+#include "data/split.h"
+#include "models/trainer.h"
+
+namespace supertac {
+
+/// Data, split, optimiser, loss and augmentation: everything but the network and the seed.
+void declare_training(Arguments& a);
+
+/// What these options say; model and seed are left to the caller. Throws UsageError.
+TrainingSettings training_settings(const Arguments& a);
+
+/// --split. Throws UsageError.
+SplitKind training_split(const Arguments& a);
+
+/// The recordings' windows as this network takes them. Throws as WindowSet::load.
+WindowSet training_windows(const Arguments& a, const SuperTacSettings& model);
+
+}  // namespace supertac

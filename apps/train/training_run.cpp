@@ -1,0 +1,145 @@
+#include "apps/train/training_run.h"
+
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "apps/common/program.h"
+#include "apps/common/progress.h"
+#include "apps/common/signals.h"
+#include "apps/common/version.h"
+#include "models/evaluation.h"
+
+namespace supertac {
+namespace {
+
+constexpr std::int64_t kStepsPerLogLine = 50;
+constexpr std::size_t kTestWindowsPerEpoch = 2000;
+
+// What the model file says of its origin; the same whatever machine, folder or number of threads.
+std::map<std::string, std::string> origin(const Arguments& a, std::uint64_t seed, const WindowSet& windows,
+                                          const Split& split) {
+  return {{"split", a.text("split")},      {"seed", std::to_string(seed)},
+          {"plates", a.text("plates")},    {"stride", a.text("stride")},
+          {"data", windows.fingerprint()}, {"split_fingerprint", fingerprint(split)}};
+}
+
+// Restored before the run folder is touched: a checkpoint that does not fit must leave the folder as it was.
+Trainer make_trainer(const WindowSet& windows, const Split& split, const TrainingSettings& settings,
+                     const std::string& resume, const std::map<std::string, std::string>& origin) {
+  Trainer trainer(windows, split.train, settings);
+  if (!resume.empty()) trainer.restore(resume, origin);
+  return trainer;
+}
+
+// Sums of the steps since the last line of the log.
+class LogMeans {
+ public:
+  void add(const StepReport& r) {
+    ++steps_;
+    total_ += r.total, reconstruction_ += r.reconstruction, kld_ += r.kld, l2_ += r.l2, ssim_ += r.ssim;
+    norm_ += r.gradient_norm;
+    last_ = r;
+  }
+  LogLine take(double seconds) {
+    const double n = static_cast<double>(steps_);
+    const LogLine line{seconds, last_.step, total_ / n, reconstruction_ / n, kld_ / n,
+                       l2_ / n, ssim_ / n,  norm_ / n,  last_.learning_rate, {},
+                       {}};
+    *this = LogMeans();
+    return line;
+  }
+
+ private:
+  std::int64_t steps_ = 0;
+  double total_ = 0, reconstruction_ = 0, kld_ = 0, l2_ = 0, ssim_ = 0, norm_ = 0;
+  StepReport last_;
+};
+
+nlohmann::ordered_json describe(const Arguments& a, const Trainer& trainer, const WindowSet& windows,
+                                const Split& split) {
+  return {
+      {"command", a.command_line()},
+      {"version", version()},
+      {"commit", commit()},
+      {"training", nlohmann::ordered_json::parse(trainer.settings().text())},
+      {"model", nlohmann::ordered_json::parse(model_metadata(trainer.settings().model, {}).at("settings"))},
+      {"parameters", trainer.model().parameter_count()},
+      {"split", a.text("split")},
+      {"train_windows", split.train.size()},
+      {"test_windows", split.test.size()},
+      {"windows", windows.counts().summary()},
+      {"data", windows.fingerprint()},
+      {"split_fingerprint", fingerprint(split)},
+      {"steps", trainer.total_steps()}};
+}
+
+}  // namespace
+
+TrainingRun::TrainingRun(const Arguments& a, const WindowSet& windows, const Split& split,
+                         const TrainingSettings& settings, TrainingTarget target)
+    : a_(a),
+      windows_(windows),
+      split_(split),
+      target_(std::move(target)),
+      origin_(origin(a, settings.seed, windows, split)),
+      trainer_(make_trainer(windows, split, settings, target_.resume, origin_)),
+      folder_(target_.out, target_.force,
+              target_.resume.empty() ? std::nullopt : std::optional(trainer_.step())),
+      description_(describe(a, trainer_, windows, split)) {
+  folder_.write_settings(description_);
+}
+
+bool TrainingRun::train() {
+  a_.note("training on " + std::to_string(split_.train.size()) + " windows, " +
+          std::to_string(trainer_.total_steps()) + " steps" +
+          (target_.resume.empty() ? "" : ", resumed at " + std::to_string(trainer_.step())));
+  step_until_done();
+  folder_.write_report(description_);
+  if (!trainer_.done()) return false;
+  std::map<std::string, std::string> metadata = origin_;
+  metadata["training"] = trainer_.settings().text();
+  save_model(target_.out, trainer_.model(),
+             {windows_.settings().rate_hz, windows_.settings().scaling, windows_.filter_s()}, metadata);
+  return true;
+}
+
+void TrainingRun::step_until_done() {
+  begin_ = std::chrono::steady_clock::now();
+  const std::int64_t every = a_.integer("checkpoint-every", 1, 1'000'000'000);
+  Progress progress(a_, target_.label, static_cast<std::uint64_t>(trainer_.total_steps()), "steps");
+  LogMeans means;
+  while (!trainer_.done() && !interrupted()) {
+    const StepReport report = trainer_.train_step();
+    means.add(report);
+    if (report.collapsed && !std::exchange(warned_, true)) {
+      a_.note("step " + std::to_string(report.step) +
+              ": the pictures have collapsed to a flat image; stop and lower --learning-rate (now " +
+              a_.text("learning-rate") + ")");
+    }
+    const bool epoch_ends = report.step % trainer_.steps_per_epoch() == 0;
+    if (epoch_ends || report.step % kStepsPerLogLine == 0) log(means.take(seconds()), epoch_ends);
+    if (report.step % every == 0) save();
+    progress.update(static_cast<std::uint64_t>(report.step));
+  }
+  save();
+}
+
+double TrainingRun::seconds() const {
+  return folder_.seconds_before() +
+         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+}
+
+// The scores of an even sample of the test windows are for the log: nothing is chosen by them.
+void TrainingRun::log(LogLine line, bool epoch_ends) {
+  if (epoch_ends) {
+    const Metrics m = score(trainer_.model(), windows_, spread(split_.test, kTestWindowsPerEpoch)).contact();
+    if (std::isfinite(m.ssim)) {
+      line.test_ssim = m.ssim;
+      line.test_psnr_db = m.psnr_mean_db;
+    }
+  }
+  if (!folder_.log(line)) a_.note(folder_.path() + "/log.csv: cannot write; the log is kept in memory only");
+}
+
+}  // namespace supertac

@@ -1,0 +1,56 @@
+// One model trained into a file: what supertac-train does once, and supertac-sweep for each model of a grid.
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <string>
+
+#include "apps/common/arguments.h"
+#include "apps/train/run_folder.h"
+#include "data/split.h"
+#include "models/trainer.h"
+
+namespace supertac {
+
+struct TrainingTarget {
+  std::string out;                 ///< the model file; its run folder lies beside it
+  bool force = false;              ///< whether an earlier run's folder may be overwritten
+  std::string resume;              ///< the checkpoint to continue from; "" = start anew
+  std::string label = "training";  ///< of the progress bar
+};
+
+class TrainingRun {
+ public:
+  /// `a` must have what declare_training() declares; all references must outlive the run. Throws as Trainer,
+  /// Trainer::restore and RunFolder.
+  TrainingRun(const Arguments& a, const WindowSet& windows, const Split& split,
+              const TrainingSettings& settings, TrainingTarget target);
+
+  /// Until the last step or a signal. The state is saved either way; after the last step report and model are
+  /// written too. Returns whether all steps are done.
+  bool train();
+
+  const Trainer& trainer() const { return trainer_; }
+  const RunFolder& folder() const { return folder_; }
+  /// What settings.json holds: command, version, commit, settings, data, split.
+  const nlohmann::ordered_json& description() const { return description_; }
+
+ private:
+  void step_until_done();
+  double seconds() const;
+  void log(LogLine line, bool epoch_ends);
+  void save() { trainer_.save(folder_.checkpoint_path(), origin_); }
+
+  const Arguments& a_;
+  const WindowSet& windows_;
+  const Split& split_;
+  TrainingTarget target_;
+  std::map<std::string, std::string> origin_;
+  Trainer trainer_;
+  RunFolder folder_;
+  nlohmann::ordered_json description_;
+  std::chrono::steady_clock::time_point begin_;
+  bool warned_ = false;
+};
+
+}  // namespace supertac
