@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <numbers>
 #include <stdexcept>
@@ -47,7 +48,7 @@ double distance_to_nearest(double at, double first, double pitch, int count) {
   throw std::invalid_argument(
       "plate \"" + name + "\": " + why +
       "; expected a rig plate such as 3_Bumps, or plain, or ridges|bumps|waves|blobs with "
-      "a pitch in mm such as bumps12 or ridges6h1.5, several joined by +");
+      "a pitch in mm such as bumps12 or ridges6h1.5, several joined by +, or an STL file");
 }
 
 // Reads a number at the front of `text` and removes it.
@@ -92,7 +93,12 @@ std::string generic_name(const std::string& name) {
 
 }  // namespace
 
+bool Plate::is_file(const std::string& name) { return name.ends_with(".stl") || name.ends_with(".STL"); }
+
 Plate Plate::named(const std::string& name) {
+  if (is_file(name))
+    return {std::filesystem::path(name).filename().string(),
+            HeightMap(read_stl(name), kWidthMm, kLengthMm, name)};
   const std::string generic = generic_name(name);
   std::vector<Texture> textures;
   for (size_t begin = 0; begin <= generic.size();) {
@@ -126,6 +132,14 @@ Plate::Plate(std::string name, const std::vector<Texture>& textures) : name_(std
     bands_.push_back(band);
   }
 }
+
+Plate::Plate(std::string name, HeightMap map)
+    : name_(std::move(name)),
+      map_(std::make_shared<const HeightMap>(std::move(map))),
+      max_height_(map_->max_height()),
+      min_height_(map_->min_height()),
+      texture_begin_(map_->texture_begin()),
+      texture_end_(map_->texture_end()) {}
 
 Plate::Band Plate::lay_out(const Texture& texture) {
   Band band{.texture = texture};
@@ -161,12 +175,14 @@ double Plate::Band::height(double x_mm, double y_mm) const {
 }
 
 double Plate::height(double x_mm, double y_mm) const {
+  if (map_) return map_->height(x_mm, y_mm);
   double z = 0;  // textures do not overlap, so at most one term differs from 0
   for (const Band& band : bands_) z += band.height(x_mm, y_mm);
   return z;
 }
 
 std::vector<double> Plate::crests() const {
+  if (map_) return map_->crests();
   std::vector<double> crests;
   for (const Band& band : bands_)
     for (int i = 0; i < band.count_y; ++i) crests.push_back(band.first_y + i * band.texture.pitch_mm);
@@ -175,6 +191,7 @@ std::vector<double> Plate::crests() const {
 }
 
 bool Plate::uniform_in_x() const {
+  if (map_) return map_->uniform_in_x();
   return std::none_of(bands_.begin(), bands_.end(),
                       [](const Band& b) { return b.texture.kind == TextureKind::blobs; });
 }

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
+
+#include "data/height_map.h"
 
 namespace supertac {
 
@@ -31,13 +34,19 @@ class Plate {
   /// A plate by name. Plates of the rig (RIG plates): 3_Bumps, 6_Bumps, 4_Ridges, 6_Ridges, 4_Waves,
   /// 6_Waves, 4_Blob, 6_Blob. Others: "plain", or KIND PITCH [h HEIGHT] in mm with KIND one of ridges, bumps,
   /// waves, blobs ("bumps12", "ridges6h1.5"), or several joined by '+', which share the length equally
-  /// ("bumps12+ridges4"). Default height 2.5, for bumps and blobs at most pitch / 2.
-  /// @throws std::invalid_argument naming the part that could not be read.
+  /// ("bumps12+ridges4"). Default height 2.5, for bumps and blobs at most pitch / 2. Or the path of an STL
+  /// file of 36 x 108 mm (data/height_map.h), whose plate has the file's name without folders.
+  /// @throws std::invalid_argument naming the part that could not be read; FileError for an STL file.
   static Plate named(const std::string& name);
+  /// True when the name is that of an STL file: it ends with ".stl".
+  static bool is_file(const std::string& name);
 
   /// @param textures may overlap nowhere; empty means plain.
   /// @throws std::invalid_argument when pitch or height are not positive or do not fit.
   Plate(std::string name, const std::vector<Texture>& textures);
+
+  /// A plate that is no texture but a map, of kWidthMm x kLengthMm.
+  Plate(std::string name, HeightMap map);
 
   /// Surface height z (mm) at (x, y); negative in the troughs of waves, 0 outside the texture.
   double height(double x_mm, double y_mm) const;
@@ -50,11 +59,11 @@ class Plate {
   double texture_begin() const { return texture_begin_; }
   double texture_end() const { return texture_end_; }
 
-  /// Where the elements' highest lines (blobs: rows of centres) lie along y (mm), ascending; empty when
-  /// plain.
+  /// Where the elements' highest lines (blobs: rows of centres; maps: HeightMap::crests) lie along y (mm),
+  /// ascending; empty when plain.
   std::vector<double> crests() const;
 
-  /// True when the height depends on y only (everything but blobs).
+  /// True when the height depends on y only (everything but blobs; a map within 0.05 mm).
   bool uniform_in_x() const;
 
   const std::string& name() const { return name_; }
@@ -71,6 +80,7 @@ class Plate {
 
   std::string name_;
   std::vector<Band> bands_;
+  std::shared_ptr<const HeightMap> map_;  // instead of bands
   double max_height_ = 0, min_height_ = 0, texture_begin_ = 0, texture_end_ = 0;
 };
 

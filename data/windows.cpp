@@ -10,6 +10,7 @@
 
 #include "data/hash.h"
 #include "data/metrics.h"
+#include "data/plate_file.h"
 #include "data/truth.h"
 #include "io/numbers.h"
 
@@ -88,7 +89,7 @@ WindowSet WindowSet::load(const std::string& dir, const std::vector<std::string>
     if (!plates.empty() && std::find(plates.begin(), plates.end(), recording.plate) == plates.end()) continue;
     missing.erase(recording.plate);
     try {
-      set.add(recording);
+      set.add(recording, dir);
     } catch (const std::exception& error) {
       throw std::runtime_error(path + ": " + error.what());
     }
@@ -103,10 +104,10 @@ WindowSet WindowSet::load(const std::string& dir, const std::vector<std::string>
 
 WindowSet::WindowSet(const WindowSettings& settings) : settings_(settings) { check(settings); }
 
-size_t WindowSet::plate_index(const std::string& name) {
+size_t WindowSet::plate_index(const std::string& name, const std::string& folder) {
   for (size_t i = 0; i < plates_.size(); ++i)
     if (plates_[i].name() == name) return i;
-  plates_.push_back(Plate::named(name));
+  plates_.push_back(plate_in_folder(name, folder));
   return plates_.size() - 1;
 }
 
@@ -130,8 +131,8 @@ bool WindowSet::accept(const Track& track, size_t frame, bool reliable) {
   return reason == &counts_.windows;
 }
 
-void WindowSet::add(const Recording& recording) {
-  const size_t plate = plate_index(recording.plate);
+void WindowSet::add(const Recording& recording, const std::string& folder) {
+  const size_t plate = plate_index(recording.plate, folder);
   Track track = resample(
       recording,
       {.rate_hz = settings_.rate_hz, .max_gap_s = settings_.max_gap_s, .scaling = settings_.scaling});
@@ -217,6 +218,12 @@ std::string WindowSet::fingerprint() const {
   Hasher hash;
   hash.add(static_cast<uint64_t>(settings_.timesteps));
   hash.add(static_cast<uint64_t>(settings_.scale));
+  for (const Plate& plate : plates_) {
+    if (!Plate::is_file(plate.name())) continue;  // elsewhere the name is the plate
+    for (double y = 0; y <= Plate::kLengthMm; y += HeightMap::kCellMm)
+      for (double x = 0; x <= Plate::kWidthMm; x += HeightMap::kCellMm)
+        hash.add(static_cast<float>(plate.height(x, y)));
+  }
   for (size_t p = 0; p < passes_.size(); ++p) {
     hash.add(passes_[p].plate);
     hash.add(static_cast<uint64_t>(passes_[p].trial));

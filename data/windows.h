@@ -67,9 +67,9 @@ class WindowSet {
   /// An empty set, to be filled by add().
   /// @throws std::invalid_argument on settings out of range.
   explicit WindowSet(const WindowSettings& settings);
-  /// Appends the windows of one recording. @throws std::invalid_argument on an unknown plate, and as
-  /// resample().
-  void add(const Recording& recording);
+  /// Appends the windows of one recording. @param folder where the recording lies, for a plate that is an
+  /// STL file beside it. @throws as plate_in_folder() and resample().
+  void add(const Recording& recording, const std::string& folder = ".");
 
   size_t size() const { return index_.size(); }
   int timesteps() const { return settings_.timesteps; }
@@ -108,7 +108,7 @@ class WindowSet {
   struct Entry {
     uint32_t pass, last;
   };
-  size_t plate_index(const std::string& name);
+  size_t plate_index(const std::string& name, const std::string& folder);
   bool accept(const Track& track, size_t frame, bool reliable);
 
   WindowSettings settings_;

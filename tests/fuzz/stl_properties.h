@@ -1,0 +1,33 @@
+// What must hold for the STL reader on any bytes; the fuzzer and the corpus test call the same function.
+#pragma once
+
+#include <cmath>
+#include <span>
+#include <stdexcept>
+
+#include "data/height_map.h"
+#include "data/stl.h"
+#include "io/file.h"
+
+namespace supertac {
+
+/// Any bytes are triangles with usable coordinates, at most one for every 50 bytes, or a FileError; and the
+/// triangles are a height map without NaN, or a FileError. Throws std::logic_error otherwise.
+inline void check_stl(std::span<const std::byte> input) {
+  try {
+    const auto triangles = parse_stl(input, "fuzz.stl");
+    if (triangles.empty() || triangles.size() > input.size() / 50)
+      throw std::logic_error("stl: more triangles than the file has room for");
+    for (const Triangle& triangle : triangles)
+      for (const auto& corner : triangle)
+        for (const float value : corner)
+          if (!(std::abs(value) <= kMaxStlCoordinateMm))
+            throw std::logic_error("stl: an unusable coordinate was accepted");
+    const HeightMap map(triangles, 36, 108, "fuzz.stl");
+    if (!(map.min_height() <= map.max_height())) throw std::logic_error("height map: NaN");
+    if (!std::isfinite(map.height(18, 54))) throw std::logic_error("height map: NaN");
+  } catch (const FileError&) {
+  }
+}
+
+}  // namespace supertac
