@@ -14,6 +14,12 @@ std::string coordinates(const Point3& p) {
 
 }  // namespace
 
+std::string move_command(const Point3& target, double speed_mm_s) {
+  return "G1" + coordinates(target) + " F" + fixed_decimals(60 * speed_mm_s, 1);
+}
+
+std::string origin_command(const Point3& here) { return "G92" + coordinates(here); }
+
 Printer::Printer(Port& port, const PrinterSettings& settings)
     : settings_(settings), link_(port, settings.marlin) {}
 
@@ -37,7 +43,7 @@ void Printer::home() {
 void Printer::confirm_origin(const Point3& here) {
   settings_.limits.check_target(here);
   link_.command("M400", kHomeDeadline);
-  link_.command("G92" + coordinates(here));
+  link_.command(origin_command(here));
   target_ = here;
   Point3 found = queue_position();
   for (int attempt = 0; attempt < 2 && distance(found, here) > settings_.tolerance_mm; ++attempt) {
@@ -59,8 +65,7 @@ double Printer::start_move(const Point3& target, double speed_mm_s) {
   if (!(speed_mm_s > 0)) throw std::invalid_argument("printer: speed must be above 0 mm/s");
   settings_.limits.check_path(target_, target);
   const double length = distance(target_, target);
-  const double sent =
-      link_.command("G1" + coordinates(target) + " F" + fixed_decimals(60 * speed_mm_s, 1)).answered_s;
+  const double sent = link_.command(move_command(target, speed_mm_s)).answered_s;
   target_ = target;
   expected_seconds_ += length / speed_mm_s + 0.5;
   return sent;

@@ -9,6 +9,10 @@
 
 namespace supertac {
 
+/// The line that makes a straight move, and the one that says where the head is.
+std::string move_command(const Point3& target, double speed_mm_s);
+std::string origin_command(const Point3& here);
+
 struct PrinterSettings {
   Limits limits;
   MarlinSettings marlin;
