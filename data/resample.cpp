@@ -17,8 +17,8 @@ bool finite(std::span<const float> volts) {
   return std::all_of(volts.begin(), volts.end(), [](float v) { return std::isfinite(v); });
 }
 
-std::span<const float> volts_of(const Recording& recording, size_t frame) {
-  return std::span(recording.volts).subspan(frame * kTaxels, kTaxels);
+std::span<const float, kTaxels> volts_of(const Recording& recording, size_t frame) {
+  return std::span(recording.volts).subspan(frame * kTaxels).first<kTaxels>();
 }
 
 void check(const Recording& recording, const ResampleSettings& settings) {
@@ -70,19 +70,15 @@ class Segment {
   double time(size_t i) const { return recording_.time_s[usable_[i]]; }
 
   size_t cell(size_t i) const {
-    // A millionth of a period of slack: time stamps are rounded.
     const double periods = (time(i) - start_) * settings_.rate_hz;
-    return static_cast<size_t>(std::max(0.0, std::ceil(periods - 0.5 - 1e-6)));
+    return static_cast<size_t>(std::max(0.0, std::ceil(periods - 0.5 - kCellSlack)));
   }
 
   void append_mean(Track& track, size_t first, size_t end) const {
-    std::array<double, kTaxels> sum{};
-    for (size_t i = first; i < end; ++i) {
-      const auto volts = volts_of(recording_, usable_[i]);
-      for (size_t k = 0; k < kTaxels; ++k) sum[k] += volts[k];
-    }
-    const auto count = static_cast<double>(end - first);
-    for (const double s : sum) track.samples.push_back(settings_.scaling(static_cast<float>(s / count)));
+    FrameMean mean;
+    for (size_t i = first; i < end; ++i) mean.add(volts_of(recording_, usable_[i]));
+    const auto scaled = settings_.scaling(mean.volts());
+    track.samples.insert(track.samples.end(), scaled.begin(), scaled.end());
   }
 
   // `before` moves along with the time: the last recorded frame at or before it.
@@ -112,6 +108,23 @@ class Segment {
 
 float Scaling::operator()(float volts) const {
   return static_cast<float>(std::clamp((rest_volts - volts) / span_volts, 0.0, 1.0));
+}
+
+std::array<float, kTaxels> Scaling::operator()(const std::array<float, kTaxels>& volts) const {
+  std::array<float, kTaxels> scaled;
+  std::transform(volts.begin(), volts.end(), scaled.begin(), *this);
+  return scaled;
+}
+
+void FrameMean::add(std::span<const float, kTaxels> volts) {
+  for (size_t k = 0; k < kTaxels; ++k) sum_[k] += volts[k];
+  ++count_;
+}
+
+std::array<float, kTaxels> FrameMean::volts() const {
+  std::array<float, kTaxels> mean;
+  for (size_t k = 0; k < kTaxels; ++k) mean[k] = static_cast<float>(sum_[k] / static_cast<double>(count_));
+  return mean;
 }
 
 Track resample(const Recording& recording, const ResampleSettings& settings) {

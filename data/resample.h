@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "data/recording.h"
@@ -11,7 +13,26 @@ namespace supertac {
 struct Scaling {
   double rest_volts = 2.45, span_volts = 0.36;
   float operator()(float volts) const;
+  std::array<float, kTaxels> operator()(const std::array<float, kTaxels>& volts) const;
 };
+
+/// Mean of some frames, summed in double precision in the order they are added: what resample() and
+/// LiveWindow make a sample of, so that both give the same bits.
+class FrameMean {
+ public:
+  void add(std::span<const float, kTaxels> volts);
+  size_t count() const { return count_; }
+  /// Of at least one frame.
+  std::array<float, kTaxels> volts() const;
+
+ private:
+  std::array<double, kTaxels> sum_{};
+  size_t count_ = 0;
+};
+
+/// Time stamps are rounded: a frame up to this share of a period past the end of a sample still belongs to
+/// it.
+constexpr double kCellSlack = 1e-6;
 
 /// A recording on an even time grid.
 struct Track {
@@ -36,8 +57,8 @@ struct ResampleSettings {
 ///   when
 ///                 there is none (counted in `held`)
 ///   position[j] = position at c, linear between recorded frames
-/// Causal but for half a period (1.7 ms at 300 Hz): a live reader that averages what arrived in each period
-/// gets the same samples. A recording made at rate_hz comes out as it is.
+/// Causal but for half a period (1.7 ms at 300 Hz): LiveWindow gives the same samples while frames arrive. A
+/// recording made at rate_hz comes out as it is.
 /// @throws std::invalid_argument on settings that are not positive, std::runtime_error when the sizes of the
 /// recording's arrays disagree or its time stamps do not increase.
 Track resample(const Recording& recording, const ResampleSettings& settings);
