@@ -14,6 +14,8 @@ namespace supertac {
 namespace {
 
 constexpr double kStartDelay = 0.1265;
+constexpr double kLargest = 1e10;   // of any number in an event: a journal may come from anywhere
+constexpr int kMostSteps = 20'000;  // of a modelled leg: 100 s every 5 ms
 
 std::string point_text(const Point3& p) {
   return fixed_decimals(p.x, 4) + " " + fixed_decimals(p.y, 4) + " " + fixed_decimals(p.z, 4);
@@ -28,7 +30,7 @@ std::optional<std::array<double, Count>> numbers_of(std::string_view text) {
     if (at == std::string_view::npos) return std::nullopt;
     const char* last = text.data() + text.size();
     const auto [end, error] = std::from_chars(text.data() + at + 1, last, value);
-    if (error != std::errc{} || !std::isfinite(value)) return std::nullopt;
+    if (error != std::errc{} || !(std::abs(value) < kLargest)) return std::nullopt;
     at = end == last ? std::string_view::npos : static_cast<std::size_t>(end - text.data());
   }
   return at == std::string_view::npos ? std::optional(values) : std::nullopt;
@@ -49,7 +51,8 @@ std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
       const auto v = numbers_of<12>(text);
       if (!v) continue;
       const auto& n = *v;
-      const Leg leg{static_cast<int>(n[1]),
+      if (n[1] < 1 || n[2] < 0 || n[2] > static_cast<int>(Phase::reposition)) continue;
+      const Leg leg{static_cast<int>(std::min(n[1], 1e6)),
                     static_cast<Phase>(static_cast<int>(n[2])),
                     {n[3], n[4], n[5]},
                     {n[6], n[7], n[8]},
@@ -157,7 +160,7 @@ void PositionTrack::model(const Leg& leg, double acceleration) {
   const double length = distance(leg.from, leg.to);
   const double start = std::min(leg.accepted_s + kStartDelay, leg.ended_s - 1e-6);
   const double duration = leg.ended_s - start;
-  const int steps = std::clamp(static_cast<int>(duration / 0.005), 1, 100000);
+  const int steps = static_cast<int>(std::clamp(duration / 0.005, 1.0, double{kMostSteps}));
   for (int i = 0; i <= steps; ++i) {
     const double t = duration * i / steps;
     const double part = length > 0 ? trapezoid_position(t, length, duration, acceleration) / length : 1;

@@ -1,17 +1,18 @@
 #include "hardware/journal.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <array>
 #include <chrono>
+#include <cmath>
+#include <filesystem>
 #include <fstream>
+#include <utility>
 
 #include "hardware/errors.h"
 #include "io/crc32.h"
+#include "io/system_calls.h"
 
 namespace supertac {
 namespace {
@@ -20,8 +21,9 @@ constexpr std::uint32_t kMagic = 0x314A5453;  // "STJ1"
 constexpr std::size_t kChunkHeader = 24;      // magic, stream, length, CRC-32, time
 constexpr std::size_t kRecordHeader = 13;     // kind, time, length
 constexpr std::size_t kMostPending = 64 << 20;
-constexpr auto kFlushEvery = std::chrono::milliseconds(200);
-constexpr int kFlushesPerSync = 5;
+constexpr double kFlushAfter = 0.2;   // of recorded time, and of the wall's
+constexpr double kLatestTime = 1e10;  // s: 300 years, so that no arithmetic on times can overflow
+constexpr auto kSyncEvery = std::chrono::seconds(1);
 
 template <class T>
 void put(std::vector<std::byte>& out, T value) {
@@ -41,24 +43,39 @@ std::uint32_t chunk_sum(std::span<const std::byte> header, std::span<const std::
   return crc32(payload, crc32(header.subspan(16, 8), crc32(header.subspan(4, 8))));
 }
 
-// False when the records do not fill the payload exactly.
+// False when the records do not fill the payload exactly, or when a time is none.
 bool parse_records(std::span<const std::byte> payload, std::vector<JournalRecord>& records) {
   while (!payload.empty()) {
     if (payload.size() < kRecordHeader) return false;
     const auto length = get<std::uint32_t>(payload, 9);
     if (length > payload.size() - kRecordHeader) return false;
+    const auto time_s = get<double>(payload, 1);
+    if (!(std::abs(time_s) < kLatestTime)) return false;
     const auto bytes = payload.subspan(kRecordHeader, length);
-    records.push_back(
-        {static_cast<RecordKind>(payload[0]), get<double>(payload, 1), {bytes.begin(), bytes.end()}});
+    records.push_back({static_cast<RecordKind>(payload[0]), time_s, {bytes.begin(), bytes.end()}});
     payload = payload.subspan(kRecordHeader + length);
   }
   return true;
 }
 
+// So that a power cut does not take the new file's name. False with errno set.
+bool sync_directory(const std::string& file) {
+  const std::filesystem::path parent = std::filesystem::path(file).parent_path();
+  const int directory =
+      system_calls().open(parent.empty() ? "." : parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC, 0);
+  if (directory < 0) return false;
+  // EINVAL: a file system that has nothing to sync for a directory.
+  const bool synced = system_calls().fsync(directory) == 0 || errno == EINVAL;
+  const int error = errno;
+  const bool closed = system_calls().close(directory) == 0;
+  if (!synced) errno = error;
+  return synced && closed;
+}
+
 }  // namespace
 
 JournalWriter::JournalWriter(const std::string& path, std::string_view header) : path_(path) {
-  descriptor_ = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  descriptor_ = system_calls().open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   if (descriptor_ < 0) {
     throw JournalError("journal " + path + ": cannot be created: " + strerror(errno) +
                        (errno == EEXIST
@@ -67,8 +84,10 @@ JournalWriter::JournalWriter(const std::string& path, std::string_view header) :
   }
   append(Stream::header, RecordKind::text, 0, std::as_bytes(std::span(header)));
   flush();
+  if (error_.empty() && !sync_directory(path)) failed("its folder cannot be synced");
   if (!error_.empty()) {
-    ::close(descriptor_);
+    (void)system_calls().close(descriptor_);
+    (void)system_calls().unlink(path.c_str());
     throw JournalError(error_);
   }
   thread_ = std::thread([this] { run(); });
@@ -86,6 +105,11 @@ void JournalWriter::append(Stream stream, RecordKind kind, double time_s, std::s
   if (pending_bytes_ > kMostPending) {
     if (error_.empty()) error_ = "journal " + path_ + ": the disk is too slow, 64 MB wait to be written";
     return;
+  }
+  if (pending_bytes_ == 0) oldest_pending_ = time_s;
+  if (time_s - oldest_pending_ > kFlushAfter && !flush_due_) {
+    flush_due_ = true;
+    wake_.notify_all();
   }
   Pending& pending = pending_[stream];
   if (pending.payload.empty()) pending.time_s = time_s;
@@ -106,19 +130,34 @@ void JournalWriter::check() {
 }
 
 void JournalWriter::run() {
-  for (int flushes = 1;; ++flushes) {
+  auto synced = std::chrono::steady_clock::now();
+  for (;;) {
     bool last = false;
     {
       std::unique_lock lock(mutex_);
-      last = wake_.wait_for(lock, kFlushEvery, [&] { return stop_; });
+      wake_.wait_for(lock, std::chrono::duration<double>(kFlushAfter), [&] { return stop_ || flush_due_; });
+      last = stop_;
     }
     flush();
-    if ((last || flushes % kFlushesPerSync == 0) && fdatasync(descriptor_) != 0) {
-      std::lock_guard lock(mutex_);
-      if (error_.empty()) error_ = "journal " + path_ + ": cannot be synced: " + strerror(errno);
+    const auto now = std::chrono::steady_clock::now();
+    if (last || now - synced >= kSyncEvery) {
+      sync();
+      synced = now;
     }
     if (last) return;
   }
+}
+
+void JournalWriter::sync() {
+  if (system_calls().fsync(descriptor_) != 0) failed("cannot be synced");
+}
+
+void JournalWriter::failed(const std::string& what) {
+  const std::string reason = strerror(errno);
+  std::lock_guard lock(mutex_);
+  if (!error_.empty()) return;
+  error_ = "journal " + path_ + ": " + what + ": " + reason +
+           "; make room or change the disk and start again, what was recorded so far is kept";
 }
 
 void JournalWriter::flush() {
@@ -127,6 +166,7 @@ void JournalWriter::flush() {
     std::lock_guard lock(mutex_);
     chunks.swap(pending_);
     pending_bytes_ = 0;
+    flush_due_ = false;
     if (!error_.empty()) return;  // after a failed write nothing behind it would be read anyway
   }
   for (const auto& [stream, pending] : chunks) write_chunk(stream, pending);
@@ -144,16 +184,10 @@ void JournalWriter::write_chunk(Stream stream, const Pending& pending) {
   memcpy(chunk.data() + 12, &sum, sizeof sum);
   chunk.insert(chunk.end(), pending.payload.begin(), pending.payload.end());
   for (std::size_t done = 0; done < chunk.size();) {
-    const ssize_t count = ::write(descriptor_, chunk.data() + done, chunk.size() - done);
+    const ssize_t count = system_calls().write(descriptor_, chunk.data() + done, chunk.size() - done);
     if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) {
-      std::lock_guard lock(mutex_);
-      if (error_.empty()) {
-        error_ = "journal " + path_ + ": cannot be written: " + strerror(count < 0 ? errno : ENOSPC) +
-                 "; make room and start again, what was recorded so far is kept";
-      }
-      return;
-    }
+    if (count == 0) errno = ENOSPC;
+    if (count <= 0) return failed("cannot be written");
     done += static_cast<std::size_t>(count);
   }
 }
@@ -166,10 +200,18 @@ void JournalWriter::close() {
     }
     wake_.notify_all();
     if (thread_.joinable()) thread_.join();
-    ::close(descriptor_);
-    descriptor_ = -1;
+    const int descriptor = std::exchange(descriptor_, -1);
+    if (system_calls().close(descriptor) != 0) failed("cannot be closed");
   }
   check();
+}
+
+void JournalWriter::discard() {
+  try {
+    close();
+  } catch (const JournalError&) {  // it goes anyway
+  }
+  (void)system_calls().unlink(path_.c_str());
 }
 
 const std::vector<JournalRecord>& Journal::of(Stream stream) const {

@@ -78,6 +78,11 @@ unsigned marlin_checksum(std::string_view text) {
   return sum;
 }
 
+std::string shielded(std::string_view command) {
+  if (!command.starts_with('M') || command.starts_with("M110")) return std::string(command);
+  return "M0" + std::string(command.substr(1));
+}
+
 std::string numbered_line(std::int64_t number, std::string_view command) {
   if (command.find_first_of("\r\n*") != std::string_view::npos) {
     throw std::invalid_argument("marlin line: a command may not hold a line break or '*', got \"" +

@@ -24,6 +24,12 @@ constexpr std::size_t kMaxLineBytes = 96;  ///< Marlin's MAX_CMD_SIZE
 /// XOR of all bytes.
 unsigned marlin_checksum(std::string_view text);
 
+/// "M114" as "M0114", which Marlin runs as the same code: its emergency parser reads every byte ahead of
+/// checksums and would obey a damaged line that begins like M112 or M410 ("M1124", one bit of "M400"). Behind
+/// the zero no single damaged byte gets there. M110, which Marlin looks for literally, and all other commands
+/// stay as they are.
+std::string shielded(std::string_view command);
+
 /// `N<n> <command>*<xor>\n`. Throws std::invalid_argument when longer than 96 bytes or when the command holds
 /// a line break or '*'.
 std::string numbered_line(std::int64_t number, std::string_view command);

@@ -8,7 +8,7 @@ namespace supertac {
 namespace {
 
 constexpr double kWriteDeadline = 2;
-constexpr double kWatchInterval = 0.1;
+constexpr double kWatchInterval = 0.05;  // half of the 0.1 s in which an unplugged board must be noticed
 // With one line in flight the firmware is never honestly more than a line or two behind. A number further
 // back is damaged text, or a firmware that restarted; the second time in a row it is believed.
 constexpr std::int64_t kPlausibleLag = 4;
@@ -83,7 +83,7 @@ void MarlinLink::read_capabilities() {
 
 MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s) {
   if (halted_) throw PrinterHalted("printer " + port_.name() + ": halted earlier; reset it and start again");
-  kept_.push_back(numbered_line(number_ + 1, code));
+  kept_.push_back(numbered_line(number_ + 1, shielded(code)));
   ++number_;
   if (kept_.size() > settings_.kept_lines) kept_.pop_front();
   ++counters_.lines;

@@ -136,21 +136,18 @@ void Palpation::recover(PalpationOutcome& outcome) {
     outcome.finger = Finger::stopped;
     outcome.note = "the firmware restarted and stands; its position is unknown, lift the finger by hand";
     return;
-  } catch (const PortUnplugged& error) {
-    if (std::string(error.what()).find(printer_.link().port().name()) != std::string::npos) {
-      outcome.note = "the printer cannot be reached; the finger may be in contact, lift it by hand";
-      return;
-    }
-  } catch (...) {  // everything else leaves a printer that can be talked to
+  } catch (...) {  // everything else leaves a printer that can be talked to, or one that is gone: see below
   }
-  const Printer::Stop stop = printer_.quick_stop();
-  if (stop.confirmed) outcome.finger = Finger::stopped;
-  outcome.note = stop.text;
   try {
+    const Printer::Stop stop = printer_.quick_stop();
+    if (stop.confirmed) outcome.finger = Finger::stopped;
+    outcome.note = stop.text;
     printer_.lift(plan_.lift, plan_.speed_z);
     outcome.finger = Finger::lifted;
     outcome.note = "the finger was lifted";
-  } catch (const HardwareError& error) {
+  } catch (const PortUnplugged&) {
+    outcome.note = "the printer cannot be reached; the finger may be in contact, lift it by hand";
+  } catch (const std::exception& error) {
     outcome.note += std::string("; the lift failed: ") + error.what();
   }
 }

@@ -23,11 +23,8 @@ PalpationObserver observer_for(const RecorderSettings& settings, JournalWriter& 
   return observer;
 }
 
-}  // namespace
-
-RecorderReport record_palpation(std::unique_ptr<Port> board_port, std::unique_ptr<Port> printer_port,
-                                const RecorderSettings& settings) {
-  JournalWriter journal(settings.journal, settings.header);
+RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> printer_port,
+                      const RecorderSettings& settings, JournalWriter& journal) {
   CapturedPort captured(std::move(printer_port), journal, Stream::printer);
   Printer printer(captured, settings.printer);
   printer.connect();
@@ -54,6 +51,19 @@ RecorderReport record_palpation(std::unique_ptr<Port> board_port, std::unique_pt
     if (!report.outcome.error) report.outcome.error = std::current_exception();
   }
   return report;
+}
+
+}  // namespace
+
+RecorderReport record_palpation(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
+                                const RecorderSettings& settings) {
+  JournalWriter journal(settings.journal, settings.header);
+  try {
+    return record(std::move(board), std::move(printer), settings, journal);
+  } catch (...) {
+    journal.discard();
+    throw;
+  }
 }
 
 }  // namespace supertac

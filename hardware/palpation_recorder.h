@@ -34,8 +34,9 @@ struct RecorderReport {
   MarlinLink::Counters printer;
 };
 
-/// Runs the plan and journals everything. Throws before anything moves; later failures are in the outcome.
-/// When this returns the journal is complete on disk, or outcome.error says why not.
+/// Runs the plan and journals everything. Throws while nothing has been recorded - no device, the wrong one,
+/// a plan outside the limits, a homing that failed - and then leaves no journal; later failures are in the
+/// outcome. When this returns the journal is complete on disk, or outcome.error says why not.
 RecorderReport record_palpation(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
                                 const RecorderSettings& settings);
 

@@ -32,6 +32,20 @@ std::int64_t integer_at(const std::string& text, std::size_t at) {
   return value;
 }
 
+// The code that Marlin's emergency parser sees in a line: spaces, a line number, an M and its digits. What
+// follows the digits it knows does not matter to it, not even more digits.
+std::string_view emergency_code(std::string_view line) {
+  const auto skip = [&line](std::string_view characters) {
+    line.remove_prefix(std::min(line.size(), line.find_first_not_of(characters)));
+  };
+  skip(" ");
+  if (line.starts_with('N')) skip("N0123456789- ");
+  if (!line.starts_with('M')) return {};
+  line.remove_prefix(1);
+  skip(" ");
+  return line;
+}
+
 }  // namespace
 
 VirtualPrinter::VirtualPrinter(const VirtualPrinterSettings& settings, double t, bool already_running)
@@ -89,7 +103,7 @@ void VirtualPrinter::take_received(double t) {
   }
 }
 
-// Marlin scans every incoming byte for these, ahead of the queue; a line number before them is allowed.
+// Marlin scans every incoming byte for these, ahead of the queue and of any checksum.
 void VirtualPrinter::watch_for_emergency(char c, double t) {
   if (c != '\n' && c != '\r') {
     if (emergency_.size() < kMaxLineBytes) emergency_.push_back(c);
@@ -97,9 +111,9 @@ void VirtualPrinter::watch_for_emergency(char c, double t) {
   }
   std::string line;
   line.swap(emergency_);
-  if (line.starts_with('N')) line.erase(0, std::min(line.find(' '), line.size() - 1) + 1);
-  if (line.starts_with("M112")) kill(t);
-  if (line.starts_with("M410")) quick_stop(t);
+  const std::string_view code = emergency_code(line);
+  if (code.starts_with("112")) kill(t);
+  if (code.starts_with("410")) quick_stop(t);
 }
 
 void VirtualPrinter::accept_line(const std::string& line, double t) {
