@@ -1,5 +1,6 @@
 #include "hardware/tactile_board.h"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 
@@ -27,6 +28,7 @@ void TactileBoard::stop() {
     std::lock_guard lock(mutex_);
     stop_ = true;
   }
+  taken_.notify_all();
   if (thread_.joinable()) thread_.join();
 }
 
@@ -49,7 +51,9 @@ void TactileBoard::run() {
     std::lock_guard lock(mutex_);
     error_ = std::current_exception();
   }
+  gaps_.finish(missing_before_);
   std::lock_guard lock(mutex_);
+  date_decided();
   ended_ = true;
   arrived_.notify_all();
 }
@@ -61,8 +65,11 @@ void TactileBoard::read_once(double until) {
   if (decoder_.counters().frames == 0) {
     for (const std::byte byte : bytes) text_bytes_ += is_text(byte) ? 1 : 0;
   }
-  decoder_.push(
-      bytes, [&](const BoardFrame& frame, std::uint64_t discarded) { take(frame, got.time_s, discarded); });
+  batch_.clear();
+  decoder_.push(bytes, [&](const BoardFrame& frame, std::uint64_t discarded) {
+    batch_.push_back({frame, discarded});
+  });
+  take_batch(got.time_s);
   check_silence(got.time_s);
   std::lock_guard lock(mutex_);
   counters_.decoder = decoder_.counters();
@@ -79,16 +86,40 @@ void TactileBoard::check_silence(double time) {
                     std::to_string(settings_.silence_s) + " s; plug the board out and in again");
 }
 
-void TactileBoard::take(const BoardFrame& frame, double time, std::uint64_t discarded) {
-  StampedFrame stamped{frame, time};
-  stamped.suspect =
-      discarded > 0 || (decoder_.counters().frames > 1 && time - last_arrival_ > 1.5 * kFramePeriod);
-  stamped.jump = jumps_.jump(frame);
-  last_arrival_ = time;
-  gaps_.push(time, missing_before_);
-  undecided_.push_back(time);
+void TactileBoard::take_batch(double time) {
+  auto left = static_cast<double>(batch_.size());
+  const double step = first_ ? kFramePeriod : std::min(kFramePeriod, (time - last_time_) / left);
+  for (const Decoded& decoded : batch_) {
+    left -= 1;
+    take({.frame = decoded.frame, .arrival_s = time, .time_s = time - left * step}, decoded.discarded);
+  }
+}
 
-  std::lock_guard lock(mutex_);
+void TactileBoard::take(StampedFrame frame, std::uint64_t discarded) {
+  frame.suspect = discarded > 0 || (!first_ && frame.arrival_s - last_arrival_ > 1.5 * kFramePeriod);
+  frame.jump = jumps_.jump(frame.frame);
+  first_ = false;
+  last_arrival_ = frame.arrival_s;
+  last_time_ = frame.time_s;
+  gaps_.push(frame.arrival_s, missing_before_);
+  undecided_.push_back(frame.arrival_s);
+
+  std::unique_lock lock(mutex_);
+  date_decided();
+  counters_.suspect += frame.suspect ? 1 : 0;
+  counters_.jumps += frame.jump ? 1 : 0;
+  if (settings_.wait_for_consumer) {
+    taken_.wait(lock, [&] { return queue_.size() < settings_.queue_frames || stop_; });
+  } else if (queue_.size() >= settings_.queue_frames) {
+    queue_.pop_front();
+    ++counters_.dropped;
+  }
+  queue_.push_back(frame);
+  arrived_.notify_one();
+}
+
+// With mutex_ held: the frames whose gaps are now certain go to the clock.
+void TactileBoard::date_decided() {
   for (const std::uint32_t missing : missing_before_) {
     clock_index_ += missing;
     clock_.add(clock_index_++, undecided_.front());
@@ -96,14 +127,6 @@ void TactileBoard::take(const BoardFrame& frame, double time, std::uint64_t disc
   }
   missing_before_.clear();
   counters_.missing = gaps_.missing();
-  counters_.suspect += stamped.suspect ? 1 : 0;
-  counters_.jumps += stamped.jump ? 1 : 0;
-  if (queue_.size() >= settings_.queue_frames) {
-    queue_.pop_front();
-    ++counters_.dropped;
-  }
-  queue_.push_back(stamped);
-  arrived_.notify_one();
 }
 
 std::optional<StampedFrame> TactileBoard::next(double wait_s) {
@@ -112,6 +135,7 @@ std::optional<StampedFrame> TactileBoard::next(double wait_s) {
   if (!queue_.empty()) {
     const StampedFrame frame = queue_.front();
     queue_.pop_front();
+    if (settings_.wait_for_consumer) taken_.notify_one();
     return frame;
   }
   if (error_) std::rethrow_exception(error_);

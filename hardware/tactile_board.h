@@ -21,19 +21,26 @@ namespace supertac {
 struct StampedFrame {
   BoardFrame frame;
   double arrival_s = 0;
+  /// When the board finished the frame, as far as that is known at once: of the frames one read brought the
+  /// last has just been finished, the others a period apart before it. Increasing; an arrival's delay is its
+  /// error.
+  double time_s = 0;
   bool suspect = false;  ///< first after a pause of 1.5 periods or after discarded bytes: may be torn
   bool jump = false;     ///< implausible change of a taxel
 };
 
 struct BoardSettings {
   std::size_t queue_frames = 4096;
-  double silence_s = 1;  ///< without a frame for so long: BoardSilent
+  bool wait_for_consumer = false;  ///< a full queue holds the reader up and drops nothing: for replays
+  double silence_s = 1;            ///< without a frame for so long: BoardSilent
 };
 
 struct BoardCounters {
   FrameDecoder::Counters decoder;
   std::uint64_t dropped = 0;  ///< frames the consumer was too slow for
-  std::uint64_t missing = 0;  ///< frames that never arrived, counted from the gaps in time
+  /// Frames that never arrived, counted from the gaps in time; the last 64 gaps are undecided until the
+  /// reader ends.
+  std::uint64_t missing = 0;
   std::uint64_t suspect = 0;
   std::uint64_t jumps = 0;
   ClockFit clock;
@@ -59,13 +66,15 @@ class TactileBoard {
  private:
   void run();
   void read_once(double until);
-  void take(const BoardFrame& frame, double time, std::uint64_t discarded);
+  void take_batch(double time);
+  void take(StampedFrame frame, std::uint64_t discarded);
+  void date_decided();
   void check_silence(double time);
 
   std::unique_ptr<Port> port_;
   BoardSettings settings_;
   std::mutex mutex_;
-  std::condition_variable arrived_;
+  std::condition_variable arrived_, taken_;
   std::deque<StampedFrame> queue_;
   std::exception_ptr error_;
   BoardCounters counters_;
@@ -77,9 +86,15 @@ class TactileBoard {
   FrameDecoder decoder_;
   GapCounter gaps_;
   JumpDetector jumps_;
+  struct Decoded {
+    BoardFrame frame;
+    std::uint64_t discarded;
+  };
+  std::vector<Decoded> batch_;  // of one read
   std::vector<std::uint32_t> missing_before_;
   std::deque<double> undecided_;
-  double last_arrival_ = 0;
+  double last_arrival_ = 0, last_time_ = 0;
+  bool first_ = true;
   double text_bytes_ = 0;
   std::thread thread_;
 };
