@@ -104,6 +104,32 @@ SafetensorsFile::ChecksumState check_checksum(const std::string& path, const Hea
   return SafetensorsFile::ChecksumState::ok;
 }
 
+void hand_over(const TensorToWrite& tensor, const ByteSink& sink) {
+  if (tensor.read) {
+    tensor.read(sink);
+  } else {
+    sink(tensor.data);
+  }
+}
+
+uint32_t checksum_of(const std::string& header, const std::vector<TensorToWrite>& tensors) {
+  uint32_t sum = crc32(std::as_bytes(std::span(header)));
+  for (const TensorToWrite& tensor : tensors) {
+    uint64_t bytes = 0;
+    hand_over(tensor, [&](std::span<const std::byte> piece) {
+      sum = crc32(piece, sum);
+      bytes += piece.size();
+    });
+    const uint64_t expected = *tensor_bytes(tensor.dtype, tensor.shape);
+    if (bytes != expected) {
+      throw std::invalid_argument("write_safetensors: tensor " + in_quotes(tensor.name) + " has " +
+                                  std::to_string(bytes) + " bytes, its shape and type need " +
+                                  std::to_string(expected));
+    }
+  }
+  return sum;
+}
+
 void check_writable(const std::map<std::string, std::string>& metadata,
                     const std::vector<TensorToWrite>& tensors) {
   const auto wrong = [](const std::string& problem) {
@@ -124,10 +150,6 @@ void check_writable(const std::map<std::string, std::string>& metadata,
     const auto bytes = tensor_bytes(tensor.dtype, tensor.shape);
     if (!bytes)
       wrong("tensor " + in_quotes(tensor.name) + " has unknown type " + in_quotes(tensor.dtype) + " or size");
-    if (*bytes != tensor.data.size()) {
-      wrong("tensor " + in_quotes(tensor.name) + " has " + std::to_string(tensor.data.size()) +
-            " bytes, its shape and type need " + std::to_string(*bytes));
-    }
   }
 }
 
@@ -215,15 +237,15 @@ void write_safetensors(const std::string& path, std::map<std::string, std::strin
     throw std::invalid_argument("write_safetensors: the header has " + std::to_string(text.size()) +
                                 " bytes, expected at most " + std::to_string(kMaxHeaderBytes));
   }
-  uint32_t sum = crc32(std::as_bytes(std::span(text)));
-  for (const TensorToWrite& tensor : tensors) sum = crc32(tensor.data, sum);
-  text.replace(*checksum_position(text), kChecksumDigits, checksum_digits(sum));
+  text.replace(*checksum_position(text), kChecksumDigits, checksum_digits(checksum_of(text, tensors)));
 
   const uint64_t length = text.size();
   AtomicFile file(path);
   file.write(std::as_bytes(std::span(&length, 1)));
   file.write(text);
-  for (const TensorToWrite& tensor : tensors) file.write(tensor.data);
+  for (const TensorToWrite& tensor : tensors) {
+    hand_over(tensor, [&file](std::span<const std::byte> piece) { file.write(piece); });
+  }
   file.commit();
 }
 

@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <span>
 #include <string>
@@ -59,15 +60,20 @@ class SafetensorsFile {
   ChecksumState checksum_ = ChecksumState::absent;
 };
 
+using ByteSink = std::function<void(std::span<const std::byte>)>;
+
 struct TensorToWrite {
   std::string name;
   std::string dtype;
   std::vector<uint64_t> shape;
   std::span<const std::byte> data;  // little-endian, row-major
+  // Instead of `data`, for what is too large for memory: hands over all bytes in pieces, front to back.
+  // Called twice, for the checksum and for the file.
+  std::function<void(const ByteSink&)> read = {};
 };
 
 /// Writes the file atomically (io/file.h), with version and checksum; the same arguments give the same bytes.
-/// Throws std::invalid_argument when data and shape disagree, a name appears twice or is "__metadata__", a
+/// Throws std::invalid_argument when bytes and shape disagree, a name appears twice or is "__metadata__", a
 /// dtype is unknown, the metadata holds a field of this layer, or a cap of read() would be exceeded;
 /// FileError when the file cannot be written.
 void write_safetensors(const std::string& path, std::map<std::string, std::string> metadata,

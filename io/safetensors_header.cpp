@@ -136,7 +136,7 @@ std::string header_text(const std::map<std::string, std::string>& metadata,
   nlohmann::ordered_json::object_t::Container& entries = header.get_ref<nlohmann::ordered_json::object_t&>();
   uint64_t begin = 0;
   for (const TensorToWrite& tensor : tensors) {
-    const uint64_t end = begin + tensor.data.size();
+    const uint64_t end = begin + *tensor_bytes(tensor.dtype, tensor.shape);
     nlohmann::ordered_json entry = {
         {"dtype", tensor.dtype}, {"shape", tensor.shape}, {"data_offsets", {begin, end}}};
     entries.emplace_back(tensor.name, std::move(entry));

@@ -30,7 +30,8 @@ struct Header {
 /// The header's JSON, checked for itself. Throws JsonError.
 Header parse_header(std::string_view text);
 
-/// JSON text, padded with spaces so that the data begins at a multiple of 8 bytes.
+/// JSON text, padded with spaces so that the data begins at a multiple of 8 bytes. Types and shapes must be
+/// good.
 std::string header_text(const std::map<std::string, std::string>& metadata,
                         std::span<const TensorToWrite> tensors);
 

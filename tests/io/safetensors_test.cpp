@@ -302,6 +302,24 @@ TEST(SafetensorsWrite, RefusesWhatItCouldNotReadBack) {
   EXPECT_EQ(folder.entries(), 0u);
 }
 
+TEST(SafetensorsWrite, PiecesGiveTheSameBytesAsAWhole) {
+  TemporaryFolder folder;
+  std::vector<float> values(1000);
+  for (size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i);
+  const auto bytes = std::as_bytes(std::span(values));
+  const auto in_pieces = [&](size_t size) {
+    return [&bytes, size](const ByteSink& sink) {
+      for (size_t at = 0; at < bytes.size(); at += size)
+        sink(bytes.subspan(at, std::min(size, bytes.size() - at)));
+    };
+  };
+  write_safetensors(folder.file("whole"), {}, {{"a", "F32", {10, 100}, bytes}});
+  write_safetensors(folder.file("pieces"), {}, {{"a", "F32", {10, 100}, {}, in_pieces(77)}});
+  EXPECT_EQ(read_file(folder.file("whole"), kPlenty), read_file(folder.file("pieces"), kPlenty));
+  EXPECT_THROW(write_safetensors(folder.file("short"), {}, {{"a", "F32", {10, 101}, {}, in_pieces(77)}}),
+               std::invalid_argument);
+}
+
 TEST(SafetensorsWrite, AFullDiskLeavesTheOldFile) {
   for (int at = 1; at <= 12; ++at) {
     TemporaryFolder folder;
