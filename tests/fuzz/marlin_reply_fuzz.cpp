@@ -1,7 +1,7 @@
-// libFuzzer target: any text is a reply of some kind.
-#include "hardware/marlin_line.h"
+// libFuzzer target: marlin_reply_fuzz tests/fuzz/corpus/marlin_reply -max_total_time=600
+#include "marlin_reply_properties.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
-  (void)supertac::parse_reply({reinterpret_cast<const char*>(data), size});
+  supertac::check_marlin_replies(std::as_bytes(std::span(data, size)));
   return 0;
 }

@@ -1,0 +1,164 @@
+#include "unplug_run.h"
+
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <thread>
+
+#include "hardware/errors.h"
+#include "hardware/palpation_recorder.h"
+#include "hardware/serial_port.h"
+#include "hardware/virtual_rig/pty_rig.h"
+#include "rig_support.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kSpeedup = 2;
+constexpr double kLatest = 0.1;
+constexpr double kRunSeconds = 5.5;  // a little less than the short plan below takes
+
+void sleep_for(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
+
+/// Notes when the port first failed and when a stop was first sent (wall's clock).
+class NotingPort : public Port {
+  template <class Call>
+  auto noting(const Call& call) {
+    try {
+      return call();
+    } catch (const PortUnplugged&) {
+      if (failed_ == 0) failed_ = monotonic_seconds();
+      throw;
+    }
+  }
+
+ public:
+  NotingPort(const std::string& path, unsigned baud, double& failed, double& stopped)
+      : port_(path, {baud, kSpeedup}), failed_(failed), stopped_(stopped) {}
+  const std::string& name() const override { return port_.name(); }
+  double now() override { return port_.now(); }
+  Received read(std::span<std::byte> buffer, double until) override {
+    return noting([&] { return port_.read(buffer, until); });
+  }
+  double write(std::span<const std::byte> bytes, double until) override {
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    if (stopped_ == 0 && text.find("M410") != std::string_view::npos) stopped_ = monotonic_seconds();
+    return noting([&] { return port_.write(bytes, until); });
+  }
+
+ private:
+  SerialPort port_;
+  double& failed_;
+  double& stopped_;
+};
+
+double pull(PtyRig& rig, Plug plug) {
+  double pulled = 0;
+  rig.with_world([&](RigWorld&) { pulled = monotonic_seconds(); });
+  plug == Plug::board ? rig.unplug_board() : rig.unplug_printer();
+  return pulled;
+}
+
+/// A collection of one pass over 20 mm that starts just above the plate.
+RecorderSettings short_run(const TemporaryFolder& folder) {
+  RecorderSettings settings;
+  settings.plan.passes = 1;
+  settings.plan.slide = 20;
+  settings.origin = {99.7, 101.17, 97.81};
+  settings.journal = folder / "journal";
+  settings.header = "unplug run";
+  return settings;
+}
+
+void judge(UnplugVerdict& verdict, Plug plug, const PalpationOutcome& outcome, const Point3& head,
+           double contact_z) {
+  using Finger = PalpationOutcome::Finger;
+  verdict.finger = outcome.finger == Finger::lifted    ? "lifted"
+                   : outcome.finger == Finger::stopped ? "stopped"
+                                                       : "unknown";
+  try {
+    if (outcome.complete) throw std::logic_error("a false done");
+    std::rethrow_exception(outcome.error);
+  } catch (const PortUnplugged&) {
+  } catch (const std::exception& error) {
+    verdict.broken = std::string("expected PortUnplugged, found: ") + error.what();
+    return;
+  }
+  const bool up = head.z > contact_z + 4.9;
+  if (plug == Plug::board && (outcome.finger != Finger::lifted || !up)) {
+    verdict.broken = "the finger was not lifted: " + outcome.note;
+  } else if (plug == Plug::printer && !up && outcome.note.find("by hand") == std::string::npos) {
+    verdict.broken = "nobody is told to lift the finger: " + outcome.note;
+  } else if (verdict.noticed_s > kLatest || verdict.noticed_s * kSpeedup > kLatest) {
+    verdict.broken = "noticed after " + std::to_string(verdict.noticed_s) + " s";
+  }
+}
+
+}  // namespace
+
+UnplugVerdict unplug_idle(Plug plug, std::uint64_t seed) {
+  const TemporaryFolder folder;
+  PtyRig rig(running_rig(), folder / "board", folder / "printer");
+  SerialPort port(folder / (plug == Plug::board ? "board" : "printer"));
+  UnplugVerdict verdict;
+  verdict.moment_s = 0.05 * RandomStream(seed, 1).uniform(0);
+  std::atomic<double> pulled{0};
+  std::thread puller([&] {
+    sleep_for(verdict.moment_s);
+    pulled = pull(rig, plug);
+  });
+  try {
+    std::array<std::byte, 4096> buffer{};
+    for (const double until = port.now() + 20; port.now() < until;) (void)port.read(buffer, until);
+    verdict.broken = "not noticed in 20 s";
+  } catch (const PortUnplugged&) {
+  }
+  const double noticed = monotonic_seconds();
+  puller.join();
+  verdict.noticed_s = verdict.returned_s = noticed - pulled;
+  if (verdict.noticed_s > kLatest)
+    verdict.broken = "noticed after " + std::to_string(verdict.noticed_s) + " s";
+  return verdict;
+}
+
+UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed) {
+  const TemporaryFolder folder;
+  RigSettings rig_settings = running_rig();
+  rig_settings.printer.head = {99.7, 101.17, 97.81};
+  PtyRig rig(rig_settings, folder / "board", folder / "printer", kSpeedup);
+  UnplugVerdict verdict;
+  verdict.speedup = kSpeedup;
+  verdict.moment_s = kRunSeconds * RandomStream(seed, 2).uniform(0);
+  const RecorderSettings settings = short_run(folder);
+  double board_failed = 0, printer_failed = 0, stopped = 0, never = 0, pulled = 0;
+  std::atomic<bool> ended{false};
+  std::thread puller([&] {
+    for (bool moves = false; !moves && !ended; sleep_for(1e-3)) {
+      rig.with_world([&](RigWorld& world) { moves = world.printer().moving(world.now()); });
+    }
+    sleep_for(verdict.moment_s / kSpeedup);
+    pulled = pull(rig, plug);
+  });
+  try {
+    const PalpationOutcome outcome =
+        record_palpation(std::make_unique<NotingPort>(folder / "board", kBoardBaud, board_failed, never),
+                         std::make_unique<NotingPort>(folder / "printer", 115200, printer_failed, stopped),
+                         settings)
+            .outcome;
+    const double returned = monotonic_seconds();
+    ended = true;
+    puller.join();
+    verdict.noticed_s = (plug == Plug::board ? stopped : printer_failed) - pulled;
+    verdict.returned_s = returned - pulled;
+    Point3 head;
+    rig.with_world([&](RigWorld& world) { head = world.printer().head(world.now()); });
+    judge(verdict, plug, outcome, head, settings.plan.start.z);
+  } catch (const std::exception& error) {
+    ended = true;
+    puller.join();
+    verdict.broken = std::string("thrown instead of told: ") + error.what();
+  }
+  return verdict;
+}
+
+}  // namespace supertac

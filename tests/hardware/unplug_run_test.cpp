@@ -1,0 +1,24 @@
+#include "unplug_run.h"
+
+#include <gtest/gtest.h>
+
+namespace supertac {
+namespace {
+
+// The 100 pulls of each plug that are promised are a program of their own: hardware_unplug_runs.
+TEST(UnplugRun, AReaderNoticesWithin100Milliseconds) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    for (const Plug plug : {Plug::board, Plug::printer})
+      EXPECT_EQ(unplug_idle(plug, seed).broken, "") << seed;
+  }
+}
+
+TEST(UnplugRun, ACollectionEndsWithATypedErrorAndTheFingerUp) {
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    for (const Plug plug : {Plug::board, Plug::printer})
+      EXPECT_EQ(unplug_in_collection(plug, seed).broken, "") << seed;
+  }
+}
+
+}  // namespace
+}  // namespace supertac
