@@ -1,0 +1,20 @@
+// The most multiply-adds that this core can do now: a loop that touches registers only, run on the widest
+// instruction set of the processor. The clock of a busy machine changes all the time, so it is measured
+// between the things that are compared with it.
+#pragma once
+
+#include <string_view>
+
+namespace supertac::bench {
+
+/// Processor time of the calling thread: what the clock on the wall shows on an idle machine, without the
+/// turns that other programs take on a busy one.
+double cpu_seconds();
+
+/// "avx512", "avx2", or "sse2" (multiplication and addition apart) for a processor without FMA.
+std::string_view fma_set();
+
+/// GFLOP/s (two per multiply-add) over about 20 us of the calling thread.
+double fma_gflops();
+
+}  // namespace supertac::bench

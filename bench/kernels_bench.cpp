@@ -1,0 +1,141 @@
+// The convolution and linear kernels at the shapes of preset `paper` (T 256, LD 10, x4), batch 1 and 64:
+// forward, gradient of the input, gradient of the weights.
+//
+// GFLOP/s and share count the usual way, padding as if it were data. `useful` is the share of those
+// multiply-adds that meet data: kernels that skip the padding can exceed the peak by its inverse.
+#include "autograd/kernels/conv.h"
+#include "bench/against_peak.h"
+
+namespace supertac {
+namespace {
+
+enum class Pass { forward, grad_x, grad_w };
+
+struct Layer {
+  const char* name;
+  kernels::ConvSettings settings;
+  Dim cin, cout;
+};
+
+constexpr kernels::ConvSettings conv2d(Dim size, Dim kernel) {
+  return {.height = size,
+          .width = size,
+          .kernel_h = kernel,
+          .kernel_w = kernel,
+          .padding_h = kernel / 2,
+          .padding_w = kernel / 2};
+}
+constexpr kernels::ConvSettings up2d(Dim size) {
+  return {.height = size,
+          .width = size,
+          .kernel_h = 4,
+          .kernel_w = 4,
+          .stride_h = 2,
+          .stride_w = 2,
+          .padding_h = 1,
+          .padding_w = 1,
+          .transposed = true};
+}
+constexpr kernels::ConvSettings down1d(Dim length) {
+  return {.width = length, .kernel_w = 3, .stride_w = 2, .padding_w = 1};
+}
+constexpr kernels::ConvSettings up1d(Dim length) {
+  return {.width = length, .kernel_w = 4, .stride_w = 2, .padding_w = 1, .transposed = true};
+}
+
+const Layer kLayers[] = {
+    {"conv3x3/4x4", conv2d(4, 3), 32, 32},
+    {"conv3x3/8x8", conv2d(8, 3), 32, 32},
+    {"conv3x3/16x16", conv2d(16, 3), 32, 32},
+    {"up4x4s2/4x4", up2d(4), 32, 32},
+    {"up4x4s2/8x8", up2d(8), 32, 32},
+    {"picture/16x16", conv2d(16, 3), 32, 1},
+    {"encoder.conv.0", down1d(256), 4, 16},
+    {"encoder.conv.1", down1d(128), 16, 32},
+    {"encoder.conv.2", down1d(64), 32, 32},
+    {"encoder.conv.3", down1d(32), 32, 32},
+    {"decoder.conv.0", up1d(16), 32, 32},
+    {"decoder.conv.1", up1d(32), 32, 32},
+    {"decoder.conv.2", up1d(64), 32, 16},
+    {"decoder.conv.3", up1d(128), 16, 16},
+    {"decoder.out", {.width = 256, .kernel_w = 3, .padding_w = 1}, 16, 4},
+    {"encoder.fc", {}, 512, 64},
+    {"encoder.mean", {}, 64, 10},
+    {"decoder.fc.1", {}, 64, 512},
+    {"upsampler.fc", {}, 40, 512},
+    {"attention.squeeze", {}, 32, 8},
+};
+
+bool is_linear(const Layer& layer) { return layer.settings == kernels::ConvSettings{}; }
+
+// Buffers of one layer at one batch size, and its three kernels. A linear layer is a convolution of one
+// pixel.
+struct Buffers {
+  Buffers(const Layer& l, Dim batch)
+      : layer(l),
+        n(batch),
+        geometry(kernels::geometry_of(l.settings)),
+        x(Tensor::full({batch, geometry.in_pixels, l.cin}, 0.5F)),
+        w(Tensor::full({geometry.taps, l.cin, l.cout}, 0.01F)),
+        b(Tensor::zeros({l.cout})),
+        y(Tensor::zeros({batch, geometry.out_pixels, l.cout})),
+        gx(Tensor::zeros(x.shape())),
+        gw(Tensor::zeros(w.shape())) {}
+
+  void run(Pass pass) {
+    const kernels::ConvSizes sizes{&geometry, n, layer.cin, layer.cout};
+    const Dim cin = layer.cin, cout = layer.cout;
+    switch (pass) {
+      case Pass::forward:
+        return is_linear(layer) ? kernels::linear(n, cin, cout, x.data(), w.data(), b.data(), y.data())
+                                : kernels::conv(sizes, x.data(), w.data(), b.data(), y.data());
+      case Pass::grad_x:
+        return is_linear(layer) ? kernels::linear_grad_x(n, cin, cout, y.data(), w.data(), gx.data())
+                                : kernels::conv_grad_x(sizes, y.data(), w.data(), gx.data());
+      case Pass::grad_w:
+        return is_linear(layer) ? kernels::linear_grad_w(n, cin, cout, x.data(), y.data(), gw.data())
+                                : kernels::conv_grad_w(sizes, x.data(), y.data(), gw.data());
+    }
+  }
+
+  Layer layer;
+  Dim n;
+  const kernels::Geometry& geometry;
+  Tensor x, w, b, y, gx, gw;
+};
+
+void run_kernel(benchmark::State& state, const Layer& layer, Pass pass) {
+  Buffers buffers(layer, state.range(0));
+  const kernels::Geometry& g = buffers.geometry;
+  double meeting = 0;
+  for (const kernels::TapPairs& pairs : g.pairs) meeting += static_cast<double>(pairs.inputs.size());
+  const auto pixels = static_cast<double>(layer.settings.transposed ? g.in_pixels : g.out_pixels);
+  const double all = pixels * static_cast<double>(g.taps);
+  const double channels = static_cast<double>(buffers.n * layer.cin * layer.cout);
+  bench::run_against_peak(state, all * channels, [&] { buffers.run(pass); });
+  state.counters["useful"] = meeting / all;
+}
+
+const bool kRegistered = [] {
+  constexpr std::pair<const char*, Pass> kPasses[] = {
+      {"forward", Pass::forward}, {"grad_x", Pass::grad_x}, {"grad_w", Pass::grad_w}};
+  for (const Layer& layer : kLayers) {
+    for (const auto& [pass_name, pass] : kPasses) {
+      const std::string name = std::string(layer.name) + "/" + pass_name;
+      benchmark::RegisterBenchmark(
+          name.c_str(), [&layer, pass = pass](benchmark::State& state) { run_kernel(state, layer, pass); })
+          ->Arg(1)
+          ->Arg(64)
+          ->ArgName("batch")
+          ->UseManualTime()
+          ->MinTime(0.03)
+          ->Unit(benchmark::kMicrosecond);
+    }
+  }
+  return true;
+}();
+
+}  // namespace
+}  // namespace supertac
+
+BENCHMARK_MAIN();

@@ -1,0 +1,120 @@
+// Preset `paper` (T 256, LD 10, x4) end to end: inference, a training step, start-up, data loading.
+#include <omp.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <filesystem>
+#include <new>
+
+#include "bench/against_peak.h"
+#include "bench/windows.h"
+#include "models/cost.h"
+#include "models/model_file.h"
+#include "models/trainer.h"
+
+namespace {
+std::atomic<long> allocations{0};
+
+void* counted(std::size_t bytes, std::size_t alignment) {
+  allocations.fetch_add(1, std::memory_order_relaxed);
+  void* block = nullptr;
+  if (posix_memalign(&block, std::max(alignment, sizeof(void*)), bytes) != 0) throw std::bad_alloc();
+  return block;
+}
+}  // namespace
+
+void* operator new(std::size_t bytes) { return counted(bytes, 16); }
+void* operator new[](std::size_t bytes) { return counted(bytes, 16); }
+void* operator new(std::size_t bytes, std::align_val_t a) {
+  return counted(bytes, static_cast<std::size_t>(a));
+}
+void* operator new[](std::size_t bytes, std::align_val_t a) {
+  return counted(bytes, static_cast<std::size_t>(a));
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete[](void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
+void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete[](void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+void operator delete[](void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+
+namespace supertac {
+namespace {
+
+const SuperTacSettings kPaper = SuperTacSettings::of_preset("paper");
+
+double counted_since(long before, const benchmark::State& state) {
+  return static_cast<double>(allocations - before) /
+         static_cast<double>(std::max<std::int64_t>(1, state.iterations()));
+}
+
+void inference(benchmark::State& state) {
+  omp_set_num_threads(1);
+  Rng rng(1);
+  const SuperTac model(kPaper, rng);
+  const Tensor windows = bench::random_windows(state.range(0), kPaper.timesteps);
+  const auto batch = static_cast<double>(state.range(0));
+  bench::run_against_peak(state, batch * cost_of(kPaper).inference, [&] { model.infer(windows); });
+  state.counters["windows/s"] = batch * 1e6 / state.counters["us"];
+}
+BENCHMARK(inference)->ArgName("batch")->Arg(1)->Arg(8)->Arg(64)->UseManualTime()->Unit(
+    benchmark::kMicrosecond);
+
+// Windows, augmentation, forward, loss, backward, Adam.
+void training_step(benchmark::State& state) {
+  omp_set_num_threads(static_cast<int>(state.range(0)));
+  TrainingSettings settings{.model = kPaper, .epochs = 100'000};
+  settings.augment = {.gain = 0.5, .taxel_gain = 0.3, .offset = 0.05, .noise = 0.02, .dropped = 2};
+  const WindowSet windows = bench::sliding_bumps(kPaper);
+  Trainer trainer(windows, bench::all_of(windows), settings);
+  for (int i = 0; i < 3; ++i) trainer.train_step();
+  const long before = allocations;
+  for (auto _ : state) trainer.train_step();
+  state.counters["allocations/step"] = counted_since(before, state);
+  state.SetItemsProcessed(state.iterations() * settings.batch);
+}
+BENCHMARK(training_step)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+// From a model file to the first picture.
+void first_picture(benchmark::State& state) {
+  omp_set_num_threads(1);
+  const std::filesystem::path path =
+      std::filesystem::temp_directory_path() / "supertac_model_bench.safetensors";
+  Rng rng(1);
+  save_model(path, SuperTac(kPaper, rng), {}, {});
+  const Tensor window = bench::random_windows(1, kPaper.timesteps);
+  for (auto _ : state) benchmark::DoNotOptimize(load_model(path.string()).model->infer(window));
+  std::filesystem::remove(path);
+}
+BENCHMARK(first_picture)->Unit(benchmark::kMillisecond);
+
+// What a training step asks of the data: the batch's indices, windows, augmentation and truths.
+void data_loading(benchmark::State& state) {
+  const WindowSet windows = bench::sliding_bumps(kPaper);
+  const Batching batching(bench::all_of(windows), 64, 0);
+  const bool augmented = state.range(0) != 0;
+  const AugmentSettings augmentation{
+      .gain = 0.5, .taxel_gain = 0.3, .offset = 0.05, .noise = 0.02, .dropped = 2};
+  std::vector<std::uint32_t> indices(64);
+  std::vector<float> window(static_cast<std::size_t>(kPaper.timesteps * kWindowTaxels));
+  std::vector<float> truth(static_cast<std::size_t>(kPaper.image_size() * kPaper.image_size()));
+  std::uint64_t step = 0;
+  for (auto _ : state) {
+    batching.batch(0, step++ % batching.batches_per_epoch(), indices);
+    for (const std::uint32_t i : indices) {
+      windows.window(i, window);
+      if (augmented) augment(augmentation, 0, i, window);
+      windows.truth(i, truth);
+      benchmark::ClobberMemory();
+    }
+  }
+  state.SetItemsProcessed(state.iterations() * 64);
+}
+BENCHMARK(data_loading)->ArgName("augmented")->Arg(0)->Arg(1)->Unit(benchmark::kMicrosecond);
+
+}  // namespace
+}  // namespace supertac
+
+BENCHMARK_MAIN();

@@ -1,0 +1,50 @@
+#include "models/cost.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <string>
+
+namespace supertac {
+namespace {
+
+// How often a weight is used: once for each pixel of the coarser side of its layer.
+Dim uses(const std::string& name, const SuperTacSettings& s) {
+  const auto level = [&](const char* mark) {
+    return std::stoi(name.substr(name.find(mark) + std::string(mark).size()));
+  };
+  if (name.find("attention") != std::string::npos || name.find("fc") != std::string::npos) return 1;
+  if (name.find("rirb.") != std::string::npos) return 16 << (2 * level("rirb."));
+  if (name.find("upsampler.out") != std::string::npos) return s.image_size() * s.image_size();
+  if (name.find("encoder") != std::string::npos && name.find("conv.") != std::string::npos)
+    return s.timesteps >> (level("conv.") + 1);
+  if (name.find("decoder") != std::string::npos && name.find("conv.") != std::string::npos)
+    return s.timesteps / 16 << level("conv.");
+  if (name.find("decoder") != std::string::npos) return s.timesteps;  // out
+  return 1;                                                           // heads
+}
+
+TEST(Cost, AgreesWithTheWeightsOfTheModel) {
+  for (const Dim scale : {2, 4, 8}) {
+    SuperTacSettings s{.timesteps = 64, .latent = 5, .scale = scale, .channels = 12, .rcabs = 2};
+    Rng rng(0);
+    const SuperTac model(s, rng);
+    double inference = 0, forward = 0;
+    for (const Parameter& p : model.parameters()) {
+      if (p.name.ends_with("bias")) continue;
+      const auto macs = static_cast<double>(p.value.value().size() * uses(p.name, s));
+      forward += macs;
+      if (!p.name.starts_with("decoder") && p.name.find("log_var") == std::string::npos) inference += macs;
+    }
+    EXPECT_EQ(cost_of(s).inference, inference) << scale;
+    EXPECT_EQ(cost_of(s).training, 3 * forward) << scale;
+  }
+}
+
+TEST(Cost, OfThePresetPaperIsAboutEightMillion) {
+  EXPECT_NEAR(cost_of(SuperTacSettings::of_preset("paper")).inference, 7.8e6, 0.1e6);
+  EXPECT_THROW(cost_of({.timesteps = 40}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace supertac
