@@ -83,6 +83,11 @@ void check_shape(const SafetensorsFile& file, const std::string& name, std::vect
 
 }  // namespace
 
+double Recording::filter_s() const {
+  const auto found = metadata.find("filter_s");
+  return found == metadata.end() ? 0 : parse_double(found->second).value_or(0);
+}
+
 Recording read_recording(const std::string& path) {
   const SafetensorsFile file = SafetensorsFile::read(path);
   Recording recording;

@@ -22,6 +22,8 @@ struct Recording {
   std::map<std::string, std::string> metadata;  ///< whatever else is worth keeping (filter, time base, ...)
 
   size_t frames() const { return time_s.size(); }
+  /// Length of the moving average the voltages went through (s); 0 when the metadata names none.
+  double filter_s() const;
 };
 
 /// Reads a safetensors file with tensors time_s F64 [n], volts F32 [n,16] and, where known, position_mm F32

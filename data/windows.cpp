@@ -12,7 +12,6 @@
 #include "data/metrics.h"
 #include "data/plate_file.h"
 #include "data/truth.h"
-#include "io/numbers.h"
 
 namespace supertac {
 namespace {
@@ -42,12 +41,6 @@ void check_size(const char* what, size_t got, size_t expected) {
 bool is_reliable(const Recording& recording) {
   const auto flag = recording.metadata.find("registration_reliable");
   return flag == recording.metadata.end() || flag->second != "no";
-}
-
-// Length of the recording's moving average (s); 0 when its metadata names none.
-double filter_of(const Recording& recording) {
-  const auto found = recording.metadata.find("filter_s");
-  return found == recording.metadata.end() ? 0 : parse_double(found->second).value_or(0);
 }
 
 // Hashes 32-bit words one after the other.
@@ -142,7 +135,7 @@ void WindowSet::add(const Recording& recording, const std::string& folder) {
             .pass = recording.pass,
             .speed_mm_s = recording.speed_mm_s,
             .source = recording.source,
-            .filter_s = filter_of(recording),
+            .filter_s = recording.filter_s(),
             .frames = track.frames(),
             .first_window = index_.size(),
             .windows = 0};

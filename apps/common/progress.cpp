@@ -1,5 +1,6 @@
 #include "apps/common/progress.h"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -13,11 +14,6 @@
 namespace supertac {
 namespace {
 
-bool drawable_terminal() {
-  const char* terminal = std::getenv("TERM");
-  return isatty(STDERR_FILENO) == 1 && terminal != nullptr && std::string_view(terminal) != "dumb";
-}
-
 std::string clock_text(double seconds) {
   const auto whole = static_cast<int64_t>(std::lround(std::min(seconds, 1e6)));
   const auto two = [](int64_t number) { return (number < 10 ? "0" : "") + std::to_string(number); };
@@ -26,6 +22,16 @@ std::string clock_text(double seconds) {
 }
 
 }  // namespace
+
+bool drawable_terminal() {
+  const char* terminal = std::getenv("TERM");
+  return isatty(STDERR_FILENO) == 1 && terminal != nullptr && std::string_view(terminal) != "dumb";
+}
+
+size_t terminal_width() {
+  winsize size{};
+  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col : 80;
+}
 
 Progress::Progress(const Arguments& arguments, std::string what, uint64_t total, std::string unit)
     : what_(std::move(what)),
@@ -39,13 +45,14 @@ Progress::~Progress() {
   if (width_ > 0) draw("");
 }
 
-void Progress::update(uint64_t done) {
+void Progress::update(uint64_t done, const std::string& detail) {
   using namespace std::chrono_literals;
   if (!enabled_) return;
   const auto now = std::chrono::steady_clock::now();
   if (now - begin_ < 2s || now - last_ < 200ms) return;
   last_ = now;
-  draw(progress_line(what_, done, total_, unit_, std::chrono::duration<double>(now - begin_).count()));
+  const double seconds = std::chrono::duration<double>(now - begin_).count();
+  draw(progress_line(what_, done, total_, unit_, seconds, detail).substr(0, terminal_width() - 1));
 }
 
 void Progress::draw(const std::string& line) {
@@ -55,14 +62,15 @@ void Progress::draw(const std::string& line) {
 }
 
 std::string progress_line(const std::string& what, uint64_t done, uint64_t total, const std::string& unit,
-                          double seconds) {
+                          double seconds, const std::string& detail) {
   constexpr int kCells = 24;
   const double share =
       total > 0 ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total)) : 0.0;
   const int cells = static_cast<int>(share * kCells);
   const double rate = seconds > 0 ? static_cast<double>(done) / seconds : 0.0;
+  const std::string rate_text = format(rate, rate < 10 ? 1 : 0) + " " + unit + "/s";
   std::string line = what + "  [" + std::string(cells, '#') + std::string(kCells - cells, '.') + "]  " +
-                     format(100 * share, 0) + " %  " + format(rate, rate < 10 ? 1 : 0) + " " + unit + "/s";
+                     format(100 * share, 0) + " %  " + (detail.empty() ? rate_text : detail);
   if (share > 0) line += "  " + clock_text(seconds * (1 - share) / share) + " left";
   return line;
 }

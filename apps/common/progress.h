@@ -8,6 +8,9 @@ namespace supertac {
 
 class Arguments;
 
+/// Whether stderr is a terminal that can be drawn on (not TERM=dumb).
+bool drawable_terminal();
+
 /// A progress bar on stderr: share done, rate, time left. Drawn on a terminal only (not TERM=dumb, not
 /// --quiet), and only once the work has taken two seconds. It needs no colour and no escape codes. Not to be
 /// shared by threads.
@@ -20,8 +23,9 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `done` of `total` so far. Cheap: draws at most five times a second.
-  void update(uint64_t done);
+  /// `done` of `total` so far; `detail` is shown in place of the rate. Cheap: draws at most five times a
+  /// second, cut to the terminal's width.
+  void update(uint64_t done, const std::string& detail = "");
 
  private:
   void draw(const std::string& line);
@@ -33,8 +37,8 @@ class Progress {
   std::chrono::steady_clock::time_point begin_, last_;
 };
 
-/// The bar's text, e.g. "training  [#####.....]  50 %  1200 steps/s  0:41 left".
+/// The bar's text, e.g. "training  [#####.....]  50 %  1200 steps/s  0:41 left"; `detail` replaces the rate.
 std::string progress_line(const std::string& what, uint64_t done, uint64_t total, const std::string& unit,
-                          double seconds);
+                          double seconds, const std::string& detail = "");
 
 }  // namespace supertac

@@ -1,0 +1,69 @@
+#include "apps/stream/picture_log.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <array>
+#include <filesystem>
+
+#include "data/recording.h"
+#include "io/file.h"
+
+namespace supertac {
+
+PictureLog::PictureLog(const std::string& path, bool force, size_t image_size)
+    : path_(path), image_size_(image_size) {
+  refuse_existing(path, force);
+  times_ = open_spool();
+  volts_ = open_spool();
+  pictures_ = open_spool();
+}
+
+void PictureLog::fail() const {
+  throw FileError(path_, std::string("the pictures cannot be kept: ") + strerror(errno) +
+                             "; make room, or choose another folder");
+}
+
+PictureLog::Spool PictureLog::open_spool() const {
+  std::string name = (std::filesystem::absolute(path_).parent_path() / ".pictures-XXXXXX").string();
+  const int file = mkostemp(name.data(), O_CLOEXEC);
+  if (file < 0) fail();
+  unlink(name.c_str());
+  Spool spool(fdopen(file, "w+b"));
+  if (!spool) fail();
+  return spool;
+}
+
+void PictureLog::append(const Spool& spool, std::span<const std::byte> bytes) {
+  if (std::fwrite(bytes.data(), 1, bytes.size(), spool.get()) != bytes.size()) fail();
+}
+
+void PictureLog::add(double time_s, std::span<const float> volts, std::span<const float> picture) {
+  append(times_, std::as_bytes(std::span(&time_s, 1)));
+  append(volts_, std::as_bytes(volts));
+  append(pictures_, std::as_bytes(picture));
+  ++count_;
+}
+
+void PictureLog::read_back(const Spool& spool, const ByteSink& sink) const {
+  if (std::fflush(spool.get()) != 0 || std::fseek(spool.get(), 0, SEEK_SET) != 0) fail();
+  std::array<std::byte, 1 << 16> buffer;
+  while (const size_t count = std::fread(buffer.data(), 1, buffer.size(), spool.get()))
+    sink(std::span(buffer).first(count));
+  if (std::ferror(spool.get()) != 0) fail();
+}
+
+void PictureLog::write(const std::map<std::string, std::string>& metadata) {
+  const auto from = [this](const Spool& spool) {
+    return [this, &spool](const ByteSink& sink) { read_back(spool, sink); };
+  };
+  write_safetensors(path_, metadata,
+                    {{"time_s", "F64", {count_}, {}, from(times_)},
+                     {"volts", "F32", {count_, kTaxels}, {}, from(volts_)},
+                     {"pictures", "F32", {count_, image_size_, image_size_}, {}, from(pictures_)}});
+}
+
+}  // namespace supertac

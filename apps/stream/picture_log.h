@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "io/safetensors.h"
+
+namespace supertac {
+
+/// Keeps pictures for a safetensors file of tensors time_s F64 [n], volts F32 [n,16] and pictures F32
+/// [n,S,S]. How many there will be is not known before the end, and they do not fit into memory (1 MB/s):
+/// they wait in nameless temporary files beside the final one.
+class PictureLog {
+ public:
+  /// @throws FileError when `path` cannot be made there, or exists without `force`.
+  PictureLog(const std::string& path, bool force, size_t image_size);
+  /// @throws FileError
+  void add(double time_s, std::span<const float> volts, std::span<const float> picture);
+  /// Writes the file, atomically. @throws FileError
+  void write(const std::map<std::string, std::string>& metadata);
+
+ private:
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  using Spool = std::unique_ptr<std::FILE, Close>;
+
+  Spool open_spool() const;
+  void append(const Spool& spool, std::span<const std::byte> bytes);
+  void read_back(const Spool& spool, const ByteSink& sink) const;
+  [[noreturn]] void fail() const;
+
+  std::string path_;
+  size_t image_size_;
+  uint64_t count_ = 0;
+  Spool times_, volts_, pictures_;
+};
+
+}  // namespace supertac

@@ -1,0 +1,44 @@
+#include "apps/stream/picture_maker.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+LiveWindowSettings window_settings(const ModelFile& model, double period_s, double filter_s) {
+  const double trained_s = model.input.filter_s.value_or(filter_s);
+  const bool same = std::abs(trained_s - filter_s) < 1e-4;
+  if (!same && filter_s > 0) {
+    throw std::runtime_error("the signals have gone through a moving average of " + format(filter_s) +
+                             " s, the model was trained behind one of " + format(trained_s) +
+                             " s; choose signals and model of one kind (supertac-info tells)");
+  }
+  return {.timesteps = static_cast<int>(model.model->settings().timesteps),
+          .rate_hz = model.input.rate_hz,
+          .scaling = model.input.scaling,
+          .filter_s = same ? 0 : trained_s,
+          .frame_period_s = period_s};
+}
+
+}  // namespace
+
+PictureMaker::PictureMaker(const ModelFile& model, double period_s, double filter_s)
+    : model_(model),
+      window_(window_settings(model, period_s, filter_s)),
+      input_(Shape{1, model.model->settings().timesteps, kWindowTaxels}),
+      output_(model.model->infer(input_)) {}  // the first run takes memory and chooses kernels
+
+std::span<const float> PictureMaker::picture() {
+  if (!window_.window(input_.values())) return {};
+  output_ = model_.model->infer(input_);
+  return output_.values();
+}
+
+double PictureMaker::window_s() const {
+  return static_cast<double>(model_.model->settings().timesteps) / model_.input.rate_hz;
+}
+
+}  // namespace supertac

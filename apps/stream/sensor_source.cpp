@@ -1,0 +1,127 @@
+#include "apps/stream/sensor_source.h"
+
+#include <algorithm>
+
+#include "hardware/capture.h"
+#include "hardware/errors.h"
+#include "hardware/port_list.h"
+#include "hardware/serial_port.h"
+#include "io/file.h"
+
+namespace supertac {
+namespace {
+
+constexpr char kCaptureHeader[] = R"({"version":1,"kind":"stream"})";
+
+class BoardSource : public SensorSource {
+ public:
+  BoardSource(std::unique_ptr<Port> port, std::unique_ptr<JournalWriter> capture, double speedup)
+      : SensorSource(kFramePeriod, 0, true),
+        speedup_(speedup),
+        capture_(std::move(capture)),
+        board_(capture_ ? std::make_unique<CapturedPort>(std::move(port), *capture_, Stream::board)
+                        : std::move(port)) {}
+
+  std::optional<SensorFrame> next(double wait_s) override {
+    if (capture_) capture_->check();
+    const auto frame = board_.next(wait_s);
+    if (!frame) return std::nullopt;
+    return SensorFrame{frame->time_s, taxel_volts(frame->frame), frame->arrival_s / speedup_};
+  }
+  bool ended() const override { return false; }
+  BoardCounters counters() override { return board_.counters(); }
+  void finish() override {
+    board_.stop();
+    if (capture_) capture_->close();
+  }
+
+ private:
+  double speedup_;
+  std::unique_ptr<JournalWriter> capture_;  // outlives the board, whose port writes to it
+  TactileBoard board_;
+};
+
+class ReplaySource : public SensorSource {
+ public:
+  explicit ReplaySource(const std::string& journal)
+      : SensorSource(kFramePeriod, 0, false),
+        board_(std::make_unique<ReplayPort>(read_journal(journal).of(Stream::board), journal),
+               {.wait_for_consumer = true}) {}
+
+  std::optional<SensorFrame> next(double wait_s) override {
+    try {
+      const auto frame = board_.next(wait_s);
+      if (!frame) return std::nullopt;
+      return SensorFrame{frame->time_s, taxel_volts(frame->frame), monotonic_seconds()};
+    } catch (const PortUnplugged&) {  // how a capture ends
+      ended_ = true;
+      return std::nullopt;
+    }
+  }
+  bool ended() const override { return ended_; }
+  BoardCounters counters() override { return board_.counters(); }
+  void finish() override { board_.stop(); }
+
+ private:
+  TactileBoard board_;
+  bool ended_ = false;
+};
+
+// Not the mean: lost frames leave a gap.
+double median_period(const Recording& recording) {
+  std::vector<double> steps;
+  for (size_t i = 1; i < recording.frames(); ++i)
+    steps.push_back(recording.time_s[i] - recording.time_s[i - 1]);
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+class RecordingSource : public SensorSource {
+ public:
+  explicit RecordingSource(Recording recording)
+      : SensorSource(median_period(recording), recording.filter_s(), false),
+        recording_(std::move(recording)) {}
+
+  std::optional<SensorFrame> next(double) override {
+    if (ended()) return std::nullopt;
+    SensorFrame frame{recording_.time_s[at_], {}, monotonic_seconds()};
+    std::copy_n(&recording_.volts[at_ * kTaxels], kTaxels, frame.volts.begin());
+    ++at_;
+    return frame;
+  }
+  bool ended() const override { return at_ == recording_.frames(); }
+  BoardCounters counters() override {
+    BoardCounters counters;
+    counters.decoder.frames = at_;
+    return counters;
+  }
+  void finish() override {}
+
+ private:
+  Recording recording_;
+  size_t at_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<SensorSource> open_board(const std::string& port, double speedup,
+                                         const std::string& capture) {
+  auto serial = std::make_unique<SerialPort>(resolve_board_port(port), SerialSettings{kBoardBaud, speedup});
+  auto journal = capture.empty() ? nullptr : std::make_unique<JournalWriter>(capture, kCaptureHeader);
+  return std::make_unique<BoardSource>(std::move(serial), std::move(journal), speedup);
+}
+
+std::unique_ptr<SensorSource> open_replay(const std::string& journal) {
+  return std::make_unique<ReplaySource>(journal);
+}
+
+std::unique_ptr<SensorSource> open_recording(const std::string& path) {
+  Recording recording = read_recording(path);
+  if (recording.frames() < 2)
+    throw FileError(
+        path, "expected a recording of at least two frames, found " + std::to_string(recording.frames()));
+  return std::make_unique<RecordingSource>(std::move(recording));
+}
+
+}  // namespace supertac

@@ -1,0 +1,126 @@
+#include "apps/stream/terminal_view.h"
+
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <span>
+
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr int kSide = 32;              // pixels of either picture on the terminal
+constexpr int kLines = kSide / 2 + 1;  // two pixels a line, and the figures
+constexpr int kColumns = 2 * kSide + 3;
+constexpr auto kDrawEvery = std::chrono::milliseconds(66);
+
+// Of the 256 colours every terminal has: black, violet, red, orange, yellow, white, ever brighter.
+constexpr std::array<int, 16> kHeat = {16,  17,  54,  90,  126, 161, 197, 203,
+                                       208, 214, 220, 226, 227, 228, 230, 231};
+constexpr std::string_view kInk = " .:-=+*#%@";
+
+template <size_t N>
+size_t level(float value) {
+  return static_cast<size_t>(std::clamp(value, 0.0F, 1.0F) * (N - 1) + 0.5F);
+}
+
+// Pixel (row, column) of a picture of any size drawn kSide x kSide, row 0 on top: that is the largest y.
+float pixel(std::span<const float> picture, int row, int column) {
+  const int size = picture.size() == 16 ? 4 : picture.size() == 64 ? 8 : picture.size() == 256 ? 16 : 32;
+  const int repeat = kSide / size;
+  if (picture.empty()) return 0;
+  return picture[static_cast<size_t>((size - 1 - row / repeat) * size + column / repeat)];
+}
+
+void append_row(std::string& text, std::span<const float> picture, int line, bool colour) {
+  size_t above_before = kHeat.size(), below_before = kHeat.size();
+  for (int column = 0; column < kSide; ++column) {
+    const float above = pixel(picture, 2 * line, column), below = pixel(picture, 2 * line + 1, column);
+    if (!colour) {
+      text += kInk[level<kInk.size()>(0.5F * (above + below))];
+      continue;
+    }
+    const size_t top = level<kHeat.size()>(above), bottom = level<kHeat.size()>(below);
+    if (top != above_before) text += "\x1b[38;5;" + std::to_string(kHeat[top]) + "m";
+    if (bottom != below_before) text += "\x1b[48;5;" + std::to_string(kHeat[bottom]) + "m";
+    text += "\u2580";  // upper half block
+    above_before = top, below_before = bottom;
+  }
+  if (colour) text += "\x1b[0m";
+}
+
+bool colour_wanted() {
+  const char* no_color = std::getenv("NO_COLOR");
+  return no_color == nullptr || *no_color == '\0';
+}
+
+bool window_is_large_enough() {
+  winsize size{};
+  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return true;
+  return size.ws_col >= kColumns && size.ws_row > kLines;
+}
+
+}  // namespace
+
+std::string status_line(const LiveState& state) {
+  return format(state.frames_per_s, 0) + " frames/s  latency " + format(state.median_ms, 2) + " ms (p99 " +
+         format(state.p99_ms, 2) + ")  lost " + std::to_string(state.lost) + "  dropped " +
+         std::to_string(state.dropped) + "\n";
+}
+
+std::string render(const LiveState& state, bool colour) {
+  std::string text;
+  for (int line = 0; line < kSide / 2; ++line) {
+    append_row(text, state.taxels, line, colour);
+    text += "   ";
+    append_row(text, state.picture, line, colour);
+    text += '\n';
+  }
+  return text + status_line(state);
+}
+
+TerminalView::TerminalView() : colour_(colour_wanted()), thread_([this] { run(); }) {}
+
+TerminalView::~TerminalView() {
+  stop_ = true;
+  thread_.join();
+}
+
+void TerminalView::update(const LiveState& state) {
+  std::lock_guard lock(mutex_);
+  newest_ = state;
+}
+
+void TerminalView::run() {
+  for (bool last = false; !last;) {
+    std::this_thread::sleep_for(kDrawEvery);
+    last = stop_;
+    LiveState state;
+    {
+      std::lock_guard lock(mutex_);
+      state = newest_;
+    }
+    draw(state);
+  }
+}
+
+// A terminal that takes nothing (Ctrl-S) is left alone: the end of the program must not wait for it.
+void TerminalView::draw(const LiveState& state) {
+  pollfd terminal{STDERR_FILENO, POLLOUT, 0};
+  if (poll(&terminal, 1, 0) != 1 || (terminal.revents & POLLOUT) == 0) return;
+  std::string text = window_is_large_enough() ? render(state, colour_) : status_line(state);
+  if (drawn_lines_ > 0) text = "\x1b[" + std::to_string(drawn_lines_) + "A\x1b[J" + text;
+  drawn_lines_ = static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+  for (std::string_view left = text; !left.empty();) {
+    const ssize_t count = ::write(STDERR_FILENO, left.data(), left.size());
+    if (count <= 0) return;
+    left.remove_prefix(static_cast<size_t>(count));
+  }
+}
+
+}  // namespace supertac

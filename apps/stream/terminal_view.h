@@ -1,0 +1,54 @@
+// The live picture on a terminal: what the array feels and what the network makes of it, side by side.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "data/recording.h"
+
+namespace supertac {
+
+struct LiveState {
+  std::array<float, kTaxels> taxels{};  ///< in [0,1]
+  std::vector<float> picture;           ///< [S][S], S = 8, 16 or 32; empty before the first
+  double frames_per_s = 0;
+  double median_ms = 0, p99_ms = 0;  ///< latency
+  uint64_t lost = 0, dropped = 0;
+};
+
+/// Two pictures of 32 columns and 16 lines, y upwards, and a line of figures; every line ends with a line
+/// feed. `colour`: half blocks in 256 colours, two pixels a character; without, characters from blank to @.
+std::string render(const LiveState& state, bool colour);
+/// The line of figures alone.
+std::string status_line(const LiveState& state);
+
+/// Draws the newest state on stderr 15 times a second, on a thread of its own: a slow terminal holds up
+/// nobody.
+class TerminalView {
+ public:
+  TerminalView();
+  /// Draws a last time.
+  ~TerminalView();
+  TerminalView(const TerminalView&) = delete;
+  TerminalView& operator=(const TerminalView&) = delete;
+
+  void update(const LiveState& state);
+
+ private:
+  void run();
+  void draw(const LiveState& state);
+
+  bool colour_;
+  int drawn_lines_ = 0;
+  std::mutex mutex_;
+  LiveState newest_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace supertac
