@@ -8,7 +8,7 @@ namespace supertac {
 namespace {
 
 constexpr double kWriteDeadline = 2;
-constexpr double kWatchInterval = 0.05;  // half of the 0.1 s in which an unplugged board must be noticed
+constexpr double kWatchInterval = 0.02;  // a fifth of the 0.1 s in which an unplugged board must be noticed
 // With one line in flight the firmware is never honestly more than a line or two behind. A number further
 // back is damaged text, or a firmware that restarted; the second time in a row it is believed.
 constexpr std::int64_t kPlausibleLag = 4;

@@ -72,7 +72,7 @@ class MarlinLink {
   /// Reads replies until the port has been silent for quiet_s (at most 2 s).
   void settle();
 
-  /// Called at least every 0.05 s while waiting for the firmware; what it throws ends the wait.
+  /// Called at least every 0.02 s while waiting for the firmware; what it throws ends the wait.
   void set_watch(std::function<void()> watch) { watch_ = std::move(watch); }
 
   const MarlinCapabilities& capabilities() const { return capabilities_; }

@@ -14,7 +14,6 @@
 namespace supertac {
 namespace {
 
-constexpr double kSpeedup = 2;
 constexpr double kLatest = 0.1;
 constexpr double kRunSeconds = 5.5;  // a little less than the short plan below takes
 
@@ -34,7 +33,7 @@ class NotingPort : public Port {
 
  public:
   NotingPort(const std::string& path, unsigned baud, double& failed, double& stopped)
-      : port_(path, {baud, kSpeedup}), failed_(failed), stopped_(stopped) {}
+      : port_(path, {baud}), failed_(failed), stopped_(stopped) {}
   const std::string& name() const override { return port_.name(); }
   double now() override { return port_.now(); }
   Received read(std::span<std::byte> buffer, double until) override {
@@ -89,7 +88,7 @@ void judge(UnplugVerdict& verdict, Plug plug, const PalpationOutcome& outcome, c
     verdict.broken = "the finger was not lifted: " + outcome.note;
   } else if (plug == Plug::printer && !up && outcome.note.find("by hand") == std::string::npos) {
     verdict.broken = "nobody is told to lift the finger: " + outcome.note;
-  } else if (verdict.noticed_s > kLatest || verdict.noticed_s * kSpeedup > kLatest) {
+  } else if (verdict.noticed_s > kLatest) {
     verdict.broken = "noticed after " + std::to_string(verdict.noticed_s) + " s";
   }
 }
@@ -125,9 +124,8 @@ UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed) {
   const TemporaryFolder folder;
   RigSettings rig_settings = running_rig();
   rig_settings.printer.head = {99.7, 101.17, 97.81};
-  PtyRig rig(rig_settings, folder / "board", folder / "printer", kSpeedup);
+  PtyRig rig(rig_settings, folder / "board", folder / "printer");
   UnplugVerdict verdict;
-  verdict.speedup = kSpeedup;
   verdict.moment_s = kRunSeconds * RandomStream(seed, 2).uniform(0);
   const RecorderSettings settings = short_run(folder);
   double board_failed = 0, printer_failed = 0, stopped = 0, never = 0, pulled = 0;
@@ -136,7 +134,7 @@ UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed) {
     for (bool moves = false; !moves && !ended; sleep_for(1e-3)) {
       rig.with_world([&](RigWorld& world) { moves = world.printer().moving(world.now()); });
     }
-    sleep_for(verdict.moment_s / kSpeedup);
+    sleep_for(verdict.moment_s);
     pulled = pull(rig, plug);
   });
   try {

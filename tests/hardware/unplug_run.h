@@ -10,21 +10,19 @@ namespace supertac {
 enum class Plug { board, printer };
 
 struct UnplugVerdict {
-  double moment_s = 0;  ///< of the collection (rig's clock) or of the idle reading, when the plug was pulled
-  double noticed_s =
-      0;  ///< from the pull to the typed error - of the board in a collection: to the stop sent
+  double moment_s = 0;  ///< of the collection or of the idle reading, when the plug was pulled
+  /// From the pull to the typed error; of the board in a collection: to the stop sent to the printer.
+  double noticed_s = 0;
   double returned_s = 0;  ///< from the pull to the end of the collection, finger lifted, journal on disk
-  double speedup = 1;
-  std::string finger;  ///< what the outcome says
-  std::string broken;  ///< the promise that was broken; empty when all held
+  std::string finger;     ///< what the outcome says
+  std::string broken;     ///< the promise that was broken; empty when all held
 };
 
 /// Pulls the plug of a port that is only read from.
 UnplugVerdict unplug_idle(Plug plug, std::uint64_t seed);
 
-/// Pulls it at a random moment of a short collection. Promises: a typed error, noticed within 0.1 s of the
-/// wall's and of the rig's clock; with the printer still there the finger ends lifted, without it the note
-/// says to lift it by hand.
+/// Pulls it at a random moment of a short collection. Promises: a typed error, noticed within 0.1 s; with the
+/// printer still there the finger ends lifted, without it the note says to lift it by hand.
 UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed);
 
 }  // namespace supertac

@@ -1,5 +1,7 @@
 // hardware_unplug_runs [PULLS [OUT.csv]]: pulls the plug of each port PULLS times while idle and PULLS times
 // in a collection.
+#include <unistd.h>
+
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
@@ -10,7 +12,8 @@ int main(int argc, char** argv) {
   using namespace supertac;
   const int pulls = argc > 1 ? std::atoi(argv[1]) : 100;
   std::ofstream file(argc > 2 ? argv[2] : "/dev/null");
-  file << "port,when,seed,moment_s,noticed_ms,noticed_rig_ms,returned_ms,finger,broken\n";
+  file << "port,when,seed,moment_s,noticed_ms,returned_ms,finger,broken\n";
+  const bool terminal = isatty(STDERR_FILENO) == 1;
   int broken = 0;
   for (const Plug plug : {Plug::board, Plug::printer}) {
     for (const bool idle : {true, false}) {
@@ -21,12 +24,13 @@ int main(int argc, char** argv) {
         broken += v.broken.empty() ? 0 : 1;
         worst = std::max(worst, v.noticed_s);
         file << (plug == Plug::board ? "board," : "printer,") << (idle ? "idle," : "collection,") << seed
-             << ',' << v.moment_s << ',' << 1e3 * v.noticed_s << ',' << 1e3 * v.noticed_s * v.speedup << ','
-             << 1e3 * v.returned_s << ',' << v.finger << ',' << v.broken << std::endl;
-        std::cerr << '\r' << (plug == Plug::board ? "board " : "printer ") << seed << '/' << pulls
-                  << std::flush;
+             << ',' << v.moment_s << ',' << 1e3 * v.noticed_s << ',' << 1e3 * v.returned_s << ',' << v.finger
+             << ',' << v.broken << std::endl;
+        if (terminal)
+          std::cerr << '\r' << (plug == Plug::board ? "board " : "printer ") << seed << '/' << pulls
+                    << std::flush;
       }
-      std::cerr << '\r';
+      if (terminal) std::cerr << '\r';
       std::cout << (plug == Plug::board ? "board" : "printer") << (idle ? ", idle: " : ", in a collection: ")
                 << pulls << " pulls, noticed after at most " << 1e3 * worst << " ms\n";
     }
