@@ -21,6 +21,8 @@ using real = float;
 #endif
 
 using Dim = std::int64_t;
+/// What a kernel does with the buffer that it is given for its result.
+enum class Into { overwrite, add };
 inline constexpr int kMaxRank = 4;
 
 /// The sizes of a tensor's dimensions, outermost first. Rank 0 is a scalar with one element.

@@ -4,6 +4,7 @@
 #include <array>
 #include <stdexcept>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "autograd/pool.h"
@@ -102,6 +103,16 @@ Tensor* Backward::grad_of(std::size_t input) {
   return &x.grad;
 }
 
+Backward::Slot Backward::slot_of(std::size_t input) {
+  Node& x = *node_.inputs[input];
+  if (!x.requires_grad) return {};
+  if (x.grad.defined()) return {&x.grad, Into::add};
+  x.grad = Tensor(x.value.shape());
+  return {&x.grad, Into::overwrite};
+}
+
+Tensor& Backward::mutable_gy() { return node_.grad; }
+
 Variable make_result(const char* op, Tensor y, std::span<const Variable* const> inputs) {
   Variable result(std::move(y));
   Node& node = *result.node_;
@@ -128,6 +139,28 @@ Variable make_result(const char* op, Tensor y, std::span<const Variable* const> 
 detail::ReverseStep* reverse_step_of(const Variable& y) {
   Node* node = y.node();
   return node->input_count > 0 ? &node->step : nullptr;
+}
+
+std::vector<Variable> inputs_of(const Variable& y) {
+  std::vector<Variable> inputs(y.node()->input_count);
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    inputs[i].node_ = y.node()->inputs[i];
+    detail::retain(inputs[i].node_);
+  }
+  return inputs;
+}
+
+std::vector<Variable> history_of(const Variable& y) {
+  std::vector<Variable> history{y};
+  std::unordered_set<const Node*> known{y.node()};
+  for (std::size_t i = 0; i < history.size(); ++i) {
+    for (const Variable& x : inputs_of(history[i])) {
+      if (known.insert(x.node()).second) history.push_back(x);
+    }
+  }
+  std::stable_sort(history.begin(), history.end(),
+                   [](const Variable& a, const Variable& b) { return a.node()->number < b.node()->number; });
+  return history;
 }
 
 namespace {

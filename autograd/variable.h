@@ -13,6 +13,7 @@
 #include <span>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "autograd/tensor.h"
 
@@ -97,6 +98,7 @@ class Variable {
 
  private:
   friend Variable make_result(const char* op, Tensor y, std::span<const Variable* const> inputs);
+  friend std::vector<Variable> inputs_of(const Variable& y);
   detail::Node* node_ = nullptr;
 };
 
@@ -111,6 +113,16 @@ class Backward {
   const Tensor& value(std::size_t input) const;
   /// The gradient of that input, zero-filled at first use; null when nobody asked for it. Add into it.
   Tensor* grad_of(std::size_t input);
+  /// The same without the zeros: at first use the contents are undefined and the step must write all of them.
+  struct Slot {
+    Tensor* grad = nullptr;
+    Into into = Into::add;
+    explicit operator bool() const { return grad != nullptr; }
+    real* data() const { return grad->data(); }
+  };
+  Slot slot_of(std::size_t input);
+  /// dL/dy to be changed in place: this step is its only reader.
+  Tensor& mutable_gy();
 
  private:
   detail::Node& node_;
@@ -133,6 +145,12 @@ Variable record(const char* op, Tensor y, std::span<const Variable* const> input
   if (detail::ReverseStep* slot = reverse_step_of(result)) slot->set(std::forward<Step>(step));
   return result;
 }
+
+/// y and every value it was computed from, in the order of computation; leaves (inputs, parameters) come
+/// first. What backward() has freed is missing. For looking into a graph when something has gone wrong.
+std::vector<Variable> history_of(const Variable& y);
+/// The inputs of the op that made y; empty for a leaf and for what is not on a graph.
+std::vector<Variable> inputs_of(const Variable& y);
 
 /// Adds dL/dv into grad() of every leaf v that requires it, for a scalar L, and frees the graph.
 /// Throws std::invalid_argument when L is not a scalar, does not depend on a parameter, or when its

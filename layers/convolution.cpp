@@ -1,7 +1,5 @@
 #include "layers/convolution.h"
 
-#include "autograd/ops/convolution.h"
-
 namespace supertac {
 
 ConvLayer::ConvLayer(int dimensions, Dim in, Dim out, const ConvLayerOptions& o, Layout layout, Rng& rng)
@@ -16,26 +14,26 @@ ConvLayer::ConvLayer(int dimensions, Dim in, Dim out, const ConvLayerOptions& o,
 
 Conv1d::Conv1d(Dim in, Dim out, const ConvLayerOptions& o, Rng& rng)
     : ConvLayer(1, in, out, o, Layout::conv, rng) {}
-Variable Conv1d::forward(const Variable& x) const {
-  return conv1d(x, weight_, bias_, {.stride = options_.stride, .padding = options_.padding});
+Variable Conv1d::forward(const Variable& x, real negative_slope) const {
+  return conv1d(x, weight_, bias_, options(negative_slope));
 }
 
 Conv2d::Conv2d(Dim in, Dim out, const ConvLayerOptions& o, Rng& rng)
     : ConvLayer(2, in, out, o, Layout::conv, rng) {}
-Variable Conv2d::forward(const Variable& x) const {
-  return conv2d(x, weight_, bias_, {.stride = options_.stride, .padding = options_.padding});
+Variable Conv2d::forward(const Variable& x, real negative_slope) const {
+  return conv2d(x, weight_, bias_, options(negative_slope));
 }
 
 ConvTranspose1d::ConvTranspose1d(Dim in, Dim out, const ConvLayerOptions& o, Rng& rng)
     : ConvLayer(1, in, out, o, Layout::conv_transpose, rng) {}
-Variable ConvTranspose1d::forward(const Variable& x) const {
-  return conv_transpose1d(x, weight_, bias_, {.stride = options_.stride, .padding = options_.padding});
+Variable ConvTranspose1d::forward(const Variable& x, real negative_slope) const {
+  return conv_transpose1d(x, weight_, bias_, options(negative_slope));
 }
 
 ConvTranspose2d::ConvTranspose2d(Dim in, Dim out, const ConvLayerOptions& o, Rng& rng)
     : ConvLayer(2, in, out, o, Layout::conv_transpose, rng) {}
-Variable ConvTranspose2d::forward(const Variable& x) const {
-  return conv_transpose2d(x, weight_, bias_, {.stride = options_.stride, .padding = options_.padding});
+Variable ConvTranspose2d::forward(const Variable& x, real negative_slope) const {
+  return conv_transpose2d(x, weight_, bias_, options(negative_slope));
 }
 
 }  // namespace supertac

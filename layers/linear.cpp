@@ -9,6 +9,8 @@ Linear::Linear(Dim in, Dim out, Rng& rng, Layout layout) {
   bias_ = add_parameter("bias", uniform_fan_in({out}, in, rng), Layout::plain);
 }
 
-Variable Linear::forward(const Variable& x) const { return supertac::linear(x, weight_, bias_); }
+Variable Linear::forward(const Variable& x, real negative_slope) const {
+  return supertac::linear(x, weight_, bias_, negative_slope);
+}
 
 }  // namespace supertac

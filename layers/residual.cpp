@@ -35,7 +35,7 @@ ChannelAttention::ChannelAttention(Dim channels, Dim reduction, Rng& rng)
 }
 
 Variable ChannelAttention::gates(const Variable& x) const {
-  return sigmoid(expand_.forward(relu(squeeze_.forward(global_mean(x)))));
+  return sigmoid(expand_.forward(squeeze_.forward(global_mean(x), kRelu)));
 }
 
 Variable ChannelAttention::forward(const Variable& x) const { return scale_channels(x, gates(x)); }
@@ -50,7 +50,7 @@ Rcab::Rcab(Dim channels, Dim reduction, Rng& rng)
 }
 
 Variable Rcab::forward(const Variable& x) const {
-  return supertac::add(x, attention_.forward(second_.forward(relu(first_.forward(x)))));
+  return supertac::add(x, attention_.forward(second_.forward(first_.forward(x, kRelu))));
 }
 
 Rirb::Rirb(const RirbOptions& options, Rng& rng)
@@ -65,7 +65,7 @@ Rirb::Rirb(const RirbOptions& options, Rng& rng)
 Variable Rirb::forward(const Variable& x) const {
   Variable h = x;
   for (const Rcab& block : blocks_) h = block.forward(h);
-  return leaky_relu(up_.forward(supertac::add(x, conv_.forward(h))));
+  return up_.forward(supertac::add(x, conv_.forward(h)), kLeakyRelu);
 }
 
 }  // namespace supertac

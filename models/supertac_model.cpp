@@ -84,7 +84,7 @@ Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
 
 Variable Upsampler::forward(const Variable& latents) const {
   const Dim pixels[] = {kCoarse, kCoarse};
-  Variable h = unflatten_channels_first(leaky_relu(fc_.forward(latents)), pixels);
+  Variable h = unflatten_channels_first(fc_.forward(latents, kLeakyRelu), pixels);
   for (const Rirb& rirb : rirbs_) h = rirb.forward(h);
   return out_.forward(h);
 }

@@ -31,8 +31,8 @@ Encoder::Encoder(const VaeOptions& o, Rng& rng)
 
 Variable Encoder::features(const Variable& x) const {
   Variable h = x;
-  for (const Conv1d& conv : conv_) h = leaky_relu(conv.forward(h));
-  return relu(fc_.forward(flatten_channels_first(h)));
+  for (const Conv1d& conv : conv_) h = conv.forward(h, kLeakyRelu);
+  return fc_.forward(flatten_channels_first(h), kRelu);
 }
 
 LatentDistribution Encoder::forward(const Variable& x) const {
@@ -59,8 +59,8 @@ Decoder::Decoder(const VaeOptions& o, Rng& rng)
 
 Variable Decoder::forward(const Variable& z) const {
   const Dim pixels[] = {coarse_};
-  Variable h = unflatten_channels_first(relu(unfold_.forward(relu(widen_.forward(z)))), pixels);
-  for (const ConvTranspose1d& conv : conv_) h = leaky_relu(conv.forward(h));
+  Variable h = unflatten_channels_first(unfold_.forward(widen_.forward(z, kRelu), kRelu), pixels);
+  for (const ConvTranspose1d& conv : conv_) h = conv.forward(h, kLeakyRelu);
   return sigmoid(out_.forward(h));
 }
 

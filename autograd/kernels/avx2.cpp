@@ -7,6 +7,8 @@ namespace supertac::kernels {
 namespace {
 
 constexpr int kTilePixels = 6;  // 6 x 2 accumulators, 2 weights, 1 value: 15 of 16 registers
+constexpr int kNarrowTilePixels = 12;
+constexpr int kOuterRows = 4;
 
 alignas(32) const std::int32_t kLaneMask[16] = {-1, -1, -1, -1, -1, -1, -1, -1, 0, 0, 0, 0, 0, 0, 0, 0};
 
@@ -21,6 +23,10 @@ struct Vec {
   static Vec broadcast(real x) { return {_mm256_set1_ps(x)}; }
   static Vec add(Vec a, Vec b) { return {_mm256_add_ps(a.v, b.v)}; }
   static Vec fma(Vec a, Vec b, Vec c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
+  static Vec rectify(Vec x, Vec slope) {
+    const __m256 positive = _mm256_cmp_ps(x.v, _mm256_setzero_ps(), _CMP_GT_OQ);
+    return {_mm256_blendv_ps(_mm256_mul_ps(slope.v, x.v), x.v, positive)};
+  }
   void store(real* p) const { _mm256_storeu_ps(p, v); }
   void store_part(real* p, Dim n) const { _mm256_maskstore_ps(p, mask(n), v); }
 };

@@ -7,6 +7,8 @@ namespace supertac::kernels {
 namespace {
 
 constexpr int kTilePixels = 8;  // 8 x 2 accumulators: twice what hides FMA's latency of 4 on two ports
+constexpr int kNarrowTilePixels = 12;
+constexpr int kOuterRows = 8;
 
 struct Vec {
   static constexpr Dim kLanes = 16;
@@ -17,6 +19,9 @@ struct Vec {
   static Vec broadcast(real x) { return {_mm512_set1_ps(x)}; }
   static Vec add(Vec a, Vec b) { return {_mm512_add_ps(a.v, b.v)}; }
   static Vec fma(Vec a, Vec b, Vec c) { return {_mm512_fmadd_ps(a.v, b.v, c.v)}; }
+  static Vec rectify(Vec x, Vec slope) {
+    return {_mm512_mask_mul_ps(x.v, _mm512_cmp_ps_mask(x.v, _mm512_setzero_ps(), _CMP_NGT_UQ), slope.v, x.v)};
+  }
   void store(real* p) const { _mm512_storeu_ps(p, v); }
   void store_part(real* p, Dim n) const { _mm512_mask_storeu_ps(p, mask(n), v); }
 };

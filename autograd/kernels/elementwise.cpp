@@ -14,6 +14,10 @@ SUPERTAC_CLONES void leaky_relu_grad(Dim n, real slope, const real* gy, const re
   for (Dim i = 0; i < n; ++i) gx[i] += y[i] > 0 ? gy[i] : slope * gy[i];
 }
 
+SUPERTAC_CLONES void rectify_in_place(Dim n, real slope, const real* y, real* __restrict g) {
+  for (Dim i = 0; i < n; ++i) g[i] = y[i] > 0 ? g[i] : slope * g[i];
+}
+
 SUPERTAC_CLONES void sigmoid(Dim n, const real* x, real* __restrict y) {
   for (Dim i = 0; i < n; ++i) y[i] = sigmoid_same_bits(x[i]);
 }

@@ -8,6 +8,8 @@ namespace supertac::kernels {
 /// y = x > 0 ? x : slope * x. The gradient reads the sign of y, which is the sign of x for slope >= 0.
 void leaky_relu(Dim n, real slope, const real* x, real* y);
 void leaky_relu_grad(Dim n, real slope, const real* gy, const real* y, real* gx);
+/// g = y > 0 ? g : slope * g
+void rectify_in_place(Dim n, real slope, const real* y, real* g);
 
 /// y = 1 / (1 + e^-x);  gx += gy y (1 - y)
 void sigmoid(Dim n, const real* x, real* y);

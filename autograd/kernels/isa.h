@@ -6,31 +6,30 @@
 
 #include <string_view>
 
-#include "autograd/kernels/geometry.h"
+#include "autograd/kernels/conv.h"
 
 namespace supertac::kernels {
 
-/// y[q, :] = bias + sum over taps, cin of x[source(tap, q), cin] * w[tap, cin, :]   for one image.
+/// y[q, :] = f(bias + sum over taps, cin of x[source(tap, q), cin] * w[tap, cin, :])   for one image, with
+/// f(s) = s for s > 0, else negative_slope * s.
 struct GatherJob {
   const std::vector<Phase>* phases = nullptr;
   const real* w = nullptr;     // [taps][cin][cout]
   const real* bias = nullptr;  // [cout] or null
   Dim cin = 0, cout = 0;
-  bool accumulate = false;  // add to what is in y instead of overwriting it
+  Into into = Into::overwrite;  // add: start from what is in y instead of the bias
+  real negative_slope = 1;      // 1: f is the identity
 };
 
-/// gw[cin, cout] += sum over images, pairs of x[image, input(pair), cin] * gy[image, output(pair), cout],
-/// for kOuterRows values of cin from `row` on and all values of cout.
+/// gw[cin, cout] += the sum over images, then pairs, of x[image, input(pair), cin] * gy[image, output(pair),
+/// cout]. The sum is taken on its own before it is added to gw.
 struct OuterJob {
   const TapPairs* pairs = nullptr;
   const real* x = nullptr;   // [images][in_pixels][cin]
   const real* gy = nullptr;  // [images][out_pixels][cout]
   real* gw = nullptr;        // [cin][cout], this tap's
   Dim images = 0, in_pixels = 0, out_pixels = 0, cin = 0, cout = 0;
-  Dim chunk =
-      1;  // images that are summed up on their own before they are added to gw; depends on shapes only
 };
-inline constexpr Dim kOuterRows = 8;
 /// The largest number of input channels that `gather` takes (the length of its row of zeros).
 inline constexpr Dim kMaxChannels = 4096;
 
@@ -39,7 +38,7 @@ struct IsaKernels {
   void (*gather)(const GatherJob& job, const real* x, real* y);
   /// `rows` images of one pixel each: y[rows, cout] = bias + x[rows, cin] * w[cin, cout]
   void (*gather_rows)(const GatherJob& job, const real* x, real* y, Dim rows);
-  void (*outer)(const OuterJob& job, Dim row);
+  void (*outer)(const OuterJob& job);
 };
 
 /// The best set this processor has, or the one that SUPERTAC_ISA=avx512|avx2|portable names.

@@ -1,52 +1,96 @@
 // The register-tiled loops, written once over a vector type. Each of portable.cpp, avx2.cpp and
-// avx512.cpp defines `Vec` (a value type with kLanes, load, load_part, store, store_part, broadcast,
-// fma) and kTilePixels in an anonymous namespace, then includes this file.
+// avx512.cpp defines `Vec` (a value type with kLanes, load, load_part, store, store_part, broadcast, add,
+// fma, rectify), kTilePixels, kNarrowTilePixels (for outputs of one vector) and
+// kOuterRows in an anonymous namespace, then includes this file.
 //
 // Nothing here may call an inline function that is not inlined for sure (these files are always built
 // with -O3): the linker keeps one copy of it, which might then run on a processor without these instructions.
 
+#define ALWAYS_INLINE inline __attribute__((always_inline))
+
+// Which pixels of a tile meet a tap at the border of a map, for the maps that occur: a tile of 8 covers a row
+// of 8 (first or last pixel cut off) or two rows of 4 (first or last column, row, or both).
+template <unsigned... kSets>
+struct PixelSets;
+template <int P>
+struct BorderSetsOf {
+  using Type = PixelSets<>;
+};
+template <>
+struct BorderSetsOf<8> {
+  using Type = PixelSets<0xFE, 0x7F, 0xEE, 0x77, 0xF0, 0x0F, 0xE0, 0x70, 0x0E, 0x07>;
+};
+
 // One tile: P pixels by J vectors of output channels stay in registers while taps and input channels
 // stream past. Each output is one accumulator; its sum runs over taps, then input channels.
+template <int P, int J>
+struct Tile {
+  Vec sum[P][J];
+  const real* pixel[P];
+};
+
+// Adds one tap to those pixels of the tile that it does not carry into the padding.
+template <unsigned kPixels, int P, int J, bool kPartial>
+ALWAYS_INLINE void add_tap(Tile<P, J>& tile, const real* w, Dim cin, Dim cout, Dim lanes) {
+#pragma GCC unroll 4
+  for (Dim c = 0; c < cin; ++c, w += cout) {
+    Vec weight[J];
+    for (int j = 0; j < J; ++j) {
+      weight[j] = kPartial && j == J - 1 ? Vec::load_part(w + j * Vec::kLanes, lanes)
+                                         : Vec::load(w + j * Vec::kLanes);
+    }
+    for (int p = 0; p < P; ++p) {
+      if ((kPixels >> p & 1U) == 0) continue;
+      const Vec value = Vec::broadcast(tile.pixel[p][c]);
+      for (int j = 0; j < J; ++j) tile.sum[p][j] = Vec::fma(value, weight[j], tile.sum[p][j]);
+    }
+  }
+}
+
+// Runs the loop that is compiled for just these pixels; false when there is none.
+template <unsigned... kSets>
+struct PixelSets {
+  template <int P, int J, bool kPartial>
+  ALWAYS_INLINE static bool add(unsigned pixels, Tile<P, J>& tile, const real* w, Dim cin, Dim cout,
+                                Dim lanes) {
+    return ((pixels == kSets && (add_tap<kSets, P, J, kPartial>(tile, w, cin, cout, lanes), true)) || ...);
+  }
+};
+
 template <int P, int J, bool kPartial>
 inline void gather_tile(const GatherJob& job, const std::int32_t* taps, Dim tap_count,
                         const std::int32_t* outputs, const std::int32_t* sources, const real* zeros,
                         const real* x, real* y, Dim channel) {
+  constexpr unsigned kAll = (1U << P) - 1;
   const Dim lanes = job.cout - channel - (J - 1) * Vec::kLanes;  // of the last vector; used when kPartial
-  Vec acc[P][J];
+  Tile<P, J> tile;
   for (int p = 0; p < P; ++p) {
-    const real* from = job.accumulate ? y + outputs[p] * job.cout + channel
-                       : job.bias     ? job.bias + channel
-                                      : nullptr;
+    const real* from = job.into == Into::add ? y + outputs[p] * job.cout + channel
+                       : job.bias            ? job.bias + channel
+                                             : nullptr;
     for (int j = 0; j < J; ++j) {
       if (from == nullptr) {
-        acc[p][j] = Vec::broadcast(0);
+        tile.sum[p][j] = Vec::broadcast(0);
       } else if (kPartial && j == J - 1) {
-        acc[p][j] = Vec::load_part(from + j * Vec::kLanes, lanes);
+        tile.sum[p][j] = Vec::load_part(from + j * Vec::kLanes, lanes);
       } else {
-        acc[p][j] = Vec::load(from + j * Vec::kLanes);
+        tile.sum[p][j] = Vec::load(from + j * Vec::kLanes);
       }
     }
   }
   for (Dim t = 0; t < tap_count; ++t) {
-    const real* pixel[P];
-    bool any = false;
+    unsigned pixels = 0;
     for (int p = 0; p < P; ++p) {
       const std::int32_t source = sources[p * tap_count + t];
-      any = any || source >= 0;
-      pixel[p] = source >= 0 ? x + source * job.cin : zeros;
+      pixels |= (source >= 0 ? 1U : 0U) << p;
+      tile.pixel[p] = source >= 0 ? x + source * job.cin : zeros;
     }
-    if (!any) continue;
     const real* w = job.w + taps[t] * job.cin * job.cout + channel;
-    for (Dim c = 0; c < job.cin; ++c, w += job.cout) {
-      Vec weight[J];
-      for (int j = 0; j < J; ++j) {
-        weight[j] = kPartial && j == J - 1 ? Vec::load_part(w + j * Vec::kLanes, lanes)
-                                           : Vec::load(w + j * Vec::kLanes);
-      }
-      for (int p = 0; p < P; ++p) {
-        const Vec value = Vec::broadcast(pixel[p][c]);
-        for (int j = 0; j < J; ++j) acc[p][j] = Vec::fma(value, weight[j], acc[p][j]);
-      }
+    if (pixels == kAll) {
+      add_tap<kAll, P, J, kPartial>(tile, w, job.cin, job.cout, lanes);
+    } else if (pixels != 0 && !BorderSetsOf<P>::Type::template add<P, J, kPartial>(pixels, tile, w, job.cin,
+                                                                                   job.cout, lanes)) {
+      add_tap<kAll, P, J, kPartial>(tile, w, job.cin, job.cout, lanes);  // zeros stand for the padding
     }
   }
   // + 0 turns -0 into +0: a sum of -0 changes its sign where 0 * w is added for a tap in the padding, and not
@@ -54,11 +98,12 @@ inline void gather_tile(const GatherJob& job, const std::int32_t* taps, Dim tap_
   for (int p = 0; p < P; ++p) {
     real* to = y + outputs[p] * job.cout + channel;
     for (int j = 0; j < J; ++j) {
-      acc[p][j] = Vec::add(acc[p][j], Vec::broadcast(0));
+      Vec value = Vec::add(tile.sum[p][j], Vec::broadcast(0));
+      if (job.negative_slope != 1) value = Vec::rectify(value, Vec::broadcast(job.negative_slope));
       if (kPartial && j == J - 1) {
-        acc[p][j].store_part(to + j * Vec::kLanes, lanes);
+        value.store_part(to + j * Vec::kLanes, lanes);
       } else {
-        acc[p][j].store(to + j * Vec::kLanes);
+        value.store(to + j * Vec::kLanes);
       }
     }
   }
@@ -68,15 +113,16 @@ template <int P>
 inline void gather_channels(const GatherJob& job, const std::int32_t* taps, Dim tap_count,
                             const std::int32_t* outputs, const std::int32_t* sources, const real* zeros,
                             const real* x, real* y) {
-  constexpr int kWide = P == 1 ? 4 : 2;  // a single pixel needs more vectors to hide the latency of FMA
   Dim channel = 0;
-  if constexpr (kWide == 4) {
+  if constexpr (P == 1) {  // a single pixel needs more vectors to hide the latency of FMA
     for (; channel + 4 * Vec::kLanes <= job.cout; channel += 4 * Vec::kLanes) {
       gather_tile<P, 4, false>(job, taps, tap_count, outputs, sources, zeros, x, y, channel);
     }
   }
-  for (; channel + 2 * Vec::kLanes <= job.cout; channel += 2 * Vec::kLanes) {
-    gather_tile<P, 2, false>(job, taps, tap_count, outputs, sources, zeros, x, y, channel);
+  if constexpr (P <= kTilePixels) {
+    for (; channel + 2 * Vec::kLanes <= job.cout; channel += 2 * Vec::kLanes) {
+      gather_tile<P, 2, false>(job, taps, tap_count, outputs, sources, zeros, x, y, channel);
+    }
   }
   for (; channel + Vec::kLanes <= job.cout; channel += Vec::kLanes) {
     gather_tile<P, 1, false>(job, taps, tap_count, outputs, sources, zeros, x, y, channel);
@@ -90,6 +136,12 @@ inline void gather_pixels(const GatherJob& job, const std::int32_t* taps, Dim ta
                           const std::int32_t* outputs, const std::int32_t* sources, Dim pixels,
                           const real* zeros, const real* x, real* y) {
   Dim q = 0;
+  if (job.cout <= Vec::kLanes) {  // one vector of channels: more pixels instead
+    for (; q + kNarrowTilePixels <= pixels; q += kNarrowTilePixels) {
+      gather_channels<kNarrowTilePixels>(job, taps, tap_count, outputs + q, sources + q * tap_count, zeros, x,
+                                         y);
+    }
+  }
   for (; q + kTilePixels <= pixels; q += kTilePixels) {
     gather_channels<kTilePixels>(job, taps, tap_count, outputs + q, sources + q * tap_count, zeros, x, y);
   }
@@ -112,19 +164,22 @@ void gather(const GatherJob& job, const real* x, real* y) {
 }
 
 const std::int32_t kFirstTap[1] = {0};
-const std::int32_t kRowNumbers[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+constexpr Dim kRows = 48;  // a multiple of every tile's pixels
+const std::int32_t kRowNumbers[kRows] = {0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15,
+                                         16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31,
+                                         32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47};
 
 void gather_rows(const GatherJob& job, const real* x, real* y, Dim rows) {
-  for (Dim row = 0; row < rows; row += 16) {
-    const Dim count = rows - row < 16 ? rows - row : 16;
+  for (Dim row = 0; row < rows; row += kRows) {
+    const Dim count = rows - row < kRows ? rows - row : kRows;
     gather_pixels(job, kFirstTap, 1, kRowNumbers, kRowNumbers, count, nullptr, x + row * job.cin,
                   y + row * job.cout);
   }
 }
 
-// R rows of gw (values of cin) by J vectors of cout; the pairs stream past.
+// R rows of gw (values of cin) by J vectors of cout; the pairs of all images stream past.
 template <int R, int J, bool kPartial>
-inline void outer_tile(const OuterJob& job, Dim row, Dim channel, Dim first_image, Dim last_image) {
+inline void outer_tile(const OuterJob& job, Dim row, Dim channel) {
   const Dim lanes = job.cout - channel - (J - 1) * Vec::kLanes;
   const std::int32_t* inputs = job.pairs->inputs.data();
   const std::int32_t* outputs = job.pairs->outputs.data();
@@ -133,7 +188,7 @@ inline void outer_tile(const OuterJob& job, Dim row, Dim channel, Dim first_imag
   for (int r = 0; r < R; ++r) {
     for (int j = 0; j < J; ++j) acc[r][j] = Vec::broadcast(0);
   }
-  for (Dim image = first_image; image < last_image; ++image) {
+  for (Dim image = 0; image < job.images; ++image) {
     const real* x = job.x + image * job.in_pixels * job.cin + row;
     const real* gy = job.gy + image * job.out_pixels * job.cout + channel;
     for (Dim i = 0; i < count; ++i) {
@@ -163,24 +218,27 @@ inline void outer_tile(const OuterJob& job, Dim row, Dim channel, Dim first_imag
 }
 
 template <int R>
-inline void outer_channels(const OuterJob& job, Dim row, Dim first_image, Dim last_image) {
+inline void outer_channels(const OuterJob& job, Dim row) {
   Dim channel = 0;
-  for (; channel + 2 * Vec::kLanes <= job.cout; channel += 2 * Vec::kLanes) {
-    outer_tile<R, 2, false>(job, row, channel, first_image, last_image);
-  }
-  for (; channel + Vec::kLanes <= job.cout; channel += Vec::kLanes) {
-    outer_tile<R, 1, false>(job, row, channel, first_image, last_image);
-  }
-  if (channel < job.cout) outer_tile<R, 1, true>(job, row, channel, first_image, last_image);
-}
-
-void outer(const OuterJob& job, Dim row) {
-  for (Dim image = 0; image < job.images; image += job.chunk) {
-    const Dim last = image + job.chunk < job.images ? image + job.chunk : job.images;
-    if (row + kOuterRows <= job.cin) {
-      outer_channels<kOuterRows>(job, row, image, last);
-    } else {
-      for (Dim r = row; r < job.cin; ++r) outer_channels<1>(job, r, image, last);
+  if constexpr (R <= kOuterRows) {
+    for (; channel + 2 * Vec::kLanes <= job.cout; channel += 2 * Vec::kLanes) {
+      outer_tile<R, 2, false>(job, row, channel);
     }
   }
+  for (; channel + Vec::kLanes <= job.cout; channel += Vec::kLanes) {
+    outer_tile<R, 1, false>(job, row, channel);
+  }
+  if (channel < job.cout) outer_tile<R, 1, true>(job, row, channel);
+}
+
+void outer(const OuterJob& job) {
+  Dim row = 0;
+  if (job.cout <= Vec::kLanes) {  // one vector of channels: more rows instead
+    for (; row + 2 * kOuterRows <= job.cin; row += 2 * kOuterRows) outer_channels<2 * kOuterRows>(job, row);
+  }
+  for (; row + kOuterRows <= job.cin; row += kOuterRows) outer_channels<kOuterRows>(job, row);
+  if constexpr (kOuterRows > 4) {
+    for (; row + 4 <= job.cin; row += 4) outer_channels<4>(job, row);
+  }
+  for (; row < job.cin; ++row) outer_channels<1>(job, row);
 }

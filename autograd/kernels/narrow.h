@@ -13,8 +13,9 @@ namespace supertac::kernels {
 /// Whether conv() and its gradients take this way: a question of shapes only, so that all processors agree.
 bool is_narrow(const ConvSizes& sizes);
 
-void narrow_conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias, real* y);
-void narrow_grad_x(const ConvSizes& sizes, const real* gy, const real* w, real* gx);
+void narrow_conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias, real negative_slope,
+                 real* y);
+void narrow_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into into, real* gx);
 void narrow_grad_w(const ConvSizes& sizes, const real* x, const real* gy, real* gw);
 
 }  // namespace supertac::kernels

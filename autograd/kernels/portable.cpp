@@ -6,6 +6,8 @@ namespace supertac::kernels {
 namespace {
 
 constexpr int kTilePixels = 4;
+constexpr int kNarrowTilePixels = 8;
+constexpr int kOuterRows = 4;
 
 struct Vec {
   static constexpr Dim kLanes = 1;
@@ -19,6 +21,7 @@ struct Vec {
 #else
   static Vec fma(Vec a, Vec b, Vec c) { return {__builtin_fmaf(a.v, b.v, c.v)}; }
 #endif
+  static Vec rectify(Vec x, Vec slope) { return {x.v > 0 ? x.v : slope.v * x.v}; }
   void store(real* p) const { *p = v; }
   void store_part(real* p, Dim) const { *p = v; }
 };

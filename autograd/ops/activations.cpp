@@ -21,8 +21,19 @@ Variable rectify(const char* op, const Variable& x, real slope) {
 Variable relu(const Variable& x) { return rectify("relu", x, 0); }
 
 Variable leaky_relu(const Variable& x, real slope) {
-  if (!(slope >= 0)) refuse("leaky_relu", "slope must not be negative, got " + std::to_string(slope));
+  check_slope("leaky_relu", slope);
   return rectify("leaky_relu", x, slope);
+}
+
+void check_slope(const char* op, real slope) {
+  if (!(slope >= 0)) refuse(op, "slope must not be negative, got " + std::to_string(slope));
+}
+
+// y and s have the same sign
+const real* before_activation(Backward& b, real slope) {
+  Tensor& g = b.mutable_gy();
+  if (slope != kNoActivation) kernels::rectify_in_place(g.size(), slope, b.y().data(), g.data());
+  return g.data();
 }
 
 // gx = gy y (1 - y)

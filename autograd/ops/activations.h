@@ -5,10 +5,19 @@
 
 namespace supertac {
 
+/// Convolutions and linear layers apply f(s) = s for s > 0, else negative_slope * s, as they store their
+/// result, which saves a pass over memory in each direction.
+inline constexpr real kNoActivation = 1, kRelu = 0, kLeakyRelu = real(0.01);
+
 /// y = max(x, 0)
 Variable relu(const Variable& x);
 /// y = x > 0 ? x : slope x. Throws for a negative slope.
-Variable leaky_relu(const Variable& x, real slope = real(0.01));
+Variable leaky_relu(const Variable& x, real slope = kLeakyRelu);
+/// For the ops that end in f: throws std::invalid_argument for a negative slope.
+void check_slope(const char* op, real negative_slope);
+/// dL/ds = dL/dy f'(s), which is left in place of dL/dy.
+const real* before_activation(Backward& b, real negative_slope);
+
 /// y = 1 / (1 + exp(-x))
 Variable sigmoid(const Variable& x);
 /// y = min(max(x, low), high); the gradient passes where low <= x <= high. Throws unless low <= high.

@@ -28,6 +28,7 @@ void check_arguments(const char* op, const Variable& x, const Variable& w, const
   }
   if (w.dim(0) < 1 || w.dim(rank - 3) < 1) refuse(op, "the kernel must be at least 1 wide" + shapes(x, w));
   check_shape(op, "bias", b, {out});
+  check_slope(op, o.negative_slope);
   if (o.stride < 1 || o.padding < 0) {
     refuse(op, "stride must be positive and padding not negative, got " + std::to_string(o.stride) + " and " +
                    std::to_string(o.padding));
@@ -50,7 +51,7 @@ ConvSettings settings_of(const Variable& x, const Variable& w, const ConvOptions
 }
 
 // Both conv and transposed conv: only the geometry differs.
-//   gx = transpose(conv)(gy)     gw[t] = sum over pixels x^T gy     gb = sum over pixels gy
+//   gs = gy f'(y)     gx = transpose(conv)(gs)     gw[t] = sum over pixels x^T gs     gb = sum over pixels gs
 Variable convolve(const char* op, const Variable& x, const Variable& w, const Variable& b,
                   const ConvOptions& o, int rank, bool transposed) {
   check_arguments(op, x, w, b, o, rank);
@@ -67,13 +68,15 @@ Variable convolve(const char* op, const Variable& x, const Variable& w, const Va
   const ConvSizes sizes{&geometry, x.dim(0), w.dim(rank - 2), w.dim(rank - 1)};
   Tensor y(rank == 3 ? Shape{x.dim(0), s.out_width(), sizes.cout}
                      : Shape{x.dim(0), s.out_height(), s.out_width(), sizes.cout});
-  kernels::conv(sizes, x.value().data(), w.value().data(), b.value().data(), y.data());
-  return record(op, y, {&x, &w, &b}, [sizes](Backward& g) {
-    const real* gy = g.gy().data();
-    if (Tensor* gx = g.grad_of(0)) kernels::conv_grad_x(sizes, gy, g.value(1).data(), gx->data());
-    if (Tensor* gw = g.grad_of(1)) kernels::conv_grad_w(sizes, g.value(0).data(), gy, gw->data());
+  kernels::conv(sizes, x.value().data(), w.value().data(), b.value().data(), o.negative_slope, y.data());
+  return record(op, y, {&x, &w, &b}, [sizes, slope = o.negative_slope](Backward& g) {
+    const real* gs = before_activation(g, slope);
+    if (const Backward::Slot gx = g.slot_of(0)) {
+      kernels::conv_grad_x(sizes, gs, g.value(1).data(), gx.into, gx.data());
+    }
+    if (Tensor* gw = g.grad_of(1)) kernels::conv_grad_w(sizes, g.value(0).data(), gs, gw->data());
     if (Tensor* gb = g.grad_of(2)) {
-      kernels::bias_grad(sizes.images * sizes.geometry->out_pixels, sizes.cout, gy, gb->data());
+      kernels::bias_grad(sizes.images * sizes.geometry->out_pixels, sizes.cout, gs, gb->data());
     }
   });
 }

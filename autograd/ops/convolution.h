@@ -4,16 +4,17 @@
 // side; checkpoints hold PyTorch's layout (layers/checkpoint.h).
 #pragma once
 
-#include "autograd/variable.h"
+#include "autograd/ops/activations.h"
 
 namespace supertac {
 
 struct ConvOptions {
   Dim stride = 1;
-  Dim padding = 0;  // zeros on every side
+  Dim padding = 0;                      // zeros on every side
+  real negative_slope = kNoActivation;  // of the activation, see autograd/ops/activations.h
 };
 
-/// y[n,l,o] = b[o] + sum over k, i of x[n, l stride + k - padding, i] w[k,i,o]
+/// y[n,l,o] = f(b[o] + sum over k, i of x[n, l stride + k - padding, i] w[k,i,o]),   f as activations.h says
 /// x [N,L,in], w [K,in,out], b [out]; y [N, (L + 2 padding - K) / stride + 1, out].
 /// All four throw std::invalid_argument naming the argument when a rank, a channel count or the output size
 /// is impossible.
@@ -21,8 +22,8 @@ Variable conv1d(const Variable& x, const Variable& w, const Variable& b, const C
 /// The same over two dimensions: x [N,H,W,in], w [K,K,in,out] (the two kernel sizes may differ), b [out].
 Variable conv2d(const Variable& x, const Variable& w, const Variable& b, const ConvOptions& options);
 
-/// The transpose of conv1d as a linear map, plus b: x [N,L,in], w [K,in,out]; y [N, (L - 1) stride - 2
-/// padding + K, out]. Kernels that the stride divides (4 for stride 2) cover every output equally often: no
+/// The transpose of conv1d as a linear map, plus b, then f: x [N,L,in], w [K,in,out]; y [N, (L - 1) stride -
+/// 2 padding + K, out]. Kernels that the stride divides (4 for stride 2) cover every output equally often: no
 /// checkerboard.
 Variable conv_transpose1d(const Variable& x, const Variable& w, const Variable& b,
                           const ConvOptions& options);

@@ -5,8 +5,8 @@
 
 namespace supertac {
 
-// gx = gy w^T     gw = x^T gy     gb = sum over rows gy
-Variable linear(const Variable& x, const Variable& w, const Variable& b) {
+// gs = gy f'(y)     gx = gs w^T     gw = x^T gs     gb = sum over rows gs
+Variable linear(const Variable& x, const Variable& w, const Variable& b, real negative_slope) {
   check_rank("linear", "x", x, 2);
   check_rank("linear", "weight", w, 2);
   const Dim rows = x.dim(0), in = w.dim(0), out = w.dim(1);
@@ -15,13 +15,17 @@ Variable linear(const Variable& x, const Variable& w, const Variable& b) {
                          " (x " + x.shape().text() + ", weight " + w.shape().text() + ")");
   }
   check_shape("linear", "bias", b, {out});
+  check_slope("linear", negative_slope);
   Tensor y(Shape{rows, out});
-  kernels::linear(rows, in, out, x.value().data(), w.value().data(), b.value().data(), y.data());
-  return record("linear", y, {&x, &w, &b}, [rows, in, out](Backward& g) {
-    const real* gy = g.gy().data();
-    if (Tensor* gx = g.grad_of(0)) kernels::linear_grad_x(rows, in, out, gy, g.value(1).data(), gx->data());
-    if (Tensor* gw = g.grad_of(1)) kernels::linear_grad_w(rows, in, out, g.value(0).data(), gy, gw->data());
-    if (Tensor* gb = g.grad_of(2)) kernels::bias_grad(rows, out, gy, gb->data());
+  kernels::linear(rows, in, out, x.value().data(), w.value().data(), b.value().data(), negative_slope,
+                  y.data());
+  return record("linear", y, {&x, &w, &b}, [rows, in, out, negative_slope](Backward& g) {
+    const real* gs = before_activation(g, negative_slope);
+    if (const Backward::Slot gx = g.slot_of(0)) {
+      kernels::linear_grad_x(rows, in, out, gs, g.value(1).data(), gx.into, gx.data());
+    }
+    if (Tensor* gw = g.grad_of(1)) kernels::linear_grad_w(rows, in, out, g.value(0).data(), gs, gw->data());
+    if (Tensor* gb = g.grad_of(2)) kernels::bias_grad(rows, out, gs, gb->data());
   });
 }
 

@@ -49,8 +49,9 @@ constexpr Dim kChannels[] = {1, 3, 7, 8, 16, 17, 33, 64, 100};
 
 Tensor gather(const IsaKernels& isa, const std::vector<Phase>& phases, const Tensor& x, const Tensor& w,
               const Tensor* bias, Tensor y, Dim cin, Dim cout) {
-  isa.gather({&phases, w.data(), bias ? bias->data() : nullptr, cin, cout, bias == nullptr}, x.data(),
-             y.data());
+  isa.gather({&phases, w.data(), bias ? bias->data() : nullptr, cin, cout,
+              bias == nullptr ? Into::add : Into::overwrite, bias == nullptr ? real(1) : real(0.25)},
+             x.data(), y.data());
   return y;
 }
 
@@ -84,7 +85,7 @@ TEST(Isa, GatherRows) {
         Tensor first;
         for (const IsaKernels* isa : available()) {
           Tensor y({rows, cout});
-          isa->gather_rows({nullptr, w.data(), bias.data(), cin, cout, false}, x.data(), y.data(), rows);
+          isa->gather_rows({nullptr, w.data(), bias.data(), cin, cout}, x.data(), y.data(), rows);
           if (!first.defined()) first = y;
           ASSERT_TRUE(same_bytes(y, first)) << isa->name << " rows " << rows << ", " << cin << " to " << cout;
         }
@@ -105,9 +106,8 @@ TEST(Isa, Outer) {
         for (const IsaKernels* isa : available()) {
           Tensor gw = start.clone();
           for (const TapPairs& pairs : g.pairs) {
-            const OuterJob job{&pairs,      x.data(),     gy.data(), gw.data(), kImages,
-                               g.in_pixels, g.out_pixels, cin,       cout,      2};
-            for (Dim row = 0; row < cin; row += kOuterRows) isa->outer(job, row);
+            isa->outer(
+                {&pairs, x.data(), gy.data(), gw.data(), kImages, g.in_pixels, g.out_pixels, cin, cout});
           }
           if (!first.defined()) first = gw;
           ASSERT_TRUE(same_bytes(gw, first)) << isa->name << ' ' << cin << " to " << cout;
@@ -142,7 +142,7 @@ TEST(Isa, StaysWithinItsRows) {
     for (const Dim cout : kChannels) {
       Tensor y = Tensor::full({cout + 40}, 7);
       const Tensor x = numbers({3}), w = numbers({3, cout}, 2);
-      isa->gather_rows({nullptr, w.data(), nullptr, 3, cout, false}, x.data(), y.data(), 1);
+      isa->gather_rows({nullptr, w.data(), nullptr, 3, cout}, x.data(), y.data(), 1);
       for (Dim i = cout; i < cout + 40; ++i) ASSERT_EQ(y.data()[i], 7) << isa->name << ' ' << cout;
     }
   }

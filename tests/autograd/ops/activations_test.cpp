@@ -1,5 +1,11 @@
 #include "autograd/ops/activations.h"
 
+#include <cstring>
+
+#include "autograd/ops/arithmetic.h"
+#include "autograd/ops/convolution.h"
+#include "autograd/ops/linear.h"
+
 #include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
 
@@ -48,6 +54,49 @@ TEST(Activations, RefusesBadSettings) {
   const Variable x(Tensor::zeros({1}));
   expect_refusal("leaky_relu: slope must not be negative, got -0.500000", [&] { leaky_relu(x, real(-0.5)); });
   expect_refusal("clamp: low must not exceed high, got 2.000000 and 1.000000", [&] { clamp(x, 2, 1); });
+}
+
+// f stored by the op itself and f as an op behind it: the same bytes, forwards and backwards.
+void expect_same_bytes(const std::function<Variable(const std::vector<Variable>&, bool fused)>& layer,
+                       const std::vector<Tensor>& inputs) {
+  std::vector<std::vector<Tensor>> found;
+  for (const bool fused : {true, false}) {
+    std::vector<Variable> leaves;
+    for (const Tensor& t : inputs) leaves.push_back(parameter(t));
+    const Variable y = layer(leaves, fused);
+    backward(sum(multiply(y, Variable(numbers(y.shape(), 9)))));
+    std::vector<Tensor>& all = found.emplace_back(std::vector<Tensor>{y.value()});
+    for (const Variable& leaf : leaves) all.push_back(leaf.grad());
+  }
+  for (std::size_t i = 0; i < found[0].size(); ++i) {
+    ASSERT_EQ(std::memcmp(found[0][i].data(), found[1][i].data(), found[0][i].values().size_bytes()), 0) << i;
+  }
+}
+
+TEST(FusedActivation, IsTheActivationBehindTheOp) {
+  for (const real slope : {kRelu, kLeakyRelu}) {
+    for (const Dim out : {1, 5, 16, 33}) {  // 1 takes the path of few outputs
+      const std::vector<Tensor> conv{numbers({2, 4, 4, 20}), numbers({3, 3, 20, out}, 2), numbers({out}, 3)};
+      expect_same_bytes(
+          [slope](const std::vector<Variable>& in, bool fused) {
+            const Variable y =
+                conv2d(in[0], in[1], in[2], {.padding = 1, .negative_slope = fused ? slope : kNoActivation});
+            return fused ? y : leaky_relu(y, slope);
+          },
+          conv);
+      expect_same_bytes(
+          [slope](const std::vector<Variable>& in, bool fused) {
+            return fused ? linear(in[0], in[1], in[2], slope)
+                         : leaky_relu(linear(in[0], in[1], in[2]), slope);
+          },
+          {numbers({7, 20}), numbers({20, out}, 2), numbers({out}, 3)});
+    }
+  }
+}
+
+TEST(FusedActivation, RefusesANegativeSlope) {
+  const Variable x(Tensor::zeros({2, 3})), w(Tensor::zeros({3, 5})), b(Tensor::zeros({5}));
+  expect_refusal("linear: slope must not be negative, got -0.500000", [&] { linear(x, w, b, real(-0.5)); });
 }
 
 #ifdef SUPERTAC_REAL_IS_DOUBLE
