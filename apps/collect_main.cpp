@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <filesystem>
 #include <iostream>
@@ -11,7 +12,7 @@
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
-#include "data/plate.h"
+#include "data/plate_file.h"
 #include "hardware/errors.h"
 #include "hardware/palpation_recorder.h"
 #include "hardware/port_list.h"
@@ -27,7 +28,8 @@ namespace fs = std::filesystem;
 void declare(Arguments& arguments) {
   arguments.option("board", "PORT", "port of the tactile board; auto finds it by its USB number", "auto")
       .option("printer", "PORT", "port of the Marlin printer")
-      .option("plate", "NAME", "plate under the finger (3_Bumps, ..., plain, or kind and pitch: ridges6)")
+      .option("plate", "NAME",
+              "plate under the finger (3_Bumps, ..., plain, kind and pitch: ridges6, or FILE.stl)")
       .option("out", "DIR", "folder for journal, recordings and report")
       .option("speed", "MM_PER_S", "of the slide", "10")
       .option("passes", "N", "slides, 5 mm apart in x (at most 8)", "8")
@@ -36,8 +38,6 @@ void declare(Arguments& arguments) {
       .flag("home", "home the printer first instead of trusting the operator's origin")
       .flag("confirm-origin", "after a run that was cut off: the head is back at X99.70 Y101.17 Z131.81")
       .flag("yes", "do not ask: the plate lies as planned and the head is at X99.70 Y101.17 Z131.81")
-      .option("recover", "JOURNAL",
-              "no collection: make the recordings of a run that was cut off, into --out")
       .flag("list-ports", "list the serial ports and end");
 }
 
@@ -85,6 +85,36 @@ RecorderSettings read_settings(const Arguments& arguments, const std::string& ou
 // Present while a collection runs, and after one that did not end with the head back at its origin.
 std::string origin_mark(const std::string& out) { return out + "/origin-unknown"; }
 
+uint64_t millimetres(const PalpationPlan& plan, int passes, double more) {
+  return static_cast<uint64_t>(plan.slide * passes + more);
+}
+
+/// Of all slides, how far the finger has come.
+uint64_t millimetres_at(const PalpationPlan& plan, const Leg& leg, const Point3& at) {
+  double part = leg.phase == Phase::slide ? at.y - leg.from.y : 0;
+  if (leg.phase == Phase::release) part = plan.slide;
+  return millimetres(plan, leg.pass - 1, std::clamp(part, 0.0, plan.slide));
+}
+
+std::string live_text(const Point3& at, const BoardCounters& board) {
+  return "X" + format(at.x, 1) + " Y" + format(at.y, 1) + "  " + format(1 / board.clock.period_s, 0) +
+         " frames/s  " + std::to_string(board.missing + board.dropped) + " lost";
+}
+
+/// The mark of a run that may move the head; gone again when it turns out that nothing could be moved.
+RecorderReport record_marked(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
+                             const RecorderSettings& settings, const std::string& mark) {
+  const bool marked_before = fs::exists(mark);
+  write_file(mark, "the head's position is unknown until a run has ended here\n");
+  const FinishDespiteSignals finger_first;
+  try {
+    return record_palpation(std::move(board), std::move(printer), settings);
+  } catch (...) {
+    if (!marked_before && !settings.home) fs::remove(mark);
+    throw;
+  }
+}
+
 RecorderReport collect(const Arguments& arguments, RecorderSettings settings, const std::string& out) {
   const double speedup = arguments.number("speedup", 0.1, 100);
   auto board = std::make_unique<SerialPort>(resolve_board_port(arguments.text("board")),
@@ -92,14 +122,11 @@ RecorderReport collect(const Arguments& arguments, RecorderSettings settings, co
   auto printer =
       std::make_unique<SerialPort>(required_text(arguments, "printer"), SerialSettings{115200, speedup});
   confirm(arguments, settings);
-  write_file(origin_mark(out), "the head's position is unknown until a run has ended here\n");
   std::atomic<bool> stop{false}, ended{false};
   settings.stop = &stop;
-  Progress progress(arguments, "collecting", static_cast<uint64_t>(settings.plan.passes) * 1000,
-                    "thousandths");
-  settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters&) {
-    const double part = leg.phase == Phase::slide ? (at.y - leg.from.y) / settings.plan.slide : 0;
-    progress.update(static_cast<uint64_t>(1000 * (leg.pass - 1 + std::min(1.0, std::max(0.0, part)))));
+  Progress progress(arguments, "collecting", millimetres(settings.plan, settings.plan.passes, 0), "mm");
+  settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters& counters) {
+    progress.update(millimetres_at(settings.plan, leg, at), live_text(at, counters));
   };
   std::thread watcher([&] {
     for (; !ended; usleep(20'000)) stop = stop || interrupted();
@@ -112,18 +139,24 @@ RecorderReport collect(const Arguments& arguments, RecorderSettings settings, co
       thread.join();
     }
   } joiner{ended, watcher};
-  return record_palpation(std::move(board), std::move(printer), settings);
+  return record_marked(std::move(board), std::move(printer), settings, origin_mark(out));
+}
+
+/// Recordings, quality report and --json of what was collected, complete or not. @returns frames
+size_t keep_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
+                   const RecorderReport& collected) {
+  OutputFolder folder(out, arguments.force());
+  PassesReport report = write_passes(arguments, journal, out, folder);
+  report.json["passes_done"] = collected.outcome.passes_done;
+  report.json["note"] = collected.outcome.note;
+  arguments.write_json(report.json);
+  folder.keep();
+  return report.frames;
 }
 
 int run(Arguments& arguments) {
   if (arguments.flag("list-ports")) return print_ports(arguments);
   const std::string out = required_text(arguments, "out");
-  if (arguments.given("recover")) {
-    make_directories(out);
-    arguments.print(std::to_string(write_passes(arguments, arguments.text("recover"), out)) +
-                    " frames recovered");
-    return kExitOk;
-  }
   std::string plate;
   try {
     plate = Plate::named(required_text(arguments, "plate")).name();
@@ -131,6 +164,7 @@ int run(Arguments& arguments) {
     throw UsageError(std::string("--plate: ") + error.what());
   }
   make_directories(out);
+  keep_plate_file(arguments.text("plate"), out);
   const RecorderSettings settings = read_settings(arguments, out, plate);
   if (fs::exists(origin_mark(out)) && !arguments.flag("home") && !arguments.flag("confirm-origin")) {
     throw OriginUnknown(
@@ -139,7 +173,7 @@ int run(Arguments& arguments) {
         "--confirm-origin, or use --home");
   }
   const RecorderReport report = collect(arguments, settings, out);
-  const int frames = write_passes(arguments, settings.journal, out);
+  const size_t frames = keep_passes(arguments, settings.journal, out, report);
   if (report.outcome.complete) {
     fs::remove(origin_mark(out));
     arguments.print(std::to_string(report.outcome.passes_done) + " passes, " + std::to_string(frames) +

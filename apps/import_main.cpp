@@ -1,12 +1,15 @@
-// supertac-import: the rig's text recordings as our recordings, each registered against its plate.
+// supertac-import: the rig's text recordings as our recordings, each registered against its plate; or those
+// of a collection that was cut off, from its journal.
 
 #include <algorithm>
 #include <filesystem>
 
+#include "apps/collect/passes.h"
 #include "apps/common/output_folder.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
+#include "data/plate_file.h"
 #include "data/registration.h"
 #include "data/text_import.h"
 #include "io/file.h"
@@ -19,7 +22,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct TextPass {
-  std::string path, plate;
+  std::string path;
+  Plate plate;
   int trial, pass;
 };
 
@@ -30,7 +34,13 @@ struct Imported {
 };
 
 void declare(Arguments& arguments) {
-  arguments.positional("TEXT_DIR", "folder with <plate>/<trial>/<pass>.txt, 16 voltages a line")
+  arguments
+      .positional(
+          "TEXT_DIR",
+          "folder with <plate>/<trial>/<pass>.txt, 16 voltages a line; a plate of your own as <plate>.stl "
+          "beside its folder",
+          false)
+      .option("journal", "FILE", "instead of TEXT_DIR: recover a collection that was cut off")
       .required("out", "DIR", "folder for the recordings, one file per pass")
       .option("speed", "MM_PER_S", "sliding speed of the passes in mm/s", "10")
       .flag("skip-bad", "leave out files that are no recordings instead of giving up");
@@ -56,20 +66,30 @@ int number_of(const fs::path& path, const std::string& name) {
   throw FileError(path.string(), "expected a number from 1 as its name: TEXT_DIR/<plate>/<trial>/<pass>.txt");
 }
 
+/// The STL file that describes a folder's plate, <plate>.stl beside it; empty when there is none.
+std::string plate_file_of(const fs::path& folder) {
+  const std::string file = folder.string() + ".stl";
+  return fs::exists(file) ? file : "";
+}
+
+Plate plate_of(const fs::path& folder) {
+  const std::string file = plate_file_of(folder);
+  try {
+    return Plate::named(file.empty() ? folder.filename().string() : file);
+  } catch (const std::invalid_argument& error) {
+    throw FileError(folder.string(), std::string("unknown plate: ") + error.what());
+  }
+}
+
 std::vector<TextPass> find_passes(const std::string& root) {
   std::vector<TextPass> passes;
-  for (const fs::path& plate : entries_of(root, true)) {
-    const std::string name = plate.filename().string();
-    try {
-      Plate::named(name);
-    } catch (const std::invalid_argument& error) {
-      throw FileError(plate.string(), std::string("unknown plate: ") + error.what());
-    }
-    for (const fs::path& trial : entries_of(plate, true)) {
+  for (const fs::path& folder : entries_of(root, true)) {
+    const Plate plate = plate_of(folder);
+    for (const fs::path& trial : entries_of(folder, true)) {
       const int trial_number = number_of(trial, trial.filename().string());
       for (const fs::path& pass : entries_of(trial, false)) {
         if (pass.extension() != ".txt") continue;
-        passes.push_back({pass.string(), name, trial_number, number_of(pass, pass.stem().string())});
+        passes.push_back({pass.string(), plate, trial_number, number_of(pass, pass.stem().string())});
       }
     }
   }
@@ -82,11 +102,11 @@ Imported import_pass(const TextPass& pass, double speed_mm_s) {
   Imported imported;
   Recording& recording = imported.recording;
   recording = import_text_pass(pass.path, imported.report);
-  recording.plate = pass.plate;
+  recording.plate = pass.plate.name();
   recording.trial = pass.trial;
   recording.pass = pass.pass;
   recording.speed_mm_s = speed_mm_s;
-  imported.registration = register_pass(recording, Plate::named(pass.plate));
+  imported.registration = register_pass(recording, pass.plate);
   apply(imported.registration, recording);
   return imported;
 }
@@ -95,7 +115,7 @@ nlohmann::ordered_json to_json(const TextPass& pass, const Imported& imported) {
   const ImportReport& report = imported.report;
   const Registration& registration = imported.registration;
   return {{"file", pass.path},
-          {"plate", pass.plate},
+          {"plate", pass.plate.name()},
           {"trial", pass.trial},
           {"pass", pass.pass},
           {"lines", report.lines},
@@ -118,7 +138,7 @@ std::string to_line(const TextPass& pass, const Imported& imported) {
   const ImportReport& report = imported.report;
   const Registration& registration = imported.registration;
   const size_t dropped = report.lines - report.empty - report.frames;
-  std::string line = pass.plate + "/" + std::to_string(pass.trial) + "/" + std::to_string(pass.pass) +
+  std::string line = pass.plate.name() + "/" + std::to_string(pass.trial) + "/" + std::to_string(pass.pass) +
                      ".txt  " + std::to_string(report.lines) + " lines, " + std::to_string(dropped) +
                      " dropped (" + std::to_string(report.malformed()) + " malformed), residual " +
                      format(registration.residual, 2) + " mm, ";
@@ -157,7 +177,26 @@ Outcome import_all(const Arguments& arguments, const std::vector<TextPass>& pass
   return outcome;
 }
 
+int recover(const Arguments& arguments) {
+  for (const char* other : {"TEXT_DIR", "speed", "skip-bad"})
+    if (arguments.given(other))
+      throw UsageError(std::string("--journal: stands alone with --out, found with ") + other);
+  const std::string out = arguments.text("out");
+  OutputFolder folder(out, arguments.force());
+  const PassesReport report = write_passes(arguments, arguments.text("journal"), out, folder);
+  if (report.frames == 0)
+    throw FileError(arguments.text("journal"),
+                    "holds no frame of a pass: it was cut off before the first contact");
+  arguments.write_json(report.json);
+  folder.keep();
+  arguments.print(std::to_string(report.frames) + " frames recovered" +
+                  (report.complete ? "" : "; the collection was cut off"));
+  return kExitOk;
+}
+
 int run(Arguments& arguments) {
+  if (arguments.given("journal")) return recover(arguments);
+  if (!arguments.given("TEXT_DIR")) throw UsageError("expected TEXT_DIR or --journal FILE, found neither");
   arguments.number("speed", 0.1, 1000);
   const auto passes = find_passes(arguments.text("TEXT_DIR"));
   OutputFolder folder(arguments.text("out"), arguments.force());
@@ -171,6 +210,8 @@ int run(Arguments& arguments) {
                         {"reliable", outcome.reliable},
                         {"left_out", outcome.bad},
                         {"files", outcome.files}});
+  for (const auto& plate : entries_of(arguments.text("TEXT_DIR"), true))
+    keep_plate_file(plate_file_of(plate), arguments.text("out"));
   folder.keep();
   arguments.print(std::to_string(outcome.written) + " recordings in " + arguments.text("out") + ", " +
                   std::to_string(outcome.reliable) + " with a reliable registration");

@@ -15,7 +15,8 @@ constexpr double kPlateX = 99.2, kPlateY = 101.17, kSlideZ = 91.81;
 
 void declare(Arguments& arguments) {
   arguments
-      .required("plate", "NAME", "plate under the finger (3_Bumps, ..., plain, or kind and pitch: ridges6)")
+      .required("plate", "NAME",
+                "plate under the finger (3_Bumps, ..., plain, kind and pitch: ridges6, or FILE.stl)")
       .required("board-link", "PATH", "where to link the board's pseudo-terminal")
       .required("printer-link", "PATH", "where to link the printer's pseudo-terminal")
       .option("speedup", "X", "time of the rig per time of the wall; give the host the same", "1")

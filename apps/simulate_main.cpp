@@ -8,6 +8,7 @@
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
+#include "data/plate_file.h"
 #include "data/simulator.h"
 #include "io/numbers.h"
 
@@ -29,7 +30,7 @@ std::string joined(const std::vector<std::string>& names) {
 void declare(Arguments& arguments) {
   arguments.required("out", "DIR", "folder for the recordings, one file per pass")
       .option("plates", "NAME,...",
-              "plates of the rig (3_Bumps, ...), plain, or kind and pitch in mm (ridges6)",
+              "plates of the rig (3_Bumps, ...), plain, kind and pitch in mm (ridges6), or FILE.stl",
               joined(default_plates()))
       .option("speeds", "MM_PER_S,...", "sliding speeds in mm/s", "5,10")
       .option("trials", "N", "trials of every plate and speed", "2")
@@ -138,6 +139,7 @@ int run(Arguments& arguments) {
                         {"frames", frames},
                         {"seed", seed},
                         {"command", arguments.command_line()}});
+  for (const std::string& plate : arguments.list("plates")) keep_plate_file(plate, arguments.text("out"));
   folder.keep();
   arguments.print(std::to_string(jobs.size()) + " recordings, " + std::to_string(frames) + " frames in " +
                   arguments.text("out"));

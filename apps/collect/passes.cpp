@@ -1,7 +1,8 @@
 #include "apps/collect/passes.h"
 
-#include <nlohmann/json.hpp>
+#include <filesystem>
 
+#include "data/plate_file.h"
 #include "data/recording.h"
 #include "hardware/errors.h"
 #include "io/file.h"
@@ -11,10 +12,36 @@
 namespace supertac {
 namespace {
 
+namespace fs = std::filesystem;
+
 // The plate's corner in the printer's coordinates: pass 1 at X99.70 runs 0.5 mm inside the plate's edge.
 constexpr double kPlateX = 99.2, kPlateY = 101.17;
 
-Recording recording_of(const CollectedPass& pass, const nlohmann::ordered_json& header) {
+struct Header {
+  std::string plate;
+  int trial = 0;
+  double speed = 0;
+};
+
+// The header as collection_header() writes it; the plate must be known, since it becomes a file's name.
+Header header_of(const Collection& collection, const std::string& journal) {
+  try {
+    const auto json = parse_json_limited(collection.header);
+    const Header header{json.at("plate").get<std::string>(), json.at("trial").get<int>(),
+                        json.at("speed_mm_s").get<double>()};
+    plate_in_folder(header.plate, fs::path(journal).parent_path().string());
+    if (header.trial >= 1 && header.trial <= 1'000'000 && header.speed > 0 && header.speed < 1e6)
+      return header;
+  } catch (const FileError&) {
+    throw;  // of the plate's file
+  } catch (const std::exception& error) {
+    throw JournalError(journal + ": its header names no plate, trial and speed (" + error.what() +
+                       "); is it a journal of supertac-collect?");
+  }
+  throw JournalError(journal + ": its header has a trial or speed out of range");
+}
+
+Recording recording_of(const CollectedPass& pass, const Header& header) {
   Recording recording;
   recording.time_s = pass.time_s;
   recording.volts = pass.volts;
@@ -22,10 +49,10 @@ Recording recording_of(const CollectedPass& pass, const nlohmann::ordered_json& 
     recording.position_mm.push_back(static_cast<float>(pass.position[3 * i] - kPlateX));
     recording.position_mm.push_back(static_cast<float>(pass.position[3 * i + 1] - kPlateY));
   }
-  recording.plate = header.at("plate").get<std::string>();
-  recording.trial = header.at("trial").get<int>();
+  recording.plate = header.plate;
+  recording.trial = header.trial;
   recording.pass = pass.pass;
-  recording.speed_mm_s = header.at("speed_mm_s").get<double>();
+  recording.speed_mm_s = header.speed;
   recording.source = "collected";
   recording.metadata = {{"complete", pass.complete ? "true" : "false"},
                         {"missing_frames", std::to_string(pass.missing)},
@@ -33,15 +60,33 @@ Recording recording_of(const CollectedPass& pass, const nlohmann::ordered_json& 
   return recording;
 }
 
-std::string quality_line(const CollectedPass& pass) {
-  size_t suspect = 0;
-  for (const uint8_t flag : pass.suspect) suspect += flag;
-  const double seconds = pass.time_s.back() - pass.time_s.front();
-  const auto frames = static_cast<double>(pass.time_s.size());
-  return "pass " + std::to_string(pass.pass) + ": " + std::to_string(pass.time_s.size()) + " frames (" +
-         format(seconds > 0 ? (frames - 1) / seconds : 0, 1) + "/s), " + std::to_string(pass.missing) +
-         " missing, " + std::to_string(suspect) + " suspect, " + std::to_string(pass.positions) +
-         " positions" + (pass.complete ? "" : ", incomplete");
+struct Quality {
+  size_t frames = 0, suspect = 0;
+  double seconds = 0, rate_hz = 0;
+};
+
+Quality quality_of(const CollectedPass& pass) {
+  Quality quality{.frames = pass.time_s.size(), .seconds = pass.time_s.back() - pass.time_s.front()};
+  for (const uint8_t flag : pass.suspect) quality.suspect += flag;
+  if (quality.seconds > 0) quality.rate_hz = static_cast<double>(quality.frames - 1) / quality.seconds;
+  return quality;
+}
+
+nlohmann::ordered_json to_json(const CollectedPass& pass, const std::string& file) {
+  const Quality quality = quality_of(pass);
+  return {{"pass", pass.pass},           {"file", file},
+          {"complete", pass.complete},   {"seconds", quality.seconds},
+          {"frames", quality.frames},    {"frames_per_s", quality.rate_hz},
+          {"missing", pass.missing},     {"suspect", quality.suspect},
+          {"positions", pass.positions}, {"rejected_positions", pass.rejected_positions}};
+}
+
+std::string to_line(const CollectedPass& pass) {
+  const Quality quality = quality_of(pass);
+  return "pass " + std::to_string(pass.pass) + ": " + std::to_string(quality.frames) + " frames (" +
+         format(quality.rate_hz, 1) + "/s), " + std::to_string(pass.missing) + " missing, " +
+         std::to_string(quality.suspect) + " suspect, " + std::to_string(pass.positions) + " positions" +
+         (pass.complete ? "" : ", incomplete");
 }
 
 }  // namespace
@@ -56,24 +101,39 @@ std::string journal_path(const std::string& folder, const std::string& plate, in
   return folder + "/" + plate + "_t" + std::to_string(trial) + "_v" + format(speed) + ".journal";
 }
 
-int write_passes(const Arguments& arguments, const std::string& journal, const std::string& folder) {
+PassesReport write_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
+                          OutputFolder& folder) {
   const Collection collection = collection_of(read_journal(journal));
-  const nlohmann::ordered_json header = parse_json_limited(collection.header);
-  int frames = 0;
+  const Header header = header_of(collection, journal);
+  PassesReport report{.complete = collection.complete};
+  nlohmann::ordered_json passes = nlohmann::ordered_json::array();
   for (const CollectedPass& pass : collection.passes) {
     if (pass.time_s.size() < 2) continue;
     const Recording recording = recording_of(pass, header);
-    const std::string path = folder + "/" + recording_file_name(recording);
-    refuse_existing(path, arguments.force());
-    write_recording(path, recording);
-    arguments.note(quality_line(pass));
-    frames += static_cast<int>(pass.time_s.size());
+    const std::string name = recording_file_name(recording);
+    write_recording(folder.add(name), recording);
+    arguments.print(to_line(pass));
+    passes.push_back(to_json(pass, name));
+    report.frames += pass.time_s.size();
   }
-  if (!collection.clock.plausible) {
-    arguments.note("warning: the board's period is " + format(1e6 * collection.clock.period_s, 1) +
+  if (Plate::is_file(header.plate))
+    keep_plate_file((fs::path(journal).parent_path() / header.plate).string(), out);
+  const ClockFit& clock = collection.clock;
+  if (!clock.plausible)
+    arguments.note("warning: the board's period is " + format(1e6 * clock.period_s, 1) +
                    " us, expected 992 +- 0.5 %");
-  }
-  return frames;
+  report.json = {{"folder", out},
+                 {"journal", journal},
+                 {"plate", header.plate},
+                 {"trial", header.trial},
+                 {"speed_mm_s", header.speed},
+                 {"complete", collection.complete},
+                 {"torn_bytes", collection.torn_bytes},
+                 {"board_period_us", 1e6 * clock.period_s},
+                 {"board_period_plausible", clock.plausible},
+                 {"frames", report.frames},
+                 {"passes", passes}};
+  return report;
 }
 
 }  // namespace supertac

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "apps/common/arguments.h"
+#include "apps/common/output_folder.h"
 #include "hardware/collection.h"
 
 namespace supertac {
@@ -11,10 +12,18 @@ namespace supertac {
 std::string collection_header(const std::string& plate, int trial, double speed);
 std::string journal_path(const std::string& folder, const std::string& plate, int trial, double speed);
 
-/// Turns a journal into one recording per pass in `folder`, with a line of quality each. A pass that was cut
-/// off is marked incomplete in its metadata. The same journal gives the same bytes.
-/// @returns frames written
+/// What a journal held, for the reader and for --json.
+struct PassesReport {
+  size_t frames = 0;      ///< in the recordings
+  bool complete = false;  ///< the run ended as planned
+  nlohmann::ordered_json json = {};
+};
+
+/// Turns a journal into one recording per pass in `folder`, with a line of quality each, and the plate's STL
+/// file, when it has one, from beside the journal. A pass that was cut off is marked incomplete in its
+/// metadata. The same journal gives the same bytes.
 /// @throws JournalError, FileError
-int write_passes(const Arguments& arguments, const std::string& journal, const std::string& folder);
+PassesReport write_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
+                          OutputFolder& folder);
 
 }  // namespace supertac

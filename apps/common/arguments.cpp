@@ -46,8 +46,8 @@ void Arguments::declare(const std::string& name, Option option) {
   order_.push_back(name);
 }
 
-Arguments& Arguments::positional(const std::string& value, const std::string& help) {
-  declare(value, {.value = value, .help = help, .is_required = true});
+Arguments& Arguments::positional(const std::string& value, const std::string& help, bool is_required) {
+  declare(value, {.value = value, .help = help, .is_required = is_required, .is_positional = true});
   positionals_.push_back(value);
   return *this;
 }
@@ -71,10 +71,11 @@ Arguments& Arguments::flag(const std::string& name, const std::string& help) {
 std::string Arguments::help() const {
   cxxopts::Options parser(program_, purpose_);
   std::string usage;
-  for (const std::string& name : positionals_) usage += name + " ";
+  for (const std::string& name : positionals_)
+    usage += options_.at(name).is_required ? name + " " : "[" + name + "] ";
   for (const std::string& name : order_) {
     const Option& option = options_.at(name);
-    if (option.is_required && name != option.value) usage += "--" + name + " " + option.value + " ";
+    if (option.is_required && !option.is_positional) usage += "--" + name + " " + option.value + " ";
   }
   parser.custom_help(usage + "[options]");
   // A program's own options first, then the six that all have.
@@ -82,7 +83,7 @@ std::string Arguments::help() const {
   for (size_t i = 0; i < order_.size(); ++i) {
     const std::string& name = order_[(i + kCommon) % order_.size()];
     const Option& option = options_.at(name);
-    if (option.is_required && name == option.value) continue;
+    if (option.is_positional) continue;
     add(parser, name, option.help, option.value, option.is_flag, option.default_value);
   }
   std::string text = parser.help();
@@ -94,7 +95,7 @@ std::string Arguments::help() const {
 void Arguments::check_names(int argc, const char* const* argv) const {
   std::vector<std::string> known;
   for (const auto& [name, option] : options_) {
-    if (!option.is_required || name != option.value) known.push_back(name);
+    if (!option.is_positional) known.push_back(name);
   }
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
@@ -136,8 +137,7 @@ void Arguments::check_complete() const {
   for (const std::string& name : order_) {
     const Option& option = options_.at(name);
     if (!option.is_required || (given(name) && !values_.at(name).empty())) continue;
-    const bool positional = name == option.value;
-    throw UsageError("missing " + (positional ? name : "--" + name + " " + option.value) + ": " +
+    throw UsageError("missing " + (option.is_positional ? name : "--" + name + " " + option.value) + ": " +
                      option.help);
   }
 }

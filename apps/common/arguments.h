@@ -25,8 +25,8 @@ class Arguments {
   // Declaring. `value` names what is expected, with its unit ("DIR", "N", "MM_PER_S"); help is a short
   // clause.
 
-  /// An argument without a name, in the order of declaration; all are required.
-  Arguments& positional(const std::string& value, const std::string& help);
+  /// An argument without a name, in the order of declaration.
+  Arguments& positional(const std::string& value, const std::string& help, bool is_required = true);
   /// An option that has to be given.
   Arguments& required(const std::string& name, const std::string& value, const std::string& help);
   /// An option with a default; "" means not given.
@@ -76,7 +76,7 @@ class Arguments {
  private:
   struct Option {
     std::string value{}, help{}, default_value{};
-    bool is_flag = false, is_required = false;
+    bool is_flag = false, is_required = false, is_positional = false;
   };
 
   void declare(const std::string& name, Option option);

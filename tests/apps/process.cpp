@@ -1,6 +1,8 @@
 #include "tests/apps/process.h"
 
 #include <fcntl.h>
+#include <stdlib.h>
+#include <sys/ioctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -9,55 +11,97 @@
 #include <filesystem>
 
 #include "io/file.h"
-#include "tests/io/temporary_folder.h"
 
 namespace supertac {
 namespace {
 
-void redirect(int target, const std::string& path) {
-  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+void redirect(int target, const std::string& path, int flags) {
+  const int file = open(path.c_str(), O_WRONLY | flags, 0600);
   if (file < 0 || dup2(file, target) < 0) _exit(126);
 }
 
-void wait_for(const std::string& path) {
-  for (int i = 0; i < 20'000 && !std::filesystem::exists(path); ++i) usleep(500);
+int open_terminal() {
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (terminal < 0 || grantpt(terminal) != 0 || unlockpt(terminal) != 0)
+    throw std::runtime_error("cannot open a pseudo-terminal");
+  winsize size{};
+  size.ws_col = 100;
+  ioctl(terminal, TIOCSWINSZ, &size);
+  return terminal;
 }
 
 }  // namespace
 
-ProcessResult run_process(const std::string& program, const std::vector<std::string>& arguments,
-                          const ProcessOptions& options) {
-  TemporaryFolder folder;
+RunningProcess::RunningProcess(const std::string& program, const std::vector<std::string>& arguments,
+                               const ProcessOptions& options) {
   const std::string path = std::string(SUPERTAC_BIN) + "/" + program;
   std::vector<std::string> words = {path};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
+  std::string error = folder_.file("error");
+  if (options.terminal) {
+    terminal_ = open_terminal();
+    error = ptsname(terminal_);
+  }
+  child_ = fork();
+  if (child_ != 0) return;
+  redirect(STDOUT_FILENO, folder_.file("out"), O_CREAT | O_TRUNC);
+  redirect(STDERR_FILENO, error, options.terminal ? O_NOCTTY : O_CREAT | O_TRUNC);
+  if (options.terminal) setenv("TERM", "vt100", 1);
+  if (options.max_file_bytes >= 0) {
+    const auto bytes = static_cast<rlim_t>(options.max_file_bytes);
+    const rlimit limit{bytes, bytes};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  execv(argv[0], argv.data());
+  _exit(127);
+}
 
-  const pid_t child = fork();
-  if (child == 0) {
-    redirect(STDOUT_FILENO, folder.file("out"));
-    redirect(STDERR_FILENO, folder.file("error"));
-    if (options.max_file_bytes >= 0) {
-      const auto bytes = static_cast<rlim_t>(options.max_file_bytes);
-      const rlimit limit{bytes, bytes};
-      setrlimit(RLIMIT_FSIZE, &limit);
-    }
-    execv(argv[0], argv.data());
-    _exit(127);
+RunningProcess::~RunningProcess() {
+  if (child_ > 0) {
+    kill(child_, SIGKILL);
+    waitpid(child_, nullptr, 0);
   }
-  if (options.signal != 0) {
-    wait_for(options.signal_when);
-    kill(child, options.signal);
-  }
+  if (terminal_ >= 0) close(terminal_);
+}
+
+void RunningProcess::send(int signal) const { kill(child_, signal); }
+
+void RunningProcess::read_terminal() {
+  char bytes[512];
+  for (ssize_t count; (count = read(terminal_, bytes, sizeof bytes)) > 0;)
+    shown_.append(bytes, static_cast<size_t>(count));
+}
+
+ProcessResult RunningProcess::wait() {
   int status = 0;
-  waitpid(child, &status, 0);
+  while (waitpid(child_, &status, terminal_ >= 0 ? WNOHANG : 0) == 0) {
+    read_terminal();
+    usleep(2000);
+  }
+  child_ = -1;
+  if (terminal_ >= 0) read_terminal();
   ProcessResult result;
   result.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  result.out = read_text_file(folder.file("out"), 1 << 26);
-  result.error = read_text_file(folder.file("error"), 1 << 26);
+  result.out = read_text_file(folder_.file("out"), 1 << 26);
+  result.error = terminal_ >= 0 ? shown_ : read_text_file(folder_.file("error"), 1 << 26);
   return result;
+}
+
+ProcessResult run_process(const std::string& program, const std::vector<std::string>& arguments,
+                          const ProcessOptions& options) {
+  RunningProcess process(program, arguments, options);
+  if (options.signal != 0) {
+    wait_for_file(options.signal_when);
+    process.send(options.signal);
+  }
+  return process.wait();
+}
+
+void wait_for_file(const std::string& path) {
+  for (int i = 0; i < 20'000 && !std::filesystem::exists(path); ++i) usleep(500);
 }
 
 }  // namespace supertac

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/io/temporary_folder.h"
+
 namespace supertac {
 
 struct ProcessResult {
@@ -17,10 +19,36 @@ struct ProcessOptions {
   int signal = 0;  ///< sent once the file `signal_when` exists
   std::string signal_when{};
   long max_file_bytes = -1;  ///< limit on the size of files written; -1: none
+  bool terminal = false;     ///< stderr is a terminal of 100 columns
 };
 
-/// `program` is a name in the build's bin folder, e.g. "supertac-info".
+/// A program that runs beside the test; killed when the test ends first. `program` is a name in the build's
+/// bin folder, e.g. "supertac-info".
+class RunningProcess {
+ public:
+  RunningProcess(const std::string& program, const std::vector<std::string>& arguments,
+                 const ProcessOptions& options = {});
+  ~RunningProcess();
+  RunningProcess(const RunningProcess&) = delete;
+  RunningProcess& operator=(const RunningProcess&) = delete;
+
+  void send(int signal) const;
+  ProcessResult wait();
+
+ private:
+  void read_terminal();
+
+  TemporaryFolder folder_;
+  pid_t child_ = -1;
+  int terminal_ = -1;
+  std::string shown_;
+};
+
+/// Starts it and waits for its end.
 ProcessResult run_process(const std::string& program, const std::vector<std::string>& arguments,
                           const ProcessOptions& options = {});
+
+/// Waits up to ten seconds for a file to appear.
+void wait_for_file(const std::string& path);
 
 }  // namespace supertac

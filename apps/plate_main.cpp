@@ -1,0 +1,114 @@
+// supertac-plate: a plate as STL, to print, and the palpation run as G-code, to send from another host.
+
+#include "apps/common/program.h"
+#include "data/plate_mesh.h"
+#include "hardware/palpation_program.h"
+#include "io/file.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr Point3 kMounted{99.7, 101.17, 131.81};  // of the head, before and after a run
+
+void declare(Arguments& arguments) {
+  arguments
+      .required("texture", "NAME",
+                "bumps, ridges, waves, blob or mixed with --pitch and --height, or a plate: 6_Ridges, "
+                "bumps12+ridges4, FILE.stl")
+      .option("pitch", "MM", "distance of the texture's elements (default 6)")
+      .option("height", "MM", "of the elements (default 2.5; bumps and blobs at most half the pitch)")
+      .option("out", "FILE", "the plate as binary STL in mm, 36 x 108 in x and y, its flat part at z = 0")
+      .option("resolution", "MM", "distance of the points where the surface is exact", "0.125")
+      .option("base", "MM", "material below the lowest point", "3")
+      .option("gcode", "FILE", "the palpation run over it, for a Marlin printer and any host")
+      .option("speed", "MM_PER_S", "of the slides, for --gcode", "10")
+      .option("passes", "N", "slides, 5 mm apart in x (at most 8), for --gcode", "8");
+}
+
+/// The name that Plate::named takes for --texture, --pitch and --height.
+std::string plate_name(const Arguments& arguments) {
+  const std::string texture = arguments.text("texture");
+  std::vector<std::string> kinds;
+  if (texture == "mixed") kinds = {"bumps", "ridges", "waves", "blobs"};
+  if (texture == "bumps" || texture == "ridges" || texture == "waves") kinds = {texture};
+  if (texture == "blob" || texture == "blobs") kinds = {"blobs"};
+  if (kinds.empty()) {
+    for (const char* option : {"pitch", "height"})
+      if (arguments.given(option))
+        throw UsageError(std::string("--") + option +
+                         ": expected with --texture bumps, ridges, waves, blob or mixed, found with " +
+                         texture);
+    return texture;
+  }
+  const double pitch = arguments.given("pitch") ? arguments.number("pitch", 0.5, 36) : 6;
+  std::string name;
+  for (const std::string& kind : kinds) {
+    name += (name.empty() ? "" : "+") + kind + format(pitch);
+    if (arguments.given("height")) name += "h" + format(arguments.number("height", 0.05, 20));
+  }
+  return name;
+}
+
+Plate read_plate(const Arguments& arguments) {
+  try {
+    return Plate::named(plate_name(arguments));
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--texture: ") + error.what());
+  }
+}
+
+nlohmann::ordered_json write_stl(const Arguments& arguments, const Plate& plate) {
+  const std::string path = arguments.text("out");
+  refuse_existing(path, arguments.force());
+  const auto triangles = mesh_of(plate, {.resolution_mm = arguments.number("resolution", 0.02, 5),
+                                         .base_mm = arguments.number("base", 0.2, 100)});
+  write_file(path, stl_bytes(triangles, "SuperTac plate " + plate.name() + ", mm"));
+  arguments.print(path + ": " + plate.name() + ", heights " + format(plate.min_height(), 2) + " to " +
+                  format(plate.max_height(), 2) +
+                  " mm, texture from y = " + format(plate.texture_begin(), 2) + " to " +
+                  format(plate.texture_end(), 2) + " mm, " + std::to_string(triangles.size()) + " triangles");
+  return {{"file", path},
+          {"triangles", triangles.size()},
+          {"min_height_mm", plate.min_height()},
+          {"max_height_mm", plate.max_height()},
+          {"texture_from_mm", plate.texture_begin()},
+          {"texture_to_mm", plate.texture_end()}};
+}
+
+nlohmann::ordered_json write_gcode(const Arguments& arguments, const Plate& plate) {
+  const std::string path = arguments.text("gcode");
+  refuse_existing(path, arguments.force());
+  PalpationPlan plan;
+  plan.speed = arguments.number("speed", 0.5, 50);
+  plan.passes = static_cast<int>(arguments.integer("passes", 1, 8));
+  const std::string title = "SuperTac: " + std::to_string(plan.passes) + " passes over plate " +
+                            plate.name() + " at " + format(plan.speed) + " mm/s";
+  write_file(path, palpation_program(plan, kMounted, Limits(), title));
+  arguments.print(path + ": " + std::to_string(plan.passes) + " passes at " + format(plan.speed) +
+                  " mm/s, from and back to " + describe(kMounted));
+  return {{"file", path}, {"passes", plan.passes}, {"speed_mm_s", plan.speed}};
+}
+
+int run(Arguments& arguments) {
+  if (!arguments.given("out") && !arguments.given("gcode"))
+    throw UsageError("--out: expected a file for the plate (or --gcode one for the run), found neither");
+  const Plate plate = read_plate(arguments);
+  nlohmann::ordered_json result{{"plate", plate.name()}};
+  if (arguments.given("out")) result["stl"] = write_stl(arguments, plate);
+  if (arguments.given("gcode")) result["gcode"] = write_gcode(arguments, plate);
+  arguments.write_json(result);
+  return kExitOk;
+}
+
+}  // namespace
+}  // namespace supertac
+
+int main(int argc, char** argv) {
+  using namespace supertac;
+  return run_program({.name = "supertac-plate",
+                      .purpose = "Writes a textured plate as STL, and the palpation run as G-code.",
+                      .declare = declare,
+                      .run = run},
+                     argc, argv);
+}
