@@ -7,14 +7,9 @@
 #include <vector>
 
 #include "bench/fma_peak.h"
+#include "bench/median.h"
 
 namespace supertac::bench {
-
-inline double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
-}
 
 /// Runs `work` (of `macs` multiply-adds, on the calling thread) in turns of at least 50 us, each followed by
 /// the FMA loop; times are cpu_seconds(). The time of an iteration is that of one call. Counters are medians

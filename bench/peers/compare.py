@@ -1,0 +1,188 @@
+#!/usr/bin/python3
+"""The same checkpoint in PyTorch and in our code, turn by turn on one machine.
+
+    bench/peers/compare.py MODEL [--bin BUILD/bin] [--pairs 15] [--out bench/results/peers.csv]
+
+First checks that both draw the same pictures. Then times them alternately (A B A B ...) and prints medians of the
+paired ratios with a 95 % interval (order statistics). One-thread figures are processor time, which other programs on
+the machine do not add to; training on two threads is time on the wall, and means something on an idle machine only.
+`share` is of the FMA peak measured between our calls of the same pair; multiply-adds count padding as data.
+Debian: python3-torch. ONNX Runtime is not packaged there and not compared.
+"""
+import argparse
+import csv
+import math
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+import torch
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "bench/peers"))
+import pytorch_model  # noqa: E402
+
+TRAINING_BATCH = 64
+
+
+class Ours:
+    """peers_ours as a child process that takes orders."""
+
+    def __init__(self, program, model, windows):
+        self.process = subprocess.Popen([program, model, windows], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def __call__(self, order):
+        self.process.stdin.write(order + "\n")
+        self.process.stdin.flush()
+        answer = self.process.stdout.readline()
+        if not answer:
+            sys.exit("compare.py: peers_ours stopped, see above")
+        return answer.split()
+
+    def timed(self, order, seconds):
+        return [float(word) for word in self(f"{order} {seconds}")]
+
+
+def timed(call, seconds):
+    """Median processor time and median wall time of a call, over about so many seconds."""
+    call()
+    cpu, wall = [], []
+    start = time.perf_counter()
+    while time.perf_counter() - start < seconds or len(cpu) < 3:
+        wall_begin, cpu_begin = time.perf_counter(), time.process_time()
+        call()
+        cpu.append(time.process_time() - cpu_begin)
+        wall.append(time.perf_counter() - wall_begin)
+    return statistics.median(cpu), statistics.median(wall)
+
+
+def interval(values):
+    """Median and the narrowest pair of order statistics that covers it with at least 95 %."""
+    ordered, n = sorted(values), len(values)
+    outside, k = 0.0, 0
+    while k < n // 2:
+        outside += math.comb(n, k) / 2**n
+        if 2 * outside > 0.05:
+            break
+        k += 1
+    return statistics.median(ordered), ordered[max(0, k - 1)], ordered[min(n - 1, n - k)]
+
+
+def inference_peers(model, windows):
+    """Name -> call, for one batch."""
+    with torch.no_grad():
+        traced = torch.jit.optimize_for_inference(torch.jit.freeze(torch.jit.trace(model, windows).eval()))
+        for _ in range(3):
+            traced(windows)
+    return {"pytorch eager": lambda: model(windows), "torchscript": lambda: traced(windows)}
+
+
+def training_peer(path, windows):
+    model = pytorch_model.SuperTac(path)
+    parameters = [tensor.requires_grad_() for tensor in model.tensors.values()]
+    adam = torch.optim.Adam(parameters, lr=1e-5)
+    eps = torch.randn(4, len(windows), model.settings["latent"])
+    with torch.no_grad():
+        truth = model(windows).clamp(0, 1)
+
+    def step():
+        adam.zero_grad()
+        model.loss(windows, eps, truth).backward()
+        torch.nn.utils.clip_grad_norm_(parameters, 1)
+        adam.step()
+
+    return model, step
+
+
+def pair(ours, order, peers, pairs, seconds, macs):
+    """One row per peer; ours and the peers take turns `pairs` times."""
+    times = {name: [] for name in peers}
+    own = []
+    for _ in range(pairs):
+        own.append(ours.timed(order, seconds))
+        for name, call in peers.items():
+            times[name].append(timed(call, seconds))
+    rows = []
+    for name in peers:
+        ratio = interval([t[0] / o[0] for t, o in zip(times[name], own)])
+        rows.append({
+            "task": order, "peer": name, "pairs": pairs,
+            "ours_us": 1e6 * statistics.median(o[0] for o in own),
+            "peer_us": 1e6 * statistics.median(t[0] for t in times[name]),
+            "ratio": ratio[0], "ratio_low": ratio[1], "ratio_high": ratio[2],
+            "wall_ratio": statistics.median(t[1] / o[1] for t, o in zip(times[name], own)),
+            "ours_share": statistics.median(2e-9 * macs / o[0] / o[2] for o in own),
+            "peer_share": statistics.median(2e-9 * macs / t[0] / o[2] for t, o in zip(times[name], own)),
+            "mmac": macs / 1e6, "peak_gflops": statistics.median(o[2] for o in own),
+        })
+    return rows
+
+
+def two_threads(ours, pairs, seconds, macs):
+    """Two threads against one, on the wall."""
+    runs = [(ours.timed("train 1", seconds), ours.timed("train 2", seconds)) for _ in range(pairs)]
+    ratio = interval([one[1] / two[1] for one, two in runs])
+    peak = statistics.median(two[2] for _, two in runs)
+    two_wall, one_wall = (statistics.median(r[i][1] for r in runs) for i in (1, 0))
+    return {"task": "train 2", "peer": "ours on one thread", "pairs": pairs, "ours_us": 1e6 * two_wall,
+            "peer_us": 1e6 * one_wall, "ratio": ratio[0], "ratio_low": ratio[1], "ratio_high": ratio[2],
+            "wall_ratio": ratio[0], "ours_share": 2e-9 * macs / two_wall / (2 * peak),
+            "peer_share": 2e-9 * macs / one_wall / peak, "mmac": macs / 1e6, "peak_gflops": peak}
+
+
+def check_pictures(ours, model, windows, folder):
+    ours(f"pictures {folder}/pictures.safetensors")
+    pictures = pytorch_model.read_safetensors(f"{folder}/pictures.safetensors")[0]["pictures"]
+    with torch.no_grad():
+        difference = np.abs(model(windows).numpy() - pictures).max()
+        counted = pytorch_model.count_macs(lambda: model(windows[:1]))
+    inference, training = (float(word) for word in ours("cost"))
+    print(f"pictures differ by at most {difference:.1e}; {inference / 1e6:.2f} MMAC a window, PyTorch runs {counted / 1e6:.2f}")
+    if not difference < 1e-4 or counted != inference:
+        sys.exit("compare.py: the two do not compute the same; nothing was timed")
+    return inference, training
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("model")
+    parser.add_argument("--bin", default=ROOT / "build-dev/bin", help="where peers_ours is (-DSUPERTAC_BENCH=ON)")
+    parser.add_argument("--pairs", type=int, default=15)
+    parser.add_argument("--seconds", type=float, default=0.2, help="of each turn")
+    parser.add_argument("--out", default=ROOT / "bench/results/peers.csv")
+    options = parser.parse_args()
+    torch.set_num_threads(1)
+    torch.manual_seed(1)
+    model = pytorch_model.SuperTac(options.model)
+    windows = torch.rand(TRAINING_BATCH, model.settings["timesteps"], 16)
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        pytorch_model.make_parity.save(f"{folder}/windows.safetensors", {"windows": windows.numpy()})
+        ours = Ours(pathlib.Path(options.bin) / "peers_ours", options.model, f"{folder}/windows.safetensors")
+        inference, training = check_pictures(ours, model, windows, folder)
+        with torch.no_grad():
+            for batch in (1, 8, 64):
+                peers = inference_peers(model, windows[:batch])
+                rows += pair(ours, f"infer {batch}", peers, options.pairs, options.seconds, batch * inference)
+        _, step = training_peer(options.model, windows)
+        rows += pair(ours, "train 1", {"pytorch eager": step}, options.pairs, options.seconds, TRAINING_BATCH * training)
+        rows.append(two_threads(ours, options.pairs, options.seconds, TRAINING_BATCH * training))
+    commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True).stdout.strip()
+    with open(options.out, "w", newline="") as file:
+        writer = csv.DictWriter(file, [*rows[0], "torch", "commit"], lineterminator="\n")
+        writer.writeheader()
+        for row in rows:
+            shown = {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
+            writer.writerow({**shown, "torch": torch.__version__, "commit": commit})
+    print(f"{'task':9} {'against':19} {'ours us':>9} {'peer us':>9} {'ratio':>6} {'95 % interval':>15} {'share':>6}")
+    for r in rows:
+        print(f"{r['task']:9} {r['peer']:19} {r['ours_us']:9.1f} {r['peer_us']:9.1f} {r['ratio']:6.2f} "
+              f"{r['ratio_low']:6.2f} .. {r['ratio_high']:5.2f} {100 * r['ours_share']:5.0f} %")
+
+
+if __name__ == "__main__":
+    main()

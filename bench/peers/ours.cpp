@@ -1,0 +1,129 @@
+// The side of bench/peers/compare.py that runs our code: one order a line on stdin, one answer a line on
+// stdout.
+//
+//   peers_ours MODEL WINDOWS        WINDOWS: safetensors with `windows` [N,T,16]
+//   pictures FILE          infers all windows, writes `pictures` [N,S,S]             -> done
+//   cost                   -> multiply-adds of inference, of training, per window
+//   infer BATCH SECONDS    -> median processor time, median wall time of a call (s), median FMA peak
+//   (GFLOP/s) train THREADS SECONDS  the same for a training step of 64 windows
+#include <omp.h>
+
+#include <chrono>
+#include <ctime>
+#include <iostream>
+#include <memory>
+#include <sstream>
+
+#include "bench/fma_peak.h"
+#include "bench/median.h"
+#include "bench/windows.h"
+#include "io/numbers.h"
+#include "io/safetensors.h"
+#include "models/cost.h"
+#include "models/model_file.h"
+#include "models/trainer.h"
+
+namespace supertac {
+namespace {
+
+class Ours {
+ public:
+  Ours(const std::string& model, const std::string& windows)
+      : model_(load_model(model).model), windows_(read_windows(windows)) {}
+
+  std::string answer(const std::string& order) {
+    std::istringstream words(order);
+    std::string what, file;
+    int number = 0;
+    double seconds = 0;
+    words >> what;
+    if (what == "pictures" && words >> file) return pictures(file);
+    if (what == "cost") {
+      const Cost cost = cost_of(model_->settings());
+      return format(cost.inference) + " " + format(cost.training);
+    }
+    if (what == "infer" && words >> number >> seconds && number <= windows_.dim(0)) {
+      omp_set_num_threads(1);
+      const Dim values = model_->settings().timesteps * kWindowTaxels;
+      const Tensor batch = Tensor::of({number, model_->settings().timesteps, kWindowTaxels},
+                                      windows_.values().first(static_cast<std::size_t>(number * values)));
+      return timed(seconds, [&] { model_->infer(batch); });
+    }
+    if (what == "train" && words >> number >> seconds) {
+      omp_set_num_threads(number);
+      return timed(seconds, [this] { trainer().train_step(); });
+    }
+    throw std::runtime_error("unknown order: " + order);
+  }
+
+ private:
+  static Tensor read_windows(const std::string& path) {
+    const SafetensorsFile file = SafetensorsFile::read(path);
+    const TensorInfo& info = file.tensors().at("windows");
+    return Tensor::of({static_cast<Dim>(info.shape.at(0)), static_cast<Dim>(info.shape.at(1)), kWindowTaxels},
+                      file.f32("windows"));
+  }
+
+  std::string pictures(const std::string& path) {
+    const Tensor pictures = model_->infer(windows_);
+    const auto size = static_cast<std::uint64_t>(model_->settings().image_size());
+    write_safetensors(path, {},
+                      {{"pictures",
+                        "F32",
+                        {static_cast<std::uint64_t>(windows_.dim(0)), size, size},
+                        std::as_bytes(pictures.values())}});
+    return "done";
+  }
+
+  Trainer& trainer() {
+    if (!trainer_) {
+      data_ = std::make_unique<WindowSet>(bench::sliding_bumps(model_->settings()));
+      trainer_ = std::make_unique<Trainer>(*data_, bench::all_of(*data_),
+                                           TrainingSettings{.model = model_->settings(), .epochs = 100'000});
+    }
+    return *trainer_;
+  }
+
+  template <class Work>
+  static std::string timed(double seconds, Work&& work) {
+    using Clock = std::chrono::steady_clock;
+    const auto process_seconds = [] { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; };
+    const auto since = [](Clock::time_point t) {
+      return std::chrono::duration<double>(Clock::now() - t).count();
+    };
+    for (int i = 0; i < 3; ++i) work();
+    // clock() counts microseconds: several calls a turn.
+    Clock::time_point begin = Clock::now();
+    work();
+    const int calls = std::max(1, static_cast<int>(1e-3 / since(begin)));
+    std::vector<double> cpu, wall, peak;
+    const Clock::time_point start = Clock::now();
+    while (since(start) < seconds || cpu.size() < 3) {
+      begin = Clock::now();
+      const double cpu_begin = process_seconds();
+      for (int i = 0; i < calls; ++i) work();
+      cpu.push_back((process_seconds() - cpu_begin) / calls);
+      wall.push_back(since(begin) / calls);
+      peak.push_back(bench::fma_gflops());
+    }
+    return format(bench::median(cpu)) + " " + format(bench::median(wall)) + " " + format(bench::median(peak));
+  }
+
+  std::unique_ptr<SuperTac> model_;
+  Tensor windows_;
+  std::unique_ptr<WindowSet> data_;
+  std::unique_ptr<Trainer> trainer_;
+};
+
+}  // namespace
+}  // namespace supertac
+
+int main(int argc, char** argv) try {
+  if (argc != 3) throw std::runtime_error("expects MODEL and WINDOWS");
+  supertac::Ours ours(argv[1], argv[2]);
+  for (std::string order; std::getline(std::cin, order);) std::cout << ours.answer(order) << std::endl;
+  return 0;
+} catch (const std::exception& error) {
+  std::cerr << "peers_ours: " << error.what() << '\n';
+  return 1;
+}
