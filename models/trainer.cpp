@@ -9,6 +9,7 @@
 #include "data/split.h"
 #include "io/json.h"
 #include "io/numbers.h"
+#include "models/diagnosis.h"
 
 namespace supertac {
 namespace {
@@ -17,7 +18,6 @@ namespace {
 constexpr std::uint64_t kEpsStream = 0x65707300;
 constexpr Dim kMostLanes = 4;
 constexpr int kFlatStepsToReport = 100;
-constexpr double kFlatShare = 0.02;  // of the truth's standard deviation
 
 TrainingSettings checked(const TrainingSettings& settings) {
   settings.check();
@@ -27,10 +27,6 @@ TrainingSettings checked(const TrainingSettings& settings) {
 SuperTac make_model(const TrainingSettings& settings) {
   Rng rng(settings.seed);
   return SuperTac(settings.model, rng);
-}
-
-double standard_deviation(double sum, double squares, double n) {
-  return std::sqrt(std::max(0.0, squares / n - sum / n * (sum / n)));
 }
 
 void copy_into(Tensor& to, const Tensor& from) { std::copy_n(from.data(), from.size(), to.data()); }
@@ -91,6 +87,7 @@ Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, con
   const Dim n = static_cast<Dim>(indices_.size()), lanes = std::min(kMostLanes, n);
   for (Dim i = 0; i < lanes; ++i)
     lanes_.emplace_back(model_, i * n / lanes, (i + 1) * n / lanes - i * n / lanes);
+  pictures_ = lanes_[0].pictures, truths_ = lanes_[0].truths, means_ = lanes_[0].means;
 }
 
 Trainer::Lane::Lane(const SuperTac& master, Dim first_sample, Dim count)
@@ -102,6 +99,8 @@ Trainer::Lane::Lane(const SuperTac& master, Dim first_sample, Dim count)
   windows = Tensor(Shape{count, s.timesteps, kWindowTaxels});
   truth = Tensor(Shape{count, s.image_size(), s.image_size(), 1});
   for (Tensor& e : eps) e = Tensor(Shape{count, s.latent});
+  pictures = truths = Spread(static_cast<std::size_t>(s.image_size() * s.image_size()));
+  means = Spread(kGroups * static_cast<std::size_t>(s.latent));
   for (std::size_t i = 0; i < master.parameters().size(); ++i) {
     Variable own = model.parameters()[i].value;
     own.mutable_value() = master.parameters()[i].value.value();  // the same buffer
@@ -151,17 +150,19 @@ void Trainer::run_lane(Lane& lane) const {
   const SuperTac::Output output = lane.model.forward(lane.windows, lane.eps);
   const Loss loss = supertac_loss(output, lane.truth, settings_.loss);
   const double share = static_cast<double>(lane.windows.dim(0)) / static_cast<double>(indices_.size());
-  const Tensor& pictures = output.image.value();
   lane.terms = {.total = share * loss.total.item(),
                 .reconstruction = share * loss.reconstruction.item(),
                 .kld = share * loss.kld.item(),
                 .l2 = share * loss.l2.item(),
                 .ssim = share * loss.ssim.item()};
-  lane.picture_sum = kernels::sum(pictures.size(), pictures.data());
-  lane.picture_squares = kernels::sum_of_squares(pictures.size(), pictures.data());
-  lane.truth_sum = kernels::sum(lane.truth.size(), lane.truth.data());
-  lane.truth_squares = kernels::sum_of_squares(lane.truth.size(), lane.truth.data());
-  if (std::isfinite(lane.terms.total)) backward(scale(loss.total, static_cast<real>(share)));
+  for (Spread* spread : {&lane.pictures, &lane.truths, &lane.means}) spread->clear();
+  lane.pictures.add(output.image.value());
+  lane.truths.add(lane.truth);
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    lane.means.add(output.latent[g].mean.value(), g * static_cast<std::size_t>(settings_.model.latent));
+  }
+  if (std::isfinite(lane.terms.total)) return backward(scale(loss.total, static_cast<real>(share)));
+  lane.trouble = where_not_finite(loss.total, lane.model.parameters());
 }
 
 StepReport Trainer::train_step() {
@@ -188,18 +189,13 @@ StepReport Trainer::train_step() {
     report.ssim += lane.terms.ssim;
   }
   check_finite(report);
-  report.collapsed = collapsed();
+  look_for_collapse(report);
   add_gradients();
   adam_.set_learning_rate(report.learning_rate);
   report.gradient_norm = adam_.step();
   if (!std::isfinite(report.gradient_norm)) {
-    for (const Parameter& p : model_.parameters()) {
-      const Tensor& gradient = p.value.grad();
-      if (!std::isfinite(kernels::sum_of_squares(gradient.size(), gradient.data()))) {
-        stop("the gradient of " + p.name + " is not finite");
-      }
-    }
-    stop("the gradient's norm is not finite");
+    const std::string name = gradient_not_finite(model_.parameters());
+    stop(name.empty() ? "the gradient's norm overflows" : "the gradient of " + name + " is not finite");
   }
   ++step_;
   return report;
@@ -219,23 +215,29 @@ void Trainer::add_gradients() {
 
 void Trainer::check_finite(const StepReport& r) const {
   if (std::isfinite(r.total)) return;
+  std::string where;
+  for (const Lane& lane : lanes_) {
+    if (where.empty()) where = lane.trouble;
+  }
   stop("the loss is " + format(r.total) + " (reconstruction " + format(r.reconstruction) + ", KLD " +
-       format(r.kld) + ", L2 " + format(r.l2) + ", SSIM " + format(r.ssim) + ")");
+       format(r.kld) + ", L2 " + format(r.l2) + ", SSIM " + format(r.ssim) + ")" +
+       (where.empty() ? "" : ": " + where));
 }
 
-bool Trainer::collapsed() {
-  double sum = 0, squares = 0, truth_sum = 0, truth_squares = 0, n = 0;
+void Trainer::look_for_collapse(StepReport& report) {
+  for (Spread* spread : {&pictures_, &truths_, &means_}) spread->clear();
   for (const Lane& lane : lanes_) {
-    sum += lane.picture_sum;
-    squares += lane.picture_squares;
-    truth_sum += lane.truth_sum;
-    truth_squares += lane.truth_squares;
-    n += static_cast<double>(lane.truth.size());
+    pictures_.add(lane.pictures);
+    truths_.add(lane.truths);
+    means_.add(lane.means);
   }
-  const bool flat =
-      standard_deviation(sum, squares, n) < kFlatShare * standard_deviation(truth_sum, truth_squares, n);
-  flat_steps_ = flat ? flat_steps_ + 1 : 0;
-  return flat_steps_ >= kFlatStepsToReport;
+  if (indices_.size() < 2) return;  // nothing to compare with
+  const auto samples = static_cast<double>(indices_.size());
+  report.active_latents = active_latents(means_, samples);
+  const bool now = report.active_latents == 0 || same_for_all(pictures_, truths_, samples);
+  // While the rate still rises a network has not had its chance to learn.
+  flat_steps_ = now && step_ >= schedule_.warm_up ? flat_steps_ + 1 : 0;
+  report.collapsed = flat_steps_ >= kFlatStepsToReport;
 }
 
 void Trainer::stop(const std::string& what) const {

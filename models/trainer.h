@@ -20,6 +20,7 @@
 #include "data/augment.h"
 #include "data/batching.h"
 #include "data/windows.h"
+#include "models/collapse.h"
 #include "models/loss.h"
 #include "models/model_file.h"
 
@@ -47,7 +48,9 @@ struct StepReport {
   double total = 0, reconstruction = 0, kld = 0, l2 = 0, ssim = 0;
   double gradient_norm = 0;  ///< before clipping
   double learning_rate = 0;
-  /// The pictures have been flat for the last 100 steps although the truth is not: lower the learning rate.
+  int active_latents = 0;  ///< of 4 LD, in this batch (models/collapse.h)
+  /// For the last 100 steps after warm-up the pictures were the same for every window, or no latent number
+  /// was active. Lower the learning rate or, when no latent is active, beta.
   bool collapsed = false;
 };
 
@@ -88,14 +91,15 @@ class Trainer {
     Tensor windows, truth;
     std::array<Tensor, kGroups> eps;
     StepReport terms;
-    double picture_sum = 0, picture_squares = 0, truth_sum = 0, truth_squares = 0;
+    Spread pictures, truths, means;
+    std::string trouble;  // where the loss stopped to be finite
     std::exception_ptr error;
   };
   void run_lane(Lane& lane) const;
   void fill(Lane& lane) const;
   void draw_eps(Lane& lane) const;
   void add_gradients();
-  bool collapsed();
+  void look_for_collapse(StepReport& report);
   void check_finite(const StepReport& report) const;
   [[noreturn]] void stop(const std::string& what) const;
 
@@ -106,7 +110,8 @@ class Trainer {
   mutable Adam adam_;
   Schedule schedule_;
   std::int64_t step_ = 0, total_steps_ = 0;
-  int flat_steps_ = 0;
+  int flat_steps_ = 0;  // how many in a row have looked collapsed
+  Spread pictures_, truths_, means_;
   std::vector<std::uint32_t> indices_;  // of the batch
   std::vector<Lane> lanes_;
 };

@@ -58,6 +58,7 @@ class LogMeans {
 
 nlohmann::ordered_json describe(const Arguments& a, const Trainer& trainer, const WindowSet& windows,
                                 const Split& split) {
+  const Leakage leakage = find_leakage(windows, split);
   return {
       {"command", a.command_line()},
       {"version", version()},
@@ -68,6 +69,8 @@ nlohmann::ordered_json describe(const Arguments& a, const Trainer& trainer, cons
       {"split", a.text("split")},
       {"train_windows", split.train.size()},
       {"test_windows", split.test.size()},
+      {"test_windows_sharing_frames", leakage.overlapping},
+      {"test_windows_duplicated", leakage.duplicated},
       {"windows", windows.counts().summary()},
       {"data", windows.fingerprint()},
       {"split_fingerprint", fingerprint(split)},
@@ -94,6 +97,13 @@ bool TrainingRun::train() {
   a_.note("training on " + std::to_string(split_.train.size()) + " windows, " +
           std::to_string(trainer_.total_steps()) + " steps" +
           (target_.resume.empty() ? "" : ", resumed at " + std::to_string(trainer_.step())));
+  const auto sharing = description_.at("test_windows_sharing_frames").get<std::size_t>(),
+             duplicated = description_.at("test_windows_duplicated").get<std::size_t>();
+  if (a_.text("split") != "none" && sharing + duplicated > 0) {
+    a_.note("split " + a_.text("split") + " leaks: of " + std::to_string(split_.test.size()) +
+            " test windows " + std::to_string(sharing) + " share frames with training windows, " +
+            std::to_string(duplicated) + " repeat one; use --split trial for results");
+  }
   step_until_done();
   folder_.write_report(description_);
   if (!trainer_.done()) return false;
@@ -113,9 +123,12 @@ void TrainingRun::step_until_done() {
     const StepReport report = trainer_.train_step();
     means.add(report);
     if (report.collapsed && !std::exchange(warned_, true)) {
-      a_.note("step " + std::to_string(report.step) +
-              ": the pictures have collapsed to a flat image; stop and lower --learning-rate (now " +
-              a_.text("learning-rate") + ")");
+      a_.note("step " + std::to_string(report.step) + ": " +
+              (report.active_latents == 0
+                   ? "no latent number tells windows apart; stop and lower --beta (now " + a_.text("beta") +
+                         ") or "
+                   : "the pictures are the same for every window; stop and lower ") +
+              "--learning-rate (now " + a_.text("learning-rate") + ")");
     }
     const bool epoch_ends = report.step % trainer_.steps_per_epoch() == 0;
     if (epoch_ends || report.step % kStepsPerLogLine == 0) log(means.take(seconds()), epoch_ends);

@@ -129,6 +129,19 @@ TEST(Backward, AGraphMayBeContinuedOnAnotherThread) {
   EXPECT_EQ(x.grad().item(), 108);
 }
 
+TEST(History, ListsWhatAValueWasComputedFromInOrder) {
+  const Variable x = parameter(Tensor::of({2}, {3, -2})), constant(Tensor::of({2}, {1, 1}));
+  const Variable square = multiply(x, x), y = sum(add(square, constant));
+  std::string ops;
+  for (const Variable& v : history_of(y)) ops += std::string(v.op()) + " ";
+  EXPECT_EQ(ops, "leaf leaf multiply add sum ");
+  EXPECT_EQ(inputs_of(square).size(), 2U);
+  EXPECT_EQ(inputs_of(square)[0].node(), x.node());
+  EXPECT_TRUE(inputs_of(x).empty());
+  backward(y);
+  EXPECT_EQ(history_of(y).size(), 1U);  // freed
+}
+
 TEST(Record, TakesAtMostEightInputs) {
   const Variable x = parameter(Tensor::full({1}, 1));
   const std::vector<const Variable*> inputs(9, &x);

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include <functional>
+
 #include "tests/models/support.h"
 
 namespace supertac {
@@ -89,45 +91,65 @@ TEST(Trainer, RefusesToResumeFromAModelWithoutState) {
   }
 }
 
-TEST(Trainer, StopsWithStepLayerAndAdviceWhenAValueIsNotFinite) {
-  TrainingSettings settings = small_training();
+// The message of the step after `damage` has been done to the parameter of that name.
+std::string stopped(const std::string& name, const std::function<void(Tensor&)>& damage) {
+  const TrainingSettings settings = small_training();
   const WindowSet windows = small_windows(settings.model);
   Trainer trainer(windows, all_of(windows), settings);
   trainer.train_step();
   for (const Parameter& p : trainer.model().parameters()) {
-    if (p.name != "upsampler.out.bias") continue;
-    Variable bias = p.value;
-    bias.mutable_value().fill(std::numeric_limits<real>::quiet_NaN());
+    if (p.name == name) damage(Variable(p.value).mutable_value());
   }
   try {
     trainer.train_step();
-    FAIL();
   } catch (const TrainingStopped& error) {
-    const std::string text = error.what();
-    EXPECT_NE(text.find("training stopped at step 2: the loss is nan"), std::string::npos) << text;
-    EXPECT_NE(text.find("lower --learning-rate (now 0.001)"), std::string::npos) << text;
+    return error.what();
   }
+  return "no error";
 }
 
-// A network whose last layer is dead draws a flat image and learns nothing any more; the detector must say
-// so, and must keep quiet about a healthy run.
-TEST(Trainer, ReportsACollapsedPicture) {
+TEST(Trainer, StopsWithStepLayerAndAdviceWhenAValueIsNotFinite) {
+  const std::string advice = "; lower --learning-rate (now 0.001) or check the input with supertac-info";
+  const std::string parameter = stopped("upsampler.rirb.0.conv.weight", [](Tensor& t) {
+    t.data()[3] = std::numeric_limits<real>::quiet_NaN();
+  });
+  EXPECT_TRUE(parameter.starts_with("training stopped at step 2: the loss is nan (reconstruction "))
+      << parameter;
+  EXPECT_TRUE(parameter.ends_with("): parameter upsampler.rirb.0.conv.weight is not finite" + advice))
+      << parameter;
+  const std::string layer = stopped("decoder.2.fc.1.weight", [](Tensor& t) { t.fill(1e38F); });
+  EXPECT_NE(layer.find("the output of linear"), std::string::npos) << layer;
+  EXPECT_TRUE(layer.ends_with(" in decoder.2.fc.1 is the first that is not finite" + advice)) << layer;
+  const std::string gradient = stopped("upsampler.out.weight", [](Tensor& t) { t.fill(1e19F); });
+  EXPECT_NE(gradient.find("upsampler.out"), std::string::npos) << gradient;
+  EXPECT_TRUE(gradient.ends_with(advice)) << gradient;
+}
+
+// A network whose last layer is dead draws a flat image and learns nothing any more, and one whose encoders
+// are dead draws the same one for all; the detector must say so, and must keep quiet about a healthy run.
+TEST(Trainer, ReportsPicturesThatAreTheSameForAllAndIdleLatents) {
   TrainingSettings settings = small_training();
   settings.epochs = 10;
   const WindowSet windows = small_windows(settings.model);
-  const auto steps_until_reported = [&](const TrainingSettings& s, bool dead) {
+  StepReport last;
+  const auto steps_until_reported = [&](const TrainingSettings& s, const std::string& dead) {
     Trainer trainer(windows, all_of(windows), s);
     for (const Parameter& p : trainer.model().parameters()) {
-      if (dead && p.name.starts_with("upsampler.out")) Variable(p.value).mutable_value().fill(0);
+      if (p.name.find(dead) != std::string::npos) Variable(p.value).mutable_value().fill(0);
     }
     while (!trainer.done()) {
-      if (trainer.train_step().collapsed) return trainer.step();
+      last = trainer.train_step();
+      if (last.collapsed) return trainer.step();
     }
     return std::int64_t{0};
   };
-  EXPECT_EQ(steps_until_reported(settings, false), 0);
+  EXPECT_EQ(steps_until_reported(settings, "none"), 0);
+  EXPECT_GT(last.active_latents, 0);
   settings.learning_rate = 1e-9;
-  EXPECT_EQ(steps_until_reported(settings, true), 100);
+  settings.warm_up = 0;
+  EXPECT_EQ(steps_until_reported(settings, "upsampler.out"), 100);
+  EXPECT_EQ(steps_until_reported(settings, ".mean."), 100);
+  EXPECT_EQ(last.active_latents, 0);
 }
 
 TEST(Trainer, RefusesWindowsOfAnotherLength) {

@@ -1,0 +1,59 @@
+#include "models/collapse.h"
+
+#include <algorithm>
+
+namespace supertac {
+namespace {
+
+constexpr double kSameShare = 0.02;       // of the truths' standard deviation
+constexpr double kActiveVariance = 0.01;  // Burda et al. 2016
+
+}  // namespace
+
+void Spread::clear() {
+  std::fill(sum_.begin(), sum_.end(), 0.0);
+  std::fill(squares_.begin(), squares_.end(), 0.0);
+}
+
+void Spread::add(const Tensor& batch, std::size_t first) {
+  const Dim samples = batch.dim(0), entries = samples > 0 ? batch.size() / samples : 0;
+  const real* x = batch.data();
+  for (Dim n = 0; n < samples; ++n) {
+    double *sum = &sum_[first], *squares = &squares_[first];
+    for (Dim i = 0; i < entries; ++i) {
+      const auto value = static_cast<double>(*x++);
+      sum[i] += value;
+      squares[i] += value * value;
+    }
+  }
+}
+
+void Spread::add(const Spread& other) {
+  for (std::size_t i = 0; i < sum_.size(); ++i) {
+    sum_[i] += other.sum_[i];
+    squares_[i] += other.squares_[i];
+  }
+}
+
+double Spread::variance(std::size_t i, double samples) const {
+  const double mean = sum_[i] / samples;
+  return std::max(0.0, squares_[i] / samples - mean * mean);
+}
+
+double Spread::mean_variance(double samples) const {
+  double total = 0;
+  for (std::size_t i = 0; i < entries(); ++i) total += variance(i, samples);
+  return total / static_cast<double>(entries());
+}
+
+bool same_for_all(const Spread& pictures, const Spread& truths, double samples) {
+  return pictures.mean_variance(samples) < kSameShare * kSameShare * truths.mean_variance(samples);
+}
+
+int active_latents(const Spread& means, double samples) {
+  int active = 0;
+  for (std::size_t i = 0; i < means.entries(); ++i) active += means.variance(i, samples) > kActiveVariance;
+  return active;
+}
+
+}  // namespace supertac

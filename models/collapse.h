@@ -1,0 +1,37 @@
+// Two ways in which a network stops to look at its input, both silent: the loss stays finite and even falls.
+#pragma once
+
+#include <vector>
+
+#include "autograd/tensor.h"
+
+namespace supertac {
+
+/// How much each entry differs within a batch: sums that lanes gather and the trainer adds up in their order.
+class Spread {
+ public:
+  Spread() = default;
+  explicit Spread(std::size_t entries) : sum_(entries), squares_(entries) {}
+  void clear();
+  /// Adds a batch [N,...], whose entries are `first`, first + 1, ... of this object.
+  void add(const Tensor& batch, std::size_t first = 0);
+  void add(const Spread& other);
+  /// Variance of entry i over `samples` samples.
+  double variance(std::size_t i, double samples) const;
+  /// The mean of all entries' variances.
+  double mean_variance(double samples) const;
+  std::size_t entries() const { return sum_.size(); }
+
+ private:
+  std::vector<double> sum_, squares_;
+};
+
+/// Pictures that are the same for every window (blank, or the mean image), although the truths are not: their
+/// standard deviation over the batch is below 2 % of the truths'.
+bool same_for_all(const Spread& pictures, const Spread& truths, double samples);
+
+/// Latent numbers that tell windows apart: the variance of the encoder's mean over the batch is above 0.01
+/// (Burda et al. 2016, section 5.1, "active units"). None is posterior collapse: the decoders ignore z.
+int active_latents(const Spread& means, double samples);
+
+}  // namespace supertac
