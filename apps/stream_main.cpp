@@ -37,13 +37,28 @@ void declare(Arguments& a) {
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1");
 }
 
-std::unique_ptr<SensorSource> open_source(const Arguments& a) {
-  const int sources = int{a.given("board")} + int{a.given("replay")} + int{a.given("recording")};
+struct Options {
+  double seconds, speedup;
+  std::string source;  // in words
+};
+
+Options read_options(const Arguments& a) {
+  Options options{a.number("seconds", 0.001, 1e9), a.number("speedup", 0.1, 100), {}};
+  int sources = 0;
+  for (const char* name : {"board", "replay", "recording"}) {
+    if (!a.given(name)) continue;
+    options.source = std::string(name) + " " + a.text(name);
+    ++sources;
+  }
   if (sources != 1) {
     throw UsageError("expected one of --board PORT, --replay JOURNAL and --recording FILE, found " +
                      std::to_string(sources));
   }
   if (a.given("capture") && !a.given("board")) throw UsageError("--capture: only with --board");
+  return options;
+}
+
+std::unique_ptr<SensorSource> open_source(const Arguments& a, const Options& options) {
   if (a.given("replay")) return open_replay(a.text("replay"));
   if (a.given("recording")) return open_recording(a.text("recording"));
   const std::string capture = a.text("capture");
@@ -51,16 +66,13 @@ std::unique_ptr<SensorSource> open_source(const Arguments& a) {
     refuse_existing(capture, a.force());
     std::filesystem::remove(capture);
   }
-  return open_board(a.text("board"), a.number("speedup", 0.1, 100), capture);
+  return open_board(a.text("board"), options.speedup, capture);
 }
 
 class Stream {
  public:
-  Stream(const Arguments& a, const ModelFile& model, SensorSource& source)
-      : a_(a),
-        source_(source),
-        maker_(model, source.period_s(), source.filter_s()),
-        seconds_(a.number("seconds", 0.001, 1e9)) {
+  Stream(const Arguments& a, double seconds, const ModelFile& model, SensorSource& source)
+      : a_(a), source_(source), maker_(model, source.period_s(), source.filter_s()), seconds_(seconds) {
     if (a.given("out")) log_ = std::make_unique<PictureLog>(a.text("out"), a.force(), maker_.image_size());
   }
 
@@ -78,8 +90,8 @@ class Stream {
 
   void finish(const std::map<std::string, std::string>& metadata) {
     view_.reset();
-    source_.finish();
     if (log_) log_->write(metadata);
+    source_.finish();
   }
 
   uint64_t pictures() const { return latency_.count(); }
@@ -171,34 +183,29 @@ class Stream {
   double begin_s_ = 0, figures_s_ = monotonic_seconds();
 };
 
-std::string source_text(const Arguments& a) {
-  for (const char* name : {"board", "replay", "recording"})
-    if (a.given(name)) return std::string(name) + " " + a.text(name);
-  return {};
-}
-
 int run(Arguments& a) {
   const double begin = monotonic_seconds();
+  const Options options = read_options(a);
   const ModelFile model = load_model(a.text("model"));
-  const auto source = open_source(a);
-  Stream stream(a, model, *source);
+  const auto source = open_source(a, options);
+  Stream stream(a, options.seconds, model, *source);
   const double ready_ms = 1e3 * (monotonic_seconds() - begin);
-  a.note("ready: " + source_text(a) + "; a picture needs " + format(stream.window_s(), 2) + " s of signal");
+  a.note("ready: " + options.source + "; a picture needs " + format(stream.window_s(), 2) + " s of signal");
   std::exception_ptr error;
   try {
     stream.run();
   } catch (...) {
     error = std::current_exception();  // what was seen before is kept
   }
-  stream.finish({{"kind", "pictures"}, {"model", a.text("model")}, {"source", source_text(a)}});
+  stream.finish({{"kind", "pictures"}, {"model", a.text("model")}, {"source", options.source}});
   a.print(stream.summary());
   nlohmann::ordered_json result = {
-      {"source", source_text(a)}, {"model", a.text("model")}, {"ready_ms", ready_ms}};
+      {"source", options.source}, {"model", a.text("model")}, {"ready_ms", ready_ms}};
   result.update(stream.result());
   a.write_json(result);
   if (error) std::rethrow_exception(error);
   if (stream.pictures() == 0 && !interrupted()) {
-    throw std::runtime_error(source_text(a) + ": no picture, expected " + format(stream.window_s(), 2) +
+    throw std::runtime_error(options.source + ": no picture, expected " + format(stream.window_s(), 2) +
                              " s of signal without a gap of 0.05 s; stream for longer");
   }
   return kExitOk;

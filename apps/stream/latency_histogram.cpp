@@ -18,7 +18,7 @@ void LatencyHistogram::add(double seconds) {
 double LatencyHistogram::quantile(double q) const {
   const auto wanted = static_cast<uint64_t>(std::ceil(q * static_cast<double>(count_)));
   uint64_t seen = 0;
-  for (size_t i = 0; i < classes_.size(); ++i) {
+  for (size_t i = 0; i + 1 < classes_.size(); ++i) {
     seen += classes_[i];
     if (classes_[i] == 0 || seen < wanted) continue;
     const double upper = 1 + static_cast<double>(i % kPerDoubling + 1) / kPerDoubling;

@@ -22,12 +22,13 @@ PictureLog::PictureLog(const std::string& path, bool force, size_t image_size)
   pictures_ = open_spool();
 }
 
-void PictureLog::fail() const {
-  throw FileError(path_, std::string("the pictures cannot be kept: ") + strerror(errno) +
-                             "; make room, or choose another folder");
+void PictureLog::fail() {
+  problem_ = std::string("the pictures cannot be kept: ") + strerror(errno) +
+             "; make room, or choose another folder";
+  throw FileError(path_, problem_);
 }
 
-PictureLog::Spool PictureLog::open_spool() const {
+PictureLog::Spool PictureLog::open_spool() {
   std::string name = (std::filesystem::absolute(path_).parent_path() / ".pictures-XXXXXX").string();
   const int file = mkostemp(name.data(), O_CLOEXEC);
   if (file < 0) fail();
@@ -48,7 +49,7 @@ void PictureLog::add(double time_s, std::span<const float> volts, std::span<cons
   ++count_;
 }
 
-void PictureLog::read_back(const Spool& spool, const ByteSink& sink) const {
+void PictureLog::read_back(const Spool& spool, const ByteSink& sink) {
   if (std::fflush(spool.get()) != 0 || std::fseek(spool.get(), 0, SEEK_SET) != 0) fail();
   std::array<std::byte, 1 << 16> buffer;
   while (const size_t count = std::fread(buffer.data(), 1, buffer.size(), spool.get()))
@@ -57,6 +58,7 @@ void PictureLog::read_back(const Spool& spool, const ByteSink& sink) const {
 }
 
 void PictureLog::write(const std::map<std::string, std::string>& metadata) {
+  if (!problem_.empty()) throw FileError(path_, problem_);
   const auto from = [this](const Spool& spool) {
     return [this, &spool](const ByteSink& sink) { read_back(spool, sink); };
   };

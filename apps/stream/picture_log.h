@@ -19,7 +19,7 @@ class PictureLog {
   PictureLog(const std::string& path, bool force, size_t image_size);
   /// @throws FileError
   void add(double time_s, std::span<const float> volts, std::span<const float> picture);
-  /// Writes the file, atomically. @throws FileError
+  /// Writes the file, atomically. @throws FileError, again when add() has.
   void write(const std::map<std::string, std::string>& metadata);
 
  private:
@@ -28,14 +28,15 @@ class PictureLog {
   };
   using Spool = std::unique_ptr<std::FILE, Close>;
 
-  Spool open_spool() const;
+  Spool open_spool();
   void append(const Spool& spool, std::span<const std::byte> bytes);
-  void read_back(const Spool& spool, const ByteSink& sink) const;
-  [[noreturn]] void fail() const;
+  void read_back(const Spool& spool, const ByteSink& sink);
+  [[noreturn]] void fail();
 
   std::string path_;
   size_t image_size_;
   uint64_t count_ = 0;
+  std::string problem_;  // of a write that failed: what was kept is not whole
   Spool times_, volts_, pictures_;
 };
 

@@ -24,9 +24,10 @@ constexpr std::array<int, 16> kHeat = {16,  17,  54,  90,  126, 161, 197, 203,
                                        208, 214, 220, 226, 227, 228, 230, 231};
 constexpr std::string_view kInk = " .:-=+*#%@";
 
+// NaN is level 0.
 template <size_t N>
 size_t level(float value) {
-  return static_cast<size_t>(std::clamp(value, 0.0F, 1.0F) * (N - 1) + 0.5F);
+  return static_cast<size_t>((value > 0 ? std::min(value, 1.0F) : 0.0F) * (N - 1) + 0.5F);
 }
 
 // Pixel (row, column) of a picture of any size drawn kSide x kSide, row 0 on top: that is the largest y.
@@ -59,10 +60,11 @@ bool colour_wanted() {
   return no_color == nullptr || *no_color == '\0';
 }
 
+// A terminal that does not know its size says 0.
 bool window_is_large_enough() {
   winsize size{};
-  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return true;
-  return size.ws_col >= kColumns && size.ws_row > kLines;
+  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0) return true;
+  return (size.ws_col == 0 || size.ws_col >= kColumns) && (size.ws_row == 0 || size.ws_row > kLines);
 }
 
 }  // namespace
