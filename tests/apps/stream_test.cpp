@@ -1,0 +1,317 @@
+// supertac-stream as a process: boards on a virtual rig in the test's own process, captures, recordings.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+
+#include "apps/stream/latency_histogram.h"
+#include "apps/stream/picture_log.h"
+#include "apps/stream/terminal_view.h"
+#include "data/simulator.h"
+#include "data/windows.h"
+#include "hardware/serial_port.h"
+#include "hardware/virtual_rig/pty_rig.h"
+#include "io/file.h"
+#include "io/json.h"
+#include "models/model_file.h"
+#include "tests/apps/process.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr Dim kTimesteps = 32;
+
+// A model of random weights: what it draws means nothing, but it is the same on every way.
+void write_model(const std::string& path, Dim timesteps = kTimesteps, std::optional<double> filter_s = 0.0) {
+  Rng rng(1);
+  const SuperTac model({.timesteps = timesteps, .latent = 3, .scale = 2, .channels = 8, .rcabs = 1}, rng);
+  save_model(path, model, {300, {}, filter_s}, {});
+}
+
+RigSettings touching_rig() {
+  RigSettings settings;
+  settings.printer_running = true;
+  settings.board.signals = [](double, double, double, double t) {
+    std::array<double, 16> volts{};
+    for (size_t k = 0; k < volts.size(); ++k)
+      volts[k] = 2.3 + 0.1 * std::sin(20 * t + static_cast<double>(k));
+    return volts;
+  };
+  return settings;
+}
+
+class Streaming : public testing::Test {
+ protected:
+  Streaming() { write_model(model()); }
+
+  std::string path(const std::string& name) const { return folder_ / name; }
+  std::string model() const { return path("model"); }
+  std::string board() const { return path("board"); }
+
+  std::vector<std::string> words(const std::vector<std::string>& more) const {
+    std::vector<std::string> all = {"--model", model(), "--quiet"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+  ProcessResult stream(const std::vector<std::string>& more, const ProcessOptions& options = {}) const {
+    return run_process("supertac-stream", words(more), options);
+  }
+  // Starts the rig; a board that streams before anyone listens is what a program finds.
+  PtyRig& plug_in(const RigSettings& settings = touching_rig()) {
+    rig_ = std::make_unique<PtyRig>(settings, board(), path("printer"));
+    return *rig_;
+  }
+  SafetensorsFile kept(const std::string& name) const { return SafetensorsFile::read(path(name)); }
+  nlohmann::ordered_json result(const std::string& name) const {
+    return parse_json_limited(read_text_file(path(name), 1 << 20));
+  }
+
+  TemporaryFolder folder_;
+  std::unique_ptr<PtyRig> rig_;
+};
+
+void expect_failure(const ProcessResult& result, int code, const std::string& part) {
+  EXPECT_EQ(result.code, code) << result.error;
+  EXPECT_NE(result.error.find(part), std::string::npos) << result.error;
+  EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
+}
+
+TEST_F(Streaming, AReplayGivesThePicturesThatLiveHad) {
+  plug_in();
+  const ProcessResult live = stream({"--board", board(), "--seconds", "1.5", "--out", path("live"),
+                                     "--capture", path("capture"), "--json", path("json")});
+  ASSERT_EQ(live.code, 0) << live.error;
+  const ProcessResult replayed =
+      stream({"--replay", path("capture"), "--seconds", "1.5", "--out", path("replay")});
+  ASSERT_EQ(replayed.code, 0) << replayed.error;
+  // One picture for every frame after the first window, but those that a busy machine was too late for.
+  const auto json = result("json");
+  const SafetensorsFile first = kept("live"), again = kept("replay");
+  const size_t pictures = first.f64("time_s").size();
+  EXPECT_EQ(json.at("pictures"), pictures);
+  const auto made = static_cast<double>(pictures + json.at("dropped").get<size_t>());
+  EXPECT_NEAR(made, (1.5 - 32 / 300.0) / 992e-6, 150);
+  ASSERT_GT(pictures, 100U);
+  const std::vector<double> times = again.f64("time_s");
+  const std::vector<float> pixels = first.f32("pictures"), pixels_again = again.f32("pictures");
+  size_t at = 0;
+  for (size_t i = 0; i < pictures; ++i) {
+    while (at < times.size() && times[at] != first.f64("time_s")[i]) ++at;
+    ASSERT_LT(at, times.size()) << "picture " << i << " has no twin in the replay";
+    ASSERT_TRUE(std::equal(&pixels[i * 64], &pixels[i * 64] + 64, &pixels_again[at * 64])) << i;
+  }
+}
+
+TEST_F(Streaming, ARecordingGivesThePicturesOfItsWindows) {
+  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
+  const Recording recording = simulate_pass(Plate::named("bumps12"), {.to_mm = 40});
+  write_recording(path("recording"), recording);
+  const ProcessResult done = stream({"--recording", path("recording"), "--out", path("out")});
+  ASSERT_EQ(done.code, 0) << done.error;
+  const std::vector<float> pictures = kept("out").f32("pictures");
+  const std::vector<double> times = kept("out").f64("time_s");
+
+  WindowSettings settings;
+  settings.timesteps = kTimesteps, settings.scale = 2, settings.min_y_mm = -1e6, settings.max_y_mm = 1e6;
+  WindowSet windows(settings);
+  windows.add(recording);
+  const ModelFile file = load_model(model());
+  Tensor window(Shape{1, kTimesteps, kWindowTaxels});
+  size_t compared = 0;
+  for (size_t i = 0, at = 0; i < windows.size(); ++i) {
+    const double time = static_cast<double>(windows.frame_of(i)) / 300;
+    while (at < times.size() && times[at] < time - 1e-9) ++at;
+    if (at == times.size() || times[at] > time + 1e-9) continue;  // a lost frame has no picture
+    windows.window(i, window.values());
+    const Tensor picture = file.model->infer(window);
+    ASSERT_TRUE(std::equal(picture.data(), picture.data() + 64, &pictures[at * 64])) << "window " << i;
+    ++compared;
+  }
+  EXPECT_EQ(compared, times.size());
+  EXPECT_GT(compared, recording.frames() - 2 * kTimesteps);
+}
+
+TEST_F(Streaming, TakesModelsOfAnyWindowAndRefusesWhatWasFilteredOtherwise) {
+  const Recording recording = simulate_pass(Plate::named("bumps12"), {.to_mm = 40});
+  write_recording(path("recording"), recording);
+  for (const Dim timesteps : {64, 256}) {
+    write_model(model(), timesteps, SimulatorSettings().filter_s);
+    ASSERT_EQ(stream({"--recording", path("recording"), "--json", path("json"), "--force"}).code, 0);
+    EXPECT_NEAR(result("json").at("pictures"), recording.frames() - timesteps, 5) << timesteps;
+  }
+  write_model(model(), kTimesteps, 0);
+  expect_failure(stream({"--recording", path("recording")}), 1, "moving average of 0.0992 s, the model was");
+  write_model(model(), kTimesteps, std::nullopt);
+  EXPECT_EQ(stream({"--recording", path("recording")}).code, 0);
+}
+
+TEST_F(Streaming, UnpluggingIsOneClearLineAndKeepsWhatWasSeen) {
+  PtyRig& rig = plug_in();
+  RunningProcess running("supertac-stream",
+                         words({"--board", board(), "--out", path("out"), "--capture", path("capture")}));
+  wait_for_file(path("capture"));
+  sleep(1);
+  rig.unplug_board();
+  const double unplugged = monotonic_seconds();
+  const ProcessResult result = running.wait();
+  RecordProperty("milliseconds", static_cast<int>(1e3 * (monotonic_seconds() - unplugged)));
+  EXPECT_LT(monotonic_seconds() - unplugged, 5);  // 100 ms on a quiet machine
+  expect_failure(result, 1, "the device is gone");
+  EXPECT_GT(kept("out").f64("time_s").size(), 0U);
+  EXPECT_EQ(stream({"--replay", path("capture")}).code, 0);
+}
+
+TEST_F(Streaming, ABoardThatPausesStartsANewWindow) {
+  PtyRig& rig = plug_in();
+  RunningProcess running("supertac-stream", words({"--board", board(), "--seconds", "2", "--json",
+                                                   path("json"), "--capture", path("capture")}));
+  wait_for_file(path("capture"));
+  usleep(500'000);
+  rig.with_world([](RigWorld&) { usleep(300'000); });
+  ASSERT_EQ(running.wait().code, 0);
+  EXPECT_GE(result("json").at("gaps"), 1);
+  EXPECT_GE(result("json").at("suspect"), 1);
+}
+
+TEST_F(Streaming, PortsThatAreNotABoardAreNamed) {
+  expect_failure(stream({"--board", path("nowhere")}), 1, "no such port");
+  write_file(path("file"), "not a port");
+  expect_failure(stream({"--board", path("file")}), 1, "expected a serial port");
+  RigSettings settings = touching_rig();
+  settings.printer.heartbeat = true;
+  plug_in(settings);
+  const SerialPort first(board());
+  expect_failure(stream({"--board", board()}), 1, "already open in another program");
+  const ProcessResult printer = stream({"--board", path("printer")});
+  EXPECT_EQ(printer.code, 1);
+  EXPECT_NE(printer.error.find("expected"), std::string::npos) << printer.error;
+}
+
+TEST_F(Streaming, FilesThatAreMissingOrOfAnotherKindAreNamed) {
+  expect_failure(stream({"--recording", path("none")}), 1, path("none"));
+  expect_failure(stream({"--replay", path("none")}), 1, path("none"));
+  expect_failure(stream({"--replay", model()}), 1, "expected a SuperTac journal");
+  expect_failure(stream({"--recording", model()}), 1, model());
+  fs::remove(model());
+  expect_failure(stream({"--board", board()}), 1, model());
+}
+
+TEST_F(Streaming, WrongUsageIsExitCode2) {
+  expect_failure(stream({}), 2, "expected one of --board");
+  expect_failure(stream({"--board", "a", "--replay", "b"}), 2, "found 2");
+  expect_failure(stream({"--replay", "a", "--capture", "b"}), 2, "--capture: only with --board");
+  expect_failure(stream({"--recording", "a", "--seconds", "0"}), 2, "--seconds");
+}
+
+TEST_F(Streaming, ASignalEndsItCleanly) {
+  plug_in();
+  for (const int signal : {SIGINT, SIGTERM}) {
+    RunningProcess running("supertac-stream", words({"--board", board(), "--out", path("out"), "--json",
+                                                     path("json"), "--capture", path("capture"), "--force"}));
+    wait_for_file(path("capture"));
+    usleep(400'000);
+    running.send(signal);
+    const ProcessResult result = running.wait();
+    EXPECT_EQ(result.code, 128 + signal);
+    EXPECT_EQ(result.error, "");
+    EXPECT_EQ(kept("out").f64("time_s").size(), this->result("json").at("pictures"));
+    fs::remove(path("capture"));
+  }
+}
+
+TEST_F(Streaming, TooShortASignalSaysHowMuchIsNeeded) {
+  Recording recording = simulate_pass(Plate::named("bumps12"), {.to_mm = 32});
+  recording.metadata.erase("filter_s");
+  recording.time_s.resize(20), recording.volts.resize(20 * kTaxels), recording.position_mm.resize(40);
+  write_recording(path("recording"), recording);
+  expect_failure(stream({"--recording", path("recording")}), 1, "no picture, expected 0.11 s of signal");
+}
+
+TEST_F(Streaming, AFullDiskIsOneLineAndLeavesNothing) {
+  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
+  write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 40}));
+  fs::create_directory(path("full"));
+  const ProcessResult result =
+      stream({"--recording", path("recording"), "--out", path("full/out")}, {.max_file_bytes = 20'000});
+  expect_failure(result, 1, path("full/out"));
+  EXPECT_TRUE(fs::is_empty(path("full")));
+}
+
+TEST_F(Streaming, NothingIsOverwrittenWithoutForce) {
+  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
+  write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 32}));
+  write_file(path("out"), "mine");
+  expect_failure(stream({"--recording", path("recording"), "--out", path("out")}), 1, "--force");
+  EXPECT_EQ(read_text_file(path("out"), 10), "mine");
+  EXPECT_EQ(stream({"--recording", path("recording"), "--out", path("out"), "--force"}).code, 0);
+  plug_in();
+  write_file(path("capture"), "mine");
+  expect_failure(stream({"--board", board(), "--capture", path("capture")}), 1, "--force");
+}
+
+TEST_F(Streaming, DrawsOnATerminalOnly) {
+  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
+  write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 40}));
+  const std::vector<std::string> arguments = {"--model",         model(),     "--recording",
+                                              path("recording"), "--seconds", "1"};
+  const double begin = monotonic_seconds();
+  const ProcessResult watched = run_process("supertac-stream", arguments, {.terminal = true});
+  EXPECT_GT(monotonic_seconds() - begin, 0.9) << "at the recording's own pace";
+  EXPECT_NE(watched.error.find("\u2580"), std::string::npos);
+  EXPECT_NE(watched.error.find("frames/s"), std::string::npos);
+  const ProcessResult script = run_process("supertac-stream", arguments);
+  EXPECT_EQ(script.error.find("\x1b"), std::string::npos);
+}
+
+TEST(LatencyHistogram, QuantilesAreRightToAClass) {
+  LatencyHistogram histogram;
+  EXPECT_EQ(histogram.quantile(0.5), 0);
+  for (int i = 1; i <= 1000; ++i) histogram.add(1e-6 * i);
+  EXPECT_EQ(histogram.count(), 1000U);
+  EXPECT_NEAR(histogram.quantile(0.5), 500e-6, 10e-6);
+  EXPECT_NEAR(histogram.quantile(0.99), 990e-6, 16e-6);
+  EXPECT_EQ(histogram.quantile(1), 1e-3);
+  histogram.add(1e7);  // beyond the last class
+  EXPECT_EQ(histogram.max(), 1e7);
+  EXPECT_EQ(histogram.quantile(1), histogram.max());
+}
+
+TEST(TerminalView, YGrowsUpwardsAndBothPicturesHaveTheSameSize) {
+  LiveState state;
+  state.taxels[12] = 1;  // largest y, smallest x: top left
+  state.picture.assign(256, 0.0F);
+  state.picture[15] = 1;  // smallest y, largest x: bottom right
+  const std::string text = render(state, false);
+  std::vector<std::string> lines;
+  for (size_t at = 0; at < text.size(); at = text.find('\n', at) + 1)
+    lines.push_back(text.substr(at, text.find('\n', at) - at));
+  ASSERT_EQ(lines.size(), 17U);
+  for (size_t i = 0; i < 16; ++i) EXPECT_EQ(lines[i].size(), 67U);
+  EXPECT_EQ(lines[0], "@@@@@@@@" + std::string(59, ' '));
+  EXPECT_EQ(lines[3], lines[0]);
+  EXPECT_EQ(lines[4], std::string(67, ' '));
+  EXPECT_EQ(lines[15], std::string(65, ' ') + "@@");
+  EXPECT_EQ(lines[16], "0 frames/s  latency 0.00 ms (p99 0.00)  lost 0  dropped 0");
+}
+
+TEST(TerminalView, ColoursAreWrittenWhereTheyChange) {
+  LiveState state;
+  const std::string blank = render(state, true);
+  // Black on black, twice a line, and back.
+  EXPECT_EQ(blank.find("\x1b[38;5;16m\x1b[48;5;16m\u2580\u2580"), 0U);
+  state.picture.assign(64, 2.0F);  // brighter than white is white, and NaN is black
+  state.picture[0] = std::nanf("");
+  EXPECT_NE(render(state, true).find("\x1b[38;5;231m"), std::string::npos);
+  for (const size_t size : {64U, 256U, 1024U}) {
+    state.picture.assign(size, 0.5F);
+    EXPECT_EQ(render(state, true).size(), render(state, true).size());
+    EXPECT_EQ(std::count(blank.begin(), blank.end(), '\n'), 17);
+  }
+}
+
+}  // namespace
+}  // namespace supertac
