@@ -21,7 +21,7 @@ constexpr std::uint32_t kMagic = 0x314A5453;  // "STJ1"
 constexpr std::size_t kChunkHeader = 24;      // magic, stream, length, CRC-32, time
 constexpr std::size_t kRecordHeader = 13;     // kind, time, length
 constexpr std::size_t kMostPending = 64 << 20;
-constexpr double kFlushAfter = 0.2;   // of recorded time, and of the wall's
+constexpr double kFlushAfter = 0.1;   // of recorded time, and of the wall's
 constexpr double kLatestTime = 1e10;  // s: 300 years, so that no arithmetic on times can overflow
 constexpr auto kSyncEvery = std::chrono::seconds(1);
 
@@ -91,6 +91,7 @@ JournalWriter::JournalWriter(const std::string& path, std::string_view header) :
     throw JournalError(error_);
   }
   thread_ = std::thread([this] { run(); });
+  sync_thread_ = std::thread([this] { run_sync(); });
 }
 
 JournalWriter::~JournalWriter() {
@@ -130,21 +131,23 @@ void JournalWriter::check() {
 }
 
 void JournalWriter::run() {
-  auto synced = std::chrono::steady_clock::now();
-  for (;;) {
-    bool last = false;
+  for (bool last = false; !last;) {
     {
       std::unique_lock lock(mutex_);
       wake_.wait_for(lock, std::chrono::duration<double>(kFlushAfter), [&] { return stop_ || flush_due_; });
       last = stop_;
     }
     flush();
-    const auto now = std::chrono::steady_clock::now();
-    if (last || now - synced >= kSyncEvery) {
-      sync();
-      synced = now;
+  }
+}
+
+void JournalWriter::run_sync() {
+  for (;;) {
+    {
+      std::unique_lock lock(mutex_);
+      if (stopping_.wait_for(lock, kSyncEvery, [&] { return stop_; })) return;
     }
-    if (last) return;
+    sync();
   }
 }
 
@@ -199,7 +202,10 @@ void JournalWriter::close() {
       stop_ = true;
     }
     wake_.notify_all();
+    stopping_.notify_all();
     if (thread_.joinable()) thread_.join();
+    if (sync_thread_.joinable()) sync_thread_.join();
+    sync();
     const int descriptor = std::exchange(descriptor_, -1);
     if (system_calls().close(descriptor) != 0) failed("cannot be closed");
   }

@@ -1,5 +1,5 @@
 // The append-only journal of a running collection. Chunks of {magic, stream, length, time, CRC-32, payload},
-// at most 0.2 s apart - of the records' own time as well, which runs faster on a sped-up rig - and synced
+// at most 0.1 s apart - of the records' own time as well, which runs faster on a sped-up rig - and synced
 // each second: kill -9 loses at most 0.5 s, a power cut 1.5 s. A torn tail is dropped on reading; all counts
 // are derived from the data.
 #pragma once
@@ -56,6 +56,7 @@ class JournalWriter {
     std::vector<std::byte> payload;
   };
   void run();
+  void run_sync();
   void flush();
   void write_chunk(Stream stream, const Pending& pending);
   void sync();
@@ -64,13 +65,14 @@ class JournalWriter {
   std::string path_;
   int descriptor_ = -1;
   std::mutex mutex_;
-  std::condition_variable wake_;
+  std::condition_variable wake_, stopping_;
   std::map<Stream, Pending> pending_;
   std::size_t pending_bytes_ = 0;
   double oldest_pending_ = 0;  // recorded time of the first record in pending_
   std::string error_;
   bool flush_due_ = false, stop_ = false;
-  std::thread thread_;
+  // Two threads: a disk may take seconds to sync, and what arrives meanwhile must not wait for it.
+  std::thread thread_, sync_thread_;
 };
 
 struct Journal {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cerrno>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -66,6 +67,8 @@ class FaultInjection {
   }
   /// Counts a call; true when it is to fail. A short count can only befall read and write.
   static bool hit(const char* name) {
+    static std::mutex mutex;  // a journal writes and syncs in two threads
+    const std::lock_guard lock(mutex);
     State& s = state();
     s.log.emplace_back(name);
     ++s.count;
