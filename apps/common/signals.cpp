@@ -9,7 +9,13 @@ namespace {
 std::atomic<int> signal_number{0};
 static_assert(std::atomic<int>::is_always_lock_free, "usable in a signal handler");
 
-void remember(int number) { signal_number = number; }
+std::atomic<bool> must_finish{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "usable in a signal handler");
+
+void remember(int number) {
+  signal_number = number;
+  if (!must_finish) std::signal(number, SIG_DFL);
+}
 
 }  // namespace
 
@@ -21,11 +27,14 @@ void catch_signals() {
     if (before.sa_handler == SIG_IGN) continue;
     struct sigaction action {};
     action.sa_handler = remember;
-    action.sa_flags = static_cast<int>(SA_RESETHAND);
     sigemptyset(&action.sa_mask);
     sigaction(number, &action, nullptr);
   }
 }
+
+FinishDespiteSignals::FinishDespiteSignals() { must_finish = true; }
+
+FinishDespiteSignals::~FinishDespiteSignals() { must_finish = false; }
 
 bool interrupted() { return signal_number != 0; }
 

@@ -7,6 +7,17 @@ namespace supertac {
 /// ignored.
 void catch_signals();
 
+/// While it lives a second signal does not end the program either: there is something that may not be left as
+/// it is, such as a finger in contact. A terminal that is closed sends SIGHUP twice, an impatient hand
+/// SIGINT.
+class FinishDespiteSignals {
+ public:
+  FinishDespiteSignals();
+  ~FinishDespiteSignals();
+  FinishDespiteSignals(const FinishDespiteSignals&) = delete;
+  FinishDespiteSignals& operator=(const FinishDespiteSignals&) = delete;
+};
+
 /// True once such a signal came.
 bool interrupted();
 

@@ -1,0 +1,55 @@
+// A virtual rig in this process - so that a test can see where the head really is - and the real
+// supertac-collect as another one.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "hardware/virtual_rig/pty_rig.h"
+#include "tests/apps/process.h"
+
+namespace supertac {
+
+class CollectRun {
+ public:
+  explicit CollectRun(double speedup = 10, const RigSettings& settings = running());
+
+  ~CollectRun();
+  CollectRun(const CollectRun&) = delete;
+  CollectRun& operator=(const CollectRun&) = delete;
+
+  static RigSettings running();
+  /// Arguments of a collection of one pass over 3_Bumps into out(), with --yes and --quiet, and `more`.
+  std::vector<std::string> arguments(const std::vector<std::string>& more = {}) const;
+  /// The whole collection, to its end.
+  ProcessResult collect(const std::vector<std::string>& more = {}, const ProcessOptions& options = {}) const;
+
+  PtyRig& rig() { return rig_; }
+  Point3 head();
+  /// Waits until the head has been in contact for `seconds` of the rig's clock; false when it never is.
+  bool wait_for_contact(double seconds);
+  /// Waits until the head stands; the finger of a program that was killed goes on to the end of its move.
+  void wait_for_rest();
+  double speedup() const { return speedup_; }
+  const std::string& out() const { return out_; }
+  std::string board() const { return folder_ / "board"; }
+  std::string printer() const { return folder_ / "printer"; }
+  std::string journal() const { return out_ + "/3_Bumps_t1_v10.journal"; }
+  /// Names in out(), sorted, one a word.
+  std::string files() const;
+
+ private:
+  TemporaryFolder folder_;
+  double speedup_;
+  PtyRig rig_;
+  std::string disk_, out_;  // a real disk where there is one, not the memory of the other temporary folders
+};
+
+constexpr double kSlideZ = 91.81;   ///< of the finger in contact
+constexpr double kLiftedZ = 96.81;  ///< lowest z of a finger that was lifted
+
+/// True for text of exactly one line.
+bool is_one_line(const std::string& text);
+
+}  // namespace supertac

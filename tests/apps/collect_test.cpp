@@ -1,0 +1,104 @@
+// supertac-collect as a process on a virtual rig: how it ends, what it says, where the finger is left.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <fstream>
+
+#include "hardware/serial_port.h"
+#include "tests/apps/collect_run.h"
+
+namespace supertac {
+namespace {
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+TEST(CollectProgram, MakesRecordingsAndLeavesTheHeadAtItsOrigin) {
+  CollectRun run(20);
+  const ProcessResult result = run.collect();
+  EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_EQ(run.files(), "3_Bumps_t1_p1_v10.safetensors 3_Bumps_t1_v10.journal");
+  EXPECT_EQ(run_process("supertac-info", {run.out() + "/3_Bumps_t1_p1_v10.safetensors"}).code, 0);
+  EXPECT_LT(distance(run.head(), {99.7, 101.17, 131.81}), 0.01);
+}
+
+TEST(CollectProgram, SignalsInContactLiftTheFingerAndKeepWhatWasRecorded) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    CollectRun run;
+    RunningProcess process("supertac-collect", run.arguments());
+    ASSERT_TRUE(run.wait_for_contact(3));
+    process.send(signal);
+    process.send(signal);  // a closed terminal says so twice; the finger comes first
+    const ProcessResult result = process.wait();
+    EXPECT_EQ(result.code, 128 + signal) << result.error;
+    EXPECT_TRUE(is_one_line(result.error)) << result.error;
+    EXPECT_GE(run.head().z, kLiftedZ - 0.01) << "signal " << signal;
+    EXPECT_EQ(run.files(), "3_Bumps_t1_p1_v10.safetensors 3_Bumps_t1_v10.journal origin-unknown");
+  }
+}
+
+TEST(CollectProgram, AfterAKillTheJournalIsRecoveredAndTheOriginMustBeConfirmed) {
+  CollectRun run;
+  RunningProcess process("supertac-collect", run.arguments());
+  ASSERT_TRUE(run.wait_for_contact(3));
+  process.send(SIGKILL);
+  process.wait();
+  run.wait_for_rest();
+
+  const ProcessResult refused = run.collect();
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_TRUE(is_one_line(refused.error)) << refused.error;
+  EXPECT_TRUE(contains(refused.error, "--confirm-origin")) << refused.error;
+  const ProcessResult recovered =
+      run_process("supertac-import", {"--journal", run.journal(), "--out", run.out() + "/recovered"});
+  EXPECT_EQ(recovered.code, 0) << recovered.error;
+  EXPECT_TRUE(contains(recovered.out, "cut off")) << recovered.out;
+}
+
+TEST(CollectProgram, AFullDiskInContactLiftsTheFinger) {
+  CollectRun run;
+  const ProcessResult result = run.collect({}, {.max_file_bytes = 2'500'000});
+  EXPECT_EQ(result.code, 1);
+  EXPECT_TRUE(is_one_line(result.error)) << result.error;
+  EXPECT_TRUE(contains(result.error, "journal")) << result.error;
+  EXPECT_GE(run.head().z, kLiftedZ - 0.01);
+  EXPECT_FALSE(contains(run.files(), ".tmp"));
+}
+
+struct Refusal {
+  const char* what;
+  std::vector<std::string> arguments;
+  std::vector<std::string> says;
+};
+
+// Nothing moves, nothing is left behind, and one line says what is wrong and what to do.
+TEST(CollectProgram, APortThatCannotBeUsedIsOneClearLine) {
+  CollectRun run;
+  const TemporaryFolder folder;
+  std::ofstream(folder / "file") << "text";
+  const std::vector<Refusal> refusals = {
+      {"no such port", {"--printer", folder / "none"}, {folder / "none", "no such port", "--list-ports"}},
+      {"a file", {"--printer", folder / "file"}, {"expected a serial port", "--list-ports"}},
+      {"another terminal's kind of file",
+       {"--board", "/dev/null"},
+       {"expected a serial port", "--list-ports"}},
+      {"ports exchanged", {"--board", run.printer(), "--printer", run.board()}, {"exchange the two ports"}},
+      {"one port twice", {"--board", run.printer()}, {"already open"}},
+  };
+  for (const Refusal& refusal : refusals) {
+    const ProcessResult result = run.collect(refusal.arguments);
+    EXPECT_EQ(result.code, 1) << refusal.what;
+    EXPECT_TRUE(is_one_line(result.error)) << refusal.what << ": " << result.error;
+    for (const std::string& part : refusal.says)
+      EXPECT_TRUE(contains(result.error, part)) << refusal.what << ": " << result.error;
+    EXPECT_EQ(run.files(), "") << refusal.what;
+  }
+  EXPECT_LT(distance(run.head(), {99.7, 101.17, 131.81}), 1e-6);
+  EXPECT_EQ(run.collect().code, 0) << "the next start, with the right ports, is not held up";
+}
+
+}  // namespace
+}  // namespace supertac
