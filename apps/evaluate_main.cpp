@@ -154,6 +154,6 @@ int run(Arguments& a) {
 
 int main(int argc, char** argv) {
   const supertac::Program program{"supertac-evaluate", "Scores a model and the baselines on a data set.",
-                                  supertac::declare, supertac::run, supertac::numerics_text};
+                                  supertac::declare, supertac::run, supertac::numerics};
   return supertac::run_program(program, argc, argv);
 }

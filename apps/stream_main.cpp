@@ -216,6 +216,6 @@ int run(Arguments& a) {
 
 int main(int argc, char** argv) {
   const supertac::Program program{"supertac-stream", "Shows super-resolved pictures live.", supertac::declare,
-                                  supertac::run, supertac::numerics_text};
+                                  supertac::run, supertac::numerics};
   return supertac::run_program(program, argc, argv);
 }

@@ -67,6 +67,6 @@ int run(Arguments& a) {
 
 int main(int argc, char** argv) {
   const supertac::Program program{"supertac-train", "Trains a tactile super-resolution model on recordings.",
-                                  supertac::declare, supertac::run, supertac::numerics_text};
+                                  supertac::declare, supertac::run, supertac::numerics};
   return supertac::run_program(program, argc, argv);
 }

@@ -4,9 +4,17 @@
 
 namespace supertac {
 
-std::string numerics_text() {
-  return "kernels   " + std::string(kernels::isa_kernels().name) +
-         " (SUPERTAC_ISA=avx512|avx2|portable overrides)\n" + "OpenBLAS  not used\n";
+Numerics numerics() {
+  const kernels::IsaKernels& chosen = kernels::isa_kernels();
+  Numerics n;
+  n.text = "kernels   " + std::string(chosen.name) + " (SUPERTAC_ISA=avx512|avx2|portable overrides)\n" +
+           "OpenBLAS  not used\n";
+  if (&chosen == &kernels::kPortableKernels) {
+    n.warning =
+        "this processor has no fused multiply-add: results are the same, but computing takes many times "
+        "longer";
+  }
+  return n;
 }
 
 }  // namespace supertac

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <string>
+#include "apps/common/program.h"
 
 namespace supertac {
 
-/// Lines of --version for programs that compute: the kernels chosen on this processor.
-std::string numerics_text();
+/// The kernels chosen on this processor; warns where fused multiply-add is done in software.
+Numerics numerics();
 
 }  // namespace supertac

@@ -25,6 +25,11 @@ int run(const Program& program, Arguments& arguments) {
   const std::string json = arguments.text("json");
   if (!json.empty() && json != "-") refuse_existing(json, arguments.force());
   catch_signals();
+  if (program.numerics != nullptr) {
+    if (const std::string warning = program.numerics().warning; !warning.empty()) {
+      std::cerr << program.name << ": " << warning << '\n';
+    }
+  }
   const int code = program.run(arguments);
   return interrupted() ? 128 + interrupting_signal() : code;
 }
@@ -73,7 +78,7 @@ std::string version() { return SUPERTAC_VERSION; }
 std::string version_text(const Program& program) {
   std::string text =
       program.name + " " + version() + "\ncommit    " + commit() + "\ncompiler  " + __VERSION__ + "\n";
-  if (program.numerics != nullptr) text += program.numerics();
+  if (program.numerics != nullptr) text += program.numerics().text;
   return text;
 }
 

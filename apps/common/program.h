@@ -9,13 +9,18 @@ namespace supertac {
 
 constexpr int kExitOk = 0, kExitFailed = 1, kExitUsage = 2;
 
+struct Numerics {
+  std::string text;     ///< lines of --version about kernels
+  std::string warning;  ///< one line for stderr when the program runs; empty: nothing to say
+};
+
 struct Program {
   std::string name;     ///< "supertac-simulate"
   std::string purpose;  ///< one sentence for --help
   void (*declare)(Arguments&);
   int (*run)(Arguments&);
-  /// Lines of --version about kernels and libraries; nullptr: none.
-  std::string (*numerics)() = nullptr;
+  /// For programs that compute (apps/common/numerics.h); nullptr: none.
+  Numerics (*numerics)() = nullptr;
 };
 
 /// The whole of main(): parses, handles --help and --version, sets the number of threads, catches signals,

@@ -51,8 +51,9 @@ ALWAYS_INLINE void add_tap(Tile<P, J>& tile, const real* w, Dim cin, Dim cout, D
 template <unsigned... kSets>
 struct PixelSets {
   template <int P, int J, bool kPartial>
-  ALWAYS_INLINE static bool add(unsigned pixels, Tile<P, J>& tile, const real* w, Dim cin, Dim cout,
-                                Dim lanes) {
+  ALWAYS_INLINE static bool add(unsigned pixels, [[maybe_unused]] Tile<P, J>& tile,
+                                [[maybe_unused]] const real* w, [[maybe_unused]] Dim cin,
+                                [[maybe_unused]] Dim cout, [[maybe_unused]] Dim lanes) {
     return ((pixels == kSets && (add_tap<kSets, P, J, kPartial>(tile, w, cin, cout, lanes), true)) || ...);
   }
 };
