@@ -61,16 +61,13 @@ void MeanImage::predict(std::span<const float> window, std::span<float> out) con
   std::copy(image_.begin(), image_.end(), out.begin());
 }
 
-Upsampling::Upsampling(Kind kind, int size) {
-  if (size < 1)
-    throw std::invalid_argument("upsampling: size must be at least 1, got " + std::to_string(size));
-  weights_.resize(static_cast<size_t>(size));
-  for (int p = 0; p < size; ++p) {
-    const double u = (p + 0.5) * kSide / size - 0.5;
+Upsampling::Weights Upsampling::weights_of(Kind kind, int taxels, int scale) {
+  Weights weights(static_cast<size_t>(taxels) * static_cast<size_t>(taxels) * static_cast<size_t>(scale));
+  for (int p = 0; p < taxels * scale; ++p) {
+    const double u = (p + 0.5) / scale - 0.5;
     const int left = static_cast<int>(std::floor(u));
-    std::array<float, 4>& row = weights_[static_cast<size_t>(p)];
-    row = {};
-    const auto inside = [](int taxel) { return static_cast<size_t>(std::clamp(taxel, 0, kSide - 1)); };
+    float* row = &weights[static_cast<size_t>(p) * static_cast<size_t>(taxels)];
+    const auto inside = [&](int taxel) { return static_cast<size_t>(std::clamp(taxel, 0, taxels - 1)); };
     if (kind == Kind::nearest) {
       row[inside(static_cast<int>(std::floor(u + 0.5)))] = 1;
     } else {
@@ -78,26 +75,39 @@ Upsampling::Upsampling(Kind kind, int size) {
         row[inside(taxel)] += static_cast<float>(keys_kernel(u - taxel));
     }
   }
+  return weights;
+}
+
+Upsampling::Upsampling(Kind kind, int rows, int columns, int scale) {
+  if (rows < 1 || columns < 1 || scale < 1)
+    throw std::invalid_argument("upsampling: rows, columns and scale must be at least 1, got " +
+                                std::to_string(rows) + ", " + std::to_string(columns) + " and " +
+                                std::to_string(scale));
+  rows_ = static_cast<size_t>(rows);
+  columns_ = static_cast<size_t>(columns);
+  down_ = weights_of(kind, rows, scale);
+  across_ = weights_of(kind, columns, scale);
 }
 
 void Upsampling::operator()(std::span<const float> frame, std::span<float> out) const {
-  const size_t size = weights_.size();
-  check_size("a frame", frame.size(), kTaxels);
-  check_size("the image", out.size(), size * size);
-  for (size_t r = 0; r < size; ++r) {
-    std::array<float, kSide> row{};  // the frame's four columns at this row of the image
-    for (size_t k = 0; k < kTaxels; ++k) row[k % kSide] += weights_[r][k / kSide] * frame[k];
-    for (size_t c = 0; c < size; ++c) {
+  const size_t height = down_.size() / rows_, width = across_.size() / columns_;
+  check_size("a frame", frame.size(), rows_ * columns_);
+  check_size("the image", out.size(), height * width);
+  std::vector<float> row(columns_);  // the frame's columns at this row of the image
+  for (size_t r = 0; r < height; ++r) {
+    std::fill(row.begin(), row.end(), 0.0F);
+    for (size_t k = 0; k < frame.size(); ++k) row[k % columns_] += down_[r * rows_ + k / columns_] * frame[k];
+    for (size_t c = 0; c < width; ++c) {
       float value = 0;
-      for (size_t k = 0; k < kSide; ++k) value += weights_[c][k] * row[k];
-      out[r * size + c] = value;
+      for (size_t k = 0; k < columns_; ++k) value += across_[c * columns_ + k] * row[k];
+      out[r * width + c] = value;
     }
   }
 }
 
 UpsampledFrame::UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows,
                                std::span<const uint32_t> train)
-    : kind_(kind), upsampling_(kind, windows.image_size()) {
+    : kind_(kind), upsampling_(kind, kSide, kSide, windows.image_size() / kSide) {
   const size_t pixels = pixels_of(windows);
   std::vector<float> image(pixels), truth(pixels);
   double sx = 0, sy = 0, sxx = 0, sxy = 0;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -33,21 +32,26 @@ class MeanImage : public Baseline {
   std::vector<float> image_;
 };
 
-/// Enlarges a 4x4 frame to [S][S]. Taxel k lies at x = -4.5 + 3 (k % 4), y = -4.5 + 3 (k / 4) mm and the
-/// pixels cover 12 mm x 12 mm, so pixel p of a row lies at u = (p + 1/2) 4 / S - 1/2 in units of taxels.
+/// Enlarges a frame of rows x columns taxels by a whole factor. Taxels lie in the middle of equal cells,
+/// which the pixels divide, so pixel p of a row lies at u = (p + 1/2) / scale - 1/2 in units of taxels.
 /// Taxels beyond the edge repeat the outermost.
 ///   nearest  the taxel at round(u)
 ///   bicubic  cubic convolution (Keys 1981, a = -1/2, also called Catmull-Rom) along both axes
 class Upsampling {
  public:
   enum class Kind { nearest, bicubic };
-  /// @throws std::invalid_argument when size < 1.
-  Upsampling(Kind kind, int size);
-  /// frame [16], out [S][S]. @throws std::invalid_argument on other sizes.
+  /// @throws std::invalid_argument when a size is below 1.
+  Upsampling(Kind kind, int rows, int columns, int scale);
+  /// frame [rows][columns], out [rows * scale][columns * scale]. @throws std::invalid_argument on other
+  /// sizes.
   void operator()(std::span<const float> frame, std::span<float> out) const;
 
  private:
-  std::vector<std::array<float, 4>> weights_;  // [S][4]: of the taxels of a row on a pixel
+  using Weights = std::vector<float>;  // [pixels][taxels]: of the taxels of a line on its pixels
+  static Weights weights_of(Kind kind, int taxels, int scale);
+
+  size_t rows_, columns_;
+  Weights down_, across_;
 };
 
 /// Upsampling of the last frame, followed by a x + b: the line that fits the truth of the training windows

@@ -85,18 +85,19 @@ double mean_squared_error(std::span<const float> a, std::span<const float> b) {
 
 double psnr_db(double mse) { return mse > 0 ? std::min(kPsnrCapDb, -10 * std::log10(mse)) : kPsnrCapDb; }
 
-double ssim(std::span<const float> a, std::span<const float> b, int size) {
-  if (size < kUniformSize)
-    throw std::invalid_argument("ssim: size must be at least 7, got " + std::to_string(size));
-  const size_t n = static_cast<size_t>(size);
-  check_pixels("ssim", a.size(), n * n);
-  check_pixels("ssim", b.size(), n * n);
-  const std::vector<double> weights = ssim_weights(size);
-  const size_t positions = n - weights.size() + 1;
+double ssim(std::span<const float> a, std::span<const float> b, size_t height, size_t width) {
+  const size_t smaller = std::min(height, width);
+  if (smaller < kUniformSize)
+    throw std::invalid_argument("ssim: size must be at least 7, got " + std::to_string(smaller));
+  check_pixels("ssim", a.size(), height * width);
+  check_pixels("ssim", b.size(), height * width);
+  const std::vector<double> weights = ssim_weights(static_cast<int>(smaller));
+  const size_t rows = height - weights.size() + 1, columns = width - weights.size() + 1;
   double sum = 0;
-  for (size_t r = 0; r < positions; ++r)
-    for (size_t c = 0; c < positions; ++c) sum += local_ssim(&a[r * n + c], &b[r * n + c], n, weights);
-  return sum / static_cast<double>(positions * positions);
+  for (size_t r = 0; r < rows; ++r)
+    for (size_t c = 0; c < columns; ++c)
+      sum += local_ssim(&a[r * width + c], &b[r * width + c], width, weights);
+  return sum / static_cast<double>(rows * columns);
 }
 
 bool in_contact(std::span<const float> truth) {

@@ -30,8 +30,13 @@ double psnr_db(double mse);
 /// Window: Gaussian 11x11, sigma 1.5, or uniform 7x7 for images below 11x11 (on which the Gaussian has no
 /// valid position). Weights add up to 1; variances and covariance are centred sums w (a - ma)(b - mb), never
 /// E[ab] - E[a]E[b], which can come out negative.
-/// @throws std::invalid_argument when size < 7 or a, b do not hold size * size pixels.
-double ssim(std::span<const float> a, std::span<const float> b, int size);
+/// The Gaussian is used when both sides have 11 pixels or more.
+/// @throws std::invalid_argument when a side is below 7 or a, b do not hold height * width pixels.
+double ssim(std::span<const float> a, std::span<const float> b, size_t height, size_t width);
+inline double ssim(std::span<const float> a, std::span<const float> b, int size) {
+  const size_t side = size > 0 ? static_cast<size_t>(size) : 0;
+  return ssim(a, b, side, side);
+}
 
 /// A frame is in contact when its truth has a pixel above 0.
 bool in_contact(std::span<const float> truth);

@@ -16,7 +16,7 @@ namespace {
 
 std::vector<float> upsampled(Upsampling::Kind kind, const std::vector<float>& frame, int size = 16) {
   std::vector<float> out(static_cast<size_t>(size * size));
-  Upsampling(kind, size)(frame, out);
+  Upsampling(kind, 4, 4, size / 4)(frame, out);
   return out;
 }
 
@@ -67,11 +67,27 @@ TEST(Upsampling, BicubicHasKeysWeights) {
               1e-6);
 }
 
+TEST(Upsampling, TakesArraysOfAnyShape) {
+  const std::vector<float> frame = {1, 2, 3, 4, 5, 6};  // 2 rows of 3
+  std::vector<float> nearest(24), bicubic(24);
+  Upsampling(Upsampling::Kind::nearest, 2, 3, 2)(frame, nearest);
+  Upsampling(Upsampling::Kind::bicubic, 2, 3, 2)(frame, bicubic);
+  for (size_t r = 0; r < 4; ++r)
+    for (size_t c = 0; c < 6; ++c) {
+      EXPECT_EQ(nearest[r * 6 + c], frame[(r / 2) * 3 + c / 2]);
+      EXPECT_NEAR(bicubic[r * 6 + c], nearest[r * 6 + c], 1.2) << r << " " << c;
+    }
+  EXPECT_LT(bicubic[0], bicubic[5]);
+  EXPECT_LT(bicubic[0], bicubic[18]);
+}
+
 TEST(Upsampling, RefusesOtherSizes) {
   std::vector<float> out(256);
-  EXPECT_THROW(Upsampling(Upsampling::Kind::nearest, 0), std::invalid_argument);
-  EXPECT_THROW(Upsampling(Upsampling::Kind::nearest, 16)(std::vector<float>(15), out), std::invalid_argument);
-  EXPECT_THROW(Upsampling(Upsampling::Kind::nearest, 8)(std::vector<float>(16), out), std::invalid_argument);
+  const auto nearest = Upsampling::Kind::nearest;
+  EXPECT_THROW(Upsampling(nearest, 4, 4, 0), std::invalid_argument);
+  EXPECT_THROW(Upsampling(nearest, 0, 4, 2), std::invalid_argument);
+  EXPECT_THROW(Upsampling(nearest, 4, 4, 4)(std::vector<float>(15), out), std::invalid_argument);
+  EXPECT_THROW(Upsampling(nearest, 4, 4, 2)(std::vector<float>(16), out), std::invalid_argument);
 }
 
 // A pass whose frames show the bicubic picture's own truth, shrunk and shifted: taxel = .2 + .5 height.
