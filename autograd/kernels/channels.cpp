@@ -35,13 +35,19 @@ SUPERTAC_CLONES void scale_channels(Dim images, Dim pixels, Dim channels, const 
   }
 }
 
-SUPERTAC_CLONES void scale_channels_grad_x(Dim images, Dim pixels, Dim channels, const real* g,
-                                           const real* gate, real* __restrict to) {
+SUPERTAC_CLONES static void add_scaled_channels(Dim images, Dim pixels, Dim channels, const real* g,
+                                                const real* gate, real* __restrict to) {
   for (Dim n = 0; n < images; ++n, gate += channels) {
     for (Dim p = 0; p < pixels; ++p, g += channels, to += channels) {
       for (Dim c = 0; c < channels; ++c) to[c] += g[c] * gate[c];
     }
   }
+}
+
+void scale_channels_grad_x(Dim images, Dim pixels, Dim channels, const real* g, const real* gate, Into into,
+                           real* to) {
+  if (into == Into::add) return add_scaled_channels(images, pixels, channels, g, gate, to);
+  scale_channels(images, pixels, channels, g, gate, to);
 }
 
 SUPERTAC_CLONES void scale_channels_grad_s(Dim images, Dim pixels, Dim channels, const real* g,

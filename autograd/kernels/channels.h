@@ -1,4 +1,5 @@
-// Channel means and channel scaling, [images, pixels, channels]. Gradients are added.
+// Channel means and channel scaling, [images, pixels, channels]. Gradients are added where `Into` does not
+// say otherwise.
 #pragma once
 
 #include "autograd/tensor.h"
@@ -9,7 +10,8 @@ void channel_mean(Dim images, Dim pixels, Dim channels, const real* x, real* y);
 void channel_mean_grad(Dim images, Dim pixels, Dim channels, const real* gy, real* gx);
 
 void scale_channels(Dim images, Dim pixels, Dim channels, const real* x, const real* s, real* y);
-void scale_channels_grad_x(Dim images, Dim pixels, Dim channels, const real* gy, const real* s, real* gx);
+void scale_channels_grad_x(Dim images, Dim pixels, Dim channels, const real* gy, const real* s, Into into,
+                           real* gx);
 void scale_channels_grad_s(Dim images, Dim pixels, Dim channels, const real* gy, const real* x, real* gs);
 
 }  // namespace supertac::kernels

@@ -1,5 +1,7 @@
 #include "autograd/kernels/elementwise.h"
 
+#include <algorithm>
+
 #include "autograd/kernels/clones.h"
 #include "autograd/kernels/exp.h"
 #include "autograd/kernels/sums.h"
@@ -49,6 +51,11 @@ SUPERTAC_CLONES void scale(Dim n, real factor, const real* x, real* __restrict y
 
 SUPERTAC_CLONES void add_scaled(Dim n, real factor, const real* x, real* __restrict y) {
   for (Dim i = 0; i < n; ++i) y[i] += factor * x[i];
+}
+
+void put(Dim n, const real* x, Into into, real* y) {
+  if (into == Into::add) return add_scaled(n, 1, x, y);
+  std::copy_n(x, n, y);
 }
 
 SUPERTAC_CLONES void add_product(Dim n, const real* a, const real* b, real* __restrict y) {

@@ -24,6 +24,8 @@ void multiply(Dim n, const real* a, const real* b, real* y);
 void scale(Dim n, real factor, const real* x, real* y);
 /// y += factor * x
 void add_scaled(Dim n, real factor, const real* x, real* y);
+/// y = or += x
+void put(Dim n, const real* x, Into into, real* y);
 /// y += a * b
 void add_product(Dim n, const real* a, const real* b, real* y);
 

@@ -12,7 +12,8 @@ Variable add(const Variable& a, const Variable& b) {
   kernels::add(y.size(), a.value().data(), b.value().data(), y.data());
   return record("add", y, {&a, &b}, [](Backward& g) {
     for (const std::size_t i : {0, 1}) {
-      if (Tensor* gx = g.grad_of(i)) kernels::add_scaled(gx->size(), 1, g.gy().data(), gx->data());
+      if (const Backward::Slot gx = g.slot_of(i))
+        kernels::put(gx.grad->size(), g.gy().data(), gx.into, gx.data());
     }
   });
 }

@@ -28,8 +28,8 @@ Variable scale_channels(const Variable& x, const Variable& s) {
   kernels::scale_channels(images, pixels, channels, x.value().data(), s.value().data(), y.data());
   return record("scale_channels", y, {&x, &s}, [=](Backward& b) {
     const real* gy = b.gy().data();
-    if (Tensor* gx = b.grad_of(0)) {
-      kernels::scale_channels_grad_x(images, pixels, channels, gy, b.value(1).data(), gx->data());
+    if (const Backward::Slot gx = b.slot_of(0)) {
+      kernels::scale_channels_grad_x(images, pixels, channels, gy, b.value(1).data(), gx.into, gx.data());
     }
     if (Tensor* gs = b.grad_of(1)) {
       kernels::scale_channels_grad_s(images, pixels, channels, gy, b.value(0).data(), gs->data());

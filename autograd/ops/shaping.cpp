@@ -29,21 +29,26 @@ void add_columns(Dim rows, Dim length, const real* from, Columns f, real* to, Co
   }
 }
 
-// to[n, j, i] += from[n, i, j] (to is zero or holds a gradient)
-void add_transposed(Dim images, Dim rows, Dim columns, const real* from, real* to) {
+// to[n, j, i] = or += from[n, i, j]
+void transpose(Dim images, Dim rows, Dim columns, const real* from, Into into, real* to) {
   for (Dim n = 0; n < images; ++n, from += rows * columns, to += rows * columns) {
     for (Dim i = 0; i < rows; ++i) {
-      for (Dim j = 0; j < columns; ++j) to[j * rows + i] += from[i * columns + j];
+      for (Dim j = 0; j < columns; ++j) {
+        real& element = to[j * rows + i];
+        element = from[i * columns + j] + (into == Into::add ? element : 0);
+      }
     }
   }
 }
 
 Variable transpose_inner(const char* op, const Variable& x, Dim images, Dim rows, Dim columns,
                          const Shape& shape) {
-  Tensor y = Tensor::zeros(shape);
-  add_transposed(images, rows, columns, x.value().data(), y.data());
+  Tensor y(shape);
+  transpose(images, rows, columns, x.value().data(), Into::overwrite, y.data());
   return record(op, y, {&x}, [=](Backward& b) {
-    if (Tensor* gx = b.grad_of(0)) add_transposed(images, columns, rows, b.gy().data(), gx->data());
+    if (const Backward::Slot gx = b.slot_of(0)) {
+      transpose(images, columns, rows, b.gy().data(), gx.into, gx.data());
+    }
   });
 }
 
