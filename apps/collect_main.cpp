@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "apps/collect/passes.h"
+#include "apps/common/ports.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
@@ -39,16 +40,6 @@ void declare(Arguments& arguments) {
       .flag("confirm-origin", "after a run that was cut off: the head is back at X99.70 Y101.17 Z131.81")
       .flag("yes", "do not ask: the plate lies as planned and the head is at X99.70 Y101.17 Z131.81")
       .flag("list-ports", "list the serial ports and end");
-}
-
-int print_ports(const Arguments& arguments) {
-  const std::vector<PortInfo> ports = list_ports();
-  for (const PortInfo& port : ports) {
-    const std::string board = port.usb_id == kBoardUsbId ? "  <- tactile board" : "";
-    arguments.print(port.path + "  " + port.usb_id + "  " + port.product + board);
-  }
-  if (ports.empty()) arguments.print("no USB serial ports found");
-  return kExitOk;
 }
 
 std::string required_text(const Arguments& arguments, const std::string& name) {
@@ -155,7 +146,10 @@ size_t keep_passes(const Arguments& arguments, const std::string& journal, const
 }
 
 int run(Arguments& arguments) {
-  if (arguments.flag("list-ports")) return print_ports(arguments);
+  if (arguments.flag("list-ports")) {
+    print_ports(arguments);
+    return kExitOk;
+  }
   const std::string out = required_text(arguments, "out");
   std::string plate;
   try {

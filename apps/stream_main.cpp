@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "apps/common/numerics.h"
+#include "apps/common/ports.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
@@ -25,7 +26,7 @@ constexpr double kMostLateS = 0.02;
 constexpr double kWaitS = 0.05, kFiguresEveryS = 0.5;
 
 void declare(Arguments& a) {
-  a.required("model", "FILE", "model of supertac-train")
+  a.option("model", "FILE", "model of supertac-train")
       .option("board", "PORT", "port of the tactile board; auto finds it by its USB number")
       .option("replay", "JOURNAL",
               "the raw bytes of --capture, or of a supertac-collect run, instead of a board")
@@ -34,7 +35,8 @@ void declare(Arguments& a) {
       .option("out", "FILE",
               "keep time, voltages and picture of every frame (safetensors, 1.1 MB/s at 16x16)")
       .option("capture", "JOURNAL", "keep the board's raw bytes (170 kB/s), for --replay")
-      .option("speedup", "X", "of a virtual rig started with the same --speedup", "1");
+      .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
+      .flag("list-ports", "list the serial ports and end");
 }
 
 struct Options {
@@ -43,6 +45,7 @@ struct Options {
 };
 
 Options read_options(const Arguments& a) {
+  if (!a.given("model")) throw UsageError("--model: expected a file of supertac-train, found none");
   Options options{a.number("seconds", 0.001, 1e9), a.number("speedup", 0.1, 100), {}};
   int sources = 0;
   for (const char* name : {"board", "replay", "recording"}) {
@@ -184,6 +187,10 @@ class Stream {
 };
 
 int run(Arguments& a) {
+  if (a.flag("list-ports")) {
+    print_ports(a);
+    return kExitOk;
+  }
   const double begin = monotonic_seconds();
   const Options options = read_options(a);
   const ModelFile model = load_model(a.text("model"));

@@ -32,6 +32,7 @@ class RunningProcess {
   RunningProcess(const RunningProcess&) = delete;
   RunningProcess& operator=(const RunningProcess&) = delete;
 
+  pid_t id() const { return child_; }
   void send(int signal) const;
   ProcessResult wait();
 
