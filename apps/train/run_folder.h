@@ -27,8 +27,8 @@ class RunFolder {
 
   std::string checkpoint_path() const { return path_ + "/last.safetensors"; }
   const std::string& path() const { return path_; }
-  /// Seconds on the clock of the log when the run was resumed; 0 for a new run.
-  double seconds_before() const { return lines_.empty() ? 0 : lines_.back().time_s; }
+  /// Seconds on the clock of the log at its last line; 0 when there is none.
+  double seconds() const { return lines_.empty() ? 0 : lines_.back().time_s; }
 
   void write_settings(const nlohmann::ordered_json& settings);
   /// Appends and flushes. When the disk refuses, returns false, once; later lines are then kept in memory

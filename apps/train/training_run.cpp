@@ -116,6 +116,7 @@ bool TrainingRun::train() {
 
 void TrainingRun::step_until_done() {
   begin_ = std::chrono::steady_clock::now();
+  seconds_before_ = folder_.seconds();
   const std::int64_t every = a_.integer("checkpoint-every", 1, 1'000'000'000);
   Progress progress(a_, target_.label, static_cast<std::uint64_t>(trainer_.total_steps()), "steps");
   LogMeans means;
@@ -139,8 +140,7 @@ void TrainingRun::step_until_done() {
 }
 
 double TrainingRun::seconds() const {
-  return folder_.seconds_before() +
-         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  return seconds_before_ + std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
 }
 
 // The scores of an even sample of the test windows are for the log: nothing is chosen by them.

@@ -50,6 +50,7 @@ class TrainingRun {
   RunFolder folder_;
   nlohmann::ordered_json description_;
   std::chrono::steady_clock::time_point begin_;
+  double seconds_before_ = 0;  // on the log's clock when this process began
   bool warned_ = false;
 };
 

@@ -1,0 +1,86 @@
+#include "apps/sweep/front.h"
+
+#include <algorithm>
+
+#include "apps/common/arguments.h"
+#include "io/numbers.h"
+
+namespace supertac {
+
+std::vector<Configuration> configurations(const SweepTable& table) {
+  std::vector<Configuration> all;
+  for (const SweepTable::Row& row : table.rows()) {
+    const std::string& model = SweepTable::text(row, "model");
+    const std::string name = model.substr(0, model.rfind("_s"));
+    auto found = std::find_if(all.begin(), all.end(), [&](const Configuration& c) { return c.name == name; });
+    if (found == all.end()) found = all.insert(all.end(), {name, 0, {}, {}});
+    ++found->seeds;
+    found->models.push_back(model);
+    for (const SweepColumn& column : sweep_columns())
+      if (!column.text) found->mean[column.name] += SweepTable::number(row, column.name);
+  }
+  for (Configuration& c : all)
+    for (auto& [column, sum] : c.mean) sum /= static_cast<double>(c.seeds);
+  return all;
+}
+
+std::vector<Configuration> pareto_front(std::vector<Configuration> all) {
+  std::stable_sort(all.begin(), all.end(), [](const Configuration& a, const Configuration& b) {
+    return a.mean.at("median_us") < b.mean.at("median_us");
+  });
+  std::vector<Configuration> front;
+  for (Configuration& c : all) {
+    const double ssim = c.mean.at("ssim");
+    if (ssim == ssim && (front.empty() || ssim > front.back().mean.at("ssim"))) front.push_back(std::move(c));
+  }
+  return front;
+}
+
+bool Condition::holds(const Configuration& c) const {
+  const double value = c.mean.at(column);
+  if (comparison == ">=") return value >= bound;
+  if (comparison == "<=") return value <= bound;
+  return comparison == ">" ? value > bound : value < bound;
+}
+
+std::vector<Condition> conditions_of(const std::string& text) {
+  std::vector<Condition> conditions;
+  for (std::size_t at = 0; at <= text.size();) {
+    const std::size_t comma = std::min(text.find(',', at), text.size());
+    const std::string part = text.substr(at, comma - at);
+    const std::size_t sign = part.find_first_of("<>");
+    const std::size_t value = sign == std::string::npos ? sign : part.find_first_not_of("<>=", sign);
+    Condition c;
+    if (value != std::string::npos) {
+      c.column = part.substr(0, sign);
+      c.comparison = part.substr(sign, value - sign);
+      c.bound = parse_double(part.substr(value)).value_or(std::nan(""));
+    }
+    const auto& columns = sweep_columns();
+    const bool known = std::any_of(columns.begin(), columns.end(),
+                                   [&](const SweepColumn& k) { return !k.text && k.name == c.column; });
+    const bool comparable =
+        c.comparison == ">" || c.comparison == "<" || c.comparison == ">=" || c.comparison == "<=";
+    if (!known || !comparable || c.bound != c.bound) {
+      throw UsageError(
+          "--pick expects conditions like \"ssim>=0.8,position_mm<=0.5\" on columns of sweep.csv, found \"" +
+          part + "\"");
+    }
+    conditions.push_back(std::move(c));
+    at = comma + 1;
+  }
+  return conditions;
+}
+
+const Configuration* cheapest(const std::vector<Configuration>& all,
+                              const std::vector<Condition>& conditions) {
+  const Configuration* best = nullptr;
+  for (const Configuration& c : all) {
+    const bool good =
+        std::all_of(conditions.begin(), conditions.end(), [&](const Condition& k) { return k.holds(c); });
+    if (good && (best == nullptr || c.mean.at("median_us") < best->mean.at("median_us"))) best = &c;
+  }
+  return best;
+}
+
+}  // namespace supertac

@@ -1,0 +1,76 @@
+#include "apps/sweep/grid.h"
+
+#include <functional>
+
+namespace supertac {
+namespace {
+
+// The listed values, or the preset's own.
+std::vector<Dim> values(const Arguments& a, const std::string& name, Dim otherwise) {
+  if (!a.given(name)) return {otherwise};
+  std::vector<Dim> all;
+  for (const double value : a.numbers(name, 0, 1e6)) {
+    all.push_back(static_cast<Dim>(value));
+    if (static_cast<double>(all.back()) != value)
+      throw UsageError("--" + name + " expects whole numbers, found " + a.text(name));
+  }
+  return all;
+}
+
+struct Axis {
+  const char* option;
+  Dim SuperTacSettings::*setting;
+};
+constexpr Axis kAxes[] = {{"timesteps", &SuperTacSettings::timesteps},
+                          {"scale", &SuperTacSettings::scale},
+                          {"latent", &SuperTacSettings::latent},
+                          {"channels", &SuperTacSettings::channels},
+                          {"rcabs", &SuperTacSettings::rcabs}};
+
+void expand(const Arguments& a, std::size_t axis, SuperTacSettings settings,
+            const std::function<void(const SuperTacSettings&)>& use) {
+  if (axis == std::size(kAxes)) return use(settings);
+  const auto& [option, setting] = kAxes[axis];
+  for (const Dim value : values(a, option, settings.*setting)) {
+    settings.*setting = value;
+    expand(a, axis + 1, settings, use);
+  }
+}
+
+}  // namespace
+
+std::string GridPoint::configuration() const {
+  const auto part = [](const char* letter, Dim value) { return letter + std::to_string(value); };
+  return model.preset + part("_t", model.timesteps) + part("_l", model.latent) + part("_x", model.scale) +
+         part("_c", model.channels) + part("_r", model.rcabs);
+}
+
+void declare_grid(Arguments& a) {
+  a.option("preset", "A,B,...", "networks to start from: paper", "paper");
+  a.option("timesteps", "T,...",
+           "samples per window at 300 Hz, multiples of 16, 32 to 512 (default: the preset's)");
+  a.option("latent", "LD,...", "latent numbers per group of taxels (default: the preset's)");
+  a.option("scale", "N,...", "pictures of 4 N pixels a side: 2, 4, 8 (default: the preset's)");
+  a.option("channels", "N,...", "of the upsampler (default: the preset's)");
+  a.option("rcabs", "N,...", "residual channel attention blocks per stage (default: the preset's)");
+  a.option("seeds", "N,...", "of split, initial weights, order, noise", "0");
+}
+
+std::vector<GridPoint> grid_of(const Arguments& a) {
+  std::vector<GridPoint> points;
+  try {
+    for (const std::string& preset : a.list("preset")) {
+      expand(a, 0, SuperTacSettings::of_preset(preset), [&](const SuperTacSettings& settings) {
+        settings.check();
+        for (const double seed : a.numbers("seeds", 0, 9e15))
+          points.push_back({settings, static_cast<std::uint64_t>(seed)});
+      });
+    }
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(error.what());
+  }
+  if (points.empty()) throw UsageError("the grid is empty: give --preset and --seeds at least one value");
+  return points;
+}
+
+}  // namespace supertac

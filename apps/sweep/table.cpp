@@ -1,0 +1,156 @@
+#include "apps/sweep/table.h"
+
+#include <filesystem>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "io/file.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr std::uint64_t kMaxBytes = 64 << 20;
+
+std::string header() {
+  std::string line;
+  for (const SweepColumn& column : sweep_columns())
+    line += (line.empty() ? "" : ",") + std::string(column.name);
+  return line;
+}
+
+std::size_t index_of(const std::string& name) {
+  const auto& columns = sweep_columns();
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    if (columns[i].name == name) return i;
+  throw std::invalid_argument("a sweep's table has no column \"" + name + "\"; it has " + header());
+}
+
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells(1);
+  for (const char c : line) {
+    if (c == ',') {
+      cells.emplace_back();
+    } else {
+      cells.back() += c;
+    }
+  }
+  return cells;
+}
+
+std::string cell(const nlohmann::ordered_json& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_number_float()) return format(value.get<double>(), 6);
+  return value.is_null() ? "nan" : value.dump();
+}
+
+}  // namespace
+
+const std::vector<SweepColumn>& sweep_columns() {
+  static const std::vector<SweepColumn> kColumns = {{"model", true},
+                                                    {"preset", true},
+                                                    {"timesteps"},
+                                                    {"latent"},
+                                                    {"scale"},
+                                                    {"channels"},
+                                                    {"rcabs"},
+                                                    {"seed"},
+                                                    {"split", true},
+                                                    {"windows"},
+                                                    {"ssim"},
+                                                    {"psnr_db"},
+                                                    {"psnr_pooled_db"},
+                                                    {"phase"},
+                                                    {"phase_floor"},
+                                                    {"position_px"},
+                                                    {"position_mm"},
+                                                    {"all_windows"},
+                                                    {"all_ssim"},
+                                                    {"all_psnr_db"},
+                                                    {"all_psnr_pooled_db"},
+                                                    {"all_phase"},
+                                                    {"all_phase_floor"},
+                                                    {"all_position_px"},
+                                                    {"all_position_mm"},
+                                                    {"median_us"},
+                                                    {"p99_us"},
+                                                    {"mmac"},
+                                                    {"parameters"},
+                                                    {"memory_mb"},
+                                                    {"train_s"},
+                                                    {"steps"},
+                                                    {"commit", true}};
+  return kColumns;
+}
+
+SweepTable::SweepTable(std::string path) : path_(std::move(path)) {
+  if (!std::filesystem::exists(path_)) return;
+  const std::string content = read_text_file(path_, kMaxBytes);
+  std::size_t begin = 0;
+  for (std::size_t number = 1; begin < content.size(); ++number) {
+    const std::size_t end = content.find('\n', begin);
+    if (end == std::string::npos) {
+      dropped_ = true;
+      return;
+    }
+    read_line(content.substr(begin, end - begin), number);
+    begin = end + 1;
+  }
+}
+
+void SweepTable::read_line(const std::string& line, std::size_t number) {
+  const auto fail = [&](const std::string& what) {
+    throw FileError(path_, "line " + std::to_string(number) + ": " + what +
+                               "; correct or remove the line, or choose another --out");
+  };
+  if (number == 1) {
+    if (line != header()) fail("expected the columns " + header() + ", found " + line);
+    return;
+  }
+  Row row = cells_of(line);
+  const auto& columns = sweep_columns();
+  if (row.size() != columns.size()) {
+    fail("expected " + std::to_string(columns.size()) + " cells, found " + std::to_string(row.size()));
+  }
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    if (!columns[i].text && !parse_double(row[i]))
+      fail(std::string(columns[i].name) + " expects a number, found \"" + row[i] + "\"");
+  }
+  if (has(row[0])) fail("model " + row[0] + " is there twice");
+  rows_.push_back(std::move(row));
+}
+
+bool SweepTable::has(const std::string& model) const {
+  for (const Row& row : rows_)
+    if (row[0] == model) return true;
+  return false;
+}
+
+void SweepTable::add(const nlohmann::ordered_json& values) {
+  Row row;
+  for (const SweepColumn& column : sweep_columns()) {
+    if (!values.contains(column.name))
+      throw std::invalid_argument("SweepTable: no value for column " + std::string(column.name));
+    row.push_back(cell(values[column.name]));
+  }
+  rows_.push_back(std::move(row));
+  std::string content = header() + "\n";
+  for (const Row& r : rows_) {
+    for (std::size_t i = 0; i < r.size(); ++i) content += (i > 0 ? "," : "") + r[i];
+    content += "\n";
+  }
+  write_file(path_, content);
+}
+
+const std::string& SweepTable::text(const Row& row, const std::string& column) {
+  return row[index_of(column)];
+}
+
+double SweepTable::number(const Row& row, const std::string& column) {
+  const std::size_t i = index_of(column);
+  if (sweep_columns()[i].text) throw std::invalid_argument("column " + column + " holds no numbers");
+  return parse_double(row[i]).value_or(std::numeric_limits<double>::quiet_NaN());
+}
+
+}  // namespace supertac
