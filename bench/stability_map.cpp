@@ -24,7 +24,7 @@ constexpr double kLeastExplained = 0.1, kMostWrong = -1;
 
 void declare(Arguments& a) {
   a.required("out", "FILE", "CSV; continued when it exists");
-  a.option("learning-rates", "X,...", "peaks of Adam's rate", "0.0003,0.001,0.003,0.01,0.03,0.1");
+  a.option("learning-rates", "X,...", "peaks of Adam's rate", "0.0003,0.001,0.003,0.01,0.1");
   a.option("betas", "X,...", "weights of the KL divergence", "0.0001,0.001,0.01,0.1,1");
   a.option("safeguards", "on,off", "on: gradient clipped at 1, 5 % warm-up; off: neither", "on,off");
   a.option("seeds", "N", "runs per cell", "5");
@@ -33,7 +33,7 @@ void declare(Arguments& a) {
 
 SuperTacSettings network() {
   SuperTacSettings s = SuperTacSettings::of_preset("paper");
-  s.timesteps = 64;
+  s.timesteps = 32;
   s.scale = 2;
   return s;
 }
@@ -61,12 +61,15 @@ struct Cell {
 
 std::vector<Cell> cells(const Arguments& a) {
   std::vector<Cell> all;
-  for (const std::string& safeguards : a.list("safeguards")) {
-    if (safeguards != "on" && safeguards != "off") throw UsageError("--safeguards expects on, off or both");
-    for (std::int64_t seed = 0; seed < a.integer("seeds", 1, 1000); ++seed) {
+  const std::vector<std::string> words = a.list("safeguards");
+  for (const std::string& word : words) {
+    if (word != "on" && word != "off") throw UsageError("--safeguards expects on, off or both");
+  }
+  for (std::int64_t seed = 0; seed < a.integer("seeds", 1, 1000);
+       ++seed) {  // outermost: a map half done is a map
+    for (const std::string& word : words) {
       for (const double rate : a.numbers("learning-rates", 1e-9, 1)) {
-        for (const double beta : a.numbers("betas", 0, 1e6))
-          all.push_back({safeguards == "on", rate, beta, seed});
+        for (const double beta : a.numbers("betas", 0, 1e6)) all.push_back({word == "on", rate, beta, seed});
       }
     }
   }
