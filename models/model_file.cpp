@@ -3,63 +3,13 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "io/json.h"
+#include "models/frame_file.h"
+#include "models/json_entry.h"
 
 namespace supertac {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-// One metadata entry that is a JSON object; every accessor names path, key and what was found.
-class JsonEntry {
- public:
-  JsonEntry(const SafetensorsFile& file, const std::string& path, const std::string& key)
-      : where_(path + ": metadata \"" + key + "\"") {
-    const auto found = file.metadata().find(key);
-    if (found == file.metadata().end())
-      throw std::runtime_error(where_ + " is missing; the file is no SuperTac model");
-    try {
-      json_ = parse_json_limited(found->second);
-    } catch (const JsonError& error) {
-      throw std::runtime_error(where_ + ": " + error.what());
-    }
-  }
-
-  Dim integer(const char* name) const {
-    const Json& value = field(name);
-    if (!value.is_number_integer() || value < -1'000'000 || value > 1'000'000)
-      wrong(name, "a whole number", value);
-    return value.get<Dim>();
-  }
-  double number(const char* name) const {
-    const Json& value = field(name);
-    if (!value.is_number() || !std::isfinite(value.get<double>())) wrong(name, "a finite number", value);
-    return value.get<double>();
-  }
-  std::optional<double> number_or_null(const char* name) const {
-    return field(name).is_null() ? std::nullopt : std::optional(number(name));
-  }
-  std::string text(const char* name) const {
-    const Json& value = field(name);
-    if (!value.is_string()) wrong(name, "a text", value);
-    return value.get<std::string>();
-  }
-  const std::string& where() const { return where_; }
-
- private:
-  const Json& field(const char* name) const {
-    if (!json_.is_object() || !json_.contains(name))
-      throw std::runtime_error(where_ + " has no \"" + name + "\"");
-    return json_.at(name);
-  }
-  [[noreturn]] void wrong(const char* name, const char* expected, const Json& found) const {
-    throw std::runtime_error(where_ + ": \"" + name + "\" must be " + expected + ", found " +
-                             found.dump(-1, ' ', true).substr(0, 60));
-  }
-
-  std::string where_;
-  Json json_;
-};
 
 SuperTacSettings read_settings(const JsonEntry& entry) {
   SuperTacSettings s;
@@ -107,6 +57,11 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
 }
 
 ModelFile load_model(const SafetensorsFile& file, const std::string& path) {
+  const auto kind = file.metadata().find("kind");
+  if (kind != file.metadata().end() && kind->second == kFrameKind)
+    throw std::runtime_error(path +
+                             ": expected a SuperTac model, found a frame model (trained with --pairs); "
+                             "use it with supertac-evaluate --pairs");
   const SuperTacSettings settings = read_settings({file, path, "settings"});
   ModelFile loaded{nullptr, read_input({file, path, "input"}), file.metadata()};
   Rng rng(0);

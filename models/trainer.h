@@ -16,13 +16,13 @@
 #include <string>
 #include <vector>
 
-#include "autograd/adam.h"
 #include "data/augment.h"
 #include "data/batching.h"
 #include "data/windows.h"
 #include "models/collapse.h"
 #include "models/loss.h"
 #include "models/model_file.h"
+#include "models/training_state.h"
 
 namespace supertac {
 
@@ -54,21 +54,15 @@ struct StepReport {
   bool collapsed = false;
 };
 
-/// A value was not finite: step, where, and what to do are in what().
-class TrainingStopped : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
 class Trainer {
  public:
   /// `windows` must outlive the trainer. Throws std::invalid_argument for settings out of range, windows of
   /// another length or picture size than the model's, or no training window.
   Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, const TrainingSettings& settings);
 
-  bool done() const { return step_ >= total_steps_; }
-  std::int64_t step() const { return step_; }
-  std::int64_t total_steps() const { return total_steps_; }
+  bool done() const { return state_.done(); }
+  std::int64_t step() const { return state_.step(); }
+  std::int64_t total_steps() const { return state_.total_steps(); }
   std::int64_t steps_per_epoch() const { return static_cast<std::int64_t>(batching_.batches_per_epoch()); }
   const SuperTac& model() const { return model_; }
   const TrainingSettings& settings() const { return settings_; }
@@ -98,22 +92,19 @@ class Trainer {
   void run_lane(Lane& lane) const;
   void fill(Lane& lane) const;
   void draw_eps(Lane& lane) const;
-  void add_gradients();
   void look_for_collapse(StepReport& report);
   void check_finite(const StepReport& report) const;
-  [[noreturn]] void stop(const std::string& what) const;
+  std::map<std::string, std::string> full(std::map<std::string, std::string> metadata) const;
 
   const WindowSet& data_;
   TrainingSettings settings_;
   Batching batching_;
   SuperTac model_;
-  mutable Adam adam_;
-  Schedule schedule_;
-  std::int64_t step_ = 0, total_steps_ = 0;
-  int flat_steps_ = 0;  // how many in a row have looked collapsed
+  TrainingState state_;
   Spread pictures_, truths_, means_;
   std::vector<std::uint32_t> indices_;  // of the batch
   std::vector<Lane> lanes_;
+  std::vector<const std::vector<Parameter>*> lane_parameters_;  // of these models
 };
 
 }  // namespace supertac

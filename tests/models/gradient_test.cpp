@@ -2,6 +2,9 @@
 #include <gtest/gtest.h>
 
 #include "autograd/gradient_checker.h"
+#include "autograd/ops/arithmetic.h"
+#include "autograd/ops/losses.h"
+#include "models/frame_model.h"
 #include "models/loss.h"
 
 namespace supertac {
@@ -55,6 +58,20 @@ TEST(SuperTacGradient, PictureOfSixteenPixelsVerticalGroups) {
   s.rcabs = 1;
   s.grouping = Grouping::vertical;
   expect_right_gradients(s);
+}
+
+TEST(FrameModelGradient, ThroughEveryLayer) {
+  Rng rng(6);
+  const FrameModel model({.in_channels = 2, .height = 2, .width = 5, .scale = 4, .channels = 8, .rcabs = 1},
+                         rng);
+  const Tensor frames = uniform({2, 2, 5, 2}, 1), truth = uniform({2, 8, 20, 1}, 2);
+  const auto loss = [&] {
+    const Variable picture = model.forward(frames);
+    return add(l2_loss(picture, Variable(truth)), scale(ssim(picture, truth), -0.3));
+  };
+  const GradientReport report =
+      check_gradients(loss, values_of(model.parameters()), {.max_entries_per_input = 4});
+  EXPECT_LE(report.max_relative_error, 1e-6) << report.text();
 }
 
 }  // namespace

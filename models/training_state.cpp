@@ -1,0 +1,123 @@
+#include "models/training_state.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "autograd/kernels/elementwise.h"
+#include "io/numbers.h"
+#include "layers/checkpoint.h"
+#include "models/diagnosis.h"
+
+namespace supertac {
+namespace {
+
+constexpr int kFlatStepsToReport = 100;
+
+void copy_into(Tensor& to, const Tensor& from) { std::copy_n(from.data(), from.size(), to.data()); }
+
+void expect_same(const SafetensorsFile& file, const std::string& path,
+                 const std::map<std::string, std::string>& expected) {
+  for (const auto& [key, value] : expected) {
+    const auto found = file.metadata().find(key);
+    if (found != file.metadata().end() && found->second == value) continue;
+    throw std::runtime_error(path + ": cannot resume: its " + key + " is " +
+                             (found == file.metadata().end() ? "missing" : found->second) +
+                             ", this run's is " + value +
+                             "; give the same options and data, or start anew without --resume");
+  }
+}
+
+}  // namespace
+
+TrainingState::TrainingState(const std::vector<Parameter>& parameters, const OptimiserSettings& settings,
+                             std::int64_t total_steps)
+    : parameters_(parameters),
+      adam_(values_of(parameters),
+            {.learning_rate = settings.learning_rate, .clip_norm = settings.clip_norm}),
+      schedule_{.peak = settings.learning_rate,
+                .warm_up = static_cast<std::int64_t>(settings.warm_up * static_cast<double>(total_steps)),
+                .total = total_steps} {}
+
+bool TrainingState::collapsed(bool looks_so) {
+  flat_steps_ = looks_so && step_ >= schedule_.warm_up ? flat_steps_ + 1 : 0;
+  return flat_steps_ >= kFlatStepsToReport;
+}
+
+double TrainingState::apply(const std::vector<const std::vector<Parameter>*>& lanes) {
+  adam_.zero_grad();
+  for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    for (const std::vector<Parameter>* lane : lanes) {
+      const Tensor& part = (*lane)[i].value.grad();
+      kernels::add_scaled(part.size(), 1, part.data(), parameters_[i].value.mutable_grad().data());
+    }
+  }
+  adam_.set_learning_rate(learning_rate());
+  const double norm = adam_.step();
+  if (!std::isfinite(norm)) {
+    const std::string name = gradient_not_finite(parameters_);
+    stop(name.empty() ? "the gradient's norm overflows" : "the gradient of " + name + " is not finite");
+  }
+  ++step_;
+  return norm;
+}
+
+void TrainingState::stop(const std::string& what) const {
+  throw TrainingStopped("training stopped at step " + std::to_string(step_ + 1) + ": " + what +
+                        "; lower --learning-rate (now " + format(schedule_.peak) +
+                        ") or check the input with supertac-info");
+}
+
+void TrainingState::save(const std::string& path, std::map<std::string, std::string> metadata) const {
+  std::vector<StoredTensor> state;
+  for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    const Parameter& p = parameters_[i];
+    state.push_back(to_stored(p, adam_.first_moments()[i], "optimizer.m." + p.name));
+    state.push_back(to_stored(p, adam_.second_moments()[i], "optimizer.v." + p.name));
+  }
+  metadata["step"] = std::to_string(step_);
+  metadata["flat_steps"] = std::to_string(flat_steps_);
+  write_checkpoint(path, parameters_, std::move(metadata), state);
+}
+
+void TrainingState::restore(const std::string& path, const std::map<std::string, std::string>& expected) {
+  const SafetensorsFile file = read_checkpoint(path);
+  expect_same(file, path, expected);
+  const auto integer = [&](const char* key) {
+    const auto found = file.metadata().find(key);
+    const auto value = found == file.metadata().end() ? std::nullopt : parse_int(found->second);
+    if (!value || *value < 0 || *value > total_steps()) {
+      throw std::runtime_error(path + ": holds no training state (metadata \"" + key +
+                               "\"); resume from the last.safetensors of the run's folder");
+    }
+    return *value;
+  };
+  const std::int64_t step = integer("step"), flat_steps = integer("flat_steps");
+  std::vector<Tensor> m, v;
+  for (const Parameter& p : parameters_) {
+    m.push_back(load_like(file, path, "optimizer.m." + p.name, p));
+    v.push_back(load_like(file, path, "optimizer.v." + p.name, p));
+  }
+  load_parameters(file, path, parameters_);
+  for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    copy_into(adam_.first_moments()[i], m[i]);
+    copy_into(adam_.second_moments()[i], v[i]);
+  }
+  adam_.set_steps(step);
+  step_ = step;
+  flat_steps_ = static_cast<int>(flat_steps);
+}
+
+void share_values(const std::vector<Parameter>& master, const std::vector<Parameter>& lane) {
+  for (std::size_t i = 0; i < master.size(); ++i) {
+    Variable own = lane[i].value;
+    own.mutable_value() = master[i].value.value();  // the same buffer
+    own.mutable_grad() = Tensor::zeros(own.shape());
+  }
+}
+
+void clear_gradients(const std::vector<Parameter>& parameters) {
+  for (const Parameter& p : parameters) Variable(p.value).mutable_grad().fill(0);
+}
+
+}  // namespace supertac

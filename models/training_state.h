@@ -1,0 +1,69 @@
+// What a training run has besides its network and data: Adam, the rate's schedule, the step; saved and
+// restored to the bit.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "autograd/adam.h"
+#include "layers/module.h"
+
+namespace supertac {
+
+struct OptimiserSettings {
+  double learning_rate = 1e-3;
+  double warm_up = 0.05;  ///< share of all steps in which the rate rises; then half a cosine to 0
+  double clip_norm = 1;   ///< 0 = never
+};
+
+/// A value was not finite: step, where, and what to do are in what().
+class TrainingStopped : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class TrainingState {
+ public:
+  /// The parameters' handles are kept.
+  TrainingState(const std::vector<Parameter>& parameters, const OptimiserSettings& settings,
+                std::int64_t total_steps);
+
+  std::int64_t step() const { return step_; }  ///< done so far
+  std::int64_t total_steps() const { return schedule_.total; }
+  bool done() const { return step_ >= schedule_.total; }
+  double learning_rate() const { return schedule_.at(step_); }
+
+  /// Counts steps in a row that look collapsed, not while the rate still rises: a network has not had its
+  /// chance to learn by then. True from the 100th on.
+  bool collapsed(bool looks_so);
+
+  /// Sets the gradients to the sum of the lanes', in their order, and applies Adam; counts the step. Returns
+  /// the gradient's norm before clipping. Throws TrainingStopped, with nothing changed, when it is not
+  /// finite.
+  double apply(const std::vector<const std::vector<Parameter>*>& lanes);
+  /// Throws TrainingStopped: step, `what`, and advice.
+  [[noreturn]] void stop(const std::string& what) const;
+
+  /// Parameters and state, a checkpoint like any other with "optimizer." tensors besides. Throws FileError.
+  void save(const std::string& path, std::map<std::string, std::string> metadata) const;
+  /// Continues where the saved state stood. Throws std::runtime_error when the file holds no training state,
+  /// or one of `expected` differs from its metadata (naming the difference); nothing is changed then.
+  void restore(const std::string& path, const std::map<std::string, std::string>& expected);
+
+ private:
+  std::vector<Parameter> parameters_;
+  mutable Adam adam_;
+  Schedule schedule_;
+  std::int64_t step_ = 0;
+  int flat_steps_ = 0;
+};
+
+/// Makes a lane's parameters share the master's values under gradients of their own.
+void share_values(const std::vector<Parameter>& master, const std::vector<Parameter>& lane);
+/// Sets gradients to 0.
+void clear_gradients(const std::vector<Parameter>& parameters);
+
+}  // namespace supertac
