@@ -5,8 +5,8 @@
 namespace supertac {
 namespace {
 
-constexpr double kSameShare = 0.02;       // of the truths' standard deviation
-constexpr double kActiveVariance = 0.01;  // Burda et al. 2016
+constexpr double kLeastShare = 0.02, kLargestShare = 10;  // of the truths' standard deviation
+constexpr double kActiveVariance = 0.01;                  // Burda et al. 2016
 
 }  // namespace
 
@@ -46,8 +46,9 @@ double Spread::mean_variance(double samples) const {
   return total / static_cast<double>(entries());
 }
 
-bool same_for_all(const Spread& pictures, const Spread& truths, double samples) {
-  return pictures.mean_variance(samples) < kSameShare * kSameShare * truths.mean_variance(samples);
+bool senseless(const Spread& pictures, const Spread& truths, double samples) {
+  const double own = pictures.mean_variance(samples), due = truths.mean_variance(samples);
+  return own < kLeastShare * kLeastShare * due || (due > 0 && own > kLargestShare * kLargestShare * due);
 }
 
 int active_latents(const Spread& means, double samples) {

@@ -1,4 +1,4 @@
-// Two ways in which a network stops to look at its input, both silent: the loss stays finite and even falls.
+// How a network fails in silence: it stops to look at its input, or blows up, while the loss stays finite.
 #pragma once
 
 #include <vector>
@@ -26,9 +26,9 @@ class Spread {
   std::vector<double> sum_, squares_;
 };
 
-/// Pictures that are the same for every window (blank, or the mean image), although the truths are not: their
-/// standard deviation over the batch is below 2 % of the truths'.
-bool same_for_all(const Spread& pictures, const Spread& truths, double samples);
+/// Pictures that say nothing of the truths: their standard deviation over the batch is below 2 % of the
+/// truths' (blank ones, or the mean image for every window) or above ten times it (training has diverged).
+bool senseless(const Spread& pictures, const Spread& truths, double samples);
 
 /// Latent numbers that tell windows apart: the variance of the encoder's mean over the batch is above 0.01
 /// (Burda et al. 2016, section 5.1, "active units"). None is posterior collapse: the decoders ignore z.

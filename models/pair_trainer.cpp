@@ -165,7 +165,7 @@ bool PairTrainer::looks_collapsed() {
     pictures_.add(lane.pictures);
     truths_.add(lane.truths);
   }
-  return indices_.size() > 1 && same_for_all(pictures_, truths_, static_cast<double>(indices_.size()));
+  return indices_.size() > 1 && senseless(pictures_, truths_, static_cast<double>(indices_.size()));
 }
 
 std::map<std::string, std::string> PairTrainer::full(std::map<std::string, std::string> metadata) const {

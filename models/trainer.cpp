@@ -204,7 +204,7 @@ void Trainer::look_for_collapse(StepReport& report) {
   if (indices_.size() < 2) return;  // nothing to compare with
   const auto samples = static_cast<double>(indices_.size());
   report.active_latents = active_latents(means_, samples);
-  const bool now = report.active_latents == 0 || same_for_all(pictures_, truths_, samples);
+  const bool now = report.active_latents == 0 || senseless(pictures_, truths_, samples);
   report.collapsed = state_.collapsed(now);
 }
 

@@ -49,8 +49,8 @@ struct StepReport {
   double gradient_norm = 0;  ///< before clipping
   double learning_rate = 0;
   int active_latents = 0;  ///< of 4 LD, in this batch (models/collapse.h)
-  /// For the last 100 steps after warm-up the pictures were the same for every window, or no latent number
-  /// was active. Lower the learning rate or, when no latent is active, beta.
+  /// For the last 100 steps after warm-up the pictures said nothing of the truths, or no latent number was
+  /// active (models/collapse.h). Lower the learning rate or, when no latent is active, beta.
   bool collapsed = false;
 };
 
