@@ -128,7 +128,7 @@ void TrainingRun::step_until_done() {
               (report.active_latents == 0
                    ? "no latent number tells windows apart; stop and lower --beta (now " + a_.text("beta") +
                          ") or "
-                   : "the pictures are the same for every window; stop and lower ") +
+                   : "the pictures are the same for every window, or far too strong; stop and lower ") +
               "--learning-rate (now " + a_.text("learning-rate") + ")");
     }
     const bool epoch_ends = report.step % trainer_.steps_per_epoch() == 0;
