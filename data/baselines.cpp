@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "data/ridge.h"
 #include "data/split.h"
 
 namespace supertac {
@@ -143,6 +144,7 @@ std::vector<std::unique_ptr<Baseline>> fit_baselines(const WindowSet& windows,
   baselines.push_back(std::make_unique<MeanImage>(windows, train));
   baselines.push_back(std::make_unique<UpsampledFrame>(Upsampling::Kind::nearest, windows, train));
   baselines.push_back(std::make_unique<UpsampledFrame>(Upsampling::Kind::bicubic, windows, train));
+  baselines.push_back(std::make_unique<Ridge>(windows, train));
   return baselines;
 }
 

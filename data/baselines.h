@@ -71,7 +71,7 @@ class UpsampledFrame : public Baseline {
   double slope_ = 0, intercept_ = 0;
 };
 
-/// mean_image, nearest and bicubic, in this order. Each is fitted to at most kFitWindows training windows,
+/// mean_image, nearest, bicubic and ridge (data/ridge.h), in this order. Each is fitted to at most kFitWindows training windows,
 /// evenly spread over the list. @throws std::invalid_argument when train is empty.
 constexpr size_t kFitWindows = 20000;
 std::vector<std::unique_ptr<Baseline>> fit_baselines(const WindowSet& windows,

@@ -134,10 +134,11 @@ TEST(Baselines, AreOrderedOnASignalThatShowsTheSurface) {
   const WindowSet set = make_set();
   const auto train = make_split(set, SplitKind::none, 1).train;
   const auto baselines = fit_baselines(set, train);
-  ASSERT_EQ(baselines.size(), 3U);
+  ASSERT_EQ(baselines.size(), 4U);
   EXPECT_EQ(baselines[0]->name(), "mean_image");
   EXPECT_EQ(baselines[1]->name(), "nearest");
   EXPECT_EQ(baselines[2]->name(), "bicubic");
+  EXPECT_EQ(baselines[3]->name(), "ridge");
   const double mean = mean_error(set, *baselines[0]), nearest = mean_error(set, *baselines[1]),
                bicubic = mean_error(set, *baselines[2]);
   EXPECT_LT(bicubic, nearest);
@@ -155,7 +156,7 @@ TEST(Baselines, MeanImageIsTheMeanTruthWhateverItSees) {
   for (size_t p = 0; p < 256; ++p) ASSERT_NEAR(out[p], (a[p] + b[p]) / 2, 1e-6);
 }
 
-TEST(Baselines, SeeTheLastFrameOnly) {
+TEST(Baselines, AllButRidgeSeeTheLastFrameOnly) {
   const WindowSet set = make_set();
   const auto baselines = fit_baselines(set, make_split(set, SplitKind::none, 1).train);
   std::vector<float> window(set.window(200).begin(), set.window(200).end()), out(256), again(256);
@@ -164,7 +165,7 @@ TEST(Baselines, SeeTheLastFrameOnly) {
     auto changed = window;
     std::fill(changed.begin(), changed.end() - 16, 0.0F);
     baseline->predict(changed, again);
-    EXPECT_EQ(out, again) << baseline->name();
+    EXPECT_EQ(out == again, baseline->name() != "ridge") << baseline->name();
   }
 }
 

@@ -1,0 +1,144 @@
+#include "data/ridge.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <stdexcept>
+
+#include "data/split.h"
+
+namespace supertac {
+namespace {
+
+using Matrix = Eigen::MatrixXd;
+
+constexpr size_t kSteps = 16;
+constexpr size_t kHeldOut = 5;  // every so many passes
+constexpr double kPenalties[] = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10};
+
+size_t features_of(size_t timesteps) { return std::min(timesteps, kSteps) * kTaxels + 1; }
+
+// Means over equal stretches of time, then 1.
+void features(std::span<const float> window, std::span<double> out) {
+  const size_t frames = window.size() / kTaxels, steps = std::min(frames, kSteps);
+  std::fill(out.begin(), out.end(), 0.0);
+  for (size_t s = 0; s < steps; ++s) {
+    const size_t begin = s * frames / steps, end = (s + 1) * frames / steps;
+    for (size_t t = begin; t < end; ++t) {
+      for (size_t k = 0; k < kTaxels; ++k)
+        out[s * kTaxels + k] += window[t * kTaxels + k] / static_cast<double>(end - begin);
+    }
+  }
+  out.back() = 1;
+}
+
+// What least squares needs of a set of windows: X'X, X'Y and Y'Y.
+struct Moments {
+  Matrix xx, xy;
+  double yy = 0;
+
+  Moments(size_t features, size_t pixels)
+      : xx(Matrix::Zero(static_cast<Eigen::Index>(features), static_cast<Eigen::Index>(features))),
+        xy(Matrix::Zero(static_cast<Eigen::Index>(features), static_cast<Eigen::Index>(pixels))) {}
+
+  Moments(const WindowSet& windows, std::span<const uint32_t> indices)
+      : Moments(features_of(static_cast<size_t>(windows.timesteps())),
+                static_cast<size_t>(windows.image_size() * windows.image_size())) {
+    constexpr size_t kBlock = 512;
+    std::vector<float> truth(static_cast<size_t>(xy.cols()));
+    for (size_t first = 0; first < indices.size(); first += kBlock) {
+      const auto part = indices.subspan(first, std::min(kBlock, indices.size() - first));
+      Matrix x(xx.rows(), static_cast<Eigen::Index>(part.size()));  // a window a column
+      Matrix y(xy.cols(), x.cols());
+      for (Eigen::Index n = 0; n < x.cols(); ++n) {
+        const uint32_t i = part[static_cast<size_t>(n)];
+        features(windows.window(i), {x.col(n).data(), static_cast<size_t>(x.rows())});
+        windows.truth(i, truth);
+        y.col(n) = Eigen::Map<const Eigen::VectorXf>(truth.data(), y.rows()).cast<double>();
+      }
+      xx.noalias() += x * x.transpose();
+      xy.noalias() += x * y.transpose();
+      yy += y.squaredNorm();
+    }
+  }
+
+  Moments& operator+=(const Moments& other) {
+    xx += other.xx;
+    xy += other.xy;
+    yy += other.yy;
+    return *this;
+  }
+
+  Matrix solve(double penalty) const {
+    const Eigen::Index n = xx.rows() - 1;
+    Matrix a = xx;
+    // Taxels that never move leave rows of zeros; the floor keeps the matrix positive definite.
+    a.diagonal().head(n).array() += penalty * xx.diagonal().head(n).mean() + 1e-9;
+    return a.llt().solve(xy);
+  }
+
+  // |Y - X W|^2
+  double error(const Matrix& w) const {
+    return yy - 2 * w.cwiseProduct(xy).sum() + w.cwiseProduct(xx * w).sum();
+  }
+};
+
+// Which windows judge the penalty: whole passes, since neighbours of one pass are nearly the same.
+std::vector<bool> held_out(const WindowSet& windows, std::span<const uint32_t> indices) {
+  std::vector<size_t> passes;
+  for (const uint32_t i : indices) {
+    if (passes.empty() || passes.back() != windows.pass_of(i)) passes.push_back(windows.pass_of(i));
+  }
+  std::vector<bool> held(indices.size());
+  for (size_t n = 0; n < indices.size(); ++n) {
+    const auto at = std::find(passes.begin(), passes.end(), windows.pass_of(indices[n])) - passes.begin();
+    held[n] = passes.size() == 1
+                  ? n >= indices.size() - indices.size() / kHeldOut
+                  : static_cast<size_t>(at) % kHeldOut == std::min(kHeldOut, passes.size()) - 1;
+  }
+  return held;
+}
+
+}  // namespace
+
+Ridge::Ridge(const WindowSet& windows, std::span<const uint32_t> train)
+    : timesteps_(static_cast<size_t>(windows.timesteps())),
+      pixels_(static_cast<size_t>(windows.image_size() * windows.image_size())) {
+  if (train.empty()) throw std::invalid_argument("ridge: there is no window to fit to");
+  const std::vector<uint32_t> chosen = spread(train, kFitWindows);
+  const std::vector<bool> held = held_out(windows, chosen);
+  std::vector<uint32_t> fit, judge;
+  for (size_t n = 0; n < chosen.size(); ++n) (held[n] ? judge : fit).push_back(chosen[n]);
+  Moments moments(windows, fit);
+  const Moments other(windows, judge);
+  double least = 0;
+  for (const double penalty : kPenalties) {
+    const double error = other.error(moments.solve(penalty));
+    if (penalty_ == 0 || error < least) {
+      penalty_ = penalty;
+      least = error;
+    }
+  }
+  const Matrix w = (moments += other).solve(penalty_).transpose();  // [pixels][f]; columns are contiguous
+  weights_.resize(static_cast<size_t>(w.size()));
+  std::transform(w.data(), w.data() + w.size(), weights_.begin(),
+                 [](double v) { return static_cast<float>(v); });
+}
+
+void Ridge::predict(std::span<const float> window, std::span<float> out) const {
+  if (window.size() != timesteps_ * kTaxels || out.size() != pixels_) {
+    throw std::invalid_argument("ridge: expects a window [" + std::to_string(timesteps_) + "][16] and " +
+                                std::to_string(pixels_) + " pixels, got " + std::to_string(window.size()) +
+                                " and " + std::to_string(out.size()) + " values");
+  }
+  std::array<double, kSteps * kTaxels + 1> x;
+  const std::span<double> used(x.data(), features_of(timesteps_));
+  features(window, used);
+  std::fill(out.begin(), out.end(), 0.0f);
+  for (size_t f = 0; f < used.size(); ++f) {
+    const float* row = weights_.data() + f * pixels_;
+    for (size_t p = 0; p < pixels_; ++p) out[p] += static_cast<float>(used[f]) * row[p];
+  }
+}
+
+}  // namespace supertac
