@@ -30,7 +30,8 @@ enum class Side : uint8_t { neither, train, test };
 std::map<std::string, std::vector<size_t>> passes_by_plate(const WindowSet& windows) {
   std::map<std::string, std::vector<size_t>> plates;
   for (size_t p = 0; p < windows.passes().size(); ++p)
-    if (windows.passes()[p].windows > 0) plates[windows.passes()[p].plate].push_back(p);
+    if (windows.passes()[p].windows > 0 && !windows.passes()[p].aside)
+      plates[windows.passes()[p].plate].push_back(p);
   return plates;
 }
 
@@ -54,7 +55,9 @@ std::vector<Side> split_passes(const WindowSet& windows, uint64_t seed) {
 std::vector<Side> split_trials(const WindowSet& windows) {
   std::vector<Side> sides;
   for (const WindowSet::Pass& pass : windows.passes())
-    sides.push_back(pass.trial == 1 ? Side::train : pass.trial == 2 ? Side::test : Side::neither);
+    sides.push_back(pass.aside || pass.trial == 1 ? Side::train
+                    : pass.trial == 2             ? Side::test
+                                                  : Side::neither);
   return sides;
 }
 
@@ -70,16 +73,18 @@ std::vector<Side> split_plates(const WindowSet& windows, uint64_t seed) {
   return sides;
 }
 
-Split split_windows(size_t count, uint64_t seed) {
-  if (count < 2)
-    throw std::invalid_argument("split window: the data has " + std::to_string(count) +
+Split split_windows(const WindowSet& windows, uint64_t seed) {
+  std::vector<uint32_t> own;  // not set aside
+  for (uint32_t i = 0; i < windows.size(); ++i)
+    if (!windows.passes()[windows.pass_of(i)].aside) own.push_back(i);
+  if (own.size() < 2)
+    throw std::invalid_argument("split window: the data has " + std::to_string(own.size()) +
                                 " window, needs two: one to train on, one to test on");
-  const EpochOrder order(count, seed, kWindowStream);
-  std::vector<bool> tested(count, false);
-  for (size_t i = 0; i < test_count(count); ++i) tested[order[i]] = true;
+  const EpochOrder order(own.size(), seed, kWindowStream);
+  std::vector<bool> tested(windows.size(), false);
+  for (size_t i = 0; i < test_count(own.size()); ++i) tested[own[order[i]]] = true;
   Split split;
-  for (size_t i = 0; i < count; ++i)
-    (tested[i] ? split.test : split.train).push_back(static_cast<uint32_t>(i));
+  for (uint32_t i = 0; i < windows.size(); ++i) (tested[i] ? split.test : split.train).push_back(i);
   return split;
 }
 
@@ -171,7 +176,7 @@ Split make_split(const WindowSet& windows, SplitKind kind, uint64_t seed) {
   Split split;
   switch (kind) {
     case SplitKind::window:
-      split = split_windows(windows.size(), seed);
+      split = split_windows(windows, seed);
       break;
     case SplitKind::pass:
       split = split_by_pass(windows, split_passes(windows, seed));
@@ -183,8 +188,10 @@ Split make_split(const WindowSet& windows, SplitKind kind, uint64_t seed) {
       split = split_by_pass(windows, split_plates(windows, seed));
       break;
     case SplitKind::none:
-      for (size_t i = 0; i < windows.size(); ++i) split.train.push_back(static_cast<uint32_t>(i));
-      split.test = split.train;
+      for (uint32_t i = 0; i < windows.size(); ++i) {
+        split.train.push_back(i);
+        if (!windows.passes()[windows.pass_of(i)].aside) split.test.push_back(i);
+      }
       break;
   }
   if (split.train.empty() || split.test.empty())

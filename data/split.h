@@ -17,6 +17,7 @@ namespace supertac {
 ///   trial    trial 1 is trained on, trial 2 tested; other trials are in neither.
 ///   texture  one plate, drawn at random, is tested, the others are trained on: an unseen surface.
 ///   none     all windows are in both: for models that are tested on other data.
+/// Windows of passes set aside (WindowSet::Pass::aside) are trained on in every kind, and tested in none.
 enum class SplitKind { window, pass, trial, texture, none };
 
 /// @throws std::invalid_argument listing the names.

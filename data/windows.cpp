@@ -76,23 +76,27 @@ std::string WindowCounts::summary() const {
 WindowSet WindowSet::load(const std::string& dir, const std::vector<std::string>& plates,
                           const WindowSettings& settings) {
   WindowSet set(settings);
+  set.add_directory(dir, plates);
+  if (set.size() == 0)
+    throw std::runtime_error(dir + ": no window of " + std::to_string(settings.timesteps) +
+                             " frames: " + set.counts_.summary() + "; try fewer timesteps or longer passes");
+  return set;
+}
+
+void WindowSet::add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside) {
   std::set<std::string> missing(plates.begin(), plates.end());
   for (const std::string& path : list_recordings(dir)) {
     const Recording recording = read_recording(path);
     if (!plates.empty() && std::find(plates.begin(), plates.end(), recording.plate) == plates.end()) continue;
     missing.erase(recording.plate);
     try {
-      set.add(recording, dir);
+      add(recording, dir, aside);
     } catch (const std::exception& error) {
       throw std::runtime_error(path + ": " + error.what());
     }
   }
   if (!missing.empty())
     throw std::invalid_argument("windows: plate '" + *missing.begin() + "' has no recording in " + dir);
-  if (set.size() == 0)
-    throw std::runtime_error(dir + ": no window of " + std::to_string(settings.timesteps) +
-                             " frames: " + set.counts_.summary() + "; try fewer timesteps or longer passes");
-  return set;
 }
 
 WindowSet::WindowSet(const WindowSettings& settings) : settings_(settings) { check(settings); }
@@ -124,7 +128,7 @@ bool WindowSet::accept(const Track& track, size_t frame, bool reliable) {
   return reason == &counts_.windows;
 }
 
-void WindowSet::add(const Recording& recording, const std::string& folder) {
+void WindowSet::add(const Recording& recording, const std::string& folder, bool aside) {
   const size_t plate = plate_index(recording.plate, folder);
   Track track = resample(
       recording,
@@ -138,7 +142,8 @@ void WindowSet::add(const Recording& recording, const std::string& folder) {
             .filter_s = recording.filter_s(),
             .frames = track.frames(),
             .first_window = index_.size(),
-            .windows = 0};
+            .windows = 0,
+            .aside = aside};
   const auto number = static_cast<uint32_t>(passes_.size());
   for (size_t frame = 0; frame < track.frames(); ++frame)
     if (accept(track, frame, reliable)) index_.push_back({number, static_cast<uint32_t>(frame)});

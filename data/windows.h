@@ -51,6 +51,7 @@ class WindowSet {
     double filter_s = 0;  ///< length of the moving average the signals went through; 0 = none
     size_t frames = 0;    ///< on the model's rate
     size_t first_window = 0, windows = 0;  ///< its windows are consecutive, in order of time
+    bool aside = false;  ///< only ever trained on: no split tests it (simulated passes beside real ones)
   };
   struct Position {
     double x_mm = 0, y_mm = 0;
@@ -69,7 +70,10 @@ class WindowSet {
   explicit WindowSet(const WindowSettings& settings);
   /// Appends the windows of one recording. @param folder where the recording lies, for a plate that is an
   /// STL file beside it. @throws as plate_in_folder() and resample().
-  void add(const Recording& recording, const std::string& folder = ".");
+  void add(const Recording& recording, const std::string& folder = ".", bool aside = false);
+  /// Appends those of all recordings in a directory, of these plates (empty: all). @throws as load, but for
+  /// the missing windows.
+  void add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside = false);
 
   size_t size() const { return index_.size(); }
   int timesteps() const { return settings_.timesteps; }

@@ -15,6 +15,7 @@ void declare_training(Arguments& a) {
   a.option("beta", "X", "weight of the KL divergence", "0.001");
   a.option("lambda", "X", "weight of 1 - SSIM", "0.1");
   a.option("plates", "A,B,...", "only recordings of these plates (default: all)");
+  a.option("also", "DIR", "more recordings to train on, never tested: simulated ones, say", "");
   a.option("checkpoint-every", "STEPS", "how often the state is saved", "500");
 }
 
@@ -40,7 +41,9 @@ WindowSet training_windows(const Arguments& a, const SuperTacSettings& model) {
   w.timesteps = static_cast<int>(model.timesteps);
   w.scale = static_cast<int>(model.scale);
   w.stride = static_cast<int>(a.integer("stride", 1, 100'000));
-  return WindowSet::load(a.text("data"), a.list("plates"), w);
+  WindowSet windows = WindowSet::load(a.text("data"), a.list("plates"), w);
+  if (a.given("also")) windows.add_directory(a.text("also"), {}, true);
+  return windows;
 }
 
 }  // namespace supertac

@@ -177,6 +177,26 @@ TEST(Leakage, RestIsNoDuplicate) {
   EXPECT_TRUE(find_leakage(set, make_split(set, SplitKind::trial, 1)).none());
 }
 
+TEST(Split, WhatIsSetAsideIsTrainedOnAndNeverTested) {
+  WindowSet set(wide_settings(16));
+  for (int trial = 1; trial <= 2; ++trial)
+    for (const char* plate : {"ridges6", "bumps6"})
+      for (int pass = 1; pass <= 2; ++pass)
+        set.add(make_recording({.plate = plate, .trial = trial, .pass = pass, .frames = 30}));
+  const size_t own = set.size();
+  set.add(make_recording({.plate = "ridges6", .trial = 2, .pass = 3, .frames = 30}), ".", true);
+  set.add(make_recording({.plate = "bumps12", .trial = 1, .pass = 1, .frames = 30}), ".", true);
+  ASSERT_EQ(set.size(), own + 30);
+  for (const SplitKind kind :
+       {SplitKind::window, SplitKind::pass, SplitKind::trial, SplitKind::texture, SplitKind::none}) {
+    const Split split = make_split(set, kind, 3);
+    EXPECT_LT(split.test.back(), own) << name_of(kind);
+    ASSERT_GT(split.train.size(), 30U) << name_of(kind);
+    for (size_t i = 0; i < 30; ++i)
+      EXPECT_EQ(split.train[split.train.size() - 30 + i], own + i) << name_of(kind);
+  }
+}
+
 TEST(Split, SpreadTakesEvenlyOrAll) {
   const std::vector<uint32_t> list{2, 3, 5, 7, 11, 13, 17};
   EXPECT_EQ(spread(list, 3), (std::vector<uint32_t>{2, 5, 11}));
