@@ -40,10 +40,7 @@ void MarlinLink::connect() {
   while (answers < 2) {
     const double now = port_.now();
     if (now >= until) {
-      throw PrinterSilent("port " + port_.name() +
-                          ": expected a Marlin firmware, found no answer to M110 within " +
-                          fixed_decimals(settings_.connect_deadline_s, 0) +
-                          " s; check that the printer is on, the port is right and the baud rate is 115200");
+      nobody_answered();
     }
     answers = probe(std::min(until, now + settings_.probe_interval_s)) ? answers + 1 : 0;
   }
@@ -51,6 +48,17 @@ void MarlinLink::connect() {
   kept_.clear();
   connected_ = true;
   read_capabilities();
+}
+
+void MarlinLink::nobody_answered() const {
+  const std::string expected = "port " + port_.name() + ": expected a Marlin firmware, found ";
+  const std::string within =
+      " answer to M110 within " + fixed_decimals(settings_.connect_deadline_s, 0) + " s; ";
+  if (sniffer_.counters().bytes > 0) {
+    throw WrongDevice(expected + std::to_string(sniffer_.counters().bytes) + " bytes that are no" + within +
+                      "check that it is the printer's port (--list-ports) and that its baud rate is 115200");
+  }
+  throw PrinterSilent(expected + "no" + within + "check that the printer is on and the port is right");
 }
 
 bool MarlinLink::probe(double until) {

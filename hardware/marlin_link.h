@@ -53,7 +53,7 @@ class MarlinLink {
   explicit MarlinLink(Port& port, const MarlinSettings& settings = {});
 
   /// Finds a fresh (`start` banner) or a running firmware, sets its line number to 0, reads M115.
-  /// Throws PrinterSilent; WrongDevice when the bytes look like the tactile board; PrinterHalted.
+  /// Throws PrinterSilent; WrongDevice when what comes is no firmware's answer; PrinterHalted.
   void connect();
 
   /// Runs one command and returns when the firmware has acknowledged it. `deadline_s` 0: ok_deadline_s;
@@ -84,6 +84,7 @@ class MarlinLink {
   struct Exchange;
 
   bool probe(double until);
+  [[noreturn]] void nobody_answered() const;
   void read_capabilities();
   double send(const std::string& text);
   /// Sends the exchange's current line (again), counting and limiting the repetitions.

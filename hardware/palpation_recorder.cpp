@@ -23,6 +23,13 @@ PalpationObserver observer_for(const RecorderSettings& settings, JournalWriter& 
   return observer;
 }
 
+// Nothing moves before the board has been heard: a wrong port would otherwise be found with the finger on its
+// way. The wait is a fixed one, so that a replay waits the same.
+void hear_board(TactileBoard& board, Printer& printer, const RecorderSettings& settings) {
+  printer.link().idle(settings.board.silence_s + 0.1);
+  if (!settings.replay) (void)board.next(2);  // throws what ended the board instead
+}
+
 RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> printer_port,
                       const RecorderSettings& settings, JournalWriter& journal) {
   CapturedPort captured(std::move(printer_port), journal, Stream::printer);
@@ -35,6 +42,7 @@ RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> pr
   }
   TactileBoard board(std::make_unique<CapturedPort>(std::move(board_port), journal, Stream::board),
                      settings.board);
+  hear_board(board, printer, settings);
   RecorderReport report;
   report.outcome = Palpation(printer, settings.plan, observer_for(settings, journal, board)).run();
   if (settings.replay) {

@@ -5,6 +5,7 @@
 #include <chrono>
 
 #include "hardware/errors.h"
+#include "hardware/marlin_line.h"
 
 namespace supertac {
 namespace {
@@ -77,13 +78,16 @@ void TactileBoard::read_once(double until) {
 
 void TactileBoard::check_silence(double time) {
   if (time - last_arrival_ < settings_.silence_s) return;
-  const auto total = static_cast<double>(decoder_.counters().bytes);
-  if (decoder_.counters().frames == 0 && total >= 2 && text_bytes_ > 0.9 * total) {
-    throw WrongDevice("port " + port_->name() +
-                      ": expected a tactile board, found text, as from a printer; exchange the two ports");
+  const std::uint64_t total = decoder_.counters().bytes;
+  if (decoder_.counters().frames == 0 && total >= 2) {
+    const bool text = text_bytes_ > 0.9 * static_cast<double>(total);
+    throw WrongDevice(
+        "port " + port_->name() + ": expected a tactile board, found " +
+        (text ? "text, as from a printer; exchange the two ports"
+              : std::to_string(total) + " bytes without a frame; choose the board's port (--list-ports)"));
   }
   throw BoardSilent("board " + port_->name() + ": expected 1008 frames/s, found none for " +
-                    std::to_string(settings_.silence_s) + " s; plug the board out and in again");
+                    fixed_decimals(settings_.silence_s, 1) + " s; plug the board out and in again");
 }
 
 void TactileBoard::take_batch(double time) {

@@ -24,7 +24,8 @@ RigSettings low_rig() {
 struct FaultyCollection {
   FaultyCollection() : rig(low_rig()) {
     settings.plan.passes = 1;
-    settings.plan.slide = 5;
+    settings.plan.slide = 2;
+    settings.plan.poll_interval_s = 0.02;
     settings.origin = {99.7, 101.17, 97.81};
     settings.journal = folder / "journal";
     settings.header = "fault";

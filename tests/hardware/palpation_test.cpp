@@ -67,6 +67,20 @@ TEST(Palpation, AFaultInContactLiftsTheFinger) {
   EXPECT_LT(bench.head().y, 130) << "it went on sliding";
 }
 
+TEST(Palpation, WhateverIsThrownInContactTheFingerIsLifted) {
+  const std::vector<std::function<void()>> throwers = {
+      [] { throw JournalError("journal: cannot be written: No space left on device"); },
+      [] { throw OperatorStop("stopped"); }, [] { throw std::bad_alloc(); }, [] { throw 42; },
+      [] { throw PortUnplugged("port simulated printer2: the device is gone"); }};
+  for (const auto& thrower : throwers) {
+    PalpationBench bench;
+    const PalpationOutcome outcome = bench.run({.passes = 1}, bench.in_slide(thrower));
+    EXPECT_FALSE(outcome.complete);
+    EXPECT_EQ(outcome.finger, PalpationOutcome::Finger::lifted) << outcome.note;
+    EXPECT_GT(bench.head().z, 96);
+  }
+}
+
 TEST(Palpation, AResetInTheSlideEndsTheRunAtOnce) {
   PalpationBench bench;
   const PalpationOutcome outcome =

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/stat.h>
 #include <sys/time.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -55,6 +56,28 @@ TEST(SerialPort, WhatCannotBeOpenedSaysWhy) {
     EXPECT_NE(std::string(error.what()).find("--list-ports"), std::string::npos);
     EXPECT_NE(std::string(error.what()).find(folder / "nothing"), std::string::npos);
   }
+}
+
+// A user without rights on the port; root first becomes nobody.
+TEST(SerialPort, WithoutPermissionTheGroupIsNamed) {
+  const TemporaryFolder folder;
+  const PseudoTerminal terminal(folder / "port");
+  ASSERT_EQ(chmod(terminal.path().c_str(), 0), 0);
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    int code = 1;
+    if (geteuid() == 0 && setuid(65534) != 0) _exit(2);
+    try {
+      const SerialPort port(terminal.path());
+    } catch (const PortPermission& error) {
+      code = std::string(error.what()).find("dialout") != std::string::npos ? 0 : 3;
+    }
+    _exit(code);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 TEST(SerialPort, TimeOutAndEndOfFileAreDifferent) {

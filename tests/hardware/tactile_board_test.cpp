@@ -1,6 +1,7 @@
 #include "hardware/tactile_board.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "hardware/errors.h"
 #include "hardware/marlin_link.h"
@@ -187,6 +188,22 @@ TEST(TactileBoard, APrinterAtTheBoardsPortIsRecognised) {
   TactileBoard board(std::make_unique<SerialPort>(folder / "printer", SerialSettings{kBoardBaud, 20}),
                      {.silence_s = 10});
   EXPECT_THROW((void)board.next(kPatience), WrongDevice);
+}
+
+// Neither board nor printer: noise without a frame, and a device that talks text to the printer's driver.
+TEST(TactileBoard, AnotherDeviceIsNoBoardAndNoPrinter) {
+  const TemporaryFolder folder;
+  const PseudoTerminal device(folder / "port");
+  const std::string noise(64, '\xAA'), text = "$GPGGA,123519,4807.038,N\r\n";
+  {
+    ASSERT_EQ(write(device.descriptor(), noise.data(), noise.size()), static_cast<ssize_t>(noise.size()));
+    TactileBoard board(std::make_unique<SerialPort>(folder / "port", SerialSettings{kBoardBaud, 10}));
+    EXPECT_THROW((void)board.next(kPatience), WrongDevice);
+  }
+  ASSERT_EQ(write(device.descriptor(), text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  SerialPort port(folder / "port", {.speedup = 100});
+  MarlinLink link(port);
+  EXPECT_THROW(link.connect(), WrongDevice);
 }
 
 TEST(TactileBoard, ABoardAtThePrintersPortIsRecognised) {
