@@ -10,7 +10,7 @@ namespace supertac {
 namespace {
 
 constexpr ConvLayerOptions kSameSize{.kernel = 3, .stride = 1, .padding = 1};
-constexpr Dim kFirst = 16, kSecond = 32;
+constexpr Dim kFirst = 16, kSecond = 32, kHidden = 64;
 
 Dim features(const ClassifierSettings& s) {
   if (s.size < 4 || s.size > 256 || s.classes < 2 || s.classes > 1024) {
@@ -18,6 +18,14 @@ Dim features(const ClassifierSettings& s) {
                                 std::to_string(s.size) + " and " + std::to_string(s.classes));
   }
   return kSecond * (s.size / 4) * (s.size / 4);
+}
+
+Dim checked_features(Dim features, Dim classes) {
+  if (features < 1 || classes < 2 || classes > 1024) {
+    throw std::invalid_argument("FeatureClassifier: expects at least 1 feature and 2 to 1024 classes, got " +
+                                std::to_string(features) + " and " + std::to_string(classes));
+  }
+  return features;
 }
 
 }  // namespace
@@ -34,6 +42,16 @@ TextureClassifier::TextureClassifier(const ClassifierSettings& s, Rng& rng)
 Variable TextureClassifier::forward(const Variable& x) const {
   const Variable h = max_pool2d(relu(first_.forward(x)));
   return out_.forward(flatten_channels_first(max_pool2d(relu(second_.forward(h)))));
+}
+
+FeatureClassifier::FeatureClassifier(Dim features, Dim classes, Rng& rng)
+    : hidden_(checked_features(features, classes), kHidden, rng), out_(kHidden, classes, rng) {
+  add("hidden", hidden_);
+  add("out", out_);
+}
+
+Variable FeatureClassifier::forward(const Variable& x) const {
+  return out_.forward(relu(hidden_.forward(x)));
 }
 
 }  // namespace supertac

@@ -1,4 +1,5 @@
-// The texture classifier: names the plate under the finger from one frame (4x4) or one picture (16x16).
+// The texture classifiers: name the plate under the finger from one frame (4x4), one picture (16x16), or
+// numbers that are no picture (latents).
 #pragma once
 
 #include "layers/convolution.h"
@@ -22,6 +23,18 @@ class TextureClassifier : public Module {
  private:
   Conv2d first_, second_;
   Linear out_;
+};
+
+/// For inputs without neighbours: a linear layer to 64, ReLU, and one to the classes.
+/// x [N,features] -> logits [N,classes].
+class FeatureClassifier : public Module {
+ public:
+  /// Throws std::invalid_argument for no feature or less than 2 classes.
+  FeatureClassifier(Dim features, Dim classes, Rng& rng);
+  Variable forward(const Variable& x) const;
+
+ private:
+  Linear hidden_, out_;
 };
 
 }  // namespace supertac

@@ -26,6 +26,13 @@ TEST(TextureClassifier, RefusesSettingsOutOfRange) {
   EXPECT_THROW(TextureClassifier({.size = 16, .classes = 1}, rng), std::invalid_argument);
 }
 
+TEST(FeatureClassifier, TakesNumbersAndRefusesNone) {
+  Rng rng(1);
+  EXPECT_EQ(FeatureClassifier(40, 4, rng).forward(Variable(uniform({3, 40}, 1))).shape(), (Shape{3, 4}));
+  EXPECT_THROW(FeatureClassifier(0, 4, rng), std::invalid_argument);
+  EXPECT_THROW(FeatureClassifier(40, 1, rng), std::invalid_argument);
+}
+
 // Stripes along x against stripes along y.
 TEST(TextureClassifier, LearnsToTellTwoTextures) {
   constexpr Dim kImages = 16;

@@ -1,0 +1,115 @@
+#include "apps/classify/views.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "data/baselines.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr Dim kSteps = 16;  // of a history
+constexpr const char* kHistory = "history";
+
+constexpr struct {
+  const char* name;
+  ViewKind kind;
+} kNames[] = {{"frame", ViewKind::frame},
+              {"bicubic", ViewKind::bicubic},
+              {"super_resolved", ViewKind::super_resolved},
+              {"latents", ViewKind::latents},
+              {"truth", ViewKind::truth}};
+
+Tensor last_frames(const Tensor& windows) {
+  const Dim count = windows.dim(0), stride = windows.dim(1) * kWindowTaxels;
+  Tensor frames(Shape{count, 4, 4, 1});
+  for (Dim n = 0; n < count; ++n) {
+    std::copy_n(windows.data() + (n + 1) * stride - kWindowTaxels, kWindowTaxels,
+                frames.data() + n * kWindowTaxels);
+  }
+  return frames;
+}
+
+Tensor enlarged(const Tensor& frames, Dim size) {
+  const Upsampling bicubic(Upsampling::Kind::bicubic, 4, 4, static_cast<int>(size) / 4);
+  Tensor pictures(Shape{frames.dim(0), size, size, 1});
+  const auto pixels = static_cast<std::size_t>(size * size);
+  for (std::size_t n = 0; n < static_cast<std::size_t>(frames.dim(0)); ++n) {
+    bicubic(frames.values().subspan(n * kWindowTaxels, kWindowTaxels),
+            pictures.values().subspan(n * pixels, pixels));
+  }
+  return pictures;
+}
+
+Tensor history(const Tensor& windows, Dim frames) {
+  if (frames > windows.dim(1)) {
+    throw std::invalid_argument("a history of " + std::to_string(frames) + " frames is longer than the " +
+                                std::to_string(windows.dim(1)) + " of the model's windows");
+  }
+  const Dim count = windows.dim(0), per_step = frames / kSteps;
+  Tensor pictures = Tensor::zeros(Shape{count, kSteps, kWindowTaxels, 1});
+  for (Dim n = 0; n < count; ++n) {
+    const real* from = windows.data() + ((n + 1) * windows.dim(1) - frames) * kWindowTaxels;
+    real* to = pictures.data() + n * kSteps * kWindowTaxels;
+    for (Dim t = 0; t < frames; ++t, from += kWindowTaxels) {
+      real* step = to + t / per_step * kWindowTaxels;
+      for (Dim k = 0; k < kWindowTaxels; ++k) step[k] += from[k] / static_cast<real>(per_step);
+    }
+  }
+  return pictures;
+}
+
+Tensor truths(const WindowSet& data, std::span<const std::uint32_t> indices) {
+  const Dim size = data.image_size();
+  Tensor pictures(Shape{static_cast<Dim>(indices.size()), size, size, 1});
+  const auto pixels = static_cast<std::size_t>(size * size);
+  for (std::size_t n = 0; n < indices.size(); ++n) {
+    data.truth(indices[n], pictures.values().subspan(n * pixels, pixels));
+  }
+  return pictures;
+}
+
+}  // namespace
+
+std::string View::name() const {
+  if (kind == ViewKind::history) return kHistory + std::to_string(frames);
+  return std::find_if(std::begin(kNames), std::end(kNames), [&](const auto& n) { return n.kind == kind; })
+      ->name;
+}
+
+View View::named(const std::string& name) {
+  for (const auto& known : kNames) {
+    if (name == known.name) return {known.kind};
+  }
+  if (name.starts_with(kHistory)) {
+    const auto frames = parse_int(name.substr(std::string(kHistory).size()));
+    if (frames && *frames >= kSteps && *frames <= 512 && *frames % kSteps == 0) {
+      return {ViewKind::history, static_cast<int>(*frames)};
+    }
+  }
+  throw std::invalid_argument("unknown view \"" + name +
+                              "\"; known: frame, bicubic, super_resolved, latents, truth, historyN with N a "
+                              "multiple of 16 frames, 16 to 512");
+}
+
+Tensor show(const View& view, const SuperTac& model, const WindowSet& data,
+            std::span<const std::uint32_t> indices, const Tensor& windows) {
+  switch (view.kind) {
+    case ViewKind::frame:
+      return last_frames(windows);
+    case ViewKind::bicubic:
+      return enlarged(last_frames(windows), data.image_size());
+    case ViewKind::super_resolved:
+      return model.infer(windows);
+    case ViewKind::latents:
+      return model.encode(windows);
+    case ViewKind::history:
+      return history(windows, view.frames);
+    case ViewKind::truth:
+      return truths(data, indices);
+  }
+  throw std::invalid_argument("show: no such view");
+}
+
+}  // namespace supertac

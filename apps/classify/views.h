@@ -1,0 +1,39 @@
+// What a texture classifier is shown of a window: the comparison of Figure 11 is one between views.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "data/windows.h"
+#include "models/supertac_model.h"
+
+namespace supertac {
+
+enum class ViewKind {
+  frame,    ///< the last frame as it is felt, 4x4: the paper's "raw"
+  bicubic,  ///< the same enlarged to the picture's size, so that only its content differs from a picture
+  super_resolved,  ///< the network's picture
+  latents,         ///< the means of the four latent distributions, 4 LD numbers
+  history,         ///< the last `frames` frames of all taxels, averaged to 16 steps: time without a network
+  truth,           ///< the plate itself: what a perfect picture would allow
+};
+
+struct View {
+  ViewKind kind = ViewKind::frame;
+  int frames = 0;  ///< of a history, a multiple of 16
+
+  /// "frame", "history32", ...
+  std::string name() const;
+  /// The view of that name. Throws std::invalid_argument that lists the names.
+  static View named(const std::string& name);
+  bool is_picture() const { return kind != ViewKind::latents; }
+};
+
+/// Shows windows [N,T,16] (the indices' ones, changed by augmentation perhaps) of a data set.
+/// Pictures are [N,S,S,1], latents [N,4 LD]. A history is a "picture" of 16 steps x 16 taxels.
+/// Throws std::invalid_argument when a history is longer than the windows.
+Tensor show(const View& view, const SuperTac& model, const WindowSet& data,
+            std::span<const std::uint32_t> indices, const Tensor& windows);
+
+}  // namespace supertac

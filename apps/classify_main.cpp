@@ -1,0 +1,127 @@
+// supertac-classify: which plate is under the finger? Asked of raw frames and of super-resolved pictures
+// (Figure 11 of the paper), and of what lies between.
+#include <exception>
+
+#include "apps/classify/experiment.h"
+#include "apps/classify/report.h"
+#include "apps/common/numerics.h"
+#include "apps/common/program.h"
+#include "apps/common/progress.h"
+#include "apps/common/version.h"
+
+namespace supertac {
+namespace {
+
+void declare(Arguments& a) {
+  a.required("model", "FILE,...", "models by supertac-train; run i uses the i-th, and again from the first");
+  a.required("data", "DIR", "recordings to train the classifiers on and to test them with");
+  a.option("plates", "A,B,...", "the classes (default: the plates the first model was trained on)");
+  a.option(
+      "views", "A,B,...",
+      "what the classifiers see: frame (raw 4x4), bicubic, super_resolved, latents, historyN (the last N "
+      "frames), truth; each is compared with the first",
+      "frame,super_resolved,latents,history32");
+  a.option("seeds", "N", "runs: seeds 0 to N - 1 of classifier and order", "5");
+  a.option("epochs", "N", "passes over the training windows", "8");
+  a.option("stride", "N", "train on every N-th window in contact; tested are all", "4");
+  a.option("augment", "NAME",
+           "standard: the training windows' gains, offsets and noise vary as in supertac-train; none",
+           "standard");
+}
+
+std::vector<View> views_of(const Arguments& a) {
+  std::vector<View> views;
+  for (const std::string& name : a.list("views")) {
+    try {
+      views.push_back(View::named(name));
+    } catch (const std::invalid_argument& error) {
+      throw UsageError(std::string("--views: ") + error.what());
+    }
+  }
+  return views;
+}
+
+// Every view in every run: independent jobs, spread over the threads.
+// Answers of run r to view v are at [r * views + v].
+using Answers = std::vector<std::vector<std::int32_t>>;
+
+Answers all_answers(const Arguments& a, const std::vector<View>& views, const std::vector<Candidate>& models,
+                    const std::vector<Exam>& exams, const WindowSet& windows, ExperimentSettings settings) {
+  Answers results(views.size() * static_cast<std::size_t>(a.integer("seeds", 1, 1000)));
+  std::exception_ptr error;
+  std::size_t done = 0;
+  Progress progress(a, "classifying", results.size(), "classifiers");
+#pragma omp parallel for schedule(dynamic, 1) firstprivate(settings)
+  for (std::size_t job = 0; job < results.size(); ++job) {
+    try {
+      settings.seed = job / views.size();
+      const std::size_t m = settings.seed % models.size();
+      results[job] = answers(views[job % views.size()], *models[m].file.model, windows, exams[m], settings);
+    } catch (...) {  // an exception must not leave a thread
+#pragma omp critical
+      error = std::current_exception();
+    }
+#pragma omp critical
+    progress.update(++done);
+  }
+  if (error) std::rethrow_exception(error);
+  return results;
+}
+
+std::vector<ViewResult> count(const Answers& given, const std::vector<View>& views,
+                              const std::vector<Exam>& exams, const WindowSet& windows,
+                              const std::vector<std::string>& classes, const std::string& folder) {
+  std::vector<ViewResult> results;
+  for (const View& view : views)
+    results.push_back({view, std::vector<Tally>(std::size(kParts), Tally(exams.front().classes))});
+  for (std::size_t job = 0; job < given.size(); ++job) {
+    const Exam& exam = exams[job / views.size() % exams.size()];
+    const std::vector<Part> parts = parts_of(windows, exam, classes, folder);
+    std::vector<Tally>& tallies = results[job % views.size()].parts;
+    for (std::size_t n = 0; n < exam.test.size(); ++n) {
+      const std::size_t pass = windows.pass_of(exam.test[n]);
+      for (auto p = static_cast<std::size_t>(parts[n]); p < tallies.size(); ++p)
+        tallies[p].add(pass, exam.label_of_pass[pass], given[job][n]);
+    }
+    for (Tally& tally : tallies) tally.end_run();
+  }
+  return results;
+}
+
+int run(Arguments& a) {
+  const std::vector<View> views = views_of(a);
+  ExperimentSettings settings;
+  settings.epochs = a.integer("epochs", 1, 10'000);
+  if (a.choice("augment", {"standard", "none"}) == "standard") {
+    settings.augment = {.gain = 0.5, .taxel_gain = 0.3, .offset = 0.05, .noise = 0.02, .dropped = 2};
+  }
+  const std::int64_t stride = a.integer("stride", 1, 100'000);
+  const std::vector<Candidate> models = load_candidates(a.list("model"));
+  const WindowSet windows = exam_windows(a.text("data"), a.list("plates"), models.front());
+  const std::vector<std::string> classes = classes_of(windows);
+  std::vector<Exam> exams;
+  for (const Candidate& model : models) exams.push_back(make_exam(windows, model, classes, stride));
+  a.note("split " + models.front().split + ": " + std::to_string(exams.front().train.size()) +
+         " training windows, " + std::to_string(exams.front().test.size()) + " test windows");
+
+  const Answers given = all_answers(a, views, models, exams, windows, settings);
+  const auto results = count(given, views, exams, windows, classes, a.text("data"));
+  for (const std::string& line : tables(results, classes)) a.print(line);
+  a.write_json({{"command", a.command_line()},
+                {"commit", commit()},
+                {"data", windows.fingerprint()},
+                {"split", models.front().split},
+                {"runs", given.size() / views.size()},
+                {"views", to_json(results, classes)}});
+  return kExitOk;
+}
+
+}  // namespace
+}  // namespace supertac
+
+int main(int argc, char** argv) {
+  const supertac::Program program{"supertac-classify",
+                                  "Tells textures apart: raw frames against super-resolved pictures.",
+                                  supertac::declare, supertac::run, supertac::numerics};
+  return supertac::run_program(program, argc, argv);
+}
