@@ -10,6 +10,7 @@
 #include "hardware/serial_port.h"
 #include "hardware/virtual_rig/pty_rig.h"
 #include "rig_support.h"
+#include "stall_watch.h"
 
 namespace supertac {
 namespace {
@@ -88,7 +89,7 @@ void judge(UnplugVerdict& verdict, Plug plug, const PalpationOutcome& outcome, c
     verdict.broken = "the finger was not lifted: " + outcome.note;
   } else if (plug == Plug::printer && !up && outcome.note.find("by hand") == std::string::npos) {
     verdict.broken = "nobody is told to lift the finger: " + outcome.note;
-  } else if (verdict.noticed_s > kLatest) {
+  } else if (verdict.noticed_s - verdict.stall_s > kLatest) {
     verdict.broken = "noticed after " + std::to_string(verdict.noticed_s) + " s";
   }
 }
@@ -101,6 +102,7 @@ UnplugVerdict unplug_idle(Plug plug, std::uint64_t seed) {
   SerialPort port(folder / (plug == Plug::board ? "board" : "printer"));
   UnplugVerdict verdict;
   verdict.moment_s = 0.05 * RandomStream(seed, 1).uniform(0);
+  StallWatch stalls;
   std::atomic<double> pulled{0};
   std::thread puller([&] {
     sleep_for(verdict.moment_s);
@@ -115,7 +117,8 @@ UnplugVerdict unplug_idle(Plug plug, std::uint64_t seed) {
   const double noticed = monotonic_seconds();
   puller.join();
   verdict.noticed_s = verdict.returned_s = noticed - pulled;
-  if (verdict.noticed_s > kLatest)
+  verdict.stall_s = stalls.longest(pulled, noticed);
+  if (verdict.noticed_s - verdict.stall_s > kLatest)
     verdict.broken = "noticed after " + std::to_string(verdict.noticed_s) + " s";
   return verdict;
 }
@@ -129,6 +132,7 @@ UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed) {
   verdict.moment_s = kRunSeconds * RandomStream(seed, 2).uniform(0);
   const RecorderSettings settings = short_run(folder);
   double board_failed = 0, printer_failed = 0, stopped = 0, never = 0, pulled = 0;
+  StallWatch stalls;
   std::atomic<bool> ended{false};
   std::thread puller([&] {
     for (bool moves = false; !moves && !ended; sleep_for(1e-3)) {
@@ -148,6 +152,7 @@ UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed) {
     puller.join();
     verdict.noticed_s = (plug == Plug::board ? stopped : printer_failed) - pulled;
     verdict.returned_s = returned - pulled;
+    verdict.stall_s = stalls.longest(pulled, pulled + verdict.noticed_s);
     Point3 head;
     rig.with_world([&](RigWorld& world) { head = world.printer().head(world.now()); });
     judge(verdict, plug, outcome, head, settings.plan.start.z);

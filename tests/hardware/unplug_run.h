@@ -14,6 +14,7 @@ struct UnplugVerdict {
   /// From the pull to the typed error; of the board in a collection: to the stop sent to the printer.
   double noticed_s = 0;
   double returned_s = 0;  ///< from the pull to the end of the collection, finger lifted, journal on disk
+  double stall_s = 0;     ///< for which the machine itself stood still between pull and error; allowed for
   std::string finger;     ///< what the outcome says
   std::string broken;     ///< the promise that was broken; empty when all held
 };
