@@ -40,7 +40,7 @@ void check_settings(const Arguments& a) {
   nlohmann::ordered_json settings = nlohmann::ordered_json::parse(training.text());
   settings.erase("seed");
   settings["grouping"] = name_of(training.model.grouping);
-  for (const char* option : {"data", "plates", "split", "stride", "limit"}) settings[option] = a.text(option);
+  for (const char* option : {"also", "data", "limit", "plates", "split", "stride"}) settings[option] = a.text(option);
   const std::string path = a.text("out") + "/settings.json";
   if (!fs::exists(path)) return write_file(path, settings.dump(2) + "\n");
   const auto before = parse_json_limited(read_text_file(path, 1 << 20));
@@ -204,6 +204,6 @@ int run(Arguments& a) {
 int main(int argc, char** argv) {
   const supertac::Program program{"supertac-sweep",
                                   "Trains and measures a grid of models: accuracy against latency.",
-                                  supertac::declare, supertac::run, supertac::numerics_text};
+                                  supertac::declare, supertac::run, supertac::numerics};
   return supertac::run_program(program, argc, argv);
 }

@@ -9,6 +9,8 @@
 namespace supertac {
 namespace {
 
+constexpr real kSlope = 0.01F;  // of the LeakyReLU that is stored with the sums
+
 enum class Pass { forward, grad_x, grad_w };
 
 struct Layer {
@@ -87,11 +89,13 @@ struct Buffers {
     const Dim cin = layer.cin, cout = layer.cout;
     switch (pass) {
       case Pass::forward:
-        return is_linear(layer) ? kernels::linear(n, cin, cout, x.data(), w.data(), b.data(), y.data())
-                                : kernels::conv(sizes, x.data(), w.data(), b.data(), y.data());
+        return is_linear(layer)
+                   ? kernels::linear(n, cin, cout, x.data(), w.data(), b.data(), kSlope, y.data())
+                   : kernels::conv(sizes, x.data(), w.data(), b.data(), kSlope, y.data());
       case Pass::grad_x:
-        return is_linear(layer) ? kernels::linear_grad_x(n, cin, cout, y.data(), w.data(), gx.data())
-                                : kernels::conv_grad_x(sizes, y.data(), w.data(), gx.data());
+        return is_linear(layer)
+                   ? kernels::linear_grad_x(n, cin, cout, y.data(), w.data(), Into::overwrite, gx.data())
+                   : kernels::conv_grad_x(sizes, y.data(), w.data(), Into::overwrite, gx.data());
       case Pass::grad_w:
         return is_linear(layer) ? kernels::linear_grad_w(n, cin, cout, x.data(), y.data(), gw.data())
                                 : kernels::conv_grad_w(sizes, x.data(), y.data(), gw.data());

@@ -3,6 +3,7 @@
 #include <spawn.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <cerrno>
 
 #include "io/file.h"
@@ -21,6 +22,13 @@ std::string points(const char* block, const std::vector<Configuration>& list) {
   return text + "EOD\n";
 }
 
+// Room for the labels, which stand left of their points.
+double lowest(const std::vector<Configuration>& all) {
+  double us = 1e9;
+  for (const Configuration& c : all) us = std::min(us, c.mean.at("median_us"));
+  return us;
+}
+
 }  // namespace
 
 bool draw_chart(const std::string& folder, const std::vector<Configuration>& all) {
@@ -34,10 +42,12 @@ bool draw_chart(const std::string& folder, const std::vector<Configuration>& all
           "/chart.png'\n"
           "set xlabel 'processor time of a window, us (batch 1, one thread)'\n"
           "set ylabel 'SSIM in contact, mean over seeds'\n"
-          "set logscale x\nset grid\nset key bottom right\nset offsets graph 0.05, graph 0.15, 0.02, 0.02\n"
+          "set logscale x\nset xrange [" +
+          format(lowest(all) / 3, 3) +
+          ":]\nset grid\nset key bottom right\nset offsets 0, 0, 0.02, 0.04\n"
           "plot $all using 1:2 with points pt 7 lc rgb '#bbbbbb' title 'configurations', \\\n"
           "     $front using 1:2 with linespoints pt 7 lw 2 lc rgb '#4477aa' title 'Pareto front', \\\n"
-          "     $front using 1:2:3 with labels left offset 1,-0.5 font ',9' notitle\n");
+          "     $front using 1:2:3 with labels right offset -1,0.5 font ',9' notitle\n");
   std::string program = "gnuplot", argument = script;
   char* arguments[] = {program.data(), argument.data(), nullptr};
   pid_t child = 0;

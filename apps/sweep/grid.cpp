@@ -5,16 +5,19 @@
 namespace supertac {
 namespace {
 
-// The listed values, or the preset's own.
-std::vector<Dim> values(const Arguments& a, const std::string& name, Dim otherwise) {
-  if (!a.given(name)) return {otherwise};
+std::vector<Dim> whole_numbers(const Arguments& a, const std::string& name) {
   std::vector<Dim> all;
-  for (const double value : a.numbers(name, 0, 1e6)) {
+  for (const double value : a.numbers(name, 0, 1e9)) {
     all.push_back(static_cast<Dim>(value));
     if (static_cast<double>(all.back()) != value)
       throw UsageError("--" + name + " expects whole numbers, found " + a.text(name));
   }
   return all;
+}
+
+// The listed values, or the preset's own.
+std::vector<Dim> values(const Arguments& a, const std::string& name, Dim otherwise) {
+  return a.given(name) ? whole_numbers(a, name) : std::vector<Dim>{otherwise};
 }
 
 struct Axis {
@@ -62,7 +65,7 @@ std::vector<GridPoint> grid_of(const Arguments& a) {
     for (const std::string& preset : a.list("preset")) {
       expand(a, 0, SuperTacSettings::of_preset(preset), [&](const SuperTacSettings& settings) {
         settings.check();
-        for (const double seed : a.numbers("seeds", 0, 9e15))
+        for (const Dim seed : whole_numbers(a, "seeds"))
           points.push_back({settings, static_cast<std::uint64_t>(seed)});
       });
     }
