@@ -35,6 +35,9 @@ void declare(Arguments& arguments) {
       .option("speeds", "MM_PER_S,...", "sliding speeds in mm/s", "5,10")
       .option("trials", "N", "trials of every plate and speed", "2")
       .option("passes", "N", "passes of every trial, 5 mm apart in x (at most 8)", "8")
+      .option("from", "MM", "where the finger's centre begins to slide; T samples before a window are needed",
+              "28")
+      .option("to", "MM", "where the slide ends", "80")
       .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms()))
       .option("seed", "N", "the same seed gives the same files", "1");
 }
@@ -69,6 +72,7 @@ std::vector<Job> plan(const Arguments& arguments, const std::vector<Plate>& plat
   const auto speeds = arguments.numbers("speeds", 0.5, 50);
   const int trials = static_cast<int>(arguments.integer("trials", 1, 1000));
   const int passes = static_cast<int>(arguments.integer("passes", 1, 8));
+  const double from = arguments.number("from", 0, 107), to = arguments.number("to", 1, 108);
   for (const Plate& plate : plates) {
     for (const double speed : speeds) {
       for (int trial = 1; trial <= trials; ++trial) {
@@ -78,7 +82,8 @@ std::vector<Job> plan(const Arguments& arguments, const std::vector<Plate>& plat
           named.trial = trial;
           named.pass = pass;
           named.speed_mm_s = speed;
-          const PassSettings settings{.trial = trial, .pass = pass, .speed_mm_s = speed};
+          const PassSettings settings{
+              .trial = trial, .pass = pass, .speed_mm_s = speed, .from_mm = from, .to_mm = to};
           jobs.push_back({&plate, settings, folder.add(recording_file_name(named))});
         }
       }

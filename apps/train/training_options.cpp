@@ -7,12 +7,19 @@ void declare_training(Arguments& a) {
   a.option("split", "NAME", "what is kept for testing: window, pass, trial, texture or none", "trial");
   a.option("epochs", "N", "passes over the training windows", "6");
   a.option("batch", "N", "windows per step", "64");
+  a.option(
+      "rate", "HZ",
+      "of the model's samples: T samples span T / HZ seconds; the paper's is 300, and the board's filter "
+      "leaves nothing above 10",
+      "300");
   a.option("stride", "N", "take every N-th window of a pass", "1");
   a.option("learning-rate", "X", "peak of Adam's rate, after warm-up and before the cosine", "0.001");
   a.option("augment", "NAME",
            "standard: random gains, offsets, noise and dropped taxels, for unseen trials; none", "standard");
   a.option("loss-a", "X", "share of the VAEs in the loss, 0 to 1", "0.2");
   a.option("beta", "X", "weight of the KL divergence", "0.001");
+  a.option("autoencoder", "NAME",
+           "variational; plain: latents without noise and KL divergence, for comparison", "variational");
   a.option("lambda", "X", "weight of 1 - SSIM", "0.1");
   a.option("plates", "A,B,...", "only recordings of these plates (default: all)");
   a.option("also", "DIR", "more recordings to train on, never tested: simulated ones, say", "");
@@ -26,6 +33,10 @@ TrainingSettings training_settings(const Arguments& a) {
   s.batch = a.integer("batch", 1, 4096);
   s.learning_rate = a.number("learning-rate", 1e-9, 1);
   s.loss = {a.number("loss-a", 0, 1), a.number("beta", 0, 1e6), a.number("lambda", 0, 1e6)};
+  if (a.choice("autoencoder", {"variational", "plain"}) == "plain") {
+    s.sampling = false;
+    s.loss.beta = 0;
+  }
   if (a.choice("augment", {"standard", "none"}) == "standard") {
     s.augment = {.gain = 0.5, .taxel_gain = 0.3, .offset = 0.05, .noise = 0.02, .dropped = 2};
   }
@@ -40,6 +51,7 @@ WindowSet training_windows(const Arguments& a, const SuperTacSettings& model) {
   WindowSettings w;
   w.timesteps = static_cast<int>(model.timesteps);
   w.scale = static_cast<int>(model.scale);
+  w.rate_hz = a.number("rate", 20, 2000);
   w.stride = static_cast<int>(a.integer("stride", 1, 100'000));
   WindowSet windows = WindowSet::load(a.text("data"), a.list("plates"), w);
   if (a.given("also")) windows.add_directory(a.text("also"), {}, true);
