@@ -9,14 +9,22 @@
 namespace supertac {
 namespace {
 
-// Taxel gains as they come out of the rig's recordings (median depth of the dips, 1 = reaches the floor).
-constexpr std::array<double, kTaxels> kGain = {0.90, 0.25, 0.15, 0.25, 1.00, 0.45, 0.18, 0.50,
-                                               0.25, 0.45, 0.20, 0.65, 0.60, 0.35, 0.12, 0.85};
+// Taxel gains of the rig: geometric means over fits to its recordings.
+constexpr std::array<double, kTaxels> kGain = {0.90, 0.18, 0.10, 0.15, 1.60, 0.60, 0.20, 0.60,
+                                               0.27, 0.55, 0.20, 0.65, 0.50, 0.40, 0.10, 0.80};
 constexpr double kRestVolts = 2.442, kRestSpreadVolts = 0.003;
 constexpr double kFullScaleVolts = 3.3;
+constexpr double kLeastIndentationMm = -1.8;  // of 2.5 mm of texture the finger then still touches the top
 constexpr int kAdcCodes = 4096;
 
-// Grid of the averaged surface: wide enough for every taxel of a finger whose centre is on the plate.
+// Points of the pad. Along the slide they are as fine as the tip of a ridge; across it little changes.
+constexpr int kAcross = 9, kAlong = 89;
+constexpr double kAcrossMm = 2, kAlongMm = 0.25;
+constexpr double across_mm(int i) { return kAcrossMm * (i - kAcross / 2); }
+constexpr double along_mm(int j) { return kAlongMm * (j - kAlong / 2); }
+constexpr double kNoPadSigmaMm = 0.3;  // without a pad a taxel feels the points next to it
+
+// Grid of the plate's surface: wide enough for the whole pad of a finger whose centre is on the plate.
 constexpr double kCellMm = 0.25, kMarginMm = 12, kBesideMm = -3;
 constexpr int kColumns = static_cast<int>((Plate::kWidthMm + 2 * kMarginMm) / kCellMm) + 1;
 constexpr int kRows = static_cast<int>((Plate::kLengthMm + 2 * kMarginMm) / kCellMm) + 1;
@@ -26,23 +34,14 @@ struct Term {
   bool SimulatorSettings::*on;
 };
 constexpr Term kTerms[] = {
-    {"mount", &SimulatorSettings::with_mount},
-    {"pad", &SimulatorSettings::with_pad},
-    {"dome", &SimulatorSettings::with_dome},
-    {"edges", &SimulatorSettings::with_edges},
-    {"tilt", &SimulatorSettings::with_tilt},
-    {"gains", &SimulatorSettings::with_gains},
-    {"variation", &SimulatorSettings::with_variation},
-    {"crosstalk", &SimulatorSettings::with_crosstalk},
-    {"vibration", &SimulatorSettings::with_vibration},
-    {"drift", &SimulatorSettings::with_drift},
-    {"emi", &SimulatorSettings::with_emi},
-    {"noise", &SimulatorSettings::with_noise},
-    {"adc", &SimulatorSettings::with_adc},
-    {"filter", &SimulatorSettings::with_filter},
-    {"saturation", &SimulatorSettings::with_saturation},
-    {"jitter", &SimulatorSettings::with_jitter},
-    {"loss", &SimulatorSettings::with_loss},
+    {"mount", &SimulatorSettings::with_mount},         {"pad", &SimulatorSettings::with_pad},
+    {"dome", &SimulatorSettings::with_dome},           {"edges", &SimulatorSettings::with_edges},
+    {"tilt", &SimulatorSettings::with_tilt},           {"gains", &SimulatorSettings::with_gains},
+    {"variation", &SimulatorSettings::with_variation}, {"vibration", &SimulatorSettings::with_vibration},
+    {"drift", &SimulatorSettings::with_drift},         {"emi", &SimulatorSettings::with_emi},
+    {"noise", &SimulatorSettings::with_noise},         {"adc", &SimulatorSettings::with_adc},
+    {"filter", &SimulatorSettings::with_filter},       {"saturation", &SimulatorSettings::with_saturation},
+    {"jitter", &SimulatorSettings::with_jitter},       {"loss", &SimulatorSettings::with_loss},
 };
 
 // sin(2 pi turns) to 2e-4 from products only, so that simulated bits do not depend on the C library.
@@ -54,32 +53,27 @@ double sine(double turns) {
   return sign * (1 - q2 * (1.2333 - q2 * (0.2526 - q2 * 0.0193)));
 }
 
-double hertz(double indentation) { return indentation > 0 ? indentation * std::sqrt(indentation) : 0.0; }
+// As often half as twice.
+double factor(double v) { return v >= 0 ? 1 + v : 1 / (1 - v); }
 
-// Mean over `cells` (odd) neighbours of a line of `count` elements, `step` apart; the ends repeat.
-void box_mean(double* line, int count, int step, int cells, std::vector<double>& copy) {
-  copy.resize(static_cast<size_t>(count));
-  for (int i = 0; i < count; ++i) copy[static_cast<size_t>(i)] = line[static_cast<ptrdiff_t>(i) * step];
-  const int half = cells / 2;
-  for (int i = 0; i < count; ++i) {
-    double sum = 0;
-    for (int j = i - half; j <= i + half; ++j) sum += copy[static_cast<size_t>(std::clamp(j, 0, count - 1))];
-    line[static_cast<ptrdiff_t>(i) * step] = sum / cells;
-  }
+// exp(-d^2 / 2 sigma^2) nearly, from products only: (1 - d^2 / 16 sigma^2)^8, 0 beyond 4 sigma.
+double bell(double distance, double sigma) {
+  const double rest = std::max(0.0, 1 - distance * distance / (16 * sigma * sigma));
+  const double squared = rest * rest, fourth = squared * squared;
+  return fourth * fourth;
 }
 
-std::array<double, kTaxels> mix_with_neighbours(const std::array<double, kTaxels>& load, double share) {
-  std::array<double, kTaxels> mixed{};
-  for (int k = 0; k < kTaxels; ++k) {
-    const int row = k / 4, column = k % 4;
+// Weights of `points` places for the taxels of four columns or rows, [4][points]; each row sums to 1.
+template <class Place>
+std::vector<double> taxel_weights(int points, Place place, double sigma) {
+  std::vector<double> weights;
+  for (int line = 0; line < 4; ++line) {
+    const double at = -4.5 + 3.0 * line;
     double sum = 0;
-    if (row > 0) sum += load[static_cast<size_t>(k - 4)];
-    if (row < 3) sum += load[static_cast<size_t>(k + 4)];
-    if (column > 0) sum += load[static_cast<size_t>(k - 1)];
-    if (column < 3) sum += load[static_cast<size_t>(k + 1)];
-    mixed[static_cast<size_t>(k)] = (1 - share) * load[static_cast<size_t>(k)] + share / 4 * sum;
+    for (int i = 0; i < points; ++i) sum += bell(place(i) - at, sigma);
+    for (int i = 0; i < points; ++i) weights.push_back(bell(place(i) - at, sigma) / sum);
   }
-  return mixed;
+  return weights;
 }
 
 uint64_t hash_text(const std::string& text) {  // FNV-1a
@@ -88,7 +82,10 @@ uint64_t hash_text(const std::string& text) {  // FNV-1a
   return hash;
 }
 
-// Streams: what belongs to the sensor, to a trial (one mounting of the finger), to a pass, and to a sample.
+// Streams: what belongs to the sensor, to a trial of a plate (one mounting), to a pass, and to a sample.
+uint64_t mounting_stream(const Plate& plate, int trial) {
+  return hash_text(plate.name() + "/" + std::to_string(trial));
+}
 uint64_t pass_stream(const Plate& plate, const FingerIdentity& id) {
   return hash_text(plate.name() + "/" + std::to_string(id.trial) + "/" + std::to_string(id.pass) + "/" +
                    std::to_string(static_cast<long long>(id.speed_mm_s * 1000)));
@@ -119,25 +116,24 @@ SimulatorSettings without_term(SimulatorSettings settings, const std::string& na
 
 FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& id)
     : settings_(settings), noise_seed_(id.seed), noise_stream_(pass_stream(plate, id) + 1) {
-  const RandomStream sensor(id.seed, 0), trial(id.seed, 1 + static_cast<uint64_t>(id.trial));
+  const RandomStream sensor(id.seed, 0), trial(id.seed, mounting_stream(plate, id.trial));
   const RandomStream pass(id.seed, pass_stream(plate, id));
   const double variation = settings.with_variation ? 1 : 0;
   const double spread = variation * settings.gain_spread;
-  const double common_gain = 1 + spread * pass.normal(1000);
+  const double common_gain = factor(spread * pass.normal(1000));
   const double tilt = settings.with_tilt ? settings.tilt_mm_per_mm : 0;
   const double tilt_spread = settings.with_tilt ? variation * settings.tilt_spread : 0;
-  const double slope_y = -tilt + tilt_spread * trial.normal(1001), slope_x = tilt_spread * trial.normal(1002);
+  const double slope_y = tilt + tilt_spread * trial.normal(1001), slope_x = tilt_spread * trial.normal(1002);
   for (int k = 0; k < kTaxels; ++k) {
     const auto c = static_cast<uint64_t>(k);
-    const double own = (1 + spread * trial.normal(c)) * (1 + spread / 3 * pass.normal(c));
-    gain_[c] = std::max(0.0, (settings.with_gains ? kGain[c] : 0.5) * own * common_gain);
+    const double own = factor(spread * trial.normal(c)) * factor(spread / 3 * pass.normal(c));
+    gain_[c] = (settings.with_gains ? kGain[c] : 0.5) * own * common_gain;
     rest_[c] = kRestVolts + variation * kRestSpreadVolts * sensor.normal(c);
     drift_[c] = settings.with_drift ? settings.drift_volts_per_s * pass.normal(100 + c) : 0;
-    tilt_[c] = slope_x * taxel_x_mm(k) + slope_y * taxel_y_mm(k);
   }
   const double press = trial.normal(1003) + pass.normal(1003);
-  indentation_mm_ =
-      std::max(0.05, settings.indentation_mm + variation * settings.indentation_spread_mm * press);
+  const double indentation = settings.indentation_mm + variation * settings.indentation_spread_mm * press;
+  indentation_mm_ = std::max(kLeastIndentationMm, indentation);
   vibration_phase_ = pass.uniform(1004);
   emi_phase_ = pass.uniform(1005);
 
@@ -149,19 +145,22 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
       map_[static_cast<size_t>(r * kColumns + c)] =
           beside && settings.with_edges ? kBesideMm : plate.height(x, y);
     }
-  if (settings.with_pad) average_surface();
+  shape_pad(slope_x, slope_y);
 }
 
-// Three box means come close to a Gaussian: variance 3 w^2 / 12, so w = 2 sigma.
-void FingerModel::average_surface() {
-  const int half = static_cast<int>(std::lround(settings_.pad_sigma_mm / kCellMm));
-  std::vector<double> copy;
-  for (int repeat = 0; repeat < 3; ++repeat) {
-    for (int r = 0; r < kRows; ++r)
-      box_mean(&map_[static_cast<size_t>(r * kColumns)], kColumns, 1, 2 * half + 1, copy);
-    for (int c = 0; c < kColumns; ++c)
-      box_mean(&map_[static_cast<size_t>(c)], kRows, kColumns, 2 * half + 1, copy);
-  }
+void FingerModel::shape_pad(double slope_x, double slope_y) {
+  const double sigma = settings_.with_pad ? settings_.pad_sigma_mm : kNoPadSigmaMm;
+  across_weight_ = taxel_weights(kAcross, across_mm, sigma);
+  along_weight_ = taxel_weights(kAlong, along_mm, sigma);
+  const double curvature = settings_.with_dome ? 1 / (2 * settings_.dome_radius_mm) : 0;
+  double lowest = 0;
+  for (int i = 0; i < kAcross; ++i)
+    for (int j = 0; j < kAlong; ++j) {
+      const double x = across_mm(i), y = along_mm(j);
+      rise_.push_back(curvature * (x * x + y * y) + slope_x * x + slope_y * y);
+      lowest = std::min(lowest, rise_.back());
+    }
+  for (double& rise : rise_) rise -= lowest;
 }
 
 double FingerModel::surface(double x_mm, double y_mm) const {
@@ -176,28 +175,34 @@ double FingerModel::surface(double x_mm, double y_mm) const {
 }
 
 std::array<double, kTaxels> FingerModel::loads(const FingerPose& pose) const {
-  const double dome = settings_.with_dome ? settings_.dome : 1;
-  std::array<double, kTaxels> depth{};
-  for (int k = 0; k < kTaxels; ++k) {
-    const auto c = static_cast<size_t>(k);
-    depth[c] =
-        surface(pose.x_mm + dome * taxel_x_mm(k), pose.y_mm + dome * taxel_y_mm(k)) + tilt_[c] - pose.z_mm;
-  }
-  // Balance of the mount: stiffness * lift = sum of loads. The excess load is convex and falls with the lift,
-  // so Newton's steps from lift 0 approach the root from below and never pass it.
+  std::array<double, kAcross * kAlong> depth;
+  for (int i = 0; i < kAcross; ++i)
+    for (int j = 0; j < kAlong; ++j) {
+      const auto at = static_cast<size_t>(i * kAlong + j);
+      depth[at] = surface(pose.x_mm + across_mm(i), pose.y_mm + along_mm(j)) - rise_[at] - pose.z_mm;
+    }
+  // Balance of the mount. The excess force is convex and falls with the lift, so Newton's steps from lift 0
+  // approach the root from below and never pass it.
   double lift = 0;
-  for (int step = 0; settings_.with_mount && step < 8; ++step) {
+  for (int step = 0; settings_.with_mount && step < 12; ++step) {
     double excess = -settings_.mount_stiffness * lift, slope = settings_.mount_stiffness;
     for (const double d : depth) {
-      if (d <= lift) continue;
-      const double root = std::sqrt(d - lift);
-      excess += (d - lift) * root;
-      slope += 1.5 * root;
+      const double indented = std::max(0.0, d - lift);
+      excess += kAcrossMm * kAlongMm * indented;
+      slope += indented > 0 ? kAcrossMm * kAlongMm : 0.0;
     }
     lift += excess / slope;
   }
   std::array<double, kTaxels> load{};
-  for (size_t k = 0; k < kTaxels; ++k) load[k] = hertz(depth[k] - lift);
+  for (size_t i = 0; i < kAcross; ++i) {
+    std::array<double, 4> rows{};
+    for (size_t j = 0; j < kAlong; ++j) {
+      const double indented = depth[i * kAlong + j] - lift;
+      if (indented <= 0) continue;
+      for (size_t row = 0; row < 4; ++row) rows[row] += along_weight_[row * kAlong + j] * indented;
+    }
+    for (size_t k = 0; k < kTaxels; ++k) load[k] += across_weight_[k % 4 * kAcross + i] * rows[k / 4];
+  }
   return load;
 }
 
@@ -205,8 +210,7 @@ std::array<double, kTaxels> FingerModel::volts(const FingerPose& pose, double ti
   FingerPose shaken = pose;
   if (settings_.with_vibration)
     shaken.z_mm += settings_.vibration_mm * sine(settings_.vibration_hz * time_s + vibration_phase_);
-  std::array<double, kTaxels> load = loads(shaken);
-  if (settings_.with_crosstalk) load = mix_with_neighbours(load, settings_.crosstalk);
+  const std::array<double, kTaxels> load = loads(shaken);
   const double emi =
       settings_.with_emi ? settings_.emi_volts * sine(settings_.emi_hz * time_s + emi_phase_) : 0;
   const RandomStream noise(noise_seed_, noise_stream_);

@@ -14,23 +14,21 @@ namespace supertac {
 /// strong it is. Defaults resemble the rig's recordings; data/README.md shows what each term changes.
 struct SimulatorSettings {
   double rate_hz = 300;
-  double indentation_mm = 0.35;  ///< how far the slide's path lies below first contact with the flat plate
-  double volts_per_load = 0.8;   ///< drop of a taxel of gain 1 under unit load; load = indentation^1.5 (mm)
+  double indentation_mm = 0.2;  ///< how far the slide's path lies below first contact with the flat plate
+  double volts_per_load = 0.9;  ///< drop of a taxel of gain 1 per unit load; load = mean indentation (mm)
 
-  bool with_mount = true;      ///< the finger gives way: a bump under one row lifts the other rows
-  double mount_stiffness = 2;  ///< unit loads per mm
-  bool with_pad = true;        ///< the elastic pad spreads a point of the surface
-  double pad_sigma_mm = 1.3;
-  bool with_dome = true;   ///< the pad is round: outer taxels meet the surface further inside
-  double dome = 0.78;      ///< contact lies at this share of the taxel's distance from the centre
+  bool with_mount = true;       ///< the finger gives way: a bump under one row lifts the other rows
+  double mount_stiffness = 15;  ///< cubic mm of indented pad per mm
+  bool with_pad = true;         ///< the elastic pad spreads an indentation to the taxels around it
+  double pad_sigma_mm = 2.27;
+  bool with_dome = true;  ///< the pad is round: it touches an element before a taxel is above it
+  double dome_radius_mm = 47;
   bool with_edges = true;  ///< beside the plate there is nothing to touch
   bool with_tilt = true;   ///< the finger's rear rows ride lower
-  double tilt_mm_per_mm = 0.02, tilt_spread = 0.01;
+  double tilt_mm_per_mm = 0.0, tilt_spread = 0.01;
   bool with_gains = true;      ///< taxels differ: the outer columns feel most
   bool with_variation = true;  ///< gain and indentation differ from trial to trial and pass to pass
-  double gain_spread = 0.15, indentation_spread_mm = 0.06;
-  bool with_crosstalk = true;  ///< share of a taxel's load that its neighbours feel
-  double crosstalk = 0.06;
+  double gain_spread = 0.4, indentation_spread_mm = 0.5;
   bool with_vibration = true;  ///< of the printer, in z
   double vibration_mm = 0.01, vibration_hz = 28;
   bool with_drift = true;  ///< of the rest voltages
@@ -70,9 +68,13 @@ struct FingerIdentity {
 /// The finger's 16 voltages over a plate: contact of an elastic pad on a yielding mount, then the sensor. A
 /// pure function of pose and time, used alike by the simulator and by the virtual rig.
 ///
-/// For taxel k at (x_k, y_k): d_k = surface(x + x_k, y + y_k) + tilt_k - z - lift, load_k = max(d_k, 0)^1.5
-/// (Hertz), stiffness * lift = sum_k load_k, V_k = rest_k - volts_per_load * gain_k * load_k + disturbances.
-/// `surface` is the plate's height averaged by the pad.
+/// A point u of the pad, 2 mm apart across and 0.25 mm along the slide, is indented by
+///   d(u) = max(0, plate(x + u_x, y + u_y) - |u|^2 / (2 radius) - slope u - z - lift)   (mm, lowest point at
+///   0),
+/// the mount yields until stiffness * lift = integral of d, and taxel k feels the mean of d around it:
+///   load_k = sum_u w(u - u_k) d(u),  w a bell of standard deviation pad_sigma, sum 1,
+///   V_k = rest_k - volts_per_load * gain_k * load_k + disturbances.
+/// Radius, sigma, stiffness, slope and the linear law were fitted to the rig's recordings (data/README.md).
 class FingerModel {
  public:
   FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& identity);
@@ -80,10 +82,11 @@ class FingerModel {
   /// Voltages before ADC, filter and saturation.
   std::array<double, kTaxels> volts(const FingerPose& pose, double time_s) const;
 
-  /// Load on every taxel (mm^1.5): what `volts` senses, without gains and disturbances.
+  /// Load on every taxel (mm): what `volts` senses, without gains and disturbances.
   std::array<double, kTaxels> loads(const FingerPose& pose) const;
 
-  /// This pass's path height during the slide: minus the indentation.
+  /// This pass's path height during the slide: minus the indentation. Positive when the finger rides above
+  /// the flat plate and touches only the texture.
   double slide_z_mm() const { return -indentation_mm_; }
 
   /// Random stream of this pass, for whatever else happens to it.
@@ -95,13 +98,15 @@ class FingerModel {
 
  private:
   double surface(double x_mm, double y_mm) const;
-  void average_surface();
+  void shape_pad(double slope_x, double slope_y);
 
   SimulatorSettings settings_;
   uint64_t noise_seed_ = 0, noise_stream_ = 0;
-  std::array<double, kTaxels> gain_{}, rest_{}, drift_{}, tilt_{};
+  std::array<double, kTaxels> gain_{}, rest_{}, drift_{};
   double indentation_mm_ = 0, vibration_phase_ = 0, emi_phase_ = 0;
-  std::vector<double> map_;  // surface on a grid, x fastest
+  std::vector<double> map_;                           // surface on a grid, x fastest
+  std::vector<double> rise_;                          // of the pad's points above its lowest, [across][along]
+  std::vector<double> across_weight_, along_weight_;  // bell of each taxel column and row, [4][points]
 };
 
 /// Position of taxel k from the finger's centre (mm): x = -4.5 + 3 (k % 4), y = -4.5 + 3 (k / 4).

@@ -66,7 +66,9 @@ TEST(Simulator, EachRowFeelsTheRidgeWhereItIs) {
 }
 
 TEST(Simulator, FourPhases) {
-  const Recording r = simulate_pass(Plate::named("plain"), {.pass = 4}, without_term({}, "loss"));
+  // Without variation the finger presses the flat plate, as half of the rig's passes do.
+  const Recording r =
+      simulate_pass(Plate::named("plain"), {.pass = 4}, without_term(without_term({}, "loss"), "variation"));
   const auto y = [&](size_t i) { return r.position_mm[2 * i + 1]; };
   const size_t n = r.frames();
   EXPECT_EQ(y(0), 28);
@@ -74,7 +76,7 @@ TEST(Simulator, FourPhases) {
   EXPECT_NEAR(y(1545), 78, 1);                // slides
   EXPECT_EQ(y(n - 1), 80);                    // release and re-position
   EXPECT_GT(r.position_mm[2 * (n - 1)], 17);  // on its way to the next pass
-  EXPECT_GT(deepest(r, 0), 0.005);            // the flat plate is touched
+  EXPECT_GT(deepest(r, 5), 0.005);            // the flat plate is touched
 }
 
 TEST(Simulator, ResemblesTheRig) {
