@@ -44,20 +44,21 @@ void TrainingSettings::check() const {
 }
 
 std::string TrainingSettings::text() const {
-  const nlohmann::ordered_json json = {{"epochs", epochs},
-                                       {"batch", batch},
-                                       {"seed", seed},
-                                       {"learning_rate", learning_rate},
-                                       {"warm_up", warm_up},
-                                       {"clip_norm", clip_norm},
-                                       {"a", loss.a},
-                                       {"beta", loss.beta},
-                                       {"lambda", loss.lambda},
-                                       {"gain", augment.gain},
-                                       {"taxel_gain", augment.taxel_gain},
-                                       {"offset", augment.offset},
-                                       {"noise", augment.noise},
-                                       {"dropped", augment.dropped}};
+  nlohmann::ordered_json json = {{"epochs", epochs},
+                                 {"batch", batch},
+                                 {"seed", seed},
+                                 {"learning_rate", learning_rate},
+                                 {"warm_up", warm_up},
+                                 {"clip_norm", clip_norm},
+                                 {"a", loss.a},
+                                 {"beta", loss.beta},
+                                 {"lambda", loss.lambda},
+                                 {"gain", augment.gain},
+                                 {"taxel_gain", augment.taxel_gain},
+                                 {"offset", augment.offset},
+                                 {"noise", augment.noise},
+                                 {"dropped", augment.dropped}};
+  if (!sampling) json["sampling"] = false;  // not named otherwise: the text of older files stays the same
   return json.dump();
 }
 
@@ -91,7 +92,7 @@ Trainer::Lane::Lane(const SuperTac& master, Dim first_sample, Dim count)
   const SuperTacSettings& s = master.settings();
   windows = Tensor(Shape{count, s.timesteps, kWindowTaxels});
   truth = Tensor(Shape{count, s.image_size(), s.image_size(), 1});
-  for (Tensor& e : eps) e = Tensor(Shape{count, s.latent});
+  for (Tensor& e : eps) e = Tensor::zeros(Shape{count, s.latent});
   pictures = truths = Spread(static_cast<std::size_t>(s.image_size() * s.image_size()));
   means = Spread(kGroups * static_cast<std::size_t>(s.latent));
   share_values(master.parameters(), model.parameters());
@@ -117,6 +118,7 @@ void Trainer::fill(Lane& lane) const {
 
 // The numbers of sample i of step s do not depend on how the batch is cut.
 void Trainer::draw_eps(Lane& lane) const {
+  if (!settings_.sampling) return;  // eps stays 0
   const RandomStream random(settings_.seed, kEpsStream);
   const auto latent = static_cast<std::uint64_t>(settings_.model.latent);
   for (std::size_t g = 0; g < kGroups; ++g) {

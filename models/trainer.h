@@ -36,6 +36,8 @@ struct TrainingSettings {
   double learning_rate = 1e-3;
   double warm_up = 0.05;  ///< share of all steps in which the rate rises; then half a cosine to 0
   double clip_norm = 1;   ///< 0 = never
+  /// Whether z is drawn around its mean. Without, and with beta 0, the VAEs are plain autoencoders.
+  bool sampling = true;
 
   /// Throws std::invalid_argument naming the setting.
   void check() const;

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include <cmath>
 #include <functional>
 
+#include "models/evaluation.h"
 #include "tests/models/support.h"
 
 namespace supertac {
@@ -19,6 +21,24 @@ TEST(Trainer, Learns) {
   double last = 0;
   while (!trainer.done()) last = trainer.train_step().l2;
   EXPECT_LT(last, first / 4);
+}
+
+// Without noise the picture of the first step is that of inference.
+TEST(Trainer, WithoutSamplingLatentsAreTheMeans) {
+  TrainingSettings settings = small_training();
+  settings.loss.beta = 0;
+  const WindowSet windows = small_windows(settings.model);
+  settings.batch = static_cast<std::int64_t>(windows.size());
+  const auto errors = [&](bool sampling) {
+    settings.sampling = sampling;
+    Trainer trainer(windows, all_of(windows), settings);
+    const ContactMetrics scores = score(trainer.model(), windows, all_of(windows));
+    const double inferred = std::pow(10, -scores.all().psnr_pooled_db / 10);
+    return std::abs(trainer.train_step().l2 - inferred) / inferred;
+  };
+  EXPECT_LT(errors(false), 1e-4);
+  EXPECT_GT(errors(true), 1e-3);
+  EXPECT_NE(settings.text().find("\"beta\":0.0"), std::string::npos);
 }
 
 std::string checkpoint_of(int threads, std::int64_t interrupted_after) {
