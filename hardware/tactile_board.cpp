@@ -11,6 +11,8 @@ namespace supertac {
 namespace {
 
 constexpr double kReadSlice = 0.05;
+constexpr std::size_t kReadBytes =
+    2048;  // half of what a terminal holds: a read that fills it left more behind
 
 bool is_text(std::byte byte) {
   const int c = std::to_integer<int>(byte);
@@ -60,7 +62,7 @@ void TactileBoard::run() {
 }
 
 void TactileBoard::read_once(double until) {
-  std::array<std::byte, 4096> buffer{};
+  std::array<std::byte, kReadBytes> buffer{};
   const Received got = port_->read(buffer, until);
   const auto bytes = std::span(buffer).first(got.count);
   if (decoder_.counters().frames == 0) {
@@ -70,7 +72,7 @@ void TactileBoard::read_once(double until) {
   decoder_.push(bytes, [&](const BoardFrame& frame, std::uint64_t discarded) {
     batch_.push_back({frame, discarded});
   });
-  take_batch(got.time_s);
+  take_batch(got.time_s, got.count == buffer.size());
   check_silence(got.time_s);
   std::lock_guard lock(mutex_);
   counters_.decoder = decoder_.counters();
@@ -90,12 +92,15 @@ void TactileBoard::check_silence(double time) {
                     fixed_decimals(settings_.silence_s, 1) + " s; plug the board out and in again");
 }
 
-void TactileBoard::take_batch(double time) {
-  auto left = static_cast<double>(batch_.size());
-  const double step = first_ ? kFramePeriod : std::min(kFramePeriod, (time - last_time_) / left);
+void TactileBoard::take_batch(double time, bool more_waits) {
+  const auto count = static_cast<double>(batch_.size());
+  const double step = first_ ? kFramePeriod : std::min(kFramePeriod, (time - last_time_) / count);
+  // Frames that have waited follow the last one; what is read as it comes has just been finished.
+  const double begin = more_waits && !first_ ? last_time_ : time - count * step;
+  double number = 0;
   for (const Decoded& decoded : batch_) {
-    left -= 1;
-    take({.frame = decoded.frame, .arrival_s = time, .time_s = time - left * step}, decoded.discarded);
+    number += 1;
+    take({.frame = decoded.frame, .arrival_s = time, .time_s = begin + number * step}, decoded.discarded);
   }
 }
 

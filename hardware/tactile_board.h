@@ -21,9 +21,9 @@ namespace supertac {
 struct StampedFrame {
   BoardFrame frame;
   double arrival_s = 0;
-  /// When the board finished the frame, as far as that is known at once: of the frames one read brought the
-  /// last has just been finished, the others a period apart before it. Increasing; an arrival's delay is its
-  /// error.
+  /// When the board finished the frame, as far as that is known at once: the last frame of a read has just
+  /// been finished and the others a period apart before it, unless the read left more behind: then they
+  /// follow the frame before. Increasing.
   double time_s = 0;
   bool suspect = false;  ///< first after a pause of 1.5 periods or after discarded bytes: may be torn
   bool jump = false;     ///< implausible change of a taxel
@@ -66,7 +66,7 @@ class TactileBoard {
  private:
   void run();
   void read_once(double until);
-  void take_batch(double time);
+  void take_batch(double time, bool more_waits);
   void take(StampedFrame frame, std::uint64_t discarded);
   void date_decided();
   void check_silence(double time);

@@ -123,6 +123,32 @@ TEST(TactileBoard, FramesOfOneReadAreAPeriodApart) {
   }
 }
 
+TEST(TactileBoard, FramesThatWaitedFollowTheOneBefore) {
+  // 24 frames waited for 50 ms in a port that held no more, the next 25 were lost; 2048 bytes are 12.5
+  // frames.
+  const std::vector<std::byte> waited = some_frames(24);
+  const auto part = [&](std::size_t from, std::size_t to) {
+    return std::vector<std::byte>(waited.begin() + static_cast<std::ptrdiff_t>(from),
+                                  waited.begin() + static_cast<std::ptrdiff_t>(to));
+  };
+  TactileBoard board(
+      std::make_unique<ScriptedPort>(std::vector<ScriptedPort::Read>{{10, some_frames(1)},
+                                                                     {10.05, part(0, 2048)},
+                                                                     {10.05, part(2048, waited.size())},
+                                                                     {10.051, some_frames(1)}}));
+  std::vector<double> times;
+  for (int i = 0; i < 26; ++i) {
+    const auto frame = board.next(kPatience);
+    ASSERT_TRUE(frame);
+    times.push_back(frame->time_s);
+  }
+  EXPECT_EQ(times[0], 10);
+  for (std::size_t i = 1; i <= 12; ++i)
+    EXPECT_NEAR(times[i], 10 + static_cast<double>(i) * kFramePeriod, 1e-9) << i;
+  EXPECT_NEAR(times[24], 10.05, 1e-9);  // of the last read nobody can say that it waited
+  EXPECT_NEAR(times[25], 10.051, 1e-9);
+}
+
 TEST(TactileBoard, LostFramesAreCountedAndTheNextIsSuspect) {
   RigSettings settings = running_rig();
   settings.faults.lost_frame_rate = 0.01;
