@@ -11,6 +11,7 @@
 #include "apps/common/signals.h"
 #include "data/plate_file.h"
 #include "data/registration.h"
+#include "data/registration_picture.h"
 #include "data/text_import.h"
 #include "io/file.h"
 #include "io/numbers.h"
@@ -43,6 +44,8 @@ void declare(Arguments& arguments) {
       .option("journal", "FILE", "instead of TEXT_DIR: recover a collection that was cut off")
       .required("out", "DIR", "folder for the recordings, one file per pass")
       .option("speed", "MM_PER_S", "sliding speed of the passes in mm/s", "10")
+      .option("pictures", "DIR", "write a PNG of each pass: its signals under the plate they were fitted to",
+              "")
       .flag("skip-bad", "leave out files that are no recordings instead of giving up");
 }
 
@@ -130,6 +133,11 @@ nlohmann::ordered_json to_json(const TextPass& pass, const Imported& imported) {
            {{"start_mm", registration.start_mm},
             {"rate_mm_s", registration.rate},
             {"residual_mm", registration.residual},
+            {"contacts", registration.contacts},
+            {"elements", registration.elements},
+            {"matched", registration.matched},
+            {"coverage", registration.coverage},
+            {"margin", registration.margin},
             {"reliable", registration.reliable},
             {"reason", registration.reason}}}};
 }
@@ -151,7 +159,8 @@ struct Outcome {
   size_t written = 0, reliable = 0, bad = 0;
 };
 
-Outcome import_all(const Arguments& arguments, const std::vector<TextPass>& passes, OutputFolder& folder) {
+Outcome import_all(const Arguments& arguments, const std::vector<TextPass>& passes, OutputFolder& folder,
+                   OutputFolder* pictures) {
   Outcome outcome;
   Progress progress(arguments, "importing", passes.size(), "files");
   const double speed = arguments.number("speed", 0.1, 1000);
@@ -160,6 +169,9 @@ Outcome import_all(const Arguments& arguments, const std::vector<TextPass>& pass
     try {
       const Imported imported = import_pass(passes[i], speed);
       write_recording(folder.add(recording_file_name(imported.recording)), imported.recording);
+      if (pictures != nullptr)
+        write_png(pictures->add(fs::path(recording_file_name(imported.recording)).stem().string() + ".png"),
+                  registration_picture(imported.recording, passes[i].plate));
       outcome.files.push_back(to_json(passes[i], imported));
       outcome.reliable += imported.registration.reliable;
       ++outcome.written;
@@ -178,7 +190,7 @@ Outcome import_all(const Arguments& arguments, const std::vector<TextPass>& pass
 }
 
 int recover(const Arguments& arguments) {
-  for (const char* other : {"TEXT_DIR", "speed", "skip-bad"})
+  for (const char* other : {"TEXT_DIR", "speed", "skip-bad", "pictures"})
     if (arguments.given(other))
       throw UsageError(std::string("--journal: stands alone with --out, found with ") + other);
   const std::string out = arguments.text("out");
@@ -200,7 +212,9 @@ int run(Arguments& arguments) {
   arguments.number("speed", 0.1, 1000);
   const auto passes = find_passes(arguments.text("TEXT_DIR"));
   OutputFolder folder(arguments.text("out"), arguments.force());
-  const Outcome outcome = import_all(arguments, passes, folder);
+  std::optional<OutputFolder> pictures;
+  if (arguments.given("pictures")) pictures.emplace(arguments.text("pictures"), arguments.force());
+  const Outcome outcome = import_all(arguments, passes, folder, pictures ? &*pictures : nullptr);
   if (outcome.written == 0) {
     throw FileError(arguments.text("TEXT_DIR"),
                     "none of " + std::to_string(outcome.bad) + " files is a recording");
@@ -213,6 +227,7 @@ int run(Arguments& arguments) {
   for (const auto& plate : entries_of(arguments.text("TEXT_DIR"), true))
     keep_plate_file(plate_file_of(plate), arguments.text("out"));
   folder.keep();
+  if (pictures) pictures->keep();
   arguments.print(std::to_string(outcome.written) + " recordings in " + arguments.text("out") + ", " +
                   std::to_string(outcome.reliable) + " with a reliable registration");
   return kExitOk;

@@ -12,9 +12,6 @@
 namespace supertac {
 namespace {
 
-// Where the contact of a taxel row lies from the finger's centre. Taxel rows are 3 mm apart, but the pad is
-// round: medians over the rig's 96 passes.
-constexpr std::array<double, 4> kRowOffsetMm = {-3.5, -1.3, 1.3, 3.5};
 // The first element under the leading row and the last one under the trailing row carry the finger alone and
 // are felt further out, with slopes of different steepness: little weight.
 constexpr double kAloneShiftMm = 1.0, kAloneWeight = 0.2;
@@ -141,7 +138,7 @@ class Fit {
   }
 
   Match match(const Event& event, const Line& line) const {
-    const double y = line.middle_mm + line.rate * event.time + kRowOffsetMm[static_cast<size_t>(event.row)];
+    const double y = line.middle_mm + line.rate * event.time + row_contact_mm(static_cast<size_t>(event.row));
     size_t nearest = 0;
     for (size_t j = 1; j < crests_.size(); ++j)
       if (std::abs(crests_[j] - y) < std::abs(crests_[nearest] - y)) nearest = j;
@@ -203,7 +200,7 @@ class Fit {
     std::vector<std::array<double, 4>> felt(crests_.size());
     double total = 0, agree = 0;
     for (const Event& event : events_) {
-      const double y = middle_mm + rate * event.time + kRowOffsetMm[static_cast<size_t>(event.row)];
+      const double y = middle_mm + rate * event.time + row_contact_mm(static_cast<size_t>(event.row));
       size_t nearest = 0;
       double distance = std::abs(crests_[0] - y);
       for (size_t j = 1; j < crests_.size(); ++j)
@@ -227,7 +224,7 @@ class Fit {
     for (size_t j = 0; j < crests_.size(); ++j) {
       double best = -1;
       for (size_t row = 0; row < 4; ++row) {
-        const double time = (crests_[j] - kRowOffsetMm[row] - line.middle_mm) / line.rate + middle_s_;
+        const double time = (crests_[j] - row_contact_mm(row) - line.middle_mm) / line.rate + middle_s_;
         if (time < stretch_.begin_s || time > stretch_.end_s) continue;
         pairs += 1, felt_pairs += felt[j][row];
         best = std::max(best, felt[j][row]);

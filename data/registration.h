@@ -24,6 +24,13 @@ struct Registration {
   std::string reason;  ///< what is wrong when it is not
 };
 
+/// Where, from the finger's centre along y, a row of taxels (0 trailing to 3 leading) feels an element best:
+/// rows are 3 mm apart, but the pad is round.
+constexpr double row_contact_mm(size_t row) {
+  constexpr double kMm[] = {-3.5, -1.3, 1.3, 3.5};  // medians over the rig's 96 passes
+  return kMm[row];
+}
+
 /// Fits start and rate of a pass to its plate. Each element of the texture that passes a taxel row makes a
 /// contact (find_contacts); the fit is the line that puts the contacts of all rows onto the plate's elements:
 ///   y(time of contact) + row offset = crest of the element.
