@@ -7,6 +7,7 @@
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
 #include "apps/evaluate/exports.h"
+#include "apps/evaluate/pairs.h"
 #include "data/baselines.h"
 #include "data/metrics.h"
 #include "data/split.h"
@@ -20,9 +21,12 @@ namespace {
 
 void declare(Arguments& a) {
   a.required("model", "FILE", "a model written by supertac-train");
-  a.required("data", "DIR", "recordings to test on");
-  a.option("split", "NAME",
-           "window, pass, trial, texture or none (default: the model's own); its test side is scored");
+  a.option("data", "DIR", "recordings to test on");
+  a.option("pairs", "FILE", "instead of --data: pairs to test a model trained with --pairs on");
+  a.option(
+      "split", "NAME",
+      "window, pass, trial, texture or none; with --pairs group, pair or none (default: the model's own); "
+      "its test side is scored");
   a.option("seed", "N", "of the split (default: the model's own)");
   a.option("plates", "A,B,...", "only recordings of these plates (default: the model's own)");
   a.option("limit", "N", "score at most N windows, evenly spread; 0 = all", "0");
@@ -90,6 +94,8 @@ std::string row(const std::string& name, const ContactMetrics& metrics) {
 }
 
 int run(Arguments& a) {
+  if (a.given("pairs")) return evaluate_on_pairs(a);
+  if (!a.given("data")) throw UsageError("expected --data DIR or --pairs FILE, found neither");
   const std::string outputs_path = a.text("outputs");
   if (!outputs_path.empty()) refuse_existing(outputs_path, a.force());
   const ModelFile file = load_model(a.text("model"));

@@ -1,6 +1,7 @@
 // supertac-train: recordings in, a SuperTac model out.
 #include "apps/common/numerics.h"
 #include "apps/common/program.h"
+#include "apps/train/pairs.h"
 #include "apps/train/training_options.h"
 #include "apps/train/training_run.h"
 #include "io/file.h"
@@ -9,7 +10,11 @@ namespace supertac {
 namespace {
 
 void declare(Arguments& a) {
-  a.required("data", "DIR", "recordings to train on (supertac-simulate, -import, -collect)");
+  a.option("data", "DIR", "recordings to train on (supertac-simulate, -import, -collect)");
+  a.option(
+      "pairs", "FILE",
+      "instead of --data: images of any sensor, safetensors with input [N,C,H,W], target [N,1,sH,sW] in 0 "
+      "to 1, optional group [N]; takes split (group, pair, none), epochs, batch, learning-rate, lambda");
   a.required("out", "FILE",
              "the model; FILE's run folder beside it (.run) holds log, report and the state to resume");
   a.option("preset", "NAME", "network: paper", "paper");
@@ -37,6 +42,8 @@ TrainingSettings settings_of(const Arguments& a) {
 }
 
 int run(Arguments& a) {
+  if (a.given("pairs")) return train_on_pairs(a);
+  if (!a.given("data")) throw UsageError("expected --data DIR or --pairs FILE, found neither");
   const std::string out = a.text("out");
   const TrainingSettings settings = settings_of(a);
   const SplitKind kind = training_split(a);

@@ -8,12 +8,12 @@
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
 #include "apps/common/version.h"
+#include "apps/train/log_means.h"
 #include "models/evaluation.h"
 
 namespace supertac {
 namespace {
 
-constexpr std::int64_t kStepsPerLogLine = 50;
 constexpr std::size_t kTestWindowsPerEpoch = 2000;
 
 // What the model file says of its origin; the same whatever machine, folder or number of threads.
@@ -31,30 +31,6 @@ Trainer make_trainer(const WindowSet& windows, const Split& split, const Trainin
   if (!resume.empty()) trainer.restore(resume, origin);
   return trainer;
 }
-
-// Sums of the steps since the last line of the log.
-class LogMeans {
- public:
-  void add(const StepReport& r) {
-    ++steps_;
-    total_ += r.total, reconstruction_ += r.reconstruction, kld_ += r.kld, l2_ += r.l2, ssim_ += r.ssim;
-    norm_ += r.gradient_norm;
-    last_ = r;
-  }
-  LogLine take(double seconds) {
-    const double n = static_cast<double>(steps_);
-    const LogLine line{seconds, last_.step, total_ / n, reconstruction_ / n, kld_ / n,
-                       l2_ / n, ssim_ / n,  norm_ / n,  last_.learning_rate, {},
-                       {}};
-    *this = LogMeans();
-    return line;
-  }
-
- private:
-  std::int64_t steps_ = 0;
-  double total_ = 0, reconstruction_ = 0, kld_ = 0, l2_ = 0, ssim_ = 0, norm_ = 0;
-  StepReport last_;
-};
 
 nlohmann::ordered_json describe(const Arguments& a, const Trainer& trainer, const WindowSet& windows,
                                 const Split& split) {
@@ -132,7 +108,7 @@ void TrainingRun::step_until_done() {
               "--learning-rate (now " + a_.text("learning-rate") + ")");
     }
     const bool epoch_ends = report.step % trainer_.steps_per_epoch() == 0;
-    if (epoch_ends || report.step % kStepsPerLogLine == 0) log(means.take(seconds()), epoch_ends);
+    if (epoch_ends || report.step % LogMeans::kSteps == 0) log(means.take(seconds()), epoch_ends);
     if (report.step % every == 0) save();
     progress.update(static_cast<std::uint64_t>(report.step));
   }

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "apps/common/arguments.h"
+
+namespace supertac {
+
+/// supertac-evaluate --pairs FILE: scores of a frame model and the baselines on the test side of pairs, all
+/// together and for every group. Throws UsageError for options that only recordings have.
+int evaluate_on_pairs(const Arguments& a);
+
+}  // namespace supertac

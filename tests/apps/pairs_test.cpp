@@ -1,0 +1,132 @@
+// supertac-train and supertac-evaluate on pairs of images of another sensor.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "io/file.h"
+#include "io/random.h"
+#include "io/safetensors.h"
+#include "tests/apps/process.h"
+
+namespace supertac {
+namespace {
+
+constexpr uint64_t kPlenty = 1 << 26;
+
+/// A ridge at a random place and angle under an array of 4 x 6 taxels; five groups of twelve.
+std::string write_pairs(const TemporaryFolder& folder, bool grouped = true) {
+  constexpr uint64_t kCount = 60, kRows = 4, kColumns = 6, kScale = 4;
+  std::vector<float> input, target;
+  std::vector<int64_t> group;
+  const RandomStream random(9, 0);
+  for (uint64_t n = 0; n < kCount; ++n) {
+    const double slope = 2 * random.uniform(2 * n) - 1, offset = 4 * random.uniform(2 * n + 1);
+    const auto ridge = [&](double y, double x, double width) {
+      return static_cast<float>(std::exp(-std::pow((y - offset - slope * (x - 3)) / width, 2)));
+    };
+    for (uint64_t k = 0; k < kRows * kColumns; ++k)
+      input.push_back(2.4F - 0.3F * ridge(static_cast<double>(k / kColumns) + 0.5,
+                                          static_cast<double>(k % kColumns) + 0.5, 1));
+    for (uint64_t p = 0; p < kRows * kColumns * kScale * kScale; ++p)
+      target.push_back(ridge((static_cast<double>(p / (kColumns * kScale)) + 0.5) / kScale,
+                             (static_cast<double>(p % (kColumns * kScale)) + 0.5) / kScale, 0.5));
+    group.push_back(static_cast<int64_t>(100 + n / 12));
+  }
+  std::vector<TensorToWrite> tensors = {
+      {"input", "F32", {kCount, 1, kRows, kColumns}, std::as_bytes(std::span(input))},
+      {"target", "F32", {kCount, 1, kRows * kScale, kColumns * kScale}, std::as_bytes(std::span(target))}};
+  if (grouped) tensors.push_back({"group", "I64", {kCount}, std::as_bytes(std::span(group))});
+  const std::string path = folder / (grouped ? "pairs.safetensors" : "loose.safetensors");
+  write_safetensors(path, {}, tensors);
+  return path;
+}
+
+std::vector<std::string> training(const TemporaryFolder& folder, const std::string& out,
+                                  const std::vector<std::string>& more = {}) {
+  std::vector<std::string> all = {"--pairs",  folder / "pairs.safetensors",
+                                  "--out",    folder / out,
+                                  "--epochs", "2",
+                                  "--batch",  "16",
+                                  "--seed",   "3"};
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
+
+TEST(Pairs, TrainEvaluateAndReportEveryGroup) {
+  const TemporaryFolder folder;
+  const std::string pairs = write_pairs(folder), model = folder / "m.safetensors";
+  const auto trained = run_process("supertac-train", {"--pairs", pairs, "--out", model, "--epochs", "25",
+                                                      "--batch", "16", "--json", folder / "train.json"});
+  ASSERT_EQ(trained.code, 0) << trained.error;
+  const auto card = nlohmann::json::parse(read_text_file(folder / "train.json", kPlenty));
+  EXPECT_EQ(card["split"], "group");
+  EXPECT_EQ(card["train_pairs"], 48);
+  EXPECT_EQ(card["model"]["width"], 6);
+  const auto evaluated =
+      run_process("supertac-evaluate", {"--model", model, "--pairs", pairs, "--json", folder / "scores.json",
+                                        "--outputs", folder / "outputs.safetensors"});
+  ASSERT_EQ(evaluated.code, 0) << evaluated.error;
+  const auto scores = nlohmann::json::parse(read_text_file(folder / "scores.json", kPlenty));
+  EXPECT_EQ(scores["all"]["pairs"], 12);
+  ASSERT_EQ(scores["groups"].size(), 1u) << "a fifth of five groups";
+  EXPECT_EQ(scores["groups"].front(), scores["all"]);
+  EXPECT_GT(scores["all"]["network"]["psnr_mean_db"], scores["all"]["bicubic"]["psnr_mean_db"]);
+  EXPECT_GT(scores["all"]["bicubic"]["psnr_mean_db"], scores["all"]["mean_image"]["psnr_mean_db"]);
+  const auto outputs = SafetensorsFile::read(folder / "outputs.safetensors");
+  EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<uint64_t>{12, 1, 16, 24}));
+  const auto whole =
+      run_process("supertac-evaluate", {"--model", model, "--pairs", pairs, "--split", "none"});
+  EXPECT_NE(whole.out.find("group 104, 12 pairs"), std::string::npos) << whole.out;
+}
+
+TEST(Pairs, SameBytesForAnyThreadsAndAfterAPause) {
+  const TemporaryFolder folder;
+  write_pairs(folder);
+  for (const char* threads : {"1", "2"}) {
+    const auto trained = run_process(
+        "supertac-train", training(folder, std::string(threads) + ".safetensors", {"--threads", threads}));
+    ASSERT_EQ(trained.code, 0) << trained.error;
+  }
+  EXPECT_EQ(read_file(folder / "1.safetensors", kPlenty), read_file(folder / "2.safetensors", kPlenty));
+  const auto finished = run_process(
+      "supertac-train", training(folder, "3.safetensors", {"--resume", folder / "1.run/last.safetensors"}));
+  ASSERT_EQ(finished.code, 0) << finished.error;
+  EXPECT_EQ(read_file(folder / "1.safetensors", kPlenty), read_file(folder / "3.safetensors", kPlenty));
+  const auto other = run_process(
+      "supertac-train",
+      training(folder, "4.safetensors", {"--resume", folder / "1.run/last.safetensors", "--lambda", "0.5"}));
+  EXPECT_EQ(other.code, 1);
+  EXPECT_NE(other.error.find("cannot resume: its training"), std::string::npos) << other.error;
+  EXPECT_FALSE(std::filesystem::exists(folder / "4.run"));
+}
+
+TEST(Pairs, RefusesWhatIsAboutRecordingsAndTheOtherModel) {
+  const TemporaryFolder folder;
+  const std::string pairs = write_pairs(folder), model = folder / "m.safetensors";
+  const auto expect = [](const ProcessResult& result, int code, const std::string& text) {
+    EXPECT_EQ(result.code, code) << result.error;
+    EXPECT_NE(result.error.find(text), std::string::npos) << result.error;
+  };
+  expect(run_process("supertac-train", training(folder, "m.safetensors", {"--timesteps", "64"})), 2,
+         "--timesteps: is about recordings");
+  expect(run_process("supertac-train", training(folder, "m.safetensors", {"--split", "trial"})), 2,
+         "expected one of group, pair, none");
+  expect(run_process("supertac-train", {"--out", model}), 2, "--data DIR or --pairs FILE");
+  const auto loose = write_pairs(folder, false);
+  expect(run_process("supertac-train", {"--pairs", loose, "--out", model, "--split", "group"}), 1,
+         "needs a tensor 'group'");
+  EXPECT_FALSE(std::filesystem::exists(model));
+  const auto trained = run_process("supertac-train", {"--pairs", loose, "--out", model, "--epochs", "1"});
+  ASSERT_EQ(trained.code, 0) << trained.error;
+  EXPECT_NE(trained.error.find("split pair leaks"), std::string::npos) << trained.error;
+  expect(run_process("supertac-evaluate", {"--model", model, "--data", folder.path()}), 1,
+         "found a frame model");
+  expect(run_process("supertac-evaluate", {"--model", model}), 2, "--data DIR or --pairs FILE");
+  expect(run_process("supertac-evaluate", {"--model", model, "--pairs", pairs, "--pictures", folder / "p"}),
+         2, "--pictures: is about recordings");
+}
+
+}  // namespace
+}  // namespace supertac
