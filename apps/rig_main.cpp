@@ -28,8 +28,9 @@ void declare(Arguments& arguments) {
 RigSettings read_settings(const Arguments& arguments) {
   const auto seed = static_cast<uint64_t>(arguments.integer("seed", 0, 1'000'000'000));
   SimulatorSettings simulator;
-  simulator.with_adc = simulator.with_filter = simulator.with_saturation =
-      false;  // the board does what it does
+  // The board does what it does.
+  simulator.with_adc = simulator.with_filter = simulator.with_saturation = false;
+  simulator.with_drift = false;  // grows with the clock, and a rig may run for days
   const FingerIdentity identity{.seed = seed, .trial = static_cast<int>(arguments.integer("trial", 1, 1000))};
   try {
     const FingerModel finger(Plate::named(arguments.text("plate")), simulator, identity);

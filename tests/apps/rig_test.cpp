@@ -64,6 +64,8 @@ TEST_F(RigTest, CollectShowsALiveLineAndReportsEveryPass) {
   const Recording recording = read_recording(folder_ / ("out/" + pass["file"].get<std::string>()));
   EXPECT_EQ(pass["frames"], recording.frames());
   EXPECT_EQ(recording.plate, "my.stl");
+  // At first the finger is in the air: at rest, however long this machine has been running.
+  for (size_t k = 0; k < kTaxels; ++k) EXPECT_NEAR(recording.volts[k], 2.44, 0.05) << "taxel " << k;
   // The folder holds its plate: truths can be drawn wherever it is moved.
   std::filesystem::rename(folder_ / "out", folder_ / "moved");
   std::filesystem::remove(folder_ / "my.stl");
