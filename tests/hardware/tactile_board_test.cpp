@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "hardware/capture.h"
 #include "hardware/errors.h"
 #include "hardware/marlin_link.h"
 #include "hardware/serial_port.h"
@@ -147,6 +148,23 @@ TEST(TactileBoard, FramesThatWaitedFollowTheOneBefore) {
     EXPECT_NEAR(times[i], 10 + static_cast<double>(i) * kFramePeriod, 1e-9) << i;
   EXPECT_NEAR(times[24], 10.05, 1e-9);  // of the last read nobody can say that it waited
   EXPECT_NEAR(times[25], 10.051, 1e-9);
+}
+
+TEST(TactileBoard, ReplaysACaptureOfLargerReads) {
+  const std::vector<std::byte> bytes = some_frames(60);
+  TactileBoard board(
+      std::make_unique<ReplayPort>(std::vector<JournalRecord>{{RecordKind::clock, 10, {}},
+                                                              {RecordKind::clock, 10, {}},
+                                                              {RecordKind::received, 10.1, bytes},
+                                                              {RecordKind::clock, 10.1, {}}},
+                                   "capture"));
+  int taken = 0;
+  EXPECT_THROW(
+      {
+        while (board.next(kPatience)) ++taken;
+      },
+      PortUnplugged);
+  EXPECT_EQ(taken, 60);
 }
 
 TEST(TactileBoard, LostFramesAreCountedAndTheNextIsSuspect) {
