@@ -8,7 +8,7 @@
 namespace supertac {
 namespace {
 
-// How far before the newest frame a window may end, and what rounding of times costs.
+// How far before the newest frame a window may end.
 constexpr double kLookBackS = 0.1;
 
 void check(const LiveWindowSettings& s) {

@@ -22,12 +22,11 @@ struct LiveWindowSettings {
 /// From a sensor's frames to a network's window, as they come: filter, rate and scaling that training saw,
 /// nothing later than the newest frame.
 ///
-///   filtered[n] = mean of the frames in (t_n - filter_s + period/2, t_n]: round(filter_s / period) frames
-///   when
-///                 none is lost
-///   sample k    = scaled mean of the filtered frames in (e - (k+1)/rate, e - k/rate], k = T-1 ... 0, or
-///   sample k+1
-///                 when there is none; e is the window's end
+///   filtered[n] = mean of the frames in (t_n - filter_s + period/2, t_n]
+///   sample k    = scaled mean of the filtered frames in (e - (k+1)/rate, e - k/rate], k = T-1 ... 0
+///
+/// where e is the window's end. A sample without frames repeats the one before it. Without losses the average
+/// is over round(filter_s / period) frames, as in the simulator.
 ///
 /// window() ends at e = t_newest + min(period, 1/rate) / 2, so a window for every frame, whatever the phase
 /// to the model's rate. window_until(c_j + 1/(2 rate)) is, bit for bit, the window of WindowSet whose last
