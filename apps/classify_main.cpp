@@ -16,6 +16,7 @@ void declare(Arguments& a) {
   a.required("model", "FILE,...", "models by supertac-train; run i uses the i-th, and again from the first");
   a.required("data", "DIR", "recordings to train the classifiers on and to test them with");
   a.option("plates", "A,B,...", "the classes (default: the plates the first model was trained on)");
+  a.option("also", "DIR", "more recordings of these plates to train on, never tested: simulated ones, say");
   a.option(
       "views", "A,B,...",
       "what the classifiers see: frame (raw 4x4), bicubic, super_resolved, latents, historyN (the last N "
@@ -97,7 +98,7 @@ int run(Arguments& a) {
   }
   const std::int64_t stride = a.integer("stride", 1, 100'000);
   const std::vector<Candidate> models = load_candidates(a.list("model"));
-  const WindowSet windows = exam_windows(a.text("data"), a.list("plates"), models.front());
+  const WindowSet windows = exam_windows(a.text("data"), a.list("plates"), a.text("also"), models.front());
   const std::vector<std::string> classes = classes_of(windows);
   std::vector<Exam> exams;
   for (const Candidate& model : models) exams.push_back(make_exam(windows, model, classes, stride));

@@ -62,7 +62,8 @@ std::vector<Candidate> load_candidates(const std::vector<std::string>& paths) {
   return all;
 }
 
-WindowSet exam_windows(const std::string& folder, std::vector<std::string> plates, const Candidate& first) {
+WindowSet exam_windows(const std::string& folder, std::vector<std::string> plates, const std::string& also,
+                       const Candidate& first) {
   const ModelFile& file = first.file;
   WindowSettings w;
   w.timesteps = static_cast<int>(file.model->settings().timesteps);
@@ -71,7 +72,9 @@ WindowSet exam_windows(const std::string& folder, std::vector<std::string> plate
   w.scaling = file.input.scaling;
   w.stride = static_cast<int>(number_of(file, first.path, "stride"));
   if (plates.empty()) plates = words(metadata_of(file, first.path, "plates"));
-  return WindowSet::load(folder, plates, w);
+  WindowSet windows = WindowSet::load(folder, plates, w);
+  if (!also.empty()) windows.add_directory(also, classes_of(windows), true);
+  return windows;
 }
 
 std::vector<std::string> classes_of(const WindowSet& windows) {
