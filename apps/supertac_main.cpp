@@ -28,6 +28,7 @@ const std::map<std::string, std::string>& purposes() {
       {"evaluate", "measures a model on recordings, beside the baselines"},
       {"import", "imports the rig's text recordings"},
       {"info", "prints what a file holds"},
+      {"pairs", "writes recordings as pairs of images"},
       {"plate", "writes a plate as STL, and the palpation run as G-code"},
       {"rig", "a virtual board and printer"},
       {"simulate", "simulates recordings"},
