@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <limits>
 
 #include "apps/common/numerics.h"
 #include "apps/common/ports.h"
@@ -24,6 +25,7 @@ namespace {
 // count.
 constexpr double kMostLateS = 0.02;
 constexpr double kWaitS = 0.05, kFiguresEveryS = 0.5;
+constexpr double kForever = std::numeric_limits<double>::infinity();
 
 void declare(Arguments& a) {
   a.option("model", "FILE", "model of supertac-train")
@@ -31,10 +33,10 @@ void declare(Arguments& a) {
       .option("replay", "JOURNAL",
               "the raw bytes of --capture, or of a supertac-collect run, instead of a board")
       .option("recording", "FILE", "a recording instead of a board")
-      .option("seconds", "N", "end after N seconds of signal", "1e9")
+      .option("seconds", "N", "end after N seconds of signal; default: when the source ends, or at Ctrl-C")
       .option("out", "FILE",
               "keep time, voltages and picture of every frame (safetensors, 1.1 MB/s at 16x16)")
-      .option("capture", "JOURNAL", "keep the board's raw bytes (170 kB/s), for --replay")
+      .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
       .flag("list-ports", "list the serial ports and end");
 }
@@ -46,7 +48,8 @@ struct Options {
 
 Options read_options(const Arguments& a) {
   if (!a.given("model")) throw UsageError("--model: expected a file of supertac-train, found none");
-  Options options{a.number("seconds", 0.001, 1e9), a.number("speedup", 0.1, 100), {}};
+  Options options{kForever, a.number("speedup", 0.1, 100), {}};
+  if (a.given("seconds")) options.seconds = a.number("seconds", 0.001, 1e9);
   int sources = 0;
   for (const char* name : {"board", "replay", "recording"}) {
     if (!a.given(name)) continue;
