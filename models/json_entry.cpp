@@ -26,6 +26,13 @@ Dim JsonEntry::integer(const char* name) const {
   return value.get<Dim>();
 }
 
+bool JsonEntry::flag(const char* name) const {
+  if (!json_.is_object() || !json_.contains(name)) return false;
+  const Json& value = json_.at(name);
+  if (!value.is_boolean()) wrong(name, "true or false", value);
+  return value.get<bool>();
+}
+
 double JsonEntry::number(const char* name) const {
   const Json& value = field(name);
   if (!value.is_number() || !std::isfinite(value.get<double>())) wrong(name, "a finite number", value);

@@ -19,6 +19,7 @@ SuperTacSettings read_settings(const JsonEntry& entry) {
   s.scale = entry.integer("scale");
   s.channels = entry.integer("channels");
   s.rcabs = entry.integer("rcabs");
+  s.sub_pixel = entry.flag("sub_pixel");
   try {
     s.grouping = grouping_of(entry.text("grouping"));
     s.check();
@@ -45,9 +46,11 @@ InputSettings read_input(const JsonEntry& entry) {
 }  // namespace
 
 std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, const InputSettings& input) {
-  const Json settings = {{"preset", s.preset}, {"timesteps", s.timesteps},        {"latent", s.latent},
-                         {"scale", s.scale},   {"grouping", name_of(s.grouping)}, {"channels", s.channels},
-                         {"rcabs", s.rcabs}};
+  Json settings = {{"preset", s.preset}, {"timesteps", s.timesteps},        {"latent", s.latent},
+                   {"scale", s.scale},   {"grouping", name_of(s.grouping)}, {"channels", s.channels},
+                   {"rcabs", s.rcabs}};
+  if (s.sub_pixel)
+    settings["sub_pixel"] = true;  // left out otherwise: the text of older files stays the same
   const Json scaling = {{"rate_hz", input.rate_hz},
                         {"rest_volts", input.scaling.rest_volts},
                         {"span_volts", input.scaling.span_volts},

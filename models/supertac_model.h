@@ -30,8 +30,9 @@ struct SuperTacSettings {
   Dim latent = 10;      ///< LD: 1 to 256
   Dim scale = 4;        ///< 2, 4, 8: pictures of 8, 16, 32 pixels a side
   Grouping grouping = Grouping::horizontal;
-  Dim channels = 32;  ///< of the upsampler
-  Dim rcabs = 3;      ///< in each RIRB
+  Dim channels = 32;       ///< of the upsampler
+  Dim rcabs = 3;           ///< in each RIRB
+  bool sub_pixel = false;  ///< RIRBs enlarge by sub-pixel instead of transposed convolution
 
   Dim image_size() const { return 4 * scale; }
   /// Throws std::invalid_argument naming the setting, its range and what was given.

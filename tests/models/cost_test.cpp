@@ -26,7 +26,8 @@ Dim uses(const std::string& name, const SuperTacSettings& s) {
 
 TEST(Cost, AgreesWithTheWeightsOfTheModel) {
   for (const Dim scale : {2, 4, 8}) {
-    SuperTacSettings s{.timesteps = 64, .latent = 5, .scale = scale, .channels = 12, .rcabs = 2};
+    SuperTacSettings s{
+        .timesteps = 64, .latent = 5, .scale = scale, .channels = 12, .rcabs = 2, .sub_pixel = scale == 8};
     Rng rng(0);
     const SuperTac model(s, rng);
     double inference = 0, forward = 0;
