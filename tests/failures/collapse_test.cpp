@@ -1,0 +1,154 @@
+// Failures 1, 2 and 4: the network stops to look at its input, and the loss falls all the same.
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <cmath>
+
+#include "autograd/ops/activations.h"
+#include "autograd/ops/losses.h"
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+class CollapseTest : public ::testing::Test {
+ protected:
+  CollapseTest() { omp_set_num_threads(1); }
+  ~CollapseTest() override { omp_set_num_threads(before_); }
+
+  TrainingSettings settings = small_training();
+  WindowSet windows = small_windows(small_settings());
+
+  struct End {
+    bool collapsed = false, stopped = false;
+    int active_latents = 0;
+    double difference = 0, decoded = 0;  // of two windows' pictures and decoded signals, root mean square
+  };
+  End train(const TrainingSettings& s) {
+    Trainer trainer(windows, all_of(windows), s);
+    StepReport report;
+    try {
+      while (!trainer.done() && !report.collapsed) report = trainer.train_step();
+    } catch (const TrainingStopped&) {
+      return {.stopped = true};
+    }
+    const SuperTac::Output output = trainer.model().forward(two_windows(), zero_eps());
+    return {report.collapsed, false, report.active_latents, difference(output.image.value()),
+            difference(output.decoded[3].value())};
+  }
+
+ private:
+  Tensor two_windows() const {
+    Tensor two(Shape{2, windows.timesteps(), kWindowTaxels});
+    const auto half = static_cast<std::size_t>(two.size() / 2);
+    windows.window(0, two.values().first(half));
+    windows.window(windows.size() / 4, two.values().last(half));
+    return two;
+  }
+  std::array<Tensor, kGroups> zero_eps() const {
+    std::array<Tensor, kGroups> eps;
+    for (Tensor& e : eps) e = Tensor::zeros({2, settings.model.latent});
+    return eps;
+  }
+  static double difference(const Tensor& pair) {
+    const Dim half = pair.size() / 2;
+    double sum = 0;
+    for (Dim i = 0; i < half; ++i)
+      sum += std::pow(static_cast<double>(pair.data()[i] - pair.data()[half + i]), 2);
+    return std::sqrt(sum / static_cast<double>(half));
+  }
+  int before_ = omp_get_max_threads();
+};
+
+// A saturated sigmoid behind the last layer passes no gradient, so that an all-zero picture stays one; the
+// linear output of this network passes all of it.
+TEST_F(CollapseTest, F1LinearOutputHasNoFlatSpot) {
+  const auto gradient = [](bool with_sigmoid) {
+    const Variable x(Tensor::full({1, 8, 8, 1}, with_sigmoid ? -20 : 0), true);
+    backward(l2_loss(with_sigmoid ? sigmoid(x) : x, Variable(uniform({1, 8, 8, 1}, 3))));
+    return std::abs(static_cast<double>(x.grad().data()[0]));
+  };
+  EXPECT_LT(gradient(true), 1e-9);
+  EXPECT_GT(gradient(false), 1e-3);
+}
+
+TEST_F(CollapseTest, F1TenSeedsOfTheDefaultsTrain) {
+  settings.epochs = 5;
+  for (settings.seed = 0; settings.seed < 10; ++settings.seed) {
+    const End end = train(settings);
+    EXPECT_FALSE(end.collapsed || end.stopped) << "seed " << settings.seed;
+    EXPECT_GT(end.active_latents, 0) << "seed " << settings.seed;
+    EXPECT_GT(end.difference, 0.005) << "seed " << settings.seed;
+  }
+}
+
+TEST_F(CollapseTest, F1ATooHighRateWithoutClippingAndWarmUpIsReported) {
+  settings.epochs = 5;
+  settings.clip_norm = settings.warm_up = 0;
+  settings.learning_rate = 0.1;
+  for (settings.seed = 0; settings.seed < 3; ++settings.seed) {
+    const End end = train(settings);
+    EXPECT_TRUE(end.collapsed || end.stopped) << "seed " << settings.seed;
+  }
+}
+
+// The largest eigenvalue of the covariance of group 3's windows, by power iteration.
+double largest_eigenvalue(const WindowSet& windows) {
+  const auto entries = static_cast<std::size_t>(windows.timesteps()) * 4;
+  std::vector<std::vector<double>> rows;
+  std::vector<double> mean(entries), v(entries, 1), next(entries);
+  for (std::size_t i = 0; i < windows.size(); ++i) {
+    std::vector<double>& row = rows.emplace_back();
+    for (std::size_t e = 0; e < entries; ++e) {
+      row.push_back(static_cast<double>(windows.window(i)[e / 4 * kTaxels + 12 + e % 4]));
+      mean[e] += row.back() / static_cast<double>(windows.size());
+    }
+  }
+  double eigenvalue = 0;
+  for (int iteration = 0; iteration < 30; ++iteration) {
+    std::fill(next.begin(), next.end(), 0.0);
+    for (const std::vector<double>& row : rows) {
+      double projection = 0;
+      for (std::size_t e = 0; e < entries; ++e) projection += (row[e] - mean[e]) * v[e];
+      for (std::size_t e = 0; e < entries; ++e) next[e] += projection * (row[e] - mean[e]);
+    }
+    double norm = 0;
+    for (const double x : next) norm += x * x;
+    norm = std::sqrt(norm);
+    for (std::size_t e = 0; e < entries; ++e) v[e] = next[e] / norm;
+    eigenvalue = norm / static_cast<double>(windows.size());
+  }
+  return eigenvalue;
+}
+
+// Mean squared error over D entries + beta KLD is the bound of a decoder of variance beta D / 2. Above the
+// largest eigenvalue of the data no latent direction pays (Lucas et al. 2019, for linear decoders).
+TEST_F(CollapseTest, F2PosteriorCollapsesAboveTheThresholdOfBetaAndIsReported) {
+  settings.epochs = 8;
+  settings.loss.a = 1;  // the VAEs alone: nothing else draws on the latents
+  settings.learning_rate = 3e-3;
+  const double threshold = 2 * largest_eigenvalue(windows) / (4.0 * windows.timesteps());
+  settings.loss.beta = threshold / 20;
+  const End below = train(settings);
+  EXPECT_FALSE(below.collapsed);
+  EXPECT_GT(below.active_latents, 0);
+  settings.loss.beta = threshold * 20;
+  const End above = train(settings);
+  EXPECT_TRUE(above.collapsed);
+  EXPECT_EQ(above.active_latents, 0);
+  EXPECT_GT(below.decoded, 20 * above.decoded);  // swapping z changes what is decoded, or does not
+}
+
+// There is no ramp of beta and no free bits: at the default weight the latents become active by themselves
+// (F1 above). What warms up is the learning rate, and it must not jump where warm-up ends.
+TEST_F(CollapseTest, F4WarmUpEndsWithoutAJump) {
+  const Schedule schedule{.peak = 1e-3, .warm_up = 50, .total = 1000};
+  for (std::int64_t step = 1; step < 1000; ++step) {
+    EXPECT_LE(std::abs(schedule.at(step) - schedule.at(step - 1)), 1e-3 / 50 + 1e-12) << step;
+  }
+  const Schedule none{.peak = 1e-3, .warm_up = 0, .total = 1000, .cosine = false};
+  EXPECT_EQ(none.at(0), 1e-3);
+}
+
+}  // namespace
+}  // namespace supertac

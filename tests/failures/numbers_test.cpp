@@ -1,0 +1,192 @@
+// Failures 3, 5, 6, 7 and 13: numbers that overflow, cancel, or do not act.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "autograd/kernels/ssim.h"
+#include "autograd/ops/activations.h"
+#include "autograd/ops/losses.h"
+#include "autograd/ops/vae.h"
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+bool finite(const Tensor& t) {
+  return std::all_of(t.values().begin(), t.values().end(), [](real x) { return std::isfinite(x); });
+}
+
+// Unclamped, one exponential outweighs everything by thirty orders of magnitude and Adam has to refuse the
+// step.
+TEST(Failures, F3LogVarianceExplodesUnlessClamped) {
+  const Variable mean(Tensor::zeros({1, 3})), raw(Tensor::full({1, 3}, 200), true);
+  const Variable unclamped = kl_divergence(mean, raw);
+  EXPECT_GT(unclamped.item(), 1e30);
+  backward(unclamped);
+  EXPECT_GT(raw.grad().data()[0], 1e30);
+  Variable(raw).mutable_grad().fill(0);
+  const Variable clamped = clamp(raw, -10, 10), kld = kl_divergence(mean, clamped);
+  EXPECT_LT(kld.item(), 1e5);
+  EXPECT_TRUE(finite(sample_gaussian(mean, clamped, Tensor::full({1, 3}, 4)).value()));
+  backward(kld);
+  EXPECT_EQ(raw.grad().data()[0], 0);  // outside the range nothing flows
+  const Variable inside(Tensor::full({1, 3}, 9), true);
+  backward(kl_divergence(mean, clamp(inside, -10, 10)));
+  EXPECT_NEAR(inside.grad().data()[0], (std::exp(9.0) - 1) / 2, 1);
+}
+
+TEST(Failures, F3ALogVarianceHeadOutOfBoundsLeavesTheLossFinite) {
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  for (const Parameter& p : model.parameters()) {
+    if (p.name.find("log_var.bias") != std::string::npos) Variable(p.value).mutable_value().fill(500);
+  }
+  const Loss loss = supertac_loss(model.forward(uniform({2, 32, 16}, 1), normal_eps(2, 3, 2)),
+                                  uniform({2, 8, 8, 1}, 3), {});
+  EXPECT_TRUE(std::isfinite(loss.total.item()));
+  backward(loss.total);
+  for (const Parameter& p : model.parameters()) EXPECT_TRUE(finite(p.value.grad())) << p.name;
+}
+
+// z = mean + exp(log_var / 2) eps has the moments it states; with uniform numbers for eps it has not.
+TEST(Failures, F5SamplesHaveTheVarianceTheyState) {
+  const Dim n = 40'000;
+  const Tensor mean = Tensor::full({n, 1}, real(0.3)),
+               log_var = Tensor::full({n, 1}, static_cast<real>(std::log(4.0)));
+  const auto moments = [&](bool normal) {
+    const RandomStream random(7, 0x65707300);
+    Tensor eps({n, 1});
+    for (Dim i = 0; i < n; ++i) {
+      const auto counter = static_cast<std::uint64_t>(i);
+      eps.data()[i] = static_cast<real>(normal ? random.normal(counter) : random.uniform(counter));
+    }
+    double sum = 0, squares = 0;
+    const Variable z = sample_gaussian(Variable(mean), Variable(log_var), eps);
+    for (const real x : z.value().values()) {
+      sum += static_cast<double>(x);
+      squares += static_cast<double>(x) * static_cast<double>(x);
+    }
+    const double m = sum / static_cast<double>(n);
+    return std::pair(m, squares / static_cast<double>(n) - m * m);
+  };
+  EXPECT_NEAR(moments(true).first, 0.3, 0.03);
+  EXPECT_NEAR(moments(true).second, 4, 0.1);
+  EXPECT_LT(moments(false).second, 0.5);  // 4 / 12: what the authors' published code draws
+}
+
+TEST(Failures, F5EvaluationDrawsNothing) {
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  const Tensor windows = uniform({1, 32, 16}, 2);
+  const Tensor a = model.infer(windows), b = model.infer(windows);
+  const Tensor c = model.forward(windows, normal_eps(1, 3, 1)).image.value(),
+               d = model.forward(windows, normal_eps(1, 3, 2)).image.value();
+  EXPECT_TRUE(std::equal(a.data(), a.data() + a.size(), b.data()));
+  EXPECT_FALSE(std::equal(c.data(), c.data() + c.size(), d.data()));
+}
+
+// The norm over the encoders of the gradient of the loss: the parameters that all terms share.
+double encoder_gradient(const LossWeights& weights) {
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  backward(supertac_loss(model.forward(uniform({4, 32, 16}, 1), normal_eps(4, 3, 2)),
+                         uniform({4, 8, 8, 1}, 3), weights)
+               .total);
+  double squares = 0;
+  for (const Parameter& p : model.parameters()) {
+    if (!p.name.starts_with("encoder.") || !p.value.grad().defined()) continue;
+    for (const real g : p.value.grad().values()) squares += static_cast<double>(g) * static_cast<double>(g);
+  }
+  return std::sqrt(squares);
+}
+
+// A term that is computed and never added has no gradient. The two terms of the picture stay within a factor
+// 100. The VAEs' are far weaker here at initialisation, before the decoders pass anything on (README.md).
+TEST(Failures, F6EveryTermOfTheLossActsAndNoneDrownsTheOthers) {
+  const LossWeights w;
+  constexpr double kAlone = 1e6;  // a weight beside which the other terms vanish
+  const double signals = encoder_gradient({.a = 1, .beta = 0, .lambda = 0}) * w.a;
+  const double l2 = encoder_gradient({.a = 0, .beta = 0, .lambda = 0}) * (1 - w.a);
+  const double ssim = encoder_gradient({.a = 0, .beta = 0, .lambda = kAlone}) / kAlone * w.lambda * (1 - w.a);
+  const double kld = encoder_gradient({.a = 1, .beta = kAlone, .lambda = 0}) / kAlone * w.beta * w.a;
+  EXPECT_GT(ssim, l2 / 100);
+  EXPECT_LT(ssim, l2 * 100);
+  EXPECT_GT(signals, l2 / 1e5);
+  EXPECT_GT(kld, l2 / 1e5);
+}
+
+// E[x^2] - E[x]^2 in fp32 of values far from zero cancels and can come out negative.
+TEST(Failures, F7NaiveVariancesTurnNegativeAndOursDoNot) {
+  Tensor x({1, 16, 16, 1});
+  const RandomStream random(3, 1);
+  for (Dim i = 0; i < x.size(); ++i)
+    x.data()[i] = static_cast<real>(200 + 1e-3 * random.uniform(static_cast<std::uint64_t>(i)));
+  real lowest = 0;
+  for (Dim row = 0; row + 7 <= 16; ++row) {
+    for (Dim column = 0; column + 7 <= 16; ++column) {
+      real sum = 0, squares = 0;
+      for (Dim i = 0; i < 49; ++i) {
+        const real value = x.data()[(row + i / 7) * 16 + column + i % 7];
+        sum += value / 49;
+        squares += value * value / 49;
+      }
+      lowest = std::min(lowest, squares - sum * sum);
+    }
+  }
+  EXPECT_LT(lowest, 0);
+  EXPECT_NEAR(kernels::ssim({1, 16, 16}, x.data(), x.data()), 1, 1e-6);
+}
+
+TEST(Failures, F7SsimOfFlatAndOppositePictures) {
+  const Tensor flat = Tensor::full({1, 16, 16, 1}, real(0.5)), textured = uniform({1, 16, 16, 1}, 5);
+  Tensor opposite = textured.clone();
+  for (real& x : opposite.values()) x = 1 - x;
+  const auto value_and_gradient = [](const Tensor& picture, const Tensor& truth) {
+    const Variable x(picture.clone(), true);
+    const Variable s = ssim(x, truth);
+    const double value = static_cast<double>(s.item());
+    backward(s);
+    EXPECT_TRUE(finite(x.grad()));
+    return value;
+  };
+  EXPECT_NEAR(value_and_gradient(flat, flat), 1, 1e-6);
+  EXPECT_NEAR(value_and_gradient(flat, textured), 0, 0.05);
+  EXPECT_LT(value_and_gradient(opposite, textured), -0.8);
+  EXPECT_GT(value_and_gradient(Tensor::zeros({1, 16, 16, 1}), textured), -0.05);
+}
+
+// One parameter whose gradient is 1, but for one spike of 1e8. How far 100 steps after the spike take it.
+double way_after_spike(double clip_norm) {
+  const Variable x(Tensor::full({1}, 1), true);
+  Adam adam({x}, {.learning_rate = 1e-3, .clip_norm = clip_norm});
+  const auto step = [&](double g) {
+    Variable(x).mutable_grad().fill(static_cast<real>(g));
+    adam.step();
+  };
+  for (int i = 0; i < 100; ++i) step(1);
+  step(1e8);
+  for (int i = 0; i < 60; ++i) step(1);  // the spike leaves the first moment
+  const double before = static_cast<double>(x.item());
+  for (int i = 0; i < 100; ++i) step(1);
+  return before - static_cast<double>(x.item());
+}
+
+TEST(Failures, F13OneSpikeStopsAdamUnlessClipped) {
+  EXPECT_LT(way_after_spike(0), 0.01);         // the second moment remembers it for thousands of steps
+  EXPECT_NEAR(way_after_spike(1), 0.1, 0.01);  // 100 steps of the learning rate
+}
+
+TEST(Failures, F13NoiseFarBelowEpsilonIsNotAmplified) {
+  const auto first_step = [](double gradient) {
+    const Variable x(Tensor::full({1}, 0), true);
+    Adam adam({x}, {.learning_rate = 1e-3});
+    Variable(x).mutable_grad().fill(static_cast<real>(gradient));
+    adam.step();
+    return -static_cast<double>(x.item());
+  };
+  EXPECT_NEAR(first_step(1e-3), 1e-3, 1e-7);  // the rate, whatever the gradient: bias correction at step 1
+  EXPECT_LT(first_step(1e-12), 1e-6);
+}
+
+}  // namespace
+}  // namespace supertac
