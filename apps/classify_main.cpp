@@ -24,7 +24,7 @@ void declare(Arguments& a) {
       "frame,super_resolved,latents,history32");
   a.option("seeds", "N", "runs: seeds 0 to N - 1 of classifier and order", "5");
   a.option("epochs", "N", "passes over the training windows", "8");
-  a.option("stride", "N", "train on every N-th window in contact; tested are all", "4");
+  a.option("stride", "N", "train on every N-th window in contact; tested are all", "1");
   a.option("augment", "NAME",
            "standard: the training windows' gains, offsets and noise vary as in supertac-train; none",
            "standard");
