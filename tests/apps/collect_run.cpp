@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <stdexcept>
 
 #include "hardware/serial_port.h"
@@ -10,8 +11,10 @@
 
 namespace supertac {
 
+// Under nohup, or in the background of a script, these are ignored, and so they would be by supertac-collect.
 CollectRun::CollectRun(double speedup, const RigSettings& settings)
     : speedup_(speedup), rig_(settings, board(), printer(), speedup) {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) std::signal(number, SIG_DFL);
   disk_ = (std::filesystem::temp_directory_path() / "supertac-collect-XXXXXX").string();
   if (mkdtemp(disk_.data()) == nullptr) throw std::runtime_error("cannot create " + disk_);
   out_ = disk_ + "/out";
