@@ -17,8 +17,8 @@ void declare(Arguments& a) {
       "to 1, optional group [N]; takes split (group, pair, none), epochs, batch, learning-rate, lambda");
   a.required("out", "FILE",
              "the model; FILE's run folder beside it (.run) holds log, report and the state to resume");
-  a.option("preset", "NAME", "network: paper", "paper");
-  a.option("timesteps", "T", "samples per window at 300 Hz, a multiple of 16, 32 to 512", "256");
+  a.option("preset", "NAME", "network: paper, or tiny (a ninth of the cost, made for --rate 50)", "paper");
+  a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512 (default: the preset's)", "");
   a.option("latent", "LD", "latent numbers per group of taxels", "10");
   a.option("scale", "N", "pictures of 4 N pixels a side: 2, 4 or 8", "4");
   a.option("upsampling", "NAME", "how pictures grow: transposed or sub-pixel convolution", "transposed");
@@ -30,9 +30,9 @@ void declare(Arguments& a) {
 TrainingSettings settings_of(const Arguments& a) {
   TrainingSettings s = training_settings(a);
   const Grouping grouping = s.model.grouping;
-  s.model = SuperTacSettings::of_preset(a.choice("preset", {"paper"}));
+  s.model = SuperTacSettings::of_preset(a.choice("preset", {"paper", "tiny"}));
   s.model.grouping = grouping;
-  s.model.timesteps = a.integer("timesteps", 32, 512);
+  if (a.given("timesteps")) s.model.timesteps = a.integer("timesteps", 32, 512);
   if (s.model.timesteps % 16 != 0) {
     throw UsageError("--timesteps expects a multiple of 16, found " + a.text("timesteps"));
   }

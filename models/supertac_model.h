@@ -37,7 +37,8 @@ struct SuperTacSettings {
   Dim image_size() const { return 4 * scale; }
   /// Throws std::invalid_argument naming the setting, its range and what was given.
   void check() const;
-  /// A preset's settings; throws std::invalid_argument for an unknown name, listing the known ones.
+  /// A preset's settings: "paper", or "tiny", which costs a ninth (made for 50 samples a second, 2.56 s).
+  /// Throws std::invalid_argument for an unknown name, listing the known ones.
   static SuperTacSettings of_preset(const std::string& name);
 };
 

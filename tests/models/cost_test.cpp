@@ -47,5 +47,10 @@ TEST(Cost, OfThePresetPaperIsAboutEightMillion) {
   EXPECT_THROW(cost_of({.timesteps = 40}), std::invalid_argument);
 }
 
+TEST(Cost, OfThePresetTinyIsANinth) {
+  EXPECT_LT(9 * cost_of(SuperTacSettings::of_preset("tiny")).inference,
+            cost_of(SuperTacSettings::of_preset("paper")).inference);
+}
+
 }  // namespace
 }  // namespace supertac
