@@ -35,7 +35,9 @@ Point inference(const char* axis, Dim value, const SuperTacSettings& settings, D
 }
 
 Point training(Dim count) {
-  TrainingSettings settings{.model = SuperTacSettings::of_preset("paper"), .epochs = 1};
+  TrainingSettings settings;
+  settings.model = SuperTacSettings::of_preset("paper");
+  settings.epochs = 1;
   const auto windows = std::make_shared<WindowSet>(bench::sliding_bumps(settings.model));
   std::vector<std::uint32_t> chosen = bench::all_of(*windows);
   chosen.resize(static_cast<std::size_t>(count));

@@ -65,7 +65,9 @@ BENCHMARK(inference)->ArgName("batch")->Arg(1)->Arg(8)->Arg(64)->UseManualTime()
 // Windows, augmentation, forward, loss, backward, Adam.
 void training_step(benchmark::State& state) {
   omp_set_num_threads(static_cast<int>(state.range(0)));
-  TrainingSettings settings{.model = kPaper, .epochs = 100'000};
+  TrainingSettings settings;
+  settings.model = kPaper;
+  settings.epochs = 100'000;
   settings.augment = {.gain = 0.5, .taxel_gain = 0.3, .offset = 0.05, .noise = 0.02, .dropped = 2};
   const WindowSet windows = bench::sliding_bumps(kPaper);
   Trainer trainer(windows, bench::all_of(windows), settings);

@@ -78,8 +78,10 @@ class Ours {
   Trainer& trainer() {
     if (!trainer_) {
       data_ = std::make_unique<WindowSet>(bench::sliding_bumps(model_->settings()));
-      trainer_ = std::make_unique<Trainer>(*data_, bench::all_of(*data_),
-                                           TrainingSettings{.model = model_->settings(), .epochs = 100'000});
+      TrainingSettings settings;
+      settings.model = model_->settings();
+      settings.epochs = 100'000;
+      trainer_ = std::make_unique<Trainer>(*data_, bench::all_of(*data_), settings);
     }
     return *trainer_;
   }
