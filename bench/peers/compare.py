@@ -21,10 +21,11 @@ import tempfile
 import time
 
 # PyTorch frees its activations after every call; by default the C library gives such blocks back to the system, and on
-# some machines getting them again takes longer than the network. Ours keeps its memory; let both.
-KEEP_MEMORY = {"MALLOC_MMAP_MAX_": "0", "MALLOC_TRIM_THRESHOLD_": "1000000000", "MALLOC_TOP_PAD_": "100000000"}
-if not KEEP_MEMORY.items() <= os.environ.items():
-    os.execve(sys.executable, [sys.executable, *sys.argv], os.environ | KEEP_MEMORY)
+# some machines getting them again takes longer than the network. Ours keeps its memory; let PyTorch do so, in large pages.
+KEEP_MEMORY = ("glibc.malloc.hugetlb=1:glibc.malloc.mmap_max=0:glibc.malloc.trim_threshold=1000000000:"
+               "glibc.malloc.top_pad=100000000")
+if os.environ.get("GLIBC_TUNABLES") != KEEP_MEMORY:
+    os.execve(sys.executable, [sys.executable, *sys.argv], os.environ | {"GLIBC_TUNABLES": KEEP_MEMORY})
 
 import numpy as np  # noqa: E402
 import torch  # noqa: E402
