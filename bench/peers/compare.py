@@ -24,8 +24,10 @@ import time
 # some machines getting them again takes longer than the network. Ours keeps its memory; let PyTorch do so, in large pages.
 KEEP_MEMORY = ("glibc.malloc.hugetlb=1:glibc.malloc.mmap_max=0:glibc.malloc.trim_threshold=1000000000:"
                "glibc.malloc.top_pad=100000000")
-if os.environ.get("GLIBC_TUNABLES") != KEEP_MEMORY:
-    os.execve(sys.executable, [sys.executable, *sys.argv], os.environ | {"GLIBC_TUNABLES": KEEP_MEMORY})
+# One thread means one: torch.set_num_threads alone leaves a second one spinning in some builds.
+ENVIRONMENT = {"GLIBC_TUNABLES": KEEP_MEMORY, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+if any(os.environ.get(name) != value for name, value in ENVIRONMENT.items()):
+    os.execve(sys.executable, [sys.executable, *sys.argv], os.environ | ENVIRONMENT)
 
 import numpy as np  # noqa: E402
 import torch  # noqa: E402
