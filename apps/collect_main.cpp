@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <atomic>
-#include <filesystem>
 #include <iostream>
 #include <thread>
 
+#include "apps/collect/origin_mark.h"
 #include "apps/collect/passes.h"
 #include "apps/common/ports.h"
 #include "apps/common/program.h"
@@ -23,8 +23,6 @@
 
 namespace supertac {
 namespace {
-
-namespace fs = std::filesystem;
 
 void declare(Arguments& arguments) {
   arguments.option("board", "PORT", "port of the tactile board; auto finds it by its USB number", "auto")
@@ -73,9 +71,6 @@ RecorderSettings read_settings(const Arguments& arguments, const std::string& ou
   return settings;
 }
 
-// Present while a collection runs, and after one that did not end with the head back at its origin.
-std::string origin_mark(const std::string& out) { return out + "/origin-unknown"; }
-
 uint64_t millimetres(const PalpationPlan& plan, int passes, double more) {
   return static_cast<uint64_t>(plan.slide * passes + more);
 }
@@ -92,26 +87,36 @@ std::string live_text(const Point3& at, const BoardCounters& board) {
          " frames/s  " + std::to_string(board.missing + board.dropped) + " lost";
 }
 
-/// The mark of a run that may move the head; gone again when it turns out that nothing could be moved.
+/// A run that may move the head: marked until the head is back, or until it turns out that nothing could be
+/// moved.
 RecorderReport record_marked(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
-                             const RecorderSettings& settings, const std::string& mark) {
-  const bool marked_before = fs::exists(mark);
-  write_file(mark, "the head's position is unknown until a run has ended here\n");
+                             const RecorderSettings& settings, const OriginMark& mark) {
+  const bool marked_before = mark.is_set();
+  mark.set();
   const FinishDespiteSignals finger_first;
   try {
-    return record_palpation(std::move(board), std::move(printer), settings);
+    RecorderReport report = record_palpation(std::move(board), std::move(printer), settings);
+    if (report.outcome.complete) mark.clear();
+    return report;
   } catch (...) {
-    if (!marked_before && !settings.home) fs::remove(mark);
+    if (!marked_before && !settings.home) mark.clear();
     throw;
   }
 }
 
-RecorderReport collect(const Arguments& arguments, RecorderSettings settings, const std::string& out) {
+void demand_origin(const Arguments& arguments, const OriginMark& mark) {
+  if (!mark.is_set() || arguments.flag("home") || arguments.flag("confirm-origin")) return;
+  throw OriginUnknown("collect: the last run on printer " + arguments.text("printer") +
+                      " was cut off, so the head's position is unknown; move it to X99.70 Y101.17 Z131.81 "
+                      "and add --confirm-origin, or use --home");
+}
+
+RecorderReport collect(const Arguments& arguments, RecorderSettings settings, const OriginMark& mark) {
   const double speedup = arguments.number("speedup", 0.1, 100);
   auto board = std::make_unique<SerialPort>(resolve_board_port(arguments.text("board")),
                                             SerialSettings{kBoardBaud, speedup});
-  auto printer =
-      std::make_unique<SerialPort>(required_text(arguments, "printer"), SerialSettings{115200, speedup});
+  auto printer = std::make_unique<SerialPort>(arguments.text("printer"), SerialSettings{115200, speedup});
+  demand_origin(arguments, mark);
   confirm(arguments, settings);
   std::atomic<bool> stop{false}, ended{false};
   settings.stop = &stop;
@@ -130,7 +135,7 @@ RecorderReport collect(const Arguments& arguments, RecorderSettings settings, co
       thread.join();
     }
   } joiner{ended, watcher};
-  return record_marked(std::move(board), std::move(printer), settings, origin_mark(out));
+  return record_marked(std::move(board), std::move(printer), settings, mark);
 }
 
 /// Recordings, quality report and --json of what was collected, complete or not. @returns frames
@@ -160,16 +165,10 @@ int run(Arguments& arguments) {
   make_directories(out);
   keep_plate_file(arguments.text("plate"), out);
   const RecorderSettings settings = read_settings(arguments, out, plate);
-  if (fs::exists(origin_mark(out)) && !arguments.flag("home") && !arguments.flag("confirm-origin")) {
-    throw OriginUnknown(
-        "collect: the last run in " + out +
-        " was cut off, so the head's position is unknown; move it to X99.70 Y101.17 Z131.81 and add "
-        "--confirm-origin, or use --home");
-  }
-  const RecorderReport report = collect(arguments, settings, out);
+  const OriginMark mark(required_text(arguments, "printer"));
+  const RecorderReport report = collect(arguments, settings, mark);
   const size_t frames = keep_passes(arguments, settings.journal, out, report);
   if (report.outcome.complete) {
-    fs::remove(origin_mark(out));
     arguments.print(std::to_string(report.outcome.passes_done) + " passes, " + std::to_string(frames) +
                     " frames");
     return kExitOk;

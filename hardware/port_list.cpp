@@ -52,4 +52,16 @@ std::string resolve_board_port(const std::string& path) {
                      std::to_string(boards.size()) + "; plug it in, or name the port");
 }
 
+std::string lasting_port_name(const std::string& path, const std::string& links) {
+  std::error_code error;
+  const std::string device = fs::weakly_canonical(path, error).string();
+  for (fs::directory_iterator entry(links, error), end; !error && entry != end; entry.increment(error)) {
+    std::error_code dangling;
+    if (fs::canonical(entry->path(), dangling) == device && !dangling) return entry->path().string();
+  }
+  if (device.empty() || device.starts_with("/dev/pts/"))
+    return fs::absolute(path).lexically_normal().string();
+  return device;
+}
+
 }  // namespace supertac

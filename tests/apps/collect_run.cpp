@@ -18,6 +18,7 @@ CollectRun::CollectRun(double speedup, const RigSettings& settings)
   disk_ = (std::filesystem::temp_directory_path() / "supertac-collect-XXXXXX").string();
   if (mkdtemp(disk_.data()) == nullptr) throw std::runtime_error("cannot create " + disk_);
   out_ = disk_ + "/out";
+  setenv("XDG_STATE_HOME", (disk_ + "/state").c_str(), 1);
 }
 
 CollectRun::~CollectRun() {
@@ -63,6 +64,10 @@ void CollectRun::wait_for_rest() {
   for (bool moves = true; moves; usleep(1000)) {
     rig_.with_world([&](RigWorld& world) { moves = world.printer().moving(world.now()); });
   }
+}
+
+bool CollectRun::origin_unknown() const {
+  return std::filesystem::exists(disk_ + "/state/supertac/origin-unknown" + printer());
 }
 
 std::string CollectRun::files() const {

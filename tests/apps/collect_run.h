@@ -33,6 +33,10 @@ class CollectRun {
   void wait_for_rest();
   double speedup() const { return speedup_; }
   const std::string& out() const { return out_; }
+  /// Everything the program may write is below it: out(), and the state that outlives a run.
+  const std::string& disk() const { return disk_; }
+  /// The mark of a run that was cut off, when there is one.
+  bool origin_unknown() const;
   std::string board() const { return folder_ / "board"; }
   std::string printer() const { return folder_ / "printer"; }
   std::string journal() const { return out_ + "/3_Bumps_t1_v10.journal"; }

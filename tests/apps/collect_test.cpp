@@ -23,6 +23,7 @@ TEST(CollectProgram, MakesRecordingsAndLeavesTheHeadAtItsOrigin) {
   EXPECT_EQ(run.files(), "3_Bumps_t1_p1_v10.safetensors 3_Bumps_t1_v10.journal");
   EXPECT_EQ(run_process("supertac-info", {run.out() + "/3_Bumps_t1_p1_v10.safetensors"}).code, 0);
   EXPECT_LT(distance(run.head(), {99.7, 101.17, 131.81}), 0.01);
+  EXPECT_FALSE(run.origin_unknown());
 }
 
 TEST(CollectProgram, SignalsInContactLiftTheFingerAndKeepWhatWasRecorded) {
@@ -36,7 +37,8 @@ TEST(CollectProgram, SignalsInContactLiftTheFingerAndKeepWhatWasRecorded) {
     EXPECT_EQ(result.code, 128 + signal) << result.error;
     EXPECT_TRUE(is_one_line(result.error)) << result.error;
     EXPECT_GE(run.head().z, kLiftedZ - 0.01) << "signal " << signal;
-    EXPECT_EQ(run.files(), "3_Bumps_t1_p1_v10.safetensors 3_Bumps_t1_v10.journal origin-unknown");
+    EXPECT_EQ(run.files(), "3_Bumps_t1_p1_v10.safetensors 3_Bumps_t1_v10.journal");
+    EXPECT_TRUE(run.origin_unknown());
   }
 }
 
@@ -48,14 +50,33 @@ TEST(CollectProgram, AfterAKillTheJournalIsRecoveredAndTheOriginMustBeConfirmed)
   process.wait();
   run.wait_for_rest();
 
-  const ProcessResult refused = run.collect();
-  EXPECT_EQ(refused.code, 1);
-  EXPECT_TRUE(is_one_line(refused.error)) << refused.error;
-  EXPECT_TRUE(contains(refused.error, "--confirm-origin")) << refused.error;
+  // Whatever the folder: the mark is the printer's.
+  const std::string other = run.disk() + "/other";
+  const Point3 left = run.head();
+  for (const std::string& out : {run.out(), other}) {
+    const ProcessResult refused = run.collect({"--out", out});
+    EXPECT_EQ(refused.code, 1);
+    EXPECT_TRUE(is_one_line(refused.error)) << refused.error;
+    EXPECT_TRUE(contains(refused.error, "--confirm-origin")) << refused.error;
+  }
+  EXPECT_EQ(run.head(), left);
   const ProcessResult recovered =
       run_process("supertac-import", {"--journal", run.journal(), "--out", run.out() + "/recovered"});
   EXPECT_EQ(recovered.code, 0) << recovered.error;
   EXPECT_TRUE(contains(recovered.out, "cut off")) << recovered.out;
+
+  const ProcessResult confirmed = run.collect({"--out", other, "--confirm-origin"});
+  EXPECT_EQ(confirmed.code, 0) << confirmed.error;
+  EXPECT_FALSE(run.origin_unknown());
+}
+
+TEST(CollectProgram, AnotherPrinterIsNotHeldUpByTheMark) {
+  CollectRun cut_off, other;  // the state folder is now that of `other`
+  const std::string mark = other.disk() + "/state/supertac/origin-unknown" + cut_off.printer();
+  std::filesystem::create_directories(std::filesystem::path(mark).parent_path());
+  std::ofstream(mark) << "left by kill -9\n";
+  EXPECT_TRUE(contains(cut_off.collect().error, "--confirm-origin"));
+  EXPECT_EQ(other.collect().code, 0);
 }
 
 TEST(CollectProgram, AFullDiskInContactLiftsTheFinger) {

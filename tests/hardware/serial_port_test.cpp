@@ -10,10 +10,12 @@
 
 #include <array>
 #include <atomic>
+#include <filesystem>
 #include <fstream>
 #include <thread>
 
 #include "hardware/errors.h"
+#include "hardware/port_list.h"
 #include "hardware/serial_termios.h"
 #include "hardware/virtual_rig/pty_rig.h"
 #include "rig_support.h"
@@ -43,6 +45,19 @@ TEST(SerialPort, SecondOpenerIsRefusedEvenAsRoot) {
     EXPECT_THROW(SerialPort second(folder / "port"), PortBusy);
   }
   EXPECT_NO_THROW(SerialPort third(folder / "port"));
+}
+
+TEST(PortList, ALastingNameIsThatOfTheDevice) {
+  const TemporaryFolder folder;
+  const PseudoTerminal terminal(folder / "port");
+  EXPECT_EQ(lasting_port_name(folder / "port"), folder / "port") << "a pseudo-terminal's number is reused";
+  EXPECT_EQ(lasting_port_name("/dev/./null"), "/dev/null");
+  std::filesystem::create_directory(folder / "by-id");
+  std::filesystem::create_symlink("/dev/none", folder / "by-id/a_gone");
+  std::filesystem::create_symlink("/dev/null", folder / "by-id/usb-Printer_7");
+  for (const std::string& path : {std::string("/dev/null"), folder / "by-id/usb-Printer_7"})
+    EXPECT_EQ(lasting_port_name(path, folder / "by-id"), folder / "by-id/usb-Printer_7");
+  EXPECT_EQ(lasting_port_name("/dev/zero", folder / "by-id"), "/dev/zero");
 }
 
 TEST(SerialPort, WhatCannotBeOpenedSaysWhy) {

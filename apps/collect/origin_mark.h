@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+
+namespace supertac {
+
+/// Says that nobody knows where a printer's head is: set while a run moves it, and left by one that did not
+/// end with the head back at its origin, were it by kill -9 or a power cut. It belongs to the printer, not to
+/// a folder of recordings: a file $XDG_STATE_HOME/supertac/origin-unknown/PORT (~/.local/state/...).
+class OriginMark {
+ public:
+  /// @throws FileError when there is no place for it.
+  explicit OriginMark(const std::string& printer_port);
+  bool is_set() const;
+  /// On the disk when it returns. @throws FileError
+  void set() const;
+  /// @throws FileError
+  void clear() const;
+
+ private:
+  std::string file_;
+};
+
+}  // namespace supertac
