@@ -1,8 +1,9 @@
 // Studies of how a collection ends, with the real supertac-collect on a virtual rig; minutes each.
 //   collect_runs kill COUNT [OUT.csv]   kill -9 at COUNT random moments
-//   collect_runs ends COUNT [OUT.csv]   COUNT random moments in contact for each of SIGINT, SIGTERM, SIGHUP,
-//   full disk collect_runs io STEP [OUT.csv]      the N-th call on a file fails: the first and last 30, and
-//   every STEP-th between
+//   collect_runs ends COUNT [OUT.csv]   COUNT random moments in contact for each of SIGINT, SIGTERM, SIGHUP
+//                                       (each twice) and a full disk
+//   collect_runs io STEP [OUT.csv]      the N-th call on a file fails: the first and last 30, and every
+//                                       STEP-th between
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include <fstream>
 #include <functional>
 #include <iostream>
+#include <sstream>
 #include <string>
 
 #include "hardware/collection.h"
@@ -25,21 +27,30 @@
 namespace supertac {
 namespace {
 
-const std::string kRecording = "3_Bumps_t1_p1_v10.safetensors", kJournal = "3_Bumps_t1_v10.journal",
-                  kMark = "origin-unknown";
+const std::string kRecording = "3_Bumps_t1_p1_v10.safetensors", kJournal = "3_Bumps_t1_v10.journal";
 
 void show(const std::string& what, int done, int total) {
   if (isatty(STDERR_FILENO) == 1) std::cerr << '\r' << what << ' ' << done << '/' << total << std::flush;
 }
 
-/// Everything in the folder is a journal, a recording or the mark.
+/// Every file is a journal, a recording or the mark.
 std::string left_behind(const CollectRun& run) {
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator(run.out(), ignored)) {
+  const bool marked = run.origin_unknown();
+  int files = 0, known = marked ? 1 : 0;
+  std::string names;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(run.disk())) {
+    if (!entry.is_regular_file()) continue;
     const std::string name = entry.path().filename().string();
-    if (name != kRecording && name != kJournal && name != kMark) return "left behind: " + name;
+    ++files;
+    known += name == kRecording || name == kJournal ? 1 : 0;
+    names += " " + name;
   }
-  return {};
+  return files == known ? "" : "left behind, among:" + names;
+}
+
+std::string without_line_ends(std::string text) {
+  std::erase(text, '\n');
+  return text;
 }
 
 // --- kill ----------------------------------------------------------------------------------------
@@ -76,7 +87,7 @@ void recover(const CollectRun& run, const Journal& journal, Killed& killed) {
 
 /// The next start demands a confirmed origin when the head may have moved; when not, it never moved.
 void start_again(CollectRun& run, Killed& killed) {
-  if (!std::filesystem::exists(run.out() + "/" + kMark)) {
+  if (!run.origin_unknown()) {
     if (distance(run.head(), {99.7, 101.17, 131.81}) > 0.01) killed.broken = "moved without a mark";
     return;
   }
@@ -133,7 +144,8 @@ int kill_study(int count, std::ostream& csv) {
   for (int seed = 1; seed <= count; ++seed) {
     const Killed k = kill_once(static_cast<std::uint64_t>(seed));
     csv << seed << ',' << k.moment_s << ',' << k.stage << ',' << k.recorded_s << ',' << k.lost_s << ','
-        << k.stall_s << ',' << k.recordings << ',' << k.frames << ",\"" << k.broken << '"' << std::endl;
+        << k.stall_s << ',' << k.recordings << ',' << k.frames << ",\"" << without_line_ends(k.broken) << '"'
+        << std::endl;
     broken += k.broken.empty() ? 0 : 1;
     running += k.stage == "running" ? 1 : 0;
     if (k.stage == "running") worst = std::max(worst, k.lost_s - k.stall_s);
@@ -159,7 +171,11 @@ std::string end_once(const End& end, std::uint64_t seed, double& moment, double&
   RunningProcess process("supertac-collect", run.arguments(),
                          {.max_file_bytes = end.signal == 0 ? limit : -1});
   if (end.signal != 0) {
-    if (!run.wait_for_contact(moment)) return "no contact";
+    if (!run.wait_for_contact(moment)) {
+      process.send(SIGKILL);
+      return "no contact: " + process.wait().error;
+    }
+    process.send(end.signal);
     process.send(end.signal);
   }
   const ProcessResult result = process.wait();
@@ -179,7 +195,8 @@ int end_study(int count, std::ostream& csv) {
     for (int seed = 1; seed <= count; ++seed) {
       double moment = 0, z = 0;
       const std::string wrong = end_once(end, static_cast<std::uint64_t>(seed), moment, z);
-      csv << end.name << ',' << seed << ',' << moment << ',' << z << ",\"" << wrong << '"' << std::endl;
+      csv << end.name << ',' << seed << ',' << moment << ',' << z << ",\"" << without_line_ends(wrong) << '"'
+          << std::endl;
       broken += wrong.empty() ? 0 : 1;
       show(end.name, seed, count);
     }
@@ -194,42 +211,49 @@ struct IoFault {
   bool forever, is_short;
 };
 
-/// Calls the program made on files of the collection, `wrong` empty when it ended as promised.
-int io_once(int at, const IoFault& fault, std::string& wrong) {
-  CollectRun run(20);
+struct IoCounts {
+  int calls = 0;  ///< of the program on files of the collection
+  int grave = 0;  ///< that failed and on which something depends
+};
+
+/// `wrong` is empty when it ended as promised: one line and exit code 1 when a call failed on which something
+/// depends, otherwise complete.
+IoCounts io_once(int at, const IoFault& fault, std::string& wrong) {
+  CollectRun run(10);
   const TemporaryFolder folder;
   const std::string text = std::to_string(at) + (fault.forever ? " forever " : " once ") +
                            (fault.is_short ? "short " : "error ") + std::to_string(fault.error) + " " +
-                           run.out();
+                           run.disk();
   setenv("SUPERTAC_FAULT", text.c_str(), 1);
   setenv("SUPERTAC_FAULT_COUNT", folder.file("count").c_str(), 1);
   setenv("LD_PRELOAD", SUPERTAC_IO_FAULTS, 1);
   RunningProcess process("supertac-collect", run.arguments());
   unsetenv("LD_PRELOAD");
   const ProcessResult result = process.wait();
-  const int calls = std::atoi(read_text_file(folder.file("count"), 64).c_str());
-  const bool harmless = calls < at || fault.is_short;
+  IoCounts counts;
+  std::istringstream(read_text_file(folder.file("count"), 64)) >> counts.calls >> counts.grave;
   wrong = left_behind(run);
-  if (result.code != (harmless ? 0 : 1))
+  if (result.code != (counts.grave == 0 ? 0 : 1))
     wrong = "exit code " + std::to_string(result.code) + ": " + result.error;
-  if (!harmless && !is_one_line(result.error)) wrong = "not one line: " + result.error;
+  if (counts.grave > 0 && !is_one_line(result.error)) wrong = "not one line: " + result.error;
   if (run.head().z < kLiftedZ - 0.01) wrong = "the finger was not lifted";
-  return calls;
+  return counts;
 }
 
 int io_study(int step, std::ostream& csv) {
-  csv << "call,calls,errno,often,kind,broken\n";
+  csv << "call,calls,grave,errno,often,kind,broken\n";
   std::string wrong;
-  const int total = io_once(0, {0, false, false}, wrong);
+  const int total = io_once(0, {0, false, false}, wrong).calls;
   int runs = 0, broken = 0;
   for (const IoFault& fault :
        {IoFault{ENOSPC, false, false}, IoFault{ENOSPC, true, false}, IoFault{EIO, false, false},
         IoFault{EIO, true, false}, IoFault{0, true, true}}) {
     for (int at = 1; at <= total + 5; ++at) {
       if (at > 30 && at < total - 30 && at % step != 0) continue;
-      const int calls = io_once(at, fault, wrong);
-      csv << at << ',' << calls << ',' << fault.error << ',' << (fault.forever ? "forever," : "once,")
-          << (fault.is_short ? "short,\"" : "error,\"") << wrong << '"' << std::endl;
+      const IoCounts counts = io_once(at, fault, wrong);
+      csv << at << ',' << counts.calls << ',' << counts.grave << ',' << fault.error << ','
+          << (fault.forever ? "forever," : "once,") << (fault.is_short ? "short,\"" : "error,\"")
+          << without_line_ends(wrong) << '"' << std::endl;
       ++runs;
       broken += wrong.empty() ? 0 : 1;
       show("call", at, total);

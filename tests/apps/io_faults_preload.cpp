@@ -1,6 +1,8 @@
 // Preloaded into a program (LD_PRELOAD): the N-th open, write, fsync, close or rename of a file below a
-// folder fails. SUPERTAC_FAULT = "N once|forever error|short ERRNO FOLDER"; the number of calls seen is kept
-// in the file SUPERTAC_FAULT_COUNT, so that the caller knows when N was beyond the last.
+// folder fails. SUPERTAC_FAULT = "N once|forever error|short ERRNO FOLDER". The file SUPERTAC_FAULT_COUNT
+// keeps the number of calls seen, and of those that failed and on which something depends: all but the close
+// of a directory or a file through which nothing was written. That one can lose nothing, and need not be
+// told.
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -23,9 +25,9 @@ struct Plan {
 };
 
 constexpr int kMostFiles = 1024;
-std::bitset<kMostFiles> watched;
+std::bitset<kMostFiles> watched, written;
 std::mutex mutex;
-int calls = 0;
+int calls = 0, grave = 0;
 
 const Plan& plan() {
   static const Plan plan = [] {
@@ -57,24 +59,40 @@ bool is_watched(int file) {
 
 void watch(int file, bool on) {
   const std::lock_guard lock(mutex);
-  if (file >= 0 && file < kMostFiles) watched[static_cast<size_t>(file)] = on;
+  if (file < 0 || file >= kMostFiles) return;
+  watched[static_cast<size_t>(file)] = on;
+  written[static_cast<size_t>(file)] = false;
 }
 
+/// Forgets the file. True when something was written through it.
+bool close_watched(int file) {
+  const std::lock_guard lock(mutex);
+  watched[static_cast<size_t>(file)] = false;
+  return written[static_cast<size_t>(file)];
+}
+
+void keep_counts() {
+  const char* path = getenv("SUPERTAC_FAULT_COUNT");
+  if (path == nullptr) return;
+  const int file = real<int (*)(const char*, int, ...)>("open")(path, O_WRONLY | O_CREAT, 0600);
+  char text[32];
+  const int length = snprintf(text, sizeof text, "%8d %8d", calls, grave);
+  (void)!real<ssize_t (*)(int, const void*, size_t)>("write")(file, text, static_cast<size_t>(length));
+  real<int (*)(int)>("close")(file);
+}
+
+enum class Call { other, write, clean_close };
+
 /// Counts a call; true when it is to fail, errno then set.
-bool hit(bool can_be_short = false) {
+bool hit(Call call = Call::other) {
   const std::lock_guard lock(mutex);
   ++calls;
-  if (const char* path = getenv("SUPERTAC_FAULT_COUNT")) {
-    const int file = real<int (*)(const char*, int, ...)>("open")(path, O_WRONLY | O_CREAT, 0600);
-    char text[16];
-    const int length = snprintf(text, sizeof text, "%8d", calls);
-    (void)!real<ssize_t (*)(int, const void*, size_t)>("write")(file, text, static_cast<size_t>(length));
-    real<int (*)(int)>("close")(file);
-  }
   const bool now = calls == plan().at || (plan().forever && calls > plan().at);
-  if (!now || (plan().is_short && !can_be_short)) return false;
-  errno = plan().error;
-  return true;
+  const bool fails = now && (!plan().is_short || call == Call::write);
+  if (fails && !plan().is_short && call != Call::clean_close) ++grave;
+  keep_counts();
+  if (fails) errno = plan().error;
+  return fails;
 }
 
 int open_file(const char* name, const char* path, int flags, mode_t mode) {
@@ -110,9 +128,13 @@ int open64(const char* path, int flags, ...) {
 }
 
 ssize_t write(int file, const void* bytes, size_t count) {
-  if (is_watched(file) && hit(true)) {
-    if (!plan().is_short) return -1;
-    count = (count + 1) / 2;
+  if (is_watched(file)) {
+    if (hit(Call::write)) {
+      if (!plan().is_short) return -1;
+      count = (count + 1) / 2;
+    }
+    const std::lock_guard lock(mutex);
+    written[static_cast<size_t>(file)] = true;
   }
   return real<ssize_t (*)(int, const void*, size_t)>("write")(file, bytes, count);
 }
@@ -122,10 +144,10 @@ int fsync(int file) { return is_watched(file) && hit() ? -1 : real<int (*)(int)>
 int fdatasync(int file) { return is_watched(file) && hit() ? -1 : real<int (*)(int)>("fdatasync")(file); }
 
 int close(int file) {
-  const bool ours = is_watched(file);
-  watch(file, false);
-  const int result = real<int (*)(int)>("close")(file);  // the descriptor is gone in any case
-  return ours && hit() ? -1 : result;
+  if (!is_watched(file)) return real<int (*)(int)>("close")(file);
+  const bool clean = !close_watched(file);
+  (void)real<int (*)(int)>("close")(file);  // the descriptor is gone in any case
+  return hit(clean ? Call::clean_close : Call::other) ? -1 : 0;
 }
 
 int rename(const char* from, const char* to) {

@@ -68,6 +68,10 @@ struct FaultyCollection {
   RecorderSettings settings;
 };
 
+// The journal's first calls: its open, the write of its header; then open, fsync and close of its folder,
+// through which nothing was written: that close can lose nothing.
+constexpr int kCloseOfFolder = 5;
+
 struct Sweep {
   int runs = 0, failed = 0;
 };
@@ -88,7 +92,7 @@ Sweep sweep(int error, bool forever) {
     untouched = reached ? 0 : untouched + 1;
     if (untouched == 5) return sweep;
     if (!reached) continue;
-    EXPECT_TRUE(failed) << "call " << at;
+    EXPECT_EQ(failed, forever || at != kCloseOfFolder) << "call " << at;
     ++sweep.runs;
     sweep.failed += failed ? 1 : 0;
   }
