@@ -182,8 +182,9 @@ std::array<double, kTaxels> FingerModel::loads(const FingerPose& pose) const {
       depth[at] = surface(pose.x_mm + across_mm(i), pose.y_mm + along_mm(j)) - rise_[at] - pose.z_mm;
     }
   // Balance of the mount. The excess force is convex and falls with the lift, so Newton's steps from lift 0
-  // approach the root from below and never pass it.
-  double lift = 0;
+  // approach the root from below and never pass it; once the same points touch as before, the last step was
+  // exact.
+  double lift = 0, last_slope = 0;
   for (int step = 0; settings_.with_mount && step < 12; ++step) {
     double excess = -settings_.mount_stiffness * lift, slope = settings_.mount_stiffness;
     for (const double d : depth) {
@@ -191,6 +192,8 @@ std::array<double, kTaxels> FingerModel::loads(const FingerPose& pose) const {
       excess += kAcrossMm * kAlongMm * indented;
       slope += indented > 0 ? kAcrossMm * kAlongMm : 0.0;
     }
+    if (slope == last_slope) break;
+    last_slope = slope;
     lift += excess / slope;
   }
   std::array<double, kTaxels> load{};
