@@ -39,11 +39,15 @@ struct Parameter {
 
 class Module {
  public:
+  Module() = default;
+  Module(const Module&) = default;
+  Module(Module&&) = default;
   /// In the order of construction, which is the order in checkpoints.
   const std::vector<Parameter>& parameters() const { return parameters_; }
   Dim parameter_count() const;
 
  protected:
+  ~Module() = default;  // not virtual: a layer is never deleted as a mere Module
   Variable add_parameter(const std::string& name, Tensor value, Layout layout);
   /// Lists the parameters of a part of this module as "name.its_name".
   void add(const std::string& name, const Module& part);

@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <memory>
 #include <stdexcept>
+#include <variant>
 
 #include "apps/common/signals.h"
 #include "autograd/adam.h"
@@ -17,23 +16,21 @@ namespace {
 
 constexpr double kWarmUp = 0.05;
 
-// A classifier that fits the view, whatever its kind.
-struct Classifier {
-  std::unique_ptr<Module> module;
-  std::function<Variable(const Variable&)> forward;
-};
-
-template <class M>
-Classifier hold(std::unique_ptr<M> module) {
-  const M& m = *module;
-  return {std::move(module), [&m](const Variable& x) { return m.forward(x); }};
-}
+// The classifier that fits the view.
+using Classifier = std::variant<FeatureClassifier, TextureClassifier>;
 
 Classifier make_classifier(const Shape& sample, Dim classes, std::uint64_t seed) {
   Rng rng(seed);
-  if (sample.rank() == 2) return hold(std::make_unique<FeatureClassifier>(sample[1], classes, rng));
-  return hold(
-      std::make_unique<TextureClassifier>(ClassifierSettings{.size = sample[1], .classes = classes}, rng));
+  if (sample.rank() == 2) return FeatureClassifier(sample[1], classes, rng);
+  return TextureClassifier({.size = sample[1], .classes = classes}, rng);
+}
+
+Variable forward(const Classifier& classifier, const Variable& x) {
+  return std::visit([&](const auto& kind) { return kind.forward(x); }, classifier);
+}
+
+std::vector<Variable> parameters_of(const Classifier& classifier) {
+  return std::visit([](const Module& kind) { return values_of(kind.parameters()); }, classifier);
 }
 
 Tensor gather(const WindowSet& data, std::span<const std::uint32_t> indices) {
@@ -60,7 +57,7 @@ void train(const Classifier& classifier, const View& view, const SuperTac& model
   const Schedule schedule{.peak = s.learning_rate,
                           .warm_up = static_cast<std::int64_t>(kWarmUp * static_cast<double>(total)),
                           .total = total};
-  Adam adam(values_of(classifier.module->parameters()), {.learning_rate = s.learning_rate, .clip_norm = 1});
+  Adam adam(parameters_of(classifier), {.learning_rate = s.learning_rate, .clip_norm = 1});
   std::vector<std::uint32_t> indices(batching.batch_size());
   for (std::int64_t step = 0; step < total; ++step) {
     stop_if_interrupted();
@@ -73,7 +70,7 @@ void train(const Classifier& classifier, const View& view, const SuperTac& model
       augment(s.augment, s.seed, batching.sample(epoch, b, n), windows.values().subspan(n * size, size));
     }
     const Variable x(show(view, model, data, indices, windows));
-    const Variable loss = softmax_cross_entropy(classifier.forward(x), labels_of(data, exam, indices));
+    const Variable loss = softmax_cross_entropy(forward(classifier, x), labels_of(data, exam, indices));
     if (!std::isfinite(loss.item())) {
       throw std::runtime_error("the classifier of view " + view.name() + " diverged at step " +
                                std::to_string(step + 1) + "; lower --learning-rate");
@@ -100,7 +97,7 @@ std::vector<std::int32_t> answers(const View& view, const SuperTac& model, const
     stop_if_interrupted();
     const auto indices = test.subspan(first, std::min(batch, test.size() - first));
     const Variable x(show(view, model, data, indices, gather(data, indices)));
-    const Variable logits = classifier.forward(x);
+    const Variable logits = forward(classifier, x);
     for (std::size_t n = 0; n < indices.size(); ++n) {
       const real* row = logits.value().data() + static_cast<Dim>(n) * exam.classes;
       result.push_back(static_cast<std::int32_t>(std::max_element(row, row + exam.classes) - row));
