@@ -40,7 +40,8 @@ void check_settings(const Arguments& a) {
   nlohmann::ordered_json settings = nlohmann::ordered_json::parse(training.text());
   settings.erase("seed");
   settings["grouping"] = name_of(training.model.grouping);
-  for (const char* option : {"also", "data", "limit", "plates", "split", "stride"}) settings[option] = a.text(option);
+  for (const char* option : {"also", "data", "limit", "plates", "rate", "scaling", "split", "stride"})
+    settings[option] = a.text(option);
   const std::string path = a.text("out") + "/settings.json";
   if (!fs::exists(path)) return write_file(path, settings.dump(2) + "\n");
   const auto before = parse_json_limited(read_text_file(path, 1 << 20));

@@ -49,9 +49,8 @@ std::string GridPoint::configuration() const {
 }
 
 void declare_grid(Arguments& a) {
-  a.option("preset", "A,B,...", "networks to start from: paper", "paper");
-  a.option("timesteps", "T,...",
-           "samples per window at 300 Hz, multiples of 16, 32 to 512 (default: the preset's)");
+  a.option("preset", "A,B,...", "networks to start from: paper, tiny", "paper");
+  a.option("timesteps", "T,...", "samples per window, multiples of 16, 32 to 512 (default: the preset's)");
   a.option("latent", "LD,...", "latent numbers per group of taxels (default: the preset's)");
   a.option("scale", "N,...", "pictures of 4 N pixels a side: 2, 4, 8 (default: the preset's)");
   a.option("channels", "N,...", "of the upsampler (default: the preset's)");

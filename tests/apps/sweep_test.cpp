@@ -91,10 +91,13 @@ TEST_F(Sweep, WritesARowAModelAndDoesNotRepeatIt) {
   EXPECT_EQ(again.error.find("training on"), std::string::npos) << again.error;
   EXPECT_EQ(bytes("grid/sweep.csv"), csv);
 
-  const ProcessResult other = sweep("grid", "2");
-  EXPECT_EQ(other.code, 1);
-  EXPECT_NE(other.error.find("this sweep began with epochs 1, now it is 2"), std::string::npos)
-      << other.error;
+  const std::string beginning = "this sweep began with ";
+  const ProcessResult longer = sweep("grid", "2"), slower = sweep("grid", "1", {"--rate", "100"});
+  EXPECT_EQ(longer.code, 1);
+  EXPECT_NE(longer.error.find(beginning + "epochs 1, now it is 2"), std::string::npos) << longer.error;
+  EXPECT_EQ(slower.code, 1);
+  EXPECT_NE(slower.error.find(beginning + "rate \"300\", now it is \"100\""), std::string::npos)
+      << slower.error;
 }
 
 TEST_F(Sweep, ACutLineIsDroppedAndItsModelMeasuredAgain) {
