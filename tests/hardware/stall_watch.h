@@ -19,9 +19,8 @@ namespace supertac {
 class StallWatch {
  public:
   StallWatch() {
-    for (unsigned cpu = 0; cpu < std::max(1U, std::thread::hardware_concurrency()); ++cpu) {
-      threads_.emplace_back([this, cpu] { run(cpu); });
-    }
+    due_.resize(std::max(1U, std::thread::hardware_concurrency()), monotonic_seconds());
+    for (unsigned cpu = 0; cpu < due_.size(); ++cpu) threads_.emplace_back([this, cpu] { run(cpu); });
   }
   ~StallWatch() {
     stop_ = true;
@@ -30,17 +29,21 @@ class StallWatch {
   StallWatch(const StallWatch&) = delete;
   StallWatch& operator=(const StallWatch&) = delete;
 
-  /// Seconds for which some processor did not wake a sleeper, at worst, between two times of the wall.
+  /// Seconds between two times of the wall for which some processor did not wake a sleeper, at worst.
   double longest(double from, double until) {
     const std::lock_guard lock(mutex_);
     double longest = 0;
-    for (const auto& [begin, end] : stalls_) {
-      if (begin < until && end > from) longest = std::max(longest, end - begin);
-    }
+    const auto count = [&](double begin, double end) {
+      if (end - begin > kLate) longest = std::max(longest, std::min(end, until) - std::max(begin, from));
+    };
+    for (const auto& [begin, end] : stalls_) count(begin, end);
+    // Whoever asks may have been woken before the sleepers were.
+    for (const double due : due_) count(due, monotonic_seconds());
     return longest;
   }
 
  private:
+  static constexpr double kLate = 2e-3;
   void run(unsigned cpu) {
     cpu_set_t only;
     CPU_ZERO(&only);
@@ -48,15 +51,20 @@ class StallWatch {
     (void)sched_setaffinity(0, sizeof only, &only);
     while (!stop_) {
       const double due = monotonic_seconds() + 1e-3;
+      {
+        const std::lock_guard lock(mutex_);
+        due_[cpu] = due;
+      }
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
       const double woken = monotonic_seconds();
-      if (woken - due < 2e-3) continue;
+      if (woken - due <= kLate) continue;
       const std::lock_guard lock(mutex_);
       stalls_.emplace_back(due, woken);
     }
   }
   std::mutex mutex_;
   std::vector<std::pair<double, double>> stalls_;
+  std::vector<double> due_;  // of every processor's sleeper
   std::atomic<bool> stop_{false};
   std::vector<std::thread> threads_;
 };

@@ -52,11 +52,16 @@ class NotingPort : public Port {
   double& stopped_;
 };
 
-double pull(PtyRig& rig, Plug plug) {
-  double pulled = 0;
-  rig.with_world([&](RigWorld&) { pulled = monotonic_seconds(); });
+/// When the plug began to be pulled, and how long the kernel took to hang the terminal up: its workers run at
+/// usual priority.
+struct Pull {
+  double at_s = 0, took_s = 0;
+};
+
+Pull pull(PtyRig& rig, Plug plug) {
+  const double begin = monotonic_seconds();
   plug == Plug::board ? rig.unplug_board() : rig.unplug_printer();
-  return pulled;
+  return {begin, monotonic_seconds() - begin};
 }
 
 /// A collection of one pass over 20 mm that starts just above the plate.
@@ -103,7 +108,7 @@ UnplugVerdict unplug_idle(Plug plug, std::uint64_t seed) {
   UnplugVerdict verdict;
   verdict.moment_s = 0.05 * RandomStream(seed, 1).uniform(0);
   StallWatch stalls;
-  std::atomic<double> pulled{0};
+  Pull pulled;
   std::thread puller([&] {
     sleep_for(verdict.moment_s);
     pulled = pull(rig, plug);
@@ -116,8 +121,9 @@ UnplugVerdict unplug_idle(Plug plug, std::uint64_t seed) {
   }
   const double noticed = monotonic_seconds();
   puller.join();
-  verdict.noticed_s = verdict.returned_s = noticed - pulled;
-  verdict.stall_s = stalls.longest(pulled, noticed);
+  verdict.noticed_s = verdict.returned_s = noticed - pulled.at_s;
+  verdict.hanging_up_s = pulled.took_s;
+  verdict.stall_s = stalls.longest(pulled.at_s, noticed);
   if (verdict.noticed_s - verdict.stall_s > kLatest)
     verdict.broken = "noticed after " + std::to_string(verdict.noticed_s) + " s";
   return verdict;
@@ -131,7 +137,8 @@ UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed) {
   UnplugVerdict verdict;
   verdict.moment_s = kRunSeconds * RandomStream(seed, 2).uniform(0);
   const RecorderSettings settings = short_run(folder);
-  double board_failed = 0, printer_failed = 0, stopped = 0, never = 0, pulled = 0;
+  double board_failed = 0, printer_failed = 0, stopped = 0, never = 0;
+  Pull pulled;
   StallWatch stalls;
   std::atomic<bool> ended{false};
   std::thread puller([&] {
@@ -150,9 +157,10 @@ UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed) {
     const double returned = monotonic_seconds();
     ended = true;
     puller.join();
-    verdict.noticed_s = (plug == Plug::board ? stopped : printer_failed) - pulled;
-    verdict.returned_s = returned - pulled;
-    verdict.stall_s = stalls.longest(pulled, pulled + verdict.noticed_s);
+    verdict.noticed_s = (plug == Plug::board ? stopped : printer_failed) - pulled.at_s;
+    verdict.returned_s = returned - pulled.at_s;
+    verdict.hanging_up_s = pulled.took_s;
+    verdict.stall_s = stalls.longest(pulled.at_s, pulled.at_s + verdict.noticed_s);
     Point3 head;
     rig.with_world([&](RigWorld& world) { head = world.printer().head(world.now()); });
     judge(verdict, plug, outcome, head, settings.plan.start.z);

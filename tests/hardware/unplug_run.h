@@ -13,10 +13,11 @@ struct UnplugVerdict {
   double moment_s = 0;  ///< of the collection or of the idle reading, when the plug was pulled
   /// From the pull to the typed error; of the board in a collection: to the stop sent to the printer.
   double noticed_s = 0;
-  double returned_s = 0;  ///< from the pull to the end of the collection, finger lifted, journal on disk
-  double stall_s = 0;     ///< for which the machine itself stood still between pull and error; allowed for
-  std::string finger;     ///< what the outcome says
-  std::string broken;     ///< the promise that was broken; empty when all held
+  double returned_s = 0;    ///< from the pull to the end of the collection, finger lifted, journal on disk
+  double stall_s = 0;       ///< for which the machine itself stood still between pull and error; allowed for
+  double hanging_up_s = 0;  ///< that the kernel took to close the terminal's other side; not allowed for
+  std::string finger;       ///< what the outcome says
+  std::string broken;       ///< the promise that was broken; empty when all held
 };
 
 /// Pulls the plug of a port that is only read from.

@@ -12,7 +12,7 @@ int main(int argc, char** argv) {
   using namespace supertac;
   const int pulls = argc > 1 ? std::atoi(argv[1]) : 100;
   std::ofstream file(argc > 2 ? argv[2] : "/dev/null");
-  file << "port,when,seed,moment_s,noticed_ms,stall_ms,returned_ms,finger,broken\n";
+  file << "port,when,seed,moment_s,noticed_ms,stall_ms,hanging_up_ms,returned_ms,finger,broken\n";
   const bool terminal = isatty(STDERR_FILENO) == 1;
   int broken = 0;
   for (const Plug plug : {Plug::board, Plug::printer}) {
@@ -25,7 +25,8 @@ int main(int argc, char** argv) {
         worst = std::max(worst, v.noticed_s - v.stall_s);
         file << (plug == Plug::board ? "board," : "printer,") << (idle ? "idle," : "collection,") << seed
              << ',' << v.moment_s << ',' << 1e3 * v.noticed_s << ',' << 1e3 * v.stall_s << ','
-             << 1e3 * v.returned_s << ',' << v.finger << ',' << v.broken << std::endl;
+             << 1e3 * v.hanging_up_s << ',' << 1e3 * v.returned_s << ',' << v.finger << ',' << v.broken
+             << std::endl;
         if (terminal)
           std::cerr << '\r' << (plug == Plug::board ? "board " : "printer ") << seed << '/' << pulls
                     << std::flush;
