@@ -6,8 +6,8 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "autograd/kernels/clones.h"
 #include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/loops.h"
 
 namespace supertac {
 namespace {
@@ -21,14 +21,16 @@ struct Update {
 // the smallest rounds back to it; arithmetic with them is 25 times slower. Epsilon hides 1e-30 by far.
 inline real flushed(real x) { return std::abs(x) < real(1e-30) ? real(0) : x; }
 
-SUPERTAC_CLONES void update_loop(Dim n, Update u, const real* gradient, real* __restrict x,
-                                 real* __restrict m, real* __restrict v) {
-  for (Dim i = 0; i < n; ++i) {
-    const real g = u.clip * gradient[i];
-    m[i] = flushed(u.b1 * m[i] + u.rest1 * g);
-    v[i] = flushed(u.b2 * v[i] + u.rest2 * g * g);
-    x[i] -= u.rate * m[i] / (std::sqrt(v[i]) * u.correction + u.epsilon);
-  }
+void update_loop(Dim n, Update u, const real* gradient, real* __restrict x, real* __restrict m,
+                 real* __restrict v) {
+  kernels::run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) {
+      const real g = u.clip * gradient[i];
+      m[i] = flushed(u.b1 * m[i] + u.rest1 * g);
+      v[i] = flushed(u.b2 * v[i] + u.rest2 * g * g);
+      x[i] -= u.rate * m[i] / (std::sqrt(v[i]) * u.correction + u.epsilon);
+    }
+  });
 }
 
 // The last bits of the C library's pow and cos depend on the processor; products and sums do not.

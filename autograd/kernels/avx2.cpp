@@ -35,7 +35,7 @@ struct Vec {
 
 }  // namespace
 
-const IsaKernels kAvx2Kernels{"avx2", gather, gather_rows, outer};
+const IsaKernels kAvx2Kernels{"avx2", Vectors::avx2, gather, gather_rows, outer};
 
 }  // namespace supertac::kernels
 

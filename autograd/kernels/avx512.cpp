@@ -30,7 +30,7 @@ struct Vec {
 
 }  // namespace
 
-const IsaKernels kAvx512Kernels{"avx512", gather, gather_rows, outer};
+const IsaKernels kAvx512Kernels{"avx512", Vectors::avx512, gather, gather_rows, outer};
 
 }  // namespace supertac::kernels
 

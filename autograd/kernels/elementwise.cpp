@@ -2,55 +2,76 @@
 
 #include <algorithm>
 
-#include "autograd/kernels/clones.h"
 #include "autograd/kernels/exp.h"
+#include "autograd/kernels/loops.h"
 #include "autograd/kernels/sums.h"
 
 namespace supertac::kernels {
 
-SUPERTAC_CLONES void leaky_relu(Dim n, real slope, const real* x, real* __restrict y) {
-  for (Dim i = 0; i < n; ++i) y[i] = x[i] > 0 ? x[i] : slope * x[i];
+void leaky_relu(Dim n, real slope, const real* x, real* __restrict y) {
+  run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) y[i] = x[i] > 0 ? x[i] : slope * x[i];
+  });
 }
 
-SUPERTAC_CLONES void leaky_relu_grad(Dim n, real slope, const real* gy, const real* y, real* __restrict gx) {
-  for (Dim i = 0; i < n; ++i) gx[i] += y[i] > 0 ? gy[i] : slope * gy[i];
+void leaky_relu_grad(Dim n, real slope, const real* gy, const real* y, real* __restrict gx) {
+  run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) gx[i] += y[i] > 0 ? gy[i] : slope * gy[i];
+  });
 }
 
-SUPERTAC_CLONES void rectify_in_place(Dim n, real slope, const real* y, real* __restrict g) {
-  for (Dim i = 0; i < n; ++i) g[i] = y[i] > 0 ? g[i] : slope * g[i];
+void rectify_in_place(Dim n, real slope, const real* y, real* __restrict g) {
+  run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) g[i] = y[i] > 0 ? g[i] : slope * g[i];
+  });
 }
 
-SUPERTAC_CLONES void sigmoid(Dim n, const real* x, real* __restrict y) {
-  for (Dim i = 0; i < n; ++i) y[i] = sigmoid_same_bits(x[i]);
+void sigmoid(Dim n, const real* x, real* __restrict y) {
+  run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) y[i] = sigmoid_same_bits(x[i]);
+  });
 }
 
-SUPERTAC_CLONES void sigmoid_grad(Dim n, const real* gy, const real* y, real* __restrict gx) {
-  for (Dim i = 0; i < n; ++i) gx[i] += gy[i] * y[i] * (1 - y[i]);
+void sigmoid_grad(Dim n, const real* gy, const real* y, real* __restrict gx) {
+  run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) gx[i] += gy[i] * y[i] * (1 - y[i]);
+  });
 }
 
-SUPERTAC_CLONES void clamp(Dim n, real low, real high, const real* x, real* __restrict y) {
-  for (Dim i = 0; i < n; ++i) y[i] = x[i] < low ? low : (x[i] > high ? high : x[i]);
+void clamp(Dim n, real low, real high, const real* x, real* __restrict y) {
+  run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) y[i] = x[i] < low ? low : (x[i] > high ? high : x[i]);
+  });
 }
 
-SUPERTAC_CLONES void clamp_grad(Dim n, real low, real high, const real* gy, const real* x,
-                                real* __restrict gx) {
-  for (Dim i = 0; i < n; ++i) gx[i] += x[i] >= low && x[i] <= high ? gy[i] : 0;
+void clamp_grad(Dim n, real low, real high, const real* gy, const real* x, real* __restrict gx) {
+  run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) gx[i] += x[i] >= low && x[i] <= high ? gy[i] : 0;
+  });
 }
 
-SUPERTAC_CLONES void add(Dim n, const real* a, const real* b, real* __restrict y) {
-  for (Dim i = 0; i < n; ++i) y[i] = a[i] + b[i];
+void add(Dim n, const real* a, const real* b, real* __restrict y) {
+  run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) y[i] = a[i] + b[i];
+  });
 }
 
-SUPERTAC_CLONES void multiply(Dim n, const real* a, const real* b, real* __restrict y) {
-  for (Dim i = 0; i < n; ++i) y[i] = a[i] * b[i];
+void multiply(Dim n, const real* a, const real* b, real* __restrict y) {
+  run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) y[i] = a[i] * b[i];
+  });
 }
 
-SUPERTAC_CLONES void scale(Dim n, real factor, const real* x, real* __restrict y) {
-  for (Dim i = 0; i < n; ++i) y[i] = factor * x[i];
+void scale(Dim n, real factor, const real* x, real* __restrict y) {
+  run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) y[i] = factor * x[i];
+  });
 }
 
-SUPERTAC_CLONES void add_scaled(Dim n, real factor, const real* x, real* __restrict y) {
-  for (Dim i = 0; i < n; ++i) y[i] += factor * x[i];
+void add_scaled(Dim n, real factor, const real* x, real* __restrict y) {
+  run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) y[i] += factor * x[i];
+  });
 }
 
 void put(Dim n, const real* x, Into into, real* y) {
@@ -58,8 +79,10 @@ void put(Dim n, const real* x, Into into, real* y) {
   std::copy_n(x, n, y);
 }
 
-SUPERTAC_CLONES void add_product(Dim n, const real* a, const real* b, real* __restrict y) {
-  for (Dim i = 0; i < n; ++i) y[i] += a[i] * b[i];
+void add_product(Dim n, const real* a, const real* b, real* __restrict y) {
+  run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) y[i] += a[i] * b[i];
+  });
 }
 
 double sum(Dim n, const real* x) {

@@ -1,5 +1,6 @@
 #include "autograd/kernels/isa.h"
 
+#include <atomic>
 #include <cstdlib>
 #include <stdexcept>
 #include <string>
@@ -40,11 +41,15 @@ const IsaKernels& choose() {
 
 #endif
 
+std::atomic<const IsaKernels*>& chosen() {
+  static std::atomic<const IsaKernels*> set{&choose()};
+  return set;
+}
+
 }  // namespace
 
-const IsaKernels& isa_kernels() {
-  static const IsaKernels& chosen = choose();
-  return chosen;
-}
+const IsaKernels& isa_kernels() { return *chosen().load(std::memory_order_relaxed); }
+
+void use_isa(const IsaKernels& set) { chosen() = &set; }
 
 }  // namespace supertac::kernels

@@ -33,8 +33,12 @@ struct OuterJob {
 /// The largest number of input channels that `gather` takes (the length of its row of zeros).
 inline constexpr Dim kMaxChannels = 4096;
 
+/// Instructions that plain loops (loops.h) are compiled for.
+enum class Vectors { baseline, avx2, avx512 };
+
 struct IsaKernels {
   std::string_view name;
+  Vectors vectors;
   void (*gather)(const GatherJob& job, const real* x, real* y);
   /// `rows` images of one pixel each: y[rows, cout] = bias + x[rows, cin] * w[cin, cout]
   void (*gather_rows)(const GatherJob& job, const real* x, real* y, Dim rows);
@@ -44,6 +48,8 @@ struct IsaKernels {
 /// The best set this processor has, or the one that SUPERTAC_ISA=avx512|avx2|portable names.
 /// Throws std::runtime_error, at first use, when SUPERTAC_ISA names an unknown or unsupported set.
 const IsaKernels& isa_kernels();
+/// Replaces the choice. For tests only, which compare the sets in one process; not while kernels run.
+void use_isa(const IsaKernels& set);
 
 extern const IsaKernels kPortableKernels;  // any processor; fused multiply-add in software where it has none
 extern const IsaKernels kPortableFmaKernels;  // the same source for processors with scalar FMA

@@ -31,9 +31,9 @@ struct Vec {
 }  // namespace
 
 #ifdef SUPERTAC_SCALAR_FMA
-const IsaKernels kPortableFmaKernels{"portable", gather, gather_rows, outer};
+const IsaKernels kPortableFmaKernels{"portable", Vectors::baseline, gather, gather_rows, outer};
 #else
-const IsaKernels kPortableKernels{"portable", gather, gather_rows, outer};
+const IsaKernels kPortableKernels{"portable", Vectors::baseline, gather, gather_rows, outer};
 #endif
 
 }  // namespace supertac::kernels

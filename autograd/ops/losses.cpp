@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "autograd/checks.h"
-#include "autograd/kernels/clones.h"
 #include "autograd/kernels/exp.h"
+#include "autograd/kernels/loops.h"
 #include "autograd/kernels/ssim.h"
 #include "autograd/kernels/sums.h"
 
@@ -13,9 +13,10 @@ namespace supertac {
 namespace {
 
 // g += factor (a - b)
-SUPERTAC_CLONES void add_scaled_difference(Dim n, real factor, const real* a, const real* b,
-                                           real* __restrict g) {
-  for (Dim i = 0; i < n; ++i) g[i] += factor * (a[i] - b[i]);
+void add_scaled_difference(Dim n, real factor, const real* a, const real* b, real* __restrict g) {
+  kernels::run_loop([=]() SUPERTAC_LOOP {
+    for (Dim i = 0; i < n; ++i) g[i] += factor * (a[i] - b[i]);
+  });
 }
 
 }  // namespace

@@ -4,6 +4,10 @@
 #include <cstring>
 #include <limits>
 
+#include "autograd/adam.h"
+#include "autograd/kernels/channels.h"
+#include "autograd/kernels/elementwise.h"
+#include "autograd/ops/losses.h"
 #include "tests/autograd/check.h"
 
 namespace supertac::kernels {
@@ -146,6 +150,79 @@ TEST(Isa, StaysWithinItsRows) {
       for (Dim i = cout; i < cout + 40; ++i) ASSERT_EQ(y.data()[i], 7) << isa->name << ' ' << cout;
     }
   }
+}
+
+// Numbers of every magnitude, with both zeros, denormals and infinities among them.
+Tensor awkward(Dim n, std::uint64_t seed) {
+  constexpr real kSpecial[] = {0,
+                               real(-0.0),
+                               1e-40F,
+                               -1e-40F,
+                               std::numeric_limits<real>::infinity(),
+                               -std::numeric_limits<real>::infinity(),
+                               100,
+                               -100};
+  Tensor t = numbers({n}, seed, -9, 9);
+  for (Dim i = 0; i < n; ++i) {
+    if (i % 11 == 0) t.data()[i] = kSpecial[i / 11 % 8];
+  }
+  return t;
+}
+
+// What every plain loop makes of n numbers, one row a loop.
+std::vector<Tensor> results_of_loops(Dim n) {
+  const Tensor a = awkward(n, 1), b = awkward(n, 2), start = numbers({n}, 3);
+  const real *x = a.data(), *y = b.data();
+  std::vector<Tensor> rows;
+  const auto row = [&](auto loop) { loop(rows.emplace_back(start.clone()).data()); };
+  row([&](real* to) { leaky_relu(n, 0.01F, x, to); });
+  row([&](real* to) { leaky_relu_grad(n, 0.01F, x, y, to); });
+  row([&](real* to) { rectify_in_place(n, 0.01F, x, to); });
+  row([&](real* to) { sigmoid(n, x, to); });
+  row([&](real* to) { sigmoid_grad(n, x, y, to); });
+  row([&](real* to) { clamp(n, -1, 1, x, to); });
+  row([&](real* to) { clamp_grad(n, -1, 1, x, y, to); });
+  row([&](real* to) { add(n, x, y, to); });
+  row([&](real* to) { multiply(n, x, y, to); });
+  row([&](real* to) { scale(n, 0.3F, x, to); });
+  row([&](real* to) { add_scaled(n, 0.3F, x, to); });
+  row([&](real* to) { add_product(n, x, y, to); });
+  // three pixels of n channels
+  const Tensor pixels = numbers({3, n}, 4), other = numbers({3, n}, 5), gate = numbers({n}, 6);
+  const auto pixels_row = [&](auto loop) { loop(rows.emplace_back(other.clone()).data()); };
+  row([&](real* to) { channel_mean(1, 3, n, pixels.data(), to); });
+  pixels_row([&](real* to) { channel_mean_grad(1, 3, n, gate.data(), to); });
+  pixels_row([&](real* to) { scale_channels(1, 3, n, pixels.data(), gate.data(), to); });
+  pixels_row([&](real* to) { scale_channels_grad_x(1, 3, n, pixels.data(), gate.data(), Into::add, to); });
+  row([&](real* to) { scale_channels_grad_s(1, 3, n, pixels.data(), other.data(), to); });
+  // the gradient of a loss, and two steps of Adam along it
+  const Variable parameter(numbers({n}, 7), true);
+  Adam adam({parameter}, {.learning_rate = 0.1});
+  for (int step = 0; step < 2; ++step) {
+    adam.zero_grad();
+    backward(l2_loss(parameter, Variable(gate)));
+    adam.step();
+  }
+  rows.push_back(parameter.grad());
+  rows.push_back(parameter.value());
+  return rows;
+}
+
+TEST(Isa, PlainLoops) {
+  const IsaKernels& chosen = isa_kernels();
+  for (const Dim n : {1, 5, 16, 33, 100, 257}) {
+    std::vector<Tensor> first;
+    for (const IsaKernels* isa : available()) {
+      use_isa(*isa);
+      const std::vector<Tensor> rows = results_of_loops(n);
+      if (first.empty()) first = rows;
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        EXPECT_TRUE(same_bytes(rows[i], first[i]))
+            << isa->name << ", loop " << i << " of " << n << " numbers";
+      }
+    }
+  }
+  use_isa(chosen);
 }
 
 TEST(Isa, TheChosenSetIsOneOfThem) {
