@@ -17,7 +17,7 @@ void declare(Arguments& a) {
       "to 1, optional group [N]; takes split (group, pair, none), epochs, batch, learning-rate, lambda");
   a.required("out", "FILE",
              "the model; FILE's run folder beside it (.run) holds log, report and the state to resume");
-  a.option("preset", "NAME", "network: paper, or tiny (a ninth of the cost, made for --rate 50)", "paper");
+  a.option("preset", "NAME", "network: paper, or tiny (a ninth of the cost)", "paper");
   a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512 (default: the preset's)", "");
   a.option("latent", "LD", "latent numbers per group of taxels", "10");
   a.option("scale", "N", "pictures of 4 N pixels a side: 2, 4 or 8", "4");

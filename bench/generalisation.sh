@@ -28,15 +28,19 @@ print(idea, options, seed, *(f"{v:.3f}" for v in (contact["ssim"], contact["psnr
                                                   every["ssim"], every["psnr_mean_db"])), sep=",")
 END
 done << END
-base;--stride 6 --epochs 10;0
-SSIM weighs more;--stride 6 --epochs 10 --lambda 0.5;0
-T 512;--stride 6 --epochs 10 --timesteps 512;0
-100 Hz;--rate 100 --stride 2 --epochs 10;0
-100 Hz again;--rate 100 --stride 2 --epochs 10;1
-75 Hz;--rate 75 --stride 2 --epochs 13;0
-100 Hz and SSIM weighs more;--rate 100 --stride 2 --epochs 10 --lambda 0.4;0
-100 Hz and columns grouped;--rate 100 --stride 2 --epochs 10 --grouping vertical;0
-100 Hz and more KL;--rate 100 --stride 2 --epochs 10 --beta 0.01;0
-100 Hz and less KL;--rate 100 --stride 2 --epochs 10 --beta 0.0001;0
-100 Hz and simulated passes;--rate 100 --stride 2 --epochs 6 --also $out/simulated;0
+base;--stride 6 --epochs 10 --rate 300 --scaling fixed;0
+SSIM weighs more;--stride 6 --epochs 10 --lambda 0.5 --rate 300 --scaling fixed;0
+T 512;--stride 6 --epochs 10 --timesteps 512 --rate 300 --scaling fixed;0
+100 Hz;--rate 100 --stride 2 --epochs 10 --scaling fixed;0
+100 Hz again;--rate 100 --stride 2 --epochs 10 --scaling fixed;1
+75 Hz;--rate 75 --stride 2 --epochs 13 --scaling fixed;0
+100 Hz and SSIM weighs more;--rate 100 --stride 2 --epochs 10 --lambda 0.4 --scaling fixed;0
+100 Hz and columns grouped;--rate 100 --stride 2 --epochs 10 --grouping vertical --scaling fixed;0
+100 Hz and more KL;--rate 100 --stride 2 --epochs 10 --beta 0.01 --scaling fixed;0
+100 Hz and less KL;--rate 100 --stride 2 --epochs 10 --beta 0.0001 --scaling fixed;0
+100 Hz and simulated passes;--rate 100 --stride 2 --epochs 6 --also $out/simulated --scaling fixed;0
+levelled;--stride 2 --epochs 10;0
+levelled and all windows;--epochs 10;0
+levelled and all windows and SSIM weighs more;--epochs 10 --lambda 0.3;0
+levelled and all windows twice as long;--epochs 20;0
 END

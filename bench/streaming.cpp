@@ -3,8 +3,9 @@
 //
 //   streaming MODEL [SECONDS = 60]          prints CSV
 //
-// `wall` is from the millisecond's beginning to the finished picture, as a user feels it: on a busy machine
-// it holds other programs' turns too. `cpu` is the processor time of the same work.
+// `wall` is from the millisecond's beginning to the finished picture, as a user feels it. It holds what the
+// machine does: `wake` is how long after the millisecond the system wakes the program, before any work, and
+// on a busy or virtual machine other programs' turns. `cpu` is the processor time of the work itself.
 #include <spawn.h>
 #include <sys/wait.h>
 #include <time.h>
@@ -74,12 +75,13 @@ int stream(double started, const std::string& model_path, double seconds) {
   const double ready = now() - started;
 
   const auto count = static_cast<std::size_t>(seconds / kPeriod);
-  std::vector<double> wall(count), cpu(count);
+  std::vector<double> wall(count), wake(count), cpu(count);
   std::size_t late = 0;
   double due = now() + kPeriod;
   for (std::size_t i = 0; i < count; ++i, due += kPeriod) {
     late += now() > due ? 1 : 0;  // still busy with the window before
     sleep_until(due);
+    wake[i] = now() - due;
     const double begin = bench::cpu_seconds();
     picture_at(i);
     cpu[i] = bench::cpu_seconds() - begin;
@@ -87,6 +89,7 @@ int stream(double started, const std::string& model_path, double seconds) {
   }
   std::cout << "figure,value\nwindows," << count << "\nready_ms," << format(1e3 * ready, 2) << "\n";
   print_quantiles("wall", wall);
+  print_quantiles("wake", wake);
   print_quantiles("cpu", cpu);
   std::cout << "late_windows," << late << "\nresident_mb," << format(status_mb("VmRSS"), 2)
             << "\npeak_resident_mb," << format(status_mb("VmHWM"), 2) << "\n";

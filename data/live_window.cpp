@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "data/levelling.h"
+
 namespace supertac {
 namespace {
 
@@ -109,6 +111,7 @@ bool LiveWindow::window_until(double end_s, std::span<float> out) const {
     if (mean.count() > 0) held = settings_.scaling(mean.volts());
     if (k < timesteps) std::copy(held.begin(), held.end(), out.begin() + (timesteps - 1 - k) * kTaxels);
   }
+  if (settings_.scaling.levelled) level(out, kTaxels);
   return true;
 }
 

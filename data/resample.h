@@ -12,6 +12,7 @@ namespace supertac {
 /// Scales a voltage to [0,1], 1 = pressed hard: clip((rest - V) / span, 0, 1).
 struct Scaling {
   double rest_volts = 2.45, span_volts = 0.36;
+  bool levelled = false;  ///< whole windows are then brought to their own rest and gain: level()
   float operator()(float volts) const;
   std::array<float, kTaxels> operator()(const std::array<float, kTaxels>& volts) const;
 };

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "data/hash.h"
+#include "data/levelling.h"
 #include "data/metrics.h"
 #include "data/plate_file.h"
 #include "data/truth.h"
@@ -172,6 +173,7 @@ void WindowSet::window(size_t i, std::span<float> out) const {
   const std::span<const float> source = window(i);
   check_size("a window", out.size(), source.size());
   std::memcpy(out.data(), source.data(), source.size_bytes());
+  if (settings_.scaling.levelled) level(out, kTaxels);
 }
 
 std::span<const float> WindowSet::last_frame(size_t i) const { return window(i).last(kTaxels); }

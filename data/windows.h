@@ -84,9 +84,9 @@ class WindowSet {
 
   // i < size() throughout, unchecked: these run for every sample of training.
   // @throws std::invalid_argument when `out` has another size.
-  /// Window i, [T][16], oldest frame first.
+  /// Window i as a network takes it, [T][16], oldest frame first; levelled when the scaling says so.
   void window(size_t i, std::span<float> out) const;
-  /// The window without copying it.
+  /// The window without copying it, not levelled.
   std::span<const float> window(size_t i) const;
   /// Truth of its last frame, [S][S], as truth_image.
   void truth(size_t i, std::span<float> out) const;

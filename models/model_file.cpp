@@ -31,7 +31,7 @@ SuperTacSettings read_settings(const JsonEntry& entry) {
 
 InputSettings read_input(const JsonEntry& entry) {
   const InputSettings input{entry.number("rate_hz"),
-                            {entry.number("rest_volts"), entry.number("span_volts")},
+                            {entry.number("rest_volts"), entry.number("span_volts"), entry.flag("levelled")},
                             entry.number_or_null("filter_s")};
   if (input.rate_hz < 1 || input.rate_hz > 100'000 || std::abs(input.scaling.rest_volts) > 1000 ||
       input.scaling.span_volts <= 1e-6 || input.scaling.span_volts > 1000 || input.filter_s.value_or(0) < 0 ||
@@ -51,11 +51,12 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
                    {"rcabs", s.rcabs}};
   if (s.sub_pixel)
     settings["sub_pixel"] = true;  // left out otherwise: the text of older files stays the same
-  const Json scaling = {{"rate_hz", input.rate_hz},
-                        {"rest_volts", input.scaling.rest_volts},
-                        {"span_volts", input.scaling.span_volts},
-                        {"filter_s", input.filter_s ? Json(*input.filter_s) : Json(nullptr)},
-                        {"formula", "clip((rest_volts - V) / span_volts, 0, 1)"}};
+  Json scaling = {{"rate_hz", input.rate_hz},
+                  {"rest_volts", input.scaling.rest_volts},
+                  {"span_volts", input.scaling.span_volts},
+                  {"filter_s", input.filter_s ? Json(*input.filter_s) : Json(nullptr)},
+                  {"formula", "clip((rest_volts - V) / span_volts, 0, 1)"}};
+  if (input.scaling.levelled) scaling["levelled"] = true;  // left out otherwise, as sub_pixel
   return {{"settings", settings.dump()}, {"input", scaling.dump()}};
 }
 

@@ -74,6 +74,11 @@ SuperTacSettings SuperTacSettings::of_preset(const std::string& name) {
   throw std::invalid_argument("unknown preset \"" + name + "\"; known: paper, tiny");
 }
 
+double rate_of_preset(const std::string& name) {
+  constexpr double kWindowS = 2.56;
+  return static_cast<double>(SuperTacSettings::of_preset(name).timesteps) / kWindowS;
+}
+
 Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
     : fc_(kGroups * s.latent, s.channels * kCoarse * kCoarse, rng),
       rirbs_(make_rirbs(s, rng)),

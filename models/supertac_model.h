@@ -37,10 +37,13 @@ struct SuperTacSettings {
   Dim image_size() const { return 4 * scale; }
   /// Throws std::invalid_argument naming the setting, its range and what was given.
   void check() const;
-  /// A preset's settings: "paper", or "tiny", which costs a ninth (made for 50 samples a second, 2.56 s).
+  /// A preset's settings: "paper", or "tiny", which costs a ninth. Both were made for windows of 2.56 s.
   /// Throws std::invalid_argument for an unknown name, listing the known ones.
   static SuperTacSettings of_preset(const std::string& name);
 };
+
+/// Samples a second that a preset was made for. Throws as SuperTacSettings::of_preset.
+double rate_of_preset(const std::string& name);
 
 /// Latents of the four groups [N,4 LD] -> picture [N,S,S,1], linear output.
 class Upsampler : public Module {

@@ -12,7 +12,7 @@ out=out/demo
 mkdir -p "$out"
 "$bin/supertac-simulate" --out "$out/recordings" --seed 1 --force
 echo "training on trial 1 (about a minute and a half)"
-"$bin/supertac-train" --data "$out/recordings" --out "$out/model.safetensors" --split trial --rate 100 --stride 2 --epochs 4 \
+"$bin/supertac-train" --data "$out/recordings" --out "$out/model.safetensors" --split trial --stride 2 --epochs 4 \
   --seed 0 --force
 echo "testing on trial 2, which the network has not seen"
 "$bin/supertac-evaluate" --model "$out/model.safetensors" --data "$out/recordings" --limit 10000 \

@@ -5,14 +5,16 @@ namespace supertac {
 void declare_training(Arguments& a) {
   a.option("grouping", "NAME", "taxels of one VAE: horizontal (rows) or vertical (columns)", "horizontal");
   a.option("split", "NAME", "what is kept for testing: window, pass, trial, texture or none", "trial");
-  a.option("epochs", "N", "passes over the training windows", "6");
+  a.option("epochs", "N", "passes over the training windows", "10");
   a.option("batch", "N", "windows per step", "64");
-  a.option(
-      "rate", "HZ",
-      "of the model's samples: T samples span T / HZ seconds; the paper's is 300, and the board's filter "
-      "leaves nothing above 10",
-      "300");
+  a.option("rate", "HZ",
+           "of the model's samples: T samples span T / HZ seconds; default 100 for paper, 50 for tiny; the "
+           "paper's is 300, and the board's filter leaves nothing above 10");
   a.option("stride", "N", "take every N-th window of a pass", "1");
+  a.option("scaling", "NAME",
+           "of the signals: levelled (each window to its own rest and gain, so that a finger pressed harder "
+           "is seen like any other) or fixed",
+           "levelled");
   a.option("learning-rate", "X", "peak of Adam's rate, after warm-up and before the cosine", "0.001");
   a.option("augment", "NAME",
            "standard: random gains, offsets, noise and dropped taxels, for unseen trials; none", "standard");
@@ -51,8 +53,9 @@ WindowSet training_windows(const Arguments& a, const SuperTacSettings& model) {
   WindowSettings w;
   w.timesteps = static_cast<int>(model.timesteps);
   w.scale = static_cast<int>(model.scale);
-  w.rate_hz = a.number("rate", 20, 2000);
+  w.rate_hz = a.given("rate") ? a.number("rate", 20, 2000) : rate_of_preset(model.preset);
   w.stride = static_cast<int>(a.integer("stride", 1, 100'000));
+  w.scaling.levelled = a.choice("scaling", {"levelled", "fixed"}) == "levelled";
   WindowSet windows = WindowSet::load(a.text("data"), a.list("plates"), w);
   if (a.given("also")) windows.add_directory(a.text("also"), {}, true);
   return windows;

@@ -38,8 +38,9 @@ void feed(LiveWindow& live, const Recording& recording, const std::function<void
 
 // Every window of WindowSet, asked for as soon as a frame has come that lies behind it, and how many there
 // were.
-size_t expect_windows_of_set(const Recording& recording, LiveWindow live) {
+size_t expect_windows_of_set(const Recording& recording, LiveWindow live, bool levelled = false) {
   WindowSettings settings = wide_settings(kTimesteps);
+  settings.scaling.levelled = levelled;
   settings.min_y_mm = -1e6, settings.max_y_mm = 1e6;
   WindowSet set(settings);
   set.add(recording);
@@ -54,13 +55,13 @@ size_t expect_windows_of_set(const Recording& recording, LiveWindow live) {
     time_of[j] = begin + (track.run[j] - 1) / settings.rate_hz;
   }
   size_t next = 0;
-  Window window(kTimesteps * kTaxels);
+  Window window(kTimesteps * kTaxels), expected(window.size());
   const auto compare_until = [&](double newest) {
     for (; next < set.size(); ++next) {
       const double end = time_of[set.frame_of(next)] + 0.5 / settings.rate_hz;
       if (end > newest) return;
       ASSERT_TRUE(live.window_until(end, window)) << "window " << next;
-      const auto expected = set.window(next);
+      set.window(next, expected);
       ASSERT_TRUE(std::equal(window.begin(), window.end(), expected.begin())) << "window " << next;
     }
   };
@@ -100,6 +101,13 @@ TEST(LiveWindow, GivesTheWindowsOfTrainingBitForBit) {
       EXPECT_GT(windows, 400U) << rate << " Hz, " << lost << " lost";
     }
   }
+}
+
+TEST(LiveWindow, IsLevelledLikeOneOfTraining) {
+  const Recording recording = rough_recording(300, 0.05, 5);
+  LiveWindowSettings settings = live_settings(300);
+  settings.scaling.levelled = true;
+  EXPECT_GT(expect_windows_of_set(recording, LiveWindow(settings), true), 400U);
 }
 
 TEST(LiveWindow, ASensorAtTheModelsRateGivesThemWithEveryFrame) {

@@ -23,12 +23,13 @@ TEST(ModelFile, ComesBackWithItsSettingsInputAndPictures) {
   settings.grouping = Grouping::vertical;
   settings.sub_pixel = true;
   const SuperTac model(settings, rng);
-  save_model(folder / "m.safetensors", model, {300, {2.5, 0.4}, 0.0992}, {{"split", "trial"}});
+  save_model(folder / "m.safetensors", model, {300, {2.5, 0.4, true}, 0.0992}, {{"split", "trial"}});
   const ModelFile file = load_model(folder / "m.safetensors");
   EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
   EXPECT_EQ(file.model->settings().latent, 3);
   EXPECT_TRUE(file.model->settings().sub_pixel);
   EXPECT_EQ(file.input.scaling.rest_volts, 2.5);
+  EXPECT_TRUE(file.input.scaling.levelled);
   EXPECT_EQ(file.input.filter_s, 0.0992);
   EXPECT_EQ(file.metadata.at("split"), "trial");
   const Tensor x = uniform({2, 32, 16}, 1), a = model.infer(x), b = file.model->infer(x);
@@ -40,6 +41,7 @@ TEST(ModelFile, ReadsTheGoldenFileOfVersion1) {
   const ModelFile file = load_model(std::string(SUPERTAC_GOLDEN_DIR) + "/model_v1.safetensors");
   EXPECT_EQ(file.model->settings().channels, 4);
   EXPECT_FALSE(file.model->settings().sub_pixel) << "a setting younger than the file";
+  EXPECT_FALSE(file.input.scaling.levelled) << "another";
   EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
   const Tensor picture = file.model->infer(uniform({1, 32, 16}, 1));
   EXPECT_NEAR(picture.data()[0], 0.116217159, 1e-6);
