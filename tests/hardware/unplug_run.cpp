@@ -1,5 +1,6 @@
 #include "unplug_run.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <memory>
@@ -52,8 +53,8 @@ class NotingPort : public Port {
   double& stopped_;
 };
 
-/// When the plug began to be pulled, and how long the kernel took to hang the terminal up: its workers run at
-/// usual priority.
+/// When the plug began to be pulled, and how long the kernel took to hang the terminal up: it waits for
+/// workers of usual priority, and before that there is nothing to be noticed.
 struct Pull {
   double at_s = 0, took_s = 0;
 };
@@ -75,6 +76,10 @@ RecorderSettings short_run(const TemporaryFolder& folder) {
   return settings;
 }
 
+bool noticed_late(const UnplugVerdict& verdict) {
+  return verdict.noticed_s - std::max(verdict.stall_s, verdict.hanging_up_s) > kLatest;
+}
+
 void judge(UnplugVerdict& verdict, Plug plug, const PalpationOutcome& outcome, const Point3& head,
            double contact_z) {
   using Finger = PalpationOutcome::Finger;
@@ -94,7 +99,7 @@ void judge(UnplugVerdict& verdict, Plug plug, const PalpationOutcome& outcome, c
     verdict.broken = "the finger was not lifted: " + outcome.note;
   } else if (plug == Plug::printer && !up && outcome.note.find("by hand") == std::string::npos) {
     verdict.broken = "nobody is told to lift the finger: " + outcome.note;
-  } else if (verdict.noticed_s - verdict.stall_s > kLatest) {
+  } else if (noticed_late(verdict)) {
     verdict.broken = "noticed after " + std::to_string(verdict.noticed_s) + " s";
   }
 }
@@ -124,8 +129,7 @@ UnplugVerdict unplug_idle(Plug plug, std::uint64_t seed) {
   verdict.noticed_s = verdict.returned_s = noticed - pulled.at_s;
   verdict.hanging_up_s = pulled.took_s;
   verdict.stall_s = stalls.longest(pulled.at_s, noticed);
-  if (verdict.noticed_s - verdict.stall_s > kLatest)
-    verdict.broken = "noticed after " + std::to_string(verdict.noticed_s) + " s";
+  if (noticed_late(verdict)) verdict.broken = "noticed after " + std::to_string(verdict.noticed_s) + " s";
   return verdict;
 }
 

@@ -15,7 +15,7 @@ struct UnplugVerdict {
   double noticed_s = 0;
   double returned_s = 0;    ///< from the pull to the end of the collection, finger lifted, journal on disk
   double stall_s = 0;       ///< for which the machine itself stood still between pull and error; allowed for
-  double hanging_up_s = 0;  ///< that the kernel took to close the terminal's other side; not allowed for
+  double hanging_up_s = 0;  ///< that the kernel took to hang the terminal up; allowed for
   std::string finger;       ///< what the outcome says
   std::string broken;       ///< the promise that was broken; empty when all held
 };
