@@ -21,36 +21,44 @@ constexpr double kRunSeconds = 5.5;  // a little less than the short plan below 
 
 void sleep_for(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
-/// Notes when the port first failed and when a stop was first sent (wall's clock).
+/// What happened at a port, by the wall's clock.
+struct Notes {
+  double failed = 0;   ///< when it first did
+  double held = 0;     ///< for which the kernel then kept the call beyond its deadline
+  double stopped = 0;  ///< when a stop was first sent
+};
+
 class NotingPort : public Port {
   template <class Call>
-  auto noting(const Call& call) {
+  auto noting(double until, const Call& call) {
+    const double begin = monotonic_seconds();
     try {
       return call();
     } catch (const PortUnplugged&) {
-      if (failed_ == 0) failed_ = monotonic_seconds();
+      const double end = monotonic_seconds();
+      if (notes_.failed == 0) notes_.held = std::max(0.0, end - std::max(begin, until));
+      if (notes_.failed == 0) notes_.failed = end;
       throw;
     }
   }
 
  public:
-  NotingPort(const std::string& path, unsigned baud, double& failed, double& stopped)
-      : port_(path, {baud}), failed_(failed), stopped_(stopped) {}
+  NotingPort(const std::string& path, unsigned baud, Notes& notes) : port_(path, {baud}), notes_(notes) {}
   const std::string& name() const override { return port_.name(); }
   double now() override { return port_.now(); }
   Received read(std::span<std::byte> buffer, double until) override {
-    return noting([&] { return port_.read(buffer, until); });
+    return noting(until, [&] { return port_.read(buffer, until); });
   }
   double write(std::span<const std::byte> bytes, double until) override {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    if (stopped_ == 0 && text.find("M410") != std::string_view::npos) stopped_ = monotonic_seconds();
-    return noting([&] { return port_.write(bytes, until); });
+    if (notes_.stopped == 0 && text.find("M410") != std::string_view::npos)
+      notes_.stopped = monotonic_seconds();
+    return noting(until, [&] { return port_.write(bytes, until); });
   }
 
  private:
   SerialPort port_;
-  double& failed_;
-  double& stopped_;
+  Notes& notes_;
 };
 
 /// When the plug began to be pulled, and how long the kernel took to hang the terminal up: it waits for
@@ -141,7 +149,7 @@ UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed) {
   UnplugVerdict verdict;
   verdict.moment_s = kRunSeconds * RandomStream(seed, 2).uniform(0);
   const RecorderSettings settings = short_run(folder);
-  double board_failed = 0, printer_failed = 0, stopped = 0, never = 0;
+  Notes board, printer;
   Pull pulled;
   StallWatch stalls;
   std::atomic<bool> ended{false};
@@ -154,16 +162,15 @@ UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed) {
   });
   try {
     const PalpationOutcome outcome =
-        record_palpation(std::make_unique<NotingPort>(folder / "board", kBoardBaud, board_failed, never),
-                         std::make_unique<NotingPort>(folder / "printer", 115200, printer_failed, stopped),
-                         settings)
+        record_palpation(std::make_unique<NotingPort>(folder / "board", kBoardBaud, board),
+                         std::make_unique<NotingPort>(folder / "printer", 115200, printer), settings)
             .outcome;
     const double returned = monotonic_seconds();
     ended = true;
     puller.join();
-    verdict.noticed_s = (plug == Plug::board ? stopped : printer_failed) - pulled.at_s;
+    verdict.noticed_s = (plug == Plug::board ? printer.stopped : printer.failed) - pulled.at_s;
     verdict.returned_s = returned - pulled.at_s;
-    verdict.hanging_up_s = pulled.took_s;
+    verdict.hanging_up_s = std::max(pulled.took_s, (plug == Plug::board ? board : printer).held);
     verdict.stall_s = stalls.longest(pulled.at_s, pulled.at_s + verdict.noticed_s);
     Point3 head;
     rig.with_world([&](RigWorld& world) { head = world.printer().head(world.now()); });
