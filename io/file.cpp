@@ -4,10 +4,12 @@
 
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <utility>
 
+#include "io/numbers.h"
 #include "io/system_calls.h"
 
 namespace supertac {
@@ -61,6 +63,27 @@ std::string final_path(const std::string& path) {
   if (!std::filesystem::is_symlink(path, error)) return path;
   const auto target = std::filesystem::canonical(path, error);
   return error ? path : target.string();
+}
+
+constexpr std::string_view kTemporary = ".tmp-";  // <file>.tmp-<process>-<number>
+
+bool is_running(uint64_t process) {
+  const auto id = static_cast<pid_t>(process);
+  return static_cast<uint64_t>(id) != process || id < 1 || ::kill(id, 0) == 0 || errno != ESRCH;
+}
+
+// What writers of this file left that were ended by kill -9 or a power cut. Failures do not matter here.
+void remove_leftovers(const std::string& path) {
+  const std::string prefix = std::filesystem::path(path).filename().string() + std::string(kTemporary);
+  std::error_code error;
+  std::filesystem::directory_iterator entry(directory_of(path), error);
+  for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!name.starts_with(prefix)) continue;
+    const auto process =
+        parse_uint(name.substr(prefix.size(), name.find('-', prefix.size()) - prefix.size()));
+    if (process && !is_running(*process)) system_calls().unlink(entry->path().c_str());
+  }
 }
 
 }  // namespace
@@ -130,6 +153,7 @@ AtomicFile::AtomicFile(const std::string& path) : path_(final_path(path)) {
   directory_ = retry([&] { return system_calls().open(directory.c_str(), flags, 0); });
   if (directory_ < 0) fail(path_, "open the directory " + directory, errno);
   try {
+    remove_leftovers(path_);
     open_temporary();
   } catch (...) {
     close_all();
@@ -139,7 +163,7 @@ AtomicFile::AtomicFile(const std::string& path) : path_(final_path(path)) {
 
 void AtomicFile::open_temporary() {
   static std::atomic<unsigned> next{0};
-  const std::string prefix = path_ + ".tmp-" + std::to_string(::getpid()) + "-";
+  const std::string prefix = path_ + std::string(kTemporary) + std::to_string(::getpid()) + "-";
   for (int attempt = 0; attempt < 100; ++attempt) {
     const std::string name = prefix + std::to_string(next++);
     const int flags = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC;

@@ -52,7 +52,8 @@ std::string read_text_file(const std::string& path, uint64_t max_bytes);
 
 /// A file that appears under its name complete or not at all: written to a temporary name in the same
 /// directory (O_EXCL), then commit() does fsync, close, rename and fsync of the directory. An existing file
-/// stays as it is until the rename. A symbolic link stays; the file it points at is replaced.
+/// stays as it is until the rename. A symbolic link stays; the file it points at is replaced. A temporary
+/// that a killed process left of the same file is removed when the file is next written.
 class AtomicFile {
  public:
   /// Throws FileError: no such directory, not writable, or `path` is something else than a regular file.

@@ -52,16 +52,6 @@ std::vector<LogLine> read_log(const std::string& path, std::int64_t last_step) {
   return lines;
 }
 
-// What a killed run was writing: nobody else writes into this folder.
-void remove_temporaries(const std::string& folder) {
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
-    if (entry.path().filename().string().find(".tmp-") != std::string::npos) {
-      std::filesystem::remove(entry.path(), ignored);
-    }
-  }
-}
-
 }  // namespace
 
 std::string RunFolder::folder_of(const std::string& model_file) {
@@ -78,7 +68,6 @@ RunFolder::RunFolder(const std::string& model_file, bool force, std::optional<st
   std::error_code error;
   std::filesystem::create_directories(path_, error);
   if (error) throw FileError(path_, "cannot create the folder: " + error.message());
-  remove_temporaries(path_);
   if (resumed_step) lines_ = read_log(path_ + "/log.csv", *resumed_step);
   std::string text = kHeader;
   for (const LogLine& line : lines_) text += csv(line);

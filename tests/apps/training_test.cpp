@@ -110,7 +110,8 @@ TEST_F(Training, InterruptedAndResumedGivesTheSameBytes) {
     const ProcessResult cut = run(name + ".safetensors", {}, {.signal = signal, .signal_when = state});
     EXPECT_EQ(cut.code, 128 + signal) << cut.error;
     EXPECT_FALSE(fs::exists(path(name + ".safetensors")));
-    write_file(path(name + ".run/last.safetensors.tmp-1-1"), "what a kill -9 in mid-write leaves");
+    // what a kill -9 in mid-write leaves, of a process whose number is above the largest there is
+    write_file(path(name + ".run/last.safetensors.tmp-4194305-1"), "half a state");
     const ProcessResult resumed = run(name + ".safetensors", {"--resume", state});
     ASSERT_EQ(resumed.code, 0) << resumed.error;
     for (const auto& entry : fs::directory_iterator(path(name + ".run"))) {

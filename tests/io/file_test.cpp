@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <fstream>
 #include <set>
 
 #include "tests/io/faults.h"
@@ -48,6 +50,38 @@ TEST(File, NothingAppearsWithoutCommit) {
   TemporaryFolder folder;
   { AtomicFile(folder.file("a")).write(kNew); }
   EXPECT_EQ(folder.entries(), 0u);
+}
+
+// A child that ends in mid-write, as after kill -9, leaves its temporary; the next writer of that file sweeps
+// it, and nothing else.
+TEST(File, SweepsWhatAKilledWriterLeft) {
+  TemporaryFolder folder;
+  const std::string path = folder.file("a");
+  const pid_t child = fork();
+  if (child == 0) {
+    AtomicFile file(path);
+    file.write(kNew);
+    _exit(0);
+  }
+  int status = -1;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_EQ(status, 0);
+  ASSERT_EQ(folder.entries(), 1u);
+  write_file(folder.file("b"), kOld);
+  EXPECT_EQ(folder.entries(), 2u) << "the leftover is of another file";
+  const std::string own = std::to_string(getpid()), dead = std::to_string(child);
+  const std::vector<std::string> kept = {"a.tmp-" + own + "-x",
+                                         "a.tmp-1-0",
+                                         "a.tmp-",
+                                         "a.tmp-x-0",
+                                         "a.tmpx" + dead,
+                                         "aa.tmp-" + dead + "-0",
+                                         "a.tmp-0-0",
+                                         "a.tmp-99999999999999999999-0"};
+  for (const std::string& name : kept) std::ofstream(folder.file(name)) << "x";
+  write_file(path, kOld);
+  EXPECT_EQ(folder.entries(), kept.size() + 2) << "a, b, and all that may still be somebody's";
+  for (const std::string& name : kept) EXPECT_TRUE(std::filesystem::exists(folder.file(name))) << name;
 }
 
 TEST(File, ErrorsNameFileAndReason) {
