@@ -5,7 +5,7 @@ namespace supertac {
 void declare_training(Arguments& a) {
   a.option("grouping", "NAME", "taxels of one VAE: horizontal (rows) or vertical (columns)", "horizontal");
   a.option("split", "NAME", "what is kept for testing: window, pass, trial, texture or none", "trial");
-  a.option("epochs", "N", "passes over the training windows", "10");
+  a.option("epochs", "N", "passes over the training windows", "20");
   a.option("batch", "N", "windows per step", "64");
   a.option("rate", "HZ",
            "of the model's samples: T samples span T / HZ seconds; default 100 for paper, 50 for tiny; the "
