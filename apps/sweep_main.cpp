@@ -42,6 +42,7 @@ void check_settings(const Arguments& a) {
   settings["grouping"] = name_of(training.model.grouping);
   for (const char* option : {"also", "data", "limit", "plates", "rate", "scaling", "split", "stride"})
     settings[option] = a.text(option);
+  if (!a.given("rate")) settings["rate"] = "the preset's";
   const std::string path = a.text("out") + "/settings.json";
   if (!fs::exists(path)) return write_file(path, settings.dump(2) + "\n");
   const auto before = parse_json_limited(read_text_file(path, 1 << 20));

@@ -71,8 +71,9 @@ TEST_F(Training, TwoHundredStepsGiveTheSameBytesOnEverySetAndAnyThreads) {
     for (const char* threads : {"1", "2", "4"}) {
       const std::string name = set + threads;
       const ProcessResult result = train_with(set, [&] {
-        return train(name + ".safetensors", {"--stride", "4", "--epochs", "5", "--threads", threads, "--json",
-                                             path(name + ".json"), "--checkpoint-every", "1000"});
+        return train(name + ".safetensors",
+                     {"--rate", "300", "--stride", "4", "--epochs", "5", "--threads", threads, "--json",
+                      path(name + ".json"), "--checkpoint-every", "1000"});
       });
       ASSERT_EQ(result.code, 0) << result.error;
       ASSERT_GE(parse_json_limited(bytes(name + ".json"))["steps"].get<int>(), 200);
