@@ -91,6 +91,8 @@ TEST(FrameDecoder, RecoversEveryUndamagedFrameAtAThousandthDroppedBytes) {
   const std::vector<BoardFrame> got = decode(decoder, stream.bytes, 164);
   std::size_t found = 0;
   for (const BoardFrame& frame : got) found += found < stream.intact.size() && frame == stream.intact[found];
+  RecordProperty("undamaged", static_cast<int>(stream.intact.size()));
+  RecordProperty("recovered", static_cast<int>(found));
   EXPECT_EQ(found, stream.intact.size());
   EXPECT_EQ(got.size(), stream.intact.size()) << "a damaged frame passed the checks";
   EXPECT_LT(stream.intact.size(), 18000U) << "the faults were not injected";
@@ -110,6 +112,8 @@ TEST(FrameDecoder, AcceptsHardlyAnyWrongFrameUnderMixedFaults) {
       ++wrong;
     }
   }
+  RecordProperty("wrong", static_cast<int>(wrong));
+  RecordProperty("accepted", static_cast<int>(got.size()));
   EXPECT_LE(static_cast<double>(wrong), 1e-3 * static_cast<double>(got.size()));
   EXPECT_GE(got.size(), stream.intact.size());
 }
