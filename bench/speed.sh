@@ -12,4 +12,4 @@ gnuplot -e "csv='$results/peers.csv'; png='$results/peers.png'" bench/peers/char
 "$bin/linear_cost" > $results/new.csv && mv $results/new.csv $results/linear_cost.csv
 gnuplot -e "csv='$results/linear_cost.csv'; png='$results/linear_cost.png'" bench/linear_cost.gp
 "$bin/streaming" "$model" 60 > $results/new.csv && mv $results/new.csv $results/streaming.csv
-bench/readme_speed.py
+bench/readme_figures.py

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Writes the figures of bench/results/{peers,streaming,linear_cost}.csv into README.md, between the lines
-<!-- speed --> and <!-- /speed -->."""
+"""Writes the figures of bench/results/{peers,streaming,linear_cost,real_recordings}.csv into README.md, between the lines
+<!-- speed --> and <!-- /speed -->, and <!-- accuracy --> and <!-- /accuracy -->."""
 import csv
 import pathlib
 import re
@@ -52,19 +52,43 @@ def growth():
             f"(r = {width[2]:.3f}), {train[0]:.2f} ms of training per window of the data set (r = {train[2]:.3f}).")
 
 
-def section():
+def speed():
     parts = {"peers.csv": table, "streaming.csv": streaming, "linear_cost.csv": growth}
     return "\n\n".join(part() for name, part in parts.items() if (ROOT / "bench/results" / name).exists())
+
+
+RUNS = {"trial": "`trial`, preset `paper`", "tiny": "`trial`, preset `tiny`", "trial_300hz": "`trial`, 300 Hz, fixed scaling",
+        "window": "`window`, preset `paper`"}
+METHODS = {"network": "", "ridge": "ridge regression", "bicubic": "bicubic", "mean_image": "mean image"}
+
+
+def accuracy():
+    found = {(r["split"], r["method"], r["part"]): r for r in rows("real_recordings.csv")}
+
+    def cell(row, figure, digits):
+        mean, half = float(row[figure]), float(row[figure + "_ci95"])
+        return f"{mean:.{digits}f}" + (f" ± {half:.{digits}f}" if half > 0 else "")
+
+    lines = ["| split and method | contact SSIM | contact PSNR dB | all SSIM | all PSNR dB | position error mm |", "|---|---|---|---|---|---|"]
+    for run, name in RUNS.items():
+        for method, label in METHODS.items():
+            if method != "network" and run != "trial" or (run, method, "contact") not in found:
+                continue
+            contact, every = found[run, method, "contact"], found[run, method, "all"]
+            lines.append(f"| {name if method == 'network' else label} | {cell(contact, 'ssim', 3)} | {cell(contact, 'psnr_mean_db', 1)} | "
+                         f"{cell(every, 'ssim', 3)} | {cell(every, 'psnr_mean_db', 1)} | {cell(contact, 'position_error_mm', 2)} |")
+    return "\n".join(lines)
 
 
 def main():
     readme = ROOT / "README.md"
     text = readme.read_text()
-    new = f"<!-- speed -->\n{section()}\n<!-- /speed -->"
-    changed, count = re.subn(r"<!-- speed -->.*<!-- /speed -->", lambda _: new, text, flags=re.DOTALL)
-    if count != 1:
-        raise SystemExit("readme_speed.py: README.md has no lines <!-- speed --> ... <!-- /speed -->")
-    readme.write_text(changed)
+    for name, section in {"speed": speed, "accuracy": accuracy}.items():
+        new = f"<!-- {name} -->\n{section()}\n<!-- /{name} -->"
+        text, count = re.subn(f"<!-- {name} -->.*<!-- /{name} -->", lambda _: new, text, flags=re.DOTALL)
+        if count != 1:
+            raise SystemExit(f"readme_figures.py: README.md has no lines <!-- {name} --> ... <!-- /{name} -->")
+    readme.write_text(text)
 
 
 if __name__ == "__main__":
