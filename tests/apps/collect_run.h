@@ -13,7 +13,9 @@ namespace supertac {
 
 class CollectRun {
  public:
-  explicit CollectRun(double speedup = 10, const RigSettings& settings = running());
+  /// Five times real time: a machine that stands still for 0.45 s is then a printer that answers none of nine
+  /// M114 R, which a run rightly gives up on.
+  explicit CollectRun(double speedup = 5, const RigSettings& settings = running());
 
   ~CollectRun();
   CollectRun(const CollectRun&) = delete;

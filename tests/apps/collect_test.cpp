@@ -17,7 +17,7 @@ bool contains(const std::string& text, const std::string& part) {
 }
 
 TEST(CollectProgram, MakesRecordingsAndLeavesTheHeadAtItsOrigin) {
-  CollectRun run(20);
+  CollectRun run;
   const ProcessResult result = run.collect();
   EXPECT_EQ(result.code, 0) << result.error;
   EXPECT_EQ(run.files(), "3_Bumps_t1_p1_v10.safetensors 3_Bumps_t1_v10.journal");
@@ -65,7 +65,7 @@ TEST(CollectProgram, AfterAKillTheJournalIsRecoveredAndTheOriginMustBeConfirmed)
   EXPECT_EQ(recovered.code, 0) << recovered.error;
   EXPECT_TRUE(contains(recovered.out, "cut off")) << recovered.out;
 
-  const ProcessResult confirmed = run.collect({"--out", other, "--confirm-origin"});
+  const ProcessResult confirmed = run.collect({"--out", other, "--confirm-origin", "--speed", "50"});
   EXPECT_EQ(confirmed.code, 0) << confirmed.error;
   EXPECT_FALSE(run.origin_unknown());
 }
@@ -76,7 +76,7 @@ TEST(CollectProgram, AnotherPrinterIsNotHeldUpByTheMark) {
   std::filesystem::create_directories(std::filesystem::path(mark).parent_path());
   std::ofstream(mark) << "left by kill -9\n";
   EXPECT_TRUE(contains(cut_off.collect().error, "--confirm-origin"));
-  EXPECT_EQ(other.collect().code, 0);
+  EXPECT_EQ(other.collect({"--speed", "50"}).code, 0);
 }
 
 TEST(CollectProgram, AFullDiskInContactLiftsTheFinger) {
@@ -118,7 +118,7 @@ TEST(CollectProgram, APortThatCannotBeUsedIsOneClearLine) {
     EXPECT_EQ(run.files(), "") << refusal.what;
   }
   EXPECT_LT(distance(run.head(), {99.7, 101.17, 131.81}), 1e-6);
-  EXPECT_EQ(run.collect().code, 0) << "the next start, with the right ports, is not held up";
+  EXPECT_EQ(run.collect({"--speed", "50"}).code, 0) << "the next start, with the right ports, is not held up";
 }
 
 }  // namespace
