@@ -1,44 +1,14 @@
 // Preset `paper` (T 256, LD 10, x4) end to end: inference, a training step, start-up, data loading.
 #include <omp.h>
 
-#include <atomic>
-#include <cstdlib>
 #include <filesystem>
-#include <new>
 
 #include "bench/against_peak.h"
 #include "bench/windows.h"
 #include "models/cost.h"
 #include "models/model_file.h"
 #include "models/trainer.h"
-
-namespace {
-std::atomic<long> allocations{0};
-
-void* counted(std::size_t bytes, std::size_t alignment) {
-  allocations.fetch_add(1, std::memory_order_relaxed);
-  void* block = nullptr;
-  if (posix_memalign(&block, std::max(alignment, sizeof(void*)), bytes) != 0) throw std::bad_alloc();
-  return block;
-}
-}  // namespace
-
-void* operator new(std::size_t bytes) { return counted(bytes, 16); }
-void* operator new[](std::size_t bytes) { return counted(bytes, 16); }
-void* operator new(std::size_t bytes, std::align_val_t a) {
-  return counted(bytes, static_cast<std::size_t>(a));
-}
-void* operator new[](std::size_t bytes, std::align_val_t a) {
-  return counted(bytes, static_cast<std::size_t>(a));
-}
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete[](void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
-void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
-void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
-void operator delete[](void* p, std::align_val_t) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
-void operator delete[](void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+#include "tests/allocations.h"
 
 namespace supertac {
 namespace {
@@ -46,7 +16,7 @@ namespace {
 const SuperTacSettings kPaper = SuperTacSettings::of_preset("paper");
 
 double counted_since(long before, const benchmark::State& state) {
-  return static_cast<double>(allocations - before) /
+  return static_cast<double>(allocations::made - before) /
          static_cast<double>(std::max<std::int64_t>(1, state.iterations()));
 }
 
@@ -72,7 +42,7 @@ void training_step(benchmark::State& state) {
   const WindowSet windows = bench::sliding_bumps(kPaper);
   Trainer trainer(windows, bench::all_of(windows), settings);
   for (int i = 0; i < 3; ++i) trainer.train_step();
-  const long before = allocations;
+  const long before = allocations::made;
   for (auto _ : state) trainer.train_step();
   state.counters["allocations/step"] = counted_since(before, state);
   state.SetItemsProcessed(state.iterations() * settings.batch);

@@ -42,10 +42,16 @@ function(supertac_library_both name)
     PRIVATE supertac_options ${arg_PRIVATE_USES})
 endfunction()
 
+# Seconds; a sanitizer makes some tests ten times as slow.
+set(SUPERTAC_TEST_TIMEOUT 300)
+if(SUPERTAC_SANITIZE)
+  set(SUPERTAC_TEST_TIMEOUT 1800)
+endif()
+
 # supertac_test(NAME SOURCES a_test.cpp ... USES target ...): one GoogleTest program, every case a ctest case.
 function(supertac_test name)
   cmake_parse_arguments(arg "" "" "SOURCES;USES" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_USES} supertac_options GTest::gtest GTest::gtest_main)
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${SUPERTAC_TEST_TIMEOUT})
 endfunction()

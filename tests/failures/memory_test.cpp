@@ -3,53 +3,10 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
-#include <atomic>
-#include <cstdlib>
 #include <new>
 
+#include "tests/allocations.h"
 #include "tests/models/support.h"
-
-namespace {
-
-std::atomic<long> live{0};    // blocks not given back
-std::atomic<long> until{-1};  // allocations until one fails; negative: never
-std::atomic<bool> failed{false};
-
-void* allocate(std::size_t bytes, std::size_t alignment) {
-  if (until.load() >= 0 && until.fetch_sub(1) == 0) {
-    failed = true;
-    throw std::bad_alloc();
-  }
-  void* block = nullptr;
-  if (posix_memalign(&block, std::max(alignment, sizeof(void*)), bytes) != 0) throw std::bad_alloc();
-  ++live;
-  return block;
-}
-
-void give_back(void* block) noexcept {
-  if (block == nullptr) return;
-  --live;
-  std::free(block);
-}
-
-}  // namespace
-
-void* operator new(std::size_t bytes) { return allocate(bytes, 16); }
-void* operator new[](std::size_t bytes) { return allocate(bytes, 16); }
-void* operator new(std::size_t bytes, std::align_val_t a) {
-  return allocate(bytes, static_cast<std::size_t>(a));
-}
-void* operator new[](std::size_t bytes, std::align_val_t a) {
-  return allocate(bytes, static_cast<std::size_t>(a));
-}
-void operator delete(void* p) noexcept { give_back(p); }
-void operator delete[](void* p) noexcept { give_back(p); }
-void operator delete(void* p, std::size_t) noexcept { give_back(p); }
-void operator delete[](void* p, std::size_t) noexcept { give_back(p); }
-void operator delete(void* p, std::align_val_t) noexcept { give_back(p); }
-void operator delete[](void* p, std::align_val_t) noexcept { give_back(p); }
-void operator delete(void* p, std::size_t, std::align_val_t) noexcept { give_back(p); }
-void operator delete[](void* p, std::size_t, std::align_val_t) noexcept { give_back(p); }
 
 namespace supertac {
 namespace {
@@ -59,15 +16,15 @@ template <class F>
 long fail_every_allocation(F work) {
   for (long n = 0;; ++n) {
     bool caught = false;
-    failed = false;
-    until = n;
+    allocations::failed = false;
+    allocations::until_fails = n;
     try {
       work();
     } catch (const std::bad_alloc&) {
       caught = true;
     }
-    until = -1;
-    if (!failed) return n;
+    allocations::until_fails = -1;
+    if (!allocations::failed) return n;
     EXPECT_TRUE(caught) << "allocation " << n << " failed and nobody said so";
     if (!caught) return n;
   }
@@ -78,9 +35,9 @@ template <class F>
 void expect_survival(F work) {
   EXPECT_GT(fail_every_allocation(work), 0);
   work();
-  const long before = live;
+  const long before = allocations::live;
   fail_every_allocation(work);
-  EXPECT_EQ(live - before, 0) << "blocks were lost";
+  EXPECT_EQ(allocations::live - before, 0) << "blocks were lost";
 }
 
 class MemoryTest : public ::testing::Test {
