@@ -13,7 +13,7 @@ for split in trial pass window; do
   for seed in 0 1 2 3 4; do
     model="$out/${split}_s$seed.safetensors"
     [ -e "$model" ] || "$bin/supertac-train" --data "$out/recordings" --out "$model" --force \
-      --plates 3_Bumps,6_Bumps,4_Ridges,6_Ridges --split "$split" --augment "$augment" --epochs 6 --seed "$seed"
+      --plates 3_Bumps,6_Bumps,4_Ridges,6_Ridges --split "$split" --augment "$augment" --seed "$seed"
     models="$models${models:+,}$model"
   done
   [ -e "$out/classify_$split.json" ] || "$bin/supertac-classify" --model "$models" --data "$out/recordings" \
