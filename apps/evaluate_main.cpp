@@ -100,8 +100,8 @@ int run(Arguments& a) {
   if (!outputs_path.empty()) refuse_existing(outputs_path, a.force());
   const ModelFile file = load_model(a.text("model"));
   const Task task = load_task(a, file);
-  const int size = task.windows.image_size();
-  const auto pixels = static_cast<std::size_t>(size * size);
+  const ImageGrid grid = task.windows.image();
+  const std::size_t pixels = grid.pixels();
 
   std::optional<OutputFolder> pictures;
   if (a.given("pictures")) pictures.emplace(a.text("pictures"), a.force());
@@ -109,9 +109,9 @@ int run(Arguments& a) {
   if (!outputs_path.empty()) outputs.emplace(task.windows, task.test.size());
   if (task.train.empty()) throw std::runtime_error("the split leaves no window to fit the baselines on");
   const auto baselines = fit_baselines(task.windows, task.train);
-  ContactMetrics network(size);
+  ContactMetrics network(grid);
   std::vector<ContactMetrics> plain;
-  for (std::size_t k = 0; k < baselines.size(); ++k) plain.emplace_back(size);
+  for (std::size_t k = 0; k < baselines.size(); ++k) plain.emplace_back(grid);
   std::vector<float> image(pixels);
   Progress progress(a, "evaluating", task.test.size(), "windows");
   for_each_output(*file.model, task.windows, task.test, [&](const EvaluatedBatch& b) {

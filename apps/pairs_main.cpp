@@ -22,20 +22,25 @@ void declare(Arguments& a) {
 // input [N,1,4,4]: the window's last frame, scaled; target [N,1,S,S]; group [N]: the number of the pass.
 nlohmann::ordered_json write(const WindowSet& windows, const std::vector<std::uint32_t>& indices,
                              const std::string& path) {
-  const auto size = static_cast<std::size_t>(windows.image_size());
-  std::vector<float> input, target(indices.size() * size * size);
+  const ImageGrid image = windows.image();
+  const std::size_t pixels = image.pixels();
+  std::vector<float> input, target(indices.size() * pixels);
   std::vector<std::int64_t> group;
   for (std::size_t n = 0; n < indices.size(); ++n) {
     const auto frame = windows.last_frame(indices[n]);
     input.insert(input.end(), frame.begin(), frame.end());
-    windows.truth(indices[n], std::span(target).subspan(n * size * size, size * size));
+    windows.truth(indices[n], std::span(target).subspan(n * pixels, pixels));
     group.push_back(static_cast<std::int64_t>(windows.pass_of(indices[n])));
   }
   const std::uint64_t count = indices.size();
-  write_safetensors(path, {{"format", "supertac-pairs"}, {"data", windows.fingerprint()}},
-                    {{"input", "F32", {count, 1, 4, 4}, std::as_bytes(std::span(input))},
-                     {"target", "F32", {count, 1, size, size}, std::as_bytes(std::span(target))},
-                     {"group", "I64", {count}, std::as_bytes(std::span(group))}});
+  write_safetensors(
+      path, {{"format", "supertac-pairs"}, {"data", windows.fingerprint()}},
+      {{"input", "F32", {count, 1, 4, 4}, std::as_bytes(std::span(input))},
+       {"target",
+        "F32",
+        {count, 1, static_cast<std::uint64_t>(image.height), static_cast<std::uint64_t>(image.width)},
+        std::as_bytes(std::span(target))},
+       {"group", "I64", {count}, std::as_bytes(std::span(group))}});
   return {{"file", path}, {"pairs", count}};
 }
 

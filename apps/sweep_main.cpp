@@ -98,8 +98,7 @@ class Sweep {
 
   // Sets of other lengths and picture sizes are dropped first: one at a time is in memory.
   const WindowSet& windows_of(const SuperTacSettings& model) {
-    if (!windows_ || windows_->timesteps() != model.timesteps ||
-        windows_->image_size() != model.image_size()) {
+    if (!windows_ || windows_->timesteps() != model.timesteps || windows_->settings().scale != model.scale) {
       windows_.reset();
       windows_.emplace(training_windows(a_, model));
       a_.note(windows_->counts().summary());

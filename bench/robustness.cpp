@@ -143,9 +143,8 @@ class Study {
   // Lines of the CSV: one per method.
   std::string run(const Condition& condition) const {
     const WindowSet windows = scene_.windows(2, condition);
-    const int size = windows.image_size();
     std::vector<ContactMetrics> metrics;  // network, then the baselines
-    for (std::size_t i = 0; i <= baselines_.size(); ++i) metrics.emplace_back(size);
+    for (std::size_t i = 0; i <= baselines_.size(); ++i) metrics.emplace_back(windows.image());
     const std::size_t count = std::min(limit_, windows.size());
     for (std::size_t first = 0; first < count; first += kBatch) {
       stop_if_interrupted();
@@ -165,7 +164,7 @@ class Study {
  private:
   void score_batch(const WindowSet& windows, const Condition& condition, std::size_t first, std::size_t n,
                    std::size_t count, std::vector<ContactMetrics>& metrics) const {
-    const auto pixels = static_cast<std::size_t>(windows.image_size() * windows.image_size());
+    const auto pixels = windows.image().pixels();
     Tensor inputs(Shape{static_cast<Dim>(n), windows.timesteps(), kWindowTaxels});
     const std::size_t window_size = inputs.values().size() / n;
     std::vector<float> truths(n * pixels), picture(pixels);

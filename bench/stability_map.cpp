@@ -77,7 +77,7 @@ std::vector<Cell> cells(const Arguments& a) {
 }
 
 double variance(const WindowSet& windows) {
-  const auto pixels = static_cast<std::size_t>(windows.image_size() * windows.image_size());
+  const auto pixels = windows.image().pixels();
   std::vector<float> image(pixels);
   double sum = 0, squares = 0, n = 0;
   for (std::size_t i = 0; i < windows.size(); i += 7) {

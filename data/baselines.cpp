@@ -12,10 +12,6 @@ namespace {
 
 constexpr int kSide = 4;
 
-size_t pixels_of(const WindowSet& windows) {
-  return static_cast<size_t>(windows.image_size()) * static_cast<size_t>(windows.image_size());
-}
-
 std::vector<uint32_t> fitted_on(std::span<const uint32_t> train) {
   if (train.empty()) throw std::invalid_argument("baseline: there is no window to fit to");
   return spread(train, kFitWindows);
@@ -44,7 +40,8 @@ double keys_kernel(double distance) {
 
 }  // namespace
 
-MeanImage::MeanImage(const WindowSet& windows, std::span<const uint32_t> train) : image_(pixels_of(windows)) {
+MeanImage::MeanImage(const WindowSet& windows, std::span<const uint32_t> train)
+    : image_(windows.image().pixels()) {
   std::vector<double> sum(image_.size());
   std::vector<float> truth(image_.size());
   const std::vector<uint32_t> chosen = fitted_on(train);
@@ -108,8 +105,8 @@ void Upsampling::operator()(std::span<const float> frame, std::span<float> out) 
 
 UpsampledFrame::UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows,
                                std::span<const uint32_t> train)
-    : kind_(kind), upsampling_(kind, kSide, kSide, windows.image_size() / kSide) {
-  const size_t pixels = pixels_of(windows);
+    : kind_(kind), upsampling_(kind, kSide, kSide, windows.settings().scale) {
+  const size_t pixels = windows.image().pixels();
   std::vector<float> image(pixels), truth(pixels);
   double sx = 0, sy = 0, sxx = 0, sxy = 0;
   const std::vector<uint32_t> chosen = fitted_on(train);

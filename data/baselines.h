@@ -16,7 +16,8 @@ class Baseline {
  public:
   virtual ~Baseline() = default;
   virtual std::string name() const = 0;
-  /// window [T][16], any T >= 1; out [S][S]. @throws std::invalid_argument on other sizes.
+  /// window [T][16], any T >= 1; out [height][width] of the truths. @throws std::invalid_argument on other
+  /// sizes.
   virtual void predict(std::span<const float> window, std::span<float> out) const = 0;
 };
 
@@ -71,8 +72,9 @@ class UpsampledFrame : public Baseline {
   double slope_ = 0, intercept_ = 0;
 };
 
-/// mean_image, nearest, bicubic and ridge (data/ridge.h), in this order. Each is fitted to at most kFitWindows training windows,
-/// evenly spread over the list. @throws std::invalid_argument when train is empty.
+/// mean_image, nearest, bicubic and ridge (data/ridge.h), in this order. Each is fitted to at most
+/// kFitWindows training windows, evenly spread over the list. @throws std::invalid_argument when train is
+/// empty.
 constexpr size_t kFitWindows = 20000;
 std::vector<std::unique_ptr<Baseline>> fit_baselines(const WindowSet& windows,
                                                      std::span<const uint32_t> train);

@@ -17,7 +17,6 @@ namespace supertac {
 namespace {
 
 constexpr int kMapSize = 256;
-constexpr int kFrameSide = 4;
 
 uint8_t srgb_byte(double linear) {
   const double v = std::clamp(linear, 0.0, 1.0);
@@ -56,19 +55,28 @@ void append(void* context, void* data, int size) {
 
 int gap_of(int side) { return std::max(1, side / 16); }
 
-void check_strips(const char* where, std::span<const Strip> strips, int size, int side) {
+// The panel of a strip's part in the picture's corner.
+Panel panel_of(const StripLayout& l) {
+  const int longer = std::max(l.rows, l.columns);
+  return {.width = l.side * l.columns / longer, .height = l.side * l.rows / longer};
+}
+
+void check_strips(const char* where, std::span<const Strip> strips, const StripLayout& l) {
   if (strips.empty()) throw std::invalid_argument(std::string(where) + ": there is no window to draw");
-  if (size < 1 || side < size)
-    throw std::invalid_argument(std::string(where) + ": size must be at least 1 and at most the side of " +
-                                std::to_string(side) + " pixels, got " + std::to_string(size));
+  const int size = std::max(l.rows, l.columns) * l.scale;
+  if (std::min({l.rows, l.columns, l.scale}) < 1 || l.side < size)
+    throw std::invalid_argument(std::string(where) + ": pictures must have 1 to " + std::to_string(l.side) +
+                                " pixels a side, the panels' size, got " + std::to_string(size));
 }
 
 // The three panels of a strip, each (step_x, step_y) further than the one before.
-void draw_strip(Picture& picture, const Strip& strip, int size, int side, int left, int top, int step_x,
+void draw_strip(Picture& picture, const Strip& strip, const StripLayout& l, Panel panel, int step_x,
                 int step_y) {
-  draw_panel(picture, left, top, side, strip.input, kFrameSide, kFrameSide);
-  draw_panel(picture, left + step_x, top + step_y, side, strip.output, size, size);
-  draw_panel(picture, left + 2 * step_x, top + 2 * step_y, side, strip.truth, size, size);
+  draw_panel(picture, panel, strip.input, l.rows, l.columns);
+  for (const std::span<const float> part : {strip.output, strip.truth}) {
+    panel.left += step_x, panel.top += step_y;
+    draw_panel(picture, panel, part, l.rows * l.scale, l.columns * l.scale);
+  }
 }
 
 }  // namespace
@@ -98,40 +106,49 @@ void Picture::set(int x, int y, Rgb colour) {
   for (size_t c = 0; c < 3; ++c) rgb.at(i + c) = colour[c];
 }
 
-void draw_panel(Picture& picture, int left, int top, int side, std::span<const float> values, int rows,
-                int cols) {
+void draw_panel(Picture& picture, const Panel& panel, std::span<const float> values, int rows, int cols) {
   if (rows < 1 || cols < 1 || values.size() != static_cast<size_t>(rows) * static_cast<size_t>(cols))
     throw std::invalid_argument("draw_panel: expects " + std::to_string(rows) + " x " + std::to_string(cols) +
                                 " values, got " + std::to_string(values.size()));
-  if (side < 1 || left < 0 || top < 0 || left + side > picture.width || top + side > picture.height)
-    throw std::invalid_argument("draw_panel: a panel of " + std::to_string(side) + " pixels at (" +
-                                std::to_string(left) + ", " + std::to_string(top) +
-                                ") leaves the picture of " + std::to_string(picture.width) + " x " +
-                                std::to_string(picture.height));
-  for (int y = 0; y < side; ++y) {
-    const int row = rows - 1 - y * rows / side;
-    for (int x = 0; x < side; ++x)
-      picture.set(left + x, top + y, colour_of(values[static_cast<size_t>(row * cols + x * cols / side)]));
+  const auto [left, top, width, height] = panel;
+  if (width < 1 || height < 1 || left < 0 || top < 0 || left + width > picture.width ||
+      top + height > picture.height)
+    throw std::invalid_argument("draw_panel: a panel of " + std::to_string(width) + " x " +
+                                std::to_string(height) + " pixels at (" + std::to_string(left) + ", " +
+                                std::to_string(top) + ") leaves the picture of " +
+                                std::to_string(picture.width) + " x " + std::to_string(picture.height));
+  for (int y = 0; y < height; ++y) {
+    const int row = rows - 1 - y * rows / height;
+    for (int x = 0; x < width; ++x)
+      picture.set(left + x, top + y, colour_of(values[static_cast<size_t>(row * cols + x * cols / width)]));
   }
 }
 
-Picture strip_picture(std::span<const Strip> strips, int size, int side) {
-  check_strips("strip_picture", strips, size, side);
-  const int gap = gap_of(side), count = static_cast<int>(strips.size());
-  Picture picture(3 * side + 4 * gap, count * (side + gap) + gap);
-  for (int i = 0; i < count; ++i)
-    draw_strip(picture, strips[static_cast<size_t>(i)], size, side, gap, gap + i * (side + gap), side + gap,
-               0);
+Picture strip_picture(std::span<const Strip> strips, const StripLayout& layout) {
+  check_strips("strip_picture", strips, layout);
+  const int gap = gap_of(layout.side), count = static_cast<int>(strips.size());
+  Panel panel = panel_of(layout);
+  const int step_x = panel.width + gap, step_y = panel.height + gap;
+  Picture picture(3 * step_x + gap, count * step_y + gap);
+  panel.left = panel.top = gap;
+  for (const Strip& strip : strips) {
+    draw_strip(picture, strip, layout, panel, step_x, 0);
+    panel.top += step_y;
+  }
   return picture;
 }
 
-Picture film_picture(std::span<const Strip> strips, int size, int side) {
-  check_strips("film_picture", strips, size, side);
-  const int gap = gap_of(side), count = static_cast<int>(strips.size());
-  Picture picture(count * (side + gap) + gap, 3 * side + 4 * gap);
-  for (int i = 0; i < count; ++i)
-    draw_strip(picture, strips[static_cast<size_t>(i)], size, side, gap + i * (side + gap), gap, 0,
-               side + gap);
+Picture film_picture(std::span<const Strip> strips, const StripLayout& layout) {
+  check_strips("film_picture", strips, layout);
+  const int gap = gap_of(layout.side), count = static_cast<int>(strips.size());
+  Panel panel = panel_of(layout);
+  const int step_x = panel.width + gap, step_y = panel.height + gap;
+  Picture picture(count * step_x + gap, 3 * step_y + gap);
+  panel.left = panel.top = gap;
+  for (const Strip& strip : strips) {
+    draw_strip(picture, strip, layout, panel, 0, step_y);
+    panel.left += step_x;
+  }
   return picture;
 }
 

@@ -27,26 +27,35 @@ struct Picture {
   void set(int x, int y, Rgb colour);
 };
 
-/// Draws values [rows][cols] into the square of `side` pixels at (left, top), y upwards: row 0, the smallest
-/// y, is at the bottom. Pixels are enlarged without smoothing.
-/// @throws std::invalid_argument when values is not rows * cols or the square leaves the picture.
-void draw_panel(Picture& picture, int left, int top, int side, std::span<const float> values, int rows,
-                int cols);
-
-/// What one window looks like. 4x4 frame: taxel k is row k / 4 (grows with y), column k % 4 (grows with x).
-struct Strip {
-  std::span<const float> input;   ///< [4][4], the window's last frame
-  std::span<const float> output;  ///< [size][size]
-  std::span<const float> truth;   ///< [size][size]
+/// A rectangle of pixels in a picture.
+struct Panel {
+  int left = 0, top = 0, width = 0, height = 0;
 };
 
-/// One line per strip: input | output | truth. Panels of `side` pixels with gaps of side / 16 (at least 1).
+/// Draws values [rows][cols] into a panel, y upwards: row 0, the smallest y, is at the bottom. Pixels are
+/// enlarged without smoothing.
+/// @throws std::invalid_argument when values is not rows * cols or the panel leaves the picture.
+void draw_panel(Picture& picture, const Panel& panel, std::span<const float> values, int rows, int cols);
+
+/// What one window looks like. Rows grow with y, columns with x.
+struct Strip {
+  std::span<const float> input;   ///< [rows][columns], the window's last frame (mean of a taxel's channels)
+  std::span<const float> output;  ///< [rows * scale][columns * scale]
+  std::span<const float> truth;   ///< [rows * scale][columns * scale]
+};
+
+/// How strips are drawn: each part in a panel whose longer side has `side` pixels.
+struct StripLayout {
+  int rows = 4, columns = 4, scale = 4, side = 128;
+};
+
+/// One line per strip: input | output | truth, with gaps of side / 16 (at least 1).
 /// @throws std::invalid_argument when there is no strip or a size is wrong.
-Picture strip_picture(std::span<const Strip> strips, int size, int side = 128);
+Picture strip_picture(std::span<const Strip> strips, const StripLayout& layout);
 
 /// A whole pass as a film: one column per strip, in the order given; input above output above truth.
 /// @throws as strip_picture.
-Picture film_picture(std::span<const Strip> strips, int size, int side = 64);
+Picture film_picture(std::span<const Strip> strips, const StripLayout& layout);
 
 /// The picture as a PNG file's bytes.
 std::vector<std::byte> encode_png(const Picture& picture);

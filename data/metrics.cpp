@@ -133,9 +133,9 @@ Metrics metrics_from_json(const nlohmann::ordered_json& json) {
   return metrics;
 }
 
-ImageScorer::ImageScorer(int size) : size_(size), correlator_(size) {
-  if (size < kUniformSize)
-    throw std::invalid_argument("metrics: size must be at least 7, got " + std::to_string(size));
+ImageScorer::ImageScorer(const ImageGrid& grid) : grid_(grid), correlator_(grid.height, grid.width) {
+  if (std::min(grid.height, grid.width) < kUniformSize)
+    throw std::invalid_argument("metrics: sides must be at least 7, got " + grid.text());
 }
 
 ImageScores ImageScorer::operator()(std::span<const float> output, std::span<const float> truth) {
@@ -144,18 +144,18 @@ ImageScores ImageScorer::operator()(std::span<const float> output, std::span<con
       throw std::invalid_argument("metrics: output pixel " + std::to_string(i) + " is not finite");
   ImageScores scores;
   scores.mse = mean_squared_error(output, truth);
-  scores.ssim = ssim(output, truth, size_);
+  scores.ssim = ssim(output, truth, static_cast<size_t>(grid_.height), static_cast<size_t>(grid_.width));
   const auto [low, high] = std::minmax_element(truth.begin(), truth.end());
   scores.has_position = *high - *low > 2 * PhaseCorrelator::kFlat;
   if (!scores.has_position) return scores;
   const PhaseCorrelation phase = correlator_(output, truth);
   scores.phase_correlation = phase.peak;
-  scores.position_error_px = phase.defined ? std::hypot(phase.dx_px, phase.dy_px) : size_ / 2.0;
+  scores.position_error_px =
+      phase.defined ? std::hypot(phase.dx_px, phase.dy_px) : std::min(grid_.height, grid_.width) / 2.0;
   return scores;
 }
 
-MetricsAccumulator::MetricsAccumulator(int size, double width_mm)
-    : size_(size), width_mm_(width_mm), scorer_(size) {}
+MetricsAccumulator::MetricsAccumulator(const ImageGrid& grid) : grid_(grid), scorer_(grid) {}
 
 void MetricsAccumulator::add(std::span<const float> output, std::span<const float> truth) {
   add(output, truth, scorer_(output, truth));
@@ -191,7 +191,7 @@ void MetricsAccumulator::sample(std::span<const float> output, std::span<const f
 }
 
 double MetricsAccumulator::floor() const {
-  const size_t pixels = static_cast<size_t>(size_) * static_cast<size_t>(size_);
+  const size_t pixels = grid_.pixels();
   const size_t count = sampled_truths_.size() / pixels;
   if (count < 2) return Metrics::kNone;
   std::vector<size_t> partner(count);
@@ -199,7 +199,7 @@ double MetricsAccumulator::floor() const {
   const RandomStream random(kFloorSeed, 1);  // Sattolo's shuffle: one cycle, so nobody meets himself
   for (size_t i = count - 1; i > 0; --i)
     std::swap(partner[i], partner[static_cast<size_t>(random.uniform(i) * static_cast<double>(i))]);
-  PhaseCorrelator correlator(size_);
+  PhaseCorrelator correlator(grid_.height, grid_.width);
   double sum = 0;
   for (size_t i = 0; i < count; ++i)
     sum += correlator(std::span(sampled_outputs_).subspan(i * pixels, pixels),
@@ -222,13 +222,12 @@ Metrics MetricsAccumulator::result() const {
     metrics.phase_correlation = peak_ / n;
     metrics.phase_correlation_floor = floor();
     metrics.position_error_px = distance_px_ / n;
-    metrics.position_error_mm = metrics.position_error_px * width_mm_ / size_;
+    metrics.position_error_mm = metrics.position_error_px * grid_.pixel_mm;
   }
   return metrics;
 }
 
-ContactMetrics::ContactMetrics(int size, double width_mm)
-    : scorer_(size), all_(size, width_mm), contact_(size, width_mm) {}
+ContactMetrics::ContactMetrics(const ImageGrid& grid) : scorer_(grid), all_(grid), contact_(grid) {}
 
 void ContactMetrics::add(std::span<const float> output, std::span<const float> truth) {
   const ImageScores scores = scorer_(output, truth);

@@ -7,10 +7,11 @@
 #include <vector>
 
 #include "data/phase_correlation.h"
+#include "data/taxel_array.h"
 
 namespace supertac {
 
-/// Images are [size][size], row-major, data range 1 (0..1). Values outside the range count as they are:
+/// Images are [height][width], row-major, data range 1 (0..1). Values outside the range count as they are:
 /// nothing is clipped here.
 
 /// PSNR values are capped here: an error of 60 dB (0.1 % of the range) is what rounding to 8 bits costs, so
@@ -46,7 +47,8 @@ struct ImageScores {
   double mse = 0, ssim = 0;
   bool has_position = false;     ///< the truth is not flat, so that it lies somewhere
   double phase_correlation = 0;  ///< 0 when the output is flat
-  double position_error_px = 0;  ///< length of the displacement; size / 2, the worst, when the output is flat
+  double position_error_px = 0;  ///< length of the displacement; half the shorter side when the output
+                                 ///< is flat
 };
 
 /// What is reported about a set of windows. Figures over no windows at all are NaN (null in JSON).
@@ -71,15 +73,13 @@ Metrics metrics_from_json(const nlohmann::ordered_json& json);
 /// Scores image pairs of one size. One object serves one thread.
 class ImageScorer {
  public:
-  /// @throws std::invalid_argument when size is odd or below 7.
-  explicit ImageScorer(int size);
+  /// @throws std::invalid_argument when a side is odd or below 7.
+  explicit ImageScorer(const ImageGrid& grid);
   /// @throws std::invalid_argument when a size is wrong or a value of the output is not finite.
   ImageScores operator()(std::span<const float> output, std::span<const float> truth);
-  PhaseCorrelator& correlator() { return correlator_; }
-  int size() const { return size_; }
 
  private:
-  int size_;
+  ImageGrid grid_;
   PhaseCorrelator correlator_;
 };
 
@@ -90,8 +90,8 @@ class MetricsAccumulator {
  public:
   static constexpr size_t kFloorPairs = 256;
 
-  /// @param width_mm side of the imaged square. @throws as ImageScorer.
-  explicit MetricsAccumulator(int size, double width_mm = 12);
+  /// @throws as ImageScorer.
+  explicit MetricsAccumulator(const ImageGrid& grid);
   void add(std::span<const float> output, std::span<const float> truth);
   /// The same for scores that `ImageScorer` has given for this pair.
   void add(std::span<const float> output, std::span<const float> truth, const ImageScores& scores);
@@ -101,8 +101,7 @@ class MetricsAccumulator {
   void sample(std::span<const float> output, std::span<const float> truth);
   double floor() const;
 
-  int size_;
-  double width_mm_;
+  ImageGrid grid_;
   ImageScorer scorer_;
   uint64_t windows_ = 0, positions_ = 0;
   double psnr_ = 0, mse_ = 0, ssim_ = 0, peak_ = 0, distance_px_ = 0;  // sums
@@ -112,7 +111,8 @@ class MetricsAccumulator {
 /// All windows, and apart those in contact: a flat truth is easy and would flatter the mean.
 class ContactMetrics {
  public:
-  explicit ContactMetrics(int size, double width_mm = 12);
+  /// @throws as ImageScorer.
+  explicit ContactMetrics(const ImageGrid& grid);
   void add(std::span<const float> output, std::span<const float> truth);
   Metrics all() const { return all_.result(); }
   Metrics contact() const { return contact_.result(); }

@@ -15,11 +15,18 @@ namespace {
 
 static_assert(sizeof(kiss_fft_cpx) == 2 * sizeof(float), "kissfft must be its single-precision build");
 
-kiss_fftndr_state* make_plan(int size, bool inverse) {
-  const int dims[2] = {size, size};
+kiss_fftndr_state* make_plan(int height, int width, bool inverse) {
+  const int dims[2] = {height, width};
   kiss_fftndr_state* plan = kiss_fftndr_alloc(dims, 2, inverse ? 1 : 0, nullptr, nullptr);
   if (plan == nullptr) throw std::bad_alloc();
   return plan;
+}
+
+std::vector<float> hann(int size) {
+  std::vector<float> window;
+  for (int i = 0; i < size; ++i)
+    window.push_back(static_cast<float>(0.5 - 0.5 * std::cos(2 * std::numbers::pi * i / (size - 1.0))));
+  return window;
 }
 
 // Offset in (-1/2, 1/2) of the top of the parabola through (-1, before), (0, top), (1, after).
@@ -32,34 +39,32 @@ double parabola_top(double before, double top, double after) {
 
 void PhaseCorrelator::Free::operator()(kiss_fftndr_state* plan) const { std::free(plan); }
 
-PhaseCorrelator::PhaseCorrelator(int size) : size_(size) {
-  if (size < 4 || size % 2 != 0)
-    throw std::invalid_argument("phase correlation: size must be even and at least 4, got " +
-                                std::to_string(size));
-  forward_.reset(make_plan(size, false));
-  inverse_.reset(make_plan(size, true));
-  const size_t n = static_cast<size_t>(size);
-  hann_.resize(n);
-  for (size_t i = 0; i < n; ++i)
-    hann_[i] = static_cast<float>(0.5 - 0.5 * std::cos(2 * std::numbers::pi * i / (n - 1.0)));
-  surface_.resize(n * n);
-  for (Spectrum* spectrum : {&a_, &b_, &cross_}) spectrum->resize(n * (n / 2 + 1) * 2);
+PhaseCorrelator::PhaseCorrelator(int height, int width) : height_(height), width_(width) {
+  if (height < 4 || width < 4 || height % 2 != 0 || width % 2 != 0)
+    throw std::invalid_argument("phase correlation: sides must be even and at least 4, got " +
+                                std::to_string(height) + "x" + std::to_string(width));
+  forward_.reset(make_plan(height, width, false));
+  inverse_.reset(make_plan(height, width, true));
+  down_ = hann(height);
+  across_ = hann(width);
+  surface_.resize(down_.size() * across_.size());
+  const auto bins = static_cast<size_t>(height) * static_cast<size_t>(width / 2 + 1);
+  for (Spectrum* spectrum : {&a_, &b_, &cross_}) spectrum->resize(2 * bins);
 }
 
 // False when the image is flat.
 bool PhaseCorrelator::transform(std::span<const float> image, Spectrum& out) {
-  const size_t n = static_cast<size_t>(size_);
-  if (image.size() != n * n)
-    throw std::invalid_argument("phase correlation: expects " + std::to_string(n * n) + " pixels, got " +
-                                std::to_string(image.size()));
+  if (image.size() != surface_.size())
+    throw std::invalid_argument("phase correlation: expects " + std::to_string(surface_.size()) +
+                                " pixels, got " + std::to_string(image.size()));
   double mean = 0;
   for (const float v : image) mean += v;
-  mean /= static_cast<double>(n * n);
+  mean /= static_cast<double>(image.size());
   double deviation = 0;
   for (size_t i = 0; i < image.size(); ++i) {
     const double centred = image[i] - mean;
     deviation = std::max(deviation, std::abs(centred));
-    surface_[i] = static_cast<float>(centred) * hann_[i / n] * hann_[i % n];
+    surface_[i] = static_cast<float>(centred) * down_[i / across_.size()] * across_[i % across_.size()];
   }
   kiss_fftndr(forward_.get(), surface_.data(), reinterpret_cast<kiss_fft_cpx*>(out.data()));
   return deviation > kFlat;
@@ -90,14 +95,14 @@ PhaseCorrelation PhaseCorrelator::operator()(std::span<const float> a, std::span
 
   correlate(kShiftEpsilon);
   const int top = static_cast<int>(std::max_element(surface_.begin(), surface_.end()) - surface_.begin());
-  const int row = top / size_, column = top % size_;
+  const int row = top / width_, column = top % width_;
   const auto at = [&](int r, int c) {
-    return surface_[static_cast<size_t>((r + size_) % size_ * size_ + (c + size_) % size_)];
+    return surface_[static_cast<size_t>((r + height_) % height_ * width_ + (c + width_) % width_)];
   };
   const double dy = row + parabola_top(at(row - 1, column), at(row, column), at(row + 1, column));
   const double dx = column + parabola_top(at(row, column - 1), at(row, column), at(row, column + 1));
-  result.dy_px = dy < size_ / 2.0 ? dy : dy - size_;
-  result.dx_px = dx < size_ / 2.0 ? dx : dx - size_;
+  result.dy_px = dy < height_ / 2.0 ? dy : dy - height_;
+  result.dx_px = dx < width_ / 2.0 ? dx : dx - width_;
   return result;
 }
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-namespace supertac {
+#include "data/taxel_array.h"
 
-constexpr int kTaxels = 16;
+namespace supertac {
 
 /// One pass of the finger over a plate, at the rate it was recorded with.
 struct Recording {

@@ -42,8 +42,7 @@ struct Moments {
         xy(Matrix::Zero(static_cast<Eigen::Index>(features), static_cast<Eigen::Index>(pixels))) {}
 
   Moments(const WindowSet& windows, std::span<const uint32_t> indices)
-      : Moments(features_of(static_cast<size_t>(windows.timesteps())),
-                static_cast<size_t>(windows.image_size() * windows.image_size())) {
+      : Moments(features_of(static_cast<size_t>(windows.timesteps())), windows.image().pixels()) {
     constexpr size_t kBlock = 512;
     std::vector<float> truth(static_cast<size_t>(xy.cols()));
     for (size_t first = 0; first < indices.size(); first += kBlock) {
@@ -102,8 +101,7 @@ std::vector<bool> held_out(const WindowSet& windows, std::span<const uint32_t> i
 }  // namespace
 
 Ridge::Ridge(const WindowSet& windows, std::span<const uint32_t> train)
-    : timesteps_(static_cast<size_t>(windows.timesteps())),
-      pixels_(static_cast<size_t>(windows.image_size() * windows.image_size())) {
+    : timesteps_(static_cast<size_t>(windows.timesteps())), pixels_(windows.image().pixels()) {
   if (train.empty()) throw std::invalid_argument("ridge: there is no window to fit to");
   const std::vector<uint32_t> chosen = spread(train, kFitWindows);
   const std::vector<bool> held = held_out(windows, chosen);

@@ -7,7 +7,8 @@ namespace supertac {
 /// Ridge regression from the window: the best picture that is a linear function of the signals.
 ///   features  the window's 16 taxels averaged over 16 equal stretches of time (over T < 16 frames: each
 ///             frame), and a constant: f = 257
-///   weights   W = (X'X + penalty D)^-1 X'Y in double precision by Cholesky; X [n,f], Y [n,S S]; D is 1 for
+///   weights   W = (X'X + penalty D)^-1 X'Y in double precision by Cholesky; X [n,f], Y [n,pixels]; D is 1
+///   for
 ///             each feature and 0 for the constant (Hoerl & Kennard 1970)
 ///   penalty   the one of 1e-5 .. 10, times the mean of X'X's diagonal, with the least squared error on every
 ///             fifth pass when fitted to the others (on the last fifth of the windows of a single pass); the

@@ -17,7 +17,7 @@
 namespace supertac {
 namespace {
 
-constexpr size_t kLargestImage = 32 * 32;
+constexpr size_t kLargestImage = size_t{16 * 8} * size_t{16 * 8};
 
 void check(const WindowSettings& s) {
   const auto fail = [](const std::string& what) { throw std::invalid_argument("windows: " + what); };
@@ -185,23 +185,23 @@ WindowSet::Position WindowSet::position(size_t i) const {
 }
 
 void WindowSet::truth(size_t i, std::span<float> out) const {
-  const auto size = static_cast<size_t>(image_size());
-  check_size("a truth image", out.size(), size * size);
+  const ImageGrid grid = image();
+  check_size("a truth image", out.size(), grid.pixels());
   const Plate& plate = plates_[plate_of_[index_[i].pass]];
   const auto [x, y] = position(i);
-  if (!plate.uniform_in_x()) return truth_image(plate, x, y, image_size(), out);
-  const double pixel = kWindowMm / image_size();
-  for (size_t row = 0; row < size; ++row) {
-    const double row_y = y - kWindowMm / 2 + (static_cast<double>(row) + 0.5) * pixel;
-    std::fill_n(&out[row * size], size, static_cast<float>(truth_value(plate, x, row_y)));
+  if (!plate.uniform_in_x()) return truth_image(plate, x, y, grid, out);
+  const auto width = static_cast<size_t>(grid.width);
+  for (size_t row = 0; row < static_cast<size_t>(grid.height); ++row) {
+    const double row_y = y - grid.height_mm() / 2 + (static_cast<double>(row) + 0.5) * grid.pixel_mm;
+    std::fill_n(&out[row * width], width, static_cast<float>(truth_value(plate, x, row_y)));
   }
 }
 
 bool WindowSet::contact(size_t i) const {
-  std::array<float, kLargestImage> image;
-  const auto size = static_cast<size_t>(image_size());
-  truth(i, std::span(image).first(size * size));
-  return in_contact(std::span(image).first(size * size));
+  std::array<float, kLargestImage> pixels;
+  const std::span<float> image_of_it = std::span(pixels).first(image().pixels());
+  truth(i, image_of_it);
+  return in_contact(image_of_it);
 }
 
 std::optional<double> WindowSet::filter_s() const {

@@ -9,6 +9,7 @@
 #include "data/plate.h"
 #include "data/recording.h"
 #include "data/resample.h"
+#include "data/taxel_array.h"
 
 namespace supertac {
 
@@ -77,7 +78,8 @@ class WindowSet {
 
   size_t size() const { return index_.size(); }
   int timesteps() const { return settings_.timesteps; }
-  int image_size() const { return 4 * settings_.scale; }
+  /// The size of a truth.
+  ImageGrid image() const { return TaxelArray{}.picture(settings_.scale); }
   const WindowSettings& settings() const { return settings_; }
   const WindowCounts& counts() const { return counts_; }
   const std::vector<Pass>& passes() const { return passes_; }
@@ -88,7 +90,7 @@ class WindowSet {
   void window(size_t i, std::span<float> out) const;
   /// The window without copying it, not levelled.
   std::span<const float> window(size_t i) const;
-  /// Truth of its last frame, [S][S], as truth_image.
+  /// Truth of its last frame, [height][width] of image(), as truth_image.
   void truth(size_t i, std::span<float> out) const;
   /// The last frame, [4][4].
   std::span<const float> last_frame(size_t i) const;

@@ -34,7 +34,7 @@ void compute(const SuperTac& model, const WindowSet& data, std::span<const std::
 void for_each_output(const SuperTac& model, const WindowSet& data, std::span<const std::uint32_t> indices,
                      const std::function<bool(const EvaluatedBatch&)>& use) {
   const Dim size = model.settings().image_size(), timesteps = model.settings().timesteps;
-  if (data.timesteps() != timesteps || data.image_size() != size) {
+  if (data.timesteps() != timesteps || data.image().height != size) {
     throw std::invalid_argument(
         "for_each_output: the windows do not have the model's length or picture size");
   }
@@ -65,9 +65,8 @@ void for_each_output(const SuperTac& model, const WindowSet& data, std::span<con
 
 ContactMetrics score(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
                      bool (*stop)()) {
-  const int size = windows.image_size();
-  const auto pixels = static_cast<std::size_t>(size * size);
-  ContactMetrics metrics(size);
+  const std::size_t pixels = windows.image().pixels();
+  ContactMetrics metrics(windows.image());
   for_each_output(model, windows, indices, [&](const EvaluatedBatch& b) {
     for (std::size_t n = 0; n < static_cast<std::size_t>(b.outputs.dim(0)); ++n) {
       metrics.add(b.outputs.values().subspan(n * pixels, pixels),

@@ -70,10 +70,10 @@ Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, con
       state_(model_.parameters(), {settings.learning_rate, settings.warm_up, settings.clip_norm},
              settings.epochs * steps_per_epoch()) {
   if (windows.timesteps() != settings.model.timesteps ||
-      windows.image_size() != settings.model.image_size()) {
+      windows.image().height != settings.model.image_size()) {
     throw std::invalid_argument(
         "Trainer: the windows have " + std::to_string(windows.timesteps()) + " samples and " +
-        std::to_string(windows.image_size()) + " pixels a side, the model expects " +
+        std::to_string(windows.image().height) + " pixels a side, the model expects " +
         std::to_string(settings.model.timesteps) + " and " + std::to_string(settings.model.image_size()));
   }
   indices_.resize(batching_.batch_size());

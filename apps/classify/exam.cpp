@@ -121,8 +121,8 @@ std::vector<Part> parts_of(const WindowSet& windows, const Exam& exam,
   for (const std::uint32_t i : exam.test) {
     const Plate& plate = plates[static_cast<std::size_t>(exam.label_of_pass[windows.pass_of(i)])];
     const double y = windows.position(i).y_mm;
-    const bool inside =
-        y - kWindowMm / 2 >= plate.texture_begin() && y + kWindowMm / 2 <= plate.texture_end();
+    const double half = windows.image().height_mm() / 2;
+    const bool inside = y - half >= plate.texture_begin() && y + half <= plate.texture_end();
     parts.push_back(inside ? Part::inside : windows.contact(i) ? Part::contact : Part::all);
   }
   return parts;

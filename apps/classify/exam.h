@@ -21,7 +21,7 @@ struct Exam {
 /// Which test windows are counted. Near the ends of a texture one element is seen of any plate, and beyond
 /// them none: there no picture, not even a perfect one, tells plates apart.
 enum class Part {
-  inside,   ///< the whole 12 mm window lies on the texture
+  inside,   ///< the whole picture lies on the texture
   contact,  ///< the truth has a pixel above 0
   all,
 };

@@ -31,10 +31,11 @@ Tensor last_frames(const Tensor& windows) {
   return frames;
 }
 
-Tensor enlarged(const Tensor& frames, Dim size) {
-  const Upsampling bicubic(Upsampling::Kind::bicubic, 4, 4, static_cast<int>(size) / 4);
-  Tensor pictures(Shape{frames.dim(0), size, size, 1});
-  const auto pixels = static_cast<std::size_t>(size * size);
+Tensor enlarged(const Tensor& frames, const WindowSet& data) {
+  const ImageGrid image = data.image();
+  const Upsampling bicubic(Upsampling::Kind::bicubic, 4, 4, data.settings().scale);
+  Tensor pictures(Shape{frames.dim(0), image.height, image.width, 1});
+  const std::size_t pixels = image.pixels();
   for (std::size_t n = 0; n < static_cast<std::size_t>(frames.dim(0)); ++n) {
     bicubic(frames.values().subspan(n * kWindowTaxels, kWindowTaxels),
             pictures.values().subspan(n * pixels, pixels));
@@ -61,9 +62,9 @@ Tensor history(const Tensor& windows, Dim frames) {
 }
 
 Tensor truths(const WindowSet& data, std::span<const std::uint32_t> indices) {
-  const Dim size = data.image_size();
-  Tensor pictures(Shape{static_cast<Dim>(indices.size()), size, size, 1});
-  const auto pixels = static_cast<std::size_t>(size * size);
+  const ImageGrid image = data.image();
+  Tensor pictures(Shape{static_cast<Dim>(indices.size()), image.height, image.width, 1});
+  const std::size_t pixels = image.pixels();
   for (std::size_t n = 0; n < indices.size(); ++n) {
     data.truth(indices[n], pictures.values().subspan(n * pixels, pixels));
   }
@@ -99,7 +100,7 @@ Tensor show(const View& view, const SuperTac& model, const WindowSet& data,
     case ViewKind::frame:
       return last_frames(windows);
     case ViewKind::bicubic:
-      return enlarged(last_frames(windows), data.image_size());
+      return enlarged(last_frames(windows), data);
     case ViewKind::super_resolved:
       return model.infer(windows);
     case ViewKind::latents:

@@ -12,12 +12,11 @@ namespace {
 
 constexpr std::size_t kStrips = 12, kFilmColumns = 24;
 
-using Draw = Picture (*)(std::span<const Strip>, int, int);
+using Draw = Picture (*)(std::span<const Strip>, const StripLayout&);
 
 Picture draw(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> chosen,
              Draw picture, int side) {
-  const int size = windows.image_size();
-  const auto pixels = static_cast<std::size_t>(size * size);
+  const std::size_t pixels = windows.image().pixels();
   std::vector<float> outputs, truths;
   for_each_output(model, windows, chosen, [&](const EvaluatedBatch& b) {
     outputs.insert(outputs.end(), b.outputs.values().begin(), b.outputs.values().end());
@@ -30,17 +29,18 @@ Picture draw(const SuperTac& model, const WindowSet& windows, std::span<const st
                       std::span<const float>(outputs).subspan(i * pixels, pixels),
                       std::span<const float>(truths).subspan(i * pixels, pixels)});
   }
-  return picture(strips, size, side);
+  return picture(strips, {.scale = windows.settings().scale, .side = side});
 }
 
 }  // namespace
 
 OutputsFile::OutputsFile(const WindowSet& windows, std::size_t count)
     : timesteps_(static_cast<std::uint64_t>(windows.timesteps())),
-      size_(static_cast<std::uint64_t>(windows.image_size())) {
+      height_(static_cast<std::uint64_t>(windows.image().height)),
+      width_(static_cast<std::uint64_t>(windows.image().width)) {
   input_.reserve(count * timesteps_ * kTaxels);
-  output_.reserve(count * size_ * size_);
-  truth_.reserve(count * size_ * size_);
+  output_.reserve(count * height_ * width_);
+  truth_.reserve(count * height_ * width_);
 }
 
 void OutputsFile::add(std::span<const float> window, std::span<const float> output,
@@ -55,8 +55,8 @@ void OutputsFile::write(const std::string& path) const {
   const auto bytes = [](const std::vector<float>& v) { return std::as_bytes(std::span(v)); };
   write_safetensors(path, {{"format", "supertac-outputs"}},
                     {{"input", "F32", {count_, timesteps_, kTaxels}, bytes(input_)},
-                     {"output", "F32", {count_, size_, size_}, bytes(output_)},
-                     {"truth", "F32", {count_, size_, size_}, bytes(truth_)}});
+                     {"output", "F32", {count_, height_, width_}, bytes(output_)},
+                     {"truth", "F32", {count_, height_, width_}, bytes(truth_)}});
 }
 
 void write_pictures(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> test,

@@ -12,7 +12,7 @@
 
 namespace supertac {
 
-/// Collects windows [N,T,16], outputs [N,S,S] and truths [N,S,S] and writes them as one safetensors file with
+/// Collects windows [N,T,16], outputs [N,H,W] and truths [N,H,W] and writes them as one safetensors file with
 /// tensors "input", "output", "truth".
 class OutputsFile {
  public:
@@ -22,7 +22,7 @@ class OutputsFile {
   void write(const std::string& path) const;
 
  private:
-  std::uint64_t timesteps_, size_, count_ = 0;
+  std::uint64_t timesteps_, height_, width_, count_ = 0;
   std::vector<float> input_, output_, truth_;
 };
 

@@ -50,7 +50,7 @@ TEST(ColourMap, ClipsAndShowsWhatIsNotANumber) {
 TEST(Panel, DrawsYUpwardsAndXToTheRight) {
   const std::vector<float> values{0, 0.25F, 0.5F, 1};  // row 0 (small y): 0, .25; row 1: .5, 1
   Picture picture(4, 4);
-  draw_panel(picture, 0, 0, 4, values, 2, 2);
+  draw_panel(picture, {0, 0, 4, 4}, values, 2, 2);
   EXPECT_EQ(picture.at(0, 3), colour_of(0));
   EXPECT_EQ(picture.at(3, 3), colour_of(0.25F));
   EXPECT_EQ(picture.at(0, 0), colour_of(0.5F));
@@ -60,9 +60,11 @@ TEST(Panel, DrawsYUpwardsAndXToTheRight) {
 TEST(Panel, StaysInsideThePicture) {
   Picture picture(4, 4);
   const std::vector<float> values(4);
-  EXPECT_THROW(draw_panel(picture, 1, 0, 4, values, 2, 2), std::invalid_argument);
-  EXPECT_THROW(draw_panel(picture, 0, 0, 4, values, 3, 2), std::invalid_argument);
+  EXPECT_THROW(draw_panel(picture, {1, 0, 4, 4}, values, 2, 2), std::invalid_argument);
+  EXPECT_THROW(draw_panel(picture, {0, 0, 4, 4}, values, 3, 2), std::invalid_argument);
 }
+
+constexpr StripLayout kSmall{.scale = 2, .side = 16};
 
 struct Windows {
   std::vector<float> input = std::vector<float>(16, 0.0F), output = std::vector<float>(64, 0.5F),
@@ -73,7 +75,7 @@ struct Windows {
 TEST(Strips, StandInputOutputTruthSideBySide) {
   const Windows windows;
   const std::vector<Strip> strips(2, windows.strip());
-  const Picture picture = strip_picture(strips, 8, 16);
+  const Picture picture = strip_picture(strips, kSmall);
   EXPECT_EQ(picture.width, 3 * 16 + 4);
   EXPECT_EQ(picture.height, 2 * 17 + 1);
   EXPECT_EQ(picture.at(0, 0), (Rgb{255, 255, 255}));
@@ -85,7 +87,7 @@ TEST(Strips, StandInputOutputTruthSideBySide) {
 TEST(Film, HasAColumnPerWindow) {
   const Windows windows;
   const std::vector<Strip> strips(5, windows.strip());
-  const Picture picture = film_picture(strips, 8, 16);
+  const Picture picture = film_picture(strips, kSmall);
   EXPECT_EQ(picture.width, 5 * 17 + 1);
   EXPECT_EQ(picture.height, 3 * 16 + 4);
   EXPECT_EQ(picture.at(70, 1), colour_of(0));
@@ -93,16 +95,32 @@ TEST(Film, HasAColumnPerWindow) {
   EXPECT_EQ(picture.at(70, 35), colour_of(1));
 }
 
+TEST(Strips, KeepTheShapeOfTheArray) {
+  const std::vector<float> input{0, 0, 0, 0, 0, 1, 0, 0}, output(32, 0.5F), truth(32, 1.0F);
+  const std::vector<Strip> strips(1, {input, output, truth});
+  const StripLayout layout{.rows = 2, .columns = 4, .scale = 2, .side = 16};
+  const Picture across = strip_picture(strips, layout), down = film_picture(strips, layout);
+  EXPECT_EQ(across.width, 3 * 16 + 4);
+  EXPECT_EQ(across.height, 8 + 2);
+  EXPECT_EQ(across.at(1 + 4, 1), colour_of(1));  // row 1 is on top
+  EXPECT_EQ(across.at(1 + 4, 1 + 4), colour_of(0));
+  EXPECT_EQ(down.width, 16 + 2);
+  EXPECT_EQ(down.height, 3 * 8 + 4);
+  EXPECT_EQ(down.at(1, 1 + 2 * 9), colour_of(1));
+}
+
 TEST(Strips, RefuseNothingAndTooMuch) {
-  EXPECT_THROW(strip_picture({}, 8), std::invalid_argument);
+  EXPECT_THROW(strip_picture({}, kSmall), std::invalid_argument);
   const Windows windows;
-  EXPECT_THROW(film_picture(std::vector<Strip>(2000, windows.strip()), 8, 64), std::invalid_argument);
-  EXPECT_THROW(strip_picture(std::vector<Strip>(1, windows.strip()), 16, 16), std::invalid_argument);
+  EXPECT_THROW(film_picture(std::vector<Strip>(2000, windows.strip()), {.scale = 2, .side = 64}),
+               std::invalid_argument);
+  EXPECT_THROW(strip_picture(std::vector<Strip>(1, windows.strip()), {.scale = 4, .side = 16}),
+               std::invalid_argument);
 }
 
 TEST(Png, ReadsBackAsDrawn) {
   const Windows windows;
-  const Picture picture = strip_picture(std::vector<Strip>(1, windows.strip()), 8, 16);
+  const Picture picture = strip_picture(std::vector<Strip>(1, windows.strip()), kSmall);
   const std::string path = ::testing::TempDir() + "supertac_images_test.png";
   write_png(path, picture);
   const auto bytes = read_file(path, 1 << 20);

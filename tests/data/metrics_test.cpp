@@ -26,7 +26,7 @@ Image noise(uint64_t stream, int size = 16) {
 
 Image plate(const char* name, double y, int size = 16) {
   Image image = flat(0, size);
-  truth_image(Plate::named(name), 18, y, size, image);
+  truth_image(Plate::named(name), 18, y, {size, size, 12.0 / size}, image);
   return image;
 }
 
@@ -48,7 +48,7 @@ TEST(Psnr, OfIdenticalImagesIsCapped) {
 }
 
 TEST(Psnr, PooledAndPerImageMeansDiffer) {
-  MetricsAccumulator metrics(16);
+  MetricsAccumulator metrics{ImageGrid{}};
   metrics.add(flat(0.1F), flat(0));    // 20 dB
   metrics.add(flat(0.001F), flat(0));  // 60 dB
   EXPECT_NEAR(metrics.result().psnr_mean_db, 40, 1e-4);
@@ -130,7 +130,7 @@ TEST(Contact, NeedsAPixelAboveZero) {
 }
 
 TEST(MetricsAccumulator, OfNothingIsNull) {
-  const auto json = to_json(MetricsAccumulator(16).result());
+  const auto json = to_json(MetricsAccumulator(ImageGrid{}).result());
   EXPECT_EQ(json["windows"], 0);
   for (const char* key : {"psnr_mean_db", "psnr_pooled_db", "ssim", "phase_correlation",
                           "phase_correlation_floor", "position_error_px", "position_error_mm"})
@@ -139,7 +139,7 @@ TEST(MetricsAccumulator, OfNothingIsNull) {
 }
 
 TEST(MetricsAccumulator, PerfectOutputsStandAboveTheFloor) {
-  MetricsAccumulator metrics(16);
+  MetricsAccumulator metrics{ImageGrid{}};
   for (int i = 0; i < 60; ++i) {
     const Image truth = plate("bumps12", 42 + 0.4 * i);
     metrics.add(truth, truth);
@@ -153,22 +153,35 @@ TEST(MetricsAccumulator, PerfectOutputsStandAboveTheFloor) {
 }
 
 TEST(MetricsAccumulator, PositionErrorIsTheDisplacementInPixelsAndMillimetres) {
-  MetricsAccumulator metrics(16);
+  MetricsAccumulator metrics{ImageGrid{}};
   metrics.add(plate("bumps12", 54 - 1.5), plate("bumps12", 54));
   EXPECT_NEAR(metrics.result().position_error_px, 2, 0.2);
   EXPECT_DOUBLE_EQ(metrics.result().position_error_mm, metrics.result().position_error_px * 0.75);
 }
 
 // A collapsed network must not look as if it knew where things are.
+TEST(MetricsAccumulator, MeasuresPixelsOfAnySize) {
+  const ImageGrid grid{8, 24, 0.5};
+  MetricsAccumulator metrics(grid);
+  std::vector<float> truth(grid.pixels()), moved(grid.pixels());
+  truth_image(Plate::named("4_Blob"), 18, 52, grid, truth);
+  truth_image(Plate::named("4_Blob"), 17, 52, grid, moved);
+  metrics.add(moved, truth);
+  EXPECT_NEAR(metrics.result().position_error_mm, 1, 0.2);
+  MetricsAccumulator of_flat(grid);
+  of_flat.add(std::vector<float>(grid.pixels(), 0.5F), truth);
+  EXPECT_EQ(of_flat.result().position_error_px, 4);  // half the shorter side
+}
+
 TEST(MetricsAccumulator, FlatOutputHasTheWorstPosition) {
-  MetricsAccumulator metrics(16);
+  MetricsAccumulator metrics{ImageGrid{}};
   metrics.add(flat(0), plate("bumps12", 54));
   EXPECT_EQ(metrics.result().position_error_px, 8);
   EXPECT_EQ(metrics.result().phase_correlation, 0);
 }
 
 TEST(MetricsAccumulator, KeepsTheFloorOfManyWindowsFromASample) {
-  MetricsAccumulator metrics(16), again(16);
+  MetricsAccumulator metrics{ImageGrid{}}, again{ImageGrid{}};
   for (uint64_t i = 0; i < 3 * MetricsAccumulator::kFloorPairs; ++i) {
     metrics.add(noise(2 * i), noise(2 * i + 1));
     again.add(noise(2 * i), noise(2 * i + 1));
@@ -178,7 +191,7 @@ TEST(MetricsAccumulator, KeepsTheFloorOfManyWindowsFromASample) {
 }
 
 TEST(MetricsAccumulator, RefusesValuesThatAreNotFinite) {
-  MetricsAccumulator metrics(16);
+  MetricsAccumulator metrics{ImageGrid{}};
   Image output = flat(0);
   output[7] = std::nanf("");
   try {
@@ -191,7 +204,7 @@ TEST(MetricsAccumulator, RefusesValuesThatAreNotFinite) {
 }
 
 TEST(ContactMetrics, ReportsContactApart) {
-  ContactMetrics metrics(16);
+  ContactMetrics metrics{ImageGrid{}};
   metrics.add(flat(0), flat(0));  // easy: 60 dB
   metrics.add(flat(0), plate("bumps12", 54));
   EXPECT_EQ(metrics.all().windows, 2U);

@@ -13,7 +13,7 @@ namespace {
 
 std::vector<float> image_of(const char* plate, double x, double y, int size = 16) {
   std::vector<float> image(static_cast<size_t>(size * size));
-  truth_image(Plate::named(plate), x, y, size, image);
+  truth_image(Plate::named(plate), x, y, {size, size, 12.0 / size}, image);
   return image;
 }
 
@@ -24,7 +24,7 @@ std::vector<float> with_noise(std::vector<float> image, double level, uint64_t s
 }
 
 double mean_peak_of_itself(const char* plate, double noise) {
-  PhaseCorrelator correlator(16);
+  PhaseCorrelator correlator(16, 16);
   double sum = 0;
   for (int i = 0; i < 20; ++i) {
     const auto image = image_of(plate, 18, 48 + 0.45 * i);
@@ -45,7 +45,7 @@ TEST(PhaseCorrelation, NoiseCostsMostOfThePeak) {
 }
 
 TEST(PhaseCorrelation, UnrelatedImagesScoreTheFloor) {
-  PhaseCorrelator correlator(16);
+  PhaseCorrelator correlator(16, 16);
   double sum = 0;
   const std::vector<float> flat(256, 0.5F);
   for (uint64_t i = 0; i < 50; ++i)
@@ -54,7 +54,7 @@ TEST(PhaseCorrelation, UnrelatedImagesScoreTheFloor) {
 }
 
 TEST(PhaseCorrelation, IgnoresAmplitudeAndLevel) {
-  PhaseCorrelator correlator(16);
+  PhaseCorrelator correlator(16, 16);
   const auto image = image_of("blobs9", 17, 50);
   auto weak = image;
   for (float& v : weak) v = 0.3F + 0.01F * v;
@@ -68,7 +68,7 @@ TEST(PhaseCorrelation, IgnoresAmplitudeAndLevel) {
 TEST(PhaseCorrelation, FindsTheDisplacementBelowAPixel) {
   for (const char* plate : {"ridges6", "bumps12", "bumps6"}) {
     for (const int size : {16, 32}) {
-      PhaseCorrelator correlator(size);
+      PhaseCorrelator correlator(size, size);
       for (const double shift_mm : {-1.5, -0.5, 0.25, 0.9, 1.5}) {
         const double centre = plate[5] == '1' ? 54 : 57;  // an element near the middle of the window
         const auto truth = image_of(plate, 18, centre, size);
@@ -82,15 +82,26 @@ TEST(PhaseCorrelation, FindsTheDisplacementBelowAPixel) {
 }
 
 TEST(PhaseCorrelation, TellsXFromY) {
-  PhaseCorrelator correlator(16);
+  PhaseCorrelator correlator(16, 16);
   const auto truth = image_of("4_Blob", 18, 52), moved = image_of("4_Blob", 17.25, 53.5);
   const auto found = correlator(moved, truth);
   EXPECT_NEAR(found.dx_px, 1, 0.25);
   EXPECT_NEAR(found.dy_px, -2, 0.25);
 }
 
+TEST(PhaseCorrelation, SidesMayDiffer) {
+  PhaseCorrelator correlator(8, 24);
+  const ImageGrid grid{8, 24, 0.5};
+  std::vector<float> truth(grid.pixels()), moved(grid.pixels());
+  truth_image(Plate::named("4_Blob"), 18, 52, grid, truth);
+  truth_image(Plate::named("4_Blob"), 17, 52.5, grid, moved);
+  const auto found = correlator(moved, truth);
+  EXPECT_NEAR(found.dx_px, 2, 0.35);
+  EXPECT_NEAR(found.dy_px, -1, 0.35);
+}
+
 TEST(PhaseCorrelation, FlatImagesHaveNoPhase) {
-  PhaseCorrelator correlator(16);
+  PhaseCorrelator correlator(16, 16);
   const std::vector<float> flat(256, 0.3F);
   const auto bumps = image_of("bumps12", 18, 54);
   for (const auto& result : {correlator(flat, flat), correlator(flat, bumps), correlator(bumps, flat)}) {
@@ -101,9 +112,9 @@ TEST(PhaseCorrelation, FlatImagesHaveNoPhase) {
 }
 
 TEST(PhaseCorrelation, RefusesOtherSizes) {
-  EXPECT_THROW(PhaseCorrelator(15), std::invalid_argument);
-  EXPECT_THROW(PhaseCorrelator(2), std::invalid_argument);
-  PhaseCorrelator correlator(8);
+  EXPECT_THROW(PhaseCorrelator(15, 16), std::invalid_argument);
+  EXPECT_THROW(PhaseCorrelator(8, 2), std::invalid_argument);
+  PhaseCorrelator correlator(8, 8);
   const std::vector<float> small(64), large(65);
   try {
     correlator(small, large);

@@ -10,7 +10,7 @@ namespace {
 
 std::vector<float> image_at(const Plate& plate, double x, double y, int size) {
   std::vector<float> image(static_cast<size_t>(size * size));
-  truth_image(plate, x, y, size, image);
+  truth_image(plate, x, y, {size, size, 12.0 / size}, image);
   return image;
 }
 
@@ -69,10 +69,22 @@ TEST(Truth, FlatScenesAreFlat) {
   for (const float v : image_at(Plate::named("3_Bumps"), 18, 30, 16)) EXPECT_EQ(v, 0.0F);
 }
 
+TEST(Truth, CoversEveryTaxelsSquareOfAnyArray) {
+  const TaxelArray array{.rows = 2, .columns = 6, .pitch_mm = 2};
+  const ImageGrid grid = array.picture(4);
+  EXPECT_EQ(grid, (ImageGrid{8, 24, 0.5}));
+  std::vector<float> image(grid.pixels());
+  truth_image(one_blob(), 15, 52, grid, image);  // x 9 .. 21, y 50 .. 54
+  for (int r = 0; r < 8; ++r)
+    for (int c = 0; c < 24; ++c)
+      EXPECT_FLOAT_EQ(image[static_cast<size_t>(24 * r + c)],
+                      static_cast<float>(one_blob().height(9.25 + 0.5 * c, 50.25 + 0.5 * r) / 1.5));
+}
+
 TEST(Truth, RefusesAnImageOfTheWrongSize) {
   std::vector<float> image(255);
-  EXPECT_THROW(truth_image(Plate::named("plain"), 0, 0, 16, image), std::invalid_argument);
-  EXPECT_THROW(truth_image(Plate::named("plain"), 0, 0, 0, {}), std::invalid_argument);
+  EXPECT_THROW(truth_image(Plate::named("plain"), 0, 0, ImageGrid{}, image), std::invalid_argument);
+  EXPECT_THROW(truth_image(Plate::named("plain"), 0, 0, {0, 0, 1}, {}), std::invalid_argument);
 }
 
 }  // namespace

@@ -117,7 +117,8 @@ TEST(Windows, TruthIsTheTruthImageOfTheLastFrame) {
       std::vector<float> truth(pixels), expected(pixels);
       for (size_t i = 0; i < set.size(); i += 7) {
         set.truth(i, truth);
-        truth_image(Plate::named(plate), set.position(i).x_mm, set.position(i).y_mm, 4 * scale, expected);
+        truth_image(Plate::named(plate), set.position(i).x_mm, set.position(i).y_mm,
+                    TaxelArray{}.picture(scale), expected);
         ASSERT_EQ(truth, expected) << plate << " " << scale << " " << i;
         ASSERT_EQ(set.contact(i), *std::max_element(truth.begin(), truth.end()) > 0);
       }
