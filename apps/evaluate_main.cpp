@@ -57,12 +57,6 @@ std::vector<std::string> split_words(const std::string& text) {
 }
 
 Task load_task(const Arguments& a, const ModelFile& file) {
-  WindowSettings w;
-  const SuperTacSettings& model = file.model->settings();
-  w.timesteps = static_cast<int>(model.timesteps);
-  w.scale = static_cast<int>(model.scale);
-  w.rate_hz = file.input.rate_hz;
-  w.scaling = file.input.scaling;
   const std::vector<std::string> plates =
       a.given("plates") ? a.list("plates") : split_words(metadata_or(file, "plates", ""));
   const std::string name = a.given("split")
@@ -72,7 +66,7 @@ Task load_task(const Arguments& a, const ModelFile& file) {
       a.given("seed")
           ? static_cast<std::uint64_t>(a.integer("seed", 0, std::numeric_limits<std::int64_t>::max()))
           : parse_uint(metadata_or(file, "seed", "0")).value_or(0);
-  Task task{WindowSet::load(a.text("data"), plates, w), name, seed, {}, {}};
+  Task task{WindowSet::load(a.text("data"), plates, file.windows()), name, seed, {}, {}};
   Split split = make_split(task.windows, split_kind(name), seed);
   task.train = std::move(split.train);
   task.test = std::move(split.test);

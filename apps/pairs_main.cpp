@@ -15,27 +15,34 @@ void declare(Arguments& a) {
   a.option("split", "NAME", "which windows go where: window, pass, trial, texture", "trial");
   a.option("seed", "N", "of the split", "0");
   a.option("timesteps", "T", "the windows are those that a model of T samples is trained on", "256");
-  a.option("scale", "N", "targets of 4 N pixels a side: 2, 4 or 8", "4");
+  a.option("scale", "N", "targets N times as fine as the array: 2, 4 or 8", "4");
   a.option("stride", "N", "take every N-th window of a pass", "1");
 }
 
-// input [N,1,4,4]: the window's last frame, scaled; target [N,1,S,S]; group [N]: the number of the pass.
+// input [N,channels,rows,columns]: the window's last frame, scaled; target [N,1,H,W]; group [N]: the number
+// of the pass.
 nlohmann::ordered_json write(const WindowSet& windows, const std::vector<std::uint32_t>& indices,
                              const std::string& path) {
   const ImageGrid image = windows.image();
   const std::size_t pixels = image.pixels();
+  const TaxelArray array = windows.array();
+  const auto channels = static_cast<std::size_t>(array.channels);
   std::vector<float> input, target(indices.size() * pixels);
   std::vector<std::int64_t> group;
   for (std::size_t n = 0; n < indices.size(); ++n) {
     const auto frame = windows.last_frame(indices[n]);
-    input.insert(input.end(), frame.begin(), frame.end());
+    for (std::size_t c = 0; c < channels; ++c)
+      for (std::size_t at = c; at < frame.size(); at += channels) input.push_back(frame[at]);
     windows.truth(indices[n], std::span(target).subspan(n * pixels, pixels));
     group.push_back(static_cast<std::int64_t>(windows.pass_of(indices[n])));
   }
   const std::uint64_t count = indices.size();
   write_safetensors(
       path, {{"format", "supertac-pairs"}, {"data", windows.fingerprint()}},
-      {{"input", "F32", {count, 1, 4, 4}, std::as_bytes(std::span(input))},
+      {{"input",
+        "F32",
+        {count, channels, static_cast<std::uint64_t>(array.rows), static_cast<std::uint64_t>(array.columns)},
+        std::as_bytes(std::span(input))},
        {"target",
         "F32",
         {count, 1, static_cast<std::uint64_t>(image.height), static_cast<std::uint64_t>(image.width)},

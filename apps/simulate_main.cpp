@@ -38,6 +38,8 @@ void declare(Arguments& arguments) {
       .option("from", "MM", "where the finger's centre begins to slide; T samples before a window are needed",
               "28")
       .option("to", "MM", "where the slide ends", "80")
+      .option("array", "ROWSxCOLUMNS", "taxels of the finger, 2 to 16 either way", "4x4")
+      .option("pitch", "MM", "from taxel to taxel", "3")
       .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms()))
       .option("seed", "N", "the same seed gives the same files", "1");
 }
@@ -55,8 +57,22 @@ std::vector<Plate> read_plates(const Arguments& arguments) {
   return plates;
 }
 
+TaxelArray read_array(const Arguments& arguments) {
+  const std::string text = arguments.text("array");
+  const std::size_t x = std::min(text.find('x'), text.size());
+  const auto rows = parse_int(text.substr(0, x)),
+             columns = parse_int(text.substr(std::min(x + 1, text.size())));
+  const auto within = [](const std::optional<std::int64_t>& n) { return n && *n >= 2 && *n <= 16; };
+  if (!within(rows) || !within(columns))
+    throw UsageError("--array expects ROWSxCOLUMNS, 2 to 16 each, found " + text);
+  return {.rows = static_cast<int>(*rows),
+          .columns = static_cast<int>(*columns),
+          .pitch_mm = arguments.number("pitch", 0.1, 100)};
+}
+
 SimulatorSettings read_settings(const Arguments& arguments) {
   SimulatorSettings settings;
+  settings.array = read_array(arguments);
   for (const std::string& term : arguments.list("without")) {
     try {
       settings = without_term(settings, term);

@@ -78,8 +78,11 @@ std::unique_ptr<SensorSource> open_source(const Arguments& a, const Options& opt
 class Stream {
  public:
   Stream(const Arguments& a, double seconds, const ModelFile& model, SensorSource& source)
-      : a_(a), source_(source), maker_(model, source.period_s(), source.filter_s()), seconds_(seconds) {
-    if (a.given("out")) log_ = std::make_unique<PictureLog>(a.text("out"), a.force(), maker_.image_size());
+      : a_(a), source_(source), maker_(model, source), seconds_(seconds) {
+    state_.array = source.array();
+    state_.scale = maker_.image().height / state_.array.rows;
+    if (a.given("out"))
+      log_ = std::make_unique<PictureLog>(a.text("out"), a.force(), source.array().signals(), maker_.image());
   }
 
   /// Until the source ends, --seconds are over, or a signal comes.
@@ -169,7 +172,7 @@ class Stream {
       state_.lost = counters.missing, state_.dropped = dropped();
       figures_s_ = now, figures_frames_ = frames_;
     }
-    state_.taxels = maker_.window().newest();
+    state_.taxels = mean_of_channels(state_.array, maker_.window().newest());
     view_->update(state_);
   }
 

@@ -78,6 +78,7 @@ class Sweep {
     const Grouping grouping = settings.model.grouping;
     settings.model = point.model;
     settings.model.grouping = grouping;
+    set_array(settings.model, windows.array());
     settings.seed = point.seed;
     const std::string out = a_.text("out") + "/models/" + point.name() + ".safetensors";
     const std::string state = RunFolder::folder_of(out) + "/last.safetensors";

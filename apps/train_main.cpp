@@ -20,7 +20,7 @@ void declare(Arguments& a) {
   a.option("preset", "NAME", "network: paper, or tiny (a ninth of the cost)", "paper");
   a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512 (default: the preset's)", "");
   a.option("latent", "LD", "latent numbers per group of taxels", "10");
-  a.option("scale", "N", "pictures of 4 N pixels a side: 2, 4 or 8", "4");
+  a.option("scale", "N", "pictures N times as fine as the array, which the recordings name: 2, 4 or 8", "4");
   a.option("upsampling", "NAME", "how pictures grow: transposed or sub-pixel convolution", "transposed");
   declare_training(a);
   a.option("seed", "N", "of split, initial weights, order, noise", "0");
@@ -47,10 +47,11 @@ int run(Arguments& a) {
   if (a.given("pairs")) return train_on_pairs(a);
   if (!a.given("data")) throw UsageError("expected --data DIR or --pairs FILE, found neither");
   const std::string out = a.text("out");
-  const TrainingSettings settings = settings_of(a);
+  TrainingSettings settings = settings_of(a);
   const SplitKind kind = training_split(a);
   refuse_existing(out, a.force());
   const WindowSet windows = training_windows(a, settings.model);
+  set_array(settings.model, windows.array());
   const Split split = make_split(windows, kind, settings.seed);
   TrainingRun training(a, windows, split, settings,
                        {.out = out, .force = a.force(), .resume = a.text("resume")});

@@ -70,8 +70,8 @@ void data_loading(benchmark::State& state) {
   const AugmentSettings augmentation{
       .gain = 0.5, .taxel_gain = 0.3, .offset = 0.05, .noise = 0.02, .dropped = 2};
   std::vector<std::uint32_t> indices(64);
-  std::vector<float> window(static_cast<std::size_t>(kPaper.timesteps * kWindowTaxels));
-  std::vector<float> truth(static_cast<std::size_t>(kPaper.image_size() * kPaper.image_size()));
+  std::vector<float> window(static_cast<std::size_t>(kPaper.timesteps * kTaxels));
+  std::vector<float> truth(static_cast<std::size_t>(kPaper.image_height() * kPaper.image_width()));
   std::uint64_t step = 0;
   for (auto _ : state) {
     batching.batch(0, step++ % batching.batches_per_epoch(), indices);

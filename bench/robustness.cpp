@@ -53,20 +53,10 @@ std::vector<Condition> conditions(bool real) {
   return all;
 }
 
-WindowSettings window_settings(const ModelFile& file) {
-  const SuperTacSettings& model = file.model->settings();
-  WindowSettings w;
-  w.timesteps = static_cast<int>(model.timesteps);
-  w.scale = static_cast<int>(model.scale);
-  w.rate_hz = file.input.rate_hz;
-  w.scaling = file.input.scaling;
-  return w;
-}
-
 // Trial 1 for the baselines, trial 2 to be tested, at this condition's speed and pitch.
 class Scene {
  public:
-  Scene(const Arguments& a, const ModelFile& file) : settings_(window_settings(file)) {
+  Scene(const Arguments& a, const ModelFile& file) : settings_(file.windows()) {
     if (!a.given("data")) return;
     const std::vector<std::string> plates = a.list("plates");
     for (const std::string& path : list_recordings(a.text("data"))) {
@@ -165,7 +155,7 @@ class Study {
   void score_batch(const WindowSet& windows, const Condition& condition, std::size_t first, std::size_t n,
                    std::size_t count, std::vector<ContactMetrics>& metrics) const {
     const auto pixels = windows.image().pixels();
-    Tensor inputs(Shape{static_cast<Dim>(n), windows.timesteps(), kWindowTaxels});
+    Tensor inputs(Shape{static_cast<Dim>(n), windows.timesteps(), kTaxels});
     const std::size_t window_size = inputs.values().size() / n;
     std::vector<float> truths(n * pixels), picture(pixels);
     for (std::size_t i = 0; i < n; ++i) {

@@ -65,9 +65,9 @@ int stream(double started, const std::string& model_path, double seconds) {
   const auto model = load_model(model_path).model;
   const Dim timesteps = model->settings().timesteps, frames = 4096;
   const Tensor track = bench::random_windows(1, frames + timesteps);
-  Tensor window(Shape{1, timesteps, kWindowTaxels});
+  Tensor window(Shape{1, timesteps, kTaxels});
   const auto picture_at = [&](std::size_t i) {
-    const auto first = static_cast<Dim>(i) % frames * kWindowTaxels;
+    const auto first = static_cast<Dim>(i) % frames * kTaxels;
     std::copy_n(track.data() + first, window.size(), window.data());
     return model->infer(window);
   };

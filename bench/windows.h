@@ -11,7 +11,7 @@ namespace supertac::bench {
 
 /// [n,T,16], uniform in [0,1).
 inline Tensor random_windows(Dim n, Dim timesteps) {
-  Tensor windows(Shape{n, timesteps, kWindowTaxels});
+  Tensor windows(Shape{n, timesteps, kTaxels});
   const RandomStream random(1, 1);
   std::uint64_t i = 0;
   for (real& x : windows.values()) x = static_cast<real>(random.uniform(i++));

@@ -7,15 +7,14 @@
 #include <string>
 
 #include "data/hash.h"
-#include "data/recording.h"
 #include "io/random.h"
 
 namespace supertac {
 namespace {
 
-// Counters within one sample's stream; each term has its own.
-constexpr uint64_t kGain = 0, kTaxelGain = 16, kOffset = 32, kDropCount = 48, kDropChoice = 64,
-                   kNoiseKey = 80;
+// Counters within one sample's stream: each term has its own, as many as there are signals.
+enum Term : uint64_t { kGain, kTaxelGain, kOffset, kDropCount, kDropChoice, kNoiseKey };
+constexpr size_t kMostTaxels = 16 * 16;
 constexpr uint64_t kAugmentStream = 0x617567ULL << 40;  // keeps clear of the streams other code uses
 
 double factor(double magnitude, double uniform) {
@@ -33,14 +32,17 @@ float rough_normal(uint64_t bits) {
 }
 
 // Which taxels are dropped: the first `count` of a random order.
-std::array<bool, kTaxels> choose_dropped(int at_most, const RandomStream& random) {
-  std::array<bool, kTaxels> dropped{};
-  const int count = static_cast<int>(random.uniform(kDropCount) * (at_most + 1));
-  std::array<size_t, kTaxels> order;
-  for (size_t k = 0; k < kTaxels; ++k) order[k] = k;
+std::array<bool, kMostTaxels> choose_dropped(int at_most, const TaxelArray& array,
+                                             const RandomStream& random) {
+  std::array<bool, kMostTaxels> dropped{};
+  const uint64_t signals = array.signals();
+  const int count = static_cast<int>(random.uniform(kDropCount * signals) * (at_most + 1));
+  std::array<size_t, kMostTaxels> order;
+  const auto taxels = static_cast<size_t>(array.taxels());
+  for (size_t k = 0; k < taxels; ++k) order[k] = k;
   for (size_t i = 0; i < static_cast<size_t>(count); ++i) {
-    const auto left = static_cast<double>(kTaxels - i);
-    std::swap(order[i], order[i + static_cast<size_t>(random.uniform(kDropChoice + i) * left)]);
+    const auto left = static_cast<double>(taxels - i);
+    std::swap(order[i], order[i + static_cast<size_t>(random.uniform(kDropChoice * signals + i) * left)]);
     dropped[order[i]] = true;
   }
   return dropped;
@@ -48,7 +50,7 @@ std::array<bool, kTaxels> choose_dropped(int at_most, const RandomStream& random
 
 }  // namespace
 
-void check(const AugmentSettings& settings) {
+void check(const AugmentSettings& settings, const TaxelArray& array) {
   const auto check_one = [](const char* name, double value) {
     if (!(value >= 0) || !std::isfinite(value))
       throw std::invalid_argument(std::string("augmentation: ") + name +
@@ -58,34 +60,38 @@ void check(const AugmentSettings& settings) {
   check_one("taxel_gain", settings.taxel_gain);
   check_one("offset", settings.offset);
   check_one("noise", settings.noise);
-  if (settings.dropped < 0 || settings.dropped > kTaxels)
-    throw std::invalid_argument("augmentation: dropped must be 0 to 16 taxels, got " +
-                                std::to_string(settings.dropped));
+  if (settings.dropped < 0 || settings.dropped > array.taxels())
+    throw std::invalid_argument("augmentation: dropped must be 0 to " + std::to_string(array.taxels()) +
+                                " taxels, got " + std::to_string(settings.dropped));
 }
 
-void augment(const AugmentSettings& settings, uint64_t seed, uint64_t sample, std::span<float> window) {
-  if (window.size() % kTaxels != 0)
-    throw std::invalid_argument("augment: a window is [T][16], got " + std::to_string(window.size()) +
+void augment(const AugmentSettings& settings, uint64_t seed, uint64_t sample, std::span<float> window,
+             const TaxelArray& array) {
+  const size_t signals = array.signals();
+  if (signals > kMostSignals || window.size() % signals != 0)
+    throw std::invalid_argument("augment: a window of " + array.text() + " is [T][" +
+                                std::to_string(signals) + "], got " + std::to_string(window.size()) +
                                 " values");
   if (!settings.any()) return;
-  check(settings);
+  check(settings, array);
   const RandomStream random(seed, kAugmentStream ^ sample);
-  const std::array<bool, kTaxels> dropped = choose_dropped(settings.dropped, random);
+  const auto dropped = choose_dropped(settings.dropped, array, random);
   const double window_gain = factor(settings.gain, random.uniform(kGain));
-  std::array<float, kTaxels> gain, offset, noise, top;
-  for (size_t k = 0; k < kTaxels; ++k) {
-    gain[k] = static_cast<float>(window_gain * factor(settings.taxel_gain, random.uniform(kTaxelGain + k)));
-    offset[k] = static_cast<float>(settings.offset * (2 * random.uniform(kOffset + k) - 1));
-    noise[k] = static_cast<float>(settings.noise);
-    top[k] = dropped[k] ? 0.0F : 1.0F;  // a dropped taxel is one whose range is empty
+  std::array<float, kMostSignals> gain, offset, top;
+  for (size_t k = 0; k < signals; ++k) {
+    const double own = factor(settings.taxel_gain, random.uniform(kTaxelGain * signals + k));
+    gain[k] = static_cast<float>(window_gain * own);
+    offset[k] = static_cast<float>(settings.offset * (2 * random.uniform(kOffset * signals + k) - 1));
+    top[k] = dropped[k / static_cast<size_t>(array.channels)] ? 0.0F : 1.0F;  // dropped: an empty range
   }
-  const uint64_t key = (uint64_t{random.bits(kNoiseKey)} << 32) | random.bits(kNoiseKey + 1);
-  const bool noisy = settings.noise > 0;
-  for (size_t t = 0; t < window.size() / kTaxels; ++t) {
-    float* x = &window[t * kTaxels];
-    for (size_t k = 0; k < kTaxels; ++k) {
+  const uint64_t noise_key = kNoiseKey * signals;
+  const uint64_t key = (uint64_t{random.bits(noise_key)} << 32) | random.bits(noise_key + 1);
+  const auto noise = static_cast<float>(settings.noise);
+  for (size_t t = 0; t < window.size() / signals; ++t) {
+    float* x = &window[t * signals];
+    for (size_t k = 0; k < signals; ++k) {
       float value = gain[k] * x[k] + offset[k];
-      if (noisy) value += noise[k] * rough_normal(mix64(key + (t * kTaxels + k) * kGolden64));
+      if (noise > 0) value += noise * rough_normal(mix64(key + (t * signals + k) * kGolden64));
       x[k] = std::min(std::max(value, 0.0F), top[k]);
     }
   }

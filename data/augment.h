@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <span>
 
+#include "data/taxel_array.h"
+
 namespace supertac {
 
 /// Changes of a training window that imitate what differs between trials: contact, gain, rest level, dead
@@ -10,26 +12,28 @@ namespace supertac {
 /// pressed hard).
 struct AugmentSettings {
   double gain = 0;        ///< one factor per window, 1/(1+gain) .. 1+gain
-  double taxel_gain = 0;  ///< one factor per taxel, 1/(1+taxel_gain) .. 1+taxel_gain
-  double offset = 0;      ///< one shift per taxel, -offset .. offset
-  double noise = 0;       ///< standard deviation of noise that is independent per sample and taxel
+  double taxel_gain = 0;  ///< one factor per signal (taxel and channel), 1/(1+taxel_gain) .. 1+taxel_gain
+  double offset = 0;      ///< one shift per signal, -offset .. offset
+  double noise = 0;       ///< standard deviation of noise that is independent per sample and signal
   int dropped = 0;        ///< 0 to `dropped` taxels, each number equally likely, read 0 (rest) throughout
 
   bool any() const { return gain > 0 || taxel_gain > 0 || offset > 0 || noise > 0 || dropped > 0; }
 };
 
-/// @throws std::invalid_argument naming the setting that is negative, not finite, or above 16 (dropped).
-void check(const AugmentSettings& settings);
+/// @throws std::invalid_argument naming the setting that is negative, not finite, or above the array's taxels
+/// (dropped).
+void check(const AugmentSettings& settings, const TaxelArray& array = {});
 
-/// Changes a window [T][16] in place:
-///   x[t,k] <- clip(g g_k x[t,k] + o_k + noise n[t,k], 0, 1),  0 for a dropped taxel k
+/// Changes a window [T][signals] of an array in place:
+///   x[t,k] <- clip(g g_k x[t,k] + o_k + noise n[t,k], 0, 1),  0 for a dropped taxel's signals k
 /// A factor is 1 + m v for v >= 0 and 1/(1 - m v) below, v uniform in [-1,1): as often half as twice.
 /// n is the sum of four 16-bit uniforms with mean 0 and variance 1, |n| <= 3.5: its tails are lighter than
 /// normal ones, and it costs 2 ns per value where a normal one costs 20.
 /// A pure function of (settings, seed, sample, window): `sample` counts the windows drawn since training
 /// began, so a run resumed at a step sees the same changes. A term that is off leaves the others' numbers
 /// unchanged.
-/// @throws std::invalid_argument when the window is not a multiple of 16 values.
-void augment(const AugmentSettings& settings, uint64_t seed, uint64_t sample, std::span<float> window);
+/// @throws std::invalid_argument when the window is no whole number of frames; as check().
+void augment(const AugmentSettings& settings, uint64_t seed, uint64_t sample, std::span<float> window,
+             const TaxelArray& array = {});
 
 }  // namespace supertac

@@ -10,8 +10,6 @@
 namespace supertac {
 namespace {
 
-constexpr int kSide = 4;
-
 std::vector<uint32_t> fitted_on(std::span<const uint32_t> train) {
   if (train.empty()) throw std::invalid_argument("baseline: there is no window to fit to");
   return spread(train, kFitWindows);
@@ -23,11 +21,10 @@ void check_size(const char* what, size_t got, size_t expected) {
                                 " values, got " + std::to_string(got));
 }
 
-std::span<const float> last_frame(std::span<const float> window) {
-  if (window.empty() || window.size() % kTaxels != 0)
-    throw std::invalid_argument("baseline: a window is [T][16], got " + std::to_string(window.size()) +
-                                " values");
-  return window.last(kTaxels);
+void check_window(std::span<const float> window, const TaxelArray& array) {
+  if (window.empty() || window.size() % array.signals() != 0)
+    throw std::invalid_argument("baseline: a window is [T][" + std::to_string(array.signals()) + "], got " +
+                                std::to_string(window.size()) + " values");
 }
 
 double keys_kernel(double distance) {
@@ -41,7 +38,7 @@ double keys_kernel(double distance) {
 }  // namespace
 
 MeanImage::MeanImage(const WindowSet& windows, std::span<const uint32_t> train)
-    : image_(windows.image().pixels()) {
+    : array_(windows.array()), image_(windows.image().pixels()) {
   std::vector<double> sum(image_.size());
   std::vector<float> truth(image_.size());
   const std::vector<uint32_t> chosen = fitted_on(train);
@@ -54,7 +51,7 @@ MeanImage::MeanImage(const WindowSet& windows, std::span<const uint32_t> train)
 }
 
 void MeanImage::predict(std::span<const float> window, std::span<float> out) const {
-  last_frame(window);
+  check_window(window, array_);
   check_size("the image", out.size(), image_.size());
   std::copy(image_.begin(), image_.end(), out.begin());
 }
@@ -105,13 +102,15 @@ void Upsampling::operator()(std::span<const float> frame, std::span<float> out) 
 
 UpsampledFrame::UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows,
                                std::span<const uint32_t> train)
-    : kind_(kind), upsampling_(kind, kSide, kSide, windows.settings().scale) {
+    : kind_(kind),
+      array_(windows.array()),
+      upsampling_(kind, array_.rows, array_.columns, windows.settings().scale) {
   const size_t pixels = windows.image().pixels();
   std::vector<float> image(pixels), truth(pixels);
   double sx = 0, sy = 0, sxx = 0, sxy = 0;
   const std::vector<uint32_t> chosen = fitted_on(train);
   for (const uint32_t i : chosen) {
-    upsampling_(windows.last_frame(i), image);
+    upsampling_(mean_of_channels(array_, windows.last_frame(i)), image);
     windows.truth(i, truth);
     for (size_t p = 0; p < pixels; ++p) {
       sx += image[p];
@@ -131,7 +130,8 @@ std::string UpsampledFrame::name() const {
 }
 
 void UpsampledFrame::predict(std::span<const float> window, std::span<float> out) const {
-  upsampling_(last_frame(window), out);
+  check_window(window, array_);
+  upsampling_(mean_of_channels(array_, window.last(array_.signals())), out);
   for (float& v : out) v = static_cast<float>(slope_ * v + intercept_);
 }
 

@@ -16,8 +16,8 @@ class Baseline {
  public:
   virtual ~Baseline() = default;
   virtual std::string name() const = 0;
-  /// window [T][16], any T >= 1; out [height][width] of the truths. @throws std::invalid_argument on other
-  /// sizes.
+  /// window [T][signals], any T >= 1; out [height][width] of the truths. @throws std::invalid_argument on
+  /// other sizes.
   virtual void predict(std::span<const float> window, std::span<float> out) const = 0;
 };
 
@@ -30,6 +30,7 @@ class MeanImage : public Baseline {
   void predict(std::span<const float> window, std::span<float> out) const override;
 
  private:
+  TaxelArray array_;
   std::vector<float> image_;
 };
 
@@ -55,8 +56,9 @@ class Upsampling {
   Weights down_, across_;
 };
 
-/// Upsampling of the last frame, followed by a x + b: the line that fits the truth of the training windows
-/// best (least squares over all pixels). It turns voltage into height, as fairly as two numbers can.
+/// Upsampling of the last frame (the mean of each taxel's channels), followed by a x + b: the line that fits
+/// the truth of the training windows best (least squares over all pixels). It turns voltage into height, as
+/// fairly as two numbers can.
 class UpsampledFrame : public Baseline {
  public:
   /// @throws std::invalid_argument when train is empty.
@@ -68,6 +70,7 @@ class UpsampledFrame : public Baseline {
 
  private:
   Upsampling::Kind kind_;
+  TaxelArray array_;
   Upsampling upsampling_;
   double slope_ = 0, intercept_ = 0;
 };

@@ -92,6 +92,9 @@ void find_in(const std::vector<double>& x, int taxel, double start_s, const Cont
 
 std::vector<Contact> find_contacts(const Recording& recording, const ContactSettings& settings) {
   const size_t n = recording.frames();
+  if (recording.array != TaxelArray{})
+    throw std::invalid_argument("find_contacts: expected the rig's " + TaxelArray{}.text() + ", got " +
+                                recording.array.text());
   if (recording.volts.size() != n * kTaxels)
     throw std::invalid_argument("find_contacts: " + std::to_string(n) + " frames need " +
                                 std::to_string(n * kTaxels) + " voltages, got " +

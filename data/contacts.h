@@ -21,7 +21,8 @@ struct ContactSettings {
 };
 
 /// The contacts of all taxels, by taxel and time. Frames that hold no finite number are skipped; a taxel that
-/// never moves has none. @throws std::invalid_argument when the recording's arrays do not fit together.
+/// never moves has none. @throws std::invalid_argument when the recording is not of the rig's array or
+/// its arrays do not fit together.
 std::vector<Contact> find_contacts(const Recording& recording, const ContactSettings& settings = {});
 
 }  // namespace supertac

@@ -9,22 +9,27 @@
 namespace supertac {
 namespace {
 
-// Taxel gains of the rig: geometric means over fits to its recordings.
-constexpr std::array<double, kTaxels> kGain = {0.90, 0.18, 0.10, 0.15, 1.60, 0.60, 0.20, 0.60,
-                                               0.27, 0.55, 0.20, 0.65, 0.50, 0.40, 0.10, 0.80};
+// Taxel gains of the rig: geometric means over fits to its recordings. Of another array nothing is known.
+constexpr double kGain[kTaxels] = {0.90, 0.18, 0.10, 0.15, 1.60, 0.60, 0.20, 0.60,
+                                   0.27, 0.55, 0.20, 0.65, 0.50, 0.40, 0.10, 0.80};
+constexpr double kUnknownGain = 0.5;
 constexpr double kRestVolts = 2.442, kRestSpreadVolts = 0.003;
 constexpr double kFullScaleVolts = 3.3;
 constexpr double kLeastIndentationMm = -1.8;  // of 2.5 mm of texture the finger then still touches the top
 constexpr int kAdcCodes = 4096;
 
 // Points of the pad. Along the slide they are as fine as the tip of a ridge; across it little changes.
-constexpr int kAcross = 9, kAlong = 89;
 constexpr double kAcrossMm = 2, kAlongMm = 0.25;
-constexpr double across_mm(int i) { return kAcrossMm * (i - kAcross / 2); }
-constexpr double along_mm(int j) { return kAlongMm * (j - kAlong / 2); }
+constexpr double kBeyondAcrossMm = 3.5, kBeyondAlongMm = 6.5;  // the outermost taxels
+
+// An odd number of points, `step` apart, that reach `beyond` the outermost of `lines` lines of taxels.
+int points_of(int lines, double pitch, double beyond, double step) {
+  return 2 * static_cast<int>(std::ceil(((lines - 1) / 2.0 * pitch + beyond) / step)) + 1;
+}
 constexpr double kNoPadSigmaMm = 0.3;  // without a pad a taxel feels the points next to it
 
-// Grid of the plate's surface: wide enough for the whole pad of a finger whose centre is on the plate.
+// Grid of the plate's surface: wide enough for the rig's whole pad with its centre on the plate; beyond it
+// everything is as at its edge.
 constexpr double kCellMm = 0.25, kMarginMm = 12, kBesideMm = -3;
 constexpr int kColumns = static_cast<int>((Plate::kWidthMm + 2 * kMarginMm) / kCellMm) + 1;
 constexpr int kRows = static_cast<int>((Plate::kLengthMm + 2 * kMarginMm) / kCellMm) + 1;
@@ -63,15 +68,16 @@ double bell(double distance, double sigma) {
   return fourth * fourth;
 }
 
-// Weights of `points` places for the taxels of four columns or rows, [4][points]; each row sums to 1.
-template <class Place>
-std::vector<double> taxel_weights(int points, Place place, double sigma) {
+// Weights of `points` places, `step` apart, for the lines (columns or rows) of taxels, [lines][points]; each
+// line sums to 1.
+std::vector<double> taxel_weights(int lines, double pitch, int points, double step, double sigma) {
   std::vector<double> weights;
-  for (int line = 0; line < 4; ++line) {
-    const double at = -4.5 + 3.0 * line;
+  for (int line = 0; line < lines; ++line) {
+    const double at = (line - (lines - 1) / 2.0) * pitch;
+    const auto weight = [&](int i) { return bell(step * (i - points / 2) - at, sigma); };
     double sum = 0;
-    for (int i = 0; i < points; ++i) sum += bell(place(i) - at, sigma);
-    for (int i = 0; i < points; ++i) weights.push_back(bell(place(i) - at, sigma) / sum);
+    for (int i = 0; i < points; ++i) sum += weight(i);
+    for (int i = 0; i < points; ++i) weights.push_back(weight(i) / sum);
   }
   return weights;
 }
@@ -116,6 +122,9 @@ SimulatorSettings without_term(SimulatorSettings settings, const std::string& na
 
 FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& id)
     : settings_(settings), noise_seed_(id.seed), noise_stream_(pass_stream(plate, id) + 1) {
+  settings.array.check();
+  if (settings.array.channels != 1)
+    throw std::invalid_argument("simulator: expected an array of one channel, got " + settings.array.text());
   const RandomStream sensor(id.seed, 0), trial(id.seed, mounting_stream(plate, id.trial));
   const RandomStream pass(id.seed, pass_stream(plate, id));
   const double variation = settings.with_variation ? 1 : 0;
@@ -124,12 +133,14 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
   const double tilt = settings.with_tilt ? settings.tilt_mm_per_mm : 0;
   const double tilt_spread = settings.with_tilt ? variation * settings.tilt_spread : 0;
   const double slope_y = tilt + tilt_spread * trial.normal(1001), slope_x = tilt_spread * trial.normal(1002);
-  for (int k = 0; k < kTaxels; ++k) {
-    const auto c = static_cast<uint64_t>(k);
+  const bool rig = settings.array.rows == 4 && settings.array.columns == 4;
+  const auto taxels = static_cast<uint64_t>(settings.array.taxels());
+  const uint64_t drifts = 100 * (1 + taxels / 100);  // numbers that no gain has taken
+  for (uint64_t c = 0; c < taxels; ++c) {
     const double own = factor(spread * trial.normal(c)) * factor(spread / 3 * pass.normal(c));
-    gain_[c] = (settings.with_gains ? kGain[c] : 0.5) * own * common_gain;
-    rest_[c] = kRestVolts + variation * kRestSpreadVolts * sensor.normal(c);
-    drift_[c] = settings.with_drift ? settings.drift_volts_per_s * pass.normal(100 + c) : 0;
+    gain_.push_back((settings.with_gains && rig ? kGain[c] : kUnknownGain) * own * common_gain);
+    rest_.push_back(kRestVolts + variation * kRestSpreadVolts * sensor.normal(c));
+    drift_.push_back(settings.with_drift ? settings.drift_volts_per_s * pass.normal(drifts + c) : 0);
   }
   const double press = trial.normal(1003) + pass.normal(1003);
   const double indentation = settings.indentation_mm + variation * settings.indentation_spread_mm * press;
@@ -150,13 +161,16 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
 
 void FingerModel::shape_pad(double slope_x, double slope_y) {
   const double sigma = settings_.with_pad ? settings_.pad_sigma_mm : kNoPadSigmaMm;
-  across_weight_ = taxel_weights(kAcross, across_mm, sigma);
-  along_weight_ = taxel_weights(kAlong, along_mm, sigma);
+  const auto [rows, columns, pitch, channels] = settings_.array;
+  across_ = points_of(columns, pitch, kBeyondAcrossMm, kAcrossMm);
+  along_ = points_of(rows, pitch, kBeyondAlongMm, kAlongMm);
+  across_weight_ = taxel_weights(columns, pitch, across_, kAcrossMm, sigma);
+  along_weight_ = taxel_weights(rows, pitch, along_, kAlongMm, sigma);
   const double curvature = settings_.with_dome ? 1 / (2 * settings_.dome_radius_mm) : 0;
   double lowest = 0;
-  for (int i = 0; i < kAcross; ++i)
-    for (int j = 0; j < kAlong; ++j) {
-      const double x = across_mm(i), y = along_mm(j);
+  for (int i = 0; i < across_; ++i)
+    for (int j = 0; j < along_; ++j) {
+      const double x = kAcrossMm * (i - across_ / 2), y = kAlongMm * (j - along_ / 2);
       rise_.push_back(curvature * (x * x + y * y) + slope_x * x + slope_y * y);
       lowest = std::min(lowest, rise_.back());
     }
@@ -174,12 +188,13 @@ double FingerModel::surface(double x_mm, double y_mm) const {
   return near + fv * (far - near);
 }
 
-std::array<double, kTaxels> FingerModel::loads(const FingerPose& pose) const {
-  std::array<double, kAcross * kAlong> depth;
-  for (int i = 0; i < kAcross; ++i)
-    for (int j = 0; j < kAlong; ++j) {
-      const auto at = static_cast<size_t>(i * kAlong + j);
-      depth[at] = surface(pose.x_mm + across_mm(i), pose.y_mm + along_mm(j)) - rise_[at] - pose.z_mm;
+std::vector<double> FingerModel::loads(const FingerPose& pose) const {
+  std::vector<double> depth(rise_.size());
+  for (int i = 0; i < across_; ++i)
+    for (int j = 0; j < along_; ++j) {
+      const auto at = static_cast<size_t>(i * along_ + j);
+      const double x = kAcrossMm * (i - across_ / 2), y = kAlongMm * (j - along_ / 2);
+      depth[at] = surface(pose.x_mm + x, pose.y_mm + y) - rise_[at] - pose.z_mm;
     }
   // Balance of the mount. The excess force is convex and falls with the lift, so Newton's steps from lift 0
   // approach the root from below and never pass it; once the same points touch as before, the last step was
@@ -196,32 +211,36 @@ std::array<double, kTaxels> FingerModel::loads(const FingerPose& pose) const {
     last_slope = slope;
     lift += excess / slope;
   }
-  std::array<double, kTaxels> load{};
-  for (size_t i = 0; i < kAcross; ++i) {
-    std::array<double, 4> rows{};
-    for (size_t j = 0; j < kAlong; ++j) {
-      const double indented = depth[i * kAlong + j] - lift;
+  const auto across = static_cast<size_t>(across_), along = static_cast<size_t>(along_);
+  const auto columns = static_cast<size_t>(settings_.array.columns);
+  std::vector<double> load(gain_.size()), rows(static_cast<size_t>(settings_.array.rows));
+  for (size_t i = 0; i < across; ++i) {
+    std::fill(rows.begin(), rows.end(), 0.0);
+    for (size_t j = 0; j < along; ++j) {
+      const double indented = depth[i * along + j] - lift;
       if (indented <= 0) continue;
-      for (size_t row = 0; row < 4; ++row) rows[row] += along_weight_[row * kAlong + j] * indented;
+      for (size_t row = 0; row < rows.size(); ++row) rows[row] += along_weight_[row * along + j] * indented;
     }
-    for (size_t k = 0; k < kTaxels; ++k) load[k] += across_weight_[k % 4 * kAcross + i] * rows[k / 4];
+    for (size_t k = 0; k < load.size(); ++k)
+      load[k] += across_weight_[k % columns * across + i] * rows[k / columns];
   }
   return load;
 }
 
-std::array<double, kTaxels> FingerModel::volts(const FingerPose& pose, double time_s) const {
+std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) const {
   FingerPose shaken = pose;
   if (settings_.with_vibration)
     shaken.z_mm += settings_.vibration_mm * sine(settings_.vibration_hz * time_s + vibration_phase_);
-  const std::array<double, kTaxels> load = loads(shaken);
+  const std::vector<double> load = loads(shaken);
   const double emi =
       settings_.with_emi ? settings_.emi_volts * sine(settings_.emi_hz * time_s + emi_phase_) : 0;
   const RandomStream noise(noise_seed_, noise_stream_);
   const auto tick = static_cast<uint64_t>(std::llround(std::max(0.0, time_s) * 1e6));
-  std::array<double, kTaxels> volts{};
-  for (size_t k = 0; k < kTaxels; ++k) {
+  const uint64_t taxels = load.size();
+  std::vector<double> volts(taxels);
+  for (size_t k = 0; k < taxels; ++k) {
     volts[k] = rest_[k] + drift_[k] * time_s + emi - settings_.volts_per_load * gain_[k] * load[k];
-    if (settings_.with_noise) volts[k] += settings_.noise_volts * noise.normal(tick * kTaxels + k);
+    if (settings_.with_noise) volts[k] += settings_.noise_volts * noise.normal(tick * taxels + k);
   }
   return volts;
 }

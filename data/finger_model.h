@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -13,6 +12,7 @@ namespace supertac {
 /// What the simulated sensor does to the scene. Every term has a switch (with_...); the other numbers say how
 /// strong it is. Defaults resemble the rig's recordings; data/README.md shows what each term changes.
 struct SimulatorSettings {
+  TaxelArray array;  ///< of one channel; gains and pad are the rig's whatever the array
   double rate_hz = 300;
   double indentation_mm = 0.2;  ///< how far the slide's path lies below first contact with the flat plate
   double volts_per_load = 0.9;  ///< drop of a taxel of gain 1 per unit load; load = mean indentation (mm)
@@ -65,10 +65,11 @@ struct FingerIdentity {
   double speed_mm_s = 10;
 };
 
-/// The finger's 16 voltages over a plate: contact of an elastic pad on a yielding mount, then the sensor. A
-/// pure function of pose and time, used alike by the simulator and by the virtual rig.
+/// The finger's voltages over a plate, one per taxel: contact of an elastic pad on a yielding mount, then the
+/// sensor. A pure function of pose and time, used alike by the simulator and by the virtual rig.
 ///
-/// A point u of the pad, 2 mm apart across and 0.25 mm along the slide, is indented by
+/// A point u of the pad, 2 mm apart across and 0.25 mm along the slide and up to 3.5 and 6.5 mm beyond the
+/// outermost taxels, is indented by
 ///   d(u) = max(0, plate(x + u_x, y + u_y) - |u|^2 / (2 radius) - slope u - z - lift)   (mm, lowest point at
 ///   0),
 /// the mount yields until stiffness * lift = integral of d, and taxel k feels the mean of d around it:
@@ -77,13 +78,14 @@ struct FingerIdentity {
 /// Radius, sigma, stiffness, slope and the linear law were fitted to the rig's recordings (data/README.md).
 class FingerModel {
  public:
+  /// @throws std::invalid_argument for an array out of range or with more than one channel.
   FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& identity);
 
   /// Voltages before ADC, filter and saturation.
-  std::array<double, kTaxels> volts(const FingerPose& pose, double time_s) const;
+  std::vector<double> volts(const FingerPose& pose, double time_s) const;
 
   /// Load on every taxel (mm): what `volts` senses, without gains and disturbances.
-  std::array<double, kTaxels> loads(const FingerPose& pose) const;
+  std::vector<double> loads(const FingerPose& pose) const;
 
   /// This pass's path height during the slide: minus the indentation. Positive when the finger rides above
   /// the flat plate and touches only the texture.
@@ -102,15 +104,12 @@ class FingerModel {
 
   SimulatorSettings settings_;
   uint64_t noise_seed_ = 0, noise_stream_ = 0;
-  std::array<double, kTaxels> gain_{}, rest_{}, drift_{};
+  std::vector<double> gain_, rest_, drift_;  // per taxel
   double indentation_mm_ = 0, vibration_phase_ = 0, emi_phase_ = 0;
   std::vector<double> map_;                           // surface on a grid, x fastest
   std::vector<double> rise_;                          // of the pad's points above its lowest, [across][along]
-  std::vector<double> across_weight_, along_weight_;  // bell of each taxel column and row, [4][points]
+  int across_ = 0, along_ = 0;                        // the pad's points across and along the slide
+  std::vector<double> across_weight_, along_weight_;  // bell of each taxel column and row, [lines][points]
 };
-
-/// Position of taxel k from the finger's centre (mm): x = -4.5 + 3 (k % 4), y = -4.5 + 3 (k / 4).
-constexpr double taxel_x_mm(int k) { return -4.5 + 3.0 * (k % 4); }
-constexpr double taxel_y_mm(int k) { return -4.5 + 3.0 * (k / 4); }
 
 }  // namespace supertac

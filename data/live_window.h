@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -11,7 +10,8 @@
 namespace supertac {
 
 struct LiveWindowSettings {
-  int timesteps = 256;  ///< T, samples per window
+  int timesteps = 256;       ///< T, samples per window
+  size_t signals = kTaxels;  ///< in a frame
   double rate_hz = 300;
   Scaling scaling = {};
   double filter_s = 0;                ///< moving average to apply to the frames; 0 = none
@@ -44,35 +44,40 @@ class LiveWindow {
   /// @throws std::invalid_argument on settings out of range.
   explicit LiveWindow(const LiveWindowSettings& settings);
 
-  void push(double time_s, std::span<const float, kTaxels> volts);
+  /// @throws std::invalid_argument when the frame has another number of signals.
+  void push(double time_s, std::span<const float> volts);
 
-  /// The window that ends with the newest frame, [T][16], oldest sample first. False, and `out` untouched,
-  /// before a run without gap spans T samples. @throws std::invalid_argument when `out` has another size.
+  /// The window that ends with the newest frame, [T][signals], oldest sample first. False, and `out`
+  /// untouched, before a run without gap spans T samples. @throws std::invalid_argument when `out` has
+  /// another size.
   bool window(std::span<float> out) const { return window_until(end_s(), out); }
   /// The same for a window that ends at `end_s`, at most 0.1 s before the newest frame.
   bool window_until(double end_s, std::span<float> out) const;
 
-  /// The newest frame's sample as the network sees it without resampling: filtered and scaled, [4][4]; zeros
-  /// before the first frame.
-  std::array<float, kTaxels> newest() const;
+  /// The newest frame's sample as the network sees it without resampling: filtered and scaled; zeros before
+  /// the first frame.
+  std::vector<float> newest() const;
   const Counters& counters() const { return counters_; }
 
  private:
-  struct Frame {
-    double time_s;
-    std::array<float, kTaxels> volts;
-  };
   /// The frames of the last `span_s` seconds.
   class Recent {
    public:
-    explicit Recent(double span_s) : span_s_(span_s) {}
-    void push(const Frame& frame);
+    Recent(double span_s, size_t signals) : span_s_(span_s), signals_(signals) {}
+    void push(double time_s, std::span<const float> volts);
     void clear();
-    std::span<const Frame> frames() const { return std::span(frames_).subspan(first_); }
+    size_t count() const { return times_.size() - first_; }
+    double time_s(size_t i) const { return times_[first_ + i]; }
+    std::span<const float> volts(size_t i) const {
+      return std::span(volts_).subspan((first_ + i) * signals_, signals_);
+    }
+    double newest_s() const { return times_.back(); }
 
    private:
     double span_s_;
-    std::vector<Frame> frames_;
+    size_t signals_;
+    std::vector<double> times_;
+    std::vector<float> volts_;
     size_t first_ = 0;
   };
 
@@ -81,6 +86,8 @@ class LiveWindow {
 
   LiveWindowSettings settings_;
   Recent raw_, filtered_;
+  FrameMean mean_;
+  std::vector<float> average_;
   double run_begin_s_ = 0;
   Counters counters_;
 };

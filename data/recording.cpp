@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "io/file.h"
+#include "io/json.h"
 #include "io/numbers.h"
 #include "io/safetensors.h"
 #include "io/text.h"
@@ -16,7 +17,7 @@ namespace supertac {
 namespace {
 
 constexpr char kKind[] = "recording";
-constexpr const char* kFields[] = {"kind", "plate", "trial", "pass", "speed_mm_s", "source"};
+constexpr const char* kFields[] = {"kind", "plate", "trial", "pass", "speed_mm_s", "source", "array"};
 
 /// What is wrong with the recording, or nothing.
 std::optional<std::string> problem_of(const Recording& recording) {
@@ -25,7 +26,8 @@ std::optional<std::string> problem_of(const Recording& recording) {
     return std::string(name) + " has " + std::to_string(found) + " values, expected " +
            std::to_string(expected) + " for " + std::to_string(n) + " frames";
   };
-  if (recording.volts.size() != n * kTaxels) return sizes("volts", recording.volts.size(), n * kTaxels);
+  const size_t signals = recording.array.signals();
+  if (recording.volts.size() != n * signals) return sizes("volts", recording.volts.size(), n * signals);
   if (!recording.position_mm.empty() && recording.position_mm.size() != n * 2) {
     return sizes("position_mm", recording.position_mm.size(), n * 2);
   }
@@ -39,8 +41,9 @@ std::optional<std::string> problem_of(const Recording& recording) {
   const auto volt = std::find_if_not(recording.volts.begin(), recording.volts.end(), finite);
   if (volt != recording.volts.end()) {
     const auto index = volt - recording.volts.begin();
-    return "volts are not finite at frame " + std::to_string(index / kTaxels) + ", taxel " +
-           std::to_string(index % kTaxels);
+    return "volts are not finite at frame " + std::to_string(static_cast<size_t>(index) / signals) +
+           ", taxel " +
+           std::to_string(static_cast<int>(static_cast<size_t>(index) % signals) / recording.array.channels);
   }
   const auto infinite = [](float value) { return std::isinf(value); };
   if (std::any_of(recording.position_mm.begin(), recording.position_mm.end(), infinite)) {
@@ -67,6 +70,23 @@ int take_count(std::map<std::string, std::string>& metadata, const std::string& 
     throw FileError(path, field + " is " + in_quotes(text) + ", expected a number from 0 to 1000000");
   }
   return static_cast<int>(*value);
+}
+
+TaxelArray take_array(std::map<std::string, std::string>& metadata, const std::string& path) {
+  const auto node = metadata.extract("array");
+  if (node.empty()) return {};
+  try {
+    const auto json = parse_json_limited(node.mapped());
+    const TaxelArray array{json.at("rows").get<int>(), json.at("columns").get<int>(),
+                           json.at("pitch_mm").get<double>(), json.at("channels").get<int>()};
+    array.check();
+    return array;
+  } catch (const std::invalid_argument& error) {
+    throw FileError(path, error.what());
+  } catch (const std::exception&) {
+    throw FileError(path, "array is " + in_quotes(node.mapped()) +
+                              ", expected {\"rows\": 4, \"columns\": 4, \"pitch_mm\": 3, \"channels\": 1}");
+  }
 }
 
 void check_shape(const SafetensorsFile& file, const std::string& name, std::vector<uint64_t> expected) {
@@ -103,11 +123,13 @@ Recording read_recording(const std::string& path) {
   if (!speed_value) throw FileError(path, "speed_mm_s is " + in_quotes(speed) + ", expected a number");
   recording.speed_mm_s = *speed_value;
 
+  recording.array = take_array(recording.metadata, path);
+
   recording.time_s = file.f64("time_s");
   recording.volts = file.f32("volts");
   const uint64_t n = recording.frames();
   check_shape(file, "time_s", {n});
-  check_shape(file, "volts", {n, kTaxels});
+  check_shape(file, "volts", {n, recording.array.signals()});
   if (file.tensors().contains("position_mm")) {
     recording.position_mm = file.f32("position_mm");
     check_shape(file, "position_mm", {n, 2});
@@ -119,6 +141,8 @@ Recording read_recording(const std::string& path) {
 
 void write_recording(const std::string& path, const Recording& recording) {
   if (const auto problem = problem_of(recording)) throw std::invalid_argument("write_recording: " + *problem);
+  const TaxelArray& array = recording.array;
+  array.check();
   auto metadata = recording.metadata;
   for (const char* field : kFields) {
     if (metadata.contains(field)) {
@@ -132,10 +156,18 @@ void write_recording(const std::string& path, const Recording& recording) {
   metadata["pass"] = std::to_string(recording.pass);
   metadata["speed_mm_s"] = format(recording.speed_mm_s);
   metadata["source"] = recording.source;
+  if (array != TaxelArray{}) {  // files of the rig's array have gone without from the start
+    metadata["array"] = nlohmann::ordered_json{
+        {"rows", array.rows},
+        {"columns", array.columns},
+        {"pitch_mm", array.pitch_mm},
+        {"channels",
+         array.channels}}.dump();
+  }
   const uint64_t n = recording.frames();
   std::vector<TensorToWrite> tensors = {
       {"time_s", "F64", {n}, std::as_bytes(std::span(recording.time_s))},
-      {"volts", "F32", {n, kTaxels}, std::as_bytes(std::span(recording.volts))}};
+      {"volts", "F32", {n, array.signals()}, std::as_bytes(std::span(recording.volts))}};
   if (!recording.position_mm.empty()) {
     tensors.push_back({"position_mm", "F32", {n, 2}, std::as_bytes(std::span(recording.position_mm))});
   }

@@ -1,7 +1,6 @@
 #include "data/resample.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -17,8 +16,9 @@ bool finite(std::span<const float> volts) {
   return std::all_of(volts.begin(), volts.end(), [](float v) { return std::isfinite(v); });
 }
 
-std::span<const float, kTaxels> volts_of(const Recording& recording, size_t frame) {
-  return std::span(recording.volts).subspan(frame * kTaxels).first<kTaxels>();
+std::span<const float> volts_of(const Recording& recording, size_t frame) {
+  const size_t signals = recording.array.signals();
+  return std::span(recording.volts).subspan(frame * signals, signals);
 }
 
 void check(const Recording& recording, const ResampleSettings& settings) {
@@ -26,11 +26,11 @@ void check(const Recording& recording, const ResampleSettings& settings) {
     throw std::invalid_argument("resample: rate_hz, max_gap_s and span_volts must be positive, got " +
                                 std::to_string(settings.rate_hz) + ", " + std::to_string(settings.max_gap_s) +
                                 " and " + std::to_string(settings.scaling.span_volts));
-  const size_t n = recording.time_s.size();
+  const size_t n = recording.time_s.size(), values = n * recording.array.signals();
   const size_t positions = recording.position_mm.size();
-  if (recording.volts.size() != n * kTaxels || (positions != 0 && positions != 2 * n))
+  if (recording.volts.size() != values || (positions != 0 && positions != 2 * n))
     throw std::runtime_error("recording: " + std::to_string(n) + " time stamps need " +
-                             std::to_string(n * kTaxels) + " voltages and 0 or " + std::to_string(2 * n) +
+                             std::to_string(values) + " voltages and 0 or " + std::to_string(2 * n) +
                              " coordinates, got " + std::to_string(recording.volts.size()) + " and " +
                              std::to_string(positions) + "; record or import the pass again");
   for (size_t i = 0; i < n; ++i)
@@ -45,9 +45,14 @@ void check(const Recording& recording, const ResampleSettings& settings) {
 class Segment {
  public:
   Segment(const Recording& recording, const ResampleSettings& settings, std::span<const size_t> usable)
-      : recording_(recording), settings_(settings), usable_(usable), start_(time(0)) {}
+      : recording_(recording),
+        settings_(settings),
+        usable_(usable),
+        mean_(recording.array.signals()),
+        start_(time(0)) {}
 
   void append_to(Track& track) {
+    const size_t signals = recording_.array.signals();
     const size_t frames = cell(usable_.size() - 1) + 1;
     size_t next = 0, before = 0;
     for (size_t j = 0; j < frames; ++j) {
@@ -58,8 +63,8 @@ class Segment {
       } else {
         ++track.held;
         const size_t previous =
-            track.samples.size() - kTaxels;  // cell 0 holds the first sample: there is one
-        for (size_t k = 0; k < kTaxels; ++k) track.samples.push_back(track.samples[previous + k]);
+            track.samples.size() - signals;  // cell 0 holds the first sample: there is one
+        for (size_t k = 0; k < signals; ++k) track.samples.push_back(track.samples[previous + k]);
       }
       append_position(track, start_ + static_cast<double>(j) / settings_.rate_hz, before);
       track.run.push_back(static_cast<uint32_t>(j + 1));
@@ -74,11 +79,14 @@ class Segment {
     return static_cast<size_t>(std::max(0.0, std::ceil(periods - 0.5 - kCellSlack)));
   }
 
-  void append_mean(Track& track, size_t first, size_t end) const {
-    FrameMean mean;
-    for (size_t i = first; i < end; ++i) mean.add(volts_of(recording_, usable_[i]));
-    const auto scaled = settings_.scaling(mean.volts());
-    track.samples.insert(track.samples.end(), scaled.begin(), scaled.end());
+  void append_mean(Track& track, size_t first, size_t end) {
+    mean_.clear();
+    for (size_t i = first; i < end; ++i) mean_.add(volts_of(recording_, usable_[i]));
+    const size_t signals = recording_.array.signals();
+    track.samples.resize(track.samples.size() + signals);
+    const std::span<float> sample = std::span(track.samples).last(signals);
+    mean_.volts(sample);
+    settings_.scaling(sample);
   }
 
   // `before` moves along with the time: the last recorded frame at or before it.
@@ -101,6 +109,7 @@ class Segment {
   const Recording& recording_;
   const ResampleSettings& settings_;
   std::span<const size_t> usable_;
+  FrameMean mean_;
   double start_;
 };
 
@@ -110,21 +119,23 @@ float Scaling::operator()(float volts) const {
   return static_cast<float>(std::clamp((rest_volts - volts) / span_volts, 0.0, 1.0));
 }
 
-std::array<float, kTaxels> Scaling::operator()(const std::array<float, kTaxels>& volts) const {
-  std::array<float, kTaxels> scaled;
-  std::transform(volts.begin(), volts.end(), scaled.begin(), *this);
-  return scaled;
+void Scaling::operator()(std::span<float> volts) const {
+  for (float& v : volts) v = (*this)(v);
 }
 
-void FrameMean::add(std::span<const float, kTaxels> volts) {
-  for (size_t k = 0; k < kTaxels; ++k) sum_[k] += volts[k];
+void FrameMean::clear() {
+  std::fill(sum_.begin(), sum_.end(), 0.0);
+  count_ = 0;
+}
+
+void FrameMean::add(std::span<const float> volts) {
+  for (size_t k = 0; k < sum_.size(); ++k) sum_[k] += volts[k];
   ++count_;
 }
 
-std::array<float, kTaxels> FrameMean::volts() const {
-  std::array<float, kTaxels> mean;
-  for (size_t k = 0; k < kTaxels; ++k) mean[k] = static_cast<float>(sum_[k] / static_cast<double>(count_));
-  return mean;
+void FrameMean::volts(std::span<float> mean) const {
+  for (size_t k = 0; k < sum_.size(); ++k)
+    mean[k] = static_cast<float>(sum_[k] / static_cast<double>(count_));
 }
 
 Track resample(const Recording& recording, const ResampleSettings& settings) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -14,20 +13,24 @@ struct Scaling {
   double rest_volts = 2.45, span_volts = 0.36;
   bool levelled = false;  ///< whole windows are then brought to their own rest and gain: level()
   float operator()(float volts) const;
-  std::array<float, kTaxels> operator()(const std::array<float, kTaxels>& volts) const;
+  /// Scales every value in place.
+  void operator()(std::span<float> volts) const;
 };
 
 /// Mean of some frames, summed in double precision in the order they are added: what resample() and
 /// LiveWindow make a sample of, so that both give the same bits.
 class FrameMean {
  public:
-  void add(std::span<const float, kTaxels> volts);
+  /// Of frames of so many signals.
+  explicit FrameMean(size_t signals) : sum_(signals) {}
+  void clear();
+  void add(std::span<const float> volts);
   size_t count() const { return count_; }
   /// Of at least one frame.
-  std::array<float, kTaxels> volts() const;
+  void volts(std::span<float> mean) const;
 
  private:
-  std::array<double, kTaxels> sum_{};
+  std::vector<double> sum_;
   size_t count_ = 0;
 };
 
@@ -37,7 +40,7 @@ constexpr double kCellSlack = 1e-6;
 
 /// A recording on an even time grid.
 struct Track {
-  std::vector<float> samples;      ///< [frames][16], scaled
+  std::vector<float> samples;      ///< [frames][signals], scaled
   std::vector<float> position_mm;  ///< [frames][2] (x, y), NaN where unknown
   std::vector<uint32_t>
       run;             ///< [frames]: frames since the pass began or since the last gap, itself included

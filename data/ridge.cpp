@@ -12,21 +12,25 @@ namespace {
 
 using Matrix = Eigen::MatrixXd;
 
-constexpr size_t kSteps = 16;
+constexpr size_t kSteps = 16, kMostFeatures = 2048;
 constexpr size_t kHeldOut = 5;  // every so many passes
 constexpr double kPenalties[] = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1, 10};
 
-size_t features_of(size_t timesteps) { return std::min(timesteps, kSteps) * kTaxels + 1; }
+size_t steps_of(size_t timesteps, size_t signals) {
+  return std::min({timesteps, kSteps, std::max<size_t>(1, kMostFeatures / signals)});
+}
+
+size_t features_of(size_t timesteps, size_t signals) { return steps_of(timesteps, signals) * signals + 1; }
 
 // Means over equal stretches of time, then 1.
-void features(std::span<const float> window, std::span<double> out) {
-  const size_t frames = window.size() / kTaxels, steps = std::min(frames, kSteps);
+void features(std::span<const float> window, size_t signals, std::span<double> out) {
+  const size_t frames = window.size() / signals, steps = steps_of(frames, signals);
   std::fill(out.begin(), out.end(), 0.0);
   for (size_t s = 0; s < steps; ++s) {
     const size_t begin = s * frames / steps, end = (s + 1) * frames / steps;
     for (size_t t = begin; t < end; ++t) {
-      for (size_t k = 0; k < kTaxels; ++k)
-        out[s * kTaxels + k] += window[t * kTaxels + k] / static_cast<double>(end - begin);
+      for (size_t k = 0; k < signals; ++k)
+        out[s * signals + k] += window[t * signals + k] / static_cast<double>(end - begin);
     }
   }
   out.back() = 1;
@@ -42,7 +46,8 @@ struct Moments {
         xy(Matrix::Zero(static_cast<Eigen::Index>(features), static_cast<Eigen::Index>(pixels))) {}
 
   Moments(const WindowSet& windows, std::span<const uint32_t> indices)
-      : Moments(features_of(static_cast<size_t>(windows.timesteps())), windows.image().pixels()) {
+      : Moments(features_of(static_cast<size_t>(windows.timesteps()), windows.array().signals()),
+                windows.image().pixels()) {
     constexpr size_t kBlock = 512;
     std::vector<float> truth(static_cast<size_t>(xy.cols()));
     for (size_t first = 0; first < indices.size(); first += kBlock) {
@@ -51,7 +56,8 @@ struct Moments {
       Matrix y(xy.cols(), x.cols());
       for (Eigen::Index n = 0; n < x.cols(); ++n) {
         const uint32_t i = part[static_cast<size_t>(n)];
-        features(windows.window(i), {x.col(n).data(), static_cast<size_t>(x.rows())});
+        features(windows.window(i), windows.array().signals(),
+                 {x.col(n).data(), static_cast<size_t>(x.rows())});
         windows.truth(i, truth);
         y.col(n) = Eigen::Map<const Eigen::VectorXf>(truth.data(), y.rows()).cast<double>();
       }
@@ -101,7 +107,9 @@ std::vector<bool> held_out(const WindowSet& windows, std::span<const uint32_t> i
 }  // namespace
 
 Ridge::Ridge(const WindowSet& windows, std::span<const uint32_t> train)
-    : timesteps_(static_cast<size_t>(windows.timesteps())), pixels_(windows.image().pixels()) {
+    : timesteps_(static_cast<size_t>(windows.timesteps())),
+      signals_(windows.array().signals()),
+      pixels_(windows.image().pixels()) {
   if (train.empty()) throw std::invalid_argument("ridge: there is no window to fit to");
   const std::vector<uint32_t> chosen = spread(train, kFitWindows);
   const std::vector<bool> held = held_out(windows, chosen);
@@ -124,14 +132,14 @@ Ridge::Ridge(const WindowSet& windows, std::span<const uint32_t> train)
 }
 
 void Ridge::predict(std::span<const float> window, std::span<float> out) const {
-  if (window.size() != timesteps_ * kTaxels || out.size() != pixels_) {
-    throw std::invalid_argument("ridge: expects a window [" + std::to_string(timesteps_) + "][16] and " +
-                                std::to_string(pixels_) + " pixels, got " + std::to_string(window.size()) +
-                                " and " + std::to_string(out.size()) + " values");
+  if (window.size() != timesteps_ * signals_ || out.size() != pixels_) {
+    throw std::invalid_argument("ridge: expects a window [" + std::to_string(timesteps_) + "][" +
+                                std::to_string(signals_) + "] and " + std::to_string(pixels_) +
+                                " pixels, got " + std::to_string(window.size()) + " and " +
+                                std::to_string(out.size()) + " values");
   }
-  std::array<double, kSteps * kTaxels + 1> x;
-  const std::span<double> used(x.data(), features_of(timesteps_));
-  features(window, used);
+  std::vector<double> used(features_of(timesteps_, signals_));
+  features(window, signals_, used);
   std::fill(out.begin(), out.end(), 0.0f);
   for (size_t f = 0; f < used.size(); ++f) {
     const float* row = weights_.data() + f * pixels_;

@@ -5,8 +5,9 @@
 namespace supertac {
 
 /// Ridge regression from the window: the best picture that is a linear function of the signals.
-///   features  the window's 16 taxels averaged over 16 equal stretches of time (over T < 16 frames: each
-///             frame), and a constant: f = 257
+///   features  the window's signals averaged over 16 equal stretches of time (over T < 16 frames: each
+///             frame; fewer for more than 128 signals, so that there are at most 2048), and a constant:
+///             f = 257 for 4x4
 ///   weights   W = (X'X + penalty D)^-1 X'Y in double precision by Cholesky; X [n,f], Y [n,pixels]; D is 1
 ///   for
 ///             each feature and 0 for the constant (Hoerl & Kennard 1970)
@@ -24,7 +25,7 @@ class Ridge : public Baseline {
   double penalty() const { return penalty_; }
 
  private:
-  size_t timesteps_, pixels_;
+  size_t timesteps_, signals_, pixels_;
   double penalty_ = 0;
   std::vector<float> weights_;  // [f][pixels], the constant last
 };

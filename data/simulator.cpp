@@ -51,24 +51,25 @@ void check(const PassSettings& pass, const SimulatorSettings& settings) {
 class MovingAverage {
  public:
   explicit MovingAverage(int length) : length_(static_cast<size_t>(std::max(1, length))) {}
-  std::array<double, kTaxels> operator()(const std::array<double, kTaxels>& sample) {
+  std::vector<double> operator()(const std::vector<double>& sample) {
     recent_.push_back(sample);
     if (recent_.size() > length_) recent_.pop_front();
-    std::array<double, kTaxels> mean{};
+    std::vector<double> mean(sample.size());
     for (const auto& s : recent_)
-      for (size_t k = 0; k < kTaxels; ++k) mean[k] += s[k];
+      for (size_t k = 0; k < s.size(); ++k) mean[k] += s[k];
     for (double& m : mean) m /= static_cast<double>(recent_.size());
     return mean;
   }
 
  private:
   size_t length_;
-  std::deque<std::array<double, kTaxels>> recent_;
+  std::deque<std::vector<double>> recent_;
 };
 
 Recording describe(const Plate& plate, const PassSettings& pass, const SimulatorSettings& settings,
                    uint64_t seed) {
   Recording recording;
+  recording.array = settings.array;
   recording.plate = plate.name();
   recording.trial = pass.trial;
   recording.pass = pass.pass;
@@ -99,7 +100,7 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
   for (size_t i = 0; i < frames; ++i) {
     const double stamp = static_cast<double>(i) / settings.rate_hz;
     const double taken = stamp + (settings.with_jitter ? settings.jitter_s * timing.normal(2 * i) : 0.0);
-    std::array<double, kTaxels> volts = finger.volts(pose_at(taken, pass, finger.slide_z_mm()), taken);
+    std::vector<double> volts = finger.volts(pose_at(taken, pass, finger.slide_z_mm()), taken);
     if (settings.with_adc)
       for (double& v : volts) v = FingerModel::volts_of_adc(FingerModel::adc(v));
     volts = filter(volts);

@@ -24,7 +24,7 @@ constexpr double pass_x_mm(int pass) { return 0.5 + 5.0 * (pass - 1); }
 /// Defaults over 8 passes, 2 trials, 5 and 10 mm/s and default_plates() make 465,600 frames. The position is
 /// where the finger is; the moving average makes the signals trail it by 49 ms, as on the rig. Deterministic
 /// in (plate, pass, settings, seed).
-/// @throws std::invalid_argument on speeds, rates or paths that make no pass.
+/// @throws std::invalid_argument on speeds, rates or paths that make no pass, and as FingerModel.
 Recording simulate_pass(const Plate& plate, const PassSettings& pass, const SimulatorSettings& settings = {},
                         uint64_t seed = 1);
 

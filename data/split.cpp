@@ -102,15 +102,15 @@ Split split_by_pass(const WindowSet& windows, const std::vector<Side>& sides) {
 // frames, modulo 2^64, as a difference of prefix sums.
 class PassHashes {
  public:
-  PassHashes(std::span<const float> samples, size_t timesteps) : timesteps_(timesteps) {
-    const size_t frames = samples.size() / kTaxels;
+  PassHashes(std::span<const float> samples, size_t signals, size_t timesteps) : timesteps_(timesteps) {
+    const size_t frames = samples.size() / signals;
     for (size_t t = 0; t < timesteps; ++t) power_ *= kBase;
     prefix_.push_back(0);
     uint64_t before = 0;
     for (size_t f = 0; f < frames; ++f) {
       uint64_t hash = 0;
-      for (size_t k = 0; k < kTaxels; ++k)
-        hash = mix64(hash * kGolden64 + std::bit_cast<uint32_t>(samples[f * kTaxels + k]) + 1);
+      for (size_t k = 0; k < signals; ++k)
+        hash = mix64(hash * kGolden64 + std::bit_cast<uint32_t>(samples[f * signals + k]) + 1);
       prefix_.push_back(prefix_.back() * kBase + hash);
       equal_.push_back(f > 0 && hash == before ? equal_.back() + 1 : 1);
       before = hash;
@@ -132,7 +132,8 @@ std::vector<uint64_t> hash_windows(const WindowSet& windows, std::vector<bool>& 
   changes.resize(windows.size());
   for (size_t p = 0; p < windows.passes().size(); ++p) {
     const WindowSet::Pass& pass = windows.passes()[p];
-    const PassHashes of_pass(windows.track(p), static_cast<size_t>(windows.timesteps()));
+    const PassHashes of_pass(windows.track(p), windows.array().signals(),
+                             static_cast<size_t>(windows.timesteps()));
     for (size_t i = pass.first_window; i < pass.first_window + pass.windows; ++i) {
       hashes[i] = of_pass.window(windows.frame_of(i));
       changes[i] = of_pass.changes(windows.frame_of(i));

@@ -43,7 +43,7 @@ struct Leakage {
 };
 
 /// Compares all test with all training windows: overlap by their place, duplicates by a 64-bit hash of all
-/// T*16 values (so that a pass filed twice under two names is found). Windows that never change are no
+/// T * signals values (so that a pass filed twice under two names is found). Windows that never change are no
 /// duplicates: at rest every pass looks the same. Takes 16 bytes per frame while it runs.
 Leakage find_leakage(const WindowSet& windows, const Split& split);
 

@@ -32,6 +32,9 @@ struct TaxelArray {
   int channels = 1;
 
   int taxels() const { return rows * columns; }
+  /// Place of taxel k from the array's centre.
+  double x_mm(int k) const { return (k % columns - (columns - 1) / 2.0) * pitch_mm; }
+  double y_mm(int k) const { return (k / columns - (rows - 1) / 2.0) * pitch_mm; }
   /// Numbers in a frame.
   size_t signals() const { return static_cast<size_t>(taxels() * channels); }
   /// The square around each taxel, cut into scale x scale pixels.

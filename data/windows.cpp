@@ -100,7 +100,10 @@ void WindowSet::add_directory(const std::string& dir, const std::vector<std::str
     throw std::invalid_argument("windows: plate '" + *missing.begin() + "' has no recording in " + dir);
 }
 
-WindowSet::WindowSet(const WindowSettings& settings) : settings_(settings) { check(settings); }
+WindowSet::WindowSet(const WindowSettings& settings) : settings_(settings) {
+  check(settings);
+  array().check();
+}
 
 size_t WindowSet::plate_index(const std::string& name, const std::string& folder) {
   for (size_t i = 0; i < plates_.size(); ++i)
@@ -130,6 +133,10 @@ bool WindowSet::accept(const Track& track, size_t frame, bool reliable) {
 }
 
 void WindowSet::add(const Recording& recording, const std::string& folder, bool aside) {
+  if (!settings_.array) settings_.array = recording.array;
+  if (recording.array != array())
+    throw std::runtime_error("was recorded with " + recording.array.text() + ", expected " + array().text() +
+                             "; give recordings of the array the model is for, and no others");
   const size_t plate = plate_index(recording.plate, folder);
   Track track = resample(
       recording,
@@ -166,17 +173,18 @@ void WindowSet::add(const Recording& recording, const std::string& folder, bool 
 std::span<const float> WindowSet::window(size_t i) const {
   const auto [pass, last] = index_[i];
   const auto frames = static_cast<size_t>(settings_.timesteps);
-  return std::span(tracks_[pass].samples).subspan((last + 1 - frames) * kTaxels, frames * kTaxels);
+  const size_t signals = settings_.array->signals();  // there is a window, so there was a recording
+  return std::span(tracks_[pass].samples).subspan((last + 1 - frames) * signals, frames * signals);
 }
 
 void WindowSet::window(size_t i, std::span<float> out) const {
   const std::span<const float> source = window(i);
   check_size("a window", out.size(), source.size());
   std::memcpy(out.data(), source.data(), source.size_bytes());
-  if (settings_.scaling.levelled) level(out, kTaxels);
+  if (settings_.scaling.levelled) level(out, array().signals());
 }
 
-std::span<const float> WindowSet::last_frame(size_t i) const { return window(i).last(kTaxels); }
+std::span<const float> WindowSet::last_frame(size_t i) const { return window(i).last(array().signals()); }
 
 WindowSet::Position WindowSet::position(size_t i) const {
   const auto [pass, last] = index_[i];
@@ -218,6 +226,7 @@ std::string WindowSet::fingerprint() const {
   Hasher hash;
   hash.add(static_cast<uint64_t>(settings_.timesteps));
   hash.add(static_cast<uint64_t>(settings_.scale));
+  if (array() != TaxelArray{}) hash.add(array().text());
   for (const Plate& plate : plates_) {
     if (!Plate::is_file(plate.name())) continue;  // elsewhere the name is the plate
     for (double y = 0; y <= Plate::kLengthMm; y += HeightMap::kCellMm)

@@ -14,11 +14,12 @@
 namespace supertac {
 
 struct WindowSettings {
-  int timesteps = 256;   ///< T, frames per window
-  int scale = 4;         ///< 2, 4 or 8: truth images of 8, 16 or 32 pixels a side
-  double rate_hz = 300;  ///< the model's rate
-  Scaling scaling = {};  ///< volts to [0,1]
-  double min_y_mm = 28;  ///< windows whose last frame lies outside min_y..max_y are left out
+  int timesteps = 256;                   ///< T, frames per window
+  int scale = 4;                         ///< 2, 4 or 8: truths that many times finer than the array
+  double rate_hz = 300;                  ///< the model's rate
+  Scaling scaling = {};                  ///< volts to [0,1]
+  std::optional<TaxelArray> array = {};  ///< that every recording must have; nothing: that of the first
+  double min_y_mm = 28;                  ///< windows whose last frame lies outside min_y..max_y are left out
   double max_y_mm = 80;
   int stride = 1;           ///< every stride-th frame of a pass ends a window
   double max_gap_s = 0.05;  ///< longer silence in a recording is a gap no window crosses
@@ -41,7 +42,8 @@ struct WindowCounts {
 
 /// The windows of a set of recordings. Nothing is copied per window: a recording is resampled once onto
 /// rate_hz and kept as scaled floats, a window is the index (pass, last frame), and none crosses the edge of
-/// a pass or a gap. Memory: 72 bytes per frame and 8 per window. Reading is const and safe from many threads.
+/// a pass or a gap. Memory: 4 bytes per signal of a
+/// frame, 8 per frame and 8 per window. Reading is const and safe from many threads.
 class WindowSet {
  public:
   struct Pass {
@@ -70,7 +72,7 @@ class WindowSet {
   /// @throws std::invalid_argument on settings out of range.
   explicit WindowSet(const WindowSettings& settings);
   /// Appends the windows of one recording. @param folder where the recording lies, for a plate that is an
-  /// STL file beside it. @throws as plate_in_folder() and resample().
+  /// STL file beside it. @throws as plate_in_folder() and resample(), std::runtime_error for another array.
   void add(const Recording& recording, const std::string& folder = ".", bool aside = false);
   /// Appends those of all recordings in a directory, of these plates (empty: all). @throws as load, but for
   /// the missing windows.
@@ -78,21 +80,23 @@ class WindowSet {
 
   size_t size() const { return index_.size(); }
   int timesteps() const { return settings_.timesteps; }
+  /// Of the recordings; the rig's while there is none.
+  TaxelArray array() const { return settings_.array.value_or(TaxelArray{}); }
   /// The size of a truth.
-  ImageGrid image() const { return TaxelArray{}.picture(settings_.scale); }
+  ImageGrid image() const { return array().picture(settings_.scale); }
   const WindowSettings& settings() const { return settings_; }
   const WindowCounts& counts() const { return counts_; }
   const std::vector<Pass>& passes() const { return passes_; }
 
   // i < size() throughout, unchecked: these run for every sample of training.
   // @throws std::invalid_argument when `out` has another size.
-  /// Window i as a network takes it, [T][16], oldest frame first; levelled when the scaling says so.
+  /// Window i as a network takes it, [T][signals], oldest frame first; levelled when the scaling says so.
   void window(size_t i, std::span<float> out) const;
   /// The window without copying it, not levelled.
   std::span<const float> window(size_t i) const;
   /// Truth of its last frame, [height][width] of image(), as truth_image.
   void truth(size_t i, std::span<float> out) const;
-  /// The last frame, [4][4].
+  /// The last frame, [signals].
   std::span<const float> last_frame(size_t i) const;
   Position position(size_t i) const;
   /// True when the truth has a pixel above 0.
@@ -100,7 +104,7 @@ class WindowSet {
   size_t pass_of(size_t i) const { return index_[i].pass; }
   /// Number of the last frame within its pass.
   size_t frame_of(size_t i) const { return index_[i].last; }
-  /// The frames of a whole pass, [frames][16]; empty when no window ends in it.
+  /// The frames of a whole pass, [frames][signals]; empty when no window ends in it.
   std::span<const float> track(size_t pass) const { return tracks_[pass].samples; }
 
   /// The filter_s of all passes with windows, or nothing when they differ.

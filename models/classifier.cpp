@@ -13,11 +13,15 @@ constexpr ConvLayerOptions kSameSize{.kernel = 3, .stride = 1, .padding = 1};
 constexpr Dim kFirst = 16, kSecond = 32, kHidden = 64;
 
 Dim features(const ClassifierSettings& s) {
-  if (s.size < 4 || s.size > 256 || s.classes < 2 || s.classes > 1024) {
-    throw std::invalid_argument("TextureClassifier: expects size 4 to 256 and 2 to 1024 classes, got " +
-                                std::to_string(s.size) + " and " + std::to_string(s.classes));
+  const auto side = [](Dim pixels) { return pixels >= 4 && pixels <= 2048; };
+  if (!side(s.height) || !side(s.width) || s.channels < 1 || s.classes < 2 || s.classes > 1024) {
+    throw std::invalid_argument(
+        "TextureClassifier: expects sides of 4 to 2048, a channel or more and 2 to 1024 "
+        "classes, got " +
+        std::to_string(s.height) + "x" + std::to_string(s.width) + ", " + std::to_string(s.channels) +
+        " and " + std::to_string(s.classes));
   }
-  return kSecond * (s.size / 4) * (s.size / 4);
+  return kSecond * (s.height / 4) * (s.width / 4);
 }
 
 Dim checked_features(Dim features, Dim classes) {
@@ -31,7 +35,7 @@ Dim checked_features(Dim features, Dim classes) {
 }  // namespace
 
 TextureClassifier::TextureClassifier(const ClassifierSettings& s, Rng& rng)
-    : first_(1, kFirst, kSameSize, rng),
+    : first_(s.channels, kFirst, kSameSize, rng),
       second_(kFirst, kSecond, kSameSize, rng),
       out_(features(s), s.classes, rng) {
   add("conv.0", first_);

@@ -8,12 +8,13 @@
 namespace supertac {
 
 struct ClassifierSettings {
-  Dim size = 16;    ///< pixels a side, at least 4
-  Dim classes = 6;  ///< at least 2
+  Dim height = 16, width = 16;  ///< pixels, at least 4
+  Dim channels = 1;             ///< of the input, at least 1
+  Dim classes = 6;              ///< at least 2
 };
 
 /// Two blocks (3x3 convolution, ReLU, max-pool 2) of 16 and 32 channels, then a linear layer.
-/// x [N,size,size,1] -> logits [N,classes]; train with softmax_cross_entropy.
+/// x [N,height,width,channels] -> logits [N,classes]; train with softmax_cross_entropy.
 class TextureClassifier : public Module {
  public:
   /// Throws std::invalid_argument for settings out of range.

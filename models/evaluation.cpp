@@ -31,21 +31,27 @@ void compute(const SuperTac& model, const WindowSet& data, std::span<const std::
 
 }  // namespace
 
+bool fits(const WindowSet& windows, const SuperTacSettings& model) {
+  const TaxelArray array = windows.array();
+  return windows.timesteps() == model.timesteps && windows.settings().scale == model.scale &&
+         array.rows == model.rows && array.columns == model.columns && array.channels == model.in_channels;
+}
+
 void for_each_output(const SuperTac& model, const WindowSet& data, std::span<const std::uint32_t> indices,
                      const std::function<bool(const EvaluatedBatch&)>& use) {
-  const Dim size = model.settings().image_size(), timesteps = model.settings().timesteps;
-  if (data.timesteps() != timesteps || data.image().height != size) {
+  const SuperTacSettings& s = model.settings();
+  if (!fits(data, s)) {
     throw std::invalid_argument(
-        "for_each_output: the windows do not have the model's length or picture size");
+        "for_each_output: the windows do not have the model's length, array or picture size");
   }
   for (std::size_t start = 0; start < indices.size(); start += kBatch * kBatchesAtOnce) {
     std::vector<Batch> batches;
     const std::size_t end = std::min(indices.size(), start + kBatch * kBatchesAtOnce);
     for (std::size_t first = start; first < end; first += kBatch) {
       const auto count = static_cast<Dim>(std::min(kBatch, end - first));
-      const Shape pictures{count, size, size, 1};
+      const Shape pictures{count, s.image_height(), s.image_width(), 1};
       batches.push_back(
-          {first, Tensor(Shape{count, timesteps, kWindowTaxels}), Tensor(pictures), Tensor(pictures), {}});
+          {first, Tensor(Shape{count, s.timesteps, s.signals()}), Tensor(pictures), Tensor(pictures), {}});
     }
 #pragma omp parallel for schedule(static, 1)
     for (std::size_t i = 0; i < batches.size(); ++i) {

@@ -11,7 +11,10 @@
 
 namespace supertac {
 
-/// A batch of results: windows [n,T,16], outputs and truths [n,S,S,1], and the first of their places in
+/// Whether a model takes windows of this length, array and picture size.
+bool fits(const WindowSet& windows, const SuperTacSettings& model);
+
+/// A batch of results: windows [n,T,signals], outputs and truths [n,H,W,1], and the first of their places in
 /// `indices`.
 struct EvaluatedBatch {
   std::size_t first;

@@ -27,11 +27,13 @@ Dim JsonEntry::integer(const char* name) const {
 }
 
 bool JsonEntry::flag(const char* name) const {
-  if (!json_.is_object() || !json_.contains(name)) return false;
+  if (!has(name)) return false;
   const Json& value = json_.at(name);
   if (!value.is_boolean()) wrong(name, "true or false", value);
   return value.get<bool>();
 }
+
+bool JsonEntry::has(const char* name) const { return json_.is_object() && json_.contains(name); }
 
 double JsonEntry::number(const char* name) const {
   const Json& value = field(name);
@@ -63,8 +65,7 @@ std::string JsonEntry::text(const char* name) const {
 }
 
 const Json& JsonEntry::field(const char* name) const {
-  if (!json_.is_object() || !json_.contains(name))
-    throw std::runtime_error(where_ + " has no \"" + name + "\"");
+  if (!has(name)) throw std::runtime_error(where_ + " has no \"" + name + "\"");
   return json_.at(name);
 }
 

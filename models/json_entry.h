@@ -19,6 +19,8 @@ class JsonEntry {
   Dim integer(const char* name) const;
   /// true or false; false when it is absent, as in files from before it existed.
   bool flag(const char* name) const;
+  /// Whether the object has it: what files from before it existed lack.
+  bool has(const char* name) const;
   double number(const char* name) const;
   std::optional<double> number_or_null(const char* name) const;
   std::vector<float> numbers(const char* name, std::size_t count) const;

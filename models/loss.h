@@ -1,11 +1,11 @@
-// What SuperTac is trained on: the four VAEs' losses and the picture's.
+// What SuperTac is trained on: the VAEs' losses and the picture's.
 #pragma once
 
 #include "models/supertac_model.h"
 
 namespace supertac {
 
-/// total = a * sum over the four VAEs of (reconstruction + beta KLD) + (1 - a) * (L2 + lambda (1 - SSIM)),
+/// total = a * sum over the VAEs of (reconstruction + beta KLD) + (1 - a) * (L2 + lambda (1 - SSIM)),
 /// the paper's convex combination; reconstruction and L2 are mean squared errors.
 struct LossWeights {
   double a = 0.2;       ///< share of the VAEs, 0..1
@@ -15,12 +15,12 @@ struct LossWeights {
   void check() const;
 };
 
-/// Scalars; reconstruction and kld are sums over the four VAEs. `total` alone is weighted.
+/// Scalars; reconstruction and kld are sums over the VAEs. `total` alone is weighted.
 struct Loss {
   Variable total, reconstruction, kld, l2, ssim;
 };
 
-/// truth [N,S,S,1] in [0,1]. Throws std::invalid_argument when it does not fit the output's image.
+/// truth [N,H,W,1] in [0,1]. Throws std::invalid_argument when it does not fit the output's image.
 Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const LossWeights& weights);
 
 }  // namespace supertac

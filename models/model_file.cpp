@@ -14,6 +14,11 @@ using Json = nlohmann::ordered_json;
 SuperTacSettings read_settings(const JsonEntry& entry) {
   SuperTacSettings s;
   s.preset = entry.text("preset");
+  if (entry.has("rows")) {
+    s.rows = entry.integer("rows");
+    s.columns = entry.integer("columns");
+    s.in_channels = entry.integer("in_channels");
+  }
   s.timesteps = entry.integer("timesteps");
   s.latent = entry.integer("latent");
   s.scale = entry.integer("scale");
@@ -32,13 +37,15 @@ SuperTacSettings read_settings(const JsonEntry& entry) {
 InputSettings read_input(const JsonEntry& entry) {
   const InputSettings input{entry.number("rate_hz"),
                             {entry.number("rest_volts"), entry.number("span_volts"), entry.flag("levelled")},
-                            entry.number_or_null("filter_s")};
+                            entry.number_or_null("filter_s"),
+                            entry.has("pitch_mm") ? entry.number("pitch_mm") : InputSettings{}.pitch_mm};
   if (input.rate_hz < 1 || input.rate_hz > 100'000 || std::abs(input.scaling.rest_volts) > 1000 ||
       input.scaling.span_volts <= 1e-6 || input.scaling.span_volts > 1000 || input.filter_s.value_or(0) < 0 ||
-      input.filter_s.value_or(0) > 10) {
+      input.filter_s.value_or(0) > 10 || input.pitch_mm < 0.1 || input.pitch_mm > 100) {
     throw std::runtime_error(
         entry.where() +
-        ": expected rate_hz 1 to 100000, |rest_volts| <= 1000, span_volts 1e-6 to 1000, filter_s 0 to 10");
+        ": expected rate_hz 1 to 100000, |rest_volts| <= 1000, span_volts 1e-6 to 1000, filter_s 0 to 10, "
+        "pitch_mm 0.1 to 100");
   }
   return input;
 }
@@ -51,13 +58,46 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
                    {"rcabs", s.rcabs}};
   if (s.sub_pixel)
     settings["sub_pixel"] = true;  // left out otherwise: the text of older files stays the same
+  if (s.rows != 4 || s.columns != 4 || s.in_channels != 1) {  // as little of the rig's array
+    settings["rows"] = s.rows;
+    settings["columns"] = s.columns;
+    settings["in_channels"] = s.in_channels;
+  }
   Json scaling = {{"rate_hz", input.rate_hz},
                   {"rest_volts", input.scaling.rest_volts},
                   {"span_volts", input.scaling.span_volts},
                   {"filter_s", input.filter_s ? Json(*input.filter_s) : Json(nullptr)},
                   {"formula", "clip((rest_volts - V) / span_volts, 0, 1)"}};
   if (input.scaling.levelled) scaling["levelled"] = true;  // left out otherwise, as sub_pixel
+  if (input.pitch_mm != InputSettings{}.pitch_mm) scaling["pitch_mm"] = input.pitch_mm;
   return {{"settings", settings.dump()}, {"input", scaling.dump()}};
+}
+
+TaxelArray ModelFile::array() const {
+  const SuperTacSettings& s = model->settings();
+  return {static_cast<int>(s.rows), static_cast<int>(s.columns), input.pitch_mm,
+          static_cast<int>(s.in_channels)};
+}
+
+WindowSettings ModelFile::windows() const {
+  WindowSettings w;
+  w.timesteps = static_cast<int>(model->settings().timesteps);
+  w.scale = static_cast<int>(model->settings().scale);
+  w.rate_hz = input.rate_hz;
+  w.scaling = input.scaling;
+  w.array = array();
+  return w;
+}
+
+InputSettings input_of(const WindowSet& windows) {
+  return {windows.settings().rate_hz, windows.settings().scaling, windows.filter_s(),
+          windows.array().pitch_mm};
+}
+
+void set_array(SuperTacSettings& settings, const TaxelArray& array) {
+  settings.rows = array.rows;
+  settings.columns = array.columns;
+  settings.in_channels = array.channels;
 }
 
 ModelFile load_model(const SafetensorsFile& file, const std::string& path) {

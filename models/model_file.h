@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "data/resample.h"
+#include "data/windows.h"
 #include "layers/checkpoint.h"
 #include "models/supertac_model.h"
 
@@ -19,6 +19,7 @@ struct InputSettings {
   /// Length of the moving average (s) that the training signals went through, 0 = none; nothing when they
   /// differed.
   std::optional<double> filter_s = 0.0;
+  double pitch_mm = 3;  ///< of the array
 };
 
 /// The metadata keys "settings" and "input", JSON texts.
@@ -29,7 +30,18 @@ struct ModelFile {
   std::unique_ptr<SuperTac> model;
   InputSettings input;
   std::map<std::string, std::string> metadata;
+
+  /// The sensor it was trained on.
+  TaxelArray array() const;
+  /// The windows it takes: its array and length, picture size, rate and scaling.
+  WindowSettings windows() const;
 };
+
+/// What the windows of a model trained on these have gone through.
+InputSettings input_of(const WindowSet& windows);
+
+/// The settings of a model for another array than the default one.
+void set_array(SuperTacSettings& settings, const TaxelArray& array);
 
 /// Builds the model that the metadata describes, after checking every setting's range, and fills it.
 /// Throws std::runtime_error naming path, what was expected and found.

@@ -1,5 +1,6 @@
 #include "models/supertac_model.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "autograd/ops/activations.h"
@@ -8,8 +9,6 @@
 
 namespace supertac {
 namespace {
-
-constexpr Dim kCoarse = 4;  // the upsampler starts on a map of 4x4
 
 void check_range(const char* name, Dim value, Dim low, Dim high) {
   if (value >= low && value <= high) return;
@@ -23,13 +22,13 @@ SuperTacSettings checked(const SuperTacSettings& settings) {
 }
 
 VaeOptions vae_options(const SuperTacSettings& s) {
-  return {.timesteps = s.timesteps, .channels = kGroupTaxels, .latent = s.latent};
+  return {.timesteps = s.timesteps, .channels = s.group_signals(), .latent = s.latent};
 }
 
 template <class Part>
 std::vector<Part> make_parts(const SuperTacSettings& s, Rng& rng) {
   std::vector<Part> parts;
-  for (Dim i = 0; i < kGroups; ++i) parts.emplace_back(vae_options(s), rng);
+  for (Dim i = 0; i < s.groups(); ++i) parts.emplace_back(vae_options(s), rng);
   return parts;
 }
 
@@ -39,6 +38,14 @@ std::vector<Rirb> make_rirbs(const SuperTacSettings& s, Rng& rng) {
     rirbs.emplace_back(RirbOptions{.channels = s.channels, .blocks = s.rcabs, .sub_pixel = s.sub_pixel}, rng);
   }
   return rirbs;
+}
+
+// concat() takes eight at most.
+Variable concat_groups(std::span<const Variable> groups) {
+  constexpr std::size_t kAtOnce = 8;
+  if (groups.size() <= kAtOnce) return concat(groups);
+  const Variable halves[] = {concat(groups.first(kAtOnce)), concat(groups.subspan(kAtOnce))};
+  return concat(halves);
 }
 
 }  // namespace
@@ -54,6 +61,9 @@ std::string name_of(Grouping grouping) {
 }
 
 void SuperTacSettings::check() const {
+  check_range("rows", rows, 2, 16);
+  check_range("columns", columns, 2, 16);
+  check_range("in_channels", in_channels, 1, 8);
   check_range("timesteps", timesteps, 32, 512);
   if (timesteps % 16 != 0) {
     throw std::invalid_argument(
@@ -63,6 +73,12 @@ void SuperTacSettings::check() const {
   check_range("latent", latent, 1, 256);
   if (scale != 2 && scale != 4 && scale != 8) {
     throw std::invalid_argument("model settings: scale must be 2, 4 or 8, got " + std::to_string(scale));
+  }
+  if (std::min(image_height(), image_width()) < 7) {
+    throw std::invalid_argument(
+        "model settings: scale " + std::to_string(scale) + " of an array of " + std::to_string(rows) + "x" +
+        std::to_string(columns) +
+        " makes pictures with a side below 7 pixels, too small for SSIM; raise scale");
   }
   check_range("channels", channels, 4, 256);
   check_range("rcabs", rcabs, 0, 16);
@@ -80,7 +96,9 @@ double rate_of_preset(const std::string& name) {
 }
 
 Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
-    : fc_(kGroups * s.latent, s.channels * kCoarse * kCoarse, rng),
+    : rows_(s.rows),
+      columns_(s.columns),
+      fc_(s.groups() * s.latent, s.channels * s.rows * s.columns, rng),
       rirbs_(make_rirbs(s, rng)),
       out_(s.channels, 1, {.kernel = 3, .stride = 1, .padding = 1}, rng) {
   add("fc", fc_);
@@ -89,7 +107,7 @@ Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
 }
 
 Variable Upsampler::forward(const Variable& latents) const {
-  const Dim pixels[] = {kCoarse, kCoarse};
+  const Dim pixels[] = {rows_, columns_};
   Variable h = unflatten_channels_first(fc_.forward(latents, kLeakyRelu), pixels);
   for (const Rirb& rirb : rirbs_) h = rirb.forward(h);
   return out_.forward(h);
@@ -105,46 +123,55 @@ SuperTac::SuperTac(const SuperTacSettings& settings, Rng& rng)
   add("upsampler", upsampler_);
 }
 
-std::array<Variable, kGroups> SuperTac::split(const Tensor& windows) const {
-  if (windows.rank() != 3 || windows.dim(1) != settings_.timesteps || windows.dim(2) != kWindowTaxels) {
-    throw std::invalid_argument("SuperTac: windows expects [N," + std::to_string(settings_.timesteps) +
-                                ",16], got " + windows.shape().text());
+// The signals of a group are its taxels in order, each with its channels: runs of `run` numbers in a frame,
+// `step` apart. One number of the group at a time: that loop has no short inner one.
+PerGroup<Variable> SuperTac::split(const Tensor& windows) const {
+  const SuperTacSettings& s = settings_;
+  if (windows.rank() != 3 || windows.dim(1) != s.timesteps || windows.dim(2) != s.signals()) {
+    throw std::invalid_argument("SuperTac: windows expects [N," + std::to_string(s.timesteps) + "," +
+                                std::to_string(s.signals()) + "], got " + windows.shape().text());
   }
-  const bool rows = settings_.grouping == Grouping::horizontal;
-  const Dim first_step = rows ? kGroupTaxels : 1, step = rows ? 1 : kGroups;
-  const Dim frames = windows.dim(0) * windows.dim(1);
-  std::array<Variable, kGroups> groups;
-  for (Dim g = 0; g < kGroups; ++g) {
-    Tensor part(Shape{windows.dim(0), windows.dim(1), kGroupTaxels});
-    const real* from = windows.data() + g * first_step;
-    real* to = part.data();
-    for (Dim f = 0; f < frames; ++f, from += kWindowTaxels, to += kGroupTaxels) {
-      for (Dim k = 0; k < kGroupTaxels; ++k) to[k] = from[k * step];
+  const bool by_rows = s.grouping == Grouping::horizontal;
+  const Dim first = by_rows ? s.columns * s.in_channels : s.in_channels;
+  const Dim run = by_rows ? s.columns * s.in_channels : s.in_channels, step = s.columns * s.in_channels;
+  const Dim frames = windows.dim(0) * windows.dim(1), from_stride = s.signals(),
+            to_stride = s.group_signals();
+  PerGroup<Variable> groups(s.groups());
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    Tensor part(Shape{windows.dim(0), windows.dim(1), to_stride});
+    for (Dim k = 0; k < to_stride; ++k) {
+      const real* from = windows.data() + static_cast<Dim>(g) * first + k / run * step + k % run;
+      real* to = part.data() + k;
+      for (Dim f = 0; f < frames; ++f, from += from_stride, to += to_stride) *to = *from;
     }
-    groups[static_cast<std::size_t>(g)] = Variable(std::move(part));
+    groups[g] = Variable(std::move(part));
   }
   return groups;
 }
 
-SuperTac::Output SuperTac::forward(const Tensor& windows, const std::array<Tensor, kGroups>& eps) const {
-  Output out;
-  out.input = split(windows);
-  std::array<Variable, kGroups> z;
+SuperTac::Output SuperTac::forward(const Tensor& windows, std::span<const Tensor> eps) const {
+  const Dim groups = settings_.groups();
+  if (eps.size() != static_cast<std::size_t>(groups)) {
+    throw std::invalid_argument("SuperTac: eps expects " + std::to_string(groups) + " tensors, got " +
+                                std::to_string(eps.size()));
+  }
+  Output out{split(windows), PerGroup<LatentDistribution>(groups), PerGroup<Variable>(groups), {}};
+  PerGroup<Variable> z(groups);
   for (std::size_t i = 0; i < z.size(); ++i) {
     out.latent[i] = encoders_[i].forward(out.input[i]);
     z[i] = sample_gaussian(out.latent[i].mean, out.latent[i].log_var, eps[i]);
     out.decoded[i] = decoders_[i].forward(z[i]);
   }
-  out.image = upsampler_.forward(concat(z));
+  out.image = upsampler_.forward(concat_groups(z.span()));
   return out;
 }
 
 Tensor SuperTac::encode(const Tensor& windows) const {
   const NoGrad no_grad;
-  const std::array<Variable, kGroups> groups = split(windows);
-  std::array<Variable, kGroups> means;
+  const PerGroup<Variable> groups = split(windows);
+  PerGroup<Variable> means(settings_.groups());
   for (std::size_t i = 0; i < means.size(); ++i) means[i] = encoders_[i].mean(groups[i]);
-  return concat(means).value();
+  return concat_groups(means.span()).value();
 }
 
 Tensor SuperTac::infer(const Tensor& windows) const {

@@ -1,8 +1,9 @@
-// SuperTac (Front. Robot. AI 12:1552922, 2025): four VAEs over groups of taxels, residual upsampling of their
+// SuperTac (Front. Robot. AI 12:1552922, 2025): VAEs over groups of taxels, residual upsampling of their
 // latents.
 #pragma once
 
 #include <array>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,14 +12,10 @@
 
 namespace supertac {
 
-inline constexpr Dim kGroups = 4;
-inline constexpr Dim kGroupTaxels = 4;
-inline constexpr Dim kWindowTaxels = kGroups * kGroupTaxels;
-
-/// Which four taxels one VAE sees. Taxel k lies in column k % 4 (x) and row k / 4 (y) of the array.
+/// Which taxels one VAE sees. Taxel k lies in column k % columns (x) and row k / columns (y) of the array.
 enum class Grouping {
-  horizontal,  ///< the rows: group i = taxels 4i .. 4i+3
-  vertical,    ///< the columns: group i = taxels i, i+4, i+8, i+12
+  horizontal,  ///< the rows: of a 4x4 array group i = taxels 4i .. 4i+3
+  vertical,    ///< the columns: of a 4x4 array group i = taxels i, i+4, i+8, i+12
 };
 /// Both throw std::invalid_argument / return "horizontal" or "vertical".
 Grouping grouping_of(const std::string& name);
@@ -26,15 +23,21 @@ std::string name_of(Grouping grouping);
 
 struct SuperTacSettings {
   std::string preset = "paper";
-  Dim timesteps = 256;  ///< T: 32 to 512, a multiple of 16
-  Dim latent = 10;      ///< LD: 1 to 256
-  Dim scale = 4;        ///< 2, 4, 8: pictures of 8, 16, 32 pixels a side
+  Dim rows = 4, columns = 4;  ///< of the array: 2 to 16
+  Dim in_channels = 1;        ///< numbers a taxel gives: 1 to 8
+  Dim timesteps = 256;        ///< T: 32 to 512, a multiple of 16
+  Dim latent = 10;            ///< LD: 1 to 256
+  Dim scale = 4;  ///< 2, 4, 8: pictures so many times finer than the array, 7 or more pixels a side
   Grouping grouping = Grouping::horizontal;
   Dim channels = 32;       ///< of the upsampler
   Dim rcabs = 3;           ///< in each RIRB
   bool sub_pixel = false;  ///< RIRBs enlarge by sub-pixel instead of transposed convolution
 
-  Dim image_size() const { return 4 * scale; }
+  Dim signals() const { return rows * columns * in_channels; }  ///< numbers in a frame
+  Dim groups() const { return grouping == Grouping::horizontal ? rows : columns; }
+  Dim group_signals() const { return signals() / groups(); }
+  Dim image_height() const { return rows * scale; }
+  Dim image_width() const { return columns * scale; }
   /// Throws std::invalid_argument naming the setting, its range and what was given.
   void check() const;
   /// A preset's settings: "paper", or "tiny", which costs a ninth. Both were made for windows of 2.56 s.
@@ -45,13 +48,29 @@ struct SuperTacSettings {
 /// Samples a second that a preset was made for. Throws as SuperTacSettings::of_preset.
 double rate_of_preset(const std::string& name);
 
-/// Latents of the four groups [N,4 LD] -> picture [N,S,S,1], linear output.
+/// One thing for each group, in place: a warm step must not go to the heap.
+template <class T>
+class PerGroup {
+ public:
+  explicit PerGroup(Dim groups = 0) : size_(static_cast<std::size_t>(groups)) {}
+  std::size_t size() const { return size_; }
+  T& operator[](std::size_t i) { return items_[i]; }
+  const T& operator[](std::size_t i) const { return items_[i]; }
+  std::span<const T> span() const { return std::span(items_).first(size_); }
+
+ private:
+  std::array<T, 16> items_;
+  std::size_t size_;
+};
+
+/// Latents of the G groups [N,G LD] -> picture [N,rows scale,columns scale,1], linear output.
 class Upsampler : public Module {
  public:
   Upsampler(const SuperTacSettings& settings, Rng& rng);
   Variable forward(const Variable& latents) const;
 
  private:
+  Dim rows_, columns_;  // the map it starts from
   Linear fc_;
   std::vector<Rirb> rirbs_;
   Conv2d out_;
@@ -63,23 +82,24 @@ class SuperTac : public Module {
   SuperTac(const SuperTacSettings& settings, Rng& rng);
 
   struct Output {
-    std::array<Variable, kGroups> input;             ///< [N,T,4], the windows of the groups
-    std::array<LatentDistribution, kGroups> latent;  ///< [N,LD]
-    std::array<Variable, kGroups> decoded;           ///< [N,T,4]
-    Variable image;                                  ///< [N,S,S,1]
+    PerGroup<Variable> input;             ///< [N,T,group_signals], the windows of the groups
+    PerGroup<LatentDistribution> latent;  ///< [N,LD]
+    PerGroup<Variable> decoded;           ///< [N,T,group_signals]
+    Variable image;                       ///< [N,rows scale,columns scale,1]
   };
-  /// Training: windows [N,T,16] in [0,1] and eps [N,LD] ~ N(0,1) for each group.
+  /// Training: windows [N,T,signals] in [0,1] and eps [N,LD] ~ N(0,1) for each group.
   /// Throws std::invalid_argument on other shapes.
-  Output forward(const Tensor& windows, const std::array<Tensor, kGroups>& eps) const;
-  /// Evaluation: z = mean, no decoders, nothing recorded. windows [N,T,16] -> [N,S,S,1].
+  Output forward(const Tensor& windows, std::span<const Tensor> eps) const;
+  /// Evaluation: z = mean, no decoders, nothing recorded. windows [N,T,signals] -> [N,rows scale,columns
+  /// scale,1].
   Tensor infer(const Tensor& windows) const;
-  /// The latent means [N,4 LD].
+  /// The latent means [N,G LD].
   Tensor encode(const Tensor& windows) const;
 
   const SuperTacSettings& settings() const { return settings_; }
 
  private:
-  std::array<Variable, kGroups> split(const Tensor& windows) const;
+  PerGroup<Variable> split(const Tensor& windows) const;
 
   SuperTacSettings settings_;
   std::vector<Encoder> encoders_;

@@ -9,6 +9,7 @@
 #include "io/json.h"
 #include "io/numbers.h"
 #include "models/diagnosis.h"
+#include "models/evaluation.h"
 
 namespace supertac {
 namespace {
@@ -32,7 +33,8 @@ SuperTac make_model(const TrainingSettings& settings) {
 void TrainingSettings::check() const {
   model.check();
   loss.check();
-  supertac::check(augment);
+  supertac::check(augment,
+                  {.rows = static_cast<int>(model.rows), .columns = static_cast<int>(model.columns)});
   const auto require = [](bool holds, const char* what) {
     if (!holds) throw std::invalid_argument(std::string("training settings: ") + what);
   };
@@ -69,12 +71,15 @@ Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, con
       model_(make_model(settings)),
       state_(model_.parameters(), {settings.learning_rate, settings.warm_up, settings.clip_norm},
              settings.epochs * steps_per_epoch()) {
-  if (windows.timesteps() != settings.model.timesteps ||
-      windows.image().height != settings.model.image_size()) {
-    throw std::invalid_argument(
-        "Trainer: the windows have " + std::to_string(windows.timesteps()) + " samples and " +
-        std::to_string(windows.image().height) + " pixels a side, the model expects " +
-        std::to_string(settings.model.timesteps) + " and " + std::to_string(settings.model.image_size()));
+  const SuperTacSettings& m = settings_.model;
+  if (!fits(windows, m)) {
+    throw std::invalid_argument("Trainer: the windows have " + std::to_string(windows.timesteps()) +
+                                " samples of " + windows.array().text() + " and pictures of " +
+                                windows.image().text() + ", the model expects " +
+                                std::to_string(m.timesteps) + " samples of " + std::to_string(m.rows) + "x" +
+                                std::to_string(m.columns) + " taxels with " + std::to_string(m.in_channels) +
+                                " channel(s) and pictures of " + std::to_string(m.image_height()) + "x" +
+                                std::to_string(m.image_width()));
   }
   indices_.resize(batching_.batch_size());
   const Dim n = static_cast<Dim>(indices_.size()), lanes = std::min(kMostLanes, n);
@@ -90,11 +95,11 @@ Trainer::Lane::Lane(const SuperTac& master, Dim first_sample, Dim count)
         return SuperTac(master.settings(), rng);
       }()) {
   const SuperTacSettings& s = master.settings();
-  windows = Tensor(Shape{count, s.timesteps, kWindowTaxels});
-  truth = Tensor(Shape{count, s.image_size(), s.image_size(), 1});
-  for (Tensor& e : eps) e = Tensor::zeros(Shape{count, s.latent});
-  pictures = truths = Spread(static_cast<std::size_t>(s.image_size() * s.image_size()));
-  means = Spread(kGroups * static_cast<std::size_t>(s.latent));
+  windows = Tensor(Shape{count, s.timesteps, s.signals()});
+  truth = Tensor(Shape{count, s.image_height(), s.image_width(), 1});
+  for (Dim g = 0; g < s.groups(); ++g) eps.push_back(Tensor::zeros(Shape{count, s.latent}));
+  pictures = truths = Spread(static_cast<std::size_t>(s.image_height() * s.image_width()));
+  means = Spread(static_cast<std::size_t>(s.groups() * s.latent));
   share_values(master.parameters(), model.parameters());
 }
 
@@ -110,7 +115,7 @@ void Trainer::fill(Lane& lane) const {
     const std::span<float> window = lane.windows.values().subspan(n * window_size, window_size);
     data_.window(indices_[slot], window);
     if (settings_.augment.any()) {
-      augment(settings_.augment, settings_.seed, batching_.sample(epoch, b, slot), window);
+      augment(settings_.augment, settings_.seed, batching_.sample(epoch, b, slot), window, data_.array());
     }
     data_.truth(indices_[slot], lane.truth.values().subspan(n * truth_size, truth_size));
   }
@@ -121,13 +126,14 @@ void Trainer::draw_eps(Lane& lane) const {
   if (!settings_.sampling) return;  // eps stays 0
   const RandomStream random(settings_.seed, kEpsStream);
   const auto latent = static_cast<std::uint64_t>(settings_.model.latent);
-  for (std::size_t g = 0; g < kGroups; ++g) {
+  const std::size_t groups = lane.eps.size();
+  for (std::size_t g = 0; g < groups; ++g) {
     real* eps = lane.eps[g].data();
     for (Dim n = 0; n < lane.eps[g].dim(0); ++n) {
       const std::uint64_t sample =
           static_cast<std::uint64_t>(step()) * indices_.size() + static_cast<std::uint64_t>(lane.first + n);
       for (std::uint64_t i = 0; i < latent; ++i) {
-        *eps++ = static_cast<real>(random.normal((sample * kGroups + g) * latent + i));
+        *eps++ = static_cast<real>(random.normal((sample * groups + g) * latent + i));
       }
     }
   }
@@ -149,7 +155,7 @@ void Trainer::run_lane(Lane& lane) const {
   for (Spread* spread : {&lane.pictures, &lane.truths, &lane.means}) spread->clear();
   lane.pictures.add(output.image.value());
   lane.truths.add(lane.truth);
-  for (std::size_t g = 0; g < kGroups; ++g) {
+  for (std::size_t g = 0; g < lane.eps.size(); ++g) {
     lane.means.add(output.latent[g].mean.value(), g * static_cast<std::size_t>(settings_.model.latent));
   }
   if (std::isfinite(lane.terms.total)) return backward(scale(loss.total, static_cast<real>(share)));
@@ -212,8 +218,7 @@ void Trainer::look_for_collapse(StepReport& report) {
 
 // What a saved state must agree in, besides the caller's own metadata.
 std::map<std::string, std::string> Trainer::full(std::map<std::string, std::string> metadata) const {
-  metadata.merge(model_metadata(settings_.model,
-                                {data_.settings().rate_hz, data_.settings().scaling, data_.filter_s()}));
+  metadata.merge(model_metadata(settings_.model, input_of(data_)));
   metadata["training"] = settings_.text();
   return metadata;
 }

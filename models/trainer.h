@@ -50,7 +50,7 @@ struct StepReport {
   double total = 0, reconstruction = 0, kld = 0, l2 = 0, ssim = 0;
   double gradient_norm = 0;  ///< before clipping
   double learning_rate = 0;
-  int active_latents = 0;  ///< of 4 LD, in this batch (models/collapse.h)
+  int active_latents = 0;  ///< of all groups, in this batch (models/collapse.h)
   /// For the last 100 steps after warm-up the pictures said nothing of the truths, or no latent number was
   /// active (models/collapse.h). Lower the learning rate or, when no latent is active, beta.
   bool collapsed = false;
@@ -59,7 +59,7 @@ struct StepReport {
 class Trainer {
  public:
   /// `windows` must outlive the trainer. Throws std::invalid_argument for settings out of range, windows of
-  /// another length or picture size than the model's, or no training window.
+  /// another length, array or picture size than the model's, or no training window.
   Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, const TrainingSettings& settings);
 
   bool done() const { return state_.done(); }
@@ -85,7 +85,7 @@ class Trainer {
     Dim first;       // its share of the batch: samples first .. first + windows.dim(0)
     SuperTac model;  // the master's values under gradients of its own
     Tensor windows, truth;
-    std::array<Tensor, kGroups> eps;
+    std::vector<Tensor> eps;  // [count,LD] of each group
     StepReport terms;
     Spread pictures, truths, means;
     std::string trouble;  // where the loss stopped to be finite

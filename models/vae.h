@@ -11,7 +11,7 @@ namespace supertac {
 
 struct VaeOptions {
   Dim timesteps = 256;  ///< T, a multiple of 16
-  Dim channels = 4;     ///< taxels of the group
+  Dim channels = 4;     ///< signals of the group: C below
   Dim latent = 10;      ///< LD
 };
 
@@ -20,7 +20,7 @@ struct LatentDistribution {
   Variable mean, log_var;
 };
 
-/// x [N,T,4] -> four strided convolutions -> [N,T/16,32] -> 64 -> mean and log variance.
+/// x [N,T,C] -> four strided convolutions -> [N,T/16,32] -> 64 -> mean and log variance.
 class Encoder : public Module {
  public:
   Encoder(const VaeOptions& options, Rng& rng);
@@ -34,7 +34,7 @@ class Encoder : public Module {
   Linear fc_, mean_, log_var_;
 };
 
-/// z [N,LD] -> 64 -> [N,T/16,32] -> four transposed convolutions -> [N,T,4] in (0,1).
+/// z [N,LD] -> 64 -> [N,T/16,32] -> four transposed convolutions -> [N,T,C] in (0,1).
 class Decoder : public Module {
  public:
   Decoder(const VaeOptions& options, Rng& rng);

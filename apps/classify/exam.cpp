@@ -65,11 +65,7 @@ std::vector<Candidate> load_candidates(const std::vector<std::string>& paths) {
 WindowSet exam_windows(const std::string& folder, std::vector<std::string> plates, const std::string& also,
                        const Candidate& first) {
   const ModelFile& file = first.file;
-  WindowSettings w;
-  w.timesteps = static_cast<int>(file.model->settings().timesteps);
-  w.scale = static_cast<int>(file.model->settings().scale);
-  w.rate_hz = file.input.rate_hz;
-  w.scaling = file.input.scaling;
+  WindowSettings w = file.windows();
   w.stride = static_cast<int>(number_of(file, first.path, "stride"));
   if (plates.empty()) plates = words(metadata_of(file, first.path, "plates"));
   WindowSet windows = WindowSet::load(folder, plates, w);

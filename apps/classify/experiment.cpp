@@ -22,7 +22,8 @@ using Classifier = std::variant<FeatureClassifier, TextureClassifier>;
 Classifier make_classifier(const Shape& sample, Dim classes, std::uint64_t seed) {
   Rng rng(seed);
   if (sample.rank() == 2) return FeatureClassifier(sample[1], classes, rng);
-  return TextureClassifier({.size = sample[1], .classes = classes}, rng);
+  return TextureClassifier(
+      {.height = sample[1], .width = sample[2], .channels = sample[3], .classes = classes}, rng);
 }
 
 Variable forward(const Classifier& classifier, const Variable& x) {
@@ -34,8 +35,9 @@ std::vector<Variable> parameters_of(const Classifier& classifier) {
 }
 
 Tensor gather(const WindowSet& data, std::span<const std::uint32_t> indices) {
-  Tensor windows(Shape{static_cast<Dim>(indices.size()), data.timesteps(), kWindowTaxels});
-  const auto size = static_cast<std::size_t>(data.timesteps() * kWindowTaxels);
+  Tensor windows(
+      Shape{static_cast<Dim>(indices.size()), data.timesteps(), static_cast<Dim>(data.array().signals())});
+  const auto size = static_cast<std::size_t>(data.timesteps()) * data.array().signals();
   for (std::size_t n = 0; n < indices.size(); ++n) {
     data.window(indices[n], windows.values().subspan(n * size, size));
   }
@@ -67,7 +69,8 @@ void train(const Classifier& classifier, const View& view, const SuperTac& model
     Tensor windows = gather(data, indices);
     const auto size = windows.values().size() / indices.size();
     for (std::size_t n = 0; s.augment.any() && n < indices.size(); ++n) {
-      augment(s.augment, s.seed, batching.sample(epoch, b, n), windows.values().subspan(n * size, size));
+      augment(s.augment, s.seed, batching.sample(epoch, b, n), windows.values().subspan(n * size, size),
+              data.array());
     }
     const Variable x(show(view, model, data, indices, windows));
     const Variable loss = softmax_cross_entropy(forward(classifier, x), labels_of(data, exam, indices));

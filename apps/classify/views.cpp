@@ -21,24 +21,27 @@ constexpr struct {
               {"latents", ViewKind::latents},
               {"truth", ViewKind::truth}};
 
-Tensor last_frames(const Tensor& windows) {
-  const Dim count = windows.dim(0), stride = windows.dim(1) * kWindowTaxels;
-  Tensor frames(Shape{count, 4, 4, 1});
-  for (Dim n = 0; n < count; ++n) {
-    std::copy_n(windows.data() + (n + 1) * stride - kWindowTaxels, kWindowTaxels,
-                frames.data() + n * kWindowTaxels);
-  }
+Tensor last_frames(const Tensor& windows, const TaxelArray& array) {
+  constexpr int kSmallest = 4;  // that a classifier of pictures takes
+  const Dim count = windows.dim(0), signals = windows.dim(2), stride = windows.dim(1) * signals;
+  Tensor frames = std::min(array.rows, array.columns) < kSmallest
+                      ? Tensor(Shape{count, signals})
+                      : Tensor(Shape{count, array.rows, array.columns, array.channels});
+  for (Dim n = 0; n < count; ++n)
+    std::copy_n(windows.data() + (n + 1) * stride - signals, signals, frames.data() + n * signals);
   return frames;
 }
 
-Tensor enlarged(const Tensor& frames, const WindowSet& data) {
+Tensor enlarged(const Tensor& windows, const WindowSet& data) {
   const ImageGrid image = data.image();
-  const Upsampling bicubic(Upsampling::Kind::bicubic, 4, 4, data.settings().scale);
-  Tensor pictures(Shape{frames.dim(0), image.height, image.width, 1});
-  const std::size_t pixels = image.pixels();
-  for (std::size_t n = 0; n < static_cast<std::size_t>(frames.dim(0)); ++n) {
-    bicubic(frames.values().subspan(n * kWindowTaxels, kWindowTaxels),
-            pictures.values().subspan(n * pixels, pixels));
+  const TaxelArray array = data.array();
+  const Upsampling bicubic(Upsampling::Kind::bicubic, array.rows, array.columns, data.settings().scale);
+  const auto count = static_cast<std::size_t>(windows.dim(0));
+  const std::size_t values = windows.values().size() / count;
+  Tensor pictures(Shape{windows.dim(0), image.height, image.width, 1});
+  for (std::size_t n = 0; n < count; ++n) {
+    const auto frame = windows.values().subspan(n * values, values).last(array.signals());
+    bicubic(mean_of_channels(array, frame), pictures.values().subspan(n * image.pixels(), image.pixels()));
   }
   return pictures;
 }
@@ -48,14 +51,14 @@ Tensor history(const Tensor& windows, Dim frames) {
     throw std::invalid_argument("a history of " + std::to_string(frames) + " frames is longer than the " +
                                 std::to_string(windows.dim(1)) + " of the model's windows");
   }
-  const Dim count = windows.dim(0), per_step = frames / kSteps;
-  Tensor pictures = Tensor::zeros(Shape{count, kSteps, kWindowTaxels, 1});
+  const Dim count = windows.dim(0), signals = windows.dim(2), per_step = frames / kSteps;
+  Tensor pictures = Tensor::zeros(Shape{count, kSteps, signals, 1});
   for (Dim n = 0; n < count; ++n) {
-    const real* from = windows.data() + ((n + 1) * windows.dim(1) - frames) * kWindowTaxels;
-    real* to = pictures.data() + n * kSteps * kWindowTaxels;
-    for (Dim t = 0; t < frames; ++t, from += kWindowTaxels) {
-      real* step = to + t / per_step * kWindowTaxels;
-      for (Dim k = 0; k < kWindowTaxels; ++k) step[k] += from[k] / static_cast<real>(per_step);
+    const real* from = windows.data() + ((n + 1) * windows.dim(1) - frames) * signals;
+    real* to = pictures.data() + n * kSteps * signals;
+    for (Dim t = 0; t < frames; ++t, from += signals) {
+      real* step = to + t / per_step * signals;
+      for (Dim k = 0; k < signals; ++k) step[k] += from[k] / static_cast<real>(per_step);
     }
   }
   return pictures;
@@ -98,9 +101,9 @@ Tensor show(const View& view, const SuperTac& model, const WindowSet& data,
             std::span<const std::uint32_t> indices, const Tensor& windows) {
   switch (view.kind) {
     case ViewKind::frame:
-      return last_frames(windows);
+      return last_frames(windows, data.array());
     case ViewKind::bicubic:
-      return enlarged(last_frames(windows), data);
+      return enlarged(windows, data);
     case ViewKind::super_resolved:
       return model.infer(windows);
     case ViewKind::latents:

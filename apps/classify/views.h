@@ -11,10 +11,10 @@
 namespace supertac {
 
 enum class ViewKind {
-  frame,    ///< the last frame as it is felt, 4x4: the paper's "raw"
+  frame,    ///< the last frame as it is felt, rows x columns: the paper's "raw"
   bicubic,  ///< the same enlarged to the picture's size, so that only its content differs from a picture
   super_resolved,  ///< the network's picture
-  latents,         ///< the means of the four latent distributions, 4 LD numbers
+  latents,         ///< the means of the latent distributions
   history,         ///< the last `frames` frames of all taxels, averaged to 16 steps: time without a network
   truth,           ///< the plate itself: what a perfect picture would allow
 };
@@ -30,8 +30,9 @@ struct View {
   bool is_picture() const { return kind != ViewKind::latents; }
 };
 
-/// Shows windows [N,T,16] (the indices' ones, changed by augmentation perhaps) of a data set.
-/// Pictures are [N,S,S,1], latents [N,4 LD]. A history is a "picture" of 16 steps x 16 taxels.
+/// Shows windows [N,T,signals] (the indices' ones, changed by augmentation perhaps) of a data set.
+/// Pictures are [N,H,W,1], latents [N,G LD], frames [N,rows,columns,channels], or [N,signals] when an array
+/// with less than four rows or columns makes no picture. A history is a "picture" of 16 steps x signals.
 /// Throws std::invalid_argument when a history is longer than the windows.
 Tensor show(const View& view, const SuperTac& model, const WindowSet& data,
             std::span<const std::uint32_t> indices, const Tensor& windows);

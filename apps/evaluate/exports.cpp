@@ -17,28 +17,31 @@ using Draw = Picture (*)(std::span<const Strip>, const StripLayout&);
 Picture draw(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> chosen,
              Draw picture, int side) {
   const std::size_t pixels = windows.image().pixels();
+  const TaxelArray array = windows.array();
   std::vector<float> outputs, truths;
   for_each_output(model, windows, chosen, [&](const EvaluatedBatch& b) {
     outputs.insert(outputs.end(), b.outputs.values().begin(), b.outputs.values().end());
     truths.insert(truths.end(), b.truths.values().begin(), b.truths.values().end());
     return true;
   });
+  std::vector<std::vector<float>> frames;
+  for (const std::uint32_t i : chosen) frames.push_back(mean_of_channels(array, windows.last_frame(i)));
   std::vector<Strip> strips;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    strips.push_back({windows.last_frame(chosen[i]),
-                      std::span<const float>(outputs).subspan(i * pixels, pixels),
+    strips.push_back({frames[i], std::span<const float>(outputs).subspan(i * pixels, pixels),
                       std::span<const float>(truths).subspan(i * pixels, pixels)});
   }
-  return picture(strips, {.scale = windows.settings().scale, .side = side});
+  return picture(strips, {array.rows, array.columns, windows.settings().scale, side});
 }
 
 }  // namespace
 
 OutputsFile::OutputsFile(const WindowSet& windows, std::size_t count)
     : timesteps_(static_cast<std::uint64_t>(windows.timesteps())),
+      signals_(windows.array().signals()),
       height_(static_cast<std::uint64_t>(windows.image().height)),
       width_(static_cast<std::uint64_t>(windows.image().width)) {
-  input_.reserve(count * timesteps_ * kTaxels);
+  input_.reserve(count * timesteps_ * signals_);
   output_.reserve(count * height_ * width_);
   truth_.reserve(count * height_ * width_);
 }
@@ -54,7 +57,7 @@ void OutputsFile::add(std::span<const float> window, std::span<const float> outp
 void OutputsFile::write(const std::string& path) const {
   const auto bytes = [](const std::vector<float>& v) { return std::as_bytes(std::span(v)); };
   write_safetensors(path, {{"format", "supertac-outputs"}},
-                    {{"input", "F32", {count_, timesteps_, kTaxels}, bytes(input_)},
+                    {{"input", "F32", {count_, timesteps_, signals_}, bytes(input_)},
                      {"output", "F32", {count_, height_, width_}, bytes(output_)},
                      {"truth", "F32", {count_, height_, width_}, bytes(truth_)}});
 }

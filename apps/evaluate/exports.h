@@ -12,8 +12,8 @@
 
 namespace supertac {
 
-/// Collects windows [N,T,16], outputs [N,H,W] and truths [N,H,W] and writes them as one safetensors file with
-/// tensors "input", "output", "truth".
+/// Collects windows [N,T,signals], outputs [N,H,W] and truths [N,H,W] and writes them as one safetensors file
+/// with tensors "input", "output", "truth".
 class OutputsFile {
  public:
   OutputsFile(const WindowSet& windows, std::size_t count);
@@ -22,7 +22,7 @@ class OutputsFile {
   void write(const std::string& path) const;
 
  private:
-  std::uint64_t timesteps_, height_, width_, count_ = 0;
+  std::uint64_t timesteps_, signals_, height_, width_, count_ = 0;
   std::vector<float> input_, output_, truth_;
 };
 

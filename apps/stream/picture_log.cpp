@@ -9,13 +9,12 @@
 #include <array>
 #include <filesystem>
 
-#include "data/recording.h"
 #include "io/file.h"
 
 namespace supertac {
 
-PictureLog::PictureLog(const std::string& path, bool force, size_t image_size)
-    : path_(path), image_size_(image_size) {
+PictureLog::PictureLog(const std::string& path, bool force, size_t signals, const ImageGrid& image)
+    : path_(path), signals_(signals), image_(image) {
   refuse_existing(path, force);
   times_ = open_spool();
   volts_ = open_spool();
@@ -62,10 +61,11 @@ void PictureLog::write(const std::map<std::string, std::string>& metadata) {
   const auto from = [this](const Spool& spool) {
     return [this, &spool](const ByteSink& sink) { read_back(spool, sink); };
   };
+  const auto height = static_cast<uint64_t>(image_.height), width = static_cast<uint64_t>(image_.width);
   write_safetensors(path_, metadata,
                     {{"time_s", "F64", {count_}, {}, from(times_)},
-                     {"volts", "F32", {count_, kTaxels}, {}, from(volts_)},
-                     {"pictures", "F32", {count_, image_size_, image_size_}, {}, from(pictures_)}});
+                     {"volts", "F32", {count_, signals_}, {}, from(volts_)},
+                     {"pictures", "F32", {count_, height, width}, {}, from(pictures_)}});
 }
 
 }  // namespace supertac

@@ -6,17 +6,18 @@
 #include <span>
 #include <string>
 
+#include "data/taxel_array.h"
 #include "io/safetensors.h"
 
 namespace supertac {
 
-/// Keeps pictures for a safetensors file of tensors time_s F64 [n], volts F32 [n,16] and pictures F32
-/// [n,S,S]. How many there will be is not known before the end, and they do not fit into memory (1 MB/s):
-/// they wait in nameless temporary files beside the final one.
+/// Keeps pictures for a safetensors file of tensors time_s F64 [n], volts F32 [n,signals] and pictures F32
+/// [n,height,width]. How many there will be is not known before the end, and they do not fit into memory (1
+/// MB/s): they wait in nameless temporary files beside the final one.
 class PictureLog {
  public:
   /// @throws FileError when `path` cannot be made there, or exists without `force`.
-  PictureLog(const std::string& path, bool force, size_t image_size);
+  PictureLog(const std::string& path, bool force, size_t signals, const ImageGrid& image);
   /// @throws FileError
   void add(double time_s, std::span<const float> volts, std::span<const float> picture);
   /// Writes the file, atomically. @throws FileError, again when add() has.
@@ -34,7 +35,8 @@ class PictureLog {
   [[noreturn]] void fail();
 
   std::string path_;
-  size_t image_size_;
+  size_t signals_;
+  ImageGrid image_;
   uint64_t count_ = 0;
   std::string problem_;  // of a write that failed: what was kept is not whole
   Spool times_, volts_, pictures_;

@@ -8,7 +8,13 @@
 namespace supertac {
 namespace {
 
-LiveWindowSettings window_settings(const ModelFile& model, double period_s, double filter_s) {
+LiveWindowSettings window_settings(const ModelFile& model, const SensorSource& source) {
+  if (source.array() != model.array()) {
+    throw std::runtime_error("the signals are those of " + source.array().text() +
+                             ", the model was trained on " + model.array().text() +
+                             "; choose signals and model of one array (supertac-info tells)");
+  }
+  const double filter_s = source.filter_s();
   const double trained_s = model.input.filter_s.value_or(filter_s);
   const bool same = std::abs(trained_s - filter_s) < 1e-4;
   if (!same && filter_s > 0) {
@@ -17,18 +23,19 @@ LiveWindowSettings window_settings(const ModelFile& model, double period_s, doub
                              " s; choose signals and model of one kind (supertac-info tells)");
   }
   return {.timesteps = static_cast<int>(model.model->settings().timesteps),
+          .signals = model.array().signals(),
           .rate_hz = model.input.rate_hz,
           .scaling = model.input.scaling,
           .filter_s = same ? 0 : trained_s,
-          .frame_period_s = period_s};
+          .frame_period_s = source.period_s()};
 }
 
 }  // namespace
 
-PictureMaker::PictureMaker(const ModelFile& model, double period_s, double filter_s)
+PictureMaker::PictureMaker(const ModelFile& model, const SensorSource& source)
     : model_(model),
-      window_(window_settings(model, period_s, filter_s)),
-      input_(Shape{1, model.model->settings().timesteps, kWindowTaxels}),
+      window_(window_settings(model, source)),
+      input_(Shape{1, model.model->settings().timesteps, model.model->settings().signals()}),
       output_(model.model->infer(input_)) {}  // the first run takes memory and chooses kernels
 
 std::span<const float> PictureMaker::picture() {

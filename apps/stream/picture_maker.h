@@ -11,17 +11,17 @@ namespace supertac {
 /// Frames in, pictures out: the signal path the model was trained behind, then the model. Used by one thread.
 class PictureMaker {
  public:
-  /// For frames `period_s` apart that have gone through a moving average of `filter_s` already. `model` must
-  /// outlive this. @throws std::runtime_error when the model was trained behind another average, which cannot
-  /// be taken back.
-  PictureMaker(const ModelFile& model, double period_s, double filter_s);
+  /// For the frames of this source. `model` must outlive this. @throws std::runtime_error when the model was
+  /// trained on another array, or behind another moving average than the frames have gone through, which
+  /// cannot be taken back.
+  PictureMaker(const ModelFile& model, const SensorSource& source);
 
   void push(const SensorFrame& frame) { window_.push(frame.time_s, frame.volts); }
-  /// The picture [S][S] after the newest frame, valid until the next call; empty before window_s() without a
-  /// gap.
+  /// The picture [height][width] of image() after the newest frame, valid until the next call; empty before
+  /// window_s() without a gap.
   std::span<const float> picture();
 
-  size_t image_size() const { return static_cast<size_t>(model_.model->settings().image_size()); }
+  ImageGrid image() const { return model_.windows().array->picture(model_.windows().scale); }
   /// Seconds of signal that a picture needs.
   double window_s() const;
   const LiveWindow& window() const { return window_; }

@@ -1,6 +1,7 @@
 #include "apps/stream/sensor_source.h"
 
 #include <algorithm>
+#include <array>
 
 #include "hardware/capture.h"
 #include "hardware/errors.h"
@@ -26,7 +27,8 @@ class BoardSource : public SensorSource {
     if (capture_) capture_->check();
     const auto frame = board_.next(wait_s);
     if (!frame) return std::nullopt;
-    return SensorFrame{frame->time_s, taxel_volts(frame->frame), frame->arrival_s / speedup_};
+    volts_ = taxel_volts(frame->frame);
+    return SensorFrame{frame->time_s, volts_, frame->arrival_s / speedup_};
   }
   bool ended() const override { return false; }
   BoardCounters counters() override { return board_.counters(); }
@@ -39,6 +41,7 @@ class BoardSource : public SensorSource {
   double speedup_;
   std::unique_ptr<JournalWriter> capture_;  // outlives the board, whose port writes to it
   TactileBoard board_;
+  std::array<float, kTaxels> volts_{};
 };
 
 class ReplaySource : public SensorSource {
@@ -52,7 +55,8 @@ class ReplaySource : public SensorSource {
     try {
       const auto frame = board_.next(wait_s);
       if (!frame) return std::nullopt;
-      return SensorFrame{frame->time_s, taxel_volts(frame->frame), monotonic_seconds()};
+      volts_ = taxel_volts(frame->frame);
+      return SensorFrame{frame->time_s, volts_, monotonic_seconds()};
     } catch (const PortUnplugged&) {  // how a capture ends
       ended_ = true;
       return std::nullopt;
@@ -64,6 +68,7 @@ class ReplaySource : public SensorSource {
 
  private:
   TactileBoard board_;
+  std::array<float, kTaxels> volts_{};
   bool ended_ = false;
 };
 
@@ -80,15 +85,14 @@ double median_period(const Recording& recording) {
 class RecordingSource : public SensorSource {
  public:
   explicit RecordingSource(Recording recording)
-      : SensorSource(median_period(recording), recording.filter_s(), false),
+      : SensorSource(median_period(recording), recording.filter_s(), false, recording.array),
         recording_(std::move(recording)) {}
 
   std::optional<SensorFrame> next(double) override {
     if (ended()) return std::nullopt;
-    SensorFrame frame{recording_.time_s[at_], {}, monotonic_seconds()};
-    std::copy_n(&recording_.volts[at_ * kTaxels], kTaxels, frame.volts.begin());
-    ++at_;
-    return frame;
+    const size_t i = at_++, signals = array().signals();
+    return SensorFrame{recording_.time_s[i], std::span(recording_.volts).subspan(i * signals, signals),
+                       monotonic_seconds()};
   }
   bool ended() const override { return at_ == recording_.frames(); }
   BoardCounters counters() override {

@@ -2,9 +2,9 @@
 // the same driver.
 #pragma once
 
-#include <array>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "data/recording.h"
@@ -13,9 +13,9 @@
 namespace supertac {
 
 struct SensorFrame {
-  double time_s = 0;  ///< of the sensor, from any zero
-  std::array<float, kTaxels> volts{};
-  double arrived_s = 0;  ///< on this computer's clock (monotonic_seconds)
+  double time_s = 0;             ///< of the sensor, from any zero
+  std::span<const float> volts;  ///< valid until the next call
+  double arrived_s = 0;          ///< on this computer's clock (monotonic_seconds)
 };
 
 class SensorSource {
@@ -31,16 +31,18 @@ class SensorSource {
 
   double period_s() const { return period_s_; }  ///< between two frames
   double filter_s() const { return filter_s_; }  ///< moving average the frames have gone through already
+  const TaxelArray& array() const { return array_; }
   /// It waits for nobody: when frames are not taken in time they are lost.
   bool live() const { return live_; }
 
  protected:
-  SensorSource(double period_s, double filter_s, bool live)
-      : period_s_(period_s), filter_s_(filter_s), live_(live) {}
+  SensorSource(double period_s, double filter_s, bool live, const TaxelArray& array = {})
+      : period_s_(period_s), filter_s_(filter_s), live_(live), array_(array) {}
 
  private:
   double period_s_, filter_s_;
   bool live_;
+  TaxelArray array_;
 };
 
 /// The board at `port` ("auto" finds it). With `capture` every byte also goes to a journal of that path.

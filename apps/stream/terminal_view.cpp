@@ -30,17 +30,29 @@ size_t level(float value) {
   return static_cast<size_t>((value > 0 ? std::min(value, 1.0F) : 0.0F) * (N - 1) + 0.5F);
 }
 
-// Pixel (row, column) of a picture of any size drawn kSide x kSide, row 0 on top: that is the largest y.
-float pixel(std::span<const float> picture, int row, int column) {
-  const int size = picture.size() == 16 ? 4 : picture.size() == 64 ? 8 : picture.size() == 256 ? 16 : 32;
-  const int repeat = kSide / size;
-  if (picture.empty()) return 0;
-  return picture[static_cast<size_t>((size - 1 - row / repeat) * size + column / repeat)];
+// An image of height x width pixels that is drawn `lines` x `columns`.
+struct Drawing {
+  std::span<const float> values;
+  int height, width, lines, columns;
+};
+
+// The longer side of the array gets kSide pixels of the terminal, the other its share, an even number.
+Drawing drawing_of(std::span<const float> values, const TaxelArray& array, int scale) {
+  const int longer = std::max(array.rows, array.columns);
+  return {values, array.rows * scale, array.columns * scale, kSide * array.rows / longer / 2 * 2,
+          kSide * array.columns / longer};
 }
 
-void append_row(std::string& text, std::span<const float> picture, int line, bool colour) {
+// Row 0 is on top: that is the largest y.
+float pixel(const Drawing& drawing, int row, int column) {
+  if (drawing.values.empty()) return 0;
+  const int r = drawing.height - 1 - row * drawing.height / drawing.lines;
+  return drawing.values[static_cast<size_t>(r * drawing.width + column * drawing.width / drawing.columns)];
+}
+
+void append_row(std::string& text, const Drawing& picture, int line, bool colour) {
   size_t above_before = kHeat.size(), below_before = kHeat.size();
-  for (int column = 0; column < kSide; ++column) {
+  for (int column = 0; column < picture.columns; ++column) {
     const float above = pixel(picture, 2 * line, column), below = pixel(picture, 2 * line + 1, column);
     if (!colour) {
       text += kInk[level<kInk.size()>(0.5F * (above + below))];
@@ -77,10 +89,12 @@ std::string status_line(const LiveState& state) {
 
 std::string render(const LiveState& state, bool colour) {
   std::string text;
-  for (int line = 0; line < kSide / 2; ++line) {
-    append_row(text, state.taxels, line, colour);
+  const Drawing felt = drawing_of(state.taxels, state.array, 1);
+  const Drawing seen = drawing_of(state.picture, state.array, state.scale);
+  for (int line = 0; line < felt.lines / 2; ++line) {
+    append_row(text, felt, line, colour);
     text += "   ";
-    append_row(text, state.picture, line, colour);
+    append_row(text, seen, line, colour);
     text += '\n';
   }
   return text + status_line(state);

@@ -1,7 +1,6 @@
 // The live picture on a terminal: what the array feels and what the network makes of it, side by side.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstdint>
 #include <mutex>
@@ -9,20 +8,23 @@
 #include <thread>
 #include <vector>
 
-#include "data/recording.h"
+#include "data/taxel_array.h"
 
 namespace supertac {
 
 struct LiveState {
-  std::array<float, kTaxels> taxels{};  ///< in [0,1]
-  std::vector<float> picture;           ///< [S][S], S = 8, 16 or 32; empty before the first
+  TaxelArray array;
+  int scale = 4;               ///< of the picture
+  std::vector<float> taxels;   ///< [rows][columns] in [0,1]; empty before the first
+  std::vector<float> picture;  ///< [rows * scale][columns * scale]; empty before the first
   double frames_per_s = 0;
   double median_ms = 0, p99_ms = 0;  ///< latency
   uint64_t lost = 0, dropped = 0;
 };
 
-/// Two pictures of 32 columns and 16 lines, y upwards, and a line of figures; every line ends with a line
-/// feed. `colour`: half blocks in 256 colours, two pixels a character; without, characters from blank to @.
+/// Two pictures of 32 columns and 16 lines, or less for the shorter side of the array, y upwards, and a line
+/// of figures; every line ends with a line feed. `colour`: half blocks in 256 colours, two pixels a
+/// character; without, characters from blank to @.
 std::string render(const LiveState& state, bool colour);
 /// The line of figures alone.
 std::string status_line(const LiveState& state);

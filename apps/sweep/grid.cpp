@@ -52,7 +52,7 @@ void declare_grid(Arguments& a) {
   a.option("preset", "A,B,...", "networks to start from: paper, tiny", "paper");
   a.option("timesteps", "T,...", "samples per window, multiples of 16, 32 to 512 (default: the preset's)");
   a.option("latent", "LD,...", "latent numbers per group of taxels (default: the preset's)");
-  a.option("scale", "N,...", "pictures of 4 N pixels a side: 2, 4, 8 (default: the preset's)");
+  a.option("scale", "N,...", "pictures N times as fine as the array: 2, 4, 8 (default: the preset's)");
   a.option("channels", "N,...", "of the upsampler (default: the preset's)");
   a.option("rcabs", "N,...", "residual channel attention blocks per stage (default: the preset's)");
   a.option("seeds", "N,...", "of split, initial weights, order, noise", "0");

@@ -23,7 +23,7 @@ double thread_seconds() {
 }  // namespace
 
 Latency measure_latency(const SuperTac& model) {
-  Tensor window(Shape{1, model.settings().timesteps, kWindowTaxels});
+  Tensor window(Shape{1, model.settings().timesteps, model.settings().signals()});
   const RandomStream random(0, 0);
   std::uint64_t i = 0;
   for (real& x : window.values()) x = static_cast<real>(random.uniform(i++));

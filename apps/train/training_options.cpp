@@ -10,6 +10,9 @@ void declare_training(Arguments& a) {
   a.option("rate", "HZ",
            "of the model's samples: T samples span T / HZ seconds; default 100 for paper, 50 for tiny; the "
            "paper's is 300, and the board's filter leaves nothing above 10");
+  a.option("range", "REST,SPAN",
+           "a signal V becomes clip((REST - V) / SPAN, 0, 1), in volts or whatever the recordings hold",
+           "2.45,0.36");
   a.option("stride", "N", "take every N-th window of a pass", "1");
   a.option("scaling", "NAME",
            "of the signals: levelled (each window to its own rest and gain, so that a finger pressed harder "
@@ -49,11 +52,19 @@ SplitKind training_split(const Arguments& a) {
   return split_kind(a.choice("split", {"window", "pass", "trial", "texture", "none"}));
 }
 
+Scaling training_range(const Arguments& a) {
+  const std::vector<double> numbers = a.numbers("range", -1000, 1000);
+  if (numbers.size() != 2 || numbers[1] <= 1e-6)
+    throw UsageError("--range expects REST,SPAN with a SPAN above 0, found " + a.text("range"));
+  return {.rest_volts = numbers[0], .span_volts = numbers[1]};
+}
+
 WindowSet training_windows(const Arguments& a, const SuperTacSettings& model) {
   WindowSettings w;
   w.timesteps = static_cast<int>(model.timesteps);
   w.scale = static_cast<int>(model.scale);
   w.rate_hz = a.given("rate") ? a.number("rate", 20, 2000) : rate_of_preset(model.preset);
+  w.scaling = training_range(a);
   w.stride = static_cast<int>(a.integer("stride", 1, 100'000));
   w.scaling.levelled = a.choice("scaling", {"levelled", "fixed"}) == "levelled";
   WindowSet windows = WindowSet::load(a.text("data"), a.list("plates"), w);

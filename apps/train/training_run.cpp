@@ -85,8 +85,7 @@ bool TrainingRun::train() {
   if (!trainer_.done()) return false;
   std::map<std::string, std::string> metadata = origin_;
   metadata["training"] = trainer_.settings().text();
-  save_model(target_.out, trainer_.model(),
-             {windows_.settings().rate_hz, windows_.settings().scaling, windows_.filter_s()}, metadata);
+  save_model(target_.out, trainer_.model(), input_of(windows_), metadata);
   return true;
 }
 

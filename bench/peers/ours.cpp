@@ -44,8 +44,8 @@ class Ours {
     }
     if (what == "infer" && words >> number >> seconds && number <= windows_.dim(0)) {
       omp_set_num_threads(1);
-      const Dim values = model_->settings().timesteps * kWindowTaxels;
-      const Tensor batch = Tensor::of({number, model_->settings().timesteps, kWindowTaxels},
+      const Dim values = model_->settings().timesteps * kTaxels;
+      const Tensor batch = Tensor::of({number, model_->settings().timesteps, kTaxels},
                                       windows_.values().first(static_cast<std::size_t>(number * values)));
       return timed(seconds, [&] { model_->infer(batch); });
     }
@@ -60,17 +60,18 @@ class Ours {
   static Tensor read_windows(const std::string& path) {
     const SafetensorsFile file = SafetensorsFile::read(path);
     const TensorInfo& info = file.tensors().at("windows");
-    return Tensor::of({static_cast<Dim>(info.shape.at(0)), static_cast<Dim>(info.shape.at(1)), kWindowTaxels},
+    return Tensor::of({static_cast<Dim>(info.shape.at(0)), static_cast<Dim>(info.shape.at(1)), kTaxels},
                       file.f32("windows"));
   }
 
   std::string pictures(const std::string& path) {
     const Tensor pictures = model_->infer(windows_);
-    const auto size = static_cast<std::uint64_t>(model_->settings().image_size());
+    const auto height = static_cast<std::uint64_t>(model_->settings().image_height());
+    const auto width = static_cast<std::uint64_t>(model_->settings().image_width());
     write_safetensors(path, {},
                       {{"pictures",
                         "F32",
-                        {static_cast<std::uint64_t>(windows_.dim(0)), size, size},
+                        {static_cast<std::uint64_t>(windows_.dim(0)), height, width},
                         std::as_bytes(pictures.values())}});
     return "done";
   }

@@ -169,7 +169,7 @@ void expect_pairs_of(const std::string& path, const WindowSet& windows,
   const PairSet pairs = PairSet::read(path);
   ASSERT_EQ(pairs.size(), indices.size());
   ASSERT_TRUE(pairs.grouped());
-  const size_t pixels = static_cast<size_t>(windows.image_size() * windows.image_size());
+  const size_t pixels = windows.image().pixels();
   std::vector<float> input(16), target(pixels), truth(pixels);
   for (size_t n = 0; n < indices.size(); ++n) {
     pairs.input(n, {{0}, {1}}, input);

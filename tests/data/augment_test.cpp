@@ -117,5 +117,30 @@ TEST(Augment, RefusesNegativeMagnitudes) {
   EXPECT_NO_THROW(check(AugmentSettings{}));
 }
 
+// More signals than the rig has: every term has numbers of its own, and a dropped taxel loses all channels.
+TEST(Augment, AnyArray) {
+  const TaxelArray array{.rows = 3, .columns = 5, .channels = 3};
+  std::set<float> levels;
+  size_t dropped = 0;
+  for (uint64_t sample = 0; sample < 50; ++sample) {
+    std::vector<float> window(8 * array.signals(), 0.5F);
+    augment({.gain = 0.5, .taxel_gain = 0.3, .offset = 0.02, .dropped = 2}, 1, sample, window, array);
+    for (size_t k = 0; k < array.signals(); k += 3) {
+      const bool silent = window[k] == 0;
+      dropped += silent;
+      for (size_t c = 0; c < 3; ++c) EXPECT_EQ(window[k + c] == 0, silent);
+    }
+    for (size_t k = 0; k < array.signals(); ++k) {
+      levels.insert(window[k]);
+      EXPECT_EQ(window[7 * array.signals() + k], window[k]);
+    }
+  }
+  EXPECT_NEAR(static_cast<double>(dropped), 50, 20);
+  EXPECT_GT(levels.size(), 1800U);  // of 2250, some of which are clipped or dropped
+  std::vector<float> window(array.signals());
+  EXPECT_THROW(augment({.dropped = 16}, 1, 1, window, array), std::invalid_argument);
+  EXPECT_THROW(augment({.gain = 1}, 1, 1, std::span(window).first(44), array), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace supertac

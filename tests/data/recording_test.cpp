@@ -49,6 +49,46 @@ TEST(Recording, RoundTripKeepsEverything) {
   EXPECT_EQ(read.metadata, written.metadata);
 }
 
+TEST(Recording, CarriesItsArrayUnlessItIsTheRigs) {
+  TemporaryFolder folder;
+  write_recording(folder.file("rig"), example());
+  EXPECT_FALSE(SafetensorsFile::read(folder.file("rig")).metadata().contains("array"));
+  Recording written = example();
+  written.array = {.rows = 2, .columns = 3, .pitch_mm = 2.5, .channels = 3};
+  written.volts.resize(written.frames() * 18);
+  write_recording(folder.file("other"), written);
+  const Recording read = read_recording(folder.file("other"));
+  EXPECT_EQ(read.array, written.array);
+  EXPECT_EQ(read.volts, written.volts);
+  EXPECT_EQ(read.metadata, written.metadata);
+  EXPECT_EQ(read.array.text(), "2x3 taxels at 2.5 mm with 3 channels");
+}
+
+TEST(Recording, RefusesAnArrayThatIsNone) {
+  TemporaryFolder folder;
+  Recording recording = example();
+  recording.metadata["array"] = "4x4";
+  EXPECT_NE(message_of<std::invalid_argument>([&] {
+              write_recording(folder.file("a"), recording);
+            }).find("metadata field \"array\" is a member"),
+            std::string::npos);
+  recording = example();
+  recording.array.rows = 17;
+  recording.volts.resize(recording.frames() * 17 * 4);
+  EXPECT_THROW(write_recording(folder.file("a"), recording), std::invalid_argument);
+  std::map<std::string, std::string> metadata{{"kind", "recording"}, {"plate", "3_Bumps"},
+                                              {"trial", "1"},        {"pass", "1"},
+                                              {"speed_mm_s", "10"},  {"source", "other"}};
+  for (const char* array :
+       {"4x4", R"({"rows": 4})", R"({"rows": 0, "columns": 4, "pitch_mm": 3, "channels": 1})"}) {
+    metadata["array"] = array;
+    write_safetensors(folder.file("a"), metadata, {});
+    EXPECT_NE(message_of<FileError>([&] { read_recording(folder.file("a")); }).find("expected"),
+              std::string::npos)
+        << array;
+  }
+}
+
 TEST(Recording, PositionsMayBeUnknown) {
   TemporaryFolder folder;
   Recording recording = example();

@@ -61,8 +61,30 @@ TEST(Simulator, EachRowFeelsTheRidgeWhereItIs) {
     for (size_t i = 0; i < r.frames(); ++i)
       if (r.volts[i * kTaxels + static_cast<size_t>(k)] < r.volts[at * kTaxels + static_cast<size_t>(k)])
         at = i;
-    EXPECT_NEAR(r.position_mm[2 * at + 1] + taxel_y_mm(k), crest, 0.1) << k;
+    EXPECT_NEAR(r.position_mm[2 * at + 1] + TaxelArray{}.y_mm(k), crest, 0.1) << k;
   }
+}
+
+TEST(Simulator, AnyArrayFeelsTheRidgeWhereItIs) {
+  SimulatorSettings settings = clean();
+  settings.array = {.rows = 6, .columns = 3, .pitch_mm = 2};
+  const Plate plate("one", {{TextureKind::ridges, 40, 2.5}});
+  const Recording r = simulate_pass(plate, {.pass = 4}, settings);
+  EXPECT_EQ(r.array, settings.array);
+  ASSERT_EQ(r.volts.size(), r.frames() * 18);
+  for (size_t k = 0; k < 18; ++k) {
+    size_t at = 0;
+    for (size_t i = 0; i < r.frames(); ++i)
+      if (r.volts[i * 18 + k] < r.volts[at * 18 + k]) at = i;
+    EXPECT_NEAR(r.position_mm[2 * at + 1] + settings.array.y_mm(static_cast<int>(k)), plate.crests()[0], 0.15)
+        << k;
+  }
+  // A taxel far outside of the rig's pad still has points to feel with.
+  settings.array = {.rows = 16, .columns = 16, .pitch_mm = 5};
+  for (const double load : FingerModel(plate, settings, {}).loads({.x_mm = 18, .y_mm = 54, .z_mm = -1}))
+    EXPECT_TRUE(std::isfinite(load));
+  settings.array.channels = 2;
+  EXPECT_THROW(simulate_pass(plate, {}, settings), std::invalid_argument);
 }
 
 TEST(Simulator, FourPhases) {
@@ -127,7 +149,8 @@ TEST(FingerModel, TheMountLiftsTheOtherRowsOffThePlate) {
   SimulatorSettings yielding = clean();
   yielding.with_mount = true;
   const double crest = plate.crests()[0];
-  const FingerPose on_bump{.x_mm = 18, .y_mm = crest - taxel_y_mm(12), .z_mm = -0.35};  // row 3 on the bump
+  const FingerPose on_bump{
+      .x_mm = 18, .y_mm = crest - TaxelArray{}.y_mm(12), .z_mm = -0.35};  // row 3 on the bump
   EXPECT_GT(FingerModel(plate, clean(), {}).loads(on_bump)[0], 0.1);
   EXPECT_EQ(FingerModel(plate, yielding, {}).loads(on_bump)[0], 0);
   EXPECT_GT(FingerModel(plate, yielding, {}).loads(on_bump)[12], 0.1);

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "data/baselines.h"
+#include "data/simulator.h"
 #include "data/truth.h"
 #include "tests/data/test_recordings.h"
 
@@ -104,6 +106,53 @@ TEST(Windows, AFlaggedReliablePassIsKept) {
   WindowSet set(wide_settings(16));
   set.add(recording);
   EXPECT_EQ(set.size(), 85U);
+}
+
+TEST(Windows, OfAnyArray) {
+  SimulatorSettings settings;
+  settings.array = {.rows = 6, .columns = 6, .pitch_mm = 2};
+  const Recording recording = simulate_pass(Plate::named("4_Blob"), {.pass = 4}, settings);
+  WindowSet set(WindowSettings{.timesteps = 32});
+  set.add(recording);
+  EXPECT_EQ(set.array(), settings.array);
+  EXPECT_EQ(set.image(), (ImageGrid{24, 24, 0.5}));
+  EXPECT_EQ(set.window(0).size(), 32U * 36);
+  EXPECT_EQ(set.last_frame(5).size(), 36U);
+  std::vector<float> truth(576), expected(576);
+  for (size_t i = 0; i < set.size(); i += 97) {
+    set.truth(i, truth);
+    truth_image(Plate::named("4_Blob"), set.position(i).x_mm, set.position(i).y_mm, {24, 24, 0.5}, expected);
+    ASSERT_EQ(truth, expected);
+  }
+  std::vector<uint32_t> train;
+  for (uint32_t i = 0; i < set.size(); i += 9) train.push_back(i);
+  for (const auto& baseline : fit_baselines(set, train)) {
+    baseline->predict(set.window(0), truth);
+    EXPECT_TRUE(std::isfinite(truth[575])) << baseline->name();
+  }
+}
+
+TEST(Windows, RefuseRecordingsOfAnotherArray) {
+  const auto message = [](WindowSet& set) -> std::string {
+    try {
+      set.add(make_recording({}));
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  WindowSettings settings = wide_settings(16);
+  settings.array = TaxelArray{.rows = 6, .columns = 6, .pitch_mm = 2};
+  WindowSet for_model(settings);
+  EXPECT_EQ(
+      message(for_model),
+      "was recorded with 4x4 taxels at 3 mm, expected 6x6 taxels at 2 mm; give recordings of the array the "
+      "model is for, and no others");
+  WindowSet mixed(wide_settings(16));
+  Recording other = make_recording({});
+  other.array.pitch_mm = 2.5;
+  mixed.add(other);
+  EXPECT_NE(message(mixed).find("expected 4x4 taxels at 2.5 mm"), std::string::npos);
 }
 
 TEST(Windows, TruthIsTheTruthImageOfTheLastFrame) {

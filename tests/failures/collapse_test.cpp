@@ -39,7 +39,7 @@ class CollapseTest : public ::testing::Test {
 
  private:
   Tensor two_windows() const {
-    Tensor two(Shape{2, windows.timesteps(), kWindowTaxels});
+    Tensor two(Shape{2, windows.timesteps(), kTaxels});
     const auto half = static_cast<std::size_t>(two.size() / 2);
     windows.window(0, two.values().first(half));
     windows.window(windows.size() / 4, two.values().last(half));

@@ -11,10 +11,11 @@ namespace {
 
 TEST(TextureClassifier, TakesFramesAndPictures) {
   Rng rng(1);
-  EXPECT_EQ(
-      TextureClassifier({.size = 4, .classes = 6}, rng).forward(Variable(uniform({2, 4, 4, 1}, 1))).shape(),
-      (Shape{2, 6}));
-  EXPECT_EQ(TextureClassifier({.size = 16, .classes = 3}, rng)
+  EXPECT_EQ(TextureClassifier({.height = 4, .width = 4, .classes = 6}, rng)
+                .forward(Variable(uniform({2, 4, 4, 1}, 1)))
+                .shape(),
+            (Shape{2, 6}));
+  EXPECT_EQ(TextureClassifier({.height = 16, .width = 16, .classes = 3}, rng)
                 .forward(Variable(uniform({2, 16, 16, 1}, 1)))
                 .shape(),
             (Shape{2, 3}));
@@ -22,8 +23,8 @@ TEST(TextureClassifier, TakesFramesAndPictures) {
 
 TEST(TextureClassifier, RefusesSettingsOutOfRange) {
   Rng rng(1);
-  EXPECT_THROW(TextureClassifier({.size = 2, .classes = 6}, rng), std::invalid_argument);
-  EXPECT_THROW(TextureClassifier({.size = 16, .classes = 1}, rng), std::invalid_argument);
+  EXPECT_THROW(TextureClassifier({.height = 2, .width = 4, .classes = 6}, rng), std::invalid_argument);
+  EXPECT_THROW(TextureClassifier({.height = 16, .width = 16, .classes = 1}, rng), std::invalid_argument);
 }
 
 TEST(FeatureClassifier, TakesNumbersAndRefusesNone) {
@@ -43,7 +44,7 @@ TEST(TextureClassifier, LearnsToTellTwoTextures) {
     for (Dim i = 0; i < 64; ++i) x.data()[n * 64 + i] = ((n % 2 ? i / 8 : i % 8) + n) % 4 < 2 ? 1 : 0;
   }
   Rng rng(2);
-  const TextureClassifier classifier({.size = 8, .classes = 2}, rng);
+  const TextureClassifier classifier({.height = 8, .width = 8, .classes = 2}, rng);
   Adam adam(values_of(classifier.parameters()), {.learning_rate = 3e-3});
   real loss_value = 0;
   for (int step = 0; step < 60; ++step) {

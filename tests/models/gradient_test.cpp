@@ -27,10 +27,11 @@ void expect_right_gradients(const SuperTacSettings& settings) {
     if (v.rank() < 2) continue;
     for (real& w : v.mutable_value().values()) w *= 2.2;
   }
-  const Tensor windows = uniform({2, settings.timesteps, kWindowTaxels}, 1);
-  const Tensor truth = uniform({2, settings.image_size(), settings.image_size(), 1}, 2);
-  std::array<Tensor, kGroups> eps;
-  for (std::size_t i = 0; i < kGroups; ++i) eps[i] = uniform({2, settings.latent}, 3 + i);
+  const Tensor windows = uniform({2, settings.timesteps, settings.signals()}, 1);
+  const Tensor truth = uniform({2, settings.image_height(), settings.image_width(), 1}, 2);
+  std::vector<Tensor> eps;
+  for (Dim i = 0; i < settings.groups(); ++i)
+    eps.push_back(uniform({2, settings.latent}, 3 + static_cast<std::uint64_t>(i)));
   const auto loss = [&] {
     return supertac_loss(model.forward(windows, eps), truth, {.a = 0.5, .beta = 0.01, .lambda = 0.3}).total;
   };
@@ -58,6 +59,20 @@ TEST(SuperTacGradient, PictureOfSixteenPixelsVerticalGroups) {
   s.rcabs = 1;
   s.grouping = Grouping::vertical;
   expect_right_gradients(s);
+}
+
+// Rows, columns and channels all differ, so that none can stand for another.
+TEST(SuperTacGradient, ThreeByFiveTaxelsOfTwoChannels) {
+  SuperTacSettings s;
+  s.rows = 3, s.columns = 5, s.in_channels = 2;
+  s.timesteps = 32;
+  s.latent = 2;
+  s.channels = 4;
+  s.rcabs = 1;
+  for (const Grouping grouping : {Grouping::horizontal, Grouping::vertical}) {
+    s.grouping = grouping;
+    expect_right_gradients(s);
+  }
 }
 
 TEST(FrameModelGradient, ThroughEveryLayer) {

@@ -36,6 +36,23 @@ TEST(ModelFile, ComesBackWithItsSettingsInputAndPictures) {
   for (Dim i = 0; i < a.size(); ++i) EXPECT_EQ(a.data()[i], b.data()[i]);
 }
 
+TEST(ModelFile, KeepsTheArrayAndSaysNothingOfTheRigs) {
+  const TemporaryFolder folder;
+  Rng rng(1);
+  SuperTacSettings settings = small_settings();
+  set_array(settings, {.rows = 4, .columns = 5, .channels = 3});
+  const SuperTac model(settings, rng);
+  save_model(folder / "m.safetensors", model, {.pitch_mm = 2.5}, {});
+  const ModelFile file = load_model(folder / "m.safetensors");
+  EXPECT_EQ(file.array(), (TaxelArray{4, 5, 2.5, 3}));
+  EXPECT_EQ(file.windows().array->picture(2), (ImageGrid{8, 10, 1.25}));
+  const Tensor x = uniform({2, 32, 60}, 1), a = model.infer(x), b = file.model->infer(x);
+  for (Dim i = 0; i < a.size(); ++i) EXPECT_EQ(a.data()[i], b.data()[i]);
+  const auto rigs = model_metadata(small_settings(), {});
+  EXPECT_EQ(rigs.at("settings").find("rows"), std::string::npos);
+  EXPECT_EQ(rigs.at("input").find("pitch"), std::string::npos);
+}
+
 // A file of version 1, to be read for ever: settings, names, layouts and what they compute.
 TEST(ModelFile, ReadsTheGoldenFileOfVersion1) {
   const ModelFile file = load_model(std::string(SUPERTAC_GOLDEN_DIR) + "/model_v1.safetensors");

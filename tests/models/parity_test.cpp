@@ -19,6 +19,7 @@ using test::Difference;
 using test::doubles;
 using test::stored;
 
+constexpr Dim kGroups = 4, kTaxels = 16;
 constexpr bool kDouble = sizeof(real) == 8;
 constexpr Dim kBatch = 4, kTimesteps = 32, kLatent = 3, kSteps = 10;
 constexpr std::size_t kSampleAbove = 1024, kSampleStride = 13;
@@ -132,9 +133,7 @@ std::array<Tensor, kGroups> eps_of_step(Dim step) {
   return eps;
 }
 
-Tensor small_windows() {
-  return tensor({kBatch, kTimesteps, kWindowTaxels}, stored(reference(), "small.windows"));
-}
+Tensor small_windows() { return tensor({kBatch, kTimesteps, kTaxels}, stored(reference(), "small.windows")); }
 
 Loss loss_of(const SuperTac::Output& out) {
   const Tensor truth = tensor({kBatch, 16, 16, 1}, stored(reference(), "small.truth"));
@@ -228,10 +227,10 @@ TEST(Parity, VerticalGrouping) {
 TEST(Parity, FullSizeOutputs) {
   Comparison compare;
   constexpr Dim kImages = 2, kT = 256, kLd = 10;
-  std::vector<double> windows = counter_numbers("full.windows", kImages * kT * kWindowTaxels);
+  std::vector<double> windows = counter_numbers("full.windows", kImages * kT * kTaxels);
   for (double& x : windows) x = (x + 1) / 2;
   const SuperTac model = make_model(kT, kLd);
-  const Tensor input = tensor({kImages, kT, kWindowTaxels}, windows);
+  const Tensor input = tensor({kImages, kT, kTaxels}, windows);
   std::array<Tensor, kGroups> eps;
   for (Tensor& t : eps) t = Tensor::zeros({kImages, kLd});
   expect_outputs(compare, "full", model.forward(input, eps));

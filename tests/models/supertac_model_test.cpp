@@ -60,6 +60,35 @@ TEST(SuperTac, VerticalGroupsAreTheColumnsOfTheArray) {
   for (Dim k = 0; k < 4; ++k) EXPECT_EQ(out.input[1].value().data()[4 + k], windows.data()[16 + 1 + 4 * k]);
 }
 
+// One number of a window for each (row, column, channel): where it goes shows where it came from.
+TEST(SuperTac, GroupsOfAnyArrayHoldTheirTaxelsWithAllChannels) {
+  SuperTacSettings s = small_settings();
+  s.rows = 2, s.columns = 12, s.in_channels = 3;
+  s.scale = 4;
+  Tensor windows(Shape{1, 32, 72});
+  for (Dim i = 0; i < windows.size(); ++i) windows.data()[i] = static_cast<real>(i % 72) / 72;
+  for (const Grouping grouping : {Grouping::horizontal, Grouping::vertical}) {
+    s.grouping = grouping;
+    const bool by_rows = grouping == Grouping::horizontal;
+    Rng rng(1);
+    const SuperTac model(s, rng);
+    EXPECT_EQ(s.groups(), by_rows ? 2 : 12);
+    const std::vector<Tensor> eps(static_cast<std::size_t>(s.groups()), Tensor::zeros({1, 3}));
+    const SuperTac::Output out = model.forward(windows, eps);
+    ASSERT_EQ(out.decoded.size(), eps.size());
+    EXPECT_EQ(out.decoded[1].shape(), (Shape{1, 32, by_rows ? 36 : 6}));
+    EXPECT_EQ(out.image.shape(), (Shape{1, 8, 48, 1}));
+    const real* second = out.input[1].value().data();
+    for (Dim taxel = 0; taxel < (by_rows ? 12 : 2); ++taxel) {
+      for (Dim c = 0; c < 3; ++c) {
+        const Dim from = by_rows ? 12 + taxel : 12 * taxel + 1;
+        EXPECT_EQ(second[3 * taxel + c], static_cast<real>(3 * from + c) / 72);
+      }
+    }
+    EXPECT_EQ(model.encode(windows).shape(), (Shape{1, 3 * s.groups()}));
+  }
+}
+
 TEST(SuperTac, EvaluationIsDeterministicAndUsesTheMean) {
   Rng rng(1);
   const SuperTac model(small_settings(), rng);
@@ -110,6 +139,14 @@ TEST(SuperTac, RefusesSettingsAndWindowsThatDoNotFit) {
   s = small_settings();
   s.scale = 3;
   EXPECT_EQ(message(s), "model settings: scale must be 2, 4 or 8, got 3");
+  s = small_settings();
+  s.columns = 17;
+  EXPECT_EQ(message(s), "model settings: columns must be 2 to 16, got 17");
+  s.columns = 4, s.rows = 3;
+  EXPECT_EQ(
+      message(s),
+      "model settings: scale 2 of an array of 3x4 makes pictures with a side below 7 pixels, too small for "
+      "SSIM; raise scale");
   Rng rng(1);
   const SuperTac model(small_settings(), rng);
   try {

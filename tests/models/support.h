@@ -1,6 +1,7 @@
 // Small models and windows for the tests of models/.
 #pragma once
 
+#include <array>
 #include <string>
 
 #include "data/windows.h"
@@ -17,6 +18,9 @@ inline Tensor uniform(const Shape& shape, std::uint64_t seed) {
   for (real& x : t.values()) x = static_cast<real>(random.uniform(i++));
   return t;
 }
+
+/// Of the rig's array.
+inline constexpr Dim kGroups = 4;
 
 inline std::array<Tensor, kGroups> normal_eps(Dim n, Dim latent, std::uint64_t seed) {
   std::array<Tensor, kGroups> eps;

@@ -1,0 +1,93 @@
+// Another sensor from simulation to scores: nothing but the recordings says what it is.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "data/recording.h"
+#include "io/file.h"
+#include "io/safetensors.h"
+#include "tests/apps/process.h"
+
+namespace supertac {
+namespace {
+
+void simulate(const std::string& out, const std::vector<std::string>& array) {
+  std::vector<std::string> arguments = {"--out", out,        "--plates", "bumps12",  "--speeds",
+                                        "10",    "--passes", "1",        "--trials", "2"};
+  arguments.insert(arguments.end(), array.begin(), array.end());
+  const auto done = run_process("supertac-simulate", arguments);
+  ASSERT_EQ(done.code, 0) << done.error;
+}
+
+void train(const std::string& data, const std::string& model) {
+  const auto done =
+      run_process("supertac-train", {"--data", data, "--out", model, "--preset", "tiny", "--timesteps", "32",
+                                     "--epochs", "1", "--stride", "40", "--batch", "8"});
+  ASSERT_EQ(done.code, 0) << done.error;
+}
+
+nlohmann::json evaluate(const TemporaryFolder& folder, const std::string& data, const std::string& model) {
+  const std::string json = folder / "scores.json", outputs = folder / "outputs.safetensors";
+  const auto done =
+      run_process("supertac-evaluate", {"--data", data, "--model", model, "--limit", "40", "--json", json,
+                                        "--outputs", outputs, "--pictures", folder / "pictures"});
+  EXPECT_EQ(done.code, 0) << done.error;
+  return nlohmann::json::parse(read_text_file(json, 1 << 20));
+}
+
+TEST(Array, SixBySixFromSimulationToScores) {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data", model = folder / "m.safetensors";
+  simulate(data, {"--array", "6x6", "--pitch", "2"});
+  train(data, model);
+  const auto scores = evaluate(folder, data, model);
+  EXPECT_EQ(scores.at("all").at("windows"), 40);
+  EXPECT_TRUE(scores.at("baselines").at("ridge").at("all").at("ssim").is_number());
+  const SafetensorsFile outputs = SafetensorsFile::read(folder / "outputs.safetensors");
+  EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<uint64_t>{40, 32, 36}));
+  EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<uint64_t>{40, 24, 24}));
+
+  simulate(folder / "rig", {});
+  const auto mismatch = run_process("supertac-evaluate", {"--data", folder / "rig", "--model", model});
+  EXPECT_EQ(mismatch.code, 1);
+  EXPECT_NE(
+      mismatch.error.find("bumps12_t1_p1_v10.safetensors: was recorded with 4x4 taxels at 3 mm, expected 6x6 "
+                          "taxels at 2 mm; give recordings of the array the model is for, and no others\n"),
+      std::string::npos)
+      << mismatch.error;
+}
+
+// Three numbers a taxel, as a magnetic sensor gives, on an array that is no square.
+TEST(Array, ThreeChannelsOfTwoBySix) {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data", model = folder / "m.safetensors";
+  simulate(data, {"--array", "2x6", "--pitch", "2.5"});
+  for (const std::string& path : list_recordings(data)) {
+    Recording recording = read_recording(path);
+    const std::vector<float> one = recording.volts;
+    recording.array.channels = 3;
+    recording.volts.clear();
+    for (const float v : one) recording.volts.insert(recording.volts.end(), {v, 0.5F * v + 1.2F, 2.4F});
+    write_recording(path, recording);
+  }
+  train(data, model);
+  const auto scores = evaluate(folder, data, model);
+  EXPECT_TRUE(scores.at("all").at("ssim").is_number());
+  const SafetensorsFile outputs = SafetensorsFile::read(folder / "outputs.safetensors");
+  EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<uint64_t>{40, 32, 36}));
+  EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<uint64_t>{40, 8, 24}));
+}
+
+TEST(Array, RefusesWhatIsNoArray) {
+  const TemporaryFolder folder;
+  for (const char* array : {"6", "6x", "x6", "1x6", "6x17", "6x6x3", "4,4"}) {
+    const auto done = run_process("supertac-simulate", {"--out", folder / "data", "--array", array});
+    EXPECT_EQ(done.code, 2) << array;
+    EXPECT_NE(done.error.find(std::string("--array expects ROWSxCOLUMNS, 2 to 16 each, found ") + array),
+              std::string::npos)
+        << done.error;
+  }
+}
+
+}  // namespace
+}  // namespace supertac
