@@ -26,9 +26,9 @@ class Classify : public testing::Test {
   static void TearDownTestSuite() { folder_.reset(); }
 
   static void train(const std::string& split) {
-    const ProcessResult made =
-        run_process("supertac-train", {"--data", path("data"), "--out", path(split), "--timesteps", "32",
-                                       "--latent", "3", "--stride", "16", "--epochs", "1", "--split", split});
+    const ProcessResult made = run_process(
+        "supertac-train", {"--data", path("data"), "--out", path(split), "--timesteps", "32", "--latent", "3",
+                           "--rate", "300", "--stride", "16", "--epochs", "1", "--split", split});
     ASSERT_EQ(made.code, 0) << made.error;
   }
   static std::string path(const std::string& name) { return *folder_ / name; }

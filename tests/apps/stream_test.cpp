@@ -334,7 +334,8 @@ TEST(Stream, AModelOfAnotherArrayTakesItsRecordingsOnly) {
   set_array(settings, array);
   Rng rng(1);
   const std::string model = folder / "m.safetensors", out = folder / "o.safetensors";
-  save_model(model, SuperTac(settings, rng), {.filter_s = 0.0992, .pitch_mm = array.pitch_mm}, {});
+  save_model(model, SuperTac(settings, rng), {.scaling = {}, .filter_s = 0.0992, .pitch_mm = array.pitch_mm},
+             {});
   write_recording(folder / "own.safetensors", simulate_pass(Plate::named("bumps12"), {}, {.array = array}));
   write_recording(folder / "rig.safetensors", simulate_pass(Plate::named("bumps12"), {}));
   const auto own = run_process("supertac-stream", {"--recording", folder / "own.safetensors", "--model",

@@ -42,7 +42,7 @@ TEST(ModelFile, KeepsTheArrayAndSaysNothingOfTheRigs) {
   SuperTacSettings settings = small_settings();
   set_array(settings, {.rows = 4, .columns = 5, .channels = 3});
   const SuperTac model(settings, rng);
-  save_model(folder / "m.safetensors", model, {.pitch_mm = 2.5}, {});
+  save_model(folder / "m.safetensors", model, {.scaling = {}, .pitch_mm = 2.5}, {});
   const ModelFile file = load_model(folder / "m.safetensors");
   EXPECT_EQ(file.array(), (TaxelArray{4, 5, 2.5, 3}));
   EXPECT_EQ(file.windows().array->picture(2), (ImageGrid{8, 10, 1.25}));
