@@ -11,6 +11,7 @@
 #include "apps/common/signals.h"
 #include "apps/common/version.h"
 #include "data/baselines.h"
+#include "data/levelling.h"
 #include "data/metrics.h"
 #include "data/simulator.h"
 #include "data/split.h"
@@ -161,19 +162,24 @@ class Study {
     for (std::size_t i = 0; i < n; ++i) {
       const std::size_t index = (first + i) * windows.size() / count;
       const std::span<float> window = inputs.values().subspan(i * window_size, window_size);
-      windows.window(index, window);
-      disturb(condition, seed_, index, window);
+      std::ranges::copy(windows.window(index), window.begin());
+      disturb(condition, seed_, index, window);  // what the sensor gives, before it is levelled
       windows.truth(index, std::span(truths).subspan(i * pixels, pixels));
     }
-    const Tensor outputs = model_.infer(inputs);
+    const auto truth = [&](std::size_t i) {
+      return std::span<const float>(truths).subspan(i * pixels, pixels);
+    };
     for (std::size_t i = 0; i < n; ++i) {
-      const std::span<const float> truth = std::span(truths).subspan(i * pixels, pixels);
-      metrics[0].add(outputs.values().subspan(i * pixels, pixels), truth);
+      const std::span<float> window = inputs.values().subspan(i * window_size, window_size);
       for (std::size_t k = 0; k < baselines_.size(); ++k) {
-        baselines_[k]->predict(inputs.values().subspan(i * window_size, window_size), picture);
-        metrics[k + 1].add(picture, truth);
+        baselines_[k]->predict(window, picture);
+        metrics[k + 1].add(picture, truth(i));
       }
+      if (windows.settings().scaling.levelled) level(window, kTaxels);
     }
+    const Tensor outputs = model_.infer(inputs);
+    for (std::size_t i = 0; i < n; ++i)
+      metrics[0].add(outputs.values().subspan(i * pixels, pixels), truth(i));
   }
 
   const SuperTac& model_;
