@@ -40,7 +40,8 @@ void check_settings(const Arguments& a) {
   nlohmann::ordered_json settings = nlohmann::ordered_json::parse(training.text());
   settings.erase("seed");
   settings["grouping"] = name_of(training.model.grouping);
-  for (const char* option : {"also", "data", "limit", "plates", "rate", "scaling", "split", "stride"})
+  for (const char* option :
+       {"also", "data", "limit", "plates", "range", "rate", "scaling", "split", "stride"})
     settings[option] = a.text(option);
   if (!a.given("rate")) settings["rate"] = "the preset's";
   const std::string path = a.text("out") + "/settings.json";

@@ -122,12 +122,10 @@ class Critic : public Module {
 /// Frames enlarged and targets of one batch.
 struct Batch {
   Batch(const PairSet& pairs, std::size_t n)
-      : scaling(fit_scaling(pairs, std::vector<std::uint32_t>{0})),
+      : scaling{{0}, {1}},  // the signals lie in [0,1] already
         frame(pairs.height() * pairs.width()),
         enlarged(shape(pairs, n)),
-        truth(shape(pairs, n)) {
-    scaling.mean.assign(1, 0), scaling.factor.assign(1, 1);  // the signals lie in [0,1] already
-  }
+        truth(shape(pairs, n)) {}
   static Shape shape(const PairSet& p, std::size_t n) {
     return {static_cast<Dim>(n), static_cast<Dim>(p.target_height()), static_cast<Dim>(p.target_width()), 1};
   }

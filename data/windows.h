@@ -42,8 +42,8 @@ struct WindowCounts {
 
 /// The windows of a set of recordings. Nothing is copied per window: a recording is resampled once onto
 /// rate_hz and kept as scaled floats, a window is the index (pass, last frame), and none crosses the edge of
-/// a pass or a gap. Memory: 4 bytes per signal of a
-/// frame, 8 per frame and 8 per window. Reading is const and safe from many threads.
+/// a pass or a gap. Memory: 4 bytes per signal of a frame, 8 per frame and 8 per window. Reading is const and
+/// safe from many threads.
 class WindowSet {
  public:
   struct Pass {

@@ -52,11 +52,13 @@ SplitKind training_split(const Arguments& a) {
   return split_kind(a.choice("split", {"window", "pass", "trial", "texture", "none"}));
 }
 
-Scaling training_range(const Arguments& a) {
+Scaling training_scaling(const Arguments& a) {
   const std::vector<double> numbers = a.numbers("range", -1000, 1000);
   if (numbers.size() != 2 || numbers[1] <= 1e-6)
     throw UsageError("--range expects REST,SPAN with a SPAN above 0, found " + a.text("range"));
-  return {.rest_volts = numbers[0], .span_volts = numbers[1]};
+  return {.rest_volts = numbers[0],
+          .span_volts = numbers[1],
+          .levelled = a.choice("scaling", {"levelled", "fixed"}) == "levelled"};
 }
 
 WindowSet training_windows(const Arguments& a, const SuperTacSettings& model) {
@@ -64,9 +66,8 @@ WindowSet training_windows(const Arguments& a, const SuperTacSettings& model) {
   w.timesteps = static_cast<int>(model.timesteps);
   w.scale = static_cast<int>(model.scale);
   w.rate_hz = a.given("rate") ? a.number("rate", 20, 2000) : rate_of_preset(model.preset);
-  w.scaling = training_range(a);
+  w.scaling = training_scaling(a);
   w.stride = static_cast<int>(a.integer("stride", 1, 100'000));
-  w.scaling.levelled = a.choice("scaling", {"levelled", "fixed"}) == "levelled";
   WindowSet windows = WindowSet::load(a.text("data"), a.list("plates"), w);
   if (a.given("also")) windows.add_directory(a.text("also"), {}, true);
   return windows;
