@@ -30,6 +30,10 @@ void declare(Arguments& a) {
   declare_grid(a);
   declare_training(a);
   a.option("limit", "N", "score at most N test windows, evenly spread; 0 = all", "0");
+  a.option("history", "N",
+           "score only windows with N frames of their pass behind them: with the longest of --timesteps, all "
+           "models are judged on the same frames; 0 = all",
+           "0");
   a.option("pick", "CONDITIONS",
            "name the fastest model for which they hold, e.g. \"ssim>=0.8,position_mm<=0.5\"");
 }
@@ -41,7 +45,7 @@ void check_settings(const Arguments& a) {
   settings.erase("seed");
   settings["grouping"] = name_of(training.model.grouping);
   for (const char* option :
-       {"also", "data", "limit", "plates", "range", "rate", "scaling", "split", "stride"})
+       {"also", "data", "history", "limit", "plates", "range", "rate", "scaling", "split", "stride"})
     settings[option] = a.text(option);
   if (!a.given("rate")) settings["rate"] = "the preset's";
   const std::string path = a.text("out") + "/settings.json";
@@ -75,6 +79,7 @@ class Sweep {
     reset_peak_memory();
     const WindowSet& windows = windows_of(point.model);
     const Split split = make_split(windows, training_split(a_), point.seed);
+    const std::vector<std::uint32_t> to_score = windows_to_score(windows, split);
     TrainingSettings settings = training_settings(a_);
     const Grouping grouping = settings.model.grouping;
     settings.model = point.model;
@@ -89,13 +94,23 @@ class Sweep {
         {.out = out, .force = true, .resume = fs::exists(state) ? state : "", .label = label});
     if (!training.train()) throw Interrupted();
     const SuperTac& model = training.trainer().model();
-    const auto limit =
-        static_cast<std::size_t>(a_.integer("limit", 0, std::numeric_limits<std::uint32_t>::max()));
-    const ContactMetrics scores =
-        score(model, windows, limit > 0 ? spread(split.test, limit) : split.test, interrupted);
+    const ContactMetrics scores = score(model, windows, to_score, interrupted);
     stop_if_interrupted();
     table_.add(row(point, training, scores));
     fs::remove(state);  // nothing is left to resume
+  }
+
+  std::vector<std::uint32_t> windows_to_score(const WindowSet& windows, const Split& split) const {
+    constexpr auto kMost = std::numeric_limits<std::uint32_t>::max();
+    const auto history = static_cast<std::size_t>(a_.integer("history", 0, kMost));
+    const auto limit = static_cast<std::size_t>(a_.integer("limit", 0, kMost));
+    std::vector<std::uint32_t> chosen;
+    for (const std::uint32_t i : split.test)
+      if (windows.history(i) >= history) chosen.push_back(i);
+    if (chosen.empty())
+      throw UsageError("--history " + a_.text("history") + " leaves none of the " +
+                       std::to_string(split.test.size()) + " test windows; give a smaller number");
+    return limit > 0 ? spread(chosen, limit) : chosen;
   }
 
   // Sets of other lengths and picture sizes are dropped first: one at a time is in memory.

@@ -161,7 +161,6 @@ void WindowSet::add(const Recording& recording, const std::string& folder, bool 
   counts_.held += track.held;
   counts_.gaps += track.gaps;
   counts_.damaged += track.damaged;
-  track.run = {};  // has served: the index tells which windows there are
   track.samples.shrink_to_fit();
   track.position_mm.shrink_to_fit();
   if (pass.windows == 0) track = {};  // nothing will read it

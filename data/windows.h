@@ -42,8 +42,8 @@ struct WindowCounts {
 
 /// The windows of a set of recordings. Nothing is copied per window: a recording is resampled once onto
 /// rate_hz and kept as scaled floats, a window is the index (pass, last frame), and none crosses the edge of
-/// a pass or a gap. Memory: 4 bytes per signal of a frame, 8 per frame and 8 per window. Reading is const and
-/// safe from many threads.
+/// a pass or a gap. Memory: 4 bytes per signal of a frame, 12 per frame and 8 per window. Reading is const
+/// and safe from many threads.
 class WindowSet {
  public:
   struct Pass {
@@ -104,6 +104,8 @@ class WindowSet {
   size_t pass_of(size_t i) const { return index_[i].pass; }
   /// Number of the last frame within its pass.
   size_t frame_of(size_t i) const { return index_[i].last; }
+  /// Frames since its pass began or since the last gap, the last frame included: at least timesteps().
+  size_t history(size_t i) const { return tracks_[index_[i].pass].run[index_[i].last]; }
   /// The frames of a whole pass, [frames][signals]; empty when no window ends in it.
   std::span<const float> track(size_t pass) const { return tracks_[pass].samples; }
 

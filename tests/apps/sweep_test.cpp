@@ -36,6 +36,15 @@ std::string row(const std::map<std::string, std::string>& cells) {
   return line + "\n";
 }
 
+// The cell of a line of the table.
+std::string cell(const std::string& line, const std::string& name) {
+  std::istringstream columns(kHeader), cells(line);
+  std::string value;
+  for (std::string column; std::getline(columns, column, ',') && std::getline(cells, value, ',');)
+    if (column == name) return value;
+  return "";
+}
+
 class Sweep : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -98,6 +107,22 @@ TEST_F(Sweep, WritesARowAModelAndDoesNotRepeatIt) {
   EXPECT_EQ(slower.code, 1);
   EXPECT_NE(slower.error.find(beginning + "rate \"the preset's\", now it is \"100\""), std::string::npos)
       << slower.error;
+}
+
+TEST_F(Sweep, HistoryJudgesModelsOnTheSameFrames) {
+  const ProcessResult swept = sweep("history", "1", {"--history", "400"});
+  ASSERT_EQ(swept.code, 0) << swept.error;
+  const std::string csv = bytes("history/sweep.csv");
+  std::istringstream lines(csv);
+  std::vector<std::string> windows;
+  for (std::string line; std::getline(lines, line);) windows.push_back(cell(line, "all_windows"));
+  ASSERT_EQ(windows.size(), 3U) << csv;
+  EXPECT_EQ(windows[1], windows[2]);
+  EXPECT_LT(std::stoi(windows[1]), 50) << "nothing was left out";
+
+  const ProcessResult none = sweep("none", "1", {"--history", "100000"});
+  EXPECT_EQ(none.code, 2);
+  EXPECT_NE(none.error.find("--history 100000 leaves none of the "), std::string::npos) << none.error;
 }
 
 TEST_F(Sweep, ACutLineIsDroppedAndItsModelMeasuredAgain) {

@@ -69,7 +69,10 @@ TEST(Windows, NeverCrossAGap) {
   EXPECT_EQ(set.size(), 70U);
   EXPECT_EQ(set.counts().gaps, 1U);
   EXPECT_EQ(set.counts().too_early, 30U);
-  for (size_t i = 0; i < set.size(); ++i) EXPECT_TRUE(set.frame_of(i) < 50 || set.frame_of(i) >= 65);
+  for (size_t i = 0; i < set.size(); ++i) {
+    EXPECT_TRUE(set.frame_of(i) < 50 || set.frame_of(i) >= 65);
+    EXPECT_EQ(set.history(i), set.frame_of(i) < 50 ? set.frame_of(i) + 1 : set.frame_of(i) - 49);
+  }
 }
 
 TEST(Windows, CountEveryFrameOnce) {
