@@ -44,8 +44,6 @@ Variable ChannelAttention::gates(const Variable& x) const {
   return sigmoid(expand_.forward(squeeze_.forward(global_mean(x), kRelu)));
 }
 
-Variable ChannelAttention::forward(const Variable& x) const { return scale_channels(x, gates(x)); }
-
 Rcab::Rcab(Dim channels, Dim reduction, Rng& rng)
     : first_(channels, channels, kSameSize, rng),
       second_(channels, channels, kSameSize, rng),
@@ -56,7 +54,8 @@ Rcab::Rcab(Dim channels, Dim reduction, Rng& rng)
 }
 
 Variable Rcab::forward(const Variable& x) const {
-  return supertac::add(x, attention_.forward(second_.forward(first_.forward(x, kRelu))));
+  const Variable h = second_.forward(first_.forward(x, kRelu));
+  return gated_sum(x, h, attention_.gates(h));
 }
 
 Rirb::Rirb(const RirbOptions& options, Rng& rng)

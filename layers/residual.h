@@ -9,22 +9,20 @@
 
 namespace supertac {
 
-/// Scales each channel by sigmoid(expand(relu(squeeze(mean over pixels)))), RCAN eq. 6-9. x [N,H,W,C] ->
-/// same.
+/// Weighs channels: sigmoid(expand(relu(squeeze(mean over pixels)))), RCAN eq. 6-9. x [N,H,W,C] -> [N,C].
 class ChannelAttention : public Module {
  public:
   /// Throws std::invalid_argument unless 1 <= reduction <= channels.
   ChannelAttention(Dim channels, Dim reduction, Rng& rng);
-  Variable forward(const Variable& x) const;
-  /// The gates [N,C], each in (0,1): all near 0 or all near 1 means the block has saturated.
+  /// Each in (0,1): all near 0 or all near 1 means the block has saturated.
   Variable gates(const Variable& x) const;
 
  private:
   Linear squeeze_, expand_;
 };
 
-/// x + attention(conv(relu(conv(x)))), both convolutions 3x3 (RCAN eq. 10); no batch norm. x [N,H,W,C] ->
-/// same.
+/// x + h gates(h), h = conv(relu(conv(x))), both convolutions 3x3 (RCAN eq. 10); no batch norm. x [N,H,W,C]
+/// -> same.
 class Rcab : public Module {
  public:
   Rcab(Dim channels, Dim reduction, Rng& rng);

@@ -123,28 +123,39 @@ SuperTac::SuperTac(const SuperTacSettings& settings, Rng& rng)
   add("upsampler", upsampler_);
 }
 
+// to[f, 0 .. kRun) = from[f, 0 .. kRun)
+template <Dim kRun>
+static void copy_runs(Dim frames, const real* from, Dim from_stride, real* to, Dim to_stride) {
+  for (Dim f = 0; f < frames; ++f, from += from_stride, to += to_stride) std::copy_n(from, kRun, to);
+}
+
 // The signals of a group are its taxels in order, each with its channels: runs of `run` numbers in a frame,
-// `step` apart. One number of the group at a time: that loop has no short inner one.
+// `step` apart. A length known to the compiler makes four numbers, a row of the rig's array, one move; one
+// window after the other stays in the cache.
 PerGroup<Variable> SuperTac::split(const Tensor& windows) const {
   const SuperTacSettings& s = settings_;
   if (windows.rank() != 3 || windows.dim(1) != s.timesteps || windows.dim(2) != s.signals()) {
     throw std::invalid_argument("SuperTac: windows expects [N," + std::to_string(s.timesteps) + "," +
                                 std::to_string(s.signals()) + "], got " + windows.shape().text());
   }
-  const bool by_rows = s.grouping == Grouping::horizontal;
-  const Dim first = by_rows ? s.columns * s.in_channels : s.in_channels;
-  const Dim run = by_rows ? s.columns * s.in_channels : s.in_channels, step = s.columns * s.in_channels;
-  const Dim frames = windows.dim(0) * windows.dim(1), from_stride = s.signals(),
-            to_stride = s.group_signals();
+  const Dim first = s.grouping == Grouping::horizontal ? s.columns * s.in_channels : s.in_channels;
+  const Dim run = first, step = s.columns * s.in_channels;
+  const Dim count = windows.dim(0), frames = windows.dim(1), width = s.group_signals();
+  const Dim piece = run % 4 == 0 ? 4 : 1;
+  const auto copy = piece == 4 ? copy_runs<4> : copy_runs<1>;
   PerGroup<Variable> groups(s.groups());
+  PerGroup<real*> to(s.groups());
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    Tensor part(Shape{windows.dim(0), windows.dim(1), to_stride});
-    for (Dim k = 0; k < to_stride; ++k) {
-      const real* from = windows.data() + static_cast<Dim>(g) * first + k / run * step + k % run;
-      real* to = part.data() + k;
-      for (Dim f = 0; f < frames; ++f, from += from_stride, to += to_stride) *to = *from;
-    }
+    Tensor part(Shape{count, frames, width});
+    to[g] = part.data();
     groups[g] = Variable(std::move(part));
+  }
+  for (Dim n = 0; n < count; ++n) {
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const real* from = windows.data() + n * frames * s.signals() + static_cast<Dim>(g) * first;
+      for (Dim k = 0; k < width; k += piece)
+        copy(frames, from + k / run * step + k % run, s.signals(), to[g] + n * frames * width + k, width);
+    }
   }
   return groups;
 }

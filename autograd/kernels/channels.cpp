@@ -28,8 +28,19 @@ void channel_mean_grad(Dim images, Dim pixels, Dim channels, const real* g, real
   });
 }
 
-void scale_channels(Dim images, Dim pixels, Dim channels, const real* from, const real* gate,
-                    real* __restrict to) {
+void gated_sum(Dim images, Dim pixels, Dim channels, const real* a, const real* from, const real* gate,
+               real* __restrict to) {
+  run_loop([=]() mutable SUPERTAC_LOOP {
+    for (Dim n = 0; n < images; ++n, gate += channels) {
+      for (Dim p = 0; p < pixels; ++p, a += channels, from += channels, to += channels) {
+        for (Dim c = 0; c < channels; ++c) to[c] = a[c] + from[c] * gate[c];
+      }
+    }
+  });
+}
+
+static void scale_channels(Dim images, Dim pixels, Dim channels, const real* from, const real* gate,
+                           real* __restrict to) {
   run_loop([=]() mutable SUPERTAC_LOOP {
     for (Dim n = 0; n < images; ++n, gate += channels) {
       for (Dim p = 0; p < pixels; ++p, from += channels, to += channels) {
@@ -50,14 +61,14 @@ static void add_scaled_channels(Dim images, Dim pixels, Dim channels, const real
   });
 }
 
-void scale_channels_grad_x(Dim images, Dim pixels, Dim channels, const real* g, const real* gate, Into into,
-                           real* to) {
+void gated_sum_grad_x(Dim images, Dim pixels, Dim channels, const real* g, const real* gate, Into into,
+                      real* to) {
   if (into == Into::add) return add_scaled_channels(images, pixels, channels, g, gate, to);
   scale_channels(images, pixels, channels, g, gate, to);
 }
 
-void scale_channels_grad_s(Dim images, Dim pixels, Dim channels, const real* g, const real* from,
-                           real* __restrict to) {
+void gated_sum_grad_s(Dim images, Dim pixels, Dim channels, const real* g, const real* from,
+                      real* __restrict to) {
   run_loop([=]() mutable SUPERTAC_LOOP {
     for (Dim n = 0; n < images; ++n, to += channels) {
       for (Dim p = 0; p < pixels; ++p, g += channels, from += channels) {

@@ -2,6 +2,7 @@
 
 #include "autograd/checks.h"
 #include "autograd/kernels/channels.h"
+#include "autograd/kernels/elementwise.h"
 
 namespace supertac {
 
@@ -19,20 +20,23 @@ Variable global_mean(const Variable& x) {
   });
 }
 
-// gx = gy s     gs[n,c] = sum over h, w of gy x
-Variable scale_channels(const Variable& x, const Variable& s) {
-  check_rank("scale_channels", "x", x, 4);
-  check_shape("scale_channels", "s", s, {x.dim(0), x.dim(3)});
+// ga = gy     gx = gy s     gs[n,c] = sum over h, w of gy x
+Variable gated_sum(const Variable& a, const Variable& x, const Variable& s) {
+  check_rank("gated_sum", "x", x, 4);
+  check_same_shape("gated_sum", "a", a, "x", x);
+  check_shape("gated_sum", "s", s, {x.dim(0), x.dim(3)});
   const Dim images = x.dim(0), pixels = x.dim(1) * x.dim(2), channels = x.dim(3);
   Tensor y(x.shape());
-  kernels::scale_channels(images, pixels, channels, x.value().data(), s.value().data(), y.data());
-  return record("scale_channels", y, {&x, &s}, [=](Backward& b) {
+  kernels::gated_sum(images, pixels, channels, a.value().data(), x.value().data(), s.value().data(),
+                     y.data());
+  return record("gated_sum", y, {&a, &x, &s}, [=](Backward& b) {
     const real* gy = b.gy().data();
-    if (const Backward::Slot gx = b.slot_of(0)) {
-      kernels::scale_channels_grad_x(images, pixels, channels, gy, b.value(1).data(), gx.into, gx.data());
+    if (const Backward::Slot ga = b.slot_of(0)) kernels::put(b.gy().size(), gy, ga.into, ga.data());
+    if (const Backward::Slot gx = b.slot_of(1)) {
+      kernels::gated_sum_grad_x(images, pixels, channels, gy, b.value(2).data(), gx.into, gx.data());
     }
-    if (Tensor* gs = b.grad_of(1)) {
-      kernels::scale_channels_grad_s(images, pixels, channels, gy, b.value(0).data(), gs->data());
+    if (Tensor* gs = b.grad_of(2)) {
+      kernels::gated_sum_grad_s(images, pixels, channels, gy, b.value(1).data(), gs->data());
     }
   });
 }

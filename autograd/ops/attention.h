@@ -1,5 +1,5 @@
-// The two halves of channel attention (Zhang et al. 2018, RCAN, eq. 6-9): look at each channel's mean, scale
-// the channels.
+// The two halves of a block with channel attention (Zhang et al. 2018, RCAN, eq. 6-10): look at each
+// channel's mean; scale the channels and add what the block began with.
 #pragma once
 
 #include "autograd/variable.h"
@@ -9,7 +9,8 @@ namespace supertac {
 /// y[n,c] = mean over h, w of x[n,h,w,c].  x [N,H,W,C] -> [N,C].
 /// Both throw std::invalid_argument on other ranks or shapes.
 Variable global_mean(const Variable& x);
-/// y[n,h,w,c] = x[n,h,w,c] s[n,c].  x [N,H,W,C], s [N,C].
-Variable scale_channels(const Variable& x, const Variable& s);
+/// y[n,h,w,c] = a[n,h,w,c] + x[n,h,w,c] s[n,c].  a, x [N,H,W,C], s [N,C]. One op, because every byte of
+/// these maps that is written and read again costs inference as much as ten products.
+Variable gated_sum(const Variable& a, const Variable& x, const Variable& s);
 
 }  // namespace supertac

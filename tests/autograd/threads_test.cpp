@@ -31,7 +31,7 @@ std::vector<real> train(int threads) {
   for (int step = 0; step < 3; ++step) {
     Variable h = leaky_relu(conv2d(Variable(x), p[0], p[1], same));
     h = conv2d(h, p[2], p[3], same);
-    h = scale_channels(h, sigmoid(global_mean(h)));
+    h = gated_sum(h, h, sigmoid(global_mean(h)));
     h = leaky_relu(conv_transpose2d(h, p[4], p[5], {.stride = 2, .padding = 1}));
     const Variable y = scale(conv2d(h, p[6], p[7], same), real(0.01));
     const Variable loss = add(l2_loss(y, Variable(truth)), scale(ssim(y, truth), -1));

@@ -52,11 +52,6 @@ TEST(LayerGradients, ConvTranspose2d) {
   expect_right_gradients(ConvTranspose2d(5, 3, {.kernel = 4, .stride = 2, .padding = 1}, rng), {2, 3, 4, 5});
 }
 
-TEST(LayerGradients, ChannelAttention) {
-  Rng rng(6);
-  expect_right_gradients(ChannelAttention(8, 4, rng), {2, 3, 4, 8});
-}
-
 TEST(LayerGradients, Rcab) {
   Rng rng(7);
   expect_right_gradients(Rcab(8, 4, rng), {2, 4, 3, 8});

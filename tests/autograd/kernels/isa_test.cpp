@@ -192,9 +192,9 @@ std::vector<Tensor> results_of_loops(Dim n) {
   const auto pixels_row = [&](auto loop) { loop(rows.emplace_back(other.clone()).data()); };
   row([&](real* to) { channel_mean(1, 3, n, pixels.data(), to); });
   pixels_row([&](real* to) { channel_mean_grad(1, 3, n, gate.data(), to); });
-  pixels_row([&](real* to) { scale_channels(1, 3, n, pixels.data(), gate.data(), to); });
-  pixels_row([&](real* to) { scale_channels_grad_x(1, 3, n, pixels.data(), gate.data(), Into::add, to); });
-  row([&](real* to) { scale_channels_grad_s(1, 3, n, pixels.data(), other.data(), to); });
+  pixels_row([&](real* to) { gated_sum(1, 3, n, other.data(), pixels.data(), gate.data(), to); });
+  pixels_row([&](real* to) { gated_sum_grad_x(1, 3, n, pixels.data(), gate.data(), Into::add, to); });
+  row([&](real* to) { gated_sum_grad_s(1, 3, n, pixels.data(), other.data(), to); });
   // the gradient of a loss, and two steps of Adam along it
   const Variable parameter(numbers({n}, 7), true);
   Adam adam({parameter}, {.learning_rate = 0.1});

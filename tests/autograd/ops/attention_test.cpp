@@ -10,14 +10,14 @@ using namespace test;
 TEST(Attention, HandComputed) {
   const Variable x(Tensor::of({1, 2, 2, 2}, {1, 10, 2, 20, 3, 30, 6, 0}));
   expect_values(global_mean(x).value(), {1, 2}, {3, 15});
-  expect_values(scale_channels(x, Variable(Tensor::of({1, 2}, {2, -1}))).value(), {1, 2, 2, 2},
-                {2, -10, 4, -20, 6, -30, 12, 0});
+  const Variable a(Tensor::of({1, 2, 2, 2}, {100, 0, 0, 0, 0, 0, 0, 5})), s(Tensor::of({1, 2}, {2, -1}));
+  expect_values(gated_sum(a, x, s).value(), {1, 2, 2, 2}, {102, -10, 4, -20, 6, -30, 12, 5});
 }
 
 TEST(Attention, Empty) {
   const Variable x(Tensor::zeros({0, 2, 2, 3})), s(Tensor::zeros({0, 3}));
   EXPECT_EQ(global_mean(x).shape().text(), "[0,3]");
-  EXPECT_EQ(scale_channels(x, s).shape().text(), "[0,2,2,3]");
+  EXPECT_EQ(gated_sum(x, x, s).shape().text(), "[0,2,2,3]");
 }
 
 TEST(Attention, RefusesOtherShapes) {
@@ -26,9 +26,10 @@ TEST(Attention, RefusesOtherShapes) {
   expect_refusal("global_mean: x has no pixels: [2,0,4,3]", [] {
     global_mean(Variable(Tensor::zeros({2, 0, 4, 3})));
   });
-  expect_refusal("scale_channels: x expects rank 4, got [2,3]", [&] { scale_channels(flat, flat); });
-  expect_refusal("scale_channels: s expects [2,3], got [3,2]", [&] {
-    scale_channels(x, Variable(Tensor::zeros({3, 2})));
+  expect_refusal("gated_sum: x expects rank 4, got [2,3]", [&] { gated_sum(flat, flat, flat); });
+  expect_refusal("gated_sum: a and x must have the same shape, got [2,3] and [2,4,4,3]", [&] { gated_sum(flat, x, flat); });
+  expect_refusal("gated_sum: s expects [2,3], got [3,2]", [&] {
+    gated_sum(x, x, Variable(Tensor::zeros({3, 2})));
   });
 }
 
@@ -37,7 +38,8 @@ TEST(Attention, Gradients) {
   for (const Dim channels : {1, 3, 17, 33}) {
     const Tensor x = numbers({2, 3, 5, channels}), s = numbers({2, channels}, 2);
     expect_gradients([](const auto& in) { return global_mean(in[0]); }, {x});
-    expect_gradients([](const auto& in) { return scale_channels(in[0], in[1]); }, {x, s});
+    const Tensor a = numbers({2, 3, 5, channels}, 3);
+    expect_gradients([](const auto& in) { return gated_sum(in[0], in[1], in[2]); }, {a, x, s});
   }
 }
 #endif
