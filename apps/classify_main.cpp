@@ -94,7 +94,7 @@ int run(Arguments& a) {
   ExperimentSettings settings;
   settings.epochs = a.integer("epochs", 1, 10'000);
   if (a.choice("augment", {"standard", "none"}) == "standard") {
-    settings.augment = {.gain = 0.5, .taxel_gain = 0.3, .offset = 0.05, .noise = 0.02, .dropped = 2};
+    settings.augment = kStandardAugmentation;
   }
   const std::int64_t stride = a.integer("stride", 1, 100'000);
   const std::vector<Candidate> models = load_candidates(a.list("model"));

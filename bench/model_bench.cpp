@@ -38,7 +38,7 @@ void training_step(benchmark::State& state) {
   TrainingSettings settings;
   settings.model = kPaper;
   settings.epochs = 100'000;
-  settings.augment = {.gain = 0.5, .taxel_gain = 0.3, .offset = 0.05, .noise = 0.02, .dropped = 2};
+  settings.augment = kStandardAugmentation;
   const WindowSet windows = bench::sliding_bumps(kPaper);
   Trainer trainer(windows, bench::all_of(windows), settings);
   for (int i = 0; i < 3; ++i) trainer.train_step();
@@ -67,8 +67,7 @@ void data_loading(benchmark::State& state) {
   const WindowSet windows = bench::sliding_bumps(kPaper);
   const Batching batching(bench::all_of(windows), 64, 0);
   const bool augmented = state.range(0) != 0;
-  const AugmentSettings augmentation{
-      .gain = 0.5, .taxel_gain = 0.3, .offset = 0.05, .noise = 0.02, .dropped = 2};
+  const AugmentSettings augmentation = kStandardAugmentation;
   std::vector<std::uint32_t> indices(64);
   std::vector<float> window(static_cast<std::size_t>(kPaper.timesteps * kTaxels));
   std::vector<float> truth(static_cast<std::size_t>(kPaper.image_height() * kPaper.image_width()));

@@ -13,7 +13,7 @@ namespace supertac {
 namespace {
 
 // Counters within one sample's stream: each term has its own, as many as there are signals.
-enum Term : uint64_t { kGain, kTaxelGain, kOffset, kDropCount, kDropChoice, kNoiseKey };
+enum Term : uint64_t { kGain, kTaxelGain, kOffset, kDropCount, kDropChoice, kNoiseKey, kLift };
 constexpr size_t kMostTaxels = 16 * 16;
 constexpr uint64_t kAugmentStream = 0x617567ULL << 40;  // keeps clear of the streams other code uses
 
@@ -56,6 +56,7 @@ void check(const AugmentSettings& settings, const TaxelArray& array) {
       throw std::invalid_argument(std::string("augmentation: ") + name +
                                   " must be 0 (off) or positive, got " + std::to_string(value));
   };
+  check_one("lift", settings.lift);
   check_one("gain", settings.gain);
   check_one("taxel_gain", settings.taxel_gain);
   check_one("offset", settings.offset);
@@ -76,6 +77,7 @@ void augment(const AugmentSettings& settings, uint64_t seed, uint64_t sample, st
   check(settings, array);
   const RandomStream random(seed, kAugmentStream ^ sample);
   const auto dropped = choose_dropped(settings.dropped, array, random);
+  const auto lift = static_cast<float>(settings.lift * random.uniform(kLift * signals));
   const double window_gain = factor(settings.gain, random.uniform(kGain));
   std::array<float, kMostSignals> gain, offset, top;
   for (size_t k = 0; k < signals; ++k) {
@@ -90,7 +92,7 @@ void augment(const AugmentSettings& settings, uint64_t seed, uint64_t sample, st
   for (size_t t = 0; t < window.size() / signals; ++t) {
     float* x = &window[t * signals];
     for (size_t k = 0; k < signals; ++k) {
-      float value = gain[k] * x[k] + offset[k];
+      float value = gain[k] * std::max(x[k] - lift, 0.0F) + offset[k];
       if (noise > 0) value += noise * rough_normal(mix64(key + (t * signals + k) * kGolden64));
       x[k] = std::min(std::max(value, 0.0F), top[k]);
     }

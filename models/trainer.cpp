@@ -55,6 +55,7 @@ std::string TrainingSettings::text() const {
                                  {"a", loss.a},
                                  {"beta", loss.beta},
                                  {"lambda", loss.lambda},
+                                 {"lift", augment.lift},
                                  {"gain", augment.gain},
                                  {"taxel_gain", augment.taxel_gain},
                                  {"offset", augment.offset},

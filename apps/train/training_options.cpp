@@ -43,7 +43,7 @@ TrainingSettings training_settings(const Arguments& a) {
     s.loss.beta = 0;
   }
   if (a.choice("augment", {"standard", "none"}) == "standard") {
-    s.augment = {.gain = 0.5, .taxel_gain = 0.3, .offset = 0.05, .noise = 0.02, .dropped = 2};
+    s.augment = kStandardAugmentation;
   }
   return s;
 }

@@ -43,6 +43,23 @@ TEST(Augment, GainIsOneFactorPerWindow) {
   EXPECT_NEAR(high, 0.9, 0.01);
 }
 
+TEST(Augment, LiftTakesTheSameFromEverySignalAndEndsAtRest) {
+  const AugmentSettings settings{.lift = 0.4};
+  float least = 1;
+  for (uint64_t sample = 0; sample < 200; ++sample) {
+    std::vector<float> window(kFrames * 16, 0.5F);
+    for (size_t i = 0; i < window.size(); i += 16) window[i] = 0.1F, window[i + 1] = 0.9F;
+    augment(settings, 1, sample, window);
+    const float lift = 0.5F - window[2];
+    ASSERT_GE(lift, 0);
+    EXPECT_NEAR(window[1], 0.9F - lift, 1e-6);
+    EXPECT_NEAR(window[0], std::max(0.1F - lift, 0.0F), 1e-6);
+    for (size_t i = 16; i < window.size(); ++i) ASSERT_EQ(window[i], window[i - 16]);
+    least = std::min(least, window[2]);
+  }
+  EXPECT_NEAR(least, 0.1, 0.01);
+}
+
 TEST(Augment, TaxelGainAndOffsetAreConstantInTime) {
   for (const AugmentSettings& settings :
        {AugmentSettings{.taxel_gain = 0.2}, AugmentSettings{.offset = 0.1}}) {
@@ -93,7 +110,8 @@ TEST(Augment, NoiseHasTheStatedDeviationAndNoMemory) {
 }
 
 TEST(Augment, IsAPureFunctionOfSeedAndSample) {
-  const AugmentSettings settings{.gain = 0.3, .taxel_gain = 0.1, .offset = 0.05, .noise = 0.02, .dropped = 2};
+  const AugmentSettings settings{
+      .lift = 0.2, .gain = 0.3, .taxel_gain = 0.1, .offset = 0.05, .noise = 0.02, .dropped = 2};
   EXPECT_EQ(changed(settings, 3), changed(settings, 3));
   EXPECT_NE(changed(settings, 3), changed(settings, 4));
   std::vector<float> other(kFrames * 16, 0.5F);

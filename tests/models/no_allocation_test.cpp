@@ -12,7 +12,7 @@ namespace {
 TEST(NoAllocation, WarmTrainingStep) {
   TrainingSettings settings = small_training();
   settings.epochs = 4;
-  settings.augment = {.gain = 0.5, .taxel_gain = 0.3, .offset = 0.05, .noise = 0.02, .dropped = 2};
+  settings.augment = kStandardAugmentation;
   const WindowSet windows = small_windows(settings.model);
   Trainer trainer(windows, all_of(windows), settings);
   for (int i = 0; i < 3; ++i) trainer.train_step();
