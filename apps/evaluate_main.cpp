@@ -1,6 +1,7 @@
 // supertac-evaluate: how good a model is on a data set, beside what does without a network.
 #include <algorithm>
 
+#include "apps/common/measure.h"
 #include "apps/common/numerics.h"
 #include "apps/common/output_folder.h"
 #include "apps/common/program.h"
@@ -76,7 +77,7 @@ Task load_task(const Arguments& a, const ModelFile& file) {
   return task;
 }
 
-std::string row(const std::string& name, const ContactMetrics& metrics) {
+std::string row(const std::string& name, const ContactMetrics& metrics, const Latency& latency) {
   const Metrics c = metrics.contact(), all = metrics.all();
   const auto cell = [](double value, int decimals) {
     const std::string text = format(value, decimals);
@@ -84,7 +85,7 @@ std::string row(const std::string& name, const ContactMetrics& metrics) {
   };
   return name + std::string(name.size() < 12 ? 12 - name.size() : 0, ' ') + cell(c.ssim, 3) +
          cell(c.psnr_mean_db, 2) + cell(c.position_error_mm, 2) + cell(all.ssim, 3) +
-         cell(all.psnr_mean_db, 2);
+         cell(all.psnr_mean_db, 2) + cell(latency.median_us, 1);
 }
 
 int run(Arguments& a) {
@@ -113,9 +114,10 @@ int run(Arguments& a) {
       const std::span<const float> output = b.outputs.values().subspan(n * pixels, pixels);
       const std::span<const float> truth = b.truths.values().subspan(n * pixels, pixels);
       const std::span<const float> window = task.windows.window(task.test[b.first + n]);
+      const std::span<const float> seen = b.windows.values().subspan(n * window.size(), window.size());
       network.add(output, truth);
       for (std::size_t k = 0; k < baselines.size(); ++k) {
-        baselines[k]->predict(window, image);
+        baselines[k]->predict(seen, image);
         plain[k].add(image, truth);
       }
       if (outputs) outputs->add(window, output, truth);
@@ -128,14 +130,22 @@ int run(Arguments& a) {
   a.print("split " + task.split_name + ", seed " + std::to_string(task.seed) + ", " +
           std::to_string(network.all().windows) + " windows, " + std::to_string(network.contact().windows) +
           " in contact");
-  a.print("            |- in contact -------------| |- all ---------|");
-  a.print("                 SSIM  PSNR dB   pos mm     SSIM  PSNR dB");
-  a.print(row("network", network));
-  for (std::size_t k = 0; k < baselines.size(); ++k) a.print(row(baselines[k]->name(), plain[k]));
+  a.print("            |- in contact -------------| |- all ---------| |- one -|");
+  a.print("                 SSIM  PSNR dB   pos mm     SSIM  PSNR dB       us");
+  const Tensor window = Tensor::full({1, task.windows.timesteps(), file.model->settings().signals()}, 0.5F);
+  const Latency latency = measure_latency([&] { file.model->infer(window); });
+  a.print(row("network", network, latency));
+  nlohmann::ordered_json latencies = {{"network", latency.to_json()}};
+  for (std::size_t k = 0; k < baselines.size(); ++k) {
+    const Latency l = measure_latency([&] { baselines[k]->predict(window.values(), image); });
+    a.print(row(baselines[k]->name(), plain[k], l));
+    latencies[baselines[k]->name()] = l.to_json();
+  }
 
   nlohmann::ordered_json result = network.to_json();
   for (std::size_t k = 0; k < baselines.size(); ++k)
     result["baselines"][baselines[k]->name()] = plain[k].to_json();
+  result["latency"] = latencies;
   result["model"] = a.text("model");
   result["data"] = task.windows.fingerprint();
   result["split"] = task.split_name;

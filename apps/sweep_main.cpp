@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "apps/common/measure.h"
 #include "apps/common/numerics.h"
 #include "apps/common/program.h"
 #include "apps/common/signals.h"
@@ -9,7 +10,6 @@
 #include "apps/sweep/chart.h"
 #include "apps/sweep/front.h"
 #include "apps/sweep/grid.h"
-#include "apps/sweep/measure.h"
 #include "apps/sweep/table.h"
 #include "apps/train/training_options.h"
 #include "apps/train/training_run.h"
@@ -127,7 +127,8 @@ class Sweep {
                              const ContactMetrics& scores) const {
     const SuperTac& model = training.trainer().model();
     const SuperTacSettings& s = model.settings();
-    const Latency latency = measure_latency(model);
+    const Tensor window = Tensor::full({1, s.timesteps, s.signals()}, real(0.5));
+    const Latency latency = measure_latency([&] { model.infer(window); });
     nlohmann::ordered_json row = {{"model", point.name()},
                                   {"preset", s.preset},
                                   {"timesteps", s.timesteps},

@@ -171,11 +171,11 @@ class Study {
     };
     for (std::size_t i = 0; i < n; ++i) {
       const std::span<float> window = inputs.values().subspan(i * window_size, window_size);
+      if (windows.settings().scaling.levelled) level(window, kTaxels);
       for (std::size_t k = 0; k < baselines_.size(); ++k) {
         baselines_[k]->predict(window, picture);
         metrics[k + 1].add(picture, truth(i));
       }
-      if (windows.settings().scaling.levelled) level(window, kTaxels);
     }
     const Tensor outputs = model_.infer(inputs);
     for (std::size_t i = 0; i < n; ++i)

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/common/measure.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
@@ -211,7 +212,10 @@ nlohmann::ordered_json score(const Generator& generator, const PairSet& pairs) {
     all.add(drawn.value().values(), batch.truth.values());
     if (in_contact(batch.truth.values())) contact.add(drawn.value().values(), batch.truth.values());
   }
-  return {{"contact", to_json(contact.result())}, {"all", to_json(all.result())}};
+  const Latency latency = measure_latency([&] { generator.forward(batch.enlarged); });
+  return {{"contact", to_json(contact.result())},
+          {"all", to_json(all.result())},
+          {"latency", {{"network", latency.to_json()}}}};
 }
 
 void declare(Arguments& a) {

@@ -109,8 +109,10 @@ UpsampledFrame::UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows,
   std::vector<float> image(pixels), truth(pixels);
   double sx = 0, sy = 0, sxx = 0, sxy = 0;
   const std::vector<uint32_t> chosen = fitted_on(train);
+  std::vector<float> window(static_cast<size_t>(windows.timesteps()) * array_.signals());
   for (const uint32_t i : chosen) {
-    upsampling_(mean_of_channels(array_, windows.last_frame(i)), image);
+    windows.window(i, window);
+    upsampling_(mean_of_channels(array_, std::span(window).last(array_.signals())), image);
     windows.truth(i, truth);
     for (size_t p = 0; p < pixels; ++p) {
       sx += image[p];

@@ -50,14 +50,15 @@ struct Moments {
                 windows.image().pixels()) {
     constexpr size_t kBlock = 512;
     std::vector<float> truth(static_cast<size_t>(xy.cols()));
+    std::vector<float> window(static_cast<size_t>(windows.timesteps()) * windows.array().signals());
     for (size_t first = 0; first < indices.size(); first += kBlock) {
       const auto part = indices.subspan(first, std::min(kBlock, indices.size() - first));
       Matrix x(xx.rows(), static_cast<Eigen::Index>(part.size()));  // a window a column
       Matrix y(xy.cols(), x.cols());
       for (Eigen::Index n = 0; n < x.cols(); ++n) {
         const uint32_t i = part[static_cast<size_t>(n)];
-        features(windows.window(i), windows.array().signals(),
-                 {x.col(n).data(), static_cast<size_t>(x.rows())});
+        windows.window(i, window);
+        features(window, windows.array().signals(), {x.col(n).data(), static_cast<size_t>(x.rows())});
         windows.truth(i, truth);
         y.col(n) = Eigen::Map<const Eigen::VectorXf>(truth.data(), y.rows()).cast<double>();
       }

@@ -1,8 +1,10 @@
 #include "apps/evaluate/pairs.h"
 
+#include <algorithm>
 #include <map>
 #include <optional>
 
+#include "apps/common/measure.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
@@ -99,6 +101,12 @@ class PairOutputs {
   std::vector<float> output_, target_;
 };
 
+// One frame as a network takes it.
+Shape frame_shape(const PairSet& pairs) {
+  return {1, static_cast<Dim>(pairs.height()), static_cast<Dim>(pairs.width()),
+          static_cast<Dim>(pairs.channels())};
+}
+
 }  // namespace
 
 int evaluate_on_pairs(const Arguments& a) {
@@ -112,7 +120,7 @@ int evaluate_on_pairs(const Arguments& a) {
   const std::vector<std::uint32_t>& test = task.sides.test;
 
   const PairBaselines baselines(pairs, file.scaling, task.sides.train);
-  Scores all(pairs);
+  Scores all(pairs), contact(pairs);
   std::map<std::int64_t, Scores> groups;
   PairOutputs outputs;
   std::vector<float> target(pairs.target_height() * pairs.target_width()), image(target.size());
@@ -122,11 +130,13 @@ int evaluate_on_pairs(const Arguments& a) {
                      const std::uint32_t i = test[n];
                      Scores& group = groups.try_emplace(pairs.group(i), pairs).first->second;
                      pairs.target(i, target);
+                     const bool touched = std::ranges::any_of(target, [](float v) { return v > 0; });
                      for (std::size_t m = 0; m < all.methods.size(); ++m) {
                        if (m > 0) baselines.predict(m - 1, i, image);
                        const std::span<const float> drawn = m == 0 ? picture : std::span<const float>(image);
                        all.methods[m].add(drawn, target);
                        group.methods[m].add(drawn, target);
+                       if (touched) contact.methods[m].add(drawn, target);
                      }
                      if (a.given("outputs")) outputs.add(pairs, i, picture, target);
                      progress.update(n + 1);
@@ -135,7 +145,12 @@ int evaluate_on_pairs(const Arguments& a) {
   stop_if_interrupted();
 
   print(a, "split " + task.split + ", seed " + std::to_string(task.seed), all);
-  nlohmann::ordered_json result = {{"all", to_json(all)}};
+  print(a, "targets that are not all 0", contact);
+  const Tensor frame = Tensor::full(frame_shape(pairs), 0.5F);
+  const Latency latency = measure_latency([&] { file.model->infer(frame); });
+  a.print("one picture in " + format(latency.median_us, 1) + " us");
+  nlohmann::ordered_json result = {
+      {"contact", to_json(contact)}, {"all", to_json(all)}, {"latency", {{"network", latency.to_json()}}}};
   for (const auto& [number, scores] : groups) {
     if (!pairs.grouped()) break;
     print(a, "group " + std::to_string(number), scores);

@@ -1,4 +1,4 @@
-#include "apps/sweep/measure.h"
+#include "apps/common/measure.h"
 
 #include <time.h>
 
@@ -7,12 +7,10 @@
 #include <sstream>
 #include <vector>
 
-#include "io/random.h"
-
 namespace supertac {
 namespace {
 
-constexpr int kWarmUp = 100, kWindows = 2000;
+constexpr int kWarmUp = 50, kPictures = 1000;
 
 double thread_seconds() {
   timespec t{};
@@ -22,20 +20,16 @@ double thread_seconds() {
 
 }  // namespace
 
-Latency measure_latency(const SuperTac& model) {
-  Tensor window(Shape{1, model.settings().timesteps, model.settings().signals()});
-  const RandomStream random(0, 0);
-  std::uint64_t i = 0;
-  for (real& x : window.values()) x = static_cast<real>(random.uniform(i++));
-  for (int n = 0; n < kWarmUp; ++n) model.infer(window);
-  std::vector<double> seconds(kWindows);
+Latency measure_latency(const std::function<void()>& make_picture) {
+  for (int n = 0; n < kWarmUp; ++n) make_picture();
+  std::vector<double> seconds(kPictures);
   for (double& s : seconds) {
     const double begin = thread_seconds();
-    model.infer(window);
+    make_picture();
     s = thread_seconds() - begin;
   }
   std::sort(seconds.begin(), seconds.end());
-  return {.median_us = 1e6 * seconds[kWindows / 2], .p99_us = 1e6 * seconds[kWindows * 99 / 100]};
+  return {.median_us = 1e6 * seconds[kPictures / 2], .p99_us = 1e6 * seconds[kPictures * 99 / 100]};
 }
 
 double peak_memory_mb() {
