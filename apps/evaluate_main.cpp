@@ -8,6 +8,7 @@
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
 #include "apps/evaluate/exports.h"
+#include "apps/evaluate/felt.h"
 #include "apps/evaluate/pairs.h"
 #include "data/baselines.h"
 #include "data/metrics.h"
@@ -88,37 +89,36 @@ std::string row(const std::string& name, const ContactMetrics& metrics, const La
          cell(all.psnr_mean_db, 2) + cell(latency.median_us, 1);
 }
 
-int run(Arguments& a) {
-  if (a.given("pairs")) return evaluate_on_pairs(a);
-  if (!a.given("data")) throw UsageError("expected --data DIR or --pairs FILE, found neither");
-  const std::string outputs_path = a.text("outputs");
-  if (!outputs_path.empty()) refuse_existing(outputs_path, a.force());
-  const ModelFile file = load_model(a.text("model"));
-  const Task task = load_task(a, file);
-  const ImageGrid grid = task.windows.image();
-  const std::size_t pixels = grid.pixels();
-
-  std::optional<OutputFolder> pictures;
-  if (a.given("pictures")) pictures.emplace(a.text("pictures"), a.force());
-  std::optional<OutputsFile> outputs;
-  if (!outputs_path.empty()) outputs.emplace(task.windows, task.test.size());
-  if (task.train.empty()) throw std::runtime_error("the split leaves no window to fit the baselines on");
-  const auto baselines = fit_baselines(task.windows, task.train);
-  ContactMetrics network(grid);
+/// The scores of the network and of every baseline over the same windows.
+struct Scores {
+  Scores(const WindowSet& windows, std::size_t baselines) : network(windows.image()), felt(windows) {
+    for (std::size_t k = 0; k < baselines; ++k) plain.emplace_back(windows.image());
+  }
+  ContactMetrics network;
+  FeltScores felt;
   std::vector<ContactMetrics> plain;
-  for (std::size_t k = 0; k < baselines.size(); ++k) plain.emplace_back(grid);
+};
+
+using Baselines = std::vector<std::unique_ptr<Baseline>>;
+
+Scores score_all(const Arguments& a, const SuperTac& model, const Task& task, const Baselines& baselines,
+                 std::optional<OutputsFile>& outputs) {
+  Scores scores(task.windows, baselines.size());
+  const std::size_t pixels = task.windows.image().pixels();
   std::vector<float> image(pixels);
   Progress progress(a, "evaluating", task.test.size(), "windows");
-  for_each_output(*file.model, task.windows, task.test, [&](const EvaluatedBatch& b) {
+  for_each_output(model, task.windows, task.test, [&](const EvaluatedBatch& b) {
     for (std::size_t n = 0; n < static_cast<std::size_t>(b.outputs.dim(0)); ++n) {
+      const std::uint32_t i = task.test[b.first + n];
       const std::span<const float> output = b.outputs.values().subspan(n * pixels, pixels);
       const std::span<const float> truth = b.truths.values().subspan(n * pixels, pixels);
-      const std::span<const float> window = task.windows.window(task.test[b.first + n]);
+      const std::span<const float> window = task.windows.window(i);
       const std::span<const float> seen = b.windows.values().subspan(n * window.size(), window.size());
-      network.add(output, truth);
+      scores.network.add(output, truth);
+      scores.felt.add(i, output, truth);
       for (std::size_t k = 0; k < baselines.size(); ++k) {
         baselines[k]->predict(seen, image);
-        plain[k].add(image, truth);
+        scores.plain[k].add(image, truth);
       }
       if (outputs) outputs->add(window, output, truth);
     }
@@ -126,30 +126,55 @@ int run(Arguments& a) {
     return !interrupted();
   });
   stop_if_interrupted();
+  return scores;
+}
 
+nlohmann::ordered_json report(const Arguments& a, const SuperTac& model, const Task& task,
+                              const Baselines& baselines, const Scores& scores) {
+  nlohmann::ordered_json result = scores.network.to_json();
+  result["felt"] = scores.felt.to_json();
   a.print("split " + task.split_name + ", seed " + std::to_string(task.seed) + ", " +
-          std::to_string(network.all().windows) + " windows, " + std::to_string(network.contact().windows) +
-          " in contact");
+          std::to_string(scores.network.all().windows) + " windows, " +
+          std::to_string(scores.network.contact().windows) + " in contact");
   a.print("            |- in contact -------------| |- all ---------| |- one -|");
   a.print("                 SSIM  PSNR dB   pos mm     SSIM  PSNR dB       us");
-  const Tensor window = Tensor::full({1, task.windows.timesteps(), file.model->settings().signals()}, 0.5F);
-  const Latency latency = measure_latency([&] { file.model->infer(window); });
-  a.print(row("network", network, latency));
+  const Tensor window = Tensor::full({1, task.windows.timesteps(), model.settings().signals()}, 0.5F);
+  std::vector<float> image(task.windows.image().pixels());
+  const Latency latency = measure_latency([&] { model.infer(window); });
+  a.print(row("network", scores.network, latency));
   nlohmann::ordered_json latencies = {{"network", latency.to_json()}};
   for (std::size_t k = 0; k < baselines.size(); ++k) {
+    const std::string name = baselines[k]->name();
     const Latency l = measure_latency([&] { baselines[k]->predict(window.values(), image); });
-    a.print(row(baselines[k]->name(), plain[k], l));
-    latencies[baselines[k]->name()] = l.to_json();
+    a.print(row(name, scores.plain[k], l));
+    latencies[name] = l.to_json();
+    result["baselines"][name] = scores.plain[k].to_json();
   }
-
-  nlohmann::ordered_json result = network.to_json();
-  for (std::size_t k = 0; k < baselines.size(); ++k)
-    result["baselines"][baselines[k]->name()] = plain[k].to_json();
+  for (const std::string& line : scores.felt.lines()) a.print(line);
   result["latency"] = latencies;
   result["model"] = a.text("model");
   result["data"] = task.windows.fingerprint();
   result["split"] = task.split_name;
   result["seed"] = task.seed;
+  return result;
+}
+
+int run(Arguments& a) {
+  if (a.given("pairs")) return evaluate_on_pairs(a);
+  if (!a.given("data")) throw UsageError("expected --data DIR or --pairs FILE, found neither");
+  const std::string outputs_path = a.text("outputs");
+  if (!outputs_path.empty()) refuse_existing(outputs_path, a.force());
+  const ModelFile file = load_model(a.text("model"));
+  const Task task = load_task(a, file);
+
+  std::optional<OutputFolder> pictures;
+  if (a.given("pictures")) pictures.emplace(a.text("pictures"), a.force());
+  std::optional<OutputsFile> outputs;
+  if (!outputs_path.empty()) outputs.emplace(task.windows, task.test.size());
+  if (task.train.empty()) throw std::runtime_error("the split leaves no window to fit the baselines on");
+  const Baselines baselines = fit_baselines(task.windows, task.train);
+  const Scores scores = score_all(a, *file.model, task, baselines, outputs);
+  const nlohmann::ordered_json result = report(a, *file.model, task, baselines, scores);
   if (pictures) {
     write_pictures(*file.model, task.windows, task.test, *pictures);
     pictures->keep();

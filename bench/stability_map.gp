@@ -11,6 +11,7 @@ set xrange [5e-4:0.2]
 set yrange [3e-4:3]
 set format xy '10^{%T}'
 set key outside bottom center horizontal
+set bmargin 6  # room for the key under the axis' name
 shift(seed) = 10**(0.07 * (seed - 2))
 do for [mode in 'on off'] {
   set title (mode eq 'on' ? 'clipped at 1, 5 % warm-up' : 'neither clipping nor warm-up')

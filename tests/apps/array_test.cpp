@@ -43,6 +43,15 @@ TEST(Array, SixBySixFromSimulationToScores) {
   const auto scores = evaluate(folder, data, model);
   EXPECT_EQ(scores.at("all").at("windows"), 40);
   EXPECT_TRUE(scores.at("baselines").at("ridge").at("all").at("ssim").is_number());
+  EXPECT_GT(scores.at("latency").at("ridge").at("median_us"), 0);
+  double windows = 0, ssim = 0;  // by how much was felt: the parts make up the whole
+  for (const auto& part : scores.at("felt")) {
+    windows += part.at("windows").get<double>();
+    ssim += part.at("windows").get<double>() * part.at("ssim").get<double>();
+  }
+  EXPECT_GT(scores.at("felt").size(), 1U);
+  EXPECT_EQ(windows, scores.at("contact").at("windows"));
+  EXPECT_NEAR(ssim / windows, scores.at("contact").at("ssim").get<double>(), 1e-9);
   const SafetensorsFile outputs = SafetensorsFile::read(folder / "outputs.safetensors");
   EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<uint64_t>{40, 32, 36}));
   EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<uint64_t>{40, 24, 24}));
