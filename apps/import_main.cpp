@@ -9,6 +9,7 @@
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
+#include "data/lost_frames.h"
 #include "data/plate_file.h"
 #include "data/registration.h"
 #include "data/registration_picture.h"
@@ -109,6 +110,7 @@ Imported import_pass(const TextPass& pass, double speed_mm_s) {
   recording.trial = pass.trial;
   recording.pass = pass.pass;
   recording.speed_mm_s = speed_mm_s;
+  restore_clock(recording, kImportRateHz);
   imported.registration = register_pass(recording, pass.plate);
   apply(imported.registration, recording);
   return imported;

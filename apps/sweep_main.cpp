@@ -40,13 +40,15 @@ void declare(Arguments& a) {
 
 // What all rows of a table have in common, so that figures of different settings cannot be mixed.
 void check_settings(const Arguments& a) {
-  TrainingSettings training = training_settings(a);
+  const TrainingSettings training = training_settings(a, {});
   nlohmann::ordered_json settings = nlohmann::ordered_json::parse(training.text());
   settings.erase("seed");
   settings["grouping"] = name_of(training.model.grouping);
   for (const char* option :
        {"also", "data", "history", "limit", "plates", "range", "rate", "scaling", "split", "stride"})
     settings[option] = a.text(option);
+  if (!a.given("epochs")) settings["epochs"] = "the preset's";
+  if (!a.given("learning-rate")) settings["learning_rate"] = "the preset's";
   if (!a.given("rate")) settings["rate"] = "the preset's";
   const std::string path = a.text("out") + "/settings.json";
   if (!fs::exists(path)) return write_file(path, settings.dump(2) + "\n");
@@ -80,10 +82,7 @@ class Sweep {
     const WindowSet& windows = windows_of(point.model);
     const Split split = make_split(windows, training_split(a_), point.seed);
     const std::vector<std::uint32_t> to_score = windows_to_score(windows, split);
-    TrainingSettings settings = training_settings(a_);
-    const Grouping grouping = settings.model.grouping;
-    settings.model = point.model;
-    settings.model.grouping = grouping;
+    TrainingSettings settings = training_settings(a_, point.model);
     set_array(settings.model, windows.array());
     settings.seed = point.seed;
     const std::string out = a_.text("out") + "/models/" + point.name() + ".safetensors";
@@ -113,9 +112,10 @@ class Sweep {
     return limit > 0 ? spread(chosen, limit) : chosen;
   }
 
-  // Sets of other lengths and picture sizes are dropped first: one at a time is in memory.
+  // Sets of other lengths, rates and picture sizes are dropped first: one at a time is in memory.
   const WindowSet& windows_of(const SuperTacSettings& model) {
-    if (!windows_ || windows_->timesteps() != model.timesteps || windows_->settings().scale != model.scale) {
+    if (!windows_ || windows_->timesteps() != model.timesteps || windows_->settings().scale != model.scale ||
+        windows_->settings().rate_hz != training_rate_hz(a_, model)) {
       windows_.reset();
       windows_.emplace(training_windows(a_, model));
       a_.note(windows_->counts().summary());

@@ -28,10 +28,8 @@ void declare(Arguments& a) {
 }
 
 TrainingSettings settings_of(const Arguments& a) {
-  TrainingSettings s = training_settings(a);
-  const Grouping grouping = s.model.grouping;
-  s.model = SuperTacSettings::of_preset(a.choice("preset", {"paper", "tiny"}));
-  s.model.grouping = grouping;
+  const std::string preset = a.choice("preset", {"paper", "tiny"});
+  TrainingSettings s = training_settings(a, SuperTacSettings::of_preset(preset));
   if (a.given("timesteps")) s.model.timesteps = a.integer("timesteps", 32, 512);
   if (s.model.timesteps % 16 != 0) {
     throw UsageError("--timesteps expects a multiple of 16, found " + a.text("timesteps"));

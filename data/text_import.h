@@ -21,9 +21,9 @@ struct ImportReport {
   size_t malformed() const { return too_few + too_many + not_numeric; }
 };
 
-/// Nominal frame rate of an imported pass (Hz): the rig's text files have some 9,400 lines for the 11.8 s
-/// that a slide of 108 mm takes at 10 mm/s, about a fifth fewer than the board's 1008 Hz.
-constexpr double kImportRateHz = 800;
+/// Frame rate of an imported pass (Hz): the board's. The rig's text files lack 5 to 20 % of its frames
+/// (data/lost_frames.h).
+constexpr double kImportRateHz = 1008.06;
 
 /// Length of the moving average that the text files went through: 100 frames of the board's 992 us.
 constexpr double kImportFilterSeconds = 0.0992;
@@ -33,7 +33,8 @@ constexpr double kImportFilterSeconds = 0.0992;
 /// rest of it on another cannot be told from halves of different frames.
 ///
 /// The files have no time stamps. Frame i, counted over *all* non-blank lines so that a dropped line leaves a
-/// gap, gets i / kImportRateHz; metadata "time_base" is "nominal" until a registration replaces it. Positions
+/// gap, gets i / kImportRateHz; metadata "time_base" is "nominal" until a registration replaces it. What the host lost
+/// without leaving a line is for restore_clock (data/lost_frames.h). Positions
 /// are unknown. plate, trial, pass are left for the caller; source is "imported".
 /// @throws FileError when the file cannot be read, is empty or over 64 MiB, or more than a tenth of its lines
 /// are not frames: then it is another kind of file. The report is filled in that case too.

@@ -24,7 +24,7 @@ namespace supertac {
 struct PairTrainingSettings {
   FrameSettings model;  ///< sizes and scale are the pairs'
   double lambda = 0.1;  ///< of 1 - SSIM: loss = L2 + lambda (1 - SSIM), the picture's part of SuperTac's
-  std::int64_t epochs = 6;
+  std::int64_t epochs = 20;
   std::int64_t batch = 64;
   std::uint64_t seed = 0;
   OptimiserSettings optimiser;

@@ -90,9 +90,15 @@ SuperTacSettings SuperTacSettings::of_preset(const std::string& name) {
   throw std::invalid_argument("unknown preset \"" + name + "\"; known: paper, tiny");
 }
 
-double rate_of_preset(const std::string& name) {
+PresetTraining PresetTraining::of_preset(const std::string& name) {
   constexpr double kWindowS = 2.56;
-  return static_cast<double>(SuperTacSettings::of_preset(name).timesteps) / kWindowS;
+  PresetTraining training{.rate_hz =
+                              static_cast<double>(SuperTacSettings::of_preset(name).timesteps) / kWindowS};
+  if (name == "tiny") {
+    training.epochs = 80;
+    training.learning_rate = 2e-3;
+  }
+  return training;
 }
 
 Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)

@@ -45,8 +45,16 @@ struct SuperTacSettings {
   static SuperTacSettings of_preset(const std::string& name);
 };
 
-/// Samples a second that a preset was made for. Throws as SuperTacSettings::of_preset.
-double rate_of_preset(const std::string& name);
+/// How a preset's network is trained to its best on the rig's recordings (measured: bench/README.md). The
+/// smaller one makes its steps faster and needs more of them.
+struct PresetTraining {
+  double rate_hz = 100;  ///< of the window's samples
+  std::int64_t epochs = 20;
+  double learning_rate = 1e-3;  ///< Adam's peak
+
+  /// Throws as SuperTacSettings::of_preset.
+  static PresetTraining of_preset(const std::string& name);
+};
 
 /// One thing for each group, in place: a warm step must not go to the heap.
 template <class T>

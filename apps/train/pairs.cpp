@@ -10,6 +10,7 @@
 #include "apps/common/version.h"
 #include "apps/train/log_means.h"
 #include "io/file.h"
+#include "io/numbers.h"
 #include "models/pair_trainer.h"
 
 namespace supertac {
@@ -34,10 +35,10 @@ std::string split_name(const Arguments& a, const PairSet& pairs) {
 PairTrainingSettings settings_of(const Arguments& a, const PairSet& pairs) {
   PairTrainingSettings s = PairTrainingSettings::of(pairs);
   s.lambda = a.number("lambda", 0, 1e6);
-  s.epochs = a.integer("epochs", 1, 100'000);
+  if (a.given("epochs")) s.epochs = a.integer("epochs", 1, 100'000);
   s.batch = a.integer("batch", 1, 4096);
   s.seed = static_cast<std::uint64_t>(a.integer("seed", 0, std::numeric_limits<std::int64_t>::max()));
-  s.optimiser.learning_rate = a.number("learning-rate", 1e-9, 1);
+  if (a.given("learning-rate")) s.optimiser.learning_rate = a.number("learning-rate", 1e-9, 1);
   return s;
 }
 
@@ -70,7 +71,7 @@ class PairRun {
       if (report.collapsed && !std::exchange(warned_, true))
         a_.note("step " + std::to_string(report.step) +
                 ": the pictures are the same for every input; stop and lower --learning-rate (now " +
-                a_.text("learning-rate") + ")");
+                format(trainer_.settings().optimiser.learning_rate) + ")");
       const bool epoch_ends = report.step % trainer_.steps_per_epoch() == 0;
       if (epoch_ends || report.step % LogMeans::kSteps == 0) log(means.take(seconds()), epoch_ends);
       if (report.step % every == 0) trainer_.save(folder_.checkpoint_path(), origin_);

@@ -5,11 +5,12 @@ namespace supertac {
 void declare_training(Arguments& a) {
   a.option("grouping", "NAME", "taxels of one VAE: horizontal (rows) or vertical (columns)", "horizontal");
   a.option("split", "NAME", "what is kept for testing: window, pass, trial, texture or none", "trial");
-  a.option("epochs", "N", "passes over the training windows", "20");
+  a.option("epochs", "N", "passes over the training windows (default: 20; preset tiny: 80)");
   a.option("batch", "N", "windows per step", "64");
-  a.option("rate", "HZ",
-           "of the model's samples: T samples span T / HZ seconds; default 100 for paper, 50 for tiny; the "
-           "paper's is 300, and the board's filter leaves nothing above 10");
+  a.option(
+      "rate", "HZ",
+      "of the model's samples: T samples span T / HZ seconds; the paper's is 300, and the board's filter "
+      "leaves nothing above 10 (default: 100; preset tiny: 50)");
   a.option("range", "REST,SPAN",
            "a signal V becomes clip((REST - V) / SPAN, 0, 1), in volts or whatever the recordings hold",
            "2.45,0.36");
@@ -18,9 +19,12 @@ void declare_training(Arguments& a) {
            "of the signals: levelled (each window to its own rest and gain, so that a finger pressed harder "
            "is seen like any other) or fixed",
            "levelled");
-  a.option("learning-rate", "X", "peak of Adam's rate, after warm-up and before the cosine", "0.001");
+  a.option("learning-rate", "X",
+           "peak of Adam's rate, after warm-up and before the cosine (default: 0.001; preset tiny: 0.002)");
   a.option("augment", "NAME",
-           "standard: random gains, offsets, noise and dropped taxels, for unseen trials; none", "standard");
+           "standard: random gains, offsets, noise, dropped taxels and a finger lifted a little, for unseen "
+           "trials; none",
+           "standard");
   a.option("loss-a", "X", "share of the VAEs in the loss, 0 to 1", "0.2");
   a.option("beta", "X", "weight of the KL divergence", "0.001");
   a.option("autoencoder", "NAME",
@@ -31,12 +35,14 @@ void declare_training(Arguments& a) {
   a.option("checkpoint-every", "STEPS", "how often the state is saved", "500");
 }
 
-TrainingSettings training_settings(const Arguments& a) {
+TrainingSettings training_settings(const Arguments& a, const SuperTacSettings& model) {
+  const PresetTraining preset = PresetTraining::of_preset(model.preset);
   TrainingSettings s;
+  s.model = model;
   s.model.grouping = grouping_of(a.choice("grouping", {"horizontal", "vertical"}));
-  s.epochs = a.integer("epochs", 1, 100'000);
+  s.epochs = a.given("epochs") ? a.integer("epochs", 1, 100'000) : preset.epochs;
   s.batch = a.integer("batch", 1, 4096);
-  s.learning_rate = a.number("learning-rate", 1e-9, 1);
+  s.learning_rate = a.given("learning-rate") ? a.number("learning-rate", 1e-9, 1) : preset.learning_rate;
   s.loss = {a.number("loss-a", 0, 1), a.number("beta", 0, 1e6), a.number("lambda", 0, 1e6)};
   if (a.choice("autoencoder", {"variational", "plain"}) == "plain") {
     s.sampling = false;
@@ -46,6 +52,10 @@ TrainingSettings training_settings(const Arguments& a) {
     s.augment = kStandardAugmentation;
   }
   return s;
+}
+
+double training_rate_hz(const Arguments& a, const SuperTacSettings& model) {
+  return a.given("rate") ? a.number("rate", 20, 2000) : PresetTraining::of_preset(model.preset).rate_hz;
 }
 
 SplitKind training_split(const Arguments& a) {
@@ -65,7 +75,7 @@ WindowSet training_windows(const Arguments& a, const SuperTacSettings& model) {
   WindowSettings w;
   w.timesteps = static_cast<int>(model.timesteps);
   w.scale = static_cast<int>(model.scale);
-  w.rate_hz = a.given("rate") ? a.number("rate", 20, 2000) : rate_of_preset(model.preset);
+  w.rate_hz = training_rate_hz(a, model);
   w.scaling = training_scaling(a);
   w.stride = static_cast<int>(a.integer("stride", 1, 100'000));
   WindowSet windows = WindowSet::load(a.text("data"), a.list("plates"), w);

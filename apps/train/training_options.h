@@ -10,8 +10,12 @@ namespace supertac {
 /// Data, split, optimiser, loss and augmentation: everything but the network and the seed.
 void declare_training(Arguments& a);
 
-/// What these options say; model and seed are left to the caller. Throws UsageError.
-TrainingSettings training_settings(const Arguments& a);
+/// What these options say about training this network; where they are not given, what its preset is best
+/// trained with. --grouping is set in the network; the seed is left to the caller. Throws UsageError.
+TrainingSettings training_settings(const Arguments& a, const SuperTacSettings& model);
+
+/// --rate, or the preset's. Throws UsageError.
+double training_rate_hz(const Arguments& a, const SuperTacSettings& model);
 
 /// --split. Throws UsageError.
 SplitKind training_split(const Arguments& a);

@@ -9,6 +9,7 @@
 #include "apps/common/signals.h"
 #include "apps/common/version.h"
 #include "apps/train/log_means.h"
+#include "io/numbers.h"
 #include "models/evaluation.h"
 
 namespace supertac {
@@ -104,7 +105,7 @@ void TrainingRun::step_until_done() {
                    ? "no latent number tells windows apart; stop and lower --beta (now " + a_.text("beta") +
                          ") or "
                    : "the pictures are the same for every window, or far too strong; stop and lower ") +
-              "--learning-rate (now " + a_.text("learning-rate") + ")");
+              "--learning-rate (now " + format(trainer_.settings().learning_rate) + ")");
     }
     const bool epoch_ends = report.step % trainer_.steps_per_epoch() == 0;
     if (epoch_ends || report.step % LogMeans::kSteps == 0) log(means.take(seconds()), epoch_ends);

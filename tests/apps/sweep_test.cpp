@@ -125,6 +125,26 @@ TEST_F(Sweep, HistoryJudgesModelsOnTheSameFrames) {
   EXPECT_NE(none.error.find("--history 100000 leaves none of the "), std::string::npos) << none.error;
 }
 
+// Each at its own rate, so that windows of 64 samples span 0.64 s of one and 1.28 s of the other.
+TEST_F(Sweep, PresetsOfOneTableAreTrainedAtTheirOwnRates) {
+  const ProcessResult swept = run_process("supertac-sweep", {"--out",       path("presets"),
+                                                             "--data",      path("data"),
+                                                             "--preset",    "paper,tiny",
+                                                             "--timesteps", "64",
+                                                             "--channels",  "8",
+                                                             "--rcabs",     "1",
+                                                             "--scale",     "2",
+                                                             "--epochs",    "1",
+                                                             "--stride",    "8",
+                                                             "--threads",   "1"});
+  ASSERT_EQ(swept.code, 0) << swept.error;
+  std::istringstream lines(bytes("presets/sweep.csv"));
+  std::vector<std::string> windows;
+  for (std::string line; std::getline(lines, line);) windows.push_back(cell(line, "all_windows"));
+  ASSERT_EQ(windows.size(), 3U);
+  EXPECT_GT(std::stoi(windows[1]), 1.8 * std::stoi(windows[2]));
+}
+
 TEST_F(Sweep, ACutLineIsDroppedAndItsModelMeasuredAgain) {
   ASSERT_EQ(sweep("cut").code, 0);
   const std::string csv = bytes("cut/sweep.csv");

@@ -1,0 +1,134 @@
+#include "data/lost_frames.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "data/registration.h"
+#include "data/simulator.h"
+#include "io/random.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kBoardHz = 1008.06;
+
+Recording full_pass(const std::string& plate, int pass, uint64_t seed) {
+  SimulatorSettings settings;
+  settings.rate_hz = kBoardHz;
+  settings.with_loss = false;
+  return simulate_pass(Plate::named(plate), {.pass = pass, .speed_mm_s = 10, .from_mm = 0, .to_mm = 108},
+                       settings, seed);
+}
+
+// Without the frames at..at + lost - 1, and with stamps that count those that are left.
+void lose(Recording& r, size_t at, size_t lost) {
+  const auto from = static_cast<ptrdiff_t>(at), to = static_cast<ptrdiff_t>(std::min(at + lost, r.frames()));
+  r.volts.erase(r.volts.begin() + from * kTaxels, r.volts.begin() + to * kTaxels);
+  r.position_mm.erase(r.position_mm.begin() + from * 2, r.position_mm.begin() + to * 2);
+  r.time_s.resize(r.frames() - static_cast<size_t>(to - from));
+}
+
+// As the rig's text files have it: the host reads chunks of 29 frames, and behind a fifth of them, more in
+// the second quarter of the pass, it lost up to 24.
+Recording lossy_pass(const std::string& plate, int pass, uint64_t seed) {
+  Recording r = full_pass(plate, pass, seed);
+  const RandomStream random(seed, static_cast<uint64_t>(pass));
+  for (size_t at = 29, chunk = 0; at < r.frames(); at += 29, ++chunk) {
+    const double part = static_cast<double>(at) / static_cast<double>(r.frames());
+    if (random.uniform(2 * chunk) < (part > 0.25 && part < 0.5 ? 0.6 : 0.2))
+      lose(r, at, static_cast<size_t>(24 * random.uniform(2 * chunk + 1)));
+  }
+  return r;
+}
+
+// How far the best straight line y(time_s) is from the true positions between y = 28 and 80: what an uneven
+// clock costs any registration (mm, the worst).
+double unevenness(const Recording& r) {
+  double n = 0, t = 0, y = 0, tt = 0, ty = 0;
+  const auto inside = [&](size_t i) {
+    return r.position_mm[2 * i + 1] >= 28 && r.position_mm[2 * i + 1] <= 80;
+  };
+  for (size_t i = 0; i < r.frames(); ++i)
+    if (inside(i)) {
+      const double at = r.position_mm[2 * i + 1];
+      n += 1, t += r.time_s[i], y += at, tt += r.time_s[i] * r.time_s[i], ty += r.time_s[i] * at;
+    }
+  const double rate = (n * ty - t * y) / (n * tt - t * t), start = (y - rate * t) / n;
+  double worst = 0;
+  for (size_t i = 0; i < r.frames(); ++i)
+    if (inside(i)) worst = std::max(worst, std::abs(start + rate * r.time_s[i] - r.position_mm[2 * i + 1]));
+  return worst;
+}
+
+TEST(LostFrames, TheClockIsRestoredWhereSignalsMove) {
+  double before = 0, after = 0;
+  int n = 0;
+  for (const char* plate : {"3_Bumps", "6_Bumps", "4_Ridges", "6_Ridges"})
+    for (const int pass : {2, 4, 5, 7}) {
+      Recording recording = lossy_pass(plate, pass, 5);
+      before += unevenness(recording), ++n;
+      restore_clock(recording, kBoardHz);
+      after += unevenness(recording);
+    }
+  EXPECT_GT(before / n, 0.8) << "the passes are not lossy enough to show anything";
+  EXPECT_LT(after / n, 0.4);
+}
+
+TEST(LostFrames, ALossIsCountedToAFrameOrATenth) {
+  const Recording whole = full_pass("6_Ridges", 4, 3);
+  // Where the fastest change is.
+  size_t at = 1000;
+  double most = 0;
+  for (size_t i = 1000; i + 1000 < whole.frames(); ++i) {
+    double change = 0;
+    for (size_t k = 0; k < kTaxels; ++k)
+      change += std::abs(whole.volts[i * kTaxels + k] - whole.volts[(i - 1) * kTaxels + k]);
+    if (change > most) most = change, at = i;
+  }
+  for (const size_t lost : {1, 5, 20}) {
+    const double tolerance = std::max(1.0, 0.1 * static_cast<double>(lost));
+    Recording cut = whole;
+    lose(cut, at, lost);
+    const std::vector<double> found = find_lost_frames(cut, kBoardHz);
+    EXPECT_NEAR(found[at], static_cast<double>(lost), tolerance) << lost;
+    EXPECT_EQ(found[at - 1], 0);
+    EXPECT_EQ(found[at + 1], 0);
+    // A gap that the stamps tell of is not counted twice.
+    for (size_t i = at; i < cut.frames(); ++i) cut.time_s[i] += static_cast<double>(lost) / kBoardHz;
+    EXPECT_LE(find_lost_frames(cut, kBoardHz)[at], tolerance) << lost;
+  }
+}
+
+TEST(LostFrames, NothingIsFoundWhereNothingIsMissing) {
+  Recording whole = full_pass("4_Ridges", 5, 4);
+  const double frames = static_cast<double>(whole.frames());
+  restore_clock(whole, kBoardHz);
+  EXPECT_LT(std::stod(whole.metadata.at("lost_frames")), 0.005 * frames);
+
+  Recording flat = whole;
+  std::fill(flat.volts.begin(), flat.volts.end(), 2.44F);
+  for (const double lost : find_lost_frames(flat, kBoardHz)) EXPECT_EQ(lost, 0);
+  std::fill(flat.volts.begin(), flat.volts.end(), std::numeric_limits<float>::quiet_NaN());
+  for (const double lost : find_lost_frames(flat, kBoardHz)) EXPECT_EQ(lost, 0);
+  EXPECT_TRUE(find_lost_frames(Recording{}, kBoardHz).empty());
+}
+
+TEST(LostFrames, DeadAndSaturatedTaxelsDoNotHideThem) {
+  Recording recording = lossy_pass("6_Bumps", 4, 6);
+  for (size_t i = 0; i < recording.frames(); ++i)
+    for (size_t k = 0; k < kTaxels; ++k) {
+      float& v = recording.volts[i * kTaxels + k];
+      if (k % 3 == 0) v = 2.44F;
+      if (k % 3 == 1) v = std::max(v, 2.35F);
+    }
+  const double before = unevenness(recording);
+  restore_clock(recording, kBoardHz);
+  EXPECT_LT(unevenness(recording), 0.5 * before);
+}
+
+}  // namespace
+}  // namespace supertac
