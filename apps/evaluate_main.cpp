@@ -15,14 +15,14 @@
 #include "data/split.h"
 #include "io/file.h"
 #include "io/numbers.h"
+#include "models/committee.h"
 #include "models/evaluation.h"
-#include "models/model_file.h"
 
 namespace supertac {
 namespace {
 
 void declare(Arguments& a) {
-  a.required("model", "FILE", "a model written by supertac-train");
+  a.required("model", "FILE,...", "a model written by supertac-train; of several the pictures are averaged");
   a.option("data", "DIR", "recordings to test on");
   a.option("pairs", "FILE", "instead of --data: pairs to test a model trained with --pairs on");
   a.option(
@@ -78,6 +78,17 @@ Task load_task(const Arguments& a, const ModelFile& file) {
   return task;
 }
 
+// Splits of windows and passes depend on the seed: what one model is tested on another was trained on.
+void refuse_leak(const std::vector<ModelFile>& files, const Task& task) {
+  const SplitKind kind = split_kind(task.split_name);
+  if (kind != SplitKind::window && kind != SplitKind::pass) return;
+  for (const ModelFile& file : files)
+    if (metadata_or(file, "seed", "0") != metadata_or(files.front(), "seed", "0"))
+      throw std::runtime_error("the models' seeds differ, and split " + task.split_name +
+                               " differs with the seed: what one is tested on the others have seen; average "
+                               "models of split trial or texture");
+}
+
 std::string row(const std::string& name, const ContactMetrics& metrics, const Latency& latency) {
   const Metrics c = metrics.contact(), all = metrics.all();
   const auto cell = [](double value, int decimals) {
@@ -101,7 +112,7 @@ struct Scores {
 
 using Baselines = std::vector<std::unique_ptr<Baseline>>;
 
-Scores score_all(const Arguments& a, const SuperTac& model, const Task& task, const Baselines& baselines,
+Scores score_all(const Arguments& a, const Committee& model, const Task& task, const Baselines& baselines,
                  std::optional<OutputsFile>& outputs) {
   Scores scores(task.windows, baselines.size());
   const std::size_t pixels = task.windows.image().pixels();
@@ -129,7 +140,7 @@ Scores score_all(const Arguments& a, const SuperTac& model, const Task& task, co
   return scores;
 }
 
-nlohmann::ordered_json report(const Arguments& a, const SuperTac& model, const Task& task,
+nlohmann::ordered_json report(const Arguments& a, const Committee& model, const Task& task,
                               const Baselines& baselines, const Scores& scores) {
   nlohmann::ordered_json result = scores.network.to_json();
   result["felt"] = scores.felt.to_json();
@@ -164,8 +175,10 @@ int run(Arguments& a) {
   if (!a.given("data")) throw UsageError("expected --data DIR or --pairs FILE, found neither");
   const std::string outputs_path = a.text("outputs");
   if (!outputs_path.empty()) refuse_existing(outputs_path, a.force());
-  const ModelFile file = load_model(a.text("model"));
-  const Task task = load_task(a, file);
+  const std::vector<ModelFile> files = load_models(a.list("model"));
+  const Committee network(files);
+  const Task task = load_task(a, files.front());
+  refuse_leak(files, task);
 
   std::optional<OutputFolder> pictures;
   if (a.given("pictures")) pictures.emplace(a.text("pictures"), a.force());
@@ -173,10 +186,10 @@ int run(Arguments& a) {
   if (!outputs_path.empty()) outputs.emplace(task.windows, task.test.size());
   if (task.train.empty()) throw std::runtime_error("the split leaves no window to fit the baselines on");
   const Baselines baselines = fit_baselines(task.windows, task.train);
-  const Scores scores = score_all(a, *file.model, task, baselines, outputs);
-  const nlohmann::ordered_json result = report(a, *file.model, task, baselines, scores);
+  const Scores scores = score_all(a, network, task, baselines, outputs);
+  const nlohmann::ordered_json result = report(a, network, task, baselines, scores);
   if (pictures) {
-    write_pictures(*file.model, task.windows, task.test, *pictures);
+    write_pictures(network, task.windows, task.test, *pictures);
     pictures->keep();
   }
   if (outputs) outputs->write(outputs_path);

@@ -28,7 +28,7 @@ constexpr double kWaitS = 0.05, kFiguresEveryS = 0.5;
 constexpr double kForever = std::numeric_limits<double>::infinity();
 
 void declare(Arguments& a) {
-  a.option("model", "FILE", "model of supertac-train")
+  a.option("model", "FILE,...", "model of supertac-train; of several the pictures are averaged")
       .option("board", "PORT", "port of the tactile board; auto finds it by its USB number")
       .option("replay", "JOURNAL",
               "the raw bytes of --capture, or of a supertac-collect run, instead of a board")
@@ -77,8 +77,8 @@ std::unique_ptr<SensorSource> open_source(const Arguments& a, const Options& opt
 
 class Stream {
  public:
-  Stream(const Arguments& a, double seconds, const ModelFile& model, SensorSource& source)
-      : a_(a), source_(source), maker_(model, source), seconds_(seconds) {
+  Stream(const Arguments& a, double seconds, std::span<const ModelFile> models, SensorSource& source)
+      : a_(a), source_(source), maker_(models, source), seconds_(seconds) {
     state_.array = source.array();
     state_.scale = maker_.image().height / state_.array.rows;
     if (a.given("out"))
@@ -199,9 +199,9 @@ int run(Arguments& a) {
   }
   const double begin = monotonic_seconds();
   const Options options = read_options(a);
-  const ModelFile model = load_model(a.text("model"));
+  const std::vector<ModelFile> models = load_models(a.list("model"));
   const auto source = open_source(a, options);
-  Stream stream(a, options.seconds, model, *source);
+  Stream stream(a, options.seconds, models, *source);
   const double ready_ms = 1e3 * (monotonic_seconds() - begin);
   a.note("ready: " + options.source + "; a picture needs " + format(stream.window_s(), 2) + " s of signal");
   std::exception_ptr error;

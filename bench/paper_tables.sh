@@ -16,11 +16,11 @@ sweep() { # folder, options
   "$bin/supertac-sweep" --data "$data" --plates 3_Bumps,6_Bumps,4_Ridges,6_Ridges --rate 100 --stride 4 --seeds 0,1,2,3,4 \
     --threads 1 --limit 1500 --out "$folder" "$@"
 }
-# Judged on frames with 512 frames of their pass behind them, which the longest window needs.
-sweep latent_timesteps --history 512 --timesteps 32,64,128,256,512 --latent 3,10,30
 sweep pixels_trial --scale 2,4,8
 sweep pixels_pass --split pass --scale 2,4,8
 sweep pixels_window --split window --augment none --scale 2,4,8
-for folder in latent_timesteps pixels_trial pixels_pass pixels_window; do
+# Judged on frames with 512 frames of their pass behind them, which the longest window needs.
+sweep latent_timesteps --history 512 --timesteps 32,64,128,256,512 --latent 3,10,30
+for folder in pixels_trial pixels_pass pixels_window latent_timesteps; do
   python3 "$here/sweep_statistics.py" "$out/$folder/sweep.csv"
 done

@@ -16,7 +16,7 @@ struct Batch {
   std::exception_ptr error;
 };
 
-void compute(const SuperTac& model, const WindowSet& data, std::span<const std::uint32_t> indices,
+void compute(const Committee& model, const WindowSet& data, std::span<const std::uint32_t> indices,
              Batch& batch) {
   const auto window_size = batch.windows.values().size() / indices.size();
   const auto truth_size = batch.truths.values().size() / indices.size();
@@ -37,7 +37,7 @@ bool fits(const WindowSet& windows, const SuperTacSettings& model) {
          array.rows == model.rows && array.columns == model.columns && array.channels == model.in_channels;
 }
 
-void for_each_output(const SuperTac& model, const WindowSet& data, std::span<const std::uint32_t> indices,
+void for_each_output(const Committee& model, const WindowSet& data, std::span<const std::uint32_t> indices,
                      const std::function<bool(const EvaluatedBatch&)>& use) {
   const SuperTacSettings& s = model.settings();
   if (!fits(data, s)) {
@@ -69,7 +69,7 @@ void for_each_output(const SuperTac& model, const WindowSet& data, std::span<con
   }
 }
 
-ContactMetrics score(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
+ContactMetrics score(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
                      bool (*stop)()) {
   const std::size_t pixels = windows.image().pixels();
   ContactMetrics metrics(windows.image());

@@ -7,7 +7,7 @@
 
 #include "data/metrics.h"
 #include "data/windows.h"
-#include "models/supertac_model.h"
+#include "models/committee.h"
 
 namespace supertac {
 
@@ -26,12 +26,12 @@ struct EvaluatedBatch {
 /// Calls `use` for the given windows in order, in batches of at most 64. `use` returns false to stop early.
 /// Batches are computed on several threads, `use` runs on the caller's. Throws std::invalid_argument when the
 /// data set's windows do not fit the model.
-void for_each_output(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
+void for_each_output(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
                      const std::function<bool(const EvaluatedBatch&)>& use);
 
 /// The metrics of the model's pictures of the given windows. `stop`, if given, is asked between batches; once
 /// it says true, the windows so far are what was measured. Throws as for_each_output.
-ContactMetrics score(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
+ContactMetrics score(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
                      bool (*stop)() = nullptr);
 
 }  // namespace supertac

@@ -14,7 +14,7 @@ constexpr std::size_t kStrips = 12, kFilmColumns = 24;
 
 using Draw = Picture (*)(std::span<const Strip>, const StripLayout&);
 
-Picture draw(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> chosen,
+Picture draw(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> chosen,
              Draw picture, int side) {
   const std::size_t pixels = windows.image().pixels();
   const TaxelArray array = windows.array();
@@ -62,7 +62,7 @@ void OutputsFile::write(const std::string& path) const {
                      {"truth", "F32", {count_, height_, width_}, bytes(truth_)}});
 }
 
-void write_pictures(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> test,
+void write_pictures(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> test,
                     OutputFolder& folder) {
   std::vector<std::uint32_t> touching;
   std::map<std::size_t, std::vector<std::uint32_t>> by_pass;

@@ -8,7 +8,7 @@
 
 #include "apps/common/output_folder.h"
 #include "data/windows.h"
-#include "models/supertac_model.h"
+#include "models/committee.h"
 
 namespace supertac {
 
@@ -28,7 +28,7 @@ class OutputsFile {
 
 /// strips.png: windows in contact spread over the test windows, input | output | truth; and for each test
 /// pass film_<plate>_t<trial>_p<pass>.png. Throws FileError.
-void write_pictures(const SuperTac& model, const WindowSet& windows, std::span<const std::uint32_t> test,
+void write_pictures(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> test,
                     OutputFolder& folder);
 
 }  // namespace supertac

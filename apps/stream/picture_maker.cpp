@@ -32,15 +32,16 @@ LiveWindowSettings window_settings(const ModelFile& model, const SensorSource& s
 
 }  // namespace
 
-PictureMaker::PictureMaker(const ModelFile& model, const SensorSource& source)
-    : model_(model),
-      window_(window_settings(model, source)),
-      input_(Shape{1, model.model->settings().timesteps, model.model->settings().signals()}),
-      output_(model.model->infer(input_)) {}  // the first run takes memory and chooses kernels
+PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource& source)
+    : model_(models.front()),
+      network_(models),
+      window_(window_settings(model_, source)),
+      input_(Shape{1, network_.settings().timesteps, network_.settings().signals()}),
+      output_(network_.infer(input_)) {}  // the first run takes memory and chooses kernels
 
 std::span<const float> PictureMaker::picture() {
   if (!window_.window(input_.values())) return {};
-  output_ = model_.model->infer(input_);
+  output_ = network_.infer(input_);
   return output_.values();
 }
 

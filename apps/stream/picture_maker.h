@@ -4,17 +4,17 @@
 
 #include "apps/stream/sensor_source.h"
 #include "data/live_window.h"
-#include "models/model_file.h"
+#include "models/committee.h"
 
 namespace supertac {
 
 /// Frames in, pictures out: the signal path the model was trained behind, then the model. Used by one thread.
 class PictureMaker {
  public:
-  /// For the frames of this source. `model` must outlive this. @throws std::runtime_error when the model was
-  /// trained on another array, or behind another moving average than the frames have gone through, which
-  /// cannot be taken back.
-  PictureMaker(const ModelFile& model, const SensorSource& source);
+  /// For the frames of this source. `models`, those of a committee, must outlive this. @throws
+  /// std::runtime_error when they were trained on another array, or behind another moving average than the
+  /// frames have gone through, which cannot be taken back.
+  PictureMaker(std::span<const ModelFile> models, const SensorSource& source);
 
   void push(const SensorFrame& frame) { window_.push(frame.time_s, frame.volts); }
   /// The picture [height][width] of image() after the newest frame, valid until the next call; empty before
@@ -27,7 +27,8 @@ class PictureMaker {
   const LiveWindow& window() const { return window_; }
 
  private:
-  const ModelFile& model_;
+  const ModelFile& model_;  // what all have in common
+  Committee network_;
   LiveWindow window_;
   Tensor input_, output_;
 };

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "models/model_file.h"
+
+namespace supertac {
+
+/// Networks that differ in their seeds and whose pictures are averaged: what each of them made up where the
+/// signals leave it open mostly differs, and is averaged away (Lakshminarayanan 2017). Costs as much as all
+/// of them.
+class Committee {
+ public:
+  /// Of one, which must outlive this: a model is taken wherever a committee is.
+  Committee(const SuperTac& model) : members_{&model} {}
+  /// Of all these files' models, at least one; they must outlive this. Throws std::invalid_argument when
+  /// there is none.
+  explicit Committee(std::span<const ModelFile> files);
+
+  const SuperTacSettings& settings() const { return members_.front()->settings(); }
+  /// The mean of the members' SuperTac::infer, added in their order. Throws as it.
+  Tensor infer(const Tensor& windows) const;
+
+ private:
+  std::vector<const SuperTac*> members_;
+};
+
+/// The models of a committee. Throws std::runtime_error, as load_model, and naming the file that differs from
+/// the first in its network or in the signals it takes.
+std::vector<ModelFile> load_models(std::span<const std::string> paths);
+
+}  // namespace supertac
