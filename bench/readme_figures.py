@@ -57,7 +57,7 @@ def speed():
     return "\n\n".join(part() for name, part in parts.items() if (ROOT / "bench/results" / name).exists())
 
 
-RUNS = {"trial": "`trial`, preset `paper`", "best": "`trial`, `best`: four of `paper` averaged", "tiny": "`trial`, preset `tiny`", "trial_300hz": "`trial`, 300 Hz, fixed scaling",
+RUNS = {"trial": "`trial`, preset `paper`", "best": "`trial`, `best`: four of `paper` averaged", "tiny": "`trial`, preset `tiny`",
         "window": "`window`, preset `paper`"}
 METHODS = {"network": "", "ridge": "ridge regression", "bicubic": "bicubic", "mean_image": "mean image"}
 

@@ -1,9 +1,8 @@
 #!/bin/sh
 # The README's table on the real recordings, five seeds: presets `paper` and `tiny` on split `trial`, `paper` on the leaky split
-# `window`, and on `trial` with the paper's 300 Hz and signals scaled alike in every trial. `best` are four of the five `paper`
-# networks, averaged: five choices of four.
+# `window`. `best` are four of the five `paper` networks, averaged: five choices of four.
 #   bench/real_recordings.sh TEXT_DIR OUT_DIR [BIN_DIR]
-# About an hour and a half on one core. A finished model is not trained again, so the script can be interrupted and rerun.
+# About half an hour on one core. A finished model is not trained again, so the script can be interrupted and rerun.
 set -eu
 here="$(cd "$(dirname "$0")" && pwd)"
 text="$1"
@@ -12,12 +11,11 @@ bin="${3:-build-release/bin}"
 mkdir -p "$out"
 [ -d "$out/recordings" ] || "$bin/supertac-import" "$text" --out "$out/recordings"
 for seed in 0 1 2 3 4; do
-  for run in trial tiny window trial_300hz; do
+  for run in trial tiny window; do
     case $run in
       tiny) options="--preset tiny" ;;
       # Augmentation imitates what differs between trials; neighbouring windows of one pass have no such difference.
       window) options="--split window --augment none" ;;
-      trial_300hz) options="--rate 300 --scaling fixed --epochs 6" ;;
       *) options="" ;;
     esac
     name="$out/${run}_s$seed"

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 from scipy import stats
 
-RUNS = ["best", "tiny", "trial", "trial_300hz", "window"]
+RUNS = ["best", "tiny", "trial", "window"]
 FIGURES = ["ssim", "psnr_mean_db", "psnr_pooled_db", "phase_correlation", "phase_correlation_floor",
            "position_error_px", "position_error_mm"]
 
