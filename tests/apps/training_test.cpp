@@ -145,6 +145,27 @@ TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
   EXPECT_TRUE(fs::exists(path("pictures/strips.png")));
 }
 
+TEST_F(Training, SeveralModelsAreAveragedUnlessTheySawEachOthersTest) {
+  const std::string one = path("one.safetensors"), two = path("two.safetensors");
+  ASSERT_EQ(train("one.safetensors", {"--seed", "1", "--split", "pass"}).code, 0);
+  ASSERT_EQ(train("two.safetensors", {"--seed", "2", "--split", "pass"}).code, 0);
+  const ProcessResult leak =
+      run_process("supertac-evaluate", {"--model", one + "," + two, "--data", path("data")});
+  EXPECT_EQ(leak.code, 1);
+  EXPECT_NE(leak.error.find("split pass differs with the seed"), std::string::npos) << leak.error;
+
+  const auto ssim = [&](const std::string& models) {
+    const ProcessResult result =
+        run_process("supertac-evaluate", {"--model", models, "--data", path("data"), "--split", "trial",
+                                          "--limit", "60", "--json", path("average.json"), "--force"});
+    EXPECT_EQ(result.code, 0) << result.error;
+    return parse_json_limited(bytes("average.json"))["all"]["ssim"].get<double>();
+  };
+  const double a = ssim(one), b = ssim(two), both = ssim(one + "," + two);
+  EXPECT_NE(both, a);
+  EXPECT_NE(both, b);
+}
+
 struct Bad {
   std::vector<std::string> arguments;
   int code;
