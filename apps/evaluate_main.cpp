@@ -15,6 +15,7 @@
 #include "data/split.h"
 #include "io/file.h"
 #include "io/numbers.h"
+#include "io/text.h"
 #include "models/committee.h"
 #include "models/evaluation.h"
 
@@ -48,19 +49,9 @@ struct Task {
   std::vector<std::uint32_t> train, test;
 };
 
-std::vector<std::string> split_words(const std::string& text) {
-  std::vector<std::string> words;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t comma = std::min(text.find(',', at), text.size());
-    words.push_back(text.substr(at, comma - at));
-    at = comma + 1;
-  }
-  return words;
-}
-
 Task load_task(const Arguments& a, const ModelFile& file) {
   const std::vector<std::string> plates =
-      a.given("plates") ? a.list("plates") : split_words(metadata_or(file, "plates", ""));
+      a.given("plates") ? a.list("plates") : comma_list(metadata_or(file, "plates", ""));
   const std::string name = a.given("split")
                                ? a.choice("split", {"window", "pass", "trial", "texture", "none"})
                                : metadata_or(file, "split", "none");
@@ -78,8 +69,15 @@ Task load_task(const Arguments& a, const ModelFile& file) {
   return task;
 }
 
-// Splits of windows and passes depend on the seed: what one model is tested on another was trained on.
+// What one model is tested on must not be what another was trained on. Splits of windows and passes depend
+// on the seed.
 void refuse_leak(const std::vector<ModelFile>& files, const Task& task) {
+  const std::string split = metadata_or(files.front(), "split", "none");
+  for (const ModelFile& file : files)
+    if (const std::string other = metadata_or(file, "split", "none"); other != split)
+      throw std::runtime_error(
+          "one model was trained with split " + split + ", another with " + other +
+          ": what one is tested on the other may have seen; average models of one split");
   const SplitKind kind = split_kind(task.split_name);
   if (kind != SplitKind::window && kind != SplitKind::pass) return;
   for (const ModelFile& file : files)

@@ -1,5 +1,7 @@
 #include "io/text.h"
 
+#include <algorithm>
+
 namespace supertac {
 
 std::string printable(std::string_view text, size_t longest) {
@@ -9,5 +11,15 @@ std::string printable(std::string_view text, size_t longest) {
 }
 
 std::string in_quotes(std::string_view text) { return "'" + printable(text) + "'"; }
+
+std::vector<std::string> comma_list(const std::string& text) {
+  std::vector<std::string> words;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t comma = std::min(text.find(',', at), text.size());
+    words.push_back(text.substr(at, comma - at));
+    at = comma + 1;
+  }
+  return words;
+}
 
 }  // namespace supertac

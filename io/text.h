@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace supertac {
 
@@ -13,5 +14,8 @@ std::string printable(std::string_view text, size_t longest = 60);
 
 /// printable() in single quotes.
 std::string in_quotes(std::string_view text);
+
+/// What stands between the commas; nothing of an empty text.
+std::vector<std::string> comma_list(const std::string& text);
 
 }  // namespace supertac

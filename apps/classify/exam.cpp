@@ -8,6 +8,7 @@
 #include "data/split.h"
 #include "data/truth.h"
 #include "io/numbers.h"
+#include "io/text.h"
 
 namespace supertac {
 namespace {
@@ -19,16 +20,6 @@ std::string metadata_of(const ModelFile& file, const std::string& path, const st
       path + ": metadata \"" + key +
       "\" is missing, so it is unknown what the model was trained on; train it anew with "
       "supertac-train");
-}
-
-std::vector<std::string> words(const std::string& text) {
-  std::vector<std::string> all;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t comma = std::min(text.find(',', at), text.size());
-    all.push_back(text.substr(at, comma - at));
-    at = comma + 1;
-  }
-  return all;
 }
 
 std::int64_t number_of(const ModelFile& file, const std::string& path, const std::string& key) {
@@ -67,7 +58,7 @@ WindowSet exam_windows(const std::string& folder, std::vector<std::string> plate
   const ModelFile& file = first.file;
   WindowSettings w = file.windows();
   w.stride = static_cast<int>(number_of(file, first.path, "stride"));
-  if (plates.empty()) plates = words(metadata_of(file, first.path, "plates"));
+  if (plates.empty()) plates = comma_list(metadata_of(file, first.path, "plates"));
   WindowSet windows = WindowSet::load(folder, plates, w);
   if (!also.empty()) windows.add_directory(also, classes_of(windows), true);
   return windows;

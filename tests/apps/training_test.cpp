@@ -153,6 +153,12 @@ TEST_F(Training, SeveralModelsAreAveragedUnlessTheySawEachOthersTest) {
       run_process("supertac-evaluate", {"--model", one + "," + two, "--data", path("data")});
   EXPECT_EQ(leak.code, 1);
   EXPECT_NE(leak.error.find("split pass differs with the seed"), std::string::npos) << leak.error;
+  const std::string all = path("all.safetensors");
+  ASSERT_EQ(train("all.safetensors", {"--split", "none"}).code, 0);
+  const ProcessResult mixed =
+      run_process("supertac-evaluate", {"--model", one + "," + all, "--data", path("data")});
+  EXPECT_EQ(mixed.code, 1);
+  EXPECT_NE(mixed.error.find("split pass, another with none"), std::string::npos) << mixed.error;
 
   const auto ssim = [&](const std::string& models) {
     const ProcessResult result =
