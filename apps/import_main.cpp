@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
+#include <optional>
 
 #include "apps/collect/passes.h"
 #include "apps/common/output_folder.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
+#include "data/alignment.h"
 #include "data/lost_frames.h"
 #include "data/plate_file.h"
 #include "data/registration.h"
@@ -30,6 +33,7 @@ struct TextPass {
 };
 
 struct Imported {
+  const TextPass* pass = nullptr;
   Recording recording;
   ImportReport report;
   Registration registration;
@@ -104,6 +108,7 @@ std::vector<TextPass> find_passes(const std::string& root) {
 
 Imported import_pass(const TextPass& pass, double speed_mm_s) {
   Imported imported;
+  imported.pass = &pass;
   Recording& recording = imported.recording;
   recording = import_text_pass(pass.path, imported.report);
   recording.plate = pass.plate.name();
@@ -112,11 +117,11 @@ Imported import_pass(const TextPass& pass, double speed_mm_s) {
   recording.speed_mm_s = speed_mm_s;
   restore_clock(recording, kImportRateHz);
   imported.registration = register_pass(recording, pass.plate);
-  apply(imported.registration, recording);
   return imported;
 }
 
-nlohmann::ordered_json to_json(const TextPass& pass, const Imported& imported) {
+nlohmann::ordered_json to_json(const Imported& imported) {
+  const TextPass& pass = *imported.pass;
   const ImportReport& report = imported.report;
   const Registration& registration = imported.registration;
   return {{"file", pass.path},
@@ -140,11 +145,15 @@ nlohmann::ordered_json to_json(const TextPass& pass, const Imported& imported) {
             {"matched", registration.matched},
             {"coverage", registration.coverage},
             {"margin", registration.margin},
+            {"shift_mm", registration.shift_mm},
+            {"stretch_mm", registration.stretch_mm},
+            {"agreement", registration.agreement},
             {"reliable", registration.reliable},
             {"reason", registration.reason}}}};
 }
 
-std::string to_line(const TextPass& pass, const Imported& imported) {
+std::string to_line(const Imported& imported) {
+  const TextPass& pass = *imported.pass;
   const ImportReport& report = imported.report;
   const Registration& registration = imported.registration;
   const size_t dropped = report.lines - report.empty - report.frames;
@@ -152,43 +161,52 @@ std::string to_line(const TextPass& pass, const Imported& imported) {
                      ".txt  " + std::to_string(report.lines) + " lines, " + std::to_string(dropped) +
                      " dropped (" + std::to_string(report.malformed()) + " malformed), residual " +
                      format(registration.residual, 2) + " mm, ";
+  if (registration.agreement > 0) line += "aligned by " + format(registration.shift_mm, 2) + " mm, ";
   return line + (registration.reliable ? "reliable" : "not reliable: " + registration.reason);
 }
 
-/// What is wrong with a file is said and counted; without --skip-bad the first such file ends the import.
-struct Outcome {
-  nlohmann::ordered_json files = nlohmann::ordered_json::array();
-  size_t written = 0, reliable = 0, bad = 0;
-};
-
-Outcome import_all(const Arguments& arguments, const std::vector<TextPass>& passes, OutputFolder& folder,
-                   OutputFolder* pictures) {
-  Outcome outcome;
+/// What is wrong with a file is said and counted in `bad`; without --skip-bad the first such file ends the
+/// import.
+std::vector<Imported> import_all(const Arguments& arguments, const std::vector<TextPass>& passes,
+                                 size_t& bad) {
+  std::vector<Imported> all;
   Progress progress(arguments, "importing", passes.size(), "files");
   const double speed = arguments.number("speed", 0.1, 1000);
   for (size_t i = 0; i < passes.size(); ++i) {
     stop_if_interrupted();
     try {
-      const Imported imported = import_pass(passes[i], speed);
-      write_recording(folder.add(recording_file_name(imported.recording)), imported.recording);
-      if (pictures != nullptr)
-        write_png(pictures->add(fs::path(recording_file_name(imported.recording)).stem().string() + ".png"),
-                  registration_picture(imported.recording, passes[i].plate));
-      outcome.files.push_back(to_json(passes[i], imported));
-      outcome.reliable += imported.registration.reliable;
-      ++outcome.written;
-      arguments.print(to_line(passes[i], imported));
+      all.push_back(import_pass(passes[i], speed));
     } catch (const FileError& error) {
-      if (error.path() != passes[i].path) throw;  // not the input's fault
       if (!arguments.flag("skip-bad")) {
         throw std::runtime_error(std::string(error.what()) + " (--skip-bad leaves such files out)");
       }
       arguments.note(std::string("left out: ") + error.what());
-      ++outcome.bad;
+      ++bad;
     }
     progress.update(i + 1);
   }
-  return outcome;
+  return all;
+}
+
+/// The passes of each plate that feels the same along every line.
+void align_plates(std::vector<Imported>& all) {
+  std::map<std::string, std::vector<RegisteredPass>> plates;
+  for (Imported& imported : all)
+    if (imported.pass->plate.uniform_in_x())
+      plates[imported.pass->plate.name()].push_back({&imported.recording, &imported.registration});
+  for (const auto& [plate, passes] : plates) {
+    stop_if_interrupted();
+    align_passes(passes);
+  }
+}
+
+void write(Imported& imported, OutputFolder& folder, OutputFolder* pictures) {
+  apply(imported.registration, imported.recording);
+  const std::string name = recording_file_name(imported.recording);
+  write_recording(folder.add(name), imported.recording);
+  if (pictures != nullptr)
+    write_png(pictures->add(fs::path(name).stem().string() + ".png"),
+              registration_picture(imported.recording, imported.pass->plate));
 }
 
 int recover(const Arguments& arguments) {
@@ -216,22 +234,30 @@ int run(Arguments& arguments) {
   OutputFolder folder(arguments.text("out"), arguments.force());
   std::optional<OutputFolder> pictures;
   if (arguments.given("pictures")) pictures.emplace(arguments.text("pictures"), arguments.force());
-  const Outcome outcome = import_all(arguments, passes, folder, pictures ? &*pictures : nullptr);
-  if (outcome.written == 0) {
-    throw FileError(arguments.text("TEXT_DIR"),
-                    "none of " + std::to_string(outcome.bad) + " files is a recording");
+  size_t bad = 0, reliable = 0;
+  std::vector<Imported> all = import_all(arguments, passes, bad);
+  if (all.empty()) {
+    throw FileError(arguments.text("TEXT_DIR"), "none of " + std::to_string(bad) + " files is a recording");
+  }
+  align_plates(all);
+  nlohmann::ordered_json files = nlohmann::ordered_json::array();
+  for (Imported& imported : all) {
+    write(imported, folder, pictures ? &*pictures : nullptr);
+    arguments.print(to_line(imported));
+    files.push_back(to_json(imported));
+    reliable += imported.registration.reliable;
   }
   arguments.write_json({{"folder", arguments.text("out")},
-                        {"recordings", outcome.written},
-                        {"reliable", outcome.reliable},
-                        {"left_out", outcome.bad},
-                        {"files", outcome.files}});
+                        {"recordings", all.size()},
+                        {"reliable", reliable},
+                        {"left_out", bad},
+                        {"files", files}});
   for (const auto& plate : entries_of(arguments.text("TEXT_DIR"), true))
     keep_plate_file(plate_file_of(plate), arguments.text("out"));
   folder.keep();
   if (pictures) pictures->keep();
-  arguments.print(std::to_string(outcome.written) + " recordings in " + arguments.text("out") + ", " +
-                  std::to_string(outcome.reliable) + " with a reliable registration");
+  arguments.print(std::to_string(all.size()) + " recordings in " + arguments.text("out") + ", " +
+                  std::to_string(reliable) + " with a reliable registration");
   return kExitOk;
 }
 

@@ -16,10 +16,10 @@ train() { # name, seed, options of supertac-simulate
   shift 2
   model="$out/simulated/${name}_s$seed"
   [ -e "$model.json" ] && return
-  [ -d "$out/simulated/$name" ] || "$bin/supertac-simulate" --out "$out/simulated/$name" --plates $plates --speeds 10 \
+  [ -e "$model.safetensors" ] || [ -d "$out/simulated/$name" ] || "$bin/supertac-simulate" --out "$out/simulated/$name" --plates $plates --speeds 10 \
     --trials 12 --passes 4 --from 4 --to 90 "$@"
-  "$bin/supertac-train" --data "$out/simulated/$name" --split none --stride 4 --epochs 10 --seed "$seed" --threads 1 \
-    --out "$model.safetensors" --force
+  [ -e "$model.safetensors" ] || "$bin/supertac-train" --data "$out/simulated/$name" --split none --stride 4 --epochs 10 \
+    --seed "$seed" --threads 1 --out "$model.safetensors" --force
   "$bin/supertac-evaluate" --model "$model.safetensors" --data "$out/recordings" --plates $plates --split trial --threads 1 \
     --json "$model.json"
 }

@@ -315,6 +315,8 @@ void apply(const Registration& registration, Recording& recording) {
   recording.metadata["registration_residual_mm"] = format(registration.residual, 3);
   recording.metadata["registration_reliable"] = registration.reliable ? "yes" : "no";
   recording.metadata["registration_reason"] = registration.reason;
+  recording.metadata["registration_shift_mm"] = format(registration.shift_mm, 3);
+  recording.metadata["registration_stretch_mm"] = format(registration.stretch_mm, 3);
 }
 
 }  // namespace supertac

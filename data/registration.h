@@ -21,7 +21,10 @@ struct Registration {
   double valid_from_s = 0;  ///< the stretch that was fitted: a recording is cut at bursts of lost frames
   double valid_until_s = 0;
   bool reliable = false;
-  std::string reason;  ///< what is wrong when it is not
+  std::string reason;     ///< what is wrong when it is not
+  double shift_mm = 0;    ///< align_passes() moved it by so much at y = 54 mm, ...
+  double stretch_mm = 0;  ///< ... by so much more at y = 80 mm, after which ...
+  double agreement = 0;   ///< ... its signals correlate so with the other passes'; 0: it was not aligned
 };
 
 /// Where, from the finger's centre along y, a row of taxels (0 trailing to 3 leading) feels an element best:
@@ -47,7 +50,7 @@ Registration register_pass(const Recording& recording, const Plate& plate);
 /// Fills position_mm: x from the number of the pass, y from the registration, limited to the plate; NaN
 /// outside valid_from_s..valid_until_s. Where the time stamps were only nominal (metadata time_base) and the
 /// fit is reliable, they are stretched so that the finger moves at its commanded speed. Writes metadata
-/// registration_start_mm, _rate, _residual_mm, _reliable (yes, no) and _reason.
+/// registration_start_mm, _rate, _residual_mm, _reliable (yes, no), _reason, _shift_mm and _stretch_mm.
 void apply(const Registration& registration, Recording& recording);
 
 }  // namespace supertac

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <span>
+
+#include "data/recording.h"
+#include "data/registration.h"
+
+namespace supertac {
+
+/// A pass and where its own registration puts it.
+struct RegisteredPass {
+  const Recording* recording = nullptr;
+  Registration* registration = nullptr;
+};
+
+/// Aligns the passes of one plate with each other. A registration knows its pass by a few dozen contacts; the
+/// whole course of the signals, beside that of the other passes over the same texture, tells its place
+/// better.
+///
+/// Each pass is a profile p_r(y): how far the four taxels of row r are pressed on average within 1 mm of y,
+/// for y = 22..92 mm. Its line is changed by a shift a and a stretch b (mm),
+///   y' = y + a + b (y - 54) / 26,
+/// for the largest
+///   mean over r of corr(p_r, mean of the other passes' p_r) - 0.002 ((a / 0.5)^2 + b^2),
+/// six rounds over all passes. The medians of a and b over the passes are taken off in each round: where the
+/// plate as a whole lies remains the registrations' word. Passes that are not reliable take no part; with
+/// fewer than three nothing changes, nor does a pass whose correlation stays below a half.
+/// Sets start_mm, rate, shift_mm, stretch_mm and agreement (the correlation). No truth, split or network has
+/// a part in it. @throws std::invalid_argument when a recording is not of the rig's array.
+void align_passes(std::span<const RegisteredPass> passes);
+
+}  // namespace supertac
