@@ -147,6 +147,8 @@ nlohmann::ordered_json to_json(const Imported& imported) {
             {"margin", registration.margin},
             {"shift_mm", registration.shift_mm},
             {"stretch_mm", registration.stretch_mm},
+            {"lost_at_s", registration.lost_at_s},
+            {"lost_s", registration.lost_s},
             {"agreement", registration.agreement},
             {"reliable", registration.reliable},
             {"reason", registration.reason}}}};
@@ -162,6 +164,7 @@ std::string to_line(const Imported& imported) {
                      " dropped (" + std::to_string(report.malformed()) + " malformed), residual " +
                      format(registration.residual, 2) + " mm, ";
   if (registration.agreement > 0) line += "aligned by " + format(registration.shift_mm, 2) + " mm, ";
+  if (registration.lost_s > 0) line += "another " + format(registration.lost_s, 2) + " s lost, ";
   return line + (registration.reliable ? "reliable" : "not reliable: " + registration.reason);
 }
 

@@ -22,6 +22,9 @@ constexpr double kFirstStepMm = 0.4, kLastStepMm = 0.01;
 constexpr int kRounds = 6;
 constexpr size_t kFewestPasses = 3;
 constexpr double kLeastAgreement = 0.5;
+// A loss is sought where passes disagree, and believed when they agree so much better with it.
+constexpr double kDisagreement = 0.9, kGain = 0.05;
+constexpr double kLossEveryS = 0.2, kLossStepS = 0.1, kLongestLossS = 0.8;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 double median(std::vector<double> values) {
@@ -32,6 +35,10 @@ double median(std::vector<double> values) {
 
 struct Change {
   double shift_mm = 0, stretch_mm = 0;
+};
+
+struct Loss {
+  double at_s = 0, seconds = 0;
 };
 
 // y' = y + a + b (y - 54) / 26 of y = start + rate t is a line again.
@@ -74,6 +81,14 @@ class Signals {
       sum_[row].assign(pressed.size() + 1, 0);
       for (size_t i = 0; i < pressed.size(); ++i) sum_[row][i + 1] = sum_[row][i] + pressed[i];
     }
+  }
+
+  const std::vector<double>& time_s() const { return time_s_; }
+
+  Signals with(const Loss& loss) const {
+    Signals later = *this;
+    for (double& t : later.time_s_) t += t >= loss.at_s ? loss.seconds : 0;
+    return later;
   }
 
   Profile along(const Registration& r) const {
@@ -128,6 +143,7 @@ double correlation(const Profile& a, const Profile& b) {
 
 struct Found {
   Change change;
+  Loss loss;
   double agreement = -1;
 };
 
@@ -139,12 +155,14 @@ Found best_change(const Signals& signals, const Registration& registration, cons
     const double shift = c.shift_mm / kUsualShiftMm, stretch = c.stretch_mm / kUsualStretchMm;
     return agreement - kPenalty * (shift * shift + stretch * stretch);
   };
-  Found best{.change = start};
+  Found best;
+  best.change = start;
   double highest = score(start, best.agreement);
   for (double step = kFirstStepMm; step >= kLastStepMm;) {
     bool better = false;
     for (const Change& move : {Change{step, 0}, Change{-step, 0}, Change{0, step}, Change{0, -step}}) {
-      Found tried{.change = {best.change.shift_mm + move.shift_mm, best.change.stretch_mm + move.stretch_mm}};
+      Found tried;
+      tried.change = {best.change.shift_mm + move.shift_mm, best.change.stretch_mm + move.stretch_mm};
       const double value = score(tried.change, tried.agreement);
       if (value > highest) highest = value, best = tried, better = true;
     }
@@ -153,46 +171,103 @@ Found best_change(const Signals& signals, const Registration& registration, cons
   return best;
 }
 
-void take_medians_off(std::vector<Found>& found) {
+// The line was fitted to contacts of both parts of the pass: it is about right in the longer one.
+Registration before_loss(Registration registration, const Loss& loss) {
+  const double middle_s = (registration.valid_from_s + registration.valid_until_s) / 2;
+  if (loss.at_s < middle_s) registration.start_mm -= registration.rate * loss.seconds;
+  return registration;
+}
+
+// The one loss of frames with which the pass agrees best with the others, if by much.
+Found with_loss(const Signals& signals, const Registration& registration, const Profile& others,
+                const Found& without) {
+  Found best = without;
+  const std::vector<double>& time = signals.time_s();
+  for (double at = time.front() + kLossEveryS; at < time.back(); at += kLossEveryS) {
+    for (double seconds = kLossStepS; seconds <= kLongestLossS; seconds += kLossStepS) {
+      const Loss loss{.at_s = at, .seconds = seconds};
+      Found tried = best_change(signals.with(loss), before_loss(registration, loss), others, without.change);
+      tried.loss = loss;
+      if (tried.agreement > best.agreement) best = tried;
+    }
+  }
+  return best.agreement > without.agreement + kGain ? best : without;
+}
+
+struct Aligned {
+  Registration* registration;
+  Signals signals;
+  Found found;
+
+  Profile profile() const { return signals.along(changed(*registration, found.change)); }
+};
+
+std::vector<Profile> profiles_of(const std::vector<Aligned>& passes) {
+  std::vector<Profile> profiles;
+  for (const Aligned& pass : passes) profiles.push_back(pass.profile());
+  return profiles;
+}
+
+void take_medians_off(std::vector<Aligned>& passes) {
   std::vector<double> shifts, stretches;
-  for (const Found& f : found) {
-    shifts.push_back(f.change.shift_mm);
-    stretches.push_back(f.change.stretch_mm);
+  for (const Aligned& pass : passes) {
+    shifts.push_back(pass.found.change.shift_mm);
+    stretches.push_back(pass.found.change.stretch_mm);
   }
   const double shift = median(shifts), stretch = median(stretches);
-  for (Found& f : found) f.change.shift_mm -= shift, f.change.stretch_mm -= stretch;
+  for (Aligned& pass : passes) pass.found.change.shift_mm -= shift, pass.found.change.stretch_mm -= stretch;
+}
+
+void align(std::vector<Aligned>& passes) {
+  for (int round = 0; round < kRounds; ++round) {
+    const std::vector<Profile> profiles = profiles_of(passes);
+    for (size_t i = 0; i < passes.size(); ++i) {
+      Aligned& pass = passes[i];
+      const Loss loss = pass.found.loss;
+      pass.found =
+          best_change(pass.signals, *pass.registration, mean_of_others(profiles, i), pass.found.change);
+      pass.found.loss = loss;
+    }
+    take_medians_off(passes);
+  }
+}
+
+bool find_losses(std::vector<Aligned>& passes) {
+  const std::vector<Profile> profiles = profiles_of(passes);
+  bool any = false;
+  for (size_t i = 0; i < passes.size(); ++i) {
+    Aligned& pass = passes[i];
+    if (pass.found.agreement > kDisagreement || pass.found.agreement < kLeastAgreement) continue;
+    pass.found = with_loss(pass.signals, *pass.registration, mean_of_others(profiles, i), pass.found);
+    if (pass.found.loss.seconds == 0) continue;
+    pass.signals = pass.signals.with(pass.found.loss);
+    *pass.registration = before_loss(*pass.registration, pass.found.loss);
+    any = true;
+  }
+  return any;
 }
 
 }  // namespace
 
 void align_passes(std::span<const RegisteredPass> passes) {
-  std::vector<Registration*> registrations;
-  std::vector<Signals> signals;
+  std::vector<Aligned> reliable;
   for (const RegisteredPass& pass : passes) {
     if (!pass.registration->reliable) continue;
     if (pass.recording->array != TaxelArray{})
       throw std::invalid_argument("align_passes: expected recordings of the rig's 4x4 array, found another");
-    registrations.push_back(pass.registration);
-    signals.emplace_back(*pass.recording, *pass.registration);
+    reliable.push_back({pass.registration, Signals(*pass.recording, *pass.registration), {}});
   }
-  const size_t n = signals.size();
-  if (n < kFewestPasses) return;
-
-  std::vector<Found> found(n);
-  for (int round = 0; round < kRounds; ++round) {
-    std::vector<Profile> profiles;
-    for (size_t i = 0; i < n; ++i)
-      profiles.push_back(signals[i].along(changed(*registrations[i], found[i].change)));
-    for (size_t i = 0; i < n; ++i)
-      found[i] = best_change(signals[i], *registrations[i], mean_of_others(profiles, i), found[i].change);
-    take_medians_off(found);
-  }
-  for (size_t i = 0; i < n; ++i) {
-    if (found[i].agreement < kLeastAgreement) continue;
-    *registrations[i] = changed(*registrations[i], found[i].change);
-    registrations[i]->shift_mm = found[i].change.shift_mm;
-    registrations[i]->stretch_mm = found[i].change.stretch_mm;
-    registrations[i]->agreement = found[i].agreement;
+  if (reliable.size() < kFewestPasses) return;
+  align(reliable);
+  if (find_losses(reliable)) align(reliable);
+  for (const auto& [registration, signals, found] : reliable) {
+    if (found.agreement < kLeastAgreement) continue;
+    *registration = changed(*registration, found.change);
+    registration->shift_mm = found.change.shift_mm;
+    registration->stretch_mm = found.change.stretch_mm;
+    registration->lost_at_s = found.loss.at_s;
+    registration->lost_s = found.loss.seconds;
+    registration->agreement = found.agreement;
   }
 }
 

@@ -298,13 +298,14 @@ void apply(const Registration& registration, Recording& recording) {
   recording.position_mm.resize(2 * n);
   const auto x = static_cast<float>(pass_x_mm(recording.pass));
   for (size_t i = 0; i < n; ++i) {
-    const double y = registration.start_mm + registration.rate * recording.time_s[i];
+    const double y = registration.y_mm(recording.time_s[i]);
     const bool known =
         recording.time_s[i] >= registration.valid_from_s && recording.time_s[i] <= registration.valid_until_s;
     recording.position_mm[2 * i] = x;
     recording.position_mm[2 * i + 1] = known ? static_cast<float>(std::clamp(y, 0.0, Plate::kLengthMm))
                                              : std::numeric_limits<float>::quiet_NaN();
   }
+  for (double& t : recording.time_s) t += t >= registration.lost_at_s ? registration.lost_s : 0;
   if (nominal && registration.reliable) {  // the finger's speed is known better than the rate of the lines
     const double speed = recording.speed_mm_s > 0 ? recording.speed_mm_s : kNominalSpeed;
     for (double& t : recording.time_s) t *= registration.rate / speed;
@@ -317,6 +318,7 @@ void apply(const Registration& registration, Recording& recording) {
   recording.metadata["registration_reason"] = registration.reason;
   recording.metadata["registration_shift_mm"] = format(registration.shift_mm, 3);
   recording.metadata["registration_stretch_mm"] = format(registration.stretch_mm, 3);
+  recording.metadata["registration_lost_s"] = format(registration.lost_s, 3);
 }
 
 }  // namespace supertac

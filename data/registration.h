@@ -8,7 +8,8 @@
 
 namespace supertac {
 
-/// Where the finger was during a pass: y(t) = start_mm + rate * t for the recording's own clock t.
+/// Where the finger was during a pass: y(t) = start_mm + rate * t for the recording's own clock t, with the
+/// time of lost frames put back.
 struct Registration {
   double start_mm = 0;      ///< y of the finger's centre at time 0
   double rate = 0;          ///< mm per second of the recording's clock
@@ -23,8 +24,13 @@ struct Registration {
   bool reliable = false;
   std::string reason;     ///< what is wrong when it is not
   double shift_mm = 0;    ///< align_passes() moved it by so much at y = 54 mm, ...
-  double stretch_mm = 0;  ///< ... by so much more at y = 80 mm, after which ...
-  double agreement = 0;   ///< ... its signals correlate so with the other passes'; 0: it was not aligned
+  double stretch_mm = 0;  ///< ... by so much more at y = 80 mm, ...
+  double lost_at_s = 0;   ///< ... found that from here on the clock is ...
+  double lost_s = 0;      ///< ... slow by so much (frames lost where nothing moved), ...
+  double agreement = 0;   ///< ... after which its signals correlate so with the other passes'; 0: not aligned
+
+  /// Where the finger was at the recording's time t.
+  double y_mm(double t) const { return start_mm + rate * (t + (t >= lost_at_s ? lost_s : 0)); }
 };
 
 /// Where, from the finger's centre along y, a row of taxels (0 trailing to 3 leading) feels an element best:
@@ -49,8 +55,9 @@ Registration register_pass(const Recording& recording, const Plate& plate);
 
 /// Fills position_mm: x from the number of the pass, y from the registration, limited to the plate; NaN
 /// outside valid_from_s..valid_until_s. Where the time stamps were only nominal (metadata time_base) and the
-/// fit is reliable, they are stretched so that the finger moves at its commanded speed. Writes metadata
-/// registration_start_mm, _rate, _residual_mm, _reliable (yes, no), _reason, _shift_mm and _stretch_mm.
+/// fit is reliable, they are stretched so that the finger moves at its commanded speed. lost_s is put into
+/// the stamps. Writes metadata registration_start_mm, _rate, _residual_mm, _reliable (yes, no), _reason,
+/// _shift_mm and _stretch_mm.
 void apply(const Registration& registration, Recording& recording);
 
 }  // namespace supertac
