@@ -22,6 +22,7 @@ struct Vec {
   static Vec load_part(const real* p, Dim n) { return {_mm256_maskload_ps(p, mask(n))}; }
   static Vec broadcast(real x) { return {_mm256_set1_ps(x)}; }
   static Vec add(Vec a, Vec b) { return {_mm256_add_ps(a.v, b.v)}; }
+  static Vec sub(Vec a, Vec b) { return {_mm256_sub_ps(a.v, b.v)}; }
   static Vec fma(Vec a, Vec b, Vec c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
   static Vec rectify(Vec x, Vec slope) {
     const __m256 positive = _mm256_cmp_ps(x.v, _mm256_setzero_ps(), _CMP_GT_OQ);
@@ -35,7 +36,8 @@ struct Vec {
 
 }  // namespace
 
-const IsaKernels kAvx2Kernels{"avx2", Vectors::avx2, gather, gather_rows, outer};
+const IsaKernels kAvx2Kernels{"avx2",  Vectors::avx2, gather,  gather_rows, outer,
+                              filters, filter_grads,  patches, squares,     square_grads};
 
 }  // namespace supertac::kernels
 

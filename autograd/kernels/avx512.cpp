@@ -18,6 +18,7 @@ struct Vec {
   static Vec load_part(const real* p, Dim n) { return {_mm512_maskz_loadu_ps(mask(n), p)}; }
   static Vec broadcast(real x) { return {_mm512_set1_ps(x)}; }
   static Vec add(Vec a, Vec b) { return {_mm512_add_ps(a.v, b.v)}; }
+  static Vec sub(Vec a, Vec b) { return {_mm512_sub_ps(a.v, b.v)}; }
   static Vec fma(Vec a, Vec b, Vec c) { return {_mm512_fmadd_ps(a.v, b.v, c.v)}; }
   static Vec rectify(Vec x, Vec slope) {
     return {_mm512_mask_mul_ps(x.v, _mm512_cmp_ps_mask(x.v, _mm512_setzero_ps(), _CMP_NGT_UQ), slope.v, x.v)};
@@ -30,7 +31,8 @@ struct Vec {
 
 }  // namespace
 
-const IsaKernels kAvx512Kernels{"avx512", Vectors::avx512, gather, gather_rows, outer};
+const IsaKernels kAvx512Kernels{"avx512", Vectors::avx512, gather,  gather_rows, outer,
+                                filters,  filter_grads,    patches, squares,     square_grads};
 
 }  // namespace supertac::kernels
 

@@ -4,6 +4,7 @@
 
 #include "autograd/kernels/isa.h"
 #include "autograd/kernels/narrow.h"
+#include "autograd/kernels/winograd.h"
 
 namespace supertac::kernels {
 namespace {
@@ -35,12 +36,14 @@ void gather_batch(const GatherJob& job, Dim images, Dim in_pixels, Dim out_pixel
 
 void conv(const ConvSizes& s, const real* x, const real* w, const real* bias, real negative_slope, real* y) {
   if (is_narrow(s)) return narrow_conv(s, x, w, bias, negative_slope, y);
+  if (is_winograd(s)) return winograd_conv(s, x, w, bias, negative_slope, y);
   const GatherJob job{&s.geometry->forward, w, bias, s.cin, s.cout, Into::overwrite, negative_slope};
   gather_batch(job, s.images, s.geometry->in_pixels, s.geometry->out_pixels, x, y);
 }
 
 void conv_grad_x(const ConvSizes& s, const real* gy, const real* w, Into into, real* gx) {
   if (is_narrow(s)) return narrow_grad_x(s, gy, w, into, gx);
+  if (is_winograd(s)) return winograd_grad_x(s, gy, w, into, gx);
   const Tensor wt = transposed_weights(w, s.geometry->taps, s.cin, s.cout);
   const GatherJob job{&s.geometry->backward, wt.data(), nullptr, s.cout, s.cin, into, 1};
   gather_batch(job, s.images, s.geometry->out_pixels, s.geometry->in_pixels, gy, gx);
@@ -49,6 +52,7 @@ void conv_grad_x(const ConvSizes& s, const real* gy, const real* w, Into into, r
 // A chunk of images passes all taps before the next one, while it is in the cache.
 void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, real* gw) {
   if (is_narrow(s)) return narrow_grad_w(s, x, gy, gw);
+  if (is_winograd(s)) return winograd_grad_w(s, x, gy, gw);
   const auto outer = isa_kernels().outer;
   const Geometry& g = *s.geometry;
   const Dim chunk = std::max<Dim>(1, kRowsPerPiece / g.out_pixels);

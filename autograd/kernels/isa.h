@@ -30,6 +30,22 @@ struct OuterJob {
   real* gw = nullptr;        // [cin][cout], this tap's
   Dim images = 0, in_pixels = 0, out_pixels = 0, cin = 0, cout = 0;
 };
+/// Tiles of 4x4 outputs for Winograd's transforms (winograd.h), numbered through a batch: tiles first ..
+/// first + count. Place (i, j) of the k-th of them is places[(6 i + j) * step + k * channels + c].
+struct TileJob {
+  const std::int32_t* pixels = nullptr;  // of one image: [tiles][36] of patches or [tiles][16] of squares
+  Dim tiles = 0, image_pixels = 0;       // of one image
+  Dim channels = 0;                      // a multiple of kTransformChannels
+  Dim first = 0, count = 0, step = 0;
+};
+inline constexpr Dim kTransformChannels = 16;
+
+/// Weights [3][3][weights] and their places u[(6 i + j) * step + k] for the same transforms.
+struct FilterJob {
+  Dim weights = 0;  // a multiple of kTransformChannels
+  Dim step = 0;
+};
+
 /// The largest number of input channels that `gather` takes (the length of its row of zeros).
 inline constexpr Dim kMaxChannels = 4096;
 
@@ -43,6 +59,16 @@ struct IsaKernels {
   /// `rows` images of one pixel each: y[rows, cout] = bias + x[rows, cin] * w[cin, cout]
   void (*gather_rows)(const GatherJob& job, const real* x, real* y, Dim rows);
   void (*outer)(const OuterJob& job);
+  /// u = G g G^T, and g += G^T u G
+  void (*filters)(const FilterJob& job, const real* g, real* u);
+  void (*filter_grads)(const FilterJob& job, const real* u, real* g);
+  /// places = B^T d B of the patches d of x
+  void (*patches)(const TileJob& job, const real* x, real* places);
+  /// y = f(start + A^T m A) of the places m; start is the bias, y itself (Into::add) or, without a bias, 0
+  void (*squares)(const TileJob& job, const real* places, const real* bias, Into into, real negative_slope,
+                  real* y);
+  /// places = A g A^T of the squares g of gy
+  void (*square_grads)(const TileJob& job, const real* gy, real* places);
 };
 
 /// The best set this processor has, or the one that SUPERTAC_ISA=avx512|avx2|portable names.

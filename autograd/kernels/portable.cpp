@@ -16,6 +16,7 @@ struct Vec {
   static Vec load_part(const real* p, Dim) { return {*p}; }
   static Vec broadcast(real x) { return {x}; }
   static Vec add(Vec a, Vec b) { return {a.v + b.v}; }
+  static Vec sub(Vec a, Vec b) { return {a.v - b.v}; }
 #ifdef SUPERTAC_REAL_IS_DOUBLE
   static Vec fma(Vec a, Vec b, Vec c) { return {__builtin_fma(a.v, b.v, c.v)}; }
 #else
@@ -31,9 +32,11 @@ struct Vec {
 }  // namespace
 
 #ifdef SUPERTAC_SCALAR_FMA
-const IsaKernels kPortableFmaKernels{"portable", Vectors::baseline, gather, gather_rows, outer};
+const IsaKernels kPortableFmaKernels{"portable", Vectors::baseline, gather,  gather_rows, outer,
+                                     filters,    filter_grads,      patches, squares,     square_grads};
 #else
-const IsaKernels kPortableKernels{"portable", Vectors::baseline, gather, gather_rows, outer};
+const IsaKernels kPortableKernels{"portable", Vectors::baseline, gather,  gather_rows, outer,
+                                  filters,    filter_grads,      patches, squares,     square_grads};
 #endif
 
 }  // namespace supertac::kernels

@@ -7,6 +7,7 @@
 #include "autograd/adam.h"
 #include "autograd/kernels/channels.h"
 #include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/winograd.h"
 #include "autograd/ops/losses.h"
 #include "tests/autograd/check.h"
 
@@ -221,6 +222,28 @@ TEST(Isa, PlainLoops) {
             << isa->name << ", loop " << i << " of " << n << " numbers";
       }
     }
+  }
+  use_isa(chosen);
+}
+
+TEST(Isa, Winograd) {
+  const ConvSettings map{
+      .height = 8, .width = 12, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1};
+  const ConvSizes sizes{&geometry_of(map), 5, 48, 16};
+  const Tensor x = numbers({5, 96, 48}), w = numbers({9, 48, 16}, 2), bias = numbers({16}, 3);
+  const Tensor gy = numbers({5, 96, 16}, 4);
+  const IsaKernels& chosen = isa_kernels();
+  Tensor first_y, first_gx, first_gw;
+  for (const IsaKernels* isa : available()) {
+    use_isa(*isa);
+    Tensor y(gy.shape()), gx = numbers(x.shape(), 5), gw = numbers(w.shape(), 6);
+    winograd_conv(sizes, x.data(), w.data(), bias.data(), 0.25F, y.data());
+    winograd_grad_x(sizes, gy.data(), w.data(), Into::add, gx.data());
+    winograd_grad_w(sizes, x.data(), gy.data(), gw.data());
+    if (!first_y.defined()) first_y = y, first_gx = gx, first_gw = gw;
+    EXPECT_TRUE(same_bytes(y, first_y)) << isa->name;
+    EXPECT_TRUE(same_bytes(gx, first_gx)) << isa->name;
+    EXPECT_TRUE(same_bytes(gw, first_gw)) << isa->name;
   }
   use_isa(chosen);
 }

@@ -1,0 +1,24 @@
+// 3x3 convolutions by Winograd's minimal filtering F(4x4, 3x3) (Lavin & Gray, CVPR 2016): each 4x4 square Y
+// of the output comes from the 6x6 patch d of the input around it with 36 instead of 144 products,
+//   Y = A^T [sum over cin of (G g G^T) * (B^T d B)] A,   * element by element.
+// The 36 places of the patches are 36 matrix products [tiles, cin] x [cin, cout], which run on the same
+// register tiles as everything else. Both gradients take the same way back. Rounding errors are ten times
+// those of plain sums: 1e-5 of the largest value.
+#pragma once
+
+#include "autograd/kernels/conv.h"
+
+namespace supertac::kernels {
+
+/// Whether conv() and its gradients take this way: four images or more of 8x8 or more, sides multiples of 4,
+/// channels multiples of 16. Elsewhere the transforms cost more than the products save. A question of shapes
+/// only, so that all processors agree; but a picture alone and the same one in a batch differ in their last
+/// bits.
+bool is_winograd(const ConvSizes& sizes);
+
+void winograd_conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias,
+                   real negative_slope, real* y);
+void winograd_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into into, real* gx);
+void winograd_grad_w(const ConvSizes& sizes, const real* x, const real* gy, real* gw);
+
+}  // namespace supertac::kernels
