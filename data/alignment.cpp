@@ -195,11 +195,11 @@ Found with_loss(const Signals& signals, const Registration& registration, const 
 }
 
 struct Aligned {
-  Registration* registration;
+  Registration registration;
   Signals signals;
   Found found;
 
-  Profile profile() const { return signals.along(changed(*registration, found.change)); }
+  Profile profile() const { return signals.along(changed(registration, found.change)); }
 };
 
 std::vector<Profile> profiles_of(const std::vector<Aligned>& passes) {
@@ -225,7 +225,7 @@ void align(std::vector<Aligned>& passes) {
       Aligned& pass = passes[i];
       const Loss loss = pass.found.loss;
       pass.found =
-          best_change(pass.signals, *pass.registration, mean_of_others(profiles, i), pass.found.change);
+          best_change(pass.signals, pass.registration, mean_of_others(profiles, i), pass.found.change);
       pass.found.loss = loss;
     }
     take_medians_off(passes);
@@ -238,10 +238,10 @@ bool find_losses(std::vector<Aligned>& passes) {
   for (size_t i = 0; i < passes.size(); ++i) {
     Aligned& pass = passes[i];
     if (pass.found.agreement > kDisagreement || pass.found.agreement < kLeastAgreement) continue;
-    pass.found = with_loss(pass.signals, *pass.registration, mean_of_others(profiles, i), pass.found);
+    pass.found = with_loss(pass.signals, pass.registration, mean_of_others(profiles, i), pass.found);
     if (pass.found.loss.seconds == 0) continue;
     pass.signals = pass.signals.with(pass.found.loss);
-    *pass.registration = before_loss(*pass.registration, pass.found.loss);
+    pass.registration = before_loss(pass.registration, pass.found.loss);
     any = true;
   }
   return any;
@@ -251,23 +251,26 @@ bool find_losses(std::vector<Aligned>& passes) {
 
 void align_passes(std::span<const RegisteredPass> passes) {
   std::vector<Aligned> reliable;
+  std::vector<Registration*> results;
   for (const RegisteredPass& pass : passes) {
     if (!pass.registration->reliable) continue;
     if (pass.recording->array != TaxelArray{})
       throw std::invalid_argument("align_passes: expected recordings of the rig's 4x4 array, found another");
-    reliable.push_back({pass.registration, Signals(*pass.recording, *pass.registration), {}});
+    reliable.push_back({*pass.registration, Signals(*pass.recording, *pass.registration), {}});
+    results.push_back(pass.registration);
   }
   if (reliable.size() < kFewestPasses) return;
   align(reliable);
   if (find_losses(reliable)) align(reliable);
-  for (const auto& [registration, signals, found] : reliable) {
+  for (size_t i = 0; i < reliable.size(); ++i) {
+    const Found& found = reliable[i].found;
     if (found.agreement < kLeastAgreement) continue;
-    *registration = changed(*registration, found.change);
-    registration->shift_mm = found.change.shift_mm;
-    registration->stretch_mm = found.change.stretch_mm;
-    registration->lost_at_s = found.loss.at_s;
-    registration->lost_s = found.loss.seconds;
-    registration->agreement = found.agreement;
+    *results[i] = changed(reliable[i].registration, found.change);
+    results[i]->shift_mm = found.change.shift_mm;
+    results[i]->stretch_mm = found.change.stretch_mm;
+    results[i]->lost_at_s = found.loss.at_s;
+    results[i]->lost_s = found.loss.seconds;
+    results[i]->agreement = found.agreement;
   }
 }
 
