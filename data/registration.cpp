@@ -291,6 +291,35 @@ Registration register_pass(const Recording& recording, const Plate& plate) {
   return result;
 }
 
+// Frames lost where nothing moved: a straight line from the signals before to those behind. Where the finger
+// was in each of them is left open.
+static void fill_loss(const Registration& registration, Recording& recording) {
+  std::vector<double>& time = recording.time_s;
+  const auto found = std::lower_bound(time.begin(), time.end(), registration.lost_at_s);
+  const auto at = static_cast<size_t>(found - time.begin());
+  for (size_t i = at; i < time.size(); ++i) time[i] += registration.lost_s;
+  if (at == 0 || at == time.size()) return;
+  const size_t signals = recording.array.signals();
+  const double step = (time[at - 1] - time[0]) / static_cast<double>(at - 1), gap = time[at] - time[at - 1];
+  const auto lost = static_cast<size_t>(gap / step) - 1;
+  std::vector<double> times(lost);
+  std::vector<float> volts(lost * signals);
+  std::vector<float> places(2 * lost, std::numeric_limits<float>::quiet_NaN());
+  for (size_t k = 0; k < lost; ++k) {
+    const double part = static_cast<double>(k + 1) / static_cast<double>(lost + 1);
+    times[k] = time[at - 1] + part * gap;
+    for (size_t s = 0; s < signals; ++s)
+      volts[k * signals + s] = std::lerp(recording.volts[(at - 1) * signals + s],
+                                         recording.volts[at * signals + s], static_cast<float>(part));
+    places[2 * k] = recording.position_mm[0];
+  }
+  const auto before = static_cast<ptrdiff_t>(at);
+  time.insert(time.begin() + before, times.begin(), times.end());
+  recording.volts.insert(recording.volts.begin() + before * static_cast<ptrdiff_t>(signals), volts.begin(),
+                         volts.end());
+  recording.position_mm.insert(recording.position_mm.begin() + 2 * before, places.begin(), places.end());
+}
+
 void apply(const Registration& registration, Recording& recording) {
   const auto base = recording.metadata.find("time_base");
   const bool nominal = base != recording.metadata.end() && base->second == "nominal";
@@ -305,7 +334,7 @@ void apply(const Registration& registration, Recording& recording) {
     recording.position_mm[2 * i + 1] = known ? static_cast<float>(std::clamp(y, 0.0, Plate::kLengthMm))
                                              : std::numeric_limits<float>::quiet_NaN();
   }
-  for (double& t : recording.time_s) t += t >= registration.lost_at_s ? registration.lost_s : 0;
+  if (registration.lost_s > 0) fill_loss(registration, recording);
   if (nominal && registration.reliable) {  // the finger's speed is known better than the rate of the lines
     const double speed = recording.speed_mm_s > 0 ? recording.speed_mm_s : kNominalSpeed;
     for (double& t : recording.time_s) t *= registration.rate / speed;

@@ -56,8 +56,9 @@ Registration register_pass(const Recording& recording, const Plate& plate);
 /// Fills position_mm: x from the number of the pass, y from the registration, limited to the plate; NaN
 /// outside valid_from_s..valid_until_s. Where the time stamps were only nominal (metadata time_base) and the
 /// fit is reliable, they are stretched so that the finger moves at its commanded speed. lost_s is put into
-/// the stamps. Writes metadata registration_start_mm, _rate, _residual_mm, _reliable (yes, no), _reason,
-/// _shift_mm, _stretch_mm and _lost_s.
+/// the stamps, filled with a straight line between the signals before and behind, position unknown. Writes
+/// metadata registration_start_mm, _rate, _residual_mm, _reliable (yes, no), _reason, _shift_mm, _stretch_mm
+/// and _lost_s.
 void apply(const Registration& registration, Recording& recording);
 
 }  // namespace supertac
