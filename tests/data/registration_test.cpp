@@ -172,6 +172,30 @@ TEST(Registration, ApplyFillsPositionsAndStretchesANominalClock) {
               10, 1e-3);
 }
 
+TEST(Registration, ApplyFillsALossWithALine) {
+  const Recording before = like_the_rig("6_Bumps", 4, 3);
+  Registration r = register_pass(before, Plate::named("6_Bumps"));
+  const size_t at = 5000, lost = 243;
+  r.lost_at_s = before.time_s[at];
+  r.lost_s = static_cast<double>(lost) / kLineHz;
+  Recording after = before;
+  apply(r, after);
+  ASSERT_EQ(after.frames(), before.frames() + lost);
+  for (size_t i = 1; i < after.frames(); ++i) ASSERT_GT(after.time_s[i], after.time_s[i - 1]) << i;
+  for (size_t i = 0; i < lost; ++i) {
+    EXPECT_TRUE(std::isnan(after.position_mm[2 * (at + i) + 1]));
+    const float low = std::min(before.volts[(at - 1) * kTaxels], before.volts[at * kTaxels]);
+    const float high = std::max(before.volts[(at - 1) * kTaxels], before.volts[at * kTaxels]);
+    EXPECT_GE(after.volts[(at + i) * kTaxels], low);
+    EXPECT_LE(after.volts[(at + i) * kTaxels], high);
+  }
+  for (const size_t i : {at - 1, at}) {  // one straight line in the new stamps
+    const size_t now = i < at ? i : i + lost;
+    EXPECT_NEAR(after.position_mm[2 * now + 1], r.start_mm + r.rate * after.time_s[now], 1e-4);
+    EXPECT_EQ(after.volts[now * kTaxels], before.volts[i * kTaxels]);
+  }
+}
+
 // The rig's own recordings: at least 92 of 96 fit, and their residuals are those of contacts, not of guesses.
 TEST(Registration, RealPasses) {
   const char* folder = std::getenv("SUPERTAC_RECORDINGS");
