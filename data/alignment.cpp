@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "data/resample.h"
+#include "io/median.h"
 
 namespace supertac {
 namespace {
@@ -26,12 +27,6 @@ constexpr double kLeastAgreement = 0.5;
 constexpr double kDisagreement = 0.9, kGain = 0.05;
 constexpr double kLossEveryS = 0.2, kLossStepS = 0.1, kLongestLossS = 0.8;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 struct Change {
   double shift_mm = 0, stretch_mm = 0;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "io/file.h"
+#include "io/median.h"
 #include "io/numbers.h"
 
 namespace supertac {
@@ -133,9 +134,7 @@ void HeightMap::level() {
     for (size_t column = 0; column < columns_; column += end ? 1 : columns_ - 1)
       outline.push_back(at(row, column));
   }
-  const auto middle = outline.begin() + static_cast<ptrdiff_t>(outline.size() / 2);
-  std::nth_element(outline.begin(), middle, outline.end());
-  const float flat = *middle;
+  const float flat = median(outline);
   for (float& z : z_) {
     z -= flat;
     if (std::abs(double{z}) < kFlatMm) z = 0;

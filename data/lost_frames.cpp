@@ -7,6 +7,7 @@
 #include <numeric>
 #include <span>
 
+#include "io/median.h"
 #include "io/numbers.h"
 
 namespace supertac {
@@ -18,12 +19,6 @@ constexpr double kRoundingVolts = 1e-5;  // of a step in a text file
 constexpr double kSigma = 1.4826;        // of a normal distribution, over the median absolute deviation
 constexpr double kLeastSteps = 1.5, kUncertainties = 3;
 constexpr double kSeenUncertainty = 0.25;
-
-double median(std::span<double> values) {
-  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Of one signal.
 double step_before(const Recording& recording, size_t i, size_t s) {

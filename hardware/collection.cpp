@@ -9,6 +9,7 @@
 
 #include "hardware/frame_decoder.h"
 #include "hardware/motion_model.h"
+#include "io/median.h"
 
 namespace supertac {
 namespace {
@@ -113,9 +114,7 @@ double off_leg(const Leg& leg, const Point3& p) {
 double median_round_trip(const std::vector<PositionSample>& samples) {
   std::vector<double> trips;
   for (const PositionSample& sample : samples) trips.push_back(sample.round_trip_s);
-  const auto middle = trips.begin() + static_cast<std::ptrdiff_t>(trips.size() / 2);
-  std::nth_element(trips.begin(), middle, trips.end());
-  return *middle;
+  return median(trips);
 }
 
 CollectedPass pass_of(const Frames& all, const FrameTimeline& timeline, const PositionTrack& track) {

@@ -1,4 +1,5 @@
 #include "hardware/frame_clock.h"
+#include "io/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -74,9 +75,7 @@ ClockFit ClockEstimator::fit() const {
   for (int round = 0; round < 3; ++round) {
     for (std::size_t i = 0; i < points_.size(); ++i) deviation[i] = std::abs(off(i));
     std::vector<double> sorted = deviation;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
-                     sorted.end());
-    const double most = std::max(3 * sorted[sorted.size() / 2], 1e-9);
+    const double most = std::max(3 * median(sorted), 1e-9);
     for (std::size_t i = 0; i < points_.size(); ++i) used[i] = deviation[i] <= most;
     line = least_squares(points_, used);
   }

@@ -8,6 +8,7 @@
 #include "hardware/port_list.h"
 #include "hardware/serial_port.h"
 #include "io/file.h"
+#include "io/median.h"
 
 namespace supertac {
 namespace {
@@ -77,9 +78,7 @@ double median_period(const Recording& recording) {
   std::vector<double> steps;
   for (size_t i = 1; i < recording.frames(); ++i)
     steps.push_back(recording.time_s[i] - recording.time_s[i - 1]);
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return median(steps);
 }
 
 class RecordingSource : public SensorSource {
