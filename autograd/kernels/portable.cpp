@@ -28,6 +28,7 @@ struct Vec {
 };
 
 #include "autograd/kernels/isa_kernels.inl"
+#include "autograd/kernels/isa_winograd.inl"
 
 }  // namespace
 

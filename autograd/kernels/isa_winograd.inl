@@ -1,0 +1,169 @@
+// Winograd's transforms (winograd.h), over the same vector type as isa_kernels.inl and included behind it.
+
+// For the points 0, 1, -1, 2, -2 and infinity, one dimension of each; both_ways() applies them to rows, then
+// columns.
+ALWAYS_INLINE Vec times(double factor, Vec v) {
+  return Vec::fma(Vec::broadcast(static_cast<real>(factor)), v, Vec::broadcast(0));
+}
+
+struct FilterTransform {  // G
+  static constexpr int kIn = 3, kOut = 6;
+  ALWAYS_INLINE static void run(const Vec (&g)[3], Vec (&to)[6]) {
+    const Vec ends = Vec::add(g[0], g[2]), middle = times(1.0 / 12, g[1]);
+    const Vec far = Vec::fma(Vec::broadcast(real(1.0 / 24)), g[0], times(1.0 / 6, g[2]));
+    to[0] = times(0.25, g[0]);
+    to[1] = times(-1.0 / 6, Vec::add(ends, g[1]));
+    to[2] = times(-1.0 / 6, Vec::sub(ends, g[1]));
+    to[3] = Vec::add(far, middle);
+    to[4] = Vec::sub(far, middle);
+    to[5] = g[2];
+  }
+};
+struct FilterGradTransform {  // G^T
+  static constexpr int kIn = 6, kOut = 3;
+  ALWAYS_INLINE static void run(const Vec (&u)[6], Vec (&to)[3]) {
+    const Vec far = Vec::add(u[3], u[4]), near = times(1.0 / 6, Vec::add(u[1], u[2]));
+    const Vec difference = times(1.0 / 6, Vec::sub(u[1], u[2]));
+    const Vec ends = Vec::fma(Vec::broadcast(real(1.0 / 24)), far, times(0.25, u[0]));
+    to[0] = Vec::sub(ends, near);
+    to[1] = Vec::sub(times(1.0 / 12, Vec::sub(u[3], u[4])), difference);
+    to[2] = Vec::add(Vec::sub(times(1.0 / 6, far), near), u[5]);
+  }
+};
+struct PatchTransform {  // B^T
+  static constexpr int kIn = 6, kOut = 6;
+  ALWAYS_INLINE static void run(const Vec (&d)[6], Vec (&to)[6]) {
+    const Vec four = Vec::broadcast(4), minus_four = Vec::broadcast(-4), minus_five = Vec::broadcast(-5);
+    const Vec even = Vec::fma(minus_four, d[2], d[4]), odd = Vec::fma(minus_four, d[1], d[3]);
+    const Vec outer = Vec::sub(d[4], d[2]), inner = Vec::sub(d[3], d[1]);
+    to[0] = Vec::fma(four, d[0], Vec::fma(minus_five, d[2], d[4]));
+    to[1] = Vec::add(even, odd);
+    to[2] = Vec::sub(even, odd);
+    to[3] = Vec::fma(Vec::broadcast(2), inner, outer);
+    to[4] = Vec::fma(Vec::broadcast(-2), inner, outer);
+    to[5] = Vec::fma(four, d[1], Vec::fma(minus_five, d[3], d[5]));
+  }
+};
+struct SquareTransform {  // A^T
+  static constexpr int kIn = 6, kOut = 4;
+  ALWAYS_INLINE static void run(const Vec (&m)[6], Vec (&to)[4]) {
+    const Vec even = Vec::add(m[1], m[2]), odd = Vec::sub(m[1], m[2]);
+    const Vec even2 = Vec::add(m[3], m[4]), odd2 = Vec::sub(m[3], m[4]);
+    to[0] = Vec::add(Vec::add(m[0], even), even2);
+    to[1] = Vec::fma(Vec::broadcast(2), odd2, odd);
+    to[2] = Vec::fma(Vec::broadcast(4), even2, even);
+    to[3] = Vec::add(Vec::fma(Vec::broadcast(8), odd2, odd), m[5]);
+  }
+};
+struct SquareGradTransform {  // A
+  static constexpr int kIn = 4, kOut = 6;
+  ALWAYS_INLINE static void run(const Vec (&g)[4], Vec (&to)[6]) {
+    const Vec even = Vec::add(g[0], g[2]), odd = Vec::add(g[1], g[3]);
+    const Vec even2 = Vec::fma(Vec::broadcast(4), g[2], g[0]);
+    const Vec half_odd2 = Vec::fma(Vec::broadcast(4), g[3], g[1]);
+    to[0] = g[0];
+    to[1] = Vec::add(even, odd);
+    to[2] = Vec::sub(even, odd);
+    to[3] = Vec::fma(Vec::broadcast(2), half_odd2, even2);
+    to[4] = Vec::fma(Vec::broadcast(-2), half_odd2, even2);
+    to[5] = g[3];
+  }
+};
+
+template <class Transform>
+ALWAYS_INLINE void both_ways(const Vec (&from)[Transform::kIn][Transform::kIn],
+                             Vec (&to)[Transform::kOut][Transform::kOut]) {
+  Vec half[Transform::kOut][Transform::kIn];
+  for (int i = 0; i < Transform::kIn; ++i) {
+    Vec row[Transform::kOut];
+    Transform::run(from[i], row);
+    for (int j = 0; j < Transform::kOut; ++j) half[j][i] = row[j];
+  }
+  for (int j = 0; j < Transform::kOut; ++j) {
+    Vec column[Transform::kOut];
+    Transform::run(half[j], column);
+    for (int i = 0; i < Transform::kOut; ++i) to[i][j] = column[i];
+  }
+}
+
+void filters(const FilterJob& job, const real* g, real* u) {
+  for (Dim k = 0; k < job.weights; k += Vec::kLanes) {
+    Vec from[3][3], to[6][6];
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) from[i][j] = Vec::load(g + (3 * i + j) * job.weights + k);
+    }
+    both_ways<FilterTransform>(from, to);
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) to[i][j].store(u + (6 * i + j) * job.step + k);
+    }
+  }
+}
+
+void filter_grads(const FilterJob& job, const real* u, real* g) {
+  for (Dim k = 0; k < job.weights; k += Vec::kLanes) {
+    Vec from[6][6], to[3][3];
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) from[i][j] = Vec::load(u + (6 * i + j) * job.step + k);
+    }
+    both_ways<FilterGradTransform>(from, to);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        real* weight = g + (3 * i + j) * job.weights + k;
+        Vec::add(Vec::load(weight), to[i][j]).store(weight);
+      }
+    }
+  }
+}
+
+template <class Transform>
+inline void into_places(const TileJob& job, const real* x, real* places) {
+  constexpr int kSide = Transform::kIn, kPlaces = Transform::kOut;
+  for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
+    const real* image = x + tile / job.tiles * job.image_pixels * job.channels;
+    const std::int32_t* pixels = job.pixels + tile % job.tiles * kSide * kSide;
+    for (Dim c = 0; c < job.channels; c += Vec::kLanes) {
+      Vec from[kSide][kSide], to[kPlaces][kPlaces];
+      for (int i = 0; i < kSide; ++i) {
+        for (int j = 0; j < kSide; ++j) {
+          const std::int32_t pixel = pixels[kSide * i + j];
+          from[i][j] = Vec::load((pixel >= 0 ? image + pixel * job.channels : kZeros) + c);
+        }
+      }
+      both_ways<Transform>(from, to);
+      for (int i = 0; i < kPlaces; ++i) {
+        for (int j = 0; j < kPlaces; ++j) to[i][j].store(places + (kPlaces * i + j) * job.step + c);
+      }
+    }
+  }
+}
+
+void patches(const TileJob& job, const real* x, real* places) { into_places<PatchTransform>(job, x, places); }
+
+void square_grads(const TileJob& job, const real* gy, real* places) {
+  into_places<SquareGradTransform>(job, gy, places);
+}
+
+void squares(const TileJob& job, const real* places, const real* bias, Into into, real negative_slope,
+             real* y) {
+  constexpr int kPlaces = SquareTransform::kIn, kSide = SquareTransform::kOut;
+  for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
+    real* image = y + tile / job.tiles * job.image_pixels * job.channels;
+    const std::int32_t* pixels = job.pixels + tile % job.tiles * kSide * kSide;
+    for (Dim c = 0; c < job.channels; c += Vec::kLanes) {
+      Vec from[kPlaces][kPlaces], to[kSide][kSide];
+      for (int i = 0; i < kPlaces; ++i) {
+        for (int j = 0; j < kPlaces; ++j) from[i][j] = Vec::load(places + (kPlaces * i + j) * job.step + c);
+      }
+      both_ways<SquareTransform>(from, to);
+      const Vec start = Vec::load((bias ? bias : kZeros) + c);
+      for (int i = 0; i < kSide; ++i) {
+        for (int j = 0; j < kSide; ++j) {
+          real* pixel = image + pixels[kSide * i + j] * job.channels + c;
+          Vec value = Vec::add(into == Into::add ? Vec::load(pixel) : start, to[i][j]);
+          if (negative_slope != 1) value = Vec::rectify(value, Vec::broadcast(negative_slope));
+          value.store(pixel);
+        }
+      }
+    }
+  }
+}
