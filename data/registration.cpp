@@ -298,10 +298,10 @@ static void fill_loss(const Registration& registration, Recording& recording) {
   const auto found = std::lower_bound(time.begin(), time.end(), registration.lost_at_s);
   const auto at = static_cast<size_t>(found - time.begin());
   for (size_t i = at; i < time.size(); ++i) time[i] += registration.lost_s;
-  if (at == 0 || at == time.size()) return;
+  if (at < 2 || at == time.size()) return;  // nothing on one side
   const size_t signals = recording.array.signals();
   const double step = (time[at - 1] - time[0]) / static_cast<double>(at - 1), gap = time[at] - time[at - 1];
-  const auto lost = static_cast<size_t>(gap / step) - 1;
+  const auto lost = static_cast<size_t>(std::max(0.0, gap / step - 1));
   std::vector<double> times(lost);
   std::vector<float> volts(lost * signals);
   std::vector<float> places(2 * lost, std::numeric_limits<float>::quiet_NaN());
