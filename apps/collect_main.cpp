@@ -13,7 +13,7 @@
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
-#include "data/plate_file.h"
+#include "data/plates/plate_file.h"
 #include "hardware/errors.h"
 #include "hardware/palpation_recorder.h"
 #include "hardware/port_list.h"
@@ -71,12 +71,12 @@ RecorderSettings read_settings(const Arguments& arguments, const std::string& ou
   return settings;
 }
 
-uint64_t millimetres(const PalpationPlan& plan, int passes, double more) {
-  return static_cast<uint64_t>(plan.slide * passes + more);
+std::uint64_t millimetres(const PalpationPlan& plan, int passes, double more) {
+  return static_cast<std::uint64_t>(plan.slide * passes + more);
 }
 
 /// Of all slides, how far the finger has come.
-uint64_t millimetres_at(const PalpationPlan& plan, const Leg& leg, const Point3& at) {
+std::uint64_t millimetres_at(const PalpationPlan& plan, const Leg& leg, const Point3& at) {
   double part = leg.phase == Phase::slide ? at.y - leg.from.y : 0;
   if (leg.phase == Phase::release) part = plan.slide;
   return millimetres(plan, leg.pass - 1, std::clamp(part, 0.0, plan.slide));
@@ -138,9 +138,9 @@ RecorderReport collect(const Arguments& arguments, RecorderSettings settings, co
   return record_marked(std::move(board), std::move(printer), settings, mark);
 }
 
-/// Recordings, quality report and --json of what was collected, complete or not. @returns frames
-size_t keep_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
-                   const RecorderReport& collected) {
+/// Recordings, quality report and --json of what was collected, complete or not. Returns frames
+std::size_t keep_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
+                        const RecorderReport& collected) {
   OutputFolder folder(out, arguments.force());
   PassesReport report = write_passes(arguments, journal, out, folder);
   report.json["passes_done"] = collected.outcome.passes_done;
@@ -167,7 +167,7 @@ int run(Arguments& arguments) {
   const RecorderSettings settings = read_settings(arguments, out, plate);
   const OriginMark mark(required_text(arguments, "printer"));
   const RecorderReport report = collect(arguments, settings, mark);
-  const size_t frames = keep_passes(arguments, settings.journal, out, report);
+  const std::size_t frames = keep_passes(arguments, settings.journal, out, report);
   if (report.outcome.complete) {
     arguments.print(std::to_string(report.outcome.passes_done) + " passes, " + std::to_string(frames) +
                     " frames");

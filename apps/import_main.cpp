@@ -11,12 +11,12 @@
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
-#include "data/alignment.h"
-#include "data/lost_frames.h"
-#include "data/plate_file.h"
-#include "data/registration.h"
-#include "data/registration_picture.h"
-#include "data/text_import.h"
+#include "data/plates/plate_file.h"
+#include "data/recordings/text_import.h"
+#include "data/registration/alignment.h"
+#include "data/registration/lost_frames.h"
+#include "data/registration/registration.h"
+#include "data/registration/registration_picture.h"
 #include "io/file.h"
 #include "io/numbers.h"
 #include "io/text.h"
@@ -158,7 +158,7 @@ std::string to_line(const Imported& imported) {
   const TextPass& pass = *imported.pass;
   const ImportReport& report = imported.report;
   const Registration& registration = imported.registration;
-  const size_t dropped = report.lines - report.empty - report.frames;
+  const std::size_t dropped = report.lines - report.empty - report.frames;
   std::string line = pass.plate.name() + "/" + std::to_string(pass.trial) + "/" + std::to_string(pass.pass) +
                      ".txt  " + std::to_string(report.lines) + " lines, " + std::to_string(dropped) +
                      " dropped (" + std::to_string(report.malformed()) + " malformed), residual " +
@@ -171,11 +171,11 @@ std::string to_line(const Imported& imported) {
 /// What is wrong with a file is said and counted in `bad`; without --skip-bad the first such file ends the
 /// import.
 std::vector<Imported> import_all(const Arguments& arguments, const std::vector<TextPass>& passes,
-                                 size_t& bad) {
+                                 std::size_t& bad) {
   std::vector<Imported> all;
   Progress progress(arguments, "importing", passes.size(), "files");
   const double speed = arguments.number("speed", 0.1, 1000);
-  for (size_t i = 0; i < passes.size(); ++i) {
+  for (std::size_t i = 0; i < passes.size(); ++i) {
     stop_if_interrupted();
     try {
       all.push_back(import_pass(passes[i], speed));
@@ -237,7 +237,7 @@ int run(Arguments& arguments) {
   OutputFolder folder(arguments.text("out"), arguments.force());
   std::optional<OutputFolder> pictures;
   if (arguments.given("pictures")) pictures.emplace(arguments.text("pictures"), arguments.force());
-  size_t bad = 0, reliable = 0;
+  std::size_t bad = 0, reliable = 0;
   std::vector<Imported> all = import_all(arguments, passes, bad);
   if (all.empty()) {
     throw FileError(arguments.text("TEXT_DIR"), "none of " + std::to_string(bad) + " files is a recording");

@@ -1,7 +1,7 @@
 // supertac-info: the card of a recording, a checkpoint, or any other safetensors file.
 
 #include "apps/common/program.h"
-#include "data/recording.h"
+#include "data/recordings/recording.h"
 #include "io/file.h"
 #include "io/json.h"
 #include "io/numbers.h"
@@ -13,15 +13,15 @@ namespace {
 
 void declare(Arguments& arguments) { arguments.positional("FILE", "a .safetensors file"); }
 
-std::string shape_text(const std::vector<uint64_t>& shape) {
+std::string shape_text(const std::vector<std::uint64_t>& shape) {
   std::string text;
-  for (const uint64_t size : shape) text += (text.empty() ? "" : ",") + std::to_string(size);
+  for (const std::uint64_t size : shape) text += (text.empty() ? "" : ",") + std::to_string(size);
   return "[" + text + "]";
 }
 
-uint64_t elements(const TensorInfo& tensor) {
-  uint64_t count = 1;
-  for (const uint64_t size : tensor.shape) count *= size;
+std::uint64_t elements(const TensorInfo& tensor) {
+  std::uint64_t count = 1;
+  for (const std::uint64_t size : tensor.shape) count *= size;
   return count;
 }
 
@@ -46,7 +46,7 @@ nlohmann::ordered_json value_of(const std::string& text) {
 nlohmann::ordered_json card(const SafetensorsFile& file, const std::string& kind) {
   nlohmann::ordered_json card = {{"file", file.path()}, {"kind", kind}};
   card["checksum"] = file.checksum() == SafetensorsFile::ChecksumState::ok ? "ok" : "absent";
-  uint64_t values = 0;
+  std::uint64_t values = 0;
   nlohmann::ordered_json tensors = nlohmann::ordered_json::array();
   for (const auto& [name, tensor] : file.tensors()) {
     values += elements(tensor);
@@ -59,7 +59,7 @@ nlohmann::ordered_json card(const SafetensorsFile& file, const std::string& kind
 }
 
 void print_row(const Arguments& arguments, const std::string& name, const std::string& value) {
-  constexpr size_t kColumn = 28;
+  constexpr std::size_t kColumn = 28;
   const std::string shown = printable(name);
   arguments.print(shown + std::string(shown.size() < kColumn ? kColumn - shown.size() : 1, ' ') +
                   printable(value, 200));
@@ -81,7 +81,7 @@ void print_metadata(const Arguments& arguments, const SafetensorsFile& file) {
 /// Frames, duration and rate; reads the file as a recording, so that what is wrong with it is said here too.
 void print_recording(const Arguments& arguments, nlohmann::ordered_json& card) {
   const Recording recording = read_recording(arguments.text("FILE"));
-  const size_t n = recording.frames();
+  const std::size_t n = recording.frames();
   const double duration = n > 0 ? recording.time_s.back() - recording.time_s.front() : 0;
   const double rate = duration > 0 ? static_cast<double>(n - 1) / duration : 0;
   print_row(arguments, "frames", std::to_string(n));
@@ -104,7 +104,7 @@ int run(Arguments& arguments) {
   print_row(arguments, "checksum", ours ? "ok" : "absent: written by another program, damage cannot be seen");
   if (kind == "recording") print_recording(arguments, result);
   print_metadata(arguments, file);
-  print_row(arguments, "values in all tensors", std::to_string(result["values"].get<uint64_t>()));
+  print_row(arguments, "values in all tensors", std::to_string(result["values"].get<std::uint64_t>()));
   for (const auto& [name, tensor] : file.tensors()) {
     print_row(arguments, "  " + name, tensor.dtype + " " + shape_text(tensor.shape));
   }

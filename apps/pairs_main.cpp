@@ -2,7 +2,7 @@
 #include "apps/common/output_folder.h"
 #include "apps/common/program.h"
 #include "apps/common/version.h"
-#include "data/split.h"
+#include "data/samples/split.h"
 #include "io/safetensors.h"
 
 namespace supertac {

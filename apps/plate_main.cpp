@@ -1,7 +1,7 @@
 // supertac-plate: a plate as STL, to print, and the palpation run as G-code, to send from another host.
 
 #include "apps/common/program.h"
-#include "data/plate_mesh.h"
+#include "data/plates/plate_mesh.h"
 #include "hardware/palpation_program.h"
 #include "io/file.h"
 #include "io/numbers.h"

@@ -4,7 +4,7 @@
 
 #include "apps/common/program.h"
 #include "apps/common/signals.h"
-#include "data/finger_model.h"
+#include "data/recordings/finger_model.h"
 #include "hardware/virtual_rig/pty_rig.h"
 
 namespace supertac {
@@ -26,7 +26,7 @@ void declare(Arguments& arguments) {
 }
 
 RigSettings read_settings(const Arguments& arguments) {
-  const auto seed = static_cast<uint64_t>(arguments.integer("seed", 0, 1'000'000'000));
+  const auto seed = static_cast<std::uint64_t>(arguments.integer("seed", 0, 1'000'000'000));
   SimulatorSettings simulator;
   // The board does what it does.
   simulator.with_adc = simulator.with_filter = simulator.with_saturation = false;

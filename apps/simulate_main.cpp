@@ -8,8 +8,8 @@
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
-#include "data/plate_file.h"
-#include "data/simulator.h"
+#include "data/plates/plate_file.h"
+#include "data/recordings/simulator.h"
 #include "io/numbers.h"
 
 namespace supertac {
@@ -109,14 +109,14 @@ std::vector<Job> plan(const Arguments& arguments, const std::vector<Plate>& plat
 }
 
 /// Simulates and writes all passes, several at a time; each depends on its own settings and the seed only.
-/// @returns frames written
-size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& settings, uint64_t seed,
-                Progress& progress) {
-  size_t frames = 0;
-  size_t done = 0;
+/// Returns frames written
+std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& settings, std::uint64_t seed,
+                     Progress& progress) {
+  std::size_t frames = 0;
+  std::size_t done = 0;
   std::exception_ptr failure;
 #pragma omp parallel for schedule(dynamic)
-  for (size_t i = 0; i < jobs.size(); ++i) {
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
     bool stop = interrupted();
 #pragma omp critical
     stop = stop || failure != nullptr;
@@ -142,7 +142,7 @@ size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& settings,
 int run(Arguments& arguments) {
   const auto plates = read_plates(arguments);
   const auto settings = read_settings(arguments);
-  const auto seed = static_cast<uint64_t>(arguments.integer("seed", 0, INT64_MAX));
+  const auto seed = static_cast<std::uint64_t>(arguments.integer("seed", 0, INT64_MAX));
   if (arguments.list("speeds").empty()) throw UsageError("--speeds: expected at least one speed");
   arguments.numbers("speeds", 0.5, 50);
   arguments.integer("trials", 1, 1000);
@@ -150,7 +150,7 @@ int run(Arguments& arguments) {
 
   OutputFolder folder(arguments.text("out"), arguments.force());
   const auto jobs = plan(arguments, plates, folder);
-  size_t frames = 0;
+  std::size_t frames = 0;
   {
     Progress progress(arguments, "simulating", jobs.size(), "passes");
     frames = simulate(jobs, settings, seed, progress);

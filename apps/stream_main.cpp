@@ -103,7 +103,7 @@ class Stream {
     source_.finish();
   }
 
-  uint64_t pictures() const { return latency_.count(); }
+  std::uint64_t pictures() const { return latency_.count(); }
   double window_s() const { return maker_.window_s(); }
 
   std::string summary() {
@@ -177,7 +177,7 @@ class Stream {
   }
 
   double milliseconds(double quantile) const { return 1e3 * latency_.quantile(quantile); }
-  uint64_t dropped() { return too_late_ + source_.counters().dropped; }
+  std::uint64_t dropped() { return too_late_ + source_.counters().dropped; }
 
   const Arguments& a_;
   SensorSource& source_;
@@ -187,7 +187,7 @@ class Stream {
   std::unique_ptr<TerminalView> view_;
   LatencyHistogram latency_;
   LiveState state_;
-  uint64_t frames_ = 0, too_late_ = 0, figures_frames_ = 0;
+  std::uint64_t frames_ = 0, too_late_ = 0, figures_frames_ = 0;
   double first_s_ = 0, last_s_ = 0;  // the sensor's time
   double begin_s_ = 0, figures_s_ = monotonic_seconds();
 };

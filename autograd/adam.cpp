@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "autograd/kernels/elementwise.h"
-#include "autograd/kernels/loops.h"
+#include "autograd/kernels/fast/loops.h"
 
 namespace supertac {
 namespace {

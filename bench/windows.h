@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "data/windows.h"
+#include "data/samples/windows.h"
 #include "io/random.h"
 #include "models/supertac_model.h"
 

@@ -28,6 +28,14 @@ function(supertac_library name)
   set_property(GLOBAL APPEND PROPERTY SUPERTAC_LIBRARIES ${name})
 endfunction()
 
+# supertac_group(NAME target ...): a name for several libraries.
+function(supertac_group name)
+  add_library(${name} INTERFACE)
+  add_library(supertac::${name} ALIAS ${name})
+  target_link_libraries(${name} INTERFACE ${ARGN})
+  set_property(GLOBAL APPEND PROPERTY SUPERTAC_LIBRARIES ${name})
+endfunction()
+
 # The same sources twice: NAME with real = float and NAME_f64 with real = double (for gradient checks).
 # USES lists plain targets, USES_BOTH targets that exist in both precisions.
 function(supertac_library_both name)

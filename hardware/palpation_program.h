@@ -12,8 +12,8 @@ namespace supertac {
 /// head is at `origin`, then sets the coordinates (G92): what a host of ours asks before it moves. All
 /// coordinates are absolute, in mm; between passes and at the end the finger is lifted, and the head returns
 /// to the origin.
-/// @param title one line for the reader
-/// @throws OutsideLimits when a target or the way to it is not allowed; std::invalid_argument for a plan that
+/// `title`: one line for the reader
+/// Throws OutsideLimits when a target or the way to it is not allowed; std::invalid_argument for a plan that
 /// makes no sense or a title with a line break
 std::string palpation_program(const PalpationPlan& plan, const Point3& origin, const Limits& limits,
                               const std::string& title);

@@ -11,18 +11,18 @@ static_assert(std::endian::native == std::endian::little, "files are little-endi
 
 // table[0] is the classical one; table[k][b] is the sum of byte b followed by k zero bytes. Eight tables let
 // the loop take eight bytes at a time: 6 MB of weights take milliseconds.
-using Tables = std::array<std::array<uint32_t, 256>, 8>;
+using Tables = std::array<std::array<std::uint32_t, 256>, 8>;
 
 constexpr Tables make_tables() {
   Tables tables{};
-  for (uint32_t byte = 0; byte < 256; ++byte) {
-    uint32_t sum = byte;
+  for (std::uint32_t byte = 0; byte < 256; ++byte) {
+    std::uint32_t sum = byte;
     for (int bit = 0; bit < 8; ++bit) sum = (sum >> 1) ^ ((sum & 1) ? 0xEDB88320u : 0u);
     tables[0][byte] = sum;
   }
-  for (size_t k = 1; k < 8; ++k) {
-    for (size_t byte = 0; byte < 256; ++byte) {
-      const uint32_t sum = tables[k - 1][byte];
+  for (std::size_t k = 1; k < 8; ++k) {
+    for (std::size_t byte = 0; byte < 256; ++byte) {
+      const std::uint32_t sum = tables[k - 1][byte];
       tables[k][byte] = (sum >> 8) ^ tables[0][sum & 0xFF];
     }
   }
@@ -33,11 +33,11 @@ constexpr Tables kTables = make_tables();
 
 }  // namespace
 
-uint32_t crc32(std::span<const std::byte> bytes, uint32_t seed) {
-  uint32_t sum = ~seed;
+std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t seed) {
+  std::uint32_t sum = ~seed;
   for (; bytes.size() >= 8; bytes = bytes.subspan(8)) {
-    uint32_t low = 0;
-    uint32_t high = 0;
+    std::uint32_t low = 0;
+    std::uint32_t high = 0;
     std::memcpy(&low, bytes.data(), 4);
     std::memcpy(&high, bytes.data() + 4, 4);
     low ^= sum;
@@ -46,7 +46,7 @@ uint32_t crc32(std::span<const std::byte> bytes, uint32_t seed) {
           kTables[1][(high >> 16) & 0xFF] ^ kTables[0][high >> 24];
   }
   for (const std::byte byte : bytes) {
-    sum = (sum >> 8) ^ kTables[0][(sum ^ static_cast<uint32_t>(byte)) & 0xFF];
+    sum = (sum >> 8) ^ kTables[0][(sum ^ static_cast<std::uint32_t>(byte)) & 0xFF];
   }
   return ~sum;
 }

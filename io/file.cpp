@@ -67,9 +67,9 @@ std::string final_path(const std::string& path) {
 
 constexpr std::string_view kTemporary = ".tmp-";  // <file>.tmp-<process>-<number>
 
-bool is_running(uint64_t process) {
+bool is_running(std::uint64_t process) {
   const auto id = static_cast<pid_t>(process);
-  return static_cast<uint64_t>(id) != process || id < 1 || ::kill(id, 0) == 0 || errno != ESRCH;
+  return static_cast<std::uint64_t>(id) != process || id < 1 || ::kill(id, 0) == 0 || errno != ESRCH;
 }
 
 // What writers of this file left that were ended by kill -9 or a power cut. Failures do not matter here.
@@ -107,7 +107,7 @@ FileReader::FileReader(const std::string& path) : path_(path) {
     throw FileError(path, S_ISDIR(status.st_mode) ? "is a directory, expected a file; name a file in it"
                                                   : "is not a regular file; copy it to one first");
   }
-  size_ = static_cast<uint64_t>(status.st_size);
+  size_ = static_cast<std::uint64_t>(status.st_size);
 }
 
 FileReader::~FileReader() { close_quietly(file_); }
@@ -121,12 +121,12 @@ void FileReader::read(std::span<std::byte> bytes) {
                                  std::to_string(position_ + bytes.size()) +
                                  "; it is cut short or was shortened while it was read");
     }
-    position_ += static_cast<uint64_t>(count);
-    bytes = bytes.subspan(static_cast<size_t>(count));
+    position_ += static_cast<std::uint64_t>(count);
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
   }
 }
 
-std::vector<std::byte> read_file(const std::string& path, uint64_t max_bytes) {
+std::vector<std::byte> read_file(const std::string& path, std::uint64_t max_bytes) {
   FileReader reader(path);
   if (reader.size() > max_bytes) {
     throw FileError(path, "has " + std::to_string(reader.size()) + " bytes, expected at most " +
@@ -137,7 +137,7 @@ std::vector<std::byte> read_file(const std::string& path, uint64_t max_bytes) {
   return bytes;
 }
 
-std::string read_text_file(const std::string& path, uint64_t max_bytes) {
+std::string read_text_file(const std::string& path, std::uint64_t max_bytes) {
   const auto bytes = read_file(path, max_bytes);
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
@@ -192,7 +192,7 @@ void AtomicFile::write(std::span<const std::byte> bytes) {
     const ssize_t count = retry([&] { return system_calls().write(file_, bytes.data(), bytes.size()); });
     if (count < 0) fail(path_, "write", errno);
     if (count == 0) fail(path_, "write", ENOSPC);
-    bytes = bytes.subspan(static_cast<size_t>(count));
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
   }
 }
 

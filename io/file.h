@@ -34,21 +34,21 @@ class FileReader {
 
   const std::string& path() const { return path_; }
   /// Bytes in the file when it was opened.
-  uint64_t size() const { return size_; }
+  std::uint64_t size() const { return size_; }
   /// Fills all of `bytes`. Throws FileError on an I/O error, or when the file ends first.
   void read(std::span<std::byte> bytes);
 
  private:
   std::string path_;
   int file_ = -1;
-  uint64_t size_ = 0;
-  uint64_t position_ = 0;
+  std::uint64_t size_ = 0;
+  std::uint64_t position_ = 0;
 };
 
 /// The whole file. Throws FileError when it cannot be read or is larger than `max_bytes`; the size is checked
 /// before anything is allocated.
-std::vector<std::byte> read_file(const std::string& path, uint64_t max_bytes);
-std::string read_text_file(const std::string& path, uint64_t max_bytes);
+std::vector<std::byte> read_file(const std::string& path, std::uint64_t max_bytes);
+std::string read_text_file(const std::string& path, std::uint64_t max_bytes);
 
 /// A file that appears under its name complete or not at all: written to a temporary name in the same
 /// directory (O_EXCL), then commit() does fsync, close, rename and fsync of the directory. An existing file

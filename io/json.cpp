@@ -19,12 +19,12 @@ class TreeBuilder : public JsonHandler {
 
   bool null() override { return add(nullptr); }
   bool boolean(bool value) override { return add(value); }
-  bool number_integer(int64_t value) override { return add(value); }
-  bool number_unsigned(uint64_t value) override { return add(value); }
+  bool number_integer(std::int64_t value) override { return add(value); }
+  bool number_unsigned(std::uint64_t value) override { return add(value); }
   bool number_float(double value, const std::string&) override { return add(value); }
   bool string(std::string& value) override { return add(std::move(value)); }
-  bool start_object(size_t) override { return open(Tree::object()); }
-  bool start_array(size_t) override { return open(Tree::array()); }
+  bool start_object(std::size_t) override { return open(Tree::object()); }
+  bool start_array(std::size_t) override { return open(Tree::array()); }
   bool end_object() override { return close(); }
   bool end_array() override { return close(); }
 
@@ -78,7 +78,7 @@ class TreeBuilder : public JsonHandler {
   JsonLimits limits_;
   Tree root_;
   std::vector<Level> levels_;
-  size_t values_ = 0;
+  std::size_t values_ = 0;
 };
 
 }  // namespace
@@ -88,7 +88,8 @@ bool JsonHandler::refuse(const std::string& why) {
   return false;
 }
 
-bool JsonHandler::parse_error(size_t position, const std::string&, const nlohmann::json::exception& error) {
+bool JsonHandler::parse_error(std::size_t position, const std::string&,
+                              const nlohmann::json::exception& error) {
   if (error.id == 406) return refuse("a number is out of range");
   return refuse("not valid JSON at byte " + std::to_string(position));
 }

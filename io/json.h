@@ -11,9 +11,9 @@
 namespace supertac {
 
 struct JsonLimits {
-  size_t max_bytes = size_t{1} << 20;
-  size_t max_depth = 16;        // nested arrays and objects
-  size_t max_values = 100'000;  // of any kind, keys included
+  std::size_t max_bytes = std::size_t{1} << 20;
+  std::size_t max_depth = 16;        // nested arrays and objects
+  std::size_t max_values = 100'000;  // of any kind, keys included
 };
 
 /// The text is not JSON, has a key twice, or exceeds a limit; what() says which and at which byte.
@@ -30,19 +30,19 @@ class JsonHandler : public nlohmann::json_sax<nlohmann::json> {
 
   bool null() override { return refuse("null is not allowed here"); }
   bool boolean(bool) override { return refuse("a boolean is not allowed here"); }
-  bool number_integer(int64_t) override { return refuse("a negative number is not allowed here"); }
-  bool number_unsigned(uint64_t) override { return refuse("a number is not allowed here"); }
+  bool number_integer(std::int64_t) override { return refuse("a negative number is not allowed here"); }
+  bool number_unsigned(std::uint64_t) override { return refuse("a number is not allowed here"); }
   bool number_float(double, const std::string&) override {
     return refuse("a fraction or a number beyond 64 bits is not allowed here");
   }
   bool string(std::string&) override { return refuse("a string is not allowed here"); }
   bool binary(nlohmann::json::binary_t&) override { return refuse("binary data is not allowed here"); }
-  bool start_object(size_t) override { return refuse("an object is not allowed here"); }
+  bool start_object(std::size_t) override { return refuse("an object is not allowed here"); }
   bool key(std::string&) override { return refuse("a key is not allowed here"); }
   bool end_object() override { return refuse("'}' is not allowed here"); }
-  bool start_array(size_t) override { return refuse("an array is not allowed here"); }
+  bool start_array(std::size_t) override { return refuse("an array is not allowed here"); }
   bool end_array() override { return refuse("']' is not allowed here"); }
-  bool parse_error(size_t position, const std::string& last_token,
+  bool parse_error(std::size_t position, const std::string& last_token,
                    const nlohmann::json::exception& error) override;
 
  protected:

@@ -25,8 +25,8 @@ std::string to_text(Arguments... arguments) {
 }  // namespace
 
 std::optional<double> parse_double(std::string_view text) { return parse<double>(text); }
-std::optional<int64_t> parse_int(std::string_view text) { return parse<int64_t>(text); }
-std::optional<uint64_t> parse_uint(std::string_view text) { return parse<uint64_t>(text); }
+std::optional<std::int64_t> parse_int(std::string_view text) { return parse<std::int64_t>(text); }
+std::optional<std::uint64_t> parse_uint(std::string_view text) { return parse<std::uint64_t>(text); }
 
 std::string format(double value) { return to_text(value); }
 std::string format(float value) { return to_text(value); }

@@ -12,8 +12,8 @@ namespace supertac {
 /// not, or when the value does not fit. "nan" and "inf" are numbers here; the caller decides whether they may
 /// be.
 std::optional<double> parse_double(std::string_view text);
-std::optional<int64_t> parse_int(std::string_view text);
-std::optional<uint64_t> parse_uint(std::string_view text);
+std::optional<std::int64_t> parse_int(std::string_view text);
+std::optional<std::uint64_t> parse_uint(std::string_view text);
 
 /// The shortest text that reads back as the same value.
 std::string format(double value);

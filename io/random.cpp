@@ -7,12 +7,12 @@
 namespace supertac {
 namespace {
 
-uint32_t low_word(uint64_t value) { return static_cast<uint32_t>(value); }
-uint32_t high_word(uint64_t value) { return static_cast<uint32_t>(value >> 32); }
+std::uint32_t low_word(std::uint64_t value) { return static_cast<std::uint32_t>(value); }
+std::uint32_t high_word(std::uint64_t value) { return static_cast<std::uint32_t>(value >> 32); }
 
 // log(x) for normal x > 0: x = m 2^e with m in [sqrt(1/2), sqrt(2)), log m = 2 atanh((m - 1) / (m + 1)).
 double natural_log(double x) {
-  const uint64_t word = std::bit_cast<uint64_t>(x);
+  const std::uint64_t word = std::bit_cast<std::uint64_t>(x);
   int exponent = static_cast<int>(word >> 52) - 1023;
   double mantissa = std::bit_cast<double>((word & 0xFFFFFFFFFFFFFull) | 0x3FF0000000000000ull);
   if (mantissa > 1.4142135623730951) {
@@ -75,10 +75,10 @@ constexpr std::array<double, 8> kF = {1.0,
 
 }  // namespace
 
-std::array<uint32_t, 4> philox(std::array<uint32_t, 4> counter, std::array<uint32_t, 2> key) {
+std::array<std::uint32_t, 4> philox(std::array<std::uint32_t, 4> counter, std::array<std::uint32_t, 2> key) {
   for (int round = 0; round < 10; ++round) {
-    const uint64_t first = uint64_t{0xD2511F53u} * counter[0];
-    const uint64_t second = uint64_t{0xCD9E8D57u} * counter[2];
+    const std::uint64_t first = std::uint64_t{0xD2511F53u} * counter[0];
+    const std::uint64_t second = std::uint64_t{0xCD9E8D57u} * counter[2];
     counter = {high_word(second) ^ counter[1] ^ key[0], low_word(second),
                high_word(first) ^ counter[3] ^ key[1], low_word(first)};
     key = {key[0] + 0x9E3779B9u, key[1] + 0xBB67AE85u};
@@ -95,19 +95,19 @@ double inverse_normal(double p) {
   return q < 0 ? -x : x;
 }
 
-uint64_t RandomStream::word64(uint64_t counter) const {
+std::uint64_t RandomStream::word64(std::uint64_t counter) const {
   const auto words = philox({low_word(counter), high_word(counter), low_word(stream_), high_word(stream_)},
                             {low_word(seed_), high_word(seed_)});
-  return words[0] | uint64_t{words[1]} << 32;
+  return words[0] | std::uint64_t{words[1]} << 32;
 }
 
-uint32_t RandomStream::bits(uint64_t counter) const { return low_word(word64(counter)); }
+std::uint32_t RandomStream::bits(std::uint64_t counter) const { return low_word(word64(counter)); }
 
-double RandomStream::uniform(uint64_t counter) const {
+double RandomStream::uniform(std::uint64_t counter) const {
   return static_cast<double>(word64(counter) >> 11) * 0x1p-53;
 }
 
-double RandomStream::normal(uint64_t counter) const {
+double RandomStream::normal(std::uint64_t counter) const {
   // The middle of one of 2^52 cells: never 0 or 1, and symmetric about 1/2.
   return inverse_normal((static_cast<double>(word64(counter) >> 12) + 0.5) * 0x1p-52);
 }

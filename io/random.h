@@ -9,7 +9,7 @@ namespace supertac {
 
 /// Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC 2011): four random words
 /// for every 128-bit counter and 64-bit key.
-std::array<uint32_t, 4> philox(std::array<uint32_t, 4> counter, std::array<uint32_t, 2> key);
+std::array<std::uint32_t, 4> philox(std::array<std::uint32_t, 4> counter, std::array<std::uint32_t, 2> key);
 
 /// The standard normal distribution's inverse, p in (0, 1), relative error about 1e-16: algorithm AS 241,
 /// PPND16 (Wichura 1988). Uses +, -, *, / and sqrt only, so that the bits do not depend on the C library.
@@ -18,20 +18,20 @@ double inverse_normal(double p);
 /// A stream of random numbers: a pure function of (seed, stream, counter). The three methods draw from the
 /// same words; use different counters (or streams) for numbers that have to be independent.
 struct RandomStream {
-  RandomStream(uint64_t seed, uint64_t stream) : seed_(seed), stream_(stream) {}
+  RandomStream(std::uint64_t seed, std::uint64_t stream) : seed_(seed), stream_(stream) {}
 
   /// 32 uniform bits.
-  uint32_t bits(uint64_t counter) const;
+  std::uint32_t bits(std::uint64_t counter) const;
   /// Uniform in [0, 1), a multiple of 2^-53.
-  double uniform(uint64_t counter) const;
+  double uniform(std::uint64_t counter) const;
   /// Normal with mean 0 and variance 1; |value| < 8.3.
-  double normal(uint64_t counter) const;
+  double normal(std::uint64_t counter) const;
 
  private:
-  uint64_t word64(uint64_t counter) const;
+  std::uint64_t word64(std::uint64_t counter) const;
 
-  uint64_t seed_;
-  uint64_t stream_;
+  std::uint64_t seed_;
+  std::uint64_t stream_;
 };
 
 }  // namespace supertac

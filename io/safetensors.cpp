@@ -21,12 +21,12 @@ using namespace safetensors;
   throw FileError(path, "not a safetensors file that can be read: " + problem);
 }
 
-uint64_t read_header_length(FileReader& reader) {
+std::uint64_t read_header_length(FileReader& reader) {
   if (reader.size() < 8) {
     refuse(reader.path(),
            "has " + std::to_string(reader.size()) + " bytes, expected at least 8; is it complete?");
   }
-  uint64_t length = 0;
+  std::uint64_t length = 0;
   reader.read(std::as_writable_bytes(std::span(&length, 1)));
   if (length > kMaxHeaderBytes) {
     refuse(reader.path(), "header length " + std::to_string(length) + ", expected at most " +
@@ -41,7 +41,7 @@ uint64_t read_header_length(FileReader& reader) {
 
 // Tensors, ordered by their place, must tile [0, data_bytes) exactly.
 void check_layout(const std::string& path, const std::map<std::string, TensorInfo>& tensors,
-                  uint64_t data_bytes) {
+                  std::uint64_t data_bytes) {
   std::vector<std::pair<const std::string*, const TensorInfo*>> order;
   for (const auto& [name, info] : tensors) {
     const auto bytes = tensor_bytes(info.dtype, info.shape);
@@ -57,7 +57,7 @@ void check_layout(const std::string& path, const std::map<std::string, TensorInf
   std::sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
     return std::pair(a.second->begin, a.second->end) < std::pair(b.second->begin, b.second->end);
   });
-  uint64_t next = 0;
+  std::uint64_t next = 0;
   for (const auto& [name, info] : order) {
     if (info->begin != next) {
       refuse(path, "tensor " + in_quotes(*name) + " begins at byte " + std::to_string(info->begin) +
@@ -112,15 +112,15 @@ void hand_over(const TensorToWrite& tensor, const ByteSink& sink) {
   }
 }
 
-uint32_t checksum_of(const std::string& header, const std::vector<TensorToWrite>& tensors) {
-  uint32_t sum = crc32(std::as_bytes(std::span(header)));
+std::uint32_t checksum_of(const std::string& header, const std::vector<TensorToWrite>& tensors) {
+  std::uint32_t sum = crc32(std::as_bytes(std::span(header)));
   for (const TensorToWrite& tensor : tensors) {
-    uint64_t bytes = 0;
+    std::uint64_t bytes = 0;
     hand_over(tensor, [&](std::span<const std::byte> piece) {
       sum = crc32(piece, sum);
       bytes += piece.size();
     });
-    const uint64_t expected = *tensor_bytes(tensor.dtype, tensor.shape);
+    const std::uint64_t expected = *tensor_bytes(tensor.dtype, tensor.shape);
     if (bytes != expected) {
       throw std::invalid_argument("write_safetensors: tensor " + in_quotes(tensor.name) + " has " +
                                   std::to_string(bytes) + " bytes, its shape and type need " +
@@ -166,7 +166,7 @@ SafetensorsFile SafetensorsFile::read(const std::string& path) {
     refuse(path, std::string("header: ") + error.what());
   }
   check_version(path, header.metadata);
-  const uint64_t data_bytes = reader.size() - 8 - text.size();
+  const std::uint64_t data_bytes = reader.size() - 8 - text.size();
   check_layout(path, header.tensors, data_bytes);
 
   SafetensorsFile file;
@@ -239,7 +239,7 @@ void write_safetensors(const std::string& path, std::map<std::string, std::strin
   }
   text.replace(*checksum_position(text), kChecksumDigits, checksum_digits(checksum_of(text, tensors)));
 
-  const uint64_t length = text.size();
+  const std::uint64_t length = text.size();
   AtomicFile file(path);
   file.write(std::as_bytes(std::span(&length, 1)));
   file.write(text);

@@ -16,9 +16,9 @@
 namespace supertac {
 
 struct TensorInfo {
-  std::string dtype;            // "F32", "F64", "U8", "I64", ... as in the format's documentation
-  std::vector<uint64_t> shape;  // row-major
-  uint64_t begin, end;          // bytes within the data
+  std::string dtype;                 // "F32", "F64", "U8", "I64", ... as in the format's documentation
+  std::vector<std::uint64_t> shape;  // row-major
+  std::uint64_t begin, end;          // bytes within the data
 };
 
 /// A file read and checked as a whole.
@@ -65,7 +65,7 @@ using ByteSink = std::function<void(std::span<const std::byte>)>;
 struct TensorToWrite {
   std::string name;
   std::string dtype;
-  std::vector<uint64_t> shape;
+  std::vector<std::uint64_t> shape;
   std::span<const std::byte> data;  // little-endian, row-major
   // Instead of `data`, for what is too large for memory: hands over all bytes in pieces, front to back.
   // Called twice, for the checksum and for the file.

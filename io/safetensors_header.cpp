@@ -15,7 +15,7 @@ class HeaderParser : public JsonHandler {
  public:
   Header take() { return std::move(header_); }
 
-  bool start_object(size_t) override {
+  bool start_object(std::size_t) override {
     if (place_ == Place::outside) return enter(Place::file);
     if (place_ != Place::file) return refuse("unexpected object in " + in_quotes(entry_));
     if (entry_ == kMetadataKey) return enter(Place::metadata);
@@ -52,17 +52,17 @@ class HeaderParser : public JsonHandler {
     return true;
   }
 
-  bool start_array(size_t) override {
+  bool start_array(std::size_t) override {
     if (place_ != Place::tensor) return unexpected("an array");
     if (field_ == "shape") return enter(Place::shape);
     if (field_ == "data_offsets") return enter(Place::offsets);
     return unexpected("an array");
   }
 
-  bool number_unsigned(uint64_t value) override {
+  bool number_unsigned(std::uint64_t value) override {
     if (place_ != Place::shape && place_ != Place::offsets) return unexpected("a number");
     auto& list = place_ == Place::shape ? tensor_.shape : offsets_;
-    const size_t longest = place_ == Place::shape ? kMaxRank : 2;
+    const std::size_t longest = place_ == Place::shape ? kMaxRank : 2;
     if (list.size() == longest) {
       return refuse(in_quotes(entry_) + ": more than " + std::to_string(longest) + " numbers in " +
                     in_quotes(field_));
@@ -106,11 +106,11 @@ class HeaderParser : public JsonHandler {
   std::string entry_;
   std::string field_;
   TensorInfo tensor_{};
-  std::vector<uint64_t> offsets_;
+  std::vector<std::uint64_t> offsets_;
 };
 
-uint64_t dtype_bytes(const std::string& dtype) {
-  static const std::map<std::string, uint64_t> kBytes = {
+std::uint64_t dtype_bytes(const std::string& dtype) {
+  static const std::map<std::string, std::uint64_t> kBytes = {
       {"BOOL", 1}, {"U8", 1},  {"I8", 1},  {"F8_E4M3", 1}, {"F8_E5M2", 1}, {"U16", 2}, {"I16", 2}, {"F16", 2},
       {"BF16", 2}, {"U32", 4}, {"I32", 4}, {"F32", 4},     {"U64", 8},     {"I64", 8}, {"F64", 8}};
   const auto found = kBytes.find(dtype);
@@ -122,7 +122,7 @@ uint64_t dtype_bytes(const std::string& dtype) {
 Header parse_header(std::string_view text) {
   if (text.empty() || text.front() != '{') throw JsonError("does not begin with '{'");
   // JSON would allow any white space here; one spelling less is one ambiguity less.
-  const size_t last = text.find_last_not_of(' ');
+  const std::size_t last = text.find_last_not_of(' ');
   if (text[last] != '}') throw JsonError("does not end with '}' and spaces");
   HeaderParser parser;
   parse_json(text, parser);
@@ -134,9 +134,9 @@ std::string header_text(const std::map<std::string, std::string>& metadata,
   nlohmann::ordered_json header = nlohmann::ordered_json::object();
   header[kMetadataKey] = metadata;
   nlohmann::ordered_json::object_t::Container& entries = header.get_ref<nlohmann::ordered_json::object_t&>();
-  uint64_t begin = 0;
+  std::uint64_t begin = 0;
   for (const TensorToWrite& tensor : tensors) {
-    const uint64_t end = begin + *tensor_bytes(tensor.dtype, tensor.shape);
+    const std::uint64_t end = begin + *tensor_bytes(tensor.dtype, tensor.shape);
     nlohmann::ordered_json entry = {
         {"dtype", tensor.dtype}, {"shape", tensor.shape}, {"data_offsets", {begin, end}}};
     entries.emplace_back(tensor.name, std::move(entry));
@@ -147,29 +147,30 @@ std::string header_text(const std::map<std::string, std::string>& metadata,
   return text;
 }
 
-std::optional<uint64_t> tensor_bytes(const std::string& dtype, const std::vector<uint64_t>& shape) {
-  uint64_t bytes = dtype_bytes(dtype);
+std::optional<std::uint64_t> tensor_bytes(const std::string& dtype, const std::vector<std::uint64_t>& shape) {
+  std::uint64_t bytes = dtype_bytes(dtype);
   if (bytes == 0 || shape.size() > kMaxRank) return std::nullopt;
-  for (const uint64_t size : shape) {
+  for (const std::uint64_t size : shape) {
     if (__builtin_mul_overflow(bytes, size, &bytes)) return std::nullopt;
   }
   return bytes;
 }
 
-std::optional<size_t> checksum_position(std::string_view text) {
+std::optional<std::size_t> checksum_position(std::string_view text) {
   // A quote inside a JSON string is escaped, so this text is a key with a string value: in __metadata__.
   const std::string key = std::string("\"") + kChecksumKey + "\":\"";
-  const size_t found = text.find(key);
+  const std::size_t found = text.find(key);
   if (found == std::string_view::npos) return std::nullopt;
-  const size_t digits = found + key.size();
-  const size_t end = text.find_first_not_of("0123456789abcdef", digits);
+  const std::size_t digits = found + key.size();
+  const std::size_t end = text.find_first_not_of("0123456789abcdef", digits);
   if (end != digits + kChecksumDigits || text[end] != '"') return std::nullopt;
   return digits;
 }
 
-std::string checksum_digits(uint32_t checksum) {
+std::string checksum_digits(std::uint32_t checksum) {
   std::string digits(kChecksumDigits, '0');
-  for (size_t i = kChecksumDigits; i-- > 0; checksum >>= 4) digits[i] = "0123456789abcdef"[checksum & 15];
+  for (std::size_t i = kChecksumDigits; i-- > 0; checksum >>= 4)
+    digits[i] = "0123456789abcdef"[checksum & 15];
   return digits;
 }
 

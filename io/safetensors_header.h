@@ -12,15 +12,15 @@
 
 namespace supertac::safetensors {
 
-constexpr uint64_t kMaxHeaderBytes = uint64_t{1} << 20;
-constexpr size_t kMaxTensors = 4096;
-constexpr size_t kMaxFields = 4096;  // of the metadata
-constexpr size_t kMaxRank = 16;
+constexpr std::uint64_t kMaxHeaderBytes = std::uint64_t{1} << 20;
+constexpr std::size_t kMaxTensors = 4096;
+constexpr std::size_t kMaxFields = 4096;  // of the metadata
+constexpr std::size_t kMaxRank = 16;
 constexpr char kMetadataKey[] = "__metadata__";
 constexpr char kFormatKey[] = "supertac_format";
 constexpr char kChecksumKey[] = "checksum";
 constexpr char kFormatVersion[] = "1";
-constexpr size_t kChecksumDigits = 8;
+constexpr std::size_t kChecksumDigits = 8;
 
 struct Header {
   std::map<std::string, std::string> metadata;
@@ -37,11 +37,11 @@ std::string header_text(const std::map<std::string, std::string>& metadata,
 
 /// Size of a tensor in bytes; nullopt for an unknown dtype, a rank over kMaxRank, or a product beyond 64
 /// bits.
-std::optional<uint64_t> tensor_bytes(const std::string& dtype, const std::vector<uint64_t>& shape);
+std::optional<std::uint64_t> tensor_bytes(const std::string& dtype, const std::vector<std::uint64_t>& shape);
 
 /// Where the digits of the checksum stand in the header's text; nullopt when there are none.
-std::optional<size_t> checksum_position(std::string_view text);
+std::optional<std::size_t> checksum_position(std::string_view text);
 
-std::string checksum_digits(uint32_t checksum);
+std::string checksum_digits(std::uint32_t checksum);
 
 }  // namespace supertac::safetensors

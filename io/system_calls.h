@@ -6,14 +6,16 @@
 #include <sys/stat.h>
 #include <sys/types.h>
 
+#include <cstddef>
+
 namespace supertac {
 
 /// Same arguments, results and errno as the POSIX calls of these names.
 struct SystemCalls {
   int (*open)(const char* path, int flags, mode_t mode);
   int (*fstat)(int file, struct stat* status);
-  ssize_t (*read)(int file, void* bytes, size_t count);
-  ssize_t (*write)(int file, const void* bytes, size_t count);
+  ssize_t (*read)(int file, void* bytes, std::size_t count);
+  ssize_t (*write)(int file, const void* bytes, std::size_t count);
   int (*fsync)(int file);
   int (*close)(int file);
   int (*rename)(const char* from, const char* to);

@@ -4,7 +4,7 @@
 
 namespace supertac {
 
-std::string printable(std::string_view text, size_t longest) {
+std::string printable(std::string_view text, std::size_t longest) {
   std::string result;
   for (const char c : text.substr(0, longest)) result += (c >= ' ' && c <= '~') ? c : '?';
   return text.size() > longest ? result + "..." : result;

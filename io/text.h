@@ -10,7 +10,7 @@ namespace supertac {
 
 /// Bytes that are not printable ASCII become '?', more than `longest` bytes are cut with "...". A hostile
 /// name can then neither break the line nor send control codes to a terminal.
-std::string printable(std::string_view text, size_t longest = 60);
+std::string printable(std::string_view text, std::size_t longest = 60);
 
 /// printable() in single quotes.
 std::string in_quotes(std::string_view text);

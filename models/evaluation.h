@@ -5,8 +5,8 @@
 #include <functional>
 #include <span>
 
-#include "data/metrics.h"
-#include "data/windows.h"
+#include "data/samples/windows.h"
+#include "data/scores/metrics.h"
 #include "models/committee.h"
 
 namespace supertac {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "data/pairs.h"
+#include "data/samples/pairs.h"
 #include "layers/checkpoint.h"
 #include "models/frame_model.h"
 

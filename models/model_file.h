@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "data/windows.h"
+#include "data/samples/windows.h"
 #include "layers/checkpoint.h"
 #include "models/supertac_model.h"
 

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "data/batching.h"
-#include "data/pairs.h"
+#include "data/samples/batching.h"
+#include "data/samples/pairs.h"
 #include "models/collapse.h"
 #include "models/frame_file.h"
 #include "models/trainer.h"

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "autograd/ops/arithmetic.h"
-#include "data/split.h"
+#include "data/samples/split.h"
 #include "io/json.h"
 #include "io/numbers.h"
 #include "models/diagnosis.h"

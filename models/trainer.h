@@ -16,9 +16,9 @@
 #include <string>
 #include <vector>
 
-#include "data/augment.h"
-#include "data/batching.h"
-#include "data/windows.h"
+#include "data/samples/augment.h"
+#include "data/samples/batching.h"
+#include "data/samples/windows.h"
 #include "models/collapse.h"
 #include "models/loss.h"
 #include "models/model_file.h"

@@ -4,9 +4,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "data/plate_file.h"
-#include "data/split.h"
-#include "data/truth.h"
+#include "data/plates/plate_file.h"
+#include "data/plates/truth.h"
+#include "data/samples/split.h"
 #include "io/numbers.h"
 #include "io/text.h"
 

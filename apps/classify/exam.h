@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "data/windows.h"
+#include "data/samples/windows.h"
 #include "models/model_file.h"
 
 namespace supertac {

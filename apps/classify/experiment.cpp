@@ -8,7 +8,7 @@
 #include "apps/common/signals.h"
 #include "autograd/adam.h"
 #include "autograd/ops/losses.h"
-#include "data/batching.h"
+#include "data/samples/batching.h"
 #include "models/classifier.h"
 
 namespace supertac {

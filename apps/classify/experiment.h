@@ -6,7 +6,7 @@
 
 #include "apps/classify/exam.h"
 #include "apps/classify/views.h"
-#include "data/augment.h"
+#include "data/samples/augment.h"
 
 namespace supertac {
 

@@ -11,7 +11,7 @@
 
 #include "apps/classify/exam.h"
 #include "apps/classify/views.h"
-#include "data/statistics.h"
+#include "data/scores/statistics.h"
 
 namespace supertac {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "data/baselines.h"
+#include "data/scores/baselines.h"
 #include "io/numbers.h"
 
 namespace supertac {

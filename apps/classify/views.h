@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "data/windows.h"
+#include "data/samples/windows.h"
 #include "models/supertac_model.h"
 
 namespace supertac {

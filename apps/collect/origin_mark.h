@@ -9,12 +9,12 @@ namespace supertac {
 /// a folder of recordings: a file $XDG_STATE_HOME/supertac/origin-unknown/PORT (~/.local/state/...).
 class OriginMark {
  public:
-  /// @throws FileError when there is no place for it.
+  /// Throws FileError when there is no place for it.
   explicit OriginMark(const std::string& printer_port);
   bool is_set() const;
-  /// On the disk when it returns. @throws FileError
+  /// On the disk when it returns. Throws FileError
   void set() const;
-  /// @throws FileError
+  /// Throws FileError
   void clear() const;
 
  private:

@@ -2,8 +2,8 @@
 
 #include <filesystem>
 
-#include "data/plate_file.h"
-#include "data/recording.h"
+#include "data/plates/plate_file.h"
+#include "data/recordings/recording.h"
 #include "hardware/errors.h"
 #include "io/file.h"
 #include "io/json.h"
@@ -45,7 +45,7 @@ Recording recording_of(const CollectedPass& pass, const Header& header) {
   Recording recording;
   recording.time_s = pass.time_s;
   recording.volts = pass.volts;
-  for (size_t i = 0; i < pass.time_s.size(); ++i) {
+  for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
     recording.position_mm.push_back(static_cast<float>(pass.position[3 * i] - kPlateX));
     recording.position_mm.push_back(static_cast<float>(pass.position[3 * i + 1] - kPlateY));
   }
@@ -61,13 +61,13 @@ Recording recording_of(const CollectedPass& pass, const Header& header) {
 }
 
 struct Quality {
-  size_t frames = 0, suspect = 0;
+  std::size_t frames = 0, suspect = 0;
   double seconds = 0, rate_hz = 0;
 };
 
 Quality quality_of(const CollectedPass& pass) {
   Quality quality{.frames = pass.time_s.size(), .seconds = pass.time_s.back() - pass.time_s.front()};
-  for (const uint8_t flag : pass.suspect) quality.suspect += flag;
+  for (const std::uint8_t flag : pass.suspect) quality.suspect += flag;
   if (quality.seconds > 0) quality.rate_hz = static_cast<double>(quality.frames - 1) / quality.seconds;
   return quality;
 }

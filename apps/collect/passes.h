@@ -14,15 +14,15 @@ std::string journal_path(const std::string& folder, const std::string& plate, in
 
 /// What a journal held, for the reader and for --json.
 struct PassesReport {
-  size_t frames = 0;      ///< in the recordings
-  bool complete = false;  ///< the run ended as planned
+  std::size_t frames = 0;  ///< in the recordings
+  bool complete = false;   ///< the run ended as planned
   nlohmann::ordered_json json = {};
 };
 
 /// Turns a journal into one recording per pass in `folder`, with a line of quality each, and the plate's STL
 /// file, when it has one, from beside the journal. A pass that was cut off is marked incomplete in its
 /// metadata. The same journal gives the same bytes.
-/// @throws JournalError, FileError
+/// Throws JournalError, FileError
 PassesReport write_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
                           OutputFolder& folder);
 

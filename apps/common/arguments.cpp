@@ -79,8 +79,8 @@ std::string Arguments::help() const {
   }
   parser.custom_help(usage + "[options]");
   // A program's own options first, then the six that all have.
-  constexpr size_t kCommon = 6;
-  for (size_t i = 0; i < order_.size(); ++i) {
+  constexpr std::size_t kCommon = 6;
+  for (std::size_t i = 0; i < order_.size(); ++i) {
     const std::string& name = order_[(i + kCommon) % order_.size()];
     const Option& option = options_.at(name);
     if (option.is_positional) continue;
@@ -167,7 +167,7 @@ std::string Arguments::choice(const std::string& name, const std::vector<std::st
                    (hint.empty() ? "" : "; did you mean '" + hint + "'?"));
 }
 
-int64_t Arguments::integer(const std::string& name, int64_t lowest, int64_t highest) const {
+std::int64_t Arguments::integer(const std::string& name, std::int64_t lowest, std::int64_t highest) const {
   const auto value = parse_int(text(name));
   if (value && *value >= lowest && *value <= highest) return *value;
   reject(name, "a whole number from " + std::to_string(lowest) + " to " + std::to_string(highest),

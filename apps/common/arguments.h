@@ -34,7 +34,7 @@ class Arguments {
                     const std::string& default_value = "");
   Arguments& flag(const std::string& name, const std::string& help);
 
-  /// @throws UsageError: an unknown option (naming the nearest known one), a value missing, an argument too
+  /// Throws UsageError: an unknown option (naming the nearest known one), a value missing, an argument too
   /// many or too few. --help and --version may stand without what is required.
   void parse(int argc, const char* const* argv);
 
@@ -46,7 +46,7 @@ class Arguments {
   std::string text(const std::string& name) const;
   /// One of the given words.
   std::string choice(const std::string& name, const std::vector<std::string>& words) const;
-  int64_t integer(const std::string& name, int64_t lowest, int64_t highest) const;
+  std::int64_t integer(const std::string& name, std::int64_t lowest, std::int64_t highest) const;
   double number(const std::string& name, double lowest, double highest) const;
   /// Comma-separated; an empty value is an empty list, an empty element is an error, and so is one given
   /// twice.

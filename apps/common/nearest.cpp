@@ -7,12 +7,12 @@ namespace supertac {
 namespace {
 
 /// Restricted Damerau-Levenshtein distance, by rows.
-size_t distance(const std::string& a, const std::string& b) {
-  std::vector<size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
-  for (size_t j = 0; j <= b.size(); ++j) last[j] = j;
-  for (size_t i = 1; i <= a.size(); ++i) {
+std::size_t distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
     row[0] = i;
-    for (size_t j = 1; j <= b.size(); ++j) {
+    for (std::size_t j = 1; j <= b.size(); ++j) {
       row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] != b[j - 1])});
       const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
       if (swapped) row[j] = std::min(row[j], before[j - 2] + 1);
@@ -27,13 +27,13 @@ size_t distance(const std::string& a, const std::string& b) {
 
 std::string nearest_name(const std::string& name, const std::vector<std::string>& candidates) {
   std::string nearest;
-  size_t fewest = name.size();  // a name all of whose letters differ is no hint
-  constexpr size_t kLongest = 64;
+  std::size_t fewest = name.size();  // a name all of whose letters differ is no hint
+  constexpr std::size_t kLongest = 64;
   if (name.empty() || name.size() > kLongest) return nearest;
   for (const std::string& candidate : candidates) {
-    const size_t changes = distance(name, candidate);
+    const std::size_t changes = distance(name, candidate);
     const bool nearer = changes < fewest || (changes == fewest && candidate.starts_with(name));
-    if (!nearer || changes > std::max<size_t>(2, candidate.size() / 3)) continue;
+    if (!nearer || changes > std::max<std::size_t>(2, candidate.size() / 3)) continue;
     fewest = changes;
     nearest = candidate;
   }

@@ -1,6 +1,6 @@
 #include "apps/common/numerics.h"
 
-#include "autograd/kernels/isa.h"
+#include "autograd/kernels/fast/isa.h"
 
 namespace supertac {
 

@@ -10,13 +10,13 @@ namespace supertac {
 class OutputFolder {
  public:
   /// Creates the folder where it is missing.
-  /// @throws FileError when it cannot be created or written to, so that a program finds out before it works.
+  /// Throws FileError when it cannot be created or written to, so that a program finds out before it works.
   OutputFolder(const std::string& path, bool force);
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
 
-  /// Path of a file to be written in the folder. @throws FileError when it exists and force is false.
+  /// Path of a file to be written in the folder. Throws FileError when it exists and force is false.
   std::string add(const std::string& name);
   void keep() { kept_ = true; }
 

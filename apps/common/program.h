@@ -25,7 +25,7 @@ struct Program {
 
 /// The whole of main(): parses, handles --help and --version, sets the number of threads, catches signals,
 /// refuses an existing --json file without --force, runs, and turns every error into one line on stderr.
-/// @returns run()'s code; 1 when something failed; 2 when the command line was wrong; 128 + signal (130, 143)
+/// Returns run()'s code; 1 when something failed; 2 when the command line was wrong; 128 + signal (130, 143)
 /// when interrupted.
 int run_program(const Program& program, int argc, const char* const* argv);
 

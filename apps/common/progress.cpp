@@ -15,8 +15,8 @@ namespace supertac {
 namespace {
 
 std::string clock_text(double seconds) {
-  const auto whole = static_cast<int64_t>(std::lround(std::min(seconds, 1e6)));
-  const auto two = [](int64_t number) { return (number < 10 ? "0" : "") + std::to_string(number); };
+  const auto whole = static_cast<std::int64_t>(std::lround(std::min(seconds, 1e6)));
+  const auto two = [](std::int64_t number) { return (number < 10 ? "0" : "") + std::to_string(number); };
   if (whole < 3600) return std::to_string(whole / 60) + ":" + two(whole % 60);
   return std::to_string(whole / 3600) + ":" + two(whole / 60 % 60) + ":" + two(whole % 60);
 }
@@ -28,12 +28,12 @@ bool drawable_terminal() {
   return isatty(STDERR_FILENO) == 1 && terminal != nullptr && std::string_view(terminal) != "dumb";
 }
 
-size_t terminal_width() {
+std::size_t terminal_width() {
   winsize size{};
   return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col : 80;
 }
 
-Progress::Progress(const Arguments& arguments, std::string what, uint64_t total, std::string unit)
+Progress::Progress(const Arguments& arguments, std::string what, std::uint64_t total, std::string unit)
     : what_(std::move(what)),
       unit_(std::move(unit)),
       total_(total),
@@ -45,7 +45,7 @@ Progress::~Progress() {
   if (width_ > 0) draw("");
 }
 
-void Progress::update(uint64_t done, const std::string& detail) {
+void Progress::update(std::uint64_t done, const std::string& detail) {
   using namespace std::chrono_literals;
   if (!enabled_) return;
   const auto now = std::chrono::steady_clock::now();
@@ -61,8 +61,8 @@ void Progress::draw(const std::string& line) {
   width_ = line.size();
 }
 
-std::string progress_line(const std::string& what, uint64_t done, uint64_t total, const std::string& unit,
-                          double seconds, const std::string& detail) {
+std::string progress_line(const std::string& what, std::uint64_t done, std::uint64_t total,
+                          const std::string& unit, double seconds, const std::string& detail) {
   constexpr int kCells = 24;
   const double share =
       total > 0 ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total)) : 0.0;

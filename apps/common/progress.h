@@ -16,8 +16,8 @@ bool drawable_terminal();
 /// shared by threads.
 class Progress {
  public:
-  /// @param unit what is counted, in the plural ("passes", "steps")
-  Progress(const Arguments& arguments, std::string what, uint64_t total, std::string unit);
+  /// `unit`: what is counted, in the plural ("passes", "steps")
+  Progress(const Arguments& arguments, std::string what, std::uint64_t total, std::string unit);
   /// Wipes the bar.
   ~Progress();
   Progress(const Progress&) = delete;
@@ -25,20 +25,20 @@ class Progress {
 
   /// `done` of `total` so far; `detail` is shown in place of the rate. Cheap: draws at most five times a
   /// second, cut to the terminal's width.
-  void update(uint64_t done, const std::string& detail = "");
+  void update(std::uint64_t done, const std::string& detail = "");
 
  private:
   void draw(const std::string& line);
 
   std::string what_, unit_;
-  uint64_t total_;
+  std::uint64_t total_;
   bool enabled_;
-  size_t width_ = 0;  // of what is drawn
+  std::size_t width_ = 0;  // of what is drawn
   std::chrono::steady_clock::time_point begin_, last_;
 };
 
 /// The bar's text, e.g. "training  [#####.....]  50 %  1200 steps/s  0:41 left"; `detail` replaces the rate.
-std::string progress_line(const std::string& what, uint64_t done, uint64_t total, const std::string& unit,
-                          double seconds, const std::string& detail = "");
+std::string progress_line(const std::string& what, std::uint64_t done, std::uint64_t total,
+                          const std::string& unit, double seconds, const std::string& detail = "");
 
 }  // namespace supertac

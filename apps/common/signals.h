@@ -27,7 +27,7 @@ int interrupting_signal();
 /// Thrown to leave long work after a signal; the wrapper of the programs turns it into the exit code.
 class Interrupted {};
 
-/// @throws Interrupted when interrupted().
+/// Throws Interrupted when interrupted().
 void stop_if_interrupted();
 
 }  // namespace supertac

@@ -47,12 +47,12 @@ int quota() {
 }  // namespace
 
 std::optional<int> quota_of_cpu_max(std::string_view text) {
-  const size_t space = text.find(' ');
+  const std::size_t space = text.find(' ');
   if (space == std::string_view::npos) return std::nullopt;
   const auto limit = parse_int(text.substr(0, space));
   const auto period = parse_int(text.substr(space + 1));
   if (!limit || !period || *limit <= 0 || *period <= 0) return std::nullopt;
-  return static_cast<int>(std::clamp<int64_t>((*limit + *period - 1) / *period, 1, 1 << 20));
+  return static_cast<int>(std::clamp<std::int64_t>((*limit + *period - 1) / *period, 1, 1 << 20));
 }
 
 int default_threads() {

@@ -2,8 +2,8 @@
 
 #include <map>
 
-#include "data/images.h"
-#include "data/split.h"
+#include "data/samples/split.h"
+#include "io/images.h"
 #include "io/safetensors.h"
 #include "models/evaluation.h"
 

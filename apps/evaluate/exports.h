@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "apps/common/output_folder.h"
-#include "data/windows.h"
+#include "data/samples/windows.h"
 #include "models/committee.h"
 
 namespace supertac {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "data/metrics.h"
+#include "data/scores/metrics.h"
 #include "io/numbers.h"
 
 namespace supertac {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "data/windows.h"
+#include "data/samples/windows.h"
 
 namespace supertac {
 

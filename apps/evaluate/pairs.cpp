@@ -8,7 +8,7 @@
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
-#include "data/pair_baselines.h"
+#include "data/scores/pair_baselines.h"
 #include "io/file.h"
 #include "io/numbers.h"
 #include "models/pair_trainer.h"

@@ -11,15 +11,15 @@ namespace supertac {
 class LatencyHistogram {
  public:
   void add(double seconds);
-  uint64_t count() const { return count_; }
+  std::uint64_t count() const { return count_; }
   /// The value that a share `q` of the durations does not exceed, in seconds; 0 without any.
   double quantile(double q) const;
   double max() const { return max_; }
 
  private:
-  static constexpr size_t kPerDoubling = 64, kDoublings = 32;
-  std::array<uint64_t, kPerDoubling * kDoublings> classes_{};
-  uint64_t count_ = 0;
+  static constexpr std::size_t kPerDoubling = 64, kDoublings = 32;
+  std::array<std::uint64_t, kPerDoubling * kDoublings> classes_{};
+  std::uint64_t count_ = 0;
   double max_ = 0;
 };
 

@@ -13,7 +13,7 @@
 
 namespace supertac {
 
-PictureLog::PictureLog(const std::string& path, bool force, size_t signals, const ImageGrid& image)
+PictureLog::PictureLog(const std::string& path, bool force, std::size_t signals, const ImageGrid& image)
     : path_(path), signals_(signals), image_(image) {
   refuse_existing(path, force);
   times_ = open_spool();
@@ -51,7 +51,7 @@ void PictureLog::add(double time_s, std::span<const float> volts, std::span<cons
 void PictureLog::read_back(const Spool& spool, const ByteSink& sink) {
   if (std::fflush(spool.get()) != 0 || std::fseek(spool.get(), 0, SEEK_SET) != 0) fail();
   std::array<std::byte, 1 << 16> buffer;
-  while (const size_t count = std::fread(buffer.data(), 1, buffer.size(), spool.get()))
+  while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), spool.get()))
     sink(std::span(buffer).first(count));
   if (std::ferror(spool.get()) != 0) fail();
 }
@@ -61,7 +61,8 @@ void PictureLog::write(const std::map<std::string, std::string>& metadata) {
   const auto from = [this](const Spool& spool) {
     return [this, &spool](const ByteSink& sink) { read_back(spool, sink); };
   };
-  const auto height = static_cast<uint64_t>(image_.height), width = static_cast<uint64_t>(image_.width);
+  const auto height = static_cast<std::uint64_t>(image_.height),
+             width = static_cast<std::uint64_t>(image_.width);
   write_safetensors(path_, metadata,
                     {{"time_s", "F64", {count_}, {}, from(times_)},
                      {"volts", "F32", {count_, signals_}, {}, from(volts_)},

@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "data/taxel_array.h"
+#include "data/plates/taxel_array.h"
 #include "io/safetensors.h"
 
 namespace supertac {
@@ -16,11 +16,11 @@ namespace supertac {
 /// MB/s): they wait in nameless temporary files beside the final one.
 class PictureLog {
  public:
-  /// @throws FileError when `path` cannot be made there, or exists without `force`.
-  PictureLog(const std::string& path, bool force, size_t signals, const ImageGrid& image);
-  /// @throws FileError
+  /// Throws FileError when `path` cannot be made there, or exists without `force`.
+  PictureLog(const std::string& path, bool force, std::size_t signals, const ImageGrid& image);
+  /// Throws FileError
   void add(double time_s, std::span<const float> volts, std::span<const float> picture);
-  /// Writes the file, atomically. @throws FileError, again when add() has.
+  /// Writes the file, atomically. Throws FileError, again when add() has.
   void write(const std::map<std::string, std::string>& metadata);
 
  private:
@@ -35,9 +35,9 @@ class PictureLog {
   [[noreturn]] void fail();
 
   std::string path_;
-  size_t signals_;
+  std::size_t signals_;
   ImageGrid image_;
-  uint64_t count_ = 0;
+  std::uint64_t count_ = 0;
   std::string problem_;  // of a write that failed: what was kept is not whole
   Spool times_, volts_, pictures_;
 };

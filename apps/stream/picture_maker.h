@@ -3,7 +3,7 @@
 #include <span>
 
 #include "apps/stream/sensor_source.h"
-#include "data/live_window.h"
+#include "data/samples/live_window.h"
 #include "models/committee.h"
 
 namespace supertac {
@@ -11,7 +11,7 @@ namespace supertac {
 /// Frames in, pictures out: the signal path the model was trained behind, then the model. Used by one thread.
 class PictureMaker {
  public:
-  /// For the frames of this source. `models`, those of a committee, must outlive this. @throws
+  /// For the frames of this source. `models`, those of a committee, must outlive this. Throws
   /// std::runtime_error when they were trained on another array, or behind another moving average than the
   /// frames have gone through, which cannot be taken back.
   PictureMaker(std::span<const ModelFile> models, const SensorSource& source);

@@ -76,7 +76,7 @@ class ReplaySource : public SensorSource {
 // Not the mean: lost frames leave a gap.
 double median_period(const Recording& recording) {
   std::vector<double> steps;
-  for (size_t i = 1; i < recording.frames(); ++i)
+  for (std::size_t i = 1; i < recording.frames(); ++i)
     steps.push_back(recording.time_s[i] - recording.time_s[i - 1]);
   return median(steps);
 }
@@ -89,7 +89,7 @@ class RecordingSource : public SensorSource {
 
   std::optional<SensorFrame> next(double) override {
     if (ended()) return std::nullopt;
-    const size_t i = at_++, signals = array().signals();
+    const std::size_t i = at_++, signals = array().signals();
     return SensorFrame{recording_.time_s[i], std::span(recording_.volts).subspan(i * signals, signals),
                        monotonic_seconds()};
   }
@@ -103,7 +103,7 @@ class RecordingSource : public SensorSource {
 
  private:
   Recording recording_;
-  size_t at_ = 0;
+  std::size_t at_ = 0;
 };
 
 }  // namespace

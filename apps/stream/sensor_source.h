@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "data/recording.h"
+#include "data/recordings/recording.h"
 #include "hardware/tactile_board.h"
 
 namespace supertac {

@@ -25,9 +25,9 @@ constexpr std::array<int, 16> kHeat = {16,  17,  54,  90,  126, 161, 197, 203,
 constexpr std::string_view kInk = " .:-=+*#%@";
 
 // NaN is level 0.
-template <size_t N>
-size_t level(float value) {
-  return static_cast<size_t>((value > 0 ? std::min(value, 1.0F) : 0.0F) * (N - 1) + 0.5F);
+template <std::size_t N>
+std::size_t level(float value) {
+  return static_cast<std::size_t>((value > 0 ? std::min(value, 1.0F) : 0.0F) * (N - 1) + 0.5F);
 }
 
 // An image of height x width pixels that is drawn `lines` x `columns`.
@@ -47,18 +47,19 @@ Drawing drawing_of(std::span<const float> values, const TaxelArray& array, int s
 float pixel(const Drawing& drawing, int row, int column) {
   if (drawing.values.empty()) return 0;
   const int r = drawing.height - 1 - row * drawing.height / drawing.lines;
-  return drawing.values[static_cast<size_t>(r * drawing.width + column * drawing.width / drawing.columns)];
+  return drawing
+      .values[static_cast<std::size_t>(r * drawing.width + column * drawing.width / drawing.columns)];
 }
 
 void append_row(std::string& text, const Drawing& picture, int line, bool colour) {
-  size_t above_before = kHeat.size(), below_before = kHeat.size();
+  std::size_t above_before = kHeat.size(), below_before = kHeat.size();
   for (int column = 0; column < picture.columns; ++column) {
     const float above = pixel(picture, 2 * line, column), below = pixel(picture, 2 * line + 1, column);
     if (!colour) {
       text += kInk[level<kInk.size()>(0.5F * (above + below))];
       continue;
     }
-    const size_t top = level<kHeat.size()>(above), bottom = level<kHeat.size()>(below);
+    const std::size_t top = level<kHeat.size()>(above), bottom = level<kHeat.size()>(below);
     if (top != above_before) text += "\x1b[38;5;" + std::to_string(kHeat[top]) + "m";
     if (bottom != below_before) text += "\x1b[48;5;" + std::to_string(kHeat[bottom]) + "m";
     text += "\u2580";  // upper half block
@@ -135,7 +136,7 @@ void TerminalView::draw(const LiveState& state) {
   for (std::string_view left = text; !left.empty();) {
     const ssize_t count = ::write(STDERR_FILENO, left.data(), left.size());
     if (count <= 0) return;
-    left.remove_prefix(static_cast<size_t>(count));
+    left.remove_prefix(static_cast<std::size_t>(count));
   }
 }
 

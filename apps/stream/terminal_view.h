@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "data/taxel_array.h"
+#include "data/plates/taxel_array.h"
 
 namespace supertac {
 
@@ -19,7 +19,7 @@ struct LiveState {
   std::vector<float> picture;  ///< [rows * scale][columns * scale]; empty before the first
   double frames_per_s = 0;
   double median_ms = 0, p99_ms = 0;  ///< latency
-  uint64_t lost = 0, dropped = 0;
+  std::uint64_t lost = 0, dropped = 0;
 };
 
 /// Two pictures of 32 columns and 16 lines, or less for the shorter side of the array, y upwards, and a line

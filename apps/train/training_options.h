@@ -2,7 +2,7 @@
 #pragma once
 
 #include "apps/common/arguments.h"
-#include "data/split.h"
+#include "data/samples/split.h"
 #include "models/trainer.h"
 
 namespace supertac {

@@ -7,7 +7,7 @@
 
 #include "apps/common/arguments.h"
 #include "apps/train/run_folder.h"
-#include "data/split.h"
+#include "data/samples/split.h"
 #include "models/trainer.h"
 
 namespace supertac {

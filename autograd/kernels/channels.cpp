@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "autograd/kernels/loops.h"
+#include "autograd/kernels/fast/loops.h"
 
 namespace supertac::kernels {
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "autograd/kernels/isa.h"
-#include "autograd/kernels/narrow.h"
-#include "autograd/kernels/winograd.h"
+#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/narrow.h"
+#include "autograd/kernels/fast/winograd.h"
 
 namespace supertac::kernels {
 namespace {

@@ -1,7 +1,7 @@
 // Convolution of any kind over a batch, callable without a graph. Channels-last: x [N, pixels, cin].
 #pragma once
 
-#include "autograd/kernels/geometry.h"
+#include "autograd/kernels/fast/geometry.h"
 
 namespace supertac::kernels {
 

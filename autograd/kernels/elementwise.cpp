@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "autograd/kernels/exp.h"
-#include "autograd/kernels/loops.h"
+#include "autograd/kernels/fast/loops.h"
 #include "autograd/kernels/sums.h"
 
 namespace supertac::kernels {

@@ -2,7 +2,7 @@
 
 #include "autograd/checks.h"
 #include "autograd/kernels/conv.h"
-#include "autograd/kernels/isa.h"
+#include "autograd/kernels/fast/isa.h"
 
 namespace supertac {
 namespace {

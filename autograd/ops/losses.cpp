@@ -5,7 +5,7 @@
 
 #include "autograd/checks.h"
 #include "autograd/kernels/exp.h"
-#include "autograd/kernels/loops.h"
+#include "autograd/kernels/fast/loops.h"
 #include "autograd/kernels/ssim.h"
 #include "autograd/kernels/sums.h"
 

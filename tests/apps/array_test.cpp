@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "data/recording.h"
+#include "data/recordings/recording.h"
 #include "io/file.h"
 #include "io/safetensors.h"
 #include "tests/apps/process.h"
@@ -53,8 +53,8 @@ TEST(Array, SixBySixFromSimulationToScores) {
   EXPECT_EQ(windows, scores.at("contact").at("windows"));
   EXPECT_NEAR(ssim / windows, scores.at("contact").at("ssim").get<double>(), 1e-9);
   const SafetensorsFile outputs = SafetensorsFile::read(folder / "outputs.safetensors");
-  EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<uint64_t>{40, 32, 36}));
-  EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<uint64_t>{40, 24, 24}));
+  EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<std::uint64_t>{40, 32, 36}));
+  EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<std::uint64_t>{40, 24, 24}));
 
   simulate(folder / "rig", {});
   const auto mismatch = run_process("supertac-evaluate", {"--data", folder / "rig", "--model", model});
@@ -83,8 +83,8 @@ TEST(Array, ThreeChannelsOfTwoBySix) {
   const auto scores = evaluate(folder, data, model);
   EXPECT_TRUE(scores.at("all").at("ssim").is_number());
   const SafetensorsFile outputs = SafetensorsFile::read(folder / "outputs.safetensors");
-  EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<uint64_t>{40, 32, 36}));
-  EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<uint64_t>{40, 8, 24}));
+  EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<std::uint64_t>{40, 32, 36}));
+  EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<std::uint64_t>{40, 8, 24}));
 }
 
 TEST(Array, RefusesWhatIsNoArray) {

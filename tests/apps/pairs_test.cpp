@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "data/pairs.h"
+#include "data/samples/pairs.h"
 #include "io/file.h"
 #include "io/random.h"
 #include "io/safetensors.h"
@@ -15,26 +15,26 @@
 namespace supertac {
 namespace {
 
-constexpr uint64_t kPlenty = 1 << 26;
+constexpr std::uint64_t kPlenty = 1 << 26;
 
 /// A ridge at a random place and angle under an array of 4 x 6 taxels; five groups of twelve.
 std::string write_pairs(const TemporaryFolder& folder, bool grouped = true) {
-  constexpr uint64_t kCount = 60, kRows = 4, kColumns = 6, kScale = 4;
+  constexpr std::uint64_t kCount = 60, kRows = 4, kColumns = 6, kScale = 4;
   std::vector<float> input, target;
-  std::vector<int64_t> group;
+  std::vector<std::int64_t> group;
   const RandomStream random(9, 0);
-  for (uint64_t n = 0; n < kCount; ++n) {
+  for (std::uint64_t n = 0; n < kCount; ++n) {
     const double slope = 2 * random.uniform(2 * n) - 1, offset = 4 * random.uniform(2 * n + 1);
     const auto ridge = [&](double y, double x, double width) {
       return static_cast<float>(std::exp(-std::pow((y - offset - slope * (x - 3)) / width, 2)));
     };
-    for (uint64_t k = 0; k < kRows * kColumns; ++k)
+    for (std::uint64_t k = 0; k < kRows * kColumns; ++k)
       input.push_back(2.4F - 0.3F * ridge(static_cast<double>(k / kColumns) + 0.5,
                                           static_cast<double>(k % kColumns) + 0.5, 1));
-    for (uint64_t p = 0; p < kRows * kColumns * kScale * kScale; ++p)
+    for (std::uint64_t p = 0; p < kRows * kColumns * kScale * kScale; ++p)
       target.push_back(ridge((static_cast<double>(p / (kColumns * kScale)) + 0.5) / kScale,
                              (static_cast<double>(p % (kColumns * kScale)) + 0.5) / kScale, 0.5));
-    group.push_back(static_cast<int64_t>(100 + n / 12));
+    group.push_back(static_cast<std::int64_t>(100 + n / 12));
   }
   std::vector<TensorToWrite> tensors = {
       {"input", "F32", {kCount, 1, kRows, kColumns}, std::as_bytes(std::span(input))},
@@ -77,7 +77,7 @@ TEST(Pairs, TrainEvaluateAndReportEveryGroup) {
   EXPECT_GT(scores["all"]["network"]["psnr_mean_db"], scores["all"]["bicubic"]["psnr_mean_db"]);
   EXPECT_GT(scores["all"]["bicubic"]["psnr_mean_db"], scores["all"]["mean_image"]["psnr_mean_db"]);
   const auto outputs = SafetensorsFile::read(folder / "outputs.safetensors");
-  EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<uint64_t>{12, 1, 16, 24}));
+  EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<std::uint64_t>{12, 1, 16, 24}));
   const auto whole =
       run_process("supertac-evaluate", {"--model", model, "--pairs", pairs, "--split", "none"});
   EXPECT_NE(whole.out.find("group 104, 12 pairs"), std::string::npos) << whole.out;
@@ -165,20 +165,21 @@ class PairsOfRecordings : public testing::Test {
 
 /// Every pair is its window's last frame, truth and pass, as they are.
 void expect_pairs_of(const std::string& path, const WindowSet& windows,
-                     const std::vector<uint32_t>& indices) {
+                     const std::vector<std::uint32_t>& indices) {
   const PairSet pairs = PairSet::read(path);
   ASSERT_EQ(pairs.size(), indices.size());
   ASSERT_TRUE(pairs.grouped());
-  const size_t pixels = windows.image().pixels();
+  const std::size_t pixels = windows.image().pixels();
   std::vector<float> input(16), target(pixels), truth(pixels);
-  for (size_t n = 0; n < indices.size(); ++n) {
+  for (std::size_t n = 0; n < indices.size(); ++n) {
     pairs.input(n, {{0}, {1}}, input);
     pairs.target(n, target);
     windows.truth(indices[n], truth);
     const auto frame = windows.last_frame(indices[n]);
     ASSERT_TRUE(std::equal(frame.begin(), frame.end(), input.begin())) << path << ", pair " << n;
     ASSERT_EQ(target, truth) << path << ", pair " << n;
-    ASSERT_EQ(pairs.group(n), static_cast<int64_t>(windows.pass_of(indices[n]))) << path << ", pair " << n;
+    ASSERT_EQ(pairs.group(n), static_cast<std::int64_t>(windows.pass_of(indices[n])))
+        << path << ", pair " << n;
   }
 }
 

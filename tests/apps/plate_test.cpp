@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "data/plate.h"
-#include "data/recording.h"
-#include "data/windows.h"
+#include "data/plates/plate.h"
+#include "data/recordings/recording.h"
+#include "data/samples/windows.h"
 #include "io/file.h"
 #include "tests/apps/process.h"
 
@@ -53,7 +53,7 @@ TEST(PlateProgram, APrintedPlateIsSimulatedAndImportedLikeANamedOne) {
 
   // The same pass as the rig's text, in a folder named like the plate's file.
   std::string text;
-  for (size_t i = 0; i < recording.volts.size(); ++i)
+  for (std::size_t i = 0; i < recording.volts.size(); ++i)
     text += std::to_string(recording.volts[i]) + (i % kTaxels == kTaxels - 1 ? "\n" : " ");
   make_directories(folder / "text/my/1");
   write_file(folder / "text/my/1/1.txt", text);

@@ -72,7 +72,7 @@ void RunningProcess::send(int signal) const { kill(child_, signal); }
 void RunningProcess::read_terminal() {
   char bytes[512];
   for (ssize_t count; (count = read(terminal_, bytes, sizeof bytes)) > 0;)
-    shown_.append(bytes, static_cast<size_t>(count));
+    shown_.append(bytes, static_cast<std::size_t>(count));
 }
 
 ProcessResult RunningProcess::wait() {

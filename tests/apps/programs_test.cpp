@@ -6,7 +6,7 @@
 #include <csignal>
 #include <nlohmann/json.hpp>
 
-#include "data/recording.h"
+#include "data/recordings/recording.h"
 #include "io/file.h"
 #include "tests/apps/process.h"
 #include "tests/io/temporary_folder.h"
@@ -14,7 +14,7 @@
 namespace supertac {
 namespace {
 
-constexpr uint64_t kPlenty = 1 << 26;
+constexpr std::uint64_t kPlenty = 1 << 26;
 
 /// A short text pass over nothing: frames of rest.
 std::string rest_lines(int count) {
@@ -73,7 +73,8 @@ TEST(Simulate, SameSeedSameBytesForAnyThreads) {
   }
   const auto first = list_recordings(folder.file("1"));
   const auto second = list_recordings(folder.file("3"));
-  for (size_t i = 0; i < 2; ++i) EXPECT_EQ(read_file(first[i], kPlenty), read_file(second.at(i), kPlenty));
+  for (std::size_t i = 0; i < 2; ++i)
+    EXPECT_EQ(read_file(first[i], kPlenty), read_file(second.at(i), kPlenty));
 }
 
 TEST(Simulate, KeepsExistingFilesWithoutForce) {

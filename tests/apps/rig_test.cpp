@@ -7,14 +7,14 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "data/windows.h"
+#include "data/samples/windows.h"
 #include "io/file.h"
 #include "tests/apps/process.h"
 
 namespace supertac {
 namespace {
 
-constexpr uint64_t kPlenty = 1 << 26;
+constexpr std::uint64_t kPlenty = 1 << 26;
 
 /// A virtual rig with a printed plate, four times faster than a real one.
 class RigTest : public testing::Test {
@@ -68,7 +68,7 @@ TEST_F(RigTest, CollectShowsALiveLineAndReportsEveryPass) {
   EXPECT_EQ(pass["frames"], recording.frames());
   EXPECT_EQ(recording.plate, "my.stl");
   // At first the finger is in the air: at rest, however long this machine has been running.
-  for (size_t k = 0; k < kTaxels; ++k) EXPECT_NEAR(recording.volts[k], 2.44, 0.05) << "taxel " << k;
+  for (std::size_t k = 0; k < kTaxels; ++k) EXPECT_NEAR(recording.volts[k], 2.44, 0.05) << "taxel " << k;
   // The folder holds its plate: truths can be drawn wherever it is moved.
   std::filesystem::rename(folder_ / "out", folder_ / "moved");
   std::filesystem::remove(folder_ / "my.stl");

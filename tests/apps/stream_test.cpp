@@ -8,8 +8,8 @@
 #include "apps/stream/latency_histogram.h"
 #include "apps/stream/picture_log.h"
 #include "apps/stream/terminal_view.h"
-#include "data/simulator.h"
-#include "data/windows.h"
+#include "data/recordings/simulator.h"
+#include "data/samples/windows.h"
 #include "hardware/serial_port.h"
 #include "hardware/virtual_rig/pty_rig.h"
 #include "io/file.h"
@@ -37,7 +37,7 @@ RigSettings touching_rig() {
   settings.printer_running = true;
   settings.board.signals = [](double, double, double, double t) {
     std::array<double, 16> volts{};
-    for (size_t k = 0; k < volts.size(); ++k)
+    for (std::size_t k = 0; k < volts.size(); ++k)
       volts[k] = 2.3 + 0.1 * std::sin(20 * t + static_cast<double>(k));
     return volts;
   };
@@ -91,15 +91,15 @@ TEST_F(Streaming, AReplayGivesThePicturesThatLiveHad) {
   // One picture for every frame after the first window, but those that a busy machine was too late for.
   const auto json = result("json");
   const SafetensorsFile first = kept("live"), again = kept("replay");
-  const size_t pictures = first.f64("time_s").size();
+  const std::size_t pictures = first.f64("time_s").size();
   EXPECT_EQ(json.at("pictures"), pictures);
-  const auto made = static_cast<double>(pictures + json.at("dropped").get<size_t>());
+  const auto made = static_cast<double>(pictures + json.at("dropped").get<std::size_t>());
   EXPECT_NEAR(made, (1.5 - 32 / 300.0) / 992e-6, 150);
   ASSERT_GT(pictures, 100U);
   const std::vector<double> times = again.f64("time_s");
   const std::vector<float> pixels = first.f32("pictures"), pixels_again = again.f32("pictures");
-  size_t at = 0;
-  for (size_t i = 0; i < pictures; ++i) {
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < pictures; ++i) {
     while (at < times.size() && times[at] != first.f64("time_s")[i]) ++at;
     ASSERT_LT(at, times.size()) << "picture " << i << " has no twin in the replay";
     ASSERT_TRUE(std::equal(&pixels[i * 64], &pixels[i * 64] + 64, &pixels_again[at * 64])) << i;
@@ -121,8 +121,8 @@ TEST_F(Streaming, ARecordingGivesThePicturesOfItsWindows) {
   windows.add(recording);
   const ModelFile file = load_model(model());
   Tensor window(Shape{1, kTimesteps, kTaxels});
-  size_t compared = 0;
-  for (size_t i = 0, at = 0; i < windows.size(); ++i) {
+  std::size_t compared = 0;
+  for (std::size_t i = 0, at = 0; i < windows.size(); ++i) {
     const double time = static_cast<double>(windows.frame_of(i)) / 300;
     while (at < times.size() && times[at] < time - 1e-9) ++at;
     if (at == times.size() || times[at] > time + 1e-9) continue;  // a lost frame has no picture
@@ -290,10 +290,10 @@ TEST(TerminalView, YGrowsUpwardsAndBothPicturesHaveTheSameSize) {
   state.picture[15] = 1;  // smallest y, largest x: bottom right
   const std::string text = render(state, false);
   std::vector<std::string> lines;
-  for (size_t at = 0; at < text.size(); at = text.find('\n', at) + 1)
+  for (std::size_t at = 0; at < text.size(); at = text.find('\n', at) + 1)
     lines.push_back(text.substr(at, text.find('\n', at) - at));
   ASSERT_EQ(lines.size(), 17U);
-  for (size_t i = 0; i < 16; ++i) EXPECT_EQ(lines[i].size(), 67U);
+  for (std::size_t i = 0; i < 16; ++i) EXPECT_EQ(lines[i].size(), 67U);
   EXPECT_EQ(lines[0], "@@@@@@@@" + std::string(59, ' '));
   EXPECT_EQ(lines[3], lines[0]);
   EXPECT_EQ(lines[4], std::string(67, ' '));
@@ -342,9 +342,9 @@ TEST(Stream, AModelOfAnotherArrayTakesItsRecordingsOnly) {
                                                    model, "--seconds", "1", "--out", out});
   EXPECT_EQ(own.code, 0) << own.error;
   const SafetensorsFile file = SafetensorsFile::read(out);
-  const uint64_t count = file.tensors().at("time_s").shape[0];
-  EXPECT_EQ(file.tensors().at("volts").shape, (std::vector<uint64_t>{count, 12}));
-  EXPECT_EQ(file.tensors().at("pictures").shape, (std::vector<uint64_t>{count, 8, 24}));
+  const std::uint64_t count = file.tensors().at("time_s").shape[0];
+  EXPECT_EQ(file.tensors().at("volts").shape, (std::vector<std::uint64_t>{count, 12}));
+  EXPECT_EQ(file.tensors().at("pictures").shape, (std::vector<std::uint64_t>{count, 8, 24}));
   const auto rig =
       run_process("supertac-stream", {"--recording", folder / "rig.safetensors", "--model", model});
   EXPECT_EQ(rig.code, 1);

@@ -4,8 +4,8 @@
 #include <utility>
 #include <vector>
 
-#include "data/recording.h"
-#include "data/windows.h"
+#include "data/recordings/recording.h"
+#include "data/samples/windows.h"
 
 namespace supertac {
 
@@ -13,7 +13,7 @@ namespace supertac {
 struct PassPlan {
   std::string plate = "bumps12";
   int trial = 1, pass = 1;
-  size_t frames = 100;
+  std::size_t frames = 100;
   double rate_hz = 300;
   double start_y_mm = 30, speed_mm_s = 10;
   float level = 2.0F;  ///< volts of frame 0, taxel 0
@@ -26,7 +26,7 @@ inline Recording make_recording(const PassPlan& plan) {
   recording.pass = plan.pass;
   recording.speed_mm_s = plan.speed_mm_s;
   recording.source = "simulated";
-  for (size_t i = 0; i < plan.frames; ++i) {
+  for (std::size_t i = 0; i < plan.frames; ++i) {
     const double t = static_cast<double>(i) / plan.rate_hz;
     recording.time_s.push_back(t);
     for (int k = 0; k < kTaxels; ++k)

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "data/split.h"
+#include "data/samples/split.h"
 #include "tests/models/support.h"
 
 namespace supertac {

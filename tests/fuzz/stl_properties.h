@@ -5,8 +5,8 @@
 #include <span>
 #include <stdexcept>
 
-#include "data/height_map.h"
-#include "data/stl.h"
+#include "data/plates/height_map.h"
+#include "data/plates/stl.h"
 #include "io/file.h"
 
 namespace supertac {

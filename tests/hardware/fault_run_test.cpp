@@ -5,7 +5,7 @@
 namespace supertac {
 namespace {
 
-// The 200 runs of the promise are a program of their own: hardware_fault_runs.
+// The 200 runs of the promise are a program of their own: rig_fault_runs.
 TEST(FaultRun, TwoPassesAtTwoPerMilleOfTheBytes) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const FaultVerdict verdict = run_faulty_collection({.byte_rate = 0.002}, seed, 2);

@@ -11,7 +11,7 @@
 namespace supertac {
 namespace {
 
-/// Runs `check` on every file of a corpus. @returns how many there were
+/// Runs `check` on every file of a corpus. Returns how many there were
 int replay(const std::string& corpus, void (*check)(std::span<const std::byte>)) {
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(SUPERTAC_FUZZ_CORPUS "/" + corpus)) {

@@ -5,7 +5,7 @@
 namespace supertac {
 namespace {
 
-// The 100 pulls of each plug that are promised are a program of their own: hardware_unplug_runs.
+// The 100 pulls of each plug that are promised are a program of their own: rig_unplug_runs.
 TEST(UnplugRun, AReaderNoticesWithin100Milliseconds) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     for (const Plug plug : {Plug::board, Plug::printer})

@@ -8,7 +8,7 @@
 namespace supertac {
 namespace {
 
-uint32_t sum_of(std::string_view text, uint32_t seed = 0) {
+std::uint32_t sum_of(std::string_view text, std::uint32_t seed = 0) {
   return crc32(std::as_bytes(std::span(text)), seed);
 }
 
@@ -21,7 +21,7 @@ TEST(Crc32, KnownSums) {
 
 TEST(Crc32, PartsGiveTheSumOfTheWhole) {
   const std::string_view text = "The quick brown fox jumps over the lazy dog";
-  for (size_t cut = 0; cut <= text.size(); ++cut) {
+  for (std::size_t cut = 0; cut <= text.size(); ++cut) {
     EXPECT_EQ(sum_of(text.substr(cut), sum_of(text.substr(0, cut))), 0x414FA339u);
   }
 }

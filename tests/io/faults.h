@@ -26,12 +26,12 @@ class FaultInjection {
     calls.fstat = [](int file, struct stat* status) {
       return hit("fstat") ? -1 : real_system_calls().fstat(file, status);
     };
-    calls.read = [](int file, void* bytes, size_t count) -> ssize_t {
+    calls.read = [](int file, void* bytes, std::size_t count) -> ssize_t {
       const bool now = hit("read");
       if (now && state().fault == Fault::error) return -1;
       return real_system_calls().read(file, bytes, now ? (count + 1) / 2 : count);
     };
-    calls.write = [](int file, const void* bytes, size_t count) -> ssize_t {
+    calls.write = [](int file, const void* bytes, std::size_t count) -> ssize_t {
       const bool now = hit("write");
       if (now && state().fault == Fault::error) return -1;
       return real_system_calls().write(file, bytes, now ? (count + 1) / 2 : count);

@@ -14,7 +14,7 @@
 namespace supertac {
 namespace {
 
-constexpr uint64_t kPlenty = 1 << 20;
+constexpr std::uint64_t kPlenty = 1 << 20;
 const std::string kOld = "the old content";
 const std::string kNew(10'000, 'n');
 
@@ -202,11 +202,11 @@ TEST(FileFaults, EveryReadCallFails) {
 
 /// What may stand under the name after a power cut that follows the first `length` calls: data not yet synced
 /// may be there, torn or gone, and a rename not yet synced may or may not have reached the disk.
-std::set<std::string> states_after(const std::vector<std::string>& calls, size_t length) {
+std::set<std::string> states_after(const std::vector<std::string>& calls, std::size_t length) {
   bool data_synced = false;
   bool renamed = false;
   bool rename_synced = false;
-  for (size_t i = 0; i < length; ++i) {
+  for (std::size_t i = 0; i < length; ++i) {
     if (calls[i] == "write") data_synced = false;
     if (calls[i] == "fsync" && renamed) rename_synced = true;
     if (calls[i] == "fsync" && !renamed) data_synced = true;
@@ -227,7 +227,7 @@ TEST(FileCrash, AlwaysOldOrNew) {
   const std::vector<std::string> expected = {"open",  "open",  "write",  "write", "write",
                                              "fsync", "close", "rename", "fsync", "close"};
   ASSERT_EQ(calls, expected);
-  for (size_t length = 0; length <= calls.size(); ++length) {
+  for (std::size_t length = 0; length <= calls.size(); ++length) {
     EXPECT_FALSE(states_after(calls, length).contains("torn")) << "power cut after " << length << " calls";
   }
   EXPECT_EQ(states_after(calls, calls.size()), std::set<std::string>{"new"});

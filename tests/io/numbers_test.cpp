@@ -18,10 +18,10 @@ TEST(Numbers, ParseTakesTheWholeText) {
   for (const char* text : {"", " 1", "1 ", "+1", "1,5", "2.12.3", "0x10", "1e999", "one", "1e"}) {
     EXPECT_FALSE(parse_double(text)) << text;
   }
-  EXPECT_EQ(parse_int("-9223372036854775808"), std::numeric_limits<int64_t>::min());
+  EXPECT_EQ(parse_int("-9223372036854775808"), std::numeric_limits<std::int64_t>::min());
   for (const char* text : {"", "9223372036854775808", "1.0", "1x", "-"})
     EXPECT_FALSE(parse_int(text)) << text;
-  EXPECT_EQ(parse_uint("18446744073709551615"), std::numeric_limits<uint64_t>::max());
+  EXPECT_EQ(parse_uint("18446744073709551615"), std::numeric_limits<std::uint64_t>::max());
   for (const char* text : {"-1", "18446744073709551616"}) EXPECT_FALSE(parse_uint(text)) << text;
 }
 

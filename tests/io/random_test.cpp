@@ -7,10 +7,10 @@
 namespace supertac {
 namespace {
 
-using Words = std::array<uint32_t, 4>;
+using Words = std::array<std::uint32_t, 4>;
 
 TEST(Random, PhiloxGivesThePublishedNumbers) {  // kat_vectors of Random123
-  constexpr uint32_t f = 0xffffffff;
+  constexpr std::uint32_t f = 0xffffffff;
   EXPECT_EQ(philox({0, 0, 0, 0}, {0, 0}), (Words{0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}));
   EXPECT_EQ(philox({f, f, f, f}, {f, f}), (Words{0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}));
   EXPECT_EQ(philox({0x243f6a88, 0x85a308d3, 0x13198a2e, 0x03707344}, {0xa4093822, 0x299f31d0}),
@@ -51,8 +51,8 @@ TEST(Random, DependsOnSeedStreamAndCounterOnly) {
   EXPECT_NE(RandomStream(1, 2).bits(3), RandomStream(2, 2).bits(3));
   EXPECT_NE(RandomStream(1, 2).bits(3), RandomStream(1, 3).bits(3));
   EXPECT_NE(RandomStream(1, 2).bits(3), RandomStream(1, 2).bits(4));
-  EXPECT_NE(RandomStream(1, 2).bits(3), RandomStream(1, 2).bits(3 + (uint64_t{1} << 32)));
-  EXPECT_NE(RandomStream(1, 2).bits(3), RandomStream(1 + (uint64_t{1} << 32), 2).bits(3));
+  EXPECT_NE(RandomStream(1, 2).bits(3), RandomStream(1, 2).bits(3 + (std::uint64_t{1} << 32)));
+  EXPECT_NE(RandomStream(1, 2).bits(3), RandomStream(1 + (std::uint64_t{1} << 32), 2).bits(3));
 }
 
 }  // namespace

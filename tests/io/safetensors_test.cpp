@@ -14,7 +14,7 @@
 namespace supertac {
 namespace {
 
-constexpr uint64_t kPlenty = 1 << 26;
+constexpr std::uint64_t kPlenty = 1 << 26;
 
 // Under a sanitizer time and memory say nothing.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -35,23 +35,24 @@ std::string message_of(const std::string& path) {
 }
 
 /// A file of the header's text and `data_bytes` zeros.
-std::string raw_file(const std::string& header, size_t data_bytes) {
-  const uint64_t length = header.size();
+std::string raw_file(const std::string& header, std::size_t data_bytes) {
+  const std::uint64_t length = header.size();
   std::string bytes(8, '\0');
   std::memcpy(bytes.data(), &length, 8);
   return bytes + header + std::string(data_bytes, '\0');
 }
 
-std::string message_of_header(const std::string& header, size_t data_bytes = 0) {
+std::string message_of_header(const std::string& header, std::size_t data_bytes = 0) {
   TemporaryFolder folder;
   write_file(folder.file("a"), raw_file(header, data_bytes));
   return message_of(folder.file("a"));
 }
 
 /// Writes a file of about `bytes` bytes.
-void write_example(const std::string& path, size_t bytes) {
+void write_example(const std::string& path, std::size_t bytes) {
   std::vector<float> values(bytes / 4);
-  for (size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(RandomStream(1, 2).normal(i));
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = static_cast<float>(RandomStream(1, 2).normal(i));
   const std::vector<double> times = {0.1, 0.2};
   write_safetensors(path, {{"kind", "example"}, {"note", "\"quoted\", \\, \xc3\xa4"}},
                     {{"volts", "F32", {values.size()}, std::as_bytes(std::span(values))},
@@ -86,8 +87,8 @@ TEST(Safetensors, GoldenFileOfVersion1IsReadForEver) {
   EXPECT_EQ(file.metadata().at("note"), "quotes \" and \xc3\xa4");
   EXPECT_EQ(file.f32("volts"), (std::vector<float>{0, 0.5, -1, 1e-3f, 2.5, 3}));
   EXPECT_EQ(file.f64("time_s"), (std::vector<double>{0.1, 1e300}));
-  EXPECT_EQ(file.tensors().at("volts").shape, (std::vector<uint64_t>{2, 3}));
-  EXPECT_EQ(file.tensors().at("empty").shape, (std::vector<uint64_t>{0, 4}));
+  EXPECT_EQ(file.tensors().at("volts").shape, (std::vector<std::uint64_t>{2, 3}));
+  EXPECT_EQ(file.tensors().at("empty").shape, (std::vector<std::uint64_t>{0, 4}));
 }
 
 TEST(Safetensors, WritesTheBytesOfTheGoldenFile) {
@@ -131,7 +132,7 @@ TEST(SafetensorsDamage, EveryPrefixIsRefused) {
   TemporaryFolder folder;
   write_example(folder.file("a"), 2000);
   const std::string whole = read_text_file(folder.file("a"), kPlenty);
-  for (size_t length = 0; length < whole.size(); ++length) {
+  for (std::size_t length = 0; length < whole.size(); ++length) {
     write_file(folder.file("b"), whole.substr(0, length));
     ASSERT_NE(message_of(folder.file("b")), "read") << length << " bytes";
   }
@@ -146,12 +147,12 @@ TEST(SafetensorsDamage, EveryFlippedBitIsRefused) {
   // Written in place: 130,000 atomic replacements would test the disk.
   FILE* file = std::fopen(folder.file("a").c_str(), "r+b");
   ASSERT_NE(file, nullptr);
-  const auto put = [&](size_t position, char value) {
+  const auto put = [&](std::size_t position, char value) {
     std::fseek(file, static_cast<long>(position), SEEK_SET);
     std::fputc(value, file);
     std::fflush(file);
   };
-  for (size_t i = 0; i < bytes.size(); ++i) {
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
     for (int bit = 0; bit < 8; ++bit) {
       put(i, static_cast<char>(bytes[i] ^ (1 << bit)));
       ASSERT_NE(message_of(folder.file("a")), "read") << "byte " << i << " bit " << bit;
@@ -222,8 +223,8 @@ TEST(SafetensorsHostile, HeadersAreRefusedForTheirReason) {
 
 TEST(SafetensorsHostile, LengthsAreComparedBeforeMemoryIsAskedFor) {
   TemporaryFolder folder;
-  for (const uint64_t length :
-       {uint64_t{1} << 63, ~uint64_t{0}, (uint64_t{1} << 20) + 1, uint64_t{1} << 40}) {
+  for (const std::uint64_t length :
+       {std::uint64_t{1} << 63, ~std::uint64_t{0}, (std::uint64_t{1} << 20) + 1, std::uint64_t{1} << 40}) {
     std::string bytes(16, ' ');
     std::memcpy(bytes.data(), &length, 8);
     write_file(folder.file("a"), bytes);
@@ -244,7 +245,7 @@ long peak_kilobytes() {
 
 /// Headers made to cost as much as they can.
 std::vector<std::string> bombs() {
-  constexpr size_t kCap = (1 << 20) - 64;
+  constexpr std::size_t kCap = (1 << 20) - 64;
   std::string many = "{";
   for (int i = 0; many.size() < kCap - 100; ++i) {
     many +=
@@ -306,11 +307,11 @@ TEST(SafetensorsWrite, RefusesWhatItCouldNotReadBack) {
 TEST(SafetensorsWrite, PiecesGiveTheSameBytesAsAWhole) {
   TemporaryFolder folder;
   std::vector<float> values(1000);
-  for (size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i);
   const auto bytes = std::as_bytes(std::span(values));
-  const auto in_pieces = [&](size_t size) {
+  const auto in_pieces = [&](std::size_t size) {
     return [&bytes, size](const ByteSink& sink) {
-      for (size_t at = 0; at < bytes.size(); at += size)
+      for (std::size_t at = 0; at < bytes.size(); at += size)
         sink(bytes.subspan(at, std::min(size, bytes.size() - at)));
     };
   };

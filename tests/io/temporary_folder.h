@@ -26,8 +26,8 @@ class TemporaryFolder {
   const std::string& path() const { return path_; }
   std::string file(const std::string& name) const { return path_ + "/" + name; }
   std::string operator/(const std::string& name) const { return file(name); }
-  size_t entries() const {
-    size_t count = 0;
+  std::size_t entries() const {
+    std::size_t count = 0;
     for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(path_)) ++count;
     return count;
   }

@@ -4,7 +4,7 @@
 #include <array>
 #include <string>
 
-#include "data/windows.h"
+#include "data/samples/windows.h"
 #include "io/file.h"
 #include "models/trainer.h"
 #include "tests/io/temporary_folder.h"

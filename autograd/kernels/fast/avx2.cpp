@@ -1,0 +1,45 @@
+#ifndef SUPERTAC_REAL_IS_DOUBLE
+#include <immintrin.h>
+
+#include "autograd/kernels/fast/isa.h"
+
+namespace supertac::kernels {
+namespace {
+
+constexpr int kTilePixels = 6;  // 6 x 2 accumulators, 2 weights, 1 value: 15 of 16 registers
+constexpr int kNarrowTilePixels = 12;
+constexpr int kOuterRows = 4;
+
+alignas(32) const std::int32_t kLaneMask[16] = {-1, -1, -1, -1, -1, -1, -1, -1, 0, 0, 0, 0, 0, 0, 0, 0};
+
+struct Vec {
+  static constexpr Dim kLanes = 8;
+  __m256 v;
+  static __m256i mask(Dim n) {
+    return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(kLaneMask + 8 - n));
+  }
+  static Vec load(const real* p) { return {_mm256_loadu_ps(p)}; }
+  static Vec load_part(const real* p, Dim n) { return {_mm256_maskload_ps(p, mask(n))}; }
+  static Vec broadcast(real x) { return {_mm256_set1_ps(x)}; }
+  static Vec add(Vec a, Vec b) { return {_mm256_add_ps(a.v, b.v)}; }
+  static Vec sub(Vec a, Vec b) { return {_mm256_sub_ps(a.v, b.v)}; }
+  static Vec fma(Vec a, Vec b, Vec c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
+  static Vec rectify(Vec x, Vec slope) {
+    const __m256 positive = _mm256_cmp_ps(x.v, _mm256_setzero_ps(), _CMP_GT_OQ);
+    return {_mm256_blendv_ps(_mm256_mul_ps(slope.v, x.v), x.v, positive)};
+  }
+  void store(real* p) const { _mm256_storeu_ps(p, v); }
+  void store_part(real* p, Dim n) const { _mm256_maskstore_ps(p, mask(n), v); }
+};
+
+#include "autograd/kernels/fast/isa_kernels.inl"
+#include "autograd/kernels/fast/isa_winograd.inl"
+
+}  // namespace
+
+const IsaKernels kAvx2Kernels{"avx2",  Vectors::avx2, gather,  gather_rows, outer,
+                              filters, filter_grads,  patches, squares,     square_grads};
+
+}  // namespace supertac::kernels
+
+#endif  // SUPERTAC_REAL_IS_DOUBLE

@@ -1,0 +1,37 @@
+// Simple loops, compiled for several instruction sets and run on the one that isa_kernels() has chosen.
+//
+// Only for loops of separate multiplications and additions (-ffp-contract=off): their bits are the same at
+// any vector width. Sums and fused multiply-adds live in isa_kernels.inl.
+#pragma once
+
+#include "autograd/kernels/fast/isa.h"
+
+/// Of a lambda for run_loop(): it must be inlined to be compiled for the set.
+#define SUPERTAC_LOOP __attribute__((always_inline))
+
+namespace supertac::kernels {
+
+template <class Loop>
+__attribute__((target("avx2"))) void run_on_avx2(Loop loop) {
+  loop();
+}
+
+template <class Loop>
+__attribute__((target("avx512f"))) void run_on_avx512(Loop loop) {
+  loop();
+}
+
+/// run_loop([=]() SUPERTAC_LOOP { for (Dim i = 0; i < n; ++i) y[i] = a[i] + b[i]; });
+template <class Loop>
+void run_loop(Loop loop) {
+  switch (isa_kernels().vectors) {
+    case Vectors::baseline:
+      return loop();
+    case Vectors::avx2:
+      return run_on_avx2(loop);
+    case Vectors::avx512:
+      return run_on_avx512(loop);
+  }
+}
+
+}  // namespace supertac::kernels

@@ -1,0 +1,43 @@
+// Scalar kernels: plain C++ with fused multiply-add. Compiled twice, see CMakeLists.txt: for any
+// processor, and (SUPERTAC_SCALAR_FMA) for those whose FMA instruction takes one instruction, not a call.
+#include "autograd/kernels/fast/isa.h"
+
+namespace supertac::kernels {
+namespace {
+
+constexpr int kTilePixels = 4;
+constexpr int kNarrowTilePixels = 8;
+constexpr int kOuterRows = 4;
+
+struct Vec {
+  static constexpr Dim kLanes = 1;
+  real v;
+  static Vec load(const real* p) { return {*p}; }
+  static Vec load_part(const real* p, Dim) { return {*p}; }
+  static Vec broadcast(real x) { return {x}; }
+  static Vec add(Vec a, Vec b) { return {a.v + b.v}; }
+  static Vec sub(Vec a, Vec b) { return {a.v - b.v}; }
+#ifdef SUPERTAC_REAL_IS_DOUBLE
+  static Vec fma(Vec a, Vec b, Vec c) { return {__builtin_fma(a.v, b.v, c.v)}; }
+#else
+  static Vec fma(Vec a, Vec b, Vec c) { return {__builtin_fmaf(a.v, b.v, c.v)}; }
+#endif
+  static Vec rectify(Vec x, Vec slope) { return {x.v > 0 ? x.v : slope.v * x.v}; }
+  void store(real* p) const { *p = v; }
+  void store_part(real* p, Dim) const { *p = v; }
+};
+
+#include "autograd/kernels/fast/isa_kernels.inl"
+#include "autograd/kernels/fast/isa_winograd.inl"
+
+}  // namespace
+
+#ifdef SUPERTAC_SCALAR_FMA
+const IsaKernels kPortableFmaKernels{"portable", Vectors::baseline, gather,  gather_rows, outer,
+                                     filters,    filter_grads,      patches, squares,     square_grads};
+#else
+const IsaKernels kPortableKernels{"portable", Vectors::baseline, gather,  gather_rows, outer,
+                                  filters,    filter_grads,      patches, squares,     square_grads};
+#endif
+
+}  // namespace supertac::kernels

@@ -1,0 +1,94 @@
+#include "autograd/kernels/fast/winograd.h"
+
+#include <algorithm>
+
+#include "autograd/kernels/fast/isa.h"
+
+namespace supertac::kernels {
+namespace {
+
+constexpr Dim kPlaces = 36, kSquare = 16;
+constexpr Dim kFewestImages = 4;    // that repay the transform of the weights
+constexpr Dim kFewestTiles = 4;     // of a map: 8x8
+constexpr Dim kTilesPerStrip = 8;   // these stay in the first cache from transform to transform, ...
+constexpr Dim kTilesPerPiece = 64;  // ... these in the second while their weights' gradient is summed
+constexpr Dim kPadding = 16;        // between places of weights: powers of two apart they share cache lines
+
+Dim tiles_of(const ConvSizes& s) { return static_cast<Dim>(s.geometry->squares.size()) / kSquare; }
+Dim place_of(const ConvSizes& s) { return s.cin * s.cout + kPadding; }
+
+// The weights of the gradient: taps in reverse order, [3][3][cin][cout] -> [3][3][cout][cin].
+Tensor turned(Dim cin, Dim cout, const real* w) {
+  constexpr Dim kTaps = 9;
+  Tensor out(Shape{kTaps, cout, cin});
+  for (Dim t = 0; t < kTaps; ++t, w += cin * cout) {
+    real* to = out.data() + (kTaps - 1 - t) * cin * cout;
+    for (Dim o = 0; o < cout; ++o) {
+      for (Dim i = 0; i < cin; ++i) *to++ = w[i * cout + o];
+    }
+  }
+  return out;
+}
+
+TileJob patches_of(const ConvSizes& s, Dim first, Dim count) {
+  const Geometry& g = *s.geometry;
+  return {g.patches.data(), tiles_of(s), g.in_pixels, s.cin, first, count, count * s.cin};
+}
+TileJob squares_of(const ConvSizes& s, Dim first, Dim count) {
+  const Geometry& g = *s.geometry;
+  return {g.squares.data(), tiles_of(s), g.out_pixels, s.cout, first, count, count * s.cout};
+}
+
+void filter(const ConvSizes& s, const real* x, const real* w, const real* bias, Into into,
+            real negative_slope, real* y) {
+  const IsaKernels& isa = isa_kernels();
+  Tensor u(Shape{kPlaces, place_of(s)});
+  isa.filters({s.cin * s.cout, place_of(s)}, w, u.data());
+  const Dim tiles = s.images * tiles_of(s), strip = std::min(kTilesPerStrip, tiles);
+  Tensor v(Shape{kPlaces, strip, s.cin}), m(Shape{kPlaces, strip, s.cout});
+  for (Dim first = 0; first < tiles; first += strip) {
+    const Dim count = std::min(strip, tiles - first);
+    isa.patches(patches_of(s, first, count), x, v.data());
+    for (Dim place = 0; place < kPlaces; ++place) {
+      isa.gather_rows({nullptr, u.data() + place * place_of(s), nullptr, s.cin, s.cout},
+                      v.data() + place * count * s.cin, m.data() + place * count * s.cout, count);
+    }
+    isa.squares(squares_of(s, first, count), m.data(), bias, into, negative_slope, y);
+  }
+}
+
+}  // namespace
+
+bool is_winograd(const ConvSizes& s) {
+  return s.images >= kFewestImages && tiles_of(s) >= kFewestTiles && s.cin % kTransformChannels == 0 &&
+         s.cout % kTransformChannels == 0;
+}
+
+void winograd_conv(const ConvSizes& s, const real* x, const real* w, const real* bias, real negative_slope,
+                   real* y) {
+  filter(s, x, w, bias, Into::overwrite, negative_slope, y);
+}
+
+void winograd_grad_x(const ConvSizes& s, const real* gy, const real* w, Into into, real* gx) {
+  filter({s.geometry, s.images, s.cout, s.cin}, gy, turned(s.cin, s.cout, w).data(), nullptr, into, 1, gx);
+}
+
+// du[place] = sum over tiles of (B^T d B)^T (A gy A^T),   gw += G^T du G
+void winograd_grad_w(const ConvSizes& s, const real* x, const real* gy, real* gw) {
+  const IsaKernels& isa = isa_kernels();
+  const Dim tiles = s.images * tiles_of(s), piece = std::min(kTilesPerPiece, tiles);
+  Tensor v(Shape{kPlaces, piece, s.cin}), m(Shape{kPlaces, piece, s.cout});
+  Tensor du = Tensor::zeros({kPlaces, place_of(s)});
+  for (Dim first = 0; first < tiles; first += piece) {
+    const Dim count = std::min(piece, tiles - first);
+    isa.patches(patches_of(s, first, count), x, v.data());
+    isa.square_grads(squares_of(s, first, count), gy, m.data());
+    for (Dim place = 0; place < kPlaces; ++place) {
+      linear_grad_w(count, s.cin, s.cout, v.data() + place * count * s.cin, m.data() + place * count * s.cout,
+                    du.data() + place * place_of(s));
+    }
+  }
+  isa.filter_grads({s.cin * s.cout, place_of(s)}, du.data(), gw);
+}
+
+}  // namespace supertac::kernels

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "data/plates/stl.h"
+
+namespace supertac {
+
+/// The upper surface of a model read from triangles, on a grid, as a surface to slide over. z = 0 is its flat
+/// part, taken as the median height along its outline; what is less than 1 um from it counts as flat.
+class HeightMap {
+ public:
+  static constexpr double kCellMm = 0.125;  ///< spacing of the grid, a third of a pixel of 32 a side
+
+  /// The highest point of the triangles above every node of the grid, walls and overhangs included. The
+  /// model may lie anywhere; its extent must be width x length, within 0.1 mm.
+  /// `name`: of the file, for messages
+  /// Throws FileError naming found and expected extent; a hole (nodes below no triangle); or triangles that
+  /// cover each other so often that no printed part needs it.
+  HeightMap(const std::vector<Triangle>& triangles, double width_mm, double length_mm,
+            const std::string& name);
+
+  /// Bilinear between the nodes; 0 outside.
+  double height(double x_mm, double y_mm) const;
+
+  double max_height() const { return max_height_; }
+  double min_height() const { return min_height_; }
+  /// First and last y at which something differs from the flat part; the middle when nothing does.
+  double texture_begin() const { return texture_begin_; }
+  double texture_end() const { return texture_end_; }
+  /// True when no height differs by more than 0.05 mm from the mean of its row.
+  bool uniform_in_x() const { return uniform_in_x_; }
+  /// Where the mean height over x, as a function of y, stays above half its maximum: the middle of each such
+  /// stretch's highest part. Elements that run into each other above half their height count as one.
+  std::vector<double> crests() const;
+
+ private:
+  std::size_t columns_ = 0, rows_ = 0;
+  std::vector<float> z_;  // [rows][columns]
+  double max_height_ = 0, min_height_ = 0, texture_begin_ = 0, texture_end_ = 0;
+  bool uniform_in_x_ = true;
+
+  float at(std::size_t row, std::size_t column) const { return z_[row * columns_ + column]; }
+  double row_mean(std::size_t row) const;
+  void level();
+  void measure();
+};
+
+}  // namespace supertac

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "data/plates/height_map.h"
+
+namespace supertac {
+
+enum class TextureKind { plain, ridges, bumps, waves, blobs };
+
+/// One texture of a plate: `count` equal elements along y, centred on `centre_mm`.
+/// Height z of one element at distance d (mm) from its centre line (blobs: from its centre, in x and y):
+///   ridges  h (1 - 2|d| / base), base = min(2.5, pitch)        triangular
+///   bumps   sqrt(h^2 - d^2), width 2h                          semi-circular
+///   blobs   sqrt(h^2 - d^2)                                    hemispheres, in columns centred on the plate
+///   waves   h cos(2 pi d / pitch)                              count - 1/2 periods, crest first and last
+/// and 0 elsewhere. Ridges, bumps and waves vary along y only.
+struct Texture {
+  TextureKind kind = TextureKind::plain;
+  double pitch_mm = 0;   ///< distance between neighbouring centres
+  double height_mm = 0;  ///< of the highest point above the plate's base
+  double from_mm = 36;   ///< the texture is laid out in [from, to], centred, as many elements as fit whole
+  double to_mm = 72;
+};
+
+/// The surface the finger slides over: 36 mm (x) by 108 mm (y), texture between y = 36 and 72 mm.
+/// Coordinates are the plate's own, origin at its corner; z = 0 is its flat part.
+class Plate {
+ public:
+  static constexpr double kWidthMm = 36, kLengthMm = 108, kTextureFromMm = 36, kTextureToMm = 72;
+
+  /// A plate by name. Plates of the rig (RIG plates): 3_Bumps, 6_Bumps, 4_Ridges, 6_Ridges, 4_Waves,
+  /// 6_Waves, 4_Blob, 6_Blob. Others: "plain", or KIND PITCH [h HEIGHT] in mm with KIND one of ridges, bumps,
+  /// waves, blobs ("bumps12", "ridges6h1.5"), or several joined by '+', which share the length equally
+  /// ("bumps12+ridges4"). Default height 2.5, for bumps and blobs at most pitch / 2. Or the path of an STL
+  /// file of 36 x 108 mm (data/height_map.h), whose plate has the file's name without folders.
+  /// Throws std::invalid_argument naming the part that could not be read; FileError for an STL file.
+  static Plate named(const std::string& name);
+  /// True when the name is that of an STL file: it ends with ".stl".
+  static bool is_file(const std::string& name);
+
+  /// `textures`: may overlap nowhere; empty means plain.
+  /// Throws std::invalid_argument when pitch or height are not positive or do not fit.
+  Plate(std::string name, const std::vector<Texture>& textures);
+
+  /// A plate that is no texture but a map, of kWidthMm x kLengthMm.
+  Plate(std::string name, HeightMap map);
+
+  /// Surface height z (mm) at (x, y); negative in the troughs of waves, 0 outside the texture.
+  double height(double x_mm, double y_mm) const;
+
+  /// Highest and lowest z of the plate (mm): 0 and 0 when plain; lowest is -h for waves, else 0.
+  double max_height() const { return max_height_; }
+  double min_height() const { return min_height_; }
+
+  /// Where the texture begins and ends along y (mm); both the middle of the plate when plain.
+  double texture_begin() const { return texture_begin_; }
+  double texture_end() const { return texture_end_; }
+
+  /// Where the elements' highest lines (blobs: rows of centres; maps: HeightMap::crests) lie along y (mm),
+  /// ascending; empty when plain.
+  std::vector<double> crests() const;
+
+  /// True when the height depends on y only (everything but blobs; a map within 0.05 mm).
+  bool uniform_in_x() const;
+
+  const std::string& name() const { return name_; }
+
+ private:
+  struct Band {  // one texture with its layout worked out
+    Texture texture;
+    int count_y = 0, count_x = 0;
+    double first_y = 0, first_x = 0;  // centre of the first element
+    double begin = 0, end = 0;        // extent along y
+    double height(double x_mm, double y_mm) const;
+  };
+  static Band lay_out(const Texture& texture);
+
+  std::string name_;
+  std::vector<Band> bands_;
+  std::shared_ptr<const HeightMap> map_;  // instead of bands
+  double max_height_ = 0, min_height_ = 0, texture_begin_ = 0, texture_end_ = 0;
+};
+
+/// Names of the eight plates of the rig, and of the six that simulations use by default (the paper's bumps
+/// and ridges at 12, 6 and 4 mm).
+const std::vector<std::string>& rig_plates();
+const std::vector<std::string>& default_plates();
+
+}  // namespace supertac

@@ -1,0 +1,33 @@
+#include "data/plates/plate_file.h"
+
+#include <filesystem>
+#include <stdexcept>
+
+#include "data/plates/stl.h"
+#include "io/file.h"
+#include "io/text.h"
+
+namespace supertac {
+
+namespace fs = std::filesystem;
+
+Plate plate_in_folder(const std::string& name, const std::string& folder) {
+  if (!Plate::is_file(name)) return Plate::named(name);
+  if (name.find('/') != std::string::npos)
+    throw std::invalid_argument("plate " + in_quotes(name) +
+                                ": expected the name of an STL file beside the recordings, found a path");
+  return Plate::named((fs::path(folder) / name).string());
+}
+
+void keep_plate_file(const std::string& path, const std::string& folder) {
+  if (!Plate::is_file(path)) return;
+  const auto bytes = read_file(path, kMaxStlBytes);
+  const std::string copy = (fs::path(folder) / fs::path(path).filename()).string();
+  if (fs::exists(copy)) {
+    if (read_file(copy, kMaxStlBytes) == bytes) return;
+    throw FileError(copy, "is another plate than " + path + "; rename one of them or choose another folder");
+  }
+  write_file(copy, bytes);
+}
+
+}  // namespace supertac

@@ -1,0 +1,108 @@
+#include "data/plates/plate_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kSliverMm = 1e-3;  // lines closer than this are one
+
+using Vertex = std::array<float, 3>;
+
+// Multiples of the step within (low, high), and these two.
+std::vector<double> lattice(double low, double high, double step) {
+  std::vector<double> lines = {low, high};
+  for (auto i = std::ceil(low / step); i * step < high; ++i) lines.push_back(i * step);
+  return lines;
+}
+
+std::vector<double> without_slivers(std::vector<double> lines) {
+  std::sort(lines.begin(), lines.end());
+  std::vector<double> kept;
+  for (const double line : lines)
+    if (kept.empty() || line - kept.back() > kSliverMm) kept.push_back(line);
+  return kept;
+}
+
+std::vector<double> lines_along_y(const Plate& plate, double step) {
+  const double begin = std::max(0.0, plate.texture_begin()), end = plate.texture_end();
+  std::vector<double> lines = lattice(begin, std::max(begin, end), step);
+  lines.insert(lines.end(), {0, Plate::kLengthMm});
+  for (const double crest : plate.crests()) lines.push_back(crest);
+  return without_slivers(lines);
+}
+
+class Solid {
+ public:
+  void triangle(const Vertex& a, const Vertex& b, const Vertex& c) { triangles_.push_back({a, b, c}); }
+  void quad(const Vertex& a, const Vertex& b, const Vertex& c, const Vertex& d) {
+    triangle(a, b, c);
+    triangle(a, c, d);
+  }
+  std::vector<Triangle> take() { return std::move(triangles_); }
+
+ private:
+  std::vector<Triangle> triangles_;
+};
+
+// The top's points, row by row; xs and ys ascend.
+struct Top {
+  std::vector<double> xs, ys;
+  std::vector<Vertex> points;
+  const Vertex& at(std::size_t row, std::size_t column) const { return points[row * xs.size() + column]; }
+};
+
+Top top_of(const Plate& plate, double step) {
+  Top top;
+  top.xs = plate.uniform_in_x() ? std::vector<double>{0, Plate::kWidthMm}
+                                : without_slivers(lattice(0, Plate::kWidthMm, step));
+  top.ys = lines_along_y(plate, step);
+  for (const double y : top.ys)
+    for (const double x : top.xs)
+      top.points.push_back(
+          {static_cast<float>(x), static_cast<float>(y), static_cast<float>(plate.height(x, y))});
+  return top;
+}
+
+// The top's outline, counter-clockwise seen from above, each point once.
+std::vector<Vertex> outline_of(const Top& top) {
+  const std::size_t last_row = top.ys.size() - 1, last_column = top.xs.size() - 1;
+  std::vector<Vertex> outline;
+  for (std::size_t c = 0; c < last_column; ++c) outline.push_back(top.at(0, c));
+  for (std::size_t r = 0; r < last_row; ++r) outline.push_back(top.at(r, last_column));
+  for (std::size_t c = last_column; c > 0; --c) outline.push_back(top.at(last_row, c));
+  for (std::size_t r = last_row; r > 0; --r) outline.push_back(top.at(r, 0));
+  return outline;
+}
+
+}  // namespace
+
+std::vector<Triangle> mesh_of(const Plate& plate, const MeshSettings& settings) {
+  if (!(settings.resolution_mm >= 0.02 && settings.resolution_mm <= 5) ||
+      !(settings.base_mm >= 0.2 && settings.base_mm <= 100))
+    throw std::invalid_argument(
+        "mesh_of: expected a resolution of 0.02 to 5 mm and a base of 0.2 to 100 mm, got " +
+        format(settings.resolution_mm) + " and " + format(settings.base_mm));
+  const Top top = top_of(plate, settings.resolution_mm);
+  const auto bottom = static_cast<float>(plate.min_height() - settings.base_mm);
+  Solid solid;
+  for (std::size_t r = 0; r + 1 < top.ys.size(); ++r)
+    for (std::size_t c = 0; c + 1 < top.xs.size(); ++c)
+      solid.quad(top.at(r, c), top.at(r, c + 1), top.at(r + 1, c + 1), top.at(r + 1, c));
+  const auto outline = outline_of(top);
+  const Vertex centre = {static_cast<float>(Plate::kWidthMm / 2), static_cast<float>(Plate::kLengthMm / 2),
+                         bottom};
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Vertex &a = outline[i], &b = outline[(i + 1) % outline.size()];
+    const Vertex below_a = {a[0], a[1], bottom}, below_b = {b[0], b[1], bottom};
+    solid.quad(a, below_a, below_b, b);
+    solid.triangle(centre, below_b, below_a);
+  }
+  return solid.take();
+}
+
+}  // namespace supertac

@@ -1,0 +1,174 @@
+#include "data/plates/stl.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+
+#include "io/file.h"
+#include "io/numbers.h"
+#include "io/text.h"
+
+namespace supertac {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "STL files are little-endian");
+
+constexpr std::size_t kTitleBytes = 80, kHeadBytes = 84, kFacetBytes = 50;
+
+bool usable(double coordinate) { return std::abs(coordinate) <= double{kMaxStlCoordinateMm}; }  // no NaN
+
+std::string expected_coordinate() { return "expected a number within +-1000000 mm; export the model again"; }
+
+std::vector<Triangle> parse_binary(std::span<const std::byte> bytes, const std::string& name) {
+  std::vector<Triangle> triangles((bytes.size() - kHeadBytes) / kFacetBytes);
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const std::byte* facet = bytes.data() + kHeadBytes + i * kFacetBytes;
+    std::memcpy(&triangles[i], facet + 3 * sizeof(float), sizeof(Triangle));  // behind the normal
+    for (const auto& corner : triangles[i]) {
+      for (const float coordinate : corner) {
+        if (usable(coordinate)) continue;
+        throw FileError(name, "triangle " + std::to_string(i + 1) + " has the coordinate " +
+                                  format(coordinate) + ", " + expected_coordinate());
+      }
+    }
+  }
+  return triangles;
+}
+
+char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+// Words of the text form, with the number of their line.
+class Words {
+ public:
+  Words(std::string_view text, const std::string& name) : text_(text), name_(name) {}
+
+  /// The next word; empty at the end.
+  std::string_view next() {
+    while (at_ < text_.size() && is_space(text_[at_])) line_ += text_[at_++] == '\n';
+    const std::size_t begin = at_;
+    while (at_ < text_.size() && !is_space(text_[at_])) ++at_;
+    return text_.substr(begin, at_ - begin);
+  }
+  void skip_line() { at_ = std::min(text_.find('\n', at_), text_.size()); }
+
+  void expect(std::string_view word) {
+    if (const auto found = next(); !same(found, word)) reject(std::string(word), found);
+  }
+  float coordinate() {
+    const auto word = next();
+    const auto number = parse_double(word.starts_with('+') ? word.substr(1) : word);
+    if (!number || !usable(*number)) reject("a number within +-1000000 mm", word);
+    return static_cast<float>(*number);
+  }
+  static bool same(std::string_view found, std::string_view word) {
+    return std::ranges::equal(found, word, {}, lower);
+  }
+  [[noreturn]] void reject(const std::string& expected, std::string_view found) const {
+    throw FileError(name_, "line " + std::to_string(line_) + ": expected " + expected + ", found " +
+                               (found.empty() ? "the end of the file" : in_quotes(found)) +
+                               "; the file is damaged or no STL, export it again");
+  }
+
+ private:
+  static bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
+  std::string_view text_;
+  const std::string& name_;
+  std::size_t at_ = 0, line_ = 1;
+};
+
+// Behind the word "facet".
+Triangle parse_facet(Words& words) {
+  words.expect("normal");
+  for (int i = 0; i < 3; ++i) words.next();  // some writers put nan here; nothing uses it
+  words.expect("outer");
+  words.expect("loop");
+  Triangle triangle{};
+  for (auto& corner : triangle) {
+    words.expect("vertex");
+    for (float& coordinate : corner) coordinate = words.coordinate();
+  }
+  words.expect("endloop");
+  words.expect("endfacet");
+  return triangle;
+}
+
+std::vector<Triangle> parse_text(std::string_view text, const std::string& name) {
+  std::vector<Triangle> triangles;
+  Words words(text, name);
+  for (auto word = words.next(); !word.empty(); word = words.next()) {
+    if (!Words::same(word, "solid")) words.reject("solid", word);
+    words.skip_line();  // the solid's name
+    for (word = words.next(); Words::same(word, "facet"); word = words.next())
+      triangles.push_back(parse_facet(words));
+    if (!Words::same(word, "endsolid")) words.reject("facet or endsolid", word);
+    words.skip_line();
+  }
+  return triangles;
+}
+
+std::array<float, 3> normal_of(const Triangle& t) {
+  std::array<double, 3> a{}, b{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    a[k] = double{t[1][k]} - double{t[0][k]};
+    b[k] = double{t[2][k]} - double{t[0][k]};
+  }
+  const std::array<double, 3> n = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                                   a[0] * b[1] - a[1] * b[0]};
+  const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+  if (!(length > 0)) return {};
+  return {static_cast<float>(n[0] / length), static_cast<float>(n[1] / length),
+          static_cast<float>(n[2] / length)};
+}
+
+}  // namespace
+
+std::vector<Triangle> parse_stl(std::span<const std::byte> bytes, const std::string& name) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  std::uint32_t count = 0;
+  if (bytes.size() >= kHeadBytes) std::memcpy(&count, bytes.data() + kTitleBytes, sizeof count);
+  const std::uint64_t length = kHeadBytes + std::uint64_t{kFacetBytes} * count;
+  std::vector<Triangle> triangles;
+  if (bytes.size() >= kHeadBytes && length == bytes.size()) {
+    triangles = parse_binary(bytes, name);
+  } else if (text.starts_with("solid") && text.find('\0') == std::string_view::npos) {
+    triangles = parse_text(text, name);
+  } else if (bytes.size() < kHeadBytes) {
+    throw FileError(name, "has " + std::to_string(bytes.size()) +
+                              " bytes, expected an STL file of 84 or more; export it again");
+  } else {
+    throw FileError(name, "announces " + std::to_string(count) + " triangles, expected " +
+                              std::to_string(length) + " bytes, found " + std::to_string(bytes.size()) +
+                              "; the file was cut off or is no STL");
+  }
+  if (triangles.empty()) throw FileError(name, "holds no triangle; export the model again");
+  return triangles;
+}
+
+std::vector<Triangle> read_stl(const std::string& path) {
+  return parse_stl(read_file(path, kMaxStlBytes), path);
+}
+
+std::vector<std::byte> stl_bytes(const std::vector<Triangle>& triangles, std::string_view title) {
+  if (title.starts_with("solid"))
+    throw std::invalid_argument("stl_bytes: the title begins with \"solid\", which marks a text file");
+  if (triangles.size() > std::numeric_limits<std::uint32_t>::max())
+    throw std::invalid_argument("stl_bytes: an STL file counts its triangles in 32 bits, got " +
+                                std::to_string(triangles.size()));
+  std::vector<std::byte> bytes(kHeadBytes + kFacetBytes * triangles.size());
+  std::memcpy(bytes.data(), title.data(), std::min(title.size(), kTitleBytes));
+  const auto count = static_cast<std::uint32_t>(triangles.size());
+  std::memcpy(bytes.data() + kTitleBytes, &count, sizeof count);
+  std::byte* facet = bytes.data() + kHeadBytes;
+  for (const Triangle& triangle : triangles) {
+    const auto normal = normal_of(triangle);
+    std::memcpy(facet, normal.data(), sizeof normal);
+    std::memcpy(facet + sizeof normal, &triangle, sizeof triangle);
+    facet += kFacetBytes;
+  }
+  return bytes;
+}
+
+}  // namespace supertac

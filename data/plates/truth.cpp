@@ -1,0 +1,39 @@
+#include "data/plates/truth.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+namespace supertac {
+
+double truth_value(const Plate& plate, double x_mm, double y_mm) {
+  const double range = plate.max_height() - plate.min_height();
+  return range > 0 ? (plate.height(x_mm, y_mm) - plate.min_height()) / range : 0.0;
+}
+
+void truth_image(const Plate& plate, double x_mm, double y_mm, const ImageGrid& grid,
+                 std::span<float> image) {
+  if (grid.height < 1 || grid.width < 1 || image.size() != grid.pixels())
+    throw std::invalid_argument("truth_image: a picture of " + grid.text() + " pixels needs as many, got " +
+                                std::to_string(image.size()));
+  const bool uniform = plate.uniform_in_x();  // then a row has one height
+  const auto width = static_cast<std::size_t>(grid.width);
+  for (int r = 0; r < grid.height; ++r) {
+    const double y = y_mm - grid.height_mm() / 2 + (r + 0.5) * grid.pixel_mm;
+    const std::span<float> row = image.subspan(static_cast<std::size_t>(r) * width, width);
+    if (uniform) {
+      std::fill(row.begin(), row.end(), static_cast<float>(truth_value(plate, x_mm, y)));
+      continue;
+    }
+    for (int c = 0; c < grid.width; ++c) {
+      const double x = x_mm - grid.width_mm() / 2 + (c + 0.5) * grid.pixel_mm;
+      row[static_cast<std::size_t>(c)] = static_cast<float>(truth_value(plate, x, y));
+    }
+  }
+}
+
+bool in_contact(std::span<const float> truth) {
+  return std::any_of(truth.begin(), truth.end(), [](float v) { return v > 0; });
+}
+
+}  // namespace supertac

@@ -1,0 +1,256 @@
+#include "data/recordings/finger_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "io/random.h"
+
+namespace supertac {
+namespace {
+
+// Taxel gains of the rig: geometric means over fits to its recordings. Of another array nothing is known.
+constexpr double kGain[kTaxels] = {0.90, 0.18, 0.10, 0.15, 1.60, 0.60, 0.20, 0.60,
+                                   0.27, 0.55, 0.20, 0.65, 0.50, 0.40, 0.10, 0.80};
+constexpr double kUnknownGain = 0.5;
+constexpr double kRestVolts = 2.442, kRestSpreadVolts = 0.003;
+constexpr double kFullScaleVolts = 3.3;
+constexpr double kLeastIndentationMm = -1.8;  // of 2.5 mm of texture the finger then still touches the top
+constexpr int kAdcCodes = 4096;
+
+// Points of the pad. Along the slide they are as fine as the tip of a ridge; across it little changes.
+constexpr double kAcrossMm = 2, kAlongMm = 0.25;
+constexpr double kBeyondAcrossMm = 3.5, kBeyondAlongMm = 6.5;  // the outermost taxels
+
+// An odd number of points, `step` apart, that reach `beyond` the outermost of `lines` lines of taxels.
+int points_of(int lines, double pitch, double beyond, double step) {
+  return 2 * static_cast<int>(std::ceil(((lines - 1) / 2.0 * pitch + beyond) / step)) + 1;
+}
+constexpr double kNoPadSigmaMm = 0.3;  // without a pad a taxel feels the points next to it
+
+// Grid of the plate's surface: wide enough for the rig's whole pad with its centre on the plate; beyond it
+// everything is as at its edge.
+constexpr double kCellMm = 0.25, kMarginMm = 12, kBesideMm = -3;
+constexpr int kColumns = static_cast<int>((Plate::kWidthMm + 2 * kMarginMm) / kCellMm) + 1;
+constexpr int kRows = static_cast<int>((Plate::kLengthMm + 2 * kMarginMm) / kCellMm) + 1;
+
+struct Term {
+  const char* name;
+  bool SimulatorSettings::*on;
+};
+constexpr Term kTerms[] = {
+    {"mount", &SimulatorSettings::with_mount},         {"pad", &SimulatorSettings::with_pad},
+    {"dome", &SimulatorSettings::with_dome},           {"edges", &SimulatorSettings::with_edges},
+    {"tilt", &SimulatorSettings::with_tilt},           {"gains", &SimulatorSettings::with_gains},
+    {"variation", &SimulatorSettings::with_variation}, {"vibration", &SimulatorSettings::with_vibration},
+    {"drift", &SimulatorSettings::with_drift},         {"emi", &SimulatorSettings::with_emi},
+    {"noise", &SimulatorSettings::with_noise},         {"adc", &SimulatorSettings::with_adc},
+    {"filter", &SimulatorSettings::with_filter},       {"saturation", &SimulatorSettings::with_saturation},
+    {"jitter", &SimulatorSettings::with_jitter},       {"loss", &SimulatorSettings::with_loss},
+};
+
+// sin(2 pi turns) to 2e-4 from products only, so that simulated bits do not depend on the C library.
+double sine(double turns) {
+  double u = turns - std::floor(turns);
+  const double sign = u < 0.5 ? 1 : -1;
+  if (u >= 0.5) u -= 0.5;
+  const double q = 4 * (u - 0.25), q2 = q * q;  // cos(pi q / 2), |q| <= 1
+  return sign * (1 - q2 * (1.2333 - q2 * (0.2526 - q2 * 0.0193)));
+}
+
+// As often half as twice.
+double factor(double v) { return v >= 0 ? 1 + v : 1 / (1 - v); }
+
+// exp(-d^2 / 2 sigma^2) nearly, from products only: (1 - d^2 / 16 sigma^2)^8, 0 beyond 4 sigma.
+double bell(double distance, double sigma) {
+  const double rest = std::max(0.0, 1 - distance * distance / (16 * sigma * sigma));
+  const double squared = rest * rest, fourth = squared * squared;
+  return fourth * fourth;
+}
+
+// Weights of `points` places, `step` apart, for the lines (columns or rows) of taxels, [lines][points]; each
+// line sums to 1.
+std::vector<double> taxel_weights(int lines, double pitch, int points, double step, double sigma) {
+  std::vector<double> weights;
+  for (int line = 0; line < lines; ++line) {
+    const double at = (line - (lines - 1) / 2.0) * pitch;
+    const auto weight = [&](int i) { return bell(step * (i - points / 2) - at, sigma); };
+    double sum = 0;
+    for (int i = 0; i < points; ++i) sum += weight(i);
+    for (int i = 0; i < points; ++i) weights.push_back(weight(i) / sum);
+  }
+  return weights;
+}
+
+std::uint64_t hash_text(const std::string& text) {  // FNV-1a
+  std::uint64_t hash = 1469598103934665603ULL;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
+  return hash;
+}
+
+// Streams: what belongs to the sensor, to a trial of a plate (one mounting), to a pass, and to a sample.
+std::uint64_t mounting_stream(const Plate& plate, int trial) {
+  return hash_text(plate.name() + "/" + std::to_string(trial));
+}
+std::uint64_t pass_stream(const Plate& plate, const FingerIdentity& id) {
+  return hash_text(plate.name() + "/" + std::to_string(id.trial) + "/" + std::to_string(id.pass) + "/" +
+                   std::to_string(static_cast<long long>(id.speed_mm_s * 1000)));
+}
+
+}  // namespace
+
+const std::vector<std::string>& simulator_terms() {
+  static const std::vector<std::string> kNames = [] {
+    std::vector<std::string> names;
+    for (const Term& term : kTerms) names.emplace_back(term.name);
+    return names;
+  }();
+  return kNames;
+}
+
+SimulatorSettings without_term(SimulatorSettings settings, const std::string& name) {
+  std::string known;
+  for (const Term& term : kTerms) {
+    if (name == term.name) {
+      settings.*term.on = false;
+      return settings;
+    }
+    known += known.empty() ? term.name : std::string(", ") + term.name;
+  }
+  throw std::invalid_argument("simulator: unknown term \"" + name + "\"; known are " + known);
+}
+
+FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& id)
+    : settings_(settings), noise_seed_(id.seed), noise_stream_(pass_stream(plate, id) + 1) {
+  settings.array.check();
+  if (settings.array.channels != 1)
+    throw std::invalid_argument("simulator: expected an array of one channel, got " + settings.array.text());
+  const RandomStream sensor(id.seed, 0), trial(id.seed, mounting_stream(plate, id.trial));
+  const RandomStream pass(id.seed, pass_stream(plate, id));
+  const double variation = settings.with_variation ? 1 : 0;
+  const double spread = variation * settings.gain_spread;
+  const double common_gain = factor(spread * pass.normal(1000));
+  const double tilt = settings.with_tilt ? settings.tilt_mm_per_mm : 0;
+  const double tilt_spread = settings.with_tilt ? variation * settings.tilt_spread : 0;
+  const double slope_y = tilt + tilt_spread * trial.normal(1001), slope_x = tilt_spread * trial.normal(1002);
+  const bool rig = settings.array.rows == 4 && settings.array.columns == 4;
+  const auto taxels = static_cast<std::uint64_t>(settings.array.taxels());
+  const std::uint64_t drifts = 100 * (1 + taxels / 100);  // numbers that no gain has taken
+  for (std::uint64_t c = 0; c < taxels; ++c) {
+    const double own = factor(spread * trial.normal(c)) * factor(spread / 3 * pass.normal(c));
+    gain_.push_back((settings.with_gains && rig ? kGain[c] : kUnknownGain) * own * common_gain);
+    rest_.push_back(kRestVolts + variation * kRestSpreadVolts * sensor.normal(c));
+    drift_.push_back(settings.with_drift ? settings.drift_volts_per_s * pass.normal(drifts + c) : 0);
+  }
+  const double press = trial.normal(1003) + pass.normal(1003);
+  const double indentation = settings.indentation_mm + variation * settings.indentation_spread_mm * press;
+  indentation_mm_ = std::max(kLeastIndentationMm, indentation);
+  vibration_phase_ = pass.uniform(1004);
+  emi_phase_ = pass.uniform(1005);
+
+  map_.resize(static_cast<std::size_t>(kColumns) * kRows);
+  for (int r = 0; r < kRows; ++r)
+    for (int c = 0; c < kColumns; ++c) {
+      const double x = c * kCellMm - kMarginMm, y = r * kCellMm - kMarginMm;
+      const bool beside = x < 0 || x > Plate::kWidthMm || y < 0 || y > Plate::kLengthMm;
+      map_[static_cast<std::size_t>(r * kColumns + c)] =
+          beside && settings.with_edges ? kBesideMm : plate.height(x, y);
+    }
+  shape_pad(slope_x, slope_y);
+}
+
+void FingerModel::shape_pad(double slope_x, double slope_y) {
+  const double sigma = settings_.with_pad ? settings_.pad_sigma_mm : kNoPadSigmaMm;
+  const auto [rows, columns, pitch, channels] = settings_.array;
+  across_ = points_of(columns, pitch, kBeyondAcrossMm, kAcrossMm);
+  along_ = points_of(rows, pitch, kBeyondAlongMm, kAlongMm);
+  across_weight_ = taxel_weights(columns, pitch, across_, kAcrossMm, sigma);
+  along_weight_ = taxel_weights(rows, pitch, along_, kAlongMm, sigma);
+  const double curvature = settings_.with_dome ? 1 / (2 * settings_.dome_radius_mm) : 0;
+  double lowest = 0;
+  for (int i = 0; i < across_; ++i)
+    for (int j = 0; j < along_; ++j) {
+      const double x = kAcrossMm * (i - across_ / 2), y = kAlongMm * (j - along_ / 2);
+      rise_.push_back(curvature * (x * x + y * y) + slope_x * x + slope_y * y);
+      lowest = std::min(lowest, rise_.back());
+    }
+  for (double& rise : rise_) rise -= lowest;
+}
+
+double FingerModel::surface(double x_mm, double y_mm) const {
+  const double u = std::clamp((x_mm + kMarginMm) / kCellMm, 0.0, kColumns - 1.001);
+  const double v = std::clamp((y_mm + kMarginMm) / kCellMm, 0.0, kRows - 1.001);
+  const auto c = static_cast<std::size_t>(u), r = static_cast<std::size_t>(v);
+  const double fu = u - static_cast<double>(c), fv = v - static_cast<double>(r);
+  const double* row = &map_[r * kColumns + c];
+  const double near = row[0] + fu * (row[1] - row[0]);
+  const double far = row[kColumns] + fu * (row[kColumns + 1] - row[kColumns]);
+  return near + fv * (far - near);
+}
+
+std::vector<double> FingerModel::loads(const FingerPose& pose) const {
+  std::vector<double> depth(rise_.size());
+  for (int i = 0; i < across_; ++i)
+    for (int j = 0; j < along_; ++j) {
+      const auto at = static_cast<std::size_t>(i * along_ + j);
+      const double x = kAcrossMm * (i - across_ / 2), y = kAlongMm * (j - along_ / 2);
+      depth[at] = surface(pose.x_mm + x, pose.y_mm + y) - rise_[at] - pose.z_mm;
+    }
+  // Balance of the mount. The excess force is convex and falls with the lift, so Newton's steps from lift 0
+  // approach the root from below and never pass it; once the same points touch as before, the last step was
+  // exact.
+  double lift = 0, last_slope = 0;
+  for (int step = 0; settings_.with_mount && step < 12; ++step) {
+    double excess = -settings_.mount_stiffness * lift, slope = settings_.mount_stiffness;
+    for (const double d : depth) {
+      const double indented = std::max(0.0, d - lift);
+      excess += kAcrossMm * kAlongMm * indented;
+      slope += indented > 0 ? kAcrossMm * kAlongMm : 0.0;
+    }
+    if (slope == last_slope) break;
+    last_slope = slope;
+    lift += excess / slope;
+  }
+  const auto across = static_cast<std::size_t>(across_), along = static_cast<std::size_t>(along_);
+  const auto columns = static_cast<std::size_t>(settings_.array.columns);
+  std::vector<double> load(gain_.size()), rows(static_cast<std::size_t>(settings_.array.rows));
+  for (std::size_t i = 0; i < across; ++i) {
+    std::fill(rows.begin(), rows.end(), 0.0);
+    for (std::size_t j = 0; j < along; ++j) {
+      const double indented = depth[i * along + j] - lift;
+      if (indented <= 0) continue;
+      for (std::size_t row = 0; row < rows.size(); ++row)
+        rows[row] += along_weight_[row * along + j] * indented;
+    }
+    for (std::size_t k = 0; k < load.size(); ++k)
+      load[k] += across_weight_[k % columns * across + i] * rows[k / columns];
+  }
+  return load;
+}
+
+std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) const {
+  FingerPose shaken = pose;
+  if (settings_.with_vibration)
+    shaken.z_mm += settings_.vibration_mm * sine(settings_.vibration_hz * time_s + vibration_phase_);
+  const std::vector<double> load = loads(shaken);
+  const double emi =
+      settings_.with_emi ? settings_.emi_volts * sine(settings_.emi_hz * time_s + emi_phase_) : 0;
+  const RandomStream noise(noise_seed_, noise_stream_);
+  const auto tick = static_cast<std::uint64_t>(std::llround(std::max(0.0, time_s) * 1e6));
+  const std::uint64_t taxels = load.size();
+  std::vector<double> volts(taxels);
+  for (std::size_t k = 0; k < taxels; ++k) {
+    volts[k] = rest_[k] + drift_[k] * time_s + emi - settings_.volts_per_load * gain_[k] * load[k];
+    if (settings_.with_noise) volts[k] += settings_.noise_volts * noise.normal(tick * taxels + k);
+  }
+  return volts;
+}
+
+int FingerModel::adc(double volts) {
+  return static_cast<int>(
+      std::clamp(std::lround(volts / kFullScaleVolts * kAdcCodes), 0L, long{kAdcCodes - 1}));
+}
+
+double FingerModel::volts_of_adc(int code) { return code * kFullScaleVolts / kAdcCodes; }
+
+}  // namespace supertac

@@ -1,0 +1,115 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "data/plates/plate.h"
+#include "data/recordings/recording.h"
+
+namespace supertac {
+
+/// What the simulated sensor does to the scene. Every term has a switch (with_...); the other numbers say how
+/// strong it is. Defaults resemble the rig's recordings; data/README.md shows what each term changes.
+struct SimulatorSettings {
+  TaxelArray array;  ///< of one channel; gains and pad are the rig's whatever the array
+  double rate_hz = 300;
+  double indentation_mm = 0.2;  ///< how far the slide's path lies below first contact with the flat plate
+  double volts_per_load = 0.9;  ///< drop of a taxel of gain 1 per unit load; load = mean indentation (mm)
+
+  bool with_mount = true;       ///< the finger gives way: a bump under one row lifts the other rows
+  double mount_stiffness = 15;  ///< cubic mm of indented pad per mm
+  bool with_pad = true;         ///< the elastic pad spreads an indentation to the taxels around it
+  double pad_sigma_mm = 2.27;
+  bool with_dome = true;  ///< the pad is round: it touches an element before a taxel is above it
+  double dome_radius_mm = 47;
+  bool with_edges = true;  ///< beside the plate there is nothing to touch
+  bool with_tilt = true;   ///< the finger's rear rows ride lower
+  double tilt_mm_per_mm = 0.0, tilt_spread = 0.01;
+  bool with_gains = true;      ///< taxels differ: the outer columns feel most
+  bool with_variation = true;  ///< gain and indentation differ from trial to trial and pass to pass
+  double gain_spread = 0.4, indentation_spread_mm = 0.5;
+  bool with_vibration = true;  ///< of the printer, in z
+  double vibration_mm = 0.01, vibration_hz = 28;
+  bool with_drift = true;  ///< of the rest voltages
+  double drift_volts_per_s = 4e-4;
+  bool with_emi = true;  ///< mains
+  double emi_volts = 1e-3, emi_hz = 50;
+  bool with_noise = true;
+  double noise_volts = 1e-3;
+
+  bool with_adc = true;     ///< 12 bit, 3.3 V
+  bool with_filter = true;  ///< moving average over 100 samples of the board
+  double filter_s = 0.0992;
+  bool with_saturation = true;  ///< recordings are cut to [2.091, 2.46] V
+  bool with_jitter = true;      ///< a sample is taken a little off the time it is stamped with
+  double jitter_s = 2e-4;
+  bool with_loss = true;
+  double lost_fraction = 0.002;
+};
+
+/// Names of the terms ("mount", "pad", ... "loss"), and the settings with one of them switched off.
+/// Throws std::invalid_argument for an unknown term, listing the known ones.
+const std::vector<std::string>& simulator_terms();
+SimulatorSettings without_term(SimulatorSettings settings, const std::string& term);
+
+/// Where the finger's centre is; z_mm = 0 is first contact with the flat plate, negative is pressed.
+struct FingerPose {
+  double x_mm = 0, y_mm = 0, z_mm = 0;
+};
+
+/// Which sensor, on which day: the same identity gives the same finger.
+struct FingerIdentity {
+  std::uint64_t seed = 1;
+  int trial = 1, pass = 1;
+  double speed_mm_s = 10;
+};
+
+/// The finger's voltages over a plate, one per taxel: contact of an elastic pad on a yielding mount, then the
+/// sensor. A pure function of pose and time, used alike by the simulator and by the virtual rig.
+///
+/// A point u of the pad, 2 mm apart across and 0.25 mm along the slide and up to 3.5 and 6.5 mm beyond the
+/// outermost taxels, is indented by
+///   d(u) = max(0, plate(x + u_x, y + u_y) - |u|^2 / (2 radius) - slope u - z - lift)   (mm, lowest point at
+///   0),
+/// the mount yields until stiffness * lift = integral of d, and taxel k feels the mean of d around it:
+///   load_k = sum_u w(u - u_k) d(u),  w a bell of standard deviation pad_sigma, sum 1,
+///   V_k = rest_k - volts_per_load * gain_k * load_k + disturbances.
+/// Radius, sigma, stiffness, slope and the linear law were fitted to the rig's recordings (data/README.md).
+class FingerModel {
+ public:
+  /// Throws std::invalid_argument for an array out of range or with more than one channel.
+  FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& identity);
+
+  /// Voltages before ADC, filter and saturation.
+  std::vector<double> volts(const FingerPose& pose, double time_s) const;
+
+  /// Load on every taxel (mm): what `volts` senses, without gains and disturbances.
+  std::vector<double> loads(const FingerPose& pose) const;
+
+  /// This pass's path height during the slide: minus the indentation. Positive when the finger rides above
+  /// the flat plate and touches only the texture.
+  double slide_z_mm() const { return -indentation_mm_; }
+
+  /// Random stream of this pass, for whatever else happens to it.
+  std::uint64_t noise_stream() const { return noise_stream_; }
+
+  /// A voltage as the board's 12-bit converter reports it (0..4095), and back.
+  static int adc(double volts);
+  static double volts_of_adc(int code);
+
+ private:
+  double surface(double x_mm, double y_mm) const;
+  void shape_pad(double slope_x, double slope_y);
+
+  SimulatorSettings settings_;
+  std::uint64_t noise_seed_ = 0, noise_stream_ = 0;
+  std::vector<double> gain_, rest_, drift_;  // per taxel
+  double indentation_mm_ = 0, vibration_phase_ = 0, emi_phase_ = 0;
+  std::vector<double> map_;                           // surface on a grid, x fastest
+  std::vector<double> rise_;                          // of the pad's points above its lowest, [across][along]
+  int across_ = 0, along_ = 0;                        // the pad's points across and along the slide
+  std::vector<double> across_weight_, along_weight_;  // bell of each taxel column and row, [lines][points]
+};
+
+}  // namespace supertac

@@ -1,0 +1,200 @@
+#include "data/recordings/recording.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <stdexcept>
+
+#include "io/file.h"
+#include "io/json.h"
+#include "io/numbers.h"
+#include "io/safetensors.h"
+#include "io/text.h"
+
+namespace supertac {
+namespace {
+
+constexpr char kKind[] = "recording";
+constexpr const char* kFields[] = {"kind", "plate", "trial", "pass", "speed_mm_s", "source", "array"};
+
+/// What is wrong with the recording, or nothing.
+std::optional<std::string> problem_of(const Recording& recording) {
+  const std::size_t n = recording.frames();
+  const auto sizes = [&](const char* name, std::size_t found, std::size_t expected) {
+    return std::string(name) + " has " + std::to_string(found) + " values, expected " +
+           std::to_string(expected) + " for " + std::to_string(n) + " frames";
+  };
+  const std::size_t signals = recording.array.signals();
+  if (recording.volts.size() != n * signals) return sizes("volts", recording.volts.size(), n * signals);
+  if (!recording.position_mm.empty() && recording.position_mm.size() != n * 2) {
+    return sizes("position_mm", recording.position_mm.size(), n * 2);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!std::isfinite(recording.time_s[i])) return "time_s is not finite at frame " + std::to_string(i);
+    if (i > 0 && recording.time_s[i] <= recording.time_s[i - 1]) {
+      return "time_s does not increase at frame " + std::to_string(i);
+    }
+  }
+  const auto finite = [](float value) { return std::isfinite(value); };
+  const auto volt = std::find_if_not(recording.volts.begin(), recording.volts.end(), finite);
+  if (volt != recording.volts.end()) {
+    const auto index = volt - recording.volts.begin();
+    return "volts are not finite at frame " + std::to_string(static_cast<std::size_t>(index) / signals) +
+           ", taxel " +
+           std::to_string(static_cast<int>(static_cast<std::size_t>(index) % signals) /
+                          recording.array.channels);
+  }
+  const auto infinite = [](float value) { return std::isinf(value); };
+  if (std::any_of(recording.position_mm.begin(), recording.position_mm.end(), infinite)) {
+    return "position_mm is infinite";
+  }
+  if (recording.trial < 0 || recording.pass < 0) return "trial and pass must not be negative";
+  if (!std::isfinite(recording.speed_mm_s) || recording.speed_mm_s < 0) return "speed_mm_s must be 0 or more";
+  return std::nullopt;
+}
+
+/// Takes one of our own fields out of the metadata.
+std::string take(std::map<std::string, std::string>& metadata, const std::string& path,
+                 const std::string& field) {
+  const auto node = metadata.extract(field);
+  if (node.empty()) throw FileError(path, "is not a recording: the metadata lacks " + in_quotes(field));
+  return node.mapped();
+}
+
+int take_count(std::map<std::string, std::string>& metadata, const std::string& path,
+               const std::string& field) {
+  const std::string text = take(metadata, path, field);
+  const auto value = parse_int(text);
+  if (!value || *value < 0 || *value > 1'000'000) {
+    throw FileError(path, field + " is " + in_quotes(text) + ", expected a number from 0 to 1000000");
+  }
+  return static_cast<int>(*value);
+}
+
+TaxelArray take_array(std::map<std::string, std::string>& metadata, const std::string& path) {
+  const auto node = metadata.extract("array");
+  if (node.empty()) return {};
+  try {
+    const auto json = parse_json_limited(node.mapped());
+    const TaxelArray array{json.at("rows").get<int>(), json.at("columns").get<int>(),
+                           json.at("pitch_mm").get<double>(), json.at("channels").get<int>()};
+    array.check();
+    return array;
+  } catch (const std::invalid_argument& error) {
+    throw FileError(path, error.what());
+  } catch (const std::exception&) {
+    throw FileError(path, "array is " + in_quotes(node.mapped()) +
+                              ", expected {\"rows\": 4, \"columns\": 4, \"pitch_mm\": 3, \"channels\": 1}");
+  }
+}
+
+void check_shape(const SafetensorsFile& file, const std::string& name, std::vector<std::uint64_t> expected) {
+  const auto& shape = file.tensors().at(name).shape;
+  if (shape == expected) return;
+  const auto text = [](const std::vector<std::uint64_t>& sizes) {
+    std::string result;
+    for (const std::uint64_t size : sizes) result += (result.empty() ? "" : ",") + std::to_string(size);
+    return "[" + result + "]";
+  };
+  throw FileError(file.path(),
+                  "tensor " + in_quotes(name) + " has shape " + text(shape) + ", expected " + text(expected));
+}
+
+}  // namespace
+
+double Recording::filter_s() const {
+  const auto found = metadata.find("filter_s");
+  return found == metadata.end() ? 0 : parse_double(found->second).value_or(0);
+}
+
+Recording read_recording(const std::string& path) {
+  const SafetensorsFile file = SafetensorsFile::read(path);
+  Recording recording;
+  recording.metadata = file.metadata();
+  const std::string kind = take(recording.metadata, path, "kind");
+  if (kind != kKind) throw FileError(path, "is a " + in_quotes(kind) + ", expected a recording");
+  recording.plate = take(recording.metadata, path, "plate");
+  recording.trial = take_count(recording.metadata, path, "trial");
+  recording.pass = take_count(recording.metadata, path, "pass");
+  recording.source = take(recording.metadata, path, "source");
+  const std::string speed = take(recording.metadata, path, "speed_mm_s");
+  const auto speed_value = parse_double(speed);
+  if (!speed_value) throw FileError(path, "speed_mm_s is " + in_quotes(speed) + ", expected a number");
+  recording.speed_mm_s = *speed_value;
+
+  recording.array = take_array(recording.metadata, path);
+
+  recording.time_s = file.f64("time_s");
+  recording.volts = file.f32("volts");
+  const std::uint64_t n = recording.frames();
+  check_shape(file, "time_s", {n});
+  check_shape(file, "volts", {n, recording.array.signals()});
+  if (file.tensors().contains("position_mm")) {
+    recording.position_mm = file.f32("position_mm");
+    check_shape(file, "position_mm", {n, 2});
+  }
+  if (const auto problem = problem_of(recording))
+    throw FileError(path, *problem + "; record or import it again");
+  return recording;
+}
+
+void write_recording(const std::string& path, const Recording& recording) {
+  if (const auto problem = problem_of(recording)) throw std::invalid_argument("write_recording: " + *problem);
+  const TaxelArray& array = recording.array;
+  array.check();
+  auto metadata = recording.metadata;
+  for (const char* field : kFields) {
+    if (metadata.contains(field)) {
+      throw std::invalid_argument("write_recording: the metadata field " + in_quotes(field) +
+                                  " is a member of the recording; set it there");
+    }
+  }
+  metadata["kind"] = kKind;
+  metadata["plate"] = recording.plate;
+  metadata["trial"] = std::to_string(recording.trial);
+  metadata["pass"] = std::to_string(recording.pass);
+  metadata["speed_mm_s"] = format(recording.speed_mm_s);
+  metadata["source"] = recording.source;
+  if (array != TaxelArray{}) {  // files of the rig's array have gone without from the start
+    metadata["array"] = nlohmann::ordered_json{
+        {"rows", array.rows},
+        {"columns", array.columns},
+        {"pitch_mm", array.pitch_mm},
+        {"channels",
+         array.channels}}.dump();
+  }
+  const std::uint64_t n = recording.frames();
+  std::vector<TensorToWrite> tensors = {
+      {"time_s", "F64", {n}, std::as_bytes(std::span(recording.time_s))},
+      {"volts", "F32", {n, array.signals()}, std::as_bytes(std::span(recording.volts))}};
+  if (!recording.position_mm.empty()) {
+    tensors.push_back({"position_mm", "F32", {n, 2}, std::as_bytes(std::span(recording.position_mm))});
+  }
+  write_safetensors(path, std::move(metadata), tensors);
+}
+
+std::string recording_file_name(const Recording& recording) {
+  return recording.plate + "_t" + std::to_string(recording.trial) + "_p" + std::to_string(recording.pass) +
+         "_v" + format(recording.speed_mm_s) + ".safetensors";
+}
+
+std::vector<std::string> list_recordings(const std::string& folder) {
+  std::vector<std::string> paths;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() == ".safetensors") paths.push_back(entry->path().string());
+  }
+  if (error)
+    throw FileError(folder, "cannot list the folder: " + error.message() + "; name a folder of recordings");
+  if (paths.empty()) {
+    throw FileError(folder,
+                    "has no recordings (*.safetensors); make some with supertac-simulate or supertac-import");
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+}  // namespace supertac

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "data/plates/taxel_array.h"
+
+namespace supertac {
+
+/// One pass of the finger over a plate, at the rate it was recorded with.
+struct Recording {
+  std::vector<double> time_s;  ///< n, strictly increasing
+  std::vector<float> volts;    ///< n x array.signals(), a frame together; pressure lowers the voltage
+  std::vector<float>
+      position_mm;  ///< n x 2: (x, y) of the finger's centre on the plate; empty, or NaN where unknown
+  TaxelArray array;
+  std::string plate;                            ///< name as Plate::named takes it
+  int trial = 0, pass = 0;                      ///< from 1
+  double speed_mm_s = 0;                        ///< as commanded; 0 when unknown
+  std::string source;                           ///< "simulated", "imported" or "collected"
+  std::map<std::string, std::string> metadata;  ///< whatever else is worth keeping (filter, time base, ...)
+
+  std::size_t frames() const { return time_s.size(); }
+  /// Length of the moving average the voltages went through (s); 0 when the metadata names none.
+  double filter_s() const;
+};
+
+/// Reads a safetensors file with tensors time_s F64 [n], volts F32 [n,signals] and, where known,
+/// position_mm F32 [n,2]. Metadata "array" says what the signals are, {"rows": 6, "columns": 6, "pitch_mm":
+/// 2, "channels": 1}; without it they are the rig's 4x4 taxels at 3 mm.
+/// Throws FileError when the file is damaged (io/safetensors.h), is no recording, or breaks a rule of
+/// Recording: sizes that do not match, values that are not finite (position_mm may be NaN), time stamps that
+/// do not increase.
+Recording read_recording(const std::string& path);
+
+/// Writes it atomically; the same recording gives the same bytes.
+/// Throws std::invalid_argument when the recording breaks a rule read_recording() checks, or its metadata
+/// has a key this function writes (kind, plate, trial, pass, speed_mm_s, source, array); FileError when it
+/// cannot be written.
+void write_recording(const std::string& path, const Recording& recording);
+
+/// "<plate>_t<trial>_p<pass>_v<speed>.safetensors", the name a recording has in a folder of recordings.
+std::string recording_file_name(const Recording& recording);
+
+/// Paths of all *.safetensors files in the folder (not below it), sorted by name.
+/// Throws FileError when the folder cannot be read or has none.
+std::vector<std::string> list_recordings(const std::string& folder);
+
+}  // namespace supertac

@@ -1,0 +1,163 @@
+#include "data/recordings/resample.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <stdexcept>
+#include <string>
+
+namespace supertac {
+namespace {
+
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+
+bool finite(std::span<const float> volts) {
+  return std::all_of(volts.begin(), volts.end(), [](float v) { return std::isfinite(v); });
+}
+
+std::span<const float> volts_of(const Recording& recording, std::size_t frame) {
+  const std::size_t signals = recording.array.signals();
+  return std::span(recording.volts).subspan(frame * signals, signals);
+}
+
+void check(const Recording& recording, const ResampleSettings& settings) {
+  if (!(settings.rate_hz > 0) || !(settings.max_gap_s > 0) || !(settings.scaling.span_volts > 0))
+    throw std::invalid_argument("resample: rate_hz, max_gap_s and span_volts must be positive, got " +
+                                std::to_string(settings.rate_hz) + ", " + std::to_string(settings.max_gap_s) +
+                                " and " + std::to_string(settings.scaling.span_volts));
+  const std::size_t n = recording.time_s.size(), values = n * recording.array.signals();
+  const std::size_t positions = recording.position_mm.size();
+  if (recording.volts.size() != values || (positions != 0 && positions != 2 * n))
+    throw std::runtime_error("recording: " + std::to_string(n) + " time stamps need " +
+                             std::to_string(values) + " voltages and 0 or " + std::to_string(2 * n) +
+                             " coordinates, got " + std::to_string(recording.volts.size()) + " and " +
+                             std::to_string(positions) + "; record or import the pass again");
+  for (std::size_t i = 0; i < n; ++i)
+    if (!std::isfinite(recording.time_s[i]) || (i > 0 && recording.time_s[i] <= recording.time_s[i - 1]))
+      throw std::runtime_error("recording: time stamps must increase, frame " + std::to_string(i) +
+                               " is at " + std::to_string(recording.time_s[i]) + " s" +
+                               (i > 0 ? " after " + std::to_string(recording.time_s[i - 1]) + " s" : "") +
+                               "; record or import the pass again");
+}
+
+// Resamples the recorded frames first..last (indices into `usable`), which no gap interrupts.
+class Segment {
+ public:
+  Segment(const Recording& recording, const ResampleSettings& settings, std::span<const std::size_t> usable)
+      : recording_(recording),
+        settings_(settings),
+        usable_(usable),
+        mean_(recording.array.signals()),
+        start_(time(0)) {}
+
+  void append_to(Track& track) {
+    const std::size_t signals = recording_.array.signals();
+    const std::size_t frames = cell(usable_.size() - 1) + 1;
+    std::size_t next = 0, before = 0;
+    for (std::size_t j = 0; j < frames; ++j) {
+      const std::size_t first = next;
+      while (next < usable_.size() && cell(next) == j) ++next;
+      if (next > first) {
+        append_mean(track, first, next);
+      } else {
+        ++track.held;
+        const std::size_t previous =
+            track.samples.size() - signals;  // cell 0 holds the first sample: there is one
+        for (std::size_t k = 0; k < signals; ++k) track.samples.push_back(track.samples[previous + k]);
+      }
+      append_position(track, start_ + static_cast<double>(j) / settings_.rate_hz, before);
+      track.run.push_back(static_cast<std::uint32_t>(j + 1));
+    }
+  }
+
+ private:
+  double time(std::size_t i) const { return recording_.time_s[usable_[i]]; }
+
+  std::size_t cell(std::size_t i) const {
+    const double periods = (time(i) - start_) * settings_.rate_hz;
+    return static_cast<std::size_t>(std::max(0.0, std::ceil(periods - 0.5 - kCellSlack)));
+  }
+
+  void append_mean(Track& track, std::size_t first, std::size_t end) {
+    mean_.clear();
+    for (std::size_t i = first; i < end; ++i) mean_.add(volts_of(recording_, usable_[i]));
+    const std::size_t signals = recording_.array.signals();
+    track.samples.resize(track.samples.size() + signals);
+    const std::span<float> sample = std::span(track.samples).last(signals);
+    mean_.volts(sample);
+    settings_.scaling(sample);
+  }
+
+  // `before` moves along with the time: the last recorded frame at or before it.
+  void append_position(Track& track, double at, std::size_t& before) const {
+    if (recording_.position_mm.empty()) {
+      track.position_mm.insert(track.position_mm.end(), 2, kUnknown);
+      return;
+    }
+    while (before + 1 < usable_.size() && time(before + 1) <= at) ++before;
+    const std::size_t after = std::min(before + 1, usable_.size() - 1);
+    const double span = time(after) - time(before);
+    const double part = span > 0 ? std::clamp((at - time(before)) / span, 0.0, 1.0) : 0.0;
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const double a = recording_.position_mm[2 * usable_[before] + axis];
+      const double b = recording_.position_mm[2 * usable_[after] + axis];
+      track.position_mm.push_back(static_cast<float>(part > 0 ? a + part * (b - a) : a));
+    }
+  }
+
+  const Recording& recording_;
+  const ResampleSettings& settings_;
+  std::span<const std::size_t> usable_;
+  FrameMean mean_;
+  double start_;
+};
+
+}  // namespace
+
+float Scaling::operator()(float volts) const {
+  return static_cast<float>(std::clamp((rest_volts - volts) / span_volts, 0.0, 1.0));
+}
+
+void Scaling::operator()(std::span<float> volts) const {
+  for (float& v : volts) v = (*this)(v);
+}
+
+void FrameMean::clear() {
+  std::fill(sum_.begin(), sum_.end(), 0.0);
+  count_ = 0;
+}
+
+void FrameMean::add(std::span<const float> volts) {
+  for (std::size_t k = 0; k < sum_.size(); ++k) sum_[k] += volts[k];
+  ++count_;
+}
+
+void FrameMean::volts(std::span<float> mean) const {
+  for (std::size_t k = 0; k < sum_.size(); ++k)
+    mean[k] = static_cast<float>(sum_[k] / static_cast<double>(count_));
+}
+
+Track resample(const Recording& recording, const ResampleSettings& settings) {
+  check(recording, settings);
+  Track track;
+  std::vector<std::size_t> usable;
+  for (std::size_t i = 0; i < recording.time_s.size(); ++i) {
+    if (finite(volts_of(recording, i)))
+      usable.push_back(i);
+    else
+      ++track.damaged;
+  }
+  std::size_t first = 0;
+  for (std::size_t i = 1; i <= usable.size(); ++i) {
+    const bool ends = i == usable.size() ||
+                      recording.time_s[usable[i]] - recording.time_s[usable[i - 1]] > settings.max_gap_s;
+    if (!ends) continue;
+    Segment(recording, settings, std::span(usable).subspan(first, i - first)).append_to(track);
+    if (i < usable.size()) ++track.gaps;
+    first = i;
+  }
+  return track;
+}
+
+}  // namespace supertac

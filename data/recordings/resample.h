@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "data/recordings/recording.h"
+
+namespace supertac {
+
+/// Scales a voltage to [0,1], 1 = pressed hard: clip((rest - V) / span, 0, 1).
+struct Scaling {
+  double rest_volts = 2.45, span_volts = 0.36;
+  bool levelled = false;  ///< whole windows are then brought to their own rest and gain: level()
+  float operator()(float volts) const;
+  /// Scales every value in place.
+  void operator()(std::span<float> volts) const;
+};
+
+/// Mean of some frames, summed in double precision in the order they are added: what resample() and
+/// LiveWindow make a sample of, so that both give the same bits.
+class FrameMean {
+ public:
+  /// Of frames of so many signals.
+  explicit FrameMean(std::size_t signals) : sum_(signals) {}
+  void clear();
+  void add(std::span<const float> volts);
+  std::size_t count() const { return count_; }
+  /// Of at least one frame.
+  void volts(std::span<float> mean) const;
+
+ private:
+  std::vector<double> sum_;
+  std::size_t count_ = 0;
+};
+
+/// Time stamps are rounded: a frame up to this share of a period past the end of a sample still belongs to
+/// it.
+constexpr double kCellSlack = 1e-6;
+
+/// A recording on an even time grid.
+struct Track {
+  std::vector<float> samples;      ///< [frames][signals], scaled
+  std::vector<float> position_mm;  ///< [frames][2] (x, y), NaN where unknown
+  std::vector<std::uint32_t>
+      run;                  ///< [frames]: frames since the pass began or since the last gap, itself included
+  std::size_t held = 0;     ///< frames for which no sample arrived: they repeat the one before
+  std::size_t gaps = 0;     ///< places where the recording is interrupted for longer than max_gap_s
+  std::size_t damaged = 0;  ///< recorded frames with a voltage that is not finite: taken as lost
+  std::size_t frames() const { return run.size(); }
+};
+
+struct ResampleSettings {
+  double rate_hz = 300;
+  double max_gap_s = 0.05;  ///< longer silence between two recorded frames is a gap, never filled
+  Scaling scaling = {};
+};
+
+/// Puts a recording onto rate_hz. Between two gaps frame j stands for the time c = t_first + j / rate:
+///   samples[j]  = scaled mean of the recorded frames in (c - 1/(2 rate), c + 1/(2 rate)], or samples[j-1]
+///   when
+///                 there is none (counted in `held`)
+///   position[j] = position at c, linear between recorded frames
+/// Causal but for half a period (1.7 ms at 300 Hz): LiveWindow gives the same samples while frames arrive. A
+/// recording made at rate_hz comes out as it is.
+/// Throws std::invalid_argument on settings that are not positive, std::runtime_error when the sizes of the
+/// recording's arrays disagree or its time stamps do not increase.
+Track resample(const Recording& recording, const ResampleSettings& settings);
+
+}  // namespace supertac

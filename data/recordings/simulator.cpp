@@ -1,0 +1,119 @@
+#include "data/recordings/simulator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <stdexcept>
+
+#include "io/numbers.h"
+#include "io/random.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kOnsetS = 0.15, kReleaseS = 0.1, kRepositionS = 0.05;
+constexpr double kLiftSpeedMmS = 5;  // as fast as the rig's z axis goes
+constexpr double kPassShiftMm = 5;
+constexpr double kFloorVolts = 2.091, kCeilingVolts = 2.46;
+
+// The finger's path through the four phases.
+FingerPose pose_at(double t, const PassSettings& pass, double slide_z) {
+  const double slide_s = (pass.to_mm - pass.from_mm) / pass.speed_mm_s;
+  FingerPose pose{.x_mm = pass_x_mm(pass.pass), .y_mm = pass.from_mm, .z_mm = slide_z};
+  if (t < kOnsetS) {
+    pose.z_mm += kLiftSpeedMmS * (kOnsetS - t);
+    return pose;
+  }
+  t -= kOnsetS;
+  pose.y_mm = std::min(pass.from_mm + pass.speed_mm_s * t, pass.to_mm);
+  if (t <= slide_s) return pose;
+  t -= slide_s;
+  pose.z_mm += kLiftSpeedMmS * std::min(t, kReleaseS);
+  if (t > kReleaseS) pose.x_mm += kPassShiftMm * (t - kReleaseS) / kRepositionS;
+  return pose;
+}
+
+void check(const PassSettings& pass, const SimulatorSettings& settings) {
+  const auto positive = [](double v) { return std::isfinite(v) && v > 0; };
+  if (!positive(pass.speed_mm_s) || !positive(settings.rate_hz) || !(pass.to_mm > pass.from_mm) ||
+      !(pass.from_mm >= 0) || !(pass.to_mm <= Plate::kLengthMm))
+    throw std::invalid_argument(
+        "simulate_pass: speed and rate must be positive and the slide lie on the plate (0..108 mm); got "
+        "speed " +
+        format(pass.speed_mm_s) + " mm/s, rate " + format(settings.rate_hz) + " Hz, slide from " +
+        format(pass.from_mm) + " to " + format(pass.to_mm) + " mm");
+  if (pass.pass < 1 || pass.pass > 8 || pass.trial < 1)
+    throw std::invalid_argument("simulate_pass: expected pass 1..8 and trial >= 1, got pass " +
+                                std::to_string(pass.pass) + ", trial " + std::to_string(pass.trial));
+}
+
+// Moving average over the last `length` samples, or as many as there are.
+class MovingAverage {
+ public:
+  explicit MovingAverage(int length) : length_(static_cast<std::size_t>(std::max(1, length))) {}
+  std::vector<double> operator()(const std::vector<double>& sample) {
+    recent_.push_back(sample);
+    if (recent_.size() > length_) recent_.pop_front();
+    std::vector<double> mean(sample.size());
+    for (const auto& s : recent_)
+      for (std::size_t k = 0; k < s.size(); ++k) mean[k] += s[k];
+    for (double& m : mean) m /= static_cast<double>(recent_.size());
+    return mean;
+  }
+
+ private:
+  std::size_t length_;
+  std::deque<std::vector<double>> recent_;
+};
+
+Recording describe(const Plate& plate, const PassSettings& pass, const SimulatorSettings& settings,
+                   std::uint64_t seed) {
+  Recording recording;
+  recording.array = settings.array;
+  recording.plate = plate.name();
+  recording.trial = pass.trial;
+  recording.pass = pass.pass;
+  recording.speed_mm_s = pass.speed_mm_s;
+  recording.source = "simulated";
+  recording.metadata["seed"] = std::to_string(seed);
+  recording.metadata["rate_hz"] = format(settings.rate_hz);
+  recording.metadata["filter_s"] = format(settings.with_filter ? settings.filter_s : 0.0);
+  return recording;
+}
+
+}  // namespace
+
+Recording simulate_pass(const Plate& plate, const PassSettings& pass, const SimulatorSettings& settings,
+                        std::uint64_t seed) {
+  check(pass, settings);
+  const FingerModel finger(
+      plate, settings, {.seed = seed, .trial = pass.trial, .pass = pass.pass, .speed_mm_s = pass.speed_mm_s});
+  const double duration = kOnsetS + (pass.to_mm - pass.from_mm) / pass.speed_mm_s + kReleaseS + kRepositionS;
+  const auto frames = static_cast<std::size_t>(std::floor(duration * settings.rate_hz + 0.5));
+  // Timing faults have a stream of their own for each pass, so that a loss in one pass does not move
+  // another's.
+  const RandomStream timing(seed, 0x7469'6d65ULL + finger.noise_stream());
+  MovingAverage filter(
+      settings.with_filter ? static_cast<int>(std::lround(settings.filter_s * settings.rate_hz)) : 1);
+
+  Recording recording = describe(plate, pass, settings, seed);
+  for (std::size_t i = 0; i < frames; ++i) {
+    const double stamp = static_cast<double>(i) / settings.rate_hz;
+    const double taken = stamp + (settings.with_jitter ? settings.jitter_s * timing.normal(2 * i) : 0.0);
+    std::vector<double> volts = finger.volts(pose_at(taken, pass, finger.slide_z_mm()), taken);
+    if (settings.with_adc)
+      for (double& v : volts) v = FingerModel::volts_of_adc(FingerModel::adc(v));
+    volts = filter(volts);
+    if (settings.with_loss && timing.uniform(2 * i + 1) < settings.lost_fraction) continue;
+    const FingerPose pose = pose_at(stamp, pass, finger.slide_z_mm());
+    recording.time_s.push_back(stamp);
+    for (const double v : volts)
+      recording.volts.push_back(
+          static_cast<float>(settings.with_saturation ? std::clamp(v, kFloorVolts, kCeilingVolts) : v));
+    recording.position_mm.push_back(static_cast<float>(pose.x_mm));
+    recording.position_mm.push_back(static_cast<float>(pose.y_mm));
+  }
+  return recording;
+}
+
+}  // namespace supertac

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <vector>
+
+#include "data/recordings/recording.h"
+
+namespace supertac {
+
+/// An element of the texture passing over a taxel: a dip of its voltage.
+struct Contact {
+  int taxel = 0;
+  double time_s = 0;   ///< middle of the dip at half its depth, which survives saturation
+  double depth_v = 0;  ///< prominence: from the deepest point up to the higher of the dip's two rims
+  double width_s = 0;  ///< at half the depth
+};
+
+struct ContactSettings {
+  double reach_s = 0.5;        ///< rims are sought this far to either side: about 0.6 pitches
+  double min_depth_v = 0.008;  ///< shallower dips are noise
+  double min_share = 0.1;      ///< ... or shallower than this share of the taxel's deepest dip
+};
+
+/// The contacts of all taxels, by taxel and time. Frames that hold no finite number are skipped; a taxel that
+/// never moves has none. Throws std::invalid_argument when the recording is not of the rig's array or
+/// its arrays do not fit together.
+std::vector<Contact> find_contacts(const Recording& recording, const ContactSettings& settings = {});
+
+}  // namespace supertac

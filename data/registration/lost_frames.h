@@ -1,0 +1,25 @@
+#pragma once
+
+#include <vector>
+
+#include "data/recordings/recording.h"
+
+namespace supertac {
+
+/// Frames that a host lost without a trace, found in the signals. n numbers: how many are missing between
+/// frame i - 1 and frame i, beyond those its time stamps tell of; a fraction where nothing can be seen.
+///
+/// Behind the board's moving average signals are smooth: around frame i each of them takes about the same
+/// step u_s from frame to frame (the median of 81). Where k frames are missing, all take k + 1 of these steps
+/// at once:
+///   k + 1 = sum_s w_s d_s u_s / sum_s w_s u_s^2,   w_s = 1 / (deviation of s's steps from u_s)^2,
+/// d_s the steps found there, with an uncertainty of 1 / sqrt(sum_s w_s u_s^2). It counts when it is
+/// above 1.5 by three of them. Where the signals stand still (uncertainty above a quarter) the mean of all
+/// other places is assumed. Values that are not finite say nothing.
+std::vector<double> find_lost_frames(const Recording& recording, double rate_hz);
+
+/// Puts the time of lost frames back into the stamps of a recording made at rate_hz. Metadata lost_frames
+/// says how many there were.
+void restore_clock(Recording& recording, double rate_hz);
+
+}  // namespace supertac

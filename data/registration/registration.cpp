@@ -1,0 +1,355 @@
+#include "data/registration/registration.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "data/recordings/simulator.h"
+#include "data/registration/contacts.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+// The first element under the leading row and the last one under the trailing row carry the finger alone and
+// are felt further out, with slopes of different steepness: little weight.
+constexpr double kAloneShiftMm = 1.0, kAloneWeight = 0.2;
+
+constexpr double kNominalSpeed = 10;
+constexpr double kFullDepthV = 0.1;  // deeper contacts weigh no more: they saturate
+constexpr double kScanReachMm = 1.2, kFitReachMm = 1.5;
+constexpr double kMiddleReachMm = 45, kMiddleStepMm = 0.25;
+constexpr double kSlowest = 0.6, kFastest = 2.2, kRateStep = 0.01;
+constexpr double kRigFilterS = 0.0992;
+
+// When a pass is believed.
+constexpr int kMinContacts = 8, kMinElements = 3;
+constexpr double kMinMatched = 0.4, kMinCoverage = 0.3, kMaxResidualMm = 0.55, kMinMargin = 0.03;
+
+// A change from one frame to the next, summed over the taxels, that is so large and so far above the usual
+// one around it is a burst of lost frames: a moving average does not jump.
+constexpr double kBurstVolts = 0.08, kBurstRatio = 60, kQuietVolts = 1e-4;
+constexpr std::size_t kBurstNeighbours = 100;
+
+struct Event {
+  int row = 0;
+  double time = 0, weight = 0;
+};
+
+struct Line {
+  double middle_mm = 0, rate = 0;  // y at the middle of the recording, mm/s
+  double matched = 0, coverage = 0, score = -std::numeric_limits<double>::infinity();
+};
+
+struct Match {
+  std::size_t crest = 0;
+  double distance_mm = 0;  // crest minus contact
+  double weight = 0;
+};
+
+struct Stretch {
+  double begin_s = 0, end_s = 0;
+};
+
+// Sum of the taxels' changes before each frame.
+std::vector<double> changes(const Recording& recording) {
+  std::vector<double> change(recording.frames());
+  for (std::size_t i = 1; i < change.size(); ++i)
+    for (std::size_t k = 0; k < kTaxels; ++k) {
+      const double step = std::abs(recording.volts[i * kTaxels + k] - recording.volts[(i - 1) * kTaxels + k]);
+      if (std::isfinite(step)) change[i] += step;
+    }
+  return change;
+}
+
+// The recording cut at its bursts of lost frames.
+std::vector<Stretch> stretches(const Recording& recording) {
+  const std::vector<double> change = changes(recording);
+  std::vector<double> sum(change.size() + 1);
+  for (std::size_t i = 0; i < change.size(); ++i) sum[i + 1] = sum[i] + change[i];
+  std::vector<Stretch> parts = {{.begin_s = recording.time_s.front()}};
+  for (std::size_t i = 1; i < change.size(); ++i) {
+    if (change[i] < kBurstVolts) continue;
+    const std::size_t from = i > kBurstNeighbours ? i - kBurstNeighbours : 0;
+    const std::size_t to = std::min(i + kBurstNeighbours + 1, change.size());
+    const double usual = (sum[to] - sum[from] - change[i]) / static_cast<double>(to - from - 1);
+    if (change[i] < kBurstRatio * (usual + kQuietVolts)) continue;
+    parts.back().end_s = recording.time_s[i - 1];
+    parts.push_back({.begin_s = recording.time_s[i]});
+  }
+  parts.back().end_s = recording.time_s.back();
+  return parts;
+}
+
+class Fit {
+ public:
+  Fit(const Recording& recording, const Plate& plate)
+      : crests_(plate.crests()),
+        troughs_(plate.min_height() < 0),
+        speed_(recording.speed_mm_s > 0 ? recording.speed_mm_s : kNominalSpeed),
+        middle_s_((recording.time_s.front() + recording.time_s.back()) / 2) {
+    const std::vector<Contact> contacts = find_contacts(recording, {.reach_s = 0.6 * pitch() / speed_});
+    double most = 0;
+    for (const Stretch& stretch : stretches(recording)) {
+      double weight = 0;
+      for (const Contact& c : contacts) weight += inside(c, stretch) ? weight_of(c) : 0.0;
+      if (weight > most) most = weight, stretch_ = stretch;
+    }
+    for (const Contact& c : contacts)
+      if (inside(c, stretch_))
+        events_.push_back({.row = c.taxel / 4, .time = c.time_s - middle_s_, .weight = weight_of(c)});
+  }
+
+  std::size_t events() const { return events_.size(); }
+  double middle_s() const { return middle_s_; }
+  double speed() const { return speed_; }
+  const Stretch& stretch() const { return stretch_; }
+
+  // Scores every start and rate; `best` is the winner, `rival` the best that means another place or another
+  // pitch.
+  void scan(Line& best, Line& rival) const {
+    std::vector<Line> lines;
+    for (double factor = kSlowest; factor < kFastest; factor *= 1 + kRateStep)
+      for (double offset = -kMiddleReachMm; offset <= kMiddleReachMm; offset += kMiddleStepMm)
+        lines.push_back(scored(Plate::kLengthMm / 2 + offset, speed_ * factor));
+    for (const Line& line : lines)
+      if (line.score > best.score) best = line;
+    for (const Line& line : lines)
+      if (elsewhere(line, best) && line.score > rival.score) rival = line;
+  }
+
+  // Weighted least squares with Tukey's biweight, repeated until the weights have settled.
+  void refine(Line& line) const {
+    for (int repeat = 0; repeat < 20; ++repeat) {
+      double w = 0, wt = 0, wtt = 0, wd = 0, wtd = 0;
+      for (const Event& event : events_) {
+        const Match m = match(event, line);
+        w += m.weight, wt += m.weight * event.time, wtt += m.weight * event.time * event.time;
+        wd += m.weight * m.distance_mm, wtd += m.weight * m.distance_mm * event.time;
+      }
+      const double determinant = w * wtt - wt * wt;
+      if (!(determinant > 1e-9)) return;
+      line.middle_mm += (wtt * wd - wt * wtd) / determinant;
+      line.rate += (w * wtd - wt * wd) / determinant;
+    }
+    const Line again = scored(line.middle_mm, line.rate);
+    line.matched = again.matched, line.coverage = again.coverage, line.score = again.score;
+  }
+
+  Match match(const Event& event, const Line& line) const {
+    const double y =
+        line.middle_mm + line.rate * event.time + row_contact_mm(static_cast<std::size_t>(event.row));
+    std::size_t nearest = 0;
+    for (std::size_t j = 1; j < crests_.size(); ++j)
+      if (std::abs(crests_[j] - y) < std::abs(crests_[nearest] - y)) nearest = j;
+    Match m{.crest = nearest, .distance_mm = crests_[nearest] - y, .weight = event.weight};
+    const bool leading_alone = event.row == 3 && nearest == 0;
+    const bool trailing_alone = event.row == 0 && nearest + 1 == crests_.size();
+    if (leading_alone) m.distance_mm -= kAloneShiftMm;
+    if (trailing_alone) m.distance_mm += kAloneShiftMm;
+    // The outermost crests of waves are lopsided: a trough inside, the flat plate outside.
+    const bool lopsided = troughs_ && (nearest == 0 || nearest + 1 == crests_.size());
+    if (leading_alone || trailing_alone || lopsided) m.weight *= kAloneWeight;
+    const double u = m.distance_mm / kFitReachMm;
+    m.weight *= std::abs(u) < 1 ? (1 - u * u) * (1 - u * u) : 0.0;
+    return m;
+  }
+
+  // Contacts used and their weighted rms distance.
+  void judge(const Line& line, Registration& out) const {
+    double w = 0, wdd = 0;
+    std::vector<bool> felt(crests_.size());
+    for (const Event& event : events_) {
+      const Match m = match(event, line);
+      if (m.weight > 0) felt[m.crest] = true;
+      out.contacts += m.weight > 0 ? 1 : 0;
+      w += m.weight, wdd += m.weight * m.distance_mm * m.distance_mm;
+    }
+    out.residual = w > 0 ? std::sqrt(wdd / w) : 0;
+    out.elements = static_cast<int>(std::count(felt.begin(), felt.end(), true));
+    out.matched = line.matched;
+    out.coverage = line.coverage;
+  }
+
+ private:
+  double pitch() const {
+    double smallest = Plate::kLengthMm;
+    for (std::size_t j = 1; j < crests_.size(); ++j)
+      smallest = std::min(smallest, crests_[j] - crests_[j - 1]);
+    return std::min(smallest, 12.0);
+  }
+
+  static bool inside(const Contact& c, const Stretch& s) {
+    return c.time_s >= s.begin_s && c.time_s <= s.end_s;
+  }
+
+  static double weight_of(const Contact& c) { return std::sqrt(std::min(c.depth_v / kFullDepthV, 1.0)); }
+
+  // A pass covers the plate about evenly and its clock is about right: mild preference, in units of the
+  // score.
+  double preference(double middle_mm, double rate) const {
+    const double off = (middle_mm - Plate::kLengthMm / 2) / 10, fast = std::log(rate / speed_) / 0.15;
+    return -0.05 * (off * off + fast * fast);
+  }
+
+  bool elsewhere(const Line& a, const Line& b) const {
+    return std::abs(a.middle_mm - b.middle_mm) > pitch() / 2 || std::abs(std::log(a.rate / b.rate)) > 0.25;
+  }
+
+  Line scored(double middle_mm, double rate) const {
+    Line line{.middle_mm = middle_mm, .rate = rate};
+    std::vector<std::array<double, 4>> felt(crests_.size());
+    double total = 0, agree = 0;
+    for (const Event& event : events_) {
+      const double y = middle_mm + rate * event.time + row_contact_mm(static_cast<std::size_t>(event.row));
+      std::size_t nearest = 0;
+      double distance = std::abs(crests_[0] - y);
+      for (std::size_t j = 1; j < crests_.size(); ++j)
+        if (const double d = std::abs(crests_[j] - y); d < distance) distance = d, nearest = j;
+      const double fit = std::max(0.0, 1 - distance / kScanReachMm);
+      total += event.weight, agree += event.weight * fit;
+      double& best = felt[nearest][static_cast<std::size_t>(event.row)];
+      best = std::max(best, fit);
+    }
+    line.matched = total > 0 ? agree / total : 0;
+    double elements = 0;
+    felt_shares(felt, line, elements);
+    line.score = line.matched + line.coverage + elements + preference(middle_mm, rate);
+    return line;
+  }
+
+  // Of the (element, row) pairs the stretch reached: share felt (line.coverage), and share of elements felt
+  // by a row.
+  void felt_shares(const std::vector<std::array<double, 4>>& felt, Line& line, double& elements) const {
+    double pairs = 0, felt_pairs = 0, reached = 0, felt_elements = 0;
+    for (std::size_t j = 0; j < crests_.size(); ++j) {
+      double best = -1;
+      for (std::size_t row = 0; row < 4; ++row) {
+        const double time = (crests_[j] - row_contact_mm(row) - line.middle_mm) / line.rate + middle_s_;
+        if (time < stretch_.begin_s || time > stretch_.end_s) continue;
+        pairs += 1, felt_pairs += felt[j][row];
+        best = std::max(best, felt[j][row]);
+      }
+      if (best >= 0) reached += 1, felt_elements += best;
+    }
+    line.coverage = pairs > 0 ? felt_pairs / pairs : 0;
+    elements = reached > 0 ? felt_elements / reached : 0;
+  }
+
+  std::vector<double> crests_;
+  bool troughs_;
+  Stretch stretch_;
+  double speed_, middle_s_;
+  std::vector<Event> events_;
+};
+
+double filter_delay(const Recording& recording) {
+  const auto found = recording.metadata.find("filter_s");
+  if (found != recording.metadata.end()) return parse_double(found->second).value_or(0) / 2;
+  return recording.source == "imported" ? kRigFilterS / 2 : 0;
+}
+
+std::string judge_reason(const Registration& r) {
+  if (r.contacts < kMinContacts)
+    return "only " + std::to_string(r.contacts) + " contacts, need " + std::to_string(kMinContacts);
+  if (r.elements < kMinElements)
+    return "only " + std::to_string(r.elements) + " elements of the texture, need " +
+           std::to_string(kMinElements);
+  if (r.matched < kMinMatched)
+    return "only " + format(100 * r.matched, 0) + " % of the contacts agree with the plate";
+  if (r.coverage < kMinCoverage)
+    return "only " + format(100 * r.coverage, 0) + " % of the plate's elements were felt";
+  if (r.residual > kMaxResidualMm) return "contacts lie " + format(r.residual, 2) + " mm (rms) off the plate";
+  if (r.margin < kMinMargin) return "another start fits as well (off by a pitch?)";
+  return "";
+}
+
+}  // namespace
+
+Registration register_pass(const Recording& recording, const Plate& plate) {
+  Registration result;
+  const auto flagged = [&](const std::string& reason) {
+    result.reason = reason;
+    return result;
+  };
+  if (plate.crests().empty()) return flagged("a plain plate has nothing to register against");
+  if (recording.frames() < 3) return flagged("the recording is empty");
+  const Fit fit(recording, plate);
+  if (fit.events() == 0) return flagged("no taxel felt anything");
+
+  Line best, rival;
+  fit.scan(best, rival);
+  result.margin = best.score - rival.score;
+  fit.refine(best);
+  fit.judge(best, result);
+  result.rate = best.rate;
+  // Signals trail the finger: where a contact shows at t, the finger has been since t - delay.
+  result.start_mm = best.middle_mm - best.rate * fit.middle_s() + fit.speed() * filter_delay(recording);
+  result.valid_from_s = fit.stretch().begin_s;
+  result.valid_until_s = fit.stretch().end_s;
+  result.reason = judge_reason(result);
+  result.reliable = result.reason.empty();
+  return result;
+}
+
+// Frames lost where nothing moved: a straight line from the signals before to those behind. Where the finger
+// was in each of them is left open.
+static void fill_loss(const Registration& registration, Recording& recording) {
+  std::vector<double>& time = recording.time_s;
+  const auto found = std::lower_bound(time.begin(), time.end(), registration.lost_at_s);
+  const auto at = static_cast<std::size_t>(found - time.begin());
+  for (std::size_t i = at; i < time.size(); ++i) time[i] += registration.lost_s;
+  if (at < 2 || at == time.size()) return;  // nothing on one side
+  const std::size_t signals = recording.array.signals();
+  const double step = (time[at - 1] - time[0]) / static_cast<double>(at - 1), gap = time[at] - time[at - 1];
+  const auto lost = static_cast<std::size_t>(std::max(0.0, gap / step - 1));
+  std::vector<double> times(lost);
+  std::vector<float> volts(lost * signals);
+  std::vector<float> places(2 * lost, std::numeric_limits<float>::quiet_NaN());
+  for (std::size_t k = 0; k < lost; ++k) {
+    const double part = static_cast<double>(k + 1) / static_cast<double>(lost + 1);
+    times[k] = time[at - 1] + part * gap;
+    for (std::size_t s = 0; s < signals; ++s)
+      volts[k * signals + s] = std::lerp(recording.volts[(at - 1) * signals + s],
+                                         recording.volts[at * signals + s], static_cast<float>(part));
+    places[2 * k] = recording.position_mm[0];
+  }
+  const auto before = static_cast<std::ptrdiff_t>(at);
+  time.insert(time.begin() + before, times.begin(), times.end());
+  recording.volts.insert(recording.volts.begin() + before * static_cast<std::ptrdiff_t>(signals),
+                         volts.begin(), volts.end());
+  recording.position_mm.insert(recording.position_mm.begin() + 2 * before, places.begin(), places.end());
+}
+
+void apply(const Registration& registration, Recording& recording) {
+  const auto base = recording.metadata.find("time_base");
+  const bool nominal = base != recording.metadata.end() && base->second == "nominal";
+  const std::size_t n = recording.frames();
+  recording.position_mm.resize(2 * n);
+  const auto x = static_cast<float>(pass_x_mm(recording.pass));
+  for (std::size_t i = 0; i < n; ++i) {
+    const double y = registration.y_mm(recording.time_s[i]);
+    const bool known =
+        recording.time_s[i] >= registration.valid_from_s && recording.time_s[i] <= registration.valid_until_s;
+    recording.position_mm[2 * i] = x;
+    recording.position_mm[2 * i + 1] = known ? static_cast<float>(std::clamp(y, 0.0, Plate::kLengthMm))
+                                             : std::numeric_limits<float>::quiet_NaN();
+  }
+  if (registration.lost_s > 0) fill_loss(registration, recording);
+  if (nominal && registration.reliable) {  // the finger's speed is known better than the rate of the lines
+    const double speed = recording.speed_mm_s > 0 ? recording.speed_mm_s : kNominalSpeed;
+    for (double& t : recording.time_s) t *= registration.rate / speed;
+    recording.metadata["time_base"] = "registered";
+  }
+  recording.metadata["registration_start_mm"] = format(registration.start_mm, 3);
+  recording.metadata["registration_rate"] = format(registration.rate, 4);
+  recording.metadata["registration_residual_mm"] = format(registration.residual, 3);
+  recording.metadata["registration_reliable"] = registration.reliable ? "yes" : "no";
+  recording.metadata["registration_reason"] = registration.reason;
+  recording.metadata["registration_shift_mm"] = format(registration.shift_mm, 3);
+  recording.metadata["registration_stretch_mm"] = format(registration.stretch_mm, 3);
+  recording.metadata["registration_lost_s"] = format(registration.lost_s, 3);
+}
+
+}  // namespace supertac

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace supertac {
+
+/// A random order of 0..count-1 that is computed, not stored: a four-round Feistel network on the next even
+/// number of bits, walked until it falls below count (Black and Rogaway 2002). Its round function is a
+/// counter-based random number of (seed, epoch). One call costs some tens of nanoseconds and no memory.
+class EpochOrder {
+ public:
+  /// Throws std::invalid_argument when count is 0 or above 2^32.
+  EpochOrder(std::uint64_t count, std::uint64_t seed, std::uint64_t epoch);
+  /// Element i of the order. Throws std::invalid_argument unless i < count.
+  std::uint64_t operator[](std::uint64_t i) const;
+  std::uint64_t count() const { return count_; }
+
+ private:
+  static constexpr int kRounds = 4;
+  std::uint64_t permute(std::uint64_t value) const;
+
+  std::uint64_t count_;
+  int half_bits_;
+  std::uint64_t keys_[kRounds];
+};
+
+/// Cuts a set of window indices into batches, in a new order each epoch. Batch b of epoch e is a pure
+/// function of (indices, batch size, seed, e, b): a resumed run needs no state but its step number. Every
+/// batch is full; the remainder of indices.size() / batch is left out, others in each epoch. With fewer
+/// indices than the batch size an epoch is one batch of all of them.
+class Batching {
+ public:
+  /// Throws std::invalid_argument when there is no index or batch < 1.
+  Batching(std::vector<std::uint32_t> indices, std::size_t batch, std::uint64_t seed);
+  std::size_t batches_per_epoch() const { return indices_.size() / batch_; }
+  std::size_t batch_size() const { return batch_; }
+  /// Writes the batch_size() window indices of a batch. Throws std::invalid_argument on b or the size of
+  /// out.
+  void batch(std::uint64_t epoch, std::uint64_t b, std::span<std::uint32_t> out) const;
+  /// Number of the sample in slot i of that batch, counted since training began: the counter for augment().
+  std::uint64_t sample(std::uint64_t epoch, std::uint64_t b, std::size_t i) const {
+    return (epoch * batches_per_epoch() + b) * batch_ + i;
+  }
+
+ private:
+  std::vector<std::uint32_t> indices_;
+  std::size_t batch_;
+  std::uint64_t seed_;
+};
+
+}  // namespace supertac

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "data/samples/windows.h"
+
+namespace supertac {
+
+/// How a set of windows is divided for training and testing; a result without its split is meaningless.
+///   window   a random fifth of all windows is tested. Leaky: neighbours share nearly all frames. Kept to
+///   compare
+///            with the literature.
+///   pass     of each plate a random fifth of its passes (rounded, at least one) is tested: unseen slides.
+///   trial    trial 1 is trained on, trial 2 tested; other trials are in neither.
+///   texture  one plate, drawn at random, is tested, the others are trained on: an unseen surface.
+///   none     all windows are in both: for models that are tested on other data.
+/// Windows of passes set aside (WindowSet::Pass::aside) are trained on in every kind, and tested in none.
+enum class SplitKind { window, pass, trial, texture, none };
+
+/// Throws std::invalid_argument listing the names.
+SplitKind split_kind(const std::string& name);
+std::string name_of(SplitKind kind);
+
+struct Split {
+  std::vector<std::uint32_t> train, test;  ///< window indices, ascending
+};
+
+/// The random choices are EpochOrder(count, seed, stream) with stream 0 for windows, 1 for plates, and 2 + p
+/// for the passes of plate p; the first of the order are tested. Plates are counted in alphabetical order,
+/// passes as in WindowSet::passes(); those without windows do not count. A pure function of the set, kind and
+/// seed; trial and none do not use the seed.
+/// Throws std::invalid_argument when a side would be empty, saying what the data lacks.
+Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed);
+
+/// What the test windows share with the training windows.
+struct Leakage {
+  std::size_t overlapping = 0;  ///< test windows that have a frame in common with a training window
+  std::size_t duplicated =
+      0;  ///< test windows whose content equals a training window's of another place, by hash
+  bool none() const { return overlapping == 0 && duplicated == 0; }
+};
+
+/// Compares all test with all training windows: overlap by their place, duplicates by a 64-bit hash of all
+/// T * signals values (so that a pass filed twice under two names is found). Windows that never change are no
+/// duplicates: at rest every pass looks the same. Takes 16 bytes per frame while it runs.
+Leakage find_leakage(const WindowSet& windows, const Split& split);
+
+/// 16 hexadecimal digits over both index lists.
+std::string fingerprint(const Split& split);
+
+/// `count` elements spread evenly over the list, in its order; the whole list when it is not longer.
+std::vector<std::uint32_t> spread(std::span<const std::uint32_t> list, std::size_t count);
+
+}  // namespace supertac

@@ -1,0 +1,135 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "data/plates/plate.h"
+#include "data/plates/taxel_array.h"
+#include "data/recordings/recording.h"
+#include "data/recordings/resample.h"
+
+namespace supertac {
+
+struct WindowSettings {
+  int timesteps = 256;                   ///< T, frames per window
+  int scale = 4;                         ///< 2, 4 or 8: truths that many times finer than the array
+  double rate_hz = 300;                  ///< the model's rate
+  Scaling scaling = {};                  ///< volts to [0,1]
+  std::optional<TaxelArray> array = {};  ///< that every recording must have; nothing: that of the first
+  double min_y_mm = 28;                  ///< windows whose last frame lies outside min_y..max_y are left out
+  double max_y_mm = 80;
+  int stride = 1;           ///< every stride-th frame of a pass ends a window
+  double max_gap_s = 0.05;  ///< longer silence in a recording is a gap no window crosses
+};
+
+/// Where the frames of the recordings went: frames is the sum of all that follow down to windows.
+struct WindowCounts {
+  std::size_t recordings = 0, frames = 0;
+  std::size_t unreliable = 0;   ///< of passes that registration flagged (metadata registration_reliable = no)
+  std::size_t no_position = 0;  ///< position unknown: no truth
+  std::size_t outside = 0;      ///< y outside min_y..max_y
+  std::size_t too_early = 0;    ///< fewer than T frames since the pass began or since a gap
+  std::size_t off_stride = 0;
+  std::size_t windows = 0;
+  // About the signals of all recordings:
+  std::size_t held = 0, gaps = 0, damaged = 0;  ///< as in Track
+  /// One line, for people.
+  std::string summary() const;
+};
+
+/// The windows of a set of recordings. Nothing is copied per window: a recording is resampled once onto
+/// rate_hz and kept as scaled floats, a window is the index (pass, last frame), and none crosses the edge of
+/// a pass or a gap. Memory: 4 bytes per signal of a frame, 12 per frame and 8 per window. Reading is const
+/// and safe from many threads.
+class WindowSet {
+ public:
+  struct Pass {
+    std::string plate;
+    int trial = 0, pass = 0;
+    double speed_mm_s = 0;
+    std::string source;
+    double filter_s = 0;     ///< length of the moving average the signals went through; 0 = none
+    std::size_t frames = 0;  ///< on the model's rate
+    std::size_t first_window = 0, windows = 0;  ///< its windows are consecutive, in order of time
+    bool aside = false;  ///< only ever trained on: no split tests it (simulated passes beside real ones)
+  };
+  struct Position {
+    double x_mm = 0, y_mm = 0;
+  };
+
+  /// Reads the recordings of a directory, in the order of their names.
+  /// `plates`: only these; all when empty.
+  /// Throws std::invalid_argument on settings out of range or a plate without recordings,
+  /// std::runtime_error when the directory holds no recording, a file is unreadable or of an unknown plate,
+  /// or no window is left (saying where the frames went).
+  static WindowSet load(const std::string& dir, const std::vector<std::string>& plates,
+                        const WindowSettings& settings);
+
+  /// An empty set, to be filled by add().
+  /// Throws std::invalid_argument on settings out of range.
+  explicit WindowSet(const WindowSettings& settings);
+  /// Appends the windows of one recording. `folder`: where the recording lies, for a plate that is an
+  /// STL file beside it. Throws as plate_in_folder() and resample(), std::runtime_error for another array.
+  void add(const Recording& recording, const std::string& folder = ".", bool aside = false);
+  /// Appends those of all recordings in a directory, of these plates (empty: all). Throws as load, but for
+  /// the missing windows.
+  void add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside = false);
+
+  std::size_t size() const { return index_.size(); }
+  int timesteps() const { return settings_.timesteps; }
+  /// Of the recordings; the rig's while there is none.
+  TaxelArray array() const { return settings_.array.value_or(TaxelArray{}); }
+  /// The size of a truth.
+  ImageGrid image() const { return array().picture(settings_.scale); }
+  const WindowSettings& settings() const { return settings_; }
+  const WindowCounts& counts() const { return counts_; }
+  const std::vector<Pass>& passes() const { return passes_; }
+
+  // i < size() throughout, unchecked: these run for every sample of training.
+  // Throws std::invalid_argument when `out` has another size.
+  /// Window i as a network takes it, [T][signals], oldest frame first; levelled when the scaling says so.
+  void window(std::size_t i, std::span<float> out) const;
+  /// The window without copying it, not levelled.
+  std::span<const float> window(std::size_t i) const;
+  /// Truth of its last frame, [height][width] of image(), as truth_image.
+  void truth(std::size_t i, std::span<float> out) const;
+  /// The last frame, [signals].
+  std::span<const float> last_frame(std::size_t i) const;
+  Position position(std::size_t i) const;
+  /// True when the truth has a pixel above 0.
+  bool contact(std::size_t i) const;
+  std::size_t pass_of(std::size_t i) const { return index_[i].pass; }
+  /// Number of the last frame within its pass.
+  std::size_t frame_of(std::size_t i) const { return index_[i].last; }
+  /// Frames since its pass began or since the last gap, the last frame included: at least timesteps().
+  std::size_t history(std::size_t i) const { return tracks_[index_[i].pass].run[index_[i].last]; }
+  /// The frames of a whole pass, [frames][signals]; empty when no window ends in it.
+  std::span<const float> track(std::size_t pass) const { return tracks_[pass].samples; }
+
+  /// The filter_s of all passes with windows, or nothing when they differ.
+  std::optional<double> filter_s() const;
+
+  /// 16 hexadecimal digits over samples, positions, plates and index: the same data and settings, the same
+  /// text.
+  std::string fingerprint() const;
+
+ private:
+  struct Entry {
+    std::uint32_t pass, last;
+  };
+  std::size_t plate_index(const std::string& name, const std::string& folder);
+  bool accept(const Track& track, std::size_t frame, bool reliable);
+
+  WindowSettings settings_;
+  WindowCounts counts_;
+  std::vector<Plate> plates_;
+  std::vector<Pass> passes_;
+  std::vector<Track> tracks_;          // per pass
+  std::vector<std::size_t> plate_of_;  // per pass, into plates_
+  std::vector<Entry> index_;
+};
+
+}  // namespace supertac

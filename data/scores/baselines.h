@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "data/samples/windows.h"
+
+namespace supertac {
+
+/// A way to an image that does without a network, so that a reader sees what the network buys. It sees the
+/// window as the network does (levelled when the scaling says so) and nothing else.
+class Baseline {
+ public:
+  virtual ~Baseline() = default;
+  virtual std::string name() const = 0;
+  /// window [T][signals], any T >= 1; out [height][width] of the truths. Throws std::invalid_argument on
+  /// other sizes.
+  virtual void predict(std::span<const float> window, std::span<float> out) const = 0;
+};
+
+/// The mean truth of the training windows, whatever the window holds.
+class MeanImage : public Baseline {
+ public:
+  /// Throws std::invalid_argument when train is empty.
+  MeanImage(const WindowSet& windows, std::span<const std::uint32_t> train);
+  std::string name() const override { return "mean_image"; }
+  void predict(std::span<const float> window, std::span<float> out) const override;
+
+ private:
+  TaxelArray array_;
+  std::vector<float> image_;
+};
+
+/// Enlarges a frame of rows x columns taxels by a whole factor. Taxels lie in the middle of equal cells,
+/// which the pixels divide, so pixel p of a row lies at u = (p + 1/2) / scale - 1/2 in units of taxels.
+/// Taxels beyond the edge repeat the outermost.
+///   nearest  the taxel at round(u)
+///   bicubic  cubic convolution (Keys 1981, a = -1/2, also called Catmull-Rom) along both axes
+class Upsampling {
+ public:
+  enum class Kind { nearest, bicubic };
+  /// Throws std::invalid_argument when a size is below 1.
+  Upsampling(Kind kind, int rows, int columns, int scale);
+  /// frame [rows][columns], out [rows * scale][columns * scale]. Throws std::invalid_argument on other
+  /// sizes.
+  void operator()(std::span<const float> frame, std::span<float> out) const;
+
+ private:
+  using Weights = std::vector<float>;  // [pixels][taxels]: of the taxels of a line on its pixels
+  static Weights weights_of(Kind kind, int taxels, int scale);
+
+  std::size_t rows_, columns_;
+  Weights down_, across_;
+};
+
+/// Upsampling of the last frame (the mean of each taxel's channels), followed by a x + b: the line that fits
+/// the truth of the training windows best (least squares over all pixels). It turns voltage into height, as
+/// fairly as two numbers can.
+class UpsampledFrame : public Baseline {
+ public:
+  /// Throws std::invalid_argument when train is empty.
+  UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows, std::span<const std::uint32_t> train);
+  std::string name() const override;
+  void predict(std::span<const float> window, std::span<float> out) const override;
+  double slope() const { return slope_; }
+  double intercept() const { return intercept_; }
+
+ private:
+  Upsampling::Kind kind_;
+  TaxelArray array_;
+  Upsampling upsampling_;
+  double slope_ = 0, intercept_ = 0;
+};
+
+/// mean_image, nearest, bicubic and ridge (data/ridge.h), in this order. Each is fitted to at most
+/// kFitWindows training windows, evenly spread over the list. Throws std::invalid_argument when train is
+/// empty.
+constexpr std::size_t kFitWindows = 20000;
+std::vector<std::unique_ptr<Baseline>> fit_baselines(const WindowSet& windows,
+                                                     std::span<const std::uint32_t> train);
+
+}  // namespace supertac

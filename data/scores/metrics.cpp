@@ -1,0 +1,263 @@
+#include "data/scores/metrics.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "data/plates/truth.h"
+#include "io/random.h"
+
+namespace supertac {
+namespace {
+
+constexpr int kGaussianSize = 11, kUniformSize = 7;
+constexpr double kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;
+constexpr std::uint64_t kFloorSeed = 0x666c6f6f72;  // "floor"
+
+// One-dimensional weights of SSIM's window; the two-dimensional ones are their products.
+std::vector<double> ssim_weights(int size) {
+  if (size < kGaussianSize) return std::vector<double>(kUniformSize, 1.0 / kUniformSize);
+  std::vector<double> weights(kGaussianSize);
+  double sum = 0;
+  for (int i = 0; i < kGaussianSize; ++i) {
+    const double d = (i - kGaussianSize / 2) / 1.5;
+    sum += weights[static_cast<std::size_t>(i)] = std::exp(-0.5 * d * d);
+  }
+  for (double& w : weights) w /= sum;
+  return weights;
+}
+
+// SSIM of the window whose first pixels are a and b, rows `stride` apart.
+double local_ssim(const float* a, const float* b, std::size_t stride, const std::vector<double>& weights) {
+  const std::size_t n = weights.size();
+  double mean_a = 0, mean_b = 0;
+  for (std::size_t r = 0; r < n; ++r) {
+    for (std::size_t c = 0; c < n; ++c) {
+      const double w = weights[r] * weights[c];
+      mean_a += w * a[r * stride + c];
+      mean_b += w * b[r * stride + c];
+    }
+  }
+  double var_a = 0, var_b = 0, cov = 0;
+  for (std::size_t r = 0; r < n; ++r) {
+    for (std::size_t c = 0; c < n; ++c) {
+      const double w = weights[r] * weights[c];
+      const double da = a[r * stride + c] - mean_a, db = b[r * stride + c] - mean_b;
+      var_a += w * da * da;
+      var_b += w * db * db;
+      cov += w * da * db;
+    }
+  }
+  return (2 * mean_a * mean_b + kC1) * (2 * cov + kC2) /
+         ((mean_a * mean_a + mean_b * mean_b + kC1) * (var_a + var_b + kC2));
+}
+
+void check_pixels(const char* where, std::size_t got, std::size_t expected) {
+  if (got != expected)
+    throw std::invalid_argument(std::string(where) + ": expects " + std::to_string(expected) +
+                                " pixels, got " + std::to_string(got));
+}
+
+using Field = std::pair<const char*, double Metrics::*>;
+constexpr std::array<Field, 7> kFields{{{"psnr_mean_db", &Metrics::psnr_mean_db},
+                                        {"psnr_pooled_db", &Metrics::psnr_pooled_db},
+                                        {"ssim", &Metrics::ssim},
+                                        {"phase_correlation", &Metrics::phase_correlation},
+                                        {"phase_correlation_floor", &Metrics::phase_correlation_floor},
+                                        {"position_error_px", &Metrics::position_error_px},
+                                        {"position_error_mm", &Metrics::position_error_mm}}};
+
+}  // namespace
+
+double mean_squared_error(std::span<const float> a, std::span<const float> b) {
+  if (a.empty()) throw std::invalid_argument("mean_squared_error: the images are empty");
+  check_pixels("mean_squared_error", b.size(), a.size());
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double d = static_cast<double>(a[i]) - b[i];
+    sum += d * d;
+  }
+  return sum / static_cast<double>(a.size());
+}
+
+double psnr_db(double mse) { return mse > 0 ? std::min(kPsnrCapDb, -10 * std::log10(mse)) : kPsnrCapDb; }
+
+double ssim(std::span<const float> a, std::span<const float> b, std::size_t height, std::size_t width) {
+  const std::size_t smaller = std::min(height, width);
+  if (smaller < kUniformSize)
+    throw std::invalid_argument("ssim: size must be at least 7, got " + std::to_string(smaller));
+  check_pixels("ssim", a.size(), height * width);
+  check_pixels("ssim", b.size(), height * width);
+  const std::vector<double> weights = ssim_weights(static_cast<int>(smaller));
+  const std::size_t rows = height - weights.size() + 1, columns = width - weights.size() + 1;
+  double sum = 0;
+  for (std::size_t r = 0; r < rows; ++r)
+    for (std::size_t c = 0; c < columns; ++c)
+      sum += local_ssim(&a[r * width + c], &b[r * width + c], width, weights);
+  return sum / static_cast<double>(rows * columns);
+}
+
+nlohmann::ordered_json to_json(const Metrics& metrics) {
+  nlohmann::ordered_json json;
+  json["windows"] = metrics.windows;
+  for (const auto& [name, field] : kFields)
+    json[name] = std::isfinite(metrics.*field) ? nlohmann::ordered_json(metrics.*field) : nullptr;
+  return json;
+}
+
+Metrics metrics_from_json(const nlohmann::ordered_json& json) {
+  const auto value_of = [&](const char* name) -> const nlohmann::ordered_json& {
+    if (!json.is_object() || !json.contains(name))
+      throw std::invalid_argument("metrics: key '" + std::string(name) + "' is missing");
+    return json.at(name);
+  };
+  Metrics metrics;
+  const auto& windows = value_of("windows");
+  if (!windows.is_number_unsigned())
+    throw std::invalid_argument("metrics: 'windows' must be a whole number, got " + windows.dump());
+  metrics.windows = windows.get<std::uint64_t>();
+  for (const auto& [name, field] : kFields) {
+    const auto& value = value_of(name);
+    if (!value.is_number() && !value.is_null())
+      throw std::invalid_argument("metrics: '" + std::string(name) + "' must be a number or null, got " +
+                                  value.dump());
+    metrics.*field = value.is_null() ? Metrics::kNone : value.get<double>();
+  }
+  return metrics;
+}
+
+ImageScorer::ImageScorer(const ImageGrid& grid) : grid_(grid), correlator_(grid.height, grid.width) {
+  if (std::min(grid.height, grid.width) < kUniformSize)
+    throw std::invalid_argument("metrics: sides must be at least 7, got " + grid.text());
+}
+
+ImageScores ImageScorer::operator()(std::span<const float> output, std::span<const float> truth) {
+  for (std::size_t i = 0; i < output.size(); ++i)
+    if (!std::isfinite(output[i]))
+      throw std::invalid_argument("metrics: output pixel " + std::to_string(i) + " is not finite");
+  ImageScores scores;
+  scores.mse = mean_squared_error(output, truth);
+  scores.ssim =
+      ssim(output, truth, static_cast<std::size_t>(grid_.height), static_cast<std::size_t>(grid_.width));
+  const auto [low, high] = std::minmax_element(truth.begin(), truth.end());
+  scores.has_position = *high - *low > 2 * PhaseCorrelator::kFlat;
+  if (!scores.has_position) return scores;
+  const PhaseCorrelation phase = correlator_(output, truth);
+  scores.phase_correlation = phase.peak;
+  scores.position_error_px =
+      phase.defined ? std::hypot(phase.dx_px, phase.dy_px) : std::min(grid_.height, grid_.width) / 2.0;
+  return scores;
+}
+
+MetricsAccumulator::MetricsAccumulator(const ImageGrid& grid) : grid_(grid), scorer_(grid) {}
+
+void MetricsAccumulator::add(std::span<const float> output, std::span<const float> truth) {
+  add(output, truth, scorer_(output, truth));
+}
+
+void MetricsAccumulator::add(std::span<const float> output, std::span<const float> truth,
+                             const ImageScores& scores) {
+  ++windows_;
+  mse_ += scores.mse;
+  psnr_ += psnr_db(scores.mse);
+  ssim_ += scores.ssim;
+  if (!scores.has_position) return;
+  sample(output, truth);
+  ++positions_;
+  peak_ += scores.phase_correlation;
+  distance_px_ += scores.position_error_px;
+}
+
+// Reservoir sampling (algorithm R): after n windows each is in the sample with the same probability.
+void MetricsAccumulator::sample(std::span<const float> output, std::span<const float> truth) {
+  const std::uint64_t n = positions_;
+  if (n < kFloorPairs) {
+    sampled_outputs_.insert(sampled_outputs_.end(), output.begin(), output.end());
+    sampled_truths_.insert(sampled_truths_.end(), truth.begin(), truth.end());
+    return;
+  }
+  const double u = RandomStream(kFloorSeed, 0).uniform(n);
+  const auto slot = static_cast<std::uint64_t>(u * static_cast<double>(n + 1));
+  if (slot >= kFloorPairs) return;
+  const auto at = static_cast<std::ptrdiff_t>(slot * output.size());
+  std::copy(output.begin(), output.end(), sampled_outputs_.begin() + at);
+  std::copy(truth.begin(), truth.end(), sampled_truths_.begin() + at);
+}
+
+double MetricsAccumulator::floor() const {
+  const std::size_t pixels = grid_.pixels();
+  const std::size_t count = sampled_truths_.size() / pixels;
+  if (count < 2) return Metrics::kNone;
+  std::vector<std::size_t> partner(count);
+  for (std::size_t i = 0; i < count; ++i) partner[i] = i;
+  const RandomStream random(kFloorSeed, 1);  // Sattolo's shuffle: one cycle, so nobody meets himself
+  for (std::size_t i = count - 1; i > 0; --i)
+    std::swap(partner[i], partner[static_cast<std::size_t>(random.uniform(i) * static_cast<double>(i))]);
+  PhaseCorrelator correlator(grid_.height, grid_.width);
+  double sum = 0;
+  for (std::size_t i = 0; i < count; ++i)
+    sum += correlator(std::span(sampled_outputs_).subspan(i * pixels, pixels),
+                      std::span(sampled_truths_).subspan(partner[i] * pixels, pixels))
+               .peak;
+  return sum / static_cast<double>(count);
+}
+
+Metrics MetricsAccumulator::result() const {
+  Metrics metrics;
+  metrics.windows = windows_;
+  if (windows_ > 0) {
+    const auto n = static_cast<double>(windows_);
+    metrics.psnr_mean_db = psnr_ / n;
+    metrics.psnr_pooled_db = psnr_db(mse_ / n);
+    metrics.ssim = ssim_ / n;
+  }
+  if (positions_ > 0) {
+    const auto n = static_cast<double>(positions_);
+    metrics.phase_correlation = peak_ / n;
+    metrics.phase_correlation_floor = floor();
+    metrics.position_error_px = distance_px_ / n;
+    metrics.position_error_mm = metrics.position_error_px * grid_.pixel_mm;
+  }
+  return metrics;
+}
+
+ContactMetrics::ContactMetrics(const ImageGrid& grid) : scorer_(grid), all_(grid), contact_(grid) {}
+
+void ContactMetrics::add(std::span<const float> output, std::span<const float> truth) {
+  const ImageScores scores = scorer_(output, truth);
+  all_.add(output, truth, scores);
+  if (in_contact(truth)) contact_.add(output, truth, scores);
+}
+
+nlohmann::ordered_json ContactMetrics::to_json() const {
+  nlohmann::ordered_json json;
+  json["all"] = supertac::to_json(all());
+  json["contact"] = supertac::to_json(contact());
+  return json;
+}
+
+void PairMetrics::add(std::span<const float> output, std::span<const float> target) {
+  for (const float value : output)
+    if (!std::isfinite(value)) throw std::invalid_argument("pair metrics: the output is not finite");
+  const double mse = mean_squared_error(output, target);
+  ssim_ += ssim(output, target, height_, width_);
+  psnr_ += psnr_db(mse);
+  mse_ += mse;
+  ++pairs_;
+}
+
+Metrics PairMetrics::result() const {
+  Metrics metrics{.windows = pairs_};
+  if (pairs_ == 0) return metrics;
+  const auto n = static_cast<double>(pairs_);
+  metrics.psnr_mean_db = psnr_ / n;
+  metrics.psnr_pooled_db = psnr_db(mse_ / n);
+  metrics.ssim = ssim_ / n;
+  return metrics;
+}
+
+}  // namespace supertac

@@ -1,0 +1,139 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <nlohmann/json_fwd.hpp>
+#include <span>
+#include <vector>
+
+#include "data/plates/taxel_array.h"
+#include "data/scores/phase_correlation.h"
+
+namespace supertac {
+
+/// Images are [height][width], row-major, data range 1 (0..1). Values outside the range count as they are:
+/// nothing is clipped here.
+
+/// PSNR values are capped here: an error of 60 dB (0.1 % of the range) is what rounding to 8 bits costs, so
+/// two images above it are the same picture. Without a cap identical images are infinitely good and flat ones
+/// decide every mean.
+constexpr double kPsnrCapDb = 60;
+
+/// Mean squared error over all pixels. Throws std::invalid_argument when the sizes differ or are 0.
+double mean_squared_error(std::span<const float> a, std::span<const float> b);
+
+/// 10 log10(1 / mse), at most kPsnrCapDb (also for mse = 0).
+double psnr_db(double mse);
+
+/// Structural similarity after Wang et al. 2004, mean over the valid positions of the window:
+///   (2 ma mb + C1)(2 sab + C2) / ((ma^2 + mb^2 + C1)(sa^2 + sb^2 + C2)),  C1 = (.01)^2, C2 = (.03)^2 (range
+///   1)
+/// Window: Gaussian 11x11, sigma 1.5, or uniform 7x7 for images below 11x11 (on which the Gaussian has no
+/// valid position). Weights add up to 1; variances and covariance are centred sums w (a - ma)(b - mb), never
+/// E[ab] - E[a]E[b], which can come out negative.
+/// The Gaussian is used when both sides have 11 pixels or more.
+/// Throws std::invalid_argument when a side is below 7 or a, b do not hold height * width pixels.
+double ssim(std::span<const float> a, std::span<const float> b, std::size_t height, std::size_t width);
+inline double ssim(std::span<const float> a, std::span<const float> b, int size) {
+  const std::size_t side = size > 0 ? static_cast<std::size_t>(size) : 0;
+  return ssim(a, b, side, side);
+}
+
+/// Scores of one output against its truth.
+struct ImageScores {
+  double mse = 0, ssim = 0;
+  bool has_position = false;     ///< the truth is not flat, so that it lies somewhere
+  double phase_correlation = 0;  ///< 0 when the output is flat
+  double position_error_px = 0;  ///< length of the displacement; half the shorter side when the output
+                                 ///< is flat
+};
+
+/// What is reported about a set of windows. Figures over no windows at all are NaN (null in JSON).
+struct Metrics {
+  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::uint64_t windows = 0;
+  double psnr_mean_db = kNone;    ///< mean over the windows of each image's PSNR
+  double psnr_pooled_db = kNone;  ///< PSNR of the mean of all squared errors
+  double ssim = kNone;            ///< mean over the windows
+  // The rest is about windows whose truth is not flat: a flat truth has no position.
+  double phase_correlation = kNone;        ///< mean peak
+  double phase_correlation_floor = kNone;  ///< the same with outputs and truths of different windows paired
+  double position_error_px = kNone;        ///< mean length of the sub-pixel displacement
+  double position_error_mm = kNone;
+};
+
+/// Keys are the member names, in their order.
+nlohmann::ordered_json to_json(const Metrics& metrics);
+/// Throws std::invalid_argument naming the missing or mistyped key.
+Metrics metrics_from_json(const nlohmann::ordered_json& json);
+
+/// Scores image pairs of one size. One object serves one thread.
+class ImageScorer {
+ public:
+  /// Throws std::invalid_argument when a side is odd or below 7.
+  explicit ImageScorer(const ImageGrid& grid);
+  /// Throws std::invalid_argument when a size is wrong or a value of the output is not finite.
+  ImageScores operator()(std::span<const float> output, std::span<const float> truth);
+
+ private:
+  ImageGrid grid_;
+  PhaseCorrelator correlator_;
+};
+
+/// Takes images one by one and gives the Metrics of all of them. For the floor it keeps a random sample of
+/// kFloorPairs windows (reservoir sampling with its own fixed seed: same windows in the same order, same
+/// bits) and pairs each output with the truth of another window.
+class MetricsAccumulator {
+ public:
+  static constexpr std::size_t kFloorPairs = 256;
+
+  /// Throws as ImageScorer.
+  explicit MetricsAccumulator(const ImageGrid& grid);
+  void add(std::span<const float> output, std::span<const float> truth);
+  /// The same for scores that `ImageScorer` has given for this pair.
+  void add(std::span<const float> output, std::span<const float> truth, const ImageScores& scores);
+  Metrics result() const;
+
+ private:
+  void sample(std::span<const float> output, std::span<const float> truth);
+  double floor() const;
+
+  ImageGrid grid_;
+  ImageScorer scorer_;
+  std::uint64_t windows_ = 0, positions_ = 0;
+  double psnr_ = 0, mse_ = 0, ssim_ = 0, peak_ = 0, distance_px_ = 0;  // sums
+  std::vector<float> sampled_outputs_, sampled_truths_;                // up to kFloorPairs images each
+};
+
+/// All windows, and apart those in contact: a flat truth is easy and would flatter the mean.
+class ContactMetrics {
+ public:
+  /// Throws as ImageScorer.
+  explicit ContactMetrics(const ImageGrid& grid);
+  void add(std::span<const float> output, std::span<const float> truth);
+  Metrics all() const { return all_.result(); }
+  Metrics contact() const { return contact_.result(); }
+  /// {"all": {...}, "contact": {...}}
+  nlohmann::ordered_json to_json() const;
+
+ private:
+  ImageScorer scorer_;
+  MetricsAccumulator all_, contact_;
+};
+
+/// Scores of pictures of any shape: pairs (as `windows`), PSNR and SSIM of Metrics; what needs a position
+/// stays NaN, for nothing is known of the pixels' size.
+class PairMetrics {
+ public:
+  PairMetrics(std::size_t height, std::size_t width) : height_(height), width_(width) {}
+  /// Throws std::invalid_argument when a size is wrong or a value of the output is not finite.
+  void add(std::span<const float> output, std::span<const float> target);
+  Metrics result() const;
+
+ private:
+  std::size_t height_, width_;
+  std::uint64_t pairs_ = 0;
+  double psnr_ = 0, mse_ = 0, ssim_ = 0;  // sums
+};
+
+}  // namespace supertac

@@ -1,0 +1,75 @@
+#include "data/scores/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "io/random.h"
+
+namespace supertac {
+namespace {
+
+constexpr std::size_t kDraws = 10'000;
+constexpr std::size_t kMostExact = 20;
+constexpr std::uint64_t kRandomPatterns = 100'000;
+constexpr std::uint64_t kBootstrapStream = 0x626f6f74, kSignStream = 0x7369676e;
+
+}  // namespace
+
+double share(std::span<const ClusterCount> clusters) {
+  double correct = 0, total = 0;
+  for (const ClusterCount& c : clusters) {
+    correct += c.correct;
+    total += c.total;
+  }
+  return total > 0 ? correct / total : std::numeric_limits<double>::quiet_NaN();
+}
+
+Interval bootstrap_interval(std::span<const ClusterCount> clusters, std::uint64_t seed) {
+  if (clusters.empty()) throw std::invalid_argument("bootstrap_interval: there is no cluster");
+  for (const ClusterCount& c : clusters) {
+    if (!(c.total > 0)) throw std::invalid_argument("bootstrap_interval: a cluster holds nothing");
+  }
+  const RandomStream random(seed, kBootstrapStream);
+  const auto count = static_cast<double>(clusters.size());
+  std::vector<ClusterCount> drawn(clusters.size());
+  std::vector<double> shares(kDraws);
+  std::uint64_t counter = 0;
+  for (double& one : shares) {
+    for (ClusterCount& c : drawn) c = clusters[static_cast<std::size_t>(random.uniform(counter++) * count)];
+    one = share(drawn);
+  }
+  std::sort(shares.begin(), shares.end());
+  return {shares[kDraws / 40], shares[kDraws - 1 - kDraws / 40]};
+}
+
+double sign_flip_p(std::span<const double> differences, std::uint64_t seed) {
+  if (differences.empty()) throw std::invalid_argument("sign_flip_p: there is no difference");
+  double observed = 0, size = 0;
+  for (const double d : differences) {
+    if (!std::isfinite(d)) throw std::invalid_argument("sign_flip_p: a difference is not finite");
+    observed += d;
+    size += std::abs(d);
+  }
+  // Sums of the same numbers in another order differ by roundings; a tie must stay a tie.
+  const double least = std::abs(observed) - 1e-9 * size;
+  const bool exact = differences.size() <= kMostExact;
+  const std::uint64_t patterns = exact ? std::uint64_t{1} << differences.size() : kRandomPatterns;
+  const RandomStream random(seed, kSignStream);
+  std::uint64_t extreme = 0;
+  for (std::uint64_t pattern = 0; pattern < patterns; ++pattern) {
+    double sum = 0;
+    for (std::size_t i = 0; i < differences.size(); ++i) {
+      const bool flip =
+          exact ? (pattern >> i) % 2 == 1 : random.bits(pattern * differences.size() + i) % 2 == 1;
+      sum += flip ? -differences[i] : differences[i];
+    }
+    if (std::abs(sum) >= least) ++extreme;
+  }
+  const double extra = exact ? 0 : 1;
+  return (static_cast<double>(extreme) + extra) / (static_cast<double>(patterns) + extra);
+}
+
+}  // namespace supertac

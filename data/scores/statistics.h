@@ -1,0 +1,34 @@
+// Is a difference between two methods more than chance? Frames of one pass resemble each other, so the
+// independent unit of every figure here is the pass (the cluster), never the frame.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+namespace supertac {
+
+/// Successes of one method among the frames of one pass; a mean over seeds need not be whole.
+struct ClusterCount {
+  double correct = 0, total = 0;
+};
+
+struct Interval {
+  double low = 0, high = 0;
+};
+
+/// Sum of correct / sum of total; NaN when there is nothing to count.
+double share(std::span<const ClusterCount> clusters);
+
+/// 95 % percentile bootstrap interval of share() over clusters drawn with replacement (Efron & Tibshirani
+/// 1993, ch. 13; 10,000 draws from the given seed: the same counts, the same interval).
+/// Throws std::invalid_argument when there is no cluster or one holds nothing.
+Interval bootstrap_interval(std::span<const ClusterCount> clusters, std::uint64_t seed = 0);
+
+/// Two-sided p-value of the paired permutation test: if two methods did not differ, exchanging their results
+/// within a pass, which flips the sign of that pass's difference, would change nothing. p is the share of the
+/// sign patterns whose |sum| is at least the observed one: of all 2^n for n <= 20, else of 100,000 random
+/// ones and the observed one. The smallest p for n passes is 2 / 2^n.
+/// Throws std::invalid_argument when there is no difference or one is not finite.
+double sign_flip_p(std::span<const double> differences, std::uint64_t seed = 0);
+
+}  // namespace supertac

@@ -1,0 +1,257 @@
+// All instruction sets give the same bytes. The tables are called directly, past the choice at run time.
+#include "autograd/kernels/fast/isa.h"
+
+#include <cstring>
+#include <limits>
+
+#include "autograd/adam.h"
+#include "autograd/kernels/channels.h"
+#include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/fast/winograd.h"
+#include "autograd/ops/losses.h"
+#include "tests/autograd/check.h"
+
+namespace supertac::kernels {
+namespace {
+
+using test::numbers;
+
+std::vector<const IsaKernels*> available() {
+  std::vector<const IsaKernels*> sets{&kPortableKernels};
+  if (__builtin_cpu_supports("fma")) sets.push_back(&kPortableFmaKernels);
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) sets.push_back(&kAvx2Kernels);
+  if (__builtin_cpu_supports("avx512f")) sets.push_back(&kAvx512Kernels);
+  return sets;
+}
+
+bool same_bytes(const Tensor& a, const Tensor& b) {
+  return std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof(real)) == 0;
+}
+
+const ConvSettings kSettings[] = {
+    {.height = 1, .width = 17, .kernel_w = 3, .stride_w = 2, .padding_w = 1},
+    {.height = 1, .width = 5, .kernel_w = 4, .stride_w = 2, .padding_w = 1, .transposed = true},
+    {.height = 4, .width = 4, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1},
+    {.height = 9,
+     .width = 6,
+     .kernel_h = 3,
+     .kernel_w = 3,
+     .stride_h = 2,
+     .stride_w = 2,
+     .padding_h = 1,
+     .padding_w = 1},
+    {.height = 3,
+     .width = 7,
+     .kernel_h = 4,
+     .kernel_w = 4,
+     .stride_h = 2,
+     .stride_w = 2,
+     .padding_h = 1,
+     .padding_w = 1,
+     .transposed = true},
+    {.height = 1, .width = 1, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1}};
+constexpr Dim kChannels[] = {1, 3, 7, 8, 16, 17, 33, 64, 100};
+
+Tensor gather(const IsaKernels& isa, const std::vector<Phase>& phases, const Tensor& x, const Tensor& w,
+              const Tensor* bias, Tensor y, Dim cin, Dim cout) {
+  isa.gather({&phases, w.data(), bias ? bias->data() : nullptr, cin, cout,
+              bias == nullptr ? Into::add : Into::overwrite, bias == nullptr ? real(1) : real(0.25)},
+             x.data(), y.data());
+  return y;
+}
+
+TEST(Isa, GatherForwardAndBackward) {
+  for (const ConvSettings& s : kSettings) {
+    const Geometry& g = geometry_of(s);
+    for (const Dim cin : kChannels) {
+      for (const Dim cout : kChannels) {
+        const Tensor x = numbers({g.in_pixels, cin}), gy = numbers({g.out_pixels, cout}, 2),
+                     bias = numbers({cout}, 3);
+        const Tensor w = numbers({g.taps, cin, cout}, 4), wt = numbers({g.taps, cout, cin}, 5);
+        const Tensor gx = numbers({g.in_pixels, cin}, 6);
+        Tensor first_y, first_gx;
+        for (const IsaKernels* isa : available()) {
+          const Tensor y = gather(*isa, g.forward, x, w, &bias, Tensor({g.out_pixels, cout}), cin, cout);
+          const Tensor grad = gather(*isa, g.backward, gy, wt, nullptr, gx.clone(), cout, cin);
+          if (!first_y.defined()) first_y = y, first_gx = grad;
+          ASSERT_TRUE(same_bytes(y, first_y)) << isa->name << " forward " << cin << " to " << cout;
+          ASSERT_TRUE(same_bytes(grad, first_gx)) << isa->name << " backward " << cin << " to " << cout;
+        }
+      }
+    }
+  }
+}
+
+TEST(Isa, GatherRows) {
+  for (const Dim rows : {1, 3, 6, 8, 16, 31}) {
+    for (const Dim cin : kChannels) {
+      for (const Dim cout : kChannels) {
+        const Tensor x = numbers({rows, cin}), w = numbers({cin, cout}, 2), bias = numbers({cout}, 3);
+        Tensor first;
+        for (const IsaKernels* isa : available()) {
+          Tensor y({rows, cout});
+          isa->gather_rows({nullptr, w.data(), bias.data(), cin, cout}, x.data(), y.data(), rows);
+          if (!first.defined()) first = y;
+          ASSERT_TRUE(same_bytes(y, first)) << isa->name << " rows " << rows << ", " << cin << " to " << cout;
+        }
+      }
+    }
+  }
+}
+
+TEST(Isa, Outer) {
+  constexpr Dim kImages = 5;
+  for (const ConvSettings& s : kSettings) {
+    const Geometry& g = geometry_of(s);
+    for (const Dim cin : kChannels) {
+      for (const Dim cout : kChannels) {
+        const Tensor x = numbers({kImages, g.in_pixels, cin}), gy = numbers({kImages, g.out_pixels, cout}, 2);
+        const Tensor start = numbers({cin, cout}, 3);
+        Tensor first;
+        for (const IsaKernels* isa : available()) {
+          Tensor gw = start.clone();
+          for (const TapPairs& pairs : g.pairs) {
+            isa->outer(
+                {&pairs, x.data(), gy.data(), gw.data(), kImages, g.in_pixels, g.out_pixels, cin, cout});
+          }
+          if (!first.defined()) first = gw;
+          ASSERT_TRUE(same_bytes(gw, first)) << isa->name << ' ' << cin << " to " << cout;
+        }
+      }
+    }
+  }
+}
+
+// A sum that is -0 so far stays -0 where a tap is skipped, and becomes +0 where 0 * w is added: which of the
+// two happens depends on the tile's neighbours, hence on the instruction set.
+TEST(Isa, NegativeZeroHasTheSameSignEverywhere) {
+  for (const ConvSettings& s : kSettings) {
+    const Geometry& g = geometry_of(s);
+    for (const Dim cout : {1, 5, 16, 33}) {
+      const Dim cin = 2;
+      const Tensor x = Tensor::full({g.in_pixels, cin}, real(-0.0)), bias = Tensor::full({cout}, real(-0.0));
+      const Tensor w = Tensor::full({g.taps, cin, cout}, 1);
+      Tensor first;
+      for (const IsaKernels* isa : available()) {
+        const Tensor y = gather(*isa, g.forward, x, w, &bias, Tensor({g.out_pixels, cout}), cin, cout);
+        if (!first.defined()) first = y;
+        ASSERT_TRUE(same_bytes(y, first)) << isa->name << " to " << cout;
+      }
+    }
+  }
+}
+
+// Nothing outside [cout] may be written: the last vector is partial.
+TEST(Isa, StaysWithinItsRows) {
+  for (const IsaKernels* isa : available()) {
+    for (const Dim cout : kChannels) {
+      Tensor y = Tensor::full({cout + 40}, 7);
+      const Tensor x = numbers({3}), w = numbers({3, cout}, 2);
+      isa->gather_rows({nullptr, w.data(), nullptr, 3, cout}, x.data(), y.data(), 1);
+      for (Dim i = cout; i < cout + 40; ++i) ASSERT_EQ(y.data()[i], 7) << isa->name << ' ' << cout;
+    }
+  }
+}
+
+// Numbers of every magnitude, with both zeros, denormals and infinities among them.
+Tensor awkward(Dim n, std::uint64_t seed) {
+  constexpr real kSpecial[] = {0,
+                               real(-0.0),
+                               1e-40F,
+                               -1e-40F,
+                               std::numeric_limits<real>::infinity(),
+                               -std::numeric_limits<real>::infinity(),
+                               100,
+                               -100};
+  Tensor t = numbers({n}, seed, -9, 9);
+  for (Dim i = 0; i < n; ++i) {
+    if (i % 11 == 0) t.data()[i] = kSpecial[i / 11 % 8];
+  }
+  return t;
+}
+
+// What every plain loop makes of n numbers, one row a loop.
+std::vector<Tensor> results_of_loops(Dim n) {
+  const Tensor a = awkward(n, 1), b = awkward(n, 2), start = numbers({n}, 3);
+  const real *x = a.data(), *y = b.data();
+  std::vector<Tensor> rows;
+  const auto row = [&](auto loop) { loop(rows.emplace_back(start.clone()).data()); };
+  row([&](real* to) { leaky_relu(n, 0.01F, x, to); });
+  row([&](real* to) { leaky_relu_grad(n, 0.01F, x, y, to); });
+  row([&](real* to) { rectify_in_place(n, 0.01F, x, to); });
+  row([&](real* to) { sigmoid(n, x, to); });
+  row([&](real* to) { sigmoid_grad(n, x, y, to); });
+  row([&](real* to) { clamp(n, -1, 1, x, to); });
+  row([&](real* to) { clamp_grad(n, -1, 1, x, y, to); });
+  row([&](real* to) { add(n, x, y, to); });
+  row([&](real* to) { multiply(n, x, y, to); });
+  row([&](real* to) { scale(n, 0.3F, x, to); });
+  row([&](real* to) { add_scaled(n, 0.3F, x, to); });
+  row([&](real* to) { add_product(n, x, y, to); });
+  // three pixels of n channels
+  const Tensor pixels = numbers({3, n}, 4), other = numbers({3, n}, 5), gate = numbers({n}, 6);
+  const auto pixels_row = [&](auto loop) { loop(rows.emplace_back(other.clone()).data()); };
+  row([&](real* to) { channel_mean(1, 3, n, pixels.data(), to); });
+  pixels_row([&](real* to) { channel_mean_grad(1, 3, n, gate.data(), to); });
+  pixels_row([&](real* to) { gated_sum(1, 3, n, other.data(), pixels.data(), gate.data(), to); });
+  pixels_row([&](real* to) { gated_sum_grad_x(1, 3, n, pixels.data(), gate.data(), Into::add, to); });
+  row([&](real* to) { gated_sum_grad_s(1, 3, n, pixels.data(), other.data(), to); });
+  // the gradient of a loss, and two steps of Adam along it
+  const Variable parameter(numbers({n}, 7), true);
+  Adam adam({parameter}, {.learning_rate = 0.1});
+  for (int step = 0; step < 2; ++step) {
+    adam.zero_grad();
+    backward(l2_loss(parameter, Variable(gate)));
+    adam.step();
+  }
+  rows.push_back(parameter.grad());
+  rows.push_back(parameter.value());
+  return rows;
+}
+
+TEST(Isa, PlainLoops) {
+  const IsaKernels& chosen = isa_kernels();
+  for (const Dim n : {1, 5, 16, 33, 100, 257}) {
+    std::vector<Tensor> first;
+    for (const IsaKernels* isa : available()) {
+      use_isa(*isa);
+      const std::vector<Tensor> rows = results_of_loops(n);
+      if (first.empty()) first = rows;
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        EXPECT_TRUE(same_bytes(rows[i], first[i]))
+            << isa->name << ", loop " << i << " of " << n << " numbers";
+      }
+    }
+  }
+  use_isa(chosen);
+}
+
+TEST(Isa, Winograd) {
+  const ConvSettings map{
+      .height = 8, .width = 12, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1};
+  const ConvSizes sizes{&geometry_of(map), 5, 48, 16};
+  const Tensor x = numbers({5, 96, 48}), w = numbers({9, 48, 16}, 2), bias = numbers({16}, 3);
+  const Tensor gy = numbers({5, 96, 16}, 4);
+  const IsaKernels& chosen = isa_kernels();
+  Tensor first_y, first_gx, first_gw;
+  for (const IsaKernels* isa : available()) {
+    use_isa(*isa);
+    Tensor y(gy.shape()), gx = numbers(x.shape(), 5), gw = numbers(w.shape(), 6);
+    winograd_conv(sizes, x.data(), w.data(), bias.data(), 0.25F, y.data());
+    winograd_grad_x(sizes, gy.data(), w.data(), Into::add, gx.data());
+    winograd_grad_w(sizes, x.data(), gy.data(), gw.data());
+    if (!first_y.defined()) first_y = y, first_gx = gx, first_gw = gw;
+    EXPECT_TRUE(same_bytes(y, first_y)) << isa->name;
+    EXPECT_TRUE(same_bytes(gx, first_gx)) << isa->name;
+    EXPECT_TRUE(same_bytes(gw, first_gw)) << isa->name;
+  }
+  use_isa(chosen);
+}
+
+TEST(Isa, TheChosenSetIsOneOfThem) {
+  const std::string name(isa_kernels().name);
+  EXPECT_TRUE(name == "portable" || name == "avx2" || name == "avx512") << name;
+}
+
+}  // namespace
+}  // namespace supertac::kernels

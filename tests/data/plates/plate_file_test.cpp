@@ -1,0 +1,75 @@
+#include "data/plates/plate_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "data/plates/plate_mesh.h"
+#include "data/plates/truth.h"
+#include "data/samples/windows.h"
+#include "io/file.h"
+#include "tests/data/test_recordings.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+void write_plate(const std::string& path, const std::string& name) {
+  write_file(path, stl_bytes(mesh_of(Plate::named(name), {.resolution_mm = 0.25}), name));
+}
+
+TEST(PlateFile, NamedReadsAnStlFileAndDropsItsFolder) {
+  const TemporaryFolder folder;
+  write_plate(folder / "my.stl", "6_Bumps");
+  const Plate plate = Plate::named(folder / "my.stl");
+  EXPECT_EQ(plate.name(), "my.stl");
+  EXPECT_NEAR(plate.height(18, 39), 2.5, 1e-3);
+  EXPECT_EQ(plate.crests().size(), 6u);
+  EXPECT_THROW(Plate::named(folder / "other.stl"), FileError);
+}
+
+TEST(PlateFile, IsKeptBesideTheRecordingsAndNeverReplacedByAnother) {
+  const TemporaryFolder folder;
+  make_directories(folder / "out");
+  write_plate(folder / "my.stl", "6_Bumps");
+  keep_plate_file("6_Bumps", folder / "out");
+  keep_plate_file(folder / "my.stl", folder / "out");
+  keep_plate_file(folder / "my.stl", folder / "out");
+  EXPECT_EQ(plate_in_folder("my.stl", folder / "out").crests().size(), 6u);
+  EXPECT_EQ(plate_in_folder("3_Bumps", folder / "out").name(), "3_Bumps");
+  write_plate(folder / "my.stl", "3_Bumps");
+  EXPECT_THROW(keep_plate_file(folder / "my.stl", folder / "out"), FileError);
+}
+
+TEST(PlateFile, ARecordingMayNotNameAFileElsewhere) {
+  const TemporaryFolder folder;
+  write_plate(folder / "my.stl", "6_Bumps");
+  EXPECT_THROW(plate_in_folder("../" + folder.path() + "/my.stl", folder.path()), std::invalid_argument);
+  EXPECT_THROW(plate_in_folder(folder / "my.stl", "."), std::invalid_argument);
+}
+
+TEST(PlateFile, WindowsTakeTheirTruthFromIt) {
+  const TemporaryFolder folder;
+  write_plate(folder / "my.stl", "4_Blob");
+  Recording recording = make_recording({.plate = "my.stl", .frames = 300});
+  write_recording(folder / "a.safetensors", recording);
+  const WindowSet set = WindowSet::load(folder.path(), {}, {.timesteps = 32});
+  recording.plate = "4_Blob";
+  WindowSet named({.timesteps = 32});
+  named.add(recording);
+  ASSERT_EQ(set.size(), named.size());
+  std::vector<float> truth(256), expected(256);
+  for (std::size_t i = 0; i < set.size(); i += 50) {
+    set.truth(i, truth);
+    named.truth(i, expected);
+    double squares = 0;  // the foot of a blob is upright: single pixels there may differ by .1
+    for (std::size_t k = 0; k < truth.size(); ++k) squares += std::pow(double{truth[k] - expected[k]}, 2);
+    EXPECT_LT(std::sqrt(squares / 256), 0.02) << i;
+  }
+  const std::string before = set.fingerprint();
+  write_plate(folder / "my.stl", "6_Blob");  // another plate of the same name is other data
+  EXPECT_NE(WindowSet::load(folder.path(), {}, {.timesteps = 32}).fingerprint(), before);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,104 @@
+#include "data/plates/plate_mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <utility>
+
+#include "io/random.h"
+
+namespace supertac {
+namespace {
+
+using Point = std::array<float, 3>;
+
+const std::vector<std::string>& plates() {
+  static const std::vector<std::string> kNames = {
+      "3_Bumps", "6_Ridges", "4_Waves", "4_Blob", "plain", "ridges4.7h1.3", "bumps6+ridges6+waves6+blobs6"};
+  return kNames;
+}
+
+// Every directed edge once, and its opposite once: closed, manifold, facing one way.
+TEST(PlateMesh, EveryEdgeBelongsToTwoTriangles) {
+  for (const std::string& name : plates()) {
+    std::map<std::pair<Point, Point>, int> edges;
+    for (const Triangle& t : mesh_of(Plate::named(name), {.resolution_mm = 0.5}))
+      for (std::size_t i = 0; i < 3; ++i) ++edges[{t[i], t[(i + 1) % 3]}];
+    for (const auto& [edge, count] : edges) {
+      ASSERT_EQ(count, 1) << name;
+      ASSERT_TRUE(edges.contains({edge.second, edge.first})) << name;
+    }
+  }
+}
+
+// Divergence theorem: positive when the triangles face outwards.
+double volume_of(const std::vector<Triangle>& triangles) {
+  double six = 0;
+  for (const Triangle& t : triangles) {
+    const auto [ax, ay, az] = t[0];
+    const auto [bx, by, bz] = t[1];
+    const auto [cx, cy, cz] = t[2];
+    six += double{ax} * (double{by} * double{cz} - double{bz} * double{cy}) -
+           double{ay} * (double{bx} * double{cz} - double{bz} * double{cx}) +
+           double{az} * (double{bx} * double{cy} - double{by} * double{cx});
+  }
+  return six / 6;
+}
+
+TEST(PlateMesh, VolumeIsThatOfThePlate) {
+  const double block = 36.0 * 108 * 3;
+  EXPECT_NEAR(volume_of(mesh_of(Plate::named("plain"))), block, 0.1);
+  EXPECT_NEAR(volume_of(mesh_of(Plate::named("6_Ridges"))), block + 6 * 0.5 * 2.5 * 2.5 * 36, 0.1);
+  const double bump = std::numbers::pi / 2 * 2.5 * 2.5 * 36;
+  EXPECT_NEAR(volume_of(mesh_of(Plate::named("3_Bumps"))), block + 3 * bump, 0.005 * 3 * bump);
+  const double blob = 2.0 / 3 * std::numbers::pi * 2.5 * 2.5 * 2.5;
+  EXPECT_NEAR(volume_of(mesh_of(Plate::named("4_Blob"))), block + 16 * blob, 0.01 * 16 * blob);
+}
+
+// Written, read and looked at anywhere: what supertac-plate's help states.
+TEST(PlateMesh, WrittenAndReadHeightsAgree) {
+  const RandomStream random(11, 0);
+  for (const std::string& name : plates()) {
+    const Plate plate = Plate::named(name);
+    const auto read = parse_stl(stl_bytes(mesh_of(plate), name), name);
+    const Plate again(name, HeightMap(read, Plate::kWidthMm, Plate::kLengthMm, name));
+    EXPECT_NEAR(again.max_height(), plate.max_height(), 0.13) << name;  // a ridge's peak between two nodes
+    double squares = 0;
+    const int points = 20'000;
+    for (std::uint64_t i = 0; i < points; ++i) {
+      const double x = 36 * random.uniform(2 * i), y = 108 * random.uniform(2 * i + 1);
+      const double error = again.height(x, y) - plate.height(x, y);
+      ASSERT_LT(std::abs(error), 0.8)
+          << name << " at " << x << " " << y;  // beside the upright foot of a bump
+      squares += error * error;
+    }
+    EXPECT_LT(std::sqrt(squares / points), 0.02) << name;
+  }
+}
+
+TEST(PlateMesh, RigPlatesComeBackExactlyAtTheNodes) {
+  for (const std::string& name : rig_plates()) {
+    const Plate plate = Plate::named(name);
+    const Plate again(name, HeightMap(mesh_of(plate), Plate::kWidthMm, Plate::kLengthMm, name));
+    EXPECT_NEAR(again.texture_begin(), plate.texture_begin(), 0.126) << name;
+    EXPECT_NEAR(again.texture_end(), plate.texture_end(), 0.126) << name;
+    EXPECT_EQ(again.uniform_in_x(), plate.uniform_in_x()) << name;
+    for (double y = 0; y <= 108; y += HeightMap::kCellMm)
+      for (double x = 0; x <= 36; x += 1.5)
+        ASSERT_NEAR(again.height(x, y), plate.height(x, y), 1.001e-3) << name << " at " << x << " " << y;
+    ASSERT_EQ(again.crests().size(), plate.crests().size()) << name;
+    for (std::size_t i = 0; i < plate.crests().size(); ++i)
+      EXPECT_NEAR(again.crests()[i], plate.crests()[i], 0.01) << name;
+  }
+}
+
+TEST(PlateMesh, UniformPlatesAreSmallAndSettingsAreChecked) {
+  EXPECT_LT(mesh_of(Plate::named("6_Bumps")).size(), 3000u);
+  EXPECT_THROW(mesh_of(Plate::named("plain"), {.resolution_mm = 0}), std::invalid_argument);
+  EXPECT_THROW(mesh_of(Plate::named("plain"), {.base_mm = -1}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,149 @@
+#include "data/plates/stl.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+
+#include "io/file.h"
+#include "tests/fuzz/stl_properties.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+const std::vector<Triangle>& two_triangles() {
+  static const std::vector<Triangle> kTriangles = {{{{0, 0, 0}, {2, 0, 0}, {0, 3, 0}}},
+                                                   {{{1.5F, -2.25F, 4}, {0, 1e-3F, 7}, {5, 5, 5}}}};
+  return kTriangles;
+}
+
+Bytes bytes_of(std::string_view text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+std::string text_stl() {
+  return "solid a name of words\n"
+         " facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 2 0 +0.0\n   vertex 0 3e0 0\n"
+         "  endloop\n endfacet\n"
+         "facet NORMAL nan nan nan outer loop vertex 1.5 -2.25 4 vertex 0 1E-3 7 vertex 5 5 5 endloop "
+         "endfacet\r\n"
+         "endsolid a name of words\n";
+}
+
+void expect_refused(const Bytes& bytes, const std::string& expected) {
+  try {
+    parse_stl(bytes, "plate.stl");
+    ADD_FAILURE() << "accepted; expected: " << expected;
+  } catch (const FileError& error) {
+    const std::string what = error.what();
+    EXPECT_TRUE(what.starts_with("plate.stl: ")) << what;
+    EXPECT_NE(what.find(expected), std::string::npos) << what << "\nexpected: " << expected;
+    EXPECT_EQ(what.find('\n'), std::string::npos) << what;
+  }
+}
+
+TEST(Stl, BinaryComesBackExactly) {
+  const Bytes bytes = stl_bytes(two_triangles(), "two triangles");
+  EXPECT_EQ(bytes.size(), 84u + 2 * 50);
+  EXPECT_EQ(parse_stl(bytes, "plate.stl"), two_triangles());
+  float normal[3];
+  std::memcpy(normal, bytes.data() + 84, sizeof normal);
+  EXPECT_EQ(normal[0], 0);
+  EXPECT_EQ(normal[1], 0);
+  EXPECT_EQ(normal[2], 1);
+}
+
+TEST(Stl, TextIsReadWhateverItsSpacesAndCase) {
+  EXPECT_EQ(parse_stl(bytes_of(text_stl()), "plate.stl"), two_triangles());
+  EXPECT_EQ(parse_stl(bytes_of(text_stl() + text_stl()), "plate.stl").size(), 4u);  // several solids
+}
+
+TEST(Stl, LengthTellsBinaryFromTextWhateverTheFirstWord) {
+  Bytes bytes = stl_bytes(two_triangles(), "title");
+  std::memcpy(bytes.data(), "solid made by a careless exporter", 33);
+  EXPECT_EQ(parse_stl(bytes, "plate.stl"), two_triangles());
+  bytes.pop_back();  // now neither: cut off, and no text because of its zero bytes
+  expect_refused(bytes, "announces 2 triangles, expected 184 bytes, found 183");
+  EXPECT_THROW(stl_bytes({}, "solid"), std::invalid_argument);
+}
+
+TEST(Stl, DamagedBinaryNamesTheTriangleOrTheLength) {
+  const Bytes good = stl_bytes(two_triangles(), "title");
+  for (const float value : {std::numeric_limits<float>::quiet_NaN(), INFINITY, -1e7F}) {
+    Bytes bad = good;
+    std::memcpy(bad.data() + 84 + 50 + 12 + 8, &value, sizeof value);
+    expect_refused(bad, "triangle 2 has the coordinate");
+  }
+  Bytes absurd = good;
+  const std::uint32_t count = 0xFFFF'FFFF;
+  std::memcpy(absurd.data() + 80, &count, sizeof count);
+  expect_refused(absurd, "announces 4294967295 triangles, expected 214748364834 bytes, found 184");
+  expect_refused({}, "has 0 bytes");
+  expect_refused(stl_bytes({}, "empty"), "holds no triangle");
+  for (std::size_t length = 0; length < good.size(); ++length)
+    EXPECT_THROW(parse_stl(std::span(good).first(length), "x"), FileError) << length;
+}
+
+TEST(Stl, DamagedTextNamesTheLine) {
+  const std::string good = text_stl();
+  expect_refused(bytes_of("solid\nendsolid"), "holds no triangle");
+  expect_refused(bytes_of("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 nan 0"),
+                 "line 4: expected a number within +-1000000 mm, found 'nan'");
+  expect_refused(bytes_of("solid\nfacet normal 0 0 1\nouter lop"), "line 3: expected loop, found 'lop'");
+  expect_refused(bytes_of("solid\nfacet normal 0 0 1\nouter loop\nvertex 1 2"), "found the end of the file");
+  expect_refused(bytes_of("solid\nfacet\n"), "expected normal");
+  expect_refused(bytes_of("solids of gold"), "line 1: expected solid, found 'solids'");
+  expect_refused(bytes_of("solid of gold"), "expected facet or endsolid, found the end of the file");
+  for (std::size_t length = 0; length < good.rfind("endsolid") + 8; ++length)
+    EXPECT_THROW(parse_stl(bytes_of(good.substr(0, length)), "x"), FileError) << length;
+}
+
+TEST(Stl, HostileHeadersCostNothing) {
+  Bytes bytes(84);
+  const auto begin = std::chrono::steady_clock::now();
+  for (const std::uint32_t count : {1u, 1000u, 0x7FFF'FFFFu, 0xFFFF'FFFFu}) {
+    std::memcpy(bytes.data() + 80, &count, sizeof count);
+    EXPECT_THROW(parse_stl(bytes, "x"), FileError);
+  }
+  // 1000 times the time it takes: the count must not size anything.
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(10));
+}
+
+TEST(Stl, FilesAreReadWithALimit) {
+  const TemporaryFolder folder;
+  write_file(folder / "plate.stl", stl_bytes(two_triangles(), "title"));
+  EXPECT_EQ(read_stl(folder / "plate.stl"), two_triangles());
+  EXPECT_THROW(read_stl(folder / "missing.stl"), FileError);
+  write_file(folder / "huge.stl", std::string());
+  std::filesystem::resize_file(folder / "huge.stl", kMaxStlBytes + 1);  // sparse
+  EXPECT_THROW(read_stl(folder / "huge.stl"), FileError);
+}
+
+TEST(Stl, EveryFlippedByteIsReadOrRefused) {
+  const Bytes binary = stl_bytes(two_triangles(), "title"), text = bytes_of(text_stl());
+  for (const Bytes& good : {binary, text})
+    for (std::size_t i = 0; i < good.size(); ++i)
+      for (const unsigned change : {0x01u, 0x80u, 0xFFu}) {
+        Bytes bad = good;
+        bad[i] ^= std::byte(change);
+        EXPECT_NO_THROW(check_stl(bad)) << i;
+      }
+}
+
+TEST(Stl, FuzzCorpus) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(SUPERTAC_FUZZ_CORPUS "/stl")) {
+    EXPECT_NO_THROW(check_stl(read_file(entry.path().string(), kMaxStlBytes))) << entry.path();
+    ++files;
+  }
+  EXPECT_GT(files, 10);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,91 @@
+#include "data/plates/truth.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <vector>
+
+namespace supertac {
+namespace {
+
+std::vector<float> image_at(const Plate& plate, double x, double y, int size) {
+  std::vector<float> image(static_cast<std::size_t>(size * size));
+  truth_image(plate, x, y, {size, size, 12.0 / size}, image);
+  return image;
+}
+
+// One hemisphere, centred on (18, 54): with the finger 3 mm left and 4 mm short of it, the scene is symmetric
+// in neither direction, so a swapped or mirrored axis shows.
+const Plate& one_blob() {
+  static const Plate plate("one blob", {{.kind = TextureKind::blobs, .pitch_mm = 40, .height_mm = 1.5}});
+  return plate;
+}
+
+TEST(Truth, RowsGrowWithYAndColumnsWithX) {
+  const auto image = image_at(one_blob(), 15, 50, 12);  // pixels of 1 mm, first centre at (9.5, 44.5)
+  for (int r = 0; r < 12; ++r)
+    for (int c = 0; c < 12; ++c)
+      EXPECT_FLOAT_EQ(image[static_cast<std::size_t>(12 * r + c)],
+                      static_cast<float>(one_blob().height(9.5 + c, 44.5 + r) / 1.5));
+  EXPECT_GT(image[12 * 9 + 8], 0.8F);   // row of y = 53.5, column of x = 17.5
+  EXPECT_EQ(image[12 * 8 + 11], 0.0F);  // its transpose side
+  EXPECT_EQ(image[12 * 2 + 8], 0.0F);   // mirrored in y
+  EXPECT_EQ(image[12 * 9 + 3], 0.0F);   // mirrored in x
+}
+
+TEST(Truth, EverySizeCoversTheSameTwelveMillimetres) {
+  for (int size : {8, 16, 32}) {
+    const auto image = image_at(one_blob(), 15, 50, size);
+    const double pixel = 12.0 / size;
+    double sum = 0, row = 0, column = 0;
+    for (int r = 0; r < size; ++r)
+      for (int c = 0; c < size; ++c) {
+        const double v = image[static_cast<std::size_t>(size * r + c)];
+        sum += v, row += v * (r + 0.5) * pixel, column += v * (c + 0.5) * pixel;
+      }
+    EXPECT_NEAR(row / sum, 10, 0.1) << size;                                       // 54 - (50 - 6)
+    EXPECT_NEAR(column / sum, 9, 0.1) << size;                                     // 18 - (15 - 6)
+    EXPECT_NEAR(sum * pixel * pixel, 2.0 / 3 * 3.14159 * 1.5 * 1.5, 0.5) << size;  // volume / height
+  }
+}
+
+TEST(Truth, ScalesHeightsToTheUnitInterval) {
+  const Plate waves = Plate::named("4_Waves"), bumps = Plate::named("3_Bumps");
+  EXPECT_NEAR(truth_value(waves, 5, 40.5), 1, 1e-12);
+  EXPECT_NEAR(truth_value(waves, 5, 45), 0, 1e-12);
+  EXPECT_NEAR(truth_value(waves, 5, 30), 0.5, 1e-12);  // flat: (0 + h) / 2h
+  EXPECT_NEAR(truth_value(bumps, 5, 42), 1, 1e-12);
+  EXPECT_EQ(truth_value(bumps, 5, 30), 0);
+  for (double y = 20; y < 90; y += 0.77)
+    for (const auto& name : rig_plates()) {
+      const double v = truth_value(Plate::named(name), 7, y);
+      EXPECT_GE(v, 0) << name;
+      EXPECT_LE(v, 1) << name;
+    }
+}
+
+TEST(Truth, FlatScenesAreFlat) {
+  for (const float v : image_at(Plate::named("plain"), 18, 54, 16)) EXPECT_EQ(v, 0.0F);
+  for (const float v : image_at(Plate::named("3_Bumps"), 18, 30, 16)) EXPECT_EQ(v, 0.0F);
+}
+
+TEST(Truth, CoversEveryTaxelsSquareOfAnyArray) {
+  const TaxelArray array{.rows = 2, .columns = 6, .pitch_mm = 2};
+  const ImageGrid grid = array.picture(4);
+  EXPECT_EQ(grid, (ImageGrid{8, 24, 0.5}));
+  std::vector<float> image(grid.pixels());
+  truth_image(one_blob(), 15, 52, grid, image);  // x 9 .. 21, y 50 .. 54
+  for (int r = 0; r < 8; ++r)
+    for (int c = 0; c < 24; ++c)
+      EXPECT_FLOAT_EQ(image[static_cast<std::size_t>(24 * r + c)],
+                      static_cast<float>(one_blob().height(9.25 + 0.5 * c, 50.25 + 0.5 * r) / 1.5));
+}
+
+TEST(Truth, RefusesAnImageOfTheWrongSize) {
+  std::vector<float> image(255);
+  EXPECT_THROW(truth_image(Plate::named("plain"), 0, 0, ImageGrid{}, image), std::invalid_argument);
+  EXPECT_THROW(truth_image(Plate::named("plain"), 0, 0, {0, 0, 1}, {}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,191 @@
+#include "data/recordings/recording.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "io/file.h"
+#include "io/safetensors.h"
+#include "tests/data/test_recordings.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+template <class Error>
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "nothing thrown";
+}
+
+Recording example() {
+  Recording recording = make_recording({.plate = "3_Bumps", .trial = 2, .pass = 5, .frames = 7});
+  recording.metadata["filter_s"] = "0.0992";
+  return recording;
+}
+
+TEST(Recording, RoundTripKeepsEverything) {
+  TemporaryFolder folder;
+  Recording written = example();
+  written.position_mm[3] = std::numeric_limits<float>::quiet_NaN();
+  write_recording(folder.file("a.safetensors"), written);
+  const Recording read = read_recording(folder.file("a.safetensors"));
+  EXPECT_EQ(read.time_s, written.time_s);
+  EXPECT_EQ(read.volts, written.volts);
+  ASSERT_EQ(read.position_mm.size(), written.position_mm.size());
+  EXPECT_TRUE(std::isnan(read.position_mm[3]));
+  EXPECT_EQ(read.position_mm[4], written.position_mm[4]);
+  EXPECT_EQ(read.plate, "3_Bumps");
+  EXPECT_EQ(read.trial, 2);
+  EXPECT_EQ(read.pass, 5);
+  EXPECT_EQ(read.speed_mm_s, 10);
+  EXPECT_EQ(read.source, "simulated");
+  EXPECT_EQ(read.metadata, written.metadata);
+}
+
+TEST(Recording, CarriesItsArrayUnlessItIsTheRigs) {
+  TemporaryFolder folder;
+  write_recording(folder.file("rig"), example());
+  EXPECT_FALSE(SafetensorsFile::read(folder.file("rig")).metadata().contains("array"));
+  Recording written = example();
+  written.array = {.rows = 2, .columns = 3, .pitch_mm = 2.5, .channels = 3};
+  written.volts.resize(written.frames() * 18);
+  write_recording(folder.file("other"), written);
+  const Recording read = read_recording(folder.file("other"));
+  EXPECT_EQ(read.array, written.array);
+  EXPECT_EQ(read.volts, written.volts);
+  EXPECT_EQ(read.metadata, written.metadata);
+  EXPECT_EQ(read.array.text(), "2x3 taxels at 2.5 mm with 3 channels");
+}
+
+TEST(Recording, RefusesAnArrayThatIsNone) {
+  TemporaryFolder folder;
+  Recording recording = example();
+  recording.metadata["array"] = "4x4";
+  EXPECT_NE(message_of<std::invalid_argument>([&] {
+              write_recording(folder.file("a"), recording);
+            }).find("is a member of the recording"),
+            std::string::npos);
+  recording = example();
+  recording.array.rows = 17;
+  recording.volts.resize(recording.frames() * 17 * 4);
+  EXPECT_THROW(write_recording(folder.file("a"), recording), std::invalid_argument);
+  std::map<std::string, std::string> metadata{{"kind", "recording"}, {"plate", "3_Bumps"},
+                                              {"trial", "1"},        {"pass", "1"},
+                                              {"speed_mm_s", "10"},  {"source", "other"}};
+  for (const char* array :
+       {"4x4", R"({"rows": 4})", R"({"rows": 0, "columns": 4, "pitch_mm": 3, "channels": 1})"}) {
+    metadata["array"] = array;
+    write_safetensors(folder.file("a"), metadata, {});
+    EXPECT_NE(message_of<FileError>([&] { read_recording(folder.file("a")); }).find("expected"),
+              std::string::npos)
+        << array;
+  }
+}
+
+TEST(Recording, PositionsMayBeUnknown) {
+  TemporaryFolder folder;
+  Recording recording = example();
+  recording.position_mm.clear();
+  write_recording(folder.file("a"), recording);
+  EXPECT_TRUE(read_recording(folder.file("a")).position_mm.empty());
+}
+
+TEST(Recording, FileNameTellsWhatItIs) {
+  Recording recording = example();
+  EXPECT_EQ(recording_file_name(recording), "3_Bumps_t2_p5_v10.safetensors");
+  recording.speed_mm_s = 7.5;
+  EXPECT_EQ(recording_file_name(recording), "3_Bumps_t2_p5_v7.5.safetensors");
+}
+
+TEST(Recording, WritesNoneThatBreaksARule) {
+  TemporaryFolder folder;
+  const auto message = [&](const std::function<void(Recording&)>& damage) {
+    Recording recording = example();
+    damage(recording);
+    return message_of<std::invalid_argument>([&] { write_recording(folder.file("a"), recording); });
+  };
+  EXPECT_EQ(message([](Recording& r) { r.volts.pop_back(); }),
+            "write_recording: volts has 111 values, expected 112 for 7 frames");
+  EXPECT_EQ(message([](Recording& r) { r.position_mm.pop_back(); }),
+            "write_recording: position_mm has 13 values, expected 14 for 7 frames");
+  EXPECT_EQ(message([](Recording& r) { r.time_s[3] = r.time_s[2]; }),
+            "write_recording: time_s does not increase at frame 3");
+  EXPECT_EQ(message([](Recording& r) { r.time_s[3] = std::nan(""); }),
+            "write_recording: time_s is not finite at frame 3");
+  EXPECT_EQ(message([](Recording& r) { r.volts[17] = INFINITY; }),
+            "write_recording: volts are not finite at frame 1, taxel 1");
+  EXPECT_EQ(message([](Recording& r) { r.trial = -1; }),
+            "write_recording: trial and pass must not be negative");
+  EXPECT_EQ(message([](Recording& r) { r.metadata["plate"] = "x"; }),
+            "write_recording: the metadata field 'plate' is a member of the recording; set it there");
+  EXPECT_EQ(folder.entries(), 0u);
+}
+
+/// A file as write_recording makes it, with some of its parts replaced.
+struct Parts {
+  std::map<std::string, std::string> metadata = {{"kind", "recording"}, {"plate", "p"},
+                                                 {"trial", "1"},        {"pass", "1"},
+                                                 {"speed_mm_s", "10"},  {"source", "imported"}};
+  std::vector<double> time_s = {0, 0.1};
+  std::vector<float> volts = std::vector<float>(32, 2.4F);
+  std::vector<std::uint64_t> volts_shape = {2, 16};
+};
+
+std::string message_of_parts(const Parts& parts) {
+  TemporaryFolder folder;
+  write_safetensors(folder.file("a"), parts.metadata,
+                    {{"time_s", "F64", {parts.time_s.size()}, std::as_bytes(std::span(parts.time_s))},
+                     {"volts", "F32", parts.volts_shape, std::as_bytes(std::span(parts.volts))}});
+  const std::string message = message_of<FileError>([&] { read_recording(folder.file("a")); });
+  const std::size_t path = folder.file("a: ").size();  // every message begins with it
+  return message.starts_with(folder.file("a: ")) ? message.substr(path) : message;
+}
+
+TEST(Recording, ReadsNoneThatBreaksARule) {
+  const auto with = [](const std::string& key, const std::string& value) {
+    Parts parts;
+    parts.metadata[key] = value;
+    return message_of_parts(parts);
+  };
+  EXPECT_EQ(message_of_parts({}), "nothing thrown");
+  EXPECT_EQ(with("kind", "checkpoint"), "is a 'checkpoint', expected a recording");
+  EXPECT_EQ(with("trial", "-1"), "trial is '-1', expected a number from 0 to 1000000");
+  EXPECT_EQ(with("pass", "99999999999999999999"),
+            "pass is '99999999999999999999', expected a number from 0 to 1000000");
+  EXPECT_EQ(with("speed_mm_s", "fast"), "speed_mm_s is 'fast', expected a number");
+  EXPECT_EQ(with("speed_mm_s", "nan"), "speed_mm_s must be 0 or more; record or import it again");
+  Parts parts;
+  parts.metadata.erase("plate");
+  EXPECT_EQ(message_of_parts(parts), "is not a recording: the metadata lacks 'plate'");
+  parts = {};
+  parts.volts_shape = {16, 2};
+  EXPECT_EQ(message_of_parts(parts), "tensor 'volts' has shape [16,2], expected [2,16]");
+  parts = {};
+  parts.time_s = {0.1, 0.1};
+  EXPECT_EQ(message_of_parts(parts), "time_s does not increase at frame 1; record or import it again");
+  parts = {};
+  parts.volts[20] = NAN;
+  EXPECT_EQ(message_of_parts(parts), "volts are not finite at frame 1, taxel 4; record or import it again");
+}
+
+TEST(Recording, ListsAFolderByName) {
+  TemporaryFolder folder;
+  EXPECT_NE(message_of<FileError>([&] { list_recordings(folder.path()); }).find("has no recordings"),
+            std::string::npos);
+  EXPECT_NE(
+      message_of<FileError>([&] { list_recordings(folder.file("none")); }).find("cannot list the folder"),
+      std::string::npos);
+  for (const char* name : {"b.safetensors", "a.safetensors", "notes.txt"}) write_file(folder.file(name), "x");
+  EXPECT_EQ(list_recordings(folder.path()),
+            (std::vector<std::string>{folder.file("a.safetensors"), folder.file("b.safetensors")}));
+}
+
+}  // namespace
+}  // namespace supertac

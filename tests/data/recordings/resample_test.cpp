@@ -1,0 +1,134 @@
+#include "data/recordings/resample.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "tests/data/test_recordings.h"
+
+namespace supertac {
+namespace {
+
+const ResampleSettings kWide{.scaling = {.rest_volts = 3.0, .span_volts = 2.0}};
+
+void remove_frame(Recording& recording, std::size_t i) {
+  const auto at = [i](auto& values, std::size_t n) {
+    const auto first = values.begin() + static_cast<std::ptrdiff_t>(i * n);
+    values.erase(first, first + static_cast<std::ptrdiff_t>(n));
+  };
+  at(recording.time_s, 1);
+  at(recording.volts, kTaxels);
+  at(recording.position_mm, 2);
+}
+
+TEST(Scaling, MapsRestToZeroAndClips) {
+  const Scaling scaling;
+  EXPECT_NEAR(scaling(2.45F), 0, 1e-6);
+  EXPECT_NEAR(scaling(2.09F), 1, 1e-6);
+  EXPECT_NEAR(scaling(2.27F), 0.5, 1e-6);
+  EXPECT_EQ(scaling(3.3F), 0);
+  EXPECT_EQ(scaling(0), 1);
+}
+
+TEST(Resample, LeavesARecordingAtItsRateAsItIs) {
+  const Recording recording = make_recording({});
+  const Track track = resample(recording, kWide);
+  ASSERT_EQ(track.frames(), recording.frames());
+  for (std::size_t i = 0; i < recording.volts.size(); ++i)
+    ASSERT_EQ(track.samples[i], kWide.scaling(recording.volts[i])) << i;
+  for (std::size_t i = 0; i < recording.position_mm.size(); ++i)
+    ASSERT_NEAR(track.position_mm[i], recording.position_mm[i], 1e-4) << i;
+  EXPECT_EQ(track.held, 0U);
+  EXPECT_EQ(track.gaps, 0U);
+  EXPECT_EQ(track.run.back(), 100U);
+}
+
+TEST(Resample, AveragesWhatArrivedInAPeriod) {
+  const Recording recording = make_recording({.frames = 901, .rate_hz = 900});
+  const Track track = resample(recording, kWide);
+  ASSERT_EQ(track.frames(), 301U);
+  // Period 10 is centred on frame 30 and holds 29, 30, 31.
+  EXPECT_NEAR(track.samples[10 * kTaxels], kWide.scaling(2.0F + 0.030F), 1e-6);
+  EXPECT_NEAR(track.position_mm[2 * 10 + 1], 30 + 10.0 * 10 / 300, 1e-5);
+}
+
+TEST(Resample, LooksNoFurtherAheadThanHalfAPeriod) {
+  const Recording recording = make_recording({.frames = 901, .rate_hz = 900});
+  Recording changed = recording;
+  for (std::size_t i = 32 * kTaxels; i < changed.volts.size(); ++i) changed.volts[i] = 1.5F;
+  const Track before = resample(recording, kWide), after = resample(changed, kWide);
+  for (std::size_t i = 0; i < 11 * kTaxels; ++i) ASSERT_EQ(before.samples[i], after.samples[i]);
+  EXPECT_NE(before.samples[11 * kTaxels], after.samples[11 * kTaxels]);
+}
+
+TEST(Resample, HoldsALostSampleAndCountsIt) {
+  Recording recording = make_recording({});
+  remove_frame(recording, 40);
+  const Track track = resample(recording, kWide);
+  ASSERT_EQ(track.frames(), 100U);
+  EXPECT_EQ(track.held, 1U);
+  EXPECT_EQ(track.gaps, 0U);
+  EXPECT_EQ(track.samples[40 * kTaxels], track.samples[39 * kTaxels]);
+  EXPECT_NEAR(track.position_mm[2 * 40 + 1], 30 + 10.0 * 40 / 300, 1e-4);  // the finger went on moving
+  EXPECT_EQ(track.run.back(), 100U);
+}
+
+TEST(Resample, NeverFillsAGap) {
+  Recording recording = make_recording({});
+  for (std::size_t i = 60; i < 100; ++i) recording.time_s[i] += 0.2;
+  const Track track = resample(recording, kWide);
+  EXPECT_EQ(track.frames(), 100U);
+  EXPECT_EQ(track.gaps, 1U);
+  EXPECT_EQ(track.held, 0U);
+  EXPECT_EQ(track.run[59], 60U);
+  EXPECT_EQ(track.run[60], 1U);
+  EXPECT_EQ(track.run.back(), 40U);
+}
+
+TEST(Resample, TakesADamagedFrameAsLost) {
+  Recording recording = make_recording({});
+  recording.volts[40 * kTaxels + 3] = std::numeric_limits<float>::quiet_NaN();
+  const Track track = resample(recording, kWide);
+  EXPECT_EQ(track.damaged, 1U);
+  EXPECT_EQ(track.held, 1U);
+  for (const float v : track.samples) ASSERT_TRUE(std::isfinite(v));
+}
+
+TEST(Resample, ToleratesJitter) {
+  Recording recording = make_recording({});
+  for (std::size_t i = 1; i < 100; ++i) recording.time_s[i] += (i % 2 == 0 ? 0.3 : -0.3) / 300;
+  const Track track = resample(recording, kWide);
+  EXPECT_EQ(track.frames(), 100U);
+  EXPECT_EQ(track.held, 0U);
+}
+
+TEST(Resample, KeepsUnknownPositionsUnknown) {
+  Recording recording = make_recording({});
+  recording.position_mm.clear();
+  const Track none = resample(recording, kWide);
+  EXPECT_TRUE(std::isnan(none.position_mm[17]));
+  EXPECT_EQ(none.position_mm.size(), 200U);
+}
+
+TEST(Resample, OfNothingIsNothing) { EXPECT_EQ(resample(Recording{}, kWide).frames(), 0U); }
+
+TEST(Resample, RefusesTimesThatDoNotIncreaseAndSizesThatDisagree) {
+  Recording recording = make_recording({});
+  recording.time_s[7] = recording.time_s[6];
+  try {
+    resample(recording, kWide);
+    FAIL() << "took a time twice";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("time stamps must increase, frame 7"), std::string::npos);
+  }
+  recording = make_recording({});
+  recording.volts.pop_back();
+  EXPECT_THROW(resample(recording, kWide), std::runtime_error);
+  EXPECT_THROW(resample(make_recording({}), {.rate_hz = 0}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,170 @@
+#include "data/recordings/simulator.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+
+namespace supertac {
+namespace {
+
+SimulatorSettings clean() {
+  SimulatorSettings settings;
+  for (const auto& term : simulator_terms()) settings = without_term(settings, term);
+  return settings;
+}
+
+double deepest(const Recording& recording, int taxel) {
+  float lowest = 9;
+  for (std::size_t i = 0; i < recording.frames(); ++i)
+    lowest = std::min(lowest, recording.volts[i * kTaxels + static_cast<std::size_t>(taxel)]);
+  return 2.442 - lowest;
+}
+
+// Root of the mean squared difference, in mV, over passes that differ in nothing but a term.
+double rms_change_mv(const std::string& term) {
+  double sum = 0, n = 0;
+  for (const char* plate : {"bumps12", "ridges6"})
+    for (const int pass : {1, 4}) {
+      const SimulatorSettings with = without_term({}, "loss");  // frames must correspond
+      const Recording a = simulate_pass(Plate::named(plate), {.pass = pass}, with);
+      const Recording b = simulate_pass(Plate::named(plate), {.pass = pass}, without_term(with, term));
+      for (std::size_t i = 0; i < a.volts.size(); ++i) sum += std::pow(a.volts[i] - b.volts[i], 2), n += 1;
+    }
+  return 1000 * std::sqrt(sum / n);
+}
+
+TEST(Simulator, DefaultsMakeTheRigsNumberOfFrames) {
+  double frames = 0;
+  for (const double speed : {5.0, 10.0})
+    frames +=
+        96.0 * static_cast<double>(simulate_pass(Plate::named("bumps12"), {.speed_mm_s = speed}).frames());
+  EXPECT_NEAR(frames, 466'000, 3'000);
+}
+
+TEST(Simulator, SameSeedSameRecordingOtherSeedOther) {
+  const Plate plate = Plate::named("ridges6");
+  const Recording a = simulate_pass(plate, {.pass = 3}), b = simulate_pass(plate, {.pass = 3});
+  EXPECT_EQ(a.time_s, b.time_s);
+  EXPECT_EQ(a.volts, b.volts);
+  EXPECT_NE(a.volts, simulate_pass(plate, {.pass = 3}, {}, 2).volts);
+  EXPECT_NE(a.volts, simulate_pass(plate, {.pass = 4}).volts);
+}
+
+TEST(Simulator, EachRowFeelsTheRidgeWhereItIs) {
+  const Recording r = simulate_pass(Plate("one", {{TextureKind::ridges, 40, 2.5}}), {.pass = 4}, clean());
+  const double crest = Plate("one", {{TextureKind::ridges, 40, 2.5}}).crests()[0];
+  for (int k = 0; k < kTaxels; ++k) {
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < r.frames(); ++i)
+      if (r.volts[i * kTaxels + static_cast<std::size_t>(k)] <
+          r.volts[at * kTaxels + static_cast<std::size_t>(k)])
+        at = i;
+    EXPECT_NEAR(r.position_mm[2 * at + 1] + TaxelArray{}.y_mm(k), crest, 0.1) << k;
+  }
+}
+
+TEST(Simulator, AnyArrayFeelsTheRidgeWhereItIs) {
+  SimulatorSettings settings = clean();
+  settings.array = {.rows = 6, .columns = 3, .pitch_mm = 2};
+  const Plate plate("one", {{TextureKind::ridges, 40, 2.5}});
+  const Recording r = simulate_pass(plate, {.pass = 4}, settings);
+  EXPECT_EQ(r.array, settings.array);
+  ASSERT_EQ(r.volts.size(), r.frames() * 18);
+  for (std::size_t k = 0; k < 18; ++k) {
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < r.frames(); ++i)
+      if (r.volts[i * 18 + k] < r.volts[at * 18 + k]) at = i;
+    EXPECT_NEAR(r.position_mm[2 * at + 1] + settings.array.y_mm(static_cast<int>(k)), plate.crests()[0], 0.15)
+        << k;
+  }
+  // A taxel far outside of the rig's pad still has points to feel with.
+  settings.array = {.rows = 16, .columns = 16, .pitch_mm = 5};
+  for (const double load : FingerModel(plate, settings, {}).loads({.x_mm = 18, .y_mm = 54, .z_mm = -1}))
+    EXPECT_TRUE(std::isfinite(load));
+  settings.array.channels = 2;
+  EXPECT_THROW(simulate_pass(plate, {}, settings), std::invalid_argument);
+}
+
+TEST(Simulator, FourPhases) {
+  // Without variation the finger presses the flat plate, as half of the rig's passes do.
+  const Recording r =
+      simulate_pass(Plate::named("plain"), {.pass = 4}, without_term(without_term({}, "loss"), "variation"));
+  const auto y = [&](std::size_t i) { return r.position_mm[2 * i + 1]; };
+  const std::size_t n = r.frames();
+  EXPECT_EQ(y(0), 28);
+  EXPECT_EQ(y(30), 28);                       // onset: comes down in place
+  EXPECT_NEAR(y(1545), 78, 1);                // slides
+  EXPECT_EQ(y(n - 1), 80);                    // release and re-position
+  EXPECT_GT(r.position_mm[2 * (n - 1)], 17);  // on its way to the next pass
+  EXPECT_GT(deepest(r, 5), 0.005);            // the flat plate is touched
+}
+
+TEST(Simulator, ResemblesTheRig) {
+  const Recording middle = simulate_pass(Plate::named("3_Bumps"), {.pass = 4});
+  EXPECT_GT(deepest(middle, 4), 0.2);
+  EXPECT_GT(deepest(middle, 15), 0.15);
+  EXPECT_LT(deepest(middle, 2), 0.15);
+  const Recording side =
+      simulate_pass(Plate::named("3_Bumps"), {.pass = 1});  // half the finger beside the plate
+  EXPECT_GT(deepest(side, 7), 4 * deepest(side, 4));
+  for (const float v : middle.volts) {
+    EXPECT_GE(v, 2.091F);
+    EXPECT_LE(v, 2.46F);
+  }
+}
+
+// Prints the table of data/README.md.
+TEST(Simulator, EveryTermChangesSomething) {
+  for (const auto& term : simulator_terms()) {
+    if (term == "loss") continue;
+    const double change = rms_change_mv(term);
+    std::printf("| %s | %.2f |\n", term.c_str(), change);
+    EXPECT_GT(change, 0.01) << term;
+  }
+}
+
+TEST(Simulator, LossLeavesGapsInTheStampsNotInTheOrder) {
+  SimulatorSettings settings;
+  settings.lost_fraction = 0.3;
+  const Recording r = simulate_pass(Plate::named("bumps6"), {}, settings);
+  EXPECT_LT(r.frames(), 1300u);
+  EXPECT_EQ(r.volts.size(), r.frames() * kTaxels);
+  EXPECT_EQ(r.position_mm.size(), r.frames() * 2);
+  for (std::size_t i = 1; i < r.frames(); ++i) EXPECT_GT(r.time_s[i], r.time_s[i - 1]);
+}
+
+TEST(Simulator, RefusesImpossiblePasses) {
+  const Plate plate = Plate::named("plain");
+  EXPECT_THROW(simulate_pass(plate, {.speed_mm_s = 0}), std::invalid_argument);
+  EXPECT_THROW(simulate_pass(plate, {.from_mm = 80, .to_mm = 28}), std::invalid_argument);
+  EXPECT_THROW(simulate_pass(plate, {.to_mm = 120}), std::invalid_argument);
+  EXPECT_THROW(simulate_pass(plate, {.pass = 9}), std::invalid_argument);
+  EXPECT_THROW(without_term({}, "gravity"), std::invalid_argument);
+}
+
+TEST(FingerModel, TheMountLiftsTheOtherRowsOffThePlate) {
+  const Plate plate("one", {{TextureKind::bumps, 40, 2.5}});
+  SimulatorSettings yielding = clean();
+  yielding.with_mount = true;
+  const double crest = plate.crests()[0];
+  const FingerPose on_bump{
+      .x_mm = 18, .y_mm = crest - TaxelArray{}.y_mm(12), .z_mm = -0.35};  // row 3 on the bump
+  EXPECT_GT(FingerModel(plate, clean(), {}).loads(on_bump)[0], 0.1);
+  EXPECT_EQ(FingerModel(plate, yielding, {}).loads(on_bump)[0], 0);
+  EXPECT_GT(FingerModel(plate, yielding, {}).loads(on_bump)[12], 0.1);
+  EXPECT_GT(FingerModel(plate, yielding, {}).loads({.x_mm = 18, .y_mm = 20, .z_mm = -0.35})[0], 0.01);
+}
+
+TEST(FingerModel, AdcRoundTrips) {
+  EXPECT_EQ(FingerModel::adc(2.44), 3029);
+  EXPECT_EQ(FingerModel::adc(-1), 0);
+  EXPECT_EQ(FingerModel::adc(9), 4095);
+  for (const int code : {0, 1, 3028, 4095})
+    EXPECT_EQ(FingerModel::adc(FingerModel::volts_of_adc(code)), code);
+}
+
+}  // namespace
+}  // namespace supertac

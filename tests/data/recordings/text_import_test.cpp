@@ -1,0 +1,147 @@
+#include "data/recordings/text_import.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <iostream>
+
+#include "io/file.h"
+#include "io/random.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+std::string line_of(double first) {
+  std::string line;
+  for (int k = 0; k < kTaxels; ++k) line += std::to_string(first + 0.01 * k) + " ";
+  return line + "\n";
+}
+
+/// `count` good lines, the n-th starting with 2 + n / 1000 volts.
+std::string good_lines(int count) {
+  std::string text;
+  for (int i = 0; i < count; ++i) text += line_of(2 + 0.001 * i);
+  return text;
+}
+
+struct Result {
+  Recording recording;
+  ImportReport report;
+  std::string error;
+};
+
+Result import_text(const std::string& text) {
+  TemporaryFolder folder;
+  write_file(folder.file("1.txt"), text);
+  Result result;
+  try {
+    result.recording = import_text_pass(folder.file("1.txt"), result.report);
+  } catch (const FileError& error) {
+    result.error = error.what();
+  }
+  return result;
+}
+
+TEST(TextImport, ReadsFramesInOrder) {
+  const Result result = import_text(good_lines(3));
+  EXPECT_EQ(result.error, "");
+  ASSERT_EQ(result.recording.frames(), 3u);
+  EXPECT_FLOAT_EQ(result.recording.volts[0], 2.0F);
+  EXPECT_FLOAT_EQ(result.recording.volts[2 * kTaxels + 5], 2.052F);
+  EXPECT_EQ(result.recording.time_s, (std::vector<double>{0, 1 / kImportRateHz, 2 / kImportRateHz}));
+  EXPECT_TRUE(result.recording.position_mm.empty());
+  EXPECT_EQ(result.recording.metadata.at("time_base"), "nominal");
+  EXPECT_EQ(result.recording.source, "imported");
+}
+
+TEST(TextImport, TakesTabsCommasWindowsLinesAndNoLastNewline) {
+  std::string text = good_lines(2);
+  for (char& c : text) c = c == ' ' ? '\t' : c;
+  text += "2.1,2.1,2.1,2.1, 2.1,2.1,2.1,2.1, 2.1,2.1,2.1,2.1, 2.1,2.1,2.1,2.1\r\n\r\n";
+  text += line_of(2.2).substr(0, line_of(2.2).size() - 2);
+  const Result result = import_text(text);
+  EXPECT_EQ(result.report.frames, 4u);
+  EXPECT_EQ(result.report.empty, 1u);
+}
+
+TEST(TextImport, DropsAndCountsEveryKindOfBadLineAndLeavesAGap) {
+  const std::string good = line_of(2.0);
+  const std::string cut = good.substr(0, 30) + "\n";
+  const std::string glued = good.substr(0, good.size() - 1) + good;
+  const std::string run_together = "2.12.2 " + good.substr(good.find(' ') + 1);
+  const std::string word = "x " + good.substr(good.find(' ') + 1);
+  const std::string nan = "nan " + good.substr(good.find(' ') + 1);
+  const std::string far = "24.4 " + good.substr(good.find(' ') + 1);
+  const std::string below = "-0.1 " + good.substr(good.find(' ') + 1);
+  const Result result = import_text(good_lines(50) + cut + glued + run_together + word + nan + far + below +
+                                    "\n" + good_lines(50));
+  EXPECT_EQ(result.error, "");
+  const ImportReport& report = result.report;
+  EXPECT_EQ(report.lines, 108u);
+  EXPECT_EQ(report.frames, 100u);
+  EXPECT_EQ(report.too_few, 1u);
+  EXPECT_EQ(report.too_many, 1u);
+  EXPECT_EQ(report.not_numeric, 2u);
+  EXPECT_EQ(report.malformed(), 4u);
+  EXPECT_EQ(report.non_finite, 1u);
+  EXPECT_EQ(report.out_of_range, 2u);
+  EXPECT_EQ(report.empty, 1u);
+  EXPECT_EQ(result.recording.frames(), 100u);
+  EXPECT_DOUBLE_EQ(result.recording.time_s[50], 57 / kImportRateHz);  // seven dropped frames, no blank line
+}
+
+TEST(TextImport, RefusesWhatIsNoRecording) {
+  EXPECT_NE(import_text("").error.find("is empty"), std::string::npos);
+  EXPECT_NE(import_text("\n \n\n").error.find("is empty"), std::string::npos);
+  EXPECT_NE(import_text("Some text\nof another kind\n").error.find("2 of 2 lines are not 16 voltages"),
+            std::string::npos);
+  EXPECT_NE(import_text(std::string(5000, '\0')).error.find("is it a recording?"), std::string::npos);
+  EXPECT_NE(import_text(good_lines(8) + "1 2 3\n").error.find("1 of 9 lines"), std::string::npos);
+  EXPECT_EQ(import_text(good_lines(9) + "1 2 3\n").error, "");
+  ImportReport report;
+  EXPECT_THROW(import_text_pass("/nowhere/1.txt", report), FileError);
+}
+
+TEST(TextImport, OneEndlessLineIsOneBadLine) {
+  const Result result = import_text(std::string(1 << 20, '1'));
+  EXPECT_EQ(result.report.too_few, 1u);
+  EXPECT_NE(result.error, "");
+}
+
+TEST(TextImport, EveryPrefixAndRandomDamageEndInARecordingOrAnError) {
+  const std::string text = good_lines(30);
+  for (std::size_t length = 0; length < text.size(); length += 7) {
+    const Result result = import_text(text.substr(0, length));
+    EXPECT_EQ(result.error.empty(), result.recording.frames() > 0);
+  }
+  const RandomStream random(5, 5);
+  for (std::uint64_t i = 0; i < 500; ++i) {
+    std::string damaged = text;
+    for (std::uint64_t j = 0; j < 5; ++j) {
+      damaged[random.bits(i * 10 + j) % damaged.size()] =
+          static_cast<char>(random.bits(1'000'000 + i * 10 + j));
+    }
+    const Result result = import_text(damaged);
+    const ImportReport& r = result.report;
+    EXPECT_EQ(r.lines, r.frames + r.malformed() + r.non_finite + r.out_of_range + r.empty);
+    for (const float volts : result.recording.volts) ASSERT_TRUE(volts >= 0 && volts <= 3.3F);
+  }
+}
+
+TEST(TextImport, RealRecording) {
+  const char* folder = std::getenv("SUPERTAC_RECORDINGS");
+  if (folder == nullptr) {
+    std::cout << "SUPERTAC_RECORDINGS is not set: no real recording checked\n";
+    return;
+  }
+  ImportReport report;
+  const Recording recording = import_text_pass(std::string(folder) + "/3_Bumps/1/1.txt", report);
+  EXPECT_EQ(report.lines, 9694u);
+  EXPECT_EQ(report.frames, recording.frames());
+  EXPECT_EQ(report.malformed() + report.frames, report.lines);
+  EXPECT_EQ(report.frames, 9648u);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,66 @@
+#include "data/registration/contacts.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace supertac {
+namespace {
+
+// Triangular dips of half-width 0.2 s on taxel 6, everything else at rest.
+Recording dips(const std::vector<double>& centres, double depth, double floor = 0) {
+  Recording recording;
+  for (int i = 0; i < 3000; ++i) {
+    const double t = i / 500.0;
+    recording.time_s.push_back(t);
+    for (int k = 0; k < kTaxels; ++k) {
+      double v = 2.44;
+      for (const double c : centres)
+        if (k == 6) v -= depth * std::max(0.0, 1 - std::abs(t - c) / 0.2);
+      recording.volts.push_back(static_cast<float>(std::max(v, floor)));
+    }
+  }
+  return recording;
+}
+
+TEST(Contacts, FindsTimeDepthAndWidth) {
+  const auto found = find_contacts(dips({1.5, 3.0}, 0.1));
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].taxel, 6);
+  EXPECT_NEAR(found[0].time_s, 1.5, 0.003);
+  EXPECT_NEAR(found[1].time_s, 3.0, 0.003);
+  EXPECT_NEAR(found[0].depth_v, 0.1, 0.004);
+  EXPECT_NEAR(found[0].width_s, 0.2, 0.01);
+}
+
+TEST(Contacts, SaturationDoesNotMoveTheMiddle) {
+  const auto found = find_contacts(dips({2.0}, 0.6, 2.2));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NEAR(found[0].time_s, 2.0, 0.003);
+}
+
+TEST(Contacts, IgnoresNoiseFlatSignalsAndHoles) {
+  EXPECT_TRUE(find_contacts(dips({}, 0)).empty());
+  EXPECT_TRUE(find_contacts(dips({2.0}, 0.005)).empty());
+  EXPECT_TRUE(find_contacts(Recording{}).empty());
+  Recording holes = dips({1.5}, 0.1);
+  for (std::size_t i = 700; i < 720; ++i)
+    holes.volts[i * kTaxels + 6] = std::numeric_limits<float>::quiet_NaN();
+  const auto found = find_contacts(holes);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NEAR(found[0].time_s, 1.5, 0.005);
+}
+
+TEST(Contacts, RefusesArraysThatDoNotFit) {
+  Recording recording = dips({1.5}, 0.1);
+  recording.volts.pop_back();
+  EXPECT_THROW(find_contacts(recording), std::invalid_argument);
+  recording = dips({1.5}, 0.1);
+  recording.time_s.back() = 1e9;
+  EXPECT_THROW(find_contacts(recording), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace supertac

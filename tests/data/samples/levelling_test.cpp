@@ -1,0 +1,81 @@
+#include "data/samples/levelling.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace supertac {
+namespace {
+
+constexpr std::size_t kFrames = 100, kChannels = 2;
+constexpr float kStep = 1.0F / 256;
+
+// Taxel 0 swings between rest and rest + swing, ten samples each; taxel 1 stays at `other`.
+std::vector<float> window(float rest, float swing, float other = 0) {
+  std::vector<float> x;
+  for (std::size_t t = 0; t < kFrames; ++t) {
+    x.push_back(rest + (t / 10 % 2 == 1 ? swing : 0));
+    x.push_back(other);
+  }
+  return x;
+}
+
+std::vector<float> levelled(std::vector<float> x) {
+  level(x, kChannels);
+  return x;
+}
+
+TEST(Levelling, TakesHalfTheRestAndDividesByTheSwing) {
+  const std::vector<float> x = levelled(window(0.25F, 0.5F, 0.125F));
+  EXPECT_FLOAT_EQ(x[0], 0.125F / 0.5F) << "at rest";
+  EXPECT_FLOAT_EQ(x[10 * kChannels], 1) << "0.625 / 0.5, clipped";
+  EXPECT_FLOAT_EQ(x[1], 0.0625F / 0.5F) << "a taxel that is pressed throughout keeps half of it";
+}
+
+TEST(Levelling, AFingerPressedHarderLooksTheSame) {
+  const std::vector<float> soft = levelled(window(0, 0.2F)), hard = levelled(window(0, 0.8F));
+  for (std::size_t i = 0; i < soft.size(); ++i) EXPECT_NEAR(soft[i], hard[i], kStep / 0.2F) << i;
+}
+
+TEST(Levelling, AQuietWindowIsNotMadeLouder) {
+  const std::vector<float> x = levelled(window(0, 0.03F));
+  EXPECT_FLOAT_EQ(x[10 * kChannels], 0.03F / kLeastGain);
+  for (const float value : levelled(std::vector<float>(kFrames * kChannels, 0))) EXPECT_EQ(value, 0);
+}
+
+TEST(Levelling, TwoGlitchesDoNotSetTheGain) {
+  std::vector<float> x = window(0, 0.25F);
+  const std::vector<float> clean = levelled(x);
+  x[3 * kChannels] = x[47 * kChannels] = 1;
+  const std::vector<float> glitchy = levelled(x);
+  EXPECT_EQ(glitchy[3 * kChannels], 1);
+  for (std::size_t t = 0; t < kFrames; ++t) {
+    if (t == 3 || t == 47) continue;
+    EXPECT_EQ(glitchy[t * kChannels], clean[t * kChannels]) << t;
+  }
+}
+
+TEST(Levelling, SaturatedDeadAndShortWindowsStayInRange) {
+  for (const float value : {0.0F, 0.5F, 1.0F}) {
+    for (const std::size_t frames : {std::size_t{1}, std::size_t{2}, std::size_t{512}}) {
+      std::vector<float> x(frames * kChannels, value);
+      level(x, kChannels);
+      for (const float y : x) ASSERT_TRUE(y >= 0 && y <= 1) << value << " x " << frames << ": " << y;
+    }
+  }
+}
+
+TEST(Levelling, RefusesWhatIsNoWindow) {
+  std::vector<float> x(7);
+  EXPECT_THROW(level(x, 2), std::invalid_argument);
+  EXPECT_THROW(level(x, 0), std::invalid_argument);
+  EXPECT_THROW(level({}, 2), std::invalid_argument);
+  std::vector<float> too_long(60'001);
+  EXPECT_THROW(level(too_long, 1), std::invalid_argument) << "its counts would not fit";
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,194 @@
+#include "data/scores/baselines.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+#include <vector>
+
+#include "data/samples/split.h"
+#include "tests/data/test_recordings.h"
+
+namespace supertac {
+namespace {
+
+std::vector<float> upsampled(Upsampling::Kind kind, const std::vector<float>& frame, int size = 16) {
+  std::vector<float> out(static_cast<std::size_t>(size * size));
+  Upsampling(kind, 4, 4, size / 4)(frame, out);
+  return out;
+}
+
+// x and y (mm) of the centre of pixel i of 16.
+double centre(std::size_t i) { return -6 + (static_cast<double>(i) + 0.5) * 0.75; }
+
+std::vector<float> ramp(double per_x, double per_y) {
+  std::vector<float> frame(16);
+  for (std::size_t k = 0; k < 16; ++k) {
+    const double x = -4.5 + 3.0 * static_cast<double>(k % 4), y = -4.5 + 3.0 * static_cast<double>(k / 4);
+    frame[k] = static_cast<float>(per_x * x + per_y * y);
+  }
+  return frame;
+}
+
+TEST(Upsampling, NearestRepeatsTheTaxel) {
+  std::vector<float> frame(16);
+  std::iota(frame.begin(), frame.end(), 0.0F);
+  const auto image = upsampled(Upsampling::Kind::nearest, frame);
+  for (std::size_t r = 0; r < 16; ++r)
+    for (std::size_t c = 0; c < 16; ++c) ASSERT_EQ(image[r * 16 + c], frame[(r / 4) * 4 + c / 4]);
+}
+
+TEST(Upsampling, BicubicKeepsConstants) {
+  for (const int size : {8, 16, 32})
+    for (const float v : upsampled(Upsampling::Kind::bicubic, std::vector<float>(16, 0.7F), size))
+      ASSERT_NEAR(v, 0.7, 1e-6);
+}
+
+// Rows grow with y and columns with x, and pixels sit where the truth image says they do.
+TEST(Upsampling, BicubicReproducesARampBetweenTheTaxels) {
+  const auto along_x = upsampled(Upsampling::Kind::bicubic, ramp(1, 0));
+  const auto along_y = upsampled(Upsampling::Kind::bicubic, ramp(0, 1));
+  for (std::size_t r = 0; r < 16; ++r) {
+    for (std::size_t c = 6; c < 10; ++c) {  // where all four taxels of the kernel exist
+      EXPECT_NEAR(along_x[r * 16 + c], centre(c), 1e-5);
+      EXPECT_NEAR(along_y[c * 16 + r], centre(c), 1e-5);
+    }
+  }
+}
+
+TEST(Upsampling, BicubicHasKeysWeights) {
+  // Row 7 of 16: u = 7.5/4 - .5 = 1.375; a lone taxel in row 1 weighs k(.375) there.
+  std::vector<float> frame(16, 0.0F);
+  for (std::size_t c = 0; c < 4; ++c) frame[4 + c] = 1;
+  const double d = 0.375;
+  EXPECT_NEAR(upsampled(Upsampling::Kind::bicubic, frame)[7 * 16 + 5], 1.5 * d * d * d - 2.5 * d * d + 1,
+              1e-6);
+}
+
+TEST(Upsampling, TakesArraysOfAnyShape) {
+  const std::vector<float> frame = {1, 2, 3, 4, 5, 6};  // 2 rows of 3
+  std::vector<float> nearest(24), bicubic(24);
+  Upsampling(Upsampling::Kind::nearest, 2, 3, 2)(frame, nearest);
+  Upsampling(Upsampling::Kind::bicubic, 2, 3, 2)(frame, bicubic);
+  for (std::size_t r = 0; r < 4; ++r)
+    for (std::size_t c = 0; c < 6; ++c) {
+      EXPECT_EQ(nearest[r * 6 + c], frame[(r / 2) * 3 + c / 2]);
+      EXPECT_NEAR(bicubic[r * 6 + c], nearest[r * 6 + c], 1.2) << r << " " << c;
+    }
+  EXPECT_LT(bicubic[0], bicubic[5]);
+  EXPECT_LT(bicubic[0], bicubic[18]);
+}
+
+TEST(Upsampling, RefusesOtherSizes) {
+  std::vector<float> out(256);
+  const auto nearest = Upsampling::Kind::nearest;
+  EXPECT_THROW(Upsampling(nearest, 4, 4, 0), std::invalid_argument);
+  EXPECT_THROW(Upsampling(nearest, 0, 4, 2), std::invalid_argument);
+  EXPECT_THROW(Upsampling(nearest, 4, 4, 4)(std::vector<float>(15), out), std::invalid_argument);
+  EXPECT_THROW(Upsampling(nearest, 4, 4, 2)(std::vector<float>(16), out), std::invalid_argument);
+}
+
+// A pass whose frames show the bicubic picture's own truth, shrunk and shifted: taxel = .2 + .5 height.
+WindowSet make_set() {
+  Recording recording = make_recording({.plate = "bumps12", .frames = 900, .start_y_mm = 40});
+  const Plate plate = Plate::named("bumps12");
+  for (std::size_t i = 0; i < recording.frames(); ++i) {
+    const double y = recording.position_mm[2 * i + 1];
+    for (int k = 0; k < kTaxels; ++k) {
+      const double height = plate.height(18, y - 4.5 + 3 * (k / 4)) / plate.max_height();
+      recording.volts[i * kTaxels + static_cast<std::size_t>(k)] =
+          static_cast<float>(3 - 2 * (0.2 + 0.5 * height));
+    }
+  }
+  WindowSet set(wide_settings(16));
+  set.add(recording);
+  return set;
+}
+
+double mean_error(const WindowSet& set, const Baseline& baseline) {
+  std::vector<float> out(256), truth(256);
+  double sum = 0;
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    baseline.predict(set.window(i), out);
+    set.truth(i, truth);
+    for (std::size_t p = 0; p < 256; ++p) sum += (out[p] - truth[p]) * (out[p] - truth[p]);
+  }
+  return sum / 256 / static_cast<double>(set.size());
+}
+
+TEST(Baselines, UndoTheScaleOfTheSignal) {
+  const WindowSet set = make_set();
+  const auto train = make_split(set, SplitKind::none, 1).train;
+  const UpsampledFrame bicubic(Upsampling::Kind::bicubic, set, train);
+  // The least-squares line is shrunk below 1 / .5 because bicubic misses part of the shape.
+  EXPECT_GT(bicubic.slope(), 1.2);
+  EXPECT_LT(bicubic.slope(), 2.05);
+  std::vector<float> flat(256);
+  bicubic.predict(std::vector<float>(16 * 16, 0.2F), flat);
+  EXPECT_NEAR(flat[100], 0, 0.15);
+}
+
+TEST(Baselines, AreOrderedOnASignalThatShowsTheSurface) {
+  const WindowSet set = make_set();
+  const auto train = make_split(set, SplitKind::none, 1).train;
+  const auto baselines = fit_baselines(set, train);
+  ASSERT_EQ(baselines.size(), 4U);
+  EXPECT_EQ(baselines[0]->name(), "mean_image");
+  EXPECT_EQ(baselines[1]->name(), "nearest");
+  EXPECT_EQ(baselines[2]->name(), "bicubic");
+  EXPECT_EQ(baselines[3]->name(), "ridge");
+  const double mean = mean_error(set, *baselines[0]), nearest = mean_error(set, *baselines[1]),
+               bicubic = mean_error(set, *baselines[2]);
+  EXPECT_LT(bicubic, nearest);
+  EXPECT_LT(nearest, 0.5 * mean);
+}
+
+TEST(Baselines, MeanImageIsTheMeanTruthWhateverItSees) {
+  const WindowSet set = make_set();
+  const std::vector<std::uint32_t> train{3, 400};
+  const MeanImage mean(set, train);
+  std::vector<float> out(256), a(256), b(256);
+  mean.predict(set.window(0), out);
+  set.truth(3, a);
+  set.truth(400, b);
+  for (std::size_t p = 0; p < 256; ++p) ASSERT_NEAR(out[p], (a[p] + b[p]) / 2, 1e-6);
+}
+
+TEST(Baselines, AllButRidgeSeeTheLastFrameOnly) {
+  const WindowSet set = make_set();
+  const auto baselines = fit_baselines(set, make_split(set, SplitKind::none, 1).train);
+  std::vector<float> window(set.window(200).begin(), set.window(200).end()), out(256), again(256);
+  for (const auto& baseline : baselines) {
+    baseline->predict(window, out);
+    auto changed = window;
+    std::fill(changed.begin(), changed.end() - 16, 0.0F);
+    baseline->predict(changed, again);
+    EXPECT_EQ(out == again, baseline->name() != "ridge") << baseline->name();
+  }
+}
+
+TEST(Baselines, ASignalThatNeverChangesGivesTheMean) {
+  Recording rest = make_recording({.frames = 300, .start_y_mm = 50});
+  std::fill(rest.volts.begin(), rest.volts.end(), 2.4F);
+  WindowSet set(wide_settings(16));
+  set.add(rest);
+  const UpsampledFrame bicubic(Upsampling::Kind::bicubic, set, make_split(set, SplitKind::none, 1).train);
+  EXPECT_EQ(bicubic.slope(), 0);
+  EXPECT_GT(bicubic.intercept(), 0);
+}
+
+TEST(Baselines, NeedWindowsToFitTo) {
+  const WindowSet set = make_set();
+  EXPECT_THROW(fit_baselines(set, {}), std::invalid_argument);
+  const auto baselines = fit_baselines(set, make_split(set, SplitKind::none, 1).train);
+  std::vector<float> out(256), small(64);
+  for (const auto& baseline : baselines) {
+    EXPECT_THROW(baseline->predict(std::vector<float>(15), out), std::invalid_argument);
+    EXPECT_THROW(baseline->predict(set.window(0), small), std::invalid_argument);
+  }
+}
+
+}  // namespace
+}  // namespace supertac
