@@ -8,6 +8,7 @@
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
+#include "data/scores/metrics.h"
 #include "data/scores/pair_baselines.h"
 #include "io/file.h"
 #include "io/numbers.h"

@@ -9,6 +9,7 @@
 #include "apps/common/signals.h"
 #include "apps/common/version.h"
 #include "apps/train/log_means.h"
+#include "data/scores/metrics.h"
 #include "io/file.h"
 #include "io/numbers.h"
 #include "models/pair_trainer.h"

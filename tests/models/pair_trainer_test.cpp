@@ -7,6 +7,7 @@
 #include <memory>
 #include <numeric>
 
+#include "data/scores/metrics.h"
 #include "models/model_file.h"
 #include "tests/models/support.h"
 

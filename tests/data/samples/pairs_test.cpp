@@ -6,6 +6,7 @@
 #include <numeric>
 #include <set>
 
+#include "data/scores/metrics.h"
 #include "data/scores/pair_baselines.h"
 #include "io/file.h"
 #include "tests/io/temporary_folder.h"
