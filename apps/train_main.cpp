@@ -21,7 +21,6 @@ void declare(Arguments& a) {
   a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512 (default: the preset's)", "");
   a.option("latent", "LD", "latent numbers per group of taxels", "10");
   a.option("scale", "N", "pictures N times as fine as the array, which the recordings name: 2, 4 or 8", "4");
-  a.option("upsampling", "NAME", "how pictures grow: transposed or sub-pixel convolution", "transposed");
   declare_training(a);
   a.option("seed", "N", "of split, initial weights, order, noise", "0");
   a.option("resume", "FILE", "continue from the last.safetensors of an interrupted run, same options");
@@ -36,7 +35,6 @@ TrainingSettings settings_of(const Arguments& a) {
   }
   s.model.latent = a.integer("latent", 1, 256);
   s.model.scale = std::stoi(a.choice("scale", {"2", "4", "8"}));
-  s.model.sub_pixel = a.choice("upsampling", {"transposed", "sub-pixel"}) == "sub-pixel";
   s.seed = static_cast<std::uint64_t>(a.integer("seed", 0, std::numeric_limits<std::int64_t>::max()));
   return s;
 }

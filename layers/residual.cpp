@@ -5,7 +5,6 @@
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/attention.h"
-#include "autograd/ops/shaping.h"
 
 namespace supertac {
 namespace {
@@ -24,11 +23,6 @@ std::vector<Rcab> make_blocks(const RirbOptions& options, Rng& rng) {
   std::vector<Rcab> blocks;
   for (Dim i = 0; i < options.blocks; ++i) blocks.emplace_back(options.channels, options.reduction, rng);
   return blocks;
-}
-
-std::variant<ConvTranspose2d, Conv2d> make_up(const RirbOptions& o, Rng& rng) {
-  if (o.sub_pixel) return Conv2d(o.channels, 4 * o.channels, kSameSize, rng);
-  return ConvTranspose2d(o.channels, o.channels, {.kernel = 4, .stride = 2, .padding = 1}, rng);
 }
 
 }  // namespace
@@ -61,18 +55,16 @@ Variable Rcab::forward(const Variable& x) const {
 Rirb::Rirb(const RirbOptions& options, Rng& rng)
     : blocks_(make_blocks(options, rng)),
       conv_(options.channels, options.channels, kSameSize, rng),
-      up_(make_up(options, rng)) {
+      up_(options.channels, options.channels, {.kernel = 4, .stride = 2, .padding = 1}, rng) {
   for (std::size_t i = 0; i < blocks_.size(); ++i) add("rcab." + std::to_string(i), blocks_[i]);
   add("conv", conv_);
-  std::visit([this](const Module& up) { add("up", up); }, up_);
+  add("up", up_);
 }
 
 Variable Rirb::forward(const Variable& x) const {
   Variable h = x;
   for (const Rcab& block : blocks_) h = block.forward(h);
-  const Variable sum = supertac::add(x, conv_.forward(h));
-  if (const auto* conv = std::get_if<Conv2d>(&up_)) return pixel_shuffle(conv->forward(sum, kLeakyRelu), 2);
-  return std::get<ConvTranspose2d>(up_).forward(sum, kLeakyRelu);
+  return up_.forward(supertac::add(x, conv_.forward(h)), kLeakyRelu);
 }
 
 }  // namespace supertac

@@ -1,7 +1,6 @@
 // Residual blocks with channel attention (Zhang et al. 2018, RCAN) and the upsampling stage of SuperTac.
 #pragma once
 
-#include <variant>
 #include <vector>
 
 #include "layers/convolution.h"
@@ -35,14 +34,12 @@ class Rcab : public Module {
 
 struct RirbOptions {
   Dim channels = 32;
-  Dim reduction = 4;       ///< of the channels inside channel attention
-  Dim blocks = 3;          ///< RCABs
-  bool sub_pixel = false;  ///< how it doubles the size
+  Dim reduction = 4;  ///< of the channels inside channel attention
+  Dim blocks = 3;     ///< RCABs
 };
 
 /// Residual in residual, then twice the size: leaky_relu(up(x + conv(rcab(...rcab(x))))).
-/// x [N,H,W,C] -> [N,2H,2W,C]; up is a transposed convolution of kernel 4, stride 2, padding 1, or with
-/// sub_pixel a 3x3 convolution to 4 C channels and pixel_shuffle (Shi et al. 2016).
+/// x [N,H,W,C] -> [N,2H,2W,C]; up is a transposed convolution of kernel 4, stride 2, padding 1.
 class Rirb : public Module {
  public:
   Rirb(const RirbOptions& options, Rng& rng);
@@ -51,7 +48,7 @@ class Rirb : public Module {
  private:
   std::vector<Rcab> blocks_;
   Conv2d conv_;
-  std::variant<ConvTranspose2d, Conv2d> up_;
+  ConvTranspose2d up_;
 };
 
 }  // namespace supertac

@@ -26,7 +26,7 @@ double upsampler_macs(const SuperTacSettings& s) {
   Dim macs = s.groups() * s.latent * c * pixels;
   for (Dim size = 1; size < s.scale; size *= 2, pixels *= 4) {
     const Dim conv = pixels * 9 * c * c, attention = 2 * c * (c / RirbOptions{}.reduction);
-    macs += s.rcabs * (2 * conv + attention) + conv + (s.sub_pixel ? 4 * conv : pixels * 16 * c * c);
+    macs += s.rcabs * (2 * conv + attention) + conv + pixels * 16 * c * c;
   }
   return static_cast<double>(macs + pixels * 9 * c);
 }

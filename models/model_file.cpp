@@ -24,7 +24,12 @@ SuperTacSettings read_settings(const JsonEntry& entry) {
   s.scale = entry.integer("scale");
   s.channels = entry.integer("channels");
   s.rcabs = entry.integer("rcabs");
-  s.sub_pixel = entry.flag("sub_pixel");
+  if (entry.flag("sub_pixel")) {
+    throw std::runtime_error(
+        entry.where() +
+        ": expected transposed convolution, found \"sub_pixel\", which SuperTac no longer "
+        "computes (22 % slower, no more accurate); train the model again");
+  }
   try {
     s.grouping = grouping_of(entry.text("grouping"));
     s.check();
@@ -56,9 +61,8 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
   Json settings = {{"preset", s.preset}, {"timesteps", s.timesteps},        {"latent", s.latent},
                    {"scale", s.scale},   {"grouping", name_of(s.grouping)}, {"channels", s.channels},
                    {"rcabs", s.rcabs}};
-  if (s.sub_pixel)
-    settings["sub_pixel"] = true;  // left out otherwise: the text of older files stays the same
-  if (s.rows != 4 || s.columns != 4 || s.in_channels != 1) {  // as little of the rig's array
+  // What is as it always was is left out: the text of older files stays the same.
+  if (s.rows != 4 || s.columns != 4 || s.in_channels != 1) {
     settings["rows"] = s.rows;
     settings["columns"] = s.columns;
     settings["in_channels"] = s.in_channels;
@@ -68,7 +72,7 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
                   {"span_volts", input.scaling.span_volts},
                   {"filter_s", input.filter_s ? Json(*input.filter_s) : Json(nullptr)},
                   {"formula", "clip((rest_volts - V) / span_volts, 0, 1)"}};
-  if (input.scaling.levelled) scaling["levelled"] = true;  // left out otherwise, as sub_pixel
+  if (input.scaling.levelled) scaling["levelled"] = true;
   if (input.pitch_mm != InputSettings{}.pitch_mm) scaling["pitch_mm"] = input.pitch_mm;
   return {{"settings", settings.dump()}, {"input", scaling.dump()}};
 }

@@ -35,7 +35,7 @@ std::vector<Part> make_parts(const SuperTacSettings& s, Rng& rng) {
 std::vector<Rirb> make_rirbs(const SuperTacSettings& s, Rng& rng) {
   std::vector<Rirb> rirbs;
   for (Dim size = 1; size < s.scale; size *= 2) {
-    rirbs.emplace_back(RirbOptions{.channels = s.channels, .blocks = s.rcabs, .sub_pixel = s.sub_pixel}, rng);
+    rirbs.emplace_back(RirbOptions{.channels = s.channels, .blocks = s.rcabs}, rng);
   }
   return rirbs;
 }

@@ -29,9 +29,8 @@ struct SuperTacSettings {
   Dim latent = 10;            ///< LD: 1 to 256
   Dim scale = 4;  ///< 2, 4, 8: pictures so many times finer than the array, 7 or more pixels a side
   Grouping grouping = Grouping::horizontal;
-  Dim channels = 32;       ///< of the upsampler
-  Dim rcabs = 3;           ///< in each RIRB
-  bool sub_pixel = false;  ///< RIRBs enlarge by sub-pixel instead of transposed convolution
+  Dim channels = 32;  ///< of the upsampler
+  Dim rcabs = 3;      ///< in each RIRB
 
   Dim signals() const { return rows * columns * in_channels; }  ///< numbers in a frame
   Dim groups() const { return grouping == Grouping::horizontal ? rows : columns; }

@@ -20,9 +20,8 @@ namespace {
 constexpr std::size_t kTestPairsPerEpoch = 2000;
 
 void refuse_options_of_recordings(const Arguments& a) {
-  for (const char* name :
-       {"data", "also", "preset", "timesteps", "latent", "scale", "grouping", "rate", "stride", "scaling",
-        "augment", "loss-a", "beta", "plates", "upsampling", "autoencoder"}) {
+  for (const char* name : {"data", "also", "preset", "timesteps", "latent", "scale", "grouping", "rate",
+                           "stride", "scaling", "augment", "loss-a", "beta", "plates", "autoencoder"}) {
     if (a.given(name))
       throw UsageError(std::string("--") + name + ": is about recordings and has no meaning with --pairs");
   }

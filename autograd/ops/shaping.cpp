@@ -52,24 +52,6 @@ Variable transpose_inner(const char* op, const Variable& x, Dim images, Dim rows
   });
 }
 
-// Calls move(coarse, fine) for every element of a pixel_shuffle: its place in x [images,h,w,c r r] and in
-// y [images,r h,r w,c].
-template <class Move>
-void for_each_shuffled(const Shape& x, Dim r, Move move) {
-  const Dim c = x[3] / (r * r), rows = x[0] * x[1], w = x[2];
-  for (Dim row = 0; row < rows; ++row) {  // of all images: fine row r row + i
-    for (Dim column = 0; column < w; ++column) {
-      const Dim coarse = (row * w + column) * x[3];
-      for (Dim i = 0; i < r; ++i) {
-        for (Dim j = 0; j < r; ++j) {
-          const Dim fine = (((row * r + i) * w + column) * r + j) * c;
-          for (Dim k = 0; k < c; ++k) move(coarse + (k * r + i) * r + j, fine + k);
-        }
-      }
-    }
-  }
-}
-
 }  // namespace
 
 Variable reshape(const Variable& x, const Shape& shape) {
@@ -150,25 +132,6 @@ Variable unflatten_channels_first(const Variable& x, std::span<const Dim> pixels
   const Shape shape =
       pixels.size() == 1 ? Shape{images, pixels[0], channels} : Shape{images, pixels[0], pixels[1], channels};
   return transpose_inner("unflatten_channels_first", x, images, channels, count, shape);
-}
-
-Variable pixel_shuffle(const Variable& x, Dim r) {
-  check_rank("pixel_shuffle", "x", x, 4);
-  if (r < 1 || x.dim(3) % (r * r) != 0) {
-    refuse("pixel_shuffle", "factor " + std::to_string(r) + " does not fit x " + x.shape().text() +
-                                ": its square must divide the channels");
-  }
-  Tensor y(Shape{x.dim(0), r * x.dim(1), r * x.dim(2), x.dim(3) / (r * r)});
-  const real* from = x.value().data();
-  real* to = y.data();
-  for_each_shuffled(x.shape(), r, [=](Dim coarse, Dim fine) { to[fine] = from[coarse]; });
-  return record("pixel_shuffle", y, {&x}, [r](Backward& b) {
-    Tensor* gx = b.grad_of(0);
-    if (gx == nullptr) return;
-    const real* gy = b.gy().data();
-    real* g = gx->data();
-    for_each_shuffled(gx->shape(), r, [=](Dim coarse, Dim fine) { g[coarse] += gy[fine]; });
-  });
 }
 
 }  // namespace supertac

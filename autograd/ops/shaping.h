@@ -20,10 +20,4 @@ Variable flatten_channels_first(const Variable& x);
 /// The inverse: [N, C P] -> [N, P..., C] with the given pixels, {L} or {H,W}.
 Variable unflatten_channels_first(const Variable& x, std::span<const Dim> pixels);
 
-/// Every r x r pixels of the result come from the channels of one pixel (sub-pixel convolution, Shi et al.
-/// 2016, eq. 4; channels in PyTorch's order):
-///   y[n, r h + i, r w + j, c] = x[n, h, w, (c r + i) r + j].   x [N,H,W,C r r] -> [N,rH,rW,C]
-/// Throws std::invalid_argument unless x has rank 4, r >= 1 and r r divides its channels.
-Variable pixel_shuffle(const Variable& x, Dim r);
-
 }  // namespace supertac

@@ -6,7 +6,7 @@ import sys
 
 from summarise import mean_and_interval
 
-NAMES = {"trial": "paper", "best": "best: four of paper averaged", "tiny": "tiny", "sub-pixel": "paper, sub-pixel", "plain-autoencoder": "paper, plain autoencoder",
+NAMES = {"trial": "paper", "best": "best: four of paper averaged", "tiny": "tiny", "plain-autoencoder": "paper, plain autoencoder",
          "frame": "one frame, our blocks", "srcnn": "one frame, SRCNN-style", "srgan": "one frame, GAN-style"}
 SIMPLE = {"mean_image": "mean image", "nearest": "nearest", "bicubic": "bicubic", "ridge": "ridge from the window"}
 

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Accuracy against cost on the unseen trial: the presets, their parts replaced one at a time (sub-pixel convolution, a plain
-# autoencoder), networks that see one frame (ours; SRCNN- and GAN-style after Wu 2022), and what needs no training.
+# Accuracy against cost on the unseen trial: the presets, `paper` with a plain autoencoder, networks that see one frame (ours;
+# SRCNN- and GAN-style after Wu 2022), and what needs no training.
 # Five seeds. OUT_DIR is that of real_recordings.sh, whose recordings and models are used.
 #   bench/studies/baselines.sh OUT_DIR [BIN_DIR]
 # About an hour on one core; what is there is not made again. Results: OUT_DIR/baselines.csv; baselines.gp draws them.
@@ -25,7 +25,6 @@ evaluate() { # model, options
 for seed in 0 1 2 3 4; do
   train "trial_s$seed"
   train "tiny_s$seed" --preset tiny
-  train "sub-pixel_s$seed" --upsampling sub-pixel
   train "plain-autoencoder_s$seed" --autoencoder plain
   frame="$out/frame_s$seed"
   [ -e "$frame.safetensors" ] || "$bin/supertac-train" --pairs "$out/pairs/train.safetensors" --split none --epochs 10 \

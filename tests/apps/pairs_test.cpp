@@ -119,7 +119,6 @@ TEST(Pairs, RefusesWhatIsAboutRecordingsAndTheOtherModel) {
                                                         {"--latent", "3"},
                                                         {"--scale", "2"},
                                                         {"--rate", "100"},
-                                                        {"--upsampling", "sub-pixel"},
                                                         {"--grouping", "vertical"},
                                                         {"--stride", "2"},
                                                         {"--augment", "none"},

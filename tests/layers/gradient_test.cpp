@@ -60,8 +60,6 @@ TEST(LayerGradients, Rcab) {
 TEST(LayerGradients, Rirb) {
   Rng rng(8);
   expect_right_gradients(Rirb({.channels = 8, .reduction = 4, .blocks = 2}, rng), {1, 3, 4, 8});
-  expect_right_gradients(Rirb({.channels = 8, .reduction = 4, .blocks = 1, .sub_pixel = true}, rng),
-                         {1, 3, 4, 8});
 }
 
 }  // namespace

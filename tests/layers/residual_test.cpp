@@ -50,15 +50,6 @@ TEST(ChannelAttention, RefusesAReductionThatLeavesNoChannel) {
   }
 }
 
-TEST(Rirb, DoublesTheMapBySubPixels) {
-  Rng rng(4);
-  const Rirb rirb({.channels = 8, .reduction = 4, .blocks = 1, .sub_pixel = true}, rng);
-  EXPECT_EQ(rirb.forward(Variable(noise({2, 3, 5, 8}, 2))).shape(), (Shape{2, 6, 10, 8}));
-  const Parameter& weight = rirb.parameters()[rirb.parameters().size() - 2];
-  EXPECT_EQ(weight.name, "up.weight");
-  EXPECT_EQ(weight.value.shape(), (Shape{3, 3, 8, 32}));
-}
-
 TEST(Rirb, DoublesTheMap) {
   Rng rng(4);
   const Rirb rirb({.channels = 8, .reduction = 4, .blocks = 1}, rng);

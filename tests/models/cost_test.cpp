@@ -34,8 +34,7 @@ TEST(Cost, AgreesWithTheWeightsOfTheModel) {
                        .latent = 5,
                        .scale = scale,
                        .channels = 12,
-                       .rcabs = 2,
-                       .sub_pixel = scale == 8};
+                       .rcabs = 2};
     Rng rng(0);
     const SuperTac model(s, rng);
     double inference = 0, forward = 0;

@@ -21,13 +21,11 @@ TEST(ModelFile, ComesBackWithItsSettingsInputAndPictures) {
   Rng rng(1);
   SuperTacSettings settings = small_settings();
   settings.grouping = Grouping::vertical;
-  settings.sub_pixel = true;
   const SuperTac model(settings, rng);
   save_model(folder / "m.safetensors", model, {300, {2.5, 0.4, true}, 0.0992}, {{"split", "trial"}});
   const ModelFile file = load_model(folder / "m.safetensors");
   EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
   EXPECT_EQ(file.model->settings().latent, 3);
-  EXPECT_TRUE(file.model->settings().sub_pixel);
   EXPECT_EQ(file.input.scaling.rest_volts, 2.5);
   EXPECT_TRUE(file.input.scaling.levelled);
   EXPECT_EQ(file.input.filter_s, 0.0992);
@@ -57,14 +55,28 @@ TEST(ModelFile, KeepsTheArrayAndSaysNothingOfTheRigs) {
 TEST(ModelFile, ReadsTheGoldenFileOfVersion1) {
   const ModelFile file = load_model(std::string(SUPERTAC_GOLDEN_DIR) + "/model_v1.safetensors");
   EXPECT_EQ(file.model->settings().channels, 4);
-  EXPECT_FALSE(file.model->settings().sub_pixel) << "a setting younger than the file";
-  EXPECT_FALSE(file.input.scaling.levelled) << "another";
+  EXPECT_FALSE(file.input.scaling.levelled) << "a setting younger than the file";
   EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
   const Tensor picture = file.model->infer(uniform({1, 32, 16}, 1));
   EXPECT_NEAR(picture.data()[0], 0.116217159, 1e-6);
   EXPECT_NEAR(picture.data()[9], 0.15846996, 1e-6);
   EXPECT_NEAR(picture.data()[27], 0.122343943, 1e-6);
   EXPECT_NEAR(picture.data()[63], 0.103620872, 1e-6);
+}
+
+TEST(ModelFile, RefusesSubPixelUpsampling) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "m.safetensors";
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  const std::string settings = model_metadata(small_settings(), {}).at("settings");
+  write_checkpoint(path, model.parameters(),
+                   {{"settings", settings.substr(0, settings.size() - 1) + R"(,"sub_pixel":true})"}});
+  EXPECT_EQ(
+      load_error(path),
+      path +
+          ": metadata \"settings\": expected transposed convolution, found \"sub_pixel\", which SuperTac "
+          "no longer computes (22 % slower, no more accurate); train the model again");
 }
 
 TEST(ModelFile, TheFileNeverSizesAnything) {

@@ -30,18 +30,6 @@ TEST(Shaping, UnflattenUndoesFlatten) {
   for (Dim i = 0; i < x.size(); ++i) ASSERT_EQ(back.value().data()[i], x.data()[i]);
 }
 
-// By hand, and what torch.nn.functional.pixel_shuffle gives for the same numbers in [N,C,H,W].
-TEST(Shaping, PixelShuffleSpreadsChannels) {
-  // One row of two pixels, two channels times 2x2: pixel 0 holds 0..7, pixel 1 holds 10..17.
-  const Variable x(Tensor::of({1, 1, 2, 8}, {0, 1, 2, 3, 4, 5, 6, 7, 10, 11, 12, 13, 14, 15, 16, 17}));
-  expect_values(pixel_shuffle(x, 2).value(), {1, 2, 4, 2},
-                {0, 4, 1, 5, 10, 14, 11, 15, 2, 6, 3, 7, 12, 16, 13, 17});
-  expect_values(pixel_shuffle(x, 1).value(), {1, 1, 2, 8},
-                {0, 1, 2, 3, 4, 5, 6, 7, 10, 11, 12, 13, 14, 15, 16, 17});
-  const Variable nine(Tensor::of({1, 1, 1, 9}, {0, 1, 2, 3, 4, 5, 6, 7, 8}));
-  expect_values(pixel_shuffle(nine, 3).value(), {1, 3, 3, 1}, {0, 1, 2, 3, 4, 5, 6, 7, 8});
-}
-
 TEST(Shaping, SliceUndoesConcat) {
   const Variable a(numbers({2, 3, 4})), b(numbers({2, 3, 5}, 2));
   const Variable back = slice(joined({a, b}), 4, 5);
@@ -72,11 +60,6 @@ TEST(Shaping, RefusesWhatDoesNotFit) {
   expect_refusal("slice: columns 1 to 1 leave x [2,3]", [&] { slice(x, 1, 0); });
   expect_refusal("flatten_channels_first: x expects rank 3 or 4, got [2,3]",
                  [&] { flatten_channels_first(x); });
-  expect_refusal("pixel_shuffle: x expects rank 4, got [2,3]", [&] { pixel_shuffle(x, 2); });
-  expect_refusal("pixel_shuffle: factor 2 does not fit x [1,2,2,6]: its square must divide the channels", [] {
-    pixel_shuffle(Variable(Tensor::zeros({1, 2, 2, 6})), 2);
-  });
-  EXPECT_THROW(pixel_shuffle(Variable(Tensor::zeros({1, 2, 2, 4})), 0), std::invalid_argument);
   expect_refusal("unflatten_channels_first: x expects rank 2, got []", [&] { unflattened(scalar, {1}); });
   expect_refusal("unflatten_channels_first: pixels must be {L} or {H,W}", [&] { unflattened(x, {1, 1, 1}); });
   expect_refusal("unflatten_channels_first: x [2,3] does not divide into 2 pixels",
@@ -92,8 +75,6 @@ TEST(Shaping, Gradients) {
   expect_gradients([](const auto& in) { return slice(in[0], 2, 3); }, {numbers({2, 3, 7})});
   expect_gradients([](const auto& in) { return flatten_channels_first(in[0]); }, {numbers({2, 3, 5, 4})});
   expect_gradients([](const auto& in) { return unflattened(in[0], {2, 3}); }, {numbers({2, 18})});
-  expect_gradients([](const auto& in) { return pixel_shuffle(in[0], 2); }, {numbers({2, 3, 5, 8})});
-  expect_gradients([](const auto& in) { return pixel_shuffle(in[0], 3); }, {numbers({1, 2, 1, 18})});
 }
 #endif
 
