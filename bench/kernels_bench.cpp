@@ -4,6 +4,12 @@
 // GFLOP/s and share count the usual way, padding as if it were data. `useful` is the share of those
 // multiply-adds that meet data: kernels that skip the padding can exceed the peak by its inverse, Winograd's
 // way (3x3, four maps or more) by up to four times that.
+//
+// `yardstick` is the share of the peak that OpenBLAS's cblas_sgemm reaches, on one thread, with the matrix
+// product of that convolution: the picture's patches laid out as a matrix beforehand, which it is not
+// charged.
+#include <cblas.h>
+
 #include "autograd/kernels/conv.h"
 #include "bench/against_peak.h"
 
@@ -109,6 +115,40 @@ struct Buffers {
   Tensor x, w, b, y, gx, gw;
 };
 
+// The product of matrices that a pass is once patches are rows: [pixels, patch] x [patch, channels] where a
+// kernel gathers, [pixels, channels] x [channels, patch] where it scatters, and [patch, pixels] x
+// [pixels, channels] for the weights.
+class Product {
+ public:
+  Product(const Buffers& b, Pass pass) {
+    const bool transposed = b.layer.settings.transposed;
+    const int pixels = static_cast<int>(b.n * (transposed ? b.geometry.in_pixels : b.geometry.out_pixels));
+    const int patch = static_cast<int>(b.geometry.taps * (transposed ? b.layer.cout : b.layer.cin));
+    const int channels = static_cast<int>(transposed ? b.layer.cin : b.layer.cout);
+    const bool gathers = (pass == Pass::forward) != transposed;
+    weights_ = pass == Pass::grad_w;
+    m_ = weights_ ? patch : pixels;
+    n_ = weights_ || gathers ? channels : patch;
+    k_ = weights_ ? pixels : gathers ? patch : channels;
+    const auto floats = [](int rows, int columns, float value) {
+      return std::vector<float>(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns), value);
+    };
+    a_ = floats(m_, k_, 0.5F);
+    b_ = floats(k_, n_, 0.01F);
+    c_ = floats(m_, n_, 0);
+  }
+
+  void run() {
+    cblas_sgemm(CblasRowMajor, weights_ ? CblasTrans : CblasNoTrans, CblasNoTrans, m_, n_, k_, 1, a_.data(),
+                weights_ ? m_ : k_, b_.data(), n_, 0, c_.data(), n_);
+  }
+
+ private:
+  bool weights_;
+  int m_, n_, k_;
+  std::vector<float> a_, b_, c_;
+};
+
 void run_kernel(benchmark::State& state, const Layer& layer, Pass pass) {
   Buffers buffers(layer, state.range(0));
   const kernels::Geometry& g = buffers.geometry;
@@ -117,7 +157,10 @@ void run_kernel(benchmark::State& state, const Layer& layer, Pass pass) {
   const auto pixels = static_cast<double>(layer.settings.transposed ? g.in_pixels : g.out_pixels);
   const double all = pixels * static_cast<double>(g.taps);
   const double channels = static_cast<double>(buffers.n * layer.cin * layer.cout);
-  bench::run_against_peak(state, all * channels, [&] { buffers.run(pass); });
+  Product product(buffers, pass);
+  openblas_set_num_threads(1);
+  bench::run_against_peak(
+      state, all * channels, [&] { buffers.run(pass); }, [&] { product.run(); });
   state.counters["useful"] = meeting / all;
 }
 

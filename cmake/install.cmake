@@ -9,6 +9,8 @@ install(EXPORT supertac NAMESPACE supertac:: DESTINATION ${CMAKE_INSTALL_LIBDIR}
   FILE supertacTargets.cmake)
 file(WRITE ${PROJECT_BINARY_DIR}/supertacConfig.cmake
 "include(CMakeFindDependencyMacro)\nfind_dependency(OpenMP COMPONENTS CXX)\nfind_dependency(Threads)\nfind_dependency(nlohmann_json)
+set(BLA_VENDOR OpenBLAS)
+find_dependency(BLAS)
 include(\${CMAKE_CURRENT_LIST_DIR}/supertacTargets.cmake)\n")
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/supertacConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/supertacConfig.cmake ${PROJECT_BINARY_DIR}/supertacConfigVersion.cmake

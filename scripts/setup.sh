@@ -1,7 +1,8 @@
 #!/bin/sh
 # Installs the Debian packages that building needs, those that are missing only. Arguments: more packages.
 set -eu
-packages="g++ cmake ninja-build nlohmann-json3-dev libcxxopts-dev libeigen3-dev libkissfft-dev libstb-dev $*"
+packages="g++ cmake ninja-build nlohmann-json3-dev libcxxopts-dev libkissfft-dev libopenblas-dev liblapacke-dev
+  libstb-dev $*"
 missing=""
 for package in $packages; do
   dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing="$missing $package"

@@ -1,16 +1,17 @@
 #include "data/scores/ridge.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Core>
+#include <cblas.h>
+#include <lapacke.h>
+#include <omp.h>
+
 #include <algorithm>
+#include <functional>
 #include <stdexcept>
 
 #include "data/samples/split.h"
 
 namespace supertac {
 namespace {
-
-using Matrix = Eigen::MatrixXd;
 
 constexpr std::size_t kSteps = 16, kMostFeatures = 2048;
 constexpr std::size_t kHeldOut = 5;  // every so many passes
@@ -25,7 +26,7 @@ std::size_t features_of(std::size_t timesteps, std::size_t signals) {
 }
 
 // Means over equal stretches of time, then 1.
-void features(std::span<const float> window, std::size_t signals, std::span<double> out) {
+void fill_features(std::span<const float> window, std::size_t signals, std::span<double> out) {
   const std::size_t frames = window.size() / signals, steps = steps_of(frames, signals);
   std::fill(out.begin(), out.end(), 0.0);
   for (std::size_t s = 0; s < steps; ++s) {
@@ -38,56 +39,89 @@ void features(std::span<const float> window, std::size_t signals, std::span<doub
   out.back() = 1;
 }
 
-// What least squares needs of a set of windows: X'X, X'Y and Y'Y.
+// Keeps OpenBLAS to one thread while it lives, so that sums have one order; a build of OpenBLAS with OpenMP
+// takes and changes OpenMP's number of threads.
+class OneThread {
+ public:
+  OneThread() { openblas_set_num_threads(1); }
+  ~OneThread() {
+    openblas_set_num_threads(before_);
+    omp_set_num_threads(openmp_before_);
+  }
+  OneThread(const OneThread&) = delete;
+  OneThread& operator=(const OneThread&) = delete;
+
+ private:
+  int before_ = openblas_get_num_threads(), openmp_before_ = omp_get_max_threads();
+};
+
+// What least squares needs of a set of windows: X'X (its upper triangle), X'Y and Y'Y; all matrices are
+// row-major.
 struct Moments {
-  Matrix xx, xy;
+  int features, pixels;
+  std::vector<double> xx, xy;
   double yy = 0;
 
-  Moments(std::size_t features, std::size_t pixels)
-      : xx(Matrix::Zero(static_cast<Eigen::Index>(features), static_cast<Eigen::Index>(features))),
-        xy(Matrix::Zero(static_cast<Eigen::Index>(features), static_cast<Eigen::Index>(pixels))) {}
-
   Moments(const WindowSet& windows, std::span<const std::uint32_t> indices)
-      : Moments(features_of(static_cast<std::size_t>(windows.timesteps()), windows.array().signals()),
-                windows.image().pixels()) {
+      : features(static_cast<int>(
+            features_of(static_cast<std::size_t>(windows.timesteps()), windows.array().signals()))),
+        pixels(static_cast<int>(windows.image().pixels())),
+        xx(static_cast<std::size_t>(features) * static_cast<std::size_t>(features)),
+        xy(static_cast<std::size_t>(features) * static_cast<std::size_t>(pixels)) {
     constexpr std::size_t kBlock = 512;
-    std::vector<float> truth(static_cast<std::size_t>(xy.cols()));
+    for (std::size_t first = 0; first < indices.size(); first += kBlock)
+      add(windows, indices.subspan(first, std::min(kBlock, indices.size() - first)));
+  }
+
+  void add(const WindowSet& windows, std::span<const std::uint32_t> part) {
+    const auto f = static_cast<std::size_t>(features), p = static_cast<std::size_t>(pixels);
+    std::vector<double> x(part.size() * f), y;
+    std::vector<float> truth(p);
     std::vector<float> window(static_cast<std::size_t>(windows.timesteps()) * windows.array().signals());
-    for (std::size_t first = 0; first < indices.size(); first += kBlock) {
-      const auto part = indices.subspan(first, std::min(kBlock, indices.size() - first));
-      Matrix x(xx.rows(), static_cast<Eigen::Index>(part.size()));  // a window a column
-      Matrix y(xy.cols(), x.cols());
-      for (Eigen::Index n = 0; n < x.cols(); ++n) {
-        const std::uint32_t i = part[static_cast<std::size_t>(n)];
-        windows.window(i, window);
-        features(window, windows.array().signals(), {x.col(n).data(), static_cast<std::size_t>(x.rows())});
-        windows.truth(i, truth);
-        y.col(n) = Eigen::Map<const Eigen::VectorXf>(truth.data(), y.rows()).cast<double>();
-      }
-      xx.noalias() += x * x.transpose();
-      xy.noalias() += x * y.transpose();
-      yy += y.squaredNorm();
+    for (std::size_t n = 0; n < part.size(); ++n) {
+      windows.window(part[n], window);
+      fill_features(window, windows.array().signals(), std::span(x).subspan(n * f, f));
+      windows.truth(part[n], truth);
+      y.insert(y.end(), truth.begin(), truth.end());
     }
+    const int n = static_cast<int>(part.size());
+    cblas_dsyrk(CblasRowMajor, CblasUpper, CblasTrans, features, n, 1, x.data(), features, 1, xx.data(),
+                features);
+    cblas_dgemm(CblasRowMajor, CblasTrans, CblasNoTrans, features, pixels, n, 1, x.data(), features, y.data(),
+                pixels, 1, xy.data(), pixels);
+    yy += dot(y, y);
   }
 
   Moments& operator+=(const Moments& other) {
-    xx += other.xx;
-    xy += other.xy;
+    std::transform(xx.begin(), xx.end(), other.xx.begin(), xx.begin(), std::plus());
+    std::transform(xy.begin(), xy.end(), other.xy.begin(), xy.begin(), std::plus());
     yy += other.yy;
     return *this;
   }
 
-  Matrix solve(double penalty) const {
-    const Eigen::Index n = xx.rows() - 1;
-    Matrix a = xx;
+  // W [f][pixels]
+  std::vector<double> solve(double penalty) const {
+    const auto n = static_cast<std::size_t>(features);
+    double mean = 0;
+    for (std::size_t i = 0; i + 1 < n; ++i) mean += xx[i * (n + 1)] / static_cast<double>(n - 1);
+    std::vector<double> a = xx, w = xy;
     // Taxels that never move leave rows of zeros; the floor keeps the matrix positive definite.
-    a.diagonal().head(n).array() += penalty * xx.diagonal().head(n).mean() + 1e-9;
-    return a.llt().solve(xy);
+    for (std::size_t i = 0; i + 1 < n; ++i) a[i * (n + 1)] += penalty * mean + 1e-9;
+    if (LAPACKE_dposv(LAPACK_ROW_MAJOR, 'U', features, pixels, a.data(), features, w.data(), pixels) != 0)
+      throw std::runtime_error("ridge: X'X of the windows is not positive definite");
+    return w;
   }
 
   // |Y - X W|^2
-  double error(const Matrix& w) const {
-    return yy - 2 * w.cwiseProduct(xy).sum() + w.cwiseProduct(xx * w).sum();
+  double error(const std::vector<double>& w) const {
+    std::vector<double> product(w.size());
+    cblas_dsymm(CblasRowMajor, CblasLeft, CblasUpper, features, pixels, 1, xx.data(), features, w.data(),
+                pixels, 0, product.data(), pixels);
+    return yy - 2 * dot(w, xy) + dot(w, product);
+  }
+
+  static double dot(const std::vector<double>& a, const std::vector<double>& b) {
+    return cblas_ddot(static_cast<int>(a.size()), a.data(), 1, b.data(), 1);
   }
 };
 
@@ -118,6 +152,7 @@ Ridge::Ridge(const WindowSet& windows, std::span<const std::uint32_t> train)
   const std::vector<bool> held = held_out(windows, chosen);
   std::vector<std::uint32_t> fit, judge;
   for (std::size_t n = 0; n < chosen.size(); ++n) (held[n] ? judge : fit).push_back(chosen[n]);
+  const OneThread one_thread;
   Moments moments(windows, fit);
   const Moments other(windows, judge);
   double least = 0;
@@ -128,10 +163,8 @@ Ridge::Ridge(const WindowSet& windows, std::span<const std::uint32_t> train)
       least = error;
     }
   }
-  const Matrix w = (moments += other).solve(penalty_).transpose();  // [pixels][f]; columns are contiguous
-  weights_.resize(static_cast<std::size_t>(w.size()));
-  std::transform(w.data(), w.data() + w.size(), weights_.begin(),
-                 [](double v) { return static_cast<float>(v); });
+  const std::vector<double> w = (moments += other).solve(penalty_);
+  weights_.assign(w.begin(), w.end());
 }
 
 void Ridge::predict(std::span<const float> window, std::span<float> out) const {
@@ -142,7 +175,7 @@ void Ridge::predict(std::span<const float> window, std::span<float> out) const {
                                 std::to_string(out.size()) + " values");
   }
   std::vector<double> used(features_of(timesteps_, signals_));
-  features(window, signals_, used);
+  fill_features(window, signals_, used);
   std::fill(out.begin(), out.end(), 0.0f);
   for (std::size_t f = 0; f < used.size(); ++f) {
     const float* row = weights_.data() + f * pixels_;

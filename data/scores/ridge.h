@@ -14,7 +14,8 @@ namespace supertac {
 ///   penalty   the one of 1e-5 .. 10, times the mean of X'X's diagonal, with the least squared error on every
 ///             fifth pass when fitted to the others (on the last fifth of the windows of a single pass); the
 ///             test side has no part in it
-/// The linear algebra is Eigen's.
+/// The linear algebra is OpenBLAS's, kept to one thread: the weights depend on the processor's instruction
+/// set, but not on the number of threads (docs/determinism.md).
 class Ridge : public Baseline {
  public:
   /// Fits to at most kFitWindows windows, evenly spread. Throws std::invalid_argument when train is empty.

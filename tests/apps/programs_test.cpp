@@ -267,5 +267,19 @@ TEST(Programs, HelpAndVersion) {
   }
 }
 
+TEST(Programs, ThoseThatLinkOpenBlasNameIt) {
+  const auto names_it = [](const std::string& program) {
+    const bool links =
+        read_text_file(std::string(SUPERTAC_BIN) + "/" + program, kPlenty).find("libopenblas") !=
+        std::string::npos;
+    const bool names = run_process(program, {"--version"}).out.find("OpenBLAS 0.") != std::string::npos;
+    EXPECT_EQ(links, names) << program;
+    return names;
+  };
+  EXPECT_TRUE(names_it("supertac-evaluate"));
+  for (const char* program : {"supertac-import", "supertac-info", "supertac-simulate"})
+    EXPECT_FALSE(names_it(program)) << program;
+}
+
 }  // namespace
 }  // namespace supertac
