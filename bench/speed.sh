@@ -1,7 +1,7 @@
 #!/bin/sh
-# All speed figures of the README, on this machine, in about three minutes:
+# All figures of speed, on this machine, in about three minutes:
 #   bench/speed.sh MODEL [BIN_DIR]        MODEL of preset paper; BIN_DIR: a build with -DSUPERTAC_BENCH=ON
-# Writes bench/results/{peers,streaming,linear_cost}.csv and charts, and the README's section. Nothing else should run.
+# Writes bench/results/{peers,streaming,linear_cost}.csv and charts, and the tables made from them. Nothing else should run.
 set -eu
 cd "$(dirname "$0")/.."
 model="$1"
@@ -12,4 +12,4 @@ gnuplot -e "csv='$results/peers.csv'; png='$results/peers.png'" bench/peers/char
 "$bin/linear_cost" > $results/new.csv && mv $results/new.csv $results/linear_cost.csv
 gnuplot -e "csv='$results/linear_cost.csv'; png='$results/linear_cost.png'" bench/linear_cost.gp
 "$bin/streaming" "$model" 60 > $results/new.csv && mv $results/new.csv $results/streaming.csv
-bench/readme_figures.py
+bench/results.py

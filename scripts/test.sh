@@ -3,7 +3,7 @@
 # SUPERTAC_CMAKE adds options, e.g. SUPERTAC_CMAKE="-DSUPERTAC_SANITIZE=address,undefined".
 set -eu
 cd "$(dirname "$0")/.."
-scripts/setup.sh libgtest-dev
+scripts/setup.sh libgtest-dev python3
 build="${SUPERTAC_BUILD:-build-test}"
 # shellcheck disable=SC2086
 cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release ${SUPERTAC_CMAKE:-} >/dev/null

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Statistics of a sweep's CSV over its seeds (Debian: python3-scipy).
 
-    bench/sweep_statistics.py SWEEP.csv [--figure ssim] [--compare CONFIGURATION_A CONFIGURATION_B]
+    bench/studies/sweep_statistics.py SWEEP.csv [--figure ssim] [--compare CONFIGURATION_A CONFIGURATION_B]
 
 Prints for each configuration the mean with its 95 % interval (Student's t); with --compare the paired t-test and the
 Wilcoxon signed-rank test over the seeds both have; and, when every latent size has been run with every T (all else

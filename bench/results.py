@@ -1,0 +1,320 @@
+#!/usr/bin/env python3
+"""Writes the tables of bench/results/README.md from the CSV files beside it, and the README's from that page.
+
+    bench/results.py            rewrites what stands between <!-- NAME --> and <!-- /NAME -->
+    bench/results.py --check    changes nothing; exit code 1 and one line for everything that is stale
+
+bench/results/sources.csv says of every file how it was made; a file that it does not name is an error. The README's tables are those
+of the page with some lines left out.
+"""
+import csv
+import itertools
+import math
+import pathlib
+import re
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "bench/results"
+PAGE, README = RESULTS / "README.md", ROOT / "README.md"
+T_975 = {1: 12.706, 2: 4.303, 3: 3.182, 4: 2.776, 5: 2.571, 6: 2.447, 7: 2.365, 8: 2.306, 9: 2.262}  # Student's t
+
+
+def rows(name):
+    with open(RESULTS / name, newline="") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def table(head, lines):
+    return "\n".join("| " + " | ".join(line) + " |" for line in [head, ["---"] * len(head), *lines])
+
+
+def mean(values):
+    return sum(values) / len(values)
+
+
+def interval(values):
+    """Half the 95 % interval of the mean."""
+    m = mean(values)
+    return T_975[len(values) - 1] * math.sqrt(sum((v - m) ** 2 for v in values) / (len(values) - 1) / len(values))
+
+
+def plus_minus(value, half, digits):
+    return f"{float(value):.{digits}f}" + (f" ± {float(half):.{digits}f}" if float(half or 0) > 0 else "")
+
+
+def over_seeds(chosen, column, digits):
+    values = [float(r[column]) for r in chosen if r[column]]
+    if not values:
+        return ""
+    return plus_minus(mean(values), interval(values) if len(values) > 1 else 0, digits)
+
+
+def sources():
+    found = rows("sources.csv")
+    return table(["file", "command", "commit", "split", "seeds", "date"],
+                 [[f"`{r['file']}`", r["command"], r["commit"], r["split"], r["seeds"], r["date"]] for r in found])
+
+
+RUNS = {"trial": "`trial`, preset `paper`", "best": "`trial`, `best`: four of `paper` averaged", "tiny": "`trial`, preset `tiny`",
+        "window": "`window`, preset `paper`"}
+METHODS = {"network": "", "ridge": "ridge regression", "bicubic": "bicubic", "nearest": "nearest", "mean_image": "mean image"}
+
+
+def accuracy():
+    found = {(r["split"], r["method"], r["part"]): r for r in rows("real_recordings.csv")}
+    lines = []
+    for run, method in itertools.product(RUNS, METHODS):
+        if (method == "network" or run == "trial") and (run, method, "contact") in found:
+            contact, every = found[run, method, "contact"], found[run, method, "all"]
+            lines.append([RUNS[run] if method == "network" else METHODS[method]] + [
+                plus_minus(row[figure], row[figure + "_ci95"], digits)
+                for row, figure, digits in ((contact, "ssim", 3), (contact, "psnr_mean_db", 1), (every, "ssim", 3),
+                                            (every, "psnr_mean_db", 1), (contact, "position_error_mm", 2))])
+    return table(["split and method", "contact SSIM", "contact PSNR dB", "all SSIM", "all PSNR dB", "position error mm"], lines)
+
+
+def phase():
+    lines = []
+    for r in rows("real_recordings.csv"):
+        if r["part"] == "contact" and r["split"] == "trial":
+            lines.append([METHODS[r["method"]] or "preset `paper`", plus_minus(r["phase_correlation"], r["phase_correlation_ci95"], 3),
+                          plus_minus(r["phase_correlation_floor"], r["phase_correlation_floor_ci95"], 3),
+                          plus_minus(r["psnr_pooled_db"], r["psnr_pooled_db_ci95"], 1)])
+    return table(["method", "phase correlation", "its floor: the pictures shuffled", "PSNR of the pooled error, dB"], lines)
+
+
+def history():
+    return table(["what was added", "commit", "contact SSIM", "contact PSNR dB"],
+                 [[r["step"], r["commit"], plus_minus(r["contact_ssim"], r["contact_ssim_ci95"], 3),
+                   plus_minus(r["contact_psnr_db"], r["contact_psnr_db_ci95"], 1)] for r in rows("history.csv")])
+
+
+def parts():
+    """What V, SSIM term, lifting, levelling, alignment and resolution of the array's network buy, each as with against without."""
+    named = {r["method"]: r for r in rows("baselines.csv")}
+    steps = {r["step"].split()[0]: r for r in rows("history.csv")}
+    ideas = {key: list(group) for key, group in itertools.groupby(rows("generalisation.csv"), lambda r: r["idea"])}
+
+    def of(row):
+        return (f"{plus_minus(row['contact_ssim'], row['contact_ssim_ci95'], 3)}, "
+                f"{plus_minus(row['contact_psnr_db'], row['contact_psnr_db_ci95'], 1)} dB")
+
+    def idea(name, seeds=("0",)):
+        chosen = [r for r in ideas[name] if r["seed"] in seeds]
+        return f"{over_seeds(chosen, 'contact_ssim', 3)}, {over_seeds(chosen, 'contact_psnr_db', 1)} dB"
+
+    plain = named["paper, plain autoencoder"]
+    lines = [
+        ["V of VAE: latent numbers drawn around their mean, KLD", of(named["paper"]), of(plain), "nothing", "`baselines.csv`, five seeds"],
+        ["a window of time instead of one frame, same blocks", of(named["paper"]), of(named["one frame, our blocks"]),
+         f"{float(named['paper']['contact_ssim']) - float(named['one frame, our blocks']['contact_ssim']):+.3f}", "`baselines.csv`, five seeds"],
+    ]
+    if "lifted; no SSIM term" in ideas:
+        lines.append(["SSIM term of the loss, lambda .1 against 0", idea("lifted; lambda 0.1"), idea("lifted; no SSIM term"), "see text",
+                      "`generalisation.csv`, seed 0"])
+    lines += [
+        ["SSIM term, lambda .1 against .3", idea("lifted by up to 0.4"), idea("lifted; lambda 0.3"), "a heavier term costs .4 dB",
+         "`generalisation.csv`, seed 0"],
+        ["lifting the finger in augmentation", of(steps["the"]), of(steps["windows"]), "", "`history.csv`, five seeds"],
+        ["levelling, beside lifting", idea("lifted by up to 0.4"), idea("lifted; scaled alike"),
+         "nothing in contact; 1.0 dB over all frames", "`generalisation.csv`, seed 0"],
+        ["clocks restored", of(steps["clocks"]), of(steps["the"]), "", "`history.csv`, five seeds"],
+        ["passes aligned", of(steps["passes"]), of(steps["clocks"]), "", "`history.csv`, five seeds"],
+        ["losses without a step found and filled", of(steps["losses"]), of(steps["passes"]), "", "`history.csv`, five seeds"],
+    ]
+    for line in lines:
+        if not line[3]:
+            line[3] = f"{float(line[1].split()[0]) - float(line[2].split()[0]):+.3f}"
+    return table(["part", "with", "without", "what it buys", "from"], lines)
+
+
+def baselines():
+    return table(["method", "contact SSIM", "contact PSNR dB", "all SSIM", "all PSNR dB", "time of a picture", "seeds"],
+                 [[r["method"], plus_minus(r["contact_ssim"], r["contact_ssim_ci95"], 3),
+                   plus_minus(r["contact_psnr_db"], r["contact_psnr_db_ci95"], 1), f"{float(r['all_ssim']):.3f}",
+                   f"{float(r['all_psnr_db']):.1f}", f"{float(r['median_us']):.1f} us", r["seeds"]] for r in rows("baselines.csv")])
+
+
+TASKS = {"infer 1": "inference, batch 1", "infer 8": "inference, batch 8", "infer 64": "inference, batch 64",
+         "train 1": "training step of 64 windows", "train 2": "the same on two threads"}
+
+
+def duration(us):
+    us = float(us)
+    return f"{us / 1000:.2f} ms" if us >= 1000 else f"{us:.0f} us"
+
+
+def speed():
+    return table(["", "SuperTac", "compared with", "", "times as fast (95 % interval)", "share of FMA peak"],
+                 [[TASKS[r["task"]], duration(r["ours_us"]), r["peer"], duration(r["peer_us"]),
+                   f"{float(r['ratio']):.1f} ({float(r['ratio_low']):.1f} to {float(r['ratio_high']):.1f})",
+                   f"{100 * float(r['ours_share']):.0f} %"] for r in rows("peers.csv")])
+
+
+def streaming():
+    f = {r["figure"]: float(r["value"]) for r in rows("streaming.csv")}
+    return table(["a window every millisecond, us", "median", "99.9 %"],
+                 [["processor time", f"{f['cpu_median_us']:.0f}", f"{f['cpu_p99.9_us']:.0f}"],
+                  ["time on the wall", f"{f['wall_median_us']:.0f}", f"{f['wall_p99.9_us']:.0f}"]]) + (
+        f"\n\nThe process ran for {f['windows'] / 1000:.0f} s, held {f['peak_resident_mb']:.0f} MB, and drew its first picture "
+        f"{f['ready_ms']:.0f} ms after its start.")
+
+
+def line_through(x, y):
+    mx, my = mean(x), mean(y)
+    sxx, syy = sum((a - mx) ** 2 for a in x), sum((b - my) ** 2 for b in y)
+    sxy = sum((a - mx) * (b - my) for a, b in zip(x, y))
+    return my - sxy / sxx * mx, sxy / sxx, sxy / math.sqrt(sxx * syy)
+
+
+def growth():
+    lines = []
+    for axis, column, unit, name in (("timesteps", "value", "sample of the window", "length of the window, 32 to 512"),
+                                     ("batch", "value", "window", "batch, 1 to 256"),
+                                     ("channels", "mmac", "million multiply-adds", "channels, 8 to 96"),
+                                     ("training_windows", "value", "window of the data set", "training, 512 to 4096 windows")):
+        chosen = [r for r in rows("linear_cost.csv") if r["axis"] == axis]
+        start, slope, r = line_through([float(c[column]) for c in chosen], [float(c["us"]) for c in chosen])
+        lines.append([name, f"{start:.0f} us", f"{slope:.3g} us a {unit}", f"{r:.3f}"])
+    return table(["what grows", "fixed cost", "cost of one more", "r"], lines)
+
+
+def pixels():
+    lines = []
+    for split in ("trial", "pass", "window"):
+        by_scale = {}
+        for r in rows(f"pixels_{split}.csv"):
+            by_scale.setdefault(r["scale"], []).append(r)
+        lines.append([f"`{split}`"] + [f"{over_seeds(by_scale[s], 'ssim', 3)}, {mean([float(r['psnr_db']) for r in by_scale[s]]):.1f} dB"
+                                       for s in ("2", "4", "8")])
+    return table(["split", "8x8", "16x16", "32x32"], lines)
+
+
+VIEWS = {"frame": "last 4x4 frame, levelled", "history32": "last 32 frames, no network", "latents": "latents",
+         "super_resolved": "super-resolved 16x16", "truth": "the plate itself"}
+
+
+def textures():
+    found = {(r["view"], r["part"]): r for r in rows("classification.csv") if r["split"] == "trial"}
+    lines = []
+    for view, name in VIEWS.items():
+        cells = (found[view, part] for part in ("inside", "contact", "all"))
+        lines.append([name] + [f"{100 * float(c['accuracy']):.1f} ({100 * float(c['passes_ci95_low']):.0f} to "
+                               f"{100 * float(c['passes_ci95_high']):.0f})" for c in cells])
+    return table(["what the classifier sees", "inside", "contact", "all"], lines)
+
+
+def felt():
+    found = rows("felt.csv")
+    return table(["mm since the first contact"] + [r["felt_mm"] for r in found],
+                 [["contact SSIM"] + [r["contact_ssim"] for r in found], ["PSNR dB"] + [r["contact_psnr_db"] for r in found]])
+
+
+def simulator():
+    return table(["simulated passes to train on", "seeds", "contact SSIM", "contact PSNR dB", "position error mm", "against the whole"],
+                 [[r["simulator"].replace("_", " "), r["seeds"], plus_minus(r["contact_ssim"], r["contact_ssim_ci95"], 3),
+                   plus_minus(r["contact_psnr_db"], r["contact_psnr_db_ci95"], 1), f"{float(r['position_error_mm']):.2f}",
+                   f"{float(r['ssim_gain']):+.3f}"] for r in rows("simulator_ablation.csv")])
+
+
+def stability():
+    counts = {}
+    for r in rows("stability_map.csv"):
+        key = r["safeguards"], r["outcome"]
+        counts[key] = [counts.get(key, [0, 0])[0] + 1, counts.get(key, [0, 0])[1] + (r["warned"] == "yes")]
+    outcomes = ["trained", "slow", "collapsed", "diverged", "stopped"]
+    return table(["clipping and warm-up"] + outcomes,
+                 [[side] + [f"{n} ({w} warned)" if n else "0" for n, w in (counts.get((side, o), (0, 0)) for o in outcomes)]
+                  for side in ("on", "off")])
+
+
+def rig():
+    pulls, kills = rows("rig_unplug.csv"), rows("rig_kill.csv")
+    soak = {r["quantity"]: float(r["measured"]) for r in rows("soak.csv")}
+    ends, calls = rows("rig_ends.csv"), rows("rig_io.csv")
+
+    def latest(port, when):
+        return max(float(r["noticed_ms"]) for r in pulls if (r["port"], r["when"]) == (port, when))
+
+    lost = sorted(float(r["lost_s"]) for r in kills)
+    lines = [
+        ["`rig_unplug.csv`", f"{len(pulls)} cables pulled; the latest was noticed after {latest('board', 'idle'):.1f} ms (board idle), "
+         f"{latest('printer', 'idle'):.1f} ms (printer idle), {latest('board', 'collection'):.1f} and "
+         f"{latest('printer', 'collection'):.1f} ms (in a collection)"],
+        ["`rig_kill.csv`", f"{len(kills)} kills of a running collection lost {lost[len(lost) // 2]:.2f} s (median) and at most {lost[-1]:.3f} s; "
+         f"{sum(bool(r['broken']) for r in kills)} broke a promise"],
+        ["`rig_ends.csv`", f"{len(ends)} ends by signal or full disk; {sum(bool(r['broken']) for r in ends)} left the finger down, "
+         "a wrong exit code or more than one line"],
+        ["`rig_io.csv`", f"{len(calls)} collections with one failing call or short writes; {sum(bool(r['broken']) for r in calls)} ended "
+         "otherwise than promised"],
+        ["`soak.csv`", f"{soak['seconds']:.0f} s of a board with seeded faults: {soak['frames lost']:.0f} frames lost, "
+         f"{soak['losses counted']:.0f} counted; {soak['latency median ms']:.2f} ms from frame to picture, {soak['latency p99 ms']:.2f} ms at "
+         f"the 99th percentile; {soak['memory kB'] / 1000:.1f} MB, drift {soak['memory drift kB']:.0f} kB"],
+    ]
+    return table(["file", "result"], lines)
+
+
+def demo():
+    return table(["method", "contact SSIM", "PSNR dB", "position mm", "all SSIM", "PSNR dB", "us"],
+                 [list(r.values()) for r in rows("demo.csv")])
+
+
+def tried():
+    lines = []
+    for key, group in itertools.groupby(rows("generalisation.csv"), lambda r: (r["idea"], r["options"], r["verdict"], r["commit"])):
+        chosen = list(group)
+        lines.append([key[0], f"`{key[1]}`", ", ".join(r["seed"] for r in chosen), over_seeds(chosen, "contact_ssim", 3),
+                      over_seeds(chosen, "contact_psnr_db", 1), over_seeds(chosen, "position_error_mm", 2), key[2], key[3]])
+    return table(["idea", "options, or the constant that was changed", "seeds", "contact SSIM", "PSNR dB", "position mm", "verdict",
+                  "commit"], lines)
+
+
+SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, baselines, speed, streaming, growth, pixels, textures, simulator, stability,
+                   rig, demo, tried],
+            README: [accuracy, speed]}
+
+
+# Lines of the page's tables that the README leaves out.
+NOT_IN_README = re.compile(r"^\| (nearest|[^|]*\| [^|]* \| torchscript) .*\n", re.MULTILINE)
+
+
+def rewritten(path):
+    text = path.read_text()
+    for section in SECTIONS[path]:
+        name, body = section.__name__, section()
+        if path == README:
+            body = NOT_IN_README.sub("", body)
+        new = f"<!-- {name} -->\n{body}\n<!-- /{name} -->"
+        text, count = re.subn(f"<!-- {name} -->.*<!-- /{name} -->", lambda _: new, text, flags=re.DOTALL)
+        if count != 1:
+            sys.exit(f"results.py: {path.relative_to(ROOT)} has no lines <!-- {name} --> and <!-- /{name} -->")
+    return text
+
+
+def unnamed():
+    """Files of results that sources.csv does not name, and the other way round."""
+    named = {name.strip(" `") for r in rows("sources.csv") for name in r["file"].split(",")}
+    present = {path.name for path in RESULTS.iterdir()} - {"README.md", "sources.csv"}
+    return ([f"bench/results/{name} has no line in sources.csv: say command, commit, split, seeds and date" for name in sorted(present - named)] +
+            [f"sources.csv names {name}, which is not in bench/results" for name in sorted(named - present)])
+
+
+def main():
+    if sys.argv[1:] not in ([], ["--check"]):
+        sys.exit(__doc__)
+    complaints = unnamed()
+    for path in SECTIONS:
+        text = rewritten(path)
+        if text != path.read_text():
+            if sys.argv[1:]:
+                complaints.append(f"{path.relative_to(ROOT)} is older than the CSV files: run bench/results.py")
+            else:
+                path.write_text(text)
+    for complaint in complaints:
+        print(f"results.py: {complaint}", file=sys.stderr)
+    sys.exit(1 if complaints else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,162 @@
+#!/usr/bin/env python3
+"""Runs the code blocks of README and docs, and checks the paths that pages name.
+
+    scripts/run_docs.py BUILD [PAGE ...]     runs the blocks of the pages (all: README.md, docs/*.md, examples/README.md) with BUILD's programs
+    scripts/run_docs.py --check              changes and runs nothing: paths, lines, marks
+
+A comment before a block, which a reader of the page does not see, says what is done with it:
+
+    <!-- run -->                      with sh; the blocks of a page run one after another in one scratch folder
+    <!-- run; A => B; C => D -->      the same with text A replaced by B: what takes long is shortened
+    <!-- run real; ... -->            only where SUPERTAC_RECORDINGS names the folder of the real recordings, $TEXT_DIR in the block
+    <!-- run python; ... -->          lines that begin with >>>, as doctest; only where python3 has the package safetensors
+    <!-- not run: WHY -->             not at all
+
+Every block without a language needs one.
+"""
+import importlib.util
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+BLOCK = re.compile(r"(?:<!-- ((?:not )?run\b.*?) -->\n)?```([a-z+]*)\n(.*?)```\n", re.DOTALL)
+LONGEST_LINE = 120
+# What a page may name although it is not in the tree: things that programs make.
+MADE = re.compile(r"^(out/|build|examples/build)|^(scores|sweep|model)\.|\.safetensors$")
+FILE = re.compile(r"`([\w./+-]+\.(?:cpp|h|inl|md|py|sh|gp|cmake|csv|png|svg|txt))`|\]\(([^)#:]+)\)")
+
+
+def pages():
+    return [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "examples/README.md"]
+
+
+def tracked_files():
+    """Paths of all files below ROOT, but for what git ignores."""
+    found = set()
+    for folder, folders, names in os.walk(ROOT):
+        folders[:] = [f for f in folders if not f.startswith(("build", ".git", "__pycache__")) and f != "out"]
+        found.update((pathlib.Path(folder) / name).relative_to(ROOT).as_posix() for name in names)
+    return found
+
+
+def missing_paths(page, files, names):
+    folder = page.parent.relative_to(ROOT)
+    for match in FILE.finditer(page.read_text()):
+        path = match[1] or match[2]
+        near = os.path.normpath(folder / path)
+        if "/" not in path and path in names or path in files or near in files or (ROOT / near).is_dir() or MADE.search(path):
+            continue
+        yield f"{page.relative_to(ROOT)} names {path}, which is not in the tree"
+
+
+def long_lines(page):
+    for number, line in enumerate(page.read_text().splitlines(), 1):
+        if len(line) > LONGEST_LINE and not line.startswith(("|", "<!--", "!")):
+            yield f"{page.relative_to(ROOT)}:{number}: {len(line)} characters, expected at most {LONGEST_LINE}"
+
+
+def unmarked(page):
+    for mark, language, text in BLOCK.findall(page.read_text()):
+        if not mark and not language:
+            yield f"{page.relative_to(ROOT)}: the block '{text.splitlines()[0]}' says neither run nor not run"
+
+
+def check():
+    files = tracked_files()
+    names = {path.rsplit("/", 1)[-1] for path in files}
+    complaints = []
+    for page in sorted(ROOT / path for path in files if path.endswith(".md")):
+        complaints += missing_paths(page, files, names)
+        complaints += long_lines(page)
+    for page in pages():
+        complaints += unmarked(page)
+    return complaints
+
+
+def replaced(text, changes, page):
+    for change in changes:
+        old, new = change.split(" => ")
+        if old not in text:
+            sys.exit(f"run_docs.py: {page.name}: the block holds no '{old}' to be replaced")
+        text = text.replace(old, new)
+    return text
+
+
+def run(command, folder, environment):
+    """Runs it in a process group of its own, of which nothing is left behind."""
+    with tempfile.TemporaryFile("w+") as output:
+        process = subprocess.Popen(command, cwd=folder, env=environment, start_new_session=True, stdin=subprocess.DEVNULL,
+                                   stdout=output, stderr=subprocess.STDOUT, text=True)
+        try:
+            process.wait(timeout=300)
+        except subprocess.TimeoutExpired:
+            output.write("it did not end within 300 s")
+        try:
+            os.killpg(process.pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+        output.seek(0)
+        return process.wait(), output.read()
+
+
+def command_of(kind, texts, folder):
+    if kind == "run python":
+        (folder / "block.txt").write_text("\n".join(texts) + "\n")
+        return [sys.executable, "-m", "doctest", "block.txt"]
+    return ["sh", "-euc", "\n".join(texts)]
+
+
+def run_page(page, environment):
+    """Runs the page's blocks; neighbours of one kind together. Returns whether all went well."""
+    groups = []
+    for mark, _, text in BLOCK.findall(page.read_text()):
+        kind, *changes = [part.strip() for part in mark.split(";")]
+        if not kind.startswith("run"):
+            continue
+        text = replaced(text, changes, page)
+        if groups and groups[-1][0] == kind:
+            groups[-1][1].append(text)
+        else:
+            groups.append((kind, [text]))
+    well = True
+    with tempfile.TemporaryDirectory() as scratch:
+        for kind, texts in groups:
+            about = f"{page.relative_to(ROOT)}: {len(texts)} blocks '{kind}'"
+            if kind == "run real" and "TEXT_DIR" not in environment:
+                print(f"{about} not run: SUPERTAC_RECORDINGS is not set")
+            elif kind == "run python" and importlib.util.find_spec("safetensors") is None:
+                print(f"{about} not run: python3 has no package safetensors")
+            else:
+                begin = time.monotonic()
+                code, output = run(command_of(kind, texts, pathlib.Path(scratch)), scratch, environment)
+                print(f"{about} {'ran' if code == 0 else 'FAILED'}, {time.monotonic() - begin:.1f} s")
+                if code != 0:
+                    print("".join(texts) + "--- gave, with exit code", code, "---\n" + output)
+                    well = False
+    return well
+
+
+def main():
+    if sys.argv[1:] == ["--check"]:
+        complaints = check()
+        for complaint in complaints:
+            print(f"run_docs.py: {complaint}", file=sys.stderr)
+        sys.exit(1 if complaints else 0)
+    if len(sys.argv) < 2 or not (pathlib.Path(sys.argv[1]) / "bin").is_dir():
+        sys.exit(__doc__)
+    build = pathlib.Path(sys.argv[1]).resolve()
+    environment = dict(os.environ, PATH=f"{build}/bin:{build}/examples:{os.environ['PATH']}")
+    if environment.get("SUPERTAC_RECORDINGS"):
+        environment["TEXT_DIR"] = environment["SUPERTAC_RECORDINGS"]
+    chosen = [pathlib.Path(page).resolve() for page in sys.argv[2:]] or pages()
+    sys.exit(0 if all([run_page(page, environment) for page in chosen]) else 1)
+
+
+if __name__ == "__main__":
+    main()
