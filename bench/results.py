@@ -110,6 +110,9 @@ def parts():
         ["a window of time instead of one frame, same blocks", of(named["paper"]), of(named["one frame, our blocks"]),
          f"{float(named['paper']['contact_ssim']) - float(named['one frame, our blocks']['contact_ssim']):+.3f}", "`baselines.csv`, five seeds"],
     ]
+    lines.append(["transposed convolution instead of sub-pixel (which has left the core)", of(named["paper"]), of(named["paper, sub-pixel"]),
+                  f"nothing; sub-pixel takes {100 * (float(named['paper, sub-pixel']['median_us']) / float(named['paper']['median_us']) - 1):.0f} % longer",
+                  "`baselines.csv`, five seeds"])
     if "lifted; no SSIM term" in ideas:
         lines.append(["SSIM term of the loss, lambda .1 against 0", idea("lifted; lambda 0.1"), idea("lifted; no SSIM term"), "see text",
                       "`generalisation.csv`, seed 0"])
