@@ -84,6 +84,16 @@ def phase():
     return table(["method", "phase correlation", "its floor: the pictures shuffled", "PSNR of the pooled error, dB"], lines)
 
 
+def imported():
+    found = rows("import.csv")
+    moved = sorted(abs(float(r["aligned_by_mm"])) for r in found if r["aligned_by_mm"])
+    return table(["imported", ""], [
+        ["passes, and those that fit their plate", f"{len(found)}, {sum(r['reliable'] == 'yes' for r in found)}"],
+        ["mean residual of a contact", f"{mean([float(r['residual_mm']) for r in found]):.2f} mm"],
+        ["passes aligned with others of their plate", f"{len(moved)}, by {moved[len(moved) // 2]:.2f} mm (median), at most {moved[-1]:.2f} mm"],
+        ["passes with a further loss found by alignment", f"{sum(bool(r['further_loss_s']) for r in found)}"]])
+
+
 def history():
     return table(["what was added", "commit", "contact SSIM", "contact PSNR dB"],
                  [[r["step"], r["commit"], plus_minus(r["contact_ssim"], r["contact_ssim_ci95"], 3),
@@ -273,7 +283,7 @@ def tried():
                   "commit"], lines)
 
 
-SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, baselines, speed, streaming, growth, pixels, textures, simulator, stability,
+SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, streaming, growth, pixels, textures, simulator, stability,
                    rig, demo, tried],
             README: [accuracy, speed]}
 

