@@ -44,10 +44,11 @@ def plus_minus(value, half, digits):
 
 
 def over_seeds(chosen, column, digits):
+    """Mean and interval; the values themselves where they are fewer than three."""
     values = [float(r[column]) for r in chosen if r[column]]
-    if not values:
-        return ""
-    return plus_minus(mean(values), interval(values) if len(values) > 1 else 0, digits)
+    if len(values) < 3:
+        return ", ".join(f"{v:.{digits}f}" for v in values)
+    return plus_minus(mean(values), interval(values), digits)
 
 
 def sources():
