@@ -35,8 +35,8 @@ void declare(Arguments& arguments) {
       .option("trial", "N", "number of this trial, for the recordings' names", "1")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
       .flag("home", "home the printer first instead of trusting the operator's origin")
-      .flag("confirm-origin", "after a run that was cut off: the head is back at X99.70 Y101.17 Z131.81")
-      .flag("yes", "do not ask: the plate lies as planned and the head is at X99.70 Y101.17 Z131.81")
+      .flag("confirm-origin", "after a run that was cut off: the head is back at " + describe(rig::kMounted))
+      .flag("yes", "do not ask: the plate lies as planned and the head is at " + describe(rig::kMounted))
       .flag("list-ports", "list the serial ports and end");
 }
 
@@ -62,8 +62,8 @@ void confirm(const Arguments& arguments, const RecorderSettings& settings) {
 
 RecorderSettings read_settings(const Arguments& arguments, const std::string& out, const std::string& plate) {
   RecorderSettings settings;
-  settings.plan.speed = arguments.number("speed", 0.5, 50);
-  settings.plan.passes = static_cast<int>(arguments.integer("passes", 1, 8));
+  settings.plan.speed = arguments.number("speed", 0.5, rig::kFastestMmS);
+  settings.plan.passes = static_cast<int>(arguments.integer("passes", 1, rig::kPasses));
   settings.home = arguments.flag("home");
   const int trial = static_cast<int>(arguments.integer("trial", 1, 1000));
   settings.header = collection_header(plate, trial, settings.plan.speed);
@@ -107,15 +107,16 @@ RecorderReport record_marked(std::unique_ptr<Port> board, std::unique_ptr<Port> 
 void demand_origin(const Arguments& arguments, const OriginMark& mark) {
   if (!mark.is_set() || arguments.flag("home") || arguments.flag("confirm-origin")) return;
   throw OriginUnknown("collect: the last run on printer " + arguments.text("printer") +
-                      " was cut off, so the head's position is unknown; move it to X99.70 Y101.17 Z131.81 "
-                      "and add --confirm-origin, or use --home");
+                      " was cut off, so the head's position is unknown; move it to " +
+                      describe(rig::kMounted) + " and add --confirm-origin, or use --home");
 }
 
 RecorderReport collect(const Arguments& arguments, RecorderSettings settings, const OriginMark& mark) {
   const double speedup = arguments.number("speedup", 0.1, 100);
   auto board = std::make_unique<SerialPort>(resolve_board_port(arguments.text("board")),
-                                            SerialSettings{kBoardBaud, speedup});
-  auto printer = std::make_unique<SerialPort>(arguments.text("printer"), SerialSettings{115200, speedup});
+                                            SerialSettings{rig::kBoardBaud, speedup});
+  auto printer =
+      std::make_unique<SerialPort>(arguments.text("printer"), SerialSettings{rig::kPrinterBaud, speedup});
   demand_origin(arguments, mark);
   confirm(arguments, settings);
   std::atomic<bool> stop{false}, ended{false};

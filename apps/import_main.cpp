@@ -115,7 +115,7 @@ Imported import_pass(const TextPass& pass, double speed_mm_s) {
   recording.trial = pass.trial;
   recording.pass = pass.pass;
   recording.speed_mm_s = speed_mm_s;
-  restore_clock(recording, kImportRateHz);
+  restore_clock(recording, rig::kFrameRateHz);
   imported.registration = register_pass(recording, pass.plate);
   return imported;
 }

@@ -2,14 +2,12 @@
 
 #include "apps/common/program.h"
 #include "data/plates/plate_mesh.h"
-#include "hardware/palpation_program.h"
+#include "hardware/palpation.h"
 #include "io/file.h"
 #include "io/numbers.h"
 
 namespace supertac {
 namespace {
-
-constexpr Point3 kMounted{99.7, 101.17, 131.81};  // of the head, before and after a run
 
 void declare(Arguments& arguments) {
   arguments
@@ -41,7 +39,7 @@ std::string plate_name(const Arguments& arguments) {
                          texture);
     return texture;
   }
-  const double pitch = arguments.given("pitch") ? arguments.number("pitch", 0.5, 36) : 6;
+  const double pitch = arguments.given("pitch") ? arguments.number("pitch", 0.5, Plate::kWidthMm) : 6;
   std::string name;
   for (const std::string& kind : kinds) {
     name += (name.empty() ? "" : "+") + kind + format(pitch);
@@ -80,13 +78,13 @@ nlohmann::ordered_json write_gcode(const Arguments& arguments, const Plate& plat
   const std::string path = arguments.text("gcode");
   refuse_existing(path, arguments.force());
   PalpationPlan plan;
-  plan.speed = arguments.number("speed", 0.5, 50);
-  plan.passes = static_cast<int>(arguments.integer("passes", 1, 8));
+  plan.speed = arguments.number("speed", 0.5, rig::kFastestMmS);
+  plan.passes = static_cast<int>(arguments.integer("passes", 1, rig::kPasses));
   const std::string title = "SuperTac: " + std::to_string(plan.passes) + " passes over plate " +
                             plate.name() + " at " + format(plan.speed) + " mm/s";
-  write_file(path, palpation_program(plan, kMounted, Limits(), title));
+  write_file(path, palpation_program(plan, rig::kMounted, Limits(), title));
   arguments.print(path + ": " + std::to_string(plan.passes) + " passes at " + format(plan.speed) +
-                  " mm/s, from and back to " + describe(kMounted));
+                  " mm/s, from and back to " + describe(rig::kMounted));
   return {{"file", path}, {"passes", plan.passes}, {"speed_mm_s", plan.speed}};
 }
 

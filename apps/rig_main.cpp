@@ -10,9 +10,6 @@
 namespace supertac {
 namespace {
 
-// Where the plate lies on the virtual printer's bed: its corner, and the height of the slide.
-constexpr double kPlateX = 99.2, kPlateY = 101.17, kSlideZ = 91.81;
-
 void declare(Arguments& arguments) {
   arguments
       .required("plate", "NAME",
@@ -38,7 +35,8 @@ RigSettings read_settings(const Arguments& arguments) {
     settings.seed = seed;
     settings.faults = RigFaults::mixed(arguments.number("faults", 0, 0.1));
     settings.board.signals = [finger](double x, double y, double z, double t) {
-      const auto volts = finger.volts({x - kPlateX, y - kPlateY, z - kSlideZ + finger.slide_z_mm()}, t);
+      const auto volts =
+          finger.volts({x - rig::kPlate.x, y - rig::kPlate.y, z - rig::kPlate.z + finger.slide_z_mm()}, t);
       std::array<double, kTaxels> frame{};
       std::copy_n(volts.begin(), frame.size(), frame.begin());
       return frame;

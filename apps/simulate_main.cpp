@@ -85,10 +85,11 @@ SimulatorSettings read_settings(const Arguments& arguments) {
 
 std::vector<Job> plan(const Arguments& arguments, const std::vector<Plate>& plates, OutputFolder& folder) {
   std::vector<Job> jobs;
-  const auto speeds = arguments.numbers("speeds", 0.5, 50);
+  const auto speeds = arguments.numbers("speeds", 0.5, rig::kFastestMmS);
   const int trials = static_cast<int>(arguments.integer("trials", 1, 1000));
-  const int passes = static_cast<int>(arguments.integer("passes", 1, 8));
-  const double from = arguments.number("from", 0, 107), to = arguments.number("to", 1, 108);
+  const int passes = static_cast<int>(arguments.integer("passes", 1, rig::kPasses));
+  const double from = arguments.number("from", 0, Plate::kLengthMm - 1),
+               to = arguments.number("to", 1, Plate::kLengthMm);
   for (const Plate& plate : plates) {
     for (const double speed : speeds) {
       for (int trial = 1; trial <= trials; ++trial) {
@@ -144,9 +145,9 @@ int run(Arguments& arguments) {
   const auto settings = read_settings(arguments);
   const auto seed = static_cast<std::uint64_t>(arguments.integer("seed", 0, INT64_MAX));
   if (arguments.list("speeds").empty()) throw UsageError("--speeds: expected at least one speed");
-  arguments.numbers("speeds", 0.5, 50);
+  arguments.numbers("speeds", 0.5, rig::kFastestMmS);
   arguments.integer("trials", 1, 1000);
-  arguments.integer("passes", 1, 8);
+  arguments.integer("passes", 1, rig::kPasses);
 
   OutputFolder folder(arguments.text("out"), arguments.force());
   const auto jobs = plan(arguments, plates, folder);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bench/fma_peak.h"
-#include "bench/median.h"
+#include "io/median.h"
 
 namespace supertac::bench {
 

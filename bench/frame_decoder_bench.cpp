@@ -16,8 +16,8 @@ std::vector<std::byte> stream_of(std::size_t frames, double fault_rate) {
   for (std::size_t i = 0; i < frames; ++i) {
     supertac::BoardFrame frame;
     for (auto& sample : frame.samples) sample = static_cast<std::uint16_t>(dice.below(4096));
-    std::vector<std::byte> bytes(supertac::kFrameBytes);
-    supertac::write_frame(frame, std::span<std::byte, supertac::kFrameBytes>(bytes));
+    std::vector<std::byte> bytes(supertac::rig::kFrameBytes);
+    supertac::write_frame(frame, std::span<std::byte, supertac::rig::kFrameBytes>(bytes));
     const auto damaged = faults.apply(bytes);
     stream.insert(stream.end(), damaged.begin(), damaged.end());
   }

@@ -9,8 +9,8 @@
 #include <memory>
 
 #include "bench/fma_peak.h"
-#include "bench/median.h"
 #include "bench/windows.h"
+#include "io/median.h"
 #include "io/numbers.h"
 #include "models/cost.h"
 #include "models/trainer.h"
@@ -94,7 +94,7 @@ int main() {
   std::vector<Point> all = points();
   measure(all);
   std::cout << "axis,value,mmac,us\n";
-  for (const Point& p : all)
+  for (Point& p : all)
     std::cout << p.axis << ',' << p.value << ',' << format(p.mmac, 4) << ','
-              << format(1e6 * bench::median(p.seconds), 2) << '\n';
+              << format(1e6 * median(p.seconds), 2) << '\n';
 }

@@ -18,8 +18,8 @@
 #include <string>
 
 #include "bench/fma_peak.h"
-#include "bench/median.h"
 #include "bench/windows.h"
+#include "io/median.h"
 #include "io/numbers.h"
 #include "models/model_file.h"
 
@@ -53,11 +53,9 @@ double status_mb(const std::string& key) {
   return 0;
 }
 
-void print_quantiles(const char* name, const std::vector<double>& seconds) {
-  for (const auto& [quantile, label] :
-       {std::pair{0.5, "median"}, {0.99, "p99"}, {0.999, "p99.9"}, {1.0, "max"}})
-    std::cout << name << "_" << label << "_us," << format(1e6 * bench::quantile(seconds, quantile), 1)
-              << "\n";
+void print_quantiles(const char* name, std::vector<double> seconds) {
+  for (const auto& [share, label] : {std::pair{0.5, "median"}, {0.99, "p99"}, {0.999, "p99.9"}, {1.0, "max"}})
+    std::cout << name << "_" << label << "_us," << format(1e6 * quantile(seconds, share), 1) << "\n";
 }
 
 // The process whose start is timed: `started` is the monotonic clock just before it was made.

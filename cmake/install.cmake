@@ -8,7 +8,7 @@ endforeach()
 install(EXPORT supertac NAMESPACE supertac:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supertac
   FILE supertacTargets.cmake)
 file(WRITE ${PROJECT_BINARY_DIR}/supertacConfig.cmake
-"include(CMakeFindDependencyMacro)\nfind_dependency(OpenMP COMPONENTS CXX)\nfind_dependency(Threads)\nfind_dependency(nlohmann_json)
+"include(CMakeFindDependencyMacro)\nfind_dependency(OpenMP COMPONENTS CXX)\nfind_dependency(Threads)\nfind_dependency(nlohmann_json)\nfind_dependency(ZLIB)
 set(BLA_VENDOR OpenBLAS)
 find_dependency(BLAS)
 include(\${CMAKE_CURRENT_LIST_DIR}/supertacTargets.cmake)\n")

@@ -58,10 +58,22 @@ if(SUPERTAC_SANITIZE)
   set(SUPERTAC_TEST_TIMEOUT 1800)
 endif()
 
-# supertac_test(NAME SOURCES a_test.cpp ... USES target ...): one GoogleTest program, every case a ctest case.
+# supertac_cases(NAME [PREFIX text] [SLOW pattern ...]): every case of a GoogleTest program as a ctest case, labelled `slow`
+# where a pattern of SLOW matches (as in --gtest_filter), else `quick`: `ctest -L quick` ends within half a minute.
+function(supertac_cases name)
+  cmake_parse_arguments(arg "" "PREFIX" "SLOW" ${ARGN})
+  list(JOIN arg_SLOW ":" slow)
+  set(properties DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${SUPERTAC_TEST_TIMEOUT} LABELS)
+  gtest_discover_tests(${name} TEST_PREFIX "${arg_PREFIX}" TEST_FILTER "-${slow}" ${properties} quick)
+  if(slow)
+    gtest_discover_tests(${name} TEST_PREFIX "${arg_PREFIX}" TEST_FILTER "${slow}" ${properties} slow)
+  endif()
+endfunction()
+
+# supertac_test(NAME SOURCES a_test.cpp ... USES target ... [SLOW pattern ...]): one GoogleTest program.
 function(supertac_test name)
-  cmake_parse_arguments(arg "" "" "SOURCES;USES" ${ARGN})
+  cmake_parse_arguments(arg "" "" "SOURCES;USES;SLOW" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_USES} supertac_options GTest::gtest GTest::gtest_main)
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${SUPERTAC_TEST_TIMEOUT})
+  supertac_cases(${name} SLOW ${arg_SLOW})
 endfunction()

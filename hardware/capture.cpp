@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "hardware/errors.h"
+#include "io/text.h"
 
 namespace supertac {
 
@@ -70,8 +71,8 @@ Received ReplayPort::read(std::span<std::byte> buffer, double) {
 double ReplayPort::write(std::span<const std::byte> bytes, double) {
   const JournalRecord& record = next(RecordKind::sent);
   if (!std::equal(bytes.begin(), bytes.end(), record.bytes.begin(), record.bytes.end())) {
-    throw ReplayDiverged("replay " + name_ + ": record " + std::to_string(at_) + " sent \"" + record.text() +
-                         "\", the driver now sent something else");
+    throw ReplayDiverged("replay " + name_ + ": record " + std::to_string(at_) + " sent " +
+                         in_quotes(record.text()) + ", the driver now sent something else");
   }
   ++at_;
   return record.time_s;

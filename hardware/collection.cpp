@@ -10,16 +10,16 @@
 #include "hardware/frame_decoder.h"
 #include "hardware/motion_model.h"
 #include "io/median.h"
+#include "io/numbers.h"
 
 namespace supertac {
 namespace {
 
-constexpr double kStartDelay = 0.1265;
 constexpr double kLargest = 1e10;   // of any number in an event: a journal may come from anywhere
 constexpr int kMostSteps = 20'000;  // of a modelled leg: 100 s every 5 ms
 
 std::string point_text(const Point3& p) {
-  return fixed_decimals(p.x, 4) + " " + fixed_decimals(p.y, 4) + " " + fixed_decimals(p.z, 4);
+  return format(p.x, 4) + " " + format(p.y, 4) + " " + format(p.z, 4);
 }
 
 // The numbers behind an event's first word; nothing when there are not exactly `Count`.
@@ -88,7 +88,8 @@ Frames frames_in(const Journal& journal, FrameDecoder::Counters& counters) {
   for (const JournalRecord& record : journal.of(Stream::board)) {
     if (record.kind != RecordKind::received) continue;
     decoder.push(record.bytes, [&](const BoardFrame& frame, std::uint64_t discarded) {
-      const bool late = !all.arrivals.empty() && record.time_s - all.arrivals.back() > 1.5 * kFramePeriod;
+      const bool late =
+          !all.arrivals.empty() && record.time_s - all.arrivals.back() > 1.5 * rig::kFramePeriodS;
       all.suspect.push_back(discarded > 0 || late || jumps.jump(frame) ? 1 : 0);
       all.frames.push_back(frame);
       all.arrivals.push_back(record.time_s);
@@ -105,10 +106,7 @@ double off_leg(const Leg& leg, const Point3& p) {
       ((p.x - leg.from.x) * (leg.to.x - leg.from.x) + (p.y - leg.from.y) * (leg.to.y - leg.from.y) +
        (p.z - leg.from.z) * (leg.to.z - leg.from.z)) /
       std::max(length * length, 1e-12);
-  const double part = std::clamp(along, 0.0, 1.0);
-  return distance(p,
-                  {leg.from.x + part * (leg.to.x - leg.from.x), leg.from.y + part * (leg.to.y - leg.from.y),
-                   leg.from.z + part * (leg.to.z - leg.from.z)});
+  return distance(p, between(leg.from, leg.to, std::clamp(along, 0.0, 1.0)));
 }
 
 double median_round_trip(const std::vector<PositionSample>& samples) {
@@ -142,12 +140,11 @@ CollectedPass pass_of(const Frames& all, const FrameTimeline& timeline, const Po
 std::string event_text(const Leg& leg, bool ended) {
   return std::string("leg ") + (ended ? "1 " : "0 ") + std::to_string(leg.pass) + " " +
          std::to_string(static_cast<int>(leg.phase)) + " " + point_text(leg.from) + " " + point_text(leg.to) +
-         " " + fixed_decimals(leg.speed, 4) + " " + fixed_decimals(leg.accepted_s, 6) + " " +
-         fixed_decimals(leg.ended_s, 6);
+         " " + format(leg.speed, 4) + " " + format(leg.accepted_s, 6) + " " + format(leg.ended_s, 6);
 }
 
 std::string event_text(const PositionSample& sample) {
-  return "at " + fixed_decimals(sample.time_s, 6) + " " + fixed_decimals(sample.round_trip_s, 6) + " " +
+  return "at " + format(sample.time_s, 6) + " " + format(sample.round_trip_s, 6) + " " +
          point_text(sample.position);
 }
 
@@ -157,14 +154,13 @@ void PositionTrack::add(double time_s, const Point3& position) {
 
 void PositionTrack::model(const Leg& leg, double acceleration) {
   const double length = distance(leg.from, leg.to);
-  const double start = std::min(leg.accepted_s + kStartDelay, leg.ended_s - 1e-6);
+  const double start = std::min(leg.accepted_s + rig::kStartDelayS, leg.ended_s - 1e-6);
   const double duration = leg.ended_s - start;
   const int steps = static_cast<int>(std::clamp(duration / 0.005, 1.0, double{kMostSteps}));
   for (int i = 0; i <= steps; ++i) {
     const double t = duration * i / steps;
     const double part = length > 0 ? trapezoid_position(t, length, duration, acceleration) / length : 1;
-    add(start + t, {leg.from.x + part * (leg.to.x - leg.from.x), leg.from.y + part * (leg.to.y - leg.from.y),
-                    leg.from.z + part * (leg.to.z - leg.from.z)});
+    add(start + t, between(leg.from, leg.to, part));
   }
 }
 
@@ -196,9 +192,7 @@ Point3 PositionTrack::at(double time_s) const {
   if (after == points_.end()) return points_.back().position;
   const Knot& a = *(after - 1);
   const Knot& b = *after;
-  const double part = (time_s - a.time_s) / (b.time_s - a.time_s);
-  const auto mix = [part](double u, double v) { return u + part * (v - u); };
-  return {mix(a.position.x, b.position.x), mix(a.position.y, b.position.y), mix(a.position.z, b.position.z)};
+  return between(a.position, b.position, (time_s - a.time_s) / (b.time_s - a.time_s));
 }
 
 Collection collection_of(const Journal& journal) {

@@ -21,7 +21,7 @@ constexpr const char* kRunComplete = "complete";
 /// physics allows, answered late) are left out; between samples the position is linear in time.
 class PositionTrack {
  public:
-  /// Adds a leg's samples; without samples the leg is modelled: 126.5 ms of start delay, then a trapezoid of
+  /// Adds a leg's samples; without samples the leg is modelled: rig::kStartDelayS, then a trapezoid of
   /// speed with `acceleration` (mm/s^2) that ends when M400 was answered.
   void add_leg(const Leg& leg, const std::vector<PositionSample>& samples, double acceleration = 500);
   Point3 at(double time_s) const;

@@ -41,7 +41,7 @@ Line least_squares(const Points& points, const std::vector<bool>& used) {
 
 void ClockEstimator::add(std::uint64_t index, double arrival_s) {
   const Point point{static_cast<double>(index), arrival_s};
-  const auto lateness = [](const Point& p) { return p.arrival - kFramePeriod * p.index; };
+  const auto lateness = [](const Point& p) { return p.arrival - rig::kFramePeriodS * p.index; };
   if (in_block_ == 0 || lateness(point) < lateness(earliest_)) earliest_ = point;
   if (++in_block_ >= block_) close_block();
 }
@@ -50,7 +50,7 @@ void ClockEstimator::close_block() {
   points_.push_back(earliest_);
   in_block_ = 0;
   if (points_.size() < kMostPoints) return;
-  const auto lateness = [](const Point& p) { return p.arrival - kFramePeriod * p.index; };
+  const auto lateness = [](const Point& p) { return p.arrival - rig::kFramePeriodS * p.index; };
   for (std::size_t i = 0; i < points_.size() / 2; ++i) {
     points_[i] = std::min(points_[2 * i], points_[2 * i + 1],
                           [&](const Point& a, const Point& b) { return lateness(a) < lateness(b); });
@@ -88,7 +88,7 @@ ClockFit ClockEstimator::fit() const {
   fit.period_s = line.slope;
   fit.offset_s = line.intercept;
   fit.residual_s = std::sqrt(squares / n);
-  fit.plausible = std::abs(line.slope / kFramePeriod - 1) <= 0.005;
+  fit.plausible = std::abs(line.slope / rig::kFramePeriodS - 1) <= 0.005;
   return fit;
 }
 
@@ -153,7 +153,7 @@ FrameTimeline timeline_of(std::span<const double> arrivals) {
 
 bool JumpDetector::jump(const BoardFrame& frame) {
   bool far = false;
-  for (int k = 0; k < kBoardTaxels && !first_; ++k) {
+  for (int k = 0; k < rig::kTaxels && !first_; ++k) {
     far = far || std::abs(frame.taxel(k) - last_[static_cast<std::size_t>(k)]) > limit_;
   }
   first_ = false;
@@ -161,7 +161,7 @@ bool JumpDetector::jump(const BoardFrame& frame) {
   const bool flag = far && flagged_ < 3;
   flagged_ = flag ? flagged_ + 1 : 0;
   if (!flag) {
-    for (int k = 0; k < kBoardTaxels; ++k) last_[static_cast<std::size_t>(k)] = frame.taxel(k);
+    for (int k = 0; k < rig::kTaxels; ++k) last_[static_cast<std::size_t>(k)] = frame.taxel(k);
   }
   return flag;
 }

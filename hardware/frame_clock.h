@@ -13,11 +13,11 @@ namespace supertac {
 
 /// arrival(index) = offset + period * index + delay, delay >= 0.
 struct ClockFit {
-  double period_s = kFramePeriod;
+  double period_s = rig::kFramePeriodS;
   double offset_s = 0;
   double residual_s = 0;  ///< RMS of the envelope's points about the line
-  bool plausible =
-      true;  ///< period within 0.5 % of 992 us; otherwise frames are miscounted or it is another board
+  bool plausible = true;  ///< period within 0.5 % of the nominal one; otherwise frames are miscounted or it
+                          ///< is another board
   double at(double index) const { return offset_s + period_s * index; }
 };
 
@@ -45,7 +45,7 @@ class ClockEstimator {
 /// by which ALL of the next `lookahead` frames are late.
 class GapCounter {
  public:
-  explicit GapCounter(double period_s = kFramePeriod, std::size_t lookahead = 64);
+  explicit GapCounter(double period_s = rig::kFramePeriodS, std::size_t lookahead = 64);
   /// Appends to `missing_before` one number for every frame that has become certain.
   void push(double arrival_s, std::vector<std::uint32_t>& missing_before);
   /// All frames still uncertain, at the end of the stream.
@@ -78,13 +78,13 @@ FrameTimeline timeline_of(std::span<const double> arrivals);
 /// flipped bit in a sample passes every check of the format; this is all that can be said about it.
 class JumpDetector {
  public:
-  /// 0.1 V in 992 us: at 10 mm/s the finger has moved 0.01 mm.
+  /// 0.1 V in a period: at 10 mm/s the finger has moved 0.01 mm.
   explicit JumpDetector(int limit = 124) : limit_(limit) {}
   bool jump(const BoardFrame& frame);
 
  private:
   int limit_;
-  std::array<int, kBoardTaxels> last_{};
+  std::array<int, rig::kTaxels> last_{};
   int flagged_ = 0;
   bool first_ = true;
 };

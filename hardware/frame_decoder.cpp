@@ -22,9 +22,9 @@ const std::byte* FrameDecoder::next() {
                                 : static_cast<std::size_t>(static_cast<const std::byte*>(header) - start));
       continue;
     }
-    if (left < kFrameBytes) return nullptr;
+    if (left < rig::kFrameBytes) return nullptr;
     if (is_frame(start)) {
-      position_ += kFrameBytes;
+      position_ += rig::kFrameBytes;
       ++counters_.frames;
       return start;
     }

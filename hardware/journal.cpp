@@ -3,23 +3,23 @@
 #include <errno.h>
 #include <string.h>
 
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <utility>
 
 #include "hardware/errors.h"
-#include "io/crc32.h"
+#include "io/file.h"
+#include "io/hash.h"
 #include "io/system_calls.h"
 
 namespace supertac {
 namespace {
 
-constexpr std::uint32_t kMagic = 0x314A5453;  // "STJ1"
-constexpr std::size_t kChunkHeader = 24;      // magic, stream, length, CRC-32, time
-constexpr std::size_t kRecordHeader = 13;     // kind, time, length
+constexpr std::uint32_t kMagic = 0x314A5453;                  // "STJ1"
+constexpr std::size_t kChunkHeader = 24;                      // magic, stream, length, CRC-32, time
+constexpr std::size_t kRecordHeader = 13;                     // kind, time, length
+constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 36;  // of a journal: four days
 constexpr std::size_t kMostPending = 64 << 20;
 constexpr double kFlushAfter = 0.1;   // of recorded time, and of the wall's
 constexpr double kLatestTime = 1e10;  // s: 300 years, so that no arithmetic on times can overflow
@@ -252,17 +252,6 @@ Journal parse_journal(std::span<const std::byte> bytes, const std::string& name)
   return journal;
 }
 
-Journal read_journal(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw JournalError("journal " + path + ": cannot be opened; check the path");
-  std::vector<std::byte> bytes;
-  std::array<char, 1 << 16> buffer{};
-  while (file.read(buffer.data(), buffer.size()), file.gcount() > 0) {
-    const auto* data = reinterpret_cast<const std::byte*>(buffer.data());
-    bytes.insert(bytes.end(), data, data + file.gcount());
-  }
-  if (file.bad()) throw JournalError("journal " + path + ": cannot be read");
-  return parse_journal(bytes, path);
-}
+Journal read_journal(const std::string& path) { return parse_journal(read_file(path, kMostBytes), path); }
 
 }  // namespace supertac

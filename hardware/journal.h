@@ -82,8 +82,8 @@ struct Journal {
   const std::vector<JournalRecord>& of(Stream stream) const;
 };
 
-/// Reads a journal up to its first damaged chunk. Throws JournalError when the file cannot be read or does
-/// not begin like a journal.
+/// Reads a journal up to its first damaged chunk. Throws FileError when the file cannot be read, JournalError
+/// when it does not begin like a journal.
 Journal read_journal(const std::string& path);
 
 /// The same from bytes in memory; what the fuzzer calls.

@@ -6,20 +6,17 @@
 #include <string>
 
 #include "hardware/errors.h"
+#include "io/numbers.h"
 
 namespace supertac {
 namespace {
 
 void check_axis(char axis, double value, double low, double high) {
   if (std::isfinite(value) && value >= low && value <= high) return;
-  const std::string found = std::isfinite(value) ? fixed_decimals(value, 2) : "no number";
-  throw OutsideLimits(std::string("limits: ") + axis + " expected " + fixed_decimals(low, 2) + " to " +
-                      fixed_decimals(high, 2) + " mm, found " + found +
+  const std::string found = std::isfinite(value) ? format(value, 2) : "no number";
+  throw OutsideLimits(std::string("limits: ") + axis + " expected " + format(low, 2) + " to " +
+                      format(high, 2) + " mm, found " + found +
                       "; nothing was sent, correct the plan or the limits");
-}
-
-Point3 between(const Point3& a, const Point3& b, double part) {
-  return {a.x + part * (b.x - a.x), a.y + part * (b.y - a.y), a.z + part * (b.z - a.z)};
 }
 
 }  // namespace
@@ -45,7 +42,7 @@ void Limits::check_path(const Point3& from, const Point3& to) const {
         end.x >= plate_low_x && end.x <= plate_high_x && end.y >= plate_low_y && end.y <= plate_high_y;
     if (!over_plate) {
       throw OutsideLimits("limits: the way from " + describe(from) + " to " + describe(to) + " passes " +
-                          describe(end) + ", below Z" + fixed_decimals(clearance_z, 2) +
+                          describe(end) + ", below Z" + format(clearance_z, 2) +
                           " and beside the plate; nothing was sent, lift first");
     }
   }

@@ -9,7 +9,7 @@ namespace supertac {
 /// A box; and below `clearance_z` only over the plate, so that the finger never runs into the plate's side.
 struct Limits {
   Point3 low{0, 0, 0};
-  Point3 high{235, 235, 250};
+  Point3 high = rig::kBed;
   double clearance_z = 95;  ///< lowest z (mm) that is free everywhere
   double plate_low_x = 97, plate_high_x = 138.5;
   double plate_low_y = 99, plate_high_y = 211.5;

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "io/numbers.h"
+#include "io/text.h"
+
 namespace supertac {
 namespace {
 
@@ -67,9 +70,12 @@ Reply error_reply(std::string_view text) {
 
 double distance(const Point3& a, const Point3& b) { return std::hypot(a.x - b.x, a.y - b.y, a.z - b.z); }
 
+Point3 between(const Point3& a, const Point3& b, double part) {
+  return {a.x + part * (b.x - a.x), a.y + part * (b.y - a.y), a.z + part * (b.z - a.z)};
+}
+
 std::string describe(const Point3& point) {
-  return "X" + fixed_decimals(point.x, 2) + " Y" + fixed_decimals(point.y, 2) + " Z" +
-         fixed_decimals(point.z, 2);
+  return "X" + format(point.x, 2) + " Y" + format(point.y, 2) + " Z" + format(point.z, 2);
 }
 
 unsigned marlin_checksum(std::string_view text) {
@@ -85,24 +91,17 @@ std::string shielded(std::string_view command) {
 
 std::string numbered_line(std::int64_t number, std::string_view command) {
   if (command.find_first_of("\r\n*") != std::string_view::npos) {
-    throw std::invalid_argument("marlin line: a command may not hold a line break or '*', got \"" +
-                                std::string(command) + "\"");
+    throw std::invalid_argument("marlin line: a command may not hold a line break or '*', got " +
+                                in_quotes(command));
   }
   std::string line = "N" + std::to_string(number) + " " + std::string(command);
   line += "*" + std::to_string(marlin_checksum(line)) + "\n";
   if (line.size() > kMaxLineBytes) {
     throw std::invalid_argument("marlin line: " + std::to_string(line.size()) +
-                                " bytes, Marlin takes at most 96: \"" + std::string(command) + "\"");
+                                " bytes, Marlin takes at most " + std::to_string(kMaxLineBytes) + ": " +
+                                in_quotes(command));
   }
   return line;
-}
-
-std::string fixed_decimals(double value, int decimals) {
-  if (!std::isfinite(value)) throw std::invalid_argument("fixed_decimals: expected a finite number");
-  std::array<char, 400> text{};
-  const auto end =
-      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed, decimals).ptr;
-  return {text.data(), end};
 }
 
 Reply parse_reply(std::string_view line) {

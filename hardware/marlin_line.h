@@ -7,14 +7,13 @@
 #include <string>
 #include <string_view>
 
+#include "hardware/rig.h"
+
 namespace supertac {
 
-struct Point3 {
-  double x = 0, y = 0, z = 0;
-  bool operator==(const Point3&) const = default;
-};
-
 double distance(const Point3& a, const Point3& b);
+/// a at part 0, b at 1.
+Point3 between(const Point3& a, const Point3& b, double part);
 
 /// "X99.70 Y101.17 Z91.81"-style text for messages.
 std::string describe(const Point3& point);
@@ -33,9 +32,6 @@ std::string shielded(std::string_view command);
 /// `N<n> <command>*<xor>\n`. Throws std::invalid_argument when longer than 96 bytes or when the command holds
 /// a line break or '*'.
 std::string numbered_line(std::int64_t number, std::string_view command);
-
-/// Fixed decimals, never an exponent, whatever the locale. Throws std::invalid_argument unless finite.
-std::string fixed_decimals(double value, int decimals);
 
 enum class ReplyKind {
   ok,

@@ -4,6 +4,9 @@
 #include <array>
 #include <utility>
 
+#include "io/numbers.h"
+#include "io/text.h"
+
 namespace supertac {
 namespace {
 
@@ -52,11 +55,11 @@ void MarlinLink::connect() {
 
 void MarlinLink::nobody_answered() const {
   const std::string expected = "port " + port_.name() + ": expected a Marlin firmware, found ";
-  const std::string within =
-      " answer to M110 within " + fixed_decimals(settings_.connect_deadline_s, 0) + " s; ";
+  const std::string within = " answer to M110 within " + format(settings_.connect_deadline_s, 0) + " s; ";
   if (sniffer_.counters().bytes > 0) {
     throw WrongDevice(expected + std::to_string(sniffer_.counters().bytes) + " bytes that are no" + within +
-                      "check that it is the printer's port (--list-ports) and that its baud rate is 115200");
+                      "check that it is the printer's port (--list-ports) and that its baud rate is " +
+                      std::to_string(rig::kPrinterBaud));
   }
   throw PrinterSilent(expected + "no" + within + "check that the printer is on and the port is right");
 }
@@ -120,7 +123,9 @@ void MarlinLink::finish(const Exchange& exchange) {
   // every later answer by one.
   if (exchange.answer.repeated) settle();
   if (exchange.error_stands) {
-    throw PrinterRefused("printer " + port_.name() + ": refused \"" + kept_.back() + "\": " + exchange.error);
+    throw PrinterRefused("printer " + port_.name() + ": refused " +
+                         in_quotes(kept_.back().substr(0, kept_.back().size() - 1)) + ": " +
+                         printable(exchange.error));
   }
 }
 
@@ -181,7 +186,8 @@ void MarlinLink::on_ok(Exchange& exchange) {
   exchange.answer.answered_s = input_time_;
   if (exchange.done) return;
   if (exchange.fault) {
-    repeat(exchange, exchange.error.empty() ? "the firmware reports damaged lines" : exchange.error);
+    repeat(exchange,
+           exchange.error.empty() ? "the firmware reports damaged lines" : printable(exchange.error));
     return;
   }
   if (exchange.cursor == exchange.number) {
@@ -246,8 +252,8 @@ void MarlinLink::settle() {
 void MarlinLink::check_alarm(const Reply& reply) {
   if (reply.kind == ReplyKind::fatal) {
     halted_ = true;
-    throw PrinterHalted("printer " + port_.name() + ": the firmware halted (\"" + reply.text +
-                        "\"); nothing more is sent, reset the printer and check it");
+    throw PrinterHalted("printer " + port_.name() + ": the firmware halted (" + in_quotes(reply.text) +
+                        "); nothing more is sent, reset the printer and check it");
   }
   if (reply.kind == ReplyKind::start && connected_) {
     connected_ = false;

@@ -6,7 +6,7 @@
 namespace supertac {
 namespace {
 
-constexpr double kStartDelay = 0.1;  // a move never starts sooner than this after its ok
+constexpr double kSoonestStartS = 0.1;  // after its ok no move starts sooner
 constexpr double kProgressDeadline = 6;
 
 }  // namespace
@@ -27,8 +27,10 @@ const char* name_of(Phase phase) {
 }
 
 std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
-  if (plan.passes < 1 || plan.passes > 1000 || !(plan.slide > 0) || !(plan.lift > 0) || !(plan.speed > 0) ||
-      !(plan.speed_z > 0) || plan.speed_z > 5 || !(plan.travel_speed > 0)) {
+  const auto usable = [](double value) { return value > 0 && std::isfinite(value); };
+  if (plan.passes < 1 || plan.passes > 1000 || !usable(plan.slide) || !usable(plan.lift) ||
+      !usable(plan.speed) || !usable(plan.speed_z) || plan.speed_z > rig::kLiftMmS ||
+      !usable(plan.travel_speed)) {
     throw std::invalid_argument(
         "palpation: expected 1 to 1000 passes, slide, lift and speeds above 0 and at most 5 mm/s in z");
   }
@@ -55,6 +57,22 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
   add(plan.passes, Phase::reposition, {here.x, here.y, at.z}, plan.travel_speed);
   std::erase_if(legs, [](const Leg& leg) { return leg.from == leg.to; });
   return legs;
+}
+
+std::string palpation_program(const PalpationPlan& plan, const Point3& origin, const Limits& limits,
+                              const std::string& title) {
+  if (title.find_first_of("\r\n") != std::string::npos)
+    throw std::invalid_argument("palpation_program: the title has a line break, which would end its comment");
+  const std::vector<Leg> legs = legs_of(plan, origin);
+  for (const Leg& leg : legs) limits.check_path(leg.from, leg.to);
+  std::string text = "; " + title + "\n; Lengths in mm, F in mm/min. The finger is lifted before every way " +
+                     "to another pass.\nG21\nG90\nM0 Head at " + describe(origin) +
+                     " and the plate below it?\n" + origin_command(origin) + "\n";
+  for (const Leg& leg : legs) {
+    text += "; pass " + std::to_string(leg.pass) + ": " + name_of(leg.phase) + "\n" +
+            move_command(leg.to, leg.speed) + "\nM400\n";
+  }
+  return text;
 }
 
 Palpation::Palpation(Printer& printer, const PalpationPlan& plan, PalpationObserver observer)
@@ -109,7 +127,7 @@ void Palpation::follow(const Leg& leg) {
       const double left = distance(sample->position, leg.to);
       if (!realtime_known_ && length > 1) {
         realtime_known_ = true;
-        realtime_ = !(left < 0.02 && sample->time_s < leg.accepted_s + kStartDelay);
+        realtime_ = !(left < 0.02 && sample->time_s < leg.accepted_s + kSoonestStartS);
         if (!realtime_) return;
       }
       observer_.position(leg, *sample);

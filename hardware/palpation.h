@@ -17,14 +17,14 @@ const char* name_of(Phase phase);
 
 /// Lengths in mm, speeds in mm/s, printer coordinates.
 struct PalpationPlan {
-  Point3 start{99.7, 101.17, 91.81};  ///< of the first slide, in contact
-  int passes = 8;
-  double slide = 108;  ///< along +y
-  double shift_x = 5;  ///< between passes
-  double lift = 5;
-  double speed = 10;  ///< of the slide
-  double speed_z = 5;
-  double travel_speed = 50;
+  Point3 start = rig::kStart;  ///< of the first slide, in contact
+  int passes = rig::kPasses;
+  double slide = rig::kSlideMm;        ///< along +y
+  double shift_x = rig::kPassShiftMm;  ///< between passes
+  double lift = rig::kLiftMm;
+  double speed = rig::kSlideMmS;  ///< of the slide
+  double speed_z = rig::kLiftMmS;
+  double travel_speed = rig::kFastestMmS;
   double poll_interval_s = 0.01;
 };
 
@@ -60,6 +60,16 @@ struct PalpationOutcome {
 /// All legs of the plan, from `here` and back (at lifting height or above). Throws std::invalid_argument for
 /// a plan that makes no sense.
 std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here);
+
+/// The palpation run as G-code, for people who send it from another host: the moves of Palpation::run, in
+/// the same lines, with M400 behind each. It begins with a pause (M0) in which the operator confirms that the
+/// head is at `origin`, then sets the coordinates (G92): what a host of ours asks before it moves. All
+/// coordinates are absolute, in mm; between passes and at the end the finger is lifted, and the head returns
+/// to the origin.
+/// `title` is one line for the reader. Throws OutsideLimits when a target or the way to it is not allowed,
+/// std::invalid_argument for a plan that makes no sense or a title with a line break.
+std::string palpation_program(const PalpationPlan& plan, const Point3& origin, const Limits& limits,
+                              const std::string& title);
 
 class Palpation {
  public:

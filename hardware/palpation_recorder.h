@@ -17,7 +17,7 @@ struct RecorderSettings {
   PalpationPlan plan;
   PrinterSettings printer;
   BoardSettings board;
-  Point3 origin{99.7, 101.17, 131.81};      ///< where the operator confirms the head to be
+  Point3 origin = rig::kMounted;            ///< where the operator confirms the head to be
   bool home = false;                        ///< home instead
   std::string journal;                      ///< path; must not exist
   std::string header;                       ///< one line that says what is collected

@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "hardware/errors.h"
+#include "hardware/rig.h"
 
 namespace supertac {
 namespace {
@@ -46,10 +47,10 @@ std::vector<PortInfo> list_ports() {
 std::string resolve_board_port(const std::string& path) {
   if (path != "auto") return path;
   std::vector<PortInfo> boards = list_ports();
-  std::erase_if(boards, [](const PortInfo& port) { return port.usb_id != kBoardUsbId; });
+  std::erase_if(boards, [](const PortInfo& port) { return port.usb_id != rig::kBoardUsbId; });
   if (boards.size() == 1) return boards.front().path;
-  throw PortNotFound("port auto: expected one tactile board (USB " + std::string(kBoardUsbId) + "), found " +
-                     std::to_string(boards.size()) + "; plug it in, or name the port");
+  throw PortNotFound("port auto: expected one tactile board (USB " + std::string(rig::kBoardUsbId) +
+                     "), found " + std::to_string(boards.size()) + "; plug it in, or name the port");
 }
 
 std::string lasting_port_name(const std::string& path, const std::string& links) {

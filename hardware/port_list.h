@@ -12,8 +12,6 @@ struct PortInfo {
   std::string product;  ///< as the device calls itself
 };
 
-constexpr const char* kBoardUsbId = "0483:5740";
-
 /// Ports with a device behind them, by name.
 std::vector<PortInfo> list_ports();
 

@@ -1,6 +1,9 @@
 #include "hardware/printer.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "io/numbers.h"
 
 namespace supertac {
 namespace {
@@ -9,13 +12,13 @@ constexpr double kHomeDeadline = 180;
 constexpr double kMoveMargin = 8;  // start delay, acceleration, and a firmware that is slower than ordered
 
 std::string coordinates(const Point3& p) {
-  return " X" + fixed_decimals(p.x, 3) + " Y" + fixed_decimals(p.y, 3) + " Z" + fixed_decimals(p.z, 3);
+  return " X" + format(p.x, 3) + " Y" + format(p.y, 3) + " Z" + format(p.z, 3);
 }
 
 }  // namespace
 
 std::string move_command(const Point3& target, double speed_mm_s) {
-  return "G1" + coordinates(target) + " F" + fixed_decimals(60 * speed_mm_s, 1);
+  return "G1" + coordinates(target) + " F" + format(60 * speed_mm_s, 1);
 }
 
 std::string origin_command(const Point3& here) { return "G92" + coordinates(here); }
@@ -62,7 +65,8 @@ double Printer::start_move(const Point3& target, double speed_mm_s) {
     throw OriginUnknown(
         "printer: the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
   }
-  if (!(speed_mm_s > 0)) throw std::invalid_argument("printer: speed must be above 0 mm/s");
+  if (!(speed_mm_s > 0) || !std::isfinite(speed_mm_s))
+    throw std::invalid_argument("printer: expected a speed above 0 mm/s, got " + format(speed_mm_s));
   settings_.limits.check_path(target_, target);
   const double length = distance(target_, target);
   const double sent = link_.command(move_command(target, speed_mm_s)).answered_s;
@@ -183,7 +187,7 @@ void Printer::lift(double mm, double speed_mm_s) {
   Point3 above = here;
   above.z = std::min(here.z + mm, settings_.limits.high.z);
   // Not through start_move(): a lift is the way out of a position that the limits forbid.
-  link_.command("G1 Z" + fixed_decimals(above.z, 3) + " F" + fixed_decimals(60 * speed_mm_s, 1));
+  link_.command("G1 Z" + format(above.z, 3) + " F" + format(60 * speed_mm_s, 1));
   target_ = above;
   expected_seconds_ = mm / speed_mm_s + 0.5;
   finish_move();

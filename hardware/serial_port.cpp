@@ -62,7 +62,7 @@ SerialPort::SerialPort(const std::string& path, const SerialSettings& settings)
     close(descriptor_);
     open_failed(path, error);
   };
-  if (!is_terminal(descriptor_)) {
+  if (isatty(descriptor_) == 0) {
     close(descriptor_);
     throw NotASerialPort("port " + path +
                          ": expected a serial port, found another kind of file; run with --list-ports");

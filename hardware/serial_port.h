@@ -7,6 +7,7 @@
 #include <string>
 
 #include "hardware/port.h"
+#include "hardware/rig.h"
 
 namespace supertac {
 
@@ -14,7 +15,7 @@ namespace supertac {
 double monotonic_seconds();
 
 struct SerialSettings {
-  unsigned baud = 115200;
+  unsigned baud = rig::kPrinterBaud;
   /// The port's clock runs this many times faster than the wall clock. 1 for everything real; a virtual rig
   /// started with `--speedup X` needs the same X here, so that all times below stay times of the rig.
   double speedup = 1;

@@ -20,11 +20,6 @@ int set_raw_terminal(int descriptor, unsigned baud) {
   return ioctl(descriptor, TCSETS2, &settings) == 0 ? 0 : errno;
 }
 
-bool is_terminal(int descriptor) {
-  termios2 settings{};
-  return ioctl(descriptor, TCGETS2, &settings) == 0;
-}
-
 unsigned terminal_baud(int descriptor) {
   termios2 settings{};
   return ioctl(descriptor, TCGETS2, &settings) == 0 ? settings.c_ospeed : 0;

@@ -8,9 +8,6 @@ namespace supertac {
 /// Returns 0 or the errno of the call that failed.
 int set_raw_terminal(int descriptor, unsigned baud);
 
-/// True when a terminal answers TCGETS2 on this descriptor.
-bool is_terminal(int descriptor);
-
 /// Baud rate as the terminal reports it, 0 when it does not.
 unsigned terminal_baud(int descriptor);
 

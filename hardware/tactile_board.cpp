@@ -6,6 +6,7 @@
 
 #include "hardware/errors.h"
 #include "hardware/marlin_line.h"
+#include "io/numbers.h"
 
 namespace supertac {
 namespace {
@@ -88,13 +89,14 @@ void TactileBoard::check_silence(double time) {
         (text ? "text, as from a printer; exchange the two ports"
               : std::to_string(total) + " bytes without a frame; choose the board's port (--list-ports)"));
   }
-  throw BoardSilent("board " + port_->name() + ": expected 1008 frames/s, found none for " +
-                    fixed_decimals(settings_.silence_s, 1) + " s; plug the board out and in again");
+  throw BoardSilent("board " + port_->name() + ": expected " + format(rig::kFrameRateHz, 0) +
+                    " frames/s, found none for " + format(settings_.silence_s, 1) +
+                    " s; plug the board out and in again");
 }
 
 void TactileBoard::take_batch(double time, bool more_waits) {
   const auto count = static_cast<double>(batch_.size());
-  const double step = first_ ? kFramePeriod : std::min(kFramePeriod, (time - last_time_) / count);
+  const double step = first_ ? rig::kFramePeriodS : std::min(rig::kFramePeriodS, (time - last_time_) / count);
   // Frames that have waited follow the last one; what is read as it comes has just been finished.
   const double begin = more_waits && !first_ ? last_time_ : time - count * step;
   double number = 0;
@@ -105,7 +107,7 @@ void TactileBoard::take_batch(double time, bool more_waits) {
 }
 
 void TactileBoard::take(StampedFrame frame, std::uint64_t discarded) {
-  frame.suspect = discarded > 0 || (!first_ && frame.arrival_s - last_arrival_ > 1.5 * kFramePeriod);
+  frame.suspect = discarded > 0 || (!first_ && frame.arrival_s - last_arrival_ > 1.5 * rig::kFramePeriodS);
   frame.jump = jumps_.jump(frame.frame);
   first_ = false;
   last_arrival_ = frame.arrival_s;

@@ -1,13 +1,19 @@
+// The hashes of the project: one for what must be told apart (fingerprints, streams), one sum against damage.
 #pragma once
 
+#include <bit>
+#include <concepts>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
+#include <string_view>
 
 namespace supertac {
 
 /// Spreads the bits of a counter or key over 64 bits (finalizer of SplitMix64, Steele et al. 2014). Not for
 /// secrets.
-inline std::uint64_t mix64(std::uint64_t z) {
+constexpr std::uint64_t mix64(std::uint64_t z) {
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
   return z ^ (z >> 31);
@@ -16,11 +22,31 @@ inline std::uint64_t mix64(std::uint64_t z) {
 constexpr std::uint64_t kGolden64 =
     0x9e3779b97f4a7c15ULL;  ///< odd step that keeps counters apart before mix64
 
-/// 16 lower-case hexadecimal digits.
-inline std::string hex64(std::uint64_t value) {
-  std::string text(16, '0');
-  for (std::size_t i = 0; i < 16; ++i) text[i] = "0123456789abcdef"[(value >> (60 - 4 * i)) & 15];
-  return text;
-}
+/// Words one after the other: state = mix64(state * kGolden64 + word). Fingerprints in checkpoints are made
+/// of it.
+class Hash {
+ public:
+  explicit Hash(std::uint64_t state = 1) : state_(state) {}
+  void add(std::integral auto word) { state_ = mix64(state_ * kGolden64 + static_cast<std::uint64_t>(word)); }
+  void add(float value) { add(std::bit_cast<std::uint32_t>(value)); }
+  void add(std::string_view text) {
+    add(text.size());
+    for (const char c : text) add(static_cast<unsigned char>(c));
+  }
+  std::uint64_t value() const { return state_; }
+  /// 16 lower-case hexadecimal digits.
+  std::string hex() const;
+
+ private:
+  std::uint64_t state_;
+};
+
+/// FNV-1a with an offset of its own: names the simulator's random streams, whose recordings must stay the
+/// same.
+std::uint64_t stream_of(std::string_view name);
+
+/// CRC-32 of ISO 3309 (the one of zlib, PNG and Ethernet), by zlib. A long input may be given in parts, each
+/// with the sum of the parts before it as `seed`: crc32(b, crc32(a)) == crc32(a followed by b).
+std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t seed = 0);
 
 }  // namespace supertac

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <numbers>
 #include <stdexcept>
 
 #include "io/file.h"
+#include "io/same_bits.h"
 
 #define STB_IMAGE_WRITE_STATIC
 #define STB_IMAGE_WRITE_IMPLEMENTATION
@@ -20,7 +20,7 @@ constexpr int kMapSize = 256;
 
 std::uint8_t srgb_byte(double linear) {
   const double v = std::clamp(linear, 0.0, 1.0);
-  const double encoded = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
+  const double encoded = v <= 0.0031308 ? 12.92 * v : 1.055 * same_bits::pow(v, 1 / 2.4) - 0.055;
   return static_cast<std::uint8_t>(std::lround(255 * encoded));
 }
 
@@ -39,10 +39,10 @@ std::array<Rgb, kMapSize> make_map() {
   std::array<Rgb, kMapSize> map;
   for (int i = 0; i < kMapSize; ++i) {
     const double t = i / (kMapSize - 1.0);
-    const double hue = (285 - 180 * t) * std::numbers::pi / 180;
-    const double chroma = 0.10 + 0.02 * std::cos(2 * std::numbers::pi * t);
+    const double hue = (285 - 180 * t) / 360;
+    const double chroma = 0.10 + 0.02 * same_bits::cosine(t);
     map[static_cast<std::size_t>(i)] =
-        rgb_of_oklab(0.22 + 0.74 * t, chroma * std::cos(hue), chroma * std::sin(hue));
+        rgb_of_oklab(0.22 + 0.74 * t, chroma * same_bits::cosine(hue), chroma * same_bits::sine(hue));
   }
   return map;
 }

@@ -12,10 +12,11 @@ namespace {
 using Tree = nlohmann::ordered_json;
 
 // Builds the tree and counts while doing so.
-class TreeBuilder : public JsonHandler {
+class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
  public:
   explicit TreeBuilder(const JsonLimits& limits) : limits_(limits) {}
   Tree take() { return std::move(root_); }
+  const std::string& problem() const { return problem_; }
 
   bool null() override { return add(nullptr); }
   bool boolean(bool value) override { return add(value); }
@@ -23,16 +24,22 @@ class TreeBuilder : public JsonHandler {
   bool number_unsigned(std::uint64_t value) override { return add(value); }
   bool number_float(double value, const std::string&) override { return add(value); }
   bool string(std::string& value) override { return add(std::move(value)); }
+  bool binary(nlohmann::json::binary_t&) override { return false; }  // there is none in text
   bool start_object(std::size_t) override { return open(Tree::object()); }
   bool start_array(std::size_t) override { return open(Tree::array()); }
-  bool end_object() override { return close(); }
-  bool end_array() override { return close(); }
+  bool end_object() override { return levels_.pop_back(), true; }
+  bool end_array() override { return levels_.pop_back(), true; }
 
   bool key(std::string& name) override {
     Level& level = levels_.back();
     if (!level.keys.insert(name).second) return refuse("the key " + in_quotes(name) + " appears twice");
     level.key = name;
     return count();
+  }
+  bool parse_error(std::size_t position, const std::string&,
+                   const nlohmann::json::exception& error) override {
+    return refuse(error.id == 406 ? "a number is out of range"
+                                  : "not valid JSON at byte " + std::to_string(position));
   }
 
  private:
@@ -41,6 +48,12 @@ class TreeBuilder : public JsonHandler {
     std::string key;             // of the next value, in an object
     std::set<std::string> keys;  // so far: ordered_json itself would search linearly for each
   };
+
+  /// Stops the parse.
+  bool refuse(const std::string& why) {
+    problem_ = why;
+    return false;
+  }
 
   bool count() {
     if (++values_ <= limits_.max_values) return true;
@@ -70,42 +83,23 @@ class TreeBuilder : public JsonHandler {
     return count();
   }
 
-  bool close() {
-    levels_.pop_back();
-    return true;
-  }
-
   JsonLimits limits_;
   Tree root_;
   std::vector<Level> levels_;
   std::size_t values_ = 0;
+  std::string problem_;
 };
 
 }  // namespace
-
-bool JsonHandler::refuse(const std::string& why) {
-  if (problem_.empty()) problem_ = why;
-  return false;
-}
-
-bool JsonHandler::parse_error(std::size_t position, const std::string&,
-                              const nlohmann::json::exception& error) {
-  if (error.id == 406) return refuse("a number is out of range");
-  return refuse("not valid JSON at byte " + std::to_string(position));
-}
-
-void parse_json(std::string_view text, JsonHandler& handler) {
-  if (text.find('\0') != std::string_view::npos) throw JsonError("not valid JSON: holds a NUL byte");
-  if (!nlohmann::json::sax_parse(text.begin(), text.end(), &handler)) throw JsonError(handler.problem());
-}
 
 nlohmann::ordered_json parse_json_limited(std::string_view text, const JsonLimits& limits) {
   if (text.size() > limits.max_bytes) {
     throw JsonError("has " + std::to_string(text.size()) + " bytes, expected at most " +
                     std::to_string(limits.max_bytes));
   }
+  if (text.find('\0') != std::string_view::npos) throw JsonError("not valid JSON: holds a NUL byte");
   TreeBuilder builder(limits);
-  parse_json(text, builder);
+  if (!nlohmann::json::sax_parse(text.begin(), text.end(), &builder)) throw JsonError(builder.problem());
   return builder.take();
 }
 

@@ -5,12 +5,21 @@
 
 namespace supertac {
 
-/// The middle one of some numbers, the upper of two; reorders them. There must be at least one.
+/// The value that the share `q` of the values lies below: the one at place q n (rounded down, at most n - 1)
+/// of n sorted ones. Reorders them; there must be at least one.
+template <class Range>
+auto quantile(Range&& values, double q) {
+  const auto place =
+      std::min(static_cast<std::size_t>(q * static_cast<double>(values.size())), values.size() - 1);
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(place);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// The middle one, the upper of two; reorders the values. There must be at least one.
 template <class Range>
 auto median(Range&& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return quantile(values, 0.5);
 }
 
 }  // namespace supertac

@@ -1,29 +1,15 @@
 #include "io/random.h"
 
-#include <bit>
 #include <cmath>
 #include <limits>
+
+#include "io/same_bits.h"
 
 namespace supertac {
 namespace {
 
 std::uint32_t low_word(std::uint64_t value) { return static_cast<std::uint32_t>(value); }
 std::uint32_t high_word(std::uint64_t value) { return static_cast<std::uint32_t>(value >> 32); }
-
-// log(x) for normal x > 0: x = m 2^e with m in [sqrt(1/2), sqrt(2)), log m = 2 atanh((m - 1) / (m + 1)).
-double natural_log(double x) {
-  const std::uint64_t word = std::bit_cast<std::uint64_t>(x);
-  int exponent = static_cast<int>(word >> 52) - 1023;
-  double mantissa = std::bit_cast<double>((word & 0xFFFFFFFFFFFFFull) | 0x3FF0000000000000ull);
-  if (mantissa > 1.4142135623730951) {
-    mantissa *= 0.5;
-    exponent += 1;
-  }
-  const double s = (mantissa - 1) / (mantissa + 1);  // |s| < 0.172: eleven terms reach 1e-17
-  double series = 0;
-  for (int n = 21; n >= 1; n -= 2) series = series * (s * s) + 1.0 / n;
-  return exponent * 0.6931471805599453 + 2 * s * series;
-}
 
 // numerator[0] + numerator[1] x + ... over the same of the denominator.
 double ratio(const std::array<double, 8>& numerator, const std::array<double, 8>& denominator, double x) {
@@ -40,38 +26,25 @@ double ratio(const std::array<double, 8>& numerator, const std::array<double, 8>
 constexpr std::array<double, 8> kA = {
     3.3871328727963666080e0,  1.3314166789178437745e+2, 1.9715909503065514427e+3, 1.3731693765509461125e+4,
     4.5921953931549871457e+4, 6.7265770927008700853e+4, 3.3430575583588128105e+4, 2.5090809287301226727e+3};
-constexpr std::array<double, 8> kB = {1.0,
-                                      4.2313330701600911252e+1,
-                                      6.8718700749205790830e+2,
-                                      5.3941960214247511077e+3,
-                                      2.1213794301586595867e+4,
-                                      3.9307895800092710610e+4,
-                                      2.8729085735721942674e+4,
-                                      5.2264952788528545610e+3};
+constexpr std::array<double, 8> kB = {
+    1.0000000000000000000e0,  4.2313330701600911252e+1, 6.8718700749205790830e+2, 5.3941960214247511077e+3,
+    2.1213794301586595867e+4, 3.9307895800092710610e+4, 2.8729085735721942674e+4, 5.2264952788528545610e+3};
 constexpr std::array<double, 8> kC = {1.42343711074968357734e0,  4.63033784615654529590e0,
                                       5.76949722146069140550e0,  3.64784832476320460504e0,
                                       1.27045825245236838258e0,  2.41780725177450611770e-1,
                                       2.27238449892691845833e-2, 7.74545014278341407640e-4};
-constexpr std::array<double, 8> kD = {1.0,
-                                      2.05319162663775882187e0,
-                                      1.67638483018380384940e0,
-                                      6.89767334985100004550e-1,
-                                      1.48103976427480074590e-1,
-                                      1.51986665636164571966e-2,
-                                      5.47593808499534494600e-4,
-                                      1.05075007164441684324e-9};
+constexpr std::array<double, 8> kD = {1.0000000000000000000e0,   2.05319162663775882187e0,
+                                      1.67638483018380384940e0,  6.89767334985100004550e-1,
+                                      1.48103976427480074590e-1, 1.51986665636164571966e-2,
+                                      5.47593808499534494600e-4, 1.05075007164441684324e-9};
 constexpr std::array<double, 8> kE = {6.65790464350110377720e0,  5.46378491116411436990e0,
                                       1.78482653991729133580e0,  2.96560571828504891230e-1,
                                       2.65321895265761230930e-2, 1.24266094738807843860e-3,
                                       2.71155556874348757815e-5, 2.01033439929228813265e-7};
-constexpr std::array<double, 8> kF = {1.0,
-                                      5.99832206555887937690e-1,
-                                      1.36929880922735805310e-1,
-                                      1.48753612908506148525e-2,
-                                      7.86869131145613259100e-4,
-                                      1.84631831751005468180e-5,
-                                      1.42151175831644588870e-7,
-                                      2.04426310338993978564e-15};
+constexpr std::array<double, 8> kF = {1.0000000000000000000e0,   5.99832206555887937690e-1,
+                                      1.36929880922735805310e-1, 1.48753612908506148525e-2,
+                                      7.86869131145613259100e-4, 1.84631831751005468180e-5,
+                                      1.42151175831644588870e-7, 2.04426310338993978564e-15};
 
 }  // namespace
 
@@ -90,7 +63,7 @@ double inverse_normal(double p) {
   if (!(p > 0 && p < 1)) return std::numeric_limits<double>::quiet_NaN();
   const double q = p - 0.5;
   if (std::abs(q) <= 0.425) return q * ratio(kA, kB, 0.180625 - q * q);
-  const double r = std::sqrt(-natural_log(q < 0 ? p : 1 - p));
+  const double r = std::sqrt(-same_bits::log(q < 0 ? p : 1 - p));
   const double x = r <= 5 ? ratio(kC, kD, r - 1.6) : ratio(kE, kF, r - 5);
   return q < 0 ? -x : x;
 }

@@ -5,8 +5,8 @@
 #include <set>
 #include <stdexcept>
 
-#include "io/crc32.h"
 #include "io/file.h"
+#include "io/hash.h"
 #include "io/json.h"
 #include "io/numbers.h"
 #include "io/safetensors_header.h"

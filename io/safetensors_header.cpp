@@ -1,113 +1,49 @@
 #include "io/safetensors_header.h"
 
-#include <limits>
-#include <set>
-
 #include "io/json.h"
 #include "io/text.h"
 
 namespace supertac::safetensors {
 namespace {
 
-// {"__metadata__": {text: text}, name: {"dtype": text, "shape": [n...], "data_offsets": [begin, end]}, ...}
-// Each callback checks that its value may stand where it stands, so the deepest nesting is three.
-class HeaderParser : public JsonHandler {
- public:
-  Header take() { return std::move(header_); }
+using Tree = nlohmann::ordered_json;
 
-  bool start_object(std::size_t) override {
-    if (place_ == Place::outside) return enter(Place::file);
-    if (place_ != Place::file) return refuse("unexpected object in " + in_quotes(entry_));
-    if (entry_ == kMetadataKey) return enter(Place::metadata);
-    if (header_.tensors.size() == kMaxTensors) {
-      return refuse("more than " + std::to_string(kMaxTensors) + " tensors");
-    }
-    tensor_ = {};
-    offsets_.clear();
-    return enter(Place::tensor);
-  }
+const char* kind_of(const Tree& value) {
+  if (value.is_null()) return "null";
+  if (value.is_boolean()) return "a boolean";
+  if (value.is_string()) return "a string";
+  if (value.is_array()) return "an array";
+  if (value.is_object()) return "an object";
+  if (value.is_number_unsigned()) return "a number";
+  return value.is_number_float() ? "a fraction or a number beyond 64 bits" : "a negative number";
+}
 
-  bool key(std::string& name) override {
-    if (place_ == Place::file) {
-      if (!entries_.insert(name).second) return refuse("the name " + in_quotes(name) + " appears twice");
-      entry_ = name;
-      fields_.clear();
-      return true;
-    }
-    if (!fields_.insert(name).second)
-      return refuse(in_quotes(name) + " appears twice in " + in_quotes(entry_));
-    if (fields_.size() > kMaxFields)
-      return refuse("more than " + std::to_string(kMaxFields) + " metadata fields");
-    field_ = name;
-    return true;
-  }
+void expect(bool right, const std::string& place, const char* expected, const Tree& found) {
+  if (!right) throw JsonError(place + ": expected " + expected + ", found " + kind_of(found));
+}
 
-  bool string(std::string& value) override {
-    if (place_ == Place::metadata) {
-      header_.metadata.emplace(field_, value);
-      return true;
-    }
-    if (place_ != Place::tensor || field_ != "dtype") return unexpected("a string");
-    tensor_.dtype = value;
-    return true;
-  }
+void expect_at_most(std::size_t most, std::size_t found, const std::string& what) {
+  if (found > most) throw JsonError("more than " + std::to_string(most) + " " + what);
+}
 
-  bool start_array(std::size_t) override {
-    if (place_ != Place::tensor) return unexpected("an array");
-    if (field_ == "shape") return enter(Place::shape);
-    if (field_ == "data_offsets") return enter(Place::offsets);
-    return unexpected("an array");
-  }
+std::vector<std::uint64_t> numbers(const Tree& list, const std::string& place) {
+  expect(list.is_array(), place, "a list", list);
+  expect_at_most(kMaxRank, list.size(), "numbers in " + place);
+  for (const Tree& value : list) expect(value.is_number_unsigned(), place, "a whole number", value);
+  return list;
+}
 
-  bool number_unsigned(std::uint64_t value) override {
-    if (place_ != Place::shape && place_ != Place::offsets) return unexpected("a number");
-    auto& list = place_ == Place::shape ? tensor_.shape : offsets_;
-    const std::size_t longest = place_ == Place::shape ? kMaxRank : 2;
-    if (list.size() == longest) {
-      return refuse(in_quotes(entry_) + ": more than " + std::to_string(longest) + " numbers in " +
-                    in_quotes(field_));
-    }
-    list.push_back(value);
-    return true;
-  }
-
-  bool end_array() override { return enter(Place::tensor); }
-
-  bool end_object() override {
-    if (place_ == Place::metadata) return enter(Place::file);
-    if (place_ == Place::file) return enter(Place::outside);
-    if (fields_ != std::set<std::string>{"data_offsets", "dtype", "shape"} || offsets_.size() != 2) {
-      return refuse("tensor " + in_quotes(entry_) +
-                    " needs exactly dtype, shape and data_offsets [begin, end]");
-    }
-    tensor_.begin = offsets_[0];
-    tensor_.end = offsets_[1];
-    header_.tensors.emplace(entry_, std::move(tensor_));
-    return enter(Place::file);
-  }
-
- private:
-  enum class Place { outside, file, metadata, tensor, shape, offsets };
-
-  bool enter(Place place) {
-    place_ = place;
-    return true;
-  }
-
-  bool unexpected(const std::string& what) {
-    return refuse("unexpected " + what + " in " + in_quotes(entry_) +
-                  (field_.empty() ? "" : " at " + in_quotes(field_)));
-  }
-
-  Header header_;
-  Place place_ = Place::outside;
-  std::set<std::string> entries_;
-  std::set<std::string> fields_;
-  std::string entry_;
-  std::string field_;
-  TensorInfo tensor_{};
-  std::vector<std::uint64_t> offsets_;
-};
+TensorInfo tensor_of(const Tree& entry, const std::string& place) {
+  const bool whole = entry.size() == 3 && entry.contains("dtype") && entry.contains("shape") &&
+                     entry.contains("data_offsets") && entry["data_offsets"].size() == 2;
+  if (!whole) throw JsonError(place + " needs exactly dtype, shape and data_offsets [begin, end]");
+  expect(entry["dtype"].is_string(), place + " at 'dtype'", "a text", entry["dtype"]);
+  const std::vector<std::uint64_t> offsets = numbers(entry["data_offsets"], place + " at 'data_offsets'");
+  return {.dtype = entry["dtype"],
+          .shape = numbers(entry["shape"], place + " at 'shape'"),
+          .begin = offsets[0],
+          .end = offsets[1]};
+}
 
 std::uint64_t dtype_bytes(const std::string& dtype) {
   static const std::map<std::string, std::uint64_t> kBytes = {
@@ -124,9 +60,24 @@ Header parse_header(std::string_view text) {
   // JSON would allow any white space here; one spelling less is one ambiguity less.
   const std::size_t last = text.find_last_not_of(' ');
   if (text[last] != '}') throw JsonError("does not end with '}' and spaces");
-  HeaderParser parser;
-  parse_json(text, parser);
-  return parser.take();
+  // {"__metadata__": {text: text}, name: {"dtype": text, "shape": [n...], "data_offsets": [begin, end]}, ...}
+  Header header;
+  const Tree tree = parse_json_limited(text, {.max_depth = 4});
+  for (const auto& [name, entry] : tree.items()) {
+    const std::string place = (name == kMetadataKey ? "" : "tensor ") + in_quotes(name);
+    expect(entry.is_object(), place, "an object", entry);
+    if (name != kMetadataKey) {
+      header.tensors.emplace(name, tensor_of(entry, place));
+      expect_at_most(kMaxTensors, header.tensors.size(), "tensors");
+      continue;
+    }
+    expect_at_most(kMaxFields, entry.size(), "metadata fields");
+    for (const auto& [field, value] : entry.items()) {
+      expect(value.is_string(), place + " at " + in_quotes(field), "a text", value);
+      header.metadata.emplace(field, value);
+    }
+  }
+  return header;
 }
 
 std::string header_text(const std::map<std::string, std::string>& metadata,

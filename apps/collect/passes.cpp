@@ -14,9 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The plate's corner in the printer's coordinates: pass 1 at X99.70 runs 0.5 mm inside the plate's edge.
-constexpr double kPlateX = 99.2, kPlateY = 101.17;
-
 struct Header {
   std::string plate;
   int trial = 0;
@@ -46,8 +43,8 @@ Recording recording_of(const CollectedPass& pass, const Header& header) {
   recording.time_s = pass.time_s;
   recording.volts = pass.volts;
   for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
-    recording.position_mm.push_back(static_cast<float>(pass.position[3 * i] - kPlateX));
-    recording.position_mm.push_back(static_cast<float>(pass.position[3 * i + 1] - kPlateY));
+    recording.position_mm.push_back(static_cast<float>(pass.position[3 * i] - rig::kPlate.x));
+    recording.position_mm.push_back(static_cast<float>(pass.position[3 * i + 1] - rig::kPlate.y));
   }
   recording.plate = header.plate;
   recording.trial = header.trial;
@@ -120,8 +117,8 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
     keep_plate_file((fs::path(journal).parent_path() / header.plate).string(), out);
   const ClockFit& clock = collection.clock;
   if (!clock.plausible)
-    arguments.note("warning: the board's period is " + format(1e6 * clock.period_s, 1) +
-                   " us, expected 992 +- 0.5 %");
+    arguments.note("warning: the board's period is " + format(1e6 * clock.period_s, 1) + " us, expected " +
+                   format(1e6 * rig::kFramePeriodS, 0) + " +- 0.5 %");
   report.json = {{"folder", out},
                  {"journal", journal},
                  {"plate", header.plate},

@@ -2,10 +2,11 @@
 
 #include <time.h>
 
-#include <algorithm>
 #include <fstream>
 #include <sstream>
 #include <vector>
+
+#include "io/median.h"
 
 namespace supertac {
 namespace {
@@ -28,8 +29,7 @@ Latency measure_latency(const std::function<void()>& make_picture) {
     make_picture();
     s = thread_seconds() - begin;
   }
-  std::sort(seconds.begin(), seconds.end());
-  return {.median_us = 1e6 * seconds[kPictures / 2], .p99_us = 1e6 * seconds[kPictures * 99 / 100]};
+  return {.median_us = 1e6 * median(seconds), .p99_us = 1e6 * quantile(seconds, 0.99)};
 }
 
 double peak_memory_mb() {

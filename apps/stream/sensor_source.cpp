@@ -18,7 +18,7 @@ constexpr char kCaptureHeader[] = R"({"version":1,"kind":"stream"})";
 class BoardSource : public SensorSource {
  public:
   BoardSource(std::unique_ptr<Port> port, std::unique_ptr<JournalWriter> capture, double speedup)
-      : SensorSource(kFramePeriod, 0, true),
+      : SensorSource(rig::kFramePeriodS, 0, true),
         speedup_(speedup),
         capture_(std::move(capture)),
         board_(capture_ ? std::make_unique<CapturedPort>(std::move(port), *capture_, Stream::board)
@@ -48,7 +48,7 @@ class BoardSource : public SensorSource {
 class ReplaySource : public SensorSource {
  public:
   explicit ReplaySource(const std::string& journal)
-      : SensorSource(kFramePeriod, 0, false),
+      : SensorSource(rig::kFramePeriodS, 0, false),
         board_(std::make_unique<ReplayPort>(read_journal(journal).of(Stream::board), journal),
                {.wait_for_consumer = true}) {}
 
@@ -110,7 +110,8 @@ class RecordingSource : public SensorSource {
 
 std::unique_ptr<SensorSource> open_board(const std::string& port, double speedup,
                                          const std::string& capture) {
-  auto serial = std::make_unique<SerialPort>(resolve_board_port(port), SerialSettings{kBoardBaud, speedup});
+  auto serial =
+      std::make_unique<SerialPort>(resolve_board_port(port), SerialSettings{rig::kBoardBaud, speedup});
   auto journal = capture.empty() ? nullptr : std::make_unique<JournalWriter>(capture, kCaptureHeader);
   return std::make_unique<BoardSource>(std::move(serial), std::move(journal), speedup);
 }

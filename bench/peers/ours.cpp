@@ -15,8 +15,8 @@
 #include <sstream>
 
 #include "bench/fma_peak.h"
-#include "bench/median.h"
 #include "bench/windows.h"
+#include "io/median.h"
 #include "io/numbers.h"
 #include "io/safetensors.h"
 #include "models/cost.h"
@@ -109,7 +109,7 @@ class Ours {
       wall.push_back(since(begin) / calls);
       peak.push_back(bench::fma_gflops());
     }
-    return format(bench::median(cpu)) + " " + format(bench::median(wall)) + " " + format(bench::median(peak));
+    return format(median(cpu)) + " " + format(median(wall)) + " " + format(median(peak));
   }
 
   std::unique_ptr<SuperTac> model_;

@@ -88,7 +88,7 @@ void recover(const CollectRun& run, const Journal& journal, Killed& killed) {
 /// The next start demands a confirmed origin when the head may have moved; when not, it never moved.
 void start_again(CollectRun& run, Killed& killed) {
   if (!run.origin_unknown()) {
-    if (distance(run.head(), {99.7, 101.17, 131.81}) > 0.01) killed.broken = "moved without a mark";
+    if (distance(run.head(), rig::kMounted) > 0.01) killed.broken = "moved without a mark";
     return;
   }
   const ProcessResult result = run.collect();

@@ -96,16 +96,12 @@ bool hit(Call call = Call::other) {
   return fails;
 }
 
-int open_file(const char* name, const char* path, int flags, mode_t mode) {
+int open_file(const char* path, int flags, mode_t mode) {
   const bool ours = below_folder(path) && ((flags & O_ACCMODE) != O_RDONLY || (flags & O_DIRECTORY) != 0);
   if (ours && hit()) return -1;
-  const int file = real<int (*)(const char*, int, ...)>(name)(path, flags, mode);
+  const int file = real<int (*)(const char*, int, ...)>("open64")(path, flags, mode);
   watch(file, ours);
   return file;
-}
-
-mode_t mode_of(va_list arguments, int flags) {
-  return (flags & O_CREAT) != 0 ? static_cast<mode_t>(va_arg(arguments, int)) : 0;
 }
 
 }  // namespace
@@ -115,18 +111,12 @@ extern "C" {
 int open(const char* path, int flags, ...) {
   va_list arguments;
   va_start(arguments, flags);
-  const mode_t mode = mode_of(arguments, flags);
+  const mode_t mode = (flags & O_CREAT) != 0 ? static_cast<mode_t>(va_arg(arguments, int)) : 0;
   va_end(arguments);
-  return open_file("open", path, flags, mode);
+  return open_file(path, flags, mode);
 }
 
-int open64(const char* path, int flags, ...) {
-  va_list arguments;
-  va_start(arguments, flags);
-  const mode_t mode = mode_of(arguments, flags);
-  va_end(arguments);
-  return open_file("open64", path, flags, mode);
-}
+int open64(const char* path, int flags, ...) __attribute__((alias("open")));  // on 64 bits they are one
 
 ssize_t write(int file, const void* bytes, std::size_t count) {
   if (is_watched(file)) {

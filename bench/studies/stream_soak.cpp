@@ -27,21 +27,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kWarmS = 30;          // until memory is compared
-constexpr std::uint64_t kWord = 4096;  // of a sample
+constexpr double kWarmS = 30;                    // until memory is compared
+constexpr std::uint64_t kWord = rig::kAdcCodes;  // of a sample
 
 /// Taxels 8 to 15, which a torn frame has fresh, carry the frame's number, four times.
 void write_number(std::uint64_t number, std::array<double, 16>& volts) {
   for (std::size_t k = 8; k < volts.size(); k += 2) {
-    volts[k] = adc_to_volts(static_cast<std::uint16_t>(number % kWord));
-    volts[k + 1] = adc_to_volts(static_cast<std::uint16_t>(number / kWord % kWord));
+    volts[k] = rig::volts_of(static_cast<int>(number % kWord));
+    volts[k + 1] = rig::volts_of(static_cast<int>(number / kWord % kWord));
   }
 }
 
 /// Nothing when a fault left no two copies alike.
 std::optional<std::uint64_t> read_number(const BoardFrame& frame) {
   std::map<std::uint64_t, int> copies;
-  for (int k = 8; k < kBoardTaxels; k += 2) {
+  for (int k = 8; k < rig::kTaxels; k += 2) {
     const std::uint64_t number = frame.taxel(k) + kWord * frame.taxel(k + 1);
     if (++copies[number] == 2) return number;
   }
@@ -58,7 +58,7 @@ RigSettings faulty_rig(std::uint64_t seed) {
     std::array<double, 16> volts{};
     for (std::size_t k = 0; k < volts.size(); ++k)
       volts[k] = 2.3 + 0.1 * std::sin(20 * t + static_cast<double>(k));
-    write_number(static_cast<std::uint64_t>(std::llround((t - begin) / kFramePeriod)), volts);
+    write_number(static_cast<std::uint64_t>(std::llround((t - begin) / rig::kFramePeriodS)), volts);
     return volts;
   };
   return settings;
@@ -112,7 +112,7 @@ Truth truth_in(const std::string& capture) {
       ++since;
       const auto number = read_number(frame);
       if (before && number) (live ? truth.lost : truth.lost_waiting) += *number - *before - since;
-      live = live || (truth.frames > 0 && record.time_s - last_s > 0.5 * kFramePeriod);
+      live = live || (truth.frames > 0 && record.time_s - last_s > 0.5 * rig::kFramePeriodS);
       last_s = record.time_s;
       ++truth.frames;
       if (!number) return;

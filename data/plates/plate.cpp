@@ -5,18 +5,17 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
-#include <numbers>
 #include <stdexcept>
 #include <string_view>
+
+#include "io/same_bits.h"
 
 namespace supertac {
 namespace {
 
-constexpr double kHeightMm = 2.5;     // of every texture of the rig
-constexpr double kRidgeBaseMm = 2.5;  // a ridge is as wide as it is high
 constexpr double kFitSlackMm = 1e-9;  // an element that fits exactly still fits after rounding
 
-double ridge_base(const Texture& t) { return std::min(kRidgeBaseMm, t.pitch_mm); }
+double ridge_base(const Texture& t) { return std::min(rig::kRidgeBaseMm, t.pitch_mm); }
 
 double element_width(const Texture& t) {
   switch (t.kind) {
@@ -70,9 +69,9 @@ Texture parse_texture(std::string_view text, const std::string& name) {
   for (const auto& [word, kind] : kKinds) {
     if (!text.starts_with(word)) continue;
     text.remove_prefix(word.size());
-    Texture t{.kind = kind, .pitch_mm = take_number(text, name, "pitch"), .height_mm = kHeightMm};
+    Texture t{.kind = kind, .pitch_mm = take_number(text, name, "pitch"), .height_mm = rig::kTextureHeightMm};
     const bool round = kind == TextureKind::bumps || kind == TextureKind::blobs;
-    if (round) t.height_mm = std::min(kHeightMm, t.pitch_mm / 2);
+    if (round) t.height_mm = std::min(rig::kTextureHeightMm, t.pitch_mm / 2);
     if (text.starts_with('h')) {
       text.remove_prefix(1);
       t.height_mm = take_number(text, name, "height");
@@ -106,9 +105,9 @@ Plate Plate::named(const std::string& name) {
     textures.push_back(parse_texture(std::string_view(generic).substr(begin, end - begin), name));
     begin = end + 1;
   }
-  const double share = (kTextureToMm - kTextureFromMm) / static_cast<double>(textures.size());
+  const double share = (rig::kTextureToMm - rig::kTextureFromMm) / static_cast<double>(textures.size());
   for (std::size_t i = 0; i < textures.size(); ++i) {
-    textures[i].from_mm = kTextureFromMm + share * static_cast<double>(i);
+    textures[i].from_mm = rig::kTextureFromMm + share * static_cast<double>(i);
     textures[i].to_mm = textures[i].from_mm + share;
   }
   return Plate(name, textures);
@@ -163,7 +162,7 @@ double Plate::Band::height(double x_mm, double y_mm) const {
     case TextureKind::bumps:
       return semicircle(h, dy * dy);
     case TextureKind::waves:
-      return h * std::cos(2 * std::numbers::pi * dy / texture.pitch_mm);
+      return h * same_bits::cosine(dy / texture.pitch_mm);
     case TextureKind::blobs: {
       const double dx = distance_to_nearest(x_mm, first_x, texture.pitch_mm, count_x);
       return semicircle(h, dx * dx + dy * dy);

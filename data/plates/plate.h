@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "data/plates/height_map.h"
+#include "hardware/rig.h"
 
 namespace supertac {
 
@@ -12,7 +13,7 @@ enum class TextureKind { plain, ridges, bumps, waves, blobs };
 
 /// One texture of a plate: `count` equal elements along y, centred on `centre_mm`.
 /// Height z of one element at distance d (mm) from its centre line (blobs: from its centre, in x and y):
-///   ridges  h (1 - 2|d| / base), base = min(2.5, pitch)        triangular
+///   ridges  h (1 - 2|d| / base), base = min(rig::kRidgeBaseMm, pitch)        triangular
 ///   bumps   sqrt(h^2 - d^2), width 2h                          semi-circular
 ///   blobs   sqrt(h^2 - d^2)                                    hemispheres, in columns centred on the plate
 ///   waves   h cos(2 pi d / pitch)                              count - 1/2 periods, crest first and last
@@ -21,22 +22,23 @@ struct Texture {
   TextureKind kind = TextureKind::plain;
   double pitch_mm = 0;   ///< distance between neighbouring centres
   double height_mm = 0;  ///< of the highest point above the plate's base
-  double from_mm = 36;   ///< the texture is laid out in [from, to], centred, as many elements as fit whole
-  double to_mm = 72;
+  double from_mm =
+      rig::kTextureFromMm;  ///< the texture is laid out in [from, to], centred, as many elements as fit whole
+  double to_mm = rig::kTextureToMm;
 };
 
-/// The surface the finger slides over: 36 mm (x) by 108 mm (y), texture between y = 36 and 72 mm.
+/// The surface the finger slides over: kWidthMm (x) by kLengthMm (y), with its texture in the middle third.
 /// Coordinates are the plate's own, origin at its corner; z = 0 is its flat part.
 class Plate {
  public:
-  static constexpr double kWidthMm = 36, kLengthMm = 108, kTextureFromMm = 36, kTextureToMm = 72;
+  static constexpr double kWidthMm = rig::kPlateWidthMm, kLengthMm = rig::kPlateLengthMm;
 
   /// A plate by name. Plates of the rig (RIG plates): 3_Bumps, 6_Bumps, 4_Ridges, 6_Ridges, 4_Waves,
   /// 6_Waves, 4_Blob, 6_Blob. Others: "plain", or KIND PITCH [h HEIGHT] in mm with KIND one of ridges, bumps,
   /// waves, blobs ("bumps12", "ridges6h1.5"), or several joined by '+', which share the length equally
-  /// ("bumps12+ridges4"). Default height 2.5, for bumps and blobs at most pitch / 2. Or the path of an STL
-  /// file of 36 x 108 mm (data/height_map.h), whose plate has the file's name without folders.
-  /// Throws std::invalid_argument naming the part that could not be read; FileError for an STL file.
+  /// ("bumps12+ridges4"). Default height rig::kTextureHeightMm, for bumps and blobs at most pitch / 2. Or the
+  /// path of an STL file of a plate's size (data/height_map.h), whose plate has the file's name without
+  /// folders. Throws std::invalid_argument naming the part that could not be read; FileError for an STL file.
   static Plate named(const std::string& name);
   /// True when the name is that of an STL file: it ends with ".stl".
   static bool is_file(const std::string& name);

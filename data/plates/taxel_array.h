@@ -5,10 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "hardware/rig.h"
+
 namespace supertac {
 
 /// Signals of the rig's array, the default one.
-constexpr int kTaxels = 16;
+constexpr int kTaxels = rig::kTaxels;
 
 /// A picture of the surface under the array: pixels, and how large they are.
 struct ImageGrid {
@@ -27,8 +29,8 @@ struct ImageGrid {
 /// a frame (one voltage; three axes of a magnetic field). Number s of a frame is channel s % channels of
 /// taxel s / channels; taxel k lies in row k / columns (y) and column k % columns (x).
 struct TaxelArray {
-  int rows = 4, columns = 4;
-  double pitch_mm = 3;
+  int rows = rig::kTaxelRows, columns = rig::kTaxelColumns;
+  double pitch_mm = rig::kTaxelPitchMm;
   int channels = 1;
 
   int taxels() const { return rows * columns; }

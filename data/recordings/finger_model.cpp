@@ -4,7 +4,9 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "io/hash.h"
 #include "io/random.h"
+#include "io/same_bits.h"
 
 namespace supertac {
 namespace {
@@ -13,10 +15,8 @@ namespace {
 constexpr double kGain[kTaxels] = {0.90, 0.18, 0.10, 0.15, 1.60, 0.60, 0.20, 0.60,
                                    0.27, 0.55, 0.20, 0.65, 0.50, 0.40, 0.10, 0.80};
 constexpr double kUnknownGain = 0.5;
-constexpr double kRestVolts = 2.442, kRestSpreadVolts = 0.003;
-constexpr double kFullScaleVolts = 3.3;
+constexpr double kRestSpreadVolts = 0.003;
 constexpr double kLeastIndentationMm = -1.8;  // of 2.5 mm of texture the finger then still touches the top
-constexpr int kAdcCodes = 4096;
 
 // Points of the pad. Along the slide they are as fine as the tip of a ridge; across it little changes.
 constexpr double kAcrossMm = 2, kAlongMm = 0.25;
@@ -49,24 +49,8 @@ constexpr Term kTerms[] = {
     {"jitter", &SimulatorSettings::with_jitter},       {"loss", &SimulatorSettings::with_loss},
 };
 
-// sin(2 pi turns) to 2e-4 from products only, so that simulated bits do not depend on the C library.
-double sine(double turns) {
-  double u = turns - std::floor(turns);
-  const double sign = u < 0.5 ? 1 : -1;
-  if (u >= 0.5) u -= 0.5;
-  const double q = 4 * (u - 0.25), q2 = q * q;  // cos(pi q / 2), |q| <= 1
-  return sign * (1 - q2 * (1.2333 - q2 * (0.2526 - q2 * 0.0193)));
-}
-
 // As often half as twice.
 double factor(double v) { return v >= 0 ? 1 + v : 1 / (1 - v); }
-
-// exp(-d^2 / 2 sigma^2) nearly, from products only: (1 - d^2 / 16 sigma^2)^8, 0 beyond 4 sigma.
-double bell(double distance, double sigma) {
-  const double rest = std::max(0.0, 1 - distance * distance / (16 * sigma * sigma));
-  const double squared = rest * rest, fourth = squared * squared;
-  return fourth * fourth;
-}
 
 // Weights of `points` places, `step` apart, for the lines (columns or rows) of taxels, [lines][points]; each
 // line sums to 1.
@@ -74,7 +58,7 @@ std::vector<double> taxel_weights(int lines, double pitch, int points, double st
   std::vector<double> weights;
   for (int line = 0; line < lines; ++line) {
     const double at = (line - (lines - 1) / 2.0) * pitch;
-    const auto weight = [&](int i) { return bell(step * (i - points / 2) - at, sigma); };
+    const auto weight = [&](int i) { return same_bits::bell(step * (i - points / 2) - at, sigma); };
     double sum = 0;
     for (int i = 0; i < points; ++i) sum += weight(i);
     for (int i = 0; i < points; ++i) weights.push_back(weight(i) / sum);
@@ -82,18 +66,12 @@ std::vector<double> taxel_weights(int lines, double pitch, int points, double st
   return weights;
 }
 
-std::uint64_t hash_text(const std::string& text) {  // FNV-1a
-  std::uint64_t hash = 1469598103934665603ULL;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
-  return hash;
-}
-
 // Streams: what belongs to the sensor, to a trial of a plate (one mounting), to a pass, and to a sample.
 std::uint64_t mounting_stream(const Plate& plate, int trial) {
-  return hash_text(plate.name() + "/" + std::to_string(trial));
+  return stream_of(plate.name() + "/" + std::to_string(trial));
 }
 std::uint64_t pass_stream(const Plate& plate, const FingerIdentity& id) {
-  return hash_text(plate.name() + "/" + std::to_string(id.trial) + "/" + std::to_string(id.pass) + "/" +
+  return stream_of(plate.name() + "/" + std::to_string(id.trial) + "/" + std::to_string(id.pass) + "/" +
                    std::to_string(static_cast<long long>(id.speed_mm_s * 1000)));
 }
 
@@ -133,13 +111,13 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
   const double tilt = settings.with_tilt ? settings.tilt_mm_per_mm : 0;
   const double tilt_spread = settings.with_tilt ? variation * settings.tilt_spread : 0;
   const double slope_y = tilt + tilt_spread * trial.normal(1001), slope_x = tilt_spread * trial.normal(1002);
-  const bool rig = settings.array.rows == 4 && settings.array.columns == 4;
+  const bool rig = settings.array.rows == rig::kTaxelRows && settings.array.columns == rig::kTaxelColumns;
   const auto taxels = static_cast<std::uint64_t>(settings.array.taxels());
   const std::uint64_t drifts = 100 * (1 + taxels / 100);  // numbers that no gain has taken
   for (std::uint64_t c = 0; c < taxels; ++c) {
     const double own = factor(spread * trial.normal(c)) * factor(spread / 3 * pass.normal(c));
     gain_.push_back((settings.with_gains && rig ? kGain[c] : kUnknownGain) * own * common_gain);
-    rest_.push_back(kRestVolts + variation * kRestSpreadVolts * sensor.normal(c));
+    rest_.push_back(rig::kRestVolts + variation * kRestSpreadVolts * sensor.normal(c));
     drift_.push_back(settings.with_drift ? settings.drift_volts_per_s * pass.normal(drifts + c) : 0);
   }
   const double press = trial.normal(1003) + pass.normal(1003);
@@ -231,10 +209,12 @@ std::vector<double> FingerModel::loads(const FingerPose& pose) const {
 std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) const {
   FingerPose shaken = pose;
   if (settings_.with_vibration)
-    shaken.z_mm += settings_.vibration_mm * sine(settings_.vibration_hz * time_s + vibration_phase_);
+    shaken.z_mm +=
+        settings_.vibration_mm * same_bits::rough_sine(settings_.vibration_hz * time_s + vibration_phase_);
   const std::vector<double> load = loads(shaken);
-  const double emi =
-      settings_.with_emi ? settings_.emi_volts * sine(settings_.emi_hz * time_s + emi_phase_) : 0;
+  const double emi = settings_.with_emi
+                         ? settings_.emi_volts * same_bits::rough_sine(settings_.emi_hz * time_s + emi_phase_)
+                         : 0;
   const RandomStream noise(noise_seed_, noise_stream_);
   const auto tick = static_cast<std::uint64_t>(std::llround(std::max(0.0, time_s) * 1e6));
   const std::uint64_t taxels = load.size();
@@ -245,12 +225,5 @@ std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) co
   }
   return volts;
 }
-
-int FingerModel::adc(double volts) {
-  return static_cast<int>(
-      std::clamp(std::lround(volts / kFullScaleVolts * kAdcCodes), 0L, long{kAdcCodes - 1}));
-}
-
-double FingerModel::volts_of_adc(int code) { return code * kFullScaleVolts / kAdcCodes; }
 
 }  // namespace supertac

@@ -38,10 +38,10 @@ struct SimulatorSettings {
   bool with_noise = true;
   double noise_volts = 1e-3;
 
-  bool with_adc = true;     ///< 12 bit, 3.3 V
-  bool with_filter = true;  ///< moving average over 100 samples of the board
-  double filter_s = 0.0992;
-  bool with_saturation = true;  ///< recordings are cut to [2.091, 2.46] V
+  bool with_adc = true;     ///< the board's converter
+  bool with_filter = true;  ///< moving average over rig::kFilterFrames of the board
+  double filter_s = rig::kFilterS;
+  bool with_saturation = true;  ///< recordings are cut to what the published ones were
   bool with_jitter = true;      ///< a sample is taken a little off the time it is stamped with
   double jitter_s = 2e-4;
   bool with_loss = true;
@@ -93,10 +93,6 @@ class FingerModel {
 
   /// Random stream of this pass, for whatever else happens to it.
   std::uint64_t noise_stream() const { return noise_stream_; }
-
-  /// A voltage as the board's 12-bit converter reports it (0..4095), and back.
-  static int adc(double volts);
-  static double volts_of_adc(int code);
 
  private:
   double surface(double x_mm, double y_mm) const;

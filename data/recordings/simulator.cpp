@@ -12,24 +12,21 @@ namespace supertac {
 namespace {
 
 constexpr double kOnsetS = 0.15, kReleaseS = 0.1, kRepositionS = 0.05;
-constexpr double kLiftSpeedMmS = 5;  // as fast as the rig's z axis goes
-constexpr double kPassShiftMm = 5;
-constexpr double kFloorVolts = 2.091, kCeilingVolts = 2.46;
 
 // The finger's path through the four phases.
 FingerPose pose_at(double t, const PassSettings& pass, double slide_z) {
   const double slide_s = (pass.to_mm - pass.from_mm) / pass.speed_mm_s;
-  FingerPose pose{.x_mm = pass_x_mm(pass.pass), .y_mm = pass.from_mm, .z_mm = slide_z};
+  FingerPose pose{.x_mm = rig::pass_x_mm(pass.pass), .y_mm = pass.from_mm, .z_mm = slide_z};
   if (t < kOnsetS) {
-    pose.z_mm += kLiftSpeedMmS * (kOnsetS - t);
+    pose.z_mm += rig::kLiftMmS * (kOnsetS - t);
     return pose;
   }
   t -= kOnsetS;
   pose.y_mm = std::min(pass.from_mm + pass.speed_mm_s * t, pass.to_mm);
   if (t <= slide_s) return pose;
   t -= slide_s;
-  pose.z_mm += kLiftSpeedMmS * std::min(t, kReleaseS);
-  if (t > kReleaseS) pose.x_mm += kPassShiftMm * (t - kReleaseS) / kRepositionS;
+  pose.z_mm += rig::kLiftMmS * std::min(t, kReleaseS);
+  if (t > kReleaseS) pose.x_mm += rig::kPassShiftMm * (t - kReleaseS) / kRepositionS;
   return pose;
 }
 
@@ -38,13 +35,14 @@ void check(const PassSettings& pass, const SimulatorSettings& settings) {
   if (!positive(pass.speed_mm_s) || !positive(settings.rate_hz) || !(pass.to_mm > pass.from_mm) ||
       !(pass.from_mm >= 0) || !(pass.to_mm <= Plate::kLengthMm))
     throw std::invalid_argument(
-        "simulate_pass: speed and rate must be positive and the slide lie on the plate (0..108 mm); got "
-        "speed " +
-        format(pass.speed_mm_s) + " mm/s, rate " + format(settings.rate_hz) + " Hz, slide from " +
-        format(pass.from_mm) + " to " + format(pass.to_mm) + " mm");
-  if (pass.pass < 1 || pass.pass > 8 || pass.trial < 1)
-    throw std::invalid_argument("simulate_pass: expected pass 1..8 and trial >= 1, got pass " +
-                                std::to_string(pass.pass) + ", trial " + std::to_string(pass.trial));
+        "simulate_pass: speed and rate must be positive and the slide lie on the plate (0.." +
+        format(Plate::kLengthMm) + " mm); got speed " + format(pass.speed_mm_s) + " mm/s, rate " +
+        format(settings.rate_hz) + " Hz, slide from " + format(pass.from_mm) + " to " + format(pass.to_mm) +
+        " mm");
+  if (pass.pass < 1 || pass.pass > rig::kPasses || pass.trial < 1)
+    throw std::invalid_argument("simulate_pass: expected pass 1.." + std::to_string(rig::kPasses) +
+                                " and trial >= 1, got pass " + std::to_string(pass.pass) + ", trial " +
+                                std::to_string(pass.trial));
 }
 
 // Moving average over the last `length` samples, or as many as there are.
@@ -102,14 +100,14 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
     const double taken = stamp + (settings.with_jitter ? settings.jitter_s * timing.normal(2 * i) : 0.0);
     std::vector<double> volts = finger.volts(pose_at(taken, pass, finger.slide_z_mm()), taken);
     if (settings.with_adc)
-      for (double& v : volts) v = FingerModel::volts_of_adc(FingerModel::adc(v));
+      for (double& v : volts) v = rig::volts_of(rig::adc_of(v));
     volts = filter(volts);
     if (settings.with_loss && timing.uniform(2 * i + 1) < settings.lost_fraction) continue;
     const FingerPose pose = pose_at(stamp, pass, finger.slide_z_mm());
     recording.time_s.push_back(stamp);
     for (const double v : volts)
-      recording.volts.push_back(
-          static_cast<float>(settings.with_saturation ? std::clamp(v, kFloorVolts, kCeilingVolts) : v));
+      recording.volts.push_back(static_cast<float>(
+          settings.with_saturation ? std::clamp(v, rig::kFloorVolts, rig::kCeilingVolts) : v));
     recording.position_mm.push_back(static_cast<float>(pose.x_mm));
     recording.position_mm.push_back(static_cast<float>(pose.y_mm));
   }

@@ -12,13 +12,10 @@ namespace supertac {
 /// in the air, towards the next pass).
 struct PassSettings {
   int trial = 1,
-      pass = 1;  ///< pass p slides at x = 0.5 + 5 (p - 1) mm, from one side of the plate to the other
-  double speed_mm_s = 10;
+      pass = 1;  ///< pass p slides at x = rig::pass_x_mm(p), from one side of the plate to the other
+  double speed_mm_s = rig::kSlideMmS;
   double from_mm = 28, to_mm = 80;  ///< the slide, of the finger's centre
 };
-
-/// x of the finger's centre in pass 1..8 (mm).
-constexpr double pass_x_mm(int pass) { return 0.5 + 5.0 * (pass - 1); }
 
 /// A recording of one pass as the rig would make it, with the finger's true position at every time stamp.
 /// Defaults over 8 passes, 2 trials, 5 and 10 mm/s and default_plates() make 465,600 frames. The position is

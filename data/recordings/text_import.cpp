@@ -11,7 +11,6 @@ namespace supertac {
 namespace {
 
 constexpr std::uint64_t kMaxBytes = std::uint64_t{64} << 20;
-constexpr double kMaxVolts = 3.3;  // the ADC's reference
 constexpr std::string_view kSeparators = " \t,\r";
 
 enum class Line { frame, empty, too_few, too_many, not_numeric, non_finite, out_of_range };
@@ -37,7 +36,7 @@ Line parse_line(std::string_view line, std::array<float, kTaxels>& volts) {
     numeric = numeric && value.has_value();
     if (!value) continue;
     finite = finite && std::isfinite(*value);
-    in_range = in_range && *value >= 0 && *value <= kMaxVolts;
+    in_range = in_range && *value >= 0 && *value <= rig::kAdcVolts;
     volts[columns] = static_cast<float>(*value);
   }
   if (columns == 0) return Line::empty;
@@ -72,13 +71,13 @@ void refuse_other_files(const std::string& path, const ImportReport& report) {
   if (written == 0) throw FileError(path, "is empty, expected lines of 16 voltages; record or copy it again");
   const std::size_t dropped = written - report.frames;
   if (dropped * 10 <= written) return;
-  throw FileError(path, std::to_string(dropped) + " of " + std::to_string(written) +
-                            " lines are not 16 voltages from 0 to 3.3 (" + std::to_string(report.too_few) +
-                            " with fewer columns, " + std::to_string(report.too_many) + " with more, " +
-                            std::to_string(report.not_numeric) + " not numeric, " +
-                            std::to_string(report.non_finite) + " not finite, " +
-                            std::to_string(report.out_of_range) +
-                            " out of range), expected at most a tenth; is it a recording?");
+  throw FileError(
+      path, std::to_string(dropped) + " of " + std::to_string(written) +
+                " lines are not 16 voltages from 0 to " + format(rig::kAdcVolts) + " (" +
+                std::to_string(report.too_few) + " with fewer columns, " + std::to_string(report.too_many) +
+                " with more, " + std::to_string(report.not_numeric) + " not numeric, " +
+                std::to_string(report.non_finite) + " not finite, " + std::to_string(report.out_of_range) +
+                " out of range), expected at most a tenth; is it a recording?");
 }
 
 }  // namespace
@@ -89,7 +88,7 @@ Recording import_text_pass(const std::string& path, ImportReport& report) {
   Recording recording;
   recording.source = "imported";
   recording.metadata["time_base"] = "nominal";
-  recording.metadata["filter_s"] = format(kImportFilterSeconds);
+  recording.metadata["filter_s"] = format(rig::kFilterS);
   std::array<float, kTaxels> volts{};
   for (std::string_view rest = text; !rest.empty();) {
     const std::string_view line = rest.substr(0, rest.find('\n'));
@@ -98,7 +97,7 @@ Recording import_text_pass(const std::string& path, ImportReport& report) {
     ++report.lines;
     ++counter(report, kind);
     if (kind != Line::frame) continue;
-    recording.time_s.push_back(static_cast<double>(report.lines - report.empty - 1) / kImportRateHz);
+    recording.time_s.push_back(static_cast<double>(report.lines - report.empty - 1) / rig::kFrameRateHz);
     recording.volts.insert(recording.volts.end(), volts.begin(), volts.end());
   }
   refuse_other_files(path, report);

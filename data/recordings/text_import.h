@@ -16,29 +16,22 @@ struct ImportReport {
   std::size_t not_numeric =
       0;  ///< 16 columns, one of which is no number (two numbers run into one, letters, NUL)
   std::size_t non_finite = 0;    ///< 16 numbers, one of them nan or inf
-  std::size_t out_of_range = 0;  ///< 16 numbers, one outside of the ADC's 0..3.3 V
+  std::size_t out_of_range = 0;  ///< 16 numbers, one outside of what the ADC measures
   std::size_t empty = 0;         ///< blank lines
 
   std::size_t malformed() const { return too_few + too_many + not_numeric; }
 };
-
-/// Frame rate of an imported pass (Hz): the board's. The rig's text files lack 5 to 20 % of its frames
-/// (data/lost_frames.h).
-constexpr double kImportRateHz = 1008.06;
-
-/// Length of the moving average that the text files went through: 100 frames of the board's 992 us.
-constexpr double kImportFilterSeconds = 0.0992;
 
 /// Reads a text recording: one frame per line, 16 columns of volts, taxel 0 to 15, separated by spaces, tabs
 /// or commas. Lines that are not such a frame are dropped and counted, never repaired: a short line and the
 /// rest of it on another cannot be told from halves of different frames.
 ///
 /// The files have no time stamps. Frame i, counted over *all* non-blank lines so that a dropped line leaves a
-/// gap, gets i / kImportRateHz; metadata "time_base" is "nominal" until a registration replaces it. What the
-/// host lost without leaving a line is for restore_clock (data/lost_frames.h). Positions are unknown. plate,
-/// trial, pass are left for the caller; source is "imported".
-/// Throws FileError when the file cannot be read, is empty or over 64 MiB, or more than a tenth of its lines
-/// are not frames: then it is another kind of file. The report is filled in that case too.
+/// gap, gets i / rig::kFrameRateHz; metadata "time_base" is "nominal" until a registration replaces it. What
+/// the host lost without leaving a line - 5 to 20 % of the frames - is for restore_clock
+/// (data/lost_frames.h). Positions are unknown. plate, trial, pass are left for the caller; source is
+/// "imported". Throws FileError when the file cannot be read, is empty or over 64 MiB, or more than a tenth
+/// of its lines are not frames: then it is another kind of file. The report is filled in that case too.
 Recording import_text_pass(const std::string& path, ImportReport& report);
 
 }  // namespace supertac

@@ -13,7 +13,7 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kRows = 4, kColumns = 4;
+constexpr std::size_t kRows = rig::kTaxelRows, kColumns = rig::kTaxelColumns;
 constexpr double kFromMm = 22, kToMm = 92, kStepMm = 0.1, kSmoothMm = 1;
 constexpr std::size_t kPoints = static_cast<std::size_t>((kToMm - kFromMm) / kStepMm) + 1;
 constexpr std::size_t kFewestPoints = 200;  // to speak of a correlation

@@ -11,7 +11,6 @@ namespace {
 constexpr double kBinS = 0.01;  // time resolution; dips last 0.2 s and more
 constexpr std::size_t kMaxBins = 1'000'000;
 constexpr double kFlatV = 1e-6;  // a saturated dip is flat up to rounding
-constexpr double kZeroV = 3.3;   // pressing is measured downwards from here
 
 // One taxel's signal as means over bins of kBinS, pressing upwards; empty bins are bridged by straight lines.
 std::vector<double> binned(const Recording& recording, int taxel, std::size_t bins) {
@@ -21,7 +20,7 @@ std::vector<double> binned(const Recording& recording, int taxel, std::size_t bi
     if (!std::isfinite(volts)) continue;
     const auto bin = static_cast<std::size_t>((recording.time_s[i] - recording.time_s[0]) / kBinS);
     if (bin >= bins) continue;
-    sum[bin] += kZeroV - volts, count[bin] += 1;
+    sum[bin] += rig::kAdcVolts - volts, count[bin] += 1;
   }
   std::vector<double> x(bins);
   std::ptrdiff_t last = -1;  // last bin that holds a sample

@@ -8,6 +8,7 @@
 #include "data/recordings/simulator.h"
 #include "data/registration/contacts.h"
 #include "io/numbers.h"
+#include "io/same_bits.h"
 
 namespace supertac {
 namespace {
@@ -16,12 +17,10 @@ namespace {
 // are felt further out, with slopes of different steepness: little weight.
 constexpr double kAloneShiftMm = 1.0, kAloneWeight = 0.2;
 
-constexpr double kNominalSpeed = 10;
 constexpr double kFullDepthV = 0.1;  // deeper contacts weigh no more: they saturate
 constexpr double kScanReachMm = 1.2, kFitReachMm = 1.5;
 constexpr double kMiddleReachMm = 45, kMiddleStepMm = 0.25;
 constexpr double kSlowest = 0.6, kFastest = 2.2, kRateStep = 0.01;
-constexpr double kRigFilterS = 0.0992;
 
 // When a pass is believed.
 constexpr int kMinContacts = 8, kMinElements = 3;
@@ -87,7 +86,7 @@ class Fit {
   Fit(const Recording& recording, const Plate& plate)
       : crests_(plate.crests()),
         troughs_(plate.min_height() < 0),
-        speed_(recording.speed_mm_s > 0 ? recording.speed_mm_s : kNominalSpeed),
+        speed_(recording.speed_mm_s > 0 ? recording.speed_mm_s : rig::kSlideMmS),
         middle_s_((recording.time_s.front() + recording.time_s.back()) / 2) {
     const std::vector<Contact> contacts = find_contacts(recording, {.reach_s = 0.6 * pitch() / speed_});
     double most = 0;
@@ -98,7 +97,8 @@ class Fit {
     }
     for (const Contact& c : contacts)
       if (inside(c, stretch_))
-        events_.push_back({.row = c.taxel / 4, .time = c.time_s - middle_s_, .weight = weight_of(c)});
+        events_.push_back(
+            {.row = c.taxel / rig::kTaxelColumns, .time = c.time_s - middle_s_, .weight = weight_of(c)});
   }
 
   std::size_t events() const { return events_.size(); }
@@ -144,7 +144,7 @@ class Fit {
     for (std::size_t j = 1; j < crests_.size(); ++j)
       if (std::abs(crests_[j] - y) < std::abs(crests_[nearest] - y)) nearest = j;
     Match m{.crest = nearest, .distance_mm = crests_[nearest] - y, .weight = event.weight};
-    const bool leading_alone = event.row == 3 && nearest == 0;
+    const bool leading_alone = event.row == rig::kTaxelRows - 1 && nearest == 0;
     const bool trailing_alone = event.row == 0 && nearest + 1 == crests_.size();
     if (leading_alone) m.distance_mm -= kAloneShiftMm;
     if (trailing_alone) m.distance_mm += kAloneShiftMm;
@@ -189,17 +189,18 @@ class Fit {
   // A pass covers the plate about evenly and its clock is about right: mild preference, in units of the
   // score.
   double preference(double middle_mm, double rate) const {
-    const double off = (middle_mm - Plate::kLengthMm / 2) / 10, fast = std::log(rate / speed_) / 0.15;
+    const double off = (middle_mm - Plate::kLengthMm / 2) / 10, fast = same_bits::log(rate / speed_) / 0.15;
     return -0.05 * (off * off + fast * fast);
   }
 
   bool elsewhere(const Line& a, const Line& b) const {
-    return std::abs(a.middle_mm - b.middle_mm) > pitch() / 2 || std::abs(std::log(a.rate / b.rate)) > 0.25;
+    return std::abs(a.middle_mm - b.middle_mm) > pitch() / 2 ||
+           std::abs(same_bits::log(a.rate / b.rate)) > 0.25;
   }
 
   Line scored(double middle_mm, double rate) const {
     Line line{.middle_mm = middle_mm, .rate = rate};
-    std::vector<std::array<double, 4>> felt(crests_.size());
+    std::vector<std::array<double, rig::kTaxelRows>> felt(crests_.size());
     double total = 0, agree = 0;
     for (const Event& event : events_) {
       const double y = middle_mm + rate * event.time + row_contact_mm(static_cast<std::size_t>(event.row));
@@ -221,11 +222,12 @@ class Fit {
 
   // Of the (element, row) pairs the stretch reached: share felt (line.coverage), and share of elements felt
   // by a row.
-  void felt_shares(const std::vector<std::array<double, 4>>& felt, Line& line, double& elements) const {
+  void felt_shares(const std::vector<std::array<double, rig::kTaxelRows>>& felt, Line& line,
+                   double& elements) const {
     double pairs = 0, felt_pairs = 0, reached = 0, felt_elements = 0;
     for (std::size_t j = 0; j < crests_.size(); ++j) {
       double best = -1;
-      for (std::size_t row = 0; row < 4; ++row) {
+      for (std::size_t row = 0; row < rig::kTaxelRows; ++row) {
         const double time = (crests_[j] - row_contact_mm(row) - line.middle_mm) / line.rate + middle_s_;
         if (time < stretch_.begin_s || time > stretch_.end_s) continue;
         pairs += 1, felt_pairs += felt[j][row];
@@ -247,7 +249,7 @@ class Fit {
 double filter_delay(const Recording& recording) {
   const auto found = recording.metadata.find("filter_s");
   if (found != recording.metadata.end()) return parse_double(found->second).value_or(0) / 2;
-  return recording.source == "imported" ? kRigFilterS / 2 : 0;
+  return recording.source == "imported" ? rig::kFilterS / 2 : 0;
 }
 
 std::string judge_reason(const Registration& r) {
@@ -327,7 +329,7 @@ void apply(const Registration& registration, Recording& recording) {
   const bool nominal = base != recording.metadata.end() && base->second == "nominal";
   const std::size_t n = recording.frames();
   recording.position_mm.resize(2 * n);
-  const auto x = static_cast<float>(pass_x_mm(recording.pass));
+  const auto x = static_cast<float>(rig::pass_x_mm(recording.pass));
   for (std::size_t i = 0; i < n; ++i) {
     const double y = registration.y_mm(recording.time_s[i]);
     const bool known =
@@ -338,7 +340,7 @@ void apply(const Registration& registration, Recording& recording) {
   }
   if (registration.lost_s > 0) fill_loss(registration, recording);
   if (nominal && registration.reliable) {  // the finger's speed is known better than the rate of the lines
-    const double speed = recording.speed_mm_s > 0 ? recording.speed_mm_s : kNominalSpeed;
+    const double speed = recording.speed_mm_s > 0 ? recording.speed_mm_s : rig::kSlideMmS;
     for (double& t : recording.time_s) t *= registration.rate / speed;
     recording.metadata["time_base"] = "registered";
   }

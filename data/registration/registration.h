@@ -34,7 +34,7 @@ struct Registration {
 };
 
 /// Where, from the finger's centre along y, a row of taxels (0 trailing to 3 leading) feels an element best:
-/// rows are 3 mm apart, but the pad is round.
+/// not rig::kTaxelPitchMm apart, for the pad is round.
 constexpr double row_contact_mm(std::size_t row) {
   constexpr double kMm[] = {-3.5, -1.3, 1.3, 3.5};  // medians over the rig's 96 passes
   return kMm[row];
@@ -48,7 +48,7 @@ constexpr double row_contact_mm(std::size_t row) {
 /// squares. Where a burst of frames was lost (a jump that the moving average makes impossible), only the
 /// stretch with most contacts is used. Row offsets are symmetric about the finger's centre, so an outline
 /// that is felt early by the leading rows and late by the trailing ones does not move the centre. The delay
-/// of the recording's moving average (metadata filter_s; 0.0992 s for imported recordings) is taken out.
+/// of the recording's moving average (metadata filter_s; rig::kFilterS for imported recordings) is taken out.
 /// Never throws for a pass that does not fit: it is flagged. Throws std::invalid_argument as find_contacts
 /// does.
 Registration register_pass(const Recording& recording, const Plate& plate);

@@ -1,7 +1,6 @@
 #include "data/samples/pairs.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <set>
@@ -161,14 +160,12 @@ void PairSet::target(std::size_t i, std::span<float> out) const {
 }
 
 std::string PairSet::fingerprint() const {
-  std::uint64_t state = 1;
-  const auto add = [&](std::uint64_t word) { state = mix64(state * kGolden64 + word); };
-  for (const std::size_t size : {count_, channels_, height_, width_, scale_}) add(size);
+  Hash hash;
+  for (const std::size_t size : {count_, channels_, height_, width_, scale_}) hash.add(size);
   for (const char* name : {"input", "target"})
-    for_each_value(file_.bytes(name),
-                   [&](std::size_t, float value) { add(std::bit_cast<std::uint32_t>(value)); });
-  for (const std::int64_t group : groups_) add(static_cast<std::uint64_t>(group));
-  return hex64(state);
+    for_each_value(file_.bytes(name), [&](std::size_t, float value) { hash.add(value); });
+  for (const std::int64_t group : groups_) hash.add(group);
+  return hash.hex();
 }
 
 ChannelScaling fit_scaling(const PairSet& pairs, std::span<const std::uint32_t> chosen) {

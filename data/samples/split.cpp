@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <map>
 #include <stdexcept>
@@ -110,12 +109,11 @@ class PassHashes {
     prefix_.push_back(0);
     std::uint64_t before = 0;
     for (std::size_t f = 0; f < frames; ++f) {
-      std::uint64_t hash = 0;
-      for (std::size_t k = 0; k < signals; ++k)
-        hash = mix64(hash * kGolden64 + std::bit_cast<std::uint32_t>(samples[f * signals + k]) + 1);
-      prefix_.push_back(prefix_.back() * kBase + hash);
-      equal_.push_back(f > 0 && hash == before ? equal_.back() + 1 : 1);
-      before = hash;
+      Hash hash;
+      for (std::size_t k = 0; k < signals; ++k) hash.add(samples[f * signals + k]);
+      prefix_.push_back(prefix_.back() * kBase + hash.value());
+      equal_.push_back(f > 0 && hash.value() == before ? equal_.back() + 1 : 1);
+      before = hash.value();
     }
   }
   std::uint64_t window(std::size_t last) const {
@@ -226,10 +224,10 @@ Leakage find_leakage(const WindowSet& windows, const Split& split) {
 }
 
 std::string fingerprint(const Split& split) {
-  std::uint64_t state = split.train.size();
+  Hash hash(split.train.size());
   for (const auto* side : {&split.train, &split.test})
-    for (const std::uint32_t i : *side) state = mix64(state * kGolden64 + i + 1);
-  return hex64(state);
+    for (const std::uint32_t i : *side) hash.add(std::uint64_t{i} + 1);
+  return hash.hex();
 }
 
 std::vector<std::uint32_t> spread(std::span<const std::uint32_t> list, std::size_t count) {

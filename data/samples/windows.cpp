@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <set>
@@ -42,21 +41,6 @@ bool is_reliable(const Recording& recording) {
   const auto flag = recording.metadata.find("registration_reliable");
   return flag == recording.metadata.end() || flag->second != "no";
 }
-
-// Hashes 32-bit words one after the other.
-class Hasher {
- public:
-  void add(std::uint64_t word) { state_ = mix64(state_ * kGolden64 + word); }
-  void add(float value) { add(std::uint64_t{std::bit_cast<std::uint32_t>(value)}); }
-  void add(const std::string& text) {
-    add(std::uint64_t{text.size()});
-    for (const char c : text) add(std::uint64_t{static_cast<unsigned char>(c)});
-  }
-  std::string hex() const { return hex64(state_); }
-
- private:
-  std::uint64_t state_ = 1;
-};
 
 }  // namespace
 
@@ -216,9 +200,9 @@ std::optional<double> WindowSet::filter_s() const {
 }
 
 std::string WindowSet::fingerprint() const {
-  Hasher hash;
-  hash.add(static_cast<std::uint64_t>(settings_.timesteps));
-  hash.add(static_cast<std::uint64_t>(settings_.scale));
+  Hash hash;
+  hash.add(settings_.timesteps);
+  hash.add(settings_.scale);
   if (array() != TaxelArray{}) hash.add(array().text());
   for (const Plate& plate : plates_) {
     if (!Plate::is_file(plate.name())) continue;  // elsewhere the name is the plate
@@ -228,7 +212,7 @@ std::string WindowSet::fingerprint() const {
   }
   for (std::size_t p = 0; p < passes_.size(); ++p) {
     hash.add(passes_[p].plate);
-    hash.add(static_cast<std::uint64_t>(passes_[p].trial));
+    hash.add(passes_[p].trial);
     for (const float v : tracks_[p].samples) hash.add(v);
     for (const float v : tracks_[p].position_mm) hash.add(v);
   }

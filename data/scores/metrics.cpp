@@ -10,6 +10,7 @@
 
 #include "data/plates/truth.h"
 #include "io/random.h"
+#include "io/same_bits.h"
 
 namespace supertac {
 namespace {
@@ -25,7 +26,7 @@ std::vector<double> ssim_weights(int size) {
   double sum = 0;
   for (int i = 0; i < kGaussianSize; ++i) {
     const double d = (i - kGaussianSize / 2) / 1.5;
-    sum += weights[static_cast<std::size_t>(i)] = std::exp(-0.5 * d * d);
+    sum += weights[static_cast<std::size_t>(i)] = same_bits::exp(-0.5 * d * d);
   }
   for (double& w : weights) w /= sum;
   return weights;

@@ -6,9 +6,10 @@
 #include <cmath>
 #include <cstdlib>
 #include <new>
-#include <numbers>
 #include <stdexcept>
 #include <string>
+
+#include "io/same_bits.h"
 
 namespace supertac {
 namespace {
@@ -25,7 +26,7 @@ kiss_fftndr_state* make_plan(int height, int width, bool inverse) {
 std::vector<float> hann(int size) {
   std::vector<float> window;
   for (int i = 0; i < size; ++i)
-    window.push_back(static_cast<float>(0.5 - 0.5 * std::cos(2 * std::numbers::pi * i / (size - 1.0))));
+    window.push_back(static_cast<float>(0.5 - 0.5 * same_bits::cosine(i / (size - 1.0))));
   return window;
 }
 

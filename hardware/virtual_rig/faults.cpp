@@ -23,14 +23,11 @@ std::vector<std::byte> ByteFaults::apply(std::span<const std::byte> bytes) {
     }
     switch (dice_.below(3)) {
       case 0:
-        ++counters_.dropped;
         break;
       case 1:
-        ++counters_.flipped;
         out.push_back(byte ^ static_cast<std::byte>(1U << dice_.below(8)));
         break;
       default:
-        ++counters_.inserted;
         out.push_back(byte);
         out.push_back(static_cast<std::byte>(dice_.below(256)));
     }

@@ -44,17 +44,12 @@ class Dice {
 /// Drops, flips and inserts bytes.
 class ByteFaults {
  public:
-  struct Counters {
-    std::uint64_t dropped = 0, flipped = 0, inserted = 0;
-  };
   ByteFaults(double rate, std::uint64_t seed, std::uint64_t stream) : rate_(rate), dice_(seed, stream) {}
   std::vector<std::byte> apply(std::span<const std::byte> bytes);
-  const Counters& counters() const { return counters_; }
 
  private:
   double rate_;
   Dice dice_;
-  Counters counters_;
 };
 
 }  // namespace supertac

@@ -15,10 +15,7 @@ Point3 MotionQueue::at(double t) {
   const Block& block = blocks_.front();
   const double length = distance(block.from, block.to);
   const double done = trapezoid_position(t - block.start, length, block.end - block.start, acceleration_);
-  const double part = length > 0 ? done / length : 1;
-  return {block.from.x + part * (block.to.x - block.from.x),
-          block.from.y + part * (block.to.y - block.from.y),
-          block.from.z + part * (block.to.z - block.from.z)};
+  return between(block.from, block.to, length > 0 ? done / length : 1);
 }
 
 bool MotionQueue::full(double t) {
@@ -31,7 +28,7 @@ void MotionQueue::move_to(const Point3& to, double speed_mm_s, double t) {
   const Point3 from = target();
   if (from == to) return;
   const double true_speed = speed_mm_s * (1 - 0.0012 * std::min(speed_mm_s, 100.0));
-  const double start = blocks_.empty() ? t + kStartDelay : blocks_.back().end;
+  const double start = blocks_.empty() ? t + rig::kStartDelayS : blocks_.back().end;
   end_ = start + trapezoid_duration(distance(from, to), true_speed, acceleration_);
   blocks_.push_back({from, to, start, end_});
 }

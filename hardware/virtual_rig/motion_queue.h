@@ -1,6 +1,6 @@
 // The planner of the virtual printer: straight moves with acceleration, one after the other, each stopping at
-// its end. As measured on Marlin, a move that finds the queue empty starts 126.5 ms late, and the true speed
-// is a little below the ordered one (9.88 mm/s at F600, 4.97 at F300).
+// its end. As measured on Marlin, a move that finds the queue empty starts rig::kStartDelayS late, and the
+// true speed is a little below the ordered one (9.88 mm/s at F600, 4.97 at F300).
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,6 @@ namespace supertac {
 class MotionQueue {
  public:
   static constexpr std::size_t kBlocks = 16;
-  static constexpr double kStartDelay = 0.1265;
 
   explicit MotionQueue(const Point3& start, double acceleration = 500)
       : rest_(start), acceleration_(acceleration) {}

@@ -13,6 +13,7 @@
 #include <array>
 
 #include "hardware/errors.h"
+#include "hardware/rig.h"
 #include "hardware/serial_port.h"
 #include "hardware/serial_termios.h"
 
@@ -45,7 +46,7 @@ PseudoTerminal::PseudoTerminal(const std::string& link) : link_(link) {
   // Held open so that the master does not see a hang-up between two programs; raw, so that nothing is echoed.
   keep_open_ = open(slave_.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
   if (keep_open_ < 0) failed("cannot open " + slave_);
-  if (set_raw_terminal(keep_open_, 115200) != 0) failed("cannot configure " + slave_);
+  if (set_raw_terminal(keep_open_, rig::kPrinterBaud) != 0) failed("cannot configure " + slave_);
   link_at(slave_, link_);
 }
 

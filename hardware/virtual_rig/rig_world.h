@@ -40,7 +40,6 @@ class RigWorld {
   double now() const { return now_; }
   VirtualPrinter& printer() { return printer_; }
   VirtualBoard& board() { return board_; }
-  const ByteFaults::Counters& board_faults() const { return board_bytes_.counters(); }
 
  private:
   double now_;

@@ -8,7 +8,7 @@
 namespace supertac {
 namespace {
 
-constexpr double kByteSeconds = 10.0 / 115200;
+constexpr double kByteSeconds = 10.0 / rig::kPrinterBaud;
 // The reader's thread may be this many frames behind simulated time.
 constexpr std::size_t kMostChunks = 64;
 // Arrival is never exactly on time: a USB frame of 125 us and the host's wake-up.

@@ -21,7 +21,7 @@ class SimulatedRig {
   SimulatedRig(const SimulatedRig&) = delete;
   SimulatedRig& operator=(const SimulatedRig&) = delete;
 
-  /// The printer's port. Time passes while it waits and writes (at 115200 baud).
+  /// The printer's port. Time passes while it waits and writes (at rig::kPrinterBaud).
   std::unique_ptr<Port> printer_port();
   /// The board's port: waits for real until simulated time has brought bytes. May be read by another thread.
   std::unique_ptr<Port> board_port();

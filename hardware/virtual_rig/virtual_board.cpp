@@ -6,7 +6,6 @@
 namespace supertac {
 namespace {
 
-constexpr double kRestVolts = 2.44;
 constexpr int kStallFrames = 20;
 
 }  // namespace
@@ -15,15 +14,16 @@ VirtualBoard::VirtualBoard(const VirtualBoardSettings& settings, double t)
     : settings_(settings), start_(t), dice_(settings.seed, 202) {}
 
 BoardFrame VirtualBoard::sample(const Point3& head, double t) {
-  std::array<double, 16> volts{};
-  volts.fill(kRestVolts);
+  std::array<double, rig::kTaxels> volts{};
+  volts.fill(rig::kRestVolts);
   if (settings_.signals) volts = settings_.signals(head.x, head.y, head.z, t);
   BoardFrame frame;
-  frame.samples.fill(volts_to_adc(kRestVolts));
+  const auto code = [](double v) { return static_cast<std::uint16_t>(rig::adc_of(v)); };
+  frame.samples.fill(code(rig::kRestVolts));
   frame.slip = 2048;
-  for (std::size_t k = 0; k < 16; ++k) {
+  for (std::size_t k = 0; k < volts.size(); ++k) {
     const double noise = settings_.noise_adc > 0 ? settings_.noise_adc * dice_.normal() : 0;
-    frame.samples[5 * k] = volts_to_adc(volts[k] + noise * (3.3 / 4096));
+    frame.samples[rig::kPatches * k] = code(volts[k] + noise * rig::volts_of(1));
   }
   return frame;
 }
@@ -43,14 +43,14 @@ std::vector<std::byte> VirtualBoard::make_frame(const Point3& head) {
   const BoardFrame fresh = sample(head, middle);
   BoardFrame frame = fresh;
   if (tear_next_) {  // half old, half new, behind a valid header and trailer
-    std::copy_n(previous_.samples.begin(), kFrameSamples / 2, frame.samples.begin());
+    std::copy_n(previous_.samples.begin(), rig::kFrameSamples / 2, frame.samples.begin());
     tear_next_ = false;
     ++counters_.torn;
   }
   previous_ = fresh;
   ++counters_.sent;
-  std::vector<std::byte> bytes(kFrameBytes);
-  write_frame(frame, std::span<std::byte, kFrameBytes>(bytes));
+  std::vector<std::byte> bytes(rig::kFrameBytes);
+  write_frame(frame, std::span<std::byte, rig::kFrameBytes>(bytes));
   return bytes;
 }
 

@@ -1,4 +1,4 @@
-// A tactile board: true byte format, 1008.06 Hz, frames that vanish when USB is busy, and after a stall a
+// A tactile board: true byte format and rate, frames that vanish when USB is busy, and after a stall a
 // torn one.
 #pragma once
 
@@ -15,14 +15,14 @@
 
 namespace supertac {
 
-/// The 16 taxel voltages when the finger's centre is at (x, y, z) mm of the printer at time t (s).
-using FingerSignals = std::function<std::array<double, 16>(double x, double y, double z, double t)>;
+/// The taxels' voltages when the finger's centre is at (x, y, z) mm of the printer at time t (s).
+using FingerSignals = std::function<std::array<double, rig::kTaxels>(double x, double y, double z, double t)>;
 
 struct VirtualBoardSettings {
-  FingerSignals signals{};         ///< empty: all taxels at rest
-  double period_s = kFramePeriod;  ///< the board's own crystal
-  double noise_adc = 0;            ///< standard deviation added to every sample
-  RigFaults faults{};              ///< lost frames and stalls; bytes are the port's matter
+  FingerSignals signals{};               ///< empty: all taxels at rest
+  double period_s = rig::kFramePeriodS;  ///< the board's own crystal
+  double noise_adc = 0;                  ///< standard deviation added to every sample
+  RigFaults faults{};                    ///< lost frames and stalls; bytes are the port's matter
   std::uint64_t seed = 1;
 };
 

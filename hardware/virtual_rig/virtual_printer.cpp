@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "hardware/marlin_line.h"
+#include "io/numbers.h"
 
 namespace supertac {
 namespace {
@@ -14,7 +15,6 @@ namespace {
 constexpr std::size_t kCommandBuffer = 4;  // Marlin's BUFSIZE
 constexpr std::size_t kReceiveLines = 6;   // about 128 bytes
 constexpr double kNever = std::numeric_limits<double>::infinity();
-constexpr double kMaxSpeedZ = 5;
 
 // The number behind a letter, as Marlin's parser reads it.
 std::optional<double> parameter(const std::string& command, char letter) {
@@ -315,22 +315,22 @@ void VirtualPrinter::move(const std::string& command, double t) {
                   axis('Z', from.z, offset_.z, settings_.bed.z)};
   const double length = distance(from, to);
   const double rise = std::abs(to.z - from.z);
-  const double speed = rise > 0 ? std::min(feed_, kMaxSpeedZ * length / rise) : feed_;
+  const double speed = rise > 0 ? std::min(feed_, rig::kLiftMmS * length / rise) : feed_;
   motion_.move_to(to, speed, t);
 }
 
 void VirtualPrinter::home(double t) {
   Point3 at = motion_.target();
-  motion_.move_to({at.x, at.y, at.z + 5}, kMaxSpeedZ, t);
+  motion_.move_to({at.x, at.y, at.z + 5}, rig::kLiftMmS, t);
   motion_.move_to({0, 0, at.z + 5}, 50, t);
-  motion_.move_to({0, 0, 0}, kMaxSpeedZ, t);
+  motion_.move_to({0, 0, 0}, rig::kLiftMmS, t);
   offset_ = {};
   homed_ = true;
   block_until(motion_.end_time(), t);
 }
 
 void VirtualPrinter::report(const Point3& physical) {
-  const auto text = [](double v) { return fixed_decimals(std::abs(v) < 0.005 ? 0.0 : v, 2); };
+  const auto text = [](double v) { return format(std::abs(v) < 0.005 ? 0.0 : v, 2); };
   const Point3 p{physical.x - offset_.x, physical.y - offset_.y, physical.z - offset_.z};
   output_ += "X:" + text(p.x) + " Y:" + text(p.y) + " Z:" + text(p.z) +
              " E:0.00 Count X:" + std::to_string(std::llround(80 * p.x)) +

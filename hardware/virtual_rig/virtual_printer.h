@@ -18,9 +18,9 @@
 namespace supertac {
 
 struct VirtualPrinterSettings {
-  Point3 head{99.7, 101.17, 131.81};  ///< where the head really is at power-on; the firmware believes 0, 0, 0
-  Point3 bed{235, 235, 250};          ///< soft limits once homed: 0 ... bed
-  bool realtime_position = true;      ///< M114 R reports the head, not the end of the queue
+  Point3 head = rig::kMounted;    ///< where the head really is at power-on; the firmware believes 0, 0, 0
+  Point3 bed = rig::kBed;         ///< soft limits once homed: 0 ... bed
+  bool realtime_position = true;  ///< M114 R reports the head, not the end of the queue
   bool emergency_parser = true;
   bool keepalive = true;   ///< echo:busy every 2 s
   bool heartbeat = false;  ///< `wait` every second when idle

@@ -27,8 +27,9 @@ inline void check_frame_decoder(std::span<const std::byte> input) {
   if (expected != found) throw std::logic_error("frame decoder: pieces give other frames than the whole");
   for (const FrameDecoder* decoder : {&whole, &pieces}) {
     const FrameDecoder::Counters& counters = decoder->counters();
-    if (counters.frames * kFrameBytes + counters.discarded_bytes + decoder->pending() != counters.bytes ||
-        counters.bytes != stream.size() || decoder->pending() >= kFrameBytes) {
+    if (counters.frames * rig::kFrameBytes + counters.discarded_bytes + decoder->pending() !=
+            counters.bytes ||
+        counters.bytes != stream.size() || decoder->pending() >= rig::kFrameBytes) {
       throw std::logic_error("frame decoder: bytes are not accounted for");
     }
   }

@@ -1,4 +1,4 @@
-// libFuzzer target: journal_fuzz tests/fuzz/corpus/journal -max_total_time=600
+// libFuzzer target: journal_fuzz corpus/journal -max_total_time=600 (the build unpacks the corpus)
 #include "journal_properties.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {

@@ -9,7 +9,7 @@
 
 #include "hardware/collection.h"
 #include "hardware/errors.h"
-#include "io/crc32.h"
+#include "io/hash.h"
 
 namespace supertac {
 

@@ -50,8 +50,9 @@ struct FaultyCollection {
     const double z = rig.world().printer().head(rig.now()).z;
     if (z < settings.plan.start.z + settings.plan.lift - 0.01)
       return "the finger is at Z" + std::to_string(z);
-    return left_behind();
+    return {};
   }
+  /// The same of its files; to be asked when the calls work again.
   std::string left_behind() const {
     for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
       if (entry.path() != settings.journal) return "left behind: " + entry.path().string();
@@ -88,6 +89,7 @@ Sweep sweep(int error, bool forever) {
       broken = collection.run(failed);
       reached = FaultInjection::reached();
     }
+    if (broken.empty()) broken = collection.left_behind();
     EXPECT_EQ(broken, "") << "call " << at << " fails with " << error << (forever ? " for ever" : " once");
     untouched = reached ? 0 : untouched + 1;
     if (untouched == 5) return sweep;
@@ -105,10 +107,13 @@ TEST(CollectionFaults, EveryCallOnceOnABrokenDisk) { EXPECT_GT(sweep(EIO, false)
 TEST(CollectionFaults, EveryCallAndAllThatFollowOnAFullDisk) { EXPECT_GT(sweep(ENOSPC, true).failed, 20); }
 
 TEST(CollectionFaults, ShortWritesAreCompleted) {
-  const FaultInjection injection(1, 0, true, Fault::short_count);
   FaultyCollection collection;
   bool failed = true;
-  EXPECT_EQ(collection.run(failed), "");
+  {
+    const FaultInjection injection(1, 0, true, Fault::short_count);
+    EXPECT_EQ(collection.run(failed), "");
+  }
+  EXPECT_EQ(collection.left_behind(), "");
   EXPECT_FALSE(failed);
 }
 

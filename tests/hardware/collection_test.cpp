@@ -9,6 +9,7 @@
 #include "hardware/errors.h"
 #include "hardware/palpation_recorder.h"
 #include "rig_support.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -186,7 +187,8 @@ TEST(Collection, NothingMovesBeforeTheBoardIsHeard) {
   RigSettings rig = running_rig();
   rig.faults.lost_frame_rate = 1;
   CollectionBench bench(rig);
-  EXPECT_THROW(bench.record(), BoardSilent);
+  EXPECT_ERROR(bench.record(), BoardSilent,
+               "expected 1008 frames/s, found none for 1.0 s; plug the board out and in again");
   EXPECT_TRUE(moves_of(bench.rig.world().printer()).empty());
   EXPECT_EQ(bench.folder.entries(), 0U) << "a journal of nothing was left behind";
 }
@@ -200,7 +202,8 @@ TEST(Collection, ABoardThatGoesAwayInContactEndsWithTheFingerUp) {
   const RecorderReport report = bench.record();
   EXPECT_FALSE(report.outcome.complete);
   EXPECT_EQ(report.outcome.finger, PalpationOutcome::Finger::lifted);
-  EXPECT_THROW(std::rethrow_exception(report.outcome.error), PortUnplugged);
+  EXPECT_ERROR(std::rethrow_exception(report.outcome.error), PortUnplugged,
+               "check the cable and start again");
   EXPECT_GT(bench.rig.world().printer().head(bench.rig.now()).z, 96);
   const Collection kept = bench.collect();
   EXPECT_FALSE(kept.complete);
@@ -217,7 +220,7 @@ TEST(Collection, TheOperatorsStopLiftsTheFinger) {
     if (leg.phase == Phase::slide && at.y > 120) stop = true;
   };
   const RecorderReport report = bench.record();
-  EXPECT_THROW(std::rethrow_exception(report.outcome.error), OperatorStop);
+  EXPECT_ERROR(std::rethrow_exception(report.outcome.error), OperatorStop, "stopped by the operator");
   EXPECT_EQ(report.outcome.finger, PalpationOutcome::Finger::lifted);
   EXPECT_LT(bench.rig.world().printer().head(bench.rig.now()).y, 130);
 }

@@ -4,6 +4,7 @@
 
 #include "hardware/collection.h"
 #include "hardware/errors.h"
+#include "io/numbers.h"
 #include "rig_support.h"
 
 namespace supertac {
@@ -15,8 +16,8 @@ constexpr double kLongestRun = 3600;
 std::vector<std::string> planned_moves(const PalpationPlan& plan, const Point3& origin) {
   std::vector<std::string> moves;
   for (const Leg& leg : legs_of(plan, origin)) {
-    moves.push_back("G1 X" + fixed_decimals(leg.to.x, 3) + " Y" + fixed_decimals(leg.to.y, 3) + " Z" +
-                    fixed_decimals(leg.to.z, 3) + " F" + fixed_decimals(60 * leg.speed, 1));
+    moves.push_back("G1 X" + format(leg.to.x, 3) + " Y" + format(leg.to.y, 3) + " Z" + format(leg.to.z, 3) +
+                    " F" + format(60 * leg.speed, 1));
   }
   return moves;
 }
@@ -40,7 +41,7 @@ std::string check_moves(const std::vector<std::string>& ran, const std::vector<s
 
 // Frame number of an arrival: it is at most a fifth of a period late.
 std::int64_t frame_of(double arrival) {
-  return std::llround(std::floor((arrival - kWorldBegin) / kFramePeriod)) - 1;
+  return std::llround(std::floor((arrival - kWorldBegin) / rig::kFramePeriodS)) - 1;
 }
 
 std::string check_frames(const Journal& journal, FaultVerdict& verdict) {

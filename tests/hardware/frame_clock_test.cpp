@@ -36,7 +36,7 @@ Arrivals arrivals(std::size_t count, double period, double loss, std::size_t sta
 
 TEST(FrameTimeline, CountsEveryMissingFrameAndPlacesItWhereItWas) {
   for (const double loss : {0.0, 0.01, 0.2}) {
-    for (const double period : {0.998 * kFramePeriod, kFramePeriod, 1.002 * kFramePeriod}) {
+    for (const double period : {0.998 * rig::kFramePeriodS, rig::kFramePeriodS, 1.002 * rig::kFramePeriodS}) {
       const Arrivals sent = arrivals(20000, period, loss, 0);
       const FrameTimeline timeline = timeline_of(sent.times);
       EXPECT_EQ(timeline.missing, sent.lost) << "loss " << loss << ", period " << period;
@@ -47,9 +47,9 @@ TEST(FrameTimeline, CountsEveryMissingFrameAndPlacesItWhereItWas) {
 }
 
 TEST(FrameTimeline, ABurstAfterAStallIsNoLoss) {
-  const Arrivals sent = arrivals(20000, kFramePeriod, 0, 300);
+  const Arrivals sent = arrivals(20000, rig::kFramePeriodS, 0, 300);
   EXPECT_EQ(timeline_of(sent.times).missing, 0U);
-  const Arrivals both = arrivals(20000, kFramePeriod, 0.01, 300);
+  const Arrivals both = arrivals(20000, rig::kFramePeriodS, 0.01, 300);
   EXPECT_EQ(timeline_of(both.times).missing, both.lost);
 }
 
@@ -71,7 +71,8 @@ TEST(ClockEstimator, LowerEnvelopeWithOutliers) {
 TEST(ClockEstimator, WarnsOutsideHalfAPercent) {
   for (const double factor : {0.994, 0.996, 1.004, 1.006}) {
     ClockEstimator estimator;
-    for (std::uint64_t i = 0; i < 5000; ++i) estimator.add(i, factor * kFramePeriod * static_cast<double>(i));
+    for (std::uint64_t i = 0; i < 5000; ++i)
+      estimator.add(i, factor * rig::kFramePeriodS * static_cast<double>(i));
     EXPECT_EQ(estimator.fit().plausible, std::abs(factor - 1) <= 0.005) << factor;
   }
 }

@@ -11,8 +11,9 @@
 
 #include "hardware/errors.h"
 #include "hardware/serial_port.h"
-#include "io/crc32.h"
+#include "io/hash.h"
 #include "rig_support.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -45,9 +46,12 @@ TEST(Journal, GivesBackWhatWasWritten) {
 TEST(Journal, NeverOverwritesAndSaysWhyItCannotWrite) {
   const TemporaryFolder folder;
   std::ofstream(folder / "j") << "precious";
-  EXPECT_THROW(JournalWriter(folder / "j", ""), JournalError);
+  EXPECT_ERROR(
+      JournalWriter(folder / "j", ""), JournalError,
+      "cannot be created: File exists; recover it with supertac-import --journal, or choose another folder");
   EXPECT_EQ(file_bytes(folder / "j").size(), 8U);
-  EXPECT_THROW(JournalWriter(folder / "no/such/folder", ""), JournalError);
+  EXPECT_ERROR(JournalWriter(folder / "no/such/folder", ""), JournalError,
+               "cannot be created: No such file or directory; choose a folder that can be written");
 }
 
 TEST(Journal, EveryPrefixReadsAsFarAsItIsWhole) {
@@ -62,7 +66,8 @@ TEST(Journal, EveryPrefixReadsAsFarAsItIsWhole) {
   for (std::size_t length = 0; length <= whole.size(); ++length) {
     const auto prefix = std::span(whole).first(length);
     if (length < head) {
-      EXPECT_THROW(parse_journal(prefix, "j"), JournalError) << length;
+      EXPECT_ERROR(parse_journal(prefix, "j"), JournalError,
+                   "journal j: expected a SuperTac journal, found other bytes or a damaged beginning");
     } else {
       const Journal journal = parse_journal(prefix, "j");
       EXPECT_EQ(journal.torn_bytes, length == whole.size() ? 0 : length - head);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "rig_support.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -69,7 +70,9 @@ TEST(MarlinLink, NobodyThereIsATypedErrorInTime) {
   const auto port = rig.printer_port();
   MarlinLink link(*port);
   const double start = port->now();
-  EXPECT_THROW(link.connect(), PrinterSilent);
+  EXPECT_ERROR(
+      link.connect(), PrinterSilent,
+      "expected a Marlin firmware, found no answer to M110 within 20 s; check that the printer is on");
   EXPECT_LT(port->now() - start, 25);
 }
 
@@ -91,7 +94,9 @@ TEST(MarlinLink, ResendOfALineNeverSentIsIgnored) {
 TEST(MarlinLink, SameLineTooOftenIsAResendLoop) {
   TamperedBench bench;
   bench.port.to_printer.assign(50, {"G1 X1", "G1 X7"});
-  EXPECT_THROW(bench.link.command("G1 X1"), ResendLoop);
+  EXPECT_ERROR(bench.link.command("G1 X1"), ResendLoop,
+               "line 2 repeated 8 times without success (the firmware reports damaged lines): resend loop; "
+               "check the cable");
   EXPECT_TRUE(moves_of(bench.printer()).empty());
 }
 
@@ -139,14 +144,16 @@ TEST(MarlinLink, PausedForUserIsAnError) {
   Bench bench;
   bench.before_line(2,
                     [](VirtualPrinter& printer, double) { printer.inject("echo:busy: paused for user\n"); });
-  EXPECT_THROW(bench.link.command("G1 X1"), PrinterPaused);
+  EXPECT_ERROR(bench.link.command("G1 X1"), PrinterPaused,
+               "waits for its user; look at the printer's display");
 }
 
 TEST(MarlinLink, StartInMidRunIsAReset) {
   Bench bench;
   bench.before_line(3, [](VirtualPrinter& printer, double t) { printer.reset(t); });
   bench.link.command("G1 X1");
-  EXPECT_THROW(bench.link.command("G1 X2"), PrinterReset);
+  EXPECT_ERROR(bench.link.command("G1 X2"), PrinterReset,
+               "the firmware restarted in use; its position is unknown, confirm the origin and start again");
 }
 
 TEST(MarlinLink, AResetWhoseBannerIsLostIsSeenInTheLineNumber) {
@@ -154,7 +161,7 @@ TEST(MarlinLink, AResetWhoseBannerIsLostIsSeenInTheLineNumber) {
   bench.go(10);
   bench.printer().reset(bench.rig.now());
   bench.port.from_printer = {{"start", "sxart"}};
-  EXPECT_THROW(bench.link.command("G1 X11"), PrinterReset);
+  EXPECT_ERROR(bench.link.command("G1 X11"), PrinterReset, "so it restarted; its position is unknown");
   EXPECT_EQ(moves_of(bench.printer()).size(), 10U) << "a line ran on the restarted firmware";
 }
 
@@ -164,9 +171,9 @@ TEST(MarlinLink, AfterAHaltNothingMoreIsSent) {
         "Error:MAXTEMP triggered, system stopped! Heater_ID: 0\n"}) {
     Bench bench;
     bench.before_line(2, [text](VirtualPrinter& printer, double) { printer.inject(text); });
-    EXPECT_THROW(bench.link.command("G1 X1"), PrinterHalted);
+    EXPECT_ERROR(bench.link.command("G1 X1"), PrinterHalted, "the firmware halted ('Error:");
     const std::int64_t last = bench.printer().last_line();
-    EXPECT_THROW(bench.link.command("G1 X2"), PrinterHalted);
+    EXPECT_ERROR(bench.link.command("G1 X2"), PrinterHalted, "halted earlier; reset it and start again");
     EXPECT_EQ(bench.printer().last_line(), last);
   }
 }
@@ -174,7 +181,7 @@ TEST(MarlinLink, AfterAHaltNothingMoreIsSent) {
 TEST(MarlinLink, ARefusedCommandIsNotSentForEver) {
   Bench bench;
   bench.before_line(2, [](VirtualPrinter& printer, double) { printer.inject("Error:Probing failed\n"); });
-  EXPECT_THROW(bench.link.command("G1 X1"), PrinterRefused);
+  EXPECT_ERROR(bench.link.command("G1 X1"), PrinterRefused, ": Error:Probing failed");
   EXPECT_NO_THROW(bench.link.command("M114"));
 }
 

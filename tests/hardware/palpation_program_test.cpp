@@ -1,4 +1,4 @@
-#include "hardware/palpation_program.h"
+#include "hardware/palpation.h"
 
 #include <gtest/gtest.h>
 
@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "rig_support.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -83,10 +84,14 @@ TEST(PalpationProgram, IsAbsoluteWithinLimitsAndEndsLifted) {
 }
 
 TEST(PalpationProgram, RefusesWhatTheRunRefuses) {
-  EXPECT_THROW(palpation_program({.passes = 40}, kMounted, {}, "x"), OutsideLimits);
-  EXPECT_THROW(palpation_program({.passes = 0}, kMounted, {}, "x"), std::invalid_argument);
-  EXPECT_THROW(palpation_program({}, {99.7, 101.17, 500}, {}, "x"), OutsideLimits);
-  EXPECT_THROW(palpation_program({}, kMounted, {}, "a\nG28"), std::invalid_argument);
+  EXPECT_ERROR(palpation_program({.passes = 40}, kMounted, {}, "x"), OutsideLimits,
+               "below Z95.00 and beside the plate; nothing was sent, lift first");
+  EXPECT_ERROR(palpation_program({.passes = 0}, kMounted, {}, "x"), std::invalid_argument,
+               "expected 1 to 1000 passes");
+  EXPECT_ERROR(palpation_program({}, {99.7, 101.17, 500}, {}, "x"), OutsideLimits,
+               "Z expected 0.00 to 250.00 mm, found 500.00; nothing was sent");
+  EXPECT_ERROR(palpation_program({}, kMounted, {}, "a\nG28"), std::invalid_argument,
+               "the title has a line break");
 }
 
 }  // namespace

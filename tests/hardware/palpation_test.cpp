@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "rig_support.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -51,8 +52,10 @@ TEST(Palpation, EightPassesLiftBeforeTheyShift) {
 
 TEST(Palpation, TheWholeWayIsCheckedBeforeTheFirstMove) {
   PalpationBench bench;
-  EXPECT_THROW(bench.run({.passes = 40}), OutsideLimits);  // only the last passes leave the plate
-  EXPECT_THROW(bench.run({.passes = 0}), std::invalid_argument);
+  EXPECT_ERROR(bench.run({.passes = 40}), OutsideLimits,
+               "beside the plate; nothing was sent, lift first");  // only the last passes leave the plate
+  EXPECT_ERROR(bench.run({.passes = 0}), std::invalid_argument, "expected 1 to 1000 passes");
+  EXPECT_ERROR(bench.run({.speed = INFINITY}), std::invalid_argument, "slide, lift and speeds above 0");
   EXPECT_TRUE(moves_of(bench.firmware()).empty());
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "rig_support.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -25,12 +26,17 @@ struct PrinterBench {
 
 TEST(Limits, NameTheAxisAndCheckTheWay) {
   const Limits limits;
-  EXPECT_THROW(limits.check_target({500, 100, 100}), OutsideLimits);
-  EXPECT_THROW(limits.check_target({100, -1, 100}), OutsideLimits);
-  EXPECT_THROW(limits.check_target({100, 100, NAN}), OutsideLimits);
+  EXPECT_ERROR(
+      limits.check_target({500, 100, 100}), OutsideLimits,
+      "limits: X expected 0.00 to 235.00 mm, found 500.00; nothing was sent, correct the plan or the limits");
+  EXPECT_ERROR(limits.check_target({100, -1, 100}), OutsideLimits,
+               "Y expected 0.00 to 235.00 mm, found -1.00");
+  EXPECT_ERROR(limits.check_target({100, 100, NAN}), OutsideLimits,
+               "Z expected 0.00 to 250.00 mm, found no number");
   EXPECT_NO_THROW(limits.check_path({99.7, 101.17, 91.81}, {99.7, 209.17, 91.81}));
   // Both ends are allowed, the way between them runs through the plate's side.
-  EXPECT_THROW(limits.check_path({50, 101.17, 96}, {99.7, 101.17, 91.81}), OutsideLimits);
+  EXPECT_ERROR(limits.check_path({50, 101.17, 96}, {99.7, 101.17, 91.81}), OutsideLimits,
+               "the way from X50.00 Y101.17 Z96.00 to X99.70 Y101.17 Z91.81 passes");
   try {
     limits.check_target({500, 100, 100});
   } catch (const OutsideLimits& error) {
@@ -41,14 +47,17 @@ TEST(Limits, NameTheAxisAndCheckTheWay) {
 
 TEST(Printer, NothingMovesWithoutAnOrigin) {
   PrinterBench bench;
-  EXPECT_THROW(bench.printer.start_move({100, 110, 120}, 10), OriginUnknown);
+  EXPECT_ERROR(bench.printer.start_move({100, 110, 120}, 10), OriginUnknown,
+               "the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
   EXPECT_TRUE(moves_of(bench.firmware()).empty());
 }
 
 TEST(Printer, OutsideTheLimitsNothingIsSent) {
   PrinterBench bench;
   bench.printer.confirm_origin(kMounted);
-  EXPECT_THROW(bench.printer.start_move({500, 101.17, 131.81}, 10), OutsideLimits);
+  EXPECT_ERROR(bench.printer.start_move({500, 101.17, 131.81}, 10), OutsideLimits, "X expected");
+  EXPECT_ERROR(bench.printer.start_move(rig::kMounted, INFINITY), std::invalid_argument,
+               "expected a speed above 0 mm/s, got inf");
   EXPECT_TRUE(moves_of(bench.firmware()).empty());
   EXPECT_EQ(bench.head(), kMounted);
 }
@@ -91,7 +100,9 @@ TEST(Printer, MarlinsSilentClampIsFound) {
   bench.printer.home();
   bench.printer.start_move({0, 0, 120}, 50);
   bench.printer.start_move({150, 0, 120}, 50);
-  EXPECT_THROW(bench.printer.finish_move(), PositionError);
+  EXPECT_ERROR(bench.printer.finish_move(), PositionError,
+               "expected the head at X150.00 Y0.00 Z120.00, found X100.00 Y0.00 Z120.00; confirm the origin "
+               "and start again");
 }
 
 TEST(Printer, QuickStopActsAheadOfTheQueue) {

@@ -22,14 +22,14 @@ namespace supertac {
 inline BoardFrame random_frame(std::uint64_t index, std::uint64_t seed = 7) {
   const RandomStream random(seed, index);
   BoardFrame frame;
-  for (std::size_t n = 0; n < kFrameSamples; ++n) frame.samples[n] = random.bits(n) & 0xFFF;
+  for (std::size_t n = 0; n < rig::kFrameSamples; ++n) frame.samples[n] = random.bits(n) & 0xFFF;
   frame.slip = random.bits(99) & 0xFFF;
   return frame;
 }
 
 inline std::vector<std::byte> frame_bytes(const BoardFrame& frame) {
-  std::vector<std::byte> bytes(kFrameBytes);
-  write_frame(frame, std::span<std::byte, kFrameBytes>(bytes));
+  std::vector<std::byte> bytes(rig::kFrameBytes);
+  write_frame(frame, std::span<std::byte, rig::kFrameBytes>(bytes));
   return bytes;
 }
 

@@ -19,6 +19,7 @@
 #include "hardware/serial_termios.h"
 #include "hardware/virtual_rig/pty_rig.h"
 #include "rig_support.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -42,7 +43,8 @@ TEST(SerialPort, SecondOpenerIsRefusedEvenAsRoot) {
   const PseudoTerminal terminal(folder / "port");
   {
     const SerialPort first(folder / "port");
-    EXPECT_THROW(SerialPort second(folder / "port"), PortBusy);
+    EXPECT_ERROR(SerialPort second(folder / "port"), PortBusy,
+                 "already open in another program; close it (see `fuser ");
   }
   EXPECT_NO_THROW(SerialPort third(folder / "port"));
 }
@@ -62,9 +64,11 @@ TEST(PortList, ALastingNameIsThatOfTheDevice) {
 
 TEST(SerialPort, WhatCannotBeOpenedSaysWhy) {
   const TemporaryFolder folder;
-  EXPECT_THROW(SerialPort port(folder / "nothing"), PortNotFound);
+  EXPECT_ERROR(SerialPort port(folder / "nothing"), PortNotFound,
+               "no such port; plug the device in, or run with --list-ports");
   std::ofstream(folder / "file") << "text";
-  EXPECT_THROW(SerialPort port(folder / "file"), NotASerialPort);
+  EXPECT_ERROR(SerialPort port(folder / "file"), NotASerialPort,
+               "expected a serial port, found another kind of file; run with --list-ports");
   try {
     SerialPort port(folder / "nothing");
   } catch (const PortNotFound& error) {
@@ -108,7 +112,8 @@ TEST(SerialPort, TimeOutAndEndOfFileAreDifferent) {
         for (int i = 0; i < 3; ++i) (void)port.read(buffer, port.now() + 1);
       },
       PortUnplugged);
-  EXPECT_THROW(port.write(bytes_of("x"), port.now() + 1), PortUnplugged);
+  EXPECT_ERROR(port.write(bytes_of("x"), port.now() + 1), PortUnplugged,
+               "check the cable and start again, nothing is resumed");
 }
 
 TEST(SerialPort, UnpluggingIsNoticedWithin100Milliseconds) {
@@ -124,7 +129,7 @@ TEST(SerialPort, UnpluggingIsNoticedWithin100Milliseconds) {
       terminal.unplug();
     });
     std::array<std::byte, 16> buffer{};
-    EXPECT_THROW((void)port.read(buffer, port.now() + 10), PortUnplugged);
+    EXPECT_ERROR((void)port.read(buffer, port.now() + 10), PortUnplugged, "the device is gone (");
     worst = std::max(worst, monotonic_seconds() - pulled);
     other.join();
   }
@@ -136,7 +141,8 @@ TEST(SerialPort, AFullDeviceIsATimeOut) {
   const PseudoTerminal terminal(folder / "port");
   SerialPort port(folder / "port");
   const std::vector<std::byte> much(1 << 20);
-  EXPECT_THROW(port.write(much, port.now() + 0.05), PortTimeout);
+  EXPECT_ERROR(port.write(much, port.now() + 0.05), PortTimeout,
+               "the device took no bytes before the deadline (");
 }
 
 // Partial writes, EAGAIN and EINTR: a slow reader, and a signal every 200 us without SA_RESTART.

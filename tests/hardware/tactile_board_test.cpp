@@ -9,6 +9,7 @@
 #include "hardware/serial_port.h"
 #include "hardware/virtual_rig/pty_rig.h"
 #include "rig_support.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -35,7 +36,7 @@ TEST(TactileBoard, DeliversEveryFrameInOrder) {
     ++frames;
   }
   EXPECT_EQ(frames, rig.world().board().counters().sent);
-  EXPECT_NEAR(static_cast<double>(frames), 2 / kFramePeriod, 2);
+  EXPECT_NEAR(static_cast<double>(frames), 2 / rig::kFramePeriodS, 2);
 }
 
 TEST(TactileBoard, ASlowConsumerLosesTheOldestAndIsTold) {
@@ -115,8 +116,13 @@ TEST(TactileBoard, FramesOfOneReadAreAPeriodApart) {
   // One on time; a stall, then four at once; two right behind one another, closer than a period allows.
   TactileBoard board(std::make_unique<ScriptedPort>(std::vector<ScriptedPort::Read>{
       {10, some_frames(1)}, {10.1, some_frames(4)}, {10.1005, some_frames(2)}}));
-  const std::vector<double> expected = {
-      10, 10.1 - 3 * kFramePeriod, 10.1 - 2 * kFramePeriod, 10.1 - kFramePeriod, 10.1, 10.10025, 10.1005};
+  const std::vector<double> expected = {10,
+                                        10.1 - 3 * rig::kFramePeriodS,
+                                        10.1 - 2 * rig::kFramePeriodS,
+                                        10.1 - rig::kFramePeriodS,
+                                        10.1,
+                                        10.10025,
+                                        10.1005};
   for (const double time : expected) {
     const auto frame = board.next(kPatience);
     ASSERT_TRUE(frame);
@@ -145,7 +151,7 @@ TEST(TactileBoard, FramesThatWaitedFollowTheOneBefore) {
   }
   EXPECT_EQ(times[0], 10);
   for (std::size_t i = 1; i <= 12; ++i)
-    EXPECT_NEAR(times[i], 10 + static_cast<double>(i) * kFramePeriod, 1e-9) << i;
+    EXPECT_NEAR(times[i], 10 + static_cast<double>(i) * rig::kFramePeriodS, 1e-9) << i;
   EXPECT_NEAR(times[24], 10.05, 1e-9);  // of the last read nobody can say that it waited
   EXPECT_NEAR(times[25], 10.051, 1e-9);
 }
@@ -184,7 +190,7 @@ TEST(TactileBoard, LostFramesAreCountedAndTheNextIsSuspect) {
   std::uint64_t suspect = 0;
   double before = 0;
   while (const auto frame = board.next(0)) {
-    const bool after_gap = before > 0 && frame->arrival_s - before > 1.5 * kFramePeriod;
+    const bool after_gap = before > 0 && frame->arrival_s - before > 1.5 * rig::kFramePeriodS;
     EXPECT_EQ(frame->suspect, after_gap);
     before = frame->arrival_s;
     suspect += frame->suspect ? 1 : 0;
@@ -209,7 +215,7 @@ TEST(TactileBoard, UnpluggingIsATypedErrorAfterTheLastFrame) {
 TEST(TactileBoard, OverAPseudoTerminalAtTenTimesTheSpeed) {
   const TemporaryFolder folder;
   PtyRig rig(running_rig(), folder / "board", folder / "printer", 10);
-  TactileBoard board(std::make_unique<SerialPort>(folder / "board", SerialSettings{kBoardBaud, 10}));
+  TactileBoard board(std::make_unique<SerialPort>(folder / "board", SerialSettings{rig::kBoardBaud, 10}));
   std::uint64_t frames = 0;
   const double until = monotonic_seconds() + kPatience;
   while (frames < 3000 && monotonic_seconds() < until) frames += board.next(1) ? 1 : 0;
@@ -229,9 +235,10 @@ TEST(TactileBoard, APrinterAtTheBoardsPortIsRecognised) {
   settings.printer.boot_s = 0.01;
   settings.printer.heartbeat = true;
   PtyRig rig(settings, folder / "board", folder / "printer", 20);
-  TactileBoard board(std::make_unique<SerialPort>(folder / "printer", SerialSettings{kBoardBaud, 20}),
+  TactileBoard board(std::make_unique<SerialPort>(folder / "printer", SerialSettings{rig::kBoardBaud, 20}),
                      {.silence_s = 10});
-  EXPECT_THROW((void)board.next(kPatience), WrongDevice);
+  EXPECT_ERROR((void)board.next(kPatience), WrongDevice,
+               "expected a tactile board, found text, as from a printer; exchange the two ports");
 }
 
 // Neither board nor printer: noise without a frame, and a device that talks text to the printer's driver.
@@ -241,13 +248,17 @@ TEST(TactileBoard, AnotherDeviceIsNoBoardAndNoPrinter) {
   const std::string noise(64, '\xAA'), text = "$GPGGA,123519,4807.038,N\r\n";
   {
     ASSERT_EQ(write(device.descriptor(), noise.data(), noise.size()), static_cast<ssize_t>(noise.size()));
-    TactileBoard board(std::make_unique<SerialPort>(folder / "port", SerialSettings{kBoardBaud, 10}));
-    EXPECT_THROW((void)board.next(kPatience), WrongDevice);
+    TactileBoard board(std::make_unique<SerialPort>(folder / "port", SerialSettings{rig::kBoardBaud, 10}));
+    EXPECT_ERROR((void)board.next(kPatience), WrongDevice,
+                 "found 64 bytes without a frame; choose the board's port (--list-ports)");
   }
   ASSERT_EQ(write(device.descriptor(), text.data(), text.size()), static_cast<ssize_t>(text.size()));
   SerialPort port(folder / "port", {.speedup = 100});
   MarlinLink link(port);
-  EXPECT_THROW(link.connect(), WrongDevice);
+  EXPECT_ERROR(link.connect(), WrongDevice,
+               "expected a Marlin firmware, found 26 bytes that are no answer to M110 within 20 s; check "
+               "that it is the "
+               "printer's port (--list-ports) and that its baud rate is 115200");
 }
 
 TEST(TactileBoard, ABoardAtThePrintersPortIsRecognised) {
@@ -255,7 +266,7 @@ TEST(TactileBoard, ABoardAtThePrintersPortIsRecognised) {
   PtyRig rig(running_rig(), folder / "board", folder / "printer", 5);
   SerialPort port(folder / "board", {.speedup = 5});
   MarlinLink link(port);
-  EXPECT_THROW(link.connect(), WrongDevice);
+  EXPECT_ERROR(link.connect(), WrongDevice, "found the frames of a tactile board; exchange the two ports");
 }
 
 }  // namespace

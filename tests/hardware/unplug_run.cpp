@@ -11,7 +11,7 @@
 #include "hardware/serial_port.h"
 #include "hardware/virtual_rig/pty_rig.h"
 #include "rig_support.h"
-#include "stall_watch.h"
+#include "bench/studies/stall_watch.h"
 
 namespace supertac {
 namespace {
@@ -162,7 +162,7 @@ UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed) {
   });
   try {
     const PalpationOutcome outcome =
-        record_palpation(std::make_unique<NotingPort>(folder / "board", kBoardBaud, board),
+        record_palpation(std::make_unique<NotingPort>(folder / "board", rig::kBoardBaud, board),
                          std::make_unique<NotingPort>(folder / "printer", 115200, printer), settings)
             .outcome;
     const double returned = monotonic_seconds();

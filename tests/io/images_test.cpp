@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "io/file.h"
+#include "tests/expect_error.h"
 
 #define STB_IMAGE_STATIC
 #define STB_IMAGE_IMPLEMENTATION
@@ -60,8 +61,10 @@ TEST(Panel, DrawsYUpwardsAndXToTheRight) {
 TEST(Panel, StaysInsideThePicture) {
   Picture picture(4, 4);
   const std::vector<float> values(4);
-  EXPECT_THROW(draw_panel(picture, {1, 0, 4, 4}, values, 2, 2), std::invalid_argument);
-  EXPECT_THROW(draw_panel(picture, {0, 0, 4, 4}, values, 3, 2), std::invalid_argument);
+  EXPECT_ERROR(draw_panel(picture, {1, 0, 4, 4}, values, 2, 2), std::invalid_argument,
+               "a panel of 4 x 4 pixels at (1, 0) leaves the picture of");
+  EXPECT_ERROR(draw_panel(picture, {0, 0, 4, 4}, values, 3, 2), std::invalid_argument,
+               "draw_panel: expects 3 x 2 values, got 4");
 }
 
 constexpr StripLayout kSmall{.scale = 2, .side = 16};
@@ -110,7 +113,7 @@ TEST(Strips, KeepTheShapeOfTheArray) {
 }
 
 TEST(Strips, RefuseNothingAndTooMuch) {
-  EXPECT_THROW(strip_picture({}, kSmall), std::invalid_argument);
+  EXPECT_ERROR(strip_picture({}, kSmall), std::invalid_argument, "there is no window to draw");
   const Windows windows;
   EXPECT_THROW(film_picture(std::vector<Strip>(2000, windows.strip()), {.scale = 2, .side = 64}),
                std::invalid_argument);
@@ -138,7 +141,7 @@ TEST(Png, ReadsBackAsDrawn) {
 }
 
 TEST(Png, NamesAPathThatCannotBeWritten) {
-  EXPECT_THROW(write_png("/nowhere/at/all.png", Picture(2, 2)), FileError);
+  EXPECT_ERROR(write_png("/nowhere/at/all.png", Picture(2, 2)), FileError, "/nowhere/at/all.png: ");
 }
 
 }  // namespace

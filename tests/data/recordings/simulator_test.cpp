@@ -158,13 +158,5 @@ TEST(FingerModel, TheMountLiftsTheOtherRowsOffThePlate) {
   EXPECT_GT(FingerModel(plate, yielding, {}).loads({.x_mm = 18, .y_mm = 20, .z_mm = -0.35})[0], 0.01);
 }
 
-TEST(FingerModel, AdcRoundTrips) {
-  EXPECT_EQ(FingerModel::adc(2.44), 3029);
-  EXPECT_EQ(FingerModel::adc(-1), 0);
-  EXPECT_EQ(FingerModel::adc(9), 4095);
-  for (const int code : {0, 1, 3028, 4095})
-    EXPECT_EQ(FingerModel::adc(FingerModel::volts_of_adc(code)), code);
-}
-
 }  // namespace
 }  // namespace supertac

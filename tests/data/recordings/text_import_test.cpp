@@ -49,7 +49,7 @@ TEST(TextImport, ReadsFramesInOrder) {
   ASSERT_EQ(result.recording.frames(), 3u);
   EXPECT_FLOAT_EQ(result.recording.volts[0], 2.0F);
   EXPECT_FLOAT_EQ(result.recording.volts[2 * kTaxels + 5], 2.052F);
-  EXPECT_EQ(result.recording.time_s, (std::vector<double>{0, 1 / kImportRateHz, 2 / kImportRateHz}));
+  EXPECT_EQ(result.recording.time_s, (std::vector<double>{0, 1 / rig::kFrameRateHz, 2 / rig::kFrameRateHz}));
   EXPECT_TRUE(result.recording.position_mm.empty());
   EXPECT_EQ(result.recording.metadata.at("time_base"), "nominal");
   EXPECT_EQ(result.recording.source, "imported");
@@ -88,7 +88,8 @@ TEST(TextImport, DropsAndCountsEveryKindOfBadLineAndLeavesAGap) {
   EXPECT_EQ(report.out_of_range, 2u);
   EXPECT_EQ(report.empty, 1u);
   EXPECT_EQ(result.recording.frames(), 100u);
-  EXPECT_DOUBLE_EQ(result.recording.time_s[50], 57 / kImportRateHz);  // seven dropped frames, no blank line
+  EXPECT_DOUBLE_EQ(result.recording.time_s[50],
+                   57 / rig::kFrameRateHz);  // seven dropped frames, no blank line
 }
 
 TEST(TextImport, RefusesWhatIsNoRecording) {

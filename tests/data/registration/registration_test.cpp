@@ -215,7 +215,7 @@ TEST(Registration, RealPasses) {
                              report);
         recording.pass = pass;
         recording.speed_mm_s = 10;
-        restore_clock(recording, kImportRateHz);
+        restore_clock(recording, rig::kFrameRateHz);
         const Registration r = register_pass(recording, Plate::named(name));
         ++passes;
         if (!r.reliable) continue;

@@ -1,0 +1,23 @@
+// EXPECT_THROW that also reads the message: a type says what a program does next, its text what a person
+// does.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <exception>
+#include <string>
+
+/// `statement` throws `Type`, and `part` stands in its what(), which is one line.
+#define EXPECT_ERROR(statement, Type, part)                        \
+  EXPECT_THROW(                                                    \
+      {                                                            \
+        try {                                                      \
+          statement;                                               \
+        } catch (const std::exception& error_) {                   \
+          const std::string what_ = error_.what();                 \
+          EXPECT_NE(what_.find(part), std::string::npos) << what_; \
+          EXPECT_EQ(what_.find('\n'), std::string::npos) << what_; \
+          throw;                                                   \
+        }                                                          \
+      },                                                           \
+      Type)
