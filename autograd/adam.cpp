@@ -21,15 +21,12 @@ struct Update {
 // the smallest rounds back to it; arithmetic with them is 25 times slower. Epsilon hides 1e-30 by far.
 inline real flushed(real x) { return std::abs(x) < real(1e-30) ? real(0) : x; }
 
-void update_loop(Dim n, Update u, const real* gradient, real* __restrict x, real* __restrict m,
-                 real* __restrict v) {
-  kernels::run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) {
-      const real g = u.clip * gradient[i];
-      m[i] = flushed(u.b1 * m[i] + u.rest1 * g);
-      v[i] = flushed(u.b2 * v[i] + u.rest2 * g * g);
-      x[i] -= u.rate * m[i] / (std::sqrt(v[i]) * u.correction + u.epsilon);
-    }
+void update(Dim n, Update u, const real* gradient, real* x, real* m, real* v) {
+  kernels::each(n, [=](Dim i) SUPERTAC_LOOP {
+    const real g = u.clip * gradient[i];
+    m[i] = flushed(u.b1 * m[i] + u.rest1 * g);
+    v[i] = flushed(u.b2 * v[i] + u.rest2 * g * g);
+    x[i] -= u.rate * m[i] / (std::sqrt(v[i]) * u.correction + u.epsilon);
   });
 }
 
@@ -91,9 +88,8 @@ double Adam::step() {
                  static_cast<real>(1 / std::sqrt(1 - power(options_.beta2, steps_))),
                  static_cast<real>(options_.epsilon)};
   for (std::size_t k = 0; k < parameters_.size(); ++k) {
-    const real* gradient = parameters_[k].grad().data();
-    real *x = parameters_[k].mutable_value().data(), *m = m_[k].data(), *v = v_[k].data();
-    update_loop(parameters_[k].size(), u, gradient, x, m, v);
+    Variable& p = parameters_[k];
+    update(p.size(), u, p.grad().data(), p.mutable_value().data(), m_[k].data(), v_[k].data());
   }
   return norm;
 }

@@ -1,6 +1,7 @@
 #include "autograd/gradient_checker.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <sstream>
 
@@ -47,14 +48,35 @@ double derivative(const Function& f, Variable& leaf, Dim index, double step) {
 
 bool far(double a, double b) { return std::abs(a - b) > 1e-7 * std::max(std::abs(a), std::abs(b)); }
 
+// A rectifier's kink between the stencil's points spoils a difference, not the gradient: a wrong gradient
+// stays wrong at a shorter step.
+double nearest_derivative(const Function& f, Variable& leaf, Dim index, double step, double analytic) {
+  double nearest = derivative(f, leaf, index, step);
+  for (double h = step / 30; far(analytic, nearest) && h > step / 1e4; h /= 30) {
+    const double shorter = derivative(f, leaf, index, h);
+    if (std::abs(analytic - shorter) < std::abs(analytic - nearest)) nearest = shorter;
+  }
+  return nearest;
+}
+
+// "name [3,0,7]"
+std::string place_of(const GradientEntry& e, const Shape& shape, const std::vector<std::string>& names) {
+  std::array<Dim, kMaxRank> at{};
+  Dim rest = e.index;
+  for (int i = shape.rank() - 1; i >= 0; rest /= shape[i--])
+    at[static_cast<std::size_t>(i)] = rest % shape[i];
+  const std::string name = e.input < names.size() ? names[e.input] : "input " + std::to_string(e.input);
+  return name + " " + Shape({at.data(), static_cast<std::size_t>(shape.rank())}).text();
+}
+
 }  // namespace
 
 std::string GradientReport::text() const {
   std::ostringstream out;
   out.precision(10);
   for (const GradientEntry& e : worst) {
-    out << "input " << e.input << " [" << e.index << "]: analytic " << e.analytic << ", numeric " << e.numeric
-        << ", relative error " << e.relative_error << '\n';
+    out << e.place << ": analytic " << e.analytic << ", numeric " << e.numeric << ", relative error "
+        << e.relative_error << '\n';
   }
   return out.str();
 }
@@ -66,41 +88,33 @@ GradientReport check_gradients(const Function& f, std::vector<Variable> inputs,
   backward(sum(multiply(y, Variable(weights_for(y.shape())))));
 
   GradientReport report;
-  double largest_of_all = 0;
+  std::vector<double> largest(inputs.size());
   for (std::size_t k = 0; k < inputs.size(); ++k) {
     const Dim size = inputs[k].size(), count = std::min(size, options.max_entries_per_input);
-    std::vector<GradientEntry> entries;
-    double largest = 0;
+    const Tensor& grad = inputs[k].grad();
     for (Dim i = 0; i < count; ++i) {
       const Dim index = i * size / count;
-      const Tensor& grad = inputs[k].grad();
       const double analytic = grad.defined() ? static_cast<double>(grad.data()[index]) : 0;
-      // A rectifier's kink between the stencil's points spoils a difference, not the gradient: a wrong
-      // gradient stays wrong at a shorter step.
-      double numeric = derivative(f, inputs[k], index, options.step);
-      for (double step = options.step / 30; far(analytic, numeric) && step > options.step / 1e4; step /= 30) {
-        const double shorter = derivative(f, inputs[k], index, step);
-        if (std::abs(analytic - shorter) < std::abs(analytic - numeric)) numeric = shorter;
-      }
-      entries.push_back({k, index, analytic, numeric, 0});
-      largest = std::max(largest, std::abs(numeric));
+      const double numeric = nearest_derivative(f, inputs[k], index, options.step, analytic);
+      report.worst.push_back({k, index, analytic, numeric, 0, {}});
+      largest[k] = std::max(largest[k], std::abs(numeric));
     }
-    for (GradientEntry& e : entries) e.relative_error = largest;  // until all inputs are known
-    largest_of_all = std::max(largest_of_all, largest);
-    report.entries += count;
-    report.worst.insert(report.worst.end(), entries.begin(), entries.end());
   }
+  report.entries = static_cast<Dim>(report.worst.size());
+  if (report.worst.empty()) return report;
+  const double largest_of_all = *std::max_element(largest.begin(), largest.end());
   for (GradientEntry& e : report.worst) {
     const double scale =
-        std::max(std::abs(e.analytic), std::abs(e.numeric)) + 1e-3 * e.relative_error + 1e-5 * largest_of_all;
+        std::max(std::abs(e.analytic), std::abs(e.numeric)) + 1e-3 * largest[e.input] + 1e-5 * largest_of_all;
     e.relative_error = std::abs(e.analytic - e.numeric) / std::max(scale, 1e-10);
     if (!std::isfinite(e.relative_error)) e.relative_error = 1e30;
   }
   std::sort(report.worst.begin(), report.worst.end(), [](const GradientEntry& a, const GradientEntry& b) {
     return a.relative_error > b.relative_error;
   });
-  if (!report.worst.empty()) report.max_relative_error = report.worst.front().relative_error;
+  report.max_relative_error = report.worst.front().relative_error;
   if (report.worst.size() > 10) report.worst.resize(10);
+  for (GradientEntry& e : report.worst) e.place = place_of(e, inputs[e.input].shape(), options.names);
   return report;
 }
 

@@ -11,24 +11,28 @@ namespace supertac {
 
 struct GradientEntry {
   std::size_t input;  // which of the inputs
-  Dim index;          // which of its elements
+  Dim index;          // which of its elements, in row-major order
   double analytic, numeric;
   /// |analytic - numeric| / (max(|analytic|, |numeric|) + 1e-3 * the largest gradient of that input
   ///                         + 1e-5 * the largest gradient of all inputs)
   double relative_error;
+  std::string
+      place;  // "encoder.2.conv.1.weight [3,0,7]": the input's name and the element's indices in memory
 };
 
 struct GradientReport {
   std::vector<GradientEntry> worst;  // the largest errors first, at most ten
   double max_relative_error = 0;
   Dim entries = 0;
-  /// One line per entry of `worst`, for a failing test to print.
+  /// One line per entry of `worst`, for a failing test to print:
+  /// "encoder.2.conv.1.weight [3,0,7]: analytic 0.25, numeric 0.5, relative error 0.5"
   std::string text() const;
 };
 
 struct GradientCheckOptions {
-  double step = 1e-3;               // of the five-point stencil; relative to max(1, |x|)
-  Dim max_entries_per_input = 200;  // larger inputs are sampled evenly
+  double step = 1e-3;                   // of the five-point stencil; relative to max(1, |x|)
+  Dim max_entries_per_input = 200;      // larger inputs are sampled evenly
+  std::vector<std::string> names = {};  // of the inputs; "input 0", "input 1" ... where there is none
 };
 
 /// `f` computes a result of any shape from the leaves, deterministically, whenever it is called. The result

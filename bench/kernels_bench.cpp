@@ -11,6 +11,9 @@
 #include <cblas.h>
 
 #include "autograd/kernels/conv.h"
+
+#include "autograd/kernels/fast/geometry.h"
+#include "autograd/kernels/linear.h"
 #include "bench/against_peak.h"
 
 namespace supertac {
@@ -92,7 +95,7 @@ struct Buffers {
         gw(Tensor::zeros(w.shape())) {}
 
   void run(Pass pass) {
-    const kernels::ConvSizes sizes{&geometry, n, layer.cin, layer.cout};
+    const kernels::ConvSizes sizes{layer.settings, n, layer.cin, layer.cout};
     const Dim cin = layer.cin, cout = layer.cout;
     switch (pass) {
       case Pass::forward:

@@ -1,7 +1,6 @@
 #include "layers/checkpoint.h"
 
 #include <algorithm>
-#include <array>
 #include <set>
 #include <stdexcept>
 
@@ -10,47 +9,28 @@
 namespace supertac {
 namespace {
 
-using Axes = std::vector<int>;
-
-// file axis i = memory axis axes[i]; pointwise is handled as linear with two axes of length 1 behind.
-Axes file_axes(const Parameter& p) {
-  const int rank = p.value.rank();
-  if (p.layout == Layout::plain) {
-    Axes same(static_cast<std::size_t>(rank));
-    for (int i = 0; i < rank; ++i) same[static_cast<std::size_t>(i)] = i;
-    return same;
-  }
-  const bool input_first = p.layout == Layout::conv_transpose;
-  Axes axes{rank - (input_first ? 2 : 1), rank - (input_first ? 1 : 2)};
-  for (int i = 0; i < rank - 2; ++i) axes.push_back(i);
-  return axes;
-}
-
 std::vector<std::uint64_t> file_shape(const Parameter& p) {
-  std::vector<std::uint64_t> shape;
-  for (const int axis : file_axes(p)) shape.push_back(static_cast<std::uint64_t>(p.value.dim(axis)));
+  const std::span<const Dim> dims = p.value.shape().dims();
+  std::vector<std::uint64_t> shape(dims.begin(), dims.end());
+  if (p.layout == Layout::plain) return shape;
+  std::rotate(shape.begin(), shape.end() - 2, shape.end());  // [k..., in, out] -> [in, out, k...]
+  if (p.layout != Layout::conv_transpose) std::swap(shape[0], shape[1]);
   if (p.layout == Layout::pointwise) shape.insert(shape.end(), {1, 1});
   return shape;
 }
 
-// Calls f(memory offset, file offset) for every element, file offsets ascending.
+// Calls f(memory offset, file offset) for every element, file offsets ascending. Memory is [taps, in, out].
 template <class F>
 void for_each_element(const Parameter& p, F f) {
-  const Axes axes = file_axes(p);
-  std::array<Dim, kMaxRank> size{1, 1, 1, 1}, stride{};
-  for (std::size_t i = 0; i < axes.size(); ++i) {
-    size[i] = p.value.dim(axes[i]);
-    stride[i] = 1;
-    for (int j = axes[i] + 1; j < p.value.rank(); ++j) stride[i] *= p.value.dim(j);
-  }
+  const bool plain = p.layout == Layout::plain, input_first = p.layout == Layout::conv_transpose;
+  const int rank = p.value.rank();
+  const Dim in = plain ? 1 : p.value.dim(rank - 2), out = plain ? p.value.size() : p.value.dim(rank - 1);
+  const Dim taps = in * out == 0 ? 0 : p.value.size() / (in * out);
   Dim at = 0;
-  for (Dim a = 0; a < size[0]; ++a) {
-    for (Dim b = 0; b < size[1]; ++b) {
-      for (Dim c = 0; c < size[2]; ++c) {
-        for (Dim d = 0; d < size[3]; ++d) {
-          f(a * stride[0] + b * stride[1] + c * stride[2] + d * stride[3], at++);
-        }
-      }
+  for (Dim a = 0; a < (input_first ? in : out); ++a) {
+    for (Dim b = 0; b < (input_first ? out : in); ++b) {
+      const Dim i = input_first ? a : b, o = input_first ? b : a;
+      for (Dim k = 0; k < taps; ++k) f((k * in + i) * out + o, at++);
     }
   }
 }

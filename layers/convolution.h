@@ -13,44 +13,21 @@ struct ConvLayerOptions {
   Dim padding = 0;
 };
 
-/// What the four layers share: a weight [kernel..., in, out] and a bias [out].
+/// A weight [kernel..., in, out] and a bias [out].
+template <int kDimensions, bool kTransposed>
 class ConvLayer : public Module {
- protected:
-  ConvLayer(int dimensions, Dim in, Dim out, const ConvLayerOptions& options, Layout layout, Rng& rng);
-  ConvOptions options(real negative_slope) const {
-    return {.stride = options_.stride, .padding = options_.padding, .negative_slope = negative_slope};
-  }
+ public:
+  ConvLayer(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
+  Variable forward(const Variable& x, real negative_slope = kNoActivation) const;
 
+ private:
   ConvLayerOptions options_;
   Variable weight_, bias_;
 };
 
-/// x [N,L,in] -> [N, (L + 2 padding - kernel) / stride + 1, out]
-class Conv1d : public ConvLayer {
- public:
-  Conv1d(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
-  Variable forward(const Variable& x, real negative_slope = kNoActivation) const;
-};
-
-/// x [N,H,W,in] -> [N,H',W',out]
-class Conv2d : public ConvLayer {
- public:
-  Conv2d(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
-  Variable forward(const Variable& x, real negative_slope = kNoActivation) const;
-};
-
-/// x [N,L,in] -> [N, (L - 1) stride - 2 padding + kernel, out]
-class ConvTranspose1d : public ConvLayer {
- public:
-  ConvTranspose1d(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
-  Variable forward(const Variable& x, real negative_slope = kNoActivation) const;
-};
-
-/// x [N,H,W,in] -> [N,H',W',out]
-class ConvTranspose2d : public ConvLayer {
- public:
-  ConvTranspose2d(Dim in, Dim out, const ConvLayerOptions& options, Rng& rng);
-  Variable forward(const Variable& x, real negative_slope = kNoActivation) const;
-};
+using Conv1d = ConvLayer<1, false>;  ///< x [N,L,in] -> [N, (L + 2 padding - kernel) / stride + 1, out]
+using Conv2d = ConvLayer<2, false>;  ///< x [N,H,W,in] -> [N,H',W',out]
+using ConvTranspose1d = ConvLayer<1, true>;  ///< x [N,L,in] -> [N, (L - 1) stride - 2 padding + kernel, out]
+using ConvTranspose2d = ConvLayer<2, true>;  ///< x [N,H,W,in] -> [N,H',W',out]
 
 }  // namespace supertac

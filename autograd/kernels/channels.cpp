@@ -5,77 +5,51 @@
 #include "autograd/kernels/fast/loops.h"
 
 namespace supertac::kernels {
+namespace {
 
-void channel_mean(Dim images, Dim pixels, Dim channels, const real* from, real* __restrict mean) {
-  run_loop([=]() mutable SUPERTAC_LOOP {
-    for (Dim n = 0; n < images; ++n, mean += channels) {
-      std::fill_n(mean, channels, real(0));
-      for (Dim p = 0; p < pixels; ++p, from += channels) {
-        for (Dim c = 0; c < channels; ++c) mean[c] += from[c];
-      }
-      for (Dim c = 0; c < channels; ++c) mean[c] /= static_cast<real>(pixels);
-    }
-  });
-}
-
-void channel_mean_grad(Dim images, Dim pixels, Dim channels, const real* g, real* __restrict to) {
-  run_loop([=]() mutable SUPERTAC_LOOP {
-    for (Dim n = 0; n < images; ++n, g += channels) {
-      for (Dim p = 0; p < pixels; ++p, to += channels) {
-        for (Dim c = 0; c < channels; ++c) to[c] += g[c] / static_cast<real>(pixels);
+// Calls body(i, k) for each element i of [images, pixels, channels] and the k of its image and channel in
+// [images, channels].
+template <class Body>
+void each_element(Dim images, Dim pixels, Dim channels, Body body) {
+  run_loop([=]() SUPERTAC_LOOP {
+    for (Dim n = 0, pixel = 0; n < images; ++n) {
+      for (Dim p = 0; p < pixels; ++p, pixel += channels) {
+        SUPERTAC_INDEPENDENT
+        for (Dim c = 0; c < channels; ++c) body(pixel + c, n * channels + c);
       }
     }
   });
 }
 
-void gated_sum(Dim images, Dim pixels, Dim channels, const real* a, const real* from, const real* gate,
-               real* __restrict to) {
-  run_loop([=]() mutable SUPERTAC_LOOP {
-    for (Dim n = 0; n < images; ++n, gate += channels) {
-      for (Dim p = 0; p < pixels; ++p, a += channels, from += channels, to += channels) {
-        for (Dim c = 0; c < channels; ++c) to[c] = a[c] + from[c] * gate[c];
-      }
-    }
-  });
+}  // namespace
+
+void channel_mean(Dim images, Dim pixels, Dim channels, const real* x, real* mean) {
+  std::fill_n(mean, images * channels, real(0));
+  each_element(images, pixels, channels, [=](Dim i, Dim k) SUPERTAC_LOOP { mean[k] += x[i]; });
+  each(images * channels, [=](Dim k) SUPERTAC_LOOP { mean[k] /= static_cast<real>(pixels); });
 }
 
-static void scale_channels(Dim images, Dim pixels, Dim channels, const real* from, const real* gate,
-                           real* __restrict to) {
-  run_loop([=]() mutable SUPERTAC_LOOP {
-    for (Dim n = 0; n < images; ++n, gate += channels) {
-      for (Dim p = 0; p < pixels; ++p, from += channels, to += channels) {
-        for (Dim c = 0; c < channels; ++c) to[c] = from[c] * gate[c];
-      }
-    }
-  });
+void channel_mean_grad(Dim images, Dim pixels, Dim channels, const real* g, real* gx) {
+  each_element(images, pixels, channels,
+               [=](Dim i, Dim k) SUPERTAC_LOOP { gx[i] += g[k] / static_cast<real>(pixels); });
 }
 
-static void add_scaled_channels(Dim images, Dim pixels, Dim channels, const real* g, const real* gate,
-                                real* __restrict to) {
-  run_loop([=]() mutable SUPERTAC_LOOP {
-    for (Dim n = 0; n < images; ++n, gate += channels) {
-      for (Dim p = 0; p < pixels; ++p, g += channels, to += channels) {
-        for (Dim c = 0; c < channels; ++c) to[c] += g[c] * gate[c];
-      }
-    }
-  });
+void gated_sum(Dim images, Dim pixels, Dim channels, const real* a, const real* x, const real* gate,
+               real* y) {
+  each_element(images, pixels, channels, [=](Dim i, Dim k) SUPERTAC_LOOP { y[i] = a[i] + x[i] * gate[k]; });
 }
 
-void gated_sum_grad_x(Dim images, Dim pixels, Dim channels, const real* g, const real* gate, Into into,
-                      real* to) {
-  if (into == Into::add) return add_scaled_channels(images, pixels, channels, g, gate, to);
-  scale_channels(images, pixels, channels, g, gate, to);
+void gated_sum_grad_x(Dim images, Dim pixels, Dim channels, const real* gy, const real* gate, Into into,
+                      real* gx) {
+  if (into == Into::add) {
+    each_element(images, pixels, channels, [=](Dim i, Dim k) SUPERTAC_LOOP { gx[i] += gy[i] * gate[k]; });
+  } else {
+    each_element(images, pixels, channels, [=](Dim i, Dim k) SUPERTAC_LOOP { gx[i] = gy[i] * gate[k]; });
+  }
 }
 
-void gated_sum_grad_s(Dim images, Dim pixels, Dim channels, const real* g, const real* from,
-                      real* __restrict to) {
-  run_loop([=]() mutable SUPERTAC_LOOP {
-    for (Dim n = 0; n < images; ++n, to += channels) {
-      for (Dim p = 0; p < pixels; ++p, g += channels, from += channels) {
-        for (Dim c = 0; c < channels; ++c) to[c] += g[c] * from[c];
-      }
-    }
-  });
+void gated_sum_grad_s(Dim images, Dim pixels, Dim channels, const real* gy, const real* x, real* gs) {
+  each_element(images, pixels, channels, [=](Dim i, Dim k) SUPERTAC_LOOP { gs[k] += gy[i] * x[i]; });
 }
 
 }  // namespace supertac::kernels

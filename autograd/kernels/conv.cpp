@@ -1,107 +1,96 @@
 #include "autograd/kernels/conv.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "autograd/kernels/fast/conv.h"
 #include "autograd/kernels/fast/isa.h"
-#include "autograd/kernels/fast/narrow.h"
-#include "autograd/kernels/fast/winograd.h"
 
 namespace supertac::kernels {
+
+Dim ConvSettings::out_height() const {
+  return transposed ? (height - 1) * stride_h - 2 * padding_h + kernel_h
+                    : (height + 2 * padding_h - kernel_h) / stride_h + 1;
+}
+Dim ConvSettings::out_width() const {
+  return transposed ? (width - 1) * stride_w - 2 * padding_w + kernel_w
+                    : (width + 2 * padding_w - kernel_w) / stride_w + 1;
+}
+
 namespace {
 
-constexpr Dim kRowsPerPiece = 256;  // a sum over pixels runs over this many before it is added to the total
-
-// [taps][cin][cout] -> [taps][cout][cin], in strips of a cache line's width
-Tensor transposed_weights(const real* w, Dim taps, Dim cin, Dim cout) {
-  constexpr Dim kStrip = 16;
-  Tensor out(Shape{taps, cout, cin});
-  real* to = out.data();
-  for (Dim t = 0; t < taps; ++t, w += cin * cout, to += cin * cout) {
-    for (Dim first = 0; first < cout; first += kStrip) {
-      const Dim last = std::min(cout, first + kStrip);
-      for (Dim i = 0; i < cin; ++i) {
-        for (Dim o = first; o < last; ++o) to[o * cin + i] = w[i * cout + o];
+// Calls meet(tap, p, q) for each pixel p of x and q of y (numbered through the batch) that a tap joins.
+// A convolution strides over x: q = (row, column) meets p = (row stride + ky - padding, ...). A transposed
+// one strides over y: the same pairs with p and q exchanged, and that is all the difference there is.
+template <class Meet>
+void for_each_meeting(const ConvSizes& s, Meet meet) {
+  const ConvSettings& m = s.map;
+  const Dim fine_h = m.transposed ? m.out_height() : m.height;
+  const Dim fine_w = m.transposed ? m.out_width() : m.width;
+  const Dim coarse_h = m.transposed ? m.height : m.out_height();
+  const Dim coarse_w = m.transposed ? m.width : m.out_width();
+  for (Dim ky = 0; ky < m.kernel_h; ++ky) {
+    for (Dim kx = 0; kx < m.kernel_w; ++kx) {
+      for (Dim n = 0; n < s.images; ++n) {
+        for (Dim row = 0; row < coarse_h; ++row) {
+          for (Dim column = 0; column < coarse_w; ++column) {
+            const Dim y = row * m.stride_h + ky - m.padding_h, x = column * m.stride_w + kx - m.padding_w;
+            if (y < 0 || y >= fine_h || x < 0 || x >= fine_w) continue;  // in the padding
+            const Dim coarse = (n * coarse_h + row) * coarse_w + column, fine = (n * fine_h + y) * fine_w + x;
+            m.transposed ? meet(ky * m.kernel_w + kx, coarse, fine)
+                         : meet(ky * m.kernel_w + kx, fine, coarse);
+          }
+        }
       }
     }
   }
-  return out;
-}
-
-void gather_batch(const GatherJob& job, Dim images, Dim in_pixels, Dim out_pixels, const real* x, real* y) {
-  const auto gather = isa_kernels().gather;
-  for (Dim n = 0; n < images; ++n) gather(job, x + n * in_pixels * job.cin, y + n * out_pixels * job.cout);
 }
 
 }  // namespace
 
+// x [p, i], w [tap, i, o], bias [o], y [q, o]:   y[q, o] = f(bias[o] + sum of x[p, i] w[tap, i, o])
 void conv(const ConvSizes& s, const real* x, const real* w, const real* bias, real negative_slope, real* y) {
-  if (is_narrow(s)) return narrow_conv(s, x, w, bias, negative_slope, y);
-  if (is_winograd(s)) return winograd_conv(s, x, w, bias, negative_slope, y);
-  const GatherJob job{&s.geometry->forward, w, bias, s.cin, s.cout, Into::overwrite, negative_slope};
-  gather_batch(job, s.images, s.geometry->in_pixels, s.geometry->out_pixels, x, y);
+  if (!is_plain()) return fast::conv(s, x, w, bias, negative_slope, y);
+  const Dim pixels = s.images * s.out_pixels();
+  for (Dim q = 0; q < pixels; ++q) {
+    for (Dim o = 0; o < s.cout; ++o) y[q * s.cout + o] = bias != nullptr ? bias[o] : 0;
+  }
+  for_each_meeting(s, [&](Dim tap, Dim p, Dim q) {
+    for (Dim i = 0; i < s.cin; ++i) {
+      for (Dim o = 0; o < s.cout; ++o) {
+        real& sum = y[q * s.cout + o];
+        sum = std::fma(x[p * s.cin + i], w[(tap * s.cin + i) * s.cout + o], sum);  // rounds once, as in fast/
+      }
+    }
+  });
+  for (Dim i = 0; i < pixels * s.cout; ++i) y[i] = y[i] > 0 ? y[i] : negative_slope * y[i];
 }
 
+// gx [p, i] = or += sum of gy[q, o] w[tap, i, o]
 void conv_grad_x(const ConvSizes& s, const real* gy, const real* w, Into into, real* gx) {
-  if (is_narrow(s)) return narrow_grad_x(s, gy, w, into, gx);
-  if (is_winograd(s)) return winograd_grad_x(s, gy, w, into, gx);
-  const Tensor wt = transposed_weights(w, s.geometry->taps, s.cin, s.cout);
-  const GatherJob job{&s.geometry->backward, wt.data(), nullptr, s.cout, s.cin, into, 1};
-  gather_batch(job, s.images, s.geometry->out_pixels, s.geometry->in_pixels, gy, gx);
+  if (!is_plain()) return fast::conv_grad_x(s, gy, w, into, gx);
+  if (into == Into::overwrite) std::fill_n(gx, s.images * s.in_pixels() * s.cin, real(0));
+  for_each_meeting(s, [&](Dim tap, Dim p, Dim q) {
+    for (Dim i = 0; i < s.cin; ++i) {
+      for (Dim o = 0; o < s.cout; ++o) {
+        real& sum = gx[p * s.cin + i];
+        sum = std::fma(gy[q * s.cout + o], w[(tap * s.cin + i) * s.cout + o], sum);
+      }
+    }
+  });
 }
 
-// A chunk of images passes all taps before the next one, while it is in the cache.
+// gw [tap, i, o] += sum of x[p, i] gy[q, o]
 void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, real* gw) {
-  if (is_narrow(s)) return narrow_grad_w(s, x, gy, gw);
-  if (is_winograd(s)) return winograd_grad_w(s, x, gy, gw);
-  const auto outer = isa_kernels().outer;
-  const Geometry& g = *s.geometry;
-  const Dim chunk = std::max<Dim>(1, kRowsPerPiece / g.out_pixels);
-  for (Dim n = 0; n < s.images; n += chunk) {
-    OuterJob job{nullptr,
-                 x + n * g.in_pixels * s.cin,
-                 gy + n * g.out_pixels * s.cout,
-                 gw,
-                 std::min(chunk, s.images - n),
-                 g.in_pixels,
-                 g.out_pixels,
-                 s.cin,
-                 s.cout};
-    for (const TapPairs& pairs : g.pairs) {
-      job.pairs = &pairs;
-      outer(job);
-      job.gw += s.cin * s.cout;
+  if (!is_plain()) return fast::conv_grad_w(s, x, gy, gw);
+  for_each_meeting(s, [&](Dim tap, Dim p, Dim q) {
+    for (Dim i = 0; i < s.cin; ++i) {
+      for (Dim o = 0; o < s.cout; ++o) {
+        real& sum = gw[(tap * s.cin + i) * s.cout + o];
+        sum = std::fma(x[p * s.cin + i], gy[q * s.cout + o], sum);
+      }
     }
-  }
-}
-
-void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
-            real* y) {
-  isa_kernels().gather_rows({nullptr, w, bias, cin, cout, Into::overwrite, negative_slope}, x, y, rows);
-}
-
-void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx) {
-  const Tensor wt = transposed_weights(w, 1, cin, cout);
-  isa_kernels().gather_rows({nullptr, wt.data(), nullptr, cout, cin, into, 1}, gy, gx, rows);
-}
-
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, real* gw) {
-  static const TapPairs kOnePixel{{0}, {0}};
-  const auto outer = isa_kernels().outer;
-  for (Dim n = 0; n < rows; n += kRowsPerPiece) {
-    outer({&kOnePixel, x + n * cin, gy + n * cout, gw, std::min(kRowsPerPiece, rows - n), 1, 1, cin, cout});
-  }
-}
-
-void bias_grad(Dim rows, Dim cout, const real* gy, real* gb) {
-  Tensor piece(Shape{cout});
-  for (Dim first = 0; first < rows; first += kRowsPerPiece) {
-    piece.fill(0);
-    const Dim last = std::min(rows, first + kRowsPerPiece);
-    for (Dim row = first; row < last; ++row) {
-      for (Dim c = 0; c < cout; ++c) piece.data()[c] += gy[row * cout + c];
-    }
-    for (Dim c = 0; c < cout; ++c) gb[c] += piece.data()[c];
-  }
+  });
 }
 
 }  // namespace supertac::kernels

@@ -1,31 +1,45 @@
-// Convolution of any kind over a batch, callable without a graph. Channels-last: x [N, pixels, cin].
+// Convolution and transposed convolution over a batch, with both gradients, callable without a graph.
+// Everything is channels-last: the channels of one pixel lie side by side.
 #pragma once
 
-#include "autograd/kernels/fast/geometry.h"
+#include <compare>
+
+#include "autograd/tensor.h"
 
 namespace supertac::kernels {
 
-struct ConvSizes {
-  const Geometry* geometry;
-  Dim images, cin, cout;
+/// Two-dimensional; a 1-D convolution has height 1, kernel_h 1, padding_h 0, stride_h 1.
+struct ConvSettings {
+  Dim height = 1, width = 1;
+  Dim kernel_h = 1, kernel_w = 1;
+  Dim stride_h = 1, stride_w = 1;
+  Dim padding_h = 0, padding_w = 0;
+  bool transposed = false;
+  auto operator<=>(const ConvSettings&) const = default;
+
+  /// conv: (size + 2 padding - kernel) / stride + 1;  transposed: (size - 1) stride - 2 padding + kernel
+  Dim out_height() const;
+  Dim out_width() const;
+  Dim taps() const { return kernel_h * kernel_w; }
 };
 
-/// y [N, out_pixels, cout] = f(bias + sum over taps of x [N, in_pixels, cin] * w [taps, cin, cout]); bias may
-/// be null; f(s) = s for s > 0, else negative_slope * s.
+struct ConvSizes {
+  ConvSettings map;
+  Dim images = 0, cin = 0, cout = 0;
+  Dim in_pixels() const { return map.height * map.width; }
+  Dim out_pixels() const { return map.out_height() * map.out_width(); }
+};
+
+/// The largest number of channels, of x or y.
+inline constexpr Dim kMaxChannels = 4096;
+
+/// y [images, out_pixels, cout] = f(bias + sum over taps of x [images, in_pixels, cin] * w [taps, cin,
+/// cout]); bias may be null; f(s) = s for s > 0, else negative_slope * s.
 void conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias, real negative_slope,
           real* y);
 /// gx = or += the transpose of conv (without f) applied to gy.
 void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into into, real* gx);
-/// gw [taps, cin, cout] += x^T gy over all pixels; partial sums over fixed groups of images, added in order.
+/// gw [taps, cin, cout] += x^T gy over all pixels.
 void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, real* gw);
-
-/// y [rows, cout] = f(bias + x [rows, cin] * w [cin, cout]), and its gradients.
-void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
-            real* y);
-void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx);
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, real* gw);
-
-/// gb [cout] += the sum of gy [rows, cout] over rows.
-void bias_grad(Dim rows, Dim cout, const real* gy, real* gb);
 
 }  // namespace supertac::kernels

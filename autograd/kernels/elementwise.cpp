@@ -4,74 +4,60 @@
 
 #include "autograd/kernels/exp.h"
 #include "autograd/kernels/fast/loops.h"
-#include "autograd/kernels/sums.h"
+#include "autograd/kernels/fast/sums.h"
 
 namespace supertac::kernels {
 
-void leaky_relu(Dim n, real slope, const real* x, real* __restrict y) {
-  run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) y[i] = x[i] > 0 ? x[i] : slope * x[i];
-  });
+void leaky_relu(Dim n, real slope, const real* x, real* y) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { y[i] = x[i] > 0 ? x[i] : slope * x[i]; });
 }
 
-void leaky_relu_grad(Dim n, real slope, const real* gy, const real* y, real* __restrict gx) {
-  run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) gx[i] += y[i] > 0 ? gy[i] : slope * gy[i];
-  });
+void leaky_relu_grad(Dim n, real slope, const real* gy, const real* y, real* gx) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { gx[i] += y[i] > 0 ? gy[i] : slope * gy[i]; });
 }
 
-void rectify_in_place(Dim n, real slope, const real* y, real* __restrict g) {
-  run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) g[i] = y[i] > 0 ? g[i] : slope * g[i];
-  });
+void rectify_in_place(Dim n, real slope, const real* y, real* g) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { g[i] = y[i] > 0 ? g[i] : slope * g[i]; });
 }
 
-void sigmoid(Dim n, const real* x, real* __restrict y) {
-  run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) y[i] = sigmoid_same_bits(x[i]);
-  });
+void sigmoid(Dim n, const real* x, real* y) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { y[i] = sigmoid_same_bits(x[i]); });
 }
 
-void sigmoid_grad(Dim n, const real* gy, const real* y, real* __restrict gx) {
-  run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) gx[i] += gy[i] * y[i] * (1 - y[i]);
-  });
+void sigmoid_grad(Dim n, const real* gy, const real* y, real* gx) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { gx[i] += gy[i] * y[i] * (1 - y[i]); });
 }
 
-void clamp(Dim n, real low, real high, const real* x, real* __restrict y) {
-  run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) y[i] = x[i] < low ? low : (x[i] > high ? high : x[i]);
-  });
+void clamp(Dim n, real low, real high, const real* x, real* y) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { y[i] = x[i] < low ? low : (x[i] > high ? high : x[i]); });
 }
 
-void clamp_grad(Dim n, real low, real high, const real* gy, const real* x, real* __restrict gx) {
-  run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) gx[i] += x[i] >= low && x[i] <= high ? gy[i] : 0;
-  });
+void clamp_grad(Dim n, real low, real high, const real* gy, const real* x, real* gx) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { gx[i] += x[i] >= low && x[i] <= high ? gy[i] : 0; });
 }
 
-void add(Dim n, const real* a, const real* b, real* __restrict y) {
-  run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) y[i] = a[i] + b[i];
-  });
+void sample_gaussian(Dim n, const real* mean, const real* log_var, const real* eps, real* z) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { z[i] = mean[i] + exp_same_bits(log_var[i] / 2) * eps[i]; });
 }
 
-void multiply(Dim n, const real* a, const real* b, real* __restrict y) {
-  run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) y[i] = a[i] * b[i];
-  });
+void sample_gaussian_grad_log_var(Dim n, const real* gz, const real* z, const real* mean, real* g) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { g[i] += gz[i] * (z[i] - mean[i]) / 2; });
 }
 
-void scale(Dim n, real factor, const real* x, real* __restrict y) {
-  run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) y[i] = factor * x[i];
-  });
+void add(Dim n, const real* a, const real* b, real* y) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { y[i] = a[i] + b[i]; });
 }
 
-void add_scaled(Dim n, real factor, const real* x, real* __restrict y) {
-  run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) y[i] += factor * x[i];
-  });
+void multiply(Dim n, const real* a, const real* b, real* y) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { y[i] = a[i] * b[i]; });
+}
+
+void scale(Dim n, real factor, const real* x, real* y) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { y[i] = factor * x[i]; });
+}
+
+void add_scaled(Dim n, real factor, const real* x, real* y) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { y[i] += factor * x[i]; });
 }
 
 void put(Dim n, const real* x, Into into, real* y) {
@@ -79,10 +65,12 @@ void put(Dim n, const real* x, Into into, real* y) {
   std::copy_n(x, n, y);
 }
 
-void add_product(Dim n, const real* a, const real* b, real* __restrict y) {
-  run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) y[i] += a[i] * b[i];
-  });
+void add_constant(Dim n, real x, real* y) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { y[i] += x; });
+}
+
+void add_product(Dim n, const real* a, const real* b, real* y) {
+  each(n, [=](Dim i) SUPERTAC_LOOP { y[i] += a[i] * b[i]; });
 }
 
 double sum(Dim n, const real* x) {

@@ -19,11 +19,17 @@ void sigmoid_grad(Dim n, const real* gy, const real* y, real* gx);
 void clamp(Dim n, real low, real high, const real* x, real* y);
 void clamp_grad(Dim n, real low, real high, const real* gy, const real* x, real* gx);
 
+/// z = mean + e^(log_var / 2) eps;  glog_var += gz (z - mean) / 2, which is half of e^(log_var / 2) eps
+void sample_gaussian(Dim n, const real* mean, const real* log_var, const real* eps, real* z);
+void sample_gaussian_grad_log_var(Dim n, const real* gz, const real* z, const real* mean, real* glog_var);
+
 void add(Dim n, const real* a, const real* b, real* y);
 void multiply(Dim n, const real* a, const real* b, real* y);
 void scale(Dim n, real factor, const real* x, real* y);
 /// y += factor * x
 void add_scaled(Dim n, real factor, const real* x, real* y);
+/// y += x, the same number everywhere
+void add_constant(Dim n, real x, real* y);
 /// y = or += x
 void put(Dim n, const real* x, Into into, real* y);
 /// y += a * b

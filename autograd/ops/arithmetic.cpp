@@ -33,6 +33,7 @@ Variable multiply(const Variable& a, const Variable& b) {
   });
 }
 
+// gx = factor gy
 Variable scale(const Variable& x, real factor) {
   Tensor y(x.shape());
   kernels::scale(y.size(), factor, x.value().data(), y.data());
@@ -41,13 +42,11 @@ Variable scale(const Variable& x, real factor) {
   });
 }
 
+// gx = gy, everywhere
 Variable sum(const Variable& x) {
   const auto total = static_cast<real>(kernels::sum(x.size(), x.value().data()));
   return record("sum", Tensor::full({}, total), {&x}, [](Backward& b) {
-    if (Tensor* gx = b.grad_of(0)) {
-      const real gy = b.gy().item();
-      for (real& g : gx->values()) g += gy;
-    }
+    if (Tensor* gx = b.grad_of(0)) kernels::add_constant(gx->size(), b.gy().item(), gx->data());
   });
 }
 

@@ -2,7 +2,7 @@
 
 #include "autograd/checks.h"
 #include "autograd/kernels/conv.h"
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/linear.h"
 
 namespace supertac {
 namespace {
@@ -64,8 +64,7 @@ Variable convolve(const char* op, const Variable& x, const Variable& w, const Va
     refuse(op, "the output would be empty (x " + x.shape().text() + ", weight " + w.shape().text() +
                    ", stride " + std::to_string(o.stride) + ", padding " + std::to_string(o.padding) + ")");
   }
-  const kernels::Geometry& geometry = kernels::geometry_of(s);
-  const ConvSizes sizes{&geometry, x.dim(0), w.dim(rank - 2), w.dim(rank - 1)};
+  const ConvSizes sizes{s, x.dim(0), w.dim(rank - 2), w.dim(rank - 1)};
   Tensor y(rank == 3 ? Shape{x.dim(0), s.out_width(), sizes.cout}
                      : Shape{x.dim(0), s.out_height(), s.out_width(), sizes.cout});
   kernels::conv(sizes, x.value().data(), w.value().data(), b.value().data(), o.negative_slope, y.data());
@@ -76,7 +75,7 @@ Variable convolve(const char* op, const Variable& x, const Variable& w, const Va
     }
     if (Tensor* gw = g.grad_of(1)) kernels::conv_grad_w(sizes, g.value(0).data(), gs, gw->data());
     if (Tensor* gb = g.grad_of(2)) {
-      kernels::bias_grad(sizes.images * sizes.geometry->out_pixels, sizes.cout, gs, gb->data());
+      kernels::bias_grad(sizes.images * sizes.out_pixels(), sizes.cout, gs, gb->data());
     }
   });
 }

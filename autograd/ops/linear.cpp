@@ -1,7 +1,7 @@
 #include "autograd/ops/linear.h"
 
 #include "autograd/checks.h"
-#include "autograd/kernels/conv.h"
+#include "autograd/kernels/linear.h"
 
 namespace supertac {
 

@@ -1,43 +1,26 @@
 #include "autograd/ops/losses.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "autograd/checks.h"
-#include "autograd/kernels/exp.h"
-#include "autograd/kernels/fast/loops.h"
+#include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/losses.h"
 #include "autograd/kernels/ssim.h"
-#include "autograd/kernels/sums.h"
 
 namespace supertac {
-namespace {
-
-// g += factor (a - b)
-void add_scaled_difference(Dim n, real factor, const real* a, const real* b, real* __restrict g) {
-  kernels::run_loop([=]() SUPERTAC_LOOP {
-    for (Dim i = 0; i < n; ++i) g[i] += factor * (a[i] - b[i]);
-  });
-}
-
-}  // namespace
 
 // gx = 2 g (x - target) / n,  gtarget = -gx
 Variable l2_loss(const Variable& x, const Variable& target) {
   check_same_shape("l2_loss", "x", x, "target", target);
   const Dim n = x.size();
   if (n == 0) refuse("l2_loss", "x is empty: " + x.shape().text());
-  const real *a = x.value().data(), *t = target.value().data();
-  const double total = kernels::sum_lanes(n, [=](Dim i) {
-    const double d = static_cast<double>(a[i]) - static_cast<double>(t[i]);
-    return d * d;
-  });
+  const double total = kernels::squared_distance(n, x.value().data(), target.value().data());
   const auto value = static_cast<real>(total / static_cast<double>(n));
   return record("l2_loss", Tensor::full({}, value), {&x, &target}, [n](Backward& b) {
     const real g = 2 * b.gy().item() / static_cast<real>(n);
     const real *from = b.value(0).data(), *to = b.value(1).data();
-    Tensor *gx = b.grad_of(0), *gt = b.grad_of(1);
-    if (gx) add_scaled_difference(n, g, from, to, gx->data());
-    if (gt) add_scaled_difference(n, g, to, from, gt->data());
+    if (Tensor* gx = b.grad_of(0)) kernels::add_scaled_difference(n, g, from, to, gx->data());
+    if (Tensor* gt = b.grad_of(1)) kernels::add_scaled_difference(n, g, to, from, gt->data());
   });
 }
 
@@ -75,22 +58,13 @@ Variable softmax_cross_entropy(const Variable& logits, std::span<const std::int3
       refuse("softmax_cross_entropy", "label " + std::to_string(label) + " of row " + std::to_string(n) +
                                           " is not in [0," + std::to_string(classes) + ")");
     }
-    const real* row = logits.value().data() + n * classes;
-    real* p = gradient.data() + n * classes;
-    const real largest = *std::max_element(row, row + classes);
-    double norm = 0;
-    for (Dim k = 0; k < classes; ++k)
-      norm += static_cast<double>(p[k] = kernels::exp_same_bits(row[k] - largest));
-    for (Dim k = 0; k < classes; ++k) p[k] = static_cast<real>(static_cast<double>(p[k]) / norm);
-    total += std::log(norm) - static_cast<double>(row[label] - largest);
-    p[label] -= 1;
+    total += kernels::cross_entropy(classes, logits.value().data() + n * classes, label,
+                                    gradient.data() + n * classes);
   }
   const auto value = static_cast<real>(total / static_cast<double>(rows));
   return record("softmax_cross_entropy", Tensor::full({}, value), {&logits}, [gradient, rows](Backward& b) {
-    if (Tensor* gx = b.grad_of(0)) {
-      const real g = b.gy().item() / static_cast<real>(rows);
-      for (Dim i = 0; i < gx->size(); ++i) gx->data()[i] += g * gradient.data()[i];
-    }
+    const real g = b.gy().item() / static_cast<real>(rows);
+    if (Tensor* gx = b.grad_of(0)) kernels::add_scaled(gx->size(), g, gradient.data(), gx->data());
   });
 }
 

@@ -1,10 +1,10 @@
 #include "autograd/ops/shaping.h"
 
-#include <algorithm>
 #include <array>
 
 #include "autograd/checks.h"
 #include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/shaping.h"
 
 namespace supertac {
 namespace {
@@ -16,38 +16,13 @@ Shape with_last(const Shape& shape, Dim last) {
   return Shape(std::span<const Dim>(dims.data(), static_cast<std::size_t>(shape.rank())));
 }
 
-// to[r, to_at + i] (+)= from[r, from_at + i] for every row r and i < length
-struct Columns {
-  Dim width, at;
-};
-void copy_columns(Dim rows, Dim length, const real* from, Columns f, real* to, Columns t) {
-  for (Dim r = 0; r < rows; ++r) std::copy_n(from + r * f.width + f.at, length, to + r * t.width + t.at);
-}
-void add_columns(Dim rows, Dim length, const real* from, Columns f, real* to, Columns t) {
-  for (Dim r = 0; r < rows; ++r) {
-    for (Dim i = 0; i < length; ++i) to[r * t.width + t.at + i] += from[r * f.width + f.at + i];
-  }
-}
-
-// to[n, j, i] = or += from[n, i, j]
-void transpose(Dim images, Dim rows, Dim columns, const real* from, Into into, real* to) {
-  for (Dim n = 0; n < images; ++n, from += rows * columns, to += rows * columns) {
-    for (Dim i = 0; i < rows; ++i) {
-      for (Dim j = 0; j < columns; ++j) {
-        real& element = to[j * rows + i];
-        element = from[i * columns + j] + (into == Into::add ? element : 0);
-      }
-    }
-  }
-}
-
 Variable transpose_inner(const char* op, const Variable& x, Dim images, Dim rows, Dim columns,
                          const Shape& shape) {
   Tensor y(shape);
-  transpose(images, rows, columns, x.value().data(), Into::overwrite, y.data());
+  kernels::transpose(images, rows, columns, x.value().data(), Into::overwrite, y.data());
   return record(op, y, {&x}, [=](Backward& b) {
     if (const Backward::Slot gx = b.slot_of(0)) {
-      transpose(images, columns, rows, b.gy().data(), gx.into, gx.data());
+      kernels::transpose(images, columns, rows, b.gy().data(), gx.into, gx.data());
     }
   });
 }
@@ -79,21 +54,22 @@ Variable concat(std::span<const Variable> xs) {
   Dim at = 0;
   for (const Variable& x : xs) {
     const Dim last = x.dim(x.rank() - 1);
-    copy_columns(rows, last, x.value().data(), {last, 0}, y.data(), {width, at});
+    kernels::move_columns(rows, last, x.value().data(), {last, 0}, Into::overwrite, y.data(), {width, at});
     at += last;
   }
-  return record("concat", y, std::span<const Variable* const>(inputs.data(), xs.size()),
-                [rows, width, count = xs.size()](Backward& b) {
-                  Dim from = 0;
-                  for (std::size_t i = 0; i < count; ++i) {
-                    const Shape& shape = b.value(i).shape();
-                    const Dim last = shape[shape.rank() - 1];
-                    if (Tensor* gx = b.grad_of(i)) {
-                      add_columns(rows, last, b.gy().data(), {width, from}, gx->data(), {last, 0});
-                    }
-                    from += last;
-                  }
-                });
+  return record(
+      "concat", y, std::span<const Variable* const>(inputs.data(), xs.size()),
+      [rows, width, count = xs.size()](Backward& b) {
+        Dim from = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+          const Shape& shape = b.value(i).shape();
+          const Dim last = shape[shape.rank() - 1];
+          if (Tensor* gx = b.grad_of(i)) {
+            kernels::move_columns(rows, last, b.gy().data(), {width, from}, Into::add, gx->data(), {last, 0});
+          }
+          from += last;
+        }
+      });
 }
 
 Variable slice(const Variable& x, Dim begin, Dim length) {
@@ -105,10 +81,11 @@ Variable slice(const Variable& x, Dim begin, Dim length) {
   }
   const Dim rows = x.size() / width;
   Tensor y(with_last(x.shape(), length));
-  copy_columns(rows, length, x.value().data(), {width, begin}, y.data(), {length, 0});
+  kernels::move_columns(rows, length, x.value().data(), {width, begin}, Into::overwrite, y.data(),
+                        {length, 0});
   return record("slice", y, {&x}, [=](Backward& b) {
     if (Tensor* gx = b.grad_of(0)) {
-      add_columns(rows, length, b.gy().data(), {length, 0}, gx->data(), {width, begin});
+      kernels::move_columns(rows, length, b.gy().data(), {length, 0}, Into::add, gx->data(), {width, begin});
     }
   });
 }

@@ -1,12 +1,10 @@
 #include "autograd/ops/vae.h"
 
 #include "autograd/checks.h"
-#include "autograd/kernels/exp.h"
-#include "autograd/kernels/sums.h"
+#include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/losses.h"
 
 namespace supertac {
-
-using kernels::exp_same_bits;
 
 // gmean = gz     glog_var = gz (z - mean) / 2
 Variable sample_gaussian(const Variable& mean, const Variable& log_var, const Tensor& eps) {
@@ -16,14 +14,13 @@ Variable sample_gaussian(const Variable& mean, const Variable& log_var, const Te
     refuse("sample_gaussian", "eps expects " + mean.shape().text() + ", got " + eps.shape().text());
   }
   Tensor z(mean.shape());
-  const real *m = mean.value().data(), *lv = log_var.value().data();
-  for (Dim i = 0; i < z.size(); ++i) z.data()[i] = m[i] + exp_same_bits(lv[i] / 2) * eps.data()[i];
+  kernels::sample_gaussian(z.size(), mean.value().data(), log_var.value().data(), eps.data(), z.data());
   return record("sample_gaussian", z, {&mean, &log_var}, [](Backward& b) {
-    const real *gz = b.gy().data(), *sample = b.y().data(), *center = b.value(0).data();
-    Tensor *gm = b.grad_of(0), *gl = b.grad_of(1);
-    for (Dim i = 0; i < b.gy().size(); ++i) {
-      if (gm) gm->data()[i] += gz[i];
-      if (gl) gl->data()[i] += gz[i] * (sample[i] - center[i]) / 2;
+    const Dim n = b.gy().size();
+    const real* gz = b.gy().data();
+    if (Tensor* g = b.grad_of(0)) kernels::add_scaled(n, 1, gz, g->data());
+    if (Tensor* g = b.grad_of(1)) {
+      kernels::sample_gaussian_grad_log_var(n, gz, b.y().data(), b.value(0).data(), g->data());
     }
   });
 }
@@ -32,21 +29,15 @@ Variable sample_gaussian(const Variable& mean, const Variable& log_var, const Te
 Variable kl_divergence(const Variable& mean, const Variable& log_var) {
   check_rank("kl_divergence", "mean", mean, 2);
   check_same_shape("kl_divergence", "mean", mean, "log_var", log_var);
-  const Dim n = mean.dim(0);
-  if (n == 0) refuse("kl_divergence", "mean is empty: " + mean.shape().text());
-  const real *m = mean.value().data(), *lv = log_var.value().data();
-  const double total = kernels::sum_lanes(mean.size(), [=](Dim i) {
-    return static_cast<double>(1 + lv[i] - m[i] * m[i] - exp_same_bits(lv[i]));
-  });
-  const auto value = static_cast<real>(-0.5 * total / static_cast<double>(n));
-  return record("kl_divergence", Tensor::full({}, value), {&mean, &log_var}, [n](Backward& b) {
-    const real g = b.gy().item() / static_cast<real>(n);
-    const real *center = b.value(0).data(), *spread = b.value(1).data();
-    Tensor *gm = b.grad_of(0), *gl = b.grad_of(1);
-    for (Dim i = 0; i < b.value(0).size(); ++i) {
-      if (gm) gm->data()[i] += g * center[i];
-      if (gl) gl->data()[i] += g * (exp_same_bits(spread[i]) - 1) / 2;
-    }
+  const Dim rows = mean.dim(0);
+  if (rows == 0) refuse("kl_divergence", "mean is empty: " + mean.shape().text());
+  const double total = kernels::kl_terms(mean.size(), mean.value().data(), log_var.value().data());
+  const auto value = static_cast<real>(-0.5 * total / static_cast<double>(rows));
+  return record("kl_divergence", Tensor::full({}, value), {&mean, &log_var}, [rows](Backward& b) {
+    const real each = b.gy().item() / static_cast<real>(rows);
+    const Dim n = b.value(0).size();
+    if (Tensor* g = b.grad_of(0)) kernels::add_scaled(n, each, b.value(0).data(), g->data());
+    if (Tensor* g = b.grad_of(1)) kernels::kl_grad_log_var(n, each, b.value(1).data(), g->data());
   });
 }
 

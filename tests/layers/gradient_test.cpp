@@ -22,7 +22,9 @@ void expect_right_gradients(const Layer& layer, const Shape& shape) {
   const Variable x(noise(shape), true);
   std::vector<Variable> leaves = values_of(layer.parameters());
   leaves.push_back(x);
-  const GradientReport report = check_gradients([&] { return layer.forward(x); }, leaves);
+  std::vector<std::string> names = names_of(layer.parameters());
+  names.push_back("x");
+  const GradientReport report = check_gradients([&] { return layer.forward(x); }, leaves, {.names = names});
   EXPECT_LE(report.max_relative_error, 1e-6) << report.text();
   EXPECT_GT(report.entries, x.size() < 200 ? x.size() : 200);
 }
@@ -60,6 +62,25 @@ TEST(LayerGradients, Rcab) {
 TEST(LayerGradients, Rirb) {
   Rng rng(8);
   expect_right_gradients(Rirb({.channels = 8, .reduction = 4, .blocks = 2}, rng), {1, 3, 4, 8});
+}
+
+// The parameter's name as in a checkpoint, its indices as in memory: [kernel..., in, out].
+TEST(LayerGradients, AReportNamesTheParameterAndItsElement) {
+  Rng rng(9);
+  const Rcab layer(8, 4, rng);
+  const Variable x(noise({1, 3, 4, 8}), true);
+  const Variable weight = layer.parameters()[2].value;
+  const auto f = [&] {  // a node that spoils one entry of the gradient on its way back
+    const Variable spoiled = record("spoil", weight.value(), {&weight}, [](Backward& b) {
+      Tensor* g = b.grad_of(0);
+      for (Dim i = 0; i < g->size(); ++i) g->data()[i] += (i == 329 ? 2 : 1) * b.gy().data()[i];
+    });
+    return conv2d(x, spoiled, layer.parameters()[3].value, {.padding = 1});
+  };
+  const GradientReport report =
+      check_gradients(f, values_of(layer.parameters()),
+                      {.max_entries_per_input = 576, .names = names_of(layer.parameters())});
+  EXPECT_EQ(report.text().find("conv.1.weight [1,2,1,1]: analytic "), 0U) << report.text();
 }
 
 }  // namespace

@@ -36,7 +36,8 @@ void expect_right_gradients(const SuperTacSettings& settings) {
     return supertac_loss(model.forward(windows, eps), truth, {.a = 0.5, .beta = 0.01, .lambda = 0.3}).total;
   };
   const GradientReport report =
-      check_gradients(loss, values_of(model.parameters()), {.max_entries_per_input = 4});
+      check_gradients(loss, values_of(model.parameters()),
+                      {.max_entries_per_input = 4, .names = names_of(model.parameters())});
   EXPECT_LE(report.max_relative_error, 1e-6) << report.text();
   EXPECT_GT(report.entries, 300);
 }
@@ -85,7 +86,8 @@ TEST(FrameModelGradient, ThroughEveryLayer) {
     return add(l2_loss(picture, Variable(truth)), scale(ssim(picture, truth), -0.3));
   };
   const GradientReport report =
-      check_gradients(loss, values_of(model.parameters()), {.max_entries_per_input = 4});
+      check_gradients(loss, values_of(model.parameters()),
+                      {.max_entries_per_input = 4, .names = names_of(model.parameters())});
   EXPECT_LE(report.max_relative_error, 1e-6) << report.text();
 }
 

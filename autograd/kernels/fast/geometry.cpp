@@ -8,15 +8,6 @@
 
 namespace supertac::kernels {
 
-Dim ConvSettings::out_height() const {
-  return transposed ? (height - 1) * stride_h - 2 * padding_h + kernel_h
-                    : (height + 2 * padding_h - kernel_h) / stride_h + 1;
-}
-Dim ConvSettings::out_width() const {
-  return transposed ? (width - 1) * stride_w - 2 * padding_w + kernel_w
-                    : (width + 2 * padding_w - kernel_w) / stride_w + 1;
-}
-
 namespace {
 
 struct Pair {

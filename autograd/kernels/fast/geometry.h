@@ -8,24 +8,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "autograd/tensor.h"
+#include "autograd/kernels/conv.h"
 
 namespace supertac::kernels {
-
-/// Two-dimensional; a 1-D convolution has height 1, kernel_h 1, padding_h 0, stride_h 1.
-struct ConvSettings {
-  Dim height = 1, width = 1;
-  Dim kernel_h = 1, kernel_w = 1;
-  Dim stride_h = 1, stride_w = 1;
-  Dim padding_h = 0, padding_w = 0;
-  bool transposed = false;
-  auto operator<=>(const ConvSettings&) const = default;
-
-  /// conv: (size + 2 padding - kernel) / stride + 1;  transposed: (size - 1) stride - 2 padding + kernel
-  Dim out_height() const;
-  Dim out_width() const;
-  Dim taps() const { return kernel_h * kernel_w; }
-};
 
 /// Outputs that use the same taps. A convolution has one phase; a transposed one with stride s has s*s.
 struct Phase {
@@ -50,6 +35,12 @@ struct Geometry {
   /// of 4x4 pixels:
   std::vector<std::int32_t> squares;  // [tiles][4][4]: their pixels
   std::vector<std::int32_t> patches;  // [tiles][6][6]: the pixels they depend on, or -1 in the padding
+};
+
+/// A convolution whose table has been looked up.
+struct ConvTask {
+  const Geometry* geometry;
+  Dim images, cin, cout;
 };
 
 /// The table of these settings, built at first use and kept. Any thread may call it.

@@ -6,40 +6,51 @@
 #include <string>
 
 namespace supertac::kernels {
+
+const IsaKernels kPlainKernels{"plain"};
+
 namespace {
 
-const IsaKernels& portable() {
-  return __builtin_cpu_supports("fma") ? kPortableFmaKernels : kPortableKernels;
+struct Set {
+  const IsaKernels* kernels;
+  bool runs_here;
+};
+
+// The best first.
+std::vector<Set> all_sets() {
+  const bool fma = __builtin_cpu_supports("fma");
+  [[maybe_unused]] const bool avx2 = fma && __builtin_cpu_supports("avx2");
+  return {
+#ifndef SUPERTAC_REAL_IS_DOUBLE
+      {&kAvx512Kernels, avx2 && __builtin_cpu_supports("avx512f")},
+      {&kAvx2Kernels, avx2},
+#endif
+      {&kPortableFmaKernels, fma},
+      {&kPortableKernels, true},
+      {&kPlainKernels, true}};
 }
 
-#ifdef SUPERTAC_REAL_IS_DOUBLE
-
-const IsaKernels& choose() { return portable(); }
-
-#else
-
-bool has_avx2() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
-bool has_avx512() { return has_avx2() && __builtin_cpu_supports("avx512f"); }
-
 [[noreturn]] void refuse(const std::string& wanted, const std::string& why) {
-  throw std::runtime_error("SUPERTAC_ISA=" + wanted + ": " + why +
-                           "; use avx512, avx2 or portable, or unset it to let the program choose");
+  std::string names;
+  for (const Set& set : all_sets()) {
+    if (set.kernels != &kPortableFmaKernels) names += std::string(set.kernels->name) + ", ";
+  }
+  throw std::runtime_error("SUPERTAC_ISA=" + wanted + ": " + why + "; use one of " + names +
+                           "or unset it to let the program choose");
 }
 
 const IsaKernels& choose() {
-  const char* setting = std::getenv("SUPERTAC_ISA");
+  // The double build has few sets; a setting that is meant for the programs would stop it.
+  const char* setting = sizeof(real) == sizeof(double) ? nullptr : std::getenv("SUPERTAC_ISA");
   const std::string wanted = setting == nullptr ? "" : setting;
-  if (wanted.empty()) return has_avx512() ? kAvx512Kernels : has_avx2() ? kAvx2Kernels : portable();
-  if (wanted == "portable") return portable();
-  if (wanted == "avx2")
-    return has_avx2() ? kAvx2Kernels : (refuse(wanted, "this processor has no AVX2"), portable());
-  if (wanted == "avx512") {
-    return has_avx512() ? kAvx512Kernels : (refuse(wanted, "this processor has no AVX-512"), portable());
+  bool known = false;
+  for (const Set& set : all_sets()) {
+    if (!wanted.empty() && set.kernels->name != wanted) continue;
+    if (set.runs_here) return *set.kernels;
+    known = true;
   }
-  refuse(wanted, "not a known instruction set");
+  refuse(wanted, known ? "this processor does not have it" : "not a known instruction set");
 }
-
-#endif
 
 std::atomic<const IsaKernels*>& chosen() {
   static std::atomic<const IsaKernels*> set{&choose()};
@@ -47,6 +58,14 @@ std::atomic<const IsaKernels*>& chosen() {
 }
 
 }  // namespace
+
+std::vector<const IsaKernels*> supported_sets() {
+  std::vector<const IsaKernels*> sets;
+  for (const Set& set : all_sets()) {
+    if (set.runs_here) sets.push_back(set.kernels);
+  }
+  return sets;
+}
 
 const IsaKernels& isa_kernels() { return *chosen().load(std::memory_order_relaxed); }
 

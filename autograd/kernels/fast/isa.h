@@ -5,8 +5,9 @@
 #pragma once
 
 #include <string_view>
+#include <vector>
 
-#include "autograd/kernels/conv.h"
+#include "autograd/kernels/fast/geometry.h"
 
 namespace supertac::kernels {
 
@@ -46,36 +47,39 @@ struct FilterJob {
   Dim step = 0;
 };
 
-/// The largest number of input channels that `gather` takes (the length of its row of zeros).
-inline constexpr Dim kMaxChannels = 4096;
-
 /// Instructions that plain loops (loops.h) are compiled for.
 enum class Vectors { baseline, avx2, avx512 };
 
 struct IsaKernels {
   std::string_view name;
-  Vectors vectors;
-  void (*gather)(const GatherJob& job, const real* x, real* y);
+  Vectors vectors = Vectors::baseline;
+  void (*gather)(const GatherJob& job, const real* x, real* y) = nullptr;
   /// `rows` images of one pixel each: y[rows, cout] = bias + x[rows, cin] * w[cin, cout]
-  void (*gather_rows)(const GatherJob& job, const real* x, real* y, Dim rows);
-  void (*outer)(const OuterJob& job);
+  void (*gather_rows)(const GatherJob& job, const real* x, real* y, Dim rows) = nullptr;
+  void (*outer)(const OuterJob& job) = nullptr;
   /// u = G g G^T, and g += G^T u G
-  void (*filters)(const FilterJob& job, const real* g, real* u);
-  void (*filter_grads)(const FilterJob& job, const real* u, real* g);
+  void (*filters)(const FilterJob& job, const real* g, real* u) = nullptr;
+  void (*filter_grads)(const FilterJob& job, const real* u, real* g) = nullptr;
   /// places = B^T d B of the patches d of x
-  void (*patches)(const TileJob& job, const real* x, real* places);
+  void (*patches)(const TileJob& job, const real* x, real* places) = nullptr;
   /// y = f(start + A^T m A) of the places m; start is the bias, y itself (Into::add) or, without a bias, 0
   void (*squares)(const TileJob& job, const real* places, const real* bias, Into into, real negative_slope,
-                  real* y);
+                  real* y) = nullptr;
   /// places = A g A^T of the squares g of gy
-  void (*square_grads)(const TileJob& job, const real* gy, real* places);
+  void (*square_grads)(const TileJob& job, const real* gy, real* places) = nullptr;
 };
 
-/// The best set this processor has, or the one that SUPERTAC_ISA=avx512|avx2|portable names.
+/// The best set this processor has, or the one that SUPERTAC_ISA=avx512|avx2|portable|plain names.
 /// Throws std::runtime_error, at first use, when SUPERTAC_ISA names an unknown or unsupported set.
 const IsaKernels& isa_kernels();
+/// All sets that this processor can run, the best first, kPlainKernels last.
+std::vector<const IsaKernels*> supported_sets();
 /// Replaces the choice. For tests only, which compare the sets in one process; not while kernels run.
 void use_isa(const IsaKernels& set);
+
+/// No kernels of this folder at all: the plain loops of autograd/kernels/conv.cpp and linear.cpp run.
+extern const IsaKernels kPlainKernels;
+inline bool is_plain() { return isa_kernels().gather == nullptr; }
 
 extern const IsaKernels kPortableKernels;  // any processor; fused multiply-add in software where it has none
 extern const IsaKernels kPortableFmaKernels;  // the same source for processors with scalar FMA

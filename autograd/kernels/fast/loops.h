@@ -9,6 +9,13 @@
 /// Of a lambda for run_loop(): it must be inlined to be compiled for the set.
 #define SUPERTAC_LOOP __attribute__((always_inline))
 
+/// Before a for: no turn reads what another one writes, so none need be looked for at run time.
+#ifdef __clang__
+#define SUPERTAC_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
+#else
+#define SUPERTAC_INDEPENDENT _Pragma("GCC ivdep")
+#endif
+
 namespace supertac::kernels {
 
 template <class Loop>
@@ -21,7 +28,7 @@ __attribute__((target("avx512f"))) void run_on_avx512(Loop loop) {
   loop();
 }
 
-/// run_loop([=]() SUPERTAC_LOOP { for (Dim i = 0; i < n; ++i) y[i] = a[i] + b[i]; });
+/// run_loop([=]() SUPERTAC_LOOP { any loops });
 template <class Loop>
 void run_loop(Loop loop) {
   switch (isa_kernels().vectors) {
@@ -32,6 +39,15 @@ void run_loop(Loop loop) {
     case Vectors::avx512:
       return run_on_avx512(loop);
   }
+}
+
+/// each(n, [=](Dim i) SUPERTAC_LOOP { y[i] = a[i] + b[i]; }) for all i below n.
+template <class Body>
+void each(Dim n, Body body) {
+  run_loop([=]() SUPERTAC_LOOP {
+    SUPERTAC_INDEPENDENT
+    for (Dim i = 0; i < n; ++i) body(i);
+  });
 }
 
 }  // namespace supertac::kernels

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "autograd/kernels/fast/conv.h"
+
 namespace supertac::kernels {
 namespace {
 
@@ -9,7 +11,7 @@ namespace {
 constexpr Dim kColumns = 16, kMostOutputs = 8;
 
 // [taps][cin][cout] -> [cin][(taps, cout), zeros]
-Tensor with_taps_inside(const ConvSizes& s, const real* w) {
+Tensor with_taps_inside(const ConvTask& s, const real* w) {
   Tensor out = Tensor::zeros({s.cin, kColumns});
   for (Dim t = 0; t < s.geometry->taps; ++t) {
     for (Dim i = 0; i < s.cin; ++i) {
@@ -20,7 +22,7 @@ Tensor with_taps_inside(const ConvSizes& s, const real* w) {
 }
 
 // to[p, t, o] = gy[q, o] where tap t joins p and q, else 0
-Tensor spread(const ConvSizes& s, const real* gy) {
+Tensor spread(const ConvTask& s, const real* gy) {
   const Geometry& g = *s.geometry;
   Tensor gz = Tensor::zeros({s.images, g.in_pixels, kColumns});
   real* to = gz.data();
@@ -39,7 +41,7 @@ Tensor spread(const ConvSizes& s, const real* gy) {
 
 // y[q, o] = bias[o] + sum over taps of z[source(t, q), t, o] for one image; the last row of z is zero.
 template <Dim kOutputs>
-void collect(const ConvSizes& s, const real* z, const real* bias, real* y) {
+void collect(const ConvTask& s, const real* z, const real* bias, real* y) {
   const std::int32_t padding = static_cast<std::int32_t>(s.geometry->in_pixels);
   for (const Phase& phase : s.geometry->forward) {
     const std::int32_t* source = phase.sources.data();
@@ -59,8 +61,8 @@ void collect(const ConvSizes& s, const real* z, const real* bias, real* y) {
   }
 }
 
-void collect(const ConvSizes& s, const real* z, const real* bias, real* y) {
-  using Collect = void (*)(const ConvSizes&, const real*, const real*, real*);
+void collect(const ConvTask& s, const real* z, const real* bias, real* y) {
+  using Collect = void (*)(const ConvTask&, const real*, const real*, real*);
   static constexpr Collect kByOutputs[kMostOutputs] = {collect<1>, collect<2>, collect<3>, collect<4>,
                                                        collect<5>, collect<6>, collect<7>, collect<8>};
   kByOutputs[s.cout - 1](s, z, bias, y);
@@ -68,32 +70,34 @@ void collect(const ConvSizes& s, const real* z, const real* bias, real* y) {
 
 }  // namespace
 
-bool is_narrow(const ConvSizes& s) {
+bool is_narrow(const ConvTask& s) {
   return s.geometry->taps * s.cout <= kColumns && s.cout <= kMostOutputs && s.cout * 2 < s.cin;
 }
 
-void narrow_conv(const ConvSizes& s, const real* x, const real* w, const real* bias, real negative_slope,
+void narrow_conv(const ConvTask& s, const real* x, const real* w, const real* bias, real negative_slope,
                  real* y) {
   const Geometry& g = *s.geometry;
   const Tensor inside = with_taps_inside(s, w);
   Tensor z(Shape{g.in_pixels + 1, kColumns});
   std::fill_n(z.data() + g.in_pixels * kColumns, kColumns, real(0));
   for (Dim n = 0; n < s.images; ++n) {
-    linear(g.in_pixels, s.cin, kColumns, x + n * g.in_pixels * s.cin, inside.data(), nullptr, 1, z.data());
+    fast::linear(g.in_pixels, s.cin, kColumns, x + n * g.in_pixels * s.cin, inside.data(), nullptr, 1,
+                 z.data());
     collect(s, z.data(), bias, y + n * g.out_pixels * s.cout);
   }
   if (negative_slope == 1) return;
   for (Dim i = 0; i < s.images * g.out_pixels * s.cout; ++i) y[i] = y[i] > 0 ? y[i] : negative_slope * y[i];
 }
 
-void narrow_grad_x(const ConvSizes& s, const real* gy, const real* w, Into into, real* gx) {
-  linear_grad_x(s.images * s.geometry->in_pixels, s.cin, kColumns, spread(s, gy).data(),
-                with_taps_inside(s, w).data(), into, gx);
+void narrow_grad_x(const ConvTask& s, const real* gy, const real* w, Into into, real* gx) {
+  fast::linear_grad_x(s.images * s.geometry->in_pixels, s.cin, kColumns, spread(s, gy).data(),
+                      with_taps_inside(s, w).data(), into, gx);
 }
 
-void narrow_grad_w(const ConvSizes& s, const real* x, const real* gy, real* gw) {
+void narrow_grad_w(const ConvTask& s, const real* x, const real* gy, real* gw) {
   Tensor inside = Tensor::zeros({s.cin, kColumns});
-  linear_grad_w(s.images * s.geometry->in_pixels, s.cin, kColumns, x, spread(s, gy).data(), inside.data());
+  fast::linear_grad_w(s.images * s.geometry->in_pixels, s.cin, kColumns, x, spread(s, gy).data(),
+                      inside.data());
   for (Dim t = 0; t < s.geometry->taps; ++t) {
     for (Dim i = 0; i < s.cin; ++i) {
       for (Dim o = 0; o < s.cout; ++o) *gw++ += inside.data()[i * kColumns + t * s.cout + o];

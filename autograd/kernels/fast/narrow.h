@@ -6,16 +6,16 @@
 //   y[q, o]    = bias[o] + sum over taps t of z[source(t, q), t, o]
 #pragma once
 
-#include "autograd/kernels/conv.h"
+#include "autograd/kernels/fast/geometry.h"
 
 namespace supertac::kernels {
 
 /// Whether conv() and its gradients take this way: a question of shapes only, so that all processors agree.
-bool is_narrow(const ConvSizes& sizes);
+bool is_narrow(const ConvTask& task);
 
-void narrow_conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias, real negative_slope,
+void narrow_conv(const ConvTask& task, const real* x, const real* w, const real* bias, real negative_slope,
                  real* y);
-void narrow_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into into, real* gx);
-void narrow_grad_w(const ConvSizes& sizes, const real* x, const real* gy, real* gw);
+void narrow_grad_x(const ConvTask& task, const real* gy, const real* w, Into into, real* gx);
+void narrow_grad_w(const ConvTask& task, const real* x, const real* gy, real* gw);
 
 }  // namespace supertac::kernels

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "autograd/kernels/fast/conv.h"
 #include "autograd/kernels/fast/isa.h"
 
 namespace supertac::kernels {
@@ -14,8 +15,8 @@ constexpr Dim kTilesPerStrip = 8;   // these stay in the first cache from transf
 constexpr Dim kTilesPerPiece = 64;  // ... these in the second while their weights' gradient is summed
 constexpr Dim kPadding = 16;        // between places of weights: powers of two apart they share cache lines
 
-Dim tiles_of(const ConvSizes& s) { return static_cast<Dim>(s.geometry->squares.size()) / kSquare; }
-Dim place_of(const ConvSizes& s) { return s.cin * s.cout + kPadding; }
+Dim tiles_of(const ConvTask& s) { return static_cast<Dim>(s.geometry->squares.size()) / kSquare; }
+Dim place_of(const ConvTask& s) { return s.cin * s.cout + kPadding; }
 
 // The weights of the gradient: taps in reverse order, [3][3][cin][cout] -> [3][3][cout][cin].
 Tensor turned(Dim cin, Dim cout, const real* w) {
@@ -30,17 +31,17 @@ Tensor turned(Dim cin, Dim cout, const real* w) {
   return out;
 }
 
-TileJob patches_of(const ConvSizes& s, Dim first, Dim count) {
+TileJob patches_of(const ConvTask& s, Dim first, Dim count) {
   const Geometry& g = *s.geometry;
   return {g.patches.data(), tiles_of(s), g.in_pixels, s.cin, first, count, count * s.cin};
 }
-TileJob squares_of(const ConvSizes& s, Dim first, Dim count) {
+TileJob squares_of(const ConvTask& s, Dim first, Dim count) {
   const Geometry& g = *s.geometry;
   return {g.squares.data(), tiles_of(s), g.out_pixels, s.cout, first, count, count * s.cout};
 }
 
-void filter(const ConvSizes& s, const real* x, const real* w, const real* bias, Into into,
-            real negative_slope, real* y) {
+void filter(const ConvTask& s, const real* x, const real* w, const real* bias, Into into, real negative_slope,
+            real* y) {
   const IsaKernels& isa = isa_kernels();
   Tensor u(Shape{kPlaces, place_of(s)});
   isa.filters({s.cin * s.cout, place_of(s)}, w, u.data());
@@ -59,22 +60,22 @@ void filter(const ConvSizes& s, const real* x, const real* w, const real* bias, 
 
 }  // namespace
 
-bool is_winograd(const ConvSizes& s) {
+bool is_winograd(const ConvTask& s) {
   return s.images >= kFewestImages && tiles_of(s) >= kFewestTiles && s.cin % kTransformChannels == 0 &&
          s.cout % kTransformChannels == 0;
 }
 
-void winograd_conv(const ConvSizes& s, const real* x, const real* w, const real* bias, real negative_slope,
+void winograd_conv(const ConvTask& s, const real* x, const real* w, const real* bias, real negative_slope,
                    real* y) {
   filter(s, x, w, bias, Into::overwrite, negative_slope, y);
 }
 
-void winograd_grad_x(const ConvSizes& s, const real* gy, const real* w, Into into, real* gx) {
+void winograd_grad_x(const ConvTask& s, const real* gy, const real* w, Into into, real* gx) {
   filter({s.geometry, s.images, s.cout, s.cin}, gy, turned(s.cin, s.cout, w).data(), nullptr, into, 1, gx);
 }
 
 // du[place] = sum over tiles of (B^T d B)^T (A gy A^T),   gw += G^T du G
-void winograd_grad_w(const ConvSizes& s, const real* x, const real* gy, real* gw) {
+void winograd_grad_w(const ConvTask& s, const real* x, const real* gy, real* gw) {
   const IsaKernels& isa = isa_kernels();
   const Dim tiles = s.images * tiles_of(s), piece = std::min(kTilesPerPiece, tiles);
   Tensor v(Shape{kPlaces, piece, s.cin}), m(Shape{kPlaces, piece, s.cout});
@@ -84,8 +85,8 @@ void winograd_grad_w(const ConvSizes& s, const real* x, const real* gy, real* gw
     isa.patches(patches_of(s, first, count), x, v.data());
     isa.square_grads(squares_of(s, first, count), gy, m.data());
     for (Dim place = 0; place < kPlaces; ++place) {
-      linear_grad_w(count, s.cin, s.cout, v.data() + place * count * s.cin, m.data() + place * count * s.cout,
-                    du.data() + place * place_of(s));
+      fast::linear_grad_w(count, s.cin, s.cout, v.data() + place * count * s.cin,
+                          m.data() + place * count * s.cout, du.data() + place * place_of(s));
     }
   }
   isa.filter_grads({s.cin * s.cout, place_of(s)}, du.data(), gw);

@@ -6,7 +6,7 @@
 // those of plain sums: 1e-5 of the largest value.
 #pragma once
 
-#include "autograd/kernels/conv.h"
+#include "autograd/kernels/fast/geometry.h"
 
 namespace supertac::kernels {
 
@@ -14,11 +14,11 @@ namespace supertac::kernels {
 /// channels multiples of 16. Elsewhere the transforms cost more than the products save. A question of shapes
 /// only, so that all processors agree; but a picture alone and the same one in a batch differ in their last
 /// bits.
-bool is_winograd(const ConvSizes& sizes);
+bool is_winograd(const ConvTask& task);
 
-void winograd_conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias,
-                   real negative_slope, real* y);
-void winograd_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into into, real* gx);
-void winograd_grad_w(const ConvSizes& sizes, const real* x, const real* gy, real* gw);
+void winograd_conv(const ConvTask& task, const real* x, const real* w, const real* bias, real negative_slope,
+                   real* y);
+void winograd_grad_x(const ConvTask& task, const real* gy, const real* w, Into into, real* gx);
+void winograd_grad_w(const ConvTask& task, const real* x, const real* gy, real* gw);
 
 }  // namespace supertac::kernels

@@ -23,7 +23,7 @@ const Case kCases[] = {{8, 8, 4, 16, 16}, {8, 8, 7, 32, 48}, {16, 16, 5, 32, 16}
 
 // Calls visit(image, tap, input pixel, output pixel) for all pairs that a tap joins.
 template <class Visit>
-void for_all_pairs(const ConvSizes& s, Visit visit) {
+void for_all_pairs(const ConvTask& s, Visit visit) {
   for (Dim n = 0; n < s.images; ++n)
     for (Dim t = 0; t < s.geometry->taps; ++t) {
       const TapPairs& pairs = s.geometry->pairs[static_cast<std::size_t>(t)];
@@ -51,7 +51,7 @@ struct Problem {
         bias(numbers({c.cout}, 3)),
         gy(numbers({c.images, c.height * c.width, c.cout}, 4)) {}
 
-  ConvSizes sizes;
+  ConvTask sizes;
   Tensor x, w, bias, gy;
 };
 
@@ -108,7 +108,7 @@ TEST(Winograd, APictureIsTheSameInAnyBatch) {
   winograd_conv(p.sizes, p.x.data(), p.w.data(), p.bias.data(), 1, all.data());
   for (const Dim images : {1, 2, 5}) {
     Tensor some(Shape{images, 64, 16});
-    ConvSizes sizes = p.sizes;
+    ConvTask sizes = p.sizes;
     sizes.images = images;
     winograd_conv(sizes, p.x.data(), p.w.data(), p.bias.data(), 1, some.data());
     for (Dim i = 0; i < some.size(); ++i) ASSERT_EQ(some.data()[i], all.data()[i]) << images << ' ' << i;

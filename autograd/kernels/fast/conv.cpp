@@ -1,0 +1,101 @@
+#include "autograd/kernels/fast/conv.h"
+
+#include <algorithm>
+
+#include "autograd/kernels/fast/geometry.h"
+#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/narrow.h"
+#include "autograd/kernels/fast/winograd.h"
+#include "autograd/kernels/linear.h"
+
+namespace supertac::kernels::fast {
+namespace {
+
+// [taps][cin][cout] -> [taps][cout][cin], in strips of a cache line's width
+Tensor transposed_weights(const real* w, Dim taps, Dim cin, Dim cout) {
+  constexpr Dim kStrip = 16;
+  Tensor out(Shape{taps, cout, cin});
+  real* to = out.data();
+  for (Dim t = 0; t < taps; ++t, w += cin * cout, to += cin * cout) {
+    for (Dim first = 0; first < cout; first += kStrip) {
+      const Dim last = std::min(cout, first + kStrip);
+      for (Dim i = 0; i < cin; ++i) {
+        for (Dim o = first; o < last; ++o) to[o * cin + i] = w[i * cout + o];
+      }
+    }
+  }
+  return out;
+}
+
+void gather_batch(const GatherJob& job, Dim images, Dim in_pixels, Dim out_pixels, const real* x, real* y) {
+  const auto gather = isa_kernels().gather;
+  for (Dim n = 0; n < images; ++n) gather(job, x + n * in_pixels * job.cin, y + n * out_pixels * job.cout);
+}
+
+ConvTask task_of(const ConvSizes& s) { return {&geometry_of(s.map), s.images, s.cin, s.cout}; }
+
+}  // namespace
+
+void conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias, real negative_slope,
+          real* y) {
+  const ConvTask s = task_of(sizes);
+  if (is_narrow(s)) return narrow_conv(s, x, w, bias, negative_slope, y);
+  if (is_winograd(s)) return winograd_conv(s, x, w, bias, negative_slope, y);
+  const GatherJob job{&s.geometry->forward, w, bias, s.cin, s.cout, Into::overwrite, negative_slope};
+  gather_batch(job, s.images, s.geometry->in_pixels, s.geometry->out_pixels, x, y);
+}
+
+void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into into, real* gx) {
+  const ConvTask s = task_of(sizes);
+  if (is_narrow(s)) return narrow_grad_x(s, gy, w, into, gx);
+  if (is_winograd(s)) return winograd_grad_x(s, gy, w, into, gx);
+  const Tensor wt = transposed_weights(w, s.geometry->taps, s.cin, s.cout);
+  const GatherJob job{&s.geometry->backward, wt.data(), nullptr, s.cout, s.cin, into, 1};
+  gather_batch(job, s.images, s.geometry->out_pixels, s.geometry->in_pixels, gy, gx);
+}
+
+// A chunk of images passes all taps before the next one, while it is in the cache.
+void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, real* gw) {
+  const ConvTask s = task_of(sizes);
+  if (is_narrow(s)) return narrow_grad_w(s, x, gy, gw);
+  if (is_winograd(s)) return winograd_grad_w(s, x, gy, gw);
+  const auto outer = isa_kernels().outer;
+  const Geometry& g = *s.geometry;
+  const Dim chunk = std::max<Dim>(1, kRowsPerPiece / g.out_pixels);
+  for (Dim n = 0; n < s.images; n += chunk) {
+    OuterJob job{nullptr,
+                 x + n * g.in_pixels * s.cin,
+                 gy + n * g.out_pixels * s.cout,
+                 gw,
+                 std::min(chunk, s.images - n),
+                 g.in_pixels,
+                 g.out_pixels,
+                 s.cin,
+                 s.cout};
+    for (const TapPairs& pairs : g.pairs) {
+      job.pairs = &pairs;
+      outer(job);
+      job.gw += s.cin * s.cout;
+    }
+  }
+}
+
+void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
+            real* y) {
+  isa_kernels().gather_rows({nullptr, w, bias, cin, cout, Into::overwrite, negative_slope}, x, y, rows);
+}
+
+void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx) {
+  const Tensor wt = transposed_weights(w, 1, cin, cout);
+  isa_kernels().gather_rows({nullptr, wt.data(), nullptr, cout, cin, into, 1}, gy, gx, rows);
+}
+
+void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, real* gw) {
+  static const TapPairs kOnePixel{{0}, {0}};
+  const auto outer = isa_kernels().outer;
+  for (Dim n = 0; n < rows; n += kRowsPerPiece) {
+    outer({&kOnePixel, x + n * cin, gy + n * cout, gw, std::min(kRowsPerPiece, rows - n), 1, 1, cin, cout});
+  }
+}
+
+}  // namespace supertac::kernels::fast

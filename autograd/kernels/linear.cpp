@@ -1,0 +1,57 @@
+#include "autograd/kernels/linear.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "autograd/kernels/fast/conv.h"
+#include "autograd/kernels/fast/isa.h"
+
+namespace supertac::kernels {
+
+void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
+            real* y) {
+  if (!is_plain()) return fast::linear(rows, cin, cout, x, w, bias, negative_slope, y);
+  for (Dim n = 0; n < rows; ++n) {
+    for (Dim o = 0; o < cout; ++o) {
+      real sum = bias != nullptr ? bias[o] : 0;
+      for (Dim i = 0; i < cin; ++i) sum = std::fma(x[n * cin + i], w[i * cout + o], sum);  // rounds once
+      y[n * cout + o] = sum > 0 ? sum : negative_slope * sum;
+    }
+  }
+}
+
+void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx) {
+  if (!is_plain()) return fast::linear_grad_x(rows, cin, cout, gy, w, into, gx);
+  for (Dim n = 0; n < rows; ++n) {
+    for (Dim i = 0; i < cin; ++i) {
+      real sum = into == Into::add ? gx[n * cin + i] : 0;
+      for (Dim o = 0; o < cout; ++o) sum = std::fma(gy[n * cout + o], w[i * cout + o], sum);
+      gx[n * cin + i] = sum;
+    }
+  }
+}
+
+void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, real* gw) {
+  if (!is_plain()) return fast::linear_grad_w(rows, cin, cout, x, gy, gw);
+  for (Dim i = 0; i < cin; ++i) {
+    for (Dim o = 0; o < cout; ++o) {
+      for (Dim n = 0; n < rows; ++n) {
+        gw[i * cout + o] = std::fma(x[n * cin + i], gy[n * cout + o], gw[i * cout + o]);
+      }
+    }
+  }
+}
+
+void bias_grad(Dim rows, Dim cout, const real* gy, real* gb) {
+  Tensor piece(Shape{cout});
+  for (Dim first = 0; first < rows; first += kRowsPerPiece) {
+    piece.fill(0);
+    const Dim last = std::min(rows, first + kRowsPerPiece);
+    for (Dim row = first; row < last; ++row) {
+      for (Dim c = 0; c < cout; ++c) piece.data()[c] += gy[row * cout + c];
+    }
+    for (Dim c = 0; c < cout; ++c) gb[c] += piece.data()[c];
+  }
+}
+
+}  // namespace supertac::kernels

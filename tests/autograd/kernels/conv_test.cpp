@@ -1,0 +1,146 @@
+// The plain loops of kernels/conv.cpp and kernels/linear.cpp against those of kernels/fast: the same bits
+// where both add in the same order.
+#include "autograd/kernels/conv.h"
+
+#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/narrow.h"
+#include "autograd/kernels/fast/winograd.h"
+#include "autograd/kernels/linear.h"
+#include "tests/autograd/check.h"
+
+namespace supertac::kernels {
+namespace {
+
+using test::numbers;
+
+struct Case {
+  Dim images, height, width, cin, cout, kernel, stride, padding;
+};
+// H != W, stride 2 and 3, no padding and much, a single pixel, channels around the vector lengths; few
+// outputs (narrow); squares of 8x8 and more in batches (Winograd).
+const Case kCases[] = {{2, 5, 7, 3, 17, 3, 1, 1},   {1, 6, 4, 1, 1, 3, 2, 1},    {2, 7, 5, 17, 3, 3, 2, 1},
+                       {1, 4, 4, 33, 1, 3, 1, 1},   {2, 3, 4, 1, 33, 1, 1, 0},   {1, 5, 4, 17, 33, 2, 2, 0},
+                       {3, 4, 3, 3, 5, 4, 2, 1},    {1, 9, 2, 16, 32, 3, 1, 2},  {2, 1, 1, 3, 8, 3, 1, 1},
+                       {70, 4, 4, 8, 9, 3, 1, 1},   {9, 8, 11, 40, 1, 3, 1, 1},  {1, 3, 3, 2, 2, 1, 3, 2},
+                       {5, 8, 12, 32, 16, 3, 1, 1}, {4, 16, 8, 16, 48, 3, 1, 1}, {0, 4, 4, 3, 5, 3, 1, 1}};
+
+ConvSizes sizes_of(const Case& c, bool transposed, bool flat) {
+  return {{.height = flat ? 1 : c.height,
+           .width = c.width,
+           .kernel_h = flat ? 1 : c.kernel,
+           .kernel_w = c.kernel,
+           .stride_h = flat ? 1 : c.stride,
+           .stride_w = c.stride,
+           .padding_h = flat ? 0 : c.padding,
+           .padding_w = c.padding,
+           .transposed = transposed},
+          c.images,
+          c.cin,
+          c.cout};
+}
+
+// What `run` gives on the plain loops and on the chosen set, whose results must agree.
+template <class Run>
+void expect_plain_is_fast(const char* what, bool same_order, Run run) {
+  const IsaKernels& chosen = isa_kernels();
+  const Tensor fast = run();
+  use_isa(kPlainKernels);
+  const Tensor plain = run();
+  use_isa(chosen);
+  double largest = 0;
+  for (const real value : plain.values()) largest = std::max(largest, std::abs(static_cast<double>(value)));
+  const double tolerance = same_order ? 0 : (sizeof(real) == 4 ? 1e-5 : 1e-13) * largest;
+  for (Dim i = 0; i < plain.size(); ++i) {
+    ASSERT_NEAR(static_cast<double>(fast.data()[i]), static_cast<double>(plain.data()[i]), tolerance)
+        << what << " [" << i << "] on " << chosen.name;
+  }
+}
+
+void expect_plain_is_fast(const ConvSizes& s) {
+  const ConvTask task{&geometry_of(s.map), s.images, s.cin, s.cout};
+  const bool same_order = !is_narrow(task) && !is_winograd(task);
+  const Dim taps = s.map.taps(), fits = kRowsPerPiece / s.out_pixels();
+  const Tensor x = numbers({s.images, s.in_pixels(), s.cin}), w = numbers({taps, s.cin, s.cout}, 2),
+               bias = numbers({s.cout}, 3), gy = numbers({s.images, s.out_pixels(), s.cout}, 4);
+  for (const real* b : {bias.data(), static_cast<const real*>(nullptr)}) {
+    for (const real slope : {real(1), real(0.25)}) {
+      expect_plain_is_fast("y", same_order, [&] {
+        Tensor y(gy.shape());
+        conv(s, x.data(), w.data(), b, slope, y.data());
+        return y;
+      });
+    }
+  }
+  for (const Into into : {Into::overwrite, Into::add}) {
+    expect_plain_is_fast("gx", same_order, [&] {
+      Tensor gx = numbers(x.shape(), 5);
+      conv_grad_x(s, gy.data(), w.data(), into, gx.data());
+      return gx;
+    });
+  }
+  for (const bool from_zero : {true, false}) {  // fast/ sums images apart before it adds them
+    expect_plain_is_fast("gw", same_order && from_zero && s.images <= fits, [&] {
+      Tensor gw = from_zero ? Tensor::zeros(w.shape()) : numbers(w.shape(), 6);
+      conv_grad_w(s, x.data(), gy.data(), gw.data());
+      return gw;
+    });
+  }
+}
+
+TEST(ConvKernels, PlainIsFast) {
+  for (const Case& c : kCases) {
+    for (const bool flat : {false, true}) {
+      for (const bool transposed : {false, true}) {
+        const ConvSizes s = sizes_of(c, transposed, flat);
+        if (s.map.out_height() < 1 || s.map.out_width() < 1) continue;
+        SCOPED_TRACE("case " + std::to_string(&c - kCases) + (transposed ? " transposed" : "") +
+                     (flat ? " 1-D" : " 2-D"));
+        expect_plain_is_fast(s);
+      }
+    }
+  }
+}
+
+// The cases above must keep meeting every way that fast/ knows.
+TEST(ConvKernels, TheCasesTakeEveryWay) {
+  int narrow = 0, winograd = 0, tiles = 0;
+  for (const Case& c : kCases) {
+    const ConvSizes s = sizes_of(c, false, false);
+    const ConvTask task{&geometry_of(s.map), s.images, s.cin, s.cout};
+    ++(is_narrow(task) ? narrow : is_winograd(task) ? winograd : tiles);
+  }
+  EXPECT_GE(narrow, 2);
+  EXPECT_GE(winograd, 2);
+  EXPECT_GE(tiles, 8);
+}
+
+TEST(LinearKernels, PlainIsFast) {
+  for (const Dim rows : {1, 7, 300}) {
+    for (const Dim cin : {1, 5, 33}) {
+      for (const Dim cout : {1, 10, 64}) {
+        const Tensor x = numbers({rows, cin}), w = numbers({cin, cout}, 2), bias = numbers({cout}, 3);
+        const Tensor gy = numbers({rows, cout}, 4);
+        expect_plain_is_fast("y", true, [&] {
+          Tensor y(gy.shape());
+          linear(rows, cin, cout, x.data(), w.data(), bias.data(), real(0.25), y.data());
+          return y;
+        });
+        for (const Into into : {Into::overwrite, Into::add}) {
+          expect_plain_is_fast("gx", true, [&] {
+            Tensor gx = numbers(x.shape(), 5);
+            linear_grad_x(rows, cin, cout, gy.data(), w.data(), into, gx.data());
+            return gx;
+          });
+        }
+        expect_plain_is_fast("gw", rows <= kRowsPerPiece, [&] {
+          Tensor gw = Tensor::zeros(w.shape());
+          linear_grad_w(rows, cin, cout, x.data(), gy.data(), gw.data());
+          return gw;
+        });
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace supertac::kernels
