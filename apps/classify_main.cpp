@@ -4,13 +4,11 @@
 
 #include "apps/classify/experiment.h"
 #include "apps/classify/report.h"
-#include "apps/common/numerics.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/version.h"
 
 namespace supertac {
-namespace {
 
 void declare(Arguments& a) {
   a.required("model", "FILE,...", "models by supertac-train; run i uses the i-th, and again from the first");
@@ -29,6 +27,8 @@ void declare(Arguments& a) {
            "standard: the training windows' gains, offsets and noise vary as in supertac-train; none",
            "standard");
 }
+
+namespace {
 
 std::vector<View> views_of(const Arguments& a) {
   std::vector<View> views;
@@ -89,6 +89,8 @@ std::vector<ViewResult> count(const Answers& given, const std::vector<View>& vie
   return results;
 }
 
+}  // namespace
+
 int run(Arguments& a) {
   const std::vector<View> views = views_of(a);
   ExperimentSettings settings;
@@ -117,12 +119,4 @@ int run(Arguments& a) {
   return kExitOk;
 }
 
-}  // namespace
 }  // namespace supertac
-
-int main(int argc, char** argv) {
-  const supertac::Program program{"supertac-classify",
-                                  "Tells textures apart: raw frames against super-resolved pictures.",
-                                  supertac::declare, supertac::run, supertac::numerics};
-  return supertac::run_program(program, argc, argv);
-}

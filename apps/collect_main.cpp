@@ -22,7 +22,6 @@
 #include "io/numbers.h"
 
 namespace supertac {
-namespace {
 
 void declare(Arguments& arguments) {
   arguments.option("board", "PORT", "port of the tactile board; auto finds it by its USB number", "auto")
@@ -39,6 +38,8 @@ void declare(Arguments& arguments) {
       .flag("yes", "do not ask: the plate lies as planned and the head is at " + describe(rig::kMounted))
       .flag("list-ports", "list the serial ports and end");
 }
+
+namespace {
 
 std::string required_text(const Arguments& arguments, const std::string& name) {
   if (!arguments.given(name)) throw UsageError("--" + name + ": expected a value, found none");
@@ -119,23 +120,15 @@ RecorderReport collect(const Arguments& arguments, RecorderSettings settings, co
       std::make_unique<SerialPort>(arguments.text("printer"), SerialSettings{rig::kPrinterBaud, speedup});
   demand_origin(arguments, mark);
   confirm(arguments, settings);
-  std::atomic<bool> stop{false}, ended{false};
+  std::atomic<bool> stop{false};
   settings.stop = &stop;
   Progress progress(arguments, "collecting", millimetres(settings.plan, settings.plan.passes, 0), "mm");
   settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters& counters) {
     progress.update(millimetres_at(settings.plan, leg, at), live_text(at, counters));
   };
-  std::thread watcher([&] {
-    for (; !ended; usleep(20'000)) stop = stop || interrupted();
+  const std::jthread watcher([&stop](const std::stop_token& ended) {
+    for (; !ended.stop_requested(); usleep(20'000)) stop = stop || interrupted();
   });
-  struct Joiner {
-    std::atomic<bool>& ended;
-    std::thread& thread;
-    ~Joiner() {
-      ended = true;
-      thread.join();
-    }
-  } joiner{ended, watcher};
   return record_marked(std::move(board), std::move(printer), settings, mark);
 }
 
@@ -151,18 +144,16 @@ std::size_t keep_passes(const Arguments& arguments, const std::string& journal, 
   return report.frames;
 }
 
+}  // namespace
+
 int run(Arguments& arguments) {
   if (arguments.flag("list-ports")) {
     print_ports(arguments);
     return kExitOk;
   }
   const std::string out = required_text(arguments, "out");
-  std::string plate;
-  try {
-    plate = Plate::named(required_text(arguments, "plate")).name();
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(std::string("--plate: ") + error.what());
-  }
+  const std::string plate =
+      read_option("plate", [&] { return Plate::named(required_text(arguments, "plate")).name(); });
   make_directories(out);
   keep_plate_file(arguments.text("plate"), out);
   const RecorderSettings settings = read_settings(arguments, out, plate);
@@ -180,14 +171,4 @@ int run(Arguments& arguments) {
   std::rethrow_exception(report.outcome.error);
 }
 
-}  // namespace
 }  // namespace supertac
-
-int main(int argc, char** argv) {
-  using namespace supertac;
-  return run_program({.name = "supertac-collect",
-                      .purpose = "Runs the finger over a plate and records every pass with positions.",
-                      .declare = declare,
-                      .run = run},
-                     argc, argv);
-}

@@ -2,7 +2,6 @@
 #include <algorithm>
 
 #include "apps/common/measure.h"
-#include "apps/common/numerics.h"
 #include "apps/common/output_folder.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
@@ -20,7 +19,6 @@
 #include "models/evaluation.h"
 
 namespace supertac {
-namespace {
 
 void declare(Arguments& a) {
   a.required("model", "FILE,...", "a model written by supertac-train; of several the pictures are averaged");
@@ -36,6 +34,8 @@ void declare(Arguments& a) {
   a.option("pictures", "DIR", "write PNG pictures: input | output | truth, and a film of each test pass");
   a.option("outputs", "FILE", "write input windows, outputs and truths as safetensors");
 }
+
+namespace {
 
 std::string metadata_or(const ModelFile& file, const std::string& key, const std::string& otherwise) {
   const auto found = file.metadata.find(key);
@@ -168,6 +168,8 @@ nlohmann::ordered_json report(const Arguments& a, const Committee& model, const 
   return result;
 }
 
+}  // namespace
+
 int run(Arguments& a) {
   if (a.given("pairs")) return evaluate_on_pairs(a);
   if (!a.given("data")) throw UsageError("expected --data DIR or --pairs FILE, found neither");
@@ -195,11 +197,4 @@ int run(Arguments& a) {
   return kExitOk;
 }
 
-}  // namespace
 }  // namespace supertac
-
-int main(int argc, char** argv) {
-  const supertac::Program program{"supertac-evaluate", "Scores a model and the baselines on a data set.",
-                                  supertac::declare, supertac::run, supertac::numerics};
-  return supertac::run_program(program, argc, argv);
-}

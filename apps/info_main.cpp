@@ -9,9 +9,10 @@
 #include "io/text.h"
 
 namespace supertac {
-namespace {
 
 void declare(Arguments& arguments) { arguments.positional("FILE", "a .safetensors file"); }
+
+namespace {
 
 std::string shape_text(const std::vector<std::uint64_t>& shape) {
   std::string text;
@@ -94,6 +95,8 @@ void print_recording(const Arguments& arguments, nlohmann::ordered_json& card) {
   card["position_known"] = !recording.position_mm.empty();
 }
 
+}  // namespace
+
 int run(Arguments& arguments) {
   const SafetensorsFile file = SafetensorsFile::read(arguments.text("FILE"));
   const std::string kind = kind_of(file);
@@ -112,12 +115,4 @@ int run(Arguments& arguments) {
   return kExitOk;
 }
 
-}  // namespace
 }  // namespace supertac
-
-int main(int argc, char** argv) {
-  using namespace supertac;
-  return run_program(
-      {"supertac-info", "Prints what a file of ours holds: kind, shapes, settings, checksum.", declare, run},
-      argc, argv);
-}

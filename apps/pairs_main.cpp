@@ -6,7 +6,6 @@
 #include "io/safetensors.h"
 
 namespace supertac {
-namespace {
 
 void declare(Arguments& a) {
   a.required("data", "DIR", "recordings");
@@ -18,6 +17,8 @@ void declare(Arguments& a) {
   a.option("scale", "N", "targets N times as fine as the array: 2, 4 or 8", "4");
   a.option("stride", "N", "take every N-th window of a pass", "1");
 }
+
+namespace {
 
 // input [N,channels,rows,columns]: the window's last frame, scaled; target [N,1,H,W]; group [N]: the number
 // of the pass.
@@ -51,6 +52,8 @@ nlohmann::ordered_json write(const WindowSet& windows, const std::vector<std::ui
   return {{"file", path}, {"pairs", count}};
 }
 
+}  // namespace
+
 int run(Arguments& a) {
   WindowSettings w;
   w.timesteps = static_cast<int>(a.integer("timesteps", 1, 4096));
@@ -73,12 +76,4 @@ int run(Arguments& a) {
   return kExitOk;
 }
 
-}  // namespace
 }  // namespace supertac
-
-int main(int argc, char** argv) {
-  const supertac::Program program{"supertac-pairs",
-                                  "Writes recordings as pairs of low- and high-resolution images.",
-                                  supertac::declare, supertac::run};
-  return supertac::run_program(program, argc, argv);
-}

@@ -2,59 +2,12 @@
 
 #include "apps/common/program.h"
 #include "data/plates/plate_mesh.h"
-#include "hardware/palpation.h"
+#include "hardware/palpation_program.h"
 #include "io/file.h"
 #include "io/numbers.h"
 
 namespace supertac {
 namespace {
-
-void declare(Arguments& arguments) {
-  arguments
-      .required("texture", "NAME",
-                "bumps, ridges, waves, blob or mixed with --pitch and --height, or a plate: 6_Ridges, "
-                "bumps12+ridges4, FILE.stl")
-      .option("pitch", "MM", "distance of the texture's elements (default 6)")
-      .option("height", "MM", "of the elements (default 2.5; bumps and blobs at most half the pitch)")
-      .option("out", "FILE", "the plate as binary STL in mm, 36 x 108 in x and y, its flat part at z = 0")
-      .option("resolution", "MM", "distance of the points where the surface is exact", "0.125")
-      .option("base", "MM", "material below the lowest point", "3")
-      .option("gcode", "FILE", "the palpation run over it, for a Marlin printer and any host")
-      .option("speed", "MM_PER_S", "of the slides, for --gcode", "10")
-      .option("passes", "N", "slides, 5 mm apart in x (at most 8), for --gcode", "8");
-}
-
-/// The name that Plate::named takes for --texture, --pitch and --height.
-std::string plate_name(const Arguments& arguments) {
-  const std::string texture = arguments.text("texture");
-  std::vector<std::string> kinds;
-  if (texture == "mixed") kinds = {"bumps", "ridges", "waves", "blobs"};
-  if (texture == "bumps" || texture == "ridges" || texture == "waves") kinds = {texture};
-  if (texture == "blob" || texture == "blobs") kinds = {"blobs"};
-  if (kinds.empty()) {
-    for (const char* option : {"pitch", "height"})
-      if (arguments.given(option))
-        throw UsageError(std::string("--") + option +
-                         ": expected with --texture bumps, ridges, waves, blob or mixed, found with " +
-                         texture);
-    return texture;
-  }
-  const double pitch = arguments.given("pitch") ? arguments.number("pitch", 0.5, Plate::kWidthMm) : 6;
-  std::string name;
-  for (const std::string& kind : kinds) {
-    name += (name.empty() ? "" : "+") + kind + format(pitch);
-    if (arguments.given("height")) name += "h" + format(arguments.number("height", 0.05, 20));
-  }
-  return name;
-}
-
-Plate read_plate(const Arguments& arguments) {
-  try {
-    return Plate::named(plate_name(arguments));
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(std::string("--texture: ") + error.what());
-  }
-}
 
 nlohmann::ordered_json write_stl(const Arguments& arguments, const Plate& plate) {
   const std::string path = arguments.text("out");
@@ -88,10 +41,25 @@ nlohmann::ordered_json write_gcode(const Arguments& arguments, const Plate& plat
   return {{"file", path}, {"passes", plan.passes}, {"speed_mm_s", plan.speed}};
 }
 
+}  // namespace
+
+void declare(Arguments& arguments) {
+  arguments
+      .required("plate", "NAME",
+                "a plate of the rig (6_Ridges), kind and pitch in mm (ridges5), with a height "
+                "(ridges5h1.5), several (bumps12+ridges4), or FILE.stl")
+      .option("out", "FILE", "the plate as binary STL in mm, 36 x 108 in x and y, its flat part at z = 0")
+      .option("resolution", "MM", "distance of the points where the surface is exact", "0.125")
+      .option("base", "MM", "material below the lowest point", "3")
+      .option("gcode", "FILE", "the palpation run over it, for a Marlin printer and any host")
+      .option("speed", "MM_PER_S", "of the slides, for --gcode", "10")
+      .option("passes", "N", "slides, 5 mm apart in x (at most 8), for --gcode", "8");
+}
+
 int run(Arguments& arguments) {
   if (!arguments.given("out") && !arguments.given("gcode"))
     throw UsageError("--out: expected a file for the plate (or --gcode one for the run), found neither");
-  const Plate plate = read_plate(arguments);
+  const Plate plate = read_option("plate", [&] { return Plate::named(arguments.text("plate")); });
   nlohmann::ordered_json result{{"plate", plate.name()}};
   if (arguments.given("out")) result["stl"] = write_stl(arguments, plate);
   if (arguments.given("gcode")) result["gcode"] = write_gcode(arguments, plate);
@@ -99,14 +67,4 @@ int run(Arguments& arguments) {
   return kExitOk;
 }
 
-}  // namespace
 }  // namespace supertac
-
-int main(int argc, char** argv) {
-  using namespace supertac;
-  return run_program({.name = "supertac-plate",
-                      .purpose = "Writes a textured plate as STL, and the palpation run as G-code.",
-                      .declare = declare,
-                      .run = run},
-                     argc, argv);
-}

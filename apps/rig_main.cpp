@@ -10,6 +10,29 @@
 namespace supertac {
 namespace {
 
+RigSettings read_settings(const Arguments& arguments) {
+  const auto seed = static_cast<std::uint64_t>(arguments.integer("seed", 0, 1'000'000'000));
+  SimulatorSettings simulator;
+  // The board does what it does.
+  simulator.with_adc = simulator.with_filter = simulator.with_saturation = false;
+  simulator.with_drift = false;  // grows with the clock, and a rig may run for days
+  const FingerIdentity identity{.seed = seed, .trial = static_cast<int>(arguments.integer("trial", 1, 1000))};
+  const Plate plate = read_option("plate", [&] { return Plate::named(arguments.text("plate")); });
+  const FingerModel finger(plate, simulator, identity);
+  RigSettings settings;
+  settings.seed = seed;
+  settings.faults = RigFaults::mixed(arguments.number("faults", 0, 0.1));
+  settings.board.signals = [finger](double x, double y, double z, double t) {
+    const auto volts = finger.volts({x - rig::kPlate.x, y - rig::kPlate.y, z - rig::kPlate.z + finger.slide_z_mm()}, t);
+    std::array<double, kTaxels> frame{};
+    std::copy_n(volts.begin(), frame.size(), frame.begin());
+    return frame;
+  };
+  return settings;
+}
+
+}  // namespace
+
 void declare(Arguments& arguments) {
   arguments
       .required("plate", "NAME",
@@ -22,31 +45,6 @@ void declare(Arguments& arguments) {
       .option("seed", "N", "the same seed gives the same finger and the same faults", "1");
 }
 
-RigSettings read_settings(const Arguments& arguments) {
-  const auto seed = static_cast<std::uint64_t>(arguments.integer("seed", 0, 1'000'000'000));
-  SimulatorSettings simulator;
-  // The board does what it does.
-  simulator.with_adc = simulator.with_filter = simulator.with_saturation = false;
-  simulator.with_drift = false;  // grows with the clock, and a rig may run for days
-  const FingerIdentity identity{.seed = seed, .trial = static_cast<int>(arguments.integer("trial", 1, 1000))};
-  try {
-    const FingerModel finger(Plate::named(arguments.text("plate")), simulator, identity);
-    RigSettings settings;
-    settings.seed = seed;
-    settings.faults = RigFaults::mixed(arguments.number("faults", 0, 0.1));
-    settings.board.signals = [finger](double x, double y, double z, double t) {
-      const auto volts =
-          finger.volts({x - rig::kPlate.x, y - rig::kPlate.y, z - rig::kPlate.z + finger.slide_z_mm()}, t);
-      std::array<double, kTaxels> frame{};
-      std::copy_n(volts.begin(), frame.size(), frame.begin());
-      return frame;
-    };
-    return settings;
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(std::string("--plate: ") + error.what());
-  }
-}
-
 int run(Arguments& arguments) {
   const PtyRig rig(read_settings(arguments), arguments.text("board-link"), arguments.text("printer-link"),
                    arguments.number("speedup", 0.1, 100));
@@ -56,14 +54,4 @@ int run(Arguments& arguments) {
   return kExitOk;
 }
 
-}  // namespace
 }  // namespace supertac
-
-int main(int argc, char** argv) {
-  using namespace supertac;
-  return run_program({.name = "supertac-rig",
-                      .purpose = "A virtual tactile board and Marlin printer behind two pseudo-terminals.",
-                      .declare = declare,
-                      .run = run},
-                     argc, argv);
-}

@@ -27,31 +27,10 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
-void declare(Arguments& arguments) {
-  arguments.required("out", "DIR", "folder for the recordings, one file per pass")
-      .option("plates", "NAME,...",
-              "plates of the rig (3_Bumps, ...), plain, kind and pitch in mm (ridges6), or FILE.stl",
-              joined(default_plates()))
-      .option("speeds", "MM_PER_S,...", "sliding speeds in mm/s", "5,10")
-      .option("trials", "N", "trials of every plate and speed", "2")
-      .option("passes", "N", "passes of every trial, 5 mm apart in x (at most 8)", "8")
-      .option("from", "MM", "where the finger's centre begins to slide; T samples before a window are needed",
-              "28")
-      .option("to", "MM", "where the slide ends", "80")
-      .option("array", "ROWSxCOLUMNS", "taxels of the finger, 2 to 16 either way", "4x4")
-      .option("pitch", "MM", "from taxel to taxel", "3")
-      .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms()))
-      .option("seed", "N", "the same seed gives the same files", "1");
-}
-
 std::vector<Plate> read_plates(const Arguments& arguments) {
   std::vector<Plate> plates;
   for (const std::string& name : arguments.list("plates")) {
-    try {
-      plates.push_back(Plate::named(name));
-    } catch (const std::invalid_argument& error) {
-      throw UsageError(std::string("--plates: ") + error.what());
-    }
+    plates.push_back(read_option("plates", [&] { return Plate::named(name); }));
   }
   if (plates.empty()) throw UsageError("--plates: expected at least one plate");
   return plates;
@@ -74,11 +53,7 @@ SimulatorSettings read_settings(const Arguments& arguments) {
   SimulatorSettings settings;
   settings.array = read_array(arguments);
   for (const std::string& term : arguments.list("without")) {
-    try {
-      settings = without_term(settings, term);
-    } catch (const std::invalid_argument& error) {
-      throw UsageError(std::string("--without: ") + error.what());
-    }
+    settings = read_option("without", [&] { return without_term(settings, term); });
   }
   return settings;
 }
@@ -140,15 +115,30 @@ std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& sett
   return frames;
 }
 
+}  // namespace
+
+void declare(Arguments& arguments) {
+  arguments.required("out", "DIR", "folder for the recordings, one file per pass")
+      .option("plates", "NAME,...",
+              "plates of the rig (3_Bumps, ...), plain, kind and pitch in mm (ridges6), or FILE.stl",
+              joined(default_plates()))
+      .option("speeds", "MM_PER_S,...", "sliding speeds in mm/s", "5,10")
+      .option("trials", "N", "trials of every plate and speed", "2")
+      .option("passes", "N", "passes of every trial, 5 mm apart in x (at most 8)", "8")
+      .option("from", "MM", "where the finger's centre begins to slide; T samples before a window are needed",
+              "28")
+      .option("to", "MM", "where the slide ends", "80")
+      .option("array", "ROWSxCOLUMNS", "taxels of the finger, 2 to 16 either way", "4x4")
+      .option("pitch", "MM", "from taxel to taxel", "3")
+      .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms()))
+      .option("seed", "N", "the same seed gives the same files", "1");
+}
+
 int run(Arguments& arguments) {
   const auto plates = read_plates(arguments);
   const auto settings = read_settings(arguments);
   const auto seed = static_cast<std::uint64_t>(arguments.integer("seed", 0, INT64_MAX));
   if (arguments.list("speeds").empty()) throw UsageError("--speeds: expected at least one speed");
-  arguments.numbers("speeds", 0.5, rig::kFastestMmS);
-  arguments.integer("trials", 1, 1000);
-  arguments.integer("passes", 1, rig::kPasses);
-
   OutputFolder folder(arguments.text("out"), arguments.force());
   const auto jobs = plan(arguments, plates, folder);
   std::size_t frames = 0;
@@ -168,12 +158,4 @@ int run(Arguments& arguments) {
   return kExitOk;
 }
 
-}  // namespace
 }  // namespace supertac
-
-int main(int argc, char** argv) {
-  using namespace supertac;
-  return run_program(
-      {"supertac-simulate", "Simulates recordings of the finger sliding over plates.", declare, run}, argc,
-      argv);
-}

@@ -2,12 +2,10 @@
 
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <iostream>
-#include <map>
 #include <vector>
 
 #include "apps/common/nearest.h"
@@ -17,49 +15,19 @@
 namespace supertac {
 namespace {
 
-namespace fs = std::filesystem;
-constexpr std::string_view kPrefix = "supertac-";
+struct Job {
+  std::string name, purpose;
+};
 
-const std::map<std::string, std::string>& purposes() {
-  static const std::map<std::string, std::string> kPurposes = {
-      {"check", "looks at permissions, disk and kernels, and does a small same-bits run"},
-      {"classify", "trains and tests the texture classifier"},
-      {"collect", "records passes with the rig"},
-      {"evaluate", "measures a model on recordings, beside the baselines"},
-      {"import", "imports the rig's text recordings"},
-      {"info", "prints what a file holds"},
-      {"pairs", "writes recordings as pairs of images"},
-      {"plate", "writes a plate as STL, and the palpation run as G-code"},
-      {"rig", "a virtual board and printer"},
-      {"simulate", "simulates recordings"},
-      {"stream", "shows super-resolved pictures live"},
-      {"sweep", "trains and measures a grid of settings"},
-      {"train", "trains a model on recordings"}};
-  return kPurposes;
-}
+const std::vector<Job> kJobs = {
+#include "programs.inc"
+};
 
-std::vector<std::string> jobs_in(const fs::path& folder) {
-  std::vector<std::string> jobs;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    if (name.starts_with(kPrefix) && ::access(entry->path().c_str(), X_OK) == 0 && !entry->is_directory()) {
-      jobs.push_back(name.substr(kPrefix.size()));
-    }
-  }
-  std::sort(jobs.begin(), jobs.end());
-  return jobs;
-}
-
-void print_help(const std::vector<std::string>& jobs) {
-  std::cout
-      << "Tactile super-resolution: one program per job.\n\nUsage:\n  supertac JOB [options]\n  supertac JOB "
-         "--help\n\n";
-  for (const std::string& job : jobs) {
-    const auto purpose = purposes().find(job);
-    std::cout << "  " << job << std::string(job.size() < 12 ? 12 - job.size() : 1, ' ')
-              << (purpose == purposes().end() ? "" : purpose->second) << '\n';
-  }
+void print_help() {
+  std::cout << "Tactile super-resolution: one program per job.\n\nUsage:\n  supertac JOB [options]\n"
+               "  supertac JOB --help\n\n";
+  for (const Job& job : kJobs)
+    std::cout << "  " << job.name << std::string(12 - job.name.size(), ' ') << job.purpose << '\n';
 }
 
 int fail(const std::string& problem, int code) {
@@ -67,17 +35,21 @@ int fail(const std::string& problem, int code) {
   return code;
 }
 
-int run_job(const fs::path& folder, const std::vector<std::string>& jobs, char** argv) {
-  const std::string job = argv[1];
-  if (std::find(jobs.begin(), jobs.end(), job) == jobs.end()) {
-    const std::string hint = nearest_name(job, jobs);
-    return fail("unknown job " + in_quotes(job) + (hint.empty() ? "" : "; did you mean '" + hint + "'?") +
+int run_job(const std::string& name, char** argv) {
+  std::vector<std::string> names;
+  for (const Job& job : kJobs) names.push_back(job.name);
+  if (std::find(names.begin(), names.end(), name) == names.end()) {
+    const std::string hint = nearest_name(name, names);
+    return fail("unknown job " + in_quotes(name) + (hint.empty() ? "" : "; did you mean '" + hint + "'?") +
                     " (supertac --help lists them)",
                 kExitUsage);
   }
-  const std::string program = (folder / (std::string(kPrefix) + job)).string();
-  argv[1] = const_cast<char*>(program.c_str());  // execv does not write to it
-  ::execv(program.c_str(), argv + 1);
+  std::error_code error;
+  const auto folder = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
+  if (error) return fail("cannot find its own folder: " + error.message(), kExitFailed);
+  std::string program = folder / ("supertac-" + name);
+  argv[1] = program.data();
+  ::execv(argv[1], argv + 1);
   return fail(program + ": cannot be run: " + std::strerror(errno), kExitFailed);
 }
 
@@ -86,20 +58,13 @@ int run_job(const fs::path& folder, const std::vector<std::string>& jobs, char**
 
 int main(int argc, char** argv) {
   using namespace supertac;
-  std::error_code error;
-  const fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
-  if (error) return fail("cannot find its own folder: " + error.message(), kExitFailed);
-  const auto jobs = jobs_in(folder);
   const std::string first = argc > 1 ? argv[1] : "";
   if (first == "--version") {
     std::cout << version_text({"supertac", "", nullptr, nullptr});
-  } else if (first == "--help" || first == "-h") {
-    print_help(jobs);
-  } else if (first.empty()) {
-    print_help(jobs);
-    return kExitUsage;
+  } else if (first == "--help" || first == "-h" || first.empty()) {
+    print_help();
   } else {
-    return run_job(folder, jobs, argv);
+    return run_job(first, argv);
   }
-  return kExitOk;
+  return first.empty() ? kExitUsage : kExitOk;
 }

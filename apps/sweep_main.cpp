@@ -3,7 +3,6 @@
 #include <optional>
 
 #include "apps/common/measure.h"
-#include "apps/common/numerics.h"
 #include "apps/common/program.h"
 #include "apps/common/signals.h"
 #include "apps/common/version.h"
@@ -20,7 +19,6 @@
 #include "models/evaluation.h"
 
 namespace supertac {
-namespace {
 
 namespace fs = std::filesystem;
 
@@ -37,6 +35,8 @@ void declare(Arguments& a) {
   a.option("pick", "CONDITIONS",
            "name the fastest model for which they hold, e.g. \"ssim>=0.8,position_mm<=0.5\"");
 }
+
+namespace {
 
 // What all rows of a table have in common, so that figures of different settings cannot be mixed.
 void check_settings(const Arguments& a) {
@@ -178,6 +178,8 @@ std::string line_of(const Configuration& c) {
          std::to_string(c.seeds) + " seed(s)";
 }
 
+}  // namespace
+
 int run(Arguments& a) {
   const std::string out = a.text("out");
   const std::vector<Condition> conditions =
@@ -217,12 +219,4 @@ int run(Arguments& a) {
   return code;
 }
 
-}  // namespace
 }  // namespace supertac
-
-int main(int argc, char** argv) {
-  const supertac::Program program{"supertac-sweep",
-                                  "Trains and measures a grid of models: accuracy against latency.",
-                                  supertac::declare, supertac::run, supertac::numerics};
-  return supertac::run_program(program, argc, argv);
-}

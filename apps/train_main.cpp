@@ -1,5 +1,4 @@
 // supertac-train: recordings in, a SuperTac model out.
-#include "apps/common/numerics.h"
 #include "apps/common/program.h"
 #include "apps/train/pairs.h"
 #include "apps/train/training_options.h"
@@ -7,7 +6,6 @@
 #include "io/file.h"
 
 namespace supertac {
-namespace {
 
 void declare(Arguments& a) {
   a.option("data", "DIR", "recordings to train on (supertac-simulate, -import, -collect)");
@@ -26,6 +24,8 @@ void declare(Arguments& a) {
   a.option("resume", "FILE", "continue from the last.safetensors of an interrupted run, same options");
 }
 
+namespace {
+
 TrainingSettings settings_of(const Arguments& a) {
   const std::string preset = a.choice("preset", {"paper", "tiny"});
   TrainingSettings s = training_settings(a, SuperTacSettings::of_preset(preset));
@@ -38,6 +38,8 @@ TrainingSettings settings_of(const Arguments& a) {
   s.seed = static_cast<std::uint64_t>(a.integer("seed", 0, std::numeric_limits<std::int64_t>::max()));
   return s;
 }
+
+}  // namespace
 
 int run(Arguments& a) {
   if (a.given("pairs")) return train_on_pairs(a);
@@ -68,11 +70,4 @@ int run(Arguments& a) {
   return kExitOk;
 }
 
-}  // namespace
 }  // namespace supertac
-
-int main(int argc, char** argv) {
-  const supertac::Program program{"supertac-train", "Trains a tactile super-resolution model on recordings.",
-                                  supertac::declare, supertac::run, supertac::numerics};
-  return supertac::run_program(program, argc, argv);
-}

@@ -17,6 +17,16 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What work() returns; an std::invalid_argument of it becomes a UsageError that names the option.
+template <class Work>
+auto read_option(const std::string& option, Work work) {
+  try {
+    return work();
+  } catch (const std::invalid_argument& error) {
+    throw UsageError("--" + option + ": " + error.what());
+  }
+}
+
 /// Options of one program. Every program also has --help, --version, --json, --quiet, --threads and --force.
 class Arguments {
  public:

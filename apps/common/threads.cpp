@@ -34,13 +34,6 @@ int quota() {
     if (const auto limit = quota_of_cpu_max(first_line(folder + "/cpu.max")))
       lowest = std::min(lowest, *limit);
   }
-  // Version 1.
-  const auto limit = parse_int(first_line("/sys/fs/cgroup/cpu/cpu.cfs_quota_us"));
-  const std::string period = first_line("/sys/fs/cgroup/cpu/cpu.cfs_period_us");
-  if (limit && *limit > 0) {
-    const auto cpus = quota_of_cpu_max(std::to_string(*limit) + " " + period);
-    if (cpus) lowest = std::min(lowest, *cpus);
-  }
   return lowest;
 }
 

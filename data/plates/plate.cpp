@@ -4,37 +4,60 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <map>
 #include <stdexcept>
 #include <string_view>
 
 #include "io/same_bits.h"
 
 namespace supertac {
+
+/// All that is particular to a texture. One row of kKinds adds one; nothing else names it.
+struct TextureKind {
+  std::string_view word;            // in a plate's name, before the pitch
+  double (*width)(const Texture&);  // of an element (mm)
+  /// Height (mm) at (dx, dy) from the centre of the nearest element; dx is 0 for a texture of lines along x.
+  double (*height)(const Texture&, double dx, double dy);
+  bool lines = true;   // along x: the height depends on y only
+  bool round = false;  // half as high as wide, so that the height is at most half the pitch
+  double lowest = 0;   // trough, in heights
+};
+
 namespace {
 
 constexpr double kFitSlackMm = 1e-9;  // an element that fits exactly still fits after rounding
 
+// Widths of an element, and heights at (dx, dy) from its centre.
 double ridge_base(const Texture& t) { return std::min(rig::kRidgeBaseMm, t.pitch_mm); }
-
-double element_width(const Texture& t) {
-  switch (t.kind) {
-    case TextureKind::ridges:
-      return ridge_base(t);
-    case TextureKind::waves:
-      return t.pitch_mm / 2;  // a crest: the band ends with one on either side
-    default:
-      return 2 * t.height_mm;
-  }
+double ridge(const Texture& t, double, double dy) {
+  return t.height_mm * std::max(0.0, 1 - 2 * std::abs(dy) / ridge_base(t));
 }
+
+double diameter(const Texture& t) { return 2 * t.height_mm; }
+double half_round(const Texture& t, double dx, double dy) {
+  return std::sqrt(std::max(0.0, t.height_mm * t.height_mm - (dx * dx + dy * dy)));
+}
+
+double half_pitch(const Texture& t) { return t.pitch_mm / 2; }  // a crest: troughs lie between crests
+double wave(const Texture& t, double, double dy) {
+  return t.height_mm * same_bits::cosine(dy / t.pitch_mm);
+}
+
+constexpr TextureKind kKinds[] = {
+    {.word = "ridges", .width = ridge_base, .height = ridge},
+    {.word = "bumps", .width = diameter, .height = half_round, .round = true},
+    {.word = "waves", .width = half_pitch, .height = wave, .lowest = -1},
+    {.word = "blobs", .width = diameter, .height = half_round, .lines = false, .round = true}};
+
+struct RigPlate {
+  const char *name, *generic;
+};
+constexpr RigPlate kRigPlates[] = {{"3_Bumps", "bumps12"},  {"6_Bumps", "bumps6"}, {"4_Ridges", "ridges9"},
+                                   {"6_Ridges", "ridges6"}, {"4_Waves", "waves9"}, {"6_Waves", "waves6"},
+                                   {"4_Blob", "blobs9"},    {"6_Blob", "blobs6"}};
 
 int elements_that_fit(double length, double pitch, double width) {
   if (length + kFitSlackMm < width) return 0;
   return static_cast<int>(std::floor((length - width + kFitSlackMm) / pitch)) + 1;
-}
-
-double semicircle(double radius, double squared_distance) {
-  return std::sqrt(std::max(0.0, radius * radius - squared_distance));
 }
 
 // Distance from `at` to the nearest of `count` centres.
@@ -44,10 +67,12 @@ double distance_to_nearest(double at, double first, double pitch, int count) {
 }
 
 [[noreturn]] void refuse(const std::string& name, const std::string& why) {
-  throw std::invalid_argument(
-      "plate \"" + name + "\": " + why +
-      "; expected a rig plate such as 3_Bumps, or plain, or ridges|bumps|waves|blobs with "
-      "a pitch in mm such as bumps12 or ridges6h1.5, several joined by +, or an STL file");
+  std::string words;
+  for (const TextureKind& kind : kKinds) words += (words.empty() ? "" : "|") + std::string(kind.word);
+  throw std::invalid_argument("plate \"" + name + "\": " + why +
+                              "; expected a rig plate such as 3_Bumps, or plain, or " + words +
+                              " with a pitch in mm such as bumps12 or ridges6h1.5, several joined by +, or "
+                              "an STL file");
 }
 
 // Reads a number at the front of `text` and removes it.
@@ -60,34 +85,32 @@ double take_number(std::string_view& text, const std::string& name, const char* 
   return value;
 }
 
-Texture parse_texture(std::string_view text, const std::string& name) {
-  static constexpr std::pair<std::string_view, TextureKind> kKinds[] = {{"ridges", TextureKind::ridges},
-                                                                        {"bumps", TextureKind::bumps},
-                                                                        {"waves", TextureKind::waves},
-                                                                        {"blobs", TextureKind::blobs}};
-  if (text == "plain") return {};
-  for (const auto& [word, kind] : kKinds) {
-    if (!text.starts_with(word)) continue;
-    text.remove_prefix(word.size());
-    Texture t{.kind = kind, .pitch_mm = take_number(text, name, "pitch"), .height_mm = rig::kTextureHeightMm};
-    const bool round = kind == TextureKind::bumps || kind == TextureKind::blobs;
-    if (round) t.height_mm = std::min(rig::kTextureHeightMm, t.pitch_mm / 2);
-    if (text.starts_with('h')) {
-      text.remove_prefix(1);
-      t.height_mm = take_number(text, name, "height");
-    }
-    if (!text.empty()) refuse(name, "cannot read \"" + std::string(text) + "\"");
-    return t;
-  }
+// The kind whose word `text` begins with; nothing for plain.
+const TextureKind* kind_of(std::string_view text, const std::string& name) {
+  if (text == "plain") return nullptr;
+  for (const TextureKind& kind : kKinds)
+    if (text.starts_with(kind.word)) return &kind;
   refuse(name, "unknown texture \"" + std::string(text) + "\"");
 }
 
+Texture parse_texture(std::string_view text, const std::string& name) {
+  const TextureKind* kind = kind_of(text, name);
+  if (kind == nullptr) return {};
+  text.remove_prefix(kind->word.size());
+  Texture t{.kind = std::string(kind->word), .pitch_mm = take_number(text, name, "pitch")};
+  t.height_mm = kind->round ? std::min(rig::kTextureHeightMm, t.pitch_mm / 2) : rig::kTextureHeightMm;
+  if (text.starts_with('h')) {
+    text.remove_prefix(1);
+    t.height_mm = take_number(text, name, "height");
+  }
+  if (!text.empty()) refuse(name, "cannot read \"" + std::string(text) + "\"");
+  return t;
+}
+
 std::string generic_name(const std::string& name) {
-  static const std::map<std::string, std::string> kRig = {
-      {"3_Bumps", "bumps12"}, {"6_Bumps", "bumps6"}, {"4_Ridges", "ridges9"}, {"6_Ridges", "ridges6"},
-      {"4_Waves", "waves9"},  {"6_Waves", "waves6"}, {"4_Blob", "blobs9"},    {"6_Blob", "blobs6"}};
-  const auto found = kRig.find(name);
-  return found == kRig.end() ? name : found->second;
+  for (const RigPlate& plate : kRigPlates)
+    if (name == plate.name) return plate.generic;
+  return name;
 }
 
 }  // namespace
@@ -116,18 +139,18 @@ Plate Plate::named(const std::string& name) {
 Plate::Plate(std::string name, const std::vector<Texture>& textures) : name_(std::move(name)) {
   texture_begin_ = texture_end_ = kLengthMm / 2;
   for (const Texture& texture : textures) {
-    if (texture.kind == TextureKind::plain) continue;
+    const TextureKind* kind = kind_of(texture.kind, name_);
+    if (kind == nullptr) continue;
     if (!(texture.pitch_mm > 0) || !(texture.height_mm > 0))
       refuse(name_, "pitch and height must be positive");
-    const bool round = texture.kind == TextureKind::bumps || texture.kind == TextureKind::blobs;
-    if (round && 2 * texture.height_mm > texture.pitch_mm + kFitSlackMm)
-      refuse(name_, "bumps and blobs are twice as wide as high and overlap at this pitch");
-    const Band band = lay_out(texture);
+    if (kind->round && 2 * texture.height_mm > texture.pitch_mm + kFitSlackMm)
+      refuse(name_, texture.kind + " are twice as wide as high and overlap at this pitch");
+    const Band band = lay_out(texture, *kind);
     if (band.count_y < 1) refuse(name_, "no element fits between its ends");
     texture_begin_ = bands_.empty() ? band.begin : std::min(texture_begin_, band.begin);
     texture_end_ = bands_.empty() ? band.end : std::max(texture_end_, band.end);
     max_height_ = std::max(max_height_, texture.height_mm);
-    if (texture.kind == TextureKind::waves) min_height_ = std::min(min_height_, -texture.height_mm);
+    min_height_ = std::min(min_height_, kind->lowest * texture.height_mm);
     bands_.push_back(band);
   }
 }
@@ -140,9 +163,9 @@ Plate::Plate(std::string name, HeightMap map)
       texture_begin_(map_->texture_begin()),
       texture_end_(map_->texture_end()) {}
 
-Plate::Band Plate::lay_out(const Texture& texture) {
-  Band band{.texture = texture};
-  const double width = element_width(texture), pitch = texture.pitch_mm;
+Plate::Band Plate::lay_out(const Texture& texture, const TextureKind& kind) {
+  Band band{.texture = texture, .kind = &kind};
+  const double width = kind.width(texture), pitch = texture.pitch_mm;
   band.count_y = elements_that_fit(texture.to_mm - texture.from_mm, pitch, width);
   band.count_x = elements_that_fit(kWidthMm, pitch, width);
   band.first_y = (texture.from_mm + texture.to_mm) / 2 - (band.count_y - 1) * pitch / 2;
@@ -154,23 +177,9 @@ Plate::Band Plate::lay_out(const Texture& texture) {
 
 double Plate::Band::height(double x_mm, double y_mm) const {
   if (y_mm <= begin || y_mm >= end) return 0;
-  const double h = texture.height_mm;
   const double dy = distance_to_nearest(y_mm, first_y, texture.pitch_mm, count_y);
-  switch (texture.kind) {
-    case TextureKind::ridges:
-      return h * std::max(0.0, 1 - 2 * std::abs(dy) / ridge_base(texture));
-    case TextureKind::bumps:
-      return semicircle(h, dy * dy);
-    case TextureKind::waves:
-      return h * same_bits::cosine(dy / texture.pitch_mm);
-    case TextureKind::blobs: {
-      const double dx = distance_to_nearest(x_mm, first_x, texture.pitch_mm, count_x);
-      return semicircle(h, dx * dx + dy * dy);
-    }
-    case TextureKind::plain:
-      break;
-  }
-  return 0;
+  const double dx = kind->lines ? 0 : distance_to_nearest(x_mm, first_x, texture.pitch_mm, count_x);
+  return kind->height(texture, dx, dy);
 }
 
 double Plate::height(double x_mm, double y_mm) const {
@@ -191,14 +200,13 @@ std::vector<double> Plate::crests() const {
 
 bool Plate::uniform_in_x() const {
   if (map_) return map_->uniform_in_x();
-  return std::none_of(bands_.begin(), bands_.end(),
-                      [](const Band& b) { return b.texture.kind == TextureKind::blobs; });
+  return std::all_of(bands_.begin(), bands_.end(), [](const Band& b) { return b.kind->lines; });
 }
 
-const std::vector<std::string>& rig_plates() {
-  static const std::vector<std::string> kNames = {"3_Bumps", "6_Bumps", "4_Ridges", "6_Ridges",
-                                                  "4_Waves", "6_Waves", "4_Blob",   "6_Blob"};
-  return kNames;
+std::vector<std::string> rig_plates() {
+  std::vector<std::string> names;
+  for (const RigPlate& plate : kRigPlates) names.emplace_back(plate.name);
+  return names;
 }
 
 const std::vector<std::string>& default_plates() {

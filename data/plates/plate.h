@@ -9,22 +9,16 @@
 
 namespace supertac {
 
-enum class TextureKind { plain, ridges, bumps, waves, blobs };
+struct TextureKind;  // what an element looks like: a row of the table in plate.cpp
 
-/// One texture of a plate: `count` equal elements along y, centred on `centre_mm`.
-/// Height z of one element at distance d (mm) from its centre line (blobs: from its centre, in x and y):
-///   ridges  h (1 - 2|d| / base), base = min(rig::kRidgeBaseMm, pitch)        triangular
-///   bumps   sqrt(h^2 - d^2), width 2h                          semi-circular
-///   blobs   sqrt(h^2 - d^2)                                    hemispheres, in columns centred on the plate
-///   waves   h cos(2 pi d / pitch)                              count - 1/2 periods, crest first and last
-/// and 0 elsewhere. Ridges, bumps and waves vary along y only.
+/// One texture of a plate: equal elements, pitch_mm apart, each as the table in plate.cpp draws it, 0 between
+/// them.
 struct Texture {
-  TextureKind kind = TextureKind::plain;
-  double pitch_mm = 0;   ///< distance between neighbouring centres
-  double height_mm = 0;  ///< of the highest point above the plate's base
-  double from_mm =
-      rig::kTextureFromMm;  ///< the texture is laid out in [from, to], centred, as many elements as fit whole
-  double to_mm = rig::kTextureToMm;
+  std::string kind = "plain";  ///< or ridges, bumps, waves, blobs, ...
+  double pitch_mm = 0;         ///< distance between neighbouring centres
+  double height_mm = 0;        ///< of the highest point above the plate's base
+  /// The texture is laid out in [from, to], centred, as many elements as fit whole.
+  double from_mm = rig::kTextureFromMm, to_mm = rig::kTextureToMm;
 };
 
 /// The surface the finger slides over: kWidthMm (x) by kLengthMm (y), with its texture in the middle third.
@@ -34,11 +28,11 @@ class Plate {
   static constexpr double kWidthMm = rig::kPlateWidthMm, kLengthMm = rig::kPlateLengthMm;
 
   /// A plate by name. Plates of the rig (RIG plates): 3_Bumps, 6_Bumps, 4_Ridges, 6_Ridges, 4_Waves,
-  /// 6_Waves, 4_Blob, 6_Blob. Others: "plain", or KIND PITCH [h HEIGHT] in mm with KIND one of ridges, bumps,
-  /// waves, blobs ("bumps12", "ridges6h1.5"), or several joined by '+', which share the length equally
-  /// ("bumps12+ridges4"). Default height rig::kTextureHeightMm, for bumps and blobs at most pitch / 2. Or the
-  /// path of an STL file of a plate's size (data/height_map.h), whose plate has the file's name without
-  /// folders. Throws std::invalid_argument naming the part that could not be read; FileError for an STL file.
+  /// 6_Waves, 4_Blob, 6_Blob. Others: "plain", or KIND PITCH [h HEIGHT] in mm ("bumps12", "ridges6h1.5"), or
+  /// several joined by '+', which share the length equally ("bumps12+ridges4"). Default height rig::kTextureHeightMm, for round
+  /// elements (bumps, blobs) at most pitch / 2. Or the path of an STL file of a plate's size
+  /// (data/plates/height_map.h), whose plate has the file's name without folders.
+  /// Throws std::invalid_argument naming the part that could not be read; FileError for an STL file.
   static Plate named(const std::string& name);
   /// True when the name is that of an STL file: it ends with ".stl".
   static bool is_file(const std::string& name);
@@ -61,11 +55,11 @@ class Plate {
   double texture_begin() const { return texture_begin_; }
   double texture_end() const { return texture_end_; }
 
-  /// Where the elements' highest lines (blobs: rows of centres; maps: HeightMap::crests) lie along y (mm),
+  /// Where the elements' highest lines or rows of centres (maps: HeightMap::crests) lie along y (mm),
   /// ascending; empty when plain.
   std::vector<double> crests() const;
 
-  /// True when the height depends on y only (everything but blobs; a map within 0.05 mm).
+  /// True when the height depends on y only (a map: within 0.05 mm).
   bool uniform_in_x() const;
 
   const std::string& name() const { return name_; }
@@ -73,12 +67,13 @@ class Plate {
  private:
   struct Band {  // one texture with its layout worked out
     Texture texture;
+    const TextureKind* kind = nullptr;
     int count_y = 0, count_x = 0;
     double first_y = 0, first_x = 0;  // centre of the first element
     double begin = 0, end = 0;        // extent along y
     double height(double x_mm, double y_mm) const;
   };
-  static Band lay_out(const Texture& texture);
+  static Band lay_out(const Texture& texture, const TextureKind& kind);
 
   std::string name_;
   std::vector<Band> bands_;
@@ -88,7 +83,7 @@ class Plate {
 
 /// Names of the eight plates of the rig, and of the six that simulations use by default (the paper's bumps
 /// and ridges at 12, 6 and 4 mm).
-const std::vector<std::string>& rig_plates();
+std::vector<std::string> rig_plates();
 const std::vector<std::string>& default_plates();
 
 }  // namespace supertac

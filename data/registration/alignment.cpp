@@ -1,22 +1,15 @@
 #include "data/registration/alignment.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <vector>
 
-#include "data/recordings/resample.h"
+#include "data/registration/profile.h"
 #include "io/median.h"
 
 namespace supertac {
 namespace {
 
-constexpr std::size_t kRows = rig::kTaxelRows, kColumns = rig::kTaxelColumns;
-constexpr double kFromMm = 22, kToMm = 92, kStepMm = 0.1, kSmoothMm = 1;
-constexpr std::size_t kPoints = static_cast<std::size_t>((kToMm - kFromMm) / kStepMm) + 1;
-constexpr std::size_t kFewestPoints = 200;  // to speak of a correlation
 constexpr double kMiddleMm = 54, kHalfMm = 26;
 constexpr double kPenalty = 0.002, kUsualShiftMm = 0.5, kUsualStretchMm = 1;
 constexpr double kFirstStepMm = 0.4, kLastStepMm = 0.01;
@@ -26,7 +19,6 @@ constexpr double kLeastAgreement = 0.5;
 // A loss is sought where passes disagree, and believed when they agree so much better with it.
 constexpr double kDisagreement = 0.9, kGain = 0.05;
 constexpr double kLossEveryS = 0.2, kLossStepS = 0.1, kLongestLossS = 0.8;
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 struct Change {
   double shift_mm = 0, stretch_mm = 0;
@@ -44,98 +36,6 @@ Registration changed(Registration r, const Change& change) {
   return r;
 }
 
-using Row = std::array<double, kPoints>;
-using Profile = std::array<Row, kRows>;
-
-// Mean 0, deviation 1 over the points that are known; all unknown when there are too few or nothing changes.
-void standardise(Row& row) {
-  double n = 0, sum = 0, squares = 0;
-  for (const double v : row)
-    if (std::isfinite(v)) n += 1, sum += v, squares += v * v;
-  const double mean = sum / n, deviation = std::sqrt(std::max(0.0, squares / n - mean * mean));
-  const bool flat = n < kFewestPoints || !(deviation > 1e-6);
-  for (double& v : row) v = flat ? kUnknown : (v - mean) / deviation;
-}
-
-// How far each row is pressed, over time.
-class Signals {
- public:
-  Signals(const Recording& recording, const Registration& registration) {
-    const auto& time = recording.time_s;
-    const auto begin = std::lower_bound(time.begin(), time.end(), registration.valid_from_s);
-    const auto end = std::upper_bound(begin, time.end(), registration.valid_until_s);
-    time_s_.assign(begin, end);
-    const auto first = static_cast<std::size_t>(begin - time.begin());
-    for (std::size_t row = 0; row < kRows; ++row) {
-      std::vector<double> pressed(time_s_.size());
-      for (std::size_t i = 0; i < pressed.size(); ++i)
-        for (std::size_t column = 0; column < kColumns; ++column) {
-          const float v = recording.volts[(first + i) * kTaxels + row * kColumns + column];
-          pressed[i] += std::isfinite(v) ? Scaling{}(v) / kColumns : 0;
-        }
-      sum_[row].assign(pressed.size() + 1, 0);
-      for (std::size_t i = 0; i < pressed.size(); ++i) sum_[row][i + 1] = sum_[row][i] + pressed[i];
-    }
-  }
-
-  const std::vector<double>& time_s() const { return time_s_; }
-
-  Signals with(const Loss& loss) const {
-    Signals later = *this;
-    for (double& t : later.time_s_) t += t >= loss.at_s ? loss.seconds : 0;
-    return later;
-  }
-
-  Profile along(const Registration& r) const {
-    Profile profile;
-    std::size_t from = 0, to = 0;
-    for (std::size_t point = 0; point < kPoints; ++point) {
-      const double y = kFromMm + static_cast<double>(point) * kStepMm;
-      while (from < time_s_.size() && r.start_mm + r.rate * time_s_[from] < y - kSmoothMm) ++from;
-      while (to < time_s_.size() && r.start_mm + r.rate * time_s_[to] <= y + kSmoothMm) ++to;
-      const bool known = from > 0 && to < time_s_.size() && from < to;
-      for (std::size_t row = 0; row < kRows; ++row)
-        profile[row][point] =
-            known ? (sum_[row][to] - sum_[row][from]) / static_cast<double>(to - from) : kUnknown;
-    }
-    for (Row& row : profile) standardise(row);
-    return profile;
-  }
-
- private:
-  std::vector<double> time_s_;
-  std::array<std::vector<double>, kRows> sum_;  // of all frames before
-};
-
-Profile mean_of_others(const std::vector<Profile>& profiles, std::size_t left_out) {
-  Profile mean;
-  for (std::size_t row = 0; row < kRows; ++row)
-    for (std::size_t point = 0; point < kPoints; ++point) {
-      double n = 0, sum = 0;
-      for (std::size_t i = 0; i < profiles.size(); ++i)
-        if (const double v = profiles[i][row][point]; i != left_out && std::isfinite(v)) n += 1, sum += v;
-      mean[row][point] = n > 0 ? sum / n : kUnknown;
-    }
-  return mean;
-}
-
-// Pearson's, mean over the rows that both know.
-double correlation(const Profile& a, const Profile& b) {
-  double rows = 0, total = 0;
-  for (std::size_t row = 0; row < kRows; ++row) {
-    double n = 0, sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
-    for (std::size_t point = 0; point < kPoints; ++point) {
-      const double u = a[row][point], v = b[row][point];
-      if (!std::isfinite(u) || !std::isfinite(v)) continue;
-      n += 1, sa += u, sb += v, saa += u * u, sbb += v * v, sab += u * v;
-    }
-    if (n < kFewestPoints) continue;
-    const double spread = (saa - sa * sa / n) * (sbb - sb * sb / n);
-    if (spread > 0) rows += 1, total += (sab - sa * sb / n) / std::sqrt(spread);
-  }
-  return rows > 0 ? total / rows : -1;
-}
-
 struct Found {
   Change change;
   Loss loss;
@@ -143,7 +43,7 @@ struct Found {
 };
 
 // Pattern search (Hooke & Jeeves 1961): steps along a and b, halved when none is better.
-Found best_change(const Signals& signals, const Registration& registration, const Profile& others,
+Found best_change(const PassSignals& signals, const Registration& registration, const Profile& others,
                   const Change& start) {
   const auto score = [&](const Change& c, double& agreement) {
     agreement = correlation(signals.along(changed(registration, c)), others);
@@ -174,14 +74,15 @@ Registration before_loss(Registration registration, const Loss& loss) {
 }
 
 // The one loss of frames with which the pass agrees best with the others, if by much.
-Found with_loss(const Signals& signals, const Registration& registration, const Profile& others,
+Found with_loss(const PassSignals& signals, const Registration& registration, const Profile& others,
                 const Found& without) {
   Found best = without;
   const std::vector<double>& time = signals.time_s();
   for (double at = time.front() + kLossEveryS; at < time.back(); at += kLossEveryS) {
     for (double seconds = kLossStepS; seconds <= kLongestLossS; seconds += kLossStepS) {
       const Loss loss{.at_s = at, .seconds = seconds};
-      Found tried = best_change(signals.with(loss), before_loss(registration, loss), others, without.change);
+      Found tried = best_change(signals.delayed(loss.at_s, loss.seconds), before_loss(registration, loss),
+                                others, without.change);
       tried.loss = loss;
       if (tried.agreement > best.agreement) best = tried;
     }
@@ -191,7 +92,7 @@ Found with_loss(const Signals& signals, const Registration& registration, const 
 
 struct Aligned {
   Registration registration;
-  Signals signals;
+  PassSignals signals;
   Found found;
 
   Profile profile() const { return signals.along(changed(registration, found.change)); }
@@ -235,7 +136,7 @@ bool find_losses(std::vector<Aligned>& passes) {
     if (pass.found.agreement > kDisagreement || pass.found.agreement < kLeastAgreement) continue;
     pass.found = with_loss(pass.signals, pass.registration, mean_of_others(profiles, i), pass.found);
     if (pass.found.loss.seconds == 0) continue;
-    pass.signals = pass.signals.with(pass.found.loss);
+    pass.signals = pass.signals.delayed(pass.found.loss.at_s, pass.found.loss.seconds);
     pass.registration = before_loss(pass.registration, pass.found.loss);
     any = true;
   }
@@ -251,7 +152,7 @@ void align_passes(std::span<const RegisteredPass> passes) {
     if (!pass.registration->reliable) continue;
     if (pass.recording->array != TaxelArray{})
       throw std::invalid_argument("align_passes: expected recordings of the rig's 4x4 array, found another");
-    reliable.push_back({*pass.registration, Signals(*pass.recording, *pass.registration), {}});
+    reliable.push_back({*pass.registration, PassSignals(*pass.recording, *pass.registration), {}});
     results.push_back(pass.registration);
   }
   if (reliable.size() < kFewestPasses) return;

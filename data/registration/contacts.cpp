@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kBinS = 0.01;  // time resolution; dips last 0.2 s and more
 constexpr std::size_t kMaxBins = 1'000'000;
+constexpr double kMinDepthV = 0.008, kMinShare = 0.1;
 constexpr double kFlatV = 1e-6;  // a saturated dip is flat up to rounding
 
 // One taxel's signal as means over bins of kBinS, pressing upwards; empty bins are bridged by straight lines.
@@ -60,10 +61,10 @@ double rim(const std::vector<double>& x, std::ptrdiff_t top, std::ptrdiff_t step
   return lowest;
 }
 
-void find_in(const std::vector<double>& x, int taxel, double start_s, const ContactSettings& settings,
+void find_in(const std::vector<double>& x, int taxel, double start_s, double reach_s,
              std::vector<Contact>& found) {
   const auto n = static_cast<std::ptrdiff_t>(x.size());
-  const auto reach = static_cast<std::ptrdiff_t>(settings.reach_s / kBinS);
+  const auto reach = static_cast<std::ptrdiff_t>(reach_s / kBinS);
   const std::size_t first = found.size();
   double deepest = 0;
   for (std::ptrdiff_t i = 1; i + 1 < n; ++i) {
@@ -74,7 +75,7 @@ void find_in(const std::vector<double>& x, int taxel, double start_s, const Cont
       ++j;
     if (j + 1 >= n || x[static_cast<std::size_t>(j + 1)] > x[static_cast<std::size_t>(i)]) continue;
     const double depth = x[static_cast<std::size_t>(i)] - std::max(rim(x, i, -1, reach), rim(x, j, 1, reach));
-    if (depth < settings.min_depth_v) continue;
+    if (depth < kMinDepthV) continue;
     const double level = x[static_cast<std::size_t>(i)] - depth / 2;
     const double left = crossing(x, i, -1, level), right = crossing(x, j, 1, level);
     deepest = std::max(deepest, depth);
@@ -84,14 +85,14 @@ void find_in(const std::vector<double>& x, int taxel, double start_s, const Cont
                      .width_s = (right - left) * kBinS});
     i = j;
   }
-  const auto shallow = [&](const Contact& c) { return c.depth_v < settings.min_share * deepest; };
+  const auto shallow = [&](const Contact& c) { return c.depth_v < kMinShare * deepest; };
   found.erase(std::remove_if(found.begin() + static_cast<std::ptrdiff_t>(first), found.end(), shallow),
               found.end());
 }
 
 }  // namespace
 
-std::vector<Contact> find_contacts(const Recording& recording, const ContactSettings& settings) {
+std::vector<Contact> find_contacts(const Recording& recording, double reach_s) {
   const std::size_t n = recording.frames();
   if (recording.array != TaxelArray{})
     throw std::invalid_argument("find_contacts: expected the rig's " + TaxelArray{}.text() + ", got " +
@@ -108,7 +109,7 @@ std::vector<Contact> find_contacts(const Recording& recording, const ContactSett
                                 std::to_string(static_cast<int>(kMaxBins * kBinS)) + " s");
   const auto bins = static_cast<std::size_t>(duration / kBinS);
   for (int k = 0; k < kTaxels; ++k)
-    find_in(binned(recording, k, bins), k, recording.time_s[0], settings, found);
+    find_in(binned(recording, k, bins), k, recording.time_s[0], reach_s, found);
   return found;
 }
 

@@ -14,15 +14,10 @@ struct Contact {
   double width_s = 0;  ///< at half the depth
 };
 
-struct ContactSettings {
-  double reach_s = 0.5;        ///< rims are sought this far to either side: about 0.6 pitches
-  double min_depth_v = 0.008;  ///< shallower dips are noise
-  double min_share = 0.1;      ///< ... or shallower than this share of the taxel's deepest dip
-};
-
-/// The contacts of all taxels, by taxel and time. Frames that hold no finite number are skipped; a taxel that
-/// never moves has none. Throws std::invalid_argument when the recording is not of the rig's array or
-/// its arrays do not fit together.
-std::vector<Contact> find_contacts(const Recording& recording, const ContactSettings& settings = {});
+/// The contacts of all taxels, by taxel and time. Rims are sought within reach_s to either side (about 0.6
+/// pitches); dips shallower than 8 mV, or than a tenth of the taxel's deepest one, are noise. Frames that
+/// hold no finite number are skipped; a taxel that never moves has none. Throws std::invalid_argument when
+/// the recording is not of the rig's array or its arrays do not fit together.
+std::vector<Contact> find_contacts(const Recording& recording, double reach_s = 0.5);
 
 }  // namespace supertac

@@ -19,6 +19,8 @@ constexpr double kRoundingVolts = 1e-5;  // of a step in a text file
 constexpr double kSigma = 1.4826;        // of a normal distribution, over the median absolute deviation
 constexpr double kLeastSteps = 1.5, kUncertainties = 3;
 constexpr double kSeenUncertainty = 0.25;
+constexpr double kBurstVolts = 0.08, kBurstRatio = 60, kQuietVolts = 1e-4;
+constexpr std::size_t kBurstNeighbours = 100;
 
 // Of one signal.
 double step_before(const Recording& recording, std::size_t i, std::size_t s) {
@@ -63,6 +65,17 @@ Steps steps_before(const Recording& recording, std::size_t i, std::span<const Us
   return {.count = agreement / information, .uncertainty = 1 / std::sqrt(information)};
 }
 
+// Sum of the taxels' changes before each frame.
+std::vector<double> changes(const Recording& recording) {
+  std::vector<double> change(recording.frames());
+  for (std::size_t i = 1; i < change.size(); ++i)
+    for (std::size_t k = 0; k < kTaxels; ++k) {
+      const double step = std::abs(recording.volts[i * kTaxels + k] - recording.volts[(i - 1) * kTaxels + k]);
+      if (std::isfinite(step)) change[i] += step;
+    }
+  return change;
+}
+
 }  // namespace
 
 std::vector<double> find_lost_frames(const Recording& recording, double rate_hz) {
@@ -92,6 +105,24 @@ void restore_clock(Recording& recording, double rate_hz) {
   std::partial_sum(lost.begin(), lost.end(), lost.begin());
   for (std::size_t i = 0; i < recording.frames(); ++i) recording.time_s[i] += lost[i] / rate_hz;
   recording.metadata["lost_frames"] = format(lost.empty() ? 0 : lost.back(), 0);
+}
+
+std::vector<Stretch> stretches_of(const Recording& recording) {
+  const std::vector<double> change = changes(recording);
+  std::vector<double> sum(change.size() + 1);
+  for (std::size_t i = 0; i < change.size(); ++i) sum[i + 1] = sum[i] + change[i];
+  std::vector<Stretch> parts = {{.begin_s = recording.time_s.front()}};
+  for (std::size_t i = 1; i < change.size(); ++i) {
+    if (change[i] < kBurstVolts) continue;
+    const std::size_t from = i > kBurstNeighbours ? i - kBurstNeighbours : 0;
+    const std::size_t to = std::min(i + kBurstNeighbours + 1, change.size());
+    const double usual = (sum[to] - sum[from] - change[i]) / static_cast<double>(to - from - 1);
+    if (change[i] < kBurstRatio * (usual + kQuietVolts)) continue;
+    parts.back().end_s = recording.time_s[i - 1];
+    parts.push_back({.begin_s = recording.time_s[i]});
+  }
+  parts.back().end_s = recording.time_s.back();
+  return parts;
 }
 
 }  // namespace supertac

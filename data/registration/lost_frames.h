@@ -22,4 +22,13 @@ std::vector<double> find_lost_frames(const Recording& recording, double rate_hz)
 /// says how many there were.
 void restore_clock(Recording& recording, double rate_hz);
 
+struct Stretch {
+  double begin_s = 0, end_s = 0;
+};
+
+/// The recording cut at its bursts of lost frames, at least one stretch: where the signals of all taxels
+/// change from one frame to the next by 0.08 V in sum and by 60 times what is usual in the 200 frames around.
+/// A moving average does not jump. Throws nothing; the recording must have a frame.
+std::vector<Stretch> stretches_of(const Recording& recording);
+
 }  // namespace supertac

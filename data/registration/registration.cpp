@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "data/recordings/simulator.h"
 #include "data/registration/contacts.h"
+#include "data/registration/lost_frames.h"
 #include "io/numbers.h"
 #include "io/same_bits.h"
 
@@ -26,11 +26,6 @@ constexpr double kSlowest = 0.6, kFastest = 2.2, kRateStep = 0.01;
 constexpr int kMinContacts = 8, kMinElements = 3;
 constexpr double kMinMatched = 0.4, kMinCoverage = 0.3, kMaxResidualMm = 0.55, kMinMargin = 0.03;
 
-// A change from one frame to the next, summed over the taxels, that is so large and so far above the usual
-// one around it is a burst of lost frames: a moving average does not jump.
-constexpr double kBurstVolts = 0.08, kBurstRatio = 60, kQuietVolts = 1e-4;
-constexpr std::size_t kBurstNeighbours = 100;
-
 struct Event {
   int row = 0;
   double time = 0, weight = 0;
@@ -47,40 +42,6 @@ struct Match {
   double weight = 0;
 };
 
-struct Stretch {
-  double begin_s = 0, end_s = 0;
-};
-
-// Sum of the taxels' changes before each frame.
-std::vector<double> changes(const Recording& recording) {
-  std::vector<double> change(recording.frames());
-  for (std::size_t i = 1; i < change.size(); ++i)
-    for (std::size_t k = 0; k < kTaxels; ++k) {
-      const double step = std::abs(recording.volts[i * kTaxels + k] - recording.volts[(i - 1) * kTaxels + k]);
-      if (std::isfinite(step)) change[i] += step;
-    }
-  return change;
-}
-
-// The recording cut at its bursts of lost frames.
-std::vector<Stretch> stretches(const Recording& recording) {
-  const std::vector<double> change = changes(recording);
-  std::vector<double> sum(change.size() + 1);
-  for (std::size_t i = 0; i < change.size(); ++i) sum[i + 1] = sum[i] + change[i];
-  std::vector<Stretch> parts = {{.begin_s = recording.time_s.front()}};
-  for (std::size_t i = 1; i < change.size(); ++i) {
-    if (change[i] < kBurstVolts) continue;
-    const std::size_t from = i > kBurstNeighbours ? i - kBurstNeighbours : 0;
-    const std::size_t to = std::min(i + kBurstNeighbours + 1, change.size());
-    const double usual = (sum[to] - sum[from] - change[i]) / static_cast<double>(to - from - 1);
-    if (change[i] < kBurstRatio * (usual + kQuietVolts)) continue;
-    parts.back().end_s = recording.time_s[i - 1];
-    parts.push_back({.begin_s = recording.time_s[i]});
-  }
-  parts.back().end_s = recording.time_s.back();
-  return parts;
-}
-
 class Fit {
  public:
   Fit(const Recording& recording, const Plate& plate)
@@ -88,17 +49,16 @@ class Fit {
         troughs_(plate.min_height() < 0),
         speed_(recording.speed_mm_s > 0 ? recording.speed_mm_s : rig::kSlideMmS),
         middle_s_((recording.time_s.front() + recording.time_s.back()) / 2) {
-    const std::vector<Contact> contacts = find_contacts(recording, {.reach_s = 0.6 * pitch() / speed_});
+    const std::vector<Contact> contacts = find_contacts(recording, 0.6 * pitch() / speed_);
     double most = 0;
-    for (const Stretch& stretch : stretches(recording)) {
+    for (const Stretch& stretch : stretches_of(recording)) {
       double weight = 0;
       for (const Contact& c : contacts) weight += inside(c, stretch) ? weight_of(c) : 0.0;
       if (weight > most) most = weight, stretch_ = stretch;
     }
     for (const Contact& c : contacts)
       if (inside(c, stretch_))
-        events_.push_back(
-            {.row = c.taxel / rig::kTaxelColumns, .time = c.time_s - middle_s_, .weight = weight_of(c)});
+        events_.push_back({.row = c.taxel / rig::kTaxelColumns, .time = c.time_s - middle_s_, .weight = weight_of(c)});
   }
 
   std::size_t events() const { return events_.size(); }
@@ -194,8 +154,7 @@ class Fit {
   }
 
   bool elsewhere(const Line& a, const Line& b) const {
-    return std::abs(a.middle_mm - b.middle_mm) > pitch() / 2 ||
-           std::abs(same_bits::log(a.rate / b.rate)) > 0.25;
+    return std::abs(a.middle_mm - b.middle_mm) > pitch() / 2 || std::abs(same_bits::log(a.rate / b.rate)) > 0.25;
   }
 
   Line scored(double middle_mm, double rate) const {
@@ -222,8 +181,7 @@ class Fit {
 
   // Of the (element, row) pairs the stretch reached: share felt (line.coverage), and share of elements felt
   // by a row.
-  void felt_shares(const std::vector<std::array<double, rig::kTaxelRows>>& felt, Line& line,
-                   double& elements) const {
+  void felt_shares(const std::vector<std::array<double, rig::kTaxelRows>>& felt, Line& line, double& elements) const {
     double pairs = 0, felt_pairs = 0, reached = 0, felt_elements = 0;
     for (std::size_t j = 0; j < crests_.size(); ++j) {
       double best = -1;
@@ -246,13 +204,9 @@ class Fit {
   std::vector<Event> events_;
 };
 
-double filter_delay(const Recording& recording) {
-  const auto found = recording.metadata.find("filter_s");
-  if (found != recording.metadata.end()) return parse_double(found->second).value_or(0) / 2;
-  return recording.source == "imported" ? rig::kFilterS / 2 : 0;
-}
+}  // namespace
 
-std::string judge_reason(const Registration& r) {
+std::string why_unreliable(const Registration& r) {
   if (r.contacts < kMinContacts)
     return "only " + std::to_string(r.contacts) + " contacts, need " + std::to_string(kMinContacts);
   if (r.elements < kMinElements)
@@ -266,8 +220,6 @@ std::string judge_reason(const Registration& r) {
   if (r.margin < kMinMargin) return "another start fits as well (off by a pitch?)";
   return "";
 }
-
-}  // namespace
 
 Registration register_pass(const Recording& recording, const Plate& plate) {
   Registration result;
@@ -287,71 +239,12 @@ Registration register_pass(const Recording& recording, const Plate& plate) {
   fit.judge(best, result);
   result.rate = best.rate;
   // Signals trail the finger: where a contact shows at t, the finger has been since t - delay.
-  result.start_mm = best.middle_mm - best.rate * fit.middle_s() + fit.speed() * filter_delay(recording);
+  result.start_mm = best.middle_mm - best.rate * fit.middle_s() + fit.speed() * recording.filter_s() / 2;
   result.valid_from_s = fit.stretch().begin_s;
   result.valid_until_s = fit.stretch().end_s;
-  result.reason = judge_reason(result);
+  result.reason = why_unreliable(result);
   result.reliable = result.reason.empty();
   return result;
-}
-
-// Frames lost where nothing moved: a straight line from the signals before to those behind. Where the finger
-// was in each of them is left open.
-static void fill_loss(const Registration& registration, Recording& recording) {
-  std::vector<double>& time = recording.time_s;
-  const auto found = std::lower_bound(time.begin(), time.end(), registration.lost_at_s);
-  const auto at = static_cast<std::size_t>(found - time.begin());
-  for (std::size_t i = at; i < time.size(); ++i) time[i] += registration.lost_s;
-  if (at < 2 || at == time.size()) return;  // nothing on one side
-  const std::size_t signals = recording.array.signals();
-  const double step = (time[at - 1] - time[0]) / static_cast<double>(at - 1), gap = time[at] - time[at - 1];
-  const auto lost = static_cast<std::size_t>(std::max(0.0, gap / step - 1));
-  std::vector<double> times(lost);
-  std::vector<float> volts(lost * signals);
-  std::vector<float> places(2 * lost, std::numeric_limits<float>::quiet_NaN());
-  for (std::size_t k = 0; k < lost; ++k) {
-    const double part = static_cast<double>(k + 1) / static_cast<double>(lost + 1);
-    times[k] = time[at - 1] + part * gap;
-    for (std::size_t s = 0; s < signals; ++s)
-      volts[k * signals + s] = std::lerp(recording.volts[(at - 1) * signals + s],
-                                         recording.volts[at * signals + s], static_cast<float>(part));
-    places[2 * k] = recording.position_mm[0];
-  }
-  const auto before = static_cast<std::ptrdiff_t>(at);
-  time.insert(time.begin() + before, times.begin(), times.end());
-  recording.volts.insert(recording.volts.begin() + before * static_cast<std::ptrdiff_t>(signals),
-                         volts.begin(), volts.end());
-  recording.position_mm.insert(recording.position_mm.begin() + 2 * before, places.begin(), places.end());
-}
-
-void apply(const Registration& registration, Recording& recording) {
-  const auto base = recording.metadata.find("time_base");
-  const bool nominal = base != recording.metadata.end() && base->second == "nominal";
-  const std::size_t n = recording.frames();
-  recording.position_mm.resize(2 * n);
-  const auto x = static_cast<float>(rig::pass_x_mm(recording.pass));
-  for (std::size_t i = 0; i < n; ++i) {
-    const double y = registration.y_mm(recording.time_s[i]);
-    const bool known =
-        recording.time_s[i] >= registration.valid_from_s && recording.time_s[i] <= registration.valid_until_s;
-    recording.position_mm[2 * i] = x;
-    recording.position_mm[2 * i + 1] = known ? static_cast<float>(std::clamp(y, 0.0, Plate::kLengthMm))
-                                             : std::numeric_limits<float>::quiet_NaN();
-  }
-  if (registration.lost_s > 0) fill_loss(registration, recording);
-  if (nominal && registration.reliable) {  // the finger's speed is known better than the rate of the lines
-    const double speed = recording.speed_mm_s > 0 ? recording.speed_mm_s : rig::kSlideMmS;
-    for (double& t : recording.time_s) t *= registration.rate / speed;
-    recording.metadata["time_base"] = "registered";
-  }
-  recording.metadata["registration_start_mm"] = format(registration.start_mm, 3);
-  recording.metadata["registration_rate"] = format(registration.rate, 4);
-  recording.metadata["registration_residual_mm"] = format(registration.residual, 3);
-  recording.metadata["registration_reliable"] = registration.reliable ? "yes" : "no";
-  recording.metadata["registration_reason"] = registration.reason;
-  recording.metadata["registration_shift_mm"] = format(registration.shift_mm, 3);
-  recording.metadata["registration_stretch_mm"] = format(registration.stretch_mm, 3);
-  recording.metadata["registration_lost_s"] = format(registration.lost_s, 3);
 }
 
 }  // namespace supertac

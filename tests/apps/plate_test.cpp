@@ -14,14 +14,14 @@ namespace {
 
 TEST(PlateProgram, WritesThePlateAndTheRun) {
   const TemporaryFolder folder;
-  for (const char* texture : {"bumps", "ridges", "waves", "blob", "mixed", "4_Ridges", "bumps12+ridges4"}) {
-    const std::string file = folder / (std::string(texture) + ".stl");
-    const auto made = run_process("supertac-plate", {"--texture", texture, "--resolution", "0.5", "--out",
-                                                     file, "--gcode", file + ".gcode", "--json", "-"});
+  for (const char* name : {"bumps6", "waves6h1", "4_Ridges", "bumps12+ridges4+waves6+blobs6"}) {
+    const std::string file = folder / (std::string(name) + ".stl");
+    const auto made = run_process("supertac-plate", {"--plate", name, "--resolution", "0.5", "--out", file,
+                                                     "--gcode", file + ".gcode", "--json", "-"});
     ASSERT_EQ(made.code, 0) << made.error;
     const auto json = nlohmann::json::parse(made.out);
     const Plate plate = Plate::named(file);
-    EXPECT_NEAR(plate.max_height(), json["stl"]["max_height_mm"], 0.13) << texture;
+    EXPECT_NEAR(plate.max_height(), json["stl"]["max_height_mm"], 0.13) << name;
     EXPECT_NE(read_text_file(file + ".gcode", 1 << 20).find("; SuperTac: 8 passes"), std::string::npos);
   }
 }
@@ -29,21 +29,26 @@ TEST(PlateProgram, WritesThePlateAndTheRun) {
 TEST(PlateProgram, RefusesWhatItCannotPrint) {
   const TemporaryFolder folder;
   const std::string out = folder / "x.stl";
-  EXPECT_EQ(run_process("supertac-plate", {"--texture", "bumps"}).code, 2);
-  EXPECT_EQ(run_process("supertac-plate", {"--texture", "lumps", "--out", out}).code, 2);
-  EXPECT_EQ(run_process("supertac-plate", {"--texture", "blob", "--height", "9", "--out", out}).code, 2);
-  EXPECT_EQ(run_process("supertac-plate", {"--texture", "6_Blob", "--pitch", "9", "--out", out}).code, 2);
-  EXPECT_EQ(run_process("supertac-plate", {"--texture", folder / "no.stl", "--out", out}).code, 1);
+  EXPECT_EQ(run_process("supertac-plate", {"--plate", "bumps6"}).code, 2);
+  const auto unknown = run_process("supertac-plate", {"--plate", "lumps6", "--out", out});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_EQ(
+      unknown.error,
+      "supertac-plate: --plate: plate \"lumps6\": unknown texture \"lumps6\"; expected a rig plate such as "
+      "3_Bumps, or plain, or ridges|bumps|waves|blobs with a pitch in mm such as bumps12 or ridges6h1.5, "
+      "several joined by +, or an STL file (see --help)\n");
+  EXPECT_EQ(run_process("supertac-plate", {"--plate", "blobs6h9", "--out", out}).code, 2);
+  EXPECT_EQ(run_process("supertac-plate", {"--plate", folder / "no.stl", "--out", out}).code, 1);
   write_file(out, std::string("solid nothing\nendsolid"));
-  EXPECT_EQ(run_process("supertac-plate", {"--texture", "bumps", "--out", out}).code, 1) << "no --force";
-  const auto bad = run_process("supertac-plate", {"--texture", out, "--gcode", folder / "x.gcode"});
+  EXPECT_EQ(run_process("supertac-plate", {"--plate", "bumps6", "--out", out}).code, 1) << "no --force";
+  const auto bad = run_process("supertac-plate", {"--plate", out, "--gcode", folder / "x.gcode"});
   EXPECT_EQ(bad.code, 1);
   EXPECT_NE(bad.error.find("holds no triangle"), std::string::npos) << bad.error;
 }
 
 TEST(PlateProgram, APrintedPlateIsSimulatedAndImportedLikeANamedOne) {
   const TemporaryFolder folder;
-  ASSERT_EQ(run_process("supertac-plate", {"--texture", "6_Ridges", "--out", folder / "my.stl"}).code, 0);
+  ASSERT_EQ(run_process("supertac-plate", {"--plate", "6_Ridges", "--out", folder / "my.stl"}).code, 0);
   const auto simulated =
       run_process("supertac-simulate", {"--plates", folder / "my.stl", "--out", folder / "sim", "--speeds",
                                         "10", "--trials", "1", "--passes", "1"});

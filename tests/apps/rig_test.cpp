@@ -21,8 +21,7 @@ class RigTest : public testing::Test {
  protected:
   RigTest() {
     setenv("XDG_STATE_HOME", (folder_ / "state").c_str(), 1);
-    const auto made =
-        run_process("supertac-plate", {"--texture", "ridges", "--pitch", "9", "--out", folder_ / "my.stl"});
+    const auto made = run_process("supertac-plate", {"--plate", "ridges9", "--out", folder_ / "my.stl"});
     if (made.code != 0) throw std::runtime_error(made.error);
     rig_ = std::make_unique<RunningProcess>(
         "supertac-rig",

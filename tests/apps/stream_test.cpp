@@ -1,4 +1,5 @@
-// supertac-stream as a process: boards on a virtual rig in the test's own process, captures, recordings.
+// Stream, and supertac-stream as a process: boards on a virtual rig in the test's own process, captures,
+// recordings.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -7,6 +8,7 @@
 
 #include "apps/stream/latency_histogram.h"
 #include "apps/stream/picture_log.h"
+#include "apps/stream/stream.h"
 #include "apps/stream/terminal_view.h"
 #include "data/recordings/simulator.h"
 #include "data/samples/windows.h"
@@ -133,6 +135,54 @@ TEST_F(Streaming, ARecordingGivesThePicturesOfItsWindows) {
   }
   EXPECT_EQ(compared, times.size());
   EXPECT_GT(compared, recording.frames() - 2 * kTimesteps);
+}
+
+// The same without a process.
+TEST_F(Streaming, EndsWhenItsTimeIsOverAndCounts) {
+  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
+  const Recording recording = simulate_pass(Plate::named("bumps12"), {.to_mm = 40});
+  write_recording(path("recording"), recording);
+  const std::vector<ModelFile> models = load_models({model()});
+  const auto source = open_recording(path("recording"));
+  Stream stream({.seconds = 0.5, .out = path("out")}, models, *source);
+  stream.run();
+  stream.finish({{"kind", "pictures"}});
+  const auto within = [&](double t) { return t - recording.time_s[0] < 0.5; };
+  const auto frames = std::count_if(recording.time_s.begin(), recording.time_s.end(), within);
+  EXPECT_EQ(stream.result()["frames"], frames);
+  EXPECT_EQ(stream.result()["dropped"], 0);
+  EXPECT_GT(stream.pictures(), 100u);
+  EXPECT_EQ(kept("out").f64("time_s").size(), stream.pictures());
+  EXPECT_TRUE(stream.summary().starts_with(std::to_string(frames) + " frames in 0.5 s, " +
+                                           std::to_string(stream.pictures()) + " pictures, latency median "))
+      << stream.summary();
+}
+
+// A board whose frames were long under way.
+class LateBoard : public SensorSource {
+ public:
+  LateBoard() : SensorSource(1.0 / 300, 0, true) {}
+  std::optional<SensorFrame> next(double) override {
+    if (ended()) return std::nullopt;
+    return SensorFrame{frame_++ / 300.0, volts_, monotonic_seconds() - (frame_ > 50 ? 1 : 0)};
+  }
+  bool ended() const override { return frame_ == 100; }
+  BoardCounters counters() override { return {}; }
+  void finish() override {}
+
+ private:
+  std::vector<float> volts_ = std::vector<float>(kTaxels, 2.3F);
+  int frame_ = 0;
+};
+
+TEST_F(Streaming, APictureThatWouldBeLateIsNotMade) {
+  const std::vector<ModelFile> models = load_models({model()});
+  LateBoard board;
+  Stream stream({}, models, board);
+  stream.run();
+  EXPECT_EQ(stream.result()["frames"], 100);
+  EXPECT_GE(stream.result()["dropped"], 50);
+  EXPECT_LT(stream.pictures(), 50u);
 }
 
 TEST_F(Streaming, TakesModelsOfAnyWindowAndRefusesWhatWasFilteredOtherwise) {

@@ -84,15 +84,32 @@ TEST(Plate, MixedPlatesShareTheLength) {
 }
 
 TEST(Plate, RefusesNamesItCannotRead) {
-  for (const char* bad : {"", "7_Bumps", "bumps", "bumpsx", "bumps0", "bumps-3", "ridges6h", "ridges6h1.5z",
-                          "+", "bumps6h4", "ridges6+", "bumps1e400", "waves90", "ridgesnan", "../plain"}) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"", "unknown texture \"\""},
+      {"7_Bumps", "unknown texture \"7_Bumps\""},
+      {"bumps", "no pitch at \"\""},
+      {"bumpsx", "no pitch at \"x\""},
+      {"bumps0", "pitch and height must be positive"},
+      {"bumps-3", "pitch and height must be positive"},
+      {"ridges6h", "no height at \"\""},
+      {"ridges6h1.5z", "cannot read \"z\""},
+      {"+", "unknown texture \"\""},
+      {"bumps6h4", "bumps are twice as wide as high and overlap at this pitch"},
+      {"ridges6+", "unknown texture \"\""},
+      {"bumps1e400", "cannot read \"e400\""},
+      {"waves90", "no element fits between its ends"},
+      {"ridgesnan", "pitch and height must be positive"},
+      {"../plain", "unknown texture \"../plain\""}};
+  for (const auto& [bad, why] : cases) {
     try {
       Plate::named(bad);
       ADD_FAILURE() << "accepted \"" << bad << '"';
     } catch (const std::invalid_argument& error) {
-      EXPECT_NE(std::string(error.what()).find("plate \"" + std::string(bad) + "\""), std::string::npos)
-          << error.what();
-      EXPECT_NE(std::string(error.what()).find("expected"), std::string::npos) << error.what();
+      EXPECT_EQ(
+          std::string(error.what()),
+          "plate \"" + std::string(bad) + "\": " + why +
+              "; expected a rig plate such as 3_Bumps, or plain, or ridges|bumps|waves|blobs with a pitch "
+              "in mm such as bumps12 or ridges6h1.5, several joined by +, or an STL file");
     }
   }
 }

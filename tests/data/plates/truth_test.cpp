@@ -17,7 +17,7 @@ std::vector<float> image_at(const Plate& plate, double x, double y, int size) {
 // One hemisphere, centred on (18, 54): with the finger 3 mm left and 4 mm short of it, the scene is symmetric
 // in neither direction, so a swapped or mirrored axis shows.
 const Plate& one_blob() {
-  static const Plate plate("one blob", {{.kind = TextureKind::blobs, .pitch_mm = 40, .height_mm = 1.5}});
+  static const Plate plate("one blob", {{.kind = "blobs", .pitch_mm = 40, .height_mm = 1.5}});
   return plate;
 }
 

@@ -54,8 +54,8 @@ TEST(Simulator, SameSeedSameRecordingOtherSeedOther) {
 }
 
 TEST(Simulator, EachRowFeelsTheRidgeWhereItIs) {
-  const Recording r = simulate_pass(Plate("one", {{TextureKind::ridges, 40, 2.5}}), {.pass = 4}, clean());
-  const double crest = Plate("one", {{TextureKind::ridges, 40, 2.5}}).crests()[0];
+  const Recording r = simulate_pass(Plate("one", {{"ridges", 40, 2.5}}), {.pass = 4}, clean());
+  const double crest = Plate("one", {{"ridges", 40, 2.5}}).crests()[0];
   for (int k = 0; k < kTaxels; ++k) {
     std::size_t at = 0;
     for (std::size_t i = 0; i < r.frames(); ++i)
@@ -69,7 +69,7 @@ TEST(Simulator, EachRowFeelsTheRidgeWhereItIs) {
 TEST(Simulator, AnyArrayFeelsTheRidgeWhereItIs) {
   SimulatorSettings settings = clean();
   settings.array = {.rows = 6, .columns = 3, .pitch_mm = 2};
-  const Plate plate("one", {{TextureKind::ridges, 40, 2.5}});
+  const Plate plate("one", {{"ridges", 40, 2.5}});
   const Recording r = simulate_pass(plate, {.pass = 4}, settings);
   EXPECT_EQ(r.array, settings.array);
   ASSERT_EQ(r.volts.size(), r.frames() * 18);
@@ -146,7 +146,7 @@ TEST(Simulator, RefusesImpossiblePasses) {
 }
 
 TEST(FingerModel, TheMountLiftsTheOtherRowsOffThePlate) {
-  const Plate plate("one", {{TextureKind::bumps, 40, 2.5}});
+  const Plate plate("one", {{"bumps", 40, 2.5}});
   SimulatorSettings yielding = clean();
   yielding.with_mount = true;
   const double crest = plate.crests()[0];

@@ -42,4 +42,26 @@ inline Recording lossy_pass(const std::string& plate, int pass, std::uint64_t se
   return r;
 }
 
+inline constexpr double kLineHz = 812;
+
+// A simulated pass over the whole plate as the rig's text files have it: 29 frames of 36 kept, no time stamps
+// but the nominal ones. The true positions stay with the frames for comparison.
+inline Recording like_the_rig(const std::string& plate, int pass, std::uint64_t seed, double late_s = 0,
+                              double early_s = 0, double speed = 10) {
+  SimulatorSettings settings;
+  settings.rate_hz = kBoardHz;
+  const Recording full = simulate_pass(
+      Plate::named(plate), {.pass = pass, .speed_mm_s = speed, .from_mm = 0, .to_mm = 108}, settings, seed);
+  Recording text = full;
+  text.time_s.clear(), text.volts.clear(), text.position_mm.clear();
+  text.source = "imported";
+  for (std::size_t i = 0; i < full.frames(); ++i) {
+    if (i % 36 >= 29 || full.time_s[i] < late_s || full.time_s[i] > full.time_s.back() - early_s) continue;
+    text.time_s.push_back(static_cast<double>(text.time_s.size()) / kLineHz);
+    for (std::size_t k = 0; k < kTaxels; ++k) text.volts.push_back(full.volts[i * kTaxels + k]);
+    for (std::size_t axis = 0; axis < 2; ++axis) text.position_mm.push_back(full.position_mm[2 * i + axis]);
+  }
+  return text;
+}
+
 }  // namespace supertac

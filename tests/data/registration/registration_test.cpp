@@ -7,34 +7,13 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "data/recordings/simulator.h"
 #include "data/recordings/text_import.h"
+#include "data/registration/apply_registration.h"
 #include "data/registration/lost_frames.h"
+#include "tests/data/registration/lossy_pass.h"
 
 namespace supertac {
 namespace {
-
-constexpr double kBoardHz = 1008.06, kLineHz = 812;
-
-// A simulated pass over the whole plate as the rig's text files have it: 29 frames of 36 kept, no time stamps
-// but the nominal ones. The true positions stay with the frames for comparison.
-Recording like_the_rig(const std::string& plate, int pass, std::uint64_t seed, double late_s = 0,
-                       double early_s = 0, double speed = 10) {
-  SimulatorSettings settings;
-  settings.rate_hz = kBoardHz;
-  const Recording full = simulate_pass(
-      Plate::named(plate), {.pass = pass, .speed_mm_s = speed, .from_mm = 0, .to_mm = 108}, settings, seed);
-  Recording text = full;
-  text.time_s.clear(), text.volts.clear(), text.position_mm.clear();
-  text.source = "imported";
-  for (std::size_t i = 0; i < full.frames(); ++i) {
-    if (i % 36 >= 29 || full.time_s[i] < late_s || full.time_s[i] > full.time_s.back() - early_s) continue;
-    text.time_s.push_back(static_cast<double>(text.time_s.size()) / kLineHz);
-    for (std::size_t k = 0; k < kTaxels; ++k) text.volts.push_back(full.volts[i * kTaxels + k]);
-    for (std::size_t axis = 0; axis < 2; ++axis) text.position_mm.push_back(full.position_mm[2 * i + axis]);
-  }
-  return text;
-}
 
 struct Error {
   double mean = 0, worst = 0;  // mm, over y = 28..80
@@ -144,8 +123,9 @@ TEST(Registration, ABurstOfLostFramesCutsThePass) {
 
 TEST(Registration, FlagsWhatCannotBeFitted) {
   const Recording pass = like_the_rig("6_Ridges", 4, 8);
-  EXPECT_FALSE(register_pass(pass, Plate::named("plain")).reliable);
-  EXPECT_FALSE(register_pass(Recording{}, Plate::named("3_Bumps")).reliable);
+  EXPECT_EQ(register_pass(pass, Plate::named("plain")).reason,
+            "a plain plate has nothing to register against");
+  EXPECT_EQ(register_pass(Recording{}, Plate::named("3_Bumps")).reason, "the recording is empty");
   Recording silent = pass;
   for (std::size_t k = 0; k < kTaxels; ++k) kill_taxel(silent, k);
   EXPECT_EQ(register_pass(silent, Plate::named("6_Ridges")).reason, "no taxel felt anything");
@@ -157,43 +137,32 @@ TEST(Registration, FlagsWhatCannotBeFitted) {
   EXPECT_FALSE(wrong.reason.empty());
 }
 
-TEST(Registration, ApplyFillsPositionsAndStretchesANominalClock) {
-  Recording recording = like_the_rig("3_Bumps", 4, 9);
-  recording.metadata["time_base"] = "nominal";
-  const Registration r = register_pass(recording, Plate::named("3_Bumps"));
-  ASSERT_TRUE(r.reliable) << r.reason;
-  apply(r, recording);
-  EXPECT_EQ(recording.metadata.at("registration_reliable"), "yes");
-  EXPECT_EQ(recording.metadata.at("time_base"), "registered");
-  EXPECT_EQ(recording.position_mm[0], 15.5F);
-  const std::size_t a = recording.frames() / 3, b = recording.frames() / 2;
-  EXPECT_NEAR((recording.position_mm[2 * b + 1] - recording.position_mm[2 * a + 1]) /
-                  (recording.time_s[b] - recording.time_s[a]),
-              10, 1e-3);
+TEST(Registration, WhatIsNotBelievedSaysWhy) {
+  const Registration good{
+      .residual = 0.55, .contacts = 8, .elements = 3, .matched = 0.4, .coverage = 0.3, .margin = 0.03};
+  EXPECT_EQ(why_unreliable(good), "") << "at every limit";
+  const auto reason = [&](auto change) {
+    Registration r = good;
+    change(r);
+    return why_unreliable(r);
+  };
+  EXPECT_EQ(reason([](Registration& r) { r.contacts = 7; }), "only 7 contacts, need 8");
+  EXPECT_EQ(reason([](Registration& r) { r.elements = 2; }), "only 2 elements of the texture, need 3");
+  EXPECT_EQ(reason([](Registration& r) { r.matched = 0.39; }),
+            "only 39 % of the contacts agree with the plate");
+  EXPECT_EQ(reason([](Registration& r) { r.coverage = 0.29; }),
+            "only 29 % of the plate's elements were felt");
+  EXPECT_EQ(reason([](Registration& r) { r.residual = 0.56; }), "contacts lie 0.56 mm (rms) off the plate");
+  EXPECT_EQ(reason([](Registration& r) { r.margin = 0.029; }),
+            "another start fits as well (off by a pitch?)");
 }
 
-TEST(Registration, ApplyFillsALossWithALine) {
-  const Recording before = like_the_rig("6_Bumps", 4, 3);
-  Registration r = register_pass(before, Plate::named("6_Bumps"));
-  const std::size_t at = 5000, lost = 243;
-  r.lost_at_s = before.time_s[at];
-  r.lost_s = static_cast<double>(lost) / kLineHz;
-  Recording after = before;
-  apply(r, after);
-  ASSERT_EQ(after.frames(), before.frames() + lost);
-  for (std::size_t i = 1; i < after.frames(); ++i) ASSERT_GT(after.time_s[i], after.time_s[i - 1]) << i;
-  for (std::size_t i = 0; i < lost; ++i) {
-    EXPECT_TRUE(std::isnan(after.position_mm[2 * (at + i) + 1]));
-    const float low = std::min(before.volts[(at - 1) * kTaxels], before.volts[at * kTaxels]);
-    const float high = std::max(before.volts[(at - 1) * kTaxels], before.volts[at * kTaxels]);
-    EXPECT_GE(after.volts[(at + i) * kTaxels], low);
-    EXPECT_LE(after.volts[(at + i) * kTaxels], high);
-  }
-  for (const std::size_t i : {at - 1, at}) {  // one straight line in the new stamps
-    const std::size_t now = i < at ? i : i + lost;
-    EXPECT_NEAR(after.position_mm[2 * now + 1], r.start_mm + r.rate * after.time_s[now], 1e-4);
-    EXPECT_EQ(after.volts[now * kTaxels], before.volts[i * kTaxels]);
-  }
+// Only the middle of the texture was felt: it lies as well a pitch further on.
+TEST(Registration, APassThatFitsAPitchFurtherIsFlagged) {
+  const Recording pass = like_the_rig("6_Ridges", 4, 8, 5.2, 5.0);
+  const Registration r = register_pass(pass, Plate::named("6_Ridges"));
+  EXPECT_FALSE(r.reliable);
+  EXPECT_LT(r.margin, 0.03);
 }
 
 // The rig's own recordings: at least 92 of 96 fit, and their residuals are those of contacts, not of guesses.

@@ -35,6 +35,21 @@ TEST(Levelling, TakesHalfTheRestAndDividesByTheSwing) {
   EXPECT_FLOAT_EQ(x[1], 0.0625F / 0.5F) << "a taxel that is pressed throughout keeps half of it";
 }
 
+// 100 frames, each of its own bin: six samples lie at or below the rest, three at or above the top.
+TEST(Levelling, RestAndTopAreTheStatedPercentiles) {
+  std::vector<float> x;
+  for (std::size_t t = 0; t < kFrames; ++t) {
+    x.push_back(static_cast<float>(2 * t) * kStep);
+    x.push_back(0);
+  }
+  level(x, kChannels);
+  const float rest = 10 * kStep, top = 194 * kStep;
+  for (const std::size_t t : {10U, 40U, 90U})
+    EXPECT_FLOAT_EQ(x[t * kChannels],
+                    (static_cast<float>(2 * t) * kStep - kRestRemoved * rest) / (top - rest))
+        << t;
+}
+
 TEST(Levelling, AFingerPressedHarderLooksTheSame) {
   const std::vector<float> soft = levelled(window(0, 0.2F)), hard = levelled(window(0, 0.8F));
   for (std::size_t i = 0; i < soft.size(); ++i) EXPECT_NEAR(soft[i], hard[i], kStep / 0.2F) << i;

@@ -1,0 +1,112 @@
+#include "apps/stream/stream.h"
+
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+
+#include "apps/common/signals.h"
+#include "hardware/serial_port.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kMostLateS = 0.02, kWaitS = 0.05, kFiguresEveryS = 0.5;
+
+}  // namespace
+
+Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models, SensorSource& source)
+    : settings_(settings), source_(source), maker_(models, source), figures_s_(monotonic_seconds()) {
+  state_.array = source.array();
+  state_.scale = maker_.image().height / state_.array.rows;
+  if (!settings.out.empty())
+    log_ =
+        std::make_unique<PictureLog>(settings.out, settings.force, source.array().signals(), maker_.image());
+}
+
+void Stream::run() {
+  if (settings_.view) view_ = std::make_unique<TerminalView>();
+  while (!interrupted()) {
+    const auto frame = source_.next(kWaitS);
+    if (frame && !take(*frame)) break;
+    if (!frame && source_.ended()) break;
+    show();
+  }
+  view_.reset();
+}
+
+void Stream::finish(const std::map<std::string, std::string>& metadata) {
+  view_.reset();
+  if (log_) log_->write(metadata);
+  source_.finish();
+}
+
+std::string Stream::summary() const {
+  const BoardCounters counters = source_.counters();
+  return std::to_string(frames_) + " frames in " + format(last_s_ - first_s_, 1) + " s, " +
+         std::to_string(pictures()) + " pictures, latency median " + format(milliseconds(0.5), 2) +
+         " ms, p99 " + format(milliseconds(0.99), 2) + " ms; lost " + std::to_string(counters.missing) +
+         ", dropped " + std::to_string(dropped());
+}
+
+nlohmann::ordered_json Stream::result() const {
+  const BoardCounters counters = source_.counters();
+  const LiveWindow::Counters& window = maker_.window().counters();
+  return {{"seconds", last_s_ - first_s_},
+          {"frames", frames_},
+          {"pictures", pictures()},
+          {"lost", counters.missing},
+          {"dropped", dropped()},
+          {"suspect", counters.suspect},
+          {"jumps", counters.jumps},
+          {"gaps", window.gaps},
+          {"board_period_us", 1e6 * counters.clock.period_s},
+          {"latency_ms",
+           {{"median", milliseconds(0.5)},
+            {"p99", milliseconds(0.99)},
+            {"p99.9", milliseconds(0.999)},
+            {"max", 1e3 * latency_.max()}}}};
+}
+
+// False when the time is over.
+bool Stream::take(SensorFrame frame) {
+  if (frames_ == 0) first_s_ = frame.time_s, begin_s_ = monotonic_seconds();
+  if (frame.time_s - first_s_ >= settings_.seconds) return false;
+  if (view_ && !source_.live()) frame.arrived_s = keep_pace(frame.time_s);
+  ++frames_;
+  last_s_ = frame.time_s;
+  maker_.push(frame);
+  if (source_.live() && monotonic_seconds() - frame.arrived_s > kMostLateS) {
+    ++too_late_;
+    return true;
+  }
+  const std::span<const float> picture = maker_.picture();
+  if (picture.empty()) return true;
+  latency_.add(monotonic_seconds() - frame.arrived_s);
+  if (log_) log_->add(frame.time_s - first_s_, frame.volts, picture);
+  state_.picture.assign(picture.begin(), picture.end());
+  return true;
+}
+
+double Stream::keep_pace(double time_s) const {
+  const double due = begin_s_ + time_s - first_s_;
+  for (double now = monotonic_seconds(); now < due && !interrupted(); now = monotonic_seconds())
+    usleep(static_cast<useconds_t>(1e6 * std::min(due - now, kWaitS)));
+  return monotonic_seconds();
+}
+
+void Stream::show() {
+  if (!view_) return;
+  const double now = monotonic_seconds();
+  if (now - figures_s_ >= kFiguresEveryS) {
+    const BoardCounters counters = source_.counters();
+    state_.frames_per_s = static_cast<double>(frames_ - figures_frames_) / (now - figures_s_);
+    state_.median_ms = milliseconds(0.5), state_.p99_ms = milliseconds(0.99);
+    state_.lost = counters.missing, state_.dropped = dropped();
+    figures_s_ = now, figures_frames_ = frames_;
+  }
+  state_.taxels = mean_of_channels(state_.array, maker_.window().newest());
+  view_->update(state_);
+}
+
+}  // namespace supertac

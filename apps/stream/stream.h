@@ -1,0 +1,63 @@
+#pragma once
+
+#include <limits>
+#include <map>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <span>
+#include <string>
+
+#include "apps/stream/latency_histogram.h"
+#include "apps/stream/picture_log.h"
+#include "apps/stream/picture_maker.h"
+#include "apps/stream/terminal_view.h"
+
+namespace supertac {
+
+struct StreamSettings {
+  double seconds = std::numeric_limits<double>::infinity();  ///< of signal, after which run() ends
+  std::string out = {};                                      ///< file that keeps the pictures; empty: none
+  bool force = false;                                        ///< an existing file is replaced
+  bool view = false;                                         ///< draw on the terminal
+};
+
+/// From a source's frames to pictures, on the terminal and in a file; counts what was lost and how long a
+/// picture took. A picture of a live source that would be older than 20 ms is not made: where the machine is
+/// too slow, or was busy, the newest count.
+class Stream {
+ public:
+  /// `models` and `source` must outlive this. Throws as PictureMaker and PictureLog.
+  Stream(const StreamSettings& settings, std::span<const ModelFile> models, SensorSource& source);
+
+  /// Until the source ends, `seconds` are over, or a signal comes. What is recorded passes as fast as it
+  /// happened where somebody watches, else as fast as it can.
+  void run();
+  /// Writes the file and ends the source.
+  void finish(const std::map<std::string, std::string>& metadata);
+
+  std::uint64_t pictures() const { return latency_.count(); }
+  double window_s() const { return maker_.window_s(); }
+  /// A line for people, and the same for --json.
+  std::string summary() const;
+  nlohmann::ordered_json result() const;
+
+ private:
+  bool take(SensorFrame frame);
+  double keep_pace(double time_s) const;
+  void show();
+  double milliseconds(double quantile) const { return 1e3 * latency_.quantile(quantile); }
+  std::uint64_t dropped() const { return too_late_ + source_.counters().dropped; }
+
+  StreamSettings settings_;
+  SensorSource& source_;
+  PictureMaker maker_;
+  std::unique_ptr<PictureLog> log_;
+  std::unique_ptr<TerminalView> view_;
+  LatencyHistogram latency_;
+  LiveState state_;
+  std::uint64_t frames_ = 0, too_late_ = 0, figures_frames_ = 0;
+  double first_s_ = 0, last_s_ = 0;  // the sensor's time
+  double begin_s_ = 0, figures_s_ = 0;
+};
+
+}  // namespace supertac

@@ -1,0 +1,155 @@
+#include "data/registration/text_folder.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "data/registration/alignment.h"
+#include "data/registration/apply_registration.h"
+#include "data/registration/lost_frames.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Entries of a folder by name, hidden ones left out.
+std::vector<fs::path> entries_of(const fs::path& folder, bool folders) {
+  std::vector<fs::path> entries;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const bool hidden = entry->path().filename().string().starts_with(".");
+    if (!hidden && entry->is_directory() == folders) entries.push_back(entry->path());
+  }
+  if (error)
+    throw FileError(folder.string(), "cannot list the folder: " + error.message() + "; check the name");
+  std::sort(entries.begin(), entries.end());
+  return entries;
+}
+
+int number_of(const fs::path& path, const std::string& name) {
+  const auto number = parse_int(name);
+  if (number && *number >= 1 && *number <= 1'000'000) return static_cast<int>(*number);
+  throw FileError(path.string(), "expected a number from 1 as its name: TEXT_DIR/<plate>/<trial>/<pass>.txt");
+}
+
+ImportedPass found_pass(const fs::path& folder, const std::string& plate_file) {
+  try {
+    return {.path = {},
+            .plate = Plate::named(plate_file.empty() ? folder.filename().string() : plate_file),
+            .plate_file = plate_file};
+  } catch (const std::invalid_argument& error) {
+    throw FileError(folder.string(), std::string("unknown plate: ") + error.what());
+  }
+}
+
+std::vector<ImportedPass> find_passes(const std::string& root) {
+  std::vector<ImportedPass> passes;
+  for (const fs::path& folder : entries_of(root, true)) {
+    const std::string stl = folder.string() + ".stl";
+    ImportedPass found = found_pass(folder, fs::exists(stl) ? stl : "");
+    found.recording.plate = found.plate.name();
+    for (const fs::path& trial : entries_of(folder, true)) {
+      found.recording.trial = number_of(trial, trial.filename().string());
+      for (const fs::path& pass : entries_of(trial, false)) {
+        if (pass.extension() != ".txt") continue;
+        found.path = pass.string();
+        found.recording.pass = number_of(pass, pass.stem().string());
+        passes.push_back(found);
+      }
+    }
+  }
+  if (passes.empty())
+    throw FileError(root, "holds no <plate>/<trial>/<pass>.txt; name the folder above the plates");
+  return passes;
+}
+
+void read_and_register(ImportedPass& pass, double speed_mm_s) {
+  Recording recording = import_text_pass(pass.path, pass.lines);
+  recording.plate = pass.recording.plate;
+  recording.trial = pass.recording.trial;
+  recording.pass = pass.recording.pass;
+  recording.speed_mm_s = speed_mm_s;
+  restore_clock(recording, rig::kFrameRateHz);
+  pass.registration = register_pass(recording, pass.plate);
+  pass.recording = std::move(recording);
+}
+
+}  // namespace
+
+std::vector<ImportedPass> import_text_folder(const std::string& root, const FolderImport& settings) {
+  const std::vector<ImportedPass> found = find_passes(root);
+  std::vector<ImportedPass> imported;
+  const auto progress = [&](std::size_t done) {
+    if (settings.progress) settings.progress(done, found.size());
+  };
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    progress(i);
+    try {
+      ImportedPass pass = found[i];
+      read_and_register(pass, settings.speed_mm_s);
+      imported.push_back(std::move(pass));
+    } catch (const FileError& error) {
+      if (!settings.left_out) throw;
+      settings.left_out(error);
+    }
+  }
+  if (imported.empty())
+    throw FileError(root, "none of " + std::to_string(found.size()) + " files is a recording");
+  std::map<std::string, std::vector<RegisteredPass>> plates;
+  for (ImportedPass& pass : imported)
+    if (pass.plate.uniform_in_x()) plates[pass.plate.name()].push_back({&pass.recording, &pass.registration});
+  for (const auto& [plate, passes] : plates) {
+    progress(found.size());
+    align_passes(passes);
+  }
+  for (ImportedPass& pass : imported) apply(pass.registration, pass.recording);
+  return imported;
+}
+
+std::string ImportedPass::summary() const {
+  const std::size_t dropped = lines.lines - lines.empty - lines.frames;
+  std::string line = plate.name() + "/" + std::to_string(recording.trial) + "/" +
+                     std::to_string(recording.pass) + ".txt  " + std::to_string(lines.lines) + " lines, " +
+                     std::to_string(dropped) + " dropped (" + std::to_string(lines.malformed()) +
+                     " malformed), residual " + format(registration.residual, 2) + " mm, ";
+  if (registration.agreement > 0) line += "aligned by " + format(registration.shift_mm, 2) + " mm, ";
+  if (registration.lost_s > 0) line += "another " + format(registration.lost_s, 2) + " s lost, ";
+  return line + (registration.reliable ? "reliable" : "not reliable: " + registration.reason);
+}
+
+nlohmann::ordered_json ImportedPass::to_json() const {
+  return {{"file", path},
+          {"plate", plate.name()},
+          {"trial", recording.trial},
+          {"pass", recording.pass},
+          {"lines", lines.lines},
+          {"frames", lines.frames},
+          {"malformed", lines.malformed()},
+          {"too_few_columns", lines.too_few},
+          {"too_many_columns", lines.too_many},
+          {"not_numeric", lines.not_numeric},
+          {"non_finite", lines.non_finite},
+          {"out_of_range", lines.out_of_range},
+          {"registration",
+           {{"start_mm", registration.start_mm},
+            {"rate_mm_s", registration.rate},
+            {"residual_mm", registration.residual},
+            {"contacts", registration.contacts},
+            {"elements", registration.elements},
+            {"matched", registration.matched},
+            {"coverage", registration.coverage},
+            {"margin", registration.margin},
+            {"shift_mm", registration.shift_mm},
+            {"stretch_mm", registration.stretch_mm},
+            {"lost_at_s", registration.lost_at_s},
+            {"lost_s", registration.lost_s},
+            {"agreement", registration.agreement},
+            {"reliable", registration.reliable},
+            {"reason", registration.reason}}}};
+}
+
+}  // namespace supertac

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "data/plates/plate.h"
+#include "data/recordings/text_import.h"
+#include "data/registration/registration.h"
+#include "io/file.h"
+
+namespace supertac {
+
+/// A text recording of the rig, and what became of it.
+struct ImportedPass {
+  std::string path;  ///< of the text file
+  Plate plate;
+  std::string plate_file;  ///< the STL file that describes the plate; empty when its name does
+  Recording recording = {};
+  ImportReport lines = {};
+  Registration registration = {};
+
+  /// A line for people: lines read and dropped, residual, what alignment changed, reliable or why not.
+  std::string summary() const;
+  nlohmann::ordered_json to_json() const;
+};
+
+struct FolderImport {
+  double speed_mm_s = 10;  ///< as commanded, of all passes
+  /// Told of every file that is no recording, which is then left out; it may throw to end the import. Unset:
+  /// the first such file's FileError ends it.
+  std::function<void(const FileError&)> left_out = {};
+  /// Told before each file and before the passes of each plate are aligned, which takes seconds; it may throw
+  /// to stop.
+  std::function<void(std::size_t done, std::size_t files)> progress = {};
+};
+
+/// Imports a folder of the rig's text recordings, <plate>/<trial>/<pass>.txt with <plate> a name that
+/// Plate::named takes or <plate>.stl beside its folder. The recordings have plate, trial, pass, speed,
+/// positions, a clock in seconds and the metadata of apply(); they are in the order of their names.
+///
+/// The files hold no clock. It is rewritten four times, and each step needs what the one before left:
+///   1. import_text_pass() counts the lines: frame i at i / rig::kFrameRateHz. A dropped line keeps its place.
+///   2. restore_clock() puts back the time of frames that the host lost, seen as steps of all signals. A
+///   registration
+///      fits a straight line through the clock, and through a clock with holes none fits within a millimetre.
+///   3. register_pass() finds start and rate against the plate, from this pass alone.
+///   4. align_passes() compares the reliable passes of a plate (one that feels the same along every line) and
+///   moves
+///      them onto each other; so it needs all their registrations. It finds losses of frames where nothing
+///      moves, which left no step for 2.
+///   5. apply() writes positions, then the losses that 4 found, then stretches the clock to the commanded
+///   speed. It is
+///      last, since the registrations count by the clock of step 2.
+/// Throws FileError when the folder cannot be read, holds no pass, a plate is unknown, a trial or pass is no
+/// number, or no file is a recording.
+std::vector<ImportedPass> import_text_folder(const std::string& root, const FolderImport& settings);
+
+}  // namespace supertac

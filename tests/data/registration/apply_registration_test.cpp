@@ -1,0 +1,100 @@
+#include "data/registration/apply_registration.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/data/registration/lossy_pass.h"
+
+namespace supertac {
+namespace {
+
+TEST(ApplyRegistration, FillsPositionsAndStretchesANominalClock) {
+  Recording recording = like_the_rig("3_Bumps", 4, 9);
+  recording.metadata["time_base"] = "nominal";
+  const Registration r = register_pass(recording, Plate::named("3_Bumps"));
+  ASSERT_TRUE(r.reliable) << r.reason;
+  apply(r, recording);
+  EXPECT_EQ(recording.metadata.at("registration_reliable"), "yes");
+  EXPECT_EQ(recording.metadata.at("time_base"), "registered");
+  EXPECT_EQ(recording.position_mm[0], 15.5F);
+  const std::size_t a = recording.frames() / 3, b = recording.frames() / 2;
+  EXPECT_NEAR((recording.position_mm[2 * b + 1] - recording.position_mm[2 * a + 1]) /
+                  (recording.time_s[b] - recording.time_s[a]),
+              10, 1e-3);
+}
+
+// Ten frames, a quarter of a second apart; the signals are 2 V before frame 5 and 1 V from there on.
+Recording step_at_frame_5() {
+  Recording recording;
+  recording.pass = 2;
+  for (int i = 0; i < 10; ++i) {
+    recording.time_s.push_back(0.25 * i);
+    recording.volts.insert(recording.volts.end(), kTaxels, i < 5 ? 2.0F : 1.0F);
+  }
+  return recording;
+}
+
+Registration lost(double at_s, double seconds) {
+  return {.start_mm = 40, .rate = 10, .valid_until_s = 100, .lost_at_s = at_s, .lost_s = seconds};
+}
+
+TEST(ApplyRegistration, ALossIsFilledWithALine) {
+  Recording r = step_at_frame_5();
+  apply(lost(1.25, 1), r);
+  ASSERT_EQ(r.frames(), 14u);
+  const float line[] = {2, 1.8F, 1.6F, 1.4F, 1.2F, 1};
+  for (std::size_t i = 4; i < 10; ++i)
+    for (const std::size_t k : {0, 15}) EXPECT_FLOAT_EQ(r.volts[i * kTaxels + k], line[i - 4]) << i;
+  for (std::size_t i = 0; i < 14; ++i) {
+    EXPECT_DOUBLE_EQ(r.time_s[i], 0.25 * static_cast<double>(i));
+    EXPECT_EQ(r.position_mm[2 * i], 5.5F);
+    EXPECT_EQ(std::isnan(r.position_mm[2 * i + 1]), i >= 5 && i < 9) << i;
+  }
+  EXPECT_FLOAT_EQ(r.position_mm[2 * 9 + 1], 40 + 10 * 2.25F) << "the line goes on behind the loss";
+  EXPECT_EQ(r.metadata.at("registration_lost_s"), "1.000");
+}
+
+TEST(ApplyRegistration, ALossAtTheEndsOrOfLessThanAFrameIsLeftOpen) {
+  for (const double at_s : {0.0, 0.25, 2.5}) {
+    Recording r = step_at_frame_5();
+    apply(lost(at_s, 1), r);
+    EXPECT_EQ(r.frames(), 10u) << at_s;
+    EXPECT_DOUBLE_EQ(r.time_s.back(), at_s < 2.5 ? 3.25 : 2.25) << at_s;
+  }
+  Recording r = step_at_frame_5();
+  apply(lost(1.25, 0.125), r);
+  EXPECT_EQ(r.frames(), 10u);
+  EXPECT_DOUBLE_EQ(r.time_s[5], 1.375);
+}
+
+TEST(ApplyRegistration, PositionsAreLimitedToThePlateAndToWhatWasFitted) {
+  Recording r = step_at_frame_5();
+  apply({.start_mm = 100, .rate = 10, .valid_from_s = 0.25, .valid_until_s = 1.5}, r);
+  EXPECT_TRUE(std::isnan(r.position_mm[1]));
+  EXPECT_FLOAT_EQ(r.position_mm[3], 102.5F);
+  EXPECT_FLOAT_EQ(r.position_mm[2 * 6 + 1], 108);
+  EXPECT_TRUE(std::isnan(r.position_mm[2 * 7 + 1]));
+  EXPECT_EQ(r.metadata.at("registration_reliable"), "no");
+}
+
+TEST(ApplyRegistration, ALossInTheMiddleKeepsBothPartsOnOneLine) {
+  const Recording before = like_the_rig("6_Bumps", 4, 3);
+  Registration r = register_pass(before, Plate::named("6_Bumps"));
+  const std::size_t at = 5000, lost = 243;
+  r.lost_at_s = before.time_s[at];
+  r.lost_s = static_cast<double>(lost) / kLineHz;
+  Recording after = before;
+  apply(r, after);
+  ASSERT_EQ(after.frames(), before.frames() + lost);
+  for (std::size_t i = 1; i < after.frames(); ++i) ASSERT_GT(after.time_s[i], after.time_s[i - 1]) << i;
+  for (std::size_t i = 0; i < lost; ++i) EXPECT_TRUE(std::isnan(after.position_mm[2 * (at + i) + 1]));
+  for (const std::size_t i : {at - 1, at}) {  // one straight line in the new stamps
+    const std::size_t now = i < at ? i : i + lost;
+    EXPECT_NEAR(after.position_mm[2 * now + 1], r.start_mm + r.rate * after.time_s[now], 1e-4);
+    EXPECT_EQ(after.volts[now * kTaxels], before.volts[i * kTaxels]);
+  }
+}
+
+}  // namespace
+}  // namespace supertac

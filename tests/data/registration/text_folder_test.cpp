@@ -1,0 +1,163 @@
+#include "data/registration/text_folder.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "data/registration/alignment.h"
+#include "data/registration/apply_registration.h"
+#include "data/registration/lost_frames.h"
+#include "tests/data/registration/lossy_pass.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+std::string as_text(const Recording& recording) {
+  std::string text;
+  for (std::size_t i = 0; i < recording.volts.size(); ++i)
+    text += std::to_string(recording.volts[i]) + (i % kTaxels == kTaxels - 1 ? "\n" : " ");
+  return text;
+}
+
+std::string put(const TemporaryFolder& folder, const std::string& name, const std::string& text) {
+  const std::string path = folder.file(name);
+  make_directories(std::filesystem::path(path).parent_path().string());
+  write_file(path, text);
+  return path;
+}
+
+TEST(TextFolder, EveryFrameGetsItsPlaceAndTheOrderIsTheStatedOne) {
+  const TemporaryFolder folder;
+  std::vector<Recording> truth;
+  std::vector<ImportedPass> by_hand;
+  std::vector<RegisteredPass> together;
+  for (const int pass : {2, 3, 4}) {
+    truth.push_back(lossy_pass("6_Ridges", pass, 41));
+    put(folder, "6_Ridges/1/" + std::to_string(pass) + ".txt", as_text(truth.back()));
+  }
+  std::size_t told = 0;
+  const auto imported = import_text_folder(
+      folder.path(),
+      {.progress = [&](std::size_t done, std::size_t files) { told += files == 3 ? 1 + done : 0; }});
+  ASSERT_EQ(imported.size(), 3u);
+  EXPECT_EQ(told, 1u + 2 + 3 + 4) << "three files, then the alignment";
+
+  for (const ImportedPass& pass : imported) {
+    ImportedPass again{.path = pass.path, .plate = pass.plate, .plate_file = {}};
+    again.recording = import_text_pass(pass.path, again.lines);
+    again.recording.pass = pass.recording.pass;
+    again.recording.speed_mm_s = 10;
+    restore_clock(again.recording, rig::kFrameRateHz);
+    again.registration = register_pass(again.recording, pass.plate);
+    by_hand.push_back(again);
+  }
+  for (ImportedPass& pass : by_hand) together.push_back({&pass.recording, &pass.registration});
+  align_passes(together);
+  for (std::size_t i = 0; i < imported.size(); ++i) {
+    apply(by_hand[i].registration, by_hand[i].recording);
+    const Recording& r = imported[i].recording;
+    EXPECT_EQ(r.time_s, by_hand[i].recording.time_s);
+    EXPECT_EQ(r.volts, by_hand[i].recording.volts);
+    EXPECT_TRUE(imported[i].registration.reliable) << imported[i].registration.reason;
+    EXPECT_GT(imported[i].registration.agreement, 0.8);
+    EXPECT_EQ(r.plate, "6_Ridges");
+    EXPECT_EQ(r.trial, 1);
+    EXPECT_EQ(r.pass, static_cast<int>(i) + 2);
+    EXPECT_EQ(r.metadata.at("time_base"), "registered");
+    ASSERT_EQ(r.frames(), truth[i].frames());
+    for (std::size_t f = 0; f < r.frames(); ++f) {
+      const float y = truth[i].position_mm[2 * f + 1];
+      if (y > 28 && y < 80) {
+        ASSERT_NEAR(r.position_mm[2 * f + 1], y, 0.75) << i << ' ' << f;
+      }
+    }
+  }
+}
+
+TEST(TextFolder, APlateOfYourOwnLiesBesideItsFolder) {
+  const TemporaryFolder folder;
+  put(folder, "my/3/7.txt", as_text(full_pass("plain", 1, 1)));
+  put(folder, "my/3/notes.md", "not looked at");
+  put(folder, ".hidden/1/1.txt", "not looked at");
+  put(folder, "my.stl", "solid nothing\nendsolid");
+  EXPECT_THROW(import_text_folder(folder.path(), {}), FileError) << "a plate without a triangle";
+  std::filesystem::remove(folder.file("my.stl"));
+  std::filesystem::rename(folder.file("my"), folder.file("plain"));
+  const auto imported = import_text_folder(folder.path(), {.speed_mm_s = 7});
+  ASSERT_EQ(imported.size(), 1u);
+  EXPECT_EQ(recording_file_name(imported[0].recording), "plain_t3_p7_v7.safetensors");
+  EXPECT_EQ(imported[0].plate_file, "");
+  EXPECT_EQ(imported[0].registration.reason, "a plain plate has nothing to register against");
+}
+
+TEST(TextFolder, FilesThatAreNoRecordingsAreLeftOutWhenAskedTo) {
+  const TemporaryFolder folder;
+  const std::string bad = put(folder, "plain/1/1.txt", "no numbers at all\n");
+  EXPECT_THROW(import_text_folder(folder.path(), {}), FileError);
+  std::vector<std::string> left_out;
+  const FolderImport lenient{.left_out = [&](const FileError& error) { left_out.push_back(error.what()); }};
+  try {
+    import_text_folder(folder.path(), lenient);
+    ADD_FAILURE() << "nothing was left";
+  } catch (const FileError& error) {
+    EXPECT_EQ(std::string(error.what()), folder.path() + ": none of 1 files is a recording");
+  }
+  put(folder, "plain/1/2.txt", as_text(full_pass("plain", 2, 1)));
+  EXPECT_EQ(import_text_folder(folder.path(), lenient).size(), 1u);
+  ASSERT_EQ(left_out.size(), 2u);
+  EXPECT_TRUE(left_out[1].starts_with(bad + ": 1 of 1 lines are not 16 voltages")) << left_out[1];
+}
+
+TEST(TextFolder, AFolderOfAnotherShapeIsNamed) {
+  const std::string number = "expected a number from 1 as its name: TEXT_DIR/<plate>/<trial>/<pass>.txt";
+  const std::tuple<std::string, std::string, std::string> cases[] = {
+      {"7_Moons/1/1.txt", "7_Moons", "unknown plate: plate \"7_Moons\": unknown texture"},
+      {"3_Bumps/one/1.txt", "3_Bumps/one", number},
+      {"3_Bumps/0/1.txt", "3_Bumps/0", number},
+      {"3_Bumps/1/first.txt", "3_Bumps/1/first.txt", number},
+      {"3_Bumps/1/1.csv", "", "holds no <plate>/<trial>/<pass>.txt; name the folder above the plates"}};
+  for (const auto& [file, named, message] : cases) {
+    const TemporaryFolder folder;
+    put(folder, file, "");
+    try {
+      import_text_folder(folder.path(), {});
+      ADD_FAILURE() << file;
+    } catch (const FileError& error) {
+      const std::string where = named.empty() ? folder.path() : folder.file(named);
+      EXPECT_TRUE(std::string(error.what()).starts_with(where + ": " + message)) << error.what();
+    }
+  }
+  const TemporaryFolder folder;
+  try {
+    import_text_folder(folder.file("none"), {});
+    ADD_FAILURE();
+  } catch (const FileError& error) {
+    EXPECT_EQ(std::string(error.what()),
+              folder.file("none") + ": cannot list the folder: No such file or directory; check the name");
+  }
+}
+
+TEST(TextFolder, TheSummaryTellsWhatBecameOfAPass) {
+  ImportedPass pass{.path = "x", .plate = Plate::named("3_Bumps"), .plate_file = {}};
+  pass.recording.trial = 2;
+  pass.recording.pass = 4;
+  pass.lines = {.lines = 100, .frames = 96, .too_few = 2, .not_numeric = 1, .empty = 1};
+  pass.registration.residual = 0.375;
+  pass.registration.reason = "no taxel felt anything";
+  const std::string start = "3_Bumps/2/4.txt  100 lines, 3 dropped (3 malformed), residual 0.38 mm, ";
+  EXPECT_EQ(pass.summary(), start + "not reliable: no taxel felt anything");
+  pass.registration.reliable = true;
+  pass.registration.agreement = 0.9;
+  pass.registration.shift_mm = -0.25;
+  pass.registration.lost_s = 0.4;
+  EXPECT_EQ(pass.summary(), start + "aligned by -0.25 mm, another 0.40 s lost, reliable");
+  EXPECT_EQ(pass.to_json()["registration"]["lost_s"], 0.4);
+  EXPECT_EQ(pass.to_json()["too_few_columns"], 2);
+}
+
+}  // namespace
+}  // namespace supertac
