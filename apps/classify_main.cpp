@@ -1,4 +1,4 @@
-// supertac-classify: which plate is under the finger? Asked of raw frames and of super-resolved pictures
+// supertac-classify: which plate is under the finger? Asked of single frames and of super-resolved pictures
 // (Figure 11 of the paper), and of what lies between.
 #include <exception>
 
@@ -14,10 +14,9 @@ void declare(Arguments& a) {
   a.required("model", "FILE,...", "models by supertac-train; run i uses the i-th, and again from the first");
   a.required("data", "DIR", "recordings to train the classifiers on and to test them with");
   a.option("plates", "A,B,...", "the classes (default: the plates the first model was trained on)");
-  a.option("also", "DIR", "more recordings of these plates to train on, never tested: simulated ones, say");
   a.option(
       "views", "A,B,...",
-      "what the classifiers see: frame (raw 4x4), bicubic, super_resolved, latents, historyN (the last N "
+      "what the classifiers see: frame (the last one, levelled as the network sees it), bicubic, super_resolved, latents, historyN (the last N "
       "frames), truth; each is compared with the first",
       "frame,super_resolved,latents,history32");
   a.option("seeds", "N", "runs: seeds 0 to N - 1 of classifier and order", "5");
@@ -100,7 +99,7 @@ int run(Arguments& a) {
   }
   const std::int64_t stride = a.integer("stride", 1, 100'000);
   const std::vector<Candidate> models = load_candidates(a.list("model"));
-  const WindowSet windows = exam_windows(a.text("data"), a.list("plates"), a.text("also"), models.front());
+  const WindowSet windows = exam_windows(a.text("data"), a.list("plates"), models.front());
   const std::vector<std::string> classes = classes_of(windows);
   std::vector<Exam> exams;
   for (const Candidate& model : models) exams.push_back(make_exam(windows, model, classes, stride));
@@ -109,11 +108,16 @@ int run(Arguments& a) {
 
   const Answers given = all_answers(a, views, models, exams, windows, settings);
   const auto results = count(given, views, exams, windows, classes, a.text("data"));
+  const std::string frames = windows.settings().scaling.levelled
+                                 ? "levelled to the window's own rest and gain"
+                                 : "scaled by the model's fixed range";
+  a.print("frame: the last frame of the window as the network sees it, " + frames + ", not the raw voltages");
   for (const std::string& line : tables(results, classes)) a.print(line);
   a.write_json({{"command", a.command_line()},
                 {"commit", commit()},
                 {"data", windows.fingerprint()},
                 {"split", models.front().split},
+                {"frames", frames},
                 {"runs", given.size() / views.size()},
                 {"views", to_json(results, classes)}});
   return kExitOk;

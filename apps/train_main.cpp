@@ -1,6 +1,5 @@
-// supertac-train: recordings in, a SuperTac model out.
+// supertac-train: recordings (or pairs of images) in, a model out.
 #include "apps/common/program.h"
-#include "apps/train/pairs.h"
 #include "apps/train/training_options.h"
 #include "apps/train/training_run.h"
 #include "io/file.h"
@@ -12,16 +11,19 @@ void declare(Arguments& a) {
   a.option(
       "pairs", "FILE",
       "instead of --data: images of any sensor, safetensors with input [N,C,H,W], target [N,1,sH,sW] in 0 "
-      "to 1, optional group [N]; takes split (group, pair, none), epochs, batch, learning-rate, lambda");
+      "to 1, optional group [N]; trains a network of single frames");
+  a.one_of("data", "pairs");
   a.required("out", "FILE",
              "the model; FILE's run folder beside it (.run) holds log, report and the state to resume");
-  a.option("preset", "NAME", "network: paper, or tiny (a ninth of the cost)", "paper");
-  a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512 (default: the preset's)", "");
-  a.option("latent", "LD", "latent numbers per group of taxels", "10");
-  a.option("scale", "N", "pictures N times as fine as the array, which the recordings name: 2, 4 or 8", "4");
-  declare_training(a);
-  a.option("seed", "N", "of split, initial weights, order, noise", "0");
   a.option("resume", "FILE", "continue from the last.safetensors of an interrupted run, same options");
+  a.option("seed", "N", "of split, initial weights, order, noise", "0");
+  declare_training(a);
+  a.only_with("data");
+  a.option("preset", "NAME", "network: paper, or tiny (a ninth of the cost)", "paper");
+  a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512 (default: the preset's)");
+  a.option("scale", "N", "pictures N times as fine as the array, which the recordings name: 2, 4 or 8", "4");
+  declare_window_training(a);
+  a.more().option("latent", "LD", "latent numbers per group of taxels", "10");
 }
 
 namespace {
@@ -35,25 +37,13 @@ TrainingSettings settings_of(const Arguments& a) {
   }
   s.model.latent = a.integer("latent", 1, 256);
   s.model.scale = std::stoi(a.choice("scale", {"2", "4", "8"}));
-  s.seed = static_cast<std::uint64_t>(a.integer("seed", 0, std::numeric_limits<std::int64_t>::max()));
+  s.seed = a.seed();
   return s;
 }
 
-}  // namespace
-
-int run(Arguments& a) {
-  if (a.given("pairs")) return train_on_pairs(a);
-  if (!a.given("data")) throw UsageError("expected --data DIR or --pairs FILE, found neither");
+int train(const Arguments& a, TrainingTask task) {
   const std::string out = a.text("out");
-  TrainingSettings settings = settings_of(a);
-  const SplitKind kind = training_split(a);
-  refuse_existing(out, a.force());
-  const WindowSet windows = training_windows(a, settings.model);
-  set_array(settings.model, windows.array());
-  const Split split = make_split(windows, kind, settings.seed);
-  TrainingRun training(a, windows, split, settings,
-                       {.out = out, .force = a.force(), .resume = a.text("resume")});
-  a.note(windows.counts().summary());
+  TrainingRun training(a, std::move(task), {.out = out, .force = a.force(), .resume = a.text("resume")});
   const bool done = training.train();
   const Trainer& trainer = training.trainer();
   if (!done) {
@@ -68,6 +58,23 @@ int run(Arguments& a) {
   result["out"] = out;
   a.write_json(result);
   return kExitOk;
+}
+
+}  // namespace
+
+int run(Arguments& a) {
+  if (a.given("pairs")) {
+    refuse_existing(a.text("out"), a.force());
+    PairSet pairs = PairSet::read(a.text("pairs"));
+    return train(a, pair_task(a, pairs));
+  }
+  TrainingSettings settings = settings_of(a);
+  training_split(a);
+  refuse_existing(a.text("out"), a.force());
+  const WindowSet windows = training_windows(a, settings.model);
+  set_array(settings.model, windows.array());
+  a.note(windows.counts().summary());
+  return train(a, window_task(a, windows, settings));
 }
 
 }  // namespace supertac

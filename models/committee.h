@@ -13,21 +13,21 @@ namespace supertac {
 class Committee {
  public:
   /// Of one, which must outlive this: a model is taken wherever a committee is.
-  Committee(const SuperTac& model) : members_{&model} {}
+  Committee(const Network& network) : members_{&network} {}
   /// Of all these files' models, at least one; they must outlive this. Throws std::invalid_argument when
   /// there is none.
   explicit Committee(std::span<const ModelFile> files);
 
-  const SuperTacSettings& settings() const { return members_.front()->settings(); }
-  /// The mean of the members' SuperTac::infer, added in their order. Throws as it.
-  Tensor infer(const Tensor& windows) const;
+  const Network& first() const { return *members_.front(); }
+  /// The mean of the members' Network::infer, added in their order. Throws as it.
+  Tensor infer(const Tensor& inputs) const;
 
  private:
-  std::vector<const SuperTac*> members_;
+  std::vector<const Network*> members_;
 };
 
 /// The models of a committee. Throws std::runtime_error, as load_model, and naming the file that differs from
 /// the first in its network or in the signals it takes.
-std::vector<ModelFile> load_models(std::span<const std::string> paths);
+std::vector<ModelFile> load_models(std::span<const std::string> paths, ModelKind kind = ModelKind::windows);
 
 }  // namespace supertac

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <exception>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 namespace supertac {
@@ -10,74 +11,75 @@ namespace {
 
 constexpr std::size_t kBatch = 64, kBatchesAtOnce = 4;
 
-struct Batch {
+struct Part {
   std::size_t first;
-  Tensor windows, outputs, truths;
+  Tensor inputs, outputs, targets;
   std::exception_ptr error;
 };
 
-void compute(const Committee& model, const WindowSet& data, std::span<const std::uint32_t> indices,
-             Batch& batch) {
-  const auto window_size = batch.windows.values().size() / indices.size();
-  const auto truth_size = batch.truths.values().size() / indices.size();
+void compute(const Committee& network, const Examples& data, std::span<const std::uint32_t> indices,
+             Part& part) {
+  const std::size_t input_size = data.input_size(), target_size = data.image().pixels();
   for (std::size_t n = 0; n < indices.size(); ++n) {
-    data.window(indices[n], batch.windows.values().subspan(n * window_size, window_size));
-    data.truth(indices[n], batch.truths.values().subspan(n * truth_size, truth_size));
+    data.input(indices[n], part.inputs.values().subspan(n * input_size, input_size));
+    data.target(indices[n], part.targets.values().subspan(n * target_size, target_size));
   }
   // Copied, so that what this thread took from its pool goes back there.
-  const Tensor outputs = model.infer(batch.windows);
-  std::copy_n(outputs.data(), outputs.size(), batch.outputs.data());
+  const Tensor outputs = network.infer(part.inputs);
+  std::copy_n(outputs.data(), outputs.size(), part.outputs.data());
+}
+
+std::string text(const NetworkFormat& f) {
+  return std::to_string(f.frames) + " frame(s) of " + std::to_string(f.rows) + "x" +
+         std::to_string(f.columns) + " taxels with " + std::to_string(f.channels) +
+         " channel(s) and pictures of " + std::to_string(f.rows * f.scale) + "x" +
+         std::to_string(f.columns * f.scale);
 }
 
 }  // namespace
 
-bool fits(const WindowSet& windows, const SuperTacSettings& model) {
-  const TaxelArray array = windows.array();
-  return windows.timesteps() == model.timesteps && windows.settings().scale == model.scale &&
-         array.rows == model.rows && array.columns == model.columns && array.channels == model.in_channels;
+void check_format(const Examples& examples, const Network& network) {
+  const TaxelArray array = examples.array();
+  const NetworkFormat own{static_cast<Dim>(examples.frames()), array.rows, array.columns, array.channels,
+                          examples.scale()};
+  if (own != network.format())
+    throw std::invalid_argument("the data have " + text(own) + ", the model expects " +
+                                text(network.format()));
 }
 
-void for_each_output(const Committee& model, const WindowSet& data, std::span<const std::uint32_t> indices,
+void for_each_output(const Committee& network, const Examples& data, std::span<const std::uint32_t> indices,
                      const std::function<bool(const EvaluatedBatch&)>& use) {
-  const SuperTacSettings& s = model.settings();
-  if (!fits(data, s)) {
-    throw std::invalid_argument(
-        "for_each_output: the windows do not have the model's length, array or picture size");
-  }
+  check_format(data, network.first());
   for (std::size_t start = 0; start < indices.size(); start += kBatch * kBatchesAtOnce) {
-    std::vector<Batch> batches;
+    std::vector<Part> parts;
     const std::size_t end = std::min(indices.size(), start + kBatch * kBatchesAtOnce);
     for (std::size_t first = start; first < end; first += kBatch) {
       const auto count = static_cast<Dim>(std::min(kBatch, end - first));
-      const Shape pictures{count, s.image_height(), s.image_width(), 1};
-      batches.push_back(
-          {first, Tensor(Shape{count, s.timesteps, s.signals()}), Tensor(pictures), Tensor(pictures), {}});
+      const Shape pictures = network.first().picture_shape(count);
+      parts.push_back(
+          {first, Tensor(network.first().input_shape(count)), Tensor(pictures), Tensor(pictures), {}});
     }
 #pragma omp parallel for schedule(static, 1)
-    for (std::size_t i = 0; i < batches.size(); ++i) {
+    for (std::size_t i = 0; i < parts.size(); ++i) {
       try {
-        const auto count = static_cast<std::size_t>(batches[i].windows.dim(0));
-        compute(model, data, indices.subspan(batches[i].first, count), batches[i]);
+        const auto count = static_cast<std::size_t>(parts[i].inputs.dim(0));
+        compute(network, data, indices.subspan(parts[i].first, count), parts[i]);
       } catch (...) {  // an exception must not leave a thread
-        batches[i].error = std::current_exception();
+        parts[i].error = std::current_exception();
       }
     }
-    for (const Batch& b : batches) {
-      if (b.error) std::rethrow_exception(b.error);
-      if (!use({b.first, b.windows, b.outputs, b.truths})) return;
+    for (const Part& p : parts) {
+      if (p.error) std::rethrow_exception(p.error);
+      if (!use({p.first, p.inputs, p.outputs, p.targets})) return;
     }
   }
 }
 
-ContactMetrics score(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
-                     bool (*stop)()) {
-  const std::size_t pixels = windows.image().pixels();
+ContactMetrics score(const Committee& network, const Examples& windows,
+                     std::span<const std::uint32_t> indices, bool (*stop)()) {
   ContactMetrics metrics(windows.image());
-  for_each_output(model, windows, indices, [&](const EvaluatedBatch& b) {
-    for (std::size_t n = 0; n < static_cast<std::size_t>(b.outputs.dim(0)); ++n) {
-      metrics.add(b.outputs.values().subspan(n * pixels, pixels),
-                  b.truths.values().subspan(n * pixels, pixels));
-    }
+  for_each_output(network, windows, indices, [&](const EvaluatedBatch& b) {
+    for (std::size_t n = 0; n < b.size(); ++n) metrics.add(b.output(n), b.target(n));
     return stop == nullptr || !stop();
   });
   return metrics;

@@ -1,37 +1,48 @@
-// Runs a model over the windows of a data set.
+// Runs a network over examples.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <span>
 
-#include "data/samples/windows.h"
+#include "data/samples/examples.h"
 #include "data/scores/metrics.h"
 #include "models/committee.h"
 
 namespace supertac {
 
-/// Whether a model takes windows of this length, array and picture size.
-bool fits(const WindowSet& windows, const SuperTacSettings& model);
+/// Throws std::invalid_argument that names both when the examples' inputs or pictures are not the network's.
+void check_format(const Examples& examples, const Network& network);
 
-/// A batch of results: windows [n,T,signals], outputs and truths [n,H,W,1], and the first of their places in
-/// `indices`.
+/// A batch of results: inputs as the network takes them, outputs and targets [n,H,W,1], and the first of their
+/// places in `indices`.
 struct EvaluatedBatch {
   std::size_t first;
-  const Tensor& windows;
+  const Tensor& inputs;
   const Tensor& outputs;
-  const Tensor& truths;
+  const Tensor& targets;
+
+  std::size_t size() const { return static_cast<std::size_t>(inputs.dim(0)); }
+  std::span<const float> input(std::size_t n) const { return sample(inputs, n); }
+  std::span<const float> output(std::size_t n) const { return sample(outputs, n); }
+  std::span<const float> target(std::size_t n) const { return sample(targets, n); }
+
+ private:
+  std::span<const float> sample(const Tensor& all, std::size_t n) const {
+    const std::size_t values = all.values().size() / size();
+    return all.values().subspan(n * values, values);
+  }
 };
 
-/// Calls `use` for the given windows in order, in batches of at most 64. `use` returns false to stop early.
-/// Batches are computed on several threads, `use` runs on the caller's. Throws std::invalid_argument when the
-/// data set's windows do not fit the model.
-void for_each_output(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
+/// Calls `use` for the given examples in order, in batches of at most 64. `use` returns false to stop early.
+/// Batches are computed on several threads, `use` runs on the caller's. Throws as check_format.
+void for_each_output(const Committee& network, const Examples& examples,
+                     std::span<const std::uint32_t> indices,
                      const std::function<bool(const EvaluatedBatch&)>& use);
 
-/// The metrics of the model's pictures of the given windows. `stop`, if given, is asked between batches; once
-/// it says true, the windows so far are what was measured. Throws as for_each_output.
-ContactMetrics score(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> indices,
-                     bool (*stop)() = nullptr);
+/// The metrics of the network's pictures of the given windows. `stop`, if given, is asked between batches;
+/// once it says true, the windows so far are what was measured. Throws as for_each_output.
+ContactMetrics score(const Committee& network, const Examples& windows,
+                     std::span<const std::uint32_t> indices, bool (*stop)() = nullptr);
 
 }  // namespace supertac

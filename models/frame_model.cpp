@@ -51,16 +51,17 @@ FrameModel::FrameModel(const FrameSettings& settings, Rng& rng)
 }
 
 Variable FrameModel::forward(const Tensor& frames) const {
-  const FrameSettings& s = settings_;
-  if (frames.rank() != 4 || frames.dim(1) != s.height || frames.dim(2) != s.width ||
-      frames.dim(3) != s.in_channels) {
-    throw std::invalid_argument("FrameModel: frames expects " +
-                                Shape{0, s.height, s.width, s.in_channels}.text() +
+  if (frames.rank() != 4 || frames.shape() != input_shape(frames.dim(0)))
+    throw std::invalid_argument("FrameModel: frames expects " + input_shape(0).text() +
                                 " with any first size, got " + frames.shape().text());
-  }
   Variable h = in_.forward(Variable(frames), kLeakyRelu);
   for (const Rirb& rirb : rirbs_) h = rirb.forward(h);
   return out_.forward(h);
+}
+
+NetworkFormat FrameModel::format() const {
+  const FrameSettings& s = settings_;
+  return {1, s.height, s.width, s.in_channels, s.scale};
 }
 
 Tensor FrameModel::infer(const Tensor& frames) const {

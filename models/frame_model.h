@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "layers/residual.h"
+#include "models/network.h"
 
 namespace supertac {
 
@@ -20,15 +21,18 @@ struct FrameSettings {
 
 /// frame [N,H,W,C] -> picture [N,sH,sW,1], linear output: Conv2d C-channels k3 p1, LeakyReLU; log2(scale) x
 /// RIRB; Conv2d channels-1 k3 p1. What SuperTac's upsampler does, from a frame instead of latents.
-class FrameModel : public Module {
+class FrameModel : public Network {
  public:
   /// Throws as FrameSettings::check.
   FrameModel(const FrameSettings& settings, Rng& rng);
   /// Throws std::invalid_argument on another shape.
   Variable forward(const Tensor& frames) const;
-  /// The same with nothing recorded.
-  Tensor infer(const Tensor& frames) const;
+  Tensor infer(const Tensor& frames) const override;
   const FrameSettings& settings() const { return settings_; }
+  NetworkFormat format() const override;
+  Shape input_shape(Dim count) const override {
+    return {count, settings_.height, settings_.width, settings_.in_channels};
+  }
 
  private:
   FrameSettings settings_;

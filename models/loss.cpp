@@ -15,22 +15,27 @@ void LossWeights::check() const {
       ", beta = " + std::to_string(beta) + ", lambda = " + std::to_string(lambda));
 }
 
-Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const LossWeights& w) {
+Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda) {
   Loss loss;
+  loss.l2 = l2_loss(picture, Variable(truth));
+  loss.ssim = ssim(picture, truth);
+  const Variable one_minus_ssim = add(Variable(Tensor::full({}, 1)), scale(loss.ssim, -1));
+  loss.total = add(loss.l2, scale(one_minus_ssim, static_cast<real>(lambda)));
+  return loss;
+}
+
+Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const LossWeights& w) {
+  Loss loss = picture_loss(output.image, truth, w.lambda);
   for (std::size_t i = 0; i < output.decoded.size(); ++i) {
     const Variable l2 = l2_loss(output.decoded[i], output.input[i]);
     const Variable kld = kl_divergence(output.latent[i].mean, output.latent[i].log_var);
     loss.reconstruction = i == 0 ? l2 : add(loss.reconstruction, l2);
     loss.kld = i == 0 ? kld : add(loss.kld, kld);
   }
-  loss.l2 = l2_loss(output.image, Variable(truth));
-  loss.ssim = ssim(output.image, truth);
   const auto share = static_cast<real>(w.a), rest = static_cast<real>(1 - w.a);
   const Variable vaes =
       add(scale(loss.reconstruction, share), scale(loss.kld, share * static_cast<real>(w.beta)));
-  const auto lambda = static_cast<real>(w.lambda);
-  const Variable one_minus_ssim = add(Variable(Tensor::full({}, 1)), scale(loss.ssim, -1));
-  loss.total = add(vaes, scale(add(loss.l2, scale(one_minus_ssim, lambda)), rest));
+  loss.total = add(vaes, scale(loss.total, rest));
   return loss;
 }
 

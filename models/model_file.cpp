@@ -3,13 +3,14 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "models/frame_file.h"
 #include "models/json_entry.h"
 
 namespace supertac {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr const char* kFrameKind = "frame-checkpoint";
 
 SuperTacSettings read_settings(const JsonEntry& entry) {
   SuperTacSettings s;
@@ -55,6 +56,43 @@ InputSettings read_input(const JsonEntry& entry) {
   return input;
 }
 
+FrameSettings read_frame_settings(const JsonEntry& entry) {
+  FrameSettings s;
+  s.in_channels = entry.integer("in_channels");
+  s.height = entry.integer("height");
+  s.width = entry.integer("width");
+  s.scale = entry.integer("scale");
+  s.channels = entry.integer("channels");
+  s.rcabs = entry.integer("rcabs");
+  try {
+    s.check();
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(entry.where() + ": " + error.what());
+  }
+  return s;
+}
+
+void expect_kind(const SafetensorsFile& file, const std::string& path, ModelKind expected) {
+  const auto entry = file.metadata().find("kind");
+  const std::string kind = entry == file.metadata().end() ? "" : entry->second;
+  if (expected == ModelKind::windows && kind == kFrameKind)
+    throw std::runtime_error(path +
+                             ": expected a SuperTac model, found a frame model (trained with --pairs); "
+                             "use it with supertac-evaluate --pairs");
+  if (expected == ModelKind::frames && kind != kFrameKind)
+    throw std::runtime_error(path + ": expected a frame model (trained with --pairs), found " +
+                             (kind.empty() ? "a SuperTac model; give it recordings"
+                                           : "kind \"" + kind + "\""));
+}
+
+template <class Model, class Settings>
+std::unique_ptr<Model> build(const Settings& settings, const SafetensorsFile& file, const std::string& path) {
+  Rng rng(0);
+  auto model = std::make_unique<Model>(settings, rng);
+  load_parameters(file, path, model->parameters());
+  return model;
+}
+
 }  // namespace
 
 std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, const InputSettings& input) {
@@ -75,6 +113,27 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
   if (input.scaling.levelled) scaling["levelled"] = true;
   if (input.pitch_mm != InputSettings{}.pitch_mm) scaling["pitch_mm"] = input.pitch_mm;
   return {{"settings", settings.dump()}, {"input", scaling.dump()}};
+}
+
+std::map<std::string, std::string> model_metadata(const FrameSettings& s, const ChannelScaling& scaling) {
+  const Json settings = {
+      {"in_channels", s.in_channels}, {"height", s.height}, {"width", s.width}, {"scale", s.scale},
+      {"channels", s.channels},       {"rcabs", s.rcabs}};
+  const Json input = {{"mean", scaling.mean}, {"factor", scaling.factor}, {"formula", "(x - mean) * factor"}};
+  return {{"kind", kFrameKind}, {"settings", settings.dump()}, {"input", input.dump()}};
+}
+
+const Network& ModelFile::network() const {
+  return model ? static_cast<const Network&>(*model) : *frame_model;
+}
+
+std::map<std::string, std::string> ModelFile::description() const {
+  return model ? model_metadata(model->settings(), input) : model_metadata(frame_model->settings(), scaling);
+}
+
+std::string ModelFile::metadata_or(const std::string& key, const std::string& otherwise) const {
+  const auto found = metadata.find(key);
+  return found == metadata.end() ? otherwise : found->second;
 }
 
 TaxelArray ModelFile::array() const {
@@ -104,25 +163,33 @@ void set_array(SuperTacSettings& settings, const TaxelArray& array) {
   settings.in_channels = array.channels;
 }
 
-ModelFile load_model(const SafetensorsFile& file, const std::string& path) {
-  const auto kind = file.metadata().find("kind");
-  if (kind != file.metadata().end() && kind->second == kFrameKind)
-    throw std::runtime_error(path +
-                             ": expected a SuperTac model, found a frame model (trained with --pairs); "
-                             "use it with supertac-evaluate --pairs");
-  const SuperTacSettings settings = read_settings({file, path, "settings"});
-  ModelFile loaded{nullptr, read_input({file, path, "input"}), file.metadata()};
-  Rng rng(0);
-  loaded.model = std::make_unique<SuperTac>(settings, rng);
-  load_parameters(file, path, loaded.model->parameters());
+ModelFile load_model(const std::string& path, ModelKind kind) {
+  const SafetensorsFile file = read_checkpoint(path);
+  expect_kind(file, path, kind);
+  const JsonEntry settings(file, path, "settings"), input(file, path, "input");
+  ModelFile loaded;
+  loaded.metadata = file.metadata();
+  if (kind == ModelKind::windows) {
+    loaded.input = read_input(input);
+    loaded.model = build<SuperTac>(read_settings(settings), file, path);
+  } else {
+    const FrameSettings read = read_frame_settings(settings);
+    const auto channels = static_cast<std::size_t>(read.in_channels);
+    loaded.scaling = {input.numbers("mean", channels), input.numbers("factor", channels)};
+    loaded.frame_model = build<FrameModel>(read, file, path);
+  }
   return loaded;
 }
-
-ModelFile load_model(const std::string& path) { return load_model(read_checkpoint(path), path); }
 
 void save_model(const std::string& path, const SuperTac& model, const InputSettings& input,
                 std::map<std::string, std::string> metadata) {
   metadata.merge(model_metadata(model.settings(), input));
+  write_checkpoint(path, model.parameters(), std::move(metadata));
+}
+
+void save_model(const std::string& path, const FrameModel& model, const ChannelScaling& scaling,
+                std::map<std::string, std::string> metadata) {
+  metadata.merge(model_metadata(model.settings(), scaling));
   write_checkpoint(path, model.parameters(), std::move(metadata));
 }
 

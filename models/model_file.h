@@ -1,4 +1,5 @@
-// A SuperTac model on disk: its parameters, and in the metadata everything needed to run a window through it.
+// A model on disk: its parameters, and in the metadata everything needed to run an input through it. Two kinds
+// share the form: SuperTac, and frame models, whose metadata say "kind": "frame-checkpoint".
 #pragma once
 
 #include <map>
@@ -6,13 +7,15 @@
 #include <optional>
 #include <string>
 
+#include "data/samples/pairs.h"
 #include "data/samples/windows.h"
 #include "layers/checkpoint.h"
+#include "models/frame_model.h"
 #include "models/supertac_model.h"
 
 namespace supertac {
 
-/// What stands between the sensor and the network's input.
+/// What stands between the sensor and SuperTac's input.
 struct InputSettings {
   double rate_hz = 300;
   Scaling scaling;
@@ -22,15 +25,31 @@ struct InputSettings {
   double pitch_mm = 3;  ///< of the array
 };
 
-/// The metadata keys "settings" and "input", JSON texts.
+/// The metadata keys "settings" and "input", JSON texts; of a frame model "kind" besides.
 std::map<std::string, std::string> model_metadata(const SuperTacSettings& settings,
                                                   const InputSettings& input);
+std::map<std::string, std::string> model_metadata(const FrameSettings& settings,
+                                                  const ChannelScaling& scaling);
+
+enum class ModelKind {
+  windows,  ///< SuperTac
+  frames,   ///< a frame model, trained with --pairs
+};
 
 struct ModelFile {
-  std::unique_ptr<SuperTac> model;
-  InputSettings input;
+  std::unique_ptr<SuperTac> model;          ///< of kind windows, with its input
+  InputSettings input;                      //
+  std::unique_ptr<FrameModel> frame_model;  ///< of kind frames, with its scaling
+  ChannelScaling scaling;                   //
   std::map<std::string, std::string> metadata;
 
+  const Network& network() const;
+  /// model_metadata() of what was loaded.
+  std::map<std::string, std::string> description() const;
+  /// An entry of the metadata, or what is to stand for one that is missing.
+  std::string metadata_or(const std::string& key, const std::string& otherwise) const;
+
+  // Of kind windows:
   /// The sensor it was trained on.
   TaxelArray array() const;
   /// The windows it takes: its array and length, picture size, rate and scaling.
@@ -44,13 +63,13 @@ InputSettings input_of(const WindowSet& windows);
 void set_array(SuperTacSettings& settings, const TaxelArray& array);
 
 /// Builds the model that the metadata describes, after checking every setting's range, and fills it.
-/// Throws std::runtime_error naming path, what was expected and found.
-ModelFile load_model(const std::string& path);
-/// The same from a file already read.
-ModelFile load_model(const SafetensorsFile& file, const std::string& path);
+/// Throws std::runtime_error naming path, what was expected and found; so for a model of another kind.
+ModelFile load_model(const std::string& path, ModelKind kind = ModelKind::windows);
 
-/// Writes parameters and metadata. Throws FileError.
+/// Write parameters and metadata. Throw FileError.
 void save_model(const std::string& path, const SuperTac& model, const InputSettings& input,
+                std::map<std::string, std::string> metadata);
+void save_model(const std::string& path, const FrameModel& model, const ChannelScaling& scaling,
                 std::map<std::string, std::string> metadata);
 
 }  // namespace supertac

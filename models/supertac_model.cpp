@@ -183,6 +183,11 @@ SuperTac::Output SuperTac::forward(const Tensor& windows, std::span<const Tensor
   return out;
 }
 
+NetworkFormat SuperTac::format() const {
+  const SuperTacSettings& s = settings_;
+  return {s.timesteps, s.rows, s.columns, s.in_channels, s.scale};
+}
+
 Tensor SuperTac::encode(const Tensor& windows) const {
   const NoGrad no_grad;
   const PerGroup<Variable> groups = split(windows);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "layers/residual.h"
+#include "models/network.h"
 #include "models/vae.h"
 
 namespace supertac {
@@ -83,7 +84,7 @@ class Upsampler : public Module {
   Conv2d out_;
 };
 
-class SuperTac : public Module {
+class SuperTac : public Network {
  public:
   /// Throws as SuperTacSettings::check.
   SuperTac(const SuperTacSettings& settings, Rng& rng);
@@ -97,13 +98,14 @@ class SuperTac : public Module {
   /// Training: windows [N,T,signals] in [0,1] and eps [N,LD] ~ N(0,1) for each group.
   /// Throws std::invalid_argument on other shapes.
   Output forward(const Tensor& windows, std::span<const Tensor> eps) const;
-  /// Evaluation: z = mean, no decoders, nothing recorded. windows [N,T,signals] -> [N,rows scale,columns
-  /// scale,1].
-  Tensor infer(const Tensor& windows) const;
+  /// Evaluation: z = mean, no decoders.
+  Tensor infer(const Tensor& windows) const override;
   /// The latent means [N,G LD].
   Tensor encode(const Tensor& windows) const;
 
   const SuperTacSettings& settings() const { return settings_; }
+  NetworkFormat format() const override;
+  Shape input_shape(Dim count) const override { return {count, settings_.timesteps, settings_.signals()}; }
 
  private:
   PerGroup<Variable> split(const Tensor& windows) const;

@@ -1,4 +1,4 @@
-// Training of SuperTac, one visible step at a time.
+// Training of any network, one visible step at a time.
 //
 //   Trainer trainer(windows, split.train, settings);
 //   while (!trainer.done()) report(trainer.train_step());
@@ -12,42 +12,26 @@
 
 #include <cstdint>
 #include <exception>
-#include <stdexcept>
+#include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "data/samples/augment.h"
 #include "data/samples/batching.h"
-#include "data/samples/windows.h"
 #include "models/collapse.h"
-#include "models/loss.h"
-#include "models/model_file.h"
+#include "models/objective.h"
 #include "models/training_state.h"
 
 namespace supertac {
 
-struct TrainingSettings {
-  SuperTacSettings model;
-  LossWeights loss;
-  AugmentSettings augment;
-  std::int64_t epochs = 4;
-  std::int64_t batch = 64;
-  std::uint64_t seed = 0;
-  double learning_rate = 1e-3;
-  double warm_up = 0.05;  ///< share of all steps in which the rate rises; then half a cosine to 0
-  double clip_norm = 1;   ///< 0 = never
-  /// Whether z is drawn around its mean. Without, and with beta 0, the VAEs are plain autoencoders.
-  bool sampling = true;
-
-  /// Throws std::invalid_argument naming the setting.
-  void check() const;
-  /// JSON text of everything that determines the result, for metadata and to compare on resume.
-  std::string text() const;
+/// The values of a Loss; 0 for a term that an objective has not.
+struct LossTerms {
+  double total = 0, reconstruction = 0, kld = 0, l2 = 0, ssim = 0;
+  void add(const LossTerms& other);
 };
 
-struct StepReport {
+struct StepReport : LossTerms {
   std::int64_t step = 0;  ///< from 1
-  double total = 0, reconstruction = 0, kld = 0, l2 = 0, ssim = 0;
   double gradient_norm = 0;  ///< before clipping
   double learning_rate = 0;
   int active_latents = 0;  ///< of all groups, in this batch (models/collapse.h)
@@ -58,16 +42,19 @@ struct StepReport {
 
 class Trainer {
  public:
-  /// `windows` must outlive the trainer. Throws std::invalid_argument for settings out of range, windows of
-  /// another length, array or picture size than the model's, or no training window.
+  /// `examples` must outlive the trainer. Throws std::invalid_argument for examples of another format than the
+  /// network's, or no training example.
+  Trainer(const Examples& examples, std::vector<std::uint32_t> train, std::unique_ptr<Objective> objective);
+  /// With window_objective() and frame_objective(); throw as these.
   Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, const TrainingSettings& settings);
+  Trainer(const PairSet& pairs, std::vector<std::uint32_t> train, const FrameTrainingSettings& settings);
 
   bool done() const { return state_.done(); }
   std::int64_t step() const { return state_.step(); }
   std::int64_t total_steps() const { return state_.total_steps(); }
   std::int64_t steps_per_epoch() const { return static_cast<std::int64_t>(batching_.batches_per_epoch()); }
-  const SuperTac& model() const { return model_; }
-  const TrainingSettings& settings() const { return settings_; }
+  const Objective& objective() const { return *objective_; }
+  const Network& model() const { return objective_->network(); }
 
   /// One batch: forward, loss, backward, Adam. Throws TrainingStopped; the parameters are then still finite.
   StepReport train_step();
@@ -75,35 +62,40 @@ class Trainer {
   /// Model and training state, a checkpoint like any other with "optimizer." tensors besides. Throws
   /// FileError.
   void save(const std::string& path, std::map<std::string, std::string> metadata) const;
+  /// The model alone, with the same metadata. Throws FileError.
+  void save_model(const std::string& path, std::map<std::string, std::string> metadata) const;
   /// Continues where the saved trainer stood. Throws std::runtime_error when the file holds no training
   /// state, or was made with other settings or data (naming the difference); nothing is changed then.
   void restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata);
 
  private:
+  struct Spreads {
+    Spread pictures, targets, means;
+    void clear();
+    void add(const Spreads& other);
+  };
   struct Lane {
-    Lane(const SuperTac& master, Dim first, Dim count);
-    Dim first;       // its share of the batch: samples first .. first + windows.dim(0)
-    SuperTac model;  // the master's values under gradients of its own
-    Tensor windows, truth;
-    std::vector<Tensor> eps;  // [count,LD] of each group
-    StepReport terms;
-    Spread pictures, truths, means;
+    Lane(const Objective& master, Dim first, Dim count);
+    Dim first;                             // its share of the batch: samples first .. first + inputs.dim(0)
+    std::unique_ptr<Objective> objective;  // the master's values under gradients of its own
+    Batch batch;
+    LossTerms terms;
+    Spreads spreads;
     std::string trouble;  // where the loss stopped to be finite
     std::exception_ptr error;
   };
   void run_lane(Lane& lane) const;
   void fill(Lane& lane) const;
-  void draw_eps(Lane& lane) const;
+  void draw_noise(Lane& lane) const;
   void look_for_collapse(StepReport& report);
-  void check_finite(const StepReport& report) const;
+  void check_finite(const LossTerms& terms) const;
   std::map<std::string, std::string> full(std::map<std::string, std::string> metadata) const;
 
-  const WindowSet& data_;
-  TrainingSettings settings_;
+  const Examples& data_;
+  std::unique_ptr<Objective> objective_;
   Batching batching_;
-  SuperTac model_;
   TrainingState state_;
-  Spread pictures_, truths_, means_;
+  Spreads spreads_;
   std::vector<std::uint32_t> indices_;  // of the batch
   std::vector<Lane> lanes_;
   std::vector<const std::vector<Parameter>*> lane_parameters_;  // of these models

@@ -30,13 +30,23 @@ void expect_same(const SafetensorsFile& file, const std::string& path,
 
 }  // namespace
 
-TrainingState::TrainingState(const std::vector<Parameter>& parameters, const OptimiserSettings& settings,
+void TrainingPace::check() const {
+  const auto require = [](bool holds, const char* what) {
+    if (!holds) throw std::invalid_argument(std::string("training settings: ") + what);
+  };
+  require(epochs >= 1 && epochs <= 100'000, "epochs must be 1 to 100000");
+  require(batch >= 1 && batch <= 4096, "batch must be 1 to 4096");
+  require(learning_rate > 0 && learning_rate <= 1, "learning rate must be above 0 and at most 1");
+  require(warm_up >= 0 && warm_up < 1, "warm-up must be a share of all steps, 0 to below 1");
+  require(clip_norm >= 0 && std::isfinite(clip_norm), "clip norm must not be negative (0 = never)");
+}
+
+TrainingState::TrainingState(const std::vector<Parameter>& parameters, const TrainingPace& pace,
                              std::int64_t total_steps)
     : parameters_(parameters),
-      adam_(values_of(parameters),
-            {.learning_rate = settings.learning_rate, .clip_norm = settings.clip_norm}),
-      schedule_{.peak = settings.learning_rate,
-                .warm_up = static_cast<std::int64_t>(settings.warm_up * static_cast<double>(total_steps)),
+      adam_(values_of(parameters), {.learning_rate = pace.learning_rate, .clip_norm = pace.clip_norm}),
+      schedule_{.peak = pace.learning_rate,
+                .warm_up = static_cast<std::int64_t>(pace.warm_up * static_cast<double>(total_steps)),
                 .total = total_steps} {}
 
 bool TrainingState::collapsed(bool looks_so) {

@@ -13,10 +13,17 @@
 
 namespace supertac {
 
-struct OptimiserSettings {
-  double learning_rate = 1e-3;
+/// How long, in what steps, how fast: whatever is trained.
+struct TrainingPace {
+  std::int64_t epochs = 20;  ///< 1 to 100,000
+  std::int64_t batch = 64;   ///< 1 to 4096
+  std::uint64_t seed = 0;
+  double learning_rate = 1e-3;  ///< Adam's peak, above 0 and at most 1
   double warm_up = 0.05;  ///< share of all steps in which the rate rises; then half a cosine to 0
   double clip_norm = 1;   ///< 0 = never
+
+  /// Throws std::invalid_argument naming the setting.
+  void check() const;
 };
 
 /// A value was not finite: step, where, and what to do are in what().
@@ -28,7 +35,7 @@ class TrainingStopped : public std::runtime_error {
 class TrainingState {
  public:
   /// The parameters' handles are kept.
-  TrainingState(const std::vector<Parameter>& parameters, const OptimiserSettings& settings,
+  TrainingState(const std::vector<Parameter>& parameters, const TrainingPace& pace,
                 std::int64_t total_steps);
 
   std::int64_t step() const { return step_; }  ///< done so far

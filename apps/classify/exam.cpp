@@ -53,15 +53,12 @@ std::vector<Candidate> load_candidates(const std::vector<std::string>& paths) {
   return all;
 }
 
-WindowSet exam_windows(const std::string& folder, std::vector<std::string> plates, const std::string& also,
-                       const Candidate& first) {
+WindowSet exam_windows(const std::string& folder, std::vector<std::string> plates, const Candidate& first) {
   const ModelFile& file = first.file;
   WindowSettings w = file.windows();
   w.stride = static_cast<int>(number_of(file, first.path, "stride"));
   if (plates.empty()) plates = comma_list(metadata_of(file, first.path, "plates"));
-  WindowSet windows = WindowSet::load(folder, plates, w);
-  if (!also.empty()) windows.add_directory(also, classes_of(windows), true);
-  return windows;
+  return WindowSet::load(folder, plates, w);
 }
 
 std::vector<std::string> classes_of(const WindowSet& windows) {

@@ -38,10 +38,8 @@ struct Candidate {
 /// trained on all windows, or differs from the first in more than its seeds.
 std::vector<Candidate> load_candidates(const std::vector<std::string>& paths);
 
-/// The recordings' windows as the models take them. No plates: those of the first model. `also`, unless
-/// empty, is a folder of more recordings of these plates, which no split tests.
-WindowSet exam_windows(const std::string& folder, std::vector<std::string> plates, const std::string& also,
-                       const Candidate& first);
+/// The recordings' windows as the models take them. No plates: those of the first model.
+WindowSet exam_windows(const std::string& folder, std::vector<std::string> plates, const Candidate& first);
 
 /// The plates of a data set in the order of their first pass; a plate's place is its class.
 /// Throws std::runtime_error when there is only one.

@@ -1,5 +1,5 @@
-// What the answers of all runs add up to: shares with intervals, confusion matrices, tests against raw
-// frames.
+// What the answers of all runs add up to: shares with intervals, confusion matrices, tests against the first
+// view.
 #pragma once
 
 #include <cstdint>

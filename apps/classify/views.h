@@ -11,7 +11,7 @@
 namespace supertac {
 
 enum class ViewKind {
-  frame,    ///< the last frame as it is felt, rows x columns: the paper's "raw"
+  frame,    ///< the last frame as the network sees it: rows x columns, levelled when its windows are
   bicubic,  ///< the same enlarged to the picture's size, so that only its content differs from a picture
   super_resolved,  ///< the network's picture
   latents,         ///< the means of the latent distributions
@@ -27,7 +27,6 @@ struct View {
   std::string name() const;
   /// The view of that name. Throws std::invalid_argument that lists the names.
   static View named(const std::string& name);
-  bool is_picture() const { return kind != ViewKind::latents; }
 };
 
 /// Shows windows [N,T,signals] (the indices' ones, changed by augmentation perhaps) of a data set.

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <cxxopts.hpp>
 #include <iostream>
+#include <limits>
 #include <set>
 
 #include "apps/common/nearest.h"
@@ -15,15 +16,15 @@ namespace supertac {
 namespace {
 
 /// The options as cxxopts wants them; everything is text there, numbers are read locale-free afterwards.
-void add(cxxopts::Options& parser, const std::string& name, const std::string& help, const std::string& value,
-         bool is_flag, const std::string& default_value) {
+void add(cxxopts::Options& parser, const std::string& group, const std::string& name, const std::string& help,
+         const std::string& value, bool is_flag, const std::string& default_value) {
   const std::string names = name == "help" ? "h,help" : name;
   if (is_flag) {
-    parser.add_options()(names, help);
+    parser.add_options(group)(names, help);
   } else {
     const auto type = cxxopts::value<std::string>();
-    parser.add_options()(names, help, default_value.empty() ? type : type->default_value(default_value),
-                         value);
+    parser.add_options(group)(names, help, default_value.empty() ? type : type->default_value(default_value),
+                              value);
   }
 }
 
@@ -40,6 +41,8 @@ Arguments::Arguments(std::string program, std::string purpose)
 }
 
 void Arguments::declare(const std::string& name, Option option) {
+  option.only_with = only_with_;
+  option.is_more = more_;
   if (!options_.emplace(name, std::move(option)).second) {
     throw std::invalid_argument("Arguments: option " + name + " declared twice");
   }
@@ -68,6 +71,21 @@ Arguments& Arguments::flag(const std::string& name, const std::string& help) {
   return *this;
 }
 
+Arguments& Arguments::one_of(const std::string& first, const std::string& second) {
+  one_of_.emplace_back(first, second);
+  return *this;
+}
+
+Arguments& Arguments::only_with(const std::string& option) {
+  only_with_ = option;
+  return *this;
+}
+
+Arguments& Arguments::more(bool on) {
+  more_ = on;
+  return *this;
+}
+
 std::string Arguments::help() const {
   cxxopts::Options parser(program_, purpose_);
   std::string usage;
@@ -84,7 +102,8 @@ std::string Arguments::help() const {
     const std::string& name = order_[(i + kCommon) % order_.size()];
     const Option& option = options_.at(name);
     if (option.is_positional) continue;
-    add(parser, name, option.help, option.value, option.is_flag, option.default_value);
+    add(parser, option.is_more ? "more" : "", name, option.help, option.value, option.is_flag,
+        option.default_value);
   }
   std::string text = parser.help();
   for (const std::string& name : positionals_) text += "\n  " + name + ": " + options_.at(name).help;
@@ -115,7 +134,7 @@ void Arguments::parse(int argc, const char* const* argv) {
   cxxopts::Options parser(program_, purpose_);
   for (const std::string& name : order_) {
     const Option& option = options_.at(name);
-    add(parser, name, option.help, option.value, option.is_flag, "");
+    add(parser, "", name, option.help, option.value, option.is_flag, "");
   }
   parser.parse_positional(positionals_);
   try {
@@ -130,7 +149,9 @@ void Arguments::parse(int argc, const char* const* argv) {
   } catch (const cxxopts::exceptions::exception& error) {
     throw UsageError(error.what());
   }
-  if (!given("help") && !given("version")) check_complete();
+  if (given("help") || given("version")) return;
+  check_complete();
+  check_together();
 }
 
 void Arguments::check_complete() const {
@@ -139,6 +160,20 @@ void Arguments::check_complete() const {
     if (!option.is_required || (given(name) && !values_.at(name).empty())) continue;
     throw UsageError("missing " + (option.is_positional ? name : "--" + name + " " + option.value) + ": " +
                      option.help);
+  }
+}
+
+void Arguments::check_together() const {
+  for (const auto& [first, second] : one_of_) {
+    if (given(first) != given(second)) continue;
+    throw UsageError("expected --" + first + " " + options_.at(first).value + " or --" + second + " " +
+                     options_.at(second).value + ", found " + (given(first) ? "both" : "neither"));
+  }
+  for (const std::string& name : order_) {
+    const std::string& needed = options_.at(name).only_with;
+    if (needed.empty() || !given(name) || given(needed)) continue;
+    throw UsageError("--" + name + ": says something beside --" + needed +
+                     " only, which is not given; leave it out");
   }
 }
 
@@ -172,6 +207,10 @@ std::int64_t Arguments::integer(const std::string& name, std::int64_t lowest, st
   if (value && *value >= lowest && *value <= highest) return *value;
   reject(name, "a whole number from " + std::to_string(lowest) + " to " + std::to_string(highest),
          text(name));
+}
+
+std::uint64_t Arguments::seed() const {
+  return static_cast<std::uint64_t>(integer("seed", 0, std::numeric_limits<std::int64_t>::max()));
 }
 
 double Arguments::number(const std::string& name, double lowest, double highest) const {

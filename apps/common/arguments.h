@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace supertac {
@@ -43,9 +44,16 @@ class Arguments {
   Arguments& option(const std::string& name, const std::string& value, const std::string& help,
                     const std::string& default_value = "");
   Arguments& flag(const std::string& name, const std::string& help);
+  /// Exactly one of these two options has to be given.
+  Arguments& one_of(const std::string& first, const std::string& second);
+  /// The options declared from here on say something beside `option` only and are refused without it; "" ends
+  /// this.
+  Arguments& only_with(const std::string& option);
+  /// The options declared from here on stand under "more options" in the help: few people need them.
+  Arguments& more(bool on = true);
 
   /// Throws UsageError: an unknown option (naming the nearest known one), a value missing, an argument too
-  /// many or too few. --help and --version may stand without what is required.
+  /// many or too few, an option that says nothing beside the others. --help and --version may stand without what is required.
   void parse(int argc, const char* const* argv);
 
   // Reading; `name` is that of an option or the value name of a positional argument. All throw UsageError
@@ -58,6 +66,8 @@ class Arguments {
   std::string choice(const std::string& name, const std::vector<std::string>& words) const;
   std::int64_t integer(const std::string& name, std::int64_t lowest, std::int64_t highest) const;
   double number(const std::string& name, double lowest, double highest) const;
+  /// --seed, from 0 on.
+  std::uint64_t seed() const;
   /// Comma-separated; an empty value is an empty list, an empty element is an error, and so is one given
   /// twice.
   std::vector<std::string> list(const std::string& name) const;
@@ -87,11 +97,14 @@ class Arguments {
   struct Option {
     std::string value{}, help{}, default_value{};
     bool is_flag = false, is_required = false, is_positional = false;
+    bool is_more = false;
+    std::string only_with{};
   };
 
   void declare(const std::string& name, Option option);
   void check_names(int argc, const char* const* argv) const;
   void check_complete() const;
+  void check_together() const;
   [[noreturn]] void reject(const std::string& name, const std::string& expected,
                            const std::string& found) const;
 
@@ -99,6 +112,9 @@ class Arguments {
   std::vector<std::string> order_;        // of declaration
   std::vector<std::string> positionals_;  // value names
   std::map<std::string, Option> options_;
+  std::vector<std::pair<std::string, std::string>> one_of_;
+  std::string only_with_;  // of the options being declared
+  bool more_ = false;
   std::map<std::string, std::string> values_;  // as given
 };
 

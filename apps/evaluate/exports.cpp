@@ -21,7 +21,7 @@ Picture draw(const Committee& model, const WindowSet& windows, std::span<const s
   std::vector<float> outputs, truths;
   for_each_output(model, windows, chosen, [&](const EvaluatedBatch& b) {
     outputs.insert(outputs.end(), b.outputs.values().begin(), b.outputs.values().end());
-    truths.insert(truths.end(), b.truths.values().begin(), b.truths.values().end());
+    truths.insert(truths.end(), b.targets.values().begin(), b.targets.values().end());
     return true;
   });
   std::vector<std::vector<float>> frames;
@@ -36,15 +36,11 @@ Picture draw(const Committee& model, const WindowSet& windows, std::span<const s
 
 }  // namespace
 
-OutputsFile::OutputsFile(const WindowSet& windows, std::size_t count)
-    : timesteps_(static_cast<std::uint64_t>(windows.timesteps())),
-      signals_(windows.array().signals()),
-      height_(static_cast<std::uint64_t>(windows.image().height)),
-      width_(static_cast<std::uint64_t>(windows.image().width)) {
-  input_.reserve(count * timesteps_ * signals_);
-  output_.reserve(count * height_ * width_);
-  truth_.reserve(count * height_ * width_);
-}
+OutputsFile::OutputsFile(const TaxelArray& array, std::size_t timesteps, const ImageGrid& image)
+    : timesteps_(timesteps),
+      signals_(array.signals()),
+      height_(static_cast<std::uint64_t>(image.height)),
+      width_(static_cast<std::uint64_t>(image.width)) {}
 
 void OutputsFile::add(std::span<const float> window, std::span<const float> output,
                       std::span<const float> truth) {
@@ -79,6 +75,32 @@ void write_pictures(const Committee& model, const WindowSet& windows, std::span<
                              ".png";
     write_png(folder.add(name), draw(model, windows, spread(list, kFilmColumns), film_picture, 48));
   }
+}
+
+void write_pairs(const WindowSet& windows, std::span<const std::uint32_t> indices, const std::string& path) {
+  const ImageGrid image = windows.image();
+  const TaxelArray array = windows.array();
+  const auto channels = static_cast<std::size_t>(array.channels);
+  std::vector<float> window(windows.input_size()), input, target(indices.size() * image.pixels());
+  std::vector<std::int64_t> group;
+  for (std::size_t n = 0; n < indices.size(); ++n) {
+    windows.input(indices[n], window);
+    const auto frame = std::span<const float>(window).last(array.signals());
+    for (std::size_t c = 0; c < channels; ++c)
+      for (std::size_t at = c; at < frame.size(); at += channels) input.push_back(frame[at]);
+    windows.target(indices[n], std::span(target).subspan(n * image.pixels(), image.pixels()));
+    group.push_back(windows.group(indices[n]));
+  }
+  const auto size = [](auto value) { return static_cast<std::uint64_t>(value); };
+  const std::uint64_t count = indices.size();
+  write_safetensors(
+      path, {{"format", "supertac-pairs"}, {"data", windows.fingerprint()}},
+      {{"input",
+        "F32",
+        {count, channels, size(array.rows), size(array.columns)},
+        std::as_bytes(std::span(input))},
+       {"target", "F32", {count, 1, size(image.height), size(image.width)}, std::as_bytes(std::span(target))},
+       {"group", "I64", {count}, std::as_bytes(std::span(group))}});
 }
 
 }  // namespace supertac

@@ -16,7 +16,7 @@ namespace supertac {
 /// with tensors "input", "output", "truth".
 class OutputsFile {
  public:
-  OutputsFile(const WindowSet& windows, std::size_t count);
+  OutputsFile(const TaxelArray& array, std::size_t timesteps, const ImageGrid& image);
   void add(std::span<const float> window, std::span<const float> output, std::span<const float> truth);
   /// Throws FileError.
   void write(const std::string& path) const;
@@ -30,5 +30,9 @@ class OutputsFile {
 /// pass film_<plate>_t<trial>_p<pass>.png. Throws FileError.
 void write_pictures(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> test,
                     OutputFolder& folder);
+
+/// Windows as pairs (data/samples/pairs.h): the last frame as a network sees it, [N,channels,rows,columns]; the
+/// truth [N,1,H,W]; and as group [N] the number of the pass. Throws FileError.
+void write_pairs(const WindowSet& windows, std::span<const std::uint32_t> indices, const std::string& path);
 
 }  // namespace supertac

@@ -36,7 +36,7 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
     : model_(models.front()),
       network_(models),
       window_(window_settings(model_, source)),
-      input_(Shape{1, network_.settings().timesteps, network_.settings().signals()}),
+      input_(network_.first().input_shape(1)),
       output_(network_.infer(input_)) {}  // the first run takes memory and chooses kernels
 
 std::span<const float> PictureMaker::picture() {

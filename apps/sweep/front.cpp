@@ -83,4 +83,17 @@ const Configuration* cheapest(const std::vector<Configuration>& all,
   return best;
 }
 
+nlohmann::ordered_json to_json(const Configuration& c) {
+  nlohmann::ordered_json json = {{"configuration", c.name}, {"seeds", c.seeds}, {"models", c.models}};
+  for (const SweepColumn& column : sweep_columns())
+    if (!column.text && column.name != "seed") json[column.name] = c.mean.at(column.name);
+  return json;
+}
+
+std::string line_of(const Configuration& c) {
+  return c.name + ": SSIM " + format(c.mean.at("ssim"), 3) + ", PSNR " + format(c.mean.at("psnr_db"), 1) +
+         " dB, " + format(c.mean.at("median_us"), 1) + " us, " + format(c.mean.at("mmac"), 2) + " MMAC, " +
+         std::to_string(c.seeds) + " seed(s)";
+}
+
 }  // namespace supertac

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,10 @@ struct Configuration {
   std::map<std::string, double> mean;
   std::vector<std::string> models;
 };
+
+/// One line for people, and all for programs.
+std::string line_of(const Configuration& c);
+nlohmann::ordered_json to_json(const Configuration& c);
 
 /// In the order of the table.
 std::vector<Configuration> configurations(const SweepTable& table);

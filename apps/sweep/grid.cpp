@@ -53,9 +53,11 @@ void declare_grid(Arguments& a) {
   a.option("timesteps", "T,...", "samples per window, multiples of 16, 32 to 512 (default: the preset's)");
   a.option("latent", "LD,...", "latent numbers per group of taxels (default: the preset's)");
   a.option("scale", "N,...", "pictures N times as fine as the array: 2, 4, 8 (default: the preset's)");
+  a.option("seeds", "N,...", "of split, initial weights, order, noise", "0");
+  a.more();
   a.option("channels", "N,...", "of the upsampler (default: the preset's)");
   a.option("rcabs", "N,...", "residual channel attention blocks per stage (default: the preset's)");
-  a.option("seeds", "N,...", "of split, initial weights, order, noise", "0");
+  a.more(false);
 }
 
 std::vector<GridPoint> grid_of(const Arguments& a) {

@@ -7,6 +7,7 @@
 
 #include "io/file.h"
 #include "io/numbers.h"
+#include "io/text.h"
 
 namespace supertac {
 namespace {
@@ -16,7 +17,7 @@ constexpr std::uint64_t kMaxBytes = 64 << 20;
 std::string header() {
   std::string line;
   for (const SweepColumn& column : sweep_columns())
-    line += (line.empty() ? "" : ",") + std::string(column.name);
+    line += (line.empty() ? "" : ",") + column.name;
   return line;
 }
 
@@ -25,18 +26,6 @@ std::size_t index_of(const std::string& name) {
   for (std::size_t i = 0; i < columns.size(); ++i)
     if (columns[i].name == name) return i;
   throw std::invalid_argument("a sweep's table has no column \"" + name + "\"; it has " + header());
-}
-
-std::vector<std::string> cells_of(const std::string& line) {
-  std::vector<std::string> cells(1);
-  for (const char c : line) {
-    if (c == ',') {
-      cells.emplace_back();
-    } else {
-      cells.back() += c;
-    }
-  }
-  return cells;
 }
 
 std::string cell(const nlohmann::ordered_json& value) {
@@ -48,39 +37,16 @@ std::string cell(const nlohmann::ordered_json& value) {
 }  // namespace
 
 const std::vector<SweepColumn>& sweep_columns() {
-  static const std::vector<SweepColumn> kColumns = {{"model", true},
-                                                    {"preset", true},
-                                                    {"timesteps"},
-                                                    {"latent"},
-                                                    {"scale"},
-                                                    {"channels"},
-                                                    {"rcabs"},
-                                                    {"seed"},
-                                                    {"split", true},
-                                                    {"windows"},
-                                                    {"ssim"},
-                                                    {"psnr_db"},
-                                                    {"psnr_pooled_db"},
-                                                    {"phase"},
-                                                    {"phase_floor"},
-                                                    {"position_px"},
-                                                    {"position_mm"},
-                                                    {"all_windows"},
-                                                    {"all_ssim"},
-                                                    {"all_psnr_db"},
-                                                    {"all_psnr_pooled_db"},
-                                                    {"all_phase"},
-                                                    {"all_phase_floor"},
-                                                    {"all_position_px"},
-                                                    {"all_position_mm"},
-                                                    {"median_us"},
-                                                    {"p99_us"},
-                                                    {"mmac"},
-                                                    {"parameters"},
-                                                    {"memory_mb"},
-                                                    {"train_s"},
-                                                    {"steps"},
-                                                    {"commit", true}};
+  static const std::vector<SweepColumn> kColumns = [] {
+    std::vector<SweepColumn> columns;
+    for (const std::string& name : comma_list(
+             "model,preset,timesteps,latent,scale,channels,rcabs,seed,split,windows,ssim,psnr_db,"
+             "psnr_pooled_db,phase,phase_floor,position_px,position_mm,all_windows,all_ssim,all_psnr_db,"
+             "all_psnr_pooled_db,all_phase,all_phase_floor,all_position_px,all_position_mm,median_us,p99_us,"
+             "mmac,parameters,memory_mb,train_s,steps,commit"))
+      columns.push_back({name, name == "model" || name == "preset" || name == "split" || name == "commit"});
+    return columns;
+  }();
   return kColumns;
 }
 
@@ -108,14 +74,14 @@ void SweepTable::read_line(const std::string& line, std::size_t number) {
     if (line != header()) fail("expected the columns " + header() + ", found " + line);
     return;
   }
-  Row row = cells_of(line);
+  Row row = comma_list(line);
   const auto& columns = sweep_columns();
   if (row.size() != columns.size()) {
     fail("expected " + std::to_string(columns.size()) + " cells, found " + std::to_string(row.size()));
   }
   for (std::size_t i = 0; i < row.size(); ++i) {
     if (!columns[i].text && !parse_double(row[i]))
-      fail(std::string(columns[i].name) + " expects a number, found \"" + row[i] + "\"");
+      fail(columns[i].name + " expects a number, found \"" + row[i] + "\"");
   }
   if (has(row[0])) fail("model " + row[0] + " is there twice");
   rows_.push_back(std::move(row));
@@ -131,7 +97,7 @@ void SweepTable::add(const nlohmann::ordered_json& values) {
   Row row;
   for (const SweepColumn& column : sweep_columns()) {
     if (!values.contains(column.name))
-      throw std::invalid_argument("SweepTable: no value for column " + std::string(column.name));
+      throw std::invalid_argument("SweepTable: no value for column " + column.name);
     row.push_back(cell(values[column.name]));
   }
   rows_.push_back(std::move(row));

@@ -17,7 +17,7 @@ namespace supertac {
 ///   train_s, steps       time on the clock that training took, scores at epoch ends included
 ///   commit               what the program was built from
 struct SweepColumn {
-  const char* name;
+  std::string name;
   bool text = false;
 };
 const std::vector<SweepColumn>& sweep_columns();

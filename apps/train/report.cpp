@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "apps/train/run_folder.h"
 #include "io/numbers.h"
@@ -23,12 +22,28 @@ struct Point {
   double x, y;
 };
 
-std::vector<Point> points_of(const std::vector<LogLine>& lines,
-                             const std::function<std::optional<double>(const LogLine&)>& value) {
+struct Curve {
+  const char* title;
+  std::optional<double> (*value)(const LogLine&);
+  bool logarithmic;
+};
+constexpr Curve kCurves[] = {
+    {"loss", [](const LogLine& l) { return std::optional(l.total); }, true},
+    {"mean squared error of the pictures", [](const LogLine& l) { return std::optional(l.l2); }, true},
+    {"SSIM of the training pictures", [](const LogLine& l) { return std::optional(l.ssim); }, false},
+    {"SSIM of test pictures in contact", [](const LogLine& l) { return l.test_ssim; }, false},
+    {"reconstruction error of the VAEs", [](const LogLine& l) { return std::optional(l.reconstruction); },
+     true},
+    {"Kullback-Leibler divergence", [](const LogLine& l) { return std::optional(l.kld); }, false},
+    {"gradient norm before clipping", [](const LogLine& l) { return std::optional(l.gradient_norm); }, true}};
+
+// A logarithmic curve has positive points only.
+std::vector<Point> points_of(const std::vector<LogLine>& lines, const Curve& curve) {
   std::vector<Point> points;
   for (const LogLine& line : lines) {
-    const std::optional<double> y = value(line);
-    if (y && std::isfinite(*y)) points.push_back({static_cast<double>(line.step), *y});
+    const std::optional<double> y = curve.value(line);
+    if (y && std::isfinite(*y) && (!curve.logarithmic || *y > 0))
+      points.push_back({static_cast<double>(line.step), *y});
   }
   return points;
 }
@@ -38,23 +53,22 @@ std::string label(double x, double y, const char* anchor, const std::string& tex
          text + "</text>";
 }
 
-// A curve with its smallest and largest value on the axes. Logarithmic curves must be positive.
-std::string curve(const std::string& title, std::vector<Point> points, bool logarithmic) {
-  if (logarithmic) std::erase_if(points, [](Point p) { return p.y <= 0; });
+// A curve with its smallest and largest value on the axes.
+std::string drawn(const Curve& curve, const std::vector<Point>& points) {
   if (points.empty()) return {};
   const auto [low, high] =
       std::minmax_element(points.begin(), points.end(), [](Point a, Point b) { return a.y < b.y; });
   const double bottom = low->y, top = high->y, last = std::max(points.back().x, 1.0);
   const auto scaled = [&](double y) {
-    const double span = logarithmic ? std::log(top / bottom) : top - bottom;
-    return span <= 0 ? 0.5 : (logarithmic ? std::log(y / bottom) : y - bottom) / span;
+    const double span = curve.logarithmic ? std::log(top / bottom) : top - bottom;
+    return span <= 0 ? 0.5 : (curve.logarithmic ? std::log(y / bottom) : y - bottom) / span;
   };
   std::string path;
   for (const Point p : points) {
     path += format(kLeft + (kWidth - kLeft - 10) * p.x / last, 1) + "," +
             format(kHeight - kBottom - (kHeight - kBottom - kTop) * scaled(p.y), 1) + " ";
   }
-  return "<h2>" + title + "</h2><svg viewBox=\"0 0 " + format(kWidth, 0) + " " + format(kHeight, 0) + "\">" +
+  return std::string("<h2>") + curve.title + (curve.logarithmic ? " (logarithmic)" : "") + "</h2><svg viewBox=\"0 0 " + format(kWidth, 0) + " " + format(kHeight, 0) + "\">" +
          "<rect x=\"60\" y=\"12\" width=\"490\" height=\"178\" fill=\"none\" stroke=\"#999\"/>" +
          label(kLeft - 5, kTop + 8, "end", format(top, 4)) +
          label(kLeft - 5, kHeight - kBottom, "end", format(bottom, 4)) +
@@ -73,21 +87,7 @@ std::string report_page(const nlohmann::ordered_json& settings, const std::vecto
       "pre{background:#f4f4f4;padding:1em;white-space:pre-wrap}h2{font-size:1em;margin-bottom:0}</style></"
       "head><body>"
       "<h1>SuperTac training</h1>";
-  using Value = std::optional<double>;
-  page +=
-      curve("loss (logarithmic)", points_of(lines, [](const LogLine& l) -> Value { return l.total; }), true);
-  page += curve("mean squared error of the pictures (logarithmic)",
-                points_of(lines, [](const LogLine& l) -> Value { return l.l2; }), true);
-  page += curve("SSIM of the training pictures",
-                points_of(lines, [](const LogLine& l) -> Value { return l.ssim; }), false);
-  page += curve("SSIM of test pictures in contact",
-                points_of(lines, [](const LogLine& l) { return l.test_ssim; }), false);
-  page += curve("reconstruction error of the VAEs (logarithmic)",
-                points_of(lines, [](const LogLine& l) -> Value { return l.reconstruction; }), true);
-  page += curve("Kullback-Leibler divergence",
-                points_of(lines, [](const LogLine& l) -> Value { return l.kld; }), false);
-  page += curve("gradient norm before clipping (logarithmic)",
-                points_of(lines, [](const LogLine& l) -> Value { return l.gradient_norm; }), true);
+  for (const Curve& curve : kCurves) page += drawn(curve, points_of(lines, curve));
   return page + "<h2>settings</h2><pre>" + escaped(settings.dump(2)) + "</pre></body></html>\n";
 }
 

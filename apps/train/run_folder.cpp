@@ -35,8 +35,13 @@ std::optional<LogLine> parse(const std::string& text) {
   for (std::size_t i = 0; i < 9; ++i) {
     if (!v[i]) return std::nullopt;
   }
-  return LogLine{
-      *v[0], static_cast<std::int64_t>(*v[1]), *v[2], *v[3], *v[4], *v[5], *v[6], *v[7], *v[8], v[9], v[10]};
+  return LogLine{{*v[2], *v[3], *v[4], *v[5], *v[6]},
+                 *v[0],
+                 static_cast<std::int64_t>(*v[1]),
+                 *v[7],
+                 *v[8],
+                 v[9],
+                 v[10]};
 }
 
 std::vector<LogLine> read_log(const std::string& path, std::int64_t last_step) {

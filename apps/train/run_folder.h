@@ -11,12 +11,12 @@
 namespace supertac {
 
 /// One line of log.csv: means over the steps since the line before.
-struct LogLine {
+struct LogLine : LossTerms {
   double time_s = 0;  ///< since training began, pauses between resumed runs left out
   std::int64_t step = 0;
-  double total = 0, reconstruction = 0, kld = 0, l2 = 0, ssim = 0, gradient_norm = 0, learning_rate = 0;
-  std::optional<double> test_ssim,
-      test_psnr_db;  ///< in contact, at the end of an epoch; nothing is chosen by them
+  double gradient_norm = 0, learning_rate = 0;
+  /// Of targets that are not all 0, at the end of an epoch; nothing is chosen by them.
+  std::optional<double> test_ssim, test_psnr_db;
 };
 
 class RunFolder {

@@ -3,10 +3,24 @@
 namespace supertac {
 
 void declare_training(Arguments& a) {
-  a.option("grouping", "NAME", "taxels of one VAE: horizontal (rows) or vertical (columns)", "horizontal");
-  a.option("split", "NAME", "what is kept for testing: window, pass, trial, texture or none", "trial");
-  a.option("epochs", "N", "passes over the training windows (default: 20; preset tiny: 80)");
-  a.option("batch", "N", "windows per step", "64");
+  a.option("split", "NAME",
+           "what is kept for testing: window, pass, trial, texture or none; with --pairs group, pair or none "
+           "(default: group, or pair for a file without groups)",
+           "trial");
+  a.option("epochs", "N", "passes over the training examples (default: 20; preset tiny: 80)");
+  a.more();
+  a.option("batch", "N", "examples per step", "64");
+  a.option("learning-rate", "X",
+           "peak of Adam's rate, after warm-up and before the cosine (default: 0.001; preset tiny: 0.002)");
+  a.option("lambda", "X", "weight of 1 - SSIM", "0.1");
+  a.option("checkpoint-every", "STEPS", "how often the state is saved", "500");
+  a.more(false);
+}
+
+void declare_window_training(Arguments& a) {
+  a.option("plates", "A,B,...", "only recordings of these plates (default: all)");
+  a.option("stride", "N", "take every N-th window of a pass", "1");
+  a.more();
   a.option(
       "rate", "HZ",
       "of the model's samples: T samples span T / HZ seconds; the paper's is 300, and the board's filter "
@@ -14,43 +28,44 @@ void declare_training(Arguments& a) {
   a.option("range", "REST,SPAN",
            "a signal V becomes clip((REST - V) / SPAN, 0, 1), in volts or whatever the recordings hold",
            "2.45,0.36");
-  a.option("stride", "N", "take every N-th window of a pass", "1");
   a.option("scaling", "NAME",
            "of the signals: levelled (each window to its own rest and gain, so that a finger pressed harder "
            "is seen like any other) or fixed",
            "levelled");
-  a.option("learning-rate", "X",
-           "peak of Adam's rate, after warm-up and before the cosine (default: 0.001; preset tiny: 0.002)");
   a.option("augment", "NAME",
            "standard: random gains, offsets, noise, dropped taxels and a finger lifted a little, for unseen "
            "trials; none",
            "standard");
-  a.option("loss-a", "X", "share of the VAEs in the loss, 0 to 1", "0.2");
+  a.option("also", "DIR", "more recordings to train on, never tested: simulated ones, say");
+  a.option("grouping", "NAME", "taxels of one VAE: horizontal (rows) or vertical (columns)", "horizontal");
   a.option("beta", "X", "weight of the KL divergence", "0.001");
   a.option("autoencoder", "NAME",
            "variational; plain: latents without noise and KL divergence, for comparison", "variational");
-  a.option("lambda", "X", "weight of 1 - SSIM", "0.1");
-  a.option("plates", "A,B,...", "only recordings of these plates (default: all)");
-  a.option("also", "DIR", "more recordings to train on, never tested: simulated ones, say", "");
-  a.option("checkpoint-every", "STEPS", "how often the state is saved", "500");
+  a.more(false);
+}
+
+void read_pace(const Arguments& a, TrainingPace& pace) {
+  if (a.given("epochs")) pace.epochs = a.integer("epochs", 1, 100'000);
+  if (a.given("learning-rate")) pace.learning_rate = a.number("learning-rate", 1e-9, 1);
+  pace.batch = a.integer("batch", 1, 4096);
 }
 
 TrainingSettings training_settings(const Arguments& a, const SuperTacSettings& model) {
   const PresetTraining preset = PresetTraining::of_preset(model.preset);
   TrainingSettings s;
+  s.epochs = preset.epochs;
+  s.learning_rate = preset.learning_rate;
+  read_pace(a, s);
   s.model = model;
   s.model.grouping = grouping_of(a.choice("grouping", {"horizontal", "vertical"}));
-  s.epochs = a.given("epochs") ? a.integer("epochs", 1, 100'000) : preset.epochs;
-  s.batch = a.integer("batch", 1, 4096);
-  s.learning_rate = a.given("learning-rate") ? a.number("learning-rate", 1e-9, 1) : preset.learning_rate;
-  s.loss = {a.number("loss-a", 0, 1), a.number("beta", 0, 1e6), a.number("lambda", 0, 1e6)};
+  s.loss.beta = a.number("beta", 0, 1e6);
+  s.loss.lambda = a.number("lambda", 0, 1e6);
   if (a.choice("autoencoder", {"variational", "plain"}) == "plain") {
+    if (a.given("beta")) throw UsageError("--beta: has no part in --autoencoder plain; leave it out");
     s.sampling = false;
     s.loss.beta = 0;
   }
-  if (a.choice("augment", {"standard", "none"}) == "standard") {
-    s.augment = kStandardAugmentation;
-  }
+  if (a.choice("augment", {"standard", "none"}) == "standard") s.augment = kStandardAugmentation;
   return s;
 }
 

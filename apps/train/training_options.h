@@ -3,12 +3,17 @@
 
 #include "apps/common/arguments.h"
 #include "data/samples/split.h"
-#include "models/trainer.h"
+#include "models/objective.h"
 
 namespace supertac {
 
-/// Data, split, optimiser, loss and augmentation: everything but the network and the seed.
+/// Split, steps and loss: what every training has.
 void declare_training(Arguments& a);
+/// Recordings, windows, augmentation and the loss of SuperTac: everything else but the network and the seed.
+void declare_window_training(Arguments& a);
+
+/// What the options of declare_training() say. Throws UsageError.
+void read_pace(const Arguments& a, TrainingPace& pace);
 
 /// What these options say about training this network; where they are not given, what its preset is best
 /// trained with. --grouping is set in the network; the seed is left to the caller. Throws UsageError.

@@ -1,6 +1,5 @@
 #include "apps/train/training_run.h"
 
-#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -8,85 +7,63 @@
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
 #include "apps/common/version.h"
-#include "apps/train/log_means.h"
+#include "data/plates/truth.h"
 #include "io/numbers.h"
 #include "models/evaluation.h"
 
 namespace supertac {
 namespace {
 
-constexpr std::size_t kTestWindowsPerEpoch = 2000;
-
-// What the model file says of its origin; the same whatever machine, folder or number of threads.
-std::map<std::string, std::string> origin(const Arguments& a, std::uint64_t seed, const WindowSet& windows,
-                                          const Split& split) {
-  return {{"split", a.text("split")},      {"seed", std::to_string(seed)},
-          {"plates", a.text("plates")},    {"stride", a.text("stride")},
-          {"data", windows.fingerprint()}, {"split_fingerprint", fingerprint(split)}};
-}
+constexpr std::size_t kTestedPerEpoch = 2000;
+constexpr std::int64_t kStepsPerLine = 50;
 
 // Restored before the run folder is touched: a checkpoint that does not fit must leave the folder as it was.
-Trainer make_trainer(const WindowSet& windows, const Split& split, const TrainingSettings& settings,
-                     const std::string& resume, const std::map<std::string, std::string>& origin) {
-  Trainer trainer(windows, split.train, settings);
-  if (!resume.empty()) trainer.restore(resume, origin);
+Trainer make_trainer(TrainingTask& task, const std::string& resume) {
+  Trainer trainer(task.examples, task.split.train, std::move(task.objective));
+  if (!resume.empty()) trainer.restore(resume, task.origin);
   return trainer;
 }
 
-nlohmann::ordered_json describe(const Arguments& a, const Trainer& trainer, const WindowSet& windows,
-                                const Split& split) {
-  const Leakage leakage = find_leakage(windows, split);
-  return {
-      {"command", a.command_line()},
-      {"version", version()},
-      {"commit", commit()},
-      {"training", nlohmann::ordered_json::parse(trainer.settings().text())},
-      {"model", nlohmann::ordered_json::parse(model_metadata(trainer.settings().model, {}).at("settings"))},
-      {"parameters", trainer.model().parameter_count()},
-      {"split", a.text("split")},
-      {"train_windows", split.train.size()},
-      {"test_windows", split.test.size()},
-      {"test_windows_sharing_frames", leakage.overlapping},
-      {"test_windows_duplicated", leakage.duplicated},
-      {"windows", windows.counts().summary()},
-      {"data", windows.fingerprint()},
-      {"split_fingerprint", fingerprint(split)},
-      {"steps", trainer.total_steps()}};
+nlohmann::ordered_json describe(const Arguments& a, const Trainer& trainer, const TrainingTask& task) {
+  using Json = nlohmann::ordered_json;
+  Json json = {{"command", a.command_line()},
+               {"version", version()},
+               {"commit", commit()},
+               {"training", Json::parse(trainer.objective().text())},
+               {"model", Json::parse(trainer.objective().metadata().at("settings"))},
+               {"parameters", trainer.model().parameter_count()},
+               {"split", task.origin.at("split")},
+               {"train_" + task.unit, task.split.train.size()},
+               {"test_" + task.unit, task.split.test.size()}};
+  json.update(task.about);
+  json.update({{"data", task.origin.at("data")},
+               {"split_fingerprint", task.origin.at("split_fingerprint")},
+               {"steps", trainer.total_steps()}});
+  return json;
 }
 
 }  // namespace
 
-TrainingRun::TrainingRun(const Arguments& a, const WindowSet& windows, const Split& split,
-                         const TrainingSettings& settings, TrainingTarget target)
+TrainingRun::TrainingRun(const Arguments& a, TrainingTask task, TrainingTarget target)
     : a_(a),
-      windows_(windows),
-      split_(split),
+      task_(std::move(task)),
       target_(std::move(target)),
-      origin_(origin(a, settings.seed, windows, split)),
-      trainer_(make_trainer(windows, split, settings, target_.resume, origin_)),
+      trainer_(make_trainer(task_, target_.resume)),
       folder_(target_.out, target_.force,
               target_.resume.empty() ? std::nullopt : std::optional(trainer_.step())),
-      description_(describe(a, trainer_, windows, split)) {
+      description_(describe(a, trainer_, task_)) {
   folder_.write_settings(description_);
 }
 
 bool TrainingRun::train() {
-  a_.note("training on " + std::to_string(split_.train.size()) + " windows, " +
+  a_.note("training on " + std::to_string(task_.split.train.size()) + " " + task_.unit + ", " +
           std::to_string(trainer_.total_steps()) + " steps" +
           (target_.resume.empty() ? "" : ", resumed at " + std::to_string(trainer_.step())));
-  const auto sharing = description_.at("test_windows_sharing_frames").get<std::size_t>(),
-             duplicated = description_.at("test_windows_duplicated").get<std::size_t>();
-  if (a_.text("split") != "none" && sharing + duplicated > 0) {
-    a_.note("split " + a_.text("split") + " leaks: of " + std::to_string(split_.test.size()) +
-            " test windows " + std::to_string(sharing) + " share frames with training windows, " +
-            std::to_string(duplicated) + " repeat one; use --split trial for results");
-  }
+  if (!task_.warning.empty()) a_.note(task_.warning);
   step_until_done();
   folder_.write_report(description_);
   if (!trainer_.done()) return false;
-  std::map<std::string, std::string> metadata = origin_;
-  metadata["training"] = trainer_.settings().text();
-  save_model(target_.out, trainer_.model(), input_of(windows_), metadata);
+  trainer_.save_model(target_.out, task_.origin);
   return true;
 }
 
@@ -95,39 +72,59 @@ void TrainingRun::step_until_done() {
   seconds_before_ = folder_.seconds();
   const std::int64_t every = a_.integer("checkpoint-every", 1, 1'000'000'000);
   Progress progress(a_, target_.label, static_cast<std::uint64_t>(trainer_.total_steps()), "steps");
-  LogMeans means;
+  LogLine sums;
+  std::int64_t steps = 0;
   while (!trainer_.done() && !interrupted()) {
     const StepReport report = trainer_.train_step();
-    means.add(report);
-    if (report.collapsed && !std::exchange(warned_, true)) {
-      a_.note("step " + std::to_string(report.step) + ": " +
-              (report.active_latents == 0
-                   ? "no latent number tells windows apart; stop and lower --beta (now " + a_.text("beta") +
-                         ") or "
-                   : "the pictures are the same for every window, or far too strong; stop and lower ") +
-              "--learning-rate (now " + format(trainer_.settings().learning_rate) + ")");
+    sums.add(report);
+    sums.gradient_norm += report.gradient_norm;
+    ++steps;
+    if (report.collapsed && !std::exchange(warned_, true)) warn_of_collapse(report);
+    if (report.step % trainer_.steps_per_epoch() == 0 || report.step % kStepsPerLine == 0) {
+      log(sums, std::exchange(steps, 0), report);
+      sums = {};
     }
-    const bool epoch_ends = report.step % trainer_.steps_per_epoch() == 0;
-    if (epoch_ends || report.step % LogMeans::kSteps == 0) log(means.take(seconds()), epoch_ends);
     if (report.step % every == 0) save();
     progress.update(static_cast<std::uint64_t>(report.step));
   }
   save();
 }
 
+void TrainingRun::warn_of_collapse(const StepReport& report) {
+  const bool idle = trainer_.objective().latents() > 0 && report.active_latents == 0;
+  const std::string advice =
+      idle ? "no latent number tells windows apart; stop and lower --beta (now " + a_.text("beta") + ") or "
+           : "the pictures are the same for every input, or far too strong; stop and lower ";
+  a_.note("step " + std::to_string(report.step) + ": " + advice + "--learning-rate (now " +
+          format(trainer_.objective().pace().learning_rate) + ")");
+}
+
 double TrainingRun::seconds() const {
   return seconds_before_ + std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
 }
 
-// The scores of an even sample of the test windows are for the log: nothing is chosen by them.
-void TrainingRun::log(LogLine line, bool epoch_ends) {
-  if (epoch_ends) {
-    const Metrics m = score(trainer_.model(), windows_, spread(split_.test, kTestWindowsPerEpoch)).contact();
-    if (std::isfinite(m.ssim)) {
-      line.test_ssim = m.ssim;
-      line.test_psnr_db = m.psnr_mean_db;
-    }
-  }
+// The scores of an even sample of the test side are for the log: nothing is chosen by them.
+void TrainingRun::test(LogLine& line) const {
+  const ImageGrid image = task_.examples.image();
+  PairMetrics metrics(static_cast<std::size_t>(image.height), static_cast<std::size_t>(image.width));
+  for_each_output(trainer_.model(), task_.examples, spread(task_.split.test, kTestedPerEpoch),
+                  [&](const EvaluatedBatch& b) {
+                    for (std::size_t n = 0; n < b.size(); ++n)
+                      if (in_contact(b.target(n))) metrics.add(b.output(n), b.target(n));
+                    return !interrupted();
+                  });
+  if (metrics.result().windows == 0) return;
+  line.test_ssim = metrics.result().ssim;
+  line.test_psnr_db = metrics.result().psnr_mean_db;
+}
+
+void TrainingRun::log(LogLine& line, std::int64_t steps, const StepReport& last) {
+  for (double* sum : {&line.total, &line.reconstruction, &line.kld, &line.l2, &line.ssim, &line.gradient_norm})
+    *sum /= static_cast<double>(steps);
+  line.time_s = seconds();
+  line.step = last.step;
+  line.learning_rate = last.learning_rate;
+  if (last.step % trainer_.steps_per_epoch() == 0) test(line);
   if (!folder_.log(line)) a_.note(folder_.path() + "/log.csv: cannot write; the log is kept in memory only");
 }
 

@@ -2,12 +2,11 @@
 #pragma once
 
 #include <chrono>
-#include <map>
 #include <string>
 
 #include "apps/common/arguments.h"
 #include "apps/train/run_folder.h"
-#include "data/samples/split.h"
+#include "apps/train/training_task.h"
 #include "models/trainer.h"
 
 namespace supertac {
@@ -21,10 +20,9 @@ struct TrainingTarget {
 
 class TrainingRun {
  public:
-  /// `a` must have what declare_training() declares; all references must outlive the run. Throws as Trainer,
-  /// Trainer::restore and RunFolder.
-  TrainingRun(const Arguments& a, const WindowSet& windows, const Split& split,
-              const TrainingSettings& settings, TrainingTarget target);
+  /// `a`, which must have what declare_training() declares, and the task's examples must outlive the run.
+  /// Throws as Trainer, Trainer::restore and RunFolder.
+  TrainingRun(const Arguments& a, TrainingTask task, TrainingTarget target);
 
   /// Until the last step or a signal. The state is saved either way; after the last step report and model are
   /// written too. Returns whether all steps are done.
@@ -32,20 +30,21 @@ class TrainingRun {
 
   const Trainer& trainer() const { return trainer_; }
   const RunFolder& folder() const { return folder_; }
+  const Split& split() const { return task_.split; }
   /// What settings.json holds: command, version, commit, settings, data, split.
   const nlohmann::ordered_json& description() const { return description_; }
 
  private:
   void step_until_done();
   double seconds() const;
-  void log(LogLine line, bool epoch_ends);
-  void save() { trainer_.save(folder_.checkpoint_path(), origin_); }
+  void warn_of_collapse(const StepReport& report);
+  void test(LogLine& line) const;
+  void log(LogLine& means, std::int64_t steps, const StepReport& last);
+  void save() { trainer_.save(folder_.checkpoint_path(), task_.origin); }
 
   const Arguments& a_;
-  const WindowSet& windows_;
-  const Split& split_;
+  TrainingTask task_;
   TrainingTarget target_;
-  std::map<std::string, std::string> origin_;
   Trainer trainer_;
   RunFolder folder_;
   nlohmann::ordered_json description_;

@@ -5,6 +5,7 @@
 // (its filter gets shorter or longer with it). Without: simulated passes, at speeds and pitches of their own.
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
@@ -18,12 +19,12 @@
 #include "io/file.h"
 #include "io/numbers.h"
 #include "io/random.h"
+#include "models/evaluation.h"
 #include "models/model_file.h"
 
 namespace supertac {
 namespace {
 
-constexpr std::size_t kBatch = 64;
 constexpr double kUsualSpeed = 10;
 
 void declare(Arguments& a) {
@@ -117,16 +118,39 @@ void disturb(const Condition& condition, std::uint64_t seed, std::uint64_t index
   }
 }
 
+// Windows as a worse sensor gives them: disturbed before they are levelled.
+class DisturbedWindows : public Examples {
+ public:
+  DisturbedWindows(const WindowSet& windows, const Condition& condition, std::uint64_t seed)
+      : windows_(windows), condition_(condition), seed_(seed) {}
+  std::size_t size() const override { return windows_.size(); }
+  std::size_t frames() const override { return windows_.frames(); }
+  TaxelArray array() const override { return windows_.array(); }
+  int scale() const override { return windows_.scale(); }
+  void input(std::size_t i, std::span<float> out) const override {
+    std::ranges::copy(windows_.window(i), out.begin());
+    disturb(condition_, seed_, i, out);
+    if (windows_.settings().scaling.levelled) level(out, kTaxels);
+  }
+  void target(std::size_t i, std::span<float> out) const override { windows_.target(i, out); }
+  std::int64_t group(std::size_t i) const override { return windows_.group(i); }
+  std::string fingerprint() const override { return windows_.fingerprint(); }
+
+ private:
+  const WindowSet& windows_;
+  const Condition& condition_;
+  std::uint64_t seed_;
+};
+
 class Study {
  public:
   Study(const Arguments& a, const ModelFile& file)
       : model_(*file.model),
-        seed_(static_cast<std::uint64_t>(a.integer("seed", 0, 1'000'000'000))),
+        seed_(a.seed()),
         limit_(static_cast<std::size_t>(a.integer("limit", 1, 100'000'000))),
         scene_(a, file) {
     const WindowSet train = scene_.windows(1, {"none", 0});
-    std::vector<std::uint32_t> all;
-    for (std::uint32_t i = 0; i < train.size(); ++i) all.push_back(i);
+    const std::vector<std::uint32_t> all = all_of(train);
     baselines_.push_back(std::make_unique<MeanImage>(train, all));
     baselines_.push_back(std::make_unique<UpsampledFrame>(Upsampling::Kind::bicubic, train, all));
   }
@@ -134,13 +158,21 @@ class Study {
   // Lines of the CSV: one per method.
   std::string run(const Condition& condition) const {
     const WindowSet windows = scene_.windows(2, condition);
+    const DisturbedWindows disturbed(windows, condition, seed_);
     std::vector<ContactMetrics> metrics;  // network, then the baselines
     for (std::size_t i = 0; i <= baselines_.size(); ++i) metrics.emplace_back(windows.image());
-    const std::size_t count = std::min(limit_, windows.size());
-    for (std::size_t first = 0; first < count; first += kBatch) {
+    std::vector<float> picture(windows.image().pixels());
+    for_each_output(model_, disturbed, spread(all_of(windows), limit_), [&](const EvaluatedBatch& b) {
       stop_if_interrupted();
-      score_batch(windows, condition, first, std::min(kBatch, count - first), count, metrics);
-    }
+      for (std::size_t n = 0; n < b.size(); ++n) {
+        metrics[0].add(b.output(n), b.target(n));
+        for (std::size_t k = 0; k < baselines_.size(); ++k) {
+          baselines_[k]->predict(b.input(n), picture);
+          metrics[k + 1].add(picture, b.target(n));
+        }
+      }
+      return true;
+    });
     std::string text;
     for (std::size_t i = 0; i < metrics.size(); ++i) {
       const Metrics m = metrics[i].contact();
@@ -153,40 +185,17 @@ class Study {
   }
 
  private:
-  void score_batch(const WindowSet& windows, const Condition& condition, std::size_t first, std::size_t n,
-                   std::size_t count, std::vector<ContactMetrics>& metrics) const {
-    const auto pixels = windows.image().pixels();
-    Tensor inputs(Shape{static_cast<Dim>(n), windows.timesteps(), kTaxels});
-    const std::size_t window_size = inputs.values().size() / n;
-    std::vector<float> truths(n * pixels), picture(pixels);
-    for (std::size_t i = 0; i < n; ++i) {
-      const std::size_t index = (first + i) * windows.size() / count;
-      const std::span<float> window = inputs.values().subspan(i * window_size, window_size);
-      std::ranges::copy(windows.window(index), window.begin());
-      disturb(condition, seed_, index, window);  // what the sensor gives, before it is levelled
-      windows.truth(index, std::span(truths).subspan(i * pixels, pixels));
-    }
-    const auto truth = [&](std::size_t i) {
-      return std::span<const float>(truths).subspan(i * pixels, pixels);
-    };
-    for (std::size_t i = 0; i < n; ++i) {
-      const std::span<float> window = inputs.values().subspan(i * window_size, window_size);
-      if (windows.settings().scaling.levelled) level(window, kTaxels);
-      for (std::size_t k = 0; k < baselines_.size(); ++k) {
-        baselines_[k]->predict(window, picture);
-        metrics[k + 1].add(picture, truth(i));
-      }
-    }
-    const Tensor outputs = model_.infer(inputs);
-    for (std::size_t i = 0; i < n; ++i)
-      metrics[0].add(outputs.values().subspan(i * pixels, pixels), truth(i));
+  static std::vector<std::uint32_t> all_of(const WindowSet& windows) {
+    std::vector<std::uint32_t> all(windows.size());
+    std::iota(all.begin(), all.end(), 0U);
+    return all;
   }
 
   const SuperTac& model_;
   std::uint64_t seed_;
   std::size_t limit_;
   Scene scene_;
-  std::vector<std::unique_ptr<Baseline>> baselines_;
+  Baselines baselines_;
 };
 
 int run(Arguments& a) {

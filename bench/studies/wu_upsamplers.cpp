@@ -1,5 +1,5 @@
 // Baselines after Wu 2022 (IROS, TactileSRCNN and TactileSRGAN): a picture from one frame of the array, on
-// pairs (supertac-pairs). Trained and scored here; the product has no use for them.
+// pairs (supertac-evaluate --write-pairs). Trained and scored here; the product has no use for them.
 //
 //   generator  frame, bilinear to the picture's size -> Conv3 1-W, ReLU -> B multi-scale blocks -> Conv3 W-1
 //   block      a = (Conv3, Conv5)(x) -> 2W;  b = (Conv3, Conv5)(a) -> 4W;  ReLU(x + Conv1(b))
@@ -124,45 +124,44 @@ class Critic : public Module {
 /// Frames enlarged and targets of one batch.
 struct Batch {
   Batch(const PairSet& pairs, std::size_t n)
-      : scaling{{0}, {1}},  // the signals lie in [0,1] already
-        frame(pairs.height() * pairs.width()),
-        enlarged(shape(pairs, n)),
-        truth(shape(pairs, n)) {}
+      : frame(pairs.input_size()), enlarged(shape(pairs, n)), truth(shape(pairs, n)) {}
   static Shape shape(const PairSet& p, std::size_t n) {
-    return {static_cast<Dim>(n), static_cast<Dim>(p.target_height()), static_cast<Dim>(p.target_width()), 1};
+    return {static_cast<Dim>(n), p.image().height, p.image().width, 1};
   }
   void fill(const PairSet& pairs, std::span<const std::uint32_t> indices) {
-    const std::size_t pixels = pairs.target_height() * pairs.target_width();
+    const std::size_t pixels = pairs.image().pixels();
     for (std::size_t n = 0; n < indices.size(); ++n) {
-      pairs.input(indices[n], scaling, frame);
+      pairs.input(indices[n], frame);  // not scaled: it lies in [0,1] already
       enlarge(pairs, enlarged.values().subspan(n * pixels, pixels));
       pairs.target(indices[n], truth.values().subspan(n * pixels, pixels));
     }
   }
 
-  ChannelScaling scaling;
   std::vector<float> frame;
   Tensor enlarged, truth;
 
  private:
   // Bilinear, pixel centres aligned, edges held.
   void enlarge(const PairSet& p, std::span<float> out) const {
-    const auto place = [](std::size_t i, std::size_t scale, std::size_t size) {
-      const double at = (static_cast<double>(i) + 0.5) / static_cast<double>(scale) - 0.5;
+    const auto place = [](std::size_t i, std::size_t pixels, std::size_t size) {
+      const double at = (static_cast<double>(i) + 0.5) / static_cast<double>(pixels) - 0.5;
       return std::clamp(at, 0.0, static_cast<double>(size - 1));
     };
-    for (std::size_t i = 0; i < p.target_height(); ++i) {
-      const double y = place(i, p.scale(), p.height());
-      const auto y0 = static_cast<std::size_t>(y), y1 = std::min(y0 + 1, p.height() - 1);
-      for (std::size_t j = 0; j < p.target_width(); ++j) {
-        const double x = place(j, p.scale(), p.width());
-        const auto x0 = static_cast<std::size_t>(x), x1 = std::min(x0 + 1, p.width() - 1);
+    const auto scale = static_cast<std::size_t>(p.scale());
+    const auto height = static_cast<std::size_t>(p.array().rows);
+    const auto width = static_cast<std::size_t>(p.array().columns);
+    for (std::size_t i = 0; i < height * scale; ++i) {
+      const double y = place(i, scale, height);
+      const auto y0 = static_cast<std::size_t>(y), y1 = std::min(y0 + 1, height - 1);
+      for (std::size_t j = 0; j < width * scale; ++j) {
+        const double x = place(j, scale, width);
+        const auto x0 = static_cast<std::size_t>(x), x1 = std::min(x0 + 1, width - 1);
         const auto row = [&](std::size_t r) {
-          const double left = frame[r * p.width() + x0], right = frame[r * p.width() + x1];
+          const double left = frame[r * width + x0], right = frame[r * width + x1];
           return left + (x - static_cast<double>(x0)) * (right - left);
         };
         const double above = row(y0), below = row(y1);
-        out[i * p.target_width() + j] =
+        out[i * width * scale + j] =
             static_cast<float>(above + (y - static_cast<double>(y0)) * (below - above));
       }
     }
@@ -205,7 +204,9 @@ void train(Generator& generator, Critic* critic, const PairSet& pairs, std::uint
 
 nlohmann::ordered_json score(const Generator& generator, const PairSet& pairs) {
   const NoGrad no_grad;
-  PairMetrics contact(pairs.target_height(), pairs.target_width()), all = contact;
+  const ImageGrid image = pairs.image();
+  PairMetrics contact(static_cast<std::size_t>(image.height), static_cast<std::size_t>(image.width));
+  PairMetrics all = contact;
   Batch batch(pairs, 1);
   for (std::uint32_t i = 0; i < pairs.size(); ++i) {
     batch.fill(pairs, {&i, 1});
@@ -234,14 +235,15 @@ int run(Arguments& a) {
   const auto seed = static_cast<std::uint64_t>(a.integer("seed", 0, 1 << 30));
   const std::int64_t epochs = a.integer("epochs", 1, 10'000);
   const Dim width = a.integer("width", 1, 256);
-  if (pairs.channels() != 1 || pairs.target_height() != pairs.target_width() || pairs.target_height() < 8)
+  const ImageGrid image = pairs.image();
+  if (pairs.array().channels != 1 || image.height != image.width || image.height < 8)
     throw std::runtime_error(a.text("train") +
                              ": expected pairs of one channel with square targets of 8 pixels or more");
   Rng rng(seed);
   Generator generator(width, a.integer("blocks", 1, 64), rng);
   std::unique_ptr<Critic> critic;
   if (a.choice("method", {"srcnn", "srgan"}) == "srgan")
-    critic = std::make_unique<Critic>(width, static_cast<Dim>(pairs.target_height()), rng);
+    critic = std::make_unique<Critic>(width, image.height, rng);
   Progress progress(a, "training", static_cast<std::size_t>(epochs) * (pairs.size() / kBatch), "steps");
   train(generator, critic.get(), pairs, seed, epochs, progress);
   nlohmann::ordered_json result = {{"command", a.command_line()}, {"commit", commit()}};

@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <set>
 #include <stdexcept>
 
-#include "data/samples/batching.h"
 #include "io/file.h"
 #include "io/hash.h"
 #include "io/numbers.h"
@@ -15,7 +13,6 @@ namespace supertac {
 namespace {
 
 constexpr std::uint64_t kMostChannels = 64, kMostPixels = 1024, kFewestPixels = 7;
-constexpr double kTestShare = 0.2;
 
 std::string text(const std::vector<std::uint64_t>& shape) {
   std::string all;
@@ -62,26 +59,6 @@ std::vector<std::int64_t> whole_numbers(std::span<const std::byte> bytes) {
   return values;
 }
 
-std::size_t test_count(std::size_t count) {
-  return std::max<std::size_t>(
-      1, static_cast<std::size_t>(std::lround(kTestShare * static_cast<double>(count))));
-}
-
-std::set<std::int64_t> test_groups(const PairSet& pairs, std::uint64_t seed) {
-  std::set<std::int64_t> all;
-  for (std::size_t i = 0; i < pairs.size(); ++i) all.insert(pairs.group(i));
-  if (!pairs.grouped() || all.size() < 2)
-    throw std::invalid_argument(
-        "split group: the file needs a tensor 'group' with two groups, one to train on, one to test on; "
-        "without "
-        "one use split pair");
-  const std::vector<std::int64_t> ordered(all.begin(), all.end());
-  const EpochOrder order(ordered.size(), seed, 0);
-  std::set<std::int64_t> tested;
-  for (std::size_t i = 0; i < test_count(ordered.size()); ++i) tested.insert(ordered[order[i]]);
-  return tested;
-}
-
 }  // namespace
 
 PairSet PairSet::read(const std::string& path) {
@@ -111,7 +88,10 @@ void PairSet::check_shapes() {
     refuse("expected target's height and width to be 2, 4, 8 or 16 times input's");
   if (std::min(target[2], target[3]) < kFewestPixels || std::max(target[2], target[3]) > kMostPixels)
     refuse("expected 7 to 1024 target pixels a side");
-  count_ = input[0], channels_ = input[1], height_ = input[2], width_ = input[3], scale_ = scale;
+  count_ = input[0];
+  array_ = {static_cast<int>(input[2]), static_cast<int>(input[3]), 1, static_cast<int>(input[1])};
+  scale_ = static_cast<int>(scale);
+  set_scaling({std::vector<float>(input[1], 0), std::vector<float>(input[1], 1)});
 }
 
 void PairSet::check_values() const {
@@ -119,7 +99,7 @@ void PairSet::check_values() const {
     throw FileError(file_.path(), std::string(tensor) + " of pair " + std::to_string(pair) + " holds " +
                                       format(value) + ", expected " + expected);
   };
-  const std::size_t inputs = channels_ * height_ * width_, targets = target_height() * target_width();
+  const std::size_t inputs = input_size(), targets = image().pixels();
   for_each_value(file_.bytes("input"), [&](std::size_t i, float value) {
     if (!std::isfinite(value)) refuse("input", i / inputs, value, "finite values");
   });
@@ -139,82 +119,62 @@ void PairSet::read_groups() {
                            : whole_numbers<std::int32_t>(file_.bytes("group"));
 }
 
-std::span<const std::byte> PairSet::input_bytes(std::size_t i) const {
-  const std::size_t bytes = channels_ * height_ * width_ * sizeof(float);
-  return file_.bytes("input").subspan(i * bytes, bytes);
+void PairSet::set_scaling(const ChannelScaling& scaling) {
+  const auto channels = static_cast<std::size_t>(array_.channels);
+  check_size("the scaling", scaling.mean.size() + scaling.factor.size(), 2 * channels);
+  scaling_ = scaling;
 }
 
-void PairSet::input(std::size_t i, const ChannelScaling& scaling, std::span<float> out) const {
-  const std::size_t pixels = height_ * width_;
-  check_size("an input", out.size(), channels_ * pixels);
-  check_size("the scaling", scaling.mean.size() + scaling.factor.size(), 2 * channels_);
-  for_each_value(input_bytes(i), [&](std::size_t k, float value) {
-    const std::size_t channel = k / pixels, pixel = k % pixels;
-    out[pixel * channels_ + channel] = (value - scaling.mean[channel]) * scaling.factor[channel];
-  });
+void PairSet::input(std::size_t i, std::span<float> out) const {
+  check_size("an input", out.size(), input_size());
+  const auto pixels = static_cast<std::size_t>(array_.taxels()), channels = out.size() / pixels;
+  for_each_value(file_.bytes("input").subspan(i * out.size_bytes(), out.size_bytes()),
+                 [&](std::size_t k, float value) {
+                   const std::size_t channel = k / pixels, pixel = k % pixels;
+                   out[pixel * channels + channel] =
+                       (value - scaling_.mean[channel]) * scaling_.factor[channel];
+                 });
 }
 
 void PairSet::target(std::size_t i, std::span<float> out) const {
-  check_size("a target", out.size(), target_height() * target_width());
+  check_size("a target", out.size(), image().pixels());
   std::memcpy(out.data(), file_.bytes("target").data() + i * out.size_bytes(), out.size_bytes());
 }
 
 std::string PairSet::fingerprint() const {
   Hash hash;
-  for (const std::size_t size : {count_, channels_, height_, width_, scale_}) hash.add(size);
+  hash.add(count_);
+  for (const int size : {array_.channels, array_.rows, array_.columns, scale_}) hash.add(static_cast<std::size_t>(size));
   for (const char* name : {"input", "target"})
     for_each_value(file_.bytes(name), [&](std::size_t, float value) { hash.add(value); });
   for (const std::int64_t group : groups_) hash.add(group);
   return hash.hex();
 }
 
-ChannelScaling fit_scaling(const PairSet& pairs, std::span<const std::uint32_t> chosen) {
+void PairSet::fit_scaling(std::span<const std::uint32_t> chosen) {
   if (chosen.empty()) throw std::invalid_argument("pairs: there is no pair to fit the scaling to");
-  const std::size_t channels = pairs.channels();
-  const ChannelScaling raw{std::vector<float>(channels, 0), std::vector<float>(channels, 1)};
-  std::vector<float> input(channels * pairs.height() * pairs.width());
+  const auto channels = static_cast<std::size_t>(array_.channels);
+  set_scaling({std::vector<float>(channels, 0), std::vector<float>(channels, 1)});
+  std::vector<float> values(input_size());
   std::vector<double> sum(channels), squares(channels);
+  const double n = static_cast<double>(chosen.size()) * static_cast<double>(array_.taxels());
   for (int pass = 0; pass < 2; ++pass) {  // squares about the mean: nothing is lost when it is far from 0
-    const double n = static_cast<double>(chosen.size()) * static_cast<double>(pairs.height() * pairs.width());
     for (const std::uint32_t i : chosen) {
-      pairs.input(i, raw, input);
-      for (std::size_t k = 0; k < input.size(); ++k) {
+      input(i, values);
+      for (std::size_t k = 0; k < values.size(); ++k) {
         const std::size_t c = k % channels;
-        const double distance = double{input[k]} - sum[c];
-        (pass == 0 ? sum[c] : squares[c]) += pass == 0 ? double{input[k]} : distance * distance;
+        const double distance = double{values[k]} - sum[c];
+        (pass == 0 ? sum[c] : squares[c]) += pass == 0 ? double{values[k]} : distance * distance;
       }
     }
     for (double& s : pass == 0 ? sum : squares) s /= n;
   }
-  ChannelScaling scaling;
   for (std::size_t c = 0; c < channels; ++c) {
     const double deviation = std::sqrt(squares[c]);
-    scaling.mean.push_back(static_cast<float>(sum[c]));
-    scaling.factor.push_back(deviation > 1e-6 * (1e-12 + std::abs(sum[c]))
-                                 ? static_cast<float>(std::min(1 / deviation, 1e12))
-                                 : 1.0F);
+    scaling_.mean[c] = static_cast<float>(sum[c]);
+    if (deviation > 1e-6 * (1e-12 + std::abs(sum[c])))
+      scaling_.factor[c] = static_cast<float>(std::min(1 / deviation, 1e12));
   }
-  return scaling;
-}
-
-Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t seed) {
-  Split split;
-  std::vector<bool> tested(pairs.size());
-  if (kind == "group") {
-    const std::set<std::int64_t> groups = test_groups(pairs, seed);
-    for (std::size_t i = 0; i < pairs.size(); ++i) tested[i] = groups.contains(pairs.group(i));
-  } else if (kind == "pair") {
-    if (pairs.size() < 2) throw std::invalid_argument("split pair: the file has one pair, needs two");
-    const EpochOrder order(pairs.size(), seed, 0);
-    for (std::size_t i = 0; i < test_count(pairs.size()); ++i) tested[order[i]] = true;
-  } else if (kind != "none") {
-    throw std::invalid_argument("split of pairs must be group, pair or none, got \"" + kind + "\"");
-  }
-  for (std::uint32_t i = 0; i < pairs.size(); ++i) {
-    if (kind == "none" || tested[i]) split.test.push_back(i);
-    if (!tested[i]) split.train.push_back(i);
-  }
-  return split;
 }
 
 }  // namespace supertac

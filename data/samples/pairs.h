@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "data/samples/split.h"
+#include "data/samples/examples.h"
 #include "io/safetensors.h"
 
 namespace supertac {
@@ -17,7 +17,7 @@ struct ChannelScaling {
 };
 
 /// Paired images of one file. Nothing is copied but what is asked for.
-class PairSet {
+class PairSet : public Examples {
  public:
   /// Reads a safetensors file with tensors
   ///   input   F32 [N,C,H,W]    what the sensor gives: N frames of H x W taxels (or pixels), C channels
@@ -28,48 +28,39 @@ class PairSet {
   /// outside [0,1] are named by their pair.
   static PairSet read(const std::string& path);
 
-  std::size_t size() const { return count_; }
-  std::size_t channels() const { return channels_; }
-  std::size_t height() const { return height_; }
-  std::size_t width() const { return width_; }
-  std::size_t scale() const { return scale_; }
-  std::size_t target_height() const { return height_ * scale_; }
-  std::size_t target_width() const { return width_ * scale_; }
+  /// Sets the scaling of the inputs, which is none before: mean and 1 / standard deviation of every channel
+  /// over the given pairs; factor 1 for a channel that never changes. Throws std::invalid_argument when there
+  /// is no pair.
+  void fit_scaling(std::span<const std::uint32_t> chosen);
+  /// Throws std::invalid_argument when it is for another number of channels.
+  void set_scaling(const ChannelScaling& scaling);
+  const ChannelScaling& scaling() const { return scaling_; }
+
+  std::size_t size() const override { return count_; }
+  std::size_t frames() const override { return 1; }
+  TaxelArray array() const override { return array_; }
+  int scale() const override { return scale_; }
   bool grouped() const { return !groups_.empty(); }
   /// 0 for all when the file has no groups.
-  std::int64_t group(std::size_t i) const { return grouped() ? groups_[i] : 0; }
-
-  // i < size(), unchecked. Throws std::invalid_argument when `out` or the scaling has another size.
-  /// The input as the networks take it, [H][W][C], scaled.
-  void input(std::size_t i, const ChannelScaling& scaling, std::span<float> out) const;
-  /// [sH][sW]
-  void target(std::size_t i, std::span<float> out) const;
-
-  /// 16 hexadecimal digits over sizes, values and groups.
-  std::string fingerprint() const;
+  std::int64_t group(std::size_t i) const override { return grouped() ? groups_[i] : 0; }
+  /// [H][W][C], scaled.
+  void input(std::size_t i, std::span<float> out) const override;
+  void target(std::size_t i, std::span<float> out) const override;
+  /// Over sizes, values and groups.
+  std::string fingerprint() const override;
 
  private:
   explicit PairSet(SafetensorsFile file);
   void check_shapes();
   void check_values() const;
   void read_groups();
-  std::span<const std::byte> input_bytes(std::size_t i) const;
 
   SafetensorsFile file_;
-  std::size_t count_ = 0, channels_ = 0, height_ = 0, width_ = 0, scale_ = 0;
+  std::size_t count_ = 0;
+  TaxelArray array_;
+  int scale_ = 0;
+  ChannelScaling scaling_;
   std::vector<std::int64_t> groups_;
 };
-
-/// Mean and 1 / standard deviation of every channel over the given pairs; factor 1 for a channel that never
-/// changes. Throws std::invalid_argument when there is no pair.
-ChannelScaling fit_scaling(const PairSet& pairs, std::span<const std::uint32_t> chosen);
-
-/// How pairs are divided:
-///   group  a random fifth of the groups (rounded, at least one) is tested: unseen passes, surfaces, days
-///   pair   a random fifth of the pairs is tested. Leaky when neighbours resemble each other.
-///   none   all pairs are in both
-/// Random choices are EpochOrder(count, seed, 0); groups are counted in ascending order.
-/// Throws std::invalid_argument for another name, no groups, or a side that would be empty.
-Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t seed);
 
 }  // namespace supertac

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <set>
 #include <stdexcept>
 #include <unordered_map>
 #include <utility>
@@ -161,6 +162,20 @@ std::size_t count_overlapping(const WindowSet& windows, const Split& split) {
   return count;
 }
 
+std::set<std::int64_t> test_groups(const PairSet& pairs, std::uint64_t seed) {
+  std::set<std::int64_t> all;
+  for (std::size_t i = 0; i < pairs.size(); ++i) all.insert(pairs.group(i));
+  if (!pairs.grouped() || all.size() < 2)
+    throw std::invalid_argument(
+        "split group: the file needs a tensor 'group' with two groups, one to train on, one to test on; "
+        "without one use split pair");
+  const std::vector<std::int64_t> ordered(all.begin(), all.end());
+  const EpochOrder order(ordered.size(), seed, 0);
+  std::set<std::int64_t> tested;
+  for (std::size_t i = 0; i < test_count(ordered.size()); ++i) tested.insert(ordered[order[i]]);
+  return tested;
+}
+
 }  // namespace
 
 SplitKind split_kind(const std::string& name) {
@@ -201,6 +216,26 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed) {
     throw std::invalid_argument("split " + name_of(kind) + ": no window to " +
                                 (split.train.empty() ? "train on" : "test on") +
                                 (kind == SplitKind::trial ? "; the data needs trials 1 and 2" : ""));
+  return split;
+}
+
+Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t seed) {
+  Split split;
+  std::vector<bool> tested(pairs.size());
+  if (kind == "group") {
+    const std::set<std::int64_t> groups = test_groups(pairs, seed);
+    for (std::size_t i = 0; i < pairs.size(); ++i) tested[i] = groups.contains(pairs.group(i));
+  } else if (kind == "pair") {
+    if (pairs.size() < 2) throw std::invalid_argument("split pair: the file has one pair, needs two");
+    const EpochOrder order(pairs.size(), seed, 0);
+    for (std::size_t i = 0; i < test_count(pairs.size()); ++i) tested[order[i]] = true;
+  } else if (kind != "none") {
+    throw std::invalid_argument("split of pairs must be group, pair or none, got \"" + kind + "\"");
+  }
+  for (std::uint32_t i = 0; i < pairs.size(); ++i) {
+    if (kind == "none" || tested[i]) split.test.push_back(i);
+    if (!tested[i]) split.train.push_back(i);
+  }
   return split;
 }
 

@@ -1,3 +1,4 @@
+// What is trained on and what is tested: a result without its split is meaningless.
 #pragma once
 
 #include <cstdint>
@@ -5,11 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "data/samples/pairs.h"
 #include "data/samples/windows.h"
 
 namespace supertac {
 
-/// How a set of windows is divided for training and testing; a result without its split is meaningless.
+/// How a set of windows is divided:
 ///   window   a random fifth of all windows is tested. Leaky: neighbours share nearly all frames. Kept to
 ///   compare
 ///            with the literature.
@@ -25,7 +27,7 @@ SplitKind split_kind(const std::string& name);
 std::string name_of(SplitKind kind);
 
 struct Split {
-  std::vector<std::uint32_t> train, test;  ///< window indices, ascending
+  std::vector<std::uint32_t> train, test;  ///< indices of examples, ascending
 };
 
 /// The random choices are EpochOrder(count, seed, stream) with stream 0 for windows, 1 for plates, and 2 + p
@@ -34,6 +36,14 @@ struct Split {
 /// seed; trial and none do not use the seed.
 /// Throws std::invalid_argument when a side would be empty, saying what the data lacks.
 Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed);
+
+/// How pairs are divided:
+///   group  a random fifth of the groups (rounded, at least one) is tested: unseen passes, surfaces, days
+///   pair   a random fifth of the pairs is tested. Leaky when neighbours resemble each other.
+///   none   all pairs are in both
+/// Random choices are EpochOrder(count, seed, 0); groups are counted in ascending order.
+/// Throws std::invalid_argument for another name, no groups, or a side that would be empty.
+Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t seed);
 
 /// What the test windows share with the training windows.
 struct Leakage {

@@ -10,6 +10,7 @@
 #include "data/plates/taxel_array.h"
 #include "data/recordings/recording.h"
 #include "data/recordings/resample.h"
+#include "data/samples/examples.h"
 
 namespace supertac {
 
@@ -44,7 +45,7 @@ struct WindowCounts {
 /// rate_hz and kept as scaled floats, a window is the index (pass, last frame), and none crosses the edge of
 /// a pass or a gap. Memory: 4 bytes per signal of a frame, 12 per frame and 8 per window. Reading is const
 /// and safe from many threads.
-class WindowSet {
+class WindowSet : public Examples {
  public:
   struct Pass {
     std::string plate;
@@ -78,12 +79,12 @@ class WindowSet {
   /// the missing windows.
   void add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside = false);
 
-  std::size_t size() const { return index_.size(); }
+  std::size_t size() const override { return index_.size(); }
+  std::size_t frames() const override { return static_cast<std::size_t>(settings_.timesteps); }
   int timesteps() const { return settings_.timesteps; }
   /// Of the recordings; the rig's while there is none.
-  TaxelArray array() const { return settings_.array.value_or(TaxelArray{}); }
-  /// The size of a truth.
-  ImageGrid image() const { return array().picture(settings_.scale); }
+  TaxelArray array() const override { return settings_.array.value_or(TaxelArray{}); }
+  int scale() const override { return settings_.scale; }
   const WindowSettings& settings() const { return settings_; }
   const WindowCounts& counts() const { return counts_; }
   const std::vector<Pass>& passes() const { return passes_; }
@@ -102,6 +103,9 @@ class WindowSet {
   /// True when the truth has a pixel above 0.
   bool contact(std::size_t i) const;
   std::size_t pass_of(std::size_t i) const { return index_[i].pass; }
+  void input(std::size_t i, std::span<float> out) const override { window(i, out); }
+  void target(std::size_t i, std::span<float> out) const override { truth(i, out); }
+  std::int64_t group(std::size_t i) const override { return static_cast<std::int64_t>(pass_of(i)); }
   /// Number of the last frame within its pass.
   std::size_t frame_of(std::size_t i) const { return index_[i].last; }
   /// Frames since its pass began or since the last gap, the last frame included: at least timesteps().
@@ -114,7 +118,7 @@ class WindowSet {
 
   /// 16 hexadecimal digits over samples, positions, plates and index: the same data and settings, the same
   /// text.
-  std::string fingerprint() const;
+  std::string fingerprint() const override;
 
  private:
   struct Entry {

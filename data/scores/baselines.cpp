@@ -11,7 +11,7 @@ namespace supertac {
 namespace {
 
 std::vector<std::uint32_t> fitted_on(std::span<const std::uint32_t> train) {
-  if (train.empty()) throw std::invalid_argument("baseline: there is no window to fit to");
+  if (train.empty()) throw std::invalid_argument("baseline: there is no example to fit to");
   return spread(train, kFitWindows);
 }
 
@@ -21,10 +21,10 @@ void check_size(const char* what, std::size_t got, std::size_t expected) {
                                 " values, got " + std::to_string(got));
 }
 
-void check_window(std::span<const float> window, const TaxelArray& array) {
-  if (window.empty() || window.size() % array.signals() != 0)
-    throw std::invalid_argument("baseline: a window is [T][" + std::to_string(array.signals()) + "], got " +
-                                std::to_string(window.size()) + " values");
+void check_input(std::span<const float> input, const TaxelArray& array) {
+  if (input.empty() || input.size() % array.signals() != 0)
+    throw std::invalid_argument("baseline: an input is [T][" + std::to_string(array.signals()) + "], got " +
+                                std::to_string(input.size()) + " values");
 }
 
 double keys_kernel(double distance) {
@@ -37,21 +37,21 @@ double keys_kernel(double distance) {
 
 }  // namespace
 
-MeanImage::MeanImage(const WindowSet& windows, std::span<const std::uint32_t> train)
-    : array_(windows.array()), image_(windows.image().pixels()) {
+MeanImage::MeanImage(const Examples& examples, std::span<const std::uint32_t> train)
+    : array_(examples.array()), image_(examples.image().pixels()) {
   std::vector<double> sum(image_.size());
   std::vector<float> truth(image_.size());
   const std::vector<std::uint32_t> chosen = fitted_on(train);
   for (const std::uint32_t i : chosen) {
-    windows.truth(i, truth);
+    examples.target(i, truth);
     for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += truth[p];
   }
   for (std::size_t p = 0; p < sum.size(); ++p)
     image_[p] = static_cast<float>(sum[p] / static_cast<double>(chosen.size()));
 }
 
-void MeanImage::predict(std::span<const float> window, std::span<float> out) const {
-  check_window(window, array_);
+void MeanImage::predict(std::span<const float> input, std::span<float> out) const {
+  check_input(input, array_);
   check_size("the image", out.size(), image_.size());
   std::copy(image_.begin(), image_.end(), out.begin());
 }
@@ -102,20 +102,20 @@ void Upsampling::operator()(std::span<const float> frame, std::span<float> out) 
   }
 }
 
-UpsampledFrame::UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows,
+UpsampledFrame::UpsampledFrame(Upsampling::Kind kind, const Examples& examples,
                                std::span<const std::uint32_t> train)
     : kind_(kind),
-      array_(windows.array()),
-      upsampling_(kind, array_.rows, array_.columns, windows.settings().scale) {
-  const std::size_t pixels = windows.image().pixels();
+      array_(examples.array()),
+      upsampling_(kind, array_.rows, array_.columns, examples.scale()) {
+  const std::size_t pixels = examples.image().pixels();
   std::vector<float> image(pixels), truth(pixels);
   double sx = 0, sy = 0, sxx = 0, sxy = 0;
   const std::vector<std::uint32_t> chosen = fitted_on(train);
-  std::vector<float> window(static_cast<std::size_t>(windows.timesteps()) * array_.signals());
+  std::vector<float> input(examples.input_size());
   for (const std::uint32_t i : chosen) {
-    windows.window(i, window);
-    upsampling_(mean_of_channels(array_, std::span(window).last(array_.signals())), image);
-    windows.truth(i, truth);
+    examples.input(i, input);
+    upsampling_(mean_of_channels(array_, std::span(input).last(array_.signals())), image);
+    examples.target(i, truth);
     for (std::size_t p = 0; p < pixels; ++p) {
       sx += image[p];
       sy += truth[p];
@@ -133,18 +133,22 @@ std::string UpsampledFrame::name() const {
   return kind_ == Upsampling::Kind::nearest ? "nearest" : "bicubic";
 }
 
-void UpsampledFrame::predict(std::span<const float> window, std::span<float> out) const {
-  check_window(window, array_);
-  upsampling_(mean_of_channels(array_, window.last(array_.signals())), out);
+void UpsampledFrame::predict(std::span<const float> input, std::span<float> out) const {
+  check_input(input, array_);
+  upsampling_(mean_of_channels(array_, input.last(array_.signals())), out);
   for (float& v : out) v = static_cast<float>(slope_ * v + intercept_);
 }
 
-std::vector<std::unique_ptr<Baseline>> fit_baselines(const WindowSet& windows,
-                                                     std::span<const std::uint32_t> train) {
-  std::vector<std::unique_ptr<Baseline>> baselines;
-  baselines.push_back(std::make_unique<MeanImage>(windows, train));
-  baselines.push_back(std::make_unique<UpsampledFrame>(Upsampling::Kind::nearest, windows, train));
-  baselines.push_back(std::make_unique<UpsampledFrame>(Upsampling::Kind::bicubic, windows, train));
+Baselines fit_baselines(const Examples& examples, std::span<const std::uint32_t> train) {
+  Baselines baselines;
+  baselines.push_back(std::make_unique<MeanImage>(examples, train));
+  for (const auto kind : {Upsampling::Kind::nearest, Upsampling::Kind::bicubic})
+    baselines.push_back(std::make_unique<UpsampledFrame>(kind, examples, train));
+  return baselines;
+}
+
+Baselines fit_baselines(const WindowSet& windows, std::span<const std::uint32_t> train) {
+  Baselines baselines = fit_baselines(static_cast<const Examples&>(windows), train);
   baselines.push_back(std::make_unique<Ridge>(windows, train));
   return baselines;
 }

@@ -11,23 +11,23 @@
 namespace supertac {
 
 /// A way to an image that does without a network, so that a reader sees what the network buys. It sees the
-/// window as the network does (levelled when the scaling says so) and nothing else.
+/// input as the network does (a window levelled when the scaling says so) and nothing else.
 class Baseline {
  public:
   virtual ~Baseline() = default;
   virtual std::string name() const = 0;
-  /// window [T][signals], any T >= 1; out [height][width] of the truths. Throws std::invalid_argument on
+  /// input [T][signals], any T >= 1; out [height][width] of the targets. Throws std::invalid_argument on
   /// other sizes.
-  virtual void predict(std::span<const float> window, std::span<float> out) const = 0;
+  virtual void predict(std::span<const float> input, std::span<float> out) const = 0;
 };
 
-/// The mean truth of the training windows, whatever the window holds.
+/// The mean target of the training examples, whatever the input holds.
 class MeanImage : public Baseline {
  public:
   /// Throws std::invalid_argument when train is empty.
-  MeanImage(const WindowSet& windows, std::span<const std::uint32_t> train);
+  MeanImage(const Examples& examples, std::span<const std::uint32_t> train);
   std::string name() const override { return "mean_image"; }
-  void predict(std::span<const float> window, std::span<float> out) const override;
+  void predict(std::span<const float> input, std::span<float> out) const override;
 
  private:
   TaxelArray array_;
@@ -57,14 +57,14 @@ class Upsampling {
 };
 
 /// Upsampling of the last frame (the mean of each taxel's channels), followed by a x + b: the line that fits
-/// the truth of the training windows best (least squares over all pixels). It turns voltage into height, as
+/// the targets of the training examples best (least squares over all pixels). It turns voltage into height, as
 /// fairly as two numbers can.
 class UpsampledFrame : public Baseline {
  public:
   /// Throws std::invalid_argument when train is empty.
-  UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows, std::span<const std::uint32_t> train);
+  UpsampledFrame(Upsampling::Kind kind, const Examples& examples, std::span<const std::uint32_t> train);
   std::string name() const override;
-  void predict(std::span<const float> window, std::span<float> out) const override;
+  void predict(std::span<const float> input, std::span<float> out) const override;
   double slope() const { return slope_; }
   double intercept() const { return intercept_; }
 
@@ -75,11 +75,13 @@ class UpsampledFrame : public Baseline {
   double slope_ = 0, intercept_ = 0;
 };
 
-/// mean_image, nearest, bicubic and ridge (data/ridge.h), in this order. Each is fitted to at most
-/// kFitWindows training windows, evenly spread over the list. Throws std::invalid_argument when train is
-/// empty.
+using Baselines = std::vector<std::unique_ptr<Baseline>>;
+
+/// mean_image, nearest and bicubic, in this order; for windows ridge (data/scores/ridge.h) besides. Each is
+/// fitted to at most kFitWindows training examples, evenly spread over the list. Throws std::invalid_argument
+/// when train is empty.
 constexpr std::size_t kFitWindows = 20000;
-std::vector<std::unique_ptr<Baseline>> fit_baselines(const WindowSet& windows,
-                                                     std::span<const std::uint32_t> train);
+Baselines fit_baselines(const Examples& examples, std::span<const std::uint32_t> train);
+Baselines fit_baselines(const WindowSet& windows, std::span<const std::uint32_t> train);
 
 }  // namespace supertac

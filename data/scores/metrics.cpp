@@ -110,27 +110,6 @@ nlohmann::ordered_json to_json(const Metrics& metrics) {
   return json;
 }
 
-Metrics metrics_from_json(const nlohmann::ordered_json& json) {
-  const auto value_of = [&](const char* name) -> const nlohmann::ordered_json& {
-    if (!json.is_object() || !json.contains(name))
-      throw std::invalid_argument("metrics: key '" + std::string(name) + "' is missing");
-    return json.at(name);
-  };
-  Metrics metrics;
-  const auto& windows = value_of("windows");
-  if (!windows.is_number_unsigned())
-    throw std::invalid_argument("metrics: 'windows' must be a whole number, got " + windows.dump());
-  metrics.windows = windows.get<std::uint64_t>();
-  for (const auto& [name, field] : kFields) {
-    const auto& value = value_of(name);
-    if (!value.is_number() && !value.is_null())
-      throw std::invalid_argument("metrics: '" + std::string(name) + "' must be a number or null, got " +
-                                  value.dump());
-    metrics.*field = value.is_null() ? Metrics::kNone : value.get<double>();
-  }
-  return metrics;
-}
-
 ImageScorer::ImageScorer(const ImageGrid& grid) : grid_(grid), correlator_(grid.height, grid.width) {
   if (std::min(grid.height, grid.width) < kUniformSize)
     throw std::invalid_argument("metrics: sides must be at least 7, got " + grid.text());

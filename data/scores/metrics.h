@@ -64,8 +64,6 @@ struct Metrics {
 
 /// Keys are the member names, in their order.
 nlohmann::ordered_json to_json(const Metrics& metrics);
-/// Throws std::invalid_argument naming the missing or mistyped key.
-Metrics metrics_from_json(const nlohmann::ordered_json& json);
 
 /// Scores image pairs of one size. One object serves one thread.
 class ImageScorer {

@@ -1,12 +1,12 @@
-// supertac-train and supertac-evaluate on pairs of images of another sensor; supertac-pairs, which makes
-// pairs of recordings.
+// supertac-train and supertac-evaluate on pairs of images: of another sensor, and of recordings.
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "data/samples/pairs.h"
+#include "data/samples/split.h"
 #include "io/file.h"
 #include "io/random.h"
 #include "io/safetensors.h"
@@ -112,26 +112,28 @@ TEST(Pairs, RefusesWhatIsAboutRecordingsAndTheOtherModel) {
     EXPECT_NE(result.error.find(text), std::string::npos) << result.error;
   };
   for (const auto& [option, value] :
-       std::vector<std::pair<std::string, std::string>>{{"--data", "d"},
-                                                        {"--also", "d"},
+       std::vector<std::pair<std::string, std::string>>{{"--also", "d"},
                                                         {"--preset", "tiny"},
                                                         {"--timesteps", "64"},
                                                         {"--latent", "3"},
                                                         {"--scale", "2"},
                                                         {"--rate", "100"},
+                                                        {"--range", "2,1"},
+                                                        {"--scaling", "fixed"},
                                                         {"--grouping", "vertical"},
                                                         {"--stride", "2"},
                                                         {"--augment", "none"},
-                                                        {"--loss-a", "0.5"},
                                                         {"--beta", "0"},
                                                         {"--plates", "p"},
                                                         {"--autoencoder", "plain"}}) {
     expect(run_process("supertac-train", training(folder, "m.safetensors", {option, value})), 2,
-           option + ": is about recordings");
+           option + ": says something beside --data only, which is not given; leave it out");
   }
+  expect(run_process("supertac-train", training(folder, "m.safetensors", {"--data", "d"})), 2,
+         "expected --data DIR or --pairs FILE, found both");
   expect(run_process("supertac-train", training(folder, "m.safetensors", {"--split", "trial"})), 2,
          "expected one of group, pair, none");
-  expect(run_process("supertac-train", {"--out", model}), 2, "--data DIR or --pairs FILE");
+  expect(run_process("supertac-train", {"--out", model}), 2, "expected --data DIR or --pairs FILE, found neither");
   const auto loose = write_pairs(folder, false);
   expect(run_process("supertac-train", {"--pairs", loose, "--out", model, "--split", "group"}), 1,
          "needs a tensor 'group'");
@@ -141,60 +143,71 @@ TEST(Pairs, RefusesWhatIsAboutRecordingsAndTheOtherModel) {
   EXPECT_NE(trained.error.find("split pair leaks"), std::string::npos) << trained.error;
   expect(run_process("supertac-evaluate", {"--model", model, "--data", folder.path()}), 1,
          "found a frame model");
-  expect(run_process("supertac-evaluate", {"--model", model}), 2, "--data DIR or --pairs FILE");
-  expect(run_process("supertac-evaluate", {"--model", model, "--pairs", pairs, "--pictures", folder / "p"}),
-         2, "--pictures: is about recordings");
+  expect(run_process("supertac-evaluate", {"--model", model}), 2, "expected --data DIR or --pairs FILE, found neither");
+  for (const char* option : {"--plates", "--pictures", "--write-pairs"})
+    expect(run_process("supertac-evaluate", {"--model", model, "--pairs", pairs, option, folder / "p"}), 2,
+           std::string(option) + ": says something beside --data only");
 }
 
 class PairsOfRecordings : public testing::Test {
  protected:
+  // A model whose windows are far from the defaults in every respect.
   PairsOfRecordings() {
     const auto made = run_process("supertac-simulate", {"--out", folder_ / "data", "--plates", "3_Bumps",
                                                         "--speeds", "10", "--passes", "2"});
     EXPECT_EQ(made.code, 0) << made.error;
+    const auto trained =
+        run_process("supertac-train", {"--data", folder_ / "data", "--out", model_, "--timesteps", "32",
+                                       "--scale", "2", "--rate", "50", "--split", "pass", "--seed", "1",
+                                       "--epochs", "1", "--latent", "2", "--range", "2.5,0.4"});
+    EXPECT_EQ(trained.code, 0) << trained.error;
   }
   ProcessResult make_pairs(const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> all = {"--data", folder_ / "data", "--out", folder_ / "pairs"};
+    std::vector<std::string> all = {"--model",       model_,           "--data",
+                                    folder_ / "data", "--write-pairs", folder_ / "pairs"};
     all.insert(all.end(), more.begin(), more.end());
-    return run_process("supertac-pairs", all);
+    return run_process("supertac-evaluate", all);
   }
 
   const TemporaryFolder folder_;
+  const std::string model_ = folder_ / "model.safetensors";
 };
 
-/// Every pair is its window's last frame, truth and pass, as they are.
+/// Every pair is its window's last frame as a network sees it, its truth and its pass.
 void expect_pairs_of(const std::string& path, const WindowSet& windows,
                      const std::vector<std::uint32_t>& indices) {
   const PairSet pairs = PairSet::read(path);
   ASSERT_EQ(pairs.size(), indices.size());
   ASSERT_TRUE(pairs.grouped());
   const std::size_t pixels = windows.image().pixels();
-  std::vector<float> input(16), target(pixels), truth(pixels);
+  std::vector<float> input(16), target(pixels), truth(pixels), window(windows.input_size());
   for (std::size_t n = 0; n < indices.size(); ++n) {
-    pairs.input(n, {{0}, {1}}, input);
+    pairs.input(n, input);
     pairs.target(n, target);
     windows.truth(indices[n], truth);
-    const auto frame = windows.last_frame(indices[n]);
-    ASSERT_TRUE(std::equal(frame.begin(), frame.end(), input.begin())) << path << ", pair " << n;
+    windows.window(indices[n], window);
+    ASSERT_TRUE(std::equal(window.end() - 16, window.end(), input.begin())) << path << ", pair " << n;
     ASSERT_EQ(target, truth) << path << ", pair " << n;
-    ASSERT_EQ(pairs.group(n), static_cast<std::int64_t>(windows.pass_of(indices[n])))
-        << path << ", pair " << n;
+    ASSERT_EQ(pairs.group(n), windows.group(indices[n])) << path << ", pair " << n;
   }
 }
 
-TEST_F(PairsOfRecordings, AreTheWindowsOfTheSplit) {
-  const auto made = make_pairs({"--scale", "2", "--timesteps", "32", "--stride", "20", "--split", "pass",
-                                "--seed", "1", "--json", folder_ / "pairs.json"});
+TEST_F(PairsOfRecordings, AreTheWindowsOfTheModelAndItsSplit) {
+  const auto made = make_pairs();
   ASSERT_EQ(made.code, 0) << made.error;
-  const WindowSet windows =
-      WindowSet::load(folder_ / "data", {}, {.timesteps = 32, .scale = 2, .stride = 20});
+  const WindowSet windows = WindowSet::load(
+      folder_ / "data", {},
+      {.timesteps = 32,
+       .scale = 2,
+       .rate_hz = 50,
+       .scaling = {.rest_volts = 2.5, .span_volts = 0.4, .levelled = true}});
   const Split split = make_split(windows, SplitKind::pass, 1);
   expect_pairs_of(folder_ / "pairs/train.safetensors", windows, split.train);
   expect_pairs_of(folder_ / "pairs/test.safetensors", windows, split.test);
-  const auto card = nlohmann::json::parse(read_text_file(folder_ / "pairs.json", kPlenty));
-  EXPECT_EQ(card["train"]["pairs"], split.train.size());
-  EXPECT_EQ(card["test"]["pairs"], split.test.size());
-  EXPECT_EQ(card["test"]["file"], folder_ / "pairs/test.safetensors");
+  EXPECT_NE(made.out.find(std::to_string(split.train.size()) + " pairs to train on, " +
+                          std::to_string(split.test.size()) + " to test"),
+            std::string::npos)
+      << made.out;
 
   const std::string model = folder_ / "m.safetensors";
   const auto trained = run_process("supertac-train", {"--pairs", folder_ / "pairs/train.safetensors", "--out",
@@ -206,23 +219,20 @@ TEST_F(PairsOfRecordings, AreTheWindowsOfTheSplit) {
   EXPECT_NE(tested.out.find(std::to_string(split.test.size()) + " pairs"), std::string::npos) << tested.out;
 }
 
-TEST_F(PairsOfRecordings, KeepsExistingFilesAndLeavesNothingOnError) {
+TEST_F(PairsOfRecordings, KeepExistingFilesAndLeaveNothingOnError) {
   const auto expect = [](const ProcessResult& result, int code, const std::string& text) {
     EXPECT_EQ(result.code, code) << result.error;
     EXPECT_NE(result.error.find(text), std::string::npos) << result.error;
     EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
   };
-  expect(make_pairs({"--split", "none"}), 2, "expected one of window, pass, trial, texture");
-  expect(make_pairs({"--scale", "3"}), 2, "--scale");
   expect(make_pairs({"--plates", "6_Ridges"}), 1, "6_Ridges");
   expect(make_pairs({"--split", "texture"}), 1, "plate");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "pairs"));
-  const std::vector<std::string> few = {"--stride", "50"};
-  ASSERT_EQ(make_pairs(few).code, 0);
+  ASSERT_EQ(make_pairs({"--limit", "50"}).code, 0);
   const auto before = read_file(folder_ / "pairs/test.safetensors", kPlenty);
-  expect(make_pairs(few), 1, "--force");
+  expect(make_pairs(), 1, "--force");
   EXPECT_EQ(read_file(folder_ / "pairs/test.safetensors", kPlenty), before);
-  EXPECT_EQ(make_pairs({"--stride", "100", "--force"}).code, 0);
+  EXPECT_EQ(make_pairs({"--limit", "20", "--force"}).code, 0);
   EXPECT_LT(read_file(folder_ / "pairs/test.safetensors", kPlenty).size(), before.size());
 }
 

@@ -5,13 +5,10 @@
 #include <csignal>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <sstream>
 
-#include "io/file.h"
 #include "io/json.h"
-#include "tests/apps/process.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/apps/simulated_data.h"
 
 namespace supertac {
 namespace {
@@ -45,19 +42,8 @@ std::string cell(const std::string& line, const std::string& name) {
   return "";
 }
 
-class Sweep : public testing::Test {
+class Sweep : public OnSimulatedData {
  protected:
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
-    const ProcessResult made = run_process("supertac-simulate", {"--out", path("data"), "--plates", "3_Bumps",
-                                                                 "--speeds", "10", "--passes", "1"});
-    ASSERT_EQ(made.code, 0) << made.error;
-  }
-  static void TearDownTestSuite() { folder_.reset(); }
-
-  static std::string path(const std::string& name) { return *folder_ / name; }
-  static std::string bytes(const std::string& name) { return read_text_file(path(name), 1 << 26); }
-
   // Two models: T 32 and 64, x2, eight channels, one RCAB.
   static ProcessResult sweep(const std::string& out, const std::string& epochs = "1",
                              const std::vector<std::string>& more = {}, const ProcessOptions& how = {}) {
@@ -79,10 +65,7 @@ class Sweep : public testing::Test {
     fs::create_directories(path(out));
     write_file(path(out) + "/sweep.csv", kHeader + "\n" + rows);
   }
-
-  static std::unique_ptr<TemporaryFolder> folder_;
 };
-std::unique_ptr<TemporaryFolder> Sweep::folder_;
 
 TEST_F(Sweep, WritesARowAModelAndDoesNotRepeatIt) {
   const ProcessResult first = sweep("grid");
@@ -229,6 +212,10 @@ TEST_F(Sweep, BadInputIsOneLine) {
     EXPECT_NE(result.error.find("--pick expects conditions"), std::string::npos) << result.error;
   }
   EXPECT_EQ(run_process("supertac-sweep", {"--out", path("absent")}).code, 2);
+  const ProcessResult reading = run_process("supertac-sweep", {"--out", path("made"), "--scale", "2"});
+  EXPECT_EQ(reading.code, 2);
+  EXPECT_NE(reading.error.find("--scale: says something beside --data only"), std::string::npos)
+      << reading.error;
   EXPECT_EQ(sweep("bad2", "1", {"--seeds", "0.5"}).code, 2);
   EXPECT_EQ(sweep("bad2", "1", {"--preset", "huge"}).code, 2);
   EXPECT_FALSE(fs::exists(path("bad2/sweep.csv")));

@@ -3,33 +3,18 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
-#include <memory>
 
-#include "io/file.h"
 #include "io/json.h"
 #include "io/safetensors.h"
-#include "tests/apps/process.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/apps/simulated_data.h"
 
 namespace supertac {
 namespace {
 
 namespace fs = std::filesystem;
 
-class Training : public testing::Test {
+class Training : public OnSimulatedData {
  protected:
-  // One small simulated data set for all tests of this program.
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
-    const ProcessResult made = run_process("supertac-simulate", {"--out", path("data"), "--plates", "3_Bumps",
-                                                                 "--speeds", "10", "--passes", "1"});
-    ASSERT_EQ(made.code, 0) << made.error;
-  }
-  static void TearDownTestSuite() { folder_.reset(); }
-
-  static std::string path(const std::string& name) { return *folder_ / name; }
-  static std::string bytes(const std::string& name) { return read_text_file(path(name), 1 << 26); }
-
   static std::vector<std::string> options(const std::string& out, std::vector<std::string> more = {}) {
     std::vector<std::string> all{"--data",   path("data"), "--out",   path(out), "--timesteps", "32",
                                  "--latent", "3",          "--scale", "2",       "--batch",     "8"};
@@ -43,10 +28,7 @@ class Training : public testing::Test {
   static ProcessResult train(const std::string& out, std::vector<std::string> more = {}) {
     return run_process("supertac-train", options(out, std::move(more)));
   }
-
-  static std::unique_ptr<TemporaryFolder> folder_;
 };
-std::unique_ptr<TemporaryFolder> Training::folder_;
 
 // The sets that this processor has, after SUPERTAC_ISA's names; portable always runs.
 std::vector<std::string> instruction_sets() {
@@ -206,7 +188,10 @@ TEST_F(Training, BadInputIsOneLineAndLeavesNothingBehind) {
        "damaged.safetensors"},
       {{"supertac-evaluate", "--model", path("cut.safetensors"), "--data", data}, 1, "cut.safetensors"},
       {{"supertac-evaluate", "--model", path("absent"), "--data", data}, 1, "absent"},
-      {{"supertac-evaluate", "--model", good}, 2, "--data"},
+      {{"supertac-train", "--data", data, "--out", out, "--autoencoder", "plain", "--beta", "1"},
+       2,
+       "--beta: has no part in --autoencoder plain"},
+      {{"supertac-evaluate", "--model", good}, 2, "expected --data DIR or --pairs FILE, found neither"},
   };
   for (const Bad& bad : cases) {
     const ProcessResult result = run_process(

@@ -6,8 +6,9 @@
 #include <numeric>
 #include <set>
 
+#include "data/samples/split.h"
+#include "data/scores/baselines.h"
 #include "data/scores/metrics.h"
-#include "data/scores/pair_baselines.h"
 #include "io/file.h"
 #include "tests/io/temporary_folder.h"
 
@@ -47,20 +48,22 @@ void expect_refused(const PairFile& file, const std::string& expected) {
 
 TEST(Pairs, ChannelsComeLastAndScaled) {
   const TemporaryFolder folder;
-  const PairSet pairs = PairSet::read(PairFile().write(folder));
+  PairSet pairs = PairSet::read(PairFile().write(folder));
   EXPECT_EQ(pairs.size(), 10u);
-  EXPECT_EQ(pairs.channels(), 2u);
-  EXPECT_EQ(pairs.scale(), 4u);
-  EXPECT_EQ(pairs.target_width(), 20u);
+  EXPECT_EQ(pairs.array().channels, 2);
+  EXPECT_EQ(pairs.scale(), 4);
+  EXPECT_EQ(pairs.image().width, 20);
   EXPECT_EQ(pairs.group(2), -3);
   std::vector<float> input(30), target(240);
-  pairs.input(4, {{100, 0}, {1, 0.5F}}, input);
+  pairs.set_scaling({{100, 0}, {1, 0.5F}});
+  pairs.input(4, input);
   // Pair 4 begins at 120; row 1, column 2 of channel 0 is 120 + 7, of channel 1 120 + 15 + 7.
   EXPECT_EQ(input[(1 * 5 + 2) * 2], 27);
   EXPECT_EQ(input[(1 * 5 + 2) * 2 + 1], 71);
   pairs.target(4, target);
   EXPECT_EQ(target[3], static_cast<float>((4 * 240 + 3) % 101) / 100);
   EXPECT_THROW(pairs.target(0, input), std::invalid_argument);
+  EXPECT_THROW(pairs.set_scaling({{0}, {1}}), std::invalid_argument);
 }
 
 TEST(Pairs, ScalingIsThatOfTheTrainingPairs) {
@@ -69,15 +72,18 @@ TEST(Pairs, ScalingIsThatOfTheTrainingPairs) {
   for (std::size_t i = 0; i < file.input.size();
        ++i)  // channel 0 alternates 999999, 1000001; channel 1 is constant
     file.input[i] = (i / 15) % 2 == 0 ? 1e6F + (i % 2 == 0 ? 1 : -1) : 5;
-  const PairSet pairs = PairSet::read(file.write(folder));
+  PairSet pairs = PairSet::read(file.write(folder));
   std::vector<std::uint32_t> all(10);
   std::iota(all.begin(), all.end(), 0U);
-  const ChannelScaling scaling = fit_scaling(pairs, all);
+  pairs.fit_scaling(all);
+  const ChannelScaling scaling = pairs.scaling();
   EXPECT_NEAR(scaling.mean[0], 1e6, 0.2);
   EXPECT_NEAR(scaling.factor[0], 1, 0.01);
   EXPECT_EQ(scaling.mean[1], 5);
   EXPECT_EQ(scaling.factor[1], 1);
-  EXPECT_THROW(fit_scaling(pairs, {}), std::invalid_argument);
+  pairs.fit_scaling(all);
+  EXPECT_EQ(pairs.scaling().mean, scaling.mean) << "the scaling before has no part in it";
+  EXPECT_THROW(pairs.fit_scaling({}), std::invalid_argument);
 }
 
 TEST(Pairs, RefusesWhatDoesNotFitTogether) {
@@ -159,7 +165,7 @@ TEST(PairMetrics, AreThoseOfTheImages) {
 }
 
 // The targets are a line of the enlarged input, so the fitted baseline is exact.
-TEST(PairBaselines, NearestFindsTheLine) {
+TEST(Baselines, NearestFindsTheLineOfPairs) {
   const TemporaryFolder folder;
   PairFile file;
   for (std::size_t n = 0; n < 10; ++n)
@@ -169,15 +175,18 @@ TEST(PairBaselines, NearestFindsTheLine) {
         file.input[at + 15] = file.input[at] = static_cast<float>((at * 7919) % 97);
         file.target[(n * 12 + r) * 20 + c] = 0.9F - file.input[at] / 120;
       }
-  const PairSet pairs = PairSet::read(file.write(folder));
+  PairSet pairs = PairSet::read(file.write(folder));
   const std::vector<std::uint32_t> train = {0, 1, 2, 3, 4, 5};
-  const PairBaselines baselines(pairs, fit_scaling(pairs, train), train);
-  std::vector<float> out(240), target(240);
+  pairs.fit_scaling(train);
+  const Baselines baselines = fit_baselines(pairs, train);
+  ASSERT_EQ(baselines.size(), 3u);
+  std::vector<float> input(30), out(240), target(240);
+  pairs.input(9, input);
   pairs.target(9, target);
-  baselines.predict(1, 9, out);
-  EXPECT_EQ(PairBaselines::names()[1], "nearest");
+  baselines[1]->predict(input, out);
+  EXPECT_EQ(baselines[1]->name(), "nearest");
   for (std::size_t p = 0; p < out.size(); ++p) EXPECT_NEAR(out[p], target[p], 1e-5);
-  baselines.predict(0, 9, out);
+  baselines[0]->predict(input, out);
   EXPECT_GT(mean_squared_error(out, target), 0.01);
 }
 

@@ -216,29 +216,14 @@ TEST(ContactMetrics, ReportsContactApart) {
   EXPECT_EQ(metrics.to_json()["contact"]["windows"], 1);
 }
 
-TEST(MetricsJson, RoundTrips) {
+TEST(Metrics, AreNullInJsonWhereThereIsNone) {
   Metrics metrics;
   metrics.windows = 12;
   metrics.ssim = 0.8125;
-  metrics.position_error_mm = 0.25;
-  const Metrics back = metrics_from_json(nlohmann::ordered_json::parse(to_json(metrics).dump()));
-  EXPECT_EQ(back.windows, 12U);
-  EXPECT_EQ(back.ssim, 0.8125);
-  EXPECT_EQ(back.position_error_mm, 0.25);
-  EXPECT_TRUE(std::isnan(back.psnr_mean_db));
-}
-
-TEST(MetricsJson, NamesWhatIsMissingOrMistyped) {
-  auto json = to_json(Metrics{});
-  json["ssim"] = "high";
-  try {
-    metrics_from_json(json);
-    FAIL() << "took text for a number";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "metrics: 'ssim' must be a number or null, got \"high\"");
-  }
-  json.erase("ssim");
-  EXPECT_THROW(metrics_from_json(json), std::invalid_argument);
+  const auto json = to_json(metrics);
+  EXPECT_EQ(json["windows"], 12);
+  EXPECT_EQ(json["ssim"], 0.8125);
+  EXPECT_TRUE(json["psnr_mean_db"].is_null());
 }
 
 }  // namespace

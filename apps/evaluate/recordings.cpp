@@ -1,0 +1,120 @@
+#include "apps/evaluate/recordings.h"
+
+#include <optional>
+
+#include "apps/common/measure.h"
+#include "apps/common/program.h"
+#include "apps/evaluate/exports.h"
+#include "apps/evaluate/felt.h"
+#include "apps/evaluate/scoring.h"
+#include "data/scores/metrics.h"
+#include "io/numbers.h"
+#include "io/text.h"
+
+namespace supertac {
+namespace {
+
+WindowSet load_windows(const Arguments& a, const ModelFile& file) {
+  const std::vector<std::string> plates =
+      a.given("plates") ? a.list("plates") : comma_list(file.metadata_or("plates", ""));
+  return WindowSet::load(a.text("data"), plates, file.windows());
+}
+
+std::string row(const std::string& name, const ContactMetrics& metrics, const Latency& latency) {
+  const Metrics c = metrics.contact(), all = metrics.all();
+  const auto number = [](double value, int decimals) { return cell(format(value, decimals), 9); };
+  return name + std::string(name.size() < 12 ? 12 - name.size() : 0, ' ') + number(c.ssim, 3) +
+         number(c.psnr_mean_db, 2) + number(c.position_error_mm, 2) + number(all.ssim, 3) +
+         number(all.psnr_mean_db, 2) + number(latency.median_us, 1);
+}
+
+/// The scores of the network and of every baseline over the same windows.
+struct Scores {
+  Scores(const WindowSet& windows, std::size_t methods) : felt(windows) {
+    for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
+  }
+  std::vector<ContactMetrics> of_method;
+  FeltScores felt;
+};
+
+Scores score_all(const Arguments& a, const Committee& network, const WindowSet& windows,
+                 const Scored& scored, const Baselines& baselines, OutputsFile* outputs) {
+  Scores scores(windows, 1 + baselines.size());
+  draw_all(a, network, windows, scored.split.test, baselines, [&](const Drawn& d) {
+    for (std::size_t m = 0; m < d.pictures.size(); ++m) scores.of_method[m].add(d.pictures[m], d.target);
+    scores.felt.add(d.example, d.pictures[0], d.target);
+    if (outputs != nullptr) outputs->add(windows.window(d.example), d.pictures[0], d.target);
+  });
+  return scores;
+}
+
+nlohmann::ordered_json report(const Arguments& a, const Committee& network, const WindowSet& windows,
+                              const Scored& scored, const Baselines& baselines, const Scores& scores) {
+  const ContactMetrics& own = scores.of_method.front();
+  nlohmann::ordered_json result = own.to_json();
+  result["felt"] = scores.felt.to_json();
+  a.print("split " + scored.split_name + ", seed " + std::to_string(scored.seed) + ", " +
+          std::to_string(own.all().windows) + " windows, " + std::to_string(own.contact().windows) +
+          " in contact");
+  a.print("            |- in contact -------------| |- all ---------| |- one -|");
+  a.print("                 SSIM  PSNR dB   pos mm     SSIM  PSNR dB       us");
+  const Tensor window = Tensor::full(network.first().input_shape(1), 0.5F);
+  std::vector<float> image(windows.image().pixels());
+  const Latency latency = measure_latency([&] { network.infer(window); });
+  a.print(row("network", own, latency));
+  nlohmann::ordered_json latencies = {{"network", latency.to_json()}};
+  for (std::size_t k = 0; k < baselines.size(); ++k) {
+    const std::string name = baselines[k]->name();
+    const Latency l = measure_latency([&] { baselines[k]->predict(window.values(), image); });
+    a.print(row(name, scores.of_method[k + 1], l));
+    latencies[name] = l.to_json();
+    result["baselines"][name] = scores.of_method[k + 1].to_json();
+  }
+  for (const std::string& line : scores.felt.lines()) a.print(line);
+  result["latency"] = latencies;
+  result["model"] = a.text("model");
+  result["data"] = windows.fingerprint();
+  result["split"] = scored.split_name;
+  result["seed"] = scored.seed;
+  return result;
+}
+
+}  // namespace
+
+int evaluate_on_recordings(const Arguments& a) {
+  const std::vector<ModelFile> files = load_models(a.list("model"));
+  const Committee network(files);
+  Scored scored = scored_of(a, files.front(), {"window", "pass", "trial", "texture", "none"});
+  const WindowSet windows = load_windows(a, files.front());
+  scored.split = make_split(windows, split_kind(scored.split_name), scored.seed);
+  check_scored(a, files, scored);
+
+  std::optional<OutputFolder> pictures, pairs;
+  std::string train_pairs, test_pairs;
+  if (a.given("pictures")) pictures.emplace(a.text("pictures"), a.force());
+  if (a.given("write-pairs")) {
+    pairs.emplace(a.text("write-pairs"), a.force());
+    train_pairs = pairs->add("train.safetensors"), test_pairs = pairs->add("test.safetensors");
+  }
+  OutputsFile outputs(windows.array(), windows.frames(), windows.image());
+  const Baselines baselines = fit_baselines(windows, scored.split.train);
+  const Scores scores =
+      score_all(a, network, windows, scored, baselines, a.given("outputs") ? &outputs : nullptr);
+  const nlohmann::ordered_json result = report(a, network, windows, scored, baselines, scores);
+  if (pictures) {
+    write_pictures(network, windows, scored.split.test, *pictures);
+    pictures->keep();
+  }
+  if (pairs) {
+    write_pairs(windows, scored.split.train, train_pairs);
+    write_pairs(windows, scored.split.test, test_pairs);
+    pairs->keep();
+    a.print(a.text("write-pairs") + ": " + std::to_string(scored.split.train.size()) +
+            " pairs to train on, " + std::to_string(scored.split.test.size()) + " to test");
+  }
+  if (a.given("outputs")) outputs.write(a.text("outputs"));
+  a.write_json(result);
+  return kExitOk;
+}
+
+}  // namespace supertac

@@ -1,0 +1,71 @@
+#include "apps/evaluate/scoring.h"
+
+#include <limits>
+#include <stdexcept>
+
+#include "apps/common/progress.h"
+#include "apps/common/signals.h"
+#include "io/numbers.h"
+#include "models/evaluation.h"
+
+namespace supertac {
+namespace {
+
+void refuse_leak(const std::vector<ModelFile>& files, const std::string& split_name) {
+  const std::string split = files.front().metadata_or("split", "none");
+  const std::string seed = files.front().metadata_or("seed", "0");
+  for (const ModelFile& file : files)
+    if (const std::string other = file.metadata_or("split", "none"); other != split)
+      throw std::runtime_error(
+          "one model was trained with split " + split + ", another with " + other +
+          ": what one is tested on the other may have seen; average models of one split");
+  if (split_name == "trial" || split_name == "none") return;  // all others are drawn with the seed
+  for (const ModelFile& file : files)
+    if (file.metadata_or("seed", "0") != seed)
+      throw std::runtime_error("the models' seeds differ, and split " + split_name +
+                               " differs with the seed: what one is tested on the others have seen; average "
+                               "models of split trial");
+}
+
+}  // namespace
+
+Scored scored_of(const Arguments& a, const ModelFile& file, const std::vector<std::string>& names) {
+  return {a.given("split") ? a.choice("split", names) : file.metadata_or("split", "none"),
+          a.given("seed") ? a.seed() : parse_uint(file.metadata_or("seed", "0")).value_or(0),
+          {}};
+}
+
+void check_scored(const Arguments& a, const std::vector<ModelFile>& files, Scored& scored) {
+  refuse_leak(files, scored.split_name);
+  const auto limit =
+      static_cast<std::size_t>(a.integer("limit", 0, std::numeric_limits<std::uint32_t>::max()));
+  if (limit > 0) scored.split.test = spread(scored.split.test, limit);
+  if (scored.split.train.empty())
+    throw std::runtime_error("the split leaves nothing to fit the baselines on");
+}
+
+void draw_all(const Arguments& a, const Committee& network, const Examples& examples,
+              std::span<const std::uint32_t> test, const Baselines& baselines,
+              const std::function<void(const Drawn&)>& use) {
+  std::vector<std::vector<float>> plain(baselines.size(), std::vector<float>(examples.image().pixels()));
+  Progress progress(a, "evaluating", test.size(), "pictures");
+  for_each_output(network, examples, test, [&](const EvaluatedBatch& b) {
+    for (std::size_t n = 0; n < b.size(); ++n) {
+      Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}};
+      for (std::size_t k = 0; k < baselines.size(); ++k) {
+        baselines[k]->predict(b.input(n), plain[k]);
+        drawn.pictures.push_back(plain[k]);
+      }
+      use(drawn);
+    }
+    progress.update(b.first + b.size());
+    return !interrupted();
+  });
+  stop_if_interrupted();
+}
+
+std::string cell(const std::string& text, std::size_t width) {
+  return std::string(text.size() < width ? width - text.size() : 0, ' ') + text;
+}
+
+}  // namespace supertac

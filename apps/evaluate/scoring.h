@@ -1,0 +1,46 @@
+// What is scored, and the one loop that draws it: the same for windows and for pairs.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "apps/common/arguments.h"
+#include "data/samples/split.h"
+#include "data/scores/baselines.h"
+#include "models/committee.h"
+
+namespace supertac {
+
+/// Which examples are scored; what the first model was trained with, unless the options say otherwise.
+struct Scored {
+  std::string split_name;
+  std::uint64_t seed = 0;
+  Split split;  ///< its test side is scored, the baselines are fitted to its training side
+};
+
+/// --split, one of `names`, and --seed, or the model's own; the split itself is left to the caller.
+Scored scored_of(const Arguments& a, const ModelFile& file, const std::vector<std::string>& names);
+
+/// Cuts the test side to --limit. Throws std::runtime_error when what one model is tested on may be what
+/// another was trained on, or no example is left to fit the baselines to.
+void check_scored(const Arguments& a, const std::vector<ModelFile>& files, Scored& scored);
+
+/// One example with its pictures: that of the network first, then those of the baselines.
+struct Drawn {
+  std::uint32_t example;
+  std::span<const float> target;
+  std::vector<std::span<const float>> pictures;
+};
+
+/// Draws the test side in order, with a progress bar. Throws Interrupted after a signal.
+void draw_all(const Arguments& a, const Committee& network, const Examples& examples,
+              std::span<const std::uint32_t> test, const Baselines& baselines,
+              const std::function<void(const Drawn&)>& use);
+
+/// " " before the text, up to a width.
+std::string cell(const std::string& text, std::size_t width);
+
+}  // namespace supertac

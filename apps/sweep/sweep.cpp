@@ -1,0 +1,146 @@
+#include "apps/sweep/sweep.h"
+
+#include <filesystem>
+#include <limits>
+#include <utility>
+
+#include "apps/common/measure.h"
+#include "apps/common/signals.h"
+#include "apps/common/version.h"
+#include "apps/train/training_options.h"
+#include "io/file.h"
+#include "io/json.h"
+#include "models/cost.h"
+#include "models/evaluation.h"
+
+namespace supertac {
+
+namespace fs = std::filesystem;
+
+void declare_measuring(Arguments& a) {
+  a.option("limit", "N", "score at most N test windows, evenly spread; 0 = all", "0");
+  a.option("history", "N",
+           "score only windows with N frames of their pass behind them: with the longest of --timesteps, all "
+           "models are judged on the same frames; 0 = all",
+           "0");
+}
+
+Sweep::Sweep(const Arguments& a, SweepTable& table) : a_(a), table_(table) { check_settings(); }
+
+// What all rows of a table have in common.
+void Sweep::check_settings() const {
+  const TrainingSettings training = training_settings(a_, {});
+  nlohmann::ordered_json settings = to_json(training);
+  settings.erase("seed");
+  settings["grouping"] = name_of(training.model.grouping);
+  for (const char* option :
+       {"also", "data", "history", "limit", "plates", "range", "rate", "scaling", "split", "stride"})
+    settings[option] = a_.text(option);
+  for (const auto& [option, key] :
+       {std::pair("epochs", "epochs"), {"learning-rate", "learning_rate"}, {"rate", "rate"}})
+    if (!a_.given(option)) settings[key] = "the preset's";
+  const std::string path = a_.text("out") + "/settings.json";
+  if (!fs::exists(path)) return write_file(path, settings.dump(2) + "\n");
+  const auto before = parse_json_limited(read_text_file(path, 1 << 20));
+  for (const auto& [key, value] : settings.items()) {
+    if (before.contains(key) && before[key] == value) continue;
+    throw FileError(path, "this sweep began with " + key + " " +
+                              (before.contains(key) ? before[key].dump() : "unset") + ", now it is " +
+                              value.dump() + "; give the same options, or choose another --out");
+  }
+}
+
+void Sweep::run(const std::vector<GridPoint>& grid) {
+  make_directories(a_.text("out") + "/models");
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    const std::string label =
+        std::to_string(i + 1) + " of " + std::to_string(grid.size()) + " " + grid[i].name();
+    if (table_.has(grid[i].name())) continue;
+    measure(grid[i], label);
+  }
+}
+
+void Sweep::measure(const GridPoint& point, const std::string& label) {
+  reset_peak_memory();
+  const WindowSet& windows = windows_of(point.model);
+  TrainingSettings settings = training_settings(a_, point.model);
+  set_array(settings.model, windows.array());
+  settings.seed = point.seed;
+  const std::string out = a_.text("out") + "/models/" + point.name() + ".safetensors";
+  const std::string state = RunFolder::folder_of(out) + "/last.safetensors";
+  a_.note(label);
+  TrainingTask task = window_task(a_, windows, settings);
+  const std::vector<std::uint32_t> to_score = windows_to_score(windows, task.split);
+  TrainingRun training(
+      a_, std::move(task),
+      {.out = out, .force = true, .resume = fs::exists(state) ? state : "", .label = label});
+  if (!training.train()) throw Interrupted();
+  const ContactMetrics scores = score(training.trainer().model(), windows, to_score, interrupted);
+  stop_if_interrupted();
+  table_.add(row(point, training, scores));
+  fs::remove(state);  // nothing is left to resume
+}
+
+std::vector<std::uint32_t> Sweep::windows_to_score(const WindowSet& windows, const Split& split) const {
+  constexpr auto kMost = std::numeric_limits<std::uint32_t>::max();
+  const auto history = static_cast<std::size_t>(a_.integer("history", 0, kMost));
+  const auto limit = static_cast<std::size_t>(a_.integer("limit", 0, kMost));
+  std::vector<std::uint32_t> chosen;
+  for (const std::uint32_t i : split.test)
+    if (windows.history(i) >= history) chosen.push_back(i);
+  if (chosen.empty())
+    throw UsageError("--history " + a_.text("history") + " leaves none of the " +
+                     std::to_string(split.test.size()) + " test windows; give a smaller number");
+  return limit > 0 ? spread(chosen, limit) : chosen;
+}
+
+// Sets of other lengths, rates and picture sizes are dropped first: one at a time is in memory.
+const WindowSet& Sweep::windows_of(const SuperTacSettings& model) {
+  if (!windows_ || windows_->timesteps() != model.timesteps || windows_->settings().scale != model.scale ||
+      windows_->settings().rate_hz != training_rate_hz(a_, model)) {
+    windows_.reset();
+    windows_.emplace(training_windows(a_, model));
+    a_.note(windows_->counts().summary());
+  }
+  return *windows_;
+}
+
+nlohmann::ordered_json Sweep::row(const GridPoint& point, const TrainingRun& training,
+                                  const ContactMetrics& scores) const {
+  const Network& model = training.trainer().model();
+  SuperTacSettings s = point.model;
+  set_array(s, windows_->array());
+  const Tensor window = Tensor::full(model.input_shape(1), real(0.5));
+  const Latency latency = measure_latency([&] { model.infer(window); });
+  nlohmann::ordered_json row = {{"model", point.name()},
+                                {"preset", s.preset},
+                                {"timesteps", s.timesteps},
+                                {"latent", s.latent},
+                                {"scale", s.scale},
+                                {"channels", s.channels},
+                                {"rcabs", s.rcabs},
+                                {"seed", point.seed},
+                                {"split", a_.text("split")},
+                                {"median_us", latency.median_us},
+                                {"p99_us", latency.p99_us},
+                                {"mmac", cost_of(s).inference * 1e-6},
+                                {"parameters", model.parameter_count()},
+                                {"memory_mb", peak_memory_mb()},
+                                {"train_s", training.folder().seconds()},
+                                {"steps", training.trainer().step()},
+                                {"commit", commit()}};
+  for (const auto& [prefix, m] :
+       {std::pair<std::string, Metrics>{"", scores.contact()}, {"all_", scores.all()}}) {
+    row[prefix + "windows"] = m.windows;
+    row[prefix + "ssim"] = m.ssim;
+    row[prefix + "psnr_db"] = m.psnr_mean_db;
+    row[prefix + "psnr_pooled_db"] = m.psnr_pooled_db;
+    row[prefix + "phase"] = m.phase_correlation;
+    row[prefix + "phase_floor"] = m.phase_correlation_floor;
+    row[prefix + "position_px"] = m.position_error_px;
+    row[prefix + "position_mm"] = m.position_error_mm;
+  }
+  return row;
+}
+
+}  // namespace supertac

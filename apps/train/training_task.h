@@ -1,0 +1,33 @@
+// What is trained on what: windows of recordings, or pairs of images.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "apps/common/arguments.h"
+#include "data/samples/split.h"
+#include "models/objective.h"
+
+namespace supertac {
+
+struct TrainingTask {
+  const Examples& examples;  ///< must outlive the task
+  std::string unit;          ///< what they are: "windows" or "pairs"
+  Split split;
+  std::unique_ptr<Objective> objective;
+  /// What the model file says of its origin; the same whatever machine, folder or number of threads.
+  std::map<std::string, std::string> origin;
+  nlohmann::ordered_json about;  ///< more for the run's settings
+  std::string warning;           ///< of a split that leaks; "" = none
+};
+
+/// --split of the windows, with settings.seed. Throws as make_split.
+TrainingTask window_task(const Arguments& a, const WindowSet& windows, const TrainingSettings& settings);
+
+/// --split of the pairs, with --seed and the options of declare_training(); sets the pairs' scaling. Throws as
+/// split_pairs, UsageError.
+TrainingTask pair_task(const Arguments& a, PairSet& pairs);
+
+}  // namespace supertac

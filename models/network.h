@@ -1,0 +1,34 @@
+// What all networks that draw have in common.
+#pragma once
+
+#include "layers/module.h"
+
+namespace supertac {
+
+/// What a network is for: inputs of `frames` frames of rows x columns taxels with `channels` numbers each, and
+/// pictures `scale` times finer than the array.
+struct NetworkFormat {
+  Dim frames = 1, rows = 4, columns = 4, channels = 1, scale = 4;
+  bool operator==(const NetworkFormat&) const = default;
+};
+
+class Network : public Module {
+ public:
+  Network() = default;
+  Network(const Network&) = default;
+  Network(Network&&) = default;
+  virtual ~Network() = default;
+
+  virtual NetworkFormat format() const = 0;
+  /// Of a batch.
+  virtual Shape input_shape(Dim count) const = 0;
+  Shape picture_shape(Dim count) const {
+    const NetworkFormat f = format();
+    return {count, f.rows * f.scale, f.columns * f.scale, 1};
+  }
+  /// Inputs -> pictures [N,rows scale,columns scale,1], nothing recorded. Throws std::invalid_argument on
+  /// another shape.
+  virtual Tensor infer(const Tensor& inputs) const = 0;
+};
+
+}  // namespace supertac
