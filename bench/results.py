@@ -4,8 +4,8 @@
     bench/results.py            rewrites what stands between <!-- NAME --> and <!-- /NAME -->
     bench/results.py --check    changes nothing; exit code 1 and one line for everything that is stale
 
-bench/results/sources.csv says of every file how it was made; a file that it does not name is an error. The README's tables are those
-of the page with some lines left out.
+bench/results/sources.csv says of every file how it was made; a file that it does not name is an error. The README's
+tables are those of the page with some lines left out.
 """
 import csv
 import itertools

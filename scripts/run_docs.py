@@ -1,19 +1,21 @@
 #!/usr/bin/env python3
 """Runs the code blocks of README and docs, and checks the paths that pages name.
 
-    scripts/run_docs.py BUILD [PAGE ...]     runs the blocks of the pages (all: README.md, docs/*.md, examples/README.md) with BUILD's programs
-    scripts/run_docs.py --check              changes and runs nothing: paths, lines, marks
+    scripts/run_docs.py BUILD [PAGE ...]     runs the blocks of the pages with BUILD's programs
+                                             (without names: README.md, docs/*.md, examples/README.md)
+    scripts/run_docs.py --check              runs nothing; looks at paths, lengths of lines and marks
 
 A comment before a block, which a reader of the page does not see, says what is done with it:
 
     <!-- run -->                      with sh; the blocks of a page run one after another in one scratch folder
     <!-- run; A => B; C => D -->      the same with text A replaced by B: what takes long is shortened
-    <!-- run real; ... -->            only where SUPERTAC_RECORDINGS names the folder of the real recordings, $TEXT_DIR in the block
-    <!-- run python; ... -->          lines that begin with >>>, as doctest; only where python3 has the package safetensors
+    <!-- run real; ... -->            only where SUPERTAC_RECORDINGS names the folder of the real recordings, here $TEXT_DIR
+    <!-- run python; ... -->          as doctest; only where python3 has the package safetensors
     <!-- not run: WHY -->             not at all
 
 Every block without a language needs one.
 """
+
 import importlib.util
 import os
 import pathlib
@@ -26,7 +28,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 BLOCK = re.compile(r"(?:<!-- ((?:not )?run\b.*?) -->\n)?```([a-z+]*)\n(.*?)```\n", re.DOTALL)
-LONGEST_LINE = 120
+LONGEST_LINE, LONGEST_README = 120, 150
 # What a page may name although it is not in the tree: things that programs make.
 MADE = re.compile(r"^(out/|build|examples/build)|^(scores|sweep|model)\.|\.safetensors$")
 FILE = re.compile(r"`([\w./+-]+\.(?:cpp|h|inl|md|py|sh|gp|cmake|csv|png|svg|txt))`|\]\(([^)#:]+)\)")
@@ -50,7 +52,14 @@ def missing_paths(page, files, names):
     for match in FILE.finditer(page.read_text()):
         path = match[1] or match[2]
         near = os.path.normpath(folder / path)
-        if "/" not in path and path in names or path in files or near in files or (ROOT / near).is_dir() or MADE.search(path):
+        if (
+            "/" not in path
+            and path in names
+            or path in files
+            or near in files
+            or (ROOT / near).is_dir()
+            or MADE.search(path)
+        ):
             continue
         yield f"{page.relative_to(ROOT)} names {path}, which is not in the tree"
 
@@ -76,6 +85,9 @@ def check():
         complaints += long_lines(page)
     for page in pages():
         complaints += unmarked(page)
+    lines = len((ROOT / "README.md").read_text().splitlines())
+    if lines > LONGEST_README:
+        complaints.append(f"README.md has {lines} lines, expected at most {LONGEST_README}")
     return complaints
 
 
@@ -91,8 +103,16 @@ def replaced(text, changes, page):
 def run(command, folder, environment):
     """Runs it in a process group of its own, of which nothing is left behind."""
     with tempfile.TemporaryFile("w+") as output:
-        process = subprocess.Popen(command, cwd=folder, env=environment, start_new_session=True, stdin=subprocess.DEVNULL,
-                                   stdout=output, stderr=subprocess.STDOUT, text=True)
+        process = subprocess.Popen(
+            command,
+            cwd=folder,
+            env=environment,
+            start_new_session=True,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
         try:
             process.wait(timeout=300)
         except subprocess.TimeoutExpired:
