@@ -14,11 +14,11 @@ void declare(Arguments& a) {
   a.required("model", "FILE,...", "models by supertac-train; run i uses the i-th, and again from the first");
   a.required("data", "DIR", "recordings to train the classifiers on and to test them with");
   a.option("plates", "A,B,...", "the classes (default: the plates the first model was trained on)");
-  a.option(
-      "views", "A,B,...",
-      "what the classifiers see: frame (the last one, levelled as the network sees it), bicubic, super_resolved, latents, historyN (the last N "
-      "frames), truth; each is compared with the first",
-      "frame,super_resolved,latents,history32");
+  a.option("views", "A,B,...",
+           "what the classifiers see: frame (the last one, levelled as the network sees it), bicubic, "
+           "super_resolved, latents, historyN (the last N "
+           "frames), truth; each is compared with the first",
+           "frame,super_resolved,latents,history32");
   a.option("seeds", "N", "runs: seeds 0 to N - 1 of classifier and order", "5");
   a.option("epochs", "N", "passes over the training windows", "8");
   a.option("stride", "N", "train on every N-th window in contact; tested are all", "1");

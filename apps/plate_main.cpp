@@ -2,7 +2,7 @@
 
 #include "apps/common/program.h"
 #include "data/plates/plate_mesh.h"
-#include "hardware/palpation_program.h"
+#include "hardware/palpation.h"
 #include "io/file.h"
 #include "io/numbers.h"
 

@@ -23,7 +23,8 @@ RigSettings read_settings(const Arguments& arguments) {
   settings.seed = seed;
   settings.faults = RigFaults::mixed(arguments.number("faults", 0, 0.1));
   settings.board.signals = [finger](double x, double y, double z, double t) {
-    const auto volts = finger.volts({x - rig::kPlate.x, y - rig::kPlate.y, z - rig::kPlate.z + finger.slide_z_mm()}, t);
+    const auto volts =
+        finger.volts({x - rig::kPlate.x, y - rig::kPlate.y, z - rig::kPlate.z + finger.slide_z_mm()}, t);
     std::array<double, kTaxels> frame{};
     std::copy_n(volts.begin(), frame.size(), frame.begin());
     return frame;

@@ -14,8 +14,8 @@ namespace supertac {
 /// Throws std::invalid_argument that names both when the examples' inputs or pictures are not the network's.
 void check_format(const Examples& examples, const Network& network);
 
-/// A batch of results: inputs as the network takes them, outputs and targets [n,H,W,1], and the first of their
-/// places in `indices`.
+/// A batch of results: inputs as the network takes them, outputs and targets [n,H,W,1], and the first of
+/// their places in `indices`.
 struct EvaluatedBatch {
   std::size_t first;
   const Tensor& inputs;

@@ -80,9 +80,9 @@ void expect_kind(const SafetensorsFile& file, const std::string& path, ModelKind
                              ": expected a SuperTac model, found a frame model (trained with --pairs); "
                              "use it with supertac-evaluate --pairs");
   if (expected == ModelKind::frames && kind != kFrameKind)
-    throw std::runtime_error(path + ": expected a frame model (trained with --pairs), found " +
-                             (kind.empty() ? "a SuperTac model; give it recordings"
-                                           : "kind \"" + kind + "\""));
+    throw std::runtime_error(
+        path + ": expected a frame model (trained with --pairs), found " +
+        (kind.empty() ? "a SuperTac model; give it recordings" : "kind \"" + kind + "\""));
 }
 
 template <class Model, class Settings>

@@ -1,5 +1,5 @@
-// A model on disk: its parameters, and in the metadata everything needed to run an input through it. Two kinds
-// share the form: SuperTac, and frame models, whose metadata say "kind": "frame-checkpoint".
+// A model on disk: its parameters, and in the metadata everything needed to run an input through it. Two
+// kinds share the form: SuperTac, and frame models, whose metadata say "kind": "frame-checkpoint".
 #pragma once
 
 #include <map>

@@ -5,8 +5,8 @@
 
 namespace supertac {
 
-/// What a network is for: inputs of `frames` frames of rows x columns taxels with `channels` numbers each, and
-/// pictures `scale` times finer than the array.
+/// What a network is for: inputs of `frames` frames of rows x columns taxels with `channels` numbers each,
+/// and pictures `scale` times finer than the array.
 struct NetworkFormat {
   Dim frames = 1, rows = 4, columns = 4, channels = 1, scale = 4;
   bool operator==(const NetworkFormat&) const = default;

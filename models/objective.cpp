@@ -9,12 +9,9 @@ namespace supertac {
 namespace {
 
 nlohmann::ordered_json pace_json(const TrainingPace& p) {
-  return {{"epochs", p.epochs},
-          {"batch", p.batch},
-          {"seed", p.seed},
-          {"learning_rate", p.learning_rate},
-          {"warm_up", p.warm_up},
-          {"clip_norm", p.clip_norm}};
+  return {{"epochs", p.epochs},   {"batch", p.batch},
+          {"seed", p.seed},       {"learning_rate", p.learning_rate},
+          {"warm_up", p.warm_up}, {"clip_norm", p.clip_norm}};
 }
 
 template <class Model, class Settings>

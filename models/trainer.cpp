@@ -91,9 +91,9 @@ void Trainer::draw_noise(Lane& lane) const {
   const RandomStream random(objective_->pace().seed, kNoiseStream);
   const auto numbers = static_cast<std::uint64_t>(objective_->noise());
   if (numbers == 0) return;
-  std::uint64_t next = (static_cast<std::uint64_t>(step()) * indices_.size() +
-                        static_cast<std::uint64_t>(lane.first)) *
-                       numbers;
+  std::uint64_t next =
+      (static_cast<std::uint64_t>(step()) * indices_.size() + static_cast<std::uint64_t>(lane.first)) *
+      numbers;
   for (real& value : lane.batch.noise.values()) value = static_cast<real>(random.normal(next++));
 }
 
@@ -104,8 +104,7 @@ void Trainer::run_lane(Lane& lane) const {
   draw_noise(lane);
   clear_gradients(parameters);
   const Outcome outcome = (*lane.objective)(lane.batch);
-  const double share =
-      static_cast<double>(lane.batch.inputs.dim(0)) / static_cast<double>(indices_.size());
+  const double share = static_cast<double>(lane.batch.inputs.dim(0)) / static_cast<double>(indices_.size());
   lane.terms = values_of(outcome.loss, share);
   lane.spreads.clear();
   lane.spreads.pictures.add(outcome.picture.value());

@@ -31,7 +31,7 @@ struct LossTerms {
 };
 
 struct StepReport : LossTerms {
-  std::int64_t step = 0;  ///< from 1
+  std::int64_t step = 0;     ///< from 1
   double gradient_norm = 0;  ///< before clipping
   double learning_rate = 0;
   int active_latents = 0;  ///< of all groups, in this batch (models/collapse.h)
@@ -42,8 +42,8 @@ struct StepReport : LossTerms {
 
 class Trainer {
  public:
-  /// `examples` must outlive the trainer. Throws std::invalid_argument for examples of another format than the
-  /// network's, or no training example.
+  /// `examples` must outlive the trainer. Throws std::invalid_argument for examples of another format than
+  /// the network's, or no training example.
   Trainer(const Examples& examples, std::vector<std::uint32_t> train, std::unique_ptr<Objective> objective);
   /// With window_objective() and frame_objective(); throw as these.
   Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, const TrainingSettings& settings);

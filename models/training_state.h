@@ -35,8 +35,7 @@ class TrainingStopped : public std::runtime_error {
 class TrainingState {
  public:
   /// The parameters' handles are kept.
-  TrainingState(const std::vector<Parameter>& parameters, const TrainingPace& pace,
-                std::int64_t total_steps);
+  TrainingState(const std::vector<Parameter>& parameters, const TrainingPace& pace, std::int64_t total_steps);
 
   std::int64_t step() const { return step_; }  ///< done so far
   std::int64_t total_steps() const { return schedule_.total; }

@@ -53,7 +53,8 @@ class Arguments {
   Arguments& more(bool on = true);
 
   /// Throws UsageError: an unknown option (naming the nearest known one), a value missing, an argument too
-  /// many or too few, an option that says nothing beside the others. --help and --version may stand without what is required.
+  /// many or too few, an option that says nothing beside the others. --help and --version may stand without
+  /// what is required.
   void parse(int argc, const char* const* argv);
 
   // Reading; `name` is that of an option or the value name of a positional argument. All throw UsageError

@@ -31,8 +31,8 @@ class OutputsFile {
 void write_pictures(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> test,
                     OutputFolder& folder);
 
-/// Windows as pairs (data/samples/pairs.h): the last frame as a network sees it, [N,channels,rows,columns]; the
-/// truth [N,1,H,W]; and as group [N] the number of the pass. Throws FileError.
+/// Windows as pairs (data/samples/pairs.h): the last frame as a network sees it, [N,channels,rows,columns];
+/// the truth [N,1,H,W]; and as group [N] the number of the pass. Throws FileError.
 void write_pairs(const WindowSet& windows, std::span<const std::uint32_t> indices, const std::string& path);
 
 }  // namespace supertac

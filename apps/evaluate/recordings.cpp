@@ -37,8 +37,8 @@ struct Scores {
   FeltScores felt;
 };
 
-Scores score_all(const Arguments& a, const Committee& network, const WindowSet& windows,
-                 const Scored& scored, const Baselines& baselines, OutputsFile* outputs) {
+Scores score_all(const Arguments& a, const Committee& network, const WindowSet& windows, const Scored& scored,
+                 const Baselines& baselines, OutputsFile* outputs) {
   Scores scores(windows, 1 + baselines.size());
   draw_all(a, network, windows, scored.split.test, baselines, [&](const Drawn& d) {
     for (std::size_t m = 0; m < d.pictures.size(); ++m) scores.of_method[m].add(d.pictures[m], d.target);

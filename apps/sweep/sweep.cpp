@@ -71,9 +71,8 @@ void Sweep::measure(const GridPoint& point, const std::string& label) {
   a_.note(label);
   TrainingTask task = window_task(a_, windows, settings);
   const std::vector<std::uint32_t> to_score = windows_to_score(windows, task.split);
-  TrainingRun training(
-      a_, std::move(task),
-      {.out = out, .force = true, .resume = fs::exists(state) ? state : "", .label = label});
+  TrainingRun training(a_, std::move(task),
+                       {.out = out, .force = true, .resume = fs::exists(state) ? state : "", .label = label});
   if (!training.train()) throw Interrupted();
   const ContactMetrics scores = score(training.trainer().model(), windows, to_score, interrupted);
   stop_if_interrupted();

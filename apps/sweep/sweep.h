@@ -18,9 +18,9 @@ void declare_measuring(Arguments& a);
 
 class Sweep {
  public:
-  /// `a` must have what declare_measuring() and the options of training declare; it and the table must outlive
-  /// this. Throws FileError when the folder's settings.json shows that the table began with other settings:
-  /// figures that cannot be compared do not mix.
+  /// `a` must have what declare_measuring() and the options of training declare; it and the table must
+  /// outlive this. Throws FileError when the folder's settings.json shows that the table began with other
+  /// settings: figures that cannot be compared do not mix.
   Sweep(const Arguments& a, SweepTable& table);
 
   /// Rows that are there are not measured again; a model whose training was cut is trained on. Throws

@@ -16,8 +16,7 @@ constexpr std::uint64_t kMaxBytes = 64 << 20;
 
 std::string header() {
   std::string line;
-  for (const SweepColumn& column : sweep_columns())
-    line += (line.empty() ? "" : ",") + column.name;
+  for (const SweepColumn& column : sweep_columns()) line += (line.empty() ? "" : ",") + column.name;
   return line;
 }
 

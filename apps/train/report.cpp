@@ -68,7 +68,8 @@ std::string drawn(const Curve& curve, const std::vector<Point>& points) {
     path += format(kLeft + (kWidth - kLeft - 10) * p.x / last, 1) + "," +
             format(kHeight - kBottom - (kHeight - kBottom - kTop) * scaled(p.y), 1) + " ";
   }
-  return std::string("<h2>") + curve.title + (curve.logarithmic ? " (logarithmic)" : "") + "</h2><svg viewBox=\"0 0 " + format(kWidth, 0) + " " + format(kHeight, 0) + "\">" +
+  return std::string("<h2>") + curve.title + (curve.logarithmic ? " (logarithmic)" : "") +
+         "</h2><svg viewBox=\"0 0 " + format(kWidth, 0) + " " + format(kHeight, 0) + "\">" +
          "<rect x=\"60\" y=\"12\" width=\"490\" height=\"178\" fill=\"none\" stroke=\"#999\"/>" +
          label(kLeft - 5, kTop + 8, "end", format(top, 4)) +
          label(kLeft - 5, kHeight - kBottom, "end", format(bottom, 4)) +

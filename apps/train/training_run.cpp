@@ -119,7 +119,8 @@ void TrainingRun::test(LogLine& line) const {
 }
 
 void TrainingRun::log(LogLine& line, std::int64_t steps, const StepReport& last) {
-  for (double* sum : {&line.total, &line.reconstruction, &line.kld, &line.l2, &line.ssim, &line.gradient_norm})
+  for (double* sum :
+       {&line.total, &line.reconstruction, &line.kld, &line.l2, &line.ssim, &line.gradient_norm})
     *sum /= static_cast<double>(steps);
   line.time_s = seconds();
   line.step = last.step;

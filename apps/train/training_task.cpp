@@ -17,8 +17,13 @@ std::map<std::string, std::string> origin_of(const std::string& split_name, std:
 
 TrainingTask window_task(const Arguments& a, const WindowSet& windows, const TrainingSettings& settings) {
   const std::string name = a.text("split");
-  TrainingTask task{windows, "windows", make_split(windows, training_split(a), settings.seed),
-                    window_objective(windows, settings), {}, {}, {}};
+  TrainingTask task{windows,
+                    "windows",
+                    make_split(windows, training_split(a), settings.seed),
+                    window_objective(windows, settings),
+                    {},
+                    {},
+                    {}};
   task.origin = origin_of(name, settings.seed, windows, task.split);
   task.origin["plates"] = a.text("plates");
   task.origin["stride"] = a.text("stride");
@@ -35,7 +40,7 @@ TrainingTask window_task(const Arguments& a, const WindowSet& windows, const Tra
 }
 
 TrainingTask pair_task(const Arguments& a, PairSet& pairs) {
-  const std::string name = a.given("split")   ? a.choice("split", {"group", "pair", "none"})
+  const std::string name = a.given("split")  ? a.choice("split", {"group", "pair", "none"})
                            : pairs.grouped() ? "group"
                                              : "pair";
   FrameTrainingSettings settings;
@@ -46,7 +51,8 @@ TrainingTask pair_task(const Arguments& a, PairSet& pairs) {
   pairs.fit_scaling(split.train);
   TrainingTask task{pairs, "pairs", std::move(split), frame_objective(pairs, settings), {}, {}, {}};
   task.origin = origin_of(name, settings.seed, pairs, task.split);
-  if (name == "pair") task.warning = "split pair leaks when frames resemble each other; use groups for results";
+  if (name == "pair")
+    task.warning = "split pair leaks when frames resemble each other; use groups for results";
   return task;
 }
 

@@ -26,8 +26,8 @@ struct TrainingTask {
 /// --split of the windows, with settings.seed. Throws as make_split.
 TrainingTask window_task(const Arguments& a, const WindowSet& windows, const TrainingSettings& settings);
 
-/// --split of the pairs, with --seed and the options of declare_training(); sets the pairs' scaling. Throws as
-/// split_pairs, UsageError.
+/// --split of the pairs, with --seed and the options of declare_training(); sets the pairs' scaling. Throws
+/// as split_pairs, UsageError.
 TrainingTask pair_task(const Arguments& a, PairSet& pairs);
 
 }  // namespace supertac

@@ -38,9 +38,7 @@ double half_round(const Texture& t, double dx, double dy) {
 }
 
 double half_pitch(const Texture& t) { return t.pitch_mm / 2; }  // a crest: troughs lie between crests
-double wave(const Texture& t, double, double dy) {
-  return t.height_mm * same_bits::cosine(dy / t.pitch_mm);
-}
+double wave(const Texture& t, double, double dy) { return t.height_mm * same_bits::cosine(dy / t.pitch_mm); }
 
 constexpr TextureKind kKinds[] = {
     {.word = "ridges", .width = ridge_base, .height = ridge},

@@ -29,10 +29,10 @@ class Plate {
 
   /// A plate by name. Plates of the rig (RIG plates): 3_Bumps, 6_Bumps, 4_Ridges, 6_Ridges, 4_Waves,
   /// 6_Waves, 4_Blob, 6_Blob. Others: "plain", or KIND PITCH [h HEIGHT] in mm ("bumps12", "ridges6h1.5"), or
-  /// several joined by '+', which share the length equally ("bumps12+ridges4"). Default height rig::kTextureHeightMm, for round
-  /// elements (bumps, blobs) at most pitch / 2. Or the path of an STL file of a plate's size
-  /// (data/plates/height_map.h), whose plate has the file's name without folders.
-  /// Throws std::invalid_argument naming the part that could not be read; FileError for an STL file.
+  /// several joined by '+', which share the length equally ("bumps12+ridges4"). Default height
+  /// rig::kTextureHeightMm, for round elements (bumps, blobs) at most pitch / 2. Or the path of an STL file
+  /// of a plate's size (data/plates/height_map.h), whose plate has the file's name without folders. Throws
+  /// std::invalid_argument naming the part that could not be read; FileError for an STL file.
   static Plate named(const std::string& name);
   /// True when the name is that of an STL file: it ends with ".stl".
   static bool is_file(const std::string& name);

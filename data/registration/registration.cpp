@@ -58,7 +58,8 @@ class Fit {
     }
     for (const Contact& c : contacts)
       if (inside(c, stretch_))
-        events_.push_back({.row = c.taxel / rig::kTaxelColumns, .time = c.time_s - middle_s_, .weight = weight_of(c)});
+        events_.push_back(
+            {.row = c.taxel / rig::kTaxelColumns, .time = c.time_s - middle_s_, .weight = weight_of(c)});
   }
 
   std::size_t events() const { return events_.size(); }
@@ -154,7 +155,8 @@ class Fit {
   }
 
   bool elsewhere(const Line& a, const Line& b) const {
-    return std::abs(a.middle_mm - b.middle_mm) > pitch() / 2 || std::abs(same_bits::log(a.rate / b.rate)) > 0.25;
+    return std::abs(a.middle_mm - b.middle_mm) > pitch() / 2 ||
+           std::abs(same_bits::log(a.rate / b.rate)) > 0.25;
   }
 
   Line scored(double middle_mm, double rate) const {
@@ -181,7 +183,8 @@ class Fit {
 
   // Of the (element, row) pairs the stretch reached: share felt (line.coverage), and share of elements felt
   // by a row.
-  void felt_shares(const std::vector<std::array<double, rig::kTaxelRows>>& felt, Line& line, double& elements) const {
+  void felt_shares(const std::vector<std::array<double, rig::kTaxelRows>>& felt, Line& line,
+                   double& elements) const {
     double pairs = 0, felt_pairs = 0, reached = 0, felt_elements = 0;
     for (std::size_t j = 0; j < crests_.size(); ++j) {
       double best = -1;

@@ -41,7 +41,8 @@ struct FolderImport {
 /// positions, a clock in seconds and the metadata of apply(); they are in the order of their names.
 ///
 /// The files hold no clock. It is rewritten four times, and each step needs what the one before left:
-///   1. import_text_pass() counts the lines: frame i at i / rig::kFrameRateHz. A dropped line keeps its place.
+///   1. import_text_pass() counts the lines: frame i at i / rig::kFrameRateHz. A dropped line keeps its
+///   place.
 ///   2. restore_clock() puts back the time of frames that the host lost, seen as steps of all signals. A
 ///   registration
 ///      fits a straight line through the clock, and through a clock with holes none fits within a millimetre.

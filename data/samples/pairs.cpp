@@ -128,12 +128,11 @@ void PairSet::set_scaling(const ChannelScaling& scaling) {
 void PairSet::input(std::size_t i, std::span<float> out) const {
   check_size("an input", out.size(), input_size());
   const auto pixels = static_cast<std::size_t>(array_.taxels()), channels = out.size() / pixels;
-  for_each_value(file_.bytes("input").subspan(i * out.size_bytes(), out.size_bytes()),
-                 [&](std::size_t k, float value) {
-                   const std::size_t channel = k / pixels, pixel = k % pixels;
-                   out[pixel * channels + channel] =
-                       (value - scaling_.mean[channel]) * scaling_.factor[channel];
-                 });
+  for_each_value(
+      file_.bytes("input").subspan(i * out.size_bytes(), out.size_bytes()), [&](std::size_t k, float value) {
+        const std::size_t channel = k / pixels, pixel = k % pixels;
+        out[pixel * channels + channel] = (value - scaling_.mean[channel]) * scaling_.factor[channel];
+      });
 }
 
 void PairSet::target(std::size_t i, std::span<float> out) const {
@@ -144,7 +143,8 @@ void PairSet::target(std::size_t i, std::span<float> out) const {
 std::string PairSet::fingerprint() const {
   Hash hash;
   hash.add(count_);
-  for (const int size : {array_.channels, array_.rows, array_.columns, scale_}) hash.add(static_cast<std::size_t>(size));
+  for (const int size : {array_.channels, array_.rows, array_.columns, scale_})
+    hash.add(static_cast<std::size_t>(size));
   for (const char* name : {"input", "target"})
     for_each_value(file_.bytes(name), [&](std::size_t, float value) { hash.add(value); });
   for (const std::int64_t group : groups_) hash.add(group);

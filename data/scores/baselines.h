@@ -57,8 +57,8 @@ class Upsampling {
 };
 
 /// Upsampling of the last frame (the mean of each taxel's channels), followed by a x + b: the line that fits
-/// the targets of the training examples best (least squares over all pixels). It turns voltage into height, as
-/// fairly as two numbers can.
+/// the targets of the training examples best (least squares over all pixels). It turns voltage into height,
+/// as fairly as two numbers can.
 class UpsampledFrame : public Baseline {
  public:
   /// Throws std::invalid_argument when train is empty.

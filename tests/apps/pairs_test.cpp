@@ -1,8 +1,8 @@
 // supertac-train and supertac-evaluate on pairs of images: of another sensor, and of recordings.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -133,7 +133,8 @@ TEST(Pairs, RefusesWhatIsAboutRecordingsAndTheOtherModel) {
          "expected --data DIR or --pairs FILE, found both");
   expect(run_process("supertac-train", training(folder, "m.safetensors", {"--split", "trial"})), 2,
          "expected one of group, pair, none");
-  expect(run_process("supertac-train", {"--out", model}), 2, "expected --data DIR or --pairs FILE, found neither");
+  expect(run_process("supertac-train", {"--out", model}), 2,
+         "expected --data DIR or --pairs FILE, found neither");
   const auto loose = write_pairs(folder, false);
   expect(run_process("supertac-train", {"--pairs", loose, "--out", model, "--split", "group"}), 1,
          "needs a tensor 'group'");
@@ -143,7 +144,8 @@ TEST(Pairs, RefusesWhatIsAboutRecordingsAndTheOtherModel) {
   EXPECT_NE(trained.error.find("split pair leaks"), std::string::npos) << trained.error;
   expect(run_process("supertac-evaluate", {"--model", model, "--data", folder.path()}), 1,
          "found a frame model");
-  expect(run_process("supertac-evaluate", {"--model", model}), 2, "expected --data DIR or --pairs FILE, found neither");
+  expect(run_process("supertac-evaluate", {"--model", model}), 2,
+         "expected --data DIR or --pairs FILE, found neither");
   for (const char* option : {"--plates", "--pictures", "--write-pairs"})
     expect(run_process("supertac-evaluate", {"--model", model, "--pairs", pairs, option, folder / "p"}), 2,
            std::string(option) + ": says something beside --data only");
@@ -157,13 +159,14 @@ class PairsOfRecordings : public testing::Test {
                                                         "--speeds", "10", "--passes", "2"});
     EXPECT_EQ(made.code, 0) << made.error;
     const auto trained =
-        run_process("supertac-train", {"--data", folder_ / "data", "--out", model_, "--timesteps", "32",
-                                       "--scale", "2", "--rate", "50", "--split", "pass", "--seed", "1",
-                                       "--epochs", "1", "--latent", "2", "--range", "2.5,0.4"});
+        run_process("supertac-train", {"--data",  folder_ / "data", "--out",  model_,    "--timesteps",
+                                       "32",      "--scale",        "2",      "--rate",  "50",
+                                       "--split", "pass",           "--seed", "1",       "--epochs",
+                                       "1",       "--latent",       "2",      "--range", "2.5,0.4"});
     EXPECT_EQ(trained.code, 0) << trained.error;
   }
   ProcessResult make_pairs(const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> all = {"--model",       model_,           "--data",
+    std::vector<std::string> all = {"--model",        model_,          "--data",
                                     folder_ / "data", "--write-pairs", folder_ / "pairs"};
     all.insert(all.end(), more.begin(), more.end());
     return run_process("supertac-evaluate", all);
@@ -195,12 +198,12 @@ void expect_pairs_of(const std::string& path, const WindowSet& windows,
 TEST_F(PairsOfRecordings, AreTheWindowsOfTheModelAndItsSplit) {
   const auto made = make_pairs();
   ASSERT_EQ(made.code, 0) << made.error;
-  const WindowSet windows = WindowSet::load(
-      folder_ / "data", {},
-      {.timesteps = 32,
-       .scale = 2,
-       .rate_hz = 50,
-       .scaling = {.rest_volts = 2.5, .span_volts = 0.4, .levelled = true}});
+  const WindowSet windows =
+      WindowSet::load(folder_ / "data", {},
+                      {.timesteps = 32,
+                       .scale = 2,
+                       .rate_hz = 50,
+                       .scaling = {.rest_volts = 2.5, .span_volts = 0.4, .levelled = true}});
   const Split split = make_split(windows, SplitKind::pass, 1);
   expect_pairs_of(folder_ / "pairs/train.safetensors", windows, split.train);
   expect_pairs_of(folder_ / "pairs/test.safetensors", windows, split.test);

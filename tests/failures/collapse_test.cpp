@@ -34,7 +34,8 @@ class CollapseTest : public ::testing::Test {
     } catch (const TrainingStopped&) {
       return {.stopped = true};
     }
-    const SuperTac::Output output = dynamic_cast<const SuperTac&>(trainer.model()).forward(two_windows(), zero_eps());
+    const SuperTac::Output output =
+        dynamic_cast<const SuperTac&>(trainer.model()).forward(two_windows(), zero_eps());
     return {report.collapsed, false, report.active_latents, difference(output.image.value()),
             difference(output.decoded[3].value())};
   }

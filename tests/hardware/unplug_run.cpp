@@ -6,12 +6,12 @@
 #include <memory>
 #include <thread>
 
+#include "bench/studies/stall_watch.h"
 #include "hardware/errors.h"
 #include "hardware/palpation_recorder.h"
 #include "hardware/serial_port.h"
 #include "hardware/virtual_rig/pty_rig.h"
 #include "rig_support.h"
-#include "bench/studies/stall_watch.h"
 
 namespace supertac {
 namespace {

@@ -129,11 +129,11 @@ TEST(ModelFile, OfFramesComesBackWithItsScalingAndPictures) {
 TEST(ModelFile, NeitherKindIsTakenForTheOther) {
   const TemporaryFolder folder;
   Rng rng(2);
-  save_model(folder / "frame.safetensors", FrameModel({.channels = 8, .rcabs = 1}, rng), {{0}, {1}},
-                   {});
+  save_model(folder / "frame.safetensors", FrameModel({.channels = 8, .rcabs = 1}, rng), {{0}, {1}}, {});
   save_model(folder / "window.safetensors", SuperTac(small_settings(), rng), {}, {});
-  EXPECT_NE(load_error(folder / "frame.safetensors").find("found a frame model (trained with --pairs); use it"),
-            std::string::npos);
+  EXPECT_NE(
+      load_error(folder / "frame.safetensors").find("found a frame model (trained with --pairs); use it"),
+      std::string::npos);
   EXPECT_NE(load_error(folder / "window.safetensors", ModelKind::frames)
                 .find("found a SuperTac model; give it recordings"),
             std::string::npos);

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <functional>
 #include <memory>
-#include <numeric>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "models/evaluation.h"
 #include "tests/models/support.h"
@@ -44,7 +44,8 @@ TEST(Trainer, WithoutSamplingLatentsAreTheMeans) {
   EXPECT_EQ(to_json(settings)["beta"], 0.0);
 }
 
-// Deleting the augmentation, or another sample's, changes the loss; it is that of the windows changed by hand.
+// Deleting the augmentation, or another sample's, changes the loss; it is that of the windows changed by
+// hand.
 TEST(Trainer, LearnsFromAugmentedWindows) {
   TrainingSettings settings = small_training();
   settings.augment = {.gain = 0.5, .noise = 0.05};
@@ -223,7 +224,8 @@ TEST(Trainer, RefusesToResumeFromAModelWithoutState) {
   const TrainingSettings settings = small_training();
   const WindowSet windows = small_windows(settings.model);
   Trainer trainer(windows, all_of(windows), settings);
-  save_model(folder / "m.safetensors", dynamic_cast<const SuperTac&>(trainer.model()), {}, {{"training", to_json(settings).dump()}});
+  save_model(folder / "m.safetensors", dynamic_cast<const SuperTac&>(trainer.model()), {},
+             {{"training", to_json(settings).dump()}});
   try {
     trainer.restore(folder / "m.safetensors", {});
     FAIL();
