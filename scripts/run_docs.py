@@ -31,7 +31,7 @@ BLOCK = re.compile(r"(?:<!-- ((?:not )?run\b.*?) -->\n)?```([a-z+]*)\n(.*?)```\n
 LONGEST_LINE, LONGEST_README = 120, 150
 # What a page may name although it is not in the tree: what programs make, and names that stand for others.
 MADE = re.compile(r"^(out/|build)|^(scores|sweep|model)\.|NAME|JOB")
-FILE = re.compile(r"`([\w./+-]+\.(?:cpp|h|inl|md|py|sh|gp|cmake|csv|png|svg|txt))`|\]\(([^)#:]+)\)")
+FILE = re.compile(r"`([\w./+-]+\.(?:cpp|h|inl|md|py|sh|gp|cmake|csv|png|svg|txt))`|\]\(([^)#: ]+)\)")
 
 
 def pages():
@@ -49,19 +49,12 @@ def tracked_files():
 
 def missing_paths(page, files):
     folder = page.parent.relative_to(ROOT)
-    for match in FILE.finditer(page.read_text()):
+    for match in FILE.finditer(re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)):
         path = match[1] or match[2]
         near = os.path.normpath(folder / path)
-        if (
-            "/" not in path
-            and path in names
-            or path in files
-            or near in files
-            or (ROOT / near).is_dir()
-            or MADE.search(path)
-        ):
-            continue
-        yield f"{page.relative_to(ROOT)} names {path}, which is not in the tree"
+        ends = any(f"/{file}".endswith(f"/{path}") for file in files)
+        if not (ends or near in files or (ROOT / near).is_dir() or MADE.search(path)):
+            yield f"{page.relative_to(ROOT)} names {path}, which is not in the tree"
 
 
 def long_lines(page):
