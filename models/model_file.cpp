@@ -166,14 +166,16 @@ void set_array(SuperTacSettings& settings, const TaxelArray& array) {
 ModelFile load_model(const std::string& path, ModelKind kind) {
   const SafetensorsFile file = read_checkpoint(path);
   expect_kind(file, path, kind);
-  const JsonEntry settings(file, path, "settings"), input(file, path, "input");
+  const JsonEntry settings(file, path, "settings");
   ModelFile loaded;
   loaded.metadata = file.metadata();
   if (kind == ModelKind::windows) {
-    loaded.input = read_input(input);
-    loaded.model = build<SuperTac>(read_settings(settings), file, path);
+    const SuperTacSettings read = read_settings(settings);
+    loaded.input = read_input({file, path, "input"});
+    loaded.model = build<SuperTac>(read, file, path);
   } else {
     const FrameSettings read = read_frame_settings(settings);
+    const JsonEntry input(file, path, "input");
     const auto channels = static_cast<std::size_t>(read.in_channels);
     loaded.scaling = {input.numbers("mean", channels), input.numbers("factor", channels)};
     loaded.frame_model = build<FrameModel>(read, file, path);

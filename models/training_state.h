@@ -19,8 +19,8 @@ struct TrainingPace {
   std::int64_t batch = 64;   ///< 1 to 4096
   std::uint64_t seed = 0;
   double learning_rate = 1e-3;  ///< Adam's peak, above 0 and at most 1
-  double warm_up = 0.05;  ///< share of all steps in which the rate rises; then half a cosine to 0
-  double clip_norm = 1;   ///< 0 = never
+  double warm_up = 0.05;        ///< share of all steps in which the rate rises; then half a cosine to 0
+  double clip_norm = 1;         ///< 0 = never
 
   /// Throws std::invalid_argument naming the setting.
   void check() const;

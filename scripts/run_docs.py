@@ -29,9 +29,9 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 BLOCK = re.compile(r"(?:<!-- ((?:not )?run\b.*?) -->\n)?```([a-z+]*)\n(.*?)```\n", re.DOTALL)
 LONGEST_LINE, LONGEST_README = 120, 150
-# What a page may name although it is not in the tree: things that programs make.
-MADE = re.compile(r"^(out/|build|examples/build)|^(scores|sweep|model)\.|\.safetensors$")
-FILE = re.compile(r"`([\w./+-]+\.(?:cpp|h|inl|md|py|sh|gp|cmake|csv|png|svg|txt))`|\]\(([^)#:]+)\)")
+# What a page may name although it is not in the tree: what programs make, and names that stand for others.
+MADE = re.compile(r"^(out/|build)|^(scores|sweep|model)\.|NAME|JOB")
+FILE = re.compile(r"`([\w./+-]+\.(?:cpp|h|inl|md|py|sh|gp|cmake|csv|png|svg|txt))`|\]\(([^)#: ]+)\)")
 
 
 def pages():
@@ -47,21 +47,14 @@ def tracked_files():
     return found
 
 
-def missing_paths(page, files, names):
+def missing_paths(page, files):
     folder = page.parent.relative_to(ROOT)
-    for match in FILE.finditer(page.read_text()):
+    for match in FILE.finditer(re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)):
         path = match[1] or match[2]
         near = os.path.normpath(folder / path)
-        if (
-            "/" not in path
-            and path in names
-            or path in files
-            or near in files
-            or (ROOT / near).is_dir()
-            or MADE.search(path)
-        ):
-            continue
-        yield f"{page.relative_to(ROOT)} names {path}, which is not in the tree"
+        ends = any(f"/{file}".endswith(f"/{path}") for file in files)
+        if not (ends or near in files or (ROOT / near).is_dir() or MADE.search(path)):
+            yield f"{page.relative_to(ROOT)} names {path}, which is not in the tree"
 
 
 def long_lines(page):
@@ -78,10 +71,9 @@ def unmarked(page):
 
 def check():
     files = tracked_files()
-    names = {path.rsplit("/", 1)[-1] for path in files}
     complaints = []
     for page in sorted(ROOT / path for path in files if path.endswith(".md")):
-        complaints += missing_paths(page, files, names)
+        complaints += missing_paths(page, files)
         complaints += long_lines(page)
     for page in pages():
         complaints += unmarked(page)

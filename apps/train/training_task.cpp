@@ -17,13 +17,10 @@ std::map<std::string, std::string> origin_of(const std::string& split_name, std:
 
 TrainingTask window_task(const Arguments& a, const WindowSet& windows, const TrainingSettings& settings) {
   const std::string name = a.text("split");
-  TrainingTask task{windows,
-                    "windows",
-                    make_split(windows, training_split(a), settings.seed),
-                    window_objective(windows, settings),
-                    {},
-                    {},
-                    {}};
+  TrainingTask task{.examples = windows,
+                    .unit = "windows",
+                    .split = make_split(windows, training_split(a), settings.seed),
+                    .objective = window_objective(windows, settings)};
   task.origin = origin_of(name, settings.seed, windows, task.split);
   task.origin["plates"] = a.text("plates");
   task.origin["stride"] = a.text("stride");
@@ -49,7 +46,10 @@ TrainingTask pair_task(const Arguments& a, PairSet& pairs) {
   settings.lambda = a.number("lambda", 0, 1e6);
   Split split = split_pairs(pairs, name, settings.seed);
   pairs.fit_scaling(split.train);
-  TrainingTask task{pairs, "pairs", std::move(split), frame_objective(pairs, settings), {}, {}, {}};
+  TrainingTask task{.examples = pairs,
+                    .unit = "pairs",
+                    .split = std::move(split),
+                    .objective = frame_objective(pairs, settings)};
   task.origin = origin_of(name, settings.seed, pairs, task.split);
   if (name == "pair")
     task.warning = "split pair leaks when frames resemble each other; use groups for results";

@@ -18,9 +18,10 @@ struct TrainingTask {
   Split split;
   std::unique_ptr<Objective> objective;
   /// What the model file says of its origin; the same whatever machine, folder or number of threads.
-  std::map<std::string, std::string> origin;
-  nlohmann::ordered_json about;  ///< more for the run's settings
-  std::string warning;           ///< of a split that leaks; "" = none
+  std::map<std::string, std::string> origin{};
+  /// More for the run's settings.
+  nlohmann::ordered_json about = nlohmann::ordered_json::object();
+  std::string warning{};  ///< of a split that leaks; "" = none
 };
 
 /// --split of the windows, with settings.seed. Throws as make_split.

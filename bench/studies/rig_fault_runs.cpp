@@ -4,7 +4,7 @@
 #include <iostream>
 #include <string_view>
 
-#include "fault_run.h"
+#include "tests/hardware/fault_run.h"
 
 int main(int argc, char** argv) {
   using namespace supertac;

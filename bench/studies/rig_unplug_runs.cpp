@@ -6,7 +6,7 @@
 #include <fstream>
 #include <iostream>
 
-#include "unplug_run.h"
+#include "tests/hardware/unplug_run.h"
 
 int main(int argc, char** argv) {
   using namespace supertac;

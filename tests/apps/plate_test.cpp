@@ -32,11 +32,9 @@ TEST(PlateProgram, RefusesWhatItCannotPrint) {
   EXPECT_EQ(run_process("supertac-plate", {"--plate", "bumps6"}).code, 2);
   const auto unknown = run_process("supertac-plate", {"--plate", "lumps6", "--out", out});
   EXPECT_EQ(unknown.code, 2);
-  EXPECT_EQ(
-      unknown.error,
-      "supertac-plate: --plate: plate \"lumps6\": unknown texture \"lumps6\"; expected a rig plate such as "
-      "3_Bumps, or plain, or ridges|bumps|waves|blobs with a pitch in mm such as bumps12 or ridges6h1.5, "
-      "several joined by +, or an STL file (see --help)\n");
+  const std::string refusal =
+      "supertac-plate: --plate: plate \"lumps6\": unknown texture \"lumps6\"; expected ";
+  EXPECT_TRUE(unknown.error.starts_with(refusal)) << unknown.error;
   EXPECT_EQ(run_process("supertac-plate", {"--plate", "blobs6h9", "--out", out}).code, 2);
   EXPECT_EQ(run_process("supertac-plate", {"--plate", folder / "no.stl", "--out", out}).code, 1);
   write_file(out, std::string("solid nothing\nendsolid"));

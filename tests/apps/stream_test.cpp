@@ -142,7 +142,7 @@ TEST_F(Streaming, EndsWhenItsTimeIsOverAndCounts) {
   write_model(model(), kTimesteps, SimulatorSettings().filter_s);
   const Recording recording = simulate_pass(Plate::named("bumps12"), {.to_mm = 40});
   write_recording(path("recording"), recording);
-  const std::vector<ModelFile> models = load_models({model()});
+  const std::vector<ModelFile> models = load_models(std::vector{model()});
   const auto source = open_recording(path("recording"));
   Stream stream({.seconds = 0.5, .out = path("out")}, models, *source);
   stream.run();
@@ -176,7 +176,7 @@ class LateBoard : public SensorSource {
 };
 
 TEST_F(Streaming, APictureThatWouldBeLateIsNotMade) {
-  const std::vector<ModelFile> models = load_models({model()});
+  const std::vector<ModelFile> models = load_models(std::vector{model()});
   LateBoard board;
   Stream stream({}, models, board);
   stream.run();

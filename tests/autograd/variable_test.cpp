@@ -1,5 +1,6 @@
 #include "autograd/variable.h"
 
+#include <memory>
 #include <string>
 #include <thread>
 
@@ -70,6 +71,15 @@ TEST(Backward, FreesTheGraph) {
   const Variable fresh = scale(x, 3);
   backward(sum(fresh));  // a refused backward leaves nothing in the queue
   expect_values(x.grad(), {2}, {5, 5});
+}
+
+TEST(Backward, FreesWhatAReverseStepHolds) {
+  const Variable x = parameter(Tensor::full({}, 3));
+  const auto held = std::make_shared<int>(1);
+  const Variable loss = record("holds", Tensor::full({}, 1), {&x}, [held](Backward&) {});
+  EXPECT_EQ(held.use_count(), 2);
+  backward(loss);
+  EXPECT_EQ(held.use_count(), 1);
 }
 
 TEST(Backward, RefusesWhatHasNoGradient) {

@@ -67,6 +67,12 @@ TEST(Panel, StaysInsideThePicture) {
                "draw_panel: expects 3 x 2 values, got 4");
 }
 
+TEST(Picture, HasSidesOf1To65535Pixels) {
+  EXPECT_EQ(Picture(65535, 1).rgb.size(), 3u * 65535);
+  EXPECT_THROW(Picture(65536, 1), std::invalid_argument);
+  EXPECT_THROW(Picture(1, 0), std::invalid_argument);
+}
+
 constexpr StripLayout kSmall{.scale = 2, .side = 16};
 
 struct Windows {

@@ -227,6 +227,14 @@ TEST(SafetensorsHostile, HeadersAreRefusedForTheirReason) {
   }
 }
 
+TEST(SafetensorsHostile, AHeaderOfTheLargestSizeIsStillRead) {
+  std::string header = "{}";
+  header.resize(1 << 20, ' ');
+  EXPECT_EQ(message_of_header(header), "read");
+  EXPECT_NE(message_of_header(header + " ").find("header length 1048577, expected at most 1048576"),
+            std::string::npos);
+}
+
 TEST(SafetensorsHostile, LengthsAreComparedBeforeMemoryIsAskedFor) {
   TemporaryFolder folder;
   for (const std::uint64_t length :

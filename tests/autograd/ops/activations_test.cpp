@@ -97,6 +97,9 @@ TEST(FusedActivation, IsTheActivationBehindTheOp) {
 TEST(FusedActivation, RefusesANegativeSlope) {
   const Variable x(Tensor::zeros({2, 3})), w(Tensor::zeros({3, 5})), b(Tensor::zeros({5}));
   expect_refusal("linear: slope must not be negative, got -0.500000", [&] { linear(x, w, b, real(-0.5)); });
+  const Variable line(Tensor::zeros({1, 4, 3})), taps(Tensor::zeros({3, 3, 5}));
+  expect_refusal("conv1d: slope must not be negative, got -0.500000",
+                 [&] { conv1d(line, taps, b, {.padding = 1, .negative_slope = real(-0.5)}); });
 }
 
 #ifdef SUPERTAC_REAL_IS_DOUBLE

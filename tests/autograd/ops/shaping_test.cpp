@@ -36,6 +36,12 @@ TEST(Shaping, SliceUndoesConcat) {
   for (Dim i = 0; i < b.size(); ++i) ASSERT_EQ(back.value().data()[i], b.value().data()[i]);
 }
 
+TEST(Shaping, OneAxisIsEnoughToJoinAndToCut) {
+  const Variable joint = joined({Variable(Tensor::of({2}, {1, 2})), Variable(Tensor::of({1}, {3}))});
+  expect_values(joint.value(), {3}, {1, 2, 3});
+  expect_values(slice(joint, 1, 2).value(), {2}, {2, 3});
+}
+
 TEST(Shaping, Empty) {
   const Variable x(Tensor::zeros({0, 3, 2}));
   EXPECT_EQ(reshape(x, {2, 0}).shape().text(), "[2,0]");

@@ -1,0 +1,102 @@
+// The bits of ops in single precision, as they are on every processor and with every number of threads. They
+// are part of what a checkpoint's hash stands for: whoever changes the arithmetic on purpose changes these
+// numbers with it, and says so.
+#include <gtest/gtest.h>
+
+#include <bit>
+
+#include "autograd/adam.h"
+#include "autograd/ops/activations.h"
+#include "autograd/ops/arithmetic.h"
+#include "autograd/ops/convolution.h"
+#include "autograd/ops/linear.h"
+#include "autograd/ops/losses.h"
+#include "autograd/ops/vae.h"
+#include "tests/autograd/check.h"
+
+namespace supertac {
+namespace {
+
+using test::numbers;
+using test::parameter;
+
+// FNV-1a
+class Bits {
+ public:
+  void add(const Tensor& tensor) {
+    for (const real x : tensor.values()) hash_ = (hash_ ^ std::bit_cast<std::uint32_t>(x)) * 0x100000001b3U;
+  }
+  std::uint64_t hash() const { return hash_; }
+
+ private:
+  std::uint64_t hash_ = 0xcbf29ce484222325U;
+};
+
+using Op = std::function<Variable(const std::vector<Variable>&)>;
+
+// Of the value, and of the gradients of all inputs.
+std::uint64_t bits_of(const Op& op, const std::vector<Shape>& shapes) {
+  std::vector<Variable> leaves;
+  for (std::size_t i = 0; i < shapes.size(); ++i) leaves.push_back(parameter(numbers(shapes[i], i + 1)));
+  const Variable y = op(leaves);
+  backward(sum(multiply(y, Variable(numbers(y.shape(), 9)))));
+  Bits bits;
+  bits.add(y.value());
+  for (const Variable& leaf : leaves) bits.add(leaf.grad());
+  return bits.hash();
+}
+
+TEST(SameBits, Convolutions) {
+  const auto conv = [](Dim stride) -> Op {
+    return [stride](const auto& in) {
+      return conv2d(in[0], in[1], in[2], {.stride = stride, .padding = 1, .negative_slope = kLeakyRelu});
+    };
+  };
+  const auto up = [](const auto& in) {
+    return conv_transpose2d(in[0], in[1], in[2], {.stride = 2, .padding = 1});
+  };
+  EXPECT_EQ(bits_of(conv(1), {{1, 8, 8, 32}, {3, 3, 32, 32}, {32}}), 0xe3d9bcb1a467090bU) << "plain";
+  EXPECT_EQ(bits_of(conv(1), {{5, 8, 8, 32}, {3, 3, 32, 32}, {32}}), 0x3de9902141a274dfU) << "Winograd";
+  EXPECT_EQ(bits_of(conv(1), {{3, 16, 16, 32}, {3, 3, 32, 1}, {1}}), 0x1c98df7a13494441U) << "few outputs";
+  EXPECT_EQ(bits_of(conv(2), {{9, 1, 64, 16}, {3, 3, 16, 32}, {32}}), 0xb96b2aef83970398U) << "stride 2";
+  EXPECT_EQ(bits_of(up, {{3, 4, 4, 32}, {4, 4, 32, 32}, {32}}), 0x0cfc0a2dc7af40b7U) << "transposed";
+}
+
+TEST(SameBits, LinearLayersAndLosses) {
+  EXPECT_EQ(
+      bits_of([](const auto& in) { return linear(in[0], in[1], in[2], kRelu); }, {{300, 40}, {40, 64}, {64}}),
+      0xf195cfe969c52f85U)
+      << "linear";
+  EXPECT_EQ(bits_of([](const auto& in) { return l2_loss(in[0], in[1]); }, {{7, 61}, {7, 61}}),
+            0xe8615c4a089444dfU)
+      << "l2";
+  EXPECT_EQ(bits_of(
+                [](const auto& in) {
+                  return ssim(in[0], numbers({3, 16, 16, 1}, 5));
+                },
+                {{3, 16, 16, 1}}),
+            0x4cfb124af1dafa08U)
+      << "ssim";
+  EXPECT_EQ(bits_of([](const auto& in) { return kl_divergence(in[0], in[1]); }, {{7, 10}, {7, 10}}),
+            0xc3f8ffdc54049883U)
+      << "KLD";
+  EXPECT_EQ(bits_of([](const auto& in) { return sigmoid(in[0]); }, {{7, 61}}), 0x28412eae397205faU)
+      << "sigmoid";
+}
+
+TEST(SameBits, Adam) {
+  const Variable x = parameter(numbers({500}));
+  Adam adam({x}, {.learning_rate = 0.01, .clip_norm = 1});
+  const Variable target(numbers({500}, 2));
+  for (int step = 0; step < 50; ++step) {
+    adam.zero_grad();
+    backward(scale(l2_loss(x, target), 100));
+    adam.step();
+  }
+  Bits bits;
+  bits.add(x.value());
+  EXPECT_EQ(bits.hash(), 0x78b52dee9f584ac8U);
+}
+
+}  // namespace
+}  // namespace supertac
