@@ -41,9 +41,11 @@ TrainingSettings settings_of(const Arguments& a) {
   return s;
 }
 
-int train(const Arguments& a, TrainingTask task) {
+// `remark` is for a training that has begun: what ends it before says one line only.
+int train(const Arguments& a, TrainingTask task, const std::string& remark) {
   const std::string out = a.text("out");
   TrainingRun training(a, std::move(task), {.out = out, .force = a.force(), .resume = a.text("resume")});
+  a.note(remark);
   const bool done = training.train();
   const Trainer& trainer = training.trainer();
   if (!done) {
@@ -66,15 +68,14 @@ int run(Arguments& a) {
   if (a.given("pairs")) {
     refuse_existing(a.text("out"), a.force());
     PairSet pairs = PairSet::read(a.text("pairs"));
-    return train(a, pair_task(a, pairs));
+    return train(a, pair_task(a, pairs), std::to_string(pairs.size()) + " pairs");
   }
   TrainingSettings settings = settings_of(a);
   training_split(a);
   refuse_existing(a.text("out"), a.force());
   const WindowSet windows = training_windows(a, settings.model);
   set_array(settings.model, windows.array());
-  a.note(windows.counts().summary());
-  return train(a, window_task(a, windows, settings));
+  return train(a, window_task(a, windows, settings), windows.counts().summary());
 }
 
 }  // namespace supertac
