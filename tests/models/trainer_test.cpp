@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "io/hash.h"
 #include "models/evaluation.h"
 #include "tests/models/support.h"
 
@@ -195,6 +196,20 @@ TEST_F(TrainerBytes, AreTheSameResumedAfterAnyStep) {
     for (std::int64_t step = 1; step < make()->total_steps(); ++step)
       ASSERT_TRUE(uninterrupted == checkpoint_of(make, 1, step)) << "stopped after step " << step;
   }
+}
+
+// The bits of a training, as they are on every processor: whoever changes the arithmetic, the order of
+// samples or the random numbers on purpose changes this number with it, and says so.
+TEST(Trainer, PinnedBits) {
+  TrainingSettings settings = small_training();
+  settings.augment = kStandardAugmentation;
+  const WindowSet windows = small_windows(settings.model);
+  Trainer trainer(windows, all_of(windows), settings);
+  while (!trainer.done()) trainer.train_step();
+  std::uint32_t bits = 0;
+  for (const Parameter& p : trainer.model().parameters())
+    bits = crc32(std::as_bytes(std::span<const real>(p.value.value().values())), bits);
+  EXPECT_EQ(bits, 0x07913746U);
 }
 
 TEST(Trainer, RefusesToResumeAnotherRun) {

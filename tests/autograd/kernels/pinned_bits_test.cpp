@@ -46,7 +46,7 @@ std::uint64_t bits_of(const Op& op, const std::vector<Shape>& shapes) {
   return bits.hash();
 }
 
-TEST(SameBits, Convolutions) {
+TEST(PinnedBits, Convolutions) {
   const auto conv = [](Dim stride) -> Op {
     return [stride](const auto& in) {
       return conv2d(in[0], in[1], in[2], {.stride = stride, .padding = 1, .negative_slope = kLeakyRelu});
@@ -62,7 +62,7 @@ TEST(SameBits, Convolutions) {
   EXPECT_EQ(bits_of(up, {{3, 4, 4, 32}, {4, 4, 32, 32}, {32}}), 0x0cfc0a2dc7af40b7U) << "transposed";
 }
 
-TEST(SameBits, LinearLayersAndLosses) {
+TEST(PinnedBits, LinearLayersAndLosses) {
   EXPECT_EQ(
       bits_of([](const auto& in) { return linear(in[0], in[1], in[2], kRelu); }, {{300, 40}, {40, 64}, {64}}),
       0xf195cfe969c52f85U)
@@ -84,7 +84,7 @@ TEST(SameBits, LinearLayersAndLosses) {
       << "sigmoid";
 }
 
-TEST(SameBits, Adam) {
+TEST(PinnedBits, Adam) {
   const Variable x = parameter(numbers({500}));
   Adam adam({x}, {.learning_rate = 0.01, .clip_norm = 1});
   const Variable target(numbers({500}, 2));
