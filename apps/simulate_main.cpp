@@ -126,8 +126,8 @@ void declare(Arguments& arguments) {
       .option("trials", "N", "trials of every plate and speed", "2")
       .option("passes", "N", "passes of every trial, 5 mm apart in x (at most 8)", "8")
       .option("from", "MM", "where the finger's centre begins to slide; T samples before a window are needed",
-              "28")
-      .option("to", "MM", "where the slide ends", "80")
+              "0")
+      .option("to", "MM", "where the slide ends", format(Plate::kLengthMm))
       .option("array", "ROWSxCOLUMNS", "taxels of the finger, 2 to 16 either way", "4x4")
       .option("pitch", "MM", "from taxel to taxel", "3")
       .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms()))

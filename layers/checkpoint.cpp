@@ -104,7 +104,7 @@ SafetensorsFile read_checkpoint(const std::string& path) {
 }
 
 void load_parameters(const SafetensorsFile& file, const std::string& path,
-                     const std::vector<Parameter>& parameters, const std::string& ignored_prefix) {
+                     const std::vector<Parameter>& parameters) {
   std::vector<std::string> problems;
   std::set<std::string> known;
   for (const Parameter& p : parameters) {
@@ -113,7 +113,8 @@ void load_parameters(const SafetensorsFile& file, const std::string& path,
       problems.push_back(std::move(problem));
   }
   for (const auto& [name, info] : file.tensors()) {
-    if (!known.contains(name) && !name.starts_with(ignored_prefix)) problems.push_back("unexpected " + name);
+    const bool beside = name.starts_with("optimizer.") || name.starts_with("novelty.");
+    if (!known.contains(name) && !beside) problems.push_back("unexpected " + name);
   }
   if (!problems.empty()) {
     std::string message = path + ": the tensors do not fit the model that its metadata describes: ";

@@ -33,12 +33,11 @@ void write_checkpoint(const std::string& path, const std::vector<Parameter>& par
 /// Reads and checks format and version. Throws std::runtime_error naming path, expected and found.
 SafetensorsFile read_checkpoint(const std::string& path);
 
-/// Fills the parameters from the file. Names that start with `ignored_prefix` may be there besides.
+/// Fills the parameters from the file. Names that begin with "optimizer." or "novelty." may be there besides.
 /// Throws std::runtime_error that lists every missing, unexpected and mismatching tensor at once; then
 /// nothing has been changed.
 void load_parameters(const SafetensorsFile& file, const std::string& path,
-                     const std::vector<Parameter>& parameters,
-                     const std::string& ignored_prefix = "optimizer.");
+                     const std::vector<Parameter>& parameters);
 
 /// Reads one array stored by to_stored() for that parameter into a tensor in the memory layout.
 /// Throws std::runtime_error when it is missing or of another shape or type.

@@ -1,24 +1,40 @@
 #include "models/committee.h"
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 namespace supertac {
 
+static double square(real x) { return static_cast<double>(x) * static_cast<double>(x); }
+
 Committee::Committee(std::span<const ModelFile> files) {
   if (files.empty()) throw std::invalid_argument("Committee: expected at least one model, got none");
   for (const ModelFile& file : files) members_.push_back(&file.network());
 }
 
-Tensor Committee::infer(const Tensor& inputs) const {
-  Tensor mean = members_.front()->infer(inputs);
+Estimate Committee::estimate(const Tensor& inputs) const {
+  Estimate mean = members_.front()->estimate(inputs);
   if (members_.size() == 1) return mean;
-  for (std::size_t m = 1; m < members_.size(); ++m) {
-    const Tensor pictures = members_[m]->infer(inputs);
-    for (std::size_t i = 0; i < mean.values().size(); ++i) mean.values()[i] += pictures.values()[i];
+  const bool spread = mean.spread.defined();
+  const auto count = static_cast<real>(members_.size());
+  const auto pixels = static_cast<std::size_t>(mean.picture.size());
+  std::vector<double> squares(spread ? pixels : 0);
+  mean.picture = mean.picture.clone();
+  for (std::size_t m = 0; m < members_.size(); ++m) {
+    const Estimate one = m == 0 ? mean : members_[m]->estimate(inputs);
+    for (std::size_t i = 0; i < squares.size(); ++i)
+      squares[i] += square(one.picture.values()[i]) + square(one.spread.values()[i]);
+    for (std::size_t i = 0; m > 0 && i < pixels; ++i) mean.picture.values()[i] += one.picture.values()[i];
   }
-  for (real& value : mean.values()) value /= static_cast<real>(members_.size());
+  for (real& value : mean.picture.values()) value /= count;
+  if (!spread) return mean;
+  mean.spread = Tensor(mean.picture.shape());
+  for (std::size_t i = 0; i < pixels; ++i)
+    mean.spread.values()[i] =
+        static_cast<real>(std::sqrt(std::max(0.0, squares[i] / count - square(mean.picture.values()[i]))));
   return mean;
 }
 

@@ -19,8 +19,10 @@ class Committee {
   explicit Committee(std::span<const ModelFile> files);
 
   const Network& first() const { return *members_.front(); }
-  /// The mean of the members' Network::infer, added in their order. Throws as it.
-  Tensor infer(const Tensor& inputs) const;
+  /// The mean of the members' pictures, added in their order; spread^2 is the mean of their spread^2 plus the
+  /// variance of their pictures, the latents are those of the first. Throws as Network::estimate.
+  Estimate estimate(const Tensor& inputs) const;
+  Tensor infer(const Tensor& inputs) const { return estimate(inputs).picture; }
 
  private:
   std::vector<const Network*> members_;

@@ -14,6 +14,7 @@ constexpr std::size_t kBatch = 64, kBatchesAtOnce = 4;
 struct Part {
   std::size_t first;
   Tensor inputs, outputs, targets;
+  std::vector<float> spreads, latents;
   std::exception_ptr error;
 };
 
@@ -25,8 +26,10 @@ void compute(const Committee& network, const Examples& data, std::span<const std
     data.target(indices[n], part.targets.values().subspan(n * target_size, target_size));
   }
   // Copied, so that what this thread took from its pool goes back there.
-  const Tensor outputs = network.infer(part.inputs);
-  std::copy_n(outputs.data(), outputs.size(), part.outputs.data());
+  const Estimate estimate = network.estimate(part.inputs);
+  std::copy_n(estimate.picture.data(), estimate.picture.size(), part.outputs.data());
+  part.spreads.assign(estimate.spread.values().begin(), estimate.spread.values().end());
+  part.latents.assign(estimate.latents.values().begin(), estimate.latents.values().end());
 }
 
 std::string text(const NetworkFormat& f) {
@@ -56,8 +59,13 @@ void for_each_output(const Committee& network, const Examples& data, std::span<c
     for (std::size_t first = start; first < end; first += kBatch) {
       const auto count = static_cast<Dim>(std::min(kBatch, end - first));
       const Shape pictures = network.first().picture_shape(count);
-      parts.push_back(
-          {first, Tensor(network.first().input_shape(count)), Tensor(pictures), Tensor(pictures), {}});
+      parts.push_back({first,
+                       Tensor(network.first().input_shape(count)),
+                       Tensor(pictures),
+                       Tensor(pictures),
+                       {},
+                       {},
+                       {}});
     }
 #pragma omp parallel for schedule(static, 1)
     for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -70,16 +78,17 @@ void for_each_output(const Committee& network, const Examples& data, std::span<c
     }
     for (const Part& p : parts) {
       if (p.error) std::rethrow_exception(p.error);
-      if (!use({p.first, p.inputs, p.outputs, p.targets})) return;
+      if (!use({p.first, p.inputs, p.outputs, p.targets, p.spreads, p.latents})) return;
     }
   }
 }
 
-ContactMetrics score(const Committee& network, const Examples& windows,
-                     std::span<const std::uint32_t> indices, bool (*stop)()) {
-  ContactMetrics metrics(windows.image());
+ZoneMetrics score(const Committee& network, const Examples& windows, std::span<const std::uint32_t> indices,
+                  bool (*stop)()) {
+  ZoneMetrics metrics(windows.image());
   for_each_output(network, windows, indices, [&](const EvaluatedBatch& b) {
-    for (std::size_t n = 0; n < b.size(); ++n) metrics.add(b.output(n), b.target(n));
+    for (std::size_t n = 0; n < b.size(); ++n)
+      metrics.add(b.output(n), b.target(n), windows.zone(indices[b.first + n]));
     return stop == nullptr || !stop();
   });
   return metrics;

@@ -14,23 +14,29 @@ namespace supertac {
 /// Throws std::invalid_argument that names both when the examples' inputs or pictures are not the network's.
 void check_format(const Examples& examples, const Network& network);
 
-/// A batch of results: inputs as the network takes them, outputs and targets [n,H,W,1], and the first of
-/// their places in `indices`.
+/// A batch of results: inputs as the network takes them, outputs, spreads and targets [n,H,W,1], latents
+/// [n,D], and the first of their places in `indices`. Spreads and latents are empty where the network has
+/// none.
 struct EvaluatedBatch {
   std::size_t first;
   const Tensor& inputs;
   const Tensor& outputs;
   const Tensor& targets;
+  std::span<const float> spreads, latents;
 
   std::size_t size() const { return static_cast<std::size_t>(inputs.dim(0)); }
   std::span<const float> input(std::size_t n) const { return sample(inputs, n); }
   std::span<const float> output(std::size_t n) const { return sample(outputs, n); }
   std::span<const float> target(std::size_t n) const { return sample(targets, n); }
+  /// Empty where the network has none.
+  std::span<const float> spread(std::size_t n) const { return sample(spreads, n); }
+  std::span<const float> latent(std::size_t n) const { return sample(latents, n); }
 
  private:
-  std::span<const float> sample(const Tensor& all, std::size_t n) const {
-    const std::size_t values = all.values().size() / size();
-    return all.values().subspan(n * values, values);
+  std::span<const float> sample(const Tensor& all, std::size_t n) const { return sample(all.values(), n); }
+  std::span<const float> sample(std::span<const float> all, std::size_t n) const {
+    const std::size_t values = all.size() / size();
+    return all.subspan(n * values, values);
   }
 };
 
@@ -42,7 +48,7 @@ void for_each_output(const Committee& network, const Examples& examples,
 
 /// The metrics of the network's pictures of the given windows. `stop`, if given, is asked between batches;
 /// once it says true, the windows so far are what was measured. Throws as for_each_output.
-ContactMetrics score(const Committee& network, const Examples& windows,
-                     std::span<const std::uint32_t> indices, bool (*stop)() = nullptr);
+ZoneMetrics score(const Committee& network, const Examples& windows, std::span<const std::uint32_t> indices,
+                  bool (*stop)() = nullptr);
 
 }  // namespace supertac

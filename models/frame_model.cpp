@@ -64,9 +64,9 @@ NetworkFormat FrameModel::format() const {
   return {1, s.height, s.width, s.in_channels, s.scale};
 }
 
-Tensor FrameModel::infer(const Tensor& frames) const {
+Estimate FrameModel::estimate(const Tensor& frames) const {
   const NoGrad no_grad;
-  return forward(frames).value();
+  return {.picture = forward(frames).value(), .spread = {}, .latents = {}};
 }
 
 }  // namespace supertac

@@ -27,7 +27,7 @@ class FrameModel : public Network {
   FrameModel(const FrameSettings& settings, Rng& rng);
   /// Throws std::invalid_argument on another shape.
   Variable forward(const Tensor& frames) const;
-  Tensor infer(const Tensor& frames) const override;
+  Estimate estimate(const Tensor& frames) const override;
   const FrameSettings& settings() const { return settings_; }
   NetworkFormat format() const override;
   Shape input_shape(Dim count) const override {

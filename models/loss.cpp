@@ -1,5 +1,6 @@
 #include "models/loss.h"
 
+#include <cmath>
 #include <stdexcept>
 
 #include "autograd/ops/arithmetic.h"
@@ -24,6 +25,14 @@ Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda) {
   return loss;
 }
 
+// |picture - truth|, a constant.
+static Variable error_of(const Variable& picture, const Tensor& truth) {
+  Tensor error(truth.shape());
+  for (Dim i = 0; i < error.size(); ++i)
+    error.data()[i] = std::abs(picture.value().data()[i] - truth.data()[i]);
+  return Variable(error);
+}
+
 Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const LossWeights& w) {
   Loss loss = picture_loss(output.image, truth, w.lambda);
   for (std::size_t i = 0; i < output.decoded.size(); ++i) {
@@ -31,6 +40,10 @@ Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const Lo
     const Variable kld = kl_divergence(output.latent[i].mean, output.latent[i].log_var);
     loss.reconstruction = i == 0 ? l2 : add(loss.reconstruction, l2);
     loss.kld = i == 0 ? kld : add(loss.kld, kld);
+  }
+  if (output.spread.defined()) {
+    loss.spread = l2_loss(output.spread, error_of(output.image, truth));
+    loss.total = add(loss.total, scale(loss.spread, static_cast<real>(kSpreadWeight)));
   }
   const auto share = static_cast<real>(w.a), rest = static_cast<real>(1 - w.a);
   const Variable vaes =

@@ -15,17 +15,22 @@ struct LossWeights {
   void check() const;
 };
 
-/// Scalars; reconstruction and kld are sums over the VAEs, undefined where there are none. `total` alone is
-/// weighted.
+/// Scalars; reconstruction and kld are sums over the VAEs, undefined where there are none, as is spread.
+/// `total` alone is weighted.
 struct Loss {
-  Variable total, reconstruction, kld, l2, ssim;
+  Variable total, reconstruction, kld, l2, ssim, spread;
 };
+
+/// How much the squared error of the spread counts beside that of the picture.
+inline constexpr double kSpreadWeight = 0.1;
 
 /// The picture's part alone: total = L2 + lambda (1 - SSIM). picture and truth [N,H,W,1], truth in [0,1].
 /// Throws std::invalid_argument when they differ in shape.
 Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda);
 
-/// truth [N,H,W,1] in [0,1]. Throws std::invalid_argument when it does not fit the output's image.
+/// To the picture's loss kSpreadWeight times the mean of (spread - |image - truth|)^2 is added, the image
+/// taken as given: the spread learns the error, the picture does not learn to be predictably wrong. truth
+/// [N,H,W,1] in [-1,1]. Throws std::invalid_argument when it does not fit the output's image.
 Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const LossWeights& weights);
 
 }  // namespace supertac

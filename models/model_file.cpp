@@ -3,6 +3,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "io/numbers.h"
+#include "models/interval.h"
 #include "models/json_entry.h"
 
 namespace supertac {
@@ -25,6 +27,7 @@ SuperTacSettings read_settings(const JsonEntry& entry) {
   s.scale = entry.integer("scale");
   s.channels = entry.integer("channels");
   s.rcabs = entry.integer("rcabs");
+  s.spread = entry.flag("spread");
   if (entry.flag("sub_pixel")) {
     throw std::runtime_error(
         entry.where() +
@@ -100,6 +103,7 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
                    {"scale", s.scale},   {"grouping", name_of(s.grouping)}, {"channels", s.channels},
                    {"rcabs", s.rcabs}};
   // What is as it always was is left out: the text of older files stays the same.
+  if (s.spread) settings["spread"] = true;
   if (s.rows != 4 || s.columns != 4 || s.in_channels != 1) {
     settings["rows"] = s.rows;
     settings["columns"] = s.columns;
@@ -134,6 +138,10 @@ std::map<std::string, std::string> ModelFile::description() const {
 std::string ModelFile::metadata_or(const std::string& key, const std::string& otherwise) const {
   const auto found = metadata.find(key);
   return found == metadata.end() ? otherwise : found->second;
+}
+
+double ModelFile::interval_factor() const {
+  return parse_double(metadata_or("interval_factor", "")).value_or(kIntervalFactor);
 }
 
 TaxelArray ModelFile::array() const {
@@ -173,6 +181,7 @@ ModelFile load_model(const std::string& path, ModelKind kind) {
     const SuperTacSettings read = read_settings(settings);
     loaded.input = read_input({file, path, "input"});
     loaded.model = build<SuperTac>(read, file, path);
+    loaded.novelty = Novelty::read(file, path, read.groups() * read.latent);
   } else {
     const FrameSettings read = read_frame_settings(settings);
     const JsonEntry input(file, path, "input");

@@ -11,6 +11,7 @@
 #include "data/samples/windows.h"
 #include "layers/checkpoint.h"
 #include "models/frame_model.h"
+#include "models/novelty.h"
 #include "models/supertac_model.h"
 
 namespace supertac {
@@ -39,6 +40,7 @@ enum class ModelKind {
 struct ModelFile {
   std::unique_ptr<SuperTac> model;          ///< of kind windows, with its input
   InputSettings input;                      //
+  std::optional<Novelty> novelty;           ///< of its training windows; nothing in older files
   std::unique_ptr<FrameModel> frame_model;  ///< of kind frames, with its scaling
   ChannelScaling scaling;                   //
   std::map<std::string, std::string> metadata;
@@ -50,6 +52,8 @@ struct ModelFile {
   std::string metadata_or(const std::string& key, const std::string& otherwise) const;
 
   // Of kind windows:
+  /// Half the width of a pixel's interval in units of its spread.
+  double interval_factor() const;
   /// The sensor it was trained on.
   TaxelArray array() const;
   /// The windows it takes: its array and length, picture size, rate and scaling.

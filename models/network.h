@@ -12,6 +12,14 @@ struct NetworkFormat {
   bool operator==(const NetworkFormat&) const = default;
 };
 
+/// Pictures and what is known of their worth.
+struct Estimate {
+  Tensor picture;  ///< [N,rows scale,columns scale,1]
+  Tensor spread;   ///< the same: how far from the truth a pixel is expected to be; undefined where nothing
+                   ///< says so
+  Tensor latents;  ///< [N,latents]; undefined for a network without any
+};
+
 class Network : public Module {
  public:
   Network() = default;
@@ -26,9 +34,11 @@ class Network : public Module {
     const NetworkFormat f = format();
     return {count, f.rows * f.scale, f.columns * f.scale, 1};
   }
-  /// Inputs -> pictures [N,rows scale,columns scale,1], nothing recorded. Throws std::invalid_argument on
-  /// another shape.
-  virtual Tensor infer(const Tensor& inputs) const = 0;
+  /// Inputs -> pictures and what is known of them, nothing recorded. Throws std::invalid_argument on another
+  /// shape.
+  virtual Estimate estimate(const Tensor& inputs) const = 0;
+  /// The pictures alone, [N,rows scale,columns scale,1].
+  Tensor infer(const Tensor& inputs) const { return estimate(inputs).picture; }
 };
 
 }  // namespace supertac

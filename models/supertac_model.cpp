@@ -85,8 +85,8 @@ void SuperTacSettings::check() const {
 }
 
 SuperTacSettings SuperTacSettings::of_preset(const std::string& name) {
-  if (name == "paper") return {};
-  if (name == "tiny") return {.preset = "tiny", .timesteps = 128, .channels = 8, .rcabs = 1};
+  if (name == "paper") return {.spread = true};
+  if (name == "tiny") return {.preset = "tiny", .timesteps = 128, .channels = 8, .rcabs = 1, .spread = true};
   throw std::invalid_argument("unknown preset \"" + name + "\"; known: paper, tiny");
 }
 
@@ -107,16 +107,18 @@ Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
       fc_(s.groups() * s.latent, s.channels * s.rows * s.columns, rng),
       rirbs_(make_rirbs(s, rng)),
       out_(s.channels, 1, {.kernel = 3, .stride = 1, .padding = 1}, rng) {
+  if (s.spread) spread_.emplace(s.channels, 1, ConvLayerOptions{.kernel = 3, .stride = 1, .padding = 1}, rng);
   add("fc", fc_);
   for (std::size_t i = 0; i < rirbs_.size(); ++i) add("rirb." + std::to_string(i), rirbs_[i]);
   add("out", out_);
+  if (spread_) add("spread", *spread_);
 }
 
-Variable Upsampler::forward(const Variable& latents) const {
+Upsampler::Output Upsampler::forward(const Variable& latents) const {
   const Dim pixels[] = {rows_, columns_};
   Variable h = unflatten_channels_first(fc_.forward(latents, kLeakyRelu), pixels);
   for (const Rirb& rirb : rirbs_) h = rirb.forward(h);
-  return out_.forward(h);
+  return {out_.forward(h), spread_ ? spread_->forward(h) : Variable()};
 }
 
 SuperTac::SuperTac(const SuperTacSettings& settings, Rng& rng)
@@ -172,14 +174,15 @@ SuperTac::Output SuperTac::forward(const Tensor& windows, std::span<const Tensor
     throw std::invalid_argument("SuperTac: eps expects " + std::to_string(groups) + " tensors, got " +
                                 std::to_string(eps.size()));
   }
-  Output out{split(windows), PerGroup<LatentDistribution>(groups), PerGroup<Variable>(groups), {}};
+  Output out{split(windows), PerGroup<LatentDistribution>(groups), PerGroup<Variable>(groups), {}, {}};
   PerGroup<Variable> z(groups);
   for (std::size_t i = 0; i < z.size(); ++i) {
     out.latent[i] = encoders_[i].forward(out.input[i]);
     z[i] = sample_gaussian(out.latent[i].mean, out.latent[i].log_var, eps[i]);
     out.decoded[i] = decoders_[i].forward(z[i]);
   }
-  out.image = upsampler_.forward(concat_groups(z.span()));
+  const Upsampler::Output drawn = upsampler_.forward(concat_groups(z.span()));
+  out.image = drawn.picture, out.spread = drawn.spread;
   return out;
 }
 
@@ -196,9 +199,13 @@ Tensor SuperTac::encode(const Tensor& windows) const {
   return concat_groups(means.span()).value();
 }
 
-Tensor SuperTac::infer(const Tensor& windows) const {
+Estimate SuperTac::estimate(const Tensor& windows) const {
   const NoGrad no_grad;
-  return upsampler_.forward(Variable(encode(windows))).value();
+  Estimate estimate{.picture = {}, .spread = {}, .latents = encode(windows)};
+  const Upsampler::Output drawn = upsampler_.forward(Variable(estimate.latents));
+  estimate.picture = drawn.picture.value();
+  if (drawn.spread.defined()) estimate.spread = drawn.spread.value();
+  return estimate;
 }
 
 }  // namespace supertac

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,8 +31,9 @@ struct SuperTacSettings {
   Dim latent = 10;            ///< LD: 1 to 256
   Dim scale = 4;  ///< 2, 4, 8: pictures so many times finer than the array, 7 or more pixels a side
   Grouping grouping = Grouping::horizontal;
-  Dim channels = 32;  ///< of the upsampler
-  Dim rcabs = 3;      ///< in each RIRB
+  Dim channels = 32;    ///< of the upsampler
+  Dim rcabs = 3;        ///< in each RIRB
+  bool spread = false;  ///< whether it also draws how far off each pixel may be; presets do
 
   Dim signals() const { return rows * columns * in_channels; }  ///< numbers in a frame
   Dim groups() const { return grouping == Grouping::horizontal ? rows : columns; }
@@ -71,17 +73,22 @@ class PerGroup {
   std::size_t size_;
 };
 
-/// Latents of the G groups [N,G LD] -> picture [N,rows scale,columns scale,1], linear output.
+/// Latents of the G groups [N,G LD] -> picture and spread [N,rows scale,columns scale,1], linear outputs.
 class Upsampler : public Module {
  public:
+  struct Output {
+    Variable picture;
+    Variable spread;  ///< expected distance of a pixel from the truth; undefined without settings.spread
+  };
   Upsampler(const SuperTacSettings& settings, Rng& rng);
-  Variable forward(const Variable& latents) const;
+  Output forward(const Variable& latents) const;
 
  private:
   Dim rows_, columns_;  // the map it starts from
   Linear fc_;
   std::vector<Rirb> rirbs_;
   Conv2d out_;
+  std::optional<Conv2d> spread_;
 };
 
 class SuperTac : public Network {
@@ -94,12 +101,13 @@ class SuperTac : public Network {
     PerGroup<LatentDistribution> latent;  ///< [N,LD]
     PerGroup<Variable> decoded;           ///< [N,T,group_signals]
     Variable image;                       ///< [N,rows scale,columns scale,1]
+    Variable spread;                      ///< the same, or undefined
   };
   /// Training: windows [N,T,signals] in [0,1] and eps [N,LD] ~ N(0,1) for each group.
   /// Throws std::invalid_argument on other shapes.
   Output forward(const Tensor& windows, std::span<const Tensor> eps) const;
   /// Evaluation: z = mean, no decoders.
-  Tensor infer(const Tensor& windows) const override;
+  Estimate estimate(const Tensor& windows) const override;
   /// The latent means [N,G LD].
   Tensor encode(const Tensor& windows) const;
 

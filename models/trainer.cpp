@@ -5,10 +5,12 @@
 #include <utility>
 
 #include "autograd/ops/arithmetic.h"
+#include "data/samples/split.h"
 #include "io/numbers.h"
 #include "layers/checkpoint.h"
 #include "models/diagnosis.h"
 #include "models/evaluation.h"
+#include "models/novelty.h"
 
 namespace supertac {
 namespace {
@@ -40,9 +42,9 @@ void Trainer::Spreads::add(const Spreads& other) {
 Trainer::Trainer(const Examples& examples, std::vector<std::uint32_t> train,
                  std::unique_ptr<Objective> objective)
     : data_(examples),
+      train_(std::move(train)),
       objective_(std::move(objective)),
-      batching_(std::move(train), static_cast<std::size_t>(objective_->pace().batch),
-                objective_->pace().seed),
+      batching_(train_, static_cast<std::size_t>(objective_->pace().batch), objective_->pace().seed),
       state_(model().parameters(), objective_->pace(), objective_->pace().epochs * steps_per_epoch()) {
   check_format(examples, model());
   indices_.resize(batching_.batch_size());
@@ -81,7 +83,7 @@ void Trainer::fill(Lane& lane) const {
     const std::size_t slot = static_cast<std::size_t>(lane.first) + n;
     const std::span<float> input = lane.batch.inputs.values().subspan(n * input_size, input_size);
     data_.input(indices_[slot], input);
-    objective_->vary(batching_.sample(epoch, b, slot), input);
+    if (data_.may_vary(indices_[slot])) objective_->vary(batching_.sample(epoch, b, slot), input);
     data_.target(indices_[slot], lane.batch.targets.values().subspan(n * target_size, target_size));
   }
 }
@@ -180,7 +182,22 @@ void Trainer::save(const std::string& path, std::map<std::string, std::string> m
 }
 
 void Trainer::save_model(const std::string& path, std::map<std::string, std::string> metadata) const {
-  write_checkpoint(path, model().parameters(), full(std::move(metadata)));
+  write_checkpoint(path, model().parameters(), full(std::move(metadata)), novelty());
+}
+
+// Of an even sample of the training examples, as they are: augmentation hides what is to be noticed.
+std::vector<StoredTensor> Trainer::novelty() const {
+  constexpr std::size_t kMostSamples = 20'000;
+  const auto latents = static_cast<std::size_t>(objective_->latents());
+  if (latents == 0) return {};
+  const std::vector<std::uint32_t> chosen = spread(train_, kMostSamples);
+  if (chosen.size() <= latents) return {};
+  Tensor all(Shape{static_cast<Dim>(chosen.size()), static_cast<Dim>(latents)});
+  for_each_output(model(), data_, chosen, [&](const EvaluatedBatch& b) {
+    std::ranges::copy(b.latents, all.values().subspan(b.first * latents).begin());
+    return true;
+  });
+  return Novelty(all).stored();
 }
 
 void Trainer::restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata) {

@@ -62,7 +62,8 @@ class Trainer {
   /// Model and training state, a checkpoint like any other with "optimizer." tensors besides. Throws
   /// FileError.
   void save(const std::string& path, std::map<std::string, std::string> metadata) const;
-  /// The model alone, with the same metadata. Throws FileError.
+  /// The model alone, with the same metadata, and, where it has latents, the Novelty of its training
+  /// examples. Throws FileError.
   void save_model(const std::string& path, std::map<std::string, std::string> metadata) const;
   /// Continues where the saved trainer stood. Throws std::runtime_error when the file holds no training
   /// state, or was made with other settings or data (naming the difference); nothing is changed then.
@@ -89,9 +90,11 @@ class Trainer {
   void draw_noise(Lane& lane) const;
   void look_for_collapse(StepReport& report);
   void check_finite(const LossTerms& terms) const;
+  std::vector<StoredTensor> novelty() const;
   std::map<std::string, std::string> full(std::map<std::string, std::string> metadata) const;
 
   const Examples& data_;
+  std::vector<std::uint32_t> train_;
   std::unique_ptr<Objective> objective_;
   Batching batching_;
   TrainingState state_;

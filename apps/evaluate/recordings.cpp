@@ -1,5 +1,6 @@
 #include "apps/evaluate/recordings.h"
 
+#include <cmath>
 #include <optional>
 
 #include "apps/common/measure.h"
@@ -7,6 +8,7 @@
 #include "apps/evaluate/exports.h"
 #include "apps/evaluate/felt.h"
 #include "apps/evaluate/scoring.h"
+#include "apps/evaluate/trust.h"
 #include "data/scores/metrics.h"
 #include "io/numbers.h"
 #include "io/text.h"
@@ -20,7 +22,7 @@ WindowSet load_windows(const Arguments& a, const ModelFile& file) {
   return WindowSet::load(a.text("data"), plates, file.windows());
 }
 
-std::string row(const std::string& name, const ContactMetrics& metrics, const Latency& latency) {
+std::string row(const std::string& name, const ZoneMetrics& metrics, const Latency& latency) {
   const Metrics c = metrics.contact(), all = metrics.all();
   const auto number = [](double value, int decimals) { return cell(format(value, decimals), 9); };
   return name + std::string(name.size() < 12 ? 12 - name.size() : 0, ' ') + number(c.ssim, 3) +
@@ -30,29 +32,52 @@ std::string row(const std::string& name, const ContactMetrics& metrics, const La
 
 /// The scores of the network and of every baseline over the same windows.
 struct Scores {
-  Scores(const WindowSet& windows, std::size_t methods) : felt(windows) {
+  Scores(const WindowSet& windows, const ModelFile& model, std::size_t methods)
+      : felt(windows), trust(windows, model) {
     for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
   }
-  std::vector<ContactMetrics> of_method;
+  std::vector<ZoneMetrics> of_method;
   FeltScores felt;
+  TrustScores trust;
 };
 
-Scores score_all(const Arguments& a, const Committee& network, const WindowSet& windows, const Scored& scored,
-                 const Baselines& baselines, OutputsFile* outputs) {
-  Scores scores(windows, 1 + baselines.size());
+Scores score_all(const Arguments& a, std::span<const ModelFile> files, const WindowSet& windows,
+                 const Scored& scored, const Baselines& baselines, OutputsFile* outputs) {
+  const Committee network(files);
+  Scores scores(windows, files.front(), 1 + baselines.size());
   draw_all(a, network, windows, scored.split.test, baselines, [&](const Drawn& d) {
-    for (std::size_t m = 0; m < d.pictures.size(); ++m) scores.of_method[m].add(d.pictures[m], d.target);
+    const Zone zone = windows.zone(d.example);
+    for (std::size_t m = 0; m < d.pictures.size(); ++m)
+      scores.of_method[m].add(d.pictures[m], d.target, zone);
     scores.felt.add(d.example, d.pictures[0], d.target);
+    scores.trust.add(d.example, d.pictures[0], d.target, d.spread, d.latents);
     if (outputs != nullptr) outputs->add(windows.window(d.example), d.pictures[0], d.target);
   });
   return scores;
 }
 
+/// What was drawn where nothing is, and not drawn where something is.
+std::vector<std::string> silence_lines(const ZoneMetrics& metrics) {
+  std::vector<std::string> lines;
+  const auto add = [&](const std::string& where, const Metrics& m) {
+    if (m.windows > 0)
+      lines.push_back(where + ": " + format(100 * m.ghost_rate, 2) + " % of " + std::to_string(m.windows) +
+                      " pictures show what is not there, PSNR " + format(m.psnr_mean_db, 1) + " dB");
+  };
+  add("flat", metrics.flat());
+  add("air", metrics.air());
+  if (std::isfinite(metrics.contact().miss_rate))
+    lines.push_back("in contact " + format(100 * metrics.contact().miss_rate, 2) +
+                    " % show nothing of what is there");
+  return lines;
+}
+
 nlohmann::ordered_json report(const Arguments& a, const Committee& network, const WindowSet& windows,
                               const Scored& scored, const Baselines& baselines, const Scores& scores) {
-  const ContactMetrics& own = scores.of_method.front();
+  const ZoneMetrics& own = scores.of_method.front();
   nlohmann::ordered_json result = own.to_json();
   result["felt"] = scores.felt.to_json();
+  result["trust"] = scores.trust.to_json();
   a.print("split " + scored.split_name + ", seed " + std::to_string(scored.seed) + ", " +
           std::to_string(own.all().windows) + " windows, " + std::to_string(own.contact().windows) +
           " in contact");
@@ -70,7 +95,9 @@ nlohmann::ordered_json report(const Arguments& a, const Committee& network, cons
     latencies[name] = l.to_json();
     result["baselines"][name] = scores.of_method[k + 1].to_json();
   }
+  for (const std::string& line : silence_lines(own)) a.print(line);
   for (const std::string& line : scores.felt.lines()) a.print(line);
+  for (const std::string& line : scores.trust.lines()) a.print(line);
   result["latency"] = latencies;
   result["model"] = a.text("model");
   result["data"] = windows.fingerprint();
@@ -86,7 +113,7 @@ int evaluate_on_recordings(const Arguments& a) {
   const Committee network(files);
   Scored scored = scored_of(a, files.front(), {"window", "pass", "trial", "texture", "none"});
   const WindowSet windows = load_windows(a, files.front());
-  scored.split = make_split(windows, split_kind(scored.split_name), scored.seed);
+  scored.split = make_split(windows, split_kind(scored.split_name), scored.seed, scored.leave_out);
   check_scored(a, files, scored);
 
   std::optional<OutputFolder> pictures, pairs;
@@ -99,7 +126,7 @@ int evaluate_on_recordings(const Arguments& a) {
   OutputsFile outputs(windows.array(), windows.frames(), windows.image());
   const Baselines baselines = fit_baselines(windows, scored.split.train);
   const Scores scores =
-      score_all(a, network, windows, scored, baselines, a.given("outputs") ? &outputs : nullptr);
+      score_all(a, files, windows, scored, baselines, a.given("outputs") ? &outputs : nullptr);
   const nlohmann::ordered_json result = report(a, network, windows, scored, baselines, scores);
   if (pictures) {
     write_pictures(network, windows, scored.split.test, *pictures);

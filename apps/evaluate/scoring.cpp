@@ -32,6 +32,7 @@ void refuse_leak(const std::vector<ModelFile>& files, const std::string& split_n
 Scored scored_of(const Arguments& a, const ModelFile& file, const std::vector<std::string>& names) {
   return {a.given("split") ? a.choice("split", names) : file.metadata_or("split", "none"),
           a.given("seed") ? a.seed() : parse_uint(file.metadata_or("seed", "0")).value_or(0),
+          file.metadata_or("leave_out", ""),
           {}};
 }
 
@@ -51,7 +52,7 @@ void draw_all(const Arguments& a, const Committee& network, const Examples& exam
   Progress progress(a, "evaluating", test.size(), "pictures");
   for_each_output(network, examples, test, [&](const EvaluatedBatch& b) {
     for (std::size_t n = 0; n < b.size(); ++n) {
-      Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}};
+      Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.spread(n), b.latent(n)};
       for (std::size_t k = 0; k < baselines.size(); ++k) {
         baselines[k]->predict(b.input(n), plain[k]);
         drawn.pictures.push_back(plain[k]);

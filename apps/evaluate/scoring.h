@@ -18,7 +18,8 @@ namespace supertac {
 struct Scored {
   std::string split_name;
   std::uint64_t seed = 0;
-  Split split;  ///< its test side is scored, the baselines are fitted to its training side
+  std::string leave_out;  ///< of split texture, the plate that is tested; "" = drawn with the seed
+  Split split;            ///< its test side is scored, the baselines are fitted to its training side
 };
 
 /// --split, one of `names`, and --seed, or the model's own; the split itself is left to the caller.
@@ -33,6 +34,7 @@ struct Drawn {
   std::uint32_t example;
   std::span<const float> target;
   std::vector<std::span<const float>> pictures;
+  std::span<const float> spread, latents;  ///< of the network's; empty where it has none
 };
 
 /// Draws the test side in order, with a progress bar. Throws Interrupted after a signal.

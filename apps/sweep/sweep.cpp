@@ -74,7 +74,7 @@ void Sweep::measure(const GridPoint& point, const std::string& label) {
   TrainingRun training(a_, std::move(task),
                        {.out = out, .force = true, .resume = fs::exists(state) ? state : "", .label = label});
   if (!training.train()) throw Interrupted();
-  const ContactMetrics scores = score(training.trainer().model(), windows, to_score, interrupted);
+  const ZoneMetrics scores = score(training.trainer().model(), windows, to_score, interrupted);
   stop_if_interrupted();
   table_.add(row(point, training, scores));
   fs::remove(state);  // nothing is left to resume
@@ -105,7 +105,7 @@ const WindowSet& Sweep::windows_of(const SuperTacSettings& model) {
 }
 
 nlohmann::ordered_json Sweep::row(const GridPoint& point, const TrainingRun& training,
-                                  const ContactMetrics& scores) const {
+                                  const ZoneMetrics& scores) const {
   const Network& model = training.trainer().model();
   SuperTacSettings s = point.model;
   set_array(s, windows_->array());

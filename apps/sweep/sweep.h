@@ -33,7 +33,7 @@ class Sweep {
   std::vector<std::uint32_t> windows_to_score(const WindowSet& windows, const Split& split) const;
   const WindowSet& windows_of(const SuperTacSettings& model);
   nlohmann::ordered_json row(const GridPoint& point, const TrainingRun& training,
-                             const ContactMetrics& scores) const;
+                             const ZoneMetrics& scores) const;
 
   const Arguments& a_;
   SweepTable& table_;

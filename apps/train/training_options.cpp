@@ -1,5 +1,9 @@
 #include "apps/train/training_options.h"
 
+#include "data/samples/random_passes.h"
+#include "io/numbers.h"
+#include "models/interval.h"
+
 namespace supertac {
 
 void declare_training(Arguments& a) {
@@ -20,6 +24,13 @@ void declare_training(Arguments& a) {
 void declare_window_training(Arguments& a) {
   a.option("plates", "A,B,...", "only recordings of these plates (default: all)");
   a.option("stride", "N", "take every N-th window of a pass", "1");
+  a.option(
+      "random-plates", "N",
+      "also train on N simulated passes, each over a random plate, so that plates are felt that were never "
+      "trained on",
+      "0");
+  a.option("leave-out", "PLATE",
+           "with --split texture: the plate that is tested (default: drawn with the seed)");
   a.more();
   a.option(
       "rate", "HZ",
@@ -37,6 +48,11 @@ void declare_window_training(Arguments& a) {
            "trials; none",
            "standard");
   a.option("also", "DIR", "more recordings to train on, never tested: simulated ones, say");
+  a.option("interval-factor", "X",
+           "half the width of a pixel's 90 % interval in units of its spread, as supertac-evaluate finds it "
+           "on passes "
+           "that the network has not seen",
+           format(kIntervalFactor));
   a.option("grouping", "NAME", "taxels of one VAE: horizontal (rows) or vertical (columns)", "horizontal");
   a.option("beta", "X", "weight of the KL divergence", "0.001");
   a.option("autoencoder", "NAME",
@@ -74,7 +90,10 @@ double training_rate_hz(const Arguments& a, const SuperTacSettings& model) {
 }
 
 SplitKind training_split(const Arguments& a) {
-  return split_kind(a.choice("split", {"window", "pass", "trial", "texture", "none"}));
+  const SplitKind split = split_kind(a.choice("split", {"window", "pass", "trial", "texture", "none"}));
+  if (a.given("leave-out") && split != SplitKind::texture)
+    throw UsageError("--leave-out needs --split texture, found --split " + a.text("split"));
+  return split;
 }
 
 Scaling training_scaling(const Arguments& a) {
@@ -86,6 +105,17 @@ Scaling training_scaling(const Arguments& a) {
           .levelled = a.choice("scaling", {"levelled", "fixed"}) == "levelled"};
 }
 
+// Of the recordings that are tested; the rig's when they differ.
+static double common_speed(const WindowSet& windows) {
+  double speed = 0;
+  for (const WindowSet::Pass& pass : windows.passes()) {
+    if (pass.windows == 0 || pass.aside || pass.speed_mm_s <= 0) continue;
+    if (speed > 0 && pass.speed_mm_s != speed) return rig::kSlideMmS;
+    speed = pass.speed_mm_s;
+  }
+  return speed > 0 ? speed : rig::kSlideMmS;
+}
+
 WindowSet training_windows(const Arguments& a, const SuperTacSettings& model) {
   WindowSettings w;
   w.timesteps = static_cast<int>(model.timesteps);
@@ -95,6 +125,11 @@ WindowSet training_windows(const Arguments& a, const SuperTacSettings& model) {
   w.stride = static_cast<int>(a.integer("stride", 1, 100'000));
   WindowSet windows = WindowSet::load(a.text("data"), a.list("plates"), w);
   if (a.given("also")) windows.add_directory(a.text("also"), {}, true);
+  const RandomPasses random{.count = static_cast<std::size_t>(a.integer("random-plates", 0, 50'000)),
+                            .seed = a.seed(),
+                            .speed_mm_s = common_speed(windows),
+                            .filter_s = windows.filter_s().value_or(rig::kFilterS)};
+  add_random_passes(windows, random);
   return windows;
 }
 

@@ -1,6 +1,7 @@
 #include "apps/train/training_task.h"
 
 #include "apps/train/training_options.h"
+#include "io/numbers.h"
 
 namespace supertac {
 namespace {
@@ -19,11 +20,15 @@ TrainingTask window_task(const Arguments& a, const WindowSet& windows, const Tra
   const std::string name = a.text("split");
   TrainingTask task{.examples = windows,
                     .unit = "windows",
-                    .split = make_split(windows, training_split(a), settings.seed),
+                    .split = make_split(windows, training_split(a), settings.seed, a.text("leave-out")),
                     .objective = window_objective(windows, settings)};
   task.origin = origin_of(name, settings.seed, windows, task.split);
   task.origin["plates"] = a.text("plates");
   task.origin["stride"] = a.text("stride");
+  if (a.given("interval-factor"))
+    task.origin["interval_factor"] = format(a.number("interval-factor", 0.1, 100));
+  if (a.given("leave-out")) task.origin["leave_out"] = a.text("leave-out");
+  if (a.given("random-plates")) task.origin["random_plates"] = a.text("random-plates");
   const Leakage leakage = find_leakage(windows, task.split);
   task.about = {{"test_windows_sharing_frames", leakage.overlapping},
                 {"test_windows_duplicated", leakage.duplicated},

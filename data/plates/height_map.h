@@ -4,12 +4,13 @@
 #include <vector>
 
 #include "data/plates/stl.h"
+#include "data/plates/surface.h"
 
 namespace supertac {
 
 /// The upper surface of a model read from triangles, on a grid, as a surface to slide over. z = 0 is its flat
 /// part, taken as the median height along its outline; what is less than 1 um from it counts as flat.
-class HeightMap {
+class HeightMap : public Surface {
  public:
   static constexpr double kCellMm = 0.125;  ///< spacing of the grid, a third of a pixel of 32 a side
 
@@ -22,18 +23,18 @@ class HeightMap {
             const std::string& name);
 
   /// Bilinear between the nodes; 0 outside.
-  double height(double x_mm, double y_mm) const;
+  double height(double x_mm, double y_mm) const override;
 
-  double max_height() const { return max_height_; }
-  double min_height() const { return min_height_; }
+  double max_height() const override { return max_height_; }
+  double min_height() const override { return min_height_; }
   /// First and last y at which something differs from the flat part; the middle when nothing does.
-  double texture_begin() const { return texture_begin_; }
-  double texture_end() const { return texture_end_; }
+  double texture_begin() const override { return texture_begin_; }
+  double texture_end() const override { return texture_end_; }
   /// True when no height differs by more than 0.05 mm from the mean of its row.
-  bool uniform_in_x() const { return uniform_in_x_; }
+  bool uniform_in_x() const override { return uniform_in_x_; }
   /// Where the mean height over x, as a function of y, stays above half its maximum: the middle of each such
   /// stretch's highest part. Elements that run into each other above half their height count as one.
-  std::vector<double> crests() const;
+  std::vector<double> crests() const override;
 
  private:
   std::size_t columns_ = 0, rows_ = 0;

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "data/plates/height_map.h"
+#include "data/plates/random_plate.h"
 #include "io/same_bits.h"
 
 namespace supertac {
@@ -70,7 +72,7 @@ double distance_to_nearest(double at, double first, double pitch, int count) {
   throw std::invalid_argument("plate \"" + name + "\": " + why +
                               "; expected a rig plate such as 3_Bumps, or plain, or " + words +
                               " with a pitch in mm such as bumps12 or ridges6h1.5, several joined by +, or "
-                              "an STL file");
+                              "random and a number, or an STL file");
 }
 
 // Reads a number at the front of `text` and removes it.
@@ -118,7 +120,8 @@ bool Plate::is_file(const std::string& name) { return name.ends_with(".stl") || 
 Plate Plate::named(const std::string& name) {
   if (is_file(name))
     return {std::filesystem::path(name).filename().string(),
-            HeightMap(read_stl(name), kWidthMm, kLengthMm, name)};
+            std::make_shared<const HeightMap>(read_stl(name), kWidthMm, kLengthMm, name)};
+  if (const auto number = random_plate_number(name)) return random_plate(*number);
   const std::string generic = generic_name(name);
   std::vector<Texture> textures;
   for (std::size_t begin = 0; begin <= generic.size();) {
@@ -153,13 +156,13 @@ Plate::Plate(std::string name, const std::vector<Texture>& textures) : name_(std
   }
 }
 
-Plate::Plate(std::string name, HeightMap map)
+Plate::Plate(std::string name, std::shared_ptr<const Surface> surface)
     : name_(std::move(name)),
-      map_(std::make_shared<const HeightMap>(std::move(map))),
-      max_height_(map_->max_height()),
-      min_height_(map_->min_height()),
-      texture_begin_(map_->texture_begin()),
-      texture_end_(map_->texture_end()) {}
+      surface_(std::move(surface)),
+      max_height_(surface_->max_height()),
+      min_height_(surface_->min_height()),
+      texture_begin_(surface_->texture_begin()),
+      texture_end_(surface_->texture_end()) {}
 
 Plate::Band Plate::lay_out(const Texture& texture, const TextureKind& kind) {
   Band band{.texture = texture, .kind = &kind};
@@ -181,14 +184,14 @@ double Plate::Band::height(double x_mm, double y_mm) const {
 }
 
 double Plate::height(double x_mm, double y_mm) const {
-  if (map_) return map_->height(x_mm, y_mm);
+  if (surface_) return surface_->height(x_mm, y_mm);
   double z = 0;  // textures do not overlap, so at most one term differs from 0
   for (const Band& band : bands_) z += band.height(x_mm, y_mm);
   return z;
 }
 
 std::vector<double> Plate::crests() const {
-  if (map_) return map_->crests();
+  if (surface_) return surface_->crests();
   std::vector<double> crests;
   for (const Band& band : bands_)
     for (int i = 0; i < band.count_y; ++i) crests.push_back(band.first_y + i * band.texture.pitch_mm);
@@ -196,8 +199,14 @@ std::vector<double> Plate::crests() const {
   return crests;
 }
 
+std::vector<Texture> Plate::textures() const {
+  std::vector<Texture> textures;
+  for (const Band& band : bands_) textures.push_back(band.texture);
+  return textures;
+}
+
 bool Plate::uniform_in_x() const {
-  if (map_) return map_->uniform_in_x();
+  if (surface_) return surface_->uniform_in_x();
   return std::all_of(bands_.begin(), bands_.end(), [](const Band& b) { return b.kind->lines; });
 }
 

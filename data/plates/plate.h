@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "data/plates/height_map.h"
+#include "data/plates/surface.h"
 #include "hardware/rig.h"
 
 namespace supertac {
@@ -29,7 +29,8 @@ class Plate {
 
   /// A plate by name. Plates of the rig (RIG plates): 3_Bumps, 6_Bumps, 4_Ridges, 6_Ridges, 4_Waves,
   /// 6_Waves, 4_Blob, 6_Blob. Others: "plain", or KIND PITCH [h HEIGHT] in mm ("bumps12", "ridges6h1.5"), or
-  /// several joined by '+', which share the length equally ("bumps12+ridges4"). Default height
+  /// several joined by '+', which share the length equally ("bumps12+ridges4"), or "random" and a number, the
+  /// plate that random_plate() draws for it. Default height
   /// rig::kTextureHeightMm, for round elements (bumps, blobs) at most pitch / 2. Or the path of an STL file
   /// of a plate's size (data/plates/height_map.h), whose plate has the file's name without folders. Throws
   /// std::invalid_argument naming the part that could not be read; FileError for an STL file.
@@ -41,8 +42,8 @@ class Plate {
   /// Throws std::invalid_argument when pitch or height are not positive or do not fit.
   Plate(std::string name, const std::vector<Texture>& textures);
 
-  /// A plate that is no texture but a map, of kWidthMm x kLengthMm.
-  Plate(std::string name, HeightMap map);
+  /// A plate of kWidthMm x kLengthMm that is no row of textures.
+  Plate(std::string name, std::shared_ptr<const Surface> surface);
 
   /// Surface height z (mm) at (x, y); negative in the troughs of waves, 0 outside the texture.
   double height(double x_mm, double y_mm) const;
@@ -63,6 +64,8 @@ class Plate {
   bool uniform_in_x() const;
 
   const std::string& name() const { return name_; }
+  /// Regular textures, one after the other; empty for a Surface.
+  std::vector<Texture> textures() const;
 
  private:
   struct Band {  // one texture with its layout worked out
@@ -77,7 +80,7 @@ class Plate {
 
   std::string name_;
   std::vector<Band> bands_;
-  std::shared_ptr<const HeightMap> map_;  // instead of bands
+  std::shared_ptr<const Surface> surface_;  // instead of bands
   double max_height_ = 0, min_height_ = 0, texture_begin_ = 0, texture_end_ = 0;
 };
 

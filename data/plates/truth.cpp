@@ -1,14 +1,16 @@
 #include "data/plates/truth.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace supertac {
 
 double truth_value(const Plate& plate, double x_mm, double y_mm) {
-  const double range = plate.max_height() - plate.min_height();
-  return range > 0 ? (plate.height(x_mm, y_mm) - plate.min_height()) / range : 0.0;
+  const double scale = std::max(plate.max_height(), -plate.min_height());
+  return scale > 0 ? plate.height(x_mm, y_mm) / scale : 0.0;
 }
 
 void truth_image(const Plate& plate, double x_mm, double y_mm, const ImageGrid& grid,
@@ -32,8 +34,20 @@ void truth_image(const Plate& plate, double x_mm, double y_mm, const ImageGrid& 
   }
 }
 
+Zone zone_of(const Plate& plate, double x_mm, double y_mm, const ImageGrid& grid) {
+  constexpr double kAroundMm = 3;
+  const auto around = static_cast<int>(std::lround(kAroundMm / grid.pixel_mm));
+  const ImageGrid larger{grid.height + 2 * around, grid.width + 2 * around, grid.pixel_mm};
+  std::vector<float> image(larger.pixels());
+  truth_image(plate, x_mm, y_mm, larger, image);
+  if (!in_contact(image)) return Zone::flat;
+  image.resize(grid.pixels());
+  truth_image(plate, x_mm, y_mm, grid, image);
+  return in_contact(image) ? Zone::contact : Zone::near;
+}
+
 bool in_contact(std::span<const float> truth) {
-  return std::any_of(truth.begin(), truth.end(), [](float v) { return v > 0; });
+  return std::any_of(truth.begin(), truth.end(), [](float v) { return v != 0; });
 }
 
 }  // namespace supertac

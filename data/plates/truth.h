@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 
 #include "data/plates/plate.h"
@@ -7,8 +8,9 @@
 
 namespace supertac {
 
-/// Height scaled to [0,1] by the plate: (z - min_height) / (max_height - min_height), which is z / h for
-/// ridges, bumps and blobs, (z + h) / 2h for waves, and 0 everywhere on a plain plate.
+/// Height by the plate's own scale: z / max(max_height, -min_height). 0 is the flat plate, whatever else is
+/// on it, 1 its highest point; the troughs of waves are negative. How deep the finger is pressed is not
+/// known, so millimetres cannot be felt (measured: bench/results/README.md).
 double truth_value(const Plate& plate, double x_mm, double y_mm);
 
 /// The plate under the finger as an image [height][width] of truth_value at the centres of its pixels:
@@ -17,7 +19,19 @@ double truth_value(const Plate& plate, double x_mm, double y_mm);
 /// Throws std::invalid_argument when a side is below 1 or image does not hold height * width elements.
 void truth_image(const Plate& plate, double x_mm, double y_mm, const ImageGrid& grid, std::span<float> image);
 
-/// A frame is in contact when its truth has a pixel above 0.
+/// Where the finger is, as far as its picture is concerned. Scores are reported for each apart: a flat
+/// picture is easy where nothing is, and what is drawn there is a ghost.
+enum class Zone : std::uint8_t {
+  contact,  ///< the picture holds texture
+  near,     ///< it holds none, but the 3 mm around it do: the finger may feel some
+  flat,     ///< on the plate, far from texture
+  air,      ///< lifted clear of the plate
+};
+
+/// Of a finger on the plate at (x, y): contact, near or flat.
+Zone zone_of(const Plate& plate, double x_mm, double y_mm, const ImageGrid& grid);
+
+/// A frame is in contact when its truth has a pixel that is not 0.
 bool in_contact(std::span<const float> truth);
 
 }  // namespace supertac

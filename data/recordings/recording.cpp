@@ -31,6 +31,8 @@ std::optional<std::string> problem_of(const Recording& recording) {
   if (!recording.position_mm.empty() && recording.position_mm.size() != n * 2) {
     return sizes("position_mm", recording.position_mm.size(), n * 2);
   }
+  if (!recording.lift_mm.empty() && recording.lift_mm.size() != n)
+    return sizes("lift_mm", recording.lift_mm.size(), n);
   for (std::size_t i = 0; i < n; ++i) {
     if (!std::isfinite(recording.time_s[i])) return "time_s is not finite at frame " + std::to_string(i);
     if (i > 0 && recording.time_s[i] <= recording.time_s[i - 1]) {
@@ -50,6 +52,8 @@ std::optional<std::string> problem_of(const Recording& recording) {
   if (std::any_of(recording.position_mm.begin(), recording.position_mm.end(), infinite)) {
     return "position_mm is infinite";
   }
+  if (!std::all_of(recording.lift_mm.begin(), recording.lift_mm.end(), finite))
+    return "lift_mm is not finite";
   if (recording.trial < 0 || recording.pass < 0) return "trial and pass must not be negative";
   if (!std::isfinite(recording.speed_mm_s) || recording.speed_mm_s < 0) return "speed_mm_s must be 0 or more";
   return std::nullopt;
@@ -135,6 +139,10 @@ Recording read_recording(const std::string& path) {
     recording.position_mm = file.f32("position_mm");
     check_shape(file, "position_mm", {n, 2});
   }
+  if (file.tensors().contains("lift_mm")) {
+    recording.lift_mm = file.f32("lift_mm");
+    check_shape(file, "lift_mm", {n});
+  }
   if (const auto problem = problem_of(recording))
     throw FileError(path, *problem + "; record or import it again");
   return recording;
@@ -172,6 +180,8 @@ void write_recording(const std::string& path, const Recording& recording) {
   if (!recording.position_mm.empty()) {
     tensors.push_back({"position_mm", "F32", {n, 2}, std::as_bytes(std::span(recording.position_mm))});
   }
+  if (!recording.lift_mm.empty())
+    tensors.push_back({"lift_mm", "F32", {n}, std::as_bytes(std::span(recording.lift_mm))});
   write_safetensors(path, std::move(metadata), tensors);
 }
 

@@ -15,6 +15,7 @@ struct Recording {
   std::vector<float> volts;    ///< n x array.signals(), a frame together; pressure lowers the voltage
   std::vector<float>
       position_mm;  ///< n x 2: (x, y) of the finger's centre on the plate; empty, or NaN where unknown
+  std::vector<float> lift_mm;  ///< n: how far the finger is above its slide; empty: it slides throughout
   TaxelArray array;
   std::string plate;                            ///< name as Plate::named takes it
   int trial = 0, pass = 0;                      ///< from 1
@@ -28,11 +29,11 @@ struct Recording {
 };
 
 /// Reads a safetensors file with tensors time_s F64 [n], volts F32 [n,signals] and, where known,
-/// position_mm F32 [n,2]. Metadata "array" says what the signals are, {"rows": 6, "columns": 6, "pitch_mm":
-/// 2, "channels": 1}; without it they are the rig's 4x4 taxels at 3 mm.
-/// Throws FileError when the file is damaged (io/safetensors.h), is no recording, or breaks a rule of
-/// Recording: sizes that do not match, values that are not finite (position_mm may be NaN), time stamps that
-/// do not increase.
+/// position_mm F32 [n,2] and lift_mm F32 [n]. Metadata "array" says what the signals are, {"rows": 6,
+/// "columns": 6, "pitch_mm": 2, "channels": 1}; without it they are the rig's 4x4 taxels at 3 mm. Throws
+/// FileError when the file is damaged (io/safetensors.h), is no recording, or breaks a rule of Recording:
+/// sizes that do not match, values that are not finite (position_mm may be NaN), time stamps that do not
+/// increase.
 Recording read_recording(const std::string& path);
 
 /// Writes it atomically; the same recording gives the same bytes.

@@ -93,6 +93,7 @@ class Segment {
   void append_position(Track& track, double at, std::size_t& before) const {
     if (recording_.position_mm.empty()) {
       track.position_mm.insert(track.position_mm.end(), 2, kUnknown);
+      track.lift_mm.push_back(0);
       return;
     }
     while (before + 1 < usable_.size() && time(before + 1) <= at) ++before;
@@ -104,6 +105,9 @@ class Segment {
       const double b = recording_.position_mm[2 * usable_[after] + axis];
       track.position_mm.push_back(static_cast<float>(part > 0 ? a + part * (b - a) : a));
     }
+    const std::vector<float>& lift = recording_.lift_mm;
+    track.lift_mm.push_back(
+        lift.empty() ? 0 : std::lerp(lift[usable_[before]], lift[usable_[after]], static_cast<float>(part)));
   }
 
   const Recording& recording_;

@@ -42,6 +42,7 @@ constexpr double kCellSlack = 1e-6;
 struct Track {
   std::vector<float> samples;      ///< [frames][signals], scaled
   std::vector<float> position_mm;  ///< [frames][2] (x, y), NaN where unknown
+  std::vector<float> lift_mm;      ///< [frames], as Recording's; 0 where it has none
   std::vector<std::uint32_t>
       run;                  ///< [frames]: frames since the pass began or since the last gap, itself included
   std::size_t held = 0;     ///< frames for which no sample arrived: they repeat the one before

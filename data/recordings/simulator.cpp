@@ -11,23 +11,21 @@
 namespace supertac {
 namespace {
 
-constexpr double kOnsetS = 0.15, kReleaseS = 0.1, kRepositionS = 0.05;
+constexpr double kLiftS = rig::kLiftMm / rig::kLiftMmS;  // of onset and of release
 
-// The finger's path through the four phases.
-FingerPose pose_at(double t, const PassSettings& pass, double slide_z) {
-  const double slide_s = (pass.to_mm - pass.from_mm) / pass.speed_mm_s;
-  FingerPose pose{.x_mm = rig::pass_x_mm(pass.pass), .y_mm = pass.from_mm, .z_mm = slide_z};
-  if (t < kOnsetS) {
-    pose.z_mm += rig::kLiftMmS * (kOnsetS - t);
-    return pose;
-  }
-  t -= kOnsetS;
-  pose.y_mm = std::min(pass.from_mm + pass.speed_mm_s * t, pass.to_mm);
-  if (t <= slide_s) return pose;
-  t -= slide_s;
-  pose.z_mm += rig::kLiftMmS * std::min(t, kReleaseS);
-  if (t > kReleaseS) pose.x_mm += rig::kPassShiftMm * (t - kReleaseS) / kRepositionS;
-  return pose;
+double slide_s(const PassSettings& pass) { return (pass.to_mm - pass.from_mm) / pass.speed_mm_s; }
+double return_s(const PassSettings& pass) { return (pass.to_mm - pass.from_mm) / rig::kFastestMmS; }
+
+// The finger's path through the four phases; z_mm is above the slide.
+FingerPose pose_at(double t, const PassSettings& pass) {
+  const double since_release = t - kLiftS - slide_s(pass);
+  const double down = std::clamp(t / kLiftS, 0.0, 1.0),
+               slid = std::clamp((t - kLiftS) / slide_s(pass), 0.0, 1.0);
+  const double up = std::clamp(since_release / kLiftS, 0.0, 1.0);
+  const double back = std::clamp((since_release - kLiftS) / return_s(pass), 0.0, 1.0);
+  return {.x_mm = rig::pass_x_mm(pass.pass) + rig::kPassShiftMm * back,
+          .y_mm = pass.from_mm + (pass.to_mm - pass.from_mm) * (slid - back),
+          .z_mm = rig::kLiftMm * (1 - down + up)};
 }
 
 void check(const PassSettings& pass, const SimulatorSettings& settings) {
@@ -86,7 +84,7 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
   check(pass, settings);
   const FingerModel finger(
       plate, settings, {.seed = seed, .trial = pass.trial, .pass = pass.pass, .speed_mm_s = pass.speed_mm_s});
-  const double duration = kOnsetS + (pass.to_mm - pass.from_mm) / pass.speed_mm_s + kReleaseS + kRepositionS;
+  const double duration = 2 * kLiftS + slide_s(pass) + return_s(pass);
   const auto frames = static_cast<std::size_t>(std::floor(duration * settings.rate_hz + 0.5));
   // Timing faults have a stream of their own for each pass, so that a loss in one pass does not move
   // another's.
@@ -98,18 +96,21 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
   for (std::size_t i = 0; i < frames; ++i) {
     const double stamp = static_cast<double>(i) / settings.rate_hz;
     const double taken = stamp + (settings.with_jitter ? settings.jitter_s * timing.normal(2 * i) : 0.0);
-    std::vector<double> volts = finger.volts(pose_at(taken, pass, finger.slide_z_mm()), taken);
+    FingerPose felt = pose_at(taken, pass);
+    felt.z_mm += finger.slide_z_mm();
+    std::vector<double> volts = finger.volts(felt, taken);
     if (settings.with_adc)
       for (double& v : volts) v = rig::volts_of(rig::adc_of(v));
     volts = filter(volts);
     if (settings.with_loss && timing.uniform(2 * i + 1) < settings.lost_fraction) continue;
-    const FingerPose pose = pose_at(stamp, pass, finger.slide_z_mm());
+    const FingerPose pose = pose_at(stamp, pass);
     recording.time_s.push_back(stamp);
     for (const double v : volts)
       recording.volts.push_back(static_cast<float>(
           settings.with_saturation ? std::clamp(v, rig::kFloorVolts, rig::kCeilingVolts) : v));
     recording.position_mm.push_back(static_cast<float>(pose.x_mm));
     recording.position_mm.push_back(static_cast<float>(pose.y_mm));
+    recording.lift_mm.push_back(static_cast<float>(pose.z_mm));
   }
   return recording;
 }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "data/plates/taxel_array.h"
+#include "data/plates/truth.h"
 
 namespace supertac {
 
@@ -28,6 +29,11 @@ class Examples {
   virtual void input(std::size_t i, std::span<float> out) const = 0;
   /// What should be drawn, [height][width] of image().
   virtual void target(std::size_t i, std::span<float> out) const = 0;
+  /// What is scored together. By its target alone an example is in contact or flat.
+  virtual Zone zone(std::size_t i) const;
+  /// Whether training may change the input to imitate other days: where every example is another day, it only
+  /// blurs.
+  virtual bool may_vary(std::size_t) const { return true; }
   /// Examples of one group (a pass, a surface, a day) resemble each other.
   virtual std::int64_t group(std::size_t i) const = 0;
 

@@ -46,7 +46,7 @@ void level(std::span<float> window, std::size_t taxels) {
   float gain = kLeastGain;
   for (std::size_t k = 0; k < taxels; ++k) {
     const Range range = range_of(window, taxels, k);
-    gain = std::max(gain, range.top - range.rest);
+    gain = std::max(gain, range.top - kRestRemoved * range.rest);
     for (std::size_t i = k; i < window.size(); i += taxels) window[i] -= kRestRemoved * range.rest;
   }
   const float factor = 1 / gain;

@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "data/plates/random_plate.h"
 #include "data/samples/batching.h"
 #include "io/hash.h"
 
@@ -62,14 +63,22 @@ std::vector<Side> split_trials(const WindowSet& windows) {
   return sides;
 }
 
-std::vector<Side> split_plates(const WindowSet& windows, std::uint64_t seed) {
+std::vector<Side> split_plates(const WindowSet& windows, std::uint64_t seed, const std::string& leave_out) {
   std::vector<Side> sides(windows.passes().size(), Side::train);
   const auto plates = passes_by_plate(windows);
   if (plates.size() < 2)
     throw std::invalid_argument("split texture: the data has " + std::to_string(plates.size()) +
                                 " plate, needs two: one to train on, one to test on");
-  const auto held_out = std::next(
-      plates.begin(), static_cast<std::ptrdiff_t>(EpochOrder(plates.size(), seed, kPlateStream)[0]));
+  const auto drawn = std::next(plates.begin(),
+                               static_cast<std::ptrdiff_t>(EpochOrder(plates.size(), seed, kPlateStream)[0]));
+  const auto held_out = leave_out.empty() ? drawn : plates.find(leave_out);
+  if (held_out == plates.end())
+    throw std::invalid_argument("split texture: the data has no windows of plate '" + leave_out +
+                                "' to leave out");
+  const Plate& tested = windows.plate(held_out->second.front());
+  for (std::size_t pass = 0; pass < sides.size(); ++pass)
+    if (windows.passes()[pass].windows > 0 && resemble(windows.plate(pass), tested))
+      sides[pass] = Side::neither;
   for (const std::size_t pass : held_out->second) sides[pass] = Side::test;
   return sides;
 }
@@ -190,7 +199,7 @@ std::string name_of(SplitKind kind) {
   throw std::invalid_argument("split: unknown kind");
 }
 
-Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed) {
+Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed, const std::string& leave_out) {
   Split split;
   switch (kind) {
     case SplitKind::window:
@@ -203,7 +212,7 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed) {
       split = split_by_pass(windows, split_trials(windows));
       break;
     case SplitKind::texture:
-      split = split_by_pass(windows, split_plates(windows, seed));
+      split = split_by_pass(windows, split_plates(windows, seed, leave_out));
       break;
     case SplitKind::none:
       for (std::uint32_t i = 0; i < windows.size(); ++i) {

@@ -1,12 +1,12 @@
 #include "data/samples/windows.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <set>
 #include <stdexcept>
 
+#include "data/plates/height_map.h"
 #include "data/plates/plate_file.h"
 #include "data/plates/truth.h"
 #include "data/samples/levelling.h"
@@ -15,7 +15,9 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kLargestImage = std::size_t{16 * 8} * std::size_t{16 * 8};
+// A finger that is pressed as deep as rigs press it is clear of the plate when it is lifted by so much more
+// than the highest element.
+constexpr double kClearanceMm = 1.5;
 
 void check(const WindowSettings& s) {
   const auto fail = [](const std::string& what) { throw std::invalid_argument("windows: " + what); };
@@ -26,9 +28,6 @@ void check(const WindowSettings& s) {
   if (!(s.rate_hz > 0) || !(s.max_gap_s > 0) || !(s.scaling.span_volts > 0))
     fail("rate_hz, max_gap_s and span_volts must be positive, got " + std::to_string(s.rate_hz) + ", " +
          std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span_volts));
-  if (!(s.min_y_mm < s.max_y_mm))
-    fail("min_y_mm must be below max_y_mm, got " + std::to_string(s.min_y_mm) + " and " +
-         std::to_string(s.max_y_mm));
 }
 
 void check_size(const char* what, std::size_t got, std::size_t expected) {
@@ -51,7 +50,7 @@ std::string WindowCounts::summary() const {
   return std::to_string(windows) + " windows from " + std::to_string(frames) + " frames of " +
          std::to_string(recordings) + " recordings" +
          part(unreliable, "in passes with unreliable registration") + part(no_position, "without position") +
-         part(outside, "outside the y range") +
+         part(lifting, "while the finger was lifted or lowered") +
          part(too_early, "too close to the start of a pass or to a gap") +
          part(off_stride, "between strides") + part(held, "held for lack of a sample") + part(gaps, "gaps") +
          part(damaged, "damaged");
@@ -96,18 +95,19 @@ std::size_t WindowSet::plate_index(const std::string& name, const std::string& f
 }
 
 // Whether a window may end at this frame; counts the reason if not.
-bool WindowSet::accept(const Track& track, std::size_t frame, bool reliable) {
+bool WindowSet::accept(const Track& track, std::size_t frame, bool reliable, double clear_mm, int stride) {
   const float x = track.position_mm[2 * frame], y = track.position_mm[2 * frame + 1];
+  const float lift = track.lift_mm[frame];
   std::size_t* reason = nullptr;
   if (!reliable)
     reason = &counts_.unreliable;
   else if (!std::isfinite(x) || !std::isfinite(y))
     reason = &counts_.no_position;
-  else if (y < settings_.min_y_mm || y > settings_.max_y_mm)
-    reason = &counts_.outside;
+  else if (lift > 0 && lift < clear_mm)
+    reason = &counts_.lifting;
   else if (track.run[frame] < static_cast<std::uint32_t>(settings_.timesteps))
     reason = &counts_.too_early;
-  else if (frame % static_cast<std::size_t>(settings_.stride) != 0)
+  else if (frame % static_cast<std::size_t>(stride) != 0)
     reason = &counts_.off_stride;
   else
     reason = &counts_.windows;
@@ -116,6 +116,14 @@ bool WindowSet::accept(const Track& track, std::size_t frame, bool reliable) {
 }
 
 void WindowSet::add(const Recording& recording, const std::string& folder, bool aside) {
+  append(recording, folder, {.aside = aside, .varied = true, .stride = settings_.stride});
+}
+
+void WindowSet::add_one_of_many(const Recording& recording, int stride) {
+  append(recording, ".", {.aside = true, .varied = false, .stride = stride});
+}
+
+void WindowSet::append(const Recording& recording, const std::string& folder, const Use& use) {
   if (!settings_.array) settings_.array = recording.array;
   if (recording.array != array())
     throw std::runtime_error("was recorded with " + recording.array.text() + ", expected " + array().text() +
@@ -134,10 +142,13 @@ void WindowSet::add(const Recording& recording, const std::string& folder, bool 
             .frames = track.frames(),
             .first_window = index_.size(),
             .windows = 0,
-            .aside = aside};
+            .aside = use.aside,
+            .varied = use.varied};
   const auto number = static_cast<std::uint32_t>(passes_.size());
+  const double clear_mm = plates_[plate].max_height() + kClearanceMm;
   for (std::size_t frame = 0; frame < track.frames(); ++frame)
-    if (accept(track, frame, reliable)) index_.push_back({number, static_cast<std::uint32_t>(frame)});
+    if (accept(track, frame, reliable, clear_mm, use.stride))
+      index_.push_back({number, static_cast<std::uint32_t>(frame)});
   pass.windows = index_.size() - pass.first_window;
   ++counts_.recordings;
   counts_.frames += track.frames();
@@ -146,6 +157,7 @@ void WindowSet::add(const Recording& recording, const std::string& folder, bool 
   counts_.damaged += track.damaged;
   track.samples.shrink_to_fit();
   track.position_mm.shrink_to_fit();
+  track.lift_mm.shrink_to_fit();
   if (pass.windows == 0) track = {};  // nothing will read it
   passes_.push_back(std::move(pass));
   tracks_.push_back(std::move(track));
@@ -178,15 +190,17 @@ WindowSet::Position WindowSet::position(std::size_t i) const {
 
 void WindowSet::truth(std::size_t i, std::span<float> out) const {
   check_size("a truth image", out.size(), image().pixels());
+  if (in_air(i)) return std::fill(out.begin(), out.end(), 0.0F);
   const auto [x, y] = position(i);
   truth_image(plates_[plate_of_[index_[i].pass]], x, y, image(), out);
 }
 
-bool WindowSet::contact(std::size_t i) const {
-  std::array<float, kLargestImage> pixels;
-  const std::span<float> image_of_it = std::span(pixels).first(image().pixels());
-  truth(i, image_of_it);
-  return in_contact(image_of_it);
+// While it is lifted there are no windows.
+bool WindowSet::in_air(std::size_t i) const { return tracks_[index_[i].pass].lift_mm[index_[i].last] > 0; }
+
+Zone WindowSet::zone(std::size_t i) const {
+  const auto [x, y] = position(i);
+  return in_air(i) ? Zone::air : zone_of(plates_[plate_of_[index_[i].pass]], x, y, image());
 }
 
 std::optional<double> WindowSet::filter_s() const {
@@ -215,6 +229,7 @@ std::string WindowSet::fingerprint() const {
     hash.add(passes_[p].trial);
     for (const float v : tracks_[p].samples) hash.add(v);
     for (const float v : tracks_[p].position_mm) hash.add(v);
+    for (const float v : tracks_[p].lift_mm) hash.add(v);
   }
   for (const Entry& entry : index_) hash.add((std::uint64_t{entry.pass} << 32) | entry.last);
   return hash.hex();

@@ -20,10 +20,8 @@ struct WindowSettings {
   double rate_hz = 300;                  ///< the model's rate
   Scaling scaling = {};                  ///< volts to [0,1]
   std::optional<TaxelArray> array = {};  ///< that every recording must have; nothing: that of the first
-  double min_y_mm = 28;                  ///< windows whose last frame lies outside min_y..max_y are left out
-  double max_y_mm = 80;
-  int stride = 1;           ///< every stride-th frame of a pass ends a window
-  double max_gap_s = 0.05;  ///< longer silence in a recording is a gap no window crosses
+  int stride = 1;                        ///< every stride-th frame of a pass ends a window
+  double max_gap_s = 0.05;               ///< longer silence in a recording is a gap no window crosses
 };
 
 /// Where the frames of the recordings went: frames is the sum of all that follow down to windows.
@@ -31,7 +29,7 @@ struct WindowCounts {
   std::size_t recordings = 0, frames = 0;
   std::size_t unreliable = 0;   ///< of passes that registration flagged (metadata registration_reliable = no)
   std::size_t no_position = 0;  ///< position unknown: no truth
-  std::size_t outside = 0;      ///< y outside min_y..max_y
+  std::size_t lifting = 0;      ///< between the plate and the air: what is felt there has no truth
   std::size_t too_early = 0;    ///< fewer than T frames since the pass began or since a gap
   std::size_t off_stride = 0;
   std::size_t windows = 0;
@@ -43,7 +41,7 @@ struct WindowCounts {
 
 /// The windows of a set of recordings. Nothing is copied per window: a recording is resampled once onto
 /// rate_hz and kept as scaled floats, a window is the index (pass, last frame), and none crosses the edge of
-/// a pass or a gap. Memory: 4 bytes per signal of a frame, 12 per frame and 8 per window. Reading is const
+/// a pass or a gap. Memory: 4 bytes per signal of a frame, 16 per frame and 8 per window. Reading is const
 /// and safe from many threads.
 class WindowSet : public Examples {
  public:
@@ -56,6 +54,7 @@ class WindowSet : public Examples {
     std::size_t frames = 0;  ///< on the model's rate
     std::size_t first_window = 0, windows = 0;  ///< its windows are consecutive, in order of time
     bool aside = false;  ///< only ever trained on: no split tests it (simulated passes beside real ones)
+    bool varied = true;  ///< may_vary() of its windows
   };
   struct Position {
     double x_mm = 0, y_mm = 0;
@@ -75,6 +74,9 @@ class WindowSet : public Examples {
   /// Appends the windows of one recording. `folder`: where the recording lies, for a plate that is an
   /// STL file beside it. Throws as plate_in_folder() and resample(), std::runtime_error for another array.
   void add(const Recording& recording, const std::string& folder = ".", bool aside = false);
+  /// The same for one of many passes that differ in everything: set aside, may_vary() is false, every
+  /// stride-th frame ends a window.
+  void add_one_of_many(const Recording& recording, int stride);
   /// Appends those of all recordings in a directory, of these plates (empty: all). Throws as load, but for
   /// the missing windows.
   void add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside = false);
@@ -88,6 +90,7 @@ class WindowSet : public Examples {
   const WindowSettings& settings() const { return settings_; }
   const WindowCounts& counts() const { return counts_; }
   const std::vector<Pass>& passes() const { return passes_; }
+  const Plate& plate(std::size_t pass) const { return plates_[plate_of_[pass]]; }
 
   // i < size() throughout, unchecked: these run for every sample of training.
   // Throws std::invalid_argument when `out` has another size.
@@ -95,13 +98,14 @@ class WindowSet : public Examples {
   void window(std::size_t i, std::span<float> out) const;
   /// The window without copying it, not levelled.
   std::span<const float> window(std::size_t i) const;
-  /// Truth of its last frame, [height][width] of image(), as truth_image.
+  /// Truth of its last frame, [height][width] of image(), as truth_image; 0 in the air.
   void truth(std::size_t i, std::span<float> out) const;
   /// The last frame, [signals].
   std::span<const float> last_frame(std::size_t i) const;
   Position position(std::size_t i) const;
-  /// True when the truth has a pixel above 0.
-  bool contact(std::size_t i) const;
+  Zone zone(std::size_t i) const override;
+  bool may_vary(std::size_t i) const override { return passes_[index_[i].pass].varied; }
+  bool contact(std::size_t i) const { return zone(i) == Zone::contact; }
   std::size_t pass_of(std::size_t i) const { return index_[i].pass; }
   void input(std::size_t i, std::span<float> out) const override { window(i, out); }
   void target(std::size_t i, std::span<float> out) const override { truth(i, out); }
@@ -124,8 +128,14 @@ class WindowSet : public Examples {
   struct Entry {
     std::uint32_t pass, last;
   };
+  struct Use {
+    bool aside, varied;
+    int stride;
+  };
+  void append(const Recording& recording, const std::string& folder, const Use& use);
   std::size_t plate_index(const std::string& name, const std::string& folder);
-  bool accept(const Track& track, std::size_t frame, bool reliable);
+  bool accept(const Track& track, std::size_t frame, bool reliable, double clear_mm, int stride);
+  bool in_air(std::size_t i) const;
 
   WindowSettings settings_;
   WindowCounts counts_;

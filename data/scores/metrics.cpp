@@ -64,13 +64,21 @@ void check_pixels(const char* where, std::size_t got, std::size_t expected) {
 }
 
 using Field = std::pair<const char*, double Metrics::*>;
-constexpr std::array<Field, 7> kFields{{{"psnr_mean_db", &Metrics::psnr_mean_db},
+constexpr std::array<Field, 9> kFields{{{"psnr_mean_db", &Metrics::psnr_mean_db},
                                         {"psnr_pooled_db", &Metrics::psnr_pooled_db},
                                         {"ssim", &Metrics::ssim},
                                         {"phase_correlation", &Metrics::phase_correlation},
                                         {"phase_correlation_floor", &Metrics::phase_correlation_floor},
                                         {"position_error_px", &Metrics::position_error_px},
-                                        {"position_error_mm", &Metrics::position_error_mm}}};
+                                        {"position_error_mm", &Metrics::position_error_mm},
+                                        {"ghost_rate", &Metrics::ghost_rate},
+                                        {"miss_rate", &Metrics::miss_rate}}};
+
+// The value farthest from 0.
+float extent(std::span<const float> image) {
+  const auto [low, high] = std::minmax_element(image.begin(), image.end());
+  return std::max(*high, -*low);
+}
 
 }  // namespace
 
@@ -145,6 +153,11 @@ void MetricsAccumulator::add(std::span<const float> output, std::span<const floa
   mse_ += scores.mse;
   psnr_ += psnr_db(scores.mse);
   ssim_ += scores.ssim;
+  const float there = extent(truth), drawn = extent(output);
+  silent_ += there == 0 ? 1 : 0;
+  ghosts_ += there == 0 && drawn > Metrics::kGhost ? 1 : 0;
+  felt_ += there > Metrics::kFelt ? 1 : 0;
+  misses_ += there > Metrics::kFelt && drawn < Metrics::kGhost ? 1 : 0;
   if (!scores.has_position) return;
   sample(output, truth);
   ++positions_;
@@ -195,6 +208,11 @@ Metrics MetricsAccumulator::result() const {
     metrics.psnr_pooled_db = psnr_db(mse_ / n);
     metrics.ssim = ssim_ / n;
   }
+  const auto share = [](std::uint64_t part, std::uint64_t of) {
+    return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : Metrics::kNone;
+  };
+  metrics.ghost_rate = share(ghosts_, silent_);
+  metrics.miss_rate = share(misses_, felt_);
   if (positions_ > 0) {
     const auto n = static_cast<double>(positions_);
     metrics.phase_correlation = peak_ / n;
@@ -205,18 +223,23 @@ Metrics MetricsAccumulator::result() const {
   return metrics;
 }
 
-ContactMetrics::ContactMetrics(const ImageGrid& grid) : scorer_(grid), all_(grid), contact_(grid) {}
+ZoneMetrics::ZoneMetrics(const ImageGrid& grid)
+    : scorer_(grid), all_(grid), contact_(grid), flat_(grid), air_(grid) {}
 
-void ContactMetrics::add(std::span<const float> output, std::span<const float> truth) {
+void ZoneMetrics::add(std::span<const float> output, std::span<const float> truth, Zone zone) {
   const ImageScores scores = scorer_(output, truth);
   all_.add(output, truth, scores);
-  if (in_contact(truth)) contact_.add(output, truth, scores);
+  if (zone == Zone::contact) contact_.add(output, truth, scores);
+  if (zone == Zone::flat) flat_.add(output, truth, scores);
+  if (zone == Zone::air) air_.add(output, truth, scores);
 }
 
-nlohmann::ordered_json ContactMetrics::to_json() const {
+nlohmann::ordered_json ZoneMetrics::to_json() const {
   nlohmann::ordered_json json;
   json["all"] = supertac::to_json(all());
   json["contact"] = supertac::to_json(contact());
+  json["flat"] = supertac::to_json(flat());
+  json["air"] = supertac::to_json(air());
   return json;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "data/plates/taxel_array.h"
+#include "data/plates/truth.h"
 #include "data/scores/phase_correlation.h"
 
 namespace supertac {
@@ -55,11 +56,16 @@ struct Metrics {
   double psnr_mean_db = kNone;    ///< mean over the windows of each image's PSNR
   double psnr_pooled_db = kNone;  ///< PSNR of the mean of all squared errors
   double ssim = kNone;            ///< mean over the windows
-  // The rest is about windows whose truth is not flat: a flat truth has no position.
+  // About windows whose truth is not flat: a flat truth has no position.
   double phase_correlation = kNone;        ///< mean peak
   double phase_correlation_floor = kNone;  ///< the same with outputs and truths of different windows paired
   double position_error_px = kNone;        ///< mean length of the sub-pixel displacement
   double position_error_mm = kNone;
+  double ghost_rate = kNone;  ///< where the truth is flat: share of pictures with a pixel beyond +-kGhost
+  double miss_rate =
+      kNone;  ///< where the truth goes beyond +-kFelt: share of pictures that stay within +-kGhost
+
+  static constexpr float kGhost = 0.2F, kFelt = 0.5F;
 };
 
 /// Keys are the member names, in their order.
@@ -99,24 +105,27 @@ class MetricsAccumulator {
   ImageGrid grid_;
   ImageScorer scorer_;
   std::uint64_t windows_ = 0, positions_ = 0;
+  std::uint64_t silent_ = 0, ghosts_ = 0, felt_ = 0, misses_ = 0;
   double psnr_ = 0, mse_ = 0, ssim_ = 0, peak_ = 0, distance_px_ = 0;  // sums
   std::vector<float> sampled_outputs_, sampled_truths_;                // up to kFloorPairs images each
 };
 
-/// All windows, and apart those in contact: a flat truth is easy and would flatter the mean.
-class ContactMetrics {
+/// All windows, and apart those of each zone: a flat truth is easy and would flatter the mean.
+class ZoneMetrics {
  public:
   /// Throws as ImageScorer.
-  explicit ContactMetrics(const ImageGrid& grid);
-  void add(std::span<const float> output, std::span<const float> truth);
+  explicit ZoneMetrics(const ImageGrid& grid);
+  void add(std::span<const float> output, std::span<const float> truth, Zone zone);
   Metrics all() const { return all_.result(); }
   Metrics contact() const { return contact_.result(); }
-  /// {"all": {...}, "contact": {...}}
+  Metrics flat() const { return flat_.result(); }
+  Metrics air() const { return air_.result(); }
+  /// {"all": {...}, "contact": {...}, "flat": {...}, "air": {...}}
   nlohmann::ordered_json to_json() const;
 
  private:
   ImageScorer scorer_;
-  MetricsAccumulator all_, contact_;
+  MetricsAccumulator all_, contact_, flat_, air_;
 };
 
 /// Scores of pictures of any shape: pairs (as `windows`), PSNR and SSIM of Metrics; what needs a position

@@ -35,6 +35,29 @@ TEST(Committee, AveragesItsMembers) {
   EXPECT_GT(difference, 0) << "the two seeds draw the same, so nothing was averaged";
 }
 
+// Where members differ, the committee is less sure than any of them.
+TEST(Committee, AddsTheVarianceOfItsMembersToTheirSpread) {
+  const TemporaryFolder folder;
+  const std::vector<std::string> paths{folder / "a.safetensors", folder / "b.safetensors"};
+  for (std::uint64_t m = 0; m < 2; ++m) {
+    Rng rng(m + 1);
+    save_model(
+        paths[m],
+        SuperTac({.timesteps = 32, .latent = 2, .scale = 2, .channels = 8, .rcabs = 1, .spread = true}, rng),
+        {}, {});
+  }
+  const std::vector<ModelFile> files = load_models(paths);
+  const Tensor windows = Tensor::full({3, 32, 16}, real(0.4));
+  const Estimate a = files[0].model->estimate(windows), b = files[1].model->estimate(windows);
+  const Estimate both = Committee(files).estimate(windows);
+  for (std::size_t i = 0; i < a.picture.values().size(); ++i) {
+    const double half = (a.picture.values()[i] - b.picture.values()[i]) / 2;
+    const double squares = (std::pow(a.spread.values()[i], 2) + std::pow(b.spread.values()[i], 2)) / 2;
+    EXPECT_NEAR(both.spread.values()[i], std::sqrt(squares + half * half), 1e-5);
+    EXPECT_FLOAT_EQ(both.picture.values()[i], (a.picture.values()[i] + b.picture.values()[i]) / 2);
+  }
+}
+
 TEST(Committee, TakesOneKindOfModelOnly) {
   EXPECT_THROW(Committee(std::span<const ModelFile>()), std::invalid_argument);
   const TemporaryFolder folder;

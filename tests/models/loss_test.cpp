@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "autograd/kernels/elementwise.h"
@@ -23,6 +24,35 @@ TEST(SuperTacLoss, IsTheConvexCombinationOfItsTerms) {
   const double expected = 0.3 * (loss.reconstruction.item() + 0.02 * loss.kld.item()) +
                           0.7 * (loss.l2.item() + 0.5 * (1 - loss.ssim.item()));
   EXPECT_NEAR(loss.total.item(), expected, 1e-6);
+}
+
+// The spread is drawn towards the picture's error, and the picture does not notice.
+TEST(SuperTacLoss, TheSpreadLearnsTheError) {
+  SuperTacSettings settings = small_settings();
+  settings.spread = true;
+  Rng rng(1);
+  const SuperTac model(settings, rng);
+  const SuperTac::Output output = model.forward(uniform({2, 32, 16}, 1), normal_eps(2, 3, 2));
+  const Tensor truth = uniform({2, 8, 8, 1}, 3);
+  const Loss loss = supertac_loss(output, truth, {});
+  double expected = 0;
+  for (std::size_t i = 0; i < truth.values().size(); ++i) {
+    const double error = std::abs(output.image.value().values()[i] - truth.values()[i]);
+    expected += std::pow(output.spread.value().values()[i] - error, 2) / 128;
+  }
+  EXPECT_NEAR(loss.spread.item(), expected, 1e-6);
+  EXPECT_NEAR(loss.total.item(),
+              0.2 * (loss.reconstruction.item() + 1e-3 * loss.kld.item()) +
+                  0.8 * (loss.l2.item() + 0.1 * (1 - loss.ssim.item()) + kSpreadWeight * loss.spread.item()),
+              1e-6);
+  backward(loss.spread);
+  for (const Parameter& p : model.parameters()) {
+    const bool of_picture = p.name.starts_with("upsampler.out");
+    const bool moved = p.value.grad().defined() &&
+                       std::ranges::any_of(p.value.grad().values(), [](real g) { return g != 0; });
+    EXPECT_TRUE(!of_picture || !moved) << p.name;
+    EXPECT_TRUE(moved || !p.name.starts_with("upsampler.spread")) << p.name;
+  }
 }
 
 // Setting one weight to 0 must change the gradients: each term really acts.

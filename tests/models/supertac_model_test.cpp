@@ -13,7 +13,7 @@ namespace {
 TEST(SuperTac, PresetPaperHasTheParametersOfTheTable) {
   Rng rng(1);
   const SuperTac model(SuperTacSettings::of_preset("paper"), rng);
-  EXPECT_EQ(model.parameter_count(), 537521);
+  EXPECT_EQ(model.parameter_count(), 537810);
   std::set<std::string> names;
   for (const Parameter& p : model.parameters()) names.insert(p.name);
   EXPECT_EQ(names.size(), model.parameters().size());
@@ -22,7 +22,7 @@ TEST(SuperTac, PresetPaperHasTheParametersOfTheTable) {
         "decoder.0.fc.1.weight", "decoder.3.conv.3.bias", "decoder.1.out.weight", "upsampler.fc.weight",
         "upsampler.rirb.1.rcab.2.conv.1.weight", "upsampler.rirb.0.rcab.0.attention.squeeze.weight",
         "upsampler.rirb.1.rcab.1.attention.expand.bias", "upsampler.rirb.1.conv.weight",
-        "upsampler.rirb.0.up.weight", "upsampler.out.bias"}) {
+        "upsampler.rirb.0.up.weight", "upsampler.out.bias", "upsampler.spread.weight"}) {
     EXPECT_TRUE(names.contains(name)) << name;
   }
 }

@@ -36,7 +36,7 @@ TEST(Trainer, WithoutSamplingLatentsAreTheMeans) {
   const auto errors = [&](bool sampling) {
     settings.sampling = sampling;
     Trainer trainer(windows, all_of(windows), settings);
-    const ContactMetrics scores = score(trainer.model(), windows, all_of(windows));
+    const ZoneMetrics scores = score(trainer.model(), windows, all_of(windows));
     const double inferred = std::pow(10, -scores.all().psnr_pooled_db / 10);
     return std::abs(trainer.train_step().l2 - inferred) / inferred;
   };

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "data/plates/height_map.h"
 #include "io/random.h"
 
 namespace supertac {
@@ -63,7 +64,7 @@ TEST(PlateMesh, WrittenAndReadHeightsAgree) {
   for (const std::string& name : plates()) {
     const Plate plate = Plate::named(name);
     const auto read = parse_stl(stl_bytes(mesh_of(plate), name), name);
-    const Plate again(name, HeightMap(read, Plate::kWidthMm, Plate::kLengthMm, name));
+    const Plate again(name, std::make_shared<const HeightMap>(read, Plate::kWidthMm, Plate::kLengthMm, name));
     EXPECT_NEAR(again.max_height(), plate.max_height(), 0.13) << name;  // a ridge's peak between two nodes
     double squares = 0;
     const int points = 20'000;
@@ -81,7 +82,7 @@ TEST(PlateMesh, WrittenAndReadHeightsAgree) {
 TEST(PlateMesh, RigPlatesComeBackExactlyAtTheNodes) {
   for (const std::string& name : rig_plates()) {
     const Plate plate = Plate::named(name);
-    const Plate again(name, HeightMap(mesh_of(plate), Plate::kWidthMm, Plate::kLengthMm, name));
+    const Plate again(name, std::make_shared<const HeightMap>(mesh_of(plate), Plate::kWidthMm, Plate::kLengthMm, name));
     EXPECT_NEAR(again.texture_begin(), plate.texture_begin(), 0.126) << name;
     EXPECT_NEAR(again.texture_end(), plate.texture_end(), 0.126) << name;
     EXPECT_EQ(again.uniform_in_x(), plate.uniform_in_x()) << name;

@@ -49,19 +49,31 @@ TEST(Truth, EverySizeCoversTheSameTwelveMillimetres) {
   }
 }
 
-TEST(Truth, ScalesHeightsToTheUnitInterval) {
+TEST(Truth, IsZeroOnTheFlatPlateAndOneOnTopOfEveryPlate) {
   const Plate waves = Plate::named("4_Waves"), bumps = Plate::named("3_Bumps");
   EXPECT_NEAR(truth_value(waves, 5, 40.5), 1, 1e-12);
-  EXPECT_NEAR(truth_value(waves, 5, 45), 0, 1e-12);
-  EXPECT_NEAR(truth_value(waves, 5, 30), 0.5, 1e-12);  // flat: (0 + h) / 2h
+  EXPECT_NEAR(truth_value(waves, 5, 45), -1, 1e-12);
+  EXPECT_EQ(truth_value(waves, 5, 30), 0);
   EXPECT_NEAR(truth_value(bumps, 5, 42), 1, 1e-12);
   EXPECT_EQ(truth_value(bumps, 5, 30), 0);
   for (double y = 20; y < 90; y += 0.77)
     for (const auto& name : rig_plates()) {
-      const double v = truth_value(Plate::named(name), 7, y);
-      EXPECT_GE(v, 0) << name;
+      const Plate plate = Plate::named(name);
+      const double v = truth_value(plate, 7, y);
+      EXPECT_GE(v, plate.min_height() < 0 ? -1 : 0) << name;
       EXPECT_LE(v, 1) << name;
     }
+}
+
+TEST(Truth, TellsContactFromNearAndFlat) {
+  const ImageGrid grid;
+  const Plate bumps = Plate::named("3_Bumps");  // from 39.5 to 68.5 mm; a picture reaches 6 mm either way
+  EXPECT_EQ(zone_of(bumps, 18, 54, grid), Zone::contact);
+  EXPECT_EQ(zone_of(bumps, 18, 34.2, grid), Zone::contact);
+  EXPECT_EQ(zone_of(bumps, 18, 33, grid), Zone::near);
+  EXPECT_EQ(zone_of(bumps, 18, 30, grid), Zone::flat);
+  EXPECT_EQ(zone_of(bumps, 18, 78, grid), Zone::flat);
+  EXPECT_EQ(zone_of(Plate::named("plain"), 18, 54, grid), Zone::flat);
 }
 
 TEST(Truth, FlatScenesAreFlat) {

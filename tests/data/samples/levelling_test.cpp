@@ -28,11 +28,11 @@ std::vector<float> levelled(std::vector<float> x) {
   return x;
 }
 
-TEST(Levelling, TakesHalfTheRestAndDividesByTheSwing) {
+TEST(Levelling, TakesHalfTheRestAndDividesByWhatIsLeft) {
   const std::vector<float> x = levelled(window(0.25F, 0.5F, 0.125F));
-  EXPECT_FLOAT_EQ(x[0], 0.125F / 0.5F) << "at rest";
-  EXPECT_FLOAT_EQ(x[10 * kChannels], 1) << "0.625 / 0.5, clipped";
-  EXPECT_FLOAT_EQ(x[1], 0.0625F / 0.5F) << "a taxel that is pressed throughout keeps half of it";
+  EXPECT_FLOAT_EQ(x[0], 0.125F / 0.625F) << "at rest";
+  EXPECT_FLOAT_EQ(x[10 * kChannels], 1) << "0.625 / 0.625: nothing is clipped";
+  EXPECT_FLOAT_EQ(x[1], 0.0625F / 0.625F) << "a taxel that is pressed throughout keeps half of it";
 }
 
 // 100 frames, each of its own bin: six samples lie at or below the rest, three at or above the top.
@@ -46,13 +46,19 @@ TEST(Levelling, RestAndTopAreTheStatedPercentiles) {
   const float rest = 10 * kStep, top = 194 * kStep;
   for (const std::size_t t : {10U, 40U, 90U})
     EXPECT_FLOAT_EQ(x[t * kChannels],
-                    (static_cast<float>(2 * t) * kStep - kRestRemoved * rest) / (top - rest))
+                    (static_cast<float>(2 * t) * kStep - kRestRemoved * rest) / (top - kRestRemoved * rest))
         << t;
 }
 
 TEST(Levelling, AFingerPressedHarderLooksTheSame) {
   const std::vector<float> soft = levelled(window(0, 0.2F)), hard = levelled(window(0, 0.8F));
   for (std::size_t i = 0; i < soft.size(); ++i) EXPECT_NEAR(soft[i], hard[i], kStep / 0.2F) << i;
+}
+
+// Pressed hard on a flat plate: a small swing upon a large rest is no texture at full gain.
+TEST(Levelling, ASmallSwingOnALargeRestStaysSmall) {
+  const std::vector<float> x = levelled(window(0.8F, 0.04F));
+  EXPECT_NEAR(x[10 * kChannels] - x[0], 0.04F / 0.44F, 2 * kStep);
 }
 
 TEST(Levelling, AQuietWindowIsNotMadeLouder) {

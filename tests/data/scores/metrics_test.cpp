@@ -134,9 +134,10 @@ TEST(MetricsAccumulator, OfNothingIsNull) {
   const auto json = to_json(MetricsAccumulator(ImageGrid{}).result());
   EXPECT_EQ(json["windows"], 0);
   for (const char* key : {"psnr_mean_db", "psnr_pooled_db", "ssim", "phase_correlation",
-                          "phase_correlation_floor", "position_error_px", "position_error_mm"})
+                          "phase_correlation_floor", "position_error_px", "position_error_mm", "ghost_rate",
+                          "miss_rate"})
     EXPECT_TRUE(json.at(key).is_null()) << key;
-  EXPECT_EQ(json.size(), 8U);
+  EXPECT_EQ(json.size(), 10U);
 }
 
 TEST(MetricsAccumulator, PerfectOutputsStandAboveTheFloor) {
@@ -204,10 +205,29 @@ TEST(MetricsAccumulator, RefusesValuesThatAreNotFinite) {
   EXPECT_EQ(metrics.result().windows, 0U);
 }
 
-TEST(ContactMetrics, ReportsContactApart) {
-  ContactMetrics metrics{ImageGrid{}};
-  metrics.add(flat(0), flat(0));  // easy: 60 dB
-  metrics.add(flat(0), plate("bumps12", 54));
+TEST(ZoneMetrics, CountsGhostsAndMisses) {
+  ZoneMetrics metrics{ImageGrid{}};
+  Image ghost = flat(0);
+  ghost[100] = -0.21F;
+  metrics.add(flat(0.19F), flat(0), Zone::flat);
+  metrics.add(ghost, flat(0), Zone::flat);
+  metrics.add(flat(0), flat(0), Zone::air);
+  metrics.add(ghost, flat(0), Zone::near);  // part of `all` alone
+  metrics.add(plate("bumps12", 54), plate("bumps12", 54), Zone::contact);
+  metrics.add(flat(0.19F), plate("bumps12", 54), Zone::contact);
+  EXPECT_EQ(metrics.flat().ghost_rate, 0.5);
+  EXPECT_EQ(metrics.air().ghost_rate, 0);
+  EXPECT_EQ(metrics.contact().miss_rate, 0.5);
+  EXPECT_EQ(metrics.all().ghost_rate, 0.5);
+  EXPECT_TRUE(std::isnan(metrics.flat().miss_rate));
+  EXPECT_EQ(metrics.to_json()["flat"]["ghost_rate"], 0.5);
+  EXPECT_EQ(metrics.to_json()["air"]["windows"], 1);
+}
+
+TEST(ZoneMetrics, ReportsContactApart) {
+  ZoneMetrics metrics{ImageGrid{}};
+  metrics.add(flat(0), flat(0), Zone::flat);  // easy: 60 dB
+  metrics.add(flat(0), plate("bumps12", 54), Zone::contact);
   EXPECT_EQ(metrics.all().windows, 2U);
   EXPECT_EQ(metrics.contact().windows, 1U);
   EXPECT_LT(metrics.contact().psnr_mean_db, metrics.all().psnr_mean_db - 20);

@@ -1,0 +1,132 @@
+#include "apps/evaluate/trust.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "data/scores/metrics.h"
+#include "io/numbers.h"
+#include "models/interval.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kGoodSsim = 0.8, kSure = 0.8, kNearMm = 15, kFarMm = 30;
+
+double mean_of(std::span<const float> values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+}  // namespace
+
+void TrustScores::add(std::uint32_t window, std::span<const float> output, std::span<const float> truth,
+                      std::span<const float> spread, std::span<const float> latents) {
+  if (model_.novelty && !latents.empty()) {
+    ++judged_;
+    unlike_ += model_.novelty->unlike_training(latents) ? 1 : 0;
+  }
+  if (spread.empty()) return;
+  if (windows_.pass_of(window) != pass_) {
+    pass_ = windows_.pass_of(window);
+    passes_.emplace_back();
+  }
+  Pass& pass = passes_.back();
+  for (std::size_t i = 0; i < output.size(); ++i) {
+    const double ratio = std::abs(double{output[i]} - double{truth[i]}) / double{at_least(spread[i])};
+    ++pass.ratios[std::min(kBins - 1, static_cast<std::size_t>(ratio * kBinsPerUnit))];
+  }
+  pass.pixels += output.size();
+  if (!windows_.contact(window)) return;
+  const double y = windows_.position(window).y_mm;
+  if (pass_ != in_contact_of_) in_contact_of_ = pass_, begin_mm_ = y;
+  const ImageGrid grid = windows_.image();
+  contact_.push_back(
+      {mean_of(spread),
+       ssim(output, truth, static_cast<std::size_t>(grid.height), static_cast<std::size_t>(grid.width)),
+       std::abs(y - begin_mm_)});
+}
+
+double TrustScores::coverage(double factor) const {
+  const auto bins = std::min(kBins, static_cast<std::size_t>(factor * kBinsPerUnit));
+  double sum = 0;
+  for (const Pass& pass : passes_)
+    sum +=
+        static_cast<double>(std::accumulate(
+            pass.ratios.begin(), pass.ratios.begin() + static_cast<std::ptrdiff_t>(bins), std::uint64_t{0})) /
+        static_cast<double>(pass.pixels);
+  return sum / static_cast<double>(passes_.size());
+}
+
+double TrustScores::factor_found() const {
+  for (std::size_t bins = 1; bins < kBins; ++bins)
+    if (coverage(static_cast<double>(bins) / kBinsPerUnit) >= kCovered)
+      return static_cast<double>(bins) / kBinsPerUnit;
+  return static_cast<double>(kBins) / kBinsPerUnit;
+}
+
+// The chance that of two windows, one good and one bad, the bad one has the larger spread (Mann-Whitney).
+double TrustScores::auroc() const {
+  std::vector<Window> order = contact_;
+  std::ranges::sort(order, {}, &Window::spread);
+  double bad_above = 0, good = 0, bad = 0;
+  for (const Window& w : order) {
+    if (w.ssim >= kGoodSsim) {
+      ++good;
+    } else {
+      ++bad;
+      bad_above += good;
+    }
+  }
+  return good > 0 && bad > 0 ? bad_above / (good * bad) : Metrics::kNone;
+}
+
+double TrustScores::ssim_of_surest(double share) const {
+  std::vector<Window> order = contact_;
+  std::ranges::sort(order, {}, &Window::spread);
+  order.resize(static_cast<std::size_t>(std::ceil(share * static_cast<double>(order.size()))));
+  double sum = 0;
+  for (const Window& w : order) sum += w.ssim;
+  return order.empty() ? Metrics::kNone : sum / static_cast<double>(order.size());
+}
+
+double TrustScores::width(double from_mm, double to_mm) const {
+  double sum = 0, count = 0;
+  for (const Window& w : contact_)
+    if (w.felt_mm >= from_mm && w.felt_mm < to_mm) sum += w.spread, ++count;
+  return count > 0 ? sum / count : Metrics::kNone;
+}
+
+std::vector<std::string> TrustScores::lines() const {
+  std::vector<std::string> lines;
+  const auto percent = [](double share) { return format(100 * share, 1) + " %"; };
+  if (!passes_.empty())
+    lines.push_back("intervals hold " + percent(coverage(model_.interval_factor())) +
+                    " of the pixels (factor " + format(model_.interval_factor(), 2) + "; " +
+                    format(factor_found(), 2) + " would hold " + percent(kCovered) + ")");
+  if (!contact_.empty())
+    lines.push_back("in contact, the surest " + percent(kSure) + " have SSIM " +
+                    format(ssim_of_surest(kSure), 3) + "; spread tells SSIM below 0.8 with AUROC " +
+                    format(auroc(), 3));
+  if (judged_ > 0)
+    lines.push_back(percent(static_cast<double>(unlike_) / static_cast<double>(judged_)) +
+                    " of the windows are unlike training");
+  return lines;
+}
+
+nlohmann::ordered_json TrustScores::to_json() const {
+  const auto number = [](double v) { return std::isfinite(v) ? nlohmann::ordered_json(v) : nullptr; };
+  nlohmann::ordered_json json;
+  if (!passes_.empty()) {
+    json["factor"] = model_.interval_factor();
+    json["coverage"] = coverage(model_.interval_factor());
+    json["factor_found"] = factor_found();
+    json["sure_ssim"] = number(ssim_of_surest(kSure));
+    json["auroc"] = number(auroc());
+    json["spread_near"] = number(width(0, kNearMm));
+    json["spread_far"] = number(width(kFarMm, 1e9));
+  }
+  if (judged_ > 0) json["unlike_training"] = static_cast<double>(unlike_) / static_cast<double>(judged_);
+  return json;
+}
+
+}  // namespace supertac

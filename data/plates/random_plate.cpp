@@ -1,0 +1,182 @@
+#include "data/plates/random_plate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "io/numbers.h"
+#include "io/random.h"
+#include "io/same_bits.h"
+
+namespace supertac {
+namespace {
+
+constexpr std::string_view kWord = "random";
+constexpr std::uint64_t kStream = 0x706c617465ULL;  // "plate"
+constexpr double kLeastPitchMm = 4, kMostPitchMm = 15, kLeastHeightMm = 0.5, kMostHeightMm = 3;
+constexpr double kSamePitchMm = 0.5;
+
+/// Random numbers one after the other.
+class Draw {
+ public:
+  explicit Draw(std::uint32_t number) : random_(number, kStream) {}
+  double between(double low, double high) { return low + (high - low) * random_.uniform(next_++); }
+  bool chance(double share) { return random_.uniform(next_++) < share; }
+  int one_of(int count) { return static_cast<int>(random_.uniform(next_++) * count); }
+
+ private:
+  RandomStream random_;
+  std::uint64_t next_ = 0;
+};
+
+enum class Form { ridge, half_round, hill };
+
+/// A line across the plate, or something round.
+struct Element {
+  Form form = Form::ridge;
+  bool line = true;
+  double x_mm = 0, y_mm = 0;          // a point of the line, or the centre
+  double across_x = 0, across_y = 1;  // unit vector across the line
+  double width_mm = 0, height_mm = 0;
+
+  double height(double x, double y) const {
+    const double dx = x - x_mm, dy = y - y_mm;
+    const double distance = line ? std::abs(dx * across_x + dy * across_y) : std::sqrt(dx * dx + dy * dy);
+    const double r = 2 * distance / width_mm;
+    if (r >= 1) return 0;
+    if (form == Form::ridge) return height_mm * (1 - r);
+    const double rest = 1 - r * r;
+    return height_mm * (form == Form::hill ? rest * rest : std::sqrt(rest));
+  }
+  /// Half of its extent along y, over the whole plate.
+  double reach_mm() const {
+    return line ? (width_mm / 2 + std::abs(across_x) * Plate::kWidthMm / 2) / across_y : width_mm / 2;
+  }
+};
+
+class Elements : public Surface {
+ public:
+  explicit Elements(std::vector<Element> elements) : elements_(std::move(elements)) {
+    begin_ = end_ = elements_.front().y_mm;
+    for (const Element& e : elements_) {
+      begin_ = std::min(begin_, std::max(0.0, e.y_mm - e.reach_mm()));
+      end_ = std::max(end_, std::min(Plate::kLengthMm, e.y_mm + e.reach_mm()));
+      highest_ = std::max(highest_, e.height_mm);
+    }
+  }
+  double height(double x_mm, double y_mm) const override {
+    double z = 0;
+    for (const Element& e : elements_) z = std::max(z, e.height(x_mm, y_mm));
+    return z;
+  }
+  double max_height() const override { return highest_; }
+  double min_height() const override { return 0; }
+  double texture_begin() const override { return begin_; }
+  double texture_end() const override { return end_; }
+  bool uniform_in_x() const override {
+    return std::ranges::all_of(elements_, [](const Element& e) { return e.line && e.across_x == 0; });
+  }
+  std::vector<double> crests() const override {
+    std::vector<double> crests;
+    for (const Element& e : elements_) crests.push_back(e.y_mm);
+    std::ranges::sort(crests);
+    return crests;
+  }
+
+ private:
+  std::vector<Element> elements_;
+  double begin_ = 0, end_ = 0, highest_ = 0;
+};
+
+/// A line or a round element: more than half have the rig's size.
+Element draw_element(Draw& draw, bool line) {
+  Element e{.form = line && draw.chance(0.5) ? Form::ridge : Form::half_round, .line = line};
+  const bool as_on_the_rig = draw.chance(0.6);
+  e.height_mm = as_on_the_rig ? rig::kTextureHeightMm : draw.between(kLeastHeightMm, kMostHeightMm);
+  const double usual = e.form == Form::ridge ? rig::kRidgeBaseMm : 2 * e.height_mm;
+  e.width_mm = as_on_the_rig ? usual : draw.between(0.8, 1.6) * usual;
+  return e;
+}
+
+/// Equal elements in rows.
+Texture draw_texture(Draw& draw, double from_mm, double to_mm) {
+  constexpr const char* kKinds[] = {"ridges", "bumps", "ridges", "bumps", "blobs", "waves"};
+  Texture t{.kind = kKinds[draw.one_of(6)], .from_mm = from_mm, .to_mm = to_mm};
+  t.pitch_mm = draw.between(kLeastPitchMm, std::min(kMostPitchMm, (to_mm - from_mm) / 1.2));
+  t.height_mm = draw.chance(0.6) ? rig::kTextureHeightMm : draw.between(kLeastHeightMm, kMostHeightMm);
+  const bool round = t.kind == "bumps" || t.kind == "blobs";
+  if (round) t.height_mm = std::min(t.height_mm, t.pitch_mm / 2);
+  return t;
+}
+
+/// Lines one behind the other, each as far from the last as it likes; all of one form and size, or mixed.
+std::vector<Element> draw_lines(Draw& draw, double from_mm, double to_mm) {
+  const double turn = draw.chance(0.4) ? draw.between(-0.11, 0.11) : 0;  // up to 40 degrees
+  const bool mixed = draw.chance(0.5);
+  Element element = draw_element(draw, true);
+  std::vector<Element> lines;
+  for (double y = from_mm + element.width_mm / 2; y < to_mm;) {
+    element.x_mm = Plate::kWidthMm / 2, element.y_mm = y;
+    element.across_x = same_bits::sine(turn), element.across_y = same_bits::cosine(turn);
+    lines.push_back(element);
+    if (mixed) element = draw_element(draw, true);
+    y += std::max(element.width_mm, draw.between(kLeastPitchMm, kMostPitchMm));
+  }
+  return lines;
+}
+
+/// Round elements, or smooth hills that run into each other, anywhere.
+std::vector<Element> draw_scattered(Draw& draw, double from_mm, double to_mm) {
+  const bool hills = draw.chance(0.5);
+  const int count = 4 + draw.one_of(24);
+  std::vector<Element> elements;
+  for (int i = 0; i < count; ++i) {
+    Element e = draw_element(draw, false);
+    if (hills) e.form = Form::hill, e.width_mm = draw.between(4, 12);
+    e.x_mm = draw.between(0, Plate::kWidthMm), e.y_mm = draw.between(from_mm, to_mm);
+    elements.push_back(e);
+  }
+  return elements;
+}
+
+Plate made_of(const std::string& name, std::vector<Element> elements) {
+  return {name, std::make_shared<const Elements>(std::move(elements))};
+}
+
+}  // namespace
+
+Plate random_plate(std::uint32_t number) {
+  Draw draw(number);
+  const std::string name = std::string(kWord) + std::to_string(number);
+  const double from = draw.between(30, 40), to = draw.between(60, 78), layout = draw.between(0, 16);
+  if (layout < 1) return {name, std::vector<Texture>{}};
+  if (layout < 8) return {name, {draw_texture(draw, from, to)}};
+  if (layout < 9.5) {
+    const double middle = (from + to) / 2;
+    return {name, {draw_texture(draw, from, middle), draw_texture(draw, middle, to)}};
+  }
+  if (layout < 13.5) return made_of(name, draw_lines(draw, from, to));
+  if (layout < 14.5) {
+    Element e = draw_element(draw, true);
+    e.x_mm = Plate::kWidthMm / 2, e.y_mm = draw.between(from, to);
+    return made_of(name, {e});
+  }
+  return made_of(name, draw_scattered(draw, from, to));
+}
+
+std::optional<std::uint32_t> random_plate_number(std::string_view name) {
+  if (!name.starts_with(kWord)) return std::nullopt;
+  const auto number = parse_uint(std::string(name.substr(kWord.size())));
+  if (!number || *number > UINT32_MAX) return std::nullopt;
+  return static_cast<std::uint32_t>(*number);
+}
+
+bool resemble(const Plate& a, const Plate& b) {
+  for (const Texture& t : a.textures())
+    for (const Texture& u : b.textures())
+      if (t.kind == u.kind && std::abs(t.pitch_mm - u.pitch_mm) < kSamePitchMm) return true;
+  return false;
+}
+
+}  // namespace supertac

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <vector>
+
+namespace supertac {
+
+/// What a plate that is no row of equal elements looks like from above: an STL file's height map, or what
+/// random_surface() draws. Lengths in mm; the words are those of Plate.
+class Surface {
+ public:
+  virtual ~Surface() = default;
+  virtual double height(double x_mm, double y_mm) const = 0;
+  virtual double max_height() const = 0;
+  virtual double min_height() const = 0;
+  virtual double texture_begin() const = 0;
+  virtual double texture_end() const = 0;
+  virtual bool uniform_in_x() const = 0;
+  virtual std::vector<double> crests() const = 0;
+};
+
+}  // namespace supertac

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include "data/samples/windows.h"
+
+namespace supertac {
+
+/// Simulated passes over random plates, for networks that are to feel what they were never trained on.
+struct RandomPasses {
+  std::size_t count = 0;
+  std::uint64_t seed = 0;
+  double speed_mm_s = rig::kSlideMmS;
+  double filter_s =
+      rig::kFilterS;  ///< of the moving average, as the recordings beside them have it; 0 = none
+};
+
+/// The first number of a random plate (random_plate()) that training uses; smaller ones are for tests.
+constexpr std::uint32_t kFirstTrainingPlate = 1'000'000;
+
+/// Adds `count` passes, each over a plate of its own with a mounting of its own: gains, tilt, depth, and
+/// where the slide begins and ends are drawn about what the rig's passes show. They are set aside: no split
+/// tests them. Computed when called, on all threads, and kept in memory only. A pure function of the
+/// arguments.
+void add_random_passes(WindowSet& windows, const RandomPasses& passes);
+
+}  // namespace supertac
