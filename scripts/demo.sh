@@ -10,12 +10,22 @@ cmake --build build-demo | grep -iE 'error|warning' || true
 bin=build-demo/bin
 out=out/demo
 mkdir -p "$out"
-"$bin/supertac-simulate" --out "$out/recordings" --seed 1 --force
-echo "training on trial 1 (about a minute and a half)"
-"$bin/supertac-train" --data "$out/recordings" --out "$out/model.safetensors" --split trial --stride 2 --epochs 4 \
-  --seed 0 --force
-echo "testing on trial 2, which the network has not seen"
-"$bin/supertac-evaluate" --model "$out/model.safetensors" --data "$out/recordings" --limit 10000 \
-  --pictures "$out/pictures" --json "$out/scores.json" --force
-echo "pictures: $out/pictures/strips.png and a film of each pass beside it; scores: $out/scores.json;"
+simulate() { "$bin/supertac-simulate" --speeds 10 --force --quiet "$@"; }
+simulate --out "$out/recordings" --passes 4
+simulate --out "$out/plain" --plates plain --passes 2 --trials 1
+simulate --out "$out/never" --passes 2 --trials 1 --plates random1,random2,random3,random4,random5,random6,random7,random8
+echo "training on trial 1 of six plates, and on plates drawn at random (about a minute and a half)"
+"$bin/supertac-train" --data "$out/recordings" --out "$out/model.safetensors" --split trial --stride 4 --epochs 6 \
+  --random-plates 500 --seed 0 --force
+score() { # title, folder, more options
+  echo
+  echo "$1"
+  title="$2"
+  shift 2
+  "$bin/supertac-evaluate" --model "$out/model.safetensors" --data "$out/$title" --json "$out/$title.json" --force "$@"
+}
+score "the six plates on trial 2, which the network has not seen" recordings --limit 10000 --pictures "$out/pictures"
+score "eight plates it has never felt" never --split none --plates "" --limit 5000
+score "a plain plate" plain --split none --plates "" --limit 5000
+echo "pictures: $out/pictures/strips.png and a film of each pass beside it; scores: $out/*.json;"
 echo "training curves: $out/model.run/report.html"

@@ -34,7 +34,8 @@ void Sweep::check_settings() const {
   settings.erase("seed");
   settings["grouping"] = name_of(training.model.grouping);
   for (const char* option :
-       {"also", "data", "history", "limit", "plates", "range", "rate", "scaling", "split", "stride"})
+       {"also", "data", "history", "leave-out", "limit", "plates", "random-plates", "range", "rate", "scaling",
+        "split", "stride"})
     settings[option] = a_.text(option);
   for (const auto& [option, key] :
        {std::pair("epochs", "epochs"), {"learning-rate", "learning_rate"}, {"rate", "rate"}})
