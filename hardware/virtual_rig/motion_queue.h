@@ -14,8 +14,9 @@ class MotionQueue {
  public:
   static constexpr std::size_t kBlocks = 16;
 
-  explicit MotionQueue(const Point3& start, double acceleration = 500)
-      : rest_(start), acceleration_(acceleration) {}
+  /// `slowness`: moves take this many times as long.
+  explicit MotionQueue(const Point3& start, double acceleration = 500, double slowness = 1)
+      : rest_(start), acceleration_(acceleration), slowness_(slowness) {}
 
   /// Where the head is at time t. Forgets moves that ended before t, so t may not go backwards.
   Point3 at(double t);
@@ -36,7 +37,7 @@ class MotionQueue {
     double start, end;
   };
   Point3 rest_;
-  double acceleration_;
+  double acceleration_, slowness_;
   double end_ = -1;
   std::deque<Block> blocks_;
 };
