@@ -132,8 +132,8 @@ RecorderReport collect(const Arguments& arguments, RecorderSettings settings, co
   return record_marked(std::move(board), std::move(printer), settings, mark);
 }
 
-/// Recordings, quality report and --json of what was collected, complete or not. Returns frames
-std::size_t keep_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
+/// Recordings, quality report and --json of what was collected, complete or not. Returns what it comes to.
+std::string keep_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
                         const RecorderReport& collected) {
   OutputFolder folder(out, arguments.force());
   PassesReport report = write_passes(arguments, journal, out, folder);
@@ -141,7 +141,7 @@ std::size_t keep_passes(const Arguments& arguments, const std::string& journal, 
   report.json["note"] = collected.outcome.note;
   arguments.write_json(report.json);
   folder.keep();
-  return report.frames;
+  return report.total();
 }
 
 }  // namespace
@@ -159,10 +159,9 @@ int run(Arguments& arguments) {
   const RecorderSettings settings = read_settings(arguments, out, plate);
   const OriginMark mark(required_text(arguments, "printer"));
   const RecorderReport report = collect(arguments, settings, mark);
-  const std::size_t frames = keep_passes(arguments, settings.journal, out, report);
+  const std::string total = keep_passes(arguments, settings.journal, out, report);
   if (report.outcome.complete) {
-    arguments.print(std::to_string(report.outcome.passes_done) + " passes, " + std::to_string(frames) +
-                    " frames");
+    arguments.print(std::to_string(report.outcome.passes_done) + " passes, " + total);
     return kExitOk;
   }
   arguments.note("incomplete after " + std::to_string(report.outcome.passes_done) + " passes; " +

@@ -60,8 +60,7 @@ int recover(const Arguments& arguments) {
                     "holds no frame of a pass: it was cut off before the first contact");
   arguments.write_json(report.json);
   folder.keep();
-  arguments.print(std::to_string(report.frames) + " frames recovered" +
-                  (report.complete ? "" : "; the collection was cut off"));
+  arguments.print(report.total() + " recovered" + (report.complete ? "" : "; the collection was cut off"));
   return kExitOk;
 }
 

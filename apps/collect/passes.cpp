@@ -54,6 +54,7 @@ Recording recording_of(const CollectedPass& pass, const Header& header) {
   recording.metadata = {{"complete", pass.complete ? "true" : "false"},
                         {"missing_frames", std::to_string(pass.missing)},
                         {"time_base", pass.positions > 0 ? "M114 R" : "modelled motion"}};
+  if (!pass.doubt.empty()) recording.metadata["doubt"] = pass.doubt;
   return recording;
 }
 
@@ -75,7 +76,8 @@ nlohmann::ordered_json to_json(const CollectedPass& pass, const std::string& fil
           {"complete", pass.complete},   {"seconds", quality.seconds},
           {"frames", quality.frames},    {"frames_per_s", quality.rate_hz},
           {"missing", pass.missing},     {"suspect", quality.suspect},
-          {"positions", pass.positions}, {"rejected_positions", pass.rejected_positions}};
+          {"positions", pass.positions}, {"rejected_positions", pass.rejected_positions},
+          {"doubt", pass.doubt}};
 }
 
 std::string to_line(const CollectedPass& pass) {
@@ -83,7 +85,7 @@ std::string to_line(const CollectedPass& pass) {
   return "pass " + std::to_string(pass.pass) + ": " + std::to_string(quality.frames) + " frames (" +
          format(quality.rate_hz, 1) + "/s), " + std::to_string(pass.missing) + " missing, " +
          std::to_string(quality.suspect) + " suspect, " + std::to_string(pass.positions) + " positions" +
-         (pass.complete ? "" : ", incomplete");
+         (pass.complete ? "" : ", incomplete") + (pass.doubt.empty() ? "" : ", doubtful: " + pass.doubt);
 }
 
 }  // namespace
@@ -96,6 +98,11 @@ std::string collection_header(const std::string& plate, int trial, double speed)
 
 std::string journal_path(const std::string& folder, const std::string& plate, int trial, double speed) {
   return folder + "/" + plate + "_t" + std::to_string(trial) + "_v" + format(speed) + ".journal";
+}
+
+std::string PassesReport::total() const {
+  return std::to_string(frames) + " frames" +
+         (doubtful > 0 ? ", " + std::to_string(doubtful) + " passes with doubtful positions" : "");
 }
 
 PassesReport write_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
@@ -112,13 +119,14 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
     arguments.print(to_line(pass));
     passes.push_back(to_json(pass, name));
     report.frames += pass.time_s.size();
+    report.doubtful += pass.doubt.empty() ? 0 : 1;
   }
   if (Plate::is_file(header.plate))
     keep_plate_file((fs::path(journal).parent_path() / header.plate).string(), out);
   const ClockFit& clock = collection.clock;
   if (!clock.plausible)
-    arguments.note("warning: the board's period is " + format(1e6 * clock.period_s, 1) + " us, expected " +
-                   format(1e6 * rig::kFramePeriodS, 0) + " +- 0.5 %");
+    arguments.note("warning: the board's period is " + format(1e6 * clock.measured_s, 1) + " us, expected " +
+                   format(1e6 * rig::kFramePeriodS, 0) + " +- 0.5 %; the nominal one is used");
   report.json = {{"folder", out},
                  {"journal", journal},
                  {"plate", header.plate},
@@ -126,9 +134,10 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
                  {"speed_mm_s", header.speed},
                  {"complete", collection.complete},
                  {"torn_bytes", collection.torn_bytes},
-                 {"board_period_us", 1e6 * clock.period_s},
+                 {"board_period_us", 1e6 * clock.measured_s},
                  {"board_period_plausible", clock.plausible},
                  {"frames", report.frames},
+                 {"doubtful_passes", report.doubtful},
                  {"passes", passes}};
   return report;
 }

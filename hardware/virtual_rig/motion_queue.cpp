@@ -33,6 +33,19 @@ void MotionQueue::move_to(const Point3& to, double speed_mm_s, double t) {
   blocks_.push_back({from, to, start, end_});
 }
 
+void MotionQueue::hold(double t, double seconds) {
+  rest_ = at(t);
+  if (blocks_.empty()) return;
+  for (Block& block : blocks_) {
+    block.start += seconds;
+    block.end += seconds;
+  }
+  end_ += seconds;
+  Block& running = blocks_.front();
+  if (running.start - seconds >= t) return;
+  running = {rest_, running.to, t + seconds, running.end};
+}
+
 Point3 MotionQueue::stop(double t) {
   rest_ = at(t);
   blocks_.clear();

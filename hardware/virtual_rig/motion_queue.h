@@ -28,6 +28,8 @@ class MotionQueue {
   double next_end() const { return blocks_.empty() ? end_ : blocks_.front().end; }
   bool full(double t);
   void move_to(const Point3& to, double speed_mm_s, double t);
+  /// Stands for so long, then goes on.
+  void hold(double t, double seconds);
   /// Stops dead; returns where.
   Point3 stop(double t);
 

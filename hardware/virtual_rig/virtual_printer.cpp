@@ -248,6 +248,12 @@ bool VirtualPrinter::random_trouble(double t) {
     command_due_ = t + 0.05;
     return true;
   }
+  if (dice_.hit(faults.freeze_rate)) {
+    const double seconds = 0.3 + 1.7 * dice_.uniform();
+    command_due_ = t + seconds;
+    motion_.hold(t, seconds);
+    return true;
+  }
   if (dice_.hit(faults.resend_storm_rate)) {
     for (int i = 0; i < 3; ++i) complain("checksum mismatch");
   }
