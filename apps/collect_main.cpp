@@ -19,6 +19,7 @@
 #include "hardware/port_list.h"
 #include "hardware/serial_port.h"
 #include "io/file.h"
+#include "io/folder_lock.h"
 #include "io/numbers.h"
 
 namespace supertac {
@@ -155,6 +156,7 @@ int run(Arguments& arguments) {
   const std::string plate =
       read_option("plate", [&] { return Plate::named(required_text(arguments, "plate")).name(); });
   make_directories(out);
+  const FolderLock alone(out);
   keep_plate_file(arguments.text("plate"), out);
   const RecorderSettings settings = read_settings(arguments, out, plate);
   const OriginMark mark(required_text(arguments, "printer"));
