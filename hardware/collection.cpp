@@ -43,6 +43,23 @@ struct RecordedLeg {
   std::vector<PositionSample> samples;
 };
 
+// The end names its leg whole: the beginning may be lost with a damaged part of the journal.
+void end_leg(std::vector<RecordedLeg>& legs, const Leg& leg) {
+  if (legs.empty() || legs.back().leg.accepted_s != leg.accepted_s) {
+    RecordedLeg found{leg, true, {}};
+    if (!legs.empty()) {
+      auto& before = legs.back().samples;
+      const auto first = std::find_if(before.begin(), before.end(),
+                                      [&](const PositionSample& s) { return s.time_s >= leg.accepted_s; });
+      found.samples.assign(first, before.end());
+      before.erase(first, before.end());
+    }
+    legs.push_back(std::move(found));
+  }
+  legs.back().leg.ended_s = leg.ended_s;
+  legs.back().ended = true;
+}
+
 std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
   std::vector<RecordedLeg> legs;
   for (const JournalRecord& record : journal.of(Stream::event)) {
@@ -62,9 +79,8 @@ std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
                     n[11]};
       if (n[0] == 0) {
         legs.push_back({leg, false, {}});
-      } else if (!legs.empty()) {
-        legs.back().leg.ended_s = leg.ended_s;
-        legs.back().ended = true;
+      } else {
+        end_leg(legs, leg);
       }
     } else if (text.starts_with("at ") && !legs.empty()) {
       if (const auto v = numbers_of<5>(text)) {
@@ -252,6 +268,8 @@ Collection collection_of(const Journal& journal) {
   Collection collection;
   collection.header = journal.header;
   collection.torn_bytes = journal.torn_bytes;
+  collection.lost_bytes = journal.lost_bytes;
+  collection.lost_s = journal.lost_s;
   const std::vector<RecordedLeg> legs = legs_in(journal, collection.complete);
   const Frames all = frames_in(journal, collection.decoder);
   const FrameTimeline timeline = timeline_of(all.arrivals);

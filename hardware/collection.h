@@ -66,6 +66,8 @@ struct Collection {
   std::string header;
   bool complete = false;
   std::uint64_t torn_bytes = 0;  ///< of the journal's end
+  std::uint64_t lost_bytes = 0;  ///< of the journal, damaged
+  double lost_s = 0;
   FrameDecoder::Counters decoder;
   std::uint64_t frames = 0, missing = 0;
   ClockFit clock;

@@ -38,7 +38,14 @@ Header header_of(const Collection& collection, const std::string& journal) {
   throw JournalError(journal + ": its header has a trial or speed out of range");
 }
 
-Recording recording_of(const CollectedPass& pass, const Header& header) {
+/// What is missing from a damaged journal; empty: nothing.
+std::string damage_of(const Collection& collection) {
+  if (collection.lost_bytes == 0) return {};
+  return std::to_string(collection.lost_bytes) + " damaged bytes of the journal, " +
+         format(collection.lost_s, 2) + " s, are missing";
+}
+
+Recording recording_of(const CollectedPass& pass, const Header& header, const std::string& damage) {
   Recording recording;
   recording.time_s = pass.time_s;
   recording.volts = pass.volts;
@@ -54,6 +61,7 @@ Recording recording_of(const CollectedPass& pass, const Header& header) {
   recording.metadata = {{"complete", pass.complete ? "true" : "false"},
                         {"missing_frames", std::to_string(pass.missing)},
                         {"time_base", pass.positions > 0 ? "M114 R" : "modelled motion"}};
+  if (!damage.empty()) recording.metadata["damage"] = damage;
   if (!pass.doubt.empty()) recording.metadata["doubt"] = pass.doubt;
   return recording;
 }
@@ -102,18 +110,19 @@ std::string journal_path(const std::string& folder, const std::string& plate, in
 
 std::string PassesReport::total() const {
   return std::to_string(frames) + " frames" +
-         (doubtful > 0 ? ", " + std::to_string(doubtful) + " passes with doubtful positions" : "");
+         (doubtful > 0 ? ", " + std::to_string(doubtful) + " passes with doubtful positions" : "") +
+         (damage.empty() ? "" : ", " + damage);
 }
 
 PassesReport write_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
                           OutputFolder& folder) {
   const Collection collection = collection_of(read_journal(journal));
   const Header header = header_of(collection, journal);
-  PassesReport report{.complete = collection.complete};
+  PassesReport report{.complete = collection.complete, .damage = damage_of(collection)};
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
   for (const CollectedPass& pass : collection.passes) {
     if (pass.time_s.size() < 2) continue;
-    const Recording recording = recording_of(pass, header);
+    const Recording recording = recording_of(pass, header, report.damage);
     const std::string name = recording_file_name(recording);
     write_recording(folder.add(name), recording);
     arguments.print(to_line(pass));
@@ -134,6 +143,8 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
                  {"speed_mm_s", header.speed},
                  {"complete", collection.complete},
                  {"torn_bytes", collection.torn_bytes},
+                 {"lost_bytes", collection.lost_bytes},
+                 {"lost_s", collection.lost_s},
                  {"board_period_us", 1e6 * clock.measured_s},
                  {"board_period_plausible", clock.plausible},
                  {"frames", report.frames},

@@ -17,6 +17,7 @@ struct PassesReport {
   std::size_t frames = 0;    ///< in the recordings
   std::size_t doubtful = 0;  ///< passes whose positions may be wrong
   bool complete = false;     ///< the run ended as planned
+  std::string damage = {};   ///< of the journal, in words; empty: none
   nlohmann::ordered_json json = {};
   /// ", N frames" and what is to be said of doubtful passes: the end of the last line.
   std::string total() const;
