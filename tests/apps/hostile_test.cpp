@@ -73,7 +73,7 @@ TEST(Outputs, AreFoundUnusableBeforeTheWork) {
   ASSERT_EQ(mkfifo((folder / "fifo").c_str(), 0600), 0);
   fs::create_directory(folder / "dir");
   const std::string long_name(250, 'x');
-  for (const std::string bad :
+  for (const std::string& bad :
        {folder / "m.run", folder / "dir", folder / "fifo", folder / long_name, folder / "no/such/m"}) {
     for (const bool json : {false, true}) {
       if (json && bad.ends_with(".run")) continue;  // a good name for JSON
