@@ -250,7 +250,8 @@ namespace {
 struct Chunk {
   Stream stream = Stream::header;
   double time_s = 0;
-  std::size_t size = 0;  // 0: there is no whole chunk here
+  std::size_t size = 0;    // 0: there is no whole chunk here
+  std::size_t summed = 0;  // bytes looked at to find that out
   std::vector<JournalRecord> records;
 };
 
@@ -260,6 +261,7 @@ Chunk chunk_at(std::span<const std::byte> bytes) {
   const auto length = get<std::uint32_t>(bytes, 8);
   if (length > bytes.size() - kChunkHeader) return chunk;
   const auto payload = bytes.subspan(kChunkHeader, length);
+  chunk.summed = length;
   if (get<std::uint32_t>(bytes, 12) != chunk_sum(bytes.first(kChunkHeader), payload)) return chunk;
   chunk.stream = static_cast<Stream>(get<std::uint32_t>(bytes, 4));
   if (!parse_records(payload, chunk.records)) return chunk;
@@ -282,10 +284,13 @@ Journal parse_journal(std::span<const std::byte> bytes, const std::string& name)
   bool headed = false;
   std::uint64_t damaged = 0;  // since the last whole chunk
   double before_s = 0;        // time of that chunk
+  // A file made of beginnings of chunks would have all of it summed up at each of them.
+  std::size_t patience = 16 * bytes.size() + (1 << 20);
   while (!bytes.empty()) {
     Chunk chunk = chunk_at(bytes);
     if (chunk.size == 0) {
-      const std::size_t skipped = next_magic(bytes);
+      const std::size_t skipped = chunk.summed > patience ? bytes.size() : next_magic(bytes);
+      patience -= std::min(patience, chunk.summed);
       damaged += skipped;
       bytes = bytes.subspan(skipped);
       continue;
