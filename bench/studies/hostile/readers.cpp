@@ -1,6 +1,7 @@
 #include "bench/studies/hostile/readers.h"
 
 #include <chrono>
+#include <fstream>
 #include <functional>
 #include <iostream>
 #include <vector>
@@ -65,7 +66,9 @@ std::vector<Reader> readers(const std::string& folder) {
   const Bytes recording = read_file(folder + "/recording", 1 << 24);
   const auto from_file = [file](auto read) {
     return [file, read](const Bytes& bytes) {
-      write_file(file, bytes);
+      // Not write_file(): a million syncs.
+      std::ofstream(file, std::ios::binary)
+          .write(reinterpret_cast<const char*>(bytes.data()), std::ssize(bytes));
       read(file);
     };
   };
