@@ -115,7 +115,7 @@ void import_text_folder(const std::string& root, const FolderImport& settings,
     const bool last = i + 1 == found.size() || found[i + 1].plate.name() != found[i].plate.name();
     if (!last || plate.empty()) continue;
     any = true;
-    progress(i);
+    progress(i + 1);
     if (found[i].plate.uniform_in_x()) align(plate);
     for (ImportedPass& pass : plate) apply(pass.registration, pass.recording);
     take(std::exchange(plate, {}));
