@@ -38,6 +38,7 @@ std::vector<View> views_of(const Arguments& a) {
       throw UsageError(std::string("--views: ") + error.what());
     }
   }
+  if (views.empty()) throw UsageError("--views: expected at least one view, found none");
   return views;
 }
 

@@ -19,6 +19,7 @@
 #include "hardware/port_list.h"
 #include "hardware/serial_port.h"
 #include "io/file.h"
+#include "io/folder_lock.h"
 #include "io/numbers.h"
 
 namespace supertac {
@@ -132,8 +133,8 @@ RecorderReport collect(const Arguments& arguments, RecorderSettings settings, co
   return record_marked(std::move(board), std::move(printer), settings, mark);
 }
 
-/// Recordings, quality report and --json of what was collected, complete or not. Returns frames
-std::size_t keep_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
+/// Recordings, quality report and --json of what was collected, complete or not. Returns what it comes to.
+std::string keep_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
                         const RecorderReport& collected) {
   OutputFolder folder(out, arguments.force());
   PassesReport report = write_passes(arguments, journal, out, folder);
@@ -141,7 +142,7 @@ std::size_t keep_passes(const Arguments& arguments, const std::string& journal, 
   report.json["note"] = collected.outcome.note;
   arguments.write_json(report.json);
   folder.keep();
-  return report.frames;
+  return report.total();
 }
 
 }  // namespace
@@ -155,14 +156,14 @@ int run(Arguments& arguments) {
   const std::string plate =
       read_option("plate", [&] { return Plate::named(required_text(arguments, "plate")).name(); });
   make_directories(out);
+  const FolderLock alone(out);
   keep_plate_file(arguments.text("plate"), out);
   const RecorderSettings settings = read_settings(arguments, out, plate);
   const OriginMark mark(required_text(arguments, "printer"));
   const RecorderReport report = collect(arguments, settings, mark);
-  const std::size_t frames = keep_passes(arguments, settings.journal, out, report);
+  const std::string total = keep_passes(arguments, settings.journal, out, report);
   if (report.outcome.complete) {
-    arguments.print(std::to_string(report.outcome.passes_done) + " passes, " + std::to_string(frames) +
-                    " frames");
+    arguments.print(std::to_string(report.outcome.passes_done) + " passes, " + total);
     return kExitOk;
   }
   arguments.note("incomplete after " + std::to_string(report.outcome.passes_done) + " passes; " +

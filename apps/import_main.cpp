@@ -31,8 +31,7 @@ void declare(Arguments& arguments) {
 
 namespace {
 
-std::vector<ImportedPass> import_all(const Arguments& arguments, std::size_t& bad) {
-  std::optional<Progress> bar;
+FolderImport import_settings(const Arguments& arguments, std::optional<Progress>& bar, std::size_t& bad) {
   FolderImport settings{.speed_mm_s = arguments.number("speed", 0.1, 1000)};
   settings.left_out = [&](const FileError& error) {
     if (!arguments.flag("skip-bad"))
@@ -45,7 +44,7 @@ std::vector<ImportedPass> import_all(const Arguments& arguments, std::size_t& ba
     if (!bar) bar.emplace(arguments, "importing", files, "files");
     bar->update(done);
   };
-  return import_text_folder(arguments.text("TEXT_DIR"), settings);
+  return settings;
 }
 
 int recover(const Arguments& arguments) {
@@ -60,8 +59,7 @@ int recover(const Arguments& arguments) {
                     "holds no frame of a pass: it was cut off before the first contact");
   arguments.write_json(report.json);
   folder.keep();
-  arguments.print(std::to_string(report.frames) + " frames recovered" +
-                  (report.complete ? "" : "; the collection was cut off"));
+  arguments.print(report.total() + " recovered" + (report.complete ? "" : "; the collection was cut off"));
   return kExitOk;
 }
 
@@ -74,10 +72,10 @@ int run(Arguments& arguments) {
   OutputFolder folder(out, arguments.force());
   std::optional<OutputFolder> pictures;
   if (arguments.given("pictures")) pictures.emplace(arguments.text("pictures"), arguments.force());
-  std::size_t bad = 0, reliable = 0;
+  std::size_t bad = 0, reliable = 0, recordings = 0;
   nlohmann::ordered_json files = nlohmann::ordered_json::array();
-  const std::vector<ImportedPass> passes = import_all(arguments, bad);
-  for (const ImportedPass& pass : passes) {
+  std::optional<Progress> bar;
+  const auto keep = [&](const ImportedPass& pass) {
     const std::string name = recording_file_name(pass.recording);
     write_recording(folder.add(name), pass.recording);
     if (pictures)
@@ -86,16 +84,23 @@ int run(Arguments& arguments) {
     arguments.print(pass.summary());
     files.push_back(pass.to_json());
     reliable += pass.registration.reliable;
-  }
+    ++recordings;
+  };
+  // A plate at a time: no more is in memory, and what is done is on the disk.
+  import_text_folder(arguments.text("TEXT_DIR"), import_settings(arguments, bar, bad),
+                     [&](const std::vector<ImportedPass>& plate) {
+                       for (const ImportedPass& pass : plate) keep(pass);
+                       keep_plate_file(plate.front().plate_file, out);
+                     });
+  bar.reset();
   arguments.write_json({{"folder", out},
-                        {"recordings", passes.size()},
+                        {"recordings", recordings},
                         {"reliable", reliable},
                         {"left_out", bad},
                         {"files", files}});
-  for (const ImportedPass& pass : passes) keep_plate_file(pass.plate_file, out);
   folder.keep();
   if (pictures) pictures->keep();
-  arguments.print(std::to_string(passes.size()) + " recordings in " + out + ", " + std::to_string(reliable) +
+  arguments.print(std::to_string(recordings) + " recordings in " + out + ", " + std::to_string(reliable) +
                   " with a reliable registration");
   return kExitOk;
 }

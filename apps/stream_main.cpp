@@ -1,7 +1,5 @@
 // supertac-stream: super-resolved touch while it happens.
 
-#include <filesystem>
-
 #include "apps/common/ports.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
@@ -35,10 +33,6 @@ std::unique_ptr<SensorSource> open_source(const Arguments& a, double speedup) {
   if (a.given("replay")) return open_replay(a.text("replay"));
   if (a.given("recording")) return open_recording(a.text("recording"));
   const std::string capture = a.text("capture");
-  if (!capture.empty()) {
-    refuse_existing(capture, a.force());
-    std::filesystem::remove(capture);
-  }
   return open_board(a.text("board"), speedup, capture);
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/common/nearest.h"
+#include "apps/common/outputs.h"
 #include "apps/common/program.h"
 #include "io/text.h"
 
@@ -58,6 +59,7 @@ int run_job(const std::string& name, char** argv) {
 
 int main(int argc, char** argv) {
   using namespace supertac;
+  open_standard_descriptors();
   const std::string first = argc > 1 ? argv[1] : "";
   if (first == "--version") {
     std::cout << version_text({"supertac", "", nullptr, nullptr});

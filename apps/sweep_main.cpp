@@ -7,6 +7,7 @@
 #include "apps/sweep/sweep.h"
 #include "apps/train/training_options.h"
 #include "io/file.h"
+#include "io/folder_lock.h"
 
 namespace supertac {
 
@@ -31,6 +32,7 @@ int run(Arguments& a) {
   if (!a.given("data") && !fs::exists(out + "/sweep.csv"))
     throw UsageError("--data is needed: there is no " + out + "/sweep.csv to read");
   make_directories(out);
+  const FolderLock alone(out);
   SweepTable table(out + "/sweep.csv");
   if (table.dropped_a_cut_line()) a.note(out + "/sweep.csv: the last line was cut off and is left out");
   if (a.given("data")) {
@@ -38,7 +40,7 @@ int run(Arguments& a) {
     Sweep(a, table).run(grid);
   }
   const std::vector<Configuration> all = configurations(table), front = pareto_front(all);
-  if (!draw_chart(out, all)) a.note("gnuplot is not installed: " + out + "/chart.gnuplot waits for it");
+  if (const std::string why = draw_chart(out, all); !why.empty()) a.note(why);
   a.print("Pareto front, fastest first:");
   nlohmann::ordered_json result = {{"configurations", all.size()}, {"rows", table.rows().size()}};
   for (const Configuration& c : front) {

@@ -43,6 +43,23 @@ struct RecordedLeg {
   std::vector<PositionSample> samples;
 };
 
+// The end names its leg whole: the beginning may be lost with a damaged part of the journal.
+void end_leg(std::vector<RecordedLeg>& legs, const Leg& leg) {
+  if (legs.empty() || legs.back().leg.accepted_s != leg.accepted_s) {
+    RecordedLeg found{leg, true, {}};
+    if (!legs.empty()) {
+      auto& before = legs.back().samples;
+      const auto first = std::find_if(before.begin(), before.end(),
+                                      [&](const PositionSample& s) { return s.time_s >= leg.accepted_s; });
+      found.samples.assign(first, before.end());
+      before.erase(first, before.end());
+    }
+    legs.push_back(std::move(found));
+  }
+  legs.back().leg.ended_s = leg.ended_s;
+  legs.back().ended = true;
+}
+
 std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
   std::vector<RecordedLeg> legs;
   for (const JournalRecord& record : journal.of(Stream::event)) {
@@ -62,9 +79,8 @@ std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
                     n[11]};
       if (n[0] == 0) {
         legs.push_back({leg, false, {}});
-      } else if (!legs.empty()) {
-        legs.back().leg.ended_s = leg.ended_s;
-        legs.back().ended = true;
+      } else {
+        end_leg(legs, leg);
       }
     } else if (text.starts_with("at ") && !legs.empty()) {
       if (const auto v = numbers_of<5>(text)) {
@@ -115,14 +131,46 @@ double median_round_trip(const std::vector<PositionSample>& samples) {
   return median(trips);
 }
 
-CollectedPass pass_of(const Frames& all, const FrameTimeline& timeline, const PositionTrack& track) {
+// By how much (s) the clock misses the frames first to last: the earliest of every 128 arrives on time.
+double clock_error(const Frames& all, const FrameTimeline& timeline, std::size_t first, std::size_t last) {
+  constexpr std::size_t kWindow = 128;
+  double worst = 0;
+  for (std::size_t begin = first; begin + kWindow <= last; begin += kWindow) {
+    double earliest = kLargest;
+    for (std::size_t i = begin; i < begin + kWindow; ++i) {
+      earliest =
+          std::min(earliest, all.arrivals[i] - timeline.clock.at(static_cast<double>(timeline.index[i])));
+    }
+    worst = std::max(worst, std::abs(earliest));
+  }
+  return worst;
+}
+
+std::string doubt_of(const ClockFit& clock, double clock_error_s, double speed, double track_mm) {
+  std::string doubt;
+  if (!clock.plausible)
+    doubt = "the board's clock says " + format(1e6 * clock.measured_s, 1) + " us a frame, the nominal " +
+            format(1e6 * rig::kFramePeriodS, 0) + " are used; ";
+  if (clock_error_s * speed > kTrustedMm)
+    doubt += "frames are up to " + format(clock_error_s, 2) + " s off their clock; ";
+  if (track_mm > kTrustedMm) doubt += "the head may have been " + format(track_mm, 1) + " mm elsewhere; ";
+  return doubt.substr(0, doubt.size() - std::min<std::size_t>(2, doubt.size()));
+}
+
+CollectedPass pass_of(const Frames& all, const FrameTimeline& timeline, const PositionTrack& track,
+                      double speed) {
   CollectedPass pass;
   std::uint64_t first = 0, last = 0;
+  std::size_t begin = 0, end = 0;
   for (std::size_t i = 0; i < all.frames.size(); ++i) {
     const double time =
         timeline.clock.at(static_cast<double>(timeline.index[i])) - 0.5 * timeline.clock.period_s;
     if (time < track.begin() || time > track.end()) continue;
-    if (pass.time_s.empty()) first = timeline.index[i];
+    if (pass.time_s.empty()) {
+      first = timeline.index[i];
+      begin = i;
+    }
+    end = i + 1;
     last = timeline.index[i];
     pass.time_s.push_back(time - track.begin());
     const auto volts = taxel_volts(all.frames[i]);
@@ -131,6 +179,8 @@ CollectedPass pass_of(const Frames& all, const FrameTimeline& timeline, const Po
     pass.position.insert(pass.position.end(), {p.x, p.y, p.z});
     pass.suspect.push_back(all.suspect[i]);
   }
+  pass.speed = speed;
+  pass.doubt = doubt_of(timeline.clock, clock_error(all, timeline, begin, end), speed, track.doubt_mm());
   if (!pass.time_s.empty()) pass.missing = last - first + 1 - pass.time_s.size();
   return pass;
 }
@@ -152,8 +202,23 @@ void PositionTrack::add(double time_s, const Point3& position) {
   if (points_.empty() || time_s > points_.back().time_s) points_.push_back({time_s, position});
 }
 
+// Between two knots no head is faster than ordered: how far it can have been from the straight line in time.
+void PositionTrack::distrust(const Leg& leg) {
+  if (points_.size() < 2 || !(leg.speed > 0)) return;
+  const Knot &a = points_[points_.size() - 2], &b = points_.back();
+  const double way = distance(a.position, b.position), farthest = leg.speed * (b.time_s - a.time_s);
+  if (way < farthest) doubt_mm_ = std::max(doubt_mm_, way * (1 - way / farthest));
+}
+
 void PositionTrack::model(const Leg& leg, double acceleration) {
   const double length = distance(leg.from, leg.to);
+  if (leg.speed > 0) {
+    // Longer than ordered: nobody knows where on the way the head was slow.
+    const double ordered =
+        rig::kStartDelayS + trapezoid_duration(length, rig::true_speed(leg.speed), acceleration);
+    const double off_s = std::abs(leg.ended_s - leg.accepted_s - ordered);
+    doubt_mm_ = std::max(doubt_mm_, std::min(length, off_s * leg.speed));
+  }
   const double start = std::min(leg.accepted_s + rig::kStartDelayS, leg.ended_s - 1e-6);
   const double duration = leg.ended_s - start;
   const int steps = static_cast<int>(std::clamp(duration / 0.005, 1.0, double{kMostSteps}));
@@ -170,9 +235,8 @@ void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& s
   const double slowest_answer = samples.empty() ? 0 : 3 * median_round_trip(samples) + 0.001;
   Knot before = points_.empty() ? Knot{leg.accepted_s, leg.from} : points_.back();
   for (const PositionSample& sample : samples) {
-    const double possible = 1.5 * leg.speed * (sample.time_s - before.time_s) + 0.05;
     const bool good = sample.round_trip_s <= slowest_answer && off_leg(leg, sample.position) < 0.05 &&
-                      distance(before.position, sample.position) < possible &&
+                      reachable(leg, {before.time_s, 0, before.position}, sample) &&
                       distance(leg.from, before.position) < distance(leg.from, sample.position) + 0.015;
     if (!good) {
       ++rejected_;
@@ -180,8 +244,13 @@ void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& s
     }
     before = {sample.time_s, sample.position};
     add(sample.time_s, sample.position);
+    distrust(leg);
+    doubt_mm_ = std::max(doubt_mm_, 0.5 * sample.round_trip_s * leg.speed);
   }
-  if (leg.ended_s > 0) add(leg.ended_s, leg.to);
+  if (leg.ended_s > 0) {
+    add(leg.ended_s, leg.to);
+    distrust(leg);
+  }
 }
 
 Point3 PositionTrack::at(double time_s) const {
@@ -199,6 +268,8 @@ Collection collection_of(const Journal& journal) {
   Collection collection;
   collection.header = journal.header;
   collection.torn_bytes = journal.torn_bytes;
+  collection.lost_bytes = journal.lost_bytes;
+  collection.lost_s = journal.lost_s;
   const std::vector<RecordedLeg> legs = legs_in(journal, collection.complete);
   const Frames all = frames_in(journal, collection.decoder);
   const FrameTimeline timeline = timeline_of(all.arrivals);
@@ -222,9 +293,8 @@ Collection collection_of(const Journal& journal) {
     if (phase == Phase::release) part.complete = recorded.ended;
   }
   for (const auto& [number, part] : parts) {
-    CollectedPass pass = pass_of(all, timeline, part.track);
+    CollectedPass pass = pass_of(all, timeline, part.track, part.speed);
     pass.pass = number;
-    pass.speed = part.speed;
     pass.complete = part.complete;
     pass.positions = part.positions;
     pass.rejected_positions = part.track.rejected();

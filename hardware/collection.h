@@ -28,6 +28,9 @@ class PositionTrack {
   double begin() const { return points_.empty() ? 0 : points_.front().time_s; }
   double end() const { return points_.empty() ? 0 : points_.back().time_s; }
   std::uint64_t rejected() const { return rejected_; }
+  /// How far (mm) at() may be from the head: between two samples, or where a modelled leg did not take its
+  /// time.
+  double doubt_mm() const { return doubt_mm_; }
 
  private:
   struct Knot {
@@ -36,8 +39,10 @@ class PositionTrack {
   };
   void add(double time_s, const Point3& position);
   void model(const Leg& leg, double acceleration);
+  void distrust(const Leg& leg);
   std::vector<Knot> points_;
   std::uint64_t rejected_ = 0;
+  double doubt_mm_ = 0;
 };
 
 /// Onset, slide and release of one pass. Times start at the onset; the middle of each frame counts.
@@ -51,12 +56,18 @@ struct CollectedPass {
   std::vector<std::uint8_t> suspect;  ///< n; 1: may be torn, or an implausible jump
   std::uint64_t missing = 0;          ///< frames that did not arrive between the first and the last
   std::uint64_t positions = 0, rejected_positions = 0;
+  std::string doubt;  ///< why positions may be wrong by more than kTrustedMm; empty: they are not
 };
+
+/// A position that may be further off is said to be doubtful: a tenth of a taxel's pitch.
+constexpr double kTrustedMm = 0.3;
 
 struct Collection {
   std::string header;
   bool complete = false;
   std::uint64_t torn_bytes = 0;  ///< of the journal's end
+  std::uint64_t lost_bytes = 0;  ///< of the journal, damaged
+  double lost_s = 0;
   FrameDecoder::Counters decoder;
   std::uint64_t frames = 0, missing = 0;
   ClockFit clock;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <utility>
 
 namespace supertac {
 namespace {
@@ -88,7 +89,13 @@ ClockFit ClockEstimator::fit() const {
   fit.period_s = line.slope;
   fit.offset_s = line.intercept;
   fit.residual_s = std::sqrt(squares / n);
+  fit.measured_s = line.slope;
   fit.plausible = std::abs(line.slope / rig::kFramePeriodS - 1) <= 0.005;
+  if (!fit.plausible) {
+    fit.period_s = rig::kFramePeriodS;
+    fit.offset_s = points_.front().arrival - fit.period_s * points_.front().index;
+    for (const Point& p : points_) fit.offset_s = std::min(fit.offset_s, p.arrival - fit.period_s * p.index);
+  }
   return fit;
 }
 
@@ -129,6 +136,25 @@ void GapCounter::track(double lateness) {
   if (std::abs(block_minimum_) < 0.5 * period_) envelope_ += 0.5 * block_minimum_;
 }
 
+namespace {
+
+// A host that did not read finds the oldest frames in the tty, all at once; what is missing vanished behind
+// them.
+void place_behind_bursts(std::span<const double> arrivals, std::vector<std::uint32_t>& missing_before) {
+  std::vector<std::uint32_t> placed = missing_before;
+  for (std::size_t i = 1; i < arrivals.size(); ++i) {
+    if (missing_before[i] == 0) continue;
+    std::size_t end = i + 1;
+    while (end < arrivals.size() && arrivals[end] - arrivals[end - 1] < 0.5 * rig::kFramePeriodS) ++end;
+    if (end < i + 3 || end == arrivals.size()) continue;
+    placed[i] -= missing_before[i];
+    placed[end] += missing_before[i];
+  }
+  missing_before = std::move(placed);
+}
+
+}  // namespace
+
 FrameTimeline timeline_of(std::span<const double> arrivals) {
   FrameTimeline timeline;
   // Once with the nominal period and a short view, then with the period found and a long one.
@@ -137,6 +163,7 @@ FrameTimeline timeline_of(std::span<const double> arrivals) {
     std::vector<std::uint32_t> missing_before;
     for (const double arrival : arrivals) gaps.push(arrival, missing_before);
     gaps.finish(missing_before);
+    place_behind_bursts(arrivals, missing_before);
     ClockEstimator estimator;
     timeline.index.clear();
     std::uint64_t index = 0;

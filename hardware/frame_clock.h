@@ -15,9 +15,10 @@ namespace supertac {
 struct ClockFit {
   double period_s = rig::kFramePeriodS;
   double offset_s = 0;
-  double residual_s = 0;  ///< RMS of the envelope's points about the line
-  bool plausible = true;  ///< period within 0.5 % of the nominal one; otherwise frames are miscounted or it
-                          ///< is another board
+  double residual_s = 0;                   ///< RMS of the envelope's points about the line
+  double measured_s = rig::kFramePeriodS;  ///< the period that the arrivals say
+  bool plausible = true;  ///< measured_s within 0.5 % of the nominal one; otherwise frames were
+                          ///< miscounted or it is another board, and period_s is the nominal one
   double at(double index) const { return offset_s + period_s * index; }
 };
 

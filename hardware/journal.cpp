@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <string.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -20,6 +21,7 @@ constexpr std::uint32_t kMagic = 0x314A5453;                  // "STJ1"
 constexpr std::size_t kChunkHeader = 24;                      // magic, stream, length, CRC-32, time
 constexpr std::size_t kRecordHeader = 13;                     // kind, time, length
 constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 36;  // of a journal: four days
+constexpr std::size_t kMostPayload = 2048;                    // of a chunk of several records
 constexpr std::size_t kMostPending = 64 << 20;
 constexpr double kFlushAfter = 0.1;   // of recorded time, and of the wall's
 constexpr double kLatestTime = 1e10;  // s: 300 years, so that no arithmetic on times can overflow
@@ -58,6 +60,19 @@ bool parse_records(std::span<const std::byte> payload, std::vector<JournalRecord
   return true;
 }
 
+// Whole records, as many as make a small chunk.
+std::vector<std::span<const std::byte>> parts_of(std::span<const std::byte> payload) {
+  std::vector<std::span<const std::byte>> parts;
+  for (std::size_t size = 0; !payload.empty(); size = 0) {
+    do size += kRecordHeader + get<std::uint32_t>(payload, size + 9);
+    while (size < payload.size() &&
+           size + kRecordHeader + get<std::uint32_t>(payload, size + 9) <= kMostPayload);
+    parts.push_back(payload.first(size));
+    payload = payload.subspan(size);
+  }
+  return parts;
+}
+
 // So that a power cut does not take the new file's name. False with errno set.
 bool sync_directory(const std::string& file) {
   const std::filesystem::path parent = std::filesystem::path(file).parent_path();
@@ -82,8 +97,10 @@ JournalWriter::JournalWriter(const std::string& path, std::string_view header) :
                             ? "; recover it with supertac-import --journal, or choose another folder"
                             : "; choose a folder that can be written"));
   }
-  append(Stream::header, RecordKind::text, 0, std::as_bytes(std::span(header)));
-  flush();
+  for (int copy = 0; copy < 2; ++copy) {
+    append(Stream::header, RecordKind::text, 0, std::as_bytes(std::span(header)));
+    flush();
+  }
   if (error_.empty() && !sync_directory(path)) failed("its folder cannot be synced");
   if (!error_.empty()) {
     (void)system_calls().close(descriptor_);
@@ -113,7 +130,6 @@ void JournalWriter::append(Stream stream, RecordKind kind, double time_s, std::s
     wake_.notify_all();
   }
   Pending& pending = pending_[stream];
-  if (pending.payload.empty()) pending.time_s = time_s;
   pending_bytes_ += kRecordHeader + bytes.size();
   pending.payload.push_back(static_cast<std::byte>(kind));
   put(pending.payload, time_s);
@@ -172,20 +188,23 @@ void JournalWriter::flush() {
     flush_due_ = false;
     if (!error_.empty()) return;  // after a failed write nothing behind it would be read anyway
   }
-  for (const auto& [stream, pending] : chunks) write_chunk(stream, pending);
+  for (const auto& [stream, pending] : chunks) {
+    for (const std::span<const std::byte> part : parts_of(pending.payload))
+      write_chunk(stream, get<double>(part, 1), part);
+  }
 }
 
-void JournalWriter::write_chunk(Stream stream, const Pending& pending) {
+void JournalWriter::write_chunk(Stream stream, double time_s, std::span<const std::byte> payload) {
   std::vector<std::byte> chunk;
-  chunk.reserve(kChunkHeader + pending.payload.size());
+  chunk.reserve(kChunkHeader + payload.size());
   put(chunk, kMagic);
   put(chunk, static_cast<std::uint32_t>(stream));
-  put(chunk, static_cast<std::uint32_t>(pending.payload.size()));
+  put(chunk, static_cast<std::uint32_t>(payload.size()));
   put(chunk, std::uint32_t{0});
-  put(chunk, pending.time_s);
-  const std::uint32_t sum = chunk_sum(chunk, pending.payload);
+  put(chunk, time_s);
+  const std::uint32_t sum = chunk_sum(chunk, payload);
   memcpy(chunk.data() + 12, &sum, sizeof sum);
-  chunk.insert(chunk.end(), pending.payload.begin(), pending.payload.end());
+  chunk.insert(chunk.end(), payload.begin(), payload.end());
   for (std::size_t done = 0; done < chunk.size();) {
     const ssize_t count = system_calls().write(descriptor_, chunk.data() + done, chunk.size() - done);
     if (count < 0 && errno == EINTR) continue;
@@ -226,29 +245,74 @@ const std::vector<JournalRecord>& Journal::of(Stream stream) const {
   return found == streams.end() ? kNone : found->second;
 }
 
+namespace {
+
+struct Chunk {
+  Stream stream = Stream::header;
+  double time_s = 0;
+  std::size_t size = 0;    // 0: there is no whole chunk here
+  std::size_t summed = 0;  // bytes looked at to find that out
+  std::vector<JournalRecord> records;
+};
+
+Chunk chunk_at(std::span<const std::byte> bytes) {
+  Chunk chunk;
+  if (bytes.size() < kChunkHeader || get<std::uint32_t>(bytes, 0) != kMagic) return chunk;
+  const auto length = get<std::uint32_t>(bytes, 8);
+  if (length > bytes.size() - kChunkHeader) return chunk;
+  const auto payload = bytes.subspan(kChunkHeader, length);
+  chunk.summed = length;
+  if (get<std::uint32_t>(bytes, 12) != chunk_sum(bytes.first(kChunkHeader), payload)) return chunk;
+  chunk.stream = static_cast<Stream>(get<std::uint32_t>(bytes, 4));
+  if (!parse_records(payload, chunk.records)) return chunk;
+  chunk.time_s = get<double>(bytes, 16);
+  chunk.size = kChunkHeader + length;
+  return chunk;
+}
+
+// The next place where a chunk may begin, behind the first byte.
+std::size_t next_magic(std::span<const std::byte> bytes) {
+  const auto magic = std::as_bytes(std::span(&kMagic, 1));
+  return static_cast<std::size_t>(std::search(bytes.begin() + 1, bytes.end(), magic.begin(), magic.end()) -
+                                  bytes.begin());
+}
+
+}  // namespace
+
 Journal parse_journal(std::span<const std::byte> bytes, const std::string& name) {
   Journal journal;
-  bool first = true;
-  while (bytes.size() >= kChunkHeader && get<std::uint32_t>(bytes, 0) == kMagic) {
-    const auto stream = static_cast<Stream>(get<std::uint32_t>(bytes, 4));
-    const auto length = get<std::uint32_t>(bytes, 8);
-    if (length > bytes.size() - kChunkHeader) break;
-    const auto payload = bytes.subspan(kChunkHeader, length);
-    if (get<std::uint32_t>(bytes, 12) != chunk_sum(bytes.first(kChunkHeader), payload)) break;
-    std::vector<JournalRecord> records;
-    if (!parse_records(payload, records)) break;
-    if (first && (stream != Stream::header || records.size() != 1)) break;
-    if (first) journal.header = records[0].text();
-    first = false;
-    auto& all = journal.streams[stream];
-    all.insert(all.end(), std::make_move_iterator(records.begin()), std::make_move_iterator(records.end()));
-    bytes = bytes.subspan(kChunkHeader + length);
+  bool headed = false;
+  std::uint64_t damaged = 0;  // since the last whole chunk
+  double before_s = 0;        // time of that chunk
+  // A file made of beginnings of chunks would have all of it summed up at each of them.
+  std::size_t patience = 16 * bytes.size() + (1 << 20);
+  while (!bytes.empty()) {
+    Chunk chunk = chunk_at(bytes);
+    if (chunk.size == 0) {
+      const std::size_t skipped = chunk.summed > patience ? bytes.size() : next_magic(bytes);
+      patience -= std::min(patience, chunk.summed);
+      damaged += skipped;
+      bytes = bytes.subspan(skipped);
+      continue;
+    }
+    const bool is_header = chunk.stream == Stream::header;
+    if (is_header && !headed && chunk.records.size() == 1) {
+      journal.header = chunk.records[0].text();
+      headed = true;
+    }
+    if (damaged > 0 && !is_header && before_s > 0) journal.lost_s += std::max(0.0, chunk.time_s - before_s);
+    journal.lost_bytes += std::exchange(damaged, 0);
+    if (!is_header) before_s = chunk.time_s;
+    auto& all = journal.streams[chunk.stream];
+    all.insert(all.end(), std::make_move_iterator(chunk.records.begin()),
+               std::make_move_iterator(chunk.records.end()));
+    bytes = bytes.subspan(chunk.size);
   }
-  if (first) {
+  if (!headed) {
     throw JournalError("journal " + name +
                        ": expected a SuperTac journal, found other bytes or a damaged beginning");
   }
-  journal.torn_bytes = bytes.size();
+  journal.torn_bytes = damaged;
   return journal;
 }
 

@@ -1,7 +1,8 @@
 // The append-only journal of a running collection. Chunks of {magic, stream, length, time, CRC-32, payload},
 // at most 0.1 s apart - of the records' own time as well, which runs faster on a sped-up rig - and synced
-// each second: kill -9 loses at most 0.5 s, a power cut 1.5 s. A torn tail is dropped on reading; all counts
-// are derived from the data.
+// each second: kill -9 loses at most 0.5 s, a power cut 1.5 s. Chunks hold at most 2 kB, and the header
+// stands there twice: what is damaged costs its own chunk only, and a torn tail is dropped. All counts are
+// derived from the data.
 #pragma once
 
 #include <condition_variable>
@@ -52,13 +53,12 @@ class JournalWriter {
 
  private:
   struct Pending {
-    double time_s = 0;
     std::vector<std::byte> payload;
   };
   void run();
   void run_sync();
   void flush();
-  void write_chunk(Stream stream, const Pending& pending);
+  void write_chunk(Stream stream, double time_s, std::span<const std::byte> payload);
   void sync();
   void failed(const std::string& what);
 
@@ -79,11 +79,13 @@ struct Journal {
   std::string header;
   std::map<Stream, std::vector<JournalRecord>> streams;
   std::uint64_t torn_bytes = 0;  ///< at the end, dropped
+  std::uint64_t lost_bytes = 0;  ///< damaged before that, dropped
+  double lost_s = 0;             ///< of the records' time, between what stands before and behind the damage
   const std::vector<JournalRecord>& of(Stream stream) const;
 };
 
-/// Reads a journal up to its first damaged chunk. Throws FileError when the file cannot be read, JournalError
-/// when it does not begin like a journal.
+/// Reads the undamaged chunks of a journal. Throws FileError when the file cannot be read, JournalError when
+/// there is none, or no header among them.
 Journal read_journal(const std::string& path);
 
 /// The same from bytes in memory; what the fuzzer calls.

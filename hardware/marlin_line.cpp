@@ -121,6 +121,9 @@ Reply parse_reply(std::string_view line) {
   if (const auto position = position_in(line)) {
     return {ReplyKind::position, {}, *position, std::string(line)};
   }
+  const std::size_t text = line.find_first_not_of(' ');
+  if (text != std::string_view::npos && line.substr(text).starts_with("T:"))
+    return kind(ReplyKind::temperature);
   return kind(ReplyKind::other);
 }
 

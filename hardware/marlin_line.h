@@ -44,7 +44,8 @@ enum class ReplyKind {
   paused,           ///< echo:busy: paused for user
   start,            ///< the firmware restarted
   wait,             ///< heartbeat of an idle firmware
-  position,         ///< M114
+  position,         ///< M114, or M154's report of the queue's end
+  temperature,      ///< M155's report
   other
 };
 

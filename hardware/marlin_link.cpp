@@ -29,6 +29,7 @@ struct MarlinLink::Exchange {
   bool done = false;
   bool proven = false;         // by Last Line, not by an ok
   std::int64_t fallback = -1;  // implausibly old line the firmware named last
+  std::string code = {};       // as sent
   std::string error = {};      // unfamiliar Error: of the command itself
   bool error_stands = false;   // and the firmware did run it
 };
@@ -50,7 +51,17 @@ void MarlinLink::connect() {
   number_ = 0;
   kept_.clear();
   connected_ = true;
+  switch_reports_off();
   read_capabilities();
+}
+
+void MarlinLink::switch_reports_off() {
+  for (const char* off : {"M154 S0", "M155 S0"}) {
+    try {
+      command(off);
+    } catch (const PrinterRefused&) {  // a firmware that does not know it sends no such reports
+    }
+  }
 }
 
 void MarlinLink::nobody_answered() const {
@@ -99,6 +110,7 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
   if (kept_.size() > settings_.kept_lines) kept_.pop_front();
   ++counters_.lines;
   Exchange exchange{number_, number_, deadline_s > 0 ? deadline_s : settings_.ok_deadline_s};
+  exchange.code = shielded(code);
   exchange.answer.sent_s = send(kept_.back());
   exchange.until = exchange.answer.sent_s + exchange.deadline_s;
   std::string text;
@@ -168,6 +180,11 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
       if (reply.number && *reply.number <= exchange.number) on_last_line(exchange, *reply.number - 1);
       break;
     case ReplyKind::unknown_command:  // acknowledged by the ok that follows, but not run
+      if (reply.text.find('"' + exchange.code + '"') != std::string::npos) {
+        exchange.error = reply.text;  // the whole line came through: the firmware does not know it
+        exchange.error_stands = true;
+        break;
+      }
       ++counters_.faults;
       exchange.fault = true;
       break;
@@ -176,6 +193,7 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
       exchange.fault = true;
       break;
     case ReplyKind::wait:
+    case ReplyKind::temperature:
       break;
     default:
       if (exchange.answer.replies.size() < 256) exchange.answer.replies.push_back(std::move(reply));
@@ -244,15 +262,20 @@ void MarlinLink::settle() {
   while (read_line(std::min(quiet_until, limit), line)) {
     const Reply reply = parse_reply(line);
     if (reply.kind == ReplyKind::start || reply.kind == ReplyKind::fatal) check_alarm(reply);
-    quiet_until = input_time_ + settings_.quiet_s;
+    // Reports come for ever; what is waited for is the end of answers.
+    const bool report = reply.kind == ReplyKind::position || reply.kind == ReplyKind::temperature;
+    if (!report) quiet_until = input_time_ + settings_.quiet_s;
   }
   input_.clear();
 }
 
 void MarlinLink::check_alarm(const Reply& reply) {
+  if (reply.kind == ReplyKind::ok) complaint_.clear();
+  if (reply.kind == ReplyKind::other && reply.text.starts_with("echo:")) complaint_ = reply.text;
   if (reply.kind == ReplyKind::fatal) {
     halted_ = true;
-    throw PrinterHalted("printer " + port_.name() + ": the firmware halted (" + in_quotes(reply.text) +
+    throw PrinterHalted("printer " + port_.name() + ": the firmware halted (" +
+                        (complaint_.empty() ? "" : in_quotes(complaint_) + ", ") + in_quotes(reply.text) +
                         "); nothing more is sent, reset the printer and check it");
   }
   if (reply.kind == ReplyKind::start && connected_) {

@@ -52,8 +52,9 @@ class MarlinLink {
   /// `port` must outlive the link.
   explicit MarlinLink(Port& port, const MarlinSettings& settings = {});
 
-  /// Finds a fresh (`start` banner) or a running firmware, sets its line number to 0, reads M115.
-  /// Throws PrinterSilent; WrongDevice when what comes is no firmware's answer; PrinterHalted.
+  /// Finds a fresh (`start` banner) or a running firmware, sets its line number to 0, switches off the
+  /// reports that an earlier host may have left on (M154, M155), reads M115. Throws PrinterSilent;
+  /// WrongDevice when what comes is no firmware's answer; PrinterHalted.
   void connect();
 
   /// Runs one command and returns when the firmware has acknowledged it. `deadline_s` 0: ok_deadline_s;
@@ -69,7 +70,7 @@ class MarlinLink {
   /// Throws PrinterReset, PrinterHalted when one of the replies says so.
   void idle(double seconds);
 
-  /// Reads replies until the port has been silent for quiet_s (at most 2 s).
+  /// Reads replies until for quiet_s none came but automatic reports (at most 2 s).
   void settle();
 
   /// Called at least every 0.02 s while waiting for the firmware; what it throws ends the wait.
@@ -85,6 +86,7 @@ class MarlinLink {
 
   bool probe(double until);
   [[noreturn]] void nobody_answered() const;
+  void switch_reports_off();
   void read_capabilities();
   double send(const std::string& text);
   /// Sends the exchange's current line (again), counting and limiting the repetitions.
@@ -106,6 +108,7 @@ class MarlinLink {
   FrameDecoder sniffer_;          // tells a tactile board from a printer while connecting
   std::string input_;             // received, not yet a whole line
   double input_time_ = 0;         // arrival of its last byte
+  std::string complaint_;         // the last echo: since an ok; a halt's reason stands before it
   std::deque<std::string> kept_;  // lines number_ - kept_.size() + 1 ... number_
   std::int64_t number_ = 0;       // of the newest line
   bool connected_ = false;

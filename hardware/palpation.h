@@ -38,6 +38,10 @@ struct Leg {
   double ended_s = 0;     ///< the firmware's ok to M400
 };
 
+/// Whether the head can have come from the one sample to the other at the leg's speed; the delay of answers
+/// and their rounding allowed for.
+bool reachable(const Leg& leg, const PositionSample& from, const PositionSample& to);
+
 /// What a run tells while it runs. `check` may throw: the operator's Ctrl-C, a board that is gone, a full
 /// disk.
 struct PalpationObserver {

@@ -15,6 +15,15 @@ std::string coordinates(const Point3& p) {
   return " X" + format(p.x, 3) + " Y" + format(p.y, 3) + " Z" + format(p.z, 3);
 }
 
+// A firmware may report its queue's end (M154) between any two lines: the answer is the last position before
+// the ok.
+const Reply* position_in(const MarlinLink::Answer& answer) {
+  for (auto reply = answer.replies.rbegin(); reply != answer.replies.rend(); ++reply) {
+    if (reply->kind == ReplyKind::position) return &*reply;
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 std::string move_command(const Point3& target, double speed_mm_s) {
@@ -90,22 +99,19 @@ double Printer::finish_move() {
                       "; confirm the origin and start again");
 }
 
-std::optional<PositionSample> Printer::sample_position() {
-  const MarlinLink::Answer answer = link_.command("M114 R", settings_.poll_deadline_s);
-  if (answer.repeated) return std::nullopt;
-  for (const Reply& reply : answer.replies) {
-    if (reply.kind != ReplyKind::position) continue;
-    return PositionSample{0.5 * (answer.sent_s + answer.answered_s), answer.answered_s - answer.sent_s,
-                          reply.position};
-  }
-  return std::nullopt;
+std::optional<PositionSample> Printer::sample_position(double deadline_s) {
+  const MarlinLink::Answer answer =
+      link_.command("M114 R", deadline_s > 0 ? deadline_s : settings_.poll_deadline_s);
+  const Reply* reply = position_in(answer);
+  if (answer.repeated || reply == nullptr) return std::nullopt;
+  return PositionSample{0.5 * (answer.sent_s + answer.answered_s), answer.answered_s - answer.sent_s,
+                        reply->position};
 }
 
 Point3 Printer::queue_position() {
   for (int attempt = 0; attempt < 5; ++attempt) {
-    for (const Reply& reply : link_.command("M114").replies) {
-      if (reply.kind == ReplyKind::position) return reply.position;
-    }
+    const MarlinLink::Answer answer = link_.command("M114");
+    if (const Reply* reply = position_in(answer)) return reply->position;
     link_.settle();
   }
   throw PrinterSilent("printer " + link_.port().name() +
@@ -128,7 +134,8 @@ bool Printer::stands_still() {
   int same = 0;
   const double until = link_.port().now() + settings_.stop_deadline_s;
   while (link_.port().now() < until) {
-    const auto sample = sample_position();
+    // M410 holds Marlin for a second, in which it answers nothing.
+    const auto sample = sample_position(settings_.stop_deadline_s);
     if (!sample) continue;
     same = same > 0 && distance(before, sample->position) < 0.005 ? same + 1 : 1;
     before = sample->position;
@@ -160,7 +167,9 @@ Printer::Stop Printer::quick_stop() {
   stop.text = stop.confirmed ? "the head stands still"
                              : "the head could not be shown to stand still; switch the printer off";
   if (!stop.ahead_of_queue)
-    stop.text += " (this firmware has no emergency parser: a stop waits behind the queue)";
+    stop.text +=
+        " (this firmware has no emergency parser: a stop acts when its line is read, not before an M400 "
+        "ends)";
   return stop;
 }
 

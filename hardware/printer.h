@@ -58,8 +58,8 @@ class Printer {
   /// they differ by more than the tolerance three times running. Returns the time at which M400 was answered.
   double finish_move();
 
-  /// M114 R; nothing when the answer was damaged or late.
-  std::optional<PositionSample> sample_position();
+  /// M114 R; nothing when the answer was damaged or later than `deadline_s` (0: poll_deadline_s).
+  std::optional<PositionSample> sample_position(double deadline_s = 0);
   /// M114: the end of the queue, which is the head's position only after M400.
   Point3 queue_position();
 

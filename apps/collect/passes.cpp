@@ -38,7 +38,14 @@ Header header_of(const Collection& collection, const std::string& journal) {
   throw JournalError(journal + ": its header has a trial or speed out of range");
 }
 
-Recording recording_of(const CollectedPass& pass, const Header& header) {
+/// What is missing from a damaged journal; empty: nothing.
+std::string damage_of(const Collection& collection) {
+  if (collection.lost_bytes == 0) return {};
+  return std::to_string(collection.lost_bytes) + " damaged bytes of the journal, " +
+         format(collection.lost_s, 2) + " s, are missing";
+}
+
+Recording recording_of(const CollectedPass& pass, const Header& header, const std::string& damage) {
   Recording recording;
   recording.time_s = pass.time_s;
   recording.volts = pass.volts;
@@ -54,6 +61,8 @@ Recording recording_of(const CollectedPass& pass, const Header& header) {
   recording.metadata = {{"complete", pass.complete ? "true" : "false"},
                         {"missing_frames", std::to_string(pass.missing)},
                         {"time_base", pass.positions > 0 ? "M114 R" : "modelled motion"}};
+  if (!damage.empty()) recording.metadata["damage"] = damage;
+  if (!pass.doubt.empty()) recording.metadata["doubt"] = pass.doubt;
   return recording;
 }
 
@@ -75,7 +84,8 @@ nlohmann::ordered_json to_json(const CollectedPass& pass, const std::string& fil
           {"complete", pass.complete},   {"seconds", quality.seconds},
           {"frames", quality.frames},    {"frames_per_s", quality.rate_hz},
           {"missing", pass.missing},     {"suspect", quality.suspect},
-          {"positions", pass.positions}, {"rejected_positions", pass.rejected_positions}};
+          {"positions", pass.positions}, {"rejected_positions", pass.rejected_positions},
+          {"doubt", pass.doubt}};
 }
 
 std::string to_line(const CollectedPass& pass) {
@@ -83,7 +93,7 @@ std::string to_line(const CollectedPass& pass) {
   return "pass " + std::to_string(pass.pass) + ": " + std::to_string(quality.frames) + " frames (" +
          format(quality.rate_hz, 1) + "/s), " + std::to_string(pass.missing) + " missing, " +
          std::to_string(quality.suspect) + " suspect, " + std::to_string(pass.positions) + " positions" +
-         (pass.complete ? "" : ", incomplete");
+         (pass.complete ? "" : ", incomplete") + (pass.doubt.empty() ? "" : ", doubtful: " + pass.doubt);
 }
 
 }  // namespace
@@ -98,27 +108,34 @@ std::string journal_path(const std::string& folder, const std::string& plate, in
   return folder + "/" + plate + "_t" + std::to_string(trial) + "_v" + format(speed) + ".journal";
 }
 
+std::string PassesReport::total() const {
+  return std::to_string(frames) + " frames" +
+         (doubtful > 0 ? ", " + std::to_string(doubtful) + " passes with doubtful positions" : "") +
+         (damage.empty() ? "" : ", " + damage);
+}
+
 PassesReport write_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
                           OutputFolder& folder) {
   const Collection collection = collection_of(read_journal(journal));
   const Header header = header_of(collection, journal);
-  PassesReport report{.complete = collection.complete};
+  PassesReport report{.complete = collection.complete, .damage = damage_of(collection)};
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
   for (const CollectedPass& pass : collection.passes) {
     if (pass.time_s.size() < 2) continue;
-    const Recording recording = recording_of(pass, header);
+    const Recording recording = recording_of(pass, header, report.damage);
     const std::string name = recording_file_name(recording);
     write_recording(folder.add(name), recording);
     arguments.print(to_line(pass));
     passes.push_back(to_json(pass, name));
     report.frames += pass.time_s.size();
+    report.doubtful += pass.doubt.empty() ? 0 : 1;
   }
   if (Plate::is_file(header.plate))
     keep_plate_file((fs::path(journal).parent_path() / header.plate).string(), out);
   const ClockFit& clock = collection.clock;
   if (!clock.plausible)
-    arguments.note("warning: the board's period is " + format(1e6 * clock.period_s, 1) + " us, expected " +
-                   format(1e6 * rig::kFramePeriodS, 0) + " +- 0.5 %");
+    arguments.note("warning: the board's period is " + format(1e6 * clock.measured_s, 1) + " us, expected " +
+                   format(1e6 * rig::kFramePeriodS, 0) + " +- 0.5 %; the nominal one is used");
   report.json = {{"folder", out},
                  {"journal", journal},
                  {"plate", header.plate},
@@ -126,9 +143,12 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
                  {"speed_mm_s", header.speed},
                  {"complete", collection.complete},
                  {"torn_bytes", collection.torn_bytes},
-                 {"board_period_us", 1e6 * clock.period_s},
+                 {"lost_bytes", collection.lost_bytes},
+                 {"lost_s", collection.lost_s},
+                 {"board_period_us", 1e6 * clock.measured_s},
                  {"board_period_plausible", clock.plausible},
                  {"frames", report.frames},
+                 {"doubtful_passes", report.doubtful},
                  {"passes", passes}};
   return report;
 }

@@ -14,9 +14,13 @@ std::string journal_path(const std::string& folder, const std::string& plate, in
 
 /// What a journal held, for the reader and for --json.
 struct PassesReport {
-  std::size_t frames = 0;  ///< in the recordings
-  bool complete = false;   ///< the run ended as planned
+  std::size_t frames = 0;    ///< in the recordings
+  std::size_t doubtful = 0;  ///< passes whose positions may be wrong
+  bool complete = false;     ///< the run ended as planned
+  std::string damage = {};   ///< of the journal, in words; empty: none
   nlohmann::ordered_json json = {};
+  /// ", N frames" and what is to be said of doubtful passes: the end of the last line.
+  std::string total() const;
 };
 
 /// Turns a journal into one recording per pass in `folder`, with a line of quality each, and the plate's STL

@@ -1,7 +1,10 @@
 #include "apps/common/arguments.h"
 
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cxxopts.hpp>
+#include <filesystem>
 #include <iostream>
 #include <limits>
 #include <set>
@@ -26,6 +29,25 @@ void add(cxxopts::Options& parser, const std::string& group, const std::string& 
     parser.add_options(group)(names, help, default_value.empty() ? type : type->default_value(default_value),
                               value);
   }
+}
+
+// What programs write, and the values that may name a file to be read.
+constexpr std::array<std::string_view, 7> kOutputs = {"capture", "gcode",    "json",       "out",
+                                                      "outputs", "pictures", "write-pairs"};
+constexpr std::array<std::string_view, 5> kPathValues = {"FILE", "DIR", "JOURNAL", "TEXT_DIR", "NAME"};
+
+bool names_path(const std::string& value) {
+  return std::any_of(kPathValues.begin(), kPathValues.end(),
+                     [&](std::string_view kind) { return value.starts_with(kind); });
+}
+
+// Names and messages may hold what a terminal obeys.
+std::string without_controls(std::string_view line) {
+  std::string text(line);
+  std::replace_if(
+      text.begin(), text.end(),
+      [](unsigned char c) { return (c < ' ' && c != '\t' && c != '\n') || c == 0x7F; }, '?');
+  return text;
 }
 
 }  // namespace
@@ -151,6 +173,7 @@ void Arguments::parse(int argc, const char* const* argv) {
   }
   if (given("help") || given("version")) return;
   check_complete();
+  check_names_given();
   check_together();
 }
 
@@ -161,6 +184,34 @@ void Arguments::check_complete() const {
     throw UsageError("missing " + (option.is_positional ? name : "--" + name + " " + option.value) + ": " +
                      option.help);
   }
+}
+
+// An empty name is a variable that was not set, not a wish to leave the option out.
+void Arguments::check_names_given() const {
+  for (const auto& [name, text] : values_) {
+    const Option& option = options_.at(name);
+    if (option.is_flag || !text.empty() || !names_path(option.value)) continue;
+    throw UsageError("--" + name + ": expected " + option.value + ", found an empty name");
+  }
+}
+
+std::vector<NamedPath> Arguments::paths() const {
+  std::vector<NamedPath> paths;
+  for (const auto& [name, text] : values_) {
+    const Option& option = options_.at(name);
+    if (option.is_flag || !names_path(option.value) || (name == "json" && text == "-")) continue;
+    const bool is_output = std::find(kOutputs.begin(), kOutputs.end(), name) != kOutputs.end();
+    const bool is_folder = option.value.ends_with("DIR");
+    if (is_output || is_folder) {
+      paths.push_back({name, text, is_output, is_folder});
+      continue;
+    }
+    for (const std::string& path : comma_list(text)) {
+      std::error_code error;
+      if (std::filesystem::exists(path, error)) paths.push_back({name, path, false, false});
+    }
+  }
+  return paths;
 }
 
 void Arguments::check_together() const {
@@ -251,11 +302,11 @@ int Arguments::threads() const {
 }
 
 void Arguments::print(std::string_view line) const {
-  if (text("json") != "-") std::cout << line << '\n';
+  if (text("json") != "-") std::cout << without_controls(line) << '\n';
 }
 
 void Arguments::note(std::string_view line) const {
-  if (!quiet()) std::cerr << line << '\n';
+  if (!quiet()) std::cerr << without_controls(line) << '\n';
 }
 
 void Arguments::write_json(const nlohmann::ordered_json& result) const {

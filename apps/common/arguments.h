@@ -28,6 +28,12 @@ auto read_option(const std::string& option, Work work) {
   }
 }
 
+/// A file or folder that the command line names.
+struct NamedPath {
+  std::string option, path;
+  bool is_output = false, is_folder = false;
+};
+
 /// Options of one program. Every program also has --help, --version, --json, --quiet, --threads and --force.
 class Arguments {
  public:
@@ -74,6 +80,9 @@ class Arguments {
   std::vector<std::string> list(const std::string& name) const;
   std::vector<double> numbers(const std::string& name, double lowest, double highest) const;
 
+  /// All files and folders named; what an option may name but does not hold is left out.
+  std::vector<NamedPath> paths() const;
+
   bool force() const { return flag("force"); }
   bool quiet() const { return flag("quiet"); }
   /// --threads, or what the machine grants (apps/common/threads.h).
@@ -105,6 +114,7 @@ class Arguments {
   void declare(const std::string& name, Option option);
   void check_names(int argc, const char* const* argv) const;
   void check_complete() const;
+  void check_names_given() const;
   void check_together() const;
   [[noreturn]] void reject(const std::string& name, const std::string& expected,
                            const std::string& found) const;

@@ -17,6 +17,7 @@ OutputFolder::OutputFolder(const std::string& path, bool force) : path_(path), f
   }
   try {
     make_directories(path);
+    lock_ = std::make_unique<FolderLock>(path);
     // Opens a temporary in the folder and removes it: the permission to write, tried.
     AtomicFile((fs::path(path) / ".writable").string());
   } catch (...) {

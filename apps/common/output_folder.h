@@ -1,12 +1,15 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "io/folder_lock.h"
+
 namespace supertac {
 
-/// A folder that a program fills with several files, all or none: what it has made is removed again unless
-/// keep() is called. Files that were there before are never removed.
+/// A folder that a program fills with several files, all or none, and holds alone meanwhile: what it has made
+/// is removed again unless keep() is called. Files that were there before are never removed.
 class OutputFolder {
  public:
   /// Creates the folder where it is missing.
@@ -24,6 +27,7 @@ class OutputFolder {
   void remove_made();
 
   std::string path_;
+  std::unique_ptr<FolderLock> lock_;
   bool force_;
   bool kept_ = false;
   std::vector<std::string> made_;     // files that were not there before

@@ -2,10 +2,11 @@
 
 #include <omp.h>
 
-#include <algorithm>
+#include <filesystem>
 #include <iostream>
 #include <new>
 
+#include "apps/common/outputs.h"
 #include "apps/common/signals.h"
 #include "apps/common/version.h"
 #include "io/file.h"
@@ -15,16 +16,16 @@ namespace {
 
 /// One line, whatever the message holds.
 int fail(const Program& program, std::string message, int code) {
-  std::replace(message.begin(), message.end(), '\n', ' ');
+  for (char& c : message)
+    if (static_cast<unsigned char>(c) < ' ' || c == 0x7F) c = c == '\n' ? ' ' : '?';
   std::cerr << program.name << ": " << message << '\n';
   return code;
 }
 
 int run(const Program& program, Arguments& arguments) {
   omp_set_num_threads(arguments.threads());
-  const std::string json = arguments.text("json");
-  if (!json.empty() && json != "-") refuse_existing(json, arguments.force());
   catch_signals();
+  check_outputs(arguments);
   if (program.numerics != nullptr) {
     if (const std::string warning = program.numerics().warning; !warning.empty()) {
       std::cerr << program.name << ": " << warning << '\n';
@@ -58,6 +59,17 @@ int catch_all(const Program& program, int argc, const char* const* argv) {
     return fail(program, std::string(error.what()) + " (see --help)", kExitUsage);
   } catch (const std::bad_alloc&) {
     return fail(program, "out of memory; close other programs or ask for less", kExitFailed);
+  } catch (const std::filesystem::filesystem_error& error) {
+    return fail(
+        program,
+        error.path1().string() + ": cannot be used: " + error.code().message() + "; choose another name",
+        kExitFailed);
+  } catch (const nlohmann::json::exception& error) {
+    const std::string what = error.what();  // "[json.exception.type_error.302] ..."
+    return fail(program,
+                "settings in a file or a name are not as expected: " + what.substr(what.find("] ") + 2) +
+                    "; is it the right file, is its name UTF-8?",
+                kExitFailed);
   } catch (const std::exception& error) {
     return fail(program, error.what(), kExitFailed);
   }
@@ -66,10 +78,11 @@ int catch_all(const Program& program, int argc, const char* const* argv) {
 }  // namespace
 
 int run_program(const Program& program, int argc, const char* const* argv) {
+  open_standard_descriptors();
   const int code = catch_all(program, argc, argv);
   std::cout.flush();
   if (std::cout.fail() && code == kExitOk)
-    return fail(program, "stdout: cannot write; is the disk full?", kExitFailed);
+    return fail(program, "stdout: cannot write; has its reader gone, is the disk full?", kExitFailed);
   return code;
 }
 

@@ -20,6 +20,7 @@ void remember(int number) {
 }  // namespace
 
 void catch_signals() {
+  std::signal(SIGPIPE, SIG_IGN);  // a reader of stdout that went away must not cost the files under way
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes is then an error of write(), like a full disk
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction before {};

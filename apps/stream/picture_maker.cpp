@@ -37,7 +37,14 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
       network_(models),
       window_(window_settings(model_, source)),
       input_(network_.first().input_shape(1)),
-      output_(network_.infer(input_)) {}  // the first run takes memory and chooses kernels
+      output_(network_.infer(input_)) {  // the first run takes memory and chooses kernels
+  for (const float value : output_.values()) {
+    if (!std::isfinite(value))
+      throw std::runtime_error(
+          "the model draws no numbers (NaN or infinity): its weights are damaged or its "
+          "training diverged; choose another model");
+  }
+}
 
 std::span<const float> PictureMaker::picture() {
   if (!window_.window(input_.values())) return {};

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
+#include <filesystem>
 
 #include "hardware/capture.h"
 #include "hardware/errors.h"
@@ -17,8 +19,11 @@ constexpr char kCaptureHeader[] = R"({"version":1,"kind":"stream"})";
 
 class BoardSource : public SensorSource {
  public:
-  BoardSource(std::unique_ptr<Port> port, std::unique_ptr<JournalWriter> capture, double speedup)
+  /// The capture takes the name `final_name` when it is complete.
+  BoardSource(std::unique_ptr<Port> port, std::unique_ptr<JournalWriter> capture, std::string final_name,
+              double speedup)
       : SensorSource(rig::kFramePeriodS, 0, true),
+        final_name_(std::move(final_name)),
         speedup_(speedup),
         capture_(std::move(capture)),
         board_(capture_ ? std::make_unique<CapturedPort>(std::move(port), *capture_, Stream::board)
@@ -35,10 +40,14 @@ class BoardSource : public SensorSource {
   BoardCounters counters() override { return board_.counters(); }
   void finish() override {
     board_.stop();
-    if (capture_) capture_->close();
+    if (!capture_) return;
+    capture_->close();
+    if (capture_->path() != final_name_ && std::rename(capture_->path().c_str(), final_name_.c_str()) != 0)
+      throw FileError(final_name_, "cannot be replaced; the capture is " + capture_->path());
   }
 
  private:
+  std::string final_name_;
   double speedup_;
   std::unique_ptr<JournalWriter> capture_;  // outlives the board, whose port writes to it
   TactileBoard board_;
@@ -112,8 +121,11 @@ std::unique_ptr<SensorSource> open_board(const std::string& port, double speedup
                                          const std::string& capture) {
   auto serial =
       std::make_unique<SerialPort>(resolve_board_port(port), SerialSettings{rig::kBoardBaud, speedup});
-  auto journal = capture.empty() ? nullptr : std::make_unique<JournalWriter>(capture, kCaptureHeader);
-  return std::make_unique<BoardSource>(std::move(serial), std::move(journal), speedup);
+  // An old capture stays until the new one is complete.
+  std::error_code error;
+  const std::string name = std::filesystem::exists(capture, error) ? capture + ".new" : capture;
+  auto journal = capture.empty() ? nullptr : std::make_unique<JournalWriter>(name, kCaptureHeader);
+  return std::make_unique<BoardSource>(std::move(serial), std::move(journal), capture, speedup);
 }
 
 std::unique_ptr<SensorSource> open_replay(const std::string& journal) {

@@ -1,10 +1,11 @@
 #include "apps/stream/terminal_view.h"
 
-#include <poll.h>
+#include <fcntl.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstdlib>
 #include <span>
@@ -101,11 +102,16 @@ std::string render(const LiveState& state, bool colour) {
   return text + status_line(state);
 }
 
-TerminalView::TerminalView() : colour_(colour_wanted()), thread_([this] { run(); }) {}
+// Opened anew: O_NONBLOCK on stderr itself would change it for the shell and everybody else who shares it.
+TerminalView::TerminalView()
+    : colour_(colour_wanted()),
+      terminal_(::open("/proc/self/fd/2", O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)),
+      thread_([this] { run(); }) {}
 
 TerminalView::~TerminalView() {
   stop_ = true;
   thread_.join();
+  if (terminal_ >= 0) ::close(terminal_);
 }
 
 void TerminalView::update(const LiveState& state) {
@@ -126,18 +132,27 @@ void TerminalView::run() {
   }
 }
 
-// A terminal that takes nothing (Ctrl-S) is left alone: the end of the program must not wait for it.
+// A terminal that takes nothing (Ctrl-S, a stuck connection) is left alone, with what it has not taken: the
+// end of the program must not wait for it. Poll says that there is room, not how much; TerminalView's own
+// descriptor does not block.
 void TerminalView::draw(const LiveState& state) {
-  pollfd terminal{STDERR_FILENO, POLLOUT, 0};
-  if (poll(&terminal, 1, 0) != 1 || (terminal.revents & POLLOUT) == 0) return;
+  if (!send_left()) return;
   std::string text = window_is_large_enough() ? render(state, colour_) : status_line(state);
   if (drawn_lines_ > 0) text = "\x1b[" + std::to_string(drawn_lines_) + "A\x1b[J" + text;
   drawn_lines_ = static_cast<int>(std::count(text.begin(), text.end(), '\n'));
-  for (std::string_view left = text; !left.empty();) {
-    const ssize_t count = ::write(STDERR_FILENO, left.data(), left.size());
-    if (count <= 0) return;
-    left.remove_prefix(static_cast<std::size_t>(count));
+  left_ = std::move(text);
+  (void)send_left();
+}
+
+bool TerminalView::send_left() {
+  while (!left_.empty()) {
+    const ssize_t count = ::write(terminal_, left_.data(), left_.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0 && errno != EAGAIN) left_.clear();  // the terminal is gone
+    if (count <= 0) return false;
+    left_.erase(0, static_cast<std::size_t>(count));
   }
+  return true;
 }
 
 }  // namespace supertac

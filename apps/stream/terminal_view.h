@@ -44,8 +44,12 @@ class TerminalView {
  private:
   void run();
   void draw(const LiveState& state);
+  /// False when the terminal has not taken everything yet.
+  bool send_left();
 
   bool colour_;
+  int terminal_ = -1;
+  std::string left_;  // not yet taken
   int drawn_lines_ = 0;
   std::mutex mutex_;
   LiveState newest_;

@@ -65,14 +65,21 @@ std::string RunFolder::folder_of(const std::string& model_file) {
 
 RunFolder::RunFolder(const std::string& model_file, bool force, std::optional<std::int64_t> resumed_step)
     : path_(folder_of(model_file)) {
+  if (path_ == model_file)
+    throw FileError(path_,
+                    "a name that ends in .run is that of the folder beside a model; choose another --out");
   const bool exists = std::filesystem::exists(path_);
   if (exists && !force && !resumed_step) {
-    throw FileError(path_, "is the folder of an earlier run; resume it with --resume " + checkpoint_path() +
-                               ", overwrite it with --force, or choose another --out");
+    throw FileError(path_, "is the folder of an earlier run; " +
+                               (std::filesystem::exists(checkpoint_path())
+                                    ? "resume it with --resume " + checkpoint_path() + ", "
+                                    : std::string()) +
+                               "overwrite it with --force, or choose another --out");
   }
   std::error_code error;
   std::filesystem::create_directories(path_, error);
   if (error) throw FileError(path_, "cannot create the folder: " + error.message());
+  lock_ = std::make_unique<FolderLock>(path_);
   if (resumed_step) lines_ = read_log(path_ + "/log.csv", *resumed_step);
   std::string text = kHeader;
   for (const LogLine& line : lines_) text += csv(line);

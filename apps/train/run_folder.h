@@ -1,11 +1,13 @@
 // What a training run leaves behind besides the model: settings.json, log.csv, last.safetensors, report.html.
 #pragma once
 
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "io/folder_lock.h"
 #include "models/trainer.h"
 
 namespace supertac {
@@ -40,6 +42,7 @@ class RunFolder {
 
  private:
   std::string path_;
+  std::unique_ptr<FolderLock> lock_;
   std::vector<LogLine> lines_;
   bool log_broken_ = false;
 };

@@ -26,6 +26,7 @@ struct TextureKind {
 
 namespace {
 
+constexpr double kFinestMm = 0.05, kWidestMm = 1000;
 constexpr double kFitSlackMm = 1e-9;  // an element that fits exactly still fits after rounding
 
 // Widths of an element, and heights at (dx, dy) from its centre.
@@ -144,6 +145,9 @@ Plate::Plate(std::string name, const std::vector<Texture>& textures) : name_(std
     if (kind == nullptr) continue;
     if (!(texture.pitch_mm > 0) || !(texture.height_mm > 0))
       refuse(name_, "pitch and height must be positive");
+    // Finer than any finger feels or printer prints, or wider than any plate: a mistyped name.
+    if (!(texture.pitch_mm >= kFinestMm && texture.pitch_mm <= kWidestMm && texture.height_mm <= kWidestMm))
+      refuse(name_, "pitch and height must be numbers from 0.05 to 1000 mm");
     if (kind->round && 2 * texture.height_mm > texture.pitch_mm + kFitSlackMm)
       refuse(name_, texture.kind + " are twice as wide as high and overlap at this pitch");
     const Band band = lay_out(texture, *kind);

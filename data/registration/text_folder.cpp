@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "data/registration/alignment.h"
 #include "data/registration/apply_registration.h"
@@ -52,12 +54,18 @@ std::vector<ImportedPass> find_passes(const std::string& root) {
     const std::string stl = folder.string() + ".stl";
     ImportedPass found = found_pass(folder, fs::exists(stl) ? stl : "");
     found.recording.plate = found.plate.name();
+    std::map<std::pair<int, int>, std::string> named;  // trial and pass
     for (const fs::path& trial : entries_of(folder, true)) {
       found.recording.trial = number_of(trial, trial.filename().string());
       for (const fs::path& pass : entries_of(trial, false)) {
         if (pass.extension() != ".txt") continue;
         found.path = pass.string();
         found.recording.pass = number_of(pass, pass.stem().string());
+        const auto [twin, is_new] =
+            named.emplace(std::pair(found.recording.trial, found.recording.pass), found.path);
+        if (!is_new)
+          throw FileError(found.path,
+                          "is the same trial and pass as " + twin->second + "; rename one of them");
         passes.push_back(found);
       }
     }
@@ -78,36 +86,49 @@ void read_and_register(ImportedPass& pass, double speed_mm_s) {
   pass.recording = std::move(recording);
 }
 
+void align(std::vector<ImportedPass>& plate) {
+  std::vector<RegisteredPass> passes;
+  for (ImportedPass& pass : plate) passes.push_back({&pass.recording, &pass.registration});
+  align_passes(passes);
+}
+
 }  // namespace
 
-std::vector<ImportedPass> import_text_folder(const std::string& root, const FolderImport& settings) {
+void import_text_folder(const std::string& root, const FolderImport& settings,
+                        const std::function<void(std::vector<ImportedPass>)>& take) {
   const std::vector<ImportedPass> found = find_passes(root);
-  std::vector<ImportedPass> imported;
   const auto progress = [&](std::size_t done) {
     if (settings.progress) settings.progress(done, found.size());
   };
+  bool any = false;
+  std::vector<ImportedPass> plate;
   for (std::size_t i = 0; i < found.size(); ++i) {
     progress(i);
     try {
       ImportedPass pass = found[i];
       read_and_register(pass, settings.speed_mm_s);
-      imported.push_back(std::move(pass));
+      plate.push_back(std::move(pass));
     } catch (const FileError& error) {
       if (!settings.left_out) throw;
       settings.left_out(error);
     }
+    const bool last = i + 1 == found.size() || found[i + 1].plate.name() != found[i].plate.name();
+    if (!last || plate.empty()) continue;
+    any = true;
+    progress(i + 1);
+    if (found[i].plate.uniform_in_x()) align(plate);
+    for (ImportedPass& pass : plate) apply(pass.registration, pass.recording);
+    take(std::exchange(plate, {}));
   }
-  if (imported.empty())
-    throw FileError(root, "none of " + std::to_string(found.size()) + " files is a recording");
-  std::map<std::string, std::vector<RegisteredPass>> plates;
-  for (ImportedPass& pass : imported)
-    if (pass.plate.uniform_in_x()) plates[pass.plate.name()].push_back({&pass.recording, &pass.registration});
-  for (const auto& [plate, passes] : plates) {
-    progress(found.size());
-    align_passes(passes);
-  }
-  for (ImportedPass& pass : imported) apply(pass.registration, pass.recording);
-  return imported;
+  if (!any) throw FileError(root, "none of " + std::to_string(found.size()) + " files is a recording");
+}
+
+std::vector<ImportedPass> import_text_folder(const std::string& root, const FolderImport& settings) {
+  std::vector<ImportedPass> all;
+  import_text_folder(root, settings, [&all](std::vector<ImportedPass> plate) {
+    std::move(plate.begin(), plate.end(), std::back_inserter(all));
+  });
+  return all;
 }
 
 std::string ImportedPass::summary() const {

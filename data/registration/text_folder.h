@@ -55,7 +55,10 @@ struct FolderImport {
 ///   speed. It is
 ///      last, since the registrations count by the clock of step 2.
 /// Throws FileError when the folder cannot be read, holds no pass, a plate is unknown, a trial or pass is no
-/// number, or no file is a recording.
+/// number, two files are the same pass, or no file is a recording.
+/// `take` gets the passes of one plate after the other, so that no more than these are in memory.
+void import_text_folder(const std::string& root, const FolderImport& settings,
+                        const std::function<void(std::vector<ImportedPass>)>& take);
 std::vector<ImportedPass> import_text_folder(const std::string& root, const FolderImport& settings);
 
 }  // namespace supertac

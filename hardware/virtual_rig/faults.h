@@ -19,6 +19,7 @@ struct RigFaults {
   double unplug_rate = 0;        ///< per line: the printer's port goes away
   double stall_rate =
       0;  ///< per line: the firmware answers 50 ms late; per frame: the board sends 20 ms late
+  double freeze_rate = 0;      ///< per line and per frame: 0.3 to 2 s without motion and answers, or frames
   double lost_frame_rate = 0;  ///< per frame: USB was busy, the frame vanishes
 
   /// The mix of `--faults RATE`: bytes at `rate`, every other fault scaled so that resets and unplugs stay

@@ -27,10 +27,23 @@ void MotionQueue::move_to(const Point3& to, double speed_mm_s, double t) {
   rest_ = blocks_.empty() ? at(t) : rest_;
   const Point3 from = target();
   if (from == to) return;
-  const double true_speed = speed_mm_s * (1 - 0.0012 * std::min(speed_mm_s, 100.0));
   const double start = blocks_.empty() ? t + rig::kStartDelayS : blocks_.back().end;
-  end_ = start + trapezoid_duration(distance(from, to), true_speed, acceleration_);
+  end_ =
+      start + slowness_ * trapezoid_duration(distance(from, to), rig::true_speed(speed_mm_s), acceleration_);
   blocks_.push_back({from, to, start, end_});
+}
+
+void MotionQueue::hold(double t, double seconds) {
+  rest_ = at(t);
+  if (blocks_.empty()) return;
+  for (Block& block : blocks_) {
+    block.start += seconds;
+    block.end += seconds;
+  }
+  end_ += seconds;
+  Block& running = blocks_.front();
+  if (running.start - seconds >= t) return;
+  running = {rest_, running.to, t + seconds, running.end};
 }
 
 Point3 MotionQueue::stop(double t) {

@@ -14,8 +14,9 @@ class MotionQueue {
  public:
   static constexpr std::size_t kBlocks = 16;
 
-  explicit MotionQueue(const Point3& start, double acceleration = 500)
-      : rest_(start), acceleration_(acceleration) {}
+  /// `slowness`: moves take this many times as long.
+  explicit MotionQueue(const Point3& start, double acceleration = 500, double slowness = 1)
+      : rest_(start), acceleration_(acceleration), slowness_(slowness) {}
 
   /// Where the head is at time t. Forgets moves that ended before t, so t may not go backwards.
   Point3 at(double t);
@@ -27,6 +28,8 @@ class MotionQueue {
   double next_end() const { return blocks_.empty() ? end_ : blocks_.front().end; }
   bool full(double t);
   void move_to(const Point3& to, double speed_mm_s, double t);
+  /// Stands for so long, then goes on.
+  void hold(double t, double seconds);
   /// Stops dead; returns where.
   Point3 stop(double t);
 
@@ -36,7 +39,7 @@ class MotionQueue {
     double start, end;
   };
   Point3 rest_;
-  double acceleration_;
+  double acceleration_, slowness_;
   double end_ = -1;
   std::deque<Block> blocks_;
 };

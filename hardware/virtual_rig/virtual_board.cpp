@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace supertac {
 namespace {
 
 constexpr int kStallFrames = 20;
+constexpr int kHeldFrames = 25;  // in the tty of a host that does not read
 
 }  // namespace
 
@@ -32,9 +34,15 @@ std::vector<std::byte> VirtualBoard::make_frame(const Point3& head) {
   const double middle = next_frame() - 0.5 * settings_.period_s;
   const std::uint64_t index = counters_.made++;
   if (stalled_frames_ == 0 && dice_.hit(settings_.faults.stall_rate)) stalled_frames_ = kStallFrames;
+  if (stalled_frames_ == 0 && dice_.hit(settings_.faults.freeze_rate)) {
+    room_ = kHeldFrames - static_cast<int>(held_.size() / rig::kFrameBytes);
+    stalled_frames_ = static_cast<int>((0.3 + 1.7 * dice_.uniform()) / settings_.period_s);
+  }
   const bool stalled = stalled_frames_ > 0;
+  const bool held = stalled && room_ > 0;
+  if (held) --room_;
   if (stalled && --stalled_frames_ == 0) tear_next_ = true;
-  const bool lost = stalled || dice_.hit(settings_.faults.lost_frame_rate);
+  const bool lost = (stalled && !held) || dice_.hit(settings_.faults.lost_frame_rate);
   if (truth_) truth_(index, middle, head, !lost);
   if (lost) {
     ++counters_.lost;
@@ -49,8 +57,10 @@ std::vector<std::byte> VirtualBoard::make_frame(const Point3& head) {
   }
   previous_ = fresh;
   ++counters_.sent;
-  std::vector<std::byte> bytes(rig::kFrameBytes);
-  write_frame(frame, std::span<std::byte, rig::kFrameBytes>(bytes));
+  std::vector<std::byte> bytes = std::exchange(held_, {});
+  bytes.resize(bytes.size() + rig::kFrameBytes);
+  write_frame(frame, std::span(bytes).last<rig::kFrameBytes>());
+  if (held) std::swap(bytes, held_);
   return bytes;
 }
 

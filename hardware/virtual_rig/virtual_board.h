@@ -57,7 +57,8 @@ class VirtualBoard {
   Counters counters_;
   Truth truth_;
   BoardFrame previous_;
-  int stalled_frames_ = 0;
+  int stalled_frames_ = 0, room_ = 0;
+  std::vector<std::byte> held_;  // made in a freeze, to be sent at its end
   bool tear_next_ = false;
 };
 

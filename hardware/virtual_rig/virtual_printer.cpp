@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <limits>
-#include <optional>
+#include <utility>
 
 #include "hardware/marlin_line.h"
-#include "io/numbers.h"
+#include "hardware/virtual_rig/marlin_texts.h"
 
 namespace supertac {
 namespace {
@@ -15,16 +14,6 @@ namespace {
 constexpr std::size_t kCommandBuffer = 4;  // Marlin's BUFSIZE
 constexpr std::size_t kReceiveLines = 6;   // about 128 bytes
 constexpr double kNever = std::numeric_limits<double>::infinity();
-
-// The number behind a letter, as Marlin's parser reads it.
-std::optional<double> parameter(const std::string& command, char letter) {
-  const std::size_t at = command.find(letter, 1);
-  if (at == std::string::npos) return std::nullopt;
-  double value = 0;
-  const char* last = command.data() + command.size();
-  const auto [end, error] = std::from_chars(command.data() + at + 1, last, value, std::chars_format::fixed);
-  return error == std::errc{} ? std::optional(value) : std::nullopt;
-}
 
 std::int64_t integer_at(const std::string& text, std::size_t at) {
   std::int64_t value = -1;
@@ -49,17 +38,24 @@ std::string_view emergency_code(std::string_view line) {
 }  // namespace
 
 VirtualPrinter::VirtualPrinter(const VirtualPrinterSettings& settings, double t, bool already_running)
-    : settings_(settings), motion_(settings.head), dice_(settings.seed, 101), now_(t), boot_end_(t) {
+    : settings_(settings),
+      motion_(settings.head, 500, settings.slowness),
+      dice_(settings.seed, 101),
+      now_(t),
+      boot_end_(t) {
   reset(t);
   if (already_running) {
     booting_ = false;
+    report_every(settings.auto_position_s, settings.auto_temperature_s);
     output_.clear();
     last_line_ = 357;
   }
 }
 
 void VirtualPrinter::reset(double t) {
-  offset_ = motion_.stop(t);
+  offset_ = steps_zero_ = motion_.stop(t);
+  report_every(0, 0);
+  waits_for_user_ = false;
   queue_.clear();
   received_.clear();
   partial_.clear();
@@ -111,9 +107,16 @@ void VirtualPrinter::watch_for_emergency(char c, double t) {
   }
   std::string line;
   line.swap(emergency_);
-  const std::string_view code = emergency_code(line);
-  if (code.starts_with("112")) kill(t);
+  act_on_critical(emergency_code(line), t);
+}
+
+void VirtualPrinter::act_on_critical(std::string_view code, double t) {
+  if (code.starts_with("112")) kill(t, "echo:M112 Shutdown\n");
   if (code.starts_with("410")) quick_stop(t);
+  if (code.starts_with("108") && waits_for_user_) {
+    waits_for_user_ = false;
+    blocked_until_ = t;
+  }
 }
 
 void VirtualPrinter::accept_line(const std::string& line, double t) {
@@ -124,6 +127,11 @@ void VirtualPrinter::accept_line(const std::string& line, double t) {
     if (halted_ || booting_ || unplugged_) return;
   } else if (const std::size_t star = command.rfind('*'); star != std::string::npos) {
     command.resize(star);
+  }
+  // Without an emergency parser an unnumbered stop acts when its line is read.
+  if (!settings_.emergency_parser && (command == "M112" || command == "M410" || command == "M108")) {
+    act_on_critical(std::string_view(command).substr(1), t);
+    if (halted_) return;
   }
   queue_.push_back(command);
   if (command_due_ < 0 && !blocked_) command_due_ = t + settings_.reply_delay_s;
@@ -160,6 +168,8 @@ bool VirtualPrinter::check_numbered(const std::string& line, std::string& comman
 void VirtualPrinter::complain(const std::string& what) {
   output_ += "Error:" + what + ", Last Line: " + std::to_string(last_line_) +
              "\nResend: " + std::to_string(last_line_ + 1) + "\nok\n";
+  received_.clear();
+  partial_.clear();
 }
 
 void VirtualPrinter::advance(double t) {
@@ -167,11 +177,13 @@ void VirtualPrinter::advance(double t) {
     now_ = std::max(now_, next_event());
     if (booting_) {
       booting_ = false;
-      output_ += "start\nMarlin 2.1.2\necho: Last Updated: virtual rig\necho:Compiled: none\n";
+      output_ += marlin_banner();
+    } else if (std::min(position_due_, temperature_due_) <= now_) {
+      automatic_report(now_);
     } else if (blocked_ && blocked_until_ <= now_) {
       finish_block(now_);
     } else if (blocked_) {
-      output_ += "echo:busy: processing\n";
+      output_ += waits_for_user_ ? "echo:busy: paused for user\n" : "echo:busy: processing\n";
       busy_due_ = now_ + 2;
     } else if (command_due_ >= 0 && command_due_ <= now_) {
       start_next(now_);
@@ -186,9 +198,15 @@ void VirtualPrinter::advance(double t) {
 double VirtualPrinter::next_event() const {
   if (halted_ || unplugged_) return kNever;
   if (booting_) return boot_end_;
-  if (blocked_) return settings_.keepalive ? std::min(blocked_until_, busy_due_) : blocked_until_;
-  if (command_due_ >= 0) return command_due_;
-  return settings_.heartbeat ? wait_due_ : kNever;
+  double next = kNever;
+  if (blocked_) {
+    next = settings_.keepalive ? std::min(blocked_until_, busy_due_) : blocked_until_;
+  } else if (command_due_ >= 0) {
+    next = command_due_;
+  } else if (settings_.heartbeat) {
+    next = wait_due_;
+  }
+  return std::min({next, position_due_, temperature_due_});
 }
 
 std::string VirtualPrinter::take_output() {
@@ -230,112 +248,16 @@ bool VirtualPrinter::random_trouble(double t) {
     command_due_ = t + 0.05;
     return true;
   }
+  if (dice_.hit(faults.freeze_rate)) {
+    const double seconds = 0.3 + 1.7 * dice_.uniform();
+    command_due_ = t + seconds;
+    motion_.hold(t, seconds);
+    return true;
+  }
   if (dice_.hit(faults.resend_storm_rate)) {
     for (int i = 0; i < 3; ++i) complain("checksum mismatch");
   }
   return false;
-}
-
-void VirtualPrinter::run(const std::string& command, double t) {
-  const auto code = static_cast<int>(integer_at(command, 1));
-  if (command[0] == 'G' && code >= 0) return run_g(code, command, t);
-  if (command[0] == 'M' && code >= 0) return run_m(code, command, t);
-  output_ += "echo:Unknown command: \"" + command + "\"\n";
-}
-
-void VirtualPrinter::run_g(int code, const std::string& command, double t) {
-  executed_.push_back({t, command});
-  switch (code) {
-    case 0:
-    case 1:
-      return move(command, t);
-    case 4:
-      return block_until(std::max(t, motion_.end_time()) + parameter(command, 'S').value_or(0) +
-                             1e-3 * parameter(command, 'P').value_or(0),
-                         t);
-    case 28:
-      return home(t);
-    case 90:
-    case 91:
-      relative_ = code == 91;
-      return;
-    case 92: {
-      const Point3 at = motion_.target();
-      if (const auto x = parameter(command, 'X')) offset_.x = at.x - *x;
-      if (const auto y = parameter(command, 'Y')) offset_.y = at.y - *y;
-      if (const auto z = parameter(command, 'Z')) offset_.z = at.z - *z;
-      return;
-    }
-    default:
-      executed_.pop_back();
-      output_ += "echo:Unknown command: \"" + command + "\"\n";
-  }
-}
-
-void VirtualPrinter::run_m(int code, const std::string& command, double t) {
-  executed_.push_back({t, command});
-  switch (code) {
-    case 110:
-    case 17:
-    case 84:
-    case 108:
-    case 211:
-      return;
-    case 112:
-      return kill(t);
-    case 114:
-      return report(settings_.realtime_position && command.find('R') != std::string::npos ? motion_.at(t)
-                                                                                          : motion_.target());
-    case 115:
-      output_ += std::string("FIRMWARE_NAME:Marlin 2.1.2 (virtual rig)\nCap:EMERGENCY_PARSER:") +
-                 (settings_.emergency_parser ? "1\n" : "0\n");
-      return;
-    case 400:
-      return block_until(std::max(t, motion_.end_time()), t);
-    case 410:
-      return quick_stop(t);
-    default:
-      executed_.pop_back();
-      output_ += "echo:Unknown command: \"" + command + "\"\n";
-  }
-}
-
-void VirtualPrinter::move(const std::string& command, double t) {
-  if (const auto f = parameter(command, 'F'); f && *f > 0) feed_ = *f / 60;
-  const Point3 from = motion_.target();
-  const auto axis = [&](char letter, double physical, double offset, double limit) {
-    const auto value = parameter(command, letter);
-    if (!value) return physical;
-    double logical = relative_ ? physical - offset + *value : *value;
-    if (homed_) logical = std::clamp(logical, 0.0, limit);  // silently, and before homing not at all
-    return logical + offset;
-  };
-  const Point3 to{axis('X', from.x, offset_.x, settings_.bed.x),
-                  axis('Y', from.y, offset_.y, settings_.bed.y),
-                  axis('Z', from.z, offset_.z, settings_.bed.z)};
-  const double length = distance(from, to);
-  const double rise = std::abs(to.z - from.z);
-  const double speed = rise > 0 ? std::min(feed_, rig::kLiftMmS * length / rise) : feed_;
-  motion_.move_to(to, speed, t);
-}
-
-void VirtualPrinter::home(double t) {
-  Point3 at = motion_.target();
-  motion_.move_to({at.x, at.y, at.z + 5}, rig::kLiftMmS, t);
-  motion_.move_to({0, 0, at.z + 5}, 50, t);
-  motion_.move_to({0, 0, 0}, rig::kLiftMmS, t);
-  offset_ = {};
-  homed_ = true;
-  block_until(motion_.end_time(), t);
-}
-
-void VirtualPrinter::report(const Point3& physical) {
-  const auto text = [](double v) { return format(std::abs(v) < 0.005 ? 0.0 : v, 2); };
-  const Point3 p{physical.x - offset_.x, physical.y - offset_.y, physical.z - offset_.z};
-  output_ += "X:" + text(p.x) + " Y:" + text(p.y) + " Z:" + text(p.z) +
-             " E:0.00 Count X:" + std::to_string(std::llround(80 * p.x)) +
-             " Y:" + std::to_string(std::llround(80 * p.y)) +
-             " Z:" + std::to_string(std::llround(400 * p.z)) + "\n";
 }
 
 void VirtualPrinter::block_until(double time, double now) {
@@ -353,18 +275,13 @@ void VirtualPrinter::finish_block(double t) {
 }
 
 void VirtualPrinter::reply_ok() {
-  if (!dice_.hit(settings_.faults.lost_ok_rate)) output_ += "ok\n";
-}
-
-void VirtualPrinter::kill(double t) {
-  motion_.stop(t);
-  output_ += "Error:Printer halted. kill() called!\n";
-  halted_ = true;
-}
-
-void VirtualPrinter::quick_stop(double t) {
-  motion_.stop(t);
-  if (blocked_) blocked_until_ = t;
+  const std::string text = std::exchange(ok_text_, {});
+  if (dice_.hit(settings_.faults.lost_ok_rate)) return;
+  output_ += "ok" + text;
+  if (settings_.advanced_ok)
+    output_ +=
+        " N" + std::to_string(last_line_) + " P15 B" + std::to_string(kCommandBuffer - 1 - queue_.size());
+  output_ += "\n";
 }
 
 }  // namespace supertac

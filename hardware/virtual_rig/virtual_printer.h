@@ -22,8 +22,15 @@ struct VirtualPrinterSettings {
   Point3 bed = rig::kBed;         ///< soft limits once homed: 0 ... bed
   bool realtime_position = true;  ///< M114 R reports the head, not the end of the queue
   bool emergency_parser = true;
-  bool keepalive = true;   ///< echo:busy every 2 s
-  bool heartbeat = false;  ///< `wait` every second when idle
+  bool display = false;      ///< where M0 can be answered
+  bool advanced_ok = false;  ///< `ok N0 P15 B3`
+  bool homing_fails = false;
+  double auto_position_s = 0;  ///< M154 as an earlier host left it on a running firmware; 0: off
+  double auto_temperature_s = 0;
+  double quick_stop_s = 1;  ///< for which M410 holds the firmware
+  double slowness = 1;      ///< moves take this many times as long: a starved board
+  bool keepalive = true;    ///< echo:busy every 2 s
+  bool heartbeat = false;   ///< `wait` every second when idle
   double reply_delay_s = 0.0003;
   double boot_s = 0.4;         ///< power-on to `start`
   std::string boot_garbage{};  ///< bytes sent before the banner
@@ -63,6 +70,10 @@ class VirtualPrinter {
   void on_line(std::function<void(std::int64_t, const std::string&, double)> hook) {
     hook_ = std::move(hook);
   }
+  /// Reports of position and temperature every so many seconds (M154, M155); 0: none.
+  void report_every(double position_s, double temperature_s);
+  /// A sensor beyond its range: the firmware says so and halts.
+  void overheat(double t);
   /// Puts raw text into the reply stream.
   void inject(const std::string& text) { output_ += text; }
 
@@ -72,6 +83,7 @@ class VirtualPrinter {
  private:
   void on_character(char c, double t);
   void watch_for_emergency(char c, double t);
+  void act_on_critical(std::string_view code, double t);
   void take_received(double t);
   void accept_line(const std::string& line, double t);
   bool check_numbered(const std::string& line, std::string& command);
@@ -86,7 +98,9 @@ class VirtualPrinter {
   void block_until(double time, double now);
   void finish_block(double t);
   void reply_ok();
-  void kill(double t);
+  void automatic_report(double t);
+  void pause(const std::string& command, double t);
+  void kill(double t, const std::string& why);
   void quick_stop(double t);
   bool random_trouble(double t);
 
@@ -94,6 +108,7 @@ class VirtualPrinter {
   MotionQueue motion_;
   Dice dice_;
   Point3 offset_;                     // logical = physical - offset
+  Point3 steps_zero_;                 // where Count is 0; G92 does not move it
   std::deque<std::string> received_;  // whole lines not yet looked at
   std::deque<std::string> queue_;     // accepted, not yet run
   std::string partial_;
@@ -108,10 +123,13 @@ class VirtualPrinter {
   double busy_due_ = 0;
   double wait_due_ = 0;
   double feed_ = 10;
+  double position_every_ = 0, position_due_ = 0, temperature_every_ = 0, temperature_due_ = 0;  // 0: off
   std::int64_t last_line_ = 0;
   bool booting_ = false, blocked_ = false, homed_ = false, halted_ = false, unplugged_ = false,
        relative_ = false;
-  bool repeat_after_block_ = false;
+  bool repeat_after_block_ = false;  // what holds the firmware is no command: no ok at its end
+  bool waits_for_user_ = false;
+  std::string ok_text_;  // behind the next ok
 };
 
 }  // namespace supertac

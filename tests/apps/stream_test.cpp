@@ -1,6 +1,8 @@
 // Stream, and supertac-stream as a process: boards on a virtual rig in the test's own process, captures,
 // recordings.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -330,6 +332,57 @@ TEST(LatencyHistogram, QuantilesAreRightToAClass) {
   histogram.add(1e7);  // beyond the last class
   EXPECT_EQ(histogram.max(), 1e7);
   EXPECT_EQ(histogram.quantile(1), histogram.max());
+}
+
+TEST_F(Streaming, AnOldCaptureStaysUntilTheNewOneIsComplete) {
+  write_file(path("capture"), "old");
+  expect_failure(stream({"--board", path("no-board"), "--capture", path("capture"), "--force"}), 1,
+                 "no-board");
+  EXPECT_EQ(read_text_file(path("capture"), 100), "old");
+  fs::create_directory(path("empty"));
+  EXPECT_NE(stream({"--board", path("no-board"), "--capture", path("empty"), "--force"}).code, 0);
+  EXPECT_TRUE(fs::exists(path("empty")));
+  plug_in();
+  ASSERT_EQ(stream({"--board", board(), "--seconds", "0.5", "--capture", path("capture"), "--force"}).code,
+            0);
+  EXPECT_EQ(stream({"--replay", path("capture")}).code, 0);
+  EXPECT_FALSE(fs::exists(path("capture.new")));
+}
+
+TEST_F(Streaming, AModelThatDrawsNoNumbersIsRefused) {
+  Rng rng(1);
+  SuperTac broken({.timesteps = kTimesteps, .latent = 3, .scale = 2, .channels = 8, .rcabs = 1}, rng);
+  for (const Parameter& parameter : broken.parameters()) {
+    const auto values = Variable(parameter.value).mutable_value().values();
+    std::fill(values.begin(), values.end(), std::nanf(""));
+  }
+  save_model(model(), broken, {300, {}, SimulatorSettings().filter_s}, {});
+  write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 40}));
+  expect_failure(stream({"--recording", path("recording")}), 1, "the model draws no numbers");
+}
+
+TEST_F(Streaming, ATerminalThatIsNotReadHoldsUpNobody) {
+  plug_in();
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
+  ASSERT_TRUE(grantpt(terminal) == 0 && unlockpt(terminal) == 0);
+  const std::string name = ptsname(terminal);
+  const std::string line = "TERM=xterm exec " SUPERTAC_BIN "/supertac-stream --model " + model() +
+                           " --board " + board() + " --seconds 3 --out " + path("out") + " >/dev/null 2>" +
+                           name;
+  const auto begin = monotonic_seconds();
+  const pid_t child = fork();
+  if (child == 0) {
+    execl("/bin/sh", "sh", "-c", line.c_str(), nullptr);
+    _exit(127);
+  }
+  int status = -1;
+  for (int i = 0; i < 1500 && waitpid(child, &status, WNOHANG) == 0; ++i) usleep(10'000);
+  const double took = monotonic_seconds() - begin;
+  kill(child, SIGKILL);
+  close(terminal);
+  EXPECT_LT(took, 8);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+  EXPECT_GT(kept("out").f64("time_s").size(), 500U);
 }
 
 TEST(TerminalView, YGrowsUpwardsAndBothPicturesHaveTheSameSize) {

@@ -8,6 +8,8 @@
 namespace supertac {
 namespace {
 
+constexpr std::int64_t kConnecting = 3;  // lines that connecting sends: M154, M155, M115
+
 /// A connected link over a simulated printer.
 struct Bench {
   explicit Bench(RigSettings settings = running_rig())
@@ -15,11 +17,11 @@ struct Bench {
     link.connect();
   }
   VirtualPrinter& printer() { return rig.world().printer(); }
-  /// Runs `plant` once, just before line `number` runs.
+  /// Runs `plant` once, just before line `number` after connecting runs.
   void before_line(std::int64_t number, std::function<void(VirtualPrinter&, double)> plant) {
     auto done = std::make_shared<bool>(false);
     printer().on_line([=, this](std::int64_t n, const std::string&, double t) {
-      if (n != number || *done) return;
+      if (n != kConnecting + number || *done) return;
       *done = true;
       plant(printer(), t);
     });
@@ -59,7 +61,7 @@ TEST(MarlinLink, ConnectsToAFreshBoardThroughBootGarbageAndHeartbeats) {
 
 TEST(MarlinLink, ConnectsToARunningFirmwareWithAForeignLineNumber) {
   Bench bench;
-  EXPECT_EQ(bench.printer().last_line(), 1);  // M115
+  EXPECT_EQ(bench.printer().last_line(), kConnecting);
   EXPECT_EQ(bench.link.counters().repeats, 0U);
 }
 
@@ -86,7 +88,7 @@ TEST(MarlinLink, DamagedLineIsSentAgainAndItsOkAcknowledgesNothing) {
 
 TEST(MarlinLink, ResendOfALineNeverSentIsIgnored) {
   Bench bench;
-  bench.before_line(3, [](VirtualPrinter& printer, double) { printer.inject("Resend: 999\nok\n"); });
+  bench.before_line(2, [](VirtualPrinter& printer, double) { printer.inject("Resend: 999\nok\n"); });
   for (int i = 1; i <= 5; ++i) bench.link.command("G1 X" + std::to_string(i));
   EXPECT_EQ(moves_of(bench.printer()).size(), 5U);
 }
@@ -95,7 +97,7 @@ TEST(MarlinLink, SameLineTooOftenIsAResendLoop) {
   TamperedBench bench;
   bench.port.to_printer.assign(50, {"G1 X1", "G1 X7"});
   EXPECT_ERROR(bench.link.command("G1 X1"), ResendLoop,
-               "line 2 repeated 8 times without success (the firmware reports damaged lines): resend loop; "
+               "line 4 repeated 8 times without success (the firmware reports damaged lines): resend loop; "
                "check the cable");
   EXPECT_TRUE(moves_of(bench.printer()).empty());
 }
@@ -112,7 +114,7 @@ TEST(MarlinLink, LostOkIsAskedForWithTheSameLineAndNothingRunsTwice) {
 
 TEST(MarlinLink, LostLeadingNIsAcknowledgedButNotRun) {
   TamperedBench bench;
-  bench.port.to_printer = {{"N4 ", "4 "}};
+  bench.port.to_printer = {{"N6 ", "6 "}};
   bench.go(3);  // the last of them: no later line would bring it to light
   EXPECT_EQ(moves_of(bench.printer()), bench.expected(3));
 }
@@ -142,7 +144,7 @@ TEST(MarlinLink, LongCommandsHaveTheirOwnDeadlineWithoutKeepalive) {
 
 TEST(MarlinLink, PausedForUserIsAnError) {
   Bench bench;
-  bench.before_line(2,
+  bench.before_line(1,
                     [](VirtualPrinter& printer, double) { printer.inject("echo:busy: paused for user\n"); });
   EXPECT_ERROR(bench.link.command("G1 X1"), PrinterPaused,
                "waits for its user; look at the printer's display");
@@ -150,7 +152,7 @@ TEST(MarlinLink, PausedForUserIsAnError) {
 
 TEST(MarlinLink, StartInMidRunIsAReset) {
   Bench bench;
-  bench.before_line(3, [](VirtualPrinter& printer, double t) { printer.reset(t); });
+  bench.before_line(2, [](VirtualPrinter& printer, double t) { printer.reset(t); });
   bench.link.command("G1 X1");
   EXPECT_ERROR(bench.link.command("G1 X2"), PrinterReset,
                "the firmware restarted in use; its position is unknown, confirm the origin and start again");
@@ -170,7 +172,7 @@ TEST(MarlinLink, AfterAHaltNothingMoreIsSent) {
        {"Error:Printer halted. kill() called!\n", "Error:Heating failed, system stopped!\n",
         "Error:MAXTEMP triggered, system stopped! Heater_ID: 0\n"}) {
     Bench bench;
-    bench.before_line(2, [text](VirtualPrinter& printer, double) { printer.inject(text); });
+    bench.before_line(1, [text](VirtualPrinter& printer, double) { printer.inject(text); });
     EXPECT_ERROR(bench.link.command("G1 X1"), PrinterHalted, "the firmware halted ('Error:");
     const std::int64_t last = bench.printer().last_line();
     EXPECT_ERROR(bench.link.command("G1 X2"), PrinterHalted, "halted earlier; reset it and start again");
@@ -180,7 +182,7 @@ TEST(MarlinLink, AfterAHaltNothingMoreIsSent) {
 
 TEST(MarlinLink, ARefusedCommandIsNotSentForEver) {
   Bench bench;
-  bench.before_line(2, [](VirtualPrinter& printer, double) { printer.inject("Error:Probing failed\n"); });
+  bench.before_line(1, [](VirtualPrinter& printer, double) { printer.inject("Error:Probing failed\n"); });
   EXPECT_ERROR(bench.link.command("G1 X1"), PrinterRefused, ": Error:Probing failed");
   EXPECT_NO_THROW(bench.link.command("M114"));
 }

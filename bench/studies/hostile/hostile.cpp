@@ -1,0 +1,305 @@
+// hostile lines N SEED: N command lines of evil values for every option of every program.
+// hostile mutants N SEED: N seeded mutants through every reader, in this process; build it with the preset
+// asan. hostile signals N SEED: N simulations and imports ended by a signal at a random moment. One table of
+// counts on stdout; exit 1 when anything was found. Run it as an ordinary user or as root: as root the
+// programs run as nobody, since evil values are also names of outputs.
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <regex>
+
+#include "bench/studies/hostile/readers.h"
+#include "io/file.h"
+#include "io/random.h"
+
+namespace supertac {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kPrograms[] = {"classify", "collect", "evaluate", "import", "info", "plate",
+                                     "simulate", "stream",  "sweep",    "train",  "rig"};
+// A command that works, on which evil is heaped; a later option replaces an earlier one.
+const std::map<std::string, std::vector<std::string>> kGood = {
+    {"classify", {"--model", "precious", "--data", "data"}},
+    {"collect",
+     {"--printer", "/dev/null", "--board", "/dev/null", "--plate", "plain", "--out", "new", "--yes"}},
+    {"evaluate", {"--model", "precious", "--data", "data"}},
+    {"import", {"data", "--out", "new"}},
+    {"info", {"data/good"}},
+    {"plate", {"--plate", "plain", "--resolution", "5", "--out", "new.stl"}},
+    {"simulate", {"--out", "new", "--plates", "plain", "--passes", "1", "--trials", "1", "--speeds", "50"}},
+    {"stream", {"--model", "precious", "--recording", "data/good"}},
+    {"sweep", {"--out", "new", "--data", "data"}},
+    {"train", {"--data", "data", "--out", "new.model", "--epochs", "1", "--preset", "tiny"}},
+    {"rig", {"--plate", "plain", "--board-link", "new.board", "--printer-link", "new.printer"}}};
+constexpr double kPatienceS = 3, kHangS = 10;
+constexpr long kMostKilobytes = 1 << 20;
+
+struct Option {
+  std::string name, value;
+};
+
+struct Run {
+  int status = 0;
+  bool hung = false;
+  long kilobytes = 0;
+  std::string error;
+};
+
+std::string evil_value(const RandomStream& random, std::uint64_t at) {
+  static const std::vector<std::string> values = {"",
+                                                  "0",
+                                                  "-1",
+                                                  "1",
+                                                  "2",
+                                                  "nan",
+                                                  "inf",
+                                                  "1e308",
+                                                  "1e-308",
+                                                  "18446744073709551616",
+                                                  "0x10",
+                                                  "1,,2",
+                                                  ",",
+                                                  "plain",
+                                                  "ridges6",
+                                                  "ridges0.0000001",
+                                                  "ridgesinf",
+                                                  "bumps-1",
+                                                  "precious",
+                                                  "precious.stl",
+                                                  "data",
+                                                  "data/1",
+                                                  "new",
+                                                  "new/er",
+                                                  "loop",
+                                                  "fifo",
+                                                  "empty",
+                                                  "link",
+                                                  "/dev/null",
+                                                  "/dev/zero",
+                                                  "/dev/full",
+                                                  "/proc/self/mem",
+                                                  "/",
+                                                  ".",
+                                                  "..",
+                                                  "-",
+                                                  "--",
+                                                  "q'; system('touch PWNED'); x='",
+                                                  "$(touch PWNED)",
+                                                  "`touch PWNED`",
+                                                  "a;touch PWNED",
+                                                  "x\ny",
+                                                  "\x1b[31mred",
+                                                  "\xff\xfe",
+                                                  std::string(300, 'x'),
+                                                  std::string(5000, 'y'),
+                                                  "4x4",
+                                                  "16x16",
+                                                  "window",
+                                                  "paper",
+                                                  "%s%n%x",
+                                                  "precious,precious"};
+  return values[random.bits(at) % values.size()];
+}
+
+void prepare(const fs::path& folder) {
+  fs::create_directories(folder / "data" / "1");
+  fs::create_directories(folder / "empty");
+  fs::create_symlink("loop", folder / "loop");
+  fs::create_symlink("precious", folder / "link");
+  (void)mkfifo((folder / "fifo").c_str(), 0666);
+  std::ofstream(folder / "precious") << "precious";
+  std::ofstream(folder / "precious.stl") << "precious";
+}
+
+[[noreturn]] void become(const fs::path& folder, const std::vector<std::string>& words, int error) {
+  if (::chdir(folder.c_str()) != 0) _exit(126);
+  if (::getuid() == 0 && (::setgid(65534) != 0 || ::setuid(65534) != 0)) _exit(126);
+  const int nothing = ::open("/dev/null", O_RDWR);
+  dup2(nothing, 0), dup2(nothing, 1), dup2(error, 2);
+  std::vector<char*> argv;
+  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
+  argv.push_back(nullptr);
+  execv(argv[0], argv.data());
+  _exit(127);
+}
+
+// Ends it with SIGTERM after `seconds`; what then does not end within kHangS hangs.
+Run run(const fs::path& folder, const std::vector<std::string>& words, double seconds) {
+  int pipe[2];
+  if (::pipe2(pipe, O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
+  const pid_t child = fork();
+  if (child == 0) become(folder, words, pipe[1]);
+  ::close(pipe[1]);
+  Run result;
+  const auto begin = std::chrono::steady_clock::now();
+  bool asked = false, ended = false;
+  rusage usage{};
+  while (!ended) {
+    pollfd reading{pipe[0], POLLIN, 0};
+    char bytes[4096];
+    if (poll(&reading, 1, 5) == 1) {
+      const ssize_t count = ::read(pipe[0], bytes, sizeof bytes);
+      if (count > 0 && result.error.size() < 100'000)
+        result.error.append(bytes, static_cast<std::size_t>(count));
+      if (count == 0) usleep(1000);
+    }
+    ended = wait4(child, &result.status, WNOHANG, &usage) == child;
+    const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    if (!asked && took > seconds) kill(child, SIGTERM), asked = true;
+    if (!result.hung && took > seconds + kHangS) kill(child, SIGKILL), result.hung = true;
+  }
+  ::close(pipe[0]);
+  result.kilobytes = usage.ru_maxrss;
+  return result;
+}
+
+std::vector<Option> options_of(const std::string& program) {
+  std::vector<Option> options;
+  FILE* help = popen((program + " --help").c_str(), "r");  // its name is ours
+  char line[1024];
+  const std::regex shape(R"(^\s+(?:-h, )?--([a-z-]+)( [A-Z][^ ]*)?)");
+  while (help != nullptr && fgets(line, sizeof line, help) != nullptr) {
+    std::cmatch match;
+    if (std::regex_search(line, match, shape)) options.push_back({match[1], match[2]});
+  }
+  if (help != nullptr) pclose(help);
+  return options;
+}
+
+using Counts = std::map<std::string, std::uint64_t>;
+
+void judge(const Run& result, const fs::path& folder, const std::string& line, Counts& counts) {
+  const auto found = [&](const char* what) {
+    ++counts[what];
+    std::cerr << what << ": " << line << "\n  " << result.error.substr(0, 300) << '\n';
+  };
+  if (result.hung) return found("hangs");
+  if (WIFEXITED(result.status)) ++counts["exit " + std::to_string(WEXITSTATUS(result.status))];
+  if (WIFEXITED(result.status) && WEXITSTATUS(result.status) == 126)
+    throw std::runtime_error("cannot start " + line);
+  if (WIFSIGNALED(result.status) && WTERMSIG(result.status) != SIGTERM) found("crashes");
+  if (WIFEXITED(result.status) && WEXITSTATUS(result.status) > 126 && WEXITSTATUS(result.status) != 143)
+    found("crashes");
+  if (result.kilobytes > kMostKilobytes) found("above 1 GB");
+  for (const char* raw :
+       {"what():", "filesystem error", "[json.", "std::", "basic_string", "terminate called"})
+    if (result.error.find(raw) != std::string::npos) return found("raw exceptions");
+  if (result.error.find('\x1b') != std::string::npos) found("control codes");
+  if (fs::exists(folder / "PWNED")) found("shells"), fs::remove(folder / "PWNED");
+  for (const char* file : {"precious", "precious.stl"}) {
+    std::ifstream in(folder / file);
+    std::string text;
+    if ((std::getline(in, text), text) == "precious") continue;
+    found("files overwritten");
+    std::ofstream(folder / file) << "precious";
+  }
+}
+
+Counts command_lines(const fs::path& folder, std::uint64_t n, std::uint64_t seed) {
+  Counts counts;
+  std::map<std::string, std::vector<Option>> options;
+  for (const char* name : kPrograms)
+    options[name] = options_of(std::string(SUPERTAC_BIN "/supertac-") + name);
+  for (std::uint64_t i = 0; i < n; ++i) {
+    const RandomStream random(seed, i);
+    const std::string name = kPrograms[i % std::size(kPrograms)];
+    std::vector<std::string> words = {std::string(SUPERTAC_BIN "/supertac-") + name};
+    std::uint64_t at = 0;
+    if (random.bits(at++) % 4 != 0) words.insert(words.end(), kGood.at(name).begin(), kGood.at(name).end());
+    const std::size_t begin = words.size();
+    for (const std::uint32_t most = 1 + random.bits(at++) % 3; words.size() < begin + 2 * most;) {
+      const Option& option = options[name][random.bits(at++) % options[name].size()];
+      // --force is the word by which a user gives up a file: "precious" is watched without it.
+      if (option.name == "force" || option.name == "help") {
+        if (random.bits(at++) % 8 != 0) break;
+        continue;
+      }
+      words.push_back("--" + option.name);
+      if (!option.value.empty()) words.push_back(evil_value(random, at++));
+    }
+    if (random.bits(at++) % 4 == 0) words.push_back(evil_value(random, at++));
+    std::string line;
+    for (const std::string& word : words) line += word.substr(0, 60) + " ";
+    ++counts["command lines"];
+    judge(run(folder, words, kPatienceS), folder, line, counts);
+    for (const auto& entry : fs::directory_iterator(folder))
+      if (entry.path().filename().string().starts_with("new")) fs::remove_all(entry.path());
+  }
+  return counts;
+}
+
+Counts signals(const fs::path& folder, std::uint64_t n, std::uint64_t seed) {
+  Counts counts;
+  for (std::uint64_t i = 0; i < n; ++i) {
+    const std::string out = "signals" + std::to_string(i);
+    const Run result = run(folder, {SUPERTAC_BIN "/supertac-simulate", "--out", out, "--plates", "ridges6"},
+                           0.3 * RandomStream(seed, i).uniform(0));
+    ++counts["signals"];
+    judge(result, folder, "simulate " + out, counts);
+    const bool finished = WIFEXITED(result.status) && WEXITSTATUS(result.status) == 0;
+    if (!finished && fs::exists(folder / out)) {
+      ++counts["half folders"];
+      std::cerr << "half folder: " << out << '\n';
+    }
+    fs::remove_all(folder / out);
+  }
+  return counts;
+}
+
+int main_of(const std::string& mode, std::uint64_t n, std::uint64_t seed) {
+  std::string name = (fs::temp_directory_path() / "hostile-XXXXXX").string();
+  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no scratch folder");
+  const fs::path folder = name;
+  prepare(folder);
+  if (::getuid() == 0)
+    for (const auto& path : {folder, folder / "data", folder / "data" / "1", folder / "empty",
+                             folder / "precious", folder / "precious.stl"})
+      if (::chown(path.c_str(), 65534, 65534) != 0) throw std::runtime_error("chown " + path.string());
+  (void)run(folder,
+            {SUPERTAC_BIN "/supertac-simulate", "--out", "data", "--plates", "plain", "--passes", "1",
+             "--trials", "1", "--speeds", "10"},
+            60);
+  for (const auto& entry : fs::directory_iterator(folder / "data"))
+    if (entry.is_regular_file()) fs::copy_file(entry.path(), folder / "data/1/good");
+  if (fs::exists(folder / "data/1/good")) fs::rename(folder / "data/1/good", folder / "data/good");
+  Counts counts;
+  if (mode == "lines") counts = command_lines(folder, n, seed);
+  if (mode == "signals") counts = signals(folder, n, seed);
+  if (mode == "mutants") counts = mutants_of_readers(folder.string(), n, seed);
+  fs::remove_all(folder);
+  const auto print = [&](std::initializer_list<const char*> names) {
+    std::uint64_t sum = 0;
+    for (const char* name_of_count : names) {
+      std::cout << name_of_count << "," << counts[name_of_count] << '\n';
+      sum += counts[name_of_count];
+    }
+    return sum;
+  };
+  print({"command lines", "exit 0", "exit 1", "exit 2", "exit 143", "signals", "mutants"});
+  const std::uint64_t findings = print({"slow mutants", "crashes", "hangs", "above 1 GB", "raw exceptions",
+                                        "control codes", "shells", "files overwritten", "half folders"});
+  return findings == 0 ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace supertac
+
+int main(int argc, char** argv) {
+  if (argc != 4) {
+    std::cerr << "hostile: expected lines|mutants|signals N SEED, found " << argc - 1 << " words\n";
+    return 2;
+  }
+  return supertac::main_of(argv[1], std::stoull(argv[2]), std::stoull(argv[3]));
+}

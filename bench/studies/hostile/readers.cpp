@@ -1,0 +1,165 @@
+#include "bench/studies/hostile/readers.h"
+
+#include <chrono>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <vector>
+
+#include "data/plates/plate.h"
+#include "data/plates/plate_mesh.h"
+#include "data/plates/stl.h"
+#include "data/recordings/recording.h"
+#include "data/recordings/simulator.h"
+#include "data/recordings/text_import.h"
+#include "hardware/collection.h"
+#include "hardware/errors.h"
+#include "hardware/frame_decoder.h"
+#include "io/file.h"
+#include "io/json.h"
+#include "io/random.h"
+#include "io/safetensors.h"
+#include "tests/fuzz/journal_properties.h"
+#include "tests/fuzz/stl_properties.h"
+
+namespace supertac {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+Bytes bytes_of(const std::string& text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+std::string_view text_of(const Bytes& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// What it reads, from a good beginning.
+struct Reader {
+  const char* name;
+  Bytes good;
+  std::function<void(const Bytes&)> read;
+};
+
+Bytes good_journal(const std::string& path) {
+  JournalWriter writer(path, R"({"version":1,"plate":"plain","trial":1,"speed_mm_s":10})");
+  const Leg leg{1, Phase::slide, {0, 0, 0}, {0, 10, 0}, 10, 1, 2.1};
+  writer.event(1, event_text(leg, false));
+  for (int i = 0; i < 50; ++i) {
+    Bytes frame(rig::kFrameBytes);
+    write_frame({}, std::span(frame).first<rig::kFrameBytes>());
+    writer.append(Stream::board, RecordKind::received, 1 + 1e-3 * i, frame);
+  }
+  writer.event(2.1, event_text(leg, true));
+  writer.close();
+  return read_file(path, 1 << 20);
+}
+
+std::vector<Reader> readers(const std::string& folder) {
+  const std::string file = folder + "/mutant";
+  write_recording(folder + "/recording", simulate_pass(Plate::named("plain"), {.from_mm = 50, .to_mm = 52}));
+  std::string lines;
+  for (int i = 0; i < 20; ++i)
+    lines += "2.40 2.41 2.42 2.43 2.44 2.45 2.40 2.41 2.42 2.43 2.44 2.45 2.40 2.41 2.42 2.43\n";
+  const Bytes recording = read_file(folder + "/recording", 1 << 24);
+  const auto from_file = [file](auto read) {
+    return [file, read](const Bytes& bytes) {
+      // Not write_file(): a million syncs.
+      std::ofstream(file, std::ios::binary)
+          .write(reinterpret_cast<const char*>(bytes.data()), std::ssize(bytes));
+      read(file);
+    };
+  };
+  Bytes frames(4 * rig::kFrameBytes);
+  for (int i = 0; i < 4; ++i)
+    write_frame({}, std::span(frames).subspan(i * rig::kFrameBytes).first<rig::kFrameBytes>());
+  return {{"journal", good_journal(folder + "/journal"), [](const Bytes& b) { check_journal(b); }},
+          {"stl", stl_bytes(mesh_of(Plate::named("ridges6"), {.resolution_mm = 5}), "x"),
+           [](const Bytes& b) { check_stl(b); }},
+          {"safetensors", recording, from_file([](const std::string& f) { (void)SafetensorsFile::read(f); })},
+          {"recording", recording, from_file([](const std::string& f) { (void)read_recording(f); })},
+          {"text", bytes_of(lines), from_file([](const std::string& f) {
+             ImportReport report;
+             (void)import_text_pass(f, report);
+           })},
+          {"json", bytes_of(R"({"a":[1,2,{"b":"c"}],"d":1e5,"e":null})"),
+           [](const Bytes& b) { (void)parse_json_limited(text_of(b)); }},
+          {"reply", bytes_of("X:99.70 Y:101.17 Z:91.81 E:0.00 Count X:1 Y:2 Z:3"),
+           [](const Bytes& b) { (void)parse_reply(text_of(b)); }},
+          {"frames", frames,
+           [](const Bytes& b) {
+             FrameDecoder decoder;
+             decoder.push(b, [](const BoardFrame&, std::uint64_t) {});
+           }},
+          {"plate", bytes_of("bumps12+ridges6h1.5"), [](const Bytes& b) {
+             const std::string name(text_of(b));
+             if (!Plate::is_file(name)) (void)Plate::named(name);
+           }}};
+}
+
+Bytes mutant_of(const Bytes& good, const RandomStream& random) {
+  Bytes mutant = good;
+  std::uint64_t at = 0;
+  for (std::uint32_t changes = 1 + random.bits(at++) % 8; changes > 0 && !mutant.empty(); --changes) {
+    const std::size_t place = random.bits(at++) % mutant.size();
+    const auto begin = mutant.begin() + static_cast<std::ptrdiff_t>(place);
+    const auto length =
+        static_cast<std::ptrdiff_t>(std::min<std::size_t>(random.bits(at++) % 64, mutant.size() - place));
+    switch (random.bits(at++) % 6) {
+      case 0:
+        *begin ^= static_cast<std::byte>(1U << (random.bits(at++) % 8));
+        break;
+      case 1:
+        *begin = static_cast<std::byte>(random.bits(at++) % 256);
+        break;
+      case 2:
+        mutant.erase(begin, begin + length);
+        break;
+      case 3: {
+        const Bytes copy(begin, begin + length);
+        mutant.insert(begin, copy.begin(), copy.end());
+        break;
+      }
+      case 4:
+        std::fill(begin, begin + length, static_cast<std::byte>(random.bits(at++) % 2 == 0 ? 0xFF : 0));
+        break;
+      default:
+        if (random.bits(at++) % 8 == 0) mutant.resize(place);
+    }
+  }
+  return mutant;
+}
+
+}  // namespace
+
+std::map<std::string, std::uint64_t> mutants_of_readers(const std::string& folder, std::uint64_t n,
+                                                        std::uint64_t seed) {
+  std::map<std::string, std::uint64_t> counts;
+  const std::vector<Reader> all = readers(folder);
+  for (std::uint64_t i = 0; i < n; ++i) {
+    const Reader& reader = all[i % all.size()];
+    const Bytes mutant = mutant_of(reader.good, RandomStream(seed, i));
+    const auto begin = std::chrono::steady_clock::now();
+    try {
+      reader.read(mutant);
+    } catch (const FileError&) {
+    } catch (const HardwareError&) {
+    } catch (const JsonError&) {
+    } catch (const std::invalid_argument&) {
+    } catch (const std::exception& error) {
+      ++counts["raw exceptions"];
+      std::cerr << reader.name << " " << i << ": " << error.what() << '\n';
+    }
+    const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    if (took > 0.1) {
+      ++counts["slow mutants"];
+      std::cerr << reader.name << " " << i << ": " << took << " s\n";
+    }
+    ++counts["mutants"];
+  }
+  return counts;
+}
+
+}  // namespace supertac

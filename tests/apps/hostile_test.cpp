@@ -1,0 +1,179 @@
+// Nothing lost, nothing obeyed, nothing hung: real programs in real processes.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+
+#include "apps/common/arguments.h"
+#include "apps/common/outputs.h"
+#include "io/file.h"
+#include "io/folder_lock.h"
+#include "process.h"
+
+namespace supertac {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string text_of(const std::string& path) { return read_text_file(path, 1 << 24); }
+
+const std::vector<std::string> kSimulate = {"--plates", "plain", "--speeds", "10",
+                                            "--trials", "1",     "--passes", "2"};
+
+ProcessResult simulate(std::vector<std::string> arguments) {
+  arguments.insert(arguments.end(), kSimulate.begin(), kSimulate.end());
+  return run_process("supertac-simulate", arguments);
+}
+
+TEST(Outputs, TwoOfThemAreNeverOneFile) {
+  const TemporaryFolder folder;
+  write_file(folder / "old", "old");
+  fs::create_hard_link(folder / "old", folder / "hard");
+  fs::create_symlink("old", folder / "soft");
+  for (const char* other : {"old", "./old", "hard", "soft"}) {
+    const auto result = run_process(
+        "supertac-plate", {"--plate", "plain", "--out", folder / "old", "--json", folder / other, "--force"});
+    EXPECT_EQ(result.code, 2) << other;
+    EXPECT_NE(result.error.find("would overwrite the output of --"), std::string::npos) << result.error;
+  }
+  const auto fresh =
+      run_process("supertac-plate", {"--plate", "plain", "--out", folder / "m", "--gcode", folder / "./m"});
+  EXPECT_EQ(fresh.code, 2) << "a name that does not exist yet";
+  EXPECT_EQ(text_of(folder / "old"), "old");
+}
+
+TEST(Outputs, AnInputIsNeverOverwritten) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(
+      run_process("supertac-plate", {"--plate", "ridges6", "--out", folder / "mine.stl", "--resolution", "5"})
+          .code,
+      0);
+  const std::string before = text_of(folder / "mine.stl");
+  const auto plate = run_process("supertac-plate",
+                                 {"--plate", folder / "mine.stl", "--out", folder / "mine.stl", "--force"});
+  EXPECT_EQ(plate.code, 2) << plate.error;
+  EXPECT_NE(plate.error.find("would overwrite the input of --plate"), std::string::npos) << plate.error;
+  EXPECT_EQ(text_of(folder / "mine.stl"), before);
+  ASSERT_EQ(simulate({"--out", folder / "data"}).code, 0);
+  const std::string recording = fs::directory_iterator(folder / "data")->path();
+  const auto train =
+      run_process("supertac-train", {"--data", folder / "data", "--out", recording, "--force"});
+  EXPECT_EQ(train.code, 2) << train.error;
+  EXPECT_NE(train.error.find("would overwrite the input of --data"), std::string::npos) << train.error;
+}
+
+TEST(Outputs, AreFoundUnusableBeforeTheWork) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(simulate({"--out", folder / "data"}).code, 0);
+  ASSERT_EQ(mkfifo((folder / "fifo").c_str(), 0600), 0);
+  fs::create_directory(folder / "dir");
+  const std::string long_name(250, 'x');
+  for (const std::string& bad :
+       {folder / "m.run", folder / "dir", folder / "fifo", folder / long_name, folder / "no/such/m"}) {
+    for (const bool json : {false, true}) {
+      if (json && bad.ends_with(".run")) continue;  // a good name for JSON
+      const std::vector<std::string> arguments = {"--data",
+                                                  folder / "data",
+                                                  "--epochs",
+                                                  "1000",
+                                                  "--force",
+                                                  "--split",
+                                                  "window",
+                                                  "--out",
+                                                  json ? folder / "model" : bad,
+                                                  "--json",
+                                                  json ? bad : folder / "json"};
+      const auto begin = std::chrono::steady_clock::now();
+      const auto result = run_process("supertac-train", arguments);
+      EXPECT_EQ(result.code, 1) << bad << result.error;
+      EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
+      EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5)) << "found after training";
+      EXPECT_FALSE(fs::exists(folder / "model.run"));
+    }
+  }
+}
+
+TEST(Outputs, ASecondWriterOfAFolderIsRefused) {
+  const TemporaryFolder folder;
+  fs::create_directory(folder / "out");
+  const pid_t holder = fork();
+  if (holder == 0) {
+    const FolderLock lock(folder / "out");
+    write_file(folder / "held", "");
+    pause();
+  }
+  wait_for_file(folder / "held");
+  const auto second = simulate({"--out", folder / "out"});
+  kill(holder, SIGKILL);
+  waitpid(holder, nullptr, 0);
+  EXPECT_EQ(second.code, 1);
+  EXPECT_NE(second.error.find("another program is writing there"), std::string::npos) << second.error;
+  EXPECT_EQ(simulate({"--out", folder / "out"}).code, 0) << "a killed program holds nothing";
+}
+
+TEST(Outputs, EmptyNamesAreRefused) {
+  for (const auto& [program, option] :
+       {std::pair{"supertac-plate", "--json"}, {"supertac-train", "--resume"}}) {
+    const auto result = run_process(program, {"--plate", "plain", "--out", "x", option, ""});
+    EXPECT_EQ(result.code, 2);
+  }
+  const auto resume = run_process("supertac-train", {"--data", "x", "--out", "x", "--resume", ""});
+  EXPECT_NE(resume.error.find("--resume: expected FILE, found an empty name"), std::string::npos)
+      << resume.error;
+}
+
+/// Runs a shell line with $BIN: only what a test needs a shell for.
+int shell(const std::string& line) {
+  const int status = std::system(("BIN=" SUPERTAC_BIN "; " + line).c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128;
+}
+
+TEST(Descriptors, ClosedOnesGoToNobody) {
+  const TemporaryFolder folder;
+  const std::string out = folder / "x.stl";
+  EXPECT_EQ(shell("$BIN/supertac-plate --plate plain --resolution 5 --out " + out + " <&- >&- 2>&-"), 0);
+  const std::string stl = text_of(out);
+  EXPECT_EQ(stl.find("triangles"), std::string::npos) << "a message was written into the file";
+  EXPECT_EQ((stl.size() - 84) % 50, 0U);
+}
+
+TEST(Pipes, AReaderThatGoesAwayCostsNoFile) {
+  const TemporaryFolder folder;
+  shell("$BIN/supertac-simulate --plates plain --speeds 10 --trials 1 --passes 8 --json - --out " +
+        (folder / "d") + " | true");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder / "d"), {}), 8);
+}
+
+TEST(Errors, AreOneClearLine) {
+  const TemporaryFolder folder;
+  fs::create_symlink("loop", folder / "loop");
+  const std::string odd = folder / "na\xff\x1b[31mme";
+  const std::string huge(5000, 'x');
+  for (const std::string& name : {folder / "loop", odd, huge, folder / "loop/x"}) {
+    for (const std::vector<std::string>& arguments :
+         {std::vector<std::string>{"supertac-info", name},
+          {"supertac-simulate", "--out", name, "--plates", name},
+          {"supertac-import", name, "--out", folder / "o"},
+          {"supertac-import", "--journal", name, "--out", folder / "o"},
+          {"supertac-plate", "--plate", name, "--out", folder / "p"},
+          {"supertac-plate", "--plate", "plain", "--json", name},
+          {"supertac-sweep", "--out", name},
+          {"supertac-evaluate", "--model", name, "--data", name},
+          {"supertac-stream", "--model", name, "--recording", name},
+          {"supertac-train", "--data", name, "--out", folder / "m"}}) {
+      const auto result = run_process(arguments[0], {arguments.begin() + 1, arguments.end()});
+      EXPECT_TRUE(result.code == 1 || result.code == 2) << arguments[0] << result.code;
+      EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
+      for (const char* raw : {"filesystem error", "[json.", "std::", "\x1b", "basic_"})
+        EXPECT_EQ((result.error + result.out).find(raw), std::string::npos) << result.error;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace supertac
