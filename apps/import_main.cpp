@@ -78,7 +78,7 @@ int run(Arguments& arguments) {
   const auto keep = [&](const ImportedPass& pass) {
     const std::string name = recording_file_name(pass.recording);
     write_recording(folder.add(name), pass.recording);
-    if (pictures)
+    if (pictures && !pass.unknown)
       write_png(pictures->add(std::filesystem::path(name).stem().string() + ".png"),
                 registration_picture(pass.recording, pass.plate));
     arguments.print(pass.summary());

@@ -52,6 +52,7 @@ Recording recording_of(const CollectedPass& pass, const Header& header, const st
   for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
     recording.position_mm.push_back(static_cast<float>(pass.position[3 * i] - rig::kPlate.x));
     recording.position_mm.push_back(static_cast<float>(pass.position[3 * i + 1] - rig::kPlate.y));
+    recording.lift_mm.push_back(static_cast<float>(pass.position[3 * i + 2] - rig::kPlate.z));
   }
   recording.plate = header.plate;
   recording.trial = header.trial;

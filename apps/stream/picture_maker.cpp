@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "io/numbers.h"
+#include "models/interval.h"
 
 namespace supertac {
 namespace {
@@ -37,8 +38,8 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
       network_(models),
       window_(window_settings(model_, source)),
       input_(network_.first().input_shape(1)),
-      output_(network_.infer(input_)) {  // the first run takes memory and chooses kernels
-  for (const float value : output_.values()) {
+      output_(network_.estimate(input_)) {  // the first run takes memory and chooses kernels
+  for (const float value : output_.picture.values()) {
     if (!std::isfinite(value))
       throw std::runtime_error(
           "the model draws no numbers (NaN or infinity): its weights are damaged or its "
@@ -48,8 +49,20 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
 
 std::span<const float> PictureMaker::picture() {
   if (!window_.window(input_.values())) return {};
-  output_ = network_.infer(input_);
-  return output_.values();
+  output_ = network_.estimate(input_);
+  return output_.picture.values();
+}
+
+double PictureMaker::doubt() const {
+  double sum = 0;
+  for (const float spread : output_.spread.values()) sum += static_cast<double>(at_least(spread));
+  return output_.spread.defined()
+             ? model_.interval_factor() * sum / static_cast<double>(output_.spread.size())
+             : 0;
+}
+
+bool PictureMaker::unlike_training() const {
+  return model_.novelty && model_.novelty->unlike_training(output_.latents.values());
 }
 
 double PictureMaker::window_s() const {

@@ -20,6 +20,11 @@ class PictureMaker {
   /// The picture [height][width] of image() after the newest frame, valid until the next call; empty before
   /// window_s() without a gap.
   std::span<const float> picture();
+  /// Of the newest picture: half the width of its pixels' 90 % intervals, mean over the pixels; 0 when the
+  /// model does not say.
+  double doubt() const;
+  /// Whether the window that it was drawn from is unlike those of training.
+  bool unlike_training() const;
 
   ImageGrid image() const { return model_.windows().array->picture(model_.windows().scale); }
   /// Seconds of signal that a picture needs.
@@ -30,7 +35,8 @@ class PictureMaker {
   const ModelFile& model_;  // what all have in common
   Committee network_;
   LiveWindow window_;
-  Tensor input_, output_;
+  Tensor input_;
+  Estimate output_;
 };
 
 }  // namespace supertac

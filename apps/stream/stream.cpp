@@ -46,7 +46,8 @@ std::string Stream::summary() const {
   return std::to_string(frames_) + " frames in " + format(last_s_ - first_s_, 1) + " s, " +
          std::to_string(pictures()) + " pictures, latency median " + format(milliseconds(0.5), 2) +
          " ms, p99 " + format(milliseconds(0.99), 2) + " ms; lost " + std::to_string(counters.missing) +
-         ", dropped " + std::to_string(dropped());
+         ", dropped " + std::to_string(dropped()) +
+         (unlike_ > 0 ? ", " + std::to_string(unlike_) + " pictures of signals unlike training" : "");
 }
 
 nlohmann::ordered_json Stream::result() const {
@@ -55,6 +56,7 @@ nlohmann::ordered_json Stream::result() const {
   return {{"seconds", last_s_ - first_s_},
           {"frames", frames_},
           {"pictures", pictures()},
+          {"unlike_training", unlike_},
           {"lost", counters.missing},
           {"dropped", dropped()},
           {"suspect", counters.suspect},
@@ -82,6 +84,8 @@ bool Stream::take(SensorFrame frame) {
   }
   const std::span<const float> picture = maker_.picture();
   if (picture.empty()) return true;
+  state_.unlike_training = maker_.unlike_training();
+  unlike_ += state_.unlike_training ? 1 : 0;
   latency_.add(monotonic_seconds() - frame.arrived_s);
   if (log_) log_->add(frame.time_s - first_s_, frame.volts, picture);
   state_.picture.assign(picture.begin(), picture.end());
@@ -105,6 +109,7 @@ void Stream::show() {
     state_.lost = counters.missing, state_.dropped = dropped();
     figures_s_ = now, figures_frames_ = frames_;
   }
+  state_.doubt = maker_.doubt();
   state_.taxels = mean_of_channels(state_.array, maker_.window().newest());
   view_->update(state_);
 }

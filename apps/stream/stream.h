@@ -55,7 +55,7 @@ class Stream {
   std::unique_ptr<TerminalView> view_;
   LatencyHistogram latency_;
   LiveState state_;
-  std::uint64_t frames_ = 0, too_late_ = 0, figures_frames_ = 0;
+  std::uint64_t frames_ = 0, too_late_ = 0, unlike_ = 0, figures_frames_ = 0;
   double first_s_ = 0, last_s_ = 0;  // the sensor's time
   double begin_s_ = 0, figures_s_ = 0;
 };

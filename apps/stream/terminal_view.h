@@ -20,6 +20,8 @@ struct LiveState {
   double frames_per_s = 0;
   double median_ms = 0, p99_ms = 0;  ///< latency
   std::uint64_t lost = 0, dropped = 0;
+  double doubt = 0;              ///< half the width of a pixel's 90 % interval, mean; 0 when unknown
+  bool unlike_training = false;  ///< the signals are not such as the model has learnt from
 };
 
 /// Two pictures of 32 columns and 16 lines, or less for the shorter side of the array, y upwards, and a line

@@ -11,7 +11,14 @@ namespace supertac {
 
 namespace fs = std::filesystem;
 
+bool is_unknown_plate(const std::string& name) { return name.starts_with("unknown"); }
+
 Plate plate_in_folder(const std::string& name, const std::string& folder) {
+  if (is_unknown_plate(name))
+    throw std::invalid_argument(
+        "plate " + in_quotes(name) +
+        ": its shape is unknown, so it has no truth to train on or score; stream its recordings "
+        "(supertac-stream --recording)");
   if (!Plate::is_file(name)) return Plate::named(name);
   if (name.find('/') != std::string::npos)
     throw std::invalid_argument("plate " + in_quotes(name) +

@@ -8,6 +8,10 @@
 
 namespace supertac {
 
+/// True for the name of a plate whose shape nobody knows: it begins with "unknown". Its recordings can be
+/// streamed and drawn; they have no truth, so nothing can be learnt from them or scored.
+bool is_unknown_plate(const std::string& name);
+
 /// The plate that `name` means for recordings of `folder`: one of Plate::named, or an STL file there.
 /// Throws std::invalid_argument for an unknown plate, or an STL file named with a folder (a recording may
 /// not choose what is read); FileError when the file is missing or no plate.

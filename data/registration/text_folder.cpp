@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "data/plates/plate_file.h"
 #include "data/registration/alignment.h"
 #include "data/registration/apply_registration.h"
 #include "data/registration/lost_frames.h"
@@ -39,12 +40,20 @@ int number_of(const fs::path& path, const std::string& name) {
 }
 
 ImportedPass found_pass(const fs::path& folder, const std::string& plate_file) {
+  const std::string name = folder.filename().string();
+  const bool unknown = plate_file.empty() && is_unknown_plate(name);
   try {
-    return {.path = {},
-            .plate = Plate::named(plate_file.empty() ? folder.filename().string() : plate_file),
-            .plate_file = plate_file};
+    ImportedPass found{.path = {},
+                       .plate = Plate::named(unknown              ? "plain"
+                                             : plate_file.empty() ? name
+                                                                  : plate_file),
+                       .unknown = unknown,
+                       .plate_file = plate_file};
+    found.recording.plate = unknown ? name : found.plate.name();
+    return found;
   } catch (const std::invalid_argument& error) {
-    throw FileError(folder.string(), std::string("unknown plate: ") + error.what());
+    throw FileError(folder.string(), std::string("unknown plate: ") + error.what() +
+                                         "; or name the folder unknown_... to import it without truth");
   }
 }
 
@@ -53,7 +62,6 @@ std::vector<ImportedPass> find_passes(const std::string& root) {
   for (const fs::path& folder : entries_of(root, true)) {
     const std::string stl = folder.string() + ".stl";
     ImportedPass found = found_pass(folder, fs::exists(stl) ? stl : "");
-    found.recording.plate = found.plate.name();
     std::map<std::pair<int, int>, std::string> named;  // trial and pass
     for (const fs::path& trial : entries_of(folder, true)) {
       found.recording.trial = number_of(trial, trial.filename().string());
@@ -82,7 +90,7 @@ void read_and_register(ImportedPass& pass, double speed_mm_s) {
   recording.pass = pass.recording.pass;
   recording.speed_mm_s = speed_mm_s;
   restore_clock(recording, rig::kFrameRateHz);
-  pass.registration = register_pass(recording, pass.plate);
+  if (!pass.unknown) pass.registration = register_pass(recording, pass.plate);
   pass.recording = std::move(recording);
 }
 
@@ -112,12 +120,13 @@ void import_text_folder(const std::string& root, const FolderImport& settings,
       if (!settings.left_out) throw;
       settings.left_out(error);
     }
-    const bool last = i + 1 == found.size() || found[i + 1].plate.name() != found[i].plate.name();
+    const bool last = i + 1 == found.size() || found[i + 1].recording.plate != found[i].recording.plate;
     if (!last || plate.empty()) continue;
     any = true;
     progress(i + 1);
-    if (found[i].plate.uniform_in_x()) align(plate);
-    for (ImportedPass& pass : plate) apply(pass.registration, pass.recording);
+    if (found[i].plate.uniform_in_x() && !found[i].unknown) align(plate);
+    for (ImportedPass& pass : plate)
+      if (!pass.unknown) apply(pass.registration, pass.recording);
     take(std::exchange(plate, {}));
   }
   if (!any) throw FileError(root, "none of " + std::to_string(found.size()) + " files is a recording");
@@ -133,10 +142,12 @@ std::vector<ImportedPass> import_text_folder(const std::string& root, const Fold
 
 std::string ImportedPass::summary() const {
   const std::size_t dropped = lines.lines - lines.empty - lines.frames;
-  std::string line = plate.name() + "/" + std::to_string(recording.trial) + "/" +
+  std::string line = recording.plate + "/" + std::to_string(recording.trial) + "/" +
                      std::to_string(recording.pass) + ".txt  " + std::to_string(lines.lines) + " lines, " +
                      std::to_string(dropped) + " dropped (" + std::to_string(lines.malformed()) +
-                     " malformed), residual " + format(registration.residual, 2) + " mm, ";
+                     " malformed), ";
+  if (unknown) return line + "of unknown shape: no position, no truth";
+  line += "residual " + format(registration.residual, 2) + " mm, ";
   if (registration.agreement > 0) line += "aligned by " + format(registration.shift_mm, 2) + " mm, ";
   if (registration.lost_s > 0) line += "another " + format(registration.lost_s, 2) + " s lost, ";
   return line + (registration.reliable ? "reliable" : "not reliable: " + registration.reason);
@@ -144,7 +155,7 @@ std::string ImportedPass::summary() const {
 
 nlohmann::ordered_json ImportedPass::to_json() const {
   return {{"file", path},
-          {"plate", plate.name()},
+          {"plate", recording.plate},
           {"trial", recording.trial},
           {"pass", recording.pass},
           {"lines", lines.lines},

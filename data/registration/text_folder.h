@@ -16,6 +16,7 @@ namespace supertac {
 struct ImportedPass {
   std::string path;  ///< of the text file
   Plate plate;
+  bool unknown = false;    ///< the plate's shape: then `plate` is plain, the recording has its name
   std::string plate_file;  ///< the STL file that describes the plate; empty when its name does
   Recording recording = {};
   ImportReport lines = {};
@@ -37,8 +38,10 @@ struct FolderImport {
 };
 
 /// Imports a folder of the rig's text recordings, <plate>/<trial>/<pass>.txt with <plate> a name that
-/// Plate::named takes or <plate>.stl beside its folder. The recordings have plate, trial, pass, speed,
-/// positions, a clock in seconds and the metadata of apply(); they are in the order of their names.
+/// Plate::named takes, or <plate>.stl beside its folder, or any name that begins with "unknown": passes over
+/// a shape that nobody knows are not registered and have no positions (is_unknown_plate()). The recordings
+/// have plate, trial, pass, speed, positions, a clock in seconds and the metadata of apply(); they are in the
+/// order of their names.
 ///
 /// The files hold no clock. It is rewritten four times, and each step needs what the one before left:
 ///   1. import_text_pass() counts the lines: frame i at i / rig::kFrameRateHz. A dropped line keeps its

@@ -18,6 +18,8 @@ namespace {
 // A finger that is pressed as deep as rigs press it is clear of the plate when it is lifted by so much more
 // than the highest element.
 constexpr double kClearanceMm = 1.5;
+// A height that is measured is never quite that of the slide.
+constexpr double kLiftedMm = 0.1;
 
 void check(const WindowSettings& s) {
   const auto fail = [](const std::string& what) { throw std::invalid_argument("windows: " + what); };
@@ -103,7 +105,7 @@ bool WindowSet::accept(const Track& track, std::size_t frame, bool reliable, dou
     reason = &counts_.unreliable;
   else if (!std::isfinite(x) || !std::isfinite(y))
     reason = &counts_.no_position;
-  else if (lift > 0 && lift < clear_mm)
+  else if (lift > kLiftedMm && lift < clear_mm)
     reason = &counts_.lifting;
   else if (track.run[frame] < static_cast<std::uint32_t>(settings_.timesteps))
     reason = &counts_.too_early;
@@ -196,7 +198,9 @@ void WindowSet::truth(std::size_t i, std::span<float> out) const {
 }
 
 // While it is lifted there are no windows.
-bool WindowSet::in_air(std::size_t i) const { return tracks_[index_[i].pass].lift_mm[index_[i].last] > 0; }
+bool WindowSet::in_air(std::size_t i) const {
+  return tracks_[index_[i].pass].lift_mm[index_[i].last] > kLiftedMm;
+}
 
 Zone WindowSet::zone(std::size_t i) const {
   const auto [x, y] = position(i);

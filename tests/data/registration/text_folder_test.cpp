@@ -10,6 +10,7 @@
 #include "data/registration/alignment.h"
 #include "data/registration/apply_registration.h"
 #include "data/registration/lost_frames.h"
+#include "data/samples/windows.h"
 #include "tests/data/registration/lossy_pass.h"
 #include "tests/io/temporary_folder.h"
 
@@ -92,6 +93,29 @@ TEST(TextFolder, APlateOfYourOwnLiesBesideItsFolder) {
   EXPECT_EQ(recording_file_name(imported[0].recording), "plain_t3_p7_v7.safetensors");
   EXPECT_EQ(imported[0].plate_file, "");
   EXPECT_EQ(imported[0].registration.reason, "a plain plate has nothing to register against");
+}
+
+TEST(TextFolder, APlateOfUnknownShapeIsImportedWithoutPositions) {
+  const TemporaryFolder folder;
+  put(folder, "unknown_felt/2/5.txt", as_text(full_pass("3_Bumps", 5, 1)));
+  const auto imported = import_text_folder(folder.path(), {});
+  ASSERT_EQ(imported.size(), 1u);
+  const Recording& recording = imported[0].recording;
+  EXPECT_EQ(recording_file_name(recording), "unknown_felt_t2_p5_v10.safetensors");
+  EXPECT_GT(recording.frames(), 1000u);
+  EXPECT_TRUE(recording.position_mm.empty());
+  EXPECT_TRUE(imported[0].summary().ends_with("of unknown shape: no position, no truth"))
+      << imported[0].summary();
+  WindowSet windows((WindowSettings()));
+  try {
+    windows.add(recording);
+    ADD_FAILURE() << "there is no truth to train on";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(
+        error.what(),
+        "plate \"unknown_felt\": its shape is unknown, so it has no truth to train on or score; stream its "
+        "recordings (supertac-stream --recording)");
+  }
 }
 
 TEST(TextFolder, FilesThatAreNoRecordingsAreLeftOutWhenAskedTo) {
