@@ -73,7 +73,7 @@ int run(Arguments& a) {
   TrainingSettings settings = settings_of(a);
   training_split(a);
   refuse_existing(a.text("out"), a.force());
-  const WindowSet windows = training_windows(a, settings.model);
+  const WindowSet windows = training_windows(a, settings.model, settings.seed);
   set_array(settings.model, windows.array());
   return train(a, window_task(a, windows, settings), windows.counts().summary());
 }

@@ -23,7 +23,6 @@ inline WindowSet sliding_bumps(const SuperTacSettings& model, int passes = 1) {
   WindowSettings settings;
   settings.timesteps = static_cast<int>(model.timesteps);
   settings.scale = static_cast<int>(model.scale);
-  settings.max_y_mm = 1000;
   WindowSet windows(settings);
   const Plate plate = Plate::named("3_Bumps");
   for (int pass = 1; pass <= passes; ++pass) {

@@ -33,9 +33,8 @@ void Sweep::check_settings() const {
   nlohmann::ordered_json settings = to_json(training);
   settings.erase("seed");
   settings["grouping"] = name_of(training.model.grouping);
-  for (const char* option :
-       {"also", "data", "history", "leave-out", "limit", "plates", "random-plates", "range", "rate", "scaling",
-        "split", "stride"})
+  for (const char* option : {"also", "data", "history", "leave-out", "limit", "plates", "random-plates",
+                             "range", "rate", "scaling", "split", "stride"})
     settings[option] = a_.text(option);
   for (const auto& [option, key] :
        {std::pair("epochs", "epochs"), {"learning-rate", "learning_rate"}, {"rate", "rate"}})
@@ -99,7 +98,7 @@ const WindowSet& Sweep::windows_of(const SuperTacSettings& model) {
   if (!windows_ || windows_->timesteps() != model.timesteps || windows_->settings().scale != model.scale ||
       windows_->settings().rate_hz != training_rate_hz(a_, model)) {
     windows_.reset();
-    windows_.emplace(training_windows(a_, model));
+    windows_.emplace(training_windows(a_, model, 0));  // all seeds share them
     a_.note(windows_->counts().summary());
   }
   return *windows_;

@@ -116,7 +116,7 @@ static double common_speed(const WindowSet& windows) {
   return speed > 0 ? speed : rig::kSlideMmS;
 }
 
-WindowSet training_windows(const Arguments& a, const SuperTacSettings& model) {
+WindowSet training_windows(const Arguments& a, const SuperTacSettings& model, std::uint64_t seed) {
   WindowSettings w;
   w.timesteps = static_cast<int>(model.timesteps);
   w.scale = static_cast<int>(model.scale);
@@ -126,7 +126,7 @@ WindowSet training_windows(const Arguments& a, const SuperTacSettings& model) {
   WindowSet windows = WindowSet::load(a.text("data"), a.list("plates"), w);
   if (a.given("also")) windows.add_directory(a.text("also"), {}, true);
   const RandomPasses random{.count = static_cast<std::size_t>(a.integer("random-plates", 0, 50'000)),
-                            .seed = a.seed(),
+                            .seed = seed,
                             .speed_mm_s = common_speed(windows),
                             .filter_s = windows.filter_s().value_or(rig::kFilterS)};
   add_random_passes(windows, random);

@@ -25,7 +25,8 @@ double training_rate_hz(const Arguments& a, const SuperTacSettings& model);
 /// --split. Throws UsageError.
 SplitKind training_split(const Arguments& a);
 
-/// The recordings' windows as this network takes them. Throws as WindowSet::load.
-WindowSet training_windows(const Arguments& a, const SuperTacSettings& model);
+/// The recordings' windows as this network takes them, and those of --random-plates, drawn with `seed`.
+/// Throws as WindowSet::load.
+WindowSet training_windows(const Arguments& a, const SuperTacSettings& model, std::uint64_t seed);
 
 }  // namespace supertac

@@ -21,7 +21,8 @@ void fill(Picture& picture, int x, int top, int height, Rgb colour) {
   for (int y = top; y < top + height; ++y) picture.set(x, y, colour);
 }
 
-// Mean depth (V below the taxel's highest voltage) in each column; -1 where no frame falls.
+// Mean depth (V below the taxel's highest voltage) of what the sliding finger felt in each column; -1 where
+// no frame falls.
 std::vector<float> depths(const Recording& recording, std::size_t taxel) {
   float rest = -1;
   for (std::size_t i = 0; i < recording.frames(); ++i)
@@ -31,6 +32,7 @@ std::vector<float> depths(const Recording& recording, std::size_t taxel) {
   for (std::size_t i = 0; i < recording.frames(); ++i) {
     const double y = recording.position_mm[2 * i + 1] + row_contact_mm(taxel / 4);
     const float v = recording.volts[i * kTaxels + taxel];
+    if (!recording.lift_mm.empty() && recording.lift_mm[i] > 0) continue;
     if (!std::isfinite(y) || !std::isfinite(v) || y < kFromMm || y >= kToMm) continue;
     const auto column = static_cast<std::size_t>(column_of(y));
     sum[column] += rest - v, ++count[column];

@@ -142,9 +142,9 @@ std::vector<ImportedPass> import_text_folder(const std::string& root, const Fold
 
 std::string ImportedPass::summary() const {
   const std::size_t dropped = lines.lines - lines.empty - lines.frames;
-  std::string line = recording.plate + "/" + std::to_string(recording.trial) + "/" +
-                     std::to_string(recording.pass) + ".txt  " + std::to_string(lines.lines) + " lines, " +
-                     std::to_string(dropped) + " dropped (" + std::to_string(lines.malformed()) +
+  std::string line = (unknown ? recording.plate : plate.name()) + "/" + std::to_string(recording.trial) +
+                     "/" + std::to_string(recording.pass) + ".txt  " + std::to_string(lines.lines) +
+                     " lines, " + std::to_string(dropped) + " dropped (" + std::to_string(lines.malformed()) +
                      " malformed), ";
   if (unknown) return line + "of unknown shape: no position, no truth";
   line += "residual " + format(registration.residual, 2) + " mm, ";

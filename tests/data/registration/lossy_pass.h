@@ -12,12 +12,27 @@ namespace supertac {
 
 inline constexpr double kBoardHz = 1008.06;
 
+// The rig's text files hold the slide and little of what was before and behind it: no frame of the air.
+inline Recording slide_of(const Recording& whole) {
+  constexpr float kTouchingMm = 0.75F;
+  Recording slide = whole;
+  slide.time_s.clear(), slide.volts.clear(), slide.position_mm.clear(), slide.lift_mm.clear();
+  double begin = -1;
+  for (std::size_t i = 0; i < whole.frames(); ++i) {
+    if (whole.lift_mm[i] > kTouchingMm) continue;
+    if (begin < 0) begin = whole.time_s[i];
+    slide.time_s.push_back(whole.time_s[i] - begin);
+    for (std::size_t k = 0; k < kTaxels; ++k) slide.volts.push_back(whole.volts[i * kTaxels + k]);
+    for (std::size_t axis = 0; axis < 2; ++axis) slide.position_mm.push_back(whole.position_mm[2 * i + axis]);
+  }
+  return slide;
+}
+
 inline Recording full_pass(const std::string& plate, int pass, std::uint64_t seed) {
   SimulatorSettings settings;
   settings.rate_hz = kBoardHz;
   settings.with_loss = false;
-  return simulate_pass(Plate::named(plate), {.pass = pass, .speed_mm_s = 10, .from_mm = 0, .to_mm = 108},
-                       settings, seed);
+  return slide_of(simulate_pass(Plate::named(plate), {.pass = pass}, settings, seed));
 }
 
 // Without the frames at..at + lost - 1, and with stamps that count those that are left.
@@ -50,8 +65,8 @@ inline Recording like_the_rig(const std::string& plate, int pass, std::uint64_t 
                               double early_s = 0, double speed = 10) {
   SimulatorSettings settings;
   settings.rate_hz = kBoardHz;
-  const Recording full = simulate_pass(
-      Plate::named(plate), {.pass = pass, .speed_mm_s = speed, .from_mm = 0, .to_mm = 108}, settings, seed);
+  const Recording full =
+      slide_of(simulate_pass(Plate::named(plate), {.pass = pass, .speed_mm_s = speed}, settings, seed));
   Recording text = full;
   text.time_s.clear(), text.volts.clear(), text.position_mm.clear();
   text.source = "imported";

@@ -45,7 +45,7 @@ TEST(LostFrames, TheClockIsRestoredWhereSignalsMove) {
   EXPECT_LT(after / n, 0.4);
 }
 
-TEST(LostFrames, ALossIsCountedToAFrameOrATenth) {
+TEST(LostFrames, ALossIsCountedToAFrameOrAFifth) {
   const Recording whole = full_pass("6_Ridges", 4, 3);
   // Where the fastest change is.
   std::size_t at = 1000;
@@ -57,7 +57,7 @@ TEST(LostFrames, ALossIsCountedToAFrameOrATenth) {
     if (change > most) most = change, at = i;
   }
   for (const std::size_t lost : {1, 5, 20}) {
-    const double tolerance = std::max(1.0, 0.1 * static_cast<double>(lost));
+    const double tolerance = std::max(1.0, 0.2 * static_cast<double>(lost));
     Recording cut = whole;
     lose(cut, at, lost);
     const std::vector<double> found = find_lost_frames(cut, kBoardHz);

@@ -113,7 +113,7 @@ TEST(TextFolder, APlateOfUnknownShapeIsImportedWithoutPositions) {
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(
         error.what(),
-        "plate \"unknown_felt\": its shape is unknown, so it has no truth to train on or score; stream its "
+        "plate 'unknown_felt': its shape is unknown, so it has no truth to train on or score; stream its "
         "recordings (supertac-stream --recording)");
   }
 }
