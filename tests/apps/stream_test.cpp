@@ -283,6 +283,7 @@ TEST_F(Streaming, TooShortASignalSaysHowMuchIsNeeded) {
   Recording recording = simulate_pass(Plate::named("bumps12"), {.to_mm = 32});
   recording.metadata.erase("filter_s");
   recording.time_s.resize(20), recording.volts.resize(20 * kTaxels), recording.position_mm.resize(40);
+  recording.lift_mm.clear();
   write_recording(path("recording"), recording);
   expect_failure(stream({"--recording", path("recording")}), 1, "no picture, expected 0.11 s of signal");
 }

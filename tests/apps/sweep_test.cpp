@@ -93,7 +93,7 @@ TEST_F(Sweep, WritesARowAModelAndDoesNotRepeatIt) {
 }
 
 TEST_F(Sweep, HistoryJudgesModelsOnTheSameFrames) {
-  const ProcessResult swept = sweep("history", "1", {"--history", "400"});
+  const ProcessResult swept = sweep("history", "1", {"--history", "1440"});
   ASSERT_EQ(swept.code, 0) << swept.error;
   const std::string csv = bytes("history/sweep.csv");
   std::istringstream lines(csv);
