@@ -269,6 +269,13 @@ def rig():
     return table(["file", "result"], lines)
 
 
+def never_felt():
+    return table(["tried", "random plates", "options", "left out", "contact SSIM", "contact PSNR dB", "ghosts on flat", "verdict"],
+                 [[r["recipe"], r["random_plates"], f"`{r['options']}`", r["left_out"], r["contact_ssim"],
+                   r["contact_psnr_db"], f"{100 * float(r['flat_ghost_rate']):.1f} %", r["verdict"]]
+                  for r in rows("never_felt.csv")])
+
+
 def demo():
     return table(["method", "contact SSIM", "PSNR dB", "position mm", "all SSIM", "PSNR dB", "us"],
                  [list(r.values()) for r in rows("demo.csv")])
@@ -285,7 +292,7 @@ def tried():
 
 
 SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, streaming, growth, pixels, textures, simulator, stability,
-                   rig, demo, tried],
+                   rig, demo, tried, never_felt],
             README: [accuracy, speed]}
 
 
