@@ -232,6 +232,17 @@ def simulator():
                    f"{float(r['ssim_gain']):+.3f}"] for r in rows("simulator_ablation.csv")])
 
 
+def terms():
+    found = rows("simulator_terms.csv")
+    names = list(dict.fromkeys(r["simulator"] for r in found))
+    of = lambda name: [r for r in found if r["simulator"] == name]
+    whole = mean([float(r["contact_ssim"]) for r in of("whole")])
+    return table(["simulated passes to train on", "contact SSIM by seed", "PSNR dB", "mean against the whole"],
+                 [[name, ", ".join(f"{float(r['contact_ssim']):.3f}" for r in of(name)),
+                   ", ".join(f"{float(r['contact_psnr_db']):.1f}" for r in of(name)),
+                   f"{mean([float(r['contact_ssim']) for r in of(name)]) - whole:+.3f}"] for name in names])
+
+
 def stability():
     counts = {}
     for r in rows("stability_map.csv"):
@@ -292,7 +303,7 @@ def tried():
 
 
 SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, streaming, growth, pixels, textures, simulator, stability,
-                   rig, demo, tried, never_felt],
+                   rig, demo, tried, never_felt, terms],
             README: [accuracy, speed]}
 
 

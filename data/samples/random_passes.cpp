@@ -1,6 +1,7 @@
 #include "data/samples/random_passes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <exception>
 
 #include "data/plates/random_plate.h"
@@ -28,6 +29,10 @@ SimulatorSettings finger_of(const WindowSettings& windows, double filter_s) {
   s.rate_hz = std::max(kLeastRateHz, windows.rate_hz);
   s.with_filter = filter_s > 0;
   s.filter_s = filter_s;
+  // The board's moving average is over ten times as many samples: what it leaves of noise and of the
+  // converter's steps.
+  s.noise_volts *= std::sqrt(s.rate_hz / rig::kFrameRateHz);
+  s.with_adc = false;
   return s;
 }
 
