@@ -24,7 +24,9 @@ WindowSet load_windows(const Arguments& a, const ModelFile& file) {
 
 std::string row(const std::string& name, const ZoneMetrics& metrics, const Latency& latency) {
   const Metrics c = metrics.contact(), all = metrics.all();
-  const auto number = [](double value, int decimals) { return cell(format(value, decimals), 9); };
+  const auto number = [](double value, int decimals) {
+    return cell(std::isfinite(value) ? format(value, decimals) : "-", 9);
+  };
   return name + std::string(name.size() < 12 ? 12 - name.size() : 0, ' ') + number(c.ssim, 3) +
          number(c.psnr_mean_db, 2) + number(c.position_error_mm, 2) + number(all.ssim, 3) +
          number(all.psnr_mean_db, 2) + number(latency.median_us, 1);
