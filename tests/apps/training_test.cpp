@@ -104,6 +104,19 @@ TEST_F(Training, InterruptedAndResumedGivesTheSameBytes) {
   }
 }
 
+TEST_F(Training, RandomPlatesGiveTheSameBytesAndAreNamedInTheModel) {
+  for (const char* threads : {"1", "2"}) {
+    const ProcessResult result = train(std::string("random") + threads + ".safetensors",
+                                       {"--random-plates", "5", "--epochs", "1", "--threads", threads});
+    ASSERT_EQ(result.code, 0) << result.error;
+  }
+  EXPECT_EQ(bytes("random1.safetensors"), bytes("random2.safetensors"));
+  const SafetensorsFile file = SafetensorsFile::read(path("random1.safetensors"));
+  EXPECT_EQ(file.metadata().at("random_plates"), "5");
+  EXPECT_TRUE(file.tensors().contains("upsampler.spread.weight"));
+  EXPECT_TRUE(file.tensors().contains("novelty.mean"));
+}
+
 TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
   ASSERT_EQ(train("scored.safetensors").code, 0);
   const ProcessResult result = run_process(
@@ -121,6 +134,10 @@ TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
       }
     }
   }
+  for (const char* part : {"flat", "air"}) EXPECT_TRUE(json[part].contains("ghost_rate")) << part;
+  EXPECT_TRUE(json["contact"].contains("miss_rate"));
+  for (const char* key : {"factor", "coverage", "factor_found", "sure_ssim", "auroc", "unlike_training"})
+    EXPECT_TRUE(json["trust"].contains(key)) << key;
   const SafetensorsFile outputs = SafetensorsFile::read(path("outputs.safetensors"));
   EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<std::uint64_t>{40, 32, 16}));
   EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<std::uint64_t>{40, 8, 8}));
