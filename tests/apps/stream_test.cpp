@@ -8,8 +8,6 @@
 #include <csignal>
 #include <filesystem>
 
-#include "apps/stream/latency_histogram.h"
-#include "apps/stream/picture_log.h"
 #include "apps/stream/stream.h"
 #include "apps/stream/terminal_view.h"
 #include "data/recordings/simulator.h"
@@ -324,19 +322,6 @@ TEST_F(Streaming, DrawsOnATerminalOnly) {
   EXPECT_EQ(script.error.find("\x1b"), std::string::npos);
 }
 
-TEST(LatencyHistogram, QuantilesAreRightToAClass) {
-  LatencyHistogram histogram;
-  EXPECT_EQ(histogram.quantile(0.5), 0);
-  for (int i = 1; i <= 1000; ++i) histogram.add(1e-6 * i);
-  EXPECT_EQ(histogram.count(), 1000U);
-  EXPECT_NEAR(histogram.quantile(0.5), 500e-6, 10e-6);
-  EXPECT_NEAR(histogram.quantile(0.99), 990e-6, 16e-6);
-  EXPECT_EQ(histogram.quantile(1), 1e-3);
-  histogram.add(1e7);  // beyond the last class
-  EXPECT_EQ(histogram.max(), 1e7);
-  EXPECT_EQ(histogram.quantile(1), histogram.max());
-}
-
 TEST_F(Streaming, AnOldCaptureStaysUntilTheNewOneIsComplete) {
   write_file(path("capture"), "old");
   expect_failure(stream({"--board", path("no-board"), "--capture", path("capture"), "--force"}), 1,
@@ -388,77 +373,8 @@ TEST_F(Streaming, ATerminalThatIsNotReadHoldsUpNobody) {
   EXPECT_GT(kept("out").f64("time_s").size(), 500U);
 }
 
-TEST(TerminalView, YGrowsUpwardsAndBothPicturesHaveTheSameSize) {
-  LiveState state;
-  state.taxels.assign(16, 0.0F);
-  state.taxels[12] = 1;  // largest y, smallest x: top left
-  state.picture.assign(256, 0.0F);
-  state.picture[15] = 1;  // smallest y, largest x: bottom right
-  const std::string text = render(state, false);
-  std::vector<std::string> lines;
-  for (std::size_t at = 0; at < text.size(); at = text.find('\n', at) + 1)
-    lines.push_back(text.substr(at, text.find('\n', at) - at));
-  ASSERT_EQ(lines.size(), 17U);
-  for (std::size_t i = 0; i < 16; ++i) EXPECT_EQ(lines[i].size(), 67U);
-  EXPECT_EQ(lines[0], "@@@@@@@@" + std::string(59, ' '));
-  EXPECT_EQ(lines[3], lines[0]);
-  EXPECT_EQ(lines[4], std::string(67, ' '));
-  EXPECT_EQ(lines[15], std::string(65, ' ') + "@@");
-  EXPECT_EQ(lines[16], "0 frames/s  latency 0.00 ms (p99 0.00)  lost 0  dropped 0");
-}
-
-TEST(TerminalView, ColoursAreWrittenWhereTheyChange) {
-  LiveState state;
-  const std::string blank = render(state, true);
-  // Black on black, twice a line, and back.
-  EXPECT_EQ(blank.find("\x1b[38;5;16m\x1b[48;5;16m\u2580\u2580"), 0U);
-  state.scale = 2;
-  state.picture.assign(64, 2.0F);  // brighter than white is white, and NaN is black
-  state.picture[0] = std::nanf("");
-  EXPECT_NE(render(state, true).find("\x1b[38;5;231m"), std::string::npos);
-  EXPECT_EQ(std::count(blank.begin(), blank.end(), '\n'), 17);
-}
-
-TEST(TerminalView, KeepsTheShapeOfAnyArray) {
-  LiveState state;
-  state.array = {.rows = 2, .columns = 8};
-  state.scale = 8;
-  state.taxels.assign(16, 0.0F);
-  state.taxels[8] = 1;
-  state.picture.assign(16 * 64, 0.0F);  // finer than the terminal
-  const std::string text = render(state, false);
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 5);  // 8 of 32 pixels high, and the figures
-  EXPECT_EQ(text.substr(0, 8), "@@@@    ");
-}
-
 // The board is 4x4: a model of another array cannot see through it, but it can through a recording of its
 // own.
-TEST(Stream, AModelOfAnotherArrayTakesItsRecordingsOnly) {
-  const TemporaryFolder folder;
-  const TaxelArray array{.rows = 2, .columns = 6, .pitch_mm = 2};
-  SuperTacSettings settings{.timesteps = kTimesteps, .latent = 3, .channels = 8, .rcabs = 1};
-  set_array(settings, array);
-  Rng rng(1);
-  const std::string model = folder / "m.safetensors", out = folder / "o.safetensors";
-  save_model(model, SuperTac(settings, rng), {.scaling = {}, .filter_s = 0.0992, .pitch_mm = array.pitch_mm},
-             {});
-  write_recording(folder / "own.safetensors", simulate_pass(Plate::named("bumps12"), {}, {.array = array}));
-  write_recording(folder / "rig.safetensors", simulate_pass(Plate::named("bumps12"), {}));
-  const auto own = run_process("supertac-stream", {"--recording", folder / "own.safetensors", "--model",
-                                                   model, "--seconds", "1", "--out", out});
-  EXPECT_EQ(own.code, 0) << own.error;
-  const SafetensorsFile file = SafetensorsFile::read(out);
-  const std::uint64_t count = file.tensors().at("time_s").shape[0];
-  EXPECT_EQ(file.tensors().at("volts").shape, (std::vector<std::uint64_t>{count, 12}));
-  EXPECT_EQ(file.tensors().at("pictures").shape, (std::vector<std::uint64_t>{count, 8, 24}));
-  const auto rig =
-      run_process("supertac-stream", {"--recording", folder / "rig.safetensors", "--model", model});
-  EXPECT_EQ(rig.code, 1);
-  EXPECT_EQ(
-      rig.error.substr(rig.error.find("the signals")),
-      "the signals are those of 4x4 taxels at 3 mm, the model was trained on 2x6 taxels at 2 mm; choose "
-      "signals and model of one array (supertac-info tells)\n");
-}
 
 }  // namespace
 }  // namespace supertac

@@ -12,18 +12,6 @@ namespace {
 
 constexpr Point3 kMounted{99.7, 101.17, 131.81};
 
-struct PrinterBench {
-  explicit PrinterBench(RigSettings settings = running_rig())
-      : rig(settings), port(rig.printer_port()), printer(*port) {
-    printer.connect();
-  }
-  VirtualPrinter& firmware() { return rig.world().printer(); }
-  Point3 head() { return firmware().head(rig.now()); }
-  SimulatedRig rig;
-  std::unique_ptr<Port> port;
-  Printer printer;
-};
-
 TEST(Limits, NameTheAxisAndCheckTheWay) {
   const Limits limits;
   EXPECT_ERROR(

@@ -10,18 +10,6 @@
 namespace supertac {
 namespace {
 
-struct MarlinBench {
-  explicit MarlinBench(RigSettings settings = running_rig())
-      : rig(settings), port(rig.printer_port()), printer(*port) {
-    printer.connect();
-  }
-  VirtualPrinter& firmware() { return rig.world().printer(); }
-  Point3 head() { return firmware().head(rig.now()); }
-  SimulatedRig rig;
-  std::unique_ptr<Port> port;
-  Printer printer;
-};
-
 RigSettings rig_without(bool emergency_parser, bool display = false) {
   RigSettings settings = running_rig();
   settings.printer.emergency_parser = emergency_parser;
@@ -34,7 +22,7 @@ TEST(RealMarlin, ReportsOfAnEarlierHostAreSwitchedOff) {
   settings.printer.auto_position_s = 0.013;
   settings.printer.auto_temperature_s = 0.017;
   const double begin = SimulatedRig(settings).now();
-  MarlinBench bench(settings);
+  PrinterBench bench(settings);
   bench.printer.confirm_origin(rig::kMounted);
   EXPECT_LT(bench.rig.now() - begin, 1) << "connecting waited for a silence that never came";
   bench.printer.start_move({120, 101.17, 131.81}, 10);
@@ -43,7 +31,7 @@ TEST(RealMarlin, ReportsOfAnEarlierHostAreSwitchedOff) {
 }
 
 TEST(RealMarlin, TheLastPositionBeforeTheOkIsTheAnswer) {
-  MarlinBench bench;
+  PrinterBench bench;
   bench.printer.confirm_origin(rig::kMounted);
   bench.printer.start_move({120, 101.17, 131.81}, 10);
   bench.printer.link().idle(0.5);
@@ -80,7 +68,7 @@ TEST(RealMarlin, AReportTakenForAnAnswerEndsNoLegAndSwitchesNothingOff) {
 
 TEST(RealMarlin, AQuickStopWaitsForTheSecondThatTheFirmwareIsHeld) {
   for (const bool parser : {true, false}) {
-    MarlinBench bench(rig_without(parser));
+    PrinterBench bench(rig_without(parser));
     bench.printer.confirm_origin(rig::kMounted);
     bench.printer.start_move({99.7, 201.17, 131.81}, 10);
     bench.printer.link().idle(2);
@@ -95,16 +83,16 @@ TEST(RealMarlin, AQuickStopWaitsForTheSecondThatTheFirmwareIsHeld) {
 TEST(RealMarlin, TheLineBeforeAHaltIsInTheError) {
   RigSettings settings = running_rig();
   settings.printer.homing_fails = true;
-  MarlinBench bench(settings);
+  PrinterBench bench(settings);
   EXPECT_ERROR(bench.printer.home(), PrinterHalted,
                "the firmware halted ('echo:Homing Failed', 'Error:Printer halted. kill() called!')");
-  MarlinBench hot;
+  PrinterBench hot;
   hot.firmware().overheat(hot.rig.now());
   EXPECT_ERROR(hot.printer.queue_position(), PrinterHalted, "Heater_ID: E0");
 }
 
 TEST(RealMarlin, ACommandThatTheFirmwareDoesNotKnowIsSentOnce) {
-  MarlinBench bench;
+  PrinterBench bench;
   EXPECT_ERROR(bench.printer.link().command("M999"), PrinterRefused, "echo:Unknown command: \"M0999\"");
   EXPECT_EQ(bench.printer.link().counters().repeats, 0U);
 }
@@ -112,7 +100,7 @@ TEST(RealMarlin, ACommandThatTheFirmwareDoesNotKnowIsSentOnce) {
 TEST(RealMarlin, AdvancedOkAndTemperatureBehindTheOkAreUnderstood) {
   RigSettings settings = running_rig();
   settings.printer.advanced_ok = true;
-  MarlinBench bench(settings);
+  PrinterBench bench(settings);
   bench.printer.confirm_origin(rig::kMounted);
   for (const char* code : {"G21", "M105", "M155 S0"}) bench.printer.link().command(code);
   EXPECT_EQ(bench.printer.link().counters().repeats, 0U);

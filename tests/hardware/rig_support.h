@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "hardware/board_frame.h"
+#include "hardware/printer.h"
 #include "hardware/virtual_rig/simulated_rig.h"
 #include "io/random.h"
 #include "tests/io/temporary_folder.h"
@@ -89,5 +90,18 @@ inline std::vector<std::string> moves_of(const VirtualPrinter& printer) {
   }
   return moves;
 }
+
+/// A connected driver on a simulated rig, and where the head really is.
+struct PrinterBench {
+  explicit PrinterBench(RigSettings settings = running_rig())
+      : rig(settings), port(rig.printer_port()), printer(*port) {
+    printer.connect();
+  }
+  VirtualPrinter& firmware() { return rig.world().printer(); }
+  Point3 head() { return firmware().head(rig.now()); }
+  SimulatedRig rig;
+  std::unique_ptr<Port> port;
+  Printer printer;
+};
 
 }  // namespace supertac

@@ -21,6 +21,7 @@
 #include "bench/studies/hostile/readers.h"
 #include "io/file.h"
 #include "io/random.h"
+#include "tests/apps/process.h"
 
 namespace supertac {
 namespace {
@@ -167,14 +168,10 @@ Run run(const fs::path& folder, const std::vector<std::string>& words, double se
 
 std::vector<Option> options_of(const std::string& program) {
   std::vector<Option> options;
-  FILE* help = popen((program + " --help").c_str(), "r");  // its name is ours
-  char line[1024];
-  const std::regex shape(R"(^\s+(?:-h, )?--([a-z-]+)( [A-Z][^ ]*)?)");
-  while (help != nullptr && fgets(line, sizeof line, help) != nullptr) {
-    std::cmatch match;
-    if (std::regex_search(line, match, shape)) options.push_back({match[1], match[2]});
-  }
-  if (help != nullptr) pclose(help);
+  const std::string help = run_process(fs::path(program).filename(), {"--help"}).out;
+  const std::regex shape(R"((?:^|\n)\s+(?:-h, )?--([a-z-]+)( [A-Z][^ ]*)?)");
+  for (std::sregex_iterator match(help.begin(), help.end(), shape), end; match != end; ++match)
+    options.push_back({(*match)[1], (*match)[2]});
   return options;
 }
 

@@ -1,0 +1,67 @@
+// What a stream shows of itself: the picture on a terminal, and how late it is.
+#include <gtest/gtest.h>
+
+#include "apps/stream/latency_histogram.h"
+#include "apps/stream/terminal_view.h"
+
+namespace supertac {
+namespace {
+
+TEST(LatencyHistogram, QuantilesAreRightToAClass) {
+  LatencyHistogram histogram;
+  EXPECT_EQ(histogram.quantile(0.5), 0);
+  for (int i = 1; i <= 1000; ++i) histogram.add(1e-6 * i);
+  EXPECT_EQ(histogram.count(), 1000U);
+  EXPECT_NEAR(histogram.quantile(0.5), 500e-6, 10e-6);
+  EXPECT_NEAR(histogram.quantile(0.99), 990e-6, 16e-6);
+  EXPECT_EQ(histogram.quantile(1), 1e-3);
+  histogram.add(1e7);  // beyond the last class
+  EXPECT_EQ(histogram.max(), 1e7);
+  EXPECT_EQ(histogram.quantile(1), histogram.max());
+}
+
+TEST(TerminalView, YGrowsUpwardsAndBothPicturesHaveTheSameSize) {
+  LiveState state;
+  state.taxels.assign(16, 0.0F);
+  state.taxels[12] = 1;  // largest y, smallest x: top left
+  state.picture.assign(256, 0.0F);
+  state.picture[15] = 1;  // smallest y, largest x: bottom right
+  const std::string text = render(state, false);
+  std::vector<std::string> lines;
+  for (std::size_t at = 0; at < text.size(); at = text.find('\n', at) + 1)
+    lines.push_back(text.substr(at, text.find('\n', at) - at));
+  ASSERT_EQ(lines.size(), 17U);
+  for (std::size_t i = 0; i < 16; ++i) EXPECT_EQ(lines[i].size(), 67U);
+  EXPECT_EQ(lines[0], "@@@@@@@@" + std::string(59, ' '));
+  EXPECT_EQ(lines[3], lines[0]);
+  EXPECT_EQ(lines[4], std::string(67, ' '));
+  EXPECT_EQ(lines[15], std::string(65, ' ') + "@@");
+  EXPECT_EQ(lines[16], "0 frames/s  latency 0.00 ms (p99 0.00)  lost 0  dropped 0");
+}
+
+TEST(TerminalView, ColoursAreWrittenWhereTheyChange) {
+  LiveState state;
+  const std::string blank = render(state, true);
+  // Black on black, twice a line, and back.
+  EXPECT_EQ(blank.find("\x1b[38;5;16m\x1b[48;5;16m\u2580\u2580"), 0U);
+  state.scale = 2;
+  state.picture.assign(64, 2.0F);  // brighter than white is white, and NaN is black
+  state.picture[0] = std::nanf("");
+  EXPECT_NE(render(state, true).find("\x1b[38;5;231m"), std::string::npos);
+  EXPECT_EQ(std::count(blank.begin(), blank.end(), '\n'), 17);
+}
+
+TEST(TerminalView, KeepsTheShapeOfAnyArray) {
+  LiveState state;
+  state.array = {.rows = 2, .columns = 8};
+  state.scale = 8;
+  state.taxels.assign(16, 0.0F);
+  state.taxels[8] = 1;
+  state.picture.assign(16 * 64, 0.0F);  // finer than the terminal
+  const std::string text = render(state, false);
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 5);  // 8 of 32 pixels high, and the figures
+  EXPECT_EQ(text.substr(0, 8), "@@@@    ");
+}
+
+}  // namespace
+}  // namespace supertac
