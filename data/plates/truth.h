@@ -10,7 +10,7 @@ namespace supertac {
 
 /// Height by the plate's own scale: z / max(max_height, -min_height). 0 is the flat plate, whatever else is
 /// on it, 1 its highest point; the troughs of waves are negative. How deep the finger is pressed is not
-/// known, so millimetres cannot be felt (measured: bench/results/README.md).
+/// known, so millimetres cannot be felt.
 double truth_value(const Plate& plate, double x_mm, double y_mm);
 
 /// The plate under the finger as an image [height][width] of truth_value at the centres of its pixels:
