@@ -14,7 +14,7 @@ constexpr std::size_t kBatch = 64, kBatchesAtOnce = 4;
 struct Part {
   std::size_t first;
   Tensor inputs, outputs, targets;
-  std::vector<float> spreads, latents;
+  std::vector<float> spreads;
   std::exception_ptr error;
 };
 
@@ -29,7 +29,6 @@ void compute(const Committee& network, const Examples& data, std::span<const std
   const Estimate estimate = network.estimate(part.inputs);
   std::copy_n(estimate.picture.data(), estimate.picture.size(), part.outputs.data());
   part.spreads.assign(estimate.spread.values().begin(), estimate.spread.values().end());
-  part.latents.assign(estimate.latents.values().begin(), estimate.latents.values().end());
 }
 
 std::string text(const NetworkFormat& f) {
@@ -64,7 +63,6 @@ void for_each_output(const Committee& network, const Examples& data, std::span<c
                        Tensor(pictures),
                        Tensor(pictures),
                        {},
-                       {},
                        {}});
     }
 #pragma omp parallel for schedule(static, 1)
@@ -78,7 +76,7 @@ void for_each_output(const Committee& network, const Examples& data, std::span<c
     }
     for (const Part& p : parts) {
       if (p.error) std::rethrow_exception(p.error);
-      if (!use({p.first, p.inputs, p.outputs, p.targets, p.spreads, p.latents})) return;
+      if (!use({p.first, p.inputs, p.outputs, p.targets, p.spreads})) return;
     }
   }
 }

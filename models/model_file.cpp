@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "data/samples/signal_features.h"
 #include "io/numbers.h"
 #include "models/interval.h"
 #include "models/json_entry.h"
@@ -181,7 +182,7 @@ ModelFile load_model(const std::string& path, ModelKind kind) {
     const SuperTacSettings read = read_settings(settings);
     loaded.input = read_input({file, path, "input"});
     loaded.model = build<SuperTac>(read, file, path);
-    loaded.novelty = Novelty::read(file, path, read.groups() * read.latent);
+    loaded.novelty = Novelty::read(file, path, signal_feature_count(loaded.array()));
   } else {
     const FrameSettings read = read_frame_settings(settings);
     const JsonEntry input(file, path, "input");

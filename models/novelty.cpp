@@ -8,15 +8,15 @@ namespace supertac {
 namespace {
 
 constexpr const char *kMean = "novelty.mean", *kWhitening = "novelty.whitening", *kLimit = "novelty.limit";
-constexpr double kLeastVariance = 1e-4, kTail = 0.001, kMargin = 1.5;
+constexpr double kLeastVariance = 1e-3, kTail = 0.001, kMargin = 1.3;
 
 using Matrix = std::vector<double>;  // [D][D]
 
-Matrix covariance_of(const Tensor& latents, const std::vector<double>& mean) {
-  const auto n = static_cast<std::size_t>(latents.dim(0)), d = mean.size();
+Matrix covariance_of(const Tensor& features, const std::vector<double>& mean) {
+  const auto n = static_cast<std::size_t>(features.dim(0)), d = mean.size();
   Matrix sum(d * d);
   for (std::size_t row = 0; row < n; ++row) {
-    const std::span<const real> z = latents.values().subspan(row * d, d);
+    const std::span<const real> z = features.values().subspan(row * d, d);
     for (std::size_t i = 0; i < d; ++i)
       for (std::size_t j = 0; j <= i; ++j) sum[i * d + j] += (z[i] - mean[i]) * (z[j] - mean[j]);
   }
@@ -51,36 +51,36 @@ std::vector<float> rounded(const std::vector<double>& values) { return {values.b
 
 }  // namespace
 
-Novelty::Novelty(const Tensor& latents) {
-  const Dim n = latents.rank() == 2 ? latents.dim(0) : 0, d = latents.rank() == 2 ? latents.dim(1) : 0;
+Novelty::Novelty(const Tensor& features) {
+  const Dim n = features.rank() == 2 ? features.dim(0) : 0, d = features.rank() == 2 ? features.dim(1) : 0;
   if (d < 1 || n <= d)
-    throw std::invalid_argument("novelty: expects latents [N,D] with N > D, got " + latents.shape().text());
+    throw std::invalid_argument("novelty: expects features [N,D] with N > D, got " + features.shape().text());
   const auto count = static_cast<std::size_t>(n), size = static_cast<std::size_t>(d);
   std::vector<double> mean(size);
-  for (std::size_t i = 0; i < count * size; ++i) mean[i % size] += latents.values()[i];
+  for (std::size_t i = 0; i < count * size; ++i) mean[i % size] += features.values()[i];
   for (double& m : mean) m /= static_cast<double>(n);
-  Matrix l = covariance_of(latents, mean);
+  Matrix l = covariance_of(features, mean);
   factorise(l, size);
   mean_ = rounded(mean);
   whitening_ = rounded(inverse_of_lower(l, size));
   std::vector<double> distances;
   for (std::size_t row = 0; row < count; ++row)
-    distances.push_back(distance(latents.values().subspan(row * size, size)));
+    distances.push_back(distance(features.values().subspan(row * size, size)));
   const auto tail = std::min(count - 1, static_cast<std::size_t>((1 - kTail) * static_cast<double>(count)));
   std::ranges::nth_element(distances, distances.begin() + static_cast<std::ptrdiff_t>(tail));
   limit_ = static_cast<float>(kMargin * distances[tail]);
 }
 
-double Novelty::distance(std::span<const real> latents) const {
+double Novelty::distance(std::span<const float> features) const {
   const std::size_t d = mean_.size();
-  if (latents.size() != d)
-    throw std::invalid_argument("novelty: expects " + std::to_string(d) + " latents, got " +
-                                std::to_string(latents.size()));
+  if (features.size() != d)
+    throw std::invalid_argument("novelty: expects " + std::to_string(d) + " features, got " +
+                                std::to_string(features.size()));
   double squares = 0;
   for (std::size_t i = 0; i < d; ++i) {
     double sum = 0;
     for (std::size_t j = 0; j <= i; ++j)
-      sum += static_cast<double>(whitening_[i * d + j]) * (static_cast<double>(latents[j]) - mean_[j]);
+      sum += static_cast<double>(whitening_[i * d + j]) * (static_cast<double>(features[j]) - mean_[j]);
     squares += sum * sum;
   }
   return std::sqrt(squares / static_cast<double>(d));
@@ -91,14 +91,15 @@ std::vector<StoredTensor> Novelty::stored() const {
   return {{kMean, {d}, mean_}, {kWhitening, {d, d}, whitening_}, {kLimit, {1}, {limit_}}};
 }
 
-std::optional<Novelty> Novelty::read(const SafetensorsFile& file, const std::string& path, Dim latents) {
+std::optional<Novelty> Novelty::read(const SafetensorsFile& file, const std::string& path,
+                                     std::size_t features) {
   if (!file.tensors().contains(kLimit)) return std::nullopt;
-  const auto d = static_cast<std::uint64_t>(latents);
+  const std::uint64_t d = features;
   const auto tensor = [&](const char* name, const std::vector<std::uint64_t>& shape) {
     const auto found = file.tensors().find(name);
     if (found == file.tensors().end() || found->second.shape != shape)
       throw std::runtime_error(path + ": the tensor " + name + " does not fit a model of " +
-                               std::to_string(d) + " latents; train it again");
+                               std::to_string(d) + " features; train it again");
     return file.f32(name);
   };
   Novelty novelty;

@@ -10,26 +10,28 @@
 
 namespace supertac {
 
-/// The Mahalanobis distance of a window's latents from those of the training windows (Lee et al. 2018, with
-/// one class):
+/// The Mahalanobis distance of a window's features z (data/samples/signal_features.h) from those of the
+/// training windows (Lee et al. 2018, with one class):
 ///   distance = |L^-1 (z - mean)| / sqrt(D),   covariance = L L^T
-/// about 1 for a window like those of training. A likelihood of the VAEs would not do: it is high for flat
-/// signals whether they were trained on or not (Xiao et al. 2020).
+/// about 1 for a window like those of training. The network's own latents would not do: training with dropped
+/// taxels makes them blind to these. Nor would a likelihood of the VAEs: it is high for flat signals whether
+/// they were trained on or not (Xiao et al. 2020).
 class Novelty {
  public:
-  /// Of latents [N,D]. Numbers that do not vary count as if they varied a little. Throws
+  /// Of features [N,D]. Numbers that do not vary count as if they varied a little. Throws
   /// std::invalid_argument unless N > D.
-  explicit Novelty(const Tensor& latents);
+  explicit Novelty(const Tensor& features);
   /// As stored() wrote it; nothing for a file without. Throws std::runtime_error naming path and tensor when
-  /// the shapes are not those of so many latents.
-  static std::optional<Novelty> read(const SafetensorsFile& file, const std::string& path, Dim latents);
+  /// the shapes are not those of so many features.
+  static std::optional<Novelty> read(const SafetensorsFile& file, const std::string& path,
+                                     std::size_t features);
   std::vector<StoredTensor> stored() const;
 
-  /// Of latents [D]. Throws std::invalid_argument for another number of them.
-  double distance(std::span<const real> latents) const;
-  /// True beyond the distance that one training window in a thousand had, and half as much again: windows of
+  /// Of features [D]. Throws std::invalid_argument for another number of them.
+  double distance(std::span<const float> features) const;
+  /// True beyond the distance that one training window in a thousand had, and a little more: windows of
   /// another trial lie farther out than those trained on.
-  bool unlike_training(std::span<const real> latents) const { return distance(latents) > limit_; }
+  bool unlike_training(std::span<const float> features) const { return distance(features) > limit_; }
   double limit() const { return limit_; }
 
  private:

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "autograd/ops/arithmetic.h"
+#include "data/samples/signal_features.h"
 #include "data/samples/split.h"
 #include "io/numbers.h"
 #include "layers/checkpoint.h"
@@ -188,16 +189,17 @@ void Trainer::save_model(const std::string& path, std::map<std::string, std::str
 // Of an even sample of the training examples, as they are: augmentation hides what is to be noticed.
 std::vector<StoredTensor> Trainer::novelty() const {
   constexpr std::size_t kMostSamples = 20'000;
-  const auto latents = static_cast<std::size_t>(objective_->latents());
-  if (latents == 0) return {};
+  if (objective_->latents() == 0) return {};  // a frame alone says nothing of its sensor
   const std::vector<std::uint32_t> chosen = spread(train_, kMostSamples);
-  if (chosen.size() <= latents) return {};
-  Tensor all(Shape{static_cast<Dim>(chosen.size()), static_cast<Dim>(latents)});
-  for_each_output(model(), data_, chosen, [&](const EvaluatedBatch& b) {
-    std::ranges::copy(b.latents, all.values().subspan(b.first * latents).begin());
-    return true;
-  });
-  return Novelty(all).stored();
+  const std::size_t count = signal_feature_count(data_.array());
+  if (chosen.size() <= count) return {};
+  Tensor features(Shape{static_cast<Dim>(chosen.size()), static_cast<Dim>(count)});
+  std::vector<float> window(data_.frames() * data_.array().signals());
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    data_.input(chosen[i], window);
+    signal_features(window, data_.array(), features.values().subspan(i * count, count));
+  }
+  return Novelty(features).stored();
 }
 
 void Trainer::restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata) {

@@ -62,7 +62,7 @@ class Trainer {
   /// Model and training state, a checkpoint like any other with "optimizer." tensors besides. Throws
   /// FileError.
   void save(const std::string& path, std::map<std::string, std::string> metadata) const;
-  /// The model alone, with the same metadata, and, where it has latents, the Novelty of its training
+  /// The model alone, with the same metadata, and, for windows of time, the Novelty of its training
   /// examples. Throws FileError.
   void save_model(const std::string& path, std::map<std::string, std::string> metadata) const;
   /// Continues where the saved trainer stood. Throws std::runtime_error when the file holds no training

@@ -52,7 +52,7 @@ Scores score_all(const Arguments& a, std::span<const ModelFile> files, const Win
     for (std::size_t m = 0; m < d.pictures.size(); ++m)
       scores.of_method[m].add(d.pictures[m], d.target, zone);
     scores.felt.add(d.example, d.pictures[0], d.target);
-    scores.trust.add(d.example, d.pictures[0], d.target, d.spread, d.latents);
+    scores.trust.add(d.example, d.pictures[0], d.target, d.spread, d.input);
     if (outputs != nullptr) outputs->add(windows.window(d.example), d.pictures[0], d.target);
   });
   return scores;

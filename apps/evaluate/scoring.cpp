@@ -52,7 +52,7 @@ void draw_all(const Arguments& a, const Committee& network, const Examples& exam
   Progress progress(a, "evaluating", test.size(), "pictures");
   for_each_output(network, examples, test, [&](const EvaluatedBatch& b) {
     for (std::size_t n = 0; n < b.size(); ++n) {
-      Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.spread(n), b.latent(n)};
+      Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.spread(n), b.input(n)};
       for (std::size_t k = 0; k < baselines.size(); ++k) {
         baselines[k]->predict(b.input(n), plain[k]);
         drawn.pictures.push_back(plain[k]);

@@ -34,7 +34,8 @@ struct Drawn {
   std::uint32_t example;
   std::span<const float> target;
   std::vector<std::span<const float>> pictures;
-  std::span<const float> spread, latents;  ///< of the network's; empty where it has none
+  std::span<const float> spread;  ///< of the network's; empty where it has none
+  std::span<const float> input;   ///< as the network takes it
 };
 
 /// Draws the test side in order, with a progress bar. Throws Interrupted after a signal.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "data/samples/signal_features.h"
 #include "data/scores/metrics.h"
 #include "io/numbers.h"
 #include "models/interval.h"
@@ -20,10 +21,10 @@ double mean_of(std::span<const float> values) {
 }  // namespace
 
 void TrustScores::add(std::uint32_t window, std::span<const float> output, std::span<const float> truth,
-                      std::span<const float> spread, std::span<const float> latents) {
-  if (model_.novelty && !latents.empty()) {
+                      std::span<const float> spread, std::span<const float> input) {
+  if (model_.novelty) {
     ++judged_;
-    unlike_ += model_.novelty->unlike_training(latents) ? 1 : 0;
+    unlike_ += model_.novelty->unlike_training(signal_features(input, windows_.array())) ? 1 : 0;
   }
   if (spread.empty()) return;
   if (windows_.pass_of(window) != pass_) {

@@ -23,10 +23,9 @@ class TrustScores {
 
   /// `model`: whose factor and novelty are judged; must outlive this, as the windows.
   TrustScores(const WindowSet& windows, const ModelFile& model) : windows_(windows), model_(model) {}
-  /// Windows of a pass come in the order of time. `spread` and `latents` may be empty: nothing is counted
-  /// then.
+  /// Windows of a pass come in the order of time. Without a `spread` nothing is counted of it.
   void add(std::uint32_t window, std::span<const float> output, std::span<const float> truth,
-           std::span<const float> spread, std::span<const float> latents);
+           std::span<const float> spread, std::span<const float> input);
 
   /// For people: nothing for a model that says nothing of its pictures.
   std::vector<std::string> lines() const;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "data/samples/signal_features.h"
 #include "io/numbers.h"
 #include "models/interval.h"
 
@@ -39,6 +40,7 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
       window_(window_settings(model_, source)),
       input_(network_.first().input_shape(1)),
       output_(network_.estimate(input_)) {  // the first run takes memory and chooses kernels
+  features_.resize(signal_feature_count(model_.array()));
   for (const float value : output_.picture.values()) {
     if (!std::isfinite(value))
       throw std::runtime_error(
@@ -61,8 +63,10 @@ double PictureMaker::doubt() const {
              : 0;
 }
 
-bool PictureMaker::unlike_training() const {
-  return model_.novelty && model_.novelty->unlike_training(output_.latents.values());
+bool PictureMaker::unlike_training() {
+  if (!model_.novelty) return false;
+  signal_features(input_.values(), model_.array(), features_);
+  return model_.novelty->unlike_training(features_);
 }
 
 double PictureMaker::window_s() const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "apps/stream/sensor_source.h"
 #include "data/samples/live_window.h"
@@ -24,7 +25,7 @@ class PictureMaker {
   /// model does not say.
   double doubt() const;
   /// Whether the window that it was drawn from is unlike those of training.
-  bool unlike_training() const;
+  bool unlike_training();
 
   ImageGrid image() const { return model_.windows().array->picture(model_.windows().scale); }
   /// Seconds of signal that a picture needs.
@@ -37,6 +38,7 @@ class PictureMaker {
   LiveWindow window_;
   Tensor input_;
   Estimate output_;
+  std::vector<float> features_;
 };
 
 }  // namespace supertac

@@ -10,6 +10,7 @@
 #include "apps/common/version.h"
 #include "bench/studies/corruption.h"
 #include "data/samples/levelling.h"
+#include "data/samples/signal_features.h"
 #include "data/samples/split.h"
 #include "data/scores/metrics.h"
 #include "io/file.h"
@@ -85,8 +86,9 @@ Point measure(const std::vector<ModelFile>& files, const Examples& examples,
       point.pixels += spread.size();
       ++point.windows;
       if (!file.novelty) continue;
-      point.distances.push_back(file.novelty->distance(b.latent(n)));
-      point.alarms += file.novelty->unlike_training(b.latent(n)) ? 1 : 0;
+      const std::vector<float> features = signal_features(b.input(n), examples.array());
+      point.distances.push_back(file.novelty->distance(features));
+      point.alarms += file.novelty->unlike_training(features) ? 1 : 0;
     }
     return true;
   });

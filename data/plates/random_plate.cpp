@@ -149,7 +149,7 @@ Plate made_of(const std::string& name, std::vector<Element> elements) {
 Plate random_plate(std::uint32_t number) {
   Draw draw(number);
   const std::string name = std::string(kWord) + std::to_string(number);
-  const double from = draw.between(30, 40), to = draw.between(60, 78), layout = draw.between(0, 16);
+  const double from = draw.between(30, 40), to = draw.between(60, 78), layout = draw.between(-1, 16);
   if (layout < 1) return {name, std::vector<Texture>{}};
   if (layout < 8) return {name, {draw_texture(draw, from, to)}};
   if (layout < 9.5) {

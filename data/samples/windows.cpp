@@ -97,9 +97,13 @@ std::size_t WindowSet::plate_index(const std::string& name, const std::string& f
 }
 
 // Whether a window may end at this frame; counts the reason if not.
-bool WindowSet::accept(const Track& track, std::size_t frame, bool reliable, double clear_mm, int stride) {
+bool WindowSet::accept(const Track& track, std::size_t frame, const Plate& plate, bool reliable,
+                       const Use& use) {
   const float x = track.position_mm[2 * frame], y = track.position_mm[2 * frame + 1];
   const float lift = track.lift_mm[frame];
+  const double clear_mm = plate.max_height() + kClearanceMm;
+  const auto between = [&](int stride) { return frame % static_cast<std::size_t>(stride) != 0; };
+  const auto silent = [&] { return lift > kLiftedMm || zone_of(plate, x, y, image()) != Zone::contact; };
   std::size_t* reason = nullptr;
   if (!reliable)
     reason = &counts_.unreliable;
@@ -109,7 +113,7 @@ bool WindowSet::accept(const Track& track, std::size_t frame, bool reliable, dou
     reason = &counts_.lifting;
   else if (track.run[frame] < static_cast<std::uint32_t>(settings_.timesteps))
     reason = &counts_.too_early;
-  else if (frame % static_cast<std::size_t>(stride) != 0)
+  else if (between(use.stride) || (use.silent_stride > use.stride && between(use.silent_stride) && silent()))
     reason = &counts_.off_stride;
   else
     reason = &counts_.windows;
@@ -118,11 +122,12 @@ bool WindowSet::accept(const Track& track, std::size_t frame, bool reliable, dou
 }
 
 void WindowSet::add(const Recording& recording, const std::string& folder, bool aside) {
-  append(recording, folder, {.aside = aside, .varied = true, .stride = settings_.stride});
+  append(recording, folder,
+         {.aside = aside, .varied = true, .stride = settings_.stride, .silent_stride = settings_.stride});
 }
 
-void WindowSet::add_one_of_many(const Recording& recording, int stride) {
-  append(recording, ".", {.aside = true, .varied = false, .stride = stride});
+void WindowSet::add_one_of_many(const Recording& recording, int stride, int silent_stride) {
+  append(recording, ".", {.aside = true, .varied = false, .stride = stride, .silent_stride = silent_stride});
 }
 
 void WindowSet::append(const Recording& recording, const std::string& folder, const Use& use) {
@@ -147,9 +152,8 @@ void WindowSet::append(const Recording& recording, const std::string& folder, co
             .aside = use.aside,
             .varied = use.varied};
   const auto number = static_cast<std::uint32_t>(passes_.size());
-  const double clear_mm = plates_[plate].max_height() + kClearanceMm;
   for (std::size_t frame = 0; frame < track.frames(); ++frame)
-    if (accept(track, frame, reliable, clear_mm, use.stride))
+    if (accept(track, frame, plates_[plate], reliable, use))
       index_.push_back({number, static_cast<std::uint32_t>(frame)});
   pass.windows = index_.size() - pass.first_window;
   ++counts_.recordings;

@@ -4,12 +4,13 @@
 
 #include <cmath>
 
+#include "data/samples/signal_features.h"
 #include "tests/models/support.h"
 
 namespace supertac {
 namespace {
 
-// Latents of a plane: the third number is the sum of the other two.
+// Features of a plane: the third number is the sum of the other two.
 Tensor plane(Dim n) {
   Tensor z(Shape{n, 3});
   const RandomStream random(1, 0);
@@ -40,11 +41,11 @@ TEST(Novelty, OfTheTrainingItselfNothingIsUnlike) {
     EXPECT_FALSE(novelty.unlike_training(z.values().subspan(static_cast<std::size_t>(3 * i), 3)));
 }
 
-TEST(Novelty, LatentsThatNeverVaryAreNoTrouble) {
+TEST(Novelty, FeaturesThatNeverVaryAreNoTrouble) {
   const Novelty novelty(Tensor::full({10, 2}, real(0.5)));
   const real same[] = {0.5, 0.5}, moved[] = {0.5, 0.6F};
   EXPECT_EQ(novelty.distance(same), 0);
-  EXPECT_NEAR(novelty.distance(moved), 10 / std::sqrt(2), 0.1);  // least deviation .01
+  EXPECT_NEAR(novelty.distance(moved), 0.1 / std::sqrt(0.001) / std::sqrt(2), 0.01);  // least variance .001
 }
 
 TEST(Novelty, TravelsInTheModelFile) {
@@ -62,19 +63,19 @@ TEST(Novelty, TravelsInTheModelFile) {
     FAIL() << "took tensors of another size";
   } catch (const std::runtime_error& error) {
     EXPECT_EQ(error.what(),
-              path + ": the tensor novelty.mean does not fit a model of 4 latents; train it again");
+              path + ": the tensor novelty.mean does not fit a model of 4 features; train it again");
   }
   write_checkpoint(path, {}, {});
   EXPECT_FALSE(Novelty::read(read_checkpoint(path), path, 3));
 }
 
-TEST(Novelty, RefusesTooFewLatents) {
+TEST(Novelty, RefusesTooFewFeatures) {
   EXPECT_THROW(Novelty(plane(3)), std::invalid_argument);
   const real two[] = {0, 0};
   EXPECT_THROW(Novelty(plane(10)).distance(two), std::invalid_argument);
 }
 
-// A trained model knows its own windows again, and not those whose rows are exchanged.
+// A trained model knows its own windows again, and not those of a sensor with a stuck taxel.
 TEST(Novelty, ComesWithATrainedModel) {
   const TemporaryFolder folder;
   TrainingSettings settings = small_training();
@@ -86,9 +87,11 @@ TEST(Novelty, ComesWithATrainedModel) {
   trainer.save_model(folder / "m.safetensors", {});
   const ModelFile file = load_model(folder / "m.safetensors");
   ASSERT_TRUE(file.novelty);
-  Tensor window(Shape{1, 32, 16});
-  windows.window(windows.size() / 2, window.values());
-  EXPECT_FALSE(file.novelty->unlike_training(file.model->estimate(window).latents.values()));
+  std::vector<float> window(32 * 16);
+  windows.window(windows.size() / 2, window);
+  EXPECT_FALSE(file.novelty->unlike_training(signal_features(window, windows.array())));
+  for (std::size_t t = 0; t < 32; ++t) window[16 * t + 5] = 0.9F;
+  EXPECT_TRUE(file.novelty->unlike_training(signal_features(window, windows.array())));
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ TEST(RandomPlate, HasEveryKindOfTextureWithinItsBounds) {
   }
   EXPECT_EQ(kinds.size(), 4U);
   for (const auto& [kind, count] : kinds) EXPECT_GT(count, 20) << kind;
-  EXPECT_NEAR(plain, 25, 15);
+  EXPECT_NEAR(plain, 47, 15);
   EXPECT_GT(two, 15);
   EXPECT_GT(oblique_or_scattered, 40);
 }
