@@ -17,10 +17,13 @@ void declare(Arguments& a) {
       "its test side is scored");
   a.option("seed", "N", "of the split (default: the model's own)");
   a.option("limit", "N", "score at most N examples, evenly spread; 0 = all", "0");
-  a.option("outputs", "FILE", "write inputs (of windows), outputs and truths as safetensors");
+  a.option("outputs", "FILE",
+           "write inputs as the network takes them, outputs, truths and spreads as safetensors");
   a.only_with("data");
   a.option("plates", "A,B,...", "only recordings of these plates (default: the model's own)");
-  a.option("pictures", "DIR", "write PNG pictures: input | output | truth, and a film of each test pass");
+  a.option(
+      "pictures", "DIR",
+      "write PNG pictures: input | output | truth | how far off it may be, and a film of each test pass");
   a.option("write-pairs", "DIR",
            "write the split's windows as pairs for networks that know no time (supertac-train --pairs): "
            "train.safetensors and test.safetensors with the last frame as the model sees it, and the truth");

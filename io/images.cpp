@@ -69,11 +69,17 @@ void check_strips(const char* where, std::span<const Strip> strips, const StripL
                                 " pixels a side, the panels' size, got " + std::to_string(size));
 }
 
-// The three panels of a strip, each (step_x, step_y) further than the one before.
+// Panels of a strip.
+int parts_of(std::span<const Strip> strips) {
+  return std::ranges::any_of(strips, [](const Strip& s) { return !s.doubt.empty(); }) ? 4 : 3;
+}
+
+// The panels of a strip, each (step_x, step_y) further than the one before.
 void draw_strip(Picture& picture, const Strip& strip, const StripLayout& l, Panel panel, int step_x,
                 int step_y) {
   draw_panel(picture, panel, strip.input, l.rows, l.columns);
-  for (const std::span<const float> part : {strip.output, strip.truth}) {
+  for (const std::span<const float> part : {strip.output, strip.truth, strip.doubt}) {
+    if (part.empty()) continue;
     panel.left += step_x, panel.top += step_y;
     draw_panel(picture, panel, part, l.rows * l.scale, l.columns * l.scale);
   }
@@ -133,7 +139,7 @@ Picture strip_picture(std::span<const Strip> strips, const StripLayout& layout) 
   const int gap = gap_of(layout.side), count = static_cast<int>(strips.size());
   Panel panel = panel_of(layout);
   const int step_x = panel.width + gap, step_y = panel.height + gap;
-  Picture picture(3 * step_x + gap, count * step_y + gap);
+  Picture picture(parts_of(strips) * step_x + gap, count * step_y + gap);
   panel.left = panel.top = gap;
   for (const Strip& strip : strips) {
     draw_strip(picture, strip, layout, panel, step_x, 0);
@@ -147,7 +153,7 @@ Picture film_picture(std::span<const Strip> strips, const StripLayout& layout) {
   const int gap = gap_of(layout.side), count = static_cast<int>(strips.size());
   Panel panel = panel_of(layout);
   const int step_x = panel.width + gap, step_y = panel.height + gap;
-  Picture picture(count * step_x + gap, 3 * step_y + gap);
+  Picture picture(count * step_x + gap, parts_of(strips) * step_y + gap);
   panel.left = panel.top = gap;
   for (const Strip& strip : strips) {
     draw_strip(picture, strip, layout, panel, 0, step_y);

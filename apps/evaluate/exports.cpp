@@ -6,6 +6,7 @@
 #include "io/images.h"
 #include "io/safetensors.h"
 #include "models/evaluation.h"
+#include "models/interval.h"
 
 namespace supertac {
 namespace {
@@ -14,22 +15,25 @@ constexpr std::size_t kStrips = 12, kFilmColumns = 24;
 
 using Draw = Picture (*)(std::span<const Strip>, const StripLayout&);
 
-Picture draw(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> chosen,
-             Draw picture, int side) {
+Picture draw(const Committee& model, double interval_factor, const WindowSet& windows,
+             std::span<const std::uint32_t> chosen, Draw picture, int side) {
   const std::size_t pixels = windows.image().pixels();
   const TaxelArray array = windows.array();
-  std::vector<float> outputs, truths;
+  std::vector<float> outputs, truths, doubts;
   for_each_output(model, windows, chosen, [&](const EvaluatedBatch& b) {
     outputs.insert(outputs.end(), b.outputs.values().begin(), b.outputs.values().end());
     truths.insert(truths.end(), b.targets.values().begin(), b.targets.values().end());
+    for (const float s : b.spreads) doubts.push_back(static_cast<float>(interval_factor) * at_least(s));
     return true;
   });
   std::vector<std::vector<float>> frames;
   for (const std::uint32_t i : chosen) frames.push_back(mean_of_channels(array, windows.last_frame(i)));
   std::vector<Strip> strips;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    strips.push_back({frames[i], std::span<const float>(outputs).subspan(i * pixels, pixels),
-                      std::span<const float>(truths).subspan(i * pixels, pixels)});
+    const auto part = [&](const std::vector<float>& all) {
+      return all.empty() ? std::span<const float>() : std::span(all).subspan(i * pixels, pixels);
+    };
+    strips.push_back({frames[i], part(outputs), part(truths), part(doubts)});
   }
   return picture(strips, {array.rows, array.columns, windows.settings().scale, side});
 }
@@ -43,7 +47,8 @@ OutputsFile::OutputsFile(const TaxelArray& array, std::size_t timesteps, const I
       width_(static_cast<std::uint64_t>(image.width)) {}
 
 void OutputsFile::add(std::span<const float> window, std::span<const float> output,
-                      std::span<const float> truth) {
+                      std::span<const float> truth, std::span<const float> spread) {
+  spread_.insert(spread_.end(), spread.begin(), spread.end());
   input_.insert(input_.end(), window.begin(), window.end());
   output_.insert(output_.end(), output.begin(), output.end());
   truth_.insert(truth_.end(), truth.begin(), truth.end());
@@ -52,14 +57,15 @@ void OutputsFile::add(std::span<const float> window, std::span<const float> outp
 
 void OutputsFile::write(const std::string& path) const {
   const auto bytes = [](const std::vector<float>& v) { return std::as_bytes(std::span(v)); };
-  write_safetensors(path, {{"format", "supertac-outputs"}},
-                    {{"input", "F32", {count_, timesteps_, signals_}, bytes(input_)},
-                     {"output", "F32", {count_, height_, width_}, bytes(output_)},
-                     {"truth", "F32", {count_, height_, width_}, bytes(truth_)}});
+  std::vector<TensorToWrite> tensors{{"input", "F32", {count_, timesteps_, signals_}, bytes(input_)},
+                                     {"output", "F32", {count_, height_, width_}, bytes(output_)},
+                                     {"truth", "F32", {count_, height_, width_}, bytes(truth_)}};
+  if (!spread_.empty()) tensors.push_back({"spread", "F32", {count_, height_, width_}, bytes(spread_)});
+  write_safetensors(path, {{"format", "supertac-outputs"}}, tensors);
 }
 
-void write_pictures(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> test,
-                    OutputFolder& folder) {
+void write_pictures(const Committee& model, double interval_factor, const WindowSet& windows,
+                    std::span<const std::uint32_t> test, OutputFolder& folder) {
   std::vector<std::uint32_t> touching;
   std::map<std::size_t, std::vector<std::uint32_t>> by_pass;
   for (const std::uint32_t i : test) {
@@ -67,13 +73,14 @@ void write_pictures(const Committee& model, const WindowSet& windows, std::span<
     by_pass[windows.pass_of(i)].push_back(i);
   }
   const std::vector<std::uint32_t> strips = spread(touching.empty() ? test : touching, kStrips);
-  write_png(folder.add("strips.png"), draw(model, windows, strips, strip_picture, 96));
+  write_png(folder.add("strips.png"), draw(model, interval_factor, windows, strips, strip_picture, 96));
   for (const auto& [pass, list] : by_pass) {
     const WindowSet::Pass& p = windows.passes()[pass];
     const std::string name = "film_" + p.plate + "_t" + std::to_string(p.trial) + "_p" +
                              std::to_string(p.pass) + "_v" + std::to_string(static_cast<int>(p.speed_mm_s)) +
                              ".png";
-    write_png(folder.add(name), draw(model, windows, spread(list, kFilmColumns), film_picture, 48));
+    write_png(folder.add(name),
+              draw(model, interval_factor, windows, spread(list, kFilmColumns), film_picture, 48));
   }
 }
 

@@ -12,24 +12,27 @@
 
 namespace supertac {
 
-/// Collects windows [N,T,signals], outputs [N,H,W] and truths [N,H,W] and writes them as one safetensors file
-/// with tensors "input", "output", "truth".
+/// Collects windows [N,T,signals] as the network takes them, outputs [N,H,W], truths [N,H,W] and, where the
+/// network has one, spreads [N,H,W], and writes them as one safetensors file with tensors "input", "output",
+/// "truth" and "spread".
 class OutputsFile {
  public:
   OutputsFile(const TaxelArray& array, std::size_t timesteps, const ImageGrid& image);
-  void add(std::span<const float> window, std::span<const float> output, std::span<const float> truth);
+  void add(std::span<const float> window, std::span<const float> output, std::span<const float> truth,
+           std::span<const float> spread);
   /// Throws FileError.
   void write(const std::string& path) const;
 
  private:
   std::uint64_t timesteps_, signals_, height_, width_, count_ = 0;
-  std::vector<float> input_, output_, truth_;
+  std::vector<float> input_, output_, truth_, spread_;
 };
 
-/// strips.png: windows in contact spread over the test windows, input | output | truth; and for each test
-/// pass film_<plate>_t<trial>_p<pass>.png. Throws FileError.
-void write_pictures(const Committee& model, const WindowSet& windows, std::span<const std::uint32_t> test,
-                    OutputFolder& folder);
+/// strips.png: windows in contact spread over the test windows, input | output | truth and, where
+/// the network says it, half the width of a pixel's 90 % interval; and for each test pass
+/// film_<plate>_t<trial>_p<pass>.png. Throws FileError.
+void write_pictures(const Committee& model, double interval_factor, const WindowSet& windows,
+                    std::span<const std::uint32_t> test, OutputFolder& folder);
 
 /// Windows as pairs (data/samples/pairs.h): the last frame as a network sees it, [N,channels,rows,columns];
 /// the truth [N,1,H,W]; and as group [N] the number of the pass. Throws FileError.

@@ -53,7 +53,7 @@ Scores score_all(const Arguments& a, std::span<const ModelFile> files, const Win
       scores.of_method[m].add(d.pictures[m], d.target, zone);
     scores.felt.add(d.example, d.pictures[0], d.target);
     scores.trust.add(d.example, d.pictures[0], d.target, d.spread, d.input);
-    if (outputs != nullptr) outputs->add(windows.window(d.example), d.pictures[0], d.target);
+    if (outputs != nullptr) outputs->add(d.input, d.pictures[0], d.target, d.spread);
   });
   return scores;
 }
@@ -131,7 +131,7 @@ int evaluate_on_recordings(const Arguments& a) {
       score_all(a, files, windows, scored, baselines, a.given("outputs") ? &outputs : nullptr);
   const nlohmann::ordered_json result = report(a, network, windows, scored, baselines, scores);
   if (pictures) {
-    write_pictures(network, windows, scored.split.test, *pictures);
+    write_pictures(network, files.front().interval_factor(), windows, scored.split.test, *pictures);
     pictures->keep();
   }
   if (pairs) {

@@ -141,6 +141,7 @@ TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
   const SafetensorsFile outputs = SafetensorsFile::read(path("outputs.safetensors"));
   EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<std::uint64_t>{40, 32, 16}));
   EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<std::uint64_t>{40, 8, 8}));
+  EXPECT_EQ(outputs.tensors().at("spread").shape, (std::vector<std::uint64_t>{40, 8, 8}));
   EXPECT_TRUE(fs::exists(path("pictures/strips.png")));
 }
 

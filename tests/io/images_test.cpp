@@ -78,7 +78,7 @@ constexpr StripLayout kSmall{.scale = 2, .side = 16};
 struct Windows {
   std::vector<float> input = std::vector<float>(16, 0.0F), output = std::vector<float>(64, 0.5F),
                      truth = std::vector<float>(64, 1.0F);
-  Strip strip() const { return {input, output, truth}; }
+  Strip strip() const { return {input, output, truth, {}}; }
 };
 
 TEST(Strips, StandInputOutputTruthSideBySide) {
@@ -91,6 +91,18 @@ TEST(Strips, StandInputOutputTruthSideBySide) {
   EXPECT_EQ(picture.at(1, 1), colour_of(0));
   EXPECT_EQ(picture.at(18, 18), colour_of(0.5F));
   EXPECT_EQ(picture.at(35, 1), colour_of(1));
+}
+
+TEST(Strips, ShowTheDoubtBehindTheTruth) {
+  const Windows windows;
+  Strip strip = windows.strip();
+  strip.doubt = windows.output;
+  const std::vector<Strip> strips{windows.strip(), strip};
+  const Picture across = strip_picture(strips, kSmall), down = film_picture(strips, kSmall);
+  EXPECT_EQ(across.width, 4 * 17 + 1);
+  EXPECT_EQ(across.at(52, 1), (Rgb{255, 255, 255}));  // the first has none
+  EXPECT_EQ(across.at(52, 18), colour_of(0.5F));
+  EXPECT_EQ(down.at(18, 52), colour_of(0.5F));
 }
 
 TEST(Film, HasAColumnPerWindow) {
@@ -106,7 +118,7 @@ TEST(Film, HasAColumnPerWindow) {
 
 TEST(Strips, KeepTheShapeOfTheArray) {
   const std::vector<float> input{0, 0, 0, 0, 0, 1, 0, 0}, output(32, 0.5F), truth(32, 1.0F);
-  const std::vector<Strip> strips(1, {input, output, truth});
+  const std::vector<Strip> strips(1, {input, output, truth, {}});
   const StripLayout layout{.rows = 2, .columns = 4, .scale = 2, .side = 16};
   const Picture across = strip_picture(strips, layout), down = film_picture(strips, layout);
   EXPECT_EQ(across.width, 3 * 16 + 4);
