@@ -1,5 +1,6 @@
 #include "apps/train/training_options.h"
 
+#include "data/recordings/signal_range.h"
 #include "data/samples/random_passes.h"
 #include "io/numbers.h"
 #include "models/interval.h"
@@ -36,9 +37,11 @@ void declare_window_training(Arguments& a) {
       "rate", "HZ",
       "of the model's samples: T samples span T / HZ seconds; the paper's is 300, and the board's filter "
       "leaves nothing above 10 (default: 100; preset tiny: 50)");
-  a.option("range", "REST,SPAN",
-           "a signal V becomes clip((REST - V) / SPAN, 0, 1), in volts or whatever the recordings hold",
-           "2.45,0.36");
+  a.option(
+      "range", "REST,SPAN",
+      "a signal V becomes clip((REST - V) / SPAN, 0, 1), in volts or whatever the recordings hold; auto: "
+      "the rig's 2.45,0.36, or where it does not fit what the recordings show",
+      "auto");
   a.option("scaling", "NAME",
            "of the signals: levelled (each window to its own rest and gain, so that a finger pressed harder "
            "is seen like any other) or fixed",
@@ -96,13 +99,42 @@ SplitKind training_split(const Arguments& a) {
   return split;
 }
 
-Scaling training_scaling(const Arguments& a) {
-  const std::vector<double> numbers = a.numbers("range", -1000, 1000);
+// What the option says.
+static Scaling stated_range(const Arguments& a) {
+  const std::vector<double> numbers = a.numbers("range", -1e6, 1e6);
   if (numbers.size() != 2 || numbers[1] <= 1e-6)
     throw UsageError("--range expects REST,SPAN with a SPAN above 0, found " + a.text("range"));
-  return {.rest_volts = numbers[0],
-          .span_volts = numbers[1],
-          .levelled = a.choice("scaling", {"levelled", "fixed"}) == "levelled"};
+  return {.rest_volts = numbers[0], .span_volts = numbers[1]};
+}
+
+// Training on signals that are clipped draws zeros without a word.
+static Scaling training_scaling(const Arguments& a) {
+  constexpr double kMostClipped = 0.5, kWorthSaying = 0.01;
+  const bool automatic = a.text("range") == "auto";
+  Scaling scaling = automatic ? Scaling() : stated_range(a);
+  const SignalRange range = SignalRange::of_folder(a.text("data"), a.list("plates"));
+  if (automatic) scaling = range.fitted();
+  const std::string text = format(scaling.rest_volts) + "," + format(scaling.span_volts);
+  const double clipped = range.clipped(scaling);
+  if (clipped > kMostClipped)
+    throw std::runtime_error("--range " + text + " clips " + format(100 * clipped, 1) +
+                             " % of the signals, which lie at " + range.text() +
+                             "; give REST,SPAN that hold them, or auto");
+  if (clipped > kWorthSaying || scaling.rest_volts != Scaling().rest_volts)
+    a.note("--range " + text + " clips " + format(100 * clipped, 1) + " % of the signals, which lie at " +
+           range.text());
+  scaling.levelled = a.choice("scaling", {"levelled", "fixed"}) == "levelled";
+  return scaling;
+}
+
+// Random passes have the rig's volts.
+static std::size_t random_plates(const Arguments& a, const Scaling& scaling) {
+  const auto count = static_cast<std::size_t>(a.integer("random-plates", 0, 50'000));
+  if (count > 0 && scaling.rest_volts != Scaling().rest_volts)
+    throw UsageError("--random-plates imitates the rig, whose signals rest at " +
+                     format(Scaling().rest_volts) + "; those of these recordings rest at " +
+                     format(scaling.rest_volts));
+  return count;
 }
 
 // Of the recordings that are tested; the rig's when they differ.
@@ -125,7 +157,7 @@ WindowSet training_windows(const Arguments& a, const SuperTacSettings& model, st
   w.stride = static_cast<int>(a.integer("stride", 1, 100'000));
   WindowSet windows = WindowSet::load(a.text("data"), a.list("plates"), w);
   if (a.given("also")) windows.add_directory(a.text("also"), {}, true);
-  const RandomPasses random{.count = static_cast<std::size_t>(a.integer("random-plates", 0, 50'000)),
+  const RandomPasses random{.count = random_plates(a, w.scaling),
                             .seed = seed,
                             .speed_mm_s = common_speed(windows),
                             .filter_s = windows.filter_s().value_or(rig::kFilterS)};

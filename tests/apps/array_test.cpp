@@ -6,6 +6,7 @@
 #include "data/recordings/recording.h"
 #include "io/file.h"
 #include "io/safetensors.h"
+#include "models/model_file.h"
 #include "tests/apps/process.h"
 
 namespace supertac {
@@ -85,6 +86,36 @@ TEST(Array, ThreeChannelsOfTwoBySix) {
   const SafetensorsFile outputs = SafetensorsFile::read(folder / "outputs.safetensors");
   EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<std::uint64_t>{40, 32, 36}));
   EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<std::uint64_t>{40, 8, 24}));
+}
+
+// Signals from 68 to 102 would all be clipped to nothing by the rig's range.
+TEST(Array, SignalsOfAnotherRangeAreNoticed) {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data", model = folder / "m.safetensors";
+  simulate(data, {"--array", "3x5", "--pitch", "2.5"});
+  for (const std::string& path : list_recordings(data)) {
+    Recording recording = read_recording(path);
+    for (float& v : recording.volts) v = 100 - (2.45F - v) / 0.36F * 35;
+    write_recording(path, recording);
+  }
+  const std::vector<std::string> brief = {"--data", data,       "--out", model,      "--preset",
+                                          "tiny",   "--epochs", "1",     "--stride", "64"};
+  const auto with = [&](const char* option, const char* value) {
+    std::vector<std::string> arguments = brief;
+    arguments.insert(arguments.end(), {option, value});
+    return run_process("supertac-train", arguments);
+  };
+  const auto refused = with("--range", "2.45,0.36");
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_NE(refused.error.find("--range 2.45,0.36 clips 100.0 % of the signals, which lie at "),
+            std::string::npos)
+      << refused.error;
+  EXPECT_EQ(with("--random-plates", "5").code, 2);
+  const auto found = with("--seed", "1");
+  EXPECT_EQ(found.code, 0) << found.error;
+  const ModelFile file = load_model(model);
+  EXPECT_NEAR(file.input.scaling.rest_volts, 100, 3);
+  EXPECT_NEAR(file.input.scaling.span_volts, 30, 15);
 }
 
 TEST(Array, RefusesWhatIsNoArray) {

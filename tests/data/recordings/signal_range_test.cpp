@@ -1,0 +1,59 @@
+#include "data/recordings/signal_range.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "data/recordings/simulator.h"
+
+namespace supertac {
+namespace {
+
+// One long recording whose signals run evenly from low to high.
+Recording even(double low, double high) {
+  Recording recording;
+  constexpr int kFrames = 64'000;
+  for (int i = 0; i < kFrames; ++i) {
+    recording.time_s.push_back(i / 1000.0);
+    for (int k = 0; k < kTaxels; ++k)
+      recording.volts.push_back(static_cast<float>(low + (high - low) * i / (kFrames - 1)));
+  }
+  return recording;
+}
+
+TEST(SignalRange, OfTheRigIsTheRigs) {
+  SignalRange range;
+  range.add(simulate_pass(Plate::named("3_Bumps"), {}));
+  EXPECT_EQ(range.fitted().rest_volts, Scaling{}.rest_volts);
+  EXPECT_EQ(range.fitted().span_volts, Scaling{}.span_volts);
+  EXPECT_LT(range.clipped(Scaling{}), 0.01);
+}
+
+TEST(SignalRange, OfAnotherSensorHoldsItsSignals) {
+  SignalRange range;
+  range.add(even(68, 102));
+  EXPECT_EQ(range.clipped(Scaling{}), 1);
+  const Scaling fitted = range.fitted();
+  EXPECT_NEAR(fitted.rest_volts, 101.8, 0.1);
+  EXPECT_NEAR(fitted.span_volts, 37, 0.3);
+  EXPECT_EQ(range.clipped(fitted), 0);
+  EXPECT_EQ(range.text(), "68.136 to 101.797");
+}
+
+TEST(SignalRange, CountsBothSides) {
+  SignalRange range;
+  range.add(even(0, 1));
+  EXPECT_NEAR(range.clipped({.rest_volts = 0.8, .span_volts = 0.4}), 0.4 + 0.1, 0.01);
+}
+
+TEST(SignalRange, LeavesOutWhatIsNoNumber) {
+  Recording recording = even(68, 102);
+  for (std::size_t i = 0; i < recording.volts.size(); i += 3) recording.volts[i] = NAN;
+  SignalRange range;
+  range.add(recording);
+  EXPECT_NEAR(range.fitted().span_volts, 37, 0.3);
+  EXPECT_EQ(SignalRange().fitted().span_volts, Scaling{}.span_volts);
+}
+
+}  // namespace
+}  // namespace supertac
