@@ -1,5 +1,7 @@
 // supertac-stream: super-resolved touch while it happens.
 
+#include <filesystem>
+
 #include "apps/common/ports.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
@@ -36,6 +38,26 @@ std::unique_ptr<SensorSource> open_source(const Arguments& a, double speedup) {
   return open_board(a.text("board"), speedup, capture);
 }
 
+/// A pseudo-terminal has a rig behind it that is none.
+std::string badge_of(const Arguments& a) {
+  if (a.given("replay")) return "replay";
+  if (a.given("recording")) return "recording";
+  std::error_code error;
+  const std::string device = std::filesystem::canonical(a.text("board"), error).string();
+  return device.starts_with("/dev/pts/") ? "virtual rig" : "board";
+}
+
+/// Where the page is served; nothing without --web.
+std::optional<WebAddress> web_address(const Arguments& a) {
+  if (!a.given("web")) return std::nullopt;
+  WebAddress address{.port = static_cast<std::uint16_t>(a.integer("web", 0, 65535))};
+  if (a.given("web-bind")) address.bind = a.text("web-bind");
+  if (!address.is_loopback())
+    a.note("warning: --web-bind " + address.bind +
+           ": everybody who reaches this computer may watch, record and re-zero");
+  return address;
+}
+
 }  // namespace
 
 void declare(Arguments& a) {
@@ -49,7 +71,11 @@ void declare(Arguments& a) {
               "keep time, voltages and picture of every frame (safetensors, 1.1 MB/s at 16x16)")
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
-      .flag("list-ports", "list the serial ports and end");
+      .option_alone("web", "PORT", "show the live page in a browser on this computer (default port 8080)",
+                    "8080")
+      .flag("list-ports", "list the serial ports and end")
+      .only_with("web")
+      .option("web-bind", "ADDRESS", "let the network see the page and its buttons: 0.0.0.0, or one address");
 }
 
 int run(Arguments& a) {
@@ -64,18 +90,22 @@ int run(Arguments& a) {
       .out = a.text("out"), .force = a.force(), .view = !a.quiet() && drawable_terminal()};
   if (a.given("seconds")) settings.seconds = a.number("seconds", 0.001, 1e9);
   const std::string origin = source_of(a);
+  settings.web = web_address(a);
+  settings.badge = badge_of(a), settings.source = origin;
+  settings.metadata = {{"kind", "pictures"}, {"model", a.text("model")}, {"source", origin}};
   const std::vector<ModelFile> models = load_models(a.list("model"));
   const auto source = open_source(a, speedup);
   Stream stream(settings, models, *source);
   const double ready_ms = 1e3 * (monotonic_seconds() - begin);
   a.note("ready: " + origin + "; a picture needs " + format(stream.window_s(), 2) + " s of signal");
+  if (!stream.url().empty()) a.note("live page: " + stream.url());
   std::exception_ptr error;
   try {
     stream.run();
   } catch (...) {
     error = std::current_exception();  // what was seen before is kept
   }
-  stream.finish({{"kind", "pictures"}, {"model", a.text("model")}, {"source", origin}});
+  stream.finish();
   a.print(stream.summary());
   nlohmann::ordered_json result = {{"source", origin}, {"model", a.text("model")}, {"ready_ms", ready_ms}};
   result.update(stream.result());

@@ -90,7 +90,12 @@ void draw_strip(Picture& picture, const Strip& strip, const StripLayout& l, Pane
 Rgb colour_of(float value) {
   static const std::array<Rgb, kMapSize> map = make_map();
   if (std::isnan(value)) return {255, 0, 0};
-  return map[static_cast<std::size_t>(std::lround(std::clamp(value, 0.0F, 1.0F) * (kMapSize - 1)))];
+  return map[level_of(value)];
+}
+
+std::uint8_t level_of(float value) {
+  if (!(value > 0)) return 0;
+  return static_cast<std::uint8_t>(std::lround(std::min(value, 1.0F) * (kMapSize - 1)));
 }
 
 Picture::Picture(int w, int h, Rgb background) : width(w), height(h) {

@@ -15,6 +15,8 @@ using Rgb = std::array<std::uint8_t, 3>;
 /// green to pale yellow. A path in Oklab (Ottosson 2020) whose lightness grows evenly from .22 to .96, so
 /// that equal steps of height look equally large and a grey print keeps their order.
 Rgb colour_of(float value);
+/// The step of the map's 256 that a value has: round(255 value), clipped; 0 for not a number.
+std::uint8_t level_of(float value);
 
 /// 8-bit RGB pixels, rows from the top, [height][width][3].
 struct Picture {

@@ -88,6 +88,12 @@ Arguments& Arguments::option(const std::string& name, const std::string& value, 
   return *this;
 }
 
+Arguments& Arguments::option_alone(const std::string& name, const std::string& value, const std::string& help,
+                                   const std::string& alone) {
+  declare(name, {.value = "[" + value + "]", .help = help, .alone = alone});
+  return *this;
+}
+
 Arguments& Arguments::flag(const std::string& name, const std::string& help) {
   declare(name, {.help = help, .is_flag = true});
   return *this;
@@ -150,6 +156,20 @@ void Arguments::check_names(int argc, const char* const* argv) const {
   }
 }
 
+/// The command line with the values of options that stand alone.
+std::vector<std::string> Arguments::complete_words(int argc, const char* const* argv) const {
+  std::vector<std::string> words;
+  for (int i = 0; i < argc; ++i) {
+    words.emplace_back(argv[i]);
+    const auto found =
+        words.back().starts_with("--") ? options_.find(words.back().substr(2)) : options_.end();
+    if (found == options_.end() || found->second.alone.empty()) continue;
+    if (i + 1 == argc || std::string_view(argv[i + 1]).starts_with("--"))
+      words.push_back(found->second.alone);
+  }
+  return words;
+}
+
 void Arguments::parse(int argc, const char* const* argv) {
   for (int i = 0; i < argc; ++i) command_line_ += (i > 0 ? " " : "") + std::string(argv[i]);
   check_names(argc, argv);
@@ -160,7 +180,10 @@ void Arguments::parse(int argc, const char* const* argv) {
   }
   parser.parse_positional(positionals_);
   try {
-    const cxxopts::ParseResult result = parser.parse(argc, argv);
+    const std::vector<std::string> words = complete_words(argc, argv);
+    std::vector<const char*> pointers;
+    for (const std::string& word : words) pointers.push_back(word.c_str());
+    const cxxopts::ParseResult result = parser.parse(static_cast<int>(pointers.size()), pointers.data());
     for (const std::string& name : order_) {
       if (result.count(name) == 0) continue;
       values_[name] = options_.at(name).is_flag ? "" : result[name].as<std::string>();

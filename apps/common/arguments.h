@@ -49,6 +49,9 @@ class Arguments {
   /// An option with a default; "" means not given.
   Arguments& option(const std::string& name, const std::string& value, const std::string& help,
                     const std::string& default_value = "");
+  /// The same, but `alone` is its value where it is given without one.
+  Arguments& option_alone(const std::string& name, const std::string& value, const std::string& help,
+                          const std::string& alone);
   Arguments& flag(const std::string& name, const std::string& help);
   /// Exactly one of these two options has to be given.
   Arguments& one_of(const std::string& first, const std::string& second);
@@ -108,11 +111,12 @@ class Arguments {
     std::string value{}, help{}, default_value{};
     bool is_flag = false, is_required = false, is_positional = false;
     bool is_more = false;
-    std::string only_with{};
+    std::string only_with{}, alone{};
   };
 
   void declare(const std::string& name, Option option);
   void check_names(int argc, const char* const* argv) const;
+  std::vector<std::string> complete_words(int argc, const char* const* argv) const;
   void check_complete() const;
   void check_names_given() const;
   void check_together() const;

@@ -13,12 +13,14 @@
 
 namespace supertac {
 
-PictureLog::PictureLog(const std::string& path, bool force, std::size_t signals, const ImageGrid& image)
-    : path_(path), signals_(signals), image_(image) {
+PictureLog::PictureLog(const std::string& path, bool force, const PictureFormat& format)
+    : path_(path), format_(format) {
   refuse_existing(path, force);
   times_ = open_spool();
   volts_ = open_spool();
   pictures_ = open_spool();
+  if (format.half_widths) half_widths_ = open_spool();
+  if (format.distance) distances_ = open_spool();
 }
 
 void PictureLog::fail() {
@@ -41,10 +43,13 @@ void PictureLog::append(const Spool& spool, std::span<const std::byte> bytes) {
   if (std::fwrite(bytes.data(), 1, bytes.size(), spool.get()) != bytes.size()) fail();
 }
 
-void PictureLog::add(double time_s, std::span<const float> volts, std::span<const float> picture) {
-  append(times_, std::as_bytes(std::span(&time_s, 1)));
-  append(volts_, std::as_bytes(volts));
-  append(pictures_, std::as_bytes(picture));
+void PictureLog::add(const Seen& seen) {
+  append(times_, std::as_bytes(std::span(&seen.time_s, 1)));
+  append(volts_, std::as_bytes(seen.volts));
+  append(pictures_, std::as_bytes(seen.picture));
+  if (half_widths_) append(half_widths_, std::as_bytes(seen.half_widths));
+  const auto distance = static_cast<float>(seen.distance.value_or(0));
+  if (distances_) append(distances_, std::as_bytes(std::span(&distance, 1)));
   ++count_;
 }
 
@@ -61,12 +66,15 @@ void PictureLog::write(const std::map<std::string, std::string>& metadata) {
   const auto from = [this](const Spool& spool) {
     return [this, &spool](const ByteSink& sink) { read_back(spool, sink); };
   };
-  const auto height = static_cast<std::uint64_t>(image_.height),
-             width = static_cast<std::uint64_t>(image_.width);
-  write_safetensors(path_, metadata,
-                    {{"time_s", "F64", {count_}, {}, from(times_)},
-                     {"volts", "F32", {count_, signals_}, {}, from(volts_)},
-                     {"pictures", "F32", {count_, height, width}, {}, from(pictures_)}});
+  const auto height = static_cast<std::uint64_t>(format_.image.height),
+             width = static_cast<std::uint64_t>(format_.image.width);
+  std::vector<TensorToWrite> tensors = {{"time_s", "F64", {count_}, {}, from(times_)},
+                                        {"volts", "F32", {count_, format_.signals}, {}, from(volts_)},
+                                        {"pictures", "F32", {count_, height, width}, {}, from(pictures_)}};
+  if (half_widths_)
+    tensors.push_back({"half_widths", "F32", {count_, height, width}, {}, from(half_widths_)});
+  if (distances_) tensors.push_back({"distances", "F32", {count_}, {}, from(distances_)});
+  write_safetensors(path_, metadata, tensors);
 }
 
 }  // namespace supertac

@@ -6,20 +6,22 @@
 #include <span>
 #include <string>
 
-#include "data/plates/taxel_array.h"
+#include "apps/stream/seen.h"
 #include "io/safetensors.h"
 
 namespace supertac {
 
 /// Keeps pictures for a safetensors file of tensors time_s F64 [n], volts F32 [n,signals] and pictures F32
-/// [n,height,width]. How many there will be is not known before the end, and they do not fit into memory (1
-/// MB/s): they wait in nameless temporary files beside the final one.
+/// [n,height,width]; of a model that says how sure it is also half_widths F32 [n,height,width], of its
+/// pixels' 90 % intervals, and distances F32 [n] from its training. How many there will be is not known
+/// before the end, and they do not fit into memory (1 MB/s): they wait in nameless temporary files beside the
+/// final one.
 class PictureLog {
  public:
   /// Throws FileError when `path` cannot be made there, or exists without `force`.
-  PictureLog(const std::string& path, bool force, std::size_t signals, const ImageGrid& image);
+  PictureLog(const std::string& path, bool force, const PictureFormat& format);
   /// Throws FileError
-  void add(double time_s, std::span<const float> volts, std::span<const float> picture);
+  void add(const Seen& seen);
   /// Writes the file, atomically. Throws FileError, again when add() has.
   void write(const std::map<std::string, std::string>& metadata);
 
@@ -35,11 +37,10 @@ class PictureLog {
   [[noreturn]] void fail();
 
   std::string path_;
-  std::size_t signals_;
-  ImageGrid image_;
+  PictureFormat format_;
   std::uint64_t count_ = 0;
   std::string problem_;  // of a write that failed: what was kept is not whole
-  Spool times_, volts_, pictures_;
+  Spool times_, volts_, pictures_, half_widths_, distances_;
 };
 
 }  // namespace supertac

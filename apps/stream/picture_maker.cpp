@@ -1,5 +1,6 @@
 #include "apps/stream/picture_maker.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -39,7 +40,9 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
       network_(models),
       window_(window_settings(model_, source)),
       input_(network_.first().input_shape(1)),
-      output_(network_.estimate(input_)) {  // the first run takes memory and chooses kernels
+      output_(network_.estimate(input_)),  // the first run takes memory and chooses kernels
+      period_s_(source.period_s()),
+      interval_factor_(model_.interval_factor()) {
   features_.resize(signal_feature_count(model_.array()));
   for (const float value : output_.picture.values()) {
     if (!std::isfinite(value))
@@ -49,24 +52,46 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
   }
 }
 
+// A running mean of some kRestS; the first frame begins it.
+void PictureMaker::push(const SensorFrame& frame) {
+  const double share = std::min(1.0, period_s_ / kRestS);
+  resting_.resize(frame.volts.size()), move_.resize(frame.volts.size());
+  for (std::size_t s = 0; s < resting_.size(); ++s)
+    if (std::isfinite(frame.volts[s]))
+      resting_[s] += (volts_.empty() ? 1 : share) * (static_cast<double>(frame.volts[s]) - resting_[s]);
+  volts_.assign(frame.volts.begin(), frame.volts.end());
+  for (std::size_t s = 0; s < volts_.size(); ++s) volts_[s] += move_[s];
+  window_.push(frame.time_s, volts_);
+}
+
+void PictureMaker::rezero() {
+  const Scaling& scaling = model_.input.scaling;
+  // A rig at rest lies a little below what its scaling calls 0.
+  const double rest = scaling.rest_volts == Scaling{}.rest_volts ? rig::kRestVolts : scaling.rest_volts;
+  for (std::size_t s = 0; s < resting_.size(); ++s) move_[s] = static_cast<float>(rest - resting_[s]);
+}
+
 std::span<const float> PictureMaker::picture() {
   if (!window_.window(input_.values())) return {};
   output_ = network_.estimate(input_);
+  if (output_.spread.defined()) {
+    half_widths_.clear();
+    for (const float spread : output_.spread.values())
+      half_widths_.push_back(static_cast<float>(interval_factor_) * at_least(spread));
+  }
+  if (model_.novelty) {
+    signal_features(input_.values(), model_.array(), features_);
+    distance_ = model_.novelty->distance(features_);
+  }
   return output_.picture.values();
 }
 
-double PictureMaker::doubt() const {
-  double sum = 0;
-  for (const float spread : output_.spread.values()) sum += static_cast<double>(at_least(spread));
-  return output_.spread.defined()
-             ? model_.interval_factor() * sum / static_cast<double>(output_.spread.size())
-             : 0;
+std::optional<double> PictureMaker::distance_limit() const {
+  return model_.novelty ? std::optional(model_.novelty->limit()) : std::nullopt;
 }
 
-bool PictureMaker::unlike_training() {
-  if (!model_.novelty) return false;
-  signal_features(input_.values(), model_.array(), features_);
-  return model_.novelty->unlike_training(features_);
+PictureFormat PictureMaker::format() const {
+  return {model_.array().signals(), image(), output_.spread.defined(), model_.novelty.has_value()};
 }
 
 double PictureMaker::window_s() const {

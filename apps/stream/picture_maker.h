@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "apps/stream/seen.h"
 #include "apps/stream/sensor_source.h"
 #include "data/samples/live_window.h"
 #include "models/committee.h"
@@ -17,16 +19,25 @@ class PictureMaker {
   /// frames have gone through, which cannot be taken back.
   PictureMaker(std::span<const ModelFile> models, const SensorSource& source);
 
-  void push(const SensorFrame& frame) { window_.push(frame.time_s, frame.volts); }
+  void push(const SensorFrame& frame);
   /// The picture [height][width] of image() after the newest frame, valid until the next call; empty before
   /// window_s() without a gap.
   std::span<const float> picture();
-  /// Of the newest picture: half the width of its pixels' 90 % intervals, mean over the pixels; 0 when the
-  /// model does not say.
-  double doubt() const;
-  /// Whether the window that it was drawn from is unlike those of training.
-  bool unlike_training();
+  /// Of the newest picture: half the width of each pixel's 90 % interval; empty when the model does not say.
+  std::span<const float> half_widths() const { return half_widths_; }
+  /// How far the window that it was drawn from is from those of training, and where "unlike" begins
+  /// (models/novelty.h); nothing when the model does not say.
+  std::optional<double> distance() const { return distance_; }
+  std::optional<double> distance_limit() const;
+  bool unlike_training() const { return distance_ && *distance_ > *distance_limit(); }
 
+  /// Takes what the array has felt in the last moments (kRestS) for "nothing": each signal is moved so that
+  /// it rests where it rested in training, from the next frame on.
+  void rezero();
+  /// The newest frame as the model takes it: moved by rezero().
+  std::span<const float> volts() const { return volts_; }
+
+  PictureFormat format() const;
   ImageGrid image() const { return model_.windows().array->picture(model_.windows().scale); }
   /// Seconds of signal that a picture needs.
   double window_s() const;
@@ -39,6 +50,12 @@ class PictureMaker {
   Tensor input_;
   Estimate output_;
   std::vector<float> features_;
+  double period_s_, interval_factor_;
+  std::vector<float> half_widths_;
+  std::optional<double> distance_;
+  static constexpr double kRestS = 0.2;
+  std::vector<float> volts_, move_;  // of the newest frame; what rezero() adds
+  std::vector<double> resting_;      // mean of the last frames as they come
 };
 
 }  // namespace supertac

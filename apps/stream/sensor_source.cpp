@@ -99,8 +99,11 @@ class RecordingSource : public SensorSource {
   std::optional<SensorFrame> next(double) override {
     if (ended()) return std::nullopt;
     const std::size_t i = at_++, signals = array().signals();
-    return SensorFrame{recording_.time_s[i], std::span(recording_.volts).subspan(i * signals, signals),
-                       monotonic_seconds()};
+    SensorFrame frame{recording_.time_s[i], std::span(recording_.volts).subspan(i * signals, signals),
+                      monotonic_seconds()};
+    if (!recording_.position_mm.empty())
+      frame.x_mm = recording_.position_mm[2 * i], frame.y_mm = recording_.position_mm[2 * i + 1];
+    return frame;
   }
   bool ended() const override { return at_ == recording_.frames(); }
   BoardCounters counters() override {

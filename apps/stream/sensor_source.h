@@ -2,6 +2,7 @@
 // the same driver.
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <span>
@@ -16,6 +17,7 @@ struct SensorFrame {
   double time_s = 0;             ///< of the sensor, from any zero
   std::span<const float> volts;  ///< valid until the next call
   double arrived_s = 0;          ///< on this computer's clock (monotonic_seconds)
+  float x_mm = NAN, y_mm = NAN;  ///< of the finger's centre on the plate, where known
 };
 
 class SensorSource {

@@ -11,7 +11,7 @@
 namespace supertac {
 namespace {
 
-constexpr double kMostLateS = 0.02, kWaitS = 0.05, kFiguresEveryS = 0.5;
+constexpr double kMostLateS = 0.02, kWaitS = 0.05, kFiguresEveryS = 0.5, kShowEveryS = 1.0 / 60;
 
 }  // namespace
 
@@ -19,9 +19,14 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
     : settings_(settings), source_(source), maker_(models, source), figures_s_(monotonic_seconds()) {
   state_.array = source.array();
   state_.scale = maker_.image().height / state_.array.rows;
-  if (!settings.out.empty())
-    log_ =
-        std::make_unique<PictureLog>(settings.out, settings.force, source.array().signals(), maker_.image());
+  const PictureFormat format = maker_.format();
+  if (!settings.out.empty()) log_ = std::make_unique<PictureLog>(settings.out, settings.force, format);
+  if (!settings.web) return;
+  recorder_ = std::make_unique<Recorder>(format, settings.metadata);
+  web_ = std::make_unique<WebView>(
+      *settings.web,
+      WebSource{settings.badge, settings.source, source.array(), state_.scale, format.half_widths},
+      *recorder_);
 }
 
 void Stream::run() {
@@ -35,9 +40,11 @@ void Stream::run() {
   view_.reset();
 }
 
-void Stream::finish(const std::map<std::string, std::string>& metadata) {
+void Stream::finish() {
   view_.reset();
-  if (log_) log_->write(metadata);
+  web_.reset();
+  recorder_.reset();
+  if (log_) log_->write(settings_.metadata);
   source_.finish();
 }
 
@@ -74,9 +81,10 @@ nlohmann::ordered_json Stream::result() const {
 bool Stream::take(SensorFrame frame) {
   if (frames_ == 0) first_s_ = frame.time_s, begin_s_ = monotonic_seconds();
   if (frame.time_s - first_s_ >= settings_.seconds) return false;
-  if (view_ && !source_.live()) frame.arrived_s = keep_pace(frame.time_s);
+  if ((view_ || web_) && !source_.live()) frame.arrived_s = keep_pace(frame.time_s);
   ++frames_;
   last_s_ = frame.time_s;
+  if (web_ && web_->take_rezero()) maker_.rezero();
   maker_.push(frame);
   if (source_.live() && monotonic_seconds() - frame.arrived_s > kMostLateS) {
     ++too_late_;
@@ -84,12 +92,21 @@ bool Stream::take(SensorFrame frame) {
   }
   const std::span<const float> picture = maker_.picture();
   if (picture.empty()) return true;
+  latency_.add(monotonic_seconds() - frame.arrived_s);
+  keep(frame, picture);
+  return true;
+}
+
+void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
+  const Seen seen{pictures() - 1, frame.time_s - first_s_, maker_.volts(),
+                  picture,        maker_.half_widths(),    maker_.distance()};
+  if (log_) log_->add(seen);
+  if (recorder_) recorder_->add(seen);
+  state_.number = seen.number, state_.time_s = seen.time_s;
   state_.unlike_training = maker_.unlike_training();
   unlike_ += state_.unlike_training ? 1 : 0;
-  latency_.add(monotonic_seconds() - frame.arrived_s);
-  if (log_) log_->add(frame.time_s - first_s_, frame.volts, picture);
   state_.picture.assign(picture.begin(), picture.end());
-  return true;
+  state_.x_mm = frame.x_mm, state_.y_mm = frame.y_mm;
 }
 
 double Stream::keep_pace(double time_s) const {
@@ -100,8 +117,9 @@ double Stream::keep_pace(double time_s) const {
 }
 
 void Stream::show() {
-  if (!view_) return;
   const double now = monotonic_seconds();
+  if ((!view_ && !web_) || now - shown_s_ < kShowEveryS) return;
+  shown_s_ = now;
   if (now - figures_s_ >= kFiguresEveryS) {
     const BoardCounters counters = source_.counters();
     state_.frames_per_s = static_cast<double>(frames_ - figures_frames_) / (now - figures_s_);
@@ -109,9 +127,11 @@ void Stream::show() {
     state_.lost = counters.missing, state_.dropped = dropped();
     figures_s_ = now, figures_frames_ = frames_;
   }
-  state_.doubt = maker_.doubt();
+  state_.half_widths.assign(maker_.half_widths().begin(), maker_.half_widths().end());
+  state_.distance = maker_.distance();
   state_.taxels = mean_of_channels(state_.array, maker_.window().newest());
-  view_->update(state_);
+  if (view_) view_->update(state_);
+  if (web_) web_->update(state_);
 }
 
 }  // namespace supertac

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -11,6 +12,7 @@
 #include "apps/stream/picture_log.h"
 #include "apps/stream/picture_maker.h"
 #include "apps/stream/terminal_view.h"
+#include "apps/stream/web_view.h"
 
 namespace supertac {
 
@@ -19,23 +21,28 @@ struct StreamSettings {
   std::string out = {};                                      ///< file that keeps the pictures; empty: none
   bool force = false;                                        ///< an existing file is replaced
   bool view = false;                                         ///< draw on the terminal
+  std::optional<WebAddress> web = {};                        ///< serve the live page
+  std::string badge = {}, source = {};                       ///< for the page: what is streamed
+  std::map<std::string, std::string> metadata = {};          ///< of files with pictures
 };
 
-/// From a source's frames to pictures, on the terminal and in a file; counts what was lost and how long a
-/// picture took. A picture of a live source that would be older than 20 ms is not made: where the machine is
-/// too slow, or was busy, the newest count.
+/// From a source's frames to pictures, on the terminal, on a page and in a file; counts what was lost and how
+/// long a picture took. A picture of a live source that would be older than 20 ms is not made: where the
+/// machine is too slow, or was busy, the newest count.
 class Stream {
  public:
-  /// `models` and `source` must outlive this. Throws as PictureMaker and PictureLog.
+  /// `models` and `source` must outlive this. Throws as PictureMaker, PictureLog and WebServer.
   Stream(const StreamSettings& settings, std::span<const ModelFile> models, SensorSource& source);
 
   /// Until the source ends, `seconds` are over, or a signal comes. What is recorded passes as fast as it
   /// happened where somebody watches, else as fast as it can.
   void run();
   /// Writes the file and ends the source.
-  void finish(const std::map<std::string, std::string>& metadata);
+  void finish();
 
   std::uint64_t pictures() const { return latency_.count(); }
+  /// Of the live page; empty without.
+  std::string url() const { return web_ ? web_->url() : std::string(); }
   double window_s() const { return maker_.window_s(); }
   /// A line for people, and the same for --json.
   std::string summary() const;
@@ -44,6 +51,7 @@ class Stream {
  private:
   bool take(SensorFrame frame);
   double keep_pace(double time_s) const;
+  void keep(const SensorFrame& frame, std::span<const float> picture);
   void show();
   double milliseconds(double quantile) const { return 1e3 * latency_.quantile(quantile); }
   std::uint64_t dropped() const { return too_late_ + source_.counters().dropped; }
@@ -53,11 +61,13 @@ class Stream {
   PictureMaker maker_;
   std::unique_ptr<PictureLog> log_;
   std::unique_ptr<TerminalView> view_;
+  std::unique_ptr<Recorder> recorder_;  // at the page's wish
+  std::unique_ptr<WebView> web_;
   LatencyHistogram latency_;
   LiveState state_;
   std::uint64_t frames_ = 0, too_late_ = 0, unlike_ = 0, figures_frames_ = 0;
   double first_s_ = 0, last_s_ = 0;  // the sensor's time
-  double begin_s_ = 0, figures_s_ = 0;
+  double begin_s_ = 0, figures_s_ = 0, shown_s_ = 0;
 };
 
 }  // namespace supertac

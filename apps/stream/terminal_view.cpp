@@ -86,7 +86,7 @@ bool window_is_large_enough() {
 std::string status_line(const LiveState& state) {
   return format(state.frames_per_s, 0) + " frames/s  latency " + format(state.median_ms, 2) + " ms (p99 " +
          format(state.p99_ms, 2) + ")  lost " + std::to_string(state.lost) + "  dropped " +
-         std::to_string(state.dropped) + (state.doubt > 0 ? "  +-" + format(state.doubt, 2) : "") +
+         std::to_string(state.dropped) + (state.doubt() > 0 ? "  +-" + format(state.doubt(), 2) : "") +
          (state.unlike_training ? "  UNLIKE TRAINING" : "") + "\n";
 }
 

@@ -8,21 +8,9 @@
 #include <thread>
 #include <vector>
 
-#include "data/plates/taxel_array.h"
+#include "apps/stream/live_state.h"
 
 namespace supertac {
-
-struct LiveState {
-  TaxelArray array;
-  int scale = 4;               ///< of the picture
-  std::vector<float> taxels;   ///< [rows][columns] in [0,1]; empty before the first
-  std::vector<float> picture;  ///< [rows * scale][columns * scale]; empty before the first
-  double frames_per_s = 0;
-  double median_ms = 0, p99_ms = 0;  ///< latency
-  std::uint64_t lost = 0, dropped = 0;
-  double doubt = 0;              ///< half the width of a pixel's 90 % interval, mean; 0 when unknown
-  bool unlike_training = false;  ///< the signals are not such as the model has learnt from
-};
 
 /// Two pictures of 32 columns and 16 lines, or less for the shorter side of the array, y upwards, and a line
 /// of figures; every line ends with a line feed. `colour`: half blocks in 256 colours, two pixels a

@@ -148,7 +148,7 @@ TEST_F(Streaming, EndsWhenItsTimeIsOverAndCounts) {
   const auto source = open_recording(path("recording"));
   Stream stream({.seconds = 0.5, .out = path("out")}, models, *source);
   stream.run();
-  stream.finish({{"kind", "pictures"}});
+  stream.finish();
   const auto within = [&](double t) { return t - recording.time_s[0] < 0.5; };
   const auto frames = std::count_if(recording.time_s.begin(), recording.time_s.end(), within);
   EXPECT_EQ(stream.result()["frames"], frames);

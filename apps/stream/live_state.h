@@ -1,0 +1,36 @@
+// What a view shows of a stream at one moment.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "data/plates/taxel_array.h"
+
+namespace supertac {
+
+struct LiveState {
+  TaxelArray array;
+  int scale = 4;                   ///< of the picture
+  std::uint64_t number = 0;        ///< of the picture, as Seen
+  double time_s = 0;               ///
+  std::vector<float> taxels;       ///< [rows][columns] in [0,1]; empty before the first
+  std::vector<float> picture;      ///< [rows * scale][columns * scale]; empty before the first
+  std::vector<float> half_widths;  ///< the same, as Seen
+  std::optional<double> distance;  ///
+  bool unlike_training = false;    ///< the signals are not such as the model has learnt from
+  float x_mm = NAN, y_mm = NAN;    ///< of the finger's centre on the plate, where known
+  double frames_per_s = 0;
+  double median_ms = 0, p99_ms = 0;  ///< latency
+  std::uint64_t lost = 0, dropped = 0;
+
+  /// Mean of half_widths; 0 when unknown.
+  double doubt() const {
+    double sum = 0;
+    for (const float half : half_widths) sum += static_cast<double>(half);
+    return half_widths.empty() ? 0 : sum / static_cast<double>(half_widths.size());
+  }
+};
+
+}  // namespace supertac

@@ -1,0 +1,89 @@
+#include "apps/stream/recorder.h"
+
+#include <algorithm>
+#include <ctime>
+#include <utility>
+
+#include "io/file.h"
+
+namespace supertac {
+namespace {
+
+std::string name_of_now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  localtime_r(&now, &local);
+  char text[64];
+  const std::size_t size = std::strftime(text, sizeof text, "pictures_%Y%m%d_%H%M%S.safetensors", &local);
+  return {text, size};
+}
+
+}  // namespace
+
+Recorder::~Recorder() {
+  stop();
+  if (writer_.joinable()) writer_.join();
+}
+
+std::string Recorder::start() {
+  const std::string name = name_of_now();
+  try {
+    auto log = std::make_unique<PictureLog>(name, false, format_);
+    const std::lock_guard lock(mutex_);
+    if (log_) return "already recording " + status_.recording;
+    log_ = std::move(log);
+    status_.recording = name, status_.seconds = 0;
+    begin_s_ = -1;
+    return "recording " + name;
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+std::string Recorder::stop() {
+  if (writer_.joinable()) writer_.join();  // of the recording before
+  const std::lock_guard lock(mutex_);
+  if (!log_) return "nothing is being recorded";
+  status_.said = "writing " + status_.recording;
+  writer_ = std::thread(&Recorder::complete, this, std::move(log_), std::exchange(status_.recording, ""));
+  return status_.said;
+}
+
+void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name) {
+  std::string said = "recorded " + name;
+  try {
+    log->write(metadata_);
+  } catch (const std::exception& error) {
+    said = error.what();
+  }
+  const std::lock_guard lock(mutex_);
+  if (said == "recorded " + name) status_.files.push_back(name);
+  status_.said = said;
+}
+
+void Recorder::add(const Seen& seen) {
+  const std::lock_guard lock(mutex_);
+  if (!log_) return;
+  if (begin_s_ < 0) begin_s_ = seen.time_s;
+  status_.seconds = seen.time_s - begin_s_;
+  try {
+    log_->add(seen);
+  } catch (const FileError& error) {
+    status_.said = error.what();
+    status_.recording.clear();
+    log_.reset();
+  }
+}
+
+Recorder::Status Recorder::status() {
+  const std::lock_guard lock(mutex_);
+  return status_;
+}
+
+std::optional<std::string> Recorder::file(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  const auto& files = status_.files;
+  return std::find(files.begin(), files.end(), name) == files.end() ? std::nullopt : std::optional(name);
+}
+
+}  // namespace supertac

@@ -1,0 +1,55 @@
+// Recording at somebody's wish, while a stream runs.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "apps/stream/picture_log.h"
+
+namespace supertac {
+
+/// Picture logs in the current folder, started and stopped from one thread and fed from another, which never
+/// waits for a file to be completed.
+class Recorder {
+ public:
+  Recorder(const PictureFormat& format, std::map<std::string, std::string> metadata)
+      : format_(format), metadata_(std::move(metadata)) {}
+  /// Stops; waits until the last file is written.
+  ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  // These answer with a line for people.
+  std::string start();
+  std::string stop();
+  /// Of the stream's thread: nothing unless it is recording. A recording that cannot be kept ends.
+  void add(const Seen& seen);
+
+  struct Status {
+    std::string recording;           ///< name of the file under way; empty: none
+    double seconds = 0;              ///< of it
+    std::string said;                ///< what became of the last one
+    std::vector<std::string> files;  ///< complete ones
+  };
+  Status status();
+  /// The path of one of status().files.
+  std::optional<std::string> file(const std::string& name);
+
+ private:
+  void complete(std::unique_ptr<PictureLog> log, std::string name);
+
+  PictureFormat format_;
+  std::map<std::string, std::string> metadata_;
+  std::mutex mutex_;  // of what follows
+  std::unique_ptr<PictureLog> log_;
+  double begin_s_ = -1;
+  Status status_;
+  std::thread writer_;  // of the starting and stopping thread
+};
+
+}  // namespace supertac

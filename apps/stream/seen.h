@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "data/plates/taxel_array.h"
+
+namespace supertac {
+
+/// What the pictures of a stream hold.
+struct PictureFormat {
+  std::size_t signals = 0;  ///< in a frame
+  ImageGrid image;
+  bool half_widths = false, distance = false;  ///< whether the model says how sure it is
+};
+
+/// One picture of a stream and what belongs to it, valid until the next.
+struct Seen {
+  std::uint64_t number = 0;  ///< from 0, the row of a picture log of the whole stream
+  double time_s = 0;         ///< since the stream's first frame
+  std::span<const float> volts, picture;
+  std::span<const float> half_widths;  ///< of each pixel's 90 % interval; empty when the model does not say
+  std::optional<double> distance;      ///< of its window from those of training (models/novelty.h)
+};
+
+}  // namespace supertac

@@ -1,0 +1,52 @@
+// The live picture in a browser.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "apps/stream/live_state.h"
+#include "apps/stream/recorder.h"
+#include "apps/web/web_server.h"
+
+namespace supertac {
+
+/// What a page shows besides the pictures, and what never changes.
+struct WebSource {
+  std::string badge;   ///< "board", "virtual rig", "replay", "recording"
+  std::string source;  ///< which
+  TaxelArray array;
+  int scale = 4;
+  bool has_spread = false;
+};
+
+/// Serves live_page() with the newest state, 30 times a second at most, from a thread of its own.
+class WebView {
+ public:
+  /// `recorder` must outlive this. Throws as WebServer.
+  WebView(const WebAddress& address, const WebSource& source, Recorder& recorder);
+
+  /// Never waits: a state that comes while the server takes the one before is left out.
+  void update(const LiveState& state);
+  /// Whether somebody has wished to re-zero since the last call.
+  bool take_rezero() { return rezero_.exchange(false); }
+  std::string url() const { return server_.url(); }
+
+ private:
+  WebSite site();
+  std::string hello() const;
+  std::string news();
+
+  WebSource source_;
+  Recorder& recorder_;
+  std::atomic<bool> rezero_{false};
+  std::mutex mutex_;
+  std::optional<LiveState> newest_;
+  WebServer server_;  // last: its thread uses the others
+};
+
+/// The event of a state, one line of JSON; pictures as levels_base64().
+std::string web_event(const LiveState& state, const Recorder::Status& recorder);
+
+}  // namespace supertac

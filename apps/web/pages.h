@@ -1,0 +1,11 @@
+// The pages, each one piece of HTML that needs nothing from elsewhere; written from page.html and its like at
+// build time.
+#pragma once
+
+#include <string_view>
+
+namespace supertac {
+
+std::string_view live_page();
+
+}  // namespace supertac

@@ -1,0 +1,268 @@
+#include "apps/web/web_server.h"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <microhttpd.h>
+#include <netinet/in.h>
+#include <sys/random.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+#include "apps/web/encode.h"
+#include "io/text.h"
+
+namespace supertac {
+namespace {
+
+constexpr unsigned kStalledS = 20;
+constexpr std::size_t kRequestBytes = 16 << 10;  // memory of a connection; more than that gets 431
+constexpr int kSendBuffer = 64 << 10;            // what a stalled page may leave unread, and show late
+constexpr double kStillHereS = 1;
+constexpr std::string_view kPolicy =
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; "
+    "img-src 'self' data: blob:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+
+double seconds_now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+std::string random_token() {
+  std::array<std::uint8_t, 18> bytes{};
+  if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+    throw std::runtime_error("web: the system gives no random numbers");
+  return base64(bytes);
+}
+
+[[noreturn]] void refuse(const WebAddress& address, const std::string& problem) {
+  throw std::runtime_error("web: " + in_quotes(address.bind) + " port " + std::to_string(address.port) +
+                           ": " + problem);
+}
+
+int listening_socket(WebAddress& address) {
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  place.sin_port = htons(address.port);
+  if (inet_pton(AF_INET, address.bind.c_str(), &place.sin_addr) != 1)
+    refuse(address, "expected a numeric address of this computer, such as 127.0.0.1 or 0.0.0.0");
+  const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const int on = 1;
+  if (file < 0) refuse(address, strerror(errno));
+  setsockopt(file, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+  setsockopt(file, SOL_SOCKET, SO_SNDBUF, &kSendBuffer, sizeof kSendBuffer);  // connections inherit it
+  socklen_t size = sizeof place;
+  if (bind(file, reinterpret_cast<sockaddr*>(&place), size) != 0 || listen(file, 64) != 0 ||
+      getsockname(file, reinterpret_cast<sockaddr*>(&place), &size) != 0) {
+    const std::string why = strerror(errno);
+    close(file);
+    refuse(address, why + "; choose another port with --web PORT");
+  }
+  address.port = ntohs(place.sin_port);
+  return file;
+}
+
+std::string_view header(MHD_Connection* connection, const char* name) {
+  const char* value = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, name);
+  return value == nullptr ? std::string_view() : std::string_view(value);
+}
+
+bool is_numeric(const std::string& host) {
+  in_addr address{};
+  return inet_pton(AF_INET, host.c_str(), &address) == 1;
+}
+
+}  // namespace
+
+struct WebServer::Reader {
+  WebServer& server;
+  MHD_Connection* connection;
+  std::uint64_t seen = 0;
+  std::string left;  // of an event that has not been taken whole
+
+  static ssize_t read(void* self, std::uint64_t, char* buffer, std::size_t most) {
+    return static_cast<Reader*>(self)->take(buffer, most);
+  }
+  static void end(void* self) {
+    auto* reader = static_cast<Reader*>(self);
+    std::erase(reader->server.waiting_, reader);
+    delete reader;
+  }
+
+  ssize_t take(char* buffer, std::size_t most) {
+    if (left.empty() && server.number_ > seen) {
+      left = server.newest_;
+      seen = server.number_;
+    }
+    if (left.empty()) {
+      server.waiting_.push_back(this);
+      MHD_suspend_connection(connection);
+      return 0;
+    }
+    const std::size_t count = std::min(most, left.size());
+    std::copy_n(left.begin(), count, buffer);
+    left.erase(0, count);
+    return static_cast<ssize_t>(count);
+  }
+};
+
+/// One request, answered when its headers are known.
+struct WebRequest {
+  WebServer& server;
+  MHD_Connection* connection;
+  std::string_view path, method;
+
+  static MHD_Result handle(void* server, MHD_Connection* connection, const char* url, const char* method,
+                           const char*, const char*, std::size_t*, void**) {
+    try {
+      return WebRequest{*static_cast<WebServer*>(server), connection, url, method}.answer();
+    } catch (const std::exception&) {
+      return MHD_NO;  // closes the connection
+    }
+  }
+
+  MHD_Result answer() {
+    if (!is_own_host())
+      return text(421, "this program serves its own computer; open the address that it printed");
+    const std::string_view origin = header(connection, "Origin");
+    if (!origin.empty() && origin != "http://" + std::string(header(connection, "Host")))
+      return text(403, "the request comes from another page");
+    if (method == "POST") return act();
+    if (method != "GET" && method != "HEAD") return text(405, "expected GET or POST");
+    if (path == "/") return page();
+    if (path == "/events") return events();
+    if (path.starts_with("/files/") && server.site_.file) return download(std::string(path.substr(7)));
+    return text(404, "there is nothing of this name");
+  }
+
+  // Names of this computer only: a foreign name that resolves to it belongs to a foreign page. An address
+  // that the network may use is open to numbers, which no foreign page can claim.
+  bool is_own_host() const {
+    const std::string host(header(connection, "Host"));
+    const std::string port = ":" + std::to_string(server.address_.port);
+    if (!host.ends_with(port)) return server.address_.port == 80 && is_own_name(host);
+    return is_own_name(host.substr(0, host.size() - port.size()));
+  }
+  bool is_own_name(const std::string& name) const {
+    return name == "localhost" || name == "127.0.0.1" || (!server.address_.is_loopback() && is_numeric(name));
+  }
+
+  MHD_Result act() {
+    const auto action = server.site_.actions.find(path.substr(std::min<std::size_t>(1, path.size())));
+    if (action == server.site_.actions.end()) return text(404, "there is no such action");
+    if (header(connection, "Origin").empty() || header(connection, "X-Token") != server.token_)
+      return text(403, "an action needs the page's token; load the page again");
+    return text(200, action->second());
+  }
+
+  MHD_Result page() {
+    return send(
+        200, "text/html; charset=utf-8",
+        MHD_create_response_from_buffer(server.site_.page.size(), const_cast<char*>(server.site_.page.data()),
+                                        MHD_RESPMEM_PERSISTENT));
+  }
+
+  MHD_Result events() {
+    auto* reader = new WebServer::Reader{server, connection, 0, server.first_event()};
+    return send(200, "text/event-stream",
+                MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 4096, &WebServer::Reader::read, reader,
+                                                  &WebServer::Reader::end));
+  }
+
+  MHD_Result download(const std::string& name) {
+    const std::optional<std::string> found = server.site_.file(name);
+    const int file = found ? open(found->c_str(), O_RDONLY | O_CLOEXEC) : -1;
+    struct stat status {};
+    if (file < 0) return text(404, "there is no such file");
+    if (fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
+      close(file);
+      return text(404, "there is no such file");
+    }
+    return send(200, "application/octet-stream",
+                MHD_create_response_from_fd64(static_cast<std::uint64_t>(status.st_size), file));
+  }
+
+  MHD_Result text(unsigned status, const std::string& line) {
+    return send(
+        status, "text/plain; charset=utf-8",
+        MHD_create_response_from_buffer(line.size(), const_cast<char*>(line.data()), MHD_RESPMEM_MUST_COPY));
+  }
+
+  MHD_Result send(unsigned status, const char* type, MHD_Response* response) {
+    if (response == nullptr) return MHD_NO;
+    for (const auto& [name, value] : {std::pair("Content-Type", type),
+                                      {"Cache-Control", "no-store"},
+                                      {"X-Content-Type-Options", "nosniff"},
+                                      {"Referrer-Policy", "no-referrer"},
+                                      {"Cross-Origin-Resource-Policy", "same-origin"},
+                                      {"Content-Security-Policy", kPolicy.data()}})
+      MHD_add_response_header(response, name, value);
+    const MHD_Result result = MHD_queue_response(connection, status, response);
+    MHD_destroy_response(response);
+    return result;
+  }
+};
+
+WebServer::WebServer(const WebAddress& address, WebSite site)
+    : address_(address), site_(std::move(site)), token_(random_token()) {
+  const int file = listening_socket(address_);
+  daemon_ = MHD_start_daemon(MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr, nullptr,
+                             &WebRequest::handle, this, MHD_OPTION_LISTEN_SOCKET, file,
+                             MHD_OPTION_CONNECTION_LIMIT, kConnections, MHD_OPTION_CONNECTION_TIMEOUT,
+                             kStalledS, MHD_OPTION_CONNECTION_MEMORY_LIMIT, kRequestBytes, MHD_OPTION_END);
+  if (daemon_ == nullptr) {
+    close(file);
+    refuse(address_, "the server does not start");
+  }
+  thread_ = std::thread([this] { run(); });
+}
+
+WebServer::~WebServer() {
+  stop_ = true;
+  thread_.join();
+}
+
+std::string WebServer::url() const { return "http://" + address_.bind + ":" + std::to_string(address_.port); }
+
+std::string WebServer::first_event() const {
+  std::string hello = site_.hello();
+  hello.insert(1, "\"token\":\"" + token_ + "\",");
+  return "retry: 1000\nevent: hello\ndata: " + hello + "\n\n";
+}
+
+// The newest event is told again after a second without another: a page that hears nothing for longer knows
+// that the program is gone, and the program finds out about pages that are.
+void WebServer::publish() {
+  const double now = seconds_now();
+  if (std::string news = site_.news(); !news.empty()) {
+    newest_ = "data: " + news + "\n\n";
+  } else if (newest_.empty() || now - told_s_ < kStillHereS) {
+    return;
+  }
+  ++number_;
+  told_s_ = now;
+  for (Reader* reader : std::exchange(waiting_, {})) MHD_resume_connection(reader->connection);
+}
+
+void WebServer::run() {
+  double due = seconds_now();
+  while (!stop_) {
+    const double now = seconds_now();
+    if (now >= due) {
+      publish();
+      due = std::max(due + 1 / kMostEventsPerS, now);
+    }
+    const auto wait_ms = static_cast<int>(1e3 * std::max(0.0, due - seconds_now()));
+    if (MHD_run_wait(daemon_, std::max(1, wait_ms)) == MHD_NO) break;
+  }
+  for (Reader* reader : std::exchange(waiting_, {})) MHD_resume_connection(reader->connection);
+  MHD_stop_daemon(daemon_);
+}
+
+}  // namespace supertac

@@ -1,0 +1,79 @@
+// A page that a program shows of itself, in a browser on the same computer.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+struct MHD_Daemon;
+
+namespace supertac {
+
+/// What is served. The functions are called on the server's thread alone.
+struct WebSite {
+  /// GET /
+  std::string_view page;
+  /// GET /events, server-sent: first an event "hello" with this JSON object, to which "token" is added ...
+  std::function<std::string()> hello;
+  /// ... then the newest of these JSON texts, at most 30 a second; an empty text: there is nothing new.
+  std::function<std::string()> news;
+  /// POST /NAME does what its name says and answers with a line for people.
+  std::map<std::string, std::function<std::string()>, std::less<>> actions;
+  /// GET /files/NAME: the path of the file that may be fetched under this name. Names are looked up, never
+  /// put together to a path.
+  std::function<std::optional<std::string>(const std::string&)> file;
+};
+
+struct WebAddress {
+  std::uint16_t port = 8080;       ///< 0: any that is free
+  std::string bind = "127.0.0.1";  ///< numeric; another than 127.0.0.1 is open to the network
+  bool is_loopback() const { return bind == "127.0.0.1"; }
+};
+
+/// Serves a site from a thread of its own. Nobody who publishes waits for a reader: a page that is too slow
+/// misses events, one that takes nothing for 20 s is closed, and so is a connection beyond kConnections.
+///
+/// Who may come in: a Host other than this computer's names for itself gets 421 (a foreign name that was
+/// made to resolve to it), a foreign Origin 403, and an action needs the token that only a page of this
+/// server has read, else 403. Bodies of requests are not read.
+class WebServer {
+ public:
+  static constexpr unsigned kConnections = 256;
+  static constexpr double kMostEventsPerS = 30;
+
+  /// Throws std::runtime_error when the address cannot be had.
+  WebServer(const WebAddress& address, WebSite site);
+  ~WebServer();
+  WebServer(const WebServer&) = delete;
+  WebServer& operator=(const WebServer&) = delete;
+
+  /// "http://127.0.0.1:8080"
+  std::string url() const;
+
+ private:
+  friend struct WebRequest;
+  struct Reader;
+
+  void run();
+  void publish();
+  std::string first_event() const;
+
+  WebAddress address_;
+  WebSite site_;
+  std::string token_;
+  MHD_Daemon* daemon_ = nullptr;
+  std::string newest_;  // as it is sent; empty before the first
+  std::uint64_t number_ = 0;
+  double told_s_ = 0;
+  std::vector<Reader*> waiting_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace supertac

@@ -1,0 +1,61 @@
+// A client for tests that sends what it is told, right or wrong.
+#pragma once
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace supertac {
+
+class HttpClient {
+ public:
+  /// Connects to 127.0.0.1. `receive_buffer`: bytes that the kernel may hold for it; 0: its own choice.
+  explicit HttpClient(int port, int receive_buffer = 0)
+      : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    if (receive_buffer > 0)
+      setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
+    sockaddr_in place{};
+    place.sin_family = AF_INET;
+    place.sin_port = htons(static_cast<std::uint16_t>(port));
+    inet_pton(AF_INET, "127.0.0.1", &place.sin_addr);
+    if (connect(socket_, reinterpret_cast<sockaddr*>(&place), sizeof place) != 0)
+      throw std::runtime_error("cannot connect to port " + std::to_string(port));
+  }
+  ~HttpClient() { close(socket_); }
+  HttpClient(const HttpClient&) = delete;
+  HttpClient& operator=(const HttpClient&) = delete;
+
+  void send(std::string_view bytes) { (void)::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL); }
+  /// What has come so far, once it holds `part` or nothing more comes for `wait_ms`.
+  std::string receive(std::string_view part, int wait_ms = 5000) {
+    char buffer[4096];
+    pollfd ready{socket_, POLLIN, 0};
+    while (got_.find(part) == std::string::npos && poll(&ready, 1, wait_ms) > 0) {
+      const ssize_t count = recv(socket_, buffer, sizeof buffer, 0);
+      if (count <= 0) break;
+      got_.append(buffer, static_cast<std::size_t>(count));
+    }
+    return got_;
+  }
+
+ private:
+  int socket_;
+  std::string got_;
+};
+
+/// Status of one request on a connection of its own; 0 when it was closed without an answer.
+inline int status_of(int port, const std::string& request) {
+  HttpClient client(port);
+  client.send(request);
+  const std::string answer = client.receive("\r\n");
+  return answer.starts_with("HTTP/1.") ? std::stoi(answer.substr(9, 3)) : 0;
+}
+
+}  // namespace supertac

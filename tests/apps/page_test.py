@@ -1,0 +1,280 @@
+#!/usr/bin/env python3
+"""The live page in a real Chromium, on a virtual rig whose finger slides.
+
+    tests/apps/page_test.py BIN [SCREENSHOTS]    BIN: the folder of our programs; SCREENSHOTS: keep some in this folder
+
+Ends with 77, after one line, where Chromium or its driver is not installed.
+"""
+
+import contextlib
+import json
+import os
+import pathlib
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import tty
+
+from browser import Browser, Png
+
+# Marlin is told where the head stands; the finger goes down, twice over the plate, and rests on the texture.
+SLIDES = ["G92 X99.7 Y101.17 Z131.81", "G1 Z91.81 F300", "G1 Y209.17 F600", "G1 Y101.17 F600", "G1 Y155.17 F1200"]
+
+
+def wait_until(what, condition, seconds=20):
+    end = time.monotonic() + seconds
+    while not (value := condition()):
+        assert time.monotonic() < end, f"not within {seconds} s: {what}"
+        time.sleep(0.05)
+    return value
+
+
+def read_safetensors(data):
+    (size,) = struct.unpack("<Q", data[:8])
+    header = json.loads(data[8 : 8 + size])
+    header.pop("__metadata__")
+    return header, data[8 + size :]
+
+
+def row_of(data, name, row):
+    """A picture of a log, as floats."""
+    header, body = read_safetensors(data)
+    count, *shape = header[name]["shape"]
+    assert row < count, f"picture {row} of {count}"
+    size = shape[0] * shape[1] if len(shape) == 2 else 1
+    begin = header[name]["data_offsets"][0] + 4 * size * row
+    return struct.unpack(f"<{size}f", body[begin : begin + 4 * size])
+
+
+def make_lively(path):
+    """Turns an untrained model into one whose pictures follow its signals, into a file of another writer."""
+    gains = {"mean.weight": lambda v: 1000 * v, "upsampler.out.weight": lambda v: 10 * v, "upsampler.out.bias": lambda _: 0.5}
+    data = bytearray(path.read_bytes())
+    header, _ = read_safetensors(data)
+    (size,) = struct.unpack("<Q", data[:8])
+    for name, entry in header.items():
+        gain = next((gain for end, gain in gains.items() if name.endswith(end)), None)
+        if gain:
+            begin, end = (8 + size + offset for offset in entry["data_offsets"])
+            values = struct.unpack(f"<{(end - begin) // 4}f", data[begin:end])
+            data[begin:end] = struct.pack(f"<{len(values)}f", *map(gain, values))
+    metadata = json.loads(data[8 : 8 + size])["__metadata__"]
+    kept = {key: text for key, text in metadata.items() if key not in ("checksum", "supertac_format")}
+    text = json.dumps({"__metadata__": kept, **header}).encode()
+    text += b" " * (-len(text) % 8)
+    path.write_bytes(struct.pack("<Q", len(text)) + text + data[8 + size :])
+
+
+class Rig:
+    """supertac-rig with a finger that can be moved."""
+
+    def __init__(self, binaries, folder):
+        self.board = folder / "board"
+        command = [binaries / "supertac-rig", "--plate", "6_Ridges", "--board-link", self.board, "--printer-link", folder / "printer"]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert self.process.stdout.readline() == "ready\n"
+        self.printer = os.open(folder / "printer", os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(self.printer)
+        threading.Thread(target=self.listen, daemon=True).start()
+
+    def listen(self):
+        with contextlib.suppress(OSError):
+            while os.read(self.printer, 4096):
+                pass
+
+    def move(self, lines):
+        os.write(self.printer, "".join(line + "\n" for line in lines).encode())
+
+    def stop(self):
+        self.process.terminate()
+        self.process.wait()
+
+
+class Stream:
+    """supertac-stream with a page at the given port (0: any)."""
+
+    def __init__(self, binaries, rig, folder, out, port=0):
+        command = [binaries / "supertac-stream", "--board", rig.board, "--model", folder / "model.safetensors"]
+        command += ["--out", out, "--web", str(port), "--force"]
+        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=folder)
+        self.url = next(m[1] for line in self.process.stderr if (m := re.search(r"live page: (\S+)", line)))
+        threading.Thread(target=self.process.stderr.read, daemon=True).start()
+
+    def stop(self):
+        self.process.terminate()
+        assert self.process.wait(30) == 143
+
+
+def shown(browser):
+    return browser.js("return supertac.shown && supertac.shown.picture ? supertac.shown.n : -1")
+
+
+def felt(browser):
+    return browser.js("return supertac.newest.felt.reduce((a, b) => a + b) / supertac.newest.felt.length / 255")
+
+
+def is_at_rest(browser):
+    before = felt(browser)
+    time.sleep(0.5)
+    return abs(felt(browser) - before) < 0.01
+
+
+def text(browser, name):
+    return browser.js(f"return document.getElementById('{name}').textContent")
+
+
+def check_changes(browser):
+    """Both pictures change while the finger slides."""
+    pictures, arrays = set(), set()
+    for _ in range(20):
+        pictures.add(browser.js("return String(supertac.shown.picture)"))
+        arrays.add(browser.js("return String(supertac.shown.felt)"))
+        time.sleep(0.1)
+    assert len(pictures) > 10 and len(arrays) > 10, (len(pictures), len(arrays))
+
+
+def colours_on_screen(browser):
+    """Of the centres of the drawn picture's pixels on a screenshot, row 0 at the bottom, and the picture's number."""
+    place = browser.js(
+        "const r = document.getElementById('drawn').getBoundingClientRect(), b = supertac.box, h = supertac.hello;"
+        "return [r.left + b.x, r.top + b.y, b.w, b.h, h.rows * h.scale, h.columns * h.scale, supertac.shown.n]"
+    )
+    left, top, width, height, rows, columns, number = place
+    png = Png(browser.screenshot())
+    centres = [
+        (left + (c + 0.5) * width / columns, top + height - (r + 0.5) * height / rows) for r in range(rows) for c in range(columns)
+    ]
+    return number, [png.at(x, y) for x, y in centres]
+
+
+def expected_colours(values, colour_map):
+    for value in values:
+        level = int(255 * min(max(value, 0), 1) + 0.5)
+        yield tuple(colour_map[3 * level : 3 * level + 3])
+
+
+def check_pause(browser):
+    """Space holds the picture and lets it go again. Returns what was seen meanwhile."""
+    browser.press(" ")
+    time.sleep(0.2)
+    before, newest = shown(browser), browser.js("return supertac.newest.n")
+    seen = colours_on_screen(browser)
+    wait_until("the stream goes on", lambda: browser.js("return supertac.newest.n") > newest + 200)
+    assert shown(browser) == before
+    assert text(browser, "link") == "paused"
+    browser.press(" ")
+    wait_until("the picture goes on", lambda: shown(browser) > before + 200)
+    return seen
+
+
+def check_rezero(browser):
+    """What the resting finger feels is then taken for nothing."""
+    before = felt(browser)
+    browser.press("z")
+    wait_until(f"re-zero: felt {before}, now less", lambda: abs(felt(browser) - 0.022) < 0.012)
+    assert before > 0.05 and "nothing" in text(browser, "said")
+
+
+def check_record(browser, folder):
+    """R begins and ends a picture log, whose name is shown and which can be fetched."""
+    browser.press("r")
+    name = wait_until("a name", lambda: re.search(r"recording (pictures_\S+\.safetensors)", text(browser, "said")))[1]
+    wait_until("1 s recorded", lambda: browser.js("return supertac.newest.recorded_s") > 1)
+    browser.press("r")
+    wait_until("a link", lambda: browser.js("return document.querySelector('#files a') !== null"))
+    fetched = browser.js(
+        "return fetch(document.querySelector('#files a').href).then(a => a.arrayBuffer()).then(b => Array.from(new Uint8Array(b)))"
+    )
+    data = (folder / name).read_bytes()
+    assert bytes(fetched) == data
+    header, _ = read_safetensors(data)
+    assert 1000 <= header["pictures"]["shape"][0] < 4000 and "volts" in header, header
+
+
+def check_snapshot(browser, folder):
+    """S saves a PNG with both pictures: in its right half lie the drawn picture's colours."""
+    browser.press("s")
+    file = wait_until("a PNG", lambda: next(folder.glob("supertac_*.png"), None))
+    wait_until("all of it", lambda: file.read_bytes()[-8:-4] == b"IEND")
+    png = Png(file.read_bytes())
+    assert (png.width, png.height) == (1640, 1000)
+    map_ = browser.js("return Array.from(supertac.hello.map)")
+    known = {tuple(map_[i : i + 3]) for i in range(0, len(map_), 3)}
+    side = 2 * (390 - 36)
+    centres = [(840 + 60 + (c + 0.5) * side / 16, 68 + 12 + (r + 0.5) * side / 16) for r in range(16) for c in range(16)]
+    assert all(png.at(x, y) in known for x, y in centres)
+
+
+def keep_screenshots(browser, folder):
+    for name, size, dark in (("light", (1280, 860), False), ("dark", (1280, 860), True), ("phone", (400, 1400), False)):
+        browser.look(*size, dark)
+        time.sleep(0.4)
+        (folder / f"page_{name}.png").write_bytes(browser.screenshot())
+
+
+def check_page(binaries, folder, browser, screenshots):
+    with contextlib.ExitStack() as stack:
+        rig = Rig(binaries, folder)
+        stack.callback(rig.stop)
+        log = folder / "seen.safetensors"
+        stream = Stream(binaries, rig, folder, log)
+        stack.callback(stream.process.kill)
+        browser.look(1280, 860)
+        browser.open(stream.url)
+        wait_until("a picture", lambda: shown(browser) > 0)
+        assert text(browser, "badge") == "virtual rig"
+        rig.move(SLIDES)
+        wait_until("contact", lambda: felt(browser) > 0.06)
+        check_changes(browser)
+        if browser.js("return document.getElementById('guess').checked"):
+            browser.press("g")
+        seen = [check_pause(browser) for _ in range(3)]
+        if screenshots:
+            keep_screenshots(browser, screenshots)
+        check_record(browser, folder)
+        check_snapshot(browser, folder)
+        wait_until("rest on the texture", lambda: felt(browser) > 0.06 and is_at_rest(browser), 30)
+        check_rezero(browser)
+        colour_map = browser.js("return Array.from(supertac.hello.map)")
+        stream.stop()
+        wait_until("it says that the program is gone", lambda: text(browser, "link").startswith("no connection"))
+        for number, colours in seen:
+            expected = list(expected_colours(row_of(log.read_bytes(), "pictures", number), colour_map))
+            assert len(set(expected)) > 20, f"picture {number} shows nothing"
+            wrong = [i for i, pair in enumerate(zip(colours, expected)) if pair[0] != pair[1]]
+            assert not wrong, f"picture {number}: pixels {wrong[:9]}: {colours[wrong[0]]}, expected {expected[wrong[0]]}"
+        again = Stream(binaries, rig, folder, log, int(stream.url.rsplit(":", 1)[1]))
+        stack.callback(again.process.kill)
+        wait_until("the page comes back by itself", lambda: text(browser, "link") == "live" and shown(browser) > 0)
+        browser.press("z")
+        wait_until("its buttons work", lambda: "nothing" in text(browser, "said"))
+        again.stop()
+
+
+def main():
+    binaries = pathlib.Path(sys.argv[1]).resolve()
+    screenshots = pathlib.Path(sys.argv[2]).resolve() if len(sys.argv) > 2 else None
+    programs = [shutil.which("chromedriver"), shutil.which("chromium")]
+    if None in programs:
+        print("skipped: chromium and chromium-driver are not installed")
+        return 77
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        quiet = {"check": True, "stdout": subprocess.DEVNULL, "cwd": folder}
+        subprocess.run([binaries / "supertac-simulate", "--out", "data", "--plates", "6_Ridges", "--passes", "1", "--speeds", "10"], **quiet)
+        train = ["--data", "data", "--out", "model.safetensors", "--preset", "tiny", "--split", "none", "--epochs", "1"]
+        subprocess.run([binaries / "supertac-train", *train, "--stride", "64", "--quiet"], **quiet)
+        make_lively(folder / "model.safetensors")
+        with Browser(*programs, folder) as browser:
+            check_page(binaries, folder, browser, screenshots)
+    print("the page does what it says")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

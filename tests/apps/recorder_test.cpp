@@ -1,0 +1,77 @@
+// Picture logs at somebody's wish.
+#include "apps/stream/recorder.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+namespace fs = std::filesystem;
+
+class InFolder : public testing::Test {
+ protected:
+  InFolder() : before_(fs::current_path()) { fs::current_path(folder_.path()); }
+  ~InFolder() override { fs::current_path(before_); }
+
+  TemporaryFolder folder_;
+  fs::path before_;
+};
+
+using RecorderTest = InFolder;
+
+const PictureFormat kFormat{.signals = 2, .image = {2, 2, 1}, .half_widths = true, .distance = true};
+
+Seen seen_at(double time_s) {
+  static const std::vector<float> volts = {1, 2}, picture = {3, 4, 5, 6}, half = {7, 8, 9, 10};
+  return {.time_s = time_s, .volts = volts, .picture = picture, .half_widths = half, .distance = 11.0};
+}
+
+TEST_F(RecorderTest, KeepsWhatCameBetweenStartAndStop) {
+  std::string name;
+  {
+    Recorder recorder(kFormat, {{"kind", "pictures"}});
+    recorder.add(seen_at(0));
+    EXPECT_EQ(recorder.stop(), "nothing is being recorded");
+    EXPECT_TRUE(recorder.start().starts_with("recording pictures_2"));
+    name = recorder.status().recording;
+    recorder.add(seen_at(1));
+    recorder.add(seen_at(1.5));
+    EXPECT_EQ(recorder.status().seconds, 0.5);
+    EXPECT_EQ(recorder.file(name), std::nullopt);  // not before it is complete
+    EXPECT_EQ(recorder.stop(), "writing " + name);
+    recorder.add(seen_at(2));
+    EXPECT_EQ(recorder.stop(), "nothing is being recorded");  // waits for the file
+    EXPECT_EQ(recorder.status().said, "recorded " + name);
+    EXPECT_EQ(recorder.file(name), name);
+  }
+  const SafetensorsFile file = SafetensorsFile::read(name);
+  EXPECT_EQ(file.f64("time_s"), (std::vector<double>{1, 1.5}));
+  EXPECT_EQ(file.f32("volts"), (std::vector<float>{1, 2, 1, 2}));
+  EXPECT_EQ(file.f32("half_widths"), (std::vector<float>{7, 8, 9, 10, 7, 8, 9, 10}));
+  EXPECT_EQ(file.f32("distances"), (std::vector<float>{11, 11}));
+}
+
+TEST_F(RecorderTest, AnEndCompletesTheFile) {
+  std::string name;
+  {
+    Recorder recorder(kFormat, {});
+    recorder.start();
+    name = recorder.status().recording;
+    recorder.add(seen_at(1));
+  }
+  EXPECT_EQ(SafetensorsFile::read(name).f64("time_s").size(), 1U);
+}
+
+TEST_F(RecorderTest, AFolderThatIsGoneIsSaid) {
+  Recorder recorder(kFormat, {});
+  fs::remove_all(fs::current_path());
+  EXPECT_FALSE(recorder.start().starts_with("recording"));
+  EXPECT_EQ(recorder.status().recording, "");
+}
+
+}  // namespace
+}  // namespace supertac

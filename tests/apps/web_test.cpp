@@ -1,0 +1,263 @@
+// The server of the live page: who may come in, what leaves, and what a slow reader costs.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <fstream>
+#include <random>
+
+#include "apps/stream/web_view.h"
+#include "apps/web/encode.h"
+#include "apps/web/pages.h"
+#include "apps/web/web_server.h"
+#include "io/file.h"
+#include "io/images.h"
+#include "io/json.h"
+#include "tests/apps/http_client.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+TEST(Encode, Base64IsThatOfRfc4648) {
+  const auto encoded = [](std::string_view text) {
+    return base64(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+  };
+  EXPECT_EQ(encoded(""), "");
+  EXPECT_EQ(encoded("f"), "Zg==");
+  EXPECT_EQ(encoded("fo"), "Zm8=");
+  EXPECT_EQ(encoded("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(levels_base64(std::vector<float>{0, 1, 0.5F}), "AP+A");
+  EXPECT_EQ(levels_base64(std::vector<float>{-1, 2, std::nanf("")}), "AP8A");
+}
+
+TEST(Encode, TheMapHasTheColoursOfPictures) {
+  const Rgb first = colour_of(0), last = colour_of(1);
+  const std::string map = colour_map_base64();
+  EXPECT_EQ(map.size(), 1024U);
+  EXPECT_TRUE(map.starts_with(base64(first)));
+  EXPECT_TRUE(map.ends_with(base64(last)));
+}
+
+class Web : public testing::Test {
+ protected:
+  Web() : server_({.port = 0}, site()), port_(std::stoi(server_.url().substr(17))) {}
+
+  WebSite site() {
+    return {.page = live_page(),
+            .hello = [] { return std::string(R"({"badge":"test"})"); },
+            .news = [this] { return "{\"n\":" + std::to_string(count_++) + "," + filling_ + "}"; },
+            .actions = {{"record", [this] { return ++records_, std::string("recording"); }}},
+            .file =
+                [this](const std::string& name) {
+                  return name == "a.safetensors" ? std::optional(folder_ / name) : std::nullopt;
+                }};
+  }
+  std::string host() const { return "Host: 127.0.0.1:" + std::to_string(port_) + "\r\n"; }
+  std::string origin() const { return "Origin: http://127.0.0.1:" + std::to_string(port_) + "\r\n"; }
+  int get(const std::string& path, const std::string& headers) const {
+    return status_of(port_, "GET " + path + " HTTP/1.1\r\n" + headers + "\r\n");
+  }
+  int get(const std::string& path) const { return get(path, host()); }
+  int post(const std::string& path, const std::string& headers) const {
+    return status_of(port_, "POST " + path + " HTTP/1.1\r\nContent-Length: 0\r\n" + headers + "\r\n");
+  }
+  std::string token() const {
+    HttpClient client(port_);
+    client.send("GET /events HTTP/1.1\r\n" + host() + "\r\n");
+    const std::string hello = client.receive("\n\n");
+    const std::size_t begin = hello.find("\"token\":\"") + 9;
+    return hello.substr(begin, hello.find('"', begin) - begin);
+  }
+  bool answers() const { return get("/") == 200; }
+
+  TemporaryFolder folder_;
+  std::string filling_ = "\"f\":\"\"";
+  std::atomic<int> count_{0}, records_{0};
+  WebServer server_;
+  int port_;
+};
+
+TEST_F(Web, ListensOnLoopbackOnly) {
+  std::ifstream table("/proc/net/tcp");
+  char hex[16];
+  std::snprintf(hex, sizeof hex, ":%04X", static_cast<unsigned>(port_));
+  int found = 0;
+  for (std::string line; std::getline(table, line);) {
+    const std::size_t at = line.find(hex);
+    if (at == std::string::npos || line.find(" 0A ") == std::string::npos) continue;  // 0A: listening
+    EXPECT_EQ(line.substr(at - 8, 8), "0100007F") << line;
+    ++found;
+  }
+  EXPECT_EQ(found, 1);
+  std::ifstream six("/proc/net/tcp6");
+  const std::string all{std::istreambuf_iterator<char>(six), {}};
+  EXPECT_EQ(all.find(std::string(hex) + " 00000000000000000000000000000000:0000 0A"), std::string::npos);
+}
+
+TEST_F(Web, AForeignHostIsMisdirected) {
+  const std::string port = std::to_string(port_);
+  for (const std::string own : {"127.0.0.1:", "localhost:"})
+    EXPECT_EQ(get("/", "Host: " + own + port + "\r\n"), 200) << own;
+  for (const std::string& foreign : std::vector<std::string>{
+           "evil.example:" + port, "127.0.0.1", "localhost", "127.0.0.1:1", "127.0.0.1:" + port + "0",
+           "192.168.0.7:" + port, "127.0.0.1:" + port + ".evil.example", "localhost.:" + port,
+           "evil:127.0.0.1:" + port})
+    EXPECT_EQ(get("/events", "Host: " + foreign + "\r\n"), 421) << foreign;
+  EXPECT_EQ(status_of(port_, "GET / HTTP/1.0\r\n\r\n"), 421);  // without a host
+}
+
+TEST_F(Web, AnActionNeedsOriginAndToken) {
+  const std::string right = "X-Token: " + token() + "\r\n";
+  EXPECT_EQ(post("/record", host() + right), 403);  // no origin: not from a page
+  EXPECT_EQ(post("/record", host() + origin()), 403);
+  EXPECT_EQ(post("/record", host() + origin() + "X-Token: x\r\n"), 403);
+  EXPECT_EQ(post("/record", host() + "Origin: http://evil.example\r\n" + right), 403);
+  EXPECT_EQ(post("/record", host() + "Origin: null\r\n" + right), 403);
+  EXPECT_EQ(get("/record"), 404);
+  EXPECT_EQ(get("/", host() + "Origin: http://evil.example\r\n"), 403);
+  EXPECT_EQ(records_, 0);
+  EXPECT_EQ(post("/record", host() + origin() + right), 200);
+  EXPECT_EQ(post("/move", host() + origin() + right), 404);
+  EXPECT_EQ(records_, 1);
+}
+
+TEST_F(Web, NoPathLeavesThePage) {
+  write_file(folder_ / "a.safetensors", "pictures");
+  write_file(folder_ / "b.safetensors", "others");
+  EXPECT_EQ(get("/files/a.safetensors"), 200);
+  for (const char* path :
+       {"/files/b.safetensors", "/files/", "/files/../a.safetensors", "/files/..%2fa.safetensors",
+        "/../etc/passwd", "//etc/passwd", "/files//etc/passwd", "/files/%2e%2e/%2e%2e/etc/passwd",
+        "/index.html", "/page.js", "/events/", "/.git/config",
+        "http://127.0.0.1/etc/passwd"})
+    EXPECT_NE(get(path), 200) << path;
+  for (const char* method : {"PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT", "BREW"})
+    EXPECT_EQ(status_of(port_, std::string(method) + " / HTTP/1.1\r\n" + host() + "\r\n"), 405) << method;
+}
+
+TEST_F(Web, ThePageNeedsNothingFromElsewhere) {
+  const std::string_view page = live_page();
+  for (const char* outside : {"http://", "https://", "src=\"", "@import", "url(", "{{"})
+    EXPECT_EQ(page.find(outside), std::string_view::npos) << outside;
+  HttpClient client(port_);
+  client.send("GET / HTTP/1.1\r\n" + host() + "\r\n");
+  const std::string answer = client.receive("</html>");
+  EXPECT_NE(answer.find("Content-Security-Policy: default-src 'none'"), std::string::npos);
+  EXPECT_NE(answer.find(page.substr(0, 100)), std::string::npos);
+}
+
+TEST_F(Web, AReaderGetsTheHelloAndThenTheNewest) {
+  HttpClient client(port_);
+  client.send("GET /events HTTP/1.1\r\n" + host() + "\r\n");
+  const std::string first = client.receive("data: {\"n\":");
+  EXPECT_NE(first.find("event: hello\ndata: {\"token\":\""), std::string::npos);
+  const int begin = count_;
+  const auto start = std::chrono::steady_clock::now();
+  client.receive("{\"n\":" + std::to_string(begin + 15) + ",");
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  EXPECT_GT(seconds, 0.4);  // at most 30 a second
+}
+
+TEST_F(Web, WhoTakesNothingMissesEventsAndHoldsUpNobody) {
+  filling_ = "\"f\":\"" + std::string(8000, 'x') + "\"";
+  HttpClient stalled(port_, 4096), reader(port_);
+  for (HttpClient* client : {&stalled, &reader}) client->send("GET /events HTTP/1.1\r\n" + host() + "\r\n");
+  reader.receive("{\"n\":" + std::to_string(count_ + 60) + ",");
+  const int newest = count_;
+  EXPECT_GE(newest, 60);
+  // What waited for it in buffers, then something recent, none of what lay between.
+  const std::string late = stalled.receive("{\"n\":" + std::to_string(newest + 10) + ",");
+  int events = 0;
+  for (std::size_t at = 0; (at = late.find("data: {\"n\":", at)) != std::string::npos; ++at) ++events;
+  EXPECT_LT(events, newest - 10);
+}
+
+// Requests that begin rightly and are changed at random; the seed is fixed. The server stays, and says yes to
+// nothing that it should not.
+TEST_F(Web, MalformedRequestsAreTurnedAway) {
+  const std::string right = token();
+  const std::vector<std::string> seeds = {
+      "GET / HTTP/1.1\r\n" + host() + "\r\n", "GET /events HTTP/1.1\r\n" + host() + "\r\n",
+      "GET /files/a.safetensors HTTP/1.1\r\n" + host() + "Range: bytes=0-9\r\n\r\n",
+      "POST /record HTTP/1.1\r\n" + host() + origin() + "Content-Length: 3\r\nX-Token: no\r\n\r\nabc",
+      "POST /record HTTP/1.1\r\n" + host() + origin() +
+          "Transfer-Encoding: chunked\r\n\r\n3\r\nabc\r\n0\r\n\r\n"};
+  std::mt19937 rng(17);  // the same numbers everywhere
+  const auto below = [&](std::size_t n) { return static_cast<std::size_t>(rng() % n); };
+  for (int i = 0; i < 3000; ++i) {
+    std::string request = seeds[below(seeds.size())];
+    for (std::size_t changes = 1 + below(8); changes > 0; --changes) {
+      const std::size_t at = below(request.size());
+      switch (below(4)) {
+        case 0:
+          request[at] = static_cast<char>(below(256));
+          break;
+        case 1:
+          request.erase(at, 1 + below(20));
+          break;
+        case 2:
+          request.insert(at, std::string(below(i % 50 == 0 ? 40000 : 40), static_cast<char>(below(256))));
+          break;
+        default:
+          request.insert(at, request.substr(below(request.size()), below(60)));
+      }
+      if (request.empty()) request = "\r\n";
+    }
+    HttpClient client(port_);
+    client.send(request);
+    if (i % 10 == 0) client.receive("\r\n", 20);
+  }
+  EXPECT_TRUE(answers());
+  EXPECT_EQ(records_, 0);
+}
+
+TEST_F(Web, ManyConnectionsThatSayNothingLeaveRoom) {
+  std::vector<std::unique_ptr<HttpClient>> slow;
+  for (int i = 0; i < 60; ++i) {
+    slow.push_back(std::make_unique<HttpClient>(port_));
+    slow.back()->send("GET / HT");
+  }
+  EXPECT_TRUE(answers());
+}
+
+TEST(WebServer, AnAddressThatCannotBeHadIsNamed) {
+  const WebSite nothing{
+      .page = "", .hello = [] { return "{}"; }, .news = [] { return ""; }, .actions = {}, .file = {}};
+  const WebServer first({.port = 0}, nothing);
+  const int port = std::stoi(first.url().substr(17));
+  const auto message = [&](const WebAddress& address) {
+    try {
+      const WebServer server(address, nothing);
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(message({.port = static_cast<std::uint16_t>(port)}),
+            "web: '127.0.0.1' port " + std::to_string(port) +
+                ": Address already in use; choose another port with --web PORT");
+  EXPECT_NE(message({.port = 0, .bind = "example.org"}).find("expected a numeric address"),
+            std::string::npos);
+}
+
+TEST(WebView, AnEventHoldsThePictureAndWhatIsKnownOfIt) {
+  LiveState state;
+  state.number = 7, state.time_s = 1.5;
+  state.taxels.assign(16, 0.5F), state.picture.assign(256, 1.0F);
+  auto event = parse_json_limited(web_event(state, {}));
+  EXPECT_EQ(event["n"], 7);
+  EXPECT_EQ(event["picture"], levels_base64(state.picture));
+  for (const char* unknown : {"wide", "distance", "unlike", "x"})
+    EXPECT_FALSE(event.contains(unknown)) << unknown;
+  state.half_widths.assign(256, 0.25F), state.distance = 2, state.unlike_training = true, state.x_mm = 3,
+                                        state.y_mm = 4;
+  event = parse_json_limited(web_event(state, {.recording = "r", .said = "", .files = {"a", "b"}}));
+  EXPECT_EQ(event["wide"], levels_base64(state.half_widths));
+  EXPECT_EQ(event["unlike"], true);
+  EXPECT_EQ(event["y"], 4);
+  EXPECT_EQ(event["files"].size(), 2U);
+}
+
+}  // namespace
+}  // namespace supertac
