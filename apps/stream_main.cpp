@@ -27,6 +27,7 @@ std::string source_of(const Arguments& a) {
     throw UsageError("expected one of --board PORT, --replay JOURNAL and --recording FILE, found " +
                      std::to_string(sources));
   }
+  if (a.text("out") == "-" && a.text("json") == "-") throw UsageError("--out and --json: only one to stdout");
   if (a.given("capture") && !a.given("board")) throw UsageError("--capture: only with --board");
   return source;
 }
@@ -68,7 +69,10 @@ void declare(Arguments& a) {
       .option("recording", "FILE", "a recording instead of a board")
       .option("seconds", "N", "end after N seconds of signal; default: when the source ends, or at Ctrl-C")
       .option("out", "FILE",
-              "keep time, voltages and picture of every frame (safetensors, 1.1 MB/s at 16x16)")
+              "keep time, voltages and picture of every frame (safetensors, 2.2 MB/s at 16x16); '-': a line "
+              "of JSON for each on stdout")
+      .option("udp", "HOST:PORT",
+              "send a datagram of JSON for each picture, e.g. to PlotJuggler at 127.0.0.1:9870")
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
       .option_alone("web", "PORT", "show the live page in a browser on this computer (default port 8080)",
@@ -86,8 +90,10 @@ int run(Arguments& a) {
   const double begin = monotonic_seconds();
   if (!a.given("model")) throw UsageError("--model: expected a file of supertac-train, found none");
   const double speedup = a.number("speedup", 0.1, 100);
-  StreamSettings settings{
-      .out = a.text("out"), .force = a.force(), .view = !a.quiet() && drawable_terminal()};
+  StreamSettings settings{.out = a.text("out"),
+                          .udp = a.text("udp"),
+                          .force = a.force(),
+                          .view = !a.quiet() && drawable_terminal()};
   if (a.given("seconds")) settings.seconds = a.number("seconds", 0.001, 1e9);
   const std::string origin = source_of(a);
   settings.web = web_address(a);
@@ -106,7 +112,10 @@ int run(Arguments& a) {
     error = std::current_exception();  // what was seen before is kept
   }
   stream.finish();
-  a.print(stream.summary());
+  if (settings.out == "-")
+    a.note(stream.summary());
+  else
+    a.print(stream.summary());
   nlohmann::ordered_json result = {{"source", origin}, {"model", a.text("model")}, {"ready_ms", ready_ms}};
   result.update(stream.result());
   a.write_json(result);

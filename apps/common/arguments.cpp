@@ -41,6 +41,10 @@ bool names_path(const std::string& value) {
                      [&](std::string_view kind) { return value.starts_with(kind); });
 }
 
+bool is_stdout(const std::string& name, const std::string& text) {
+  return (name == "json" || name == "out") && text == "-";
+}
+
 // Names and messages may hold what a terminal obeys.
 std::string without_controls(std::string_view line) {
   std::string text(line);
@@ -222,7 +226,7 @@ std::vector<NamedPath> Arguments::paths() const {
   std::vector<NamedPath> paths;
   for (const auto& [name, text] : values_) {
     const Option& option = options_.at(name);
-    if (option.is_flag || !names_path(option.value) || (name == "json" && text == "-")) continue;
+    if (option.is_flag || !names_path(option.value) || is_stdout(name, text)) continue;
     const bool is_output = std::find(kOutputs.begin(), kOutputs.end(), name) != kOutputs.end();
     const bool is_folder = option.value.ends_with("DIR");
     if (is_output || is_folder) {

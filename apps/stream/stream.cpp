@@ -20,7 +20,11 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   state_.array = source.array();
   state_.scale = maker_.image().height / state_.array.rows;
   const PictureFormat format = maker_.format();
-  if (!settings.out.empty()) log_ = std::make_unique<PictureLog>(settings.out, settings.force, format);
+  if (settings.out == "-")
+    pipe_ = std::make_unique<PipeOutput>(STDOUT_FILENO, !source.live());
+  else if (!settings.out.empty())
+    log_ = std::make_unique<PictureLog>(settings.out, settings.force, format);
+  if (!settings.udp.empty()) udp_ = std::make_unique<UdpOutput>(settings.udp);
   if (!settings.web) return;
   recorder_ = std::make_unique<Recorder>(format, settings.metadata);
   web_ = std::make_unique<WebView>(
@@ -44,6 +48,9 @@ void Stream::finish() {
   view_.reset();
   web_.reset();
   recorder_.reset();
+  lines_lost_ = (udp_ ? udp_->lost() : 0) + (pipe_ ? pipe_->lost() : 0);
+  udp_.reset();
+  pipe_.reset();
   if (log_) log_->write(settings_.metadata);
   source_.finish();
 }
@@ -54,6 +61,7 @@ std::string Stream::summary() const {
          std::to_string(pictures()) + " pictures, latency median " + format(milliseconds(0.5), 2) +
          " ms, p99 " + format(milliseconds(0.99), 2) + " ms; lost " + std::to_string(counters.missing) +
          ", dropped " + std::to_string(dropped()) +
+         (lines_lost_ > 0 ? ", " + std::to_string(lines_lost_) + " lines not taken by their reader" : "") +
          (unlike_ > 0 ? ", " + std::to_string(unlike_) + " pictures of signals unlike training" : "");
 }
 
@@ -69,6 +77,7 @@ nlohmann::ordered_json Stream::result() const {
           {"suspect", counters.suspect},
           {"jumps", counters.jumps},
           {"gaps", window.gaps},
+          {"lines_lost", lines_lost_},
           {"board_period_us", 1e6 * counters.clock.period_s},
           {"latency_ms",
            {{"median", milliseconds(0.5)},
@@ -81,7 +90,7 @@ nlohmann::ordered_json Stream::result() const {
 bool Stream::take(SensorFrame frame) {
   if (frames_ == 0) first_s_ = frame.time_s, begin_s_ = monotonic_seconds();
   if (frame.time_s - first_s_ >= settings_.seconds) return false;
-  if ((view_ || web_) && !source_.live()) frame.arrived_s = keep_pace(frame.time_s);
+  if ((view_ || web_ || udp_) && !source_.live()) frame.arrived_s = keep_pace(frame.time_s);
   ++frames_;
   last_s_ = frame.time_s;
   if (web_ && web_->take_rezero()) maker_.rezero();
@@ -102,6 +111,11 @@ void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
                   picture,        maker_.half_widths(),    maker_.distance()};
   if (log_) log_->add(seen);
   if (recorder_) recorder_->add(seen);
+  if (udp_ || pipe_) {
+    std::string line = picture_line(seen, maker_.unlike_training());
+    if (udp_) udp_->send(line);
+    if (pipe_) pipe_->send(std::move(line));
+  }
   state_.number = seen.number, state_.time_s = seen.time_s;
   state_.unlike_training = maker_.unlike_training();
   unlike_ += state_.unlike_training ? 1 : 0;

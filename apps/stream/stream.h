@@ -9,6 +9,7 @@
 #include <string>
 
 #include "apps/stream/latency_histogram.h"
+#include "apps/stream/line_output.h"
 #include "apps/stream/picture_log.h"
 #include "apps/stream/picture_maker.h"
 #include "apps/stream/terminal_view.h"
@@ -18,12 +19,13 @@ namespace supertac {
 
 struct StreamSettings {
   double seconds = std::numeric_limits<double>::infinity();  ///< of signal, after which run() ends
-  std::string out = {};                                      ///< file that keeps the pictures; empty: none
-  bool force = false;                                        ///< an existing file is replaced
-  bool view = false;                                         ///< draw on the terminal
-  std::optional<WebAddress> web = {};                        ///< serve the live page
-  std::string badge = {}, source = {};                       ///< for the page: what is streamed
-  std::map<std::string, std::string> metadata = {};          ///< of files with pictures
+  std::string out = {};  ///< file that keeps the pictures; "-": a line for each to stdout; empty: none
+  std::string udp = {};  ///< HOST:PORT that gets a line for each; empty: none
+  bool force = false;    ///< an existing file is replaced
+  bool view = false;     ///< draw on the terminal
+  std::optional<WebAddress> web = {};                ///< serve the live page
+  std::string badge = {}, source = {};               ///< for the page: what is streamed
+  std::map<std::string, std::string> metadata = {};  ///< of files with pictures
 };
 
 /// From a source's frames to pictures, on the terminal, on a page and in a file; counts what was lost and how
@@ -61,11 +63,13 @@ class Stream {
   PictureMaker maker_;
   std::unique_ptr<PictureLog> log_;
   std::unique_ptr<TerminalView> view_;
+  std::unique_ptr<UdpOutput> udp_;
+  std::unique_ptr<PipeOutput> pipe_;
   std::unique_ptr<Recorder> recorder_;  // at the page's wish
   std::unique_ptr<WebView> web_;
   LatencyHistogram latency_;
   LiveState state_;
-  std::uint64_t frames_ = 0, too_late_ = 0, unlike_ = 0, figures_frames_ = 0;
+  std::uint64_t frames_ = 0, too_late_ = 0, unlike_ = 0, lines_lost_ = 0, figures_frames_ = 0;
   double first_s_ = 0, last_s_ = 0;  // the sensor's time
   double begin_s_ = 0, figures_s_ = 0, shown_s_ = 0;
 };

@@ -4,6 +4,8 @@
 #include <fcntl.h>
 #include <microhttpd.h>
 #include <netinet/in.h>
+#include <pthread.h>
+#include <sys/resource.h>
 #include <sys/random.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -26,6 +28,7 @@ constexpr unsigned kStalledS = 20;
 constexpr std::size_t kRequestBytes = 16 << 10;  // memory of a connection; more than that gets 431
 constexpr int kSendBuffer = 64 << 10;            // what a stalled page may leave unread, and show late
 constexpr double kStillHereS = 1;
+constexpr int kNice = 5;
 constexpr std::string_view kPolicy =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; "
     "img-src 'self' data: blob:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
@@ -250,7 +253,11 @@ void WebServer::publish() {
   for (Reader* reader : std::exchange(waiting_, {})) MHD_resume_connection(reader->connection);
 }
 
+// A page may come late, a frame may not: this thread yields to the others.
 void WebServer::run() {
+  const sched_param none{};
+  pthread_setschedparam(pthread_self(), SCHED_OTHER, &none);
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
   double due = seconds_now();
   while (!stop_) {
     const double now = seconds_now();

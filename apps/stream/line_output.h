@@ -1,0 +1,69 @@
+// Pictures for other programs, one line of JSON each.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "apps/stream/seen.h"
+
+namespace supertac {
+
+/// {"timestamp":s,"number":n,"volts":[...],"picture":[...]} with the numbers of Seen, four decimals of volts
+/// and pictures, and a line feed; of a model that says how sure it is also "half_width", the mean over the
+/// pixels, "distance", and "unlike_training", 0 or 1. PlotJuggler (JSON over UDP, field "timestamp" as time)
+/// makes a curve of every number.
+std::string picture_line(const Seen& seen, bool unlike_training);
+
+/// Sends each line as a datagram; one that does not fit into the socket's buffer is lost.
+class UdpOutput {
+ public:
+  /// "HOST:PORT". Throws std::runtime_error when it is not, or the host is unknown.
+  explicit UdpOutput(const std::string& address);
+  ~UdpOutput();
+  UdpOutput(const UdpOutput&) = delete;
+  UdpOutput& operator=(const UdpOutput&) = delete;
+  /// Never waits.
+  void send(const std::string& line);
+  std::uint64_t lost() const { return lost_; }
+
+ private:
+  int socket_ = -1;
+  std::uint64_t lost_ = 0;
+};
+
+/// Writes lines to a pipe from a thread of its own. At most kWaiting lines wait for a reader that is slow;
+/// more are lost.
+class PipeOutput {
+ public:
+  static constexpr std::size_t kWaiting = 2048;
+
+  /// Of a descriptor that stays open. `patient`: nothing is lost, send() waits for the reader instead, until
+  /// a signal comes: for what was recorded before.
+  PipeOutput(int file, bool patient);
+  /// Gives the reader a second to take what waits.
+  ~PipeOutput();
+  PipeOutput(const PipeOutput&) = delete;
+  PipeOutput& operator=(const PipeOutput&) = delete;
+  /// Throws std::runtime_error once the reader is gone.
+  void send(std::string line);
+  std::uint64_t lost() const { return lost_; }
+
+ private:
+  void run();
+  bool write_all(const std::string& text);
+
+  int file_;
+  bool patient_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<std::string> waiting_;
+  bool stop_ = false, gone_ = false;
+  double stopped_s_ = 0;
+  std::uint64_t lost_ = 0;
+  std::thread thread_;
+};
+
+}  // namespace supertac
