@@ -15,9 +15,8 @@
 namespace supertac {
 namespace {
 
-constexpr int kSide = 32;              // pixels of either picture on the terminal
-constexpr int kLines = kSide / 2 + 1;  // two pixels a line, and the figures
-constexpr int kColumns = 2 * kSide + 3;
+constexpr int kSide = 32;  // pixels of either picture on the terminal
+constexpr std::string_view kGap = "   ";
 constexpr auto kDrawEvery = std::chrono::milliseconds(66);
 
 // Of the 256 colours every terminal has: black, violet, red, orange, yellow, white, ever brighter.
@@ -69,38 +68,80 @@ void append_row(std::string& text, const Drawing& picture, int line, bool colour
   if (colour) text += "\x1b[0m";
 }
 
+std::string padded(std::string text, int columns) {
+  text.resize(static_cast<std::size_t>(columns), ' ');
+  return text;
+}
+
+// 0 [a step of each colour] 1
+std::string scale_line(bool colour, int columns) {
+  std::string text = "0 ";
+  if (colour) {
+    for (const int code : kHeat) text += "\x1b[48;5;" + std::to_string(code) + "m ";
+    text += "\x1b[0m";
+  } else {
+    text += kInk;
+  }
+  text += " 1";
+  const bool room = columns == 0 || columns > kSide + 24;
+  return text + (room ? "  pressed hard; the plate's highest\n" : "\n");
+}
+
+std::string heading(const char* name, const TaxelArray& array, int scale) {
+  const ImageGrid grid = array.picture(scale);
+  return std::string(name) + ", " + format(grid.width_mm()) + " x " + format(grid.height_mm()) + " mm";
+}
+
 bool colour_wanted() {
   const char* no_color = std::getenv("NO_COLOR");
   return no_color == nullptr || *no_color == '\0';
 }
 
-// A terminal that does not know its size says 0.
-bool window_is_large_enough() {
+TerminalSize terminal_size() {
   winsize size{};
-  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0) return true;
-  return (size.ws_col == 0 || size.ws_col >= kColumns) && (size.ws_row == 0 || size.ws_row > kLines);
+  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 ? TerminalSize{size.ws_col, size.ws_row}
+                                                      : TerminalSize{};
 }
 
 }  // namespace
 
-std::string status_line(const LiveState& state) {
-  return format(state.frames_per_s, 0) + " frames/s  latency " + format(state.median_ms, 2) + " ms (p99 " +
-         format(state.p99_ms, 2) + ")  lost " + std::to_string(state.lost) + "  dropped " +
-         std::to_string(state.dropped) + (state.doubt() > 0 ? "  +-" + format(state.doubt(), 2) : "") +
-         (state.unlike_training ? "  UNLIKE TRAINING" : "") + "\n";
+std::string status_line(const LiveState& state, int columns) {
+  std::string line =
+      format(state.frames_per_s, 0) + " frames/s  latency " + format(state.median_ms, 2) + " ms (p99 " +
+      format(state.p99_ms, 2) + ")  lost " + std::to_string(state.lost) + "  dropped " +
+      std::to_string(state.dropped) + (state.doubt() > 0 ? "  +-" + format(state.doubt(), 2) : "") +
+      (std::isfinite(state.x_mm) ? "  at x " + format(static_cast<double>(state.x_mm), 1) + " y " +
+                                       format(static_cast<double>(state.y_mm), 1) + " mm"
+                                 : "");
+  if (state.unlike_training) line = "UNLIKE TRAINING  " + line;  // never cut
+  if (columns > 0) line = line.substr(0, static_cast<std::size_t>(columns));
+  return line + "\n";
 }
 
-std::string render(const LiveState& state, bool colour) {
-  std::string text;
+std::string render(const LiveState& state, bool colour, const TerminalSize& size) {
   const Drawing felt = drawing_of(state.taxels, state.array, 1);
   const Drawing seen = drawing_of(state.picture, state.array, state.scale);
-  for (int line = 0; line < felt.lines / 2; ++line) {
-    append_row(text, felt, line, colour);
-    text += "   ";
+  const auto fits = [&](int columns, int lines) {
+    return (size.columns == 0 || size.columns >= columns) && (size.lines == 0 || size.lines > lines);
+  };
+  const int lines = seen.lines / 2 + 3, gap = static_cast<int>(kGap.size());
+  const bool both = fits(felt.columns + gap + seen.columns, lines), one = fits(seen.columns, lines);
+  if (!one) {
+    const std::string note = "too small a window for pictures\n";
+    return (fits(static_cast<int>(note.size()), 2) ? note : "") + status_line(state, size.columns);
+  }
+  std::string text;
+  if (both) text += padded(heading("felt", state.array, 1), felt.columns) + std::string(kGap);
+  text += heading("drawn", state.array, state.scale) + "\n";
+  for (int line = 0; line < seen.lines / 2; ++line) {
+    if (both) {
+      append_row(text, felt, line, colour);
+      text += kGap;
+    }
     append_row(text, seen, line, colour);
     text += '\n';
   }
-  return text + status_line(state);
+  return text + scale_line(colour, size.columns) + status_line(state, size.columns);
 }
 
 // Opened anew: O_NONBLOCK on stderr itself would change it for the shell and everybody else who shares it.
@@ -138,7 +179,7 @@ void TerminalView::run() {
 // descriptor does not block.
 void TerminalView::draw(const LiveState& state) {
   if (!send_left()) return;
-  std::string text = window_is_large_enough() ? render(state, colour_) : status_line(state);
+  std::string text = render(state, colour_, terminal_size());
   if (drawn_lines_ > 0) text = "\x1b[" + std::to_string(drawn_lines_) + "A\x1b[J" + text;
   drawn_lines_ = static_cast<int>(std::count(text.begin(), text.end(), '\n'));
   left_ = std::move(text);

@@ -12,12 +12,18 @@
 
 namespace supertac {
 
-/// Two pictures of 32 columns and 16 lines, or less for the shorter side of the array, y upwards, and a line
-/// of figures; every line ends with a line feed. `colour`: half blocks in 256 colours, two pixels a
-/// character; without, characters from blank to @.
-std::string render(const LiveState& state, bool colour);
-/// The line of figures alone.
-std::string status_line(const LiveState& state);
+/// Size of a terminal in characters; 0 where it does not say.
+struct TerminalSize {
+  int columns = 0, lines = 0;
+};
+
+/// A line of headings with mm; two pictures of 32 columns and 16 lines, or less for the shorter side of the
+/// array, y upwards; a line with the scale, and status_line(). Every line ends with a line feed. Where both
+/// do not fit, the drawn picture alone; where that does not, a line that says so and the figures. `colour`:
+/// half blocks in 256 colours, two pixels a character; without, characters from blank to @.
+std::string render(const LiveState& state, bool colour, const TerminalSize& size = {});
+/// The line of figures alone, and where the finger is, cut to so many columns (0: not cut).
+std::string status_line(const LiveState& state, int columns = 0);
 
 /// Draws the newest state on stderr 15 times a second, on a thread of its own: a slow terminal holds up
 /// nobody.
