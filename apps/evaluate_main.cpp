@@ -24,6 +24,8 @@ void declare(Arguments& a) {
   a.option(
       "pictures", "DIR",
       "write PNG pictures: input | output | truth | how far off it may be, and a film of each test pass");
+  a.option("report", "FILE",
+           "write one page with scores, the best and worst windows and a film of each test pass (HTML)");
   a.option("write-pairs", "DIR",
            "write the split's windows as pairs for networks that know no time (supertac-train --pairs): "
            "train.safetensors and test.safetensors with the last frame as the model sees it, and the truth");

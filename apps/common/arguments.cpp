@@ -32,8 +32,8 @@ void add(cxxopts::Options& parser, const std::string& group, const std::string& 
 }
 
 // What programs write, and the values that may name a file to be read.
-constexpr std::array<std::string_view, 7> kOutputs = {"capture", "gcode",    "json",       "out",
-                                                      "outputs", "pictures", "write-pairs"};
+constexpr std::array<std::string_view, 8> kOutputs = {"capture", "gcode",    "json",   "out",
+                                                      "outputs", "pictures", "report", "write-pairs"};
 constexpr std::array<std::string_view, 5> kPathValues = {"FILE", "DIR", "JOURNAL", "TEXT_DIR", "NAME"};
 
 bool names_path(const std::string& value) {

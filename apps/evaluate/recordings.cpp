@@ -5,11 +5,15 @@
 
 #include "apps/common/measure.h"
 #include "apps/common/program.h"
+#include "apps/common/version.h"
 #include "apps/evaluate/exports.h"
 #include "apps/evaluate/felt.h"
+#include "apps/evaluate/page.h"
 #include "apps/evaluate/scoring.h"
 #include "apps/evaluate/trust.h"
 #include "data/scores/metrics.h"
+#include "io/file.h"
+#include "io/hash.h"
 #include "io/numbers.h"
 #include "io/text.h"
 
@@ -44,7 +48,8 @@ struct Scores {
 };
 
 Scores score_all(const Arguments& a, std::span<const ModelFile> files, const WindowSet& windows,
-                 const Scored& scored, const Baselines& baselines, OutputsFile* outputs) {
+                 const Scored& scored, const Baselines& baselines, OutputsFile* outputs,
+                 EvaluationPage* page) {
   const Committee network(files);
   Scores scores(windows, files.front(), 1 + baselines.size());
   draw_all(a, network, windows, scored.split.test, baselines, [&](const Drawn& d) {
@@ -53,6 +58,7 @@ Scores score_all(const Arguments& a, std::span<const ModelFile> files, const Win
       scores.of_method[m].add(d.pictures[m], d.target, zone);
     scores.felt.add(d.example, d.pictures[0], d.target);
     scores.trust.add(d.example, d.pictures[0], d.target, d.spread, d.input);
+    if (page != nullptr) page->add(d);
     if (outputs != nullptr) outputs->add(d.input, d.pictures[0], d.target, d.spread);
   });
   return scores;
@@ -108,6 +114,19 @@ nlohmann::ordered_json report(const Arguments& a, const Committee& network, cons
   return result;
 }
 
+/// What the page was made with and of.
+std::vector<std::pair<std::string, std::string>> made_by(const Arguments& a, const WindowSet& windows) {
+  std::vector<std::pair<std::string, std::string>> lines = {{"command", a.command_line()},
+                                                            {"version", version() + ", commit " + commit()}};
+  for (const std::string& model : a.list("model")) {
+    Hash hash;
+    hash.add(read_text_file(model, std::uint64_t{1} << 32));
+    lines.emplace_back("model", model + ", hash " + hash.hex());
+  }
+  lines.emplace_back("data", a.text("data") + ", hash " + windows.fingerprint());
+  return lines;
+}
+
 }  // namespace
 
 int evaluate_on_recordings(const Arguments& a) {
@@ -127,8 +146,10 @@ int evaluate_on_recordings(const Arguments& a) {
   }
   OutputsFile outputs(windows.array(), windows.frames(), windows.image());
   const Baselines baselines = fit_baselines(windows, scored.split.train);
+  EvaluationPage page(windows);
   const Scores scores =
-      score_all(a, files, windows, scored, baselines, a.given("outputs") ? &outputs : nullptr);
+      score_all(a, files, windows, scored, baselines, a.given("outputs") ? &outputs : nullptr,
+                a.given("report") ? &page : nullptr);
   const nlohmann::ordered_json result = report(a, network, windows, scored, baselines, scores);
   if (pictures) {
     write_pictures(network, files.front().interval_factor(), windows, scored.split.test, *pictures);
@@ -142,6 +163,8 @@ int evaluate_on_recordings(const Arguments& a) {
             " pairs to train on, " + std::to_string(scored.split.test.size()) + " to test");
   }
   if (a.given("outputs")) outputs.write(a.text("outputs"));
+  if (a.given("report"))
+    write_file(a.text("report"), page.html(network, scored.split.test, result, made_by(a, windows)));
   a.write_json(result);
   return kExitOk;
 }

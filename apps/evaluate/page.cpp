@@ -1,0 +1,320 @@
+#include "apps/evaluate/page.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "apps/web/encode.h"
+#include "apps/web/pages.h"
+#include "data/samples/split.h"
+#include "io/images.h"
+#include "io/numbers.h"
+#include "models/evaluation.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kApartMm = 3;
+constexpr float kTexture = 0.1F;
+constexpr int kPanel = 64;  // pixels of a PNG's longer side
+
+std::string escaped(std::string_view text) {
+  std::string out;
+  for (const char c : text)
+    out += c == '<' ? "&lt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
+  return out;
+}
+
+std::string cell_of(const nlohmann::ordered_json& value, int decimals, double factor = 1) {
+  return "<td>" + (value.is_number() ? format(factor * value.get<double>(), decimals) : "-") + "</td>";
+}
+
+std::string section(const std::string& title, const std::string& note, const std::string& content) {
+  return "<section class=\"card\"><h2>" + title + "</h2>" +
+         (note.empty() ? "" : "<p class=\"quiet\">" + note + "</p>") + content + "</section>\n";
+}
+
+std::string table(const std::vector<std::string>& heads, const std::string& rows) {
+  std::string text = "<div class=\"scroll\"><table><thead><tr>";
+  for (const std::string& head : heads) text += "<th scope=\"col\">" + head + "</th>";
+  return text + "</tr></thead><tbody>" + rows + "</tbody></table></div>";
+}
+
+std::string method_row(const std::string& name, const nlohmann::ordered_json& scores,
+                       const nlohmann::ordered_json& latency) {
+  const auto& contact = scores["contact"];
+  const auto& all = scores["all"];
+  return std::string(name == "network" ? "<tr class=\"own\">" : "<tr>") + "<td>" + escaped(name) + "</td>" +
+         cell_of(contact["ssim"], 3) + cell_of(contact["psnr_mean_db"], 2) +
+         cell_of(contact["position_error_mm"], 2) + cell_of(all["ssim"], 3) +
+         cell_of(all["psnr_mean_db"], 2) + cell_of(latency["median_us"], 1) + "</tr>";
+}
+
+std::string by_method(const nlohmann::ordered_json& result) {
+  std::string rows = method_row("network", result, result["latency"]["network"]);
+  for (const auto& [name, scores] : result["baselines"].items())
+    rows += method_row(name, scores, result["latency"][name]);
+  return section(
+      "Scores beside the baselines", "in contact: the truth has a pixel that is not 0",
+      table({"method", "contact SSIM", "PSNR dB", "position mm", "all SSIM", "PSNR dB", "one picture, us"},
+            rows));
+}
+
+std::string by_zone(const nlohmann::ordered_json& result) {
+  std::string rows;
+  for (const char* zone : {"contact", "flat", "air", "all"}) {
+    const auto& m = result[zone];
+    rows += std::string("<tr><td>") + zone + "</td>" + cell_of(m["windows"], 0) + cell_of(m["ssim"], 3) +
+            cell_of(m["psnr_mean_db"], 2) + cell_of(m.value("ghost_rate", nlohmann::ordered_json()), 2, 100) +
+            cell_of(m.value("miss_rate", nlohmann::ordered_json()), 2, 100) + "</tr>";
+  }
+  return section("Contact, flat plate, air", "ghosts show what is not there, misses show nothing of what is",
+                 table({"zone", "windows", "SSIM", "PSNR dB", "ghosts %", "misses %"}, rows));
+}
+
+// Bars on an axis from 0 to 1, which is as far as SSIM goes.
+std::string by_way(const nlohmann::ordered_json& felt) {
+  constexpr double kLeft = 40, kTop = 10, kHeight = 150, kStep = 90, kBar = 64;
+  const auto text = [](double x, double y, const char* anchor, const std::string& words) {
+    return "<text x=\"" + format(x, 1) + "\" y=\"" + format(y, 1) + "\" text-anchor=\"" + anchor + "\">" +
+           words + "</text>";
+  };
+  std::string svg;
+  for (const double tick : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+    const double y = kTop + kHeight * (1 - tick);
+    svg += "<path d=\"M" + format(kLeft, 1) + " " + format(y, 1) + "h560\" stroke=\"var(--line)\"/>" +
+           text(kLeft - 6, y + 4, "end", format(tick, 2));
+  }
+  double x = kLeft + 12;
+  for (std::size_t i = 0; i < felt.size(); ++i, x += kStep) {
+    const double ssim = std::clamp(felt[i]["ssim"].get<double>(), 0.0, 1.0), height = kHeight * ssim;
+    const std::string from = format(felt[i]["from_mm"].get<double>(), 0);
+    svg += "<rect x=\"" + format(x, 1) + "\" y=\"" + format(kTop + kHeight - height, 1) + "\" width=\"" +
+           format(kBar, 1) + "\" height=\"" + format(height, 1) + "\" fill=\"var(--accent)\"/>" +
+           text(x + kBar / 2, kTop + kHeight - height - 3, "middle", format(ssim, 3)) +
+           text(x + kBar / 2, kTop + kHeight + 15, "middle",
+                i + 1 < felt.size() ? from + " to " + format(felt[i + 1]["from_mm"].get<double>(), 0)
+                                    : from + " on") +
+           text(x + kBar / 2, kTop + kHeight + 29, "middle",
+                std::to_string(felt[i]["windows"].get<long>()) + " windows");
+  }
+  return section(
+      "By way since the first contact",
+      "SSIM against millimetres slid over the texture; what it is cannot be known before two of its elements",
+      "<svg viewBox=\"0 0 610 196\" role=\"img\" aria-label=\"SSIM by millimetres since the first "
+      "contact\">" +
+          svg + "</svg>");
+}
+
+std::string png_of(std::span<const float> values, int rows, int columns) {
+  const int longer = std::max(rows, columns);
+  supertac::Picture picture(kPanel * columns / longer, kPanel * rows / longer);
+  draw_panel(picture, {0, 0, picture.width, picture.height}, values, rows, columns);
+  const std::vector<std::byte> file = encode_png(picture);
+  return "data:image/png;base64," +
+         base64(std::span(reinterpret_cast<const std::uint8_t*>(file.data()), file.size()));
+}
+
+const char* word_of(Zone zone) {
+  switch (zone) {
+    case Zone::contact:
+      return "in contact";
+    case Zone::near:
+      return "near texture";
+    case Zone::flat:
+      return "flat plate";
+    case Zone::air:
+      return "in the air";
+  }
+  return "";
+}
+
+void replace(std::string& page, std::string_view mark, const std::string& text) {
+  page.replace(page.find(mark), mark.size(), text);
+}
+
+}  // namespace
+
+void EvaluationPage::add(const Drawn& d) {
+  const std::string& plate = windows_.passes()[windows_.pass_of(d.example)].plate;
+  plates_.try_emplace(plate, windows_.image())
+      .first->second.add(d.pictures[0], d.target, windows_.zone(d.example));
+  const ImageGrid grid = windows_.image();
+  if (!windows_.contact(d.example)) return;
+  const auto texture = std::count_if(d.target.begin(), d.target.end(), [](float v) { return v > kTexture; });
+  contact_.push_back({ssim(d.pictures[0], d.target, static_cast<std::size_t>(grid.height),
+                           static_cast<std::size_t>(grid.width)),
+                      d.example, 4 * static_cast<std::size_t>(texture) >= d.target.size()});
+}
+
+std::vector<EvaluationPage::Scored> EvaluationPage::extremes(bool best) const {
+  std::vector<Scored> sorted = contact_, chosen;
+  std::sort(sorted.begin(), sorted.end(), [&](const Scored& a, const Scored& b) {
+    return std::pair(best ? -a.ssim : a.ssim, a.window) < std::pair(best ? -b.ssim : b.ssim, b.window);
+  });
+  const auto near = [&](const Scored& a, const Scored& b) {
+    return windows_.pass_of(a.window) == windows_.pass_of(b.window) &&
+           std::abs(windows_.position(a.window).y_mm - windows_.position(b.window).y_mm) < kApartMm;
+  };
+  for (const Scored& one : sorted) {
+    if (chosen.size() == kShown) break;
+    if (best && !one.full) continue;  // the edge of a texture is drawn well too easily
+    if (std::none_of(chosen.begin(), chosen.end(), [&](const Scored& c) { return near(c, one); }))
+      chosen.push_back(one);
+  }
+  return chosen;
+}
+
+std::map<std::uint32_t, EvaluationPage::Picture> EvaluationPage::drawn_again(
+    const Committee& network, std::vector<std::uint32_t> chosen) const {
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  std::map<std::uint32_t, Picture> pictures;
+  for_each_output(network, windows_, chosen, [&](const EvaluatedBatch& b) {
+    for (std::size_t n = 0; n < b.size(); ++n) {
+      const std::uint32_t window = chosen[b.first + n];
+      const auto output = b.output(n), target = b.target(n);
+      pictures[window] = {mean_of_channels(windows_.array(), windows_.last_frame(window)),
+                          {output.begin(), output.end()},
+                          {target.begin(), target.end()}};
+    }
+    return true;
+  });
+  return pictures;
+}
+
+std::vector<std::uint32_t> EvaluationPage::film_frames(std::span<const std::uint32_t> test) const {
+  std::map<std::size_t, std::vector<std::uint32_t>> of_pass;
+  for (const std::uint32_t window : test) of_pass[windows_.pass_of(window)].push_back(window);
+  std::vector<std::uint32_t> frames;
+  const std::size_t most =
+      std::clamp<std::size_t>(kFilmFrames / std::max<std::size_t>(1, of_pass.size()), 1, kFramesOfPass);
+  for (const auto& [pass, all] : of_pass) {
+    const std::vector<std::uint32_t> some = spread(all, most);
+    frames.insert(frames.end(), some.begin(), some.end());
+  }
+  return frames;
+}
+
+std::string EvaluationPage::name_of(std::uint32_t window) const {
+  const WindowSet::Pass& pass = windows_.passes()[windows_.pass_of(window)];
+  return pass.plate + ", trial " + std::to_string(pass.trial) + ", pass " + std::to_string(pass.pass) +
+         (pass.speed_mm_s > 0 ? ", " + format(pass.speed_mm_s) + " mm/s" : "");
+}
+
+std::string EvaluationPage::by_plate() const {
+  std::string rows;
+  for (const auto& [plate, metrics] : plates_) {
+    const nlohmann::ordered_json m = metrics.to_json();
+    rows += "<tr><td>" + escaped(plate) + "</td>" + cell_of(m["contact"]["windows"], 0) +
+            cell_of(m["contact"]["ssim"], 3) + cell_of(m["contact"]["psnr_mean_db"], 2) +
+            cell_of(m["contact"]["position_error_mm"], 2) + cell_of(m["all"]["ssim"], 3) + "</tr>";
+  }
+  return section("By plate", "",
+                 table({"plate", "contact", "SSIM", "PSNR dB", "position mm", "all SSIM"}, rows));
+}
+
+std::string EvaluationPage::shown(const std::string& title, const std::string& note,
+                                  const std::vector<Scored>& chosen,
+                                  const std::map<std::uint32_t, Picture>& pictures) const {
+  const TaxelArray array = windows_.array();
+  const ImageGrid grid = windows_.image();
+  std::string cards = "<div class=\"windows\">";
+  for (const auto& [score, window, full] : chosen) {
+    const Picture& p = pictures.at(window);
+    std::vector<float> difference;
+    for (std::size_t i = 0; i < p.drawn.size(); ++i) difference.push_back(std::abs(p.drawn[i] - p.truth[i]));
+    const WindowSet::Position at = windows_.position(window);
+    const std::string name =
+        name_of(window) + ", x " + format(at.x_mm, 1) + ", y " + format(at.y_mm, 1) + " mm";
+    cards += "<figure class=\"window\"><p>" + escaped(name) + "<br>SSIM " + format(score, 3) + ", PSNR " +
+             format(psnr_db(mean_squared_error(p.drawn, p.truth)), 1) + " dB</p><div>";
+    const auto add = [&](const char* what, std::span<const float> values, int rows, int columns) {
+      cards += "<span><img alt=\"" + std::string(what) + ", " + escaped(name) + "\" src=\"" +
+               png_of(values, rows, columns) + "\">" + what + "</span>";
+    };
+    add("felt", p.felt, array.rows, array.columns);
+    add("drawn", p.drawn, grid.height, grid.width);
+    add("true", p.truth, grid.height, grid.width);
+    add("difference", difference, grid.height, grid.width);
+    cards += "</div></figure>";
+  }
+  return section(title, note, cards + "</div>");
+}
+
+std::string EvaluationPage::films(std::span<const std::uint32_t> frames,
+                                  const std::map<std::uint32_t, Picture>& pictures) const {
+  const ImageGrid grid = windows_.image();
+  nlohmann::json passes = nlohmann::json::array();
+  std::size_t pass = SIZE_MAX;
+  for (const std::uint32_t window : frames) {
+    if (windows_.pass_of(window) != pass) {
+      pass = windows_.pass_of(window);
+      passes.push_back({{"name", name_of(window)}, {"frames", nlohmann::json::array()}});
+    }
+    const Picture& p = pictures.at(window);
+    std::vector<float> all = p.felt;
+    all.insert(all.end(), p.drawn.begin(), p.drawn.end());
+    all.insert(all.end(), p.truth.begin(), p.truth.end());
+    const WindowSet::Position at = windows_.position(window);
+    passes.back()["frames"].push_back({{"x", at.x_mm},
+                                       {"y", at.y_mm},
+                                       {"zone", word_of(windows_.zone(window))},
+                                       {"ssim", ssim(p.drawn, p.truth, static_cast<std::size_t>(grid.height),
+                                                     static_cast<std::size_t>(grid.width))},
+                                       {"levels", levels_base64(all)}});
+  }
+  const TaxelArray array = windows_.array();
+  std::string text = nlohmann::json{
+      {"map", colour_map_base64()},
+      {"rows", array.rows},
+      {"columns", array.columns},
+      {"scale", windows_.settings().scale},
+      {"passes", passes}}.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+  for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos;) text.replace(at, 1, "\\u003c");
+  return text;
+}
+
+std::string EvaluationPage::html(const Committee& network, std::span<const std::uint32_t> test,
+                                 const nlohmann::ordered_json& result,
+                                 const std::vector<std::pair<std::string, std::string>>& made_by) const {
+  const std::vector<Scored> best = extremes(true), worst = extremes(false);
+  const std::vector<std::uint32_t> frames = film_frames(test);
+  std::vector<std::uint32_t> chosen = frames;
+  for (const std::vector<Scored>* some : {&best, &worst})
+    for (const Scored& one : *some) chosen.push_back(one.window);
+  const std::map<std::uint32_t, Picture> pictures = drawn_again(network, chosen);
+
+  std::string made;
+  for (const auto& [name, text] : made_by)
+    made += "<tr><td>" + escaped(name) + "</td><td style=\"text-align:left;white-space:normal\"><code>" +
+            escaped(text) + "</code></td></tr>";
+  std::string content = "<p class=\"quiet\">" + escaped(result["model"].get<std::string>()) + ", split " +
+                        escaped(result["split"].get<std::string>()) + ", " +
+                        std::to_string(result["all"]["windows"].get<long>()) + " windows, " +
+                        std::to_string(result["contact"]["windows"].get<long>()) + " in contact</p>";
+  content +=
+      by_method(result) + "<div class=\"two\">" + by_plate() + by_zone(result) + "</div>" +
+      by_way(result["felt"]) +
+      shown("The worst windows", "in contact, by SSIM; no two within 3 mm of one pass", worst, pictures) +
+      shown("The best windows", "of those with texture on a quarter of the picture", best, pictures);
+  content +=
+      section("Films", "each pass of the test side; felt, drawn, true",
+              "<div class=\"controls\"><select id=\"pass\" aria-label=\"pass\"></select><button "
+              "id=\"play\">Play</button>"
+              "<input id=\"at\" type=\"range\" min=\"0\" value=\"0\" aria-label=\"place in the pass\"></div>"
+              "<div class=\"film\"><figure><canvas id=\"film-felt\"></canvas>felt</figure><figure><canvas "
+              "id=\"film-drawn\">"
+              "</canvas>drawn</figure><figure><canvas id=\"film-true\"></canvas>true</figure></div>"
+              "<p class=\"quiet\" id=\"film-label\" role=\"status\"></p><canvas id=\"bar\" "
+              "style=\"width:100%\"></canvas>"
+              "<p class=\"quiet ends\"><span>0: flat plate, not pressed</span><span>1: the plate's highest, "
+              "pressed hard</span></p>");
+  content += section("What made this page", "", table({"", ""}, made));
+  std::string page(evaluation_page());
+  replace(page, "<!--content-->", content);
+  replace(page, "<!--films-->", films(frames, pictures));
+  return page;
+}
+
+}  // namespace supertac

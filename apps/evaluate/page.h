@@ -1,0 +1,59 @@
+// An evaluation as one page that needs nothing from elsewhere.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "apps/evaluate/scoring.h"
+#include "data/samples/windows.h"
+#include "data/scores/metrics.h"
+#include "models/committee.h"
+
+namespace supertac {
+
+/// Scores beside those of the baselines, by plate, zone and way since the first contact; the twelve worst
+/// windows in contact, and the twelve best of those with texture on a quarter of the picture, no two of them
+/// within 3 mm of one pass; a film of each pass; and what made it all.
+class EvaluationPage {
+ public:
+  explicit EvaluationPage(const WindowSet& windows) : windows_(windows) {}
+  void add(const Drawn& drawn);
+
+  /// `result` is the evaluation's JSON; `made_by` says what to repeat it with, a name and a text each. The
+  /// windows shown are drawn once more. At most kFilmFrames pictures are in the films, evenly spread.
+  std::string html(const Committee& network, std::span<const std::uint32_t> test,
+                   const nlohmann::ordered_json& result,
+                   const std::vector<std::pair<std::string, std::string>>& made_by) const;
+
+  static constexpr std::size_t kShown = 12, kFilmFrames = 2400, kFramesOfPass = 80;
+
+ private:
+  struct Scored {
+    double ssim;
+    std::uint32_t window;
+    bool full;  ///< a quarter of the truth is texture
+  };
+  struct Picture {
+    std::vector<float> felt, drawn, truth;
+  };
+  std::vector<Scored> extremes(bool best) const;
+  std::map<std::uint32_t, Picture> drawn_again(const Committee& network,
+                                               std::vector<std::uint32_t> chosen) const;
+  std::vector<std::uint32_t> film_frames(std::span<const std::uint32_t> test) const;
+  std::string by_plate() const;
+  std::string shown(const std::string& title, const std::string& note, const std::vector<Scored>& chosen,
+                    const std::map<std::uint32_t, Picture>& pictures) const;
+  std::string films(std::span<const std::uint32_t> frames,
+                    const std::map<std::uint32_t, Picture>& pictures) const;
+  std::string name_of(std::uint32_t window) const;
+
+  const WindowSet& windows_;
+  std::vector<Scored> contact_;
+  std::map<std::string, ZoneMetrics> plates_;
+};
+
+}  // namespace supertac

@@ -1,0 +1,53 @@
+// The films of an evaluation: a pass is chosen, a slider goes through it.
+"use strict";
+const films = JSON.parse(document.getElementById("films").textContent);
+const element = (id) => document.getElementById(id);
+const bytes = (base64) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+const map = bytes(films.map);
+let playing = 0;
+
+function draw(canvas, levels, rows, columns) {
+  canvas.width = columns;
+  canvas.height = rows;
+  const g = canvas.getContext("2d"), dots = g.createImageData(columns, rows);
+  for (let i = 0; i < levels.length; ++i) {
+    const at = 4 * ((rows - 1 - Math.floor(i / columns)) * columns + i % columns);
+    dots.data.set([map[3 * levels[i]], map[3 * levels[i] + 1], map[3 * levels[i] + 2], 255], at);
+  }
+  g.putImageData(dots, 0, 0);
+}
+
+function show() {
+  const {rows, columns, scale} = films, pass = films.passes[element("pass").selectedIndex];
+  const frame = pass.frames[element("at").value], levels = bytes(frame.levels), taxels = rows * columns;
+  const pixels = taxels * scale * scale;
+  draw(element("film-felt"), levels.subarray(0, taxels), rows, columns);
+  draw(element("film-drawn"), levels.subarray(taxels, taxels + pixels), rows * scale, columns * scale);
+  draw(element("film-true"), levels.subarray(taxels + pixels), rows * scale, columns * scale);
+  element("film-label").textContent = `${pass.name}: finger at x ${frame.x.toFixed(1)}, y ${frame.y.toFixed(1)} mm, ` +
+      `${frame.zone}, SSIM ${frame.ssim.toFixed(3)}`;
+}
+
+function choose() {
+  element("at").max = films.passes[element("pass").selectedIndex].frames.length - 1;
+  element("at").value = 0;
+  show();
+}
+
+function play() {
+  playing = playing ? (clearInterval(playing), 0) : setInterval(() => {
+    const at = element("at");
+    at.value = Number(at.value) === Number(at.max) ? 0 : Number(at.value) + 1;
+    show();
+  }, 120);
+  element("play").textContent = playing ? "Pause" : "Play";
+}
+
+if (films.passes.length > 0) {
+  element("pass").append(...films.passes.map((pass) => new Option(pass.name)));
+  element("pass").addEventListener("change", choose);
+  element("at").addEventListener("input", show);
+  element("play").addEventListener("click", play);
+  draw(element("bar"), Uint8Array.from({length: 256}, (_, i) => i), 1, 256);
+  choose();
+}

@@ -1,0 +1,60 @@
+// supertac-evaluate --report: the page holds everything, needs nothing, and says what made it.
+#include <gtest/gtest.h>
+
+#include "data/recordings/simulator.h"
+#include "io/json.h"
+#include "models/model_file.h"
+#include "tests/apps/simulated_data.h"
+
+namespace supertac {
+namespace {
+
+using EvaluationPage = OnSimulatedData;
+
+std::size_t count(const std::string& text, const std::string& part) {
+  std::size_t found = 0;
+  for (std::size_t at = 0; (at = text.find(part, at)) != std::string::npos; at += part.size()) ++found;
+  return found;
+}
+
+// What stands between two marks.
+std::string between(const std::string& text, const std::string& begin, const std::string& end) {
+  const std::size_t from = text.find(begin) + begin.size();
+  return text.substr(from, text.find(end, from) - from);
+}
+
+TEST_F(EvaluationPage, HoldsScoresWindowsFilmsAndWhatMadeIt) {
+  Rng rng(1);
+  const SuperTac model({.timesteps = 32, .latent = 3, .scale = 2, .channels = 8, .rcabs = 1}, rng);
+  save_model(path("<model>"), model, {300, {}, SimulatorSettings().filter_s}, {});
+  const std::vector<std::string> words = {
+      "--model", path("<model>"), "--data",   path("data"),        "--split", "none",        "--limit",
+      "2000",    "--quiet",       "--report", path("report.html"), "--json",  path("r.json")};
+  const ProcessResult result = run_process("supertac-evaluate", words);
+  ASSERT_EQ(result.code, 0) << result.error;
+  const std::string page = bytes("report.html");
+  EXPECT_LT(page.size(), 5'000'000U);
+  for (const char* outside : {"http://", "https://", "src=\"/", "url(", "<!--content", "<!--films", "{{"})
+    EXPECT_EQ(page.find(outside), std::string::npos) << outside;
+  EXPECT_EQ(page.find("<model>"), std::string::npos);  // names are no markup
+  const auto scores = parse_json_limited(bytes("r.json"));
+  for (const std::string& text :
+       {std::string("ridge"), std::string("3_Bumps"), std::string("in the air"),
+        std::string("&lt;model>, hash "), "hash " + scores["data"].get<std::string>(),
+        std::string("--report"), std::string("commit ")})
+    EXPECT_NE(page.find(text), std::string::npos) << text;
+  for (const char* part : {"alt=\"felt, ", "alt=\"drawn, ", "alt=\"true, ", "alt=\"difference, "})
+    EXPECT_EQ(count(page, part), 24U) << part;
+  const auto films = nlohmann::json::parse(between(page, "type=\"application/json\">", "</script>"));
+  ASSERT_EQ(films["passes"].size(), 2U);
+  EXPECT_EQ(films["passes"][1]["name"], "3_Bumps, trial 2, pass 1, 10 mm/s");
+  for (const auto& pass : films["passes"]) {
+    EXPECT_EQ(pass["frames"].size(), 80U);
+    for (const auto& frame : pass["frames"])  // 16 taxels, 64 pixels drawn and 64 true
+      EXPECT_EQ(frame["levels"].get<std::string>().size(), 192U);
+  }
+  EXPECT_EQ(run_process("supertac-evaluate", words).code, 1);  // nothing is overwritten
+}
+
+}  // namespace
+}  // namespace supertac
