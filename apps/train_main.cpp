@@ -19,7 +19,7 @@ void declare(Arguments& a) {
   a.option("seed", "N", "of split, initial weights, order, noise", "0");
   declare_training(a);
   a.only_with("data");
-  a.option("preset", "NAME", "network: paper, or tiny (a ninth of the cost)", "paper");
+  a.option("preset", "NAME", "network: paper, or tiny (a ninth of the multiply-adds, a third of the time)", "paper");
   a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512 (default: the preset's)");
   a.option("scale", "N", "pictures N times as fine as the array, which the recordings name: 2, 4 or 8", "4");
   declare_window_training(a);

@@ -42,7 +42,7 @@ struct SuperTacSettings {
   Dim image_width() const { return columns * scale; }
   /// Throws std::invalid_argument naming the setting, its range and what was given.
   void check() const;
-  /// A preset's settings: "paper", or "tiny", which costs a ninth. Both were made for windows of 2.56 s.
+  /// A preset's settings: "paper", or "tiny", with a ninth of its multiply-adds. Both were made for windows of 2.56 s.
   /// Throws std::invalid_argument for an unknown name, listing the known ones.
   static SuperTacSettings of_preset(const std::string& name);
 };

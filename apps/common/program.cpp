@@ -14,6 +14,12 @@
 namespace supertac {
 namespace {
 
+#ifdef __clang__
+constexpr const char* kCompiler = "";  // it names itself
+#else
+constexpr const char* kCompiler = "GCC ";
+#endif
+
 /// One line, whatever the message holds.
 int fail(const Program& program, std::string message, int code) {
   for (char& c : message)
@@ -89,8 +95,8 @@ int run_program(const Program& program, int argc, const char* const* argv) {
 std::string version() { return SUPERTAC_VERSION; }
 
 std::string version_text(const Program& program) {
-  std::string text =
-      program.name + " " + version() + "\ncommit    " + commit() + "\ncompiler  " + __VERSION__ + "\n";
+  std::string text = program.name + " " + version() + "\ncommit    " + commit() + "\ncompiler  " + kCompiler +
+                     __VERSION__ + "\n";
   if (program.numerics != nullptr) text += program.numerics().text;
   return text;
 }

@@ -38,6 +38,10 @@ Scored scored_of(const Arguments& a, const ModelFile& file, const std::vector<st
 
 void check_scored(const Arguments& a, const std::vector<ModelFile>& files, Scored& scored) {
   refuse_leak(files, scored.split_name);
+  if (!a.given("split") && scored.split_name == "none")
+    a.note(
+        "the model was trained with split none: if these are the recordings of its training, it has seen "
+        "every one of them");
   const auto limit =
       static_cast<std::size_t>(a.integer("limit", 0, std::numeric_limits<std::uint32_t>::max()));
   if (limit > 0) scored.split.test = spread(scored.split.test, limit);

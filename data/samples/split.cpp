@@ -228,6 +228,20 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed, c
   return split;
 }
 
+std::vector<std::uint32_t> without_most_silence(const WindowSet& windows,
+                                                std::span<const std::uint32_t> list) {
+  constexpr std::size_t kSilentApart = 4;
+  std::vector<std::uint32_t> kept;
+  std::size_t pass = SIZE_MAX, silent = 0;
+  for (const std::uint32_t i : list) {
+    if (windows.pass_of(i) != pass) pass = windows.pass_of(i), silent = 0;
+    const Plate& plate = windows.plate(pass);
+    const bool plain = plate.max_height() == plate.min_height();
+    if (plain || windows.contact(i) || silent++ % kSilentApart == 0) kept.push_back(i);
+  }
+  return kept;
+}
+
 Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t seed) {
   Split split;
   std::vector<bool> tested(pairs.size());

@@ -49,6 +49,12 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
 /// Throws std::invalid_argument for another name, no groups, or a side that would be empty.
 Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t seed);
 
+/// Of these windows, ascending, all that are in contact and every fourth of a pass that are not: two of three
+/// windows of a whole pass show a flat plate or the air, which is soon learnt. All of passes over a plain
+/// plate, on which a finger is pressed as hard as elsewhere on a texture.
+std::vector<std::uint32_t> without_most_silence(const WindowSet& windows,
+                                                std::span<const std::uint32_t> list);
+
 /// What the test windows share with the training windows.
 struct Leakage {
   std::size_t overlapping = 0;  ///< test windows that have a frame in common with a training window

@@ -69,9 +69,10 @@ WindowSet WindowSet::load(const std::string& dir, const std::vector<std::string>
 }
 
 void WindowSet::add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside) {
-  std::set<std::string> missing(plates.begin(), plates.end());
+  std::set<std::string> missing(plates.begin(), plates.end()), found;
   for (const std::string& path : list_recordings(dir)) {
     const Recording recording = read_recording(path);
+    found.insert(recording.plate);
     if (!plates.empty() && std::find(plates.begin(), plates.end(), recording.plate) == plates.end()) continue;
     missing.erase(recording.plate);
     try {
@@ -80,8 +81,11 @@ void WindowSet::add_directory(const std::string& dir, const std::vector<std::str
       throw std::runtime_error(path + ": " + error.what());
     }
   }
-  if (!missing.empty())
-    throw std::invalid_argument("windows: plate '" + *missing.begin() + "' has no recording in " + dir);
+  if (missing.empty()) return;
+  std::string names;
+  for (const std::string& name : found) names += (names.empty() ? "" : ", ") + name;
+  throw std::invalid_argument("windows: plate '" + *missing.begin() + "' has no recording in " + dir +
+                              "; it has those of " + names);
 }
 
 WindowSet::WindowSet(const WindowSettings& settings) : settings_(settings) {
@@ -97,13 +101,9 @@ std::size_t WindowSet::plate_index(const std::string& name, const std::string& f
 }
 
 // Whether a window may end at this frame; counts the reason if not.
-bool WindowSet::accept(const Track& track, std::size_t frame, const Plate& plate, bool reliable,
-                       const Use& use) {
+bool WindowSet::accept(const Track& track, std::size_t frame, bool reliable, double clear_mm, int stride) {
   const float x = track.position_mm[2 * frame], y = track.position_mm[2 * frame + 1];
   const float lift = track.lift_mm[frame];
-  const double clear_mm = plate.max_height() + kClearanceMm;
-  const auto between = [&](int stride) { return frame % static_cast<std::size_t>(stride) != 0; };
-  const auto silent = [&] { return lift > kLiftedMm || zone_of(plate, x, y, image()) != Zone::contact; };
   std::size_t* reason = nullptr;
   if (!reliable)
     reason = &counts_.unreliable;
@@ -113,7 +113,7 @@ bool WindowSet::accept(const Track& track, std::size_t frame, const Plate& plate
     reason = &counts_.lifting;
   else if (track.run[frame] < static_cast<std::uint32_t>(settings_.timesteps))
     reason = &counts_.too_early;
-  else if (between(use.stride) || (use.silent_stride > use.stride && between(use.silent_stride) && silent()))
+  else if (frame % static_cast<std::size_t>(stride) != 0)
     reason = &counts_.off_stride;
   else
     reason = &counts_.windows;
@@ -122,12 +122,11 @@ bool WindowSet::accept(const Track& track, std::size_t frame, const Plate& plate
 }
 
 void WindowSet::add(const Recording& recording, const std::string& folder, bool aside) {
-  append(recording, folder,
-         {.aside = aside, .varied = true, .stride = settings_.stride, .silent_stride = settings_.stride});
+  append(recording, folder, {.aside = aside, .varied = true, .stride = settings_.stride});
 }
 
-void WindowSet::add_one_of_many(const Recording& recording, int stride, int silent_stride) {
-  append(recording, ".", {.aside = true, .varied = false, .stride = stride, .silent_stride = silent_stride});
+void WindowSet::add_one_of_many(const Recording& recording, int stride) {
+  append(recording, ".", {.aside = true, .varied = false, .stride = stride});
 }
 
 void WindowSet::append(const Recording& recording, const std::string& folder, const Use& use) {
@@ -152,8 +151,9 @@ void WindowSet::append(const Recording& recording, const std::string& folder, co
             .aside = use.aside,
             .varied = use.varied};
   const auto number = static_cast<std::uint32_t>(passes_.size());
+  const double clear_mm = plates_[plate].max_height() + kClearanceMm;
   for (std::size_t frame = 0; frame < track.frames(); ++frame)
-    if (accept(track, frame, plates_[plate], reliable, use))
+    if (accept(track, frame, reliable, clear_mm, use.stride))
       index_.push_back({number, static_cast<std::uint32_t>(frame)});
   pass.windows = index_.size() - pass.first_window;
   ++counts_.recordings;

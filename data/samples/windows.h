@@ -75,8 +75,8 @@ class WindowSet : public Examples {
   /// STL file beside it. Throws as plate_in_folder() and resample(), std::runtime_error for another array.
   void add(const Recording& recording, const std::string& folder = ".", bool aside = false);
   /// The same for one of many passes that differ in everything: set aside, may_vary() is false, every
-  /// stride-th frame ends a window; where the truth is flat, every silent_stride-th, a multiple of it.
-  void add_one_of_many(const Recording& recording, int stride, int silent_stride);
+  /// stride-th frame ends a window.
+  void add_one_of_many(const Recording& recording, int stride);
   /// Appends those of all recordings in a directory, of these plates (empty: all). Throws as load, but for
   /// the missing windows.
   void add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside = false);
@@ -130,11 +130,11 @@ class WindowSet : public Examples {
   };
   struct Use {
     bool aside, varied;
-    int stride, silent_stride;
+    int stride;
   };
   void append(const Recording& recording, const std::string& folder, const Use& use);
   std::size_t plate_index(const std::string& name, const std::string& folder);
-  bool accept(const Track& track, std::size_t frame, const Plate& plate, bool reliable, const Use& use);
+  bool accept(const Track& track, std::size_t frame, bool reliable, double clear_mm, int stride);
   bool in_air(std::size_t i) const;
 
   WindowSettings settings_;

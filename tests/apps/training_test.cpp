@@ -159,6 +159,9 @@ TEST_F(Training, SeveralModelsAreAveragedUnlessTheySawEachOthersTest) {
       run_process("supertac-evaluate", {"--model", one + "," + all, "--data", path("data")});
   EXPECT_EQ(mixed.code, 1);
   EXPECT_NE(mixed.error.find("split pass, another with none"), std::string::npos) << mixed.error;
+  const ProcessResult seen =
+      run_process("supertac-evaluate", {"--model", all, "--data", path("data"), "--limit", "20"});
+  EXPECT_NE(seen.error.find("it has seen every one of them"), std::string::npos) << seen.error;
 
   const auto ssim = [&](const std::string& models) {
     const ProcessResult result =

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "data/recordings/simulator.h"
 #include "tests/data/test_recordings.h"
 
 namespace supertac {
@@ -223,6 +224,28 @@ TEST(Split, SpreadTakesEvenlyOrAll) {
   EXPECT_EQ(spread(list, 7), list);
   EXPECT_EQ(spread(list, 100), list);
   EXPECT_TRUE(spread({}, 3).empty());
+}
+
+TEST(Split, TrainingKeepsContactAndAFourthOfTheSilence) {
+  WindowSet windows({.timesteps = 32, .rate_hz = 100, .stride = 8});
+  windows.add(simulate_pass(Plate::named("3_Bumps"), {}));
+  const std::size_t textured = windows.size();
+  windows.add(simulate_pass(Plate::named("plain"), {}));
+  std::vector<std::uint32_t> all(windows.size());
+  for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
+  std::size_t contact = 0, silent = 0, kept_silent = 0, kept_plain = 0;
+  for (std::uint32_t i = 0; i < textured; ++i) ++(windows.contact(i) ? contact : silent);
+  std::size_t kept_contact = 0;
+  for (const std::uint32_t i : without_most_silence(windows, all)) {
+    if (i >= textured)
+      ++kept_plain;
+    else
+      ++(windows.contact(i) ? kept_contact : kept_silent);
+  }
+  EXPECT_GT(contact, 20U);
+  EXPECT_EQ(kept_contact, contact);
+  EXPECT_EQ(kept_silent, (silent + 3) / 4);
+  EXPECT_EQ(kept_plain, windows.size() - textured);
 }
 
 }  // namespace

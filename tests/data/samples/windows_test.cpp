@@ -272,7 +272,7 @@ TEST_F(WindowFiles, SayWhatIsMissing) {
   write({}, "bumps12_t1_p1_v10");
   EXPECT_NE(message_of([&] {
               WindowSet::load(dir_, {"ridges6"}, wide_settings(16));
-            }).find("plate 'ridges6' has no recording"),
+            }).find("plate 'ridges6' has no recording in " + dir_ + "; it has those of bumps12"),
             std::string::npos);
   EXPECT_NE(message_of<std::runtime_error>([&] {
               WindowSet::load(dir_, {}, wide_settings(256));
