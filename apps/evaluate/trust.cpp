@@ -42,7 +42,7 @@ void TrustScores::add(std::uint32_t window, std::span<const float> output, std::
   if (pass_ != in_contact_of_) in_contact_of_ = pass_, begin_mm_ = y;
   const ImageGrid grid = windows_.image();
   contact_.push_back(
-      {mean_of(spread),
+      {doubt_of(spread), mean_of(spread),
        ssim(output, truth, static_cast<std::size_t>(grid.height), static_cast<std::size_t>(grid.width)),
        std::abs(y - begin_mm_)});
 }
@@ -65,10 +65,10 @@ double TrustScores::factor_found() const {
   return static_cast<double>(kBins) / kBinsPerUnit;
 }
 
-// The chance that of two windows, one good and one bad, the bad one has the larger spread (Mann-Whitney).
+// The chance that of two windows, one good and one bad, the bad one is doubted more (Mann-Whitney).
 double TrustScores::auroc() const {
   std::vector<Window> order = contact_;
-  std::ranges::sort(order, {}, &Window::spread);
+  std::ranges::sort(order, {}, &Window::doubt);
   double bad_above = 0, good = 0, bad = 0;
   for (const Window& w : order) {
     if (w.ssim >= kGoodSsim) {
@@ -83,7 +83,7 @@ double TrustScores::auroc() const {
 
 double TrustScores::ssim_of_surest(double share) const {
   std::vector<Window> order = contact_;
-  std::ranges::sort(order, {}, &Window::spread);
+  std::ranges::sort(order, {}, &Window::doubt);
   order.resize(static_cast<std::size_t>(std::ceil(share * static_cast<double>(order.size()))));
   double sum = 0;
   for (const Window& w : order) sum += w.ssim;

@@ -40,7 +40,7 @@ class TrustScores {
     std::uint64_t pixels = 0;
   };
   struct Window {
-    double spread, ssim, felt_mm;
+    double doubt, spread, ssim, felt_mm;
   };
   double coverage(double factor) const;
   double factor_found() const;
