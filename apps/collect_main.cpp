@@ -7,12 +7,14 @@
 #include <iostream>
 #include <thread>
 
+#include "apps/collect/collect_view.h"
 #include "apps/collect/origin_mark.h"
 #include "apps/collect/passes.h"
 #include "apps/common/ports.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
+#include "apps/web/web_options.h"
 #include "data/plates/plate_file.h"
 #include "hardware/errors.h"
 #include "hardware/palpation_recorder.h"
@@ -38,6 +40,7 @@ void declare(Arguments& arguments) {
       .flag("confirm-origin", "after a run that was cut off: the head is back at " + describe(rig::kMounted))
       .flag("yes", "do not ask: the plate lies as planned and the head is at " + describe(rig::kMounted))
       .flag("list-ports", "list the serial ports and end");
+  declare_web(arguments);
 }
 
 namespace {
@@ -113,6 +116,17 @@ void demand_origin(const Arguments& arguments, const OriginMark& mark) {
                       describe(rig::kMounted) + " and add --confirm-origin, or use --home");
 }
 
+/// The page of --web; none without.
+std::unique_ptr<CollectView> web_view(const Arguments& arguments, const PalpationPlan& plan) {
+  const auto address = web_address(arguments);
+  if (!address) return nullptr;
+  auto view = std::make_unique<CollectView>(*address, Plate::named(arguments.text("plate")), plan,
+                                            arguments.number("speedup", 0.1, 100),
+                                            arguments.text("printer") + ", into " + arguments.text("out"));
+  arguments.note("live page: " + view->url());
+  return view;
+}
+
 RecorderReport collect(const Arguments& arguments, RecorderSettings settings, const OriginMark& mark) {
   const double speedup = arguments.number("speedup", 0.1, 100);
   auto board = std::make_unique<SerialPort>(resolve_board_port(arguments.text("board")),
@@ -120,12 +134,14 @@ RecorderReport collect(const Arguments& arguments, RecorderSettings settings, co
   auto printer =
       std::make_unique<SerialPort>(arguments.text("printer"), SerialSettings{rig::kPrinterBaud, speedup});
   demand_origin(arguments, mark);
+  const std::unique_ptr<CollectView> page = web_view(arguments, settings.plan);
   confirm(arguments, settings);
   std::atomic<bool> stop{false};
   settings.stop = &stop;
   Progress progress(arguments, "collecting", millimetres(settings.plan, settings.plan.passes, 0), "mm");
   settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters& counters) {
     progress.update(millimetres_at(settings.plan, leg, at), live_text(at, counters));
+    if (page) page->update(leg, at, counters);
   };
   const std::jthread watcher([&stop](const std::stop_token& ended) {
     for (; !ended.stop_requested(); usleep(20'000)) stop = stop || interrupted();

@@ -7,6 +7,7 @@
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
 #include "apps/stream/stream.h"
+#include "apps/web/web_options.h"
 #include "hardware/serial_port.h"
 #include "io/file.h"
 #include "io/numbers.h"
@@ -48,17 +49,6 @@ std::string badge_of(const Arguments& a) {
   return device.starts_with("/dev/pts/") ? "virtual rig" : "board";
 }
 
-/// Where the page is served; nothing without --web.
-std::optional<WebAddress> web_address(const Arguments& a) {
-  if (!a.given("web")) return std::nullopt;
-  WebAddress address{.port = static_cast<std::uint16_t>(a.integer("web", 0, 65535))};
-  if (a.given("web-bind")) address.bind = a.text("web-bind");
-  if (!address.is_loopback())
-    a.note("warning: --web-bind " + address.bind +
-           ": everybody who reaches this computer may watch, record and re-zero");
-  return address;
-}
-
 }  // namespace
 
 void declare(Arguments& a) {
@@ -75,11 +65,8 @@ void declare(Arguments& a) {
               "send a datagram of JSON for each picture, e.g. to PlotJuggler at 127.0.0.1:9870")
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
-      .option_alone("web", "PORT", "show the live page in a browser on this computer (default port 8080)",
-                    "8080")
-      .flag("list-ports", "list the serial ports and end")
-      .only_with("web")
-      .option("web-bind", "ADDRESS", "let the network see the page and its buttons: 0.0.0.0, or one address");
+      .flag("list-ports", "list the serial ports and end");
+  declare_web(a);
 }
 
 int run(Arguments& a) {

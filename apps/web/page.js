@@ -351,13 +351,11 @@ function snapshot() {
   const root = document.documentElement.style;
   root.setProperty("--quiet", "#333");
   const place = event.x === undefined ? "" : `, finger at x ${event.x.toFixed(1)} mm, y ${event.y.toFixed(1)} mm`;
-  const titles = [["The array feels", 10], ["The network draws", 420]];
   g.fillStyle = "#111";
   g.textBaseline = "top";
-  for (const [title, x] of titles) {
-    g.font = "600 15px system-ui, sans-serif";
-    g.fillText(title, x + 30, 10);
-  }
+  g.font = "600 15px system-ui, sans-serif";
+  g.fillText("The array feels", 40, 10);
+  g.fillText("The network draws", 450, 10);
   const panel = (x, levels, rows, columns, mm) => {
     g.save();
     g.translate(x, 34);

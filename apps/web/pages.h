@@ -7,6 +7,7 @@
 namespace supertac {
 
 std::string_view live_page();
+std::string_view collect_page();
 /// With <!--content--> where the results stand and <!--films--> where their films (JSON).
 std::string_view evaluation_page();
 

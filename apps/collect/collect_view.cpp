@@ -1,0 +1,111 @@
+#include "apps/collect/collect_view.h"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "apps/common/signals.h"
+#include "apps/web/encode.h"
+#include "apps/web/pages.h"
+#include "data/plates/truth.h"
+#include "hardware/rig.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr int kWidth = static_cast<int>(rig::kPlateWidthMm), kLength = static_cast<int>(rig::kPlateLengthMm);
+
+double way(const Point3& a, const Point3& b) { return std::hypot(a.x - b.x, a.y - b.y, a.z - b.z); }
+
+// A run that lifts the finger is under way after the first wish; a second one would end it at once.
+std::string stop_as_ctrl_c() {
+  if (!interrupted()) kill(getpid(), SIGINT);
+  return "the finger is lifted and the run ends; what was collected is kept";
+}
+
+std::string dumped(const nlohmann::json& json) {
+  return json.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace
+
+CollectView::CollectView(const WebAddress& address, const Plate& plate, const PalpationPlan& plan,
+                         double speedup, const std::string& source)
+    : plate_(plate),
+      plan_(plan),
+      legs_(legs_of(plan, rig::kMounted)),
+      speedup_(speedup),
+      source_(source),
+      server_(address, site()) {}
+
+WebSite CollectView::site() {
+  return {.page = collect_page(),
+          .hello = [this] { return hello(); },
+          .news = [this] { return news(); },
+          .actions = {{"stop", stop_as_ctrl_c}},
+          .file = {}};
+}
+
+void CollectView::update(const Leg& leg, const Point3& at, const BoardCounters& board) {
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (lock) newest_ = State{leg, at, board};
+}
+
+std::string CollectView::hello() const {
+  std::vector<float> heights;  // of square millimetres, row by row of y
+  for (int y = 0; y < kLength; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      heights.push_back(static_cast<float>(truth_value(plate_, x + 0.5, y + 0.5)));
+  std::vector<double> passes;
+  for (int pass = 0; pass < plan_.passes; ++pass)
+    passes.push_back(plan_.start.x + plan_.shift_x * pass - rig::kPlate.x);
+  return dumped({{"plate", plate_.name()},
+                 {"source", source_},
+                 {"plan", std::to_string(plan_.passes) + " passes of " + format(plan_.slide, 0) + " mm at " +
+                              format(plan_.speed, 1) + " mm/s, " + format(plan_.lift, 0) + " mm lift"},
+                 {"width", kWidth},
+                 {"length", kLength},
+                 {"heights", levels_base64(heights)},
+                 {"map", colour_map_base64()},
+                 {"passes", passes}});
+}
+
+double CollectView::seconds_left(const State& state) const {
+  double seconds = way(state.at, state.leg.to) / state.leg.speed;
+  bool later = false;
+  for (const Leg& leg : legs_) {
+    if (later) seconds += way(leg.from, leg.to) / leg.speed;
+    later = later || (leg.pass == state.leg.pass && leg.phase == state.leg.phase);
+  }
+  return seconds / speedup_;
+}
+
+std::string CollectView::news() {
+  std::optional<State> state;
+  {
+    const std::lock_guard lock(mutex_);
+    state.swap(newest_);
+  }
+  if (!state) return {};
+  const auto& [leg, at, board] = *state;
+  const double slid = leg.phase == Phase::slide     ? std::clamp(at.y - leg.from.y, 0.0, plan_.slide)
+                      : leg.phase >= Phase::release ? plan_.slide
+                                                    : 0;
+  return dumped({{"pass", leg.pass},
+                 {"phase", name_of(leg.phase)},
+                 {"x", at.x - rig::kPlate.x},
+                 {"y", at.y - rig::kPlate.y},
+                 {"lifted", at.z > plan_.start.z + 0.1},
+                 {"left_s", seconds_left(*state)},
+                 {"done", (plan_.slide * (leg.pass - 1) + slid) / (plan_.slide * plan_.passes)},
+                 {"frames", board.decoder.frames},
+                 {"rate", board.clock.period_s > 0 ? 1 / board.clock.period_s : 0},
+                 {"lost", board.missing + board.dropped},
+                 {"suspect", board.suspect}});
+}
+
+}  // namespace supertac

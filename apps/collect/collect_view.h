@@ -1,0 +1,48 @@
+// A collection in a browser.
+#pragma once
+
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/web/web_server.h"
+#include "data/plates/plate.h"
+#include "hardware/palpation_recorder.h"
+
+namespace supertac {
+
+/// Serves collect_page(): the plan, the plate with the finger on it, and one action, "stop", which does what
+/// Ctrl-C does. Nothing begins or moves anything.
+class CollectView {
+ public:
+  /// `source` names ports and folder. Throws as WebServer.
+  CollectView(const WebAddress& address, const Plate& plate, const PalpationPlan& plan, double speedup,
+              const std::string& source);
+
+  /// Never waits.
+  void update(const Leg& leg, const Point3& at, const BoardCounters& board);
+  std::string url() const { return server_.url(); }
+
+ private:
+  struct State {
+    Leg leg;
+    Point3 at;
+    BoardCounters board;
+  };
+  WebSite site();
+  std::string hello() const;
+  std::string news();
+  double seconds_left(const State& state) const;
+
+  const Plate plate_;
+  PalpationPlan plan_;
+  std::vector<Leg> legs_;
+  double speedup_;
+  std::string source_;
+  std::mutex mutex_;
+  std::optional<State> newest_;
+  WebServer server_;  // last: its thread uses the others
+};
+
+}  // namespace supertac

@@ -1,0 +1,64 @@
+// The page of supertac-collect: it shows the run and can end it, and nothing else.
+#include <gtest/gtest.h>
+
+#include "io/json.h"
+#include "tests/apps/collect_run.h"
+#include "tests/apps/http_client.h"
+
+namespace supertac {
+namespace {
+
+// A port that was free a moment ago.
+int free_port() {
+  const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof place;
+  EXPECT_EQ(bind(file, reinterpret_cast<sockaddr*>(&place), size), 0);
+  getsockname(file, reinterpret_cast<sockaddr*>(&place), &size);
+  close(file);
+  return ntohs(place.sin_port);
+}
+
+nlohmann::ordered_json event_after(const std::string& text, const std::string& mark) {
+  const std::size_t begin = text.find(mark) + mark.size();
+  return parse_json_limited(text.substr(begin, text.find("\n\n", begin) - begin));
+}
+
+TEST(CollectPage, ShowsTheRunAndItsButtonEndsItAsCtrlCDoes) {
+  CollectRun run;
+  const int port = free_port();
+  const std::string number = std::to_string(port), host = "Host: 127.0.0.1:" + number + "\r\n";
+  RunningProcess program("supertac-collect", run.arguments({"--web", number}));
+  std::unique_ptr<HttpClient> client;
+  for (int i = 0; !client && i < 200; ++i, usleep(50'000)) {
+    try {
+      client = std::make_unique<HttpClient>(port);
+    } catch (const std::runtime_error&) {  // not yet
+    }
+  }
+  ASSERT_TRUE(client);
+  client->send("GET /events HTTP/1.1\r\n" + host + "\r\n");
+  const auto hello = event_after(client->receive("\n\n"), "event: hello\ndata: ");
+  EXPECT_EQ(hello["plate"], "3_Bumps");
+  EXPECT_EQ(hello["passes"].get<std::vector<double>>(), std::vector<double>{0.5});
+  ASSERT_TRUE(run.wait_for_contact(1));
+  const auto act = [&](const std::string& action) {
+    return status_of(port, "POST /" + action + " HTTP/1.1\r\nContent-Length: 0\r\n" + host +
+                               "Origin: http://127.0.0.1:" + number +
+                               "\r\nX-Token: " + hello["token"].get<std::string>() + "\r\n\r\n");
+  };
+  const std::string seen = client->receive("\"phase\":\"slide\"");
+  EXPECT_NE(seen.find("\"lifted\":false"), std::string::npos);
+  for (const char* action : {"start", "move", "home", "record"}) EXPECT_EQ(act(action), 404) << action;
+  EXPECT_EQ(act("stop"), 200);
+  act("stop");  // an impatient hand
+  const ProcessResult result = program.wait();
+  EXPECT_EQ(result.code, 130) << result.error;
+  run.wait_for_rest();
+  EXPECT_GT(run.head().z, kLiftedZ - 0.1);
+}
+
+}  // namespace
+}  // namespace supertac
