@@ -3,7 +3,7 @@
 # real plates, the four known plates on the unseen trial, and simulated plates that no training drew; the specialist beside
 # it. Blind protocol (bench/README.md): choices were made on trial 1; this script is what looks at trial 2.
 #   bench/studies/generalist.sh TEXT_DIR OUT_DIR [BIN_DIR] [SEEDS]
-# About seven minutes a network on one core, 18 networks a seed. A finished model is not trained again.
+# About two minutes a network on one core, 18 networks a seed. A finished model is not trained again.
 set -eu
 here="$(cd "$(dirname "$0")" && pwd)"
 text="$1"
@@ -11,7 +11,7 @@ out="$2"
 bin="${3:-build-release/bin}"
 seeds="${4:-0 1 2 3 4}"
 known=3_Bumps,6_Bumps,4_Ridges,6_Ridges
-recipe="--stride 4 --epochs 6 --random-plates 1000"
+recipe="--preset tiny --stride 4 --epochs 12 --random-plates 1000"
 mkdir -p "$out"
 [ -d "$out/recordings" ] || "$bin/supertac-import" "$text" --out "$out/recordings"
 random=$(seq -f random%g -s, 1 24)
@@ -35,12 +35,13 @@ for seed in $seeds; do
     # shellcheck disable=SC2086 # a recipe is several words
     train "generalist_without_${plate}_s$seed" --split texture --leave-out $plate --seed "$seed" $recipe
     score "generalist_without_${plate}_s$seed" left_out --data "$out/recordings"
-    train "specialist_without_${plate}_s$seed" --split texture --leave-out $plate --seed "$seed" --plates $known,$plate --epochs 12
+    train "specialist_without_${plate}_s$seed" --split texture --leave-out $plate --seed "$seed" --plates $known,$plate \
+      --preset tiny --epochs 12
     score "specialist_without_${plate}_s$seed" left_out --data "$out/recordings"
   done
   # shellcheck disable=SC2086
   train "generalist_s$seed" --split trial --seed "$seed" $recipe
-  train "specialist_s$seed" --split trial --seed "$seed" --plates $known
+  train "specialist_s$seed" --split trial --seed "$seed" --plates $known --preset tiny
   for kind in generalist specialist; do
     score "${kind}_s$seed" trial --data "$out/recordings" --plates $known
     score "${kind}_s$seed" never --data "$out/never" --split none --plates ""

@@ -237,7 +237,7 @@ std::vector<std::uint32_t> without_most_silence(const WindowSet& windows,
     if (windows.pass_of(i) != pass) pass = windows.pass_of(i), silent = 0;
     const Plate& plate = windows.plate(pass);
     const bool plain = plate.max_height() == plate.min_height();
-    if (plain || windows.contact(i) || silent++ % kSilentApart == 0) kept.push_back(i);
+    if (windows.may_vary(i) || plain || windows.contact(i) || silent++ % kSilentApart == 0) kept.push_back(i);
   }
   return kept;
 }
