@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "autograd/pool.h"
+#include "autograd/trace.h"
 
 namespace supertac {
 namespace detail {
@@ -117,6 +118,7 @@ Variable make_result(const char* op, Tensor y, std::span<const Variable* const> 
   Variable result(std::move(y));
   Node& node = *result.node_;
   node.op = op;
+  Trace::note(op, result, inputs);
   if (!detail::recording) return result;
   const bool needed =
       std::any_of(inputs.begin(), inputs.end(), [](const Variable* x) { return x->requires_grad(); });

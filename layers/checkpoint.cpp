@@ -113,7 +113,8 @@ void load_parameters(const SafetensorsFile& file, const std::string& path,
       problems.push_back(std::move(problem));
   }
   for (const auto& [name, info] : file.tensors()) {
-    const bool beside = name.starts_with("optimizer.") || name.starts_with("novelty.");
+    const bool beside =
+        name.starts_with("optimizer.") || name.starts_with("novelty.") || name.starts_with("int8.");
     if (!known.contains(name) && !beside) problems.push_back("unexpected " + name);
   }
   if (!problems.empty()) {

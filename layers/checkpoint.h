@@ -33,7 +33,8 @@ void write_checkpoint(const std::string& path, const std::vector<Parameter>& par
 /// Reads and checks format and version. Throws std::runtime_error naming path, expected and found.
 SafetensorsFile read_checkpoint(const std::string& path);
 
-/// Fills the parameters from the file. Names that begin with "optimizer." or "novelty." may be there besides.
+/// Fills the parameters from the file. Names that begin with "optimizer.", "novelty." or "int8." may be there
+/// besides.
 /// Throws std::runtime_error that lists every missing, unexpected and mismatching tensor at once; then
 /// nothing has been changed.
 void load_parameters(const SafetensorsFile& file, const std::string& path,

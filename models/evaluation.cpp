@@ -9,7 +9,7 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kBatch = 64, kBatchesAtOnce = 4;
+constexpr std::size_t kBatchesAtOnce = 4;
 
 struct Part {
   std::size_t first;
@@ -50,20 +50,16 @@ void check_format(const Examples& examples, const Network& network) {
 }
 
 void for_each_output(const Committee& network, const Examples& data, std::span<const std::uint32_t> indices,
-                     const std::function<bool(const EvaluatedBatch&)>& use) {
+                     const std::function<bool(const EvaluatedBatch&)>& use, std::size_t batch) {
   check_format(data, network.first());
-  for (std::size_t start = 0; start < indices.size(); start += kBatch * kBatchesAtOnce) {
+  for (std::size_t start = 0; start < indices.size(); start += batch * kBatchesAtOnce) {
     std::vector<Part> parts;
-    const std::size_t end = std::min(indices.size(), start + kBatch * kBatchesAtOnce);
-    for (std::size_t first = start; first < end; first += kBatch) {
-      const auto count = static_cast<Dim>(std::min(kBatch, end - first));
+    const std::size_t end = std::min(indices.size(), start + batch * kBatchesAtOnce);
+    for (std::size_t first = start; first < end; first += batch) {
+      const auto count = static_cast<Dim>(std::min(batch, end - first));
       const Shape pictures = network.first().picture_shape(count);
-      parts.push_back({first,
-                       Tensor(network.first().input_shape(count)),
-                       Tensor(pictures),
-                       Tensor(pictures),
-                       {},
-                       {}});
+      parts.push_back(
+          {first, Tensor(network.first().input_shape(count)), Tensor(pictures), Tensor(pictures), {}, {}});
     }
 #pragma omp parallel for schedule(static, 1)
     for (std::size_t i = 0; i < parts.size(); ++i) {

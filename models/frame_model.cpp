@@ -50,11 +50,11 @@ FrameModel::FrameModel(const FrameSettings& settings, Rng& rng)
   add("out", out_);
 }
 
-Variable FrameModel::forward(const Tensor& frames) const {
+Variable FrameModel::forward(const Variable& frames) const {
   if (frames.rank() != 4 || frames.shape() != input_shape(frames.dim(0)))
     throw std::invalid_argument("FrameModel: frames expects " + input_shape(0).text() +
                                 " with any first size, got " + frames.shape().text());
-  Variable h = in_.forward(Variable(frames), kLeakyRelu);
+  Variable h = in_.forward(frames, kLeakyRelu);
   for (const Rirb& rirb : rirbs_) h = rirb.forward(h);
   return out_.forward(h);
 }
@@ -64,9 +64,8 @@ NetworkFormat FrameModel::format() const {
   return {1, s.height, s.width, s.in_channels, s.scale};
 }
 
-Estimate FrameModel::estimate(const Tensor& frames) const {
-  const NoGrad no_grad;
-  return {.picture = forward(frames).value(), .spread = {}, .latents = {}};
+Drawing FrameModel::draw(const Variable& frames) const {
+  return {.picture = forward(frames), .spread = {}, .latents = {}};
 }
 
 }  // namespace supertac

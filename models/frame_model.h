@@ -26,8 +26,8 @@ class FrameModel : public Network {
   /// Throws as FrameSettings::check.
   FrameModel(const FrameSettings& settings, Rng& rng);
   /// Throws std::invalid_argument on another shape.
-  Variable forward(const Tensor& frames) const;
-  Estimate estimate(const Tensor& frames) const override;
+  Variable forward(const Variable& frames) const;
+  Drawing draw(const Variable& frames) const override;
   const FrameSettings& settings() const { return settings_; }
   NetworkFormat format() const override;
   Shape input_shape(Dim count) const override {

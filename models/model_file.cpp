@@ -190,6 +190,7 @@ ModelFile load_model(const std::string& path, ModelKind kind) {
     loaded.scaling = {input.numbers("mean", channels), input.numbers("factor", channels)};
     loaded.frame_model = build<FrameModel>(read, file, path);
   }
+  loaded.ranges = ActivationRanges::read(file, path);
   return loaded;
 }
 

@@ -12,6 +12,7 @@
 #include "layers/checkpoint.h"
 #include "models/frame_model.h"
 #include "models/novelty.h"
+#include "models/ranges.h"
 #include "models/supertac_model.h"
 
 namespace supertac {
@@ -41,6 +42,7 @@ struct ModelFile {
   std::unique_ptr<SuperTac> model;          ///< of kind windows, with its input
   InputSettings input;                      //
   std::optional<Novelty> novelty;           ///< of its training windows; nothing in older files
+  std::optional<ActivationRanges> ranges;   ///< likewise, for less than fp32
   std::unique_ptr<FrameModel> frame_model;  ///< of kind frames, with its scaling
   ChannelScaling scaling;                   //
   std::map<std::string, std::string> metadata;

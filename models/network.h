@@ -20,6 +20,11 @@ struct Estimate {
   Tensor latents;  ///< [N,latents]; undefined for a network without any
 };
 
+/// The same on the graph.
+struct Drawing {
+  Variable picture, spread, latents;
+};
+
 class Network : public Module {
  public:
   Network() = default;
@@ -34,11 +39,19 @@ class Network : public Module {
     const NetworkFormat f = format();
     return {count, f.rows * f.scale, f.columns * f.scale, 1};
   }
-  /// Inputs -> pictures and what is known of them, nothing recorded. Throws std::invalid_argument on another
-  /// shape.
-  virtual Estimate estimate(const Tensor& inputs) const = 0;
+  /// Inputs -> pictures and what is known of them. Throws std::invalid_argument on another shape.
+  virtual Drawing draw(const Variable& inputs) const = 0;
+  /// The same, nothing recorded. Who draws many pictures prepares the network (prepared.h).
+  Estimate estimate(const Tensor& inputs) const;
   /// The pictures alone, [N,rows scale,columns scale,1].
   Tensor infer(const Tensor& inputs) const { return estimate(inputs).picture; }
 };
+
+inline Estimate Network::estimate(const Tensor& inputs) const {
+  const NoGrad no_grad;
+  const Drawing drawn = draw(Variable(inputs));
+  const auto value = [](const Variable& x) { return x.defined() ? x.value() : Tensor(); };
+  return {.picture = drawn.picture.value(), .spread = value(drawn.spread), .latents = value(drawn.latents)};
+}
 
 }  // namespace supertac

@@ -85,7 +85,7 @@ class FrameObjective : public Objective {
     return std::make_unique<FrameObjective>(settings_, scaling_, 0);
   }
   Outcome operator()(const Batch& batch) const override {
-    const Variable picture = model_.forward(batch.inputs);
+    const Variable picture = model_.forward(Variable(batch.inputs));
     return {picture_loss(picture, batch.targets, settings_.lambda), picture, PerGroup<Variable>()};
   }
   std::string text() const override { return to_json(settings_).dump(); }

@@ -131,40 +131,18 @@ SuperTac::SuperTac(const SuperTacSettings& settings, Rng& rng)
   add("upsampler", upsampler_);
 }
 
-// to[f, 0 .. kRun) = from[f, 0 .. kRun)
-template <Dim kRun>
-static void copy_runs(Dim frames, const real* from, Dim from_stride, real* to, Dim to_stride) {
-  for (Dim f = 0; f < frames; ++f, from += from_stride, to += to_stride) std::copy_n(from, kRun, to);
-}
-
-// The signals of a group are its taxels in order, each with its channels: runs of `run` numbers in a frame,
-// `step` apart. A length known to the compiler makes four numbers, a row of the rig's array, one move; one
-// window after the other stays in the cache.
-PerGroup<Variable> SuperTac::split(const Tensor& windows) const {
+// The signals of a group are its taxels in order, each with its channels.
+PerGroup<Variable> SuperTac::split(const Variable& windows) const {
   const SuperTacSettings& s = settings_;
   if (windows.rank() != 3 || windows.dim(1) != s.timesteps || windows.dim(2) != s.signals()) {
     throw std::invalid_argument("SuperTac: windows expects [N," + std::to_string(s.timesteps) + "," +
                                 std::to_string(s.signals()) + "], got " + windows.shape().text());
   }
-  const Dim first = s.grouping == Grouping::horizontal ? s.columns * s.in_channels : s.in_channels;
-  const Dim run = first, step = s.columns * s.in_channels;
-  const Dim count = windows.dim(0), frames = windows.dim(1), width = s.group_signals();
-  const Dim piece = run % 4 == 0 ? 4 : 1;
-  const auto copy = piece == 4 ? copy_runs<4> : copy_runs<1>;
+  const Dim row = s.columns * s.in_channels;
+  const Dim run = s.grouping == Grouping::horizontal ? row : s.in_channels;
   PerGroup<Variable> groups(s.groups());
-  PerGroup<real*> to(s.groups());
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    Tensor part(Shape{count, frames, width});
-    to[g] = part.data();
-    groups[g] = Variable(std::move(part));
-  }
-  for (Dim n = 0; n < count; ++n) {
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      const real* from = windows.data() + n * frames * s.signals() + static_cast<Dim>(g) * first;
-      for (Dim k = 0; k < width; k += piece)
-        copy(frames, from + k / run * step + k % run, s.signals(), to[g] + n * frames * width + k, width);
-    }
-  }
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    groups[g] = take_runs(windows, {static_cast<Dim>(g) * run, run, row, s.group_signals()});
   return groups;
 }
 
@@ -174,7 +152,8 @@ SuperTac::Output SuperTac::forward(const Tensor& windows, std::span<const Tensor
     throw std::invalid_argument("SuperTac: eps expects " + std::to_string(groups) + " tensors, got " +
                                 std::to_string(eps.size()));
   }
-  Output out{split(windows), PerGroup<LatentDistribution>(groups), PerGroup<Variable>(groups), {}, {}};
+  Output out{
+      split(Variable(windows)), PerGroup<LatentDistribution>(groups), PerGroup<Variable>(groups), {}, {}};
   PerGroup<Variable> z(groups);
   for (std::size_t i = 0; i < z.size(); ++i) {
     out.latent[i] = encoders_[i].forward(out.input[i]);
@@ -191,21 +170,22 @@ NetworkFormat SuperTac::format() const {
   return {s.timesteps, s.rows, s.columns, s.in_channels, s.scale};
 }
 
-Tensor SuperTac::encode(const Tensor& windows) const {
-  const NoGrad no_grad;
+Variable SuperTac::means(const Variable& windows) const {
   const PerGroup<Variable> groups = split(windows);
   PerGroup<Variable> means(settings_.groups());
   for (std::size_t i = 0; i < means.size(); ++i) means[i] = encoders_[i].mean(groups[i]);
-  return concat_groups(means.span()).value();
+  return concat_groups(means.span());
 }
 
-Estimate SuperTac::estimate(const Tensor& windows) const {
+Tensor SuperTac::encode(const Tensor& windows) const {
   const NoGrad no_grad;
-  Estimate estimate{.picture = {}, .spread = {}, .latents = encode(windows)};
-  const Upsampler::Output drawn = upsampler_.forward(Variable(estimate.latents));
-  estimate.picture = drawn.picture.value();
-  if (drawn.spread.defined()) estimate.spread = drawn.spread.value();
-  return estimate;
+  return means(Variable(windows)).value();
+}
+
+Drawing SuperTac::draw(const Variable& windows) const {
+  const Variable latents = means(windows);
+  const Upsampler::Output drawn = upsampler_.forward(latents);
+  return {.picture = drawn.picture, .spread = drawn.spread, .latents = latents};
 }
 
 }  // namespace supertac

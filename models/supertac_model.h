@@ -42,8 +42,8 @@ struct SuperTacSettings {
   Dim image_width() const { return columns * scale; }
   /// Throws std::invalid_argument naming the setting, its range and what was given.
   void check() const;
-  /// A preset's settings: "paper", or "tiny", with a ninth of its multiply-adds. Both were made for windows of 2.56 s.
-  /// Throws std::invalid_argument for an unknown name, listing the known ones.
+  /// A preset's settings: "paper", or "tiny", with a ninth of its multiply-adds. Both were made for windows
+  /// of 2.56 s. Throws std::invalid_argument for an unknown name, listing the known ones.
   static SuperTacSettings of_preset(const std::string& name);
 };
 
@@ -107,7 +107,7 @@ class SuperTac : public Network {
   /// Throws std::invalid_argument on other shapes.
   Output forward(const Tensor& windows, std::span<const Tensor> eps) const;
   /// Evaluation: z = mean, no decoders.
-  Estimate estimate(const Tensor& windows) const override;
+  Drawing draw(const Variable& windows) const override;
   /// The latent means [N,G LD].
   Tensor encode(const Tensor& windows) const;
 
@@ -116,7 +116,8 @@ class SuperTac : public Network {
   Shape input_shape(Dim count) const override { return {count, settings_.timesteps, settings_.signals()}; }
 
  private:
-  PerGroup<Variable> split(const Tensor& windows) const;
+  PerGroup<Variable> split(const Variable& windows) const;
+  Variable means(const Variable& windows) const;
 
   SuperTacSettings settings_;
   std::vector<Encoder> encoders_;

@@ -12,13 +12,14 @@
 #include "models/diagnosis.h"
 #include "models/evaluation.h"
 #include "models/novelty.h"
+#include "models/ranges.h"
 
 namespace supertac {
 namespace {
 
 // Streams of random numbers that must not meet: the seed is shared with splits and batching.
 constexpr std::uint64_t kNoiseStream = 0x65707300;
-constexpr Dim kMostLanes = 4;
+constexpr Dim kMostLanes = 8;
 
 LossTerms values_of(const Loss& loss, double share) {
   const auto value = [share](const Variable& term) { return term.defined() ? share * term.item() : 0; };
@@ -183,7 +184,9 @@ void Trainer::save(const std::string& path, std::map<std::string, std::string> m
 }
 
 void Trainer::save_model(const std::string& path, std::map<std::string, std::string> metadata) const {
-  write_checkpoint(path, model().parameters(), full(std::move(metadata)), novelty());
+  std::vector<StoredTensor> more = novelty();
+  more.push_back(ranges());
+  write_checkpoint(path, model().parameters(), full(std::move(metadata)), more);
 }
 
 // Of an even sample of the training examples, as they are: augmentation hides what is to be noticed.
@@ -200,6 +203,16 @@ std::vector<StoredTensor> Trainer::novelty() const {
     signal_features(window, data_.array(), features.values().subspan(i * count, count));
   }
   return Novelty(features).stored();
+}
+
+StoredTensor Trainer::ranges() const {
+  constexpr std::size_t kSamples = 1024;
+  ActivationRanges ranges;
+  for_each_output(model(), data_, spread(train_, kSamples), [&](const EvaluatedBatch& b) {
+    ranges.add(model(), b.inputs);
+    return true;
+  });
+  return ranges.stored();
 }
 
 void Trainer::restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata) {

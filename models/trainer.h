@@ -91,6 +91,7 @@ class Trainer {
   void look_for_collapse(StepReport& report);
   void check_finite(const LossTerms& terms) const;
   std::vector<StoredTensor> novelty() const;
+  StoredTensor ranges() const;
   std::map<std::string, std::string> full(std::map<std::string, std::string> metadata) const;
 
   const Examples& data_;

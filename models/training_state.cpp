@@ -57,10 +57,14 @@ bool TrainingState::collapsed(bool looks_so) {
 double TrainingState::apply(const std::vector<const std::vector<Parameter>*>& lanes) {
   adam_.zero_grad();
   for (std::size_t i = 0; i < parameters_.size(); ++i) {
-    for (const std::vector<Parameter>* lane : lanes) {
-      const Tensor& part = (*lane)[i].value.grad();
-      kernels::add_scaled(part.size(), 1, part.data(), parameters_[i].value.mutable_grad().data());
+    const auto add = [&](Variable to, const Variable& from) {
+      kernels::add_scaled(from.grad().size(), 1, from.grad().data(), to.mutable_grad().data());
+    };
+    for (std::size_t apart = 1; apart < lanes.size(); apart *= 2) {
+      for (std::size_t lane = 0; lane + apart < lanes.size(); lane += 2 * apart)
+        add((*lanes[lane])[i].value, (*lanes[lane + apart])[i].value);
     }
+    add(parameters_[i].value, (*lanes.front())[i].value);
   }
   adam_.set_learning_rate(learning_rate());
   const double norm = adam_.step();

@@ -46,7 +46,8 @@ class TrainingState {
   /// chance to learn by then. True from the 100th on.
   bool collapsed(bool looks_so);
 
-  /// Sets the gradients to the sum of the lanes', in their order, and applies Adam; counts the step. Returns
+  /// Sets the gradients to the sum of the lanes', which is taken as a balanced binary tree (pairs of
+  /// neighbours, then pairs of pairs) in the lanes' own gradients, and applies Adam; counts the step. Returns
   /// the gradient's norm before clipping. Throws TrainingStopped, with nothing changed, when it is not
   /// finite.
   double apply(const std::vector<const std::vector<Parameter>*>& lanes);

@@ -50,7 +50,7 @@ struct Scores {
 Scores score_all(const Arguments& a, std::span<const ModelFile> files, const WindowSet& windows,
                  const Scored& scored, const Baselines& baselines, OutputsFile* outputs,
                  EvaluationPage* page) {
-  const Committee network(files);
+  const Committee network(files, precision_of(a.choice("precision", {"fp32", "int8"})));
   Scores scores(windows, files.front(), 1 + baselines.size());
   draw_all(a, network, windows, scored.split.test, baselines, [&](const Drawn& d) {
     const Zone zone = windows.zone(d.example);
@@ -131,7 +131,7 @@ std::vector<std::pair<std::string, std::string>> made_by(const Arguments& a, con
 
 int evaluate_on_recordings(const Arguments& a) {
   const std::vector<ModelFile> files = load_models(a.list("model"));
-  const Committee network(files);
+  const Committee network(files, precision_of(a.choice("precision", {"fp32", "int8"})));
   Scored scored = scored_of(a, files.front(), {"window", "pass", "trial", "texture", "none"});
   const WindowSet windows = load_windows(a, files.front());
   scored.split = make_split(windows, split_kind(scored.split_name), scored.seed, scored.leave_out);

@@ -54,18 +54,21 @@ void draw_all(const Arguments& a, const Committee& network, const Examples& exam
               const std::function<void(const Drawn&)>& use) {
   std::vector<std::vector<float>> plain(baselines.size(), std::vector<float>(examples.image().pixels()));
   Progress progress(a, "evaluating", test.size(), "pictures");
-  for_each_output(network, examples, test, [&](const EvaluatedBatch& b) {
-    for (std::size_t n = 0; n < b.size(); ++n) {
-      Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.spread(n), b.input(n)};
-      for (std::size_t k = 0; k < baselines.size(); ++k) {
-        baselines[k]->predict(b.input(n), plain[k]);
-        drawn.pictures.push_back(plain[k]);
-      }
-      use(drawn);
-    }
-    progress.update(b.first + b.size());
-    return !interrupted();
-  });
+  for_each_output(
+      network, examples, test,
+      [&](const EvaluatedBatch& b) {
+        for (std::size_t n = 0; n < b.size(); ++n) {
+          Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.spread(n), b.input(n)};
+          for (std::size_t k = 0; k < baselines.size(); ++k) {
+            baselines[k]->predict(b.input(n), plain[k]);
+            drawn.pictures.push_back(plain[k]);
+          }
+          use(drawn);
+        }
+        progress.update(b.first + b.size());
+        return !interrupted();
+      },
+      static_cast<std::size_t>(a.integer("batch", 1, 4096)));
   stop_if_interrupted();
 }
 

@@ -35,9 +35,9 @@ LiveWindowSettings window_settings(const ModelFile& model, const SensorSource& s
 
 }  // namespace
 
-PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource& source)
+PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource& source, Precision precision)
     : model_(models.front()),
-      network_(models),
+      network_(models, precision),
       window_(window_settings(model_, source)),
       input_(network_.first().input_shape(1)),
       output_(network_.estimate(input_)),  // the first run takes memory and chooses kernels

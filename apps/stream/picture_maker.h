@@ -17,7 +17,8 @@ class PictureMaker {
   /// For the frames of this source. `models`, those of a committee, must outlive this. Throws
   /// std::runtime_error when they were trained on another array, or behind another moving average than the
   /// frames have gone through, which cannot be taken back.
-  PictureMaker(std::span<const ModelFile> models, const SensorSource& source);
+  PictureMaker(std::span<const ModelFile> models, const SensorSource& source,
+               Precision precision = Precision::fp32);
 
   void push(const SensorFrame& frame);
   /// The picture [height][width] of image() after the newest frame, valid until the next call; empty before

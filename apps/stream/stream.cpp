@@ -16,7 +16,10 @@ constexpr double kMostLateS = 0.02, kWaitS = 0.05, kFiguresEveryS = 0.5, kShowEv
 }  // namespace
 
 Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models, SensorSource& source)
-    : settings_(settings), source_(source), maker_(models, source), figures_s_(monotonic_seconds()) {
+    : settings_(settings),
+      source_(source),
+      maker_(models, source, settings.precision),
+      figures_s_(monotonic_seconds()) {
   state_.array = source.array();
   state_.scale = maker_.image().height / state_.array.rows;
   const PictureFormat format = maker_.format();

@@ -110,7 +110,8 @@ nlohmann::ordered_json Sweep::row(const GridPoint& point, const TrainingRun& tra
   SuperTacSettings s = point.model;
   set_array(s, windows_->array());
   const Tensor window = Tensor::full(model.input_shape(1), real(0.5));
-  const Latency latency = measure_latency([&] { model.infer(window); });
+  const Prepared prepared(model);
+  const Latency latency = measure_latency([&] { prepared.estimate(window); });
   nlohmann::ordered_json row = {{"model", point.name()},
                                 {"preset", s.preset},
                                 {"timesteps", s.timesteps},

@@ -3,6 +3,7 @@
 #include "autograd/checks.h"
 #include "autograd/kernels/conv.h"
 #include "autograd/kernels/linear.h"
+#include "autograd/trace.h"
 
 namespace supertac {
 namespace {
@@ -68,6 +69,7 @@ Variable convolve(const char* op, const Variable& x, const Variable& w, const Va
   Tensor y(rank == 3 ? Shape{x.dim(0), s.out_width(), sizes.cout}
                      : Shape{x.dim(0), s.out_height(), s.out_width(), sizes.cout});
   kernels::conv(sizes, x.value().data(), w.value().data(), b.value().data(), o.negative_slope, y.data());
+  Trace::describe({.map = s, .negative_slope = o.negative_slope});
   return record(op, y, {&x, &w, &b}, [sizes, slope = o.negative_slope](Backward& g) {
     const real* gs = before_activation(g, slope);
     if (const Backward::Slot gx = g.slot_of(0)) {

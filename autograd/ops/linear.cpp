@@ -2,6 +2,7 @@
 
 #include "autograd/checks.h"
 #include "autograd/kernels/linear.h"
+#include "autograd/trace.h"
 
 namespace supertac {
 
@@ -19,6 +20,7 @@ Variable linear(const Variable& x, const Variable& w, const Variable& b, real ne
   Tensor y(Shape{rows, out});
   kernels::linear(rows, in, out, x.value().data(), w.value().data(), b.value().data(), negative_slope,
                   y.data());
+  Trace::describe({.negative_slope = negative_slope});
   return record("linear", y, {&x, &w, &b}, [rows, in, out, negative_slope](Backward& g) {
     const real* gs = before_activation(g, negative_slope);
     if (const Backward::Slot gx = g.slot_of(0)) {

@@ -1,10 +1,12 @@
 #include "autograd/ops/shaping.h"
 
+#include <algorithm>
 #include <array>
 
 #include "autograd/checks.h"
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/shaping.h"
+#include "autograd/trace.h"
 
 namespace supertac {
 namespace {
@@ -88,6 +90,26 @@ Variable slice(const Variable& x, Dim begin, Dim length) {
       kernels::move_columns(rows, length, b.gy().data(), {length, 0}, Into::add, gx->data(), {width, begin});
     }
   });
+}
+
+Variable take_runs(const Variable& x, const Runs& r) {
+  if (x.rank() < 1) refuse("take_runs", "x expects at least rank 1, got " + x.shape().text());
+  const Dim width = x.dim(x.rank() - 1);
+  if (r.first < 0 || r.run < 1 || r.step < r.run || r.width < r.run || r.width % r.run != 0 ||
+      r.first + (r.width / r.run - 1) * r.step + r.run > width) {
+    refuse("take_runs", std::to_string(r.width / std::max<Dim>(r.run, 1)) + " runs of " +
+                            std::to_string(r.run) + " from " + std::to_string(r.first) + " leave x " +
+                            x.shape().text());
+  }
+  Tensor y(with_last(x.shape(), r.width));
+  const Dim rows = x.size() / width;
+  for (Dim at = 0; at < r.width; at += r.run) {
+    kernels::move_columns(rows, r.run, x.value().data(), {width, r.first + at / r.run * r.step},
+                          Into::overwrite, y.data(), {r.width, at});
+  }
+  if (x.requires_grad()) refuse("take_runs", "x wants a gradient, which this op does not have");
+  Trace::describe({.first = r.first, .run = r.run, .step = r.step});
+  return record("take_runs", y, {&x}, [](Backward&) {});
 }
 
 Variable flatten_channels_first(const Variable& x) {

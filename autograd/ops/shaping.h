@@ -14,6 +14,13 @@ Variable concat(std::span<const Variable> xs);
 /// y = x[..., begin : begin + length] along the last axis. Throws when the range leaves x.
 Variable slice(const Variable& x, Dim begin, Dim length);
 
+/// Which columns of [.., width] take_runs() takes: from `first` on, runs of `run`, `step` apart.
+struct Runs {
+  Dim first, run, step, width;  // width of the result: a multiple of run
+};
+/// y[.., k] = x[.., first + k / run * step + k % run]. Throws when that leaves x. No gradient: for inputs.
+Variable take_runs(const Variable& x, const Runs& runs);
+
 /// [N, P..., C] -> [N, C P]: the order in which PyTorch flattens [N,C,P...], so that the weights of the
 /// following linear layer mean the same there.
 Variable flatten_channels_first(const Variable& x);

@@ -131,7 +131,7 @@ TEST_F(Streaming, ARecordingGivesThePicturesOfItsWindows) {
     while (at < times.size() && times[at] < time - 1e-9) ++at;
     if (at == times.size() || times[at] > time + 1e-9) continue;  // a lost frame has no picture
     windows.window(i, window.values());
-    const Tensor picture = file.model->infer(window);
+    const Tensor picture = Prepared(*file.model).estimate(window).picture;
     ASSERT_TRUE(std::equal(picture.data(), picture.data() + 64, &pictures[at * 64])) << "window " << i;
     ++compared;
   }

@@ -23,7 +23,8 @@ TEST(Committee, AveragesItsMembers) {
   save_model(paths[1], small_model(2), {}, {});
   const std::vector<ModelFile> files = load_models(paths);
   const Tensor windows = Tensor::full({3, 32, 16}, real(0.4));
-  const Tensor a = files[0].model->infer(windows), b = files[1].model->infer(windows);
+  const Tensor a = Prepared(*files[0].model).estimate(windows).picture,
+               b = Prepared(*files[1].model).estimate(windows).picture;
   const Tensor mean = Committee(files).infer(windows), alone = Committee(*files[0].model).infer(windows);
   ASSERT_EQ(mean.shape(), a.shape());
   double difference = 0;
@@ -48,7 +49,8 @@ TEST(Committee, AddsTheVarianceOfItsMembersToTheirSpread) {
   }
   const std::vector<ModelFile> files = load_models(paths);
   const Tensor windows = Tensor::full({3, 32, 16}, real(0.4));
-  const Estimate a = files[0].model->estimate(windows), b = files[1].model->estimate(windows);
+  const Estimate a = Prepared(*files[0].model).estimate(windows),
+                 b = Prepared(*files[1].model).estimate(windows);
   const Estimate both = Committee(files).estimate(windows);
   for (std::size_t i = 0; i < a.picture.values().size(); ++i) {
     const double half = (a.picture.values()[i] - b.picture.values()[i]) / 2;

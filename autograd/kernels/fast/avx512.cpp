@@ -9,6 +9,7 @@ namespace {
 constexpr int kTilePixels = 8;  // 8 x 2 accumulators: twice what hides FMA's latency of 4 on two ports
 constexpr int kNarrowTilePixels = 12;
 constexpr int kOuterRows = 8;
+constexpr int kPlaneRows = 8;
 
 struct Vec {
   static constexpr Dim kLanes = 16;
@@ -23,6 +24,31 @@ struct Vec {
   static Vec rectify(Vec x, Vec slope) {
     return {_mm512_mask_mul_ps(x.v, _mm512_cmp_ps_mask(x.v, _mm512_setzero_ps(), _CMP_NGT_UQ), slope.v, x.v)};
   }
+  /// to[j * to_step + i] = from[i * from_step + j]
+  static void transpose(const real* from, Dim from_step, real* to, Dim to_step) {
+    __m512 a[16], b[16];
+    for (Dim i = 0; i < 16; ++i) a[i] = _mm512_loadu_ps(from + i * from_step);
+    for (int i = 0; i < 16; i += 2) {
+      b[i] = _mm512_unpacklo_ps(a[i], a[i + 1]);
+      b[i + 1] = _mm512_unpackhi_ps(a[i], a[i + 1]);
+    }
+    for (int i = 0; i < 16; i += 4) {  // a[i + k]: column k of every group of four, rows i .. i + 3
+      a[i] = _mm512_shuffle_ps(b[i], b[i + 2], 0x44);
+      a[i + 1] = _mm512_shuffle_ps(b[i], b[i + 2], 0xEE);
+      a[i + 2] = _mm512_shuffle_ps(b[i + 1], b[i + 3], 0x44);
+      a[i + 3] = _mm512_shuffle_ps(b[i + 1], b[i + 3], 0xEE);
+    }
+    for (Dim k = 0; k < 4; ++k) {
+      const __m512 even = _mm512_shuffle_f32x4(a[k], a[k + 4], 0x88);
+      const __m512 odd = _mm512_shuffle_f32x4(a[k], a[k + 4], 0xDD);
+      const __m512 even2 = _mm512_shuffle_f32x4(a[k + 8], a[k + 12], 0x88);
+      const __m512 odd2 = _mm512_shuffle_f32x4(a[k + 8], a[k + 12], 0xDD);
+      _mm512_storeu_ps(to + k * to_step, _mm512_shuffle_f32x4(even, even2, 0x88));
+      _mm512_storeu_ps(to + (k + 4) * to_step, _mm512_shuffle_f32x4(odd, odd2, 0x88));
+      _mm512_storeu_ps(to + (k + 8) * to_step, _mm512_shuffle_f32x4(even, even2, 0xDD));
+      _mm512_storeu_ps(to + (k + 12) * to_step, _mm512_shuffle_f32x4(odd, odd2, 0xDD));
+    }
+  }
   void store(real* p) const { _mm512_storeu_ps(p, v); }
   void store_part(real* p, Dim n) const { _mm512_mask_storeu_ps(p, mask(n), v); }
 };
@@ -30,10 +56,13 @@ struct Vec {
 #include "autograd/kernels/fast/isa_kernels.inl"
 #include "autograd/kernels/fast/isa_winograd.inl"
 
+#include "autograd/kernels/fast/isa_inference.inl"
+
 }  // namespace
 
-const IsaKernels kAvx512Kernels{"avx512", Vectors::avx512, gather,  gather_rows, outer,
-                                filters,  filter_grads,    patches, squares,     square_grads};
+const IsaKernels kAvx512Kernels{"avx512",     Vectors::avx512, gather,  gather_rows,  outer,   filters,
+                                filter_grads, patches,         squares, square_grads, product, map_patches,
+                                places,       map_squares,     gate,    mean,         planes,  plane_conv};
 
 }  // namespace supertac::kernels
 

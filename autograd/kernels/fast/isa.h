@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "autograd/kernels/fast/geometry.h"
+#include "autograd/kernels/fast/inference.h"
 
 namespace supertac::kernels {
 
@@ -45,6 +46,7 @@ inline constexpr Dim kTransformChannels = 16;
 struct FilterJob {
   Dim weights = 0;  // a multiple of kTransformChannels
   Dim step = 0;
+  Dim square = 4;  // pixels each way: 4, or 2 (map_patches, map_squares)
 };
 
 /// Instructions that plain loops (loops.h) are compiled for.
@@ -67,6 +69,17 @@ struct IsaKernels {
                   real* y) = nullptr;
   /// places = A g A^T of the squares g of gy
   void (*square_grads)(const TileJob& job, const real* gy, real* places) = nullptr;
+
+  // Of prepared networks, see inference.h. `x` of patches and plane_conv begins with the margin.
+  void (*product)(const ProductJob& job, const real* x, real* y) = nullptr;
+  void (*map_patches)(const MapTileJob& job, const real* x, real* places) = nullptr;
+  void (*places)(const PlacesJob& job, const real* v, const real* u, real* m) = nullptr;
+  void (*map_squares)(const MapTileJob& job, const real* places, const real* bias, real negative_slope,
+                      real* y) = nullptr;
+  void (*gate)(const MapJob& job, const real* a, const real* x, const real* gates, real* y) = nullptr;
+  void (*mean)(const MapJob& job, const real* x, real* means) = nullptr;
+  void (*planes)(const PlaneJob& job, Dim x_line, const real* x, real* to) = nullptr;
+  void (*plane_conv)(const PlaneJob& job, const real* x, real* y) = nullptr;
 };
 
 /// The best set this processor has, or the one that SUPERTAC_ISA=avx512|avx2|portable|plain names.

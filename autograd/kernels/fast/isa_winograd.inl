@@ -70,6 +70,34 @@ struct SquareGradTransform {  // A
   }
 };
 
+// F(2x2, 3x3), for the points 0, 1, -1 and infinity.
+struct SmallFilterTransform {
+  static constexpr int kIn = 3, kOut = 4;
+  ALWAYS_INLINE static void run(const Vec (&g)[3], Vec (&to)[4]) {
+    const Vec ends = Vec::add(g[0], g[2]);
+    to[0] = g[0];
+    to[1] = times(0.5, Vec::add(ends, g[1]));
+    to[2] = times(0.5, Vec::sub(ends, g[1]));
+    to[3] = g[2];
+  }
+};
+struct SmallPatchTransform {
+  static constexpr int kIn = 4, kOut = 4;
+  ALWAYS_INLINE static void run(const Vec (&d)[4], Vec (&to)[4]) {
+    to[0] = Vec::sub(d[0], d[2]);
+    to[1] = Vec::add(d[1], d[2]);
+    to[2] = Vec::sub(d[2], d[1]);
+    to[3] = Vec::sub(d[3], d[1]);
+  }
+};
+struct SmallSquareTransform {
+  static constexpr int kIn = 4, kOut = 2;
+  ALWAYS_INLINE static void run(const Vec (&m)[4], Vec (&to)[2]) {
+    to[0] = Vec::add(Vec::add(m[0], m[1]), m[2]);
+    to[1] = Vec::add(Vec::sub(m[1], m[2]), m[3]);
+  }
+};
+
 template <class Transform>
 ALWAYS_INLINE void both_ways(const Vec (&from)[Transform::kIn][Transform::kIn],
                              Vec (&to)[Transform::kOut][Transform::kOut]) {
@@ -86,17 +114,23 @@ ALWAYS_INLINE void both_ways(const Vec (&from)[Transform::kIn][Transform::kIn],
   }
 }
 
-void filters(const FilterJob& job, const real* g, real* u) {
+template <class Transform>
+inline void filters_by(const FilterJob& job, const real* g, real* u) {
+  constexpr int kSide = Transform::kOut;
   for (Dim k = 0; k < job.weights; k += Vec::kLanes) {
-    Vec from[3][3], to[6][6];
+    Vec from[3][3], to[kSide][kSide];
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) from[i][j] = Vec::load(g + (3 * i + j) * job.weights + k);
     }
-    both_ways<FilterTransform>(from, to);
-    for (int i = 0; i < 6; ++i) {
-      for (int j = 0; j < 6; ++j) to[i][j].store(u + (6 * i + j) * job.step + k);
+    both_ways<Transform>(from, to);
+    for (int i = 0; i < kSide; ++i) {
+      for (int j = 0; j < kSide; ++j) to[i][j].store(u + (kSide * i + j) * job.step + k);
     }
   }
+}
+
+void filters(const FilterJob& job, const real* g, real* u) {
+  job.square == 4 ? filters_by<FilterTransform>(job, g, u) : filters_by<SmallFilterTransform>(job, g, u);
 }
 
 void filter_grads(const FilterJob& job, const real* u, real* g) {

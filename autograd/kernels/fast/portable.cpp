@@ -8,6 +8,7 @@ namespace {
 constexpr int kTilePixels = 4;
 constexpr int kNarrowTilePixels = 8;
 constexpr int kOuterRows = 4;
+constexpr int kPlaneRows = 4;
 
 struct Vec {
   static constexpr Dim kLanes = 1;
@@ -23,6 +24,7 @@ struct Vec {
   static Vec fma(Vec a, Vec b, Vec c) { return {__builtin_fmaf(a.v, b.v, c.v)}; }
 #endif
   static Vec rectify(Vec x, Vec slope) { return {x.v > 0 ? x.v : slope.v * x.v}; }
+  static void transpose(const real* from, Dim, real* to, Dim) { *to = *from; }
   void store(real* p) const { *p = v; }
   void store_part(real* p, Dim) const { *p = v; }
 };
@@ -30,14 +32,20 @@ struct Vec {
 #include "autograd/kernels/fast/isa_kernels.inl"
 #include "autograd/kernels/fast/isa_winograd.inl"
 
+#include "autograd/kernels/fast/isa_inference.inl"
+
 }  // namespace
 
 #ifdef SUPERTAC_SCALAR_FMA
-const IsaKernels kPortableFmaKernels{"portable", Vectors::baseline, gather,  gather_rows, outer,
-                                     filters,    filter_grads,      patches, squares,     square_grads};
+const IsaKernels kPortableFmaKernels{
+    "portable",   Vectors::baseline, gather,  gather_rows,  outer,   filters,
+    filter_grads, patches,           squares, square_grads, product, map_patches,
+    places,       map_squares,       gate,    mean,         planes,  plane_conv};
 #else
-const IsaKernels kPortableKernels{"portable", Vectors::baseline, gather,  gather_rows, outer,
-                                  filters,    filter_grads,      patches, squares,     square_grads};
+const IsaKernels kPortableKernels{
+    "portable",   Vectors::baseline, gather,  gather_rows,  outer,   filters,
+    filter_grads, patches,           squares, square_grads, product, map_patches,
+    places,       map_squares,       gate,    mean,         planes,  plane_conv};
 #endif
 
 }  // namespace supertac::kernels

@@ -51,6 +51,16 @@ TEST(Shaping, Empty) {
   EXPECT_EQ(unflattened(Variable(Tensor::zeros({0, 6})), {3}).shape().text(), "[0,3,2]");
 }
 
+TEST(Shaping, TakesRunsOfColumns) {
+  const Variable x(Tensor::of({2, 6}, {0, 1, 2, 3, 4, 5, 10, 11, 12, 13, 14, 15}));
+  const Variable y = take_runs(x, {.first = 1, .run = 2, .step = 3, .width = 4});
+  EXPECT_EQ(std::vector<real>(y.value().values().begin(), y.value().values().end()),
+            (std::vector<real>{1, 2, 4, 5, 11, 12, 14, 15}));
+  expect_refusal("take_runs: 2 runs of 2 from 2 leave x [2,6]", [&] { take_runs(x, {2, 2, 3, 4}); });
+  expect_refusal("take_runs: x wants a gradient, which this op does not have",
+                 [&] { take_runs(Variable(Tensor::zeros({2, 6}), true), {0, 2, 2, 4}); });
+}
+
 TEST(Shaping, RefusesWhatDoesNotFit) {
   const Variable x(Tensor::zeros({2, 3})), scalar(Tensor::zeros({}));
   expect_refusal("reshape: [2,3] has 6 elements, the new shape [4] needs 4", [&] { reshape(x, {4}); });

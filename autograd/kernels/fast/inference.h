@@ -1,0 +1,60 @@
+// Jobs of the kernels that prepared networks run (models/prepared.h). Maps have margins of zeros, so that no
+// tap needs to know where the border is, and weights lie as the loops read them.
+#pragma once
+
+#include "autograd/tensor.h"
+
+namespace supertac::kernels {
+
+/// Numbers from one image, line or pixel of a map to the next.
+struct Strides {
+  Dim image = 0, line = 0, pixel = 0;
+};
+
+/// y[pixel, :] = f(bias + sum over segments, k of x[pixel + segment + k] * w[segment, k, :]) for the pixels
+/// of a map, f(s) = s for s > 0, else negative_slope * s. Neighbours in a line lie side by side, so a row of
+/// taps is one segment. A linear layer is the map of one pixel.
+struct ProductJob {
+  Dim images = 1, height = 1, width = 1;  // of y
+  Strides from, to;
+  const Dim* segments = nullptr;  // [segment_count], offsets
+  Dim segment_count = 0, length = 0;
+  const real* w = nullptr;     // [segment_count][length][cout]
+  const real* bias = nullptr;  // [cout] or null
+  Dim cout = 0;
+  real negative_slope = 1;
+};
+
+/// Tiles of square x square pixels of maps with a margin of one pixel, numbered through a batch: first ..
+/// first + count. Place (i, j) of the k-th of them is places[((square + 2) i + j) * step + k * channels + c].
+struct MapTileJob {
+  Dim tiles_down = 0, tiles_across = 0;
+  Strides map;
+  Dim channels = 0;  // a multiple of kTransformChannels
+  Dim square = 4;    // or 2
+  Dim first = 0, count = 0, step = 0;
+};
+
+/// For each place of Winograd's transform m[place, tile, :] = sum over cin of v[place, tile, cin] * u[place,
+/// cin, :].
+struct PlacesJob {
+  Dim places = 0, tiles = 0, cin = 0, cout = 0;
+  Dim place = 0;  // numbers from one place of u to the next
+};
+
+/// y[pixel, c] = a[pixel, c] + x[pixel, c] * gate[image, c], without gates a + x; and means over pixels.
+struct MapJob {
+  Dim images = 0, height = 0, width = 0, channels = 0;
+  Strides a, x, y;
+};
+
+/// A 3x3 convolution with one output of a map of one image whose channels are planes [cin][height + 2][line]
+/// with a margin of one pixel and `line` at least the width, filled up to whole vectors, plus two.
+struct PlaneJob {
+  Dim height = 0, width = 0, cin = 0, line = 0;
+  const real* w = nullptr;  // [cin][3 columns][3 rows]
+  real bias = 0, negative_slope = 1;
+};
+inline constexpr Dim kWidestVector = 16;
+
+}  // namespace supertac::kernels

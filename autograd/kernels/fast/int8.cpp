@@ -1,0 +1,78 @@
+#include "autograd/kernels/fast/int8.h"
+
+#include <cmath>
+
+#include "autograd/kernels/fast/isa.h"
+
+namespace supertac::kernels {
+namespace {
+
+std::uint8_t to_byte(float x, Steps s) {
+  float level = std::fma(x, 1 / s.step, static_cast<float>(s.zero));
+  level = level > 0 ? level : 0;  // not a number counts as 0
+  level = level < 255 ? level : 255;
+  return static_cast<std::uint8_t>(std::lrint(level));  // to the nearest, halves to the even one
+}
+
+void finish(const Outcome& to, Dim o, std::int32_t sum, float* y, std::uint8_t* bytes) {
+  float value = std::fma(static_cast<float>(sum), to.scale[o], to.bias[o]);
+  value = value > 0 || to.negative_slope == 1 ? value : to.negative_slope * value;
+  if (y != nullptr) y[o] = value;
+  if (bytes != nullptr) bytes[o] = to_byte(value, to.steps);
+}
+
+// Whole sums of one pixel, then what becomes of them.
+void plain_pixel(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes) {
+  std::int32_t sum[kMaxChannels + kByteOutputs];
+  for (Dim o = 0; o < job.cout; ++o) sum[o] = 0;
+  const std::int8_t* w = job.w;
+  for (Dim s = 0; s < job.segment_count; ++s) {
+    for (Dim k = 0; k < job.length; k += kQuad, w += job.cout * kQuad) {
+      const std::uint8_t* v = x + job.segments[s] + k;
+      for (Dim o = 0; o < job.cout; ++o)
+        sum[o] += v[0] * w[o * 4] + v[1] * w[o * 4 + 1] + v[2] * w[o * 4 + 2] + v[3] * w[o * 4 + 3];
+    }
+  }
+  for (Dim o = 0; o < job.kept; ++o) finish(job.outcome, o, sum[o], y, bytes);
+}
+
+void product(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes) {
+  for (Dim n = 0; n < job.images; ++n) {
+    for (Dim i = 0; i < job.height; ++i) {
+      for (Dim j = 0; j < job.width; ++j) {
+        const Dim at = n * job.to.image + i * job.to.line + j * job.to.pixel;
+        plain_pixel(job, x + n * job.from.image + i * job.from.line + j * job.from.pixel,
+                    y ? y + at : nullptr, bytes ? bytes + at : nullptr);
+      }
+    }
+  }
+}
+
+void line_to_bytes(Dim n, const float* x, Steps steps, std::uint8_t* bytes) {
+  for (Dim i = 0; i < n; ++i) bytes[i] = to_byte(x[i], steps);
+}
+
+}  // namespace
+
+const ByteKernels kPlainByteKernels{product, line_to_bytes};
+
+void to_bytes(const ToBytesJob& job, const float* x, std::uint8_t* bytes) {
+  const auto run = byte_kernels().line_to_bytes;
+  for (Dim n = 0; n < job.images; ++n) {
+    for (Dim i = 0; i < job.height; ++i)
+      run(job.line, x + n * job.from.image + i * job.from.line, job.steps,
+          bytes + n * job.to.image + i * job.to.line);
+  }
+}
+
+const ByteKernels& byte_kernels() {
+#ifndef SUPERTAC_REAL_IS_DOUBLE
+  static const bool has_vnni = __builtin_cpu_supports("avx512vnni");
+  const Vectors vectors = isa_kernels().vectors;
+  if (vectors == Vectors::avx512 && has_vnni) return kVnniByteKernels;
+  if (vectors != Vectors::baseline) return kAvx2ByteKernels;
+#endif
+  return kPlainByteKernels;
+}
+
+}  // namespace supertac::kernels

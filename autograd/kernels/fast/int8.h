@@ -1,0 +1,65 @@
+// Products of bytes, for networks that are prepared with less than fp32 (models/prepared.h). Sums of integers
+// are exact: every instruction set, and every order, gives the same bits.
+#pragma once
+
+#include <cstdint>
+
+#include "autograd/kernels/fast/inference.h"
+
+namespace supertac::kernels {
+
+/// A number x stands for the byte round(x / step) + zero, limited to 0 .. 255.
+struct Steps {
+  float step = 1;
+  std::int32_t zero = 0;
+};
+
+/// What becomes of a sum s of output o: y = f(s * scale[o] + bias[o]), f as in ProductJob, written as a float
+/// and, where asked for, as the byte that stands for it.
+struct Outcome {
+  const float* scale = nullptr;  // [cout]
+  const float* bias = nullptr;   // [cout]
+  float negative_slope = 1;
+  Steps steps;
+};
+
+/// ProductJob with bytes: s[pixel, o] = sum over segments, k of x[pixel + segment + k] * w[segment, k, o].
+/// Strides and segments of x are bytes. `length` is a multiple of kQuad and cout of kByteOutputs; neighbours
+/// along k lie together: w [segment_count][length / kQuad][cout][kQuad].
+struct ByteProductJob {
+  Dim images = 1, height = 1, width = 1;
+  Strides from, to;
+  const Dim* segments = nullptr;
+  Dim segment_count = 0, length = 0;
+  const std::int8_t* w = nullptr;
+  Dim cout = 0, kept = 0;  // of cout outputs the first are kept
+  Outcome outcome;
+};
+inline constexpr Dim kQuad = 4, kByteOutputs = 16;
+
+/// A kernel of one instruction set; either result may be null.
+using ByteProduct = void (*)(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes);
+
+struct ByteKernels {
+  ByteProduct product;
+  void (*line_to_bytes)(Dim n, const float* x, Steps steps, std::uint8_t* bytes);
+};
+
+/// The best that this processor has within the set that isa_kernels() has chosen.
+const ByteKernels& byte_kernels();
+
+/// bytes = the bytes that stand for the numbers of maps [height][line], x and bytes each with its strides.
+struct ToBytesJob {
+  Dim images = 1, height = 1, line = 0;
+  Strides from, to;
+  Steps steps;
+};
+void to_bytes(const ToBytesJob& job, const float* x, std::uint8_t* bytes);
+
+extern const ByteKernels kPlainByteKernels;
+#ifndef SUPERTAC_REAL_IS_DOUBLE
+extern const ByteKernels kAvx2ByteKernels;
+extern const ByteKernels kVnniByteKernels;
+#endif
+
+}  // namespace supertac::kernels

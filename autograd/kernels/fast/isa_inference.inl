@@ -1,0 +1,325 @@
+// The loops of prepared networks (inference.h), over the same vector type as isa_kernels.inl and included
+// behind isa_winograd.inl.
+
+// The pixels of a job one after another.
+struct Cursor {
+  const ProductJob& job;
+  const real* x;
+  real* y;
+  Dim column = 0, line = 0;
+
+  ALWAYS_INLINE void next() {
+    x += job.from.pixel, y += job.to.pixel;
+    if (++column < job.width) return;
+    x += job.from.line - job.width * job.from.pixel, y += job.to.line - job.width * job.to.pixel;
+    column = 0;
+    if (++line < job.height) return;
+    x += job.from.image - job.height * job.from.line, y += job.to.image - job.height * job.to.line;
+    line = 0;
+  }
+};
+
+// P pixels by J vectors of outputs; each output is one accumulator, its sum runs over segments, then k.
+template <int P, int J, bool kPartial>
+inline void product_tile(const ProductJob& job, const real* const (&x)[P], real* const (&y)[P], Dim channel) {
+  const Dim lanes = job.cout - channel - (J - 1) * Vec::kLanes;
+  Vec sum[P][J];
+  for (int j = 0; j < J; ++j) {
+    const real* from = job.bias + channel + j * Vec::kLanes;
+    const Vec start = job.bias == nullptr      ? Vec::broadcast(0)
+                      : kPartial && j == J - 1 ? Vec::load_part(from, lanes)
+                                               : Vec::load(from);
+    for (int p = 0; p < P; ++p) sum[p][j] = start;
+  }
+  const real* w = job.w + channel;
+  for (Dim s = 0; s < job.segment_count; ++s) {
+    const Dim offset = job.segments[s];
+    const real* pixel[P];
+    for (int p = 0; p < P; ++p) pixel[p] = x[p] + offset;
+#pragma GCC unroll 4
+    for (Dim k = 0; k < job.length; ++k, w += job.cout) {
+      Vec weight[J];
+      for (int j = 0; j < J; ++j) {
+        weight[j] = kPartial && j == J - 1 ? Vec::load_part(w + j * Vec::kLanes, lanes)
+                                           : Vec::load(w + j * Vec::kLanes);
+      }
+      for (int p = 0; p < P; ++p) {
+        const Vec value = Vec::broadcast(pixel[p][k]);
+        for (int j = 0; j < J; ++j) sum[p][j] = Vec::fma(value, weight[j], sum[p][j]);
+      }
+    }
+  }
+  for (int p = 0; p < P; ++p) {
+    for (int j = 0; j < J; ++j) {
+      Vec value = sum[p][j];
+      if (job.negative_slope != 1) value = Vec::rectify(value, Vec::broadcast(job.negative_slope));
+      real* to = y[p] + channel + j * Vec::kLanes;
+      if (kPartial && j == J - 1) {
+        value.store_part(to, lanes);
+      } else {
+        value.store(to);
+      }
+    }
+  }
+}
+
+template <int P>
+inline void product_pixels(const ProductJob& job, Cursor& cursor) {
+  const real* x[P];
+  real* y[P];
+  for (int p = 0; p < P; ++p, cursor.next()) x[p] = cursor.x, y[p] = cursor.y;
+  Dim channel = 0;
+  if constexpr (P <= 2) {  // few pixels need more vectors to hide the latency of FMA
+    for (; channel + 4 * Vec::kLanes <= job.cout; channel += 4 * Vec::kLanes) {
+      product_tile<P, 4, false>(job, x, y, channel);
+    }
+  }
+  if constexpr (P <= kTilePixels) {
+    for (; channel + 2 * Vec::kLanes <= job.cout; channel += 2 * Vec::kLanes) {
+      product_tile<P, 2, false>(job, x, y, channel);
+    }
+  }
+  for (; channel + Vec::kLanes <= job.cout; channel += Vec::kLanes) {
+    product_tile<P, 1, false>(job, x, y, channel);
+  }
+  if (channel < job.cout) product_tile<P, 1, true>(job, x, y, channel);
+}
+
+void product(const ProductJob& job, const real* x, real* y) {
+  Cursor cursor{job, x, y};
+  Dim left = job.images * job.height * job.width;
+  if (job.cout <= Vec::kLanes) {  // one vector of outputs: more pixels instead
+    for (; left >= kNarrowTilePixels; left -= kNarrowTilePixels) {
+      product_pixels<kNarrowTilePixels>(job, cursor);
+    }
+  }
+  for (; left >= kTilePixels; left -= kTilePixels) product_pixels<kTilePixels>(job, cursor);
+  if constexpr (kTilePixels > 4) {
+    for (; left >= 4; left -= 4) product_pixels<4>(job, cursor);
+  }
+  for (; left >= 2; left -= 2) product_pixels<2>(job, cursor);
+  if (left > 0) product_pixels<1>(job, cursor);
+}
+
+template <int kSquare>
+ALWAYS_INLINE Dim tile_corner(const MapTileJob& job, Dim tile) {
+  const Dim tiles = job.tiles_down * job.tiles_across, within = tile % tiles;
+  return tile / tiles * job.map.image + within / job.tiles_across * kSquare * job.map.line +
+         within % job.tiles_across * kSquare * job.map.pixel;
+}
+
+template <class Transform>
+inline void patches_by(const MapTileJob& job, const real* x, real* places) {
+  constexpr int kSide = Transform::kIn;
+  for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
+    const real* corner = x + tile_corner<kSide - 2>(job, tile);
+    for (Dim c = 0; c < job.channels; c += Vec::kLanes) {
+      Vec from[kSide][kSide], to[kSide][kSide];
+      for (int i = 0; i < kSide; ++i) {
+        for (int j = 0; j < kSide; ++j)
+          from[i][j] = Vec::load(corner + i * job.map.line + j * job.map.pixel + c);
+      }
+      both_ways<Transform>(from, to);
+      for (int i = 0; i < kSide; ++i) {
+        for (int j = 0; j < kSide; ++j) to[i][j].store(places + (kSide * i + j) * job.step + c);
+      }
+    }
+  }
+}
+
+// x points at the margin's first pixel.
+void map_patches(const MapTileJob& job, const real* x, real* places) {
+  job.square == 4 ? patches_by<PatchTransform>(job, x, places)
+                  : patches_by<SmallPatchTransform>(job, x, places);
+}
+
+// P tiles by J vectors of outputs. The weights are met once for each strip of tiles: those of the next place
+// are called for while these are used.
+template <int P, int J>
+ALWAYS_INLINE void place_tile(const PlacesJob& job, const real* v, const real* u, real* m) {
+  Vec sum[P][J];
+  for (int p = 0; p < P; ++p) {
+    for (int j = 0; j < J; ++j) sum[p][j] = Vec::broadcast(0);
+  }
+#pragma GCC unroll 4
+  for (Dim k = 0; k < job.cin; ++k, u += job.cout) {
+    Vec weight[J];
+    for (int j = 0; j < J; ++j) {
+      weight[j] = Vec::load(u + j * Vec::kLanes);
+      __builtin_prefetch(u + job.place + j * Vec::kLanes);
+    }
+    for (int p = 0; p < P; ++p) {
+      const Vec value = Vec::broadcast(v[p * job.cin + k]);
+      for (int j = 0; j < J; ++j) sum[p][j] = Vec::fma(value, weight[j], sum[p][j]);
+    }
+  }
+  for (int p = 0; p < P; ++p) {
+    for (int j = 0; j < J; ++j) sum[p][j].store(m + p * job.cout + j * Vec::kLanes);
+  }
+}
+
+template <int P>
+ALWAYS_INLINE void place_tiles(const PlacesJob& job, Dim& tile, const real* v, const real* u, real* m) {
+  for (; tile + P <= job.tiles; tile += P) {
+    Dim channel = 0;
+    for (; channel + 2 * Vec::kLanes <= job.cout; channel += 2 * Vec::kLanes) {
+      place_tile<P, 2>(job, v + tile * job.cin, u + channel, m + tile * job.cout + channel);
+    }
+    for (; channel < job.cout; channel += Vec::kLanes) {
+      place_tile<P, 1>(job, v + tile * job.cin, u + channel, m + tile * job.cout + channel);
+    }
+  }
+}
+
+void places(const PlacesJob& job, const real* v, const real* u, real* m) {
+  for (Dim i = 0; i < job.places; ++i) {
+    Dim tile = 0;
+    place_tiles<kTilePixels>(job, tile, v, u, m);
+    if constexpr (kTilePixels > 4) place_tiles<4>(job, tile, v, u, m);
+    place_tiles<2>(job, tile, v, u, m);
+    place_tiles<1>(job, tile, v, u, m);
+    v += job.tiles * job.cin, u += job.place, m += job.tiles * job.cout;
+  }
+}
+
+template <class Transform>
+inline void squares_by(const MapTileJob& job, const real* places, const real* bias, real negative_slope,
+                       real* y) {
+  constexpr int kSide = Transform::kIn, kSquare = Transform::kOut;
+  const Vec slope = Vec::broadcast(negative_slope);
+  for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
+    real* corner = y + tile_corner<kSquare>(job, tile);
+    for (Dim c = 0; c < job.channels; c += Vec::kLanes) {
+      Vec from[kSide][kSide], to[kSquare][kSquare];
+      for (int i = 0; i < kSide; ++i) {
+        for (int j = 0; j < kSide; ++j) from[i][j] = Vec::load(places + (kSide * i + j) * job.step + c);
+      }
+      both_ways<Transform>(from, to);
+      const Vec start = Vec::load(bias + c);
+      for (int i = 0; i < kSquare; ++i) {
+        for (int j = 0; j < kSquare; ++j) {
+          Vec value = Vec::add(start, to[i][j]);
+          if (negative_slope != 1) value = Vec::rectify(value, slope);
+          value.store(corner + i * job.map.line + j * job.map.pixel + c);
+        }
+      }
+    }
+  }
+}
+
+// y points at the map's first pixel.
+void map_squares(const MapTileJob& job, const real* places, const real* bias, real negative_slope, real* y) {
+  job.square == 4 ? squares_by<SquareTransform>(job, places, bias, negative_slope, y)
+                  : squares_by<SmallSquareTransform>(job, places, bias, negative_slope, y);
+}
+
+// A vector of channels of a map that may be the last, partial one.
+struct Lanes {
+  Dim count;
+  ALWAYS_INLINE Vec load(const real* p) const {
+    return count < Vec::kLanes ? Vec::load_part(p, count) : Vec::load(p);
+  }
+  ALWAYS_INLINE void store(Vec v, real* p) const {
+    count < Vec::kLanes ? v.store_part(p, count) : v.store(p);
+  }
+};
+
+template <class Work>
+ALWAYS_INLINE void for_each_vector(const MapJob& job, Work work) {
+  for (Dim image = 0; image < job.images; ++image) {
+    for (Dim c = 0; c < job.channels; c += Vec::kLanes) {
+      work(image, c, Lanes{job.channels - c < Vec::kLanes ? job.channels - c : Vec::kLanes});
+    }
+  }
+}
+
+void gate(const MapJob& job, const real* a, const real* x, const real* gates, real* y) {
+  for_each_vector(
+      job, [&](Dim image, Dim c, Lanes lanes) __attribute__((always_inline)) {
+        const Vec factor = gates ? lanes.load(gates + image * job.channels + c) : Vec::broadcast(1);
+        for (Dim i = 0; i < job.height; ++i) {
+          const real* from = a + image * job.a.image + i * job.a.line + c;
+          const real* change = x + image * job.x.image + i * job.x.line + c;
+          real* to = y + image * job.y.image + i * job.y.line + c;
+          for (Dim j = 0; j < job.width; ++j) {
+            lanes.store(Vec::fma(lanes.load(change), factor, lanes.load(from)), to);
+            from += job.a.pixel, change += job.x.pixel, to += job.y.pixel;
+          }
+        }
+      });
+}
+
+void mean(const MapJob& job, const real* x, real* to) {
+  const Vec share = Vec::broadcast(1 / static_cast<real>(job.height * job.width));
+  for_each_vector(
+      job, [&](Dim image, Dim c, Lanes lanes) __attribute__((always_inline)) {
+        Vec sum = Vec::broadcast(0);
+        for (Dim i = 0; i < job.height; ++i) {
+          const real* from = x + image * job.x.image + i * job.x.line + c;
+          for (Dim j = 0; j < job.width; ++j, from += job.x.pixel) sum = Vec::add(sum, lanes.load(from));
+        }
+        lanes.store(Vec::fma(sum, share, Vec::broadcast(0)), to + image * job.channels + c);
+      });
+}
+
+// Planes of one image [height][width][channels]: x and to point at the map's first pixel.
+void planes(const PlaneJob& job, Dim x_line, const real* x, real* to) {
+  const Dim plane = (job.height + 2) * job.line;
+  for (Dim row = 0; row < job.height; ++row, x += x_line, to += job.line) {
+    for (Dim column = 0; column < job.width; column += Vec::kLanes) {
+      for (Dim c = 0; c < job.cin; c += Vec::kLanes) {
+        if (column + Vec::kLanes <= job.width && c + Vec::kLanes <= job.cin) {
+          Vec::transpose(x + column * job.cin + c, job.cin, to + c * plane + column, plane);
+          continue;
+        }
+        for (Dim k = c; k < c + Vec::kLanes && k < job.cin; ++k) {
+          for (Dim p = column; p < column + Vec::kLanes && p < job.width; ++p) {
+            to[k * plane + p] = x[p * job.cin + k];
+          }
+        }
+      }
+    }
+  }
+}
+
+// R rows of a vector of pixels; each pixel's sum runs over channels, then columns, then rows of the kernel.
+template <int R>
+inline void plane_rows(const PlaneJob& job, const real* x, real* y, Dim lanes) {
+  Vec sum[R];
+  for (int r = 0; r < R; ++r) sum[r] = Vec::broadcast(job.bias);
+  const real* w = job.w;
+  const Dim plane = (job.height + 2) * job.line;
+  for (Dim c = 0; c < job.cin; ++c, x += plane) {
+    for (int column = 0; column < 3; ++column, w += 3) {
+      const Vec top = Vec::broadcast(w[0]), middle = Vec::broadcast(w[1]), bottom = Vec::broadcast(w[2]);
+      Vec value[R + 2];
+      for (int r = 0; r < R + 2; ++r) value[r] = Vec::load(x + r * job.line + column);
+      for (int r = 0; r < R; ++r) sum[r] = Vec::fma(top, value[r], sum[r]);
+      for (int r = 0; r < R; ++r) sum[r] = Vec::fma(middle, value[r + 1], sum[r]);
+      for (int r = 0; r < R; ++r) sum[r] = Vec::fma(bottom, value[r + 2], sum[r]);
+    }
+  }
+  for (int r = 0; r < R; ++r, y += job.width) {
+    const Vec value =
+        job.negative_slope == 1 ? sum[r] : Vec::rectify(sum[r], Vec::broadcast(job.negative_slope));
+    if (lanes < Vec::kLanes) {
+      value.store_part(y, lanes);
+    } else {
+      value.store(y);
+    }
+  }
+}
+
+// x points at the margin's first pixel, y [height][width].
+void plane_conv(const PlaneJob& job, const real* x, real* y) {
+  for (Dim column = 0; column < job.width; column += Vec::kLanes) {
+    const Dim lanes = job.width - column < Vec::kLanes ? job.width - column : Vec::kLanes;
+    Dim row = 0;
+    for (; row + kPlaneRows <= job.height; row += kPlaneRows) {
+      plane_rows<kPlaneRows>(job, x + row * job.line + column, y + row * job.width + column, lanes);
+    }
+    for (; row < job.height; ++row) {
+      plane_rows<1>(job, x + row * job.line + column, y + row * job.width + column, lanes);
+    }
+  }
+}

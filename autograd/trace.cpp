@@ -1,0 +1,27 @@
+#include "autograd/trace.h"
+
+#include <stdexcept>
+#include <utility>
+
+namespace supertac {
+
+static thread_local Trace* current = nullptr;
+
+Trace::Trace() {
+  if (current != nullptr) throw std::logic_error("Trace: this thread is traced already");
+  current = this;
+}
+
+Trace::~Trace() { current = nullptr; }
+
+void Trace::describe(const OpSettings& settings) {
+  if (current != nullptr) current->next_ = settings;
+}
+
+void Trace::note(const char* op, const Variable& y, std::span<const Variable* const> inputs) {
+  if (current == nullptr) return;
+  TracedOp& traced = current->ops_.emplace_back(TracedOp{op, y, {}, std::exchange(current->next_, {})});
+  for (const Variable* x : inputs) traced.inputs.push_back(*x);
+}
+
+}  // namespace supertac

@@ -1,0 +1,48 @@
+// Trace: notes which ops ran, on what and with which settings, for those who compute the same in another way
+// (models/prepared.h).
+#pragma once
+
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "autograd/kernels/conv.h"
+#include "autograd/variable.h"
+
+namespace supertac {
+
+/// What an op was told besides its inputs; each op fills in what it has.
+struct OpSettings {
+  kernels::ConvSettings map{};       ///< convolutions
+  real negative_slope = 1;           ///< convolutions and linear layers
+  Dim first = 0, run = 0, step = 0;  ///< take_runs
+};
+
+struct TracedOp {
+  std::string_view op;  ///< "conv2d"
+  Variable y;
+  std::vector<Variable> inputs;
+  OpSettings settings;
+};
+
+/// While one lives, the ops of this thread are noted in their order. One at a time.
+class Trace {
+ public:
+  Trace();
+  ~Trace();
+  Trace(const Trace&) = delete;
+  Trace& operator=(const Trace&) = delete;
+
+  const std::vector<TracedOp>& ops() const { return ops_; }
+
+  /// For ops: settings of the one that is recorded next.
+  static void describe(const OpSettings& settings);
+  /// For record(): `y` was made.
+  static void note(const char* op, const Variable& y, std::span<const Variable* const> inputs);
+
+ private:
+  std::vector<TracedOp> ops_;
+  OpSettings next_;
+};
+
+}  // namespace supertac

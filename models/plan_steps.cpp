@@ -1,0 +1,234 @@
+// The steps of models/planner.h: each packs its op's weights and returns what runs for a block of images.
+#include <algorithm>
+
+#include "autograd/kernels/elementwise.h"
+#include "models/planner.h"
+
+namespace supertac {
+
+using kernels::ConvSettings;
+
+namespace {
+
+constexpr Dim kTilesAtOnce = 8;
+
+Dim places_of(Dim square) { return (square + 2) * (square + 2); }
+
+bool is_same_3x3(const ConvSettings& s) {
+  return s == ConvSettings{.height = s.height,
+                           .width = s.width,
+                           .kernel_h = 3,
+                           .kernel_w = 3,
+                           .padding_h = 1,
+                           .padding_w = 1};
+}
+
+// Tiles of 4x4 save more products than those of 2x2, but their weights take four times the direct ones' room
+// in the cache: on a small map that is not made up for.
+Dim square_of(const Map& x) {
+  constexpr Dim kFewest = 8;
+  const bool fits = x.height % 4 == 0 && x.width % 4 == 0 && std::min(x.height, x.width) >= kFewest;
+  return fits ? 4 : 2;
+}
+
+struct Winograd {
+  kernels::MapTileJob from, to;
+  Tensor u, bias;  // [kPlaces][place]
+  Dim place;
+  real negative_slope;
+  Map x, y;
+
+  void operator()(const Block& block) const {
+    const auto& set = isa();
+    const Dim tiles = block.images * from.tiles_down * from.tiles_across, places = places_of(from.square);
+    real* v = block.scratch;
+    real* m = v + places * kTilesAtOnce * from.channels;
+    for (Dim first = 0; first < tiles; first += kTilesAtOnce) {
+      kernels::MapTileJob in = from, out = to;
+      in.first = out.first = first;
+      in.count = out.count = std::min(kTilesAtOnce, tiles - first);
+      in.step = in.count * in.channels, out.step = out.count * out.channels;
+      set.map_patches(in, block.begin(x), v);
+      set.places({places, in.count, in.channels, out.channels, place}, v, u.data(), m);
+      set.map_squares(out, m, bias.data(), negative_slope, block.first_pixel(y));
+    }
+  }
+};
+
+}  // namespace
+
+void Planner::load_input(const Variable& input) {
+  if (maps_.contains(input.node())) return;
+  const Map y = new_map(input);
+  plan_->steps_.push_back([y](const Block& b) {
+    const real* from = b.input;
+    for (Dim n = 0; n < b.images; ++n) {
+      real* line = b.first_pixel(y) + n * y.image();
+      for (Dim i = 0; i < y.height; ++i, line += y.line(), from += y.width * y.channels)
+        std::copy_n(from, y.width * y.channels, line);
+    }
+  });
+}
+
+template <Dim kRun>
+static void copy_runs(Dim rows, const real* from, Dim from_step, real* to, Dim to_step) {
+  for (Dim r = 0; r < rows; ++r, from += from_step, to += to_step) std::copy_n(from, kRun, to);
+}
+
+void Planner::take_runs(const TracedOp& op) {
+  const Map y = new_map(op.y);
+  const Dim width = op.inputs[0].dim(2), rows = y.width;
+  const OpSettings s = op.settings;
+  const Dim piece = s.run % 4 == 0 ? 4 : 1;  // a row of the rig's array is one move
+  plan_->steps_.push_back([=](const Block& b) {
+    for (Dim n = 0; n < b.images; ++n) {
+      const real* from = b.input + n * rows * width + s.first;
+      real* to = b.first_pixel(y) + n * y.image();
+      for (Dim k = 0; k < y.channels; k += piece) {
+        (piece == 4 ? copy_runs<4> : copy_runs<1>)(rows, from + k / s.run * s.step + k % s.run, width, to + k,
+                                                   y.channels);
+      }
+    }
+  });
+}
+
+void Planner::conv(const TracedOp& op) {
+  const ConvSettings& s = op.settings.map;
+  const Dim cin = op.inputs[0].dim(op.inputs[0].rank() - 1), cout = op.y.dim(op.y.rank() - 1);
+  const bool whole_vectors =
+      cin % kernels::kTransformChannels == 0 && cout % kernels::kTransformChannels == 0;
+  const bool even = s.height % 2 == 0 && s.width % 2 == 0;
+  if (is_same_3x3(s) && cout == 1) return plane_conv(op);
+  if (is_of_bytes(op)) return direct_conv(op);
+  if (is_same_3x3(s) && whole_vectors && even) return winograd(op);
+  direct_conv(op);
+}
+
+void Planner::winograd(const TracedOp& op) {
+  constexpr Dim kPadding = 16;  // powers of two apart the places share cache lines
+  const Map x = map_of(op.inputs[0]), y = new_map(op.y);
+  const Dim place = x.channels * y.channels + kPadding, square = square_of(x);
+  const Dim down = x.height / square, across = x.width / square, places = places_of(square);
+  Winograd step{.from = {down, across, x.strides(), x.channels, square},
+                .to = {down, across, y.strides(), y.channels, square},
+                .u = Tensor(Shape{places, place}),
+                .bias = op.inputs[2].value().clone(),
+                .place = place,
+                .negative_slope = op.settings.negative_slope,
+                .x = x,
+                .y = y};
+  isa().filters({x.channels * y.channels, place, square}, op.inputs[1].value().data(), step.u.data());
+  plan_->scratch_ = std::max(plan_->scratch_, places * kTilesAtOnce * (x.channels + y.channels));
+  plan_->steps_.push_back(std::move(step));
+}
+
+// [3][3][cin][1] -> [cin][column][row]
+static Tensor plane_weights(const Variable& w) {
+  const Dim cin = w.dim(2);
+  Tensor out(Shape{cin, 3, 3});
+  for (Dim c = 0; c < cin; ++c) {
+    for (Dim k = 0; k < 9; ++k) out.data()[c * 9 + k % 3 * 3 + k / 3] = w.value().data()[k * cin + c];
+  }
+  return out;
+}
+
+// The planes of an image and the convolutions that look at them.
+struct PlaneConvs {
+  struct Output {
+    kernels::PlaneJob job;
+    Tensor w;
+    Map y;
+  };
+  Map x, planes;
+  std::vector<Output> outputs;
+
+  void operator()(const Block& block) const {
+    for (Dim n = 0; n < block.images; ++n) {
+      real* first = block.workspace + planes.offset * block.images;
+      isa().planes(outputs.front().job, x.line(), block.first_pixel(x) + n * x.image(),
+                   first + outputs.front().job.line + 1);
+      for (const Output& output : outputs) {
+        kernels::PlaneJob job = output.job;
+        job.w = output.w.data();
+        isa().plane_conv(job, first, block.first_pixel(output.y) + n * output.y.image());
+      }
+    }
+  }
+};
+
+void Planner::plane_conv(const TracedOp& op) {
+  const Map x = map_of(op.inputs[0]), y = new_map(op.y);
+  const Dim vectors = (x.width + kernels::kWidestVector - 1) / kernels::kWidestVector;
+  const kernels::PlaneJob job{.height = x.height,
+                              .width = x.width,
+                              .cin = x.channels,
+                              .line = vectors * kernels::kWidestVector + 2,
+                              .bias = op.inputs[2].value().data()[0],
+                              .negative_slope = op.settings.negative_slope};
+  PlaneConvs::Output output{job, plane_weights(op.inputs[1]), y};
+  PlaneConvs* last = plan_->steps_.empty() ? nullptr : plan_->steps_.back().target<PlaneConvs>();
+  if (last != nullptr && last->x.offset == x.offset) return last->outputs.push_back(std::move(output));
+  const Map planes = plan_->add_buffer({.height = x.channels * (x.height + 2), .width = job.line});
+  plan_->planes_.push_back(planes);
+  plan_->steps_.push_back(PlaneConvs{x, planes, {std::move(output)}});
+}
+
+void Planner::flatten(const TracedOp&) {}  // the linear layer behind it takes the map as it is
+
+void Planner::unflatten(const TracedOp& op) {
+  const Map x = map_of(op.inputs[0]), y = new_map(op.y);
+  plan_->steps_.push_back([=](const Block& b) {
+    const Dim run = y.width * y.channels;
+    for (Dim n = 0; n < b.images; ++n) {
+      const real* from = b.begin(x) + n * x.image();
+      real* line = b.first_pixel(y) + n * y.image();
+      for (Dim i = 0; i < y.height; ++i, from += run, line += y.line()) std::copy_n(from, run, line);
+    }
+  });
+}
+
+void Planner::concat(const TracedOp& op) {
+  const Map y = new_map(op.y);
+  Dim at = 0;
+  for (const Variable& input : op.inputs) {
+    const Map x = map_of(input);
+    plan_->steps_.push_back([=](const Block& b) {
+      for (Dim n = 0; n < b.images; ++n)
+        std::copy_n(b.begin(x) + n * x.image(), x.channels, b.begin(y) + n * y.image() + at);
+    });
+    at += x.channels;
+  }
+}
+
+void Planner::global_mean(const TracedOp& op) {
+  const Map x = map_of(op.inputs[0]), y = new_map(op.y);
+  plan_->steps_.push_back([=](const Block& b) {
+    isa().mean({b.images, x.height, x.width, x.channels, {}, x.strides(), {}}, b.first_pixel(x), b.begin(y));
+  });
+}
+
+void Planner::sigmoid(const TracedOp& op) {
+  const Map x = map_of(op.inputs[0]), y = new_map(op.y);
+  if (op.y.rank() > 2) throw std::logic_error("Prepared: a sigmoid of maps has no step");
+  plan_->steps_.push_back(
+      [=](const Block& b) { kernels::sigmoid(b.images * x.image(), b.begin(x), b.begin(y)); });
+}
+
+void Planner::gated_sum(const TracedOp& op) {
+  const Map a = map_of(op.inputs[0]), x = map_of(op.inputs[1]), gates = map_of(op.inputs[2]);
+  const Map y = new_map(op.y);
+  plan_->steps_.push_back([=](const Block& b) {
+    isa().gate({b.images, x.height, x.width, x.channels, a.strides(), x.strides(), y.strides()},
+               b.first_pixel(a), b.first_pixel(x), b.begin(gates), b.first_pixel(y));
+  });
+}
+
+void Planner::add(const TracedOp& op) {
+  const Map a = map_of(op.inputs[0]), x = map_of(op.inputs[1]), y = new_map(op.y);
+  plan_->steps_.push_back([=](const Block& b) {
+    isa().gate({b.images, x.height, x.width, x.channels, a.strides(), x.strides(), y.strides()},
+               b.first_pixel(a), b.first_pixel(x), nullptr, b.first_pixel(y));
+  });
+}
+
+}  // namespace supertac
