@@ -151,6 +151,7 @@ def baselines():
 
 
 TASKS = {"infer 1": "inference, batch 1", "infer 8": "inference, batch 8", "infer 64": "inference, batch 64",
+         "int8 1": "in int8, batch 1", "int8 8": "in int8, batch 8", "int8 64": "in int8, batch 64",
          "train 1": "training step of 64 windows", "train 2": "the same on two threads"}
 
 

@@ -50,7 +50,10 @@ class SuperTac(torch.nn.Module):
              layer(f"decoder.{i}.out"))
             for i in range(4)
         ]
-        self.fc, self.out, self.rirbs = layer("upsampler.fc"), layer("upsampler.out"), []
+        self.fc, self.rirbs = layer("upsampler.fc"), []
+        # The picture and, where there is one, its spread: one convolution.
+        outputs = [layer(name) for name in ("upsampler.out", "upsampler.spread") if name + ".weight" in self.tensors]
+        self.out = torch.cat([w for w, _ in outputs]), torch.cat([b for _, b in outputs])
         self.channels = self.fc[0].shape[0] // 16
         while f"upsampler.rirb.{len(self.rirbs)}.up.weight" in self.tensors:
             rirb, rcabs = f"upsampler.rirb.{len(self.rirbs)}", []
@@ -85,10 +88,10 @@ class SuperTac(torch.nn.Module):
                 h = h + r * torch.sigmoid(gate)
             h = skip + F.conv2d(h, w, b, padding=1)
             h = F.leaky_relu(F.conv_transpose2d(h, up_w, up_b, stride=2, padding=1), 0.01)
-        return F.conv2d(h, *self.out, padding=1)[:, 0]
+        return F.conv2d(h, *self.out, padding=1)
 
     def forward(self, windows):
-        """Inference, z = mean: windows [N,T,16] -> [N,S,S]."""
+        """Inference, z = mean: windows [N,T,16] -> [N,1 or 2,S,S], the picture and its spread."""
         return self.upsample(torch.cat([F.linear(self.features(windows, i), *self.encoders[i][2]) for i in range(4)], 1))
 
     def loss(self, windows, eps, truth, a=0.2, beta=1e-3, weight_ssim=0.1):
@@ -101,7 +104,7 @@ class SuperTac(torch.nn.Module):
             z = mean + torch.exp(log_var / 2) * eps[i]
             vae = vae + F.mse_loss(self.decode(z, i), windows[:, :, self.groups[i]]) + beta * make_parity.kld(mean, log_var)
             zs.append(z)
-        picture = self.upsample(torch.cat(zs, 1))
+        picture = self.upsample(torch.cat(zs, 1))[:, 0]
         return a * vae + (1 - a) * (F.mse_loss(picture, truth) + weight_ssim * (1 - make_parity.ssim(picture, truth)))
 
 
