@@ -288,6 +288,33 @@ def never_felt():
                   for r in rows("never_felt.csv")])
 
 
+def simulated_only():
+    return table(["random passes", "epochs", "plate", "contact SSIM", "PSNR dB", "ghosts on flat"],
+                 [[r["random_passes"], r["epochs"], r["plate"], r["contact_ssim"], r["contact_psnr_db"],
+                   f"{100 * float(r['flat_ghost_rate']):.0f} %"] for r in rows("simulated_only.csv")])
+
+
+def whole_passes():
+    percent = lambda v: f"{100 * float(v):.1f} %"
+    return table(["network", "windows of", "contact SSIM", "PSNR dB", "position mm", "misses", "ghosts on flat", "intervals hold",
+                  "SSIM of the surest 80 %", "AUROC of SSIM below .8", "spread at 0 to 15 mm / beyond 30"],
+                 [[r["network"], r["windows_of"], f"{float(r['contact_ssim']):.3f}", f"{float(r['contact_psnr_db']):.1f}",
+                   f"{float(r['position_error_mm']):.2f}", percent(r["miss_rate"]), percent(r["flat_ghost_rate"]), percent(r["coverage"]),
+                   f"{float(r['sure_ssim']):.3f}", f"{float(r['auroc']):.2f}", f"{float(r['spread_near']) / float(r['spread_far']):.2f}"]
+                  for r in rows("whole_passes.csv")])
+
+
+def corruptions():
+    found = rows("corruptions.csv")
+    lines = []
+    for name in dict.fromkeys(r["corruption"] for r in found if r["corruption"] != "none"):
+        at = {r["severity"]: r for r in found if r["corruption"] == name}
+        lines.append([name] + [f"{float(at[s]['ssim']):.3f}" for s in "135"] + [f"{100 * float(at[s]['coverage']):.0f} %" for s in "135"] +
+                     [f"{float(at[s]['alarm_auroc']):.3f}" for s in "135"] + [f"{100 * float(at['3']['alarms']):.0f} %"])
+    return table(["corruption", "contact SSIM at 1", "at 3", "at 5", "intervals hold at 1", "at 3", "at 5", "alarm's AUROC at 1", "at 3",
+                  "at 5", "alarms at 3"], lines)
+
+
 def demo():
     return table(["windows of", "method", "contact SSIM", "PSNR dB", "position mm", "misses", "ghosts: flat", "air", "all SSIM",
                   "PSNR dB"],
@@ -306,7 +333,7 @@ def tried():
 
 
 SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, streaming, growth, pixels, textures, simulator, stability,
-                   rig, demo, tried, never_felt, terms],
+                   rig, whole_passes, corruptions, demo, tried, never_felt, simulated_only, terms],
             README: [accuracy, speed]}
 
 
