@@ -61,7 +61,7 @@ int listening_socket(WebAddress& address) {
   setsockopt(file, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
   setsockopt(file, SOL_SOCKET, SO_SNDBUF, &kSendBuffer, sizeof kSendBuffer);  // connections inherit it
   socklen_t size = sizeof place;
-  if (bind(file, reinterpret_cast<sockaddr*>(&place), size) != 0 || listen(file, 64) != 0 ||
+  if (bind(file, reinterpret_cast<sockaddr*>(&place), size) != 0 || listen(file, SOMAXCONN) != 0 ||
       getsockname(file, reinterpret_cast<sockaddr*>(&place), &size) != 0) {
     const std::string why = strerror(errno);
     close(file);
@@ -215,10 +215,11 @@ struct WebRequest {
 WebServer::WebServer(const WebAddress& address, WebSite site)
     : address_(address), site_(std::move(site)), token_(random_token()) {
   const int file = listening_socket(address_);
-  daemon_ = MHD_start_daemon(MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr, nullptr,
-                             &WebRequest::handle, this, MHD_OPTION_LISTEN_SOCKET, file,
-                             MHD_OPTION_CONNECTION_LIMIT, kConnections, MHD_OPTION_CONNECTION_TIMEOUT,
-                             kStalledS, MHD_OPTION_CONNECTION_MEMORY_LIMIT, kRequestBytes, MHD_OPTION_END);
+  // Not with epoll: it would see no end of a connection that was closed behind half a request.
+  daemon_ = MHD_start_daemon(MHD_ALLOW_SUSPEND_RESUME, 0, nullptr, nullptr, &WebRequest::handle, this,
+                             MHD_OPTION_LISTEN_SOCKET, file, MHD_OPTION_CONNECTION_LIMIT, kConnections,
+                             MHD_OPTION_CONNECTION_TIMEOUT, kStalledS, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+                             kRequestBytes, MHD_OPTION_END);
   if (daemon_ == nullptr) {
     close(file);
     refuse(address_, "the server does not start");

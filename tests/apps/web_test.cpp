@@ -222,6 +222,12 @@ TEST_F(Web, ManyConnectionsThatSayNothingLeaveRoom) {
   EXPECT_TRUE(answers());
 }
 
+// Twice as many as may be open at a time: each must be noticed to be gone.
+TEST_F(Web, HalfRequestsThatWereClosedLeaveRoom) {
+  for (unsigned i = 0; i < 2 * WebServer::kConnections; ++i) HttpClient(port_).send("GET / HT");
+  EXPECT_TRUE(answers());
+}
+
 TEST(WebServer, AnAddressThatCannotBeHadIsNamed) {
   const WebSite nothing{
       .page = "", .hello = [] { return "{}"; }, .news = [] { return ""; }, .actions = {}, .file = {}};
