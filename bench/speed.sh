@@ -1,13 +1,14 @@
 #!/bin/sh
 # All figures of speed, on this machine, in about three minutes:
 #   bench/speed.sh MODEL [BIN_DIR]        MODEL of preset paper; BIN_DIR: a build with -DSUPERTAC_BENCH=ON
+# PEERS_PYTHON: the python of a virtual environment with bench/peers/requirements.txt.
 # Writes bench/results/{peers,streaming,linear_cost}.csv and charts, and the tables made from them. Nothing else should run.
 set -eu
 cd "$(dirname "$0")/.."
 model="$1"
 bin="${2:-build-dev/bin}"
 results=bench/results
-bench/peers/compare.py "$model" --bin "$bin" --out $results/peers.csv
+"${PEERS_PYTHON:-/usr/bin/python3}" bench/peers/compare.py "$model" --bin "$bin" --out $results/peers.csv
 gnuplot -e "csv='$results/peers.csv'; png='$results/peers.png'" bench/peers/chart.gp
 "$bin/linear_cost" > $results/new.csv && mv $results/new.csv $results/linear_cost.csv
 gnuplot -e "csv='$results/linear_cost.csv'; png='$results/linear_cost.png'" bench/linear_cost.gp

@@ -50,13 +50,13 @@ Estimate Plan::run(const Tensor& inputs) const {
   Estimate out{.picture = Tensor(with_count(picture_shape_, count)), .spread = {}, .latents = {}};
   if (has_spread_) out.spread = Tensor(out.picture.shape());
   if (has_latents_) out.latents = Tensor(with_count(latents_shape_, count));
-  const Dim images = std::min(count, kBlock), bytes = byte_workspace_ * images;
+  const Dim images = std::min(count, block_), bytes = byte_workspace_ * images;
   Tensor memory(Shape{scratch_ + workspace_ * images + bytes / static_cast<Dim>(sizeof(real)) + 1});
   real* const workspace = memory.data() + scratch_;
-  for (Dim first = 0; first < count; first += kBlock) {
-    const Block block{inputs.data() + first * size, std::min(kBlock, count - first), workspace,
+  for (Dim first = 0; first < count; first += block_) {
+    const Block block{inputs.data() + first * size, std::min(block_, count - first), workspace,
                       reinterpret_cast<std::uint8_t*>(workspace + workspace_ * images), memory.data()};
-    if (first == 0 || block.images != kBlock) clear_margins(block);
+    if (first == 0 || block.images != block_) clear_margins(block);
     for (const PlanStep& step : steps_) step(block);
     copy_out(block, picture_, out.picture, first);
     if (has_spread_) copy_out(block, spread_, out.spread, first);

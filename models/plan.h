@@ -46,9 +46,6 @@ using PlanStep = std::function<void(const Block&)>;
 
 class Plan {
  public:
-  /// A picture's way through the memory is short: what a block touches stays in the second cache.
-  static constexpr Dim kBlock = 8;
-
   Estimate run(const Tensor& inputs) const;
 
  private:
@@ -56,6 +53,10 @@ class Plan {
   Map add_buffer(Map layout);
   void clear_margins(const Block& block) const;
   void copy_out(const Block& block, const Map& map, Tensor& to, Dim first) const;
+
+  /// Images that go through the steps together. They share the weights on their way from memory, but what
+  /// they leave behind must stay in the second cache.
+  static constexpr Dim kBlock = 8, kByteBlock = 2;
 
   std::vector<PlanStep> steps_;
   std::vector<Map> buffers_;  // each once
@@ -65,6 +66,7 @@ class Plan {
   Dim byte_workspace_ = 0;  // bytes of an image
   Dim scratch_ = 0;         // numbers
   Map picture_, spread_, latents_;
+  Dim block_ = kBlock;
   bool has_spread_ = false, has_latents_ = false;
   Shape picture_shape_, latents_shape_;  // of one image
 };

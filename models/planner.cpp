@@ -15,6 +15,7 @@ std::shared_ptr<const Plan> Planner::plan(const Network& network, const Activati
   const Drawing drawn = network.draw(input);
   Planner planner(input, trace.ops(), drawn, ranges);
   Plan& plan = *planner.plan_;
+  if (ranges != nullptr) plan.block_ = Plan::kByteBlock;
   plan.picture_ = planner.map_of(drawn.picture);
   plan.picture_shape_ = drawn.picture.shape();
   plan.has_spread_ = drawn.spread.defined();

@@ -150,8 +150,9 @@ def check_pictures(ours, model, windows, folder):
     return inference, training, pictures
 
 
-# By how much an engine's pictures may differ before it is not the same network any more.
-TOLERANCE = {"bf16": 0.1, "int8": 0.5}
+# By how much an engine's pictures may differ before it is not the same network any more. The windows are random numbers,
+# unlike those of training, where int8 is at its worst.
+TOLERANCE = {"bf16": 0.1, "int8": 1}
 
 
 def differences(calls, pictures):
