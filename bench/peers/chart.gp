@@ -1,21 +1,21 @@
 # gnuplot -e "csv='bench/results/peers.csv'; png='bench/results/peers.png'" bench/peers/chart.gp
 set datafile separator ","
-set terminal pngcairo size 900,420 font ",11"
+set terminal pngcairo size 900,520 font ",11"
 set output png
-eager = "< grep 'pytorch eager' " . csv
-set multiplot layout 1,2
+set title "times as fast as each engine, one thread (bars: 95 % interval)"
+set ylabel "engine's time / ours"
 set style fill solid 0.9 border lt -1
+set logscale y 2
+set yrange [0.5:32]
 set grid ytics
-set xtics nomirror
-set xrange [-0.6:3.6]
-set title "speed, PyTorch eager = 1 (bars: 95 % interval)"
-set yrange [0:*]
-unset key
-plot eager using 0:6:(0.6):xtic(1) with boxes lc rgb "#4477aa", \
-     eager using 0:6:7:8 with yerrorbars lc rgb "black" pt 7 ps 0.4
-set title "share of the measured FMA peak, one thread"
-set yrange [0:1]
+set xtics nomirror rotate by 45 right noenhanced
 set key top right
-plot eager using ($0 - 0.2):10:(0.38):xtic(1) with boxes lc rgb "#4477aa" title "SuperTac", \
-     eager using ($0 + 0.2):11:(0.38) with boxes lc rgb "#ee6677" title "PyTorch eager"
-unset multiplot
+set bmargin 11
+measured = "< grep -v '^#\\|ours on one thread' " . csv
+of(word) = strstrt(stringcolumn(1), word) == 1 ? column(6) : NaN
+plot measured using 0:6:(0.6):xtic(stringcolumn(1) . ": " . stringcolumn(2)) every ::1 with boxes lc rgb "#bbbbbb" notitle, \
+     measured using 0:(of("infer")):(0.6) every ::1 with boxes lc rgb "#4477aa" title "pictures, fp32", \
+     measured using 0:(of("int8")):(0.6) every ::1 with boxes lc rgb "#228833" title "pictures, int8", \
+     measured using 0:(of("train")):(0.6) every ::1 with boxes lc rgb "#ccbb44" title "training", \
+     measured using 0:6:7:8 every ::1 with yerrorbars lc rgb "black" pt 7 ps 0.4 notitle, \
+     1 lc rgb "black" dt 2 notitle

@@ -170,6 +170,7 @@ def main():
     parser.add_argument("--bin", default=ROOT / "build-dev/bin", help="where peers_ours is (-DSUPERTAC_BENCH=ON)")
     parser.add_argument("--pairs", type=int, default=15)
     parser.add_argument("--seconds", type=float, default=0.2, help="of each turn")
+    parser.add_argument("--compile", action="store_true", help="also torch.compile, which takes minutes to get ready")
     parser.add_argument("--out", default=ROOT / "bench/results/peers.csv")
     options = parser.parse_args()
     torch.set_num_threads(1)
@@ -186,7 +187,7 @@ def main():
         print(f"pictures in int8 differ by at most {np.abs(int8 - pictures).max():.1e}")
         with torch.no_grad():
             for batch in (1, 8, 64):
-                peers = engines.inference(model, windows[:batch], windows, folder)
+                peers = engines.inference(model, windows[:batch], windows, folder, options.compile)
                 found = differences(peers, pictures[:batch])
                 less = {name: call for name, call in peers.items() if name.split()[-1] in TOLERANCE}
                 full = {name: call for name, call in peers.items() if name not in less}
@@ -195,7 +196,7 @@ def main():
                         rows.append(row | {"difference": found[row["peer"]]})
         _, step = training_peer(options.model, windows)
         steps = {"pytorch eager": step}
-        if hasattr(torch, "compile"):
+        if options.compile:
             steps["torch.compile"] = torch.compile(step)
         rows += pair(ours, "train 1", steps, options.pairs, options.seconds, TRAINING_BATCH * training)
         rows.append(two_threads(ours, options.pairs, options.seconds, TRAINING_BATCH * training))

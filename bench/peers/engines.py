@@ -26,9 +26,9 @@ def export_onnx(model, windows, folder):
     return path
 
 
-def pytorch(model, windows):
+def pytorch(model, windows, compiled_too):
     calls = {"pytorch eager": lambda: model(windows)}
-    if hasattr(torch, "compile"):
+    if compiled_too:
         compiled = torch.compile(model)
         compiled(windows)
         calls["torch.compile"] = lambda: compiled(windows)
@@ -83,9 +83,9 @@ def open_vino(path, windows, calibration):
     return calls
 
 
-def inference(model, windows, calibration, folder):
+def inference(model, windows, calibration, folder, compiled_too):
     """All of them for one batch; `calibration` are windows for the quantisers."""
-    calls = pytorch(model, windows)
+    calls = pytorch(model, windows, compiled_too)
     if installed("onnx") is None:
         return calls
     path = export_onnx(model, windows, folder)
