@@ -338,7 +338,7 @@ SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, bas
 
 
 # Lines of the page's tables that the README leaves out.
-NOT_IN_README = re.compile(r"^\| (nearest|[^|]*\| [^|]* \| torchscript) .*\n", re.MULTILINE)
+NOT_IN_README = re.compile(r"^\| (nearest|(inference|in int8)[^|]*\| [^|]* \| (pytorch eager|onnx runtime|onnx runtime int8|openvino int8) |[^|]*batch 8 ).*\n", re.MULTILINE)
 
 
 def rewritten(path):
