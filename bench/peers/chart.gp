@@ -11,6 +11,7 @@ set grid ytics
 set xtics nomirror rotate by 45 right noenhanced
 set key top right
 set bmargin 11
+set lmargin 12
 measured = "< grep -v '^#\\|ours on one thread' " . csv
 of(word) = strstrt(stringcolumn(1), word) == 1 ? column(6) : NaN
 plot measured using 0:6:(0.6):xtic(stringcolumn(1) . ": " . stringcolumn(2)) every ::1 with boxes lc rgb "#bbbbbb" notitle, \
