@@ -7,7 +7,7 @@
 #include "bench/windows.h"
 #include "models/cost.h"
 #include "models/model_file.h"
-#include "models/prepared.h"
+#include "models/prepared/prepared.h"
 #include "models/trainer.h"
 #include "tests/allocations.h"
 

@@ -4,14 +4,14 @@
 #include <vector>
 
 #include "models/model_file.h"
-#include "models/prepared.h"
+#include "models/prepared/prepared.h"
 
 namespace supertac {
 
 /// What the products of a network are made of.
 enum class Precision {
   fp32,
-  int8,  ///< bytes: faster, and the pictures differ a little (models/prepared.h)
+  int8,  ///< bytes: faster, and the pictures differ a little (models/prepared/prepared.h)
 };
 /// "fp32" or "int8"; throws std::invalid_argument.
 Precision precision_of(const std::string& name);

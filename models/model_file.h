@@ -12,7 +12,7 @@
 #include "layers/checkpoint.h"
 #include "models/frame_model.h"
 #include "models/novelty.h"
-#include "models/ranges.h"
+#include "models/prepared/ranges.h"
 #include "models/supertac_model.h"
 
 namespace supertac {

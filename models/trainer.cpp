@@ -12,7 +12,7 @@
 #include "models/diagnosis.h"
 #include "models/evaluation.h"
 #include "models/novelty.h"
-#include "models/ranges.h"
+#include "models/prepared/ranges.h"
 
 namespace supertac {
 namespace {

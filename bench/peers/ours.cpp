@@ -22,7 +22,7 @@
 #include "io/safetensors.h"
 #include "models/cost.h"
 #include "models/model_file.h"
-#include "models/prepared.h"
+#include "models/prepared/prepared.h"
 #include "models/trainer.h"
 
 namespace supertac {

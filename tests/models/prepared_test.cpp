@@ -1,4 +1,4 @@
-#include "models/prepared.h"
+#include "models/prepared/prepared.h"
 
 #include <gtest/gtest.h>
 #include <omp.h>

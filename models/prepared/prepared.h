@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "models/network.h"
-#include "models/ranges.h"
+#include "models/prepared/ranges.h"
 
 namespace supertac {
 

@@ -1,9 +1,9 @@
-#include "models/prepared.h"
+#include "models/prepared/prepared.h"
 
 #include <stdexcept>
 
 #include "autograd/kernels/fast/isa.h"
-#include "models/planner.h"
+#include "models/prepared/planner.h"
 
 namespace supertac {
 

@@ -8,8 +8,8 @@
 
 #include "autograd/kernels/fast/isa.h"
 #include "autograd/trace.h"
-#include "models/plan.h"
-#include "models/ranges.h"
+#include "models/prepared/plan.h"
+#include "models/prepared/ranges.h"
 
 namespace supertac {
 

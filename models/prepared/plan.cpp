@@ -1,4 +1,4 @@
-#include "models/plan.h"
+#include "models/prepared/plan.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "models/planner.h"
+#include "models/prepared/planner.h"
 
 #include <algorithm>
 #include <limits>
@@ -60,7 +60,7 @@ Planner::Planner(const Variable& input, const std::vector<TracedOp>& ops, const 
     const auto make = makers().find(ops[i].op);
     if (make == makers().end())
       throw std::logic_error("Prepared: no step computes the op " + std::string(ops[i].op) +
-                             "; models/planner.h lists those that have one");
+                             "; models/prepared/planner.h lists those that have one");
     if (ops[i].op != "take_runs" && ops[i].inputs[0].node() == input_) load_input(ops[i].inputs[0]);
     (this->*make->second)(ops[i]);
     add_bytes(ops[i]);

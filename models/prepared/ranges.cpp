@@ -1,4 +1,4 @@
-#include "models/ranges.h"
+#include "models/prepared/ranges.h"
 
 #include <algorithm>
 #include <cmath>

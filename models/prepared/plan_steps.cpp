@@ -1,8 +1,9 @@
-// The steps of models/planner.h: each packs its op's weights and returns what runs for a block of images.
+// The steps of models/prepared/planner.h: each packs its op's weights and returns what runs for a block of
+// images.
 #include <algorithm>
 
 #include "autograd/kernels/elementwise.h"
-#include "models/planner.h"
+#include "models/prepared/planner.h"
 
 namespace supertac {
 

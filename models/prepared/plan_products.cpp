@@ -1,9 +1,9 @@
-// The steps of models/planner.h that are products: of numbers, or of the bytes that stand for them.
+// The steps of models/prepared/planner.h that are products: of numbers, or of the bytes that stand for them.
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
-#include "models/planner.h"
+#include "models/prepared/planner.h"
 
 namespace supertac {
 
