@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "autograd/pool.h"
+#include "autograd/reverse_watch.h"
 #include "autograd/trace.h"
 
 namespace supertac {
@@ -65,6 +66,7 @@ Node* new_node() { return new (pool_allocate(sizeof(Node))) Node; }
 
 thread_local bool recording = true;
 thread_local std::uint64_t last_number = 0;
+thread_local ReverseWatch* reverse_watch = nullptr;
 
 }  // namespace
 
@@ -191,7 +193,11 @@ void visit(Node& node, std::vector<Node*>& queue, Node*& dead) {
         " belongs to a graph that an earlier backward freed; run the forward pass again");
   }
   Backward b(node);
-  node.step(b);
+  if (ReverseWatch* watch = ReverseWatch::current()) {
+    watch->reverse(node.op, node.input_count, b, [&] { node.step(b); });
+  } else {
+    node.step(b);
+  }
   for (std::size_t i = 0; i < node.input_count; ++i) {
     Node* input = node.inputs[i];
     if (input->pending || !input->requires_grad || !input->grad.defined()) continue;
@@ -240,6 +246,14 @@ void backward(const Variable& loss) {
     detail::release(node);
   }
 }
+
+ReverseWatch::ReverseWatch() {
+  if (detail::reverse_watch != nullptr)
+    throw std::logic_error("ReverseWatch: this thread is watched already");
+  detail::reverse_watch = this;
+}
+ReverseWatch::~ReverseWatch() { detail::reverse_watch = nullptr; }
+ReverseWatch* ReverseWatch::current() { return detail::reverse_watch; }
 
 NoGrad::NoGrad() : before_(detail::recording) { detail::recording = false; }
 NoGrad::~NoGrad() { detail::recording = before_; }

@@ -1,0 +1,283 @@
+#include "apps/check/gradient_cases.h"
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <optional>
+
+#include "autograd/ops/arithmetic.h"
+#include "autograd/ops/attention.h"
+#include "autograd/ops/convolution.h"
+#include "autograd/ops/linear.h"
+#include "autograd/ops/losses.h"
+#include "autograd/ops/max_pool.h"
+#include "autograd/ops/shaping.h"
+#include "autograd/ops/vae.h"
+#include "layers/residual.h"
+#include "models/classifier.h"
+#include "models/frame_model.h"
+#include "models/loss.h"
+
+namespace supertac {
+namespace {
+
+Tensor uniform(const Shape& shape, std::uint64_t stream, double low = -1, double high = 1) {
+  Tensor t(shape);
+  const RandomStream random(19, stream);
+  std::uint64_t i = 0;
+  for (real& x : t.values()) x = static_cast<real>(low + (high - low) * random.uniform(i++));
+  return t;
+}
+
+// At least .1 from zero, where rectifiers have no derivative.
+Tensor off_zero(const Shape& shape) {
+  Tensor t = uniform(shape, 1);
+  for (real& x : t.values()) x += static_cast<real>(x < 0 ? -0.1 : 0.1);
+  return t;
+}
+
+using Leaves = std::vector<Variable>;
+
+class Cases {
+ public:
+  explicit Cases(std::string kind) : kind_(std::move(kind)) {}
+
+  void op(const std::string& name, const std::vector<std::string>& inputs, const std::vector<Tensor>& values,
+          const std::function<Variable(const Leaves&)>& f, GradientCheckOptions options = {}) {
+    Leaves leaves;
+    for (const Tensor& t : values) leaves.emplace_back(t, true);
+    options.names = inputs;
+    for (std::string& input : options.names) input = name + " " + input;
+    cases_.push_back({kind_, name, [f, leaves] { return f(leaves); }, leaves, std::move(options)});
+  }
+
+  // The parameters asked for, and x where it has a gradient.
+  template <class M>
+  void module(
+      const std::string& name, std::shared_ptr<M> m, const std::optional<Tensor>& x,
+      const std::function<Variable(const M&, const Variable&)>& f, Dim most,
+      const std::function<bool(const Parameter&)>& asked = [](const Parameter&) { return true; }) {
+    std::vector<Parameter> parameters;
+    std::copy_if(m->parameters().begin(), m->parameters().end(), std::back_inserter(parameters), asked);
+    Leaves leaves = values_of(parameters);
+    GradientCheckOptions options{.max_entries_per_input = most, .names = names_of(parameters)};
+    const Variable input = x ? Variable(*x, true) : Variable();
+    if (x) leaves.push_back(input), options.names.push_back("x");
+    for (std::string& leaf : options.names) leaf = name + " " + leaf;
+    cases_.push_back({kind_, name, [=] { return f(*m, input); }, leaves, std::move(options)});
+  }
+
+  template <class M>
+  void layer(const std::string& name, const M& made, const Shape& x) {
+    module<M>(
+        name, std::make_shared<M>(made), uniform(x, 2),
+        [](const M& m, const Variable& input) { return m.forward(input); }, 200);
+  }
+
+  std::vector<GradientCase> take() { return std::move(cases_); }
+
+ private:
+  std::string kind_;
+  std::vector<GradientCase> cases_;
+};
+
+void elementwise(Cases& cases) {
+  for (const Shape& shape : {Shape{2, 5, 3, 7}, Shape{33}}) {
+    const std::vector<Tensor> x{off_zero(shape)};
+    cases.op("relu", {"x"}, x, [](const Leaves& in) { return relu(in[0]); });
+  }
+  const std::vector<Tensor> x{off_zero({2, 5, 3, 7})};
+  cases.op("leaky_relu", {"x"}, x, [](const Leaves& in) { return leaky_relu(in[0]); });
+  cases.op("sigmoid", {"x"}, x, [](const Leaves& in) { return sigmoid(in[0]); });
+  cases.op("clamp", {"x"}, x, [](const Leaves& in) { return clamp(in[0], -0.7, 0.6); });
+  const std::vector<Tensor> two{uniform({3, 5, 2}, 1), uniform({3, 5, 2}, 2)};
+  cases.op("add", {"a", "b"}, two, [](const Leaves& in) { return add(in[0], in[1]); });
+  cases.op("multiply", {"a", "b"}, two, [](const Leaves& in) { return multiply(in[0], in[1]); });
+  cases.op("scale", {"x"}, {uniform({17}, 1)}, [](const Leaves& in) { return scale(in[0], -3); });
+  cases.op("sum", {"x"}, {uniform({3, 7}, 1)}, [](const Leaves& in) { return sum(in[0]); });
+}
+
+void attention(Cases& cases) {
+  const Tensor x = uniform({2, 3, 5, 7}, 1);
+  cases.op("global_mean", {"x"}, {x}, [](const Leaves& in) { return global_mean(in[0]); });
+  cases.op("gated_sum", {"a", "x", "s"}, {uniform({2, 3, 5, 7}, 3), x, uniform({2, 7}, 2)},
+           [](const Leaves& in) { return gated_sum(in[0], in[1], in[2]); });
+}
+
+using Convolve = Variable (*)(const Variable&, const Variable&, const Variable&, const ConvOptions&);
+
+void convolution(Cases& cases, const std::string& name, Convolve op, const Shape& x, const Shape& w,
+                 Dim most = 200) {
+  const Tensor bias = uniform({w[w.rank() - 1]}, 3);
+  for (const ConvOptions& o : {ConvOptions{.stride = 1, .padding = 1}, ConvOptions{.stride = 2, .padding = 1},
+                               ConvOptions{.stride = 1, .padding = 0, .negative_slope = kLeakyRelu}}) {
+    cases.op(name, {"x", "weight", "bias"}, {uniform(x, 1), uniform(w, 2), bias},
+             [=](const Leaves& in) { return op(in[0], in[1], in[2], o); }, {.max_entries_per_input = most});
+  }
+}
+
+void convolutions(Cases& cases) {
+  convolution(cases, "conv1d", conv1d, {2, 9, 3}, {4, 3, 5});
+  convolution(cases, "conv2d", conv2d, {2, 5, 4, 3}, {3, 2, 3, 5});
+  // Few outputs, and maps that are transformed: each is computed in a way of its own (kernels/fast).
+  convolution(cases, "conv2d", conv2d, {2, 4, 5, 7}, {3, 3, 7, 1});
+  convolution(cases, "conv2d", conv2d, {4, 8, 8, 16}, {3, 3, 16, 16}, 40);
+  convolution(cases, "conv_transpose1d", conv_transpose1d, {2, 5, 3}, {4, 3, 5});
+  convolution(cases, "conv_transpose2d", conv_transpose2d, {2, 3, 4, 3}, {4, 3, 3, 5});
+  for (const real slope : {kNoActivation, kRelu}) {
+    cases.op("linear", {"x", "weight", "bias"}, {uniform({3, 17}, 1), uniform({17, 5}, 2), uniform({5}, 3)},
+             [=](const Leaves& in) { return linear(in[0], in[1], in[2], slope); });
+  }
+}
+
+void shaping(Cases& cases) {
+  // No two values closer than the steps of the differences.
+  Tensor apart({2, 5, 4, 3});
+  for (Dim i = 0; i < apart.size(); ++i) apart.data()[i] = static_cast<real>(0.05 * double(i * 7919 % 120));
+  cases.op("max_pool2d", {"x"}, {apart}, [](const Leaves& in) { return max_pool2d(in[0]); }, {.step = 1e-4});
+  cases.op("reshape", {"x"}, {uniform({2, 3, 7}, 1)}, [](const Leaves& in) {
+    return reshape(in[0], {3, 14});
+  });
+  cases.op("concat", {"x0", "x1", "x2"},
+           {uniform({2, 3, 1}, 1), uniform({2, 3, 17}, 2), uniform({2, 3, 3}, 3)},
+           [](const Leaves& in) { return concat(in); });
+  cases.op("slice", {"x"}, {uniform({2, 3, 7}, 1)}, [](const Leaves& in) { return slice(in[0], 2, 3); });
+  cases.op("flatten_channels_first", {"x"}, {uniform({2, 3, 5, 4}, 1)},
+           [](const Leaves& in) { return flatten_channels_first(in[0]); });
+  cases.op("unflatten_channels_first", {"x"}, {uniform({2, 18}, 1)}, [](const Leaves& in) {
+    return unflatten_channels_first(in[0], std::array<Dim, 2>{2, 3});
+  });
+}
+
+void losses(Cases& cases) {
+  cases.op("l2_loss", {"x", "target"}, {uniform({2, 5, 3, 1}, 1), uniform({2, 5, 3, 1}, 2)},
+           [](const Leaves& in) { return l2_loss(in[0], in[1]); });
+  for (const Shape& shape : {Shape{2, 12, 13, 1}, Shape{1, 8, 9, 1}}) {
+    const Tensor target = uniform(shape, 2, 0, 1);
+    cases.op("ssim", {"x"}, {uniform(shape, 1, 0, 1)}, [=](const Leaves& in) { return ssim(in[0], target); });
+  }
+  cases.op("softmax_cross_entropy", {"logits"}, {uniform({3, 7}, 1, -3, 3)}, [](const Leaves& in) {
+    return softmax_cross_entropy(in[0], std::array<std::int32_t, 3>{2, 0, 6});
+  });
+  const std::vector<Tensor> two{uniform({5, 33}, 1), uniform({5, 33}, 2)};
+  const Tensor eps = uniform({5, 33}, 3, -2, 2);
+  cases.op("sample_gaussian", {"mean", "log_var"}, two,
+           [=](const Leaves& in) { return sample_gaussian(in[0], in[1], eps); });
+  cases.op("kl_divergence", {"mean", "log_var"}, two,
+           [](const Leaves& in) { return kl_divergence(in[0], in[1]); });
+}
+
+// At the initial weights the deepest gradients are 1e-10 of the loss, below what a difference of doubles
+// resolves.
+template <class M>
+std::shared_ptr<M> with_larger_weights(std::shared_ptr<M> model) {
+  for (Variable v : values_of(model->parameters())) {
+    if (v.rank() < 2) continue;
+    for (real& w : v.mutable_value().values()) w *= real(2.2);
+  }
+  return model;
+}
+
+// With a spread its head alone is asked for: the loss takes the picture as given there, differences do not.
+void supertac_losses(Cases& cases, const std::string& name, const SuperTacSettings& s) {
+  Rng rng(11);  // one for which no rectifier is within 1e-6 of its kink
+  const Tensor windows = uniform({2, s.timesteps, s.signals()}, 1, 0, 1);
+  const Tensor truth = uniform({2, s.image_height(), s.image_width(), 1}, 2, 0, 1);
+  std::vector<Tensor> eps;
+  for (Dim i = 0; i < s.groups(); ++i)
+    eps.push_back(uniform({2, s.latent}, 3 + static_cast<std::uint64_t>(i), 0, 1));
+  const auto loss = [=](const SuperTac& model, const Variable&) {
+    return supertac_loss(model.forward(windows, eps), truth, {.a = 0.5, .beta = 0.01, .lambda = 0.3}).total;
+  };
+  const auto asked = [&](const Parameter& p) { return !s.spread || p.name.starts_with("upsampler.spread."); };
+  cases.module<SuperTac>(name, with_larger_weights(std::make_shared<SuperTac>(s, rng)), {}, loss, 4, asked);
+}
+
+}  // namespace
+
+std::vector<GradientCase> op_cases() {
+  Cases cases("op");
+  elementwise(cases);
+  attention(cases);
+  convolutions(cases);
+  shaping(cases);
+  losses(cases);
+  return cases.take();
+}
+
+std::vector<GradientCase> layer_cases() {
+  Cases cases("layer");
+  Rng rng(1);
+  cases.layer("Linear", Linear(5, 3, rng), {4, 5});
+  cases.layer("Conv1d", Conv1d(3, 5, {.kernel = 3, .stride = 2, .padding = 1}, rng), {2, 9, 3});
+  cases.layer("Conv2d", Conv2d(3, 5, {.kernel = 3, .stride = 1, .padding = 1}, rng), {2, 5, 4, 3});
+  cases.layer("ConvTranspose1d", ConvTranspose1d(5, 3, {.kernel = 4, .stride = 2, .padding = 1}, rng),
+              {2, 5, 5});
+  cases.layer("ConvTranspose2d", ConvTranspose2d(5, 3, {.kernel = 4, .stride = 2, .padding = 1}, rng),
+              {2, 3, 4, 5});
+  cases.module<ChannelAttention>(
+      "ChannelAttention", std::make_shared<ChannelAttention>(8, 4, rng), uniform({2, 4, 3, 8}, 2),
+      [](const ChannelAttention& m, const Variable& x) { return m.gates(x); }, 200);
+  cases.layer("Rcab", Rcab(8, 4, rng), {2, 4, 3, 8});
+  cases.layer("Rirb", Rirb({.channels = 8, .reduction = 4, .blocks = 2}, rng), {1, 3, 4, 8});
+  const VaeOptions vae{.timesteps = 32, .channels = 4, .latent = 3};
+  cases.module<Encoder>(
+      "Encoder", with_larger_weights(std::make_shared<Encoder>(vae, rng)), uniform({2, 32, 4}, 2),
+      [](const Encoder& m, const Variable& x) {
+        const LatentDistribution latent = m.forward(x);
+        return concat(std::array{latent.mean, latent.log_var});
+      },
+      20);
+  cases.module<Decoder>(
+      "Decoder", with_larger_weights(std::make_shared<Decoder>(vae, rng)), uniform({2, 3}, 2),
+      [](const Decoder& m, const Variable& z) { return m.forward(z); }, 20);
+  cases.layer("TextureClassifier", TextureClassifier({.height = 8, .width = 8, .classes = 3}, rng),
+              {2, 8, 8, 1});
+  return cases.take();
+}
+
+std::vector<GradientCase> loss_cases() {
+  Cases cases("loss");
+  SuperTacSettings small{.timesteps = 32, .latent = 3, .scale = 2, .channels = 8};
+  supertac_losses(cases, "SuperTac, 8x8 pixels", small);
+  small = {.timesteps = 48, .latent = 2, .grouping = Grouping::vertical, .channels = 8, .rcabs = 1};
+  supertac_losses(cases, "SuperTac, 16x16 pixels", small);
+  small.spread = true;
+  supertac_losses(cases, "SuperTac's spread", small);
+  small = {
+      .rows = 3, .columns = 5, .in_channels = 2, .timesteps = 32, .latent = 2, .channels = 4, .rcabs = 1};
+  supertac_losses(cases, "SuperTac, 3x5 taxels x 2", small);
+  Rng rng(6);
+  const FrameSettings frame{.in_channels = 2, .height = 2, .width = 5, .channels = 8, .rcabs = 1};
+  const Variable frames(uniform({2, 2, 5, 2}, 1, 0, 1));
+  const Tensor truth = uniform({2, 8, 20, 1}, 2, 0, 1);
+  cases.module<FrameModel>(
+      "FrameModel", std::make_shared<FrameModel>(frame, rng), {},
+      [=](const FrameModel& m, const Variable&) { return picture_loss(m.forward(frames), truth, 0.3).total; },
+      4);
+  return cases.take();
+}
+
+CheckedGradients check(std::span<const GradientCase> cases) {
+  CheckedGradients all{.kind = cases.front().kind, .name = cases.front().name};
+  for (const GradientCase& c : cases) {
+    const GradientReport report = check_gradients(c.f, c.leaves, c.options);
+    if (all.entries == 0 || report.max_relative_error > all.worst.relative_error)
+      all.worst = report.worst.front();
+    all.entries += report.entries;
+  }
+  return all;
+}
+
+std::vector<std::span<const GradientCase>> by_name(std::span<const GradientCase> cases) {
+  std::vector<std::span<const GradientCase>> runs;
+  while (!cases.empty()) {
+    const auto end = std::find_if(cases.begin(), cases.end(),
+                                  [&](const GradientCase& c) { return c.name != cases.front().name; });
+    runs.push_back(cases.first(static_cast<std::size_t>(end - cases.begin())));
+    cases = cases.subspan(runs.back().size());
+  }
+  return runs;
+}
+
+}  // namespace supertac

@@ -1,0 +1,137 @@
+// supertac-check-gradients: what `supertac-check gradients` runs, compiled with real = double.
+#include <chrono>
+#include <span>
+
+#include "apps/check/gradient_cases.h"
+#include "apps/check/planted_error.h"
+#include "apps/common/program.h"
+#include "apps/common/signals.h"
+#include "io/numbers.h"
+
+namespace supertac {
+
+void declare(Arguments& a) {
+  a.option(
+      "break", "OP",
+      "plant an error in the reverse step of this op, or of 'all', one after the other: the gradient of each "
+      "input with the wrong sign, doubled, without one of its terms, at the wrong index; each has to be "
+      "found");
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json to_json(const GradientEntry& e) {
+  return {{"entry", e.place},
+          {"analytic", e.analytic},
+          {"numeric", e.numeric},
+          {"relative_error", e.relative_error}};
+}
+
+std::string column(const std::string& text, std::size_t width) {
+  return text + std::string(text.size() < width ? width - text.size() : 1, ' ');
+}
+
+std::string short_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+std::string text_of(const GradientEntry& e) {
+  return e.place + ": analytic " + short_text(e.analytic) + ", numeric " + short_text(e.numeric);
+}
+
+void print_row(const Arguments& a, const CheckedGradients& c) {
+  a.print(column(c.kind, 7) + column(c.name, 26) + column(std::to_string(c.entries), 9) +
+          column(short_text(c.worst.relative_error), 10) + (c.wrong() ? "WRONG  " : "ok     ") +
+          text_of(c.worst));
+}
+
+int check_all(const Arguments& a) {
+  std::vector<GradientCase> cases = op_cases();
+  for (const auto& more : {layer_cases(), loss_cases()}) cases.insert(cases.end(), more.begin(), more.end());
+  const auto begin = std::chrono::steady_clock::now();
+  a.print(column("kind", 7) + column("name", 26) + column("entries", 9) + column("error", 10) +
+          "       worst entry");
+  Json rows = Json::array();
+  std::size_t wrong = 0;
+  Dim entries = 0;
+  for (const auto& run : by_name(cases)) {
+    stop_if_interrupted();
+    const CheckedGradients c = check(run);
+    print_row(a, c);
+    wrong += c.wrong();
+    entries += c.entries;
+    rows.push_back({{"kind", c.kind},
+                    {"name", c.name},
+                    {"entries", c.entries},
+                    {"wrong", c.wrong()},
+                    {"worst", to_json(c.worst)}});
+  }
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  a.print(std::to_string(entries) + " entries in " + format(seconds, 1) + " s, " + std::to_string(wrong) +
+          " of " + std::to_string(rows.size()) + " rows wrong (relative error above " +
+          format(CheckedGradients::kTolerance) + ")");
+  a.write_json({{"rows", rows}, {"entries", entries}, {"wrong", wrong}, {"seconds", seconds}});
+  return wrong == 0 ? kExitOk : kExitFailed;
+}
+
+// The ops whose rows are wrong while the error is there.
+std::vector<CheckedGradients> wrong_rows(std::span<const std::span<const GradientCase>> runs) {
+  std::vector<CheckedGradients> wrong;
+  for (const auto& run : runs)
+    if (CheckedGradients c = check(run); c.wrong()) wrong.push_back(std::move(c));
+  return wrong;
+}
+
+struct Tally {
+  std::size_t planted = 0, found = 0;
+  Json rows = Json::array();
+};
+
+void plant(const Arguments& a, const Plant& p, const std::string& input,
+           std::span<const std::span<const GradientCase>> runs, Tally& tally) {
+  PlantedError error(p);
+  const std::vector<CheckedGradients> wrong = wrong_rows(runs);
+  if (!error.changed()) return;  // the same gradient: at every index the same number
+  const bool found = wrong.size() == 1 && wrong.front().name == p.op;
+  ++tally.planted;
+  tally.found += found;
+  a.print(column(input, 36) + column(name_of(p.kind), 8) +
+          (found ? "found: " + text_of(wrong.front().worst)
+                 : "NOT FOUND, " + std::to_string(wrong.size()) + " rows wrong"));
+  Json row = {{"op", p.op}, {"input", input}, {"error", name_of(p.kind)}, {"found", found}};
+  if (found) row["worst"] = to_json(wrong.front().worst);
+  tally.rows.push_back(std::move(row));
+}
+
+int break_ops(const Arguments& a, const std::string& op) {
+  const std::vector<GradientCase> cases = op_cases();
+  const auto runs = by_name(cases);
+  std::vector<std::string> names{"all"};
+  for (const auto& run : runs) names.push_back(run.front().name);
+  a.choice("break", names);
+  Tally tally;
+  for (const auto& run : runs) {
+    const GradientCase& c = run.front();
+    if (op != "all" && op != c.name) continue;
+    for (std::size_t input = 0; input < c.leaves.size(); ++input) {
+      for (const Plant::Kind kind : kPlantKinds) {
+        stop_if_interrupted();
+        plant(a, {c.name, input, kind}, c.options.names[input], runs, tally);
+      }
+    }
+  }
+  a.print(std::to_string(tally.found) + " of " + std::to_string(tally.planted) +
+          " planted errors found and named");
+  a.write_json({{"planted", tally.planted}, {"found", tally.found}, {"rows", tally.rows}});
+  return tally.found == tally.planted ? kExitOk : kExitFailed;
+}
+
+}  // namespace
+
+int run(Arguments& a) { return a.given("break") ? break_ops(a, a.text("break")) : check_all(a); }
+
+}  // namespace supertac

@@ -1,0 +1,30 @@
+// ReverseWatch: stands between backward() and the reverse steps, for those who measure them or spoil one to
+// see whether a check notices (apps/check/planted_error.h).
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+#include "autograd/variable.h"
+
+namespace supertac {
+
+/// While one lives, backward() of this thread hands every reverse step to it. One at a time.
+class ReverseWatch {
+ public:
+  /// Throws std::logic_error where this thread has one already.
+  ReverseWatch();
+  virtual ~ReverseWatch();
+  ReverseWatch(const ReverseWatch&) = delete;
+  ReverseWatch& operator=(const ReverseWatch&) = delete;
+
+  /// Must call `step`, which reads b.gy() and adds into the gradients of the op's inputs; it may be called
+  /// again once those and b.gy() are as they were.
+  virtual void reverse(const char* op, std::size_t inputs, Backward& b,
+                       const std::function<void()>& step) = 0;
+
+  /// The one of this thread, or null.
+  static ReverseWatch* current();
+};
+
+}  // namespace supertac
