@@ -32,7 +32,7 @@ void add(cxxopts::Options& parser, const std::string& group, const std::string& 
 }
 
 // What programs write, and the values that may name a file to be read.
-constexpr std::array<std::string_view, 8> kOutputs = {"capture", "gcode",    "json",   "out",
+constexpr std::array<std::string_view, 9> kOutputs = {"capture", "gcode",    "json",   "onnx",       "out",
                                                       "outputs", "pictures", "report", "write-pairs"};
 constexpr std::array<std::string_view, 5> kPathValues = {"FILE", "DIR", "JOURNAL", "TEXT_DIR", "NAME"};
 

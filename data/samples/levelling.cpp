@@ -10,8 +10,6 @@ namespace supertac {
 namespace {
 
 constexpr std::size_t kBins = 256;
-constexpr std::size_t kRestShare = 20;  // one sample in 20 lies below the rest
-constexpr std::size_t kTopRank = 3;     // two samples may lie above the top: a glitch is no touch
 constexpr std::size_t kMostFrames = 60'000;
 
 struct Range {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <span>
 
 namespace supertac {
@@ -11,6 +12,8 @@ constexpr float kLeastGain = 0.15F;
 /// The share of a taxel's rest that is taken away. Wide textures never let go of a taxel: without its rest
 /// their signal would be that of a narrow one.
 constexpr float kRestRemoved = 0.5F;
+constexpr std::size_t kRestShare = 20;  ///< one sample in 20 lies below the rest
+constexpr std::size_t kTopRank = 3;     ///< two samples may lie above the top: a glitch is no touch
 
 /// Brings a window of scaled signals to its own rest and gain, so that a finger that is pressed harder, or
 /// whose taxels are pressed a little all the time, is seen like any other:

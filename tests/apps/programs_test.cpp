@@ -65,6 +65,16 @@ TEST(Simulate, WritesRecordingsThatInfoDescribes) {
   EXPECT_NE(run_process("supertac-info", {paths[0]}).out.find("recording"), std::string::npos);
 }
 
+TEST(Export, SaysWhatItCannotExport) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_process("supertac-simulate", small_simulation(folder.file("sim"))).code, 0);
+  const std::string recording = list_recordings(folder.file("sim")).at(0);
+  expect_failure(run_process("supertac-export", {recording, "--onnx", folder.file("m.onnx")}), 1,
+                 "give a file that supertac-train wrote");
+  EXPECT_FALSE(std::filesystem::exists(folder.file("m.onnx")));
+  expect_failure(run_process("supertac-export", {recording}), 2, "missing --onnx FILE");
+}
+
 TEST(Simulate, SameSeedSameBytesForAnyThreads) {
   TemporaryFolder folder;
   for (const char* threads : {"1", "3"}) {
@@ -269,7 +279,8 @@ TEST(Dispatcher, EveryProgramOfTheListIsThereAndSaysWhatItIsFor) {
     EXPECT_NE(help.out.find("Usage:\n  " + program), std::string::npos) << help.out;
     const auto version = run_process(program, {"--version"});
     EXPECT_TRUE(version.out.starts_with(program + " ")) << version.out;
-    for (const char* text : {"commit ", "compiler  GCC "}) EXPECT_NE(version.out.find(text), std::string::npos);
+    for (const char* text : {"commit ", "compiler  GCC "})
+      EXPECT_NE(version.out.find(text), std::string::npos);
     ++programs;
   }
   EXPECT_GE(programs, 10u);
