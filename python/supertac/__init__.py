@@ -1,0 +1,13 @@
+"""Reads what SuperTac writes - recordings, models, logs of pictures - and draws pictures with NumPy alone.
+
+    import supertac
+    model = supertac.load_model("model.safetensors")
+    recording = supertac.read_recording("recordings/6_Ridges_t1_p1_v10.safetensors")
+    times, volts = model.windows(recording)
+    pictures = model.draw(volts).picture        # [N, height, width]
+"""
+from .files import read
+from .model import Model, Pictures, load_model
+from .recordings import Log, Recording, read_pictures, read_recording, windows
+
+__all__ = ["Log", "Model", "Pictures", "Recording", "load_model", "read", "read_pictures", "read_recording", "windows"]

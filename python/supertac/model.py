@@ -1,0 +1,149 @@
+"""A model file and its forward pass in NumPy (docs/network.md has the layers)."""
+import collections
+import json
+
+import numpy as np
+
+from . import recordings
+from .files import read
+
+Pictures = collections.namedtuple("Pictures", "picture spread latents")
+Pictures.__doc__ = "[N,height,width] each, spread is None for a model without; latents [N,groups x latent]."
+
+# Of levelling (data/samples/levelling.h).
+BINS, LEAST_GAIN, REST_REMOVED, REST_SHARE, TOP_RANK = 256, np.float32(0.15), np.float32(0.5), 20, 3
+
+
+def leaky_relu(x):
+    return np.where(x > 0, x, np.float32(0.01) * x)
+
+
+def relu(x):
+    return np.maximum(x, 0)
+
+
+def sigmoid(x):
+    return 1 / (1 + np.exp(-x))
+
+
+def convolve(x, weight, bias, stride=1, padding=1):
+    """x [N,C,P...], weight [out,C,k...] -> [N,out,P'...]"""
+    axes = tuple(range(2, x.ndim))
+    x = np.pad(x, [(0, 0), (0, 0)] + [(padding, padding)] * len(axes))
+    patches = np.lib.stride_tricks.sliding_window_view(x, weight.shape[2:], axes)
+    patches = patches[(slice(None), slice(None)) + (slice(None, None, stride),) * len(axes)]
+    summed = [1, *range(x.ndim, patches.ndim)]
+    y = np.tensordot(patches, weight, axes=(summed, range(1, weight.ndim)))
+    return np.moveaxis(y + bias, -1, 1)
+
+
+def convolve_transposed(x, weight, bias, stride=2, padding=1):
+    """x [N,C,P...], weight [C,out,k...]: zeros between the pixels, then a convolution with the mirrored kernel."""
+    axes = tuple(range(2, x.ndim))
+    wide = np.zeros(x.shape[:2] + tuple((n - 1) * stride + 1 for n in x.shape[2:]), x.dtype)
+    wide[(slice(None), slice(None)) + (slice(None, None, stride),) * len(axes)] = x
+    return convolve(wide, np.flip(weight.swapaxes(0, 1), axes), bias, 1, weight.shape[2] - 1 - padding)
+
+
+def level(windows):
+    """Windows [N,T,S] in [0,1], each brought to its own rest and gain."""
+    timesteps = windows.shape[1]
+    ordered = np.sort(windows, axis=1)
+
+    def bin_of(sample):
+        return np.floor(np.minimum(sample * np.float32(BINS), BINS - 1)) / np.float32(BINS)
+
+    removed = REST_REMOVED * bin_of(ordered[:, timesteps // REST_SHARE])
+    swing = bin_of(ordered[:, timesteps - TOP_RANK]) - removed
+    gain = np.maximum(swing.max(axis=1), LEAST_GAIN)[:, None, None]
+    return np.clip((windows - removed[:, None]) * (np.float32(1) / gain), 0, 1)
+
+
+def groups_of(settings):
+    """The signals of each VAE: a row of the array, or a column."""
+    rows, columns, channels = (settings.get(name, value) for name, value in
+                               (("rows", 4), ("columns", 4), ("in_channels", 1)))
+    signals = np.arange(rows * columns * channels).reshape(rows, columns, channels)
+    along = signals if settings["grouping"] == "horizontal" else signals.swapaxes(0, 1)
+    return [group.reshape(-1) for group in along]
+
+
+class Model:
+    """The tensors and settings of a model file."""
+
+    def __init__(self, tensors, metadata):
+        self.tensors, self.metadata = tensors, metadata
+        self.settings, self.input = json.loads(metadata["settings"]), json.loads(metadata["input"])
+        self.groups = groups_of(self.settings)
+        self.map = tuple(self.settings.get(name, 4) for name in ("rows", "columns"))
+
+    def windows(self, recording):
+        """Times and windows in volts of a recording that was filtered as the training was."""
+        return recordings.windows(recording, self.settings["timesteps"], self.input["rate_hz"])
+
+    def scale(self, volts):
+        """Volts [N,T,S] -> what the network takes."""
+        share = (self.input["rest_volts"] - volts.astype(np.float64)) / self.input["span_volts"]
+        x = np.clip(share, 0, 1).astype(np.float32)
+        return level(x) if self.input.get("levelled") else x
+
+    def draw(self, volts, batch=64):
+        """Pictures of windows [N,T,S] in volts."""
+        parts = [self._draw(self.scale(volts[i : i + batch])) for i in range(0, len(volts), batch)]
+        return Pictures(*(None if part[0] is None else np.concatenate(part) for part in zip(*parts)))
+
+    def to_torch(self):
+        """A torch.nn.Module with the same parameters and names; its forward() takes volts and returns Pictures."""
+        from .torch_model import SuperTac
+
+        return SuperTac(self)
+
+    def _of(self, name):
+        return self.tensors[name + ".weight"], self.tensors[name + ".bias"]
+
+    def _linear(self, x, name):
+        weight, bias = self._of(name)
+        return x @ weight.reshape(weight.shape[:2]).T + bias
+
+    def _convolve(self, x, name, **settings):
+        return convolve(x, *self._of(name), **settings)
+
+    def _parts(self, pattern):
+        """Names that the pattern makes of 0, 1, ... as long as there is such a layer."""
+        count = 0
+        while any(name.startswith(pattern.format(count) + ".") for name in self.tensors):
+            yield pattern.format(count)
+            count += 1
+
+    def _encode(self, x, name):
+        for conv in self._parts(name + ".conv.{}"):
+            x = leaky_relu(self._convolve(x, conv, stride=2))
+        return self._linear(relu(self._linear(x.reshape(len(x), -1), name + ".fc")), name + ".mean")
+
+    def _rcab(self, x, name):
+        h = self._convolve(relu(self._convolve(x, name + ".conv.0")), name + ".conv.1")
+        squeezed = relu(self._linear(h.mean(axis=(2, 3)), name + ".attention.squeeze"))
+        return x + h * sigmoid(self._linear(squeezed, name + ".attention.expand"))[:, :, None, None]
+
+    def _rirb(self, x, name):
+        h = x
+        for block in self._parts(name + ".rcab.{}"):
+            h = self._rcab(h, block)
+        return leaky_relu(convolve_transposed(x + self._convolve(h, name + ".conv"), *self._of(name + ".up")))
+
+    def _draw(self, x):
+        latents = np.concatenate([self._encode(x[:, :, group].swapaxes(1, 2), f"encoder.{i}")
+                                  for i, group in enumerate(self.groups)], axis=1)
+        h = leaky_relu(self._linear(latents, "upsampler.fc")).reshape(len(x), -1, *self.map)
+        for name in self._parts("upsampler.rirb.{}"):
+            h = self._rirb(h, name)
+        spread = self._convolve(h, "upsampler.spread")[:, 0] if self.settings.get("spread") else None
+        return self._convolve(h, "upsampler.out")[:, 0], spread, latents
+
+
+def load_model(path):
+    tensors, metadata = read(path)
+    if metadata.get("format") != "supertac-checkpoint" or "kind" in metadata:
+        raise ValueError(f"{path}: expected a model that supertac-train --data wrote, found "
+                         + metadata.get("kind", metadata.get("format", "another file")))
+    return Model(tensors, metadata)

@@ -1,0 +1,140 @@
+#!/usr/bin/env python3
+"""What the package in python/ reads and draws, against our programs: windows and pictures of supertac-stream to 1e-5,
+for presets tiny and paper and arrays of 4x4 taxels and of 3x5 taxels with two channels. Where PyTorch is installed,
+to_torch() likewise; where onnxruntime is, what supertac-export writes.
+
+    tests/python/against_programs.py BIN [WINDOWS of each, 100] [options of supertac-train]
+
+77 when NumPy is not installed.
+"""
+import importlib
+import json
+import pathlib
+import struct
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "python"))
+try:
+    import numpy as np
+except ImportError as missing:
+    print(f"skipped: {missing}")
+    sys.exit(77)
+import supertac  # noqa: E402
+from supertac.model import convolve, convolve_transposed  # noqa: E402
+
+
+
+def installed(name):
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        print(f"not compared: {name} is not installed")
+        return None
+
+
+torch, onnxruntime = installed("torch"), installed("onnxruntime")
+TOLERANCE = 1e-5
+WINDOWS = int(sys.argv[2]) if len(sys.argv) > 2 else 100
+TRAINING = sys.argv[3:] or ["--epochs", "1", "--stride", "24"]
+
+
+def run(program, *words):
+    done = subprocess.run([pathlib.Path(sys.argv[1]) / program, *map(str, words)], capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(done.stderr)
+
+
+def write(path, tensors, metadata):
+    """A safetensors file of another program: without our checksum."""
+    header, at = {"__metadata__": metadata}, 0
+    for name, (kind, array) in tensors.items():
+        header[name] = {"dtype": kind, "shape": array.shape, "data_offsets": [at, at + array.nbytes]}
+        at += array.nbytes
+    text = json.dumps(header).encode()
+    path.write_bytes(struct.pack("<Q", len(text)) + text + b"".join(array.tobytes() for _, array in tensors.values()))
+
+
+def with_two_channels(recording, path):
+    """A recording of the rig as if by 3x5 taxels with two channels each."""
+    volts = np.concatenate([recording.volts, 4.9 - recording.volts[:, :14]], axis=1)
+    array = {"rows": 3, "columns": 5, "pitch_mm": 3, "channels": 2}
+    tensors = {"time_s": ("F64", recording.time_s), "volts": ("F32", np.ascontiguousarray(volts)),
+               "position_mm": ("F32", recording.position_mm)}
+    ours = {key: text for key, text in recording.metadata.items() if key not in ("checksum", "supertac_format")}
+    write(path, tensors, ours | {"array": json.dumps(array)})
+
+
+def check(name, ours, theirs):
+    difference = float(np.abs(np.asarray(ours) - theirs).max())
+    print(f"{name}: {len(theirs)} within {difference:.1e}")
+    return difference <= TOLERANCE
+
+
+def compare(folder, data, preset, recording):
+    name, log = f"{preset} {data.name}", folder / f"{preset}{data.name}.log.safetensors"
+    path = folder / f"{preset}{data.name}.safetensors"
+    run("supertac-train", "--data", data, "--out", path, "--preset", preset, "--split", "none", "--quiet",
+        *TRAINING)
+    run("supertac-stream", "--recording", recording, "--model", path, "--out", log, "--quiet")
+    seen, model = supertac.read_pictures(log), supertac.load_model(path)
+    times, volts = model.windows(supertac.read_recording(recording))
+    if not np.array_equal(times, seen.time_s):
+        sys.exit(f"{name}: {len(times)} windows, supertac-stream drew {len(seen.time_s)}")
+    some = slice(None, None, max(1, len(times) // WINDOWS))
+    drawn = model.draw(volts[some])
+    good = check(f"{name}, NumPy", drawn.picture, seen.pictures[some])
+    if torch is not None:
+        module = model.to_torch().eval()
+        with torch.no_grad():
+            good &= check(f"{name}, PyTorch", module(torch.tensor(volts[some])).picture.numpy(), seen.pictures[some])
+            good &= check(f"{name}, spread", module(torch.tensor(volts[some])).spread.numpy(), drawn.spread)
+    if onnxruntime is not None:
+        run("supertac-export", path, "--onnx", path.with_suffix(".onnx"))
+        session = onnxruntime.InferenceSession(str(path.with_suffix(".onnx")), providers=["CPUExecutionProvider"])
+        good &= check(f"{name}, onnxruntime", session.run(["picture"], {"volts": volts[some]})[0], seen.pictures[some])
+    return good
+
+
+def check_convolutions():
+    """<conv(x), y> = <x, its transpose(y)>, and a sum by hand."""
+    random = np.random.default_rng(1)
+    x, y = random.normal(size=(2, 3, 8)), random.normal(size=(2, 5, 4))
+    weight = random.normal(size=(5, 3, 4))
+    one = (convolve(x, weight, 0, 2, 1) * y).sum()
+    other = (x * convolve_transposed(y, weight, 0, 2, 1)).sum()
+    by_hand = convolve(np.array([[[1.0, 2, 3]]]), np.array([[[1.0, 10, 100]]]), 5)
+    return abs(one - other) < 1e-9 and by_hand.tolist() == [[[215, 326, 37]]]
+
+
+def refuses_damage(path):
+    raw = bytearray(path.read_bytes())
+    raw[-5] ^= 1
+    path.with_suffix(".damaged").write_bytes(raw)
+    try:
+        supertac.read(path.with_suffix(".damaged"))
+    except ValueError as error:
+        return "damaged" in str(error)
+    return False
+
+
+def main():
+    good = check_convolutions()
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        rig, other = folder / "4x4", folder / "3x5x2"
+        run("supertac-simulate", "--out", rig, "--plates", "6_Ridges", "--passes", 1, "--trials", 1, "--speeds", 10, "--quiet")
+        recordings = sorted(rig.glob("*.safetensors"))
+        other.mkdir()
+        with_two_channels(supertac.read_recording(recordings[0]), other / recordings[0].name)
+        for preset in ("tiny", "paper"):
+            for data in (rig, other):
+                good &= compare(folder, data, preset, data / recordings[0].name)
+        good &= refuses_damage(recordings[0])
+    sys.exit(0 if good else 1)
+
+
+if __name__ == "__main__":
+    main()
