@@ -1,5 +1,6 @@
 // supertac-train: recordings (or pairs of images) in, a model out.
 #include "apps/common/program.h"
+#include "apps/ranks/together.h"
 #include "apps/train/training_options.h"
 #include "apps/train/training_run.h"
 #include "io/file.h"
@@ -19,11 +20,14 @@ void declare(Arguments& a) {
   a.option("seed", "N", "of split, initial weights, order, noise", "0");
   declare_training(a);
   a.only_with("data");
-  a.option("preset", "NAME", "network: paper, or tiny (a ninth of the multiply-adds, a third of the time)", "paper");
+  a.option("preset", "NAME", "network: paper, or tiny (a ninth of the multiply-adds, a third of the time)",
+           "paper");
   a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512 (default: the preset's)");
   a.option("scale", "N", "pictures N times as fine as the array, which the recordings name: 2, 4 or 8", "4");
   declare_window_training(a);
   a.more().option("latent", "LD", "latent numbers per group of taxels", "10");
+  a.only_with("");
+  declare_together(a);
 }
 
 namespace {
@@ -42,12 +46,14 @@ TrainingSettings settings_of(const Arguments& a) {
 }
 
 // `remark` is for a training that has begun: what ends it before says one line only.
-int train(const Arguments& a, TrainingTask task, const std::string& remark) {
+int train(const Arguments& a, TrainingTask task, const std::string& remark, Ranks& ranks) {
   const std::string out = a.text("out");
-  TrainingRun training(a, std::move(task), {.out = out, .force = a.force(), .resume = a.text("resume")});
+  TrainingRun training(a, std::move(task),
+                       {.out = out, .force = a.force(), .resume = a.text("resume"), .ranks = ranks});
   a.note(remark);
   const bool done = training.train();
   const Trainer& trainer = training.trainer();
+  if (!ranks.first()) return done ? kExitOk : kExitFailed;
   if (!done) {
     a.note("stopped at step " + std::to_string(trainer.step()) + " of " +
            std::to_string(trainer.total_steps()) + "; continue with the same options and --resume " +
@@ -62,20 +68,29 @@ int train(const Arguments& a, TrainingTask task, const std::string& remark) {
   return kExitOk;
 }
 
-}  // namespace
-
-int run(Arguments& a) {
+int train(const Arguments& a, Ranks& ranks) {
+  try {
+    check_lanes(ranks.size(), 8);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(error.what());
+  }
   if (a.given("pairs")) {
     refuse_existing(a.text("out"), a.force());
     PairSet pairs = PairSet::read(a.text("pairs"));
-    return train(a, pair_task(a, pairs), std::to_string(pairs.size()) + " pairs");
+    return train(a, pair_task(a, pairs), std::to_string(pairs.size()) + " pairs", ranks);
   }
   TrainingSettings settings = settings_of(a);
   training_split(a);
   refuse_existing(a.text("out"), a.force());
   const WindowSet windows = training_windows(a, settings.model, settings.seed);
   set_array(settings.model, windows.array());
-  return train(a, window_task(a, windows, settings), windows.counts().summary());
+  return train(a, window_task(a, windows, settings), windows.counts().summary(), ranks);
+}
+
+}  // namespace
+
+int run(Arguments& a) {
+  return together(a, [&](Ranks& ranks) { return train(a, ranks); });
 }
 
 }  // namespace supertac

@@ -10,17 +10,14 @@ constexpr double kActiveVariance = 0.01;                  // Burda et al. 2016
 
 }  // namespace
 
-void Spread::clear() {
-  std::fill(sum_.begin(), sum_.end(), 0.0);
-  std::fill(squares_.begin(), squares_.end(), 0.0);
-}
+void Spread::clear() { std::fill(values_.begin(), values_.end(), 0.0); }
 
 void Spread::add(const Tensor& batch, std::size_t first) {
-  const Dim samples = batch.dim(0), entries = samples > 0 ? batch.size() / samples : 0;
+  const Dim samples = batch.dim(0), count = samples > 0 ? batch.size() / samples : 0;
   const real* x = batch.data();
   for (Dim n = 0; n < samples; ++n) {
-    double *sum = &sum_[first], *squares = &squares_[first];
-    for (Dim i = 0; i < entries; ++i) {
+    double *sum = &values_[first], *squares = &values_[entries() + first];
+    for (Dim i = 0; i < count; ++i) {
       const auto value = static_cast<double>(*x++);
       sum[i] += value;
       squares[i] += value * value;
@@ -29,15 +26,12 @@ void Spread::add(const Tensor& batch, std::size_t first) {
 }
 
 void Spread::add(const Spread& other) {
-  for (std::size_t i = 0; i < sum_.size(); ++i) {
-    sum_[i] += other.sum_[i];
-    squares_[i] += other.squares_[i];
-  }
+  for (std::size_t i = 0; i < values_.size(); ++i) values_[i] += other.values_[i];
 }
 
 double Spread::variance(std::size_t i, double samples) const {
-  const double mean = sum_[i] / samples;
-  return std::max(0.0, squares_[i] / samples - mean * mean);
+  const double mean = values_[i] / samples;
+  return std::max(0.0, values_[entries() + i] / samples - mean * mean);
 }
 
 double Spread::mean_variance(double samples) const {

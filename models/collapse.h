@@ -1,17 +1,18 @@
 // How a network fails in silence: it stops to look at its input, or blows up, while the loss stays finite.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "autograd/tensor.h"
 
 namespace supertac {
 
-/// How much each entry differs within a batch: sums that lanes gather and the trainer adds up in their order.
+/// How much each entry differs within a batch: sums that lanes gather and the trainer adds up.
 class Spread {
  public:
   Spread() = default;
-  explicit Spread(std::size_t entries) : sum_(entries), squares_(entries) {}
+  explicit Spread(std::size_t entries) : values_(2 * entries) {}
   void clear();
   /// Adds a batch [N,...], whose entries are `first`, first + 1, ... of this object.
   void add(const Tensor& batch, std::size_t first = 0);
@@ -20,10 +21,12 @@ class Spread {
   double variance(std::size_t i, double samples) const;
   /// The mean of all entries' variances.
   double mean_variance(double samples) const;
-  std::size_t entries() const { return sum_.size(); }
+  std::size_t entries() const { return values_.size() / 2; }
+  /// The sums themselves, for who adds up those of several processes.
+  std::span<double> values() { return values_; }
 
  private:
-  std::vector<double> sum_, squares_;
+  std::vector<double> values_;  // a sum for each entry, then a sum of squares for each
 };
 
 /// Pictures that say nothing of the truths: their standard deviation over the batch is below 2 % of the

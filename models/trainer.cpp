@@ -7,6 +7,7 @@
 #include "autograd/ops/arithmetic.h"
 #include "data/samples/signal_features.h"
 #include "data/samples/split.h"
+#include "io/hash.h"
 #include "io/numbers.h"
 #include "layers/checkpoint.h"
 #include "models/diagnosis.h"
@@ -20,6 +21,7 @@ namespace {
 // Streams of random numbers that must not meet: the seed is shared with splits and batching.
 constexpr std::uint64_t kNoiseStream = 0x65707300;
 constexpr Dim kMostLanes = 8;
+constexpr std::int64_t kStepsPerComparison = 100;
 
 LossTerms values_of(const Loss& loss, double share) {
   const auto value = [share](const Variable& term) { return term.defined() ? share * term.item() : 0; };
@@ -34,7 +36,7 @@ void LossTerms::add(const LossTerms& other) {
 }
 
 void Trainer::Spreads::clear() {
-  for (Spread* spread : {&pictures, &targets, &means}) spread->clear();
+  for (Spread* spread : all()) spread->clear();
 }
 
 void Trainer::Spreads::add(const Spreads& other) {
@@ -42,19 +44,21 @@ void Trainer::Spreads::add(const Spreads& other) {
 }
 
 Trainer::Trainer(const Examples& examples, std::vector<std::uint32_t> train,
-                 std::unique_ptr<Objective> objective)
+                 std::unique_ptr<Objective> objective, Ranks& ranks)
     : data_(examples),
       train_(std::move(train)),
       objective_(std::move(objective)),
       batching_(train_, static_cast<std::size_t>(objective_->pace().batch), objective_->pace().seed),
-      state_(model().parameters(), objective_->pace(), objective_->pace().epochs * steps_per_epoch()) {
+      state_(model().parameters(), objective_->pace(), objective_->pace().epochs * steps_per_epoch()),
+      ranks_(ranks) {
   check_format(examples, model());
   indices_.resize(batching_.batch_size());
+  check_lanes(ranks.size(), indices_.size());
   const Dim n = static_cast<Dim>(indices_.size()), lanes = std::min(kMostLanes, n);
-  for (Dim i = 0; i < lanes; ++i)
+  const Dim first = lanes * ranks.rank() / ranks.size();
+  for (Dim i = first; i < first + lanes / ranks.size(); ++i)
     lanes_.emplace_back(*objective_, i * n / lanes, (i + 1) * n / lanes - i * n / lanes);
   for (const Lane& lane : lanes_) lane_parameters_.push_back(&lane.objective->network().parameters());
-  spreads_ = lanes_[0].spreads;
 }
 
 Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, const TrainingSettings& settings)
@@ -122,7 +126,7 @@ void Trainer::run_lane(Lane& lane) const {
   lane.trouble = where_not_finite(outcome.loss.total, parameters);
 }
 
-StepReport Trainer::train_step() {
+StepReport Trainer::train_step(const std::function<bool()>& stop) {
   if (done())
     throw std::invalid_argument("train_step: all " + std::to_string(total_steps()) + " steps are done");
   const auto per_epoch = static_cast<std::uint64_t>(steps_per_epoch());
@@ -141,12 +145,41 @@ StepReport Trainer::train_step() {
   report.learning_rate = state_.learning_rate();
   for (Lane& lane : lanes_) {
     if (lane.error) std::rethrow_exception(std::exchange(lane.error, nullptr));
-    report.add(lane.terms);
   }
+  report.stop = stop && stop();
+  add_up(report);
   check_finite(report);
   look_for_collapse(report);
-  report.gradient_norm = state_.apply(lane_parameters_);
+  report.gradient_norm = state_.apply(lane_parameters_, ranks_);
+  if (step() % kStepsPerComparison == 0) check_same();
   return report;
+}
+
+// Of lanes, then of processes, as balanced binary trees.
+void Trainer::add_up(StepReport& report) {
+  for (std::size_t apart = 1; apart < lanes_.size(); apart *= 2) {
+    for (std::size_t lane = 0; lane + apart < lanes_.size(); lane += 2 * apart) {
+      lanes_[lane].terms.add(lanes_[lane + apart].terms);
+      lanes_[lane].spreads.add(lanes_[lane + apart].spreads);
+    }
+  }
+  Lane& sum = lanes_.front();
+  if (ranks_.size() > 1) {
+    const auto each = [&](const std::function<void(double&)>& use) {
+      LossTerms& t = sum.terms;
+      for (double* term : {&t.total, &t.reconstruction, &t.kld, &t.l2, &t.ssim}) use(*term);
+      for (Spread* spread : sum.spreads.all())
+        for (double& value : spread->values()) use(value);
+    };
+    statistics_.assign(1, report.stop ? 1 : 0);
+    each([&](double& value) { statistics_.push_back(value); });
+    of_partner_.resize(statistics_.size());
+    ranks_.add_up(statistics_, of_partner_);
+    report.stop = statistics_[0] > 0;
+    std::size_t next = 1;
+    each([&](double& value) { value = statistics_[next++]; });
+  }
+  report.add(sum.terms);
 }
 
 void Trainer::check_finite(const LossTerms& t) const {
@@ -154,6 +187,10 @@ void Trainer::check_finite(const LossTerms& t) const {
   std::string where;
   for (const Lane& lane : lanes_) {
     if (where.empty()) where = lane.trouble;
+  }
+  for (const std::string& its : ranks_.gather(where)) {
+    where = its;
+    if (!where.empty()) break;
   }
   const std::string vaes = objective_->latents() == 0 ? ""
                                                       : "reconstruction " + format(t.reconstruction) +
@@ -163,13 +200,12 @@ void Trainer::check_finite(const LossTerms& t) const {
 }
 
 void Trainer::look_for_collapse(StepReport& report) {
-  spreads_.clear();
-  for (const Lane& lane : lanes_) spreads_.add(lane.spreads);
+  const Spreads& spreads = lanes_.front().spreads;
   if (indices_.size() < 2) return;  // nothing to compare with
   const auto samples = static_cast<double>(indices_.size());
-  report.active_latents = active_latents(spreads_.means, samples);
+  report.active_latents = active_latents(spreads.means, samples);
   const bool idle = objective_->latents() > 0 && report.active_latents == 0;
-  report.collapsed = state_.collapsed(idle || senseless(spreads_.pictures, spreads_.targets, samples));
+  report.collapsed = state_.collapsed(idle || senseless(spreads.pictures, spreads.targets, samples));
 }
 
 // What a saved state must agree in, besides the caller's own metadata.
@@ -180,7 +216,22 @@ std::map<std::string, std::string> Trainer::full(std::map<std::string, std::stri
 }
 
 void Trainer::save(const std::string& path, std::map<std::string, std::string> metadata) const {
-  state_.save(path, full(std::move(metadata)));
+  check_same();
+  if (ranks_.first()) state_.save(path, full(std::move(metadata)));
+}
+
+void Trainer::check_same() const {
+  if (ranks_.size() == 1) return;
+  std::map<std::string, std::string> sums;
+  for (const Parameter& p : model().parameters())
+    sums[p.name] = std::to_string(crc32(std::as_bytes(std::span<const real>(p.value.value().values()))));
+  const std::optional<Disagreement> found = find_disagreement(ranks_, sums);
+  if (!found) return;
+  throw RanksError("after step " + std::to_string(step()) + " rank " + std::to_string(found->rank) +
+                   " holds another " + found->entry + " than the others (CRC-32 " + found->its + ", theirs " +
+                   found->usual +
+                   "): its memory or its build is faulty; leave that machine out and continue from the last "
+                   "state with --resume");
 }
 
 void Trainer::save_model(const std::string& path, std::map<std::string, std::string> metadata) const {

@@ -5,13 +5,16 @@
 //
 // Every random choice is a function of (seed, step), so that a restored trainer continues to the same bits.
 //
-// A batch is cut into lanes, at most four, whatever the number of threads. Each lane runs the whole forward
-// and backward pass on its share, on one thread, with gradients of its own; these are added in the order of
-// the lanes. So threads meet once per step, and which of them ran a lane changes no bit.
+// A batch is cut into lanes, at most eight, whatever the number of threads. Each lane runs the whole forward
+// and backward pass on its share, on one thread, with gradients of its own; these are added as a balanced
+// binary tree. So threads meet once per step, and which of them ran a lane changes no bit. Several processes
+// share the lanes (models/ranks.h), each a subtree, and go on to the same bits as one.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -20,6 +23,7 @@
 #include "data/samples/batching.h"
 #include "models/collapse.h"
 #include "models/objective.h"
+#include "models/ranks.h"
 #include "models/training_state.h"
 
 namespace supertac {
@@ -38,13 +42,16 @@ struct StepReport : LossTerms {
   /// For the last 100 steps after warm-up the pictures said nothing of the truths, or no latent number was
   /// active (models/collapse.h). Lower the learning rate or, when no latent is active, beta.
   bool collapsed = false;
+  bool stop = false;  ///< whether a process wishes to stop after this step
 };
 
 class Trainer {
  public:
   /// `examples` must outlive the trainer. Throws std::invalid_argument for examples of another format than
-  /// the network's, or no training example.
-  Trainer(const Examples& examples, std::vector<std::uint32_t> train, std::unique_ptr<Objective> objective);
+  /// the network's, no training example, or as check_lanes(). `ranks` train together: all of them call
+  /// train_step() and save().
+  Trainer(const Examples& examples, std::vector<std::uint32_t> train, std::unique_ptr<Objective> objective,
+          Ranks& ranks = one_process());
   /// With window_objective() and frame_objective(); throw as these.
   Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, const TrainingSettings& settings);
   Trainer(const PairSet& pairs, std::vector<std::uint32_t> train, const FrameTrainingSettings& settings);
@@ -57,10 +64,14 @@ class Trainer {
   const Network& model() const { return objective_->network(); }
 
   /// One batch: forward, loss, backward, Adam. Throws TrainingStopped; the parameters are then still finite.
-  StepReport train_step();
+  /// `stop` is asked before the gradients are added up. With several processes throws as check_same(), which
+  /// is called every 100 steps.
+  StepReport train_step(const std::function<bool()>& stop = {});
+  /// Throws RanksError naming rank and tensor when the processes' parameters are not the same to the bit.
+  void check_same() const;
 
-  /// Model and training state, a checkpoint like any other with "optimizer." tensors besides. Throws
-  /// FileError.
+  /// Model and training state, a checkpoint like any other with "optimizer." tensors besides. Of several
+  /// processes only the first writes, after check_same(). Throws FileError.
   void save(const std::string& path, std::map<std::string, std::string> metadata) const;
   /// The model alone, with the same metadata, and, for windows of time, the Novelty of its training
   /// examples. Throws FileError.
@@ -72,6 +83,7 @@ class Trainer {
  private:
   struct Spreads {
     Spread pictures, targets, means;
+    std::array<Spread*, 3> all() { return {&pictures, &targets, &means}; }
     void clear();
     void add(const Spreads& other);
   };
@@ -88,6 +100,7 @@ class Trainer {
   void run_lane(Lane& lane) const;
   void fill(Lane& lane) const;
   void draw_noise(Lane& lane) const;
+  void add_up(StepReport& report);
   void look_for_collapse(StepReport& report);
   void check_finite(const LossTerms& terms) const;
   std::vector<StoredTensor> novelty() const;
@@ -99,9 +112,10 @@ class Trainer {
   std::unique_ptr<Objective> objective_;
   Batching batching_;
   TrainingState state_;
-  Spreads spreads_;
-  std::vector<std::uint32_t> indices_;  // of the batch
-  std::vector<Lane> lanes_;
+  Ranks& ranks_;
+  std::vector<double> statistics_, of_partner_;
+  std::vector<std::uint32_t> indices_;                          // of the batch
+  std::vector<Lane> lanes_;                                     // of this process
   std::vector<const std::vector<Parameter>*> lane_parameters_;  // of these models
 };
 

@@ -54,18 +54,35 @@ bool TrainingState::collapsed(bool looks_so) {
   return flat_steps_ >= kFlatStepsToReport;
 }
 
-double TrainingState::apply(const std::vector<const std::vector<Parameter>*>& lanes) {
+void TrainingState::add_up(const std::vector<Parameter>& lane, Ranks& ranks) {
+  sum_.clear();
+  for (const Parameter& p : lane) {
+    const auto gradient = p.value.grad().values();
+    sum_.insert(sum_.end(), gradient.begin(), gradient.end());
+  }
+  of_partner_.resize(sum_.size());
+  ranks.add_up(sum_, of_partner_);
+  const real* next = sum_.data();
+  for (const Parameter& p : lane) {
+    const auto gradient = Variable(p.value).mutable_grad().values();
+    std::copy_n(next, gradient.size(), gradient.data());
+    next += gradient.size();
+  }
+}
+
+double TrainingState::apply(const std::vector<const std::vector<Parameter>*>& lanes, Ranks& ranks) {
   adam_.zero_grad();
+  const auto add = [&](Variable to, const Variable& from) {
+    kernels::add_scaled(from.grad().size(), 1, from.grad().data(), to.mutable_grad().data());
+  };
   for (std::size_t i = 0; i < parameters_.size(); ++i) {
-    const auto add = [&](Variable to, const Variable& from) {
-      kernels::add_scaled(from.grad().size(), 1, from.grad().data(), to.mutable_grad().data());
-    };
     for (std::size_t apart = 1; apart < lanes.size(); apart *= 2) {
       for (std::size_t lane = 0; lane + apart < lanes.size(); lane += 2 * apart)
         add((*lanes[lane])[i].value, (*lanes[lane + apart])[i].value);
     }
-    add(parameters_[i].value, (*lanes.front())[i].value);
   }
+  if (ranks.size() > 1) add_up(*lanes.front(), ranks);
+  for (std::size_t i = 0; i < parameters_.size(); ++i) add(parameters_[i].value, (*lanes.front())[i].value);
   adam_.set_learning_rate(learning_rate());
   const double norm = adam_.step();
   if (!std::isfinite(norm)) {

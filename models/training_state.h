@@ -10,6 +10,7 @@
 
 #include "autograd/adam.h"
 #include "layers/module.h"
+#include "models/ranks.h"
 
 namespace supertac {
 
@@ -47,10 +48,10 @@ class TrainingState {
   bool collapsed(bool looks_so);
 
   /// Sets the gradients to the sum of the lanes', which is taken as a balanced binary tree (pairs of
-  /// neighbours, then pairs of pairs) in the lanes' own gradients, and applies Adam; counts the step. Returns
-  /// the gradient's norm before clipping. Throws TrainingStopped, with nothing changed, when it is not
-  /// finite.
-  double apply(const std::vector<const std::vector<Parameter>*>& lanes);
+  /// neighbours, then pairs of pairs) in the lanes' own gradients, then over `ranks`; applies Adam; counts
+  /// the step. Returns the gradient's norm before clipping. Throws TrainingStopped, with nothing changed,
+  /// when it is not finite.
+  double apply(const std::vector<const std::vector<Parameter>*>& lanes, Ranks& ranks);
   /// Throws TrainingStopped: step, `what`, and advice.
   [[noreturn]] void stop(const std::string& what) const;
 
@@ -61,11 +62,14 @@ class TrainingState {
   void restore(const std::string& path, const std::map<std::string, std::string>& expected);
 
  private:
+  void add_up(const std::vector<Parameter>& lane, Ranks& ranks);
+
   std::vector<Parameter> parameters_;
   mutable Adam adam_;
   Schedule schedule_;
   std::int64_t step_ = 0;
   int flat_steps_ = 0;
+  std::vector<real> sum_, of_partner_;  // all gradients in one piece, of several processes
 };
 
 /// Makes a lane's parameters share the master's values under gradients of their own.

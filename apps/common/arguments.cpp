@@ -329,7 +329,7 @@ int Arguments::threads() const {
 }
 
 void Arguments::print(std::string_view line) const {
-  if (text("json") != "-") std::cout << without_controls(line) << '\n';
+  if (!muted_ && text("json") != "-") std::cout << without_controls(line) << '\n';
 }
 
 void Arguments::note(std::string_view line) const {
@@ -337,7 +337,7 @@ void Arguments::note(std::string_view line) const {
 }
 
 void Arguments::write_json(const nlohmann::ordered_json& result) const {
-  if (!given("json")) return;
+  if (muted_ || !given("json")) return;
   const std::string document = result.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   if (text("json") == "-") {
     std::cout << document;

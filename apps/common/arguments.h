@@ -87,7 +87,7 @@ class Arguments {
   std::vector<NamedPath> paths() const;
 
   bool force() const { return flag("force"); }
-  bool quiet() const { return flag("quiet"); }
+  bool quiet() const { return muted_ || flag("quiet"); }
   /// --threads, or what the machine grants (apps/common/threads.h).
   int threads() const;
 
@@ -98,6 +98,8 @@ class Arguments {
 
   // Talking.
 
+  /// From here on nothing of this is said or written, as if under --quiet: another process does it.
+  void mute() { muted_ = true; }
   /// A line of the result for a reader, on stdout; nothing when the JSON goes there.
   void print(std::string_view line) const;
   /// A remark on stderr; nothing under --quiet.
@@ -129,7 +131,7 @@ class Arguments {
   std::map<std::string, Option> options_;
   std::vector<std::pair<std::string, std::string>> one_of_;
   std::string only_with_;  // of the options being declared
-  bool more_ = false;
+  bool more_ = false, muted_ = false;
   std::map<std::string, std::string> values_;  // as given
 };
 

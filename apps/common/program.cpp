@@ -2,10 +2,13 @@
 
 #include <omp.h>
 
+#include <chrono>
 #include <filesystem>
 #include <iostream>
 #include <new>
+#include <thread>
 
+#include "apps/common/launch.h"
 #include "apps/common/outputs.h"
 #include "apps/common/signals.h"
 #include "apps/common/version.h"
@@ -20,11 +23,21 @@ constexpr const char* kCompiler = "";  // it names itself
 constexpr const char* kCompiler = "GCC ";
 #endif
 
+// A mistake in the command line is made by all processes of an mpirun: when the first reports it, mpirun
+// ends the others before they do.
+std::string among_others() {
+  const int rank = launch().rank;
+  if (rank == 0) return "";
+  if (!interrupted()) std::this_thread::sleep_for(std::chrono::milliseconds(400));
+  return " (rank " + std::to_string(rank) + ")";
+}
+
 /// One line, whatever the message holds.
 int fail(const Program& program, std::string message, int code) {
+  const std::string rank = among_others();
   for (char& c : message)
     if (static_cast<unsigned char>(c) < ' ' || c == 0x7F) c = c == '\n' ? ' ' : '?';
-  std::cerr << program.name << ": " << message << '\n';
+  std::cerr << program.name + rank + ": " + message + "\n";
   return code;
 }
 

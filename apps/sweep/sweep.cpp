@@ -1,12 +1,16 @@
 #include "apps/sweep/sweep.h"
 
+#include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <limits>
+#include <thread>
 #include <utility>
 
 #include "apps/common/measure.h"
 #include "apps/common/signals.h"
 #include "apps/common/version.h"
+#include "apps/sweep/shards.h"
 #include "apps/train/training_options.h"
 #include "io/file.h"
 #include "io/json.h"
@@ -39,7 +43,9 @@ void Sweep::check_settings() const {
   for (const auto& [option, key] :
        {std::pair("epochs", "epochs"), {"learning-rate", "learning_rate"}, {"rate", "rate"}})
     if (!a_.given(option)) settings[key] = "the preset's";
+  if (a_.given("shard")) settings[kShardKey] = a_.text("shard"), settings[kGridKey] = names_of(grid_of(a_));
   const std::string path = a_.text("out") + "/settings.json";
+  const FolderLock alone = wait_for_table(a_.text("out"));
   if (!fs::exists(path)) return write_file(path, settings.dump(2) + "\n");
   const auto before = parse_json_limited(read_text_file(path, 1 << 20));
   for (const auto& [key, value] : settings.items()) {
@@ -50,14 +56,60 @@ void Sweep::check_settings() const {
   }
 }
 
+std::vector<GridPoint> longest_first(std::vector<GridPoint> grid) {
+  std::stable_sort(grid.begin(), grid.end(), [](const GridPoint& a, const GridPoint& b) {
+    return cost_of(a.model).training > cost_of(b.model).training;
+  });
+  return grid;
+}
+
+FolderLock wait_for_table(const std::string& folder) {
+  const auto limit = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (true) {
+    try {
+      return FolderLock(folder);
+    } catch (const FileError&) {
+      if (std::chrono::steady_clock::now() > limit) throw;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  }
+}
+
 void Sweep::run(const std::vector<GridPoint>& grid) {
   make_directories(a_.text("out") + "/models");
-  for (std::size_t i = 0; i < grid.size(); ++i) {
-    const std::string label =
-        std::to_string(i + 1) + " of " + std::to_string(grid.size()) + " " + grid[i].name();
-    if (table_.has(grid[i].name())) continue;
-    measure(grid[i], label);
+  order_ = names_of(grid);
+  const std::vector<GridPoint> trainings = longest_first(grid);
+  const auto done = [&] {
+    return std::all_of(order_.begin(), order_.end(), [&](const auto& name) { return table_.has(name); });
+  };
+  while (!done()) {
+    if (take_one(trainings)) continue;
+    stop_if_interrupted();
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    table_.read_again();
   }
+}
+
+// Whoever holds the folder of a model's run has the model; a killed process holds nothing.
+bool Sweep::take_one(const std::vector<GridPoint>& longest_first) {
+  for (const GridPoint& point : longest_first) {
+    if (table_.has(point.name())) continue;
+    const std::string folder =
+        RunFolder::folder_of(a_.text("out") + "/models/" + point.name() + ".safetensors");
+    make_directories(folder);
+    std::optional<FolderLock> mine;
+    try {
+      mine.emplace(folder);
+    } catch (const FileError&) {
+      continue;  // another process has it
+    }
+    table_.read_again();
+    if (table_.has(point.name())) continue;
+    const auto number = std::find(order_.begin(), order_.end(), point.name()) - order_.begin() + 1;
+    measure(point, std::to_string(number) + " of " + std::to_string(order_.size()) + " " + point.name());
+    return true;
+  }
+  return false;
 }
 
 void Sweep::measure(const GridPoint& point, const std::string& label) {
@@ -76,7 +128,12 @@ void Sweep::measure(const GridPoint& point, const std::string& label) {
   if (!training.train()) throw Interrupted();
   const ZoneMetrics scores = score(training.trainer().model(), windows, to_score, interrupted);
   stop_if_interrupted();
-  table_.add(row(point, training, scores));
+  const nlohmann::ordered_json measured = row(point, training, scores);
+  {
+    const FolderLock alone = wait_for_table(a_.text("out"));
+    table_.read_again();
+    table_.add(measured, order_);
+  }
   fs::remove(state);  // nothing is left to resume
 }
 

@@ -10,11 +10,18 @@
 #include "apps/sweep/table.h"
 #include "apps/train/training_run.h"
 #include "data/scores/metrics.h"
+#include "io/folder_lock.h"
 
 namespace supertac {
 
 /// --limit and --history: which test windows are scored.
 void declare_measuring(Arguments& a);
+
+/// Those of the greatest cost first; equal ones stay in their order.
+std::vector<GridPoint> longest_first(std::vector<GridPoint> grid);
+
+/// The sweep's folder, once no other process of it writes its table. Throws FileError after 30 s.
+FolderLock wait_for_table(const std::string& folder);
 
 class Sweep {
  public:
@@ -23,12 +30,16 @@ class Sweep {
   /// settings: figures that cannot be compared do not mix.
   Sweep(const Arguments& a, SweepTable& table);
 
-  /// Rows that are there are not measured again; a model whose training was cut is trained on. Throws
-  /// Interrupted after a signal, UsageError, and as TrainingRun.
+  /// Rows that are there are not measured again; a model whose training was cut is trained on. Several
+  /// processes may run the same sweep at once, on any machines that see the folder and its locks: each takes
+  /// the longest training that nobody has, the rows stand in the order of the grid, and who finds nothing
+  /// left waits, to take over from one that is lost. Throws Interrupted after a signal, UsageError, and as
+  /// TrainingRun.
   void run(const std::vector<GridPoint>& grid);
 
  private:
   void check_settings() const;
+  bool take_one(const std::vector<GridPoint>& longest_first);
   void measure(const GridPoint& point, const std::string& label);
   std::vector<std::uint32_t> windows_to_score(const WindowSet& windows, const Split& split) const;
   const WindowSet& windows_of(const SuperTacSettings& model);
@@ -38,6 +49,7 @@ class Sweep {
   const Arguments& a_;
   SweepTable& table_;
   std::optional<WindowSet> windows_;
+  std::vector<std::string> order_;  // of the rows
 };
 
 }  // namespace supertac

@@ -1,5 +1,6 @@
 #include "apps/sweep/table.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <limits>
 #include <stdexcept>
@@ -49,7 +50,14 @@ const std::vector<SweepColumn>& sweep_columns() {
   return kColumns;
 }
 
-SweepTable::SweepTable(std::string path) : path_(std::move(path)) {
+SweepTable::SweepTable(std::string path) : path_(std::move(path)) { read(); }
+
+void SweepTable::read_again() {
+  rows_.clear();
+  read();
+}
+
+void SweepTable::read() {
   if (!std::filesystem::exists(path_)) return;
   const std::string content = read_text_file(path_, kMaxBytes);
   std::size_t begin = 0;
@@ -92,14 +100,23 @@ bool SweepTable::has(const std::string& model) const {
   return false;
 }
 
-void SweepTable::add(const nlohmann::ordered_json& values) {
+void SweepTable::add(const nlohmann::ordered_json& values, const std::vector<std::string>& order) {
   Row row;
   for (const SweepColumn& column : sweep_columns()) {
     if (!values.contains(column.name))
       throw std::invalid_argument("SweepTable: no value for column " + column.name);
     row.push_back(cell(values[column.name]));
   }
-  rows_.push_back(std::move(row));
+  add(row, order);
+}
+
+void SweepTable::add(const Row& row, const std::vector<std::string>& order) {
+  const auto place = [&](const Row& r) {
+    const auto found = std::find(order.begin(), order.end(), r[0]);
+    return found == order.end() ? -1 : found - order.begin();
+  };
+  rows_.insert(std::find_if(rows_.begin(), rows_.end(), [&](const Row& r) { return place(r) > place(row); }),
+               row);
   std::string content = header() + "\n";
   for (const Row& r : rows_) {
     for (std::size_t i = 0; i < r.size(); ++i) content += (i > 0 ? "," : "") + r[i];

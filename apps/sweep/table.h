@@ -34,9 +34,13 @@ class SweepTable {
 
   bool dropped_a_cut_line() const { return dropped_; }
   bool has(const std::string& model) const;
-  /// Adds a row, keys as sweep_columns(), and writes the file atomically. Throws FileError,
-  /// std::invalid_argument when a column is missing.
-  void add(const nlohmann::ordered_json& values);
+  /// What another process has added meanwhile. Throws as the constructor.
+  void read_again();
+  /// Adds a row, keys as sweep_columns(), and writes the file atomically: rows of models in `order` stand in
+  /// that order, after all others. Throws FileError, std::invalid_argument when a column is missing.
+  void add(const nlohmann::ordered_json& values, const std::vector<std::string>& order);
+  /// The same for a row of another table.
+  void add(const Row& row, const std::vector<std::string>& order);
 
   const std::vector<Row>& rows() const { return rows_; }
   static const std::string& text(const Row& row, const std::string& column);
@@ -44,6 +48,7 @@ class SweepTable {
   static double number(const Row& row, const std::string& column);
 
  private:
+  void read();
   void read_line(const std::string& line, std::size_t number);
 
   std::string path_;

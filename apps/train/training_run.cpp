@@ -17,10 +17,24 @@ namespace {
 constexpr std::size_t kTestedPerEpoch = 2000;
 constexpr std::int64_t kStepsPerLine = 50;
 
+void check_agreement(const Trainer& trainer, const TrainingTask& task, Ranks& ranks) {
+  std::map<std::string, std::string> mine = task.origin;
+  mine["build"] = version() + " " + commit();
+  mine["training"] = trainer.objective().text();
+  mine["model"] = trainer.objective().metadata().at("settings");
+  mine["step"] = std::to_string(trainer.step());
+  if (const auto odd = find_disagreement(ranks, mine))
+    throw RanksError("rank " + std::to_string(odd->rank) + ": its " + odd->entry + " is " + odd->its +
+                     ", that of the others is " + odd->usual +
+                     "; start all with the same build, data and options");
+  trainer.check_same();
+}
+
 // Restored before the run folder is touched: a checkpoint that does not fit must leave the folder as it was.
-Trainer make_trainer(TrainingTask& task, const std::string& resume) {
-  Trainer trainer(task.examples, task.split.train, std::move(task.objective));
-  if (!resume.empty()) trainer.restore(resume, task.origin);
+Trainer make_trainer(TrainingTask& task, const TrainingTarget& target) {
+  Trainer trainer(task.examples, task.split.train, std::move(task.objective), target.ranks);
+  if (!target.resume.empty()) trainer.restore(target.resume, task.origin);
+  if (target.ranks.size() > 1) check_agreement(trainer, task, target.ranks);
   return trainer;
 }
 
@@ -48,11 +62,12 @@ TrainingRun::TrainingRun(const Arguments& a, TrainingTask task, TrainingTarget t
     : a_(a),
       task_(std::move(task)),
       target_(std::move(target)),
-      trainer_(make_trainer(task_, target_.resume)),
-      folder_(target_.out, target_.force,
-              target_.resume.empty() ? std::nullopt : std::optional(trainer_.step())),
+      trainer_(make_trainer(task_, target_)),
       description_(describe(a, trainer_, task_)) {
-  folder_.write_settings(description_);
+  if (!target_.ranks.first()) return;
+  folder_.emplace(target_.out, target_.force,
+                  target_.resume.empty() ? std::nullopt : std::optional(trainer_.step()));
+  folder_->write_settings(description_);
 }
 
 bool TrainingRun::train() {
@@ -61,31 +76,33 @@ bool TrainingRun::train() {
           (target_.resume.empty() ? "" : ", resumed at " + std::to_string(trainer_.step())));
   if (!task_.warning.empty()) a_.note(task_.warning);
   step_until_done();
-  folder_.write_report(description_);
+  if (folder_) folder_->write_report(description_);
   if (!trainer_.done()) return false;
-  trainer_.save_model(target_.out, task_.origin);
+  if (folder_) trainer_.save_model(target_.out, task_.origin);
   return true;
 }
 
 void TrainingRun::step_until_done() {
   begin_ = std::chrono::steady_clock::now();
-  seconds_before_ = folder_.seconds();
+  seconds_before_ = folder_ ? folder_->seconds() : 0;
   const std::int64_t every = a_.integer("checkpoint-every", 1, 1'000'000'000);
   Progress progress(a_, target_.label, static_cast<std::uint64_t>(trainer_.total_steps()), "steps");
   LogLine sums;
   std::int64_t steps = 0;
-  while (!trainer_.done() && !interrupted()) {
-    const StepReport report = trainer_.train_step();
+  bool stop = target_.ranks.size() == 1 && interrupted();
+  while (!trainer_.done() && !stop) {
+    const StepReport report = trainer_.train_step(interrupted);
     sums.add(report);
     sums.gradient_norm += report.gradient_norm;
     ++steps;
     if (report.collapsed && !std::exchange(warned_, true)) warn_of_collapse(report);
     if (report.step % trainer_.steps_per_epoch() == 0 || report.step % kStepsPerLine == 0) {
-      log(sums, std::exchange(steps, 0), report);
+      if (folder_) log(sums, std::exchange(steps, 0), report);
       sums = {};
     }
     if (report.step % every == 0) save();
     progress.update(static_cast<std::uint64_t>(report.step));
+    stop = report.stop || (target_.ranks.size() == 1 && interrupted());
   }
   save();
 }
@@ -126,7 +143,8 @@ void TrainingRun::log(LogLine& line, std::int64_t steps, const StepReport& last)
   line.step = last.step;
   line.learning_rate = last.learning_rate;
   if (last.step % trainer_.steps_per_epoch() == 0) test(line);
-  if (!folder_.log(line)) a_.note(folder_.path() + "/log.csv: cannot write; the log is kept in memory only");
+  if (!folder_->log(line))
+    a_.note(folder_->path() + "/log.csv: cannot write; the log is kept in memory only");
 }
 
 }  // namespace supertac

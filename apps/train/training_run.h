@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
 
 #include "apps/common/arguments.h"
@@ -16,12 +17,13 @@ struct TrainingTarget {
   bool force = false;              ///< whether an earlier run's folder may be overwritten
   std::string resume;              ///< the checkpoint to continue from; "" = start anew
   std::string label = "training";  ///< of the progress bar
+  Ranks& ranks = one_process();    ///< that train together; only the first writes
 };
 
 class TrainingRun {
  public:
   /// `a`, which must have what declare_training() declares, and the task's examples must outlive the run.
-  /// Throws as Trainer, Trainer::restore and RunFolder.
+  /// Throws as Trainer, Trainer::restore and RunFolder; RanksError when ranks have other data or options.
   TrainingRun(const Arguments& a, TrainingTask task, TrainingTarget target);
 
   /// Until the last step or a signal. The state is saved either way; after the last step report and model are
@@ -29,7 +31,8 @@ class TrainingRun {
   bool train();
 
   const Trainer& trainer() const { return trainer_; }
-  const RunFolder& folder() const { return folder_; }
+  /// Of the first rank only.
+  const RunFolder& folder() const { return *folder_; }
   const Split& split() const { return task_.split; }
   /// What settings.json holds: command, version, commit, settings, data, split.
   const nlohmann::ordered_json& description() const { return description_; }
@@ -40,13 +43,13 @@ class TrainingRun {
   void warn_of_collapse(const StepReport& report);
   void test(LogLine& line) const;
   void log(LogLine& means, std::int64_t steps, const StepReport& last);
-  void save() { trainer_.save(folder_.checkpoint_path(), task_.origin); }
+  void save() { trainer_.save(folder_ ? folder_->checkpoint_path() : "", task_.origin); }
 
   const Arguments& a_;
   TrainingTask task_;
   TrainingTarget target_;
   Trainer trainer_;
-  RunFolder folder_;
+  std::optional<RunFolder> folder_;
   nlohmann::ordered_json description_;
   std::chrono::steady_clock::time_point begin_;
   double seconds_before_ = 0;  // on the log's clock when this process began

@@ -34,7 +34,7 @@ int open_terminal() {
 
 RunningProcess::RunningProcess(const std::string& program, const std::vector<std::string>& arguments,
                                const ProcessOptions& options) {
-  const std::string path = std::string(SUPERTAC_BIN) + "/" + program;
+  const std::string path = program.starts_with("/") ? program : std::string(SUPERTAC_BIN) + "/" + program;
   std::vector<std::string> words = {path};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;

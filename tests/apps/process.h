@@ -22,8 +22,8 @@ struct ProcessOptions {
   bool terminal = false;     ///< stderr is a terminal of 100 columns
 };
 
-/// A program that runs beside the test; killed when the test ends first. `program` is a name in the build's
-/// bin folder, e.g. "supertac-info".
+/// A program that runs beside the test; killed when the test ends first. `program` is a path or a name in the
+/// build's bin folder, e.g. "supertac-info".
 class RunningProcess {
  public:
   RunningProcess(const std::string& program, const std::vector<std::string>& arguments,

@@ -155,6 +155,77 @@ TEST_F(Sweep, AStoppedModelGoesOnToTheSameBytes) {
   EXPECT_TRUE(bytes("whole" + model + ".safetensors") == bytes("stopped" + model + ".safetensors"));
 }
 
+// Everything but times and memory, which are never the same.
+std::string without_times(const std::string& csv) {
+  std::string kept;
+  std::istringstream lines(csv);
+  for (std::string line; std::getline(lines, line); kept += "\n") {
+    std::istringstream columns(kHeader), cells(line);
+    std::string value;
+    for (std::string column; std::getline(columns, column, ',') && std::getline(cells, value, ',');)
+      if (column != "median_us" && column != "p99_us" && column != "memory_mb" && column != "train_s")
+        kept += value + ",";
+  }
+  return kept;
+}
+
+const std::vector<std::string> kFour{"--seeds", "0,1"};  // models
+
+TEST_F(Sweep, ProcessesOfOneFolderShareTheTrainingsAndTakeOverFromALostOne) {
+  ASSERT_EQ(sweep("one", "1", kFour).code, 0);
+  const std::string expected = without_times(bytes("one/sweep.csv"));
+  EXPECT_EQ(std::count(expected.begin(), expected.end(), '\n'), 5);
+  const auto words = [&](const std::string& out) {
+    return std::vector<std::string>{"--out",     path(out), "--data",      path("data"), "--latent",   "2",
+                                    "--scale",   "2",       "--timesteps", "32,64",      "--channels", "8",
+                                    "--rcabs",   "1",       "--batch",     "8",          "--stride",   "8",
+                                    "--threads", "1",       "--limit",     "50",         "--epochs",   "1",
+                                    "--seeds",   "0,1"};
+  };
+  RunningProcess first("supertac-sweep", words("two")), second("supertac-sweep", words("two"));
+  const ProcessResult a = first.wait(), b = second.wait();
+  EXPECT_EQ(a.code + b.code, 0) << a.error << b.error;
+  EXPECT_EQ(without_times(bytes("two/sweep.csv")), expected);
+  EXPECT_NE(a.error.find("of 4 paper"), std::string::npos) << "the second did it all";
+  EXPECT_NE(b.error.find("of 4 paper"), std::string::npos) << "the first did it all";
+  RunningProcess lost("supertac-sweep", words("left"));
+  wait_for_file(path("left/models/paper_t64_l2_x2_c8_r1_s0.run/log.csv"));
+  RunningProcess other("supertac-sweep", words("left"));
+  wait_for_file(path("left/models/paper_t64_l2_x2_c8_r1_s1.run/log.csv"));
+  lost.send(SIGKILL);
+  EXPECT_EQ(lost.wait().code, 128 + SIGKILL);
+  const ProcessResult left = other.wait();
+  EXPECT_EQ(left.code, 0) << left.error;
+  EXPECT_EQ(without_times(bytes("left/sweep.csv")), expected);
+}
+
+TEST_F(Sweep, ShardsAreMergedWhenNothingIsMissingOrTwice) {
+  ASSERT_EQ(sweep("whole4", "1", kFour).code, 0);
+  for (const char* shard : {"1/3", "2/3", "3/3"})
+    ASSERT_EQ(sweep(std::string("part") + shard[0], "1", {"--seeds", "0,1", "--shard", shard}).code, 0);
+  const auto merge = [](const std::string& folders, const std::string& out) {
+    return run_process("supertac-sweep", {"--out", path(out), "--merge", folders});
+  };
+  const std::string one = path("part1"), two = path("part2"), three = path("part3");
+  const ProcessResult missing = merge(one + "," + three, "merged");
+  EXPECT_EQ(missing.code, 1);
+  EXPECT_NE(missing.error.find("no shard has a row of"), std::string::npos) << missing.error;
+  EXPECT_EQ(std::count(missing.error.begin(), missing.error.end(), '\n'), 1) << missing.error;
+  fs::copy(one, path("copy"), fs::copy_options::recursive);
+  const ProcessResult twice = merge(one + "," + two + "," + three + "," + path("copy"), "merged");
+  EXPECT_EQ(twice.code, 1);
+  EXPECT_NE(twice.error.find("and so has"), std::string::npos) << twice.error;
+  EXPECT_NE(merge(one + "," + path("whole4"), "merged").error.find("did not run with --shard"),
+            std::string::npos);
+  const ProcessResult all = merge(three + "," + one + "," + two, "merged");
+  ASSERT_EQ(all.code, 0) << all.error;
+  EXPECT_EQ(without_times(bytes("merged/sweep.csv")), without_times(bytes("whole4/sweep.csv")));
+  const std::string model = "/models/paper_t64_l2_x2_c8_r1_s1.safetensors";
+  EXPECT_EQ(bytes("merged" + model), bytes("whole4" + model));
+  EXPECT_EQ(sweep("part1", "1", {"--seeds", "0,1", "--shard", "2/3"}).code, 1) << "a folder is of one shard";
+  EXPECT_EQ(sweep("bad3", "1", {"--shard", "4/3"}).code, 2);
+}
+
 TEST_F(Sweep, PicksTheFastestConfigurationThatHolds) {
   // Means over two seeds: slow .9, middle .8, bad .7 (slower and worse than middle), fast .5.
   write_table("made",

@@ -1,0 +1,151 @@
+#include "models/ranks.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <atomic>
+
+#include "tests/models/support.h"
+#include "tests/models/thread_ranks.h"
+
+namespace supertac {
+namespace {
+
+using Texts = std::vector<std::string>;
+
+TEST(Ranks, GatherTextsByRank) {
+  on_ranks(4, [](Ranks& ranks) {
+    const std::string mine(static_cast<std::size_t>(3 * ranks.rank()), static_cast<char>('a' + ranks.rank()));
+    EXPECT_EQ(ranks.gather(mine), (Texts{"", "bbb", "cccccc", "ddddddddd"}));
+  });
+}
+
+// A sum in order would lose the ones: (1e16 + 1) + 1 = 1e16.
+TEST(Ranks, AddUpAsABalancedTree) {
+  on_ranks(4, [](Ranks& ranks) {
+    const double mine[] = {1e16, 0, 1, 1};
+    std::vector<double> value = {mine[ranks.rank()]}, buffer(1);
+    ranks.add_up(value, buffer);
+    EXPECT_EQ(value[0], 1e16 + 2);
+  });
+}
+
+TEST(Ranks, OnlyNumbersThatShareEightLanesAreTaken) {
+  for (const int ranks : {1, 2, 4, 8}) EXPECT_NO_THROW(check_lanes(ranks, 8));
+  EXPECT_NO_THROW(check_lanes(1, 3));
+  for (const int ranks : {3, 5, 6, 7, 9, 16}) {
+    try {
+      check_lanes(ranks, 64);
+      FAIL() << ranks;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_EQ(error.what(),
+                std::to_string(ranks) +
+                    " processes cannot share the eight lanes of a batch evenly; start 1, 2, 4 or "
+                    "8, or train several models at once with supertac-sweep");
+    }
+  }
+  EXPECT_THROW(check_lanes(2, 7), std::invalid_argument);
+}
+
+TEST(Ranks, TheMajoritySaysWhoDisagrees) {
+  on_ranks(4, [](Ranks& ranks) {
+    EXPECT_FALSE(find_disagreement(ranks, {{"build", "a"}, {"data", "b"}}));
+    const auto odd = find_disagreement(ranks, {{"build", "a"}, {"data", ranks.first() ? "c" : "b"}});
+    ASSERT_TRUE(odd);
+    EXPECT_EQ(odd->rank, 0);
+    EXPECT_EQ(odd->entry + odd->its + odd->usual, "datacb");
+    std::map<std::string, std::string> entries{{"build", "a"}};
+    if (ranks.rank() == 2) entries["data"] = "b";
+    const auto more = find_disagreement(ranks, entries);
+    ASSERT_TRUE(more);
+    EXPECT_EQ(more->rank, 2);
+    EXPECT_EQ(more->usual, "missing");
+  });
+  on_ranks(2, [](Ranks& ranks) {
+    EXPECT_EQ(find_disagreement(ranks, {{"data", std::to_string(ranks.rank())}})->rank, 1);
+  });
+}
+
+class RanksTrain : public testing::Test {
+ protected:
+  RanksTrain() {
+    settings_.augment = {.gain = 0.5, .noise = 0.02};
+    settings_.batch = 12;  // lanes of one and of two samples
+  }
+  Trainer trainer(Ranks& ranks) const {
+    return {windows_, all_of(windows_), window_objective(windows_, settings_), ranks};
+  }
+  /// From the state in `from` ("" = start) by `ranks` for `steps` steps; the state's file.
+  std::string train(int size, const std::string& from, std::int64_t steps) {
+    const std::string to = folder_ / ("state" + std::to_string(++files_) + ".safetensors");
+    const Texts errors = on_ranks(size, [&](Ranks& ranks) {
+      omp_set_num_threads(1);
+      Trainer t = trainer(ranks);
+      if (!from.empty()) t.restore(from, {});
+      for (std::int64_t i = 0; i < steps && !t.done(); ++i) last_loss_ = t.train_step().total;
+      t.save(to, {});
+    });
+    EXPECT_EQ(errors, Texts(static_cast<std::size_t>(size)));
+    return to;
+  }
+
+  TemporaryFolder folder_;
+  TrainingSettings settings_ = small_training();
+  const WindowSet windows_ = small_windows(settings_.model);
+  std::atomic<double> last_loss_ = 0;
+
+ private:
+  int files_ = 0;
+};
+
+TEST_F(RanksTrain, TheSameBytesForAnyNumberOfThem) {
+  const std::string alone = file_text(train(1, "", 1000));
+  const double loss = last_loss_;
+  for (const int size : {2, 4, 8}) {
+    EXPECT_TRUE(alone == file_text(train(size, "", 1000))) << size;
+    EXPECT_EQ(last_loss_, loss);
+  }
+  std::string state;
+  for (const int size : {4, 2, 1, 8}) state = train(size, state, 4);
+  EXPECT_TRUE(alone == file_text(train(2, state, 1000))) << "stopped and resumed with other numbers";
+}
+
+TEST_F(RanksTrain, StopTogetherWhenOneWishesTo) {
+  on_ranks(4, [&](Ranks& ranks) {
+    Trainer t = trainer(ranks);
+    std::int64_t steps = 0;
+    while (!t.train_step([&] { return ranks.rank() == 2 && t.step() == 5; }).stop) ++steps;
+    EXPECT_EQ(steps, 5);
+  });
+}
+
+TEST_F(RanksTrain, ADifferenceNamesRankAndTensorAndKeepsTheState) {
+  const std::string path = train(2, "", 3), before = file_text(path);
+  const Texts errors = on_ranks(4, [&](Ranks& ranks) {
+    Trainer t = trainer(ranks);
+    t.restore(path, {});
+    for (const Parameter& p : t.model().parameters())
+      if (ranks.rank() == 3 && p.name == "upsampler.out.weight")
+        Variable(p.value).mutable_value().data()[5] += 1e-6F;
+    t.train_step();
+    t.save(path, {});
+  });
+  for (const std::string& error : errors)
+    EXPECT_TRUE(error.starts_with("after step 4 rank 3 holds another upsampler.out.weight than the others"))
+        << error;
+  EXPECT_TRUE(before == file_text(path));
+}
+
+TEST_F(RanksTrain, AllNameTheLayerThatIsNotFinite) {
+  const Texts errors = on_ranks(2, [&](Ranks& ranks) {
+    Trainer t = trainer(ranks);
+    for (const Parameter& p : t.model().parameters())
+      if (ranks.rank() == 1 && p.name == "upsampler.out.weight") Variable(p.value).mutable_value().fill(NAN);
+    t.train_step();
+  });
+  for (const std::string& error : errors)
+    EXPECT_NE(error.find("parameter upsampler.out.weight is not finite"), std::string::npos) << error;
+}
+
+}  // namespace
+}  // namespace supertac
