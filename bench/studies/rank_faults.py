@@ -2,13 +2,13 @@
 """Seeded faults of trainings on several processes: rank_faults.py BUILD_DIR OUT_DIR [RUNS] [SEED].
 
 Each run starts 2 or 4 ranks under mpirun and does one of: kill -9 of any rank at a random moment, a frozen rank
-(SIGSTOP), a full disk (a limit on the size of files, which all ranks share but only rank 0 writes), one rank with
-another option. It must end with an error within 30 s of the fault and with at most one line of ours, and a resumed
+(SIGSTOP), a full disk (rank 0 may not write any more than 60 kB into a file), one rank with another option. It must end with an error within 30 s of the fault and with at most one line of ours, and a resumed
 run, on another number of ranks, must give the bytes of an undisturbed one. Writes OUT_DIR/rank_faults.csv.
 """
 import hashlib
 import os
 import random
+import resource
 import signal
 import subprocess
 import sys
@@ -56,7 +56,10 @@ def disturb(process, kind, rank, out, moment):
     pid = process_of(out, rank)
     if pid is None:
         return None
-    os.kill(pid, signal.SIGKILL if kind == "kill" else signal.SIGSTOP)
+    if kind == "disk":
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (60_000, 60_000))
+    else:
+        os.kill(pid, signal.SIGKILL if kind == "kill" else signal.SIGSTOP)
     return time.monotonic()
 
 
@@ -68,17 +71,15 @@ def digest(path):
 def fault_run(number, chance, train, folder, data, usual_s):
     kind = chance.choice(["kill", "kill", "freeze", "freeze", "disk", "option"])
     ranks = chance.choice([2, 4])
-    rank = chance.randrange(ranks)
+    rank = 0 if kind == "disk" else chance.randrange(ranks)
     moment = chance.uniform(0, usual_s)
     out = os.path.join(folder, f"run{number}.safetensors")
     odd = ["--beta", "0.5"] if kind == "option" else None
     words = command(train, ranks, out, data, ["--deadline", "20"], odd)
-    if kind == "disk":
-        words = ["bash", "-c", f'ulimit -f {chance.randrange(8, 200)}; exec "$@"', "bash", *words]
     begin = time.monotonic()
     with open(out + ".txt", "w") as text:
         process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=text)
-    struck = begin if kind in ("disk", "option") else disturb(process, kind, rank, out, moment)
+    struck = begin if kind == "option" else disturb(process, kind, rank, out, moment)
     try:
         code = process.wait(timeout=300)
     except subprocess.TimeoutExpired:

@@ -143,7 +143,7 @@ TEST_F(Sweep, ACutLineIsDroppedAndItsModelMeasuredAgain) {
 TEST_F(Sweep, AStoppedModelGoesOnToTheSameBytes) {
   const std::vector<std::string> often{"--checkpoint-every", "5"};
   ASSERT_EQ(sweep("whole", "8", often).code, 0);
-  const std::string model = "/models/paper_t32_l2_x2_c8_r1_s0";
+  const std::string model = "/models/paper_t64_l2_x2_c8_r1_s0";  // the longest is the first
   const ProcessResult stopped =
       sweep("stopped", "8", often,
             {.signal = SIGINT, .signal_when = path("stopped" + model + ".run/last.safetensors")});
