@@ -93,7 +93,7 @@ double LiveWindow::end_s() const {
   return filtered_.newest_s() + 0.5 * std::min(settings_.frame_period_s, 1 / settings_.rate_hz);
 }
 
-bool LiveWindow::window_until(double end_s, std::span<float> out) const {
+bool LiveWindow::window_until(double end_s, std::span<float> out) {
   const auto timesteps = static_cast<std::ptrdiff_t>(settings_.timesteps);
   const std::size_t signals = settings_.signals, values = static_cast<std::size_t>(timesteps) * signals;
   if (out.size() != values)
@@ -117,13 +117,13 @@ bool LiveWindow::window_until(double end_s, std::span<float> out) const {
     const std::ptrdiff_t before = sample(at - 1);
     while (at != 0 && sample(at - 1) == before) --at;
   }
-  std::vector<float> held(signals);
-  FrameMean mean(signals);
+  std::vector<float>& held = average_;  // push() needs neither between two frames
+  std::fill(held.begin(), held.end(), 0.0F);
   for (std::ptrdiff_t k = std::max(timesteps - 1, sample(at)); k >= 0; --k) {
-    mean.clear();
-    for (; at != frames && sample(at) == k; ++at) mean.add(filtered_.volts(at));
-    if (mean.count() > 0) {
-      mean.volts(held);
+    mean_.clear();
+    for (; at != frames && sample(at) == k; ++at) mean_.add(filtered_.volts(at));
+    if (mean_.count() > 0) {
+      mean_.volts(held);
       settings_.scaling(held);
     }
     if (k >= timesteps) continue;

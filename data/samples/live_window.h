@@ -51,9 +51,9 @@ class LiveWindow {
   /// The window that ends with the newest frame, [T][signals], oldest sample first. False, and `out`
   /// untouched, before a run without gap spans T samples. Throws std::invalid_argument when `out` has
   /// another size.
-  bool window(std::span<float> out) const { return window_until(end_s(), out); }
+  bool window(std::span<float> out) { return window_until(end_s(), out); }
   /// The same for a window that ends at `end_s`, at most 0.1 s before the newest frame.
-  bool window_until(double end_s, std::span<float> out) const;
+  bool window_until(double end_s, std::span<float> out);
 
   /// The newest frame's sample as the network sees it without resampling: filtered and scaled; zeros before
   /// the first frame.
@@ -88,7 +88,7 @@ class LiveWindow {
   LiveWindowSettings settings_;
   Recent raw_, filtered_;
   FrameMean mean_;
-  std::vector<float> average_;
+  std::vector<float> average_;  // of mean_
   double run_begin_s_ = 0;
   Counters counters_;
 };

@@ -262,7 +262,7 @@ TEST(LiveWindow, ADeadTaxelStaysWithinTheNetworksRange) {
 }
 
 TEST(LiveWindow, NothingBeforeTheFirstFrame) {
-  const LiveWindow live(live_settings(300));
+  LiveWindow live(live_settings(300));
   Window window(kTimesteps * kTaxels, -1);
   EXPECT_FALSE(live.window(window));
   EXPECT_EQ(window[0], -1);
@@ -274,7 +274,7 @@ TEST(LiveWindow, RefusesSettingsOutOfRangeAndAWrongRoom) {
   EXPECT_THROW(LiveWindow({.rate_hz = 0}), std::invalid_argument);
   EXPECT_THROW(LiveWindow({.filter_s = -1}), std::invalid_argument);
   EXPECT_THROW(LiveWindow({.filter_s = std::nan("")}), std::invalid_argument);
-  const LiveWindow live(live_settings(300));
+  LiveWindow live(live_settings(300));
   Window small(10);
   EXPECT_THROW((void)live.window(small), std::invalid_argument);
 }
