@@ -12,6 +12,7 @@ import itertools
 import math
 import pathlib
 import re
+import statistics
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
@@ -294,6 +295,16 @@ def simulated_only():
                    f"{100 * float(r['flat_ghost_rate']):.0f} %"] for r in rows("simulated_only.csv")])
 
 
+def finger_fit():
+    lines = []
+    for plate, group in itertools.groupby(rows("finger_fit.csv"), lambda r: r["plate"]):
+        fitted = [r for r in group if r["pass"] not in "18" and float(r["explained"]) >= 0.6]
+        middle = lambda key: f"{statistics.median(float(r[key]) for r in fitted):.2f}"
+        lines.append([plate, str(len(fitted)), *(middle(key) for key in list(fitted[0])[2:])])
+    return table(["plate", "passes", "explained", "indentation mm", "tilt across", "tilt along", "rise mm in 50 mm", "offset mm"],
+                 lines)
+
+
 def whole_passes():
     percent = lambda v: f"{100 * float(v):.1f} %"
     return table(["network", "windows of", "contact SSIM", "PSNR dB", "position mm", "misses", "ghosts on flat", "intervals hold",
@@ -333,7 +344,7 @@ def tried():
 
 
 SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, streaming, growth, pixels, textures, simulator, stability,
-                   rig, whole_passes, corruptions, demo, tried, never_felt, simulated_only, terms],
+                   rig, whole_passes, corruptions, demo, tried, never_felt, simulated_only, finger_fit, terms],
             README: [accuracy, speed]}
 
 
