@@ -23,7 +23,7 @@ os.environ["OMPI_MCA_hwloc_base_binding_policy"] = "none"
 
 def options(out, data):
     return ["--data", data, "--out", out, "--timesteps", "32", "--latent", "3", "--scale", "2", "--batch", "8",
-            "--stride", "4", "--epochs", "12", "--checkpoint-every", "5", "--threads", "1", "--quiet"]
+            "--stride", "4", "--epochs", "4", "--checkpoint-every", "5", "--threads", "1", "--quiet"]
 
 
 def process_of(out, rank):
