@@ -1,20 +1,34 @@
-// supertac-check: what an auditor asks of this machine and of a file.
+// supertac-check: what an auditor asks of this machine, of a file and of a training.
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 
+#include "apps/check/machine.h"
+#include "apps/check/training.h"
 #include "apps/common/program.h"
 #include "io/file.h"
 
 namespace supertac {
 
 void declare(Arguments& a) {
-  a.positional("WHAT", "gradients: every gradient against finite differences, in double precision");
+  a.positional(
+      "WHAT",
+      "gradients: all of them against finite differences, in double precision; bits: the hashes that every "
+      "processor has to give; machine: processor, disk, ports; file FILE [OTHER]: checksum, provenance, and "
+      "whether OTHER (recordings or a file) is what it was made from; training FILE --data DIR: repeats "
+      "parts "
+      "of a training that kept a ledger; ledgers FILE OTHER: the first difference of two");
+  a.positional("FILE", "what is checked", false);
+  a.positional("OTHER", "what it is compared with", false);
   a.option("break", "OP",
            "gradients: plant errors in the reverse step of this op, or of 'all', one after the other: wrong "
            "sign, doubled, without a term, at the wrong index; each has to be found");
+  a.option("data", "DIR", "training: the recordings that the model was trained on");
+  a.option("also", "DIR", "training: those of its --also");
+  a.option("segments", "K", "training: how many of its twenty parts are repeated", "1");
+  a.option("seed", "N", "training: draws them", "0");
 }
 
 namespace {
@@ -36,11 +50,21 @@ int check_gradients(const Arguments& a) {
   throw FileError(program, std::string("cannot be run: ") + std::strerror(errno));
 }
 
+void need(const Arguments& a, const char* name) {
+  if (!a.given(name)) throw UsageError(a.text("WHAT") + ": expected " + name + ", found none");
+}
+
 }  // namespace
 
 int run(Arguments& a) {
-  a.choice("WHAT", {"gradients"});
-  return check_gradients(a);
+  const std::string what = a.choice("WHAT", {"gradients", "bits", "machine", "file", "training", "ledgers"});
+  if (what == "gradients") return check_gradients(a);
+  if (what == "bits") return check_bits(a);
+  if (what == "machine") return check_machine(a);
+  need(a, "FILE");
+  if (what == "file") return check_file(a);
+  need(a, what == "training" ? "data" : "OTHER");
+  return what == "training" ? check_training(a) : check_ledgers(a);
 }
 
 }  // namespace supertac

@@ -6,6 +6,7 @@
 #include "apps/classify/report.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
+#include "apps/common/provenance.h"
 #include "apps/common/version.h"
 
 namespace supertac {
@@ -100,6 +101,7 @@ int run(Arguments& a) {
   }
   const std::int64_t stride = a.integer("stride", 1, 100'000);
   const std::vector<Candidate> models = load_candidates(a.list("model"));
+  add_model_parents(a.list("model"));
   const WindowSet windows = exam_windows(a.text("data"), a.list("plates"), models.front());
   const std::vector<std::string> classes = classes_of(windows);
   std::vector<Exam> exams;

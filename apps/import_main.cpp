@@ -8,6 +8,7 @@
 #include "apps/common/output_folder.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
+#include "apps/common/provenance.h"
 #include "apps/common/signals.h"
 #include "data/plates/plate_file.h"
 #include "data/registration/registration_picture.h"
@@ -77,6 +78,7 @@ int run(Arguments& arguments) {
   std::optional<Progress> bar;
   const auto keep = [&](const ImportedPass& pass) {
     const std::string name = recording_file_name(pass.recording);
+    add_parent_file("text", pass.path);
     write_recording(folder.add(name), pass.recording);
     if (pictures && !pass.unknown)
       write_png(pictures->add(std::filesystem::path(name).stem().string() + ".png"),

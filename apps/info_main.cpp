@@ -1,16 +1,24 @@
-// supertac-info: the card of a recording, a checkpoint, or any other safetensors file.
+// supertac-info: the card of a recording, a model, or any other safetensors file, and of a folder of
+// recordings: what it holds and how it was made.
+
+#include <filesystem>
+#include <sstream>
 
 #include "apps/common/program.h"
+#include "apps/common/provenance.h"
 #include "data/recordings/recording.h"
 #include "io/file.h"
 #include "io/json.h"
 #include "io/numbers.h"
+#include "io/provenance.h"
 #include "io/safetensors.h"
 #include "io/text.h"
 
 namespace supertac {
 
-void declare(Arguments& arguments) { arguments.positional("FILE", "a .safetensors file"); }
+void declare(Arguments& arguments) {
+  arguments.positional("FILE", "a .safetensors file, or a folder of recordings");
+}
 
 namespace {
 
@@ -46,6 +54,7 @@ nlohmann::ordered_json value_of(const std::string& text) {
 
 nlohmann::ordered_json card(const SafetensorsFile& file, const std::string& kind) {
   nlohmann::ordered_json card = {{"file", file.path()}, {"kind", kind}};
+  card["content"] = content_hash(file);
   card["checksum"] = file.checksum() == SafetensorsFile::ChecksumState::ok ? "ok" : "absent";
   std::uint64_t values = 0;
   nlohmann::ordered_json tensors = nlohmann::ordered_json::array();
@@ -66,6 +75,10 @@ void print_row(const Arguments& arguments, const std::string& name, const std::s
                   printable(value, 200));
 }
 
+std::string text_of(const nlohmann::ordered_json& value) {
+  return value.is_string() ? value.get<std::string>() : value.dump();
+}
+
 void print_metadata(const Arguments& arguments, const SafetensorsFile& file) {
   for (const auto& [key, text] : file.metadata()) {
     const auto value = value_of(text);
@@ -74,9 +87,28 @@ void print_metadata(const Arguments& arguments, const SafetensorsFile& file) {
       continue;
     }
     for (const auto& [name, entry] : value.items()) {
-      print_row(arguments, key + "." + name, entry.is_string() ? entry.get<std::string>() : entry.dump());
+      print_row(arguments, key + "." + name, text_of(entry));
     }
   }
+}
+
+/// When a model was made and how long it took stands in its run folder, if that is still of this model.
+void print_run(const Arguments& arguments, nlohmann::ordered_json& card) {
+  namespace fs = std::filesystem;
+  constexpr std::uint64_t kMostBytes = 1 << 20;
+  const fs::path settings = fs::path(arguments.text("FILE")).replace_extension(".run") / "settings.json";
+  std::error_code error;
+  if (!fs::exists(settings, error)) return;
+  try {
+    const auto run = parse_json_limited(read_text_file(settings, kMostBytes));
+    if (run.value("content", "") != card["content"]) return;
+    card["run"] = run.at("provenance");
+  } catch (const std::exception&) {
+    return;  // of another program
+  }
+  for (const char* key : {"command", "began", "seconds"})
+    print_row(arguments, std::string("run.") + key,
+              text_of(card["run"].value(key, nlohmann::ordered_json())));
 }
 
 /// Frames, duration and rate; reads the file as a recording, so that what is wrong with it is said here too.
@@ -95,18 +127,48 @@ void print_recording(const Arguments& arguments, nlohmann::ordered_json& card) {
   card["position_known"] = !recording.position_mm.empty();
 }
 
+/// A folder of recordings: what all have in common in their provenance, and each time that it was filled.
+int describe_folder(const Arguments& arguments) {
+  namespace fs = std::filesystem;
+  constexpr std::uint64_t kMostBytes = 16 << 20;
+  const std::string folder = arguments.text("FILE");
+  const std::size_t count = list_recordings(folder).size();
+  nlohmann::ordered_json card = {{"folder", folder},
+                                 {"kind", "recordings"},
+                                 {"files", count},
+                                 {"content", hash_of_recordings(folder, {})},
+                                 {"provenance", nlohmann::ordered_json::array()}};
+  for (const char* key : {"folder", "kind", "files", "content"})
+    print_row(arguments, key, text_of(card[key]));
+  const fs::path made = fs::path(folder) / kFolderProvenance;
+  std::error_code error;
+  std::istringstream lines(fs::exists(made, error) ? read_text_file(made, kMostBytes) : "");
+  for (std::string line; std::getline(lines, line);) {
+    const auto entry = value_of(line);
+    if (!entry.is_object()) continue;
+    arguments.print("");
+    for (const auto& [key, value] : entry.items()) print_row(arguments, key, text_of(value));
+    card["provenance"].push_back(entry);
+  }
+  arguments.write_json(card);
+  return kExitOk;
+}
+
 }  // namespace
 
 int run(Arguments& arguments) {
+  if (std::filesystem::is_directory(arguments.text("FILE"))) return describe_folder(arguments);
   const SafetensorsFile file = SafetensorsFile::read(arguments.text("FILE"));
   const std::string kind = kind_of(file);
   auto result = card(file, kind);
   const bool ours = file.checksum() == SafetensorsFile::ChecksumState::ok;
   print_row(arguments, "file", file.path());
   print_row(arguments, "kind", kind);
+  print_row(arguments, "content", text_of(result["content"]));
   print_row(arguments, "checksum", ours ? "ok" : "absent: written by another program, damage cannot be seen");
   if (kind == "recording") print_recording(arguments, result);
   print_metadata(arguments, file);
+  print_run(arguments, result);
   print_row(arguments, "values in all tensors", std::to_string(result["values"].get<std::uint64_t>()));
   for (const auto& [name, tensor] : file.tensors()) {
     print_row(arguments, "  " + name, tensor.dtype + " " + shape_text(tensor.shape));

@@ -5,6 +5,7 @@
 #include "apps/common/ports.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
+#include "apps/common/provenance.h"
 #include "apps/common/signals.h"
 #include "apps/stream/stream.h"
 #include "apps/web/web_options.h"
@@ -89,6 +90,7 @@ int run(Arguments& a) {
   settings.badge = badge_of(a), settings.source = origin;
   settings.metadata = {{"kind", "pictures"}, {"model", a.text("model")}, {"source", origin}};
   const std::vector<ModelFile> models = load_models(a.list("model"));
+  add_model_parents(a.list("model"));
   const auto source = open_source(a, speedup);
   Stream stream(settings, models, *source);
   const double ready_ms = 1e3 * (monotonic_seconds() - begin);

@@ -1,5 +1,6 @@
 // supertac-train: recordings (or pairs of images) in, a model out.
 #include "apps/common/program.h"
+#include "apps/common/provenance.h"
 #include "apps/ranks/together.h"
 #include "apps/train/training_options.h"
 #include "apps/train/training_run.h"
@@ -19,31 +20,12 @@ void declare(Arguments& a) {
   a.option("resume", "FILE", "continue from the last.safetensors of an interrupted run, same options");
   a.option("seed", "N", "of split, initial weights, order, noise", "0");
   declare_training(a);
-  a.only_with("data");
-  a.option("preset", "NAME", "network: paper, or tiny (a ninth of the multiply-adds, a third of the time)",
-           "paper");
-  a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512 (default: the preset's)");
-  a.option("scale", "N", "pictures N times as fine as the array, which the recordings name: 2, 4 or 8", "4");
-  declare_window_training(a);
-  a.more().option("latent", "LD", "latent numbers per group of taxels", "10");
+  declare_network(a);
   a.only_with("");
   declare_together(a);
 }
 
 namespace {
-
-TrainingSettings settings_of(const Arguments& a) {
-  const std::string preset = a.choice("preset", {"paper", "tiny"});
-  TrainingSettings s = training_settings(a, SuperTacSettings::of_preset(preset));
-  if (a.given("timesteps")) s.model.timesteps = a.integer("timesteps", 32, 512);
-  if (s.model.timesteps % 16 != 0) {
-    throw UsageError("--timesteps expects a multiple of 16, found " + a.text("timesteps"));
-  }
-  s.model.latent = a.integer("latent", 1, 256);
-  s.model.scale = std::stoi(a.choice("scale", {"2", "4", "8"}));
-  s.seed = a.seed();
-  return s;
-}
 
 // `remark` is for a training that has begun: what ends it before says one line only.
 int train(const Arguments& a, TrainingTask task, const std::string& remark, Ranks& ranks) {
@@ -77,12 +59,15 @@ int train(const Arguments& a, Ranks& ranks) {
   if (a.given("pairs")) {
     refuse_existing(a.text("out"), a.force());
     PairSet pairs = PairSet::read(a.text("pairs"));
+    add_parent_file("pairs", a.text("pairs"));
     return train(a, pair_task(a, pairs), std::to_string(pairs.size()) + " pairs", ranks);
   }
-  TrainingSettings settings = settings_of(a);
+  TrainingSettings settings = network_settings(a);
   training_split(a);
   refuse_existing(a.text("out"), a.force());
   const WindowSet windows = training_windows(a, settings.model, settings.seed);
+  add_parent("recordings", hash_of_recordings(a.text("data"), a.list("plates")));
+  if (a.given("also")) add_parent("also", hash_of_recordings(a.text("also"), {}));
   set_array(settings.model, windows.array());
   return train(a, window_task(a, windows, settings), windows.counts().summary(), ranks);
 }

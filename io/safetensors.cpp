@@ -9,6 +9,7 @@
 #include "io/hash.h"
 #include "io/json.h"
 #include "io/numbers.h"
+#include "io/provenance.h"
 #include "io/safetensors_header.h"
 #include "io/text.h"
 
@@ -224,6 +225,7 @@ std::vector<double> SafetensorsFile::f64(const std::string& name) const {
 
 void write_safetensors(const std::string& path, std::map<std::string, std::string> metadata,
                        const std::vector<TensorToWrite>& tensors) {
+  if (!provenance().empty()) metadata[kProvenanceKey] = provenance();
   check_writable(metadata, tensors);
   metadata[kFormatKey] = kFormatVersion;
   metadata[kChecksumKey] = std::string(kChecksumDigits, '0');

@@ -126,12 +126,16 @@ void Trainer::run_lane(Lane& lane) const {
   lane.trouble = where_not_finite(outcome.loss.total, parameters);
 }
 
+void Trainer::batch_of(std::int64_t step, std::span<std::uint32_t> out) const {
+  const auto number = static_cast<std::uint64_t>(step);
+  const auto per_epoch = static_cast<std::uint64_t>(steps_per_epoch());
+  batching_.batch(number / per_epoch, number % per_epoch, out);
+}
+
 StepReport Trainer::train_step(const std::function<bool()>& stop) {
   if (done())
     throw std::invalid_argument("train_step: all " + std::to_string(total_steps()) + " steps are done");
-  const auto per_epoch = static_cast<std::uint64_t>(steps_per_epoch());
-  batching_.batch(static_cast<std::uint64_t>(step()) / per_epoch,
-                  static_cast<std::uint64_t>(step()) % per_epoch, indices_);
+  batch_of(step(), indices_);
 #pragma omp parallel for schedule(static, 1)
   for (std::size_t i = 0; i < lanes_.size(); ++i) {
     try {

@@ -17,6 +17,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -69,6 +70,14 @@ class Trainer {
   StepReport train_step(const std::function<bool()>& stop = {});
   /// Throws RanksError naming rank and tensor when the processes' parameters are not the same to the bit.
   void check_same() const;
+
+  /// For a ledger (models/ledger.h): the batch of the last step, that of any step (from 0), and every array
+  /// of the state.
+  std::span<const std::uint32_t> batch() const { return indices_; }
+  void batch_of(std::int64_t step, std::span<std::uint32_t> out) const;
+  void for_each_tensor(const std::function<void(const std::string&, std::span<const real>)>& visit) const {
+    state_.for_each_tensor(visit);
+  }
 
   /// Model and training state, a checkpoint like any other with "optimizer." tensors besides. Of several
   /// processes only the first writes, after check_same(). Throws FileError.

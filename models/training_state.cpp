@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "autograd/kernels/elementwise.h"
 #include "io/numbers.h"
@@ -97,6 +98,15 @@ void TrainingState::stop(const std::string& what) const {
   throw TrainingStopped("training stopped at step " + std::to_string(step_ + 1) + ": " + what +
                         "; lower --learning-rate (now " + format(schedule_.peak) +
                         ") or check the input with supertac-info");
+}
+
+void TrainingState::for_each_tensor(
+    const std::function<void(const std::string&, std::span<const real>)>& visit) const {
+  for (const Parameter& p : parameters_) visit(p.name, p.value.value().values());
+  for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    visit("optimizer.m." + parameters_[i].name, std::as_const(adam_.first_moments()[i]).values());
+    visit("optimizer.v." + parameters_[i].name, std::as_const(adam_.second_moments()[i]).values());
+  }
 }
 
 void TrainingState::save(const std::string& path, std::map<std::string, std::string> metadata) const {

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -54,6 +56,10 @@ class TrainingState {
   double apply(const std::vector<const std::vector<Parameter>*>& lanes, Ranks& ranks);
   /// Throws TrainingStopped: step, `what`, and advice.
   [[noreturn]] void stop(const std::string& what) const;
+
+  /// Every array of the state: the parameters, then Adam's first and second moments, named as in a
+  /// checkpoint.
+  void for_each_tensor(const std::function<void(const std::string&, std::span<const real>)>& visit) const;
 
   /// Parameters and state, a checkpoint like any other with "optimizer." tensors besides. Throws FileError.
   void save(const std::string& path, std::map<std::string, std::string> metadata) const;

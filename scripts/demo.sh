@@ -29,8 +29,8 @@ score "eight plates it has never felt" never --split none --plates "" --limit 50
 score "a plain plate" plain --split none --plates "" --limit 5000
 echo "pictures: $out/pictures/strips.png and a film of each pass beside it; scores: $out/*.json;"
 echo "training curves: $out/model.run/report.html"
-# The same bytes on every processor: README says which.
-hash=$(sha256sum "$out/model.safetensors" | cut -c1-16)
+# The same content on every processor: README says which.
+hash=$("$bin/supertac-info" "$out/model.safetensors" | sed -n 's/^content *//p' | cut -c1-16)
 known=$(sed -n 's/.*the hash of its model, `\([^`]*\)`.*/\1/p' README.md)
 if [ "$hash" = "$known" ]; then
   echo "the model's hash is $hash, as README says"

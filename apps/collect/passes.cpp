@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "apps/common/provenance.h"
 #include "data/plates/plate_file.h"
 #include "data/recordings/recording.h"
 #include "hardware/errors.h"
@@ -121,6 +122,7 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
   const Header header = header_of(collection, journal);
   PassesReport report{.complete = collection.complete, .damage = damage_of(collection)};
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
+  add_parent_file("journal", journal);
   for (const CollectedPass& pass : collection.passes) {
     if (pass.time_s.size() < 2) continue;
     const Recording recording = recording_of(pass, header, report.damage);

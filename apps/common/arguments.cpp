@@ -10,6 +10,7 @@
 #include <set>
 
 #include "apps/common/nearest.h"
+#include "apps/common/provenance.h"
 #include "apps/common/threads.h"
 #include "io/file.h"
 #include "io/numbers.h"
@@ -241,6 +242,20 @@ std::vector<NamedPath> Arguments::paths() const {
   return paths;
 }
 
+std::string Arguments::deciding_options() const {
+  static const std::set<std::string> kHow = {
+      "json", "quiet", "threads", "force", "ledger", "checkpoint-every", "deadline"};
+  std::string line = program_;
+  for (const std::string& name : order_) {
+    const Option& option = options_.at(name);
+    const bool is_path = option.value != "NAME" && names_path(option.value);
+    if (!given(name) || is_path || kHow.contains(name) || name == "seed") continue;
+    line += option.is_positional ? " " : " --" + name + (option.is_flag ? "" : " ");
+    line += values_.at(name);
+  }
+  return line;
+}
+
 void Arguments::check_together() const {
   for (const auto& [first, second] : one_of_) {
     if (given(first) != given(second)) continue;
@@ -338,7 +353,9 @@ void Arguments::note(std::string_view line) const {
 
 void Arguments::write_json(const nlohmann::ordered_json& result) const {
   if (muted_ || !given("json")) return;
-  const std::string document = result.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  nlohmann::ordered_json whole = result;
+  if (whole.is_object() && !whole.contains("provenance")) whole["provenance"] = full_provenance();
+  const std::string document = whole.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   if (text("json") == "-") {
     std::cout << document;
   } else {

@@ -94,6 +94,10 @@ class Arguments {
   const std::string& program() const { return program_; }
   /// The whole command line, words separated by spaces, for a run's settings.
   const std::string& command_line() const { return command_line_; }
+  /// Program and options that decide what it makes, in the order of declaration: no files and folders, and
+  /// nothing of how it is computed, shown or kept.
+  std::string deciding_options() const;
+  bool declares(const std::string& name) const { return options_.contains(name); }
   std::string help() const;
 
   // Talking.
@@ -104,7 +108,8 @@ class Arguments {
   void print(std::string_view line) const;
   /// A remark on stderr; nothing under --quiet.
   void note(std::string_view line) const;
-  /// The machine-readable result, to where --json says: a file (atomically) or, for '-', stdout. Without
+  /// The machine-readable result and its provenance, to where --json says: a file (atomically) or, for '-',
+  /// stdout. Without
   /// --json nothing. The wrapper has refused an existing file before the work began.
   void write_json(const nlohmann::ordered_json& result) const;
 

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "apps/common/provenance.h"
 #include "io/file.h"
 
 namespace supertac {
@@ -36,9 +37,21 @@ void OutputFolder::remove_made() {
   for (const std::string& folder : folders_) fs::remove(folder, ignored);  // only when empty
 }
 
+void OutputFolder::keep() {
+  constexpr std::uint64_t kMostBytes = 16 << 20;
+  const std::string file = (fs::path(path_) / kFolderProvenance).string();
+  std::error_code error;
+  std::string lines = fs::exists(file, error) ? read_text_file(file, kMostBytes) : "";
+  nlohmann::ordered_json line = full_provenance();
+  line["files"] = added_;
+  write_file(file, lines + line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  kept_ = true;
+}
+
 std::string OutputFolder::add(const std::string& name) {
   const std::string file = (fs::path(path_) / name).string();
   refuse_existing(file, force_);
+  ++added_;
   std::error_code error;
   if (!fs::exists(fs::symlink_status(file, error))) made_.push_back(file);
   return file;

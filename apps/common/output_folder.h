@@ -21,7 +21,9 @@ class OutputFolder {
 
   /// Path of a file to be written in the folder. Throws FileError when it exists and force is false.
   std::string add(const std::string& name);
-  void keep() { kept_ = true; }
+  /// The folder's provenance.jsonl gains a line: what full_provenance() says, and how many files it was.
+  /// Throws FileError.
+  void keep();
 
  private:
   void remove_made();
@@ -30,6 +32,7 @@ class OutputFolder {
   std::unique_ptr<FolderLock> lock_;
   bool force_;
   bool kept_ = false;
+  std::size_t added_ = 0;
   std::vector<std::string> made_;     // files that were not there before
   std::vector<std::string> folders_;  // the same, innermost first
 };

@@ -10,6 +10,7 @@
 
 #include "apps/common/launch.h"
 #include "apps/common/outputs.h"
+#include "apps/common/provenance.h"
 #include "apps/common/signals.h"
 #include "apps/common/version.h"
 #include "io/file.h"
@@ -45,6 +46,7 @@ int run(const Program& program, Arguments& arguments) {
   omp_set_num_threads(arguments.threads());
   catch_signals();
   check_outputs(arguments);
+  begin_provenance(arguments);
   if (program.numerics != nullptr) {
     if (const std::string warning = program.numerics().warning; !warning.empty()) {
       std::cerr << program.name << ": " << warning << '\n';

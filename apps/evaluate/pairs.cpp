@@ -4,6 +4,7 @@
 
 #include "apps/common/measure.h"
 #include "apps/common/program.h"
+#include "apps/common/provenance.h"
 #include "apps/evaluate/scoring.h"
 #include "data/plates/truth.h"
 #include "data/scores/metrics.h"
@@ -82,6 +83,8 @@ int evaluate_on_pairs(const Arguments& a) {
   Scored scored = scored_of(a, files.front(), {"group", "pair", "none"});
   PairSet pairs = PairSet::read(a.text("pairs"));
   pairs.set_scaling(files.front().scaling);
+  add_model_parents(a.list("model"));
+  add_parent_file("pairs", a.text("pairs"));
   scored.split = split_pairs(pairs, scored.split_name, scored.seed);
   check_scored(a, files, scored);
 

@@ -5,24 +5,28 @@
 
 #include "apps/common/measure.h"
 #include "apps/common/program.h"
+#include "apps/common/provenance.h"
 #include "apps/common/version.h"
 #include "apps/evaluate/exports.h"
 #include "apps/evaluate/felt.h"
 #include "apps/evaluate/page.h"
 #include "apps/evaluate/scoring.h"
 #include "apps/evaluate/trust.h"
+#include "data/recordings/recording.h"
 #include "data/scores/metrics.h"
 #include "io/file.h"
-#include "io/hash.h"
 #include "io/numbers.h"
 #include "io/text.h"
 
 namespace supertac {
 namespace {
 
+// What is scored, and by which models, is noted for all that is written.
 WindowSet load_windows(const Arguments& a, const ModelFile& file) {
   const std::vector<std::string> plates =
       a.given("plates") ? a.list("plates") : comma_list(file.metadata_or("plates", ""));
+  add_model_parents(a.list("model"));
+  add_parent("recordings", hash_of_recordings(a.text("data"), plates));
   return WindowSet::load(a.text("data"), plates, file.windows());
 }
 
@@ -118,12 +122,11 @@ nlohmann::ordered_json report(const Arguments& a, const Committee& network, cons
 std::vector<std::pair<std::string, std::string>> made_by(const Arguments& a, const WindowSet& windows) {
   std::vector<std::pair<std::string, std::string>> lines = {{"command", a.command_line()},
                                                             {"version", version() + ", commit " + commit()}};
-  for (const std::string& model : a.list("model")) {
-    Hash hash;
-    hash.add(read_text_file(model, std::uint64_t{1} << 32));
-    lines.emplace_back("model", model + ", hash " + hash.hex());
-  }
-  lines.emplace_back("data", a.text("data") + ", hash " + windows.fingerprint());
+  const nlohmann::ordered_json whole = full_provenance();
+  lines.emplace_back("began", whole["began"].get<std::string>() + ", took " +
+                                  format(whole["seconds"].get<double>(), 1) + " s");
+  for (const auto& [name, hash] : whole["parents"].items()) lines.emplace_back(name, hash.get<std::string>());
+  lines.emplace_back("windows", a.text("data") + ", hash " + windows.fingerprint());
   return lines;
 }
 

@@ -19,6 +19,10 @@ void declare_training(Arguments& a) {
            "peak of Adam's rate, after warm-up and before the cosine (default: 0.001; preset tiny: 0.002)");
   a.option("lambda", "X", "weight of 1 - SSIM", "0.1");
   a.option("checkpoint-every", "STEPS", "how often the state is saved", "500");
+  a.option("ledger", "N",
+           "every N steps a line that names parameters, Adam's state and batches by hashes, and twenty "
+           "states on the "
+           "way, for supertac-check training");
   a.more(false);
 }
 
@@ -61,6 +65,29 @@ void declare_window_training(Arguments& a) {
   a.option("autoencoder", "NAME",
            "variational; plain: latents without noise and KL divergence, for comparison", "variational");
   a.more(false);
+}
+
+void declare_network(Arguments& a) {
+  a.only_with("data");
+  a.option("preset", "NAME", "network: paper, or tiny (a ninth of the multiply-adds, a third of the time)",
+           "paper");
+  a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512 (default: the preset's)");
+  a.option("scale", "N", "pictures N times as fine as the array, which the recordings name: 2, 4 or 8", "4");
+  declare_window_training(a);
+  a.more().option("latent", "LD", "latent numbers per group of taxels", "10");
+}
+
+TrainingSettings network_settings(const Arguments& a) {
+  const std::string preset = a.choice("preset", {"paper", "tiny"});
+  TrainingSettings s = training_settings(a, SuperTacSettings::of_preset(preset));
+  if (a.given("timesteps")) s.model.timesteps = a.integer("timesteps", 32, 512);
+  if (s.model.timesteps % 16 != 0) {
+    throw UsageError("--timesteps expects a multiple of 16, found " + a.text("timesteps"));
+  }
+  s.model.latent = a.integer("latent", 1, 256);
+  s.model.scale = std::stoi(a.choice("scale", {"2", "4", "8"}));
+  s.seed = a.seed();
+  return s;
 }
 
 void read_pace(const Arguments& a, TrainingPace& pace) {

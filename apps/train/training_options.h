@@ -12,6 +12,11 @@ void declare_training(Arguments& a);
 /// Recordings, windows, augmentation and the loss of SuperTac: everything else but the network and the seed.
 void declare_window_training(Arguments& a);
 
+/// The network of one training, and declare_window_training(): what stands beside --data only.
+void declare_network(Arguments& a);
+/// What these say, --seed included. Throws UsageError.
+TrainingSettings network_settings(const Arguments& a);
+
 /// What the options of declare_training() say. Throws UsageError.
 void read_pace(const Arguments& a, TrainingPace& pace);
 

@@ -5,6 +5,7 @@
 
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
+#include "apps/common/provenance.h"
 #include "apps/common/signals.h"
 #include "apps/common/version.h"
 #include "data/plates/truth.h"
@@ -64,10 +65,14 @@ TrainingRun::TrainingRun(const Arguments& a, TrainingTask task, TrainingTarget t
       target_(std::move(target)),
       trainer_(make_trainer(task_, target_)),
       description_(describe(a, trainer_, task_)) {
+  if (a_.given("ledger") && target_.ranks.size() > 1)
+    throw UsageError("--ledger: of one process only; leave it out under mpirun");
   if (!target_.ranks.first()) return;
   folder_.emplace(target_.out, target_.force,
                   target_.resume.empty() ? std::nullopt : std::optional(trainer_.step()));
   folder_->write_settings(description_);
+  if (a_.given("ledger"))
+    ledger_.emplace(folder_->path(), a_.integer("ledger", 1, 1'000'000'000), trainer_, task_.origin);
 }
 
 bool TrainingRun::train() {
@@ -76,10 +81,19 @@ bool TrainingRun::train() {
           (target_.resume.empty() ? "" : ", resumed at " + std::to_string(trainer_.step())));
   if (!task_.warning.empty()) a_.note(task_.warning);
   step_until_done();
-  if (folder_) folder_->write_report(description_);
-  if (!trainer_.done()) return false;
-  if (folder_) trainer_.save_model(target_.out, task_.origin);
-  return true;
+  if (folder_) write_end();
+  return trainer_.done();
+}
+
+// Report and settings with the time that it took, and the model.
+void TrainingRun::write_end() {
+  description_["provenance"] = full_provenance();
+  if (trainer_.done()) {
+    trainer_.save_model(target_.out, task_.origin);
+    description_["content"] = hash_of_file(target_.out);
+  }
+  folder_->write_settings(description_);
+  folder_->write_report(description_);
 }
 
 void TrainingRun::step_until_done() {
@@ -92,6 +106,7 @@ void TrainingRun::step_until_done() {
   bool stop = target_.ranks.size() == 1 && interrupted();
   while (!trainer_.done() && !stop) {
     const StepReport report = trainer_.train_step(interrupted);
+    if (ledger_) ledger_->after_step();
     sums.add(report);
     sums.gradient_norm += report.gradient_norm;
     ++steps;

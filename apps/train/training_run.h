@@ -6,6 +6,7 @@
 #include <string>
 
 #include "apps/common/arguments.h"
+#include "apps/train/ledger_file.h"
 #include "apps/train/run_folder.h"
 #include "apps/train/training_task.h"
 #include "models/trainer.h"
@@ -39,6 +40,7 @@ class TrainingRun {
 
  private:
   void step_until_done();
+  void write_end();
   double seconds() const;
   void warn_of_collapse(const StepReport& report);
   void test(LogLine& line) const;
@@ -50,6 +52,7 @@ class TrainingRun {
   TrainingTarget target_;
   Trainer trainer_;
   std::optional<RunFolder> folder_;
+  std::optional<LedgerFile> ledger_;
   nlohmann::ordered_json description_;
   std::chrono::steady_clock::time_point begin_;
   double seconds_before_ = 0;  // on the log's clock when this process began

@@ -10,7 +10,9 @@
 #include "io/file.h"
 #include "io/json.h"
 #include "io/numbers.h"
+#include "io/provenance.h"
 #include "io/safetensors.h"
+#include "io/sha256.h"
 #include "io/text.h"
 
 namespace supertac {
@@ -117,6 +119,7 @@ Recording read_recording(const std::string& path) {
   const SafetensorsFile file = SafetensorsFile::read(path);
   Recording recording;
   recording.metadata = file.metadata();
+  recording.metadata.erase(kProvenanceKey);
   const std::string kind = take(recording.metadata, path, "kind");
   if (kind != kKind) throw FileError(path, "is a " + in_quotes(kind) + ", expected a recording");
   recording.plate = take(recording.metadata, path, "plate");
@@ -205,6 +208,21 @@ std::vector<std::string> list_recordings(const std::string& folder) {
   }
   std::sort(paths.begin(), paths.end());
   return paths;
+}
+
+std::string hash_of_recordings(const std::string& folder, const std::vector<std::string>& plates) {
+  std::vector<std::string> hashes;
+  for (const std::string& path : list_recordings(folder)) {
+    const SafetensorsFile file = SafetensorsFile::read(path);
+    const auto plate = file.metadata().find("plate");
+    if (plate == file.metadata().end()) continue;
+    if (plates.empty() || std::find(plates.begin(), plates.end(), plate->second) != plates.end())
+      hashes.push_back(content_hash(file));
+  }
+  std::sort(hashes.begin(), hashes.end());
+  Sha256 sum;
+  for (const std::string& hash : hashes) sum.add(hash);
+  return sum.hex();
 }
 
 }  // namespace supertac

@@ -49,4 +49,9 @@ std::string recording_file_name(const Recording& recording);
 /// Throws FileError when the folder cannot be read or has none.
 std::vector<std::string> list_recordings(const std::string& folder);
 
+/// Names the content of a folder's recordings (of these plates; all when empty), whatever windows are cut
+/// from them, however the files are called and whoever made them: SHA-256 over their sorted content hashes
+/// (io/provenance.h). Throws FileError.
+std::string hash_of_recordings(const std::string& folder, const std::vector<std::string>& plates);
+
 }  // namespace supertac

@@ -6,8 +6,10 @@
 #include <regex>
 #include <set>
 
+#include "data/recordings/recording.h"
 #include "io/file.h"
-#include "tests/apps/process.h"
+#include "io/safetensors.h"
+#include "tests/apps/simulated_data.h"
 
 namespace supertac {
 namespace {
@@ -59,6 +61,110 @@ TEST(CheckGradients, AnUnknownOpIsNamed) {
   const auto result = run_process("supertac-check", {"gradients", "--break", "gated_sums"});
   EXPECT_EQ(result.code, 2);
   EXPECT_NE(result.error.find("did you mean 'gated_sum'?"), std::string::npos) << result.error;
+}
+
+TEST(Check, TheBitsOfThisProcessor) {
+  const auto result = run_process("supertac-check", {"bits"});
+  EXPECT_EQ(result.code, 0) << result.out << result.error;
+}
+
+TEST(Check, TheMachineIsDescribed) {
+  const auto result = run_process("supertac-check", {"machine", "--json", "-"});
+  ASSERT_EQ(result.code, 0) << result.error;
+  std::set<std::string> found;
+  const auto described = nlohmann::json::parse(result.out);
+  for (const auto& row : described["findings"]) found.insert(row["what"]);
+  for (const char* what : {"processor", "threads", "memory", "disk", "tactile board"})
+    EXPECT_TRUE(found.contains(what)) << what;
+}
+
+class Audit : public OnSimulatedData {
+ protected:
+  static ProcessResult train(const std::string& out, std::vector<std::string> more = {}) {
+    std::vector<std::string> all{"--data",   path("data"), "--out",    path(out), "--timesteps", "32",
+                                 "--latent", "3",          "--scale",  "2",       "--batch",     "8",
+                                 "--stride", "8",          "--epochs", "4",       "--ledger",    "2"};
+    all.insert(all.end(), more.begin(), more.end());
+    return run_process("supertac-train", all);
+  }
+  static ProcessResult audit(const std::string& model, const char* segments) {
+    return run_process("supertac-check",
+                       {"training", path(model), "--data", path("data"), "--segments", segments});
+  }
+  static void edit(const std::string& name, const std::function<void(std::string&)>& change) {
+    std::string text = bytes(name);
+    change(text);
+    write_file(path(name), text);
+  }
+};
+
+TEST_F(Audit, AModelSaysWhatItWasMadeFrom) {
+  ASSERT_EQ(train("made.safetensors", {"--seed", "3", "--threads", "1"}).code, 0);
+  const auto info = run_process("supertac-info", {path("made.safetensors"), "--json", "-"});
+  const auto card = nlohmann::json::parse(info.out);
+  const auto provenance = card["metadata"]["provenance"];
+  EXPECT_EQ(provenance["command"],
+            "supertac-train --epochs 4 --batch 8 --timesteps 32 --scale 2 --stride 8 --latent 3");
+  EXPECT_EQ(provenance["seed"], "3");
+  EXPECT_EQ(provenance["parents"]["recordings"].get<std::string>().size(), 64U);
+  EXPECT_GT(card["run"]["seconds"], 0);
+  const auto folder = nlohmann::json::parse(run_process("supertac-info", {path("data"), "--json", "-"}).out);
+  EXPECT_EQ(folder["content"], provenance["parents"]["recordings"]);
+  EXPECT_NE(folder["provenance"][0]["command"].get<std::string>().find("supertac-simulate"),
+            std::string::npos);
+
+  EXPECT_EQ(run_process("supertac-check", {"file", path("made.safetensors"), path("data")}).code, 0);
+  std::filesystem::copy(path("data"), path("fewer"));
+  std::filesystem::remove(list_recordings(path("fewer")).front());
+  const auto other = run_process("supertac-check", {"file", path("made.safetensors"), path("fewer")});
+  EXPECT_EQ(other.code, 1);
+  EXPECT_NE(other.out.find("NOT made from"), std::string::npos) << other.out;
+}
+
+TEST_F(Audit, APartThatIsRepeatedGivesTheLedgersLines) {
+  ASSERT_EQ(train("kept.safetensors").code, 0);
+  const auto all = audit("kept.safetensors", "1000");
+  EXPECT_EQ(all.code, 0) << all.out << all.error;
+  const auto one = audit("kept.safetensors", "1");
+  EXPECT_NE(one.out.find("\n1 of "), std::string::npos) << one.out;
+
+  // A state is exchanged for that of another training.
+  ASSERT_EQ(train("other.safetensors", {"--learning-rate", "0.0009"}).code, 0);
+  const auto two = run_process("supertac-check",
+                               {"ledgers", path("kept.run/ledger.jsonl"), path("other.run/ledger.jsonl")});
+  EXPECT_EQ(two.code, 1);
+  EXPECT_NE(two.out.find("differs between steps 1 and 2: encoder.0.conv.0.weight"), std::string::npos)
+      << two.out;
+  std::filesystem::copy(path("other.safetensors"), path("kept.safetensors"),
+                        std::filesystem::copy_options::overwrite_existing);
+  const auto changed = audit("kept.safetensors", "1");
+  EXPECT_EQ(changed.code, 1) << changed.out;
+}
+
+TEST_F(Audit, ALedgerThatWasChangedIsRefused) {
+  ASSERT_EQ(train("told.safetensors").code, 0);
+  edit("told.run/ledger.jsonl", [](std::string& text) {
+    const std::size_t at = text.find("\"batches\":\"", text.size() / 2) + 11;
+    text[at] = text[at] == '0' ? '1' : '0';
+  });
+  const auto result = audit("told.safetensors", "1");
+  EXPECT_EQ(result.code, 1);
+  EXPECT_NE(result.error.find("the chain is broken"), std::string::npos) << result.error;
+}
+
+// Every step from volts to pixels, once more by NumPy; without it there is nothing to compare with.
+TEST_F(Audit, AnExplainedPictureIsComputedAgain) {
+  ASSERT_EQ(train("drawn.safetensors").code, 0);
+  const std::string out = path("explained.safetensors");
+  const auto result =
+      run_process("supertac-explain", {path("drawn.safetensors"), "--recording",
+                                       list_recordings(path("data")).front(), "--at", "4", "--out", out});
+  ASSERT_EQ(result.code, 0) << result.error;
+  EXPECT_GT(SafetensorsFile::read(out).tensors().size(), 30U);
+  if (std::system("python3 -c 'import numpy' 2>/dev/null") != 0) GTEST_SKIP() << "python3 has no NumPy here";
+  const std::string command = "python3 " SUPERTAC_SOURCE "/examples/recompute.py " + out + " " +
+                              path("drawn.safetensors") + " > " + path("recomputed.txt");
+  EXPECT_EQ(std::system(command.c_str()), 0) << bytes("recomputed.txt");
 }
 
 }  // namespace

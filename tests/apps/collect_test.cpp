@@ -20,7 +20,7 @@ TEST(CollectProgram, MakesRecordingsAndLeavesTheHeadAtItsOrigin) {
   CollectRun run;
   const ProcessResult result = run.collect();
   EXPECT_EQ(result.code, 0) << result.error;
-  EXPECT_EQ(run.files(), "3_Bumps_t1_p1_v10.safetensors 3_Bumps_t1_v10.journal");
+  EXPECT_EQ(run.files(), "3_Bumps_t1_p1_v10.safetensors 3_Bumps_t1_v10.journal provenance.jsonl");
   EXPECT_EQ(run_process("supertac-info", {run.out() + "/3_Bumps_t1_p1_v10.safetensors"}).code, 0);
   EXPECT_LT(distance(run.head(), {99.7, 101.17, 131.81}), 0.01);
   EXPECT_FALSE(run.origin_unknown());
@@ -37,7 +37,7 @@ TEST(CollectProgram, SignalsInContactLiftTheFingerAndKeepWhatWasRecorded) {
     EXPECT_EQ(result.code, 128 + signal) << result.error;
     EXPECT_TRUE(is_one_line(result.error)) << result.error;
     EXPECT_GE(run.head().z, kLiftedZ - 0.01) << "signal " << signal;
-    EXPECT_EQ(run.files(), "3_Bumps_t1_p1_v10.safetensors 3_Bumps_t1_v10.journal");
+    EXPECT_EQ(run.files(), "3_Bumps_t1_p1_v10.safetensors 3_Bumps_t1_v10.journal provenance.jsonl");
     EXPECT_TRUE(run.origin_unknown());
   }
 }

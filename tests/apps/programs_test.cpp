@@ -240,7 +240,7 @@ TEST(Info, RefusesWhatItCannotRead) {
   write_file(folder.file("empty"), "");
   write_file(folder.file("absurd"), std::string(64, '\xff'));
   expect_failure(run_process("supertac-info", {folder.file("none")}), 1, "No such file or directory");
-  expect_failure(run_process("supertac-info", {folder.path()}), 1, "is a directory");
+  expect_failure(run_process("supertac-info", {folder.path()}), 1, "has no recordings");
   expect_failure(run_process("supertac-info", {folder.file("empty")}), 1, "has 0 bytes, expected at least 8");
   expect_failure(run_process("supertac-info", {folder.file("absurd")}), 1,
                  "header length 18446744073709551615");

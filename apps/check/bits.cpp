@@ -1,0 +1,101 @@
+#include <array>
+
+#include "apps/check/machine.h"
+#include "apps/common/program.h"
+#include "autograd/kernels/fast/isa.h"
+#include "data/recordings/simulator.h"
+#include "io/sha256.h"
+#include "models/prepared/prepared.h"
+#include "models/trainer.h"
+
+namespace supertac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Bits {
+  std::string recording, training, pictures, bytes;  // hashes
+};
+
+// What every processor has to give.
+const Bits kGolden{"8fc820b03f1fd35f", "99d773bd3465638b", "884204f539d7e681", "2d6d630b82130105"};
+
+std::string short_hash(const Sha256& sum) { return sum.hex().substr(0, 16); }
+
+template <class T>
+void add(Sha256& sum, std::span<const T> values) {
+  sum.add(std::as_bytes(values));
+}
+
+// A pass, ten steps of training on its windows, and pictures of the network that comes out.
+Bits bits_here() {
+  const Recording pass = simulate_pass(Plate::named("ridges6"), {.from_mm = 20, .to_mm = 45});
+  Sha256 recording;
+  add(recording, std::span(pass.volts));
+  add(recording, std::span(pass.time_s));
+  WindowSet windows(
+      {.timesteps = 32, .scale = 4, .rate_hz = 100, .scaling = {.levelled = true}, .stride = 4});
+  windows.add(pass, ".");
+  TrainingSettings settings;
+  settings.model = SuperTacSettings::of_preset("tiny");
+  settings.model.timesteps = 32;
+  settings.epochs = 100;
+  settings.batch = 32;
+  settings.augment = kStandardAugmentation;
+  std::vector<std::uint32_t> all(windows.size());
+  for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
+  Trainer trainer(windows, all, settings);
+  for (int step = 0; step < 10; ++step) trainer.train_step();
+  Sha256 training;
+  trainer.for_each_tensor([&](const std::string&, std::span<const real> values) { add(training, values); });
+
+  constexpr Dim kPictures = 12;
+  Tensor inputs(trainer.model().input_shape(kPictures));
+  const std::size_t size = inputs.values().size() / kPictures;
+  for (std::size_t i = 0; i < kPictures; ++i)
+    windows.window(i * (windows.size() - 1) / (kPictures - 1), inputs.values().subspan(i * size, size));
+  Sha256 pictures, bytes;
+  const Estimate drawn = Prepared(trainer.model()).estimate(inputs);
+  add(pictures, std::as_const(drawn.picture).values());
+  ActivationRanges ranges;
+  ranges.add(trainer.model(), inputs);
+  const Estimate coarse = Prepared(trainer.model(), ranges).estimate(inputs);
+  add(bytes, std::as_const(coarse.picture).values());
+  return {short_hash(recording), short_hash(training), short_hash(pictures), short_hash(bytes)};
+}
+
+}  // namespace
+
+int check_bits(const Arguments& a) {
+  Json rows = Json::array();
+  std::size_t wrong = 0;
+  for (const kernels::IsaKernels* set : kernels::supported_sets()) {
+    if (set == &kernels::kPlainKernels) continue;  // sums in another order: right up to rounding only
+    kernels::use_isa(*set);
+    const Bits found = bits_here();
+    Json row = {
+        {"kernels", std::string(set->name) + (set == &kernels::kPortableFmaKernels ? ", with fma" : "")}};
+    std::string line;
+    for (const auto& [name, member] :
+         std::array<std::pair<const char*, std::string Bits::*>, 4>{{{"recording", &Bits::recording},
+                                                                     {"training", &Bits::training},
+                                                                     {"pictures", &Bits::pictures},
+                                                                     {"int8", &Bits::bytes}}}) {
+      const bool same = found.*member == kGolden.*member;
+      wrong += !same;
+      row[name] = found.*member;
+      line +=
+          std::string("  ") + name + " " + found.*member + (same ? " ok" : " expected " + kGolden.*member);
+    }
+    a.print(row["kernels"].get<std::string>() + ":" + line);
+    rows.push_back(std::move(row));
+  }
+  a.print(wrong == 0 ? "the same bits on every path"
+                     : std::to_string(wrong) +
+                           " hashes differ: another version, or this processor or compiler computes "
+                           "otherwise");
+  a.write_json({{"paths", rows}, {"wrong", wrong}});
+  return wrong == 0 ? kExitOk : kExitFailed;
+}
+
+}  // namespace supertac

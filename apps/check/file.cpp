@@ -1,0 +1,64 @@
+#include <filesystem>
+
+#include "apps/check/machine.h"
+#include "apps/common/program.h"
+#include "apps/common/provenance.h"
+#include "data/recordings/recording.h"
+#include "io/file.h"
+#include "io/json.h"
+#include "io/provenance.h"
+#include "io/text.h"
+
+namespace supertac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json provenance_in(const SafetensorsFile& file) {
+  const auto found = file.metadata().find(kProvenanceKey);
+  return found == file.metadata().end() ? Json::object() : parse_json_limited(found->second);
+}
+
+// Recordings are those of the plates that the model names.
+std::string hash_of_data(const SafetensorsFile& file, const std::string& data) {
+  if (!std::filesystem::is_directory(data)) return hash_of_file(data);
+  const auto plates = file.metadata().find("plates");
+  return hash_of_recordings(
+      data, plates == file.metadata().end() ? std::vector<std::string>{} : comma_list(plates->second));
+}
+
+}  // namespace
+
+int check_file(const Arguments& a) {
+  const SafetensorsFile file = SafetensorsFile::read(a.text("FILE"));
+  const bool ours = file.checksum() == SafetensorsFile::ChecksumState::ok;
+  const Json provenance = provenance_in(file);
+  Json result = {{"file", file.path()},
+                 {"checksum", ours ? "ok" : "absent"},
+                 {"content", content_hash(file)},
+                 {"provenance", provenance}};
+  a.print("checksum   " +
+          std::string(ours ? "ok" : "absent: written by another program, damage cannot be seen"));
+  a.print("content    " + result["content"].get<std::string>());
+  if (provenance.empty()) a.print("provenance none: made by another program or an older version");
+  for (const auto& [key, value] : provenance.items()) {
+    if (key != "parents")
+      a.print(key + std::string(key.size() < 11 ? 11 - key.size() : 1, ' ') + value.get<std::string>());
+  }
+  const Json parents = provenance.value("parents", Json::object());
+  for (const auto& [name, hash] : parents.items())
+    a.print("from       " + name + " " + hash.get<std::string>());
+  bool matches = true;
+  if (a.given("OTHER")) {
+    const std::string found = hash_of_data(file, a.text("OTHER"));
+    matches = false;
+    for (const auto& [name, hash] : parents.items()) matches = matches || hash == found;
+    a.print(a.text("OTHER") + ": content " + found +
+            (matches ? ", which it was made from" : ", which it was NOT made from"));
+    result["data"] = {{"path", a.text("OTHER")}, {"content", found}, {"matches", matches}};
+  }
+  a.write_json(result);
+  return ours && matches ? kExitOk : kExitFailed;
+}
+
+}  // namespace supertac

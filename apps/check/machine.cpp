@@ -1,0 +1,110 @@
+#include "apps/check/machine.h"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "apps/common/program.h"
+#include "apps/common/threads.h"
+#include "autograd/kernels/fast/isa.h"
+#include "hardware/port_list.h"
+#include "hardware/rig.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+struct Finding {
+  std::string what, found, advice;  // advice: "" = all is well
+};
+
+Finding processor() {
+  const kernels::IsaKernels& set = kernels::isa_kernels();
+  if (&set == &kernels::kPortableKernels)
+    return {"processor", "no fused multiply-add",
+            "results are the same, computing takes many times longer; use a processor from 2013 on"};
+  return {"processor", "kernels " + std::string(set.name), ""};
+}
+
+Finding threads() {
+  const int granted = default_threads();
+  const auto online = ::sysconf(_SC_NPROCESSORS_ONLN);
+  return {"threads", std::to_string(granted) + " of " + std::to_string(online) + " processors",
+          granted < online
+              ? "OMP_NUM_THREADS, the affinity mask or a quota grants fewer; --threads N asks for more"
+              : ""};
+}
+
+Finding memory() {
+  constexpr double kWanted = 512;
+  std::ifstream info("/proc/meminfo");
+  double available = 0;
+  for (std::string key; info >> key;) {
+    if (key == "MemAvailable:") info >> available;
+  }
+  return {
+      "memory", format(available / 1024, 0) + " MB available",
+      available / 1024 < kWanted ? "training wants " + format(kWanted, 0) + " MB; close other programs" : ""};
+}
+
+Finding disk() {
+  constexpr double kWanted = 2;
+  std::error_code error;
+  const fs::space_info space = fs::space(".", error);
+  const double gigabytes = error ? 0 : static_cast<double>(space.available) / 1e9;
+  if (::access(".", W_OK) != 0)
+    return {"disk", "this folder cannot be written to", "work in a folder of your own"};
+  return {"disk", format(gigabytes, 1) + " GB free here",
+          gigabytes < kWanted ? "recordings and runs want " + format(kWanted, 0) + " GB; free some" : ""};
+}
+
+void ports(std::vector<Finding>& findings) {
+  bool board = false;
+  for (const PortInfo& port : list_ports()) {
+    board = board || port.usb_id == rig::kBoardUsbId;
+    const bool allowed = ::access(port.path.c_str(), R_OK | W_OK) == 0;
+    findings.push_back({"port " + port.path, port.product.empty() ? port.usb_id : port.product,
+                        allowed ? "" : "no permission: sudo usermod -aG dialout $USER, then log in anew"});
+  }
+  findings.push_back(
+      {"tactile board", board ? "found" : "not found",
+       board ? "" : "plug it in for collecting and streaming; recordings and the virtual rig need none"});
+}
+
+// Services that open serial ports by themselves and talk to what is behind them.
+void services(std::vector<Finding>& findings) {
+  std::string running;
+  std::error_code error;
+  for (const auto& process : fs::directory_iterator("/proc", error)) {
+    std::ifstream name(process.path() / "comm");
+    std::string text;
+    if (!std::getline(name, text)) continue;
+    for (const char* grabs : {"ModemManager", "brltty", "octoprint", "klippy", "pronterface", "gpsd"})
+      if (text == grabs) running += (running.empty() ? "" : ", ") + text;
+  }
+  findings.push_back(
+      {"services that take serial ports", running.empty() ? "none running" : running,
+       running.empty() ? "" : "they talk to board and printer; sudo systemctl stop " + running});
+}
+
+}  // namespace
+
+int check_machine(const Arguments& a) {
+  std::vector<Finding> findings{processor(), threads(), memory(), disk()};
+  ports(findings);
+  services(findings);
+  Json rows = Json::array();
+  for (const Finding& f : findings) {
+    a.print((f.advice.empty() ? "ok    " : "look  ") + f.what + ": " + f.found +
+            (f.advice.empty() ? "" : "; " + f.advice));
+    rows.push_back({{"what", f.what}, {"found", f.found}, {"advice", f.advice}});
+  }
+  a.write_json({{"findings", rows}});
+  return kExitOk;
+}
+
+}  // namespace supertac

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "apps/common/arguments.h"
+
+namespace supertac {
+
+/// `supertac-check machine`: processor, threads, memory, disk, serial ports and who else may take them, and
+/// what to do about each.
+int check_machine(const Arguments& a);
+
+/// `supertac-check bits`: the hashes of a simulated pass, of ten training steps and of pictures in fp32 and
+/// int8, on every instruction set that this processor has, against those that every processor has to give.
+int check_bits(const Arguments& a);
+
+/// `supertac-check file`: checksum, content hash and provenance, and whether its data are those given.
+int check_file(const Arguments& a);
+
+}  // namespace supertac

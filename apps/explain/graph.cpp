@@ -1,0 +1,105 @@
+#include "apps/explain/graph.h"
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "autograd/kernels/elementwise.h"
+#include "autograd/reverse_watch.h"
+#include "autograd/trace.h"
+#include "io/file.h"
+
+namespace supertac {
+namespace {
+
+double norm(const Tensor& t) { return std::sqrt(kernels::sum_of_squares(t.size(), t.data())); }
+
+std::string number(const char* format, double value) {
+  char text[48];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+struct Reverse {
+  double gradient = 0, us = 0;
+};
+
+// By op and result: a reshaped result has the buffer of the one before.
+using Key = std::pair<std::string, const real*>;
+
+class Clock : public ReverseWatch {
+ public:
+  void reverse(const char* op, std::size_t, Backward& b, const std::function<void()>& step) override {
+    Reverse& r = of_[{op, b.y().data()}];
+    r.gradient = norm(b.gy());
+    const auto begin = std::chrono::steady_clock::now();
+    step();
+    r.us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count();
+  }
+  const std::map<Key, Reverse>& of() const { return of_; }
+
+ private:
+  std::map<Key, Reverse> of_;
+};
+
+std::string label(const TracedOp& op, const std::map<const real*, const Parameter*>& parameters,
+                  const std::map<Key, Reverse>& reverse) {
+  std::string text = std::string(op.op) + " " + op.y.shape().text() + "\\n" +
+                     number("%.1f kB", static_cast<double>(op.y.size()) * sizeof(real) / 1000);
+  for (const Variable& x : op.inputs) {
+    const auto p = parameters.find(x.value().data());
+    if (p != parameters.end()) text += "\\n" + p->second->name + " " + x.shape().text();
+  }
+  text += "\\n|y| " + number("%.3g", norm(op.y.value()));
+  const auto r = reverse.find({std::string(op.op), op.y.value().data()});
+  if (r != reverse.end())
+    text += "  |g| " + number("%.3g", r->second.gradient) + "  " + number("%.0f us", r->second.us);
+  return text;
+}
+
+}  // namespace
+
+std::string graph_of(const std::function<Variable()>& loss, const std::vector<Parameter>& parameters) {
+  std::map<const real*, const Parameter*> known;
+  for (const Parameter& p : parameters) known[p.value.value().data()] = &p;
+  Trace trace;
+  const Variable total = loss();
+  Clock clock;
+  backward(total);
+  std::string text = "digraph step {\n  rankdir=TB; node [shape=box, fontname=\"Helvetica\", fontsize=10];\n";
+  std::map<const real*, std::size_t> maker;
+  const std::vector<TracedOp>& ops = trace.ops();
+  for (std::size_t i = 0; i < ops.size(); ++i) {
+    text += "  n" + std::to_string(i) + " [label=\"" + label(ops[i], known, clock.of()) + "\"];\n";
+    for (const Variable& x : ops[i].inputs) {
+      const auto from = maker.find(x.value().data());
+      if (from != maker.end())
+        text += "  n" + std::to_string(from->second) + " -> n" + std::to_string(i) + ";\n";
+    }
+    maker[ops[i].y.value().data()] = i;
+  }
+  return text + "}\n";
+}
+
+void write_graph(const std::string& path, const std::string& dot) {
+  if (path.ends_with(".dot")) return write_file(path, dot);
+  if (!path.ends_with(".svg")) throw std::invalid_argument("expected FILE.dot or FILE.svg, found " + path);
+  const std::string source = path + ".dot";
+  write_file(source, dot);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::execlp("dot", "dot", "-Tsvg", source.c_str(), "-o", path.c_str(), static_cast<char*>(nullptr));
+    ::_exit(127);
+  }
+  int status = 0;
+  const bool ran = child > 0 && ::waitpid(child, &status, 0) == child && WIFEXITED(status);
+  ::unlink(source.c_str());
+  if (!ran || WEXITSTATUS(status) != 0)
+    throw FileError(path, "dot of Graphviz did not draw it; install graphviz, or ask for FILE.dot");
+}
+
+}  // namespace supertac

@@ -1,0 +1,212 @@
+// supertac-explain: one picture with every array on the way to it, from volts to pixels.
+#include <cmath>
+#include <filesystem>
+
+#include "apps/common/program.h"
+#include "apps/common/provenance.h"
+#include "apps/explain/graph.h"
+#include "autograd/trace.h"
+#include "data/plates/plate_file.h"
+#include "data/plates/truth.h"
+#include "data/recordings/recording.h"
+#include "data/samples/levelling.h"
+#include "io/file.h"
+#include "io/numbers.h"
+#include "models/loss.h"
+#include "models/model_file.h"
+#include "models/prepared/prepared.h"
+
+namespace supertac {
+
+void declare(Arguments& a) {
+  a.positional("FILE", "the model");
+  a.required("recording", "FILE", "what was felt");
+  a.required("at", "SECONDS", "on the recording's clock: the last window that ends by then");
+  a.required("out", "FILE",
+             "every array, safetensors; examples/recompute.py does each step again with NumPy");
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// The recorded frames that no gap separates from `at`, up to it: what the window can depend on.
+Recording heard(const Recording& recording, double at, double max_gap_s) {
+  const std::size_t signals = recording.array.signals();
+  Recording part;
+  part.array = recording.array;
+  for (std::size_t i = 0; i < recording.frames() && recording.time_s[i] <= at; ++i) {
+    const auto volts = std::span(recording.volts).subspan(i * signals, signals);
+    if (!std::all_of(volts.begin(), volts.end(), [](float v) { return std::isfinite(v); })) continue;
+    if (!part.time_s.empty() && recording.time_s[i] - part.time_s.back() > max_gap_s) {
+      part.time_s.clear();
+      part.volts.clear();
+      part.position_mm.clear();
+    }
+    part.time_s.push_back(recording.time_s[i]);
+    part.volts.insert(part.volts.end(), volts.begin(), volts.end());
+    if (recording.position_mm.empty()) continue;
+    part.position_mm.insert(part.position_mm.end(),
+                            {recording.position_mm[2 * i], recording.position_mm[2 * i + 1]});
+  }
+  return part;
+}
+
+// Leaves out the last sample's frames where some of them come after `at`: the window ends before it.
+void end_by(Recording& part, double at, double rate_hz) {
+  if (part.time_s.empty()) return;
+  const double start = part.time_s.front(), last = std::floor((at - start) * rate_hz - 0.5);
+  std::size_t n = part.frames();
+  while (n > 0 && (part.time_s[n - 1] - start) * rate_hz - 0.5 - kCellSlack > last) --n;
+  part.time_s.resize(n);
+  part.volts.resize(n * part.array.signals());
+  if (!part.position_mm.empty()) part.position_mm.resize(2 * n);
+}
+
+struct Array {
+  std::string name, dtype;
+  std::vector<std::uint64_t> shape;
+  std::vector<std::byte> bytes;
+};
+
+template <class T>
+Array array(const std::string& name, std::vector<std::uint64_t> shape, std::span<const T> values) {
+  const auto bytes = std::as_bytes(values);
+  return {name, sizeof(T) == 8 ? "F64" : "F32", std::move(shape), {bytes.begin(), bytes.end()}};
+}
+
+Array array(const std::string& name, const Tensor& tensor) {
+  std::vector<std::uint64_t> shape;
+  for (const Dim d : tensor.shape().dims()) shape.push_back(static_cast<std::uint64_t>(d));
+  return array(name, std::move(shape), tensor.values());
+}
+
+// Names the results of ops by their number, and parameters as the model's file does.
+class Names {
+ public:
+  explicit Names(const std::vector<Parameter>& parameters) {
+    for (const Parameter& p : parameters) names_[p.value.value().data()] = p.name;
+  }
+  void add(const Tensor& tensor, const std::string& name) { names_[tensor.data()] = name; }
+  const std::string& of(const Variable& x) const { return names_.at(x.value().data()); }
+
+ private:
+  std::map<const real*, std::string> names_;
+};
+
+Json step_of(const TracedOp& op, const std::string& y, const Names& names) {
+  Json inputs = Json::array();
+  for (const Variable& x : op.inputs) inputs.push_back(names.of(x));
+  const auto dims = op.y.shape().dims();
+  Json step = {
+      {"y", y}, {"op", op.op}, {"inputs", inputs}, {"shape", std::vector<Dim>(dims.begin(), dims.end())}};
+  if (op.op.starts_with("conv"))
+    step.update({{"stride", op.settings.map.stride_w}, {"padding", op.settings.map.padding_w}});
+  if (op.op.starts_with("conv") || op.op == "linear") step["slope"] = op.settings.negative_slope;
+  if (op.op == "take_runs")
+    step.update({{"first", op.settings.first}, {"run", op.settings.run}, {"step", op.settings.step}});
+  return step;
+}
+
+// Every op between the window and the picture; returns what they are, in their order.
+Json trace(const SuperTac& model, const Tensor& input, std::vector<Array>& arrays) {
+  const NoGrad no_grad;
+  const Variable window(input);
+  Trace ops;
+  model.draw(window);
+  Names names(model.parameters());
+  names.add(input, "input");
+  Json steps = Json::array();
+  for (const TracedOp& op : ops.ops()) {
+    const std::string number = std::to_string(1000 + steps.size()).substr(1);
+    const std::string name = number + "." + std::string(op.op);
+    steps.push_back(step_of(op, name, names));
+    if (op.op != "reshape") arrays.push_back(array(name, op.y.value()));
+    names.add(op.y.value(), name);
+  }
+  return steps;
+}
+
+// One training step on this window; the loss is the default one, latents are their means.
+int draw_graph(const Arguments& a, const ModelFile& file, const Recording& recording, const Tensor& input,
+               const Track& track) {
+  const SuperTacSettings& s = file.model->settings();
+  const std::size_t last = 2 * track.frames() - 2;
+  const float x = track.position_mm[last], y = track.position_mm[last + 1];
+  if (!std::isfinite(x) || !std::isfinite(y))
+    throw FileError(a.text("recording"),
+                    "does not say where the finger was; a training step needs the truth");
+  Tensor truth(file.model->picture_shape(1));
+  const std::string folder = std::filesystem::path(a.text("recording")).parent_path();
+  const ImageGrid image = file.array().picture(static_cast<int>(s.scale));
+  truth_image(plate_in_folder(recording.plate, folder), x, y, image, truth.values());
+  const std::vector<Tensor> eps(static_cast<std::size_t>(s.groups()), Tensor::zeros({1, s.latent}));
+  const std::string dot =
+      graph_of([&] { return supertac_loss(file.model->forward(input, eps), truth, {}).total; },
+               file.model->parameters());
+  read_option("out", [&] {
+    write_graph(a.text("out"), dot);
+    return 0;
+  });
+  a.print(a.text("out") + ": the graph of a training step");
+  a.write_json({{"out", a.text("out")}});
+  return kExitOk;
+}
+
+}  // namespace
+
+int run(Arguments& a) {
+  refuse_existing(a.text("out"), a.force());
+  const ModelFile file = load_model(a.text("FILE"));
+  const Recording recording = read_recording(a.text("recording"));
+  if (recording.array != file.array())
+    throw FileError(a.text("recording"), "was recorded with " + recording.array.text() +
+                                             ", the model expects " + file.array().text());
+  const WindowSettings w = file.windows();
+  Recording part = heard(recording, a.number("at", 0, 1e9), w.max_gap_s);
+  end_by(part, a.number("at", 0, 1e9), w.rate_hz);
+  const std::size_t signals = part.array.signals(), frames = static_cast<std::size_t>(w.timesteps);
+  const Track track =
+      part.frames() == 0
+          ? Track()
+          : resample(part, {.rate_hz = w.rate_hz, .max_gap_s = w.max_gap_s, .scaling = w.scaling});
+  if (track.frames() < frames)
+    throw std::runtime_error("--at " + a.text("at") + ": the model needs " + std::to_string(frames) +
+                             " samples at " + format(w.rate_hz) + "/s without a gap before it, found " +
+                             std::to_string(track.frames()) + "; choose a later time");
+  add_model_parents({a.text("FILE")});
+  add_parent_file("recording", a.text("recording"));
+
+  const auto scaled = std::span(track.samples).last(frames * signals);
+  Tensor input(file.model->input_shape(1));
+  std::copy(scaled.begin(), scaled.end(), input.data());
+  if (w.scaling.levelled) level(input.values(), signals);
+  if (!a.text("out").ends_with(".safetensors")) return draw_graph(a, file, recording, input, track);
+  const std::uint64_t n = part.frames(), t = frames, s = signals;
+  std::vector<Array> arrays{array("time_s", {n}, std::span<const double>(part.time_s)),
+                            array("volts", {n, s}, std::span<const float>(part.volts)),
+                            array("scaled", {t, s}, scaled)};
+  arrays.push_back(array("input", input));
+  const Json steps = trace(*file.model, input, arrays);
+  const Estimate drawn = Prepared(*file.model).estimate(input);
+  arrays.push_back(array("picture", drawn.picture));
+  if (drawn.spread.defined()) arrays.push_back(array("spread", drawn.spread));
+
+  std::vector<TensorToWrite> tensors;
+  for (const Array& x : arrays) tensors.push_back({x.name, x.dtype, x.shape, x.bytes});
+  const Json signal = {{"rate_hz", w.rate_hz},
+                       {"rest_volts", w.scaling.rest_volts},
+                       {"span_volts", w.scaling.span_volts},
+                       {"levelled", w.scaling.levelled},
+                       {"least_gain", kLeastGain},
+                       {"rest_removed", kRestRemoved}};
+  write_safetensors(a.text("out"),
+                    {{"kind", "explanation"}, {"steps", steps.dump()}, {"signal", signal.dump()}}, tensors);
+  const double end = part.time_s.front() + static_cast<double>(track.frames() - 1) / w.rate_hz;
+  a.print(a.text("out") + ": " + std::to_string(arrays.size()) + " arrays, " + std::to_string(steps.size()) +
+          " steps, of the window that ends at " + format(end, 3) + " s");
+  a.write_json({{"arrays", arrays.size()}, {"steps", steps.size()}, {"window_ends_s", end}});
+  return kExitOk;
+}
+
+}  // namespace supertac
