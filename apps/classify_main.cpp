@@ -1,5 +1,6 @@
 // supertac-classify: which plate is under the finger? Asked of single frames and of super-resolved pictures
 // (Figure 11 of the paper), and of what lies between.
+#include <algorithm>
 #include <exception>
 
 #include "apps/classify/experiment.h"
@@ -8,6 +9,7 @@
 #include "apps/common/progress.h"
 #include "apps/common/provenance.h"
 #include "apps/common/version.h"
+#include "io/file.h"
 
 namespace supertac {
 
@@ -26,6 +28,8 @@ void declare(Arguments& a) {
   a.option("augment", "NAME",
            "standard: the training windows' gains, offsets and noise vary as in supertac-train; none",
            "standard");
+  a.option("out", "FILE",
+           "keep the first run's classifier of super_resolved pictures, for supertac-stream --classifier");
 }
 
 namespace {
@@ -48,7 +52,8 @@ std::vector<View> views_of(const Arguments& a) {
 using Answers = std::vector<std::vector<std::int32_t>>;
 
 Answers all_answers(const Arguments& a, const std::vector<View>& views, const std::vector<Candidate>& models,
-                    const std::vector<Exam>& exams, const WindowSet& windows, ExperimentSettings settings) {
+                    const std::vector<Exam>& exams, const WindowSet& windows,
+                    const std::vector<std::string>& classes, ExperimentSettings settings) {
   Answers results(views.size() * static_cast<std::size_t>(a.integer("seeds", 1, 1000)));
   std::exception_ptr error;
   std::size_t done = 0;
@@ -58,7 +63,9 @@ Answers all_answers(const Arguments& a, const std::vector<View>& views, const st
     try {
       settings.seed = job / views.size();
       const std::size_t m = settings.seed % models.size();
-      results[job] = answers(views[job % views.size()], *models[m].file.model, windows, exams[m], settings);
+      const View& view = views[job % views.size()];
+      settings.keep = settings.seed == 0 && view.kind == ViewKind::super_resolved ? a.text("out") : "";
+      results[job] = answers(view, *models[m].file.model, windows, exams[m], classes, settings);
     } catch (...) {  // an exception must not leave a thread
 #pragma omp critical
       error = std::current_exception();
@@ -94,6 +101,11 @@ std::vector<ViewResult> count(const Answers& given, const std::vector<View>& vie
 
 int run(Arguments& a) {
   const std::vector<View> views = views_of(a);
+  if (a.given("out")) {
+    refuse_existing(a.text("out"), a.force());
+    if (std::ranges::none_of(views, [](const View& v) { return v.kind == ViewKind::super_resolved; }))
+      throw UsageError("--out keeps the classifier of super_resolved pictures, which is not among --views");
+  }
   ExperimentSettings settings;
   settings.epochs = a.integer("epochs", 1, 10'000);
   if (a.choice("augment", {"standard", "none"}) == "standard") {
@@ -109,7 +121,7 @@ int run(Arguments& a) {
   a.note("split " + models.front().split + ": " + std::to_string(exams.front().train.size()) +
          " training windows, " + std::to_string(exams.front().test.size()) + " test windows");
 
-  const Answers given = all_answers(a, views, models, exams, windows, settings);
+  const Answers given = all_answers(a, views, models, exams, windows, classes, settings);
   const auto results = count(given, views, exams, windows, classes, a.text("data"));
   const std::string frames = windows.settings().scaling.levelled
                                  ? "levelled to the window's own rest and gain"

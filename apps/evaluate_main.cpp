@@ -1,5 +1,6 @@
 // supertac-evaluate: how good a model is on a data set, beside what does without a network.
 #include "apps/common/program.h"
+#include "apps/common/remarks.h"
 #include "apps/evaluate/pairs.h"
 #include "apps/evaluate/recordings.h"
 #include "io/file.h"
@@ -22,6 +23,7 @@ void declare(Arguments& a) {
   a.option("batch", "N", "examples that are drawn at once; their pictures do not depend on it", "64");
   a.option("outputs", "FILE",
            "write inputs as the network takes them, outputs, truths and spreads as safetensors");
+  declare_strict(a);
   a.only_with("data");
   a.option("plates", "A,B,...", "only recordings of these plates (default: the model's own)");
   a.option(

@@ -10,8 +10,8 @@
 #include "apps/common/progress.h"
 #include "apps/common/provenance.h"
 #include "apps/common/signals.h"
+#include "apps/import/page.h"
 #include "data/plates/plate_file.h"
-#include "data/registration/registration_picture.h"
 #include "data/registration/text_folder.h"
 
 namespace supertac {
@@ -26,7 +26,8 @@ void declare(Arguments& arguments) {
       .option("journal", "FILE", "instead of TEXT_DIR: recover a collection that was cut off")
       .required("out", "DIR", "folder for the recordings, one file per pass")
       .option("speed", "MM_PER_S", "sliding speed of the passes in mm/s", "10")
-      .option("pictures", "DIR", "write a PNG of each pass: its signals under the plate they were fitted to")
+      .option("pictures", "DIR",
+              "write index.html: the signals of each pass under the plate they were fitted to")
       .flag("skip-bad", "leave out files that are no recordings instead of giving up");
 }
 
@@ -76,13 +77,12 @@ int run(Arguments& arguments) {
   std::size_t bad = 0, reliable = 0, recordings = 0;
   nlohmann::ordered_json files = nlohmann::ordered_json::array();
   std::optional<Progress> bar;
+  ImportPage page;
   const auto keep = [&](const ImportedPass& pass) {
     const std::string name = recording_file_name(pass.recording);
     add_parent_file("text", pass.path);
     write_recording(folder.add(name), pass.recording);
-    if (pictures && !pass.unknown)
-      write_png(pictures->add(std::filesystem::path(name).stem().string() + ".png"),
-                registration_picture(pass.recording, pass.plate));
+    if (pictures) page.add(pass);
     arguments.print(pass.summary());
     files.push_back(pass.to_json());
     reliable += pass.registration.reliable;
@@ -92,9 +92,10 @@ int run(Arguments& arguments) {
   import_text_folder(arguments.text("TEXT_DIR"), import_settings(arguments, bar, bad),
                      [&](const std::vector<ImportedPass>& plate) {
                        for (const ImportedPass& pass : plate) keep(pass);
-                       keep_plate_file(plate.front().plate_file, out);
+                       keep_plate_file(plate.front().plate_file, folder.path());
                      });
   bar.reset();
+  if (pictures) write_file(pictures->add("index.html"), page.html(arguments.command_line()));
   arguments.write_json({{"folder", out},
                         {"recordings", recordings},
                         {"reliable", reliable},

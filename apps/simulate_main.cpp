@@ -151,7 +151,7 @@ int run(Arguments& arguments) {
                         {"frames", frames},
                         {"seed", seed},
                         {"command", arguments.command_line()}});
-  for (const std::string& plate : arguments.list("plates")) keep_plate_file(plate, arguments.text("out"));
+  for (const std::string& plate : arguments.list("plates")) keep_plate_file(plate, folder.path());
   folder.keep();
   arguments.print(std::to_string(jobs.size()) + " recordings, " + std::to_string(frames) + " frames in " +
                   arguments.text("out"));

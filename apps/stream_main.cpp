@@ -65,6 +65,8 @@ void declare(Arguments& a) {
       .option("udp", "HOST:PORT",
               "send a datagram of JSON for each picture, e.g. to PlotJuggler at 127.0.0.1:9870")
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
+      .option("classifier", "FILE",
+              "name the texture on the page, with a classifier by supertac-classify --out")
       .option("precision", "NAME", "fp32, or int8: faster, for models that hold their values' ranges", "fp32")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
       .flag("list-ports", "list the serial ports and end");
@@ -81,6 +83,7 @@ int run(Arguments& a) {
   const double speedup = a.number("speedup", 0.1, 100);
   StreamSettings settings{.out = a.text("out"),
                           .precision = precision_of(a.choice("precision", {"fp32", "int8"})),
+                          .classifier = a.text("classifier"),
                           .udp = a.text("udp"),
                           .force = a.force(),
                           .view = !a.quiet() && drawable_terminal()};

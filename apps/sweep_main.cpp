@@ -3,6 +3,7 @@
 
 #include "apps/common/launch.h"
 #include "apps/common/program.h"
+#include "apps/common/version.h"
 #include "apps/sweep/chart.h"
 #include "apps/sweep/front.h"
 #include "apps/sweep/shards.h"
@@ -16,7 +17,7 @@ namespace supertac {
 namespace fs = std::filesystem;
 
 void declare(Arguments& a) {
-  a.required("out", "DIR", "sweep.csv, chart.png and models; a sweep that was stopped goes on where it was");
+  a.required("out", "DIR", "sweep.csv, chart.html and models; a sweep that was stopped goes on where it was");
   a.option("data", "DIR", "recordings to train and test on; without it only the table in --out is read");
   a.option("pick", "CONDITIONS",
            "name the fastest model for which they hold, e.g. \"ssim>=0.8,position_mm<=0.5\"");
@@ -49,7 +50,7 @@ int run(Arguments& a) {
   }
   const FolderLock alone = wait_for_table(out);
   const std::vector<Configuration> all = configurations(table), front = pareto_front(all);
-  if (const std::string why = draw_chart(out, all); !why.empty()) a.note(why);
+  write_file(out + "/chart.html", sweep_page(all, a.command_line(), commit()));
   a.print("Pareto front, fastest first:");
   nlohmann::ordered_json result = {{"configurations", all.size()}, {"rows", table.rows().size()}};
   for (const Configuration& c : front) {

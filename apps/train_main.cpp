@@ -1,9 +1,11 @@
 // supertac-train: recordings (or pairs of images) in, a model out.
 #include "apps/common/program.h"
 #include "apps/common/provenance.h"
+#include "apps/common/remarks.h"
 #include "apps/ranks/together.h"
 #include "apps/train/training_options.h"
 #include "apps/train/training_run.h"
+#include "data/samples/signal_remarks.h"
 #include "io/file.h"
 
 namespace supertac {
@@ -19,6 +21,7 @@ void declare(Arguments& a) {
              "the model; FILE's run folder beside it (.run) holds log, report and the state to resume");
   a.option("resume", "FILE", "continue from the last.safetensors of an interrupted run, same options");
   a.option("seed", "N", "of split, initial weights, order, noise", "0");
+  declare_strict(a);
   declare_training(a);
   declare_network(a);
   a.only_with("");
@@ -27,12 +30,15 @@ void declare(Arguments& a) {
 
 namespace {
 
-// `remark` is for a training that has begun: what ends it before says one line only.
-int train(const Arguments& a, TrainingTask task, const std::string& remark, Ranks& ranks) {
+// `remarks` and `about` are for a training that has begun: what ends it before says one line only.
+int train(const Arguments& a, TrainingTask task, const std::vector<std::string>& remarks,
+          const std::string& about, Ranks& ranks) {
   const std::string out = a.text("out");
+  if (a.flag("strict")) remark(a, remarks);
   TrainingRun training(a, std::move(task),
                        {.out = out, .force = a.force(), .resume = a.text("resume"), .ranks = ranks});
-  a.note(remark);
+  a.note(about);
+  remark(a, remarks);
   const bool done = training.train();
   const Trainer& trainer = training.trainer();
   if (!ranks.first()) return done ? kExitOk : kExitFailed;
@@ -60,7 +66,8 @@ int train(const Arguments& a, Ranks& ranks) {
     refuse_existing(a.text("out"), a.force());
     PairSet pairs = PairSet::read(a.text("pairs"));
     add_parent_file("pairs", a.text("pairs"));
-    return train(a, pair_task(a, pairs), std::to_string(pairs.size()) + " pairs", ranks);
+    TrainingTask task = pair_task(a, pairs);
+    return train(a, std::move(task), remarks_on(pairs), std::to_string(pairs.size()) + " pairs", ranks);
   }
   TrainingSettings settings = network_settings(a);
   training_split(a);
@@ -69,7 +76,9 @@ int train(const Arguments& a, Ranks& ranks) {
   add_parent("recordings", hash_of_recordings(a.text("data"), a.list("plates")));
   if (a.given("also")) add_parent("also", hash_of_recordings(a.text("also"), {}));
   set_array(settings.model, windows.array());
-  return train(a, window_task(a, windows, settings), windows.counts().summary(), ranks);
+  TrainingTask task = window_task(a, windows, settings);
+  const std::vector<std::string> remarks = remarks_on(windows, task.split.train);
+  return train(a, std::move(task), remarks, windows.counts().summary(), ranks);
 }
 
 }  // namespace

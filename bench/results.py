@@ -282,6 +282,38 @@ def rig():
     return table(["file", "result"], lines)
 
 
+def promises():
+    return table(["promise", "how it is tested", "figure"], [[r["promise"], r["tests"], r["figure"]] for r in rows("promises.csv")])
+
+
+def hostile():
+    counted = ["slow mutants", "crashes", "hangs", "above 1 GB", "raw exceptions", "control codes", "shells", "files overwritten", "half folders"]
+    lines = []
+    for campaign, tried in (("lines", "command lines"), ("mutants", "mutants"), ("signals", "signals")):
+        found = {r["what"]: r["count"] for r in rows("hostile.csv") if r["campaign"] == campaign}
+        if found:
+            lines.append([tried, f"{int(found[tried]):,}"] + [found[c] for c in counted])
+    return table(["what was tried", "how many"] + counted, lines)
+
+
+def page():
+    runs, hour = rows("page_load.csv"), rows("page_hour.csv")
+    lines = []
+    for build in dict.fromkeys(r["build"] for r in runs):
+        of = lambda load, column: [float(r[column]) for r in runs if (r["build"], r["load"]) == (build, load)]
+        p99 = {(r["pair"], r["load"]): float(r["p99_ms"]) for r in runs if r["build"] == build}
+        ratios = sorted(p99[pair, "with"] / p99[pair, "without"] for pair, load in p99 if load == "with")
+        middle = (ratios[(len(ratios) - 1) // 2] + ratios[len(ratios) // 2]) / 2
+        lines.append([f"`page_load.csv`, {build}", f"{len(ratios)} pairs: 99th percentile from frame to picture with the load {middle:.2f} times that "
+                      f"without (median; {ratios[0]:.2f} to {ratios[-1]:.2f}); frames lost in the port {sum(of('with', 'lost')):.0f} of "
+                      f"{sum(of('with', 'frames')):.0f} with, {sum(of('without', 'lost')):.0f} of {sum(of('without', 'frames')):.0f} without; "
+                      f"{mean(of('with', 'events_a_page_a_second')):.1f} pictures a second for each page that reads"])
+    span = lambda column: f"{min(float(r[column]) for r in hour):.0f} to {max(float(r[column]) for r in hour):.0f}"
+    lines.append(["`page_hour.csv`", f"{float(hour[-1]['seconds']):.0f} s: heap of the page {span('page_heap_kb')} kB, {span('bytes_a_second')} bytes a "
+                  f"second; the program's memory grew by {float(hour[-1]['program_resident_kb']) - float(hour[0]['program_resident_kb']):.0f} kB"])
+    return table(["file", "result"], lines)
+
+
 def never_felt():
     return table(["tried", "random plates", "options", "left out", "contact SSIM", "contact PSNR dB", "ghosts on flat", "verdict"],
                  [[r["recipe"], r["random_plates"], f"`{r['options']}`", r["left_out"], r["contact_ssim"],
@@ -344,7 +376,7 @@ def tried():
 
 
 SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, streaming, growth, pixels, textures, simulator, stability,
-                   rig, whole_passes, corruptions, demo, tried, never_felt, simulated_only, finger_fit, terms],
+                   rig, page, hostile, promises, whole_passes, corruptions, demo, tried, never_felt, simulated_only, finger_fit, terms],
             README: [accuracy, speed]}
 
 

@@ -1,10 +1,12 @@
 #include "models/model_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include "data/samples/signal_features.h"
 #include "io/numbers.h"
+#include "io/text.h"
 #include "models/interval.h"
 #include "models/json_entry.h"
 
@@ -94,6 +96,11 @@ std::unique_ptr<Model> build(const Settings& settings, const SafetensorsFile& fi
   Rng rng(0);
   auto model = std::make_unique<Model>(settings, rng);
   load_parameters(file, path, model->parameters());
+  for (const Parameter& parameter : model->parameters())
+    if (!std::ranges::all_of(parameter.value.value().values(), [](real v) { return std::isfinite(v); }))
+      throw std::runtime_error(
+          path + ": " + in_quotes(parameter.name) +
+          " holds NaN or infinity: its training diverged, or it is damaged; choose another model");
   return model;
 }
 

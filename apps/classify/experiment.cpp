@@ -9,7 +9,7 @@
 #include "autograd/adam.h"
 #include "autograd/ops/losses.h"
 #include "data/samples/batching.h"
-#include "models/classifier.h"
+#include "models/classifier_file.h"
 
 namespace supertac {
 namespace {
@@ -88,11 +88,15 @@ void train(const Classifier& classifier, const View& view, const SuperTac& model
 }  // namespace
 
 std::vector<std::int32_t> answers(const View& view, const SuperTac& model, const WindowSet& data,
-                                  const Exam& exam, const ExperimentSettings& settings) {
+                                  const Exam& exam, const std::vector<std::string>& classes,
+                                  const ExperimentSettings& settings) {
   const std::span<const std::uint32_t> test(exam.test), one = std::span(exam.train).first(1);
   const Tensor sample = show(view, model, data, one, gather(data, one));
   const Classifier classifier = make_classifier(sample.shape(), exam.classes, settings.seed);
   train(classifier, view, model, data, exam, settings);
+  if (!settings.keep.empty())
+    save_classifier(settings.keep, std::get<TextureClassifier>(classifier),
+                    {.height = sample.dim(1), .width = sample.dim(2)}, classes);
   const NoGrad no_grad;
   const auto batch = static_cast<std::size_t>(settings.batch);
   std::vector<std::int32_t> result;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "apps/classify/exam.h"
@@ -16,11 +17,14 @@ struct ExperimentSettings {
   std::int64_t batch = 64;
   double learning_rate = 1e-3;  ///< Adam's, after a warm-up of 5 % and down half a cosine
   std::uint64_t seed = 0;
+  std::string keep = {};  ///< file for the classifier of pictures; empty: none
 };
 
-/// Trains a classifier on the view and returns its answer to every test window, in order.
-/// The same arguments give the same answers. Throws std::runtime_error when the loss is not finite.
+/// Trains a classifier on the view and returns its answer to every test window, in order. `classes` are the
+/// names of the classes. The same arguments give the same answers. Throws std::runtime_error when the loss is
+/// not finite, FileError.
 std::vector<std::int32_t> answers(const View& view, const SuperTac& model, const WindowSet& data,
-                                  const Exam& exam, const ExperimentSettings& settings);
+                                  const Exam& exam, const std::vector<std::string>& classes,
+                                  const ExperimentSettings& settings);
 
 }  // namespace supertac

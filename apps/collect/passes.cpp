@@ -134,7 +134,7 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
     report.doubtful += pass.doubt.empty() ? 0 : 1;
   }
   if (Plate::is_file(header.plate))
-    keep_plate_file((fs::path(journal).parent_path() / header.plate).string(), out);
+    keep_plate_file((fs::path(journal).parent_path() / header.plate).string(), folder.path());
   const ClockFit& clock = collection.clock;
   if (!clock.plausible)
     arguments.note("warning: the board's period is " + format(1e6 * clock.measured_s, 1) + " us, expected " +

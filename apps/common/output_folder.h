@@ -8,8 +8,10 @@
 
 namespace supertac {
 
-/// A folder that a program fills with several files, all or none, and holds alone meanwhile: what it has made
-/// is removed again unless keep() is called. Files that were there before are never removed.
+/// A folder that a program fills with several files, all or none, and holds alone meanwhile. A folder that is
+/// not there yet is filled under a hidden name (.NAME.unfinished) and appears when keep() is called, so that
+/// not even a killed program leaves a part of it; in one that is there, what was made is removed again unless
+/// keep() is called. Files that were there before are never removed.
 class OutputFolder {
  public:
   /// Creates the folder where it is missing.
@@ -19,16 +21,19 @@ class OutputFolder {
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
 
+  /// Where the files are written until keep().
+  const std::string& path() const { return path_; }
   /// Path of a file to be written in the folder. Throws FileError when it exists and force is false.
   std::string add(const std::string& name);
   /// The folder's provenance.jsonl gains a line: what full_provenance() says, and how many files it was.
   /// Throws FileError.
+  /// Throws FileError when the folder cannot appear.
   void keep();
 
  private:
   void remove_made();
 
-  std::string path_;
+  std::string path_, final_;  // final_ is empty when the folder was there
   std::unique_ptr<FolderLock> lock_;
   bool force_;
   bool kept_ = false;

@@ -3,7 +3,9 @@
 #include <map>
 
 #include "data/samples/split.h"
+#include "io/captions.h"
 #include "io/images.h"
+#include "io/numbers.h"
 #include "io/safetensors.h"
 #include "models/evaluation.h"
 #include "models/interval.h"
@@ -13,29 +15,64 @@ namespace {
 
 constexpr std::size_t kStrips = 12, kFilmColumns = 24;
 
-using Draw = Picture (*)(std::span<const Strip>, const StripLayout&);
+constexpr const char* kParts[] = {"felt", "drawn", "true", "off by"};
 
-Picture draw(const Committee& model, double interval_factor, const WindowSet& windows,
-             std::span<const std::uint32_t> chosen, Draw picture, int side) {
-  const std::size_t pixels = windows.image().pixels();
-  const TaxelArray array = windows.array();
+/// What is drawn of some windows, and what must outlive the strips.
+struct Drawing {
+  std::vector<std::vector<float>> frames;
   std::vector<float> outputs, truths, doubts;
+  std::vector<Strip> strips;
+  std::vector<std::string> names;  // of the windows, in two lines
+};
+
+Drawing drawing_of(const Committee& model, double interval_factor, const WindowSet& windows,
+                   std::span<const std::uint32_t> chosen) {
+  const std::size_t pixels = windows.image().pixels();
+  Drawing d;
   for_each_output(model, windows, chosen, [&](const EvaluatedBatch& b) {
-    outputs.insert(outputs.end(), b.outputs.values().begin(), b.outputs.values().end());
-    truths.insert(truths.end(), b.targets.values().begin(), b.targets.values().end());
-    for (const float s : b.spreads) doubts.push_back(static_cast<float>(interval_factor) * at_least(s));
+    d.outputs.insert(d.outputs.end(), b.outputs.values().begin(), b.outputs.values().end());
+    d.truths.insert(d.truths.end(), b.targets.values().begin(), b.targets.values().end());
+    for (const float s : b.spreads) d.doubts.push_back(static_cast<float>(interval_factor) * at_least(s));
     return true;
   });
-  std::vector<std::vector<float>> frames;
-  for (const std::uint32_t i : chosen) frames.push_back(mean_of_channels(array, windows.last_frame(i)));
-  std::vector<Strip> strips;
+  for (const std::uint32_t i : chosen)
+    d.frames.push_back(mean_of_channels(windows.array(), windows.last_frame(i)));
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     const auto part = [&](const std::vector<float>& all) {
       return all.empty() ? std::span<const float>() : std::span(all).subspan(i * pixels, pixels);
     };
-    strips.push_back({frames[i], part(outputs), part(truths), part(doubts)});
+    d.strips.push_back({d.frames[i], part(d.outputs), part(d.truths), part(d.doubts)});
+    const WindowSet::Pass& pass = windows.passes()[windows.pass_of(chosen[i])];
+    d.names.push_back(pass.plate + " t" + std::to_string(pass.trial) + " p" + std::to_string(pass.pass) +
+                      "\ny " + format(windows.position(chosen[i]).y_mm, 1) + " mm");
   }
-  return picture(strips, {array.rows, array.columns, windows.settings().scale, side});
+  return d;
+}
+
+// With headings, units and a colour bar. `down`: windows stand below each other, else side by side.
+Picture figure(const Drawing& d, const WindowSet& windows, int side, bool down, const std::string& title) {
+  const TaxelArray array = windows.array();
+  const StripLayout layout{array.rows, array.columns, windows.settings().scale, side};
+  const Picture inside = down ? strip_picture(d.strips, layout) : film_picture(d.strips, layout);
+  const auto parts = static_cast<int>(d.doubts.empty() ? 3 : 4), count = static_cast<int>(d.strips.size());
+  const ImageGrid image = windows.image();
+  Captions captions{.title = title + "; a picture is " + format(image.width_mm()) + " x " +
+                             format(image.height_mm()) + " mm",
+                    .low = "0: flat plate, not pressed",
+                    .high = "1: plate's highest, pressed hard"};
+  const auto middle = [](int pixels, int of, int i) { return pixels * (2 * i + 1) / (2 * of); };
+  for (int i = 0; i < parts; ++i)
+    (down ? captions.columns : captions.rows)
+        .push_back({middle(down ? inside.width : inside.height, parts, i), kParts[i]});
+  for (int i = 0; i < count; ++i) {
+    const std::string& name = d.names[static_cast<std::size_t>(i)];
+    const std::string y = name.substr(name.find('\n') + 3);  // of a film the pass is in the title
+    if (down)
+      captions.rows.push_back({middle(inside.height, count, i), name});
+    else if (i % 3 == 0)
+      captions.columns.push_back({middle(inside.width, count, i), "y " + y});
+  }
+  return captioned(inside, captions);
 }
 
 }  // namespace
@@ -72,15 +109,19 @@ void write_pictures(const Committee& model, double interval_factor, const Window
     if (windows.contact(i)) touching.push_back(i);
     by_pass[windows.pass_of(i)].push_back(i);
   }
+  const auto drawing = [&](std::span<const std::uint32_t> chosen) {
+    return drawing_of(model, interval_factor, windows, chosen);
+  };
   const std::vector<std::uint32_t> strips = spread(touching.empty() ? test : touching, kStrips);
-  write_png(folder.add("strips.png"), draw(model, interval_factor, windows, strips, strip_picture, 96));
+  write_png(folder.add("strips.png"), figure(drawing(strips), windows, 96, true, "Windows in contact"));
   for (const auto& [pass, list] : by_pass) {
     const WindowSet::Pass& p = windows.passes()[pass];
-    const std::string name = "film_" + p.plate + "_t" + std::to_string(p.trial) + "_p" +
-                             std::to_string(p.pass) + "_v" + std::to_string(static_cast<int>(p.speed_mm_s)) +
-                             ".png";
-    write_png(folder.add(name),
-              draw(model, interval_factor, windows, spread(list, kFilmColumns), film_picture, 48));
+    const std::string name = p.plate + "_t" + std::to_string(p.trial) + "_p" + std::to_string(p.pass) + "_v" +
+                             std::to_string(static_cast<int>(p.speed_mm_s));
+    write_png(folder.add("film_" + name + ".png"),
+              figure(drawing(spread(list, kFilmColumns)), windows, 48, false,
+                     p.plate + ", trial " + std::to_string(p.trial) + ", pass " + std::to_string(p.pass) +
+                         ", " + format(p.speed_mm_s) + " mm/s"));
   }
 }
 

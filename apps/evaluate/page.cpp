@@ -4,8 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/web/chart.h"
 #include "apps/web/encode.h"
-#include "apps/web/pages.h"
+#include "apps/web/result_page.h"
 #include "data/samples/split.h"
 #include "io/images.h"
 #include "io/numbers.h"
@@ -18,26 +19,8 @@ constexpr double kApartMm = 3;
 constexpr float kTexture = 0.1F;
 constexpr int kPanel = 64;  // pixels of a PNG's longer side
 
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text)
-    out += c == '<' ? "&lt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
-  return out;
-}
-
 std::string cell_of(const nlohmann::ordered_json& value, int decimals, double factor = 1) {
   return "<td>" + (value.is_number() ? format(factor * value.get<double>(), decimals) : "-") + "</td>";
-}
-
-std::string section(const std::string& title, const std::string& note, const std::string& content) {
-  return "<section class=\"card\"><h2>" + title + "</h2>" +
-         (note.empty() ? "" : "<p class=\"quiet\">" + note + "</p>") + content + "</section>\n";
-}
-
-std::string table(const std::vector<std::string>& heads, const std::string& rows) {
-  std::string text = "<div class=\"scroll\"><table><thead><tr>";
-  for (const std::string& head : heads) text += "<th scope=\"col\">" + head + "</th>";
-  return text + "</tr></thead><tbody>" + rows + "</tbody></table></div>";
 }
 
 std::string method_row(const std::string& name, const nlohmann::ordered_json& scores,
@@ -50,14 +33,32 @@ std::string method_row(const std::string& name, const nlohmann::ordered_json& sc
          cell_of(all["psnr_mean_db"], 2) + cell_of(latency["median_us"], 1) + "</tr>";
 }
 
+std::string against_time(const nlohmann::ordered_json& result) {
+  ChartSeries network{.name = "network", .points = {}, .line = false, .dots = true},
+      baselines{.name = "baselines", .points = {}, .line = false, .dots = true};
+  const auto add = [&](ChartSeries& series, const std::string& name, const nlohmann::ordered_json& scores) {
+    const auto& us = result["latency"][name]["median_us"];
+    const auto& ssim = scores["contact"]["ssim"];
+    if (!us.is_number() || !ssim.is_number()) return;
+    series.points.emplace_back(us.get<double>(), ssim.get<double>());
+    series.labels.push_back(name);
+  };
+  add(network, "network", result);
+  for (const auto& [name, scores] : result["baselines"].items()) add(baselines, name, scores);
+  return chart_svg("Contact SSIM", {.label = "one picture, us", .logarithmic = true},
+                   {.label = "SSIM", .most = 1}, {network, baselines});
+}
+
 std::string by_method(const nlohmann::ordered_json& result) {
   std::string rows = method_row("network", result, result["latency"]["network"]);
   for (const auto& [name, scores] : result["baselines"].items())
     rows += method_row(name, scores, result["latency"][name]);
-  return section(
-      "Scores beside the baselines", "in contact: the truth has a pixel that is not 0",
-      table({"method", "contact SSIM", "PSNR dB", "position mm", "all SSIM", "PSNR dB", "one picture, us"},
-            rows));
+  return page_section("Scores beside the baselines", "in contact: the truth has a pixel that is not 0",
+                      page_table({"method", "contact SSIM", "PSNR dB", "position mm", "all SSIM", "PSNR dB",
+                                  "one picture, us"},
+                                 rows)) +
+         page_section("Accuracy against the time of a picture", "processor time of one picture on one thread",
+                      against_time(result));
 }
 
 std::string by_zone(const nlohmann::ordered_json& result) {
@@ -68,8 +69,9 @@ std::string by_zone(const nlohmann::ordered_json& result) {
             cell_of(m["psnr_mean_db"], 2) + cell_of(m.value("ghost_rate", nlohmann::ordered_json()), 2, 100) +
             cell_of(m.value("miss_rate", nlohmann::ordered_json()), 2, 100) + "</tr>";
   }
-  return section("Contact, flat plate, air", "ghosts show what is not there, misses show nothing of what is",
-                 table({"zone", "windows", "SSIM", "PSNR dB", "ghosts %", "misses %"}, rows));
+  return page_section("Contact, flat plate, air",
+                      "ghosts show what is not there, misses show nothing of what is",
+                      page_table({"zone", "windows", "SSIM", "PSNR dB", "ghosts %", "misses %"}, rows));
 }
 
 // Bars on an axis from 0 to 1, which is as far as SSIM goes.
@@ -98,7 +100,7 @@ std::string by_way(const nlohmann::ordered_json& felt) {
            text(x + kBar / 2, kTop + kHeight + 29, "middle",
                 std::to_string(felt[i]["windows"].get<long>()) + " windows");
   }
-  return section(
+  return page_section(
       "By way since the first contact",
       "SSIM against millimetres slid over the texture; what it is cannot be known before two of its elements",
       "<svg viewBox=\"0 0 610 196\" role=\"img\" aria-label=\"SSIM by millimetres since the first "
@@ -110,9 +112,7 @@ std::string png_of(std::span<const float> values, int rows, int columns) {
   const int longer = std::max(rows, columns);
   supertac::Picture picture(kPanel * columns / longer, kPanel * rows / longer);
   draw_panel(picture, {0, 0, picture.width, picture.height}, values, rows, columns);
-  const std::vector<std::byte> file = encode_png(picture);
-  return "data:image/png;base64," +
-         base64(std::span(reinterpret_cast<const std::uint8_t*>(file.data()), file.size()));
+  return picture_address(picture);
 }
 
 const char* word_of(Zone zone) {
@@ -127,10 +127,6 @@ const char* word_of(Zone zone) {
       return "in the air";
   }
   return "";
-}
-
-void replace(std::string& page, std::string_view mark, const std::string& text) {
-  page.replace(page.find(mark), mark.size(), text);
 }
 
 }  // namespace
@@ -210,8 +206,8 @@ std::string EvaluationPage::by_plate() const {
             cell_of(m["contact"]["ssim"], 3) + cell_of(m["contact"]["psnr_mean_db"], 2) +
             cell_of(m["contact"]["position_error_mm"], 2) + cell_of(m["all"]["ssim"], 3) + "</tr>";
   }
-  return section("By plate", "",
-                 table({"plate", "contact", "SSIM", "PSNR dB", "position mm", "all SSIM"}, rows));
+  return page_section("By plate", "",
+                      page_table({"plate", "contact", "SSIM", "PSNR dB", "position mm", "all SSIM"}, rows));
 }
 
 std::string EvaluationPage::shown(const std::string& title, const std::string& note,
@@ -239,7 +235,7 @@ std::string EvaluationPage::shown(const std::string& title, const std::string& n
     add("difference", difference, grid.height, grid.width);
     cards += "</div></figure>";
   }
-  return section(title, note, cards + "</div>");
+  return page_section(title, note, cards + "</div>");
 }
 
 std::string EvaluationPage::films(std::span<const std::uint32_t> frames,
@@ -285,10 +281,6 @@ std::string EvaluationPage::html(const Committee& network, std::span<const std::
     for (const Scored& one : *some) chosen.push_back(one.window);
   const std::map<std::uint32_t, Picture> pictures = drawn_again(network, chosen);
 
-  std::string made;
-  for (const auto& [name, text] : made_by)
-    made += "<tr><td>" + escaped(name) + "</td><td style=\"text-align:left;white-space:normal\"><code>" +
-            escaped(text) + "</code></td></tr>";
   std::string content = "<p class=\"quiet\">" + escaped(result["model"].get<std::string>()) + ", split " +
                         escaped(result["split"].get<std::string>()) + ", " +
                         std::to_string(result["all"]["windows"].get<long>()) + " windows, " +
@@ -298,23 +290,20 @@ std::string EvaluationPage::html(const Committee& network, std::span<const std::
       by_way(result["felt"]) +
       shown("The worst windows", "in contact, by SSIM; no two within 3 mm of one pass", worst, pictures) +
       shown("The best windows", "of those with texture on a quarter of the picture", best, pictures);
-  content +=
-      section("Films", "each pass of the test side; felt, drawn, true",
-              "<div class=\"controls\"><select id=\"pass\" aria-label=\"pass\"></select><button "
-              "id=\"play\">Play</button>"
-              "<input id=\"at\" type=\"range\" min=\"0\" value=\"0\" aria-label=\"place in the pass\"></div>"
-              "<div class=\"film\"><figure><canvas id=\"film-felt\"></canvas>felt</figure><figure><canvas "
-              "id=\"film-drawn\">"
-              "</canvas>drawn</figure><figure><canvas id=\"film-true\"></canvas>true</figure></div>"
-              "<p class=\"quiet\" id=\"film-label\" role=\"status\"></p><canvas id=\"bar\" "
-              "style=\"width:100%\"></canvas>"
-              "<p class=\"quiet ends\"><span>0: flat plate, not pressed</span><span>1: the plate's highest, "
-              "pressed hard</span></p>");
-  content += section("What made this page", "", table({"", ""}, made));
-  std::string page(evaluation_page());
-  replace(page, "<!--content-->", content);
-  replace(page, "<!--films-->", films(frames, pictures));
-  return page;
+  content += page_section(
+      "Films", "each pass of the test side; felt, drawn, true",
+      "<div class=\"controls\"><select id=\"pass\" aria-label=\"pass\"></select><button "
+      "id=\"play\">Play</button>"
+      "<input id=\"at\" type=\"range\" min=\"0\" value=\"0\" aria-label=\"place in the pass\"></div>"
+      "<div class=\"film\"><figure><canvas id=\"film-felt\"></canvas>felt</figure><figure><canvas "
+      "id=\"film-drawn\">"
+      "</canvas>drawn</figure><figure><canvas id=\"film-true\"></canvas>true</figure></div>"
+      "<p class=\"quiet\" id=\"film-label\" role=\"status\"></p><canvas id=\"bar\" "
+      "style=\"width:100%\"></canvas>"
+      "<p class=\"quiet ends\"><span>0: flat plate, not pressed</span><span>1: the plate's highest, "
+      "pressed hard</span></p>");
+  content += page_section("What made this page", "", page_facts(made_by));
+  return result_page("SuperTac evaluation", content, films(frames, pictures));
 }
 
 }  // namespace supertac

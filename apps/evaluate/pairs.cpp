@@ -5,8 +5,10 @@
 #include "apps/common/measure.h"
 #include "apps/common/program.h"
 #include "apps/common/provenance.h"
+#include "apps/common/remarks.h"
 #include "apps/evaluate/scoring.h"
 #include "data/plates/truth.h"
+#include "data/samples/signal_remarks.h"
 #include "data/scores/metrics.h"
 #include "io/numbers.h"
 #include "io/safetensors.h"
@@ -87,6 +89,7 @@ int evaluate_on_pairs(const Arguments& a) {
   add_parent_file("pairs", a.text("pairs"));
   scored.split = split_pairs(pairs, scored.split_name, scored.seed);
   check_scored(a, files, scored);
+  remark(a, remarks_on(pairs));
 
   const Baselines baselines = fit_baselines(pairs, scored.split.train);
   const Scores none(pairs.image(), baselines);

@@ -6,6 +6,7 @@
 #include "apps/common/measure.h"
 #include "apps/common/program.h"
 #include "apps/common/provenance.h"
+#include "apps/common/remarks.h"
 #include "apps/common/version.h"
 #include "apps/evaluate/exports.h"
 #include "apps/evaluate/felt.h"
@@ -13,6 +14,7 @@
 #include "apps/evaluate/scoring.h"
 #include "apps/evaluate/trust.h"
 #include "data/recordings/recording.h"
+#include "data/samples/signal_remarks.h"
 #include "data/scores/metrics.h"
 #include "io/file.h"
 #include "io/numbers.h"
@@ -139,6 +141,7 @@ int evaluate_on_recordings(const Arguments& a) {
   const WindowSet windows = load_windows(a, files.front());
   scored.split = make_split(windows, split_kind(scored.split_name), scored.seed, scored.leave_out);
   check_scored(a, files, scored);
+  remark(a, remarks_on(windows, scored.split.test));
 
   std::optional<OutputFolder> pictures, pairs;
   std::string train_pairs, test_pairs;
@@ -154,14 +157,11 @@ int evaluate_on_recordings(const Arguments& a) {
       score_all(a, files, windows, scored, baselines, a.given("outputs") ? &outputs : nullptr,
                 a.given("report") ? &page : nullptr);
   const nlohmann::ordered_json result = report(a, network, windows, scored, baselines, scores);
-  if (pictures) {
+  if (pictures)
     write_pictures(network, files.front().interval_factor(), windows, scored.split.test, *pictures);
-    pictures->keep();
-  }
   if (pairs) {
     write_pairs(windows, scored.split.train, train_pairs);
     write_pairs(windows, scored.split.test, test_pairs);
-    pairs->keep();
     a.print(a.text("write-pairs") + ": " + std::to_string(scored.split.train.size()) +
             " pairs to train on, " + std::to_string(scored.split.test.size()) + " to test");
   }
@@ -169,6 +169,8 @@ int evaluate_on_recordings(const Arguments& a) {
   if (a.given("report"))
     write_file(a.text("report"), page.html(network, scored.split.test, result, made_by(a, windows)));
   a.write_json(result);
+  for (OutputFolder* folder : {pictures ? &*pictures : nullptr, pairs ? &*pairs : nullptr})
+    if (folder != nullptr) folder->keep();
   return kExitOk;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "data/plates/taxel_array.h"
@@ -20,6 +21,8 @@ struct LiveState {
   std::vector<float> half_widths;  ///< the same, as Seen
   std::optional<double> distance;  ///
   bool unlike_training = false;    ///< the signals are not such as the model has learnt from
+  std::string texture;             ///< that the picture shows, by a classifier; empty: none, or no texture
+  double texture_probability = 0;  ///
   float x_mm = NAN, y_mm = NAN;    ///< of the finger's centre on the plate, where known
   double frames_per_s = 0;
   double median_ms = 0, p99_ms = 0;  ///< latency

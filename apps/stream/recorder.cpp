@@ -29,11 +29,11 @@ std::string Recorder::start() {
   const std::string name = name_of_now();
   try {
     auto log = std::make_unique<PictureLog>(name, false, format_);
-    const std::lock_guard lock(mutex_);
+    const std::scoped_lock lock(log_mutex_, mutex_);
     if (log_) return "already recording " + status_.recording;
     log_ = std::move(log);
-    status_.recording = name, status_.seconds = 0;
-    begin_s_ = -1;
+    status_.recording = name;
+    begin_s_ = -1, seconds_ = 0;
     return "recording " + name;
   } catch (const std::exception& error) {
     return error.what();
@@ -42,7 +42,7 @@ std::string Recorder::start() {
 
 std::string Recorder::stop() {
   if (writer_.joinable()) writer_.join();  // of the recording before
-  const std::lock_guard lock(mutex_);
+  const std::scoped_lock lock(log_mutex_, mutex_);
   if (!log_) return "nothing is being recorded";
   status_.said = "writing " + status_.recording;
   writer_ = std::thread(&Recorder::complete, this, std::move(log_), std::exchange(status_.recording, ""));
@@ -62,22 +62,25 @@ void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name) {
 }
 
 void Recorder::add(const Seen& seen) {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(log_mutex_);
   if (!log_) return;
   if (begin_s_ < 0) begin_s_ = seen.time_s;
-  status_.seconds = seen.time_s - begin_s_;
+  seconds_ = seen.time_s - begin_s_;
   try {
     log_->add(seen);
   } catch (const FileError& error) {
+    log_.reset();
+    const std::lock_guard status_lock(mutex_);
     status_.said = error.what();
     status_.recording.clear();
-    log_.reset();
   }
 }
 
 Recorder::Status Recorder::status() {
   const std::lock_guard lock(mutex_);
-  return status_;
+  Status status = status_;
+  status.seconds = seconds_;
+  return status;
 }
 
 std::optional<std::string> Recorder::file(const std::string& name) {

@@ -1,6 +1,7 @@
 // Recording at somebody's wish, while a stream runs.
 #pragma once
 
+#include <atomic>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -45,9 +46,13 @@ class Recorder {
 
   PictureFormat format_;
   std::map<std::string, std::string> metadata_;
-  std::mutex mutex_;  // of what follows
+  // Two, so that the stream's thread never waits for one that is asked how things stand, 30 times a second
+  // and with no hurry: log_mutex_ is otherwise held for a moment at a start and a stop only.
+  std::mutex log_mutex_;  // of log_ and begin_s_
   std::unique_ptr<PictureLog> log_;
   double begin_s_ = -1;
+  std::atomic<double> seconds_ = 0;
+  std::mutex mutex_;  // of status_
   Status status_;
   std::thread writer_;  // of the starting and stopping thread
 };

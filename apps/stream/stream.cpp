@@ -2,7 +2,9 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "apps/common/signals.h"
 #include "hardware/serial_port.h"
@@ -11,7 +13,9 @@
 namespace supertac {
 namespace {
 
-constexpr double kMostLateS = 0.02, kWaitS = 0.05, kFiguresEveryS = 0.5, kShowEveryS = 1.0 / 60;
+constexpr double kMostLateS = 0.02, kWaitS = 0.05, kFiguresEveryS = 0.5, kShowEveryS = 1.0 / 60,
+                 kNameEveryS = 0.1;
+constexpr float kTexture = 0.2F;  // a picture without a pixel above this shows none
 
 }  // namespace
 
@@ -28,12 +32,21 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   else if (!settings.out.empty())
     log_ = std::make_unique<PictureLog>(settings.out, settings.force, format);
   if (!settings.udp.empty()) udp_ = std::make_unique<UdpOutput>(settings.udp);
+  if (!settings.classifier.empty()) {
+    classifier_ = load_classifier(settings.classifier);
+    const ImageGrid image = maker_.image();
+    if (classifier_->settings.height != image.height || classifier_->settings.width != image.width)
+      throw std::runtime_error(settings.classifier + ": names pictures of " +
+                               std::to_string(classifier_->settings.height) + "x" +
+                               std::to_string(classifier_->settings.width) + " pixels, the model's have " +
+                               image.text() + "; give a classifier that was trained with this model");
+  }
   if (!settings.web) return;
   recorder_ = std::make_unique<Recorder>(format, settings.metadata);
-  web_ = std::make_unique<WebView>(
-      *settings.web,
-      WebSource{settings.badge, settings.source, source.array(), state_.scale, format.half_widths},
-      *recorder_);
+  web_ = std::make_unique<WebView>(*settings.web,
+                                   WebSource{settings.badge, settings.source, source.array(), state_.scale,
+                                             format.half_widths, classifier_.has_value()},
+                                   *recorder_);
 }
 
 void Stream::run() {
@@ -133,6 +146,13 @@ double Stream::keep_pace(double time_s) const {
   return monotonic_seconds();
 }
 
+void Stream::name_texture() {
+  state_.texture.clear();
+  if (std::ranges::none_of(state_.picture, [](float v) { return v > kTexture; })) return;
+  const NamedClassifier::Answer answer = classifier_->name_of(state_.picture);
+  state_.texture = answer.name, state_.texture_probability = answer.probability;
+}
+
 void Stream::show() {
   const double now = monotonic_seconds();
   if ((!view_ && !web_) || now - shown_s_ < kShowEveryS) return;
@@ -147,6 +167,7 @@ void Stream::show() {
   state_.half_widths.assign(maker_.half_widths().begin(), maker_.half_widths().end());
   state_.distance = maker_.distance();
   state_.taxels = mean_of_channels(state_.array, maker_.window().newest());
+  if (classifier_ && now - named_s_ >= kNameEveryS) named_s_ = now, name_texture();
   if (view_) view_->update(state_);
   if (web_) web_->update(state_);
 }

@@ -14,6 +14,7 @@
 #include "apps/stream/picture_maker.h"
 #include "apps/stream/terminal_view.h"
 #include "apps/stream/web_view.h"
+#include "models/classifier_file.h"
 
 namespace supertac {
 
@@ -21,6 +22,7 @@ struct StreamSettings {
   double seconds = std::numeric_limits<double>::infinity();  ///< of signal, after which run() ends
   std::string out = {};  ///< file that keeps the pictures; "-": a line for each to stdout; empty: none
   Precision precision = Precision::fp32;
+  std::string classifier = {};                       ///< file that names the texture; empty: none
   std::string udp = {};                              ///< HOST:PORT that gets a line for each; empty: none
   bool force = false;                                ///< an existing file is replaced
   bool view = false;                                 ///< draw on the terminal
@@ -34,7 +36,8 @@ struct StreamSettings {
 /// machine is too slow, or was busy, the newest count.
 class Stream {
  public:
-  /// `models` and `source` must outlive this. Throws as PictureMaker, PictureLog and WebServer.
+  /// `models` and `source` must outlive this. Throws as PictureMaker, PictureLog, load_classifier() and
+  /// WebServer; std::runtime_error for a classifier of other pictures than the models'.
   Stream(const StreamSettings& settings, std::span<const ModelFile> models, SensorSource& source);
 
   /// Until the source ends, `seconds` are over, or a signal comes. What is recorded passes as fast as it
@@ -56,6 +59,7 @@ class Stream {
   double keep_pace(double time_s) const;
   void keep(const SensorFrame& frame, std::span<const float> picture);
   void show();
+  void name_texture();
   double milliseconds(double quantile) const { return 1e3 * latency_.quantile(quantile); }
   std::uint64_t dropped() const { return too_late_ + source_.counters().dropped; }
 
@@ -68,11 +72,12 @@ class Stream {
   std::unique_ptr<PipeOutput> pipe_;
   std::unique_ptr<Recorder> recorder_;  // at the page's wish
   std::unique_ptr<WebView> web_;
+  std::optional<NamedClassifier> classifier_;
   LatencyHistogram latency_;
   LiveState state_;
   std::uint64_t frames_ = 0, too_late_ = 0, unlike_ = 0, lines_lost_ = 0, figures_frames_ = 0;
   double first_s_ = 0, last_s_ = 0;  // the sensor's time
-  double begin_s_ = 0, figures_s_ = 0, shown_s_ = 0;
+  double begin_s_ = 0, figures_s_ = 0, shown_s_ = 0, named_s_ = 0;
 };
 
 }  // namespace supertac

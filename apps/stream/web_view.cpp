@@ -39,6 +39,7 @@ std::string WebView::hello() const {
                         {"scale", source_.scale},
                         {"height_mm", rig::kTextureHeightMm},
                         {"has_spread", source_.has_spread},
+                        {"names_textures", source_.names_textures},
                         {"map", colour_map_base64()}}
       .dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
 }
@@ -70,6 +71,8 @@ std::string web_event(const LiveState& state, const Recorder::Status& recorder) 
   }
   if (!state.half_widths.empty()) event["wide"] = levels_base64(state.half_widths);
   if (state.distance) event["distance"] = *state.distance, event["unlike"] = state.unlike_training;
+  if (!state.texture.empty())
+    event["texture"] = state.texture, event["probability"] = state.texture_probability;
   if (std::isfinite(state.x_mm)) event["x"] = state.x_mm, event["y"] = state.y_mm;
   return event.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
 }

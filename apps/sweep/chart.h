@@ -7,9 +7,9 @@
 
 namespace supertac {
 
-/// Accuracy against latency, every configuration a point, the Pareto front a line: writes
-/// folder/chart.gnuplot, data included, and has gnuplot draw folder/chart.png. Returns false when gnuplot is
-/// not installed or fails; the script is there then all the same. Throws FileError.
-std::string draw_chart(const std::string& folder, const std::vector<Configuration>& all);
+/// A page with accuracy against latency, every configuration a point, the Pareto front a line with names; and
+/// the table of the front. It loads nothing from elsewhere.
+std::string sweep_page(const std::vector<Configuration>& all, const std::string& command,
+                       const std::string& commit);
 
 }  // namespace supertac

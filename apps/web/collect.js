@@ -1,8 +1,4 @@
 // The page of a collection: where the finger is, and a button that does what Ctrl-C does. Nothing here moves it.
-"use strict";
-const element = (id) => document.getElementById(id);
-const bytes = (base64) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
-const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 let hello = null, newest = null, alive = 0, texture = null;
 
 // The plate's heights as an image, y to the right.

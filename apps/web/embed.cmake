@@ -1,15 +1,20 @@
 cmake_minimum_required(VERSION 3.22)
-# Run at build time: writes OUTPUT, which defines supertac::NAME(), the page HTML with STYLES and SCRIPT in it.
+# Run at build time: writes OUTPUT, which defines supertac::NAME(): frame.html with TITLE, CLASS of the body, BODY, STYLES and
+# SCRIPTS in it.
 set(folder ${CMAKE_CURRENT_LIST_DIR})
-file(READ ${folder}/${HTML} page)
-set(style "")
-foreach(file ${STYLES})
-  file(READ ${folder}/${file} text)
-  string(APPEND style "${text}")
+file(READ ${folder}/frame.html page)
+file(READ ${folder}/${BODY} body)
+foreach(kind STYLES SCRIPTS)
+  foreach(file ${${kind}})
+    file(READ ${folder}/${file} text)
+    string(APPEND all_${kind} "${text}")
+  endforeach()
 endforeach()
-file(READ ${folder}/${SCRIPT} script)
-string(REPLACE "{{style}}" "${style}" page "${page}")
-string(REPLACE "{{script}}" "${script}" page "${page}")
+string(REPLACE "{{title}}" "${TITLE}" page "${page}")
+string(REPLACE "{{class}}" "${CLASS}" page "${page}")
+string(REPLACE "{{style}}" "${all_STYLES}" page "${page}")
+string(REPLACE "{{body}}" "${body}" page "${page}")
+string(REPLACE "{{script}}" "${all_SCRIPTS}" page "${page}")
 file(WRITE ${OUTPUT} "#include \"apps/web/pages.h\"
 
 std::string_view supertac::${NAME}() {

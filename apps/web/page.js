@@ -1,18 +1,9 @@
 // The live page. The server sends one "hello" with everything that stays, then an event for a picture, at most
 // 30 a second; what the page cannot draw in time it never sees.
-"use strict";
 const HISTORY_S = 10, COLUMNS = 300;      // of the strips
 const GUESS = 64;                         // level of half an interval's width (255 is the plate's height): +-0.25
-const element = (id) => document.getElementById(id);
 const supertac = {hello: null, newest: null, shown: null, paused: false};  // looked at by the test
 const strips = {times: new Float64Array(COLUMNS), felt: null, profile: null, end: 0};
-
-function bytes(base64) {
-  const text = atob(base64), out = new Uint8Array(text.length);
-  for (let i = 0; i < text.length; ++i) out[i] = text.charCodeAt(i);
-  return out;
-}
-const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 // --- Drawing -------------------------------------------------------------------------------------------------
 
@@ -197,6 +188,7 @@ function onHello(hello) {
   element("felt-size").textContent = `${hello.rows} × ${hello.columns} taxels, ${hello.pitch_mm} mm apart`;
   element("drawn-size").textContent =
     `${hello.rows * hello.scale} × ${hello.columns * hello.scale} pixels of ${hello.pitch_mm / hello.scale} mm`;
+  for (const id of ["texture-name", "texture"]) element(id).hidden = !hello.names_textures;
   element("guess-line").hidden = !hello.has_spread;
   element("sure").hidden = !hello.has_spread;
   for (const id of ["felt", "drawn"]) element(id).style.aspectRatio = `${hello.columns} / ${hello.rows}`;
@@ -253,6 +245,7 @@ function drawPictures(event) {
 
 function showFigures(event) {
   const set = (id, text) => { if (element(id).textContent !== text) element(id).textContent = text; };
+  set("texture", event.texture ? `${event.texture}, ${(100 * event.probability).toFixed(0)} %` : "none");
   set("rate", event.rate.toFixed(0) + " /s");
   set("p50", event.p50.toFixed(2) + " ms");
   set("p99", event.p99.toFixed(2) + " ms");

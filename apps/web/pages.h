@@ -1,5 +1,5 @@
-// The pages, each one piece of HTML that needs nothing from elsewhere; written from page.html and its like at
-// build time.
+// The pages, each one piece of HTML that needs nothing from elsewhere; put together from frame.html and
+// its like at build time.
 #pragma once
 
 #include <string_view>
@@ -8,7 +8,8 @@ namespace supertac {
 
 std::string_view live_page();
 std::string_view collect_page();
-/// With <!--content--> where the results stand and <!--films--> where their films (JSON).
-std::string_view evaluation_page();
+/// Of results, with <!--title-->, <!--content--> and <!--films--> (JSON) where these stand: see
+/// result_page.h.
+std::string_view report_page_frame();
 
 }  // namespace supertac

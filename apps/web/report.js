@@ -1,9 +1,6 @@
-// The films of an evaluation: a pass is chosen, a slider goes through it.
-"use strict";
+// The films of a result page, where it has some: a pass is chosen, a slider goes through it.
 const films = JSON.parse(document.getElementById("films").textContent);
-const element = (id) => document.getElementById(id);
-const bytes = (base64) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
-const map = bytes(films.map);
+const map = bytes(films.map || "");
 let playing = 0;
 
 function draw(canvas, levels, rows, columns) {

@@ -172,7 +172,7 @@ std::string end_once(const End& end, std::uint64_t seed, double& moment, double&
   RunningProcess process("supertac-collect", run.arguments(),
                          {.max_file_bytes = end.signal == 0 ? limit : -1});
   if (end.signal != 0) {
-    if (!run.wait_for_contact(moment)) {
+    if (!run.wait_for_contact(moment, process)) {
       process.send(SIGKILL);
       return "no contact: " + process.wait().error;
     }

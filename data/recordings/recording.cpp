@@ -19,6 +19,8 @@ namespace supertac {
 namespace {
 
 constexpr char kKind[] = "recording";
+// What no rig does; a model file has the same limit for its filter.
+constexpr double kFastest = 1e4, kLongestFilter = 10, kLongest = 1e10;
 constexpr const char* kFields[] = {"kind", "plate", "trial", "pass", "speed_mm_s", "source", "array"};
 
 /// What is wrong with the recording, or nothing.
@@ -57,7 +59,14 @@ std::optional<std::string> problem_of(const Recording& recording) {
   if (!std::all_of(recording.lift_mm.begin(), recording.lift_mm.end(), finite))
     return "lift_mm is not finite";
   if (recording.trial < 0 || recording.pass < 0) return "trial and pass must not be negative";
-  if (!std::isfinite(recording.speed_mm_s) || recording.speed_mm_s < 0) return "speed_mm_s must be 0 or more";
+  if (!(recording.speed_mm_s >= 0 && recording.speed_mm_s <= kFastest))
+    return "speed_mm_s is " + format(recording.speed_mm_s) + ", expected 0 to " + format(kFastest);
+  if (const auto filter = recording.metadata.find("filter_s"); filter != recording.metadata.end())
+    if (const auto s = parse_double(filter->second); !s || !(*s >= 0 && *s <= kLongestFilter))
+      return "filter_s is " + in_quotes(filter->second) + ", expected 0 to " + format(kLongestFilter) + " s";
+  if (n > 0 &&
+      !(std::abs(recording.time_s.front()) <= kLongest && std::abs(recording.time_s.back()) <= kLongest))
+    return "time_s lies beyond " + format(kLongest) + " s";
   return std::nullopt;
 }
 

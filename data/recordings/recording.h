@@ -33,7 +33,7 @@ struct Recording {
 /// "columns": 6, "pitch_mm": 2, "channels": 1}; without it they are the rig's 4x4 taxels at 3 mm. Throws
 /// FileError when the file is damaged (io/safetensors.h), is no recording, or breaks a rule of Recording:
 /// sizes that do not match, values that are not finite (position_mm may be NaN), time stamps that do not
-/// increase.
+/// increase, a speed, a moving average (metadata "filter_s", s) or a time that no rig has.
 Recording read_recording(const std::string& path);
 
 /// Writes it atomically; the same recording gives the same bytes.

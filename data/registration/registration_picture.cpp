@@ -10,7 +10,7 @@
 namespace supertac {
 namespace {
 
-constexpr double kFromMm = 20, kToMm = 88;
+constexpr double kFromMm = kPictureFromMm, kToMm = kPictureToMm;
 constexpr int kPixelsPerMm = 12, kBandHeight = 12, kPlateHeight = 24, kRowGap = 6;
 constexpr int kWidth = static_cast<int>((kToMm - kFromMm) * kPixelsPerMm);
 constexpr Rgb kGrey = {128, 128, 128};

@@ -26,6 +26,7 @@ struct VirtualPrinterSettings {
   bool advanced_ok = false;  ///< `ok N0 P15 B3`
   bool homing_fails = false;
   double auto_position_s = 0;  ///< M154 as an earlier host left it on a running firmware; 0: off
+  bool deaf_to_m154 = false;   ///< these reports cannot be switched off
   double auto_temperature_s = 0;
   double quick_stop_s = 1;  ///< for which M410 holds the firmware
   double slowness = 1;      ///< moves take this many times as long: a starved board

@@ -76,6 +76,7 @@ void VirtualPrinter::run_m(int code, const std::string& command, double t) {
       ok_text_ = " T:25.00 /0.00 B:25.00 /0.00 @:0 B@:0";
       return;
     case 154:
+      if (settings_.deaf_to_m154) return;
       return report_every(parameter(command, 'S').value_or(position_every_), temperature_every_);
     case 155:
       return report_every(position_every_, parameter(command, 'S').value_or(temperature_every_));

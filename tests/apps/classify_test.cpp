@@ -6,6 +6,7 @@
 
 #include "io/file.h"
 #include "io/json.h"
+#include "models/classifier_file.h"
 #include "tests/apps/process.h"
 #include "tests/io/temporary_folder.h"
 
@@ -41,6 +42,21 @@ class Classify : public testing::Test {
   static std::unique_ptr<TemporaryFolder> folder_;
 };
 std::unique_ptr<TemporaryFolder> Classify::folder_;
+
+TEST_F(Classify, KeepsAClassifierThatNamesTextures) {
+  ASSERT_EQ(classify(path("trial"),
+                     {"--seeds", "1", "--epochs", "2", "--views", "super_resolved", "--out", path("kept")})
+                .code,
+            0);
+  const NamedClassifier kept = load_classifier(path("kept"));
+  EXPECT_EQ(kept.names, (std::vector<std::string>{"3_Bumps", "6_Ridges"}));
+  const auto answer = kept.name_of(std::vector<float>(256, 0.5F));
+  EXPECT_TRUE(std::ranges::count(kept.names, answer.name) == 1 && answer.probability >= 0.5 &&
+              answer.probability <= 1);
+  EXPECT_THROW((void)kept.name_of(std::vector<float>(64)), std::invalid_argument);
+  EXPECT_THROW((void)load_classifier(path("trial")), std::runtime_error);
+  EXPECT_EQ(classify(path("trial"), {"--views", "frame", "--out", path("none")}).code, 2);
+}
 
 TEST_F(Classify, CountsEveryTestWindowAndKnowsTheTruth) {
   const ProcessResult result =

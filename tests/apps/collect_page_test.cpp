@@ -43,7 +43,7 @@ TEST(CollectPage, ShowsTheRunAndItsButtonEndsItAsCtrlCDoes) {
   const auto hello = event_after(client->receive("\n\n"), "event: hello\ndata: ");
   EXPECT_EQ(hello["plate"], "3_Bumps");
   EXPECT_EQ(hello["passes"].get<std::vector<double>>(), std::vector<double>{0.5});
-  ASSERT_TRUE(run.wait_for_contact(1));
+  ASSERT_TRUE(run.wait_for_contact(1, program));
   const auto act = [&](const std::string& action) {
     return status_of(port, "POST /" + action + " HTTP/1.1\r\nContent-Length: 0\r\n" + host +
                                "Origin: http://127.0.0.1:" + number +

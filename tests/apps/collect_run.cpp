@@ -50,10 +50,10 @@ Point3 CollectRun::head() {
   return head;
 }
 
-bool CollectRun::wait_for_contact(double seconds) {
+bool CollectRun::wait_for_contact(double seconds, const RunningProcess& program) {
   const double until = monotonic_seconds() + 60;
   while (head().z > kSlideZ + 0.5) {
-    if (monotonic_seconds() > until) return false;
+    if (monotonic_seconds() > until || program.ended()) return false;
     usleep(1000);
   }
   usleep(static_cast<useconds_t>(1e6 * seconds / speedup_));

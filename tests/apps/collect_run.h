@@ -29,8 +29,9 @@ class CollectRun {
 
   PtyRig& rig() { return rig_; }
   Point3 head();
-  /// Waits until the head has been in contact for `seconds` of the rig's clock; false when it never is.
-  bool wait_for_contact(double seconds);
+  /// Waits until the head has been in contact for `seconds` of the rig's clock; false when it never is, or
+  /// the program that moves it has ended.
+  bool wait_for_contact(double seconds, const RunningProcess& program);
   /// Waits until the head stands; the finger of a program that was killed goes on to the end of its move.
   void wait_for_rest();
   double speedup() const { return speedup_; }

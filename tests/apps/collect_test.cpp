@@ -30,7 +30,7 @@ TEST(CollectProgram, SignalsInContactLiftTheFingerAndKeepWhatWasRecorded) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     CollectRun run;
     RunningProcess process("supertac-collect", run.arguments());
-    ASSERT_TRUE(run.wait_for_contact(3));
+    ASSERT_TRUE(run.wait_for_contact(3, process)) << process.wait().error;
     process.send(signal);
     process.send(signal);  // a closed terminal says so twice; the finger comes first
     const ProcessResult result = process.wait();
@@ -45,7 +45,7 @@ TEST(CollectProgram, SignalsInContactLiftTheFingerAndKeepWhatWasRecorded) {
 TEST(CollectProgram, AfterAKillTheJournalIsRecoveredAndTheOriginMustBeConfirmed) {
   CollectRun run;
   RunningProcess process("supertac-collect", run.arguments());
-  ASSERT_TRUE(run.wait_for_contact(3));
+  ASSERT_TRUE(run.wait_for_contact(3, process)) << process.wait().error;
   process.send(SIGKILL);
   process.wait();
   run.wait_for_rest();

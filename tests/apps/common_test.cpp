@@ -123,7 +123,9 @@ TEST(OutputFolder, RemovesWhatItMadeUnlessKept) {
   {
     OutputFolder output(folder.file("a/b"), false);
     write_file(output.add("x"), "x");
+    EXPECT_FALSE(std::filesystem::exists(folder.file("a/b"))) << "half a folder is seen";
     output.keep();
+    EXPECT_TRUE(std::filesystem::exists(folder.file("a/b/x")));
   }
   {
     OutputFolder output(folder.file("a/b"), true);
@@ -133,6 +135,17 @@ TEST(OutputFolder, RemovesWhatItMadeUnlessKept) {
   }
   EXPECT_TRUE(std::filesystem::exists(folder.file("a/b/x")));
   EXPECT_FALSE(std::filesystem::exists(folder.file("a/b/y")));
+}
+
+TEST(OutputFolder, WhatAKilledProgramLeftIsNotKept) {
+  TemporaryFolder folder;
+  std::filesystem::create_directories(folder.file(".a.unfinished"));
+  write_file(folder.file(".a.unfinished/old"), "of a program that was killed");
+  OutputFolder output(folder.file("a/"), false);
+  write_file(output.add("new"), "");
+  output.keep();
+  EXPECT_FALSE(std::filesystem::exists(folder.file("a/old")));
+  EXPECT_TRUE(std::filesystem::exists(folder.file("a/new")));
 }
 
 }  // namespace

@@ -67,6 +67,12 @@ RunningProcess::~RunningProcess() {
   if (terminal_ >= 0) close(terminal_);
 }
 
+bool RunningProcess::ended() const {
+  siginfo_t state{};
+  return child_ < 0 || (waitid(P_PID, static_cast<id_t>(child_), &state, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+                        state.si_pid == child_);
+}
+
 void RunningProcess::send(int signal) const { kill(child_, signal); }
 
 void RunningProcess::read_terminal() {

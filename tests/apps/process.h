@@ -34,6 +34,8 @@ class RunningProcess {
 
   pid_t id() const { return child_; }
   void send(int signal) const;
+  /// Whether it has ended; wait() says how.
+  bool ended() const;
   ProcessResult wait();
 
  private:

@@ -176,8 +176,9 @@ TEST(Output, JsonIsWrittenAtomicallyAndNotOverAnother) {
 TEST(Import, ReportsEveryFile) {
   TemporaryFolder folder;
   const std::string text = text_tree(folder, rest_lines(900) + "1 2 3\n" + rest_lines(900));
-  const auto result =
-      run_process("supertac-import", {text, "--out", folder.file("out"), "--json", folder.file("j")});
+  const auto result = run_process(
+      "supertac-import",
+      {text, "--out", folder.file("out"), "--json", folder.file("j"), "--pictures", folder.file("pictures")});
   EXPECT_EQ(result.code, 0) << result.error;
   EXPECT_NE(result.out.find("3_Bumps/1/1.txt  1801 lines, 1 dropped (1 malformed)"), std::string::npos)
       << result.out;
@@ -187,6 +188,12 @@ TEST(Import, ReportsEveryFile) {
   const auto recording = read_recording(folder.file("out/3_Bumps_t1_p1_v10.safetensors"));
   EXPECT_EQ(recording.frames(), 1800u);
   EXPECT_EQ(recording.metadata.at("registration_reliable"), "no");
+  const std::string page = read_text_file(folder.file("pictures/index.html"), kPlenty);
+  for (const char* part :
+       {"3_Bumps, trial 1, pass 1", "not reliable", "data:image/png;base64,", "y on the plate, mm"})
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+  for (const char* outside : {"http://", "https://", "<!--", "{{"})
+    EXPECT_EQ(page.find(outside), std::string::npos) << outside;
 }
 
 TEST(Import, ACutPassIsFlaggedNotRefused) {

@@ -77,7 +77,9 @@ TEST_F(Sweep, WritesARowAModelAndDoesNotRepeatIt) {
     EXPECT_NE(csv.find(std::string("\n") + name + ",paper,"), std::string::npos) << csv;
     EXPECT_TRUE(fs::exists(path("grid/models/" + std::string(name) + ".safetensors")));
   }
-  EXPECT_TRUE(fs::exists(path("grid/chart.gnuplot")));
+  const std::string page = bytes("grid/chart.html");
+  EXPECT_NE(page.find("Pareto front"), std::string::npos);
+  EXPECT_EQ(page.find("<!--"), std::string::npos);
   const ProcessResult again = sweep("grid");
   EXPECT_EQ(again.code, 0) << again.error;
   EXPECT_EQ(again.error.find("training on"), std::string::npos) << again.error;

@@ -117,8 +117,34 @@ TEST_F(Training, RandomPlatesGiveTheSameBytesAndAreNamedInTheModel) {
   EXPECT_TRUE(file.tensors().contains("novelty.mean"));
 }
 
+TEST_F(Training, DataThatTeachNothingAreRemarkedOnAndRefusedUnderStrict) {
+  ASSERT_EQ(run_process("supertac-simulate",
+                        {"--out", path("plain"), "--plates", "plain", "--speeds", "10", "--passes", "1"})
+                .code,
+            0);
+  const std::string remark = "every truth is 0 everywhere: nothing can be learnt";
+  const ProcessResult said = train("nothing.safetensors", {"--data", path("plain"), "--epochs", "1"});
+  EXPECT_EQ(said.code, 0) << said.error;
+  EXPECT_NE(said.error.find("warning: " + remark), std::string::npos) << said.error;
+  const ProcessResult refused = train("strict.safetensors", {"--data", path("plain"), "--strict"});
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_NE(refused.error.find(remark), std::string::npos) << refused.error;
+  EXPECT_FALSE(fs::exists(path("strict.safetensors")) || fs::exists(path("strict.run")));
+  const ProcessResult scored = run_process(
+      "supertac-evaluate",
+      {"--model", path("nothing.safetensors"), "--data", path("plain"), "--limit", "20", "--strict"});
+  EXPECT_EQ(scored.code, 1);
+  EXPECT_NE(scored.error.find(remark), std::string::npos) << scored.error;
+}
+
 TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
   ASSERT_EQ(train("scored.safetensors").code, 0);
+  const std::string page = bytes("scored.run/report.html");
+  for (const char* part :
+       {"SSIM, linear axes", "1 - SSIM, logarithmic axes", "test pictures in contact", "Settings"})
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+  for (const char* outside : {"http://", "https://", "<!--", "{{"})
+    EXPECT_EQ(page.find(outside), std::string::npos) << outside;
   const ProcessResult result = run_process(
       "supertac-evaluate",
       {"--model", path("scored.safetensors"), "--data", path("data"), "--json", path("scores.json"),

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <random>
+#include <span>
 
 #include "apps/stream/web_view.h"
 #include "apps/web/encode.h"
@@ -15,6 +16,7 @@
 #include "io/images.h"
 #include "io/json.h"
 #include "tests/apps/http_client.h"
+#include "tests/fuzz/corpus.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {
@@ -213,6 +215,24 @@ TEST_F(Web, MalformedRequestsAreTurnedAway) {
   EXPECT_EQ(records_, 0);
 }
 
+// What fuzzing has kept, and what hands have written: @PORT@ stands for the server's.
+int corpus_port = 0;
+void ask(std::span<const std::byte> bytes) {
+  std::string request(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  for (std::size_t at = 0; (at = request.find("@PORT@", at)) != std::string::npos;)
+    request.replace(at, 6, std::to_string(corpus_port));
+  HttpClient client(corpus_port);
+  client.send(request);
+  client.receive("\r\n", 20);
+}
+
+TEST_F(Web, TheCorpusOfRequestsIsTurnedAway) {
+  corpus_port = port_;
+  EXPECT_GE(replay("web", ask), 190);
+  EXPECT_TRUE(answers());
+  EXPECT_EQ(records_, 0);
+}
+
 TEST_F(Web, ManyConnectionsThatSayNothingLeaveRoom) {
   std::vector<std::unique_ptr<HttpClient>> slow;
   for (int i = 0; i < 60; ++i) {
@@ -255,13 +275,16 @@ TEST(WebView, AnEventHoldsThePictureAndWhatIsKnownOfIt) {
   auto event = parse_json_limited(web_event(state, {}));
   EXPECT_EQ(event["n"], 7);
   EXPECT_EQ(event["picture"], levels_base64(state.picture));
-  for (const char* unknown : {"wide", "distance", "unlike", "x"})
+  for (const char* unknown : {"wide", "distance", "unlike", "texture", "x"})
     EXPECT_FALSE(event.contains(unknown)) << unknown;
   state.half_widths.assign(256, 0.25F), state.distance = 2, state.unlike_training = true, state.x_mm = 3,
-                                        state.y_mm = 4;
+                                        state.y_mm = 4, state.texture = "3_Bumps",
+                                        state.texture_probability = .75;
   event = parse_json_limited(web_event(state, {.recording = "r", .said = "", .files = {"a", "b"}}));
   EXPECT_EQ(event["wide"], levels_base64(state.half_widths));
   EXPECT_EQ(event["unlike"], true);
+  EXPECT_EQ(event["texture"], "3_Bumps");
+  EXPECT_EQ(event["probability"], .75);
   EXPECT_EQ(event["y"], 4);
   EXPECT_EQ(event["files"].size(), 2U);
 }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <sstream>
 
+#include "hardware/errors.h"
+#include "hardware/marlin_link.h"
 #include "rig_support.h"
 #include "tests/expect_error.h"
 
@@ -81,6 +83,37 @@ TEST(PalpationProgram, IsAbsoluteWithinLimitsAndEndsLifted) {
   EXPECT_EQ(slides, 8);
   EXPECT_EQ(here, kMounted);
   EXPECT_EQ(lines.back(), "M400");
+}
+
+// A default Marlin has neither display nor emergency parser and knows no M0: there the 20 s of G4 are the
+// pause, and the file says so.
+TEST(PalpationProgram, PausesBeforeTheFirstMoveAlsoWhereM0IsUnknown) {
+  RigSettings settings = running_rig();
+  settings.printer.display = settings.printer.emergency_parser = false;
+  settings.printer.head = kMounted;
+  SimulatedRig rig(settings);
+  const auto port = rig.printer_port();
+  MarlinLink link(*port);
+  link.connect();
+  const std::string program = palpation_program({}, kMounted, {}, "x");
+  EXPECT_NE(program.find("G4 leaves 20 s to switch it off"), std::string::npos);
+  EXPECT_NE(program.find("until the host sends M108"), std::string::npos);
+  double asked_s = 0;
+  bool refused = false;
+  for (const std::string& line : lines_of(program)) {
+    if (line.starts_with("G1")) break;
+    if (line.starts_with(";")) continue;
+    if (line.starts_with("M0")) asked_s = port->now();
+    try {
+      (void)link.command(line, 60);
+    } catch (const PrinterRefused&) {
+      EXPECT_TRUE(line.starts_with("M0")) << line;
+      refused = true;
+    }
+  }
+  EXPECT_TRUE(refused) << "this printer knows M0; the test shows nothing";
+  EXPECT_GE(port->now() - asked_s, 20);
+  EXPECT_EQ(rig.world().printer().head(port->now()), kMounted);
 }
 
 TEST(PalpationProgram, RefusesWhatTheRunRefuses) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 
 #include "hardware/collection.h"
 #include "hardware/motion_model.h"
@@ -25,7 +26,7 @@ std::array<double, rig::kTaxels> where(double, double y, double, double) {
 }
 
 struct Stalled {
-  double error_mm = 0;
+  double error_mm = 0, rms_mm = 0;
   std::string doubt;
   bool complete = false, realtime = true;
 };
@@ -44,6 +45,7 @@ Stalled collect(RigSettings rig, double speed) {
   settings.board.queue_frames = 16;
   settings.board.silence_s = 5;
   Stalled result;
+  double frames = 0;
   const RecorderReport report = record_palpation(simulated.board_port(), simulated.printer_port(), settings);
   result.complete = report.outcome.complete;
   result.realtime = report.outcome.realtime_position;
@@ -54,9 +56,13 @@ Stalled collect(RigSettings rig, double speed) {
       if (pass.suspect[i] != 0) continue;
       const double y = 100 + 1e-3 * (kCodes * rig::adc_of(static_cast<double>(pass.volts[16 * i])) +
                                      rig::adc_of(static_cast<double>(pass.volts[16 * i + 1])));
-      result.error_mm = std::max(result.error_mm, std::abs(y - pass.position[3 * i + 1]));
+      const double error = y - pass.position[3 * i + 1];
+      result.error_mm = std::max(result.error_mm, std::abs(error));
+      result.rms_mm += error * error;
+      ++frames;
     }
   }
+  result.rms_mm = std::sqrt(result.rms_mm / std::max(1.0, frames));
   return result;
 }
 
@@ -84,18 +90,28 @@ TEST(Stalls, AModelledSlideThatTakesTooLongIsDoubted) {
 }
 
 TEST(Stalls, ReportsEveryThirteenMillisecondsChangeNothing) {
-  RigSettings rig = running_rig();
-  rig.printer.auto_position_s = 0.013;
-  const Stalled reported = collect(rig, 10);
-  EXPECT_EQ(reported.doubt, "");
-  EXPECT_LT(reported.error_mm, 0.05);
+  const Stalled quiet = collect(running_rig(), 10);
+  for (const bool in_the_slide : {false, true}) {
+    RigSettings rig = running_rig();
+    rig.printer.auto_position_s = 0.013;
+    rig.printer.deaf_to_m154 = in_the_slide;
+    const Stalled reported = collect(rig, 10);
+    EXPECT_EQ(reported.doubt, "");
+    EXPECT_TRUE(reported.realtime);
+    EXPECT_LT(reported.error_mm, 0.05);
+    EXPECT_LT(reported.rms_mm, std::max(0.02, 1.1 * quiet.rms_mm));
+    std::printf("reports every 13 ms%s: %.4f mm RMS, %.4f without\n", in_the_slide ? " in the slide" : "",
+                reported.rms_mm, quiet.rms_mm);
+  }
 }
 
 // Right within .3 mm, incomplete, or doubted: never wrong in silence.
 TEST(StalledCollections, AreRightOrSaySo) {
   int silent = 0, doubted = 0, right = 0, incomplete = 0;
   double worst = 0, worst_trusted = 0;
-  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+  const char* chosen = std::getenv("SUPERTAC_STALLS_FROM");  // for a study with fresh seeds
+  const std::uint64_t first = chosen == nullptr ? 1 : std::strtoull(chosen, nullptr, 10);
+  for (std::uint64_t seed = first; seed < first + 200; ++seed) {
     RigSettings rig = running_rig();
     rig.seed = seed;
     rig.printer.realtime_position = seed % 2 == 0;

@@ -1,8 +1,8 @@
 // hostile lines N SEED: N command lines of evil values for every option of every program.
 // hostile mutants N SEED: N seeded mutants through every reader, in this process; build it with the preset
-// asan. hostile signals N SEED: N simulations and imports ended by a signal at a random moment. One table of
-// counts on stdout; exit 1 when anything was found. Run it as an ordinary user or as root: as root the
-// programs run as nobody, since evil values are also names of outputs.
+// asan. hostile signals N SEED: N simulations, imports and trainings ended by a signal at a random moment.
+// One table of counts on stdout; exit 1 when anything was found. Run it as an ordinary user or as root: as
+// root the programs run as nobody, since evil values are also names of outputs.
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
@@ -11,7 +11,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -44,8 +47,13 @@ const std::map<std::string, std::vector<std::string>> kGood = {
     {"sweep", {"--out", "new", "--data", "data"}},
     {"train", {"--data", "data", "--out", "new.model", "--epochs", "1", "--preset", "tiny"}},
     {"rig", {"--plate", "plain", "--board-link", "new.board", "--printer-link", "new.printer"}}};
-constexpr double kPatienceS = 3, kHangS = 10;
+constexpr int kSkipped = 77;
+constexpr double kPatienceS = 1, kHangS = 10;
 constexpr long kMostKilobytes = 1 << 20;
+// By --force a user gives up what these name, and nothing else.
+constexpr const char* kOutputs[] = {"--out",          "--json",       "--gcode",    "--outputs",
+                                    "--capture",      "--report",     "--pictures", "--board-link",
+                                    "--printer-link", "--write-pairs"};
 
 struct Option {
   std::string name, value;
@@ -137,7 +145,7 @@ void prepare(const fs::path& folder) {
 }
 
 // Ends it with SIGTERM after `seconds`; what then does not end within kHangS hangs.
-Run run(const fs::path& folder, const std::vector<std::string>& words, double seconds) {
+Run run(const fs::path& folder, const std::vector<std::string>& words, double seconds, int signal = SIGTERM) {
   int pipe[2];
   if (::pipe2(pipe, O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
   const pid_t child = fork();
@@ -158,7 +166,7 @@ Run run(const fs::path& folder, const std::vector<std::string>& words, double se
     }
     ended = wait4(child, &result.status, WNOHANG, &usage) == child;
     const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    if (!asked && took > seconds) kill(child, SIGTERM), asked = true;
+    if (!asked && took > seconds) kill(child, signal), asked = true;
     if (!result.hung && took > seconds + kHangS) kill(child, SIGKILL), result.hung = true;
   }
   ::close(pipe[0]);
@@ -177,7 +185,23 @@ std::vector<Option> options_of(const std::string& program) {
 
 using Counts = std::map<std::string, std::uint64_t>;
 
-void judge(const Run& result, const fs::path& folder, const std::string& line, Counts& counts) {
+bool is_output(const std::string& option) {
+  return std::find(std::begin(kOutputs), std::end(kOutputs), option) != std::end(kOutputs);
+}
+
+// Whether these words give up the file: --force, and an output whose value is the file or a link to it.
+bool given_up(const fs::path& folder, const std::vector<std::string>& words, const std::string& file) {
+  if (std::find(words.begin(), words.end(), "--force") == words.end()) return false;
+  std::error_code error;
+  for (std::size_t i = 0; i + 1 < words.size(); ++i)
+    if (is_output(words[i]) && fs::weakly_canonical(folder / words[i + 1], error) == folder / file)
+      return true;
+  return false;
+}
+
+void judge(const Run& result, const fs::path& folder, const std::vector<std::string>& words, Counts& counts) {
+  std::string line;
+  for (const std::string& word : words) line += word.substr(0, 60) + " ";
   const auto found = [&](const char* what) {
     ++counts[what];
     std::cerr << what << ": " << line << "\n  " << result.error.substr(0, 300) << '\n';
@@ -186,8 +210,13 @@ void judge(const Run& result, const fs::path& folder, const std::string& line, C
   if (WIFEXITED(result.status)) ++counts["exit " + std::to_string(WEXITSTATUS(result.status))];
   if (WIFEXITED(result.status) && WEXITSTATUS(result.status) == 126)
     throw std::runtime_error("cannot start " + line);
-  if (WIFSIGNALED(result.status) && WTERMSIG(result.status) != SIGTERM) found("crashes");
-  if (WIFEXITED(result.status) && WEXITSTATUS(result.status) > 126 && WEXITSTATUS(result.status) != 143)
+  const auto asked = [](int signal) { return signal == SIGTERM || signal == SIGINT || signal == SIGHUP; };
+  if (WIFSIGNALED(result.status) && !asked(WTERMSIG(result.status))) found("crashes");
+  if (WIFEXITED(result.status) && WEXITSTATUS(result.status) > 126 &&
+      !asked(WEXITSTATUS(result.status) - 128))
+    found("crashes");
+  if (result.error.find("Sanitizer") != std::string::npos ||
+      result.error.find("runtime error:") != std::string::npos)
     found("crashes");
   if (result.kilobytes > kMostKilobytes) found("above 1 GB");
   for (const char* raw :
@@ -199,8 +228,10 @@ void judge(const Run& result, const fs::path& folder, const std::string& line, C
     std::ifstream in(folder / file);
     std::string text;
     if ((std::getline(in, text), text) == "precious") continue;
-    found("files overwritten");
+    if (!given_up(folder, words, file)) found("files overwritten");
+    fs::remove_all(folder / file);
     std::ofstream(folder / file) << "precious";
+    fs::permissions(folder / file, fs::perms(0666));
   }
 }
 
@@ -218,8 +249,7 @@ Counts command_lines(const fs::path& folder, std::uint64_t n, std::uint64_t seed
     const std::size_t begin = words.size();
     for (const std::uint32_t most = 1 + random.bits(at++) % 3; words.size() < begin + 2 * most;) {
       const Option& option = options[name][random.bits(at++) % options[name].size()];
-      // --force is the word by which a user gives up a file: "precious" is watched without it.
-      if (option.name == "force" || option.name == "help") {
+      if (option.name == "help") {
         if (random.bits(at++) % 8 != 0) break;
         continue;
       }
@@ -227,30 +257,52 @@ Counts command_lines(const fs::path& folder, std::uint64_t n, std::uint64_t seed
       if (!option.value.empty()) words.push_back(evil_value(random, at++));
     }
     if (random.bits(at++) % 4 == 0) words.push_back(evil_value(random, at++));
-    std::string line;
-    for (const std::string& word : words) line += word.substr(0, 60) + " ";
+    if (random.bits(at++) % 4 == 0) words.push_back("--force"), ++counts["with --force"];
     ++counts["command lines"];
-    judge(run(folder, words, kPatienceS), folder, line, counts);
+    judge(run(folder, words, kPatienceS), folder, words, counts);
     for (const auto& entry : fs::directory_iterator(folder))
       if (entry.path().filename().string().starts_with("new")) fs::remove_all(entry.path());
   }
   return counts;
 }
 
+// Text files of a collection, and a command of some tenths of a second for each kind of output.
+void write_texts(const fs::path& folder) {
+  for (const char* trial : {"1", "2"}) {
+    fs::create_directories(folder / "texts/6_Ridges" / trial);
+    for (int pass = 1; pass <= 4; ++pass) {
+      std::ofstream file(folder / "texts/6_Ridges" / trial / (std::to_string(pass) + ".txt"));
+      for (int i = 0; i < 4000; ++i)
+        for (int k = 0; k < 16; ++k)
+          file << 2.4 - 0.1 * std::abs(std::sin(0.01 * i + k)) << (k < 15 ? ' ' : '\n');
+    }
+  }
+}
+
 Counts signals(const fs::path& folder, std::uint64_t n, std::uint64_t seed) {
   Counts counts;
+  write_texts(folder);
+  const auto program = [](const char* name) { return std::string(SUPERTAC_BIN "/supertac-") + name; };
+  const std::vector<std::vector<std::string>> commands = {
+      {program("simulate"), "--plates", "ridges6"},
+      {program("import"), "texts", "--skip-bad"},
+      {program("train"), "--data", "data", "--preset", "tiny", "--epochs", "1", "--split", "none", "--stride",
+       "64"}};
   for (std::uint64_t i = 0; i < n; ++i) {
+    const RandomStream random(seed, i);
     const std::string out = "signals" + std::to_string(i);
-    const Run result = run(folder, {SUPERTAC_BIN "/supertac-simulate", "--out", out, "--plates", "ridges6"},
-                           0.3 * RandomStream(seed, i).uniform(0));
+    std::vector<std::string> words = commands[i % commands.size()];
+    words.insert(words.end(), {"--out", out});
+    const int signal = std::array{SIGTERM, SIGINT, SIGHUP}[random.bits(1) % 3];
+    const Run result = run(folder, words, 0.4 * random.uniform(0), signal);
     ++counts["signals"];
-    judge(result, folder, "simulate " + out, counts);
+    judge(result, folder, words, counts);
     const bool finished = WIFEXITED(result.status) && WEXITSTATUS(result.status) == 0;
-    if (!finished && fs::exists(folder / out)) {
+    if (!finished && fs::is_directory(folder / out)) {
       ++counts["half folders"];
-      std::cerr << "half folder: " << out << '\n';
+      std::cerr << "half a folder: " << out << ' ' << words[0] << '\n';
     }
-    fs::remove_all(folder / out);
+    for (const char* left : {"", ".run"}) fs::remove_all(folder / (out + left));
   }
   return counts;
 }
@@ -264,6 +316,12 @@ int main_of(const std::string& mode, std::uint64_t n, std::uint64_t seed) {
     for (const auto& path : {folder, folder / "data", folder / "data" / "1", folder / "empty",
                              folder / "precious", folder / "precious.stl"})
       if (::chown(path.c_str(), 65534, 65534) != 0) throw std::runtime_error("chown " + path.string());
+  const Run start = run(folder, {SUPERTAC_BIN "/supertac-info", "--version"}, 60);
+  if (!WIFEXITED(start.status) || WEXITSTATUS(start.status) != 0) {
+    fs::remove_all(folder);
+    std::cerr << "skipped: nobody but root may run what is in " SUPERTAC_BIN "\n";
+    return kSkipped;
+  }
   (void)run(folder,
             {SUPERTAC_BIN "/supertac-simulate", "--out", "data", "--plates", "plain", "--passes", "1",
              "--trials", "1", "--speeds", "10"},
@@ -284,7 +342,7 @@ int main_of(const std::string& mode, std::uint64_t n, std::uint64_t seed) {
     }
     return sum;
   };
-  print({"command lines", "exit 0", "exit 1", "exit 2", "exit 143", "signals", "mutants"});
+  print({"command lines", "with --force", "exit 0", "exit 1", "exit 2", "exit 143", "signals", "mutants"});
   const std::uint64_t findings = print({"slow mutants", "crashes", "hangs", "above 1 GB", "raw exceptions",
                                         "control codes", "shells", "files overwritten", "half folders"});
   return findings == 0 ? 0 : 1;

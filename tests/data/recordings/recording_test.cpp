@@ -160,8 +160,14 @@ TEST(Recording, ReadsNoneThatBreaksARule) {
   EXPECT_EQ(with("pass", "99999999999999999999"),
             "pass is '99999999999999999999', expected a number from 0 to 1000000");
   EXPECT_EQ(with("speed_mm_s", "fast"), "speed_mm_s is 'fast', expected a number");
-  EXPECT_EQ(with("speed_mm_s", "nan"), "speed_mm_s must be 0 or more; record or import it again");
+  EXPECT_EQ(with("speed_mm_s", "nan"), "speed_mm_s is nan, expected 0 to 10000; record or import it again");
+  for (const char* impossible : {"-1", "1e300", "nan", "long"})
+    EXPECT_EQ(with("filter_s", impossible),
+              "filter_s is '" + std::string(impossible) + "', expected 0 to 10 s; record or import it again");
   Parts parts;
+  parts.time_s = {0, 1e300};
+  EXPECT_EQ(message_of_parts(parts), "time_s lies beyond 1e+10 s; record or import it again");
+  parts = {};
   parts.metadata.erase("plate");
   EXPECT_EQ(message_of_parts(parts), "is not a recording: the metadata lacks 'plate'");
   parts = {};

@@ -136,6 +136,18 @@ TEST(TextFolder, FilesThatAreNoRecordingsAreLeftOutWhenAskedTo) {
   EXPECT_TRUE(left_out[1].starts_with(bad + ": 1 of 1 lines are not 16 voltages")) << left_out[1];
 }
 
+TEST(TextFolder, TwoFilesOfOnePassAreNamed) {
+  const TemporaryFolder folder;
+  const std::string first = put(folder, "plain/1/01.txt", ""), second = put(folder, "plain/1/1.txt", "");
+  try {
+    import_text_folder(folder.path(), {});
+    ADD_FAILURE() << "one would replace the other";
+  } catch (const FileError& error) {
+    EXPECT_EQ(std::string(error.what()),
+              second + ": is the same trial and pass as " + first + "; rename one of them");
+  }
+}
+
 TEST(TextFolder, AFolderOfAnotherShapeIsNamed) {
   const std::string number = "expected a number from 1 as its name: TEXT_DIR/<plate>/<trial>/<pass>.txt";
   const std::tuple<std::string, std::string, std::string> cases[] = {

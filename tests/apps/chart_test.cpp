@@ -1,0 +1,71 @@
+#include "apps/web/chart.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "apps/web/result_page.h"
+#include "io/numbers.h"
+
+namespace supertac {
+namespace {
+
+using Numbers = std::vector<double>;
+
+// The y of a series' points on the page, in their order.
+Numbers heights(const std::string& svg) {
+  const std::size_t begin = svg.find("points=\"") + 8;
+  const std::string points = svg.substr(begin, svg.find('"', begin) - begin);
+  Numbers found;
+  for (std::size_t at = 0; (at = points.find(',', at)) != std::string::npos;)
+    ++at, found.push_back(*parse_double(points.substr(at, points.find(' ', at) - at)));
+  return found;
+}
+
+TEST(Chart, AxesHaveRoundNumbersWithinTheirRange) {
+  EXPECT_EQ(round_numbers(0.61, 1, false), (Numbers{0.7, 0.8, 0.9, 1}));
+  EXPECT_EQ(round_numbers(0, 2300, false), (Numbers{0, 500, 1000, 1500, 2000}));
+  EXPECT_EQ(round_numbers(0.002, 0.3, true), (Numbers{0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2}));
+  EXPECT_EQ(round_numbers(1, 1e6, true).front(), 1);
+  EXPECT_LE(round_numbers(1e-9, 1e9, true).size(), 8U);
+}
+
+TEST(Chart, AnAxisEndsWhereItsValuesDo) {
+  const std::string svg = chart_svg("SSIM", {.label = "step"}, {.label = "SSIM", .most = 1},
+                                    {{.name = "a", .points = {{0, .5}, {9, .99}}}});
+  EXPECT_EQ(svg.find(">1.0"), std::string::npos) << svg;
+  EXPECT_NE(svg.find(">1<"), std::string::npos) << svg;
+  EXPECT_EQ(svg.find(">1.1<"), std::string::npos) << svg;
+}
+
+TEST(Chart, EqualFactorsAreEqualStepsOnALogarithmicAxis) {
+  const Numbers y =
+      heights(chart_svg("", {.label = ""}, {.label = "", .logarithmic = true},
+                        {{.name = "a", .points = {{0, .01}, {1, .1}, {2, 1}, {3, -1}, {4, NAN}}}}));
+  ASSERT_EQ(y.size(), 3U);
+  EXPECT_NEAR(y[0] - y[1], y[1] - y[2], 0.11);
+  EXPECT_GT(y[0], y[1]);
+}
+
+TEST(Chart, NamesAreNoMarkup) {
+  const std::string svg = chart_svg("<b>", {.label = "<x>"}, {.label = ""},
+                                    {{.name = "<a>", .points = {{0, 1}}}, {.name = "b", .points = {{1, 2}}}});
+  for (const char* raw : {"<b>", "<x>", "<a>"}) EXPECT_EQ(svg.find(raw), std::string::npos) << raw;
+  EXPECT_EQ(escaped("a<b & \"c\""), "a&lt;b &amp; &quot;c&quot;");
+}
+
+TEST(Chart, NothingToShowIsNoChart) {
+  EXPECT_EQ(
+      chart_svg("", {.label = ""}, {.label = "", .logarithmic = true}, {{.name = "a", .points = {{0, 0}}}}),
+      "");
+}
+
+TEST(ResultPage, IsWhole) {
+  const std::string page = result_page("a <title>", "content");
+  for (const char* left : {"<!--title", "<!--content", "<!--films", "{{", "http://", "https://"})
+    EXPECT_EQ(page.find(left), std::string::npos) << left;
+  EXPECT_NE(page.find("<title>a &lt;title></title>"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace supertac
