@@ -24,9 +24,14 @@ const std::vector<Job> kJobs = {
 #include "programs.inc"
 };
 
+constexpr const char* kGlossary =
+#include "glossary.inc"
+    ;
+
 void print_help() {
   std::cout << "Tactile super-resolution: one program per job.\n\nUsage:\n  supertac JOB [options]\n"
-               "  supertac JOB --help\n\n";
+               "  supertac help JOB\n  supertac help glossary   explains taxel, window, latent, SSIM and the "
+               "others\n\n";
   for (const Job& job : kJobs)
     std::cout << "  " << job.name << std::string(12 - job.name.size(), ' ') << job.purpose << '\n';
 }
@@ -54,6 +59,12 @@ int run_job(const std::string& name, char** argv) {
   return fail(program + ": cannot be run: " + std::strerror(errno), kExitFailed);
 }
 
+int show_help(const std::string& job) {
+  std::string words[] = {"supertac", job, "--help"};
+  char* argv[] = {words[0].data(), words[1].data(), words[2].data(), nullptr};
+  return run_job(job, argv);
+}
+
 }  // namespace
 }  // namespace supertac
 
@@ -63,8 +74,12 @@ int main(int argc, char** argv) {
   const std::string first = argc > 1 ? argv[1] : "";
   if (first == "--version") {
     std::cout << version_text({"supertac", "", nullptr, nullptr});
-  } else if (first == "--help" || first == "-h" || first.empty()) {
+  } else if (first == "--help" || first == "-h" || first.empty() || (first == "help" && argc == 2)) {
     print_help();
+  } else if (first == "help" && argc > 2) {
+    const std::string about = argv[2];
+    if (about != "glossary") return show_help(about);
+    std::cout << kGlossary;
   } else {
     return run_job(first, argv);
   }

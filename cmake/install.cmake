@@ -1,12 +1,12 @@
 # cmake --install and find_package(supertac)
 include(CMakePackageConfigHelpers)
 get_property(libraries GLOBAL PROPERTY SUPERTAC_LIBRARIES)
-install(TARGETS ${libraries} EXPORT supertac ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(TARGETS ${libraries} EXPORT supertac ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
 foreach(folder io autograd layers data models hardware)
-  install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/supertac FILES_MATCHING PATTERN "*.h")
+  install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/supertac COMPONENT development FILES_MATCHING PATTERN "*.h")
 endforeach()
 install(EXPORT supertac NAMESPACE supertac:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supertac
-  FILE supertacTargets.cmake)
+  FILE supertacTargets.cmake COMPONENT development)
 file(WRITE ${PROJECT_BINARY_DIR}/supertacConfig.cmake
 "include(CMakeFindDependencyMacro)\nfind_dependency(OpenMP COMPONENTS CXX)\nfind_dependency(Threads)\nfind_dependency(nlohmann_json)\nfind_dependency(ZLIB)
 set(BLA_VENDOR OpenBLAS)
@@ -14,4 +14,21 @@ find_dependency(BLAS)
 include(\${CMAKE_CURRENT_LIST_DIR}/supertacTargets.cmake)\n")
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/supertacConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/supertacConfig.cmake ${PROJECT_BINARY_DIR}/supertacConfigVersion.cmake
-  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supertac)
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supertac COMPONENT development)
+
+# The same for pkg-config; static libraries need each other in turn.
+foreach(library ${libraries})
+  get_target_property(type ${library} TYPE)
+  if(type STREQUAL "STATIC_LIBRARY")
+    string(APPEND links " -l${library}")
+  endif()
+endforeach()
+file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/supertac.pc @ONLY CONTENT
+"prefix=@CMAKE_INSTALL_PREFIX@
+Name: supertac
+Description: @PROJECT_DESCRIPTION@
+Version: @PROJECT_VERSION@
+Cflags: -I\${prefix}/@CMAKE_INSTALL_INCLUDEDIR@/supertac
+Libs: -L\${prefix}/@CMAKE_INSTALL_LIBDIR@ -Wl,--start-group@links@ -Wl,--end-group -lopenblas -lz -fopenmp -pthread
+")
+install(FILES ${PROJECT_BINARY_DIR}/supertac.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)

@@ -1,0 +1,52 @@
+# Man pages, completion, the bill of materials, and cpack -G DEB.
+get_property(jobs GLOBAL PROPERTY SUPERTAC_PROGRAM_TARGETS)
+set(share ${CMAKE_CURRENT_BINARY_DIR}/share)
+foreach(program supertac ${jobs})
+  install(FILES ${CMAKE_CURRENT_SOURCE_DIR}/packaging/completion.bash RENAME ${program}
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT programs)
+endforeach()
+install(FILES docs/glossary.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT programs)
+
+find_program(SUPERTAC_HELP2MAN help2man)
+if(SUPERTAC_HELP2MAN)
+  foreach(program supertac ${jobs})
+    set(page ${share}/man/${program}.1)
+    add_custom_command(OUTPUT ${page} DEPENDS ${program}
+      COMMAND ${CMAKE_COMMAND} -E make_directory ${share}/man
+      COMMAND ${SUPERTAC_HELP2MAN} --no-info --version-string=${PROJECT_VERSION} --section=1
+        --name "$<TARGET_PROPERTY:${program},SUPERTAC_PURPOSE>" --output ${page} $<TARGET_FILE:${program}>
+      COMMENT "" VERBATIM)
+    list(APPEND pages ${page})
+  endforeach()
+  add_custom_target(supertac_man ALL DEPENDS ${pages})
+  install(FILES ${pages} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT programs)
+endif()
+
+find_program(SUPERTAC_DPKG dpkg-query)
+find_package(Python3 COMPONENTS Interpreter)
+if(SUPERTAC_DPKG AND Python3_FOUND)
+  add_custom_command(OUTPUT ${share}/supertac.cdx.json DEPENDS ${jobs} packaging/sbom.py
+    COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/packaging/sbom.py ${PROJECT_BINARY_DIR}/bin --version
+      ${PROJECT_VERSION} --out ${share}/supertac.cdx.json
+    COMMENT "" VERBATIM)
+  add_custom_target(supertac_sbom ALL DEPENDS ${share}/supertac.cdx.json)
+  install(FILES ${share}/supertac.cdx.json DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT programs)
+endif()
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_CONTACT "The SuperTac authors <supertac@localhost>")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_COMPONENTS_ALL programs development)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_PROGRAMS_PACKAGE_NAME supertac)
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME supertac-dev)
+set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SUGGESTS gnuplot)
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "g++, libopenblas-dev, nlohmann-json3-dev, zlib1g-dev")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_COMPONENT_PROGRAMS_DESCRIPTION "Tactile super-resolution: simulate, record, train, evaluate, stream.")
+set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "Libraries and headers of SuperTac.")
+include(CPack)
