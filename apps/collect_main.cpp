@@ -23,12 +23,14 @@
 #include "io/file.h"
 #include "io/folder_lock.h"
 #include "io/numbers.h"
+#include "io/text.h"
 
 namespace supertac {
 
 void declare(Arguments& arguments) {
   arguments.option("board", "PORT", "port of the tactile board; auto finds it by its USB number", "auto")
-      .option("printer", "PORT", "port of the Marlin printer")
+      .option("printer", "PORT",
+              "port of the Marlin printer; needed, as --plate and --out, but for --list-ports")
       .option("plate", "NAME",
               "plate under the finger (3_Bumps, ..., plain, kind and pitch: ridges6, or FILE.stl)")
       .option("out", "DIR", "folder for journal, recordings and report")
@@ -46,7 +48,8 @@ void declare(Arguments& arguments) {
 namespace {
 
 std::string required_text(const Arguments& arguments, const std::string& name) {
-  if (!arguments.given(name)) throw UsageError("--" + name + ": expected a value, found none");
+  if (!arguments.given(name))
+    throw UsageError("missing --" + name + ", which a collection needs beside --printer, --plate and --out");
   return arguments.text(name);
 }
 
@@ -61,8 +64,8 @@ void confirm(const Arguments& arguments, const RecorderSettings& settings) {
                               : "Is the head at " + describe(settings.origin) + ", the plate below it?")
             << " [yes/no] ";
   std::string answer;
-  if (!std::getline(std::cin, answer) || answer != "yes")
-    throw UsageError("not confirmed; nothing was moved");
+  if (!std::getline(std::cin, answer) || (answer != "yes" && answer != "y"))
+    throw UsageError("expected yes, found " + in_quotes(answer) + "; nothing was moved");
 }
 
 RecorderSettings read_settings(const Arguments& arguments, const std::string& out, const std::string& plate) {
@@ -89,7 +92,7 @@ std::uint64_t millimetres_at(const PalpationPlan& plan, const Leg& leg, const Po
 
 std::string live_text(const Point3& at, const BoardCounters& board) {
   return "X" + format(at.x, 1) + " Y" + format(at.y, 1) + "  " + format(1 / board.clock.period_s, 0) +
-         " frames/s  " + std::to_string(board.missing + board.dropped) + " lost";
+         " frames/s  " + std::to_string(board.missing) + " lost";
 }
 
 /// A run that may move the head: marked until the head is back, or until it turns out that nothing could be

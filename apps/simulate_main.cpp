@@ -3,6 +3,7 @@
 #include <omp.h>
 
 #include <exception>
+#include <filesystem>
 
 #include "apps/common/output_folder.h"
 #include "apps/common/program.h"
@@ -134,12 +135,24 @@ void declare(Arguments& arguments) {
       .option("seed", "N", "the same seed gives the same files", "1");
 }
 
+namespace {
+
+std::size_t recordings_in(const std::string& folder) {
+  std::size_t count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    count += entry.path().extension() == ".safetensors";
+  return count;
+}
+
+}  // namespace
+
 int run(Arguments& arguments) {
   const auto plates = read_plates(arguments);
   const auto settings = read_settings(arguments);
   const auto seed = static_cast<std::uint64_t>(arguments.integer("seed", 0, INT64_MAX));
   if (arguments.list("speeds").empty()) throw UsageError("--speeds: expected at least one speed");
   OutputFolder folder(arguments.text("out"), arguments.force());
+  const std::size_t before = recordings_in(arguments.text("out"));
   const auto jobs = plan(arguments, plates, folder);
   std::size_t frames = 0;
   {
@@ -153,6 +166,9 @@ int run(Arguments& arguments) {
                         {"command", arguments.command_line()}});
   for (const std::string& plate : arguments.list("plates")) keep_plate_file(plate, folder.path());
   folder.keep();
+  if (before > 0)
+    arguments.note(arguments.text("out") + " held " + std::to_string(before) +
+                   " recordings before; those of other names stay and belong to the data set now");
   arguments.print(std::to_string(jobs.size()) + " recordings, " + std::to_string(frames) + " frames in " +
                   arguments.text("out"));
   return kExitOk;

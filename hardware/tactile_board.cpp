@@ -89,9 +89,11 @@ void TactileBoard::check_silence(double time) {
         (text ? "text, as from a printer; exchange the two ports"
               : std::to_string(total) + " bytes without a frame; choose the board's port (--list-ports)"));
   }
-  throw BoardSilent("board " + port_->name() + ": expected " + format(rig::kFrameRateHz, 0) +
-                    " frames/s, found none for " + format(settings_.silence_s, 1) +
-                    " s; plug the board out and in again");
+  throw BoardSilent(
+      "board " + port_->name() + ": expected " + format(rig::kFrameRateHz, 0) + " frames/s, found none for " +
+      format(settings_.silence_s, 1) + " s; " +
+      (decoder_.counters().frames == 0 ? "is this the board's port (--list-ports)? If it is, " : "") +
+      "plug the board out and in again");
 }
 
 void TactileBoard::take_batch(double time, bool more_waits) {

@@ -104,7 +104,7 @@ std::string CollectView::news() {
                  {"done", (plan_.slide * (leg.pass - 1) + slid) / (plan_.slide * plan_.passes)},
                  {"frames", board.decoder.frames},
                  {"rate", board.clock.period_s > 0 ? 1 / board.clock.period_s : 0},
-                 {"lost", board.missing + board.dropped},
+                 {"lost", board.missing},
                  {"suspect", board.suspect}});
 }
 

@@ -63,7 +63,9 @@ Arguments::Arguments(std::string program, std::string purpose)
   flag("version", "print version, commit, compiler and exit");
   option("json", "FILE", "also write the results as JSON; '-' is stdout");
   flag("quiet", "no progress bar and no remarks");
-  option("threads", "N", "worker threads; default OMP_NUM_THREADS, else what the machine grants");
+  // A program that only looks at files has nothing to share out.
+  if (program_ != "supertac-info")
+    option("threads", "N", "worker threads; default OMP_NUM_THREADS, else what the machine grants");
   flag("force", "replace existing output");
 }
 
@@ -129,10 +131,11 @@ std::string Arguments::help() const {
     if (option.is_required && !option.is_positional) usage += "--" + name + " " + option.value + " ";
   }
   parser.custom_help(usage + "[options]");
-  // A program's own options first, then the six that all have.
-  constexpr std::size_t kCommon = 6;
+  // A program's own options first, then those that all have, up to --force.
+  const auto common =
+      static_cast<std::size_t>(std::find(order_.begin(), order_.end(), "force") - order_.begin()) + 1;
   for (std::size_t i = 0; i < order_.size(); ++i) {
-    const std::string& name = order_[(i + kCommon) % order_.size()];
+    const std::string& name = order_[(i + common) % order_.size()];
     const Option& option = options_.at(name);
     if (option.is_positional) continue;
     add(parser, option.is_more ? "more" : "", name, option.help, option.value, option.is_flag,
@@ -340,7 +343,8 @@ std::vector<double> Arguments::numbers(const std::string& name, double lowest, d
 }
 
 int Arguments::threads() const {
-  return given("threads") ? static_cast<int>(integer("threads", 1, 1024)) : default_threads();
+  return options_.contains("threads") && given("threads") ? static_cast<int>(integer("threads", 1, 1024))
+                                                          : default_threads();
 }
 
 void Arguments::print(std::string_view line) const {

@@ -1,5 +1,6 @@
 #include "apps/evaluate/pairs.h"
 
+#include <algorithm>
 #include <map>
 
 #include "apps/common/measure.h"
@@ -91,6 +92,10 @@ int evaluate_on_pairs(const Arguments& a) {
   check_scored(a, files, scored);
   remark(a, remarks_on(pairs));
 
+  if (const int side = std::min(pairs.image().height, pairs.image().width); side < 7)
+    a.note("targets of " + pairs.image().text() + " pixels: SSIM's window is " +
+           std::to_string((side - 1) / 2 * 2 + 1) +
+           " pixels wide instead of 7; compare it with others of that size only");
   const Baselines baselines = fit_baselines(pairs, scored.split.train);
   const Scores none(pairs.image(), baselines);
   Scores all = none, contact = none;

@@ -125,10 +125,12 @@ void TrainingRun::step_until_done() {
 void TrainingRun::warn_of_collapse(const StepReport& report) {
   const bool idle = trainer_.objective().latents() > 0 && report.active_latents == 0;
   const std::string advice =
-      idle ? "no latent number tells windows apart; stop and lower --beta (now " + a_.text("beta") + ") or "
-           : "the pictures are the same for every input, or far too strong; stop and lower ";
+      idle ? "no latent number tells windows apart; if that stays so, lower --beta (now " + a_.text("beta") +
+                 ") or "
+           : "the pictures are the same for every input, or far too strong; if that stays so, lower ";
   a_.note("step " + std::to_string(report.step) + ": " + advice + "--learning-rate (now " +
-          format(trainer_.objective().pace().learning_rate) + ")");
+          format(trainer_.objective().pace().learning_rate) +
+          "); early in a run it often mends itself: watch SSIM");
 }
 
 double TrainingRun::seconds() const {

@@ -27,11 +27,12 @@ constexpr double kGaussian[] = {1,
                                 0.0038659201394728076};
 
 Window window_for(Dim height, Dim width) {
-  Window w{std::min(height, width) < 11 ? 7 : 11};
+  const Dim side = std::min(height, width);
+  Window w{side >= 11 ? 11 : std::min<Dim>(7, (side - 1) / 2 * 2 + 1)};
   std::array<double, 11> value{};
   double total = 0;
   for (Dim i = 0; i < w.size; ++i) {
-    total += value[static_cast<std::size_t>(i)] = w.size == 7 ? 1.0 : kGaussian[std::abs(i - 5)];
+    total += value[static_cast<std::size_t>(i)] = w.size < 11 ? 1.0 : kGaussian[std::abs(i - 5)];
   }
   for (std::size_t i = 0; i < value.size(); ++i) w.weight[i] = static_cast<real>(value[i] / total);
   return w;

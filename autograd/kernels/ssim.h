@@ -5,7 +5,7 @@
 
 namespace supertac::kernels {
 
-inline constexpr Dim kSmallestSsimImage = 7;
+inline constexpr Dim kSmallestSsimImage = 3;
 
 struct ImageSizes {
   Dim images, height, width;

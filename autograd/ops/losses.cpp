@@ -31,7 +31,7 @@ Variable ssim(const Variable& x, const Tensor& target) {
                        target.shape().text());
   }
   if (x.dim(0) < 1 || x.dim(3) != 1 || std::min(x.dim(1), x.dim(2)) < kernels::kSmallestSsimImage) {
-    refuse("ssim", "x expects [N,H,W,1] with H, W >= 7, got " + x.shape().text());
+    refuse("ssim", "x expects [N,H,W,1] with H, W >= 3, got " + x.shape().text());
   }
   const kernels::ImageSizes sizes{x.dim(0), x.dim(1), x.dim(2)};
   const double value = kernels::ssim(sizes, x.value().data(), target.data());

@@ -12,9 +12,9 @@ namespace supertac {
 Variable l2_loss(const Variable& x, const Variable& target);
 
 /// Mean structural similarity (Wang et al. 2004, eq. 13) of images in [0,1], x and target [N,H,W,1], H, W >=
-/// 7: K1 = .01, K2 = .03, range 1, Gaussian 11x11 window of sigma 1.5, or a uniform 7x7 one for images below
-/// 11 pixels; valid window positions only; averaged over positions and images. The gradient flows into x
-/// only.
+/// 3: K1 = .01, K2 = .03, range 1, Gaussian 11x11 window of sigma 1.5; for images below 11 pixels a uniform
+/// one of 7x7, or of the largest odd side that fits; valid window positions only; averaged over positions and
+/// images. The gradient flows into x only.
 Variable ssim(const Variable& x, const Tensor& target);
 
 /// -1/N sum over n of log softmax(logits[n])[labels[n]].  logits [N,K], labels in [0,K).

@@ -12,7 +12,7 @@
 namespace supertac {
 namespace {
 
-constexpr std::uint64_t kMostChannels = 64, kMostPixels = 1024, kFewestPixels = 7;
+constexpr std::uint64_t kMostChannels = 64, kMostPixels = 1024, kFewestPixels = 3;
 
 std::string text(const std::vector<std::uint64_t>& shape) {
   std::string all;
@@ -87,7 +87,7 @@ void PairSet::check_shapes() {
   if (!fits || (scale != 2 && scale != 4 && scale != 8 && scale != 16))
     refuse("expected target's height and width to be 2, 4, 8 or 16 times input's");
   if (std::min(target[2], target[3]) < kFewestPixels || std::max(target[2], target[3]) > kMostPixels)
-    refuse("expected 7 to 1024 target pixels a side");
+    refuse("expected 3 to 1024 target pixels a side");
   count_ = input[0];
   array_ = {static_cast<int>(input[2]), static_cast<int>(input[3]), 1, static_cast<int>(input[1])};
   scale_ = static_cast<int>(scale);

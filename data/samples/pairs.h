@@ -23,7 +23,7 @@ class PairSet : public Examples {
   ///   input   F32 [N,C,H,W]    what the sensor gives: N frames of H x W taxels (or pixels), C channels
   ///   target  F32 [N,1,sH,sW]  what is to be drawn, in [0,1]; s is 2, 4, 8 or 16
   ///   group   I64 or I32 [N]   optional: frames of one group (a pass, a surface, a day) belong together
-  /// N, C >= 1, H, W >= 1, at least 7 and at most 1024 target pixels a side, at most 64 channels.
+  /// N, C >= 1, H, W >= 1, at least 3 and at most 1024 target pixels a side, at most 64 channels.
   /// Throws FileError naming the tensor, what was expected and found; values that are not finite or a target
   /// outside [0,1] are named by their pair.
   static PairSet read(const std::string& path);

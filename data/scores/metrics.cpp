@@ -15,13 +15,16 @@
 namespace supertac {
 namespace {
 
-constexpr int kGaussianSize = 11, kUniformSize = 7;
+constexpr int kGaussianSize = 11, kUniformSize = 7, kFewestPixels = 3;
 constexpr double kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;
 constexpr std::uint64_t kFloorSeed = 0x666c6f6f72;  // "floor"
 
 // One-dimensional weights of SSIM's window; the two-dimensional ones are their products.
 std::vector<double> ssim_weights(int size) {
-  if (size < kGaussianSize) return std::vector<double>(kUniformSize, 1.0 / kUniformSize);
+  if (size < kGaussianSize) {
+    const int side = std::min(kUniformSize, (size - 1) / 2 * 2 + 1);
+    return std::vector<double>(static_cast<std::size_t>(side), 1.0 / side);
+  }
   std::vector<double> weights(kGaussianSize);
   double sum = 0;
   for (int i = 0; i < kGaussianSize; ++i) {
@@ -97,8 +100,8 @@ double psnr_db(double mse) { return mse > 0 ? std::min(kPsnrCapDb, -10 * std::lo
 
 double ssim(std::span<const float> a, std::span<const float> b, std::size_t height, std::size_t width) {
   const std::size_t smaller = std::min(height, width);
-  if (smaller < kUniformSize)
-    throw std::invalid_argument("ssim: size must be at least 7, got " + std::to_string(smaller));
+  if (smaller < kFewestPixels)
+    throw std::invalid_argument("ssim: size must be at least 3, got " + std::to_string(smaller));
   check_pixels("ssim", a.size(), height * width);
   check_pixels("ssim", b.size(), height * width);
   const std::vector<double> weights = ssim_weights(static_cast<int>(smaller));

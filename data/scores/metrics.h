@@ -29,11 +29,11 @@ double psnr_db(double mse);
 /// Structural similarity after Wang et al. 2004, mean over the valid positions of the window:
 ///   (2 ma mb + C1)(2 sab + C2) / ((ma^2 + mb^2 + C1)(sa^2 + sb^2 + C2)),  C1 = (.01)^2, C2 = (.03)^2 (range
 ///   1)
-/// Window: Gaussian 11x11, sigma 1.5, or uniform 7x7 for images below 11x11 (on which the Gaussian has no
-/// valid position). Weights add up to 1; variances and covariance are centred sums w (a - ma)(b - mb), never
-/// E[ab] - E[a]E[b], which can come out negative.
-/// The Gaussian is used when both sides have 11 pixels or more.
-/// Throws std::invalid_argument when a side is below 7 or a, b do not hold height * width pixels.
+/// Window: Gaussian 11x11, sigma 1.5; for images below 11x11 (on which the Gaussian has no valid position)
+/// uniform, 7x7 or the largest odd size that fits. Weights add up to 1; variances and covariance are centred
+/// sums w (a - ma)(b - mb), never E[ab] - E[a]E[b], which can come out negative. The Gaussian is used when
+/// both sides have 11 pixels or more. Throws std::invalid_argument when a side is below 3 or a, b do not hold
+/// height * width pixels.
 double ssim(std::span<const float> a, std::span<const float> b, std::size_t height, std::size_t width);
 inline double ssim(std::span<const float> a, std::span<const float> b, int size) {
   const std::size_t side = size > 0 ? static_cast<std::size_t>(size) : 0;

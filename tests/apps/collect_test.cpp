@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
 
 #include "hardware/serial_port.h"
@@ -94,6 +95,21 @@ struct Refusal {
   std::vector<std::string> arguments;
   std::vector<std::string> says;
 };
+
+TEST(CollectProgram, TheQuestionMayBeAnsweredWithY) {
+  CollectRun run;
+  std::string words = SUPERTAC_BIN "/supertac-collect";
+  for (const std::string& word : run.arguments({"--speed", "50"}))
+    if (word != "--yes") words += " " + word;
+  const auto answer = [&](const std::string& text) {
+    return std::system(
+        ("printf '" + text + "\\n' | script -qec '" + words + "' /dev/null >/dev/null").c_str());
+  };
+  EXPECT_NE(answer("perhaps"), 0);
+  EXPECT_EQ(run.files(), "");
+  EXPECT_EQ(answer("y"), 0);
+  EXPECT_NE(run.files(), "");
+}
 
 // Nothing moves, nothing is left behind, and one line says what is wrong and what to do.
 TEST(CollectProgram, APortThatCannotBeUsedIsOneClearLine) {

@@ -45,6 +45,24 @@ std::string write_pairs(const TemporaryFolder& folder, bool grouped = true) {
   return path;
 }
 
+/// Targets of a sensor with 6 x 10 taxels, below it one of 3 x 5.
+std::string write_small_pairs(const TemporaryFolder& folder) {
+  constexpr std::uint64_t kCount = 24;
+  std::vector<float> input, target;
+  for (std::uint64_t n = 0; n < kCount; ++n) {
+    const auto at = [&](std::uint64_t i, double step) {
+      return static_cast<float>(0.5 + 0.4 * std::sin(static_cast<double>(n) + step * static_cast<double>(i)));
+    };
+    for (std::uint64_t i = 0; i < 15; ++i) input.push_back(at(i, 0.4));
+    for (std::uint64_t i = 0; i < 60; ++i) target.push_back(at(i, 0.2));
+  }
+  const std::string path = folder / "small.safetensors";
+  write_safetensors(path, {},
+                    {{"input", "F32", {kCount, 1, 3, 5}, std::as_bytes(std::span(input))},
+                     {"target", "F32", {kCount, 1, 6, 10}, std::as_bytes(std::span(target))}});
+  return path;
+}
+
 std::vector<std::string> training(const TemporaryFolder& folder, const std::string& out,
                                   const std::vector<std::string>& more = {}) {
   std::vector<std::string> all = {"--pairs",  folder / "pairs.safetensors",
@@ -81,6 +99,20 @@ TEST(Pairs, TrainEvaluateAndReportEveryGroup) {
   const auto whole =
       run_process("supertac-evaluate", {"--model", model, "--pairs", pairs, "--split", "none"});
   EXPECT_NE(whole.out.find("group 104, 12 pairs"), std::string::npos) << whole.out;
+}
+
+TEST(Pairs, TargetsBelowSevenPixelsAreJudgedByASmallerWindowAndItIsSaid) {
+  const TemporaryFolder folder;
+  const std::string pairs = write_small_pairs(folder), model = folder / "m.safetensors",
+                    json = folder / "scores.json";
+  const auto trained =
+      run_process("supertac-train", {"--pairs", pairs, "--out", model, "--epochs", "1", "--batch", "8"});
+  ASSERT_EQ(trained.code, 0) << trained.error;
+  const auto judged = run_process("supertac-evaluate", {"--pairs", pairs, "--model", model, "--json", json});
+  EXPECT_EQ(judged.code, 0) << judged.error;
+  EXPECT_NE(judged.error.find("SSIM's window is 5 pixels wide instead of 7"), std::string::npos)
+      << judged.error;
+  EXPECT_TRUE(nlohmann::json::parse(read_text_file(json, kPlenty)).at("all").at("ssim").is_number());
 }
 
 TEST(Pairs, SameBytesForAnyThreadsAndAfterAPause) {

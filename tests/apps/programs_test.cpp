@@ -273,6 +273,49 @@ TEST(Dispatcher, RunsTheProgramsNextToIt) {
   expect_failure(run_process("supertac", {"info"}), 2, "missing FILE");
 }
 
+TEST(Dispatcher, HelpIsThatOfTheJobOrTheGlossary) {
+  EXPECT_EQ(run_process("supertac", {"help", "info"}).out, run_process("supertac-info", {"--help"}).out);
+  EXPECT_EQ(run_process("supertac", {"help"}).out, run_process("supertac", {"--help"}).out);
+  expect_failure(run_process("supertac", {"help", "inf"}), 2, "did you mean 'info'?");
+  const std::string glossary = run_process("supertac", {"help", "glossary"}).out;
+  for (const char* term :
+       {"taxel", "window", "pass", "trial", "split", "levelled", "latent", "contact", "SSIM", "ghost rate"})
+    EXPECT_NE(glossary.find("**" + std::string(term) + "** - "), std::string::npos) << term;
+  EXPECT_NE(run_process("supertac", {"--help"}).out.find("supertac help glossary"), std::string::npos);
+}
+
+TEST(Help, OffersNoThreadsWhereThereIsNothingToShareOut) {
+  EXPECT_EQ(run_process("supertac-info", {"--help"}).out.find("--threads"), std::string::npos);
+  EXPECT_NE(run_process("supertac-simulate", {"--help"}).out.find("--threads"), std::string::npos);
+}
+
+TEST(Help, BreaksNoWords) {
+  // Words of the help as declared; a line that ends within one would leave a part of it.
+  const std::string help = run_process("supertac-train", {"--help"}).out;
+  for (const char* word :
+       {"multiply-adds", "safetensors", "recordings", "overwritten", "interrupted", "learning"}) {
+    const std::string text(word);
+    for (std::size_t cut = 4; cut + 3 < text.size(); ++cut)
+      EXPECT_EQ(help.find(text.substr(0, cut) + "\n"), std::string::npos) << text;
+  }
+}
+
+TEST(Collect, SaysWhichOptionIsMissing) {
+  const TemporaryFolder folder;
+  expect_failure(run_process("supertac-collect", {"--plate", "6_Ridges", "--out", folder.file("c")}), 2,
+                 "missing --printer, which a collection needs beside");
+  const std::string help = run_process("supertac-collect", {"--help"}).out;
+  EXPECT_NE(help.find("port of the Marlin printer; needed"), std::string::npos) << help;
+}
+
+TEST(Simulate, SaysThatAFolderHasRecordingsAlready) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(run_process("supertac-simulate", small_simulation(folder.file("sim"))).error, "");
+  auto more = small_simulation(folder.file("sim"));
+  more[3] = "bumps6";
+  EXPECT_NE(run_process("supertac-simulate", more).error.find("held 2 recordings before"), std::string::npos);
+}
+
 TEST(Dispatcher, EveryProgramOfTheListIsThereAndSaysWhatItIsFor) {
   std::istringstream lines(run_process("supertac", {"--help"}).out);
   std::size_t programs = 0;

@@ -47,6 +47,34 @@ ProcessResult train_with(const std::string& set, const std::function<ProcessResu
   return result;
 }
 
+// What a newcomer met: the reason comes with the refusal.
+TEST_F(Training, SaysWhyAFinishedRunIsNotResumed) {
+  ASSERT_EQ(train("done.safetensors", {"--epochs", "1", "--stride", "64"}).code, 0);
+  const ProcessResult resumed = train(
+      "done.safetensors", {"--epochs", "1", "--stride", "64", "--resume", path("done.run/last.safetensors")});
+  EXPECT_EQ(resumed.code, 1);
+  EXPECT_NE(resumed.error.find("the run that --resume continues has ended"), std::string::npos)
+      << resumed.error;
+}
+
+TEST_F(Training, NamesThePlatesThereAre) {
+  const ProcessResult result = train("none.safetensors", {"--plates", "6_Bump"});
+  EXPECT_NE(result.error.find("plate '6_Bump' has no recording in " + path("data") + "; it has those of "),
+            std::string::npos)
+      << result.error;
+}
+
+TEST_F(Training, EvaluationSaysThatSplitNoneHasSeenItAll) {
+  ASSERT_EQ(train("all.safetensors", {"--epochs", "1", "--stride", "64", "--split", "none"}).code, 0);
+  const ProcessResult result = run_process(
+      "supertac-evaluate", {"--model", path("all.safetensors"), "--data", path("data"), "--limit", "20"});
+  EXPECT_NE(result.error.find("it has seen every one of them"), std::string::npos) << result.error;
+}
+
+TEST_F(Training, HelpSaysWhatTinyCosts) {
+  EXPECT_NE(run_process("supertac-train", {"--help"}).out.find("a ninth of the"), std::string::npos);
+}
+
 TEST_F(Training, TwoHundredStepsGiveTheSameBytesOnEverySetAndAnyThreads) {
   std::string first;
   for (const std::string& set : instruction_sets()) {
