@@ -139,6 +139,7 @@ namespace {
 
 std::size_t recordings_in(const std::string& folder) {
   std::size_t count = 0;
+  if (!std::filesystem::is_directory(folder)) return count;
   for (const auto& entry : std::filesystem::directory_iterator(folder))
     count += entry.path().extension() == ".safetensors";
   return count;
@@ -151,8 +152,8 @@ int run(Arguments& arguments) {
   const auto settings = read_settings(arguments);
   const auto seed = static_cast<std::uint64_t>(arguments.integer("seed", 0, INT64_MAX));
   if (arguments.list("speeds").empty()) throw UsageError("--speeds: expected at least one speed");
-  OutputFolder folder(arguments.text("out"), arguments.force());
   const std::size_t before = recordings_in(arguments.text("out"));
+  OutputFolder folder(arguments.text("out"), arguments.force());
   const auto jobs = plan(arguments, plates, folder);
   std::size_t frames = 0;
   {

@@ -26,8 +26,7 @@ class OutputFolder {
   /// Path of a file to be written in the folder. Throws FileError when it exists and force is false.
   std::string add(const std::string& name);
   /// The folder's provenance.jsonl gains a line: what full_provenance() says, and how many files it was.
-  /// Throws FileError.
-  /// Throws FileError when the folder cannot appear.
+  /// Throws FileError, also when the folder cannot appear.
   void keep();
 
  private:
