@@ -55,7 +55,7 @@ TEST_F(Classify, KeepsAClassifierThatNamesTextures) {
               answer.probability <= 1);
   EXPECT_THROW((void)kept.name_of(std::vector<float>(64)), std::invalid_argument);
   EXPECT_THROW((void)load_classifier(path("trial")), std::runtime_error);
-  EXPECT_EQ(classify(path("trial"), {"--views", "frame", "--out", path("none")}).code, 2);
+  EXPECT_EQ(classify(path("trial"), {"--views", "frame", "--out", path("no_file")}).code, 2);
 }
 
 TEST_F(Classify, CountsEveryTestWindowAndKnowsTheTruth) {
