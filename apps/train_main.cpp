@@ -1,6 +1,4 @@
 // supertac-train: recordings (or pairs of images) in, a model out.
-#include <filesystem>
-
 #include "apps/common/program.h"
 #include "apps/common/provenance.h"
 #include "apps/common/remarks.h"
@@ -31,16 +29,6 @@ void declare(Arguments& a) {
 }
 
 namespace {
-
-// A run that was stopped has not written its model yet.
-void refuse_existing_model(const Arguments& a) {
-  const std::string out = a.text("out");
-  if (a.given("resume") && !a.force() && std::filesystem::exists(out))
-    throw FileError(out,
-                    "exists already: the run that --resume continues has ended, or this is another model; "
-                    "pass --force to replace it, or choose another --out");
-  refuse_existing(out, a.force());
-}
 
 // `remarks` and `about` are for a training that has begun: what ends it before says one line only.
 int train(const Arguments& a, TrainingTask task, const std::vector<std::string>& remarks,
@@ -75,7 +63,7 @@ int train(const Arguments& a, Ranks& ranks) {
     throw UsageError(error.what());
   }
   if (a.given("pairs")) {
-    refuse_existing_model(a);
+    refuse_existing(a.text("out"), a.force());
     PairSet pairs = PairSet::read(a.text("pairs"));
     add_parent_file("pairs", a.text("pairs"));
     TrainingTask task = pair_task(a, pairs);
@@ -83,7 +71,7 @@ int train(const Arguments& a, Ranks& ranks) {
   }
   TrainingSettings settings = network_settings(a);
   training_split(a);
-  refuse_existing_model(a);
+  refuse_existing(a.text("out"), a.force());
   const WindowSet windows = training_windows(a, settings.model, settings.seed);
   add_parent("recordings", hash_of_recordings(a.text("data"), a.list("plates")));
   if (a.given("also")) add_parent("also", hash_of_recordings(a.text("also"), {}));

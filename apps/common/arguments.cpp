@@ -247,7 +247,7 @@ std::vector<NamedPath> Arguments::paths() const {
 
 std::string Arguments::deciding_options() const {
   static const std::set<std::string> kHow = {
-      "json", "quiet", "threads", "force", "ledger", "checkpoint-every", "deadline"};
+      "json", "quiet", "threads", "force", "merge", "ledger", "checkpoint-every", "deadline", "shard"};
   std::string line = program_;
   for (const std::string& name : order_) {
     const Option& option = options_.at(name);

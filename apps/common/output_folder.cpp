@@ -36,6 +36,11 @@ OutputFolder::OutputFolder(const std::string& path, bool force) : path_(path), f
       for (const auto& left : fs::directory_iterator(path_)) fs::remove_all(left.path());
     // Opens a temporary in the folder and removes it: the permission to write, tried.
     AtomicFile((fs::path(path_) / ".writable").string());
+  } catch (const FileError& failure) {
+    remove_made();
+    if (final_.empty()) throw;
+    const std::string text = failure.what();  // of the hidden folder, which nobody asked for
+    throw FileError(path, text.starts_with(path_ + ": ") ? text.substr(path_.size() + 2) : text);
   } catch (...) {
     remove_made();
     throw;
