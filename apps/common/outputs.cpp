@@ -77,8 +77,8 @@ void check_outputs(const Arguments& arguments) {
       check_folder(output.path);
     } else {
       // A run that was stopped has not written its model yet.
-      if (output.option == "out" && arguments.given("resume") && !arguments.force() &&
-          fs::exists(output.path))
+      if (output.option == "out" && arguments.declares("resume") && arguments.given("resume") &&
+          !arguments.force() && fs::exists(output.path))
         throw FileError(output.path,
                         "exists already: the run that --resume continues has ended, or this is another "
                         "model; pass --force to replace it, or choose another --out");
