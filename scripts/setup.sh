@@ -5,7 +5,7 @@ packages="g++ cmake ninja-build nlohmann-json3-dev libcxxopts-dev libkissfft-dev
   liblapacke-dev libstb-dev zlib1g-dev $*"
 missing=""
 for package in $packages; do
-  dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing="$missing $package"
+  dpkg-query -W -f '${db:Status-Status}\n' "$package" 2>/dev/null | grep -qx installed || missing="$missing $package"
 done
 [ -n "$missing" ] || exit 0
 echo "installing:$missing"
