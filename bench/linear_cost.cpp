@@ -13,7 +13,7 @@
 #include "io/median.h"
 #include "io/numbers.h"
 #include "models/cost.h"
-#include "models/trainer.h"
+#include "models/training/trainer.h"
 
 namespace supertac {
 namespace {

@@ -8,7 +8,7 @@
 #include "models/cost.h"
 #include "models/model_file.h"
 #include "models/prepared/prepared.h"
-#include "models/trainer.h"
+#include "models/training/trainer.h"
 #include "tests/allocations.h"
 
 namespace supertac {

@@ -1,5 +1,5 @@
 // What a network is trained on: from a batch to the named terms of its loss. SuperTac learns from windows, a
-// frame model from pairs; Trainer (models/trainer.h) knows neither.
+// frame model from pairs; Trainer (models/training/trainer.h) knows neither.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 #include "models/frame_model.h"
 #include "models/loss.h"
 #include "models/model_file.h"
-#include "models/training_state.h"
+#include "models/training/training_state.h"
 
 namespace supertac {
 

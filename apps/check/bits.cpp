@@ -6,7 +6,7 @@
 #include "data/recordings/simulator.h"
 #include "io/sha256.h"
 #include "models/prepared/prepared.h"
-#include "models/trainer.h"
+#include "models/training/trainer.h"
 
 namespace supertac {
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "apps/common/launch.h"
-#include "models/ranks.h"
+#include "models/training/ranks.h"
 
 namespace supertac {
 

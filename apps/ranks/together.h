@@ -4,7 +4,7 @@
 #include <functional>
 
 #include "apps/common/arguments.h"
-#include "models/ranks.h"
+#include "models/training/ranks.h"
 
 namespace supertac {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "io/folder_lock.h"
-#include "models/trainer.h"
+#include "models/training/trainer.h"
 
 namespace supertac {
 

@@ -9,7 +9,7 @@
 #include "apps/train/ledger_file.h"
 #include "apps/train/run_folder.h"
 #include "apps/train/training_task.h"
-#include "models/trainer.h"
+#include "models/training/trainer.h"
 
 namespace supertac {
 

@@ -10,7 +10,7 @@
 #include "data/recordings/simulator.h"
 #include "io/random.h"
 #include "layers/checkpoint.h"
-#include "models/ledger.h"
+#include "models/training/ledger.h"
 
 namespace supertac {
 namespace {

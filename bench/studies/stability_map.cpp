@@ -13,7 +13,7 @@
 #include "data/recordings/simulator.h"
 #include "io/file.h"
 #include "io/numbers.h"
-#include "models/trainer.h"
+#include "models/training/trainer.h"
 
 namespace supertac {
 namespace {

@@ -1,4 +1,4 @@
-#include "models/ranks.h"
+#include "models/training/ranks.h"
 
 #include <gtest/gtest.h>
 #include <omp.h>

@@ -6,7 +6,7 @@
 
 #include "data/samples/windows.h"
 #include "io/file.h"
-#include "models/trainer.h"
+#include "models/training/trainer.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {

@@ -11,7 +11,7 @@
 #include <thread>
 #include <utility>
 
-#include "models/ranks.h"
+#include "models/training/ranks.h"
 
 namespace supertac {
 

@@ -1,4 +1,4 @@
-#include "models/trainer.h"
+#include "models/training/trainer.h"
 
 #include <gtest/gtest.h>
 #include <omp.h>

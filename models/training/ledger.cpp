@@ -1,0 +1,133 @@
+#include "models/training/ledger.h"
+
+#include <algorithm>
+#include <fstream>
+
+#include "io/file.h"
+#include "io/json.h"
+
+namespace supertac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kFormat = "supertac-ledger-1";
+constexpr JsonLimits kLimits{.max_bytes = std::size_t{4} << 20};
+
+std::string chained(const std::string& before, const std::string& text) { return sha256(before + text); }
+
+LedgerLine line_of(const std::string& text) {
+  const Json json = parse_json_limited(text, kLimits);
+  LedgerLine line;
+  line.step = json.at("step").get<std::int64_t>();
+  line.batches = json.at("batches").get<std::string>();
+  line.tensors = json.at("tensors").get<std::vector<std::string>>();
+  line.chain = json.at("chain").get<std::string>();
+  return line;
+}
+
+}  // namespace
+
+std::string LedgerLine::text() const {
+  return Json{{"step", step}, {"batches", batches}, {"tensors", tensors}}.dump();
+}
+
+Ledger Ledger::read(const std::string& path) {
+  std::ifstream in(path);
+  if (!in) throw FileError(path, "cannot be read; train with --ledger N to have one");
+  Ledger ledger;
+  std::string text;
+  try {
+    std::getline(in, text);
+    const Json header = parse_json_limited(text, kLimits);
+    if (header.at("format") != kFormat) throw FileError(path, "is no ledger of supertac-train --ledger");
+    ledger.every = header.at("every").get<std::int64_t>();
+    ledger.names = header.at("tensors").get<std::vector<std::string>>();
+    std::string chain = sha256(text);
+    while (std::getline(in, text)) {
+      if (in.eof()) break;  // torn off in the middle: the run was killed as it wrote
+      LedgerLine line = line_of(text);
+      chain = chained(chain, line.text());
+      if (line.chain != chain || line.tensors.size() != ledger.names.size())
+        throw FileError(path, "step " + std::to_string(line.step) +
+                                  ": the chain is broken; a line was changed after it had been written");
+      ledger.lines.push_back(std::move(line));
+    }
+  } catch (const Json::exception&) {
+    throw FileError(path, "is no ledger of supertac-train --ledger, or damaged");
+  } catch (const JsonError& error) {
+    throw FileError(path,
+                    std::string("is no ledger of supertac-train --ledger, or damaged: ") + error.what());
+  }
+  return ledger;
+}
+
+const LedgerLine* Ledger::at(std::int64_t step) const {
+  const auto found = std::lower_bound(lines.begin(), lines.end(), step,
+                                      [](const LedgerLine& line, std::int64_t s) { return line.step < s; });
+  return found != lines.end() && found->step == step ? &*found : nullptr;
+}
+
+std::vector<std::string> hashes_of(const Trainer& trainer) {
+  constexpr std::size_t kDigits = 16;  // the chain has all of its own
+  std::vector<std::string> hashes;
+  trainer.for_each_tensor([&](const std::string&, std::span<const real> values) {
+    Sha256 hash;
+    hash.add(std::as_bytes(values));
+    hashes.push_back(hash.hex().substr(0, kDigits));
+  });
+  return hashes;
+}
+
+LedgerWriter::LedgerWriter(const Trainer& trainer, std::int64_t every, const LedgerLine* previous)
+    : trainer_(trainer), every_(every) {
+  std::vector<std::string> names;
+  trainer.for_each_tensor([&](const std::string& name, std::span<const real>) { names.push_back(name); });
+  header_ = Json{{"format", kFormat}, {"every", every}, {"tensors", names}}.dump();
+  chain_ = previous != nullptr ? previous->chain : sha256(header_);
+  // Batches between that line and a state that lies behind it.
+  std::vector<std::uint32_t> batch(trainer.batch().size());
+  for (std::int64_t step = previous != nullptr ? previous->step : 0; step < trainer.step(); ++step) {
+    trainer.batch_of(step, batch);
+    batches_.add(std::as_bytes(std::span(batch)));
+  }
+}
+
+std::optional<LedgerLine> LedgerWriter::after_step() {
+  batches_.add(std::as_bytes(trainer_.batch()));
+  if (trainer_.step() % every_ != 0 && !trainer_.done()) return std::nullopt;
+  LedgerLine line{
+      .step = trainer_.step(), .batches = batches_.hex(), .tensors = hashes_of(trainer_), .chain = {}};
+  line.chain = chain_ = chained(chain_, line.text());
+  batches_ = {};
+  return line;
+}
+
+std::optional<LedgerDifference> difference(const Ledger& header, const LedgerLine& a, const LedgerLine& b) {
+  LedgerDifference d{
+      .after = a.step - header.every, .step = a.step, .what = {}, .batches = a.batches != b.batches};
+  for (std::size_t i = 0; i < a.tensors.size() && d.what.empty(); ++i)
+    if (a.tensors[i] != b.tensors[i]) d.what = header.names[i];
+  if (d.what.empty() && !d.batches) return std::nullopt;
+  if (d.what.empty()) d.what = "the batches";
+  return d;
+}
+
+std::optional<LedgerDifference> first_difference(const Ledger& a, const Ledger& b) {
+  if (a.names != b.names || a.every != b.every)
+    throw std::invalid_argument(
+        "ledgers: expected two of the same network and the same steps from line to line");
+  const std::size_t both = std::min(a.lines.size(), b.lines.size());
+  std::size_t low = 0, high = both;  // the chains agree before low, and differ from high on
+  while (low < high) {
+    const std::size_t middle = (low + high) / 2;
+    if (a.lines[middle].chain == b.lines[middle].chain) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  return low == both ? std::nullopt : difference(a, a.lines[low], b.lines[low]);
+}
+
+}  // namespace supertac

@@ -1,0 +1,73 @@
+// The ledger of a training: every N steps a line that names the whole state by hashes, each line chained to
+// the one before, and now and then the state itself. Equal bits make a training checkable: whoever repeats a
+// piece of it from a kept state has to get the same lines.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/sha256.h"
+#include "models/training/trainer.h"
+
+namespace supertac {
+
+struct LedgerLine {
+  std::int64_t step = 0;
+  std::string batches;               ///< of the indices of every batch since the line before
+  std::vector<std::string> tensors;  ///< of each parameter and of Adam's moments, in the order of the header
+  std::string chain;                 ///< over all that stands here and the chain before
+
+  /// The line without its chain as JSON text.
+  std::string text() const;
+};
+
+struct Ledger {
+  std::int64_t every = 0;          ///< steps from line to line
+  std::vector<std::string> names;  ///< of the tensors
+  std::vector<LedgerLine> lines;
+
+  /// Throws FileError when the file is no ledger, or a line's chain is not that of what stands before it
+  /// (naming the line): it was changed after it had been written.
+  static Ledger read(const std::string& path);
+  const LedgerLine* at(std::int64_t step) const;
+};
+
+/// Of every array of a trainer's state, as a line has them.
+std::vector<std::string> hashes_of(const Trainer& trainer);
+
+/// Hashes the state of a trainer step by step.
+class LedgerWriter {
+ public:
+  /// `previous`: the line it continues behind, at or before the trainer's step; null: the training's
+  /// beginning. The trainer must outlive it.
+  LedgerWriter(const Trainer& trainer, std::int64_t every, const LedgerLine* previous = nullptr);
+  /// After every step: takes note of its batch, and gives a line where one is due.
+  std::optional<LedgerLine> after_step();
+  /// The ledger's first line.
+  const std::string& header() const { return header_; }
+
+ private:
+  const Trainer& trainer_;
+  std::int64_t every_;
+  std::string header_, chain_;
+  Sha256 batches_;
+};
+
+/// The first difference of two ledgers, found by bisection of their chains.
+struct LedgerDifference {
+  std::int64_t after = 0, step = 0;  ///< it came about behind the one and up to the other
+  /// The first tensor that differs at `step`; "the batches" where those differ, and all tensors are the same.
+  std::string what;
+  bool batches = false;  ///< whether other batches were taken
+};
+/// Nothing when they agree as far as both go. Throws std::invalid_argument when they are of other tensors or
+/// have no step in common.
+std::optional<LedgerDifference> first_difference(const Ledger& a, const Ledger& b);
+/// The same of one line.
+std::optional<LedgerDifference> difference(const Ledger& header, const LedgerLine& a, const LedgerLine& b);
+
+}  // namespace supertac

@@ -1,0 +1,127 @@
+#include "models/training/ranks.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+
+#include "io/json.h"
+
+namespace supertac {
+namespace {
+
+class OneProcess : public Ranks {
+ public:
+  OneProcess() : Ranks(0, 1) {}
+  void exchange(int, std::span<const std::byte>, std::span<std::byte>) override {
+    throw std::logic_error("a single process has no partner");
+  }
+};
+
+// Below this a second message costs more than the bytes that it saves.
+constexpr std::size_t kLeastToCut = 4096;
+
+template <class T>
+void add_whole(Ranks& ranks, std::span<T> values, std::span<T> buffer) {
+  for (int apart = 1; apart < ranks.size(); apart *= 2) {
+    ranks.exchange(ranks.rank() ^ apart, std::as_bytes(values), std::as_writable_bytes(buffer));
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] += buffer[i];
+  }
+}
+
+// Each pair of ranks shares out the additions of its piece, neighbours first, so that the sum of every value
+// is the same tree; then the pieces are put together again in the opposite order. A rank sends 2 (1 - 1/R) of
+// its values instead of log2 R.
+template <class T>
+void add_in_pieces(Ranks& ranks, std::span<T> values, std::span<T> buffer) {
+  std::vector<std::span<T>> pieces{values};
+  for (int apart = 1; apart < ranks.size(); apart *= 2) {
+    const std::span<T> all = pieces.back(), low = all.first(all.size() / 2),
+                       high = all.subspan(all.size() / 2);
+    const bool upper = (ranks.rank() & apart) != 0;
+    const std::span<T> mine = upper ? high : low, theirs = upper ? low : high;
+    ranks.exchange(ranks.rank() ^ apart, std::as_bytes(theirs),
+                   std::as_writable_bytes(buffer.first(mine.size())));
+    for (std::size_t i = 0; i < mine.size(); ++i) mine[i] += buffer[i];
+    pieces.push_back(mine);
+  }
+  for (int apart = ranks.size() / 2; apart >= 1; apart /= 2) {
+    const std::span<T> mine = pieces.back();
+    pieces.pop_back();
+    const std::span<T> all = pieces.back();
+    const bool upper = (ranks.rank() & apart) != 0;
+    const std::span<T> theirs = upper ? all.first(all.size() - mine.size()) : all.subspan(mine.size());
+    ranks.exchange(ranks.rank() ^ apart, std::as_bytes(mine), std::as_writable_bytes(theirs));
+  }
+}
+
+template <class T>
+void add_up_over(Ranks& ranks, std::span<T> values, std::span<T> buffer) {
+  return values.size() < kLeastToCut ? add_whole(ranks, values, buffer)
+                                     : add_in_pieces(ranks, values, buffer);
+}
+
+std::string value_of(const nlohmann::ordered_json& all, const std::string& entry) {
+  return all.contains(entry) ? all[entry].get<std::string>() : "missing";
+}
+
+}  // namespace
+
+std::vector<std::string> Ranks::gather(const std::string& mine) {
+  std::vector<std::string> all(static_cast<std::size_t>(size_));
+  all[static_cast<std::size_t>(rank_)] = mine;
+  for (int apart = 1; apart < size_; ++apart) {
+    const int partner = rank_ ^ apart;
+    const std::uint64_t length = mine.size();
+    std::uint64_t its_length = 0;
+    exchange(partner, std::as_bytes(std::span(&length, 1)),
+             std::as_writable_bytes(std::span(&its_length, 1)));
+    std::string& theirs = all[static_cast<std::size_t>(partner)];
+    theirs.resize(its_length);
+    exchange(partner, std::as_bytes(std::span(mine)), std::as_writable_bytes(std::span(theirs)));
+  }
+  return all;
+}
+
+void Ranks::add_up(std::span<double> values, std::span<double> buffer) { add_up_over(*this, values, buffer); }
+
+void Ranks::add_up(std::span<float> values, std::span<float> buffer) { add_up_over(*this, values, buffer); }
+
+Ranks& one_process() {
+  static OneProcess alone;
+  return alone;
+}
+
+void check_lanes(int ranks, std::size_t batch) {
+  constexpr std::size_t kLanes = 8;
+  if (ranks == 1) return;
+  if (ranks != 2 && ranks != 4 && ranks != 8)
+    throw std::invalid_argument(
+        std::to_string(ranks) +
+        " processes cannot share the eight lanes of a batch evenly; start 1, 2, 4 or 8, "
+        "or train several models at once with supertac-sweep");
+  if (batch < kLanes)
+    throw std::invalid_argument("several processes need a batch of at least 8, got " + std::to_string(batch) +
+                                "; give a larger --batch or start one process");
+}
+
+std::optional<Disagreement> find_disagreement(Ranks& ranks, const std::map<std::string, std::string>& mine) {
+  std::vector<nlohmann::ordered_json> all;
+  for (const std::string& text : ranks.gather(nlohmann::ordered_json(mine).dump()))
+    all.push_back(parse_json_limited(text));
+  std::map<std::string, std::string> entries;  // of anybody
+  for (const auto& its : all)
+    for (const auto& [entry, value] : its.items()) entries[entry];
+  for (const auto& [entry, none] : entries) {
+    std::map<std::string, int> votes;
+    for (const auto& its : all) ++votes[value_of(its, entry)];
+    std::string usual = value_of(all[0], entry);
+    for (const auto& [value, count] : votes)
+      if (count > votes[usual]) usual = value;
+    for (std::size_t r = 0; r < all.size(); ++r)
+      if (value_of(all[r], entry) != usual)
+        return Disagreement{static_cast<int>(r), entry, value_of(all[r], entry), usual};
+  }
+  return std::nullopt;
+}
+
+}  // namespace supertac

@@ -1,0 +1,59 @@
+// Processes that train one model together. Each holds the whole model; rank r of R sums the gradients of its
+// 8/R neighbouring lanes, then R ranks add theirs pairwise. IEEE addition commutes, so both partners of a
+// pair get the same bits, those of a single process (models/training/trainer.h).
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace supertac {
+
+/// The ranks cannot go on: one is lost, or they disagree. All that are left throw it with the same text.
+class RanksError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Who this process is among others, and how two of them swap bytes.
+class Ranks {
+ public:
+  Ranks(int rank, int size) : rank_(rank), size_(size) {}
+  virtual ~Ranks() = default;
+  int rank() const { return rank_; }
+  int size() const { return size_; }
+  bool first() const { return rank_ == 0; }
+
+  /// Sends `mine` and fills `theirs`; the partner calls it with sizes the other way round. Throws RanksError
+  /// when the partner does not answer.
+  virtual void exchange(int partner, std::span<const std::byte> mine, std::span<std::byte> theirs) = 0;
+
+  /// Everybody's text, by rank. For sizes that are powers of two.
+  std::vector<std::string> gather(const std::string& mine);
+  /// Makes `values` the sum over all ranks, a balanced binary tree; `buffer` is of the same size.
+  void add_up(std::span<double> values, std::span<double> buffer);
+  void add_up(std::span<float> values, std::span<float> buffer);
+
+ private:
+  int rank_, size_;
+};
+
+/// A process that is alone.
+Ranks& one_process();
+
+/// Throws std::invalid_argument, with advice, for a number of ranks that cannot share eight lanes evenly, and
+/// for a batch that does not fill them.
+void check_lanes(int ranks, std::size_t batch);
+
+/// Where ranks differ: the first entry for which one has another value than most (at a tie: than rank 0).
+struct Disagreement {
+  int rank = 0;
+  std::string entry, its, usual;
+};
+std::optional<Disagreement> find_disagreement(Ranks& ranks, const std::map<std::string, std::string>& mine);
+
+}  // namespace supertac

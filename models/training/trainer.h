@@ -1,0 +1,131 @@
+// Training of any network, one visible step at a time.
+//
+//   Trainer trainer(windows, split.train, settings);
+//   while (!trainer.done()) report(trainer.train_step());
+//
+// Every random choice is a function of (seed, step), so that a restored trainer continues to the same bits.
+//
+// A batch is cut into lanes, at most eight, whatever the number of threads. Each lane runs the whole forward
+// and backward pass on its share, on one thread, with gradients of its own; these are added as a balanced
+// binary tree. So threads meet once per step, and which of them ran a lane changes no bit. Several processes
+// share the lanes (models/training/ranks.h), each a subtree, and go on to the same bits as one.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "data/samples/batching.h"
+#include "models/collapse.h"
+#include "models/objective.h"
+#include "models/training/ranks.h"
+#include "models/training/training_state.h"
+
+namespace supertac {
+
+/// The values of a Loss; 0 for a term that an objective has not.
+struct LossTerms {
+  double total = 0, reconstruction = 0, kld = 0, l2 = 0, ssim = 0;
+  void add(const LossTerms& other);
+};
+
+struct StepReport : LossTerms {
+  std::int64_t step = 0;     ///< from 1
+  double gradient_norm = 0;  ///< before clipping
+  double learning_rate = 0;
+  int active_latents = 0;  ///< of all groups, in this batch (models/collapse.h)
+  /// For the last 100 steps after warm-up the pictures said nothing of the truths, or no latent number was
+  /// active (models/collapse.h). Lower the learning rate or, when no latent is active, beta.
+  bool collapsed = false;
+  bool stop = false;  ///< whether a process wishes to stop after this step
+};
+
+class Trainer {
+ public:
+  /// `examples` must outlive the trainer. Throws std::invalid_argument for examples of another format than
+  /// the network's, no training example, or as check_lanes(). `ranks` train together: all of them call
+  /// train_step() and save().
+  Trainer(const Examples& examples, std::vector<std::uint32_t> train, std::unique_ptr<Objective> objective,
+          Ranks& ranks = one_process());
+  /// With window_objective() and frame_objective(); throw as these.
+  Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, const TrainingSettings& settings);
+  Trainer(const PairSet& pairs, std::vector<std::uint32_t> train, const FrameTrainingSettings& settings);
+
+  bool done() const { return state_.done(); }
+  std::int64_t step() const { return state_.step(); }
+  std::int64_t total_steps() const { return state_.total_steps(); }
+  std::int64_t steps_per_epoch() const { return static_cast<std::int64_t>(batching_.batches_per_epoch()); }
+  const Objective& objective() const { return *objective_; }
+  const Network& model() const { return objective_->network(); }
+
+  /// One batch: forward, loss, backward, Adam. Throws TrainingStopped; the parameters are then still finite.
+  /// `stop` is asked before the gradients are added up. With several processes throws as check_same(), which
+  /// is called every 100 steps.
+  StepReport train_step(const std::function<bool()>& stop = {});
+  /// Throws RanksError naming rank and tensor when the processes' parameters are not the same to the bit.
+  void check_same() const;
+
+  /// For a ledger (models/training/ledger.h): the batch of the last step, that of any step (from 0), and
+  /// every array of the state.
+  std::span<const std::uint32_t> batch() const { return indices_; }
+  void batch_of(std::int64_t step, std::span<std::uint32_t> out) const;
+  void for_each_tensor(const std::function<void(const std::string&, std::span<const real>)>& visit) const {
+    state_.for_each_tensor(visit);
+  }
+
+  /// Model and training state, a checkpoint like any other with "optimizer." tensors besides. Of several
+  /// processes only the first writes, after check_same(). Throws FileError.
+  void save(const std::string& path, std::map<std::string, std::string> metadata) const;
+  /// The model alone, with the same metadata, and, for windows of time, the Novelty of its training
+  /// examples. Throws FileError.
+  void save_model(const std::string& path, std::map<std::string, std::string> metadata) const;
+  /// Continues where the saved trainer stood. Throws std::runtime_error when the file holds no training
+  /// state, or was made with other settings or data (naming the difference); nothing is changed then.
+  void restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata);
+
+ private:
+  struct Spreads {
+    Spread pictures, targets, means;
+    std::array<Spread*, 3> all() { return {&pictures, &targets, &means}; }
+    void clear();
+    void add(const Spreads& other);
+  };
+  struct Lane {
+    Lane(const Objective& master, Dim first, Dim count);
+    Dim first;                             // its share of the batch: samples first .. first + inputs.dim(0)
+    std::unique_ptr<Objective> objective;  // the master's values under gradients of its own
+    Batch batch;
+    LossTerms terms;
+    Spreads spreads;
+    std::string trouble;  // where the loss stopped to be finite
+    std::exception_ptr error;
+  };
+  void run_lane(Lane& lane) const;
+  void fill(Lane& lane) const;
+  void draw_noise(Lane& lane) const;
+  void add_up(StepReport& report);
+  void look_for_collapse(StepReport& report);
+  void check_finite(const LossTerms& terms) const;
+  std::vector<StoredTensor> novelty() const;
+  StoredTensor ranges() const;
+  std::map<std::string, std::string> full(std::map<std::string, std::string> metadata) const;
+
+  const Examples& data_;
+  std::vector<std::uint32_t> train_;
+  std::unique_ptr<Objective> objective_;
+  Batching batching_;
+  TrainingState state_;
+  Ranks& ranks_;
+  std::vector<double> statistics_, of_partner_;
+  std::vector<std::uint32_t> indices_;                          // of the batch
+  std::vector<Lane> lanes_;                                     // of this process
+  std::vector<const std::vector<Parameter>*> lane_parameters_;  // of these models
+};
+
+}  // namespace supertac

@@ -1,0 +1,164 @@
+#include "models/training/training_state.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "autograd/kernels/elementwise.h"
+#include "io/numbers.h"
+#include "layers/checkpoint.h"
+#include "models/diagnosis.h"
+
+namespace supertac {
+namespace {
+
+constexpr int kFlatStepsToReport = 100;
+
+void copy_into(Tensor& to, const Tensor& from) { std::copy_n(from.data(), from.size(), to.data()); }
+
+void expect_same(const SafetensorsFile& file, const std::string& path,
+                 const std::map<std::string, std::string>& expected) {
+  for (const auto& [key, value] : expected) {
+    const auto found = file.metadata().find(key);
+    if (found != file.metadata().end() && found->second == value) continue;
+    throw std::runtime_error(path + ": cannot resume: its " + key + " is " +
+                             (found == file.metadata().end() ? "missing" : found->second) +
+                             ", this run's is " + value +
+                             "; give the same options and data, or start anew without --resume");
+  }
+}
+
+}  // namespace
+
+void TrainingPace::check() const {
+  const auto require = [](bool holds, const char* what) {
+    if (!holds) throw std::invalid_argument(std::string("training settings: ") + what);
+  };
+  require(epochs >= 1 && epochs <= 100'000, "epochs must be 1 to 100000");
+  require(batch >= 1 && batch <= 4096, "batch must be 1 to 4096");
+  require(learning_rate > 0 && learning_rate <= 1, "learning rate must be above 0 and at most 1");
+  require(warm_up >= 0 && warm_up < 1, "warm-up must be a share of all steps, 0 to below 1");
+  require(clip_norm >= 0 && std::isfinite(clip_norm), "clip norm must not be negative (0 = never)");
+}
+
+TrainingState::TrainingState(const std::vector<Parameter>& parameters, const TrainingPace& pace,
+                             std::int64_t total_steps)
+    : parameters_(parameters),
+      adam_(values_of(parameters), {.learning_rate = pace.learning_rate, .clip_norm = pace.clip_norm}),
+      schedule_{.peak = pace.learning_rate,
+                .warm_up = static_cast<std::int64_t>(pace.warm_up * static_cast<double>(total_steps)),
+                .total = total_steps} {}
+
+bool TrainingState::collapsed(bool looks_so) {
+  flat_steps_ = looks_so && step_ >= schedule_.warm_up ? flat_steps_ + 1 : 0;
+  return flat_steps_ >= kFlatStepsToReport;
+}
+
+void TrainingState::add_up(const std::vector<Parameter>& lane, Ranks& ranks) {
+  sum_.clear();
+  for (const Parameter& p : lane) {
+    const auto gradient = p.value.grad().values();
+    sum_.insert(sum_.end(), gradient.begin(), gradient.end());
+  }
+  of_partner_.resize(sum_.size());
+  ranks.add_up(sum_, of_partner_);
+  const real* next = sum_.data();
+  for (const Parameter& p : lane) {
+    const auto gradient = Variable(p.value).mutable_grad().values();
+    std::copy_n(next, gradient.size(), gradient.data());
+    next += gradient.size();
+  }
+}
+
+double TrainingState::apply(const std::vector<const std::vector<Parameter>*>& lanes, Ranks& ranks) {
+  adam_.zero_grad();
+  const auto add = [&](Variable to, const Variable& from) {
+    kernels::add_scaled(from.grad().size(), 1, from.grad().data(), to.mutable_grad().data());
+  };
+  for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    for (std::size_t apart = 1; apart < lanes.size(); apart *= 2) {
+      for (std::size_t lane = 0; lane + apart < lanes.size(); lane += 2 * apart)
+        add((*lanes[lane])[i].value, (*lanes[lane + apart])[i].value);
+    }
+  }
+  if (ranks.size() > 1) add_up(*lanes.front(), ranks);
+  for (std::size_t i = 0; i < parameters_.size(); ++i) add(parameters_[i].value, (*lanes.front())[i].value);
+  adam_.set_learning_rate(learning_rate());
+  const double norm = adam_.step();
+  if (!std::isfinite(norm)) {
+    const std::string name = gradient_not_finite(parameters_);
+    stop(name.empty() ? "the gradient's norm overflows" : "the gradient of " + name + " is not finite");
+  }
+  ++step_;
+  return norm;
+}
+
+void TrainingState::stop(const std::string& what) const {
+  throw TrainingStopped("training stopped at step " + std::to_string(step_ + 1) + ": " + what +
+                        "; lower --learning-rate (now " + format(schedule_.peak) +
+                        ") or check the input with supertac-info");
+}
+
+void TrainingState::for_each_tensor(
+    const std::function<void(const std::string&, std::span<const real>)>& visit) const {
+  for (const Parameter& p : parameters_) visit(p.name, p.value.value().values());
+  for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    visit("optimizer.m." + parameters_[i].name, std::as_const(adam_.first_moments()[i]).values());
+    visit("optimizer.v." + parameters_[i].name, std::as_const(adam_.second_moments()[i]).values());
+  }
+}
+
+void TrainingState::save(const std::string& path, std::map<std::string, std::string> metadata) const {
+  std::vector<StoredTensor> state;
+  for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    const Parameter& p = parameters_[i];
+    state.push_back(to_stored(p, adam_.first_moments()[i], "optimizer.m." + p.name));
+    state.push_back(to_stored(p, adam_.second_moments()[i], "optimizer.v." + p.name));
+  }
+  metadata["step"] = std::to_string(step_);
+  metadata["flat_steps"] = std::to_string(flat_steps_);
+  write_checkpoint(path, parameters_, std::move(metadata), state);
+}
+
+void TrainingState::restore(const std::string& path, const std::map<std::string, std::string>& expected) {
+  const SafetensorsFile file = read_checkpoint(path);
+  expect_same(file, path, expected);
+  const auto integer = [&](const char* key) {
+    const auto found = file.metadata().find(key);
+    const auto value = found == file.metadata().end() ? std::nullopt : parse_int(found->second);
+    if (!value || *value < 0 || *value > total_steps()) {
+      throw std::runtime_error(path + ": holds no training state (metadata \"" + key +
+                               "\"); resume from the last.safetensors of the run's folder");
+    }
+    return *value;
+  };
+  const std::int64_t step = integer("step"), flat_steps = integer("flat_steps");
+  std::vector<Tensor> m, v;
+  for (const Parameter& p : parameters_) {
+    m.push_back(load_like(file, path, "optimizer.m." + p.name, p));
+    v.push_back(load_like(file, path, "optimizer.v." + p.name, p));
+  }
+  load_parameters(file, path, parameters_);
+  for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    copy_into(adam_.first_moments()[i], m[i]);
+    copy_into(adam_.second_moments()[i], v[i]);
+  }
+  adam_.set_steps(step);
+  step_ = step;
+  flat_steps_ = static_cast<int>(flat_steps);
+}
+
+void share_values(const std::vector<Parameter>& master, const std::vector<Parameter>& lane) {
+  for (std::size_t i = 0; i < master.size(); ++i) {
+    Variable own = lane[i].value;
+    own.mutable_value() = master[i].value.value();  // the same buffer
+    own.mutable_grad() = Tensor::zeros(own.shape());
+  }
+}
+
+void clear_gradients(const std::vector<Parameter>& parameters) {
+  for (const Parameter& p : parameters) Variable(p.value).mutable_grad().fill(0);
+}
+
+}  // namespace supertac

@@ -1,0 +1,86 @@
+// What a training run has besides its network and data: Adam, the rate's schedule, the step; saved and
+// restored to the bit.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "autograd/adam.h"
+#include "layers/module.h"
+#include "models/training/ranks.h"
+
+namespace supertac {
+
+/// How long, in what steps, how fast: whatever is trained.
+struct TrainingPace {
+  std::int64_t epochs = 20;  ///< 1 to 100,000
+  std::int64_t batch = 64;   ///< 1 to 4096
+  std::uint64_t seed = 0;
+  double learning_rate = 1e-3;  ///< Adam's peak, above 0 and at most 1
+  double warm_up = 0.05;        ///< share of all steps in which the rate rises; then half a cosine to 0
+  double clip_norm = 1;         ///< 0 = never
+
+  /// Throws std::invalid_argument naming the setting.
+  void check() const;
+};
+
+/// A value was not finite: step, where, and what to do are in what().
+class TrainingStopped : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class TrainingState {
+ public:
+  /// The parameters' handles are kept.
+  TrainingState(const std::vector<Parameter>& parameters, const TrainingPace& pace, std::int64_t total_steps);
+
+  std::int64_t step() const { return step_; }  ///< done so far
+  std::int64_t total_steps() const { return schedule_.total; }
+  bool done() const { return step_ >= schedule_.total; }
+  double learning_rate() const { return schedule_.at(step_); }
+
+  /// Counts steps in a row that look collapsed, not while the rate still rises: a network has not had its
+  /// chance to learn by then. True from the 100th on.
+  bool collapsed(bool looks_so);
+
+  /// Sets the gradients to the sum of the lanes', which is taken as a balanced binary tree (pairs of
+  /// neighbours, then pairs of pairs) in the lanes' own gradients, then over `ranks`; applies Adam; counts
+  /// the step. Returns the gradient's norm before clipping. Throws TrainingStopped, with nothing changed,
+  /// when it is not finite.
+  double apply(const std::vector<const std::vector<Parameter>*>& lanes, Ranks& ranks);
+  /// Throws TrainingStopped: step, `what`, and advice.
+  [[noreturn]] void stop(const std::string& what) const;
+
+  /// Every array of the state: the parameters, then Adam's first and second moments, named as in a
+  /// checkpoint.
+  void for_each_tensor(const std::function<void(const std::string&, std::span<const real>)>& visit) const;
+
+  /// Parameters and state, a checkpoint like any other with "optimizer." tensors besides. Throws FileError.
+  void save(const std::string& path, std::map<std::string, std::string> metadata) const;
+  /// Continues where the saved state stood. Throws std::runtime_error when the file holds no training state,
+  /// or one of `expected` differs from its metadata (naming the difference); nothing is changed then.
+  void restore(const std::string& path, const std::map<std::string, std::string>& expected);
+
+ private:
+  void add_up(const std::vector<Parameter>& lane, Ranks& ranks);
+
+  std::vector<Parameter> parameters_;
+  mutable Adam adam_;
+  Schedule schedule_;
+  std::int64_t step_ = 0;
+  int flat_steps_ = 0;
+  std::vector<real> sum_, of_partner_;  // all gradients in one piece, of several processes
+};
+
+/// Makes a lane's parameters share the master's values under gradients of their own.
+void share_values(const std::vector<Parameter>& master, const std::vector<Parameter>& lane);
+/// Sets gradients to 0.
+void clear_gradients(const std::vector<Parameter>& parameters);
+
+}  // namespace supertac
