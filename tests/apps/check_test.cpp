@@ -161,8 +161,9 @@ TEST_F(Audit, AnExplainedPictureIsComputedAgain) {
                                        list_recordings(path("data")).front(), "--at", "4", "--out", out});
   ASSERT_EQ(result.code, 0) << result.error;
   EXPECT_GT(SafetensorsFile::read(out).tensors().size(), 30U);
-  if (std::system("python3 -c 'import numpy' 2>/dev/null") != 0) GTEST_SKIP() << "python3 has no NumPy here";
-  const std::string command = "python3 " SUPERTAC_SOURCE "/examples/recompute.py " + out + " " +
+  if (std::system(SUPERTAC_PYTHON " -c 'import numpy' 2>/dev/null") != 0)
+    GTEST_SKIP() << "there is no Debian Python with NumPy here";
+  const std::string command = SUPERTAC_PYTHON " " SUPERTAC_SOURCE "/examples/recompute.py " + out + " " +
                               path("drawn.safetensors") + " > " + path("recomputed.txt");
   EXPECT_EQ(std::system(command.c_str()), 0) << bytes("recomputed.txt");
 }
