@@ -326,9 +326,7 @@ int main_of(const std::string& mode, std::uint64_t n, std::uint64_t seed) {
             {SUPERTAC_BIN "/supertac-simulate", "--out", "data", "--plates", "plain", "--passes", "1",
              "--trials", "1", "--speeds", "10"},
             60);
-  for (const auto& entry : fs::directory_iterator(folder / "data"))
-    if (entry.is_regular_file()) fs::copy_file(entry.path(), folder / "data/1/good");
-  if (fs::exists(folder / "data/1/good")) fs::rename(folder / "data/1/good", folder / "data/good");
+  fs::rename(folder / "data/plain_t1_p1_v10.safetensors", folder / "data/good");
   Counts counts;
   if (mode == "lines") counts = command_lines(folder, n, seed);
   if (mode == "signals") counts = signals(folder, n, seed);
