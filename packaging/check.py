@@ -11,6 +11,7 @@ import pathlib
 import shutil
 import subprocess
 import sys
+import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 build = pathlib.Path(sys.argv[1]).resolve()
@@ -24,9 +25,32 @@ def expect(holds, what):
         sys.exit(f"check.py: {what}")
 
 
-def bill():
-    words = [sys.executable, HERE / "sbom.py", build / "bin", "--version", "0"]
+def bill(*models):
+    words = [sys.executable, HERE / "sbom.py", build / "bin", *models, "--version", "0"]
     return subprocess.run(words, capture_output=True, text=True, check=True).stdout
+
+
+def validated(text):
+    """Whether CycloneDX's schema could be asked: pip install cyclonedx-python-lib[validation]."""
+    try:
+        from cyclonedx.schema import SchemaVersion
+        from cyclonedx.validation.json import JsonStrictValidator
+    except ImportError:
+        return False
+    error = JsonStrictValidator(SchemaVersion.V1_5).validate_str(text)
+    expect(error is None, f"CycloneDX 1.5 refuses the list: {error}")
+    return True
+
+
+def bill_with_a_model(folder):
+    """The list with the card of a model that this trains."""
+    def run(program, *words):
+        subprocess.run([build / "bin" / program, *words, "--quiet"], check=True, stdout=subprocess.DEVNULL)
+
+    run("supertac-simulate", "--out", f"{folder}/d", "--plates", "6_Ridges", "--passes", "1", "--speeds", "10")
+    run("supertac-train", "--data", f"{folder}/d", "--out", f"{folder}/m.safetensors", "--preset", "tiny", "--split", "none",
+        "--epochs", "1", "--stride", "64")
+    return bill(f"{folder}/m.safetensors")
 
 
 def completed(program, *words):
@@ -40,6 +64,12 @@ def completed(program, *words):
 
 text = bill()
 expect(text == bill(), "two lists of the same programs differ")
+with tempfile.TemporaryDirectory() as folder:
+    with_model = bill_with_a_model(folder)
+card = next(part for part in json.loads(with_model)["components"] if part["type"] == "machine-learning-model")
+said = {entry["name"]: entry["value"] for entry in card["properties"]}
+expect("recordings" in said["supertac:provenance"], "the model's card does not say what it was trained on")
+asked = validated(text) and validated(with_model)
 parts = {entry["ref"]: " ".join(entry["dependsOn"]) for entry in json.loads(text)["dependencies"]}
 expect("libstdc%2B%2B6" in parts["supertac-info"] or "libstdc++6" in parts["supertac-info"], "supertac-info links no C++")
 expect("openblas" in parts["supertac-evaluate"], "supertac-evaluate links OpenBLAS, the list does not say so")
@@ -54,4 +84,5 @@ if shutil.which("help2man"):
     for job in jobs:
         page = (pages / f"supertac-{job}.1").read_text()
         expect("\\-\\-json" in page and ".SH NAME" in page, f"the man page of {job} lacks its options")
+print("CycloneDX's schema accepts the list" if asked else "cyclonedx is not installed: its schema was not asked")
 print(f"{len(parts)} programs listed, {len(jobs)} completed" + (f", {len(list(pages.glob('*.1')))} man pages" if pages.exists() else ""))

@@ -7,6 +7,7 @@ The libraries are those that the programs themselves name, with the Debian packa
 headers that are compiled in are listed besides. The same programs give the same bytes.
 """
 import argparse
+import functools
 import hashlib
 import json
 import pathlib
@@ -16,6 +17,7 @@ import subprocess
 COMPILED_IN = ("nlohmann-json3-dev", "libcxxopts-dev", "libstb-dev")
 
 
+@functools.cache
 def output(*words):
     done = subprocess.run(words, capture_output=True, text=True)
     return done.stdout if done.returncode == 0 else ""

@@ -125,7 +125,7 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         rig, other = folder / "4x4", folder / "3x5x2"
-        run("supertac-simulate", "--out", rig, "--plates", "6_Ridges", "--passes", 1, "--trials", 1, "--speeds", 10, "--quiet")
+        run("supertac-simulate", "--out", rig, "--plates", "6_Ridges", "--passes", 1, "--trials", 1, "--speeds", 5, "--quiet")
         recordings = sorted(rig.glob("*.safetensors"))
         other.mkdir()
         with_two_channels(supertac.read_recording(recordings[0]), other / recordings[0].name)
