@@ -31,9 +31,10 @@ PAGES, STALLED, SLOW, MALFORMED, SECONDS = 50, 5, 60, 100_000, 30
 SLIDES = ["G92 X99.7 Y101.17 Z131.81", "G1 Z91.81 F1200"]
 
 
-def ordinary():
-    """Load and browser are no part of what is measured and get what the machine has left."""
-    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+def give_way(policy):
+    """Load and browser are no part of what is measured. The load stands for other machines and gets what this one has left
+    (SCHED_IDLE), also behind the kernel's own threads, which hand over what came at a port."""
+    os.sched_setscheduler(0, policy, os.sched_param(0))
 
 
 def keep_sliding(rig, end):
@@ -115,7 +116,7 @@ def run_once(binaries, model, folder, loaded, malformed):
     came = {"events": 0, "answered": 0, "pages": 0, "seconds": SECONDS}
     if loaded:
         words = [sys.executable, __file__, "attack", str(stream.port), str(SECONDS), str(malformed)]
-        came = json.loads(subprocess.run(words, stdout=subprocess.PIPE, check=True, preexec_fn=ordinary).stdout)
+        came = json.loads(subprocess.run(words, stdout=subprocess.PIPE, check=True, preexec_fn=lambda: give_way(os.SCHED_IDLE)).stdout)
     else:
         time.sleep(SECONDS)
     resident = stream.resident_kb()
@@ -152,7 +153,7 @@ def hour(binaries, model, seconds):
         sliding = threading.Thread(target=keep_sliding, args=(rig, end))
         sliding.start()
         stream = Stream(binaries, model, rig.board, folder, True)
-        ordinary()
+        give_way(os.SCHED_OTHER)
         with Browser(shutil.which("chromedriver"), shutil.which("chromium"), folder) as browser:
             browser.look(1280, 860)
             browser.open(f"http://127.0.0.1:{stream.port}")

@@ -2,6 +2,12 @@
 
 #include <cmath>
 
+#if defined(__x86_64__) && defined(__linux__)
+#include <cpuid.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+#endif
+
 #include "autograd/kernels/fast/isa.h"
 
 namespace supertac::kernels {
@@ -52,6 +58,19 @@ void line_to_bytes(Dim n, const float* x, Steps steps, std::uint8_t* bytes) {
   for (Dim i = 0; i < n; ++i) bytes[i] = to_byte(x[i], steps);
 }
 
+// Tiles are a part of the processor's state that Linux gives only to who asks for it.
+bool may_use_tiles() {
+#if defined(__x86_64__) && defined(SYS_arch_prctl)
+  constexpr unsigned kTiles = 1U << 24, kBytes = 1U << 25;
+  constexpr long kAskForState = 0x1023, kTileData = 18;
+  unsigned a = 0, b = 0, c = 0, d = 0;
+  return __get_cpuid_count(7, 0, &a, &b, &c, &d) != 0 && (d & kTiles) != 0 && (d & kBytes) != 0 &&
+         syscall(SYS_arch_prctl, kAskForState, kTileData) == 0;
+#else
+  return false;
+#endif
+}
+
 }  // namespace
 
 const ByteKernels kPlainByteKernels{product, line_to_bytes};
@@ -67,8 +86,9 @@ void to_bytes(const ToBytesJob& job, const float* x, std::uint8_t* bytes) {
 
 const ByteKernels& byte_kernels() {
 #ifndef SUPERTAC_REAL_IS_DOUBLE
-  static const bool has_vnni = __builtin_cpu_supports("avx512vnni");
+  static const bool has_vnni = __builtin_cpu_supports("avx512vnni"), has_tiles = may_use_tiles();
   const Vectors vectors = isa_kernels().vectors;
+  if (vectors == Vectors::avx512 && has_vnni && has_tiles) return kAmxByteKernels;
   if (vectors == Vectors::avx512 && has_vnni) return kVnniByteKernels;
   if (vectors != Vectors::baseline) return kAvx2ByteKernels;
 #endif

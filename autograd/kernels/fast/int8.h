@@ -60,6 +60,7 @@ extern const ByteKernels kPlainByteKernels;
 #ifndef SUPERTAC_REAL_IS_DOUBLE
 extern const ByteKernels kAvx2ByteKernels;
 extern const ByteKernels kVnniByteKernels;
+extern const ByteKernels kAmxByteKernels;
 #endif
 
 }  // namespace supertac::kernels

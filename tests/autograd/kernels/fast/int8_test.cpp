@@ -30,43 +30,49 @@ std::vector<ByteKernels> kernels_here() {
     all.push_back(byte_kernels());
   }
   use_isa(before);
+#ifndef SUPERTAC_REAL_IS_DOUBLE
+  if (__builtin_cpu_supports("avx512vnni")) all.push_back(kVnniByteKernels);  // where there are tiles too
+#endif
   return all;
 }
 
-// The largest bytes everywhere: what saturates would show.
-TEST(Bytes, EveryKernelHasTheBitsOfThePlainOne) {
+// Maps of 2 x 3 x 5 pixels and two segments; the largest bytes everywhere, too: what saturates would show.
+void expect_bits_of_the_plain_kernel(Dim length, Dim kept, bool extreme) {
   const std::array<Dim, 2> segments{0, 40};
-  for (const Dim kept : {1, 7, 16, 20, 32, 64}) {
-    const Dim cout = (kept + 15) / 16 * 16, length = 12, images = 2, height = 3, width = 5;
-    for (const int extreme : {0, 1}) {
-      const auto x = extreme ? std::vector<std::uint8_t>(1000, 255) : numbers<std::uint8_t>(1000, 0, 255);
-      const Dim weights = 2 * length * cout;
-      const auto w = extreme ? std::vector<std::int8_t>(static_cast<std::size_t>(weights), -127)
-                             : numbers<std::int8_t>(weights, -127, 127);
-      const auto scale = numbers<float>(cout, 1, 9), bias = numbers<float>(cout, -9, 9);
-      const ByteProductJob job{.images = images,
-                               .height = height,
-                               .width = width,
-                               .from = {300, 60, 8},
-                               .to = {height * width * kept, width * kept, kept},
-                               .segments = segments.data(),
-                               .segment_count = 2,
-                               .length = length,
-                               .w = w.data(),
-                               .cout = cout,
-                               .kept = kept,
-                               .outcome = {scale.data(), bias.data(), 0.01F, {700.0F, 100}}};
-      const auto size = static_cast<std::size_t>(images * height * width * kept);
-      std::vector<float> expected(size), y(size);
-      std::vector<std::uint8_t> expected_bytes(size), bytes(size);
-      kPlainByteKernels.product(job, x.data(), expected.data(), expected_bytes.data());
-      for (const ByteKernels& set : kernels_here()) {
-        set.product(job, x.data(), y.data(), bytes.data());
-        EXPECT_EQ(y, expected);
-        EXPECT_EQ(bytes, expected_bytes);
-      }
-    }
+  const Dim cout = (kept + 15) / 16 * 16, images = 2, height = 3, width = 5, size_of_x = 1000;
+  const auto x =
+      extreme ? std::vector<std::uint8_t>(size_of_x, 255) : numbers<std::uint8_t>(size_of_x, 0, 255);
+  const Dim weights = 2 * length * cout;
+  const auto w = extreme ? std::vector<std::int8_t>(static_cast<std::size_t>(weights), -127)
+                         : numbers<std::int8_t>(weights, -127, 127);
+  const auto scale = numbers<float>(cout, 1, 9), bias = numbers<float>(cout, -9, 9);
+  const ByteProductJob job{.images = images,
+                           .height = height,
+                           .width = width,
+                           .from = {300, 60, 8},
+                           .to = {height * width * kept, width * kept, kept},
+                           .segments = segments.data(),
+                           .segment_count = 2,
+                           .length = length,
+                           .w = w.data(),
+                           .cout = cout,
+                           .kept = kept,
+                           .outcome = {scale.data(), bias.data(), 0.01F, {700.0F, 100}}};
+  const auto size = static_cast<std::size_t>(images * height * width * kept);
+  std::vector<float> expected(size), y(size);
+  std::vector<std::uint8_t> expected_bytes(size), bytes(size);
+  kPlainByteKernels.product(job, x.data(), expected.data(), expected_bytes.data());
+  for (const ByteKernels& set : kernels_here()) {
+    set.product(job, x.data(), y.data(), bytes.data());
+    EXPECT_EQ(y, expected) << length << " bytes, " << kept << " outputs";
+    EXPECT_EQ(bytes, expected_bytes) << length << " bytes, " << kept << " outputs";
   }
+}
+
+TEST(Bytes, EveryKernelHasTheBitsOfThePlainOne) {
+  for (const Dim length : {12, 36, 64, 96, 400})  // those from 36 on fill rows of tiles
+    for (const Dim kept : {1, 7, 16, 20, 32, 64})
+      for (const bool extreme : {false, true}) expect_bits_of_the_plain_kernel(length, kept, extreme);
 }
 
 TEST(Bytes, RoundToTheNearestAndStayInRange) {
