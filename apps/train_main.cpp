@@ -73,8 +73,13 @@ int train(const Arguments& a, Ranks& ranks) {
   training_split(a);
   refuse_existing(a.text("out"), a.force());
   const WindowSet windows = training_windows(a, settings.model, settings.seed);
-  add_parent("recordings", hash_of_recordings(a.text("data"), a.list("plates")));
-  if (a.given("also")) add_parent("also", hash_of_recordings(a.text("also"), {}));
+  const auto add_folder = [&](const char* role, const std::string& folder,
+                              const std::vector<std::string>& plates) {
+    const auto known = windows.content(folder);
+    add_parent(role, known ? *known : hash_of_recordings(folder, plates));
+  };
+  add_folder("recordings", a.text("data"), a.list("plates"));
+  if (a.given("also")) add_folder("also", a.text("also"), {});
   set_array(settings.model, windows.array());
   TrainingTask task = window_task(a, windows, settings);
   const std::vector<std::string> remarks = remarks_on(windows, task.split.train);

@@ -11,6 +11,7 @@ SystemCalls real_system_calls() {
       .open = [](const char* path, int flags, mode_t mode) { return ::open(path, flags, mode); },
       .fstat = [](int file, struct stat* status) { return ::fstat(file, status); },
       .read = ::read,
+      .pread = ::pread,
       .write = ::write,
       .fsync = ::fsync,
       .close = ::close,

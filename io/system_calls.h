@@ -15,6 +15,7 @@ struct SystemCalls {
   int (*open)(const char* path, int flags, mode_t mode);
   int (*fstat)(int file, struct stat* status);
   ssize_t (*read)(int file, void* bytes, std::size_t count);
+  ssize_t (*pread)(int file, void* bytes, std::size_t count, off_t offset);
   ssize_t (*write)(int file, const void* bytes, std::size_t count);
   int (*fsync)(int file);
   int (*close)(int file);

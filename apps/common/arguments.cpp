@@ -246,8 +246,9 @@ std::vector<NamedPath> Arguments::paths() const {
 }
 
 std::string Arguments::deciding_options() const {
-  static const std::set<std::string> kHow = {
-      "json", "quiet", "threads", "force", "merge", "ledger", "checkpoint-every", "deadline", "shard"};
+  static const std::set<std::string> kHow = {"json",  "quiet",  "threads",          "force",
+                                             "merge", "ledger", "checkpoint-every", "deadline",
+                                             "shard", "memory"};
   std::string line = program_;
   for (const std::string& name : order_) {
     const Option& option = options_.at(name);

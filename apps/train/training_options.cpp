@@ -1,5 +1,8 @@
 #include "apps/train/training_options.h"
 
+#include <cmath>
+#include <optional>
+
 #include "data/recordings/signal_range.h"
 #include "data/samples/random_passes.h"
 #include "io/numbers.h"
@@ -54,6 +57,10 @@ void declare_window_training(Arguments& a) {
            "standard: random gains, offsets, noise, dropped taxels and a finger lifted a little, for unseen "
            "trials; none",
            "standard");
+  a.option("memory", "SIZE",
+           "for recordings that do not fit into memory: hold SIZE (500M, 2G) of their samples and read the "
+           "others from DIR/.supertac, which is made once and takes as much disk as samples of --rate need "
+           "(default: hold all)");
   a.option("also", "DIR", "more recordings to train on, never tested: simulated ones, say");
   a.option("interval-factor", "X",
            "half the width of a pixel's 90 % interval in units of its spread, as supertac-evaluate finds it "
@@ -135,11 +142,10 @@ static Scaling stated_range(const Arguments& a) {
 }
 
 // Training on signals that are clipped draws zeros without a word.
-static Scaling training_scaling(const Arguments& a) {
+static Scaling training_scaling(const Arguments& a, const SignalRange& range) {
   constexpr double kMostClipped = 0.5, kWorthSaying = 0.01;
   const bool automatic = a.text("range") == "auto";
   Scaling scaling = automatic ? Scaling() : stated_range(a);
-  const SignalRange range = SignalRange::of_folder(a.text("data"), a.list("plates"));
   if (automatic) scaling = range.fitted();
   const std::string text = format(scaling.rest_volts) + "," + format(scaling.span_volts);
   const double clipped = range.clipped(scaling);
@@ -175,15 +181,38 @@ static double common_speed(const WindowSet& windows) {
   return speed > 0 ? speed : rig::kSlideMmS;
 }
 
+// --memory, "500M" say; nothing when all recordings are held.
+static std::optional<std::uint64_t> memory_limit(const Arguments& a) {
+  if (!a.given("memory")) return std::nullopt;
+  std::string text = a.text("memory");
+  const std::size_t unit = text.empty() ? std::string::npos : std::string("KMG").find(text.back());
+  if (unit != std::string::npos) text.pop_back();
+  const auto number = parse_double(text);
+  if (!number || !(*number >= 0 && *number <= 1e9))
+    throw UsageError("--memory expects a size such as 500M or 2G, found " + a.text("memory"));
+  return static_cast<std::uint64_t>(*number * (unit == std::string::npos ? 1 : std::pow(1000, unit + 1)));
+}
+
 WindowSet training_windows(const Arguments& a, const SuperTacSettings& model, std::uint64_t seed) {
+  const std::string dir = a.text("data");
+  const std::vector<std::string> plates = a.list("plates");
   WindowSettings w;
   w.timesteps = static_cast<int>(model.timesteps);
   w.scale = static_cast<int>(model.scale);
   w.rate_hz = training_rate_hz(a, model);
-  w.scaling = training_scaling(a);
   w.stride = static_cast<int>(a.integer("stride", 1, 100'000));
-  WindowSet windows = WindowSet::load(a.text("data"), a.list("plates"), w);
-  if (a.given("also")) windows.add_directory(a.text("also"), {}, true);
+  const auto limit = memory_limit(a);
+  const auto file_of = [&](const std::string& folder, const std::vector<std::string>& chosen) {
+    return TrackFile::open(folder, {chosen, w.rate_hz, w.max_gap_s, *limit});
+  };
+  const auto file = limit ? file_of(dir, plates) : nullptr;
+  w.scaling = training_scaling(a, file ? file->index().range : SignalRange::of_folder(dir, plates));
+  WindowSet windows(w);
+  if (file) windows.add(file);
+  if (!file) windows.add_directory(dir, plates);
+  windows.check_any(dir);
+  if (a.given("also") && limit) windows.add(file_of(a.text("also"), {}), true);
+  if (a.given("also") && !limit) windows.add_directory(a.text("also"), {}, true);
   const RandomPasses random{.count = random_plates(a, w.scaling),
                             .seed = seed,
                             .speed_mm_s = common_speed(windows),

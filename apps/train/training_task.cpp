@@ -22,7 +22,7 @@ TrainingTask window_task(const Arguments& a, const WindowSet& windows, const Tra
                     .unit = "windows",
                     .split = make_split(windows, training_split(a), settings.seed, a.text("leave-out")),
                     .objective = window_objective(windows, settings)};
-  task.split.train = without_most_silence(windows, task.split.train);
+  task.split.train = without_most_silence(windows, std::move(task.split.train));
   task.origin = origin_of(name, settings.seed, windows, task.split);
   task.origin["plates"] = a.text("plates");
   task.origin["stride"] = a.text("stride");

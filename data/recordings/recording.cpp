@@ -6,12 +6,12 @@
 #include <optional>
 #include <span>
 #include <stdexcept>
+#include <utility>
 
 #include "io/file.h"
 #include "io/json.h"
 #include "io/numbers.h"
 #include "io/provenance.h"
-#include "io/safetensors.h"
 #include "io/sha256.h"
 #include "io/text.h"
 
@@ -124,8 +124,10 @@ double Recording::filter_s() const {
   return found == metadata.end() ? 0 : parse_double(found->second).value_or(0);
 }
 
-Recording read_recording(const std::string& path) {
-  const SafetensorsFile file = SafetensorsFile::read(path);
+Recording read_recording(const std::string& path) { return recording_of(SafetensorsFile::read(path)); }
+
+Recording recording_of(const SafetensorsFile& file) {
+  const std::string& path = file.path();
   Recording recording;
   recording.metadata = file.metadata();
   recording.metadata.erase(kProvenanceKey);
@@ -228,6 +230,10 @@ std::string hash_of_recordings(const std::string& folder, const std::vector<std:
     if (plates.empty() || std::find(plates.begin(), plates.end(), plate->second) != plates.end())
       hashes.push_back(content_hash(file));
   }
+  return hash_of_contents(std::move(hashes));
+}
+
+std::string hash_of_contents(std::vector<std::string> hashes) {
   std::sort(hashes.begin(), hashes.end());
   Sha256 sum;
   for (const std::string& hash : hashes) sum.add(hash);

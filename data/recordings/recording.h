@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "data/plates/taxel_array.h"
+#include "io/safetensors.h"
 
 namespace supertac {
 
@@ -35,6 +36,8 @@ struct Recording {
 /// sizes that do not match, values that are not finite (position_mm may be NaN), time stamps that do not
 /// increase, a speed, a moving average (metadata "filter_s", s) or a time that no rig has.
 Recording read_recording(const std::string& path);
+/// The same of a file that has been read.
+Recording recording_of(const SafetensorsFile& file);
 
 /// Writes it atomically; the same recording gives the same bytes.
 /// Throws std::invalid_argument when the recording breaks a rule read_recording() checks, or its metadata
@@ -53,5 +56,7 @@ std::vector<std::string> list_recordings(const std::string& folder);
 /// from them, however the files are called and whoever made them: SHA-256 over their sorted content hashes
 /// (io/provenance.h). Throws FileError.
 std::string hash_of_recordings(const std::string& folder, const std::vector<std::string>& plates);
+/// The same from the content hashes.
+std::string hash_of_contents(std::vector<std::string> hashes);
 
 }  // namespace supertac

@@ -22,10 +22,11 @@ std::span<const float> volts_of(const Recording& recording, std::size_t frame) {
 }
 
 void check(const Recording& recording, const ResampleSettings& settings) {
-  if (!(settings.rate_hz > 0) || !(settings.max_gap_s > 0) || !(settings.scaling.span_volts > 0))
+  const double span_volts = settings.scaling.value_or(Scaling{}).span_volts;
+  if (!(settings.rate_hz > 0) || !(settings.max_gap_s > 0) || !(span_volts > 0))
     throw std::invalid_argument("resample: rate_hz, max_gap_s and span_volts must be positive, got " +
                                 std::to_string(settings.rate_hz) + ", " + std::to_string(settings.max_gap_s) +
-                                " and " + std::to_string(settings.scaling.span_volts));
+                                " and " + std::to_string(span_volts));
   const std::size_t n = recording.time_s.size(), values = n * recording.array.signals();
   const std::size_t positions = recording.position_mm.size();
   if (recording.volts.size() != values || (positions != 0 && positions != 2 * n))
@@ -86,7 +87,7 @@ class Segment {
     track.samples.resize(track.samples.size() + signals);
     const std::span<float> sample = std::span(track.samples).last(signals);
     mean_.volts(sample);
-    settings_.scaling(sample);
+    if (settings_.scaling) (*settings_.scaling)(sample);
   }
 
   // `before` moves along with the time: the last recorded frame at or before it.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -54,7 +55,7 @@ struct Track {
 struct ResampleSettings {
   double rate_hz = 300;
   double max_gap_s = 0.05;  ///< longer silence between two recorded frames is a gap, never filled
-  Scaling scaling = {};
+  std::optional<Scaling> scaling = Scaling{};  ///< nothing: the samples stay in volts
 };
 
 /// Puts a recording onto rate_hz. Between two gaps frame j stands for the time c = t_first + j / rate:

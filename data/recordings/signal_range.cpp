@@ -8,7 +8,7 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kFramesApart = 64;
+constexpr std::size_t kMostValues = std::size_t{1} << 22;
 constexpr double kTail = 0.005, kMostClipped = 0.05, kLeastFilled = 0.1, kMargin = 1.1;
 // The rest of some taxels lies above the common one.
 constexpr double kAboveRest = 0.25;
@@ -25,37 +25,55 @@ SignalRange SignalRange::of_folder(const std::string& dir, const std::vector<std
 }
 
 void SignalRange::add(const Recording& recording) {
-  const std::size_t signals = recording.array.signals();
-  const auto before = static_cast<std::ptrdiff_t>(sorted_.size());
-  for (std::size_t i = 0; i < recording.volts.size(); i += kFramesApart * signals)
-    for (std::size_t k = 0; k < signals; ++k)
-      if (std::isfinite(recording.volts[i + k])) sorted_.push_back(recording.volts[i + k]);
-  std::sort(sorted_.begin() + before, sorted_.end());
-  std::inplace_merge(sorted_.begin(), sorted_.begin() + before, sorted_.end());
+  const std::size_t signals = recording.array.signals(), frames = recording.frames();
+  for (; next_ < frames; next_ += apart_)
+    for (std::size_t k = 0; k < signals; ++k) {
+      const float value = recording.volts[next_ * signals + k];
+      if (std::isfinite(value)) values_.push_back(value);
+    }
+  sorted_ = false;
+  next_ = thinned_ ? next_ - frames : 0;
+  while (values_.size() > kMostValues) thin_out();
+}
+
+// Every second of the sorted values: the levels stay where they are.
+void SignalRange::thin_out() {
+  values();
+  for (std::size_t i = 0; 2 * i < values_.size(); ++i) values_[i] = values_[2 * i];
+  values_.resize((values_.size() + 1) / 2);
+  apart_ *= 2;
+  thinned_ = true;
+}
+
+const std::vector<float>& SignalRange::values() const {
+  if (!sorted_) std::sort(values_.begin(), values_.end());
+  sorted_ = true;
+  return values_;
 }
 
 double SignalRange::clipped(const Scaling& s) const {
-  if (sorted_.empty()) return 0;
-  const auto pressed = std::ranges::lower_bound(sorted_, s.rest_volts - s.span_volts) - sorted_.begin();
+  if (values_.empty()) return 0;
+  const std::vector<float>& sorted = values();
+  const auto pressed = std::ranges::lower_bound(sorted, s.rest_volts - s.span_volts) - sorted.begin();
   const auto above =
-      sorted_.end() - std::ranges::upper_bound(sorted_, s.rest_volts + kAboveRest * s.span_volts);
-  return static_cast<double>(pressed + above) / static_cast<double>(sorted_.size());
+      sorted.end() - std::ranges::upper_bound(sorted, s.rest_volts + kAboveRest * s.span_volts);
+  return static_cast<double>(pressed + above) / static_cast<double>(sorted.size());
 }
 
 double SignalRange::level(double share) const {
-  return double{sorted_[static_cast<std::size_t>(share * static_cast<double>(sorted_.size() - 1))]};
+  return double{values()[static_cast<std::size_t>(share * static_cast<double>(values_.size() - 1))]};
 }
 
 Scaling SignalRange::fitted() const {
   const Scaling rig;
-  if (sorted_.empty()) return rig;
+  if (values_.empty()) return rig;
   const double low = level(kTail), high = level(1 - kTail);
   if (clipped(rig) <= kMostClipped && high - low >= kLeastFilled * rig.span_volts) return rig;
   return {.rest_volts = high, .span_volts = std::max(kMargin * (high - low), 1e-6)};
 }
 
 std::string SignalRange::text() const {
-  return sorted_.empty() ? "nowhere" : format(level(kTail), 3) + " to " + format(level(1 - kTail), 3);
+  return values_.empty() ? "nowhere" : format(level(kTail), 3) + " to " + format(level(1 - kTail), 3);
 }
 
 }  // namespace supertac

@@ -1,16 +1,22 @@
 // In what range a sensor's signals lie.
 #pragma once
 
+#include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "data/recordings/resample.h"
 
 namespace supertac {
 
-/// The signals of some recordings, an even sample of them.
+/// The signals of some recordings, an even sample of them: one frame in 64, and of more than 16 million
+/// frames fewer.
 class SignalRange {
  public:
+  SignalRange() = default;
+  /// From the values() of one that took in all its recordings.
+  explicit SignalRange(std::vector<float> values) : values_(std::move(values)), sorted_(false) {}
   /// Of a folder's recordings, only these plates when any are named. Throws as list_recordings() and
   /// read_recording().
   static SignalRange of_folder(const std::string& dir, const std::vector<std::string>& plates);
@@ -25,10 +31,17 @@ class SignalRange {
   Scaling fitted() const;
   /// "68 to 102.3", all but the outermost 200th on both sides.
   std::string text() const;
+  /// All of the sample, in ascending order.
+  const std::vector<float>& values() const;
 
  private:
   double level(double share) const;
-  std::vector<float> sorted_;
+  void thin_out();
+
+  mutable std::vector<float> values_;
+  mutable bool sorted_ = true;
+  std::size_t apart_ = 64, next_ = 0;  // frames from one of the sample to the next, and to the first
+  bool thinned_ = false;               // until then every recording begins with one of the sample
 };
 
 }  // namespace supertac

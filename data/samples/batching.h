@@ -35,6 +35,7 @@ class Batching {
   /// Throws std::invalid_argument when there is no index or batch < 1.
   Batching(std::vector<std::uint32_t> indices, std::size_t batch, std::uint64_t seed);
   std::size_t batches_per_epoch() const { return indices_.size() / batch_; }
+  const std::vector<std::uint32_t>& indices() const { return indices_; }
   std::size_t batch_size() const { return batch_; }
   /// Writes the batch_size() window indices of a batch. Throws std::invalid_argument on b or the size of
   /// out.

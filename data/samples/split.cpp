@@ -6,17 +6,18 @@
 #include <map>
 #include <set>
 #include <stdexcept>
-#include <unordered_map>
 #include <utility>
 
 #include "data/plates/random_plate.h"
 #include "data/samples/batching.h"
 #include "io/hash.h"
+#include "io/numbers.h"
 
 namespace supertac {
 namespace {
 
 constexpr double kTestShare = 0.2;
+constexpr std::size_t kMostHashed = std::size_t{1} << 22;
 constexpr std::uint64_t kWindowStream = 0, kPlateStream = 1, kPassStream = 2;
 
 constexpr std::array<std::pair<const char*, SplitKind>, 5> kNames{{{"window", SplitKind::window},
@@ -94,16 +95,24 @@ Split split_windows(const WindowSet& windows, std::uint64_t seed) {
   std::vector<bool> tested(windows.size(), false);
   for (std::size_t i = 0; i < test_count(own.size()); ++i) tested[own[order[i]]] = true;
   Split split;
+  split.test.reserve(test_count(own.size()));
+  split.train.reserve(windows.size() - test_count(own.size()));
   for (std::uint32_t i = 0; i < windows.size(); ++i) (tested[i] ? split.test : split.train).push_back(i);
   return split;
 }
 
 Split split_by_pass(const WindowSet& windows, const std::vector<Side>& sides) {
   Split split;
-  for (std::size_t i = 0; i < windows.size(); ++i) {
-    const Side side = sides[windows.pass_of(i)];
-    if (side != Side::neither)
-      (side == Side::test ? split.test : split.train).push_back(static_cast<std::uint32_t>(i));
+  for (const Side side : {Side::train, Side::test}) {
+    std::vector<std::uint32_t>& list = side == Side::test ? split.test : split.train;
+    std::size_t size = 0;
+    for (std::size_t p = 0; p < sides.size(); ++p) size += sides[p] == side ? windows.passes()[p].windows : 0;
+    list.reserve(size);  // growing takes twice the memory
+    for (std::size_t p = 0; p < sides.size(); ++p) {
+      const WindowSet::Pass& pass = windows.passes()[p];
+      for (std::size_t i = 0; sides[p] == side && i < pass.windows; ++i)
+        list.push_back(static_cast<std::uint32_t>(pass.first_window + i));
+    }
   }
   return split;
 }
@@ -139,31 +148,65 @@ class PassHashes {
   std::vector<std::uint32_t> equal_;  // frames up to here that are all the same
 };
 
-std::vector<std::uint64_t> hash_windows(const WindowSet& windows, std::vector<bool>& changes) {
-  std::vector<std::uint64_t> hashes(windows.size());
-  changes.resize(windows.size());
+struct HashedWindow {
+  std::uint64_t hash;
+  std::uint32_t window;
+};
+
+// Of the windows whose content changes, by hash and number. Of many windows only those whose hash ends with
+// some zeros: of two that are the same both or none.
+std::vector<HashedWindow> hash_windows(const WindowSet& windows, std::uint64_t every) {
+  std::vector<HashedWindow> hashed;
   for (std::size_t p = 0; p < windows.passes().size(); ++p) {
     const WindowSet::Pass& pass = windows.passes()[p];
-    const PassHashes of_pass(windows.track(p), windows.array().signals(),
+    if (pass.windows == 0) continue;
+    const PassHashes of_pass(windows.track(p).samples, windows.array().signals(),
                              static_cast<std::size_t>(windows.timesteps()));
     for (std::size_t i = pass.first_window; i < pass.first_window + pass.windows; ++i) {
-      hashes[i] = of_pass.window(windows.frame_of(i));
-      changes[i] = of_pass.changes(windows.frame_of(i));
+      const std::size_t frame = windows.frame_of(i);
+      const std::uint64_t hash = of_pass.window(frame);
+      if (of_pass.changes(frame) && hash % every == 0)
+        hashed.push_back({hash, static_cast<std::uint32_t>(i)});
     }
   }
-  return hashes;
+  std::ranges::sort(hashed, {}, [](const HashedWindow& w) { return std::pair(w.hash, w.window); });
+  return hashed;
+}
+
+std::size_t count_duplicated(const WindowSet& windows, const Split& split) {
+  std::uint64_t every = 1;
+  while (windows.size() / every > kMostHashed) every *= 2;
+  const std::vector<HashedWindow> hashed = hash_windows(windows, every);
+  std::size_t count = 0;
+  for (auto first = hashed.begin(); first != hashed.end();) {
+    const auto end = std::find_if(first, hashed.end(), [&](const auto& w) { return w.hash != first->hash; });
+    const auto trained = [&](const HashedWindow& w) {
+      return std::ranges::binary_search(split.train, w.window);
+    };
+    const auto same = std::count_if(first, end, trained);
+    for (; first != end; ++first)
+      if (std::ranges::binary_search(split.test, first->window))
+        count += same - (trained(*first) ? 1 : 0) > 0 ? 1 : 0;
+  }
+  return count * every;
 }
 
 std::size_t count_overlapping(const WindowSet& windows, const Split& split) {
   const auto timesteps = static_cast<std::size_t>(windows.timesteps());
-  const auto touches = [&](std::size_t a, std::size_t b) {
+  std::size_t count = 0, begin = 0, end = 0;  // windows of the pass
+  const auto touches = [&](std::uint32_t a, std::uint32_t b) {
+    if (b < begin || b >= end) return false;
     const std::size_t fa = windows.frame_of(a), fb = windows.frame_of(b);
-    return windows.pass_of(a) == windows.pass_of(b) && (fa > fb ? fa - fb : fb - fa) < timesteps;
+    return (fa > fb ? fa - fb : fb - fa) < timesteps;
   };
-  std::size_t count = 0;
+  auto after = split.train.begin();
   for (const std::uint32_t i : split.test) {
+    if (i >= end) {
+      const WindowSet::Pass& pass = windows.passes()[windows.pass_of(i)];
+      begin = pass.first_window, end = begin + pass.windows;
+    }
     // Indices follow pass and time, so the nearest training windows are the neighbours in the list.
-    const auto after = std::lower_bound(split.train.begin(), split.train.end(), i);
+    while (after != split.train.end() && *after < i) ++after;
     const bool shares = (after != split.train.end() && touches(i, *after)) ||
                         (after != split.train.begin() && touches(i, *std::prev(after)));
     count += shares ? 1 : 0;
@@ -228,18 +271,26 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed, c
   return split;
 }
 
-std::vector<std::uint32_t> without_most_silence(const WindowSet& windows,
-                                                std::span<const std::uint32_t> list) {
+std::vector<std::uint32_t> without_most_silence(const WindowSet& windows, std::vector<std::uint32_t> list) {
   constexpr std::size_t kSilentApart = 4;
-  std::vector<std::uint32_t> kept;
-  std::size_t pass = SIZE_MAX, silent = 0;
-  for (const std::uint32_t i : list) {
-    if (windows.pass_of(i) != pass) pass = windows.pass_of(i), silent = 0;
-    const Plate& plate = windows.plate(pass);
-    const bool plain = plate.max_height() == plate.min_height();
-    if (windows.may_vary(i) || plain || windows.contact(i) || silent++ % kSilentApart == 0) kept.push_back(i);
-  }
-  return kept;
+  std::size_t end = 0, silent = 0;  // of the pass
+  bool whole = true;
+  const auto is_left_out = [&](std::uint32_t i) {
+    if (i >= end) {
+      const std::size_t number = windows.pass_of(i);
+      const WindowSet::Pass& pass = windows.passes()[number];
+      const Plate& plate = windows.plate(number);
+      end = pass.first_window + pass.windows, silent = 0;
+      whole = pass.varied || plate.max_height() == plate.min_height();
+    }
+    return !whole && !windows.contact(i) && silent++ % kSilentApart != 0;
+  };
+  // Not std::erase_if, which may copy the predicate.
+  std::size_t kept = 0;
+  for (const std::uint32_t i : list)
+    if (!is_left_out(i)) list[kept++] = i;
+  list.resize(kept);
+  return list;
 }
 
 Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t seed) {
@@ -263,22 +314,13 @@ Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t s
 }
 
 Leakage find_leakage(const WindowSet& windows, const Split& split) {
-  std::vector<bool> changes;
-  const std::vector<std::uint64_t> hashes = hash_windows(windows, changes);
-  std::unordered_map<std::uint64_t, std::uint32_t> trained;  // hash to the first training window that has it
-  std::vector<std::uint64_t> repeated;                       // hashes of more than one training window
-  for (const std::uint32_t i : split.train)
-    if (changes[i] && !trained.emplace(hashes[i], i).second) repeated.push_back(hashes[i]);
-  std::sort(repeated.begin(), repeated.end());
-  Leakage leakage{.overlapping = count_overlapping(windows, split)};
-  for (const std::uint32_t i : split.test) {
-    const auto found = changes[i] ? trained.find(hashes[i]) : trained.end();
-    if (found == trained.end()) continue;
-    const bool elsewhere =
-        found->second != i || std::binary_search(repeated.begin(), repeated.end(), hashes[i]);
-    leakage.duplicated += elsewhere ? 1 : 0;
-  }
-  return leakage;
+  const std::string counts = windows.recall("leakage " + fingerprint(split), [&] {
+    return std::to_string(count_overlapping(windows, split)) + " " +
+           std::to_string(count_duplicated(windows, split));
+  });
+  const std::size_t space = counts.find(' ');
+  return {.overlapping = parse_uint(counts.substr(0, space)).value_or(0),
+          .duplicated = parse_uint(counts.substr(space + 1)).value_or(0)};
 }
 
 std::string fingerprint(const Split& split) {

@@ -54,8 +54,7 @@ Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t s
 /// learnt. Passes over a plain plate, on which a finger is pressed as hard as elsewhere on a texture, are
 /// kept whole. So are recorded ones: without three quarters of their silence a network of four plates drew
 /// ghosts on .8 % of the flat plate instead of .1 %.
-std::vector<std::uint32_t> without_most_silence(const WindowSet& windows,
-                                                std::span<const std::uint32_t> list);
+std::vector<std::uint32_t> without_most_silence(const WindowSet& windows, std::vector<std::uint32_t> list);
 
 /// What the test windows share with the training windows.
 struct Leakage {
@@ -67,7 +66,8 @@ struct Leakage {
 
 /// Compares all test with all training windows: overlap by their place, duplicates by a 64-bit hash of all
 /// T * signals values (so that a pass filed twice under two names is found). Windows that never change are no
-/// duplicates: at rest every pass looks the same. Takes 16 bytes per frame while it runs.
+/// duplicates: at rest every pass looks the same. Of more than four million windows duplicates are looked for
+/// among an even share, and the count is as many times larger. Takes 16 bytes per window of these.
 Leakage find_leakage(const WindowSet& windows, const Split& split);
 
 /// 16 hexadecimal digits over both index lists.

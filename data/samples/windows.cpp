@@ -1,25 +1,20 @@
 #include "data/samples/windows.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <cstring>
-#include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "data/plates/height_map.h"
 #include "data/plates/plate_file.h"
 #include "data/plates/truth.h"
+#include "data/samples/chosen_plates.h"
 #include "data/samples/levelling.h"
 #include "io/hash.h"
 
 namespace supertac {
 namespace {
-
-// A finger that is pressed as deep as rigs press it is clear of the plate when it is lifted by so much more
-// than the highest element.
-constexpr double kClearanceMm = 1.5;
-// A height that is measured is never quite that of the slide.
-constexpr double kLiftedMm = 0.1;
 
 void check(const WindowSettings& s) {
   const auto fail = [](const std::string& what) { throw std::invalid_argument("windows: " + what); };
@@ -36,11 +31,6 @@ void check_size(const char* what, std::size_t got, std::size_t expected) {
   if (got != expected)
     throw std::invalid_argument("windows: " + std::string(what) + " needs room for " +
                                 std::to_string(expected) + " values, got " + std::to_string(got));
-}
-
-bool is_reliable(const Recording& recording) {
-  const auto flag = recording.metadata.find("registration_reliable");
-  return flag == recording.metadata.end() || flag->second != "no";
 }
 
 }  // namespace
@@ -62,30 +52,28 @@ WindowSet WindowSet::load(const std::string& dir, const std::vector<std::string>
                           const WindowSettings& settings) {
   WindowSet set(settings);
   set.add_directory(dir, plates);
-  if (set.size() == 0)
-    throw std::runtime_error(dir + ": no window of " + std::to_string(settings.timesteps) +
-                             " frames: " + set.counts_.summary() + "; try fewer timesteps or longer passes");
+  set.check_any(dir);
   return set;
 }
 
+void WindowSet::check_any(const std::string& dir) const {
+  if (size() > 0) return;
+  throw std::runtime_error(dir + ": no window of " + std::to_string(settings_.timesteps) +
+                           " frames: " + counts_.summary() + "; try fewer timesteps or longer passes");
+}
+
 void WindowSet::add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside) {
-  std::set<std::string> missing(plates.begin(), plates.end()), found;
+  ChosenPlates chosen(plates);
   for (const std::string& path : list_recordings(dir)) {
     const Recording recording = read_recording(path);
-    found.insert(recording.plate);
-    if (!plates.empty() && std::find(plates.begin(), plates.end(), recording.plate) == plates.end()) continue;
-    missing.erase(recording.plate);
+    if (!chosen.take(recording.plate)) continue;
     try {
       add(recording, dir, aside);
     } catch (const std::exception& error) {
       throw std::runtime_error(path + ": " + error.what());
     }
   }
-  if (missing.empty()) return;
-  std::string names;
-  for (const std::string& name : found) names += (names.empty() ? "" : ", ") + name;
-  throw std::invalid_argument("windows: plate '" + *missing.begin() + "' has no recording in " + dir +
-                              "; it has those of " + names);
+  chosen.check(dir);
 }
 
 WindowSet::WindowSet(const WindowSettings& settings) : settings_(settings) {
@@ -100,27 +88,6 @@ std::size_t WindowSet::plate_index(const std::string& name, const std::string& f
   return plates_.size() - 1;
 }
 
-// Whether a window may end at this frame; counts the reason if not.
-bool WindowSet::accept(const Track& track, std::size_t frame, bool reliable, double clear_mm, int stride) {
-  const float x = track.position_mm[2 * frame], y = track.position_mm[2 * frame + 1];
-  const float lift = track.lift_mm[frame];
-  std::size_t* reason = nullptr;
-  if (!reliable)
-    reason = &counts_.unreliable;
-  else if (!std::isfinite(x) || !std::isfinite(y))
-    reason = &counts_.no_position;
-  else if (lift > kLiftedMm && lift < clear_mm)
-    reason = &counts_.lifting;
-  else if (track.run[frame] < static_cast<std::uint32_t>(settings_.timesteps))
-    reason = &counts_.too_early;
-  else if (frame % static_cast<std::size_t>(stride) != 0)
-    reason = &counts_.off_stride;
-  else
-    reason = &counts_.windows;
-  ++*reason;
-  return reason == &counts_.windows;
-}
-
 void WindowSet::add(const Recording& recording, const std::string& folder, bool aside) {
   append(recording, folder, {.aside = aside, .varied = true, .stride = settings_.stride});
 }
@@ -129,86 +96,162 @@ void WindowSet::add_one_of_many(const Recording& recording, int stride) {
   append(recording, ".", {.aside = true, .varied = false, .stride = stride});
 }
 
-void WindowSet::append(const Recording& recording, const std::string& folder, const Use& use) {
-  if (!settings_.array) settings_.array = recording.array;
-  if (recording.array != array())
-    throw std::runtime_error("was recorded with " + recording.array.text() + ", expected " + array().text() +
+void WindowSet::expect_array(const TaxelArray& found) {
+  if (!settings_.array) settings_.array = found;
+  if (found != array())
+    throw std::runtime_error("was recorded with " + found.text() + ", expected " + array().text() +
                              "; give recordings of the array the model is for, and no others");
+}
+
+void WindowSet::append(const Recording& recording, const std::string& folder, const Use& use) {
+  expect_array(recording.array);
   const std::size_t plate = plate_index(recording.plate, folder);
   Track track = resample(
       recording,
       {.rate_hz = settings_.rate_hz, .max_gap_s = settings_.max_gap_s, .scaling = settings_.scaling});
-  const bool reliable = is_reliable(recording);
-  Pass pass{.plate = recording.plate,
-            .trial = recording.trial,
-            .pass = recording.pass,
-            .speed_mm_s = recording.speed_mm_s,
-            .source = recording.source,
-            .filter_s = recording.filter_s(),
-            .frames = track.frames(),
-            .first_window = index_.size(),
-            .windows = 0,
-            .aside = use.aside,
-            .varied = use.varied};
-  const auto number = static_cast<std::uint32_t>(passes_.size());
-  const double clear_mm = plates_[plate].max_height() + kClearanceMm;
-  for (std::size_t frame = 0; frame < track.frames(); ++frame)
-    if (accept(track, frame, reliable, clear_mm, use.stride))
-      index_.push_back({number, static_cast<std::uint32_t>(frame)});
-  pass.windows = index_.size() - pass.first_window;
-  ++counts_.recordings;
-  counts_.frames += track.frames();
-  counts_.held += track.held;
-  counts_.gaps += track.gaps;
-  counts_.damaged += track.damaged;
+  append(card_of(recording, track, plates_[plate]), plate, use);
+  track.run = {};
   track.samples.shrink_to_fit();
   track.position_mm.shrink_to_fit();
   track.lift_mm.shrink_to_fit();
-  if (pass.windows == 0) track = {};  // nothing will read it
+  if (passes_.back().windows == 0) track = {};  // nothing will read it
+  sources_.push_back({std::move(track), nullptr, 0});
+}
+
+void WindowSet::add(std::shared_ptr<const TrackFile> file, bool aside) {
+  expect_array(file->index().array);
+  const std::vector<TrackCard>& cards = file->index().cards;
+  for (std::size_t i = 0; i < cards.size(); ++i) {
+    append(cards[i], plate_index(cards[i].plate, file->folder()),
+           {.aside = aside, .varied = true, .stride = settings_.stride});
+    sources_.push_back({{}, file, i});
+  }
+}
+
+void WindowSet::append(const TrackCard& card, std::size_t plate, const Use& use) {
+  Pass pass{.plate = card.plate,
+            .trial = card.trial,
+            .pass = card.pass,
+            .speed_mm_s = card.speed_mm_s,
+            .source = card.source,
+            .filter_s = card.filter_s,
+            .frames = card.frames,
+            .first_window = size(),
+            .windows = 0,
+            .aside = use.aside,
+            .varied = use.varied};
+  for (const FrameRange& stretch : card.stretches) append(card, stretch, static_cast<std::uint32_t>(use.stride));
+  pass.windows = size() - pass.first_window;
+  ++counts_.recordings;
+  counts_.frames += card.frames;
+  counts_.held += card.held;
+  counts_.gaps += card.gaps;
+  counts_.damaged += card.damaged;
   passes_.push_back(std::move(pass));
-  tracks_.push_back(std::move(track));
   plate_of_.push_back(plate);
 }
 
-std::span<const float> WindowSet::window(std::size_t i) const {
-  const auto [pass, last] = index_[i];
-  const auto frames = static_cast<std::size_t>(settings_.timesteps);
-  const std::size_t signals = settings_.array->signals();  // there is a window, so there was a recording
-  return std::span(tracks_[pass].samples).subspan((last + 1 - frames) * signals, frames * signals);
+// The windows that end in the stretch, and why its other frames end none.
+void WindowSet::append(const TrackCard& card, const FrameRange& stretch, std::uint32_t stride) {
+  if (!card.reliable) {
+    counts_.unreliable += stretch.frames;
+  } else if (stretch.kind != FrameRange::usable) {
+    (stretch.kind == FrameRange::lifting ? counts_.lifting : counts_.no_position) += stretch.frames;
+  } else {
+    const auto timesteps = static_cast<std::uint32_t>(settings_.timesteps);
+    const std::uint32_t early = stretch.run < timesteps ? timesteps - stretch.run : 0;
+    const std::uint32_t skipped = std::min(early, stretch.frames);
+    const std::uint32_t begin = stretch.first + skipped, end = stretch.first + stretch.frames;
+    const std::uint32_t last = (begin + stride - 1) / stride * stride;
+    const std::uint32_t windows = last < end ? (end - last + stride - 1) / stride : 0;
+    counts_.too_early += skipped;
+    counts_.off_stride += end - begin - windows;
+    if (windows == 0) return;
+    rows_.push_back({static_cast<std::uint32_t>(passes_.size()), last, stretch.run + last - stretch.first,
+                     stride, counts_.windows});
+    counts_.windows += windows;
+  }
+}
+
+WindowSet::Place WindowSet::place_of(std::size_t i) const {
+  const Row& row = *std::prev(std::ranges::upper_bound(rows_, i, {}, &Row::first_window));
+  const std::size_t further = (i - row.first_window) * row.stride;
+  return {row.pass, row.last + further, row.run + further};
+}
+
+void WindowSet::samples(std::size_t pass, std::size_t first, std::span<float> out) const {
+  const Source& source = sources_[pass];
+  if (source.file) {
+    source.file->volts(source.card, first, out);
+    settings_.scaling(out);
+  } else {
+    std::copy_n(&source.track.samples[first * array().signals()], out.size(), out.begin());
+  }
+}
+
+// Its (x, y, lift) at the end of a window.
+std::array<float, 3> WindowSet::finger(const Place& place) const {
+  const Source& source = sources_[place.pass];
+  if (source.file) return source.file->place(source.card, place.last);
+  const Track& track = source.track;
+  return {track.position_mm[2 * place.last], track.position_mm[2 * place.last + 1],
+          track.lift_mm[place.last]};
+}
+
+Track WindowSet::track(std::size_t pass) const {
+  const Source& source = sources_[pass];
+  if (!source.file || passes_[pass].windows == 0) return source.track;
+  Track track = source.file->track(source.card);
+  settings_.scaling(track.samples);
+  return track;
 }
 
 void WindowSet::window(std::size_t i, std::span<float> out) const {
-  const std::span<const float> source = window(i);
-  check_size("a window", out.size(), source.size());
-  std::memcpy(out.data(), source.data(), source.size_bytes());
+  const std::size_t values = frames() * array().signals();
+  check_size("a window", out.size(), values);
+  const Place place = place_of(i);
+  samples(place.pass, place.last + 1 - frames(), out);
   if (settings_.scaling.levelled) level(out, array().signals());
 }
 
-std::span<const float> WindowSet::last_frame(std::size_t i) const {
-  return window(i).last(array().signals());
+std::vector<float> WindowSet::window(std::size_t i) const {
+  std::vector<float> values(frames() * array().signals());
+  const Place place = place_of(i);
+  samples(place.pass, place.last + 1 - frames(), values);
+  return values;
+}
+
+std::vector<float> WindowSet::last_frame(std::size_t i) const {
+  std::vector<float> values(array().signals());
+  const Place place = place_of(i);
+  samples(place.pass, place.last, values);
+  return values;
 }
 
 WindowSet::Position WindowSet::position(std::size_t i) const {
-  const auto [pass, last] = index_[i];
-  const std::vector<float>& position = tracks_[pass].position_mm;
-  return {position[2 * std::size_t{last}], position[2 * std::size_t{last} + 1]};
+  const auto [x, y, lift] = finger(place_of(i));
+  return {x, y};
 }
 
 void WindowSet::truth(std::size_t i, std::span<float> out) const {
   check_size("a truth image", out.size(), image().pixels());
-  if (in_air(i)) return std::fill(out.begin(), out.end(), 0.0F);
-  const auto [x, y] = position(i);
-  truth_image(plates_[plate_of_[index_[i].pass]], x, y, image(), out);
-}
-
-// While it is lifted there are no windows.
-bool WindowSet::in_air(std::size_t i) const {
-  return tracks_[index_[i].pass].lift_mm[index_[i].last] > kLiftedMm;
+  const Place place = place_of(i);
+  const auto [x, y, lift] = finger(place);
+  // While it is lifted there are no windows.
+  if (lift > kLiftedMm) return std::fill(out.begin(), out.end(), 0.0F);
+  truth_image(plate(place.pass), x, y, image(), out);
 }
 
 Zone WindowSet::zone(std::size_t i) const {
-  const auto [x, y] = position(i);
-  return in_air(i) ? Zone::air : zone_of(plates_[plate_of_[index_[i].pass]], x, y, image());
+  const Place place = place_of(i);
+  const auto [x, y, lift] = finger(place);
+  return lift > kLiftedMm ? Zone::air : zone_of(plate(place.pass), x, y, image());
+}
+
+std::optional<std::string> WindowSet::content(const std::string& folder) const {
+  for (const Source& source : sources_)
+    if (source.file && source.file->folder() == folder) return source.file->index().content;
+  return std::nullopt;
 }
 
 std::optional<double> WindowSet::filter_s() const {
@@ -221,7 +264,23 @@ std::optional<double> WindowSet::filter_s() const {
   return common;
 }
 
+std::string WindowSet::recall(const std::string& key, const std::function<std::string()>& compute) const {
+  const std::shared_ptr<const TrackFile> file = sources_.empty() ? nullptr : sources_.front().file;
+  const bool one = file && passes_.size() == file->index().cards.size() &&
+                   std::ranges::all_of(sources_, [&](const Source& s) { return s.file == file; });
+  if (!one) return compute();
+  Hash settings;
+  for (const int number : {settings_.timesteps, settings_.scale, settings_.stride}) settings.add(number);
+  for (const double volts : {settings_.scaling.rest_volts, settings_.scaling.span_volts})
+    settings.add(std::bit_cast<std::uint64_t>(volts));
+  return file->recall(key + " " + settings.hex(), compute);
+}
+
 std::string WindowSet::fingerprint() const {
+  return recall("fingerprint", [this] { return compute_fingerprint(); });
+}
+
+std::string WindowSet::compute_fingerprint() const {
   Hash hash;
   hash.add(settings_.timesteps);
   hash.add(settings_.scale);
@@ -235,11 +294,16 @@ std::string WindowSet::fingerprint() const {
   for (std::size_t p = 0; p < passes_.size(); ++p) {
     hash.add(passes_[p].plate);
     hash.add(passes_[p].trial);
-    for (const float v : tracks_[p].samples) hash.add(v);
-    for (const float v : tracks_[p].position_mm) hash.add(v);
-    for (const float v : tracks_[p].lift_mm) hash.add(v);
+    const Track all = track(p);
+    for (const auto* values : {&all.samples, &all.position_mm, &all.lift_mm})
+      for (const float v : *values) hash.add(v);
   }
-  for (const Entry& entry : index_) hash.add((std::uint64_t{entry.pass} << 32) | entry.last);
+  for (std::size_t r = 0; r < rows_.size(); ++r) {
+    const std::size_t end = r + 1 < rows_.size() ? rows_[r + 1].first_window : size();
+    for (std::size_t i = rows_[r].first_window; i < end; ++i)
+      hash.add((std::uint64_t{rows_[r].pass} << 32) |
+               (rows_[r].last + (i - rows_[r].first_window) * rows_[r].stride));
+  }
   return hash.hex();
 }
 

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -11,6 +14,7 @@
 #include "data/recordings/recording.h"
 #include "data/recordings/resample.h"
 #include "data/samples/examples.h"
+#include "data/samples/track_file.h"
 
 namespace supertac {
 
@@ -40,9 +44,10 @@ struct WindowCounts {
 };
 
 /// The windows of a set of recordings. Nothing is copied per window: a recording is resampled once onto
-/// rate_hz and kept as scaled floats, a window is the index (pass, last frame), and none crosses the edge of
-/// a pass or a gap. Memory: 4 bytes per signal of a frame, 16 per frame and 8 per window. Reading is const
-/// and safe from many threads.
+/// rate_hz and kept as scaled floats, or read from a TrackFile each time, with the same bits. A window is a
+/// number, from which pass and last frame follow, and none crosses the edge of a pass or a gap. Memory: 4
+/// bytes per signal of a frame and 12 per frame, nothing of a TrackFile's. Reading is const and safe from
+/// many threads.
 class WindowSet : public Examples {
  public:
   struct Pass {
@@ -80,8 +85,12 @@ class WindowSet : public Examples {
   /// Appends those of all recordings in a directory, of these plates (empty: all). Throws as load, but for
   /// the missing windows.
   void add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside = false);
+  /// The same of a file of tracks, which must have this set's rate_hz and max_gap_s.
+  void add(std::shared_ptr<const TrackFile> file, bool aside = false);
+  /// Throws std::runtime_error, saying where the frames of `dir` went, when there is no window.
+  void check_any(const std::string& dir) const;
 
-  std::size_t size() const override { return index_.size(); }
+  std::size_t size() const override { return counts_.windows; }
   std::size_t frames() const override { return static_cast<std::size_t>(settings_.timesteps); }
   int timesteps() const { return settings_.timesteps; }
   /// Of the recordings; the rig's while there is none.
@@ -93,57 +102,77 @@ class WindowSet : public Examples {
   const Plate& plate(std::size_t pass) const { return plates_[plate_of_[pass]]; }
 
   // i < size() throughout, unchecked: these run for every sample of training.
-  // Throws std::invalid_argument when `out` has another size.
+  // Throws std::invalid_argument when `out` has another size; FileError as TrackFile.
   /// Window i as a network takes it, [T][signals], oldest frame first; levelled when the scaling says so.
   void window(std::size_t i, std::span<float> out) const;
-  /// The window without copying it, not levelled.
-  std::span<const float> window(std::size_t i) const;
+  /// The window, not levelled.
+  std::vector<float> window(std::size_t i) const;
   /// Truth of its last frame, [height][width] of image(), as truth_image; 0 in the air.
   void truth(std::size_t i, std::span<float> out) const;
   /// The last frame, [signals].
-  std::span<const float> last_frame(std::size_t i) const;
+  std::vector<float> last_frame(std::size_t i) const;
   Position position(std::size_t i) const;
   Zone zone(std::size_t i) const override;
-  bool may_vary(std::size_t i) const override { return passes_[index_[i].pass].varied; }
+  bool may_vary(std::size_t i) const override { return passes_[pass_of(i)].varied; }
   bool contact(std::size_t i) const { return zone(i) == Zone::contact; }
-  std::size_t pass_of(std::size_t i) const { return index_[i].pass; }
+  std::size_t pass_of(std::size_t i) const { return place_of(i).pass; }
   void input(std::size_t i, std::span<float> out) const override { window(i, out); }
   void target(std::size_t i, std::span<float> out) const override { truth(i, out); }
   std::int64_t group(std::size_t i) const override { return static_cast<std::int64_t>(pass_of(i)); }
   /// Number of the last frame within its pass.
-  std::size_t frame_of(std::size_t i) const { return index_[i].last; }
+  std::size_t frame_of(std::size_t i) const { return place_of(i).last; }
   /// Frames since its pass began or since the last gap, the last frame included: at least timesteps().
-  std::size_t history(std::size_t i) const { return tracks_[index_[i].pass].run[index_[i].last]; }
-  /// The frames of a whole pass, [frames][signals]; empty when no window ends in it.
-  std::span<const float> track(std::size_t pass) const { return tracks_[pass].samples; }
+  std::size_t history(std::size_t i) const { return place_of(i).run; }
+  /// The frames of a whole pass, but for `run`; none when no window ends in it.
+  Track track(std::size_t pass) const;
 
+  /// hash_of_recordings() of a folder that was added as a TrackFile; nothing of any other.
+  std::optional<std::string> content(const std::string& folder) const;
   /// The filter_s of all passes with windows, or nothing when they differ.
   std::optional<double> filter_s() const;
 
   /// 16 hexadecimal digits over samples, positions, plates and index: the same data and settings, the same
   /// text.
   std::string fingerprint() const override;
+  /// What `compute` returns; when all windows are of one TrackFile, as its recall(), with `key` and the
+  /// settings for its key.
+  std::string recall(const std::string& key, const std::function<std::string()>& compute) const;
 
  private:
-  struct Entry {
-    std::uint32_t pass, last;
+  /// Windows that end at every stride-th frame.
+  struct Row {
+    std::uint32_t pass, last, run, stride;  // of the first of them
+    std::size_t first_window;
+  };
+  struct Place {
+    std::size_t pass, last, run;
+  };
+  struct Source {
+    Track track;                            // without `run`; empty for those of a file
+    std::shared_ptr<const TrackFile> file;  // or nothing
+    std::size_t card;
   };
   struct Use {
     bool aside, varied;
     int stride;
   };
   void append(const Recording& recording, const std::string& folder, const Use& use);
+  void expect_array(const TaxelArray& array);
   std::size_t plate_index(const std::string& name, const std::string& folder);
-  bool accept(const Track& track, std::size_t frame, bool reliable, double clear_mm, int stride);
-  bool in_air(std::size_t i) const;
+  void append(const TrackCard& card, std::size_t plate, const Use& use);
+  void append(const TrackCard& card, const FrameRange& stretch, std::uint32_t stride);
+  Place place_of(std::size_t i) const;
+  void samples(std::size_t pass, std::size_t first, std::span<float> out) const;
+  std::array<float, 3> finger(const Place& place) const;
+  std::string compute_fingerprint() const;
 
   WindowSettings settings_;
   WindowCounts counts_;
   std::vector<Plate> plates_;
   std::vector<Pass> passes_;
-  std::vector<Track> tracks_;          // per pass
+  std::vector<Source> sources_;        // per pass
   std::vector<std::size_t> plate_of_;  // per pass, into plates_
-  std::vector<Entry> index_;
+  std::vector<Row> rows_;
 };
 
 }  // namespace supertac

@@ -46,9 +46,9 @@ void Trainer::Spreads::add(const Spreads& other) {
 Trainer::Trainer(const Examples& examples, std::vector<std::uint32_t> train,
                  std::unique_ptr<Objective> objective, Ranks& ranks)
     : data_(examples),
-      train_(std::move(train)),
       objective_(std::move(objective)),
-      batching_(train_, static_cast<std::size_t>(objective_->pace().batch), objective_->pace().seed),
+      batching_(std::move(train), static_cast<std::size_t>(objective_->pace().batch),
+                objective_->pace().seed),
       state_(model().parameters(), objective_->pace(), objective_->pace().epochs * steps_per_epoch()),
       ranks_(ranks) {
   check_format(examples, model());
@@ -248,7 +248,7 @@ void Trainer::save_model(const std::string& path, std::map<std::string, std::str
 std::vector<StoredTensor> Trainer::novelty() const {
   constexpr std::size_t kMostSamples = 20'000;
   if (objective_->latents() == 0) return {};  // a frame alone says nothing of its sensor
-  const std::vector<std::uint32_t> chosen = spread(train_, kMostSamples);
+  const std::vector<std::uint32_t> chosen = spread(batching_.indices(), kMostSamples);
   const std::size_t count = signal_feature_count(data_.array());
   if (chosen.size() <= count) return {};
   Tensor features(Shape{static_cast<Dim>(chosen.size()), static_cast<Dim>(count)});
@@ -263,7 +263,7 @@ std::vector<StoredTensor> Trainer::novelty() const {
 StoredTensor Trainer::ranges() const {
   constexpr std::size_t kSamples = 1024;
   ActivationRanges ranges;
-  for_each_output(model(), data_, spread(train_, kSamples), [&](const EvaluatedBatch& b) {
+  for_each_output(model(), data_, spread(batching_.indices(), kSamples), [&](const EvaluatedBatch& b) {
     ranges.add(model(), b.inputs);
     return true;
   });

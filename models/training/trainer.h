@@ -117,7 +117,6 @@ class Trainer {
   std::map<std::string, std::string> full(std::map<std::string, std::string> metadata) const;
 
   const Examples& data_;
-  std::vector<std::uint32_t> train_;
   std::unique_ptr<Objective> objective_;
   Batching batching_;
   TrainingState state_;

@@ -57,6 +57,19 @@ TEST_F(Training, SaysWhyAFinishedRunIsNotResumed) {
       << resumed.error;
 }
 
+TEST_F(Training, GivesTheSameBytesHoweverMuchIsHeldInMemory) {
+  ASSERT_EQ(train("held.safetensors").code, 0);
+  for (const std::string memory : {"0", "500K", "1G"}) {
+    const std::string name = "memory" + memory;
+    const ProcessResult result = train(name + ".safetensors", {"--memory", memory});
+    ASSERT_EQ(result.code, 0) << result.error;
+    EXPECT_TRUE(bytes("held.safetensors") == bytes(name + ".safetensors")) << memory;
+    EXPECT_TRUE(bytes("held.run/last.safetensors") == bytes(name + ".run/last.safetensors")) << memory;
+  }
+  EXPECT_NE(train("half.safetensors", {"--memory", "half"}).error.find("--memory expects a size"),
+            std::string::npos);
+}
+
 TEST_F(Training, NamesThePlatesThereAre) {
   const ProcessResult result = train("none.safetensors", {"--plates", "6_Bump"});
   EXPECT_NE(result.error.find("plate '6_Bump' has no recording in " + path("data") + "; it has those of "),

@@ -31,6 +31,11 @@ class FaultInjection {
       if (now && state().fault == Fault::error) return -1;
       return real_system_calls().read(file, bytes, now ? (count + 1) / 2 : count);
     };
+    calls.pread = [](int file, void* bytes, std::size_t count, off_t offset) -> ssize_t {
+      const bool now = hit("pread");
+      if (now && state().fault == Fault::error) return -1;
+      return real_system_calls().pread(file, bytes, now ? (count + 1) / 2 : count, offset);
+    };
     calls.write = [](int file, const void* bytes, std::size_t count) -> ssize_t {
       const bool now = hit("write");
       if (now && state().fault == Fault::error) return -1;

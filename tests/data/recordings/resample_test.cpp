@@ -12,7 +12,7 @@
 namespace supertac {
 namespace {
 
-const ResampleSettings kWide{.scaling = {.rest_volts = 3.0, .span_volts = 2.0}};
+const ResampleSettings kWide{.scaling = Scaling{.rest_volts = 3.0, .span_volts = 2.0}};
 
 void remove_frame(Recording& recording, std::size_t i) {
   const auto at = [i](auto& values, std::size_t n) {
@@ -38,7 +38,7 @@ TEST(Resample, LeavesARecordingAtItsRateAsItIs) {
   const Track track = resample(recording, kWide);
   ASSERT_EQ(track.frames(), recording.frames());
   for (std::size_t i = 0; i < recording.volts.size(); ++i)
-    ASSERT_EQ(track.samples[i], kWide.scaling(recording.volts[i])) << i;
+    ASSERT_EQ(track.samples[i], (*kWide.scaling)(recording.volts[i])) << i;
   for (std::size_t i = 0; i < recording.position_mm.size(); ++i)
     ASSERT_NEAR(track.position_mm[i], recording.position_mm[i], 1e-4) << i;
   EXPECT_EQ(track.held, 0U);
@@ -51,7 +51,7 @@ TEST(Resample, AveragesWhatArrivedInAPeriod) {
   const Track track = resample(recording, kWide);
   ASSERT_EQ(track.frames(), 301U);
   // Period 10 is centred on frame 30 and holds 29, 30, 31.
-  EXPECT_NEAR(track.samples[10 * kTaxels], kWide.scaling(2.0F + 0.030F), 1e-6);
+  EXPECT_NEAR(track.samples[10 * kTaxels], (*kWide.scaling)(2.0F + 0.030F), 1e-6);
   EXPECT_NEAR(track.position_mm[2 * 10 + 1], 30 + 10.0 * 10 / 300, 1e-5);
 }
 

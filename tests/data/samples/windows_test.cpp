@@ -41,7 +41,7 @@ TEST(Windows, AreTheLastFramesOfAPass) {
   EXPECT_EQ(set.frame_of(3), 18U);
   for (std::size_t i = 0; i < window.size(); ++i)
     ASSERT_EQ(window[i], set.settings().scaling(recording.volts[3 * kTaxels + i]));
-  EXPECT_TRUE(std::equal(set.last_frame(3).begin(), set.last_frame(3).end(), window.end() - kTaxels));
+  EXPECT_EQ(set.last_frame(3), std::vector<float>(window.end() - kTaxels, window.end()));
   EXPECT_NEAR(set.position(3).y_mm, 30 + 18 * 10.0 / 300, 1e-4);
   EXPECT_EQ(set.position(3).x_mm, 18);
 }
