@@ -4,6 +4,7 @@
 
 #include "apps/common/program.h"
 #include "apps/common/provenance.h"
+#include "apps/explain/expression.h"
 #include "apps/explain/graph.h"
 #include "autograd/trace.h"
 #include "data/plates/plate_file.h"
@@ -19,11 +20,14 @@
 namespace supertac {
 
 void declare(Arguments& a) {
-  a.positional("FILE", "the model");
-  a.required("recording", "FILE", "what was felt");
-  a.required("at", "SECONDS", "on the recording's clock: the last window that ends by then");
-  a.required("out", "FILE",
-             "every array, safetensors; examples/recompute.py does each step again with NumPy");
+  a.positional("FILE",
+               "the model; or an expression on numbers, \"a=2; b=-3; relu(a*b+10)\", whose graph is drawn");
+  a.option("recording", "FILE", "what was felt");
+  a.option("at", "SECONDS", "on the recording's clock: the last window that ends by then");
+  a.required(
+      "out", "FILE",
+      "every array, safetensors, which examples/recompute.py computes again with NumPy; .dot or .svg: the "
+      "graph of one training step on this window, with shapes, values, gradients and times");
 }
 
 namespace {
@@ -127,6 +131,16 @@ Json trace(const SuperTac& model, const Tensor& input, std::vector<Array>& array
   return steps;
 }
 
+int write_graph_out(const Arguments& a, const std::string& dot) {
+  read_option("out", [&] {
+    write_graph(a.text("out"), dot);
+    return 0;
+  });
+  a.print(a.text("out") + ": the graph of a training step");
+  a.write_json({{"out", a.text("out")}});
+  return kExitOk;
+}
+
 // One training step on this window; the loss is the default one, latents are their means.
 int draw_graph(const Arguments& a, const ModelFile& file, const Recording& recording, const Tensor& input,
                const Track& track) {
@@ -141,22 +155,37 @@ int draw_graph(const Arguments& a, const ModelFile& file, const Recording& recor
   const ImageGrid image = file.array().picture(static_cast<int>(s.scale));
   truth_image(plate_in_folder(recording.plate, folder), x, y, image, truth.values());
   const std::vector<Tensor> eps(static_cast<std::size_t>(s.groups()), Tensor::zeros({1, s.latent}));
-  const std::string dot =
-      graph_of([&] { return supertac_loss(file.model->forward(input, eps), truth, {}).total; },
-               file.model->parameters());
-  read_option("out", [&] {
-    write_graph(a.text("out"), dot);
-    return 0;
-  });
-  a.print(a.text("out") + ": the graph of a training step");
-  a.write_json({{"out", a.text("out")}});
-  return kExitOk;
+  return write_graph_out(
+      a, graph_of([&] { return supertac_loss(file.model->forward(input, eps), truth, {}).total; },
+                  file.model->parameters()));
+}
+
+bool is_expression(const std::string& text) {
+  return text.find_first_of("+*()=") != std::string::npos && !std::filesystem::exists(text);
+}
+
+int draw_expression(const Arguments& a) {
+  for (const char* other : {"recording", "at"})
+    if (a.given(other))
+      throw UsageError(std::string("--") + other + ": has no part in an expression; leave it out");
+  Expression e;
+  const auto result = [&] {
+    try {
+      return (e = parse_expression(a.text("FILE"))).result;
+    } catch (const std::invalid_argument& error) {
+      throw UsageError(error.what());
+    }
+  };
+  return write_graph_out(a, graph_of(result, e.leaves));
 }
 
 }  // namespace
 
 int run(Arguments& a) {
   refuse_existing(a.text("out"), a.force());
+  if (is_expression(a.text("FILE"))) return draw_expression(a);
+  for (const char* needed : {"recording", "at"})
+    if (!a.given(needed)) throw UsageError(std::string("expected --") + needed + " with a model, found none");
   const ModelFile file = load_model(a.text("FILE"));
   const Recording recording = read_recording(a.text("recording"));
   if (recording.array != file.array())

@@ -10,6 +10,7 @@ static thread_local Trace* current = nullptr;
 Trace::Trace() {
   if (current != nullptr) throw std::logic_error("Trace: this thread is traced already");
   current = this;
+  last_ = std::chrono::steady_clock::now();
 }
 
 Trace::~Trace() { current = nullptr; }
@@ -20,8 +21,11 @@ void Trace::describe(const OpSettings& settings) {
 
 void Trace::note(const char* op, const Variable& y, std::span<const Variable* const> inputs) {
   if (current == nullptr) return;
-  TracedOp& traced = current->ops_.emplace_back(TracedOp{op, y, {}, std::exchange(current->next_, {})});
+  const auto now = std::chrono::steady_clock::now();
+  const double us = std::chrono::duration<double, std::micro>(now - current->last_).count();
+  TracedOp& traced = current->ops_.emplace_back(TracedOp{op, y, {}, std::exchange(current->next_, {}), us});
   for (const Variable* x : inputs) traced.inputs.push_back(*x);
+  current->last_ = std::chrono::steady_clock::now();
 }
 
 }  // namespace supertac

@@ -2,6 +2,7 @@
 // (models/prepared/prepared.h).
 #pragma once
 
+#include <chrono>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -23,6 +24,7 @@ struct TracedOp {
   Variable y;
   std::vector<Variable> inputs;
   OpSettings settings;
+  double us = 0;  ///< since the op before was noted: its time, where nothing else is done between ops
 };
 
 /// While one lives, the ops of this thread are noted in their order. One at a time.
@@ -43,6 +45,7 @@ class Trace {
  private:
   std::vector<TracedOp> ops_;
   OpSettings next_;
+  std::chrono::steady_clock::time_point last_;
 };
 
 }  // namespace supertac

@@ -5,6 +5,7 @@
 #include "apps/check/gradient_cases.h"
 #include "apps/check/planted_error.h"
 #include "apps/common/program.h"
+#include "apps/common/progress.h"
 #include "apps/common/signals.h"
 #include "io/numbers.h"
 
@@ -58,9 +59,12 @@ int check_all(const Arguments& a) {
   Json rows = Json::array();
   std::size_t wrong = 0;
   Dim entries = 0;
-  for (const auto& run : by_name(cases)) {
+  const auto runs = by_name(cases);
+  Progress progress(a, "checking", runs.size(), "rows");
+  for (const auto& run : runs) {
     stop_if_interrupted();
     const CheckedGradients c = check(run);
+    progress.update(rows.size() + 1);
     print_row(a, c);
     wrong += c.wrong();
     entries += c.entries;
@@ -114,15 +118,20 @@ int break_ops(const Arguments& a, const std::string& op) {
   for (const auto& run : runs) names.push_back(run.front().name);
   a.choice("break", names);
   Tally tally;
+  std::vector<std::pair<const GradientCase*, std::size_t>> inputs;
   for (const auto& run : runs) {
     const GradientCase& c = run.front();
     if (op != "all" && op != c.name) continue;
-    for (std::size_t input = 0; input < c.leaves.size(); ++input) {
-      for (const Plant::Kind kind : kPlantKinds) {
-        stop_if_interrupted();
-        plant(a, {c.name, input, kind}, c.options.names[input], runs, tally);
-      }
+    for (std::size_t input = 0; input < c.leaves.size(); ++input) inputs.emplace_back(&c, input);
+  }
+  Progress progress(a, "planting", inputs.size(), "inputs");
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    const auto& [c, input] = inputs[i];
+    for (const Plant::Kind kind : kPlantKinds) {
+      stop_if_interrupted();
+      plant(a, {c->name, input, kind}, c->options.names[input], runs, tally);
     }
+    progress.update(i + 1);
   }
   a.print(std::to_string(tally.found) + " of " + std::to_string(tally.planted) +
           " planted errors found and named");

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <filesystem>
 
+#include "apps/common/command_words.h"
 #include "apps/common/program.h"
 #include "apps/common/progress.h"
 #include "apps/common/provenance.h"
@@ -42,9 +43,7 @@ Arguments training_arguments(const Arguments& a, const Json& provenance) {
   t.option("seed", "N", "", "0");
   declare_training(t);
   declare_network(t);
-  std::vector<std::string> words;
-  std::istringstream command(provenance.at("command").get<std::string>());
-  for (std::string word; command >> word;) words.push_back(word);
+  std::vector<std::string> words = command_words(provenance.at("command").get<std::string>());
   if (words.empty() || words.front() != "supertac-train")
     throw FileError(a.text("FILE"), "was not made by supertac-train");
   words.insert(words.end(),
@@ -95,12 +94,14 @@ std::vector<Segment> drawn(std::vector<Segment> segments, std::size_t count, std
 }
 
 // The first line that comes out otherwise, if any.
-std::optional<LedgerDifference> repeat(Trainer& trainer, const Ledger& ledger, const Segment& s) {
+std::optional<LedgerDifference> repeat(Trainer& trainer, const Ledger& ledger, const Segment& s,
+                                       const std::function<void()>& after_step) {
   const LedgerLine* before = s.from == 0 ? nullptr : ledger.at(s.from);
   LedgerWriter writer(trainer, ledger.every, before);
   while (trainer.step() < s.to) {
     stop_if_interrupted();
     trainer.train_step();
+    after_step();
     const std::optional<LedgerLine> mine = writer.after_step();
     if (!mine) continue;
     const LedgerLine* theirs = ledger.at(mine->step);
@@ -167,13 +168,17 @@ int check_training(const Arguments& a) {
     wrong += d.has_value();
     rows.push_back(std::move(row));
   };
+  std::int64_t steps = 0, done = 0;
+  for (const Segment& s : chosen) steps += s.to - s.from;
+  std::optional<Progress> progress(std::in_place, a, "repeating", static_cast<std::uint64_t>(steps), "steps");
   for (const Segment& s : chosen) {
     trainer.restore(LedgerFile::state_path(folder, s.from), task.origin);
     auto d = state_difference(trainer, ledger);
-    if (!d) d = repeat(trainer, ledger, s);
+    if (!d) d = repeat(trainer, ledger, s, [&] { progress->update(static_cast<std::uint64_t>(++done)); });
     say("steps " + std::to_string(s.from) + " to " + std::to_string(s.to) + ": ", d,
         {{"from", s.from}, {"to", s.to}});
   }
+  progress.reset();
   trainer.restore(LedgerFile::state_path(folder, trainer.total_steps()), task.origin);
   auto last = state_difference(trainer, ledger);
   if (!last && !is_of(model, trainer.model()))

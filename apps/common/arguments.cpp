@@ -9,6 +9,7 @@
 #include <limits>
 #include <set>
 
+#include "apps/common/command_words.h"
 #include "apps/common/nearest.h"
 #include "apps/common/provenance.h"
 #include "apps/common/threads.h"
@@ -179,7 +180,7 @@ std::vector<std::string> Arguments::complete_words(int argc, const char* const* 
 }
 
 void Arguments::parse(int argc, const char* const* argv) {
-  for (int i = 0; i < argc; ++i) command_line_ += (i > 0 ? " " : "") + std::string(argv[i]);
+  for (int i = 0; i < argc; ++i) command_line_ += (i > 0 ? " " : "") + quoted_word(argv[i]);
   check_names(argc, argv);
   cxxopts::Options parser(program_, purpose_);
   for (const std::string& name : order_) {
@@ -255,7 +256,7 @@ std::string Arguments::deciding_options() const {
     const bool is_path = option.value != "NAME" && names_path(option.value);
     if (!given(name) || is_path || kHow.contains(name) || name == "seed") continue;
     line += option.is_positional ? " " : " --" + name + (option.is_flag ? "" : " ");
-    line += values_.at(name);
+    if (!option.is_flag) line += quoted_word(values_.at(name));
   }
   return line;
 }

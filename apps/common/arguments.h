@@ -92,10 +92,10 @@ class Arguments {
   int threads() const;
 
   const std::string& program() const { return program_; }
-  /// The whole command line, words separated by spaces, for a run's settings.
+  /// The whole command line, words quoted as a shell takes them, for a run's settings.
   const std::string& command_line() const { return command_line_; }
   /// Program and options that decide what it makes, in the order of declaration: no files and folders, and
-  /// nothing of how it is computed, shown or kept.
+  /// nothing of how it is computed, shown or kept. command_words() has the words again.
   std::string deciding_options() const;
   bool declares(const std::string& name) const { return options_.contains(name); }
   std::string help() const;

@@ -33,11 +33,21 @@ std::size_t terminal_width() {
   return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col : 80;
 }
 
-Progress::Progress(const Arguments& arguments, std::string what, std::uint64_t total, std::string unit)
-    : what_(std::move(what)),
+std::string about(double seconds) {
+  if (seconds < 90) return std::to_string(5 * std::lround(seconds / 5)) + " seconds";
+  if (seconds < 90 * 60) return std::to_string(std::lround(seconds / 60)) + " minutes";
+  return format(seconds / 3600, 1) + " hours";
+}
+
+Progress::Progress(const Arguments& arguments, std::string what, std::uint64_t total, std::string unit,
+                   std::uint64_t before, double whole)
+    : arguments_(arguments),
+      what_(std::move(what)),
       unit_(std::move(unit)),
       total_(total),
-      enabled_(!arguments.quiet() && drawable_terminal()),
+      before_(before),
+      whole_(whole),
+      drawable_(!arguments.quiet() && drawable_terminal()),
       begin_(std::chrono::steady_clock::now()),
       last_(begin_) {}
 
@@ -47,12 +57,26 @@ Progress::~Progress() {
 
 void Progress::update(std::uint64_t done, const std::string& detail) {
   using namespace std::chrono_literals;
-  if (!enabled_) return;
   const auto now = std::chrono::steady_clock::now();
-  if (now - begin_ < 2s || now - last_ < 200ms) return;
+  if (now - begin_ < 2s || now - last_ < 200ms || done <= before_) return;
   last_ = now;
   const double seconds = std::chrono::duration<double>(now - begin_).count();
-  draw(progress_line(what_, done, total_, unit_, seconds, detail).substr(0, terminal_width() - 1));
+  const double rate = static_cast<double>(done - before_) / seconds;
+  if (!said_ && now - begin_ >= 3s) {
+    said_ = true;
+    const double part = static_cast<double>(total_ - before_) / rate;
+    say_how_long(whole_ * part - seconds);
+  }
+  if (drawable_)
+    draw(progress_line(what_, done, total_, unit_, rate, detail).substr(0, terminal_width() - 1));
+}
+
+void Progress::say_how_long(double seconds_left) {
+  constexpr double kShort = 5;
+  if (seconds_left < kShort) return;
+  if (width_ > 0) draw("");
+  arguments_.note(what_ + (whole_ > 1 ? " and what follows" : "") + ": about " + about(seconds_left) +
+                  " to go");
 }
 
 void Progress::draw(const std::string& line) {
@@ -62,16 +86,16 @@ void Progress::draw(const std::string& line) {
 }
 
 std::string progress_line(const std::string& what, std::uint64_t done, std::uint64_t total,
-                          const std::string& unit, double seconds, const std::string& detail) {
-  constexpr int kCells = 24;
+                          const std::string& unit, double rate, const std::string& detail) {
+  const int width = detail.empty() ? 24 : 10;
   const double share =
       total > 0 ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total)) : 0.0;
-  const int cells = static_cast<int>(share * kCells);
-  const double rate = seconds > 0 ? static_cast<double>(done) / seconds : 0.0;
+  const int cells = static_cast<int>(share * width);
   const std::string rate_text = format(rate, rate < 10 ? 1 : 0) + " " + unit + "/s";
-  std::string line = what + "  [" + std::string(cells, '#') + std::string(kCells - cells, '.') + "]  " +
+  std::string line = what + "  [" + std::string(cells, '#') + std::string(width - cells, '.') + "]  " +
                      format(100 * share, 0) + " %  " + (detail.empty() ? rate_text : detail);
-  if (share > 0) line += "  " + clock_text(seconds * (1 - share) / share) + " left";
+  if (rate > 0 && total >= done)
+    line += "  " + clock_text(static_cast<double>(total - done) / rate) + " left";
   return line;
 }
 

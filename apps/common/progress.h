@@ -11,13 +11,16 @@ class Arguments;
 /// Whether stderr is a terminal that can be drawn on (not TERM=dumb).
 bool drawable_terminal();
 
-/// A progress bar on stderr: share done, rate, time left. Drawn on a terminal only (not TERM=dumb, not
-/// --quiet), and only once the work has taken two seconds. It needs no colour and no escape codes. Not to be
-/// shared by threads.
+/// How far a long work is, on stderr and not under --quiet. After its first seconds a line says how long the
+/// whole of it takes, where that is long. On a terminal (not TERM=dumb) a bar shows share done, rate and time
+/// left, once the work has taken two seconds; it needs no colour and no escape codes. Not to be shared by
+/// threads.
 class Progress {
  public:
-  /// `unit`: what is counted, in the plural ("passes", "steps")
-  Progress(const Arguments& arguments, std::string what, std::uint64_t total, std::string unit);
+  /// `unit`: what is counted, in the plural ("passes", "steps"). `before`: how many of `total` were done
+  /// earlier, by the run that is resumed. `whole`: how many times as long as this part the command takes.
+  Progress(const Arguments& arguments, std::string what, std::uint64_t total, std::string unit,
+           std::uint64_t before = 0, double whole = 1);
   /// Wipes the bar.
   ~Progress();
   Progress(const Progress&) = delete;
@@ -28,17 +31,24 @@ class Progress {
   void update(std::uint64_t done, const std::string& detail = "");
 
  private:
+  void say_how_long(double seconds_left);
   void draw(const std::string& line);
 
+  const Arguments& arguments_;
   std::string what_, unit_;
-  std::uint64_t total_;
-  bool enabled_;
+  std::uint64_t total_, before_;
+  double whole_;
+  bool drawable_, said_ = false;
   std::size_t width_ = 0;  // of what is drawn
   std::chrono::steady_clock::time_point begin_, last_;
 };
 
-/// The bar's text, e.g. "training  [#####.....]  50 %  1200 steps/s  0:41 left"; `detail` replaces the rate.
+/// The bar's text, e.g. "training  [#####.....]  50 %  1200 steps/s  0:41 left"; `rate` is in units a second,
+/// `detail` replaces it.
 std::string progress_line(const std::string& what, std::uint64_t done, std::uint64_t total,
-                          const std::string& unit, double seconds, const std::string& detail = "");
+                          const std::string& unit, double rate, const std::string& detail = "");
+
+/// About how long that is, in words: "40 seconds", "12 minutes", "2.5 hours".
+std::string about(double seconds);
 
 }  // namespace supertac

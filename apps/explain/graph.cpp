@@ -24,8 +24,15 @@ std::string number(const char* format, double value) {
   return text;
 }
 
+// A single value as it is, of more the norm.
+std::string said(const std::string& name, const Tensor& t) {
+  return t.size() == 1 ? name + " " + number("%.4g", t.data()[0])
+                       : "|" + name + "| " + number("%.3g", norm(t));
+}
+
 struct Reverse {
-  double gradient = 0, us = 0;
+  std::string gradient{};
+  double us = 0;
 };
 
 // By op and result: a reshaped result has the buffer of the one before.
@@ -35,7 +42,7 @@ class Clock : public ReverseWatch {
  public:
   void reverse(const char* op, std::size_t, Backward& b, const std::function<void()>& step) override {
     Reverse& r = of_[{op, b.y().data()}];
-    r.gradient = norm(b.gy());
+    r.gradient = said("g", b.gy());
     const auto begin = std::chrono::steady_clock::now();
     step();
     r.us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count();
@@ -52,22 +59,25 @@ std::string label(const TracedOp& op, const std::map<const real*, const Paramete
                      number("%.1f kB", static_cast<double>(op.y.size()) * sizeof(real) / 1000);
   for (const Variable& x : op.inputs) {
     const auto p = parameters.find(x.value().data());
-    if (p != parameters.end()) text += "\\n" + p->second->name + " " + x.shape().text();
+    if (p == parameters.end()) continue;
+    text += "\\n" + p->second->name + " " + x.shape().text() + " " + said("value", x.value());
+    if (x.grad().defined()) text += "  " + said("g", x.grad());
   }
-  text += "\\n|y| " + number("%.3g", norm(op.y.value()));
+  text += "\\n" + said("y", op.y.value());
   const auto r = reverse.find({std::string(op.op), op.y.value().data()});
-  if (r != reverse.end())
-    text += "  |g| " + number("%.3g", r->second.gradient) + "  " + number("%.0f us", r->second.us);
+  if (r != reverse.end()) text += "  " + r->second.gradient;
+  text += "\\n" + number("%.0f us", op.us);
+  if (r != reverse.end()) text += " forward, " + number("%.0f us", r->second.us) + " back";
   return text;
 }
 
 }  // namespace
 
 std::string graph_of(const std::function<Variable()>& loss, const std::vector<Parameter>& parameters) {
-  std::map<const real*, const Parameter*> known;
-  for (const Parameter& p : parameters) known[p.value.value().data()] = &p;
   Trace trace;
   const Variable total = loss();
+  std::map<const real*, const Parameter*> known;
+  for (const Parameter& p : parameters) known[p.value.value().data()] = &p;
   Clock clock;
   backward(total);
   std::string text = "digraph step {\n  rankdir=TB; node [shape=box, fontname=\"Helvetica\", fontsize=10];\n";

@@ -1,5 +1,5 @@
-// The graph of one training step as a picture: every op with its shape, parameters, bytes, norms of value and
-// gradient, and the time of its reverse step.
+// The graph of one training step as a picture: every op with its shape, bytes, parameters, values and
+// gradients (of single numbers themselves, of more their norms), and the time of both its steps.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,8 @@
 namespace supertac {
 
 /// Runs `loss` forward and backward and returns the graph as Graphviz's text. Parameters are part of the op
-/// that they go into.
+/// that they go into; `loss` may still make
+/// them.
 std::string graph_of(const std::function<Variable()>& loss, const std::vector<Parameter>& parameters);
 
 /// Writes it: FILE.dot, or by Graphviz's program dot FILE.svg. Throws FileError, std::invalid_argument for

@@ -112,6 +112,17 @@ bool Sweep::take_one(const std::vector<GridPoint>& longest_first) {
   return false;
 }
 
+// How many times as long as this point's training all that no table holds takes, by the multiply-adds.
+double Sweep::whole_by(const GridPoint& point) const {
+  const auto work = [&](const GridPoint& p) {
+    return cost_of(p.model).training * training_rate_hz(a_, p.model) *
+           static_cast<double>(training_settings(a_, p.model).epochs);
+  };
+  double all = 0;
+  for (const GridPoint& p : shard_of(a_, grid_of(a_))) all += table_.has(p.name()) ? 0 : work(p);
+  return all / work(point);
+}
+
 void Sweep::measure(const GridPoint& point, const std::string& label) {
   reset_peak_memory();
   const WindowSet& windows = windows_of(point.model);
@@ -124,7 +135,11 @@ void Sweep::measure(const GridPoint& point, const std::string& label) {
   TrainingTask task = window_task(a_, windows, settings);
   const std::vector<std::uint32_t> to_score = windows_to_score(windows, task.split);
   TrainingRun training(a_, std::move(task),
-                       {.out = out, .force = true, .resume = fs::exists(state) ? state : "", .label = label});
+                       {.out = out,
+                        .force = true,
+                        .resume = fs::exists(state) ? state : "",
+                        .label = label,
+                        .whole = whole_by(point)});
   if (!training.train()) throw Interrupted();
   const ZoneMetrics scores = score(training.trainer().model(), windows, to_score, interrupted);
   stop_if_interrupted();

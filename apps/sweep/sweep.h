@@ -40,6 +40,7 @@ class Sweep {
  private:
   void check_settings() const;
   bool take_one(const std::vector<GridPoint>& longest_first);
+  double whole_by(const GridPoint& point) const;
   void measure(const GridPoint& point, const std::string& label);
   std::vector<std::uint32_t> windows_to_score(const WindowSet& windows, const Split& split) const;
   const WindowSet& windows_of(const SuperTacSettings& model);

@@ -100,7 +100,8 @@ void TrainingRun::step_until_done() {
   begin_ = std::chrono::steady_clock::now();
   seconds_before_ = folder_ ? folder_->seconds() : 0;
   const std::int64_t every = a_.integer("checkpoint-every", 1, 1'000'000'000);
-  Progress progress(a_, target_.label, static_cast<std::uint64_t>(trainer_.total_steps()), "steps");
+  Progress progress(a_, target_.label, static_cast<std::uint64_t>(trainer_.total_steps()), "steps",
+                    static_cast<std::uint64_t>(trainer_.step()), target_.whole);
   LogLine sums;
   std::int64_t steps = 0;
   bool stop = target_.ranks.size() == 1 && interrupted();
@@ -116,10 +117,19 @@ void TrainingRun::step_until_done() {
       sums = {};
     }
     if (report.step % every == 0) save();
-    progress.update(static_cast<std::uint64_t>(report.step));
+    progress.update(static_cast<std::uint64_t>(report.step), detail(report));
     stop = report.stop || (target_.ranks.size() == 1 && interrupted());
   }
   save();
+}
+
+std::string TrainingRun::detail(const StepReport& report) const {
+  const std::int64_t epoch = trainer_.steps_per_epoch();
+  std::string text = "epoch " + std::to_string((report.step - 1) / epoch + 1) + "/" +
+                     std::to_string(trainer_.total_steps() / epoch) + " loss " +
+                     format(loss_.value_or(report.total), 3);
+  if (test_ssim_) text += " test SSIM " + format(*test_ssim_, 3);
+  return text;
 }
 
 void TrainingRun::warn_of_collapse(const StepReport& report) {
@@ -159,7 +169,11 @@ void TrainingRun::log(LogLine& line, std::int64_t steps, const StepReport& last)
   line.time_s = seconds();
   line.step = last.step;
   line.learning_rate = last.learning_rate;
-  if (last.step % trainer_.steps_per_epoch() == 0) test(line);
+  loss_ = line.total;
+  if (last.step % trainer_.steps_per_epoch() == 0) {
+    test(line);
+    test_ssim_ = line.test_ssim;
+  }
   if (!folder_->log(line))
     a_.note(folder_->path() + "/log.csv: cannot write; the log is kept in memory only");
 }

@@ -18,6 +18,7 @@ struct TrainingTarget {
   bool force = false;              ///< whether an earlier run's folder may be overwritten
   std::string resume;              ///< the checkpoint to continue from; "" = start anew
   std::string label = "training";  ///< of the progress bar
+  double whole = 1;                ///< how many times as long as this training the whole command takes
   Ranks& ranks = one_process();    ///< that train together; only the first writes
 };
 
@@ -42,6 +43,7 @@ class TrainingRun {
   void step_until_done();
   void write_end();
   double seconds() const;
+  std::string detail(const StepReport& report) const;
   void warn_of_collapse(const StepReport& report);
   void test(LogLine& line) const;
   void log(LogLine& means, std::int64_t steps, const StepReport& last);
@@ -57,6 +59,7 @@ class TrainingRun {
   std::chrono::steady_clock::time_point begin_;
   double seconds_before_ = 0;  // on the log's clock when this process began
   bool warned_ = false;
+  std::optional<double> loss_, test_ssim_;  // as last logged
 };
 
 }  // namespace supertac

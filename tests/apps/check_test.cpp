@@ -6,6 +6,8 @@
 #include <regex>
 #include <set>
 
+#include "data/plates/plate_mesh.h"
+
 #include "data/recordings/recording.h"
 #include "io/file.h"
 #include "io/safetensors.h"
@@ -139,6 +141,49 @@ TEST_F(Audit, APartThatIsRepeatedGivesTheLedgersLines) {
                         std::filesystem::copy_options::overwrite_existing);
   const auto changed = audit("kept.safetensors", "1");
   EXPECT_EQ(changed.code, 1) << changed.out;
+}
+
+TEST_F(Audit, TheGraphOfATrainingStepHasEveryParametersGradient) {
+  ASSERT_EQ(train("graphed.safetensors").code, 0);
+  const auto result = run_process(
+      "supertac-explain", {path("graphed.safetensors"), "--recording", list_recordings(path("data")).front(),
+                           "--at", "4", "--out", path("step.dot")});
+  ASSERT_EQ(result.code, 0) << result.error;
+  const std::string dot = bytes("step.dot");
+  for (const char* text : {"encoder.0.conv.0.weight [3,4,16] |value| ", "upsampler.out.bias [1] value ",
+                           " us forward, ", " us back", "|y| ", "|g| ", " kB"})
+    EXPECT_NE(dot.find(text), std::string::npos) << text << dot.substr(0, 2000);
+}
+
+TEST_F(Audit, TheGraphOfAnExpressionHasValuesAndGradients) {
+  const auto draw = [](const std::string& text) {
+    return run_process("supertac-explain", {text, "--out", path("expression.dot"), "--force"});
+  };
+  const auto result = draw("a=2; b=-3; relu(a*b+10)");
+  ASSERT_EQ(result.code, 0) << result.error;
+  const std::string dot = bytes("expression.dot");
+  for (const char* text :
+       {"a [] value 2  g -3", "b [] value -3  g 2", "10 [] value 10  g 1", "relu []", "y 4  g 1"})
+    EXPECT_NE(dot.find(text), std::string::npos) << text << dot;
+  EXPECT_NE(draw("a=2; a*c").error.find("expected a number, a name that has one, relu( or sigmoid( at 'c'"),
+            std::string::npos);
+  EXPECT_NE(draw("(1+2").error.find("expected ) at ''"), std::string::npos);
+  EXPECT_EQ(draw("1 + 2 3").code, 2);
+}
+
+TEST_F(Audit, NamesMayHoldSpaces) {
+  const std::string plate = path("my plate.stl"), data = path("my data");
+  write_file(plate, stl_bytes(mesh_of(Plate::named("6_Bumps"), {.resolution_mm = 1}), "6_Bumps"));
+  const auto felt =
+      run_process("supertac-simulate", {"--out", data, "--plates", plate, "--speeds", "10", "--passes", "1"});
+  ASSERT_EQ(felt.code, 0) << felt.error;
+  const auto made = run_process(
+      "supertac-train", {"--data", data, "--out", path("my model.safetensors"), "--plates", "my plate.stl",
+                         "--preset", "tiny", "--stride", "64", "--epochs", "1", "--ledger", "1"});
+  ASSERT_EQ(made.code, 0) << made.error;
+  const auto checked =
+      run_process("supertac-check", {"training", path("my model.safetensors"), "--data", data});
+  EXPECT_EQ(checked.code, 0) << checked.out << checked.error;
 }
 
 TEST_F(Audit, ALedgerThatWasChangedIsRefused) {

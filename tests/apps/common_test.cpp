@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "apps/common/arguments.h"
+#include "apps/common/command_words.h"
 #include "apps/common/nearest.h"
 #include "apps/common/output_folder.h"
 #include "apps/common/progress.h"
@@ -107,10 +108,27 @@ TEST(Threads, QuotaOfACgroup) {
 }
 
 TEST(Progress, LineTellsShareRateAndTimeLeft) {
-  EXPECT_EQ(progress_line("training", 50, 200, "steps", 10),
+  EXPECT_EQ(progress_line("training", 50, 200, "steps", 5),
             "training  [######..................]  25 %  5.0 steps/s  0:30 left");
   EXPECT_EQ(progress_line("x", 0, 0, "steps", 0), "x  [........................]  0 %  0.0 steps/s");
   EXPECT_NE(progress_line("x", 1, 10'000, "steps", 1).find("2:46:39 left"), std::string::npos);
+  EXPECT_EQ(progress_line("x", 50, 200, "steps", 5, "epoch 1/4"),
+            "x  [##........]  25 %  epoch 1/4  0:30 left");
+}
+
+TEST(Progress, SaysAboutHowLong) {
+  EXPECT_EQ(about(38), "40 seconds");
+  EXPECT_EQ(about(700), "12 minutes");
+  EXPECT_EQ(about(9000), "2.5 hours");
+}
+
+TEST(CommandWords, AreTheSameAgain) {
+  const std::vector<std::string> words = {"supertac-train", "--data", "my data", "", "it's", "a\\b", "x,y=1"};
+  std::string line;
+  for (const std::string& word : words) line += (line.empty() ? "" : " ") + quoted_word(word);
+  EXPECT_EQ(command_words(line), words) << line;
+  EXPECT_EQ(quoted_word("plain-word_1.5"), "plain-word_1.5");
+  EXPECT_THROW(command_words("a 'b"), std::invalid_argument);
 }
 
 TEST(OutputFolder, RemovesWhatItMadeUnlessKept) {

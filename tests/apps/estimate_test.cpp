@@ -1,0 +1,108 @@
+// Every long command says after its first seconds how long it takes; each is stopped once it has.
+#include <unistd.h>
+
+#include <filesystem>
+#include <regex>
+
+#include "data/recordings/recording.h"
+#include "tests/apps/simulated_data.h"
+
+namespace supertac {
+namespace {
+
+class Estimate : public OnSimulatedData {
+ protected:
+  static std::vector<std::string> training(std::vector<std::string> more) {
+    std::vector<std::string> all{"--data", path("data"), "--timesteps", "32",       "--latent",
+                                 "3",      "--scale",    "2",           "--stride", "8"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+
+  static void expect(const std::string& program, const std::vector<std::string>& arguments,
+                     const std::string& what) {
+    const std::string file = path("said");
+    std::vector<std::string> words{"-c", "exec \"$@\" 2>" + file, "sh", SUPERTAC_BIN "/" + program};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::filesystem::remove(file);
+    RunningProcess process("/bin/sh", words);
+    const std::regex estimate(what + ": about [0-9.]+ (seconds|minutes|hours) to go\n");
+    std::string said;
+    for (int i = 0; i < 1200 && !std::regex_search(said, estimate) && !process.ended(); ++i) {
+      ::usleep(50'000);
+      if (std::filesystem::exists(file)) said = read_text_file(file, 1 << 20);
+    }
+    EXPECT_TRUE(std::regex_search(said, estimate)) << program << ": " << said;
+  }
+};
+
+TEST_F(Estimate, OfATraining) {
+  expect("supertac-train", training({"--out", path("long.safetensors"), "--epochs", "5000"}), "training");
+}
+
+TEST_F(Estimate, OfASweepCountsWhatFollows) {
+  expect("supertac-sweep", training({"--out", path("sweep"), "--epochs", "5000", "--seeds", "0,1"}),
+         "1 of 2 .* and what follows");
+}
+
+TEST_F(Estimate, OfASimulation) {
+  expect("supertac-simulate", {"--out", path("many"), "--threads", "1"}, "simulating");
+}
+
+TEST_F(Estimate, OfGradientChecks) {
+  expect("supertac-check", {"gradients"}, "checking");
+  expect("supertac-check", {"gradients", "--break", "conv2d"}, "planting");
+}
+
+TEST_F(Estimate, OfAnImport) {
+  const Recording pass = read_recording(list_recordings(path("data")).front());
+  std::string text;
+  for (std::size_t i = 0; i < pass.volts.size(); ++i)
+    text += std::to_string(pass.volts[i]) + (i % 16 == 15 ? '\n' : ' ');
+  for (int k = 1; k <= 100; ++k) {
+    const std::string folder = path("text/3_Bumps/" + std::to_string(k));
+    std::filesystem::create_directories(folder);
+    write_file(folder + "/1.txt", text);
+  }
+  expect("supertac-import", {path("text"), "--out", path("imported"), "--threads", "1"}, "importing");
+}
+
+TEST_F(Estimate, OfAnAudit) {
+  const std::string model = path("short.safetensors");
+  const auto made =
+      run_process("supertac-train", training({"--out", model, "--epochs", "60", "--ledger", "40"}));
+  ASSERT_EQ(made.code, 0) << made.error;
+  expect("supertac-check",
+         {"training", model, "--data", path("data"), "--segments", "1000", "--threads", "1"}, "repeating");
+}
+
+TEST_F(Estimate, OfWhatIsDoneWithAModel) {
+  const std::string data = path("two"), model = path("fine.safetensors");
+  const auto felt = run_process(
+      "supertac-simulate", {"--out", data, "--plates", "3_Bumps,6_Ridges", "--speeds", "5", "--passes", "2"});
+  ASSERT_EQ(felt.code, 0) << felt.error;
+  const auto made = run_process(
+      "supertac-train", {"--data", data, "--out", model, "--scale", "8", "--epochs", "1", "--stride", "64"});
+  ASSERT_EQ(made.code, 0) << made.error;
+  expect("supertac-classify",
+         {"--model", model, "--data", data, "--views", "frame", "--stride", "1", "--seeds", "1000"},
+         "classifying");
+  expect("supertac-evaluate", {"--model", model, "--data", data, "--threads", "1"}, "evaluating");
+}
+
+// On a terminal the bar has epoch, loss and SSIM of the test side.
+TEST_F(Estimate, TheBarOfATrainingShowsEpochLossAndTestSsim) {
+  ProcessOptions options;
+  options.terminal = true;
+  const auto made = run_process("supertac-train",
+                                training({"--out", path("shown.safetensors"), "--epochs", "60"}), options);
+  ASSERT_EQ(made.code, 0) << made.error;
+  EXPECT_TRUE(std::regex_search(
+      made.error,
+      std::regex(
+          R"(training  \[#+\.*\]  \d+ %  epoch \d+/60 loss \d*\.\d+ test SSIM -?\d*\.\d+  \d+:\d\d left)")))
+      << made.error;
+}
+
+}  // namespace
+}  // namespace supertac
