@@ -58,6 +58,7 @@ void line_to_bytes(Dim n, const float* x, Steps steps, std::uint8_t* bytes) {
   for (Dim i = 0; i < n; ++i) bytes[i] = to_byte(x[i], steps);
 }
 
+#ifndef SUPERTAC_REAL_IS_DOUBLE
 // Tiles are a part of the processor's state that Linux gives only to who asks for it.
 bool may_use_tiles() {
 #if defined(__x86_64__) && defined(SYS_arch_prctl)
@@ -70,6 +71,7 @@ bool may_use_tiles() {
   return false;
 #endif
 }
+#endif
 
 }  // namespace
 
