@@ -7,22 +7,25 @@ set multiplot layout 1,3
 set logscale xy
 set xlabel 'recorded frames'
 set format x '10^{%T}'
-set key top left
+set xrange [5e4:2e8]
+set key bottom right
 set grid
 rows(mode) = sprintf("< grep ',%s,' %s", mode, csv)
 set title 'until the first step'
 set ylabel 's'
-plot rows('held') using 1:5 with linespoints lc rgb '#e76f51' pt 7 title 'all held in memory', \
-     rows('first') using 1:5 with linespoints lc rgb '#e9c46a' pt 5 title '--memory, first time', \
-     rows('read') using 1:5 with linespoints lc rgb '#2a9d8f' pt 9 title '--memory, later'
+set yrange [0.1:2e3]
+plot rows('held,all') using 1:6 with linespoints lc rgb '#e76f51' pt 7 title 'all held in memory', \
+     rows('first') using 1:6 with linespoints lc rgb '#e9c46a' pt 5 title '--memory, first time', \
+     rows('read,500M') using 1:6 with linespoints lc rgb '#2a9d8f' pt 9 title '--memory, later'
 set title 'most memory held'
 set ylabel 'MB'
-plot rows('held') using 1:6 with linespoints lc rgb '#e76f51' pt 7 title 'all held in memory', \
-     rows('read') using 1:6 with linespoints lc rgb '#2a9d8f' pt 9 title '--memory'
+set yrange [10:2e4]
+plot rows('held') using 1:8 with linespoints lc rgb '#e76f51' pt 7 title 'all held in memory', \
+     rows('read,500M') using 1:8 with linespoints lc rgb '#2a9d8f' pt 9 title '--memory'
 unset logscale y
 set title 'processor time of a step'
 set ylabel 'ms'
-set yrange [0:]
-plot rows('held') using 1:9 with linespoints lc rgb '#e76f51' pt 7 title 'all held in memory', \
-     rows('read') using 1:9 with linespoints lc rgb '#2a9d8f' pt 9 title '--memory'
+set yrange [0:60]
+plot rows('held') using 1:11 with points lc rgb '#e76f51' pt 7 title 'all held in memory', \
+     rows('read') using 1:11 with points lc rgb '#2a9d8f' pt 9 title '--memory'
 unset multiplot

@@ -19,8 +19,8 @@ import subprocess
 import sys
 import time
 
-COLUMNS = ["frames", "recordings", "tracks_mb", "mode", "start_s", "peak_mb", "steps", "ms_per_step",
-           "cpu_ms_per_step"]
+COLUMNS = ["frames", "recordings", "tracks_mb", "mode", "memory", "start_s", "start_cpu_s", "peak_mb", "steps",
+           "ms_per_step", "cpu_ms_per_step"]
 
 
 class Training:
@@ -44,6 +44,8 @@ class Training:
         else:
             raise SystemExit("".join(lines))
         self.start_s = time.monotonic() - self.begin
+        self.start_cpu_s = self.cpu_s()
+        self.memory = options[options.index("--memory") + 1] if "--memory" in options else "all"
 
     def cpu_s(self):
         with open(f"/proc/{self.process.pid}/stat") as stat:
@@ -77,7 +79,8 @@ def row(folder, mode, training, peak, log, cpu):
     tracks = sum(os.path.getsize(os.path.join(kept, name)) for name in os.listdir(kept) if name.endswith(".f32"))
     timed = len(log) > 1
     return {"frames": counts[1], "recordings": counts[2], "tracks_mb": round(tracks / 1e6), "mode": mode,
-            "start_s": f"{training.start_s:.2f}", "peak_mb": f"{peak:.0f}", "steps": log[-1][1] if timed else "",
+            "memory": training.memory, "start_s": f"{training.start_s:.2f}",
+            "start_cpu_s": f"{training.start_cpu_s:.2f}", "peak_mb": f"{peak:.0f}", "steps": log[-1][1] if timed else "",
             "ms_per_step": f"{1e3 * (log[-1][0] - log[0][0]) / (log[-1][1] - log[0][1]):.1f}" if timed else "",
             "cpu_ms_per_step": cpu}
 
