@@ -107,6 +107,12 @@ def attack(port, seconds, malformed):
     print(json.dumps({"events": events, "answered": answered, "pages": len(watch.get_map()), "seconds": time.monotonic() - begin}))
 
 
+def processor_time():
+    """Of the machine since its start: all, and what the host gave to others meanwhile."""
+    times = list(map(int, pathlib.Path("/proc/stat").read_text().split("\n")[0].split()[1:9]))
+    return sum(times), times[7]
+
+
 def run_once(binaries, model, folder, loaded, malformed):
     """The stream's own figures, after SECONDS with the load or without a page."""
     rig, end = Rig(binaries, folder), threading.Event()
@@ -128,15 +134,17 @@ def run_once(binaries, model, folder, loaded, malformed):
 
 
 def load(binaries, model, pairs):
-    print("pair,load,seconds,frames,lost,dropped,median_ms,p99_ms,pages_served,events_a_page_a_second,resident_kb", flush=True)
+    print("pair,load,seconds,frames,lost,dropped,median_ms,p99_ms,pages_served,events_a_page_a_second,resident_kb,stolen_percent", flush=True)
     for pair in range(pairs):
         for loaded in (pair % 2 == 0, pair % 2 == 1):
+            before = processor_time()
             with tempfile.TemporaryDirectory() as name:
                 result, came, resident = run_once(binaries, model, pathlib.Path(name), loaded, MALFORMED // pairs)
+            all_time, stolen = (now - then for now, then in zip(processor_time(), before))
             latency = result["latency_ms"]
             rate = came["events"] / came["pages"] / came["seconds"] if came["pages"] else 0
             print(f"{pair},{'with' if loaded else 'without'},{result['seconds']:.1f},{result['frames']},{result['lost']},{result['dropped']},"
-                  f"{latency['median']:.3f},{latency['p99']:.3f},{came['pages']},{rate:.1f},{resident}", flush=True)
+                  f"{latency['median']:.3f},{latency['p99']:.3f},{came['pages']},{rate:.1f},{resident},{100 * stolen / all_time:.2f}", flush=True)
 
 
 def sent_to_page(port):
