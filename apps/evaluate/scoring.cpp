@@ -11,20 +11,25 @@
 namespace supertac {
 namespace {
 
+// What decides which windows a split tests.
+std::string drawn_by(const ModelFile& file) {
+  const std::string plate = file.metadata_or("leave_out", "");
+  return plate.empty() ? "seed " + file.metadata_or("seed", "0") : "left-out plate " + plate;
+}
+
 void refuse_leak(const std::vector<ModelFile>& files, const std::string& split_name) {
   const std::string split = files.front().metadata_or("split", "none");
-  const std::string seed = files.front().metadata_or("seed", "0");
   for (const ModelFile& file : files)
     if (const std::string other = file.metadata_or("split", "none"); other != split)
       throw std::runtime_error(
           "one model was trained with split " + split + ", another with " + other +
           ": what one is tested on the other may have seen; average models of one split");
-  if (split_name == "trial" || split_name == "none") return;  // all others are drawn with the seed
+  if (split_name == "trial" || split_name == "none") return;  // these are drawn by nothing
   for (const ModelFile& file : files)
-    if (file.metadata_or("seed", "0") != seed)
-      throw std::runtime_error("the models' seeds differ, and split " + split_name +
-                               " differs with the seed: what one is tested on the others have seen; average "
-                               "models of split trial");
+    if (drawn_by(file) != drawn_by(files.front()))
+      throw std::runtime_error("split " + split_name + " of one model was drawn by " +
+                               drawn_by(files.front()) + ", of another by " + drawn_by(file) +
+                               ": what one is tested on the other has seen; average models of one split");
 }
 
 }  // namespace

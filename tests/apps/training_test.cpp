@@ -219,7 +219,7 @@ TEST_F(Training, SeveralModelsAreAveragedUnlessTheySawEachOthersTest) {
   const ProcessResult leak =
       run_process("supertac-evaluate", {"--model", one + "," + two, "--data", path("data")});
   EXPECT_EQ(leak.code, 1);
-  EXPECT_NE(leak.error.find("split pass differs with the seed"), std::string::npos) << leak.error;
+  EXPECT_NE(leak.error.find("drawn by seed 1, of another by seed 2"), std::string::npos) << leak.error;
   const std::string all = path("all.safetensors");
   ASSERT_EQ(train("all.safetensors", {"--split", "none"}).code, 0);
   const ProcessResult mixed =
@@ -240,6 +240,34 @@ TEST_F(Training, SeveralModelsAreAveragedUnlessTheySawEachOthersTest) {
   const double a = ssim(one), b = ssim(two), both = ssim(one + "," + two);
   EXPECT_NE(both, a);
   EXPECT_NE(both, b);
+}
+
+// What a network left out decides what it is tested on, not its seed.
+TEST_F(Training, NetworksThatLeftOutTheSamePlateAreAveraged) {
+  const std::string data = path("plates");
+  ASSERT_EQ(run_process("supertac-simulate", {"--out", data, "--plates", "6_Bumps,6_Ridges", "--passes", "1",
+                                              "--trials", "1", "--speeds", "30"})
+                .code,
+            0);
+  const auto train_without = [&](const char* plate, const char* seed, const std::string& out) {
+    std::vector<std::string> words =
+        options(out, {"--split", "texture", "--leave-out", plate, "--seed", seed, "--epochs", "1"});
+    words[1] = data;
+    ASSERT_EQ(run_process("supertac-train", words).code, 0);
+  };
+  train_without("6_Bumps", "1", "left1.safetensors");
+  train_without("6_Bumps", "2", "left2.safetensors");
+  train_without("6_Ridges", "1", "other.safetensors");
+  const auto judge = [&](const char* other) {
+    return run_process("supertac-evaluate", {"--model", path("left1.safetensors") + "," + path(other),
+                                             "--data", data, "--limit", "20"});
+  };
+  const ProcessResult good = judge("left2.safetensors"), leak = judge("other.safetensors");
+  EXPECT_EQ(good.code, 0) << good.error;
+  EXPECT_EQ(leak.code, 1);
+  EXPECT_NE(leak.error.find("by left-out plate 6_Bumps, of another by left-out plate 6_Ridges"),
+            std::string::npos)
+      << leak.error;
 }
 
 struct Bad {
