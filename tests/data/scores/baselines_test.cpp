@@ -159,7 +159,8 @@ TEST(Baselines, MeanImageIsTheMeanTruthWhateverItSees) {
 TEST(Baselines, AllButRidgeSeeTheLastFrameOnly) {
   const WindowSet set = make_set();
   const auto baselines = fit_baselines(set, make_split(set, SplitKind::none, 1).train);
-  std::vector<float> window(set.window(200).begin(), set.window(200).end()), out(256), again(256);
+  const std::vector<float> window = set.window(200);
+  std::vector<float> out(256), again(256);
   for (const auto& baseline : baselines) {
     baseline->predict(window, out);
     auto changed = window;
