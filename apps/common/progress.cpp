@@ -63,20 +63,21 @@ void Progress::update(std::uint64_t done, const std::string& detail) {
   const double seconds = std::chrono::duration<double>(now - begin_).count();
   const double rate = static_cast<double>(done - before_) / seconds;
   if (!said_ && now - begin_ >= 3s) {
-    said_ = true;
     const double part = static_cast<double>(total_ - before_) / rate;
-    say_how_long(whole_ * part - seconds);
+    said_ = say_how_long(whole_ * part - seconds);
   }
   if (drawable_)
     draw(progress_line(what_, done, total_, unit_, rate, detail).substr(0, terminal_width() - 1));
 }
 
-void Progress::say_how_long(double seconds_left) {
+// Where the first parts are the short ones, the work turns out to be long only later.
+bool Progress::say_how_long(double seconds_left) {
   constexpr double kShort = 5;
-  if (seconds_left < kShort) return;
+  if (seconds_left < kShort) return false;
   if (width_ > 0) draw("");
   arguments_.note(what_ + (whole_ > 1 ? " and what follows" : "") + ": about " + about(seconds_left) +
                   " to go");
+  return true;
 }
 
 void Progress::draw(const std::string& line) {

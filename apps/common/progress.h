@@ -31,7 +31,7 @@ class Progress {
   void update(std::uint64_t done, const std::string& detail = "");
 
  private:
-  void say_how_long(double seconds_left);
+  bool say_how_long(double seconds_left);
   void draw(const std::string& line);
 
   const Arguments& arguments_;
