@@ -91,12 +91,15 @@ class Maker {
   AtomicFile data_;
 };
 
-// Processes of one training start at the same time; one makes what all of them read.
+// Processes of one training start at the same time; one makes what all of them read. That takes minutes even
+// for a hundred million frames: who holds the folder for an hour is stuck.
 FolderLock wait_for_lock(const std::string& folder) {
-  for (;;) {
+  using Clock = std::chrono::steady_clock;
+  for (const auto deadline = Clock::now() + std::chrono::hours(1);;) {
     try {
       return FolderLock(folder);
     } catch (const FileError&) {
+      if (Clock::now() > deadline) throw;
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
   }

@@ -32,9 +32,9 @@ class TrackFile {
  public:
   /// Opens the file. It is made first when there is none, when a recording or STL file of the folder has
   /// come, gone, or got another size or time, or when the index fails its checksum. While another process
-  /// makes it, this one waits. Throws as list_recordings(), read_recording(), plate_in_folder() and
-  /// ChosenPlates::check(); FileError when it cannot be written; std::runtime_error for recordings of
-  /// different arrays.
+  /// makes it, this one waits, for an hour at most. Throws as list_recordings(), read_recording(),
+  /// plate_in_folder() and ChosenPlates::check(); FileError when it cannot be written; std::runtime_error for
+  /// recordings of different arrays.
   static std::shared_ptr<const TrackFile> open(const std::string& folder, const TrackFileSettings& settings);
 
   const std::string& folder() const { return folder_; }
