@@ -1,4 +1,4 @@
-# gnuplot -e "csv='bench/results/linear_cost.csv'; png='bench/results/linear_cost.png'" bench/linear_cost.gp
+# gnuplot -e "csv='bench/results/linear_cost.csv'; png='bench/results/charts/linear_cost.png'" bench/linear_cost.gp
 set datafile separator ","
 set terminal pngcairo size 1000,720 font ",11"
 set output png

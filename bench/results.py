@@ -7,49 +7,16 @@
 bench/results/sources.csv says of every file how it was made; a file that it does not name is an error. The README's
 tables are those of the page with some lines left out.
 """
-import csv
 import itertools
-import math
 import pathlib
 import re
 import statistics
 import sys
 
+from result_tables import RESULTS, line_through, mean, over_seeds, plus_minus, rows, table
+
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-RESULTS = ROOT / "bench/results"
 PAGE, README = RESULTS / "README.md", ROOT / "README.md"
-T_975 = {1: 12.706, 2: 4.303, 3: 3.182, 4: 2.776, 5: 2.571, 6: 2.447, 7: 2.365, 8: 2.306, 9: 2.262}  # Student's t
-
-
-def rows(name):
-    with open(RESULTS / name, newline="") as file:
-        return list(csv.DictReader(line for line in file if not line.startswith("#")))
-
-
-def table(head, lines):
-    return "\n".join("| " + " | ".join(line) + " |" for line in [head, ["---"] * len(head), *lines])
-
-
-def mean(values):
-    return sum(values) / len(values)
-
-
-def interval(values):
-    """Half the 95 % interval of the mean."""
-    m = mean(values)
-    return T_975[len(values) - 1] * math.sqrt(sum((v - m) ** 2 for v in values) / (len(values) - 1) / len(values))
-
-
-def plus_minus(value, half, digits):
-    return f"{float(value):.{digits}f}" + (f" ± {float(half):.{digits}f}" if float(half or 0) > 0 else "")
-
-
-def over_seeds(chosen, column, digits):
-    """Mean and interval; the values themselves where they are fewer than three."""
-    values = [float(r[column]) for r in chosen if r[column]]
-    if len(values) < 3:
-        return ", ".join(f"{v:.{digits}f}" for v in values)
-    return plus_minus(mean(values), interval(values), digits)
 
 
 def sources():
@@ -177,13 +144,6 @@ def streaming():
         f"{f['ready_ms']:.0f} ms after its start.")
 
 
-def line_through(x, y):
-    mx, my = mean(x), mean(y)
-    sxx, syy = sum((a - mx) ** 2 for a in x), sum((b - my) ** 2 for b in y)
-    sxy = sum((a - mx) * (b - my) for a, b in zip(x, y))
-    return my - sxy / sxx * mx, sxy / sxx, sxy / math.sqrt(sxx * syy)
-
-
 def growth():
     lines = []
     for axis, column, unit, name in (("timesteps", "value", "sample of the window", "length of the window, 32 to 512"),
@@ -257,25 +217,25 @@ def stability():
 
 
 def rig():
-    pulls, kills = rows("rig_unplug.csv"), rows("rig_kill.csv")
-    soak = {r["quantity"]: float(r["measured"]) for r in rows("soak.csv")}
-    ends, calls = rows("rig_ends.csv"), rows("rig_io.csv")
+    pulls, kills = rows("rig/unplug.csv"), rows("rig/kill.csv")
+    soak = {r["quantity"]: float(r["measured"]) for r in rows("rig/soak.csv")}
+    ends, calls = rows("rig/ends.csv"), rows("rig/io.csv")
 
     def latest(port, when):
         return max(float(r["noticed_ms"]) for r in pulls if (r["port"], r["when"]) == (port, when))
 
     lost = sorted(float(r["lost_s"]) for r in kills)
     lines = [
-        ["`rig_unplug.csv`", f"{len(pulls)} cables pulled; the latest was noticed after {latest('board', 'idle'):.1f} ms (board idle), "
+        ["`rig/unplug.csv`", f"{len(pulls)} cables pulled; the latest was noticed after {latest('board', 'idle'):.1f} ms (board idle), "
          f"{latest('printer', 'idle'):.1f} ms (printer idle), {latest('board', 'collection'):.1f} and "
          f"{latest('printer', 'collection'):.1f} ms (in a collection)"],
-        ["`rig_kill.csv`", f"{len(kills)} kills of a running collection lost {lost[len(lost) // 2]:.2f} s (median) and at most {lost[-1]:.3f} s; "
+        ["`rig/kill.csv`", f"{len(kills)} kills of a running collection lost {lost[len(lost) // 2]:.2f} s (median) and at most {lost[-1]:.3f} s; "
          f"{sum(bool(r['broken']) for r in kills)} broke a promise"],
-        ["`rig_ends.csv`", f"{len(ends)} ends by signal or full disk; {sum(bool(r['broken']) for r in ends)} left the finger down, "
+        ["`rig/ends.csv`", f"{len(ends)} ends by signal or full disk; {sum(bool(r['broken']) for r in ends)} left the finger down, "
          "a wrong exit code or more than one line"],
-        ["`rig_io.csv`", f"{len(calls)} collections with one failing call or short writes; {sum(bool(r['broken']) for r in calls)} ended "
+        ["`rig/io.csv`", f"{len(calls)} collections with one failing call or short writes; {sum(bool(r['broken']) for r in calls)} ended "
          "otherwise than promised"],
-        ["`soak.csv`", f"{soak['seconds']:.0f} s of a board with seeded faults: {soak['frames lost']:.0f} frames lost, "
+        ["`rig/soak.csv`", f"{soak['seconds']:.0f} s of a board with seeded faults: {soak['frames lost']:.0f} frames lost, "
          f"{soak['losses counted']:.0f} counted; {soak['latency median ms']:.2f} ms from frame to picture, {soak['latency p99 ms']:.2f} ms at "
          f"the 99th percentile; {soak['memory kB'] / 1000:.1f} MB, drift {soak['memory drift kB']:.0f} kB"],
     ]
@@ -400,7 +360,7 @@ def rewritten(path):
 def unnamed():
     """Files of results that sources.csv does not name, and the other way round."""
     named = {name.strip(" `") for r in rows("sources.csv") for name in r["file"].split(",")}
-    present = {path.name for path in RESULTS.iterdir()} - {"README.md", "sources.csv"}
+    present = {str(path.relative_to(RESULTS)) for path in RESULTS.rglob("*") if path.is_file()} - {"README.md", "sources.csv"}
     return ([f"bench/results/{name} has no line in sources.csv: say command, commit, split, seeds and date" for name in sorted(present - named)] +
             [f"sources.csv names {name}, which is not in bench/results" for name in sorted(named - present)])
 

@@ -9,8 +9,8 @@ model="$1"
 bin="${2:-build-dev/bin}"
 results=bench/results
 "${PEERS_PYTHON:-/usr/bin/python3}" bench/peers/compare.py "$model" --bin "$bin" --out $results/peers.csv
-gnuplot -e "csv='$results/peers.csv'; png='$results/peers.png'" bench/peers/chart.gp
+gnuplot -e "csv='$results/peers.csv'; png='$results/charts/peers.png'" bench/peers/chart.gp
 "$bin/linear_cost" > $results/new.csv && mv $results/new.csv $results/linear_cost.csv
-gnuplot -e "csv='$results/linear_cost.csv'; png='$results/linear_cost.png'" bench/linear_cost.gp
+gnuplot -e "csv='$results/linear_cost.csv'; png='$results/charts/linear_cost.png'" bench/linear_cost.gp
 "$bin/streaming" "$model" 60 > $results/new.csv && mv $results/new.csv $results/streaming.csv
 bench/results.py

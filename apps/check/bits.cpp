@@ -73,19 +73,19 @@ int check_bits(const Arguments& a) {
     if (set == &kernels::kPlainKernels) continue;  // sums in another order: right up to rounding only
     kernels::use_isa(*set);
     const Bits found = bits_here();
-    Json row = {
-        {"kernels", std::string(set->name) + (set == &kernels::kPortableFmaKernels ? ", with fma" : "")}};
+    const bool fma = set != &kernels::kPortableKernels && set->name == kernels::kPortableKernels.name;
+    Json row = {{"kernels", std::string(set->name) + (fma ? ", with fma" : "")}};
     std::string line;
-    for (const auto& [name, member] :
+    for (const auto& [what, member] :
          std::array<std::pair<const char*, std::string Bits::*>, 4>{{{"recording", &Bits::recording},
                                                                      {"training", &Bits::training},
                                                                      {"pictures", &Bits::pictures},
                                                                      {"int8", &Bits::bytes}}}) {
       const bool same = found.*member == kGolden.*member;
       wrong += !same;
-      row[name] = found.*member;
+      row[what] = found.*member;
       line +=
-          std::string("  ") + name + " " + found.*member + (same ? " ok" : " expected " + kGolden.*member);
+          std::string("  ") + what + " " + found.*member + (same ? " ok" : " expected " + kGolden.*member);
     }
     a.print(row["kernels"].get<std::string>() + ":" + line);
     rows.push_back(std::move(row));

@@ -10,7 +10,8 @@ namespace supertac {
 Numerics numerics() {
   const kernels::IsaKernels& chosen = kernels::isa_kernels();
   Numerics n;
-  n.text = "kernels   " + std::string(chosen.name) + " (SUPERTAC_ISA=avx512|avx2|portable|plain overrides)\n";
+  n.text =
+      "kernels   " + std::string(chosen.name) + " (SUPERTAC_ISA=avx512|avx2|neon|portable|plain overrides)\n";
   if (openblas_get_config != nullptr)
     n.text += "algebra   " + std::string(openblas_get_config()) + ", one thread of it\n";
   if (&chosen == &kernels::kPortableKernels) {

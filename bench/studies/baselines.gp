@@ -1,4 +1,4 @@
-# Accuracy against cost: gnuplot -e "csv='bench/results/baselines.csv'; png='bench/results/baselines.png'" bench/studies/baselines.gp
+# Accuracy against cost: gnuplot -e "csv='bench/results/baselines.csv'; png='bench/results/charts/baselines.png'" bench/studies/baselines.gp
 set terminal pngcairo size 1100,640 font "sans,11"
 set output png
 set datafile separator ","

@@ -1,4 +1,4 @@
-# gnuplot -e "csv='results/large_data.csv'; out='results/large_data.png'" large_data.gp
+# gnuplot -e "csv='results/large_data.csv'; out='results/charts/large_data.png'" large_data.gp
 # What a training costs as its recordings grow: time to the first step, memory, and processor time of a step.
 set datafile separator ','
 set terminal pngcairo size 1200,400 font 'sans,10'

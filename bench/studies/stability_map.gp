@@ -1,4 +1,4 @@
-# gnuplot -e "csv='results/stability_map.csv'; out='results/stability_map.png'" stability_map.gp
+# gnuplot -e "csv='results/stability_map.csv'; out='results/charts/stability_map.png'" stability_map.gp
 # Rows: beta; columns: learning rate; a panel with and one without safeguards. A cell tells its seeds' outcomes.
 set datafile separator ','
 set terminal pngcairo size 1100,420 font 'sans,10'

@@ -1,9 +1,11 @@
 #include "models/onnx/export.h"
 
+#include <set>
 #include <stdexcept>
 
 #include "autograd/trace.h"
 #include "data/samples/levelling.h"
+#include "io/numbers.h"
 #include "models/interval.h"
 #include "models/onnx/onnx_file.h"
 
@@ -42,22 +44,22 @@ class Exporter {
 
   std::map<Id, std::string> names_;
   std::map<Id, StoredTensor> parameters_;
-  std::map<std::string, std::string> written_;  // constants by what they are
+  std::set<std::string> written_;  // constants, named by what they are: the order of calls shall not show
   int count_ = 0;
 };
 
 std::string Exporter::number(float value) {
-  const std::string name = "number " + std::to_string(std::bit_cast<std::uint32_t>(value));
-  if (!written_.contains(name)) written_[name] = graph.constant(new_name("number"), {}, std::span(&value, 1));
-  return written_.at(name);
+  const std::string name = "number_" + format(value);
+  if (written_.insert(name).second) graph.constant(name, {}, std::span(&value, 1));
+  return name;
 }
 
 std::string Exporter::numbers(const Ints& values) {
   std::string name = "numbers";
-  for (const std::int64_t i : values) name += " " + std::to_string(i);
+  for (const std::int64_t i : values) name += "_" + std::to_string(i);
   const std::int64_t shape[] = {static_cast<std::int64_t>(values.size())};
-  if (!written_.contains(name)) written_[name] = graph.constant(new_name("numbers"), shape, values);
-  return written_.at(name);
+  if (written_.insert(name).second) graph.constant(name, shape, values);
+  return name;
 }
 
 // In double precision, as Scaling computes.
@@ -123,11 +125,11 @@ std::string Exporter::network_input(const ModelFile& file) {
 
 std::string Exporter::weight(const Variable& x) {
   const StoredTensor& p = parameters_.at(x.node());
-  if (!written_.contains(p.name)) {
+  if (written_.insert(p.name).second) {
     Ints shape(p.shape.begin(), p.shape.end());
     // A 1x1 convolution of means is a linear layer.
     if (shape.size() == 4 && x.rank() == 2) shape.resize(2);
-    written_[p.name] = graph.constant(p.name, shape, p.values);
+    graph.constant(p.name, shape, p.values);
   }
   return p.name;
 }
@@ -186,8 +188,10 @@ std::string Exporter::made(const TracedOp& op) {
     for (int i = 1; i + 1 < op.y.rank(); ++i) shape.push_back(op.y.dim(i));
     return graph.node("Reshape", {x, numbers(shape)}, new_name("map"));
   }
-  if (kind == "global_mean")
-    return graph.node("Flatten", {graph.node("GlobalAveragePool", {x}, new_name("mean"))}, new_name("means"));
+  if (kind == "global_mean") {
+    const std::string mean = graph.node("GlobalAveragePool", {x}, new_name("mean"));
+    return graph.node("Flatten", {mean}, new_name("means"));
+  }
   if (kind == "sigmoid") return graph.node("Sigmoid", {x}, new_name("sigmoid"));
   if (kind == "add") return graph.node("Add", {x, of(op.inputs[1])}, new_name("add"));
   if (kind == "concat") {

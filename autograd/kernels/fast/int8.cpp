@@ -58,10 +58,10 @@ void line_to_bytes(Dim n, const float* x, Steps steps, std::uint8_t* bytes) {
   for (Dim i = 0; i < n; ++i) bytes[i] = to_byte(x[i], steps);
 }
 
-#ifndef SUPERTAC_REAL_IS_DOUBLE
+#if defined(__x86_64__) && !defined(SUPERTAC_REAL_IS_DOUBLE)
 // Tiles are a part of the processor's state that Linux gives only to who asks for it.
 bool may_use_tiles() {
-#if defined(__x86_64__) && defined(SYS_arch_prctl)
+#ifdef SYS_arch_prctl
   constexpr unsigned kTiles = 1U << 24, kBytes = 1U << 25;
   constexpr long kAskForState = 0x1023, kTileData = 18;
   unsigned a = 0, b = 0, c = 0, d = 0;
@@ -87,7 +87,7 @@ void to_bytes(const ToBytesJob& job, const float* x, std::uint8_t* bytes) {
 }
 
 const ByteKernels& byte_kernels() {
-#ifndef SUPERTAC_REAL_IS_DOUBLE
+#if defined(__x86_64__) && !defined(SUPERTAC_REAL_IS_DOUBLE)
   static const bool has_vnni = __builtin_cpu_supports("avx512vnni"), has_tiles = may_use_tiles();
   const Vectors vectors = isa_kernels().vectors;
   if (vectors == Vectors::avx512 && has_vnni && has_tiles) return kAmxByteKernels;

@@ -57,10 +57,7 @@ struct ToBytesJob {
 void to_bytes(const ToBytesJob& job, const float* x, std::uint8_t* bytes);
 
 extern const ByteKernels kPlainByteKernels;
-#ifndef SUPERTAC_REAL_IS_DOUBLE
-extern const ByteKernels kAvx2ByteKernels;
-extern const ByteKernels kVnniByteKernels;
-extern const ByteKernels kAmxByteKernels;
-#endif
+// Built for x86 alone, in single precision.
+extern const ByteKernels kAvx2ByteKernels, kVnniByteKernels, kAmxByteKernels;
 
 }  // namespace supertac::kernels

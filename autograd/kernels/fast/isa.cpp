@@ -18,22 +18,28 @@ struct Set {
 
 // The best first.
 std::vector<Set> all_sets() {
+  std::vector<Set> sets;
+#ifdef __x86_64__
   const bool fma = __builtin_cpu_supports("fma");
-  [[maybe_unused]] const bool avx2 = fma && __builtin_cpu_supports("avx2");
-  return {
 #ifndef SUPERTAC_REAL_IS_DOUBLE
-      {&kAvx512Kernels, avx2 && __builtin_cpu_supports("avx512f")},
-      {&kAvx2Kernels, avx2},
+  const bool avx2 = fma && __builtin_cpu_supports("avx2");
+  sets.push_back({&kAvx512Kernels, avx2 && __builtin_cpu_supports("avx512f")});
+  sets.push_back({&kAvx2Kernels, avx2});
 #endif
-      {&kPortableFmaKernels, fma},
-      {&kPortableKernels, true},
-      {&kPlainKernels, true}};
+  sets.push_back({&kPortableFmaKernels, fma});
+#elif defined(__aarch64__) && !defined(SUPERTAC_REAL_IS_DOUBLE)
+  sets.push_back({&kNeonKernels, true});
+#endif
+  sets.push_back({&kPortableKernels, true});
+  sets.push_back({&kPlainKernels, true});
+  return sets;
 }
 
 [[noreturn]] void refuse(const std::string& wanted, const std::string& why) {
   std::string names;
   for (const Set& set : all_sets()) {
-    if (set.kernels != &kPortableFmaKernels) names += std::string(set.kernels->name) + ", ";
+    const std::string name = std::string(set.kernels->name) + ", ";
+    if (!names.ends_with(name)) names += name;  // portable stands there twice
   }
   throw std::runtime_error("SUPERTAC_ISA=" + wanted + ": " + why + "; use one of " + names +
                            "or unset it to let the program choose");

@@ -82,7 +82,7 @@ struct IsaKernels {
   void (*plane_conv)(const PlaneJob& job, const real* x, real* y) = nullptr;
 };
 
-/// The best set this processor has, or the one that SUPERTAC_ISA=avx512|avx2|portable|plain names.
+/// The best set this processor has, or the one that SUPERTAC_ISA=avx512|avx2|neon|portable|plain names.
 /// Throws std::runtime_error, at first use, when SUPERTAC_ISA names an unknown or unsupported set.
 const IsaKernels& isa_kernels();
 /// All sets that this processor can run, the best first, kPlainKernels last.
@@ -95,10 +95,9 @@ extern const IsaKernels kPlainKernels;
 inline bool is_plain() { return isa_kernels().gather == nullptr; }
 
 extern const IsaKernels kPortableKernels;  // any processor; fused multiply-add in software where it has none
-extern const IsaKernels kPortableFmaKernels;  // the same source for processors with scalar FMA
-#ifndef SUPERTAC_REAL_IS_DOUBLE
-extern const IsaKernels kAvx2Kernels;
-extern const IsaKernels kAvx512Kernels;
-#endif
+// Those below are built for the processors that can have them, all but the first for single precision only.
+extern const IsaKernels kPortableFmaKernels;  // the portable source for x86 processors with scalar FMA
+extern const IsaKernels kAvx2Kernels, kAvx512Kernels;
+extern const IsaKernels kNeonKernels;
 
 }  // namespace supertac::kernels

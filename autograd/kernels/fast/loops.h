@@ -18,6 +18,7 @@
 
 namespace supertac::kernels {
 
+#ifdef __x86_64__
 template <class Loop>
 __attribute__((target("avx2"))) void run_on_avx2(Loop loop) {
   loop();
@@ -28,17 +29,17 @@ __attribute__((target("avx512f"))) void run_on_avx512(Loop loop) {
   loop();
 }
 
+#endif
+
 /// run_loop([=]() SUPERTAC_LOOP { any loops });
 template <class Loop>
 void run_loop(Loop loop) {
-  switch (isa_kernels().vectors) {
-    case Vectors::baseline:
-      return loop();
-    case Vectors::avx2:
-      return run_on_avx2(loop);
-    case Vectors::avx512:
-      return run_on_avx512(loop);
-  }
+#ifdef __x86_64__
+  const Vectors vectors = isa_kernels().vectors;
+  if (vectors == Vectors::avx512) return run_on_avx512(loop);
+  if (vectors == Vectors::avx2) return run_on_avx2(loop);
+#endif
+  loop();
 }
 
 /// each(n, [=](Dim i) SUPERTAC_LOOP { y[i] = a[i] + b[i]; }) for all i below n.

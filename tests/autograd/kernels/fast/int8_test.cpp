@@ -30,7 +30,7 @@ std::vector<ByteKernels> kernels_here() {
     all.push_back(byte_kernels());
   }
   use_isa(before);
-#ifndef SUPERTAC_REAL_IS_DOUBLE
+#if defined(__x86_64__) && !defined(SUPERTAC_REAL_IS_DOUBLE)
   if (__builtin_cpu_supports("avx512vnni")) all.push_back(kVnniByteKernels);  // where there are tiles too
 #endif
   return all;

@@ -1,0 +1,7 @@
+# cmake -DCMAKE_TOOLCHAIN_FILE=cmake/aarch64.cmake: for aarch64, with Debian's cross compiler; tests run under emulation
+# (scripts/aarch64.sh).
+set(CMAKE_SYSTEM_NAME Linux)
+set(CMAKE_SYSTEM_PROCESSOR aarch64)
+set(CMAKE_CXX_COMPILER aarch64-linux-gnu-g++)
+set(CMAKE_LIBRARY_ARCHITECTURE aarch64-linux-gnu)
+set(CMAKE_CROSSCOMPILING_EMULATOR qemu-aarch64)
