@@ -4,11 +4,12 @@
     supertac-explain model.safetensors --recording pass.safetensors --at 6.2 --out explained.safetensors
     examples/recompute.py explained.safetensors model.safetensors
 
-Each step is computed in double precision from the arrays that it is said to have been made of, with the weights of the
-model's own file, and compared with what was written. The program adds in single precision, where every addition is
-rounded by up to 6e-8 of the sum so far. So a difference is judged as a share of the largest sum of magnitudes, that of
-the same step without signs, which may be well above the largest value where terms cancel; the share of the largest
-value stands beside it. Exit code 1 when the former is above 1e-6.
+Each step is computed from the arrays that it is said to have been made of, with the weights of the model's own file, and
+compared with what was written. Sums are made as the program makes them (docs/determinism.md): in single precision, from
+the bias on, a fused multiply-add for each product, taps in the order of rows and columns, the channels of a tap one after
+the other. A convolution of few outputs adds up the channels of each tap by itself first. Printed is the largest
+difference, as a share of the array's largest value, and how many numbers have the same bits. Exit code 1 when a
+difference is above 1e-6.
 """
 import json
 import struct
@@ -56,8 +57,20 @@ def levelled(window, signal):
     return np.clip((window - signal["rest_removed"] * rest) / gain, 0, 1)
 
 
+def fused(total, x, w):
+    """total + x w, rounded once: a product of two singles is exact in double precision."""
+    return (x.astype(float) * w + total).astype(np.float32)
+
+
+def added(total, x, w):
+    """total + x w over the last axis of x, one product after the other; w [in,out]."""
+    for c in range(x.shape[-1]):
+        total = fused(total, x[..., c:c + 1], w[c])
+    return total
+
+
 def activated(y, step):
-    return np.where(y > 0, y, step["slope"] * y)
+    return np.where(y > 0, y, np.float32(step["slope"]) * y)
 
 
 def convolution(x, w, b, step, transposed):
@@ -69,18 +82,24 @@ def convolution(x, w, b, step, transposed):
     s, p = step["stride"], step["padding"]
     s_h, p_h = (1, 0) if flat else (s, p)
     n, rows, columns, _ = x.shape
+    narrow = high * wide * len(b) <= 16 and len(b) <= 8 and 2 * len(b) < x.shape[-1]
     if transposed:
-        full = np.zeros((n, (rows - 1) * s_h + high, (columns - 1) * s + wide, w.shape[1]))
-        for i in range(high):
-            for j in range(wide):
-                full[:, i:i + (rows - 1) * s_h + 1:s_h, j:j + (columns - 1) * s + 1:s] += x @ w[:, :, i, j]
-        y = full[:, p_h:full.shape[1] - p_h, p:full.shape[2] - p]
+        size = (rows - 1) * s_h + high, (columns - 1) * s + wide
     else:
         x = np.pad(x, ((0, 0), (p_h, p_h), (p, p), (0, 0)))
-        out_h, out_w = (x.shape[1] - high) // s_h + 1, (x.shape[2] - wide) // s + 1
-        y = sum(x[:, i:i + (out_h - 1) * s_h + 1:s_h, j:j + (out_w - 1) * s + 1:s] @ w[:, :, i, j].T
-                for i in range(high) for j in range(wide))
-    return activated((y[:, 0] if flat else y) + b, step)
+        size = (x.shape[1] - high) // s_h + 1, (x.shape[2] - wide) // s + 1
+    y = np.broadcast_to(b, (n, *size, len(b))).copy()
+    for i, j in np.ndindex(high, wide):
+        if transposed:
+            to, part = y[:, i:i + (rows - 1) * s_h + 1:s_h, j:j + (columns - 1) * s + 1:s], x
+            kernel = w[:, :, i, j]
+        else:
+            to, part = y, x[:, i:i + (size[0] - 1) * s_h + 1:s_h, j:j + (size[1] - 1) * s + 1:s]
+            kernel = w[:, :, i, j].T
+        to[...] = to + added(np.zeros_like(to), part, kernel) if narrow else added(to, part, kernel)
+    if transposed:
+        y = y[:, p_h:y.shape[1] - p_h, p:y.shape[2] - p]
+    return activated(y[:, 0] if flat else y, step)
 
 
 def computed(step, x, shape):
@@ -92,13 +111,13 @@ def computed(step, x, shape):
         return convolution(*x, step, "transpose" in op)
     if op == "linear":
         w = x[1].reshape(x[1].shape[0], -1)  # a 1x1 convolution in the file
-        return activated(x[0] @ w.T + x[2], step)
+        return activated(added(np.broadcast_to(x[2], (len(x[0]), len(x[2]))), x[0], w.T), step)
     return {
         "concat": lambda: np.concatenate(x, axis=-1),
         "flatten_channels_first": lambda: np.moveaxis(x[0], -1, 1).reshape(len(x[0]), -1),
         "unflatten_channels_first":
             lambda: np.moveaxis(x[0].reshape(len(x[0]), shape[-1], *shape[1:-1]), 1, -1),
-        "global_mean": lambda: x[0].mean(axis=(1, 2)),
+        "global_mean": lambda: x[0].mean(axis=(1, 2), dtype=float),
         "gated_sum": lambda: x[0] + x[1] * x[2][:, None, None],
         "sigmoid": lambda: 1 / (1 + np.exp(-x[0])),
         "add": lambda: x[0] + x[1],
@@ -111,30 +130,27 @@ def main():
     arrays, metadata = read(sys.argv[1])
     weights, _ = read(sys.argv[2])
     steps, signal = json.loads(metadata["steps"]), json.loads(metadata["signal"])
-    known = {name: x.astype(float) for name, x in {**weights, **arrays}.items()}
+    known = {**weights, **arrays}
     wrong = 0
 
-    def compare(name, found, expected, magnitudes=None):
+    def compare(name, found, expected):
         nonlocal wrong
-        difference = np.abs(found.reshape(expected.shape) - expected).max()
-        largest = max(np.abs(expected).max(), 1e-30)
-        error = difference / max(largest, 0 if magnitudes is None else magnitudes.max())
+        found = found.reshape(expected.shape).astype(np.float32)
+        error = np.abs(found - expected).max() / max(np.abs(expected).max(), 1e-30)
         wrong += not error <= TOLERANCE
-        print(f"{name:34} {str(list(expected.shape)):18} {error:.1e}  {difference / largest:.1e}"
+        print(f"{name:34} {str(list(expected.shape)):18} {error:.1e}  {int(100 * np.mean(found == expected))} %"
               f"{'' if error <= TOLERANCE else '  WRONG'}")
 
-    print(f"{'array':34} {'shape':18} of sums  of values")
+    print(f"{'array':34} {'shape':18} error    same bits")
     compare("scaled", scaled(arrays["volts"], arrays["time_s"], signal, len(arrays["scaled"])), known["scaled"])
     if signal["levelled"]:
-        compare("input", levelled(known["scaled"], signal), known["input"])
+        compare("input", levelled(known["scaled"].astype(float), signal), known["input"])
     for step in steps:
         x = [known[name] for name in step["inputs"]]
         if step["op"] == "reshape":  # the same numbers
             known[step["y"]] = x[0].reshape(step["shape"])
             continue
-        expected = known[step["y"]]
-        without_signs = computed(step | {"slope": 1}, [np.abs(part) for part in x], expected.shape)
-        compare(step["y"], computed(step, x, expected.shape), expected, without_signs)
+        compare(step["y"], computed(step, x, known[step["y"]].shape), known[step["y"]])
     drawn = [known[step["y"]] for step in steps if known[step["y"]].shape == known["picture"].shape]
     error = np.abs(drawn[0] - known["picture"]).max() / np.abs(known["picture"]).max()
     print(f"the picture as programs draw it differs from the last of these by {error:.1e} of its largest value")

@@ -60,7 +60,7 @@ std::string without_controls(std::string_view line) {
 
 Arguments::Arguments(std::string program, std::string purpose)
     : program_(std::move(program)), purpose_(std::move(purpose)) {
-  flag("help", "print this and exit");
+  flag("help", "print this and exit; supertac help glossary explains the words");
   flag("version", "print version, commit, compiler and exit");
   option("json", "FILE", "also write the results as JSON; '-' is stdout");
   flag("quiet", "no progress bar and no remarks");

@@ -3,7 +3,8 @@
 
     bench/studies/recompute.py BIN RECORDINGS RESULTS.csv WINDOWS MODEL ...
 
-A line for each model: the worst step of all windows, as a share of the largest sum of magnitudes and of the largest value.
+A line for each model: the worst step of all windows, as a share of its largest value, and how many steps had the same
+bits throughout.
 """
 import csv
 import pathlib
@@ -23,7 +24,7 @@ def steps(programs, model, recording, at, explained):
     for line in text.splitlines():
         words = line.replace("  WRONG", "").split()
         if "[" in line and not line.startswith("array"):
-            yield words[0], float(words[-2]), float(words[-1])
+            yield words[0], float(words[-3]), words[-2] == "100"
 
 
 def main():
@@ -33,12 +34,12 @@ def main():
     recordings, count = sorted(data.glob("*.safetensors")), int(sys.argv[4])
     with tempfile.TemporaryDirectory() as name, open(sys.argv[3], "w", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(["model", "windows", "steps", "worst step", "of_sums", "of_values"])
+        table.writerow(["model", "windows", "steps", "same_bits", "worst_step", "of_largest_value"])
         for model in map(pathlib.Path, sys.argv[5:]):
             found = [step for k in range(count) for step in
                      steps(programs, model, recordings[k * len(recordings) // count], 4 + 0.61 * (k % 8), f"{name}/e.safetensors")]
             worst = max(found, key=lambda step: step[1])
-            row = [model.stem, count, len(found), worst[0], worst[1], max(step[2] for step in found)]
+            row = [model.stem, count, len(found), sum(step[2] for step in found), worst[0], worst[1]]
             table.writerow(row)
             print(*row, flush=True)
 

@@ -3,8 +3,9 @@
 
     bench/studies/signal_range.py BIN RESULTS.csv [BIN_BEFORE]
 
-Simulated passes over two plates are trained on with three ranges by preset tiny, the same data, epochs and seed; the
-other trial is scored. BIN_BEFORE holds programs from before training looked at the signals. About five minutes.
+Simulated passes over two plates are trained on with three ranges by preset tiny, the same data and epochs; the other
+trial is scored; five seeds where the range is taken, one where it is refused. BIN_BEFORE holds programs from before
+training looked at the signals. About a quarter of an hour.
 """
 import csv
 import json
@@ -39,10 +40,10 @@ def in_other_numbers(path):
     path.write_bytes(struct.pack("<Q", len(text)) + text + data)
 
 
-def measured(programs, data, model, given):
+def measured(programs, data, model, given, seed):
     """Contact SSIM on the other trial, and what training said where it refused."""
     trained = run(programs, "supertac-train", "--data", data, "--out", model, "--preset", "tiny", "--epochs", 30, "--stride", 2,
-                  "--force", *given)
+                  "--force", "--seed", seed, *given)
     if trained.returncode != 0:
         return "", trained.stderr.strip().splitlines()[-1].partition(": ")[2]
     scores = json.loads(run(programs, "supertac-evaluate", "--data", data, "--model", model, "--json", "-").stdout)
@@ -62,14 +63,15 @@ def main():
         for path in data.glob("*.safetensors"):
             in_other_numbers(path)
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(["programs", "range", "contact_ssim", "range in the model, or why it was refused"])
+        table.writerow(["programs", "range", "seed", "contact_ssim", "range in the model, or why it was refused"])
         cases = [("now", now, "auto"), ("now", now, "100,35"), ("now", now, RIG)]
         if len(sys.argv) == 4:
             cases += [("before", pathlib.Path(sys.argv[3]), given) for given in ("none given", "100,35")]
         for label, programs, given in cases:
-            row = [label, given, *measured(programs, data, model, [] if given == "none given" else ["--range", given])]
-            table.writerow(row)
-            print(*row, flush=True)
+            for seed in range(1 if given == RIG else 5):
+                row = [label, given, seed, *measured(programs, data, model, [] if given == "none given" else ["--range", given], seed)]
+                table.writerow(row)
+                print(*row, flush=True)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 // supertac-collect as a process on a virtual rig: how it ends, what it says, where the finger is left.
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -8,6 +9,7 @@
 #include <fstream>
 
 #include "hardware/serial_port.h"
+#include "io/file.h"
 #include "tests/apps/collect_run.h"
 
 namespace supertac {
@@ -109,6 +111,20 @@ TEST(CollectProgram, TheQuestionMayBeAnsweredWithY) {
   EXPECT_EQ(run.files(), "");
   EXPECT_EQ(answer("y"), 0);
   EXPECT_NE(run.files(), "");
+}
+
+// Pictures that the bar had no time for, more than half of all, are not lost frames.
+TEST(CollectProgram, TheBarOfAFaultlessRigCountsNoDroppedPicturesAsLost) {
+  CollectRun run;
+  std::vector<std::string> words = run.arguments({"--json", run.out() + ".json"});
+  std::erase(words, "--quiet");
+  const ProcessResult result = run_process("supertac-collect", words, {.terminal = true});
+  ASSERT_EQ(result.code, 0) << result.error;
+  const std::size_t end = result.error.rfind(" lost");
+  ASSERT_NE(end, std::string::npos) << result.error;
+  const std::size_t begin = result.error.rfind(' ', end - 1) + 1;
+  const auto json = nlohmann::json::parse(read_text_file(run.out() + ".json", 1 << 20));
+  EXPECT_LT(std::stod(result.error.substr(begin, end - begin)), 0.1 * json.at("frames").get<double>());
 }
 
 // Nothing moves, nothing is left behind, and one line says what is wrong and what to do.

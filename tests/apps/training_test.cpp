@@ -70,6 +70,15 @@ TEST_F(Training, GivesTheSameBytesHoweverMuchIsHeldInMemory) {
             std::string::npos);
 }
 
+TEST_F(Training, AWarningOfCollapseSaysThatItOftenMendsItself) {
+  const ProcessResult result = train("idle.safetensors", {"--beta", "100", "--epochs", "12"});
+  EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_NE(result.error.find("no latent number tells windows apart; if that stays so, lower --beta (now 100)"),
+            std::string::npos)
+      << result.error;
+  EXPECT_NE(result.error.find("early in a run it often mends itself: watch SSIM"), std::string::npos);
+}
+
 TEST_F(Training, NamesThePlatesThereAre) {
   const ProcessResult result = train("none.safetensors", {"--plates", "6_Bump"});
   EXPECT_NE(result.error.find("plate '6_Bump' has no recording in " + path("data") + "; it has those of "),
