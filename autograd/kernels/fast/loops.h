@@ -28,7 +28,6 @@ template <class Loop>
 __attribute__((target("avx512f"))) void run_on_avx512(Loop loop) {
   loop();
 }
-
 #endif
 
 /// run_loop([=]() SUPERTAC_LOOP { any loops });
