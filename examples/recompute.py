@@ -58,7 +58,7 @@ def levelled(window, signal):
 
 
 def fused(total, x, w):
-    """total + x w, rounded once: a product of two singles is exact in double precision."""
+    """total + x w: the product of two singles is exact in double precision, so the sum alone is rounded."""
     return (x.astype(float) * w + total).astype(np.float32)
 
 
