@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cstring>
+#include <ctime>
 #include <filesystem>
 #include <limits>
 
@@ -107,13 +107,13 @@ TEST(Stl, DamagedTextNamesTheLine) {
 
 TEST(Stl, HostileHeadersCostNothing) {
   Bytes bytes(84);
-  const auto begin = std::chrono::steady_clock::now();
+  const std::clock_t begin = std::clock();
   for (const std::uint32_t count : {1u, 1000u, 0x7FFF'FFFFu, 0xFFFF'FFFFu}) {
     std::memcpy(bytes.data() + 80, &count, sizeof count);
     EXPECT_THROW(parse_stl(bytes, "x"), FileError);
   }
-  // 1000 times the time it takes: the count must not size anything.
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(10));
+  // The count must not size anything: clearing what it asks for would take many seconds.
+  EXPECT_LT(std::clock() - begin, CLOCKS_PER_SEC);
 }
 
 TEST(Stl, FilesAreReadWithALimit) {
