@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
+#include <sstream>
 
 #include "data/plates/plate_mesh.h"
 
@@ -211,6 +212,12 @@ TEST_F(Audit, AnExplainedPictureIsComputedAgain) {
   const std::string command = SUPERTAC_PYTHON " " SUPERTAC_SOURCE "/examples/recompute.py " + out + " " +
                               path("drawn.safetensors") + " > " + path("recomputed.txt");
   EXPECT_EQ(std::system(command.c_str()), 0) << bytes("recomputed.txt");
+  std::istringstream lines(bytes("recomputed.txt"));
+  for (std::string line; std::getline(lines, line);) {
+    if (std::regex_search(line, std::regex("^[0-9]+\\.(conv|linear)"))) {
+      EXPECT_TRUE(line.ends_with(" 100 %")) << "other bits: " << line;
+    }
+  }
 }
 
 }  // namespace
