@@ -135,6 +135,8 @@ void prepare(const fs::path& folder) {
 [[noreturn]] void become(const fs::path& folder, const std::vector<std::string>& words, int error) {
   if (::chdir(folder.c_str()) != 0) _exit(126);
   if (::getuid() == 0 && (::setgid(65534) != 0 || ::setuid(65534) != 0)) _exit(126);
+  // Who starts this behind nohup or in a script's background leaves some of them ignored.
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) ::signal(signal, SIG_DFL);
   const int nothing = ::open("/dev/null", O_RDWR);
   dup2(nothing, 0), dup2(nothing, 1), dup2(error, 2);
   std::vector<char*> argv;

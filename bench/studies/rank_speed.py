@@ -1,0 +1,49 @@
+#!/usr/bin/env python3
+"""How fast several processes train: rank_speed.py BIN BIN_WITHOUT_MPI RECORDINGS RESULTS.csv [PAIRS].
+
+By turns the build without MPI, the build with it on one process, and on two processes, one thread each, train the same
+preset for the same steps. Milliseconds a step are those between the ends of the first and the last epoch. The bytes of all
+models are compared. Bind nothing: `mpirun` is told to leave the processors to the system.
+"""
+import csv
+import hashlib
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+OPTIONS = ["--split", "none", "--stride", "20", "--epochs", "4", "--threads", "1", "--quiet"]
+ENVIRONMENT = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+                            "OMPI_MCA_hwloc_base_binding_policy": "none"}
+
+
+def train(words, recordings, folder):
+    """Milliseconds a step, steps, and the hash of the model."""
+    out = pathlib.Path(folder) / "model.safetensors"
+    subprocess.run([*words, "--data", recordings, "--out", out, "--force", *OPTIONS], env=ENVIRONMENT, check=True,
+                   stdout=subprocess.DEVNULL)
+    with open(out.with_suffix(".run") / "log.csv") as file:
+        rows = [(float(row["time_s"]), int(row["step"])) for row in csv.DictReader(file)]
+    (begin, first), (end, last) = rows[0], rows[-1]
+    return 1e3 * (end - begin) / (last - first), last - first, hashlib.sha256(out.read_bytes()).hexdigest()[:16]
+
+
+def main():
+    binaries, without, recordings, results = sys.argv[1:5]
+    pairs = int(sys.argv[5]) if len(sys.argv) > 5 else 9
+    program = f"{binaries}/supertac-train"
+    runs = {"no MPI": [f"{without}/supertac-train"], "1": ["mpirun", "-n", "1", program], "2": ["mpirun", "-n", "2", program]}
+    with open(results, "w") as file, tempfile.TemporaryDirectory() as folder:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["pair", "ranks", "ms_per_step", "steps", "hash"])
+        for pair in range(pairs):
+            for name in list(runs)[:: 1 if pair % 2 == 0 else -1]:
+                took, steps, digest = train(runs[name], recordings, folder)
+                writer.writerow([pair, name, f"{took:.3f}", steps, digest])
+                file.flush()
+                print(pair, name, f"{took:.3f} ms", digest, file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()
