@@ -80,9 +80,10 @@ void conv_grad_x(const ConvSizes& s, const real* gy, const real* w, Into into, r
   });
 }
 
-// gw [tap, i, o] += sum of x[p, i] gy[q, o]
-void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, real* gw) {
-  if (!is_plain()) return fast::conv_grad_w(s, x, gy, gw);
+// gw [tap, i, o] = or += sum of x[p, i] gy[q, o]
+void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, Into into, real* gw) {
+  if (!is_plain()) return fast::conv_grad_w(s, x, gy, into, gw);
+  if (into == Into::overwrite) std::fill_n(gw, s.map.taps() * s.cin * s.cout, real(0));
   for_each_meeting(s, [&](Dim tap, Dim p, Dim q) {
     for (Dim i = 0; i < s.cin; ++i) {
       for (Dim o = 0; o < s.cout; ++o) {

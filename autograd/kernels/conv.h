@@ -39,7 +39,7 @@ void conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias
           real* y);
 /// gx = or += the transpose of conv (without f) applied to gy.
 void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into into, real* gx);
-/// gw [taps, cin, cout] += x^T gy over all pixels.
-void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, real* gw);
+/// gw [taps, cin, cout] = or += x^T gy over all pixels.
+void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Into into, real* gw);
 
 }  // namespace supertac::kernels

@@ -1,6 +1,8 @@
 #include "autograd/kernels/elementwise.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 
 #include "autograd/kernels/exp.h"
 #include "autograd/kernels/fast/loops.h"
@@ -58,6 +60,32 @@ void scale(Dim n, real factor, const real* x, real* y) {
 
 void add_scaled(Dim n, real factor, const real* x, real* y) {
   each(n, [=](Dim i) SUPERTAC_LOOP { y[i] += factor * x[i]; });
+}
+
+namespace {
+
+constexpr Dim kTreeBlock = 1024;  // so that what the tree adds up on its way stays in the first cache
+
+// The left half of the tree is a whole one: as many parts as the largest power of two below their number.
+void add_block(Dim n, Dim at, std::span<const real* const> parts, real* y) {
+  if (parts.size() == 1) return put(n, parts[0] + at, Into::overwrite, y);
+  if (parts.size() == 2) return add(n, parts[0] + at, parts[1] + at, y);
+  const std::size_t left = std::bit_ceil(parts.size()) / 2;
+  std::array<real, kTreeBlock> right;
+  add_block(n, at, parts.first(left), y);
+  add_block(n, at, parts.subspan(left), right.data());
+  const real* other = right.data();
+  each(n, [=](Dim i) SUPERTAC_LOOP { y[i] += other[i]; });
+}
+
+}  // namespace
+
+void add_as_tree(Dim n, std::span<const real* const> parts, real* y) {
+  for (Dim at = 0; at < n; at += kTreeBlock) {
+    const Dim count = std::min(kTreeBlock, n - at);
+    add_block(count, at, parts, y + at);
+    add_constant(count, 0, y + at);  // -0 becomes +0
+  }
 }
 
 void put(Dim n, const real* x, Into into, real* y) {

@@ -5,6 +5,7 @@
 
 #include "autograd/kernels/fast/conv.h"
 #include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/loops.h"
 
 namespace supertac::kernels {
 
@@ -31,8 +32,9 @@ void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, I
   }
 }
 
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, real* gw) {
-  if (!is_plain()) return fast::linear_grad_w(rows, cin, cout, x, gy, gw);
+void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw) {
+  if (!is_plain()) return fast::linear_grad_w(rows, cin, cout, x, gy, into, gw);
+  if (into == Into::overwrite) std::fill_n(gw, cin * cout, real(0));
   for (Dim i = 0; i < cin; ++i) {
     for (Dim o = 0; o < cout; ++o) {
       for (Dim n = 0; n < rows; ++n) {
@@ -42,15 +44,25 @@ void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, r
   }
 }
 
-void bias_grad(Dim rows, Dim cout, const real* gy, real* gb) {
-  Tensor piece(Shape{cout});
+void bias_grad(Dim rows, Dim cout, const real* gy, Into into, real* gb) {
+  constexpr Dim kAtOnce = 16;  // sums that stay in registers
+  if (into == Into::overwrite) std::fill_n(gb, cout, real(0));
   for (Dim first = 0; first < rows; first += kRowsPerPiece) {
-    piece.fill(0);
     const Dim last = std::min(rows, first + kRowsPerPiece);
-    for (Dim row = first; row < last; ++row) {
-      for (Dim c = 0; c < cout; ++c) piece.data()[c] += gy[row * cout + c];
-    }
-    for (Dim c = 0; c < cout; ++c) gb[c] += piece.data()[c];
+    run_loop([=]() SUPERTAC_LOOP {
+      for (Dim c = 0; c < cout; c += kAtOnce) {
+        const Dim count = std::min(kAtOnce, cout - c);
+        real sum[kAtOnce] = {};
+        if (count == kAtOnce) {
+          for (Dim row = first; row < last; ++row)
+            for (Dim k = 0; k < kAtOnce; ++k) sum[k] += gy[row * cout + c + k];
+        } else {
+          for (Dim row = first; row < last; ++row)
+            for (Dim k = 0; k < count; ++k) sum[k] += gy[row * cout + c + k];
+        }
+        for (Dim k = 0; k < count; ++k) gb[c + k] += sum[k];
+      }
+    });
   }
 }
 

@@ -11,11 +11,11 @@ void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const rea
             real* y);
 /// gx = or += gy w^T
 void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx);
-/// gw += x^T gy
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, real* gw);
+/// gw = or += x^T gy
+void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw);
 /// A sum over rows runs over this many before it is added to the total.
 inline constexpr Dim kRowsPerPiece = 256;
-/// gb [cout] += the sum of gy over rows; of a convolution the rows are the pixels of all images.
-void bias_grad(Dim rows, Dim cout, const real* gy, real* gb);
+/// gb [cout] = or += the sum of gy over rows; of a convolution the rows are the pixels of all images.
+void bias_grad(Dim rows, Dim cout, const real* gy, Into into, real* gb);
 
 }  // namespace supertac::kernels

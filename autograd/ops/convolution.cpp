@@ -75,9 +75,11 @@ Variable convolve(const char* op, const Variable& x, const Variable& w, const Va
     if (const Backward::Slot gx = g.slot_of(0)) {
       kernels::conv_grad_x(sizes, gs, g.value(1).data(), gx.into, gx.data());
     }
-    if (Tensor* gw = g.grad_of(1)) kernels::conv_grad_w(sizes, g.value(0).data(), gs, gw->data());
-    if (Tensor* gb = g.grad_of(2)) {
-      kernels::bias_grad(sizes.images * sizes.out_pixels(), sizes.cout, gs, gb->data());
+    if (const Backward::Slot gw = g.slot_of(1)) {
+      kernels::conv_grad_w(sizes, g.value(0).data(), gs, gw.into, gw.data());
+    }
+    if (const Backward::Slot gb = g.slot_of(2)) {
+      kernels::bias_grad(sizes.images * sizes.out_pixels(), sizes.cout, gs, gb.into, gb.data());
     }
   });
 }

@@ -26,8 +26,10 @@ Variable linear(const Variable& x, const Variable& w, const Variable& b, real ne
     if (const Backward::Slot gx = g.slot_of(0)) {
       kernels::linear_grad_x(rows, in, out, gs, g.value(1).data(), gx.into, gx.data());
     }
-    if (Tensor* gw = g.grad_of(1)) kernels::linear_grad_w(rows, in, out, g.value(0).data(), gs, gw->data());
-    if (Tensor* gb = g.grad_of(2)) kernels::bias_grad(rows, out, gs, gb->data());
+    if (const Backward::Slot gw = g.slot_of(1)) {
+      kernels::linear_grad_w(rows, in, out, g.value(0).data(), gs, gw.into, gw.data());
+    }
+    if (const Backward::Slot gb = g.slot_of(2)) kernels::bias_grad(rows, out, gs, gb.into, gb.data());
   });
 }
 

@@ -20,7 +20,6 @@ namespace {
 
 // Streams of random numbers that must not meet: the seed is shared with splits and batching.
 constexpr std::uint64_t kNoiseStream = 0x65707300;
-constexpr Dim kMostLanes = 8;
 constexpr std::int64_t kStepsPerComparison = 100;
 
 LossTerms values_of(const Loss& loss, double share) {
@@ -54,11 +53,14 @@ Trainer::Trainer(const Examples& examples, std::vector<std::uint32_t> train,
   check_format(examples, model());
   indices_.resize(batching_.batch_size());
   check_lanes(ranks.size(), indices_.size());
-  const Dim n = static_cast<Dim>(indices_.size()), lanes = std::min(kMostLanes, n);
+  const Dim n = static_cast<Dim>(indices_.size()), lanes = std::min(static_cast<Dim>(kMostLanes), n);
   const Dim first = lanes * ranks.rank() / ranks.size();
   for (Dim i = first; i < first + lanes / ranks.size(); ++i)
     lanes_.emplace_back(*objective_, i * n / lanes, (i + 1) * n / lanes - i * n / lanes);
   for (const Lane& lane : lanes_) lane_parameters_.push_back(&lane.objective->network().parameters());
+  std::vector<Tensor> weights;
+  for (const Parameter& p : model().parameters()) weights.push_back(p.value.value());
+  forms_ = std::make_unique<kernels::WeightForms>(weights);
 }
 
 Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, const TrainingSettings& settings)
@@ -108,9 +110,10 @@ void Trainer::draw_noise(Lane& lane) const {
 // Forward, loss, backward of one lane, each term weighted by its share of the batch.
 void Trainer::run_lane(Lane& lane) const {
   const std::vector<Parameter>& parameters = lane.objective->network().parameters();
+  const kernels::WeightForms::Use use(*forms_);
   fill(lane);
   draw_noise(lane);
-  clear_gradients(parameters);
+  drop_gradients(parameters);
   const Outcome outcome = (*lane.objective)(lane.batch);
   const double share = static_cast<double>(lane.batch.inputs.dim(0)) / static_cast<double>(indices_.size());
   lane.terms = values_of(outcome.loss, share);
@@ -136,6 +139,7 @@ StepReport Trainer::train_step(const std::function<bool()>& stop) {
   if (done())
     throw std::invalid_argument("train_step: all " + std::to_string(total_steps()) + " steps are done");
   batch_of(step(), indices_);
+  forms_->forget();  // Adam has written the weights since, or restore()
 #pragma omp parallel for schedule(static, 1)
   for (std::size_t i = 0; i < lanes_.size(); ++i) {
     try {

@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "autograd/kernels/fast/weight_forms.h"
 #include "data/samples/batching.h"
 #include "models/collapse.h"
 #include "models/objective.h"
@@ -125,6 +126,7 @@ class Trainer {
   std::vector<std::uint32_t> indices_;                          // of the batch
   std::vector<Lane> lanes_;                                     // of this process
   std::vector<const std::vector<Parameter>*> lane_parameters_;  // of these models
+  std::unique_ptr<kernels::WeightForms> forms_;                 // of the weights that all lanes share
 };
 
 }  // namespace supertac

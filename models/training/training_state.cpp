@@ -1,6 +1,7 @@
 #include "models/training/training_state.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -55,16 +56,16 @@ bool TrainingState::collapsed(bool looks_so) {
   return flat_steps_ >= kFlatStepsToReport;
 }
 
-void TrainingState::add_up(const std::vector<Parameter>& lane, Ranks& ranks) {
+void TrainingState::add_up_over(Ranks& ranks) {
   sum_.clear();
-  for (const Parameter& p : lane) {
+  for (const Parameter& p : parameters_) {
     const auto gradient = p.value.grad().values();
     sum_.insert(sum_.end(), gradient.begin(), gradient.end());
   }
   of_partner_.resize(sum_.size());
   ranks.add_up(sum_, of_partner_);
   const real* next = sum_.data();
-  for (const Parameter& p : lane) {
+  for (const Parameter& p : parameters_) {
     const auto gradient = Variable(p.value).mutable_grad().values();
     std::copy_n(next, gradient.size(), gradient.data());
     next += gradient.size();
@@ -72,18 +73,19 @@ void TrainingState::add_up(const std::vector<Parameter>& lane, Ranks& ranks) {
 }
 
 double TrainingState::apply(const std::vector<const std::vector<Parameter>*>& lanes, Ranks& ranks) {
-  adam_.zero_grad();
-  const auto add = [&](Variable to, const Variable& from) {
-    kernels::add_scaled(from.grad().size(), 1, from.grad().data(), to.mutable_grad().data());
-  };
+#pragma omp parallel for schedule(dynamic)
   for (std::size_t i = 0; i < parameters_.size(); ++i) {
-    for (std::size_t apart = 1; apart < lanes.size(); apart *= 2) {
-      for (std::size_t lane = 0; lane + apart < lanes.size(); lane += 2 * apart)
-        add((*lanes[lane])[i].value, (*lanes[lane + apart])[i].value);
+    std::array<const real*, kMostLanes> parts;
+    for (std::size_t lane = 0; lane < lanes.size(); ++lane)
+      parts[lane] = (*lanes[lane])[i].value.grad().data();
+    Tensor& sum = Variable(parameters_[i].value).mutable_grad();
+    if (parts[0] == nullptr) {  // the loss does not depend on it
+      sum.fill(0);
+    } else {
+      kernels::add_as_tree(sum.size(), std::span(parts).first(lanes.size()), sum.data());
     }
   }
-  if (ranks.size() > 1) add_up(*lanes.front(), ranks);
-  for (std::size_t i = 0; i < parameters_.size(); ++i) add(parameters_[i].value, (*lanes.front())[i].value);
+  if (ranks.size() > 1) add_up_over(ranks);
   adam_.set_learning_rate(learning_rate());
   const double norm = adam_.step();
   if (!std::isfinite(norm)) {
@@ -153,12 +155,11 @@ void share_values(const std::vector<Parameter>& master, const std::vector<Parame
   for (std::size_t i = 0; i < master.size(); ++i) {
     Variable own = lane[i].value;
     own.mutable_value() = master[i].value.value();  // the same buffer
-    own.mutable_grad() = Tensor::zeros(own.shape());
   }
 }
 
-void clear_gradients(const std::vector<Parameter>& parameters) {
-  for (const Parameter& p : parameters) Variable(p.value).mutable_grad().fill(0);
+void drop_gradients(const std::vector<Parameter>& parameters) {
+  for (const Parameter& p : parameters) Variable(p.value).mutable_grad() = Tensor();
 }
 
 }  // namespace supertac

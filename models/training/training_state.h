@@ -29,6 +29,8 @@ struct TrainingPace {
   void check() const;
 };
 
+inline constexpr std::size_t kMostLanes = 8;  ///< that a batch is cut into (models/training/trainer.h)
+
 /// A value was not finite: step, where, and what to do are in what().
 class TrainingStopped : public std::runtime_error {
  public:
@@ -50,8 +52,7 @@ class TrainingState {
   bool collapsed(bool looks_so);
 
   /// Sets the gradients to the sum of the lanes', which is taken as a balanced binary tree (pairs of
-  /// neighbours, then pairs of pairs) in the lanes' own gradients, then over `ranks`; applies Adam; counts
-  /// the step. Returns the gradient's norm before clipping. Throws TrainingStopped, with nothing changed,
+  /// neighbours, then pairs of pairs), then over `ranks`; applies Adam; counts the step. Returns the gradient's norm before clipping. Throws TrainingStopped, with nothing changed,
   /// when it is not finite.
   double apply(const std::vector<const std::vector<Parameter>*>& lanes, Ranks& ranks);
   /// Throws TrainingStopped: step, `what`, and advice.
@@ -68,7 +69,7 @@ class TrainingState {
   void restore(const std::string& path, const std::map<std::string, std::string>& expected);
 
  private:
-  void add_up(const std::vector<Parameter>& lane, Ranks& ranks);
+  void add_up_over(Ranks& ranks);
 
   std::vector<Parameter> parameters_;
   mutable Adam adam_;
@@ -80,7 +81,7 @@ class TrainingState {
 
 /// Makes a lane's parameters share the master's values under gradients of their own.
 void share_values(const std::vector<Parameter>& master, const std::vector<Parameter>& lane);
-/// Sets gradients to 0.
-void clear_gradients(const std::vector<Parameter>& parameters);
+/// So that backward() sets the gradients instead of adding to them.
+void drop_gradients(const std::vector<Parameter>& parameters);
 
 }  // namespace supertac

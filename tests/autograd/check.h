@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <functional>
 #include <initializer_list>
 #include <stdexcept>
@@ -38,6 +39,11 @@ inline Tensor numbers_off_zero(const Shape& shape, std::uint64_t seed = 1) {
   Tensor t = numbers(shape, seed);
   for (real& x : t.values()) x += static_cast<real>(x < 0 ? -0.1 : 0.1);
   return t;
+}
+
+inline bool same_bytes(const Tensor& a, const Tensor& b) {
+  return a.size() == b.size() &&
+         std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof(real)) == 0;
 }
 
 inline Variable constant(const Tensor& t) { return Variable(t); }

@@ -5,6 +5,7 @@
 #include "autograd/kernels/fast/geometry.h"
 #include "autograd/kernels/fast/isa.h"
 #include "autograd/kernels/fast/narrow.h"
+#include "autograd/kernels/fast/weight_forms.h"
 #include "autograd/kernels/fast/winograd.h"
 #include "autograd/kernels/linear.h"
 
@@ -12,19 +13,19 @@ namespace supertac::kernels::fast {
 namespace {
 
 // [taps][cin][cout] -> [taps][cout][cin], in strips of a cache line's width
-Tensor transposed_weights(const real* w, Dim taps, Dim cin, Dim cout) {
+Tensor transposed_weights(const real* weights, Dim taps, Dim cin, Dim cout) {
   constexpr Dim kStrip = 16;
-  Tensor out(Shape{taps, cout, cin});
-  real* to = out.data();
-  for (Dim t = 0; t < taps; ++t, w += cin * cout, to += cin * cout) {
-    for (Dim first = 0; first < cout; first += kStrip) {
-      const Dim last = std::min(cout, first + kStrip);
-      for (Dim i = 0; i < cin; ++i) {
-        for (Dim o = first; o < last; ++o) to[o * cin + i] = w[i * cout + o];
+  return weight_form(weights, WeightForm::transposed, {taps, cout, cin}, [&](real* to) {
+    const real* w = weights;
+    for (Dim t = 0; t < taps; ++t, w += cin * cout, to += cin * cout) {
+      for (Dim first = 0; first < cout; first += kStrip) {
+        const Dim last = std::min(cout, first + kStrip);
+        for (Dim i = 0; i < cin; ++i) {
+          for (Dim o = first; o < last; ++o) to[o * cin + i] = w[i * cout + o];
+        }
       }
     }
-  }
-  return out;
+  });
 }
 
 void gather_batch(const GatherJob& job, Dim images, Dim in_pixels, Dim out_pixels, const real* x, real* y) {
@@ -55,10 +56,11 @@ void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into int
 }
 
 // A chunk of images passes all taps before the next one, while it is in the cache.
-void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, real* gw) {
+void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Into into, real* gw) {
   const ConvTask s = task_of(sizes);
-  if (is_narrow(s)) return narrow_grad_w(s, x, gy, gw);
-  if (is_winograd(s)) return winograd_grad_w(s, x, gy, gw);
+  if (s.images == 0 && into == Into::overwrite) std::fill_n(gw, sizes.map.taps() * s.cin * s.cout, real(0));
+  if (is_narrow(s)) return narrow_grad_w(s, x, gy, into, gw);
+  if (is_winograd(s)) return winograd_grad_w(s, x, gy, into, gw);
   const auto outer = isa_kernels().outer;
   const Geometry& g = *s.geometry;
   const Dim chunk = std::max<Dim>(1, kRowsPerPiece / g.out_pixels);
@@ -71,7 +73,8 @@ void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, real* gw
                  g.in_pixels,
                  g.out_pixels,
                  s.cin,
-                 s.cout};
+                 s.cout,
+                 n == 0 ? into : Into::add};
     for (const TapPairs& pairs : g.pairs) {
       job.pairs = &pairs;
       outer(job);
@@ -90,11 +93,13 @@ void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, I
   isa_kernels().gather_rows({nullptr, wt.data(), nullptr, cout, cin, into, 1}, gy, gx, rows);
 }
 
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, real* gw) {
+void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw) {
   static const TapPairs kOnePixel{{0}, {0}};
   const auto outer = isa_kernels().outer;
+  if (rows == 0 && into == Into::overwrite) std::fill_n(gw, cin * cout, real(0));
   for (Dim n = 0; n < rows; n += kRowsPerPiece) {
-    outer({&kOnePixel, x + n * cin, gy + n * cout, gw, std::min(kRowsPerPiece, rows - n), 1, 1, cin, cout});
+    outer({&kOnePixel, x + n * cin, gy + n * cout, gw, std::min(kRowsPerPiece, rows - n), 1, 1, cin, cout,
+           n == 0 ? into : Into::add});
   }
 }
 

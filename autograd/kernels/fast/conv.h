@@ -11,11 +11,11 @@ void conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias
           real* y);
 void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into into, real* gx);
 /// Partial sums over fixed groups of images, added in order.
-void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, real* gw);
+void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Into into, real* gw);
 
 void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
             real* y);
 void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx);
-void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, real* gw);
+void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw);
 
 }  // namespace supertac::kernels::fast

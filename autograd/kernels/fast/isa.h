@@ -23,14 +23,15 @@ struct GatherJob {
   real negative_slope = 1;      // 1: f is the identity
 };
 
-/// gw[cin, cout] += the sum over images, then pairs, of x[image, input(pair), cin] * gy[image, output(pair),
-/// cout]. The sum is taken on its own before it is added to gw.
+/// gw[cin, cout] = or += the sum over images, then pairs, of x[image, input(pair), cin] * gy[image, output(pair),
+/// cout]. The sum is taken on its own before it is added to gw, or to 0.
 struct OuterJob {
   const TapPairs* pairs = nullptr;
   const real* x = nullptr;   // [images][in_pixels][cin]
   const real* gy = nullptr;  // [images][out_pixels][cout]
   real* gw = nullptr;        // [cin][cout], this tap's
   Dim images = 0, in_pixels = 0, out_pixels = 0, cin = 0, cout = 0;
+  Into into = Into::add;
 };
 /// Tiles of 4x4 outputs for Winograd's transforms (winograd.h), numbered through a batch: tiles first ..
 /// first + count. Place (i, j) of the k-th of them is places[(6 i + j) * step + k * channels + c].
@@ -47,6 +48,7 @@ struct FilterJob {
   Dim weights = 0;  // a multiple of kTransformChannels
   Dim step = 0;
   Dim square = 4;  // pixels each way: 4, or 2 (map_patches, map_squares)
+  Into into = Into::add;  // of filter_grads
 };
 
 /// Instructions that plain loops (loops.h) are compiled for.
@@ -59,7 +61,7 @@ struct IsaKernels {
   /// `rows` images of one pixel each: y[rows, cout] = bias + x[rows, cin] * w[cin, cout]
   void (*gather_rows)(const GatherJob& job, const real* x, real* y, Dim rows) = nullptr;
   void (*outer)(const OuterJob& job) = nullptr;
-  /// u = G g G^T, and g += G^T u G
+  /// u = G g G^T, and g = or += G^T u G
   void (*filters)(const FilterJob& job, const real* g, real* u) = nullptr;
   void (*filter_grads)(const FilterJob& job, const real* u, real* g) = nullptr;
   /// places = B^T d B of the patches d of x

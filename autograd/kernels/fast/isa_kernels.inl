@@ -209,11 +209,11 @@ inline void outer_tile(const OuterJob& job, Dim row, Dim channel) {
   for (int r = 0; r < R; ++r) {
     real* to = job.gw + (row + r) * job.cout + channel;
     for (int j = 0; j < J; ++j, to += Vec::kLanes) {
-      if (kPartial && j == J - 1) {
-        Vec::add(Vec::load_part(to, lanes), acc[r][j]).store_part(to, lanes);
-      } else {
-        Vec::add(Vec::load(to), acc[r][j]).store(to);
-      }
+      const bool part = kPartial && j == J - 1;
+      Vec before = Vec::broadcast(0);
+      if (job.into == Into::add) before = part ? Vec::load_part(to, lanes) : Vec::load(to);
+      const Vec sum = Vec::add(before, acc[r][j]);
+      part ? sum.store_part(to, lanes) : sum.store(to);
     }
   }
 }

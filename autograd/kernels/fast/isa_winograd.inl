@@ -143,7 +143,8 @@ void filter_grads(const FilterJob& job, const real* u, real* g) {
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
         real* weight = g + (3 * i + j) * job.weights + k;
-        Vec::add(Vec::load(weight), to[i][j]).store(weight);
+        const Vec before = job.into == Into::add ? Vec::load(weight) : Vec::broadcast(0);
+        Vec::add(before, to[i][j]).store(weight);
       }
     }
   }

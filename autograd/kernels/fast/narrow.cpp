@@ -1,6 +1,7 @@
 #include "autograd/kernels/fast/narrow.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "autograd/kernels/fast/conv.h"
 
@@ -21,22 +22,22 @@ Tensor with_taps_inside(const ConvTask& s, const real* w) {
   return out;
 }
 
-// to[p, t, o] = gy[q, o] where tap t joins p and q, else 0
-Tensor spread(const ConvTask& s, const real* gy) {
-  const Geometry& g = *s.geometry;
-  Tensor gz = Tensor::zeros({s.images, g.in_pixels, kColumns});
-  real* to = gz.data();
-  for (Dim n = 0; n < s.images; ++n, to += g.in_pixels * kColumns, gy += g.out_pixels * s.cout) {
-    for (Dim t = 0; t < g.taps; ++t) {
-      const TapPairs& pairs = g.pairs[static_cast<std::size_t>(t)];
-      for (std::size_t i = 0; i < pairs.inputs.size(); ++i) {
-        for (Dim o = 0; o < s.cout; ++o) {
-          to[pairs.inputs[i] * kColumns + t * s.cout + o] = gy[pairs.outputs[i] * s.cout + o];
-        }
+// to[p, t, o] = gy[q, o] where tap t joins p and q, else 0, for one image
+template <Dim kOutputs>
+void spread(const ConvTask& s, const real* gy, real* to) {
+  for (const Phase& phase : s.geometry->backward) {
+    const std::int32_t* source = phase.sources.data();
+    const std::int32_t* const taps = phase.taps.data();
+    const std::size_t tap_count = phase.taps.size();
+    for (const std::int32_t p : phase.outputs) {
+      real* const row = to + p * kColumns;
+      std::fill_n(row, kColumns, real(0));
+      for (std::size_t t = 0; t < tap_count; ++t) {
+        if (source[t] >= 0) std::copy_n(gy + source[t] * kOutputs, kOutputs, row + taps[t] * kOutputs);
       }
+      source += tap_count;
     }
   }
-  return gz;
 }
 
 // y[q, o] = bias[o] + sum over taps of z[source(t, q), t, o] for one image; the last row of z is zero.
@@ -61,11 +62,23 @@ void collect(const ConvTask& s, const real* z, const real* bias, real* y) {
   }
 }
 
-void collect(const ConvTask& s, const real* z, const real* bias, real* y) {
-  using Collect = void (*)(const ConvTask&, const real*, const real*, real*);
-  static constexpr Collect kByOutputs[kMostOutputs] = {collect<1>, collect<2>, collect<3>, collect<4>,
-                                                       collect<5>, collect<6>, collect<7>, collect<8>};
-  kByOutputs[s.cout - 1](s, z, bias, y);
+// use(the number of outputs as a constant): the inner loops must know it to be fast.
+template <class Use>
+void with_outputs(Dim outputs, Use use) {
+  [&]<std::size_t... kBelow>(std::index_sequence<kBelow...>) {
+    ((outputs == kBelow + 1 ? use(std::integral_constant<Dim, kBelow + 1>()) : void()), ...);
+  }(std::make_index_sequence<kMostOutputs>());
+}
+
+// Of all images.
+Tensor spread(const ConvTask& s, const real* gy) {
+  const Geometry& g = *s.geometry;
+  Tensor gz(Shape{s.images, g.in_pixels, kColumns});
+  with_outputs(s.cout, [&](auto outputs) {
+    for (Dim n = 0; n < s.images; ++n)
+      spread<outputs>(s, gy + n * g.out_pixels * outputs, gz.data() + n * g.in_pixels * kColumns);
+  });
+  return gz;
 }
 
 }  // namespace
@@ -83,7 +96,9 @@ void narrow_conv(const ConvTask& s, const real* x, const real* w, const real* bi
   for (Dim n = 0; n < s.images; ++n) {
     fast::linear(g.in_pixels, s.cin, kColumns, x + n * g.in_pixels * s.cin, inside.data(), nullptr, 1,
                  z.data());
-    collect(s, z.data(), bias, y + n * g.out_pixels * s.cout);
+    with_outputs(s.cout, [&](auto outputs) {
+      collect<outputs>(s, z.data(), bias, y + n * g.out_pixels * outputs);
+    });
   }
   if (negative_slope == 1) return;
   for (Dim i = 0; i < s.images * g.out_pixels * s.cout; ++i) y[i] = y[i] > 0 ? y[i] : negative_slope * y[i];
@@ -94,10 +109,11 @@ void narrow_grad_x(const ConvTask& s, const real* gy, const real* w, Into into, 
                       with_taps_inside(s, w).data(), into, gx);
 }
 
-void narrow_grad_w(const ConvTask& s, const real* x, const real* gy, real* gw) {
-  Tensor inside = Tensor::zeros({s.cin, kColumns});
+void narrow_grad_w(const ConvTask& s, const real* x, const real* gy, Into into, real* gw) {
+  if (into == Into::overwrite) std::fill_n(gw, s.geometry->taps * s.cin * s.cout, real(0));
+  Tensor inside(Shape{s.cin, kColumns});
   fast::linear_grad_w(s.images * s.geometry->in_pixels, s.cin, kColumns, x, spread(s, gy).data(),
-                      inside.data());
+                      Into::overwrite, inside.data());
   for (Dim t = 0; t < s.geometry->taps; ++t) {
     for (Dim i = 0; i < s.cin; ++i) {
       for (Dim o = 0; o < s.cout; ++o) *gw++ += inside.data()[i * kColumns + t * s.cout + o];

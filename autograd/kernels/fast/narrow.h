@@ -16,6 +16,6 @@ bool is_narrow(const ConvTask& task);
 void narrow_conv(const ConvTask& task, const real* x, const real* w, const real* bias, real negative_slope,
                  real* y);
 void narrow_grad_x(const ConvTask& task, const real* gy, const real* w, Into into, real* gx);
-void narrow_grad_w(const ConvTask& task, const real* x, const real* gy, real* gw);
+void narrow_grad_w(const ConvTask& task, const real* x, const real* gy, Into into, real* gw);
 
 }  // namespace supertac::kernels

@@ -4,6 +4,7 @@
 
 #include "autograd/kernels/fast/conv.h"
 #include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/weight_forms.h"
 
 namespace supertac::kernels {
 namespace {
@@ -40,11 +41,10 @@ TileJob squares_of(const ConvTask& s, Dim first, Dim count) {
   return {g.squares.data(), tiles_of(s), g.out_pixels, s.cout, first, count, count * s.cout};
 }
 
-void filter(const ConvTask& s, const real* x, const real* w, const real* bias, Into into, real negative_slope,
-            real* y) {
+// Of the places u of the weights.
+void filter(const ConvTask& s, const real* x, const Tensor& u, const real* bias, Into into,
+            real negative_slope, real* y) {
   const IsaKernels& isa = isa_kernels();
-  Tensor u(Shape{kPlaces, place_of(s)});
-  isa.filters({s.cin * s.cout, place_of(s)}, w, u.data());
   const Dim tiles = s.images * tiles_of(s), strip = std::min(kTilesPerStrip, tiles);
   Tensor v(Shape{kPlaces, strip, s.cin}), m(Shape{kPlaces, strip, s.cout});
   for (Dim first = 0; first < tiles; first += strip) {
@@ -67,29 +67,36 @@ bool is_winograd(const ConvTask& s) {
 
 void winograd_conv(const ConvTask& s, const real* x, const real* w, const real* bias, real negative_slope,
                    real* y) {
-  filter(s, x, w, bias, Into::overwrite, negative_slope, y);
+  const Tensor u = weight_form(w, WeightForm::filters, {kPlaces, place_of(s)}, [&](real* to) {
+    isa_kernels().filters({s.cin * s.cout, place_of(s)}, w, to);
+  });
+  filter(s, x, u, bias, Into::overwrite, negative_slope, y);
 }
 
 void winograd_grad_x(const ConvTask& s, const real* gy, const real* w, Into into, real* gx) {
-  filter({s.geometry, s.images, s.cout, s.cin}, gy, turned(s.cin, s.cout, w).data(), nullptr, into, 1, gx);
+  const Tensor u = weight_form(w, WeightForm::turned_filters, {kPlaces, place_of(s)}, [&](real* to) {
+    isa_kernels().filters({s.cin * s.cout, place_of(s)}, turned(s.cin, s.cout, w).data(), to);
+  });
+  filter({s.geometry, s.images, s.cout, s.cin}, gy, u, nullptr, into, 1, gx);
 }
 
-// du[place] = sum over tiles of (B^T d B)^T (A gy A^T),   gw += G^T du G
-void winograd_grad_w(const ConvTask& s, const real* x, const real* gy, real* gw) {
+// du[place] = sum over tiles of (B^T d B)^T (A gy A^T),   gw = or += G^T du G
+void winograd_grad_w(const ConvTask& s, const real* x, const real* gy, Into into, real* gw) {
   const IsaKernels& isa = isa_kernels();
   const Dim tiles = s.images * tiles_of(s), piece = std::min(kTilesPerPiece, tiles);
   Tensor v(Shape{kPlaces, piece, s.cin}), m(Shape{kPlaces, piece, s.cout});
-  Tensor du = Tensor::zeros({kPlaces, place_of(s)});
+  Tensor du(Shape{kPlaces, place_of(s)});
   for (Dim first = 0; first < tiles; first += piece) {
     const Dim count = std::min(piece, tiles - first);
     isa.patches(patches_of(s, first, count), x, v.data());
     isa.square_grads(squares_of(s, first, count), gy, m.data());
     for (Dim place = 0; place < kPlaces; ++place) {
       fast::linear_grad_w(count, s.cin, s.cout, v.data() + place * count * s.cin,
-                          m.data() + place * count * s.cout, du.data() + place * place_of(s));
+                          m.data() + place * count * s.cout, first == 0 ? Into::overwrite : Into::add,
+                          du.data() + place * place_of(s));
     }
   }
-  isa.filter_grads({s.cin * s.cout, place_of(s)}, du.data(), gw);
+  isa.filter_grads({s.cin * s.cout, place_of(s), 4, into}, du.data(), gw);
 }
 
 }  // namespace supertac::kernels

@@ -18,6 +18,6 @@ bool is_winograd(const ConvTask& task);
 void winograd_conv(const ConvTask& task, const real* x, const real* w, const real* bias, real negative_slope,
                    real* y);
 void winograd_grad_x(const ConvTask& task, const real* gy, const real* w, Into into, real* gx);
-void winograd_grad_w(const ConvTask& task, const real* x, const real* gy, real* gw);
+void winograd_grad_w(const ConvTask& task, const real* x, const real* gy, Into into, real* gw);
 
 }  // namespace supertac::kernels

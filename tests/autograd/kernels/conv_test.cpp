@@ -12,6 +12,7 @@ namespace supertac::kernels {
 namespace {
 
 using test::numbers;
+using test::same_bytes;
 
 struct Case {
   Dim images, height, width, cin, cout, kernel, stride, padding;
@@ -78,13 +79,16 @@ void expect_plain_is_fast(const ConvSizes& s) {
       return gx;
     });
   }
-  for (const bool from_zero : {true, false}) {  // fast/ sums images apart before it adds them
-    expect_plain_is_fast("gw", same_order && from_zero && s.images <= fits, [&] {
-      Tensor gw = from_zero ? Tensor::zeros(w.shape()) : numbers(w.shape(), 6);
-      conv_grad_w(s, x.data(), gy.data(), gw.data());
-      return gw;
-    });
+  const auto grad_w = [&](Into into, Tensor gw) {
+    conv_grad_w(s, x.data(), gy.data(), into, gw.data());
+    return gw;
+  };
+  for (const Into into : {Into::overwrite, Into::add}) {  // fast/ sums images apart before it adds them
+    expect_plain_is_fast("gw", same_order && into == Into::overwrite && s.images <= fits,
+                         [&] { return grad_w(into, numbers(w.shape(), 6)); });
   }
+  EXPECT_TRUE(same_bytes(grad_w(Into::overwrite, numbers(w.shape(), 6)),
+                         grad_w(Into::add, Tensor::zeros(w.shape()))));
 }
 
 TEST(ConvKernels, PlainIsFast) {
@@ -133,10 +137,14 @@ TEST(LinearKernels, PlainIsFast) {
           });
         }
         expect_plain_is_fast("gw", rows <= kRowsPerPiece, [&] {
-          Tensor gw = Tensor::zeros(w.shape());
-          linear_grad_w(rows, cin, cout, x.data(), gy.data(), gw.data());
+          Tensor gw = numbers(w.shape(), 6);
+          linear_grad_w(rows, cin, cout, x.data(), gy.data(), Into::overwrite, gw.data());
           return gw;
         });
+        Tensor gb = numbers({cout}, 7), added = Tensor::zeros({cout});
+        bias_grad(rows, cout, gy.data(), Into::overwrite, gb.data());
+        bias_grad(rows, cout, gy.data(), Into::add, added.data());
+        EXPECT_TRUE(same_bytes(gb, added));
       }
     }
   }

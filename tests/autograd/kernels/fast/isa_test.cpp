@@ -17,15 +17,12 @@ namespace supertac::kernels {
 namespace {
 
 using test::numbers;
+using test::same_bytes;
 
 std::vector<const IsaKernels*> available() {
   std::vector<const IsaKernels*> sets = supported_sets();
   sets.pop_back();  // plain has no kernels of its own, see kernels/conv_test.cpp
   return sets;
-}
-
-bool same_bytes(const Tensor& a, const Tensor& b) {
-  return std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof(real)) == 0;
 }
 
 const ConvSettings kSettings[] = {
@@ -243,7 +240,7 @@ TEST(Isa, Winograd) {
     Tensor y(gy.shape()), gx = numbers(x.shape(), 5), gw = numbers(w.shape(), 6);
     winograd_conv(sizes, x.data(), w.data(), bias.data(), 0.25F, y.data());
     winograd_grad_x(sizes, gy.data(), w.data(), Into::add, gx.data());
-    winograd_grad_w(sizes, x.data(), gy.data(), gw.data());
+    winograd_grad_w(sizes, x.data(), gy.data(), Into::add, gw.data());
     if (!first_y.defined()) first_y = y, first_gx = gx, first_gw = gw;
     EXPECT_TRUE(same_bytes(y, first_y)) << isa->name;
     EXPECT_TRUE(same_bytes(gx, first_gx)) << isa->name;

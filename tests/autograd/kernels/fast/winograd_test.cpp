@@ -93,7 +93,7 @@ TEST(Winograd, BothGradientsAreThoseOfPlainSums) {
     });
     Tensor added = start_x.clone(), written = start_x.clone(), weights = start_w.clone();
     winograd_grad_x(p.sizes, p.gy.data(), p.w.data(), Into::add, added.data());
-    winograd_grad_w(p.sizes, p.x.data(), p.gy.data(), weights.data());
+    winograd_grad_w(p.sizes, p.x.data(), p.gy.data(), Into::add, weights.data());
     expect_near(added, gx, "gx added");
     expect_near(weights, gw, "gw");
     winograd_grad_x(p.sizes, p.gy.data(), p.w.data(), Into::overwrite, written.data());
