@@ -107,8 +107,9 @@ struct Buffers {
                    ? kernels::linear_grad_x(n, cin, cout, y.data(), w.data(), Into::overwrite, gx.data())
                    : kernels::conv_grad_x(sizes, y.data(), w.data(), Into::overwrite, gx.data());
       case Pass::grad_w:
-        return is_linear(layer) ? kernels::linear_grad_w(n, cin, cout, x.data(), y.data(), Into::add, gw.data())
-                                : kernels::conv_grad_w(sizes, x.data(), y.data(), Into::add, gw.data());
+        return is_linear(layer)
+                   ? kernels::linear_grad_w(n, cin, cout, x.data(), y.data(), Into::add, gw.data())
+                   : kernels::conv_grad_w(sizes, x.data(), y.data(), Into::add, gw.data());
     }
   }
 

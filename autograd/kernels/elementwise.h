@@ -32,7 +32,8 @@ void scale(Dim n, real factor, const real* x, real* y);
 void add_scaled(Dim n, real factor, const real* x, real* y);
 /// y += x, the same number everywhere
 void add_constant(Dim n, real x, real* y);
-/// y = 0 + the sum of all parts as a balanced binary tree: neighbours, then pairs of pairs. At least one part.
+/// y = 0 + the sum of all parts as a balanced binary tree: neighbours, then pairs of pairs. At least one
+/// part.
 void add_as_tree(Dim n, std::span<const real* const> parts, real* y);
 /// y = or += x
 void put(Dim n, const real* x, Into into, real* y);

@@ -30,8 +30,8 @@ Range range_of(std::span<const std::uint16_t, kBins> counts, std::size_t frames)
 
 constexpr std::size_t kAtOnce = 16;
 
-// Of `count` taxels from `first` on. Counting costs a tenth of sorting; taking turns lets one count be written while
-// the next is read.
+// Of `count` taxels from `first` on. Counting costs a tenth of sorting; taking turns lets one count be
+// written while the next is read.
 std::array<Range, kAtOnce> ranges_of(std::span<const float> window, std::size_t taxels, std::size_t first,
                                      std::size_t count) {
   std::array<std::uint16_t, kAtOnce * kBins> counts{};

@@ -52,8 +52,8 @@ class TrainingState {
   bool collapsed(bool looks_so);
 
   /// Sets the gradients to the sum of the lanes', which is taken as a balanced binary tree (pairs of
-  /// neighbours, then pairs of pairs), then over `ranks`; applies Adam; counts the step. Returns the gradient's norm before clipping. Throws TrainingStopped, with nothing changed,
-  /// when it is not finite.
+  /// neighbours, then pairs of pairs), then over `ranks`; applies Adam; counts the step. Returns the
+  /// gradient's norm before clipping. Throws TrainingStopped, with nothing changed, when it is not finite.
   double apply(const std::vector<const std::vector<Parameter>*>& lanes, Ranks& ranks);
   /// Throws TrainingStopped: step, `what`, and advice.
   [[noreturn]] void stop(const std::string& what) const;

@@ -23,8 +23,8 @@ struct GatherJob {
   real negative_slope = 1;      // 1: f is the identity
 };
 
-/// gw[cin, cout] = or += the sum over images, then pairs, of x[image, input(pair), cin] * gy[image, output(pair),
-/// cout]. The sum is taken on its own before it is added to gw, or to 0.
+/// gw[cin, cout] = or += the sum over images, then pairs, of x[image, input(pair), cin] * gy[image,
+/// output(pair), cout]. The sum is taken on its own before it is added to gw, or to 0.
 struct OuterJob {
   const TapPairs* pairs = nullptr;
   const real* x = nullptr;   // [images][in_pixels][cin]
@@ -47,7 +47,7 @@ inline constexpr Dim kTransformChannels = 16;
 struct FilterJob {
   Dim weights = 0;  // a multiple of kTransformChannels
   Dim step = 0;
-  Dim square = 4;  // pixels each way: 4, or 2 (map_patches, map_squares)
+  Dim square = 4;         // pixels each way: 4, or 2 (map_patches, map_squares)
   Into into = Into::add;  // of filter_grads
 };
 

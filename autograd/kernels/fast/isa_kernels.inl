@@ -1,7 +1,7 @@
 // The register-tiled loops, written once over a vector type. Each of portable.cpp, avx2.cpp and
-// avx512.cpp defines `Vec` (a value type with kLanes, load, load_part, store, store_part, broadcast, add, sub,
-// fma, rectify), kTilePixels, kNarrowTilePixels (for outputs of one vector) and
-// kOuterRows in an anonymous namespace, then includes this file.
+// avx512.cpp defines `Vec` (a value type with kLanes, load, load_part, store, store_part, broadcast, add,
+// sub, fma, rectify), kTilePixels, kNarrowTilePixels (for outputs of one vector) and kOuterRows in an
+// anonymous namespace, then includes this file.
 //
 // Nothing here may call an inline function that is not inlined for sure (these files are always built
 // with -O3): the linker keeps one copy of it, which might then run on a processor without these instructions.

@@ -67,7 +67,8 @@ template <class Use>
 void with_outputs(Dim outputs, Use use) {
   [&]<std::size_t... kBelow>(std::index_sequence<kBelow...>) {
     ((outputs == kBelow + 1 ? use(std::integral_constant<Dim, kBelow + 1>()) : void()), ...);
-  }(std::make_index_sequence<kMostOutputs>());
+  }
+  (std::make_index_sequence<kMostOutputs>());
 }
 
 // Of all images.
@@ -96,9 +97,8 @@ void narrow_conv(const ConvTask& s, const real* x, const real* w, const real* bi
   for (Dim n = 0; n < s.images; ++n) {
     fast::linear(g.in_pixels, s.cin, kColumns, x + n * g.in_pixels * s.cin, inside.data(), nullptr, 1,
                  z.data());
-    with_outputs(s.cout, [&](auto outputs) {
-      collect<outputs>(s, z.data(), bias, y + n * g.out_pixels * outputs);
-    });
+    with_outputs(s.cout,
+                 [&](auto outputs) { collect<outputs>(s, z.data(), bias, y + n * g.out_pixels * outputs); });
   }
   if (negative_slope == 1) return;
   for (Dim i = 0; i < s.images * g.out_pixels * s.cout; ++i) y[i] = y[i] > 0 ? y[i] : negative_slope * y[i];

@@ -14,7 +14,10 @@ using test::numbers;
 using test::same_bytes;
 
 ConvSizes map_of(Dim side) {
-  return {{.height = side, .width = side, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1}, 5, 32, 16};
+  return {{.height = side, .width = side, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1},
+          5,
+          32,
+          16};
 }
 
 // Each kernel that makes a form: of a map for Winograd, of a smaller one, of a linear layer.
