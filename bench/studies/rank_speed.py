@@ -19,14 +19,16 @@ ENVIRONMENT = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_RO
 
 
 def train(words, recordings, folder):
-    """Milliseconds a step, steps, and the hash of the model."""
+    """Milliseconds a step, steps, and the hash of the model's values (its metadata name the build)."""
     out = pathlib.Path(folder) / "model.safetensors"
     subprocess.run([*words, "--data", recordings, "--out", out, "--force", *OPTIONS], env=ENVIRONMENT, check=True,
                    stdout=subprocess.DEVNULL)
     with open(out.with_suffix(".run") / "log.csv") as file:
         rows = [(float(row["time_s"]), int(row["step"])) for row in csv.DictReader(file)]
     (begin, first), (end, last) = rows[0], rows[-1]
-    return 1e3 * (end - begin) / (last - first), last - first, hashlib.sha256(out.read_bytes()).hexdigest()[:16]
+    model = out.read_bytes()
+    values = model[8 + int.from_bytes(model[:8], "little"):]
+    return 1e3 * (end - begin) / (last - first), last - first, hashlib.sha256(values).hexdigest()[:16]
 
 
 def main():
