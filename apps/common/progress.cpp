@@ -6,9 +6,11 @@
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
+#include <memory>
 #include <string_view>
 
 #include "apps/common/arguments.h"
+#include "apps/common/signals.h"
 #include "io/numbers.h"
 
 namespace supertac {
@@ -84,6 +86,15 @@ void Progress::draw(const std::string& line) {
   const std::string rest(width_ > line.size() ? width_ - line.size() : 0, ' ');
   std::cerr << '\r' << line << rest << (line.empty() ? "\r" : "") << std::flush;
   width_ = line.size();
+}
+
+std::function<void(std::size_t, std::size_t)> reading_of(const Arguments& arguments,
+                                                         const std::string& folder) {
+  return [&arguments, folder, bar = std::shared_ptr<Progress>()](std::size_t done, std::size_t all) mutable {
+    stop_if_interrupted();
+    if (!bar) bar = std::make_shared<Progress>(arguments, "reading " + folder, all, "recordings");
+    bar->update(done);
+  };
 }
 
 std::string progress_line(const std::string& what, std::uint64_t done, std::uint64_t total,

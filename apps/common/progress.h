@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <string>
 
 namespace supertac {
@@ -42,6 +43,11 @@ class Progress {
   std::size_t width_ = 0;  // of what is drawn
   std::chrono::steady_clock::time_point begin_, last_;
 };
+
+/// To be called for each of many recordings of a folder: shows how far the reading is, and ends it by
+/// Interrupted after a signal.
+std::function<void(std::size_t done, std::size_t all)> reading_of(const Arguments& arguments,
+                                                                  const std::string& folder);
 
 /// The bar's text, e.g. "training  [#####.....]  50 %  1200 steps/s  0:41 left"; `rate` is in units a second,
 /// `detail` replaces it.

@@ -5,6 +5,7 @@
 
 #include "apps/common/measure.h"
 #include "apps/common/program.h"
+#include "apps/common/progress.h"
 #include "apps/common/provenance.h"
 #include "apps/common/remarks.h"
 #include "apps/common/version.h"
@@ -29,7 +30,7 @@ WindowSet load_windows(const Arguments& a, const ModelFile& file) {
       a.given("plates") ? a.list("plates") : comma_list(file.metadata_or("plates", ""));
   add_model_parents(a.list("model"));
   add_parent("recordings", hash_of_recordings(a.text("data"), plates));
-  return WindowSet::load(a.text("data"), plates, file.windows());
+  return WindowSet::load(a.text("data"), plates, file.windows(), reading_of(a, a.text("data")));
 }
 
 std::string row(const std::string& name, const ZoneMetrics& metrics, const Latency& latency) {

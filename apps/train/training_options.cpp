@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 
+#include "apps/common/progress.h"
 #include "data/recordings/signal_range.h"
 #include "data/samples/random_passes.h"
 #include "io/numbers.h"
@@ -203,16 +204,18 @@ WindowSet training_windows(const Arguments& a, const SuperTacSettings& model, st
   w.stride = static_cast<int>(a.integer("stride", 1, 100'000));
   const auto limit = memory_limit(a);
   const auto file_of = [&](const std::string& folder, const std::vector<std::string>& chosen) {
-    return TrackFile::open(folder, {chosen, w.rate_hz, w.max_gap_s, *limit});
+    return TrackFile::open(folder, {chosen, w.rate_hz, w.max_gap_s, *limit, reading_of(a, folder)});
   };
   const auto file = limit ? file_of(dir, plates) : nullptr;
-  w.scaling = training_scaling(a, file ? file->index().range : SignalRange::of_folder(dir, plates));
+  w.scaling = training_scaling(
+      a, file ? file->index().range : SignalRange::of_folder(dir, plates, reading_of(a, dir)));
   WindowSet windows(w);
   if (file) windows.add(file);
-  if (!file) windows.add_directory(dir, plates);
+  if (!file) windows.add_directory(dir, plates, false, reading_of(a, dir));
   windows.check_any(dir);
   if (a.given("also") && limit) windows.add(file_of(a.text("also"), {}), true);
-  if (a.given("also") && !limit) windows.add_directory(a.text("also"), {}, true);
+  if (a.given("also") && !limit)
+    windows.add_directory(a.text("also"), {}, true, reading_of(a, a.text("also")));
   const RandomPasses random{.count = random_plates(a, w.scaling),
                             .seed = seed,
                             .speed_mm_s = common_speed(windows),

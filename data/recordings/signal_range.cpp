@@ -15,10 +15,13 @@ constexpr double kAboveRest = 0.25;
 
 }  // namespace
 
-SignalRange SignalRange::of_folder(const std::string& dir, const std::vector<std::string>& plates) {
+SignalRange SignalRange::of_folder(const std::string& dir, const std::vector<std::string>& plates,
+                                   const ReadingWatch& watch) {
   SignalRange range;
-  for (const std::string& path : list_recordings(dir)) {
-    const Recording recording = read_recording(path);
+  const std::vector<std::string> paths = list_recordings(dir);
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    if (watch) watch(i, paths.size());
+    const Recording recording = read_recording(paths[i]);
     if (plates.empty() || std::ranges::find(plates, recording.plate) != plates.end()) range.add(recording);
   }
   return range;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,6 +10,10 @@
 #include "data/recordings/resample.h"
 
 namespace supertac {
+
+/// Called before each recording of a folder is read, with how many were read and how many there are; what it
+/// throws ends the reading.
+using ReadingWatch = std::function<void(std::size_t done, std::size_t all)>;
 
 /// The signals of some recordings, an even sample of them: one frame in 64, and of more than 16 million
 /// frames fewer.
@@ -19,7 +24,8 @@ class SignalRange {
   explicit SignalRange(std::vector<float> values) : values_(std::move(values)), sorted_(false) {}
   /// Of a folder's recordings, only these plates when any are named. Throws as list_recordings() and
   /// read_recording().
-  static SignalRange of_folder(const std::string& dir, const std::vector<std::string>& plates);
+  static SignalRange of_folder(const std::string& dir, const std::vector<std::string>& plates,
+                               const ReadingWatch& watch = {});
   void add(const Recording& recording);
 
   /// Share of the signals that the scaling makes all the same: those below rest - span, and those more than

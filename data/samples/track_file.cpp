@@ -93,13 +93,14 @@ class Maker {
 
 // Processes of one training start at the same time; one makes what all of them read. That takes minutes even
 // for a hundred million frames: who holds the folder for an hour is stuck.
-FolderLock wait_for_lock(const std::string& folder) {
+FolderLock wait_for_lock(const std::string& folder, const ReadingWatch& watch) {
   using Clock = std::chrono::steady_clock;
   for (const auto deadline = Clock::now() + std::chrono::hours(1);;) {
     try {
       return FolderLock(folder);
     } catch (const FileError&) {
       if (Clock::now() > deadline) throw;
+      if (watch) watch(0, 1);
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
   }
@@ -108,8 +109,10 @@ FolderLock wait_for_lock(const std::string& folder) {
 TrackIndex make(const std::string& folder, const std::string& base, const TrackFileSettings& settings,
                 std::vector<ListedFile> sources) {
   Maker maker(folder, settings, base + ".f32");
-  for (const ListedFile& source : sources)
-    if (!Plate::is_file(source.name)) maker.add(source.name);
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (settings.watch) settings.watch(i, sources.size());
+    if (!Plate::is_file(sources[i].name)) maker.add(sources[i].name);
+  }
   TrackIndex index = maker.end(std::move(sources));
   write_index(base, index);
   return index;
@@ -124,7 +127,7 @@ std::shared_ptr<const TrackFile> TrackFile::open(const std::string& folder,
   std::optional<TrackIndex> index = read_index(base, sources);
   if (!index) {
     make_directories(kept_in(folder));
-    const FolderLock lock = wait_for_lock(kept_in(folder));
+    const FolderLock lock = wait_for_lock(kept_in(folder), settings.watch);
     index = read_index(base, sources);
     if (!index) index = make(folder, base, settings, std::move(sources));
   }
@@ -197,7 +200,7 @@ std::string TrackFile::recall(const std::string& key, const std::function<std::s
   if (notes.contains(entry) && notes[entry].is_string()) return notes[entry].get<std::string>();
   std::string value = compute();
   try {
-    const FolderLock lock = wait_for_lock(kept_in(folder_));
+    const FolderLock lock = wait_for_lock(kept_in(folder_), {});
     notes = read_notes();
     notes[entry] = value;
     write_file(path, notes.dump(1) + "\n");

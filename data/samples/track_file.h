@@ -24,6 +24,7 @@ struct TrackFileSettings {
   std::vector<std::string> plates = {};  ///< only these; all when empty
   double rate_hz = 300, max_gap_s = 0.05;
   std::uint64_t memory = 0;  ///< so many bytes of the tracks are held in memory, the others are read
+  ReadingWatch watch = {};   ///< of the recordings that are read to make the file, and while it waits
 };
 
 /// Gives what read_recording() and resample() make of the recordings, to the bit. Reading is const and safe

@@ -49,9 +49,9 @@ std::string WindowCounts::summary() const {
 }
 
 WindowSet WindowSet::load(const std::string& dir, const std::vector<std::string>& plates,
-                          const WindowSettings& settings) {
+                          const WindowSettings& settings, const ReadingWatch& watch) {
   WindowSet set(settings);
-  set.add_directory(dir, plates);
+  set.add_directory(dir, plates, false, watch);
   set.check_any(dir);
   return set;
 }
@@ -62,15 +62,18 @@ void WindowSet::check_any(const std::string& dir) const {
                            " frames: " + counts_.summary() + "; try fewer timesteps or longer passes");
 }
 
-void WindowSet::add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside) {
+void WindowSet::add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside,
+                              const ReadingWatch& watch) {
   ChosenPlates chosen(plates);
-  for (const std::string& path : list_recordings(dir)) {
-    const Recording recording = read_recording(path);
+  const std::vector<std::string> paths = list_recordings(dir);
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    if (watch) watch(i, paths.size());
+    const Recording recording = read_recording(paths[i]);
     if (!chosen.take(recording.plate)) continue;
     try {
       add(recording, dir, aside);
     } catch (const std::exception& error) {
-      throw std::runtime_error(path + ": " + error.what());
+      throw std::runtime_error(paths[i] + ": " + error.what());
     }
   }
   chosen.check(dir);
@@ -140,7 +143,8 @@ void WindowSet::append(const TrackCard& card, std::size_t plate, const Use& use)
             .windows = 0,
             .aside = use.aside,
             .varied = use.varied};
-  for (const FrameRange& stretch : card.stretches) append(card, stretch, static_cast<std::uint32_t>(use.stride));
+  for (const FrameRange& stretch : card.stretches)
+    append(card, stretch, static_cast<std::uint32_t>(use.stride));
   pass.windows = size() - pass.first_window;
   ++counts_.recordings;
   counts_.frames += card.frames;

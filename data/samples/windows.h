@@ -71,7 +71,7 @@ class WindowSet : public Examples {
   /// std::runtime_error when the directory holds no recording, a file is unreadable or of an unknown plate,
   /// or no window is left (saying where the frames went).
   static WindowSet load(const std::string& dir, const std::vector<std::string>& plates,
-                        const WindowSettings& settings);
+                        const WindowSettings& settings, const ReadingWatch& watch = {});
 
   /// An empty set, to be filled by add().
   /// Throws std::invalid_argument on settings out of range.
@@ -84,7 +84,8 @@ class WindowSet : public Examples {
   void add_one_of_many(const Recording& recording, int stride);
   /// Appends those of all recordings in a directory, of these plates (empty: all). Throws as load, but for
   /// the missing windows.
-  void add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside = false);
+  void add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside = false,
+                     const ReadingWatch& watch = {});
   /// The same of a file of tracks, which must have this set's rate_hz and max_gap_s.
   void add(std::shared_ptr<const TrackFile> file, bool aside = false);
   /// Throws std::runtime_error, saying where the frames of `dir` went, when there is no window.

@@ -20,6 +20,7 @@
 #include <iostream>
 #include <map>
 #include <regex>
+#include <span>
 
 #include "bench/studies/hostile/readers.h"
 #include "io/file.h"
@@ -31,29 +32,36 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kPrograms[] = {"classify", "collect", "evaluate", "import", "info", "plate",
-                                     "simulate", "stream",  "sweep",    "train",  "rig"};
+constexpr const char* kPrograms[] = {"check",  "classify", "collect", "evaluate", "explain",
+                                     "export", "import",   "info",    "plate",    "simulate",
+                                     "stream", "sweep",    "train",   "rig"};
 // A command that works, on which evil is heaped; a later option replaces an earlier one.
 const std::map<std::string, std::vector<std::string>> kGood = {
-    {"classify", {"--model", "precious", "--data", "data"}},
+    {"check", {"file", "model", "data"}},
+    {"classify", {"--model", "model", "--data", "data", "--epochs", "1"}},
     {"collect",
      {"--printer", "/dev/null", "--board", "/dev/null", "--plate", "plain", "--out", "new", "--yes"}},
-    {"evaluate", {"--model", "precious", "--data", "data"}},
+    {"evaluate", {"--model", "model", "--data", "data", "--split", "none", "--limit", "9"}},
+    {"explain", {"model", "--recording", "data/good", "--at", "2", "--out", "new.steps"}},
+    {"export", {"model", "--onnx", "new.onnx"}},
     {"import", {"data", "--out", "new"}},
     {"info", {"data/good"}},
     {"plate", {"--plate", "plain", "--resolution", "5", "--out", "new.stl"}},
     {"simulate", {"--out", "new", "--plates", "plain", "--passes", "1", "--trials", "1", "--speeds", "50"}},
-    {"stream", {"--model", "precious", "--recording", "data/good"}},
+    {"stream", {"--model", "model", "--recording", "data/good"}},
     {"sweep", {"--out", "new", "--data", "data"}},
     {"train", {"--data", "data", "--out", "new.model", "--epochs", "1", "--preset", "tiny"}},
     {"rig", {"--plate", "plain", "--board-link", "new.board", "--printer-link", "new.printer"}}};
 constexpr int kSkipped = 77;
 constexpr double kPatienceS = 1, kHangS = 10;
 constexpr long kMostKilobytes = 1 << 20;
+constexpr std::uint64_t kMost = 1 << 26;  // bytes of a file that is compared
 // By --force a user gives up what these name, and nothing else.
-constexpr const char* kOutputs[] = {"--out",          "--json",       "--gcode",    "--outputs",
-                                    "--capture",      "--report",     "--pictures", "--board-link",
-                                    "--printer-link", "--write-pairs"};
+constexpr const char* kOutputs[] = {"--out",        "--json",         "--gcode",      "--outputs",
+                                    "--capture",    "--report",       "--pictures",   "--onnx",
+                                    "--board-link", "--printer-link", "--write-pairs"};
+// What no program may change.
+constexpr const char* kKept[] = {"precious", "precious.stl", "model", "data/good"};
 
 struct Option {
   std::string name, value;
@@ -89,6 +97,8 @@ std::string evil_value(const RandomStream& random, std::uint64_t at) {
                                                   "precious.stl",
                                                   "data",
                                                   "data/1",
+                                                  "data/good",
+                                                  "model",
                                                   "new",
                                                   "new/er",
                                                   "loop",
@@ -176,6 +186,14 @@ Run run(const fs::path& folder, const std::vector<std::string>& words, double se
   return result;
 }
 
+// A program that has to succeed.
+void run_whole(const fs::path& folder, std::vector<std::string> words) {
+  words[0] = SUPERTAC_BIN "/supertac-" + words[0];
+  const Run whole = run(folder, words, 60);
+  if (!WIFEXITED(whole.status) || WEXITSTATUS(whole.status) != 0)
+    throw std::runtime_error(words[0] + ": " + whole.error);
+}
+
 std::vector<Option> options_of(const std::string& program) {
   std::vector<Option> options;
   const std::string help = run_process(fs::path(program).filename(), {"--help"}).out;
@@ -186,22 +204,38 @@ std::vector<Option> options_of(const std::string& program) {
 }
 
 using Counts = std::map<std::string, std::uint64_t>;
+using Files = std::map<std::string, std::vector<std::byte>>;  // by name
 
 bool is_output(const std::string& option) {
   return std::find(std::begin(kOutputs), std::end(kOutputs), option) != std::end(kOutputs);
 }
 
-// Whether these words give up the file: --force, and an output whose value is the file or a link to it.
+// Whether these words give up the file: --force, and an output whose value is the file, a link to it or a
+// folder that holds it.
 bool given_up(const fs::path& folder, const std::vector<std::string>& words, const std::string& file) {
   if (std::find(words.begin(), words.end(), "--force") == words.end()) return false;
   std::error_code error;
-  for (std::size_t i = 0; i + 1 < words.size(); ++i)
-    if (is_output(words[i]) && fs::weakly_canonical(folder / words[i + 1], error) == folder / file)
-      return true;
+  const std::string whole = (folder / file).string();
+  for (std::size_t i = 0; i + 1 < words.size(); ++i) {
+    if (!is_output(words[i])) continue;
+    const std::string output = fs::weakly_canonical(folder / words[i + 1], error).string();
+    if (output == whole || (output != folder && whole.starts_with(output + "/"))) return true;
+  }
   return false;
 }
 
-void judge(const Run& result, const fs::path& folder, const std::vector<std::string>& words, Counts& counts) {
+// Writes it as nobody's, whom the programs run as, and makes the folders that it needs.
+void put(const fs::path& folder, const std::string& file, std::span<const std::byte> bytes) {
+  fs::create_directories((folder / file).parent_path());
+  std::ofstream(folder / file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  for (fs::path path = folder / file; path != folder; path = path.parent_path())
+    if (::getuid() == 0 && ::chown(path.c_str(), 65534, 65534) != 0)
+      throw std::runtime_error("chown " + path.string());
+}
+
+void judge(const Run& result, const fs::path& folder, const std::vector<std::string>& words,
+           const Files& kept, Counts& counts) {
   std::string line;
   for (const std::string& word : words) line += word.substr(0, 60) + " ";
   const auto found = [&](const char* what) {
@@ -226,18 +260,15 @@ void judge(const Run& result, const fs::path& folder, const std::vector<std::str
     if (result.error.find(raw) != std::string::npos) return found("raw exceptions");
   if (result.error.find('\x1b') != std::string::npos) found("control codes");
   if (fs::exists(folder / "PWNED")) found("shells"), fs::remove(folder / "PWNED");
-  for (const char* file : {"precious", "precious.stl"}) {
-    std::ifstream in(folder / file);
-    std::string text;
-    if ((std::getline(in, text), text) == "precious") continue;
+  for (const auto& [file, bytes] : kept) {
+    if (fs::is_regular_file(folder / file) && read_file(folder / file, kMost) == bytes) continue;
     if (!given_up(folder, words, file)) found("files overwritten");
     fs::remove_all(folder / file);
-    std::ofstream(folder / file) << "precious";
-    fs::permissions(folder / file, fs::perms(0666));
+    put(folder, file, bytes);
   }
 }
 
-Counts command_lines(const fs::path& folder, std::uint64_t n, std::uint64_t seed) {
+Counts command_lines(const fs::path& folder, const Files& kept, std::uint64_t n, std::uint64_t seed) {
   Counts counts;
   std::map<std::string, std::vector<Option>> options;
   for (const char* name : kPrograms)
@@ -261,7 +292,7 @@ Counts command_lines(const fs::path& folder, std::uint64_t n, std::uint64_t seed
     if (random.bits(at++) % 4 == 0) words.push_back(evil_value(random, at++));
     if (random.bits(at++) % 4 == 0) words.push_back("--force"), ++counts["with --force"];
     ++counts["command lines"];
-    judge(run(folder, words, kPatienceS), folder, words, counts);
+    judge(run(folder, words, kPatienceS), folder, words, kept, counts);
     for (const auto& entry : fs::directory_iterator(folder))
       if (entry.path().filename().string().starts_with("new")) fs::remove_all(entry.path());
   }
@@ -281,31 +312,29 @@ void write_texts(const fs::path& folder) {
   }
 }
 
-Counts signals(const fs::path& folder, std::uint64_t n, std::uint64_t seed) {
+Counts signals(const fs::path& folder, const Files& kept, std::uint64_t n, std::uint64_t seed) {
   Counts counts;
   write_texts(folder);
-  const auto program = [](const char* name) { return std::string(SUPERTAC_BIN "/supertac-") + name; };
   const std::vector<std::vector<std::string>> commands = {
-      {program("simulate"), "--plates", "ridges6"},
-      {program("import"), "texts", "--skip-bad"},
-      {program("train"), "--data", "whole0", "--preset", "tiny", "--epochs", "1", "--split", "none",
-       "--stride", "64"}};
+      {"simulate", "--plates", "ridges6"},
+      {"import", "texts", "--skip-bad"},
+      {"train", "--data", "whole0", "--preset", "tiny", "--epochs", "1", "--split", "none", "--stride",
+       "64"}};
   for (std::size_t i = 0; i < commands.size(); ++i) {  // what ends by itself at once would not be attacked
     std::vector<std::string> words = commands[i];
     words.insert(words.end(), {"--out", "whole" + std::to_string(i)});
-    const Run whole = run(folder, words, 60);
-    if (!WIFEXITED(whole.status) || WEXITSTATUS(whole.status) != 0)
-      throw std::runtime_error(words[0] + " without a signal: " + whole.error);
+    run_whole(folder, words);
   }
   for (std::uint64_t i = 0; i < n; ++i) {
     const RandomStream random(seed, i);
     const std::string out = "signals" + std::to_string(i);
     std::vector<std::string> words = commands[i % commands.size()];
+    words[0] = SUPERTAC_BIN "/supertac-" + words[0];
     words.insert(words.end(), {"--out", out});
     const int signal = std::array{SIGTERM, SIGINT, SIGHUP}[random.bits(1) % 3];
     const Run result = run(folder, words, 0.4 * random.uniform(0), signal);
     ++counts["signals"];
-    judge(result, folder, words, counts);
+    judge(result, folder, words, kept, counts);
     const bool finished = WIFEXITED(result.status) && WEXITSTATUS(result.status) == 0;
     if (!finished && fs::is_directory(folder / out)) {
       ++counts["half folders"];
@@ -331,14 +360,17 @@ int main_of(const std::string& mode, std::uint64_t n, std::uint64_t seed) {
     std::cerr << "skipped: nobody but root may run what is in " SUPERTAC_BIN "\n";
     return kSkipped;
   }
-  (void)run(folder,
-            {SUPERTAC_BIN "/supertac-simulate", "--out", "data", "--plates", "plain", "--passes", "1",
-             "--trials", "1", "--speeds", "10"},
-            60);
+  run_whole(folder, {"simulate", "--out", "data", "--plates", "plain", "--passes", "1", "--trials", "1",
+                     "--speeds", "10"});
   fs::rename(folder / "data/plain_t1_p1_v10.safetensors", folder / "data/good");
+  run_whole(folder, {"simulate", "--out", "felt", "--plates", "ridges6", "--passes", "1", "--trials", "1"});
+  run_whole(folder, {"train", "--data", "felt", "--out", "model", "--preset", "tiny", "--split", "none",
+                     "--epochs", "1", "--stride", "64"});
+  Files kept;
+  for (const char* file : kKept) kept[file] = read_file(folder / file, kMost);
   Counts counts;
-  if (mode == "lines") counts = command_lines(folder, n, seed);
-  if (mode == "signals") counts = signals(folder, n, seed);
+  if (mode == "lines") counts = command_lines(folder, kept, n, seed);
+  if (mode == "signals") counts = signals(folder, kept, n, seed);
   if (mode == "mutants") counts = mutants_of_readers(folder.string(), n, seed);
   fs::remove_all(folder);
   const auto print = [&](std::initializer_list<const char*> names) {

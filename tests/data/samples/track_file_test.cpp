@@ -68,6 +68,24 @@ class TrackFiles : public testing::Test {
   WindowSettings settings_ = wide_settings(16);
 };
 
+TEST_F(TrackFiles, ReadingIsWatchedAndCanBeEnded) {
+  std::vector<std::size_t> seen;
+  const auto watch = [&](std::size_t done, std::size_t all) {
+    EXPECT_EQ(all, 4u);
+    seen.push_back(done);
+    if (seen.size() == 3) throw std::runtime_error("enough");
+  };
+  TrackFileSettings settings{.rate_hz = settings_.rate_hz, .watch = watch};
+  EXPECT_THROW((void)TrackFile::open(folder_.path(), settings), std::runtime_error);
+  EXPECT_EQ(seen, (std::vector<std::size_t>{0, 1, 2}));
+  EXPECT_TRUE(kept(".f32").empty());
+  EXPECT_EQ(open()->index().cards.size(), 4u);
+  seen.clear();
+  EXPECT_THROW((void)WindowSet::load(folder_.path(), {}, settings_, watch), std::runtime_error);
+  seen.clear();
+  EXPECT_THROW((void)SignalRange::of_folder(folder_.path(), {}, watch), std::runtime_error);
+}
+
 TEST_F(TrackFiles, GiveTheSameWindowsWhateverIsHeldInMemory) {
   for (const double rate_hz : {300.0, 110.0}) {
     settings_.rate_hz = rate_hz;
