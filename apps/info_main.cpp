@@ -101,7 +101,7 @@ void print_run(const Arguments& arguments, nlohmann::ordered_json& card) {
   if (!fs::exists(settings, error)) return;
   try {
     const auto run = parse_json_limited(read_text_file(settings, kMostBytes));
-    if (run.value("content", "") != card["content"]) return;
+    if (run.value("content", "") != card["content"].get<std::string>()) return;
     card["run"] = run.at("provenance");
   } catch (const std::exception&) {
     return;  // of another program

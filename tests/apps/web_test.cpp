@@ -49,7 +49,11 @@ class Web : public testing::Test {
   WebSite site() {
     return {.page = live_page(),
             .hello = [] { return std::string(R"({"badge":"test"})"); },
-            .news = [this] { return "{\"n\":" + std::to_string(count_++) + "," + filling_ + "}"; },
+            .news =
+                [this] {
+                  return "{\"n\":" + std::to_string(count_++) + ",\"f\":\"" + std::string(letters_, 'x') +
+                         "\"}";
+                },
             .actions = {{"record", [this] { return ++records_, std::string("recording"); }}},
             .file =
                 [this](const std::string& name) {
@@ -75,7 +79,7 @@ class Web : public testing::Test {
   bool answers() const { return get("/") == 200; }
 
   TemporaryFolder folder_;
-  std::string filling_ = "\"f\":\"\"";
+  std::atomic<std::size_t> letters_{0};  // of what fills an event
   std::atomic<int> count_{0}, records_{0};
   WebServer server_;
   int port_;
@@ -162,7 +166,7 @@ TEST_F(Web, AReaderGetsTheHelloAndThenTheNewest) {
 }
 
 TEST_F(Web, WhoTakesNothingMissesEventsAndHoldsUpNobody) {
-  filling_ = "\"f\":\"" + std::string(8000, 'x') + "\"";
+  letters_ = 8000;
   HttpClient stalled(port_, 4096), reader(port_);
   for (HttpClient* client : {&stalled, &reader}) client->send("GET /events HTTP/1.1\r\n" + host() + "\r\n");
   reader.receive("{\"n\":" + std::to_string(count_ + 60) + ",");

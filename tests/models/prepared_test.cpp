@@ -104,7 +104,8 @@ Prepared prepare(const Network& network, bool bytes) {
 class PreparedBits : public testing::TestWithParam<std::tuple<const char*, bool>> {};
 
 TEST_P(PreparedBits, AreOneForBatchesInstructionSetsAndThreads) {
-  const auto [preset, bytes] = GetParam();
+  const char* const preset = std::get<0>(GetParam());
+  const bool bytes = std::get<1>(GetParam());
   {
     Rng rng(3);
     const SuperTac network(SuperTacSettings::of_preset(preset), rng);
