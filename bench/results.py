@@ -249,10 +249,11 @@ def promises():
 def hostile():
     counted = ["slow mutants", "crashes", "hangs", "above 1 GB", "raw exceptions", "control codes", "shells", "files overwritten", "half folders"]
     lines = []
-    for campaign, tried in (("lines", "command lines"), ("mutants", "mutants"), ("signals", "signals")):
+    for campaign in dict.fromkeys(r["campaign"] for r in rows("hostile.csv")):
         found = {r["what"]: r["count"] for r in rows("hostile.csv") if r["campaign"] == campaign}
-        if found:
-            lines.append([tried, f"{int(found[tried]):,}"] + [found[c] for c in counted])
+        tried = next(what for what in ("command lines", "mutants", "signals") if what in found)
+        lines.append([campaign, f"{int(found[tried]):,}"] +
+                     [found[c] for c in counted])
     return table(["what was tried", "how many"] + counted, lines)
 
 

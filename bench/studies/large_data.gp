@@ -16,12 +16,12 @@ set ylabel 's'
 set yrange [0.1:2e3]
 plot rows('held,all') using 1:6 with linespoints lc rgb '#e76f51' pt 7 title 'all held in memory', \
      rows('first') using 1:6 with linespoints lc rgb '#e9c46a' pt 5 title '--memory, first time', \
-     rows('read,500M') using 1:6 with linespoints lc rgb '#2a9d8f' pt 9 title '--memory, later'
+     rows('read') using 1:6 with linespoints lc rgb '#2a9d8f' pt 9 title '--memory, later'
 set title 'most memory held'
 set ylabel 'MB'
 set yrange [10:2e4]
 plot rows('held') using 1:8 with linespoints lc rgb '#e76f51' pt 7 title 'all held in memory', \
-     rows('read,500M') using 1:8 with linespoints lc rgb '#2a9d8f' pt 9 title '--memory'
+     rows('read') using 1:8 with linespoints lc rgb '#2a9d8f' pt 9 title '--memory'
 unset logscale y
 set title 'processor time of a step'
 set ylabel 'ms'

@@ -5,8 +5,9 @@
 
 a, c: the fixed part of a step and a window's, from one process with batches of 16 and 128; h: how much slower two
 processes of this machine compute when both do, from a batch of 64 in shared memory, where the sum of the gradients takes
-s = 0.75 ms (ordered_sum.csv); e: how much of a link's rate is used, from 100 Mbit/s. G is the size of the gradient.
-Settings that were not fitted test it. Medians over ROUNDS (3), by turns, preset paper, one thread a process.
+s = 0.75 ms (ordered_sum.csv); e: how much of a link's rate is used, from 200 Mbit/s. G is the size of the gradient.
+Settings that were not fitted test it. Preset paper, one thread a process, the settings by turns. A machine's speed changes
+from minute to minute, so every one of ROUNDS (6) is fitted and tested on its own, and medians over the rounds are given.
 
 Then it is drawn beyond this machine: ranks on machines of their own (h = 1), each with a full-duplex link of its own and
 LATENCY_S for a message, so S = 2 (1 - 1/R) G / rate + 2 log2(R) latency; the batch B for which R ranks are 80 % as
@@ -26,8 +27,8 @@ import time
 GRADIENT_BITS = 8 * 4 * 537_521
 SHARED_MEMORY_MS = 0.75
 LATENCY_S = 20e-6
-FITTED = [(1, 16, None), (1, 128, None), (2, 64, None), (2, 16, 100)]  # ranks, batch, Mbit/s (None: shared memory)
-TESTED = [(1, 64, None), (2, 128, None), (2, 64, 200), (2, 128, 400)]
+FITTED = [(1, 16, None), (1, 128, None), (2, 64, None), (2, 16, 200)]  # ranks, batch, Mbit/s (None: shared memory)
+TESTED = [(1, 64, None), (2, 128, None), (2, 64, 400), (2, 128, 400)]
 OPTIONS = ["--split", "none", "--epochs", "20", "--threads", "1", "--quiet", "--force", "--checkpoint-every", "1000000"]
 ENVIRONMENT = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
                             "OMPI_MCA_hwloc_base_binding_policy": "none"}
@@ -35,7 +36,7 @@ OVER_TCP = {"OMPI_MCA_btl": "tcp,self", "OMPI_MCA_btl_tcp_if_include": "lo", "OM
 
 
 def step_ms(program, recordings, folder, ranks, batch, rate):
-    """Milliseconds a step, from the first line of the log (every 50 steps) to the fourth."""
+    """Milliseconds a step, from the first line of the log to the second."""
     out = pathlib.Path(folder) / f"r{ranks}b{batch}.safetensors"
     log = out.with_suffix(".run") / "log.csv"
     log.unlink(missing_ok=True)
@@ -45,7 +46,7 @@ def step_ms(program, recordings, folder, ranks, batch, rate):
     process = subprocess.Popen([*shell, *words], env=ENVIRONMENT | (OVER_TCP if rate else {}), stdout=subprocess.DEVNULL)
     limit = time.monotonic() + 300
     rows = []
-    while len(rows) < 4:
+    while len(rows) < 2:
         if process.poll() is not None or time.monotonic() > limit:
             raise SystemExit(f"rank_model.py: {ranks} ranks, batch {batch}: ended or took more than 300 s")
         time.sleep(0.2)
@@ -54,7 +55,7 @@ def step_ms(program, recordings, folder, ranks, batch, rate):
                 rows = [row for row in csv.DictReader(file) if row["test_psnr_db"] is not None]  # whole lines
     process.send_signal(signal.SIGTERM)
     process.wait(60)
-    (begin, first), (end, last) = [(float(row["time_s"]), int(row["step"])) for row in (rows[0], rows[3])]
+    (begin, first), (end, last) = [(float(row["time_s"]), int(row["step"])) for row in rows[:2]]
     return 1e3 * (end - begin) / (last - first)
 
 
@@ -83,26 +84,28 @@ def efficient_batch(a, c, ranks, gbit):
 
 def main():
     binaries, recordings, results = sys.argv[1:4]
-    rounds = int(sys.argv[4]) if len(sys.argv) > 4 else 3
-    times = {setting: [] for setting in FITTED + TESTED}
+    rounds = int(sys.argv[4]) if len(sys.argv) > 4 else 6
+    seen = []  # of every round the fitted parameters, and by setting what was measured and what the model says
     with tempfile.TemporaryDirectory() as folder:
         for turn in range(rounds):
-            for setting, seen in times.items():
-                seen.append(step_ms(f"{binaries}/supertac-train", recordings, folder, *setting))
-                print(turn, setting, f"{seen[-1]:.2f} ms", file=sys.stderr)
-    measured = {setting: statistics.median(seen) for setting, seen in times.items()}
-    parameters = fit(measured)
-    print("a {:.2f} ms, c {:.3f} ms, h {:.3f}, e {:.3f}".format(*parameters))
+            measured = {setting: step_ms(f"{binaries}/supertac-train", recordings, folder, *setting)
+                        for setting in FITTED + TESTED}
+            parameters = fit(measured)
+            seen.append((parameters, {setting: (ms, model_ms(*parameters, *setting)) for setting, ms in measured.items()}))
+            print(turn, *(f"{ms:.1f}/{model:.1f}" for ms, model in seen[-1][1].values()), file=sys.stderr)
+    a, c, h, e = (statistics.median(values) for values in zip(*(parameters for parameters, _ in seen)))
+    print(f"a {a:.2f} ms, c {c:.3f} ms, h {h:.3f}, e {e:.3f}")
     with open(results, "w") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["kind", "ranks", "batch", "link_mbit", "measured_ms", "model_ms", "model_over_measured"])
-        for setting, ms in measured.items():
-            model = model_ms(*parameters, *setting)
-            writer.writerow(["fitted" if setting in FITTED else "tested", *setting[:2], setting[2] or "", f"{ms:.2f}",
-                             f"{model:.2f}", f"{model / ms:.3f}"])
+        for setting in FITTED + TESTED:
+            pairs = [both[setting] for _, both in seen]
+            middle = [statistics.median(values) for values in zip(*((ms, model, model / ms) for ms, model in pairs))]
+            writer.writerow(["fitted" if setting in FITTED else "tested", *setting[:2], setting[2] or "",
+                             f"{middle[0]:.2f}", f"{middle[1]:.2f}", f"{middle[2]:.3f}"])
         for gbit in (1, 10, 100):
             for ranks in (2**k for k in range(1, 11)):
-                batch, ms = efficient_batch(*parameters[:2], ranks, gbit)
+                batch, ms = efficient_batch(a, c, ranks, gbit)
                 writer.writerow(["80 % efficient", ranks, math.ceil(batch), 1000 * gbit, "", f"{ms:.2f}", ""])
 
 

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <functional>
 #include <sstream>
+#include <thread>
 
 #include "tests/apps/simulated_data.h"
 
@@ -65,7 +66,7 @@ class Mpi : public OnSimulatedData {
     Words lines;
     std::istringstream text(result.error);
     for (std::string line; std::getline(text, line);)
-      if (line.starts_with("supertac-train")) lines.push_back(line);
+      if (line.starts_with("supertac")) lines.push_back(line);
     return lines;
   }
   static void expect_one_line(const ProcessResult& result, const std::string& part) {
@@ -158,6 +159,23 @@ TEST_F(Mpi, AFrozenRankIsNamed) {
   for (const int rank : {0, 2})
     expect_one_line(lose(rank, "frozen" + std::to_string(rank), [](pid_t p) { kill(p, SIGSTOP); }),
                     "rank " + std::to_string(rank) + " of 4 has not answered");
+}
+
+// The first rank waits for the other in MPI_Init, and its own alarm reaches it when all is over.
+TEST_F(Mpi, ARankFrozenAtTheStartIsOneLine) {
+  const Words mine = options("start.safetensors", {"--deadline", "3"});
+  std::string late = "sleep 2; exec " SUPERTAC_BIN "/supertac-train";
+  for (const std::string& word : mine) late += " '" + word + "'";
+  RunningProcess run(SUPERTAC_MPIRUN, both(ranks(1, mine), {"-n", "1", "sh", "-c", late}));
+  const auto begin = std::chrono::steady_clock::now();
+  pid_t first = 0;
+  while (first == 0 && std::chrono::steady_clock::now() - begin < std::chrono::seconds(2))
+    first = process_of(path("start"), 0);
+  ASSERT_GT(first, 0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  kill(first, SIGSTOP);
+  expect_one_line(run.wait(), "not all processes of mpirun came to start");
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
 }
 
 TEST_F(Mpi, AKilledRankEndsAll) {
