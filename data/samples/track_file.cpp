@@ -93,14 +93,14 @@ class Maker {
 
 // Processes of one training start at the same time; one makes what all of them read. That takes minutes even
 // for a hundred million frames: who holds the folder for an hour is stuck.
-FolderLock wait_for_lock(const std::string& folder, const ReadingWatch& watch) {
+FolderLock wait_for_lock(const std::string& folder, const std::function<void()>& meanwhile = {}) {
   using Clock = std::chrono::steady_clock;
   for (const auto deadline = Clock::now() + std::chrono::hours(1);;) {
     try {
       return FolderLock(folder);
     } catch (const FileError&) {
       if (Clock::now() > deadline) throw;
-      if (watch) watch(0, 1);
+      if (meanwhile) meanwhile();
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
   }
@@ -127,7 +127,9 @@ std::shared_ptr<const TrackFile> TrackFile::open(const std::string& folder,
   std::optional<TrackIndex> index = read_index(base, sources);
   if (!index) {
     make_directories(kept_in(folder));
-    const FolderLock lock = wait_for_lock(kept_in(folder), settings.watch);
+    const FolderLock lock = wait_for_lock(kept_in(folder), [&] {
+      if (settings.watch) settings.watch(0, sources.size());
+    });
     index = read_index(base, sources);
     if (!index) index = make(folder, base, settings, std::move(sources));
   }
@@ -200,7 +202,7 @@ std::string TrackFile::recall(const std::string& key, const std::function<std::s
   if (notes.contains(entry) && notes[entry].is_string()) return notes[entry].get<std::string>();
   std::string value = compute();
   try {
-    const FolderLock lock = wait_for_lock(kept_in(folder_), {});
+    const FolderLock lock = wait_for_lock(kept_in(folder_));
     notes = read_notes();
     notes[entry] = value;
     write_file(path, notes.dump(1) + "\n");
