@@ -2,11 +2,14 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <ranges>
@@ -177,6 +180,64 @@ TEST(Errors, AreOneClearLine) {
         EXPECT_EQ((result.error + result.out).find(raw), std::string::npos) << result.error;
     }
   }
+}
+
+// The most memory that a program of this test has held so far, in kB.
+long most_kilobytes() {
+  rusage used{};
+  getrusage(RUSAGE_CHILDREN, &used);
+  return used.ru_maxrss;
+}
+
+TEST(Errors, EvilValuesAreOneClearLineAtOnce) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(mkfifo((folder / "fifo").c_str(), 0600), 0);
+  const std::string out = folder / "out";
+  struct Evil {
+    std::vector<std::string> words;
+    std::string said;
+  };
+  for (const auto& [words, said] :
+       {Evil{{"supertac-import", "--journal", folder / "fifo", "--out", out}, "is not a regular file"},
+        Evil{{"supertac-import", "--journal", "/dev/zero", "--out", out}, "is not a regular file"},
+        Evil{{"supertac-classify", "--model", "none", "--data", folder.path(), "--views", ""}, "found none"},
+        Evil{{"supertac-plate", "--plate", "ridges0.0000001", "--out", out}, "from 0.05 to 1000 mm"},
+        Evil{{"supertac-plate", "--plate", "ridgesinf", "--out", out}, "from 0.05 to 1000 mm"},
+        Evil{{"supertac-simulate", "--plates", "ridges0.0000001", "--out", out}, "from 0.05 to 1000 mm"},
+        Evil{{"supertac-train", "--data", folder.path(), "--out", out, "--resume", ""},
+             "found an empty name"}}) {
+    const auto begin = std::chrono::steady_clock::now();
+    const auto result = run_process(words[0], {words.begin() + 1, words.end()});
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5)) << words[0];
+    EXPECT_TRUE(result.code == 1 || result.code == 2) << words[0] << ' ' << words[2] << result.code;
+    EXPECT_NE(result.error.find(said), std::string::npos) << result.error;
+    EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
+    EXPECT_FALSE(fs::exists(out)) << words[0] << ' ' << words[2];
+  }
+  EXPECT_LT(most_kilobytes(), 200'000);
+}
+
+TEST(Import, HoldsOnePlateAtATime) {
+  const TemporaryFolder folder;
+  std::string text;
+  for (int i = 0; i < 4000; ++i)
+    for (int k = 0; k < 16; ++k)
+      text += std::to_string(2.4 - 0.1 * std::abs(std::sin(0.01 * i + k))) + (k < 15 ? ' ' : '\n');
+  long one = 0;
+  for (const char* plate : {"6_Ridges", "4_Ridges", "3_Bumps", "6_Bumps", "4_Blob", "6_Blob"}) {
+    for (const char* trial : {"1", "2"}) {
+      fs::create_directories(folder / ("texts/" + std::string(plate) + "/" + trial));
+      for (const char* pass : {"1", "2", "3", "4"})
+        write_file(folder / ("texts/" + std::string(plate) + "/" + trial + "/" + pass + ".txt"), text);
+    }
+    if (one > 0) continue;
+    ASSERT_EQ(run_process("supertac-import", {folder / "texts", "--skip-bad", "--out", folder / "one"}).code,
+              0);
+    one = most_kilobytes();
+  }
+  const auto all = run_process("supertac-import", {folder / "texts", "--skip-bad", "--out", folder / "all"});
+  ASSERT_EQ(all.code, 0) << all.error;
+  EXPECT_LT(most_kilobytes(), one + one / 4);
 }
 
 }  // namespace

@@ -112,7 +112,8 @@ TEST(Pairs, TargetsBelowSevenPixelsAreJudgedByASmallerWindowAndItIsSaid) {
   EXPECT_EQ(judged.code, 0) << judged.error;
   EXPECT_NE(judged.error.find("SSIM's window is 5 pixels wide instead of 7"), std::string::npos)
       << judged.error;
-  EXPECT_TRUE(nlohmann::json::parse(read_text_file(json, kPlenty)).at("all").at("network").at("ssim").is_number());
+  EXPECT_TRUE(
+      nlohmann::json::parse(read_text_file(json, kPlenty)).at("all").at("network").at("ssim").is_number());
 }
 
 TEST(Pairs, SameBytesForAnyThreadsAndAfterAPause) {
@@ -252,6 +253,12 @@ TEST_F(PairsOfRecordings, AreTheWindowsOfTheModelAndItsSplit) {
       run_process("supertac-evaluate", {"--model", model, "--pairs", folder_ / "pairs/test.safetensors"});
   EXPECT_EQ(tested.code, 0) << tested.error;
   EXPECT_NE(tested.out.find(std::to_string(split.test.size()) + " pairs"), std::string::npos) << tested.out;
+
+  const std::string path = folder_ / "pairs/test.safetensors";
+  auto bytes = read_file(path, 1 << 26);
+  bytes[bytes.size() - 100] ^= std::byte{1};
+  write_file(path, bytes);
+  EXPECT_THROW((void)PairSet::read(path), FileError) << "a flipped bit was not noticed";
 }
 
 TEST_F(PairsOfRecordings, KeepExistingFilesAndLeaveNothingOnError) {

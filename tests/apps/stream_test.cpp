@@ -247,6 +247,7 @@ TEST_F(Streaming, FilesThatAreMissingOrOfAnotherKindAreNamed) {
   expect_failure(stream({"--recording", path("none")}), 1, path("none"));
   expect_failure(stream({"--replay", path("none")}), 1, path("none"));
   expect_failure(stream({"--replay", model()}), 1, "expected a SuperTac journal");
+  expect_failure(stream({"--replay", "/dev/zero"}), 1, "is not a regular file");
   expect_failure(stream({"--recording", model()}), 1, model());
   fs::remove(model());
   expect_failure(stream({"--board", board()}), 1, model());
