@@ -164,12 +164,12 @@ TEST_F(Mpi, AFrozenRankIsNamed) {
 // The first rank waits for the other in MPI_Init, and its own alarm reaches it when all is over.
 TEST_F(Mpi, ARankFrozenAtTheStartIsOneLine) {
   const Words mine = options("start.safetensors", {"--deadline", "3"});
-  std::string late = "sleep 2; exec " SUPERTAC_BIN "/supertac-train";
+  std::string late = "sleep 4; exec " SUPERTAC_BIN "/supertac-train";
   for (const std::string& word : mine) late += " '" + word + "'";
   RunningProcess run(SUPERTAC_MPIRUN, both(ranks(1, mine), {"-n", "1", "sh", "-c", late}));
   const auto begin = std::chrono::steady_clock::now();
   pid_t first = 0;
-  while (first == 0 && std::chrono::steady_clock::now() - begin < std::chrono::seconds(2))
+  while (first == 0 && std::chrono::steady_clock::now() - begin < std::chrono::seconds(3))
     first = process_of(path("start"), 0);
   ASSERT_GT(first, 0);
   std::this_thread::sleep_for(std::chrono::milliseconds(500));

@@ -60,11 +60,12 @@ def step_ms(program, recordings, folder, ranks, batch, rate):
 
 
 def fit(measured):
-    ms = [measured[setting] for setting in FITTED]
-    c = (ms[1] - ms[0]) / (128 - 16)
-    a = ms[0] - 16 * c
-    h = (ms[2] - SHARED_MEMORY_MS) / (a + c * 64 / 2)
-    e = (ms[3] - h * (a + c * 16 / 2)) / (1e3 * 2 * GRADIENT_BITS / 100e6)
+    """a, c, h, e from the four settings of FITTED, each of which adds one of them."""
+    (few, many, shared, linked), ms = [batch for _, batch, _ in FITTED], [measured[setting] for setting in FITTED]
+    c = (ms[1] - ms[0]) / (many - few)
+    a = ms[0] - few * c
+    h = (ms[2] - SHARED_MEMORY_MS) / (a + c * shared / 2)
+    e = (ms[3] - h * (a + c * linked / 2)) / (1e3 * 2 * GRADIENT_BITS / (FITTED[3][2] * 1e6))
     return a, c, h, e
 
 
