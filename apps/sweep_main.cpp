@@ -48,7 +48,7 @@ int run(Arguments& a) {
     const std::vector<GridPoint> grid = shard_of(a, grid_of(a));
     Sweep(a, table).run(grid);
   }
-  const FolderLock alone = wait_for_table(out);
+  const FolderLock alone = lock_within(kLongestWriting, out);
   const std::vector<Configuration> all = configurations(table), front = pareto_front(all);
   write_file(out + "/chart.html", sweep_page(all, a.command_line(), commit()));
   a.print("Pareto front, fastest first:");

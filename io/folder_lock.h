@@ -1,6 +1,8 @@
 // Two programs must not fill one folder at a time.
 #pragma once
 
+#include <chrono>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -17,5 +19,10 @@ class FolderLock {
  private:
   std::shared_ptr<const int> held_;
 };
+
+/// The lock of a folder, once nobody else holds it; `meanwhile` is called while it waits, and ends the wait
+/// when it throws. Throws FileError after so long.
+FolderLock lock_within(std::chrono::seconds most, const std::string& folder,
+                       const std::function<void()>& meanwhile = {});
 
 }  // namespace supertac

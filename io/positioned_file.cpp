@@ -1,5 +1,7 @@
 #include "io/positioned_file.h"
 
+#include <fcntl.h>
+
 #include <cerrno>
 #include <cstring>
 #include <utility>
@@ -28,6 +30,11 @@ void PositionedFile::read(std::uint64_t offset, std::span<std::byte> bytes) cons
     offset += static_cast<std::uint64_t>(count);
     bytes = bytes.subspan(static_cast<std::size_t>(count));
   }
+}
+
+// A hint: what comes of it does not matter.
+void PositionedFile::will_read(std::uint64_t offset, std::uint64_t count) const {
+  (void)::posix_fadvise(file_, static_cast<off_t>(offset), static_cast<off_t>(count), POSIX_FADV_WILLNEED);
 }
 
 }  // namespace supertac

@@ -20,6 +20,8 @@ class PositionedFile {
 
   /// Fills all of `bytes` from `offset` on. Throws FileError on an I/O error, or when the file ends first.
   void read(std::uint64_t offset, std::span<std::byte> bytes) const;
+  /// So much is read from there soon: the system may fetch it meanwhile.
+  void will_read(std::uint64_t offset, std::uint64_t count) const;
 
  private:
   std::string path_;

@@ -1,6 +1,8 @@
 #include "models/loss.h"
 
+#include <algorithm>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 
 #include "autograd/ops/arithmetic.h"
@@ -16,10 +18,24 @@ void LossWeights::check() const {
       ", beta = " + std::to_string(beta) + ", lambda = " + std::to_string(lambda));
 }
 
+// The pictures with the truth itself in place of those whose truth is flat.
+static Variable where_textured(const Variable& picture, const Tensor& truth) {
+  const Dim images = truth.dim(0), pixels = truth.size() / images;
+  Tensor keep(truth.shape()), flat(truth.shape());
+  for (Dim n = 0; n < images; ++n) {
+    const std::span<const real> values(truth.data() + n * pixels, static_cast<std::size_t>(pixels));
+    const auto [least, most] = std::ranges::minmax(values);
+    const bool textured = most - least >= kLeastTexture;
+    std::fill_n(keep.data() + n * pixels, pixels, textured ? real(1) : real(0));
+    for (Dim i = n * pixels; i < (n + 1) * pixels; ++i) flat.data()[i] = textured ? 0 : truth.data()[i];
+  }
+  return add(multiply(picture, Variable(keep)), Variable(flat));
+}
+
 Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda) {
   Loss loss;
   loss.l2 = l2_loss(picture, Variable(truth));
-  loss.ssim = ssim(picture, truth);
+  loss.ssim = ssim(where_textured(picture, truth), truth);
   const Variable one_minus_ssim = add(Variable(Tensor::full({}, 1)), scale(loss.ssim, -1));
   loss.total = add(loss.l2, scale(one_minus_ssim, static_cast<real>(lambda)));
   return loss;

@@ -24,8 +24,13 @@ struct Loss {
 /// How much the squared error of the spread counts beside that of the picture.
 inline constexpr double kSpreadWeight = 0.1;
 
+/// A truth whose pixels differ by less is flat.
+inline constexpr real kLeastTexture = 0.01F;
+
 /// The picture's part alone: total = L2 + lambda (1 - SSIM). picture and truth [N,H,W,1], truth in [0,1].
-/// Throws std::invalid_argument when they differ in shape.
+/// Where the truth is flat the SSIM counts as 1: with no structure to compare it measures how large the noise
+/// is beside nothing, and pulls harder than all textures together. Throws std::invalid_argument when they
+/// differ in shape.
 Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda);
 
 /// To the picture's loss kSpreadWeight times the mean of (spread - |image - truth|)^2 is added, the image

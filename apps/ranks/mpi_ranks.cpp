@@ -18,6 +18,7 @@ constexpr int kDataTag = 1, kNewsTag = 2;
 constexpr char kHere = 'H', kLeft = 'L';
 constexpr std::size_t kMostText = 1000;  // sent at once by every MPI, whether or not it is received
 constexpr double kHurriedS = 0.15;       // mpirun kills a second after its signal
+constexpr double kAfterAlarmsS = 5;      // by then mpirun has ended all if a rank's alarm has told it to
 
 std::chrono::steady_clock::duration seconds(double s) {
   return std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(s));
@@ -206,8 +207,9 @@ bool MpiRanks::leave(const std::string& why) {
   return left_.empty() || left_.begin()->first > rank();
 }
 
-void MpiRanks::finish() {
+void MpiRanks::finish(const EndWatch& watch) {
   gather("");
+  watch.end_within(deadline_s_ + kAfterAlarmsS);
   const Alarm alarm(deadline_s_, rank());
   MPI_Finalize();
 }

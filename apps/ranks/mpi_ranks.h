@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "apps/common/launch.h"
+#include "apps/ranks/end_watch.h"
 #include "models/training/ranks.h"
 
 namespace supertac {
@@ -36,8 +37,8 @@ class MpiRanks : public Ranks {
   /// Tells the others that this rank ends with an error. Returns whether it is the one to report it: the
   /// lowest rank of those that end so.
   bool leave(const std::string& why);
-  /// Waits for all, then MPI_Finalize. Throws as exchange().
-  void finish();
+  /// Waits for all, then MPI_Finalize, which `watch` limits. Throws as exchange().
+  void finish(const EndWatch& watch);
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -30,11 +30,12 @@ int together(Arguments& a, const std::function<int(Ranks&)>& work) {
   const Launch l = launch();
   if (l.size == 1) return work(one_process());
   check_mpi(l);
+  const EndWatch watch;
   MpiRanks ranks(l.rank, a.number("deadline", 1, 1e6));
   join_launch(a);
   try {
     const int code = work(ranks);
-    ranks.finish();
+    ranks.finish(watch);
     return code;
   } catch (const RankLeft&) {
     std::this_thread::sleep_for(

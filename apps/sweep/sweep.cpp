@@ -4,6 +4,7 @@
 #include <chrono>
 #include <filesystem>
 #include <limits>
+#include <stdexcept>
 #include <thread>
 #include <utility>
 
@@ -14,6 +15,7 @@
 #include "apps/train/training_options.h"
 #include "io/file.h"
 #include "io/json.h"
+#include "io/numbers.h"
 #include "models/cost.h"
 #include "models/evaluation.h"
 
@@ -27,6 +29,8 @@ void declare_measuring(Arguments& a) {
            "score only windows with N frames of their pass behind them: with the longest of --timesteps, all "
            "models are judged on the same frames; 0 = all",
            "0");
+  a.option("deadline", "S",
+           "give up other processes of the sweep when they have written nothing for S seconds", "900");
 }
 
 Sweep::Sweep(const Arguments& a, SweepTable& table) : a_(a), table_(table) { check_settings(); }
@@ -45,7 +49,7 @@ void Sweep::check_settings() const {
     if (!a_.given(option)) settings[key] = "the preset's";
   if (a_.given("shard")) settings[kShardKey] = a_.text("shard"), settings[kGridKey] = names_of(grid_of(a_));
   const std::string path = a_.text("out") + "/settings.json";
-  const FolderLock alone = wait_for_table(a_.text("out"));
+  const FolderLock alone = lock_within(kLongestWriting, a_.text("out"));
   if (!fs::exists(path)) return write_file(path, settings.dump(2) + "\n");
   const auto before = parse_json_limited(read_text_file(path, 1 << 20));
   for (const auto& [key, value] : settings.items()) {
@@ -63,16 +67,12 @@ std::vector<GridPoint> longest_first(std::vector<GridPoint> grid) {
   return grid;
 }
 
-FolderLock wait_for_table(const std::string& folder) {
-  const auto limit = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-  while (true) {
-    try {
-      return FolderLock(folder);
-    } catch (const FileError&) {
-      if (std::chrono::steady_clock::now() > limit) throw;
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    }
-  }
+static fs::file_time_type last_write_in(const std::string& folder) {
+  auto newest = fs::file_time_type::min();
+  std::error_code gone;  // files come and go
+  for (fs::recursive_directory_iterator at(folder, gone), end; at != end; at.increment(gone))
+    newest = std::max(newest, fs::last_write_time(at->path(), gone));
+  return newest;
 }
 
 void Sweep::run(const std::vector<GridPoint>& grid) {
@@ -83,11 +83,25 @@ void Sweep::run(const std::vector<GridPoint>& grid) {
     return std::all_of(order_.begin(), order_.end(), [&](const auto& name) { return table_.has(name); });
   };
   while (!done()) {
-    if (take_one(trainings)) continue;
-    stop_if_interrupted();
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
-    table_.read_again();
+    if (!take_one(trainings)) wait_for_others();
   }
+}
+
+// They hold what is left. A process that is frozen holds its folder too, but writes nothing.
+void Sweep::wait_for_others() {
+  stop_if_interrupted();
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  table_.read_again();
+  const fs::file_time_type newest = last_write_in(a_.text("out") + "/models");
+  const auto now = std::chrono::steady_clock::now();
+  if (newest != std::exchange(last_write_, newest)) last_seen_ = now;
+  const double deadline_s = a_.number("deadline", 1, 1e6);
+  if (now - last_seen_ > std::chrono::duration<double>(deadline_s))
+    throw std::runtime_error(a_.text("out") +
+                             "/models: other processes hold the last trainings and have written "
+                             "nothing for " +
+                             format(deadline_s) +
+                             " s; end those that are frozen, then give the same command again");
 }
 
 // Whoever holds the folder of a model's run has the model; a killed process holds nothing.
@@ -145,7 +159,7 @@ void Sweep::measure(const GridPoint& point, const std::string& label) {
   stop_if_interrupted();
   const nlohmann::ordered_json measured = row(point, training, scores);
   {
-    const FolderLock alone = wait_for_table(a_.text("out"));
+    const FolderLock alone = lock_within(kLongestWriting, a_.text("out"));
     table_.read_again();
     table_.add(measured, order_);
   }

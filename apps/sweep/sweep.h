@@ -1,6 +1,8 @@
 // A grid of models, each trained into a file and measured into a row of the table.
 #pragma once
 
+#include <chrono>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,14 +16,14 @@
 
 namespace supertac {
 
-/// --limit and --history: which test windows are scored.
+/// --limit and --history: which test windows are scored; --deadline.
 void declare_measuring(Arguments& a);
 
 /// Those of the greatest cost first; equal ones stay in their order.
 std::vector<GridPoint> longest_first(std::vector<GridPoint> grid);
 
-/// The sweep's folder, once no other process of it writes its table. Throws FileError after 30 s.
-FolderLock wait_for_table(const std::string& folder);
+/// How long another process of a sweep may write its table.
+inline constexpr std::chrono::seconds kLongestWriting{30};
 
 class Sweep {
  public:
@@ -33,13 +35,14 @@ class Sweep {
   /// Rows that are there are not measured again; a model whose training was cut is trained on. Several
   /// processes may run the same sweep at once, on any machines that see the folder and its locks: each takes
   /// the longest training that nobody has, the rows stand in the order of the grid, and who finds nothing
-  /// left waits, to take over from one that is lost. Throws Interrupted after a signal, UsageError, and as
-  /// TrainingRun.
+  /// left waits, to take over from one that is lost. Throws Interrupted after a signal, UsageError,
+  /// std::runtime_error when the others have written nothing for --deadline, and as TrainingRun.
   void run(const std::vector<GridPoint>& grid);
 
  private:
   void check_settings() const;
   bool take_one(const std::vector<GridPoint>& longest_first);
+  void wait_for_others();
   double whole_by(const GridPoint& point) const;
   void measure(const GridPoint& point, const std::string& label);
   std::vector<std::uint32_t> windows_to_score(const WindowSet& windows, const Split& split) const;
@@ -50,7 +53,9 @@ class Sweep {
   const Arguments& a_;
   SweepTable& table_;
   std::optional<WindowSet> windows_;
-  std::vector<std::string> order_;  // of the rows
+  std::vector<std::string> order_;              // of the rows
+  std::filesystem::file_time_type last_write_;  // by any process of the sweep
+  std::chrono::steady_clock::time_point last_seen_ = std::chrono::steady_clock::now();  // that it changed
 };
 
 }  // namespace supertac

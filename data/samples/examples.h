@@ -29,6 +29,8 @@ class Examples {
   virtual void input(std::size_t i, std::span<float> out) const = 0;
   /// What should be drawn, [height][width] of image().
   virtual void target(std::size_t i, std::span<float> out) const = 0;
+  /// Example i is wanted soon: whoever has it in a file may have it fetched.
+  virtual void will_read(std::size_t) const {}
   /// What is scored together. By its target alone an example is in contact or flat.
   virtual Zone zone(std::size_t i) const;
   /// Whether training may change the input to imitate other days: where every example is another day, it only

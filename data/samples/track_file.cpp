@@ -25,6 +25,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kPlaceNumbers = 3;
+// Processes of one training start at the same time; one makes what all of them read. That takes minutes even
+// for a hundred million frames: who holds the folder for an hour is stuck.
+constexpr std::chrono::hours kLongestMaking{1};
 
 std::string kept_in(const std::string& folder) { return (fs::path(folder) / ".supertac").string(); }
 
@@ -91,21 +94,6 @@ class Maker {
   AtomicFile data_;
 };
 
-// Processes of one training start at the same time; one makes what all of them read. That takes minutes even
-// for a hundred million frames: who holds the folder for an hour is stuck.
-FolderLock wait_for_lock(const std::string& folder, const std::function<void()>& meanwhile = {}) {
-  using Clock = std::chrono::steady_clock;
-  for (const auto deadline = Clock::now() + std::chrono::hours(1);;) {
-    try {
-      return FolderLock(folder);
-    } catch (const FileError&) {
-      if (Clock::now() > deadline) throw;
-      if (meanwhile) meanwhile();
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
-  }
-}
-
 TrackIndex make(const std::string& folder, const std::string& base, const TrackFileSettings& settings,
                 std::vector<ListedFile> sources) {
   Maker maker(folder, settings, base + ".f32");
@@ -127,7 +115,7 @@ std::shared_ptr<const TrackFile> TrackFile::open(const std::string& folder,
   std::optional<TrackIndex> index = read_index(base, sources);
   if (!index) {
     make_directories(kept_in(folder));
-    const FolderLock lock = wait_for_lock(kept_in(folder), [&] {
+    const FolderLock lock = lock_within(kLongestMaking, kept_in(folder), [&] {
       if (settings.watch) settings.watch(0, sources.size());
     });
     index = read_index(base, sources);
@@ -163,15 +151,29 @@ void TrackFile::read(std::uint64_t offset, std::span<float> out) const {
     file_.read(offset, bytes);
 }
 
+std::uint64_t TrackFile::offset_of_volts(std::size_t card, std::size_t frame) const {
+  return offsets_[card] + frame * index_.array.signals() * sizeof(float);
+}
+
+std::uint64_t TrackFile::offset_of_place(std::size_t card, std::size_t frame) const {
+  return offset_of_volts(card, index_.cards[card].frames) + kPlaceNumbers * frame * sizeof(float);
+}
+
 void TrackFile::volts(std::size_t card, std::size_t first, std::span<float> out) const {
-  read(offsets_[card] + first * index_.array.signals() * sizeof(float), out);
+  read(offset_of_volts(card, first), out);
 }
 
 std::array<float, 3> TrackFile::place(std::size_t card, std::size_t frame) const {
   std::array<float, kPlaceNumbers> place{};
-  const std::size_t samples = index_.cards[card].frames * index_.array.signals();
-  read(offsets_[card] + (samples + kPlaceNumbers * frame) * sizeof(float), place);
+  read(offset_of_place(card, frame), place);
   return place;
+}
+
+void TrackFile::will_read(std::size_t card, std::size_t first, std::size_t count) const {
+  const std::uint64_t begin = offset_of_volts(card, first), end = offset_of_volts(card, first + count);
+  if (end > head_.size()) file_.will_read(begin, end - begin);
+  const std::uint64_t place = offset_of_place(card, first + count - 1), size = kPlaceNumbers * sizeof(float);
+  if (place + size > head_.size()) file_.will_read(place, size);
 }
 
 Track TrackFile::track(std::size_t card) const {
@@ -202,7 +204,7 @@ std::string TrackFile::recall(const std::string& key, const std::function<std::s
   if (notes.contains(entry) && notes[entry].is_string()) return notes[entry].get<std::string>();
   std::string value = compute();
   try {
-    const FolderLock lock = wait_for_lock(kept_in(folder_));
+    const FolderLock lock = lock_within(kLongestMaking, kept_in(folder_));
     notes = read_notes();
     notes[entry] = value;
     write_file(path, notes.dump(1) + "\n");

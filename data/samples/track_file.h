@@ -47,6 +47,8 @@ class TrackFile {
   void volts(std::size_t card, std::size_t first, std::span<float> out) const;
   /// (x, y, lift) of a frame.
   std::array<float, 3> place(std::size_t card, std::size_t frame) const;
+  /// volts() of `count` frames from `first` on is called soon, and place() of the last of them.
+  void will_read(std::size_t card, std::size_t first, std::size_t count) const;
   /// samples in volts, position_mm and lift_mm of all frames.
   Track track(std::size_t card) const;
 
@@ -56,6 +58,8 @@ class TrackFile {
  private:
   TrackFile(std::string folder, const std::string& base, TrackIndex index, std::uint64_t memory);
   void read(std::uint64_t offset, std::span<float> out) const;
+  std::uint64_t offset_of_volts(std::size_t card, std::size_t frame) const;
+  std::uint64_t offset_of_place(std::size_t card, std::size_t frame) const;
 
   std::string folder_, identity_;
   TrackIndex index_;

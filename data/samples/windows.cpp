@@ -218,6 +218,12 @@ void WindowSet::window(std::size_t i, std::span<float> out) const {
   if (settings_.scaling.levelled) level(out, array().signals());
 }
 
+void WindowSet::will_read(std::size_t i) const {
+  const Place place = place_of(i);
+  const Source& source = sources_[place.pass];
+  if (source.file) source.file->will_read(source.card, place.last + 1 - frames(), frames());
+}
+
 std::vector<float> WindowSet::window(std::size_t i) const {
   std::vector<float> values(frames() * array().signals());
   const Place place = place_of(i);

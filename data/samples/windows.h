@@ -119,6 +119,7 @@ class WindowSet : public Examples {
   std::size_t pass_of(std::size_t i) const { return place_of(i).pass; }
   void input(std::size_t i, std::span<float> out) const override { window(i, out); }
   void target(std::size_t i, std::span<float> out) const override { truth(i, out); }
+  void will_read(std::size_t i) const override;
   std::int64_t group(std::size_t i) const override { return static_cast<std::int64_t>(pass_of(i)); }
   /// Number of the last frame within its pass.
   std::size_t frame_of(std::size_t i) const { return place_of(i).last; }

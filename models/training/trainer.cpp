@@ -96,6 +96,15 @@ void Trainer::fill(Lane& lane) const {
   }
 }
 
+// While this step is computed, a disk may fetch this process's share of the next batch.
+void Trainer::announce_next() {
+  if (step() + 1 >= total_steps()) return;
+  batch_of(step() + 1, indices_);
+  const auto first = static_cast<std::size_t>(lanes_.front().first);
+  const auto end = static_cast<std::size_t>(lanes_.back().first + lanes_.back().batch.inputs.dim(0));
+  for (std::size_t slot = first; slot < end; ++slot) data_.will_read(indices_[slot]);
+}
+
 // The numbers of sample i of step s do not depend on how the batch is cut.
 void Trainer::draw_noise(Lane& lane) const {
   const RandomStream random(objective_->pace().seed, kNoiseStream);
@@ -138,6 +147,7 @@ void Trainer::batch_of(std::int64_t step, std::span<std::uint32_t> out) const {
 StepReport Trainer::train_step(const std::function<bool()>& stop) {
   if (done())
     throw std::invalid_argument("train_step: all " + std::to_string(total_steps()) + " steps are done");
+  announce_next();
   batch_of(step(), indices_);
   forms_->forget();  // Adam has written the weights since, or restore()
 #pragma omp parallel for schedule(static, 1)

@@ -109,6 +109,7 @@ class Trainer {
   };
   void run_lane(Lane& lane) const;
   void fill(Lane& lane) const;
+  void announce_next();
   void draw_noise(Lane& lane) const;
   void add_up(StepReport& report);
   void look_for_collapse(StepReport& report);

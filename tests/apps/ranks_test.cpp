@@ -178,6 +178,17 @@ TEST_F(Mpi, ARankFrozenAtTheStartIsOneLine) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
 }
 
+// The other rank has ended well, and mpirun waits for this one without a deadline.
+TEST_F(Mpi, ARankFrozenAtTheEndIsOneLine) {
+  const auto begin = std::chrono::steady_clock::now();
+  const std::string preload = "LD_PRELOAD=" SUPERTAC_FREEZE_AT_END;
+  Words words = ranks(2, options("end.safetensors", {"--epochs", "1", "--deadline", "2"}));
+  words.insert(words.begin() + 2, {"env", preload});
+  expect_one_line(mpirun(words), "all is written, but a process of mpirun did not end within the deadline");
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
+  EXPECT_EQ(run_process("supertac-info", {path("end.safetensors")}).code, 0);
+}
+
 TEST_F(Mpi, AKilledRankEndsAll) {
   lose(1, "killed", [](pid_t p) { kill(p, SIGKILL); });
 }

@@ -201,6 +201,31 @@ TEST_F(Sweep, ProcessesOfOneFolderShareTheTrainingsAndTakeOverFromALostOne) {
   EXPECT_EQ(without_times(bytes("left/sweep.csv")), expected);
 }
 
+// A frozen process keeps its folder's lock for ever.
+TEST_F(Sweep, AFrozenProcessIsGivenUp) {
+  const std::vector<std::string> words{"--out",       path("frozen"),
+                                       "--data",      path("data"),
+                                       "--latent",    "2",
+                                       "--scale",     "2",
+                                       "--timesteps", "32",
+                                       "--channels",  "8",
+                                       "--rcabs",     "1",
+                                       "--batch",     "8",
+                                       "--stride",    "8",
+                                       "--threads",   "1",
+                                       "--epochs",    "50",
+                                       "--deadline",  "2"};
+  RunningProcess frozen("supertac-sweep", words);
+  wait_for_file(path("frozen/models/paper_t32_l2_x2_c8_r1_s0.run/log.csv"));
+  frozen.send(SIGSTOP);
+  const auto begin = std::chrono::steady_clock::now();
+  const ProcessResult other = run_process("supertac-sweep", words);
+  EXPECT_EQ(other.code, 1);
+  EXPECT_NE(other.error.find("have written nothing for 2 s; end those that are frozen"), std::string::npos)
+      << other.error;
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
+}
+
 TEST_F(Sweep, ShardsAreMergedWhenNothingIsMissingOrTwice) {
   ASSERT_EQ(sweep("whole4", "1", kFour).code, 0);
   for (const char* shard : {"1/3", "2/3", "3/3"})

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "autograd/kernels/elementwise.h"
+#include "autograd/ops/losses.h"
 #include "tests/models/support.h"
 
 namespace supertac {
@@ -27,6 +28,25 @@ TEST(SuperTacLoss, IsTheConvexCombinationOfItsTerms) {
 }
 
 // The spread is drawn towards the picture's error, and the picture does not notice.
+// One of two pictures has a truth to compare structure with; of the other only the squared error counts.
+TEST(PictureLoss, TheSsimOfAFlatTruthCountsAsOne) {
+  const Variable picture(uniform({2, 16, 16, 1}, 1), true);
+  Tensor truth = uniform({2, 16, 16, 1}, 2), one(Shape{1, 16, 16, 1}), its(Shape{1, 16, 16, 1});
+  std::copy_n(picture.value().data(), 256, one.data());
+  std::copy_n(truth.data(), 256, its.data());
+  std::fill_n(truth.data() + 256, 256, 0.25F);
+  const Loss loss = picture_loss(picture, truth, 0.5);
+  EXPECT_NEAR(loss.ssim.item(), (ssim(Variable(one), its).item() + 1) / 2, 1e-6);
+  backward(loss.ssim);
+  const auto sum = [&](Dim from) {
+    double total = 0;
+    for (Dim i = from; i < from + 256; ++i) total += std::abs(picture.grad().data()[i]);
+    return total;
+  };
+  EXPECT_GT(sum(0), 0);
+  EXPECT_EQ(sum(256), 0);
+}
+
 TEST(SuperTacLoss, TheSpreadLearnsTheError) {
   SuperTacSettings settings = small_settings();
   settings.spread = true;
