@@ -42,7 +42,7 @@ void TrustScores::add(std::uint32_t window, std::span<const float> output, std::
   if (pass_ != in_contact_of_) in_contact_of_ = pass_, begin_mm_ = y;
   const ImageGrid grid = windows_.image();
   contact_.push_back(
-      {doubt_of(spread), mean_of(spread),
+      {doubt_of(output, spread, grid), mean_of(spread),
        ssim(output, truth, static_cast<std::size_t>(grid.height), static_cast<std::size_t>(grid.width)),
        std::abs(y - begin_mm_)});
 }
@@ -106,7 +106,7 @@ std::vector<std::string> TrustScores::lines() const {
                     format(factor_found(), 2) + " would hold " + percent(kCovered) + ")");
   if (!contact_.empty())
     lines.push_back("in contact, the surest " + percent(kSure) + " have SSIM " +
-                    format(ssim_of_surest(kSure), 3) + "; spread tells SSIM below 0.8 with AUROC " +
+                    format(ssim_of_surest(kSure), 3) + "; doubt tells SSIM below 0.8 with AUROC " +
                     format(auroc(), 3));
   if (judged_ > 0)
     lines.push_back(percent(static_cast<double>(unlike_) / static_cast<double>(judged_)) +
