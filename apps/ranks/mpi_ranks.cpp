@@ -18,7 +18,8 @@ constexpr int kDataTag = 1, kNewsTag = 2;
 constexpr char kHere = 'H', kLeft = 'L';
 constexpr std::size_t kMostText = 1000;  // sent at once by every MPI, whether or not it is received
 constexpr double kHurriedS = 0.15;       // mpirun kills a second after its signal
-constexpr double kAfterAlarmsS = 5;      // by then mpirun has ended all if a rank's alarm has told it to
+constexpr int kApartS = 3;               // from one rank's alarm to the next: mpirun ends all meanwhile
+constexpr double kAfterAlarmsS = 8;
 
 std::chrono::steady_clock::duration seconds(double s) {
   return std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(s));
@@ -35,7 +36,7 @@ double monotonic_s() {
 
 // A process that was frozen gets its alarm when the others have ended and said why, so it says nothing.
 void not_together(int) {
-  constexpr double kLateS = 0.8;  // the next rank's alarm comes a second later
+  constexpr double kLateS = 0.8;
   if (monotonic_s() > alarm_due_s + kLateS) _exit(1);
   static const char kText[] =
       "supertac: not all processes of mpirun came to start and to end together within the deadline; start "
@@ -50,7 +51,8 @@ class Alarm {
  public:
   Alarm(double deadline_s, int rank) {
     std::signal(SIGALRM, not_together);
-    const unsigned wait_s = static_cast<unsigned>(std::min(deadline_s, 1e6)) + static_cast<unsigned>(rank);
+    const unsigned wait_s =
+        static_cast<unsigned>(std::min(deadline_s, 1e6)) + static_cast<unsigned>(kApartS * rank);
     alarm_due_s = monotonic_s() + wait_s;
     alarm(wait_s);
   }
