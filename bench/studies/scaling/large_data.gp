@@ -8,12 +8,12 @@ set logscale xy
 set xlabel 'recorded frames'
 set format x '10^{%T}'
 set xrange [5e4:2e8]
-set key bottom right
+set key top left
 set grid
 rows(mode) = sprintf("< grep ',%s,' %s", mode, csv)
 set title 'until the first step'
 set ylabel 's'
-set yrange [0.1:2e3]
+set yrange [0.05:2e3]
 plot rows('held,all') using 1:6 with linespoints lc rgb '#e76f51' pt 7 title 'all held in memory', \
      rows('first') using 1:6 with linespoints lc rgb '#e9c46a' pt 5 title '--memory, first time', \
      rows('read') using 1:6 with linespoints lc rgb '#2a9d8f' pt 9 title '--memory, later'
