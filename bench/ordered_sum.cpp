@@ -28,6 +28,7 @@ double milliseconds(const Work& work) {
 int main(int argc, char** argv) {
   const std::size_t count = argc > 1 ? std::stoul(argv[1]) : 537'521;  // parameters of preset paper
   const int turns = argc > 2 ? std::stoi(argv[2]) : 200;
+  const supertac::EndWatch watch;
   supertac::MpiRanks ranks(supertac::launch().rank, 60);
   std::vector<float> values(count, 1e-30F), buffer(count);
   std::vector<double> ordered, reduced, exchanged;
@@ -48,5 +49,5 @@ int main(int argc, char** argv) {
                 quantile(ordered, 0.5), quantile(reduced, 0.5), quantile(exchanged, 0.5),
                 quantile(ordered, 0.1), quantile(reduced, 0.1), quantile(exchanged, 0.1));
   }
-  ranks.finish();
+  ranks.finish(watch);
 }
