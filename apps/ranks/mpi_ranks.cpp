@@ -19,7 +19,7 @@ constexpr char kHere = 'H', kLeft = 'L';
 constexpr std::size_t kMostText = 1000;  // sent at once by every MPI, whether or not it is received
 constexpr double kHurriedS = 0.15;       // mpirun kills a second after its signal
 constexpr int kApartS = 3;               // from one rank's alarm to the next: mpirun ends all meanwhile
-constexpr double kAfterAlarmsS = 8;
+constexpr double kAfterAlarmsS = 6;      // those of the first two ranks; 30 s in all with the usual deadline
 
 std::chrono::steady_clock::duration seconds(double s) {
   return std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(s));
