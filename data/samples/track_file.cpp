@@ -7,7 +7,6 @@
 #include <map>
 #include <optional>
 #include <stdexcept>
-#include <thread>
 
 #include "data/plates/plate_file.h"
 #include "data/samples/chosen_plates.h"
