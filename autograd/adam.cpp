@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 
 #include "autograd/kernels/elementwise.h"
@@ -30,20 +29,13 @@ void update(Dim n, Update u, const real* gradient, real* x, real* m, real* v) {
   });
 }
 
-// The last bits of the C library's pow and cos depend on the processor; products and sums do not.
+// The last bits of the C library's pow depend on the processor; products do not.
 double power(double base, std::int64_t exponent) {
   double result = 1;
   for (; exponent > 0; exponent /= 2, base *= base) {
     if (exponent % 2 == 1) result *= base;
   }
   return result;
-}
-
-// The Taylor series, for |x| <= pi: the first term left out is below 1e-19.
-double series_of_cosine(double x) {
-  double sum = 1, term = 1;
-  for (int k = 2; k <= 30; k += 2) sum += term *= -x * x / (k * (k - 1));
-  return sum;
 }
 
 }  // namespace
@@ -92,14 +84,6 @@ double Adam::step() {
     update(p.size(), u, p.grad().data(), p.mutable_value().data(), m_[k].data(), v_[k].data());
   }
   return norm;
-}
-
-double Schedule::at(std::int64_t step) const {
-  if (step < warm_up) return peak * static_cast<double>(step + 1) / static_cast<double>(warm_up);
-  if (!cosine || total <= warm_up) return peak;
-  const double done =
-      std::min(1.0, static_cast<double>(step - warm_up) / static_cast<double>(total - warm_up));
-  return last + (peak - last) * (1 + series_of_cosine(std::numbers::pi * done)) / 2;
 }
 
 }  // namespace supertac

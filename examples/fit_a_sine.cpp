@@ -7,6 +7,7 @@
 #include "autograd/adam.h"
 #include "autograd/ops/losses.h"
 #include "layers/linear.h"
+#include "models/schedule.h"
 
 using namespace supertac;
 

@@ -17,6 +17,7 @@
 #include "io/images.h"
 #include "layers/convolution.h"
 #include "layers/linear.h"
+#include "models/schedule.h"
 
 using namespace supertac;
 
@@ -126,8 +127,7 @@ void train_and_draw(const char* path) {
   const Tensor shown = domes(unseen, 0, kShown);
   const Variable decoded = vae.forward(Variable(shown), Tensor::zeros({kShown, kLatent})).picture;
   draw(path, {shown, decoded.value(), vae.decode(Variable(normal(dreams, 0, kShown))).value()}, kShown);
-  std::printf("12 pictures never seen: squared error %.5f; %s\n", l2_loss(decoded, Variable(shown)).item(),
-              path);
+  std::printf("12 pictures never seen: squared error %.5f\n", l2_loss(decoded, Variable(shown)).item());
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "autograd/ops/losses.h"
 #include "data/samples/batching.h"
 #include "models/classifier_file.h"
+#include "models/schedule.h"
 
 namespace supertac {
 namespace {

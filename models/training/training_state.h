@@ -12,6 +12,7 @@
 
 #include "autograd/adam.h"
 #include "layers/module.h"
+#include "models/schedule.h"
 #include "models/training/ranks.h"
 
 namespace supertac {

@@ -8,6 +8,7 @@
 
 #include "autograd/ops/activations.h"
 #include "autograd/ops/losses.h"
+#include "models/schedule.h"
 #include "tests/models/support.h"
 
 namespace supertac {

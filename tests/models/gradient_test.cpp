@@ -1,10 +1,10 @@
 // The whole SuperTac loss, every parameter, in double precision.
 #include <gtest/gtest.h>
 
-#include "autograd/gradient_checker.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/losses.h"
 #include "models/frame_model.h"
+#include "models/gradient_checker.h"
 #include "models/loss.h"
 
 namespace supertac {

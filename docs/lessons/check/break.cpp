@@ -14,6 +14,7 @@
 #include "docs/lessons/check/check.h"
 #include "io/random.h"
 #include "layers/residual.h"
+#include "models/schedule.h"
 
 namespace lessons {
 namespace {

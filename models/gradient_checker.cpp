@@ -1,4 +1,4 @@
-#include "autograd/gradient_checker.h"
+#include "models/gradient_checker.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "autograd/gradient_checker.h"
+#include "models/gradient_checker.h"
 
 #include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
