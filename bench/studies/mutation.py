@@ -289,9 +289,15 @@ def build(pristine, tree, folder, programs, mutants, numbers):
                              capture_output=True, text=True)
         if run.returncode == 0:
             return mutants
-        found = re.findall(r"^(\S+?):(\d+):\d+: (?:error|note: in expansion of macro)", run.stdout, re.M)
+        found = re.findall(r"^(\S+?):(\d+):\d+: (?:error|note: in expansion of macro"
+                           r"|note: .* was not initialized with a constant)", run.stdout, re.M)
+        found += re.findall(r"inlined from .* at (\S+?):(\d+):\d+[,:]$", run.stdout, re.M)  # an intrinsic's constant
         wrong = {(os.path.relpath(os.path.join(folder, file), tree), int(line) - 1) for file, line in found}
         bad = [m for m in mutants if any((m.file, m.line + i) in wrong for i in range(m.old.count("\n") + 1))]
+        if not bad:  # a constant that an array's size or a template needs, further down
+            names = set(re.findall(r"^ *\d+ \|.*?\b(k[A-Z]\w*)", run.stdout, re.M))
+            names |= set(re.findall(r"\[(k[A-Z]\w*)\]", run.stdout))
+            bad = [m for m in mutants if (c := CONSTANT.match(m.old)) and c.group(2).split()[1] in names]
         for m in bad:
             print(f"does not compile: {m.name} {m.file}:{m.line} {m.what}", flush=True)
         if not bad:

@@ -28,6 +28,12 @@ TEST(Text, IsDrawnWithinItsSize) {
   EXPECT_NE(other.rgb, picture.rgb);
 }
 
+TEST(Text, EveryStrokeOfALetterIsDrawn) {
+  Picture picture(20, 20);
+  draw_text(picture, 2, 2, "-");  // one stroke
+  EXPECT_GT(black(picture), 0);
+}
+
 TEST(Text, OutsideIsCutAndForeignLettersAreQuestionMarks) {
   Picture picture(20, 10), marks(20, 10);
   draw_text(picture, -5, -3, "w\xff\xc3\xa4 and a long line");

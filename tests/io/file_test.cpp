@@ -57,6 +57,19 @@ TEST(File, NothingAppearsWithoutCommit) {
 
 // A child that ends in mid-write, as after kill -9, leaves its temporary; the next writer of that file sweeps
 // it, and nothing else.
+TEST(File, LeavesNoDescriptorOpen) {
+  const TemporaryFolder folder;
+  const auto descriptors = [] {
+    const std::filesystem::directory_iterator all("/proc/self/fd");
+    return std::distance(begin(all), end(all));
+  };
+  const auto before = descriptors();
+  { const AtomicFile dropped(folder.file("dropped")); }
+  AtomicFile kept(folder.file("kept"));
+  kept.commit();
+  EXPECT_EQ(descriptors(), before);
+}
+
 TEST(File, SweepsWhatAKilledWriterLeft) {
   TemporaryFolder folder;
   const std::string path = folder.file("a");

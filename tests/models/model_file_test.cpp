@@ -38,13 +38,13 @@ TEST(ModelFile, KeepsTheArrayAndSaysNothingOfTheRigs) {
   const TemporaryFolder folder;
   Rng rng(1);
   SuperTacSettings settings = small_settings();
-  set_array(settings, {.rows = 4, .columns = 5, .channels = 3});
+  set_array(settings, {.rows = 5, .columns = 6, .channels = 3});
   const SuperTac model(settings, rng);
   save_model(folder / "m.safetensors", model, {.scaling = {}, .pitch_mm = 2.5}, {});
   const ModelFile file = load_model(folder / "m.safetensors");
-  EXPECT_EQ(file.array(), (TaxelArray{4, 5, 2.5, 3}));
-  EXPECT_EQ(file.windows().array->picture(2), (ImageGrid{8, 10, 1.25}));
-  const Tensor x = uniform({2, 32, 60}, 1), a = model.infer(x), b = file.model->infer(x);
+  EXPECT_EQ(file.array(), (TaxelArray{5, 6, 2.5, 3}));
+  EXPECT_EQ(file.windows().array->picture(2), (ImageGrid{10, 12, 1.25}));
+  const Tensor x = uniform({2, 32, 90}, 1), a = model.infer(x), b = file.model->infer(x);
   for (Dim i = 0; i < a.size(); ++i) EXPECT_EQ(a.data()[i], b.data()[i]);
   const auto rigs = model_metadata(small_settings(), {});
   EXPECT_EQ(rigs.at("settings").find("rows"), std::string::npos);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -87,6 +88,20 @@ TEST(SuperTac, GroupsOfAnyArrayHoldTheirTaxelsWithAllChannels) {
     }
     EXPECT_EQ(model.encode(windows).shape(), (Shape{1, 3 * s.groups()}));
   }
+}
+
+// exp(log_var / 2) of an encoder gone astray would be infinite.
+TEST(Vae, LogVarianceIsClampedToTen) {
+  Rng rng(1);
+  const Encoder encoder({.timesteps = 32, .channels = 4, .latent = 5}, rng);
+  for (const Parameter& p : encoder.parameters()) {
+    Variable handle = p.value;
+    for (real& w : handle.mutable_value().values()) w *= 100;
+  }
+  const Variable log_var = encoder.forward(Variable(uniform({8, 32, 4}, 1))).log_var;
+  const auto [least, most] = std::ranges::minmax(log_var.value().values());
+  EXPECT_EQ(least, -10);
+  EXPECT_EQ(most, 10);
 }
 
 TEST(SuperTac, EvaluationIsDeterministicAndUsesTheMean) {
