@@ -68,6 +68,7 @@ TEST(File, LeavesNoDescriptorOpen) {
   AtomicFile kept(folder.file("kept"));
   kept.commit();
   EXPECT_EQ(descriptors(), before);
+  EXPECT_THROW(kept.commit(), std::invalid_argument);
 }
 
 TEST(File, SweepsWhatAKilledWriterLeft) {

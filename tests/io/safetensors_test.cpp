@@ -359,5 +359,20 @@ TEST(SafetensorsWrite, AFullDiskLeavesTheOldFile) {
   }
 }
 
+TEST(Safetensors, NamesTheFirstOfManyTensors) {
+  const TemporaryFolder folder;
+  std::vector<TensorToWrite> tensors;
+  for (int i = 100; i < 200; ++i) tensors.push_back({"tensor" + std::to_string(i), "U8", {0}, {}});
+  write_safetensors(folder / "many", {}, tensors);
+  const SafetensorsFile file = SafetensorsFile::read(folder / "many");
+  try {
+    file.f32("volts");
+    FAIL();
+  } catch (const FileError& error) {
+    const std::string text = error.what();
+    EXPECT_TRUE(text.ends_with("'tensor114', 'tensor115', ...)")) << text;
+  }
+}
+
 }  // namespace
 }  // namespace supertac

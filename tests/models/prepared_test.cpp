@@ -154,6 +154,17 @@ TEST(Prepared, RefusesTheRangesOfAnotherNetwork) {
   EXPECT_THROW(Prepared(network, ActivationRanges()), std::invalid_argument);
 }
 
+TEST(Prepared, RefusesRangesThatAreNotFinite) {
+  const TemporaryFolder folder;
+  const auto read = [&](float high) {
+    write_checkpoint(folder / "m.safetensors", {}, {}, {{"int8.ranges", {2, 2}, {0, 1, -1, high}}});
+    return ActivationRanges::read(SafetensorsFile::read(folder / "m.safetensors"), "m");
+  };
+  EXPECT_EQ(read(2)->ops(), 2U);
+  for (const float high : {-1.0F, std::numeric_limits<float>::infinity(), std::nanf("")})
+    EXPECT_THROW(read(high), std::runtime_error) << high;
+}
+
 TEST(Prepared, RefusesInputsOfAnotherShape) {
   Rng rng(1);
   const SuperTac network(small_settings(), rng);

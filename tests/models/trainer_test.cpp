@@ -245,6 +245,18 @@ TEST(Trainer, RefusesToResumeAnotherRun) {
   EXPECT_NE(message(settings, "1234").find("cannot resume: its training is"), std::string::npos);
 }
 
+TEST(Trainer, KeepsWithTheModelWhatBytesAndTheAlarmNeed) {
+  const TemporaryFolder folder;
+  const TrainingSettings settings = small_training();
+  const WindowSet windows = small_windows(settings.model);
+  Trainer trainer(windows, all_of(windows), settings);
+  trainer.train_step();
+  trainer.save_model(folder / "m.safetensors", model_metadata(settings.model, input_of(windows)));
+  const ModelFile file = load_model(folder / "m.safetensors");
+  EXPECT_TRUE(file.ranges);
+  EXPECT_TRUE(file.novelty);
+}
+
 TEST(Trainer, RefusesToResumeFromAModelWithoutState) {
   const TemporaryFolder folder;
   const TrainingSettings settings = small_training();

@@ -19,7 +19,11 @@ ConvSettings map_of(Dim height, Dim width) {
 struct Case {
   Dim height, width, images, cin, cout;
 };
-const Case kCases[] = {{8, 8, 4, 16, 16}, {8, 8, 7, 32, 48}, {16, 16, 5, 32, 16}, {12, 8, 6, 16, 32}};
+const Case kCases[] = {{8, 8, 4, 16, 16},
+                       {8, 8, 7, 32, 48},
+                       {16, 16, 5, 32, 16},
+                       {12, 8, 6, 16, 32},
+                       {12, 12, 57, 16, 16}};  // of 513 tiles the last is alone in its piece
 
 // Calls visit(image, tap, input pixel, output pixel) for all pairs that a tap joins.
 template <class Visit>
