@@ -88,6 +88,16 @@ TEST(Resample, NeverFillsAGap) {
   EXPECT_EQ(track.run.back(), 40U);
 }
 
+TEST(Resample, CallsASilenceOfOverFiftyMillisecondsAGap) {
+  const auto gaps_after = [](double silence_s) {
+    Recording recording = make_recording({});
+    for (std::size_t i = 60; i < 100; ++i) recording.time_s[i] += silence_s - 1 / 300.0;
+    return resample(recording, kWide).gaps;
+  };
+  EXPECT_EQ(gaps_after(0.049), 0U);
+  EXPECT_EQ(gaps_after(0.051), 1U);
+}
+
 TEST(Resample, TakesADamagedFrameAsLost) {
   Recording recording = make_recording({});
   recording.volts[40 * kTaxels + 3] = std::numeric_limits<float>::quiet_NaN();
