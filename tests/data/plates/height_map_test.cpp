@@ -54,6 +54,12 @@ TEST(HeightMap, HeightIsThatOfTheHighestTriangleAboveTheOutline) {
   EXPECT_FALSE(map.uniform_in_x());
 }
 
+TEST(HeightMap, ATipThatOnlyTouchesANodeCounts) {
+  auto triangles = sheet();
+  triangles.push_back({Point{10, 20, 1}, Point{12, 20, 1}, Point{11, 22, 2}});
+  EXPECT_EQ(map_of(triangles).height(11, 22), 2);
+}
+
 TEST(HeightMap, SlantedFacesAreExactAtNodesAndLinearBetween) {
   std::vector<Triangle> triangles;
   const auto z = [](float x, float y) { return 0.05F * x - 0.02F * y; };

@@ -76,6 +76,16 @@ TEST(Truth, TellsContactFromNearAndFlat) {
   EXPECT_EQ(zone_of(Plate::named("plain"), 18, 54, grid), Zone::flat);
 }
 
+TEST(Truth, ThreeMillimetresAroundThePictureAreNear) {
+  const Plate plate = Plate::named("3_Bumps");
+  const auto first = [&](Zone zone) {
+    double y = 0;
+    while (zone_of(plate, 18, y, ImageGrid()) != zone && y < 60) y += 0.05;
+    return y;
+  };
+  EXPECT_NEAR(first(Zone::contact) - first(Zone::near), 3, 0.3);
+}
+
 TEST(Truth, FlatScenesAreFlat) {
   for (const float v : image_at(Plate::named("plain"), 18, 54, 16)) EXPECT_EQ(v, 0.0F);
   for (const float v : image_at(Plate::named("3_Bumps"), 18, 30, 16)) EXPECT_EQ(v, 0.0F);
