@@ -31,7 +31,7 @@ PLACES = {"io": 25, "autograd": 50, "layers": 15, "models": 35, "data": 65}  # d
 # Test programs in the order in which they are asked.
 PROGRAMS = {
     "io": ["io_test", "layers_test", "data_test"],
-    "autograd": ["autograd_test", "autograd_f64_test", "layers_test", "parity_test"],
+    "autograd": ["autograd_test", "autograd_f64_test", "layers_test", "parity_test", "models_test"],
     "layers": ["layers_test", "layers_f64_test", "parity_test"],
     "models": ["models_test", "models_f64_test", "failures_test"],
     "data": ["data_test", "models_test", "failures_test"],
