@@ -275,6 +275,15 @@ def page():
     return table(["file", "result"], lines)
 
 
+def mutation():
+    lines = []
+    for folder, group in itertools.groupby(rows("audit/mutation.csv"), lambda r: r["file"].split("/")[0]):
+        mutants = list(group)
+        lives = [f"`{r['file']}:{r['line']}`: {r['why it lives']}" for r in mutants if r["verdict"] == "survived"]
+        lines.append([folder, str(len(mutants)), str(len(mutants) - len(lives)), "; ".join(lives) or "none"])
+    return table(["folder", "mutants", "noticed", "not noticed, and why"], lines)
+
+
 def never_felt():
     return table(["tried", "random plates", "options", "left out", "contact SSIM", "contact PSNR dB", "ghosts on flat", "verdict"],
                  [[r["recipe"], r["random_plates"], f"`{r['options']}`", r["left_out"], r["contact_ssim"],
@@ -341,7 +350,7 @@ def tried():
 
 
 SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, streaming, growth, pixels, textures, simulator, stability,
-                   rig, page, hostile, promises, whole_passes, corruptions, demo, tried, never_felt, simulated_only, finger_fit, terms],
+                   rig, page, hostile, promises, mutation, whole_passes, corruptions, demo, tried, never_felt, simulated_only, finger_fit, terms],
             README: [accuracy, speed]}
 
 

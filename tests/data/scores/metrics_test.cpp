@@ -192,6 +192,17 @@ TEST(MetricsAccumulator, KeepsTheFloorOfManyWindowsFromASample) {
   EXPECT_EQ(metrics.result().phase_correlation_floor, again.result().phase_correlation_floor);
 }
 
+// Late windows are in the sample as often as early ones: three of four pictures here are the same.
+TEST(MetricsAccumulator, SamplesLateWindowsForTheFloorToo) {
+  MetricsAccumulator metrics{ImageGrid{}};
+  const Image same = plate("bumps12", 54);
+  for (std::uint64_t i = 0; i < 4 * MetricsAccumulator::kFloorPairs; ++i) {
+    const Image picture = i < MetricsAccumulator::kFloorPairs ? noise(i) : same;
+    metrics.add(picture, picture);
+  }
+  EXPECT_GT(metrics.result().phase_correlation_floor, 0.4);
+}
+
 TEST(MetricsAccumulator, RefusesValuesThatAreNotFinite) {
   MetricsAccumulator metrics{ImageGrid{}};
   Image output = flat(0);
