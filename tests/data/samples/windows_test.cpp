@@ -75,6 +75,16 @@ TEST(Windows, NeverCrossAGap) {
   }
 }
 
+TEST(Windows, OfWhichXOrYIsUnknownHaveNoTruth) {
+  for (const std::size_t unknown : {0U, 1U}) {
+    Recording recording = make_recording({});
+    for (std::size_t i = 90; i < 100; ++i) recording.position_mm[2 * i + unknown] = NAN;
+    WindowSet set(wide_settings(16));
+    set.add(recording);
+    EXPECT_EQ(set.counts().no_position, 10U) << unknown;
+  }
+}
+
 TEST(Windows, CountEveryFrameOnce) {
   WindowSettings settings = wide_settings(16);
   settings.stride = 3;
