@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Breaks the product at about 190 places, one at a time, and shows the test that notices.
+"""Breaks the product at about 220 places, one at a time, and shows the test that notices.
 
     bench/studies/mutation.py SOURCE SCRATCH RESULTS.csv [FOLDER[=PROGRAM,...] ...]
 

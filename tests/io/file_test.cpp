@@ -55,8 +55,6 @@ TEST(File, NothingAppearsWithoutCommit) {
   EXPECT_EQ(folder.entries(), 0u);
 }
 
-// A child that ends in mid-write, as after kill -9, leaves its temporary; the next writer of that file sweeps
-// it, and nothing else.
 TEST(File, LeavesNoDescriptorOpen) {
   const TemporaryFolder folder;
   const auto descriptors = [] {
@@ -71,6 +69,8 @@ TEST(File, LeavesNoDescriptorOpen) {
   EXPECT_THROW(kept.commit(), std::invalid_argument);
 }
 
+// A child that ends in mid-write, as after kill -9, leaves its temporary; the next writer of that file sweeps
+// it, and nothing else.
 TEST(File, SweepsWhatAKilledWriterLeft) {
   TemporaryFolder folder;
   const std::string path = folder.file("a");
