@@ -23,7 +23,7 @@ def mean(values):
 def interval(values):
     """Half the 95 % interval of the mean."""
     m = mean(values)
-    return T_975[len(values) - 1] * math.sqrt(sum((v - m) ** 2 for v in values) / (len(values) - 1) / len(values))
+    return T_975.get(len(values) - 1, 1.96) * math.sqrt(sum((v - m) ** 2 for v in values) / (len(values) - 1) / len(values))
 
 
 def plus_minus(value, half, digits):

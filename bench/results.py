@@ -135,6 +135,19 @@ def speed():
                    f"{100 * float(r['ours_share']):.0f} %"] for r in rows("peers.csv")])
 
 
+def precision():
+    lines = []
+    found = rows("precision.csv")
+    for preset in dict.fromkeys(r["name"].split()[0] for r in found):
+        of = {kind: [r for r in found if r["name"].split()[0] == preset and r["precision"] == kind] for kind in ("fp32", "int8")}
+        lost = [float(a["contact_ssim"]) - float(b["contact_ssim"]) for a, b in zip(of["fp32"], of["int8"])]
+        middle = lambda kind, column, digits: f"{mean([float(r[column]) for r in of[kind]]):.{digits}f}"
+        lines.append([preset, *(middle(kind, column, digits) for column, digits in (("contact_ssim", 4), ("contact_psnr_db", 2))
+                                for kind in of), f"{max(lost):.4f}", *(middle(kind, "median_us", 0) + " us" for kind in of)])
+    return table(["model", "contact SSIM in fp32", "in int8", "PSNR dB in fp32", "in int8", "most that a seed loses",
+                  "time of a picture in fp32", "in int8"], lines)
+
+
 def streaming():
     f = {r["figure"]: float(r["value"]) for r in rows("streaming.csv")}
     return table(["a window every millisecond, us", "median", "99.9 %"],
@@ -291,6 +304,27 @@ def never_felt():
                   for r in rows("never_felt.csv")])
 
 
+def left_out():
+    found = rows("left_out.csv")
+    share = lambda chosen, column: f"{100 * mean([float(r[column]) for r in chosen]):.1f} %"
+    line = lambda name, seeds, chosen: [name, seeds, over_seeds(chosen, "contact_ssim", 3), over_seeds(chosen, "contact_psnr_db", 1),
+                                        share(chosen, "miss_rate"), share(chosen, "flat_ghost_rate"), share(chosen, "coverage")]
+    lines = []
+    for plate in dict.fromkeys(r["left_out"] for r in found):
+        chosen = [r for r in found if r["left_out"] == plate]
+        lines.append(line(plate, ", ".join(r["seed"] for r in chosen), chosen))
+    four = ("3_Bumps", "6_Bumps", "4_Ridges", "6_Ridges")
+    seeds = dict.fromkeys(r["seed"] for r in found)
+    means = [{column: mean([float(r[column]) for r in found if r["seed"] == seed and r["left_out"] in four])
+              for column in found[0] if column not in ("left_out", "seed")} | {"seed": seed}
+             for seed in seeds if sum(r["seed"] == seed and r["left_out"] in four for r in found) == 4]
+    lines.insert(4, line("mean of the four", ", ".join(r["seed"] for r in means), means))
+    simulated = [{column.replace("random_", "contact_" if "ssim" in column or "psnr" in column else "flat_" if "ghost" in column else ""): value
+                  for column, value in r.items() if column.startswith("random_")} for r in found]
+    lines.append(line("simulated plates that no training draws", f"{len(found)} networks", simulated))
+    return table(["plate that was left out", "seeds", "contact SSIM", "PSNR dB", "misses", "ghosts on flat", "intervals hold"], lines)
+
+
 def simulated_only():
     return table(["random passes", "epochs", "plate", "contact SSIM", "PSNR dB", "ghosts on flat"],
                  [[r["random_passes"], r["epochs"], r["plate"], r["contact_ssim"], r["contact_psnr_db"],
@@ -322,14 +356,29 @@ def whole_passes():
 
 
 def corruptions():
-    found = rows("corruptions.csv")
+    found = {key: list(group) for key, group in itertools.groupby(
+        sorted(rows("corruptions.csv"), key=lambda r: (r["model"], r["corruption"], r["severity"])),
+        lambda r: (r["model"], r["corruption"], r["severity"]))}
+    middle = lambda model, name, severity, column: mean([float(r[column]) for r in found[model, name, severity]])
     lines = []
-    for name in dict.fromkeys(r["corruption"] for r in found if r["corruption"] != "none"):
-        at = {r["severity"]: r for r in found if r["corruption"] == name}
-        lines.append([name] + [f"{float(at[s]['ssim']):.3f}" for s in "135"] + [f"{100 * float(at[s]['coverage']):.0f} %" for s in "135"] +
-                     [f"{float(at[s]['alarm_auroc']):.3f}" for s in "135"] + [f"{100 * float(at['3']['alarms']):.0f} %"])
-    return table(["corruption", "contact SSIM at 1", "at 3", "at 5", "intervals hold at 1", "at 3", "at 5", "alarm's AUROC at 1", "at 3",
-                  "at 5", "alarms at 3"], lines)
+    for name in dict.fromkeys(r["corruption"] for r in rows("corruptions.csv") if r["corruption"] != "none"):
+        lines.append([name] + [f"{middle('paper', name, s, 'ssim'):.3f}" for s in "135"] +
+                     [f"{middle(model, name, '3', 'ssim'):.3f}" for model in ("tiny", "best", "generalist")] +
+                     [f"{100 * middle(model, name, '3', 'coverage'):.0f} %" for model in ("paper", "tiny", "best", "generalist")] +
+                     [f"{middle('paper', name, s, 'alarm_auroc'):.3f}" for s in "135"] +
+                     [f"{100 * middle('paper', name, '3', 'alarms'):.0f} %"])
+    return table(["corruption", "contact SSIM of `paper` at 1", "at 3", "at 5", "of `tiny` at 3", "`best` at 3", "generalist at 3",
+                  "intervals of `paper` hold at 3", "`tiny`", "`best`", "generalist", "alarm's AUROC for `paper` at 1", "at 3", "at 5",
+                  "alarms at 3"], lines)
+
+
+def unknown_plates():
+    lines = []
+    found = rows("unknown_plates.csv")
+    for way in dict.fromkeys(r["way"] for r in found):
+        lines.append([way] + [over_seeds([r for r in found if (r["way"], r["plate"]) == (way, plate) and r["model"].startswith("paper")],
+                                         "auroc", 2) for plate in ("4_Waves", "6_Waves", "4_Blob", "6_Blob")])
+    return table(["what a network could go by", "4_Waves", "6_Waves", "4_Blob", "6_Blob"], lines)
 
 
 def demo():
@@ -349,8 +398,8 @@ def tried():
                   "commit"], lines)
 
 
-SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, streaming, growth, pixels, textures, simulator, stability,
-                   rig, page, hostile, promises, mutation, whole_passes, corruptions, demo, tried, never_felt, simulated_only, finger_fit, terms],
+SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, precision, streaming, growth, pixels, textures, simulator, stability,
+                   rig, page, hostile, promises, mutation, whole_passes, corruptions, unknown_plates, demo, tried, left_out, never_felt, simulated_only, finger_fit, terms],
             README: [accuracy, speed]}
 
 

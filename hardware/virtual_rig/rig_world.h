@@ -1,6 +1,6 @@
 // Printer and board of the virtual rig in one world with one time: the board feels what is under the
-// printer's head. No threads and no clock: SimulatedRig drives it in simulated time, PtyRig in (sped-up) real
-// time.
+// printer's head. No threads and no clock: PtyRig drives it in (sped-up) real time, the tests'
+// simulated_rig.h in simulated time.
 #pragma once
 
 #include <functional>

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "hardware/palpation_recorder.h"
-#include "hardware/virtual_rig/simulated_rig.h"
+#include "tests/hardware/simulated_rig.h"
 
 namespace supertac {
 

@@ -14,7 +14,7 @@
 
 #include "hardware/board_frame.h"
 #include "hardware/printer.h"
-#include "hardware/virtual_rig/simulated_rig.h"
+#include "tests/hardware/simulated_rig.h"
 #include "io/random.h"
 #include "tests/io/temporary_folder.h"
 

@@ -1,4 +1,4 @@
-#include "hardware/virtual_rig/simulated_rig.h"
+#include "tests/hardware/simulated_rig.h"
 
 #include <algorithm>
 #include <chrono>
