@@ -67,7 +67,7 @@ void declare(Arguments& a) {
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
       .option("classifier", "FILE",
               "name the texture on the page, with a classifier by supertac-classify --out")
-      .option("precision", "NAME", "fp32, or int8: faster, for models that hold their values' ranges", "fp32")
+      .option("precision", "NAME", "fp32, or int8: faster on processors with AVX-512 VNNI, slower on others", "fp32")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
       .flag("list-ports", "list the serial ports and end");
   declare_web(a);
