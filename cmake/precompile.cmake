@@ -1,6 +1,6 @@
 # -DSUPERTAC_PRECOMPILE=ON, as scripts/demo.sh and scripts/test.sh have it: headers of the standard library, JSON and
-# GoogleTest are parsed once instead of in every file, which saves a third of the building. Off by default, since a file
-# that forgets an #include would compile with it.
+# GoogleTest are parsed once instead of in every file, which takes about a third off a file. Off by default, since one that
+# forgets an #include would compile with it.
 option(SUPERTAC_PRECOMPILE "Parse the headers that cost most once" OFF)
 if(NOT SUPERTAC_PRECOMPILE)
   return()
