@@ -128,11 +128,15 @@ def duration(us):
     return f"{us / 1000:.2f} ms" if us >= 1000 else f"{us:.0f} us"
 
 
-def speed():
+def speed(file="peers.csv"):
     return table(["", "SuperTac", "compared with", "", "times as fast (95 % interval)", "share of FMA peak"],
                  [[TASKS[r["task"]], duration(r["ours_us"]), r["peer"], duration(r["peer_us"]),
                    f"{float(r['ratio']):.1f} ({float(r['ratio_low']):.1f} to {float(r['ratio_high']):.1f})",
-                   f"{100 * float(r['ours_share']):.0f} %"] for r in rows("peers.csv")])
+                   f"{100 * float(r['ours_share']):.0f} %"] for r in rows(file)])
+
+
+def speed_avx2():
+    return speed("peers_avx2.csv")
 
 
 def precision():
@@ -398,7 +402,7 @@ def tried():
                   "commit"], lines)
 
 
-SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, precision, streaming, growth, pixels, textures, simulator, stability,
+SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, speed_avx2, precision, streaming, growth, pixels, textures, simulator, stability,
                    rig, page, hostile, promises, mutation, whole_passes, corruptions, unknown_plates, demo, tried, left_out, never_felt, simulated_only, finger_fit, terms],
             README: [accuracy, speed]}
 
