@@ -1,6 +1,6 @@
 #!/bin/sh
 # From nothing to super-resolved pictures: installs what is missing, builds, simulates, trains, evaluates.
-# Takes about six minutes on two cores. Everything it makes is in out/demo; of the programs it builds those it needs, and
+# Takes about seven minutes on two cores. Everything it makes is in out/demo; of the programs it builds those it needs, and
 # scripts/test.sh or `cmake --build build` goes on from there.
 set -eu
 cd "$(dirname "$0")/.."
