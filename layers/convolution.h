@@ -12,6 +12,8 @@ struct ConvLayerOptions {
   Dim stride = 1;
   Dim padding = 0;
 };
+/// A map keeps its size.
+inline constexpr ConvLayerOptions kSameSize{.kernel = 3, .stride = 1, .padding = 1};
 
 /// A weight [kernel..., in, out] and a bias [out].
 template <int kDimensions, bool kTransposed>

@@ -17,8 +17,6 @@ Dim squeezed(Dim channels, Dim reduction) {
   return channels / reduction;
 }
 
-constexpr ConvLayerOptions kSameSize{.kernel = 3, .stride = 1, .padding = 1};
-
 std::vector<Rcab> make_blocks(const RirbOptions& options, Rng& rng) {
   std::vector<Rcab> blocks;
   for (Dim i = 0; i < options.blocks; ++i) blocks.emplace_back(options.channels, options.reduction, rng);

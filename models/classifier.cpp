@@ -9,7 +9,6 @@
 namespace supertac {
 namespace {
 
-constexpr ConvLayerOptions kSameSize{.kernel = 3, .stride = 1, .padding = 1};
 constexpr Dim kFirst = 16, kSecond = 32, kHidden = 64;
 
 Dim features(const ClassifierSettings& s) {

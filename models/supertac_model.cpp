@@ -106,8 +106,8 @@ Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
       columns_(s.columns),
       fc_(s.groups() * s.latent, s.channels * s.rows * s.columns, rng),
       rirbs_(make_rirbs(s, rng)),
-      out_(s.channels, 1, {.kernel = 3, .stride = 1, .padding = 1}, rng) {
-  if (s.spread) spread_.emplace(s.channels, 1, ConvLayerOptions{.kernel = 3, .stride = 1, .padding = 1}, rng);
+      out_(s.channels, 1, kSameSize, rng) {
+  if (s.spread) spread_.emplace(s.channels, 1, kSameSize, rng);
   add("fc", fc_);
   for (std::size_t i = 0; i < rirbs_.size(); ++i) add("rirb." + std::to_string(i), rirbs_[i]);
   add("out", out_);

@@ -50,7 +50,7 @@ Decoder::Decoder(const VaeOptions& o, Rng& rng)
             {kFeatures, kFeatures, kDouble, rng},
             {kFeatures, 16, kDouble, rng},
             {16, 16, kDouble, rng}},
-      out_(16, o.channels, {.kernel = 3, .stride = 1, .padding = 1}, rng) {
+      out_(16, o.channels, kSameSize, rng) {
   add("fc.0", widen_);
   add("fc.1", unfold_);
   for (std::size_t i = 0; i < conv_.size(); ++i) add("conv." + std::to_string(i), conv_[i]);

@@ -5,7 +5,7 @@
 set -eu
 cd "$(dirname "$0")/.."
 scripts/setup.sh
-cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DSUPERTAC_PRECOMPILE=ON -DSUPERTAC_TESTS=OFF >/dev/null
+cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DSUPERTAC_QUICK_BUILD=ON -DSUPERTAC_TESTS=OFF >/dev/null
 cmake --build build --target supertac-simulate supertac-train supertac-evaluate supertac-info
 bin=build/bin
 out=out/demo

@@ -18,9 +18,9 @@ namespace supertac {
 namespace {
 
 /// Scores of the network and of every baseline, by their names.
-class Scores {
+class PairScores {
  public:
-  Scores(const ImageGrid& image, const Baselines& baselines) {
+  PairScores(const ImageGrid& image, const Baselines& baselines) {
     const PairMetrics none(static_cast<std::size_t>(image.height), static_cast<std::size_t>(image.width));
     methods_.emplace_back("network", none);
     for (const auto& baseline : baselines) methods_.emplace_back(baseline->name(), none);
@@ -97,9 +97,9 @@ int evaluate_on_pairs(const Arguments& a) {
            std::to_string((side - 1) / 2 * 2 + 1) +
            " pixels wide instead of 7; compare it with others of that size only");
   const Baselines baselines = fit_baselines(pairs, scored.split.train);
-  const Scores none(pairs.image(), baselines);
-  Scores all = none, contact = none;
-  std::map<std::int64_t, Scores> groups;
+  const PairScores none(pairs.image(), baselines);
+  PairScores all = none, contact = none;
+  std::map<std::int64_t, PairScores> groups;
   PairOutputs outputs;
   draw_all(a, network, pairs, scored.split.test, baselines, [&](const Drawn& d) {
     all.add(d);

@@ -44,8 +44,8 @@ std::string row(const std::string& name, const ZoneMetrics& metrics, const Laten
 }
 
 /// The scores of the network and of every baseline over the same windows.
-struct Scores {
-  Scores(const WindowSet& windows, const ModelFile& model, std::size_t methods)
+struct RecordingScores {
+  RecordingScores(const WindowSet& windows, const ModelFile& model, std::size_t methods)
       : felt(windows), trust(windows, model) {
     for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
   }
@@ -54,11 +54,11 @@ struct Scores {
   TrustScores trust;
 };
 
-Scores score_all(const Arguments& a, std::span<const ModelFile> files, const WindowSet& windows,
-                 const Scored& scored, const Baselines& baselines, OutputsFile* outputs,
-                 EvaluationPage* page) {
+RecordingScores score_all(const Arguments& a, std::span<const ModelFile> files, const WindowSet& windows,
+                          const Scored& scored, const Baselines& baselines, OutputsFile* outputs,
+                          EvaluationPage* page) {
   const Committee network(files, precision_of(a.choice("precision", {"fp32", "int8"})));
-  Scores scores(windows, files.front(), 1 + baselines.size());
+  RecordingScores scores(windows, files.front(), 1 + baselines.size());
   draw_all(a, network, windows, scored.split.test, baselines, [&](const Drawn& d) {
     const Zone zone = windows.zone(d.example);
     for (std::size_t m = 0; m < d.pictures.size(); ++m)
@@ -88,7 +88,8 @@ std::vector<std::string> silence_lines(const ZoneMetrics& metrics) {
 }
 
 nlohmann::ordered_json report(const Arguments& a, const Committee& network, const WindowSet& windows,
-                              const Scored& scored, const Baselines& baselines, const Scores& scores) {
+                              const Scored& scored, const Baselines& baselines,
+                              const RecordingScores& scores) {
   const ZoneMetrics& own = scores.of_method.front();
   nlohmann::ordered_json result = own.to_json();
   result["felt"] = scores.felt.to_json();
@@ -154,7 +155,7 @@ int evaluate_on_recordings(const Arguments& a) {
   OutputsFile outputs(windows.array(), windows.frames(), windows.image());
   const Baselines baselines = fit_baselines(windows, scored.split.train);
   EvaluationPage page(windows);
-  const Scores scores =
+  const RecordingScores scores =
       score_all(a, files, windows, scored, baselines, a.given("outputs") ? &outputs : nullptr,
                 a.given("report") ? &page : nullptr);
   const nlohmann::ordered_json result = report(a, network, windows, scored, baselines, scores);

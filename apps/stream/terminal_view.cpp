@@ -31,27 +31,27 @@ std::size_t level(float value) {
 }
 
 // An image of height x width pixels that is drawn `lines` x `columns`.
-struct Drawing {
+struct Raster {
   std::span<const float> values;
   int height, width, lines, columns;
 };
 
 // The longer side of the array gets kSide pixels of the terminal, the other its share, an even number.
-Drawing drawing_of(std::span<const float> values, const TaxelArray& array, int scale) {
+Raster raster_of(std::span<const float> values, const TaxelArray& array, int scale) {
   const int longer = std::max(array.rows, array.columns);
   return {values, array.rows * scale, array.columns * scale, kSide * array.rows / longer / 2 * 2,
           kSide * array.columns / longer};
 }
 
 // Row 0 is on top: that is the largest y.
-float pixel(const Drawing& drawing, int row, int column) {
+float pixel(const Raster& drawing, int row, int column) {
   if (drawing.values.empty()) return 0;
   const int r = drawing.height - 1 - row * drawing.height / drawing.lines;
   return drawing
       .values[static_cast<std::size_t>(r * drawing.width + column * drawing.width / drawing.columns)];
 }
 
-void append_row(std::string& text, const Drawing& picture, int line, bool colour) {
+void append_row(std::string& text, const Raster& picture, int line, bool colour) {
   std::size_t above_before = kHeat.size(), below_before = kHeat.size();
   for (int column = 0; column < picture.columns; ++column) {
     const float above = pixel(picture, 2 * line, column), below = pixel(picture, 2 * line + 1, column);
@@ -119,8 +119,8 @@ std::string status_line(const LiveState& state, int columns) {
 }
 
 std::string render(const LiveState& state, bool colour, const TerminalSize& size) {
-  const Drawing felt = drawing_of(state.taxels, state.array, 1);
-  const Drawing seen = drawing_of(state.picture, state.array, state.scale);
+  const Raster felt = raster_of(state.taxels, state.array, 1);
+  const Raster seen = raster_of(state.picture, state.array, state.scale);
   const auto fits = [&](int columns, int lines) {
     return (size.columns == 0 || size.columns >= columns) && (size.lines == 0 || size.lines > lines);
   };

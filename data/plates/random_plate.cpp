@@ -101,8 +101,8 @@ Element draw_element(Draw& draw, bool line) {
 
 /// Equal elements in rows.
 Texture draw_texture(Draw& draw, double from_mm, double to_mm) {
-  constexpr const char* kKinds[] = {"ridges", "bumps", "ridges", "bumps", "blobs", "waves"};
-  Texture t{.kind = kKinds[draw.one_of(6)], .from_mm = from_mm, .to_mm = to_mm};
+  constexpr const char* kDrawn[] = {"ridges", "bumps", "ridges", "bumps", "blobs", "waves"};
+  Texture t{.kind = kDrawn[draw.one_of(6)], .from_mm = from_mm, .to_mm = to_mm};
   t.pitch_mm = draw.between(kLeastPitchMm, std::min(kMostPitchMm, (to_mm - from_mm) / 1.2));
   t.height_mm = draw.chance(0.6) ? rig::kTextureHeightMm : draw.between(kLeastHeightMm, kMostHeightMm);
   const bool round = t.kind == "bumps" || t.kind == "blobs";

@@ -14,9 +14,9 @@ constexpr float kStill = 0.02F;
 constexpr double kAtTheEnd = 0.05;
 
 /// Smallest and largest value of each signal.
-class Swings {
+class SwingRanges {
  public:
-  explicit Swings(std::size_t signals) : low_(signals, 1e30F), high_(signals, -1e30F) {}
+  explicit SwingRanges(std::size_t signals) : low_(signals, 1e30F), high_(signals, -1e30F) {}
   void add(std::span<const float> frame) {
     for (std::size_t s = 0; s < low_.size(); ++s) {
       low_[s] = std::min(low_[s], frame[s]), high_[s] = std::max(high_[s], frame[s]);
@@ -55,7 +55,7 @@ void remark_on_truths(bool any, std::vector<std::string>& remarks) {
 
 std::vector<std::string> remarks_on(const WindowSet& windows, std::span<const std::uint32_t> chosen) {
   if (chosen.empty()) return {};
-  Swings swings(windows.array().signals());
+  SwingRanges swings(windows.array().signals());
   bool touched = false;
   for (const std::uint32_t i : spread(chosen, kLookedAt)) swings.add(windows.last_frame(i));
   for (const std::uint32_t i : chosen) touched = touched || windows.contact(i);
@@ -76,7 +76,7 @@ std::vector<std::string> remarks_on(const WindowSet& windows, std::span<const st
 std::vector<std::string> remarks_on(const PairSet& pairs) {
   const std::size_t every = 1 + pairs.size() / kLookedAt;
   std::vector<float> input(pairs.array().signals()), target(pairs.image().pixels());
-  Swings swings(input.size());
+  SwingRanges swings(input.size());
   bool touched = false;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     pairs.target(i, target);

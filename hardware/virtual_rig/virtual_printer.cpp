@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <limits>
 #include <utility>
 
 #include "hardware/marlin_line.h"
@@ -13,7 +12,6 @@ namespace {
 
 constexpr std::size_t kCommandBuffer = 4;  // Marlin's BUFSIZE
 constexpr std::size_t kReceiveLines = 6;   // about 128 bytes
-constexpr double kNever = std::numeric_limits<double>::infinity();
 
 std::int64_t integer_at(const std::string& text, std::size_t at) {
   std::int64_t value = -1;

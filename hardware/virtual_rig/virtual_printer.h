@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <map>
 #include <string>
 #include <string_view>
@@ -82,6 +83,8 @@ class VirtualPrinter {
   std::int64_t last_line() const { return last_line_; }
 
  private:
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+
   void on_character(char c, double t);
   void watch_for_emergency(char c, double t);
   void act_on_critical(std::string_view code, double t);

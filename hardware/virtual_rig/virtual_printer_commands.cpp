@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include "hardware/marlin_line.h"
@@ -13,8 +12,6 @@
 
 namespace supertac {
 namespace {
-
-constexpr double kNever = std::numeric_limits<double>::infinity();
 
 // The number behind a letter, as Marlin's parser reads it.
 std::optional<double> parameter(const std::string& command, char letter) {

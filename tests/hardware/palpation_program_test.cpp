@@ -13,7 +13,7 @@
 namespace supertac {
 namespace {
 
-constexpr Point3 kMounted{99.7, 101.17, 131.81};
+using rig::kMounted;
 
 std::vector<std::string> lines_of(const std::string& text) {
   std::vector<std::string> lines;

@@ -8,7 +8,7 @@
 namespace supertac {
 namespace {
 
-constexpr Point3 kMounted{99.7, 101.17, 131.81};
+using rig::kMounted;
 
 struct PalpationBench {
   explicit PalpationBench(RigSettings settings = running_rig())

@@ -10,7 +10,7 @@
 namespace supertac {
 namespace {
 
-constexpr Point3 kMounted{99.7, 101.17, 131.81};
+using rig::kMounted;
 
 TEST(Limits, NameTheAxisAndCheckTheWay) {
   const Limits limits;

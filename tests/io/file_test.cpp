@@ -21,7 +21,7 @@ constexpr std::uint64_t kPlenty = 1 << 20;
 const std::string kOld = "the old content";
 const std::string kNew(10'000, 'n');
 
-std::string message_of(const auto& action) {
+std::string error_of(const auto& action) {
   try {
     action();
   } catch (const FileError& error) {
@@ -104,23 +104,21 @@ TEST(File, SweepsWhatAKilledWriterLeft) {
 TEST(File, ErrorsNameFileAndReason) {
   TemporaryFolder folder;
   const std::string path = folder.file("a");
-  EXPECT_EQ(message_of([&] { read_file(path, kPlenty); }),
+  EXPECT_EQ(error_of([&] { read_file(path, kPlenty); }),
             path + ": cannot open the file: No such file or directory; check the name");
-  EXPECT_NE(message_of([&] { read_file(folder.path(), kPlenty); }).find("is a directory"), std::string::npos);
-  EXPECT_NE(message_of([&] { write_file(folder.path(), "x"); }).find("not a regular file"),
-            std::string::npos);
-  EXPECT_NE(message_of([&] { write_file(folder.file("no/where"), "x"); }).find("open the directory"),
+  EXPECT_NE(error_of([&] { read_file(folder.path(), kPlenty); }).find("is a directory"), std::string::npos);
+  EXPECT_NE(error_of([&] { write_file(folder.path(), "x"); }).find("not a regular file"), std::string::npos);
+  EXPECT_NE(error_of([&] { write_file(folder.file("no/where"), "x"); }).find("open the directory"),
             std::string::npos);
   write_file(path, "12345");
-  EXPECT_NE(message_of([&] { read_file(path, 4); }).find("has 5 bytes, expected at most 4"),
-            std::string::npos);
+  EXPECT_NE(error_of([&] { read_file(path, 4); }).find("has 5 bytes, expected at most 4"), std::string::npos);
 }
 
 TEST(File, ReadsNoPipeAndWaitsForNoWriter) {
   TemporaryFolder folder;
   const std::string path = folder.file("pipe");
   ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
-  EXPECT_NE(message_of([&] { read_file(path, kPlenty); }).find("not a regular file"), std::string::npos);
+  EXPECT_NE(error_of([&] { read_file(path, kPlenty); }).find("not a regular file"), std::string::npos);
 }
 
 TEST(File, SaysWhenItIsShortenedWhileRead) {
@@ -131,7 +129,7 @@ TEST(File, SaysWhenItIsShortenedWhileRead) {
   std::vector<std::byte> half(5000);
   reader.read(half);
   ASSERT_EQ(truncate(path.c_str(), 6000), 0);
-  EXPECT_NE(message_of([&] { reader.read(half); }).find("ends after 6000 bytes, expected 10000"),
+  EXPECT_NE(error_of([&] { reader.read(half); }).find("ends after 6000 bytes, expected 10000"),
             std::string::npos);
 }
 
@@ -150,7 +148,7 @@ TEST(File, RefusesExistingWithoutForce) {
   EXPECT_NO_THROW(refuse_existing(path, false));
   write_file(path, "x");
   EXPECT_NO_THROW(refuse_existing(path, true));
-  EXPECT_EQ(message_of([&] { refuse_existing(path, false); }),
+  EXPECT_EQ(error_of([&] { refuse_existing(path, false); }),
             path + ": exists already; choose another name or pass --force to replace it");
 }
 
@@ -165,7 +163,7 @@ int fail_each_call(int error, bool forever) {
     bool reached = false;
     {
       FaultInjection injection(at, error, forever);
-      message = message_of([&] { replace(path); });
+      message = error_of([&] { replace(path); });
       reached = FaultInjection::reached();
     }
     const bool failed = message != "nothing thrown";
@@ -201,7 +199,7 @@ TEST(FileFaults, ShortWritesAndReadsAreContinued) {
 TEST(FileFaults, FailedSyncIsNotRetried) {
   TemporaryFolder folder;
   FaultInjection injection(4, EIO, false);  // open, open, write, fsync
-  EXPECT_NE(message_of([&] { write_file(folder.file("a"), kNew); }).find("sync to disk"), std::string::npos);
+  EXPECT_NE(error_of([&] { write_file(folder.file("a"), kNew); }).find("sync to disk"), std::string::npos);
   int syncs = 0;
   for (const std::string& call : FaultInjection::calls()) syncs += call == "fsync";
   EXPECT_EQ(syncs, 1);
@@ -212,7 +210,7 @@ TEST(FileFaults, EveryReadCallFails) {
     TemporaryFolder folder;
     write_file(folder.file("a"), kNew);
     FaultInjection injection(at, EIO, false);
-    EXPECT_NE(message_of([&] { read_file(folder.file("a"), kPlenty); }).find("check the disk"),
+    EXPECT_NE(error_of([&] { read_file(folder.file("a"), kPlenty); }).find("check the disk"),
               std::string::npos);
   }
 }

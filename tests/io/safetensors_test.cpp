@@ -25,7 +25,7 @@ constexpr bool kSlowBuild = false;
 
 std::string golden(const std::string& name) { return std::string(SUPERTAC_GOLDEN) + "/" + name; }
 
-std::string message_of(const std::string& path) {
+std::string refusal_of(const std::string& path) {
   try {
     SafetensorsFile::read(path);
   } catch (const FileError& error) {
@@ -45,7 +45,7 @@ std::string raw_file(const std::string& header, std::size_t data_bytes) {
 std::string message_of_header(const std::string& header, std::size_t data_bytes = 0) {
   TemporaryFolder folder;
   write_file(folder.file("a"), raw_file(header, data_bytes));
-  return message_of(folder.file("a"));
+  return refusal_of(folder.file("a"));
 }
 
 /// Writes a file of about `bytes` bytes.
@@ -134,10 +134,10 @@ TEST(SafetensorsDamage, EveryPrefixIsRefused) {
   const std::string whole = read_text_file(folder.file("a"), kPlenty);
   for (std::size_t length = 0; length < whole.size(); ++length) {
     write_file(folder.file("b"), whole.substr(0, length));
-    ASSERT_NE(message_of(folder.file("b")), "read") << length << " bytes";
+    ASSERT_NE(refusal_of(folder.file("b")), "read") << length << " bytes";
   }
   write_file(folder.file("b"), whole + " ");
-  EXPECT_NE(message_of(folder.file("b")), "read");
+  EXPECT_NE(refusal_of(folder.file("b")), "read");
 }
 
 TEST(SafetensorsDamage, EveryFlippedBitIsRefused) {
@@ -155,12 +155,12 @@ TEST(SafetensorsDamage, EveryFlippedBitIsRefused) {
   for (std::size_t i = 0; i < bytes.size(); ++i) {
     for (int bit = 0; bit < 8; ++bit) {
       put(i, static_cast<char>(bytes[i] ^ (1 << bit)));
-      ASSERT_NE(message_of(folder.file("a")), "read") << "byte " << i << " bit " << bit;
+      ASSERT_NE(refusal_of(folder.file("a")), "read") << "byte " << i << " bit " << bit;
     }
     put(i, bytes[i]);
   }
   std::fclose(file);
-  EXPECT_EQ(message_of(folder.file("a")), "read");
+  EXPECT_EQ(refusal_of(folder.file("a")), "read");
 }
 
 TEST(SafetensorsHostile, HeadersAreRefusedForTheirReason) {
@@ -242,7 +242,7 @@ TEST(SafetensorsHostile, LengthsAreComparedBeforeMemoryIsAskedFor) {
     std::string bytes(16, ' ');
     std::memcpy(bytes.data(), &length, 8);
     write_file(folder.file("a"), bytes);
-    EXPECT_NE(message_of(folder.file("a")).find("header length " + std::to_string(length)),
+    EXPECT_NE(refusal_of(folder.file("a")).find("header length " + std::to_string(length)),
               std::string::npos);
   }
   EXPECT_NE(
@@ -286,7 +286,7 @@ TEST(SafetensorsHostile, BombsCostLittle) {
     double best = 1e9;
     for (int i = 0; i < 5; ++i) {
       const std::clock_t begin = std::clock();
-      ASSERT_NE(message_of(folder.file("a")), "read") << header.substr(0, 40);
+      ASSERT_NE(refusal_of(folder.file("a")), "read") << header.substr(0, 40);
       best = std::min(best, static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
     }
     EXPECT_LT(best, 1.0) << header.substr(0, 40);
@@ -354,7 +354,7 @@ TEST(SafetensorsWrite, AFullDiskLeavesTheOldFile) {
     if (message != "written" && message.find("sync the directory") == std::string::npos) {
       EXPECT_EQ(read_file(folder.file("a"), kPlenty), before) << message;
     } else {
-      EXPECT_EQ(message_of(folder.file("a")), "read");
+      EXPECT_EQ(refusal_of(folder.file("a")), "read");
     }
   }
 }

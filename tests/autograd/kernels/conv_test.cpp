@@ -14,18 +14,19 @@ namespace {
 using test::numbers;
 using test::same_bytes;
 
-struct Case {
+struct ConvCase {
   Dim images, height, width, cin, cout, kernel, stride, padding;
 };
 // H != W, stride 2 and 3, no padding and much, a single pixel, channels around the vector lengths; few
 // outputs (narrow); squares of 8x8 and more in batches (Winograd).
-const Case kCases[] = {{2, 5, 7, 3, 17, 3, 1, 1},   {1, 6, 4, 1, 1, 3, 2, 1},    {2, 7, 5, 17, 3, 3, 2, 1},
-                       {1, 4, 4, 33, 1, 3, 1, 1},   {2, 3, 4, 1, 33, 1, 1, 0},   {1, 5, 4, 17, 33, 2, 2, 0},
-                       {3, 4, 3, 3, 5, 4, 2, 1},    {1, 9, 2, 16, 32, 3, 1, 2},  {2, 1, 1, 3, 8, 3, 1, 1},
-                       {70, 4, 4, 8, 9, 3, 1, 1},   {9, 8, 11, 40, 1, 3, 1, 1},  {1, 3, 3, 2, 2, 1, 3, 2},
-                       {5, 8, 12, 32, 16, 3, 1, 1}, {4, 16, 8, 16, 48, 3, 1, 1}, {0, 4, 4, 3, 5, 3, 1, 1}};
+const ConvCase kConvCases[] = {
+    {2, 5, 7, 3, 17, 3, 1, 1},   {1, 6, 4, 1, 1, 3, 2, 1},    {2, 7, 5, 17, 3, 3, 2, 1},
+    {1, 4, 4, 33, 1, 3, 1, 1},   {2, 3, 4, 1, 33, 1, 1, 0},   {1, 5, 4, 17, 33, 2, 2, 0},
+    {3, 4, 3, 3, 5, 4, 2, 1},    {1, 9, 2, 16, 32, 3, 1, 2},  {2, 1, 1, 3, 8, 3, 1, 1},
+    {70, 4, 4, 8, 9, 3, 1, 1},   {9, 8, 11, 40, 1, 3, 1, 1},  {1, 3, 3, 2, 2, 1, 3, 2},
+    {5, 8, 12, 32, 16, 3, 1, 1}, {4, 16, 8, 16, 48, 3, 1, 1}, {0, 4, 4, 3, 5, 3, 1, 1}};
 
-ConvSizes sizes_of(const Case& c, bool transposed, bool flat) {
+ConvSizes sizes_of(const ConvCase& c, bool transposed, bool flat) {
   return {{.height = flat ? 1 : c.height,
            .width = c.width,
            .kernel_h = flat ? 1 : c.kernel,
@@ -92,12 +93,12 @@ void expect_plain_is_fast(const ConvSizes& s) {
 }
 
 TEST(ConvKernels, PlainIsFast) {
-  for (const Case& c : kCases) {
+  for (const ConvCase& c : kConvCases) {
     for (const bool flat : {false, true}) {
       for (const bool transposed : {false, true}) {
         const ConvSizes s = sizes_of(c, transposed, flat);
         if (s.map.out_height() < 1 || s.map.out_width() < 1) continue;
-        SCOPED_TRACE("case " + std::to_string(&c - kCases) + (transposed ? " transposed" : "") +
+        SCOPED_TRACE("case " + std::to_string(&c - kConvCases) + (transposed ? " transposed" : "") +
                      (flat ? " 1-D" : " 2-D"));
         expect_plain_is_fast(s);
       }
@@ -108,7 +109,7 @@ TEST(ConvKernels, PlainIsFast) {
 // The cases above must keep meeting every way that fast/ knows.
 TEST(ConvKernels, TheCasesTakeEveryWay) {
   int narrow = 0, winograd = 0, tiles = 0;
-  for (const Case& c : kCases) {
+  for (const ConvCase& c : kConvCases) {
     const ConvSizes s = sizes_of(c, false, false);
     const ConvTask task{&geometry_of(s.map), s.images, s.cin, s.cout};
     ++(is_narrow(task) ? narrow : is_winograd(task) ? winograd : tiles);

@@ -85,7 +85,7 @@ TEST(Stl, DamagedBinaryNamesTheTriangleOrTheLength) {
   const std::uint32_t count = 0xFFFF'FFFF;
   std::memcpy(absurd.data() + 80, &count, sizeof count);
   expect_refused(absurd, "announces 4294967295 triangles, expected 214748364834 bytes, found 184");
-  expect_refused({}, "has 0 bytes");
+  expect_refused(Bytes{}, "has 0 bytes");
   expect_refused(stl_bytes({}, "empty"), "holds no triangle");
   for (std::size_t length = 0; length < good.size(); ++length)
     EXPECT_THROW(parse_stl(std::span(good).first(length), "x"), FileError) << length;

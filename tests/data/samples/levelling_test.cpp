@@ -10,13 +10,13 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kFrames = 100, kChannels = 2;
+constexpr std::size_t kTimes = 100, kChannels = 2;
 constexpr float kStep = 1.0F / 256;
 
 // Taxel 0 swings between rest and rest + swing, ten samples each; taxel 1 stays at `other`.
 std::vector<float> window(float rest, float swing, float other = 0) {
   std::vector<float> x;
-  for (std::size_t t = 0; t < kFrames; ++t) {
+  for (std::size_t t = 0; t < kTimes; ++t) {
     x.push_back(rest + (t / 10 % 2 == 1 ? swing : 0));
     x.push_back(other);
   }
@@ -38,7 +38,7 @@ TEST(Levelling, TakesHalfTheRestAndDividesByWhatIsLeft) {
 // 100 frames, each of its own bin: six samples lie at or below the rest, three at or above the top.
 TEST(Levelling, RestAndTopAreTheStatedPercentiles) {
   std::vector<float> x;
-  for (std::size_t t = 0; t < kFrames; ++t) {
+  for (std::size_t t = 0; t < kTimes; ++t) {
     x.push_back(static_cast<float>(2 * t) * kStep);
     x.push_back(0);
   }
@@ -64,7 +64,7 @@ TEST(Levelling, ASmallSwingOnALargeRestStaysSmall) {
 TEST(Levelling, AQuietWindowIsNotMadeLouder) {
   const std::vector<float> x = levelled(window(0, 0.03F));
   EXPECT_FLOAT_EQ(x[10 * kChannels], 0.03F / kLeastGain);
-  for (const float value : levelled(std::vector<float>(kFrames * kChannels, 0))) EXPECT_EQ(value, 0);
+  for (const float value : levelled(std::vector<float>(kTimes * kChannels, 0))) EXPECT_EQ(value, 0);
 }
 
 TEST(Levelling, TwoGlitchesDoNotSetTheGain) {
@@ -73,7 +73,7 @@ TEST(Levelling, TwoGlitchesDoNotSetTheGain) {
   x[3 * kChannels] = x[47 * kChannels] = 1;
   const std::vector<float> glitchy = levelled(x);
   EXPECT_EQ(glitchy[3 * kChannels], 1);
-  for (std::size_t t = 0; t < kFrames; ++t) {
+  for (std::size_t t = 0; t < kTimes; ++t) {
     if (t == 3 || t == 47) continue;
     EXPECT_EQ(glitchy[t * kChannels], clean[t * kChannels]) << t;
   }

@@ -8,12 +8,12 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kFrames = 64;
+constexpr std::size_t kLength = 64;
 
 // A bump that runs from row to row, `lag` frames later each, over all columns.
 std::vector<float> running(double lag) {
   std::vector<float> window;
-  for (std::size_t t = 0; t < kFrames; ++t)
+  for (std::size_t t = 0; t < kLength; ++t)
     for (std::size_t k = 0; k < 16; ++k) {
       const double d = (static_cast<double>(t) - 10 - lag * static_cast<double>(k / 4)) / 5;
       window.push_back(static_cast<float>(0.2 + 0.5 * std::exp(-d * d)));
@@ -22,8 +22,8 @@ std::vector<float> running(double lag) {
 }
 
 TEST(SignalFeatures, AreMeansAndLogarithmsOfSwings) {
-  std::vector<float> window(kFrames * 16, 0.25F);
-  for (std::size_t t = 0; t < kFrames; ++t) window[16 * t + 3] = t % 2 == 0 ? 0.4F : 0.6F;
+  std::vector<float> window(kLength * 16, 0.25F);
+  for (std::size_t t = 0; t < kLength; ++t) window[16 * t + 3] = t % 2 == 0 ? 0.4F : 0.6F;
   const std::vector<float> features = signal_features(window, TaxelArray{});
   ASSERT_EQ(features.size(), 35U);
   EXPECT_FLOAT_EQ(features[0], 0.25F);
@@ -44,13 +44,13 @@ TEST(SignalFeatures, TellWhichRowComesFirst) {
 }
 
 TEST(SignalFeatures, OfSilenceAreFinite) {
-  const std::vector<float> none(kFrames * 16);
+  const std::vector<float> none(kLength * 16);
   for (const float f : signal_features(none, TaxelArray{})) EXPECT_TRUE(std::isfinite(f));
 }
 
 TEST(SignalFeatures, FollowTheArray) {
   const TaxelArray array{.rows = 3, .columns = 5, .channels = 2};
-  const std::vector<float> window(kFrames * array.signals(), 0.5F);
+  const std::vector<float> window(kLength * array.signals(), 0.5F);
   EXPECT_EQ(signal_features(window, array).size(), 2U * 30 + 2);
 }
 

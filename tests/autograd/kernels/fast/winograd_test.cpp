@@ -16,14 +16,14 @@ ConvSettings map_of(Dim height, Dim width) {
   return {.height = height, .width = width, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1};
 }
 
-struct Case {
+struct Layer {
   Dim height, width, images, cin, cout;
 };
-const Case kCases[] = {{8, 8, 4, 16, 16},
-                       {8, 8, 7, 32, 48},
-                       {16, 16, 5, 32, 16},
-                       {12, 8, 6, 16, 32},
-                       {12, 12, 57, 16, 16}};  // of 513 tiles the last is alone in its piece
+const Layer kLayers[] = {{8, 8, 4, 16, 16},
+                         {8, 8, 7, 32, 48},
+                         {16, 16, 5, 32, 16},
+                         {12, 8, 6, 16, 32},
+                         {12, 12, 57, 16, 16}};  // of 513 tiles the last is alone in its piece
 
 // Calls visit(image, tap, input pixel, output pixel) for all pairs that a tap joins.
 template <class Visit>
@@ -48,7 +48,7 @@ void expect_near(const Tensor& found, const std::vector<double>& expected, const
 std::vector<double> doubles(const Tensor& t) { return {t.data(), t.data() + t.size()}; }
 
 struct Problem {
-  explicit Problem(const Case& c)
+  explicit Problem(const Layer& c)
       : sizes{&geometry_of(map_of(c.height, c.width)), c.images, c.cin, c.cout},
         x(numbers({c.images, c.height * c.width, c.cin}, 1)),
         w(numbers({9, c.cin, c.cout}, 2)),
@@ -60,7 +60,7 @@ struct Problem {
 };
 
 TEST(Winograd, ConvolutionIsThatOfPlainSums) {
-  for (const Case& c : kCases)
+  for (const Layer& c : kLayers)
     for (const real slope : {real(1), real(0.25)}) {
       const Problem p(c);
       std::vector<double> expected(static_cast<std::size_t>(p.gy.size()));
@@ -82,7 +82,7 @@ TEST(Winograd, ConvolutionIsThatOfPlainSums) {
 }
 
 TEST(Winograd, BothGradientsAreThoseOfPlainSums) {
-  for (const Case& c : kCases) {
+  for (const Layer& c : kLayers) {
     const Problem p(c);
     const Tensor start_x = numbers(p.x.shape(), 5), start_w = numbers(p.w.shape(), 6);
     std::vector<double> gx = doubles(start_x), gw = doubles(start_w);

@@ -1,8 +1,8 @@
-# -DSUPERTAC_PRECOMPILE=ON, as scripts/demo.sh and scripts/test.sh have it: headers of the standard library, JSON and
-# GoogleTest are parsed once instead of in every file, which takes about a third off a file. Off by default, since one that
-# forgets an #include would compile with it.
-option(SUPERTAC_PRECOMPILE "Parse the headers that cost most once" OFF)
-if(NOT SUPERTAC_PRECOMPILE)
+# -DSUPERTAC_QUICK_BUILD=ON, as scripts/demo.sh and scripts/test.sh have it: neighbouring files are compiled six at a time,
+# and headers of the standard library, JSON and GoogleTest are parsed once. Together they take away more than half of the
+# time. Off by default, since a file that forgets an #include would compile with it, and one that is changed takes five
+# others along.
+if(NOT SUPERTAC_QUICK_BUILD)
   return()
 endif()
 
@@ -16,10 +16,10 @@ set(headers_json ${standard} <nlohmann/json.hpp>)
 set(headers_test ${standard} <gtest/gtest.h>)
 set(headers_test_json ${headers_test} <nlohmann/json.hpp>)
 file(WRITE ${PROJECT_BINARY_DIR}/precompiled.cpp "int main() {}\n")
-# Files for one instruction set have flags with which a header compiled without them is of no use.
+# Files for one instruction set have flags with which a header compiled without them is of no use, and names in common.
 file(GLOB_RECURSE own_flags ${PROJECT_SOURCE_DIR}/autograd/kernels/fast/*.cpp)
 set_source_files_properties(${own_flags} TARGET_DIRECTORY supertac_autograd supertac_autograd_f64
-  PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
+  PROPERTIES SKIP_PRECOMPILE_HEADERS ON SKIP_UNITY_BUILD_INCLUSION ON)
 
 # A library (-fPIC) and a program (-fPIE) cannot share a header, nor can files with OpenMP and without, nor examples, which
 # have none of our options.
