@@ -189,21 +189,26 @@ inline void outer_tile(const OuterJob& job, Dim row, Dim channel) {
   for (int r = 0; r < R; ++r) {
     for (int j = 0; j < J; ++j) acc[r][j] = Vec::broadcast(0);
   }
-  for (Dim image = 0; image < job.images; ++image) {
-    const real* x = job.x + image * job.in_pixels * job.cin + row;
-    const real* gy = job.gy + image * job.out_pixels * job.cout + channel;
-    for (Dim i = 0; i < count; ++i) {
-      const real* g = gy + outputs[i] * job.cout;
-      const real* v = x + inputs[i] * job.cin;
-      Vec grad[J];
-      for (int j = 0; j < J; ++j) {
-        grad[j] = kPartial && j == J - 1 ? Vec::load_part(g + j * Vec::kLanes, lanes)
-                                         : Vec::load(g + j * Vec::kLanes);
-      }
-      for (int r = 0; r < R; ++r) {
-        const Vec value = Vec::broadcast(v[r]);
-        for (int j = 0; j < J; ++j) acc[r][j] = Vec::fma(value, grad[j], acc[r][j]);
-      }
+  const auto add_pair = [&](const real* v, const real* g) __attribute__((always_inline)) {
+    Vec grad[J];
+    for (int j = 0; j < J; ++j) {
+      grad[j] = kPartial && j == J - 1 ? Vec::load_part(g + j * Vec::kLanes, lanes)
+                                       : Vec::load(g + j * Vec::kLanes);
+    }
+    for (int r = 0; r < R; ++r) {
+      const Vec value = Vec::broadcast(v[r]);
+      for (int j = 0; j < J; ++j) acc[r][j] = Vec::fma(value, grad[j], acc[r][j]);
+    }
+  };
+  const real* x = job.x + row;
+  const real* gy = job.gy + channel;
+  const Dim x_step = job.in_pixels * job.cin, gy_step = job.out_pixels * job.cout;
+  if (count == 1) {  // rows of a matrix
+    x += inputs[0] * job.cin, gy += outputs[0] * job.cout;
+    for (Dim image = 0; image < job.images; ++image, x += x_step, gy += gy_step) add_pair(x, gy);
+  } else {
+    for (Dim image = 0; image < job.images; ++image, x += x_step, gy += gy_step) {
+      for (Dim i = 0; i < count; ++i) add_pair(x + inputs[i] * job.cin, gy + outputs[i] * job.cout);
     }
   }
   for (int r = 0; r < R; ++r) {
