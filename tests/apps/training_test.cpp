@@ -97,10 +97,12 @@ TEST_F(Training, HelpSaysWhatTinyCosts) {
   EXPECT_NE(run_process("supertac-train", {"--help"}).out.find("a ninth of the"), std::string::npos);
 }
 
+// Every set with every number of threads, over fewer steps: Trainer.PinnedBits.
 TEST_F(Training, TwoHundredStepsGiveTheSameBytesOnEverySetAndAnyThreads) {
   std::string first;
   for (const std::string& set : instruction_sets()) {
-    for (const char* threads : {"1", "2", "4"}) {
+    const bool slow = set == "portable";
+    for (const char* threads : slow ? std::vector{"2"} : std::vector{"1", "2", "4"}) {
       const std::string name = set + threads;
       const ProcessResult result = train_with(set, [&] {
         return train(name + ".safetensors",
@@ -111,7 +113,7 @@ TEST_F(Training, TwoHundredStepsGiveTheSameBytesOnEverySetAndAnyThreads) {
       ASSERT_GE(parse_json_limited(bytes(name + ".json"))["steps"].get<int>(), 200);
       const std::string model = bytes(name + ".safetensors") + bytes(name + ".run/last.safetensors");
       if (first.empty()) first = model;
-      EXPECT_TRUE(model == first) << name << " differs from portable on one thread";
+      EXPECT_TRUE(model == first) << name << " differs from the first set's";
     }
   }
 }
