@@ -1,6 +1,6 @@
 #!/bin/sh
 # From nothing to super-resolved pictures: installs what is missing, builds, simulates, trains, evaluates.
-# Takes about seven minutes on two cores. Everything it makes is in out/demo; of the programs it builds those it needs, and
+# Takes about six minutes on two cores. Everything it makes is in out/demo; of the programs it builds those it needs, and
 # scripts/test.sh or `cmake --build build` goes on from there.
 set -eu
 cd "$(dirname "$0")/.."
@@ -11,22 +11,24 @@ bin=build/bin
 out=out/demo
 mkdir -p "$out"
 simulate() { "$bin/supertac-simulate" --speeds 10 --force --quiet "$@"; }
-simulate --out "$out/recordings" --passes 4
-simulate --out "$out/plain" --plates plain --passes 2 --trials 1
+plates=bumps4,bumps6,bumps12,ridges4,ridges6,ridges12
+simulate --out "$out/recordings" --passes 8 --plates "$plates,plain"
 simulate --out "$out/never" --passes 2 --trials 1 --plates random1,random2,random3,random4,random5,random6,random7,random8
-echo "training on trial 1 of six plates, and on plates drawn at random (two to four minutes)"
+echo "training on trial 1 of six plates and a plain one, and on plates drawn at random (two to four minutes)"
 "$bin/supertac-train" --data "$out/recordings" --out "$out/model.safetensors" --preset tiny --split trial \
-  --stride 4 --epochs 12 --random-plates 1200 --seed 0 --force
-score() { # title, folder, more options
+  --stride 4 --epochs 23 --random-plates 1000 --seed 0 --force
+score() { # title, name of its JSON, folder, more options
   echo
   echo "$1"
-  title="$2"
-  shift 2
-  "$bin/supertac-evaluate" --model "$out/model.safetensors" --data "$out/$title" --json "$out/$title.json" --force "$@"
+  scores="$out/$2.json"
+  data="$out/$3"
+  shift 3
+  "$bin/supertac-evaluate" --model "$out/model.safetensors" --data "$data" --json "$scores" --force "$@"
 }
-score "the six plates on trial 2, which the network has not seen" recordings --limit 10000 --pictures "$out/pictures"
-score "eight plates it has never felt" never --split none --plates "" --limit 5000
-score "a plain plate" plain --split none --plates "" --limit 5000
+score "the six plates on trial 2, which the network has not seen" known recordings --plates "$plates" --limit 10000 \
+  --pictures "$out/pictures"
+score "eight plates it has never felt" never never --split none --plates "" --limit 5000
+score "the plain plate on trial 2" plain recordings --plates plain
 echo "pictures: $out/pictures/strips.png and a film of each pass beside it; scores: $out/*.json;"
 echo "training curves: $out/model.run/report.html"
 # The same content on every processor: README says which.
