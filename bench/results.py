@@ -312,7 +312,8 @@ def left_out():
     found = rows("left_out.csv")
     share = lambda chosen, column: f"{100 * mean([float(r[column]) for r in chosen]):.1f} %"
     line = lambda name, seeds, chosen: [name, seeds, over_seeds(chosen, "contact_ssim", 3), over_seeds(chosen, "contact_psnr_db", 1),
-                                        share(chosen, "miss_rate"), share(chosen, "flat_ghost_rate"), share(chosen, "coverage")]
+                                        share(chosen, "miss_rate"), share(chosen, "flat_ghost_rate"), share(chosen, "coverage"),
+                                        over_seeds(chosen, "specialist_ssim", 3) if chosen[0].get("specialist_ssim") else ""]
     lines = []
     for plate in dict.fromkeys(r["left_out"] for r in found):
         chosen = [r for r in found if r["left_out"] == plate]
@@ -326,7 +327,7 @@ def left_out():
     simulated = [{column.replace("random_", "contact_" if "ssim" in column or "psnr" in column else "flat_" if "ghost" in column else ""): value
                   for column, value in r.items() if column.startswith("random_")} for r in found]
     lines.append(line("simulated plates that no training draws", f"{len(found)} networks", simulated))
-    return table(["plate that was left out", "seeds", "contact SSIM", "PSNR dB", "misses", "ghosts on flat", "intervals hold"], lines)
+    return table(["plate that was left out", "seeds", "contact SSIM", "PSNR dB", "misses", "ghosts on flat", "intervals hold", "a specialist's SSIM"], lines)
 
 
 def simulated_only():
