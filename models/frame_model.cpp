@@ -8,7 +8,7 @@
 namespace supertac {
 namespace {
 
-void check_frame(const char* name, Dim value, Dim low, Dim high) {
+void check_setting(const char* name, Dim value, Dim low, Dim high) {
   if (value >= low && value <= high) return;
   throw std::invalid_argument(std::string("frame model: ") + name + " must be " + std::to_string(low) +
                               " to " + std::to_string(high) + ", got " + std::to_string(value));
@@ -29,13 +29,13 @@ std::vector<Rirb> make_rirbs(const FrameSettings& s, Rng& rng) {
 }  // namespace
 
 void FrameSettings::check() const {
-  check_frame("in_channels", in_channels, 1, 64);
-  check_frame("height", height, 1, 512);
-  check_frame("width", width, 1, 512);
+  check_setting("in_channels", in_channels, 1, 64);
+  check_setting("height", height, 1, 512);
+  check_setting("width", width, 1, 512);
   if (scale != 2 && scale != 4 && scale != 8 && scale != 16)
     throw std::invalid_argument("frame model: scale must be 2, 4, 8 or 16, got " + std::to_string(scale));
-  check_frame("channels", channels, 4, 256);
-  check_frame("rcabs", rcabs, 0, 16);
+  check_setting("channels", channels, 4, 256);
+  check_setting("rcabs", rcabs, 0, 16);
 }
 
 FrameModel::FrameModel(const FrameSettings& settings, Rng& rng)

@@ -44,11 +44,10 @@ Raster raster_of(std::span<const float> values, const TaxelArray& array, int sca
 }
 
 // Row 0 is on top: that is the largest y.
-float pixel(const Raster& drawing, int row, int column) {
-  if (drawing.values.empty()) return 0;
-  const int r = drawing.height - 1 - row * drawing.height / drawing.lines;
-  return drawing
-      .values[static_cast<std::size_t>(r * drawing.width + column * drawing.width / drawing.columns)];
+float pixel(const Raster& raster, int row, int column) {
+  if (raster.values.empty()) return 0;
+  const int r = raster.height - 1 - row * raster.height / raster.lines;
+  return raster.values[static_cast<std::size_t>(r * raster.width + column * raster.width / raster.columns)];
 }
 
 void append_row(std::string& text, const Raster& picture, int line, bool colour) {
