@@ -42,6 +42,13 @@ struct ByteProduct {
   Dim x_offset = 0, y_offset = 0;
 
   ByteProduct(const Product& p, kernels::Steps from, kernels::Steps to);
+  /// Numbers for so many images.
+  Dim scratch(Dim images) const {
+    kernels::ByteProductJob one = job;
+    one.segments = segments.data();
+    one.segment_count = static_cast<Dim>(segments.size());
+    return (images * kernels::reach_of(one).count * 2 + 3) / 4;
+  }
   void operator()(const Block& block) const {
     kernels::ByteProductJob now = job;
     now.images = block.images;
@@ -50,6 +57,7 @@ struct ByteProduct {
     now.w = w.data();
     now.outcome.scale = scale.data();
     now.outcome.bias = bias.data();
+    now.scratch = reinterpret_cast<std::int16_t*>(block.scratch);
     kernels::byte_kernels().product(now, block.first_byte(x) + x_offset,
                                     y ? block.first_pixel(*y) + y_offset : nullptr,
                                     y_bytes ? block.first_byte(*y_bytes) + y_offset : nullptr);
@@ -106,6 +114,7 @@ void Planner::add_product(const TracedOp& op, Product product) {
   const auto to = steps_.find(y);
   ByteProduct step(product, steps_.at(owner(op.inputs[0])),
                    to == steps_.end() ? kernels::Steps{} : to->second);
+  plan_->scratch_ = std::max(plan_->scratch_, step.scratch(Plan::kByteBlock));
   if (maps_.contains(y)) step.y = maps_.at(y);
   if (bytes_.contains(y)) step.y_bytes = bytes_.at(y);
   plan_->steps_.push_back(std::move(step));

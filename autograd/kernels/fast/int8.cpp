@@ -1,6 +1,8 @@
 #include "autograd/kernels/fast/int8.h"
 
+#include <algorithm>
 #include <cmath>
+#include <span>
 
 #if defined(__x86_64__) && defined(__linux__)
 #include <cpuid.h>
@@ -14,7 +16,7 @@ namespace supertac::kernels {
 namespace {
 
 std::uint8_t to_byte(float x, Steps s) {
-  float level = std::fma(x, 1 / s.step, static_cast<float>(s.zero));
+  float level = std::fma(x, s.per_step, static_cast<float>(s.zero));
   level = level > 0 ? level : 0;  // not a number counts as 0
   level = level < 255 ? level : 255;
   return static_cast<std::uint8_t>(std::lrint(level));  // to the nearest, halves to the even one
@@ -74,6 +76,14 @@ bool may_use_tiles() {
 #endif
 
 }  // namespace
+
+ByteReach reach_of(const ByteProductJob& job) {
+  Dim lowest = 0, highest = 0;
+  for (const Dim segment : std::span(job.segments, static_cast<std::size_t>(job.segment_count)))
+    lowest = std::min(lowest, segment), highest = std::max(highest, segment);
+  const Dim last_pixel = (job.height - 1) * job.from.line + (job.width - 1) * job.from.pixel;
+  return {-lowest, last_pixel + highest + job.length - lowest};
+}
 
 const ByteKernels kPlainByteKernels{product, line_to_bytes};
 

@@ -12,6 +12,7 @@ namespace supertac::kernels {
 struct Steps {
   float step = 1;
   std::int32_t zero = 0;
+  float per_step = 1 / step;  ///< divided once, not for every tile
 };
 
 /// What becomes of a sum s of output o: y = f(s * scale[o] + bias[o]), f as in ProductJob, written as a float
@@ -34,8 +35,15 @@ struct ByteProductJob {
   const std::int8_t* w = nullptr;
   Dim cout = 0, kept = 0;  // of cout outputs the first are kept
   Outcome outcome;
+  std::int16_t* scratch = nullptr;  // images * reach_of(job).count, for kernels that multiply wider numbers
 };
 inline constexpr Dim kQuad = 4, kByteOutputs = 16;
+
+/// The bytes of an image that a job reads: from `before` bytes before x on.
+struct ByteReach {
+  Dim before = 0, count = 0;
+};
+ByteReach reach_of(const ByteProductJob& job);
 
 /// A kernel of one instruction set; either result may be null.
 using ByteProduct = void (*)(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes);

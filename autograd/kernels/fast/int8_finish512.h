@@ -29,7 +29,7 @@ struct Finish {
         scale(s),
         bias(b),
         slope(_mm512_set1_ps(o.negative_slope)),
-        per_step(_mm512_set1_ps(1 / o.steps.step)),
+        per_step(_mm512_set1_ps(o.steps.per_step)),
         first(_mm512_set1_ps(static_cast<float>(o.steps.zero))),
         rectifies(o.negative_slope != 1) {}
   /// Of outputs from `channel` on, of which so many are left.

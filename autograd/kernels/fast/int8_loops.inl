@@ -1,10 +1,11 @@
 // The register-tiled loop over bytes. Each of int8_avx2.cpp and int8_vnni.cpp defines in an anonymous
-// namespace `Sums` (kLanes integers: zero, dot, finish, below) and kTile, then includes this file.
+// namespace `Sums` (kLanes integers: zero, dot, finish, below; of Values, bytes or wider), kTile and kVectors
+// of P pixels, then includes this file.
 
 #define ALWAYS_INLINE inline __attribute__((always_inline))
 
 template <int P, int J>
-ALWAYS_INLINE void byte_tile(const ByteProductJob& job, const std::uint8_t* const (&x)[P], const Dim (&at)[P],
+ALWAYS_INLINE void byte_tile(const ByteProductJob& job, const Sums::Value* const (&x)[P], const Dim (&at)[P],
                              Dim channel, float* y, std::uint8_t* bytes) {
   Sums sum[P][J];
   for (int p = 0; p < P; ++p) {
@@ -12,7 +13,7 @@ ALWAYS_INLINE void byte_tile(const ByteProductJob& job, const std::uint8_t* cons
   }
   const std::int8_t* w = job.w + channel * kQuad;
   for (Dim s = 0; s < job.segment_count; ++s) {
-    const std::uint8_t* pixel[P];
+    const Sums::Value* pixel[P];
     for (int p = 0; p < P; ++p) pixel[p] = x[p] + job.segments[s];
 #pragma GCC unroll 2
     for (Dim k = 0; k < job.length; k += kQuad, w += job.cout * kQuad) {
@@ -24,10 +25,12 @@ ALWAYS_INLINE void byte_tile(const ByteProductJob& job, const std::uint8_t* cons
       }
     }
   }
+#pragma GCC unroll 4
   for (int j = 0; j < J; ++j) {
     const Dim c = channel + j * Sums::kLanes;
     if (c >= job.kept) break;
     const Sums::Finish finish(job.outcome, c, job.kept - c);
+#pragma GCC unroll 8  // indexed at run time, the sums would lie in memory
     for (int p = 0; p < P; ++p)
       finish(sum[p][j], y ? y + at[p] + c : nullptr, bytes ? bytes + at[p] + c : nullptr);
   }
@@ -36,7 +39,7 @@ ALWAYS_INLINE void byte_tile(const ByteProductJob& job, const std::uint8_t* cons
 // The pixels of a job one after another.
 struct ByteCursor {
   const ByteProductJob& job;
-  const std::uint8_t* x;
+  const Sums::Value* x;
   Dim at = 0, column = 0, line = 0;
 
   ALWAYS_INLINE void next() {
@@ -52,20 +55,22 @@ struct ByteCursor {
 
 template <int P>
 inline void byte_pixels(const ByteProductJob& job, ByteCursor& cursor, float* y, std::uint8_t* bytes) {
-  const std::uint8_t* x[P];
+  const Sums::Value* x[P];
   Dim at[P];
   for (int p = 0; p < P; ++p, cursor.next()) x[p] = cursor.x, at[p] = cursor.at;
   Dim channel = 0;
-  if constexpr (P <= 2) {  // few pixels need more vectors to hide the latency
-    for (; channel + 4 * Sums::kLanes <= job.cout; channel += 4 * Sums::kLanes)
+  if constexpr (2 < kVectors<P>) {
+    for (; channel + 3 * Sums::kLanes < job.kept; channel += 4 * Sums::kLanes)
       byte_tile<P, 4>(job, x, at, channel, y, bytes);
   }
-  for (; channel + 2 * Sums::kLanes <= job.cout; channel += 2 * Sums::kLanes)
-    byte_tile<P, 2>(job, x, at, channel, y, bytes);
-  for (; channel < job.cout; channel += Sums::kLanes) byte_tile<P, 1>(job, x, at, channel, y, bytes);
+  if constexpr (1 < kVectors<P>) {
+    for (; channel + Sums::kLanes < job.kept; channel += 2 * Sums::kLanes)
+      byte_tile<P, 2>(job, x, at, channel, y, bytes);
+  }
+  for (; channel < job.kept; channel += Sums::kLanes) byte_tile<P, 1>(job, x, at, channel, y, bytes);
 }
 
-inline void run_bytes(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes) {
+inline void run(const ByteProductJob& job, const Sums::Value* x, float* y, std::uint8_t* bytes) {
   ByteCursor cursor{job, x};
   Dim left = job.images * job.height * job.width;
   for (; left >= kTile; left -= kTile) byte_pixels<kTile>(job, cursor, y, bytes);

@@ -5,9 +5,12 @@ namespace supertac::kernels {
 namespace {
 
 constexpr int kTile = 8;
+template <int P>
+constexpr int kVectors = P <= 2 ? 4 : 2;  // few pixels need more vectors to hide the latency
 
 struct Sums {
   static constexpr Dim kLanes = 16;
+  using Value = std::uint8_t;
   using Weights = __m512i;
   using Values = __m512i;
   __m512i v;
@@ -32,7 +35,7 @@ struct Sums {
 #include "autograd/kernels/fast/int8_loops.inl"
 
 void line_to_bytes(Dim n, const float* x, Steps steps, std::uint8_t* bytes) {
-  const __m512 per_step = _mm512_set1_ps(1 / steps.step),
+  const __m512 per_step = _mm512_set1_ps(steps.per_step),
                first = _mm512_set1_ps(static_cast<float>(steps.zero));
   for (Dim i = 0; i < n; i += 16) {
     const __mmask16 mask = mask_of(n - i);
@@ -42,7 +45,7 @@ void line_to_bytes(Dim n, const float* x, Steps steps, std::uint8_t* bytes) {
 
 }  // namespace
 
-const ByteKernels kVnniByteKernels{run_bytes, line_to_bytes};
+const ByteKernels kVnniByteKernels{run, line_to_bytes};
 
 }  // namespace supertac::kernels
 

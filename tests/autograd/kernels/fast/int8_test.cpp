@@ -46,21 +46,23 @@ void expect_bits_of_the_plain_kernel(Dim length, Dim kept, bool extreme) {
   const auto w = extreme ? std::vector<std::int8_t>(static_cast<std::size_t>(weights), -127)
                          : numbers<std::int8_t>(weights, -127, 127);
   const auto scale = numbers<float>(cout, 1, 9), bias = numbers<float>(cout, -9, 9);
-  const ByteProductJob job{.images = images,
-                           .height = height,
-                           .width = width,
-                           .from = {300, 60, 8},
-                           .to = {height * width * kept, width * kept, kept},
-                           .segments = segments.data(),
-                           .segment_count = 2,
-                           .length = length,
-                           .w = w.data(),
-                           .cout = cout,
-                           .kept = kept,
-                           .outcome = {scale.data(), bias.data(), 0.01F, {700.0F, 100}}};
+  ByteProductJob job{.images = images,
+                     .height = height,
+                     .width = width,
+                     .from = {300, 60, 8},
+                     .to = {height * width * kept, width * kept, kept},
+                     .segments = segments.data(),
+                     .segment_count = 2,
+                     .length = length,
+                     .w = w.data(),
+                     .cout = cout,
+                     .kept = kept,
+                     .outcome = {scale.data(), bias.data(), 0.01F, {700.0F, 100}}};
   const auto size = static_cast<std::size_t>(images * height * width * kept);
   std::vector<float> expected(size), y(size);
   std::vector<std::uint8_t> expected_bytes(size), bytes(size);
+  std::vector<std::int16_t> scratch(static_cast<std::size_t>(images * reach_of(job).count));
+  job.scratch = scratch.data();
   kPlainByteKernels.product(job, x.data(), expected.data(), expected_bytes.data());
   for (const ByteKernels& set : kernels_here()) {
     set.product(job, x.data(), y.data(), bytes.data());
