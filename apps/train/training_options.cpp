@@ -56,7 +56,7 @@ void declare_window_training(Arguments& a) {
            "levelled");
   a.option("augment", "NAME",
            "standard: random gains, offsets, noise, dropped taxels and a finger lifted a little, for unseen "
-           "trials; none",
+           "trials, and signals in which nothing is felt; none",
            "standard");
   a.option("memory", "SIZE",
            "for recordings that do not fit into memory: hold SIZE (500M, 2G) of their samples and read the "
@@ -221,6 +221,7 @@ WindowSet training_windows(const Arguments& a, const SuperTacSettings& model, st
                             .speed_mm_s = common_speed(windows),
                             .filter_s = windows.filter_s().value_or(rig::kFilterS)};
   add_random_passes(windows, random);
+  if (a.text("augment") == "standard") add_silent_passes(windows, seed);
   return windows;
 }
 

@@ -36,6 +36,8 @@ class Examples {
   /// Whether training may change the input to imitate other days: where every example is another day, it only
   /// blurs.
   virtual bool may_vary(std::size_t) const { return true; }
+  /// Whether the example shows what the network will be used on, by which an alarm knows what is not usual.
+  virtual bool usual(std::size_t) const { return true; }
   /// Examples of one group (a pass, a surface, a day) resemble each other.
   virtual std::int64_t group(std::size_t i) const = 0;
 

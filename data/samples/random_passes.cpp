@@ -54,7 +54,48 @@ Recording simulate(std::uint32_t number, const RandomPasses& passes, const Windo
   return simulate_pass(random_plate(number), pass, finger, number);
 }
 
+constexpr std::uint64_t kSilentStream = 0x73696c656e74ULL;  // "silent"
+// Each two windows long and good for eight: other levels teach more than the same again.
+constexpr std::size_t kMostSilentPasses = 300, kOthersForASilentPass = 80;
+constexpr int kWindowsLong = 2, kWindowsOfAPass = 8;
+constexpr double kMostNoise = 0.05, kMostDrift = 0.1;
+
+Recording silent_pass(const RandomStream& random, const WindowSettings& windows) {
+  enum Draw : std::uint64_t { kPressed, kNoise, kDrift, kTaxels = 10, kSamples = 10'000 };
+  Recording recording;
+  recording.array = windows.array.value_or(TaxelArray{});
+  recording.plate = "plain", recording.trial = recording.pass = 1, recording.source = "simulated";
+  const auto frames = static_cast<std::size_t>(kWindowsLong * windows.timesteps);
+  const std::size_t signals = recording.array.signals();
+  // Squares: a light touch and weak disturbances are what is hard to tell from a texture.
+  const auto square = [&](Draw i) { return random.uniform(i) * random.uniform(i); };
+  const double pressed = square(kPressed), noise = kMostNoise * square(kNoise),
+               drift = kMostDrift * square(kDrift);
+  for (std::size_t t = 0; t < frames; ++t) {
+    const double windows_past =
+        (static_cast<double>(t) - static_cast<double>(frames) / 2) / windows.timesteps;
+    recording.time_s.push_back(static_cast<double>(t) / windows.rate_hz);
+    for (std::size_t k = 0; k < signals; ++k) {
+      const double slope = drift * (2 * random.uniform(kTaxels + 2 * k + 1) - 1);
+      const double x = pressed * random.uniform(kTaxels + 2 * k) + slope * windows_past +
+                       noise * random.normal(kSamples + t * signals + k);
+      recording.volts.push_back(static_cast<float>(windows.scaling.rest_volts -
+                                                   windows.scaling.span_volts * std::clamp(x, 0.0, 1.0)));
+    }
+    recording.position_mm.push_back(static_cast<float>(Plate::kWidthMm / 2));
+    recording.position_mm.push_back(static_cast<float>(Plate::kLengthMm / 2));
+  }
+  return recording;
+}
+
 }  // namespace
+
+void add_silent_passes(WindowSet& windows, std::uint64_t seed) {
+  const std::size_t count = std::min(kMostSilentPasses, windows.size() / kOthersForASilentPass);
+  for (std::uint64_t i = 0; i < count; ++i)
+    windows.add_one_of_many(silent_pass(RandomStream(seed, kSilentStream + i), windows.settings()),
+                            std::max(1, windows.settings().timesteps / kWindowsOfAPass), false);
+}
 
 void add_random_passes(WindowSet& windows, const RandomPasses& passes) {
   constexpr std::size_t kAtOnce = 64;

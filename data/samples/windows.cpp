@@ -95,8 +95,8 @@ void WindowSet::add(const Recording& recording, const std::string& folder, bool 
   append(recording, folder, {.aside = aside, .varied = true, .stride = settings_.stride});
 }
 
-void WindowSet::add_one_of_many(const Recording& recording, int stride) {
-  append(recording, ".", {.aside = true, .varied = false, .stride = stride});
+void WindowSet::add_one_of_many(const Recording& recording, int stride, bool usual) {
+  append(recording, ".", {.aside = true, .varied = false, .stride = stride, .usual = usual});
 }
 
 void WindowSet::expect_array(const TaxelArray& found) {
@@ -142,7 +142,8 @@ void WindowSet::append(const TrackCard& card, std::size_t plate, const Use& use)
             .first_window = size(),
             .windows = 0,
             .aside = use.aside,
-            .varied = use.varied};
+            .varied = use.varied,
+            .usual = use.usual};
   for (const FrameRange& stretch : card.stretches)
     append(card, stretch, static_cast<std::uint32_t>(use.stride));
   pass.windows = size() - pass.first_window;

@@ -60,6 +60,7 @@ class WindowSet : public Examples {
     std::size_t first_window = 0, windows = 0;  ///< its windows are consecutive, in order of time
     bool aside = false;  ///< only ever trained on: no split tests it (simulated passes beside real ones)
     bool varied = true;  ///< may_vary() of its windows
+    bool usual = true;   ///< usual() of its windows
   };
   struct Position {
     double x_mm = 0, y_mm = 0;
@@ -80,8 +81,8 @@ class WindowSet : public Examples {
   /// STL file beside it. Throws as plate_in_folder() and resample(), std::runtime_error for another array.
   void add(const Recording& recording, const std::string& folder = ".", bool aside = false);
   /// The same for one of many passes that differ in everything: set aside, may_vary() is false, every
-  /// stride-th frame ends a window.
-  void add_one_of_many(const Recording& recording, int stride);
+  /// stride-th frame ends a window. `usual`: usual() of its windows.
+  void add_one_of_many(const Recording& recording, int stride, bool usual = true);
   /// Appends those of all recordings in a directory, of these plates (empty: all). Throws as load, but for
   /// the missing windows.
   void add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside = false,
@@ -115,6 +116,7 @@ class WindowSet : public Examples {
   Position position(std::size_t i) const;
   Zone zone(std::size_t i) const override;
   bool may_vary(std::size_t i) const override { return passes_[pass_of(i)].varied; }
+  bool usual(std::size_t i) const override { return passes_[pass_of(i)].usual; }
   bool contact(std::size_t i) const { return zone(i) == Zone::contact; }
   std::size_t pass_of(std::size_t i) const { return place_of(i).pass; }
   void input(std::size_t i, std::span<float> out) const override { window(i, out); }
@@ -157,6 +159,7 @@ class WindowSet : public Examples {
   struct Use {
     bool aside, varied;
     int stride;
+    bool usual = true;
   };
   void append(const Recording& recording, const std::string& folder, const Use& use);
   void expect_array(const TaxelArray& array);

@@ -262,7 +262,10 @@ void Trainer::save_model(const std::string& path, std::map<std::string, std::str
 std::vector<StoredTensor> Trainer::novelty() const {
   constexpr std::size_t kMostSamples = 20'000;
   if (objective_->latents() == 0) return {};  // a frame alone says nothing of its sensor
-  const std::vector<std::uint32_t> chosen = spread(batching_.indices(), kMostSamples);
+  std::vector<std::uint32_t> usual;
+  std::ranges::copy_if(batching_.indices(), std::back_inserter(usual),
+                       [&](std::uint32_t i) { return data_.usual(i); });
+  const std::vector<std::uint32_t> chosen = spread(usual, kMostSamples);
   const std::size_t count = signal_feature_count(data_.array());
   if (chosen.size() <= count) return {};
   Tensor features(Shape{static_cast<Dim>(chosen.size()), static_cast<Dim>(count)});

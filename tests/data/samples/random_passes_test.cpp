@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "data/recordings/simulator.h"
 #include "data/samples/split.h"
@@ -50,6 +52,76 @@ TEST(RandomPasses, ShowEveryZone) {
   for (std::size_t i = 0; i < windows.size(); ++i) ++zones[static_cast<std::size_t>(windows.zone(i))];
   for (const Zone zone : {Zone::contact, Zone::flat, Zone::air})
     EXPECT_GT(zones[static_cast<std::size_t>(zone)], 30) << static_cast<int>(zone);
+}
+
+// So many windows of one pass, again and again, that any number of silent ones may be shown beside them.
+WindowSet many(WindowSettings settings, std::size_t count) {
+  settings.stride = 1;
+  WindowSet windows(settings);
+  Recording pass = simulate_pass(Plate::named("3_Bumps"), {});
+  pass.array = settings.array.value_or(pass.array);
+  pass.volts.resize(pass.time_s.size() * pass.array.signals());
+  while (windows.size() < count) windows.add(pass);
+  return windows;
+}
+
+TEST(SilentPasses, AreATenthOfTheOthersButNeverMoreThan2400Windows) {
+  for (const std::size_t count : {1U, 3000U, 60'000U}) {
+    WindowSet windows = many(small(), count);
+    const std::size_t own = windows.size();
+    add_silent_passes(windows, 0);
+    EXPECT_NEAR(static_cast<double>(windows.size() - own), std::min(2400.0, static_cast<double>(own) / 10),
+                0.2 * static_cast<double>(own) / 10);
+  }
+  WindowSet nothing(small());
+  add_silent_passes(nothing, 0);
+  EXPECT_EQ(nothing.size(), 0U);
+}
+
+// Signals that stand, drift or are noisy, with the truth of a plain plate.
+TEST(SilentPasses, ShowNothingAndAreNotUsual) {
+  WindowSet windows = many(small(), 24'000);
+  const std::size_t own = windows.size();
+  add_silent_passes(windows, 0);
+  const Split split = make_split(windows, SplitKind::none, 0);
+  for (const std::uint32_t i : split.test) EXPECT_LT(i, own);
+  EXPECT_GT(split.train.size(), own + 2000);
+  EXPECT_TRUE(windows.usual(0));
+  std::vector<float> input(windows.input_size()), target(windows.image().pixels());
+  int standing = 0, moving = 0;
+  for (std::size_t i = own; i < windows.size(); ++i) {
+    EXPECT_FALSE(windows.usual(i) || windows.may_vary(i));
+    EXPECT_EQ(windows.zone(i), Zone::flat);
+    windows.target(i, target);
+    EXPECT_TRUE(std::ranges::all_of(target, [](float z) { return z == 0; }));
+    windows.input(i, input);
+    float most = 0;
+    for (std::size_t k = 16; k < input.size(); ++k) most = std::max(most, std::abs(input[k] - input[k % 16]));
+    (most < 0.01F ? standing : moving) += 1;
+  }
+  EXPECT_GT(standing, 20);
+  EXPECT_GT(moving, 1000);
+}
+
+TEST(SilentPasses, AreTheSameForTheSameSeedAndFitAnyArrayAndRange) {
+  WindowSettings settings = small();
+  settings.array = TaxelArray{.rows = 3, .columns = 5};
+  settings.scaling = {.rest_volts = 40, .span_volts = 40};
+  settings.scaling.levelled = false;
+  const WindowSet others = many(settings, 24'000);
+  WindowSet a = others, b = others, c = others;
+  add_silent_passes(a, 5);
+  add_silent_passes(b, 5);
+  add_silent_passes(c, 6);
+  EXPECT_EQ(a.fingerprint(), b.fingerprint());
+  EXPECT_NE(a.fingerprint(), c.fingerprint());
+  std::vector<float> input(a.input_size());
+  float highest = 0;
+  for (std::size_t i = others.size(); i < a.size(); ++i) {
+    a.input(i, input);
+    highest = std::max(highest, std::ranges::max(input));
+  }
+  EXPECT_GT(highest, 0.9F);
 }
 
 }  // namespace
