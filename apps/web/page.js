@@ -292,13 +292,14 @@ function frame(now) {
   document.body.classList.toggle("away", away);
   setLamp("link", away ? "alarm" : supertac.paused ? "unknown" : "",
           away ? "no connection, trying again" : supertac.paused ? "paused" : "live");
-  if (!supertac.hello || supertac.paused) return;
-  const event = supertac.newest;
+  if (!supertac.hello) return;
+  const event = supertac.paused ? supertac.shown : supertac.newest;
   if (event && event !== supertac.shown || resized) {
     resized = false;
     supertac.shown = event;
     drawPictures(event);
   }
+  if (supertac.paused) return;
   if (event && now - figures > 200) {
     figures = now;
     showFigures(event);

@@ -26,7 +26,7 @@ from browser import Browser, Png
 SLIDES = ["G92 X99.7 Y101.17 Z131.81", "G1 Z91.81 F300", "G1 Y209.17 F600", "G1 Y101.17 F600", "G1 Y155.17 F1200"]
 
 
-def wait_until(what, condition, seconds=20):
+def wait_until(what, condition, seconds=60):
     end = time.monotonic() + seconds
     while not (value := condition()):
         assert time.monotonic() < end, f"not within {seconds} s: {what}"
@@ -131,11 +131,13 @@ def text(browser, name):
 def check_changes(browser):
     """Both pictures change while the finger slides."""
     pictures, arrays = set(), set()
-    for _ in range(20):
+
+    def more():
         pictures.add(browser.js("return String(supertac.shown.picture)"))
         arrays.add(browser.js("return String(supertac.shown.felt)"))
-        time.sleep(0.1)
-    assert len(pictures) > 10 and len(arrays) > 10, (len(pictures), len(arrays))
+        return len(pictures) > 10 and len(arrays) > 10
+
+    wait_until("more than ten different pictures and arrays", more)
 
 
 def colours_on_screen(browser):
@@ -159,14 +161,24 @@ def expected_colours(values, colour_map):
 
 
 def check_pause(browser):
-    """Space holds the picture and lets it go again. Returns what was seen meanwhile."""
+    """Space holds the picture and lets it go again; what is chosen meanwhile is drawn. Returns what was seen."""
     browser.press(" ")
-    time.sleep(0.2)
+    wait_until("it says so", lambda: text(browser, "link") == "paused")
+    if browser.js("return document.getElementById('guess').checked"):
+        browser.press("g")
+    # a browser that is short of time shows what was drawn some frames later
+    browser.js("return new Promise(done => { let n = 0; (function frame() { ++n < 5 ? requestAnimationFrame(frame) : done(n); })(); })")
     before, newest = shown(browser), browser.js("return supertac.newest.n")
-    seen = colours_on_screen(browser)
+    shots = [None, colours_on_screen(browser)]
+
+    def settled():
+        shots[:] = shots[1], colours_on_screen(browser)
+        return shots[0] == shots[1]
+
+    wait_until("two screenshots alike", settled)
+    seen = shots[1]
     wait_until("the stream goes on", lambda: browser.js("return supertac.newest.n") > newest + 200)
     assert shown(browser) == before
-    assert text(browser, "link") == "paused"
     browser.press(" ")
     wait_until("the picture goes on", lambda: shown(browser) > before + 200)
     return seen
@@ -193,7 +205,7 @@ def check_record(browser, folder):
     data = (folder / name).read_bytes()
     assert bytes(fetched) == data
     header, _ = read_safetensors(data)
-    assert 1000 <= header["pictures"]["shape"][0] < 4000 and "volts" in header, header
+    assert 500 <= header["pictures"]["shape"][0] < 20000 and "volts" in header, header
 
 
 def check_snapshot(browser, folder):
@@ -231,15 +243,13 @@ def check_page(binaries, folder, browser, screenshots):
         rig.move(SLIDES)
         wait_until("contact", lambda: felt(browser) > 0.06)
         check_changes(browser)
-        if browser.js("return document.getElementById('guess').checked"):
-            browser.press("g")
         seen = [check_pause(browser) for _ in range(3)]
         wait_until("a texture with its probability", lambda: re.fullmatch(r"(6_Ridges|3_Bumps), \d+ %", text(browser, "texture")))
         if screenshots:
             keep_screenshots(browser, screenshots)
         check_record(browser, folder)
         check_snapshot(browser, folder)
-        wait_until("rest on the texture", lambda: felt(browser) > 0.06 and is_at_rest(browser), 30)
+        wait_until("rest on the texture", lambda: felt(browser) > 0.06 and is_at_rest(browser))
         check_rezero(browser)
         colour_map = browser.js("return Array.from(supertac.hello.map)")
         stream.stop()
