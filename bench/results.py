@@ -128,9 +128,18 @@ def duration(us):
     return f"{us / 1000:.2f} ms" if us >= 1000 else f"{us:.0f} us"
 
 
+PACKAGES = {"pytorch": "torch", "torch.compile": "torch", "onnx": "onnxruntime", "openvino": "openvino"}
+
+
+def with_version(peer, versions):
+    """A peer's name, followed by the version of its package as compare.py found it."""
+    known = dict(zip(versions.split()[::2], versions.split()[1::2]))
+    return f"{peer} {known[package].split('+')[0]}" if (package := PACKAGES.get(peer.split()[0])) in known else peer
+
+
 def speed(file="peers.csv"):
     return table(["", "SuperTac", "compared with", "", "times as fast (95 % interval)", "share of FMA peak"],
-                 [[TASKS[r["task"]], duration(r["ours_us"]), r["peer"], duration(r["peer_us"]),
+                 [[TASKS[r["task"]], duration(r["ours_us"]), with_version(r["peer"], r["versions"]), duration(r["peer_us"]),
                    f"{float(r['ratio']):.1f} ({float(r['ratio_low']):.1f} to {float(r['ratio_high']):.1f})",
                    f"{100 * float(r['ours_share']):.0f} %"] for r in rows(file)])
 
@@ -313,6 +322,7 @@ def left_out():
     share = lambda chosen, column: f"{100 * mean([float(r[column]) for r in chosen]):.1f} %"
     line = lambda name, seeds, chosen: [name, seeds, over_seeds(chosen, "contact_ssim", 3), over_seeds(chosen, "contact_psnr_db", 1),
                                         share(chosen, "miss_rate"), share(chosen, "flat_ghost_rate"), share(chosen, "coverage"),
+                                        over_seeds(chosen, "copy_ssim", 3) if chosen[0].get("copy_ssim") else "",
                                         over_seeds(chosen, "specialist_ssim", 3) if chosen[0].get("specialist_ssim") else ""]
     lines = []
     for plate in dict.fromkeys(r["left_out"] for r in found):
@@ -327,7 +337,8 @@ def left_out():
     simulated = [{column.replace("random_", "contact_" if "ssim" in column or "psnr" in column else "flat_" if "ghost" in column else ""): value
                   for column, value in r.items() if column.startswith("random_")} for r in found]
     lines.append(line("simulated plates that no training draws", f"{len(found)} networks", simulated))
-    return table(["plate that was left out", "seeds", "contact SSIM", "PSNR dB", "misses", "ghosts on flat", "intervals hold", "a specialist's SSIM"], lines)
+    return table(["plate that was left out", "seeds", "contact SSIM", "PSNR dB", "misses", "ghosts on flat", "intervals hold",
+                  "SSIM on a simulated copy of it", "a specialist's SSIM"], lines)
 
 
 def simulated_only():
@@ -358,6 +369,21 @@ def whole_passes():
                       f"{middle('spread_near') / middle('spread_far'):.2f}"])
     return table(["network", "windows of", "seeds", "contact SSIM", "PSNR dB", "position mm", "misses", "ghosts on flat", "intervals hold",
                   "SSIM of the surest 80 %", "AUROC of SSIM below .8", "spread at 0 to 15 mm / beyond 30"], lines)
+
+
+def silent_signals():
+    found = rows("audit/silent_signals.csv")
+    strengths = [("constant", "0"), *(("noisy", s) for s in ("0.003", "0.01", "0.02", "0.04")),
+                 *(("drifting", s) for s in ("0.003", "0.02", "0.05", "0.1"))]
+    lines = []
+    for network in dict.fromkeys((r["network"], r["silence_shown"]) for r in found):
+        chosen = [r for r in found if (r["network"], r["silence_shown"]) == network]
+        ghosts = lambda signals, strength: mean([float(r["ghost_rate"]) for r in chosen
+                                                 if (r["signals"], r["strength"]) == (signals, strength)])
+        lines.append([f"{network[0]}, {network[1]}", ", ".join(dict.fromkeys(r["seed"] for r in chosen)),
+                      *(f"{100 * ghosts(*strength):.1f} %" for strength in strengths)])
+    return table(["network, silence shown in training", "seeds", "constant", *(f"noise {s}" for k, s in strengths if k == "noisy"),
+                  *(f"drift {s}" for k, s in strengths if k == "drifting")], lines)
 
 
 def corruptions():
@@ -404,12 +430,12 @@ def tried():
 
 
 SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, speed_avx2, precision, streaming, growth, pixels, textures, simulator, stability,
-                   rig, page, hostile, promises, mutation, whole_passes, corruptions, unknown_plates, demo, tried, left_out, never_felt, simulated_only, finger_fit, terms],
+                   rig, page, hostile, promises, mutation, whole_passes, silent_signals, corruptions, unknown_plates, demo, tried, left_out, never_felt, simulated_only, finger_fit, terms],
             README: [accuracy, speed]}
 
 
 # Lines of the page's tables that the README leaves out.
-NOT_IN_README = re.compile(r"^\| (nearest|(inference|in int8)[^|]*\| [^|]* \| (pytorch eager|onnx runtime|onnx runtime int8|openvino int8) |[^|]*batch 8 ).*\n", re.MULTILINE)
+NOT_IN_README = re.compile(r"^\| (nearest|(inference|in int8)[^|]*\| [^|]* \| (pytorch eager|onnx runtime|onnx runtime int8|openvino int8) [\d.]+ |[^|]*batch 8 ).*\n", re.MULTILINE)
 
 
 def rewritten(path):

@@ -8,7 +8,7 @@ set grid
 set key bottom right
 set xrange [20:2000]
 set yrange [0.84:0.9]
-set xlabel "time of one picture, one thread, AVX2 (us)"
+set xlabel "time of one picture, one thread (us)"
 set ylabel "contact SSIM, unseen trial"
 set title "Accuracy against time, each seed, in both precisions"
 plot csv skip 1 using 5:(strcol(2) eq "fp32" ? $3 : NaN) with points pt 7 ps 1.2 lc rgb "#1f5fa8" title "fp32", \
