@@ -189,7 +189,7 @@ Tensor phase_weights(const ConvSettings& s, const Phase& v, const Phase& h, cons
 
 }  // namespace
 
-void Planner::transposed_conv(const TracedOp& op) {
+void Planner::direct_transposed_conv(const TracedOp& op) {
   const ConvSettings& s = op.settings.map;
   const Map x = source_of(op), y = new_results(op);
   for (Dim top = 0; top < s.stride_h; ++top) {

@@ -7,57 +7,6 @@
 
 namespace supertac {
 
-using kernels::ConvSettings;
-
-namespace {
-
-constexpr Dim kTilesAtOnce = 8;
-
-Dim places_of(Dim square) { return (square + 2) * (square + 2); }
-
-bool is_same_3x3(const ConvSettings& s) {
-  return s == ConvSettings{.height = s.height,
-                           .width = s.width,
-                           .kernel_h = 3,
-                           .kernel_w = 3,
-                           .padding_h = 1,
-                           .padding_w = 1};
-}
-
-// Tiles of 4x4 save more products than those of 2x2, but their weights take four times the direct ones' room
-// in the cache: on a small map that is not made up for.
-Dim square_of(const Map& x) {
-  constexpr Dim kFewest = 8;
-  const bool fits = x.height % 4 == 0 && x.width % 4 == 0 && std::min(x.height, x.width) >= kFewest;
-  return fits ? 4 : 2;
-}
-
-struct Winograd {
-  kernels::MapTileJob from, to;
-  Tensor u, bias;  // [kPlaces][place]
-  Dim place;
-  real negative_slope;
-  Map x, y;
-
-  void operator()(const Block& block) const {
-    const auto& set = isa();
-    const Dim tiles = block.images * from.tiles_down * from.tiles_across, places = places_of(from.square);
-    real* v = block.scratch;
-    real* m = v + places * kTilesAtOnce * from.channels;
-    for (Dim first = 0; first < tiles; first += kTilesAtOnce) {
-      kernels::MapTileJob in = from, out = to;
-      in.first = out.first = first;
-      in.count = out.count = std::min(kTilesAtOnce, tiles - first);
-      in.step = in.count * in.channels, out.step = out.count * out.channels;
-      set.map_patches(in, block.begin(x), v);
-      set.places({places, in.count, in.channels, out.channels, place}, v, u.data(), m);
-      set.map_squares(out, m, bias.data(), negative_slope, block.first_pixel(y));
-    }
-  }
-};
-
-}  // namespace
-
 void Planner::load_input(const Variable& input) {
   if (maps_.contains(input.node())) return;
   const Map y = new_map(input);
@@ -91,36 +40,6 @@ void Planner::take_runs(const TracedOp& op) {
       }
     }
   });
-}
-
-void Planner::conv(const TracedOp& op) {
-  const ConvSettings& s = op.settings.map;
-  const Dim cin = op.inputs[0].dim(op.inputs[0].rank() - 1), cout = op.y.dim(op.y.rank() - 1);
-  const bool whole_vectors =
-      cin % kernels::kTransformChannels == 0 && cout % kernels::kTransformChannels == 0;
-  const bool even = s.height % 2 == 0 && s.width % 2 == 0;
-  if (is_same_3x3(s) && cout == 1) return plane_conv(op);
-  if (is_of_bytes(op)) return direct_conv(op);
-  if (is_same_3x3(s) && whole_vectors && even) return winograd(op);
-  direct_conv(op);
-}
-
-void Planner::winograd(const TracedOp& op) {
-  constexpr Dim kPadding = 16;  // powers of two apart the places share cache lines
-  const Map x = map_of(op.inputs[0]), y = new_map(op.y);
-  const Dim place = x.channels * y.channels + kPadding, square = square_of(x);
-  const Dim down = x.height / square, across = x.width / square, places = places_of(square);
-  Winograd step{.from = {down, across, x.strides(), x.channels, square},
-                .to = {down, across, y.strides(), y.channels, square},
-                .u = Tensor(Shape{places, place}),
-                .bias = op.inputs[2].value().clone(),
-                .place = place,
-                .negative_slope = op.settings.negative_slope,
-                .x = x,
-                .y = y};
-  isa().filters({x.channels * y.channels, place, square}, op.inputs[1].value().data(), step.u.data());
-  plan_->scratch_ = std::max(plan_->scratch_, places * kTilesAtOnce * (x.channels + y.channels));
-  plan_->steps_.push_back(std::move(step));
 }
 
 // [3][3][cin][1] -> [cin][column][row]

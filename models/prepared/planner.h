@@ -57,6 +57,8 @@ class Planner {
   void plane_conv(const TracedOp& op);
   void direct_conv(const TracedOp& op);
   void transposed_conv(const TracedOp& op);
+  void transposed_winograd(const TracedOp& op);
+  void direct_transposed_conv(const TracedOp& op);
   void linear(const TracedOp& op);
   void flatten(const TracedOp& op);
   void unflatten(const TracedOp& op);

@@ -58,11 +58,31 @@ struct Vec {
 
 #include "autograd/kernels/fast/isa_inference.inl"
 
+// Vectors of eight where half of sixteen would be idle: the masks cost more than the wider set gains.
+void product_of_any_width(const ProductJob& job, const real* x, real* y) {
+  job.cout <= Vec::kLanes / 2 ? kAvx2Kernels.product(job, x, y) : product(job, x, y);
+}
+
 }  // namespace
 
-const IsaKernels kAvx512Kernels{"avx512",     Vectors::avx512, gather,  gather_rows,  outer,   filters,
-                                filter_grads, patches,         squares, square_grads, product, map_patches,
-                                places,       map_squares,     gate,    mean,         planes,  plane_conv};
+const IsaKernels kAvx512Kernels{"avx512",
+                                Vectors::avx512,
+                                gather,
+                                gather_rows,
+                                outer,
+                                filters,
+                                filter_grads,
+                                patches,
+                                squares,
+                                square_grads,
+                                product_of_any_width,
+                                map_patches,
+                                places,
+                                map_squares,
+                                gate,
+                                mean,
+                                planes,
+                                plane_conv};
 
 }  // namespace supertac::kernels
 
