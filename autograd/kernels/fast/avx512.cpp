@@ -58,24 +58,26 @@ struct Vec {
 
 #include "autograd/kernels/fast/isa_inference.inl"
 
-// Vectors of eight where half of sixteen would be idle: the masks cost more than the wider set gains.
-void product_of_any_width(const ProductJob& job, const real* x, real* y) {
-  job.cout <= Vec::kLanes / 2 ? kAvx2Kernels.product(job, x, y) : product(job, x, y);
+// Few outputs by vectors of eight: half of sixteen would be idle, and masks cost more than the wider set
+// gains.
+template <auto kWide, auto kNarrow, class Job, class... Rest>
+void by_width(const Job& job, Rest... rest) {
+  job.cout <= Vec::kLanes / 2 ? (kAvx2Kernels.*kNarrow)(job, rest...) : kWide(job, rest...);
 }
 
 }  // namespace
 
 const IsaKernels kAvx512Kernels{"avx512",
                                 Vectors::avx512,
-                                gather,
-                                gather_rows,
-                                outer,
+                                by_width<gather, &IsaKernels::gather>,
+                                by_width<gather_rows, &IsaKernels::gather_rows>,
+                                by_width<outer, &IsaKernels::outer>,
                                 filters,
                                 filter_grads,
                                 patches,
                                 squares,
                                 square_grads,
-                                product_of_any_width,
+                                by_width<product, &IsaKernels::product>,
                                 map_patches,
                                 places,
                                 map_squares,
