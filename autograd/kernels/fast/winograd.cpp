@@ -50,10 +50,7 @@ void filter(const ConvTask& s, const real* x, const Tensor& u, const real* bias,
   for (Dim first = 0; first < tiles; first += strip) {
     const Dim count = std::min(strip, tiles - first);
     isa.patches(patches_of(s, first, count), x, v.data());
-    for (Dim place = 0; place < kPlaces; ++place) {
-      isa.gather_rows({nullptr, u.data() + place * place_of(s), nullptr, s.cin, s.cout},
-                      v.data() + place * count * s.cin, m.data() + place * count * s.cout, count);
-    }
+    isa.places({kPlaces, count, s.cin, s.cout, place_of(s)}, v.data(), u.data(), m.data());
     isa.squares(squares_of(s, first, count), m.data(), bias, into, negative_slope, y);
   }
 }
