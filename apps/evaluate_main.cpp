@@ -21,6 +21,7 @@ void declare(Arguments& a) {
   a.option("precision", "NAME", "fp32, or int8: products of bytes, faster on processors with AVX-512 VNNI",
            "fp32");
   a.option("batch", "N", "examples that are drawn at once; their pictures do not depend on it", "64");
+  a.decides_nothing();
   a.option("outputs", "FILE",
            "write inputs as the network takes them, outputs, truths and spreads as safetensors");
   declare_strict(a);

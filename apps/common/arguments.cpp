@@ -117,6 +117,11 @@ Arguments& Arguments::only_with(const std::string& option) {
   return *this;
 }
 
+Arguments& Arguments::decides_nothing() {
+  options_.at(order_.back()).decides = false;
+  return *this;
+}
+
 Arguments& Arguments::more(bool on) {
   more_ = on;
   return *this;
@@ -254,7 +259,7 @@ std::string Arguments::deciding_options() const {
   for (const std::string& name : order_) {
     const Option& option = options_.at(name);
     const bool is_path = option.value != "NAME" && names_path(option.value);
-    if (!given(name) || is_path || kHow.contains(name) || name == "seed") continue;
+    if (!given(name) || is_path || kHow.contains(name) || !option.decides || name == "seed") continue;
     line += option.is_positional ? " " : " --" + name + (option.is_flag ? "" : " ");
     if (!option.is_flag) line += quoted_word(values_.at(name));
   }

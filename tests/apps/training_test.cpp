@@ -73,8 +73,9 @@ TEST_F(Training, GivesTheSameBytesHoweverMuchIsHeldInMemory) {
 TEST_F(Training, AWarningOfCollapseSaysThatItOftenMendsItself) {
   const ProcessResult result = train("idle.safetensors", {"--beta", "100", "--epochs", "12"});
   EXPECT_EQ(result.code, 0) << result.error;
-  EXPECT_NE(result.error.find("no latent number tells windows apart; if that stays so, lower --beta (now 100)"),
-            std::string::npos)
+  EXPECT_NE(
+      result.error.find("no latent number tells windows apart; if that stays so, lower --beta (now 100)"),
+      std::string::npos)
       << result.error;
   EXPECT_NE(result.error.find("early in a run it often mends itself: watch SSIM"), std::string::npos);
 }
@@ -84,6 +85,21 @@ TEST_F(Training, NamesThePlatesThereAre) {
   EXPECT_NE(result.error.find("plate '6_Bump' has no recording in " + path("data") + "; it has those of "),
             std::string::npos)
       << result.error;
+}
+
+TEST_F(Training, EvaluationWritesTheSameBytesForEveryBatch) {
+  ASSERT_EQ(train("batches.safetensors", {"--epochs", "1", "--stride", "64"}).code, 0);
+  std::string first;
+  for (const char* batch : {"64", "7", "1"}) {
+    const std::string outputs = path("outputs.safetensors");
+    const ProcessResult result = run_process(
+        "supertac-evaluate", {"--model", path("batches.safetensors"), "--data", path("data"), "--limit", "20",
+                              "--batch", batch, "--outputs", outputs, "--force"});
+    ASSERT_EQ(result.code, 0) << result.error;
+    const std::string bytes = read_text_file(outputs, 1 << 24);
+    if (first.empty()) first = bytes;
+    EXPECT_TRUE(bytes == first) << "batch " << batch;
+  }
 }
 
 TEST_F(Training, EvaluationSaysThatSplitNoneHasSeenItAll) {
