@@ -63,11 +63,12 @@ Arguments::Arguments(std::string program, std::string purpose)
   flag("help", "print this and exit; supertac help glossary explains the words");
   flag("version", "print version, commit, compiler and exit");
   option("json", "FILE", "also write the results as JSON; '-' is stdout");
-  flag("quiet", "no progress bar and no remarks");
+  flag("quiet", "no progress bar and no remarks").decides_nothing();
   // A program that only looks at files has nothing to share out.
   if (program_ != "supertac-info")
-    option("threads", "N", "worker threads; default OMP_NUM_THREADS, else what the machine grants");
-  flag("force", "replace existing output");
+    option("threads", "N", "worker threads; default OMP_NUM_THREADS, else what the machine grants")
+        .decides_nothing();
+  flag("force", "replace existing output").decides_nothing();
 }
 
 void Arguments::declare(const std::string& name, Option option) {
@@ -252,14 +253,11 @@ std::vector<NamedPath> Arguments::paths() const {
 }
 
 std::string Arguments::deciding_options() const {
-  static const std::set<std::string> kHow = {"json",  "quiet",  "threads",          "force",
-                                             "merge", "ledger", "checkpoint-every", "deadline",
-                                             "shard", "memory"};
   std::string line = program_;
   for (const std::string& name : order_) {
     const Option& option = options_.at(name);
     const bool is_path = option.value != "NAME" && names_path(option.value);
-    if (!given(name) || is_path || kHow.contains(name) || !option.decides || name == "seed") continue;
+    if (!given(name) || is_path || !option.decides || name == "seed") continue;
     line += option.is_positional ? " " : " --" + name + (option.is_flag ? "" : " ");
     if (!option.is_flag) line += quoted_word(values_.at(name));
   }

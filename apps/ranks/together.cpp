@@ -24,6 +24,7 @@ void check_mpi(const Launch& l) {
 void declare_together(Arguments& a) {
   a.more().option("deadline", "S", "under mpirun: give up a process that has not answered for S seconds",
                   "20");
+  a.decides_nothing();
 }
 
 int together(Arguments& a, const std::function<int(Ranks&)>& work) {

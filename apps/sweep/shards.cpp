@@ -58,6 +58,7 @@ void check_row(const std::string& folder, const Shard& shard,
 void declare_shards(Arguments& a) {
   a.option("shard", "I/N",
            "train only part I of N of the grid, I from 1, in an --out of its own (job arrays)");
+  a.decides_nothing();
 }
 
 std::vector<std::string> names_of(const std::vector<GridPoint>& grid) {

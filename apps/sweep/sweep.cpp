@@ -31,6 +31,7 @@ void declare_measuring(Arguments& a) {
            "0");
   a.option("deadline", "S",
            "give up other processes of the sweep when they have written nothing for S seconds", "900");
+  a.decides_nothing();
 }
 
 Sweep::Sweep(const Arguments& a, SweepTable& table) : a_(a), table_(table) { check_settings(); }

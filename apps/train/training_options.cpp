@@ -23,10 +23,12 @@ void declare_training(Arguments& a) {
            "peak of Adam's rate, after warm-up and before the cosine (default: 0.001; preset tiny: 0.002)");
   a.option("lambda", "X", "weight of 1 - SSIM", "0.1");
   a.option("checkpoint-every", "STEPS", "how often the state is saved", "500");
+  a.decides_nothing();
   a.option("ledger", "N",
            "every N steps a line that names parameters, Adam's state and batches by hashes, and twenty "
            "states on the "
            "way, for supertac-check training");
+  a.decides_nothing();
   a.more(false);
 }
 
@@ -62,6 +64,7 @@ void declare_window_training(Arguments& a) {
            "for recordings that do not fit into memory: hold SIZE (500M, 2G) of their samples and read the "
            "others from DIR/.supertac, which is made once and takes as much disk as samples of --rate need "
            "(default: hold all)");
+  a.decides_nothing();
   a.option("also", "DIR", "more recordings to train on, never tested: simulated ones, say");
   a.option("interval-factor", "X",
            "half the width of a pixel's 90 % interval in units of its spread, as supertac-evaluate finds it "
