@@ -16,6 +16,7 @@ constexpr double kGain[kTaxels] = {0.90, 0.18, 0.10, 0.15, 1.60, 0.60, 0.20, 0.6
                                    0.27, 0.55, 0.20, 0.65, 0.50, 0.40, 0.10, 0.80};
 constexpr double kUnknownGain = 0.5;
 constexpr double kRestSpreadVolts = 0.003;
+constexpr std::uint64_t kThresholds = 2000;   // numbers of a mounting that nothing else has taken
 constexpr double kLeastIndentationMm = -1.8;  // of 2.5 mm of texture the finger then still touches the top
 
 // Points of the pad. Along the slide they are as fine as the tip of a ridge; across it little changes.
@@ -117,6 +118,7 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
   for (std::uint64_t c = 0; c < taxels; ++c) {
     const double own = factor(spread * trial.normal(c)) * factor(spread / 3 * pass.normal(c));
     gain_.push_back((settings.with_gains && rig ? kGain[c] : kUnknownGain) * own * common_gain);
+    threshold_.push_back(settings.threshold_mm * std::abs(trial.normal(kThresholds + c)));
     rest_.push_back(rig::kRestVolts + variation * kRestSpreadVolts * sensor.normal(c));
     drift_.push_back(settings.with_drift ? settings.drift_volts_per_s * pass.normal(drifts + c) : 0);
   }
@@ -220,7 +222,8 @@ std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) co
   const std::uint64_t taxels = load.size();
   std::vector<double> volts(taxels);
   for (std::size_t k = 0; k < taxels; ++k) {
-    volts[k] = rest_[k] + drift_[k] * time_s + emi - settings_.volts_per_load * gain_[k] * load[k];
+    const double felt = std::max(0.0, load[k] - threshold_[k]);
+    volts[k] = rest_[k] + drift_[k] * time_s + emi - settings_.volts_per_load * gain_[k] * felt;
     if (settings_.with_noise) volts[k] += settings_.noise_volts * noise.normal(tick * taxels + k);
   }
   return volts;

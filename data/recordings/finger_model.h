@@ -16,6 +16,7 @@ struct SimulatorSettings {
   double rate_hz = 300;
   double indentation_mm = 0.2;  ///< how far the slide's path lies below first contact with the flat plate
   double volts_per_load = 0.9;  ///< drop of a taxel of gain 1 per unit load; load = mean indentation (mm)
+  double threshold_mm = 0;      ///< a taxel feels what its load exceeds; half-normal, other taxels other ones
 
   bool with_mount = true;       ///< the finger gives way: a bump under one row lifts the other rows
   double mount_stiffness = 15;  ///< cubic mm of indented pad per mm
@@ -74,7 +75,7 @@ struct FingerIdentity {
 ///   0),
 /// the mount yields until stiffness * lift = integral of d, and taxel k feels the mean of d around it:
 ///   load_k = sum_u w(u - u_k) d(u),  w a bell of standard deviation pad_sigma, sum 1,
-///   V_k = rest_k - volts_per_load * gain_k * load_k + disturbances.
+///   V_k = rest_k - volts_per_load * gain_k * max(0, load_k - threshold_k) + disturbances.
 /// Radius, sigma, stiffness, slope and the linear law were fitted to the rig's recordings (data/README.md).
 class FingerModel {
  public:
@@ -100,7 +101,7 @@ class FingerModel {
 
   SimulatorSettings settings_;
   std::uint64_t noise_seed_ = 0, noise_stream_ = 0;
-  std::vector<double> gain_, rest_, drift_;  // per taxel
+  std::vector<double> gain_, threshold_, rest_, drift_;  // per taxel
   double indentation_mm_ = 0, vibration_phase_ = 0, emi_phase_ = 0;
   std::vector<double> map_;                           // surface on a grid, x fastest
   std::vector<double> rise_;                          // of the pad's points above its lowest, [across][along]

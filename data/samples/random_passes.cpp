@@ -7,6 +7,7 @@
 #include "data/plates/random_plate.h"
 #include "data/recordings/simulator.h"
 #include "io/random.h"
+#include "io/same_bits.h"
 
 namespace supertac {
 namespace {
@@ -27,9 +28,16 @@ double from_edge_mm(double u) { return std::max(0.0, kEndMm * (2 * u - 1)); }
 // plate with half the signal of the texture, some with as much.
 constexpr double kLeastIndentationMm = -0.5, kMostIndentationMm = 2.2;
 
-// Tilt and gains differ from pass to pass by themselves. Pad, dome and mount are one finger's: with
-// them drawn too, networks were no better on plates never felt (SSIM .451 and .444).
-SimulatorSettings finger_of(const WindowSettings& windows, double filter_s) {
+// Tilt and gains differ from pass to pass by themselves. Mount and dome from half to twice the rig's, the
+// pad's bell by a third either way, and taxels that feel nothing of a light touch: a network that has seen
+// one finger only is lost on the real one (bench/results/README.md, "Plates never felt").
+constexpr double kFingerSpread = 0.7, kPadSpread = 0.28, kMostThresholdMm = 0.15;
+double about(double value, double spread, double u) { return value * same_bits::exp(spread * (2 * u - 1)); }
+
+// The random numbers of a pass.
+enum FingerDraw : std::uint64_t { kFrom, kTo, kIndentation, kMount, kDome, kPad, kThreshold };
+
+SimulatorSettings finger_of(const WindowSettings& windows, double filter_s, const RandomStream& random) {
   SimulatorSettings s;
   s.array = windows.array.value_or(TaxelArray{});
   s.rate_hz = std::max(kLeastRateHz, windows.rate_hz);
@@ -39,6 +47,11 @@ SimulatorSettings finger_of(const WindowSettings& windows, double filter_s) {
   // converter's steps.
   s.noise_volts *= std::sqrt(s.rate_hz / rig::kFrameRateHz);
   s.with_adc = false;
+  s.indentation_mm = std::lerp(kLeastIndentationMm, kMostIndentationMm, random.uniform(kIndentation));
+  s.mount_stiffness = about(s.mount_stiffness, kFingerSpread, random.uniform(kMount));
+  s.dome_radius_mm = about(s.dome_radius_mm, kFingerSpread, random.uniform(kDome));
+  s.pad_sigma_mm = about(s.pad_sigma_mm, kPadSpread, random.uniform(kPad));
+  s.threshold_mm = kMostThresholdMm * random.uniform(kThreshold);
   return s;
 }
 
@@ -47,11 +60,9 @@ Recording simulate(std::uint32_t number, const RandomPasses& passes, const Windo
   const PassSettings pass{.trial = 1,
                           .pass = 1 + static_cast<int>(number % rig::kPasses),
                           .speed_mm_s = passes.speed_mm_s,
-                          .from_mm = from_edge_mm(random.uniform(0)),
-                          .to_mm = Plate::kLengthMm - from_edge_mm(random.uniform(1))};
-  SimulatorSettings finger = finger_of(windows, passes.filter_s);
-  finger.indentation_mm = std::lerp(kLeastIndentationMm, kMostIndentationMm, random.uniform(2));
-  return simulate_pass(random_plate(number), pass, finger, number);
+                          .from_mm = from_edge_mm(random.uniform(kFrom)),
+                          .to_mm = Plate::kLengthMm - from_edge_mm(random.uniform(kTo))};
+  return simulate_pass(random_plate(number), pass, finger_of(windows, passes.filter_s, random), number);
 }
 
 constexpr std::uint64_t kSilentStream = 0x73696c656e74ULL;  // "silent"

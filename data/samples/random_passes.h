@@ -18,8 +18,9 @@ struct RandomPasses {
 /// The first number of a random plate (random_plate()) that training uses; smaller ones are for tests.
 constexpr std::uint32_t kFirstTrainingPlate = 1'000'000;
 
-/// Adds `count` passes, each over a plate of its own with a mounting of its own: gains, tilt, depth, and
-/// where the slide begins and ends are drawn about what the rig's passes show. They are set aside: no split
+/// Adds `count` passes, each over a plate of its own with a finger of its own: gains, tilt, depth, and where
+/// the slide begins and ends are drawn about what the rig's passes show, mount, dome, pad and the load below
+/// which a taxel feels nothing much wider than that. They are set aside: no split
 /// tests them. Computed when called, on all threads, and kept in memory only. A pure function of the
 /// arguments.
 void add_random_passes(WindowSet& windows, const RandomPasses& passes);

@@ -86,6 +86,33 @@ TEST(Simulator, AnyArrayFeelsTheRidgeWhereItIs) {
   EXPECT_THROW(simulate_pass(plate, {}, settings), std::invalid_argument);
 }
 
+// What a threshold takes from a taxel grows with its load up to that threshold and stays there.
+TEST(Simulator, AThresholdTakesNoMoreThanItself) {
+  SimulatorSettings settings = clean();
+  const Plate plate = Plate::named("plain");
+  const FingerModel every(plate, settings, {});
+  settings.threshold_mm = 0.1;
+  const FingerModel deaf(plate, settings, {});
+  std::vector<double> taken(kTaxels);
+  std::vector<double> silent(kTaxels);
+  const std::vector<double> rest = deaf.volts({.x_mm = 18, .y_mm = 54, .z_mm = 5}, 0);
+  for (const double z : {0.0, -0.02, -0.05, -0.1, -0.3, -1.0, -2.0}) {
+    const FingerPose pose{.x_mm = 18, .y_mm = 54, .z_mm = z};
+    const auto loads = every.loads(pose), all = every.volts(pose, 0), some = deaf.volts(pose, 0);
+    for (std::size_t k = 0; k < taken.size(); ++k) {
+      EXPECT_GE(some[k] - all[k], taken[k] - 1e-12) << k << " at " << z;
+      taken[k] = some[k] - all[k];
+      if (loads[k] > 0 && some[k] == rest[k]) ++silent[k];
+    }
+  }
+  EXPECT_GT(std::ranges::count_if(silent, [](double n) { return n > 0; }), kTaxels / 2);
+  for (std::size_t k = 0; k < taken.size(); ++k) {  // pressed harder still, nothing more is taken
+    const FingerPose pose{.x_mm = 18, .y_mm = 54, .z_mm = -2.5};
+    EXPECT_NEAR(deaf.volts(pose, 0)[k] - every.volts(pose, 0)[k], taken[k], 1e-12) << k;
+    EXPECT_GT(taken[k], 0) << k;
+  }
+}
+
 TEST(Simulator, FourPhases) {
   // Without variation the finger presses the flat plate, as half of the rig's passes do.
   const Recording r =
