@@ -1,5 +1,6 @@
 #include "apps/train/training_options.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -185,6 +186,12 @@ static double common_speed(const WindowSet& windows) {
   return speed > 0 ? speed : rig::kSlideMmS;
 }
 
+// Who trains and tests on the simulated finger needs no other one; a real finger is not like it.
+static bool all_simulated(const WindowSet& windows) {
+  return std::ranges::all_of(windows.passes(),
+                             [](const WindowSet::Pass& pass) { return pass.source == "simulated"; });
+}
+
 // --memory, "500M" say; nothing when all recordings are held.
 static std::optional<std::uint64_t> memory_limit(const Arguments& a) {
   if (!a.given("memory")) return std::nullopt;
@@ -222,7 +229,8 @@ WindowSet training_windows(const Arguments& a, const SuperTacSettings& model, st
   const RandomPasses random{.count = random_plates(a, w.scaling),
                             .seed = seed,
                             .speed_mm_s = common_speed(windows),
-                            .filter_s = windows.filter_s().value_or(rig::kFilterS)};
+                            .filter_s = windows.filter_s().value_or(rig::kFilterS),
+                            .other_fingers = !all_simulated(windows)};
   add_random_passes(windows, random);
   if (a.text("augment") == "standard") add_silent_passes(windows, seed);
   return windows;

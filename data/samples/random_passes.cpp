@@ -28,26 +28,31 @@ double from_edge_mm(double u) { return std::max(0.0, kEndMm * (2 * u - 1)); }
 // plate with half the signal of the texture, some with as much.
 constexpr double kLeastIndentationMm = -0.5, kMostIndentationMm = 2.2;
 
-// Tilt and gains differ from pass to pass by themselves. Mount and dome from half to twice the rig's, the
-// pad's bell by a third either way, and taxels that feel nothing of a light touch: a network that has seen
-// one finger only is lost on the real one (bench/results/README.md, "Plates never felt").
-constexpr double kFingerSpread = 0.7, kPadSpread = 0.28, kMostThresholdMm = 0.15;
+// Tilt and gains differ from pass to pass by themselves. Other fingers have a mount and a dome from half to
+// twice the simulated one's, a pad's bell by a third narrower or wider, and taxels that feel nothing of a
+// light touch; and their slides are less deep. Each was chosen on real plates by networks that had seen none
+// (bench/results/README.md, "Plates never felt").
+constexpr double kFingerSpread = 0.7, kPadSpread = 0.28, kMostThresholdMm = 0.15, kMostOfOthersMm = 1.2;
 double about(double value, double spread, double u) { return value * same_bits::exp(spread * (2 * u - 1)); }
 
 // The random numbers of a pass.
 enum FingerDraw : std::uint64_t { kFrom, kTo, kIndentation, kMount, kDome, kPad, kThreshold };
 
-SimulatorSettings finger_of(const WindowSettings& windows, double filter_s, const RandomStream& random) {
+SimulatorSettings finger_of(const RandomPasses& passes, const WindowSettings& windows,
+                            const RandomStream& random) {
   SimulatorSettings s;
   s.array = windows.array.value_or(TaxelArray{});
   s.rate_hz = std::max(kLeastRateHz, windows.rate_hz);
-  s.with_filter = filter_s > 0;
-  s.filter_s = filter_s;
+  s.with_filter = passes.filter_s > 0;
+  s.filter_s = passes.filter_s;
   // The board's moving average is over ten times as many samples: what it leaves of noise and of the
   // converter's steps.
   s.noise_volts *= std::sqrt(s.rate_hz / rig::kFrameRateHz);
   s.with_adc = false;
-  s.indentation_mm = std::lerp(kLeastIndentationMm, kMostIndentationMm, random.uniform(kIndentation));
+  s.indentation_mm =
+      std::lerp(kLeastIndentationMm, passes.other_fingers ? kMostOfOthersMm : kMostIndentationMm,
+                random.uniform(kIndentation));
+  if (!passes.other_fingers) return s;
   s.mount_stiffness = about(s.mount_stiffness, kFingerSpread, random.uniform(kMount));
   s.dome_radius_mm = about(s.dome_radius_mm, kFingerSpread, random.uniform(kDome));
   s.pad_sigma_mm = about(s.pad_sigma_mm, kPadSpread, random.uniform(kPad));
@@ -62,7 +67,7 @@ Recording simulate(std::uint32_t number, const RandomPasses& passes, const Windo
                           .speed_mm_s = passes.speed_mm_s,
                           .from_mm = from_edge_mm(random.uniform(kFrom)),
                           .to_mm = Plate::kLengthMm - from_edge_mm(random.uniform(kTo))};
-  return simulate_pass(random_plate(number), pass, finger_of(windows, passes.filter_s, random), number);
+  return simulate_pass(random_plate(number), pass, finger_of(passes, windows, random), number);
 }
 
 constexpr std::uint64_t kSilentStream = 0x73696c656e74ULL;  // "silent"

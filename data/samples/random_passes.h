@@ -12,16 +12,17 @@ struct RandomPasses {
   std::uint64_t seed = 0;
   double speed_mm_s = rig::kSlideMmS;
   double filter_s =
-      rig::kFilterS;  ///< of the moving average, as the recordings beside them have it; 0 = none
+      rig::kFilterS;           ///< of the moving average, as the recordings beside them have it; 0 = none
+  bool other_fingers = false;  ///< no two alike, for recordings that no simulated finger made
 };
 
 /// The first number of a random plate (random_plate()) that training uses; smaller ones are for tests.
 constexpr std::uint32_t kFirstTrainingPlate = 1'000'000;
 
-/// Adds `count` passes, each over a plate of its own with a finger of its own: gains, tilt, depth, and where
-/// the slide begins and ends are drawn about what the rig's passes show, mount, dome, pad and the load below
-/// which a taxel feels nothing much wider than that. They are set aside: no split
-/// tests them. Computed when called, on all threads, and kept in memory only. A pure function of the
+/// Adds `count` passes, each over a plate of its own with a mounting of its own: gains, tilt, depth, and
+/// where the slide begins and ends are drawn about what the rig's passes show. With other_fingers mount, dome
+/// and pad are drawn as well, and for each taxel the load below which it feels nothing. They are set aside:
+/// no split tests them. Computed when called, on all threads, and kept in memory only. A pure function of the
 /// arguments.
 void add_random_passes(WindowSet& windows, const RandomPasses& passes);
 
