@@ -318,27 +318,30 @@ def never_felt():
 
 
 def left_out():
-    found = rows("left_out.csv")
     share = lambda chosen, column: f"{100 * mean([float(r[column]) for r in chosen]):.1f} %"
-    line = lambda name, seeds, chosen: [name, seeds, over_seeds(chosen, "contact_ssim", 3), over_seeds(chosen, "contact_psnr_db", 1),
-                                        share(chosen, "miss_rate"), share(chosen, "flat_ghost_rate"), share(chosen, "coverage"),
+    line = lambda name, seeds, chosen: [chosen[0]["fingers"], name, seeds, over_seeds(chosen, "contact_ssim", 3),
+                                        over_seeds(chosen, "contact_psnr_db", 1), share(chosen, "miss_rate"),
+                                        share(chosen, "flat_ghost_rate"), share(chosen, "coverage"),
                                         over_seeds(chosen, "copy_ssim", 3) if chosen[0].get("copy_ssim") else "",
                                         over_seeds(chosen, "specialist_ssim", 3) if chosen[0].get("specialist_ssim") else ""]
-    lines = []
-    for plate in dict.fromkeys(r["left_out"] for r in found):
-        chosen = [r for r in found if r["left_out"] == plate]
-        lines.append(line(plate, ", ".join(r["seed"] for r in chosen), chosen))
     four = ("3_Bumps", "6_Bumps", "4_Ridges", "6_Ridges")
-    seeds = dict.fromkeys(r["seed"] for r in found)
-    means = [{column: mean([float(r[column]) for r in found if r["seed"] == seed and r["left_out"] in four])
-              for column in found[0] if column not in ("left_out", "seed")} | {"seed": seed}
-             for seed in seeds if sum(r["seed"] == seed and r["left_out"] in four for r in found) == 4]
-    lines.insert(4, line("mean of the four", ", ".join(r["seed"] for r in means), means))
-    simulated = [{column.replace("random_", "contact_" if "ssim" in column or "psnr" in column else "flat_" if "ghost" in column else ""): value
-                  for column, value in r.items() if column.startswith("random_")} for r in found]
-    lines.append(line("simulated plates that no training draws", f"{len(found)} networks", simulated))
-    return table(["plate that was left out", "seeds", "contact SSIM", "PSNR dB", "misses", "ghosts on flat", "intervals hold",
-                  "SSIM on a simulated copy of it", "a specialist's SSIM"], lines)
+    names = ("left_out", "seed", "fingers")
+    lines = []
+    for fingers, group in itertools.groupby(rows("left_out.csv"), lambda r: r["fingers"]):
+        found = list(group)
+        for plate in dict.fromkeys(r["left_out"] for r in found):
+            chosen = [r for r in found if r["left_out"] == plate]
+            lines.append(line(plate, ", ".join(r["seed"] for r in chosen), chosen))
+        means = [{column: mean([float(r[column]) for r in found if r["seed"] == seed and r["left_out"] in four])
+                  for column in found[0] if column not in names} | {"seed": seed, "fingers": fingers}
+                 for seed in dict.fromkeys(r["seed"] for r in found)
+                 if sum(r["seed"] == seed and r["left_out"] in four for r in found) == 4]
+        lines.append(line("mean of the four", ", ".join(r["seed"] for r in means), means))
+        simulated = [{column.replace("random_", "contact_" if "ssim" in column or "psnr" in column else "flat_" if "ghost" in column else ""): value
+                      for column, value in r.items() if column.startswith("random_")} | {"fingers": fingers} for r in found]
+        lines.append(line("simulated plates that no training draws", f"{len(found)} networks", simulated))
+    return table(["fingers of the random passes", "plate that was left out", "seeds", "contact SSIM", "PSNR dB", "misses", "ghosts on flat",
+                  "intervals hold", "SSIM on a simulated copy of it", "a specialist's SSIM"], lines)
 
 
 def simulated_only():

@@ -38,8 +38,8 @@ void declare_window_training(Arguments& a) {
   a.option("stride", "N", "take every N-th window of a pass", "1");
   a.option(
       "random-plates", "N",
-      "also train on N simulated passes, each over a random plate, so that plates are felt that were never "
-      "trained on",
+      "also train on N simulated passes, each over a random plate (beside recordings of a real finger with a "
+      "finger of its own), so that plates are felt that were never trained on",
       "0");
   a.option("leave-out", "PLATE",
            "with --split texture: the plate that is tested (default: drawn with the seed)");

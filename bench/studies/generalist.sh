@@ -3,7 +3,7 @@
 # real plates, the four known plates on the unseen trial, and simulated plates that no training drew; the specialist beside
 # it. Blind protocol (bench/README.md): choices were made on trial 1; this script is what looks at trial 2.
 #   bench/studies/generalist.sh TEXT_DIR OUT_DIR [BIN_DIR] [SEEDS]
-# About two minutes a network on one core, 18 networks a seed. A finished model is not trained again.
+# About four minutes a network on one core, 18 networks a seed. A finished model is not trained again.
 set -eu
 here="$(cd "$(dirname "$0")" && pwd)"
 text="$1"
@@ -11,7 +11,7 @@ out="$2"
 bin="${3:-build-release/bin}"
 seeds="${4:-0 1 2 3 4}"
 known=3_Bumps,6_Bumps,4_Ridges,6_Ridges
-recipe="--preset tiny --stride 4 --epochs 12 --random-plates 1000"
+recipe="--preset tiny --latent 20 --stride 4 --epochs 12 --random-plates 1500"
 mkdir -p "$out"
 [ -d "$out/recordings" ] || "$bin/supertac-import" "$text" --out "$out/recordings"
 random=$(seq -f random%g -s, 1 24)
