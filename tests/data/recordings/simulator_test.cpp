@@ -94,7 +94,7 @@ TEST(Simulator, AThresholdTakesNoMoreThanItself) {
   settings.threshold_mm = 0.1;
   const FingerModel deaf(plate, settings, {});
   std::vector<double> taken(kTaxels);
-  std::vector<double> silent(kTaxels);
+  std::vector<int> silent(kTaxels);
   const std::vector<double> rest = deaf.volts({.x_mm = 18, .y_mm = 54, .z_mm = 5}, 0);
   for (const double z : {0.0, -0.02, -0.05, -0.1, -0.3, -1.0, -2.0}) {
     const FingerPose pose{.x_mm = 18, .y_mm = 54, .z_mm = z};
@@ -105,7 +105,7 @@ TEST(Simulator, AThresholdTakesNoMoreThanItself) {
       if (loads[k] > 0 && some[k] == rest[k]) ++silent[k];
     }
   }
-  EXPECT_GT(std::ranges::count_if(silent, [](double n) { return n > 0; }), kTaxels / 2);
+  EXPECT_GT(std::ranges::count_if(silent, [](int n) { return n > 0; }), kTaxels / 2);
   for (std::size_t k = 0; k < taken.size(); ++k) {  // pressed harder still, nothing more is taken
     const FingerPose pose{.x_mm = 18, .y_mm = 54, .z_mm = -2.5};
     EXPECT_NEAR(deaf.volts(pose, 0)[k] - every.volts(pose, 0)[k], taken[k], 1e-12) << k;
