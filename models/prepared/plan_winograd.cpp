@@ -21,7 +21,6 @@ struct Filters {
   Dim row = 0, column = 0, side = 0;  // the square of places that are not zero throughout
   Tensor u;                           // [side][side][place]
   Dim y_offset = 0;                   // from the map's first pixel
-  bool holds(Dim r, Dim c) const { return r >= row && r < row + side && c >= column && c < column + side; }
 };
 
 struct Winograd {
@@ -61,8 +60,7 @@ void Winograd::operator()(const Block& block) const {
     in.step = in.count * in.channels, out.step = out.count * out.channels;
     set.map_patches(in, block.first_pixel(x) - x.line() - x.channels, v);
     for (const Filters& f : filters) {
-      for (Dim p = 0; p < side() * side(); ++p)
-        if (!f.holds(p / side(), p % side())) std::fill_n(m + p * out.step, out.step, real(0));
+      if (f.side < side()) std::fill_n(m, side() * side() * out.step, real(0));
       const Dim runs = f.side < side() ? f.side : 1, run = f.side * f.side / runs;
       for (Dim r = 0; r < runs; ++r) {
         const Dim at = (f.row + r) * side() + f.column;
