@@ -22,7 +22,6 @@ void declare(Arguments& a) {
   a.option("pick", "CONDITIONS",
            "name the fastest model for which they hold, e.g. \"ssim>=0.8,position_mm<=0.5\"");
   a.option("merge", "DIR,...", "make --out the sweep whose shards these folders are");
-  a.decides_nothing();
   a.only_with("data");
   declare_grid(a);
   declare_shards(a);

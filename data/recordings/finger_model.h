@@ -16,7 +16,7 @@ struct SimulatorSettings {
   double rate_hz = 300;
   double indentation_mm = 0.2;  ///< how far the slide's path lies below first contact with the flat plate
   double volts_per_load = 0.9;  ///< drop of a taxel of gain 1 per unit load; load = mean indentation (mm)
-  double threshold_mm = 0;      ///< a taxel feels what its load exceeds; half-normal, other taxels other ones
+  double threshold_mm = 0;      ///< |N(0, 1)| times this is the load of which a taxel feels nothing
 
   bool with_mount = true;       ///< the finger gives way: a bump under one row lifts the other rows
   double mount_stiffness = 15;  ///< cubic mm of indented pad per mm

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "data/recordings/recording.h"
 #include "io/json.h"
 #include "io/safetensors.h"
 #include "tests/apps/simulated_data.h"
@@ -183,6 +184,27 @@ TEST_F(Training, RandomPlatesGiveTheSameBytesAndAreNamedInTheModel) {
   EXPECT_EQ(file.metadata().at("random_plates"), "5");
   EXPECT_TRUE(file.tensors().contains("upsampler.spread.weight"));
   EXPECT_TRUE(file.tensors().contains("novelty.mean"));
+}
+
+// The same signals, once as the simulated finger's and once as a real one's.
+TEST_F(Training, RandomPlatesBesideARealFingerAreFeltByOtherFingers) {
+  fs::create_directories(path("real"));
+  for (const auto& entry : fs::directory_iterator(path("data"))) {
+    if (entry.path().extension() != ".safetensors") continue;
+    Recording pass = read_recording(entry.path());
+    pass.source = "imported";
+    write_recording(path("real/" + entry.path().filename().string()), pass);
+  }
+  const auto weights = [](const std::string& name, const std::string& data, std::vector<std::string> more) {
+    more.insert(more.end(), {"--data", path(data), "--epochs", "1"});
+    const ProcessResult result = train(name + ".safetensors", std::move(more));
+    EXPECT_EQ(result.code, 0) << result.error;
+    return SafetensorsFile::read(path(name + ".safetensors")).f32("upsampler.fc.weight");
+  };
+  EXPECT_EQ(weights("one", "data", {}), weights("another", "real", {}));
+  const auto other = weights("other", "real", {"--random-plates", "5"});
+  EXPECT_NE(weights("own", "data", {"--random-plates", "5"}), other);
+  EXPECT_EQ(weights("other_filed", "real", {"--random-plates", "5", "--memory", "1M"}), other);
 }
 
 TEST_F(Training, DataThatTeachNothingAreRemarkedOnAndRefusedUnderStrict) {
