@@ -6,6 +6,7 @@
 #include "apps/common/progress.h"
 #include "apps/common/signals.h"
 #include "io/numbers.h"
+#include "io/text.h"
 #include "models/evaluation.h"
 
 namespace supertac {
@@ -37,7 +38,7 @@ void refuse_leak(const std::vector<ModelFile>& files, const std::string& split_n
 Scored scored_of(const Arguments& a, const ModelFile& file, const std::vector<std::string>& names) {
   return {a.given("split") ? a.choice("split", names) : file.metadata_or("split", "none"),
           a.given("seed") ? a.seed() : parse_uint(file.metadata_or("seed", "0")).value_or(0),
-          file.metadata_or("leave_out", ""),
+          comma_list(file.metadata_or("leave_out", "")),
           {}};
 }
 

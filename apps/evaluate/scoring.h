@@ -18,8 +18,8 @@ namespace supertac {
 struct Scored {
   std::string split_name;
   std::uint64_t seed = 0;
-  std::string leave_out;  ///< of split texture, the plate that is tested; "" = drawn with the seed
-  Split split;            ///< its test side is scored, the baselines are fitted to its training side
+  std::vector<std::string> leave_out;  ///< of split texture, the plates tested; none = drawn with the seed
+  Split split;  ///< its test side is scored, the baselines are fitted to its training side
 };
 
 /// --split, one of `names`, and --seed, or the model's own; the split itself is left to the caller.

@@ -20,7 +20,7 @@ TrainingTask window_task(const Arguments& a, const WindowSet& windows, const Tra
   const std::string name = a.text("split");
   TrainingTask task{.examples = windows,
                     .unit = "windows",
-                    .split = make_split(windows, training_split(a), settings.seed, a.text("leave-out")),
+                    .split = make_split(windows, training_split(a), settings.seed, a.list("leave-out")),
                     .objective = window_objective(windows, settings)};
   task.split.train = without_most_silence(windows, std::move(task.split.train));
   task.origin = origin_of(name, settings.seed, windows, task.split);

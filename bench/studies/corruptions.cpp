@@ -15,6 +15,7 @@
 #include "data/scores/metrics.h"
 #include "io/file.h"
 #include "io/numbers.h"
+#include "io/text.h"
 #include "models/evaluation.h"
 #include "models/interval.h"
 
@@ -112,9 +113,9 @@ int run(Arguments& a) {
   const std::vector<ModelFile> files = load_models(a.list("model"));
   const ModelFile& file = files.front();
   const WindowSet windows = WindowSet::load(a.text("data"), a.list("plates"), file.windows());
-  const Split split =
-      make_split(windows, split_kind(file.metadata_or("split", "none")),
-                 parse_uint(file.metadata_or("seed", "0")).value_or(0), file.metadata_or("leave_out", ""));
+  const Split split = make_split(windows, split_kind(file.metadata_or("split", "none")),
+                                 parse_uint(file.metadata_or("seed", "0")).value_or(0),
+                                 comma_list(file.metadata_or("leave_out", "")));
   const auto chosen = spread(split.test, static_cast<std::size_t>(a.integer("limit", 1, 100'000'000)));
   const Point usual = measure(files, CorruptedWindows(windows, nullptr, 0), chosen);
   const std::string name = a.text("name");

@@ -64,23 +64,29 @@ std::vector<Side> split_trials(const WindowSet& windows) {
   return sides;
 }
 
-std::vector<Side> split_plates(const WindowSet& windows, std::uint64_t seed, const std::string& leave_out) {
+std::vector<Side> split_plates(const WindowSet& windows, std::uint64_t seed,
+                               std::vector<std::string> leave_out) {
   std::vector<Side> sides(windows.passes().size(), Side::train);
   const auto plates = passes_by_plate(windows);
-  if (plates.size() < 2)
+  if (plates.size() < 2 && leave_out.empty())
     throw std::invalid_argument("split texture: the data has " + std::to_string(plates.size()) +
                                 " plate, needs two: one to train on, one to test on");
-  const auto drawn = std::next(plates.begin(),
-                               static_cast<std::ptrdiff_t>(EpochOrder(plates.size(), seed, kPlateStream)[0]));
-  const auto held_out = leave_out.empty() ? drawn : plates.find(leave_out);
-  if (held_out == plates.end())
-    throw std::invalid_argument("split texture: the data has no windows of plate '" + leave_out +
-                                "' to leave out");
-  const Plate& tested = windows.plate(held_out->second.front());
-  for (std::size_t pass = 0; pass < sides.size(); ++pass)
-    if (windows.passes()[pass].windows > 0 && resemble(windows.plate(pass), tested))
-      sides[pass] = Side::neither;
-  for (const std::size_t pass : held_out->second) sides[pass] = Side::test;
+  if (leave_out.empty())
+    leave_out.push_back(std::next(plates.begin(), static_cast<std::ptrdiff_t>(
+                                                      EpochOrder(plates.size(), seed, kPlateStream)[0]))
+                            ->first);
+  for (const std::string& name : leave_out) {
+    const auto held_out = plates.find(name);
+    if (held_out == plates.end())
+      throw std::invalid_argument("split texture: the data has no windows of plate '" + name +
+                                  "' to leave out");
+    const Plate& tested = windows.plate(held_out->second.front());
+    for (std::size_t pass = 0; pass < sides.size(); ++pass)
+      if (sides[pass] == Side::train && windows.passes()[pass].windows > 0 &&
+          resemble(windows.plate(pass), tested))
+        sides[pass] = Side::neither;
+    for (const std::size_t pass : held_out->second) sides[pass] = Side::test;
+  }
   return sides;
 }
 
@@ -242,7 +248,8 @@ std::string name_of(SplitKind kind) {
   throw std::invalid_argument("split: unknown kind");
 }
 
-Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed, const std::string& leave_out) {
+Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
+                 const std::vector<std::string>& leave_out) {
   Split split;
   switch (kind) {
     case SplitKind::window:

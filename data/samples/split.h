@@ -17,8 +17,8 @@ namespace supertac {
 ///            with the literature.
 ///   pass     of each plate a random fifth of its passes (rounded, at least one) is tested: unseen slides.
 ///   trial    trial 1 is trained on, trial 2 tested; other trials are in neither.
-///   texture  one plate, the named one or one drawn at random, is tested; the others are trained on, but for
-///            those that resemble() it, passes set aside included: an unseen surface.
+///   texture  the named plates, or one drawn at random, are tested; the others are trained on, but for
+///            those that resemble() one of them, passes set aside included: unseen surfaces.
 ///   none     all windows are in both: for models that are tested on other data.
 /// Windows of passes set aside (WindowSet::Pass::aside) are trained on in every kind (but for such as split
 /// texture leaves out), and tested in none.
@@ -37,9 +37,9 @@ struct Split {
 /// passes as in WindowSet::passes(); those without windows do not count. A pure function of the set, kind and
 /// seed; trial and none do not use the seed.
 /// Throws std::invalid_argument when a side would be empty, saying what the data lacks.
-/// `leave_out`: of split texture, the plate that is tested.
+/// `leave_out`: of split texture, the plates that are tested.
 Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
-                 const std::string& leave_out = "");
+                 const std::vector<std::string>& leave_out = {});
 
 /// How pairs are divided:
 ///   group  a random fifth of the groups (rounded, at least one) is tested: unseen passes, surfaces, days

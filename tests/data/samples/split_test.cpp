@@ -111,18 +111,36 @@ TEST(Split, TextureLeavesOutTheNamedPlateAndItsLikes) {
     set.add(
         make_recording({.plate = plate, .frames = 40, .level = 1.0F + static_cast<float>(set.size()) / 100}));
   set.add(make_recording({.plate = "bumps12", .frames = 40, .level = 2.5F}), ".", true);
-  const Split split = make_split(set, SplitKind::texture, 7, "3_Bumps");
+  const Split split = make_split(set, SplitKind::texture, 7, {"3_Bumps"});
   std::set<std::string> train, test;
   for (const std::size_t p : passes_of(set, split.train)) train.insert(set.passes()[p].plate);
   for (const std::size_t p : passes_of(set, split.test)) test.insert(set.passes()[p].plate);
   EXPECT_EQ(test, std::set<std::string>{"3_Bumps"});
   EXPECT_EQ(train, (std::set<std::string>{"bumps6", "4_Ridges"}));
   try {
-    make_split(set, SplitKind::texture, 7, "6_Blob");
+    make_split(set, SplitKind::texture, 7, {"6_Blob"});
     FAIL() << "left out a plate that is not there";
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(error.what(), "split texture: the data has no windows of plate '6_Blob' to leave out");
   }
+}
+
+// With all of them left out only passes set aside are trained on, and none that resembles any of them.
+TEST(Split, TextureLeavesOutAllPlatesThatAreNamed) {
+  WindowSet set(wide_settings(16));
+  for (const char* plate : {"3_Bumps", "4_Ridges", "bumps6"})
+    set.add(
+        make_recording({.plate = plate, .frames = 40, .level = 1.0F + static_cast<float>(set.size()) / 100}));
+  for (const char* plate : {"bumps12", "ridges9", "bumps8"})
+    set.add(
+        make_recording({.plate = plate, .frames = 40, .level = 2.0F + static_cast<float>(set.size()) / 100}),
+        ".", true);
+  const Split split = make_split(set, SplitKind::texture, 7, {"3_Bumps", "4_Ridges", "bumps6"});
+  std::set<std::string> train, test;
+  for (const std::size_t p : passes_of(set, split.train)) train.insert(set.passes()[p].plate);
+  for (const std::size_t p : passes_of(set, split.test)) test.insert(set.passes()[p].plate);
+  EXPECT_EQ(test, (std::set<std::string>{"3_Bumps", "4_Ridges", "bumps6"}));
+  EXPECT_EQ(train, std::set<std::string>{"bumps8"});
 }
 
 TEST(Split, NoneTrainsAndTestsOnAll) {
