@@ -174,7 +174,8 @@ std::vector<double> FingerModel::loads(const FingerPose& pose) const {
     for (int j = 0; j < along_; ++j) {
       const auto at = static_cast<std::size_t>(i * along_ + j);
       const double x = kAcrossMm * (i - across_ / 2), y = kAlongMm * (j - along_ / 2);
-      depth[at] = surface(pose.x_mm + x, pose.y_mm + y) - rise_[at] - pose.z_mm;
+      depth[at] =
+          surface(pose.x_mm + x, pose.y_mm + y) - rise_[at] - pose.slope_x * x - pose.slope_y * y - pose.z_mm;
     }
   // Balance of the mount. The excess force is convex and falls with the lift, so Newton's steps from lift 0
   // approach the root from below and never pass it; once the same points touch as before, the last step was

@@ -16,6 +16,7 @@ struct SimulatorSettings {
   double rate_hz = 300;
   double indentation_mm = 0.2;  ///< how far the slide's path lies below first contact with the flat plate
   double volts_per_load = 0.9;  ///< drop of a taxel of gain 1 per unit load; load = mean indentation (mm)
+  double wander = 0;            ///< how much the finger rocks on its way, see simulate_pass()
   double threshold_mm = 0;      ///< |N(0, 1)| times this is the load of which a taxel feels nothing
 
   bool with_mount = true;       ///< the finger gives way: a bump under one row lifts the other rows
@@ -57,6 +58,7 @@ SimulatorSettings without_term(SimulatorSettings settings, const std::string& te
 /// Where the finger's centre is; z_mm = 0 is first contact with the flat plate, negative is pressed.
 struct FingerPose {
   double x_mm = 0, y_mm = 0, z_mm = 0;
+  double slope_x = 0, slope_y = 0;  ///< added to the mounting's tilt, in mm per mm: the pad is higher there
 };
 
 /// Which sensor, on which day: the same identity gives the same finger.
@@ -71,8 +73,8 @@ struct FingerIdentity {
 ///
 /// A point u of the pad, 2 mm apart across and 0.25 mm along the slide and up to 3.5 and 6.5 mm beyond the
 /// outermost taxels, is indented by
-///   d(u) = max(0, plate(x + u_x, y + u_y) - |u|^2 / (2 radius) - slope u - z - lift)   (mm, lowest point at
-///   0),
+///   d(u) = max(0, plate(x + u_x, y + u_y) - |u|^2 / (2 radius) - slope u - z - lift)   (mm, lowest point of
+///   the pad as it is mounted at 0),
 /// the mount yields until stiffness * lift = integral of d, and taxel k feels the mean of d around it:
 ///   load_k = sum_u w(u - u_k) d(u),  w a bell of standard deviation pad_sigma, sum 1,
 ///   V_k = rest_k - volts_per_load * gain_k * max(0, load_k - threshold_k) + disturbances.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <numbers>
 #include <stdexcept>
 
 #include "io/numbers.h"
@@ -27,6 +28,42 @@ FingerPose pose_at(double t, const PassSettings& pass) {
           .y_mm = pass.from_mm + (pass.to_mm - pass.from_mm) * (slid - back),
           .z_mm = rig::kLiftMm * (1 - down + up)};
 }
+
+// Smooth noise along the slide: normal numbers `step` apart and smooth steps between them, octave by octave
+// half as far and of half the variance.
+double rocking(const RandomStream& random, double y_mm) {
+  constexpr std::uint64_t kOctaves = 6, kKnots = 1000;  // numbers of an octave
+  constexpr double kWidestMm = 40, kWeight = 0.7, kBeforePlateMm = 100;
+  double sum = 0, step = kWidestMm, weight = kWeight;
+  for (std::uint64_t octave = 0; octave < kOctaves; ++octave, step /= 2, weight *= std::numbers::sqrt2 / 2) {
+    const double at = (y_mm + kBeforePlateMm) / step, knot = std::floor(at), f = at - knot;
+    const std::uint64_t number = octave * kKnots + static_cast<std::uint64_t>(knot);
+    sum += weight * std::lerp(random.normal(number), random.normal(number + 1), f * f * (3 - 2 * f));
+  }
+  return sum;
+}
+
+// A finger that is dragged over a plate does not keep its angles, and a printer's path is not level.
+class Wander {
+ public:
+  Wander(double strength, std::uint64_t seed, std::uint64_t stream)
+      : strength_(strength),
+        across_(seed, kStream + stream),
+        along_(seed, kStream + stream + 1),
+        height_(seed, kStream + stream + 2) {}
+  void apply(FingerPose& pose) const {
+    constexpr double kHeightMm = 4;  // per unit of slope
+    if (strength_ <= 0) return;
+    pose.slope_x += strength_ * rocking(across_, pose.y_mm);
+    pose.slope_y += strength_ * rocking(along_, pose.y_mm);
+    pose.z_mm += strength_ * kHeightMm * rocking(height_, pose.y_mm);
+  }
+
+ private:
+  static constexpr std::uint64_t kStream = 0x77616e646572ULL;  // "wander"
+  double strength_;
+  RandomStream across_, along_, height_;
+};
 
 void check(const PassSettings& pass, const SimulatorSettings& settings) {
   const auto positive = [](double v) { return std::isfinite(v) && v > 0; };
@@ -89,6 +126,7 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
   // Timing faults have a stream of their own for each pass, so that a loss in one pass does not move
   // another's.
   const RandomStream timing(seed, 0x7469'6d65ULL + finger.noise_stream());
+  const Wander wander(settings.wander, seed, finger.noise_stream());
   MovingAverage filter(
       settings.with_filter ? static_cast<int>(std::lround(settings.filter_s * settings.rate_hz)) : 1);
 
@@ -98,6 +136,7 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
     const double taken = stamp + (settings.with_jitter ? settings.jitter_s * timing.normal(2 * i) : 0.0);
     FingerPose felt = pose_at(taken, pass);
     felt.z_mm += finger.slide_z_mm();
+    wander.apply(felt);
     std::vector<double> volts = finger.volts(felt, taken);
     if (settings.with_adc)
       for (double& v : volts) v = rig::volts_of(rig::adc_of(v));

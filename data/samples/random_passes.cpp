@@ -28,15 +28,16 @@ double from_edge_mm(double u) { return std::max(0.0, kEndMm * (2 * u - 1)); }
 // plate with half the signal of the texture, some with as much.
 constexpr double kLeastIndentationMm = -0.5, kMostIndentationMm = 2.2;
 
-// Tilt and gains differ from pass to pass by themselves. Other fingers have a mount and a dome from half to
-// twice the simulated one's, a pad's bell by a third narrower or wider, and taxels that feel nothing of a
-// light touch; and their slides are less deep. Each was chosen on real plates by networks that had seen none
-// (bench/results/README.md, "Plates never felt").
-constexpr double kFingerSpread = 0.7, kPadSpread = 0.28, kMostThresholdMm = 0.15, kMostOfOthersMm = 1.2;
+// Gains differ from pass to pass by themselves. Other fingers have a mount and a dome from half to twice the
+// simulated one's, a pad as narrow as the peaks of real signals show it and by a fifth narrower or wider,
+// taxels that feel nothing of a light touch, a tilt as real fingers have it, and they rock on their way. Each
+// was chosen on real plates by networks that had seen none (bench/results/README.md, "Plates never felt").
+constexpr double kFingerSpread = 0.7, kPadMm = 1.6, kPadSpread = 0.2, kMostThresholdMm = 0.1,
+                 kTiltSpread = 0.05, kMostWander = 0.025;
 double about(double value, double spread, double u) { return value * same_bits::exp(spread * (2 * u - 1)); }
 
 // The random numbers of a pass.
-enum FingerDraw : std::uint64_t { kFrom, kTo, kIndentation, kMount, kDome, kPad, kThreshold };
+enum FingerDraw : std::uint64_t { kFrom, kTo, kIndentation, kMount, kDome, kPad, kThreshold, kWander };
 
 SimulatorSettings finger_of(const RandomPasses& passes, const WindowSettings& windows,
                             const RandomStream& random) {
@@ -49,14 +50,14 @@ SimulatorSettings finger_of(const RandomPasses& passes, const WindowSettings& wi
   // converter's steps.
   s.noise_volts *= std::sqrt(s.rate_hz / rig::kFrameRateHz);
   s.with_adc = false;
-  s.indentation_mm =
-      std::lerp(kLeastIndentationMm, passes.other_fingers ? kMostOfOthersMm : kMostIndentationMm,
-                random.uniform(kIndentation));
+  s.indentation_mm = std::lerp(kLeastIndentationMm, kMostIndentationMm, random.uniform(kIndentation));
   if (!passes.other_fingers) return s;
   s.mount_stiffness = about(s.mount_stiffness, kFingerSpread, random.uniform(kMount));
   s.dome_radius_mm = about(s.dome_radius_mm, kFingerSpread, random.uniform(kDome));
-  s.pad_sigma_mm = about(s.pad_sigma_mm, kPadSpread, random.uniform(kPad));
+  s.pad_sigma_mm = about(kPadMm, kPadSpread, random.uniform(kPad));
   s.threshold_mm = kMostThresholdMm * random.uniform(kThreshold);
+  s.tilt_spread = kTiltSpread;
+  s.wander = kMostWander * random.uniform(kWander);
   return s;
 }
 

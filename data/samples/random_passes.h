@@ -21,9 +21,9 @@ constexpr std::uint32_t kFirstTrainingPlate = 1'000'000;
 
 /// Adds `count` passes, each over a plate of its own with a mounting of its own: gains, tilt, depth, and
 /// where the slide begins and ends are drawn about what the rig's passes show. With other_fingers mount, dome
-/// and pad are drawn as well, and for each taxel the load below which it feels nothing. They are set aside:
-/// no split tests them. Computed when called, on all threads, and kept in memory only. A pure function of the
-/// arguments.
+/// and pad are drawn as well, for each taxel the load below which it feels nothing, and how much the finger
+/// rocks on its way. They are set aside: no split tests them. Computed when called, on all threads, and kept
+/// in memory only. A pure function of the arguments.
 void add_random_passes(WindowSet& windows, const RandomPasses& passes);
 
 /// Adds passes in which nothing is felt, over a plain plate: taxel k, scaled, stands at

@@ -113,6 +113,42 @@ TEST(Simulator, AThresholdTakesNoMoreThanItself) {
   }
 }
 
+// Without pad, dome and mount a taxel feels the plate where it is: the mean over the taxels is the height,
+// the difference of rows (columns) 9 mm apart the slope along (across).
+TEST(Simulator, AFingerThatWandersRocksAsMuchAsSaid) {
+  SimulatorSettings settings = clean();
+  settings.indentation_mm = 2;  // never lets go
+  const Plate plate = Plate::named("plain");
+  const auto deviations = [&](double wander) {
+    settings.wander = wander;
+    double height = 0, across = 0, along = 0, n = 0;
+    for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+      const Recording r = simulate_pass(plate, {.pass = 4, .from_mm = 20, .to_mm = 100}, settings, seed);
+      for (std::size_t i = 0; i < r.frames(); i += 30) {
+        if (r.lift_mm[i] > 0) continue;
+        double mean = 0, lines[4] = {};
+        for (std::size_t k = 0; k < kTaxels; ++k) {
+          const double load = (rig::kRestVolts - r.volts[i * kTaxels + k]) / settings.volts_per_load / 0.5;
+          mean += load / kTaxels;
+          if (k / 4 == 0) lines[0] += load / 4;
+          if (k / 4 == 3) lines[1] += load / 4;
+          if (k % 4 == 0) lines[2] += load / 4;
+          if (k % 4 == 3) lines[3] += load / 4;
+        }
+        height += std::pow(mean - settings.indentation_mm, 2), ++n;
+        along += std::pow(lines[1] - lines[0], 2), across += std::pow(lines[3] - lines[2], 2);
+      }
+    }
+    return std::vector<double>{std::sqrt(height / n), std::sqrt(along / n), std::sqrt(across / n)};
+  };
+  for (const double still : deviations(0)) EXPECT_LT(still, 1e-6);
+  constexpr double kWander = 0.04, kDeviation = 0.85;
+  const std::vector<double> rocks = deviations(kWander);
+  EXPECT_NEAR(rocks[0], kWander * kDeviation * 4, 0.03);
+  EXPECT_NEAR(rocks[1], kWander * kDeviation * 9, 0.06);
+  EXPECT_NEAR(rocks[2], kWander * kDeviation * 9, 0.06);
+}
+
 TEST(Simulator, FourPhases) {
   // Without variation the finger presses the flat plate, as half of the rig's passes do.
   const Recording r =
