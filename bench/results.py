@@ -355,12 +355,13 @@ def simulated_only():
 
 def finger_fit():
     lines = []
-    for plate, group in itertools.groupby(rows("finger_fit.csv"), lambda r: r["plate"]):
+    where = lambda r: (f"trial {r['trial']}" if r["source"] == "imported" else r["source"], r["plate"])
+    for (source, plate), group in itertools.groupby(rows("finger_fit.csv"), where):
         fitted = [r for r in group if r["pass"] not in "18" and float(r["explained"]) >= 0.6]
-        middle = lambda key: f"{statistics.median(float(r[key]) for r in fitted):.2f}"
-        lines.append([plate, str(len(fitted)), *(middle(key) for key in list(fitted[0])[2:])])
-    return table(["plate", "passes", "explained", "indentation mm", "tilt across", "tilt along", "rise mm in 50 mm", "offset mm"],
-                 lines)
+        middle = lambda key: f"{statistics.median(float(r[key]) for r in fitted):.2f}" if fitted and fitted[0][key] else ""
+        lines.append([source, plate, str(len(fitted)), *(middle(key) for key in list(fitted[0])[4:])])
+    return table(["of", "plate", "passes", "explained", "indentation mm", "tilt across", "tilt along", "rise mm in 50 mm",
+                  "offset mm", "peaks mm wide"], lines)
 
 
 def whole_passes():
