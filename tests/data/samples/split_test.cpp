@@ -168,9 +168,9 @@ TEST(Split, IsAFunctionOfTheSeed) {
 TEST(Split, SaysWhatTheDataLacks) {
   WindowSet set(wide_settings(16));
   set.add(make_recording({.frames = 40}));
-  const auto message = [&](SplitKind kind) -> std::string {
+  const auto message = [&](SplitKind kind, const std::vector<std::string>& leave_out = {}) -> std::string {
     try {
-      make_split(set, kind, 1);
+      make_split(set, kind, 1, leave_out);
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
@@ -182,6 +182,7 @@ TEST(Split, SaysWhatTheDataLacks) {
   EXPECT_EQ(message(SplitKind::trial), "split trial: no window to test on; the data needs trials 1 and 2");
   EXPECT_EQ(message(SplitKind::texture),
             "split texture: the data has 1 plate, needs two: one to train on, one to test on");
+  EXPECT_EQ(message(SplitKind::texture, {"bumps12"}), "split texture: no window to train on");
   EXPECT_EQ(message(SplitKind::window), "nothing was thrown");
 }
 
