@@ -52,7 +52,8 @@ void check_scored(const Arguments& a, const std::vector<ModelFile>& files, Score
       static_cast<std::size_t>(a.integer("limit", 0, std::numeric_limits<std::uint32_t>::max()));
   if (limit > 0) scored.split.test = spread(scored.split.test, limit);
   if (scored.split.train.empty())
-    throw std::runtime_error("the split leaves nothing to fit the baselines on");
+    throw std::runtime_error(
+        "the split leaves nothing to fit the baselines on; --split none fits them to what is tested");
 }
 
 void draw_all(const Arguments& a, const Committee& network, const Examples& examples,

@@ -272,9 +272,12 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
       break;
   }
   if (split.train.empty() || split.test.empty())
-    throw std::invalid_argument("split " + name_of(kind) + ": no window to " +
-                                (split.train.empty() ? "train on" : "test on") +
-                                (kind == SplitKind::trial ? "; the data needs trials 1 and 2" : ""));
+    throw std::invalid_argument(
+        "split " + name_of(kind) + ": no window to " + (split.train.empty() ? "train on" : "test on") +
+        (kind == SplitKind::trial     ? "; the data needs trials 1 and 2"
+         : kind == SplitKind::texture ? "; the data has nothing unlike what is left out: train beside random "
+                                        "plates, score with split none"
+                                      : ""));
   return split;
 }
 

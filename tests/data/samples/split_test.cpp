@@ -182,7 +182,9 @@ TEST(Split, SaysWhatTheDataLacks) {
   EXPECT_EQ(message(SplitKind::trial), "split trial: no window to test on; the data needs trials 1 and 2");
   EXPECT_EQ(message(SplitKind::texture),
             "split texture: the data has 1 plate, needs two: one to train on, one to test on");
-  EXPECT_EQ(message(SplitKind::texture, {"bumps12"}), "split texture: no window to train on");
+  EXPECT_EQ(message(SplitKind::texture, {"bumps12"}),
+            "split texture: no window to train on; the data has nothing unlike what is left out: train "
+            "beside random plates, score with split none");
   EXPECT_EQ(message(SplitKind::window), "nothing was thrown");
 }
 
