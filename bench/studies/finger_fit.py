@@ -72,9 +72,8 @@ def read(path):
     }
 
 
-def slide(path):
+def slide(pass_):
     """Positions and voltages where the finger slides, by y."""
-    pass_ = read(path)
     known = np.isfinite(pass_["position_mm"]).all(1)
     if "lift_mm" in pass_:
         known &= pass_["lift_mm"] <= 0
@@ -83,9 +82,8 @@ def slide(path):
     return position[order], volts[order]
 
 
-def signals(path):
+def signals(position, volts):
     """x, y every mm, signals below rest [y][16] and which of them were cut."""
-    position, volts = slide(path)
     y = np.arange(max(2, position[:, 1].min() + 0.5), min(106, position[:, 1].max() - 0.5))
     along = [np.interp(y, position[:, 1], v) for v in volts.T]
     cut = [np.interp(y, position[:, 1], v) > 0.01 for v in (volts.T <= FLOOR).astype(float)]
@@ -93,10 +91,10 @@ def signals(path):
     return np.median(position[:, 0]), y, felt - np.minimum(np.quantile(felt, 0.02, axis=0), 0.02), np.stack(cut, 1)
 
 
-def peak_width(plate, path):
+def peak_width(plate, position, volts):
     """mm, or nothing where too few peaks stand alone."""
-    (position, volts), step = slide(path), 0.1
-    pitch, y, widths = PLATES[plate][0], np.arange(30, 78, step), []
+    pitch, step, widths = PLATES[plate][0], 0.1, []
+    y = np.arange(30, 78, step)
     for taxel in volts.T:
         felt = REST - np.interp(y, position[:, 1], taxel)
         if felt.max() < 0.02 or felt.max() > 0.95 * (REST - FLOOR):
@@ -107,8 +105,8 @@ def peak_width(plate, path):
     return np.median(widths) if pitch > 6 and len(widths) >= 4 else None
 
 
-def fit(plate, path):
-    x, y, felt, cut = signals(path)
+def fit(plate, position, volts):
+    x, y, felt, cut = signals(position, volts)
 
     def residuals(p):
         load = loads(plate, x, y + p[4], *p[:4])
@@ -126,14 +124,12 @@ def main():
     out = csv.writer(sys.stdout, lineterminator="\n")
     out.writerow("source,trial,plate,pass,explained,indentation_mm,tilt_across,tilt_along,rise_mm_per_50_mm,offset_mm,peak_mm".split(","))
     for folder in map(pathlib.Path, sys.argv[1:]):
-        passes = {path: read(path) for path in folder.glob("*.safetensors")}
-        for path in sorted(passes, key=lambda path: (passes[path]["trial"], path)):
-            about = passes[path]
-            if about["plate"] not in PLATES:
-                continue
-            explained, p = fit(about["plate"], path)
-            peak = peak_width(about["plate"], path)
-            out.writerow([about["source"], about["trial"], about["plate"], about["pass"], f"{explained:.3f}",
+        passes = map(read, sorted(folder.glob("*.safetensors")))
+        for pass_ in sorted((p for p in passes if p["plate"] in PLATES), key=lambda p: p["trial"]):
+            plate, felt = pass_["plate"], slide(pass_)
+            explained, p = fit(plate, *felt)
+            peak = peak_width(plate, *felt)
+            out.writerow([pass_["source"], pass_["trial"], plate, pass_["pass"], f"{explained:.3f}",
                           *(f"{v:.3f}" for v in p), "" if peak is None else f"{peak:.2f}"])
             sys.stdout.flush()
 
