@@ -53,7 +53,7 @@ std::string badge_of(const Arguments& a) {
 }  // namespace
 
 void declare(Arguments& a) {
-  a.option("model", "FILE,...", "model of supertac-train; of several the pictures are averaged")
+  a.option("model", "FILE,...", "model of supertac-train; of several as supertac-evaluate")
       .option("board", "PORT", "port of the tactile board; auto finds it by its USB number")
       .option("replay", "JOURNAL",
               "the raw bytes of --capture, or of a supertac-collect run, instead of a board")
@@ -67,7 +67,8 @@ void declare(Arguments& a) {
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
       .option("classifier", "FILE",
               "name the texture on the page, with a classifier by supertac-classify --out")
-      .option("precision", "NAME", "fp32, or int8: faster on processors with AVX-512 VNNI, slower on others", "fp32")
+      .option("precision", "NAME", "fp32, or int8: faster on processors with AVX-512 VNNI, slower on others",
+              "fp32")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
       .flag("list-ports", "list the serial ports and end");
   declare_web(a);

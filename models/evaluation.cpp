@@ -4,6 +4,7 @@
 #include <exception>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace supertac {
@@ -15,6 +16,7 @@ struct Part {
   std::size_t first;
   Tensor inputs, outputs, targets;
   std::vector<float> spreads;
+  std::vector<std::uint8_t> unfamiliar;
   std::exception_ptr error;
 };
 
@@ -26,9 +28,10 @@ void compute(const Committee& network, const Examples& data, std::span<const std
     data.target(indices[n], part.targets.values().subspan(n * target_size, target_size));
   }
   // Copied, so that what this thread took from its pool goes back there.
-  const Estimate estimate = network.estimate(part.inputs);
+  Estimate estimate = network.estimate(part.inputs);
   std::copy_n(estimate.picture.data(), estimate.picture.size(), part.outputs.data());
   part.spreads.assign(estimate.spread.values().begin(), estimate.spread.values().end());
+  part.unfamiliar = std::move(estimate.unfamiliar);
 }
 
 std::string text(const NetworkFormat& f) {
@@ -58,8 +61,13 @@ void for_each_output(const Committee& network, const Examples& data, std::span<c
     for (std::size_t first = start; first < end; first += batch) {
       const auto count = static_cast<Dim>(std::min(batch, end - first));
       const Shape pictures = network.first().picture_shape(count);
-      parts.push_back(
-          {first, Tensor(network.first().input_shape(count)), Tensor(pictures), Tensor(pictures), {}, {}});
+      parts.push_back({first,
+                       Tensor(network.first().input_shape(count)),
+                       Tensor(pictures),
+                       Tensor(pictures),
+                       {},
+                       {},
+                       {}});
     }
 #pragma omp parallel for schedule(static, 1)
     for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -72,7 +80,7 @@ void for_each_output(const Committee& network, const Examples& data, std::span<c
     }
     for (const Part& p : parts) {
       if (p.error) std::rethrow_exception(p.error);
-      if (!use({p.first, p.inputs, p.outputs, p.targets, p.spreads})) return;
+      if (!use({p.first, p.inputs, p.outputs, p.targets, p.spreads, p.unfamiliar})) return;
     }
   }
 }

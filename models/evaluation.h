@@ -15,13 +15,15 @@ namespace supertac {
 void check_format(const Examples& examples, const Network& network);
 
 /// A batch of results: inputs as the network takes them, outputs, spreads and targets [n,H,W,1], and the
-/// first of their places in `indices`. Spreads are empty where the network has none.
+/// first of their places in `indices`. Spreads are empty where the network has none, `unfamiliar` as in
+/// Estimate.
 struct EvaluatedBatch {
   std::size_t first;
   const Tensor& inputs;
   const Tensor& outputs;
   const Tensor& targets;
   std::span<const float> spreads;
+  std::span<const std::uint8_t> unfamiliar;
 
   std::size_t size() const { return static_cast<std::size_t>(inputs.dim(0)); }
   std::span<const float> input(std::size_t n) const { return sample(inputs, n); }

@@ -52,6 +52,8 @@ struct ModelFile {
   std::map<std::string, std::string> description() const;
   /// An entry of the metadata, or what is to stand for one that is missing.
   std::string metadata_or(const std::string& key, const std::string& otherwise) const;
+  /// Whether it was trained beside random plates, and so feels plates that were never recorded.
+  bool knows_random_plates() const { return metadata_or("random_plates", "0") != "0"; }
 
   // Of kind windows:
   /// Half the width of a pixel's interval in units of its spread.

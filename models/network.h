@@ -1,6 +1,9 @@
 // What all networks that draw have in common.
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include "layers/module.h"
 
 namespace supertac {
@@ -18,6 +21,8 @@ struct Estimate {
   Tensor spread;   ///< the same: how far from the truth a pixel is expected to be; undefined where nothing
                    ///< says so
   Tensor latents;  ///< [N,latents]; undefined for a network without any
+  std::vector<std::uint8_t> unfamiliar;  ///< [N], 1 for a picture that is felt and not recalled; empty where
+                                         ///< networks of one kind alone draw (models/committee.h)
 };
 
 /// The same on the graph.
@@ -51,7 +56,10 @@ inline Estimate Network::estimate(const Tensor& inputs) const {
   const NoGrad no_grad;
   const Drawing drawn = draw(Variable(inputs));
   const auto value = [](const Variable& x) { return x.defined() ? x.value() : Tensor(); };
-  return {.picture = drawn.picture.value(), .spread = value(drawn.spread), .latents = value(drawn.latents)};
+  return {.picture = drawn.picture.value(),
+          .spread = value(drawn.spread),
+          .latents = value(drawn.latents),
+          .unfamiliar = {}};
 }
 
 }  // namespace supertac

@@ -64,7 +64,7 @@ RecordingScores score_all(const Arguments& a, std::span<const ModelFile> files, 
     for (std::size_t m = 0; m < d.pictures.size(); ++m)
       scores.of_method[m].add(d.pictures[m], d.target, zone);
     scores.felt.add(d.example, d.pictures[0], d.target);
-    scores.trust.add(d.example, d.pictures[0], d.target, d.spread, d.input);
+    scores.trust.add(d);
     if (page != nullptr) page->add(d);
     if (outputs != nullptr) outputs->add(d.input, d.pictures[0], d.target, d.spread);
   });

@@ -65,7 +65,8 @@ void draw_all(const Arguments& a, const Committee& network, const Examples& exam
       network, examples, test,
       [&](const EvaluatedBatch& b) {
         for (std::size_t n = 0; n < b.size(); ++n) {
-          Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.spread(n), b.input(n)};
+          Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.spread(n), b.input(n), {}};
+          if (!b.unfamiliar.empty()) drawn.unfamiliar = b.unfamiliar[n] != 0;
           for (std::size_t k = 0; k < baselines.size(); ++k) {
             baselines[k]->predict(b.input(n), plain[k]);
             drawn.pictures.push_back(plain[k]);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -34,8 +35,9 @@ struct Drawn {
   std::uint32_t example;
   std::span<const float> target;
   std::vector<std::span<const float>> pictures;
-  std::span<const float> spread;  ///< of the network's; empty where it has none
-  std::span<const float> input;   ///< as the network takes it
+  std::span<const float> spread;   ///< of the network's; empty where it has none
+  std::span<const float> input;    ///< as the network takes it
+  std::optional<bool> unfamiliar;  ///< as Estimate
 };
 
 /// Draws the test side in order, with a progress bar. Throws Interrupted after a signal.

@@ -20,12 +20,14 @@ double mean_of(std::span<const float> values) {
 
 }  // namespace
 
-void TrustScores::add(std::uint32_t window, std::span<const float> output, std::span<const float> truth,
-                      std::span<const float> spread, std::span<const float> input) {
+void TrustScores::add(const Drawn& drawn) {
+  const std::uint32_t window = drawn.example;
+  const std::span<const float> output = drawn.pictures[0], truth = drawn.target, spread = drawn.spread;
   if (model_.novelty) {
     ++judged_;
-    unlike_ += model_.novelty->unlike_training(signal_features(input, windows_.array())) ? 1 : 0;
+    unlike_ += model_.novelty->unlike_training(signal_features(drawn.input, windows_.array())) ? 1 : 0;
   }
+  if (drawn.unfamiliar && windows_.contact(window)) ++compared_, unfamiliar_ += *drawn.unfamiliar ? 1 : 0;
   if (spread.empty()) return;
   if (windows_.pass_of(window) != pass_) {
     pass_ = windows_.pass_of(window);
@@ -111,6 +113,10 @@ std::vector<std::string> TrustScores::lines() const {
   if (judged_ > 0)
     lines.push_back(percent(static_cast<double>(unlike_) / static_cast<double>(judged_)) +
                     " of the windows are unlike training");
+  if (compared_ > 0)
+    lines.push_back("in contact, " +
+                    percent(static_cast<double>(unfamiliar_) / static_cast<double>(compared_)) +
+                    " of the pictures are felt: what is recalled of known plates does not agree");
   return lines;
 }
 
@@ -127,6 +133,7 @@ nlohmann::ordered_json TrustScores::to_json() const {
     json["spread_far"] = number(width(kFarMm, 1e9));
   }
   if (judged_ > 0) json["unlike_training"] = static_cast<double>(unlike_) / static_cast<double>(judged_);
+  if (compared_ > 0) json["unfamiliar"] = static_cast<double>(unfamiliar_) / static_cast<double>(compared_);
   return json;
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/evaluate/scoring.h"
 #include "data/samples/windows.h"
 #include "models/model_file.h"
 
@@ -23,13 +24,13 @@ class TrustScores {
 
   /// `model`: whose factor and novelty are judged; must outlive this, as the windows.
   TrustScores(const WindowSet& windows, const ModelFile& model) : windows_(windows), model_(model) {}
-  /// Windows of a pass come in the order of time. Without a `spread` nothing is counted of it.
-  void add(std::uint32_t window, std::span<const float> output, std::span<const float> truth,
-           std::span<const float> spread, std::span<const float> input);
+  /// Windows of a pass come in the order of time. Without a spread nothing is counted of it.
+  void add(const Drawn& drawn);
 
   /// For people: nothing for a model that says nothing of its pictures.
   std::vector<std::string> lines() const;
-  /// {"factor", "coverage", "factor_found", "sure_ssim", "auroc", "width_near_mm"..., "unlike_training"}
+  /// {"factor", "coverage", "factor_found", "sure_ssim", "auroc", "width_near_mm"..., "unlike_training",
+  /// "unfamiliar": of the windows in contact}
   nlohmann::ordered_json to_json() const;
 
  private:
@@ -54,7 +55,7 @@ class TrustScores {
   std::vector<Window> contact_;
   std::size_t pass_ = SIZE_MAX, in_contact_of_ = SIZE_MAX;
   double begin_mm_ = 0;
-  std::uint64_t judged_ = 0, unlike_ = 0;
+  std::uint64_t judged_ = 0, unlike_ = 0, compared_ = 0, unfamiliar_ = 0;
 };
 
 }  // namespace supertac

@@ -90,8 +90,13 @@ std::optional<double> PictureMaker::distance_limit() const {
   return model_.novelty ? std::optional(model_.novelty->limit()) : std::nullopt;
 }
 
+std::optional<bool> PictureMaker::unfamiliar() const {
+  return output_.unfamiliar.empty() ? std::nullopt : std::optional(output_.unfamiliar.front() != 0);
+}
+
 PictureFormat PictureMaker::format() const {
-  return {model_.array().signals(), image(), output_.spread.defined(), model_.novelty.has_value()};
+  return {model_.array().signals(), image(), output_.spread.defined(), model_.novelty.has_value(),
+          !output_.unfamiliar.empty()};
 }
 
 double PictureMaker::window_s() const {

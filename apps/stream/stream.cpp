@@ -78,7 +78,8 @@ std::string Stream::summary() const {
          " ms, p99 " + format(milliseconds(0.99), 2) + " ms; lost " + std::to_string(counters.missing) +
          ", dropped " + std::to_string(dropped()) +
          (lines_lost_ > 0 ? ", " + std::to_string(lines_lost_) + " lines not taken by their reader" : "") +
-         (unlike_ > 0 ? ", " + std::to_string(unlike_) + " pictures of signals unlike training" : "");
+         (unlike_ > 0 ? ", " + std::to_string(unlike_) + " pictures of signals unlike training" : "") +
+         (unfamiliar_ > 0 ? ", " + std::to_string(unfamiliar_) + " pictures felt and not recalled" : "");
 }
 
 nlohmann::ordered_json Stream::result() const {
@@ -88,6 +89,7 @@ nlohmann::ordered_json Stream::result() const {
           {"frames", frames_},
           {"pictures", pictures()},
           {"unlike_training", unlike_},
+          {"unfamiliar", unfamiliar_},
           {"lost", counters.missing},
           {"dropped", dropped()},
           {"suspect", counters.suspect},
@@ -123,8 +125,8 @@ bool Stream::take(SensorFrame frame) {
 }
 
 void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
-  const Seen seen{pictures() - 1, frame.time_s - first_s_, maker_.volts(),
-                  picture,        maker_.half_widths(),    maker_.distance()};
+  const Seen seen{pictures() - 1,       frame.time_s - first_s_, maker_.volts(),     picture,
+                  maker_.half_widths(), maker_.distance(),       maker_.unfamiliar()};
   if (log_) log_->add(seen);
   if (recorder_) recorder_->add(seen);
   if (udp_ || pipe_) {
@@ -134,7 +136,8 @@ void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
   }
   state_.number = seen.number, state_.time_s = seen.time_s;
   state_.unlike_training = maker_.unlike_training();
-  unlike_ += state_.unlike_training ? 1 : 0;
+  state_.unfamiliar = seen.unfamiliar;
+  unlike_ += state_.unlike_training ? 1 : 0, unfamiliar_ += seen.unfamiliar.value_or(false) ? 1 : 0;
   state_.picture.assign(picture.begin(), picture.end());
   state_.x_mm = frame.x_mm, state_.y_mm = frame.y_mm;
 }

@@ -112,7 +112,11 @@ std::string status_line(const LiveState& state, int columns) {
       (std::isfinite(state.x_mm) ? "  at x " + format(static_cast<double>(state.x_mm), 1) + " y " +
                                        format(static_cast<double>(state.y_mm), 1) + " mm"
                                  : "");
-  if (state.unlike_training) line = "UNLIKE TRAINING  " + line;  // never cut
+  // Never cut.
+  if (state.unlike_training)
+    line = "UNLIKE TRAINING  " + line;
+  else if (state.unfamiliar.value_or(false))
+    line = "felt, not recalled  " + line;
   if (columns > 0) line = line.substr(0, static_cast<std::size_t>(columns));
   return line + "\n";
 }

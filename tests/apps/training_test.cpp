@@ -291,6 +291,30 @@ TEST_F(Training, SeveralModelsAreAveragedUnlessTheySawEachOthersTest) {
   EXPECT_NE(both, b);
 }
 
+// Live and scored: the same choice, said in both.
+TEST_F(Training, ANetworkOfRandomPlatesBesideAnotherFeelsWhatThatDoesNotRecall) {
+  ASSERT_EQ(train("recalls.safetensors", {}).code, 0);
+  ASSERT_EQ(train("feels.safetensors", {"--random-plates", "3", "--epochs", "1"}).code, 0);
+  const std::string both = path("recalls.safetensors") + "," + path("feels.safetensors");
+  const ProcessResult scored = run_process(
+      "supertac-evaluate", {"--model", both, "--data", path("data"), "--json", path("both.json")});
+  ASSERT_EQ(scored.code, 0) << scored.error;
+  EXPECT_NE(scored.out.find("of the pictures are felt"), std::string::npos) << scored.out;
+  const double share = parse_json_limited(bytes("both.json"))["trust"]["unfamiliar"].get<double>();
+  EXPECT_GE(share, 0);
+  EXPECT_LE(share, 1);
+  std::string recording;
+  for (const auto& entry : fs::directory_iterator(path("data")))
+    if (entry.path().extension() == ".safetensors") recording = entry.path().string();
+  const ProcessResult live =
+      run_process("supertac-stream", {"--model", both, "--recording", recording, "--out",
+                                      path("live.safetensors"), "--json", path("live.json")});
+  ASSERT_EQ(live.code, 0) << live.error;
+  const SafetensorsFile seen = SafetensorsFile::read(path("live.safetensors"));
+  EXPECT_EQ(seen.tensors().at("unfamiliar").shape, seen.tensors().at("time_s").shape);
+  EXPECT_TRUE(parse_json_limited(bytes("live.json")).contains("unfamiliar"));
+}
+
 // What a network left out decides what it is tested on, not its seed.
 TEST_F(Training, NetworksThatLeftOutTheSamePlateAreAveraged) {
   const std::string data = path("plates");
