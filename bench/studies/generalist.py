@@ -9,7 +9,7 @@ import sys
 
 COLUMNS = [("contact", "ssim"), ("contact", "psnr_mean_db"), ("contact", "miss_rate"), ("flat", "ghost_rate"),
            ("air", "ghost_rate"), ("trust", "coverage"), ("trust", "factor_found"), ("trust", "sure_ssim"),
-           ("trust", "auroc"), ("trust", "unlike_training")]
+           ("trust", "auroc"), ("trust", "unlike_training"), ("trust", "unfamiliar")]
 
 
 def cell(value):

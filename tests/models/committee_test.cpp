@@ -90,7 +90,7 @@ std::string saved(const std::string& path, std::uint64_t seed, std::optional<rea
 
 const std::map<std::string, std::string> kFeels{{"random_plates", "100"}};
 
-// A flat picture is doubted by s^2 / (s^2 + .005): .14 of it is reached when the two lie .1195 apart.
+// A flat picture is doubted by s^2 / (s^2 + .005): .15 of it is reached when the two lie .125 apart.
 TEST(Committee, RecallsWhatAgreesWithWhatIsFeltAndElseFeels) {
   const TemporaryFolder folder;
   const std::string recalls = saved(folder / "recalls.safetensors", 1, real(0.3), real(0.01), {});
@@ -124,7 +124,7 @@ TEST(Committee, JudgesEachWindowAloneWhateverItsBatch) {
   const TemporaryFolder folder;
   const std::vector<ModelFile> files =
       load_models(std::vector{saved(folder / "a.safetensors", 1, {}, real(0.01), {}),
-                              saved(folder / "b.safetensors", 2, real(0.2), real(0.02), kFeels)});
+                              saved(folder / "b.safetensors", 2, real(0.4), real(0.02), kFeels)});
   const Committee both(files);
   constexpr Dim kWindows = 40;
   Tensor windows = uniform({kWindows, 32, 16}, 5);
