@@ -30,7 +30,7 @@ class TrustScores {
   /// For people: nothing for a model that says nothing of its pictures.
   std::vector<std::string> lines() const;
   /// {"factor", "coverage", "factor_found", "sure_ssim", "auroc", "width_near_mm"..., "unlike_training",
-  /// "unfamiliar": of the windows in contact}
+  /// "unfamiliar": of the windows in contact, "unfamiliar_of_pass": [...]}
   nlohmann::ordered_json to_json() const;
 
  private:
@@ -38,7 +38,7 @@ class TrustScores {
   static constexpr double kBinsPerUnit = 20;
   struct Pass {
     std::array<std::uint64_t, kBins> ratios{};
-    std::uint64_t pixels = 0;
+    std::uint64_t pixels = 0, compared = 0, unfamiliar = 0;
   };
   struct Window {
     double doubt, spread, ssim, felt_mm;
@@ -48,6 +48,9 @@ class TrustScores {
   double auroc() const;
   double ssim_of_surest(double share) const;
   double width(double from_mm, double to_mm) const;
+  /// Of each pass with windows in contact that two kinds of networks drew.
+  std::vector<double> unfamiliar_of_pass() const;
+  double unfamiliar() const;
 
   const WindowSet& windows_;
   const ModelFile& model_;
@@ -55,7 +58,7 @@ class TrustScores {
   std::vector<Window> contact_;
   std::size_t pass_ = SIZE_MAX, in_contact_of_ = SIZE_MAX;
   double begin_mm_ = 0;
-  std::uint64_t judged_ = 0, unlike_ = 0, compared_ = 0, unfamiliar_ = 0;
+  std::uint64_t judged_ = 0, unlike_ = 0;
 };
 
 }  // namespace supertac

@@ -15,7 +15,11 @@ namespace {
 
 constexpr double kMostLateS = 0.02, kWaitS = 0.05, kFiguresEveryS = 0.5, kShowEveryS = 1.0 / 60,
                  kNameEveryS = 0.1;
-constexpr float kTexture = 0.2F;  // a picture without a pixel above this shows none
+constexpr double kPlateS = 5, kJudgedS = 1;  // of pictures with texture: remembered, before the first verdict
+
+bool has_texture(std::span<const float> picture) {
+  return std::ranges::any_of(picture, [](float v) { return v > 0.2F; });
+}
 
 }  // namespace
 
@@ -136,10 +140,19 @@ void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
   }
   state_.number = seen.number, state_.time_s = seen.time_s;
   state_.unlike_training = maker_.unlike_training();
-  state_.unfamiliar = seen.unfamiliar;
+  if (seen.unfamiliar) judge_plate(picture, *seen.unfamiliar);
   unlike_ += state_.unlike_training ? 1 : 0, unfamiliar_ += seen.unfamiliar.value_or(false) ? 1 : 0;
   state_.picture.assign(picture.begin(), picture.end());
   state_.x_mm = frame.x_mm, state_.y_mm = frame.y_mm;
+}
+
+// A running mean over the last kPlateS of pictures with texture; at first over all there are.
+void Stream::judge_plate(std::span<const float> picture, bool unfamiliar) {
+  if (!has_texture(picture)) return;
+  const double newest = std::max(1.0 / static_cast<double>(++textured_), source_.period_s() / kPlateS);
+  unfamiliar_share_ += newest * ((unfamiliar ? 1.0 : 0.0) - unfamiliar_share_);
+  state_.unfamiliar_plate =
+      static_cast<double>(textured_) * source_.period_s() > kJudgedS && unfamiliar_share_ > kUnfamiliarShare;
 }
 
 double Stream::keep_pace(double time_s) const {
@@ -151,7 +164,7 @@ double Stream::keep_pace(double time_s) const {
 
 void Stream::name_texture() {
   state_.texture.clear();
-  if (std::ranges::none_of(state_.picture, [](float v) { return v > kTexture; })) return;
+  if (!has_texture(state_.picture)) return;
   const NamedClassifier::Answer answer = classifier_->name_of(state_.picture);
   state_.texture = answer.name, state_.texture_probability = answer.probability;
 }

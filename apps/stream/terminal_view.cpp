@@ -115,8 +115,8 @@ std::string status_line(const LiveState& state, int columns) {
   // Never cut.
   if (state.unlike_training)
     line = "UNLIKE TRAINING  " + line;
-  else if (state.unfamiliar.value_or(false))
-    line = "felt, not recalled  " + line;
+  else if (state.unfamiliar_plate)
+    line = "UNFAMILIAR PLATE  " + line;
   if (columns > 0) line = line.substr(0, static_cast<std::size_t>(columns));
   return line + "\n";
 }
