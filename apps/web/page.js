@@ -255,7 +255,7 @@ function showFigures(event) {
   set("place", event.x === undefined ? "unknown" : `x ${event.x.toFixed(1)}, y ${event.y.toFixed(1)} mm`);
   if (event.distance === undefined) setLamp("lamp", "unknown", event.picture ? "this model knows no doubt" : "filling the first window");
   else if (event.unlike) setLamp("lamp", "alarm", "UNLIKE TRAINING: do not trust this picture");
-  else if (event.unfamiliar) setLamp("lamp", "unknown", "UNFAMILIAR PLATE: felt, not recalled");
+  else if (event.unfamiliar) setLamp("lamp", "alarm", "UNFAMILIAR PLATE: felt, not recalled");
   else setLamp("lamp", "", "signals as in training");
   if (event.wide) {
     let guesses = 0, sum = 0;
