@@ -9,7 +9,6 @@
 #include "models/interval.h"
 
 namespace supertac {
-
 namespace {
 
 constexpr double kMostDoubt = 0.15;  // chosen on trial 1, as the twentieth below
@@ -42,10 +41,10 @@ Estimate mean_of(std::span<const Prepared> members, const Tensor& inputs) {
 /// Whether what is recalled of a window is to be trusted beside what is felt of it, [H,W] each.
 bool agree(std::span<const real> recalled, std::span<const real> spread, std::span<const real> felt,
            const ImageGrid& grid) {
-  std::vector<real> errors(recalled.size());
-  for (std::size_t i = 0; i < errors.size(); ++i)
-    errors[i] = static_cast<real>(std::sqrt(square(spread[i]) + square(recalled[i] - felt[i]) / 20));
-  return doubt_of(recalled, errors, grid) < kMostDoubt;
+  Tensor errors(Shape{static_cast<Dim>(recalled.size())});  // of a pool: nothing of the heap
+  for (std::size_t i = 0; i < recalled.size(); ++i)
+    errors.values()[i] = static_cast<real>(std::sqrt(square(spread[i]) + square(recalled[i] - felt[i]) / 20));
+  return doubt_of(recalled, errors.values(), grid) < kMostDoubt;
 }
 
 /// Puts what is felt in place of what is recalled wherever the two disagree.
@@ -54,13 +53,14 @@ Estimate gated(Estimate recalled, const Estimate& felt) {
   const ImageGrid grid{.height = static_cast<int>(recalled.picture.dim(1)),
                        .width = static_cast<int>(recalled.picture.dim(2))};
   recalled.picture = recalled.picture.clone(), recalled.spread = recalled.spread.clone();
-  recalled.unfamiliar.assign(windows, 0);
+  recalled.unfamiliar = Tensor(Shape{recalled.picture.dim(0)});
   for (std::size_t n = 0; n < windows; ++n) {
     const auto of = [&](auto& all) { return all.values().subspan(n * grid.pixels(), grid.pixels()); };
-    if (agree(of(recalled.picture), of(recalled.spread), of(felt.picture), grid)) continue;
+    const bool familiar = agree(of(recalled.picture), of(recalled.spread), of(felt.picture), grid);
+    recalled.unfamiliar.values()[n] = familiar ? 0 : 1;
+    if (familiar) continue;
     std::ranges::copy(of(felt.picture), of(recalled.picture).begin());
     std::ranges::copy(of(felt.spread), of(recalled.spread).begin());
-    recalled.unfamiliar[n] = 1;
   }
   return recalled;
 }

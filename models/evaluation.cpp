@@ -4,7 +4,6 @@
 #include <exception>
 #include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace supertac {
@@ -15,8 +14,7 @@ constexpr std::size_t kBatchesAtOnce = 4;
 struct Part {
   std::size_t first;
   Tensor inputs, outputs, targets;
-  std::vector<float> spreads;
-  std::vector<std::uint8_t> unfamiliar;
+  std::vector<float> spreads, unfamiliar;
   std::exception_ptr error;
 };
 
@@ -28,10 +26,10 @@ void compute(const Committee& network, const Examples& data, std::span<const std
     data.target(indices[n], part.targets.values().subspan(n * target_size, target_size));
   }
   // Copied, so that what this thread took from its pool goes back there.
-  Estimate estimate = network.estimate(part.inputs);
+  const Estimate estimate = network.estimate(part.inputs);
   std::copy_n(estimate.picture.data(), estimate.picture.size(), part.outputs.data());
   part.spreads.assign(estimate.spread.values().begin(), estimate.spread.values().end());
-  part.unfamiliar = std::move(estimate.unfamiliar);
+  part.unfamiliar.assign(estimate.unfamiliar.values().begin(), estimate.unfamiliar.values().end());
 }
 
 std::string text(const NetworkFormat& f) {

@@ -23,7 +23,7 @@ struct EvaluatedBatch {
   const Tensor& outputs;
   const Tensor& targets;
   std::span<const float> spreads;
-  std::span<const std::uint8_t> unfamiliar;
+  std::span<const float> unfamiliar;
 
   std::size_t size() const { return static_cast<std::size_t>(inputs.dim(0)); }
   std::span<const float> input(std::size_t n) const { return sample(inputs, n); }

@@ -1,9 +1,6 @@
 // What all networks that draw have in common.
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include "layers/module.h"
 
 namespace supertac {
@@ -17,12 +14,12 @@ struct NetworkFormat {
 
 /// Pictures and what is known of their worth.
 struct Estimate {
-  Tensor picture;  ///< [N,rows scale,columns scale,1]
-  Tensor spread;   ///< the same: how far from the truth a pixel is expected to be; undefined where nothing
-                   ///< says so
-  Tensor latents;  ///< [N,latents]; undefined for a network without any
-  std::vector<std::uint8_t> unfamiliar;  ///< [N], 1 for a picture that is felt and not recalled; empty where
-                                         ///< networks of one kind alone draw (models/committee.h)
+  Tensor picture;     ///< [N,rows scale,columns scale,1]
+  Tensor spread;      ///< the same: how far from the truth a pixel is expected to be; undefined where nothing
+                      ///< says so
+  Tensor latents;     ///< [N,latents]; undefined for a network without any
+  Tensor unfamiliar;  ///< [N], 1 for a picture that is felt and not recalled; undefined where networks of one
+                      ///< kind alone draw (models/committee.h)
 };
 
 /// The same on the graph.

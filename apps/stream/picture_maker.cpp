@@ -91,12 +91,12 @@ std::optional<double> PictureMaker::distance_limit() const {
 }
 
 std::optional<bool> PictureMaker::unfamiliar() const {
-  return output_.unfamiliar.empty() ? std::nullopt : std::optional(output_.unfamiliar.front() != 0);
+  return output_.unfamiliar.defined() ? std::optional(output_.unfamiliar.item() != 0) : std::nullopt;
 }
 
 PictureFormat PictureMaker::format() const {
   return {model_.array().signals(), image(), output_.spread.defined(), model_.novelty.has_value(),
-          !output_.unfamiliar.empty()};
+          output_.unfamiliar.defined()};
 }
 
 double PictureMaker::window_s() const {
