@@ -324,9 +324,16 @@ def left_out():
                                         share(chosen, "flat_ghost_rate"), share(chosen, "coverage"),
                                         over_seeds(chosen, "copy_ssim", 3) if chosen[0].get("copy_ssim") else "",
                                         over_seeds(chosen, "trial2_ssim", 3) if chosen[0].get("trial2_ssim") else "",
-                                        over_seeds(chosen, "specialist_ssim", 3) if chosen[0].get("specialist_ssim") else ""]
+                                        over_seeds(chosen, "specialist_ssim", 3) if chosen[0].get("specialist_ssim") else "",
+                                        over_seeds(chosen, "both_ssim", 3) if chosen[0].get("both_ssim") else "",
+                                        over_seeds(chosen, "both_trial2_ssim", 3) if chosen[0].get("both_trial2_ssim") else "",
+                                        unfamiliar(chosen)]
+    def unfamiliar(chosen):
+        passes = [float(x) for r in chosen for x in r.get("unfamiliar_of_pass", "").split()]
+        return f"{sum(x > 0.1 for x in passes)} of {len(passes)}" if passes else ""
+
     four = ("3_Bumps", "6_Bumps", "4_Ridges", "6_Ridges")
-    names = ("left_out", "seed", "fingers")
+    names = ("left_out", "seed", "fingers", "unfamiliar_of_pass")
     lines = []
     for fingers, group in itertools.groupby(rows("left_out.csv"), lambda r: r["fingers"]):
         found = list(group)
@@ -338,11 +345,13 @@ def left_out():
                  for seed in dict.fromkeys(r["seed"] for r in found)
                  if sum(r["seed"] == seed and r["left_out"] in four for r in found) == 4]
         lines.append(line("mean of the four", ", ".join(r["seed"] for r in means), means))
+        lines[-1][-1] = unfamiliar(found)
         simulated = [{column.replace("random_", "contact_" if "ssim" in column or "psnr" in column else "flat_" if "ghost" in column else ""): value
                       for column, value in r.items() if column.startswith("random_")} | {"fingers": fingers} for r in found]
         lines.append(line("simulated plates that no training draws", f"{len(found)} networks", simulated))
     return table(["fingers of the random passes", "plate that was left out", "seeds", "contact SSIM", "PSNR dB", "misses", "ghosts on flat",
-                  "intervals hold", "SSIM on a simulated copy of it", "on trial 2 imported on its own", "a specialist's SSIM"], lines)
+                  "intervals hold", "SSIM on a simulated copy of it", "on trial 2 imported on its own", "a specialist's SSIM",
+                  "both together", "both on trial 2", "passes called unfamiliar"], lines)
 
 
 def simulated_only():
