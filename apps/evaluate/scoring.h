@@ -27,7 +27,8 @@ struct Scored {
 Scored scored_of(const Arguments& a, const ModelFile& file, const std::vector<std::string>& names);
 
 /// Cuts the test side to --limit. Throws std::runtime_error when what one model is tested on may be what
-/// another was trained on, or no example is left to fit the baselines to.
+/// another was trained on (not where --split none asks for all of them), or no example is left to fit the
+/// baselines to.
 void check_scored(const Arguments& a, const std::vector<ModelFile>& files, Scored& scored);
 
 /// One example with its pictures: that of the network first, then those of the baselines.

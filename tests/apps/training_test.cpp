@@ -275,6 +275,10 @@ TEST_F(Training, SeveralModelsAreAveragedUnlessTheySawEachOthersTest) {
       run_process("supertac-evaluate", {"--model", one + "," + all, "--data", path("data")});
   EXPECT_EQ(mixed.code, 1);
   EXPECT_NE(mixed.error.find("split pass, another with none"), std::string::npos) << mixed.error;
+  const ProcessResult every =
+      run_process("supertac-evaluate",
+                  {"--model", one + "," + all, "--data", path("data"), "--split", "none", "--limit", "20"});
+  EXPECT_EQ(every.code, 0) << every.error;
   const ProcessResult seen =
       run_process("supertac-evaluate", {"--model", all, "--data", path("data"), "--limit", "20"});
   EXPECT_NE(seen.error.find("it has seen every one of them"), std::string::npos) << seen.error;
