@@ -14,9 +14,8 @@ namespace supertac {
 /// Keeps pictures for a safetensors file of tensors time_s F64 [n], volts F32 [n,signals] and pictures F32
 /// [n,height,width]; of a model that says how sure it is also half_widths F32 [n,height,width], of its
 /// pixels' 90 % intervals, and distances F32 [n] from its training; of two kinds of models unfamiliar U8 [n].
-/// How many there will be is not known
-/// before the end, and they do not fit into memory (1 MB/s): they wait in nameless temporary files beside the
-/// final one.
+/// How many there will be is not known before the end, and they do not fit into memory (1 MB/s): they wait in
+/// nameless temporary files beside the final one.
 class PictureLog {
  public:
   /// Throws FileError when `path` cannot be made there, or exists without `force`.

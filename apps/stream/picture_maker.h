@@ -30,9 +30,9 @@ class PictureMaker {
   /// (models/novelty.h); nothing when the model does not say.
   std::optional<double> distance() const { return distance_; }
   std::optional<double> distance_limit() const;
+  bool unlike_training() const { return distance_ && *distance_ > *distance_limit(); }
   /// Whether it is felt and not recalled (models/committee.h); nothing of models of one kind.
   std::optional<bool> unfamiliar() const;
-  bool unlike_training() const { return distance_ && *distance_ > *distance_limit(); }
 
   /// Takes what the array has felt in the last moments (kRestS) for "nothing": each signal is moved so that
   /// it rests where it rested in training, from the next frame on.
