@@ -102,11 +102,5 @@ TEST_F(SeveralModels, NetworksThatLeftOutTheSamePlateAreAveraged) {
       << leak.error;
 }
 
-struct Bad {
-  std::vector<std::string> arguments;
-  int code;
-  std::string message;
-};
-
 }  // namespace
 }  // namespace supertac

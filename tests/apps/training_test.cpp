@@ -252,6 +252,11 @@ TEST_F(Training, BadInputIsOneLineAndLeavesNothingBehind) {
   write_file(path("cut.safetensors"), std::string_view(damaged).substr(0, 1000));
   fs::create_directories(path("empty"));
   const std::string data = path("data"), out = path("never.safetensors"), good = path("good.safetensors");
+  struct Bad {
+    std::vector<std::string> arguments;
+    int code;
+    std::string message;
+  };
   const std::vector<Bad> cases{
       {{"supertac-train", "--data", data, "--out", out, "--timesteps", "40"}, 2, "multiple of 16"},
       {{"supertac-train", "--data", data, "--out", out, "--timesteps", "1024"}, 2, "--timesteps"},
