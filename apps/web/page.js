@@ -345,6 +345,7 @@ function snapshot() {
   g.scale(2, 2);
   const root = document.documentElement.style;
   root.setProperty("--quiet", "#333");
+  const alarm = event.unlike ? "; UNLIKE TRAINING" : event.unfamiliar ? "; UNFAMILIAR PLATE" : "";
   const place = event.x === undefined ? "" : `, finger at x ${event.x.toFixed(1)} mm, y ${event.y.toFixed(1)} mm`;
   g.fillStyle = "#111";
   g.textBaseline = "top";
@@ -366,7 +367,7 @@ function snapshot() {
   g.fillStyle = "#333";
   g.font = "11px system-ui, sans-serif";
   g.textAlign = "left";
-  g.fillText(`${h.badge}: ${h.source}; ${event.t.toFixed(3)} s${place}${event.unlike ? "; UNLIKE TRAINING" : ""}`, 40, 481);
+  g.fillText(`${h.badge}: ${h.source}; ${event.t.toFixed(3)} s${place}${alarm}`, 40, 481);
   root.removeProperty("--quiet");
   const link = document.createElement("a");
   link.download = `supertac_${event.t.toFixed(3)}s.png`;
