@@ -232,7 +232,8 @@ WindowSet training_windows(const Arguments& a, const SuperTacSettings& model, st
                             .filter_s = windows.filter_s().value_or(rig::kFilterS),
                             .other_fingers = !all_simulated(windows)};
   add_random_passes(windows, random);
-  if (a.text("augment") == "standard") add_silent_passes(windows, seed);
+  if (a.text("augment") == "standard")
+    add_silent_passes(windows, seed, random.count > 0 && random.other_fingers);
   return windows;
 }
 

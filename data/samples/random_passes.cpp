@@ -73,11 +73,11 @@ Recording simulate(std::uint32_t number, const RandomPasses& passes, const Windo
 
 constexpr std::uint64_t kSilentStream = 0x73696c656e74ULL;  // "silent"
 // Each two windows long and good for eight: other levels teach more than the same again.
-constexpr std::size_t kMostSilentPasses = 300, kOthersForASilentPass = 80;
+constexpr std::size_t kFewSilentPasses = 300, kOthersForASilentPass = 80;
 constexpr int kWindowsLong = 2, kWindowsOfAPass = 8;
 constexpr double kMostNoise = 0.05, kMostDrift = 0.1;
 
-Recording silent_pass(const RandomStream& random, const WindowSettings& windows) {
+Recording silent_pass(const RandomStream& random, const WindowSettings& windows, bool faint) {
   enum Draw : std::uint64_t { kPressed, kNoise, kDrift, kTaxels = 10, kSamples = 10'000 };
   Recording recording;
   recording.array = windows.array.value_or(TaxelArray{});
@@ -86,8 +86,8 @@ Recording silent_pass(const RandomStream& random, const WindowSettings& windows)
   const std::size_t signals = recording.array.signals();
   // Squares: a light touch and weak disturbances are what is hard to tell from a texture.
   const auto square = [&](Draw i) { return random.uniform(i) * random.uniform(i); };
-  const double pressed = square(kPressed), noise = kMostNoise * square(kNoise),
-               drift = kMostDrift * square(kDrift);
+  const double pressed = faint ? square(kPressed) * square(kPressed) : square(kPressed);
+  const double noise = kMostNoise * square(kNoise), drift = kMostDrift * square(kDrift);
   for (std::size_t t = 0; t < frames; ++t) {
     const double windows_past =
         (static_cast<double>(t) - static_cast<double>(frames) / 2) / windows.timesteps;
@@ -107,11 +107,14 @@ Recording silent_pass(const RandomStream& random, const WindowSettings& windows)
 
 }  // namespace
 
-void add_silent_passes(WindowSet& windows, std::uint64_t seed) {
-  const std::size_t count = std::min(kMostSilentPasses, windows.size() / kOthersForASilentPass);
-  for (std::uint64_t i = 0; i < count; ++i)
-    windows.add_one_of_many(silent_pass(RandomStream(seed, kSilentStream + i), windows.settings()),
-                            std::max(1, windows.settings().timesteps / kWindowsOfAPass), false);
+void add_silent_passes(WindowSet& windows, std::uint64_t seed, bool many) {
+  const std::size_t tenth = windows.size() / kOthersForASilentPass;
+  const std::size_t count = many ? tenth : std::min(kFewSilentPasses, tenth);
+  const int stride = std::max(1, windows.settings().timesteps / kWindowsOfAPass);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const RandomStream random(seed, kSilentStream + i);
+    windows.add_one_of_many(silent_pass(random, windows.settings(), i >= kFewSilentPasses), stride, false);
+  }
 }
 
 void add_random_passes(WindowSet& windows, const RandomPasses& passes) {
