@@ -7,6 +7,8 @@
 
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/fast/loops.h"
+#include "autograd/orthogonal.h"
+#include "autograd/pool.h"
 
 namespace supertac {
 namespace {
@@ -29,6 +31,21 @@ void update(Dim n, Update u, const real* gradient, real* x, real* m, real* v) {
   });
 }
 
+void turn(const Shape& shape, real clip, double rate, const real* gradient, real* x, real* m) {
+  constexpr real kMomentum = real(0.95), kRest = real(0.05);
+  const Dim n = shape.elements(), columns = shape[shape.rank() - 1], rows = n / columns;
+  Scratch<real> direction(static_cast<std::size_t>(n));
+  real* to = direction.data();
+  kernels::each(n, [=](Dim i) SUPERTAC_LOOP {
+    const real g = clip * gradient[i], moment = flushed(kMomentum * m[i] + kRest * g);
+    m[i] = moment;
+    to[i] = kMomentum * moment + kRest * g;  // Nesterov's
+  });
+  orthogonalise(rows, columns, to);
+  const double length = kMuonLength * rate * std::sqrt(static_cast<double>(std::max(rows, columns)));
+  kernels::add_scaled(n, static_cast<real>(-length), to, x);
+}
+
 // The last bits of the C library's pow depend on the processor; products do not.
 double power(double base, std::int64_t exponent) {
   double result = 1;
@@ -40,6 +57,13 @@ double power(double base, std::int64_t exponent) {
 
 }  // namespace
 
+bool is_matrix(const Shape& shape) {
+  constexpr Dim kFewest = 8;
+  if (shape.rank() < 2) return false;
+  const Dim columns = shape[shape.rank() - 1];
+  return columns >= kFewest && shape.elements() / columns >= kFewest;
+}
+
 Adam::Adam(std::vector<Variable> parameters, const AdamOptions& options)
     : parameters_(std::move(parameters)), options_(options) {
   const auto in_unit = [](double beta) { return beta >= 0 && beta < 1; };
@@ -48,8 +72,10 @@ Adam::Adam(std::vector<Variable> parameters, const AdamOptions& options)
     throw std::invalid_argument(
         "Adam: expects learning_rate >= 0, beta1 and beta2 in [0,1), epsilon > 0, clip_norm >= 0");
   }
-  for (Variable& p : parameters_) {
+  for (std::size_t k = 0; k < parameters_.size(); ++k) {
+    Variable& p = parameters_[k];
     if (!p.requires_grad()) throw std::invalid_argument("Adam: a parameter does not require a gradient");
+    (options.muon && is_matrix(p.shape()) ? matrices_ : others_).push_back(k);
     p.mutable_grad() = Tensor::zeros(p.shape());
     m_.push_back(Tensor::zeros(p.shape()));
     v_.push_back(Tensor::zeros(p.shape()));
@@ -79,9 +105,15 @@ double Adam::step() {
                  static_cast<real>(options_.learning_rate / (1 - power(options_.beta1, steps_))),
                  static_cast<real>(1 / std::sqrt(1 - power(options_.beta2, steps_))),
                  static_cast<real>(options_.epsilon)};
-  for (std::size_t k = 0; k < parameters_.size(); ++k) {
+  for (const std::size_t k : others_) {
     Variable& p = parameters_[k];
     update(p.size(), u, p.grad().data(), p.mutable_value().data(), m_[k].data(), v_[k].data());
+  }
+  // By turns, so that a thread asks its pool for the same blocks in every step.
+#pragma omp parallel for schedule(static, 1)
+  for (const std::size_t k : matrices_) {
+    Variable& p = parameters_[k];
+    turn(p.shape(), u.clip, options_.learning_rate, p.grad().data(), p.mutable_value().data(), m_[k].data());
   }
   return norm;
 }

@@ -1,4 +1,5 @@
-// Adam (Kingma & Ba 2015, algorithm 1) with bias correction and clipping of the gradient norm.
+// Adam (Kingma & Ba 2015, algorithm 1) with bias correction and clipping of the gradient norm; and Muon, by
+// which matrices of weights move on request.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,16 @@ struct AdamOptions {
   double epsilon = 1e-8;
   /// The gradient is scaled down to this L2 norm over all parameters when it is longer; 0 = never.
   double clip_norm = 0;
+  /// Matrices move as Muon has it, whatever else there is as Adam has it.
+  bool muon = false;
 };
+
+/// The mean length of a weight's step by Muon, in learning rates.
+inline constexpr double kMuonLength = 0.2;
+
+/// Whether Muon moves it: [..., columns], eight or more columns (the outputs of a convolution or a linear
+/// layer) and eight or more rows (all that feeds one of them).
+bool is_matrix(const Shape& shape);
 
 class Adam {
  public:
@@ -25,6 +35,12 @@ class Adam {
   /// Sets every gradient to zero; call it before backward().
   void zero_grad();
   /// m = b1 m + (1-b1) g;  v = b2 v + (1-b2) g^2;  x -= lr (m / (1-b1^t)) / (sqrt(v / (1-b2^t)) + epsilon).
+  ///
+  /// Of a matrix [R,C] with `muon`, where O makes it orthogonal (autograd/orthogonal.h):
+  /// m = .95 m + .05 g;  x -= kMuonLength lr sqrt(max(R,C)) O(.95 m + .05 g)
+  /// (Jordan et al. 2024; the root, by which matrices of any shape take steps of one length: Liu et al. 2025,
+  /// arXiv 2502.16982, eq. 4). Its second moment stays 0.
+  ///
   /// Returns the gradient's norm before clipping, infinity when the square of the clipped one overflows
   /// `real`. When it is not finite nothing is changed: check it.
   double step();
@@ -39,6 +55,7 @@ class Adam {
  private:
   std::vector<Variable> parameters_;
   AdamOptions options_;
+  std::vector<std::size_t> matrices_, others_;  // of parameters_
   std::vector<Tensor> m_, v_;
   std::int64_t steps_ = 0;
 };

@@ -9,9 +9,11 @@ namespace supertac {
 namespace {
 
 nlohmann::ordered_json pace_json(const TrainingPace& p) {
-  return {{"epochs", p.epochs},   {"batch", p.batch},
-          {"seed", p.seed},       {"learning_rate", p.learning_rate},
-          {"warm_up", p.warm_up}, {"clip_norm", p.clip_norm}};
+  nlohmann::ordered_json json{{"epochs", p.epochs},   {"batch", p.batch},
+                              {"seed", p.seed},       {"learning_rate", p.learning_rate},
+                              {"warm_up", p.warm_up}, {"clip_norm", p.clip_norm}};
+  if (p.muon) json["optimizer"] = "muon";  // not named otherwise: the text of older files stays the same
+  return json;
 }
 
 template <class Model, class Settings>
@@ -112,7 +114,7 @@ nlohmann::ordered_json to_json(const TrainingSettings& s) {
                {"offset", s.augment.offset},
                {"noise", s.augment.noise},
                {"dropped", s.augment.dropped}});
-  if (!s.sampling) json["sampling"] = false;  // not named otherwise: the text of older files stays the same
+  if (!s.sampling) json["sampling"] = false;  // not named otherwise, as above
   return json;
 }
 

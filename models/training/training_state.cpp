@@ -46,7 +46,8 @@ void TrainingPace::check() const {
 TrainingState::TrainingState(const std::vector<Parameter>& parameters, const TrainingPace& pace,
                              std::int64_t total_steps)
     : parameters_(parameters),
-      adam_(values_of(parameters), {.learning_rate = pace.learning_rate, .clip_norm = pace.clip_norm}),
+      adam_(values_of(parameters),
+            {.learning_rate = pace.learning_rate, .clip_norm = pace.clip_norm, .muon = pace.muon}),
       schedule_{.peak = pace.learning_rate,
                 .warm_up = static_cast<std::int64_t>(pace.warm_up * static_cast<double>(total_steps)),
                 .total = total_steps} {}

@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "autograd/orthogonal.h"
 #include "tests/autograd/check.h"
 
 namespace supertac {
@@ -152,6 +153,49 @@ TEST(Adam, RefusesBadOptions) {
   }
   expect_refusal("Adam: a parameter does not require a gradient",
                  [] { Adam({Variable(Tensor::zeros({1}))}, {}); });
+}
+
+TEST(Muon, MovesMatricesAlongTheOrthogonalFactorAndTheRestAsAdam) {
+  const Tensor start = numbers({16, 24}), gradient = numbers({16, 24}, 2);
+  const Variable w = parameter(start.clone()), b = parameter(Tensor::zeros({24}));
+  const Variable alone = parameter(Tensor::zeros({24}));
+  Adam muon({w, b}, {.learning_rate = 0.01, .muon = true}), adam({alone}, {.learning_rate = 0.01});
+  for (int step = 0; step < 3; ++step) {  // of one gradient: the momentum points along it
+    Variable(w).mutable_grad() = gradient.clone();
+    Variable(b).mutable_grad() = Variable(alone).mutable_grad() = numbers({24}, 3);
+    muon.step(), adam.step();
+  }
+  EXPECT_TRUE(same_bytes(b.value(), alone.value()));
+  Tensor along = gradient.clone();
+  orthogonalise(16, 24, along.data());
+  const double length = 3 * kMuonLength * 0.01 * std::sqrt(24.0);
+  for (Dim i = 0; i < start.size(); ++i) {
+    ASSERT_NEAR(static_cast<double>(w.value().data()[i]),
+                static_cast<double>(start.data()[i]) - length * static_cast<double>(along.data()[i]), 1e-5);
+  }
+  for (const real v : muon.second_moments()[0].values()) ASSERT_EQ(v, 0);
+}
+
+TEST(Muon, WithoutAGradientNothingMoves) {
+  const Variable w = parameter(numbers({8, 9}));
+  Adam muon({w}, {.learning_rate = 0.1, .muon = true});
+  for (int step = 0; step < 10; ++step) muon.step();
+  EXPECT_TRUE(same_bytes(w.value(), numbers({8, 9})));
+  Variable(w).mutable_grad() = numbers({8, 9}, 2);
+  muon.step();
+  Variable(w).mutable_grad().fill(0);
+  for (int step = 0; step < 3000; ++step) muon.step();  // the momentum dies away, and with it the steps
+  const Tensor rested = w.value().clone();
+  for (int step = 0; step < 100; ++step) muon.step();
+  EXPECT_TRUE(same_bytes(w.value(), rested));
+  EXPECT_EQ(muon.first_moments()[0].data()[0], 0);
+}
+
+TEST(Muon, TakesForMatricesWhatHasEightRowsAndColumns) {
+  for (const Shape& shape : {Shape{8, 8}, Shape{3, 3, 1, 32}, Shape{4, 4, 16}})
+    EXPECT_TRUE(is_matrix(shape)) << shape.text();
+  for (const Shape& shape : {Shape{64}, Shape{64, 7}, Shape{7, 64}, Shape{3, 3, 32, 1}, Shape{}})
+    EXPECT_FALSE(is_matrix(shape)) << shape.text();
 }
 
 }  // namespace

@@ -48,7 +48,7 @@ TEST(Pool, AWarmTrainingStepDoesNotTouchTheHeap) {
   const Variable w2 = test::parameter(test::numbers({3, 3, 8, 1}, 2)),
                  b2 = test::parameter(Tensor::zeros({1}));
   const Tensor x = test::numbers({2, 12, 12, 1}, 3), truth = test::numbers({2, 12, 12, 1}, 4, 0, 1);
-  Adam adam({w, b, w2, b2}, {});
+  Adam adam({w, b, w2, b2}, {.muon = true});
   const auto step = [&] {
     const ConvOptions same{.padding = 1};
     adam.zero_grad();

@@ -26,7 +26,7 @@ std::vector<real> train(int threads) {
                           parameter(numbers({3, 3, 32, 1}, 7)),  parameter(numbers({1}, 8))};
   const Tensor x = numbers({9, 10, 10, 1}, 9, 0, 1), truth = numbers({9, 20, 20, 1}, 10, 0, 1);
   const ConvOptions same{.padding = 1};
-  Adam adam(p, {.clip_norm = 1});
+  Adam adam(p, {.clip_norm = 1, .muon = true});
   std::vector<real> all;
   for (int step = 0; step < 3; ++step) {
     Variable h = leaky_relu(conv2d(Variable(x), p[0], p[1], same));

@@ -241,8 +241,30 @@ TEST(Trainer, RefusesToResumeAnotherRun) {
   EXPECT_EQ(message(settings, "1234"), "no error");
   EXPECT_NE(message(settings, "5678").find("cannot resume: its data is 1234, this run's is 5678"),
             std::string::npos);
-  settings.seed = 4;
+  settings.muon = true;
   EXPECT_NE(message(settings, "1234").find("cannot resume: its training is"), std::string::npos);
+}
+
+TEST(Trainer, MuonGoesOnToTheSameBitsOnAnyNumberOfThreads) {
+  const TemporaryFolder folder;
+  TrainingSettings settings = small_training();
+  settings.muon = true;
+  const WindowSet windows = small_windows(settings.model);
+  Trainer straight(windows, all_of(windows), settings), first(windows, all_of(windows), settings),
+      resumed(windows, all_of(windows), settings);
+  omp_set_num_threads(4);
+  for (int step = 0; step < 5; ++step) first.train_step();
+  first.save(folder / "state.safetensors", {});
+  resumed.restore(folder / "state.safetensors", {});
+  while (!resumed.done()) resumed.train_step();
+  omp_set_num_threads(1);
+  while (!straight.done()) straight.train_step();
+  for (std::size_t i = 0; i < straight.model().parameters().size(); ++i) {
+    const Parameter &a = straight.model().parameters()[i], &b = resumed.model().parameters()[i];
+    EXPECT_EQ(crc32(std::as_bytes(std::span<const real>(a.value.value().values()))),
+              crc32(std::as_bytes(std::span<const real>(b.value.value().values()))))
+        << a.name;
+  }
 }
 
 TEST(Trainer, KeepsWithTheModelWhatBytesAndTheAlarmNeed) {

@@ -84,6 +84,21 @@ TEST(PinnedBits, LinearLayersAndLosses) {
       << "sigmoid";
 }
 
+TEST(PinnedBits, Muon) {
+  const Variable tall = parameter(numbers({3, 3, 16, 24})), wide = parameter(numbers({16, 40}, 2));
+  Adam muon({tall, wide}, {.learning_rate = 0.01, .clip_norm = 1, .muon = true});
+  const Variable a(numbers(tall.shape(), 3)), b(numbers(wide.shape(), 4));
+  for (int step = 0; step < 20; ++step) {
+    muon.zero_grad();
+    backward(add(l2_loss(tall, a), l2_loss(wide, b)));
+    muon.step();
+  }
+  Bits bits;
+  bits.add(tall.value());
+  bits.add(wide.value());
+  EXPECT_EQ(bits.hash(), 0xfaffca44ea026b4dU);
+}
+
 TEST(PinnedBits, Adam) {
   const Variable x = parameter(numbers({500}));
   Adam adam({x}, {.learning_rate = 0.01, .clip_norm = 1});
