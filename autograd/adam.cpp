@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <stdexcept>
 
@@ -31,7 +32,8 @@ void update(Dim n, Update u, const real* gradient, real* x, real* m, real* v) {
   });
 }
 
-void turn(const Shape& shape, real clip, double rate, const real* gradient, real* x, real* m) {
+// Muon's step.
+void move_matrix(const Shape& shape, real clip, double rate, const real* gradient, real* x, real* m) {
   constexpr real kMomentum = real(0.95), kRest = real(0.05);
   const Dim n = shape.elements(), columns = shape[shape.rank() - 1], rows = n / columns;
   Scratch<real> direction(static_cast<std::size_t>(n));
@@ -86,6 +88,23 @@ void Adam::zero_grad() {
   for (Variable& p : parameters_) p.mutable_grad().fill(0);
 }
 
+// By turns, so that a thread asks its pool for the same blocks in every step.
+void Adam::move_matrices(real clip) {
+  std::exception_ptr error;  // one that must not leave a thread: no memory
+#pragma omp parallel for schedule(static, 1)
+  for (const std::size_t k : matrices_) {
+    Variable& p = parameters_[k];
+    try {
+      move_matrix(p.shape(), clip, options_.learning_rate, p.grad().data(), p.mutable_value().data(),
+                  m_[k].data());
+    } catch (...) {
+#pragma omp critical
+      error = std::current_exception();
+    }
+  }
+  if (error) std::rethrow_exception(error);
+}
+
 double Adam::step() {
   double squares = 0;
   for (const Variable& p : parameters_) squares += kernels::sum_of_squares(p.size(), p.grad().data());
@@ -109,12 +128,7 @@ double Adam::step() {
     Variable& p = parameters_[k];
     update(p.size(), u, p.grad().data(), p.mutable_value().data(), m_[k].data(), v_[k].data());
   }
-  // By turns, so that a thread asks its pool for the same blocks in every step.
-#pragma omp parallel for schedule(static, 1)
-  for (const std::size_t k : matrices_) {
-    Variable& p = parameters_[k];
-    turn(p.shape(), u.clip, options_.learning_rate, p.grad().data(), p.mutable_value().data(), m_[k].data());
-  }
+  move_matrices(u.clip);
   return norm;
 }
 

@@ -20,7 +20,7 @@ struct AdamOptions {
   bool muon = false;
 };
 
-/// The mean length of a weight's step by Muon, in learning rates.
+/// How long a weight's step by Muon is (root mean square), in learning rates.
 inline constexpr double kMuonLength = 0.2;
 
 /// Whether Muon moves it: [..., columns], eight or more columns (the outputs of a convolution or a linear
@@ -53,6 +53,8 @@ class Adam {
   void set_steps(std::int64_t steps) { steps_ = steps; }
 
  private:
+  void move_matrices(real clip);
+
   std::vector<Variable> parameters_;
   AdamOptions options_;
   std::vector<std::size_t> matrices_, others_;  // of parameters_

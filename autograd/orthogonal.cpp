@@ -19,8 +19,8 @@ void multiply(Dim n, const real* a, const real* b, real* y) { kernels::linear(n,
 
 }  // namespace
 
-// With S = X X^T a step is X <- P X, P = a I + b S + c S^2, and S <- P S P: the product Q of all P needs no
-// X.
+// With S = X X^T a step is X <- P X, P = a I + b S + c S^2, and S <- P S P, so that Q, the product of all P,
+// is found without X.
 void orthogonalise(Dim rows, Dim columns, real* x) {
   const Dim size = rows * columns, side = std::min(rows, columns), square = side * side;
   const bool wide = rows <= columns;

@@ -242,6 +242,12 @@ def stability():
                   for side in ("on", "off")])
 
 
+def optimizers():
+    return table(["training", "windows of", "seed", "steps", "optimizer", "contact SSIM", "PSNR dB", "ghosts on flat"],
+                 [[r["training"], r["windows_of"], r["seed"], r["steps"], r["optimizer"], f"{float(r['contact_ssim']):.3f}",
+                   f"{float(r['contact_psnr_db']):.1f}", f"{100 * float(r['flat_ghost_rate']):.1f} %"] for r in rows("optimizers.csv")])
+
+
 def rig():
     pulls, kills = rows("rig/unplug.csv"), rows("rig/kill.csv")
     soak = {r["quantity"]: float(r["measured"]) for r in rows("rig/soak.csv")}
@@ -445,7 +451,7 @@ def tried():
                   "commit"], lines)
 
 
-SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, speed_avx2, precision, streaming, growth, pixels, textures, simulator, stability,
+SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, speed_avx2, precision, streaming, growth, pixels, textures, simulator, stability, optimizers,
                    rig, page, hostile, promises, mutation, whole_passes, silent_signals, corruptions, unknown_plates, demo, tried, left_out, never_felt, simulated_only, finger_fit, terms],
             README: [accuracy, speed]}
 

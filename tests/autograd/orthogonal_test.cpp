@@ -56,7 +56,7 @@ TEST(Orthogonal, TakesTheStepsOfItsFormula) {
   }
 }
 
-// Directions a hundred times fainter than the loudest come out nearly as long: X^T X is nearly the identity.
+// Directions twenty times fainter than the loudest come out nearly as long: X^T X is nearly the identity.
 TEST(Orthogonal, EvensOutWhatIsLoudAndWhatIsFaint) {
   constexpr Dim kRows = 96, kColumns = 16;
   Tensor x = numbers({kRows, kColumns}, 3);
