@@ -1,5 +1,5 @@
 // Adam (Kingma & Ba 2015, algorithm 1) with bias correction and clipping of the gradient norm; and Muon, by
-// which matrices of weights move when asked to, as trainings do by default.
+// which matrices of weights move on request.
 #pragma once
 
 #include <cstdint>
@@ -20,10 +20,8 @@ struct AdamOptions {
   bool muon = false;
 };
 
-/// How long a weight's step by Muon is (root mean square), in learning rates. Where the rates of AdamW are
-/// taken for a hundred thousand steps and more it is .2 (Liu et al. 2025); trainings here have some thousand
-/// and learn most of what there is to learn at .8 (bench/results).
-inline constexpr double kMuonLength = 0.8;
+/// How long a weight's step by Muon is (root mean square), in learning rates.
+inline constexpr double kMuonLength = 0.2;
 
 /// Whether Muon moves it: [..., columns], eight or more columns (the outputs of a convolution or a linear
 /// layer) and eight or more rows (all that feeds one of them).

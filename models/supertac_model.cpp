@@ -94,7 +94,10 @@ PresetTraining PresetTraining::of_preset(const std::string& name) {
   constexpr double kWindowS = 2.56;
   PresetTraining training{.rate_hz =
                               static_cast<double>(SuperTacSettings::of_preset(name).timesteps) / kWindowS};
-  if (name == "tiny") training.epochs = 80;
+  if (name == "tiny") {
+    training.epochs = 80;
+    training.learning_rate = 2e-3;
+  }
   return training;
 }
 

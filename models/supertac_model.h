@@ -52,6 +52,7 @@ struct SuperTacSettings {
 struct PresetTraining {
   double rate_hz = 100;  ///< of the window's samples
   std::int64_t epochs = 20;
+  double learning_rate = 1e-3;  ///< Adam's peak
 
   /// Throws as SuperTacSettings::of_preset.
   static PresetTraining of_preset(const std::string& name);

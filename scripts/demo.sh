@@ -16,7 +16,7 @@ simulate --out "$out/recordings" --passes 8 --plates "$plates,plain"
 simulate --out "$out/never" --passes 2 --trials 1 --plates random1,random2,random3,random4,random5,random6,random7,random8
 echo "training on trial 1 of six plates and a plain one, and on plates drawn at random (two to four minutes)"
 "$bin/supertac-train" --data "$out/recordings" --out "$out/model.safetensors" --preset tiny --split trial \
-  --stride 4 --epochs 19 --random-plates 1000 --seed 0 --force
+  --stride 4 --epochs 19 --random-plates 1000 --optimizer muon --seed 0 --force
 score() { # title, name of its JSON, folder, more options
   echo
   echo "$1"

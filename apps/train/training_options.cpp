@@ -20,16 +20,14 @@ void declare_training(Arguments& a) {
   a.option("epochs", "N", "passes over the training examples (default: 20; preset tiny: 80)");
   a.more();
   a.option("batch", "N", "examples per step", "64");
-  a.option(
-      "learning-rate", "X",
-      "peak of the rate, after warm-up and before the cosine; trainings of a few hundred steps learn more "
-      "at 0.002",
-      "0.001");
+  a.option("learning-rate", "X",
+           "peak of the rate, after warm-up and before the cosine (default: 0.001; preset tiny: 0.002)");
   a.option(
       "optimizer", "NAME",
-      "muon: matrices of weights move by the orthogonal factor of their momentum, the rest by Adam, which "
-      "learns more in as many steps; or adam, as in the paper",
-      "muon");
+      "adam, as in the paper; or muon: matrices of weights move by the orthogonal factor of their momentum, "
+      "the rest by Adam, which learns more in as many steps from some thousand steps on (in a few hundred "
+      "it leaves latent numbers idle)",
+      "adam");
   a.option("lambda", "X", "weight of 1 - SSIM", "0.1");
   a.option("checkpoint-every", "STEPS", "how often the state is saved", "500");
   a.decides_nothing();
@@ -112,14 +110,16 @@ TrainingSettings network_settings(const Arguments& a) {
 
 void read_pace(const Arguments& a, TrainingPace& pace) {
   if (a.given("epochs")) pace.epochs = a.integer("epochs", 1, 100'000);
-  pace.learning_rate = a.number("learning-rate", 1e-9, 1);
+  if (a.given("learning-rate")) pace.learning_rate = a.number("learning-rate", 1e-9, 1);
   pace.batch = a.integer("batch", 1, 4096);
-  pace.muon = a.choice("optimizer", {"muon", "adam"}) == "muon";
+  pace.muon = a.choice("optimizer", {"adam", "muon"}) == "muon";
 }
 
 TrainingSettings training_settings(const Arguments& a, const SuperTacSettings& model) {
+  const PresetTraining preset = PresetTraining::of_preset(model.preset);
   TrainingSettings s;
-  s.epochs = PresetTraining::of_preset(model.preset).epochs;
+  s.epochs = preset.epochs;
+  s.learning_rate = preset.learning_rate;
   read_pace(a, s);
   s.model = model;
   s.model.grouping = grouping_of(a.choice("grouping", {"horizontal", "vertical"}));

@@ -93,7 +93,6 @@ class Ours {
       TrainingSettings settings;
       settings.model = model_->settings();
       settings.epochs = 100'000;
-      settings.muon = false;  // Adam, as the peers
       trainer_ = std::make_unique<Trainer>(*data_, bench::all_of(*data_), settings);
     }
     return *trainer_;

@@ -65,9 +65,9 @@ class Trainer {
   const Objective& objective() const { return *objective_; }
   const Network& model() const { return objective_->network(); }
 
-  /// One batch: forward, loss, backward, a step of the optimizer. Throws TrainingStopped; the parameters are
-  /// then still finite. `stop` is asked before the gradients are added up. With several processes throws as
-  /// check_same(), which is called every 100 steps.
+  /// One batch: forward, loss, backward, Adam. Throws TrainingStopped; the parameters are then still finite.
+  /// `stop` is asked before the gradients are added up. With several processes throws as check_same(), which
+  /// is called every 100 steps.
   StepReport train_step(const std::function<bool()>& stop = {});
   /// Throws RanksError naming rank and tensor when the processes' parameters are not the same to the bit.
   void check_same() const;

@@ -22,10 +22,10 @@ struct TrainingPace {
   std::int64_t epochs = 20;  ///< 1 to 100,000
   std::int64_t batch = 64;   ///< 1 to 4096
   std::uint64_t seed = 0;
-  double learning_rate = 1e-3;  ///< the peak, above 0 and at most 1
+  double learning_rate = 1e-3;  ///< Adam's peak, above 0 and at most 1
   double warm_up = 0.05;        ///< share of all steps in which the rate rises; then half a cosine to 0
   double clip_norm = 1;         ///< 0 = never
-  bool muon = true;             ///< matrices of weights move as AdamOptions::muon has it
+  bool muon = false;            ///< matrices of weights move as AdamOptions::muon has it
 
   /// Throws std::invalid_argument naming the setting.
   void check() const;

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 
-BATCHES, SEEDS, USUAL_BATCH, USUAL_RATE = [64, 256, 1024], range(5), 64, 0.001
+BATCHES, SEEDS, USUAL_BATCH, USUAL_RATE = [64, 256, 1024], range(5), 64, 0.002
 
 
 def score(binaries, recordings, options, folder, batch, rule, seed):
