@@ -243,9 +243,12 @@ def stability():
 
 
 def optimizers():
-    return table(["training", "windows of", "seed", "steps", "optimizer", "contact SSIM", "PSNR dB", "ghosts on flat"],
-                 [[r["training"], r["windows_of"], r["seed"], r["steps"], r["optimizer"], f"{float(r['contact_ssim']):.3f}",
-                   f"{float(r['contact_psnr_db']):.1f}", f"{100 * float(r['flat_ghost_rate']):.1f} %"] for r in rows("optimizers.csv")])
+    lines = []
+    for key, group in itertools.groupby(rows("optimizers.csv"), lambda r: (r["training"], r["windows_of"], r["optimizer"])):
+        chosen = list(group)
+        lines.append([*key[:2], ", ".join(r["seed"] for r in chosen), chosen[0]["steps"], key[2], over_seeds(chosen, "contact_ssim", 3),
+                      over_seeds(chosen, "contact_psnr_db", 1), f"{100 * mean([float(r['flat_ghost_rate']) for r in chosen]):.1f} %"])
+    return table(["training", "windows of", "seeds", "steps", "optimizer", "contact SSIM", "PSNR dB", "ghosts on flat"], lines)
 
 
 def rig():
