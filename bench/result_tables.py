@@ -9,7 +9,11 @@ T_975 = {1: 12.706, 2: 4.303, 3: 3.182, 4: 2.776, 5: 2.571, 6: 2.447, 7: 2.365, 
 
 def rows(name):
     with open(RESULTS / name, newline="") as file:
-        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+        found = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    for number, row in enumerate(found, 2):  # a stray comma would move all columns behind it
+        if None in row or None in row.values():
+            raise SystemExit(f"{name}: line {number} has not as many values as the head; quote commas within a value")
+    return found
 
 
 def table(head, lines):
