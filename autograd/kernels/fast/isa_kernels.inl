@@ -84,7 +84,7 @@ inline void gather_tile(const GatherJob& job, const std::int32_t* taps, Dim tap_
     for (int p = 0; p < P; ++p) {
       const std::int32_t source = sources[p * tap_count + t];
       pixels |= (source >= 0 ? 1U : 0U) << p;
-      tile.pixel[p] = source >= 0 ? x + source * job.cin : zeros;
+      tile.pixel[p] = source >= 0 ? x + source * job.x_step : zeros;
     }
     const real* w = job.w + taps[t] * job.cin * job.cout + channel;
     if (pixels == kAll) {
@@ -156,7 +156,9 @@ inline void gather_pixels(const GatherJob& job, const std::int32_t* taps, Dim ta
 
 alignas(64) const real kZeros[kMaxChannels] = {};
 
-void gather(const GatherJob& job, const real* x, real* y) {
+void gather(const GatherJob& map, const real* x, real* y) {
+  GatherJob job = map;
+  job.x_step = job.cin;
   const Phase* phase = job.phases->data();
   for (std::size_t i = 0; i < job.phases->size(); ++i, ++phase) {
     gather_pixels(job, phase->taps.data(), static_cast<Dim>(phase->taps.size()), phase->outputs.data(),
@@ -165,16 +167,32 @@ void gather(const GatherJob& job, const real* x, real* y) {
 }
 
 const std::int32_t kFirstTap[1] = {0};
-constexpr Dim kRows = 48;  // a multiple of every tile's pixels
+constexpr Dim kRows = 48;                          // a multiple of every tile's pixels
+constexpr Dim kFewRows = 16, kNearWeights = 4096;  // half of a first cache
 const std::int32_t kRowNumbers[kRows] = {0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15,
                                          16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31,
                                          32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47};
 
+// A few rows meet weights that come from a slower cache. Pieces of whole lines lie one behind the other
+// there, and processors fetch what lies ahead; the columns that one tile reads lie a line apart.
 void gather_rows(const GatherJob& job, const real* x, real* y, Dim rows) {
+  const bool whole = rows > kFewRows || job.cin * job.cout <= kNearWeights;
+  const Dim inputs = whole ? job.cin : kNearWeights / job.cout < 8 ? 8 : kNearWeights / job.cout;
+  GatherJob piece = job;
+  piece.x_step = job.cin;
   for (Dim row = 0; row < rows; row += kRows) {
     const Dim count = rows - row < kRows ? rows - row : kRows;
-    gather_pixels(job, kFirstTap, 1, kRowNumbers, kRowNumbers, count, nullptr, x + row * job.cin,
-                  y + row * job.cout);
+    Dim first = 0;
+    do {
+      const bool last = first + inputs >= job.cin;
+      piece.w = job.w + first * job.cout;
+      piece.cin = last ? job.cin - first : inputs;
+      piece.into = first > 0 ? Into::add : job.into;
+      piece.negative_slope = last ? job.negative_slope : 1;
+      gather_pixels(piece, kFirstTap, 1, kRowNumbers, kRowNumbers, count, nullptr, x + row * job.cin + first,
+                    y + row * job.cout);
+      first += inputs;
+    } while (first < job.cin);
   }
 }
 
