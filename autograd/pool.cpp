@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <new>
+#include <vector>
 
 namespace supertac {
 namespace {
@@ -10,10 +11,6 @@ namespace {
 constexpr std::align_val_t kAlignment{64};
 constexpr std::size_t kSmallest = 64;
 constexpr std::size_t kStepsPerDoubling = 4;
-
-struct FreeBlock {
-  FreeBlock* next;
-};
 
 struct SizeClass {
   std::size_t index;
@@ -35,24 +32,20 @@ class Pool {
  public:
   ~Pool() {
     closed_ = true;
-    for (FreeBlock*& list : free_) {
-      while (list != nullptr) {
-        FreeBlock* next = list->next;
-        ::operator delete(static_cast<void*>(list), kAlignment);
-        list = next;
-      }
+    for (const std::vector<void*>& list : free_) {
+      for (void* block : list) ::operator delete(block, kAlignment);
     }
   }
 
   void* allocate(std::size_t bytes) {
     const SizeClass size_class = class_of(bytes);
-    FreeBlock*& list = free_.at(size_class.index);
-    if (list == nullptr || closed_) {
+    std::vector<void*>& list = free_.at(size_class.index);
+    if (closed_ || list.empty()) {
       ++heap_allocations_;
       return ::operator new(size_class.bytes, kAlignment);
     }
-    FreeBlock* block = list;
-    list = block->next;
+    void* block = list.back();
+    list.pop_back();
     return block;
   }
 
@@ -61,14 +54,18 @@ class Pool {
       ::operator delete(block, kAlignment);
       return;
     }
-    FreeBlock*& list = free_[class_of(bytes).index];
-    list = new (block) FreeBlock{list};
+    try {
+      free_[class_of(bytes).index].push_back(block);
+    } catch (const std::bad_alloc&) {
+      ::operator delete(block, kAlignment);
+    }
   }
 
   std::uint64_t heap_allocations() const { return heap_allocations_; }
 
  private:
-  std::array<FreeBlock*, 1 + 40 * kStepsPerDoubling> free_{};
+  // Apart from the blocks, so that giving one out does not wait for its memory.
+  std::array<std::vector<void*>, 1 + 40 * kStepsPerDoubling> free_{};
   std::uint64_t heap_allocations_ = 0;
   bool closed_ = false;
 };

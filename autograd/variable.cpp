@@ -23,6 +23,7 @@ struct Node {
   const char* op = "leaf";
   Tensor value;
   Tensor grad;
+  Tensor spare;  // the memory of a gradient that was dropped
   std::array<Node*, kMaxInputs> inputs{};
   std::size_t input_count = 0;
   ReverseStep step;
@@ -94,6 +95,9 @@ const Tensor& Variable::value() const {
 }
 const Tensor& Variable::grad() const { return node_->grad; }
 Tensor& Variable::mutable_grad() { return node_->grad; }
+void Variable::drop_grad() {
+  if (node_->grad.defined()) node_->spare = std::move(node_->grad);
+}
 
 const Tensor& Backward::gy() const { return node_.grad; }
 const Tensor& Backward::y() const { return node_.value; }
@@ -102,7 +106,7 @@ const Tensor& Backward::value(std::size_t input) const { return node_.inputs[inp
 Tensor* Backward::grad_of(std::size_t input) {
   Node& x = *node_.inputs[input];
   if (!x.requires_grad) return nullptr;
-  if (!x.grad.defined()) x.grad = Tensor::zeros(x.value.shape());
+  if (const Slot slot = slot_of(input); slot.into == Into::overwrite) slot.grad->fill(0);
   return &x.grad;
 }
 
@@ -110,7 +114,8 @@ Backward::Slot Backward::slot_of(std::size_t input) {
   Node& x = *node_.inputs[input];
   if (!x.requires_grad) return {};
   if (x.grad.defined()) return {&x.grad, Into::add};
-  x.grad = Tensor(x.value.shape());
+  x.grad =
+      x.spare.shape() == x.value.shape() && x.spare.defined() ? std::move(x.spare) : Tensor(x.value.shape());
   return {&x.grad, Into::overwrite};
 }
 

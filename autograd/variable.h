@@ -87,6 +87,10 @@ class Variable {
   /// Empty until backward() has reached this variable.
   const Tensor& grad() const;
   Tensor& mutable_grad();
+  /// Empties grad(). Its memory is kept for the next gradient, also where another Tensor still shows it:
+  /// given to the pool it would go to what the next forward pass makes first, long after it has left the
+  /// caches.
+  void drop_grad();
 
   const Shape& shape() const { return value().shape(); }
   int rank() const { return value().rank(); }

@@ -70,6 +70,13 @@ constexpr Dim kTreeBlock = 1024;  // so that what the tree adds up on its way st
 void add_block(Dim n, Dim at, std::span<const real* const> parts, real* y) {
   if (parts.size() == 1) return put(n, parts[0] + at, Into::overwrite, y);
   if (parts.size() == 2) return add(n, parts[0] + at, parts[1] + at, y);
+  if (parts.size() == 8) {  // a batch's lanes: eight streams that are fetched side by side
+    const real *a = parts[0] + at, *b = parts[1] + at, *c = parts[2] + at, *d = parts[3] + at;
+    const real *e = parts[4] + at, *f = parts[5] + at, *g = parts[6] + at, *h = parts[7] + at;
+    return each(n, [=](Dim i) SUPERTAC_LOOP {
+      y[i] = ((a[i] + b[i]) + (c[i] + d[i])) + ((e[i] + f[i]) + (g[i] + h[i]));
+    });
+  }
   const std::size_t left = std::bit_ceil(parts.size()) / 2;
   std::array<real, kTreeBlock> right;
   add_block(n, at, parts.first(left), y);

@@ -160,7 +160,7 @@ void share_values(const std::vector<Parameter>& master, const std::vector<Parame
 }
 
 void drop_gradients(const std::vector<Parameter>& parameters) {
-  for (const Parameter& p : parameters) Variable(p.value).mutable_grad() = Tensor();
+  for (const Parameter& p : parameters) Variable(p.value).drop_grad();
 }
 
 }  // namespace supertac

@@ -6,6 +6,7 @@
 
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
+#include "autograd/ops/convolution.h"
 #include "autograd/ops/shaping.h"
 #include "tests/autograd/check.h"
 
@@ -48,6 +49,24 @@ TEST(Backward, GradientsOfLeavesAccumulate) {
   EXPECT_EQ(x.grad().item(), 7);
   backward(x);  // dx/dx = 1
   EXPECT_EQ(x.grad().item(), 8);
+}
+
+// Ops add to a gradient (multiply) or write it (conv2d, whose first use it is).
+TEST(Backward, ADroppedGradientLeavesItsMemoryButNoValue) {
+  const Variable w = parameter(Tensor::of({1, 1, 1, 1}, {3}));
+  const Variable x(Tensor::of({1, 1, 1, 1}, {2}));
+  for (const bool by_conv : {true, false, true}) {
+    backward(sum(by_conv ? conv2d(x, w, Variable(Tensor::zeros({1})), {}) : multiply(x, w)));
+    ASSERT_EQ(w.grad().item(), 2);
+    const real* const memory = w.grad().data();
+    Variable(w).drop_grad();
+    EXPECT_FALSE(w.grad().defined());
+    Variable(w).drop_grad();
+    backward(sum(multiply(x, w)));
+    EXPECT_EQ(w.grad().item(), 2);
+    EXPECT_EQ(w.grad().data(), memory);
+    Variable(w).drop_grad();
+  }
 }
 
 TEST(Backward, LeavesThatNeedNoGradientGetNone) {

@@ -205,7 +205,10 @@ inline void outer_tile(const OuterJob& job, Dim row, Dim channel) {
   const Dim count = static_cast<Dim>(job.pairs->inputs.size());
   Vec acc[R][J];
   for (int r = 0; r < R; ++r) {
-    for (int j = 0; j < J; ++j) acc[r][j] = Vec::broadcast(0);
+    for (int j = 0; j < J; ++j) {
+      acc[r][j] = Vec::broadcast(0);  // what is written at the end is on its way meanwhile
+      __builtin_prefetch(job.gw + (row + r) * job.cout + channel + j * Vec::kLanes, 1);
+    }
   }
   const auto add_pair = [&](const real* v, const real* g) __attribute__((always_inline)) {
     Vec grad[J];

@@ -1,63 +1,79 @@
 #include "autograd/kernels/fast/narrow.h"
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 
 #include "autograd/kernels/fast/conv.h"
+#include "autograd/kernels/fast/isa.h"
 
 namespace supertac::kernels {
 namespace {
 
-// Taps times outputs, filled up with zeros to a whole vector: a partial one costs more than the zeros.
-constexpr Dim kColumns = 16, kMostOutputs = 8;
+// Taps times outputs, in a product that makes them filled up with zeros to a whole vector: a partial one
+// costs more than the zeros.
+constexpr Dim kColumns = 16;
+constexpr Dim kAcross = 3, kMostOutputs = kColumns / kAcross;  // taps of a line
+
+constexpr Dim kPart = 4;
+constexpr Dim filled_up(Dim n) { return (n + kPart - 1) / kPart * kPart; }
+
+Dim pixels_of(const ConvTask& s) { return s.geometry->in_pixels; }
+Dim sums_of(const ConvTask& s) { return s.geometry->taps * s.cout; }
+// Of a map with its margin.
+Dim lines_of(const ConvTask& s) { return s.geometry->map.height + s.geometry->map.kernel_h - 1; }
+Dim line_of(const ConvTask& s) { return s.geometry->map.width + kAcross - 1; }
 
 // [taps][cin][cout] -> [cin][(taps, cout), zeros]
-Tensor with_taps_inside(const ConvTask& s, const real* w) {
-  Tensor out = Tensor::zeros({s.cin, kColumns});
+Tensor with_taps_inside(const ConvTask& s, const real* w, Dim columns) {
+  Tensor out = Tensor::zeros({s.cin, columns});
   for (Dim t = 0; t < s.geometry->taps; ++t) {
     for (Dim i = 0; i < s.cin; ++i) {
-      for (Dim o = 0; o < s.cout; ++o) out.data()[i * kColumns + t * s.cout + o] = *w++;
+      for (Dim o = 0; o < s.cout; ++o) out.data()[i * columns + t * s.cout + o] = *w++;
     }
   }
   return out;
 }
 
-// to[p, t, o] = gy[q, o] where tap t joins p and q, else 0, for one image
+// to[p, t, o] = gy[p - t, o], 0 outside the map, for one image. Of `turned`, the map by half a turn with a
+// margin of zeros, the taps of a line lie side by side.
 template <Dim kOutputs>
-void spread(const ConvTask& s, const real* gy, real* to) {
-  for (const Phase& phase : s.geometry->backward) {
-    const std::int32_t* source = phase.sources.data();
-    const std::int32_t* const taps = phase.taps.data();
-    const std::size_t tap_count = phase.taps.size();
-    for (const std::int32_t p : phase.outputs) {
-      real* const row = to + p * kColumns;
-      std::fill_n(row, kColumns, real(0));
-      for (std::size_t t = 0; t < tap_count; ++t) {
-        if (source[t] >= 0) std::copy_n(gy + source[t] * kOutputs, kOutputs, row + taps[t] * kOutputs);
-      }
-      source += tap_count;
+void spread(const ConvTask& s, const real* gy, real* turned, real* to) {
+  constexpr Dim kRun = kAcross * kOutputs;
+  const Dim width = s.geometry->map.width, height = s.geometry->map.height,
+            taps_down = s.geometry->map.kernel_h;
+  const Dim line = line_of(s) * kOutputs;
+  real* inside = turned + (height - 1 + taps_down / 2) * line + width * kOutputs;
+  for (Dim i = 0; i < height; ++i, inside -= line) {
+    for (Dim j = 0; j < width; ++j, gy += kOutputs)
+      std::memcpy(inside - j * kOutputs, gy, kOutputs * sizeof(real));
+  }
+  const real* last = turned + (height - 1) * line + (width - 1) * kOutputs;
+  for (Dim i = 0; i < height; ++i, last -= line) {
+    for (Dim j = 0; j < width; ++j) {
+      const real* from = last - j * kOutputs;
+      for (Dim k = 0; k < taps_down; ++k, from += line, to += kRun)  // what is too much is written over
+        std::memcpy(to, from, filled_up(kRun) * sizeof(real));
     }
   }
 }
 
-// y[q, o] = bias[o] + sum over taps of z[source(t, q), t, o] for one image; the last row of z is zero.
+// y[q, o] = bias[o] + sum over taps of z[q + t, t, o] for one image; z has a margin of zeros.
 template <Dim kOutputs>
 void collect(const ConvTask& s, const real* z, const real* bias, real* y) {
-  const std::int32_t padding = static_cast<std::int32_t>(s.geometry->in_pixels);
-  for (const Phase& phase : s.geometry->forward) {
-    const std::int32_t* source = phase.sources.data();
-    const std::int32_t* const taps = phase.taps.data();
-    const std::size_t tap_count = phase.taps.size();
-    for (const std::int32_t q : phase.outputs) {
-      real total[kOutputs] = {};
-      for (Dim o = 0; bias != nullptr && o < kOutputs; ++o) total[o] = bias[o];
-      for (std::size_t t = 0; t < tap_count; ++t) {
-        const std::int32_t p = source[t] >= 0 ? source[t] : padding;
-        const real* part = z + p * kColumns + taps[t] * kOutputs;
-        for (Dim o = 0; o < kOutputs; ++o) total[o] += part[o];
+  const ConvSettings& map = s.geometry->map;
+  for (Dim i = 0; i < map.height; ++i, y += map.width * kOutputs) {
+    for (Dim j = 0; j < map.width * kOutputs; ++j) y[j] = bias != nullptr ? bias[j % kOutputs] : 0;
+    for (Dim k = 0; k < map.kernel_h; ++k) {
+      const real* part = z + (i + k) * line_of(s) * kColumns + k * kAcross * kOutputs;
+      for (Dim j = 0; j < map.width; ++j, part += kColumns) {
+        real total[kOutputs];
+        for (Dim o = 0; o < kOutputs; ++o) total[o] = y[j * kOutputs + o];
+        for (Dim t = 0; t < kAcross; ++t) {
+          for (Dim o = 0; o < kOutputs; ++o) total[o] += part[t * (kColumns + kOutputs) + o];
+        }
+        std::copy_n(total, kOutputs, y + j * kOutputs);
       }
-      std::copy_n(total, kOutputs, y + q * kOutputs);
-      source += tap_count;
     }
   }
 }
@@ -73,11 +89,13 @@ void with_outputs(Dim outputs, Use use) {
 
 // Of all images.
 Tensor spread(const ConvTask& s, const real* gy) {
-  const Geometry& g = *s.geometry;
-  Tensor gz(Shape{s.images, g.in_pixels, kColumns});
+  Tensor turned = Tensor::zeros({lines_of(s) * line_of(s) * s.cout + kPart});
+  Tensor gz(Shape{s.images * pixels_of(s) * sums_of(s) + kPart});
   with_outputs(s.cout, [&](auto outputs) {
-    for (Dim n = 0; n < s.images; ++n)
-      spread<outputs>(s, gy + n * g.out_pixels * outputs, gz.data() + n * g.in_pixels * kColumns);
+    for (Dim n = 0; n < s.images; ++n) {
+      spread<outputs>(s, gy + n * pixels_of(s) * outputs, turned.data(),
+                      gz.data() + n * pixels_of(s) * sums_of(s));
+    }
   });
   return gz;
 }
@@ -85,38 +103,52 @@ Tensor spread(const ConvTask& s, const real* gy) {
 }  // namespace
 
 bool is_narrow(const ConvTask& s) {
-  return s.geometry->taps * s.cout <= kColumns && s.cout <= kMostOutputs && s.cout * 2 < s.cin;
+  const ConvSettings& map = s.geometry->map;
+  ConvSettings same{.height = map.height, .width = map.width, .kernel_h = map.kernel_h, .kernel_w = kAcross};
+  same.padding_h = map.kernel_h / 2, same.padding_w = kAcross / 2;
+  return map == same && map.kernel_h % 2 == 1 && sums_of(s) <= kColumns && s.cout * 2 < s.cin;
 }
 
 void narrow_conv(const ConvTask& s, const real* x, const real* w, const real* bias, real negative_slope,
                  real* y) {
-  const Geometry& g = *s.geometry;
-  const Tensor inside = with_taps_inside(s, w);
-  Tensor z(Shape{g.in_pixels + 1, kColumns});
-  std::fill_n(z.data() + g.in_pixels * kColumns, kColumns, real(0));
+  const ConvSettings& map = s.geometry->map;
+  const Tensor inside = with_taps_inside(s, w, kColumns);
+  const Dim line = line_of(s) * kColumns, pixel_itself = 0;
+  Tensor z = Tensor::zeros({lines_of(s), line});
+  const ProductJob job{.height = map.height,
+                       .width = map.width,
+                       .from = {0, map.width * s.cin, s.cin},
+                       .to = {0, line, kColumns},
+                       .segments = &pixel_itself,
+                       .segment_count = 1,
+                       .length = s.cin,
+                       .w = inside.data(),
+                       .cout = kColumns};
   for (Dim n = 0; n < s.images; ++n) {
-    fast::linear(g.in_pixels, s.cin, kColumns, x + n * g.in_pixels * s.cin, inside.data(), nullptr, 1,
-                 z.data());
+    isa_kernels().product(job, x + n * pixels_of(s) * s.cin,
+                          z.data() + map.padding_h * line + map.padding_w * kColumns);
     with_outputs(s.cout,
-                 [&](auto outputs) { collect<outputs>(s, z.data(), bias, y + n * g.out_pixels * outputs); });
+                 [&](auto outputs) { collect<outputs>(s, z.data(), bias, y + n * pixels_of(s) * outputs); });
   }
   if (negative_slope == 1) return;
-  for (Dim i = 0; i < s.images * g.out_pixels * s.cout; ++i) y[i] = y[i] > 0 ? y[i] : negative_slope * y[i];
+  for (Dim i = 0; i < s.images * pixels_of(s) * s.cout; ++i) y[i] = y[i] > 0 ? y[i] : negative_slope * y[i];
 }
 
 void narrow_grad_x(const ConvTask& s, const real* gy, const real* w, Into into, real* gx) {
-  fast::linear_grad_x(s.images * s.geometry->in_pixels, s.cin, kColumns, spread(s, gy).data(),
-                      with_taps_inside(s, w).data(), into, gx);
+  fast::linear_grad_x(s.images * pixels_of(s), s.cin, sums_of(s), spread(s, gy).data(),
+                      with_taps_inside(s, w, sums_of(s)).data(), into, gx);
 }
 
 void narrow_grad_w(const ConvTask& s, const real* x, const real* gy, Into into, real* gw) {
-  if (into == Into::overwrite) std::fill_n(gw, s.geometry->taps * s.cin * s.cout, real(0));
-  Tensor inside(Shape{s.cin, kColumns});
-  fast::linear_grad_w(s.images * s.geometry->in_pixels, s.cin, kColumns, x, spread(s, gy).data(),
-                      Into::overwrite, inside.data());
+  Tensor inside(Shape{sums_of(s), s.cin});
+  fast::linear_grad_w(s.images * pixels_of(s), sums_of(s), s.cin, spread(s, gy).data(), x, Into::overwrite,
+                      inside.data());
   for (Dim t = 0; t < s.geometry->taps; ++t) {
     for (Dim i = 0; i < s.cin; ++i) {
-      for (Dim o = 0; o < s.cout; ++o) *gw++ += inside.data()[i * kColumns + t * s.cout + o];
+      for (Dim o = 0; o < s.cout; ++o, ++gw) {
+        const real sum = inside.data()[(t * s.cout + o) * s.cin + i];
+        *gw = into == Into::add ? *gw + sum : sum + 0;
+      }
     }
   }
 }

@@ -3,14 +3,16 @@
 // The gather kernel puts output channels side by side in a vector; with one channel it would leave 15 of 16
 // lanes empty. Here taps and output channels together fill the vector:
 //   z[p, t, o] = sum over cin of x[p, :] * w[t, :, o]        one matrix product
-//   y[q, o]    = bias[o] + sum over taps t of z[source(t, q), t, o]
+//   y[q, o]    = bias[o] + sum over taps t of z[q + t, t, o]
+// The gradients are one product each with gz[p, t, o] = gy[p - t, o].
 #pragma once
 
 #include "autograd/kernels/fast/geometry.h"
 
 namespace supertac::kernels {
 
-/// Whether conv() and its gradients take this way: a question of shapes only, so that all processors agree.
+/// Whether conv() and its gradients take this way: kernels three wide that keep the size of a map. A question
+/// of shapes only, so that all processors agree.
 bool is_narrow(const ConvTask& task);
 
 void narrow_conv(const ConvTask& task, const real* x, const real* w, const real* bias, real negative_slope,

@@ -1,6 +1,7 @@
 // Sums whose bits do not depend on the width of vectors: 16 lanes that are added in a fixed order.
 #pragma once
 
+#include "autograd/kernels/fast/loops.h"
 #include "autograd/tensor.h"
 
 namespace supertac::kernels {
@@ -10,11 +11,15 @@ template <class F>
 double sum_lanes(Dim n, F&& term) {
   constexpr Dim kLanes = 16;
   double lane[kLanes] = {};
-  Dim i = 0;
-  for (; i + kLanes <= n; i += kLanes) {
-    for (Dim j = 0; j < kLanes; ++j) lane[j] += term(i + j);
-  }
-  for (Dim j = 0; i < n; ++i, ++j) lane[j] += term(i);
+  run_loop([&, n]() SUPERTAC_LOOP {
+    double sums[kLanes] = {};
+    Dim i = 0;
+    for (; i + kLanes <= n; i += kLanes) {
+      for (Dim j = 0; j < kLanes; ++j) sums[j] += term(i + j);
+    }
+    for (Dim j = 0; i < n; ++i, ++j) sums[j] += term(i);
+    for (Dim j = 0; j < kLanes; ++j) lane[j] = sums[j];
+  });
   double total = 0;
   for (Dim j = 0; j < kLanes; ++j) total += lane[j];
   return total;
