@@ -1,16 +1,24 @@
 #include "autograd/pool.h"
 
+#include <sys/mman.h>
+
 #include <array>
 #include <bit>
+#include <cstddef>
+#include <mutex>
 #include <new>
+#include <utility>
 #include <vector>
 
 namespace supertac {
 namespace {
 
-constexpr std::align_val_t kAlignment{64};
+constexpr std::size_t kAlignment = 64;
 constexpr std::size_t kSmallest = 64;
 constexpr std::size_t kStepsPerDoubling = 4;
+
+// Apart from the blocks, so that giving one out does not wait for its memory.
+using FreeBlocks = std::array<std::vector<void*>, 1 + 40 * kStepsPerDoubling>;
 
 struct SizeClass {
   std::size_t index;
@@ -28,44 +36,102 @@ SizeClass class_of(std::size_t bytes) {
   return {1 + (exponent - first_exponent) * kStepsPerDoubling + quarter, base + (quarter + 1) * step};
 }
 
+// Without memory for the list the block is lost, which such a program can bear.
+void keep(void* block, std::vector<void*>& list) noexcept {
+  try {
+    list.push_back(block);
+  } catch (const std::bad_alloc&) {
+  }
+}
+
+// What all threads share: memory to cut blocks from, and the blocks of threads that have ended. It is asked
+// while a program warms up, and lives as long as the program.
+class Source {
+ public:
+  void* take(SizeClass size_class) {
+    const std::lock_guard lock(mutex_);
+    std::vector<void*>& list = left_.at(size_class.index);
+    if (list.empty()) return cut(size_class.bytes);
+    void* block = list.back();
+    list.pop_back();
+    return block;
+  }
+
+  void inherit(FreeBlocks& blocks) noexcept {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      for (void* block : blocks[i]) keep(block, left_[i]);
+    }
+  }
+
+ private:
+  // The blocks of a step together need few of the addresses that a processor remembers where pages are large.
+  static constexpr std::size_t kPage = std::size_t{2} << 20, kChunk = 4 * kPage;
+  // Blocks of 2^n bytes one behind the other would share their places in the caches.
+  static constexpr std::size_t kGap = 3 * kAlignment;
+
+  void* cut(std::size_t bytes) {
+#ifdef __SANITIZE_ADDRESS__  // which knows where a block ends if it comes from the heap
+    return ::operator new(bytes, std::align_val_t(kAlignment));
+#else
+    const std::size_t whole = (bytes + kGap + kAlignment - 1) / kAlignment * kAlignment;
+    if (whole > kChunk / 4) return new_chunk(whole);
+    if (whole > rest_) {
+      next_ = new_chunk(kChunk);
+      rest_ = kChunk;
+    }
+    rest_ -= whole;
+    return std::exchange(next_, next_ + whole);
+#endif
+  }
+
+  static std::byte* new_chunk(std::size_t bytes) {
+    const std::size_t whole = (bytes + kPage - 1) / kPage * kPage;
+    void* chunk = ::operator new(whole, std::align_val_t(kPage));
+#ifdef MADV_HUGEPAGE
+    madvise(chunk, whole, MADV_HUGEPAGE);  // where the system refuses, small pages serve
+#endif
+    return static_cast<std::byte*>(chunk);
+  }
+
+  std::mutex mutex_;
+  FreeBlocks left_;
+  std::byte* next_ = nullptr;
+  std::size_t rest_ = 0;
+};
+
+Source& source() {
+  static auto& source = *new Source;
+  return source;
+}
+
 class Pool {
  public:
   ~Pool() {
     closed_ = true;
-    for (const std::vector<void*>& list : free_) {
-      for (void* block : list) ::operator delete(block, kAlignment);
-    }
+    source().inherit(free_);
   }
 
   void* allocate(std::size_t bytes) {
     const SizeClass size_class = class_of(bytes);
-    std::vector<void*>& list = free_.at(size_class.index);
-    if (closed_ || list.empty()) {
+    if (closed_ || free_.at(size_class.index).empty()) {
       ++heap_allocations_;
-      return ::operator new(size_class.bytes, kAlignment);
+      return source().take(size_class);
     }
+    std::vector<void*>& list = free_[size_class.index];
     void* block = list.back();
     list.pop_back();
     return block;
   }
 
   void release(void* block, std::size_t bytes) noexcept {
-    if (closed_) {  // a tensor with static lifetime outlives its thread's pool
-      ::operator delete(block, kAlignment);
-      return;
-    }
-    try {
-      free_[class_of(bytes).index].push_back(block);
-    } catch (const std::bad_alloc&) {
-      ::operator delete(block, kAlignment);
-    }
+    if (!closed_) keep(block, free_[class_of(bytes).index]);  // a static tensor outlives its thread's pool
   }
 
   std::uint64_t heap_allocations() const { return heap_allocations_; }
 
  private:
-  // Apart from the blocks, so that giving one out does not wait for its memory.
-  std::array<std::vector<void*>, 1 + 40 * kStepsPerDoubling> free_{};
+  FreeBlocks free_;
   std::uint64_t heap_allocations_ = 0;
   bool closed_ = false;
 };
