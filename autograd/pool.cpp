@@ -36,7 +36,7 @@ SizeClass class_of(std::size_t bytes) {
   return {1 + (exponent - first_exponent) * kStepsPerDoubling + quarter, base + (quarter + 1) * step};
 }
 
-// Without memory for the list the block is lost, which such a program can bear.
+// Without memory for the list the block is lost, which a program without memory can bear.
 void keep(void* block, std::vector<void*>& list) noexcept {
   try {
     list.push_back(block);
@@ -57,11 +57,9 @@ class Source {
     return block;
   }
 
-  void inherit(FreeBlocks& blocks) noexcept {
+  void give_back(void* block, std::size_t index) noexcept {
     const std::lock_guard lock(mutex_);
-    for (std::size_t i = 0; i < blocks.size(); ++i) {
-      for (void* block : blocks[i]) keep(block, left_[i]);
-    }
+    keep(block, left_[index]);
   }
 
  private:
@@ -109,7 +107,9 @@ class Pool {
  public:
   ~Pool() {
     closed_ = true;
-    source().inherit(free_);
+    for (std::size_t i = 0; i < free_.size(); ++i) {
+      for (void* block : free_[i]) source().give_back(block, i);
+    }
   }
 
   void* allocate(std::size_t bytes) {
@@ -125,7 +125,9 @@ class Pool {
   }
 
   void release(void* block, std::size_t bytes) noexcept {
-    if (!closed_) keep(block, free_[class_of(bytes).index]);  // a static tensor outlives its thread's pool
+    const std::size_t index = class_of(bytes).index;
+    closed_ ? source().give_back(block, index)  // a tensor with static lifetime outlives its thread's pool
+            : keep(block, free_[index]);
   }
 
   std::uint64_t heap_allocations() const { return heap_allocations_; }

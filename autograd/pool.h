@@ -2,7 +2,8 @@
 //
 // A training step asks for the same few hundred buffers each time. Released blocks wait in a free
 // list of their size class and are handed out again, so that a warm step never calls the heap.
-// The lists belong to the calling thread: no locks, and a block may be released by another thread.
+// The lists belong to the calling thread: no locks, and a block may be released by another thread. What a
+// warm step touches lies together in large pages, where the system has them.
 #pragma once
 
 #include <cstddef>

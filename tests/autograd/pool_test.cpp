@@ -26,6 +26,19 @@ TEST(Pool, AReleasedBlockIsHandedOutAgain) {
   pool_release(again, 1001);
 }
 
+TEST(Pool, BlocksOfAnEndedThreadServeTheNextOne) {
+  constexpr std::size_t kBytes = 777'777;  // of a size that no other test asks for
+  void* block = nullptr;
+  const auto borrow = [&] {
+    block = pool_allocate(kBytes);
+    pool_release(block, kBytes);
+  };
+  std::thread(borrow).join();
+  const void* const first = block;
+  std::thread(borrow).join();
+  EXPECT_EQ(block, first);
+}
+
 // A block must hold what was asked for at every size class boundary; the sanitizer build sees an overrun.
 TEST(Pool, EveryByteOfABlockIsUsable) {
   for (std::size_t bytes = 1; bytes < 5000; bytes += bytes < 300 ? 1 : 37) {
