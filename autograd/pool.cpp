@@ -36,7 +36,7 @@ SizeClass class_of(std::size_t bytes) {
   return {1 + (exponent - first_exponent) * kStepsPerDoubling + quarter, base + (quarter + 1) * step};
 }
 
-// Without memory for the list the block is lost, which a program without memory can bear.
+// Without memory for the list, of a thread that gets blocks from others, the block is lost.
 void keep(void* block, std::vector<void*>& list) noexcept {
   try {
     list.push_back(block);
@@ -114,11 +114,15 @@ class Pool {
 
   void* allocate(std::size_t bytes) {
     const SizeClass size_class = class_of(bytes);
-    if (closed_ || free_.at(size_class.index).empty()) {
+    if (closed_) return source().take(size_class);
+    std::vector<void*>& list = free_.at(size_class.index);
+    if (list.empty()) {
       ++heap_allocations_;
+      // Now, since a release cannot say that there is no memory for its list.
+      const std::size_t made = ++made_[size_class.index];
+      if (list.capacity() < made) list.reserve(2 * made);
       return source().take(size_class);
     }
-    std::vector<void*>& list = free_[size_class.index];
     void* block = list.back();
     list.pop_back();
     return block;
@@ -134,6 +138,7 @@ class Pool {
 
  private:
   FreeBlocks free_;
+  std::array<std::size_t, std::tuple_size_v<FreeBlocks>> made_{};  // blocks that this thread asked for
   std::uint64_t heap_allocations_ = 0;
   bool closed_ = false;
 };
