@@ -63,7 +63,7 @@ class Source {
   }
 
  private:
-  // The blocks of a step together need few of the addresses that a processor remembers where pages are large.
+  // Where pages are large, the blocks of a step together need few entries of the processor's TLB.
   static constexpr std::size_t kPage = std::size_t{2} << 20, kChunk = 4 * kPage;
   // Blocks of 2^n bytes one behind the other would share their places in the caches.
   static constexpr std::size_t kGap = 3 * kAlignment;

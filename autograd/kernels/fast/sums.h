@@ -12,7 +12,7 @@ double sum_lanes(Dim n, F&& term) {
   constexpr Dim kLanes = 16;
   double lane[kLanes] = {};
   run_loop([&, n]() SUPERTAC_LOOP {
-    double sums[kLanes] = {};
+    double sums[kLanes] = {};  // the loop's own, so that they stay in registers
     Dim i = 0;
     for (; i + kLanes <= n; i += kLanes) {
       for (Dim j = 0; j < kLanes; ++j) sums[j] += term(i + j);
