@@ -36,6 +36,12 @@ SizeClass class_of(std::size_t bytes) {
   return {1 + (exponent - first_exponent) * kStepsPerDoubling + quarter, base + (quarter + 1) * step};
 }
 
+void* take_last(std::vector<void*>& list) {
+  void* block = list.back();
+  list.pop_back();
+  return block;
+}
+
 // Without memory for the list, of a thread that gets blocks from others, the block is lost.
 void keep(void* block, std::vector<void*>& list) noexcept {
   try {
@@ -51,10 +57,7 @@ class Source {
   void* take(SizeClass size_class) {
     const std::lock_guard lock(mutex_);
     std::vector<void*>& list = left_.at(size_class.index);
-    if (list.empty()) return cut(size_class.bytes);
-    void* block = list.back();
-    list.pop_back();
-    return block;
+    return list.empty() ? cut(size_class.bytes) : take_last(list);
   }
 
   void give_back(void* block, std::size_t index) noexcept {
@@ -123,9 +126,7 @@ class Pool {
       if (list.capacity() < made) list.reserve(2 * made);
       return source().take(size_class);
     }
-    void* block = list.back();
-    list.pop_back();
-    return block;
+    return take_last(list);
   }
 
   void release(void* block, std::size_t bytes) noexcept {

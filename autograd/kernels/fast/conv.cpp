@@ -12,7 +12,16 @@
 namespace supertac::kernels::fast {
 namespace {
 
-// [taps][cin][cout] -> [taps][cout][cin], in strips of a cache line's width
+void gather_batch(const GatherJob& job, Dim images, Dim in_pixels, Dim out_pixels, const real* x, real* y) {
+  const auto gather = isa_kernels().gather;
+  for (Dim n = 0; n < images; ++n) gather(job, x + n * in_pixels * job.cin, y + n * out_pixels * job.cout);
+}
+
+ConvTask task_of(const ConvSizes& s) { return {&geometry_of(s.map), s.images, s.cin, s.cout}; }
+
+}  // namespace
+
+// In strips of a cache line's width.
 Tensor transposed_weights(const real* weights, Dim taps, Dim cin, Dim cout) {
   constexpr Dim kStrip = 16;
   return weight_form(weights, WeightForm::transposed, {taps, cout, cin}, [&](real* to) {
@@ -27,15 +36,6 @@ Tensor transposed_weights(const real* weights, Dim taps, Dim cin, Dim cout) {
     }
   });
 }
-
-void gather_batch(const GatherJob& job, Dim images, Dim in_pixels, Dim out_pixels, const real* x, real* y) {
-  const auto gather = isa_kernels().gather;
-  for (Dim n = 0; n < images; ++n) gather(job, x + n * in_pixels * job.cin, y + n * out_pixels * job.cout);
-}
-
-ConvTask task_of(const ConvSizes& s) { return {&geometry_of(s.map), s.images, s.cin, s.cout}; }
-
-}  // namespace
 
 void conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias, real negative_slope,
           real* y) {

@@ -25,11 +25,11 @@ Dim lines_of(const ConvTask& s) { return s.geometry->map.height + s.geometry->ma
 Dim line_of(const ConvTask& s) { return s.geometry->map.width + kAcross - 1; }
 
 // [taps][cin][cout] -> [cin][(taps, cout), zeros]
-Tensor with_taps_inside(const ConvTask& s, const real* w, Dim columns) {
-  Tensor out = Tensor::zeros({s.cin, columns});
+Tensor with_taps_inside(const ConvTask& s, const real* w) {
+  Tensor out = Tensor::zeros({s.cin, kColumns});
   for (Dim t = 0; t < s.geometry->taps; ++t) {
     for (Dim i = 0; i < s.cin; ++i) {
-      for (Dim o = 0; o < s.cout; ++o) out.data()[i * columns + t * s.cout + o] = *w++;
+      for (Dim o = 0; o < s.cout; ++o) out.data()[i * kColumns + t * s.cout + o] = *w++;
     }
   }
   return out;
@@ -112,7 +112,7 @@ bool is_narrow(const ConvTask& s) {
 void narrow_conv(const ConvTask& s, const real* x, const real* w, const real* bias, real negative_slope,
                  real* y) {
   const ConvSettings& map = s.geometry->map;
-  const Tensor inside = with_taps_inside(s, w, kColumns);
+  const Tensor inside = with_taps_inside(s, w);
   const Dim line = line_of(s) * kColumns, pixel_itself = 0;
   Tensor z = Tensor::zeros({lines_of(s), line});
   const ProductJob job{.height = map.height,
@@ -135,8 +135,9 @@ void narrow_conv(const ConvTask& s, const real* x, const real* w, const real* bi
 }
 
 void narrow_grad_x(const ConvTask& s, const real* gy, const real* w, Into into, real* gx) {
-  fast::linear_grad_x(s.images * pixels_of(s), s.cin, sums_of(s), spread(s, gy).data(),
-                      with_taps_inside(s, w, sums_of(s)).data(), into, gx);
+  const Tensor wt = fast::transposed_weights(w, s.geometry->taps, s.cin, s.cout);
+  isa_kernels().gather_rows({nullptr, wt.data(), nullptr, sums_of(s), s.cin, into, 1}, spread(s, gy).data(),
+                            gx, s.images * pixels_of(s));
 }
 
 void narrow_grad_w(const ConvTask& s, const real* x, const real* gy, Into into, real* gw) {

@@ -10,18 +10,16 @@ namespace supertac::kernels {
 template <class F>
 double sum_lanes(Dim n, F&& term) {
   constexpr Dim kLanes = 16;
-  double lane[kLanes] = {};
+  double total = 0;
   run_loop([&, n]() SUPERTAC_LOOP {
-    double sums[kLanes] = {};  // the loop's own, so that they stay in registers
+    double lane[kLanes] = {};
     Dim i = 0;
     for (; i + kLanes <= n; i += kLanes) {
-      for (Dim j = 0; j < kLanes; ++j) sums[j] += term(i + j);
+      for (Dim j = 0; j < kLanes; ++j) lane[j] += term(i + j);
     }
-    for (Dim j = 0; i < n; ++i, ++j) sums[j] += term(i);
-    for (Dim j = 0; j < kLanes; ++j) lane[j] = sums[j];
+    for (Dim j = 0; i < n; ++i, ++j) lane[j] += term(i);
+    for (Dim j = 0; j < kLanes; ++j) total += lane[j];
   });
-  double total = 0;
-  for (Dim j = 0; j < kLanes; ++j) total += lane[j];
   return total;
 }
 
