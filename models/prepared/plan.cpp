@@ -55,8 +55,12 @@ Estimate Plan::run(const Tensor& inputs) const {
   Tensor memory(Shape{scratch_ + workspace_ * images + bytes / static_cast<Dim>(sizeof(real)) + 1});
   real* const workspace = memory.data() + scratch_;
   for (Dim first = 0; first < count; first += block_) {
-    const Block block{inputs.data() + first * size, std::min(block_, count - first), workspace,
-                      reinterpret_cast<std::uint8_t*>(workspace + workspace_ * images), memory.data()};
+    const Block block{inputs.data() + first * size,
+                      std::min(block_, count - first),
+                      workspace,
+                      reinterpret_cast<std::uint8_t*>(workspace + workspace_ * images),
+                      memory.data(),
+                      filters_anew_ && count == 1};
     if (first == 0 || block.images != block_) clear_margins(block);
     for (const PlanStep& step : steps_) step(block);
     copy_out(block, picture_, out.picture, first);

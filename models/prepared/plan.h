@@ -34,7 +34,8 @@ struct Block {
   Dim images = 0;
   real* workspace = nullptr;
   std::uint8_t* bytes = nullptr;
-  real* scratch = nullptr;  ///< of the step that runs
+  real* scratch = nullptr;    ///< of the step that runs
+  bool filters_anew = false;  ///< Winograd's filters are transformed on the way
 
   real* begin(const Map& map) const { return workspace + map.offset * images; }
   real* first_pixel(const Map& map) const { return begin(map) + map.origin(); }
@@ -47,6 +48,8 @@ using PlanStep = std::function<void(const Block&)>;
 class Plan {
  public:
   Estimate run(const Tensor& inputs) const;
+  /// Whether a picture alone has Winograd's filters transformed anew: the same bits from less memory.
+  bool filters_anew() const { return filters_anew_; }
 
  private:
   friend class Planner;
@@ -67,6 +70,7 @@ class Plan {
   Dim scratch_ = 0;         // numbers
   Map picture_, spread_, latents_;
   Dim block_ = kBlock;
+  bool filters_anew_ = false;
   bool has_spread_ = false, has_latents_ = false;
   Shape picture_shape_, latents_shape_;  // of one image
 };

@@ -107,6 +107,7 @@ ByteProduct::ByteProduct(const Product& p, kernels::Steps from, kernels::Steps t
 void Planner::add_product(const TracedOp& op, Product product) {
   const Id y = op.y.node();
   if (!is_of_bytes(op)) {
+    weights_ += bytes_of(product.w);
     product.y = maps_.at(y);
     plan_->steps_.push_back(std::move(product));
     return;
@@ -114,6 +115,7 @@ void Planner::add_product(const TracedOp& op, Product product) {
   const auto to = steps_.find(y);
   ByteProduct step(product, steps_.at(owner(op.inputs[0])),
                    to == steps_.end() ? kernels::Steps{} : to->second);
+  weights_ += step.w.size();
   plan_->scratch_ = std::max(plan_->scratch_, step.scratch(Plan::kByteBlock));
   if (maps_.contains(y)) step.y = maps_.at(y);
   if (bytes_.contains(y)) step.y_bytes = bytes_.at(y);

@@ -7,45 +7,70 @@
 namespace supertac {
 
 using kernels::ConvSettings;
-
-namespace {
+using kernels::Taps;
 
 constexpr Dim kTilesAtOnce = 8;
 
-// Tiles of 4x4 take fewer products than those of 2x2; their weights, four times the direct ones, come from a
-// slower cache, which a picture alone feels where its maps are small.
-Dim square_of(const Map& x) { return x.height % 4 == 0 && x.width % 4 == 0 ? 4 : 2; }
-
 // A 3x3 convolution from the places of a map to every pixel of another, or to every second one.
 struct Filters {
-  Dim row = 0, column = 0, side = 0;  // the square of places that are not zero throughout
-  Tensor u;                           // [side][side][place]
-  Dim y_offset = 0;                   // from the map's first pixel
+  Taps down = Taps::three, across = Taps::three;
+  std::vector<Dim> taps;  // those that are there, from the first weight
+  Dim y_offset = 0;       // from the map's first pixel
+  Tensor u = {};          // [side(down)][side(across)][place]
+
+  static Dim first(Taps t) { return t == Taps::last_two ? 1 : 0; }  // of the taps, and of the places
+  static Dim count(Taps t) { return t == Taps::three ? 3 : 2; }
 };
 
 struct Winograd {
   kernels::MapTileJob from, to;
-  Tensor bias;
+  Tensor w, bias;
   Dim place = 0;  // numbers from one place of u to the next
   real negative_slope = 1;
   Map x, y;
-  std::vector<Filters> filters;
+  std::vector<Filters> filters = {};
 
   Dim side() const { return from.square + 2; }
+  Dim side(Taps t) const { return t == Taps::three ? side() : side() - 1; }
   Dim scratch() const { return side() * side() * kTilesAtOnce * (from.channels + to.channels); }
-  void add(const Tensor& w, Dim row, Dim column, Dim own_side, Dim y_offset);
+  void add(Filters f);
+  void multiply(const Filters& f, bool anew, Dim tiles, const real* v, real* m) const;
   void operator()(const Block& block) const;
 };
 
-// w: [3][3][cin][cout]
-void Winograd::add(const Tensor& w, Dim row, Dim column, Dim own_side, Dim y_offset) {
-  Filters f{row, column, own_side, Tensor(Shape{own_side * own_side, place}), y_offset};
-  Tensor all(Shape{side() * side(), place});
-  isa().filters({from.channels * to.channels, place, from.square}, w.data(), all.data());
-  for (Dim r = 0; r < own_side; ++r)
-    std::copy_n(all.data() + ((row + r) * side() + column) * place, own_side * place,
-                f.u.data() + r * own_side * place);
+void Winograd::add(Filters f) {
+  const Dim size = from.channels * to.channels;
+  Tensor square = Tensor::zeros(Shape{3, 3, size}), all(Shape{side() * side(), place});
+  const auto* tap = f.taps.data();
+  for (Dim i = 0; i < Filters::count(f.down); ++i) {
+    for (Dim j = 0; j < Filters::count(f.across); ++j)
+      std::copy_n(w.data() + *tap++, size,
+                  square.data() + (3 * (i + Filters::first(f.down)) + j + Filters::first(f.across)) * size);
+  }
+  isa().filters({size, place, from.square}, square.data(), all.data());
+  f.u = Tensor(Shape{side(f.down) * side(f.across), place});
+  for (Dim i = 0; i < side(f.down); ++i)
+    std::copy_n(all.data() + ((i + Filters::first(f.down)) * side() + Filters::first(f.across)) * place,
+                side(f.across) * place, f.u.data() + i * side(f.across) * place);
   filters.push_back(std::move(f));
+}
+
+// Fills m with the products of the places v of so many tiles.
+void Winograd::multiply(const Filters& f, bool anew, Dim tiles, const real* v, real* m) const {
+  const auto& set = isa();
+  const Dim down = side(f.down), across = side(f.across), v_step = tiles * from.channels,
+            m_step = tiles * to.channels;
+  const bool whole = down == side() && across == side();
+  if (!whole) std::fill_n(m, side() * side() * m_step, real(0));
+  if (anew)
+    return set.filtered_places({f.down, f.across, f.taps.data(), tiles, from.channels, to.channels}, v,
+                               w.data(), m);
+  const Dim runs = whole ? 1 : down, run = down * across / runs;
+  for (Dim r = 0; r < runs; ++r) {
+    const Dim at = (Filters::first(f.down) + r) * side() + Filters::first(f.across);
+    set.places({run, tiles, from.channels, to.channels, place}, v + at * v_step, f.u.data() + r * run * place,
+               m + at * m_step);
+  }
 }
 
 void Winograd::operator()(const Block& block) const {
@@ -60,29 +85,28 @@ void Winograd::operator()(const Block& block) const {
     in.step = in.count * in.channels, out.step = out.count * out.channels;
     set.map_patches(in, block.first_pixel(x) - x.line() - x.channels, v);
     for (const Filters& f : filters) {
-      if (f.side < side()) std::fill_n(m, side() * side() * out.step, real(0));
-      const Dim runs = f.side < side() ? f.side : 1, run = f.side * f.side / runs;
-      for (Dim r = 0; r < runs; ++r) {
-        const Dim at = (f.row + r) * side() + f.column;
-        set.places({run, in.count, in.channels, out.channels, place}, v + at * in.step,
-                   f.u.data() + r * run * place, m + at * out.step);
-      }
+      multiply(f, block.filters_anew && from.square == 4, in.count, v, m);
       set.map_squares(out, m, bias.data(), negative_slope, block.first_pixel(y) + f.y_offset);
     }
   }
 }
+
+namespace {
+
+// Tiles of 4x4 take fewer products than those of 2x2, though their weights are four times the direct ones.
+Dim square_of(const Map& x) { return x.height % 4 == 0 && x.width % 4 == 0 ? 4 : 2; }
 
 Winograd winograd_step(const TracedOp& op, const Map& x, const Map& y, kernels::Strides to) {
   constexpr Dim kPadding = 16;  // powers of two apart the places share cache lines
   const Dim square = square_of(x), down = x.height / square, across = x.width / square;
   return {.from = {down, across, x.strides(), x.channels, square},
           .to = {down, across, to, y.channels, square},
+          .w = op.inputs[1].value().clone(),
           .bias = op.inputs[2].value().clone(),
           .place = x.channels * y.channels + kPadding,
           .negative_slope = op.settings.negative_slope,
           .x = x,
-          .y = y,
-          .filters = {}};
+          .y = y};
 }
 
 bool is_of_tiles(const TracedOp& op) {
@@ -92,21 +116,15 @@ bool is_of_tiles(const TracedOp& op) {
          s.height % 2 == 0 && s.width % 2 == 0;
 }
 
-// [4][4][cin][cout] -> [3][3][cin][cout]: what output (top, left) of every two by two sees of the inputs
-// around. Output 2t sees input t - 1 through tap 3 and t through tap 1, output 2t + 1 input t through tap 2,
-// t + 1 through 0.
-Tensor quarter_weights(const Variable& w, Dim top, Dim left) {
-  constexpr Dim kNone = -1, kTaps[2][3] = {{3, 1, kNone}, {kNone, 2, 0}};
-  const Dim size = w.dim(2) * w.dim(3);
-  Tensor out = Tensor::zeros(Shape{3, 3, w.dim(2), w.dim(3)});
-  for (Dim i = 0; i < 3; ++i) {
-    for (Dim j = 0; j < 3; ++j) {
-      const Dim ky = kTaps[top][i], kx = kTaps[left][j];
-      if (ky != kNone && kx != kNone)
-        std::copy_n(w.value().data() + (4 * ky + kx) * size, size, out.data() + (3 * i + j) * size);
-    }
+// The taps that output (top, left) of every two by two sees: output 2t sees input t - 1 through tap 3 and t
+// through tap 1, output 2t + 1 input t through tap 2, t + 1 through 0.
+std::vector<Dim> quarter_taps(Dim top, Dim left, Dim size) {
+  constexpr Dim kTaps[2][2] = {{3, 1}, {2, 0}};
+  std::vector<Dim> taps;
+  for (const Dim ky : kTaps[top]) {
+    for (const Dim kx : kTaps[left]) taps.push_back((4 * ky + kx) * size);
   }
-  return out;
+  return taps;
 }
 
 }  // namespace
@@ -135,12 +153,20 @@ void Planner::transposed_conv(const TracedOp& op) {
   doubles && !is_of_bytes(op) && is_of_tiles(op) ? transposed_winograd(op) : direct_transposed_conv(op);
 }
 
+void Planner::add_winograd(Winograd step) {
+  weights_ += bytes_of(step.w);
+  for (const Filters& f : step.filters) transformed_ += bytes_of(f.u);
+  plan_->scratch_ = std::max(plan_->scratch_, step.scratch());
+  plan_->steps_.push_back(std::move(step));
+}
+
 void Planner::winograd(const TracedOp& op) {
   const Map x = map_of(op.inputs[0]), y = new_map(op.y);
   Winograd step = winograd_step(op, x, y, y.strides());
-  step.add(op.inputs[1].value(), 0, 0, step.side(), 0);
-  plan_->scratch_ = std::max(plan_->scratch_, step.scratch());
-  plan_->steps_.push_back(std::move(step));
+  Filters all;
+  for (Dim tap = 0; tap < 9; ++tap) all.taps.push_back(tap * x.channels * y.channels);
+  step.add(std::move(all));
+  add_winograd(std::move(step));
 }
 
 // Each quarter of the outputs is a convolution with two by two of the three by three inputs around. The first
@@ -149,13 +175,13 @@ void Planner::winograd(const TracedOp& op) {
 void Planner::transposed_winograd(const TracedOp& op) {
   const Map x = map_of(op.inputs[0]), y = new_map(op.y);
   Winograd step = winograd_step(op, x, y, {y.image(), 2 * y.line(), 2 * y.channels});
+  constexpr Taps kTaps[] = {Taps::first_two, Taps::last_two};
   for (Dim top = 0; top < 2; ++top) {
     for (Dim left = 0; left < 2; ++left)
-      step.add(quarter_weights(op.inputs[1], top, left), top, left, step.side() - 1,
-               top * y.line() + left * y.channels);
+      step.add({kTaps[top], kTaps[left], quarter_taps(top, left, x.channels * y.channels),
+                top * y.line() + left * y.channels});
   }
-  plan_->scratch_ = std::max(plan_->scratch_, step.scratch());
-  plan_->steps_.push_back(std::move(step));
+  add_winograd(std::move(step));
 }
 
 }  // namespace supertac

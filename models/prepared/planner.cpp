@@ -1,5 +1,7 @@
 #include "models/prepared/planner.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
@@ -8,7 +10,24 @@ namespace supertac {
 
 using kernels::ConvSettings;
 
-std::shared_ptr<const Plan> Planner::plan(const Network& network, const ActivationRanges* ranges) {
+std::size_t Planner::second_cache_bytes() {
+#ifdef _SC_LEVEL2_CACHE_SIZE
+  return static_cast<std::size_t>(std::max(0L, sysconf(_SC_LEVEL2_CACHE_SIZE)));
+#else
+  return 0;
+#endif
+}
+
+// A picture alone meets each weight once. Where the second cache holds all weights from one picture to the
+// next, but not their transforms too, transforming them on the way costs less than fetching them from the
+// third: .69 of the time of `paper` with 2 MB.
+bool Planner::filters_anew(std::size_t second_cache) const {
+  const auto maps = static_cast<std::size_t>(plan_->workspace_ + plan_->scratch_) * sizeof(real);
+  return weights_ + maps <= second_cache && weights_ + transformed_ + maps > second_cache;
+}
+
+std::shared_ptr<const Plan> Planner::plan(const Network& network, const ActivationRanges* ranges,
+                                          std::size_t second_cache) {
   const NoGrad no_grad;
   const Variable input(Tensor::zeros(network.input_shape(1)));
   const Trace trace;
@@ -16,6 +35,7 @@ std::shared_ptr<const Plan> Planner::plan(const Network& network, const Activati
   Planner planner(input, trace.ops(), drawn, ranges);
   Plan& plan = *planner.plan_;
   if (ranges != nullptr) plan.block_ = Plan::kByteBlock;
+  plan.filters_anew_ = planner.filters_anew(second_cache);
   plan.picture_ = planner.map_of(drawn.picture);
   plan.picture_shape_ = drawn.picture.shape();
   plan.has_spread_ = drawn.spread.defined();

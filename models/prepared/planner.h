@@ -24,12 +24,17 @@ class Planner {
  public:
   /// With `ranges` the convolutions and the linear layers behind them are products of bytes. Throws
   /// std::logic_error naming an op that has no step, std::invalid_argument for the ranges of another network.
-  static std::shared_ptr<const Plan> plan(const Network& network, const ActivationRanges* ranges = nullptr);
+  /// `second_cache`: of the processor, in bytes; 0: not known.
+  static std::shared_ptr<const Plan> plan(const Network& network, const ActivationRanges* ranges = nullptr,
+                                          std::size_t second_cache = second_cache_bytes());
 
  private:
   using Id = const detail::Node*;
   using Make = void (Planner::*)(const TracedOp&);
 
+  static std::size_t second_cache_bytes();
+  static std::size_t bytes_of(const Tensor& t) { return static_cast<std::size_t>(t.size()) * sizeof(real); }
+  bool filters_anew(std::size_t second_cache) const;
   Planner(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn,
           const ActivationRanges* ranges);
   static const std::map<std::string_view, Make>& makers();
@@ -48,6 +53,7 @@ class Planner {
   const Map& new_bytes(const Variable& y);
   Map new_results(const TracedOp& op);
   void add_product(const TracedOp& op, struct Product product);
+  void add_winograd(struct Winograd step);
   void add_bytes(const TracedOp& op);
   void release_after(std::size_t op);
 
@@ -82,6 +88,7 @@ class Planner {
   std::vector<Map> free_, free_bytes_;
   std::map<Id, kernels::Steps> steps_;  // of values that bytes stand for
   std::set<Id> read_as_numbers_;
+  std::size_t weights_ = 0, transformed_ = 0;  // bytes: as they are, and Winograd's places of some of them
 };
 
 }  // namespace supertac

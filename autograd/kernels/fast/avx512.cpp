@@ -56,6 +56,8 @@ struct Vec {
 #include "autograd/kernels/fast/isa_kernels.inl"
 #include "autograd/kernels/fast/isa_winograd.inl"
 
+#include "autograd/kernels/fast/isa_tiles.inl"
+
 #include "autograd/kernels/fast/isa_inference.inl"
 
 // Few outputs by vectors of eight: half of sixteen would be idle, and masks cost more than the wider set
@@ -80,6 +82,7 @@ const IsaKernels kAvx512Kernels{"avx512",
                                 by_width<product, &IsaKernels::product>,
                                 map_patches,
                                 places,
+                                filtered_places,
                                 map_squares,
                                 gate,
                                 mean,

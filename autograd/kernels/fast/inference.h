@@ -42,6 +42,18 @@ struct PlacesJob {
   Dim place = 0;  // numbers from one place of u to the next
 };
 
+/// Taps of a 3x3 filter along one axis: all, or all but the last or the first, which is 0.
+enum class Taps { three, first_two, last_two };
+
+/// The same of a few tiles of 4x4, from the filters themselves: u = G g G^T is made of a few rows of cin at a
+/// time, which the first cache holds. Tap (i, j), of those that are there, is g[taps[i, j] + k], k < cin *
+/// cout. m is written where u is not 0 throughout; v and m are [6][6][tiles][channels].
+struct FilteredPlacesJob {
+  Taps down = Taps::three, across = Taps::three;
+  const Dim* taps = nullptr;
+  Dim tiles = 0, cin = 0, cout = 0;  // both a multiple of kTransformChannels
+};
+
 /// y[pixel, c] = a[pixel, c] + x[pixel, c] * gate[image, c], without gates a + x; and means over pixels.
 struct MapJob {
   Dim images = 0, height = 0, width = 0, channels = 0;

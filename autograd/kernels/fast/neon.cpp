@@ -47,13 +47,17 @@ struct Vec {
 #include "autograd/kernels/fast/isa_kernels.inl"
 #include "autograd/kernels/fast/isa_winograd.inl"
 
+#include "autograd/kernels/fast/isa_tiles.inl"
+
 #include "autograd/kernels/fast/isa_inference.inl"
 
 }  // namespace
 
-const IsaKernels kNeonKernels{"neon",       Vectors::baseline, gather,  gather_rows,  outer,   filters,
-                              filter_grads, patches,           squares, square_grads, product, map_patches,
-                              places,       map_squares,       gate,    mean,         planes,  plane_conv};
+const IsaKernels kNeonKernels{
+    "neon",       Vectors::baseline, gather,      gather_rows,  outer,   filters,
+    filter_grads, patches,           squares,     square_grads, product, map_patches,
+    places,       filtered_places,   map_squares, gate,         mean,    planes,
+    plane_conv};
 
 }  // namespace supertac::kernels
 

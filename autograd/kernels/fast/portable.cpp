@@ -32,20 +32,24 @@ struct Vec {
 #include "autograd/kernels/fast/isa_kernels.inl"
 #include "autograd/kernels/fast/isa_winograd.inl"
 
+#include "autograd/kernels/fast/isa_tiles.inl"
+
 #include "autograd/kernels/fast/isa_inference.inl"
 
 }  // namespace
 
 #ifdef SUPERTAC_SCALAR_FMA
 const IsaKernels kPortableFmaKernels{
-    "portable",   Vectors::baseline, gather,  gather_rows,  outer,   filters,
-    filter_grads, patches,           squares, square_grads, product, map_patches,
-    places,       map_squares,       gate,    mean,         planes,  plane_conv};
+    "portable",   Vectors::baseline, gather,      gather_rows,  outer,   filters,
+    filter_grads, patches,           squares,     square_grads, product, map_patches,
+    places,       filtered_places,   map_squares, gate,         mean,    planes,
+    plane_conv};
 #else
 const IsaKernels kPortableKernels{
-    "portable",   Vectors::baseline, gather,  gather_rows,  outer,   filters,
-    filter_grads, patches,           squares, square_grads, product, map_patches,
-    places,       map_squares,       gate,    mean,         planes,  plane_conv};
+    "portable",   Vectors::baseline, gather,      gather_rows,  outer,   filters,
+    filter_grads, patches,           squares,     square_grads, product, map_patches,
+    places,       filtered_places,   map_squares, gate,         mean,    planes,
+    plane_conv};
 #endif
 
 }  // namespace supertac::kernels

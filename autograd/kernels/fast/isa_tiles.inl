@@ -1,0 +1,186 @@
+// Winograd's products of prepared networks (inference.h), over the same vector type as isa_kernels.inl and
+// included behind isa_winograd.inl.
+
+template <int kSquare>
+ALWAYS_INLINE Dim tile_corner(const MapTileJob& job, Dim tile) {
+  const Dim tiles = job.tiles_down * job.tiles_across, within = tile % tiles;
+  return tile / tiles * job.map.image + within / job.tiles_across * kSquare * job.map.line +
+         within % job.tiles_across * kSquare * job.map.pixel;
+}
+
+template <class Transform>
+inline void patches_by(const MapTileJob& job, const real* x, real* places) {
+  constexpr int kSide = Transform::kIn;
+  for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
+    const real* corner = x + tile_corner<kSide - 2>(job, tile);
+    for (Dim c = 0; c < job.channels; c += Vec::kLanes) {
+      Vec from[kSide][kSide], to[kSide][kSide];
+      for (int i = 0; i < kSide; ++i) {
+        for (int j = 0; j < kSide; ++j)
+          from[i][j] = Vec::load(corner + i * job.map.line + j * job.map.pixel + c);
+      }
+      both_ways<Transform>(from, to);
+      for (int i = 0; i < kSide; ++i) {
+        for (int j = 0; j < kSide; ++j) to[i][j].store(places + (kSide * i + j) * job.step + c);
+      }
+    }
+  }
+}
+
+// x points at the margin's first pixel.
+void map_patches(const MapTileJob& job, const real* x, real* places) {
+  job.square == 4 ? patches_by<PatchTransform>(job, x, places)
+                  : patches_by<SmallPatchTransform>(job, x, places);
+}
+
+// P tiles by J vectors of outputs. The weights are met once for each strip of tiles: those of the next place
+// are called for while these are used.
+template <int P, int J>
+ALWAYS_INLINE void place_tile(const PlacesJob& job, const real* v, const real* u, real* m) {
+  Vec sum[P][J];
+  for (int p = 0; p < P; ++p) {
+    for (int j = 0; j < J; ++j) sum[p][j] = Vec::broadcast(0);
+  }
+#pragma GCC unroll 4
+  for (Dim k = 0; k < job.cin; ++k, u += job.cout) {
+    Vec weight[J];
+    for (int j = 0; j < J; ++j) {
+      weight[j] = Vec::load(u + j * Vec::kLanes);
+      __builtin_prefetch(u + job.place + j * Vec::kLanes);
+    }
+    for (int p = 0; p < P; ++p) {
+      const Vec value = Vec::broadcast(v[p * job.cin + k]);
+      for (int j = 0; j < J; ++j) sum[p][j] = Vec::fma(value, weight[j], sum[p][j]);
+    }
+  }
+  for (int p = 0; p < P; ++p) {
+    for (int j = 0; j < J; ++j) sum[p][j].store(m + p * job.cout + j * Vec::kLanes);
+  }
+}
+
+template <int P>
+ALWAYS_INLINE void place_tiles(const PlacesJob& job, Dim& tile, const real* v, const real* u, real* m) {
+  for (; tile + P <= job.tiles; tile += P) {
+    Dim channel = 0;
+    for (; channel + 2 * Vec::kLanes <= job.cout; channel += 2 * Vec::kLanes) {
+      place_tile<P, 2>(job, v + tile * job.cin, u + channel, m + tile * job.cout + channel);
+    }
+    for (; channel < job.cout; channel += Vec::kLanes) {
+      place_tile<P, 1>(job, v + tile * job.cin, u + channel, m + tile * job.cout + channel);
+    }
+  }
+}
+
+void places(const PlacesJob& job, const real* v, const real* u, real* m) {
+  for (Dim i = 0; i < job.places; ++i) {
+    Dim tile = 0;
+    place_tiles<kTilePixels>(job, tile, v, u, m);
+    if constexpr (kTilePixels > 4) place_tiles<4>(job, tile, v, u, m);
+    place_tiles<2>(job, tile, v, u, m);
+    place_tiles<1>(job, tile, v, u, m);
+    v += job.tiles * job.cin, u += job.place, m += job.tiles * job.cout;
+  }
+}
+
+// Rows of u, and vectors of them, that are made and used at a time: 4 x 36 vectors of 16.
+constexpr int kFilterRows = 4, kFilterVectors = Vec::kLanes >= kTransformChannels ? 1 : 2;
+
+// P tiles of one place: m += v * u for these rows.
+template <int P>
+ALWAYS_INLINE void add_rows(const FilteredPlacesJob& job, const real* v, const real* u, bool first, real* m) {
+  constexpr int J = kFilterVectors;
+  Vec sum[P][J];
+  for (int p = 0; p < P; ++p) {
+    for (int j = 0; j < J; ++j)
+      sum[p][j] = first ? Vec::broadcast(0) : Vec::load(m + p * job.cout + j * Vec::kLanes);
+  }
+#pragma GCC unroll 4
+  for (int k = 0; k < kFilterRows; ++k) {
+    for (int j = 0; j < J; ++j) {
+      const Vec weight = Vec::load(u + (k * J + j) * Vec::kLanes);
+      for (int p = 0; p < P; ++p) sum[p][j] = Vec::fma(Vec::broadcast(v[p * job.cin + k]), weight, sum[p][j]);
+    }
+  }
+  for (int p = 0; p < P; ++p) {
+    for (int j = 0; j < J; ++j) sum[p][j].store(m + p * job.cout + j * Vec::kLanes);
+  }
+}
+
+// g and m begin with the channels of kFilterVectors.
+template <class Down, class Across>
+inline void filtered_vectors(const FilteredPlacesJob& job, const real* v, const real* g, real* m) {
+  constexpr Dim kRow = kFilterVectors * Vec::kLanes;
+  alignas(64) real u[Down::kOut][Across::kOut][kFilterRows * kRow];
+  for (Dim k = 0; k < job.cin; k += kFilterRows) {
+    for (Dim at = 0; at < kFilterRows * kRow; at += Vec::kLanes) {
+      const real* weights = g + (k + at / kRow) * job.cout + at % kRow;
+      Vec from[Down::kIn][Across::kIn], to[Down::kOut][Across::kOut];
+      for (int i = 0; i < Down::kIn; ++i) {
+        for (int j = 0; j < Across::kIn; ++j) from[i][j] = Vec::load(weights + job.taps[Across::kIn * i + j]);
+      }
+      both_ways<Across, Down>(from, to);
+      for (int i = 0; i < Down::kOut; ++i) {
+        for (int j = 0; j < Across::kOut; ++j) to[i][j].store(u[i][j] + at);
+      }
+    }
+    for (int i = 0; i < Down::kOut; ++i) {
+      for (int j = 0; j < Across::kOut; ++j) {
+        const Dim first = (6 * (i + Down::kFirst) + j + Across::kFirst) * job.tiles;
+        Dim tile = first;
+        for (; tile + 4 <= first + job.tiles; tile += 4)
+          add_rows<4>(job, v + tile * job.cin + k, u[i][j], k == 0, m + tile * job.cout);
+        for (; tile < first + job.tiles; ++tile)
+          add_rows<1>(job, v + tile * job.cin + k, u[i][j], k == 0, m + tile * job.cout);
+      }
+    }
+  }
+}
+
+template <class Down>
+inline void filtered_down(const FilteredPlacesJob& job, const real* v, const real* g, real* m) {
+  for (Dim c = 0; c < job.cout; c += kFilterVectors * Vec::kLanes) {
+    if constexpr (Down::kIn == 3) {
+      filtered_vectors<Down, FilterTransform>(job, v, g + c, m + c);
+    } else {
+      job.across == Taps::first_two ? filtered_vectors<Down, FirstTwoTapsTransform>(job, v, g + c, m + c)
+                                    : filtered_vectors<Down, LastTwoTapsTransform>(job, v, g + c, m + c);
+    }
+  }
+}
+
+void filtered_places(const FilteredPlacesJob& job, const real* v, const real* g, real* m) {
+  if (job.down == Taps::three) return filtered_down<FilterTransform>(job, v, g, m);
+  job.down == Taps::first_two ? filtered_down<FirstTwoTapsTransform>(job, v, g, m)
+                              : filtered_down<LastTwoTapsTransform>(job, v, g, m);
+}
+
+template <class Transform>
+inline void squares_by(const MapTileJob& job, const real* places, const real* bias, real negative_slope,
+                       real* y) {
+  constexpr int kSide = Transform::kIn, kSquare = Transform::kOut;
+  const Vec slope = Vec::broadcast(negative_slope);
+  for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
+    real* corner = y + tile_corner<kSquare>(job, tile);
+    for (Dim c = 0; c < job.channels; c += Vec::kLanes) {
+      Vec from[kSide][kSide], to[kSquare][kSquare];
+      for (int i = 0; i < kSide; ++i) {
+        for (int j = 0; j < kSide; ++j) from[i][j] = Vec::load(places + (kSide * i + j) * job.step + c);
+      }
+      both_ways<Transform>(from, to);
+      const Vec start = Vec::load(bias + c);
+      for (int i = 0; i < kSquare; ++i) {
+        for (int j = 0; j < kSquare; ++j) {
+          Vec value = Vec::add(start, to[i][j]);
+          if (negative_slope != 1) value = Vec::rectify(value, slope);
+          value.store(corner + i * job.map.line + j * job.map.pixel + c);
+        }
+      }
+    }
+  }
+}
+
+// y points at the map's first pixel.
+void map_squares(const MapTileJob& job, const real* places, const real* bias, real negative_slope, real* y) {
+  job.square == 4 ? squares_by<SquareTransform>(job, places, bias, negative_slope, y)
+                  : squares_by<SmallSquareTransform>(job, places, bias, negative_slope, y);
+}
