@@ -60,7 +60,7 @@ Estimate Plan::run(const Tensor& inputs) const {
                       workspace,
                       reinterpret_cast<std::uint8_t*>(workspace + workspace_ * images),
                       memory.data(),
-                      filters_anew_ && count == 1};
+                      filters_anew_};
     if (first == 0 || block.images != block_) clear_margins(block);
     for (const PlanStep& step : steps_) step(block);
     copy_out(block, picture_, out.picture, first);

@@ -32,6 +32,7 @@ struct Winograd {
 
   Dim side() const { return from.square + 2; }
   Dim side(Taps t) const { return t == Taps::three ? side() : side() - 1; }
+  bool can_transform_anew() const { return from.square == 4 && to.channels % kernels::kFilterChannels == 0; }
   Dim scratch() const { return side() * side() * kTilesAtOnce * (from.channels + to.channels); }
   void add(Filters f);
   void multiply(const Filters& f, bool anew, Dim tiles, const real* v, real* m) const;
@@ -85,7 +86,7 @@ void Winograd::operator()(const Block& block) const {
     in.step = in.count * in.channels, out.step = out.count * out.channels;
     set.map_patches(in, block.first_pixel(x) - x.line() - x.channels, v);
     for (const Filters& f : filters) {
-      multiply(f, block.filters_anew && from.square == 4, in.count, v, m);
+      multiply(f, block.filters_anew && can_transform_anew() && tiles <= kTilesAtOnce / 2, in.count, v, m);
       set.map_squares(out, m, bias.data(), negative_slope, block.first_pixel(y) + f.y_offset);
     }
   }
@@ -155,7 +156,8 @@ void Planner::transposed_conv(const TracedOp& op) {
 
 void Planner::add_winograd(Winograd step) {
   weights_ += bytes_of(step.w);
-  for (const Filters& f : step.filters) transformed_ += bytes_of(f.u);
+  for (const Filters& f : step.filters)
+    (step.can_transform_anew() ? transformed_ : weights_) += bytes_of(f.u);
   plan_->scratch_ = std::max(plan_->scratch_, step.scratch());
   plan_->steps_.push_back(std::move(step));
 }

@@ -51,8 +51,9 @@ enum class Taps { three, first_two, last_two };
 struct FilteredPlacesJob {
   Taps down = Taps::three, across = Taps::three;
   const Dim* taps = nullptr;
-  Dim tiles = 0, cin = 0, cout = 0;  // both a multiple of kTransformChannels
+  Dim tiles = 0, cin = 0, cout = 0;  // cout: a multiple of kFilterChannels
 };
+inline constexpr Dim kFilterChannels = 32;
 
 /// y[pixel, c] = a[pixel, c] + x[pixel, c] * gate[image, c], without gates a + x; and means over pixels.
 struct MapJob {

@@ -82,27 +82,29 @@ void places(const PlacesJob& job, const real* v, const real* u, real* m) {
   }
 }
 
-// Rows of u, and vectors of them, that are made and used at a time: 4 x 36 vectors of 16.
-constexpr int kFilterRows = 4, kFilterVectors = Vec::kLanes >= kTransformChannels ? 1 : 2;
+// Rows of u, and vectors of each, that are made and used at a time: no more than the first cache holds.
+constexpr int kFilterRows = 4, kFilterVectors = 2;
 
-// P tiles of one place: m += v * u for these rows.
+// P tiles of one place: m += v * u for these rows; v and m are [P][cin] and [P][cout].
 template <int P>
-ALWAYS_INLINE void add_rows(const FilteredPlacesJob& job, const real* v, const real* u, bool first, real* m) {
+ALWAYS_INLINE void add_rows(const real* v, Dim cin, const real* u, bool first, real* m, Dim cout) {
   constexpr int J = kFilterVectors;
   Vec sum[P][J];
   for (int p = 0; p < P; ++p) {
     for (int j = 0; j < J; ++j)
-      sum[p][j] = first ? Vec::broadcast(0) : Vec::load(m + p * job.cout + j * Vec::kLanes);
+      sum[p][j] = first ? Vec::broadcast(0) : Vec::load(m + p * cout + j * Vec::kLanes);
   }
 #pragma GCC unroll 4
   for (int k = 0; k < kFilterRows; ++k) {
-    for (int j = 0; j < J; ++j) {
-      const Vec weight = Vec::load(u + (k * J + j) * Vec::kLanes);
-      for (int p = 0; p < P; ++p) sum[p][j] = Vec::fma(Vec::broadcast(v[p * job.cin + k]), weight, sum[p][j]);
+    Vec weight[J];
+    for (int j = 0; j < J; ++j) weight[j] = Vec::load(u + (k * J + j) * Vec::kLanes);
+    for (int p = 0; p < P; ++p) {
+      const Vec value = Vec::broadcast(v[p * cin + k]);
+      for (int j = 0; j < J; ++j) sum[p][j] = Vec::fma(value, weight[j], sum[p][j]);
     }
   }
   for (int p = 0; p < P; ++p) {
-    for (int j = 0; j < J; ++j) sum[p][j].store(m + p * job.cout + j * Vec::kLanes);
+    for (int j = 0; j < J; ++j) sum[p][j].store(m + p * cout + j * Vec::kLanes);
   }
 }
 
@@ -110,10 +112,11 @@ ALWAYS_INLINE void add_rows(const FilteredPlacesJob& job, const real* v, const r
 template <class Down, class Across>
 inline void filtered_vectors(const FilteredPlacesJob& job, const real* v, const real* g, real* m) {
   constexpr Dim kRow = kFilterVectors * Vec::kLanes;
+  const Dim tiles = job.tiles, cin = job.cin, cout = job.cout;
   alignas(64) real u[Down::kOut][Across::kOut][kFilterRows * kRow];
-  for (Dim k = 0; k < job.cin; k += kFilterRows) {
+  for (Dim k = 0; k < cin; k += kFilterRows) {
     for (Dim at = 0; at < kFilterRows * kRow; at += Vec::kLanes) {
-      const real* weights = g + (k + at / kRow) * job.cout + at % kRow;
+      const real* weights = g + (k + at / kRow) * cout + at % kRow;
       Vec from[Down::kIn][Across::kIn], to[Down::kOut][Across::kOut];
       for (int i = 0; i < Down::kIn; ++i) {
         for (int j = 0; j < Across::kIn; ++j) from[i][j] = Vec::load(weights + job.taps[Across::kIn * i + j]);
@@ -124,13 +127,15 @@ inline void filtered_vectors(const FilteredPlacesJob& job, const real* v, const 
       }
     }
     for (int i = 0; i < Down::kOut; ++i) {
+      const Dim first = (6 * (i + Down::kFirst) + Across::kFirst) * tiles;
+      const real* values = v + first * cin + k;
+      real* sums = m + first * cout;
       for (int j = 0; j < Across::kOut; ++j) {
-        const Dim first = (6 * (i + Down::kFirst) + j + Across::kFirst) * job.tiles;
-        Dim tile = first;
-        for (; tile + 4 <= first + job.tiles; tile += 4)
-          add_rows<4>(job, v + tile * job.cin + k, u[i][j], k == 0, m + tile * job.cout);
-        for (; tile < first + job.tiles; ++tile)
-          add_rows<1>(job, v + tile * job.cin + k, u[i][j], k == 0, m + tile * job.cout);
+        Dim tile = 0;
+        for (; tile + 4 <= tiles; tile += 4, values += 4 * cin, sums += 4 * cout)
+          add_rows<4>(values, cin, u[i][j], k == 0, sums, cout);
+        for (; tile < tiles; ++tile, values += cin, sums += cout)
+          add_rows<1>(values, cin, u[i][j], k == 0, sums, cout);
       }
     }
   }
