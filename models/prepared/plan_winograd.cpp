@@ -7,6 +7,7 @@
 namespace supertac {
 
 using kernels::ConvSettings;
+using kernels::place_step;
 using kernels::Taps;
 
 constexpr Dim kTilesAtOnce = 8;
@@ -33,7 +34,9 @@ struct Winograd {
   Dim side() const { return from.square + 2; }
   Dim side(Taps t) const { return t == Taps::three ? side() : side() - 1; }
   bool can_transform_anew() const { return from.square == 4 && to.channels % kernels::kFilterChannels == 0; }
-  Dim scratch() const { return side() * side() * kTilesAtOnce * (from.channels + to.channels); }
+  /// Of v, and of m behind it.
+  Dim places(Dim channels) const { return side() * side() * place_step(kTilesAtOnce, channels); }
+  Dim scratch() const { return places(from.channels) + places(to.channels); }
   void add(Filters f);
   void multiply(const Filters& f, bool anew, Dim tiles, const real* v, real* m) const;
   void operator()(const Block& block) const;
@@ -59,8 +62,8 @@ void Winograd::add(Filters f) {
 // Fills m with the products of the places v of so many tiles.
 void Winograd::multiply(const Filters& f, bool anew, Dim tiles, const real* v, real* m) const {
   const auto& set = isa();
-  const Dim down = side(f.down), across = side(f.across), v_step = tiles * from.channels,
-            m_step = tiles * to.channels;
+  const Dim down = side(f.down), across = side(f.across);
+  const Dim v_step = place_step(tiles, from.channels), m_step = place_step(tiles, to.channels);
   const bool whole = down == side() && across == side();
   if (!whole) std::fill_n(m, side() * side() * m_step, real(0));
   if (anew)
@@ -78,12 +81,12 @@ void Winograd::operator()(const Block& block) const {
   const auto& set = isa();
   const Dim tiles = block.images * from.tiles_down * from.tiles_across;
   real* const v = block.scratch;
-  real* const m = v + side() * side() * kTilesAtOnce * from.channels;
+  real* const m = v + places(from.channels);
   for (Dim first = 0; first < tiles; first += kTilesAtOnce) {
     kernels::MapTileJob in = from, out = to;
     in.first = out.first = first;
     in.count = out.count = std::min(kTilesAtOnce, tiles - first);
-    in.step = in.count * in.channels, out.step = out.count * out.channels;
+    in.step = place_step(in.count, in.channels), out.step = place_step(out.count, out.channels);
     set.map_patches(in, block.first_pixel(x) - x.line() - x.channels, v);
     for (const Filters& f : filters) {
       multiply(f, block.filters_anew && can_transform_anew() && tiles <= kTilesAtOnce / 2, in.count, v, m);

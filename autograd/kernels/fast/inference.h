@@ -36,7 +36,7 @@ struct MapTileJob {
 };
 
 /// For each place of Winograd's transform m[place, tile, :] = sum over cin of v[place, tile, cin] * u[place,
-/// cin, :].
+/// cin, :]. From one place of v and m to the next it is place_step() numbers.
 struct PlacesJob {
   Dim places = 0, tiles = 0, cin = 0, cout = 0;
   Dim place = 0;  // numbers from one place of u to the next
@@ -47,7 +47,7 @@ enum class Taps { three, first_two, last_two };
 
 /// The same of a few tiles of 4x4, from the filters themselves: u = G g G^T is made of a few rows of cin at a
 /// time, which the first cache holds. Tap (i, j), of those that are there, is g[taps[i, j] + k], k < cin *
-/// cout. m is written where u is not 0 throughout; v and m are [6][6][tiles][channels].
+/// cout. m is written where u is not 0 throughout. v and m have [6][6] places.
 struct FilteredPlacesJob {
   Taps down = Taps::three, across = Taps::three;
   const Dim* taps = nullptr;

@@ -43,6 +43,9 @@ struct TileJob {
   Dim first = 0, count = 0, step = 0;
 };
 inline constexpr Dim kTransformChannels = 16;
+/// Numbers from one place of so many tiles to the next: a power of two apart, the places of a tile would
+/// share few sets of the first cache.
+inline constexpr Dim place_step(Dim tiles, Dim channels) { return tiles * channels + 16; }
 
 /// Weights [3][3][weights] and their places u[(6 i + j) * step + k] for the same transforms.
 struct FilterJob {

@@ -72,13 +72,14 @@ ALWAYS_INLINE void place_tiles(const PlacesJob& job, Dim& tile, const real* v, c
 }
 
 void places(const PlacesJob& job, const real* v, const real* u, real* m) {
+  const Dim v_step = place_step(job.tiles, job.cin), m_step = place_step(job.tiles, job.cout);
   for (Dim i = 0; i < job.places; ++i) {
     Dim tile = 0;
     place_tiles<kTilePixels>(job, tile, v, u, m);
     if constexpr (kTilePixels > 4) place_tiles<4>(job, tile, v, u, m);
     place_tiles<2>(job, tile, v, u, m);
     place_tiles<1>(job, tile, v, u, m);
-    v += job.tiles * job.cin, u += job.place, m += job.tiles * job.cout;
+    v += v_step, u += job.place, m += m_step;
   }
 }
 
@@ -113,6 +114,7 @@ template <class Down, class Across>
 inline void filtered_vectors(const FilteredPlacesJob& job, const real* v, const real* g, real* m) {
   constexpr Dim kRow = kFilterVectors * Vec::kLanes;
   const Dim tiles = job.tiles, cin = job.cin, cout = job.cout;
+  const Dim v_step = place_step(tiles, cin), m_step = place_step(tiles, cout);
   alignas(64) real u[Down::kOut][Across::kOut][kFilterRows * kRow];
   for (Dim k = 0; k < cin; k += kFilterRows) {
     for (Dim at = 0; at < kFilterRows * kRow; at += Vec::kLanes) {
@@ -127,10 +129,10 @@ inline void filtered_vectors(const FilteredPlacesJob& job, const real* v, const 
       }
     }
     for (int i = 0; i < Down::kOut; ++i) {
-      const Dim first = (6 * (i + Down::kFirst) + Across::kFirst) * tiles;
-      const real* values = v + first * cin + k;
-      real* sums = m + first * cout;
       for (int j = 0; j < Across::kOut; ++j) {
+        const Dim place = 6 * (i + Down::kFirst) + j + Across::kFirst;
+        const real* values = v + place * v_step + k;
+        real* sums = m + place * m_step;
         Dim tile = 0;
         for (; tile + 4 <= tiles; tile += 4, values += 4 * cin, sums += 4 * cout)
           add_rows<4>(values, cin, u[i][j], k == 0, sums, cout);

@@ -34,11 +34,11 @@ Tensor turned(Dim cin, Dim cout, const real* w) {
 
 TileJob patches_of(const ConvTask& s, Dim first, Dim count) {
   const Geometry& g = *s.geometry;
-  return {g.patches.data(), tiles_of(s), g.in_pixels, s.cin, first, count, count * s.cin};
+  return {g.patches.data(), tiles_of(s), g.in_pixels, s.cin, first, count, place_step(count, s.cin)};
 }
 TileJob squares_of(const ConvTask& s, Dim first, Dim count) {
   const Geometry& g = *s.geometry;
-  return {g.squares.data(), tiles_of(s), g.out_pixels, s.cout, first, count, count * s.cout};
+  return {g.squares.data(), tiles_of(s), g.out_pixels, s.cout, first, count, place_step(count, s.cout)};
 }
 
 // Of the places u of the weights.
@@ -46,7 +46,7 @@ void filter(const ConvTask& s, const real* x, const Tensor& u, const real* bias,
             real negative_slope, real* y) {
   const IsaKernels& isa = isa_kernels();
   const Dim tiles = s.images * tiles_of(s), strip = std::min(kTilesPerStrip, tiles);
-  Tensor v(Shape{kPlaces, strip, s.cin}), m(Shape{kPlaces, strip, s.cout});
+  Tensor v(Shape{kPlaces, place_step(strip, s.cin)}), m(Shape{kPlaces, place_step(strip, s.cout)});
   for (Dim first = 0; first < tiles; first += strip) {
     const Dim count = std::min(strip, tiles - first);
     isa.patches(patches_of(s, first, count), x, v.data());
@@ -81,16 +81,16 @@ void winograd_grad_x(const ConvTask& s, const real* gy, const real* w, Into into
 void winograd_grad_w(const ConvTask& s, const real* x, const real* gy, Into into, real* gw) {
   const IsaKernels& isa = isa_kernels();
   const Dim tiles = s.images * tiles_of(s), piece = std::min(kTilesPerPiece, tiles);
-  Tensor v(Shape{kPlaces, piece, s.cin}), m(Shape{kPlaces, piece, s.cout});
+  Tensor v(Shape{kPlaces, place_step(piece, s.cin)}), m(Shape{kPlaces, place_step(piece, s.cout)});
   Tensor du(Shape{kPlaces, place_of(s)});
   for (Dim first = 0; first < tiles; first += piece) {
     const Dim count = std::min(piece, tiles - first);
     isa.patches(patches_of(s, first, count), x, v.data());
     isa.square_grads(squares_of(s, first, count), gy, m.data());
     for (Dim place = 0; place < kPlaces; ++place) {
-      fast::linear_grad_w(count, s.cin, s.cout, v.data() + place * count * s.cin,
-                          m.data() + place * count * s.cout, first == 0 ? Into::overwrite : Into::add,
-                          du.data() + place * place_of(s));
+      fast::linear_grad_w(count, s.cin, s.cout, v.data() + place * place_step(count, s.cin),
+                          m.data() + place * place_step(count, s.cout),
+                          first == 0 ? Into::overwrite : Into::add, du.data() + place * place_of(s));
     }
   }
   isa.filter_grads({s.cin * s.cout, place_of(s), 4, into}, du.data(), gw);
