@@ -1,6 +1,7 @@
 // The steps of models/prepared/planner.h: each packs its op's weights and returns what runs for a block of
 // images.
 #include <algorithm>
+#include <array>
 
 #include "autograd/kernels/elementwise.h"
 #include "models/prepared/planner.h"
@@ -55,42 +56,46 @@ static Tensor plane_weights(const Variable& w) {
 // The planes of an image and the convolutions that look at them.
 struct PlaneConvs {
   struct Output {
-    kernels::PlaneJob job;
+    kernels::PlaneOutput to;
     Tensor w;
     Map y;
   };
+  kernels::PlaneJob job;
   Map x, planes;
   std::vector<Output> outputs;
 
   void operator()(const Block& block) const {
+    real* const first = block.workspace + planes.offset * block.images;
+    std::array<kernels::PlaneOutput, kMost> to;
     for (Dim n = 0; n < block.images; ++n) {
-      real* first = block.workspace + planes.offset * block.images;
-      isa().planes(outputs.front().job, x.line(), block.first_pixel(x) + n * x.image(),
-                   first + outputs.front().job.line + 1);
-      for (const Output& output : outputs) {
-        kernels::PlaneJob job = output.job;
-        job.w = output.w.data();
-        isa().plane_conv(job, first, block.first_pixel(output.y) + n * output.y.image());
+      isa().planes(job, x.line(), block.first_pixel(x) + n * x.image(), first + job.line + 1);
+      for (std::size_t i = 0; i < outputs.size(); ++i) {
+        to[i] = outputs[i].to;
+        to[i].y = block.first_pixel(outputs[i].y) + n * outputs[i].y.image();
       }
+      kernels::PlaneJob now = job;
+      now.outputs = to.data(), now.output_count = static_cast<Dim>(outputs.size());
+      isa().plane_conv(now, first);
     }
   }
+  static constexpr std::size_t kMost = 2;  // picture and spread
 };
 
 void Planner::plane_conv(const TracedOp& op) {
   const Map x = map_of(op.inputs[0]), y = new_map(op.y);
-  const Dim vectors = (x.width + kernels::kWidestVector - 1) / kernels::kWidestVector;
-  const kernels::PlaneJob job{.height = x.height,
-                              .width = x.width,
-                              .cin = x.channels,
-                              .line = vectors * kernels::kWidestVector + 2,
-                              .bias = op.inputs[2].value().data()[0],
-                              .negative_slope = op.settings.negative_slope};
-  PlaneConvs::Output output{job, plane_weights(op.inputs[1]), y};
+  PlaneConvs::Output output{{}, plane_weights(op.inputs[1]), y};
+  output.to = {output.w.data(), op.inputs[2].value().data()[0], op.settings.negative_slope};
   PlaneConvs* last = plan_->steps_.empty() ? nullptr : plan_->steps_.back().target<PlaneConvs>();
-  if (last != nullptr && last->x.offset == x.offset) return last->outputs.push_back(std::move(output));
-  const Map planes = plan_->add_buffer({.height = x.channels * (x.height + 2), .width = job.line});
+  if (last != nullptr && last->x.offset == x.offset && last->outputs.size() < PlaneConvs::kMost)
+    return last->outputs.push_back(std::move(output));
+  const Dim vectors = (x.width + kernels::kWidestVector - 1) / kernels::kWidestVector;
+  const Dim line = vectors * kernels::kWidestVector + 2;
+  const Map planes = plan_->add_buffer({.height = x.channels * (x.height + 2), .width = line});
   plan_->planes_.push_back(planes);
-  plan_->steps_.push_back(PlaneConvs{x, planes, {std::move(output)}});
+  plan_->steps_.push_back(PlaneConvs{{.height = x.height, .width = x.width, .cin = x.channels, .line = line},
+                                     x,
+                                     planes,
+                                     {std::move(output)}});
 }
 
 void Planner::flatten(const TracedOp&) {}  // the linear layer behind it takes the map as it is

@@ -61,12 +61,19 @@ struct MapJob {
   Strides a, x, y;
 };
 
-/// A 3x3 convolution with one output of a map of one image whose channels are planes [cin][height + 2][line]
-/// with a margin of one pixel and `line` at least the width, filled up to whole vectors, plus two.
-struct PlaneJob {
-  Dim height = 0, width = 0, cin = 0, line = 0;
+/// y of a 3x3 convolution with one output, [height][width].
+struct PlaneOutput {
   const real* w = nullptr;  // [cin][3 columns][3 rows]
   real bias = 0, negative_slope = 1;
+  real* y = nullptr;
+};
+
+/// Such convolutions of a map of one image whose channels are planes [cin][height + 2][line] with a margin of
+/// one pixel and `line` at least the width, filled up to whole vectors, plus two.
+struct PlaneJob {
+  Dim height = 0, width = 0, cin = 0, line = 0;
+  const PlaneOutput* outputs = nullptr;
+  Dim output_count = 0;
 };
 inline constexpr Dim kWidestVector = 16;
 

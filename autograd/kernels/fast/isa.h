@@ -86,7 +86,7 @@ struct IsaKernels {
   void (*gate)(const MapJob& job, const real* a, const real* x, const real* gates, real* y) = nullptr;
   void (*mean)(const MapJob& job, const real* x, real* means) = nullptr;
   void (*planes)(const PlaneJob& job, Dim x_line, const real* x, real* to) = nullptr;
-  void (*plane_conv)(const PlaneJob& job, const real* x, real* y) = nullptr;
+  void (*plane_conv)(const PlaneJob& job, const real* x) = nullptr;
 };
 
 /// The best set this processor has, or the one that SUPERTAC_ISA=avx512|avx2|neon|portable|plain names.

@@ -171,43 +171,58 @@ void planes(const PlaneJob& job, Dim x_line, const real* x, real* to) {
 }
 
 // R rows of a vector of pixels; each pixel's sum runs over channels, then columns, then rows of the kernel.
-template <int R>
-inline void plane_rows(const PlaneJob& job, const real* x, real* y, Dim lanes) {
-  Vec sum[R];
-  for (int r = 0; r < R; ++r) sum[r] = Vec::broadcast(job.bias);
-  const real* w = job.w;
+// R lines of O outputs by a vector of columns.
+template <int R, int O>
+inline void plane_rows(const PlaneJob& job, const PlaneOutput* outputs, const real* x, Dim at, Dim lanes) {
+  Vec sum[O][R];
+  const real* w[O];
+  for (int o = 0; o < O; ++o) {
+    w[o] = outputs[o].w;
+    for (int r = 0; r < R; ++r) sum[o][r] = Vec::broadcast(outputs[o].bias);
+  }
   const Dim plane = (job.height + 2) * job.line;
   for (Dim c = 0; c < job.cin; ++c, x += plane) {
-    for (int column = 0; column < 3; ++column, w += 3) {
-      const Vec top = Vec::broadcast(w[0]), middle = Vec::broadcast(w[1]), bottom = Vec::broadcast(w[2]);
+    for (int column = 0; column < 3; ++column) {
       Vec value[R + 2];
       for (int r = 0; r < R + 2; ++r) value[r] = Vec::load(x + r * job.line + column);
-      for (int r = 0; r < R; ++r) sum[r] = Vec::fma(top, value[r], sum[r]);
-      for (int r = 0; r < R; ++r) sum[r] = Vec::fma(middle, value[r + 1], sum[r]);
-      for (int r = 0; r < R; ++r) sum[r] = Vec::fma(bottom, value[r + 2], sum[r]);
+      for (int o = 0; o < O; ++o, w[o - 1] += 3) {
+        for (int tap = 0; tap < 3; ++tap) {
+          const Vec weight = Vec::broadcast(w[o][tap]);
+          for (int r = 0; r < R; ++r) sum[o][r] = Vec::fma(weight, value[r + tap], sum[o][r]);
+        }
+      }
     }
   }
-  for (int r = 0; r < R; ++r, y += job.width) {
-    const Vec value =
-        job.negative_slope == 1 ? sum[r] : Vec::rectify(sum[r], Vec::broadcast(job.negative_slope));
-    if (lanes < Vec::kLanes) {
-      value.store_part(y, lanes);
-    } else {
-      value.store(y);
+  for (int o = 0; o < O; ++o) {
+    const Vec slope = Vec::broadcast(outputs[o].negative_slope);
+    real* y = outputs[o].y + at;
+    for (int r = 0; r < R; ++r, y += job.width) {
+      const Vec value = outputs[o].negative_slope == 1 ? sum[o][r] : Vec::rectify(sum[o][r], slope);
+      if (lanes < Vec::kLanes) {
+        value.store_part(y, lanes);
+      } else {
+        value.store(y);
+      }
     }
   }
 }
 
-// x points at the margin's first pixel, y [height][width].
-void plane_conv(const PlaneJob& job, const real* x, real* y) {
+template <int O>
+inline void plane_outputs(const PlaneJob& job, const PlaneOutput* outputs, const real* x) {
   for (Dim column = 0; column < job.width; column += Vec::kLanes) {
     const Dim lanes = job.width - column < Vec::kLanes ? job.width - column : Vec::kLanes;
     Dim row = 0;
     for (; row + kPlaneRows <= job.height; row += kPlaneRows) {
-      plane_rows<kPlaneRows>(job, x + row * job.line + column, y + row * job.width + column, lanes);
+      plane_rows<kPlaneRows, O>(job, outputs, x + row * job.line + column, row * job.width + column, lanes);
     }
     for (; row < job.height; ++row) {
-      plane_rows<1>(job, x + row * job.line + column, y + row * job.width + column, lanes);
+      plane_rows<1, O>(job, outputs, x + row * job.line + column, row * job.width + column, lanes);
     }
   }
+}
+
+void plane_conv(const PlaneJob& job, const real* x) {
+  Dim o = 0;
+  for (; o + 2 <= job.output_count; o += 2) plane_outputs<2>(job, job.outputs + o, x);
+  if (o < job.output_count) plane_outputs<1>(job, job.outputs + o, x);
 }
