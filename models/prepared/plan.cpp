@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "autograd/kernels/fast/int8.h"
+
 namespace supertac {
 namespace {
 
@@ -54,6 +56,7 @@ Estimate Plan::run(const Tensor& inputs) const {
   const Dim images = std::min(count, block_), bytes = byte_workspace_ * images;
   Tensor memory(Shape{scratch_ + workspace_ * images + bytes / static_cast<Dim>(sizeof(real)) + 1});
   real* const workspace = memory.data() + scratch_;
+  const kernels::ByteProducts byte_products;
   for (Dim first = 0; first < count; first += block_) {
     const Block block{inputs.data() + first * size,
                       std::min(block_, count - first),

@@ -35,26 +35,30 @@ namespace {
 struct ByteProduct {
   kernels::ByteProductJob job;
   std::vector<Dim> segments;
-  std::vector<std::int8_t> w;
+  std::vector<kernels::BytePlaces> places;
+  Tensor w;  // of bytes, from the beginning of a line of the cache
   std::vector<float> scale, bias;
   Map x;
   std::optional<Map> y, y_bytes;
   Dim x_offset = 0, y_offset = 0;
 
-  ByteProduct(const Product& p, kernels::Steps from, kernels::Steps to);
-  /// Numbers for so many images.
-  Dim scratch(Dim images) const {
+  /// For blocks of up to so many images.
+  ByteProduct(const Product& p, Dim images, kernels::Steps from, kernels::Steps to);
+  /// Numbers.
+  Dim scratch() const {
     kernels::ByteProductJob one = job;
     one.segments = segments.data();
     one.segment_count = static_cast<Dim>(segments.size());
-    return (images * kernels::reach_of(one).count * 2 + 3) / 4;
+    return (job.images * kernels::reach_of(one).count * 2 + 3) / 4;
   }
   void operator()(const Block& block) const {
     kernels::ByteProductJob now = job;
     now.images = block.images;
     now.segments = segments.data();
     now.segment_count = static_cast<Dim>(segments.size());
-    now.w = w.data();
+    now.w = reinterpret_cast<const std::int8_t*>(w.data());
+    now.places = places.data();
+    now.place_count = static_cast<Dim>(places.size());
     now.outcome.scale = scale.data();
     now.outcome.bias = bias.data();
     now.scratch = reinterpret_cast<std::int16_t*>(block.scratch);
@@ -64,8 +68,9 @@ struct ByteProduct {
   }
 };
 
-ByteProduct::ByteProduct(const Product& p, kernels::Steps from, kernels::Steps to)
-    : job{.height = p.job.height,
+ByteProduct::ByteProduct(const Product& p, Dim images, kernels::Steps from, kernels::Steps to)
+    : job{.images = images,
+          .height = p.job.height,
           .width = p.job.width,
           .from = p.job.from,
           .to = p.job.to,
@@ -74,6 +79,7 @@ ByteProduct::ByteProduct(const Product& p, kernels::Steps from, kernels::Steps t
           .kept = p.job.cout,
           .outcome = {.negative_slope = static_cast<float>(p.job.negative_slope), .steps = to}},
       segments(p.segments),
+      places(places_of(job)),
       scale(static_cast<std::size_t>(p.job.cout)),
       bias(scale.size()),
       x(p.x),
@@ -81,7 +87,8 @@ ByteProduct::ByteProduct(const Product& p, kernels::Steps from, kernels::Steps t
       y_offset(p.y_offset) {
   constexpr double kLargest = 127;
   const Dim rows = p.job.length * static_cast<Dim>(p.segments.size());
-  w.resize(static_cast<std::size_t>(rows * job.cout), 0);
+  w = Tensor::zeros(Shape{(rows * job.cout + 3) / 4});
+  auto* const bytes = reinterpret_cast<std::int8_t*>(w.data());
   for (Dim o = 0; o < p.job.cout; ++o) {
     double largest = 0;
     for (Dim k = 0; k < rows; ++k)
@@ -91,7 +98,7 @@ ByteProduct::ByteProduct(const Product& p, kernels::Steps from, kernels::Steps t
     for (Dim k = 0; k < rows; ++k) {
       const long whole = std::lrint(static_cast<double>(p.w.data()[k * p.job.cout + o]) / step);
       const Dim at = (k / kernels::kQuad * job.cout + o) * kernels::kQuad + k % kernels::kQuad;
-      w[static_cast<std::size_t>(at)] = static_cast<std::int8_t>(whole);
+      bytes[at] = static_cast<std::int8_t>(whole);
       sum += whole;
     }
     const double unit = step * static_cast<double>(from.step);
@@ -113,10 +120,10 @@ void Planner::add_product(const TracedOp& op, Product product) {
     return;
   }
   const auto to = steps_.find(y);
-  ByteProduct step(product, steps_.at(owner(op.inputs[0])),
+  ByteProduct step(product, Plan::kByteBlock, steps_.at(owner(op.inputs[0])),
                    to == steps_.end() ? kernels::Steps{} : to->second);
-  weights_ += step.w.size();
-  plan_->scratch_ = std::max(plan_->scratch_, step.scratch(Plan::kByteBlock));
+  weights_ += bytes_of(step.w);
+  plan_->scratch_ = std::max(plan_->scratch_, step.scratch());
   if (maps_.contains(y)) step.y = maps_.at(y);
   if (bytes_.contains(y)) step.y_bytes = bytes_.at(y);
   plan_->steps_.push_back(std::move(step));

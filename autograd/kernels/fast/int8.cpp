@@ -77,6 +77,26 @@ bool may_use_tiles() {
 
 }  // namespace
 
+std::vector<BytePlaces> places_of(const ByteProductJob& job) {
+  constexpr Dim kAtOnce = 16;
+  const Dim line = job.height > 1 ? job.from.line / job.from.pixel : job.width;
+  const Dim count = (job.height - 1) * line + job.width;
+  if (count < kAtOnce || (job.height > 1 && job.from.line % job.from.pixel != 0)) return {};
+  std::vector<BytePlaces> all;
+  for (Dim first = 0; first < count; first += kAtOnce) {
+    const Dim begin = std::min(first, count - kAtOnce);
+    BytePlaces places{.x = static_cast<std::int32_t>(begin * job.from.pixel)};
+    for (Dim p = first - begin; p < kAtOnce; ++p) {
+      const Dim i = (begin + p) / line, j = (begin + p) % line;
+      if (j < job.width)
+        places.pixels[static_cast<std::size_t>(places.count++)] = {
+            static_cast<std::int32_t>(p), static_cast<std::int32_t>(i * job.to.line + j * job.to.pixel)};
+    }
+    all.push_back(places);
+  }
+  return all;
+}
+
 ByteReach reach_of(const ByteProductJob& job) {
   Dim lowest = 0, highest = 0;
   for (const Dim segment : std::span(job.segments, static_cast<std::size_t>(job.segment_count)))
@@ -105,6 +125,11 @@ const ByteKernels& byte_kernels() {
   if (vectors != Vectors::baseline) return kAvx2ByteKernels;
 #endif
   return kPlainByteKernels;
+}
+
+ByteProducts::ByteProducts() : release_(byte_kernels().release) {}
+ByteProducts::~ByteProducts() {
+  if (release_ != nullptr) release_();
 }
 
 }  // namespace supertac::kernels

@@ -2,7 +2,9 @@
 // integers are exact: every instruction set, and every order, gives the same bits.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <vector>
 
 #include "autograd/kernels/fast/inference.h"
 
@@ -24,6 +26,17 @@ struct Outcome {
   Steps steps;
 };
 
+/// Sixteen places of a map with its margins one behind the other, from.pixel bytes apart: where the first of
+/// them begins, and which are pixels with results.
+struct BytePlaces {
+  struct Pixel {
+    std::int32_t place = 0, to = 0;
+  };
+  std::int32_t x = 0;
+  std::int32_t count = 0;
+  std::array<Pixel, 16> pixels = {};
+};
+
 /// ProductJob with bytes: s[pixel, o] = sum over segments, k of x[pixel + segment + k] * w[segment, k, o].
 /// Strides and segments of x are bytes. `length` is a multiple of kQuad and cout of kByteOutputs; neighbours
 /// along k lie together: w [segment_count][length / kQuad][cout][kQuad].
@@ -35,9 +48,15 @@ struct ByteProductJob {
   const std::int8_t* w = nullptr;
   Dim cout = 0, kept = 0;  // of cout outputs the first are kept
   Outcome outcome;
+  const BytePlaces* places = nullptr;  // of an image, places_of()
+  Dim place_count = 0;
   std::int16_t* scratch = nullptr;  // images * reach_of(job).count, for kernels that multiply wider numbers
 };
 inline constexpr Dim kQuad = 4, kByteOutputs = 16;
+
+/// All places of an image, the last sixteen again where their number is no multiple; none where lines are no
+/// multiple of from.pixel apart or there are fewer than sixteen.
+std::vector<BytePlaces> places_of(const ByteProductJob& job);
 
 /// The bytes of an image that a job reads: from `before` bytes before x on.
 struct ByteReach {
@@ -51,6 +70,18 @@ using ByteProduct = void (*)(const ByteProductJob& job, const std::uint8_t* x, f
 struct ByteKernels {
   ByteProduct product;
   void (*line_to_bytes)(Dim n, const float* x, Steps steps, std::uint8_t* bytes);
+  void (*release)() = nullptr;  ///< behind the last of some products of a thread, where it is not null
+};
+/// Calls release() at its end.
+class ByteProducts {
+ public:
+  ByteProducts();
+  ~ByteProducts();
+  ByteProducts(const ByteProducts&) = delete;
+  ByteProducts& operator=(const ByteProducts&) = delete;
+
+ private:
+  void (*release_)();
 };
 
 /// The best that this processor has within the set that isa_kernels() has chosen.

@@ -1,5 +1,7 @@
 #ifndef SUPERTAC_REAL_IS_DOUBLE
+#include <algorithm>
 #include <array>
+#include <span>
 
 #include "autograd/kernels/fast/int8_finish512.h"
 
@@ -23,126 +25,132 @@ struct alignas(64) TileShapes {
   std::array<std::uint8_t, 16> rows{};
 };
 
-// Sixteen pixels one after another.
-struct Pixels {
-  std::array<const std::uint8_t*, kPixels> x;
-  std::array<Dim, kPixels> to;
-  Dim count = 0;
+struct Whole {
+  Whole() = default;
+  Whole(const Outcome& o, Dim channel)
+      : scale(_mm512_loadu_ps(o.scale + channel)),
+        bias(_mm512_loadu_ps(o.bias + channel)),
+        slope(_mm512_set1_ps(o.negative_slope)),
+        per_step(_mm512_set1_ps(o.steps.per_step)),
+        first(_mm512_set1_ps(static_cast<float>(o.steps.zero))) {}
+  __attribute__((always_inline)) void operator()(__m512i sum, float* y, std::uint8_t* bytes) const {
+    const __m512 v = _mm512_fmadd_ps(_mm512_cvtepi32_ps(sum), scale, bias),
+                 value = _mm512_max_ps(v, _mm512_mul_ps(v, slope));
+    if (y != nullptr) _mm512_storeu_ps(y, value);
+    if (bytes == nullptr) return;
+    const __m512 level = _mm512_max_ps(_mm512_fmadd_ps(value, per_step, first), _mm512_setzero_ps());
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(bytes), _mm512_cvtusepi32_epi8(_mm512_cvtps_epi32(level)));
+  }
+  __m512 scale, bias, slope, per_step, first;
 };
 
-class PixelCursor {
- public:
-  PixelCursor(const ByteProductJob& job, const std::uint8_t* x)
-      : job_(job), x_(x), left_(job.images * job.height * job.width) {}
-  Dim left() const { return left_; }
+// Sixteen places of one of the images.
+struct Tile {
+  const std::uint8_t* x;
+  const BytePlaces* places;
+  Dim to;
+};
 
-  Pixels next() {
-    Pixels pixels;
-    pixels.count = std::min(kPixels, left_);
-    for (Dim p = 0; p < kPixels; ++p) {  // a pixel too many is the last one again
-      pixels.x[static_cast<std::size_t>(p)] = x_, pixels.to[static_cast<std::size_t>(p)] = to_;
-      if (left_ > 1) step();
-      if (p < pixels.count) --left_;
-    }
-    return pixels;
+// A job of some outputs, J times sixteen from `channel` on, to numbers or bytes or both. The sums of two
+// tiles of places are finished while the next two are summed.
+template <int J, bool kNumbers, bool kBytes>
+class Outputs {
+ public:
+  Outputs(const ByteProductJob& job, std::span<const Dim> at, Dim chunk, Dim channel, float* y,
+          std::uint8_t* bytes)
+      : job_(job),
+        at_(at),
+        w_(job.w + channel * kQuad),
+        w_row_(job.cout * kQuad),
+        w_tile_(chunk * job.cout),
+        y_(y + (kNumbers ? channel : 0)),
+        bytes_(bytes + (kBytes ? channel : 0)),
+        some_((2 * kPixels + static_cast<Dim>(at.size()) - 1) / static_cast<Dim>(at.size())) {
+    for (int j = 0; j < J; ++j) finish_[j] = Whole(job.outcome, channel + j * kOutputs);
+  }
+  void run(const std::uint8_t* x) {
+    const Dim tiles = job_.images * job_.place_count;
+    Dim t = 0;
+    for (; t + 2 <= tiles; t += 2) sum<2>({tile(x, t), tile(x, t + 1)});
+    if (t < tiles) sum<1>({tile(x, t)});
+    finish(2 * kPixels, finish_);
   }
 
  private:
-  void step() {
-    x_ += job_.from.pixel, to_ += job_.to.pixel;
-    if (++column_ < job_.width) return;
-    x_ += job_.from.line - job_.width * job_.from.pixel, to_ += job_.to.line - job_.width * job_.to.pixel;
-    column_ = 0;
-    if (++line_ < job_.height) return;
-    x_ += job_.from.image - job_.height * job_.from.line, to_ += job_.to.image - job_.height * job_.to.line;
-    line_ = 0;
+  Tile tile(const std::uint8_t* x, Dim t) const {
+    const Dim n = t / job_.place_count;
+    const BytePlaces* places = job_.places + t % job_.place_count;
+    return {x + n * job_.from.image + places->x, places, n * job_.to.image};
   }
-
-  const ByteProductJob& job_;
-  const std::uint8_t* x_;
-  Dim left_, to_ = 0, column_ = 0, line_ = 0;
-};
-
-// What all outputs of some pixels see, a tile of rows after another: pixels of a small map are not equally
-// far from each other.
-class Rows {
- public:
-  static constexpr Dim kMostTiles = 64;
-
-  void gather(const ByteProductJob& job, const Pixels& pixels, Dim chunk) {
-    const auto quads = mask_of(chunk / kQuad);
-    std::uint8_t* to = bytes_;
-    for (Dim s = 0; s < job.segment_count; ++s) {
-      for (Dim k = 0; k < job.length; k += chunk, to += kTile) {
-        const Dim at = job.segments[s] + k;
-        for (std::size_t p = 0; p < kPixels; ++p)
-          _mm512_store_si512(to + p * kRowBytes, _mm512_maskz_loadu_epi32(quads, pixels.x[p] + at));
+  template <int P>
+  void sum(const Tile (&tiles)[P]) {
+    _tile_zero(0);
+    if constexpr (J == 2) _tile_zero(1);
+    if constexpr (P == 2) _tile_zero(2);
+    if constexpr (P == 2 && J == 2) _tile_zero(3);
+    const std::array<Whole, J> with = finish_;
+    const std::int8_t* w = w_;
+    const Dim row = job_.from.pixel;
+    for (const Dim offset : at_) {
+      _tile_loadd(6, w, w_row_);
+      _tile_loadd(4, tiles[0].x + offset, row);
+      _tile_dpbusd(0, 4, 6);
+      if constexpr (J == 2) _tile_loadd(7, w + kOutputs * kQuad, w_row_);
+      if constexpr (J == 2) _tile_dpbusd(1, 4, 7);
+      if constexpr (P == 2) {
+        _tile_loadd(5, tiles[1].x + offset, row);
+        _tile_dpbusd(2, 5, 6);
+        if constexpr (J == 2) _tile_dpbusd(3, 5, 7);
+      }
+      finish(some_, with);
+      w += w_tile_;
+    }
+    finish(2 * kPixels, with);
+    _tile_stored(0, sums_[0], kRowBytes);
+    if constexpr (J == 2) _tile_stored(1, sums_[1], kRowBytes);
+    if constexpr (P == 2) _tile_stored(2, sums_[2], kRowBytes);
+    if constexpr (P == 2 && J == 2) _tile_stored(3, sums_[3], kRowBytes);
+    count_ = 0;
+    for (int p = 0; p < P; ++p) {
+      for (std::int32_t i = 0; i < tiles[p].places->count; ++i) {
+        const BytePlaces::Pixel& pixel = tiles[p].places->pixels[static_cast<std::size_t>(i)];
+        left_[count_++] = {2 * p * kPixels * kOutputs + pixel.place * kOutputs, tiles[p].to + pixel.to};
       }
     }
+    next_ = 0;
   }
-  const std::uint8_t* tile(Dim i) const { return bytes_ + i * kTile; }
-
- private:
-  static constexpr Dim kTile = kPixels * kRowBytes;
-  alignas(64) std::uint8_t bytes_[kMostTiles * kTile];
-};
-
-// Sums of P times sixteen pixels and J times sixteen outputs.
-template <int P, int J>
-void sum_tiles(const Rows (&rows)[P], Dim tiles, const std::int8_t* w, Dim w_row, Dim w_tile) {
-  _tile_zero(0);
-  if constexpr (J == 2) _tile_zero(1);
-  if constexpr (P == 2) _tile_zero(2);
-  if constexpr (P == 2 && J == 2) _tile_zero(3);
-  for (Dim i = 0; i < tiles; ++i, w += w_tile) {
-    _tile_loadd(6, w, w_row);
-    _tile_loadd(4, rows[0].tile(i), kRowBytes);
-    _tile_dpbusd(0, 4, 6);
-    if constexpr (J == 2) _tile_loadd(7, w + kOutputs * kQuad, w_row);
-    if constexpr (J == 2) _tile_dpbusd(1, 4, 7);
-    if constexpr (P == 2) {
-      _tile_loadd(5, rows[1].tile(i), kRowBytes);
-      _tile_dpbusd(2, 5, 6);
-      if constexpr (J == 2) _tile_dpbusd(3, 5, 7);
+  __attribute__((always_inline)) void finish(Dim count, const std::array<Whole, J>& with) {
+    const Dim end = std::min(next_ + count, count_);
+    for (; next_ < end; ++next_) {
+      const auto [sum, to] = left_[next_];
+      for (int j = 0; j < J; ++j)
+        with[j](_mm512_load_si512(sums_[0] + sum + j * kPixels * kOutputs),
+                kNumbers ? y_ + to + j * kOutputs : nullptr, kBytes ? bytes_ + to + j * kOutputs : nullptr);
     }
   }
-}
 
-void finish_tile(const ByteProductJob& job, const std::int32_t* sums, const Pixels& pixels, Dim channel,
+  alignas(64) std::int32_t sums_[4][kPixels * kOutputs];
+  const ByteProductJob& job_;
+  const std::span<const Dim> at_;
+  const std::int8_t* const w_;
+  const Dim w_row_, w_tile_;
+  float* const y_;
+  std::uint8_t* const bytes_;
+  const Dim some_;
+  std::array<Whole, J> finish_;
+  struct {
+    Dim sum, to;
+  } left_[2 * kPixels];
+  Dim count_ = 0, next_ = 0;
+};
+
+template <bool kNumbers, bool kBytes>
+void all_outputs(const ByteProductJob& job, const std::uint8_t* x, std::span<const Dim> at, Dim chunk,
                  float* y, std::uint8_t* bytes) {
-  if (channel >= job.kept) return;
-  const Finish finish(job.outcome, channel, job.kept - channel);
-  for (Dim p = 0; p < pixels.count; ++p) {
-    const Dim at = pixels.to[static_cast<std::size_t>(p)] + channel;
-    finish(_mm512_load_si512(sums + p * kOutputs), y ? y + at : nullptr, bytes ? bytes + at : nullptr);
-  }
-}
-
-template <int P, int J>
-void outputs_from(const ByteProductJob& job, const Pixels (&pixels)[P], const Rows (&rows)[P], Dim chunk,
-                  Dim channel, float* y, std::uint8_t* bytes) {
-  alignas(64) std::int32_t sums[4][kPixels * kOutputs];
-  const Dim tiles = job.segment_count * job.length / chunk;
-  sum_tiles<P, J>(rows, tiles, job.w + channel * kQuad, job.cout * kQuad, chunk * job.cout);
-  _tile_stored(0, sums[0], kRowBytes);
-  if constexpr (J == 2) _tile_stored(1, sums[1], kRowBytes);
-  if constexpr (P == 2) _tile_stored(2, sums[2], kRowBytes);
-  if constexpr (P == 2 && J == 2) _tile_stored(3, sums[3], kRowBytes);
-  for (int p = 0; p < P; ++p) {
-    for (int j = 0; j < J; ++j)
-      finish_tile(job, sums[2 * p + j], pixels[p], channel + j * kOutputs, y, bytes);
-  }
-}
-
-template <int P>
-void all_outputs(const ByteProductJob& job, const Pixels (&pixels)[P], Dim chunk, float* y,
-                 std::uint8_t* bytes) {
-  Rows rows[P];
-  for (int p = 0; p < P; ++p) rows[p].gather(job, pixels[p], chunk);
   Dim channel = 0;
-  for (; channel + 2 * kOutputs <= job.cout; channel += 2 * kOutputs)
-    outputs_from<P, 2>(job, pixels, rows, chunk, channel, y, bytes);
-  if (channel < job.cout) outputs_from<P, 1>(job, pixels, rows, chunk, channel, y, bytes);
+  for (; channel + kOutputs < job.kept; channel += 2 * kOutputs)
+    Outputs<2, kNumbers, kBytes>(job, at, chunk, channel, y, bytes).run(x);
+  if (channel < job.kept) Outputs<1, kNumbers, kBytes>(job, at, chunk, channel, y, bytes).run(x);
 }
 
 // The longest equal parts of a segment that fit into a row of a tile.
@@ -152,26 +160,40 @@ Dim chunk_of(Dim length) {
   return length / parts;
 }
 
-void run_tiles(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes) {
-  constexpr Dim kFewestPixels = 8, kShortestChunk = 32;
-  const Dim chunk = chunk_of(job.length);
-  PixelCursor cursor(job, x);
-  if (cursor.left() < kFewestPixels || chunk < kShortestChunk ||
-      job.segment_count * job.length > chunk * Rows::kMostTiles)
-    return kVnniByteKernels.product(job, x, y, bytes);
+// Giving tiles their shapes takes as long as eight products of them: most jobs have those of the last.
+thread_local Dim shaped_for = 0;  // chunk; 0: the tiles are released
+
+void shape_tiles(Dim chunk) {
+  if (shaped_for == chunk) return;
   const TileShapes shapes(chunk);
   _tile_loadconfig(&shapes);
-  while (cursor.left() > kPixels) {
-    const Pixels first = cursor.next();
-    all_outputs<2>(job, {first, cursor.next()}, chunk, y, bytes);
+  shaped_for = chunk;
+}
+
+void release_tiles() {
+  if (shaped_for != 0) _tile_release();
+  shaped_for = 0;
+}
+
+void run_tiles(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes) {
+  constexpr Dim kShortestChunk = 32, kMostParts = 64;
+  const Dim chunk = chunk_of(job.length), parts = job.segment_count * job.length / chunk;
+  if (job.place_count == 0 || chunk < kShortestChunk || parts > kMostParts || job.kept % kOutputs != 0)
+    return kVnniByteKernels.product(job, x, y, bytes);
+  Dim at[kMostParts];
+  for (Dim i = 0, s = 0; s < job.segment_count; ++s) {
+    for (Dim k = 0; k < job.length; k += chunk) at[i++] = job.segments[s] + k;
   }
-  if (cursor.left() > 0) all_outputs<1>(job, {cursor.next()}, chunk, y, bytes);
-  _tile_release();
+  const std::span<const Dim> of_parts(at, static_cast<std::size_t>(parts));
+  shape_tiles(chunk);
+  if (y && bytes) all_outputs<true, true>(job, x, of_parts, chunk, y, bytes);
+  if (y && !bytes) all_outputs<true, false>(job, x, of_parts, chunk, y, nullptr);
+  if (!y) all_outputs<false, true>(job, x, of_parts, chunk, nullptr, bytes);
 }
 
 }  // namespace
 
-const ByteKernels kAmxByteKernels{run_tiles, kVnniByteKernels.line_to_bytes};
+const ByteKernels kAmxByteKernels{run_tiles, kVnniByteKernels.line_to_bytes, release_tiles};
 
 }  // namespace supertac::kernels
 

@@ -14,16 +14,17 @@ inline __mmask16 mask_of(Dim lanes) {
 
 inline void store_bytes(__m512 value, __m512 per_step, __m512 first, __mmask16 mask, std::uint8_t* bytes) {
   const __m512 level = _mm512_fmadd_ps(value, per_step, first);  // not a number counts as 0
-  const __m512 within = _mm512_min_ps(_mm512_max_ps(level, _mm512_setzero_ps()), _mm512_set1_ps(255));
-  const __m512i whole = _mm512_cvtps_epi32(within);
+  // What is too large for a whole number becomes the largest one without a sign.
+  const __m512i whole = _mm512_cvtps_epi32(_mm512_max_ps(level, _mm512_setzero_ps()));
   if (mask == 0xFFFF) {
-    _mm_storeu_si128(reinterpret_cast<__m128i*>(bytes), _mm512_cvtepi32_epi8(whole));
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(bytes), _mm512_cvtusepi32_epi8(whole));
   } else {
-    _mm512_mask_cvtepi32_storeu_epi8(bytes, mask, whole);
+    _mm512_mask_cvtusepi32_storeu_epi8(bytes, mask, whole);
   }
 }
 
 struct Finish {
+  Finish() = default;
   Finish(const Outcome& o, Dim lanes, __m512 s, __m512 b)
       : mask(mask_of(lanes)),
         scale(s),

@@ -63,6 +63,8 @@ void expect_bits_of_the_plain_kernel(Dim length, Dim kept, bool extreme) {
   std::vector<std::uint8_t> expected_bytes(size), bytes(size);
   std::vector<std::int16_t> scratch(static_cast<std::size_t>(images * reach_of(job).count));
   job.scratch = scratch.data();
+  const std::vector<BytePlaces> places = places_of(job);
+  job.places = places.data(), job.place_count = static_cast<Dim>(places.size());
   kPlainByteKernels.product(job, x.data(), expected.data(), expected_bytes.data());
   for (const ByteKernels& set : kernels_here()) {
     set.product(job, x.data(), y.data(), bytes.data());
