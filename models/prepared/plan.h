@@ -59,7 +59,7 @@ class Plan {
 
   /// Images that go through the steps together. They share the weights on their way from memory, but what
   /// they leave behind must stay in the second cache.
-  static constexpr Dim kBlock = 8, kByteBlock = 2;
+  static constexpr Dim kBlock = 8, kByteBlock = 4;
 
   std::vector<PlanStep> steps_;
   std::vector<Map> buffers_;  // each once

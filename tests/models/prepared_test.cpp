@@ -4,11 +4,13 @@
 #include <omp.h>
 
 #include <cmath>
+#include <set>
 #include <vector>
 
 #include "autograd/kernels/fast/isa.h"
 #include "io/random.h"
 #include "models/frame_model.h"
+#include "models/prepared/planner.h"
 #include "tests/allocations.h"
 #include "tests/models/support.h"
 
@@ -135,6 +137,26 @@ TEST_P(PreparedBits, AreOneForBatchesInstructionSetsAndThreads) {
 
 INSTANTIATE_TEST_SUITE_P(All, PreparedBits,
                          testing::Combine(testing::Values("paper", "tiny"), testing::Bool()));
+
+// Whether a picture alone has its filters transformed on the way depends on the second cache.
+TEST(Prepared, OfAnyCacheHasTheSameBits) {
+  Rng rng(4);
+  const SuperTac network(SuperTacSettings::of_preset("paper"), rng);
+  std::set<bool> seen;
+  for (const Dim count : {1, 2, 3}) {
+    const Tensor windows = uniform(network.input_shape(count), 6);
+    const Estimate expected = Planner::plan(network, nullptr, 0)->run(windows);
+    for (const std::size_t megabytes : {1, 2, 3, 4, 64}) {
+      const auto plan = Planner::plan(network, nullptr, megabytes << 20);
+      seen.insert(plan->filters_anew());
+      const Estimate found = plan->run(windows);
+      EXPECT_TRUE(std::ranges::equal(expected.picture.values(), found.picture.values()))
+          << megabytes << " MB";
+      EXPECT_TRUE(std::ranges::equal(expected.spread.values(), found.spread.values())) << megabytes << " MB";
+    }
+  }
+  EXPECT_EQ(seen.size(), 2U);
+}
 
 TEST(Prepared, InBytesDrawsNearlyTheSame) {
   for (std::uint64_t seed = 0; seed < 12; ++seed) {

@@ -22,19 +22,19 @@ struct Steps {
 struct Outcome {
   const float* scale = nullptr;  // [cout]
   const float* bias = nullptr;   // [cout]
-  float negative_slope = 1;
+  float negative_slope = 1;      // at most 1
   Steps steps;
 };
 
-/// Sixteen places of a map with its margins one behind the other, from.pixel bytes apart: where the first of
-/// them begins, and which are pixels with results.
+/// Sixteen places of an image one behind the other, from.pixel bytes apart. Where lines follow each other,
+/// places of the margin lie between those that are pixels.
 struct BytePlaces {
   struct Pixel {
-    std::int32_t place = 0, to = 0;
+    std::int32_t place = 0, to = 0;  // of the sixteen; where its results go, from the first pixel's
   };
-  std::int32_t x = 0;
+  std::int32_t x = 0;  // where they begin, from the first pixel
   std::int32_t count = 0;
-  std::array<Pixel, 16> pixels = {};
+  std::array<Pixel, 16> pixels = {};  // the first `count`
 };
 
 /// ProductJob with bytes: s[pixel, o] = sum over segments, k of x[pixel + segment + k] * w[segment, k, o].
@@ -47,15 +47,15 @@ struct ByteProductJob {
   Dim segment_count = 0, length = 0;
   const std::int8_t* w = nullptr;
   Dim cout = 0, kept = 0;  // of cout outputs the first are kept
-  Outcome outcome;
+  Outcome outcome = {};
   const BytePlaces* places = nullptr;  // of an image, places_of()
   Dim place_count = 0;
   std::int16_t* scratch = nullptr;  // images * reach_of(job).count, for kernels that multiply wider numbers
 };
 inline constexpr Dim kQuad = 4, kByteOutputs = 16;
 
-/// All places of an image, the last sixteen again where their number is no multiple; none where lines are no
-/// multiple of from.pixel apart or there are fewer than sixteen.
+/// All places of an image, sixteen at a time, each pixel once: the last sixteen begin sooner where they are
+/// no multiple. None where there are fewer or lines are no multiple of from.pixel apart.
 std::vector<BytePlaces> places_of(const ByteProductJob& job);
 
 /// The bytes of an image that a job reads: from `before` bytes before x on.
@@ -70,9 +70,11 @@ using ByteProduct = void (*)(const ByteProductJob& job, const std::uint8_t* x, f
 struct ByteKernels {
   ByteProduct product;
   void (*line_to_bytes)(Dim n, const float* x, Steps steps, std::uint8_t* bytes);
-  void (*release)() = nullptr;  ///< behind the last of some products of a thread, where it is not null
+  /// Gives back what the processor keeps between products of a thread; may be null.
+  void (*release)() = nullptr;
 };
-/// Calls release() at its end.
+
+/// While it lives its thread runs products, with whatever they keep; products need one.
 class ByteProducts {
  public:
   ByteProducts();

@@ -5,18 +5,19 @@
 
 #include "autograd/kernels/fast/int8_finish512.h"
 
-// Tiles of the processor: a pixel's bytes are a row of A, four bytes of sixteen outputs a row of B, and one
-// instruction adds A B to a tile of 16 x 16 sums.
+// Tiles of the processor: the bytes of a place are a row of A, four bytes of sixteen outputs a row of B, and
+// one instruction adds A B to a tile of 16 x 16 sums.
 namespace supertac::kernels {
 namespace {
 
-constexpr Dim kPixels = 16, kOutputs = 16, kRowBytes = 64;
+constexpr int kPlaces = 16;
+constexpr Dim kOutputs = 16, kRowBytes = 64;
 
-// Tiles 0 to 3 are sums, [pixels][outputs]; 4 and 5 hold pixels, 6 and 7 weights.
+// Tiles 0 to 3 are sums, [places][outputs]; 4 and 5 hold places, 6 and 7 weights.
 struct alignas(64) TileShapes {
   explicit TileShapes(Dim chunk) {
-    for (const std::size_t sums : {0, 1, 2, 3}) row_bytes[sums] = kRowBytes, rows[sums] = kPixels;
-    for (const std::size_t x : {4, 5}) row_bytes[x] = static_cast<std::uint16_t>(chunk), rows[x] = kPixels;
+    for (const std::size_t sums : {0, 1, 2, 3}) row_bytes[sums] = kRowBytes, rows[sums] = kPlaces;
+    for (const std::size_t x : {4, 5}) row_bytes[x] = static_cast<std::uint16_t>(chunk), rows[x] = kPlaces;
     for (const std::size_t w : {6, 7})
       row_bytes[w] = kRowBytes, rows[w] = static_cast<std::uint8_t>(chunk / kQuad);
   }
@@ -25,132 +26,117 @@ struct alignas(64) TileShapes {
   std::array<std::uint8_t, 16> rows{};
 };
 
-struct Whole {
-  Whole() = default;
-  Whole(const Outcome& o, Dim channel)
-      : scale(_mm512_loadu_ps(o.scale + channel)),
-        bias(_mm512_loadu_ps(o.bias + channel)),
-        slope(_mm512_set1_ps(o.negative_slope)),
-        per_step(_mm512_set1_ps(o.steps.per_step)),
-        first(_mm512_set1_ps(static_cast<float>(o.steps.zero))) {}
-  __attribute__((always_inline)) void operator()(__m512i sum, float* y, std::uint8_t* bytes) const {
-    const __m512 v = _mm512_fmadd_ps(_mm512_cvtepi32_ps(sum), scale, bias),
-                 value = _mm512_max_ps(v, _mm512_mul_ps(v, slope));
-    if (y != nullptr) _mm512_storeu_ps(y, value);
-    if (bytes == nullptr) return;
-    const __m512 level = _mm512_max_ps(_mm512_fmadd_ps(value, per_step, first), _mm512_setzero_ps());
-    _mm_storeu_si128(reinterpret_cast<__m128i*>(bytes), _mm512_cvtusepi32_epi8(_mm512_cvtps_epi32(level)));
-  }
-  __m512 scale, bias, slope, per_step, first;
-};
-
-// Sixteen places of one of the images.
-struct Tile {
-  const std::uint8_t* x;
-  const BytePlaces* places;
-  Dim to;
-};
-
-// A job of some outputs, J times sixteen from `channel` on, to numbers or bytes or both. The sums of two
-// tiles of places are finished while the next two are summed.
+// A product of J times sixteen outputs from `channel` on. Two times sixteen places are summed at a time, and
+// those before finished in the meantime: tiles work beside vectors, but only as far as the processor looks
+// ahead.
 template <int J, bool kNumbers, bool kBytes>
-class Outputs {
+class TiledProduct {
  public:
-  Outputs(const ByteProductJob& job, std::span<const Dim> at, Dim chunk, Dim channel, float* y,
-          std::uint8_t* bytes)
+  TiledProduct(const ByteProductJob& job, std::span<const Dim> parts, Dim chunk, Dim channel, float* y,
+               std::uint8_t* bytes)
       : job_(job),
-        at_(at),
+        parts_(parts),
         w_(job.w + channel * kQuad),
-        w_row_(job.cout * kQuad),
-        w_tile_(chunk * job.cout),
-        y_(y + (kNumbers ? channel : 0)),
-        bytes_(bytes + (kBytes ? channel : 0)),
-        some_((2 * kPixels + static_cast<Dim>(at.size()) - 1) / static_cast<Dim>(at.size())) {
-    for (int j = 0; j < J; ++j) finish_[j] = Whole(job.outcome, channel + j * kOutputs);
+        w_part_(chunk * job.cout),
+        y_(kNumbers ? y + channel : nullptr),
+        bytes_(kBytes ? bytes + channel : nullptr),
+        pixels_of_part_(kPlaces / static_cast<std::int32_t>(parts.size()) + 1) {
+    for (int j = 0; j < J; ++j) finish_[j] = Finish(job.outcome, channel + j * kOutputs);
   }
+
   void run(const std::uint8_t* x) {
-    const Dim tiles = job_.images * job_.place_count;
-    Dim t = 0;
-    for (; t + 2 <= tiles; t += 2) sum<2>({tile(x, t), tile(x, t + 1)});
-    if (t < tiles) sum<1>({tile(x, t)});
-    finish(2 * kPixels, finish_);
+    Dim tiles = job_.images * job_.place_count;
+    for (; tiles >= 2; tiles -= 2) run_tiles<2>(x);
+    if (tiles > 0) run_tiles<1>(x);
+    finish(kPlaces, finish_);
   }
 
  private:
-  Tile tile(const std::uint8_t* x, Dim t) const {
-    const Dim n = t / job_.place_count;
-    const BytePlaces* places = job_.places + t % job_.place_count;
-    return {x + n * job_.from.image + places->x, places, n * job_.to.image};
-  }
+  // The next P.
   template <int P>
-  void sum(const Tile (&tiles)[P]) {
+  void run_tiles(const std::uint8_t* x) {
+    Waiting next[2] = {};
+    const std::uint8_t* rows[P];
+    for (int p = 0; p < P; ++p) {
+      next[p] = {job_.places + place_, image_ * job_.to.image};
+      rows[p] = x + image_ * job_.from.image + next[p].places->x;
+      if (++place_ == job_.place_count) place_ = 0, ++image_;
+    }
+    sum(rows);
+    waiting_[0] = next[0], waiting_[1] = next[1];
+    done_ = 0;
+  }
+
+  // Behind this the sums before are finished.
+  template <int P>
+  __attribute__((always_inline)) void sum(const std::uint8_t* const (&rows)[P]) {
+    const std::array<Finish, J> with = finish_;  // in registers
+    const Dim row = job_.from.pixel, w_row = job_.cout * kQuad;
+    const std::int8_t* w = w_;
     _tile_zero(0);
     if constexpr (J == 2) _tile_zero(1);
     if constexpr (P == 2) _tile_zero(2);
     if constexpr (P == 2 && J == 2) _tile_zero(3);
-    const std::array<Whole, J> with = finish_;
-    const std::int8_t* w = w_;
-    const Dim row = job_.from.pixel;
-    for (const Dim offset : at_) {
-      _tile_loadd(6, w, w_row_);
-      _tile_loadd(4, tiles[0].x + offset, row);
+    for (const Dim part : parts_) {
+      _tile_loadd(6, w, w_row);
+      _tile_loadd(4, rows[0] + part, row);
       _tile_dpbusd(0, 4, 6);
-      if constexpr (J == 2) _tile_loadd(7, w + kOutputs * kQuad, w_row_);
+      if constexpr (J == 2) _tile_loadd(7, w + kOutputs * kQuad, w_row);
       if constexpr (J == 2) _tile_dpbusd(1, 4, 7);
-      if constexpr (P == 2) {
-        _tile_loadd(5, tiles[1].x + offset, row);
-        _tile_dpbusd(2, 5, 6);
-        if constexpr (J == 2) _tile_dpbusd(3, 5, 7);
-      }
-      finish(some_, with);
-      w += w_tile_;
+      if constexpr (P == 2) _tile_loadd(5, rows[1] + part, row);
+      if constexpr (P == 2) _tile_dpbusd(2, 5, 6);
+      if constexpr (P == 2 && J == 2) _tile_dpbusd(3, 5, 7);
+      finish(pixels_of_part_, with);
+      w += w_part_;
     }
-    finish(2 * kPixels, with);
+    finish(kPlaces, with);
     _tile_stored(0, sums_[0], kRowBytes);
     if constexpr (J == 2) _tile_stored(1, sums_[1], kRowBytes);
     if constexpr (P == 2) _tile_stored(2, sums_[2], kRowBytes);
     if constexpr (P == 2 && J == 2) _tile_stored(3, sums_[3], kRowBytes);
-    count_ = 0;
-    for (int p = 0; p < P; ++p) {
-      for (std::int32_t i = 0; i < tiles[p].places->count; ++i) {
-        const BytePlaces::Pixel& pixel = tiles[p].places->pixels[static_cast<std::size_t>(i)];
-        left_[count_++] = {2 * p * kPixels * kOutputs + pixel.place * kOutputs, tiles[p].to + pixel.to};
-      }
-    }
-    next_ = 0;
-  }
-  __attribute__((always_inline)) void finish(Dim count, const std::array<Whole, J>& with) {
-    const Dim end = std::min(next_ + count, count_);
-    for (; next_ < end; ++next_) {
-      const auto [sum, to] = left_[next_];
-      for (int j = 0; j < J; ++j)
-        with[j](_mm512_load_si512(sums_[0] + sum + j * kPixels * kOutputs),
-                kNumbers ? y_ + to + j * kOutputs : nullptr, kBytes ? bytes_ + to + j * kOutputs : nullptr);
-    }
   }
 
-  alignas(64) std::int32_t sums_[4][kPixels * kOutputs];
+  // So many pixels of each of the places that wait.
+  __attribute__((always_inline)) void finish(std::int32_t pixels, const std::array<Finish, J>& with) {
+    for (int p = 0; p < 2; ++p) {
+      if (waiting_[p].places == nullptr) continue;
+      const auto& [places, image] = waiting_[p];
+      for (std::int32_t i = done_; i < std::min(done_ + pixels, places->count); ++i) {
+        const BytePlaces::Pixel& pixel = places->pixels[static_cast<std::size_t>(i)];
+        const Dim to = image + pixel.to;
+        for (int j = 0; j < J; ++j)
+          with[j](_mm512_load_si512(sums_[2 * p + j] + pixel.place * kOutputs),
+                  kNumbers ? y_ + to + j * kOutputs : nullptr, kBytes ? bytes_ + to + j * kOutputs : nullptr);
+      }
+    }
+    done_ += pixels;
+  }
+
+  struct Waiting {
+    const BytePlaces* places = nullptr;
+    Dim to = 0;  // of the image
+  };
+  alignas(64) std::int32_t sums_[4][kPlaces * kOutputs];  // of tiles 0 to 3: [two of places][two of outputs]
   const ByteProductJob& job_;
-  const std::span<const Dim> at_;
+  const std::span<const Dim> parts_;
   const std::int8_t* const w_;
-  const Dim w_row_, w_tile_;
+  const Dim w_part_;
   float* const y_;
   std::uint8_t* const bytes_;
-  const Dim some_;
-  std::array<Whole, J> finish_;
-  struct {
-    Dim sum, to;
-  } left_[2 * kPixels];
-  Dim count_ = 0, next_ = 0;
+  const std::int32_t pixels_of_part_;
+  std::array<Finish, J> finish_;
+  Waiting waiting_[2];
+  std::int32_t done_ = 0;  // pixels of each
+  Dim image_ = 0, place_ = 0;
 };
 
 template <bool kNumbers, bool kBytes>
-void all_outputs(const ByteProductJob& job, const std::uint8_t* x, std::span<const Dim> at, Dim chunk,
+void all_outputs(const ByteProductJob& job, const std::uint8_t* x, std::span<const Dim> parts, Dim chunk,
                  float* y, std::uint8_t* bytes) {
   Dim channel = 0;
   for (; channel + kOutputs < job.kept; channel += 2 * kOutputs)
-    Outputs<2, kNumbers, kBytes>(job, at, chunk, channel, y, bytes).run(x);
-  if (channel < job.kept) Outputs<1, kNumbers, kBytes>(job, at, chunk, channel, y, bytes).run(x);
+    TiledProduct<2, kNumbers, kBytes>(job, parts, chunk, channel, y, bytes).run(x);
+  if (channel < job.kept) TiledProduct<1, kNumbers, kBytes>(job, parts, chunk, channel, y, bytes).run(x);
 }
 
 // The longest equal parts of a segment that fit into a row of a tile.
@@ -175,25 +161,25 @@ void release_tiles() {
   shaped_for = 0;
 }
 
-void run_tiles(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes) {
+void run(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes) {
   constexpr Dim kShortestChunk = 32, kMostParts = 64;
-  const Dim chunk = chunk_of(job.length), parts = job.segment_count * job.length / chunk;
-  if (job.place_count == 0 || chunk < kShortestChunk || parts > kMostParts || job.kept % kOutputs != 0)
+  const Dim chunk = chunk_of(job.length), count = job.segment_count * job.length / chunk;
+  if (job.place_count == 0 || chunk < kShortestChunk || count > kMostParts || job.kept % kOutputs != 0)
     return kVnniByteKernels.product(job, x, y, bytes);
-  Dim at[kMostParts];
+  Dim offsets[kMostParts];
   for (Dim i = 0, s = 0; s < job.segment_count; ++s) {
-    for (Dim k = 0; k < job.length; k += chunk) at[i++] = job.segments[s] + k;
+    for (Dim k = 0; k < job.length; k += chunk) offsets[i++] = job.segments[s] + k;
   }
-  const std::span<const Dim> of_parts(at, static_cast<std::size_t>(parts));
+  const std::span<const Dim> parts(offsets, static_cast<std::size_t>(count));
   shape_tiles(chunk);
-  if (y && bytes) all_outputs<true, true>(job, x, of_parts, chunk, y, bytes);
-  if (y && !bytes) all_outputs<true, false>(job, x, of_parts, chunk, y, nullptr);
-  if (!y) all_outputs<false, true>(job, x, of_parts, chunk, nullptr, bytes);
+  if (y && bytes) all_outputs<true, true>(job, x, parts, chunk, y, bytes);
+  if (y && !bytes) all_outputs<true, false>(job, x, parts, chunk, y, bytes);
+  if (!y && bytes) all_outputs<false, true>(job, x, parts, chunk, y, bytes);
 }
 
 }  // namespace
 
-const ByteKernels kAmxByteKernels{run_tiles, kVnniByteKernels.line_to_bytes, release_tiles};
+const ByteKernels kAmxByteKernels{run, kVnniByteKernels.line_to_bytes, release_tiles};
 
 }  // namespace supertac::kernels
 

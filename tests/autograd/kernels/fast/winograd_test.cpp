@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "autograd/kernels/fast/isa.h"
 #include "tests/autograd/check.h"
 
 namespace supertac::kernels {
@@ -135,6 +136,40 @@ TEST(Winograd, OtherShapesGoTheUsualWay) {
   ConvSettings up = map_of(8, 8);
   up.transposed = true;
   EXPECT_FALSE(is_winograd({&geometry_of(up), 64, 32, 32}));
+}
+
+// The filters of a map's taps, of which those that are not there are 0, transformed beforehand and on the
+// way.
+void expect_places_of_filters(const IsaKernels& isa, Taps down, Taps across, Dim tiles) {
+  constexpr Dim cin = 16, cout = 2 * kFilterChannels, size = cin * cout, places = 36;
+  const auto first = [](Taps t) { return t == Taps::last_two ? 1 : 0; };
+  const auto count = [](Taps t) { return t == Taps::three ? 3 : 2; };
+  const Tensor w = numbers({9, size}, 1), v = numbers({places, place_step(tiles, cin)}, 2);
+  std::vector<Dim> taps;
+  Tensor square = Tensor::zeros({9, size}), u({places, size});
+  for (Dim i = 0; i < count(down); ++i)
+    for (Dim j = 0; j < count(across); ++j) {
+      taps.push_back((8 - static_cast<Dim>(taps.size())) * size);
+      std::copy_n(w.data() + taps.back(), size,
+                  square.data() + (3 * (i + first(down)) + j + first(across)) * size);
+    }
+  Tensor expected = Tensor::zeros({places, place_step(tiles, cout)}), found = expected.clone();
+  isa.filters({size, size}, square.data(), u.data());
+  isa.places({places, tiles, cin, cout, size}, v.data(), u.data(), expected.data());
+  isa.filtered_places({down, across, taps.data(), tiles, cin, cout}, v.data(), w.data(), found.data());
+  EXPECT_TRUE(test::same_bytes(expected, found)) << isa.name << ", " << tiles << " tiles";
+}
+
+TEST(Winograd, FiltersOnTheWayGiveTheBitsOfThoseBeforehand) {
+  for (const IsaKernels* isa : supported_sets()) {
+    if (isa == &kPlainKernels) continue;
+    for (const Dim tiles : {1, 3, 4, 6}) {
+      expect_places_of_filters(*isa, Taps::three, Taps::three, tiles);
+      for (const Taps down : {Taps::first_two, Taps::last_two})
+        for (const Taps across : {Taps::first_two, Taps::last_two})
+          expect_places_of_filters(*isa, down, across, tiles);
+    }
+  }
 }
 
 }  // namespace
