@@ -58,8 +58,9 @@ class Plan {
   void copy_out(const Block& block, const Map& map, Tensor& to, Dim first) const;
 
   /// Images that go through the steps together. They share the weights on their way from memory, but what
-  /// they leave behind must stay in the second cache.
-  static constexpr Dim kBlock = 8, kByteBlock = 4;
+  /// they leave behind must stay in the second cache: one of kLargeCache bytes has room for kLargeBlock.
+  static constexpr Dim kBlock = 8, kLargeBlock = 16, kByteBlock = 4;
+  static constexpr std::size_t kLargeCache = std::size_t{2} << 20;
 
   std::vector<PlanStep> steps_;
   std::vector<Map> buffers_;  // each once

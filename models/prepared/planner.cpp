@@ -34,6 +34,7 @@ std::shared_ptr<const Plan> Planner::plan(const Network& network, const Activati
   const Drawing drawn = network.draw(input);
   Planner planner(input, trace.ops(), drawn, ranges);
   Plan& plan = *planner.plan_;
+  if (second_cache >= Plan::kLargeCache) plan.block_ = Plan::kLargeBlock;
   if (ranges != nullptr) plan.block_ = Plan::kByteBlock;
   plan.filters_anew_ = planner.filters_anew(second_cache);
   plan.picture_ = planner.map_of(drawn.picture);

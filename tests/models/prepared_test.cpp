@@ -138,12 +138,13 @@ TEST_P(PreparedBits, AreOneForBatchesInstructionSetsAndThreads) {
 INSTANTIATE_TEST_SUITE_P(All, PreparedBits,
                          testing::Combine(testing::Values("paper", "tiny"), testing::Bool()));
 
-// Whether a picture alone has its filters transformed on the way depends on the second cache.
+// On the second cache depend how many pictures are drawn at once and whether few have their filters
+// transformed on the way.
 TEST(Prepared, OfAnyCacheHasTheSameBits) {
   Rng rng(4);
   const SuperTac network(SuperTacSettings::of_preset("paper"), rng);
   std::set<bool> seen;
-  for (const Dim count : {1, 2, 3}) {
+  for (const Dim count : {1, 2, 3, 17}) {
     const Tensor windows = uniform(network.input_shape(count), 6);
     const Estimate expected = Planner::plan(network, nullptr, 0)->run(windows);
     for (const std::size_t megabytes : {1, 2, 3, 4, 64}) {
