@@ -148,8 +148,8 @@ def speed_avx2():
     return speed("peers_avx2.csv")
 
 
-def speed_amx():
-    return speed("peers_amx.csv")
+def speed_avx512():
+    return speed("peers_avx512.csv")
 
 
 def precision():
@@ -458,7 +458,7 @@ def tried():
                   "commit"], lines)
 
 
-SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, speed_avx2, speed_amx, precision, streaming, growth, pixels, textures, simulator, stability, optimizers,
+SECTIONS = {PAGE: [sources, accuracy, phase, history, parts, felt, imported, baselines, speed, speed_avx512, speed_avx2, precision, streaming, growth, pixels, textures, simulator, stability, optimizers,
                    rig, page, hostile, promises, mutation, whole_passes, silent_signals, corruptions, unknown_plates, demo, tried, left_out, never_felt, simulated_only, finger_fit, terms],
             README: [accuracy, speed]}
 
