@@ -11,6 +11,7 @@ using kernels::place_step;
 using kernels::Taps;
 
 constexpr Dim kTilesAtOnce = 8;
+constexpr Dim kFewTiles = 4;  // whose filters may be transformed on the way
 
 // A 3x3 convolution from the places of a map to every pixel of another, or to every second one.
 struct Filters {
@@ -80,6 +81,7 @@ void Winograd::multiply(const Filters& f, bool anew, Dim tiles, const real* v, r
 void Winograd::operator()(const Block& block) const {
   const auto& set = isa();
   const Dim tiles = block.images * from.tiles_down * from.tiles_across;
+  const bool anew = block.filters_anew && can_transform_anew() && tiles <= kFewTiles;
   real* const v = block.scratch;
   real* const m = v + places(from.channels);
   for (Dim first = 0; first < tiles; first += kTilesAtOnce) {
@@ -89,7 +91,7 @@ void Winograd::operator()(const Block& block) const {
     in.step = place_step(in.count, in.channels), out.step = place_step(out.count, out.channels);
     set.map_patches(in, block.first_pixel(x) - x.line() - x.channels, v);
     for (const Filters& f : filters) {
-      multiply(f, block.filters_anew && can_transform_anew() && tiles <= kTilesAtOnce / 2, in.count, v, m);
+      multiply(f, anew, in.count, v, m);
       set.map_squares(out, m, bias.data(), negative_slope, block.first_pixel(y) + f.y_offset);
     }
   }

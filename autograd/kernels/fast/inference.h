@@ -51,7 +51,7 @@ enum class Taps { three, first_two, last_two };
 struct FilteredPlacesJob {
   Taps down = Taps::three, across = Taps::three;
   const Dim* taps = nullptr;
-  Dim tiles = 0, cin = 0, cout = 0;  // cout: a multiple of kFilterChannels
+  Dim tiles = 0, cin = 0, cout = 0;  // multiples of kTransformChannels and of kFilterChannels
 };
 inline constexpr Dim kFilterChannels = 32;
 
@@ -61,7 +61,7 @@ struct MapJob {
   Strides a, x, y;
 };
 
-/// y of a 3x3 convolution with one output, [height][width].
+/// A 3x3 convolution with one output, y [height][width].
 struct PlaneOutput {
   const real* w = nullptr;  // [cin][3 columns][3 rows]
   real bias = 0, negative_slope = 1;
