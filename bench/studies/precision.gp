@@ -6,7 +6,7 @@ set datafile missing NaN
 set logscale x
 set grid
 set key bottom right
-set xrange [20:2000]
+set xrange [10:1000]
 set yrange [0.84:0.9]
 set xlabel "time of one picture, one thread (us)"
 set ylabel "contact SSIM, unseen trial"
