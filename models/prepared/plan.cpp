@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 
 #include "autograd/kernels/fast/int8.h"
 
@@ -56,7 +57,8 @@ Estimate Plan::run(const Tensor& inputs) const {
   const Dim images = std::min(count, block_), bytes = byte_workspace_ * images;
   Tensor memory(Shape{scratch_ + workspace_ * images + bytes / static_cast<Dim>(sizeof(real)) + 1});
   real* const workspace = memory.data() + scratch_;
-  const kernels::ByteProducts byte_products;
+  std::optional<kernels::ByteProducts> byte_products;  // of tiles, for which a process asks the system
+  if (byte_workspace_ > 0) byte_products.emplace();
   for (Dim first = 0; first < count; first += block_) {
     const Block block{inputs.data() + first * size,
                       std::min(block_, count - first),

@@ -48,7 +48,7 @@ using PlanStep = std::function<void(const Block&)>;
 class Plan {
  public:
   Estimate run(const Tensor& inputs) const;
-  /// Whether a picture alone has Winograd's filters transformed anew: the same bits from less memory.
+  /// Whether few pictures have Winograd's filters transformed on the way: the same bits from less memory.
   bool filters_anew() const { return filters_anew_; }
 
  private:

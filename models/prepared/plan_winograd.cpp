@@ -160,9 +160,10 @@ void Planner::transposed_conv(const TracedOp& op) {
 }
 
 void Planner::add_winograd(Winograd step) {
-  weights_ += bytes_of(step.w);
-  for (const Filters& f : step.filters)
-    (step.can_transform_anew() ? transformed_ : weights_) += bytes_of(f.u);
+  const bool either = step.can_transform_anew();
+  if (!either) step.w = {};
+  if (either) weights_ += bytes_of(step.w);
+  for (const Filters& f : step.filters) (either ? transformed_ : weights_) += bytes_of(f.u);
   plan_->scratch_ = std::max(plan_->scratch_, step.scratch());
   plan_->steps_.push_back(std::move(step));
 }

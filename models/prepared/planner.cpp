@@ -113,7 +113,7 @@ void Planner::look_ahead(const std::vector<TracedOp>& ops, const Drawing& drawn)
 // Where whole quads of channels meet enough outputs to repay the way into bytes and back. The input and the
 // picture itself are not rounded: measured, that costs the most (bench/results).
 bool Planner::is_of_bytes(const TracedOp& op) const {
-  if (!steps_.contains(owner(op.inputs[0]))) return false;
+  if (!steps_.contains(owner(op.inputs[0])) || op.settings.negative_slope > 1) return false;  // Outcome
   if (op.op == "linear") return owner(op.inputs[0]) != op.inputs[0].node();
   return op.op.starts_with("conv") && op.inputs[0].dim(op.inputs[0].rank() - 1) % kernels::kQuad == 0 &&
          op.y.dim(op.y.rank() - 1) > 1;

@@ -85,6 +85,7 @@ void places(const PlacesJob& job, const real* v, const real* u, real* m) {
 
 // Rows of u, and vectors of each, that are made and used at a time: no more than the first cache holds.
 constexpr int kFilterRows = 4, kFilterVectors = 2;
+static_assert(kTransformChannels % kFilterRows == 0 && kFilterChannels % (kFilterVectors * Vec::kLanes) == 0);
 
 // P tiles of one place: m += v * u for these rows; v and m are [P][cin] and [P][cout].
 template <int P>
