@@ -1,9 +1,9 @@
-"""CSV files of bench/results, means with intervals, tables of Markdown: what bench/results.py is written with."""
+"""CSV files of bench/results, means with intervals, tables of Markdown: what the tables are written with."""
 import csv
 import math
 import pathlib
 
-RESULTS = pathlib.Path(__file__).resolve().parent / "results"
+RESULTS = pathlib.Path(__file__).resolve().parents[1] / "results"
 T_975 = {1: 12.706, 2: 4.303, 3: 3.182, 4: 2.776, 5: 2.571, 6: 2.447, 7: 2.365, 8: 2.306, 9: 2.262}  # Student's t
 
 
