@@ -5,8 +5,10 @@
 
 #include "bench/against_peak.h"
 #include "bench/windows.h"
+#include "data/samples/signal_features.h"
 #include "models/cost.h"
 #include "models/model_file.h"
+#include "models/novelty.h"
 #include "models/prepared/prepared.h"
 #include "models/training/trainer.h"
 #include "tests/allocations.h"
@@ -33,6 +35,42 @@ void inference(benchmark::State& state) {
 }
 BENCHMARK(inference)->ArgName("batch")->Arg(1)->Arg(8)->Arg(64)->UseManualTime()->Unit(
     benchmark::kMicrosecond);
+
+// What the intervals cost: the same network without its second plane.
+void without_interval(benchmark::State& state) {
+  omp_set_num_threads(1);
+  SuperTacSettings settings = kPaper;
+  settings.spread = false;
+  Rng rng(1);
+  const SuperTac model(settings, rng);
+  const Prepared prepared(model);
+  const Tensor windows = bench::random_windows(state.range(0), settings.timesteps);
+  bench::run_against_peak(state, static_cast<double>(state.range(0)) * cost_of(settings).inference,
+                          [&] { prepared.estimate(windows); });
+}
+BENCHMARK(without_interval)
+    ->ArgName("batch")
+    ->Arg(1)
+    ->Arg(64)
+    ->UseManualTime()
+    ->Unit(benchmark::kMicrosecond);
+
+// What the alarm costs a window.
+void alarm(benchmark::State& state) {
+  const TaxelArray array;
+  const auto count = static_cast<Dim>(signal_feature_count(array));
+  Rng rng(1);
+  Tensor of_training(Shape{10 * count, count});
+  for (real& x : of_training.values()) x = rng.uniform(1.0);
+  const Novelty novelty(of_training);
+  const Tensor window = bench::random_windows(1, kPaper.timesteps);
+  std::vector<float> features(static_cast<std::size_t>(count));
+  for (auto _ : state) {
+    signal_features(window.values(), array, features);
+    benchmark::DoNotOptimize(novelty.unlike_training(features));
+  }
+}
+BENCHMARK(alarm)->Unit(benchmark::kMicrosecond);
 
 // Windows, augmentation, forward, loss, backward, Adam.
 void training_step(benchmark::State& state) {

@@ -1,6 +1,7 @@
 #include "models/novelty.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -9,6 +10,7 @@ namespace {
 
 constexpr const char *kMean = "novelty.mean", *kWhitening = "novelty.whitening", *kLimit = "novelty.limit";
 constexpr double kLeastVariance = 1e-3, kTail = 0.001, kMargin = 1.3;
+constexpr std::size_t kRows = 8;  // whose sums run side by side
 
 using Matrix = std::vector<double>;  // [D][D]
 
@@ -77,11 +79,14 @@ double Novelty::distance(std::span<const float> features) const {
     throw std::invalid_argument("novelty: expects " + std::to_string(d) + " features, got " +
                                 std::to_string(features.size()));
   double squares = 0;
-  for (std::size_t i = 0; i < d; ++i) {
-    double sum = 0;
-    for (std::size_t j = 0; j <= i; ++j)
-      sum += static_cast<double>(whitening_[i * d + j]) * (static_cast<double>(features[j]) - mean_[j]);
-    squares += sum * sum;
+  for (std::size_t i = 0; i < d; i += kRows) {
+    const std::size_t rows = std::min(kRows, d - i);
+    std::array<double, kRows> sums{};
+    for (std::size_t j = 0; j < i + rows; ++j)
+      for (std::size_t r = j > i ? j - i : 0; r < rows; ++r)
+        sums[r] +=
+            static_cast<double>(whitening_[(i + r) * d + j]) * (static_cast<double>(features[j]) - mean_[j]);
+    for (std::size_t r = 0; r < rows; ++r) squares += sums[r] * sums[r];
   }
   return std::sqrt(squares / static_cast<double>(d));
 }

@@ -1,6 +1,7 @@
 #include "data/samples/signal_features.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
@@ -13,6 +14,7 @@ namespace {
 
 constexpr std::size_t kLeastFrames = 16, kFramesLookedAt = 64, kLagShare = 8;
 constexpr double kStillest = 0.0005, kLeastSwing = 0.003;
+constexpr std::size_t kAtOnce = 16;  // sums that run side by side: one alone waits for each of its additions
 
 /// The frames of a window that are looked at, their means taken off.
 struct Swings {
@@ -24,10 +26,17 @@ struct Swings {
   }
 };
 
-double variance_of(const Swings& x, std::size_t k) {
-  double sum = 0;
-  for (std::size_t t = 0; t < x.frames; ++t) sum += x(t, k) * x(t, k);
-  return sum / static_cast<double>(x.frames);
+// The mean over time of value(t, k) for each k of `out`, added up in the order of time.
+template <class Value>
+void mean_over_time(std::size_t frames, std::span<float> out, const Value& value) {
+  for (std::size_t first = 0; first < out.size(); first += kAtOnce) {
+    const std::size_t count = std::min(kAtOnce, out.size() - first);
+    std::array<double, kAtOnce> sums{};
+    for (std::size_t t = 0; t < frames; ++t)
+      for (std::size_t k = 0; k < count; ++k) sums[k] += value(t, first + k);
+    for (std::size_t k = 0; k < count; ++k)
+      out[first + k] = static_cast<float>(sums[k] / static_cast<double>(frames));
+  }
 }
 
 // How far `width` signals are ahead of as many from `behind` on.
@@ -57,12 +66,9 @@ void signal_features(std::span<const float> window, const TaxelArray& array, std
   const std::size_t all = window.size() / signals, step = std::max<std::size_t>(1, all / kFramesLookedAt);
   const std::span<float> mean = out.first(signals), spread = out.subspan(signals, signals);
   const Swings x{.window = window, .mean = mean, .frames = all / step, .step = step};
-  for (std::size_t k = 0; k < signals; ++k) {
-    double sum = 0;
-    for (std::size_t t = 0; t < x.frames; ++t) sum += double{window[t * step * signals + k]};
-    mean[k] = static_cast<float>(sum / static_cast<double>(x.frames));
-    spread[k] = static_cast<float>(variance_of(x, k));
-  }
+  mean_over_time(x.frames, mean,
+                 [&](std::size_t t, std::size_t k) { return double{window[t * step * signals + k]}; });
+  mean_over_time(x.frames, spread, [&](std::size_t t, std::size_t k) { return x(t, k) * x(t, k); });
   const std::size_t width = signals / rows;
   const auto square_of = [&](std::size_t row) {
     const std::span<const float> variances = spread.subspan(row * width, width);
