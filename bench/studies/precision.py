@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""What int8 costs in accuracy and what it saves: every model on the unseen trial in both precisions, its time on one thread.
-    precision.py BIN RECORDINGS RESULTS.csv NAME=MODEL[,MODEL...] ...
-A model of several files is a committee. Times are medians over five rounds by turns; nothing else should run."""
+"""Accuracy against time on the unseen trial: every model in fp32 and int8, and what needs no training; on one thread.
+    precision.py BIN RECORDINGS RESULTS.csv NAME=MODEL[,MODEL...] ... [NAME=MODEL@PAIRS ...]
+A model of several files is a committee; one that sees single frames is scored on PAIRS (supertac-evaluate --write-pairs), in fp32.
+Times are medians over five rounds by turns; nothing else should run."""
 import json
 import pathlib
 import statistics
@@ -10,32 +11,43 @@ import sys
 import tempfile
 
 PLATES = "3_Bumps,6_Bumps,4_Ridges,6_Ridges"
+UNTRAINED = {"mean_image": "mean image", "nearest": "nearest", "bicubic": "bicubic", "ridge": "ridge regression"}
+ROUNDS = 5
 
 
-def scores(binaries, recordings, model, precision, limit, folder):
-    out = pathlib.Path(folder) / "scores.json"
-    subprocess.run([binaries / "supertac-evaluate", "--data", recordings, "--plates", PLATES, "--model", model, "--precision",
-                    precision, "--limit", str(limit), "--threads", "1", "--json", out, "--force", "--quiet"],
-                   check=True, stdout=subprocess.DEVNULL)
-    return json.loads(out.read_text())
+class Scorer:
+    def __init__(self, binaries, recordings, folder):
+        self.binaries, self.recordings, self.out = pathlib.Path(binaries), recordings, pathlib.Path(folder) / "scores.json"
+
+    def __call__(self, model, precision, limit):
+        model, _, pairs = model.partition("@")
+        data = ["--pairs", pairs, "--split", "none"] if pairs else ["--data", self.recordings, "--plates", PLATES]
+        subprocess.run([self.binaries / "supertac-evaluate", *data, "--model", model, "--precision", precision, "--limit", str(limit),
+                        "--threads", "1", "--json", self.out, "--force", "--quiet"], check=True, stdout=subprocess.DEVNULL)
+        return json.loads(self.out.read_text())
+
+
+def line(name, precision, contact, times):
+    return f"{name},{precision},{contact['ssim']:.4f},{contact['psnr_mean_db']:.2f},{statistics.median(times):.4g}"
 
 
 def main():
     binaries, recordings, results, *models = sys.argv[1:]
-    binaries = pathlib.Path(binaries)
     lines = ["name,precision,contact_ssim,contact_psnr_db,median_us"]
     with tempfile.TemporaryDirectory() as folder:
-        for named in models:
+        score = Scorer(binaries, recordings, folder)
+        for number, named in enumerate(models):
             name, model = named.split("=", 1)
-            times = {"fp32": [], "int8": []}
-            for _ in range(5):
-                for precision in times:
-                    latency = scores(binaries, recordings, model, precision, 200, folder)["latency"]["network"]
-                    times[precision].append(latency["median_us"])
-            for precision, measured in times.items():
-                contact = scores(binaries, recordings, model, precision, 0, folder)["contact"]
-                lines.append(f"{name},{precision},{contact['ssim']:.4f},{contact['psnr_mean_db']:.2f},"
-                             f"{statistics.median(measured):.1f}")
+            precisions = ["fp32"] if "@" in model else ["fp32", "int8"]
+            rounds = [(precision, score(model, precision, 200)["latency"]) for _ in range(ROUNDS) for precision in precisions]
+            whole = {precision: score(model, precision, 0) for precision in precisions}
+            if number == 0:
+                for key, title in UNTRAINED.items():
+                    lines.append(line(title, "fp32", whole["fp32"]["baselines"][key]["contact"],
+                                      [latency[key]["median_us"] for precision, latency in rounds if precision == "fp32"]))
+            for precision in precisions:
+                lines.append(line(name, precision, whole[precision]["contact"],
+                                  [latency["network"]["median_us"] for of, latency in rounds if of == precision]))
                 print(lines[-1], flush=True)
     pathlib.Path(results).write_text("\n".join(lines) + "\n")
 

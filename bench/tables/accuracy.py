@@ -80,6 +80,19 @@ def parts():
         ["passes aligned", of(steps["passes"]), of(steps["clocks"]), "", "`history.csv`, five seeds"],
         ["losses without a step found and filled", of(steps["losses"]), of(steps["passes"]), "", "`history.csv`, five seeds"],
     ]
+    whole = lambda network: [r for r in rows("whole_passes.csv") if (r["network"], r["windows_of"]) == (network, "trial 2")]
+    muon = [r for r in rows("optimizers.csv") if (r["training"], r["windows_of"], r["optimizer"]) == ("preset paper", "trial 2", "muon")]
+
+    def with_ghosts(chosen):
+        return (f"{over_seeds(chosen, 'contact_ssim', 3)}, {over_seeds(chosen, 'contact_psnr_db', 1)} dB, ghosts "
+                f"{100 * mean([float(r['flat_ghost_rate']) for r in chosen]):.1f} %")
+
+    lines += [
+        ["V of VAE; whole passes, Muon", with_ghosts(muon), with_ghosts(whole("preset paper (muon; plain autoencoder)")), "",
+         "`optimizers.csv`, `whole_passes.csv`, five seeds"],
+        ["SSIM term, lambda .1 against 0; `tiny`, whole passes", with_ghosts(whole("preset tiny")),
+         with_ghosts(whole("preset tiny; lambda 0")), "", "`whole_passes.csv`, five seeds"],
+    ]
     for line in lines:
         if not line[3]:
             line[3] = f"{float(line[1].split()[0]) - float(line[2].split()[0]):+.3f}"

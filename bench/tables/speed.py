@@ -38,7 +38,7 @@ def speed_avx2():
 def precision():
     lines = []
     found = rows("precision.csv")
-    for preset in dict.fromkeys(r["name"].split()[0] for r in found):
+    for preset in dict.fromkeys(r["name"].split()[0] for r in found if r["precision"] == "int8"):
         of = {kind: [r for r in found if r["name"].split()[0] == preset and r["precision"] == kind] for kind in ("fp32", "int8")}
         lost = [float(a["contact_ssim"]) - float(b["contact_ssim"]) for a, b in zip(of["fp32"], of["int8"])]
         middle = lambda kind, column, digits: f"{mean([float(r[column]) for r in of[kind]]):.{digits}f}"
