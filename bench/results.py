@@ -12,7 +12,7 @@ import pathlib
 import re
 import sys
 
-from tables import accuracy, never_felt, reliability, speed, training, whole_passes
+from tables import accuracy, never_felt, reliability, simulated_fingers, speed, training, whole_passes
 from tables.figures import RESULTS, rows, table
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
@@ -26,7 +26,7 @@ def sources():
 
 
 PAGES = {INDEX: [sources], README: [whole_passes.reached, speed.speed]}
-for page in (accuracy, speed, training, reliability, never_felt, whole_passes):
+for page in (accuracy, speed, training, reliability, never_felt, simulated_fingers, whole_passes):
     PAGES[RESULTS / f"{page.__name__.split('.')[-1]}.md"] = page.TABLES
 
 
