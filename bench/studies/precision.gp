@@ -7,7 +7,7 @@ set logscale x
 set grid
 set key bottom right
 set xrange [0.1:2000]
-set yrange [0:1]
+set yrange [-0.05:1]
 set xlabel "time of one picture, one thread (us)"
 set ylabel "contact SSIM, unseen trial"
 set title "Accuracy against time, each seed"
@@ -16,4 +16,4 @@ first(name) = strstrt("123456789", name[strlen(name):strlen(name)]) == 0 ? name 
 label(name) = first(name) eq "" ? "" : name[strlen(name) - 1:] eq " 0" ? name[:strlen(name) - 2] : name
 plot csv skip 1 using 5:(strcol(2) eq "fp32" ? $3 : NaN) with points pt 7 ps 1.2 lc rgb "#1f5fa8" title "fp32", \
      "" skip 1 using 5:(strcol(2) eq "int8" ? $3 : NaN) with points pt 5 ps 1.2 lc rgb "#d2691e" title "int8", \
-     "" skip 1 using 5:(strcol(2) eq "fp32" && label(strcol(1)) ne "" ? $3 : NaN):(label(strcol(1))) with labels left offset 0.8,-0.8 font "sans,10" notitle
+     "" skip 1 using 5:(strcol(2) eq "fp32" && label(strcol(1)) ne "" ? $3 : NaN):(label(strcol(1))) with labels left offset 0.8,0.8 font "sans,10" notitle
