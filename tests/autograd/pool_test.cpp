@@ -26,6 +26,14 @@ TEST(Pool, AReleasedBlockIsHandedOutAgain) {
   pool_release(again, 1001);
 }
 
+TEST(Pool, CountsWhatItTakesFromTheHeap) {
+  constexpr std::size_t kBytes = 3'333'333;  // of a size that no other test asks for
+  const std::uint64_t before = pool_heap_allocations();
+  void* block = pool_allocate(kBytes);
+  EXPECT_EQ(pool_heap_allocations(), before + 1);
+  pool_release(block, kBytes);
+}
+
 TEST(Pool, BlocksOfAnEndedThreadServeTheNextOne) {
   constexpr std::size_t kBytes = 777'777;  // of a size that no other test asks for
   void* block = nullptr;

@@ -19,6 +19,8 @@ TEST(Shaping, HandComputed) {
   expect_values(reshape(x, {3, 2}).value(), {3, 2}, {1, 2, 3, 4, 5, 6});
   expect_values(joined({x, y}).value(), {2, 4}, {1, 2, 3, 7, 4, 5, 6, 8});
   expect_values(slice(x, 1, 2).value(), {2, 2}, {2, 3, 5, 6});
+  expect_values(slice(x, 0, 1).value(), {2, 1}, {1, 4});
+  expect_values(slice(x, 0, 3).value(), {2, 3}, {1, 2, 3, 4, 5, 6});
   const Variable pixels(Tensor::of({1, 2, 3}, {1, 10, 100, 2, 20, 200}));  // [N,L,C]
   expect_values(flatten_channels_first(pixels).value(), {1, 6}, {1, 2, 10, 20, 100, 200});
 }
@@ -57,8 +59,9 @@ TEST(Shaping, TakesRunsOfColumns) {
   EXPECT_EQ(std::vector<real>(y.value().values().begin(), y.value().values().end()),
             (std::vector<real>{1, 2, 4, 5, 11, 12, 14, 15}));
   expect_refusal("take_runs: 2 runs of 2 from 2 leave x [2,6]", [&] { take_runs(x, {2, 2, 3, 4}); });
-  expect_refusal("take_runs: x wants a gradient, which this op does not have",
-                 [&] { take_runs(Variable(Tensor::zeros({2, 6}), true), {0, 2, 2, 4}); });
+  expect_refusal("take_runs: x wants a gradient, which this op does not have", [&] {
+    take_runs(Variable(Tensor::zeros({2, 6}), true), {0, 2, 2, 4});
+  });
 }
 
 TEST(Shaping, RefusesWhatDoesNotFit) {
