@@ -6,7 +6,7 @@
 #include <memory>
 #include <thread>
 
-#include "bench/studies/stall_watch.h"
+#include "bench/studies/rig/stall_watch.h"
 #include "hardware/errors.h"
 #include "hardware/palpation_recorder.h"
 #include "hardware/serial_port.h"

@@ -16,7 +16,7 @@
 #include <sstream>
 #include <string>
 
-#include "bench/studies/stall_watch.h"
+#include "bench/studies/rig/stall_watch.h"
 #include "hardware/collection.h"
 #include "hardware/errors.h"
 #include "hardware/serial_port.h"

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """What the live page costs the stream that it shows, on a virtual rig whose finger slides to and fro.
 
-    bench/studies/page_load.py BIN MODEL load [PAIRS]   with and without 50 pages (5 of them stalled), 60 slow connections and
+    bench/studies/rig/page_load.py BIN MODEL load [PAIRS]   with and without 50 pages (5 of them stalled), 60 slow connections and
                                                         malformed requests, 100,000 in all, by turns; a line of CSV a run;
                                                         the processors kept awake in both
-    bench/studies/page_load.py BIN MODEL udp [SECONDS]  the datagrams that PlotJuggler's server would get, each parsed
-    bench/studies/page_load.py BIN MODEL hour [SECONDS] one page in Chromium for an hour; a line of CSV a minute
+    bench/studies/rig/page_load.py BIN MODEL udp [SECONDS]  the datagrams that PlotJuggler's server would get, each parsed
+    bench/studies/rig/page_load.py BIN MODEL hour [SECONDS] one page in Chromium for an hour; a line of CSV a minute
 
 BIN is the folder of our programs. As in stream_soak, chrt -r 10 keeps other work of the machine out of the latency.
 """
@@ -25,7 +25,7 @@ import tempfile
 import threading
 import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tests" / "apps"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "tests" / "apps"))
 from browser import Browser
 from page_test import Rig
 

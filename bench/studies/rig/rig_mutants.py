@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Breaks each of the rig's 19 behaviours in a copy of the tree and shows the test that then fails.
 
-    bench/studies/rig_mutants.py SOURCE SCRATCH [FIRST]
+    bench/studies/rig/rig_mutants.py SOURCE SCRATCH [FIRST]
 
 SOURCE is copied to SCRATCH/tree, every mutant is put in behind a switch (the environment variable SUPERTAC_MUTANT),
 the copy is built once, and each mutant is run against the tests that are to catch it. Prints one line a mutant;
