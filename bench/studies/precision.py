@@ -34,9 +34,12 @@ def line(name, precision, contact, times):
 
 def main():
     binaries, recordings, results, *models = sys.argv[1:]
-    lines = ["name,precision,contact_ssim,contact_psnr_db,median_us"]
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, open(results, "w") as out:
+        def write(text):
+            print(text, file=out, flush=True)  # a model that fails must not take the others' figures with it
+
         score = Scorer(binaries, recordings, folder)
+        write("name,precision,contact_ssim,contact_psnr_db,median_us")
         for number, named in enumerate(models):
             name, model = named.split("=", 1)
             precisions = ["fp32"] if "@" in model else ["fp32", "int8"]
@@ -44,13 +47,11 @@ def main():
             whole = {precision: score(model, precision, 0) for precision in precisions}
             if number == 0:
                 for key, title in UNTRAINED.items():
-                    lines.append(line(title, "fp32", whole["fp32"]["baselines"][key]["contact"],
-                                      [latency[key]["median_us"] for precision, latency in rounds if precision == "fp32"]))
+                    write(line(title, "fp32", whole["fp32"]["baselines"][key]["contact"],
+                               [latency[key]["median_us"] for precision, latency in rounds if precision == "fp32"]))
             for precision in precisions:
-                lines.append(line(name, precision, whole[precision]["contact"],
-                                  [latency["network"]["median_us"] for of, latency in rounds if of == precision]))
-                print(lines[-1], flush=True)
-    pathlib.Path(results).write_text("\n".join(lines) + "\n")
+                write(line(name, precision, whole[precision]["contact"],
+                           [latency["network"]["median_us"] for of, latency in rounds if of == precision]))
 
 
 if __name__ == "__main__":
