@@ -4,8 +4,8 @@ one change that suits its truth best, which no network could know:
     width   x^p, p from .4 to 4: above 1 slopes draw in and elements become narrower, below 1 wider
     place   moved along the slide by up to 1.5 mm
     height  times .5 to 2, cut at 1
-    what_is_missing.py BIN RECORDINGS RESULTS.csv MODEL=PLATE ...
-RESULTS.csv grows by a line for each model and plate. Needs NumPy and PyTorch
+    what_is_missing.py BIN RECORDINGS RESULTS.csv NETWORK SEED MODEL=PLATE ...
+RESULTS.csv grows by a line for each model and plate, which NETWORK and SEED describe. Needs NumPy and PyTorch
 (bench/peers/requirements.txt). Half a minute a model."""
 import csv
 import pathlib
@@ -63,12 +63,12 @@ def scores_of(pictures, truths):
 
 
 def main():
-    if len(sys.argv) < 5:
+    if len(sys.argv) < 7:
         sys.exit(__doc__)
-    binaries, recordings, results = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3])
+    binaries, recordings, results, network, seed = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3]), *sys.argv[4:6]
     with tempfile.TemporaryDirectory() as folder, open(results, "a", newline="") as file:
         out = csv.writer(file, lineterminator="\n")
-        for number, (model, plate) in enumerate(argument.rsplit("=", 1) for argument in sys.argv[4:]):
+        for number, (model, plate) in enumerate(argument.rsplit("=", 1) for argument in sys.argv[6:]):
             outputs = pathlib.Path(folder) / "outputs.safetensors"
             subprocess.run([binaries / "supertac-evaluate", "--model", model, "--data", recordings, "--plates", plate, "--split", "none",
                             "--outputs", outputs, "--force", "--quiet"], check=True, stdout=subprocess.DEVNULL)
@@ -77,8 +77,8 @@ def main():
             looked_at = contact[np.linspace(0, len(contact) - 1, min(WINDOWS, len(contact))).astype(int)]
             scores = scores_of(tensors["output"][looked_at], tensors["truth"][looked_at])
             if number == 0 and results.stat().st_size == 0:
-                out.writerow(["model", "plate", *scores])
-            out.writerow([pathlib.Path(model).stem, plate, *(f"{score:.4f}" for score in scores.values())])
+                out.writerow(["network", "seed", "plate", *scores])
+            out.writerow([network, seed, plate, *(f"{score:.4f}" for score in scores.values())])
             file.flush()
 
 
