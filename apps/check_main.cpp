@@ -7,8 +7,8 @@
 
 #include "apps/check/machine.h"
 #include "apps/check/training.h"
-#include "apps/common/program.h"
-#include "io/file.h"
+#include "apps/common/command_line/program.h"
+#include "io/files/file.h"
 
 namespace supertac {
 

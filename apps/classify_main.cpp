@@ -5,11 +5,11 @@
 
 #include "apps/classify/experiment.h"
 #include "apps/classify/report.h"
-#include "apps/common/program.h"
-#include "apps/common/progress.h"
-#include "apps/common/provenance.h"
-#include "apps/common/version.h"
-#include "io/file.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/command_line/version.h"
+#include "apps/common/output/provenance.h"
+#include "apps/common/running/progress.h"
+#include "io/files/file.h"
 
 namespace supertac {
 

@@ -1,9 +1,9 @@
 // supertac-evaluate: how good a model is on a data set, beside what does without a network.
-#include "apps/common/program.h"
-#include "apps/common/remarks.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/output/remarks.h"
 #include "apps/evaluate/pairs.h"
 #include "apps/evaluate/recordings.h"
-#include "io/file.h"
+#include "io/files/file.h"
 
 namespace supertac {
 

@@ -2,20 +2,20 @@
 #include <cmath>
 #include <filesystem>
 
-#include "apps/common/program.h"
-#include "apps/common/provenance.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/output/provenance.h"
 #include "apps/explain/expression.h"
 #include "apps/explain/graph.h"
 #include "autograd/trace.h"
 #include "data/plates/plate_file.h"
 #include "data/plates/truth.h"
 #include "data/recordings/recording.h"
-#include "data/samples/levelling.h"
-#include "io/file.h"
-#include "io/numbers.h"
-#include "models/loss.h"
-#include "models/model_file.h"
-#include "models/prepared/prepared.h"
+#include "data/windows/levelling.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
+#include "models/files/model_file.h"
+#include "models/inference/prepared.h"
+#include "models/training/loss.h"
 
 namespace supertac {
 

@@ -1,8 +1,8 @@
 // supertac-export: a model in the form of other runtimes.
 
-#include "apps/common/program.h"
-#include "io/file.h"
-#include "models/onnx/export.h"
+#include "apps/common/command_line/program.h"
+#include "io/files/file.h"
+#include "models/files/onnx.h"
 
 namespace supertac {
 

@@ -5,11 +5,11 @@
 #include <optional>
 
 #include "apps/collect/passes.h"
-#include "apps/common/output_folder.h"
-#include "apps/common/program.h"
-#include "apps/common/progress.h"
-#include "apps/common/provenance.h"
-#include "apps/common/signals.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/output/output_folder.h"
+#include "apps/common/output/provenance.h"
+#include "apps/common/running/progress.h"
+#include "apps/common/running/signals.h"
 #include "apps/import/page.h"
 #include "data/plates/plate_file.h"
 #include "data/registration/text_folder.h"

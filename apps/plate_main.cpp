@@ -1,10 +1,10 @@
 // supertac-plate: a plate as STL, to print, and the palpation run as G-code, to send from another host.
 
-#include "apps/common/program.h"
+#include "apps/common/command_line/program.h"
 #include "data/plates/plate_mesh.h"
-#include "hardware/palpation.h"
-#include "io/file.h"
-#include "io/numbers.h"
+#include "hardware/printers/palpation.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

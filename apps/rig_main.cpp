@@ -2,8 +2,8 @@
 
 #include <unistd.h>
 
-#include "apps/common/program.h"
-#include "apps/common/signals.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/running/signals.h"
 #include "data/recordings/finger_model.h"
 #include "hardware/virtual_rig/pty_rig.h"
 

@@ -5,13 +5,13 @@
 #include <exception>
 #include <filesystem>
 
-#include "apps/common/output_folder.h"
-#include "apps/common/program.h"
-#include "apps/common/progress.h"
-#include "apps/common/signals.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/output/output_folder.h"
+#include "apps/common/running/progress.h"
+#include "apps/common/running/signals.h"
 #include "data/plates/plate_file.h"
 #include "data/recordings/simulator.h"
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

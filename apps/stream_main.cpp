@@ -2,16 +2,16 @@
 
 #include <filesystem>
 
-#include "apps/common/ports.h"
-#include "apps/common/program.h"
-#include "apps/common/progress.h"
-#include "apps/common/provenance.h"
-#include "apps/common/signals.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/output/provenance.h"
+#include "apps/common/running/ports.h"
+#include "apps/common/running/progress.h"
+#include "apps/common/running/signals.h"
 #include "apps/stream/stream.h"
 #include "apps/web/web_options.h"
-#include "hardware/serial_port.h"
-#include "io/file.h"
-#include "io/numbers.h"
+#include "hardware/ports/serial_port.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

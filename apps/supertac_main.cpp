@@ -8,10 +8,10 @@
 #include <iostream>
 #include <vector>
 
-#include "apps/common/nearest.h"
-#include "apps/common/outputs.h"
-#include "apps/common/program.h"
-#include "io/text.h"
+#include "apps/common/command_line/nearest.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/output/outputs.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {

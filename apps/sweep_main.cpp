@@ -1,16 +1,16 @@
 // supertac-sweep: trains and measures a grid of models, and draws accuracy against latency.
 #include <filesystem>
 
-#include "apps/common/launch.h"
-#include "apps/common/program.h"
-#include "apps/common/version.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/command_line/version.h"
+#include "apps/common/running/launch.h"
 #include "apps/sweep/chart.h"
 #include "apps/sweep/front.h"
 #include "apps/sweep/shards.h"
 #include "apps/sweep/sweep.h"
 #include "apps/train/training_options.h"
-#include "io/file.h"
-#include "io/folder_lock.h"
+#include "io/files/file.h"
+#include "io/files/folder_lock.h"
 
 namespace supertac {
 

@@ -1,12 +1,12 @@
 // supertac-train: recordings (or pairs of images) in, a model out.
-#include "apps/common/program.h"
-#include "apps/common/provenance.h"
-#include "apps/common/remarks.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/output/provenance.h"
+#include "apps/common/output/remarks.h"
 #include "apps/ranks/together.h"
 #include "apps/train/training_options.h"
 #include "apps/train/training_run.h"
-#include "data/samples/signal_remarks.h"
-#include "io/file.h"
+#include "data/windows/signal_remarks.h"
+#include "io/files/file.h"
 
 namespace supertac {
 

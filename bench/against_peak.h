@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bench/fma_peak.h"
-#include "io/median.h"
+#include "io/numbers/median.h"
 
 namespace supertac::bench {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "hardware/frame_decoder.h"
+#include "hardware/boards/frame_decoder.h"
 #include "hardware/virtual_rig/faults.h"
 
 namespace {

@@ -10,9 +10,9 @@
 
 #include "bench/fma_peak.h"
 #include "bench/windows.h"
-#include "io/median.h"
-#include "io/numbers.h"
-#include "models/cost.h"
+#include "io/numbers/median.h"
+#include "io/numbers/numbers.h"
+#include "models/networks/cost.h"
 #include "models/training/trainer.h"
 
 namespace supertac {

@@ -5,11 +5,11 @@
 
 #include "bench/against_peak.h"
 #include "bench/windows.h"
-#include "data/samples/signal_features.h"
-#include "models/cost.h"
-#include "models/model_file.h"
-#include "models/novelty.h"
-#include "models/prepared/prepared.h"
+#include "data/windows/signal_features.h"
+#include "models/files/model_file.h"
+#include "models/inference/novelty.h"
+#include "models/inference/prepared.h"
+#include "models/networks/cost.h"
 #include "models/training/trainer.h"
 #include "tests/allocations.h"
 

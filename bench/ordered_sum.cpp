@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "apps/common/launch.h"
+#include "apps/common/running/launch.h"
 #include "apps/ranks/mpi_ranks.h"
-#include "io/median.h"
+#include "io/numbers/median.h"
 
 namespace {
 

@@ -19,9 +19,9 @@
 
 #include "bench/fma_peak.h"
 #include "bench/windows.h"
-#include "io/median.h"
-#include "io/numbers.h"
-#include "models/model_file.h"
+#include "io/numbers/median.h"
+#include "io/numbers/numbers.h"
+#include "models/files/model_file.h"
 
 extern char** environ;
 

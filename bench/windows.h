@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "data/samples/windows.h"
-#include "io/random.h"
-#include "models/supertac_model.h"
+#include "data/windows/windows.h"
+#include "io/numbers/random.h"
+#include "models/networks/supertac_model.h"
 
 namespace supertac::bench {
 

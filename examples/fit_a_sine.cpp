@@ -7,7 +7,7 @@
 #include "autograd/adam.h"
 #include "autograd/ops/losses.h"
 #include "layers/linear.h"
-#include "models/schedule.h"
+#include "models/training/schedule.h"
 
 using namespace supertac;
 

@@ -12,9 +12,9 @@
 #include <string>
 
 #include "data/recordings/recording.h"
-#include "data/samples/live_window.h"
-#include "io/images.h"
-#include "models/model_file.h"
+#include "data/windows/live_window.h"
+#include "io/images/images.h"
+#include "models/files/model_file.h"
 
 using namespace supertac;
 

@@ -13,10 +13,10 @@
 #include "autograd/ops/losses.h"
 #include "autograd/ops/shaping.h"
 #include "autograd/ops/vae.h"
-#include "io/images.h"
+#include "io/images/images.h"
 #include "layers/convolution.h"
 #include "layers/linear.h"
-#include "models/schedule.h"
+#include "models/training/schedule.h"
 
 using namespace supertac;
 

@@ -4,7 +4,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

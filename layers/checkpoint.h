@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "io/safetensors.h"
+#include "io/files/safetensors.h"
 #include "layers/module.h"
 
 namespace supertac {

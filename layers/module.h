@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "autograd/variable.h"
-#include "io/random.h"
+#include "io/numbers/random.h"
 
 namespace supertac {
 

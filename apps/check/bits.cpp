@@ -1,11 +1,11 @@
 #include <array>
 
 #include "apps/check/machine.h"
-#include "apps/common/program.h"
+#include "apps/common/command_line/program.h"
 #include "autograd/kernels/fast/isa.h"
 #include "data/recordings/simulator.h"
-#include "io/sha256.h"
-#include "models/prepared/prepared.h"
+#include "io/numbers/sha256.h"
+#include "models/inference/prepared.h"
 #include "models/training/trainer.h"
 
 namespace supertac {

@@ -1,13 +1,13 @@
 #include <filesystem>
 
 #include "apps/check/machine.h"
-#include "apps/common/program.h"
-#include "apps/common/provenance.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/output/provenance.h"
 #include "data/recordings/recording.h"
-#include "io/file.h"
-#include "io/json.h"
-#include "io/provenance.h"
-#include "io/text.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
+#include "io/files/provenance.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {

@@ -14,9 +14,9 @@
 #include "autograd/ops/shaping.h"
 #include "autograd/ops/vae.h"
 #include "layers/residual.h"
-#include "models/classifier.h"
-#include "models/frame_model.h"
-#include "models/loss.h"
+#include "models/networks/classifier.h"
+#include "models/networks/frame_model.h"
+#include "models/training/loss.h"
 
 namespace supertac {
 namespace {

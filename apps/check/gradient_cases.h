@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "models/gradient_checker.h"
+#include "autograd/gradient_checker.h"
 
 namespace supertac {
 

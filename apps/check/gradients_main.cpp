@@ -4,10 +4,10 @@
 
 #include "apps/check/gradient_cases.h"
 #include "apps/check/planted_error.h"
-#include "apps/common/program.h"
-#include "apps/common/progress.h"
-#include "apps/common/signals.h"
-#include "io/numbers.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/running/progress.h"
+#include "apps/common/running/signals.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 

@@ -5,12 +5,12 @@
 #include <filesystem>
 #include <fstream>
 
-#include "apps/common/program.h"
-#include "apps/common/threads.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/running/threads.h"
 #include "autograd/kernels/fast/isa.h"
-#include "hardware/port_list.h"
-#include "hardware/rig.h"
-#include "io/numbers.h"
+#include "data/sensors/rig.h"
+#include "hardware/ports/port_list.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

@@ -4,22 +4,22 @@
 #include <chrono>
 #include <filesystem>
 
-#include "apps/common/command_words.h"
-#include "apps/common/program.h"
-#include "apps/common/progress.h"
-#include "apps/common/provenance.h"
-#include "apps/common/signals.h"
+#include "apps/common/command_line/command_words.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/output/provenance.h"
+#include "apps/common/running/progress.h"
+#include "apps/common/running/signals.h"
 #include "apps/train/ledger_file.h"
 #include "apps/train/run_folder.h"
 #include "apps/train/training_options.h"
 #include "apps/train/training_task.h"
 #include "data/recordings/recording.h"
-#include "io/file.h"
-#include "io/hash.h"
-#include "io/json.h"
-#include "io/numbers.h"
-#include "io/provenance.h"
-#include "io/text.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
+#include "io/files/provenance.h"
+#include "io/numbers/hash.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {

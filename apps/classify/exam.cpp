@@ -6,9 +6,9 @@
 
 #include "data/plates/plate_file.h"
 #include "data/plates/truth.h"
-#include "data/samples/split.h"
-#include "io/numbers.h"
-#include "io/text.h"
+#include "data/windows/split.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "data/samples/windows.h"
-#include "models/model_file.h"
+#include "data/windows/windows.h"
+#include "models/files/model_file.h"
 
 namespace supertac {
 

@@ -5,12 +5,12 @@
 #include <stdexcept>
 #include <variant>
 
-#include "apps/common/signals.h"
+#include "apps/common/running/signals.h"
 #include "autograd/adam.h"
 #include "autograd/ops/losses.h"
-#include "data/samples/batching.h"
-#include "models/classifier_file.h"
-#include "models/schedule.h"
+#include "data/windows/batching.h"
+#include "models/files/classifier_file.h"
+#include "models/training/schedule.h"
 
 namespace supertac {
 namespace {

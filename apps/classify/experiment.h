@@ -7,7 +7,7 @@
 
 #include "apps/classify/exam.h"
 #include "apps/classify/views.h"
-#include "data/samples/augment.h"
+#include "data/windows/augment.h"
 
 namespace supertac {
 

@@ -2,7 +2,7 @@
 
 #include <numeric>
 
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "data/scores/baselines.h"
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

@@ -5,8 +5,8 @@
 #include <span>
 #include <string>
 
-#include "data/samples/windows.h"
-#include "models/supertac_model.h"
+#include "data/windows/windows.h"
+#include "models/networks/supertac_model.h"
 
 namespace supertac {
 

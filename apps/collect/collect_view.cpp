@@ -7,12 +7,12 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "apps/common/signals.h"
+#include "apps/common/running/signals.h"
 #include "apps/web/encode.h"
 #include "apps/web/pages.h"
 #include "data/plates/truth.h"
-#include "hardware/rig.h"
-#include "io/numbers.h"
+#include "data/sensors/rig.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "apps/web/web_server.h"
 #include "data/plates/plate.h"
-#include "hardware/palpation_recorder.h"
+#include "hardware/collection/palpation_recorder.h"
 
 namespace supertac {
 

@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
-#include "hardware/port_list.h"
-#include "io/file.h"
+#include "hardware/ports/port_list.h"
+#include "io/files/file.h"
 
 namespace supertac {
 namespace {

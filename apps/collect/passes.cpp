@@ -2,13 +2,13 @@
 
 #include <filesystem>
 
-#include "apps/common/provenance.h"
+#include "apps/common/output/provenance.h"
 #include "data/plates/plate_file.h"
 #include "data/recordings/recording.h"
-#include "hardware/errors.h"
-#include "io/file.h"
-#include "io/json.h"
-#include "io/numbers.h"
+#include "hardware/ports/errors.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

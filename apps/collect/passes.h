@@ -2,9 +2,9 @@
 
 #include <string>
 
-#include "apps/common/arguments.h"
-#include "apps/common/output_folder.h"
-#include "hardware/collection.h"
+#include "apps/common/command_line/arguments.h"
+#include "apps/common/output/output_folder.h"
+#include "hardware/collection/collection.h"
 
 namespace supertac {
 

@@ -2,13 +2,13 @@
 
 #include <map>
 
-#include "data/samples/split.h"
-#include "io/captions.h"
-#include "io/images.h"
-#include "io/numbers.h"
-#include "io/safetensors.h"
-#include "models/evaluation.h"
-#include "models/interval.h"
+#include "data/windows/split.h"
+#include "io/files/safetensors.h"
+#include "io/images/captions.h"
+#include "io/images/images.h"
+#include "io/numbers/numbers.h"
+#include "models/inference/evaluation.h"
+#include "models/inference/interval.h"
 
 namespace supertac {
 namespace {

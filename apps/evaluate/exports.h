@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "apps/common/output_folder.h"
-#include "data/samples/windows.h"
-#include "models/committee.h"
+#include "apps/common/output/output_folder.h"
+#include "data/windows/windows.h"
+#include "models/inference/committee.h"
 
 namespace supertac {
 
@@ -34,7 +34,7 @@ class OutputsFile {
 void write_pictures(const Committee& model, double interval_factor, const WindowSet& windows,
                     std::span<const std::uint32_t> test, OutputFolder& folder);
 
-/// Windows as pairs (data/samples/pairs.h): the last frame as a network sees it, [N,channels,rows,columns];
+/// Windows as pairs (data/windows/pairs.h): the last frame as a network sees it, [N,channels,rows,columns];
 /// the truth [N,1,H,W]; and as group [N] the number of the pass. Throws FileError.
 void write_pairs(const WindowSet& windows, std::span<const std::uint32_t> indices, const std::string& path);
 

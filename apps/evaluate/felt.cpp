@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "data/scores/metrics.h"
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "data/samples/windows.h"
+#include "data/windows/windows.h"
 
 namespace supertac {
 

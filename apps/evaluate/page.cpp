@@ -7,10 +7,10 @@
 #include "apps/web/chart.h"
 #include "apps/web/encode.h"
 #include "apps/web/result_page.h"
-#include "data/samples/split.h"
-#include "io/images.h"
-#include "io/numbers.h"
-#include "models/evaluation.h"
+#include "data/windows/split.h"
+#include "io/images/images.h"
+#include "io/numbers/numbers.h"
+#include "models/inference/evaluation.h"
 
 namespace supertac {
 namespace {

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "apps/evaluate/scoring.h"
-#include "data/samples/windows.h"
 #include "data/scores/metrics.h"
-#include "models/committee.h"
+#include "data/windows/windows.h"
+#include "models/inference/committee.h"
 
 namespace supertac {
 

@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <map>
 
-#include "apps/common/measure.h"
-#include "apps/common/program.h"
-#include "apps/common/provenance.h"
-#include "apps/common/remarks.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/output/provenance.h"
+#include "apps/common/output/remarks.h"
+#include "apps/common/running/measure.h"
 #include "apps/evaluate/scoring.h"
 #include "data/plates/truth.h"
-#include "data/samples/signal_remarks.h"
 #include "data/scores/metrics.h"
-#include "io/numbers.h"
-#include "io/safetensors.h"
+#include "data/windows/signal_remarks.h"
+#include "io/files/safetensors.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

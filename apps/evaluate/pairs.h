@@ -1,6 +1,6 @@
 #pragma once
 
-#include "apps/common/arguments.h"
+#include "apps/common/command_line/arguments.h"
 
 namespace supertac {
 

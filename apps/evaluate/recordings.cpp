@@ -3,23 +3,23 @@
 #include <cmath>
 #include <optional>
 
-#include "apps/common/measure.h"
-#include "apps/common/program.h"
-#include "apps/common/progress.h"
-#include "apps/common/provenance.h"
-#include "apps/common/remarks.h"
-#include "apps/common/version.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/command_line/version.h"
+#include "apps/common/output/provenance.h"
+#include "apps/common/output/remarks.h"
+#include "apps/common/running/measure.h"
+#include "apps/common/running/progress.h"
 #include "apps/evaluate/exports.h"
 #include "apps/evaluate/felt.h"
 #include "apps/evaluate/page.h"
 #include "apps/evaluate/scoring.h"
 #include "apps/evaluate/trust.h"
 #include "data/recordings/recording.h"
-#include "data/samples/signal_remarks.h"
 #include "data/scores/metrics.h"
-#include "io/file.h"
-#include "io/numbers.h"
-#include "io/text.h"
+#include "data/windows/signal_remarks.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {

@@ -3,11 +3,11 @@
 #include <limits>
 #include <stdexcept>
 
-#include "apps/common/progress.h"
-#include "apps/common/signals.h"
-#include "io/numbers.h"
-#include "io/text.h"
-#include "models/evaluation.h"
+#include "apps/common/running/progress.h"
+#include "apps/common/running/signals.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+#include "models/inference/evaluation.h"
 
 namespace supertac {
 namespace {

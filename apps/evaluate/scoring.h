@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "apps/common/arguments.h"
-#include "data/samples/split.h"
+#include "apps/common/command_line/arguments.h"
 #include "data/scores/baselines.h"
-#include "models/committee.h"
+#include "data/windows/split.h"
+#include "models/inference/committee.h"
 
 namespace supertac {
 

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <numeric>
 
-#include "data/samples/signal_features.h"
 #include "data/scores/metrics.h"
-#include "io/numbers.h"
-#include "models/interval.h"
+#include "data/windows/signal_features.h"
+#include "io/numbers/numbers.h"
+#include "models/inference/interval.h"
 
 namespace supertac {
 namespace {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "apps/evaluate/scoring.h"
-#include "data/samples/windows.h"
-#include "models/model_file.h"
+#include "data/windows/windows.h"
+#include "models/files/model_file.h"
 
 namespace supertac {
 

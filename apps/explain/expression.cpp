@@ -7,7 +7,7 @@
 
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

@@ -11,7 +11,7 @@
 #include "autograd/kernels/elementwise.h"
 #include "autograd/reverse_watch.h"
 #include "autograd/trace.h"
-#include "io/file.h"
+#include "io/files/file.h"
 
 namespace supertac {
 namespace {

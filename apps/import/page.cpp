@@ -1,9 +1,9 @@
 #include "apps/import/page.h"
 
-#include "apps/common/version.h"
+#include "apps/common/command_line/version.h"
 #include "apps/web/result_page.h"
 #include "data/registration/registration_picture.h"
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

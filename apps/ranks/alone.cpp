@@ -1,5 +1,5 @@
 // together() of a build without MPI.
-#include "apps/common/launch.h"
+#include "apps/common/running/launch.h"
 #include "apps/ranks/together.h"
 
 namespace supertac {

@@ -8,8 +8,8 @@
 #include <ctime>
 #include <thread>
 
-#include "apps/common/signals.h"
-#include "io/numbers.h"
+#include "apps/common/running/signals.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

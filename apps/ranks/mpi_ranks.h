@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/common/launch.h"
+#include "apps/common/running/launch.h"
 #include "apps/ranks/end_watch.h"
 #include "models/training/ranks.h"
 

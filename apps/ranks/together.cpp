@@ -3,9 +3,9 @@
 #include <chrono>
 #include <thread>
 
-#include "apps/common/launch.h"
-#include "apps/common/program.h"
-#include "apps/common/signals.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/running/launch.h"
+#include "apps/common/running/signals.h"
 #include "apps/ranks/mpi_ranks.h"
 
 namespace supertac {

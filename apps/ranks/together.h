@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "apps/common/arguments.h"
+#include "apps/common/command_line/arguments.h"
 #include "models/training/ranks.h"
 
 namespace supertac {

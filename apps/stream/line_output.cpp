@@ -12,10 +12,10 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "apps/common/signals.h"
-#include "hardware/serial_port.h"
-#include "io/numbers.h"
-#include "io/text.h"
+#include "apps/common/running/signals.h"
+#include "hardware/ports/serial_port.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {

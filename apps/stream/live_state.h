@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "data/plates/taxel_array.h"
+#include "data/sensors/taxel_array.h"
 
 namespace supertac {
 

@@ -9,7 +9,7 @@
 #include <array>
 #include <filesystem>
 
-#include "io/file.h"
+#include "io/files/file.h"
 
 namespace supertac {
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "apps/stream/seen.h"
-#include "io/safetensors.h"
+#include "io/files/safetensors.h"
 
 namespace supertac {
 

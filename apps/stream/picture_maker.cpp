@@ -4,9 +4,9 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "data/samples/signal_features.h"
-#include "io/numbers.h"
-#include "models/interval.h"
+#include "data/windows/signal_features.h"
+#include "io/numbers/numbers.h"
+#include "models/inference/interval.h"
 
 namespace supertac {
 namespace {

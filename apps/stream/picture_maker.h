@@ -6,8 +6,8 @@
 
 #include "apps/stream/seen.h"
 #include "apps/stream/sensor_source.h"
-#include "data/samples/live_window.h"
-#include "models/committee.h"
+#include "data/windows/live_window.h"
+#include "models/inference/committee.h"
 
 namespace supertac {
 
@@ -27,11 +27,11 @@ class PictureMaker {
   /// Of the newest picture: half the width of each pixel's 90 % interval; empty when the model does not say.
   std::span<const float> half_widths() const { return half_widths_; }
   /// How far the window that it was drawn from is from those of training, and where "unlike" begins
-  /// (models/novelty.h); nothing when the model does not say.
+  /// (models/inference/novelty.h); nothing when the model does not say.
   std::optional<double> distance() const { return distance_; }
   std::optional<double> distance_limit() const;
   bool unlike_training() const { return distance_ && *distance_ > *distance_limit(); }
-  /// Whether it is felt and not recalled (models/committee.h); nothing of models of one kind.
+  /// Whether it is felt and not recalled (models/inference/committee.h); nothing of models of one kind.
   std::optional<bool> unfamiliar() const;
 
   /// Takes what the array has felt in the last moments (kRestS) for "nothing": each signal is moved so that

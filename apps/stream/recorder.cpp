@@ -4,7 +4,7 @@
 #include <ctime>
 #include <utility>
 
-#include "io/file.h"
+#include "io/files/file.h"
 
 namespace supertac {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <span>
 
-#include "data/plates/taxel_array.h"
+#include "data/sensors/taxel_array.h"
 
 namespace supertac {
 
@@ -22,8 +22,8 @@ struct Seen {
   double time_s = 0;         ///< since the stream's first frame
   std::span<const float> volts, picture;
   std::span<const float> half_widths;  ///< of each pixel's 90 % interval; empty when the model does not say
-  std::optional<double> distance;      ///< of its window from those of training (models/novelty.h)
-  std::optional<bool> unfamiliar;      ///< whether it is felt and not recalled (models/committee.h)
+  std::optional<double> distance;      ///< of its window from those of training (models/inference/novelty.h)
+  std::optional<bool> unfamiliar;      ///< whether it is felt and not recalled (models/inference/committee.h)
 };
 
 }  // namespace supertac

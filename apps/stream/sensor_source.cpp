@@ -5,12 +5,12 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "hardware/capture.h"
-#include "hardware/errors.h"
-#include "hardware/port_list.h"
-#include "hardware/serial_port.h"
-#include "io/file.h"
-#include "io/median.h"
+#include "hardware/collection/capture.h"
+#include "hardware/ports/errors.h"
+#include "hardware/ports/port_list.h"
+#include "hardware/ports/serial_port.h"
+#include "io/files/file.h"
+#include "io/numbers/median.h"
 
 namespace supertac {
 namespace {

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "data/recordings/recording.h"
-#include "hardware/tactile_board.h"
+#include "hardware/boards/tactile_board.h"
 
 namespace supertac {
 
@@ -24,7 +24,7 @@ class SensorSource {
  public:
   virtual ~SensorSource() = default;
   /// The next frame; nothing when none came within `wait_s`, or ended(). Throws what went wrong with a board
-  /// (hardware/errors.h) after the frames before it.
+  /// (hardware/ports/errors.h) after the frames before it.
   virtual std::optional<SensorFrame> next(double wait_s) = 0;
   virtual bool ended() const = 0;
   virtual BoardCounters counters() = 0;

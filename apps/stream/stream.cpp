@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "apps/common/signals.h"
-#include "hardware/serial_port.h"
-#include "io/numbers.h"
+#include "apps/common/running/signals.h"
+#include "hardware/ports/serial_port.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

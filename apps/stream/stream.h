@@ -14,7 +14,7 @@
 #include "apps/stream/picture_maker.h"
 #include "apps/stream/terminal_view.h"
 #include "apps/stream/web_view.h"
-#include "models/classifier_file.h"
+#include "models/files/classifier_file.h"
 
 namespace supertac {
 

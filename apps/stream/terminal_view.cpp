@@ -10,7 +10,7 @@
 #include <cstdlib>
 #include <span>
 
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "apps/web/encode.h"
 #include "apps/web/pages.h"
-#include "hardware/rig.h"
+#include "data/sensors/rig.h"
 
 namespace supertac {
 

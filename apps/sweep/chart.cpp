@@ -2,7 +2,7 @@
 
 #include "apps/web/chart.h"
 #include "apps/web/result_page.h"
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "apps/common/arguments.h"
-#include "io/numbers.h"
+#include "apps/common/command_line/arguments.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/common/arguments.h"
-#include "models/supertac_model.h"
+#include "apps/common/command_line/arguments.h"
+#include "models/networks/supertac_model.h"
 
 namespace supertac {
 

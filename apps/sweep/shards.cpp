@@ -6,9 +6,9 @@
 
 #include "apps/sweep/sweep.h"
 #include "apps/sweep/table.h"
-#include "io/file.h"
-#include "io/json.h"
-#include "io/numbers.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/common/arguments.h"
+#include "apps/common/command_line/arguments.h"
 #include "apps/sweep/grid.h"
 
 namespace supertac {

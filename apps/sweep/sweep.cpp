@@ -8,16 +8,16 @@
 #include <thread>
 #include <utility>
 
-#include "apps/common/measure.h"
-#include "apps/common/signals.h"
-#include "apps/common/version.h"
+#include "apps/common/command_line/version.h"
+#include "apps/common/running/measure.h"
+#include "apps/common/running/signals.h"
 #include "apps/sweep/shards.h"
 #include "apps/train/training_options.h"
-#include "io/file.h"
-#include "io/json.h"
-#include "io/numbers.h"
-#include "models/cost.h"
-#include "models/evaluation.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
+#include "io/numbers/numbers.h"
+#include "models/inference/evaluation.h"
+#include "models/networks/cost.h"
 
 namespace supertac {
 

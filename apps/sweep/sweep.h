@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "apps/common/arguments.h"
+#include "apps/common/command_line/arguments.h"
 #include "apps/sweep/grid.h"
 #include "apps/sweep/table.h"
 #include "apps/train/training_run.h"
 #include "data/scores/metrics.h"
-#include "io/folder_lock.h"
+#include "io/files/folder_lock.h"
 
 namespace supertac {
 

@@ -6,9 +6,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "io/file.h"
-#include "io/numbers.h"
-#include "io/text.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {

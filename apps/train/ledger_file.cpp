@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "io/file.h"
+#include "io/files/file.h"
 
 namespace supertac {
 namespace {

@@ -5,8 +5,8 @@
 #include <sstream>
 
 #include "apps/train/report.h"
-#include "io/file.h"
-#include "io/numbers.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

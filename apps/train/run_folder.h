@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "io/folder_lock.h"
+#include "io/files/folder_lock.h"
 #include "models/training/trainer.h"
 
 namespace supertac {

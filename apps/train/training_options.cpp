@@ -4,11 +4,11 @@
 #include <cmath>
 #include <optional>
 
-#include "apps/common/progress.h"
+#include "apps/common/running/progress.h"
 #include "data/recordings/signal_range.h"
-#include "data/samples/random_passes.h"
-#include "io/numbers.h"
-#include "models/interval.h"
+#include "data/windows/random_passes.h"
+#include "io/numbers/numbers.h"
+#include "models/inference/interval.h"
 
 namespace supertac {
 

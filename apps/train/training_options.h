@@ -1,9 +1,9 @@
 // The options that programs which train have in common, and what they mean.
 #pragma once
 
-#include "apps/common/arguments.h"
-#include "data/samples/split.h"
-#include "models/objective.h"
+#include "apps/common/command_line/arguments.h"
+#include "data/windows/split.h"
+#include "models/training/objective.h"
 
 namespace supertac {
 

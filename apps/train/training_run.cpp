@@ -3,14 +3,14 @@
 #include <optional>
 #include <utility>
 
-#include "apps/common/program.h"
-#include "apps/common/progress.h"
-#include "apps/common/provenance.h"
-#include "apps/common/signals.h"
-#include "apps/common/version.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/command_line/version.h"
+#include "apps/common/output/provenance.h"
+#include "apps/common/running/progress.h"
+#include "apps/common/running/signals.h"
 #include "data/plates/truth.h"
-#include "io/numbers.h"
-#include "models/evaluation.h"
+#include "io/numbers/numbers.h"
+#include "models/inference/evaluation.h"
 
 namespace supertac {
 namespace {

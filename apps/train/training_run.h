@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "apps/common/arguments.h"
+#include "apps/common/command_line/arguments.h"
 #include "apps/train/ledger_file.h"
 #include "apps/train/run_folder.h"
 #include "apps/train/training_task.h"

@@ -1,7 +1,7 @@
 #include "apps/train/training_task.h"
 
 #include "apps/train/training_options.h"
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "apps/common/arguments.h"
-#include "data/samples/split.h"
-#include "models/objective.h"
+#include "apps/common/command_line/arguments.h"
+#include "data/windows/split.h"
+#include "models/training/objective.h"
 
 namespace supertac {
 

@@ -1,7 +1,7 @@
 cmake_minimum_required(VERSION 3.22)
 # Run at build time: writes OUTPUT, which defines supertac::NAME(): frame.html with TITLE, CLASS of the body, BODY, STYLES and
 # SCRIPTS in it.
-set(folder ${CMAKE_CURRENT_LIST_DIR})
+set(folder ${CMAKE_CURRENT_LIST_DIR}/pages)
 file(READ ${folder}/frame.html page)
 file(READ ${folder}/${BODY} body)
 foreach(kind STYLES SCRIPTS)

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "io/images.h"
+#include "io/images/images.h"
 
 namespace supertac {
 

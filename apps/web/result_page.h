@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/images.h"
+#include "io/images/images.h"
 
 namespace supertac {
 

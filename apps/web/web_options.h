@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "apps/common/arguments.h"
+#include "apps/common/command_line/arguments.h"
 #include "apps/web/web_server.h"
 
 namespace supertac {

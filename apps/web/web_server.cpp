@@ -19,7 +19,7 @@
 #include <utility>
 
 #include "apps/web/encode.h"
-#include "io/text.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {

@@ -17,12 +17,12 @@
 
 #include "bench/fma_peak.h"
 #include "bench/windows.h"
-#include "io/median.h"
-#include "io/numbers.h"
-#include "io/safetensors.h"
-#include "models/cost.h"
-#include "models/model_file.h"
-#include "models/prepared/prepared.h"
+#include "io/files/safetensors.h"
+#include "io/numbers/median.h"
+#include "io/numbers/numbers.h"
+#include "models/files/model_file.h"
+#include "models/inference/prepared.h"
+#include "models/networks/cost.h"
 #include "models/training/trainer.h"
 
 namespace supertac {

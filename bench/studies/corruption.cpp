@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "hardware/rig.h"
-#include "io/random.h"
+#include "data/sensors/rig.h"
+#include "io/numbers/random.h"
 
 namespace supertac {
 namespace {

@@ -4,20 +4,20 @@
 #include <array>
 #include <numeric>
 
-#include "apps/common/program.h"
-#include "apps/common/progress.h"
-#include "apps/common/signals.h"
-#include "apps/common/version.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/command_line/version.h"
+#include "apps/common/running/progress.h"
+#include "apps/common/running/signals.h"
 #include "bench/studies/corruption.h"
-#include "data/samples/levelling.h"
-#include "data/samples/signal_features.h"
-#include "data/samples/split.h"
 #include "data/scores/metrics.h"
-#include "io/file.h"
-#include "io/numbers.h"
-#include "io/text.h"
-#include "models/evaluation.h"
-#include "models/interval.h"
+#include "data/windows/levelling.h"
+#include "data/windows/signal_features.h"
+#include "data/windows/split.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+#include "models/inference/evaluation.h"
+#include "models/inference/interval.h"
 
 namespace supertac {
 namespace {

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Plates never felt, and silence: a generalist learns from real passes and from random plates, a specialist from real
-# passes, and both together recall or feel (models/committee.h). Leave one plate out over all real plates, the four known
+# passes, and both together recall or feel (models/inference/committee.h). Leave one plate out over all real plates, the four known
 # plates on the unseen trial, and simulated plates that no training drew. Blind protocol (bench/README.md): choices were
 # made on trial 1; this script is what looks at trial 2.
 #   bench/studies/generalist.sh TEXT_DIR OUT_DIR [BIN_DIR] [SEEDS]

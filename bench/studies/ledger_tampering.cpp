@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "data/recordings/simulator.h"
-#include "io/random.h"
+#include "io/numbers/random.h"
 #include "layers/checkpoint.h"
 #include "models/training/ledger.h"
 

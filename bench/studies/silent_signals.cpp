@@ -5,15 +5,15 @@
 #include <cmath>
 #include <numeric>
 
-#include "apps/common/program.h"
-#include "apps/common/signals.h"
-#include "apps/common/version.h"
-#include "data/samples/levelling.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/command_line/version.h"
+#include "apps/common/running/signals.h"
 #include "data/scores/metrics.h"
-#include "io/file.h"
-#include "io/numbers.h"
-#include "io/random.h"
-#include "models/evaluation.h"
+#include "data/windows/levelling.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/random.h"
+#include "models/inference/evaluation.h"
 
 namespace supertac {
 namespace {

@@ -6,13 +6,13 @@
 #include <fstream>
 #include <set>
 
-#include "apps/common/program.h"
-#include "apps/common/progress.h"
-#include "apps/common/signals.h"
-#include "apps/common/version.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/command_line/version.h"
+#include "apps/common/running/progress.h"
+#include "apps/common/running/signals.h"
 #include "data/recordings/simulator.h"
-#include "io/file.h"
-#include "io/numbers.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
 #include "models/training/trainer.h"
 
 namespace supertac {

@@ -11,11 +11,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "apps/common/measure.h"
-#include "apps/common/program.h"
-#include "apps/common/progress.h"
-#include "apps/common/signals.h"
-#include "apps/common/version.h"
+#include "apps/common/command_line/program.h"
+#include "apps/common/command_line/version.h"
+#include "apps/common/running/measure.h"
+#include "apps/common/running/progress.h"
+#include "apps/common/running/signals.h"
 #include "autograd/adam.h"
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
@@ -23,9 +23,9 @@
 #include "autograd/ops/max_pool.h"
 #include "autograd/ops/shaping.h"
 #include "data/plates/truth.h"
-#include "data/samples/batching.h"
-#include "data/samples/pairs.h"
 #include "data/scores/metrics.h"
+#include "data/windows/batching.h"
+#include "data/windows/pairs.h"
 #include "layers/convolution.h"
 #include "layers/linear.h"
 

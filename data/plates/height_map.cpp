@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "io/file.h"
-#include "io/median.h"
-#include "io/numbers.h"
+#include "io/files/file.h"
+#include "io/numbers/median.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

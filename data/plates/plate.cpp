@@ -9,7 +9,7 @@
 
 #include "data/plates/height_map.h"
 #include "data/plates/random_plate.h"
-#include "io/same_bits.h"
+#include "io/numbers/same_bits.h"
 
 namespace supertac {
 

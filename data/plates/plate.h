@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "data/plates/surface.h"
-#include "hardware/rig.h"
+#include "data/sensors/rig.h"
 
 namespace supertac {
 

@@ -4,8 +4,8 @@
 #include <stdexcept>
 
 #include "data/plates/stl.h"
-#include "io/file.h"
-#include "io/text.h"
+#include "io/files/file.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 

@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "io/numbers.h"
-#include "io/random.h"
-#include "io/same_bits.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/random.h"
+#include "io/numbers/same_bits.h"
 
 namespace supertac {
 namespace {

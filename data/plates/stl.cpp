@@ -7,9 +7,9 @@
 #include <limits>
 #include <stdexcept>
 
-#include "io/file.h"
-#include "io/numbers.h"
-#include "io/text.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "data/plates/plate.h"
-#include "data/plates/taxel_array.h"
+#include "data/sensors/taxel_array.h"
 
 namespace supertac {
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "io/hash.h"
-#include "io/random.h"
-#include "io/same_bits.h"
+#include "io/numbers/hash.h"
+#include "io/numbers/random.h"
+#include "io/numbers/same_bits.h"
 
 namespace supertac {
 namespace {

@@ -8,12 +8,12 @@
 #include <stdexcept>
 #include <utility>
 
-#include "io/file.h"
-#include "io/json.h"
-#include "io/numbers.h"
-#include "io/provenance.h"
-#include "io/sha256.h"
-#include "io/text.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
+#include "io/files/provenance.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/sha256.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {

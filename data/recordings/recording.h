@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "data/plates/taxel_array.h"
-#include "io/safetensors.h"
+#include "data/sensors/taxel_array.h"
+#include "io/files/safetensors.h"
 
 namespace supertac {
 
@@ -32,9 +32,9 @@ struct Recording {
 /// Reads a safetensors file with tensors time_s F64 [n], volts F32 [n,signals] and, where known,
 /// position_mm F32 [n,2] and lift_mm F32 [n]. Metadata "array" says what the signals are, {"rows": 6,
 /// "columns": 6, "pitch_mm": 2, "channels": 1}; without it they are the rig's 4x4 taxels at 3 mm. Throws
-/// FileError when the file is damaged (io/safetensors.h), is no recording, or breaks a rule of Recording:
-/// sizes that do not match, values that are not finite (position_mm may be NaN), time stamps that do not
-/// increase, a speed, a moving average (metadata "filter_s", s) or a time that no rig has.
+/// FileError when the file is damaged (io/files/safetensors.h), is no recording, or breaks a rule of
+/// Recording: sizes that do not match, values that are not finite (position_mm may be NaN), time stamps that
+/// do not increase, a speed, a moving average (metadata "filter_s", s) or a time that no rig has.
 Recording read_recording(const std::string& path);
 /// The same of a file that has been read.
 Recording recording_of(const SafetensorsFile& file);
@@ -54,7 +54,7 @@ std::vector<std::string> list_recordings(const std::string& folder);
 
 /// Names the content of a folder's recordings (of these plates; all when empty), whatever windows are cut
 /// from them, however the files are called and whoever made them: SHA-256 over their sorted content hashes
-/// (io/provenance.h). Throws FileError.
+/// (io/files/provenance.h). Throws FileError.
 std::string hash_of_recordings(const std::string& folder, const std::vector<std::string>& plates);
 /// The same from the content hashes.
 std::string hash_of_contents(std::vector<std::string> hashes);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "io/numbers.h"
-#include "io/random.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/random.h"
 
 namespace supertac {
 namespace {

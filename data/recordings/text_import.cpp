@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string_view>
 
-#include "io/file.h"
-#include "io/numbers.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

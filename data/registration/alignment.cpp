@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "data/registration/profile.h"
-#include "io/median.h"
+#include "io/numbers/median.h"
 
 namespace supertac {
 namespace {

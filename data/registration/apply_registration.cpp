@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "data/recordings/simulator.h"
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

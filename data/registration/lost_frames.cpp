@@ -7,8 +7,8 @@
 #include <numeric>
 #include <span>
 
-#include "io/median.h"
-#include "io/numbers.h"
+#include "io/numbers/median.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "data/registration/contacts.h"
 #include "data/registration/lost_frames.h"
-#include "io/numbers.h"
-#include "io/same_bits.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/same_bits.h"
 
 namespace supertac {
 namespace {

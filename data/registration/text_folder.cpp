@@ -12,7 +12,7 @@
 #include "data/registration/alignment.h"
 #include "data/registration/apply_registration.h"
 #include "data/registration/lost_frames.h"
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

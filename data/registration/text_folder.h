@@ -8,7 +8,7 @@
 #include "data/plates/plate.h"
 #include "data/recordings/text_import.h"
 #include "data/registration/registration.h"
-#include "io/file.h"
+#include "io/files/file.h"
 
 namespace supertac {
 

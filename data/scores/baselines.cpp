@@ -4,8 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "data/samples/split.h"
 #include "data/scores/ridge.h"
+#include "data/windows/split.h"
 
 namespace supertac {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "data/samples/windows.h"
+#include "data/windows/windows.h"
 
 namespace supertac {
 

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "data/plates/truth.h"
-#include "io/random.h"
-#include "io/same_bits.h"
+#include "io/numbers/random.h"
+#include "io/numbers/same_bits.h"
 
 namespace supertac {
 namespace {

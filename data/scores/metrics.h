@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "data/plates/taxel_array.h"
 #include "data/plates/truth.h"
 #include "data/scores/phase_correlation.h"
+#include "data/sensors/taxel_array.h"
 
 namespace supertac {
 

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "io/same_bits.h"
+#include "io/numbers/same_bits.h"
 
 namespace supertac {
 namespace {

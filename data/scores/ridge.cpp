@@ -8,7 +8,7 @@
 #include <functional>
 #include <stdexcept>
 
-#include "data/samples/split.h"
+#include "data/windows/split.h"
 
 namespace supertac {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "hardware/motion_model.h"
+#include "hardware/printers/motion_model.h"
 
 namespace supertac {
 

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <deque>
 
-#include "hardware/marlin_line.h"
+#include "hardware/printers/marlin_line.h"
 
 namespace supertac {
 

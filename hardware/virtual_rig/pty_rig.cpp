@@ -12,10 +12,10 @@
 #include <algorithm>
 #include <array>
 
-#include "hardware/errors.h"
-#include "hardware/rig.h"
-#include "hardware/serial_port.h"
-#include "hardware/serial_termios.h"
+#include "data/sensors/rig.h"
+#include "hardware/ports/errors.h"
+#include "hardware/ports/serial_port.h"
+#include "hardware/ports/serial_termios.h"
 
 namespace supertac {
 namespace {

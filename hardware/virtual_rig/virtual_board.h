@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "hardware/board_frame.h"
-#include "hardware/marlin_line.h"
+#include "hardware/boards/board_frame.h"
+#include "hardware/printers/marlin_line.h"
 #include "hardware/virtual_rig/faults.h"
 
 namespace supertac {

@@ -4,7 +4,7 @@
 #include <charconv>
 #include <utility>
 
-#include "hardware/marlin_line.h"
+#include "hardware/printers/marlin_line.h"
 #include "hardware/virtual_rig/marlin_texts.h"
 
 namespace supertac {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <optional>
 
-#include "hardware/marlin_line.h"
+#include "hardware/printers/marlin_line.h"
 #include "hardware/virtual_rig/marlin_texts.h"
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

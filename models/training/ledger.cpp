@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <fstream>
 
-#include "io/file.h"
-#include "io/json.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
 
 namespace supertac {
 namespace {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "io/sha256.h"
+#include "io/numbers/sha256.h"
 #include "models/training/trainer.h"
 
 namespace supertac {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
-#include "io/json.h"
+#include "io/files/json.h"
 
 namespace supertac {
 namespace {

@@ -5,15 +5,15 @@
 #include <utility>
 
 #include "autograd/ops/arithmetic.h"
-#include "data/samples/signal_features.h"
-#include "data/samples/split.h"
-#include "io/hash.h"
-#include "io/numbers.h"
+#include "data/windows/signal_features.h"
+#include "data/windows/split.h"
+#include "io/numbers/hash.h"
+#include "io/numbers/numbers.h"
 #include "layers/checkpoint.h"
-#include "models/diagnosis.h"
-#include "models/evaluation.h"
-#include "models/novelty.h"
-#include "models/prepared/ranges.h"
+#include "models/inference/evaluation.h"
+#include "models/inference/novelty.h"
+#include "models/inference/ranges.h"
+#include "models/training/diagnosis.h"
 
 namespace supertac {
 namespace {

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "autograd/kernels/elementwise.h"
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 #include "layers/checkpoint.h"
-#include "models/diagnosis.h"
+#include "models/training/diagnosis.h"
 
 namespace supertac {
 namespace {

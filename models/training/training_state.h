@@ -12,8 +12,8 @@
 
 #include "autograd/adam.h"
 #include "layers/module.h"
-#include "models/schedule.h"
 #include "models/training/ranks.h"
+#include "models/training/schedule.h"
 
 namespace supertac {
 

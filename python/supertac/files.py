@@ -1,4 +1,4 @@
-"""The project's one file format, safetensors, with the checks of io/safetensors.h that matter to a reader."""
+"""The project's one file format, safetensors, with the checks of io/files/safetensors.h that matter to a reader."""
 import json
 import pathlib
 import struct

@@ -10,7 +10,7 @@ from .files import read
 Pictures = collections.namedtuple("Pictures", "picture spread latents")
 Pictures.__doc__ = "[N,height,width] each, spread is None for a model without; latents [N,groups x latent]."
 
-# Of levelling (data/samples/levelling.h).
+# Of levelling (data/windows/levelling.h).
 BINS, LEAST_GAIN, REST_REMOVED, REST_SHARE, TOP_RANK = 256, np.float32(0.15), np.float32(0.5), 20, 3
 
 

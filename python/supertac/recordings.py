@@ -73,7 +73,7 @@ def _window(times, volts, end_s, timesteps, rate_hz):
 
 def windows(recording, timesteps, rate_hz, max_gap_s=0.05):
     """Times [N] and windows [N,timesteps,S] in volts, one for each frame that has a whole window behind it: what
-    supertac-stream draws (data/samples/live_window.h)."""
+    supertac-stream draws (data/windows/live_window.h)."""
     finite = np.isfinite(recording.volts).all(axis=1) & np.isfinite(recording.time_s)
     times, volts = recording.time_s[finite], recording.volts[finite]
     half_s = 0.5 * min(recording.period_s, 1 / rate_hz)

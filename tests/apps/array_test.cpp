@@ -4,9 +4,9 @@
 #include <nlohmann/json.hpp>
 
 #include "data/recordings/recording.h"
-#include "io/file.h"
-#include "io/safetensors.h"
-#include "models/model_file.h"
+#include "io/files/file.h"
+#include "io/files/safetensors.h"
+#include "models/files/model_file.h"
 #include "tests/apps/process.h"
 
 namespace supertac {

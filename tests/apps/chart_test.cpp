@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "apps/web/result_page.h"
-#include "io/numbers.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

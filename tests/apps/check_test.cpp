@@ -10,8 +10,8 @@
 #include "data/plates/plate_mesh.h"
 
 #include "data/recordings/recording.h"
-#include "io/file.h"
-#include "io/safetensors.h"
+#include "io/files/file.h"
+#include "io/files/safetensors.h"
 #include "tests/apps/simulated_data.h"
 
 namespace supertac {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <memory>
 
-#include "io/file.h"
-#include "io/json.h"
-#include "models/classifier_file.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
+#include "models/files/classifier_file.h"
 #include "tests/apps/process.h"
 #include "tests/io/temporary_folder.h"
 

@@ -1,7 +1,7 @@
 // The page of supertac-collect: it shows the run and can end it, and nothing else.
 #include <gtest/gtest.h>
 
-#include "io/json.h"
+#include "io/files/json.h"
 #include "tests/apps/collect_run.h"
 #include "tests/apps/http_client.h"
 

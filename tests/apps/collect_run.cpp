@@ -6,8 +6,8 @@
 #include <csignal>
 #include <stdexcept>
 
-#include "hardware/serial_port.h"
-#include "io/numbers.h"
+#include "hardware/ports/serial_port.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 

@@ -1,15 +1,15 @@
 // supertac-collect as a process on a virtual rig: how it ends, what it says, where the finger is left.
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <nlohmann/json.hpp>
 
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
 
-#include "hardware/serial_port.h"
-#include "io/file.h"
+#include "hardware/ports/serial_port.h"
+#include "io/files/file.h"
 #include "tests/apps/collect_run.h"
 
 namespace supertac {

@@ -1,12 +1,12 @@
 #include <gtest/gtest.h>
 
-#include "apps/common/arguments.h"
-#include "apps/common/command_words.h"
-#include "apps/common/nearest.h"
-#include "apps/common/output_folder.h"
-#include "apps/common/progress.h"
-#include "apps/common/threads.h"
-#include "io/file.h"
+#include "apps/common/command_line/arguments.h"
+#include "apps/common/command_line/command_words.h"
+#include "apps/common/command_line/nearest.h"
+#include "apps/common/output/output_folder.h"
+#include "apps/common/running/progress.h"
+#include "apps/common/running/threads.h"
+#include "io/files/file.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {

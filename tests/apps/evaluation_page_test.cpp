@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "data/recordings/simulator.h"
-#include "io/json.h"
-#include "models/model_file.h"
+#include "io/files/json.h"
+#include "models/files/model_file.h"
 #include "tests/apps/simulated_data.h"
 
 namespace supertac {

@@ -14,10 +14,10 @@
 #include <fstream>
 #include <ranges>
 
-#include "apps/common/arguments.h"
-#include "apps/common/outputs.h"
-#include "io/file.h"
-#include "io/folder_lock.h"
+#include "apps/common/command_line/arguments.h"
+#include "apps/common/output/outputs.h"
+#include "io/files/file.h"
+#include "io/files/folder_lock.h"
 #include "process.h"
 
 namespace supertac {

@@ -13,7 +13,7 @@
 #include <csignal>
 #include <fstream>
 
-#include "io/json.h"
+#include "io/files/json.h"
 
 namespace supertac {
 namespace {

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "apps/stream/picture_maker.h"
-#include "hardware/rig.h"
+#include "data/sensors/rig.h"
 #include "tests/allocations.h"
 
 namespace {

@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "data/samples/split.h"
-#include "io/file.h"
-#include "io/random.h"
-#include "io/safetensors.h"
+#include "data/windows/split.h"
+#include "io/files/file.h"
+#include "io/files/safetensors.h"
+#include "io/numbers/random.h"
 #include "tests/apps/process.h"
 
 namespace supertac {

@@ -5,8 +5,8 @@
 
 #include "data/plates/plate.h"
 #include "data/recordings/recording.h"
-#include "data/samples/windows.h"
-#include "io/file.h"
+#include "data/windows/windows.h"
+#include "io/files/file.h"
 #include "tests/apps/process.h"
 
 namespace supertac {

@@ -10,7 +10,7 @@
 #include <csignal>
 #include <filesystem>
 
-#include "io/file.h"
+#include "io/files/file.h"
 
 namespace supertac {
 namespace {

@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "data/recordings/recording.h"
-#include "io/file.h"
+#include "io/files/file.h"
 #include "tests/apps/process.h"
 #include "tests/io/temporary_folder.h"
 

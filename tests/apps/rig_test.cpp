@@ -7,8 +7,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "data/samples/windows.h"
-#include "io/file.h"
+#include "data/windows/windows.h"
+#include "io/files/file.h"
 #include "tests/apps/process.h"
 
 namespace supertac {

@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
-#include "io/json.h"
-#include "io/safetensors.h"
+#include "io/files/json.h"
+#include "io/files/safetensors.h"
 #include "tests/apps/trained.h"
 
 namespace supertac {

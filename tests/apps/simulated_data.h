@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "io/file.h"
+#include "io/files/file.h"
 #include "tests/apps/process.h"
 #include "tests/io/temporary_folder.h"
 

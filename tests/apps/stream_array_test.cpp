@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "data/recordings/simulator.h"
-#include "io/safetensors.h"
-#include "models/model_file.h"
+#include "io/files/safetensors.h"
+#include "models/files/model_file.h"
 #include "tests/apps/process.h"
 
 namespace supertac {

@@ -7,7 +7,7 @@
 #include <map>
 #include <sstream>
 
-#include "io/json.h"
+#include "io/files/json.h"
 #include "tests/apps/simulated_data.h"
 
 namespace supertac {

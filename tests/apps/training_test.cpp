@@ -5,8 +5,8 @@
 #include <functional>
 
 #include "data/recordings/recording.h"
-#include "io/json.h"
-#include "io/safetensors.h"
+#include "io/files/json.h"
+#include "io/files/safetensors.h"
 #include "tests/apps/trained.h"
 
 namespace supertac {

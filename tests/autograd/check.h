@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "autograd/gradient_checker.h"
 #include "autograd/tensor.h"
 #include "autograd/variable.h"
-#include "models/gradient_checker.h"
 
 namespace supertac::test {
 

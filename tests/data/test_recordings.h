@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "data/recordings/recording.h"
-#include "data/samples/windows.h"
+#include "data/windows/windows.h"
 
 namespace supertac {
 

@@ -8,7 +8,7 @@
 
 #include "autograd/ops/activations.h"
 #include "autograd/ops/losses.h"
-#include "models/schedule.h"
+#include "models/training/schedule.h"
 #include "tests/models/support.h"
 
 namespace supertac {

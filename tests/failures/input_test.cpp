@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "data/samples/split.h"
+#include "data/windows/split.h"
 #include "tests/models/support.h"
 
 namespace supertac {

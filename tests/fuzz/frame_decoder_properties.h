@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "hardware/frame_decoder.h"
+#include "hardware/boards/frame_decoder.h"
 
 namespace supertac {
 

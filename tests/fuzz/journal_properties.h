@@ -7,9 +7,9 @@
 #include <stdexcept>
 #include <vector>
 
-#include "hardware/collection.h"
-#include "hardware/errors.h"
-#include "io/hash.h"
+#include "hardware/collection/collection.h"
+#include "hardware/ports/errors.h"
+#include "io/numbers/hash.h"
 
 namespace supertac {
 

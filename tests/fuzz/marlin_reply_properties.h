@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "hardware/marlin_link.h"
-#include "hardware/printer.h"
+#include "hardware/printers/marlin_link.h"
+#include "hardware/printers/printer.h"
 
 namespace supertac {
 

@@ -7,7 +7,7 @@
 
 #include "data/plates/height_map.h"
 #include "data/plates/stl.h"
-#include "io/file.h"
+#include "io/files/file.h"
 
 namespace supertac {
 

@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include "hardware/collection.h"
-#include "hardware/errors.h"
-#include "io/numbers.h"
+#include "hardware/collection/collection.h"
+#include "hardware/ports/errors.h"
+#include "io/numbers/numbers.h"
 #include "rig_support.h"
 
 namespace supertac {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "hardware/palpation_recorder.h"
+#include "hardware/collection/palpation_recorder.h"
 #include "tests/hardware/simulated_rig.h"
 
 namespace supertac {

@@ -12,10 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include "hardware/board_frame.h"
-#include "hardware/printer.h"
+#include "hardware/boards/board_frame.h"
+#include "hardware/printers/printer.h"
+#include "io/numbers/random.h"
 #include "tests/hardware/simulated_rig.h"
-#include "io/random.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {

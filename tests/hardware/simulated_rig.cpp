@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "hardware/errors.h"
+#include "hardware/ports/errors.h"
 
 namespace supertac {
 namespace {

@@ -9,7 +9,7 @@
 #include <mutex>
 #include <vector>
 
-#include "hardware/port.h"
+#include "hardware/ports/port.h"
 #include "hardware/virtual_rig/rig_world.h"
 
 namespace supertac {

@@ -7,9 +7,9 @@
 #include <thread>
 
 #include "bench/studies/rig/stall_watch.h"
-#include "hardware/errors.h"
-#include "hardware/palpation_recorder.h"
-#include "hardware/serial_port.h"
+#include "hardware/collection/palpation_recorder.h"
+#include "hardware/ports/errors.h"
+#include "hardware/ports/serial_port.h"
 #include "hardware/virtual_rig/pty_rig.h"
 #include "rig_support.h"
 

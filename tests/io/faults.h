@@ -1,4 +1,4 @@
-// The N-th system call fails: a table for io/system_calls.h that counts and injects.
+// The N-th system call fails: a table for io/files/system_calls.h that counts and injects.
 #pragma once
 
 #include <cerrno>
@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "io/system_calls.h"
+#include "io/files/system_calls.h"
 
 namespace supertac {
 

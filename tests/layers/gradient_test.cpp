@@ -1,10 +1,10 @@
 // Every layer's gradients with respect to its input and all of its parameters, in double precision.
 #include <gtest/gtest.h>
 
+#include "autograd/gradient_checker.h"
 #include "layers/convolution.h"
 #include "layers/linear.h"
 #include "layers/residual.h"
-#include "models/gradient_checker.h"
 
 namespace supertac {
 namespace {

@@ -4,8 +4,8 @@
 #include <array>
 #include <string>
 
-#include "data/samples/windows.h"
-#include "io/file.h"
+#include "data/windows/windows.h"
+#include "io/files/file.h"
 #include "models/training/trainer.h"
 #include "tests/io/temporary_folder.h"
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "autograd/tensor.h"
-#include "io/safetensors.h"
+#include "io/files/safetensors.h"
 
 namespace supertac::test {
 

@@ -1,5 +1,5 @@
-// Products of bytes, for networks that are prepared with less than fp32 (models/prepared/prepared.h). Sums of
-// integers are exact: every instruction set, and every order, gives the same bits.
+// Products of bytes, for networks that are prepared with less than fp32 (models/inference/prepared.h). Sums
+// of integers are exact: every instruction set, and every order, gives the same bits.
 #pragma once
 
 #include <array>

@@ -23,8 +23,8 @@
 #include <span>
 
 #include "bench/studies/hostile/readers.h"
-#include "io/file.h"
-#include "io/random.h"
+#include "io/files/file.h"
+#include "io/numbers/random.h"
 #include "tests/apps/process.h"
 
 namespace supertac {

@@ -17,11 +17,11 @@
 #include <string>
 
 #include "bench/studies/rig/stall_watch.h"
-#include "hardware/collection.h"
-#include "hardware/errors.h"
-#include "hardware/serial_port.h"
-#include "io/file.h"
-#include "io/random.h"
+#include "hardware/collection/collection.h"
+#include "hardware/ports/errors.h"
+#include "hardware/ports/serial_port.h"
+#include "io/files/file.h"
+#include "io/numbers/random.h"
 #include "tests/apps/collect_run.h"
 
 namespace supertac {

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "hardware/serial_port.h"
+#include "hardware/ports/serial_port.h"
 
 namespace supertac {
 

@@ -13,13 +13,13 @@
 #include <map>
 #include <optional>
 
-#include "hardware/frame_decoder.h"
-#include "hardware/journal.h"
-#include "hardware/serial_port.h"
+#include "hardware/boards/frame_decoder.h"
+#include "hardware/collection/journal.h"
+#include "hardware/ports/serial_port.h"
 #include "hardware/virtual_rig/pty_rig.h"
-#include "io/file.h"
-#include "io/json.h"
-#include "io/numbers.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
+#include "io/numbers/numbers.h"
 #include "tests/apps/process.h"
 
 namespace supertac {

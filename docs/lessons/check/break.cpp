@@ -12,9 +12,9 @@
 #include "autograd/ops/losses.h"
 #include "autograd/ops/vae.h"
 #include "docs/lessons/check/check.h"
-#include "io/random.h"
+#include "io/numbers/random.h"
 #include "layers/residual.h"
-#include "models/schedule.h"
+#include "models/training/schedule.h"
 
 namespace lessons {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "docs/lessons/check/check.h"
-#include "io/file.h"
+#include "io/files/file.h"
 
 namespace {
 

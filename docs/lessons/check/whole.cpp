@@ -12,7 +12,7 @@
 #include "autograd/ops/shaping.h"
 #include "autograd/ops/vae.h"
 #include "docs/lessons/check/check.h"
-#include "io/random.h"
+#include "io/numbers/random.h"
 
 namespace lessons {
 namespace {

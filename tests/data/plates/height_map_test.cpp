@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "io/file.h"
+#include "io/files/file.h"
 
 namespace supertac {
 namespace {

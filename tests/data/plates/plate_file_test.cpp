@@ -6,8 +6,8 @@
 
 #include "data/plates/plate_mesh.h"
 #include "data/plates/truth.h"
-#include "data/samples/windows.h"
-#include "io/file.h"
+#include "data/windows/windows.h"
+#include "io/files/file.h"
 #include "tests/data/test_recordings.h"
 #include "tests/io/temporary_folder.h"
 

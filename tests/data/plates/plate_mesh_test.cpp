@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "data/plates/height_map.h"
-#include "io/random.h"
+#include "io/numbers/random.h"
 
 namespace supertac {
 namespace {
@@ -82,7 +82,8 @@ TEST(PlateMesh, WrittenAndReadHeightsAgree) {
 TEST(PlateMesh, RigPlatesComeBackExactlyAtTheNodes) {
   for (const std::string& name : rig_plates()) {
     const Plate plate = Plate::named(name);
-    const Plate again(name, std::make_shared<const HeightMap>(mesh_of(plate), Plate::kWidthMm, Plate::kLengthMm, name));
+    const Plate again(
+        name, std::make_shared<const HeightMap>(mesh_of(plate), Plate::kWidthMm, Plate::kLengthMm, name));
     EXPECT_NEAR(again.texture_begin(), plate.texture_begin(), 0.126) << name;
     EXPECT_NEAR(again.texture_end(), plate.texture_end(), 0.126) << name;
     EXPECT_EQ(again.uniform_in_x(), plate.uniform_in_x()) << name;

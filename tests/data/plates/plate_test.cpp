@@ -109,7 +109,8 @@ TEST(Plate, RefusesNamesItCannotRead) {
           std::string(error.what()),
           "plate \"" + std::string(bad) + "\": " + why +
               "; expected a rig plate such as 3_Bumps, or plain, or ridges|bumps|waves|blobs with a pitch "
-              "in mm such as bumps12 or ridges6h1.5, several joined by +, or random and a number, or an STL file");
+              "in mm such as bumps12 or ridges6h1.5, several joined by +, or random and a number, or an STL "
+              "file");
     }
   }
 }

@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "io/hash.h"
+#include "io/numbers/hash.h"
 
 namespace supertac {
 namespace {

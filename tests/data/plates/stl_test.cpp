@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <limits>
 
-#include "io/file.h"
+#include "io/files/file.h"
 #include "tests/fuzz/corpus.h"
 #include "tests/fuzz/stl_properties.h"
 #include "tests/io/temporary_folder.h"

@@ -6,8 +6,8 @@
 #include <functional>
 #include <limits>
 
-#include "io/file.h"
-#include "io/safetensors.h"
+#include "io/files/file.h"
+#include "io/files/safetensors.h"
 #include "tests/data/test_recordings.h"
 #include "tests/io/temporary_folder.h"
 

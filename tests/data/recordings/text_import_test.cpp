@@ -5,8 +5,8 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "io/file.h"
-#include "io/random.h"
+#include "io/files/file.h"
+#include "io/numbers/random.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {

@@ -6,7 +6,7 @@
 
 #include "data/plates/plate.h"
 #include "data/recordings/simulator.h"
-#include "io/random.h"
+#include "io/numbers/random.h"
 
 namespace supertac {
 

@@ -10,7 +10,7 @@
 #include "data/registration/alignment.h"
 #include "data/registration/apply_registration.h"
 #include "data/registration/lost_frames.h"
-#include "data/samples/windows.h"
+#include "data/windows/windows.h"
 #include "tests/data/registration/lossy_pass.h"
 #include "tests/io/temporary_folder.h"
 

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "data/samples/split.h"
+#include "data/windows/split.h"
 #include "tests/data/test_recordings.h"
 
 namespace supertac {

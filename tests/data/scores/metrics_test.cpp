@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "data/plates/truth.h"
-#include "io/random.h"
+#include "io/numbers/random.h"
 
 namespace supertac {
 namespace {
@@ -133,9 +133,9 @@ TEST(Contact, NeedsAPixelAboveZero) {
 TEST(MetricsAccumulator, OfNothingIsNull) {
   const auto json = to_json(MetricsAccumulator(ImageGrid{}).result());
   EXPECT_EQ(json["windows"], 0);
-  for (const char* key : {"psnr_mean_db", "psnr_pooled_db", "ssim", "phase_correlation",
-                          "phase_correlation_floor", "position_error_px", "position_error_mm", "ghost_rate",
-                          "miss_rate"})
+  for (const char* key :
+       {"psnr_mean_db", "psnr_pooled_db", "ssim", "phase_correlation", "phase_correlation_floor",
+        "position_error_px", "position_error_mm", "ghost_rate", "miss_rate"})
     EXPECT_TRUE(json.at(key).is_null()) << key;
   EXPECT_EQ(json.size(), 10U);
 }

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "data/plates/truth.h"
-#include "io/random.h"
+#include "io/numbers/random.h"
 
 namespace supertac {
 namespace {

@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cstring>
 
-#include "data/samples/split.h"
-#include "io/random.h"
+#include "data/windows/split.h"
+#include "io/numbers/random.h"
 #include "tests/data/test_recordings.h"
 
 namespace supertac {

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "io/random.h"
+#include "io/numbers/random.h"
 
 namespace supertac {
 namespace {

@@ -1,0 +1,375 @@
+#include "apps/common/command_line/arguments.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cxxopts.hpp>
+#include <filesystem>
+#include <iostream>
+#include <limits>
+#include <set>
+
+#include "apps/common/command_line/command_words.h"
+#include "apps/common/command_line/nearest.h"
+#include "apps/common/output/provenance.h"
+#include "apps/common/running/threads.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+
+namespace supertac {
+namespace {
+
+/// The options as cxxopts wants them; everything is text there, numbers are read locale-free afterwards.
+void add(cxxopts::Options& parser, const std::string& group, const std::string& name, const std::string& help,
+         const std::string& value, bool is_flag, const std::string& default_value) {
+  const std::string names = name == "help" ? "h,help" : name;
+  if (is_flag) {
+    parser.add_options(group)(names, help);
+  } else {
+    const auto type = cxxopts::value<std::string>();
+    parser.add_options(group)(names, help, default_value.empty() ? type : type->default_value(default_value),
+                              value);
+  }
+}
+
+// What programs write, and the values that may name a file to be read.
+constexpr std::array<std::string_view, 9> kOutputs = {"capture", "gcode",    "json",   "onnx",       "out",
+                                                      "outputs", "pictures", "report", "write-pairs"};
+constexpr std::array<std::string_view, 5> kPathValues = {"FILE", "DIR", "JOURNAL", "TEXT_DIR", "NAME"};
+
+bool names_path(const std::string& value) {
+  return std::any_of(kPathValues.begin(), kPathValues.end(),
+                     [&](std::string_view kind) { return value.starts_with(kind); });
+}
+
+bool is_stdout(const std::string& name, const std::string& text) {
+  return (name == "json" || name == "out") && text == "-";
+}
+
+// Names and messages may hold what a terminal obeys.
+std::string without_controls(std::string_view line) {
+  std::string text(line);
+  std::replace_if(
+      text.begin(), text.end(),
+      [](unsigned char c) { return (c < ' ' && c != '\t' && c != '\n') || c == 0x7F; }, '?');
+  return text;
+}
+
+}  // namespace
+
+Arguments::Arguments(std::string program, std::string purpose)
+    : program_(std::move(program)), purpose_(std::move(purpose)) {
+  flag("help", "print this and exit; supertac help glossary explains the words");
+  flag("version", "print version, commit, compiler and exit");
+  option("json", "FILE", "also write the results as JSON; '-' is stdout");
+  flag("quiet", "no progress bar and no remarks").decides_nothing();
+  // A program that only looks at files has nothing to share out.
+  if (program_ != "supertac-info")
+    option("threads", "N", "worker threads; default OMP_NUM_THREADS, else what the machine grants")
+        .decides_nothing();
+  flag("force", "replace existing output").decides_nothing();
+}
+
+void Arguments::declare(const std::string& name, Option option) {
+  option.only_with = only_with_;
+  option.is_more = more_;
+  if (!options_.emplace(name, std::move(option)).second) {
+    throw std::invalid_argument("Arguments: option " + name + " declared twice");
+  }
+  order_.push_back(name);
+}
+
+Arguments& Arguments::positional(const std::string& value, const std::string& help, bool is_required) {
+  declare(value, {.value = value, .help = help, .is_required = is_required, .is_positional = true});
+  positionals_.push_back(value);
+  return *this;
+}
+
+Arguments& Arguments::required(const std::string& name, const std::string& value, const std::string& help) {
+  declare(name, {.value = value, .help = help, .is_required = true});
+  return *this;
+}
+
+Arguments& Arguments::option(const std::string& name, const std::string& value, const std::string& help,
+                             const std::string& default_value) {
+  declare(name, {.value = value, .help = help, .default_value = default_value});
+  return *this;
+}
+
+Arguments& Arguments::option_alone(const std::string& name, const std::string& value, const std::string& help,
+                                   const std::string& alone) {
+  declare(name, {.value = "[" + value + "]", .help = help, .alone = alone});
+  return *this;
+}
+
+Arguments& Arguments::flag(const std::string& name, const std::string& help) {
+  declare(name, {.help = help, .is_flag = true});
+  return *this;
+}
+
+Arguments& Arguments::one_of(const std::string& first, const std::string& second) {
+  one_of_.emplace_back(first, second);
+  return *this;
+}
+
+Arguments& Arguments::only_with(const std::string& option) {
+  only_with_ = option;
+  return *this;
+}
+
+Arguments& Arguments::decides_nothing() {
+  options_.at(order_.back()).decides = false;
+  return *this;
+}
+
+Arguments& Arguments::more(bool on) {
+  more_ = on;
+  return *this;
+}
+
+std::string Arguments::help() const {
+  cxxopts::Options parser(program_, purpose_);
+  std::string usage;
+  for (const std::string& name : positionals_)
+    usage += options_.at(name).is_required ? name + " " : "[" + name + "] ";
+  for (const std::string& name : order_) {
+    const Option& option = options_.at(name);
+    if (option.is_required && !option.is_positional) usage += "--" + name + " " + option.value + " ";
+  }
+  parser.custom_help(usage + "[options]");
+  // A program's own options first, then those that all have, up to --force.
+  const auto common =
+      static_cast<std::size_t>(std::find(order_.begin(), order_.end(), "force") - order_.begin()) + 1;
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    const std::string& name = order_[(i + common) % order_.size()];
+    const Option& option = options_.at(name);
+    if (option.is_positional) continue;
+    add(parser, option.is_more ? "more" : "", name, option.help, option.value, option.is_flag,
+        option.default_value);
+  }
+  std::string text = parser.help();
+  for (const std::string& name : positionals_) text += "\n  " + name + ": " + options_.at(name).help;
+  return text + (positionals_.empty() ? "" : "\n");
+}
+
+/// cxxopts would name an unknown option without a hint.
+void Arguments::check_names(int argc, const char* const* argv) const {
+  std::vector<std::string> known;
+  for (const auto& [name, option] : options_) {
+    if (!option.is_positional) known.push_back(name);
+  }
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word == "--") return;
+    if (!word.starts_with("--")) continue;
+    const std::string name(word.substr(2, word.find('=') - 2));
+    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    const std::string hint = nearest_name(name, known);
+    throw UsageError("unknown option " + in_quotes("--" + name) +
+                     (hint.empty() ? "" : "; did you mean '--" + hint + "'?"));
+  }
+}
+
+/// The command line with the values of options that stand alone.
+std::vector<std::string> Arguments::complete_words(int argc, const char* const* argv) const {
+  std::vector<std::string> words;
+  for (int i = 0; i < argc; ++i) {
+    words.emplace_back(argv[i]);
+    const auto found =
+        words.back().starts_with("--") ? options_.find(words.back().substr(2)) : options_.end();
+    if (found == options_.end() || found->second.alone.empty()) continue;
+    if (i + 1 == argc || std::string_view(argv[i + 1]).starts_with("--"))
+      words.push_back(found->second.alone);
+  }
+  return words;
+}
+
+void Arguments::parse(int argc, const char* const* argv) {
+  for (int i = 0; i < argc; ++i) command_line_ += (i > 0 ? " " : "") + quoted_word(argv[i]);
+  check_names(argc, argv);
+  cxxopts::Options parser(program_, purpose_);
+  for (const std::string& name : order_) {
+    const Option& option = options_.at(name);
+    add(parser, "", name, option.help, option.value, option.is_flag, "");
+  }
+  parser.parse_positional(positionals_);
+  try {
+    const std::vector<std::string> words = complete_words(argc, argv);
+    std::vector<const char*> pointers;
+    for (const std::string& word : words) pointers.push_back(word.c_str());
+    const cxxopts::ParseResult result = parser.parse(static_cast<int>(pointers.size()), pointers.data());
+    for (const std::string& name : order_) {
+      if (result.count(name) == 0) continue;
+      values_[name] = options_.at(name).is_flag ? "" : result[name].as<std::string>();
+    }
+    if (!result.unmatched().empty()) {
+      throw UsageError("unexpected argument " + in_quotes(result.unmatched().front()));
+    }
+  } catch (const cxxopts::exceptions::exception& error) {
+    throw UsageError(error.what());
+  }
+  if (given("help") || given("version")) return;
+  check_complete();
+  check_names_given();
+  check_together();
+}
+
+void Arguments::check_complete() const {
+  for (const std::string& name : order_) {
+    const Option& option = options_.at(name);
+    if (!option.is_required || (given(name) && !values_.at(name).empty())) continue;
+    throw UsageError("missing " + (option.is_positional ? name : "--" + name + " " + option.value) + ": " +
+                     option.help);
+  }
+}
+
+// An empty name is a variable that was not set, not a wish to leave the option out.
+void Arguments::check_names_given() const {
+  for (const auto& [name, text] : values_) {
+    const Option& option = options_.at(name);
+    if (option.is_flag || !text.empty() || !names_path(option.value)) continue;
+    throw UsageError("--" + name + ": expected " + option.value + ", found an empty name");
+  }
+}
+
+std::vector<NamedPath> Arguments::paths() const {
+  std::vector<NamedPath> paths;
+  for (const auto& [name, text] : values_) {
+    const Option& option = options_.at(name);
+    if (option.is_flag || !names_path(option.value) || is_stdout(name, text)) continue;
+    const bool is_output = std::find(kOutputs.begin(), kOutputs.end(), name) != kOutputs.end();
+    const bool is_folder = option.value.ends_with("DIR");
+    if (is_output || is_folder) {
+      paths.push_back({name, text, is_output, is_folder});
+      continue;
+    }
+    for (const std::string& path : comma_list(text)) {
+      std::error_code error;
+      if (std::filesystem::exists(path, error)) paths.push_back({name, path, false, false});
+    }
+  }
+  return paths;
+}
+
+std::string Arguments::deciding_options() const {
+  std::string line = program_;
+  for (const std::string& name : order_) {
+    const Option& option = options_.at(name);
+    const bool is_path = option.value != "NAME" && names_path(option.value);
+    if (!given(name) || is_path || !option.decides || name == "seed") continue;
+    line += option.is_positional ? " " : " --" + name + (option.is_flag ? "" : " ");
+    if (!option.is_flag) line += quoted_word(values_.at(name));
+  }
+  return line;
+}
+
+void Arguments::check_together() const {
+  for (const auto& [first, second] : one_of_) {
+    if (given(first) != given(second)) continue;
+    throw UsageError("expected --" + first + " " + options_.at(first).value + " or --" + second + " " +
+                     options_.at(second).value + ", found " + (given(first) ? "both" : "neither"));
+  }
+  for (const std::string& name : order_) {
+    const std::string& needed = options_.at(name).only_with;
+    if (needed.empty() || !given(name) || given(needed)) continue;
+    throw UsageError("--" + name + ": says something beside --" + needed +
+                     " only, which is not given; leave it out");
+  }
+}
+
+void Arguments::reject(const std::string& name, const std::string& expected, const std::string& found) const {
+  throw UsageError("--" + name + ": expected " + expected + ", found " + in_quotes(found));
+}
+
+bool Arguments::given(const std::string& name) const {
+  if (!options_.contains(name)) throw std::invalid_argument("Arguments: no option " + name);
+  return values_.contains(name);
+}
+
+std::string Arguments::text(const std::string& name) const {
+  return given(name) ? values_.at(name) : options_.at(name).default_value;
+}
+
+std::string Arguments::choice(const std::string& name, const std::vector<std::string>& words) const {
+  const std::string word = text(name);
+  std::string all;
+  for (const std::string& known : words) {
+    if (word == known) return word;
+    all += (all.empty() ? "" : ", ") + known;
+  }
+  const std::string hint = nearest_name(word, words);
+  throw UsageError("--" + name + ": expected one of " + all + ", found " + in_quotes(word) +
+                   (hint.empty() ? "" : "; did you mean '" + hint + "'?"));
+}
+
+std::int64_t Arguments::integer(const std::string& name, std::int64_t lowest, std::int64_t highest) const {
+  const auto value = parse_int(text(name));
+  if (value && *value >= lowest && *value <= highest) return *value;
+  reject(name, "a whole number from " + std::to_string(lowest) + " to " + std::to_string(highest),
+         text(name));
+}
+
+std::uint64_t Arguments::seed() const {
+  return static_cast<std::uint64_t>(integer("seed", 0, std::numeric_limits<std::int64_t>::max()));
+}
+
+double Arguments::number(const std::string& name, double lowest, double highest) const {
+  const auto value = parse_double(text(name));
+  if (value && *value >= lowest && *value <= highest) return *value;
+  reject(name, "a number from " + format(lowest) + " to " + format(highest), text(name));
+}
+
+std::vector<std::string> Arguments::list(const std::string& name) const {
+  std::vector<std::string> elements;
+  std::set<std::string> seen;
+  const std::string value = text(name);
+  if (value.empty()) return elements;
+  for (std::string_view rest = value;; rest.remove_prefix(1)) {
+    const std::string element(rest.substr(0, rest.find(',')));
+    if (element.empty()) reject(name, "a list without empty elements", value);
+    if (!seen.insert(element).second) reject(name, "every element once", value);
+    elements.push_back(element);
+    rest.remove_prefix(element.size());
+    if (rest.empty()) return elements;
+  }
+}
+
+std::vector<double> Arguments::numbers(const std::string& name, double lowest, double highest) const {
+  std::vector<double> values;
+  for (const std::string& element : list(name)) {
+    const auto value = parse_double(element);
+    if (!value || !(*value >= lowest && *value <= highest)) {
+      reject(name, "numbers from " + format(lowest) + " to " + format(highest), element);
+    }
+    values.push_back(*value);
+  }
+  return values;
+}
+
+int Arguments::threads() const {
+  return options_.contains("threads") && given("threads") ? static_cast<int>(integer("threads", 1, 1024))
+                                                          : default_threads();
+}
+
+void Arguments::print(std::string_view line) const {
+  if (!muted_ && text("json") != "-") std::cout << without_controls(line) << '\n';
+}
+
+void Arguments::note(std::string_view line) const {
+  if (!quiet()) std::cerr << without_controls(line) << '\n';
+}
+
+void Arguments::write_json(const nlohmann::ordered_json& result) const {
+  if (muted_ || !given("json")) return;
+  nlohmann::ordered_json whole = result;
+  if (whole.is_object() && !whole.contains("provenance")) whole["provenance"] = full_provenance();
+  const std::string document = whole.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  if (text("json") == "-") {
+    std::cout << document;
+  } else {
+    write_file(text("json"), document);
+  }
+}
+
+}  // namespace supertac

@@ -1,0 +1,145 @@
+// The command line of a program: its options are declared, parsed (cxxopts), and read with range checks.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace supertac {
+
+/// The command line is wrong: exit code 2.
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// What work() returns; an std::invalid_argument of it becomes a UsageError that names the option.
+template <class Work>
+auto read_option(const std::string& option, Work work) {
+  try {
+    return work();
+  } catch (const std::invalid_argument& error) {
+    throw UsageError("--" + option + ": " + error.what());
+  }
+}
+
+/// A file or folder that the command line names.
+struct NamedPath {
+  std::string option, path;
+  bool is_output = false, is_folder = false;
+};
+
+/// Options of one program. Every program also has --help, --version, --json, --quiet, --threads and --force.
+class Arguments {
+ public:
+  Arguments(std::string program, std::string purpose);
+
+  // Declaring. `value` names what is expected, with its unit ("DIR", "N", "MM_PER_S"); help is a short
+  // clause.
+
+  /// An argument without a name, in the order of declaration.
+  Arguments& positional(const std::string& value, const std::string& help, bool is_required = true);
+  /// An option that has to be given.
+  Arguments& required(const std::string& name, const std::string& value, const std::string& help);
+  /// An option with a default; "" means not given.
+  Arguments& option(const std::string& name, const std::string& value, const std::string& help,
+                    const std::string& default_value = "");
+  /// The same, but `alone` is its value where it is given without one.
+  Arguments& option_alone(const std::string& name, const std::string& value, const std::string& help,
+                          const std::string& alone);
+  Arguments& flag(const std::string& name, const std::string& help);
+  /// Exactly one of these two options has to be given.
+  Arguments& one_of(const std::string& first, const std::string& second);
+  /// The options declared from here on say something beside `option` only and are refused without it; "" ends
+  /// this.
+  Arguments& only_with(const std::string& option);
+  /// The option declared last changes no byte of what is made, so its provenance does not name it.
+  Arguments& decides_nothing();
+  /// The options declared from here on stand under "more options" in the help: few people need them.
+  Arguments& more(bool on = true);
+
+  /// Throws UsageError: an unknown option (naming the nearest known one), a value missing, an argument too
+  /// many or too few, an option that says nothing beside the others. --help and --version may stand without
+  /// what is required.
+  void parse(int argc, const char* const* argv);
+
+  // Reading; `name` is that of an option or the value name of a positional argument. All throw UsageError
+  // that names option, expected and found.
+
+  bool given(const std::string& name) const;  ///< on the command line
+  bool flag(const std::string& name) const { return given(name); }
+  std::string text(const std::string& name) const;
+  /// One of the given words.
+  std::string choice(const std::string& name, const std::vector<std::string>& words) const;
+  std::int64_t integer(const std::string& name, std::int64_t lowest, std::int64_t highest) const;
+  double number(const std::string& name, double lowest, double highest) const;
+  /// --seed, from 0 on.
+  std::uint64_t seed() const;
+  /// Comma-separated; an empty value is an empty list, an empty element is an error, and so is one given
+  /// twice.
+  std::vector<std::string> list(const std::string& name) const;
+  std::vector<double> numbers(const std::string& name, double lowest, double highest) const;
+
+  /// All files and folders named; what an option may name but does not hold is left out.
+  std::vector<NamedPath> paths() const;
+
+  bool force() const { return flag("force"); }
+  bool quiet() const { return muted_ || flag("quiet"); }
+  /// --threads, or what the machine grants (apps/common/running/threads.h).
+  int threads() const;
+
+  const std::string& program() const { return program_; }
+  /// The whole command line, words quoted as a shell takes them, for a run's settings.
+  const std::string& command_line() const { return command_line_; }
+  /// Program and options that decide what it makes, in the order of declaration: no files and folders, and
+  /// nothing of how it is computed, shown or kept. command_words() has the words again.
+  std::string deciding_options() const;
+  bool declares(const std::string& name) const { return options_.contains(name); }
+  std::string help() const;
+
+  // Talking.
+
+  /// From here on nothing of this is said or written, as if under --quiet: another process does it.
+  void mute() { muted_ = true; }
+  /// A line of the result for a reader, on stdout; nothing when the JSON goes there.
+  void print(std::string_view line) const;
+  /// A remark on stderr; nothing under --quiet.
+  void note(std::string_view line) const;
+  /// The machine-readable result and its provenance, to where --json says: a file (atomically) or, for '-',
+  /// stdout. Without
+  /// --json nothing. The wrapper has refused an existing file before the work began.
+  void write_json(const nlohmann::ordered_json& result) const;
+
+ private:
+  struct Option {
+    std::string value{}, help{}, default_value{};
+    bool is_flag = false, is_required = false, is_positional = false;
+    bool is_more = false, decides = true;
+    std::string only_with{}, alone{};
+  };
+
+  void declare(const std::string& name, Option option);
+  void check_names(int argc, const char* const* argv) const;
+  std::vector<std::string> complete_words(int argc, const char* const* argv) const;
+  void check_complete() const;
+  void check_names_given() const;
+  void check_together() const;
+  [[noreturn]] void reject(const std::string& name, const std::string& expected,
+                           const std::string& found) const;
+
+  std::string program_, purpose_, command_line_;
+  std::vector<std::string> order_;        // of declaration
+  std::vector<std::string> positionals_;  // value names
+  std::map<std::string, Option> options_;
+  std::vector<std::pair<std::string, std::string>> one_of_;
+  std::string only_with_;  // of the options being declared
+  bool more_ = false, muted_ = false;
+  std::map<std::string, std::string> values_;  // as given
+};
+
+}  // namespace supertac

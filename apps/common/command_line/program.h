@@ -1,0 +1,40 @@
+// What all programs share. A program is a file JOB_main.cpp that defines
+//   void declare(Arguments&);  its options
+//   int run(Arguments&);       its work; returns the exit code
+// in namespace supertac, and a line of apps/CMakeLists.txt with its name and purpose, from which its main()
+// is written (main.cpp.in) and `supertac` lists it.
+#pragma once
+
+#include <string>
+
+#include "apps/common/command_line/arguments.h"
+
+namespace supertac {
+
+constexpr int kExitOk = 0, kExitFailed = 1, kExitUsage = 2;
+
+struct Numerics {
+  std::string text;     ///< lines of --version about kernels
+  std::string warning;  ///< one line for stderr when the program runs; empty: nothing to say
+};
+
+struct Program {
+  std::string name;     ///< "supertac-simulate"
+  std::string purpose;  ///< one sentence for --help
+  void (*declare)(Arguments&);
+  int (*run)(Arguments&);
+  /// For programs that compute (apps/common/running/numerics.h); nullptr: none.
+  Numerics (*numerics)() = nullptr;
+};
+
+/// The whole of main(): parses, handles --help and --version, sets the number of threads, catches signals,
+/// refuses an existing --json file without --force, runs, and turns every error into one line on stderr.
+/// Returns run()'s code; 1 when something failed; 2 when the command line was wrong; 128 + signal (130, 143)
+/// when interrupted.
+int run_program(const Program& program, int argc, const char* const* argv);
+
+/// "0.1.0", and the text of --version: version, commit, compiler.
+std::string version();
+std::string version_text(const Program& program);
+
+}  // namespace supertac

@@ -1,0 +1,18 @@
+#include "apps/common/output/remarks.h"
+
+#include <stdexcept>
+
+namespace supertac {
+
+void declare_strict(Arguments& a) { a.flag("strict", "what would be a warning about the data is an error"); }
+
+void remark(const Arguments& a, const std::vector<std::string>& remarks) {
+  if (!remarks.empty() && a.flag("strict")) {
+    std::string all;
+    for (const std::string& one : remarks) all += (all.empty() ? "" : "; ") + one;
+    throw std::runtime_error(all + " (--strict)");
+  }
+  for (const std::string& one : remarks) a.note("warning: " + one);
+}
+
+}  // namespace supertac

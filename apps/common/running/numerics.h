@@ -1,0 +1,11 @@
+#pragma once
+
+#include "apps/common/command_line/program.h"
+
+namespace supertac {
+
+/// The kernels chosen on this processor and, in programs that link it, the OpenBLAS found; warns where fused
+/// multiply-add is done in software.
+Numerics numerics();
+
+}  // namespace supertac

@@ -1,0 +1,114 @@
+#include "apps/common/running/progress.h"
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <iostream>
+#include <memory>
+#include <string_view>
+
+#include "apps/common/command_line/arguments.h"
+#include "apps/common/running/signals.h"
+#include "io/numbers/numbers.h"
+
+namespace supertac {
+namespace {
+
+std::string clock_text(double seconds) {
+  const auto whole = static_cast<std::int64_t>(std::lround(std::min(seconds, 1e6)));
+  const auto two = [](std::int64_t number) { return (number < 10 ? "0" : "") + std::to_string(number); };
+  if (whole < 3600) return std::to_string(whole / 60) + ":" + two(whole % 60);
+  return std::to_string(whole / 3600) + ":" + two(whole / 60 % 60) + ":" + two(whole % 60);
+}
+
+}  // namespace
+
+bool drawable_terminal() {
+  const char* terminal = std::getenv("TERM");
+  return isatty(STDERR_FILENO) == 1 && terminal != nullptr && std::string_view(terminal) != "dumb";
+}
+
+std::size_t terminal_width() {
+  winsize size{};
+  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col : 80;
+}
+
+std::string about(double seconds) {
+  if (seconds < 90) return std::to_string(5 * std::lround(seconds / 5)) + " seconds";
+  if (seconds < 90 * 60) return std::to_string(std::lround(seconds / 60)) + " minutes";
+  return format(seconds / 3600, 1) + " hours";
+}
+
+Progress::Progress(const Arguments& arguments, std::string what, std::uint64_t total, std::string unit,
+                   std::uint64_t before, double whole)
+    : arguments_(arguments),
+      what_(std::move(what)),
+      unit_(std::move(unit)),
+      total_(total),
+      before_(before),
+      whole_(whole),
+      drawable_(!arguments.quiet() && drawable_terminal()),
+      begin_(std::chrono::steady_clock::now()),
+      last_(begin_) {}
+
+Progress::~Progress() {
+  if (width_ > 0) draw("");
+}
+
+void Progress::update(std::uint64_t done, const std::string& detail) {
+  using namespace std::chrono_literals;
+  const auto now = std::chrono::steady_clock::now();
+  if (now - begin_ < 2s || now - last_ < 200ms || done <= before_) return;
+  last_ = now;
+  const double seconds = std::chrono::duration<double>(now - begin_).count();
+  const double rate = static_cast<double>(done - before_) / seconds;
+  if (!said_ && now - begin_ >= 3s) {
+    const double part = static_cast<double>(total_ - before_) / rate;
+    said_ = say_how_long(whole_ * part - seconds);
+  }
+  if (drawable_)
+    draw(progress_line(what_, done, total_, unit_, rate, detail).substr(0, terminal_width() - 1));
+}
+
+// Where the first parts are the short ones, the work turns out to be long only later.
+bool Progress::say_how_long(double seconds_left) {
+  constexpr double kShort = 5;
+  if (seconds_left < kShort) return false;
+  if (width_ > 0) draw("");
+  arguments_.note(what_ + (whole_ > 1 ? " and what follows" : "") + ": about " + about(seconds_left) +
+                  " to go");
+  return true;
+}
+
+void Progress::draw(const std::string& line) {
+  const std::string rest(width_ > line.size() ? width_ - line.size() : 0, ' ');
+  std::cerr << '\r' << line << rest << (line.empty() ? "\r" : "") << std::flush;
+  width_ = line.size();
+}
+
+std::function<void(std::size_t, std::size_t)> reading_of(const Arguments& arguments,
+                                                         const std::string& folder) {
+  return [&arguments, folder, bar = std::shared_ptr<Progress>()](std::size_t done, std::size_t all) mutable {
+    stop_if_interrupted();
+    if (!bar) bar = std::make_shared<Progress>(arguments, "reading " + folder, all, "recordings");
+    bar->update(done);
+  };
+}
+
+std::string progress_line(const std::string& what, std::uint64_t done, std::uint64_t total,
+                          const std::string& unit, double rate, const std::string& detail) {
+  const int width = detail.empty() ? 24 : 10;
+  const double share =
+      total > 0 ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total)) : 0.0;
+  const int cells = static_cast<int>(share * width);
+  const std::string rate_text = format(rate, rate < 10 ? 1 : 0) + " " + unit + "/s";
+  std::string line = what + "  [" + std::string(cells, '#') + std::string(width - cells, '.') + "]  " +
+                     format(100 * share, 0) + " %  " + (detail.empty() ? rate_text : detail);
+  if (rate > 0 && total >= done)
+    line += "  " + clock_text(static_cast<double>(total - done) / rate) + " left";
+  return line;
+}
+
+}  // namespace supertac

@@ -1,0 +1,35 @@
+#include "data/sensors/taxel_array.h"
+
+#include <stdexcept>
+
+#include "io/numbers/numbers.h"
+
+namespace supertac {
+
+std::string ImageGrid::text() const { return std::to_string(height) + "x" + std::to_string(width); }
+
+std::string TaxelArray::text() const {
+  return std::to_string(rows) + "x" + std::to_string(columns) + " taxels at " + format(pitch_mm) + " mm" +
+         (channels == 1 ? "" : " with " + std::to_string(channels) + " channels");
+}
+
+void TaxelArray::check() const {
+  const auto within = [](double value, double low, double high) { return value >= low && value <= high; };
+  if (within(rows, 2, 16) && within(columns, 2, 16) && within(channels, 1, 8) && within(pitch_mm, 0.1, 100))
+    return;
+  throw std::invalid_argument(
+      "array: expected 2 to 16 rows and columns, 1 to 8 channels, a pitch of 0.1 to 100 mm; got " + text());
+}
+
+std::vector<float> mean_of_channels(const TaxelArray& array, std::span<const float> frame) {
+  if (frame.size() != array.signals())
+    throw std::invalid_argument("a frame of " + array.text() + " has " + std::to_string(array.signals()) +
+                                " values, got " + std::to_string(frame.size()));
+  const auto channels = static_cast<std::size_t>(array.channels);
+  std::vector<float> mean(frame.size() / channels);
+  for (std::size_t s = 0; s < frame.size(); ++s)
+    mean[s / channels] += frame[s] / static_cast<float>(array.channels);
+  return mean;
+}
+
+}  // namespace supertac

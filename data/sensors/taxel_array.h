@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "data/sensors/rig.h"
+
+namespace supertac {
+
+/// Signals of the rig's array, the default one.
+constexpr int kTaxels = rig::kTaxels;
+
+/// A picture of the surface under the array: pixels, and how large they are.
+struct ImageGrid {
+  int height = 16, width = 16;
+  double pixel_mm = 0.75;
+
+  std::size_t pixels() const { return static_cast<std::size_t>(height) * static_cast<std::size_t>(width); }
+  double height_mm() const { return height * pixel_mm; }
+  double width_mm() const { return width * pixel_mm; }
+  /// "16x16"
+  std::string text() const;
+  bool operator==(const ImageGrid&) const = default;
+};
+
+/// What a sensor is: rows x columns taxels, pitch_mm apart both ways, each of which gives `channels` numbers
+/// a frame (one voltage; three axes of a magnetic field). Number s of a frame is channel s % channels of
+/// taxel s / channels; taxel k lies in row k / columns (y) and column k % columns (x).
+struct TaxelArray {
+  int rows = rig::kTaxelRows, columns = rig::kTaxelColumns;
+  double pitch_mm = rig::kTaxelPitchMm;
+  int channels = 1;
+
+  int taxels() const { return rows * columns; }
+  /// Place of taxel k from the array's centre.
+  double x_mm(int k) const { return (k % columns - (columns - 1) / 2.0) * pitch_mm; }
+  double y_mm(int k) const { return (k / columns - (rows - 1) / 2.0) * pitch_mm; }
+  /// Numbers in a frame.
+  std::size_t signals() const { return static_cast<std::size_t>(taxels() * channels); }
+  /// The square around each taxel, cut into scale x scale pixels.
+  ImageGrid picture(int scale) const { return {rows * scale, columns * scale, pitch_mm / scale}; }
+  /// "4x4 taxels at 3 mm", "2x6 taxels at 2.5 mm with 3 channels"
+  std::string text() const;
+  /// Throws std::invalid_argument outside 2 to 16 rows and columns, 1 to 8 channels, and a pitch of 0.1 to
+  /// 100 mm.
+  void check() const;
+  bool operator==(const TaxelArray&) const = default;
+};
+
+/// Most numbers a frame may have.
+constexpr std::size_t kMostSignals = 16 * 16 * 8;
+
+/// The mean over each taxel's channels, [rows][columns]: a frame as a picture shows it.
+/// Throws std::invalid_argument unless the frame has array.signals() values.
+std::vector<float> mean_of_channels(const TaxelArray& array, std::span<const float> frame);
+
+}  // namespace supertac

@@ -1,0 +1,64 @@
+#include "data/windows/batching.h"
+
+#include <algorithm>
+#include <bit>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "io/numbers/hash.h"
+#include "io/numbers/random.h"
+
+namespace supertac {
+namespace {
+
+constexpr std::uint64_t kOrderStream = 0x6f7264ULL << 40;
+
+}  // namespace
+
+EpochOrder::EpochOrder(std::uint64_t count, std::uint64_t seed, std::uint64_t epoch) : count_(count) {
+  if (count < 1 || count > std::uint64_t{1} << 32)
+    throw std::invalid_argument("epoch order: count must be 1 to 2^32, got " + std::to_string(count));
+  half_bits_ = std::max(1, (static_cast<int>(std::bit_width(count - 1)) + 1) / 2);
+  const RandomStream random(seed, kOrderStream ^ epoch);
+  for (std::uint64_t r = 0; r < kRounds; ++r)
+    keys_[r] = (std::uint64_t{random.bits(2 * r)} << 32) | random.bits(2 * r + 1);
+}
+
+std::uint64_t EpochOrder::permute(std::uint64_t value) const {
+  const std::uint64_t mask = (std::uint64_t{1} << half_bits_) - 1;
+  std::uint64_t left = value >> half_bits_, right = value & mask;
+  for (const std::uint64_t key : keys_) {
+    left ^= mix64(key + right * kGolden64) & mask;
+    std::swap(left, right);
+  }
+  return (left << half_bits_) | right;
+}
+
+std::uint64_t EpochOrder::operator[](std::uint64_t i) const {
+  if (i >= count_)
+    throw std::invalid_argument("epoch order: index " + std::to_string(i) + " is not below " +
+                                std::to_string(count_));
+  do {
+    i = permute(i);
+  } while (i >= count_);
+  return i;
+}
+
+Batching::Batching(std::vector<std::uint32_t> indices, std::size_t batch, std::uint64_t seed)
+    : indices_(std::move(indices)), batch_(batch), seed_(seed) {
+  if (indices_.empty()) throw std::invalid_argument("batching: there is no window to train on");
+  if (batch < 1) throw std::invalid_argument("batching: the batch size must be at least 1, got 0");
+  batch_ = std::min(batch_, indices_.size());
+}
+
+void Batching::batch(std::uint64_t epoch, std::uint64_t b, std::span<std::uint32_t> out) const {
+  if (b >= batches_per_epoch() || out.size() != batch_)
+    throw std::invalid_argument("batching: batch " + std::to_string(b) + " of " +
+                                std::to_string(batches_per_epoch()) + " into " + std::to_string(out.size()) +
+                                " places; a batch has " + std::to_string(batch_) + " windows");
+  const EpochOrder order(indices_.size(), seed_, epoch);
+  for (std::size_t i = 0; i < batch_; ++i) out[i] = indices_[order[b * batch_ + i]];
+}
+
+}  // namespace supertac

@@ -1,0 +1,349 @@
+#include "data/windows/split.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "data/plates/random_plate.h"
+#include "data/windows/batching.h"
+#include "io/numbers/hash.h"
+#include "io/numbers/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kTestShare = 0.2;
+constexpr std::size_t kMostHashed = std::size_t{1} << 22;
+constexpr std::uint64_t kWindowStream = 0, kPlateStream = 1, kPassStream = 2;
+
+constexpr std::array<std::pair<const char*, SplitKind>, 5> kNames{{{"window", SplitKind::window},
+                                                                   {"pass", SplitKind::pass},
+                                                                   {"trial", SplitKind::trial},
+                                                                   {"texture", SplitKind::texture},
+                                                                   {"none", SplitKind::none}}};
+
+enum class Side : std::uint8_t { neither, train, test };
+
+// Numbers of the passes that have windows, by plate in alphabetical order.
+std::map<std::string, std::vector<std::size_t>> passes_by_plate(const WindowSet& windows) {
+  std::map<std::string, std::vector<std::size_t>> plates;
+  for (std::size_t p = 0; p < windows.passes().size(); ++p)
+    if (windows.passes()[p].windows > 0 && !windows.passes()[p].aside)
+      plates[windows.passes()[p].plate].push_back(p);
+  return plates;
+}
+
+std::size_t test_count(std::size_t count) {
+  return std::max<std::size_t>(
+      1, static_cast<std::size_t>(std::lround(kTestShare * static_cast<double>(count))));
+}
+
+std::vector<Side> split_passes(const WindowSet& windows, std::uint64_t seed) {
+  std::vector<Side> sides(windows.passes().size(), Side::train);
+  std::uint64_t stream = kPassStream;
+  for (const auto& [plate, passes] : passes_by_plate(windows)) {
+    if (passes.size() < 2)
+      throw std::invalid_argument("split pass: plate '" + plate +
+                                  "' has one pass with windows, needs two: one to train on, one to test on");
+    const EpochOrder order(passes.size(), seed, stream++);
+    for (std::size_t i = 0; i < test_count(passes.size()); ++i) sides[passes[order[i]]] = Side::test;
+  }
+  return sides;
+}
+
+std::vector<Side> split_trials(const WindowSet& windows) {
+  std::vector<Side> sides;
+  for (const WindowSet::Pass& pass : windows.passes())
+    sides.push_back(pass.aside || pass.trial == 1 ? Side::train
+                    : pass.trial == 2             ? Side::test
+                                                  : Side::neither);
+  return sides;
+}
+
+std::vector<Side> split_plates(const WindowSet& windows, std::uint64_t seed,
+                               std::vector<std::string> leave_out) {
+  std::vector<Side> sides(windows.passes().size(), Side::train);
+  const auto plates = passes_by_plate(windows);
+  if (plates.size() < 2 && leave_out.empty())
+    throw std::invalid_argument("split texture: the data has " + std::to_string(plates.size()) +
+                                " plate, needs two: one to train on, one to test on");
+  if (leave_out.empty())
+    leave_out.push_back(std::next(plates.begin(), static_cast<std::ptrdiff_t>(
+                                                      EpochOrder(plates.size(), seed, kPlateStream)[0]))
+                            ->first);
+  for (const std::string& name : leave_out) {
+    const auto held_out = plates.find(name);
+    if (held_out == plates.end())
+      throw std::invalid_argument("split texture: the data has no windows of plate '" + name +
+                                  "' to leave out");
+    const Plate& tested = windows.plate(held_out->second.front());
+    for (std::size_t pass = 0; pass < sides.size(); ++pass)
+      if (sides[pass] == Side::train && windows.passes()[pass].windows > 0 &&
+          resemble(windows.plate(pass), tested))
+        sides[pass] = Side::neither;
+    for (const std::size_t pass : held_out->second) sides[pass] = Side::test;
+  }
+  return sides;
+}
+
+Split split_windows(const WindowSet& windows, std::uint64_t seed) {
+  std::vector<std::uint32_t> own;  // not set aside
+  for (std::uint32_t i = 0; i < windows.size(); ++i)
+    if (!windows.passes()[windows.pass_of(i)].aside) own.push_back(i);
+  if (own.size() < 2)
+    throw std::invalid_argument("split window: the data has " + std::to_string(own.size()) +
+                                " window, needs two: one to train on, one to test on");
+  const EpochOrder order(own.size(), seed, kWindowStream);
+  std::vector<bool> tested(windows.size(), false);
+  for (std::size_t i = 0; i < test_count(own.size()); ++i) tested[own[order[i]]] = true;
+  Split split;
+  split.test.reserve(test_count(own.size()));
+  split.train.reserve(windows.size() - test_count(own.size()));
+  for (std::uint32_t i = 0; i < windows.size(); ++i) (tested[i] ? split.test : split.train).push_back(i);
+  return split;
+}
+
+Split split_by_pass(const WindowSet& windows, const std::vector<Side>& sides) {
+  Split split;
+  for (const Side side : {Side::train, Side::test}) {
+    std::vector<std::uint32_t>& list = side == Side::test ? split.test : split.train;
+    std::size_t size = 0;
+    for (std::size_t p = 0; p < sides.size(); ++p) size += sides[p] == side ? windows.passes()[p].windows : 0;
+    list.reserve(size);  // growing takes twice the memory
+    for (std::size_t p = 0; p < sides.size(); ++p) {
+      const WindowSet::Pass& pass = windows.passes()[p];
+      for (std::size_t i = 0; sides[p] == side && i < pass.windows; ++i)
+        list.push_back(static_cast<std::uint32_t>(pass.first_window + i));
+    }
+  }
+  return split;
+}
+
+// Hash of every window of one pass in constant time each: a polynomial in kBase over the hashes of its
+// frames, modulo 2^64, as a difference of prefix sums.
+class PassHashes {
+ public:
+  PassHashes(std::span<const float> samples, std::size_t signals, std::size_t timesteps)
+      : timesteps_(timesteps) {
+    const std::size_t frames = samples.size() / signals;
+    for (std::size_t t = 0; t < timesteps; ++t) power_ *= kBase;
+    prefix_.push_back(0);
+    std::uint64_t before = 0;
+    for (std::size_t f = 0; f < frames; ++f) {
+      Hash hash;
+      for (std::size_t k = 0; k < signals; ++k) hash.add(samples[f * signals + k]);
+      prefix_.push_back(prefix_.back() * kBase + hash.value());
+      equal_.push_back(f > 0 && hash.value() == before ? equal_.back() + 1 : 1);
+      before = hash.value();
+    }
+  }
+  std::uint64_t window(std::size_t last) const {
+    return prefix_[last + 1] - prefix_[last + 1 - timesteps_] * power_;
+  }
+  bool changes(std::size_t last) const { return equal_[last] < timesteps_; }
+
+ private:
+  static constexpr std::uint64_t kBase = 0xd1342543de82ef95ULL;  // odd
+  std::size_t timesteps_;
+  std::uint64_t power_ = 1;
+  std::vector<std::uint64_t> prefix_;
+  std::vector<std::uint32_t> equal_;  // frames up to here that are all the same
+};
+
+struct HashedWindow {
+  std::uint64_t hash;
+  std::uint32_t window;
+};
+
+// Of the windows whose content changes, by hash and number. Of many windows only those whose hash ends with
+// some zeros: of two that are the same both or none.
+std::vector<HashedWindow> hash_windows(const WindowSet& windows, std::uint64_t every) {
+  std::vector<HashedWindow> hashed;
+  for (std::size_t p = 0; p < windows.passes().size(); ++p) {
+    const WindowSet::Pass& pass = windows.passes()[p];
+    if (pass.windows == 0) continue;
+    const PassHashes of_pass(windows.track(p).samples, windows.array().signals(),
+                             static_cast<std::size_t>(windows.timesteps()));
+    for (std::size_t i = pass.first_window; i < pass.first_window + pass.windows; ++i) {
+      const std::size_t frame = windows.frame_of(i);
+      const std::uint64_t hash = of_pass.window(frame);
+      if (of_pass.changes(frame) && hash % every == 0)
+        hashed.push_back({hash, static_cast<std::uint32_t>(i)});
+    }
+  }
+  std::ranges::sort(hashed, {}, [](const HashedWindow& w) { return std::pair(w.hash, w.window); });
+  return hashed;
+}
+
+std::size_t count_duplicated(const WindowSet& windows, const Split& split) {
+  std::uint64_t every = 1;
+  while (windows.size() / every > kMostHashed) every *= 2;
+  const std::vector<HashedWindow> hashed = hash_windows(windows, every);
+  std::size_t count = 0;
+  for (auto first = hashed.begin(); first != hashed.end();) {
+    const auto end = std::find_if(first, hashed.end(), [&](const auto& w) { return w.hash != first->hash; });
+    const auto trained = [&](const HashedWindow& w) {
+      return std::ranges::binary_search(split.train, w.window);
+    };
+    const auto same = std::count_if(first, end, trained);
+    for (; first != end; ++first)
+      if (std::ranges::binary_search(split.test, first->window))
+        count += same - (trained(*first) ? 1 : 0) > 0 ? 1 : 0;
+  }
+  return count * every;
+}
+
+std::size_t count_overlapping(const WindowSet& windows, const Split& split) {
+  const auto timesteps = static_cast<std::size_t>(windows.timesteps());
+  std::size_t count = 0, begin = 0, end = 0;  // windows of the pass
+  const auto touches = [&](std::uint32_t a, std::uint32_t b) {
+    if (b < begin || b >= end) return false;
+    const std::size_t fa = windows.frame_of(a), fb = windows.frame_of(b);
+    return (fa > fb ? fa - fb : fb - fa) < timesteps;
+  };
+  auto after = split.train.begin();
+  for (const std::uint32_t i : split.test) {
+    if (i >= end) {
+      const WindowSet::Pass& pass = windows.passes()[windows.pass_of(i)];
+      begin = pass.first_window, end = begin + pass.windows;
+    }
+    // Indices follow pass and time, so the nearest training windows are the neighbours in the list.
+    while (after != split.train.end() && *after < i) ++after;
+    const bool shares = (after != split.train.end() && touches(i, *after)) ||
+                        (after != split.train.begin() && touches(i, *std::prev(after)));
+    count += shares ? 1 : 0;
+  }
+  return count;
+}
+
+std::set<std::int64_t> test_groups(const PairSet& pairs, std::uint64_t seed) {
+  std::set<std::int64_t> all;
+  for (std::size_t i = 0; i < pairs.size(); ++i) all.insert(pairs.group(i));
+  if (!pairs.grouped() || all.size() < 2)
+    throw std::invalid_argument(
+        "split group: the file needs a tensor 'group' with two groups, one to train on, one to test on; "
+        "without one use split pair");
+  const std::vector<std::int64_t> ordered(all.begin(), all.end());
+  const EpochOrder order(ordered.size(), seed, 0);
+  std::set<std::int64_t> tested;
+  for (std::size_t i = 0; i < test_count(ordered.size()); ++i) tested.insert(ordered[order[i]]);
+  return tested;
+}
+
+}  // namespace
+
+SplitKind split_kind(const std::string& name) {
+  for (const auto& [known, kind] : kNames)
+    if (name == known) return kind;
+  throw std::invalid_argument("split: expects window, pass, trial, texture or none, got '" + name + "'");
+}
+
+std::string name_of(SplitKind kind) {
+  for (const auto& [name, known] : kNames)
+    if (kind == known) return name;
+  throw std::invalid_argument("split: unknown kind");
+}
+
+Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
+                 const std::vector<std::string>& leave_out) {
+  Split split;
+  switch (kind) {
+    case SplitKind::window:
+      split = split_windows(windows, seed);
+      break;
+    case SplitKind::pass:
+      split = split_by_pass(windows, split_passes(windows, seed));
+      break;
+    case SplitKind::trial:
+      split = split_by_pass(windows, split_trials(windows));
+      break;
+    case SplitKind::texture:
+      split = split_by_pass(windows, split_plates(windows, seed, leave_out));
+      break;
+    case SplitKind::none:
+      for (std::uint32_t i = 0; i < windows.size(); ++i) {
+        split.train.push_back(i);
+        if (!windows.passes()[windows.pass_of(i)].aside) split.test.push_back(i);
+      }
+      break;
+  }
+  if (split.train.empty() || split.test.empty())
+    throw std::invalid_argument(
+        "split " + name_of(kind) + ": no window to " + (split.train.empty() ? "train on" : "test on") +
+        (kind == SplitKind::trial     ? "; the data needs trials 1 and 2"
+         : kind == SplitKind::texture ? "; the data has nothing unlike what is left out: train beside random "
+                                        "plates, score with split none"
+                                      : ""));
+  return split;
+}
+
+std::vector<std::uint32_t> without_most_silence(const WindowSet& windows, std::vector<std::uint32_t> list) {
+  constexpr std::size_t kSilentApart = 4;
+  std::size_t end = 0, silent = 0;  // of the pass
+  bool whole = true;
+  const auto is_left_out = [&](std::uint32_t i) {
+    if (i >= end) {
+      const std::size_t number = windows.pass_of(i);
+      const WindowSet::Pass& pass = windows.passes()[number];
+      const Plate& plate = windows.plate(number);
+      end = pass.first_window + pass.windows, silent = 0;
+      whole = pass.varied || plate.max_height() == plate.min_height();
+    }
+    return !whole && !windows.contact(i) && silent++ % kSilentApart != 0;
+  };
+  // Not std::erase_if, which may copy the predicate.
+  std::size_t kept = 0;
+  for (const std::uint32_t i : list)
+    if (!is_left_out(i)) list[kept++] = i;
+  list.resize(kept);
+  return list;
+}
+
+Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t seed) {
+  Split split;
+  std::vector<bool> tested(pairs.size());
+  if (kind == "group") {
+    const std::set<std::int64_t> groups = test_groups(pairs, seed);
+    for (std::size_t i = 0; i < pairs.size(); ++i) tested[i] = groups.contains(pairs.group(i));
+  } else if (kind == "pair") {
+    if (pairs.size() < 2) throw std::invalid_argument("split pair: the file has one pair, needs two");
+    const EpochOrder order(pairs.size(), seed, 0);
+    for (std::size_t i = 0; i < test_count(pairs.size()); ++i) tested[order[i]] = true;
+  } else if (kind != "none") {
+    throw std::invalid_argument("split of pairs must be group, pair or none, got \"" + kind + "\"");
+  }
+  for (std::uint32_t i = 0; i < pairs.size(); ++i) {
+    if (kind == "none" || tested[i]) split.test.push_back(i);
+    if (!tested[i]) split.train.push_back(i);
+  }
+  return split;
+}
+
+Leakage find_leakage(const WindowSet& windows, const Split& split) {
+  const std::string counts = windows.recall("leakage " + fingerprint(split), [&] {
+    return std::to_string(count_overlapping(windows, split)) + " " +
+           std::to_string(count_duplicated(windows, split));
+  });
+  const std::size_t space = counts.find(' ');
+  return {.overlapping = parse_uint(counts.substr(0, space)).value_or(0),
+          .duplicated = parse_uint(counts.substr(space + 1)).value_or(0)};
+}
+
+std::string fingerprint(const Split& split) {
+  Hash hash(split.train.size());
+  for (const auto* side : {&split.train, &split.test})
+    for (const std::uint32_t i : *side) hash.add(std::uint64_t{i} + 1);
+  return hash.hex();
+}
+
+std::vector<std::uint32_t> spread(std::span<const std::uint32_t> list, std::size_t count) {
+  std::vector<std::uint32_t> chosen(std::min(count, list.size()));
+  for (std::size_t i = 0; i < chosen.size(); ++i) chosen[i] = list[i * list.size() / chosen.size()];
+  return chosen;
+}
+
+}  // namespace supertac

@@ -1,0 +1,79 @@
+// What is trained on and what is tested: a result without its split is meaningless.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "data/windows/pairs.h"
+#include "data/windows/windows.h"
+
+namespace supertac {
+
+/// How a set of windows is divided:
+///   window   a random fifth of all windows is tested. Leaky: neighbours share nearly all frames. Kept to
+///   compare
+///            with the literature.
+///   pass     of each plate a random fifth of its passes (rounded, at least one) is tested: unseen slides.
+///   trial    trial 1 is trained on, trial 2 tested; other trials are in neither.
+///   texture  the named plates, or one drawn at random, are tested; the others are trained on, but for
+///            those that resemble() one of them, passes set aside included: unseen surfaces.
+///   none     all windows are in both: for models that are tested on other data.
+/// Windows of passes set aside (WindowSet::Pass::aside) are trained on in every kind (but for such as split
+/// texture leaves out), and tested in none.
+enum class SplitKind { window, pass, trial, texture, none };
+
+/// Throws std::invalid_argument listing the names.
+SplitKind split_kind(const std::string& name);
+std::string name_of(SplitKind kind);
+
+struct Split {
+  std::vector<std::uint32_t> train, test;  ///< indices of examples, ascending
+};
+
+/// The random choices are EpochOrder(count, seed, stream) with stream 0 for windows, 1 for plates, and 2 + p
+/// for the passes of plate p; the first of the order are tested. Plates are counted in alphabetical order,
+/// passes as in WindowSet::passes(); those without windows do not count. A pure function of the set, kind and
+/// seed; trial and none do not use the seed.
+/// Throws std::invalid_argument when a side would be empty, saying what the data lacks.
+/// `leave_out`: of split texture, the plates that are tested.
+Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
+                 const std::vector<std::string>& leave_out = {});
+
+/// How pairs are divided:
+///   group  a random fifth of the groups (rounded, at least one) is tested: unseen passes, surfaces, days
+///   pair   a random fifth of the pairs is tested. Leaky when neighbours resemble each other.
+///   none   all pairs are in both
+/// Random choices are EpochOrder(count, seed, 0); groups are counted in ascending order.
+/// Throws std::invalid_argument for another name, no groups, or a side that would be empty.
+Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t seed);
+
+/// Of these windows, ascending, without three of four that are not in contact, if they are of one of many
+/// passes (add_one_of_many): two of three windows of a whole pass show a flat plate or the air, which is soon
+/// learnt. Passes over a plain plate, on which a finger is pressed as hard as elsewhere on a texture, are
+/// kept whole. So are recorded ones: without three quarters of their silence a network of four plates drew
+/// ghosts on .8 % of the flat plate instead of .1 %.
+std::vector<std::uint32_t> without_most_silence(const WindowSet& windows, std::vector<std::uint32_t> list);
+
+/// What the test windows share with the training windows.
+struct Leakage {
+  std::size_t overlapping = 0;  ///< test windows that have a frame in common with a training window
+  std::size_t duplicated =
+      0;  ///< test windows whose content equals a training window's of another place, by hash
+  bool none() const { return overlapping == 0 && duplicated == 0; }
+};
+
+/// Compares all test with all training windows: overlap by their place, duplicates by a 64-bit hash of all
+/// T * signals values (so that a pass filed twice under two names is found). Windows that never change are no
+/// duplicates: at rest every pass looks the same. Of more than four million windows duplicates are looked for
+/// among an even share, and the count is as many times larger. Takes 16 bytes per window of these.
+Leakage find_leakage(const WindowSet& windows, const Split& split);
+
+/// 16 hexadecimal digits over both index lists.
+std::string fingerprint(const Split& split);
+
+/// `count` elements spread evenly over the list, in its order; the whole list when it is not longer.
+std::vector<std::uint32_t> spread(std::span<const std::uint32_t> list, std::size_t count);
+
+}  // namespace supertac

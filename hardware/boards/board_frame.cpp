@@ -1,0 +1,58 @@
+#include "hardware/boards/board_frame.h"
+
+#include <bit>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+
+namespace supertac {
+
+std::array<float, rig::kTaxels> taxel_volts(const BoardFrame& frame) {
+  constexpr auto kVoltsPerCode = static_cast<float>(rig::kAdcVolts / rig::kAdcCodes);
+  std::array<float, rig::kTaxels> volts{};
+  for (int k = 0; k < rig::kTaxels; ++k)
+    volts[static_cast<std::size_t>(k)] = static_cast<float>(frame.taxel(k)) * kVoltsPerCode;
+  return volts;
+}
+
+bool is_frame(const std::byte* bytes) {
+  static_assert(std::endian::native == std::endian::little, "the mask below is for little-endian words");
+  if (bytes[0] != kFrameHeader || bytes[rig::kFrameBytes - 1] != kFrameTrailer) return false;
+  // The high bytes are at 1, 3, ..., 161: every even byte of the 162 that follow the header.
+  constexpr std::uint64_t kHighNibbles = 0x00F000F000F000F0ULL;
+  std::uint64_t seen = 0;
+  for (std::size_t at = 1; at + 8 <= 161; at += 8) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, bytes + at, sizeof word);
+    seen |= word;
+  }
+  return (seen & kHighNibbles) == 0 && (bytes[161] & std::byte{0xF0}) == std::byte{0};
+}
+
+BoardFrame parse_frame(const std::byte* bytes) {
+  const auto sample = [bytes](std::size_t at) {
+    return static_cast<std::uint16_t>(std::to_integer<unsigned>(bytes[at]) << 8 |
+                                      std::to_integer<unsigned>(bytes[at + 1]));
+  };
+  BoardFrame frame;
+  for (std::size_t n = 0; n < rig::kFrameSamples; ++n) frame.samples[n] = sample(1 + 2 * n);
+  frame.slip = sample(161);
+  return frame;
+}
+
+void write_frame(const BoardFrame& frame, std::span<std::byte, rig::kFrameBytes> out) {
+  const auto put = [&out](std::size_t at, std::uint16_t value) {
+    if (value > kAdcMax) {
+      throw std::invalid_argument("write_frame: sample " + std::to_string(value) + ", expected at most " +
+                                  std::to_string(kAdcMax));
+    }
+    out[at] = static_cast<std::byte>(value >> 8);
+    out[at + 1] = static_cast<std::byte>(value & 0xFF);
+  };
+  out[0] = kFrameHeader;
+  for (std::size_t n = 0; n < rig::kFrameSamples; ++n) put(1 + 2 * n, frame.samples[n]);
+  put(161, frame.slip);
+  out[rig::kFrameBytes - 1] = kFrameTrailer;
+}
+
+}  // namespace supertac

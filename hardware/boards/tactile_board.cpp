@@ -1,0 +1,175 @@
+#include "hardware/boards/tactile_board.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+
+#include "hardware/ports/errors.h"
+#include "hardware/printers/marlin_line.h"
+#include "io/numbers/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kReadSlice = 0.05;
+constexpr std::size_t kReadBytes =
+    2048;  // half of what a terminal holds: a read that fills it left more behind
+
+bool is_text(std::byte byte) {
+  const int c = std::to_integer<int>(byte);
+  return c == '\n' || c == '\r' || (c >= ' ' && c < 127);
+}
+
+}  // namespace
+
+TactileBoard::TactileBoard(std::unique_ptr<Port> port, const BoardSettings& settings)
+    : port_(std::move(port)), settings_(settings), last_arrival_(port_->now()), thread_([this] { run(); }) {}
+
+TactileBoard::~TactileBoard() { stop(); }
+
+void TactileBoard::stop() {
+  {
+    std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  taken_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void TactileBoard::run() {
+  try {
+    for (;;) {
+      {
+        std::lock_guard lock(mutex_);
+        if (stop_) break;
+      }
+      read_once(port_->now() + kReadSlice);
+    }
+    // What had arrived when the stop was asked for still counts; bounded, in case the board never pauses.
+    for (int i = 0; i < 10000; ++i) {
+      const std::uint64_t before = decoder_.counters().bytes;
+      read_once(port_->now());
+      if (decoder_.counters().bytes == before) break;
+    }
+  } catch (...) {
+    std::lock_guard lock(mutex_);
+    error_ = std::current_exception();
+  }
+  gaps_.finish(missing_before_);
+  std::lock_guard lock(mutex_);
+  date_decided();
+  ended_ = true;
+  arrived_.notify_all();
+}
+
+void TactileBoard::read_once(double until) {
+  std::array<std::byte, kReadBytes> buffer{};
+  const Received got = port_->read(buffer, until);
+  const auto bytes = std::span(buffer).first(got.count);
+  if (decoder_.counters().frames == 0) {
+    for (const std::byte byte : bytes) text_bytes_ += is_text(byte) ? 1 : 0;
+  }
+  batch_.clear();
+  decoder_.push(bytes, [&](const BoardFrame& frame, std::uint64_t discarded) {
+    batch_.push_back({frame, discarded});
+  });
+  take_batch(got.time_s, got.count == buffer.size());
+  check_silence(got.time_s);
+  std::lock_guard lock(mutex_);
+  counters_.decoder = decoder_.counters();
+}
+
+void TactileBoard::check_silence(double time) {
+  if (time - last_arrival_ < settings_.silence_s) return;
+  const std::uint64_t total = decoder_.counters().bytes;
+  if (decoder_.counters().frames == 0 && total >= 2) {
+    const bool text = text_bytes_ > 0.9 * static_cast<double>(total);
+    throw WrongDevice(
+        "port " + port_->name() + ": expected a tactile board, found " +
+        (text ? "text, as from a printer; exchange the two ports"
+              : std::to_string(total) + " bytes without a frame; choose the board's port (--list-ports)"));
+  }
+  throw BoardSilent(
+      "board " + port_->name() + ": expected " + format(rig::kFrameRateHz, 0) + " frames/s, found none for " +
+      format(settings_.silence_s, 1) + " s; " +
+      (decoder_.counters().frames == 0 ? "is this the board's port (--list-ports)? If it is, " : "") +
+      "plug the board out and in again");
+}
+
+void TactileBoard::take_batch(double time, bool more_waits) {
+  const auto count = static_cast<double>(batch_.size());
+  const double step = first_ ? rig::kFramePeriodS : std::min(rig::kFramePeriodS, (time - last_time_) / count);
+  // Frames that have waited follow the last one; what is read as it comes has just been finished.
+  const double begin = more_waits && !first_ ? last_time_ : time - count * step;
+  double number = 0;
+  for (const Decoded& decoded : batch_) {
+    number += 1;
+    take({.frame = decoded.frame, .arrival_s = time, .time_s = begin + number * step}, decoded.discarded);
+  }
+}
+
+void TactileBoard::take(StampedFrame frame, std::uint64_t discarded) {
+  frame.suspect = discarded > 0 || (!first_ && frame.arrival_s - last_arrival_ > 1.5 * rig::kFramePeriodS);
+  frame.jump = jumps_.jump(frame.frame);
+  first_ = false;
+  last_arrival_ = frame.arrival_s;
+  last_time_ = frame.time_s;
+  gaps_.push(frame.arrival_s, missing_before_);
+  undecided_.push_back(frame.arrival_s);
+
+  std::unique_lock lock(mutex_);
+  date_decided();
+  counters_.suspect += frame.suspect ? 1 : 0;
+  counters_.jumps += frame.jump ? 1 : 0;
+  if (settings_.wait_for_consumer) {
+    taken_.wait(lock, [&] { return queue_.size() < settings_.queue_frames || stop_; });
+  } else if (queue_.size() >= settings_.queue_frames) {
+    queue_.pop_front();
+    ++counters_.dropped;
+  }
+  queue_.push_back(frame);
+  arrived_.notify_one();
+}
+
+// With mutex_ held: the frames whose gaps are now certain go to the clock.
+void TactileBoard::date_decided() {
+  for (const std::uint32_t missing : missing_before_) {
+    clock_index_ += missing;
+    clock_.add(clock_index_++, undecided_.front());
+    undecided_.pop_front();
+  }
+  missing_before_.clear();
+  counters_.missing = gaps_.missing();
+}
+
+std::optional<StampedFrame> TactileBoard::next(double wait_s) {
+  std::unique_lock lock(mutex_);
+  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return !queue_.empty() || ended_; });
+  if (!queue_.empty()) {
+    const StampedFrame frame = queue_.front();
+    queue_.pop_front();
+    if (settings_.wait_for_consumer) taken_.notify_one();
+    return frame;
+  }
+  if (error_) std::rethrow_exception(error_);
+  return std::nullopt;
+}
+
+void TactileBoard::check() {
+  std::lock_guard lock(mutex_);
+  if (error_) std::rethrow_exception(error_);
+}
+
+void TactileBoard::wait_for_end(double wait_s) {
+  std::unique_lock lock(mutex_);
+  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return ended_; });
+}
+
+BoardCounters TactileBoard::counters() {
+  std::lock_guard lock(mutex_);
+  BoardCounters counters = counters_;
+  counters.clock = clock_.fit();
+  return counters;
+}
+
+}  // namespace supertac

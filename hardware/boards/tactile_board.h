@@ -1,0 +1,102 @@
+// The live board: a thread reads and decodes, a bounded queue hands frames over. The reader never waits for
+// its consumer - the terminal holds 24.8 ms - so a slow consumer loses the oldest frames, and a counter says
+// how many.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "hardware/boards/frame_clock.h"
+#include "hardware/boards/frame_decoder.h"
+#include "hardware/ports/port.h"
+
+namespace supertac {
+
+struct StampedFrame {
+  BoardFrame frame;
+  double arrival_s = 0;
+  /// When the board finished the frame, as far as that is known at once: the last frame of a read has just
+  /// been finished and the others a period apart before it, unless the read left more behind: then they
+  /// follow the frame before. Increasing.
+  double time_s = 0;
+  bool suspect = false;  ///< first after a pause of 1.5 periods or after discarded bytes: may be torn
+  bool jump = false;     ///< implausible change of a taxel
+};
+
+struct BoardSettings {
+  std::size_t queue_frames = 4096;
+  bool wait_for_consumer = false;  ///< a full queue holds the reader up and drops nothing: for replays
+  double silence_s = 1;            ///< without a frame for so long: BoardSilent
+};
+
+struct BoardCounters {
+  FrameDecoder::Counters decoder;
+  std::uint64_t dropped = 0;  ///< frames the consumer was too slow for
+  /// Frames that never arrived, counted from the gaps in time; the last 64 gaps are undecided until the
+  /// reader ends.
+  std::uint64_t missing = 0;
+  std::uint64_t suspect = 0;
+  std::uint64_t jumps = 0;
+  ClockFit clock;
+};
+
+class TactileBoard {
+ public:
+  /// Starts to read `port`.
+  explicit TactileBoard(std::unique_ptr<Port> port, const BoardSettings& settings = {});
+  /// Stops reading; frames that already arrived at the port are still read.
+  ~TactileBoard();
+  void stop();
+
+  /// The next frame, oldest first; nothing after `wait_s` of wall time. Rethrows what ended the reader
+  /// (PortUnplugged, BoardSilent, WrongDevice) once the frames before it have been taken.
+  std::optional<StampedFrame> next(double wait_s);
+  /// Rethrows what ended the reader, without waiting and without taking frames.
+  void check();
+  /// Waits at most `wait_s` of wall time for the reader to end by itself.
+  void wait_for_end(double wait_s);
+  BoardCounters counters();
+
+ private:
+  void run();
+  void read_once(double until);
+  void take_batch(double time, bool more_waits);
+  void take(StampedFrame frame, std::uint64_t discarded);
+  void date_decided();
+  void check_silence(double time);
+
+  std::unique_ptr<Port> port_;
+  BoardSettings settings_;
+  std::mutex mutex_;
+  std::condition_variable arrived_, taken_;
+  std::deque<StampedFrame> queue_;
+  std::exception_ptr error_;
+  BoardCounters counters_;
+  ClockEstimator clock_;
+  std::uint64_t clock_index_ = 0;
+  bool stop_ = false, ended_ = false;
+
+  // of the reader's thread alone
+  FrameDecoder decoder_;
+  GapCounter gaps_;
+  JumpDetector jumps_;
+  struct Decoded {
+    BoardFrame frame;
+    std::uint64_t discarded;
+  };
+  std::vector<Decoded> batch_;  // of one read
+  std::vector<std::uint32_t> missing_before_;
+  std::deque<double> undecided_;
+  double last_arrival_ = 0, last_time_ = 0;
+  bool first_ = true;
+  double text_bytes_ = 0;
+  std::thread thread_;
+};
+
+}  // namespace supertac

@@ -1,0 +1,81 @@
+#include "hardware/collection/capture.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "hardware/ports/errors.h"
+#include "io/numbers/text.h"
+
+namespace supertac {
+
+CapturedPort::CapturedPort(std::unique_ptr<Port> port, JournalWriter& journal, Stream stream)
+    : port_(std::move(port)), journal_(journal), stream_(stream) {}
+
+double CapturedPort::now() {
+  const double time = port_->now();
+  journal_.append(stream_, RecordKind::clock, time, {});
+  return time;
+}
+
+Received CapturedPort::read(std::span<std::byte> buffer, double until) {
+  const Received got = port_->read(buffer, until);
+  const RecordKind kind = got.count > 0 ? RecordKind::received : RecordKind::timed_out;
+  journal_.append(stream_, kind, got.time_s, buffer.first(got.count));
+  return got;
+}
+
+double CapturedPort::write(std::span<const std::byte> bytes, double until) {
+  const double time = port_->write(bytes, until);
+  journal_.append(stream_, RecordKind::sent, time, bytes);
+  return time;
+}
+
+ReplayPort::ReplayPort(std::vector<JournalRecord> records, std::string name)
+    : records_(std::move(records)), name_(std::move(name)) {}
+
+const JournalRecord& ReplayPort::next(RecordKind expected) {
+  if (at_ >= records_.size()) throw PortUnplugged("replay " + name_ + ": the end of the recording");
+  const JournalRecord& record = records_[at_];
+  if (record.kind != expected) {
+    throw ReplayDiverged("replay " + name_ + ": record " + std::to_string(at_) + " is of kind " +
+                         std::to_string(static_cast<int>(record.kind)) + ", the driver now did " +
+                         std::to_string(static_cast<int>(expected)) +
+                         "; replay with the program and settings that recorded it");
+  }
+  return record;
+}
+
+double ReplayPort::now() {
+  // A driver that reads less at once than the one that was recorded asks in between.
+  if (taken_ > 0) return records_[at_].time_s;
+  const double time = next(RecordKind::clock).time_s;
+  ++at_;
+  return time;
+}
+
+Received ReplayPort::read(std::span<std::byte> buffer, double) {
+  if (at_ < records_.size() && records_[at_].kind == RecordKind::timed_out)
+    return {0, records_[at_++].time_s};
+  const JournalRecord& record = next(RecordKind::received);
+  const std::size_t count = std::min(buffer.size(), record.bytes.size() - taken_);
+  std::copy_n(record.bytes.begin() + static_cast<std::ptrdiff_t>(taken_), count, buffer.begin());
+  taken_ += count;
+  const double time = record.time_s;
+  if (taken_ == record.bytes.size()) {
+    taken_ = 0;
+    ++at_;
+  }
+  return {count, time};
+}
+
+double ReplayPort::write(std::span<const std::byte> bytes, double) {
+  const JournalRecord& record = next(RecordKind::sent);
+  if (!std::equal(bytes.begin(), bytes.end(), record.bytes.begin(), record.bytes.end())) {
+    throw ReplayDiverged("replay " + name_ + ": record " + std::to_string(at_) + " sent " +
+                         in_quotes(record.text()) + ", the driver now sent something else");
+  }
+  ++at_;
+  return record.time_s;
+}
+
+}  // namespace supertac

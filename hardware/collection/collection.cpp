@@ -1,0 +1,306 @@
+#include "hardware/collection/collection.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "hardware/boards/frame_decoder.h"
+#include "hardware/printers/motion_model.h"
+#include "io/numbers/median.h"
+#include "io/numbers/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kLargest = 1e10;   // of any number in an event: a journal may come from anywhere
+constexpr int kMostSteps = 20'000;  // of a modelled leg: 100 s every 5 ms
+
+std::string point_text(const Point3& p) {
+  return format(p.x, 4) + " " + format(p.y, 4) + " " + format(p.z, 4);
+}
+
+// The numbers behind an event's first word; nothing when there are not exactly `Count`.
+template <std::size_t Count>
+std::optional<std::array<double, Count>> numbers_of(std::string_view text) {
+  std::array<double, Count> values{};
+  std::size_t at = text.find(' ');
+  for (double& value : values) {
+    if (at == std::string_view::npos) return std::nullopt;
+    const char* last = text.data() + text.size();
+    const auto [end, error] = std::from_chars(text.data() + at + 1, last, value);
+    if (error != std::errc{} || !(std::abs(value) < kLargest)) return std::nullopt;
+    at = end == last ? std::string_view::npos : static_cast<std::size_t>(end - text.data());
+  }
+  return at == std::string_view::npos ? std::optional(values) : std::nullopt;
+}
+
+struct RecordedLeg {
+  Leg leg;
+  bool ended = false;
+  std::vector<PositionSample> samples;
+};
+
+// The end names its leg whole: the beginning may be lost with a damaged part of the journal.
+void end_leg(std::vector<RecordedLeg>& legs, const Leg& leg) {
+  if (legs.empty() || legs.back().leg.accepted_s != leg.accepted_s) {
+    RecordedLeg found{leg, true, {}};
+    if (!legs.empty()) {
+      auto& before = legs.back().samples;
+      const auto first = std::find_if(before.begin(), before.end(),
+                                      [&](const PositionSample& s) { return s.time_s >= leg.accepted_s; });
+      found.samples.assign(first, before.end());
+      before.erase(first, before.end());
+    }
+    legs.push_back(std::move(found));
+  }
+  legs.back().leg.ended_s = leg.ended_s;
+  legs.back().ended = true;
+}
+
+std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
+  std::vector<RecordedLeg> legs;
+  for (const JournalRecord& record : journal.of(Stream::event)) {
+    const std::string text = record.text();
+    if (text == kRunComplete) complete = true;
+    if (text.starts_with("leg ")) {
+      const auto v = numbers_of<12>(text);
+      if (!v) continue;
+      const auto& n = *v;
+      if (n[1] < 1 || n[2] < 0 || n[2] > static_cast<int>(Phase::reposition)) continue;
+      const Leg leg{static_cast<int>(std::min(n[1], 1e6)),
+                    static_cast<Phase>(static_cast<int>(n[2])),
+                    {n[3], n[4], n[5]},
+                    {n[6], n[7], n[8]},
+                    n[9],
+                    n[10],
+                    n[11]};
+      if (n[0] == 0) {
+        legs.push_back({leg, false, {}});
+      } else {
+        end_leg(legs, leg);
+      }
+    } else if (text.starts_with("at ") && !legs.empty()) {
+      if (const auto v = numbers_of<5>(text)) {
+        legs.back().samples.push_back({(*v)[0], (*v)[1], {(*v)[2], (*v)[3], (*v)[4]}});
+      }
+    }
+  }
+  return legs;
+}
+
+struct Frames {
+  std::vector<BoardFrame> frames;
+  std::vector<double> arrivals;
+  std::vector<std::uint8_t> suspect;
+};
+
+Frames frames_in(const Journal& journal, FrameDecoder::Counters& counters) {
+  Frames all;
+  FrameDecoder decoder;
+  JumpDetector jumps;
+  for (const JournalRecord& record : journal.of(Stream::board)) {
+    if (record.kind != RecordKind::received) continue;
+    decoder.push(record.bytes, [&](const BoardFrame& frame, std::uint64_t discarded) {
+      const bool late =
+          !all.arrivals.empty() && record.time_s - all.arrivals.back() > 1.5 * rig::kFramePeriodS;
+      all.suspect.push_back(discarded > 0 || late || jumps.jump(frame) ? 1 : 0);
+      all.frames.push_back(frame);
+      all.arrivals.push_back(record.time_s);
+    });
+  }
+  counters = decoder.counters();
+  return all;
+}
+
+// How far the sample is from the leg's straight line, ends included.
+double off_leg(const Leg& leg, const Point3& p) {
+  const double length = distance(leg.from, leg.to);
+  const double along =
+      ((p.x - leg.from.x) * (leg.to.x - leg.from.x) + (p.y - leg.from.y) * (leg.to.y - leg.from.y) +
+       (p.z - leg.from.z) * (leg.to.z - leg.from.z)) /
+      std::max(length * length, 1e-12);
+  return distance(p, between(leg.from, leg.to, std::clamp(along, 0.0, 1.0)));
+}
+
+double median_round_trip(const std::vector<PositionSample>& samples) {
+  std::vector<double> trips;
+  for (const PositionSample& sample : samples) trips.push_back(sample.round_trip_s);
+  return median(trips);
+}
+
+// By how much (s) the clock misses the frames first to last: the earliest of every 128 arrives on time.
+double clock_error(const Frames& all, const FrameTimeline& timeline, std::size_t first, std::size_t last) {
+  constexpr std::size_t kWindow = 128;
+  double worst = 0;
+  for (std::size_t begin = first; begin + kWindow <= last; begin += kWindow) {
+    double earliest = kLargest;
+    for (std::size_t i = begin; i < begin + kWindow; ++i) {
+      earliest =
+          std::min(earliest, all.arrivals[i] - timeline.clock.at(static_cast<double>(timeline.index[i])));
+    }
+    worst = std::max(worst, std::abs(earliest));
+  }
+  return worst;
+}
+
+std::string doubt_of(const ClockFit& clock, double clock_error_s, double speed, double track_mm) {
+  std::string doubt;
+  if (!clock.plausible)
+    doubt = "the board's clock says " + format(1e6 * clock.measured_s, 1) + " us a frame, the nominal " +
+            format(1e6 * rig::kFramePeriodS, 0) + " are used; ";
+  if (clock_error_s * speed > kTrustedMm)
+    doubt += "frames are up to " + format(clock_error_s, 2) + " s off their clock; ";
+  if (track_mm > kTrustedMm) doubt += "the head may have been " + format(track_mm, 1) + " mm elsewhere; ";
+  return doubt.substr(0, doubt.size() - std::min<std::size_t>(2, doubt.size()));
+}
+
+CollectedPass pass_of(const Frames& all, const FrameTimeline& timeline, const PositionTrack& track,
+                      double speed) {
+  CollectedPass pass;
+  std::uint64_t first = 0, last = 0;
+  std::size_t begin = 0, end = 0;
+  for (std::size_t i = 0; i < all.frames.size(); ++i) {
+    const double time =
+        timeline.clock.at(static_cast<double>(timeline.index[i])) - 0.5 * timeline.clock.period_s;
+    if (time < track.begin() || time > track.end()) continue;
+    if (pass.time_s.empty()) {
+      first = timeline.index[i];
+      begin = i;
+    }
+    end = i + 1;
+    last = timeline.index[i];
+    pass.time_s.push_back(time - track.begin());
+    const auto volts = taxel_volts(all.frames[i]);
+    pass.volts.insert(pass.volts.end(), volts.begin(), volts.end());
+    const Point3 p = track.at(time);
+    pass.position.insert(pass.position.end(), {p.x, p.y, p.z});
+    pass.suspect.push_back(all.suspect[i]);
+  }
+  pass.speed = speed;
+  pass.doubt = doubt_of(timeline.clock, clock_error(all, timeline, begin, end), speed, track.doubt_mm());
+  if (!pass.time_s.empty()) pass.missing = last - first + 1 - pass.time_s.size();
+  return pass;
+}
+
+}  // namespace
+
+std::string event_text(const Leg& leg, bool ended) {
+  return std::string("leg ") + (ended ? "1 " : "0 ") + std::to_string(leg.pass) + " " +
+         std::to_string(static_cast<int>(leg.phase)) + " " + point_text(leg.from) + " " + point_text(leg.to) +
+         " " + format(leg.speed, 4) + " " + format(leg.accepted_s, 6) + " " + format(leg.ended_s, 6);
+}
+
+std::string event_text(const PositionSample& sample) {
+  return "at " + format(sample.time_s, 6) + " " + format(sample.round_trip_s, 6) + " " +
+         point_text(sample.position);
+}
+
+void PositionTrack::add(double time_s, const Point3& position) {
+  if (points_.empty() || time_s > points_.back().time_s) points_.push_back({time_s, position});
+}
+
+// Between two knots no head is faster than ordered: how far it can have been from the straight line in time.
+void PositionTrack::distrust(const Leg& leg) {
+  if (points_.size() < 2 || !(leg.speed > 0)) return;
+  const Knot &a = points_[points_.size() - 2], &b = points_.back();
+  const double way = distance(a.position, b.position), farthest = leg.speed * (b.time_s - a.time_s);
+  if (way < farthest) doubt_mm_ = std::max(doubt_mm_, way * (1 - way / farthest));
+}
+
+void PositionTrack::model(const Leg& leg, double acceleration) {
+  const double length = distance(leg.from, leg.to);
+  if (leg.speed > 0) {
+    // Longer than ordered: nobody knows where on the way the head was slow.
+    const double ordered =
+        rig::kStartDelayS + trapezoid_duration(length, rig::true_speed(leg.speed), acceleration);
+    const double off_s = std::abs(leg.ended_s - leg.accepted_s - ordered);
+    doubt_mm_ = std::max(doubt_mm_, std::min(length, off_s * leg.speed));
+  }
+  const double start = std::min(leg.accepted_s + rig::kStartDelayS, leg.ended_s - 1e-6);
+  const double duration = leg.ended_s - start;
+  const int steps = static_cast<int>(std::clamp(duration / 0.005, 1.0, double{kMostSteps}));
+  for (int i = 0; i <= steps; ++i) {
+    const double t = duration * i / steps;
+    const double part = length > 0 ? trapezoid_position(t, length, duration, acceleration) / length : 1;
+    add(start + t, between(leg.from, leg.to, part));
+  }
+}
+
+void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& samples, double acceleration) {
+  add(leg.accepted_s, leg.from);
+  if (samples.empty() && leg.ended_s > leg.accepted_s) return model(leg, acceleration);
+  const double slowest_answer = samples.empty() ? 0 : 3 * median_round_trip(samples) + 0.001;
+  Knot before = points_.empty() ? Knot{leg.accepted_s, leg.from} : points_.back();
+  for (const PositionSample& sample : samples) {
+    const bool good = sample.round_trip_s <= slowest_answer && off_leg(leg, sample.position) < 0.05 &&
+                      reachable(leg, {before.time_s, 0, before.position}, sample) &&
+                      distance(leg.from, before.position) < distance(leg.from, sample.position) + 0.015;
+    if (!good) {
+      ++rejected_;
+      continue;
+    }
+    before = {sample.time_s, sample.position};
+    add(sample.time_s, sample.position);
+    distrust(leg);
+    doubt_mm_ = std::max(doubt_mm_, 0.5 * sample.round_trip_s * leg.speed);
+  }
+  if (leg.ended_s > 0) {
+    add(leg.ended_s, leg.to);
+    distrust(leg);
+  }
+}
+
+Point3 PositionTrack::at(double time_s) const {
+  if (points_.empty()) return {};
+  const auto after = std::lower_bound(points_.begin(), points_.end(), time_s,
+                                      [](const Knot& knot, double t) { return knot.time_s < t; });
+  if (after == points_.begin()) return points_.front().position;
+  if (after == points_.end()) return points_.back().position;
+  const Knot& a = *(after - 1);
+  const Knot& b = *after;
+  return between(a.position, b.position, (time_s - a.time_s) / (b.time_s - a.time_s));
+}
+
+Collection collection_of(const Journal& journal) {
+  Collection collection;
+  collection.header = journal.header;
+  collection.torn_bytes = journal.torn_bytes;
+  collection.lost_bytes = journal.lost_bytes;
+  collection.lost_s = journal.lost_s;
+  const std::vector<RecordedLeg> legs = legs_in(journal, collection.complete);
+  const Frames all = frames_in(journal, collection.decoder);
+  const FrameTimeline timeline = timeline_of(all.arrivals);
+  collection.frames = all.frames.size();
+  collection.missing = timeline.missing;
+  collection.clock = timeline.clock;
+  struct Parts {
+    PositionTrack track;
+    double speed = 0;
+    bool complete = false;
+    std::uint64_t positions = 0;
+  };
+  std::map<int, Parts> parts;
+  for (const RecordedLeg& recorded : legs) {
+    const Phase phase = recorded.leg.phase;
+    if (phase != Phase::onset && phase != Phase::slide && phase != Phase::release) continue;
+    Parts& part = parts[recorded.leg.pass];
+    part.track.add_leg(recorded.leg, recorded.samples);
+    part.positions += recorded.samples.size();
+    if (phase == Phase::slide) part.speed = recorded.leg.speed;
+    if (phase == Phase::release) part.complete = recorded.ended;
+  }
+  for (const auto& [number, part] : parts) {
+    CollectedPass pass = pass_of(all, timeline, part.track, part.speed);
+    pass.pass = number;
+    pass.complete = part.complete;
+    pass.positions = part.positions;
+    pass.rejected_positions = part.track.rejected();
+    collection.passes.push_back(std::move(pass));
+  }
+  return collection;
+}
+
+}  // namespace supertac

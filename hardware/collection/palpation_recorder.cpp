@@ -1,0 +1,77 @@
+#include "hardware/collection/palpation_recorder.h"
+
+#include "hardware/collection/collection.h"
+#include "hardware/ports/errors.h"
+
+namespace supertac {
+namespace {
+
+PalpationObserver observer_for(const RecorderSettings& settings, JournalWriter& journal,
+                               TactileBoard& board) {
+  PalpationObserver observer;
+  observer.leg_started = [&](const Leg& leg) { journal.event(leg.accepted_s, event_text(leg, false)); };
+  observer.leg_ended = [&](const Leg& leg) { journal.event(leg.ended_s, event_text(leg, true)); };
+  observer.position = [&](const Leg& leg, const PositionSample& sample) {
+    journal.event(sample.time_s, event_text(sample));
+    if (settings.progress) settings.progress(leg, sample.position, board.counters());
+  };
+  observer.check = [&] {
+    if (settings.stop != nullptr && *settings.stop) throw OperatorStop("stopped by the operator");
+    journal.check();
+    if (!settings.replay) board.check();
+  };
+  return observer;
+}
+
+// Nothing moves before the board has been heard: a wrong port would otherwise be found with the finger on its
+// way. The wait is a fixed one, so that a replay waits the same.
+void hear_board(TactileBoard& board, Printer& printer, const RecorderSettings& settings) {
+  printer.link().idle(settings.board.silence_s + 0.1);
+  if (!settings.replay) (void)board.next(2);  // throws what ended the board instead
+}
+
+RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> printer_port,
+                      const RecorderSettings& settings, JournalWriter& journal) {
+  CapturedPort captured(std::move(printer_port), journal, Stream::printer);
+  Printer printer(captured, settings.printer);
+  printer.connect();
+  if (settings.home) {
+    printer.home();
+  } else {
+    printer.confirm_origin(settings.origin);
+  }
+  TactileBoard board(std::make_unique<CapturedPort>(std::move(board_port), journal, Stream::board),
+                     settings.board);
+  hear_board(board, printer, settings);
+  RecorderReport report;
+  report.outcome = Palpation(printer, settings.plan, observer_for(settings, journal, board)).run();
+  if (settings.replay) {
+    board.wait_for_end(60);
+  }
+  board.stop();
+  report.board = board.counters();
+  report.printer = printer.link().counters();
+  if (report.outcome.complete) journal.event(captured.now(), kRunComplete);
+  try {
+    journal.close();
+  } catch (const JournalError&) {
+    report.outcome.complete = false;
+    if (!report.outcome.error) report.outcome.error = std::current_exception();
+  }
+  return report;
+}
+
+}  // namespace
+
+RecorderReport record_palpation(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
+                                const RecorderSettings& settings) {
+  JournalWriter journal(settings.journal, settings.header);
+  try {
+    return record(std::move(board), std::move(printer), settings, journal);
+  } catch (...) {
+    journal.discard();
+    throw;
+  }
+}
+
+}  // namespace supertac

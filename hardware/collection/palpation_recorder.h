@@ -1,0 +1,43 @@
+// A whole collection against two ports: captured bytes, journal events, board and palpation run together.
+// What supertac-collect does, without its talk.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "hardware/boards/tactile_board.h"
+#include "hardware/collection/capture.h"
+#include "hardware/printers/palpation.h"
+
+namespace supertac {
+
+struct RecorderSettings {
+  PalpationPlan plan;
+  PrinterSettings printer;
+  BoardSettings board;
+  Point3 origin = rig::kMounted;            ///< where the operator confirms the head to be
+  bool home = false;                        ///< home instead
+  std::string journal;                      ///< path; must not exist
+  std::string header;                       ///< one line that says what is collected
+  const std::atomic<bool>* stop = nullptr;  ///< set by a signal handler: lift the finger and end
+  /// The ports replay a journal: the board's is read to its end, which is no error.
+  bool replay = false;
+  /// Called for every polled position; for a live line.
+  std::function<void(const Leg&, const Point3&, const BoardCounters&)> progress;
+};
+
+struct RecorderReport {
+  PalpationOutcome outcome;
+  BoardCounters board;
+  MarlinLink::Counters printer;
+};
+
+/// Runs the plan and journals everything. Throws while nothing has been recorded - no device, the wrong one,
+/// a plan outside the limits, a homing that failed - and then leaves no journal; later failures are in the
+/// outcome. When this returns the journal is complete on disk, or outcome.error says why not.
+RecorderReport record_palpation(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
+                                const RecorderSettings& settings);
+
+}  // namespace supertac

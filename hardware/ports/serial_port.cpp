@@ -1,0 +1,131 @@
+#include "hardware/ports/serial_port.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "hardware/ports/errors.h"
+#include "hardware/ports/serial_termios.h"
+
+namespace supertac {
+namespace {
+
+[[noreturn]] void open_failed(const std::string& path, int error) {
+  const std::string at = "port " + path + ": ";
+  switch (error) {
+    case ENOENT:
+      throw PortNotFound(at +
+                         "no such port; plug the device in, or run with --list-ports to see what is there");
+    case EACCES:
+    case EPERM:
+      throw PortPermission(at + "permission denied; run `sudo usermod -aG dialout $USER` and log in again");
+    case EBUSY:
+      throw PortBusy(at + "already open in another program; close it (see `fuser " + path +
+                     "`) and try again");
+    case ENXIO:
+    case ENODEV:
+    case EIO:
+      throw PortUnplugged(at + "the device behind it is gone (" + strerror(error) + "); plug it in again");
+    default:
+      throw PortError(at + "cannot be opened: " + strerror(error));
+  }
+}
+
+// Boards with a bootloader want DTR and RTS; a pseudo-terminal has neither and says ENOTTY or EINVAL.
+void raise_modem_lines(int descriptor) {
+  int lines = TIOCM_DTR | TIOCM_RTS;
+  (void)ioctl(descriptor, TIOCMBIS, &lines);
+}
+
+}  // namespace
+
+double monotonic_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+SerialPort::SerialPort(const std::string& path, const SerialSettings& settings)
+    : path_(path), speedup_(settings.speedup) {
+  descriptor_ = open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor_ < 0) open_failed(path, errno);
+  const auto give_up = [&](int error) {
+    close(descriptor_);
+    open_failed(path, error);
+  };
+  if (isatty(descriptor_) == 0) {
+    close(descriptor_);
+    throw NotASerialPort("port " + path +
+                         ": expected a serial port, found another kind of file; run with --list-ports");
+  }
+  if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) give_up(errno == EWOULDBLOCK ? EBUSY : errno);
+  if (ioctl(descriptor_, TIOCEXCL) != 0) give_up(errno);
+  if (const int error = set_raw_terminal(descriptor_, settings.baud)) give_up(error);
+  raise_modem_lines(descriptor_);
+}
+
+SerialPort::~SerialPort() {
+  (void)ioctl(descriptor_, TIOCNXCL);
+  close(descriptor_);
+}
+
+Received SerialPort::read(std::span<std::byte> buffer, double until) {
+  for (;;) {
+    const ssize_t count = ::read(descriptor_, buffer.data(), buffer.size());
+    if (count > 0) return {static_cast<std::size_t>(count), now()};
+    if (count == 0) unplugged("end of file");
+    if (errno == EINTR) continue;
+    if (errno != EAGAIN) unplugged(strerror(errno));
+    if (!wait_for(POLLIN, until)) return {0, now()};
+  }
+}
+
+double SerialPort::write(std::span<const std::byte> bytes, double until) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(descriptor_, bytes.data(), bytes.size());
+    if (count > 0) {
+      bytes = bytes.subspan(static_cast<std::size_t>(count));
+      continue;
+    }
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0 && errno != EAGAIN) unplugged(strerror(errno));
+    if (!wait_for(POLLOUT, until)) {
+      throw PortTimeout("port " + path_ + ": the device took no bytes before the deadline (" +
+                        std::to_string(bytes.size()) + " left); switch it off and on again");
+    }
+  }
+  return now();
+}
+
+bool SerialPort::wait_for(short events, double until) {
+  for (;;) {
+    const double wait_ms = std::max(0.0, 1e3 * (until - now()) / speedup_);
+    pollfd entry{descriptor_, events, 0};
+    const int ready = poll(&entry, 1, static_cast<int>(std::min(std::ceil(wait_ms), 1e9)));
+    if (ready < 0 && errno != EINTR) unplugged(strerror(errno));
+    if (ready > 0 && (entry.revents & events) != 0 && (entry.revents & POLLHUP) == 0) return true;
+    if (ready > 0 && (entry.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) {
+      // Bytes that arrived before the plug was pulled are still readable; then the next read ends here again.
+      int left = 0;
+      if (events == POLLIN && ioctl(descriptor_, FIONREAD, &left) == 0 && left > 0) return true;
+      unplugged("end of file");
+    }
+    if (now() >= until) return false;
+  }
+}
+
+void SerialPort::unplugged(const std::string& found) const {
+  throw PortUnplugged("port " + path_ + ": the device is gone (" + found +
+                      "); check the cable and start again, nothing is resumed");
+}
+
+}  // namespace supertac

@@ -1,0 +1,130 @@
+#include "hardware/printers/marlin_line.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+
+namespace supertac {
+namespace {
+
+bool contains(std::string_view text, std::string_view part) {
+  return text.find(part) != std::string_view::npos;
+}
+
+std::optional<std::int64_t> number_after(std::string_view text, std::string_view label) {
+  const std::size_t at = text.find(label);
+  if (at == std::string_view::npos) return std::nullopt;
+  std::string_view rest = text.substr(at + label.size());
+  while (!rest.empty() && rest.front() == ' ') rest.remove_prefix(1);
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), value);
+  const bool ends_cleanly = end == rest.data() + rest.size() || *end == ' ';
+  if (error != std::errc{} || !ends_cleanly) return std::nullopt;
+  return value;
+}
+
+// "X:99.70 Y:101.17 Z:91.81 E:0.00 Count ...": all three, or the line counts as damaged.
+std::optional<Point3> position_in(std::string_view text) {
+  if (!text.starts_with("X:")) return std::nullopt;
+  std::array<double, 3> values{};
+  constexpr std::array<std::string_view, 3> kLabels{"X:", " Y:", " Z:"};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::size_t at = text.find(kLabels[axis]);
+    if (at == std::string_view::npos) return std::nullopt;
+    const char* first = text.data() + at + kLabels[axis].size();
+    const char* last = text.data() + text.size();
+    const auto [end, error] = std::from_chars(first, last, values[axis], std::chars_format::fixed);
+    // Two decimals at least: a lost point or digit would otherwise move the head by metres.
+    const std::string_view number(first, static_cast<std::size_t>(end - first));
+    const std::size_t point = number.find('.');
+    if (error != std::errc{} || point == std::string_view::npos || number.size() - point < 3)
+      return std::nullopt;
+    if (end != last && *end != ' ') return std::nullopt;
+  }
+  return Point3{values[0], values[1], values[2]};
+}
+
+bool is_fatal(std::string_view text) {
+  for (const std::string_view mark : {"kill() called", "Printer halted", "Thermal Runaway", "THERMAL RUNAWAY",
+                                      "Heating failed", "MAXTEMP", "MINTEMP", "Printer stopped"}) {
+    if (contains(text, mark)) return true;
+  }
+  return false;
+}
+
+Reply error_reply(std::string_view text) {
+  if (is_fatal(text)) return {ReplyKind::fatal, {}, {}, std::string(text)};
+  const bool line_fault = contains(text, "checksum") || contains(text, "Checksum") ||
+                          contains(text, "Line Number") || contains(text, "Last Line");
+  return {line_fault ? ReplyKind::line_fault : ReplyKind::error,
+          number_after(text, "Last Line:"),
+          {},
+          std::string(text)};
+}
+
+}  // namespace
+
+double distance(const Point3& a, const Point3& b) { return std::hypot(a.x - b.x, a.y - b.y, a.z - b.z); }
+
+Point3 between(const Point3& a, const Point3& b, double part) {
+  return {a.x + part * (b.x - a.x), a.y + part * (b.y - a.y), a.z + part * (b.z - a.z)};
+}
+
+std::string describe(const Point3& point) {
+  return "X" + format(point.x, 2) + " Y" + format(point.y, 2) + " Z" + format(point.z, 2);
+}
+
+unsigned marlin_checksum(std::string_view text) {
+  unsigned sum = 0;
+  for (const char c : text) sum ^= static_cast<unsigned char>(c);
+  return sum;
+}
+
+std::string shielded(std::string_view command) {
+  if (!command.starts_with('M') || command.starts_with("M110")) return std::string(command);
+  return "M0" + std::string(command.substr(1));
+}
+
+std::string numbered_line(std::int64_t number, std::string_view command) {
+  if (command.find_first_of("\r\n*") != std::string_view::npos) {
+    throw std::invalid_argument("marlin line: a command may not hold a line break or '*', got " +
+                                in_quotes(command));
+  }
+  std::string line = "N" + std::to_string(number) + " " + std::string(command);
+  line += "*" + std::to_string(marlin_checksum(line)) + "\n";
+  if (line.size() > kMaxLineBytes) {
+    throw std::invalid_argument("marlin line: " + std::to_string(line.size()) +
+                                " bytes, Marlin takes at most " + std::to_string(kMaxLineBytes) + ": " +
+                                in_quotes(command));
+  }
+  return line;
+}
+
+Reply parse_reply(std::string_view line) {
+  const auto kind = [line](ReplyKind k, std::optional<std::int64_t> number = {}) {
+    return Reply{k, number, {}, std::string(line)};
+  };
+  if (line == "ok" || line.starts_with("ok ")) return kind(ReplyKind::ok);
+  if (line == "start") return kind(ReplyKind::start);
+  if (line == "wait") return kind(ReplyKind::wait);
+  if (line.starts_with("Resend:")) return kind(ReplyKind::resend, number_after(line, "Resend:"));
+  if (line.starts_with("rs ")) return kind(ReplyKind::resend, number_after(line, "rs "));
+  if (line.starts_with("Error:")) return error_reply(line);
+  if (is_fatal(line)) return kind(ReplyKind::fatal);
+  if (line.starts_with("echo:busy: paused")) return kind(ReplyKind::paused);
+  if (line.starts_with("echo:busy:")) return kind(ReplyKind::busy);
+  if (line.starts_with("echo:Unknown command")) return kind(ReplyKind::unknown_command);
+  if (const auto position = position_in(line)) {
+    return {ReplyKind::position, {}, *position, std::string(line)};
+  }
+  const std::size_t text = line.find_first_not_of(' ');
+  if (text != std::string_view::npos && line.substr(text).starts_with("T:"))
+    return kind(ReplyKind::temperature);
+  return kind(ReplyKind::other);
+}
+
+}  // namespace supertac

@@ -1,0 +1,328 @@
+#include "hardware/printers/marlin_link.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kWriteDeadline = 2;
+constexpr double kWatchInterval = 0.02;  // a fifth of the 0.1 s in which an unplugged board must be noticed
+// With one line in flight the firmware is never honestly more than a line or two behind. A number further
+// back is damaged text, or a firmware that restarted; the second time in a row it is believed.
+constexpr std::int64_t kPlausibleLag = 4;
+
+}  // namespace
+
+struct MarlinLink::Exchange {
+  std::int64_t number;  // of the command
+  std::int64_t cursor;  // line now in flight: earlier than `number` while catching up
+  double deadline_s;
+  double until = 0;
+  Answer answer = {};
+  int repeats = 0;     // of the line at `cursor`
+  bool fault = false;  // the next ok acknowledges nothing
+  bool done = false;
+  bool proven = false;         // by Last Line, not by an ok
+  std::int64_t fallback = -1;  // implausibly old line the firmware named last
+  std::string code = {};       // as sent
+  std::string error = {};      // unfamiliar Error: of the command itself
+  bool error_stands = false;   // and the firmware did run it
+};
+
+MarlinLink::MarlinLink(Port& port, const MarlinSettings& settings) : port_(port), settings_(settings) {}
+
+void MarlinLink::connect() {
+  connected_ = false;
+  const double until = port_.now() + settings_.connect_deadline_s;
+  // Two answers in a row: the first ok may belong to something an earlier program sent.
+  int answers = 0;
+  while (answers < 2) {
+    const double now = port_.now();
+    if (now >= until) {
+      nobody_answered();
+    }
+    answers = probe(std::min(until, now + settings_.probe_interval_s)) ? answers + 1 : 0;
+  }
+  number_ = 0;
+  kept_.clear();
+  connected_ = true;
+  switch_reports_off();
+  read_capabilities();
+}
+
+void MarlinLink::switch_reports_off() {
+  for (const char* off : {"M154 S0", "M155 S0"}) {
+    try {
+      command(off);
+    } catch (const PrinterRefused&) {  // a firmware that does not know it sends no such reports
+    }
+  }
+}
+
+void MarlinLink::nobody_answered() const {
+  const std::string expected = "port " + port_.name() + ": expected a Marlin firmware, found ";
+  const std::string within = " answer to M110 within " + format(settings_.connect_deadline_s, 0) + " s; ";
+  if (sniffer_.counters().bytes > 0) {
+    throw WrongDevice(expected + std::to_string(sniffer_.counters().bytes) + " bytes that are no" + within +
+                      "check that it is the printer's port (--list-ports) and that its baud rate is " +
+                      std::to_string(rig::kPrinterBaud));
+  }
+  throw PrinterSilent(expected + "no" + within + "check that the printer is on and the port is right");
+}
+
+bool MarlinLink::probe(double until) {
+  send("\n" + numbered_line(0, "M110 N0"));
+  std::string line;
+  while (read_line(until, line)) {
+    const Reply reply = parse_reply(line);
+    if (reply.kind == ReplyKind::fatal) check_alarm(reply);
+    if (reply.kind != ReplyKind::ok) continue;
+    settle();
+    return true;
+  }
+  if (sniffer_.counters().frames >= 3) {
+    throw WrongDevice(
+        "port " + port_.name() +
+        ": expected a Marlin printer, found the frames of a tactile board; exchange the two ports");
+  }
+  return false;
+}
+
+void MarlinLink::read_capabilities() {
+  for (int attempt = 0; attempt < 2 && capabilities_.firmware.empty(); ++attempt) {
+    for (const Reply& reply : command("M115").replies) {
+      constexpr std::string_view kName = "FIRMWARE_NAME:";
+      if (reply.text.starts_with(kName)) capabilities_.firmware = reply.text.substr(kName.size());
+      if (reply.text == "Cap:EMERGENCY_PARSER:1") capabilities_.emergency_parser = true;
+    }
+  }
+}
+
+MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s) {
+  if (halted_) throw PrinterHalted("printer " + port_.name() + ": halted earlier; reset it and start again");
+  kept_.push_back(numbered_line(number_ + 1, shielded(code)));
+  ++number_;
+  if (kept_.size() > settings_.kept_lines) kept_.pop_front();
+  ++counters_.lines;
+  Exchange exchange{number_, number_, deadline_s > 0 ? deadline_s : settings_.ok_deadline_s};
+  exchange.code = shielded(code);
+  exchange.answer.sent_s = send(kept_.back());
+  exchange.until = exchange.answer.sent_s + exchange.deadline_s;
+  std::string text;
+  while (!exchange.done) {
+    if (read_line(exchange.until, text)) {
+      on_reply(exchange, parse_reply(text));
+    } else {
+      ++counters_.timeouts;
+      repeat(exchange, "no answer");
+    }
+  }
+  finish(exchange);
+  if (exchange.proven && deadline_s > settings_.ok_deadline_s) {
+    // Taken is not finished: the ok of a command behind it in the queue tells when a long one has ended.
+    exchange.answer.answered_s = command("M400", deadline_s).answered_s;
+  }
+  return std::move(exchange.answer);
+}
+
+void MarlinLink::finish(const Exchange& exchange) {
+  // After a disturbance a late second answer may be under way; taken for the next line's it would shift
+  // every later answer by one.
+  if (exchange.answer.repeated) settle();
+  if (exchange.error_stands) {
+    throw PrinterRefused("printer " + port_.name() + ": refused " +
+                         in_quotes(kept_.back().substr(0, kept_.back().size() - 1)) + ": " +
+                         printable(exchange.error));
+  }
+}
+
+void MarlinLink::repeat(Exchange& exchange, const std::string& why) {
+  const std::string& line = kept_[kept_.size() - 1 - static_cast<std::size_t>(number_ - exchange.cursor)];
+  if (++exchange.repeats > settings_.max_repeats) {
+    const std::string text = "printer " + port_.name() + ": line " + std::to_string(exchange.cursor) +
+                             " repeated " + std::to_string(settings_.max_repeats) +
+                             " times without success (" + why + ")";
+    if (exchange.fault) throw ResendLoop(text + ": resend loop; check the cable and start again");
+    throw PrinterSilent(text + "; check the printer and the cable");
+  }
+  exchange.answer.repeated = true;
+  exchange.fault = false;
+  ++counters_.repeats;
+  input_.clear();  // half an answer, such as an ok whose line break was lost
+  // The line break ends what may be left of a damaged line; Marlin ignores empty ones.
+  exchange.answer.sent_s = send("\n" + line);
+  exchange.until = exchange.answer.sent_s + exchange.deadline_s;
+}
+
+void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
+  check_alarm(reply);
+  switch (reply.kind) {
+    case ReplyKind::ok:
+      on_ok(exchange);
+      break;
+    case ReplyKind::busy:
+      exchange.until = std::max(exchange.until, input_time_ + settings_.busy_deadline_s);
+      break;
+    case ReplyKind::line_fault:
+      ++counters_.faults;
+      exchange.fault = true;
+      if (reply.number) on_last_line(exchange, *reply.number);
+      break;
+    case ReplyKind::resend:
+      exchange.fault = true;
+      exchange.error.clear();  // the Error: before it was a damaged complaint about the line
+      // A line never sent cannot be sent again. What ran is known from Last Line, not from here.
+      if (reply.number && *reply.number <= exchange.number) on_last_line(exchange, *reply.number - 1);
+      break;
+    case ReplyKind::unknown_command:  // acknowledged by the ok that follows, but not run
+      if (reply.text.find('"' + exchange.code + '"') != std::string::npos) {
+        exchange.error = reply.text;  // the whole line came through: the firmware does not know it
+        exchange.error_stands = true;
+        break;
+      }
+      ++counters_.faults;
+      exchange.fault = true;
+      break;
+    case ReplyKind::error:
+      exchange.error = reply.text;
+      exchange.fault = true;
+      break;
+    case ReplyKind::wait:
+    case ReplyKind::temperature:
+      break;
+    default:
+      if (exchange.answer.replies.size() < 256) exchange.answer.replies.push_back(std::move(reply));
+  }
+}
+
+void MarlinLink::on_ok(Exchange& exchange) {
+  exchange.answer.answered_s = input_time_;
+  if (exchange.done) return;
+  if (exchange.fault) {
+    repeat(exchange,
+           exchange.error.empty() ? "the firmware reports damaged lines" : printable(exchange.error));
+    return;
+  }
+  if (exchange.cursor == exchange.number) {
+    exchange.done = true;
+    return;
+  }
+  ++exchange.cursor;
+  exchange.repeats = 0;
+  repeat(exchange, "catching up");
+}
+
+void MarlinLink::on_last_line(Exchange& exchange, std::int64_t last) {
+  if (last >= exchange.number) {
+    if (last > exchange.number) return;  // damaged text
+    exchange.done = true;                // it was taken: its ok was lost
+    exchange.proven = true;
+    exchange.answer.answered_s = input_time_;
+    exchange.answer.repeated = true;
+    exchange.error_stands = !exchange.error.empty();
+    return;
+  }
+  const std::int64_t next = std::max<std::int64_t>(last + 1, 0);
+  if (next < exchange.number - kPlausibleLag) {
+    const bool believed = exchange.fallback == next;
+    exchange.fallback = next;
+    if (!believed) return;
+    if (next <= 1) {
+      throw PrinterReset("printer " + port_.name() + ": its line number fell back from " +
+                         std::to_string(exchange.number - 1) +
+                         " to 0, so it restarted; its position is unknown");
+    }
+  }
+  if (next <= number_ - static_cast<std::int64_t>(kept_.size())) {
+    throw ResendLoop("printer " + port_.name() + ": asks for line " + std::to_string(next) + ", kept are " +
+                     std::to_string(number_ - static_cast<std::int64_t>(kept_.size()) + 1) + " to " +
+                     std::to_string(number_) + "; start again");
+  }
+  if (next != exchange.cursor) exchange.repeats = std::max(0, exchange.repeats - 1);
+  exchange.cursor = next;
+}
+
+void MarlinLink::emergency(std::string_view code) { send("\n" + std::string(code) + "\n"); }
+
+void MarlinLink::idle(double seconds) {
+  const double until = port_.now() + seconds;
+  std::string line;
+  while (read_line(until, line)) check_alarm(parse_reply(line));
+}
+
+void MarlinLink::settle() {
+  const double limit = port_.now() + 2;
+  std::string line;
+  double quiet_until = port_.now() + settings_.quiet_s;
+  while (read_line(std::min(quiet_until, limit), line)) {
+    const Reply reply = parse_reply(line);
+    if (reply.kind == ReplyKind::start || reply.kind == ReplyKind::fatal) check_alarm(reply);
+    // Reports come for ever; what is waited for is the end of answers.
+    const bool report = reply.kind == ReplyKind::position || reply.kind == ReplyKind::temperature;
+    if (!report) quiet_until = input_time_ + settings_.quiet_s;
+  }
+  input_.clear();
+}
+
+void MarlinLink::check_alarm(const Reply& reply) {
+  if (reply.kind == ReplyKind::ok) complaint_.clear();
+  if (reply.kind == ReplyKind::other && reply.text.starts_with("echo:")) complaint_ = reply.text;
+  if (reply.kind == ReplyKind::fatal) {
+    halted_ = true;
+    throw PrinterHalted("printer " + port_.name() + ": the firmware halted (" +
+                        (complaint_.empty() ? "" : in_quotes(complaint_) + ", ") + in_quotes(reply.text) +
+                        "); nothing more is sent, reset the printer and check it");
+  }
+  if (reply.kind == ReplyKind::start && connected_) {
+    connected_ = false;
+    throw PrinterReset(
+        "printer " + port_.name() +
+        ": the firmware restarted in use; its position is unknown, confirm the origin and start again");
+  }
+  if (reply.kind == ReplyKind::paused && connected_) {
+    throw PrinterPaused("printer " + port_.name() +
+                        ": waits for its user; look at the printer's display and start again");
+  }
+}
+
+double MarlinLink::send(const std::string& text) {
+  return port_.write(std::as_bytes(std::span(text)), port_.now() + kWriteDeadline);
+}
+
+bool MarlinLink::take_line(std::string& line) {
+  for (;;) {
+    const std::size_t end = input_.find_first_of("\r\n");
+    if (end == std::string::npos) return false;
+    line.assign(input_, 0, end);
+    input_.erase(0, end + 1);
+    while (!line.empty() && line.back() == ' ') line.pop_back();
+    if (!line.empty()) return true;
+  }
+}
+
+bool MarlinLink::read_line(double until, std::string& line) {
+  constexpr std::size_t kLongestInput = 4096;
+  std::array<std::byte, 1024> buffer{};
+  while (!take_line(line)) {
+    if (watch_) watch_();
+    const double slice = watch_ ? std::min(until, port_.now() + kWatchInterval) : until;
+    const Received got = port_.read(buffer, slice);
+    if (got.count == 0) {
+      if (got.time_s >= until) return false;
+      continue;
+    }
+    input_time_ = got.time_s;
+    const auto bytes = std::span(buffer).first(got.count);
+    if (!connected_) sniffer_.push(bytes, [](const BoardFrame&, std::uint64_t) {});
+    input_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    if (input_.size() > kLongestInput && input_.find_first_of("\r\n") == std::string::npos) input_.clear();
+  }
+  return true;
+}
+
+}  // namespace supertac

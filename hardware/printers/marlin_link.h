@@ -1,0 +1,118 @@
+// Marlin's line protocol over any port: numbered lines with checksums, one in flight, repeated until the
+// firmware is known to have run them, and never run twice - a repetition carries the same number, and Marlin
+// runs a number once.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hardware/boards/frame_decoder.h"
+#include "hardware/ports/errors.h"
+#include "hardware/ports/port.h"
+#include "hardware/printers/marlin_line.h"
+
+namespace supertac {
+
+struct MarlinSettings {
+  double connect_deadline_s = 20;  ///< for a board that boots
+  double probe_interval_s = 1;     ///< between two M110 N0 while connecting
+  double ok_deadline_s = 2.5;      ///< of an ordinary command; Marlin's first echo:busy comes after 2 s
+  double busy_deadline_s = 6;      ///< after echo:busy (Marlin repeats it every 2 s)
+  double quiet_s = 0.05;           ///< silence that ends a disturbance
+  int max_repeats = 8;             ///< of one line, for any reason
+  std::size_t kept_lines = 64;     ///< for Resend; RIG asks for 50
+};
+
+/// Firmware facts from M115.
+struct MarlinCapabilities {
+  std::string firmware;           ///< the text of FIRMWARE_NAME, empty when not told
+  bool emergency_parser = false;  ///< M112, M410 act ahead of the queue
+};
+
+class MarlinLink {
+ public:
+  struct Counters {
+    std::uint64_t lines = 0;     ///< different lines sent
+    std::uint64_t repeats = 0;   ///< lines sent again
+    std::uint64_t timeouts = 0;  ///< answers that did not come in time
+    std::uint64_t faults = 0;    ///< damaged lines reported by the firmware
+  };
+  /// What a command brought back; times are those of the port's clock.
+  struct Answer {
+    std::vector<Reply> replies;  ///< everything but ok, in order
+    double sent_s = 0;           ///< when the last copy of the line was handed over
+    double answered_s = 0;       ///< when its ok (or the proof that it ran) arrived
+    bool repeated = false;       ///< sent more than once: `sent_s` says little about when it ran
+  };
+
+  /// `port` must outlive the link.
+  explicit MarlinLink(Port& port, const MarlinSettings& settings = {});
+
+  /// Finds a fresh (`start` banner) or a running firmware, sets its line number to 0, switches off the
+  /// reports that an earlier host may have left on (M154, M155), reads M115. Throws PrinterSilent;
+  /// WrongDevice when what comes is no firmware's answer; PrinterHalted.
+  void connect();
+
+  /// Runs one command and returns when the firmware has acknowledged it. `deadline_s` 0: ok_deadline_s;
+  /// commands that take long (M400, G4, G28) need their own. Throws PrinterSilent, PrinterReset,
+  /// PrinterHalted, ResendLoop, PrinterPaused, PrinterRefused, PortUnplugged, PortTimeout.
+  Answer command(std::string_view code, double deadline_s = 0);
+
+  /// Sends `code` (M410, M112, M108) without number, ahead of everything: only the emergency parser sees it
+  /// in time.
+  void emergency(std::string_view code);
+
+  /// Reads and forgets replies for `seconds`; the way to wait while the port's clock runs.
+  /// Throws PrinterReset, PrinterHalted when one of the replies says so.
+  void idle(double seconds);
+
+  /// Reads replies until for quiet_s none came but automatic reports (at most 2 s).
+  void settle();
+
+  /// Called at least every 0.02 s while waiting for the firmware; what it throws ends the wait.
+  void set_watch(std::function<void()> watch) { watch_ = std::move(watch); }
+
+  const MarlinCapabilities& capabilities() const { return capabilities_; }
+  const Counters& counters() const { return counters_; }
+  bool halted() const { return halted_; }
+  Port& port() { return port_; }
+
+ private:
+  struct Exchange;
+
+  bool probe(double until);
+  [[noreturn]] void nobody_answered() const;
+  void switch_reports_off();
+  void read_capabilities();
+  double send(const std::string& text);
+  /// Sends the exchange's current line (again), counting and limiting the repetitions.
+  void repeat(Exchange& exchange, const std::string& why);
+  void on_reply(Exchange& exchange, Reply reply);
+  void on_ok(Exchange& exchange);
+  void on_last_line(Exchange& exchange, std::int64_t last);
+  void finish(const Exchange& exchange);
+  void check_alarm(const Reply& reply);
+  /// The next line, without its break; false when `until` passes first.
+  bool read_line(double until, std::string& line);
+  bool take_line(std::string& line);
+
+  Port& port_;
+  MarlinSettings settings_;
+  MarlinCapabilities capabilities_;
+  Counters counters_;
+  std::function<void()> watch_;
+  FrameDecoder sniffer_;          // tells a tactile board from a printer while connecting
+  std::string input_;             // received, not yet a whole line
+  double input_time_ = 0;         // arrival of its last byte
+  std::string complaint_;         // the last echo: since an ok; a halt's reason stands before it
+  std::deque<std::string> kept_;  // lines number_ - kept_.size() + 1 ... number_
+  std::int64_t number_ = 0;       // of the newest line
+  bool connected_ = false;
+  bool halted_ = false;
+};
+
+}  // namespace supertac

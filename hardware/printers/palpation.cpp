@@ -1,0 +1,187 @@
+#include "hardware/printers/palpation.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace supertac {
+namespace {
+
+constexpr double kProgressDeadline = 6;
+constexpr int kClaims = 3;  // of having arrived at once, before a firmware is taken for one without M114 R
+
+}  // namespace
+
+const char* name_of(Phase phase) {
+  switch (phase) {
+    case Phase::approach:
+      return "approach";
+    case Phase::onset:
+      return "onset";
+    case Phase::slide:
+      return "slide";
+    case Phase::release:
+      return "release";
+    default:
+      return "reposition";
+  }
+}
+
+bool reachable(const Leg& leg, const PositionSample& from, const PositionSample& to) {
+  return distance(from.position, to.position) < 1.5 * leg.speed * (to.time_s - from.time_s) + 0.05;
+}
+
+std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
+  const auto usable = [](double value) { return value > 0 && std::isfinite(value); };
+  if (plan.passes < 1 || plan.passes > 1000 || !usable(plan.slide) || !usable(plan.lift) ||
+      !usable(plan.speed) || !usable(plan.speed_z) || plan.speed_z > rig::kLiftMmS ||
+      !usable(plan.travel_speed)) {
+    throw std::invalid_argument(
+        "palpation: expected 1 to 1000 passes, slide, lift and speeds above 0 and at most 5 mm/s in z");
+  }
+  std::vector<Leg> legs;
+  Point3 at = here;
+  const auto add = [&](int pass, Phase phase, const Point3& to, double speed) {
+    legs.push_back({pass, phase, at, to, speed});
+    at = to;
+  };
+  const double high = plan.start.z + plan.lift;
+  add(1, Phase::approach, {at.x, at.y, std::max(at.z, high)}, plan.speed_z);
+  for (int pass = 1; pass <= plan.passes; ++pass) {
+    const double x = plan.start.x + plan.shift_x * (pass - 1);
+    const double y = plan.start.y, z = plan.start.z;
+    const Phase travel = pass == 1 ? Phase::approach : Phase::reposition;
+    add(pass, travel, {x, y, std::max(at.z, high)}, plan.travel_speed);
+    add(pass, travel, {x, y, high}, plan.speed_z);
+    add(pass, Phase::onset, {x, y, z}, plan.speed_z);
+    add(pass, Phase::slide, {x, y + plan.slide, z}, plan.speed);
+    add(pass, Phase::release, {x, y + plan.slide, high}, plan.speed_z);
+  }
+  // Back to where it began: the next run's operator confirms the same place.
+  add(plan.passes, Phase::reposition, {at.x, at.y, std::max(here.z, high)}, plan.speed_z);
+  add(plan.passes, Phase::reposition, {here.x, here.y, at.z}, plan.travel_speed);
+  std::erase_if(legs, [](const Leg& leg) { return leg.from == leg.to; });
+  return legs;
+}
+
+std::string palpation_program(const PalpationPlan& plan, const Point3& origin, const Limits& limits,
+                              const std::string& title) {
+  if (title.find_first_of("\r\n") != std::string::npos)
+    throw std::invalid_argument("palpation_program: the title has a line break, which would end its comment");
+  const std::vector<Leg> legs = legs_of(plan, origin);
+  for (const Leg& leg : legs) limits.check_path(leg.from, leg.to);
+  std::string text =
+      "; " + title + "\n; Lengths in mm, F in mm/min. The finger is lifted before every way " +
+      "to another pass.\n; Send it only with the head at " + describe(origin) +
+      " and the plate below it. M0 waits for the " +
+      "operator: at the printer's\n; display; without one, but with an emergency parser, until " +
+      "the host sends M108; with neither, Marlin answers \"Unknown\n; command\" and goes on, " +
+      "and G4 leaves 20 s to switch it off.\nG21\nG90\nM0 Head at " + describe(origin) +
+      " and the plate below it?\nG4 S20\n" + origin_command(origin) + "\n";
+  for (const Leg& leg : legs) {
+    text += "; pass " + std::to_string(leg.pass) + ": " + name_of(leg.phase) + "\n" +
+            move_command(leg.to, leg.speed) + "\nM400\n";
+  }
+  return text;
+}
+
+Palpation::Palpation(Printer& printer, const PalpationPlan& plan, PalpationObserver observer)
+    : printer_(printer), plan_(plan), observer_(std::move(observer)) {}
+
+PalpationOutcome Palpation::run() {
+  std::vector<Leg> legs = legs_of(plan_, printer_.target());
+  if (printer_.origin() == Printer::Origin::unknown) {
+    throw OriginUnknown(
+        "palpation: the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
+  }
+  for (const Leg& leg : legs) printer_.limits().check_path(leg.from, leg.to);
+  PalpationOutcome outcome;
+  printer_.link().set_watch(observer_.check);
+  try {
+    for (Leg& leg : legs) {
+      in_contact_ = leg.phase == Phase::onset || leg.phase == Phase::slide || leg.phase == Phase::release;
+      run_leg(leg);
+      if (leg.phase == Phase::release) ++outcome.passes_done;
+    }
+    outcome.complete = true;
+  } catch (...) {
+    outcome.error = std::current_exception();
+  }
+  printer_.link().set_watch(nullptr);
+  outcome.realtime_position = realtime_;
+  if (!outcome.complete) recover(outcome);
+  return outcome;
+}
+
+void Palpation::run_leg(Leg& leg) {
+  observer_.check();
+  leg.accepted_s = printer_.start_move(leg.to, leg.speed);
+  observer_.leg_started(leg);
+  if (realtime_) follow(leg);
+  leg.ended_s = printer_.finish_move();
+  observer_.leg_ended(leg);
+}
+
+// Polls the position until the head arrives. A firmware that reports the end of the queue instead gives
+// itself away: it claims again and again to have arrived before the head can be there. A single such claim is
+// M154's report in the place of a damaged answer.
+void Palpation::follow(const Leg& leg) {
+  const double length = distance(leg.from, leg.to);
+  const double expected = length / leg.speed;
+  const double until = leg.accepted_s + 1.5 * expected + kProgressDeadline;
+  double next = leg.accepted_s;
+  int claims = 0;
+  PositionSample before{leg.accepted_s, 0, leg.from};
+  for (double time = next; time < until;) {
+    const auto sample = printer_.sample_position();
+    time = printer_.link().port().now();
+    observer_.check();
+    if (sample) {
+      const bool arrived = distance(sample->position, leg.to) < 0.02;
+      const bool possible = reachable(leg, before, *sample);
+      if (!possible && arrived && !realtime_known_ && length > 1 && ++claims >= kClaims) {
+        realtime_ = false;
+        return;
+      }
+      realtime_known_ = realtime_known_ || (possible && !arrived && length > 1);
+      if (possible || !arrived) observer_.position(leg, *sample);
+      if (possible && arrived) return;
+      if (possible) before = *sample;
+    }
+    next = std::max(next + plan_.poll_interval_s, time);
+    if (next > time) printer_.link().idle(next - time);
+  }
+  throw PositionError(std::string("palpation: the head did not arrive at ") + describe(leg.to) +
+                      " in time (pass " + std::to_string(leg.pass) + ", " + name_of(leg.phase) +
+                      "); check the printer");
+}
+
+void Palpation::recover(PalpationOutcome& outcome) {
+  using Finger = PalpationOutcome::Finger;
+  outcome.finger = in_contact_ ? Finger::unknown : Finger::lifted;
+  try {
+    std::rethrow_exception(outcome.error);
+  } catch (const PrinterHalted&) {
+    outcome.finger = Finger::stopped;
+    outcome.note = "the firmware halted and takes no more commands; lift the finger by hand";
+    return;
+  } catch (const PrinterReset&) {
+    outcome.finger = Finger::stopped;
+    outcome.note = "the firmware restarted and stands; its position is unknown, lift the finger by hand";
+    return;
+  } catch (...) {  // everything else leaves a printer that can be talked to, or one that is gone: see below
+  }
+  try {
+    const Printer::Stop stop = printer_.quick_stop();
+    if (stop.confirmed) outcome.finger = Finger::stopped;
+    outcome.note = stop.text;
+    printer_.lift(plan_.lift, plan_.speed_z);
+    outcome.finger = Finger::lifted;
+    outcome.note = "the finger was lifted";
+  } catch (const PortUnplugged&) {
+    outcome.note = "the printer cannot be reached; the finger may be in contact, lift it by hand";
+  } catch (const std::exception& error) {
+    outcome.note += std::string("; the lift failed: ") + error.what();
+  }
+}
+
+}  // namespace supertac

@@ -1,0 +1,98 @@
+// One palpation run: onset, slide, release, re-position, pass after pass, as a state machine. Every way is
+// checked before the first contact, every boundary between two phases is verified, and whatever happens in
+// contact the finger is lifted before the run gives up - unless nothing may be sent any more.
+#pragma once
+
+#include <exception>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "hardware/printers/printer.h"
+
+namespace supertac {
+
+enum class Phase { approach, onset, slide, release, reposition };
+const char* name_of(Phase phase);
+
+/// Lengths in mm, speeds in mm/s, printer coordinates.
+struct PalpationPlan {
+  Point3 start = rig::kStart;  ///< of the first slide, in contact
+  int passes = rig::kPasses;
+  double slide = rig::kSlideMm;        ///< along +y
+  double shift_x = rig::kPassShiftMm;  ///< between passes
+  double lift = rig::kLiftMm;
+  double speed = rig::kSlideMmS;  ///< of the slide
+  double speed_z = rig::kLiftMmS;
+  double travel_speed = rig::kFastestMmS;
+  double poll_interval_s = 0.01;
+};
+
+/// One straight part of a run.
+struct Leg {
+  int pass = 0;  ///< from 1
+  Phase phase = Phase::approach;
+  Point3 from, to;
+  double speed = 0;
+  double accepted_s = 0;  ///< the firmware's ok to the move
+  double ended_s = 0;     ///< the firmware's ok to M400
+};
+
+/// Whether the head can have come from the one sample to the other at the leg's speed; the delay of answers
+/// and their rounding allowed for.
+bool reachable(const Leg& leg, const PositionSample& from, const PositionSample& to);
+
+/// What a run tells while it runs. `check` may throw: the operator's Ctrl-C, a board that is gone, a full
+/// disk.
+struct PalpationObserver {
+  std::function<void(const Leg&)> leg_started = [](const Leg&) {};
+  std::function<void(const Leg&)> leg_ended = [](const Leg&) {};
+  std::function<void(const Leg&, const PositionSample&)> position = [](const Leg&, const PositionSample&) {};
+  std::function<void()> check = [] {};
+};
+
+struct PalpationOutcome {
+  enum class Finger { lifted, stopped, unknown };
+  int passes_done = 0;
+  bool complete = false;
+  bool realtime_position = true;  ///< the firmware reports where the head is (M114 R)
+  Finger finger = Finger::lifted;
+  std::string note;          ///< how it ended, when not complete
+  std::exception_ptr error;  ///< why, when not complete
+};
+
+/// All legs of the plan, from `here` and back (at lifting height or above). Throws std::invalid_argument for
+/// a plan that makes no sense.
+std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here);
+
+/// The palpation run as G-code, for people who send it from another host: the moves of Palpation::run, in
+/// the same lines, with M400 behind each. It begins with a pause (M0) in which the operator confirms that the
+/// head is at `origin`, then sets the coordinates (G92): what a host of ours asks before it moves. All
+/// coordinates are absolute, in mm; between passes and at the end the finger is lifted, and the head returns
+/// to the origin.
+/// `title` is one line for the reader. Throws OutsideLimits when a target or the way to it is not allowed,
+/// std::invalid_argument for a plan that makes no sense or a title with a line break.
+std::string palpation_program(const PalpationPlan& plan, const Point3& origin, const Limits& limits,
+                              const std::string& title);
+
+class Palpation {
+ public:
+  Palpation(Printer& printer, const PalpationPlan& plan, PalpationObserver observer = {});
+
+  /// Throws OutsideLimits, OriginUnknown or std::invalid_argument before anything moves; after that every
+  /// failure is in the outcome.
+  PalpationOutcome run();
+
+ private:
+  void run_leg(Leg& leg);
+  void follow(const Leg& leg);
+  void recover(PalpationOutcome& outcome);
+
+  Printer& printer_;
+  PalpationPlan plan_;
+  PalpationObserver observer_;
+  bool realtime_known_ = false, realtime_ = true;
+  bool in_contact_ = false;
+};
+
+}  // namespace supertac

@@ -1,0 +1,205 @@
+#include "hardware/printers/printer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/numbers/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kHomeDeadline = 180;
+constexpr double kMoveMargin = 8;  // start delay, acceleration, and a firmware that is slower than ordered
+
+std::string coordinates(const Point3& p) {
+  return " X" + format(p.x, 3) + " Y" + format(p.y, 3) + " Z" + format(p.z, 3);
+}
+
+// A firmware may report its queue's end (M154) between any two lines: the answer is the last position before
+// the ok.
+const Reply* position_in(const MarlinLink::Answer& answer) {
+  for (auto reply = answer.replies.rbegin(); reply != answer.replies.rend(); ++reply) {
+    if (reply->kind == ReplyKind::position) return &*reply;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+std::string move_command(const Point3& target, double speed_mm_s) {
+  return "G1" + coordinates(target) + " F" + format(60 * speed_mm_s, 1);
+}
+
+std::string origin_command(const Point3& here) { return "G92" + coordinates(here); }
+
+Printer::Printer(Port& port, const PrinterSettings& settings)
+    : settings_(settings), link_(port, settings.marlin) {}
+
+void Printer::connect() {
+  origin_ = Origin::unknown;
+  link_.connect();
+  link_.command("G90");
+}
+
+void Printer::home() {
+  link_.command("G91");
+  link_.command("G1 Z10.000 F300");  // relative: wherever z is, first away from the plate
+  link_.command("G90");
+  link_.command("G28", kHomeDeadline);
+  target_ = agreed_position();
+  origin_ = Origin::homed;
+  const double missing = settings_.limits.clearance_z - target_.z;
+  if (missing > 0) lift(missing);
+}
+
+void Printer::confirm_origin(const Point3& here) {
+  settings_.limits.check_target(here);
+  link_.command("M400", kHomeDeadline);
+  link_.command(origin_command(here));
+  target_ = here;
+  Point3 found = queue_position();
+  for (int attempt = 0; attempt < 2 && distance(found, here) > settings_.tolerance_mm; ++attempt) {
+    link_.settle();
+    found = queue_position();  // the answer may have been damaged
+  }
+  if (distance(found, here) > settings_.tolerance_mm) {
+    throw PositionError("printer: after G92 expected " + describe(here) + ", found " + describe(found) +
+                        "; confirm the origin again");
+  }
+  origin_ = Origin::confirmed;
+}
+
+double Printer::start_move(const Point3& target, double speed_mm_s) {
+  if (origin_ == Origin::unknown) {
+    throw OriginUnknown(
+        "printer: the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
+  }
+  if (!(speed_mm_s > 0) || !std::isfinite(speed_mm_s))
+    throw std::invalid_argument("printer: expected a speed above 0 mm/s, got " + format(speed_mm_s));
+  settings_.limits.check_path(target_, target);
+  const double length = distance(target_, target);
+  const double sent = link_.command(move_command(target, speed_mm_s)).answered_s;
+  target_ = target;
+  expected_seconds_ += length / speed_mm_s + 0.5;
+  return sent;
+}
+
+double Printer::finish_move() {
+  const double end = link_.command("M400", 1.5 * expected_seconds_ + kMoveMargin).answered_s;
+  expected_seconds_ = 0;
+  Point3 found;
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    found = queue_position();
+    if (distance(found, target_) <= settings_.tolerance_mm) return end;
+    link_.settle();
+    link_.command("M400", kMoveMargin);
+  }
+  origin_ = Origin::unknown;
+  throw PositionError("printer: expected the head at " + describe(target_) + ", found " + describe(found) +
+                      "; confirm the origin and start again");
+}
+
+std::optional<PositionSample> Printer::sample_position(double deadline_s) {
+  const MarlinLink::Answer answer =
+      link_.command("M114 R", deadline_s > 0 ? deadline_s : settings_.poll_deadline_s);
+  const Reply* reply = position_in(answer);
+  if (answer.repeated || reply == nullptr) return std::nullopt;
+  return PositionSample{0.5 * (answer.sent_s + answer.answered_s), answer.answered_s - answer.sent_s,
+                        reply->position};
+}
+
+Point3 Printer::queue_position() {
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    const MarlinLink::Answer answer = link_.command("M114");
+    if (const Reply* reply = position_in(answer)) return reply->position;
+    link_.settle();
+  }
+  throw PrinterSilent("printer " + link_.port().name() +
+                      ": expected a position from M114, found none in 5 answers");
+}
+
+Point3 Printer::agreed_position() {
+  Point3 before = queue_position();
+  for (int attempt = 0; attempt < 6; ++attempt) {
+    const Point3 now = queue_position();
+    if (distance(before, now) < 0.005) return now;
+    before = now;
+  }
+  throw PositionError("printer " + link_.port().name() +
+                      ": expected two equal positions in a row, found none in 7 answers; check the cable");
+}
+
+bool Printer::stands_still() {
+  Point3 before;
+  int same = 0;
+  const double until = link_.port().now() + settings_.stop_deadline_s;
+  while (link_.port().now() < until) {
+    // M410 holds Marlin for a second, in which it answers nothing.
+    const auto sample = sample_position(settings_.stop_deadline_s);
+    if (!sample) continue;
+    same = same > 0 && distance(before, sample->position) < 0.005 ? same + 1 : 1;
+    before = sample->position;
+    if (same >= 3) break;
+    link_.idle(0.1);
+  }
+  return same >= 3;
+}
+
+Printer::Stop Printer::quick_stop() {
+  Stop stop;
+  stop.ahead_of_queue = link_.capabilities().emergency_parser;
+  try {
+    link_.emergency("M410");
+    link_.settle();
+    stop.confirmed = stands_still();
+    // The position of the queue is that of the head only once nothing moves any more.
+    link_.command("M400",
+                  stop.ahead_of_queue ? settings_.stop_deadline_s : 1.5 * expected_seconds_ + kMoveMargin);
+    target_ = agreed_position();
+    expected_seconds_ = 0;
+  } catch (const PrinterHalted&) {
+    stop.confirmed = true;
+  } catch (const HardwareError& error) {
+    stop.confirmed = false;
+    stop.text = error.what();
+    return stop;
+  }
+  stop.text = stop.confirmed ? "the head stands still"
+                             : "the head could not be shown to stand still; switch the printer off";
+  if (!stop.ahead_of_queue)
+    stop.text +=
+        " (this firmware has no emergency parser: a stop acts when its line is read, not before an M400 "
+        "ends)";
+  return stop;
+}
+
+Printer::Stop Printer::emergency_stop() {
+  Stop stop;
+  stop.ahead_of_queue = link_.capabilities().emergency_parser;
+  origin_ = Origin::unknown;
+  try {
+    link_.emergency("M112");
+    link_.idle(settings_.stop_deadline_s);
+    stop.text = "no answer to the emergency stop; switch the printer off";
+  } catch (const PrinterHalted&) {
+    stop.confirmed = true;
+    stop.text = "the firmware halted; reset the printer before the next start";
+  } catch (const HardwareError& error) {
+    stop.text = error.what();
+  }
+  if (!stop.confirmed && !stop.ahead_of_queue) stop.text += " (this firmware has no emergency parser)";
+  return stop;
+}
+
+void Printer::lift(double mm, double speed_mm_s) {
+  const Point3 here = agreed_position();
+  Point3 above = here;
+  above.z = std::min(here.z + mm, settings_.limits.high.z);
+  // Not through start_move(): a lift is the way out of a position that the limits forbid.
+  link_.command("G1 Z" + format(above.z, 3) + " F" + format(60 * speed_mm_s, 1));
+  target_ = above;
+  expected_seconds_ = mm / speed_mm_s + 0.5;
+  finish_move();
+}
+
+}  // namespace supertac

@@ -1,0 +1,90 @@
+// A Marlin printer that carries the finger: absolute moves within limits, verified positions, stops.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "hardware/printers/limits.h"
+#include "hardware/printers/marlin_link.h"
+
+namespace supertac {
+
+/// The line that makes a straight move, and the one that says where the head is.
+std::string move_command(const Point3& target, double speed_mm_s);
+std::string origin_command(const Point3& here);
+
+struct PrinterSettings {
+  Limits limits;
+  MarlinSettings marlin;
+  double tolerance_mm = 0.05;
+  double stop_deadline_s = 3;
+  double poll_deadline_s = 0.25;
+};
+
+/// Where the head was (M114 R), and when: the middle of question and answer.
+struct PositionSample {
+  double time_s = 0;
+  double round_trip_s = 0;
+  Point3 position;
+};
+
+class Printer {
+ public:
+  enum class Origin { unknown, confirmed, homed };
+  struct Stop {
+    bool confirmed = false;       ///< the head was shown to stand still
+    bool ahead_of_queue = false;  ///< the firmware has an emergency parser
+    std::string text;             ///< one line for the operator
+  };
+
+  /// `port` must outlive the printer.
+  explicit Printer(Port& port, const PrinterSettings& settings = {});
+
+  /// Finds the firmware. The origin stays unknown: Marlin cannot tell whether its coordinates mean anything.
+  void connect();
+
+  /// Lifts, homes, and lifts again when the limits say so. Never homes x and y with z low.
+  void home();
+  /// The operator's word that the head is at `here` (G92). Checked against the limits.
+  void confirm_origin(const Point3& here);
+  Origin origin() const { return origin_; }
+
+  /// Sends one straight move and returns when the firmware has taken it (it starts about 126 ms later).
+  /// Throws OriginUnknown, OutsideLimits before anything is sent; then whatever MarlinLink::command throws.
+  /// Returns the time of the firmware's ok.
+  double start_move(const Point3& target, double speed_mm_s);
+
+  /// Waits until the head stands (M400), then compares M114 with the last target. Throws PositionError when
+  /// they differ by more than the tolerance three times running. Returns the time at which M400 was answered.
+  double finish_move();
+
+  /// M114 R; nothing when the answer was damaged or later than `deadline_s` (0: poll_deadline_s).
+  std::optional<PositionSample> sample_position(double deadline_s = 0);
+  /// M114: the end of the queue, which is the head's position only after M400.
+  Point3 queue_position();
+
+  /// M114 until two answers in a row agree: a lost digit must never become a target. Throws PositionError.
+  Point3 agreed_position();
+
+  /// M410: stops where it is. Never throws for a firmware that does not answer; says so in the result.
+  Stop quick_stop();
+  /// M112: kills the firmware; afterwards only a reset helps.
+  Stop emergency_stop();
+  /// Raises the finger by `mm` from wherever it is, after a fault. Throws when that could not be verified.
+  void lift(double mm, double speed_mm_s = rig::kLiftMmS);
+
+  const Point3& target() const { return target_; }
+  const Limits& limits() const { return settings_.limits; }
+  MarlinLink& link() { return link_; }
+
+ private:
+  bool stands_still();
+
+  PrinterSettings settings_;
+  MarlinLink link_;
+  Origin origin_ = Origin::unknown;
+  Point3 target_;
+  double expected_seconds_ = 0;  // of the moves since the last finish
+};
+
+}  // namespace supertac

@@ -1,0 +1,240 @@
+#include "io/files/file.h"
+
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <utility>
+
+#include "io/files/system_calls.h"
+#include "io/numbers/numbers.h"
+
+namespace supertac {
+namespace {
+
+const char* advice(int error) {
+  switch (error) {
+    case ENOENT:
+      return "; check the name";
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return "; check the permissions or choose another place";
+    case ENOSPC:
+    case EDQUOT:
+      return "; free some space or choose another place";
+    case EIO:
+      return "; check the disk";
+    default:
+      return "";
+  }
+}
+
+[[noreturn]] void fail(const std::string& path, const std::string& action, int error) {
+  throw FileError(path, "cannot " + action + ": " + std::strerror(error) + advice(error));
+}
+
+// Calls again as long as a signal interrupts.
+template <class Call>
+auto retry(Call call) {
+  for (;;) {
+    const auto result = call();
+    if (result >= 0 || errno != EINTR) return result;
+  }
+}
+
+// Not retried: on Linux the descriptor is gone even after EINTR, and may by now be somebody else's.
+void close_quietly(int& file) {
+  if (file >= 0) system_calls().close(file);
+  file = -1;
+}
+
+std::string directory_of(const std::string& path) {
+  const auto parent = std::filesystem::path(path).parent_path();
+  return parent.empty() ? "." : parent.string();
+}
+
+// Where the bytes go: the target of a symbolic link, otherwise the path itself.
+std::string final_path(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_symlink(path, error)) return path;
+  const auto target = std::filesystem::canonical(path, error);
+  return error ? path : target.string();
+}
+
+constexpr std::string_view kTemporary = ".tmp-";  // <file>.tmp-<process>-<number>
+
+bool is_running(std::uint64_t process) {
+  const auto id = static_cast<pid_t>(process);
+  return static_cast<std::uint64_t>(id) != process || id < 1 || ::kill(id, 0) == 0 || errno != ESRCH;
+}
+
+// What writers of this file left that were ended by kill -9 or a power cut. Failures do not matter here.
+void remove_leftovers(const std::string& path) {
+  const std::string prefix = std::filesystem::path(path).filename().string() + std::string(kTemporary);
+  std::error_code error;
+  std::filesystem::directory_iterator entry(directory_of(path), error);
+  for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!name.starts_with(prefix)) continue;
+    const auto process =
+        parse_uint(name.substr(prefix.size(), name.find('-', prefix.size()) - prefix.size()));
+    if (process && !is_running(*process)) system_calls().unlink(entry->path().c_str());
+  }
+}
+
+}  // namespace
+
+FileError::FileError(const std::string& path, const std::string& problem)
+    : std::runtime_error(path + ": " + problem), path_(path) {}
+
+FileReader::FileReader(const std::string& path) : path_(path) {
+  // O_NONBLOCK: opening a pipe must not wait for a writer.
+  const int flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK;
+  file_ = retry([&] { return system_calls().open(path.c_str(), flags, 0); });
+  if (file_ < 0) fail(path, "open the file", errno);
+  struct stat status {};
+  if (system_calls().fstat(file_, &status) != 0) {
+    const int error = errno;
+    close_quietly(file_);
+    fail(path, "look at the file", error);
+  }
+  if (!S_ISREG(status.st_mode)) {
+    close_quietly(file_);
+    throw FileError(path, S_ISDIR(status.st_mode) ? "is a directory, expected a file; name a file in it"
+                                                  : "is not a regular file; copy it to one first");
+  }
+  size_ = static_cast<std::uint64_t>(status.st_size);
+}
+
+FileReader::~FileReader() { close_quietly(file_); }
+
+void FileReader::read(std::span<std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = retry([&] { return system_calls().read(file_, bytes.data(), bytes.size()); });
+    if (count < 0) fail(path_, "read", errno);
+    if (count == 0) {
+      throw FileError(path_, "ends after " + std::to_string(position_) + " bytes, expected " +
+                                 std::to_string(position_ + bytes.size()) +
+                                 "; it is cut short or was shortened while it was read");
+    }
+    position_ += static_cast<std::uint64_t>(count);
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+}
+
+std::vector<std::byte> read_file(const std::string& path, std::uint64_t max_bytes) {
+  FileReader reader(path);
+  if (reader.size() > max_bytes) {
+    throw FileError(path, "has " + std::to_string(reader.size()) + " bytes, expected at most " +
+                              std::to_string(max_bytes) + "; is it the right file?");
+  }
+  std::vector<std::byte> bytes(reader.size());
+  reader.read(bytes);
+  return bytes;
+}
+
+std::string read_text_file(const std::string& path, std::uint64_t max_bytes) {
+  const auto bytes = read_file(path, max_bytes);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+AtomicFile::AtomicFile(const std::string& path) : path_(final_path(path)) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path_, error);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw FileError(path_, "exists and is not a regular file; choose another name");
+  }
+  const std::string directory = directory_of(path_);
+  const int flags = O_RDONLY | O_DIRECTORY | O_CLOEXEC;
+  directory_ = retry([&] { return system_calls().open(directory.c_str(), flags, 0); });
+  if (directory_ < 0) fail(path_, "open the directory " + directory, errno);
+  try {
+    remove_leftovers(path_);
+    open_temporary();
+  } catch (...) {
+    close_all();
+    throw;
+  }
+}
+
+void AtomicFile::open_temporary() {
+  static std::atomic<unsigned> next{0};
+  const std::string prefix = path_ + std::string(kTemporary) + std::to_string(::getpid()) + "-";
+  for (int attempt = 0; attempt < 100; ++attempt) {
+    const std::string name = prefix + std::to_string(next++);
+    const int flags = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC;
+    file_ = retry([&] { return system_calls().open(name.c_str(), flags, 0666); });
+    if (file_ >= 0) {
+      temporary_ = name;
+      return;
+    }
+    if (errno != EEXIST) fail(path_, "create a file in " + directory_of(path_), errno);
+  }
+  throw FileError(path_, "100 temporary files " + prefix + "* are in the way; remove them");
+}
+
+AtomicFile::~AtomicFile() { close_all(); }
+
+void AtomicFile::close_all() {
+  close_quietly(file_);
+  close_quietly(directory_);
+  if (!temporary_.empty()) system_calls().unlink(temporary_.c_str());
+  temporary_.clear();
+}
+
+void AtomicFile::write(std::span<const std::byte> bytes) {
+  if (file_ < 0) throw std::invalid_argument("AtomicFile: write after commit (" + path_ + ")");
+  while (!bytes.empty()) {
+    const ssize_t count = retry([&] { return system_calls().write(file_, bytes.data(), bytes.size()); });
+    if (count < 0) fail(path_, "write", errno);
+    if (count == 0) fail(path_, "write", ENOSPC);
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+}
+
+void AtomicFile::write(std::string_view text) { write(std::as_bytes(std::span(text))); }
+
+void AtomicFile::commit() {
+  if (file_ < 0) throw std::invalid_argument("AtomicFile: commit twice (" + path_ + ")");
+  if (retry([&] { return system_calls().fsync(file_); }) != 0) fail(path_, "sync to disk", errno);
+  const int closed = system_calls().close(std::exchange(file_, -1));
+  if (closed != 0 && errno != EINTR) fail(path_, "close", errno);
+  if (system_calls().rename(temporary_.c_str(), path_.c_str()) != 0) fail(path_, "rename into place", errno);
+  temporary_.clear();
+  // EINVAL: a file system that has nothing to sync for a directory.
+  if (retry([&] { return system_calls().fsync(directory_); }) != 0 && errno != EINVAL) {
+    fail(path_, "sync the directory (the file is written, a power cut may yet lose it)", errno);
+  }
+  close_quietly(directory_);
+}
+
+void write_file(const std::string& path, std::span<const std::byte> bytes) {
+  AtomicFile file(path);
+  file.write(bytes);
+  file.commit();
+}
+
+void write_file(const std::string& path, std::string_view text) {
+  write_file(path, std::as_bytes(std::span(text)));
+}
+
+void refuse_existing(const std::string& path, bool force) {
+  std::error_code error;
+  const auto status = std::filesystem::symlink_status(path, error);
+  if (!force && std::filesystem::exists(status)) {
+    throw FileError(path, "exists already; choose another name or pass --force to replace it");
+  }
+}
+
+void make_directories(const std::string& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (!error && std::filesystem::is_directory(path, error)) return;
+  fail(path, "create the directory", error ? error.value() : ENOTDIR);
+}
+
+}  // namespace supertac

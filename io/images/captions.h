@@ -1,0 +1,33 @@
+// Words and a colour bar on a picture, so that it can stand in a paper.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/images/images.h"
+
+namespace supertac {
+
+inline constexpr int kLetterHeight = 14, kLineHeight = 20;
+
+/// Writes lines (parted by '\n') in a plain pixel font from (left, top) on; letters outside ASCII become '?',
+/// and what leaves the picture is cut.
+void draw_text(Picture& picture, int left, int top, const std::string& text, Rgb colour = {0, 0, 0});
+/// Pixels of its longest line.
+int text_width(const std::string& text);
+
+struct Captions {
+  struct Heading {
+    int at = 0;  ///< pixel of the picture that it stands at
+    std::string text = {};
+  };
+  std::string title = {};
+  std::vector<Heading> columns = {},
+                       rows = {};   ///< centred above, and right of the margin beside the picture
+  std::string low = {}, high = {};  ///< what the ends of the colour bar mean
+};
+
+/// The picture with title, headings and colour bar around it.
+Picture captioned(const Picture& picture, const Captions& captions);
+
+}  // namespace supertac

@@ -1,0 +1,25 @@
+#include "io/numbers/hash.h"
+
+#include <zlib.h>
+
+namespace supertac {
+
+std::string Hash::hex() const {
+  std::string text(16, '0');
+  for (std::size_t i = 0; i < 16; ++i) text[i] = "0123456789abcdef"[(state_ >> (60 - 4 * i)) & 15];
+  return text;
+}
+
+std::uint64_t stream_of(std::string_view name) {
+  std::uint64_t hash = 1469598103934665603ULL;
+  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
+  return hash;
+}
+
+std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t seed) {
+  if (bytes.empty()) return seed;  // zlib would begin anew
+  return static_cast<std::uint32_t>(
+      ::crc32_z(seed, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+}  // namespace supertac

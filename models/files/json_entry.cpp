@@ -1,0 +1,77 @@
+#include "models/files/json_entry.h"
+
+#include <cmath>
+#include <stdexcept>
+
+namespace supertac {
+
+using Json = nlohmann::ordered_json;
+
+JsonEntry::JsonEntry(const SafetensorsFile& file, const std::string& path, const std::string& key)
+    : where_(path + ": metadata \"" + key + "\"") {
+  const auto found = file.metadata().find(key);
+  if (found == file.metadata().end())
+    throw std::runtime_error(where_ + " is missing; the file is no SuperTac model");
+  try {
+    json_ = parse_json_limited(found->second);
+  } catch (const JsonError& error) {
+    throw std::runtime_error(where_ + ": " + error.what());
+  }
+}
+
+Dim JsonEntry::integer(const char* name) const {
+  const Json& value = field(name);
+  if (!value.is_number_integer() || value < -1'000'000 || value > 1'000'000)
+    wrong(name, "a whole number", value);
+  return value.get<Dim>();
+}
+
+bool JsonEntry::flag(const char* name) const {
+  if (!has(name)) return false;
+  const Json& value = json_.at(name);
+  if (!value.is_boolean()) wrong(name, "true or false", value);
+  return value.get<bool>();
+}
+
+bool JsonEntry::has(const char* name) const { return json_.is_object() && json_.contains(name); }
+
+double JsonEntry::number(const char* name) const {
+  const Json& value = field(name);
+  if (!value.is_number() || !std::isfinite(value.get<double>())) wrong(name, "a finite number", value);
+  return value.get<double>();
+}
+
+std::optional<double> JsonEntry::number_or_null(const char* name) const {
+  return field(name).is_null() ? std::nullopt : std::optional(number(name));
+}
+
+std::vector<float> JsonEntry::numbers(const char* name, std::size_t count) const {
+  const Json& value = field(name);
+  std::vector<float> values;
+  if (value.is_array() && value.size() == count) {
+    for (const Json& element : value)
+      if (element.is_number()) values.push_back(element.get<float>());
+  }
+  for (const float v : values)
+    if (!std::isfinite(v)) values.clear();
+  if (values.size() != count || count == 0) wrong(name, std::to_string(count) + " finite numbers", value);
+  return values;
+}
+
+std::string JsonEntry::text(const char* name) const {
+  const Json& value = field(name);
+  if (!value.is_string()) wrong(name, "a text", value);
+  return value.get<std::string>();
+}
+
+const Json& JsonEntry::field(const char* name) const {
+  if (!has(name)) throw std::runtime_error(where_ + " has no \"" + name + "\"");
+  return json_.at(name);
+}
+
+void JsonEntry::wrong(const char* name, const std::string& expected, const Json& found) const {
+  throw std::runtime_error(where_ + ": \"" + name + "\" must be " + expected + ", found " +
+                           found.dump(-1, ' ', true).substr(0, 60));
+}
+
+}  // namespace supertac

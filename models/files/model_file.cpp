@@ -1,0 +1,216 @@
+#include "models/files/model_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "data/windows/signal_features.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+#include "models/files/json_entry.h"
+#include "models/inference/interval.h"
+
+namespace supertac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kFrameKind = "frame-checkpoint";
+
+SuperTacSettings read_settings(const JsonEntry& entry) {
+  SuperTacSettings s;
+  s.preset = entry.text("preset");
+  if (entry.has("rows")) {
+    s.rows = entry.integer("rows");
+    s.columns = entry.integer("columns");
+    s.in_channels = entry.integer("in_channels");
+  }
+  s.timesteps = entry.integer("timesteps");
+  s.latent = entry.integer("latent");
+  s.scale = entry.integer("scale");
+  s.channels = entry.integer("channels");
+  s.rcabs = entry.integer("rcabs");
+  s.spread = entry.flag("spread");
+  if (entry.flag("sub_pixel")) {
+    throw std::runtime_error(
+        entry.where() +
+        ": expected transposed convolution, found \"sub_pixel\", which SuperTac no longer "
+        "computes (22 % slower, no more accurate); train the model again");
+  }
+  try {
+    s.grouping = grouping_of(entry.text("grouping"));
+    s.check();
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(entry.where() + ": " + error.what());
+  }
+  return s;
+}
+
+InputSettings read_input(const JsonEntry& entry) {
+  const InputSettings input{entry.number("rate_hz"),
+                            {entry.number("rest_volts"), entry.number("span_volts"), entry.flag("levelled")},
+                            entry.number_or_null("filter_s"),
+                            entry.has("pitch_mm") ? entry.number("pitch_mm") : InputSettings{}.pitch_mm};
+  if (input.rate_hz < 1 || input.rate_hz > 100'000 || std::abs(input.scaling.rest_volts) > 1000 ||
+      input.scaling.span_volts <= 1e-6 || input.scaling.span_volts > 1000 || input.filter_s.value_or(0) < 0 ||
+      input.filter_s.value_or(0) > 10 || input.pitch_mm < 0.1 || input.pitch_mm > 100) {
+    throw std::runtime_error(
+        entry.where() +
+        ": expected rate_hz 1 to 100000, |rest_volts| <= 1000, span_volts 1e-6 to 1000, filter_s 0 to 10, "
+        "pitch_mm 0.1 to 100");
+  }
+  return input;
+}
+
+FrameSettings read_frame_settings(const JsonEntry& entry) {
+  FrameSettings s;
+  s.in_channels = entry.integer("in_channels");
+  s.height = entry.integer("height");
+  s.width = entry.integer("width");
+  s.scale = entry.integer("scale");
+  s.channels = entry.integer("channels");
+  s.rcabs = entry.integer("rcabs");
+  try {
+    s.check();
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(entry.where() + ": " + error.what());
+  }
+  return s;
+}
+
+void expect_kind(const SafetensorsFile& file, const std::string& path, ModelKind expected) {
+  const auto entry = file.metadata().find("kind");
+  const std::string kind = entry == file.metadata().end() ? "" : entry->second;
+  if (expected == ModelKind::windows && kind == kFrameKind)
+    throw std::runtime_error(path +
+                             ": expected a SuperTac model, found a frame model (trained with --pairs); "
+                             "use it with supertac-evaluate --pairs");
+  if (expected == ModelKind::frames && kind != kFrameKind)
+    throw std::runtime_error(
+        path + ": expected a frame model (trained with --pairs), found " +
+        (kind.empty() ? "a SuperTac model; give it recordings" : "kind \"" + kind + "\""));
+}
+
+template <class Model, class Settings>
+std::unique_ptr<Model> build(const Settings& settings, const SafetensorsFile& file, const std::string& path) {
+  Rng rng(0);
+  auto model = std::make_unique<Model>(settings, rng);
+  load_parameters(file, path, model->parameters());
+  for (const Parameter& parameter : model->parameters())
+    if (!std::ranges::all_of(parameter.value.value().values(), [](real v) { return std::isfinite(v); }))
+      throw std::runtime_error(
+          path + ": " + in_quotes(parameter.name) +
+          " holds NaN or infinity: its training diverged, or it is damaged; choose another model");
+  return model;
+}
+
+}  // namespace
+
+std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, const InputSettings& input) {
+  Json settings = {{"preset", s.preset}, {"timesteps", s.timesteps},        {"latent", s.latent},
+                   {"scale", s.scale},   {"grouping", name_of(s.grouping)}, {"channels", s.channels},
+                   {"rcabs", s.rcabs}};
+  // What is as it always was is left out: the text of older files stays the same.
+  if (s.spread) settings["spread"] = true;
+  if (s.rows != 4 || s.columns != 4 || s.in_channels != 1) {
+    settings["rows"] = s.rows;
+    settings["columns"] = s.columns;
+    settings["in_channels"] = s.in_channels;
+  }
+  Json scaling = {{"rate_hz", input.rate_hz},
+                  {"rest_volts", input.scaling.rest_volts},
+                  {"span_volts", input.scaling.span_volts},
+                  {"filter_s", input.filter_s ? Json(*input.filter_s) : Json(nullptr)},
+                  {"formula", "clip((rest_volts - V) / span_volts, 0, 1)"}};
+  if (input.scaling.levelled) scaling["levelled"] = true;
+  if (input.pitch_mm != InputSettings{}.pitch_mm) scaling["pitch_mm"] = input.pitch_mm;
+  return {{"settings", settings.dump()}, {"input", scaling.dump()}};
+}
+
+std::map<std::string, std::string> model_metadata(const FrameSettings& s, const ChannelScaling& scaling) {
+  const Json settings = {
+      {"in_channels", s.in_channels}, {"height", s.height}, {"width", s.width}, {"scale", s.scale},
+      {"channels", s.channels},       {"rcabs", s.rcabs}};
+  const Json input = {{"mean", scaling.mean}, {"factor", scaling.factor}, {"formula", "(x - mean) * factor"}};
+  return {{"kind", kFrameKind}, {"settings", settings.dump()}, {"input", input.dump()}};
+}
+
+const Network& ModelFile::network() const {
+  return model ? static_cast<const Network&>(*model) : *frame_model;
+}
+
+std::map<std::string, std::string> ModelFile::description() const {
+  return model ? model_metadata(model->settings(), input) : model_metadata(frame_model->settings(), scaling);
+}
+
+std::string ModelFile::metadata_or(const std::string& key, const std::string& otherwise) const {
+  const auto found = metadata.find(key);
+  return found == metadata.end() ? otherwise : found->second;
+}
+
+double ModelFile::interval_factor() const {
+  return parse_double(metadata_or("interval_factor", "")).value_or(kIntervalFactor);
+}
+
+TaxelArray ModelFile::array() const {
+  const SuperTacSettings& s = model->settings();
+  return {static_cast<int>(s.rows), static_cast<int>(s.columns), input.pitch_mm,
+          static_cast<int>(s.in_channels)};
+}
+
+WindowSettings ModelFile::windows() const {
+  WindowSettings w;
+  w.timesteps = static_cast<int>(model->settings().timesteps);
+  w.scale = static_cast<int>(model->settings().scale);
+  w.rate_hz = input.rate_hz;
+  w.scaling = input.scaling;
+  w.array = array();
+  return w;
+}
+
+InputSettings input_of(const WindowSet& windows) {
+  return {windows.settings().rate_hz, windows.settings().scaling, windows.filter_s(),
+          windows.array().pitch_mm};
+}
+
+void set_array(SuperTacSettings& settings, const TaxelArray& array) {
+  settings.rows = array.rows;
+  settings.columns = array.columns;
+  settings.in_channels = array.channels;
+}
+
+ModelFile load_model(const std::string& path, ModelKind kind) {
+  const SafetensorsFile file = read_checkpoint(path);
+  expect_kind(file, path, kind);
+  const JsonEntry settings(file, path, "settings");
+  ModelFile loaded;
+  loaded.metadata = file.metadata();
+  if (kind == ModelKind::windows) {
+    const SuperTacSettings read = read_settings(settings);
+    loaded.input = read_input({file, path, "input"});
+    loaded.model = build<SuperTac>(read, file, path);
+    loaded.novelty = Novelty::read(file, path, signal_feature_count(loaded.array()));
+  } else {
+    const FrameSettings read = read_frame_settings(settings);
+    const JsonEntry input(file, path, "input");
+    const auto channels = static_cast<std::size_t>(read.in_channels);
+    loaded.scaling = {input.numbers("mean", channels), input.numbers("factor", channels)};
+    loaded.frame_model = build<FrameModel>(read, file, path);
+  }
+  loaded.ranges = ActivationRanges::read(file, path);
+  return loaded;
+}
+
+void save_model(const std::string& path, const SuperTac& model, const InputSettings& input,
+                std::map<std::string, std::string> metadata) {
+  metadata.merge(model_metadata(model.settings(), input));
+  write_checkpoint(path, model.parameters(), std::move(metadata));
+}
+
+void save_model(const std::string& path, const FrameModel& model, const ChannelScaling& scaling,
+                std::map<std::string, std::string> metadata) {
+  metadata.merge(model_metadata(model.settings(), scaling));
+  write_checkpoint(path, model.parameters(), std::move(metadata));
+}
+
+}  // namespace supertac

@@ -1,0 +1,83 @@
+// A model on disk: its parameters, and in the metadata everything needed to run an input through it. Two
+// kinds share the form: SuperTac, and frame models, whose metadata say "kind": "frame-checkpoint".
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "data/windows/pairs.h"
+#include "data/windows/windows.h"
+#include "layers/checkpoint.h"
+#include "models/inference/novelty.h"
+#include "models/inference/ranges.h"
+#include "models/networks/frame_model.h"
+#include "models/networks/supertac_model.h"
+
+namespace supertac {
+
+/// What stands between the sensor and SuperTac's input.
+struct InputSettings {
+  double rate_hz = 300;
+  Scaling scaling;
+  /// Length of the moving average (s) that the training signals went through, 0 = none; nothing when they
+  /// differed.
+  std::optional<double> filter_s = 0.0;
+  double pitch_mm = 3;  ///< of the array
+};
+
+/// The metadata keys "settings" and "input", JSON texts; of a frame model "kind" besides.
+std::map<std::string, std::string> model_metadata(const SuperTacSettings& settings,
+                                                  const InputSettings& input);
+std::map<std::string, std::string> model_metadata(const FrameSettings& settings,
+                                                  const ChannelScaling& scaling);
+
+enum class ModelKind {
+  windows,  ///< SuperTac
+  frames,   ///< a frame model, trained with --pairs
+};
+
+struct ModelFile {
+  std::unique_ptr<SuperTac> model;          ///< of kind windows, with its input
+  InputSettings input;                      //
+  std::optional<Novelty> novelty;           ///< of its training windows; nothing in older files
+  std::optional<ActivationRanges> ranges;   ///< likewise, for less than fp32
+  std::unique_ptr<FrameModel> frame_model;  ///< of kind frames, with its scaling
+  ChannelScaling scaling;                   //
+  std::map<std::string, std::string> metadata;
+
+  const Network& network() const;
+  /// model_metadata() of what was loaded.
+  std::map<std::string, std::string> description() const;
+  /// An entry of the metadata, or what is to stand for one that is missing.
+  std::string metadata_or(const std::string& key, const std::string& otherwise) const;
+  /// Whether it was trained beside random plates, and so feels plates that were never recorded.
+  bool knows_random_plates() const { return metadata_or("random_plates", "0") != "0"; }
+
+  // Of kind windows:
+  /// Half the width of a pixel's interval in units of its spread.
+  double interval_factor() const;
+  /// The sensor it was trained on.
+  TaxelArray array() const;
+  /// The windows it takes: its array and length, picture size, rate and scaling.
+  WindowSettings windows() const;
+};
+
+/// What the windows of a model trained on these have gone through.
+InputSettings input_of(const WindowSet& windows);
+
+/// The settings of a model for another array than the default one.
+void set_array(SuperTacSettings& settings, const TaxelArray& array);
+
+/// Builds the model that the metadata describes, after checking every setting's range, and fills it.
+/// Throws std::runtime_error naming path, what was expected and found; so for a model of another kind.
+ModelFile load_model(const std::string& path, ModelKind kind = ModelKind::windows);
+
+/// Write parameters and metadata. Throw FileError.
+void save_model(const std::string& path, const SuperTac& model, const InputSettings& input,
+                std::map<std::string, std::string> metadata);
+void save_model(const std::string& path, const FrameModel& model, const ChannelScaling& scaling,
+                std::map<std::string, std::string> metadata);
+
+}  // namespace supertac

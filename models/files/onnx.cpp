@@ -1,0 +1,232 @@
+#include "models/files/onnx.h"
+
+#include <set>
+#include <stdexcept>
+
+#include "autograd/trace.h"
+#include "data/windows/levelling.h"
+#include "io/numbers/numbers.h"
+#include "models/files/onnx_file.h"
+#include "models/inference/interval.h"
+
+namespace supertac {
+namespace {
+
+using Ints = std::vector<std::int64_t>;
+using kernels::ConvSettings;
+
+/// From a trace to nodes. Maps are channels-first here, [N,C,P...], as ONNX has them.
+class Exporter {
+ public:
+  std::string picture_of(const ModelFile& file);
+  OnnxGraph graph;
+
+ private:
+  using Id = const detail::Node*;
+
+  std::string scaled(const ModelFile& file);
+  std::string levelled(const std::string& x, Dim timesteps);
+  std::string percentile(const std::string& x, const std::string& name, std::int64_t rank, bool largest);
+  std::string network_input(const ModelFile& file);
+
+  const std::string& of(const Variable& x) const { return names_.at(x.node()); }
+  std::string number(float value);
+  std::string numbers(const Ints& values);
+  std::string weight(const Variable& x);
+  std::string new_name(const std::string& op) { return op + "_" + std::to_string(++count_); }
+  std::string activated(const std::string& y, real negative_slope);
+  void add(const TracedOp& op);
+  std::string made(const TracedOp& op);
+  std::string convolution(const TracedOp& op);
+  std::string linear(const TracedOp& op);
+  std::string gated_sum(const TracedOp& op);
+  void output(const char* name, const Variable& y, const char* about);
+
+  std::map<Id, std::string> names_;
+  std::map<Id, StoredTensor> parameters_;
+  std::set<std::string> written_;  // constants, named by what they are: the order of calls shall not show
+  int count_ = 0;
+};
+
+std::string Exporter::number(float value) {
+  const std::string name = "number_" + format(value);
+  if (written_.insert(name).second) graph.constant(name, {}, std::span(&value, 1));
+  return name;
+}
+
+std::string Exporter::numbers(const Ints& values) {
+  std::string name = "numbers";
+  for (const std::int64_t i : values) name += "_" + std::to_string(i);
+  const std::int64_t shape[] = {static_cast<std::int64_t>(values.size())};
+  if (written_.insert(name).second) graph.constant(name, shape, values);
+  return name;
+}
+
+// In double precision, as Scaling computes.
+std::string Exporter::scaled(const ModelFile& file) {
+  constexpr std::int64_t kF32 = 1, kF64 = 11;
+  const double rest[] = {file.input.scaling.rest_volts}, span[] = {file.input.scaling.span_volts};
+  const std::string volts = graph.node("Cast", {"volts"}, "volts_f64", {{"to", kF64}});
+  const std::string below = graph.node("Sub", {graph.constant("rest_volts", rest), volts}, "below_rest");
+  const std::string share = graph.node("Div", {below, graph.constant("span_volts", span)}, "share_of_span");
+  const std::string x = graph.node("Cast", {share}, "unclipped", {{"to", kF32}});
+  return graph.node("Clip", {x, number(0), number(1)}, "scaled");
+}
+
+// Lower edge of the bin of 1/256 that holds the rank-th smallest or largest sample of each signal,
+// [N,1,signals].
+std::string Exporter::percentile(const std::string& x, const std::string& name, std::int64_t rank,
+                                 bool largest) {
+  constexpr float kBins = 256;
+  constexpr std::int64_t kTime = 1;
+  graph.node_of_many("TopK", {x, numbers({rank})}, {name + "_sorted", name + "_places"},
+                     {{"axis", kTime}, {"largest", std::int64_t{largest}}, {"sorted", std::int64_t{1}}});
+  const std::string sample =
+      graph.node("Gather", {name + "_sorted", numbers({rank - 1})}, name + "_sample", {{"axis", kTime}});
+  const std::string bins = graph.node("Mul", {sample, number(kBins)}, name + "_in_bins");
+  const std::string bin =
+      graph.node("Floor", {graph.node("Min", {bins, number(kBins - 1)}, name + "_in_range")}, name + "_bin");
+  return graph.node("Mul", {bin, number(1 / kBins)}, name);
+}
+
+// level(), which counts samples in bins: the bin of the rank-th sample is the rank-th bin.
+std::string Exporter::levelled(const std::string& x, Dim timesteps) {
+  const std::string rest = percentile(x, "rest", timesteps / Dim{kRestShare} + 1, false);
+  const std::string top = percentile(x, "top", kTopRank, true);
+  const std::string removed = graph.node("Mul", {rest, number(kRestRemoved)}, "rest_removed");
+  const std::string most = graph.node("ReduceMax", {graph.node("Sub", {top, removed}, "swing")},
+                                      "largest_swing", {{"axes", Ints{2}}, {"keepdims", std::int64_t{1}}});
+  const std::string gain = graph.node("Max", {most, number(kLeastGain)}, "gain");
+  const std::string factor = graph.node("Div", {number(1), gain}, "factor");
+  const std::string apart = graph.node("Sub", {x, removed}, "without_rest");
+  const std::string full = graph.node("Mul", {apart, factor}, "at_full_gain");
+  return graph.node("Clip", {full, number(0), number(1)}, "levelled");
+}
+
+std::string Exporter::network_input(const ModelFile& file) {
+  const std::string any = "N";
+  if (file.model) {
+    const SuperTacSettings& s = file.model->settings();
+    graph.input(
+        "volts", {any, s.timesteps, s.signals()},
+        "Volts of every signal, oldest sample first; taxel k lies in row k / columns, column k % columns.");
+    const std::string x = scaled(file);
+    return file.input.scaling.levelled ? levelled(x, s.timesteps) : x;
+  }
+  const FrameSettings& s = file.frame_model->settings();
+  graph.input("frames", {any, s.in_channels, s.height, s.width}, "Frames in the sensor's numbers.");
+  const std::int64_t shape[] = {s.in_channels, 1, 1};
+  const std::vector<float> mean(file.scaling.mean.begin(), file.scaling.mean.end());
+  const std::vector<float> factor(file.scaling.factor.begin(), file.scaling.factor.end());
+  const std::string apart =
+      graph.node("Sub", {"frames", graph.constant("mean", shape, mean)}, "without_mean");
+  return graph.node("Mul", {apart, graph.constant("factor", shape, factor)}, "scaled");
+}
+
+std::string Exporter::weight(const Variable& x) {
+  const StoredTensor& p = parameters_.at(x.node());
+  if (written_.insert(p.name).second) {
+    Ints shape(p.shape.begin(), p.shape.end());
+    // A 1x1 convolution of means is a linear layer.
+    if (shape.size() == 4 && x.rank() == 2) shape.resize(2);
+    graph.constant(p.name, shape, p.values);
+  }
+  return p.name;
+}
+
+std::string Exporter::activated(const std::string& y, real negative_slope) {
+  if (negative_slope == 1) return y;
+  if (negative_slope == 0) return graph.node("Relu", {y}, y + "_relu");
+  return graph.node("LeakyRelu", {y}, y + "_leaky_relu", {{"alpha", static_cast<float>(negative_slope)}});
+}
+
+std::string Exporter::convolution(const TracedOp& op) {
+  const ConvSettings& s = op.settings.map;
+  const bool plane = op.inputs[0].rank() == 4;
+  const auto both = [&](Dim height, Dim width) { return plane ? Ints{height, width} : Ints{width}; };
+  Ints pads = both(s.padding_h, s.padding_w);
+  pads.insert(pads.end(), pads.begin(), pads.begin() + (plane ? 2 : 1));
+  const std::string y =
+      graph.node(s.transposed ? "ConvTranspose" : "Conv",
+                 {of(op.inputs[0]), weight(op.inputs[1]), weight(op.inputs[2])}, new_name(std::string(op.op)),
+                 {{"kernel_shape", both(s.kernel_h, s.kernel_w)},
+                  {"strides", both(s.stride_h, s.stride_w)},
+                  {"pads", pads}});
+  return activated(y, op.settings.negative_slope);
+}
+
+std::string Exporter::linear(const TracedOp& op) {
+  const std::string y = graph.node("Gemm", {of(op.inputs[0]), weight(op.inputs[1]), weight(op.inputs[2])},
+                                   new_name("linear"), {{"transB", std::int64_t{1}}});
+  return activated(y, op.settings.negative_slope);
+}
+
+std::string Exporter::gated_sum(const TracedOp& op) {
+  const std::string gates = graph.node("Unsqueeze", {of(op.inputs[2]), numbers({2, 3})}, new_name("gates"));
+  const std::string gated = graph.node("Mul", {of(op.inputs[1]), gates}, new_name("gated"));
+  return graph.node("Add", {of(op.inputs[0]), gated}, new_name("gated_sum"));
+}
+
+std::string Exporter::made(const TracedOp& op) {
+  const std::string kind(op.op);
+  if (kind.starts_with("conv")) return convolution(op);
+  if (kind == "linear") return linear(op);
+  if (kind == "gated_sum") return gated_sum(op);
+  const std::string x = of(op.inputs[0]);
+  const Ints images = {-1};
+  if (kind == "take_runs") {
+    Ints columns;
+    for (Dim k = 0; k < op.y.dim(2); ++k)
+      columns.push_back(op.settings.first + k / op.settings.run * op.settings.step + k % op.settings.run);
+    const std::string taken =
+        graph.node("Gather", {x, numbers(columns)}, new_name("group"), {{"axis", std::int64_t{2}}});
+    return graph.node("Transpose", {taken}, taken + "_channels_first", {{"perm", Ints{0, 2, 1}}});
+  }
+  if (kind == "flatten_channels_first") return graph.node("Flatten", {x}, new_name("flat"));
+  if (kind == "unflatten_channels_first") {
+    Ints shape = {-1, op.y.dim(op.y.rank() - 1)};
+    for (int i = 1; i + 1 < op.y.rank(); ++i) shape.push_back(op.y.dim(i));
+    return graph.node("Reshape", {x, numbers(shape)}, new_name("map"));
+  }
+  if (kind == "global_mean") {
+    const std::string mean = graph.node("GlobalAveragePool", {x}, new_name("mean"));
+    return graph.node("Flatten", {mean}, new_name("means"));
+  }
+  if (kind == "sigmoid") return graph.node("Sigmoid", {x}, new_name("sigmoid"));
+  if (kind == "add") return graph.node("Add", {x, of(op.inputs[1])}, new_name("add"));
+  if (kind == "concat") {
+    std::vector<std::string> parts;
+    for (const Variable& part : op.inputs) parts.push_back(of(part));
+    return graph.node("Concat", parts, new_name("concat"), {{"axis", std::int64_t{1}}});
+  }
+  throw std::logic_error("export: ONNX has no counterpart of the op " + kind + "; see models/files/onnx.cpp");
+}
+
+void Exporter::output(const char* name, const Variable& y, const char* about) {
+  graph.node("Reshape", {of(y), numbers({-1, y.dim(1), y.dim(2)})}, name);
+  graph.output(name, {"N", y.dim(1), y.dim(2)}, about);
+}
+
+std::string Exporter::picture_of(const ModelFile& file) {
+  const Network& network = file.network();
+  for (const Parameter& p : network.parameters()) parameters_.emplace(p.value.node(), to_stored(p));
+  const NoGrad no_grad;
+  const Variable input(Tensor::zeros(network.input_shape(1)));
+  const Trace trace;
+  const Drawing drawn = network.draw(input);
+  names_[input.node()] = network_input(file);
+  for (const TracedOp& op : trace.ops()) names_[op.y.node()] = made(op);
+  output("picture", drawn.picture, "Heights over the flat plate, 0 to 1; row grows with y, column with x.");
+  if (drawn.spread.defined())
+    output("spread", drawn.spread, "How far from the truth a pixel is expected to be.");
+  auto metadata = file.metadata;
+  if (drawn.spread.defined()) metadata.emplace("interval_factor", std::to_string(kIntervalFactor));
+  return graph.file(
+      "1", file.model ? "SuperTac: volts in, picture out." : "SuperTac: frames in, picture out.", metadata);
+}
+
+}  // namespace
+
+std::string onnx_of(const ModelFile& model) { return Exporter().picture_of(model); }
+
+}  // namespace supertac

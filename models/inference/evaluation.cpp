@@ -1,0 +1,97 @@
+#include "models/inference/evaluation.h"
+
+#include <algorithm>
+#include <exception>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace supertac {
+namespace {
+
+constexpr std::size_t kBatchesAtOnce = 4;
+
+struct Part {
+  std::size_t first;
+  Tensor inputs, outputs, targets;
+  std::vector<float> spreads, unfamiliar;
+  std::exception_ptr error;
+};
+
+void compute(const Committee& network, const Examples& data, std::span<const std::uint32_t> indices,
+             Part& part) {
+  const std::size_t input_size = data.input_size(), target_size = data.image().pixels();
+  for (std::size_t n = 0; n < indices.size(); ++n) {
+    data.input(indices[n], part.inputs.values().subspan(n * input_size, input_size));
+    data.target(indices[n], part.targets.values().subspan(n * target_size, target_size));
+  }
+  // Copied, so that what this thread took from its pool goes back there.
+  const Estimate estimate = network.estimate(part.inputs);
+  std::copy_n(estimate.picture.data(), estimate.picture.size(), part.outputs.data());
+  part.spreads.assign(estimate.spread.values().begin(), estimate.spread.values().end());
+  part.unfamiliar.assign(estimate.unfamiliar.values().begin(), estimate.unfamiliar.values().end());
+}
+
+std::string text(const NetworkFormat& f) {
+  return std::to_string(f.frames) + " frame(s) of " + std::to_string(f.rows) + "x" +
+         std::to_string(f.columns) + " taxels with " + std::to_string(f.channels) +
+         " channel(s) and pictures of " + std::to_string(f.rows * f.scale) + "x" +
+         std::to_string(f.columns * f.scale);
+}
+
+}  // namespace
+
+void check_format(const Examples& examples, const Network& network) {
+  const TaxelArray array = examples.array();
+  const NetworkFormat own{static_cast<Dim>(examples.frames()), array.rows, array.columns, array.channels,
+                          examples.scale()};
+  if (own != network.format())
+    throw std::invalid_argument("the data have " + text(own) + ", the model expects " +
+                                text(network.format()));
+}
+
+void for_each_output(const Committee& network, const Examples& data, std::span<const std::uint32_t> indices,
+                     const std::function<bool(const EvaluatedBatch&)>& use, std::size_t batch) {
+  check_format(data, network.first());
+  for (std::size_t start = 0; start < indices.size(); start += batch * kBatchesAtOnce) {
+    std::vector<Part> parts;
+    const std::size_t end = std::min(indices.size(), start + batch * kBatchesAtOnce);
+    for (std::size_t first = start; first < end; first += batch) {
+      const auto count = static_cast<Dim>(std::min(batch, end - first));
+      const Shape pictures = network.first().picture_shape(count);
+      parts.push_back({first,
+                       Tensor(network.first().input_shape(count)),
+                       Tensor(pictures),
+                       Tensor(pictures),
+                       {},
+                       {},
+                       {}});
+    }
+#pragma omp parallel for schedule(static, 1)
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      try {
+        const auto count = static_cast<std::size_t>(parts[i].inputs.dim(0));
+        compute(network, data, indices.subspan(parts[i].first, count), parts[i]);
+      } catch (...) {  // an exception must not leave a thread
+        parts[i].error = std::current_exception();
+      }
+    }
+    for (const Part& p : parts) {
+      if (p.error) std::rethrow_exception(p.error);
+      if (!use({p.first, p.inputs, p.outputs, p.targets, p.spreads, p.unfamiliar})) return;
+    }
+  }
+}
+
+ZoneMetrics score(const Committee& network, const Examples& windows, std::span<const std::uint32_t> indices,
+                  bool (*stop)()) {
+  ZoneMetrics metrics(windows.image());
+  for_each_output(network, windows, indices, [&](const EvaluatedBatch& b) {
+    for (std::size_t n = 0; n < b.size(); ++n)
+      metrics.add(b.output(n), b.target(n), windows.zone(indices[b.first + n]));
+    return stop == nullptr || !stop();
+  });
+  return metrics;
+}
+
+}  // namespace supertac

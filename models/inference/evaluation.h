@@ -1,0 +1,54 @@
+// Runs a network over examples.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+
+#include "data/scores/metrics.h"
+#include "data/windows/examples.h"
+#include "models/inference/committee.h"
+
+namespace supertac {
+
+/// Throws std::invalid_argument that names both when the examples' inputs or pictures are not the network's.
+void check_format(const Examples& examples, const Network& network);
+
+/// A batch of results: inputs as the network takes them, outputs, spreads and targets [n,H,W,1], and the
+/// first of their places in `indices`. Spreads are empty where the network has none, `unfamiliar` as in
+/// Estimate.
+struct EvaluatedBatch {
+  std::size_t first;
+  const Tensor& inputs;
+  const Tensor& outputs;
+  const Tensor& targets;
+  std::span<const float> spreads;
+  std::span<const float> unfamiliar;
+
+  std::size_t size() const { return static_cast<std::size_t>(inputs.dim(0)); }
+  std::span<const float> input(std::size_t n) const { return sample(inputs, n); }
+  std::span<const float> output(std::size_t n) const { return sample(outputs, n); }
+  std::span<const float> target(std::size_t n) const { return sample(targets, n); }
+  /// Empty where the network has none.
+  std::span<const float> spread(std::size_t n) const { return sample(spreads, n); }
+
+ private:
+  std::span<const float> sample(const Tensor& all, std::size_t n) const { return sample(all.values(), n); }
+  std::span<const float> sample(std::span<const float> all, std::size_t n) const {
+    const std::size_t values = all.size() / size();
+    return all.subspan(n * values, values);
+  }
+};
+
+/// Calls `use` for the given examples in order, in batches of at most `batch`. `use` returns false to stop
+/// early. Batches are computed on several threads, `use` runs on the caller's. Throws as check_format.
+void for_each_output(const Committee& network, const Examples& examples,
+                     std::span<const std::uint32_t> indices,
+                     const std::function<bool(const EvaluatedBatch&)>& use, std::size_t batch = 64);
+
+/// The metrics of the network's pictures of the given windows. `stop`, if given, is asked between batches;
+/// once it says true, the windows so far are what was measured. Throws as for_each_output.
+ZoneMetrics score(const Committee& network, const Examples& windows, std::span<const std::uint32_t> indices,
+                  bool (*stop)() = nullptr);
+
+}  // namespace supertac

@@ -1,0 +1,78 @@
+#include "models/inference/plan.h"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+
+#include "autograd/kernels/fast/int8.h"
+
+namespace supertac {
+namespace {
+
+Shape with_count(const Shape& one, Dim count) {
+  std::array<Dim, kMaxRank> dims{};
+  std::copy(one.dims().begin(), one.dims().end(), dims.begin());
+  dims[0] = count;
+  return Shape(std::span<const Dim>(dims.data(), one.dims().size()));
+}
+
+}  // namespace
+
+template <class T>
+static void fill_margins(const Map& map, Dim images, T value, T* image) {
+  if (map.margin_h + map.margin_w == 0) return;
+  const Dim ends = map.margin_h * map.line(), side = map.margin_w * map.channels;
+  for (T* const last = image + images * map.image(); image < last; image += map.image()) {
+    std::fill_n(image, ends, value);
+    std::fill_n(image + map.image() - ends, ends, value);
+    for (T* line = image + ends; line < image + map.image() - ends; line += map.line()) {
+      std::fill_n(line, side, value);
+      std::fill_n(line + map.line() - side, side, value);
+    }
+  }
+}
+
+void Plan::clear_margins(const Block& block) const {
+  for (const Map& map : planes_) std::fill_n(block.begin(map), map.image(), real(0));
+  for (const Map& map : buffers_) fill_margins(map, block.images, real(0), block.begin(map));
+  for (const Map& map : byte_buffers_)
+    fill_margins(map, block.images, static_cast<std::uint8_t>(map.zero), block.byte_begin(map));
+}
+
+void Plan::copy_out(const Block& block, const Map& map, Tensor& to, Dim first) const {
+  const Dim run = map.width * map.channels;
+  real* target = to.data() + first * map.height * run;
+  for (Dim n = 0; n < block.images; ++n) {
+    const real* line = block.first_pixel(map) + n * map.image();
+    for (Dim y = 0; y < map.height; ++y, line += map.line(), target += run) std::copy_n(line, run, target);
+  }
+}
+
+Estimate Plan::run(const Tensor& inputs) const {
+  const Dim count = inputs.dim(0), size = count == 0 ? 0 : inputs.size() / count;
+  Estimate out{
+      .picture = Tensor(with_count(picture_shape_, count)), .spread = {}, .latents = {}, .unfamiliar = {}};
+  if (has_spread_) out.spread = Tensor(out.picture.shape());
+  if (has_latents_) out.latents = Tensor(with_count(latents_shape_, count));
+  const Dim images = std::min(count, block_), bytes = byte_workspace_ * images;
+  Tensor memory(Shape{scratch_ + workspace_ * images + bytes / static_cast<Dim>(sizeof(real)) + 1});
+  real* const workspace = memory.data() + scratch_;
+  std::optional<kernels::ByteProducts> byte_products;  // of tiles, for which a process asks the system
+  if (byte_workspace_ > 0) byte_products.emplace();
+  for (Dim first = 0; first < count; first += block_) {
+    const Block block{inputs.data() + first * size,
+                      std::min(block_, count - first),
+                      workspace,
+                      reinterpret_cast<std::uint8_t*>(workspace + workspace_ * images),
+                      memory.data(),
+                      filters_anew_};
+    if (first == 0 || block.images != block_) clear_margins(block);
+    for (const PlanStep& step : steps_) step(block);
+    copy_out(block, picture_, out.picture, first);
+    if (has_spread_) copy_out(block, spread_, out.spread, first);
+    if (has_latents_) copy_out(block, latents_, out.latents, first);
+  }
+  return out;
+}
+
+}  // namespace supertac

@@ -1,0 +1,94 @@
+// From what an inference was seen to do to a plan.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+
+#include "autograd/kernels/fast/isa.h"
+#include "autograd/trace.h"
+#include "models/inference/plan.h"
+#include "models/inference/ranges.h"
+
+namespace supertac {
+
+/// What the steps run on. Without the fast kernels only networks of bytes are prepared: on the portable ones.
+inline const kernels::IsaKernels& isa() {
+  return kernels::is_plain() ? kernels::kPortableKernels : kernels::isa_kernels();
+}
+
+/// One step for each op, in the order in which they ran; a map's memory is taken again behind its last
+/// reader.
+class Planner {
+ public:
+  /// With `ranges` the convolutions and the linear layers behind them are products of bytes. Throws
+  /// std::logic_error naming an op that has no step, std::invalid_argument for the ranges of another network.
+  /// `second_cache`: of the processor, in bytes; 0: not known.
+  static std::shared_ptr<const Plan> plan(const Network& network, const ActivationRanges* ranges = nullptr,
+                                          std::size_t second_cache = second_cache_bytes());
+
+ private:
+  using Id = const detail::Node*;
+  using Make = void (Planner::*)(const TracedOp&);
+
+  static std::size_t second_cache_bytes();
+  static std::size_t bytes_of(const Tensor& t) { return static_cast<std::size_t>(t.size()) * sizeof(real); }
+  bool filters_anew(std::size_t second_cache) const;
+  Planner(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn,
+          const ActivationRanges* ranges);
+  static const std::map<std::string_view, Make>& makers();
+
+  // Before the steps are made: who reads what until when, and how wide its margin must be.
+  void look_ahead(const std::vector<TracedOp>& ops, const Drawing& drawn);
+  void need_margin(const TracedOp& conv);
+  Id owner(const Variable& x) const;
+
+  bool is_of_bytes(const TracedOp& op) const;
+  const Map& map_of(const Variable& x) const;
+  /// Of the first input: its numbers, or the bytes that stand for them.
+  const Map& source_of(const TracedOp& op) const;
+  Map layout_of(const Variable& y) const;
+  const Map& new_map(const Variable& y);
+  const Map& new_bytes(const Variable& y);
+  Map new_results(const TracedOp& op);
+  void add_product(const TracedOp& op, struct Product product);
+  void add_winograd(struct Winograd step);
+  void add_bytes(const TracedOp& op);
+  void release_after(std::size_t op);
+
+  void take_runs(const TracedOp& op);
+  void conv(const TracedOp& op);
+  void winograd(const TracedOp& op);
+  void plane_conv(const TracedOp& op);
+  void direct_conv(const TracedOp& op);
+  void transposed_conv(const TracedOp& op);
+  void transposed_winograd(const TracedOp& op);
+  void direct_transposed_conv(const TracedOp& op);
+  void linear(const TracedOp& op);
+  void flatten(const TracedOp& op);
+  void unflatten(const TracedOp& op);
+  void concat(const TracedOp& op);
+  void global_mean(const TracedOp& op);
+  void sigmoid(const TracedOp& op);
+  void gated_sum(const TracedOp& op);
+  void add(const TracedOp& op);
+  void load_input(const Variable& input);
+
+  struct Margin {
+    Dim height = 0, width = 0;
+  };
+  std::shared_ptr<Plan> plan_ = std::make_shared<Plan>();
+  Id input_;
+  std::map<Id, Id> flattened_;             // value -> the map whose numbers it has
+  std::map<Id, Dim> pixels_of_unflatten_;  // value that is unflattened -> pixels
+  std::map<Id, std::size_t> last_use_;
+  std::map<Id, Margin> margins_;
+  std::map<Id, Map> maps_, bytes_;
+  std::vector<Map> free_, free_bytes_;
+  std::map<Id, kernels::Steps> steps_;  // of values that bytes stand for
+  std::set<Id> read_as_numbers_;
+  std::size_t weights_ = 0, transformed_ = 0;  // bytes: as they are, and Winograd's places of some of them
+};
+
+}  // namespace supertac

@@ -1,0 +1,62 @@
+// What all networks that draw have in common.
+#pragma once
+
+#include "layers/module.h"
+
+namespace supertac {
+
+/// What a network is for: inputs of `frames` frames of rows x columns taxels with `channels` numbers each,
+/// and pictures `scale` times finer than the array.
+struct NetworkFormat {
+  Dim frames = 1, rows = 4, columns = 4, channels = 1, scale = 4;
+  bool operator==(const NetworkFormat&) const = default;
+};
+
+/// Pictures and what is known of their worth.
+struct Estimate {
+  Tensor picture;     ///< [N,rows scale,columns scale,1]
+  Tensor spread;      ///< the same: how far from the truth a pixel is expected to be; undefined where nothing
+                      ///< says so
+  Tensor latents;     ///< [N,latents]; undefined for a network without any
+  Tensor unfamiliar;  ///< [N], 1 for a picture that is felt and not recalled; undefined where networks of one
+                      ///< kind alone draw (models/inference/committee.h)
+};
+
+/// The same on the graph.
+struct Drawing {
+  Variable picture, spread, latents;
+};
+
+class Network : public Module {
+ public:
+  Network() = default;
+  Network(const Network&) = default;
+  Network(Network&&) = default;
+  virtual ~Network() = default;
+
+  virtual NetworkFormat format() const = 0;
+  /// Of a batch.
+  virtual Shape input_shape(Dim count) const = 0;
+  Shape picture_shape(Dim count) const {
+    const NetworkFormat f = format();
+    return {count, f.rows * f.scale, f.columns * f.scale, 1};
+  }
+  /// Inputs -> pictures and what is known of them. Throws std::invalid_argument on another shape.
+  virtual Drawing draw(const Variable& inputs) const = 0;
+  /// The same, nothing recorded. Who draws many pictures prepares the network (prepared.h).
+  Estimate estimate(const Tensor& inputs) const;
+  /// The pictures alone, [N,rows scale,columns scale,1].
+  Tensor infer(const Tensor& inputs) const { return estimate(inputs).picture; }
+};
+
+inline Estimate Network::estimate(const Tensor& inputs) const {
+  const NoGrad no_grad;
+  const Drawing drawn = draw(Variable(inputs));
+  const auto value = [](const Variable& x) { return x.defined() ? x.value() : Tensor(); };
+  return {.picture = drawn.picture.value(),
+          .spread = value(drawn.spread),
+          .latents = value(drawn.latents),
+          .unfamiliar = {}};
+}
+
+}  // namespace supertac

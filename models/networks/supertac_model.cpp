@@ -1,0 +1,191 @@
+#include "models/networks/supertac_model.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "autograd/ops/activations.h"
+#include "autograd/ops/shaping.h"
+#include "autograd/ops/vae.h"
+
+namespace supertac {
+namespace {
+
+void check_range(const char* name, Dim value, Dim low, Dim high) {
+  if (value >= low && value <= high) return;
+  throw std::invalid_argument(std::string("model settings: ") + name + " must be " + std::to_string(low) +
+                              " to " + std::to_string(high) + ", got " + std::to_string(value));
+}
+
+SuperTacSettings checked(const SuperTacSettings& settings) {
+  settings.check();
+  return settings;
+}
+
+VaeOptions vae_options(const SuperTacSettings& s) {
+  return {.timesteps = s.timesteps, .channels = s.group_signals(), .latent = s.latent};
+}
+
+template <class Part>
+std::vector<Part> make_parts(const SuperTacSettings& s, Rng& rng) {
+  std::vector<Part> parts;
+  for (Dim i = 0; i < s.groups(); ++i) parts.emplace_back(vae_options(s), rng);
+  return parts;
+}
+
+std::vector<Rirb> make_rirbs(const SuperTacSettings& s, Rng& rng) {
+  std::vector<Rirb> rirbs;
+  for (Dim size = 1; size < s.scale; size *= 2) {
+    rirbs.emplace_back(RirbOptions{.channels = s.channels, .blocks = s.rcabs}, rng);
+  }
+  return rirbs;
+}
+
+// concat() takes eight at most.
+Variable concat_groups(std::span<const Variable> groups) {
+  constexpr std::size_t kAtOnce = 8;
+  if (groups.size() <= kAtOnce) return concat(groups);
+  const Variable halves[] = {concat(groups.first(kAtOnce)), concat(groups.subspan(kAtOnce))};
+  return concat(halves);
+}
+
+}  // namespace
+
+Grouping grouping_of(const std::string& name) {
+  if (name == "horizontal") return Grouping::horizontal;
+  if (name == "vertical") return Grouping::vertical;
+  throw std::invalid_argument("grouping must be horizontal or vertical, got \"" + name + "\"");
+}
+
+std::string name_of(Grouping grouping) {
+  return grouping == Grouping::horizontal ? "horizontal" : "vertical";
+}
+
+void SuperTacSettings::check() const {
+  check_range("rows", rows, 2, 16);
+  check_range("columns", columns, 2, 16);
+  check_range("in_channels", in_channels, 1, 8);
+  check_range("timesteps", timesteps, 32, 512);
+  if (timesteps % 16 != 0) {
+    throw std::invalid_argument(
+        "model settings: timesteps must be a multiple of 16 (the encoder halves four times), got " +
+        std::to_string(timesteps));
+  }
+  check_range("latent", latent, 1, 256);
+  if (scale != 2 && scale != 4 && scale != 8) {
+    throw std::invalid_argument("model settings: scale must be 2, 4 or 8, got " + std::to_string(scale));
+  }
+  if (std::min(image_height(), image_width()) < 7) {
+    throw std::invalid_argument(
+        "model settings: scale " + std::to_string(scale) + " of an array of " + std::to_string(rows) + "x" +
+        std::to_string(columns) +
+        " makes pictures with a side below 7 pixels, too small for SSIM; raise scale");
+  }
+  check_range("channels", channels, 4, 256);
+  check_range("rcabs", rcabs, 0, 16);
+}
+
+SuperTacSettings SuperTacSettings::of_preset(const std::string& name) {
+  if (name == "paper") return {.spread = true};
+  if (name == "tiny") return {.preset = "tiny", .timesteps = 128, .channels = 8, .rcabs = 1, .spread = true};
+  throw std::invalid_argument("unknown preset \"" + name + "\"; known: paper, tiny");
+}
+
+PresetTraining PresetTraining::of_preset(const std::string& name) {
+  constexpr double kWindowS = 2.56;
+  PresetTraining training{.rate_hz =
+                              static_cast<double>(SuperTacSettings::of_preset(name).timesteps) / kWindowS};
+  if (name == "tiny") {
+    training.epochs = 80;
+    training.learning_rate = 2e-3;
+  }
+  return training;
+}
+
+Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
+    : rows_(s.rows),
+      columns_(s.columns),
+      fc_(s.groups() * s.latent, s.channels * s.rows * s.columns, rng),
+      rirbs_(make_rirbs(s, rng)),
+      out_(s.channels, 1, kSameSize, rng) {
+  if (s.spread) spread_.emplace(s.channels, 1, kSameSize, rng);
+  add("fc", fc_);
+  for (std::size_t i = 0; i < rirbs_.size(); ++i) add("rirb." + std::to_string(i), rirbs_[i]);
+  add("out", out_);
+  if (spread_) add("spread", *spread_);
+}
+
+Upsampler::Output Upsampler::forward(const Variable& latents) const {
+  const Dim pixels[] = {rows_, columns_};
+  Variable h = unflatten_channels_first(fc_.forward(latents, kLeakyRelu), pixels);
+  for (const Rirb& rirb : rirbs_) h = rirb.forward(h);
+  return {out_.forward(h), spread_ ? spread_->forward(h) : Variable()};
+}
+
+SuperTac::SuperTac(const SuperTacSettings& settings, Rng& rng)
+    : settings_(checked(settings)),
+      encoders_(make_parts<Encoder>(settings, rng)),
+      decoders_(make_parts<Decoder>(settings, rng)),
+      upsampler_(settings, rng) {
+  for (std::size_t i = 0; i < encoders_.size(); ++i) add("encoder." + std::to_string(i), encoders_[i]);
+  for (std::size_t i = 0; i < decoders_.size(); ++i) add("decoder." + std::to_string(i), decoders_[i]);
+  add("upsampler", upsampler_);
+}
+
+// The signals of a group are its taxels in order, each with its channels.
+PerGroup<Variable> SuperTac::split(const Variable& windows) const {
+  const SuperTacSettings& s = settings_;
+  if (windows.rank() != 3 || windows.dim(1) != s.timesteps || windows.dim(2) != s.signals()) {
+    throw std::invalid_argument("SuperTac: windows expects [N," + std::to_string(s.timesteps) + "," +
+                                std::to_string(s.signals()) + "], got " + windows.shape().text());
+  }
+  const Dim row = s.columns * s.in_channels;
+  const Dim run = s.grouping == Grouping::horizontal ? row : s.in_channels;
+  PerGroup<Variable> groups(s.groups());
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    groups[g] = take_runs(windows, {static_cast<Dim>(g) * run, run, row, s.group_signals()});
+  return groups;
+}
+
+SuperTac::Output SuperTac::forward(const Tensor& windows, std::span<const Tensor> eps) const {
+  const Dim groups = settings_.groups();
+  if (eps.size() != static_cast<std::size_t>(groups)) {
+    throw std::invalid_argument("SuperTac: eps expects " + std::to_string(groups) + " tensors, got " +
+                                std::to_string(eps.size()));
+  }
+  Output out{
+      split(Variable(windows)), PerGroup<LatentDistribution>(groups), PerGroup<Variable>(groups), {}, {}};
+  PerGroup<Variable> z(groups);
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    out.latent[i] = encoders_[i].forward(out.input[i]);
+    z[i] = sample_gaussian(out.latent[i].mean, out.latent[i].log_var, eps[i]);
+    out.decoded[i] = decoders_[i].forward(z[i]);
+  }
+  const Upsampler::Output drawn = upsampler_.forward(concat_groups(z.span()));
+  out.image = drawn.picture, out.spread = drawn.spread;
+  return out;
+}
+
+NetworkFormat SuperTac::format() const {
+  const SuperTacSettings& s = settings_;
+  return {s.timesteps, s.rows, s.columns, s.in_channels, s.scale};
+}
+
+Variable SuperTac::means(const Variable& windows) const {
+  const PerGroup<Variable> groups = split(windows);
+  PerGroup<Variable> means(settings_.groups());
+  for (std::size_t i = 0; i < means.size(); ++i) means[i] = encoders_[i].mean(groups[i]);
+  return concat_groups(means.span());
+}
+
+Tensor SuperTac::encode(const Tensor& windows) const {
+  const NoGrad no_grad;
+  return means(Variable(windows)).value();
+}
+
+Drawing SuperTac::draw(const Variable& windows) const {
+  const Variable latents = means(windows);
+  const Upsampler::Output drawn = upsampler_.forward(latents);
+  return {.picture = drawn.picture, .spread = drawn.spread, .latents = latents};
+}
+
+}  // namespace supertac

@@ -1,0 +1,128 @@
+// SuperTac (Front. Robot. AI 12:1552922, 2025): VAEs over groups of taxels, residual upsampling of their
+// latents.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "layers/residual.h"
+#include "models/networks/network.h"
+#include "models/networks/vae.h"
+
+namespace supertac {
+
+/// Which taxels one VAE sees. Taxel k lies in column k % columns (x) and row k / columns (y) of the array.
+enum class Grouping {
+  horizontal,  ///< the rows: of a 4x4 array group i = taxels 4i .. 4i+3
+  vertical,    ///< the columns: of a 4x4 array group i = taxels i, i+4, i+8, i+12
+};
+/// Both throw std::invalid_argument / return "horizontal" or "vertical".
+Grouping grouping_of(const std::string& name);
+std::string name_of(Grouping grouping);
+
+struct SuperTacSettings {
+  std::string preset = "paper";
+  Dim rows = 4, columns = 4;  ///< of the array: 2 to 16
+  Dim in_channels = 1;        ///< numbers a taxel gives: 1 to 8
+  Dim timesteps = 256;        ///< T: 32 to 512, a multiple of 16
+  Dim latent = 10;            ///< LD: 1 to 256
+  Dim scale = 4;  ///< 2, 4, 8: pictures so many times finer than the array, 7 or more pixels a side
+  Grouping grouping = Grouping::horizontal;
+  Dim channels = 32;    ///< of the upsampler
+  Dim rcabs = 3;        ///< in each RIRB
+  bool spread = false;  ///< whether it also draws how far off each pixel may be; presets do
+
+  Dim signals() const { return rows * columns * in_channels; }  ///< numbers in a frame
+  Dim groups() const { return grouping == Grouping::horizontal ? rows : columns; }
+  Dim group_signals() const { return signals() / groups(); }
+  Dim image_height() const { return rows * scale; }
+  Dim image_width() const { return columns * scale; }
+  /// Throws std::invalid_argument naming the setting, its range and what was given.
+  void check() const;
+  /// A preset's settings: "paper", or "tiny", with a ninth of its multiply-adds. Both were made for windows
+  /// of 2.56 s. Throws std::invalid_argument for an unknown name, listing the known ones.
+  static SuperTacSettings of_preset(const std::string& name);
+};
+
+/// How a preset's network is trained to its best on the rig's recordings (measured: bench/results). The
+/// smaller one makes its steps faster and needs more of them.
+struct PresetTraining {
+  double rate_hz = 100;  ///< of the window's samples
+  std::int64_t epochs = 20;
+  double learning_rate = 1e-3;  ///< Adam's peak
+
+  /// Throws as SuperTacSettings::of_preset.
+  static PresetTraining of_preset(const std::string& name);
+};
+
+/// One thing for each group, in place: a warm step must not go to the heap.
+template <class T>
+class PerGroup {
+ public:
+  explicit PerGroup(Dim groups = 0) : size_(static_cast<std::size_t>(groups)) {}
+  std::size_t size() const { return size_; }
+  T& operator[](std::size_t i) { return items_[i]; }
+  const T& operator[](std::size_t i) const { return items_[i]; }
+  std::span<const T> span() const { return std::span(items_).first(size_); }
+
+ private:
+  std::array<T, 16> items_;
+  std::size_t size_;
+};
+
+/// Latents of the G groups [N,G LD] -> picture and spread [N,rows scale,columns scale,1], linear outputs.
+class Upsampler : public Module {
+ public:
+  struct Output {
+    Variable picture;
+    Variable spread;  ///< expected distance of a pixel from the truth; undefined without settings.spread
+  };
+  Upsampler(const SuperTacSettings& settings, Rng& rng);
+  Output forward(const Variable& latents) const;
+
+ private:
+  Dim rows_, columns_;  // the map it starts from
+  Linear fc_;
+  std::vector<Rirb> rirbs_;
+  Conv2d out_;
+  std::optional<Conv2d> spread_;
+};
+
+class SuperTac : public Network {
+ public:
+  /// Throws as SuperTacSettings::check.
+  SuperTac(const SuperTacSettings& settings, Rng& rng);
+
+  struct Output {
+    PerGroup<Variable> input;             ///< [N,T,group_signals], the windows of the groups
+    PerGroup<LatentDistribution> latent;  ///< [N,LD]
+    PerGroup<Variable> decoded;           ///< [N,T,group_signals]
+    Variable image;                       ///< [N,rows scale,columns scale,1]
+    Variable spread;                      ///< the same, or undefined
+  };
+  /// Training: windows [N,T,signals] in [0,1] and eps [N,LD] ~ N(0,1) for each group.
+  /// Throws std::invalid_argument on other shapes.
+  Output forward(const Tensor& windows, std::span<const Tensor> eps) const;
+  /// Evaluation: z = mean, no decoders.
+  Drawing draw(const Variable& windows) const override;
+  /// The latent means [N,G LD].
+  Tensor encode(const Tensor& windows) const;
+
+  const SuperTacSettings& settings() const { return settings_; }
+  NetworkFormat format() const override;
+  Shape input_shape(Dim count) const override { return {count, settings_.timesteps, settings_.signals()}; }
+
+ private:
+  PerGroup<Variable> split(const Variable& windows) const;
+  Variable means(const Variable& windows) const;
+
+  SuperTacSettings settings_;
+  std::vector<Encoder> encoders_;
+  std::vector<Decoder> decoders_;
+  Upsampler upsampler_;
+};
+
+}  // namespace supertac

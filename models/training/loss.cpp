@@ -1,0 +1,71 @@
+#include "models/training/loss.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <stdexcept>
+
+#include "autograd/ops/arithmetic.h"
+#include "autograd/ops/losses.h"
+#include "autograd/ops/vae.h"
+
+namespace supertac {
+
+void LossWeights::check() const {
+  if (a >= 0 && a <= 1 && beta >= 0 && lambda >= 0) return;
+  throw std::invalid_argument(
+      "loss weights: expected 0 <= a <= 1, beta >= 0, lambda >= 0, got a = " + std::to_string(a) +
+      ", beta = " + std::to_string(beta) + ", lambda = " + std::to_string(lambda));
+}
+
+// The pictures with the truth itself in place of those whose truth is flat.
+static Variable where_textured(const Variable& picture, const Tensor& truth) {
+  const Dim images = truth.dim(0), pixels = truth.size() / images;
+  Tensor keep(truth.shape()), flat(truth.shape());
+  for (Dim n = 0; n < images; ++n) {
+    const std::span<const real> values(truth.data() + n * pixels, static_cast<std::size_t>(pixels));
+    const auto [least, most] = std::ranges::minmax(values);
+    const bool textured = most - least >= kLeastTexture;
+    std::fill_n(keep.data() + n * pixels, pixels, textured ? real(1) : real(0));
+    for (Dim i = n * pixels; i < (n + 1) * pixels; ++i) flat.data()[i] = textured ? 0 : truth.data()[i];
+  }
+  return add(multiply(picture, Variable(keep)), Variable(flat));
+}
+
+Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda) {
+  Loss loss;
+  loss.l2 = l2_loss(picture, Variable(truth));
+  loss.ssim = ssim(where_textured(picture, truth), truth);
+  const Variable one_minus_ssim = add(Variable(Tensor::full({}, 1)), scale(loss.ssim, -1));
+  loss.total = add(loss.l2, scale(one_minus_ssim, static_cast<real>(lambda)));
+  return loss;
+}
+
+// |picture - truth|, a constant.
+static Variable error_of(const Variable& picture, const Tensor& truth) {
+  Tensor error(truth.shape());
+  for (Dim i = 0; i < error.size(); ++i)
+    error.data()[i] = std::abs(picture.value().data()[i] - truth.data()[i]);
+  return Variable(error);
+}
+
+Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const LossWeights& w) {
+  Loss loss = picture_loss(output.image, truth, w.lambda);
+  for (std::size_t i = 0; i < output.decoded.size(); ++i) {
+    const Variable l2 = l2_loss(output.decoded[i], output.input[i]);
+    const Variable kld = kl_divergence(output.latent[i].mean, output.latent[i].log_var);
+    loss.reconstruction = i == 0 ? l2 : add(loss.reconstruction, l2);
+    loss.kld = i == 0 ? kld : add(loss.kld, kld);
+  }
+  if (output.spread.defined()) {
+    loss.spread = l2_loss(output.spread, error_of(output.image, truth));
+    loss.total = add(loss.total, scale(loss.spread, static_cast<real>(kSpreadWeight)));
+  }
+  const auto share = static_cast<real>(w.a), rest = static_cast<real>(1 - w.a);
+  const Variable vaes =
+      add(scale(loss.reconstruction, share), scale(loss.kld, share * static_cast<real>(w.beta)));
+  loss.total = add(vaes, scale(loss.total, rest));
+  return loss;
+}
+
+}  // namespace supertac

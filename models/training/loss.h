@@ -1,0 +1,41 @@
+// What SuperTac is trained on: the VAEs' losses and the picture's.
+#pragma once
+
+#include "models/networks/supertac_model.h"
+
+namespace supertac {
+
+/// total = a * sum over the VAEs of (reconstruction + beta KLD) + (1 - a) * (L2 + lambda (1 - SSIM)),
+/// the paper's convex combination; reconstruction and L2 are mean squared errors.
+struct LossWeights {
+  double a = 0.2;       ///< share of the VAEs, 0..1
+  double beta = 1e-3;   ///< of the Kullback-Leibler divergence
+  double lambda = 0.1;  ///< of 1 - SSIM
+  /// Throws std::invalid_argument outside 0 <= a <= 1, beta >= 0, lambda >= 0.
+  void check() const;
+};
+
+/// Scalars; reconstruction and kld are sums over the VAEs, undefined where there are none, as is spread.
+/// `total` alone is weighted.
+struct Loss {
+  Variable total, reconstruction, kld, l2, ssim, spread;
+};
+
+/// How much the squared error of the spread counts beside that of the picture.
+inline constexpr double kSpreadWeight = 0.1;
+
+/// A truth whose pixels differ by less is flat.
+inline constexpr real kLeastTexture = 0.01F;
+
+/// The picture's part alone: total = L2 + lambda (1 - SSIM). picture and truth [N,H,W,1], truth in [0,1].
+/// Where the truth is flat the SSIM counts as 1: with no structure to compare it measures how large the noise
+/// is beside nothing, and pulls harder than all textures together. Throws std::invalid_argument when they
+/// differ in shape.
+Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda);
+
+/// To the picture's loss kSpreadWeight times the mean of (spread - |image - truth|)^2 is added, the image
+/// taken as given: the spread learns the error, the picture does not learn to be predictably wrong. truth
+/// [N,H,W,1] in [-1,1]. Throws std::invalid_argument when it does not fit the output's image.
+Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const LossWeights& weights);
+
+}  // namespace supertac

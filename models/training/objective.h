@@ -1,0 +1,80 @@
+// What a network is trained on: from a batch to the named terms of its loss. SuperTac learns from windows, a
+// frame model from pairs; Trainer (models/training/trainer.h) knows neither.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <span>
+#include <string>
+
+#include "data/windows/augment.h"
+#include "data/windows/pairs.h"
+#include "data/windows/windows.h"
+#include "models/files/model_file.h"
+#include "models/networks/frame_model.h"
+#include "models/training/loss.h"
+#include "models/training/training_state.h"
+
+namespace supertac {
+
+struct TrainingSettings : TrainingPace {
+  SuperTacSettings model;
+  LossWeights loss;
+  AugmentSettings augment;
+  /// Whether z is drawn around its mean. Without, and with beta 0, the VAEs are plain autoencoders.
+  bool sampling = true;
+};
+
+struct FrameTrainingSettings : TrainingPace {
+  FrameSettings model;
+  double lambda = 0.1;  ///< of 1 - SSIM: loss = L2 + lambda (1 - SSIM), the picture's part of SuperTac's
+};
+
+/// Everything that determines the result besides network and data.
+nlohmann::ordered_json to_json(const TrainingSettings& settings);
+nlohmann::ordered_json to_json(const FrameTrainingSettings& settings);
+
+/// One batch, or a lane's share of it.
+struct Batch {
+  Tensor inputs, targets;
+  Tensor noise;  ///< [N,Objective::noise()], ~ N(0,1)
+};
+
+/// Of a batch: the loss, and what tells a collapse (models/training/collapse.h).
+struct Outcome {
+  Loss loss;
+  Variable picture;
+  PerGroup<Variable> means;  ///< of the latents, [N,LD] each; none for a network without latents
+};
+
+class Objective {
+ public:
+  virtual ~Objective() = default;
+  virtual const Network& network() const = 0;
+  virtual const TrainingPace& pace() const = 0;
+  /// The same over a network of its own, which awaits the values of this one's parameters.
+  virtual std::unique_ptr<Objective> twin() const = 0;
+
+  virtual Outcome operator()(const Batch& batch) const = 0;
+  /// Numbers of noise and of latents that a sample has.
+  virtual Dim noise() const { return 0; }
+  virtual Dim latents() const { return 0; }
+  /// Changes an input in training: a function of the sample's number since training began.
+  virtual void vary(std::uint64_t sample, std::span<float> input) const;
+
+  /// Its settings as JSON text, to compare on resume.
+  virtual std::string text() const = 0;
+  /// What the checkpoint says of the network and its input.
+  virtual std::map<std::string, std::string> metadata() const = 0;
+};
+
+/// supertac_loss of windows that are augmented before. Throws std::invalid_argument naming the setting.
+std::unique_ptr<Objective> window_objective(const WindowSet& windows, const TrainingSettings& settings);
+
+/// Of pairs as they are scaled now. The model's sizes and scale become the pairs'. Throws
+/// std::invalid_argument naming the setting.
+std::unique_ptr<Objective> frame_objective(const PairSet& pairs, FrameTrainingSettings settings);
+
+}  // namespace supertac

@@ -1,0 +1,98 @@
+#include "autograd/gradient_checker.h"
+
+#include "autograd/ops/arithmetic.h"
+#include "tests/autograd/check.h"
+
+namespace supertac {
+namespace {
+
+// y = a b + a with a planted error in the gradient of a: ga = gy (by_b * b + by_one).
+Variable planted(const std::vector<Variable>& in, real by_b, real by_one) {
+  const Tensor y = add(multiply(in[0], in[1]), in[0]).value();
+  return record("planted", y, {&in[0], &in[1]}, [=](Backward& g) {
+    for (Dim i = 0; i < g.gy().size(); ++i) {
+      const real gy = g.gy().data()[i];
+      if (Tensor* ga = g.grad_of(0)) ga->data()[i] += gy * (by_b * g.value(1).data()[i] + by_one);
+      if (Tensor* gb = g.grad_of(1)) gb->data()[i] += gy * g.value(0).data()[i];
+    }
+  });
+}
+
+GradientReport check_planted(real by_b, real by_one) {
+  return check_gradients([=](const auto& in) { return planted(in, by_b, by_one); },
+                         {test::numbers_off_zero({3, 4}), test::numbers_off_zero({3, 4}, 2)});
+}
+
+#ifdef SUPERTAC_REAL_IS_DOUBLE
+TEST(GradientChecker, PassesTheRightGradient) {
+  const GradientReport report = check_planted(1, 1);
+  EXPECT_LT(report.max_relative_error, 1e-9) << report.text();
+  EXPECT_EQ(report.entries, 24);
+  EXPECT_EQ(report.worst.size(), 10U);
+}
+
+TEST(GradientChecker, FindsAnErrorOfAMillionth) {
+  EXPECT_GT(check_planted(1, 1.00001).max_relative_error, 1e-6);
+}
+#endif
+
+TEST(GradientChecker, FailsOnPlantedErrors) {
+  const struct {
+    const char* name;
+    real by_b, by_one;
+  } errors[] = {{"sign", -1, -1}, {"factor 2", 2, 2}, {"missing term", 1, 0}, {"zero", 0, 0}};
+  for (const auto& e : errors) {
+    const GradientReport report = check_planted(e.by_b, e.by_one);
+    EXPECT_GT(report.max_relative_error, 0.1) << e.name;
+    ASSERT_FALSE(report.worst.empty());
+    EXPECT_EQ(report.worst[0].input, 0U) << e.name << ": the report names the wrong input\n" << report.text();
+  }
+}
+
+TEST(GradientChecker, FailsOnOneWrongElement) {
+  const auto f = [](const std::vector<Variable>& in) {
+    return record("planted", in[0].value().clone(), {&in[0]}, [](Backward& b) {
+      Tensor* gx = b.grad_of(0);
+      for (Dim i = 0; i < gx->size(); ++i) gx->data()[i] += b.gy().data()[i] * (i == 7 ? -1 : 1);
+    });
+  };
+  const GradientReport report = check_gradients(f, {test::numbers({3, 4})});
+  EXPECT_EQ(report.worst[0].index, 7);
+  EXPECT_GT(report.max_relative_error, 0.1);
+  EXPECT_EQ(report.text().find("input 0 [1,3]: analytic "), 0U) << report.text();
+  EXPECT_EQ(check_gradients(f, {test::numbers({3, 4})}, {.names = {"mean"}}).worst[0].place, "mean [1,3]");
+  EXPECT_EQ(check_gradients(f, {test::numbers({12})}).worst[0].place, "input 0 [7]");
+  EXPECT_EQ(check_gradients(f, {test::numbers({2, 2, 3, 1})}).worst[0].place, "input 0 [1,0,1,0]");
+}
+
+TEST(GradientChecker, ReportsOneLinePerEntry) {
+  const GradientReport report{
+      {{0, 0, 0.25, 0.5, 0.5, "fc.weight [3,0]"}, {1, 0, 1, -1, 2, "fc.bias [0]"}}, 2, 2};
+  EXPECT_EQ(report.text(),
+            "fc.weight [3,0]: analytic 0.25, numeric 0.5, relative error 0.5\n"
+            "fc.bias [0]: analytic 1, numeric -1, relative error 2\n");
+}
+
+TEST(GradientChecker, FailsOnNotANumber) {
+  const auto f = [](const std::vector<Variable>& in) {
+    return record("planted", in[0].value().clone(), {&in[0]},
+                  [](Backward& b) { b.grad_of(0)->fill(std::numeric_limits<real>::quiet_NaN()); });
+  };
+  EXPECT_GT(check_gradients(f, {test::numbers({2})}).max_relative_error, 1e6);
+}
+
+TEST(GradientChecker, FailsWhenNoGradientArrives) {
+  const auto cut = [](const std::vector<Variable>& in) {
+    return add(Variable(scale(in[0], 2).value()), scale(in[1], 1));  // in[0] is cut off from the graph
+  };
+  EXPECT_GT(check_gradients(cut, {test::numbers({2}), test::numbers({2})}).max_relative_error, 0.1);
+}
+
+TEST(GradientChecker, LeavesTheCallersTensorsAlone) {
+  const Tensor x = test::numbers({5}), copy = x.clone();
+  check_gradients([](const auto& in) { return multiply(in[0], in[0]); }, {x});
+  for (Dim i = 0; i < 5; ++i) EXPECT_EQ(x.data()[i], copy.data()[i]);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,283 @@
+#include "data/windows/live_window.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <stdexcept>
+
+#include "data/recordings/simulator.h"
+#include "data/windows/windows.h"
+#include "io/numbers/random.h"
+#include "tests/data/test_recordings.h"
+
+namespace supertac {
+namespace {
+
+constexpr int kTimesteps = 16;
+const Scaling kWide{.rest_volts = 3.0, .span_volts = 2.0};
+
+std::span<const float, kTaxels> volts_of(const Recording& recording, std::size_t frame) {
+  return std::span(recording.volts).subspan(frame * kTaxels).first<kTaxels>();
+}
+
+LiveWindowSettings live_settings(double sensor_rate_hz) {
+  return {.timesteps = kTimesteps, .scaling = kWide, .frame_period_s = 1 / sensor_rate_hz};
+}
+
+using Window = std::vector<float>;
+
+// Feeds a recording frame by frame; `use` sees what is known after each of them.
+void feed(LiveWindow& live, const Recording& recording,
+          const std::function<void(std::size_t frame)>& use = {}) {
+  for (std::size_t i = 0; i < recording.frames(); ++i) {
+    live.push(recording.time_s[i], volts_of(recording, i));
+    if (use) use(i);
+  }
+}
+
+// Every window of WindowSet, asked for as soon as a frame has come that lies behind it, and how many there
+// were.
+std::size_t expect_windows_of_set(const Recording& recording, LiveWindow live, bool levelled = false) {
+  WindowSettings settings = wide_settings(kTimesteps);
+  settings.scaling.levelled = levelled;
+  WindowSet set(settings);
+  Recording sliding = recording;
+  sliding.lift_mm.clear();  // or frames between air and plate would end no window
+  set.add(sliding);
+  const Track track = resample(recording, {.scaling = kWide});
+  std::vector<double> time_of(track.frames());  // the middle of each frame of the track
+  double begin = recording.time_s[0];
+  for (std::size_t j = 0, i = 0; j < track.frames(); ++j) {
+    if (j > 0 && track.run[j] == 1) {
+      while (recording.time_s[i + 1] - recording.time_s[i] <= settings.max_gap_s) ++i;
+      begin = recording.time_s[++i];
+    }
+    time_of[j] = begin + (track.run[j] - 1) / settings.rate_hz;
+  }
+  std::size_t next = 0;
+  Window window(kTimesteps * kTaxels), expected(window.size());
+  const auto compare_until = [&](double newest) {
+    for (; next < set.size(); ++next) {
+      const double end = time_of[set.frame_of(next)] + 0.5 / settings.rate_hz;
+      if (end > newest) return;
+      ASSERT_TRUE(live.window_until(end, window)) << "window " << next;
+      set.window(next, expected);
+      ASSERT_TRUE(std::equal(window.begin(), window.end(), expected.begin())) << "window " << next;
+    }
+  };
+  for (std::size_t i = 0; i < recording.frames(); ++i) {
+    const bool gap = i > 0 && recording.time_s[i] - recording.time_s[i - 1] > settings.max_gap_s;
+    if (gap) compare_until(recording.time_s[i - 1] + 1 / settings.rate_hz);
+    live.push(recording.time_s[i], volts_of(recording, i));
+    compare_until(recording.time_s[i]);
+  }
+  compare_until(recording.time_s.back() + 1 / settings.rate_hz);
+  EXPECT_EQ(next, set.size());
+  return set.size();
+}
+
+// A recording as a sensor makes it: jitter, lost frames, a gap; signals without any pattern.
+Recording rough_recording(double rate_hz, double lost, std::uint64_t seed) {
+  const RandomStream random(seed, 1);
+  const Recording smooth =
+      make_recording({.frames = static_cast<std::size_t>(2 * rate_hz), .rate_hz = rate_hz});
+  Recording rough = smooth;
+  rough.time_s.clear(), rough.volts.clear(), rough.position_mm.clear();
+  for (std::size_t i = 0; i < smooth.frames(); ++i) {
+    if (random.uniform(3 * i) < lost) continue;
+    const double gap = i > smooth.frames() / 2 ? 0.3 : 0;
+    rough.time_s.push_back(smooth.time_s[i] + gap + 0.4 * (random.uniform(3 * i + 1) - 0.5) / rate_hz);
+    for (int k = 0; k < kTaxels; ++k)
+      rough.volts.push_back(1 + 2 * static_cast<float>(random.uniform(1000 + kTaxels * i + k)));
+    rough.position_mm.insert(rough.position_mm.end(), {18.0F, 30.0F});
+  }
+  return rough;
+}
+
+TEST(LiveWindow, GivesTheWindowsOfTrainingBitForBit) {
+  for (const double rate : {300.0, 783.7, 1008.0645161290322, 150.0}) {
+    for (const double lost : {0.0, 0.05, 0.4}) {
+      const Recording recording = rough_recording(rate, lost, 5);
+      const std::size_t windows = expect_windows_of_set(recording, LiveWindow(live_settings(rate)));
+      EXPECT_GT(windows, 400U) << rate << " Hz, " << lost << " lost";
+    }
+  }
+}
+
+TEST(LiveWindow, IsLevelledLikeOneOfTraining) {
+  const Recording recording = rough_recording(300, 0.05, 5);
+  LiveWindowSettings settings = live_settings(300);
+  settings.scaling.levelled = true;
+  EXPECT_GT(expect_windows_of_set(recording, LiveWindow(settings), true), 400U);
+}
+
+TEST(LiveWindow, ASensorAtTheModelsRateGivesThemWithEveryFrame) {
+  const Recording recording = make_recording({.frames = 60});
+  WindowSet set(wide_settings(kTimesteps));
+  set.add(recording);
+  ASSERT_EQ(set.size(), 45U);
+  LiveWindow live(live_settings(300));
+  Window window(kTimesteps * kTaxels);
+  std::size_t windows = 0;
+  feed(live, recording, [&](std::size_t frame) {
+    ASSERT_EQ(live.window(window), frame + 1 >= kTimesteps) << frame;
+    if (frame + 1 < kTimesteps) return;
+    const auto expected = set.window(windows++);
+    ASSERT_TRUE(std::equal(window.begin(), window.end(), expected.begin())) << frame;
+  });
+  EXPECT_EQ(windows, set.size());
+}
+
+TEST(LiveWindow, OneForEveryFrameOfTheBoardWhateverThePhase) {
+  constexpr double kBoardHz = 1 / 992e-6;
+  Recording ramp = make_recording({.frames = 300, .rate_hz = kBoardHz});
+  for (std::size_t i = 0; i < ramp.frames(); ++i)  // 1 V/s: a voltage is a time
+    for (std::size_t k = 0; k < kTaxels; ++k)
+      ramp.volts[i * kTaxels + k] = 1 + static_cast<float>(ramp.time_s[i]);
+  LiveWindow live(live_settings(kBoardHz));
+  Window window(kTimesteps * kTaxels);
+  std::size_t windows = 0;
+  feed(live, ramp, [&](std::size_t frame) {
+    if (!live.window(window)) return;
+    ++windows;
+    // The first window's oldest sample begins half a period before the first frame, as in training.
+    for (int n = windows == 1 ? 1 : 0; n < kTimesteps; ++n) {
+      // Three or four frames in each sample: their mean is within half a frame of the sample's middle.
+      const double middle = ramp.time_s[frame] + 0.5 / kBoardHz - (kTimesteps - n - 0.5) / 300;
+      const double time =
+          kWide.rest_volts - kWide.span_volts * window[static_cast<std::size_t>(n * kTaxels)] - 1;
+      ASSERT_NEAR(time, middle, 0.51 / kBoardHz) << frame << " " << n;
+    }
+  });
+  // From the first frame that ends a window's worth, 16/300 s, on.
+  EXPECT_EQ(windows, 300U - 52U);
+}
+
+TEST(LiveWindow, AppliesTheMovingAverageOfTraining) {
+  SimulatorSettings filtered;
+  filtered.with_loss = filtered.with_saturation = false;
+  SimulatorSettings unfiltered = filtered;
+  unfiltered.with_filter = false;
+  const Plate plate = Plate::named("bumps12");
+  const Recording truth = simulate_pass(plate, {.to_mm = 36}, filtered);
+  const Recording raw = simulate_pass(plate, {.to_mm = 36}, unfiltered);
+  LiveWindow with_filter({.timesteps = kTimesteps, .filter_s = filtered.filter_s});
+  LiveWindow without({.timesteps = kTimesteps});
+  Window expected(kTimesteps * kTaxels), window(kTimesteps * kTaxels);
+  for (std::size_t i = 0; i < truth.frames(); ++i) {
+    with_filter.push(raw.time_s[i], volts_of(raw, i));
+    without.push(truth.time_s[i], volts_of(truth, i));
+    ASSERT_EQ(without.window(expected), with_filter.window(window));
+    if (i + 1 < kTimesteps) continue;
+    for (std::size_t n = 0; n < window.size(); ++n) ASSERT_NEAR(window[n], expected[n], 2e-6) << i;
+  }
+}
+
+TEST(LiveWindow, HoldsALostFrameAndNeverLooksIntoTheFuture) {
+  const Recording recording = make_recording({.frames = 40});
+  LiveWindow whole(live_settings(300)), lossy(live_settings(300));
+  Window expected(kTimesteps * kTaxels), window(kTimesteps * kTaxels);
+  for (std::size_t i = 0; i < 30; ++i) {
+    whole.push(recording.time_s[i], volts_of(recording, i));
+    if (i != 24) lossy.push(recording.time_s[i], volts_of(recording, i));
+  }
+  ASSERT_TRUE(whole.window(expected) && lossy.window(window));
+  for (std::size_t n = 0; n < kTimesteps; ++n) {
+    const std::size_t frame = 14 + n;
+    const float* same = &expected[(frame == 24 ? n - 1 : n) * kTaxels];
+    for (std::size_t k = 0; k < kTaxels; ++k) ASSERT_EQ(window[n * kTaxels + k], same[k]) << frame;
+  }
+}
+
+TEST(LiveWindow, ALostFrameBeforeTheOldestSampleIsHeldFromFurtherBack) {
+  const Recording recording = make_recording({.frames = 40});
+  LiveWindow live(live_settings(300));
+  for (std::size_t i = 0; i < 30; ++i)
+    if (i < 12 || i > 16) live.push(recording.time_s[i], volts_of(recording, i));
+  Window window(kTimesteps * kTaxels);
+  ASSERT_TRUE(live.window(window));  // frames 14 ... 29; 14, 15, 16 repeat 11
+  const float held = kWide(recording.volts[11 * kTaxels]);
+  for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(window[n * kTaxels], held);
+  EXPECT_EQ(window[3 * kTaxels], kWide(recording.volts[17 * kTaxels]));
+}
+
+TEST(LiveWindow, StartsAnewAfterAGapEvenOneLongerThanTheWindow) {
+  for (const double gap : {0.06, 10.0}) {
+    Recording recording = make_recording({.frames = 60});
+    for (std::size_t i = 30; i < 60; ++i) recording.time_s[i] += gap;
+    LiveWindow live(live_settings(300));
+    Window window(kTimesteps * kTaxels);
+    feed(live, recording, [&](std::size_t frame) {
+      const bool spans = frame < 30 ? frame >= 15 : frame >= 45;
+      EXPECT_EQ(live.window(window), spans) << "frame " << frame << ", gap " << gap;
+    });
+    EXPECT_EQ(live.counters().gaps, 1U);
+    EXPECT_EQ(window[0], kWide(recording.volts[44 * kTaxels]));
+  }
+}
+
+TEST(LiveWindow, AFrameThatIsNotLaterIsLeftOutAClockSetBackStartsAnew) {
+  const Recording recording = make_recording({.frames = 40});
+  LiveWindow live(live_settings(300));
+  feed(live, recording);
+  Window before(kTimesteps * kTaxels), after(kTimesteps * kTaxels);
+  ASSERT_TRUE(live.window(before));
+  live.push(recording.time_s[39], volts_of(recording, 0));
+  live.push(recording.time_s[37], volts_of(recording, 0));
+  EXPECT_EQ(live.counters().late, 2U);
+  ASSERT_TRUE(live.window(after));
+  EXPECT_EQ(before, after);
+  live.push(recording.time_s[0] - 1, volts_of(recording, 0));
+  EXPECT_EQ(live.counters().gaps, 1U);
+  EXPECT_FALSE(live.window(after));
+}
+
+TEST(LiveWindow, TakesADamagedFrameAsLost) {
+  const Recording recording = make_recording({.frames = 40});
+  LiveWindow live(live_settings(300));
+  std::array<float, kTaxels> damaged{};
+  damaged[7] = std::numeric_limits<float>::quiet_NaN();
+  feed(live, recording, [&](std::size_t i) { live.push(recording.time_s[i] + 1e-3, damaged); });
+  live.push(std::numeric_limits<double>::infinity(), volts_of(recording, 0));
+  EXPECT_EQ(live.counters().damaged, 41U);
+  EXPECT_EQ(live.counters().frames, 40U);
+  Window window(kTimesteps * kTaxels);
+  ASSERT_TRUE(live.window(window));
+  for (const float v : window) ASSERT_TRUE(std::isfinite(v));
+}
+
+TEST(LiveWindow, ADeadTaxelStaysWithinTheNetworksRange) {
+  Recording recording = make_recording({.frames = 40});
+  for (std::size_t i = 0; i < 40; ++i)
+    recording.volts[i * kTaxels + 3] = 0, recording.volts[i * kTaxels + 4] = 3.3F;
+  LiveWindow live(live_settings(300));
+  feed(live, recording);
+  Window window(kTimesteps * kTaxels);
+  ASSERT_TRUE(live.window(window));
+  EXPECT_EQ(window[3], 1);
+  EXPECT_EQ(window[4], 0);
+  EXPECT_EQ(live.newest()[3], 1);
+}
+
+TEST(LiveWindow, NothingBeforeTheFirstFrame) {
+  LiveWindow live(live_settings(300));
+  Window window(kTimesteps * kTaxels, -1);
+  EXPECT_FALSE(live.window(window));
+  EXPECT_EQ(window[0], -1);
+  EXPECT_EQ(live.newest()[0], 0);
+}
+
+TEST(LiveWindow, RefusesSettingsOutOfRangeAndAWrongRoom) {
+  EXPECT_THROW(LiveWindow({.timesteps = 0}), std::invalid_argument);
+  EXPECT_THROW(LiveWindow({.rate_hz = 0}), std::invalid_argument);
+  EXPECT_THROW(LiveWindow({.filter_s = -1}), std::invalid_argument);
+  EXPECT_THROW(LiveWindow({.filter_s = std::nan("")}), std::invalid_argument);
+  LiveWindow live(live_settings(300));
+  Window small(10);
+  EXPECT_THROW((void)live.window(small), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,274 @@
+#include "data/windows/split.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <iterator>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "data/recordings/simulator.h"
+#include "tests/data/test_recordings.h"
+
+namespace supertac {
+namespace {
+
+// Two plates, two trials, four passes of 40 frames: 16 passes with 25 windows each. Every pass has its own
+// level.
+WindowSet make_set() {
+  WindowSet set(wide_settings(16));
+  int number = 0;
+  for (const char* plate : {"ridges6", "bumps12"})
+    for (int trial = 1; trial <= 2; ++trial)
+      for (int pass = 1; pass <= 4; ++pass)
+        set.add(make_recording({.plate = plate,
+                                .trial = trial,
+                                .pass = pass,
+                                .frames = 40,
+                                .level = 1.2F + 0.1F * static_cast<float>(number++)}));
+  return set;
+}
+
+std::set<std::size_t> passes_of(const WindowSet& set, const std::vector<std::uint32_t>& side) {
+  std::set<std::size_t> passes;
+  for (const std::uint32_t i : side) passes.insert(set.pass_of(i));
+  return passes;
+}
+
+bool disjoint(const Split& split) {
+  std::vector<std::uint32_t> both;
+  std::set_intersection(split.train.begin(), split.train.end(), split.test.begin(), split.test.end(),
+                        std::back_inserter(both));
+  return both.empty();
+}
+
+TEST(SplitKind, HasANameBothWays) {
+  for (const char* name : {"window", "pass", "trial", "texture", "none"})
+    EXPECT_EQ(name_of(split_kind(name)), name);
+  try {
+    split_kind("trails");
+    FAIL() << "took a name that is none";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "split: expects window, pass, trial, texture or none, got 'trails'");
+  }
+}
+
+TEST(Split, WindowTestsARandomFifthAndLeaks) {
+  const WindowSet set = make_set();
+  const Split split = make_split(set, SplitKind::window, 1);
+  EXPECT_EQ(split.test.size(), set.size() / 5);
+  EXPECT_EQ(split.train.size() + split.test.size(), set.size());
+  EXPECT_TRUE(disjoint(split));
+  EXPECT_EQ(find_leakage(set, split).overlapping, split.test.size());  // what makes it the easy one
+}
+
+TEST(Split, PassTestsUnseenPassesOfEveryPlate) {
+  const WindowSet set = make_set();
+  const Split split = make_split(set, SplitKind::pass, 1);
+  const auto train = passes_of(set, split.train), test = passes_of(set, split.test);
+  EXPECT_EQ(test.size(), 4U);  // a fifth of 8, rounded, of each plate
+  EXPECT_EQ(train.size(), 12U);
+  std::set<std::string> plates;
+  for (const std::size_t p : test) {
+    EXPECT_FALSE(train.contains(p));
+    plates.insert(set.passes()[p].plate);
+  }
+  EXPECT_EQ(plates.size(), 2U);
+  EXPECT_TRUE(find_leakage(set, split).none());
+}
+
+TEST(Split, TrialTrainsOnOneAndTestsOnTwo) {
+  WindowSet set = make_set();
+  set.add(make_recording({.trial = 3, .frames = 40, .level = 2.9F}));
+  const Split split = make_split(set, SplitKind::trial, 1);
+  for (const std::size_t p : passes_of(set, split.train)) EXPECT_EQ(set.passes()[p].trial, 1);
+  for (const std::size_t p : passes_of(set, split.test)) EXPECT_EQ(set.passes()[p].trial, 2);
+  EXPECT_EQ(split.train.size() + split.test.size(), set.size() - 25);
+  EXPECT_TRUE(find_leakage(set, split).none());
+}
+
+TEST(Split, TextureTestsAnUnseenPlate) {
+  const WindowSet set = make_set();
+  std::set<std::string> held_out;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const Split split = make_split(set, SplitKind::texture, seed);
+    std::set<std::string> train, test;
+    for (const std::size_t p : passes_of(set, split.train)) train.insert(set.passes()[p].plate);
+    for (const std::size_t p : passes_of(set, split.test)) test.insert(set.passes()[p].plate);
+    ASSERT_EQ(test.size(), 1U);
+    ASSERT_FALSE(train.contains(*test.begin()));
+    held_out.insert(*test.begin());
+  }
+  EXPECT_EQ(held_out.size(), 2U);  // the seed chooses
+}
+
+// What resembles the plate left out is not trained on either, set aside or not.
+TEST(Split, TextureLeavesOutTheNamedPlateAndItsLikes) {
+  WindowSet set(wide_settings(16));
+  for (const char* plate : {"3_Bumps", "bumps6", "4_Ridges"})
+    set.add(
+        make_recording({.plate = plate, .frames = 40, .level = 1.0F + static_cast<float>(set.size()) / 100}));
+  set.add(make_recording({.plate = "bumps12", .frames = 40, .level = 2.5F}), ".", true);
+  const Split split = make_split(set, SplitKind::texture, 7, {"3_Bumps"});
+  std::set<std::string> train, test;
+  for (const std::size_t p : passes_of(set, split.train)) train.insert(set.passes()[p].plate);
+  for (const std::size_t p : passes_of(set, split.test)) test.insert(set.passes()[p].plate);
+  EXPECT_EQ(test, std::set<std::string>{"3_Bumps"});
+  EXPECT_EQ(train, (std::set<std::string>{"bumps6", "4_Ridges"}));
+  try {
+    make_split(set, SplitKind::texture, 7, {"6_Blob"});
+    FAIL() << "left out a plate that is not there";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "split texture: the data has no windows of plate '6_Blob' to leave out");
+  }
+}
+
+// With all of them left out only passes set aside are trained on, and none that resembles any of them.
+TEST(Split, TextureLeavesOutAllPlatesThatAreNamed) {
+  WindowSet set(wide_settings(16));
+  for (const char* plate : {"3_Bumps", "4_Ridges", "bumps6"})
+    set.add(
+        make_recording({.plate = plate, .frames = 40, .level = 1.0F + static_cast<float>(set.size()) / 100}));
+  for (const char* plate : {"bumps12", "ridges9", "bumps8"})
+    set.add(
+        make_recording({.plate = plate, .frames = 40, .level = 2.0F + static_cast<float>(set.size()) / 100}),
+        ".", true);
+  const Split split = make_split(set, SplitKind::texture, 7, {"3_Bumps", "4_Ridges", "bumps6"});
+  std::set<std::string> train, test;
+  for (const std::size_t p : passes_of(set, split.train)) train.insert(set.passes()[p].plate);
+  for (const std::size_t p : passes_of(set, split.test)) test.insert(set.passes()[p].plate);
+  EXPECT_EQ(test, (std::set<std::string>{"3_Bumps", "4_Ridges", "bumps6"}));
+  EXPECT_EQ(train, std::set<std::string>{"bumps8"});
+}
+
+TEST(Split, NoneTrainsAndTestsOnAll) {
+  const WindowSet set = make_set();
+  const Split split = make_split(set, SplitKind::none, 1);
+  EXPECT_EQ(split.train.size(), set.size());
+  EXPECT_EQ(split.test, split.train);
+  EXPECT_EQ(find_leakage(set, split).overlapping, set.size());
+  EXPECT_EQ(find_leakage(set, split).duplicated, 0U);  // the same place is no duplicate
+}
+
+TEST(Split, IsAFunctionOfTheSeed) {
+  const WindowSet set = make_set();
+  for (const SplitKind kind : {SplitKind::window, SplitKind::pass}) {
+    const Split a = make_split(set, kind, 1), again = make_split(set, kind, 1), b = make_split(set, kind, 2);
+    EXPECT_EQ(a.test, again.test);
+    EXPECT_NE(a.test, b.test);
+    EXPECT_EQ(fingerprint(a), fingerprint(again));
+    EXPECT_NE(fingerprint(a), fingerprint(b));
+    EXPECT_TRUE(std::is_sorted(a.train.begin(), a.train.end()));
+    EXPECT_TRUE(std::is_sorted(a.test.begin(), a.test.end()));
+  }
+}
+
+TEST(Split, SaysWhatTheDataLacks) {
+  WindowSet set(wide_settings(16));
+  set.add(make_recording({.frames = 40}));
+  const auto message = [&](SplitKind kind, const std::vector<std::string>& leave_out = {}) -> std::string {
+    try {
+      make_split(set, kind, 1, leave_out);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "nothing was thrown";
+  };
+  EXPECT_EQ(
+      message(SplitKind::pass),
+      "split pass: plate 'bumps12' has one pass with windows, needs two: one to train on, one to test on");
+  EXPECT_EQ(message(SplitKind::trial), "split trial: no window to test on; the data needs trials 1 and 2");
+  EXPECT_EQ(message(SplitKind::texture),
+            "split texture: the data has 1 plate, needs two: one to train on, one to test on");
+  EXPECT_EQ(message(SplitKind::texture, {"bumps12"}),
+            "split texture: no window to train on; the data has nothing unlike what is left out: train "
+            "beside random plates, score with split none");
+  EXPECT_EQ(message(SplitKind::window), "nothing was thrown");
+}
+
+TEST(Leakage, FindsAPassThatIsFiledTwice) {
+  WindowSet set = make_set();
+  Recording copy = make_recording({.plate = "ridges6", .trial = 1, .pass = 1, .frames = 40, .level = 1.2F});
+  copy.trial = 2;
+  copy.pass = 9;
+  set.add(copy);
+  const Leakage leakage = find_leakage(set, make_split(set, SplitKind::trial, 1));
+  EXPECT_EQ(leakage.overlapping, 0U);
+  EXPECT_EQ(leakage.duplicated, 25U);
+}
+
+TEST(Leakage, ASingleChangedValueMakesAnotherWindow) {
+  WindowSet set(wide_settings(16));
+  Recording recording = make_recording({.frames = 40});
+  set.add(recording);
+  recording.trial = 2;
+  recording.volts[20 * kTaxels + 5] += 0.01F;
+  set.add(recording);
+  // Frame 20 lies in the windows that end at 20..35; those at 15..19 and 36..39 are still the same.
+  EXPECT_EQ(find_leakage(set, make_split(set, SplitKind::trial, 1)).duplicated, 9U);
+}
+
+TEST(Leakage, RestIsNoDuplicate) {
+  WindowSet set(wide_settings(16));
+  for (int trial = 1; trial <= 2; ++trial) {
+    Recording rest = make_recording({.trial = trial, .frames = 40});
+    std::fill(rest.volts.begin(), rest.volts.end(), 2.44F);
+    set.add(rest);
+  }
+  EXPECT_TRUE(find_leakage(set, make_split(set, SplitKind::trial, 1)).none());
+}
+
+TEST(Split, WhatIsSetAsideIsTrainedOnAndNeverTested) {
+  WindowSet set(wide_settings(16));
+  for (int trial = 1; trial <= 2; ++trial)
+    for (const char* plate : {"ridges6", "bumps6"})
+      for (int pass = 1; pass <= 2; ++pass)
+        set.add(make_recording({.plate = plate, .trial = trial, .pass = pass, .frames = 30}));
+  const std::size_t own = set.size();
+  set.add(make_recording({.plate = "ridges6", .trial = 2, .pass = 3, .frames = 30}), ".", true);
+  set.add(make_recording({.plate = "bumps12", .trial = 1, .pass = 1, .frames = 30}), ".", true);
+  ASSERT_EQ(set.size(), own + 30);
+  for (const SplitKind kind : {SplitKind::window, SplitKind::pass, SplitKind::trial, SplitKind::none}) {
+    const Split split = make_split(set, kind, 3);
+    EXPECT_LT(split.test.back(), own) << name_of(kind);
+    ASSERT_GT(split.train.size(), 30U) << name_of(kind);
+    for (std::size_t i = 0; i < 30; ++i)
+      EXPECT_EQ(split.train[split.train.size() - 30 + i], own + i) << name_of(kind);
+  }
+}
+
+TEST(Split, SpreadTakesEvenlyOrAll) {
+  const std::vector<std::uint32_t> list{2, 3, 5, 7, 11, 13, 17};
+  EXPECT_EQ(spread(list, 3), (std::vector<std::uint32_t>{2, 5, 11}));
+  EXPECT_EQ(spread(list, 7), list);
+  EXPECT_EQ(spread(list, 100), list);
+  EXPECT_TRUE(spread({}, 3).empty());
+}
+
+TEST(Split, OfManyPassesAFourthOfTheSilenceIsKept) {
+  WindowSet windows({.timesteps = 32, .rate_hz = 100, .stride = 8});
+  windows.add_one_of_many(simulate_pass(Plate::named("3_Bumps"), {}), 8);
+  const std::size_t textured = windows.size();
+  windows.add_one_of_many(simulate_pass(Plate::named("plain"), {}), 8);
+  windows.add(simulate_pass(Plate::named("6_Bumps"), {}));
+  std::vector<std::uint32_t> all(windows.size());
+  for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
+  std::size_t contact = 0, silent = 0, kept_silent = 0, kept_whole = 0;
+  for (std::uint32_t i = 0; i < textured; ++i) ++(windows.contact(i) ? contact : silent);
+  std::size_t kept_contact = 0;
+  for (const std::uint32_t i : without_most_silence(windows, all)) {
+    if (i >= textured)
+      ++kept_whole;
+    else
+      ++(windows.contact(i) ? kept_contact : kept_silent);
+  }
+  EXPECT_GT(contact, 20U);
+  EXPECT_EQ(kept_contact, contact);
+  EXPECT_EQ(kept_silent, (silent + 3) / 4);
+  EXPECT_EQ(kept_whole, windows.size() - textured);
+}
+
+}  // namespace
+}  // namespace supertac

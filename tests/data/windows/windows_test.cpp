@@ -1,0 +1,294 @@
+#include "data/windows/windows.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "data/plates/truth.h"
+#include "data/recordings/simulator.h"
+#include "data/scores/baselines.h"
+#include "tests/data/test_recordings.h"
+
+namespace supertac {
+namespace {
+
+template <class Exception = std::invalid_argument, class Call>
+std::string message_of(Call call) {
+  try {
+    call();
+  } catch (const Exception& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+std::size_t sum_of_reasons(const WindowCounts& c) {
+  return c.unreliable + c.no_position + c.lifting + c.too_early + c.off_stride + c.windows;
+}
+
+TEST(Windows, AreTheLastFramesOfAPass) {
+  WindowSet set(wide_settings(16));
+  const Recording recording = make_recording({});
+  set.add(recording);
+  ASSERT_EQ(set.size(), 85U);  // 100 frames, the first window ends at frame 15
+  std::vector<float> window(16 * 16);
+  set.window(3, window);
+  EXPECT_EQ(set.frame_of(3), 18U);
+  for (std::size_t i = 0; i < window.size(); ++i)
+    ASSERT_EQ(window[i], set.settings().scaling(recording.volts[3 * kTaxels + i]));
+  EXPECT_EQ(set.last_frame(3), std::vector<float>(window.end() - kTaxels, window.end()));
+  EXPECT_NEAR(set.position(3).y_mm, 30 + 18 * 10.0 / 300, 1e-4);
+  EXPECT_EQ(set.position(3).x_mm, 18);
+}
+
+TEST(Windows, NeverCrossTheEdgeOfAPass) {
+  WindowSet set(wide_settings(16));
+  set.add(make_recording({.frames = 40, .level = 2.0F}));
+  set.add(make_recording({.pass = 2, .frames = 40, .level = 1.2F}));
+  ASSERT_EQ(set.size(), 50U);
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    const auto window = set.window(i);
+    const bool first = set.pass_of(i) == 0;
+    for (const float v : window)
+      ASSERT_EQ(v < 0.7F, first) << i;  // (3 - 2) / 2 = .5 against (3 - 1.2) / 2 = .9
+  }
+  EXPECT_EQ(set.passes()[1].first_window, 25U);
+  EXPECT_EQ(set.passes()[1].windows, 25U);
+}
+
+TEST(Windows, NeverCrossAGap) {
+  Recording recording = make_recording({});
+  for (std::size_t i = 50; i < 100; ++i) recording.time_s[i] += 1;
+  WindowSet set(wide_settings(16));
+  set.add(recording);
+  EXPECT_EQ(set.size(), 70U);
+  EXPECT_EQ(set.counts().gaps, 1U);
+  EXPECT_EQ(set.counts().too_early, 30U);
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    EXPECT_TRUE(set.frame_of(i) < 50 || set.frame_of(i) >= 65);
+    EXPECT_EQ(set.history(i), set.frame_of(i) < 50 ? set.frame_of(i) + 1 : set.frame_of(i) - 49);
+  }
+}
+
+TEST(Windows, OfWhichXOrYIsUnknownHaveNoTruth) {
+  for (const std::size_t unknown : {0U, 1U}) {
+    Recording recording = make_recording({});
+    for (std::size_t i = 90; i < 100; ++i) recording.position_mm[2 * i + unknown] = NAN;
+    WindowSet set(wide_settings(16));
+    set.add(recording);
+    EXPECT_EQ(set.counts().no_position, 10U) << unknown;
+  }
+}
+
+TEST(Windows, CountEveryFrameOnce) {
+  WindowSettings settings = wide_settings(16);
+  settings.stride = 3;
+  WindowSet set(settings);
+  Recording lifting = make_recording({});
+  lifting.lift_mm.assign(100, 0);
+  for (std::size_t i = 61; i < 100; ++i) lifting.lift_mm[i] = 1;
+  set.add(lifting);
+  Recording unplaced = make_recording({.pass = 2});
+  unplaced.position_mm.clear();
+  set.add(unplaced);
+  Recording unreliable = make_recording({.pass = 3});
+  unreliable.metadata["registration_reliable"] = "no";
+  set.add(unreliable);
+  const WindowCounts& counts = set.counts();
+  EXPECT_EQ(counts.recordings, 3U);
+  EXPECT_EQ(counts.frames, 300U);
+  EXPECT_EQ(sum_of_reasons(counts), counts.frames);
+  EXPECT_EQ(counts.no_position, 100U);
+  EXPECT_EQ(counts.unreliable, 100U);
+  EXPECT_EQ(counts.lifting, 39U);
+  EXPECT_EQ(counts.too_early, 15U);
+  EXPECT_EQ(counts.windows, 16U);  // frames 15, 18, ..., 60
+  EXPECT_EQ(set.size(), 16U);
+  EXPECT_EQ(set.frame_of(0), 15U);
+  EXPECT_EQ(set.frame_of(1), 18U);
+  EXPECT_NE(counts.summary().find("100 without position"), std::string::npos);
+  EXPECT_EQ(counts.summary().find("gaps"), std::string::npos);
+}
+
+TEST(Windows, InTheAirTheTruthIsFlat) {
+  Recording recording = make_recording({.plate = "3_Bumps"});
+  for (std::size_t i = 0; i < 100; ++i) recording.position_mm[2 * i + 1] = 54;
+  recording.lift_mm.assign(100, 0);
+  for (std::size_t i = 50; i < 100; ++i)
+    recording.lift_mm[i] = i < 60 ? 3.9F : 4.1F;  // clear at 2.5 + 1.5 mm
+  WindowSet set(wide_settings(16));
+  set.add(recording);
+  ASSERT_EQ(set.size(), 75U);
+  EXPECT_EQ(set.counts().lifting, 10U);
+  std::vector<float> truth(256);
+  set.truth(0, truth);
+  EXPECT_EQ(set.zone(0), Zone::contact);
+  EXPECT_TRUE(in_contact(truth));
+  set.truth(74, truth);
+  EXPECT_EQ(set.zone(74), Zone::air);
+  EXPECT_FALSE(in_contact(truth));
+}
+
+TEST(Windows, AFlaggedReliablePassIsKept) {
+  Recording recording = make_recording({});
+  recording.metadata["registration_reliable"] = "yes";
+  WindowSet set(wide_settings(16));
+  set.add(recording);
+  EXPECT_EQ(set.size(), 85U);
+}
+
+TEST(Windows, OfAnyArray) {
+  SimulatorSettings settings;
+  settings.array = {.rows = 6, .columns = 6, .pitch_mm = 2};
+  const Recording recording = simulate_pass(Plate::named("4_Blob"), {.pass = 4}, settings);
+  WindowSet set(WindowSettings{.timesteps = 32});
+  set.add(recording);
+  EXPECT_EQ(set.array(), settings.array);
+  EXPECT_EQ(set.image(), (ImageGrid{24, 24, 0.5}));
+  EXPECT_EQ(set.window(0).size(), 32U * 36);
+  EXPECT_EQ(set.last_frame(5).size(), 36U);
+  std::vector<float> truth(576), expected(576);
+  for (std::size_t i = 0; i < set.size(); i += 97) {
+    if (set.zone(i) == Zone::air) continue;
+    set.truth(i, truth);
+    truth_image(Plate::named("4_Blob"), set.position(i).x_mm, set.position(i).y_mm, {24, 24, 0.5}, expected);
+    ASSERT_EQ(truth, expected);
+  }
+  std::vector<std::uint32_t> train;
+  for (std::uint32_t i = 0; i < set.size(); i += 9) train.push_back(i);
+  for (const auto& baseline : fit_baselines(set, train)) {
+    baseline->predict(set.window(0), truth);
+    EXPECT_TRUE(std::isfinite(truth[575])) << baseline->name();
+  }
+}
+
+TEST(Windows, RefuseRecordingsOfAnotherArray) {
+  const auto message = [](WindowSet& set) -> std::string {
+    try {
+      set.add(make_recording({}));
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  WindowSettings settings = wide_settings(16);
+  settings.array = TaxelArray{.rows = 6, .columns = 6, .pitch_mm = 2};
+  WindowSet for_model(settings);
+  EXPECT_EQ(
+      message(for_model),
+      "was recorded with 4x4 taxels at 3 mm, expected 6x6 taxels at 2 mm; give recordings of the array the "
+      "model is for, and no others");
+  WindowSet mixed(wide_settings(16));
+  Recording other = make_recording({});
+  other.array.pitch_mm = 2.5;
+  mixed.add(other);
+  EXPECT_NE(message(mixed).find("expected 4x4 taxels at 2.5 mm"), std::string::npos);
+}
+
+TEST(Windows, TruthIsTheTruthImageOfTheLastFrame) {
+  for (const char* plate : {"bumps12", "ridges6", "4_Blob", "6_Waves", "plain"}) {
+    for (const int scale : {2, 4, 8}) {
+      WindowSettings settings = wide_settings(16);
+      settings.scale = scale;
+      WindowSet set(settings);
+      set.add(make_recording({.plate = plate, .start_y_mm = 45}));
+      const auto pixels = static_cast<std::size_t>(16 * scale * scale);
+      std::vector<float> truth(pixels), expected(pixels);
+      for (std::size_t i = 0; i < set.size(); i += 7) {
+        set.truth(i, truth);
+        truth_image(Plate::named(plate), set.position(i).x_mm, set.position(i).y_mm,
+                    TaxelArray{}.picture(scale), expected);
+        ASSERT_EQ(truth, expected) << plate << " " << scale << " " << i;
+        ASSERT_EQ(set.contact(i), *std::max_element(truth.begin(), truth.end()) > 0);
+      }
+    }
+  }
+}
+
+TEST(Windows, APassShorterThanTheWindowGivesNone) {
+  WindowSet set(wide_settings(64));
+  set.add(make_recording({.frames = 63}));
+  EXPECT_EQ(set.size(), 0U);
+  EXPECT_EQ(set.counts().too_early, 63U);
+  set.add(make_recording({.frames = 64}));
+  EXPECT_EQ(set.size(), 1U);
+}
+
+TEST(Windows, RefuseSettingsOutOfRange) {
+  EXPECT_EQ(message_of([] { WindowSet({.scale = 3}); }), "windows: scale must be 2, 4 or 8, got 3");
+  EXPECT_THROW(WindowSet({.timesteps = 0}), std::invalid_argument);
+  EXPECT_THROW(WindowSet({.stride = 0}), std::invalid_argument);
+  EXPECT_THROW(WindowSet({.rate_hz = 0}), std::invalid_argument);
+}
+
+TEST(Windows, RefuseOutputsOfAnotherSizeAndUnknownPlates) {
+  WindowSet set(wide_settings(16));
+  set.add(make_recording({}));
+  std::vector<float> small(255);
+  EXPECT_EQ(message_of([&] { set.window(0, small); }),
+            "windows: a window needs room for 256 values, got 255");
+  EXPECT_THROW(set.truth(0, small), std::invalid_argument);
+  EXPECT_THROW(set.add(make_recording({.plate = "carpet"})), std::invalid_argument);
+  EXPECT_EQ(set.size(), 85U);
+}
+
+TEST(Windows, FingerprintTellsDataApart) {
+  WindowSet a(wide_settings(16)), b(wide_settings(16)), c(wide_settings(16)), d(wide_settings(32));
+  a.add(make_recording({}));
+  b.add(make_recording({}));
+  c.add(make_recording({.level = 2.0001F}));
+  d.add(make_recording({}));
+  EXPECT_EQ(a.fingerprint(), b.fingerprint());
+  EXPECT_NE(a.fingerprint(), c.fingerprint());
+  EXPECT_NE(a.fingerprint(), d.fingerprint());
+  EXPECT_EQ(a.fingerprint().size(), 16U);
+}
+
+class WindowFiles : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    dir_ = ::testing::TempDir() + "supertac_windows_" +
+           ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::filesystem::remove_all(dir_);
+    std::filesystem::create_directories(dir_);
+  }
+  void TearDown() override { std::filesystem::remove_all(dir_); }
+  void write(const PassPlan& plan, const std::string& name) {
+    write_recording(dir_ + "/" + name + ".safetensors", make_recording(plan));
+  }
+  std::string dir_;
+};
+
+TEST_F(WindowFiles, LoadInTheOrderOfNames) {
+  write({.plate = "ridges6"}, "ridges6_t1_p1_v10");
+  write({.plate = "bumps12", .pass = 2}, "bumps12_t1_p2_v10");
+  write({.plate = "bumps12"}, "bumps12_t1_p1_v10");
+  const WindowSet set = WindowSet::load(dir_, {}, wide_settings(16));
+  ASSERT_EQ(set.passes().size(), 3U);
+  EXPECT_EQ(set.passes()[0].plate, "bumps12");
+  EXPECT_EQ(set.passes()[1].pass, 2);
+  EXPECT_EQ(set.passes()[2].plate, "ridges6");
+  EXPECT_EQ(set.size(), 3U * 85U);
+  EXPECT_EQ(WindowSet::load(dir_, {"ridges6"}, wide_settings(16)).size(), 85U);
+}
+
+TEST_F(WindowFiles, SayWhatIsMissing) {
+  EXPECT_THROW(WindowSet::load(dir_, {}, wide_settings(16)), std::runtime_error);  // an empty folder
+  write({}, "bumps12_t1_p1_v10");
+  EXPECT_NE(message_of([&] {
+              WindowSet::load(dir_, {"ridges6"}, wide_settings(16));
+            }).find("plate 'ridges6' has no recording in " + dir_ + "; it has those of bumps12"),
+            std::string::npos);
+  EXPECT_NE(message_of<std::runtime_error>([&] {
+              WindowSet::load(dir_, {}, wide_settings(256));
+            }).find("100 too close to the start"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace supertac

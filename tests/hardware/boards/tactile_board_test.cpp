@@ -1,0 +1,273 @@
+#include "hardware/boards/tactile_board.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "hardware/collection/capture.h"
+#include "hardware/ports/errors.h"
+#include "hardware/ports/serial_port.h"
+#include "hardware/printers/marlin_link.h"
+#include "hardware/virtual_rig/pty_rig.h"
+#include "rig_support.h"
+#include "tests/expect_error.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kPatience = 20;  // seconds of wall time; a loaded machine is no failure
+
+TEST(TactileBoard, DeliversEveryFrameInOrder) {
+  RigSettings settings = running_rig();
+  settings.board.signals = [](double, double, double, double t) {
+    std::array<double, 16> volts{};
+    volts.fill(2.0 + 0.1 * (t - 1000));
+    return volts;
+  };
+  SimulatedRig rig(settings);
+  TactileBoard board(rig.board_port());
+  rig.run_for(2);
+  board.stop();
+  std::uint64_t frames = 0;
+  std::uint16_t before = 0;
+  while (const auto frame = board.next(0)) {
+    EXPECT_GE(frame->frame.taxel(0), before);
+    before = frame->frame.taxel(0);
+    EXPECT_FALSE(frame->suspect);
+    ++frames;
+  }
+  EXPECT_EQ(frames, rig.world().board().counters().sent);
+  EXPECT_NEAR(static_cast<double>(frames), 2 / rig::kFramePeriodS, 2);
+}
+
+TEST(TactileBoard, ASlowConsumerLosesTheOldestAndIsTold) {
+  SimulatedRig rig(running_rig());
+  TactileBoard board(rig.board_port(), {.queue_frames = 100});
+  rig.run_for(1);
+  board.stop();
+  std::uint64_t taken = 0;
+  double first = 0;
+  while (const auto frame = board.next(0)) {
+    if (taken++ == 0) first = frame->arrival_s;
+  }
+  EXPECT_EQ(taken, 100U);
+  EXPECT_EQ(board.counters().dropped + taken, rig.world().board().counters().sent);
+  EXPECT_GT(first, 1000.89) << "the newest frames should have been kept";
+}
+
+// Bytes handed over in reads of the given sizes, at the given times.
+class ScriptedPort : public Port {
+ public:
+  struct Read {
+    double time_s;
+    std::vector<std::byte> bytes;
+  };
+  explicit ScriptedPort(std::vector<Read> reads) : reads_(std::move(reads)) {}
+  const std::string& name() const override { return name_; }
+  double now() override { return at_ < reads_.size() ? reads_[at_].time_s : 1e9; }
+  Received read(std::span<std::byte> buffer, double) override {
+    if (at_ == reads_.size()) throw PortUnplugged("script: the end");
+    const Read& read = reads_[at_++];
+    std::copy(read.bytes.begin(), read.bytes.end(), buffer.begin());
+    return {read.bytes.size(), read.time_s};
+  }
+  double write(std::span<const std::byte>, double) override { return now(); }
+
+ private:
+  std::string name_ = "script";
+  std::vector<Read> reads_;
+  std::size_t at_ = 0;
+};
+
+std::vector<std::byte> some_frames(int count) {
+  std::vector<std::byte> bytes;
+  for (int i = 0; i < count; ++i) {
+    const auto one = frame_bytes(random_frame(static_cast<std::uint64_t>(i)));
+    bytes.insert(bytes.end(), one.begin(), one.end());
+  }
+  return bytes;
+}
+
+std::unique_ptr<Port> hundred_frames() {
+  std::vector<ScriptedPort::Read> reads;
+  for (int i = 0; i < 10; ++i) reads.push_back({10 + 0.01 * i, some_frames(10)});
+  return std::make_unique<ScriptedPort>(reads);
+}
+
+TEST(TactileBoard, AReplaysReaderWaitsForItsConsumer) {
+  TactileBoard board(hundred_frames(), {.queue_frames = 15, .wait_for_consumer = true});
+  int taken = 0;
+  EXPECT_THROW(
+      {
+        while (board.next(kPatience)) ++taken;
+      },
+      PortUnplugged);
+  EXPECT_EQ(taken, 100);
+  EXPECT_EQ(board.counters().dropped, 0U);
+}
+
+TEST(TactileBoard, StoppingDoesNotWaitForAConsumerThatIsGone) {
+  TactileBoard board(hundred_frames(), {.queue_frames = 15, .wait_for_consumer = true});
+  ASSERT_TRUE(board.next(kPatience));
+  board.stop();
+  EXPECT_TRUE(board.next(0));
+}
+
+TEST(TactileBoard, FramesOfOneReadAreAPeriodApart) {
+  // One on time; a stall, then four at once; two right behind one another, closer than a period allows.
+  TactileBoard board(std::make_unique<ScriptedPort>(std::vector<ScriptedPort::Read>{
+      {10, some_frames(1)}, {10.1, some_frames(4)}, {10.1005, some_frames(2)}}));
+  const std::vector<double> expected = {10,
+                                        10.1 - 3 * rig::kFramePeriodS,
+                                        10.1 - 2 * rig::kFramePeriodS,
+                                        10.1 - rig::kFramePeriodS,
+                                        10.1,
+                                        10.10025,
+                                        10.1005};
+  for (const double time : expected) {
+    const auto frame = board.next(kPatience);
+    ASSERT_TRUE(frame);
+    EXPECT_NEAR(frame->time_s, time, 1e-9);
+  }
+}
+
+TEST(TactileBoard, FramesThatWaitedFollowTheOneBefore) {
+  // 24 frames waited for 50 ms in a port that held no more, the next 25 were lost; 2048 bytes are 12.5
+  // frames.
+  const std::vector<std::byte> waited = some_frames(24);
+  const auto part = [&](std::size_t from, std::size_t to) {
+    return std::vector<std::byte>(waited.begin() + static_cast<std::ptrdiff_t>(from),
+                                  waited.begin() + static_cast<std::ptrdiff_t>(to));
+  };
+  TactileBoard board(
+      std::make_unique<ScriptedPort>(std::vector<ScriptedPort::Read>{{10, some_frames(1)},
+                                                                     {10.05, part(0, 2048)},
+                                                                     {10.05, part(2048, waited.size())},
+                                                                     {10.051, some_frames(1)}}));
+  std::vector<double> times;
+  for (int i = 0; i < 26; ++i) {
+    const auto frame = board.next(kPatience);
+    ASSERT_TRUE(frame);
+    times.push_back(frame->time_s);
+  }
+  EXPECT_EQ(times[0], 10);
+  for (std::size_t i = 1; i <= 12; ++i)
+    EXPECT_NEAR(times[i], 10 + static_cast<double>(i) * rig::kFramePeriodS, 1e-9) << i;
+  EXPECT_NEAR(times[24], 10.05, 1e-9);  // of the last read nobody can say that it waited
+  EXPECT_NEAR(times[25], 10.051, 1e-9);
+}
+
+TEST(TactileBoard, ReplaysACaptureOfLargerReads) {
+  const std::vector<std::byte> bytes = some_frames(60);
+  TactileBoard board(
+      std::make_unique<ReplayPort>(std::vector<JournalRecord>{{RecordKind::clock, 10, {}},
+                                                              {RecordKind::clock, 10, {}},
+                                                              {RecordKind::received, 10.1, bytes},
+                                                              {RecordKind::clock, 10.1, {}}},
+                                   "capture"));
+  int taken = 0;
+  EXPECT_THROW(
+      {
+        while (board.next(kPatience)) ++taken;
+      },
+      PortUnplugged);
+  EXPECT_EQ(taken, 60);
+}
+
+TEST(TactileBoard, LostFramesAreCountedAndTheNextIsSuspect) {
+  RigSettings settings = running_rig();
+  settings.faults.lost_frame_rate = 0.01;
+  settings.faults.stall_rate = 0.001;
+  SimulatedRig rig(settings);
+  TactileBoard board(rig.board_port(), {.queue_frames = 100'000});
+  rig.run_for(10);
+  board.stop();
+  const VirtualBoard::Counters truth = rig.world().board().counters();
+  const BoardCounters counters = board.counters();
+  EXPECT_GT(truth.torn, 0U);
+  EXPECT_EQ(counters.decoder.frames, truth.sent);
+  // What was lost before the first or after the last frame cannot be seen.
+  EXPECT_NEAR(static_cast<double>(counters.missing), static_cast<double>(truth.lost), 2);
+  std::uint64_t suspect = 0;
+  double before = 0;
+  while (const auto frame = board.next(0)) {
+    const bool after_gap = before > 0 && frame->arrival_s - before > 1.5 * rig::kFramePeriodS;
+    EXPECT_EQ(frame->suspect, after_gap);
+    before = frame->arrival_s;
+    suspect += frame->suspect ? 1 : 0;
+  }
+  EXPECT_GE(suspect, truth.torn);
+}
+
+TEST(TactileBoard, UnpluggingIsATypedErrorAfterTheLastFrame) {
+  SimulatedRig rig(running_rig());
+  TactileBoard board(rig.board_port());
+  rig.run_for(0.1);
+  rig.unplug_board();
+  std::uint64_t frames = 0;
+  EXPECT_THROW(
+      {
+        while (board.next(kPatience)) ++frames;
+      },
+      PortUnplugged);
+  EXPECT_EQ(frames, rig.world().board().counters().sent);
+}
+
+TEST(TactileBoard, OverAPseudoTerminalAtTenTimesTheSpeed) {
+  const TemporaryFolder folder;
+  PtyRig rig(running_rig(), folder / "board", folder / "printer", 10);
+  TactileBoard board(std::make_unique<SerialPort>(folder / "board", SerialSettings{rig::kBoardBaud, 10}));
+  std::uint64_t frames = 0;
+  const double until = monotonic_seconds() + kPatience;
+  while (frames < 3000 && monotonic_seconds() < until) frames += board.next(1) ? 1 : 0;
+  EXPECT_EQ(frames, 3000U);
+  EXPECT_GT(monotonic_seconds(), until - kPatience + 0.2) << "the board does not keep its rate";
+  rig.unplug_board();
+  EXPECT_THROW(
+      {
+        while (board.next(kPatience)) continue;
+      },
+      PortUnplugged);
+}
+
+TEST(TactileBoard, APrinterAtTheBoardsPortIsRecognised) {
+  const TemporaryFolder folder;
+  RigSettings settings;
+  settings.printer.boot_s = 0.01;
+  settings.printer.heartbeat = true;
+  PtyRig rig(settings, folder / "board", folder / "printer", 20);
+  TactileBoard board(std::make_unique<SerialPort>(folder / "printer", SerialSettings{rig::kBoardBaud, 20}),
+                     {.silence_s = 10});
+  EXPECT_ERROR((void)board.next(kPatience), WrongDevice,
+               "expected a tactile board, found text, as from a printer; exchange the two ports");
+}
+
+// Neither board nor printer: noise without a frame, and a device that talks text to the printer's driver.
+TEST(TactileBoard, AnotherDeviceIsNoBoardAndNoPrinter) {
+  const TemporaryFolder folder;
+  const PseudoTerminal device(folder / "port");
+  const std::string noise(64, '\xAA'), text = "$GPGGA,123519,4807.038,N\r\n";
+  {
+    ASSERT_EQ(write(device.descriptor(), noise.data(), noise.size()), static_cast<ssize_t>(noise.size()));
+    TactileBoard board(std::make_unique<SerialPort>(folder / "port", SerialSettings{rig::kBoardBaud, 10}));
+    EXPECT_ERROR((void)board.next(kPatience), WrongDevice,
+                 "found 64 bytes without a frame; choose the board's port (--list-ports)");
+  }
+  ASSERT_EQ(write(device.descriptor(), text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  SerialPort port(folder / "port", {.speedup = 100});
+  MarlinLink link(port);
+  EXPECT_ERROR(link.connect(), WrongDevice,
+               "expected a Marlin firmware, found 26 bytes that are no answer to M110 within 20 s; check "
+               "that it is the "
+               "printer's port (--list-ports) and that its baud rate is 115200");
+}
+
+TEST(TactileBoard, ABoardAtThePrintersPortIsRecognised) {
+  const TemporaryFolder folder;
+  PtyRig rig(running_rig(), folder / "board", folder / "printer", 5);
+  SerialPort port(folder / "board", {.speedup = 5});
+  MarlinLink link(port);
+  EXPECT_ERROR(link.connect(), WrongDevice, "found the frames of a tactile board; exchange the two ports");
+}
+
+}  // namespace
+}  // namespace supertac

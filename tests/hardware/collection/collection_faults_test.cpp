@@ -1,0 +1,121 @@
+// The N-th call on the journal's file fails, for every N of a short collection.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include "hardware/collection/collection.h"
+#include "hardware/collection/palpation_recorder.h"
+#include "hardware/ports/errors.h"
+#include "rig_support.h"
+#include "tests/io/faults.h"
+
+namespace supertac {
+namespace {
+
+RigSettings low_rig() {
+  RigSettings settings = running_rig();
+  settings.printer.head = {99.7, 101.17, 97.81};
+  return settings;
+}
+
+/// One short collection on a simulated rig whose journal meets a fault.
+struct FaultyCollection {
+  FaultyCollection() : rig(low_rig()) {
+    settings.plan.passes = 1;
+    settings.plan.slide = 2;
+    settings.plan.poll_interval_s = 0.02;
+    settings.origin = {99.7, 101.17, 97.81};
+    settings.journal = folder / "journal";
+    settings.header = "fault";
+    // Simulated time would otherwise run away from the journal's thread, which would then write all at once.
+    settings.progress = [](const Leg&, const Point3&, const BoardCounters&) {
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
+    };
+  }
+  /// What was promised and does not hold; empty when all does. Says in `failed` whether the run ended in an
+  /// error.
+  std::string run(bool& failed) {
+    failed = true;
+    try {
+      const PalpationOutcome outcome =
+          record_palpation(rig.board_port(), rig.printer_port(), settings).outcome;
+      failed = !outcome.complete;
+      if (failed) std::rethrow_exception(outcome.error);
+    } catch (const JournalError&) {
+    } catch (const std::exception& error) {
+      return std::string("expected JournalError, found: ") + error.what();
+    }
+    const double z = rig.world().printer().head(rig.now()).z;
+    if (z < settings.plan.start.z + settings.plan.lift - 0.01)
+      return "the finger is at Z" + std::to_string(z);
+    return {};
+  }
+  /// The same of its files; to be asked when the calls work again.
+  std::string left_behind() const {
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+      if (entry.path() != settings.journal) return "left behind: " + entry.path().string();
+      try {
+        (void)collection_of(read_journal(settings.journal));
+      } catch (const JournalError& error) {
+        return error.what();
+      }
+    }
+    return {};
+  }
+  TemporaryFolder folder;
+  SimulatedRig rig;
+  RecorderSettings settings;
+};
+
+// The journal's first calls: its open, two writes of its header; then open, fsync and close of its folder,
+// through which nothing was written: that close can lose nothing.
+constexpr int kCloseOfFolder = 6;
+
+struct Sweep {
+  int runs = 0, failed = 0;
+};
+
+Sweep sweep(int error, bool forever) {
+  Sweep sweep;
+  int untouched = 0;  // the number of calls differs a little from run to run
+  for (int at = 1; at < 2000; ++at) {
+    FaultyCollection collection;
+    bool failed = false, reached = false;
+    std::string broken;
+    {
+      const FaultInjection injection(at, error, forever);
+      broken = collection.run(failed);
+      reached = FaultInjection::reached();
+    }
+    if (broken.empty()) broken = collection.left_behind();
+    EXPECT_EQ(broken, "") << "call " << at << " fails with " << error << (forever ? " for ever" : " once");
+    untouched = reached ? 0 : untouched + 1;
+    if (untouched == 5) return sweep;
+    if (!reached) continue;
+    EXPECT_EQ(failed, forever || at != kCloseOfFolder) << "call " << at;
+    ++sweep.runs;
+    sweep.failed += failed ? 1 : 0;
+  }
+  ADD_FAILURE() << "the run never ends";
+  return sweep;
+}
+
+TEST(CollectionFaults, EveryCallOnceOnABrokenDisk) { EXPECT_GT(sweep(EIO, false).failed, 20); }
+
+TEST(CollectionFaults, EveryCallAndAllThatFollowOnAFullDisk) { EXPECT_GT(sweep(ENOSPC, true).failed, 20); }
+
+TEST(CollectionFaults, ShortWritesAreCompleted) {
+  FaultyCollection collection;
+  bool failed = true;
+  {
+    const FaultInjection injection(1, 0, true, Fault::short_count);
+    EXPECT_EQ(collection.run(failed), "");
+  }
+  EXPECT_EQ(collection.left_behind(), "");
+  EXPECT_FALSE(failed);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,202 @@
+#include "hardware/collection/journal.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "hardware/ports/errors.h"
+#include "hardware/ports/serial_port.h"
+#include "io/numbers/hash.h"
+#include "rig_support.h"
+#include "tests/expect_error.h"
+
+namespace supertac {
+namespace {
+
+std::vector<std::byte> file_bytes(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+TEST(Journal, GivesBackWhatWasWritten) {
+  const TemporaryFolder folder;
+  {
+    JournalWriter writer(folder / "j", "a header");
+    writer.append(Stream::board, RecordKind::received, 1.5, frame_bytes(random_frame(1)));
+    writer.event(2.5, "something");
+    writer.close();
+  }
+  const Journal journal = read_journal(folder / "j");
+  EXPECT_EQ(journal.header, "a header");
+  ASSERT_EQ(journal.of(Stream::board).size(), 1U);
+  EXPECT_EQ(journal.of(Stream::board)[0].time_s, 1.5);
+  EXPECT_EQ(journal.of(Stream::board)[0].bytes, frame_bytes(random_frame(1)));
+  EXPECT_EQ(journal.of(Stream::event)[0].text(), "something");
+  EXPECT_EQ(journal.torn_bytes, 0U);
+  EXPECT_TRUE(journal.of(Stream::printer).empty());
+}
+
+TEST(Journal, NeverOverwritesAndSaysWhyItCannotWrite) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "j") << "precious";
+  EXPECT_ERROR(
+      JournalWriter(folder / "j", ""), JournalError,
+      "cannot be created: File exists; recover it with supertac-import --journal, or choose another folder");
+  EXPECT_EQ(file_bytes(folder / "j").size(), 8U);
+  EXPECT_ERROR(JournalWriter(folder / "no/such/folder", ""), JournalError,
+               "cannot be created: No such file or directory; choose a folder that can be written");
+}
+
+TEST(Journal, EveryPrefixReadsAsFarAsItIsWhole) {
+  const TemporaryFolder folder;
+  {
+    JournalWriter writer(folder / "j", "h");
+    for (int i = 0; i < 20; ++i) writer.event(1e-3 * i, "event " + std::to_string(i));
+    writer.close();
+  }
+  const std::vector<std::byte> whole = file_bytes(folder / "j");
+  const std::size_t head = 24 + 13 + 1;
+  for (std::size_t length = 0; length <= whole.size(); ++length) {
+    const auto prefix = std::span(whole).first(length);
+    if (length < head) {
+      EXPECT_ERROR(parse_journal(prefix, "j"), JournalError,
+                   "journal j: expected a SuperTac journal, found other bytes or a damaged beginning");
+    } else {
+      const Journal journal = parse_journal(prefix, "j");
+      EXPECT_EQ(journal.torn_bytes,
+                length == whole.size() ? 0 : length - (length < 2 * head ? head : 2 * head));
+    }
+  }
+}
+
+TEST(Journal, EveryFlippedBitIsFound) {
+  const TemporaryFolder folder;
+  {
+    JournalWriter writer(folder / "j", "h");
+    writer.event(1, "first");
+    writer.close();
+  }
+  const std::vector<std::byte> whole = file_bytes(folder / "j");
+  for (std::size_t bit = 0; bit < 8 * whole.size(); ++bit) {
+    std::vector<std::byte> damaged = whole;
+    damaged[bit / 8] ^= static_cast<std::byte>(1U << (bit % 8));
+    const Journal journal = parse_journal(damaged, "j");
+    const std::uint64_t header = 2 * (24 + 13 + 1);
+    EXPECT_GT(journal.lost_bytes + journal.torn_bytes, 0U) << "bit " << bit;
+    EXPECT_EQ(journal.header, "h") << "it stands there twice, bit " << bit;
+    EXPECT_EQ(journal.of(Stream::event).size(), bit / 8 < header ? 1U : 0U) << "bit " << bit;
+  }
+}
+
+TEST(Journal, TenFlippedBitsCostTheirOwnChunksOnly) {
+  const TemporaryFolder folder;
+  constexpr int kFrames = 12'000;
+  {
+    JournalWriter writer(folder / "j", "h");
+    for (int i = 0; i < kFrames; ++i)
+      writer.append(Stream::board, RecordKind::received, 100 + 1e-3 * i, frame_bytes(random_frame(1)));
+    writer.close();
+  }
+  const std::vector<std::byte> whole = file_bytes(folder / "j");
+  // Two copies of 24 + 13 + 1 bytes. One bit in each would cost everything, and how long the file is, and so
+  // where a random bit lies, depends on when the writer's thread woke.
+  constexpr std::size_t kHeaders = 76;
+  double worst = 1;
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    std::vector<std::byte> damaged = whole;
+    const RandomStream random(seed, 1);
+    for (std::uint64_t flip = 0; flip < 10; ++flip) {
+      // The first of them in a header, where it once cost everything.
+      const std::size_t at = flip == 0 ? random.bits(flip) % kHeaders
+                                       : kHeaders + random.bits(flip) % (damaged.size() - kHeaders);
+      damaged[at] ^= static_cast<std::byte>(1U << (random.bits(flip + 100) % 8));
+    }
+    const Journal journal = parse_journal(damaged, "j");
+    worst = std::min(worst, static_cast<double>(journal.of(Stream::board).size()) / kFrames);
+    EXPECT_GT(journal.lost_bytes, 0U);
+    EXPECT_GT(journal.lost_s, 0.005);
+    EXPECT_LT(journal.lost_s, 0.2);
+  }
+  EXPECT_GE(worst, 0.99);
+  std::printf("ten flipped bits: at least %.2f %% of the frames\n", 100 * worst);
+}
+
+TEST(Journal, BeginningsOfChunksWithoutEndTakeNoTime) {
+  const TemporaryFolder folder;
+  {
+    JournalWriter writer(folder / "j", "h");
+    writer.close();
+  }
+  std::vector<std::byte> bytes = file_bytes(folder / "j");
+  const std::vector<std::byte> head(bytes.begin(), bytes.begin() + 24);
+  while (bytes.size() < (4 << 20)) {
+    bytes.insert(bytes.end(), head.begin(), head.end());
+    const std::uint32_t length = (2 << 20);
+    memcpy(&bytes[bytes.size() - 16], &length, sizeof length);
+  }
+  const double begin = monotonic_seconds();
+  EXPECT_EQ(parse_journal(bytes, "j").header, "h");
+  EXPECT_LT(monotonic_seconds() - begin, 2);
+}
+
+// ENOSPC and EFBIG look alike from here; a file size limit needs no full disk.
+TEST(Journal, AFullDiskIsReportedAndWhatWasWrittenIsKept) {
+  const TemporaryFolder folder;
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{20'000, 20'000};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    int code = 1;
+    try {
+      JournalWriter writer(folder / "j", "h");
+      const double until = monotonic_seconds() + 20;
+      while (monotonic_seconds() < until) {
+        writer.append(Stream::board, RecordKind::received, 1, std::vector<std::byte>(1000));
+        usleep(10'000);
+        writer.check();
+      }
+    } catch (const JournalError& error) {
+      code = std::string(error.what()).find("make room") != std::string::npos ? 0 : 2;
+    }
+    _exit(code);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_NO_THROW(read_journal(folder / "j"));
+}
+
+TEST(Journal, KillLosesAtMostHalfASecond) {
+  const TemporaryFolder folder;
+  for (int round = 0; round < 6; ++round) {
+    const std::string path = folder / ("j" + std::to_string(round));
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      JournalWriter writer(path, "h");
+      for (;;) {
+        writer.event(monotonic_seconds(), "tick");
+        usleep(1000);
+      }
+    }
+    usleep(static_cast<useconds_t>(350'000 + 70'000 * round));
+    kill(child, SIGKILL);
+    const double killed = monotonic_seconds();
+    waitpid(child, nullptr, 0);
+    const Journal journal = read_journal(path);
+    ASSERT_FALSE(journal.of(Stream::event).empty());
+    EXPECT_LT(killed - journal.of(Stream::event).back().time_s, 0.5);
+  }
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,182 @@
+#include "hardware/ports/serial_port.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <sys/time.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "hardware/ports/errors.h"
+#include "hardware/ports/port_list.h"
+#include "hardware/ports/serial_termios.h"
+#include "hardware/virtual_rig/pty_rig.h"
+#include "rig_support.h"
+#include "tests/expect_error.h"
+
+namespace supertac {
+namespace {
+
+std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
+
+TEST(SerialPort, TakesTheBoardsOddBaudRateAndNoModemLines) {
+  const TemporaryFolder folder;
+  const PseudoTerminal terminal(folder / "port");
+  const SerialPort port(folder / "port", {.baud = 7'372'800});  // a pty has no DTR: not an error
+  const int other = open(terminal.path().c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK);
+  // Root may still look; everybody else is refused by TIOCEXCL.
+  if (other >= 0) {
+    EXPECT_EQ(terminal_baud(other), 7'372'800U);
+    close(other);
+  }
+}
+
+TEST(SerialPort, SecondOpenerIsRefusedEvenAsRoot) {
+  const TemporaryFolder folder;
+  const PseudoTerminal terminal(folder / "port");
+  {
+    const SerialPort first(folder / "port");
+    EXPECT_ERROR(SerialPort second(folder / "port"), PortBusy,
+                 "already open in another program; close it (see `fuser ");
+  }
+  EXPECT_NO_THROW(SerialPort third(folder / "port"));
+}
+
+TEST(PortList, ALastingNameIsThatOfTheDevice) {
+  const TemporaryFolder folder;
+  const PseudoTerminal terminal(folder / "port");
+  EXPECT_EQ(lasting_port_name(folder / "port"), folder / "port") << "a pseudo-terminal's number is reused";
+  EXPECT_EQ(lasting_port_name("/dev/./null"), "/dev/null");
+  std::filesystem::create_directory(folder / "by-id");
+  std::filesystem::create_symlink("/dev/none", folder / "by-id/a_gone");
+  std::filesystem::create_symlink("/dev/null", folder / "by-id/usb-Printer_7");
+  for (const std::string& path : {std::string("/dev/null"), folder / "by-id/usb-Printer_7"})
+    EXPECT_EQ(lasting_port_name(path, folder / "by-id"), folder / "by-id/usb-Printer_7");
+  EXPECT_EQ(lasting_port_name("/dev/zero", folder / "by-id"), "/dev/zero");
+}
+
+TEST(SerialPort, WhatCannotBeOpenedSaysWhy) {
+  const TemporaryFolder folder;
+  EXPECT_ERROR(SerialPort port(folder / "nothing"), PortNotFound,
+               "no such port; plug the device in, or run with --list-ports");
+  std::ofstream(folder / "file") << "text";
+  EXPECT_ERROR(SerialPort port(folder / "file"), NotASerialPort,
+               "expected a serial port, found another kind of file; run with --list-ports");
+  try {
+    SerialPort port(folder / "nothing");
+  } catch (const PortNotFound& error) {
+    EXPECT_NE(std::string(error.what()).find("--list-ports"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find(folder / "nothing"), std::string::npos);
+  }
+}
+
+// A user without rights on the port; root first becomes nobody.
+TEST(SerialPort, WithoutPermissionTheGroupIsNamed) {
+  const TemporaryFolder folder;
+  const PseudoTerminal terminal(folder / "port");
+  ASSERT_EQ(chmod(terminal.path().c_str(), 0), 0);
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    int code = 1;
+    if (geteuid() == 0 && setuid(65534) != 0) _exit(2);
+    try {
+      const SerialPort port(terminal.path());
+    } catch (const PortPermission& error) {
+      code = std::string(error.what()).find("dialout") != std::string::npos ? 0 : 3;
+    }
+    _exit(code);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+TEST(SerialPort, TimeOutAndEndOfFileAreDifferent) {
+  const TemporaryFolder folder;
+  PseudoTerminal terminal(folder / "port");
+  SerialPort port(folder / "port");
+  std::array<std::byte, 16> buffer{};
+  EXPECT_EQ(port.read(buffer, port.now() + 0.02).count, 0U);
+  ASSERT_EQ(write(terminal.descriptor(), "last", 4), 4);
+  terminal.unplug();
+  EXPECT_THROW(
+      {
+        for (int i = 0; i < 3; ++i) (void)port.read(buffer, port.now() + 1);
+      },
+      PortUnplugged);
+  EXPECT_ERROR(port.write(bytes_of("x"), port.now() + 1), PortUnplugged,
+               "check the cable and start again, nothing is resumed");
+}
+
+TEST(SerialPort, UnpluggingIsNoticedWithin100Milliseconds) {
+  double worst = 0;
+  for (int i = 0; i < 20; ++i) {
+    const TemporaryFolder folder;
+    PseudoTerminal terminal(folder / "port");
+    SerialPort port(folder / "port");
+    std::atomic<double> pulled{0};
+    std::thread other([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      pulled = monotonic_seconds();
+      terminal.unplug();
+    });
+    std::array<std::byte, 16> buffer{};
+    EXPECT_ERROR((void)port.read(buffer, port.now() + 10), PortUnplugged, "the device is gone (");
+    worst = std::max(worst, monotonic_seconds() - pulled);
+    other.join();
+  }
+  EXPECT_LT(worst, 0.1);
+}
+
+TEST(SerialPort, AFullDeviceIsATimeOut) {
+  const TemporaryFolder folder;
+  const PseudoTerminal terminal(folder / "port");
+  SerialPort port(folder / "port");
+  const std::vector<std::byte> much(1 << 20);
+  EXPECT_ERROR(port.write(much, port.now() + 0.05), PortTimeout,
+               "the device took no bytes before the deadline (");
+}
+
+// Partial writes, EAGAIN and EINTR: a slow reader, and a signal every 200 us without SA_RESTART.
+TEST(SerialPort, OutputIsByteExactUnderAStormOfSignals) {
+  const TemporaryFolder folder;
+  const PseudoTerminal terminal(folder / "port");
+  SerialPort port(folder / "port");
+  std::vector<std::byte> sent(200'000);
+  for (std::size_t i = 0; i < sent.size(); ++i) sent[i] = static_cast<std::byte>(i * 131 >> 3);
+
+  struct sigaction quiet {};
+  quiet.sa_handler = [](int) {};
+  struct sigaction before {};
+  sigaction(SIGALRM, &quiet, &before);
+  const itimerval storm{{0, 200}, {0, 200}};
+  setitimer(ITIMER_REAL, &storm, nullptr);
+
+  std::vector<std::byte> got;
+  std::thread reader([&] {
+    std::array<std::byte, 777> buffer{};
+    const double until = monotonic_seconds() + 30;
+    while (got.size() < sent.size() && monotonic_seconds() < until) {
+      const ssize_t count = read(terminal.descriptor(), buffer.data(), buffer.size());
+      if (count > 0) got.insert(got.end(), buffer.begin(), buffer.begin() + count);
+      if (count < 0) std::this_thread::sleep_for(std::chrono::microseconds(300));
+    }
+  });
+  EXPECT_NO_THROW(port.write(sent, port.now() + 30));
+  reader.join();
+  const itimerval off{};
+  setitimer(ITIMER_REAL, &off, nullptr);
+  sigaction(SIGALRM, &before, nullptr);
+  EXPECT_EQ(got, sent);
+}
+
+}  // namespace
+}  // namespace supertac

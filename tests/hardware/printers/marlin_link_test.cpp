@@ -1,0 +1,211 @@
+#include "hardware/printers/marlin_link.h"
+
+#include <gtest/gtest.h>
+
+#include "rig_support.h"
+#include "tests/expect_error.h"
+
+namespace supertac {
+namespace {
+
+constexpr std::int64_t kConnecting = 3;  // lines that connecting sends: M154, M155, M115
+
+/// A connected link over a simulated printer.
+struct Bench {
+  explicit Bench(RigSettings settings = running_rig())
+      : rig(settings), port(rig.printer_port()), link(*port) {
+    link.connect();
+  }
+  VirtualPrinter& printer() { return rig.world().printer(); }
+  /// Runs `plant` once, just before line `number` after connecting runs.
+  void before_line(std::int64_t number, std::function<void(VirtualPrinter&, double)> plant) {
+    auto done = std::make_shared<bool>(false);
+    printer().on_line([=, this](std::int64_t n, const std::string&, double t) {
+      if (n != kConnecting + number || *done) return;
+      *done = true;
+      plant(printer(), t);
+    });
+  }
+  SimulatedRig rig;
+  std::unique_ptr<Port> port;
+  MarlinLink link;
+};
+
+struct TamperedBench {
+  TamperedBench() : rig(running_rig()), port(rig.printer_port()), link(port) { link.connect(); }
+  VirtualPrinter& printer() { return rig.world().printer(); }
+  void go(int count) {
+    for (int i = 1; i <= count; ++i) link.command("G1 X" + std::to_string(i));
+  }
+  std::vector<std::string> expected(int count) {
+    std::vector<std::string> moves;
+    for (int i = 1; i <= count; ++i) moves.push_back("G1 X" + std::to_string(i));
+    return moves;
+  }
+  SimulatedRig rig;
+  Tampering port;
+  MarlinLink link;
+};
+
+TEST(MarlinLink, ConnectsToAFreshBoardThroughBootGarbageAndHeartbeats) {
+  RigSettings settings;
+  settings.printer.boot_s = 3;
+  settings.printer.boot_garbage = "\x80\xff\x01zz\nok\x0e\xfe";
+  settings.printer.heartbeat = true;
+  Bench bench(settings);
+  EXPECT_TRUE(bench.link.capabilities().emergency_parser);
+  EXPECT_NE(bench.link.capabilities().firmware.find("Marlin"), std::string::npos);
+  bench.rig.run_for(5);  // `wait` every second
+  EXPECT_NO_THROW(bench.link.command("M114"));
+}
+
+TEST(MarlinLink, ConnectsToARunningFirmwareWithAForeignLineNumber) {
+  Bench bench;
+  EXPECT_EQ(bench.printer().last_line(), kConnecting);
+  EXPECT_EQ(bench.link.counters().repeats, 0U);
+}
+
+TEST(MarlinLink, NobodyThereIsATypedErrorInTime) {
+  RigSettings settings;
+  settings.printer.boot_s = 1e6;
+  SimulatedRig rig(settings);
+  const auto port = rig.printer_port();
+  MarlinLink link(*port);
+  const double start = port->now();
+  EXPECT_ERROR(
+      link.connect(), PrinterSilent,
+      "expected a Marlin firmware, found no answer to M110 within 20 s; check that the printer is on");
+  EXPECT_LT(port->now() - start, 25);
+}
+
+TEST(MarlinLink, DamagedLineIsSentAgainAndItsOkAcknowledgesNothing) {
+  TamperedBench bench;
+  bench.port.to_printer = {{"X3", "X8"}};
+  bench.go(5);
+  EXPECT_EQ(moves_of(bench.printer()), bench.expected(5));
+  EXPECT_EQ(bench.link.counters().faults, 1U);
+}
+
+TEST(MarlinLink, ResendOfALineNeverSentIsIgnored) {
+  Bench bench;
+  bench.before_line(2, [](VirtualPrinter& printer, double) { printer.inject("Resend: 999\nok\n"); });
+  for (int i = 1; i <= 5; ++i) bench.link.command("G1 X" + std::to_string(i));
+  EXPECT_EQ(moves_of(bench.printer()).size(), 5U);
+}
+
+TEST(MarlinLink, SameLineTooOftenIsAResendLoop) {
+  TamperedBench bench;
+  bench.port.to_printer.assign(50, {"G1 X1", "G1 X7"});
+  EXPECT_ERROR(bench.link.command("G1 X1"), ResendLoop,
+               "line 4 repeated 8 times without success (the firmware reports damaged lines): resend loop; "
+               "check the cable");
+  EXPECT_TRUE(moves_of(bench.printer()).empty());
+}
+
+TEST(MarlinLink, LostOkIsAskedForWithTheSameLineAndNothingRunsTwice) {
+  for (const char* damage : {"", "ok\x0e", "o\n", "k\n", "\xefk\n"}) {
+    TamperedBench bench;
+    bench.port.from_printer = {{"ok\n", damage}};
+    bench.go(5);
+    EXPECT_EQ(moves_of(bench.printer()), bench.expected(5)) << "ok became \"" << damage << '"';
+    EXPECT_GE(bench.link.counters().repeats, 1U);
+  }
+}
+
+TEST(MarlinLink, LostLeadingNIsAcknowledgedButNotRun) {
+  TamperedBench bench;
+  bench.port.to_printer = {{"N6 ", "6 "}};
+  bench.go(3);  // the last of them: no later line would bring it to light
+  EXPECT_EQ(moves_of(bench.printer()), bench.expected(3));
+}
+
+TEST(MarlinLink, LostLineBreakGluesNothingTogether) {
+  TamperedBench bench;
+  bench.port.to_printer = {{"\n", ""}};
+  bench.go(3);
+  EXPECT_EQ(moves_of(bench.printer()), bench.expected(3));
+}
+
+TEST(MarlinLink, BusyRenewsTheDeadline) {
+  Bench bench;
+  const double start = bench.port->now();
+  EXPECT_NO_THROW(bench.link.command("G4 S30"));  // the ordinary deadline is 2 s
+  EXPECT_GE(bench.port->now() - start, 30);
+  EXPECT_LE(bench.link.counters().repeats, 1U);
+}
+
+TEST(MarlinLink, LongCommandsHaveTheirOwnDeadlineWithoutKeepalive) {
+  RigSettings settings = running_rig();
+  settings.printer.keepalive = false;
+  Bench bench(settings);
+  EXPECT_NO_THROW(bench.link.command("G4 S30", 40));
+  EXPECT_EQ(bench.link.counters().timeouts, 0U);
+}
+
+TEST(MarlinLink, PausedForUserIsAnError) {
+  Bench bench;
+  bench.before_line(1,
+                    [](VirtualPrinter& printer, double) { printer.inject("echo:busy: paused for user\n"); });
+  EXPECT_ERROR(bench.link.command("G1 X1"), PrinterPaused,
+               "waits for its user; look at the printer's display");
+}
+
+TEST(MarlinLink, StartInMidRunIsAReset) {
+  Bench bench;
+  bench.before_line(2, [](VirtualPrinter& printer, double t) { printer.reset(t); });
+  bench.link.command("G1 X1");
+  EXPECT_ERROR(bench.link.command("G1 X2"), PrinterReset,
+               "the firmware restarted in use; its position is unknown, confirm the origin and start again");
+}
+
+TEST(MarlinLink, AResetWhoseBannerIsLostIsSeenInTheLineNumber) {
+  TamperedBench bench;
+  bench.go(10);
+  bench.printer().reset(bench.rig.now());
+  bench.port.from_printer = {{"start", "sxart"}};
+  EXPECT_ERROR(bench.link.command("G1 X11"), PrinterReset, "so it restarted; its position is unknown");
+  EXPECT_EQ(moves_of(bench.printer()).size(), 10U) << "a line ran on the restarted firmware";
+}
+
+TEST(MarlinLink, AfterAHaltNothingMoreIsSent) {
+  for (const char* text :
+       {"Error:Printer halted. kill() called!\n", "Error:Heating failed, system stopped!\n",
+        "Error:MAXTEMP triggered, system stopped! Heater_ID: 0\n"}) {
+    Bench bench;
+    bench.before_line(1, [text](VirtualPrinter& printer, double) { printer.inject(text); });
+    EXPECT_ERROR(bench.link.command("G1 X1"), PrinterHalted, "the firmware halted ('Error:");
+    const std::int64_t last = bench.printer().last_line();
+    EXPECT_ERROR(bench.link.command("G1 X2"), PrinterHalted, "halted earlier; reset it and start again");
+    EXPECT_EQ(bench.printer().last_line(), last);
+  }
+}
+
+TEST(MarlinLink, ARefusedCommandIsNotSentForEver) {
+  Bench bench;
+  bench.before_line(1, [](VirtualPrinter& printer, double) { printer.inject("Error:Probing failed\n"); });
+  EXPECT_ERROR(bench.link.command("G1 X1"), PrinterRefused, ": Error:Probing failed");
+  EXPECT_NO_THROW(bench.link.command("M114"));
+}
+
+TEST(MarlinLink, EveryLineRunsOnceInOrderAtFiftyTimesTheUsualFaults) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    RigSettings settings = running_rig();
+    settings.seed = seed;
+    settings.faults = {
+        .byte_rate = 0.002, .lost_ok_rate = 0.01, .resend_storm_rate = 0.01, .stall_rate = 0.01};
+    Bench bench(settings);
+    std::vector<std::string> expected;
+    for (int i = 1; i <= 200; ++i) {
+      expected.push_back("G1 X" + std::to_string(i % 7));
+      bench.link.command(expected.back());
+    }
+    bench.link.command("M400", 60);
+    const std::vector<std::string> ran = moves_of(bench.printer());
+    const auto [first, second] = std::mismatch(ran.begin(), ran.end(), expected.begin(), expected.end());
+    EXPECT_TRUE(ran == expected) << "seed " << seed << ", " << ran.size() << " moves, first difference at "
+                                 << first - ran.begin() << ": " << (first == ran.end() ? "missing" : *first);
+  }
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,129 @@
+#include "hardware/printers/palpation.h"
+
+#include <gtest/gtest.h>
+
+#include "rig_support.h"
+#include "tests/expect_error.h"
+
+namespace supertac {
+namespace {
+
+using rig::kMounted;
+
+struct PalpationBench {
+  explicit PalpationBench(RigSettings settings = running_rig())
+      : rig(settings), port(rig.printer_port()), printer(*port) {
+    printer.connect();
+    printer.confirm_origin(kMounted);
+  }
+  PalpationOutcome run(PalpationPlan plan, PalpationObserver observer = {}) {
+    return Palpation(printer, plan, std::move(observer)).run();
+  }
+  VirtualPrinter& firmware() { return rig.world().printer(); }
+  Point3 head() { return firmware().head(rig.now()); }
+  /// Does `plant` once, when the head is in the slide of pass 1.
+  PalpationObserver in_slide(std::function<void()> plant) {
+    PalpationObserver observer;
+    auto done = std::make_shared<bool>(false);
+    observer.position = [=](const Leg& leg, const PositionSample& sample) {
+      if (leg.phase != Phase::slide || sample.position.y < 120 || *done) return;
+      *done = true;
+      plant();
+    };
+    return observer;
+  }
+  SimulatedRig rig;
+  std::unique_ptr<Port> port;
+  Printer printer;
+};
+
+TEST(Palpation, EightPassesLiftBeforeTheyShift) {
+  PalpationBench bench;
+  std::vector<std::string> phases;
+  PalpationObserver observer;
+  observer.leg_ended = [&](const Leg& leg) { phases.emplace_back(name_of(leg.phase)); };
+  const PalpationOutcome outcome = bench.run({.passes = 2}, observer);
+  EXPECT_TRUE(outcome.complete);
+  EXPECT_EQ(outcome.passes_done, 2);
+  EXPECT_EQ(phases, (std::vector<std::string>{"approach", "onset", "slide", "release", "reposition", "onset",
+                                              "slide", "release", "reposition", "reposition"}));
+  EXPECT_LT(distance(bench.head(), kMounted), 1e-6) << "the next run confirms the same origin";
+}
+
+TEST(Palpation, TheWholeWayIsCheckedBeforeTheFirstMove) {
+  PalpationBench bench;
+  EXPECT_ERROR(bench.run({.passes = 40}), OutsideLimits,
+               "beside the plate; nothing was sent, lift first");  // only the last passes leave the plate
+  EXPECT_ERROR(bench.run({.passes = 0}), std::invalid_argument, "expected 1 to 1000 passes");
+  EXPECT_ERROR(bench.run({.speed = INFINITY}), std::invalid_argument, "slide, lift and speeds above 0");
+  EXPECT_TRUE(moves_of(bench.firmware()).empty());
+}
+
+TEST(Palpation, AFaultInContactLiftsTheFinger) {
+  PalpationBench bench;
+  const PalpationOutcome outcome =
+      bench.run({.passes = 2}, bench.in_slide([] { throw BoardSilent("board: no frames"); }));
+  EXPECT_FALSE(outcome.complete);
+  EXPECT_EQ(outcome.finger, PalpationOutcome::Finger::lifted);
+  EXPECT_THROW(std::rethrow_exception(outcome.error), BoardSilent);
+  EXPECT_GT(bench.head().z, 96);
+  EXPECT_LT(bench.head().y, 130) << "it went on sliding";
+}
+
+TEST(Palpation, WhateverIsThrownInContactTheFingerIsLifted) {
+  const std::vector<std::function<void()>> throwers = {
+      [] { throw JournalError("journal: cannot be written: No space left on device"); },
+      [] { throw OperatorStop("stopped"); }, [] { throw std::bad_alloc(); }, [] { throw 42; },
+      [] { throw PortUnplugged("port simulated printer2: the device is gone"); }};
+  for (const auto& thrower : throwers) {
+    PalpationBench bench;
+    const PalpationOutcome outcome = bench.run({.passes = 1}, bench.in_slide(thrower));
+    EXPECT_FALSE(outcome.complete);
+    EXPECT_EQ(outcome.finger, PalpationOutcome::Finger::lifted) << outcome.note;
+    EXPECT_GT(bench.head().z, 96);
+  }
+}
+
+TEST(Palpation, AResetInTheSlideEndsTheRunAtOnce) {
+  PalpationBench bench;
+  const PalpationOutcome outcome =
+      bench.run({.passes = 2}, bench.in_slide([&] { bench.firmware().reset(bench.rig.now()); }));
+  EXPECT_FALSE(outcome.complete);
+  EXPECT_EQ(outcome.finger, PalpationOutcome::Finger::stopped);
+  EXPECT_THROW(std::rethrow_exception(outcome.error), PrinterReset);
+  EXPECT_LT(bench.head().y, 125);
+  EXPECT_LT(bench.head().z, 92) << "something was sent after the reset";
+}
+
+TEST(Palpation, UnpluggingThePrinterSaysThatTheFingerMayBeInContact) {
+  PalpationBench bench;
+  const PalpationOutcome outcome =
+      bench.run({.passes = 1}, bench.in_slide([&] { bench.rig.unplug_printer(); }));
+  EXPECT_THROW(std::rethrow_exception(outcome.error), PortUnplugged);
+  EXPECT_EQ(outcome.finger, PalpationOutcome::Finger::unknown);
+  EXPECT_NE(outcome.note.find("by hand"), std::string::npos);
+}
+
+TEST(Palpation, FirmwareWithoutRealtimePositionIsRecognised) {
+  RigSettings settings = running_rig();
+  settings.printer.realtime_position = false;
+  PalpationBench bench(settings);
+  const PalpationOutcome outcome = bench.run({.passes = 1});
+  EXPECT_TRUE(outcome.complete);
+  EXPECT_FALSE(outcome.realtime_position);
+}
+
+TEST(Palpation, TheStartDelayIsSeenInThePositions) {
+  PalpationBench bench;
+  double first_motion = 0;
+  PalpationObserver observer;
+  observer.position = [&](const Leg& leg, const PositionSample& sample) {
+    const bool moved = leg.phase == Phase::slide && sample.position.y > leg.from.y + 0.05;
+    if (moved && first_motion == 0) first_motion = sample.time_s - leg.accepted_s;
+  };
+  bench.run({.passes = 1}, observer);
+  EXPECT_NEAR(first_motion, 0.135, 0.02);
+}
+
+}  // namespace
+}  // namespace supertac

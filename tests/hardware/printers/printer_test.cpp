@@ -1,0 +1,155 @@
+#include "hardware/printers/printer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "rig_support.h"
+#include "tests/expect_error.h"
+
+namespace supertac {
+namespace {
+
+using rig::kMounted;
+
+TEST(Limits, NameTheAxisAndCheckTheWay) {
+  const Limits limits;
+  EXPECT_ERROR(
+      limits.check_target({500, 100, 100}), OutsideLimits,
+      "limits: X expected 0.00 to 235.00 mm, found 500.00; nothing was sent, correct the plan or the limits");
+  EXPECT_ERROR(limits.check_target({100, -1, 100}), OutsideLimits,
+               "Y expected 0.00 to 235.00 mm, found -1.00");
+  EXPECT_ERROR(limits.check_target({100, 100, NAN}), OutsideLimits,
+               "Z expected 0.00 to 250.00 mm, found no number");
+  EXPECT_NO_THROW(limits.check_path({99.7, 101.17, 91.81}, {99.7, 209.17, 91.81}));
+  // Both ends are allowed, the way between them runs through the plate's side.
+  EXPECT_ERROR(limits.check_path({50, 101.17, 96}, {99.7, 101.17, 91.81}), OutsideLimits,
+               "the way from X50.00 Y101.17 Z96.00 to X99.70 Y101.17 Z91.81 passes");
+  try {
+    limits.check_target({500, 100, 100});
+  } catch (const OutsideLimits& error) {
+    EXPECT_NE(std::string(error.what()).find("X expected 0.00 to 235.00 mm, found 500.00"),
+              std::string::npos);
+  }
+}
+
+TEST(Printer, NothingMovesWithoutAnOrigin) {
+  PrinterBench bench;
+  EXPECT_ERROR(bench.printer.start_move({100, 110, 120}, 10), OriginUnknown,
+               "the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
+  EXPECT_TRUE(moves_of(bench.firmware()).empty());
+}
+
+TEST(Printer, OutsideTheLimitsNothingIsSent) {
+  PrinterBench bench;
+  bench.printer.confirm_origin(kMounted);
+  EXPECT_ERROR(bench.printer.start_move({500, 101.17, 131.81}, 10), OutsideLimits, "X expected");
+  EXPECT_ERROR(bench.printer.start_move(rig::kMounted, INFINITY), std::invalid_argument,
+               "expected a speed above 0 mm/s, got inf");
+  EXPECT_TRUE(moves_of(bench.firmware()).empty());
+  EXPECT_EQ(bench.head(), kMounted);
+}
+
+TEST(Printer, ArrivesWhereItWasSent) {
+  PrinterBench bench;
+  bench.printer.confirm_origin(kMounted);
+  bench.printer.start_move({120, 110, 131.81}, 20);
+  bench.printer.finish_move();
+  EXPECT_LT(distance(bench.head(), {120, 110, 131.81}), 1e-6);
+}
+
+TEST(Printer, PlainM114IsNotBelieved) {
+  RigSettings settings = running_rig();
+  PrinterBench bench(settings);
+  bench.printer.confirm_origin(kMounted);
+  bench.printer.start_move({120, 101.17, 131.81}, 10);
+  EXPECT_NEAR(bench.printer.queue_position().x, 120, 1e-6) << "the end of the queue, at once";
+  EXPECT_NEAR(bench.printer.sample_position()->position.x, 99.7, 1e-6) << "the head has not moved yet";
+}
+
+TEST(Printer, HomesWithTheFingerUp) {
+  PrinterBench bench;
+  bench.printer.home();
+  const auto& executed = bench.firmware().executed();
+  std::size_t lift = 0, home = 0;
+  for (std::size_t i = 0; i < executed.size(); ++i) {
+    if (executed[i].command.starts_with("G1 Z10")) lift = i;
+    if (executed[i].command == "G28") home = i;
+  }
+  EXPECT_GT(lift, 0U);
+  EXPECT_LT(lift, home);
+  EXPECT_EQ(bench.printer.origin(), Printer::Origin::homed);
+}
+
+TEST(Printer, MarlinsSilentClampIsFound) {
+  RigSettings settings = running_rig();
+  settings.printer.bed = {100, 235, 250};  // smaller than the limits claim
+  PrinterBench bench(settings);
+  bench.printer.home();
+  bench.printer.start_move({0, 0, 120}, 50);
+  bench.printer.start_move({150, 0, 120}, 50);
+  EXPECT_ERROR(bench.printer.finish_move(), PositionError,
+               "expected the head at X150.00 Y0.00 Z120.00, found X100.00 Y0.00 Z120.00; confirm the origin "
+               "and start again");
+}
+
+TEST(Printer, QuickStopActsAheadOfTheQueue) {
+  PrinterBench bench;
+  bench.printer.confirm_origin(kMounted);
+  bench.printer.start_move({99.7, 201.17, 131.81}, 10);
+  bench.printer.link().idle(2);
+  const double before = bench.rig.now();
+  const Printer::Stop stop = bench.printer.quick_stop();
+  EXPECT_TRUE(stop.confirmed) << stop.text;
+  EXPECT_LT(bench.rig.now() - before, 3);
+  EXPECT_LT(bench.head().y, 125);
+  EXPECT_LT(distance(bench.printer.target(), bench.head()), 0.01);
+}
+
+TEST(Printer, StopsDuringM400) {
+  PrinterBench bench;
+  bench.printer.confirm_origin(kMounted);
+  bench.printer.start_move({99.7, 201.17, 131.81}, 10);
+  const double stop_at = bench.rig.now() + 3;
+  bench.printer.link().set_watch([&] {
+    if (bench.rig.now() > stop_at) throw OperatorStop("asked to stop");
+  });
+  EXPECT_THROW(bench.printer.finish_move(), OperatorStop);
+  bench.printer.link().set_watch(nullptr);
+  EXPECT_TRUE(bench.printer.quick_stop().confirmed);
+  EXPECT_LT(bench.head().y, 140);
+}
+
+TEST(Printer, SaysSoWithoutEmergencyParser) {
+  RigSettings settings = running_rig();
+  settings.printer.emergency_parser = false;
+  PrinterBench bench(settings);
+  const Printer::Stop stop = bench.printer.quick_stop();
+  EXPECT_FALSE(stop.ahead_of_queue);
+  EXPECT_NE(stop.text.find("no emergency parser"), std::string::npos);
+}
+
+TEST(Printer, ADamagedPositionNeverLowersTheFinger) {
+  SimulatedRig rig(running_rig());
+  Tampering port(rig.printer_port());
+  Printer printer(port);
+  printer.connect();
+  printer.confirm_origin({99.7, 101.17, 131.81});
+  port.from_printer = {{"Z:131.81", "Z:11.81"}};  // a lost digit
+  printer.lift(5);
+  EXPECT_TRUE(port.from_printer.empty());
+  EXPECT_NEAR(rig.world().printer().head(rig.now()).z, 136.81, 1e-6);
+  EXPECT_EQ(moves_of(rig.world().printer()).size(), 1U);
+}
+
+TEST(Printer, EmergencyStopIsConfirmedByTheHalt) {
+  PrinterBench bench;
+  bench.printer.confirm_origin(kMounted);
+  bench.printer.start_move({99.7, 201.17, 131.81}, 10);
+  EXPECT_TRUE(bench.printer.emergency_stop().confirmed);
+  EXPECT_TRUE(bench.firmware().halted());
+  EXPECT_THROW(bench.printer.start_move({99.7, 101.17, 131.81}, 10), OriginUnknown);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,275 @@
+#include "io/files/file.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <set>
+
+#include "io/files/positioned_file.h"
+#include "tests/io/faults.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+constexpr std::uint64_t kPlenty = 1 << 20;
+const std::string kOld = "the old content";
+const std::string kNew(10'000, 'n');
+
+std::string error_of(const auto& action) {
+  try {
+    action();
+  } catch (const FileError& error) {
+    return error.what();
+  }
+  return "nothing thrown";
+}
+
+/// Replaces a file in three parts.
+void replace(const std::string& path) {
+  AtomicFile file(path);
+  file.write(kNew.substr(0, 10));
+  file.write(kNew.substr(10, 5000));
+  file.write(kNew.substr(5010));
+  file.commit();
+}
+
+TEST(File, WritesAndReadsBack) {
+  TemporaryFolder folder;
+  const std::string path = folder.file("a");
+  write_file(path, kNew);
+  EXPECT_EQ(read_text_file(path, kPlenty), kNew);
+  write_file(path, "");
+  EXPECT_EQ(read_text_file(path, kPlenty), "");
+  EXPECT_EQ(folder.entries(), 1u);
+}
+
+TEST(File, NothingAppearsWithoutCommit) {
+  TemporaryFolder folder;
+  { AtomicFile(folder.file("a")).write(kNew); }
+  EXPECT_EQ(folder.entries(), 0u);
+}
+
+TEST(File, LeavesNoDescriptorOpen) {
+  const TemporaryFolder folder;
+  const auto descriptors = [] {
+    const std::filesystem::directory_iterator all("/proc/self/fd");
+    return std::distance(begin(all), end(all));
+  };
+  const auto before = descriptors();
+  { const AtomicFile dropped(folder.file("dropped")); }
+  AtomicFile kept(folder.file("kept"));
+  kept.commit();
+  EXPECT_EQ(descriptors(), before);
+  EXPECT_THROW(kept.commit(), std::invalid_argument);
+}
+
+// A child that ends in mid-write, as after kill -9, leaves its temporary; the next writer of that file sweeps
+// it, and nothing else.
+TEST(File, SweepsWhatAKilledWriterLeft) {
+  TemporaryFolder folder;
+  const std::string path = folder.file("a");
+  const pid_t child = fork();
+  if (child == 0) {
+    AtomicFile file(path);
+    file.write(kNew);
+    _exit(0);
+  }
+  int status = -1;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_EQ(status, 0);
+  ASSERT_EQ(folder.entries(), 1u);
+  write_file(folder.file("b"), kOld);
+  EXPECT_EQ(folder.entries(), 2u) << "the leftover is of another file";
+  const std::string own = std::to_string(getpid()), dead = std::to_string(child);
+  const std::vector<std::string> kept = {"a.tmp-" + own + "-x",
+                                         "a.tmp-1-0",
+                                         "a.tmp-",
+                                         "a.tmp-x-0",
+                                         "a.tmpx" + dead,
+                                         "aa.tmp-" + dead + "-0",
+                                         "a.tmp-0-0",
+                                         "a.tmp-99999999999999999999-0"};
+  for (const std::string& name : kept) std::ofstream(folder.file(name)) << "x";
+  write_file(path, kOld);
+  EXPECT_EQ(folder.entries(), kept.size() + 2) << "a, b, and all that may still be somebody's";
+  for (const std::string& name : kept) EXPECT_TRUE(std::filesystem::exists(folder.file(name))) << name;
+}
+
+TEST(File, ErrorsNameFileAndReason) {
+  TemporaryFolder folder;
+  const std::string path = folder.file("a");
+  EXPECT_EQ(error_of([&] { read_file(path, kPlenty); }),
+            path + ": cannot open the file: No such file or directory; check the name");
+  EXPECT_NE(error_of([&] { read_file(folder.path(), kPlenty); }).find("is a directory"), std::string::npos);
+  EXPECT_NE(error_of([&] { write_file(folder.path(), "x"); }).find("not a regular file"), std::string::npos);
+  EXPECT_NE(error_of([&] { write_file(folder.file("no/where"), "x"); }).find("open the directory"),
+            std::string::npos);
+  write_file(path, "12345");
+  EXPECT_NE(error_of([&] { read_file(path, 4); }).find("has 5 bytes, expected at most 4"), std::string::npos);
+}
+
+TEST(File, ReadsNoPipeAndWaitsForNoWriter) {
+  TemporaryFolder folder;
+  const std::string path = folder.file("pipe");
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  EXPECT_NE(error_of([&] { read_file(path, kPlenty); }).find("not a regular file"), std::string::npos);
+}
+
+TEST(File, SaysWhenItIsShortenedWhileRead) {
+  TemporaryFolder folder;
+  const std::string path = folder.file("a");
+  write_file(path, kNew);
+  FileReader reader(path);
+  std::vector<std::byte> half(5000);
+  reader.read(half);
+  ASSERT_EQ(truncate(path.c_str(), 6000), 0);
+  EXPECT_NE(error_of([&] { reader.read(half); }).find("ends after 6000 bytes, expected 10000"),
+            std::string::npos);
+}
+
+TEST(File, SymbolicLinkStays) {
+  TemporaryFolder folder;
+  write_file(folder.file("target"), kOld);
+  std::filesystem::create_symlink("target", folder.file("link"));
+  write_file(folder.file("link"), kNew);
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.file("link")));
+  EXPECT_EQ(read_text_file(folder.file("target"), kPlenty), kNew);
+}
+
+TEST(File, RefusesExistingWithoutForce) {
+  TemporaryFolder folder;
+  const std::string path = folder.file("a");
+  EXPECT_NO_THROW(refuse_existing(path, false));
+  write_file(path, "x");
+  EXPECT_NO_THROW(refuse_existing(path, true));
+  EXPECT_EQ(error_of([&] { refuse_existing(path, false); }),
+            path + ": exists already; choose another name or pass --force to replace it");
+}
+
+/// Lets every call of a replacement fail in turn; returns how many runs threw.
+int fail_each_call(int error, bool forever) {
+  int thrown = 0;
+  for (int at = 1;; ++at) {
+    TemporaryFolder folder;
+    const std::string path = folder.file("a");
+    write_file(path, kOld);
+    std::string message;
+    bool reached = false;
+    {
+      FaultInjection injection(at, error, forever);
+      message = error_of([&] { replace(path); });
+      reached = FaultInjection::reached();
+    }
+    const bool failed = message != "nothing thrown";
+    const bool in_place = !failed || message.find("sync the directory") != std::string::npos;
+    EXPECT_EQ(read_text_file(path, kPlenty), in_place ? kNew : kOld) << "call " << at << ": " << message;
+    EXPECT_EQ(folder.entries(), 1u) << "call " << at;
+    thrown += failed;
+    if (!reached) return thrown;
+  }
+}
+
+TEST(FileFaults, EveryCallFailsOnceAndForEver) {
+  for (const int error : {ENOSPC, EIO, EDQUOT}) {
+    // open directory, open temporary, 3 writes, fsync, close, rename, fsync directory; its close may fail.
+    EXPECT_EQ(fail_each_call(error, false), 9);
+    EXPECT_EQ(fail_each_call(error, true), 9);
+  }
+}
+
+TEST(FileFaults, InterruptedCallsAreRepeated) {
+  EXPECT_EQ(fail_each_call(EINTR, false), 1);
+}  // rename never is
+
+TEST(FileFaults, ShortWritesAndReadsAreContinued) {
+  for (int at = 1; at < 30; ++at) {
+    TemporaryFolder folder;
+    FaultInjection injection(at, 0, true, Fault::short_count);
+    replace(folder.file("a"));
+    EXPECT_EQ(read_text_file(folder.file("a"), kPlenty), kNew);
+  }
+}
+
+TEST(FileFaults, FailedSyncIsNotRetried) {
+  TemporaryFolder folder;
+  FaultInjection injection(4, EIO, false);  // open, open, write, fsync
+  EXPECT_NE(error_of([&] { write_file(folder.file("a"), kNew); }).find("sync to disk"), std::string::npos);
+  int syncs = 0;
+  for (const std::string& call : FaultInjection::calls()) syncs += call == "fsync";
+  EXPECT_EQ(syncs, 1);
+}
+
+TEST(FileFaults, EveryReadCallFails) {
+  for (int at = 1; at <= 3; ++at) {
+    TemporaryFolder folder;
+    write_file(folder.file("a"), kNew);
+    FaultInjection injection(at, EIO, false);
+    EXPECT_NE(error_of([&] { read_file(folder.file("a"), kPlenty); }).find("check the disk"),
+              std::string::npos);
+  }
+}
+
+/// What may stand under the name after a power cut that follows the first `length` calls: data not yet synced
+/// may be there, torn or gone, and a rename not yet synced may or may not have reached the disk.
+std::set<std::string> states_after(const std::vector<std::string>& calls, std::size_t length) {
+  bool data_synced = false;
+  bool renamed = false;
+  bool rename_synced = false;
+  for (std::size_t i = 0; i < length; ++i) {
+    if (calls[i] == "write") data_synced = false;
+    if (calls[i] == "fsync" && renamed) rename_synced = true;
+    if (calls[i] == "fsync" && !renamed) data_synced = true;
+    if (calls[i] == "rename") renamed = true;
+  }
+  std::set<std::string> states;
+  if (!rename_synced) states.insert("old");
+  if (renamed) states.insert("new");
+  if (renamed && !data_synced) states.insert("torn");
+  return states;
+}
+
+TEST(FileCrash, AlwaysOldOrNew) {
+  TemporaryFolder folder;
+  FaultInjection record(1 << 30, 0, false);  // only listens
+  replace(folder.file("a"));
+  const auto calls = FaultInjection::calls();
+  const std::vector<std::string> expected = {"open",  "open",  "write",  "write", "write",
+                                             "fsync", "close", "rename", "fsync", "close"};
+  ASSERT_EQ(calls, expected);
+  for (std::size_t length = 0; length <= calls.size(); ++length) {
+    EXPECT_FALSE(states_after(calls, length).contains("torn")) << "power cut after " << length << " calls";
+  }
+  EXPECT_EQ(states_after(calls, calls.size()), std::set<std::string>{"new"});
+}
+
+// A file system in memory always has the page.
+TEST(PositionedFile, FetchesWhatWillBeRead) {
+  TemporaryFolder folder;
+  write_file(folder / "large", std::string(1 << 20, 'x'));
+  const int file = ::open((folder / "large").c_str(), O_RDONLY);
+  ASSERT_GE(file, 0);
+  void* page = ::mmap(nullptr, 4096, PROT_READ, MAP_SHARED, file, 1 << 19);
+  ASSERT_NE(page, MAP_FAILED);
+  const auto resident = [&] {
+    unsigned char there = 0;
+    EXPECT_EQ(::mincore(page, 4096, &there), 0);
+    return (there & 1) != 0;
+  };
+  ASSERT_EQ(::posix_fadvise(file, 0, 0, POSIX_FADV_DONTNEED), 0);
+  const bool in_memory = resident();
+  PositionedFile(folder / "large").will_read(1 << 19, 100);
+  for (int i = 0; i < 500 && !resident(); ++i) ::usleep(10'000);
+  EXPECT_TRUE(resident());
+  if (in_memory) std::printf("this file system forgets nothing: the test shows nothing here\n");
+  ::munmap(page, 4096);
+  ::close(file);
+}
+
+}  // namespace
+}  // namespace supertac

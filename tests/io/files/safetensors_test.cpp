@@ -1,0 +1,378 @@
+#include "io/files/safetensors.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <cstring>
+#include <ctime>
+
+#include "io/files/file.h"
+#include "io/numbers/random.h"
+#include "tests/io/faults.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+constexpr std::uint64_t kPlenty = 1 << 26;
+
+// Under a sanitizer memory says nothing.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSlowBuild = true;
+#else
+constexpr bool kSlowBuild = false;
+#endif
+
+std::string golden(const std::string& name) { return std::string(SUPERTAC_GOLDEN) + "/" + name; }
+
+std::string refusal_of(const std::string& path) {
+  try {
+    SafetensorsFile::read(path);
+  } catch (const FileError& error) {
+    return error.what();
+  }
+  return "read";
+}
+
+/// A file of the header's text and `data_bytes` zeros.
+std::string raw_file(const std::string& header, std::size_t data_bytes) {
+  const std::uint64_t length = header.size();
+  std::string bytes(8, '\0');
+  std::memcpy(bytes.data(), &length, 8);
+  return bytes + header + std::string(data_bytes, '\0');
+}
+
+std::string message_of_header(const std::string& header, std::size_t data_bytes = 0) {
+  TemporaryFolder folder;
+  write_file(folder.file("a"), raw_file(header, data_bytes));
+  return refusal_of(folder.file("a"));
+}
+
+/// Writes a file of about `bytes` bytes.
+void write_example(const std::string& path, std::size_t bytes) {
+  std::vector<float> values(bytes / 4);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = static_cast<float>(RandomStream(1, 2).normal(i));
+  const std::vector<double> times = {0.1, 0.2};
+  write_safetensors(path, {{"kind", "example"}, {"note", "\"quoted\", \\, \xc3\xa4"}},
+                    {{"volts", "F32", {values.size()}, std::as_bytes(std::span(values))},
+                     {"time_s", "F64", {2}, std::as_bytes(std::span(times))},
+                     {"none", "U8", {0, 3}, {}}});
+}
+
+TEST(Safetensors, RoundTrip) {
+  TemporaryFolder folder;
+  write_example(folder.file("a"), 400);
+  const auto file = SafetensorsFile::read(folder.file("a"));
+  EXPECT_EQ(file.checksum(), SafetensorsFile::ChecksumState::ok);
+  const std::map<std::string, std::string> expected = {{"kind", "example"},
+                                                       {"note", "\"quoted\", \\, \xc3\xa4"}};
+  EXPECT_EQ(file.metadata(), expected);
+  EXPECT_EQ(file.f64("time_s"), (std::vector<double>{0.1, 0.2}));
+  EXPECT_EQ(file.f32("volts").size(), 100u);
+  EXPECT_EQ(file.f32("volts")[99], static_cast<float>(RandomStream(1, 2).normal(99)));
+  EXPECT_TRUE(file.bytes("none").empty());
+}
+
+TEST(Safetensors, SameArgumentsSameBytes) {
+  TemporaryFolder folder;
+  write_example(folder.file("a"), 1000);
+  write_example(folder.file("b"), 1000);
+  EXPECT_EQ(read_file(folder.file("a"), kPlenty), read_file(folder.file("b"), kPlenty));
+}
+
+TEST(Safetensors, GoldenFileOfVersion1IsReadForEver) {
+  const auto file = SafetensorsFile::read(golden("version_1.safetensors"));
+  EXPECT_EQ(file.checksum(), SafetensorsFile::ChecksumState::ok);
+  EXPECT_EQ(file.metadata().at("note"), "quotes \" and \xc3\xa4");
+  EXPECT_EQ(file.f32("volts"), (std::vector<float>{0, 0.5, -1, 1e-3f, 2.5, 3}));
+  EXPECT_EQ(file.f64("time_s"), (std::vector<double>{0.1, 1e300}));
+  EXPECT_EQ(file.tensors().at("volts").shape, (std::vector<std::uint64_t>{2, 3}));
+  EXPECT_EQ(file.tensors().at("empty").shape, (std::vector<std::uint64_t>{0, 4}));
+}
+
+TEST(Safetensors, WritesTheBytesOfTheGoldenFile) {
+  const auto file = SafetensorsFile::read(golden("version_1.safetensors"));
+  std::vector<TensorToWrite> tensors;
+  for (const std::string name : {"volts", "time_s", "bytes", "empty"}) {
+    const TensorInfo& info = file.tensors().at(name);
+    tensors.push_back({name, info.dtype, info.shape, file.bytes(name)});
+  }
+  TemporaryFolder folder;
+  write_safetensors(folder.file("a"), file.metadata(), tensors);
+  EXPECT_EQ(read_file(folder.file("a"), kPlenty), read_file(golden("version_1.safetensors"), kPlenty));
+}
+
+TEST(Safetensors, AccessErrorsSayWhatThereIs) {
+  const auto file = SafetensorsFile::read(golden("version_1.safetensors"));
+  const auto message = [&](const auto& action) -> std::string {
+    try {
+      action();
+    } catch (const FileError& error) {
+      return error.what();
+    }
+    return "nothing thrown";
+  };
+  EXPECT_EQ(message([&] { file.f32("volt"); }),
+            file.path() + ": has no tensor 'volt' (it has: 'bytes', 'empty', 'time_s', 'volts')");
+  EXPECT_EQ(message([&] { file.f32("time_s"); }),
+            file.path() + ": tensor 'time_s' has type F64, expected F32");
+}
+
+TEST(Safetensors, FilesOfOtherWritersLoadWithoutChecksum) {
+  TemporaryFolder folder;
+  const std::string header = R"({"b":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}}  )";
+  write_file(folder.file("a"), raw_file(header, 4));
+  const auto file = SafetensorsFile::read(folder.file("a"));
+  EXPECT_EQ(file.checksum(), SafetensorsFile::ChecksumState::absent);
+  EXPECT_EQ(file.f32("b"), std::vector<float>{0});
+}
+
+TEST(SafetensorsDamage, EveryPrefixIsRefused) {
+  TemporaryFolder folder;
+  write_example(folder.file("a"), 2000);
+  const std::string whole = read_text_file(folder.file("a"), kPlenty);
+  for (std::size_t length = 0; length < whole.size(); ++length) {
+    write_file(folder.file("b"), whole.substr(0, length));
+    ASSERT_NE(refusal_of(folder.file("b")), "read") << length << " bytes";
+  }
+  write_file(folder.file("b"), whole + " ");
+  EXPECT_NE(refusal_of(folder.file("b")), "read");
+}
+
+TEST(SafetensorsDamage, EveryFlippedBitIsRefused) {
+  TemporaryFolder folder;
+  write_example(folder.file("a"), 16'000);
+  std::string bytes = read_text_file(folder.file("a"), kPlenty);
+  // Written in place: 130,000 atomic replacements would test the disk.
+  FILE* file = std::fopen(folder.file("a").c_str(), "r+b");
+  ASSERT_NE(file, nullptr);
+  const auto put = [&](std::size_t position, char value) {
+    std::fseek(file, static_cast<long>(position), SEEK_SET);
+    std::fputc(value, file);
+    std::fflush(file);
+  };
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    for (int bit = 0; bit < 8; ++bit) {
+      put(i, static_cast<char>(bytes[i] ^ (1 << bit)));
+      ASSERT_NE(refusal_of(folder.file("a")), "read") << "byte " << i << " bit " << bit;
+    }
+    put(i, bytes[i]);
+  }
+  std::fclose(file);
+  EXPECT_EQ(refusal_of(folder.file("a")), "read");
+}
+
+TEST(SafetensorsHostile, HeadersAreRefusedForTheirReason) {
+  const std::pair<std::string, std::string> cases[] = {
+      {"", "begin with"},
+      {" {}", "begin with"},
+      {"[]", "begin with"},
+      {"{}\n", "end with"},
+      {"{} x", "end with"},
+      {"{", "end with"},
+      {"{\"a\":}", "not valid JSON"},
+      {std::string("{}\0}", 4), "NUL"},
+      {R"({"a":1})", "tensor 'a': expected an object, found a number"},
+      {R"({"a":null})", "tensor 'a': expected an object, found null"},
+      {R"({"a":{}})", "needs exactly"},
+      {R"({"a":{"dtype":"F32","shape":[1]}})", "needs exactly"},
+      {R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0]}})", "needs exactly"},
+      {R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0,4,8]}})", "needs exactly"},
+      {R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0,4],"x":"y"}})",
+       "tensor 'a' needs exactly dtype, shape and data_offsets [begin, end]"},
+      {R"({"a":{"dtype":"F32","dtype":"F32","shape":[1],"data_offsets":[0,4]}})", "twice"},
+      {R"({"a":{"dtype":"F32","shape":[0],"data_offsets":[0,0]},"a":{}})", "twice"},
+      {R"({"__metadata__":{"a":"b","a":"c"}})", "twice"},
+      {R"({"__metadata__":{},"__metadata__":{}})", "twice"},
+      {R"({"__metadata__":{"a":{}}})", "'__metadata__' at 'a': expected a text, found an object"},
+      {R"({"__metadata__":{"a":1}})", "expected a text, found a number"},
+      {R"({"__metadata__":[]})", "expected an object, found an array"},
+      {R"({"a":{"dtype":"F99","shape":[1],"data_offsets":[0,4]}})", "unknown type 'F99'"},
+      {R"({"a":{"dtype":"F32","shape":[-1],"data_offsets":[0,4]}})", "negative"},
+      {R"({"a":{"dtype":"F32","shape":[1.0],"data_offsets":[0,4]}})", "fraction"},
+      {R"({"a":{"dtype":"F32","shape":[1e0],"data_offsets":[0,4]}})", "fraction"},
+      {R"({"a":{"dtype":"F32","shape":[18446744073709551616],"data_offsets":[0,4]}})", "beyond 64 bits"},
+      {R"({"a":{"dtype":"F32","shape":[4611686018427387905],"data_offsets":[0,4]}})", "too large"},
+      {R"({"a":{"dtype":"U8","shape":[4294967296,4294967296],"data_offsets":[0,0]}})", "too large"},
+      {R"({"a":{"dtype":"U8","shape":[1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1],"data_offsets":[0,1]}})",
+       "more than 16 numbers in tensor 'a' at 'shape'"},
+      {R"({"a":{"dtype":"U8","shape":[[1]],"data_offsets":[0,1]}})",
+       "tensor 'a' at 'shape': expected a whole number, found an array"},
+      {R"({"a":{"dtype":1,"shape":[1],"data_offsets":[0,4]}})",
+       "tensor 'a' at 'dtype': expected a text, found a number"},
+      {R"({"a":{"dtype":"U8","shape":1,"data_offsets":[0,1]}})",
+       "tensor 'a' at 'shape': expected a list, found a number"},
+      {R"({"a":[[[[1]]]]})", "nested deeper than 4 levels"},
+      {R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[4,0]}})", "spans"},
+      {R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,4]}})", "spans"},
+      {R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,8]}})", "cut short"},
+      {R"({"a":{"dtype":"U8","shape":[2],"data_offsets":[2,4]}})", "begins at byte 2, expected 0"},
+      {R"({"a":{"dtype":"U8","shape":[3],"data_offsets":[0,3]},"b":{"dtype":"U8","shape":[2],"data_offsets":[2,4]}})",
+       "begins at byte 2, expected 3"},
+      {R"({"a":{"dtype":"U8","shape":[3],"data_offsets":[0,3]}})", "need 3 bytes of data, the file has 4"},
+      {R"({"__metadata__":{"supertac_format":"2","checksum":"00000000"}})", "use a newer SuperTac"},
+      {R"({"__metadata__":{"supertac_format":"one","checksum":"00000000"}})", "format version 'one'"},
+      {R"({"a":{"dtype":"U8","shape":[4],"data_offsets":[0,4]},"__metadata__":{"supertac_format":"1"}})",
+       "checksum is missing"},
+      {R"({"a":{"dtype":"U8","shape":[4],"data_offsets":[0,4]},"__metadata__":{"checksum":"00000000"}})",
+       "without a format version"},
+      {R"({"__metadata__":{"supertac_format":"1","checksum":"123"},"a":{"dtype":"U8","shape":[4],"data_offsets":[0,4]}})",
+       "malformed"},
+  };
+  for (const auto& [header, reason] : cases) {
+    const std::string message = message_of_header(header, 4);
+    EXPECT_NE(message.find(reason), std::string::npos) << header << "\n  gave: " << message;
+    EXPECT_EQ(message.find('\n'), std::string::npos) << header;
+  }
+}
+
+TEST(SafetensorsHostile, AHeaderOfTheLargestSizeIsStillRead) {
+  std::string header = "{}";
+  header.resize(1 << 20, ' ');
+  EXPECT_EQ(message_of_header(header), "read");
+  EXPECT_NE(message_of_header(header + " ").find("header length 1048577, expected at most 1048576"),
+            std::string::npos);
+}
+
+TEST(SafetensorsHostile, LengthsAreComparedBeforeMemoryIsAskedFor) {
+  TemporaryFolder folder;
+  for (const std::uint64_t length :
+       {std::uint64_t{1} << 63, ~std::uint64_t{0}, (std::uint64_t{1} << 20) + 1, std::uint64_t{1} << 40}) {
+    std::string bytes(16, ' ');
+    std::memcpy(bytes.data(), &length, 8);
+    write_file(folder.file("a"), bytes);
+    EXPECT_NE(refusal_of(folder.file("a")).find("header length " + std::to_string(length)),
+              std::string::npos);
+  }
+  EXPECT_NE(
+      message_of_header(R"({"a":{"dtype":"U8","shape":[1099511627776],"data_offsets":[0,1099511627776]}})", 4)
+          .find("cut short"),
+      std::string::npos);
+}
+
+long peak_kilobytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return usage.ru_maxrss;
+}
+
+/// Headers made to cost as much as they can.
+std::vector<std::string> bombs() {
+  constexpr std::size_t kCap = (1 << 20) - 64;
+  std::string many = "{";
+  for (int i = 0; many.size() < kCap - 100; ++i) {
+    many +=
+        (i > 0 ? ",\"" : "\"") + std::to_string(i) + R"(":{"dtype":"U8","shape":[0],"data_offsets":[0,0]})";
+  }
+  std::string keys = R"({"__metadata__":{)";
+  for (int i = 0; keys.size() < kCap - 100; ++i)
+    keys += (i > 0 ? ",\"" : "\"") + std::to_string(i) + "\":\"\"";
+  return {"{\"a\":" + std::string(kCap, '[') + "}",
+          std::string(kCap, '{') + "}",
+          "{\"a\":{\"shape\":[" + std::string(kCap, '1') + "]}}",
+          "{\"" + std::string(kCap, 'k') + "\":1}",
+          many + "}",
+          keys + "},\"a\":1}"};
+}
+
+TEST(SafetensorsHostile, BombsCostLittle) {
+  TemporaryFolder folder;
+  for (const std::string& header : bombs()) {
+    write_file(folder.file("a"), raw_file(header, 0));
+    const long before = peak_kilobytes();
+    // Processor time, best of a few: this must not depend on what else the machine does. Measured: below 10
+    // ms each, half a second on an emulated processor.
+    double best = 1e9;
+    for (int i = 0; i < 5; ++i) {
+      const std::clock_t begin = std::clock();
+      ASSERT_NE(refusal_of(folder.file("a")), "read") << header.substr(0, 40);
+      best = std::min(best, static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
+    }
+    EXPECT_LT(best, 1.0) << header.substr(0, 40);
+    EXPECT_LT(peak_kilobytes() - before, kSlowBuild ? 1 << 20 : 16 * 1024) << header.substr(0, 40);
+  }
+}
+
+TEST(SafetensorsWrite, RefusesWhatItCouldNotReadBack) {
+  TemporaryFolder folder;
+  const std::vector<std::byte> data(4);
+  const auto message = [&](std::map<std::string, std::string> metadata, std::vector<TensorToWrite> tensors) {
+    try {
+      write_safetensors(folder.file("a"), std::move(metadata), tensors);
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string("written");
+  };
+  EXPECT_NE(message({}, {{"a", "F32", {2}, data}}).find("has 4 bytes, its shape and type need 8"),
+            std::string::npos);
+  EXPECT_NE(message({}, {{"a", "X", {2}, data}}).find("unknown type 'X'"), std::string::npos);
+  EXPECT_NE(message({}, {{"a", "F32", {1}, data}, {"a", "F32", {1}, data}}).find("taken"), std::string::npos);
+  EXPECT_NE(message({}, {{"__metadata__", "F32", {1}, data}}).find("taken"), std::string::npos);
+  EXPECT_NE(message({{"checksum", ""}}, {}).find("'checksum' is written by this function"),
+            std::string::npos);
+  EXPECT_NE(message({{"a", "\xff"}}, {}).find("UTF-8"), std::string::npos);
+  EXPECT_NE(message({{"a", std::string(1 << 20, 'x')}}, {}).find("expected at most 1048576"),
+            std::string::npos);
+  EXPECT_EQ(folder.entries(), 0u);
+}
+
+TEST(SafetensorsWrite, PiecesGiveTheSameBytesAsAWhole) {
+  TemporaryFolder folder;
+  std::vector<float> values(1000);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i);
+  const auto bytes = std::as_bytes(std::span(values));
+  const auto in_pieces = [&](std::size_t size) {
+    return [&bytes, size](const ByteSink& sink) {
+      for (std::size_t at = 0; at < bytes.size(); at += size)
+        sink(bytes.subspan(at, std::min(size, bytes.size() - at)));
+    };
+  };
+  write_safetensors(folder.file("whole"), {}, {{"a", "F32", {10, 100}, bytes}});
+  write_safetensors(folder.file("pieces"), {}, {{"a", "F32", {10, 100}, {}, in_pieces(77)}});
+  EXPECT_EQ(read_file(folder.file("whole"), kPlenty), read_file(folder.file("pieces"), kPlenty));
+  EXPECT_THROW(write_safetensors(folder.file("short"), {}, {{"a", "F32", {10, 101}, {}, in_pieces(77)}}),
+               std::invalid_argument);
+}
+
+TEST(SafetensorsWrite, AFullDiskLeavesTheOldFile) {
+  for (int at = 1; at <= 12; ++at) {
+    TemporaryFolder folder;
+    write_example(folder.file("a"), 100);
+    const auto before = read_file(folder.file("a"), kPlenty);
+    std::string message = "written";
+    {
+      FaultInjection injection(at, ENOSPC, true);
+      try {
+        write_example(folder.file("a"), 5000);
+      } catch (const FileError& error) {
+        message = error.what();
+      }
+    }
+    EXPECT_EQ(folder.entries(), 1u);
+    if (message != "written" && message.find("sync the directory") == std::string::npos) {
+      EXPECT_EQ(read_file(folder.file("a"), kPlenty), before) << message;
+    } else {
+      EXPECT_EQ(refusal_of(folder.file("a")), "read");
+    }
+  }
+}
+
+TEST(Safetensors, NamesTheFirstOfManyTensors) {
+  const TemporaryFolder folder;
+  std::vector<TensorToWrite> tensors;
+  for (int i = 100; i < 200; ++i) tensors.push_back({"tensor" + std::to_string(i), "U8", {0}, {}});
+  write_safetensors(folder / "many", {}, tensors);
+  const SafetensorsFile file = SafetensorsFile::read(folder / "many");
+  try {
+    file.f32("volts");
+    FAIL();
+  } catch (const FileError& error) {
+    const std::string text = error.what();
+    EXPECT_TRUE(text.ends_with("'tensor114', 'tensor115', ...)")) << text;
+  }
+}
+
+}  // namespace
+}  // namespace supertac

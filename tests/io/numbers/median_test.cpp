@@ -1,0 +1,19 @@
+#include "io/numbers/median.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace supertac {
+namespace {
+
+TEST(Median, IsTheMiddleOneOrTheUpperOfTwo) {
+  EXPECT_EQ(median(std::vector{5}), 5);
+  EXPECT_EQ(median(std::vector{9, 1, 2}), 2);
+  EXPECT_EQ(median(std::vector{9, 1, 7, 2}), 7);
+  std::vector<double> numbers{3, 3, -1, 8, 0};
+  EXPECT_EQ(median(numbers), 3);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,165 @@
+#include "models/files/model_file.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+std::string load_error(const std::string& path, ModelKind kind = ModelKind::windows) {
+  try {
+    load_model(path, kind);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(ModelFile, ComesBackWithItsSettingsInputAndPictures) {
+  const TemporaryFolder folder;
+  Rng rng(1);
+  SuperTacSettings settings = small_settings();
+  settings.grouping = Grouping::vertical;
+  const SuperTac model(settings, rng);
+  save_model(folder / "m.safetensors", model, {300, {2.5, 0.4, true}, 0.0992}, {{"split", "trial"}});
+  const ModelFile file = load_model(folder / "m.safetensors");
+  EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
+  EXPECT_EQ(file.model->settings().latent, 3);
+  EXPECT_EQ(file.input.scaling.rest_volts, 2.5);
+  EXPECT_TRUE(file.input.scaling.levelled);
+  EXPECT_EQ(file.input.filter_s, 0.0992);
+  EXPECT_EQ(file.metadata.at("split"), "trial");
+  const Tensor x = uniform({2, 32, 16}, 1), a = model.infer(x), b = file.model->infer(x);
+  for (Dim i = 0; i < a.size(); ++i) EXPECT_EQ(a.data()[i], b.data()[i]);
+}
+
+TEST(ModelFile, KeepsTheArrayAndSaysNothingOfTheRigs) {
+  const TemporaryFolder folder;
+  Rng rng(1);
+  SuperTacSettings settings = small_settings();
+  set_array(settings, {.rows = 5, .columns = 6, .channels = 3});
+  const SuperTac model(settings, rng);
+  save_model(folder / "m.safetensors", model, {.scaling = {}, .pitch_mm = 2.5}, {});
+  const ModelFile file = load_model(folder / "m.safetensors");
+  EXPECT_EQ(file.array(), (TaxelArray{5, 6, 2.5, 3}));
+  EXPECT_EQ(file.windows().array->picture(2), (ImageGrid{10, 12, 1.25}));
+  const Tensor x = uniform({2, 32, 90}, 1), a = model.infer(x), b = file.model->infer(x);
+  for (Dim i = 0; i < a.size(); ++i) EXPECT_EQ(a.data()[i], b.data()[i]);
+  const auto rigs = model_metadata(small_settings(), {});
+  EXPECT_EQ(rigs.at("settings").find("rows"), std::string::npos);
+  EXPECT_EQ(rigs.at("input").find("pitch"), std::string::npos);
+}
+
+// A file of version 1, to be read for ever: settings, names, layouts and what they compute.
+TEST(ModelFile, ReadsTheGoldenFileOfVersion1) {
+  const ModelFile file = load_model(std::string(SUPERTAC_GOLDEN_DIR) + "/model_v1.safetensors");
+  EXPECT_EQ(file.model->settings().channels, 4);
+  EXPECT_FALSE(file.input.scaling.levelled) << "a setting younger than the file";
+  EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
+  const Tensor picture = file.model->infer(uniform({1, 32, 16}, 1));
+  EXPECT_NEAR(picture.data()[0], 0.116217159, 1e-6);
+  EXPECT_NEAR(picture.data()[9], 0.15846996, 1e-6);
+  EXPECT_NEAR(picture.data()[27], 0.122343943, 1e-6);
+  EXPECT_NEAR(picture.data()[63], 0.103620872, 1e-6);
+}
+
+TEST(ModelFile, RefusesSubPixelUpsampling) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "m.safetensors";
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  const std::string settings = model_metadata(small_settings(), {}).at("settings");
+  write_checkpoint(path, model.parameters(),
+                   {{"settings", settings.substr(0, settings.size() - 1) + R"(,"sub_pixel":true})"}});
+  EXPECT_EQ(
+      load_error(path),
+      path +
+          ": metadata \"settings\": expected transposed convolution, found \"sub_pixel\", which SuperTac "
+          "no longer computes (22 % slower, no more accurate); train the model again");
+}
+
+TEST(ModelFile, TheFileNeverSizesAnything) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "m.safetensors";
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  const auto write = [&](const std::string& settings, const std::string& input) {
+    write_checkpoint(path, model.parameters(), {{"settings", settings}, {"input", input}});
+  };
+  const std::string input = R"({"rate_hz":300,"rest_volts":2.45,"span_volts":0.36,"filter_s":0})";
+  const auto settings = [](const std::string& timesteps, const std::string& latent) {
+    return R"({"preset":"paper","timesteps":)" + timesteps + R"(,"latent":)" + latent +
+           R"(,"scale":2,"grouping":"horizontal","channels":8,"rcabs":1})";
+  };
+  write(settings("32", "3"), input);
+  EXPECT_EQ(load_error(path), "no error");
+  write(settings("1000000", "3"), input);
+  EXPECT_NE(load_error(path).find("timesteps must be 32 to 512, got 1000000"), std::string::npos)
+      << load_error(path);
+  write(settings("32", "1e300"), input);
+  EXPECT_NE(load_error(path).find("\"latent\" must be a whole number"), std::string::npos)
+      << load_error(path);
+  write(settings("32", "4"), input);
+  EXPECT_NE(load_error(path).find("encoder.0.mean.weight expected F32 [4,64], found F32 [3,64]"),
+            std::string::npos)
+      << load_error(path);
+  write("[[[[", input);
+  EXPECT_NE(load_error(path).find("metadata \"settings\""), std::string::npos) << load_error(path);
+  write(settings("32", "3"), R"({"rate_hz":300,"rest_volts":2.45,"span_volts":0,"filter_s":null})");
+  EXPECT_NE(load_error(path).find("span_volts 1e-6 to 1000, filter_s 0 to 10"), std::string::npos)
+      << load_error(path);
+}
+
+TEST(ModelFile, OfFramesComesBackWithItsScalingAndPictures) {
+  const TemporaryFolder folder;
+  Rng rng(2);
+  const FrameModel model({.in_channels = 2, .height = 3, .width = 5, .scale = 2, .channels = 8, .rcabs = 1},
+                         rng);
+  const ChannelScaling scaling{{0.1F, 1e-7F}, {3, 1e6F}};
+  save_model(folder / "m.safetensors", model, scaling, {{"split", "group"}});
+  const ModelFile file = load_model(folder / "m.safetensors", ModelKind::frames);
+  EXPECT_EQ(file.scaling.mean, scaling.mean);
+  EXPECT_EQ(file.scaling.factor, scaling.factor);
+  EXPECT_EQ(file.metadata.at("split"), "group");
+  const Tensor x = uniform({2, 3, 5, 2}, 1), a = model.infer(x), b = file.network().infer(x);
+  for (Dim i = 0; i < a.size(); ++i) EXPECT_EQ(a.data()[i], b.data()[i]);
+}
+
+TEST(ModelFile, NeitherKindIsTakenForTheOther) {
+  const TemporaryFolder folder;
+  Rng rng(2);
+  save_model(folder / "frame.safetensors", FrameModel({.channels = 8, .rcabs = 1}, rng), {{0}, {1}}, {});
+  save_model(folder / "window.safetensors", SuperTac(small_settings(), rng), {}, {});
+  EXPECT_NE(
+      load_error(folder / "frame.safetensors").find("found a frame model (trained with --pairs); use it"),
+      std::string::npos);
+  EXPECT_NE(load_error(folder / "window.safetensors", ModelKind::frames)
+                .find("found a SuperTac model; give it recordings"),
+            std::string::npos);
+}
+
+TEST(ModelFile, OfFramesTheFileNeverSizesAnything) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "m.safetensors";
+  Rng rng(1);
+  const FrameModel model({.channels = 8, .rcabs = 1}, rng);
+  const auto write = [&](const std::string& height, const std::string& mean) {
+    write_checkpoint(
+        path, model.parameters(),
+        {{"kind", "frame-checkpoint"},
+         {"settings",
+          R"({"in_channels":1,"width":4,"scale":4,"channels":8,"rcabs":1,"height":)" + height + "}"},
+         {"input", R"({"mean":)" + mean + R"(,"factor":[1]})"}});
+    return load_error(path, ModelKind::frames);
+  };
+  EXPECT_EQ(write("4", "[0]"), "no error");
+  EXPECT_NE(write("100000", "[0]").find("height must be 1 to 512"), std::string::npos);
+  EXPECT_NE(write("\"4\"", "[0]").find("must be a whole number"), std::string::npos);
+  for (const char* mean : {"[0,0]", "[]", "[null]", "0", "[1e300]"})
+    EXPECT_NE(write("4", mean).find("\"mean\" must be 1 finite numbers"), std::string::npos)
+        << mean << write("4", mean);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,126 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "data/windows/levelling.h"
+#include "io/files/safetensors.h"
+#include "io/numbers/hash.h"
+#include "models/files/onnx.h"
+#include "models/files/onnx_file.h"
+#include "models/inference/prepared.h"
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+constexpr Dim kWindows = 1000;
+
+ModelFile model_of(const std::string& preset, const TaxelArray& array, Grouping grouping) {
+  SuperTacSettings settings = SuperTacSettings::of_preset(preset);
+  set_array(settings, array);
+  settings.grouping = grouping;
+  Rng rng(7);
+  ModelFile file;
+  file.model = std::make_unique<SuperTac>(settings, rng);
+  file.input.scaling.levelled = true;
+  file.metadata = file.description();
+  return file;
+}
+
+// Fingers that press, each window as hard and as long as chance will have it; some are pressed all the time.
+Tensor volts_of(const Network& network, Dim count) {
+  Tensor volts(network.input_shape(count));
+  const RandomStream random(11, 3);
+  const Dim frames = volts.dim(1), signals = volts.dim(2);
+  std::uint64_t next = 0;
+  for (Dim n = 0; n < count; ++n) {
+    for (Dim k = 0; k < signals; ++k) {
+      const double rest = 0.1 * random.uniform(next++), depth = 0.4 * random.uniform(next++);
+      const double phase = 6 * random.uniform(next++), speed = 0.1 * random.uniform(next++);
+      for (Dim t = 0; t < frames; ++t) {
+        const double press = rest + depth * std::max(0.0, std::sin(phase + speed * static_cast<double>(t)));
+        const double noise = 0.01 * random.normal(next++);
+        volts.data()[(n * frames + t) * signals + k] = static_cast<real>(2.45 - press + noise);
+      }
+    }
+  }
+  return volts;
+}
+
+void write_case(const TemporaryFolder& folder, const std::string& name, const ModelFile& file, Dim count) {
+  const Tensor volts = volts_of(*file.model, count);
+  Tensor windows = volts.clone();
+  file.input.scaling(windows.values());
+  const auto size = static_cast<std::size_t>(windows.dim(1) * windows.dim(2));
+  for (Dim n = 0; n < count && file.input.scaling.levelled; ++n)
+    level(windows.values().subspan(static_cast<std::size_t>(n) * size, size),
+          static_cast<std::size_t>(windows.dim(2)));
+  const Estimate drawn = Prepared(*file.model).estimate(windows);
+  const auto array = [](const std::string& called, const Tensor& t) {
+    TensorToWrite out{called, "F32", {}, std::as_bytes(std::span<const real>(t.values()))};
+    for (int i = 0; i < std::min(t.rank(), 3); ++i) out.shape.push_back(static_cast<std::uint64_t>(t.dim(i)));
+    return out;
+  };
+  std::vector<TensorToWrite> tensors = {array("volts", volts), array("picture", drawn.picture)};
+  if (drawn.spread.defined()) tensors.push_back(array("spread", drawn.spread));
+  write_safetensors(folder.file(name + ".safetensors"), {}, tensors);
+  write_file(folder.file(name + ".onnx"), onnx_of(file));
+}
+
+TEST(Onnx, OnnxruntimeDrawsOurPictures) {
+  const TemporaryFolder folder;
+  const TaxelArray rig, other{3, 5, 2.5, 2};
+  for (const char* preset : {"tiny", "paper"}) {
+    const std::string name(preset);
+    write_case(folder, name + "_4x4", model_of(name, rig, Grouping::horizontal), kWindows);
+    write_case(folder, name + "_3x5x2", model_of(name, other, Grouping::vertical), kWindows);
+  }
+  ModelFile plain = model_of("tiny", rig, Grouping::horizontal);
+  plain.input.scaling.levelled = false;
+  write_case(folder, "not_levelled", plain, 50);
+  const char* python = std::getenv("SUPERTAC_PYTHON");
+  const std::string log = folder.file("log");
+  const std::string command = std::string(python == nullptr ? "python3" : python) +
+                              " " SUPERTAC_CHECK_ONNX " " + folder.path() + " >" + log + " 2>&1";
+  const int status = std::system(command.c_str());
+  const std::string said = read_text_file(log, 1 << 20);
+  if (WEXITSTATUS(status) == 77 || WEXITSTATUS(status) == 127) GTEST_SKIP() << said;
+  EXPECT_EQ(status, 0) << said;
+  std::fputs(said.c_str(), stdout);
+}
+
+// Where onnxruntime is not installed this tells that the graph was changed since it was last compared.
+TEST(Onnx, TheGraphIsTheOneThatWasCompared) {
+  const std::string bytes = onnx_of(model_of("tiny", {}, Grouping::horizontal));
+  Hash hash;
+  hash.add(bytes);
+  EXPECT_EQ(hash.hex(), "71f29035f4d03d64")
+      << "compare again: SUPERTAC_PYTHON=... models_test --gtest_filter=Onnx.*";
+}
+
+TEST(Onnx, AFrameModelTakesFramesAsPairsHaveThem) {
+  Rng rng(3);
+  ModelFile file;
+  file.frame_model = std::make_unique<FrameModel>(FrameSettings{2, 3, 5, 2, 8, 1}, rng);
+  file.scaling = {{1, 2}, {3, 4}};
+  const std::string bytes = onnx_of(file);
+  EXPECT_NE(bytes.find("frames"), std::string::npos);
+  EXPECT_EQ(bytes.find("volts"), std::string::npos);
+}
+
+// From the documentation of the wire format: 150 in field 1 is 08 96 01, "testing" in field 2 is 12 07 ...
+TEST(Onnx, TheWireFormatIsThatOfItsDocumentation) {
+  WireMessage message;
+  message.integer(1, 150);
+  message.bytes(2, "testing");
+  message.integer(3, -2);
+  message.number(4, 1.0F);
+  EXPECT_EQ(message.text(),
+            std::string("\x08\x96\x01\x12\x07testing\x18\xFE\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF\x01"
+                        "\x25\x00\x00\x80\x3F",
+                        28));
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,61 @@
+#include "models/networks/classifier.h"
+
+#include <gtest/gtest.h>
+
+#include "autograd/adam.h"
+#include "autograd/ops/losses.h"
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+TEST(TextureClassifier, TakesFramesAndPictures) {
+  Rng rng(1);
+  EXPECT_EQ(TextureClassifier({.height = 4, .width = 4, .classes = 6}, rng)
+                .forward(Variable(uniform({2, 4, 4, 1}, 1)))
+                .shape(),
+            (Shape{2, 6}));
+  EXPECT_EQ(TextureClassifier({.height = 16, .width = 16, .classes = 3}, rng)
+                .forward(Variable(uniform({2, 16, 16, 1}, 1)))
+                .shape(),
+            (Shape{2, 3}));
+}
+
+TEST(TextureClassifier, RefusesSettingsOutOfRange) {
+  Rng rng(1);
+  EXPECT_THROW(TextureClassifier({.height = 2, .width = 4, .classes = 6}, rng), std::invalid_argument);
+  EXPECT_THROW(TextureClassifier({.height = 16, .width = 16, .classes = 1}, rng), std::invalid_argument);
+}
+
+TEST(FeatureClassifier, TakesNumbersAndRefusesNone) {
+  Rng rng(1);
+  EXPECT_EQ(FeatureClassifier(40, 4, rng).forward(Variable(uniform({3, 40}, 1))).shape(), (Shape{3, 4}));
+  EXPECT_THROW(FeatureClassifier(0, 4, rng), std::invalid_argument);
+  EXPECT_THROW(FeatureClassifier(40, 1, rng), std::invalid_argument);
+}
+
+// Stripes along x against stripes along y.
+TEST(TextureClassifier, LearnsToTellTwoTextures) {
+  constexpr Dim kImages = 16;
+  Tensor x(Shape{kImages, 8, 8, 1});
+  std::vector<std::int32_t> labels;
+  for (Dim n = 0; n < kImages; ++n) {
+    labels.push_back(static_cast<std::int32_t>(n % 2));
+    for (Dim i = 0; i < 64; ++i) x.data()[n * 64 + i] = ((n % 2 ? i / 8 : i % 8) + n) % 4 < 2 ? 1 : 0;
+  }
+  Rng rng(2);
+  const TextureClassifier classifier({.height = 8, .width = 8, .classes = 2}, rng);
+  Adam adam(values_of(classifier.parameters()), {.learning_rate = 3e-3});
+  real loss_value = 0;
+  for (int step = 0; step < 60; ++step) {
+    const Variable loss = softmax_cross_entropy(classifier.forward(Variable(x)), labels);
+    adam.zero_grad();
+    backward(loss);
+    adam.step();
+    loss_value = loss.item();
+  }
+  EXPECT_LT(loss_value, 0.05);
+}
+
+}  // namespace
+}  // namespace supertac

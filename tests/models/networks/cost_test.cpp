@@ -1,0 +1,74 @@
+#include "models/networks/cost.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <string>
+
+namespace supertac {
+namespace {
+
+// How often a weight is used: once for each pixel of the coarser side of its layer.
+Dim uses(const std::string& name, const SuperTacSettings& s) {
+  const auto level = [&](const char* mark) {
+    return std::stoi(name.substr(name.find(mark) + std::string(mark).size()));
+  };
+  if (name.find("attention") != std::string::npos || name.find("fc") != std::string::npos) return 1;
+  if (name.find("rirb.") != std::string::npos) return s.rows * s.columns << (2 * level("rirb."));
+  if (name.find("upsampler.out") != std::string::npos) return s.image_height() * s.image_width();
+  if (name.find("encoder") != std::string::npos && name.find("conv.") != std::string::npos)
+    return s.timesteps >> (level("conv.") + 1);
+  if (name.find("decoder") != std::string::npos && name.find("conv.") != std::string::npos)
+    return s.timesteps / 16 << level("conv.");
+  if (name.find("decoder") != std::string::npos) return s.timesteps;  // out
+  return 1;                                                           // heads
+}
+
+TEST(Cost, AgreesWithTheWeightsOfTheModel) {
+  for (const Dim scale : {2, 4, 8}) {
+    const bool rig = scale == 4;
+    SuperTacSettings s{.rows = rig ? 4 : 5,
+                       .columns = rig ? 4 : 12,
+                       .in_channels = rig ? 1 : 3,
+                       .timesteps = 64,
+                       .latent = 5,
+                       .scale = scale,
+                       .channels = 12,
+                       .rcabs = 2};
+    Rng rng(0);
+    const SuperTac model(s, rng);
+    double inference = 0, forward = 0;
+    for (const Parameter& p : model.parameters()) {
+      if (p.name.ends_with("bias")) continue;
+      const auto macs = static_cast<double>(p.value.value().size() * uses(p.name, s));
+      forward += macs;
+      if (!p.name.starts_with("decoder") && p.name.find("log_var") == std::string::npos) inference += macs;
+    }
+    EXPECT_EQ(cost_of(s).inference, inference) << scale;
+    EXPECT_EQ(cost_of(s).training, 3 * forward) << scale;
+  }
+}
+
+TEST(Cost, OfThePresetPaperIsAboutEightMillion) {
+  EXPECT_NEAR(cost_of(SuperTacSettings::of_preset("paper")).inference, 7.8e6, 0.1e6);
+  EXPECT_THROW(cost_of({.timesteps = 40}), std::invalid_argument);
+}
+
+TEST(Preset, BothSeeTwoAndAHalfSeconds) {
+  for (const char* name : {"paper", "tiny"}) {
+    const auto samples = static_cast<double>(SuperTacSettings::of_preset(name).timesteps);
+    EXPECT_DOUBLE_EQ(samples / PresetTraining::of_preset(name).rate_hz, 2.56) << name;
+  }
+}
+
+TEST(Cost, OfThePresetTinyIsANinthAndOfItsTrainingHalf) {
+  const PresetTraining paper = PresetTraining::of_preset("paper"), tiny = PresetTraining::of_preset("tiny");
+  EXPECT_LT(2 * tiny.rate_hz * static_cast<double>(tiny.epochs) / 9,
+            paper.rate_hz * static_cast<double>(paper.epochs));
+  EXPECT_THROW(PresetTraining::of_preset("small"), std::invalid_argument);
+  EXPECT_LT(9 * cost_of(SuperTacSettings::of_preset("tiny")).inference,
+            cost_of(SuperTacSettings::of_preset("paper")).inference);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,177 @@
+#include "models/networks/supertac_model.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+TEST(SuperTac, PresetPaperHasTheParametersOfTheTable) {
+  Rng rng(1);
+  const SuperTac model(SuperTacSettings::of_preset("paper"), rng);
+  EXPECT_EQ(model.parameter_count(), 537810);
+  std::set<std::string> names;
+  for (const Parameter& p : model.parameters()) names.insert(p.name);
+  EXPECT_EQ(names.size(), model.parameters().size());
+  for (const char* name :
+       {"encoder.0.conv.0.weight", "encoder.3.fc.bias", "encoder.2.mean.weight", "encoder.1.log_var.bias",
+        "decoder.0.fc.1.weight", "decoder.3.conv.3.bias", "decoder.1.out.weight", "upsampler.fc.weight",
+        "upsampler.rirb.1.rcab.2.conv.1.weight", "upsampler.rirb.0.rcab.0.attention.squeeze.weight",
+        "upsampler.rirb.1.rcab.1.attention.expand.bias", "upsampler.rirb.1.conv.weight",
+        "upsampler.rirb.0.up.weight", "upsampler.out.bias", "upsampler.spread.weight"}) {
+    EXPECT_TRUE(names.contains(name)) << name;
+  }
+}
+
+TEST(SuperTac, PicturesOfAllSizes) {
+  for (const Dim scale : {2, 4, 8}) {
+    Rng rng(1);
+    SuperTacSettings s = small_settings();
+    s.scale = scale;
+    const SuperTac model(s, rng);
+    EXPECT_EQ(model.infer(uniform({2, 32, 16}, 1)).shape(), (Shape{2, 4 * scale, 4 * scale, 1}));
+  }
+}
+
+TEST(SuperTac, DecodesTheWindowsOfItsGroups) {
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  const Tensor windows = uniform({2, 32, 16}, 2);
+  const SuperTac::Output out = model.forward(windows, normal_eps(2, 3, 1));
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    EXPECT_EQ(out.decoded[g].shape(), (Shape{2, 32, 4}));
+    for (Dim k = 0; k < 4; ++k) {  // horizontal: a row of the array
+      EXPECT_EQ(out.input[g].value().data()[k], windows.data()[4 * static_cast<Dim>(g) + k]);
+    }
+  }
+}
+
+TEST(SuperTac, VerticalGroupsAreTheColumnsOfTheArray) {
+  Rng rng(1);
+  SuperTacSettings s = small_settings();
+  s.grouping = Grouping::vertical;
+  const SuperTac model(s, rng);
+  const Tensor windows = uniform({1, 32, 16}, 2);
+  const SuperTac::Output out = model.forward(windows, normal_eps(1, 3, 1));
+  for (Dim k = 0; k < 4; ++k) EXPECT_EQ(out.input[1].value().data()[4 + k], windows.data()[16 + 1 + 4 * k]);
+}
+
+// One number of a window for each (row, column, channel): where it goes shows where it came from.
+TEST(SuperTac, GroupsOfAnyArrayHoldTheirTaxelsWithAllChannels) {
+  SuperTacSettings s = small_settings();
+  s.rows = 2, s.columns = 12, s.in_channels = 3;
+  s.scale = 4;
+  Tensor windows(Shape{1, 32, 72});
+  for (Dim i = 0; i < windows.size(); ++i) windows.data()[i] = static_cast<real>(i % 72) / 72;
+  for (const Grouping grouping : {Grouping::horizontal, Grouping::vertical}) {
+    s.grouping = grouping;
+    const bool by_rows = grouping == Grouping::horizontal;
+    Rng rng(1);
+    const SuperTac model(s, rng);
+    EXPECT_EQ(s.groups(), by_rows ? 2 : 12);
+    const std::vector<Tensor> eps(static_cast<std::size_t>(s.groups()), Tensor::zeros({1, 3}));
+    const SuperTac::Output out = model.forward(windows, eps);
+    ASSERT_EQ(out.decoded.size(), eps.size());
+    EXPECT_EQ(out.decoded[1].shape(), (Shape{1, 32, by_rows ? 36 : 6}));
+    EXPECT_EQ(out.image.shape(), (Shape{1, 8, 48, 1}));
+    const real* second = out.input[1].value().data();
+    for (Dim taxel = 0; taxel < (by_rows ? 12 : 2); ++taxel) {
+      for (Dim c = 0; c < 3; ++c) {
+        const Dim from = by_rows ? 12 + taxel : 12 * taxel + 1;
+        EXPECT_EQ(second[3 * taxel + c], static_cast<real>(3 * from + c) / 72);
+      }
+    }
+    EXPECT_EQ(model.encode(windows).shape(), (Shape{1, 3 * s.groups()}));
+  }
+}
+
+// exp(log_var / 2) of an encoder gone astray would be infinite.
+TEST(Vae, LogVarianceIsClampedToTen) {
+  Rng rng(1);
+  const Encoder encoder({.timesteps = 32, .channels = 4, .latent = 5}, rng);
+  for (const Parameter& p : encoder.parameters()) {
+    Variable handle = p.value;
+    for (real& w : handle.mutable_value().values()) w *= 100;
+  }
+  const Variable log_var = encoder.forward(Variable(uniform({8, 32, 4}, 1))).log_var;
+  const auto [least, most] = std::ranges::minmax(log_var.value().values());
+  EXPECT_EQ(least, -10);
+  EXPECT_EQ(most, 10);
+}
+
+TEST(SuperTac, EvaluationIsDeterministicAndUsesTheMean) {
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  const Tensor windows = uniform({2, 32, 16}, 2);
+  std::array<Tensor, kGroups> zero;
+  for (Tensor& e : zero) e = Tensor::zeros({2, 3});
+  const Tensor a = model.infer(windows), b = model.infer(windows);
+  const Tensor c = model.forward(windows, zero).image.value();
+  for (Dim i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a.data()[i], b.data()[i]);
+    EXPECT_EQ(a.data()[i], c.data()[i]);
+  }
+}
+
+TEST(SuperTac, AWindowsPictureDoesNotDependOnItsBatch) {
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  const Tensor two = uniform({2, 32, 16}, 4);
+  const Tensor second = Tensor::of({1, 32, 16}, two.values().subspan(512));
+  const Tensor both = model.infer(two), alone = model.infer(second);
+  for (Dim i = 0; i < alone.size(); ++i) EXPECT_EQ(alone.data()[i], both.data()[alone.size() + i]);
+}
+
+TEST(SuperTac, ConstantWindowsGiveFinitePictures) {
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  for (const real level : {real(0), real(1)}) {
+    for (const real x : model.infer(Tensor::full({1, 32, 16}, level)).values()) EXPECT_TRUE(std::isfinite(x));
+  }
+}
+
+TEST(SuperTac, RefusesSettingsAndWindowsThatDoNotFit) {
+  const auto message = [](SuperTacSettings s) -> std::string {
+    try {
+      Rng rng(1);
+      SuperTac model(s, rng);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  SuperTacSettings s = small_settings();
+  s.timesteps = 40;
+  EXPECT_EQ(message(s),
+            "model settings: timesteps must be a multiple of 16 (the encoder halves four times), got 40");
+  s.timesteps = 1024;
+  EXPECT_EQ(message(s), "model settings: timesteps must be 32 to 512, got 1024");
+  s = small_settings();
+  s.scale = 3;
+  EXPECT_EQ(message(s), "model settings: scale must be 2, 4 or 8, got 3");
+  s = small_settings();
+  s.columns = 17;
+  EXPECT_EQ(message(s), "model settings: columns must be 2 to 16, got 17");
+  s.columns = 4, s.rows = 3;
+  EXPECT_EQ(
+      message(s),
+      "model settings: scale 2 of an array of 3x4 makes pictures with a side below 7 pixels, too small for "
+      "SSIM; raise scale");
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  try {
+    model.infer(Tensor::zeros({1, 64, 16}));
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "SuperTac: windows expects [N,32,16], got [1,64,16]");
+  }
+  EXPECT_THROW(SuperTacSettings::of_preset("huge"), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace supertac

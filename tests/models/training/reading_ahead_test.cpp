@@ -1,0 +1,52 @@
+// What a training announces before it reads it, so that a disk may fetch it meanwhile.
+#include <gtest/gtest.h>
+
+#include <set>
+#include <utility>
+
+#include "models/training/objective.h"
+#include "models/training/trainer.h"
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+// Windows that note which of them is announced, and which is read.
+struct Watched : Examples {
+  explicit Watched(const WindowSet& set) : windows(set) {}
+  std::size_t size() const override { return windows.size(); }
+  std::size_t frames() const override { return windows.frames(); }
+  TaxelArray array() const override { return windows.array(); }
+  int scale() const override { return windows.scale(); }
+  void input(std::size_t i, std::span<float> out) const override {
+#pragma omp critical
+    read.insert(i);
+    windows.input(i, out);
+  }
+  void target(std::size_t i, std::span<float> out) const override { windows.target(i, out); }
+  void will_read(std::size_t i) const override { announced.insert(i); }
+  std::int64_t group(std::size_t i) const override { return windows.group(i); }
+  std::string fingerprint() const override { return windows.fingerprint(); }
+  const WindowSet& windows;
+  mutable std::multiset<std::size_t> announced, read;
+};
+
+// Over the end of an epoch too; behind the last step nothing is read.
+TEST(ReadingAhead, AnnouncesTheWindowsOfTheNextStep) {
+  const TrainingSettings settings = small_training();
+  const WindowSet windows = small_windows(settings.model);
+  const Watched watched(windows);
+  Trainer trainer(watched, all_of(windows), window_objective(windows, settings));
+  std::multiset<std::size_t> before;
+  for (; !trainer.done(); before = std::exchange(watched.announced, {})) {
+    watched.read.clear();
+    const bool first = trainer.step() == 0;
+    trainer.train_step();
+    EXPECT_TRUE(first || watched.read == before) << "step " << trainer.step();
+  }
+  EXPECT_TRUE(before.empty());
+  EXPECT_GT(trainer.step(), trainer.steps_per_epoch());
+}
+
+}  // namespace
+}  // namespace supertac

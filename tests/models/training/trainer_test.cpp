@@ -1,0 +1,398 @@
+#include "models/training/trainer.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "autograd/kernels/fast/isa.h"
+#include "io/numbers/hash.h"
+#include "models/inference/evaluation.h"
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+TEST(Trainer, Learns) {
+  TrainingSettings settings = small_training();
+  settings.epochs = 30;
+  const WindowSet windows = small_windows(settings.model);
+  Trainer trainer(windows, all_of(windows), settings);
+  const double first = trainer.train_step().l2;
+  double last = 0;
+  while (!trainer.done()) last = trainer.train_step().l2;
+  EXPECT_LT(last, first / 4);
+}
+
+// Without noise the picture of the first step is that of inference.
+TEST(Trainer, WithoutSamplingLatentsAreTheMeans) {
+  TrainingSettings settings = small_training();
+  settings.loss.beta = 0;
+  const WindowSet windows = small_windows(settings.model);
+  settings.batch = static_cast<std::int64_t>(windows.size());
+  const auto errors = [&](bool sampling) {
+    settings.sampling = sampling;
+    Trainer trainer(windows, all_of(windows), settings);
+    const ZoneMetrics scores = score(trainer.model(), windows, all_of(windows));
+    const double inferred = std::pow(10, -scores.all().psnr_pooled_db / 10);
+    return std::abs(trainer.train_step().l2 - inferred) / inferred;
+  };
+  EXPECT_LT(errors(false), 1e-4);
+  EXPECT_GT(errors(true), 1e-3);
+  EXPECT_EQ(to_json(settings)["beta"], 0.0);
+}
+
+// Deleting the augmentation, or another sample's, changes the loss; it is that of the windows changed by
+// hand.
+TEST(Trainer, LearnsFromAugmentedWindows) {
+  TrainingSettings settings = small_training();
+  settings.augment = {.gain = 0.5, .noise = 0.05};
+  settings.sampling = false;
+  const WindowSet windows = small_windows(settings.model);
+  Trainer trainer(windows, all_of(windows), settings);
+  const Batching batching(all_of(windows), 8, settings.seed);
+  std::vector<std::uint32_t> indices(8);
+  batching.batch(0, 0, indices);
+  Batch by_hand{Tensor(trainer.model().input_shape(8)), Tensor(trainer.model().picture_shape(8)), {}};
+  for (std::size_t n = 0; n < 8; ++n) {
+    const auto window = by_hand.inputs.values().subspan(n * windows.input_size(), windows.input_size());
+    windows.window(indices[n], window);
+    augment(settings.augment, settings.seed, batching.sample(0, 0, n), window);
+    windows.truth(indices[n], by_hand.targets.values().subspan(n * 64, 64));
+  }
+  const double expected = trainer.objective()(by_hand).loss.total.item();
+  EXPECT_NEAR(trainer.train_step().total, expected, 1e-5 * expected);
+  settings.augment = {};
+  EXPECT_GT(std::abs(Trainer(windows, all_of(windows), settings).train_step().total - expected),
+            1e-3 * expected);
+}
+
+/// Blurred blobs on an array of 3 x 5 taxels with two channels, drawn `scale` times as fine.
+std::string write_pairs(const TemporaryFolder& folder, std::uint64_t scale = 4, std::uint64_t count = 40) {
+  const std::uint64_t height = 3 * scale, width = 5 * scale;
+  std::vector<float> input(count * 2 * 15), target(count * height * width);
+  std::vector<std::int64_t> group;
+  const RandomStream random(4, 0);
+  for (std::uint64_t n = 0; n < count; ++n) {
+    const double y = 3 * random.uniform(2 * n), x = 5 * random.uniform(2 * n + 1);
+    const auto blob = [&](double row, double column, double width_of) {
+      return static_cast<float>(std::exp(-((row - y) * (row - y) + (column - x) * (column - x)) / width_of));
+    };
+    for (std::uint64_t k = 0; k < 15; ++k) {
+      const float v = blob(static_cast<double>(k / 5) + 0.5, static_cast<double>(k % 5) + 0.5, 2);
+      input[n * 30 + k] = 1000 - 200 * v;  // falls when pressed, far from 0
+      input[n * 30 + 15 + k] = 0.01F * v;
+    }
+    for (std::uint64_t p = 0; p < height * width; ++p) {
+      const auto at = [&](std::uint64_t i) {
+        return (static_cast<double>(i) + 0.5) / static_cast<double>(scale);
+      };
+      target[n * height * width + p] = blob(at(p / width), at(p % width), 0.5);
+    }
+    group.push_back(static_cast<std::int64_t>(n / 8));
+  }
+  write_safetensors(folder / "pairs.safetensors", {},
+                    {{"input", "F32", {count, 2, 3, 5}, std::as_bytes(std::span(input))},
+                     {"target", "F32", {count, 1, height, width}, std::as_bytes(std::span(target))},
+                     {"group", "I64", {count}, std::as_bytes(std::span(group))}});
+  return folder / "pairs.safetensors";
+}
+
+FrameTrainingSettings small_frames() {
+  FrameTrainingSettings s;
+  s.model.channels = 8;
+  s.model.rcabs = 1;
+  s.epochs = 3;
+  s.batch = 8;
+  s.seed = 5;
+  return s;
+}
+
+std::vector<std::uint32_t> first(std::uint32_t count) {
+  std::vector<std::uint32_t> indices(count);
+  std::iota(indices.begin(), indices.end(), 0U);
+  return indices;
+}
+
+PairSet scaled_pairs(const TemporaryFolder& folder) {
+  PairSet pairs = PairSet::read(write_pairs(folder));
+  pairs.fit_scaling(first(32));
+  return pairs;
+}
+
+TEST(Trainer, LearnsFromPairs) {
+  const TemporaryFolder folder;
+  const PairSet pairs = scaled_pairs(folder);
+  FrameTrainingSettings settings = small_frames();
+  settings.epochs = 60;
+  settings.learning_rate = 5e-3;
+  Trainer trainer(pairs, first(32), settings);
+  const double before = trainer.train_step().l2;
+  double after = 0;
+  while (!trainer.done()) after = trainer.train_step().l2;
+  EXPECT_LT(after, before / 10);
+  PairMetrics metrics(12, 20);
+  const std::vector<std::uint32_t> unseen = {32, 33, 34, 35, 36, 37, 38, 39};
+  for_each_output(trainer.model(), pairs, unseen, [&](const EvaluatedBatch& b) {
+    for (std::size_t n = 0; n < b.size(); ++n) metrics.add(b.output(n), b.target(n));
+    return true;
+  });
+  EXPECT_EQ(metrics.result().windows, 8u);
+  EXPECT_GT(metrics.result().psnr_mean_db, 18);
+}
+
+using MakeTrainer = std::function<std::unique_ptr<Trainer>()>;
+
+std::string checkpoint_of(const MakeTrainer& make, int threads, std::int64_t interrupted_after) {
+  const TemporaryFolder folder;
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(threads);
+  std::unique_ptr<Trainer> trainer = make();
+  while (!trainer->done()) {
+    trainer->train_step();
+    if (trainer->step() == interrupted_after) {
+      trainer->save(folder / "state.safetensors", {});
+      trainer = make();
+      trainer->restore(folder / "state.safetensors", {});
+    }
+  }
+  trainer->save(folder / "end.safetensors", {});
+  omp_set_num_threads(before);
+  return file_text(folder / "end.safetensors");
+}
+
+// Windows and pairs, whoever trains them.
+class TrainerBytes : public testing::Test {
+ protected:
+  TrainerBytes() {
+    settings_.augment.gain = 0.5;
+    settings_.augment.noise = 0.02;
+  }
+  const std::vector<MakeTrainer> makers_ = {
+      [this] { return std::make_unique<Trainer>(windows_, all_of(windows_), settings_); },
+      [this] { return std::make_unique<Trainer>(pairs_, first(32), small_frames()); }};
+
+ private:
+  const TemporaryFolder folder_;
+  TrainingSettings settings_ = small_training();
+  const WindowSet windows_ = small_windows(settings_.model);
+  const PairSet pairs_ = scaled_pairs(folder_);
+};
+
+TEST_F(TrainerBytes, AreTheSameForAnyNumberOfThreads) {
+  for (const MakeTrainer& make : makers_) {
+    const std::string one = checkpoint_of(make, 1, -1);
+    for (const int threads : {2, 3, 4})
+      EXPECT_TRUE(one == checkpoint_of(make, threads, -1)) << threads << " threads";
+  }
+}
+
+TEST_F(TrainerBytes, AreTheSameResumedAfterAnyStep) {
+  for (const MakeTrainer& make : makers_) {
+    const std::string uninterrupted = checkpoint_of(make, 1, -1);
+    for (std::int64_t step = 1; step < make()->total_steps(); ++step)
+      ASSERT_TRUE(uninterrupted == checkpoint_of(make, 1, step)) << "stopped after step " << step;
+  }
+}
+
+// The bits of a training, as they are on every processor: whoever changes the arithmetic, the order of
+// samples or the random numbers on purpose changes this number with it, and says so.
+TEST(Trainer, PinnedBits) {
+  const kernels::IsaKernels& before = kernels::isa_kernels();
+  for (const kernels::IsaKernels* set : kernels::supported_sets()) {
+    if (set == &kernels::kPlainKernels) continue;  // takes no Winograd's way
+    kernels::use_isa(*set);
+    for (const int threads : {1, 2, 4, 8}) {
+      omp_set_num_threads(threads);
+      TrainingSettings settings = small_training();
+      settings.augment = kStandardAugmentation;
+      const WindowSet windows = small_windows(settings.model);
+      Trainer trainer(windows, all_of(windows), settings);
+      while (!trainer.done()) trainer.train_step();
+      std::uint32_t bits = 0;
+      for (const Parameter& p : trainer.model().parameters())
+        bits = crc32(std::as_bytes(std::span<const real>(p.value.value().values())), bits);
+      EXPECT_EQ(bits, 0x1BABFD50U) << set->name << ", " << threads << " threads";
+    }
+  }
+  kernels::use_isa(before);
+  omp_set_num_threads(1);
+}
+
+TEST(Trainer, RefusesToResumeAnotherRun) {
+  const TemporaryFolder folder;
+  TrainingSettings settings = small_training();
+  const WindowSet windows = small_windows(settings.model);
+  Trainer trainer(windows, all_of(windows), settings);
+  trainer.train_step();
+  trainer.save(folder / "state.safetensors", {{"data", "1234"}});
+  const auto message = [&](const TrainingSettings& other, const std::string& data) -> std::string {
+    try {
+      Trainer(windows, all_of(windows), other).restore(folder / "state.safetensors", {{"data", data}});
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(message(settings, "1234"), "no error");
+  EXPECT_NE(message(settings, "5678").find("cannot resume: its data is 1234, this run's is 5678"),
+            std::string::npos);
+  settings.muon = true;
+  EXPECT_NE(message(settings, "1234").find("cannot resume: its training is"), std::string::npos);
+}
+
+TEST(Trainer, MuonGoesOnToTheSameBitsOnAnyNumberOfThreads) {
+  const TemporaryFolder folder;
+  TrainingSettings settings = small_training();
+  settings.muon = true;
+  const WindowSet windows = small_windows(settings.model);
+  Trainer straight(windows, all_of(windows), settings), first(windows, all_of(windows), settings),
+      resumed(windows, all_of(windows), settings);
+  omp_set_num_threads(4);
+  for (int step = 0; step < 5; ++step) first.train_step();
+  first.save(folder / "state.safetensors", {});
+  resumed.restore(folder / "state.safetensors", {});
+  while (!resumed.done()) resumed.train_step();
+  omp_set_num_threads(1);
+  while (!straight.done()) straight.train_step();
+  for (std::size_t i = 0; i < straight.model().parameters().size(); ++i) {
+    const Parameter &a = straight.model().parameters()[i], &b = resumed.model().parameters()[i];
+    EXPECT_EQ(crc32(std::as_bytes(std::span<const real>(a.value.value().values()))),
+              crc32(std::as_bytes(std::span<const real>(b.value.value().values()))))
+        << a.name;
+  }
+}
+
+TEST(Trainer, KeepsWithTheModelWhatBytesAndTheAlarmNeed) {
+  const TemporaryFolder folder;
+  const TrainingSettings settings = small_training();
+  const WindowSet windows = small_windows(settings.model);
+  Trainer trainer(windows, all_of(windows), settings);
+  trainer.train_step();
+  trainer.save_model(folder / "m.safetensors", model_metadata(settings.model, input_of(windows)));
+  const ModelFile file = load_model(folder / "m.safetensors");
+  EXPECT_TRUE(file.ranges);
+  EXPECT_TRUE(file.novelty);
+}
+
+TEST(Trainer, RefusesToResumeFromAModelWithoutState) {
+  const TemporaryFolder folder;
+  const TrainingSettings settings = small_training();
+  const WindowSet windows = small_windows(settings.model);
+  Trainer trainer(windows, all_of(windows), settings);
+  save_model(folder / "m.safetensors", dynamic_cast<const SuperTac&>(trainer.model()), {},
+             {{"training", to_json(settings).dump()}});
+  try {
+    trainer.restore(folder / "m.safetensors", {});
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("holds no training state"), std::string::npos) << error.what();
+  }
+}
+
+// The message of the step after `damage` has been done to the parameter of that name.
+std::string stopped(const std::string& name, const std::function<void(Tensor&)>& damage) {
+  const TrainingSettings settings = small_training();
+  const WindowSet windows = small_windows(settings.model);
+  Trainer trainer(windows, all_of(windows), settings);
+  trainer.train_step();
+  for (const Parameter& p : trainer.model().parameters()) {
+    if (p.name == name) damage(Variable(p.value).mutable_value());
+  }
+  try {
+    trainer.train_step();
+  } catch (const TrainingStopped& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Trainer, StopsWithStepLayerAndAdviceWhenAValueIsNotFinite) {
+  const std::string advice = "; lower --learning-rate (now 0.001) or check the input with supertac-info";
+  const std::string parameter = stopped("upsampler.rirb.0.conv.weight", [](Tensor& t) {
+    t.data()[3] = std::numeric_limits<real>::quiet_NaN();
+  });
+  EXPECT_TRUE(parameter.starts_with("training stopped at step 2: the loss is nan (reconstruction "))
+      << parameter;
+  EXPECT_TRUE(parameter.ends_with("): parameter upsampler.rirb.0.conv.weight is not finite" + advice))
+      << parameter;
+  const std::string layer = stopped("decoder.2.fc.1.weight", [](Tensor& t) { t.fill(1e38F); });
+  EXPECT_NE(layer.find("the output of linear"), std::string::npos) << layer;
+  EXPECT_TRUE(layer.ends_with(" in decoder.2.fc.1 is the first that is not finite" + advice)) << layer;
+  const std::string gradient = stopped("upsampler.out.weight", [](Tensor& t) { t.fill(1e19F); });
+  EXPECT_NE(gradient.find("upsampler.out"), std::string::npos) << gradient;
+  EXPECT_TRUE(gradient.ends_with(advice)) << gradient;
+}
+
+// A network whose last layer is dead draws a flat image and learns nothing any more, and one whose encoders
+// are dead draws the same one for all; the detector must say so, and must keep quiet about a healthy run.
+TEST(Trainer, ReportsPicturesThatAreTheSameForAllAndIdleLatents) {
+  TrainingSettings settings = small_training();
+  settings.epochs = 10;
+  const WindowSet windows = small_windows(settings.model);
+  StepReport last;
+  const auto steps_until_reported = [&](const TrainingSettings& s, const std::string& dead) {
+    Trainer trainer(windows, all_of(windows), s);
+    for (const Parameter& p : trainer.model().parameters()) {
+      if (p.name.find(dead) != std::string::npos) Variable(p.value).mutable_value().fill(0);
+    }
+    while (!trainer.done()) {
+      last = trainer.train_step();
+      if (last.collapsed) return trainer.step();
+    }
+    return std::int64_t{0};
+  };
+  EXPECT_EQ(steps_until_reported(settings, "none"), 0);
+  EXPECT_GT(last.active_latents, 0);
+  settings.learning_rate = 1e-9;
+  settings.warm_up = 0;
+  EXPECT_EQ(steps_until_reported(settings, "upsampler.out"), 100);
+  EXPECT_EQ(steps_until_reported(settings, ".mean."), 100);
+  EXPECT_EQ(last.active_latents, 0);
+}
+
+TEST(Trainer, RefusesWindowsOfAnotherFormat) {
+  TrainingSettings settings = small_training();
+  const WindowSet windows = small_windows(settings.model);
+  settings.model.timesteps = 48;
+  try {
+    Trainer(windows, all_of(windows), settings);
+    FAIL() << "windows of 32 frames were taken for 48";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(),
+                 "the data have 32 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8, the model "
+                 "expects 48 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8");
+  }
+  EXPECT_THROW(Trainer(windows, {}, small_training()), std::invalid_argument);
+}
+
+TEST(Trainer, NamesTheSettingThatIsOutOfRange) {
+  const WindowSet windows = small_windows(small_settings());
+  const auto message = [&](const std::function<void(TrainingSettings&)>& spoil) -> std::string {
+    TrainingSettings settings = small_training();
+    spoil(settings);
+    try {
+      Trainer(windows, all_of(windows), settings);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(message([](auto& s) { s.epochs = 0; }), "training settings: epochs must be 1 to 100000");
+  EXPECT_EQ(message([](auto& s) { s.batch = 5000; }), "training settings: batch must be 1 to 4096");
+  EXPECT_EQ(message([](auto& s) { s.learning_rate = 2; }),
+            "training settings: learning rate must be above 0 and at most 1");
+  EXPECT_EQ(message([](auto& s) { s.warm_up = 1; }),
+            "training settings: warm-up must be a share of all steps, 0 to below 1");
+  EXPECT_EQ(message([](auto& s) { s.clip_norm = -1; }),
+            "training settings: clip norm must not be negative (0 = never)");
+  EXPECT_NE(message([](auto& s) { s.loss.beta = -1; }).find("beta = -1"), std::string::npos);
+  EXPECT_NE(message([](auto& s) { s.augment.dropped = 17; }), "no error");
+}
+
+}  // namespace
+}  // namespace supertac
