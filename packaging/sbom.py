@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes a CycloneDX 1.5 list of the programs in a folder and of what each links; of model files also their cards.
 
-    packaging/sbom.py BIN --version 0.1.0 [--out FILE] [MODEL ...]
+    packaging/sbom.py BIN --version 0.2.0 [--out FILE] [MODEL ...]
 
 The libraries are those that the programs themselves name, with the Debian package and version they came from; the
 headers that are compiled in are listed besides. The same programs give the same bytes.

@@ -33,7 +33,7 @@ struct Program {
 /// when interrupted.
 int run_program(const Program& program, int argc, const char* const* argv);
 
-/// "0.1.0", and the text of --version: version, commit, compiler.
+/// "0.2.0", and the text of --version: version, commit, compiler.
 std::string version();
 std::string version_text(const Program& program);
 
