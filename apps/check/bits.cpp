@@ -2,7 +2,7 @@
 
 #include "apps/check/machine.h"
 #include "apps/common/command_line/program.h"
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 #include "data/recordings/simulator.h"
 #include "io/numbers/sha256.h"
 #include "models/inference/prepared.h"

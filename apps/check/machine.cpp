@@ -7,7 +7,7 @@
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/threads.h"
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 #include "data/sensors/rig.h"
 #include "hardware/ports/port_list.h"
 #include "io/numbers/numbers.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "autograd/kernels/fast/conv.h"
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 
 namespace supertac::kernels {
 

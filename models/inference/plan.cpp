@@ -4,7 +4,7 @@
 #include <array>
 #include <optional>
 
-#include "autograd/kernels/fast/int8.h"
+#include "autograd/kernels/fast/int8/int8.h"
 
 namespace supertac {
 namespace {

@@ -6,7 +6,7 @@
 #include <set>
 #include <string>
 
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 #include "autograd/trace.h"
 #include "models/inference/plan.h"
 #include "models/inference/ranges.h"

@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 #include "models/inference/planner.h"
 
 namespace supertac {

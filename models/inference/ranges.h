@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "autograd/kernels/fast/int8.h"
+#include "autograd/kernels/fast/int8/int8.h"
 #include "layers/checkpoint.h"
 #include "models/networks/network.h"
 

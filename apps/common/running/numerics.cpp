@@ -1,6 +1,6 @@
 #include "apps/common/running/numerics.h"
 
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 
 // Weak: programs without ridge regression do not link OpenBLAS, and have nothing to say about it.
 extern "C" char* openblas_get_config() __attribute__((weak));

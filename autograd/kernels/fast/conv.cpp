@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "autograd/kernels/fast/geometry.h"
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 #include "autograd/kernels/fast/narrow.h"
 #include "autograd/kernels/fast/weight_forms.h"
 #include "autograd/kernels/fast/winograd.h"

@@ -1,10 +1,10 @@
 // Simple loops, compiled for several instruction sets and run on the one that isa_kernels() has chosen.
 //
 // Only for loops of separate multiplications and additions (-ffp-contract=off): their bits are the same at
-// any vector width. Sums and fused multiply-adds live in isa_kernels.inl.
+// any vector width. Sums and fused multiply-adds live in isa/kernels.inl.
 #pragma once
 
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 
 /// Of a lambda for run_loop(): it must be inlined to be compiled for the set.
 #define SUPERTAC_LOOP __attribute__((always_inline))

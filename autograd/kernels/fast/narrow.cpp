@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "autograd/kernels/fast/conv.h"
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 
 namespace supertac::kernels {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "autograd/kernels/fast/conv.h"
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 #include "autograd/kernels/fast/weight_forms.h"
 
 namespace supertac::kernels {

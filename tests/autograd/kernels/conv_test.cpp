@@ -2,7 +2,7 @@
 // where both add in the same order.
 #include "autograd/kernels/conv.h"
 
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 #include "autograd/kernels/fast/narrow.h"
 #include "autograd/kernels/fast/winograd.h"
 #include "autograd/kernels/linear.h"

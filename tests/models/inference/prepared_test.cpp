@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 #include "io/numbers/random.h"
 #include "models/inference/planner.h"
 #include "models/networks/frame_model.h"

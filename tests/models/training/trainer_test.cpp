@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 #include "io/numbers/hash.h"
 #include "models/inference/evaluation.h"
 #include "tests/models/support.h"

@@ -1,4 +1,4 @@
-#include "autograd/kernels/fast/int8.h"
+#include "autograd/kernels/fast/int8/int8.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 
 namespace supertac::kernels {
 namespace {

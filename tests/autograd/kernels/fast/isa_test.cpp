@@ -1,5 +1,5 @@
 // All instruction sets give the same bytes. The tables are called directly, past the choice at run time.
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 
 #include <algorithm>
 #include <cstring>

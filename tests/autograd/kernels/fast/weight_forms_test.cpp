@@ -3,7 +3,7 @@
 
 #include "autograd/kernels/conv.h"
 #include "autograd/kernels/elementwise.h"
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 #include "autograd/kernels/linear.h"
 #include "tests/autograd/check.h"
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 #include "tests/autograd/check.h"
 
 namespace supertac::kernels {

@@ -3,7 +3,7 @@
 #include <array>
 #include <span>
 
-#include "autograd/kernels/fast/int8_finish512.h"
+#include "autograd/kernels/fast/int8/finish512.h"
 
 // Tiles of the processor: the bytes of a place are a row of A, four bytes of sixteen outputs a row of B, and
 // one instruction adds A B to a tile of 16 x 16 sums.

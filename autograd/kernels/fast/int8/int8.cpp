@@ -1,4 +1,4 @@
-#include "autograd/kernels/fast/int8.h"
+#include "autograd/kernels/fast/int8/int8.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include <unistd.h>
 #endif
 
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 
 namespace supertac::kernels {
 namespace {

@@ -1,6 +1,6 @@
 // Scalar kernels: plain C++ with fused multiply-add. Compiled twice, see CMakeLists.txt: for any
 // processor, and (SUPERTAC_SCALAR_FMA) for those whose FMA instruction takes one instruction, not a call.
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 
 namespace supertac::kernels {
 namespace {
@@ -29,12 +29,12 @@ struct Vec {
   void store_part(real* p, Dim) const { *p = v; }
 };
 
-#include "autograd/kernels/fast/isa_kernels.inl"
-#include "autograd/kernels/fast/isa_winograd.inl"
+#include "autograd/kernels/fast/isa/kernels.inl"
+#include "autograd/kernels/fast/isa/winograd.inl"
 
-#include "autograd/kernels/fast/isa_tiles.inl"
+#include "autograd/kernels/fast/isa/tiles.inl"
 
-#include "autograd/kernels/fast/isa_inference.inl"
+#include "autograd/kernels/fast/isa/inference.inl"
 
 }  // namespace
 

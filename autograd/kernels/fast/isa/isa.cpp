@@ -1,4 +1,4 @@
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 
 #include <atomic>
 #include <cstdlib>

@@ -1,7 +1,7 @@
 #ifndef SUPERTAC_REAL_IS_DOUBLE
 #include <immintrin.h>
 
-#include "autograd/kernels/fast/int8.h"
+#include "autograd/kernels/fast/int8/int8.h"
 
 namespace supertac::kernels {
 namespace {
@@ -86,7 +86,7 @@ struct Sums {
   };
 };
 
-#include "autograd/kernels/fast/int8_loops.inl"
+#include "autograd/kernels/fast/int8/loops.inl"
 
 void widen(Dim n, const std::uint8_t* from, std::int16_t* to) {
   Dim i = 0;

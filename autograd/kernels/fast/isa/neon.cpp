@@ -1,7 +1,7 @@
 #ifndef SUPERTAC_REAL_IS_DOUBLE
 #include <arm_neon.h>
 
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 
 namespace supertac::kernels {
 namespace {
@@ -44,12 +44,12 @@ struct Vec {
   }
 };
 
-#include "autograd/kernels/fast/isa_kernels.inl"
-#include "autograd/kernels/fast/isa_winograd.inl"
+#include "autograd/kernels/fast/isa/kernels.inl"
+#include "autograd/kernels/fast/isa/winograd.inl"
 
-#include "autograd/kernels/fast/isa_tiles.inl"
+#include "autograd/kernels/fast/isa/tiles.inl"
 
-#include "autograd/kernels/fast/isa_inference.inl"
+#include "autograd/kernels/fast/isa/inference.inl"
 
 }  // namespace
 

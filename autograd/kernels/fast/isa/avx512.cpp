@@ -1,7 +1,7 @@
 #ifndef SUPERTAC_REAL_IS_DOUBLE
 #include <immintrin.h>
 
-#include "autograd/kernels/fast/isa.h"
+#include "autograd/kernels/fast/isa/isa.h"
 
 namespace supertac::kernels {
 namespace {
@@ -53,12 +53,12 @@ struct Vec {
   void store_part(real* p, Dim n) const { _mm512_mask_storeu_ps(p, mask(n), v); }
 };
 
-#include "autograd/kernels/fast/isa_kernels.inl"
-#include "autograd/kernels/fast/isa_winograd.inl"
+#include "autograd/kernels/fast/isa/kernels.inl"
+#include "autograd/kernels/fast/isa/winograd.inl"
 
-#include "autograd/kernels/fast/isa_tiles.inl"
+#include "autograd/kernels/fast/isa/tiles.inl"
 
-#include "autograd/kernels/fast/isa_inference.inl"
+#include "autograd/kernels/fast/isa/inference.inl"
 
 // Few outputs by vectors of eight: half of sixteen would be idle, and masks cost more than the wider set
 // gains.

@@ -3,7 +3,7 @@
 
 #include <immintrin.h>
 
-#include "autograd/kernels/fast/int8.h"
+#include "autograd/kernels/fast/int8/int8.h"
 
 namespace supertac::kernels {
 namespace {

@@ -1,5 +1,5 @@
 #ifndef SUPERTAC_REAL_IS_DOUBLE
-#include "autograd/kernels/fast/int8_finish512.h"
+#include "autograd/kernels/fast/int8/finish512.h"
 
 namespace supertac::kernels {
 namespace {
@@ -32,7 +32,7 @@ struct Sums {
   };
 };
 
-#include "autograd/kernels/fast/int8_loops.inl"
+#include "autograd/kernels/fast/int8/loops.inl"
 
 void line_to_bytes(Dim n, const float* x, Steps steps, std::uint8_t* bytes) {
   const __m512 per_step = _mm512_set1_ps(steps.per_step),

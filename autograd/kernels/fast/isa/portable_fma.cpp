@@ -1,0 +1,2 @@
+#define SUPERTAC_SCALAR_FMA
+#include "autograd/kernels/fast/isa/portable.cpp"

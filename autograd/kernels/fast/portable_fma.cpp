@@ -1,2 +1,0 @@
-#define SUPERTAC_SCALAR_FMA
-#include "autograd/kernels/fast/portable.cpp"
