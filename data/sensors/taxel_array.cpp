@@ -15,10 +15,10 @@ std::string TaxelArray::text() const {
 
 void TaxelArray::check() const {
   const auto within = [](double value, double low, double high) { return value >= low && value <= high; };
-  if (within(rows, 2, 16) && within(columns, 2, 16) && within(channels, 1, 8) && within(pitch_mm, 0.1, 100))
+  if (within(rows, 1, 64) && within(columns, 1, 64) && within(channels, 1, 8) && within(pitch_mm, 0.1, 100))
     return;
   throw std::invalid_argument(
-      "array: expected 2 to 16 rows and columns, 1 to 8 channels, a pitch of 0.1 to 100 mm; got " + text());
+      "array: expected 1 to 64 rows and columns, 1 to 8 channels, a pitch of 0.1 to 100 mm; got " + text());
 }
 
 std::vector<float> mean_of_channels(const TaxelArray& array, std::span<const float> frame) {

@@ -43,14 +43,14 @@ struct TaxelArray {
   ImageGrid picture(int scale) const { return {rows * scale, columns * scale, pitch_mm / scale}; }
   /// "4x4 taxels at 3 mm", "2x6 taxels at 2.5 mm with 3 channels"
   std::string text() const;
-  /// Throws std::invalid_argument outside 2 to 16 rows and columns, 1 to 8 channels, and a pitch of 0.1 to
+  /// Throws std::invalid_argument outside 1 to 64 rows and columns, 1 to 8 channels, and a pitch of 0.1 to
   /// 100 mm.
   void check() const;
   bool operator==(const TaxelArray&) const = default;
 };
 
 /// Most numbers a frame may have.
-constexpr std::size_t kMostSignals = 16 * 16 * 8;
+constexpr std::size_t kMostSignals = 64 * 64 * 8;
 
 /// The mean over each taxel's channels, [rows][columns]: a frame as a picture shows it.
 /// Throws std::invalid_argument unless the frame has array.signals() values.

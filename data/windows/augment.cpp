@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "io/numbers/hash.h"
 #include "io/numbers/random.h"
@@ -14,7 +15,7 @@ namespace {
 
 // Counters within one sample's stream: each term has its own, as many as there are signals.
 enum Term : std::uint64_t { kGain, kTaxelGain, kOffset, kDropCount, kDropChoice, kNoiseKey, kLift };
-constexpr std::size_t kMostTaxels = 16 * 16;
+constexpr std::size_t kMostTaxels = 64 * 64;
 constexpr std::uint64_t kAugmentStream = 0x617567ULL << 40;  // keeps clear of the streams other code uses
 
 double factor(double magnitude, double uniform) {
@@ -80,7 +81,9 @@ void augment(const AugmentSettings& settings, std::uint64_t seed, std::uint64_t 
   const auto dropped = choose_dropped(settings.dropped, array, random);
   const auto lift = static_cast<float>(settings.lift * random.uniform(kLift * signals));
   const double window_gain = factor(settings.gain, random.uniform(kGain));
-  std::array<float, kMostSignals> gain, offset, top;
+  // Too large for the stack of a small thread, and not to be taken anew for every window.
+  thread_local std::vector<float> gain, offset, top;
+  for (std::vector<float>* values : {&gain, &offset, &top}) values->resize(signals);
   for (std::size_t k = 0; k < signals; ++k) {
     const double own = factor(settings.taxel_gain, random.uniform(kTaxelGain * signals + k));
     gain[k] = static_cast<float>(window_gain * own);

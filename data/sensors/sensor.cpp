@@ -1,0 +1,137 @@
+#include "data/sensors/sensor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+#include <stdexcept>
+
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+
+namespace supertac {
+namespace {
+
+constexpr std::size_t kLongestText = 200, kLongestMark = 64;
+constexpr double kLargest = 1e9, kFinest = 1e-5;  // of a range, and of its share of its ends: floats hold it
+
+void expect(bool good, const std::string& key, const std::string& expected, const std::string& found) {
+  if (!good) throw std::invalid_argument("\"" + key + "\" must be " + expected + ", found " + found);
+}
+
+void expect_text(const std::string& key, const std::string& text) {
+  expect(!text.empty() && text.size() <= kLongestText && printable(text, kLongestText) == text, key,
+         "1 to 200 printable characters", in_quotes(text));
+}
+
+void check_scale(const SignalScale& s) {
+  expect_text("unit", s.unit);
+  const double largest = std::max(std::abs(s.low()), std::abs(s.high()));
+  expect(largest <= kLargest && s.high() - s.low() >= kFinest * largest && s.span != 0, "range",
+         "two numbers within 1e9, apart by at least 1e-5 of the larger",
+         format(s.low()) + " to " + format(s.high()));
+}
+
+void check_format(const FrameFormat& f) {
+  const auto one_of = [](const std::string& word, std::initializer_list<const char*> words) {
+    return std::ranges::find(words, word) != words.end();
+  };
+  if (f.kind == FrameKind::text) {
+    std::set<int> columns(f.skip.begin(), f.skip.end());
+    if (f.time) columns.insert(f.time->column);
+    expect(columns.size() == f.skip.size() + (f.time ? 1 : 0), "frame.skip",
+           "other columns than that of time", "one twice");
+    expect(columns.empty() || (*columns.begin() >= 0 && *columns.rbegin() < 100'000), "frame.skip",
+           "columns from 0 to 99999", std::to_string(columns.empty() ? 0 : *columns.begin()));
+    expect(f.separator >= ' ' ? f.separator <= '~' : f.separator == '\t', "frame.separator",
+           "one printable character or a tab", in_quotes(std::string(1, f.separator)));
+    expect(std::string("0123456789.+-eE").find(f.separator) == std::string::npos, "frame.separator",
+           "no part of a number", in_quotes(std::string(1, f.separator)));
+  }
+  if (f.kind != FrameKind::binary) return;
+  expect(f.header.size() <= kLongestMark && f.trailer.size() <= kLongestMark, "frame.header",
+         "at most 64 bytes, as frame.trailer", std::to_string(std::max(f.header.size(), f.trailer.size())));
+  expect(!f.header.empty() || !f.trailer.empty() || f.checksum != "none", "frame.header",
+         "at least a byte where there is neither trailer nor checksum", "nothing");
+  expect(one_of(f.type, {"u8", "i8", "u16", "i16", "u32", "f32"}), "frame.type",
+         "u8, i8, u16, i16, u32 or f32", in_quotes(f.type));
+  expect(one_of(f.checksum, {"none", "sum8", "xor8", "crc16-modbus", "crc16-ccitt"}), "frame.checksum",
+         "none, sum8, xor8, crc16-modbus or crc16-ccitt", in_quotes(f.checksum));
+  if (f.time)
+    expect(one_of(f.time->type, {"u16", "u32", "u64", "f64"}), "frame.time.type", "u16, u32, u64 or f64",
+           in_quotes(f.time->type));
+}
+
+}  // namespace
+
+std::size_t Sensor::values() const {
+  if (order.empty()) return array.signals();
+  return static_cast<std::size_t>(array.taxels() - std::ranges::count(order, -1)) *
+         static_cast<std::size_t>(array.channels);
+}
+
+std::vector<int> Sensor::silent() const {
+  std::set<int> all(dead.begin(), dead.end());
+  for (std::size_t k = 0; k < order.size(); ++k)
+    if (order[k] < 0) all.insert(static_cast<int>(k));
+  return {all.begin(), all.end()};
+}
+
+void Sensor::arrange(std::span<const float> sent, std::span<float> signals) const {
+  const auto channels = static_cast<std::size_t>(array.channels);
+  for (std::size_t k = 0; k < signals.size() / channels; ++k) {
+    const int from = order.empty() ? static_cast<int>(k) : order[k];
+    if (from >= 0)
+      std::copy_n(&sent[static_cast<std::size_t>(from) * channels], channels, &signals[k * channels]);
+  }
+  const std::vector<int> silent_ = silent();
+  if (silent_.empty()) return;
+  std::vector<bool> speaks(static_cast<std::size_t>(array.taxels()), true);
+  for (const int k : silent_) speaks[static_cast<std::size_t>(k)] = false;
+  for (const int k : silent_) {
+    for (std::size_t c = 0; c < channels; ++c) {
+      double near = 0, all = 0;
+      int count_near = 0, count_all = 0;
+      for (int other = 0; other < array.taxels(); ++other) {
+        if (!speaks[static_cast<std::size_t>(other)]) continue;
+        const double value = double{signals[static_cast<std::size_t>(other) * channels + c]};
+        all += value, ++count_all;
+        if (std::abs(other % array.columns - k % array.columns) > 1 ||
+            std::abs(other / array.columns - k / array.columns) > 1)
+          continue;
+        near += value, ++count_near;
+      }
+      signals[static_cast<std::size_t>(k) * channels + c] =
+          static_cast<float>(count_near > 0 ? near / count_near : all / std::max(count_all, 1));
+    }
+  }
+}
+
+void Sensor::check() const {
+  expect_text("name", name);
+  array.check();
+  check_scale(scale);
+  expect(rate_hz >= 1 && rate_hz <= 100'000, "rate_hz", "1 to 100000", format(rate_hz));
+  expect_text("port", port);
+  check_format(frame);
+  if (frame.kind == FrameKind::board)
+    expect(array == TaxelArray{}, "frame.kind", "text, json or binary where the array is not the rig's 4x4",
+           "\"board\" and " + array.text());
+  const auto taxels = static_cast<std::size_t>(array.taxels());
+  std::set<int> places;
+  std::size_t filled = 0;
+  for (const int place : order)
+    if (place >= 0) places.insert(place), ++filled;
+  expect(order.empty() || (order.size() == taxels && places.size() == filled && filled > 0 &&
+                           *places.rbegin() == static_cast<int>(filled) - 1),
+         "order",
+         "row-major, column-major, or for each of the " + std::to_string(taxels) +
+             " taxels its place in the frame, from 0 and each once, -1 where there is none",
+         std::to_string(order.size()) + " places, " + std::to_string(places.size()) + " different");
+  for (const int k : dead)
+    expect(k >= 0 && k < array.taxels(), "dead", "taxels 0 to " + std::to_string(taxels - 1),
+           std::to_string(k));
+  expect(silent().size() < taxels, "dead", "fewer than all taxels", std::to_string(taxels));
+}
+
+}  // namespace supertac

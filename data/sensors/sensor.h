@@ -1,0 +1,91 @@
+// A sensor is a file: what its array is, what its numbers mean, and how its frames arrive.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/sensors/taxel_array.h"
+
+namespace supertac {
+
+/// What a signal says: (rest - signal) / span is 0 where nothing touches and 1 where a taxel is pressed hard.
+/// As JSON {"unit": "counts", "pressed": "higher", "range": [40, 900]}; the default is the rig's.
+struct SignalScale {
+  std::string unit = "V";
+  double rest = 2.45;
+  double span = 0.36;  ///< below 0 when pressing raises the signal
+
+  bool rises() const { return span < 0; }
+  double low() const { return rises() ? rest : rest - span; }
+  double high() const { return rises() ? rest - span : rest; }
+  bool operator==(const SignalScale&) const = default;
+};
+
+/// The time stamp in a frame.
+struct FrameTime {
+  int column = 0;         ///< of a line of text
+  std::string key = {};   ///< of a JSON object
+  std::string type = {};  ///< of a binary frame, where it follows the header: "u16", "u32", "u64", "f64"
+  double unit_s = 1;      ///< "s", "ms" or "us"
+  bool operator==(const FrameTime&) const = default;
+};
+
+enum class FrameKind { board, text, json, binary };
+
+/// How a frame is written. Its values stand in the order that Sensor::order names.
+struct FrameFormat {
+  FrameKind kind = FrameKind::board;
+  std::optional<FrameTime> time = {};
+  // text: a line a frame
+  char separator = ',';        ///< ' ': any white space
+  std::vector<int> skip = {};  ///< columns that are neither time nor values
+  // json: a line a frame
+  std::string values = {};  ///< key of the array, which may be nested; empty: the line is the array
+  // binary: header, time, values, checksum, trailer
+  std::string header = {}, trailer = {};  ///< bytes
+  bool big_endian = false;
+  std::string type = "u16";       ///< "u8", "i8", "u16", "i16", "u32" or "f32"
+  std::string checksum = "none";  ///< "sum8", "xor8", "crc16-modbus", "crc16-ccitt": of time and values
+  bool operator==(const FrameFormat&) const = default;
+};
+
+/// A sensor; by default the rig.
+struct Sensor {
+  std::string name = "rig";
+  TaxelArray array = {};
+  SignalScale scale = {};
+  double rate_hz = rig::kFrameRateHz;
+  std::string port = "serial:auto@7372800";  ///< as open_port() takes it (hardware/ports/open_port.h)
+  FrameFormat frame = {};
+  std::vector<int> order =
+      {};                      ///< taxel k is the order[k]-th of a frame, -1: a place without taxel; empty: k
+  std::vector<int> dead = {};  ///< taxels that say nothing
+
+  /// Values in a frame: fewer than array.signals() where the array has places without taxel.
+  std::size_t values() const;
+  /// dead, and the places without taxel.
+  std::vector<int> silent() const;
+  /// From the values of a frame to [rows][columns][channels]; a silent taxel gets the mean of the others
+  /// around it, of all when there is none. `sent` has values() numbers, `signals` array.signals().
+  void arrange(std::span<const float> sent, std::span<float> signals) const;
+  /// Throws std::invalid_argument where a member is out of its range, with its key in the file.
+  void check() const;
+  bool operator==(const Sensor&) const = default;
+};
+
+/// "rig", or the path of a sensor's file. Throws FileError that names the key, what was expected and found.
+Sensor read_sensor(const std::string& name_or_path);
+/// The same from text; `where` names it in messages.
+Sensor sensor_of_json(const std::string& text, const std::string& where);
+nlohmann::ordered_json json_of(const Sensor& sensor);
+/// Throws std::invalid_argument as check(), FileError.
+void write_sensor(const std::string& path, const Sensor& sensor);
+
+/// Of one line each, for a recording's or model's metadata. Throws FileError as sensor_of_json().
+nlohmann::ordered_json json_of(const SignalScale& scale);
+SignalScale scale_of_json(const nlohmann::ordered_json& json, const std::string& where);
+
+}  // namespace supertac

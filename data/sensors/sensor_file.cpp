@@ -1,0 +1,304 @@
+// A Sensor as JSON.
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "data/sensors/sensor.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+
+namespace supertac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 20;
+constexpr std::pair<const char*, FrameKind> kKinds[] = {{"board", FrameKind::board},
+                                                        {"text", FrameKind::text},
+                                                        {"json", FrameKind::json},
+                                                        {"binary", FrameKind::binary}};
+constexpr std::pair<const char*, double> kUnits[] = {{"s", 1}, {"ms", 1e-3}, {"us", 1e-6}};
+
+/// The keys of one object, each read once; others are refused when it ends.
+class Keys {
+ public:
+  Keys(const Json& json, std::string where, std::string prefix = {})
+      : json_(json), where_(std::move(where)), prefix_(std::move(prefix)) {
+    if (!json.is_object()) throw FileError(where_, "expected an object {...}, found " + shown(json));
+  }
+
+  const Json* find(const char* name) {
+    known_ += (known_.empty() ? "" : ", ") + std::string(name);
+    return json_.contains(name) ? &json_.at(name) : nullptr;
+  }
+  double number(const char* name, double fallback) {
+    const Json* value = find(name);
+    if (value == nullptr) return fallback;
+    if (!value->is_number()) wrong(name, "a number", *value);
+    return value->get<double>();
+  }
+  int integer(const char* name, int fallback) {
+    const Json* value = find(name);
+    return value == nullptr ? fallback : whole(name, *value);
+  }
+  std::string text(const char* name, const std::string& fallback) {
+    const Json* value = find(name);
+    if (value == nullptr) return fallback;
+    if (!value->is_string()) wrong(name, "a text", *value);
+    return value->get<std::string>();
+  }
+  std::vector<int> integers(const char* name, const Json& value) {
+    if (!value.is_array()) wrong(name, "a list of whole numbers", value);
+    std::vector<int> list;
+    for (const Json& element : value) list.push_back(whole(name, element));
+    return list;
+  }
+  std::vector<int> integers(const char* name) {
+    const Json* value = find(name);
+    return value == nullptr ? std::vector<int>() : integers(name, *value);
+  }
+  /// One of the names of a table; its value.
+  template <class Table>
+  auto one_of(const char* name, const Table& table, const std::string& fallback) {
+    const std::string word = text(name, fallback);
+    std::string words;
+    for (const auto& [known, value] : table) {
+      if (word == known) return value;
+      words += (words.empty() ? "" : ", ") + std::string(known);
+    }
+    wrong(name, "one of " + words, Json(word));
+  }
+  void no_others() const {
+    for (const auto& [name, value] : json_.items())
+      if ((", " + known_ + ", ").find(", " + name + ", ") == std::string::npos)
+        throw FileError(where_, "knows no key " + in_quotes(prefix_ + name) + "; it may have " + known_);
+  }
+  [[noreturn]] void wrong(const char* name, const std::string& expected, const Json& found) const {
+    throw FileError(where_, "\"" + prefix_ + name + "\" must be " + expected + ", found " + shown(found));
+  }
+  const std::string& where() const { return where_; }
+
+ private:
+  static std::string shown(const Json& json) {
+    return printable(json.dump(-1, ' ', true, Json::error_handler_t::replace));
+  }
+  int whole(const char* name, const Json& value) const {
+    if (!value.is_number_integer() || value < -1'000'000 || value > 1'000'000)
+      wrong(name, "a whole number", value);
+    return value.get<int>();
+  }
+
+  const Json& json_;
+  std::string where_, prefix_, known_;
+};
+
+// So that 2.09 and 2.45 are 0.36 apart, as they are for a reader.
+double rounded(double value) {
+  char text[40];
+  const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::general, 12).ptr;
+  return parse_double({text, end}).value_or(value);
+}
+
+SignalScale take_scale(Keys& keys) {
+  SignalScale scale;
+  scale.unit = keys.text("unit", scale.unit);
+  constexpr std::pair<const char*, bool> kPolarities[] = {{"higher", true}, {"lower", false}};
+  const bool rises = keys.one_of("pressed", kPolarities, "lower");
+  if (const Json* range = keys.find("range")) {
+    if (!range->is_array() || range->size() != 2 || !range->at(0).is_number() || !range->at(1).is_number())
+      keys.wrong("range", "[low, high], the lower first", *range);
+    const double low = range->at(0), high = range->at(1);
+    if (!(low < high)) keys.wrong("range", "[low, high], the lower first", *range);
+    scale.rest = rises ? low : high;
+    scale.span = rounded(rises ? low - high : high - low);
+  } else if (rises) {
+    throw FileError(keys.where(), "has no \"range\": expected [rest, pressed hard] of a signal that rises");
+  }
+  return scale;
+}
+
+std::string bytes_of_hex(Keys& keys, const char* name) {
+  const std::string hex = keys.text(name, "");
+  std::string bytes;
+  for (std::size_t at = 0; at < hex.size(); at += 2) {
+    unsigned value = 0;
+    const auto read = std::from_chars(&hex[at], hex.data() + std::min(at + 2, hex.size()), value, 16);
+    if (read.ptr != &hex[at] + 2)
+      keys.wrong(name, "bytes as hexadecimal digits, such as \"AA55\"", Json(hex));
+    bytes += static_cast<char>(value);
+  }
+  return bytes;
+}
+
+std::string hex_of_bytes(const std::string& bytes) {
+  constexpr char kDigits[] = "0123456789ABCDEF";
+  std::string hex;
+  for (const char c : bytes) {
+    const auto byte = static_cast<unsigned char>(c);
+    hex += kDigits[byte >> 4], hex += kDigits[byte & 15];
+  }
+  return hex;
+}
+
+FrameTime time_of(const Json& json, FrameKind kind, const std::string& where) {
+  Keys keys(json, where, "frame.time.");
+  FrameTime time;
+  if (kind == FrameKind::text) time.column = keys.integer("column", 0);
+  if (kind == FrameKind::json) time.key = keys.text("key", "time");
+  if (kind == FrameKind::binary) time.type = keys.text("type", "u32");
+  time.unit_s = keys.one_of("unit", kUnits, "s");
+  keys.no_others();
+  return time;
+}
+
+FrameFormat format_of(const Json& json, const std::string& where) {
+  Keys keys(json, where, "frame.");
+  FrameFormat f;
+  f.kind = keys.one_of("kind", kKinds, "");
+  if (const Json* time = f.kind == FrameKind::board ? nullptr : keys.find("time"))
+    f.time = time_of(*time, f.kind, where);
+  if (f.kind == FrameKind::text) {
+    const std::string separator = keys.text("separator", ",");
+    if (separator.size() != 1) keys.wrong("separator", "one character", Json(separator));
+    f.separator = separator.front();
+    f.skip = keys.integers("skip");
+  }
+  if (f.kind == FrameKind::json) f.values = keys.text("values", "");
+  if (f.kind == FrameKind::binary) {
+    constexpr std::pair<const char*, bool> kEndian[] = {{"little", false}, {"big", true}};
+    f.header = bytes_of_hex(keys, "header");
+    f.trailer = bytes_of_hex(keys, "trailer");
+    f.big_endian = keys.one_of("endian", kEndian, "little");
+    f.type = keys.text("type", f.type);
+    f.checksum = keys.text("checksum", f.checksum);
+  }
+  keys.no_others();
+  return f;
+}
+
+std::vector<int> take_order(Keys& keys, const TaxelArray& array) {
+  const Json* value = keys.find("order");
+  if (value == nullptr || *value == "row-major") return {};
+  if (value->is_array()) return keys.integers("order", *value);
+  if (*value != "column-major") keys.wrong("order", "row-major, column-major, or a list of places", *value);
+  std::vector<int> order;
+  for (int k = 0; k < array.taxels(); ++k)
+    order.push_back(k % array.columns * array.rows + k / array.columns);
+  return order;
+}
+
+TaxelArray take_array(Keys& keys) {
+  TaxelArray array;
+  array.rows = keys.integer("rows", array.rows);
+  array.columns = keys.integer("columns", array.columns);
+  array.channels = keys.integer("channels", 1);
+  array.pitch_mm = keys.number("pitch_mm", array.pitch_mm);
+  array.check();
+  return array;
+}
+
+Json json_of(const FrameFormat& f) {
+  Json json;
+  for (const auto& [word, kind] : kKinds)
+    if (kind == f.kind) json["kind"] = word;
+  const bool text = f.kind == FrameKind::text, object = f.kind == FrameKind::json;
+  if (text) json["separator"] = std::string(1, f.separator);
+  if (text && !f.skip.empty()) json["skip"] = f.skip;
+  if (object && !f.values.empty()) json["values"] = f.values;
+  if (f.kind == FrameKind::binary) {
+    if (!f.header.empty()) json["header"] = hex_of_bytes(f.header);
+    json["endian"] = f.big_endian ? "big" : "little";
+    json["type"] = f.type;
+    if (f.checksum != "none") json["checksum"] = f.checksum;
+    if (!f.trailer.empty()) json["trailer"] = hex_of_bytes(f.trailer);
+  }
+  if (!f.time) return json;
+  Json time;
+  if (text) time["column"] = f.time->column;
+  if (object) time["key"] = f.time->key;
+  if (f.kind == FrameKind::binary) time["type"] = f.time->type;
+  for (const auto& [word, unit_s] : kUnits)
+    if (unit_s == f.time->unit_s) time["unit"] = word;
+  json["time"] = time;
+  return json;
+}
+
+}  // namespace
+
+Json json_of(const SignalScale& scale) {
+  return {{"unit", scale.unit},
+          {"pressed", scale.rises() ? "higher" : "lower"},
+          {"range", {rounded(scale.low()), rounded(scale.high())}}};
+}
+
+SignalScale scale_of_json(const Json& json, const std::string& where) {
+  Keys keys(json, where);
+  Sensor sensor;
+  sensor.scale = take_scale(keys);
+  keys.no_others();
+  try {
+    sensor.check();
+  } catch (const std::invalid_argument& error) {
+    throw FileError(where, error.what());
+  }
+  return sensor.scale;
+}
+
+Sensor sensor_of_json(const std::string& text, const std::string& where) {
+  try {
+    const Json json = parse_json_limited(text, {.max_bytes = kMostBytes});
+    Keys keys(json, where);
+    Sensor sensor;
+    sensor.name = keys.text("name", "sensor");
+    sensor.array = take_array(keys);
+    sensor.scale = take_scale(keys);
+    sensor.rate_hz = keys.number("rate_hz", 100);
+    sensor.port = keys.text("port", "-");
+    const Json* frame = keys.find("frame");
+    if (frame == nullptr)
+      throw FileError(where,
+                      "has no \"frame\", such as {\"kind\": \"text\"}; supertac-stream --probe finds it");
+    sensor.frame = format_of(*frame, where);
+    sensor.order = take_order(keys, sensor.array);
+    sensor.dead = keys.integers("dead");
+    keys.no_others();
+    sensor.check();
+    return sensor;
+  } catch (const JsonError& error) {
+    throw FileError(where, error.what());
+  } catch (const std::invalid_argument& error) {
+    throw FileError(where, error.what());
+  }
+}
+
+Sensor read_sensor(const std::string& name_or_path) {
+  const Sensor rig;
+  if (name_or_path == rig.name) return rig;
+  return sensor_of_json(read_text_file(name_or_path, kMostBytes), name_or_path);
+}
+
+Json json_of(const Sensor& sensor) {
+  const TaxelArray& array = sensor.array;
+  Json json = {{"name", sensor.name},
+               {"rows", array.rows},
+               {"columns", array.columns},
+               {"pitch_mm", array.pitch_mm},
+               {"channels", array.channels}};
+  json.update(json_of(sensor.scale));
+  json["rate_hz"] = sensor.rate_hz;
+  json["port"] = sensor.port;
+  json["frame"] = json_of(sensor.frame);
+  if (!sensor.order.empty()) json["order"] = sensor.order;
+  if (!sensor.dead.empty()) json["dead"] = sensor.dead;
+  return json;
+}
+
+void write_sensor(const std::string& path, const Sensor& sensor) {
+  sensor.check();
+  write_file(path, json_of(sensor).dump(2, ' ', true) + "\n");
+}
+
+}  // namespace supertac

@@ -1,0 +1,163 @@
+#include "data/sensors/sensor.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "io/files/file.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char kMat[] = R"({"name": "velostat mat", "rows": 3, "columns": 4, "pitch_mm": 5, "unit": "counts",
+  "pressed": "higher", "range": [40, 900], "rate_hz": 100, "port": "serial:/dev/ttyACM0@115200",
+  "frame": {"kind": "text", "separator": ",", "skip": [1], "time": {"column": 0, "unit": "ms"}},
+  "order": "column-major", "dead": [5]})";
+
+// What is said of kMat with one key changed: a value, or null to take it away.
+std::string refusal(const std::string& key, const Json& value) {
+  Json json = Json::parse(kMat);
+  Json* at = &json;
+  std::string name = key;
+  if (const auto dot = key.find('.'); dot != std::string::npos)
+    at = &json[key.substr(0, dot)], name = key.substr(dot + 1);
+  if (value.is_null())
+    at->erase(name);
+  else
+    (*at)[name] = value;
+  try {
+    sensor_of_json(json.dump(), "mat.json");
+  } catch (const FileError& error) {
+    return error.what();
+  }
+  return "taken";
+}
+
+TEST(Sensor, IsReadFromAFile) {
+  const Sensor mat = sensor_of_json(kMat, "mat.json");
+  EXPECT_EQ(mat.name, "velostat mat");
+  EXPECT_EQ(mat.array, (TaxelArray{.rows = 3, .columns = 4, .pitch_mm = 5}));
+  EXPECT_EQ(mat.scale, (SignalScale{.unit = "counts", .rest = 40, .span = -860}));
+  EXPECT_EQ(mat.frame.kind, FrameKind::text);
+  EXPECT_EQ(mat.frame.skip, std::vector{1});
+  EXPECT_EQ(mat.frame.time->column, 0);
+  EXPECT_EQ(mat.frame.time->unit_s, 1e-3);
+  EXPECT_EQ(mat.order, (std::vector{0, 3, 6, 9, 1, 4, 7, 10, 2, 5, 8, 11}));
+  EXPECT_EQ(mat.dead, std::vector{5});
+}
+
+TEST(Sensor, RigIsBuiltInAndItsFileGivesTheSameNumbers) {
+  EXPECT_EQ(read_sensor("rig"), Sensor{});
+  EXPECT_EQ(sensor_of_json(json_of(Sensor{}).dump(), "rig.json"), Sensor{});
+}
+
+TEST(Sensor, WritesWhatItReads) {
+  const TemporaryFolder folder;
+  Sensor sensor = sensor_of_json(kMat, "mat.json");
+  for (int kind = 1; kind < 4; ++kind) {
+    sensor.frame = {.kind = static_cast<FrameKind>(kind)};
+    if (kind == 2) sensor.frame.values = "taxels", sensor.frame.time = FrameTime{.key = "t", .unit_s = 1e-6};
+    if (kind == 3)
+      sensor.frame.header = "\xAA\x55", sensor.frame.trailer = "\n", sensor.frame.type = "i16",
+      sensor.frame.big_endian = true, sensor.frame.checksum = "crc16-modbus",
+      sensor.frame.time = FrameTime{.type = "u32", .unit_s = 1e-3};
+    write_sensor(folder / "sensor.json", sensor);
+    EXPECT_EQ(read_sensor(folder / "sensor.json"), sensor) << kind;
+  }
+}
+
+TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
+  EXPECT_EQ(
+      refusal("rows", 65),
+      "mat.json: array: expected 1 to 64 rows and columns, 1 to 8 channels, a pitch of 0.1 to 100 mm; got "
+      "65x4 taxels at 5 mm");
+  EXPECT_EQ(refusal("rows", "3"), "mat.json: \"rows\" must be a whole number, found \"3\"");
+  EXPECT_EQ(refusal("pressed", "up"), "mat.json: \"pressed\" must be one of higher, lower, found \"up\"");
+  EXPECT_EQ(refusal("range", Json{900, 40}),
+            "mat.json: \"range\" must be [low, high], the lower first, found [900,40]");
+  EXPECT_EQ(
+      refusal("range", Json{900, 900.001}),
+      "mat.json: \"range\" must be two numbers within 1e9, apart by at least 1e-5 of the larger, found 900 "
+      "to 900.001");
+  EXPECT_EQ(refusal("range", nullptr),
+            "mat.json: has no \"range\": expected [rest, pressed hard] of a signal that rises");
+  EXPECT_EQ(refusal("rate_hz", 0.5), "mat.json: \"rate_hz\" must be 1 to 100000, found 0.5");
+  EXPECT_EQ(refusal("pich_mm", 5),
+            "mat.json: knows no key 'pich_mm'; it may have name, rows, columns, channels, pitch_mm, unit, "
+            "pressed, range, rate_hz, port, frame, order, dead");
+  EXPECT_EQ(refusal("frame", nullptr),
+            "mat.json: has no \"frame\", such as {\"kind\": \"text\"}; supertac-stream --probe finds it");
+  EXPECT_EQ(refusal("frame.kind", "csv"),
+            "mat.json: \"frame.kind\" must be one of board, text, json, binary, found \"csv\"");
+  EXPECT_EQ(refusal("frame.kind", "board"), "mat.json: knows no key 'frame.separator'; it may have kind");
+  EXPECT_EQ(refusal("frame.separator", ", "),
+            "mat.json: \"frame.separator\" must be one character, found \", \"");
+  EXPECT_EQ(refusal("frame.skip", Json{0}),
+            "mat.json: \"frame.skip\" must be other columns than that of time, found one twice");
+  EXPECT_EQ(refusal("frame.time", Json{{"column", 0}, {"unit", "minutes"}}),
+            "mat.json: \"frame.time.unit\" must be one of s, ms, us, found \"minutes\"");
+  EXPECT_EQ(refusal("frame", Json{{"kind", "binary"}}),
+            "mat.json: \"frame.header\" must be at least a byte where there is neither trailer nor checksum, "
+            "found nothing");
+  EXPECT_EQ(
+      refusal("frame", Json{{"kind", "binary"}, {"header", "A5 5"}}),
+      "mat.json: \"frame.header\" must be bytes as hexadecimal digits, such as \"AA55\", found \"A5 5\"");
+  EXPECT_EQ(
+      refusal("order", Json{0, 1, 2}),
+      "mat.json: \"order\" must be row-major, column-major, or for each of the 12 taxels its place in the "
+      "frame, from 0 and each once, -1 where there is none, found 3 places, 3 different");
+  EXPECT_EQ(refusal("dead", Json{12}), "mat.json: \"dead\" must be taxels 0 to 11, found 12");
+  EXPECT_EQ(refusal("name", "a\nb"), "mat.json: \"name\" must be 1 to 200 printable characters, found 'a?b'");
+}
+
+TEST(Sensor, ArrangesTheTaxelsAndFillsTheSilentFromTheirNeighbours) {
+  Sensor cross;
+  cross.array = {.rows = 3, .columns = 3, .pitch_mm = 5, .channels = 2};
+  cross.order = {-1, 3, -1, 1, 0, 2, -1, 4, -1};
+  cross.frame.kind = FrameKind::text;
+  cross.check();
+  EXPECT_EQ(cross.values(), 10U);
+  EXPECT_EQ(cross.silent(), (std::vector{0, 2, 6, 8}));
+  const std::vector<float> frame = {0, 100, 1, 101, 2, 102, 3, 103, 4, 104};
+  std::vector<float> signals(18);
+  cross.arrange(frame, signals);
+  EXPECT_EQ(signals[8], 0);               // the centre
+  EXPECT_EQ(signals[2], 3);               // row 0, column 1
+  EXPECT_EQ(signals[3], 103);             //
+  EXPECT_FLOAT_EQ(signals[0], 4.0F / 3);  // the mean of 0, 1 and 3 around it
+}
+
+TEST(Sensor, MutatedFilesAreTakenOrRefusedInOneLine) {
+  std::mt19937 random(1);
+  const std::string whole = Json::parse(kMat).dump();
+  std::size_t taken = 0;
+  for (int n = 0; n < 500; ++n) {
+    std::string text = whole;
+    for (unsigned change = 0; change <= random() % 3; ++change) {
+      const std::size_t at = random() % text.size();
+      if (random() % 3 == 0)
+        text.erase(at, 1 + random() % 8);
+      else if (random() % 2 == 0)
+        text[at] = static_cast<char>(random() % 256);
+      else
+        text.insert(at, text.substr(random() % text.size(), random() % 12));
+      if (text.empty()) text = "{";
+    }
+    try {
+      sensor_of_json(text, "mat.json").check();
+      ++taken;
+    } catch (const FileError& error) {
+      EXPECT_TRUE(std::string(error.what()).starts_with("mat.json: "));
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+    }
+  }
+  EXPECT_GT(taken, 0U);
+  EXPECT_LT(taken, 250U);
+}
+
+}  // namespace
+}  // namespace supertac
