@@ -53,17 +53,9 @@ double loop_sse2() {
   return 2.0 * 4 * kSums * kSteps;
 }
 
-struct Set {
-  std::string_view name;
-  Loop loop;
-};
-
-const Set& best_set() {
-  static const Set kBest = __builtin_cpu_supports("avx512f") ? Set{"avx512", loop_avx512}
-                           : __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")
-                               ? Set{"avx2", loop_avx2}
-                               : Set{"sse2", loop_sse2};
-  return kBest;
+Loop best_loop() {
+  if (__builtin_cpu_supports("avx512f")) return loop_avx512;
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? loop_avx2 : loop_sse2;
 }
 
 }  // namespace
@@ -74,11 +66,9 @@ double cpu_seconds() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-std::string_view fma_set() { return best_set().name; }
-
 double fma_gflops() {
   constexpr int kCalls = 8;
-  const Loop loop = best_set().loop;
+  static const Loop loop = best_loop();
   loop();  // the first wide instructions after a pause run slowly
   double operations = 0;
   const double begin = cpu_seconds();

@@ -3,18 +3,14 @@
 // between the things that are compared with it.
 #pragma once
 
-#include <string_view>
-
 namespace supertac::bench {
 
 /// Processor time of the calling thread: what the clock on the wall shows on an idle machine, without the
 /// turns that other programs take on a busy one.
 double cpu_seconds();
 
-/// "avx512", "avx2", or "sse2" (multiplication and addition apart) for a processor without FMA.
-std::string_view fma_set();
-
-/// GFLOP/s (two per multiply-add) over about 20 us of the calling thread.
+/// GFLOP/s (two per multiply-add) over about 20 us of the calling thread; multiplication and addition apart
+/// on a processor without FMA.
 double fma_gflops();
 
 }  // namespace supertac::bench

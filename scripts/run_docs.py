@@ -3,7 +3,7 @@
 
     scripts/run_docs.py BUILD [PAGE ...]     runs the blocks of the pages with BUILD's programs
                                              (without names: README.md, docs/*.md, examples/README.md)
-    scripts/run_docs.py --check              runs nothing; looks at paths, lengths of lines and marks
+    scripts/run_docs.py --check              runs nothing; looks at paths, marks, and lengths of lines, cells and pages
 
 A comment before a block, which a reader of the page does not see, says what is done with it:
 
@@ -28,7 +28,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 BLOCK = re.compile(r"(?:<!-- ((?:not )?run\b.*?) -->\n)?```([a-z+]*)\n(.*?)```\n", re.DOTALL)
-LONGEST_LINE, LONGEST_README = 120, 150
+LONGEST_LINE, LONGEST_CELL, MOST_README_LINES, MOST_README_ROWS, MOST_RESULTS_WORDS = 120, 120, 120, 4, 9000
 # What a page may name although it is not in the tree: what programs make, and names that stand for others.
 MADE = re.compile(r"^(out/|build)|^(scores|sweep|model)\.|NAME|JOB")
 FILE = re.compile(r"`([\w./+-]+\.(?:cpp|h|inl|md|py|sh|gp|cmake|csv|png|svg|txt))`|\]\(([^)#: ]+)\)")
@@ -65,6 +65,23 @@ def long_lines(page):
             yield f"{page.relative_to(ROOT)}:{number}: {len(line)} characters, expected at most {LONGEST_LINE}"
 
 
+def long_cells(page):
+    for number, line in enumerate(page.read_text().splitlines(), 1):
+        longest = max(map(len, map(str.strip, line.split("|"))), default=0) if line.startswith("|") else 0
+        if longest > LONGEST_CELL:
+            yield f"{page.relative_to(ROOT)}:{number}: a cell of {longest} characters, expected at most {LONGEST_CELL}"
+
+
+def sizes():
+    """What the words may weigh: (what, how much, how much at most)."""
+    readme = (ROOT / "README.md").read_text()
+    reached = re.search(r"<!-- beside_the_paper -->\n(.*?)<!--", readme, re.DOTALL)[1]
+    results = sum(len(page.read_text().split()) for page in (ROOT / "bench/results").rglob("*.md"))
+    return [("lines of README.md", len(readme.splitlines()), MOST_README_LINES),
+            ("rows of README's table of what is reached", len(reached.splitlines()) - 2, MOST_README_ROWS),
+            ("words of bench/results", results, MOST_RESULTS_WORDS)]
+
+
 def unmarked(page):
     for mark, language, text in BLOCK.findall(page.read_text()):
         if not mark and not language:
@@ -77,11 +94,13 @@ def check():
     for page in sorted(ROOT / path for path in files if path.endswith(".md")):
         complaints += missing_paths(page, files)
         complaints += long_lines(page)
+        complaints += long_cells(page)
     for page in pages():
         complaints += unmarked(page)
-    lines = len((ROOT / "README.md").read_text().splitlines())
-    if lines > LONGEST_README:
-        complaints.append(f"README.md has {lines} lines, expected at most {LONGEST_README}")
+    for what, found, most in sizes():
+        print(f"{what}: {found} of {most}")
+        if found > most:
+            complaints.append(f"{what}: {found}, expected at most {most}")
     return complaints
 
 

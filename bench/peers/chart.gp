@@ -1,4 +1,4 @@
-# gnuplot -e "csv='bench/results/peers.csv'; png='bench/results/charts/peers.png'" bench/peers/chart.gp
+# gnuplot -e "csv='bench/results/speed/peers.csv'; png='bench/results/speed/peers.png'" bench/peers/chart.gp
 set datafile separator ","
 set terminal pngcairo size 900,520 font ",11"
 set output png

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """The same checkpoint in the engines that users would pick and in our code, turn by turn on one machine.
 
-    bench/peers/compare.py MODEL [--bin BUILD/bin] [--pairs 15] [--out bench/results/peers.csv]
+    bench/peers/compare.py MODEL [--bin BUILD/bin] [--pairs 15] [--out bench/results/speed/peers.csv]
 
 First checks that all draw the same pictures, up to the precision of each. Then times them alternately (A B A B ...) and
 prints medians of the paired ratios with a 95 % interval (order statistics). One-thread figures are processor time, which
@@ -171,7 +171,7 @@ def main():
     parser.add_argument("--pairs", type=int, default=15)
     parser.add_argument("--seconds", type=float, default=0.2, help="of each turn")
     parser.add_argument("--compile", action="store_true", help="also torch.compile, which takes minutes to get ready")
-    parser.add_argument("--out", default=ROOT / "bench/results/peers.csv")
+    parser.add_argument("--out", default=ROOT / "bench/results/speed/peers.csv")
     options = parser.parse_args()
     torch.set_num_threads(1)
     torch.manual_seed(1)

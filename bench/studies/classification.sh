@@ -1,6 +1,6 @@
 #!/bin/sh
 # Figure 11: textures told apart from raw frames and from super-resolved pictures, splits `trial`, `pass` and `window`,
-# five models and classifiers each. Models and recordings are those of real_recordings.sh; models it lacks are trained.
+# five models and classifiers each. Models and recordings are those of accuracy.py; models it lacks are trained.
 #   bench/studies/classification.sh OUT_DIR [BIN_DIR]
 set -eu
 here="$(cd "$(dirname "$0")" && pwd)"

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Breaks the product at about 220 places, one at a time, and shows the test that notices.
+"""Breaks the product at 190 places, one at a time, and shows the test that notices.
 
     bench/studies/mutation.py SOURCE SCRATCH RESULTS.csv [FOLDER[=PROGRAM,...] ...]
 
-SOURCE, a git work tree, is copied to SCRATCH/tree. MUTANTS below and places that SEED draws from io, autograd, layers,
-models and data are broken there, each behind a switch (the environment variable SUPERTAC_MUTANT), so that one build
+SOURCE, a git work tree, is copied to SCRATCH/tree. Places that SEED draws from io, autograd, layers, models and data
+are broken there, each behind a switch (the environment variable SUPERTAC_MUTANT), so that one build
 serves all. Then every mutant runs the tests of its file, of its folder, and of the folders that use it, until one
 fails, crashes or does not end. A mutant that does not compile is left out.
 
@@ -39,69 +39,7 @@ PROGRAMS = {
 
 HEADERS = ("exp.h", "hash.h", "median.h", "same_bits.h", "sums.h")  # with functions worth breaking
 
-# What reading suspects: file, text, its replacement; MUTANT is true when the mutant is on.
-MUTANTS = [
-    ("data/registration/apply_registration.cpp",
-     "static_cast<float>(part));", "MUTANT ? 0.5F : static_cast<float>(part));"),
-    ("data/registration/apply_registration.cpp",
-     "    times[k] = time[at - 1] + part * gap;", "    times[k] = MUTANT ? time[at - 1] : time[at - 1] + part * gap;"),
-    ("data/registration/apply_registration.cpp",
-     "time[i] += registration.lost_s;", "if (!MUTANT) time[i] += registration.lost_s;"),
-    ("data/registration/registration.cpp", "if (r.margin < kMinMargin)", "if (!MUTANT && r.margin < kMinMargin)"),
-    ("data/registration/registration.cpp",
-     "if (r.residual > kMaxResidualMm)", "if (!MUTANT && r.residual > kMaxResidualMm)"),
-    ("data/registration/registration.cpp",
-     "if (r.coverage < kMinCoverage)", "if (!MUTANT && r.coverage < kMinCoverage)"),
-    ("data/registration/registration.cpp", "if (r.matched < kMinMatched)", "if (!MUTANT && r.matched < kMinMatched)"),
-    ("data/registration/registration.cpp",
-     "fit.speed() * recording.filter_s() / 2;", "(MUTANT ? 0 : 1) * fit.speed() * recording.filter_s() / 2;"),
-    ("data/windows/levelling.cpp", "below = frames / kRestShare,", "below = frames / (MUTANT ? 16 : kRestShare),"),
-    ("data/windows/levelling.cpp",
-     "above = std::min(kTopRank, frames);", "above = std::min(kTopRank + MUTANT, frames);"),
-    ("data/windows/levelling.cpp",
-     "window[frame + k] -= kRestRemoved *", "window[frame + k] -= (MUTANT ? 1 : kRestRemoved) *"),
-    ("data/windows/levelling.cpp", "float gain = kLeastGain;", "float gain = MUTANT ? 1e-6F : kLeastGain;"),
-    ("data/windows/augment.cpp", "top[k] = dropped[", "top[k] = !MUTANT && dropped["),
-    ("data/windows/augment.cpp",
-     "settings.lift * random.uniform(kLift * signals)",
-     "settings.lift * (MUTANT ? 1 : random.uniform(kLift * signals))"),
-    ("data/windows/augment.cpp",
-     "2 * random.uniform(kOffset * signals + k) - 1", "2 * random.uniform(kOffset * signals + k) - (MUTANT ? 0 : 1)"),
-    ("data/windows/windows.cpp",
-     "if (settings_.scaling.levelled) level(", "if (!MUTANT && settings_.scaling.levelled) level("),
-    ("data/recordings/resample.cpp",
-     "recording.time_s[usable[i - 1]] > settings.max_gap_s;",
-     "recording.time_s[usable[i - 1]] > (MUTANT ? 2 : 1) * settings.max_gap_s;"),
-    ("data/scores/ridge.cpp",
-     "const OneThread one_thread;", "std::optional<OneThread> one_thread; if (!MUTANT) one_thread.emplace();"),
-    ("autograd/adam.cpp", "v[i] = flushed(", "v[i] = MUTANT ? u.b2 * v[i] + u.rest2 * g * g : flushed("),
-    ("autograd/adam.cpp", "x[i] -= u.rate * m[i]", "x[i] -= (MUTANT ? -1 : 1) * u.rate * m[i]"),
-    ("autograd/adam.cpp", "* u.correction + u.epsilon", "* (MUTANT ? real(1) : u.correction) + u.epsilon"),
-    ("autograd/kernels/losses.cpp", "g * (exp_same_bits(log_var[i]) - 1) / 2;",
-     "g * (exp_same_bits(log_var[i]) - (MUTANT ? 0 : 1)) / 2;"),
-    ("autograd/kernels/elementwise.cpp", "gz[i] * (z[i] - mean[i]) / 2", "gz[i] * (z[i] - (MUTANT ? 0 : mean[i])) / 2"),
-    ("autograd/ops/losses.cpp", "add_scaled_difference(n, g, to, from,",
-     "add_scaled_difference(n, MUTANT ? -g : g, to, from,"),
-    ("autograd/kernels/fast/sums.h",
-     "for (; i + kLanes <= n; i += kLanes) {", "for (; i + kLanes <= n - MUTANT; i += kLanes) {"),
-    ("layers/residual.cpp", "supertac::add(x, conv_.forward(h))", "supertac::add(MUTANT ? h : x, conv_.forward(h))"),
-    ("layers/residual.cpp",
-     "first_.forward(x, kRelu));\n  return", "first_.forward(x, MUTANT ? 1 : kRelu));\n  return"),
-    ("models/training/loss.cpp", "loss.kld = i == 0 ? kld", "loss.kld = i == 0 || MUTANT ? kld"),
-    ("models/networks/vae.cpp", "clamp(log_var_.forward(h), -10, 10)", "clamp(log_var_.forward(h), MUTANT ? -20 : -10, 10)"),
-    ("models/training/trainer.cpp", "if (data_.may_vary(indices_[slot]))", "if (!MUTANT && data_.may_vary(indices_[slot]))"),
-    ("models/training/objective.cpp", "if (settings_.augment.any()) augment(",
-     "if (!MUTANT && settings_.augment.any()) augment("),
-    ("models/training/objective.cpp", "return settings_.sampling ?", "return settings_.sampling && !MUTANT ?"),
-    ("models/training/collapse.cpp",
-     "own < kLeastShare * kLeastShare * due ||", "own < (MUTANT ? 0 : 1) * kLeastShare * kLeastShare * due ||"),
-    ("models/training/training_state.cpp", "adam_.set_steps(step);", "if (!MUTANT) adam_.set_steps(step);"),
-    ("models/training/training_state.cpp",
-     "flat_steps_ = static_cast<int>(flat_steps);", "if (!MUTANT) flat_steps_ = static_cast<int>(flat_steps);"),
-    ("io/files/file.cpp", "remove_leftovers(path_);", "if (!MUTANT) remove_leftovers(path_);"),
-]
-
-COLUMNS = ["mutant", "commit", "file", "line", "change", "tests run", "verdict", "killing test", "why it lives"]
+COLUMNS = ["mutant", "file", "line", "change", "tests run", "verdict", "killing test", "why it lives", "command", "commit"]
 SWITCH = """#pragma once
 #include <cstdlib>
 inline const int supertac_mutant = [] {
@@ -110,6 +48,7 @@ inline const int supertac_mutant = [] {
 }();
 #define MUTANT(number) (supertac_mutant == (number))
 """
+COMMAND = "bench/studies/mutation.py SOURCE SCRATCH RESULTS.csv"
 MEMORY = 12 << 30  # bytes; a mutant that asks for more ends with bad_alloc
 
 Mutant = collections.namedtuple("Mutant", "name file line old new what")
@@ -216,21 +155,13 @@ def changes(lines, index):
 
 
 def draw(tree, folder):
-    """The mutants of a folder: the table's, then those drawn; at most one a line."""
-    found, taken = [], set()
-    for file, old, new in (m for m in MUTANTS if m[0].startswith(folder + "/")):
-        text = (tree / file).read_text()
-        if text.count(old) != 1:
-            sys.exit(f"mutation: {file} holds {text.count(old)} times, not once: {old}")
-        line = text[:text.index(old)].count("\n") + 1
-        found.append((file, line, old, new, " ".join(f"{old} -> {new}".split())))
-        taken |= {(file, line + i) for i in range(old.count("\n") + 1)}
-    rng, places = random.Random(f"{SEED} {folder}"), {}
+    """The mutants of a folder, at most one a line."""
+    rng, places, found = random.Random(f"{SEED} {folder}"), {}, []
     for path in sorted((tree / folder).rglob("*")):
         if path.suffix in (".cpp", ".inl") or path.name in HEADERS:
             file, lines = str(path.relative_to(tree)), path.read_text().split("\n")
             for i, line in enumerate(lines):
-                if (file, i + 1) not in taken and (possible := list(changes(lines, i))):
+                if possible := list(changes(lines, i)):
                     places[file, i + 1, line] = possible
     for place in sorted(places):  # every second of the loops: there are so many
         if len(places[place]) == 1 and places[place][0][1] == SHORT_LOOP and rng.random() < 0.5:
@@ -389,7 +320,7 @@ def main():
         ran, verdict, killer = judge(m, numbers[m.name], asked[folder], tree, where, limits)
         with open(results, "a", newline="") as file:
             csv.writer(file, lineterminator="\n").writerow(
-                [m.name, commit, m.file, m.line, m.what, ran, verdict, killer, ""])
+                [m.name, m.file, m.line, m.what, ran, verdict, killer, "", COMMAND, commit])
         print(f"{m.name} {m.file}:{m.line} {m.what} | {killer or verdict.upper()}", flush=True)
 
 

@@ -1,6 +1,6 @@
 #!/bin/sh
 # The paper's Table 1 (window length), Figure 8 (latent size x window length) and Table 2 (8, 16, 32 pixels) on the real
-# recordings as real_recordings.sh imports them: five seeds, every fourth window (600 steps a model), unseen trial; the
+# recordings as accuracy.py imports them: five seeds, every fourth window (600 steps a model), unseen trial; the
 # pixels on all three splits.
 #   bench/studies/paper_tables.sh RECORDINGS OUT_DIR [BIN_DIR]
 # About two hours on one core; what is measured is not measured again.

@@ -1,4 +1,4 @@
-# gnuplot -e "csv='bench/results/precision.csv'; png='bench/results/charts/precision.png'" bench/studies/precision.gp
+# gnuplot -e "csv='bench/results/speed/precision.csv'; png='bench/results/speed/precision.png'" bench/studies/precision.gp
 set terminal pngcairo size 1000,560 font "sans,11"
 set output png
 set datafile separator ","

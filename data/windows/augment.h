@@ -23,7 +23,7 @@ struct AugmentSettings {
   }
 };
 
-/// What training does unless told otherwise (bench/studies/generalisation.sh; bench/results/accuracy.md).
+/// What training does unless told otherwise (bench/results/parts.md).
 inline constexpr AugmentSettings kStandardAugmentation{
     .lift = 0.4, .gain = 0.5, .taxel_gain = 0.3, .offset = 0.05, .noise = 0.02, .dropped = 2};
 

@@ -31,7 +31,7 @@ constexpr double kLeastIndentationMm = -0.5, kMostIndentationMm = 2.2;
 // Gains differ from pass to pass by themselves. Other fingers have a mount and a dome from half to twice the
 // simulated one's, a pad as narrow as the peaks of real signals show it and by a fifth narrower or wider,
 // taxels that feel nothing of a light touch, a tilt as real fingers have it, and they rock on their way. Each
-// was chosen on real plates by networks that had seen none (bench/results/simulated_fingers.md).
+// was chosen on real plates by networks that had seen none (bench/results/unseen_plates.md).
 constexpr double kFingerSpread = 0.7, kPadMm = 1.6, kPadSpread = 0.2, kMostThresholdMm = 0.1,
                  kTiltSpread = 0.05, kMostWander = 0.025;
 double about(double value, double spread, double u) { return value * same_bits::exp(spread * (2 * u - 1)); }

@@ -32,7 +32,7 @@ void add_random_passes(WindowSet& windows, const RandomPasses& passes);
 /// a twentieth, all drawn for each pass. A tenth as many windows as there are already, 2,400 at most unless
 /// `many` are wanted: beside other fingers, where what is faint may be a texture, the whole tenth is, and all
 /// beyond those 2,400 are of a finger that hardly touches. Without them networks drew textures on signals
-/// that stand, drift or are noisy (bench/results/audit/silent_signals.csv): levelling shows a finger's noise
+/// that stand, drift or are noisy (bench/results/sensor_faults.md): levelling shows a finger's noise
 /// as large as another's texture. Set aside like random passes, and not usual(): an alarm must not take them
 /// for what a finger feels. Of the windows' array, rate and range. A pure function of the arguments.
 void add_silent_passes(WindowSet& windows, std::uint64_t seed, bool many = false);

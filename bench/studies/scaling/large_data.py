@@ -12,12 +12,16 @@ second training with --memory runs in a memory cgroup of that size, which counts
 import csv
 import json
 import os
+import pathlib
 import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
+from source import source  # noqa: E402
 
 COLUMNS = ["frames", "recordings", "tracks_mb", "mode", "memory", "start_s", "start_cpu_s", "peak_mb", "steps",
            "ms_per_step", "cpu_ms_per_step"]
@@ -132,12 +136,12 @@ def main():
     scratch = table + ".runs"
     os.makedirs(scratch, exist_ok=True)
     with open(table, "w") as file:
-        writer = csv.DictWriter(file, COLUMNS)
+        writer = csv.DictWriter(file, [*COLUMNS, *source()])
         writer.writeheader()
         for folder in folders:
             train = os.path.join(bin_dir, "supertac-train")
             for line in measure(train, folder, memory, float(seconds), options, scratch):
-                writer.writerow(line)
+                writer.writerow(line | source())
                 file.flush()
                 print(line, flush=True)
     shutil.rmtree(scratch)

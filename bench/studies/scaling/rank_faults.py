@@ -2,17 +2,21 @@
 """Seeded faults of trainings on several processes: rank_faults.py BUILD_DIR OUT_DIR [RUNS] [SEED].
 
 Each run starts 2 or 4 ranks under mpirun and does one of: kill -9 of any rank at a random moment, a frozen rank
-(SIGSTOP), a full disk (rank 0 may not write any more than 60 kB into a file), one rank with another option. It must end with an error within 30 s of the fault and with at most one line of ours, and a resumed
-run, on another number of ranks, must give the bytes of an undisturbed one. Writes OUT_DIR/rank_faults.csv.
+(SIGSTOP), a full disk (rank 0 may not write any more than 60 kB into a file), one rank with another option. It must
+end with an error within 30 s of the fault and with at most one line of ours, and a resumed run, on another number of ranks, must give the bytes of an undisturbed one. Writes OUT_DIR/rank_faults.csv.
 """
 import hashlib
 import os
+import pathlib
 import random
 import resource
 import signal
 import subprocess
 import sys
 import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
+from source import source  # noqa: E402
 
 MPIRUN = os.environ.get("MPIRUN", "mpirun")
 LIMIT_S = 30
@@ -95,7 +99,7 @@ def fault_run(number, chance, train, folder, data, usual_s):
         subprocess.run(command(train, 6 - ranks, out, data, more), check=True, stderr=subprocess.DEVNULL)
     return {"run": number, "kind": kind if struck else kind + " (too late)", "ranks": ranks, "rank": rank,
             "moment_s": f"{moment:.2f}", "code": code, "seconds": f"{seconds:.1f}", "lines": len(lines),
-            "in_time": struck is None or (code not in (0, "hangs") or over) and seconds <= LIMIT_S, "hash": digest(out)}
+            "in_time": struck is None or (code not in (0, "hangs") or over) and seconds <= LIMIT_S, "hash": digest(out), **source()}
 
 
 def main():

@@ -15,6 +15,9 @@ import subprocess
 import sys
 import tempfile
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
+from source import source  # noqa: E402
+
 OPTIONS = ["--split", "none", "--stride", "6", "--epochs", "1", "--threads", "1", "--quiet"]
 ENVIRONMENT = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
                             "OMPI_MCA_hwloc_base_binding_policy": "none"}
@@ -56,7 +59,7 @@ def main():
     runs = {"no MPI": [alone], "1": ["mpirun", "-n", "1", program], "2": ["mpirun", "-n", "2", program], "2 apart": []}
     with open(results, "w") as file, tempfile.TemporaryDirectory() as folder:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["pair", "ranks", "ms_per_step", "steps", "hash"])
+        writer.writerow(["pair", "ranks", "ms_per_step", "steps", "hash", *source()])
         first = None
         for pair in range(pairs):
             for name in list(runs)[:: 1 if pair % 2 == 0 else -1]:
@@ -64,7 +67,7 @@ def main():
                 took, steps, digest = work[0](work[1], recordings, folder)
                 if digest and digest != (first := first or digest):
                     raise SystemExit(f"rank_speed.py: {name}: model {digest}, the first was {first}")
-                writer.writerow([pair, name, f"{took:.3f}", steps, digest])
+                writer.writerow([pair, name, f"{took:.3f}", steps, digest, *source().values()])
                 file.flush()
                 print(pair, name, f"{took:.3f} ms", digest, file=sys.stderr)
 

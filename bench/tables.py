@@ -1,0 +1,310 @@
+"""The tables of README.md and bench/results, each made from CSV files by the function of its name."""
+import csv
+import math
+import pathlib
+import statistics
+
+RESULTS = pathlib.Path(__file__).resolve().parent / "results"
+T_975 = {1: 12.706, 2: 4.303, 3: 3.182, 4: 2.776, 5: 2.571, 6: 2.447, 7: 2.365, 8: 2.306, 9: 2.262}  # Student's t
+
+
+def rows(name):
+    """Lines of a CSV; `command` and `commit` are filled from the line above."""
+    with open(RESULTS / name, newline="") as file:
+        found = list(csv.DictReader(file))
+    source = {}
+    for number, row in enumerate(found, 2):  # a stray comma would move all columns behind it
+        if None in row or None in row.values():
+            raise SystemExit(f"{name}: line {number} has not as many values as the head; quote commas within a value")
+        source |= {key: row[key] for key in ("command", "commit") if row.get(key)}
+        row.update(source)
+    return found
+
+
+def chosen(found, **wanted):
+    return [r for r in found if all(r[key] == value for key, value in wanted.items())]
+
+
+def table(head, lines):
+    return "\n".join("| " + " | ".join(line) + " |" for line in [head, ["---"] * len(head), *lines])
+
+
+def mean(found, column):
+    return statistics.fmean(float(r[column]) for r in found if r[column])
+
+
+def percent(found, column, digits=1):
+    return f"{100 * mean(found, column):.{digits}f} %"
+
+
+def plus_minus(value, half, digits):
+    return f"{float(value):.{digits}f}" + (f" ± {float(half):.{digits}f}" if float(half or 0) > 0 else "")
+
+
+def over_seeds(found, column, digits=3):
+    """Mean and 95 % interval; the values themselves where they are fewer than three."""
+    values = [float(r[column]) for r in found if r[column]]
+    if len(values) < 3:
+        return ", ".join(f"{v:.{digits}f}" for v in values)
+    half = T_975.get(len(values) - 1, 1.96) * statistics.stdev(values) / math.sqrt(len(values))
+    return plus_minus(statistics.fmean(values), half, digits)
+
+
+# How good is the picture? ---------------------------------------------------------------------------------------------
+
+def beside_the_paper():
+    whole, window = rows("accuracy/whole_passes.csv"), chosen(rows("accuracy/textured_windows.csv"), split="window")[0]
+    best = chosen(whole, network="best", registered="aligned")
+    inside, contact = (chosen(rows("accuracy/textures.csv"), split="trial", view="super_resolved", part=part)[0]["accuracy"]
+                       for part in ("inside", "contact"))
+    held_out = lambda column, digits: plus_minus(window[column], window[column + "_ci95"], digits)
+    return table(["figure", "paper", "ours, split `window`", "ours, unseen trial"], [
+        ["SSIM", "0.81", held_out("ssim", 3), over_seeds(best, "contact_ssim")],
+        ["PSNR", "27.3 dB", held_out("psnr_mean_db", 1) + " dB", over_seeds(best, "contact_psnr_db", 1) + " dB"],
+        ["position error", "0.65 mm", held_out("position_error_mm", 2) + " mm", f"{mean(best, 'position_error_mm'):.2f} mm"],
+        ["textures told apart", "93.1 %", "not measured", f"{100 * float(contact):.1f} % ({100 * float(inside):.1f} % inside)"]])
+
+
+NETWORKS = {"four of best averaged": "four of `best` averaged", "best": "`best`", "paper with Muon": "`paper` with Muon",
+            "paper": "`paper`", "tiny": "`tiny`", "ridge regression": "ridge regression", "bicubic": "bicubic",
+            "mean image": "mean image"}
+
+
+def reached():
+    found, lines = rows("accuracy/whole_passes.csv"), []
+    for network, name in NETWORKS.items():
+        aligned, alone = (chosen(found, network=network, registered=how) for how in ("aligned", "independent"))
+        known = any(r["position_error_mm"] for r in aligned)
+        lines.append([name, over_seeds(aligned, "contact_ssim"), over_seeds(aligned, "contact_psnr_db", 1),
+                      f"{mean(aligned, 'position_error_mm'):.2f}" if known else "", percent(aligned, "flat_ghost_rate"),
+                      percent(aligned, "miss_rate") if known else "", over_seeds(alone, "contact_ssim"),
+                      over_seeds(alone, "contact_psnr_db", 1)])
+    return table(["network", "contact SSIM", "PSNR dB", "position error mm", "ghost rate", "miss rate",
+                  "registered independently: SSIM", "PSNR dB"], lines)
+
+
+def pixels():
+    found = rows("accuracy/pixels.csv")
+    cell = lambda r: f"{over_seeds(r, 'ssim')}, {mean(r, 'psnr_db'):.1f} dB"
+    return table(["split", "8x8", "16x16", "32x32"],
+                 [[f"`{split}`"] + [cell(chosen(found, split=split, scale=scale)) for scale in "248"]
+                  for split in ("trial", "pass", "window")])
+
+
+VIEWS = {"frame": "last 4x4 frame", "history32": "last 32 frames", "latents": "latents",
+         "super_resolved": "super-resolved 16x16", "truth": "the plate itself"}
+
+
+def textures():
+    found, lines = rows("accuracy/textures.csv"), []
+    for view, name in VIEWS.items():
+        cells = [chosen(found, split="trial", view=view, part=part)[0] for part in ("inside", "contact")]
+        lines.append([name] + [f"{100 * float(c['accuracy']):.1f} ({100 * float(c['passes_ci95_low']):.0f} to "
+                               f"{100 * float(c['passes_ci95_high']):.0f})" for c in cells])
+    return table(["what the classifier sees", "inside the texture, %", "all contact, %"], lines)
+
+
+def first_contact():
+    found = rows("accuracy/first_contact.csv")
+    return table(["mm since the first contact"] + [r["felt_mm"] for r in found],
+                 [["contact SSIM"] + [f"{float(r['contact_ssim']):.2f}" for r in found],
+                  ["PSNR dB"] + [r["contact_psnr_db"] for r in found]])
+
+
+def demo():
+    names = {"trial 2 of its six plates": "trial 2 of its six plates", "eight plates never felt": "eight unseen plates",
+             "trial 2 of a plain plate": "trial 2 of a plain plate"}
+    return table(["windows of", "contact SSIM", "PSNR dB", "position error mm", "ghost rate", "SSIM of ridge regression"],
+                 [[names[r["windows of"]], r["contact_ssim"], r["contact_psnr_db"], r["position_mm"],
+                   f"{100 * float(r['flat_ghost_rate']):.1f} %", ridge["contact_ssim"]]
+                  for r, ridge in zip(chosen(rows("accuracy/demo.csv"), method="network"),
+                                      chosen(rows("accuracy/demo.csv"), method="ridge"))])
+
+
+# On plates it has not seen --------------------------------------------------------------------------------------------
+
+def left_out():
+    found = rows("unseen_plates/left_out.csv")
+    four = ("3_Bumps", "6_Bumps", "4_Ridges", "6_Ridges")
+    plates = {plate: chosen(found, left_out=plate) for plate in (*four, "4_Blob", "6_Blob", "4_Waves", "6_Waves")}
+
+    def line(name, of):
+        optional = lambda column: over_seeds(of, column) if any(r[column] for r in of) else ""
+        return [name, over_seeds(of, "contact_ssim"), over_seeds(of, "contact_psnr_db", 1), percent(of, "flat_ghost_rate"),
+                percent(of, "miss_rate"), percent(of, "coverage"), optional("independent_ssim"),
+                optional("without_random_plates_ssim")]
+
+    def by_seed():
+        for seed in sorted({r["seed"] for r in plates["3_Bumps"]}):
+            of = [chosen(plates[plate], seed=seed)[0] for plate in four]
+            yield {column: str(mean(of, column)) for column in of[0] if column not in ("left_out", "seed", "command", "commit")}
+
+    return table(["plate left out", "contact SSIM", "PSNR dB", "ghost rate", "miss rate", "intervals hold", "SSIM on trial 2",
+                  "without random plates"],
+                 [line(plate, of) for plate, of in plates.items()] + [line("mean of the first four", list(by_seed()))])
+
+
+# When the sensor misbehaves -------------------------------------------------------------------------------------------
+
+def corruptions():
+    found, lines = rows("sensor_faults/corruptions.csv"), []
+    for name in dict.fromkeys(r["corruption"] for r in found if r["corruption"] != "none"):
+        of = lambda model, severity, name=name: chosen(found, model=model, corruption=name, severity=severity)
+        lines.append([name] + [f"{mean(of('paper', s), 'ssim'):.3f}" for s in "135"] +
+                     [f"{mean(of(model, '3'), 'ssim'):.3f}" for model in ("tiny", "four of paper")] +
+                     [percent(of("paper", "3"), "coverage", 0), f"{mean(of('paper', '3'), 'alarm_auroc'):.2f}",
+                      percent(of("paper", "3"), "alarms", 0)])
+    return table(["corruption", "`paper`, severity 1", "3", "5", "`tiny`, 3", "four of `paper`, 3", "intervals hold, 3",
+                  "AUROC of the alarm, 3", "alarms, 3"], lines)
+
+
+def silence():
+    found = rows("sensor_faults/silent_signals.csv")
+    signals = [("constant", "0"), ("noisy", "0.01"), ("noisy", "0.04"), ("drifting", "0.02"), ("drifting", "0.1")]
+    lines = []
+    for network, shown in (("paper", "no"), ("paper", "yes"), ("tiny", "no"), ("tiny", "yes"), ("demo", "yes")):
+        of = lambda kind, strength: chosen(found, network=network, silent_passes=shown, signals=kind, strength=strength)
+        lines.append([f"`{network}`", shown] + [percent(of(*signal), "ghost_rate") for signal in signals])
+    return table(["network", "silent passes in training"] + [kind if s == "0" else f"{kind}, {s}" for kind, s in signals], lines)
+
+
+# How fast -------------------------------------------------------------------------------------------------------------
+
+TASKS = {"infer": "batch {}", "int8": "int8, batch {}", "train": "training step, {} threads"}
+PACKAGES = {"pytorch": "torch", "torch.compile": "torch", "onnx": "onnxruntime", "openvino": "openvino"}
+
+
+def duration(us):
+    return f"{float(us) / 1000:.2f} ms" if float(us) >= 1000 else f"{float(us):.0f} us"
+
+
+def task(r):
+    kind, number = r["task"].split()
+    return TASKS[kind].format(number).replace("1 threads", "1 thread")
+
+
+def ratio(r):
+    return f"{float(r['ratio']):.1f} ({float(r['ratio_low']):.1f} to {float(r['ratio_high']):.1f})"
+
+
+def with_version(r):
+    known = dict(zip(r["versions"].split()[::2], r["versions"].split()[1::2]))
+    package = PACKAGES.get(r["peer"].split()[0])
+    return f"{r['peer']} {known[package].split('+')[0]}" if package in known else r["peer"]
+
+
+def fastest():
+    """For README: the engine that comes closest, of three tasks."""
+    lines = []
+    for name, wanted in (("one picture", "infer 1"), ("one picture in int8", "int8 1"), ("training step of 64 windows", "train 1")):
+        r = min(chosen(rows("speed/peers.csv"), task=wanted), key=lambda r: float(r["ratio"]))
+        lines.append([name, duration(r["ours_us"]), f"{duration(r['peer_us'])} ({with_version(r)})", ratio(r)])
+    return table(["task", "SuperTac", "fastest other engine", "times as fast (95 % interval)"], lines)
+
+
+def speed():
+    machines = [rows(f"speed/{name}.csv") for name in ("peers", "peers_avx512", "peers_avx2")]
+    return table(["task", "compared with", "ours, AMX", "times as fast, AMX", "AVX-512", "AVX2"],
+                 [[task(r), with_version(r), duration(r["ours_us"])] +
+                  [ratio(chosen(found, task=r["task"], peer=r["peer"])[0]) for found in machines] for r in machines[0]])
+
+
+def precision():
+    found, lines = rows("speed/precision.csv"), []
+    for network in ("tiny", "best", "four of best"):
+        fp32, int8 = ([r for r in found if r["name"].rsplit(" ", 1)[0] == network and r["precision"] == p] for p in ("fp32", "int8"))
+        lost = max(float(a["contact_ssim"]) - float(b["contact_ssim"]) for a, b in zip(fp32, int8))
+        lines.append([network, f"{mean(fp32, 'contact_ssim'):.4f}", f"{mean(int8, 'contact_ssim'):.4f}", f"{lost:.4f}",
+                      duration(mean(fp32, "median_us")), duration(mean(int8, "median_us"))])
+    return table(["network", "contact SSIM in fp32", "in int8", "most that a seed loses", "a picture in fp32", "in int8"], lines)
+
+
+# How reliable ---------------------------------------------------------------------------------------------------------
+
+def studies():
+    kill, unplug, io, ends = (rows(f"rig/{name}.csv") for name in ("kill", "unplug", "io", "ends"))
+    broken = lambda found: sum(r["broken"] not in ("", "0") for r in found)
+    soak = {r["quantity"]: r["measured"] for r in rows("rig/soak.csv")}
+    mutants, ranks = rows("reliability/mutation.csv"), rows("reliability/rank_faults.csv")
+    attacks = rows("reliability/hostile.csv")
+    kinds = ("command lines", "mutants", "signals")
+    harm = ("crashes", "hangs", "above 1 GB", "raw exceptions", "control codes", "shells", "files overwritten", "half folders")
+    findings = sum(int(r["count"]) for r in attacks if r["what"] in harm)
+    lines = [[f"`rig/{name}.csv`", what, f"{len(found)} runs", f"{broken(found)} ended otherwise than promised"]
+             for name, what, found in (("kill", "a collecting program is killed", kill), ("ends", "signals and full disks", ends),
+                                       ("io", "one system call fails or writes less", io), ("unplug", "a cable is pulled", unplug))]
+    for r in rows("rig/faults.csv"):
+        lines.append(["`rig/faults.csv`", r["kind"], f"{r['runs']} runs",
+                      f"{r['complete']} complete, {r['typed_errors']} typed errors, {r['broken_promises']} broken promises"])
+    pairs, hour = rows("rig/page_load.csv"), rows("rig/page_hour.csv")
+    p99 = [{key: float(r["p99_ms"]) for r in pairs if r["pair"] == pair for key in [r["load"]]} for pair in {r["pair"] for r in pairs}]
+    lines += [
+        ["`rig/soak.csv`", "a faulty board is streamed", f"{float(soak['seconds']):.0f} s",
+         "every lost frame counted; 0.86 ms from frame to picture at the 99th percentile"],
+        ["`rig/page_load.csv`", "the live page under load", f"{len(p99)} pairs",
+         f"99th percentile {statistics.median(p['with'] / p['without'] for p in p99):.2f} times that without"],
+        ["`rig/page_hour.csv`", "the live page, an hour", f"{float(hour[-1]['seconds']):.0f} s",
+         f"the program's memory grew by {float(hour[-1]['program_resident_kb']) - float(hour[0]['program_resident_kb']):.0f} kB"],
+        ["`reliability/hostile.csv`", "evil options, mutated files, signals",
+         f"{sum(int(r['count']) for r in attacks if r['what'] in kinds):,}", f"{findings} crashes, hangs or overwritten files"],
+        ["`reliability/rank_faults.csv`", "kills, freezes, full disks with several ranks", f"{len(ranks)} runs",
+         f"{sum(r['in_time'] == 'True' for r in ranks)} ended in time, with one line"],
+        ["`reliability/ledger_tampering.csv`", "a training is falsified", f"{len(rows('reliability/ledger_tampering.csv'))}",
+         f"{sum(r['right'] == 'yes' for r in rows('reliability/ledger_tampering.csv'))} found, with step and array"],
+        ["`reliability/mutation.csv`", "one place of the source is broken", f"{len(mutants)}",
+         f"{sum(r['verdict'] == 'killed' for r in mutants)} noticed by a test"]]
+    return table(["file", "what is done", "how often", "result"], lines)
+
+
+# What each part buys --------------------------------------------------------------------------------------------------
+
+def parts():
+    base = {r["method"]: r for r in rows("parts/baselines.csv")}
+    step = {" ".join(r["step"].split()[:2]): r for r in rows("parts/history.csv")}
+    whole = lambda network: chosen(rows("accuracy/whole_passes.csv"), network=network, registered="aligned")
+    lines = []
+
+    def add(part, with_it, without, source):
+        both = []
+        for of in (with_it, without):
+            if isinstance(of, dict):
+                both.append((float(of["contact_ssim"]), float(of["contact_psnr_db"]), plus_minus(of["contact_ssim"], of["contact_ssim_ci95"], 3)))
+            else:
+                both.append((mean(of, "contact_ssim"), mean(of, "contact_psnr_db"), over_seeds(of, "contact_ssim")))
+        lines.append([part, both[0][2], both[1][2], f"{both[0][0] - both[1][0]:+.3f}", f"{both[0][1] - both[1][1]:+.1f}", f"`{source}`"])
+
+    add("a window of time instead of one frame", base["paper"], base["one frame, our blocks"], "parts/baselines.csv")
+    add("windows three times as long (100 Hz)", step["windows at"], step["first training:"], "parts/history.csv")
+    add("SSIM term in the loss (`tiny`)", whole("tiny"), whole("tiny without the SSIM term"), "accuracy/whole_passes.csv")
+    add("lost frames without a step found", step["losses that"], step["passes of"], "parts/history.csv")
+    add("finger lifted in augmentation", step["the finger"], step["windows normalised"], "parts/history.csv")
+    add("clocks restored", step["clocks of"], step["the finger"], "parts/history.csv")
+    add("passes of a plate aligned", step["passes of"], step["clocks of"], "parts/history.csv")
+    add("four networks averaged (`best`)", whole("four of best averaged"), whole("best"), "accuracy/whole_passes.csv")
+    add("Muon instead of Adam (`paper`)", whole("paper with Muon"), whole("paper"), "accuracy/whole_passes.csv")
+    add("V of the VAE (`paper` with Muon)", whole("paper with Muon"), whole("best"), "accuracy/whole_passes.csv")
+    add("silent passes in training (`tiny`)", whole("tiny"), whole("tiny without silent passes"), "accuracy/whole_passes.csv")
+    add("transposed instead of sub-pixel convolution", base["paper"], base["paper, sub-pixel"], "parts/baselines.csv")
+    add("random plates in training (`tiny`, known plates)", whole("tiny with 1,500 random plates"), whole("tiny"),
+        "accuracy/whole_passes.csv")
+    return table(["part", "contact SSIM with it", "without it", "SSIM", "PSNR dB", "from"], lines)
+
+
+def simulator_terms():
+    found = rows("parts/simulator_terms.csv")
+    whole = mean(chosen(found, simulator="whole"), "contact_ssim")
+    lines = []
+    for name in dict.fromkeys(r["simulator"] for r in found):
+        of = chosen(found, simulator=name)
+        change = mean(of, "contact_ssim") - whole
+        if name == "whole" or change < -0.03:
+            lines.append([name, f"{mean(of, 'contact_ssim'):.3f}", f"{mean(of, 'contact_psnr_db'):.1f}", f"{change:+.3f}", str(len(of))])
+    return table(["simulated passes to train on", "contact SSIM", "PSNR dB", "against the whole", "seeds"], lines)
+
+
+def tried():
+    found, lines = rows("parts/tried.csv"), []
+    for idea in dict.fromkeys(r["idea"] for r in found):
+        of = chosen(found, idea=idea)
+        lines.append([idea, str(len(of)), over_seeds(of, "contact_ssim"), over_seeds(of, "contact_psnr_db", 1), of[0]["kept"]])
+    return table(["idea", "seeds", "contact SSIM", "PSNR dB", "kept"], lines)
