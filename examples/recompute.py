@@ -12,28 +12,16 @@ difference, as a share of the array's largest value, and how many numbers have t
 difference is above 1e-6.
 """
 import json
-import struct
+import pathlib
 import sys
 
 import numpy as np
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "python"))
+from supertac.files import read  # noqa: E402
+from supertac.model import level, sigmoid  # noqa: E402
+
 TOLERANCE = 1e-6
-
-
-def read(path):
-    """Tensors and metadata of a safetensors file."""
-    with open(path, "rb") as file:
-        data = file.read()
-    length = struct.unpack("<Q", data[:8])[0]
-    header = json.loads(data[8:8 + length])
-    metadata = header.pop("__metadata__", {})
-    types = {"F32": "<f4", "F64": "<f8"}
-    tensors = {}
-    for name, entry in header.items():
-        begin, end = (8 + length + at for at in entry["data_offsets"])
-        if entry["dtype"] in types:
-            tensors[name] = np.frombuffer(data[begin:end], types[entry["dtype"]]).reshape(entry["shape"])
-    return tensors, metadata
 
 
 def scaled(volts, time_s, signal, samples):
@@ -45,16 +33,6 @@ def scaled(volts, time_s, signal, samples):
         grid.append(here.mean(axis=0).astype(np.float32) if len(here) else grid[-1])
     v = np.array(grid[-samples:], dtype=float)
     return np.clip((signal["rest_volts"] - v) / signal["span_volts"], 0, 1)
-
-
-def levelled(window, signal):
-    """Each window to its own rest and gain; percentiles are the lower edges of 256 bins."""
-    bins = np.minimum(np.maximum(window, 0) * 256, 255).astype(int)
-    ordered = np.sort(bins, axis=0)
-    rest = ordered[len(window) // 20] / 256
-    top = ordered[-min(3, len(window))] / 256
-    gain = max(signal["least_gain"], (top - signal["rest_removed"] * rest).max())
-    return np.clip((window - signal["rest_removed"] * rest) / gain, 0, 1)
 
 
 def fused(total, x, w):
@@ -119,7 +97,7 @@ def computed(step, x, shape):
             lambda: np.moveaxis(x[0].reshape(len(x[0]), shape[-1], *shape[1:-1]), 1, -1),
         "global_mean": lambda: x[0].mean(axis=(1, 2), dtype=float),
         "gated_sum": lambda: x[0] + x[1] * x[2][:, None, None],
-        "sigmoid": lambda: 1 / (1 + np.exp(-x[0])),
+        "sigmoid": lambda: sigmoid(x[0]),
         "add": lambda: x[0] + x[1],
     }[op]()
 
@@ -144,7 +122,7 @@ def main():
     print(f"{'array':34} {'shape':18} error    same bits")
     compare("scaled", scaled(arrays["volts"], arrays["time_s"], signal, len(arrays["scaled"])), known["scaled"])
     if signal["levelled"]:
-        compare("input", levelled(known["scaled"].astype(float), signal), known["input"])
+        compare("input", level(known["scaled"][None])[0], known["input"])
     for step in steps:
         x = [known[name] for name in step["inputs"]]
         if step["op"] == "reshape":  # the same numbers

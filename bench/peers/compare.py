@@ -31,13 +31,53 @@ if any(os.environ.get(name) != value for name, value in ENVIRONMENT.items()):
 
 import numpy as np  # noqa: E402
 import torch  # noqa: E402
+import torch.nn.functional as F  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "bench/peers"))
+sys.path[:0] = [str(ROOT / folder) for folder in ("bench", "bench/peers", "python")]
 import engines  # noqa: E402
-import pytorch_model  # noqa: E402
+import supertac  # noqa: E402
+from source import source  # noqa: E402
+from supertac.torch_model import loss_terms  # noqa: E402
 
 TRAINING_BATCH = 64
+
+
+class Drawing(torch.nn.Module):
+    """The package's network on windows as it sees them: [N,T,16] -> [N,1 or 2,S,S], the picture and its spread."""
+
+    def __init__(self, path):
+        super().__init__()
+        model = supertac.load_model(path)
+        self.network, self.settings = model.to_torch(), model.settings
+
+    def forward(self, windows):
+        return torch.stack([plane for plane in self.network.draw(windows)[:2] if plane is not None], 1)
+
+
+def count_macs(call):
+    """Multiply-adds of the convolutions and linear layers that `call` runs, padding counted as data."""
+    total, originals = 0, {}
+
+    def counted(name):
+        def run(x, w, *rest, **options):
+            nonlocal total
+            y = originals[name](x, w, *rest, **options)
+            positions = x if "transpose" in name else y
+            total += w.numel() * positions.numel() // positions.shape[0] // (w.shape[0])
+            return y
+
+        return run
+
+    for name in ("linear", "conv1d", "conv2d", "conv_transpose1d", "conv_transpose2d"):
+        originals[name] = getattr(F, name)
+        setattr(F, name, counted(name))
+    try:
+        call()
+    finally:
+        for name, original in originals.items():
+            setattr(F, name, original)
+    return total
 
 
 class Ours:
@@ -83,21 +123,19 @@ def interval(values):
     return statistics.median(ordered), ordered[max(0, k - 1)], ordered[min(n - 1, n - k)]
 
 
-def training_peer(path, windows):
-    model = pytorch_model.SuperTac(path)
-    parameters = [tensor.requires_grad_() for tensor in model.tensors.values()]
-    adam = torch.optim.Adam(parameters, lr=1e-5)
+def training_peer(model, windows):
+    network, adam = model.network, torch.optim.Adam(model.parameters(), lr=1e-5)
     eps = torch.randn(4, len(windows), model.settings["latent"])
     with torch.no_grad():
         truth = model(windows)[:, 0].clamp(0, 1)
 
     def step():
         adam.zero_grad()
-        model.loss(windows, eps, truth).backward()
-        torch.nn.utils.clip_grad_norm_(parameters, 1)
+        loss_terms(network.training_outputs(windows, eps), truth)["total"].backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 1)
         adam.step()
 
-    return model, step
+    return step
 
 
 def pair(ours, order, peers, pairs, seconds, macs):
@@ -138,10 +176,10 @@ def two_threads(ours, pairs, seconds, macs):
 
 def check_pictures(ours, model, windows, folder):
     ours(f"pictures {folder}/pictures.safetensors")
-    pictures = pytorch_model.read_safetensors(f"{folder}/pictures.safetensors")[0]["pictures"]
+    pictures = supertac.read(f"{folder}/pictures.safetensors")[0]["pictures"]
     with torch.no_grad():
         difference = np.abs(model(windows)[:, 0].numpy() - pictures).max()
-        counted = pytorch_model.count_macs(lambda: model(windows[:1]))
+        counted = count_macs(lambda: model(windows[:1]))
     inference, training = (float(word) for word in ours("cost"))
     print(f"pictures differ by at most {difference:.1e}; {inference / 1e6:.2f} MMAC a window, PyTorch runs {counted / 1e6:.2f}")
     # cost_of() leaves out the spread, which PyTorch counts: 1 %.
@@ -175,15 +213,15 @@ def main():
     options = parser.parse_args()
     torch.set_num_threads(1)
     torch.manual_seed(1)
-    model = pytorch_model.SuperTac(options.model)
+    model = Drawing(options.model)
     windows = torch.rand(TRAINING_BATCH, model.settings["timesteps"], 16)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        pytorch_model.make_parity.save(f"{folder}/windows.safetensors", {"windows": windows.numpy()})
+        supertac.write(f"{folder}/windows.safetensors", {"windows": windows.numpy()})
         ours = Ours(pathlib.Path(options.bin) / "peers_ours", options.model, f"{folder}/windows.safetensors")
         inference, training, pictures = check_pictures(ours, model, windows, folder)
         ours(f"pictures8 {folder}/int8.safetensors")
-        int8 = pytorch_model.read_safetensors(f"{folder}/int8.safetensors")[0]["pictures"]
+        int8 = supertac.read(f"{folder}/int8.safetensors")[0]["pictures"]
         print(f"pictures in int8 differ by at most {np.abs(int8 - pictures).max():.1e}")
         with torch.no_grad():
             for batch in (1, 8, 64):
@@ -194,20 +232,17 @@ def main():
                 for task, group in ((f"infer {batch}", full), (f"int8 {batch}", less)):
                     for row in pair(ours, task, group, options.pairs, options.seconds, batch * inference):
                         rows.append(row | {"difference": found[row["peer"]]})
-        _, step = training_peer(options.model, windows)
-        steps = {"pytorch eager": step}
-        if options.compile:
-            steps["torch.compile"] = torch.compile(step)
+        step = training_peer(model, windows)
+        steps = {"pytorch eager": step} | ({"torch.compile": torch.compile(step)} if options.compile else {})
         rows += pair(ours, "train 1", steps, options.pairs, options.seconds, TRAINING_BATCH * training)
         rows.append(two_threads(ours, options.pairs, options.seconds, TRAINING_BATCH * training))
     versions = " ".join(f"{name} {version}" for name, version in engines.versions().items())
-    commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True).stdout.strip()
     with open(options.out, "w", newline="") as file:
-        writer = csv.DictWriter(file, [*rows[0], "versions", "commit"], lineterminator="\n")
+        writer = csv.DictWriter(file, [*rows[0], "versions", *source()], lineterminator="\n")
         writer.writeheader()
         for row in rows:
             shown = {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
-            writer.writerow({**shown, "versions": versions, "commit": commit})
+            writer.writerow({**shown, "versions": versions, **source()})
     print(f"{'task':9} {'against':19} {'ours us':>9} {'peer us':>9} {'ratio':>6} {'95 % interval':>15} {'share':>6}")
     for r in rows:
         print(f"{r['task']:9} {r['peer']:19} {r['ours_us']:9.1f} {r['peer_us']:9.1f} {r['ratio']:6.2f} "

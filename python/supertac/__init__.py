@@ -6,8 +6,8 @@
     times, volts = model.windows(recording)
     pictures = model.draw(volts).picture        # [N, height, width]
 """
-from .files import read
+from .files import read, write
 from .model import Model, Pictures, load_model
 from .recordings import Log, Recording, read_pictures, read_recording, windows
 
-__all__ = ["Log", "Model", "Pictures", "Recording", "load_model", "read", "read_pictures", "read_recording", "windows"]
+__all__ = ["Log", "Model", "Pictures", "Recording", "load_model", "read", "read_pictures", "read_recording", "windows", "write"]

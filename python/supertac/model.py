@@ -94,9 +94,14 @@ class Model:
 
     def to_torch(self):
         """A torch.nn.Module with the same parameters and names; its forward() takes volts and returns Pictures."""
+        import torch
+
         from .torch_model import SuperTac
 
-        return SuperTac(self)
+        module = SuperTac(self.settings, self.input, self.groups)
+        own = ("encoder.", "decoder.", "upsampler.")
+        module.load_state_dict({name: torch.tensor(t) for name, t in self.tensors.items() if name.startswith(own)})
+        return module
 
     def _of(self, name):
         return self.tensors[name + ".weight"], self.tensors[name + ".bias"]

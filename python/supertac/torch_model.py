@@ -6,6 +6,9 @@ from torch.nn import functional as F
 from .model import BINS, LEAST_GAIN, REST_REMOVED, REST_SHARE, TOP_RANK, Pictures
 
 
+REDUCTION = 4  # of the channels inside channel attention
+
+
 def layers(**parts):
     return nn.ModuleDict(parts)
 
@@ -34,23 +37,22 @@ def rirb(channels, squeezed, blocks):
 
 
 class SuperTac(nn.Module):
-    def __init__(self, model):
+    """Of a model file's settings, with parameters that load_state_dict() takes from its tensors."""
+
+    def __init__(self, settings, input_of_model, groups):
         super().__init__()
-        s, self.input, self.map = model.settings, model.input, model.map
-        self.groups = [torch.tensor(group) for group in model.groups]
-        vae = len(model.groups[0]), s["timesteps"], s["latent"]
-        channels, count = s["channels"], len(self.groups)
-        squeezed = max((t.shape[0] for name, t in model.tensors.items() if name.endswith("squeeze.bias")), default=1)
+        s, self.input, self.map = settings, input_of_model, tuple(settings.get(name, 4) for name in ("rows", "columns"))
+        self.groups = [torch.tensor(group) for group in groups]
+        vae = len(groups[0]), s["timesteps"], s["latent"]
+        channels, count = s["channels"], len(groups)
         self.encoder = nn.ModuleList(encoder(*vae) for _ in range(count))
         self.decoder = nn.ModuleList(decoder(*vae) for _ in range(count))
         self.upsampler = layers(fc=nn.Linear(count * s["latent"], channels * self.map[0] * self.map[1]),
-                                rirb=nn.ModuleList(rirb(channels, squeezed, s["rcabs"])
+                                rirb=nn.ModuleList(rirb(channels, channels // REDUCTION, s["rcabs"])
                                                    for _ in range(s["scale"].bit_length() - 1)),
                                 out=nn.Conv2d(channels, 1, 3, padding=1))
         if s.get("spread"):
             self.upsampler["spread"] = nn.Conv2d(channels, 1, 3, padding=1)
-        own = ("encoder.", "decoder.", "upsampler.")
-        self.load_state_dict({name: torch.tensor(t) for name, t in model.tensors.items() if name.startswith(own)})
 
     def scale(self, volts):
         """Volts [N,T,S] -> what the network takes."""
@@ -99,5 +101,50 @@ class SuperTac(nn.Module):
         return up["out"](h)[:, 0], up["spread"](h)[:, 0] if "spread" in up else None
 
     def forward(self, volts):
-        latents = torch.cat([mean for mean, _ in self.distributions(self.scale(volts))], 1)
+        return self.draw(self.scale(volts))
+
+    def draw(self, x):
+        """Pictures of windows [N,T,S] that were scaled and normalised."""
+        latents = torch.cat([mean for mean, _ in self.distributions(x)], 1)
         return Pictures(*self.upsample(latents), latents)
+
+    def training_outputs(self, x, eps=None):
+        """What a training step looks at: lists over the groups, and the picture. eps [groups,N,latent]; None: z = mean."""
+        out = {"mean": [], "log_var": [], "decoded": [], "input": [x[:, :, group] for group in self.groups]}
+        latents = []
+        for i, (mean, log_var) in enumerate(self.distributions(x)):
+            latents.append(mean if eps is None else mean + torch.exp(log_var / 2) * eps[i])
+            for key, value in (("mean", mean), ("log_var", log_var), ("decoded", self.decode(latents[i], i))):
+                out[key].append(value)
+        return out | {"picture": self.upsample(torch.cat(latents, 1))[0]}
+
+
+def ssim(x, y):
+    """Mean SSIM of pictures [N,H,W] after Wang 2004: Gaussian of 11x11 and sigma 1.5, 7x7 uniform on smaller ones, data
+    range 1, places where the window fits."""
+    if min(x.shape[1:]) < 11:
+        window = torch.full((7, 7), 1 / 49, dtype=x.dtype)
+    else:
+        g = torch.exp(-(torch.arange(11, dtype=x.dtype) - 5) ** 2 / (2 * 1.5**2))
+        window = torch.outer(g, g) / g.sum() ** 2
+
+    def blur(image):
+        return F.conv2d(image[:, None], window[None, None])[:, 0]
+
+    mx, my = blur(x), blur(y)
+    vx, vy, cov = blur(x * x) - mx**2, blur(y * y) - my**2, blur(x * y) - mx * my
+    c1, c2 = 0.01**2, 0.03**2
+    return ((2 * mx * my + c1) * (2 * cov + c2) / ((mx**2 + my**2 + c1) * (vx + vy + c2))).mean()
+
+
+def kl_divergence(mean, log_var):
+    return -0.5 * (1 + log_var - mean**2 - log_var.exp()).sum(1).mean()
+
+
+def loss_terms(out, truth, a=0.2, beta=1e-3, weight_ssim=0.1):
+    """Of training_outputs(): docs/network.md has the formula; here without the term of the spread."""
+    terms = {"reconstruction": sum(F.mse_loss(d, x) for d, x in zip(out["decoded"], out["input"])),
+             "kld": sum(kl_divergence(m, v) for m, v in zip(out["mean"], out["log_var"])),
+             "l2": F.mse_loss(out["picture"], truth), "ssim": ssim(out["picture"], truth)}
+    picture = terms["l2"] + weight_ssim * (1 - terms["ssim"])
+    return terms | {"total": a * (terms["reconstruction"] + beta * terms["kld"]) + (1 - a) * picture}

@@ -10,7 +10,6 @@ to_torch() likewise; where onnxruntime is, what supertac-export writes.
 import importlib
 import json
 import pathlib
-import struct
 import subprocess
 import sys
 import tempfile
@@ -24,7 +23,6 @@ except ImportError as missing:
     sys.exit(77)
 import supertac  # noqa: E402
 from supertac.model import convolve, convolve_transposed  # noqa: E402
-
 
 
 def installed(name):
@@ -47,24 +45,13 @@ def run(program, *words):
         sys.exit(done.stderr)
 
 
-def write(path, tensors, metadata):
-    """A safetensors file of another program: without our checksum."""
-    header, at = {"__metadata__": metadata}, 0
-    for name, (kind, array) in tensors.items():
-        header[name] = {"dtype": kind, "shape": array.shape, "data_offsets": [at, at + array.nbytes]}
-        at += array.nbytes
-    text = json.dumps(header).encode()
-    path.write_bytes(struct.pack("<Q", len(text)) + text + b"".join(array.tobytes() for _, array in tensors.values()))
-
-
 def with_two_channels(recording, path):
     """A recording of the rig as if by 3x5 taxels with two channels each."""
     volts = np.concatenate([recording.volts, 4.9 - recording.volts[:, :14]], axis=1)
     array = {"rows": 3, "columns": 5, "pitch_mm": 3, "channels": 2}
-    tensors = {"time_s": ("F64", recording.time_s), "volts": ("F32", np.ascontiguousarray(volts)),
-               "position_mm": ("F32", recording.position_mm)}
+    tensors = {"time_s": recording.time_s, "volts": volts, "position_mm": recording.position_mm}
     ours = {key: text for key, text in recording.metadata.items() if key not in ("checksum", "supertac_format")}
-    write(path, tensors, ours | {"array": json.dumps(array)})
+    supertac.write(path, tensors, ours | {"array": json.dumps(array)})
 
 
 def check(name, ours, theirs):
