@@ -23,6 +23,7 @@ SUPERTAC_ERROR(PortBusy, PortError);  ///< held by another program, or another p
 SUPERTAC_ERROR(NotASerialPort, PortError);
 SUPERTAC_ERROR(WrongDevice, PortError);    ///< it works, but another device is behind it
 SUPERTAC_ERROR(PortUnplugged, PortError);  ///< end of file (POLLHUP, read 0, EIO, ENXIO); never resumed
+SUPERTAC_ERROR(PortEnded, PortUnplugged);  ///< end of a file or pipe, which may end
 SUPERTAC_ERROR(PortTimeout, PortError);    ///< the device is there, but a deadline passed
 
 // The printer.

@@ -73,7 +73,7 @@ TEST(Recording, RefusesAnArrayThatIsNone) {
             }).find("is a member of the recording"),
             std::string::npos);
   recording = example();
-  recording.array.rows = 17;
+  recording.array.rows = 65;
   recording.volts.resize(recording.frames() * 17 * 4);
   EXPECT_THROW(write_recording(folder.file("a"), recording), std::invalid_argument);
   std::map<std::string, std::string> metadata{{"kind", "recording"}, {"plate", "3_Bumps"},

@@ -1,0 +1,168 @@
+// Frames that are lines: columns of text, or JSON.
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hardware/boards/binary_decoder.h"
+#include "hardware/boards/frame_decoder.h"
+#include "hardware/boards/sensor_decoder.h"
+#include "io/files/json.h"
+#include "io/numbers/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr std::size_t kBytesOfNumber = 32, kBytesBesides = 4096;  // of the longest line
+
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+/// Cuts the stream into lines; one that is too long to be a frame is thrown away as it comes.
+class LineDecoder : public SensorDecoder {
+ public:
+  explicit LineDecoder(const Sensor& sensor) : format_(sensor.frame), count_(sensor.values()) {
+    longest_ = kBytesBesides + kBytesOfNumber * (count_ + format_.skip.size());
+  }
+
+  void push(std::span<const std::byte> bytes, const Sink& sink) override {
+    counters_.bytes += bytes.size();
+    for (const std::byte byte : bytes) {
+      if (byte != std::byte{'\n'}) {
+        line_ += static_cast<char>(byte);
+        if (line_.size() > longest_) overlong_ += line_.size(), line_.clear();
+        continue;
+      }
+      const std::size_t size = line_.size() + overlong_;
+      const std::string_view line = trimmed(line_);
+      DecodedFrame frame;
+      values_.clear();
+      if (overlong_ == 0 && read(line, frame) && values_.size() == count_) {
+        ++counters_.frames;
+        frame.values = values_;
+        sink(frame);
+      } else if (!line.empty() || overlong_ > 0) {
+        ++counters_.torn, counters_.discarded_bytes += size + 1;
+      }
+      line_.clear(), overlong_ = 0;
+    }
+  }
+
+ protected:
+  /// Fills values_ and the frame's time; false when the line is no frame.
+  virtual bool read(std::string_view line, DecodedFrame& frame) = 0;
+
+  FrameFormat format_;
+  std::size_t count_;
+  std::vector<float> values_;
+
+ private:
+  std::size_t longest_, overlong_ = 0;
+  std::string line_;
+};
+
+class TextDecoder : public LineDecoder {
+ public:
+  using LineDecoder::LineDecoder;
+
+ private:
+  bool read(std::string_view line, DecodedFrame& frame) override {
+    const std::vector<std::string_view> columns = split_line(line, format_.separator);
+    if (columns.size() != count_ + format_.skip.size() + (format_.time ? 1 : 0)) return false;
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const int column = static_cast<int>(c);
+      if (std::ranges::find(format_.skip, column) != format_.skip.end()) continue;
+      const auto number = number_of(columns[c]);
+      if (!number) return false;
+      if (format_.time && format_.time->column == column)
+        frame.time_s = *number * format_.time->unit_s;
+      else
+        values_.push_back(static_cast<float>(*number));
+    }
+    return true;
+  }
+};
+
+class JsonDecoder : public LineDecoder {
+ public:
+  using LineDecoder::LineDecoder;
+
+ private:
+  bool read(std::string_view line, DecodedFrame& frame) override {
+    if (line.empty() || (line.front() != '{' && line.front() != '[')) return false;
+    try {
+      const auto json = parse_json_limited(line);
+      if (format_.time) frame.time_s = json.at(format_.time->key).get<double>() * format_.time->unit_s;
+      return flatten(format_.values.empty() ? json : json.at(format_.values), values_);
+    } catch (const std::exception&) {  // of the parser, or a key that is missing or no number
+      return false;
+    }
+  }
+};
+
+/// The rig's board.
+class RigDecoder : public SensorDecoder {
+ public:
+  void push(std::span<const std::byte> bytes, const Sink& sink) override {
+    decoder_.push(bytes, [&](const BoardFrame& frame, std::uint64_t discarded) {
+      counters_.torn += discarded > 0 ? 1 : 0;
+      sink({taxel_volts(frame), std::nullopt});
+    });
+    const FrameDecoder::Counters& counted = decoder_.counters();
+    counters_.bytes = counted.bytes, counters_.frames = counted.frames;
+    counters_.discarded_bytes = counted.discarded_bytes;
+  }
+
+ private:
+  FrameDecoder decoder_;
+};
+
+}  // namespace
+
+std::vector<std::string_view> split_line(std::string_view line, char separator) {
+  std::vector<std::string_view> columns;
+  line = trimmed(line);
+  while (!line.empty()) {
+    const std::size_t end =
+        std::min(separator == ' ' ? line.find_first_of(" \t") : line.find(separator), line.size());
+    columns.push_back(trimmed(line.substr(0, end)));
+    line.remove_prefix(std::min(end + 1, line.size()));
+    if (separator == ' ') line = trimmed(line);
+  }
+  return columns;
+}
+
+std::optional<double> number_of(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  return parse_double(text);
+}
+
+bool flatten(const nlohmann::ordered_json& json, std::vector<float>& numbers) {
+  if (json.is_number()) {
+    numbers.push_back(json.get<float>());
+    return true;
+  }
+  return json.is_array() && std::ranges::all_of(json, [&](const auto& e) { return flatten(e, numbers); });
+}
+
+std::unique_ptr<SensorDecoder> make_decoder(const Sensor& sensor) {
+  switch (sensor.frame.kind) {
+    case FrameKind::text:
+      return std::make_unique<TextDecoder>(sensor);
+    case FrameKind::json:
+      return std::make_unique<JsonDecoder>(sensor);
+    case FrameKind::binary:
+      return std::make_unique<BinaryDecoder>(sensor);
+    case FrameKind::board:
+      break;
+  }
+  return std::make_unique<RigDecoder>();
+}
+
+}  // namespace supertac

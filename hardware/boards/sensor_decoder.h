@@ -1,0 +1,52 @@
+// From a sensor's bytes to frames, whatever they are written in. A decoder knows no port and no clock.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "data/sensors/sensor.h"
+
+namespace supertac {
+
+/// One frame as its sensor sent it, valid during the call that hands it over.
+struct DecodedFrame {
+  std::span<const float> values;  ///< as many as Sensor::values(), in the order of the frame
+  std::optional<double> time_s;   ///< of the sensor's clock, where it sends one
+};
+
+class SensorDecoder {
+ public:
+  using Sink = std::function<void(const DecodedFrame&)>;
+  struct Counters {
+    std::uint64_t bytes = 0, frames = 0;
+    std::uint64_t torn = 0;             ///< lines, or runs of bytes, that were no frame
+    std::uint64_t discarded_bytes = 0;  ///< of these
+  };
+
+  virtual ~SensorDecoder() = default;
+  /// Takes the next bytes and hands over every frame that they complete.
+  virtual void push(std::span<const std::byte> bytes, const Sink& sink) = 0;
+  const Counters& counters() const { return counters_; }
+
+ protected:
+  Counters counters_;
+};
+
+/// Looks again from the next line, or the next byte, where something is no frame: at 1e-3 lost bytes all
+/// undamaged frames come through. Of text and JSON nobody can tell a number that lost a digit from a right
+/// one.
+std::unique_ptr<SensorDecoder> make_decoder(const Sensor& sensor);
+
+// The numbers and time stamps in a line, as the probe looks at them too.
+/// What stands between the separators, without blanks around it; ' ' is any white space. An empty last one is
+/// left out.
+std::vector<std::string_view> split_line(std::string_view line, char separator);
+/// A number, with or without a leading '+'; nothing when it is none.
+std::optional<double> number_of(std::string_view text);
+/// All numbers of a JSON value, nested arrays in turn; false when it holds anything else.
+bool flatten(const nlohmann::ordered_json& json, std::vector<float>& numbers);
+
+}  // namespace supertac

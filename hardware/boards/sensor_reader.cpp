@@ -1,0 +1,187 @@
+#include "hardware/boards/sensor_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+
+#include "hardware/ports/errors.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kReadSlice = 0.05, kSilenceS = 3, kSilentPeriods = 10;
+constexpr std::size_t kReadBytes = 65536;  // no datagram is longer
+constexpr double kChunkS = 0.12;  // an adapter hands bytes on up to 0.1 s late: frames are lost beyond
+constexpr double kRestartS = 1;   // a clock that goes back by more has started anew
+constexpr std::uint64_t kBlock = 64;
+constexpr std::size_t kShown = 120;
+
+}  // namespace
+
+FrameDates::FrameDates(const Sensor& sensor) : nominal_s_(1 / sensor.rate_hz), period_s_(nominal_s_) {
+  if (!sensor.frame.time) return;
+  const std::string& type = sensor.frame.time->type;
+  // millis() and micros() of lines and JSON have 32 bits.
+  const double bits = type == "u16"                                                      ? 16
+                      : type == "u64" || type == "f64" || sensor.frame.time->unit_s == 1 ? 0
+                                                                                         : 32;
+  if (bits > 0) wraps_s_ = std::exp2(bits) * sensor.frame.time->unit_s;
+}
+
+std::optional<double> FrameDates::date(std::optional<double> stamp_s, double arrival_s) {
+  double time = stamp_s ? *stamp_s + offset_s_ : by_arrival(arrival_s);
+  if (count_ > 0 && stamp_s && time <= last_s_) {
+    const double back = last_s_ - time;
+    if (wraps_s_ > 0 && back > 0.5 * wraps_s_)
+      offset_s_ += wraps_s_, time += wraps_s_;
+    else if (back > kRestartS)
+      offset_s_ += back + std::max(arrival_s - last_arrival_s_, nominal_s_), time = *stamp_s + offset_s_;
+  }
+  if (count_ > 0 && time <= last_s_) return std::nullopt;
+  if (count_ > 0) {
+    const double periods = (time - last_s_) / period_s_;
+    if (periods > 1.5)
+      missing_ += static_cast<std::uint64_t>(std::min(std::lround(periods - 1), 1'000'000'000L));
+    if (stamp_s && periods < 1.5) period_s_ += (time - last_s_ - period_s_) / 64;
+  }
+  ++count_;
+  last_s_ = time, last_arrival_s_ = arrival_s;
+  return time;
+}
+
+// The rate that a sensor's file names is a word, not a clock: the least lateness of every block moves the
+// dates, and its drift the period.
+double FrameDates::by_arrival(double arrival_s) {
+  if (count_ == 0) return arrival_s;
+  const double due = last_s_ + period_s_, late = arrival_s - due;
+  if (late > std::max(kChunkS, 3 * period_s_)) {
+    in_block_ = 0;
+    return arrival_s;
+  }
+  least_late_s_ = in_block_ == 0 ? late : std::min(least_late_s_, late);
+  if (++in_block_ == kBlock) {
+    const double drift = least_late_s_ / static_cast<double>(kBlock);
+    period_s_ = std::clamp(period_s_ + 0.5 * drift, 0.5 * nominal_s_, 2 * nominal_s_);
+    in_block_ = 0;
+    return std::min(arrival_s, due + std::min(0.5 * least_late_s_, 0.4 * period_s_));
+  }
+  // Not early, and later than the one before.
+  return late >= 0 ? due : std::max(arrival_s, last_s_ + 0.01 * period_s_);
+}
+
+SensorReader::SensorReader(OpenedPort opened, const Sensor& sensor)
+    : port_(std::move(opened.port)),
+      live_(opened.live),
+      sensor_(sensor),
+      decoder_(make_decoder(sensor)),
+      dates_(sensor),
+      signals_(sensor.array.signals()),
+      last_frame_s_(port_->now()),
+      thread_([this] { run(); }) {}
+
+SensorReader::~SensorReader() { stop(); }
+
+void SensorReader::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  taken_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void SensorReader::run() {
+  try {
+    for (bool stopped = false; !stopped;) {
+      read_once();
+      const std::lock_guard lock(mutex_);
+      stopped = stop_;
+    }
+  } catch (const PortEnded&) {  // nothing is wrong, and the last line may have no end
+    const std::byte end{'\n'};
+    if (sensor_.frame.kind == FrameKind::text || sensor_.frame.kind == FrameKind::json)
+      decoder_->push({&end, 1}, [&](const DecodedFrame& frame) { take(frame, port_->now()); });
+    const std::lock_guard lock(mutex_);
+    counters_.decoder = decoder_->counters();
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    error_ = std::current_exception();
+  }
+  const std::lock_guard lock(mutex_);
+  ended_ = true;
+  arrived_.notify_all();
+}
+
+void SensorReader::read_once() {
+  std::array<std::byte, kReadBytes> buffer;
+  const Received got = port_->read(buffer, port_->now() + kReadSlice);
+  const auto bytes = std::span(buffer).first(got.count);
+  if (decoder_->counters().frames == 0 && beginning_.size() < kShown)
+    for (const std::byte byte : bytes) beginning_ += std::to_integer<char>(byte);
+  decoder_->push(bytes, [&](const DecodedFrame& frame) { take(frame, got.time_s); });
+  check_silence(got.time_s);
+  const std::lock_guard lock(mutex_);
+  counters_.decoder = decoder_->counters();
+  counters_.missing = dates_.missing(), counters_.period_s = dates_.period_s();
+}
+
+void SensorReader::check_silence(double time_s) {
+  const double silence_s = std::max(kSilenceS, kSilentPeriods / sensor_.rate_hz);
+  if (!live_ || time_s - last_frame_s_ < silence_s) return;
+  const SensorDecoder::Counters& counted = decoder_->counters();
+  const std::string at = "sensor " + sensor_.name + " at " + port_->name() + ": ";
+  if (counted.frames == 0 && counted.bytes > 0)
+    throw WrongDevice(at + "expected frames of " + std::to_string(sensor_.values()) + " values, found " +
+                      std::to_string(counted.bytes) + " bytes without one, such as '" +
+                      printable(beginning_, kShown) + "'; supertac-stream --probe says what they are");
+  throw BoardSilent(at + "expected " + format(sensor_.rate_hz, 0) + " frames/s, found none for " +
+                    format(silence_s, 1) + " s; see whether it is switched on and sends to this port");
+}
+
+void SensorReader::take(const DecodedFrame& decoded, double arrival_s) {
+  last_frame_s_ = arrival_s;
+  sensor_.arrange(decoded.values, signals_);
+  const bool damaged = !std::ranges::all_of(signals_, [](float v) { return std::isfinite(v); }) ||
+                       (decoded.time_s && !std::isfinite(*decoded.time_s));
+  const auto time = damaged ? std::nullopt : dates_.date(decoded.time_s, arrival_s);
+  std::unique_lock lock(mutex_);
+  counters_.damaged += damaged ? 1 : 0, counters_.late += !damaged && !time ? 1 : 0;
+  if (!time) return;
+  if (!live_) {
+    taken_.wait(lock, [&] { return queue_.size() < kQueueFrames || stop_; });
+    if (stop_) return;
+  } else if (queue_.size() >= kQueueFrames) {
+    queue_.pop_front();
+    ++counters_.dropped;
+  }
+  queue_.push_back({signals_, *time, arrival_s});
+  arrived_.notify_one();
+}
+
+std::optional<ReadFrame> SensorReader::next(double wait_s) {
+  std::unique_lock lock(mutex_);
+  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return !queue_.empty() || ended_; });
+  if (!queue_.empty()) {
+    ReadFrame frame = std::move(queue_.front());
+    queue_.pop_front();
+    taken_.notify_one();
+    return frame;
+  }
+  if (error_) std::rethrow_exception(error_);
+  return std::nullopt;
+}
+
+bool SensorReader::ended() {
+  const std::lock_guard lock(mutex_);
+  return ended_ && queue_.empty() && !error_;
+}
+
+ReaderCounters SensorReader::counters() {
+  const std::lock_guard lock(mutex_);
+  return counters_;
+}
+
+}  // namespace supertac

@@ -1,0 +1,94 @@
+// Any sensor, live: a thread reads, decodes and dates, a bounded queue hands frames over.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "hardware/boards/sensor_decoder.h"
+#include "hardware/ports/open_port.h"
+
+namespace supertac {
+
+struct ReadFrame {
+  std::vector<float> signals;  ///< as Sensor::arrange(), in the sensor's unit
+  double time_s = 0;           ///< of the sensor, increasing; from any zero
+  double arrival_s = 0;        ///< on the port's clock
+};
+
+struct ReaderCounters {
+  SensorDecoder::Counters decoder;
+  std::uint64_t damaged = 0;  ///< frames with a signal that is no number; not handed over
+  std::uint64_t late = 0;     ///< frames not later than the one before, by the sensor's clock; neither
+  std::uint64_t missing = 0;  ///< frames that never arrived, by the gaps in time
+  std::uint64_t dropped = 0;  ///< frames that nobody took in time
+  double period_s = 0;        ///< from frame to frame, as they came
+};
+
+/// Dates frames in the order they come: by the sensor's stamps where it sends any (a counter of 16 or 32 bits
+/// may run over; a sensor that starts anew goes on where it was), else by arrival. A frame can come late, not
+/// early, so without stamps the frames are a period apart below the earliest arrivals.
+class FrameDates {
+ public:
+  explicit FrameDates(const Sensor& sensor);
+  /// Nothing for a frame that is not later than the one before.
+  std::optional<double> date(std::optional<double> stamp_s, double arrival_s);
+  std::uint64_t missing() const { return missing_; }
+  double period_s() const { return period_s_; }
+
+ private:
+  double by_arrival(double arrival_s);
+  double nominal_s_, period_s_, wraps_s_ = 0;
+  double offset_s_ = 0, last_s_ = 0, last_arrival_s_ = 0, least_late_s_ = 0;
+  std::uint64_t count_ = 0, in_block_ = 0, missing_ = 0;
+};
+
+class SensorReader {
+ public:
+  static constexpr std::size_t kQueueFrames = 4096;
+
+  /// Starts to read. From a port that is not live nothing is dropped: it waits instead.
+  SensorReader(OpenedPort opened, const Sensor& sensor);
+  ~SensorReader();
+  SensorReader(const SensorReader&) = delete;
+  SensorReader& operator=(const SensorReader&) = delete;
+  void stop();
+
+  /// The next frame, oldest first; nothing after `wait_s`, or at the end. Rethrows what ended the reader
+  /// (PortUnplugged, BoardSilent, WrongDevice) once the frames before it have been taken.
+  std::optional<ReadFrame> next(double wait_s);
+  /// The source is at its end and all frames have been taken.
+  bool ended();
+  bool live() const { return live_; }
+  ReaderCounters counters();
+
+ private:
+  void run();
+  void read_once();
+  void take(const DecodedFrame& decoded, double arrival_s);
+  void check_silence(double time_s);
+
+  std::unique_ptr<Port> port_;
+  bool live_;
+  Sensor sensor_;
+  std::unique_ptr<SensorDecoder> decoder_;
+  FrameDates dates_;
+  std::vector<float> signals_;
+  std::string beginning_;  // of what came before the first frame
+  double last_frame_s_;
+
+  std::mutex mutex_;
+  std::condition_variable arrived_, taken_;
+  std::deque<ReadFrame> queue_;
+  std::exception_ptr error_;
+  ReaderCounters counters_;
+  bool stop_ = false, ended_ = false;
+  std::thread thread_;
+};
+
+}  // namespace supertac

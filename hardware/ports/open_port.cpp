@@ -1,0 +1,178 @@
+#include "hardware/ports/open_port.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <netdb.h>
+#include <poll.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "hardware/ports/errors.h"
+#include "hardware/ports/port_list.h"
+#include "hardware/ports/serial_port.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+
+namespace supertac {
+namespace {
+
+constexpr int kConnectMs = 5000, kSocketBytes = 4 << 20;
+constexpr double kNoWriterWaitS = 0.02;
+
+/// Bytes of a descriptor that are only read.
+class DescriptorPort : public Port {
+ public:
+  enum class Kind { file, fifo, stream, datagrams, lines };
+
+  DescriptorPort(std::string name, int descriptor, Kind kind)
+      : name_(std::move(name)), descriptor_(descriptor), kind_(kind) {}
+  ~DescriptorPort() override { close(descriptor_); }
+  DescriptorPort(const DescriptorPort&) = delete;
+  DescriptorPort& operator=(const DescriptorPort&) = delete;
+
+  const std::string& name() const override { return name_; }
+  double now() override { return monotonic_seconds(); }
+
+  Received read(std::span<std::byte> buffer, double until) override {
+    for (;;) {
+      const auto wait_ms = std::clamp(std::ceil(1e3 * (until - now())), 0.0, 1e9);
+      pollfd entry{descriptor_, POLLIN, 0};
+      const int ready = poll(&entry, 1, static_cast<int>(wait_ms));
+      if (ready < 0 && errno != EINTR) gone(strerror(errno));
+      if (ready <= 0 && now() >= until) return {0, now()};
+      if (ready <= 0) continue;
+      // A line's end is added to a datagram, and must fit.
+      const bool lines = kind_ == Kind::lines;
+      const ssize_t count = ::read(descriptor_, buffer.data(), buffer.size() - (lines ? 1 : 0));
+      if (count < 0 && (errno == EINTR || errno == EAGAIN || errno == ECONNREFUSED)) continue;
+      if (count < 0) gone(strerror(errno));
+      auto bytes = static_cast<std::size_t>(count);
+      if (lines && (bytes == 0 || buffer[bytes - 1] != std::byte{'\n'})) buffer[bytes++] = std::byte{'\n'};
+      if (bytes > 0) {
+        began_ = true;
+        return {bytes, now()};
+      }
+      if (kind_ == Kind::datagrams) continue;
+      // A FIFO that nobody has opened to write looks as one that has been closed.
+      if (kind_ != Kind::fifo || began_) gone("");
+      if (now() >= until) return {0, now()};
+      usleep(static_cast<useconds_t>(1e6 * std::clamp(until - now(), 0.0, kNoWriterWaitS)));
+    }
+  }
+
+  double write(std::span<const std::byte>, double) override {
+    throw PortError("port " + name_ + ": expected a port that can be written to; it is only read");
+  }
+
+ private:
+  [[noreturn]] void gone(const std::string& why) const {
+    if (why.empty() && kind_ != Kind::stream) throw PortEnded("port " + name_ + ": the end");
+    throw PortUnplugged("port " + name_ + ": the other side is gone (" + (why.empty() ? "closed" : why) +
+                        "); see whether it still runs, and start again");
+  }
+
+  std::string name_;
+  int descriptor_;
+  Kind kind_;
+  bool began_ = false;
+};
+
+[[noreturn]] void fail(const std::string& address, const std::string& problem) {
+  throw PortError("port " + printable(address) + ": " + problem);
+}
+
+OpenedPort open_serial(const std::string& address, const std::string& rest, double speedup) {
+  const std::size_t at = rest.rfind('@');
+  const auto baud = at == std::string::npos ? std::nullopt : parse_uint(rest.substr(at + 1));
+  if (!baud || *baud < 50 || *baud > 100'000'000 || at == 0)
+    fail(address, "expected serial:DEVICE@BAUD, such as serial:/dev/ttyACM0@115200");
+  const SerialSettings settings{.baud = static_cast<unsigned>(*baud), .speedup = speedup};
+  return {std::make_unique<SerialPort>(resolve_board_port(rest.substr(0, at)), settings)};
+}
+
+/// Bound, or connected within kConnectMs; nothing, and errno, when that fails.
+std::optional<int> open_socket(const addrinfo& at, bool datagrams) {
+  const int type = at.ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK;
+  const int descriptor = socket(at.ai_family, type, at.ai_protocol);
+  if (descriptor < 0) return std::nullopt;
+  // What arrives while the reader is held up; the kernel gives at most net.core.rmem_max.
+  (void)setsockopt(descriptor, SOL_SOCKET, SO_RCVBUF, &kSocketBytes, sizeof kSocketBytes);
+  int error = 0;
+  if (datagrams) {
+    error = bind(descriptor, at.ai_addr, at.ai_addrlen) == 0 ? 0 : errno;
+  } else if (connect(descriptor, at.ai_addr, at.ai_addrlen) != 0) {
+    error = errno;
+    pollfd entry{descriptor, POLLOUT, 0};
+    socklen_t size = sizeof error;
+    if (error == EINPROGRESS && poll(&entry, 1, kConnectMs) != 1) error = ETIMEDOUT;
+    if (error == EINPROGRESS) (void)getsockopt(descriptor, SOL_SOCKET, SO_ERROR, &error, &size);
+  }
+  if (error == 0) return descriptor;
+  close(descriptor);
+  errno = error;
+  return std::nullopt;
+}
+
+OpenedPort open_network(const std::string& address, const std::string& rest, bool datagrams, bool lines) {
+  const std::size_t colon = rest.rfind(':');
+  const std::string host = colon == std::string::npos ? "" : rest.substr(0, colon);
+  const auto number = colon == std::string::npos ? std::nullopt : parse_uint(rest.substr(colon + 1));
+  if (!number || *number < 1 || *number > 65535 || (host.empty() && !datagrams))
+    fail(address, "expected udp:[HOST]:PORT or tcp:HOST:PORT, such as udp::5005");
+  addrinfo wanted{}, *found = nullptr;
+  wanted.ai_socktype = datagrams ? SOCK_DGRAM : SOCK_STREAM;
+  wanted.ai_flags = datagrams ? AI_PASSIVE : 0;
+  wanted.ai_family = host.empty() ? AF_INET : AF_UNSPEC;
+  const std::string service = std::to_string(*number);
+  if (const int error = getaddrinfo(host.empty() ? nullptr : host.c_str(), service.c_str(), &wanted, &found))
+    fail(address, std::string(gai_strerror(error)) + "; see whether the host is right");
+  std::optional<int> descriptor;
+  for (const addrinfo* at = found; at != nullptr && !descriptor; at = at->ai_next)
+    descriptor = open_socket(*at, datagrams);
+  const int error = errno;
+  freeaddrinfo(found);
+  if (!descriptor)
+    fail(address, std::string(strerror(error)) + (datagrams ? "; another program may listen there"
+                                                            : "; see whether the sensor serves there"));
+  using Kind = DescriptorPort::Kind;
+  const Kind kind = !datagrams ? Kind::stream : lines ? Kind::lines : Kind::datagrams;
+  return {std::make_unique<DescriptorPort>(address, *descriptor, kind)};
+}
+
+OpenedPort open_file(const std::string& path) {
+  const bool input = path == "-";
+  const int descriptor = input ? fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3)
+                               : open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+  struct stat status {};
+  if (descriptor < 0 || fstat(descriptor, &status) != 0)
+    fail(path, std::string(strerror(errno)) +
+                   "; expected serial:DEVICE@BAUD, udp:[HOST]:PORT, tcp:HOST:PORT, - or a file");
+  auto port = std::make_unique<DescriptorPort>(
+      input ? "standard input" : path, descriptor,
+      S_ISFIFO(status.st_mode) && !input ? DescriptorPort::Kind::fifo : DescriptorPort::Kind::file);
+  if (S_ISDIR(status.st_mode)) fail(path, "expected a file or FIFO, found a folder");
+  if (S_ISCHR(status.st_mode) && !input && isatty(descriptor) != 0)
+    fail(path, "is a serial port, whose speed must be said: serial:" + path + "@115200");
+  return {std::move(port), false};
+}
+
+}  // namespace
+
+OpenedPort open_port(const std::string& address, bool lines, double speedup) {
+  const auto after = [&](const char* scheme) -> std::optional<std::string> {
+    if (!address.starts_with(scheme)) return std::nullopt;
+    return address.substr(strlen(scheme));
+  };
+  if (const auto rest = after("serial:")) return open_serial(address, *rest, speedup);
+  if (const auto rest = after("udp:")) return open_network(address, *rest, true, lines);
+  if (const auto rest = after("tcp:")) return open_network(address, *rest, false, lines);
+  return open_file(address);
+}
+
+}  // namespace supertac

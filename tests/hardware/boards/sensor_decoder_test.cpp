@@ -1,0 +1,153 @@
+#include "hardware/boards/sensor_decoder.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+
+#include "hardware/boards/binary_decoder.h"
+#include "tests/hardware/fake_sensor.h"
+
+namespace supertac {
+namespace {
+
+Sensor sensor_of(const std::string& array, const std::string& frame) {
+  return sensor_of_json("{" + array + R"(,"pressed":"higher","range":[0,1000],"frame":)" + frame + "}",
+                        "test");
+}
+
+// Every kind, with what can be left out left out somewhere.
+std::map<std::string, Sensor> sensors() {
+  const std::string mat = R"("rows":4,"columns":5)", skin = R"("rows":4,"columns":4,"channels":3)";
+  return {
+      {"commas", sensor_of(mat, R"({"kind":"text"})")},
+      {"blanks",
+       sensor_of(mat, R"({"kind":"text","separator":" ","skip":[1,3],"time":{"column":0,"unit":"ms"}})")},
+      {"tabs", sensor_of(mat, R"({"kind":"text","separator":"\t","time":{"column":20,"unit":"s"}})")},
+      {"list", sensor_of(mat, R"({"kind":"json"})")},
+      {"object", sensor_of(skin, R"({"kind":"json","values":"b","time":{"key":"t","unit":"us"}})")},
+      {"header", sensor_of(skin, R"({"kind":"binary","header":"AA55","type":"i16"})")},
+      {"trailer", sensor_of(mat, R"({"kind":"binary","trailer":"0D0A7E","type":"f32","endian":"big"})")},
+      {"sum", sensor_of(mat, R"({"kind":"binary","header":"FF","type":"u8","checksum":"sum8"})")},
+      {"crc",
+       sensor_of(mat, R"({"kind":"binary","header":"24","type":"u32","checksum":"crc16-modbus","trailer":"21",
+        "time":{"type":"u32","unit":"ms"}})")},
+      {"ccitt", sensor_of(mat, R"({"kind":"binary","header":"2424","type":"u16","checksum":"crc16-ccitt",
+        "endian":"big","time":{"type":"u16","unit":"ms"}})")}};
+}
+
+std::vector<double> values_of(const Sensor& sensor, unsigned frame) {
+  std::mt19937 random(frame);
+  const bool byte = sensor.frame.type == "u8";
+  std::vector<double> values;
+  for (std::size_t i = 0; i < sensor.values(); ++i) values.push_back(random() % (byte ? 256 : 1000));
+  return values;
+}
+
+struct Decoded {
+  std::vector<std::vector<float>> frames;
+  std::vector<std::optional<double>> times;
+  SensorDecoder::Counters counters;
+};
+
+Decoded decode(const Sensor& sensor, const std::string& bytes, std::size_t piece) {
+  const auto decoder = make_decoder(sensor);
+  Decoded decoded;
+  for (std::size_t at = 0; at < bytes.size(); at += piece)
+    decoder->push(std::as_bytes(std::span(bytes)).subspan(at, std::min(piece, bytes.size() - at)),
+                  [&](const DecodedFrame& frame) {
+                    decoded.frames.emplace_back(frame.values.begin(), frame.values.end());
+                    decoded.times.push_back(frame.time_s);
+                  });
+  decoded.counters = decoder->counters();
+  return decoded;
+}
+
+TEST(SensorDecoder, ReadsEveryKindInPiecesOfAnySize) {
+  for (const auto& [name, sensor] : sensors()) {
+    SCOPED_TRACE(name);
+    std::string bytes;
+    for (unsigned n = 0; n < 20; ++n) bytes += sent_frame(sensor, values_of(sensor, n), 0.01 * n);
+    for (const std::size_t piece : {std::size_t{1}, std::size_t{7}, std::size_t{100'000}}) {
+      const Decoded decoded = decode(sensor, bytes, piece);
+      ASSERT_EQ(decoded.frames.size(), 20U);
+      EXPECT_EQ(decoded.counters.torn, 0U);
+      EXPECT_EQ(decoded.counters.bytes, bytes.size());
+      for (unsigned n = 0; n < 20; ++n) {
+        const std::vector<double> sent = values_of(sensor, n);
+        EXPECT_EQ(decoded.frames[n], std::vector<float>(sent.begin(), sent.end()));
+        ASSERT_EQ(decoded.times[n].has_value(), sensor.frame.time.has_value());
+        const double unit_s = sensor.frame.time ? sensor.frame.time->unit_s : 0;
+        EXPECT_NEAR(decoded.times[n].value_or(0.01 * n), 0.01 * n, 0.51 * unit_s + 1e-9);
+      }
+    }
+  }
+}
+
+// Every frame none of whose bytes was lost, at a thousandth of them lost.
+TEST(SensorDecoder, FindsTheUndamagedFramesAgain) {
+  for (const auto& [name, sensor] : sensors()) {
+    std::mt19937 random(3);
+    std::string bytes;
+    std::map<std::vector<float>, int> undamaged;
+    for (unsigned n = 0; n < 3000; ++n) {
+      const std::vector<double> values = values_of(sensor, n);
+      bool whole = true;
+      for (const char c : sent_frame(sensor, values, 0.01 * n))
+        if (random() % 1000 == 0)
+          whole = false;
+        else
+          bytes += c;
+      if (whole) undamaged[{values.begin(), values.end()}] = 1;
+    }
+    const Decoded decoded = decode(sensor, bytes, 100);
+    std::size_t found = 0;
+    for (const auto& frame : decoded.frames) found += undamaged.contains(frame) ? 1 : 0;
+    EXPECT_GE(static_cast<double>(found), 0.99 * static_cast<double>(undamaged.size())) << name;
+    EXPECT_LT(undamaged.size(), 2990U) << name;
+    EXPECT_GT(decoded.counters.torn, 0U) << name;
+  }
+}
+
+TEST(SensorDecoder, AHeaderInTheValuesOfARestingSensorIsNoFrame) {
+  const Sensor sensor = sensors().at("sum");
+  std::vector<double> values(20, 255);  // as the header
+  std::string bytes;
+  for (int n = 0; n < 50; ++n) bytes += sent_frame(sensor, values, 0);
+  const Decoded decoded = decode(sensor, bytes.substr(5), 64);
+  EXPECT_GE(decoded.frames.size(), 48U);
+  for (const auto& frame : decoded.frames) EXPECT_EQ(frame, std::vector<float>(20, 255));
+}
+
+TEST(SensorDecoder, MutatedStreamsGiveFramesOrNone) {
+  std::mt19937 random(5);
+  for (const auto& [name, sensor] : sensors()) {
+    for (int run = 0; run < 40; ++run) {
+      std::string bytes;
+      for (unsigned n = 0; n < 8; ++n) bytes += sent_frame(sensor, values_of(sensor, n), 0.01 * n);
+      for (unsigned change = 0; change < 1 + random() % 20; ++change) {
+        const std::size_t at = random() % bytes.size();
+        switch (random() % 4) {
+          case 0:
+            bytes.erase(at, random() % 9);
+            break;
+          case 1:
+            bytes.insert(at, bytes.substr(random() % bytes.size(), random() % 30));
+            break;
+          case 2:
+            bytes[at] = static_cast<char>(random());
+            break;
+          default:
+            bytes.insert(at, random() % 9000, static_cast<char>(random()));
+        }
+      }
+      const Decoded decoded = decode(sensor, bytes, 1 + random() % 500);
+      EXPECT_EQ(decoded.counters.frames, decoded.frames.size());
+      EXPECT_LE(decoded.counters.discarded_bytes, bytes.size());
+      for (const auto& frame : decoded.frames) EXPECT_EQ(frame.size(), sensor.values()) << name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,247 @@
+#include "hardware/boards/sensor_reader.h"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <pty.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "hardware/ports/errors.h"
+#include "hardware/ports/serial_port.h"
+#include "io/files/file.h"
+#include "tests/hardware/fake_sensor.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+Sensor mat(int rows, int columns, double rate_hz, const std::string& frame) {
+  return sensor_of_json("{\"rows\":" + std::to_string(rows) + ",\"columns\":" + std::to_string(columns) +
+                            ",\"rate_hz\":" + format(rate_hz) +
+                            R"(,"pressed":"higher","range":[0,1000],"frame":)" + frame + "}",
+                        "test");
+}
+
+std::vector<double> numbered(const Sensor& sensor, int frame) {
+  std::vector<double> values(sensor.values(), 7);
+  values.front() = frame;
+  return values;
+}
+
+// All frames until the end, or until as many have come.
+std::vector<ReadFrame> all_of(SensorReader& reader, std::size_t most = 1'000'000) {
+  std::vector<ReadFrame> frames;
+  const double until = monotonic_seconds() + 30;
+  while (frames.size() < most && !reader.ended() && monotonic_seconds() < until)
+    if (auto frame = reader.next(0.05)) frames.push_back(std::move(*frame));
+  return frames;
+}
+
+// Something that listens at a port of its own; the address of it.
+sockaddr_in at_port(int port) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  return address;
+}
+
+int free_port(int type) {
+  const int probe = socket(AF_INET, type, 0);
+  sockaddr_in address = at_port(0);
+  socklen_t size = sizeof address;
+  EXPECT_EQ(bind(probe, reinterpret_cast<sockaddr*>(&address), size), 0);
+  EXPECT_EQ(getsockname(probe, reinterpret_cast<sockaddr*>(&address), &size), 0);
+  close(probe);
+  return ntohs(address.sin_port);
+}
+
+std::string refusal(const std::string& address) {
+  try {
+    open_port(address);
+  } catch (const PortError& error) {
+    return error.what();
+  }
+  return "opened";
+}
+
+TEST(OpenPort, RefusesInOneLine) {
+  EXPECT_EQ(refusal("serial:/dev/ttyACM0"),
+            "port serial:/dev/ttyACM0: expected serial:DEVICE@BAUD, such as serial:/dev/ttyACM0@115200");
+  EXPECT_EQ(refusal("udp:5005"),
+            "port udp:5005: expected udp:[HOST]:PORT or tcp:HOST:PORT, such as udp::5005");
+  EXPECT_EQ(refusal("tcp::5005"),
+            "port tcp::5005: expected udp:[HOST]:PORT or tcp:HOST:PORT, such as udp::5005");
+  EXPECT_EQ(refusal("/nowhere"),
+            "port /nowhere: No such file or directory; expected serial:DEVICE@BAUD, udp:[HOST]:PORT, "
+            "tcp:HOST:PORT, - or a file");
+  EXPECT_EQ(refusal("/tmp"), "port /tmp: expected a file or FIFO, found a folder");
+  EXPECT_EQ(refusal("tcp:127.0.0.1:" + std::to_string(free_port(SOCK_STREAM))).find("port tcp:127.0.0.1:"),
+            0U);
+}
+
+TEST(SensorReader, ReadsAFileToItsEndWithoutLoss) {
+  const TemporaryFolder folder;
+  const Sensor sensor = mat(2, 3, 100, R"({"kind":"text","time":{"column":0,"unit":"ms"}})");
+  std::string text = "booting\n";
+  for (int n = 0; n < 10'000; ++n) text += sent_frame(sensor, numbered(sensor, n), 5 + 0.01 * n);
+  text.resize(text.size() - 2);  // no line feed behind the last
+  write_file(folder / "frames.csv", text);
+  SensorReader reader(open_port(folder / "frames.csv"), sensor);
+  EXPECT_FALSE(reader.live());
+  usleep(100'000);  // longer than the queue
+  const std::vector<ReadFrame> frames = all_of(reader);
+  ASSERT_EQ(frames.size(), 10'000U);
+  EXPECT_NEAR(frames.back().time_s - frames.front().time_s, 99.99, 1e-6);
+  EXPECT_EQ(frames.back().signals.front(), 9999);
+  const ReaderCounters counters = reader.counters();
+  EXPECT_EQ(counters.decoder.torn, 1U);  // "booting"
+  EXPECT_EQ(counters.missing + counters.late + counters.dropped, 0U);
+}
+
+TEST(SensorReader, CountsWhatIsLostLateAndDamaged) {
+  const TemporaryFolder folder;
+  const Sensor sensor = mat(1, 2, 100, R"({"kind":"text","time":{"column":0,"unit":"ms"}})");
+  std::string text;
+  for (int n = 0; n < 300; ++n) {
+    if (n >= 100 && n < 103) continue;
+    text += n == 150   ? "1500,nan,7\n"
+            : n == 170 ? "1690,1,7\n"  // as the one before
+            : n == 190 ? "1900,1\n"
+                       : std::to_string(10 * n) + "," + std::to_string(n) + ",7\n";
+  }
+  write_file(folder / "frames.csv", text);
+  SensorReader reader(open_port(folder / "frames.csv"), sensor);
+  EXPECT_EQ(all_of(reader).size(), 294U);
+  const ReaderCounters counters = reader.counters();
+  EXPECT_EQ(counters.damaged, 1U);
+  EXPECT_EQ(counters.late, 1U);
+  EXPECT_EQ(counters.decoder.torn, 1U);
+  EXPECT_EQ(counters.missing, 6U);
+}
+
+TEST(SensorReader, ACounterOfMicrosecondsRunsOver) {
+  FrameDates dates(mat(1, 2, 100, R"({"kind":"text","time":{"column":0,"unit":"us"}})"));
+  const double wrap = 4294.967296;
+  double first = 0, last = 0;
+  for (int n = 0; n < 200; ++n) {
+    const auto time = dates.date(std::fmod(4294 + 0.01 * n, wrap), 100 + 0.01 * n);
+    ASSERT_TRUE(time);
+    (n == 0 ? first : last) = *time;
+  }
+  EXPECT_NEAR(last - first, 1.99, 1e-6);
+  EXPECT_EQ(dates.missing(), 0U);
+}
+
+// Chunks of a tenth of a second, a rate that is not the stated one, and frames that were lost.
+TEST(SensorReader, DatesByArrivalWhereNothingIsStamped) {
+  const double rate_hz = 103;
+  FrameDates dates(mat(1, 2, 100, R"({"kind":"text"})"));
+  double worst_s = 0, last = -1;
+  for (int n = 0; n < 6000; ++n) {
+    if (n >= 3000 && n < 3060) continue;
+    const double made = n / rate_hz, arrival = std::ceil(made / 0.1) * 0.1;
+    const auto time = dates.date(std::nullopt, arrival);
+    ASSERT_TRUE(time);
+    EXPECT_GT(*time, last);
+    last = *time;
+    if (n > 2000 && (n < 3000 || n > 4500)) worst_s = std::max(worst_s, std::abs(*time - made));
+  }
+  EXPECT_LT(worst_s, 0.1);
+  EXPECT_NEAR(dates.period_s(), 1 / rate_hz, 3e-4);
+  EXPECT_NEAR(static_cast<double>(dates.missing()), 60, 12);
+}
+
+TEST(SensorReader, LosesNothingOfAThousandFramesOf16x16OverUdp) {
+  const Sensor sensor = mat(16, 16, 1000, R"({"kind":"binary","header":"AA55","type":"u16"})");
+  const int port = free_port(SOCK_DGRAM);
+  SensorReader reader(open_port("udp:127.0.0.1:" + std::to_string(port)), sensor);
+  const int out = socket(AF_INET, SOCK_DGRAM, 0);
+  const sockaddr_in to = at_port(port);
+  std::thread sender([&] {
+    for (int n = 0; n < 2000; ++n) {
+      const std::string frame = sent_frame(sensor, numbered(sensor, n), 0);
+      sendto(out, frame.data(), frame.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
+      usleep(1000);
+    }
+  });
+  const std::vector<ReadFrame> frames = all_of(reader, 2000);
+  sender.join();
+  close(out);
+  ASSERT_EQ(frames.size(), 2000U);
+  for (int n = 0; n < 2000; ++n) ASSERT_EQ(frames[static_cast<std::size_t>(n)].signals.front(), n);
+}
+
+TEST(SensorReader, ADatagramOfTextIsALine) {
+  const Sensor sensor = mat(1, 3, 100, R"({"kind":"text"})");
+  const int port = free_port(SOCK_DGRAM);
+  SensorReader reader(open_port("udp::" + std::to_string(port), true), sensor);
+  const int out = socket(AF_INET, SOCK_DGRAM, 0);
+  const sockaddr_in to = at_port(port);
+  for (int n = 0; n < 20; ++n) sendto(out, "1,2,3", 5, 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
+  EXPECT_EQ(all_of(reader, 20).size(), 20U);
+  close(out);
+}
+
+TEST(SensorReader, ReadsTcpUntilTheOtherSideIsGone) {
+  const Sensor sensor = mat(2, 2, 100, R"({"kind":"json"})");
+  const int port = free_port(SOCK_STREAM), server = socket(AF_INET, SOCK_STREAM, 0);
+  const sockaddr_in at = at_port(port);
+  ASSERT_EQ(bind(server, reinterpret_cast<const sockaddr*>(&at), sizeof at), 0);
+  ASSERT_EQ(listen(server, 1), 0);
+  SensorReader reader(open_port("tcp:127.0.0.1:" + std::to_string(port)), sensor);
+  const int client = accept(server, nullptr, nullptr);
+  for (int n = 0; n < 50; ++n) {
+    const std::string frame = sent_frame(sensor, numbered(sensor, n), 0);
+    ASSERT_EQ(send(client, frame.data(), frame.size(), 0), static_cast<ssize_t>(frame.size()));
+  }
+  EXPECT_EQ(all_of(reader, 50).size(), 50U);
+  close(client);
+  close(server);
+  EXPECT_THROW(all_of(reader), PortUnplugged);
+}
+
+TEST(SensorReader, WaitsForTheWriterOfAFifo) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "fifo";
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  const Sensor sensor = mat(1, 2, 100, R"({"kind":"text"})");
+  SensorReader reader(open_port(path), sensor);
+  EXPECT_FALSE(reader.next(0.1));
+  EXPECT_FALSE(reader.ended());
+  const int out = open(path.c_str(), O_WRONLY);
+  ASSERT_EQ(write(out, "1,2\n3,4\n", 8), 8);
+  close(out);
+  EXPECT_EQ(all_of(reader).size(), 2U);
+}
+
+TEST(SensorReader, AnotherDeviceIsSaidWithWhatItSends) {
+  int master = -1, slave = -1;
+  char name[100];
+  ASSERT_EQ(openpty(&master, &slave, name, nullptr, nullptr), 0);
+  const Sensor sensor = mat(2, 2, 1000, R"({"kind":"text"})");
+  SensorReader reader(open_port("serial:" + std::string(name) + "@115200"), sensor);
+  const std::string line = "echo:busy: processing\n";
+  ASSERT_EQ(write(master, line.data(), line.size()), static_cast<ssize_t>(line.size()));
+  try {
+    all_of(reader);
+    ADD_FAILURE() << "nothing was said";
+  } catch (const WrongDevice& error) {
+    EXPECT_EQ(
+        std::string(error.what()),
+        "sensor sensor at " + std::string(name) +
+            ": expected frames of 4 values, found 22 bytes without one, such as 'echo:busy: processing?'; "
+            "supertac-stream --probe says what they are");
+  }
+  close(slave);
+  close(master);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,75 @@
+// A device that sends frames as a Sensor describes them, written down apart from the decoders.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "data/sensors/sensor.h"
+#include "io/numbers/numbers.h"
+
+namespace supertac {
+
+inline void append_bytes(std::string& bytes, std::uint64_t bits, std::size_t count, bool big_endian) {
+  for (std::size_t i = 0; i < count; ++i)
+    bytes += static_cast<char>(bits >> 8 * (big_endian ? count - 1 - i : i));
+}
+
+inline std::uint64_t bits_of(double value, const std::string& type) {
+  if (type == "f32") return std::bit_cast<std::uint32_t>(static_cast<float>(value));
+  if (type == "f64") return std::bit_cast<std::uint64_t>(value);
+  return static_cast<std::uint64_t>(std::llround(value));
+}
+
+/// One frame of so many values, in the order of the frame.
+inline std::string sent_frame(const Sensor& sensor, std::span<const double> values, double time_s) {
+  const FrameFormat& f = sensor.frame;
+  const double stamp = f.time ? std::round(time_s / f.time->unit_s) : 0;
+  std::string bytes;
+  if (f.kind == FrameKind::text) {
+    std::size_t next = 0;
+    for (int column = 0; next < values.size() || (f.time && f.time->column == column); ++column) {
+      const bool skipped = std::find(f.skip.begin(), f.skip.end(), column) != f.skip.end();
+      if (column > 0) bytes += f.separator;
+      bytes += skipped ? "x" : f.time && f.time->column == column ? format(stamp) : format(values[next++]);
+    }
+    return bytes + "\r\n";
+  }
+  if (f.kind == FrameKind::json) {
+    std::string list;
+    const auto columns = static_cast<std::size_t>(sensor.array.columns * sensor.array.channels);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      list += (i == 0 ? "[" : i % columns == 0 ? "],[" : ",") + format(values[i]);
+    list = "[" + list + "]]";
+    if (f.values.empty()) return list + "\n";
+    return (f.time ? "{\"" + f.time->key + "\":" + format(stamp) + "," : "{") + "\"" + f.values +
+           "\":" + list + "}\n";
+  }
+  if (f.time)
+    append_bytes(bytes, bits_of(stamp, f.time->type),
+                 f.time->type.back() == '6'   ? 2
+                 : f.time->type.back() == '2' ? 4
+                                              : 8,
+                 f.big_endian);
+  const std::size_t width = f.type.ends_with("8") ? 1 : f.type.ends_with("16") ? 2 : 4;
+  for (const double value : values) append_bytes(bytes, bits_of(value, f.type), width, f.big_endian);
+  std::uint32_t sum = 0, crossed = 0, modbus = 0xFFFF, ccitt = 0xFFFF;
+  for (const char c : bytes) {
+    const auto byte = static_cast<unsigned char>(c);
+    sum += byte, crossed ^= byte, modbus ^= byte, ccitt ^= std::uint32_t{byte} << 8;
+    for (int bit = 0; bit < 8; ++bit) {
+      modbus = modbus >> 1 ^ ((modbus & 1) != 0 ? 0xA001U : 0U);
+      ccitt = (ccitt << 1 ^ ((ccitt & 0x8000) != 0 ? 0x1021U : 0U)) & 0xFFFF;
+    }
+  }
+  if (f.checksum == "sum8") append_bytes(bytes, sum & 0xFF, 1, false);
+  if (f.checksum == "xor8") append_bytes(bytes, crossed, 1, false);
+  if (f.checksum == "crc16-modbus") append_bytes(bytes, modbus, 2, f.big_endian);
+  if (f.checksum == "crc16-ccitt") append_bytes(bytes, ccitt, 2, f.big_endian);
+  return f.header + bytes + f.trailer;
+}
+
+}  // namespace supertac
