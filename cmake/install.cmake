@@ -2,9 +2,10 @@
 include(CMakePackageConfigHelpers)
 get_property(libraries GLOBAL PROPERTY SUPERTAC_LIBRARIES)
 install(TARGETS ${libraries} EXPORT supertac ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
-foreach(folder io autograd layers data models hardware)
-  install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/supertac COMPONENT development FILES_MATCHING PATTERN "*.h")
-endforeach()
+install(CODE "set(SUPERTAC_SOURCE [[${PROJECT_SOURCE_DIR}]])
+set(SUPERTAC_BUILD [[${PROJECT_BINARY_DIR}]])
+set(SUPERTAC_INCLUDEDIR [[${CMAKE_INSTALL_INCLUDEDIR}]])" COMPONENT development)
+install(SCRIPT cmake/install_headers.cmake COMPONENT development)
 install(EXPORT supertac NAMESPACE supertac:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supertac
   FILE supertacTargets.cmake COMPONENT development)
 file(WRITE ${PROJECT_BINARY_DIR}/supertacConfig.cmake
@@ -28,7 +29,7 @@ file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/supertac.pc @ONLY CONTENT
 Name: supertac
 Description: @PROJECT_DESCRIPTION@
 Version: @PROJECT_VERSION@
-Cflags: -I\${prefix}/@CMAKE_INSTALL_INCLUDEDIR@/supertac
+Cflags: -I\${prefix}/@CMAKE_INSTALL_INCLUDEDIR@
 Libs: -L\${prefix}/@CMAKE_INSTALL_LIBDIR@ -Wl,--start-group@links@ -Wl,--end-group -lopenblas -lz -fopenmp -pthread
 ")
 install(FILES ${PROJECT_BINARY_DIR}/supertac.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)

@@ -24,7 +24,7 @@ function(supertac_library name)
   add_library(${name} STATIC ${arg_SOURCES})
   add_library(supertac::${name} ALIAS ${name})
   target_include_directories(${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
-    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/supertac>)
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_features(${name} PUBLIC cxx_std_20)
   target_link_libraries(${name} PUBLIC ${arg_USES} PRIVATE $<BUILD_INTERFACE:supertac_options> ${arg_PRIVATE_USES})
   set_property(GLOBAL APPEND PROPERTY SUPERTAC_LIBRARIES ${name})

@@ -4,10 +4,10 @@
 #include <cstdio>
 #include <numbers>
 
-#include "autograd/adam.h"
-#include "autograd/ops/losses.h"
-#include "layers/linear.h"
-#include "models/training/schedule.h"
+#include <supertac/autograd/adam.h>
+#include <supertac/autograd/ops/losses.h>
+#include <supertac/layers/linear.h>
+#include <supertac/models/training/schedule.h>
 
 using namespace supertac;
 

@@ -11,10 +11,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "data/recordings/recording.h"
-#include "data/windows/live_window.h"
-#include "io/images/images.h"
-#include "models/files/model_file.h"
+#include <supertac/data/recordings/recording.h>
+#include <supertac/data/windows/live_window.h>
+#include <supertac/io/images/images.h>
+#include <supertac/models/files/model_file.h>
 
 using namespace supertac;
 

@@ -8,15 +8,15 @@
 #include <exception>
 #include <vector>
 
-#include "autograd/adam.h"
-#include "autograd/ops/arithmetic.h"
-#include "autograd/ops/losses.h"
-#include "autograd/ops/shaping.h"
-#include "autograd/ops/vae.h"
-#include "io/images/images.h"
-#include "layers/convolution.h"
-#include "layers/linear.h"
-#include "models/training/schedule.h"
+#include <supertac/autograd/adam.h>
+#include <supertac/autograd/ops/arithmetic.h>
+#include <supertac/autograd/ops/losses.h>
+#include <supertac/autograd/ops/shaping.h>
+#include <supertac/autograd/ops/vae.h>
+#include <supertac/io/images/images.h>
+#include <supertac/layers/convolution.h>
+#include <supertac/layers/linear.h>
+#include <supertac/models/training/schedule.h>
 
 using namespace supertac;
 
