@@ -37,8 +37,8 @@ struct FolderImport {
   std::function<void(std::size_t done, std::size_t files)> progress = {};
 };
 
-/// Imports a folder of the rig's text recordings, <plate>/<trial>/<pass>.txt with <plate> a name that
-/// Plate::named takes, or <plate>.stl beside its folder, or any name that begins with "unknown": passes over
+/// Imports a folder of the rig's text recordings, `PLATE/TRIAL/PASS.txt` with PLATE a name that
+/// Plate::named takes, or `PLATE.stl` beside its folder, or any name that begins with "unknown": passes over
 /// a shape that nobody knows are not registered and have no positions (is_unknown_plate()). The recordings
 /// have plate, trial, pass, speed, positions, a clock in seconds and the metadata of apply(); they are in the
 /// order of their names.

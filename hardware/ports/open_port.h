@@ -13,8 +13,8 @@ struct OpenedPort {
   bool live = true;  ///< nobody waits for its reader: a serial line or a socket, not a file or a pipe
 };
 
-/// serial:DEVICE@BAUD ("auto" finds the rig's board), udp:[HOST]:PORT (listens), tcp:HOST:PORT (connects, at
-/// most 5 s), "-" for standard input, or the path of a file or FIFO. `lines`: a datagram ends a line.
+/// `serial:DEVICE@BAUD` ("auto" finds the rig's board), udp:[HOST]:PORT (listens), tcp:HOST:PORT (connects,
+/// at most 5 s), "-" for standard input, or the path of a file or FIFO. `lines`: a datagram ends a line.
 /// `speedup` as SerialSettings. Throws PortError and its kinds.
 OpenedPort open_port(const std::string& address, bool lines = false, double speedup = 1);
 

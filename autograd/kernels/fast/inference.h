@@ -25,8 +25,9 @@ struct ProductJob {
   real negative_slope = 1;
 };
 
-/// Tiles of square x square pixels of maps with a margin of one pixel, numbered through a batch: first ..
-/// first + count. Place (i, j) of the k-th of them is places[((square + 2) i + j) * step + k * channels + c].
+/// Tiles of square x square pixels of maps with a margin of one pixel, numbered through a batch from `first`
+/// on, `count` of them. Place (i, j) of the k-th of them is places[((square + 2) i + j) * step + k * channels
+/// + c].
 struct MapTileJob {
   Dim tiles_down = 0, tiles_across = 0;
   Strides map;
