@@ -281,8 +281,8 @@ TEST(Dispatcher, HelpIsThatOfTheJobOrTheGlossary) {
   EXPECT_EQ(run_process("supertac", {"help"}).out, run_process("supertac", {"--help"}).out);
   expect_failure(run_process("supertac", {"help", "inf"}), 2, "did you mean 'info'?");
   const std::string glossary = run_process("supertac", {"help", "glossary"}).out;
-  for (const char* term :
-       {"taxel", "window", "pass", "trial", "split", "levelled", "latent", "contact", "SSIM", "ghost rate"})
+  for (const char* term : {"taxel", "window", "pass", "trial", "split", "normalised per window", "latent",
+                           "contact", "SSIM", "ghost rate"})
     EXPECT_NE(glossary.find("**" + std::string(term) + "** - "), std::string::npos) << term;
   EXPECT_NE(run_process("supertac", {"--help"}).out.find("supertac help glossary"), std::string::npos);
 }
