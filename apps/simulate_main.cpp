@@ -22,9 +22,9 @@ struct Job {
   std::string path;
 };
 
-std::string joined(const std::vector<std::string>& names) {
+std::string joined(const std::vector<std::string>& names, const char* between = ",") {
   std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  for (const std::string& name : names) text += (text.empty() ? "" : between) + name;
   return text;
 }
 
@@ -131,7 +131,7 @@ void declare(Arguments& arguments) {
       .option("to", "MM", "where the slide ends", format(Plate::kLengthMm))
       .option("array", "ROWSxCOLUMNS", "taxels of the finger, 2 to 16 either way", "4x4")
       .option("pitch", "MM", "from taxel to taxel", "3")
-      .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms()))
+      .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms(), ", "))
       .option("seed", "N", "the same seed gives the same files", "1");
 }
 
