@@ -21,7 +21,8 @@ namespace {
 constexpr char kKind[] = "recording";
 // What no rig does; a model file has the same limit for its filter.
 constexpr double kFastest = 1e4, kLongestFilter = 10, kLongest = 1e10;
-constexpr const char* kFields[] = {"kind", "plate", "trial", "pass", "speed_mm_s", "source", "array"};
+constexpr const char* kFields[] = {"kind",       "plate",  "trial", "pass",
+                                   "speed_mm_s", "source", "array", "signals"};
 
 /// What is wrong with the recording, or nothing.
 std::optional<std::string> problem_of(const Recording& recording) {
@@ -105,6 +106,16 @@ TaxelArray take_array(std::map<std::string, std::string>& metadata, const std::s
   }
 }
 
+SignalScale take_scale(std::map<std::string, std::string>& metadata, const std::string& path) {
+  const auto node = metadata.extract("signals");
+  if (node.empty()) return {};
+  try {
+    return scale_of_json(parse_json_limited(node.mapped()), path);
+  } catch (const JsonError& error) {
+    throw FileError(path, std::string("signals: ") + error.what());
+  }
+}
+
 void check_shape(const SafetensorsFile& file, const std::string& name, std::vector<std::uint64_t> expected) {
   const auto& shape = file.tensors().at(name).shape;
   if (shape == expected) return;
@@ -122,6 +133,13 @@ void check_shape(const SafetensorsFile& file, const std::string& name, std::vect
 double Recording::filter_s() const {
   const auto found = metadata.find("filter_s");
   return found == metadata.end() ? 0 : parse_double(found->second).value_or(0);
+}
+
+void restate(Recording& recording, const SignalScale& scale) {
+  if (recording.signal_scale == scale) return;
+  for (float& volts : recording.volts)
+    volts = static_cast<float>(recording.signal_scale.in(scale, double{volts}));
+  recording.signal_scale = scale;
 }
 
 Recording read_recording(const std::string& path) { return recording_of(SafetensorsFile::read(path)); }
@@ -143,6 +161,7 @@ Recording recording_of(const SafetensorsFile& file) {
   recording.speed_mm_s = *speed_value;
 
   recording.array = take_array(recording.metadata, path);
+  recording.signal_scale = take_scale(recording.metadata, path);
 
   recording.time_s = file.f64("time_s");
   recording.volts = file.f32("volts");
@@ -187,6 +206,7 @@ void write_recording(const std::string& path, const Recording& recording) {
         {"channels",
          array.channels}}.dump();
   }
+  if (recording.signal_scale != SignalScale{}) metadata["signals"] = json_of(recording.signal_scale).dump();
   const std::uint64_t n = recording.frames();
   std::vector<TensorToWrite> tensors = {
       {"time_s", "F64", {n}, std::as_bytes(std::span(recording.time_s))},

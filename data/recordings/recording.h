@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "data/sensors/taxel_array.h"
+#include "data/sensors/sensor.h"
 #include "io/files/safetensors.h"
 
 namespace supertac {
@@ -13,11 +13,12 @@ namespace supertac {
 /// One pass of the finger over a plate, at the rate it was recorded with.
 struct Recording {
   std::vector<double> time_s;  ///< n, strictly increasing
-  std::vector<float> volts;    ///< n x array.signals(), a frame together; pressure lowers the voltage
+  std::vector<float> volts;    ///< n x array.signals(), a frame together, in the unit of signal_scale
   std::vector<float>
       position_mm;  ///< n x 2: (x, y) of the finger's centre on the plate; empty, or NaN where unknown
   std::vector<float> lift_mm;  ///< n: how far the finger is above its slide; empty: it slides throughout
   TaxelArray array;
+  SignalScale signal_scale;                     ///< unit, polarity and range of the signals
   std::string plate;                            ///< name as Plate::named takes it
   int trial = 0, pass = 0;                      ///< from 1
   double speed_mm_s = 0;                        ///< as commanded; 0 when unknown
@@ -29,20 +30,25 @@ struct Recording {
   double filter_s() const;
 };
 
+/// States the signals in another sensor's unit, polarity and range: they say the same.
+void restate(Recording& recording, const SignalScale& scale);
+
 /// Reads a safetensors file with tensors time_s F64 [n], volts F32 [n,signals] and, where known,
 /// position_mm F32 [n,2] and lift_mm F32 [n]. Metadata "array" says what the signals are, {"rows": 6,
-/// "columns": 6, "pitch_mm": 2, "channels": 1}; without it they are the rig's 4x4 taxels at 3 mm. Throws
-/// FileError when the file is damaged (io/files/safetensors.h), is no recording, or breaks a rule of
-/// Recording: sizes that do not match, values that are not finite (position_mm may be NaN), time stamps that
-/// do not increase, a speed, a moving average (metadata "filter_s", s) or a time that no rig has.
+/// "columns": 6, "pitch_mm": 2, "channels": 1}; without it they are the rig's 4x4 taxels at 3 mm. Metadata
+/// "signals" says what they mean, {"unit": "counts", "pressed": "higher", "range": [40, 900]}; without it
+/// they are the rig's volts. Throws FileError when the file is damaged (io/files/safetensors.h), is no
+/// recording, or breaks a rule of Recording: sizes that do not match, values that are not finite (position_mm
+/// may be NaN), time stamps that do not increase, a speed, a moving average (metadata "filter_s", s) or a
+/// time that no rig has.
 Recording read_recording(const std::string& path);
 /// The same of a file that has been read.
 Recording recording_of(const SafetensorsFile& file);
 
 /// Writes it atomically; the same recording gives the same bytes.
 /// Throws std::invalid_argument when the recording breaks a rule read_recording() checks, or its metadata
-/// has a key this function writes (kind, plate, trial, pass, speed_mm_s, source, array); FileError when it
-/// cannot be written.
+/// has a key this function writes (kind, plate, trial, pass, speed_mm_s, source, array, signals); FileError
+/// when it cannot be written.
 void write_recording(const std::string& path, const Recording& recording);
 
 /// "<plate>_t<trial>_p<pass>_v<speed>.safetensors", the name a recording has in a folder of recordings.

@@ -23,8 +23,8 @@ std::span<const float> volts_of(const Recording& recording, std::size_t frame) {
 
 void check(const Recording& recording, const ResampleSettings& settings) {
   const double span_volts = settings.scaling.value_or(Scaling{}).span_volts;
-  if (!(settings.rate_hz > 0) || !(settings.max_gap_s > 0) || !(span_volts > 0))
-    throw std::invalid_argument("resample: rate_hz, max_gap_s and span_volts must be positive, got " +
+  if (!(settings.rate_hz > 0) || !(settings.max_gap_s > 0) || !(std::abs(span_volts) > 0))
+    throw std::invalid_argument("resample: rate_hz and max_gap_s must be positive, span_volts not 0, got " +
                                 std::to_string(settings.rate_hz) + ", " + std::to_string(settings.max_gap_s) +
                                 " and " + std::to_string(span_volts));
   const std::size_t n = recording.time_s.size(), values = n * recording.array.signals();

@@ -9,9 +9,10 @@
 
 namespace supertac {
 
-/// Scales a voltage to [0,1], 1 = pressed hard: clip((rest - V) / span, 0, 1).
+/// Scales a signal to [0,1], 1 = pressed hard: clip((rest - V) / span, 0, 1). The span is below 0 where
+/// pressing raises the signal.
 struct Scaling {
-  double rest_volts = 2.45, span_volts = 0.36;
+  double rest_volts = SignalScale{}.rest, span_volts = SignalScale{}.span;
   bool levelled = false;  ///< whole windows are then brought to their own rest and gain: level()
   float operator()(float volts) const;
   /// Scales every value in place.

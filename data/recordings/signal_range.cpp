@@ -28,6 +28,7 @@ SignalRange SignalRange::of_folder(const std::string& dir, const std::vector<std
 }
 
 void SignalRange::add(const Recording& recording) {
+  stated_ = {.rest_volts = recording.signal_scale.rest, .span_volts = recording.signal_scale.span};
   const std::size_t signals = recording.array.signals(), frames = recording.frames();
   for (; next_ < frames; next_ += apart_)
     for (std::size_t k = 0; k < signals; ++k) {
@@ -57,10 +58,10 @@ const std::vector<float>& SignalRange::values() const {
 double SignalRange::clipped(const Scaling& s) const {
   if (values_.empty()) return 0;
   const std::vector<float>& sorted = values();
-  const auto pressed = std::ranges::lower_bound(sorted, s.rest_volts - s.span_volts) - sorted.begin();
-  const auto above =
-      sorted.end() - std::ranges::upper_bound(sorted, s.rest_volts + kAboveRest * s.span_volts);
-  return static_cast<double>(pressed + above) / static_cast<double>(sorted.size());
+  const double pressed = s.rest_volts - s.span_volts, beyond_rest = s.rest_volts + kAboveRest * s.span_volts;
+  const auto below = std::ranges::lower_bound(sorted, std::min(pressed, beyond_rest)) - sorted.begin();
+  const auto above = sorted.end() - std::ranges::upper_bound(sorted, std::max(pressed, beyond_rest));
+  return static_cast<double>(below + above) / static_cast<double>(sorted.size());
 }
 
 double SignalRange::level(double share) const {
@@ -68,11 +69,13 @@ double SignalRange::level(double share) const {
 }
 
 Scaling SignalRange::fitted() const {
-  const Scaling rig;
-  if (values_.empty()) return rig;
+  if (values_.empty()) return stated_;
   const double low = level(kTail), high = level(1 - kTail);
-  if (clipped(rig) <= kMostClipped && high - low >= kLeastFilled * rig.span_volts) return rig;
-  return {.rest_volts = high, .span_volts = std::max(kMargin * (high - low), 1e-6)};
+  if (clipped(stated_) <= kMostClipped && high - low >= kLeastFilled * std::abs(stated_.span_volts))
+    return stated_;
+  const double span = std::max(kMargin * (high - low), 1e-6);
+  if (stated_.span_volts < 0) return {.rest_volts = low, .span_volts = -span};
+  return {.rest_volts = high, .span_volts = span};
 }
 
 std::string SignalRange::text() const {

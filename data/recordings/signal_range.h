@@ -31,9 +31,10 @@ class SignalRange {
   /// Share of the signals that the scaling makes all the same: those below rest - span, and those more than
   /// a quarter of the span above rest.
   double clipped(const Scaling& scaling) const;
-  /// The rig's scaling where it clips no more than a twentieth and the signals fill a tenth of it; otherwise
-  /// rest is the level that one signal in 200 exceeds, and span reaches from there to the level that one in
-  /// 200 stays below, and a tenth further.
+  /// The range that the recordings state (the rig's in older ones) where it clips no more than a twentieth
+  /// and the signals fill a tenth of it; otherwise rest is the level that one signal in 200 exceeds, and span
+  /// reaches from there to the level that one in 200 stays below, and a tenth further; the other way round
+  /// where pressing raises the signals.
   Scaling fitted() const;
   /// "68 to 102.3", all but the outermost 200th on both sides.
   std::string text() const;
@@ -45,6 +46,7 @@ class SignalRange {
   void thin_out();
 
   mutable std::vector<float> values_;
+  Scaling stated_;
   mutable bool sorted_ = true;
   std::size_t apart_ = 64, next_ = 0;  // frames from one of the sample to the next, and to the first
   bool thinned_ = false;               // until then every recording begins with one of the sample

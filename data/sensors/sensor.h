@@ -21,6 +21,10 @@ struct SignalScale {
   bool rises() const { return span < 0; }
   double low() const { return rises() ? rest : rest - span; }
   double high() const { return rises() ? rest - span : rest; }
+  /// The signal of another sensor that says the same.
+  double in(const SignalScale& other, double signal) const {
+    return other.rest - other.span * ((rest - signal) / span);
+  }
   bool operator==(const SignalScale&) const = default;
 };
 

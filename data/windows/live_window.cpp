@@ -18,8 +18,9 @@ void check(const LiveWindowSettings& s) {
   const auto fail = [](const std::string& what) { throw std::invalid_argument("live window: " + what); };
   if (s.signals < 1) fail("a frame must have at least 1 signal");
   if (s.timesteps < 1) fail("timesteps must be at least 1, got " + std::to_string(s.timesteps));
-  if (!(s.rate_hz > 0) || !(s.frame_period_s > 0) || !(s.max_gap_s > 0) || !(s.scaling.span_volts > 0))
-    fail("rate_hz, frame_period_s, max_gap_s and span_volts must be positive, got " +
+  if (!(s.rate_hz > 0) || !(s.frame_period_s > 0) || !(s.max_gap_s > 0) ||
+      !(std::abs(s.scaling.span_volts) > 0))
+    fail("rate_hz, frame_period_s and max_gap_s must be positive, span_volts not 0, got " +
          std::to_string(s.rate_hz) + ", " + std::to_string(s.frame_period_s) + ", " +
          std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span_volts));
   if (!(s.filter_s >= 0)) fail("filter_s must not be negative, got " + std::to_string(s.filter_s));

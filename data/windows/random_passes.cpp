@@ -68,7 +68,9 @@ Recording simulate(std::uint32_t number, const RandomPasses& passes, const Windo
                           .speed_mm_s = passes.speed_mm_s,
                           .from_mm = from_edge_mm(random.uniform(kFrom)),
                           .to_mm = Plate::kLengthMm - from_edge_mm(random.uniform(kTo))};
-  return simulate_pass(random_plate(number), pass, finger_of(passes, windows, random), number);
+  Recording recording = simulate_pass(random_plate(number), pass, finger_of(passes, windows, random), number);
+  restate(recording, windows.signal_scale.value_or(SignalScale{}));
+  return recording;
 }
 
 constexpr std::uint64_t kSilentStream = 0x73696c656e74ULL;  // "silent"
@@ -81,6 +83,7 @@ Recording silent_pass(const RandomStream& random, const WindowSettings& windows,
   enum Draw : std::uint64_t { kPressed, kNoise, kDrift, kTaxels = 10, kSamples = 10'000 };
   Recording recording;
   recording.array = windows.array.value_or(TaxelArray{});
+  recording.signal_scale = windows.signal_scale.value_or(SignalScale{});
   recording.plate = "plain", recording.trial = recording.pass = 1, recording.source = "simulated";
   const auto frames = static_cast<std::size_t>(kWindowsLong * windows.timesteps);
   const std::size_t signals = recording.array.signals();

@@ -12,6 +12,7 @@
 #include "data/windows/chosen_plates.h"
 #include "data/windows/levelling.h"
 #include "io/numbers/hash.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -22,8 +23,8 @@ void check(const WindowSettings& s) {
   if (s.scale != 2 && s.scale != 4 && s.scale != 8)
     fail("scale must be 2, 4 or 8, got " + std::to_string(s.scale));
   if (s.stride < 1) fail("stride must be at least 1, got " + std::to_string(s.stride));
-  if (!(s.rate_hz > 0) || !(s.max_gap_s > 0) || !(s.scaling.span_volts > 0))
-    fail("rate_hz, max_gap_s and span_volts must be positive, got " + std::to_string(s.rate_hz) + ", " +
+  if (!(s.rate_hz > 0) || !(s.max_gap_s > 0) || !(std::abs(s.scaling.span_volts) > 0))
+    fail("rate_hz and max_gap_s must be positive, span_volts not 0, got " + std::to_string(s.rate_hz) + ", " +
          std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span_volts));
 }
 
@@ -106,8 +107,20 @@ void WindowSet::expect_array(const TaxelArray& found) {
                              "; give recordings of the array the model is for, and no others");
 }
 
+void WindowSet::expect_unit(const SignalScale& found) {
+  if (!settings_.signal_scale) settings_.signal_scale = found;
+  const SignalScale expected = signal_scale();
+  if (found.unit == expected.unit && found.rises() == expected.rises()) return;
+  const auto text = [](const SignalScale& s) {
+    return in_quotes(s.unit) + (s.rises() ? " that rise" : " that fall") + " under pressure";
+  };
+  throw std::runtime_error("has signals in " + text(found) + ", expected " + text(expected) +
+                           ", as in the others; give recordings of one sensor");
+}
+
 void WindowSet::append(const Recording& recording, const std::string& folder, const Use& use) {
   expect_array(recording.array);
+  expect_unit(recording.signal_scale);
   const std::size_t plate = plate_index(recording.plate, folder);
   Track track = resample(
       recording,

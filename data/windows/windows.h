@@ -24,8 +24,9 @@ struct WindowSettings {
   double rate_hz = 300;                  ///< the model's rate
   Scaling scaling = {};                  ///< volts to [0,1]
   std::optional<TaxelArray> array = {};  ///< that every recording must have; nothing: that of the first
-  int stride = 1;                        ///< every stride-th frame of a pass ends a window
-  double max_gap_s = 0.05;               ///< longer silence in a recording is a gap no window crosses
+  std::optional<SignalScale> signal_scale = {};  ///< likewise, its unit and polarity
+  int stride = 1;                                ///< every stride-th frame of a pass ends a window
+  double max_gap_s = 0.05;                       ///< longer silence in a recording is a gap no window crosses
 };
 
 /// Where the frames of the recordings went: frames is the sum of all that follow down to windows.
@@ -97,6 +98,7 @@ class WindowSet : public Examples {
   int timesteps() const { return settings_.timesteps; }
   /// Of the recordings; the rig's while there is none.
   TaxelArray array() const override { return settings_.array.value_or(TaxelArray{}); }
+  SignalScale signal_scale() const { return settings_.signal_scale.value_or(SignalScale{}); }
   int scale() const override { return settings_.scale; }
   const WindowSettings& settings() const { return settings_; }
   const WindowCounts& counts() const { return counts_; }
@@ -163,6 +165,7 @@ class WindowSet : public Examples {
   };
   void append(const Recording& recording, const std::string& folder, const Use& use);
   void expect_array(const TaxelArray& array);
+  void expect_unit(const SignalScale& found);
   std::size_t plate_index(const std::string& name, const std::string& folder);
   void append(const TrackCard& card, std::size_t plate, const Use& use);
   void append(const TrackCard& card, const FrameRange& stretch, std::uint32_t stride);

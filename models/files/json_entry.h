@@ -25,6 +25,8 @@ class JsonEntry {
   std::optional<double> number_or_null(const char* name) const;
   std::vector<float> numbers(const char* name, std::size_t count) const;
   std::string text(const char* name) const;
+  /// A value as it stands, to be checked by whoever reads it.
+  const nlohmann::ordered_json& object(const char* name) const { return field(name); }
   const std::string& where() const { return where_; }
 
  private:

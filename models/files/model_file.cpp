@@ -47,16 +47,19 @@ SuperTacSettings read_settings(const JsonEntry& entry) {
 }
 
 InputSettings read_input(const JsonEntry& entry) {
-  const InputSettings input{entry.number("rate_hz"),
-                            {entry.number("rest_volts"), entry.number("span_volts"), entry.flag("levelled")},
-                            entry.number_or_null("filter_s"),
-                            entry.has("pitch_mm") ? entry.number("pitch_mm") : InputSettings{}.pitch_mm};
-  if (input.rate_hz < 1 || input.rate_hz > 100'000 || std::abs(input.scaling.rest_volts) > 1000 ||
-      input.scaling.span_volts <= 1e-6 || input.scaling.span_volts > 1000 || input.filter_s.value_or(0) < 0 ||
-      input.filter_s.value_or(0) > 10 || input.pitch_mm < 0.1 || input.pitch_mm > 100) {
+  const InputSettings input{
+      entry.number("rate_hz"),
+      {entry.number("rest_volts"), entry.number("span_volts"), entry.flag("levelled")},
+      entry.number_or_null("filter_s"),
+      entry.has("pitch_mm") ? entry.number("pitch_mm") : InputSettings{}.pitch_mm,
+      entry.has("signals") ? scale_of_json(entry.object("signals"), entry.where()) : SignalScale{}};
+  const double span = std::abs(input.scaling.span_volts);
+  if (input.rate_hz < 1 || input.rate_hz > 100'000 || std::abs(input.scaling.rest_volts) > 2e9 ||
+      span <= 1e-6 || span > 2e9 || input.filter_s.value_or(0) < 0 || input.filter_s.value_or(0) > 10 ||
+      input.pitch_mm < 0.1 || input.pitch_mm > 100) {
     throw std::runtime_error(
         entry.where() +
-        ": expected rate_hz 1 to 100000, |rest_volts| <= 1000, span_volts 1e-6 to 1000, filter_s 0 to 10, "
+        ": expected rate_hz 1 to 100000, |rest_volts| <= 2e9, |span_volts| 1e-6 to 2e9, filter_s 0 to 10, "
         "pitch_mm 0.1 to 100");
   }
   return input;
@@ -124,6 +127,7 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
                   {"formula", "clip((rest_volts - V) / span_volts, 0, 1)"}};
   if (input.scaling.levelled) scaling["levelled"] = true;
   if (input.pitch_mm != InputSettings{}.pitch_mm) scaling["pitch_mm"] = input.pitch_mm;
+  if (input.signal_scale != SignalScale{}) scaling["signals"] = json_of(input.signal_scale);
   return {{"settings", settings.dump()}, {"input", scaling.dump()}};
 }
 
@@ -165,12 +169,13 @@ WindowSettings ModelFile::windows() const {
   w.rate_hz = input.rate_hz;
   w.scaling = input.scaling;
   w.array = array();
+  w.signal_scale = input.signal_scale;
   return w;
 }
 
 InputSettings input_of(const WindowSet& windows) {
   return {windows.settings().rate_hz, windows.settings().scaling, windows.filter_s(),
-          windows.array().pitch_mm};
+          windows.array().pitch_mm, windows.signal_scale()};
 }
 
 void set_array(SuperTacSettings& settings, const TaxelArray& array) {

@@ -24,7 +24,8 @@ struct InputSettings {
   /// Length of the moving average (s) that the training signals went through, 0 = none; nothing when they
   /// differed.
   std::optional<double> filter_s = 0.0;
-  double pitch_mm = 3;  ///< of the array
+  double pitch_mm = 3;            ///< of the array
+  SignalScale signal_scale = {};  ///< as the recordings state it: unit, polarity and range of the signals
 };
 
 /// The metadata keys "settings" and "input", JSON texts; of a frame model "kind" besides.
