@@ -8,10 +8,7 @@
 namespace supertac {
 
 void declare(Arguments& a) {
-  a.required(
-      "model", "FILE,...",
-      "a model written by supertac-train; of several the pictures are averaged, and beside models that "
-      "saw random plates those of the others are drawn where both agree");
+  a.required("model", "FILE,...", "a model written by supertac-train; of several the pictures are averaged");
   a.option("data", "DIR", "recordings to test on");
   a.option("pairs", "FILE", "instead of --data: pairs to test a model trained with --pairs on");
   a.one_of("data", "pairs");

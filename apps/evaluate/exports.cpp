@@ -25,7 +25,7 @@ struct Drawing {
   std::vector<std::string> names;  // of the windows, in two lines
 };
 
-Drawing drawing_of(const Committee& model, double interval_factor, const WindowSet& windows,
+Drawing drawing_of(const Ensemble& model, double interval_factor, const WindowSet& windows,
                    std::span<const std::uint32_t> chosen) {
   const std::size_t pixels = windows.image().pixels();
   Drawing d;
@@ -101,7 +101,7 @@ void OutputsFile::write(const std::string& path) const {
   write_safetensors(path, {{"format", "supertac-outputs"}}, tensors);
 }
 
-void write_pictures(const Committee& model, double interval_factor, const WindowSet& windows,
+void write_pictures(const Ensemble& model, double interval_factor, const WindowSet& windows,
                     std::span<const std::uint32_t> test, OutputFolder& folder) {
   std::vector<std::uint32_t> touching;
   std::map<std::size_t, std::vector<std::uint32_t>> by_pass;

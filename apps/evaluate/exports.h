@@ -8,7 +8,7 @@
 
 #include "apps/common/output/output_folder.h"
 #include "data/windows/windows.h"
-#include "models/inference/committee.h"
+#include "models/inference/ensemble.h"
 
 namespace supertac {
 
@@ -31,7 +31,7 @@ class OutputsFile {
 /// strips.png: windows in contact spread over the test windows, input | output | truth and, where
 /// the network says it, half the width of a pixel's 90 % interval; and for each test pass
 /// film_<plate>_t<trial>_p<pass>.png. Throws FileError.
-void write_pictures(const Committee& model, double interval_factor, const WindowSet& windows,
+void write_pictures(const Ensemble& model, double interval_factor, const WindowSet& windows,
                     std::span<const std::uint32_t> test, OutputFolder& folder);
 
 /// Windows as pairs (data/windows/pairs.h): the last frame as a network sees it, [N,channels,rows,columns];

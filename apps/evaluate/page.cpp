@@ -162,7 +162,7 @@ std::vector<EvaluationPage::Scored> EvaluationPage::extremes(bool best) const {
 }
 
 std::map<std::uint32_t, EvaluationPage::Picture> EvaluationPage::drawn_again(
-    const Committee& network, std::vector<std::uint32_t> chosen) const {
+    const Ensemble& network, std::vector<std::uint32_t> chosen) const {
   std::sort(chosen.begin(), chosen.end());
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
   std::map<std::uint32_t, Picture> pictures;
@@ -271,7 +271,7 @@ std::string EvaluationPage::films(std::span<const std::uint32_t> frames,
   return text;
 }
 
-std::string EvaluationPage::html(const Committee& network, std::span<const std::uint32_t> test,
+std::string EvaluationPage::html(const Ensemble& network, std::span<const std::uint32_t> test,
                                  const nlohmann::ordered_json& result,
                                  const std::vector<std::pair<std::string, std::string>>& made_by) const {
   const std::vector<Scored> best = extremes(true), worst = extremes(false);

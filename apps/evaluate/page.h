@@ -11,7 +11,7 @@
 #include "apps/evaluate/scoring.h"
 #include "data/scores/metrics.h"
 #include "data/windows/windows.h"
-#include "models/inference/committee.h"
+#include "models/inference/ensemble.h"
 
 namespace supertac {
 
@@ -25,7 +25,7 @@ class EvaluationPage {
 
   /// `result` is the evaluation's JSON; `made_by` says what to repeat it with, a name and a text each. The
   /// windows shown are drawn once more. At most kFilmFrames pictures are in the films, evenly spread.
-  std::string html(const Committee& network, std::span<const std::uint32_t> test,
+  std::string html(const Ensemble& network, std::span<const std::uint32_t> test,
                    const nlohmann::ordered_json& result,
                    const std::vector<std::pair<std::string, std::string>>& made_by) const;
 
@@ -41,7 +41,7 @@ class EvaluationPage {
     std::vector<float> felt, drawn, truth;
   };
   std::vector<Scored> extremes(bool best) const;
-  std::map<std::uint32_t, Picture> drawn_again(const Committee& network,
+  std::map<std::uint32_t, Picture> drawn_again(const Ensemble& network,
                                                std::vector<std::uint32_t> chosen) const;
   std::vector<std::uint32_t> film_frames(std::span<const std::uint32_t> test) const;
   std::string by_plate() const;

@@ -82,7 +82,7 @@ class PairOutputs {
 
 int evaluate_on_pairs(const Arguments& a) {
   const std::vector<ModelFile> files = load_models(a.list("model"), ModelKind::frames);
-  const Committee network(files, precision_of(a.choice("precision", {"fp32", "int8"})));
+  const Ensemble network = ensemble_of(files, precision_of(a.choice("precision", {"fp32", "int8"})));
   Scored scored = scored_of(a, files.front(), {"group", "pair", "none"});
   PairSet pairs = PairSet::read(a.text("pairs"));
   pairs.set_scaling(files.front().scaling);

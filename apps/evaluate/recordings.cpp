@@ -57,7 +57,7 @@ struct RecordingScores {
 RecordingScores score_all(const Arguments& a, std::span<const ModelFile> files, const WindowSet& windows,
                           const Scored& scored, const Baselines& baselines, OutputsFile* outputs,
                           EvaluationPage* page) {
-  const Committee network(files, precision_of(a.choice("precision", {"fp32", "int8"})));
+  const Ensemble network = ensemble_of(files, precision_of(a.choice("precision", {"fp32", "int8"})));
   RecordingScores scores(windows, files.front(), 1 + baselines.size());
   draw_all(a, network, windows, scored.split.test, baselines, [&](const Drawn& d) {
     const Zone zone = windows.zone(d.example);
@@ -87,7 +87,7 @@ std::vector<std::string> silence_lines(const ZoneMetrics& metrics) {
   return lines;
 }
 
-nlohmann::ordered_json report(const Arguments& a, const Committee& network, const WindowSet& windows,
+nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const WindowSet& windows,
                               const Scored& scored, const Baselines& baselines,
                               const RecordingScores& scores) {
   const ZoneMetrics& own = scores.of_method.front();
@@ -138,7 +138,7 @@ std::vector<std::pair<std::string, std::string>> made_by(const Arguments& a, con
 
 int evaluate_on_recordings(const Arguments& a) {
   const std::vector<ModelFile> files = load_models(a.list("model"));
-  const Committee network(files, precision_of(a.choice("precision", {"fp32", "int8"})));
+  const Ensemble network = ensemble_of(files, precision_of(a.choice("precision", {"fp32", "int8"})));
   Scored scored = scored_of(a, files.front(), {"window", "pass", "trial", "texture", "none"});
   const WindowSet windows = load_windows(a, files.front());
   scored.split = make_split(windows, split_kind(scored.split_name), scored.seed, scored.leave_out);

@@ -57,7 +57,7 @@ void check_scored(const Arguments& a, const std::vector<ModelFile>& files, Score
         "the split leaves nothing to fit the baselines on; --split none fits them to what is tested");
 }
 
-void draw_all(const Arguments& a, const Committee& network, const Examples& examples,
+void draw_all(const Arguments& a, const Ensemble& network, const Examples& examples,
               std::span<const std::uint32_t> test, const Baselines& baselines,
               const std::function<void(const Drawn&)>& use) {
   std::vector<std::vector<float>> plain(baselines.size(), std::vector<float>(examples.image().pixels()));
@@ -66,8 +66,7 @@ void draw_all(const Arguments& a, const Committee& network, const Examples& exam
       network, examples, test,
       [&](const EvaluatedBatch& b) {
         for (std::size_t n = 0; n < b.size(); ++n) {
-          Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.spread(n), b.input(n), {}};
-          if (!b.unfamiliar.empty()) drawn.unfamiliar = b.unfamiliar[n] != 0;
+          Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.spread(n), b.input(n)};
           for (std::size_t k = 0; k < baselines.size(); ++k) {
             baselines[k]->predict(b.input(n), plain[k]);
             drawn.pictures.push_back(plain[k]);

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,7 +10,7 @@
 #include "apps/common/command_line/arguments.h"
 #include "data/scores/baselines.h"
 #include "data/windows/split.h"
-#include "models/inference/committee.h"
+#include "models/inference/ensemble.h"
 
 namespace supertac {
 
@@ -36,13 +35,12 @@ struct Drawn {
   std::uint32_t example;
   std::span<const float> target;
   std::vector<std::span<const float>> pictures;
-  std::span<const float> spread;   ///< of the network's; empty where it has none
-  std::span<const float> input;    ///< as the network takes it
-  std::optional<bool> unfamiliar;  ///< as Estimate
+  std::span<const float> spread;  ///< of the network's; empty where it has none
+  std::span<const float> input;   ///< as the network takes it
 };
 
 /// Draws the test side in order, with a progress bar. Throws Interrupted after a signal.
-void draw_all(const Arguments& a, const Committee& network, const Examples& examples,
+void draw_all(const Arguments& a, const Ensemble& network, const Examples& examples,
               std::span<const std::uint32_t> test, const Baselines& baselines,
               const std::function<void(const Drawn&)>& use);
 

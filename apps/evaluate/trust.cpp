@@ -39,7 +39,6 @@ void TrustScores::add(const Drawn& drawn) {
   }
   pass.pixels += output.size();
   if (!windows_.contact(window)) return;
-  if (drawn.unfamiliar) ++pass.compared, pass.unfamiliar += *drawn.unfamiliar ? 1 : 0;
   const double y = windows_.position(window).y_mm;
   if (pass_ != in_contact_of_) in_contact_of_ = pass_, begin_mm_ = y;
   const ImageGrid grid = windows_.image();
@@ -99,21 +98,6 @@ double TrustScores::width(double from_mm, double to_mm) const {
   return count > 0 ? sum / count : Metrics::kNone;
 }
 
-std::vector<double> TrustScores::unfamiliar_of_pass() const {
-  std::vector<double> shares;
-  for (const Pass& pass : passes_)
-    if (pass.compared > 0)
-      shares.push_back(static_cast<double>(pass.unfamiliar) / static_cast<double>(pass.compared));
-  return shares;
-}
-
-double TrustScores::unfamiliar() const {
-  double compared = 0, unfamiliar = 0;
-  for (const Pass& pass : passes_)
-    compared += static_cast<double>(pass.compared), unfamiliar += static_cast<double>(pass.unfamiliar);
-  return unfamiliar / compared;
-}
-
 std::vector<std::string> TrustScores::lines() const {
   std::vector<std::string> lines;
   const auto percent = [](double share) { return format(100 * share, 1) + " %"; };
@@ -128,11 +112,6 @@ std::vector<std::string> TrustScores::lines() const {
   if (judged_ > 0)
     lines.push_back(percent(static_cast<double>(unlike_) / static_cast<double>(judged_)) +
                     " of the windows are unlike training");
-  if (const std::vector<double> shares = unfamiliar_of_pass(); !shares.empty())
-    lines.push_back(
-        "in contact, " + percent(unfamiliar()) + " of the pictures are felt and not recalled; in " +
-        std::to_string(std::ranges::count_if(shares, [](double s) { return s > kUnfamiliarShare; })) +
-        " of " + std::to_string(shares.size()) + " passes so many that the plate is unfamiliar");
   return lines;
 }
 
@@ -149,8 +128,6 @@ nlohmann::ordered_json TrustScores::to_json() const {
     json["spread_far"] = number(width(kFarMm, 1e9));
   }
   if (judged_ > 0) json["unlike_training"] = static_cast<double>(unlike_) / static_cast<double>(judged_);
-  if (const std::vector<double> shares = unfamiliar_of_pass(); !shares.empty())
-    json["unfamiliar"] = unfamiliar(), json["unfamiliar_of_pass"] = shares;
   return json;
 }
 

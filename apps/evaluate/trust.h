@@ -29,8 +29,8 @@ class TrustScores {
 
   /// For people: nothing for a model that says nothing of its pictures.
   std::vector<std::string> lines() const;
-  /// {"factor", "coverage", "factor_found", "sure_ssim", "auroc", "width_near_mm"..., "unlike_training",
-  /// "unfamiliar": of the windows in contact, "unfamiliar_of_pass": [...]}
+  /// {"factor", "coverage", "factor_found", "sure_ssim", "auroc", "spread_near", "spread_far",
+  /// "unlike_training"}
   nlohmann::ordered_json to_json() const;
 
  private:
@@ -38,7 +38,7 @@ class TrustScores {
   static constexpr double kBinsPerUnit = 20;
   struct Pass {
     std::array<std::uint64_t, kBins> ratios{};
-    std::uint64_t pixels = 0, compared = 0, unfamiliar = 0;
+    std::uint64_t pixels = 0;
   };
   struct Window {
     double doubt, spread, ssim, felt_mm;
@@ -48,9 +48,6 @@ class TrustScores {
   double auroc() const;
   double ssim_of_surest(double share) const;
   double width(double from_mm, double to_mm) const;
-  /// Of each pass with windows in contact that two kinds of networks drew.
-  std::vector<double> unfamiliar_of_pass() const;
-  double unfamiliar() const;
 
   const WindowSet& windows_;
   const ModelFile& model_;

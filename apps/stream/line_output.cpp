@@ -55,7 +55,6 @@ std::string picture_line(const Seen& seen, bool unlike_training) {
     append(line, *seen.distance, 4);
     line += std::string(",\"unlike_training\":") + (unlike_training ? "1" : "0");
   }
-  if (seen.unfamiliar) line += std::string(",\"unfamiliar\":") + (*seen.unfamiliar ? "1" : "0");
   return line + "}\n";
 }
 

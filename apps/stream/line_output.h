@@ -13,7 +13,7 @@ namespace supertac {
 
 /// {"timestamp":s,"number":n,"volts":[...],"picture":[...]} with the numbers of Seen, four decimals of volts
 /// and pictures, and a line feed; of a model that says how sure it is also "half_width", the mean over the
-/// pixels, "distance", "unlike_training" and "unfamiliar", 0 or 1. PlotJuggler (JSON over UDP, field
+/// pixels, "distance" and "unlike_training", 0 or 1. PlotJuggler (JSON over UDP, field
 /// "timestamp" as time) makes a curve of every number.
 std::string picture_line(const Seen& seen, bool unlike_training);
 

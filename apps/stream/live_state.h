@@ -21,8 +21,7 @@ struct LiveState {
   std::vector<float> half_widths;  ///< the same, as Seen
   std::optional<double> distance;  ///
   bool unlike_training = false;    ///< the signals are not such as the model has learnt from
-  bool unfamiliar_plate = false;  ///< what is recalled of known plates often does not agree with what is felt
-  std::string texture;            ///< that the picture shows, by a classifier; empty: none, or no texture
+  std::string texture;             ///< that the picture shows, by a classifier; empty: none, or no texture
   double texture_probability = 0;  ///
   float x_mm = NAN, y_mm = NAN;    ///< of the finger's centre on the plate, where known
   double frames_per_s = 0;

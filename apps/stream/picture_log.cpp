@@ -21,7 +21,6 @@ PictureLog::PictureLog(const std::string& path, bool force, const PictureFormat&
   pictures_ = open_spool();
   if (format.half_widths) half_widths_ = open_spool();
   if (format.distance) distances_ = open_spool();
-  if (format.unfamiliar) unfamiliar_ = open_spool();
 }
 
 void PictureLog::fail() {
@@ -51,8 +50,6 @@ void PictureLog::add(const Seen& seen) {
   if (half_widths_) append(half_widths_, std::as_bytes(seen.half_widths));
   const auto distance = static_cast<float>(seen.distance.value_or(0));
   if (distances_) append(distances_, std::as_bytes(std::span(&distance, 1)));
-  const std::uint8_t unfamiliar = seen.unfamiliar.value_or(false) ? 1 : 0;
-  if (unfamiliar_) append(unfamiliar_, std::as_bytes(std::span(&unfamiliar, 1)));
   ++count_;
 }
 
@@ -77,7 +74,6 @@ void PictureLog::write(const std::map<std::string, std::string>& metadata) {
   if (half_widths_)
     tensors.push_back({"half_widths", "F32", {count_, height, width}, {}, from(half_widths_)});
   if (distances_) tensors.push_back({"distances", "F32", {count_}, {}, from(distances_)});
-  if (unfamiliar_) tensors.push_back({"unfamiliar", "U8", {count_}, {}, from(unfamiliar_)});
   write_safetensors(path_, metadata, tensors);
 }
 

@@ -13,7 +13,7 @@ namespace supertac {
 
 /// Keeps pictures for a safetensors file of tensors time_s F64 [n], volts F32 [n,signals] and pictures F32
 /// [n,height,width]; of a model that says how sure it is also half_widths F32 [n,height,width], of its
-/// pixels' 90 % intervals, and distances F32 [n] from its training; of two kinds of models unfamiliar U8 [n].
+/// pixels' 90 % intervals, and distances F32 [n] from its training.
 /// How many there will be is not known before the end, and they do not fit into memory (1 MB/s): they wait in
 /// nameless temporary files beside the final one.
 class PictureLog {
@@ -40,7 +40,7 @@ class PictureLog {
   PictureFormat format_;
   std::uint64_t count_ = 0;
   std::string problem_;  // of a write that failed: what was kept is not whole
-  Spool times_, volts_, pictures_, half_widths_, distances_, unfamiliar_;
+  Spool times_, volts_, pictures_, half_widths_, distances_;
 };
 
 }  // namespace supertac

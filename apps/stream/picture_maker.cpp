@@ -37,7 +37,7 @@ LiveWindowSettings window_settings(const ModelFile& model, const SensorSource& s
 
 PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource& source, Precision precision)
     : model_(models.front()),
-      network_(models, precision),
+      network_(ensemble_of(models, precision)),
       window_(window_settings(model_, source)),
       input_(network_.first().input_shape(1)),
       output_(network_.estimate(input_)),  // the first run takes memory and chooses kernels
@@ -90,13 +90,8 @@ std::optional<double> PictureMaker::distance_limit() const {
   return model_.novelty ? std::optional(model_.novelty->limit()) : std::nullopt;
 }
 
-std::optional<bool> PictureMaker::unfamiliar() const {
-  return output_.unfamiliar.defined() ? std::optional(output_.unfamiliar.item() != 0) : std::nullopt;
-}
-
 PictureFormat PictureMaker::format() const {
-  return {model_.array().signals(), image(), output_.spread.defined(), model_.novelty.has_value(),
-          output_.unfamiliar.defined()};
+  return {model_.array().signals(), image(), output_.spread.defined(), model_.novelty.has_value()};
 }
 
 double PictureMaker::window_s() const {

@@ -7,14 +7,14 @@
 #include "apps/stream/seen.h"
 #include "apps/stream/sensor_source.h"
 #include "data/windows/live_window.h"
-#include "models/inference/committee.h"
+#include "models/inference/ensemble.h"
 
 namespace supertac {
 
 /// Frames in, pictures out: the signal path the model was trained behind, then the model. Used by one thread.
 class PictureMaker {
  public:
-  /// For the frames of this source. `models`, those of a committee, must outlive this. Throws
+  /// For the frames of this source. The `models` are averaged and must outlive this. Throws
   /// std::runtime_error when they were trained on another array, or behind another moving average than the
   /// frames have gone through, which cannot be taken back.
   PictureMaker(std::span<const ModelFile> models, const SensorSource& source,
@@ -31,8 +31,6 @@ class PictureMaker {
   std::optional<double> distance() const { return distance_; }
   std::optional<double> distance_limit() const;
   bool unlike_training() const { return distance_ && *distance_ > *distance_limit(); }
-  /// Whether it is felt and not recalled (models/inference/committee.h); nothing of models of one kind.
-  std::optional<bool> unfamiliar() const;
 
   /// Takes what the array has felt in the last moments (kRestS) for "nothing": each signal is moved so that
   /// it rests where it rested in training, from the next frame on.
@@ -48,7 +46,7 @@ class PictureMaker {
 
  private:
   const ModelFile& model_;  // what all have in common
-  Committee network_;
+  Ensemble network_;
   LiveWindow window_;
   Tensor input_;
   Estimate output_;

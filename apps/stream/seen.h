@@ -13,7 +13,6 @@ struct PictureFormat {
   std::size_t signals = 0;  ///< in a frame
   ImageGrid image;
   bool half_widths = false, distance = false;  ///< whether the model says how sure it is
-  bool unfamiliar = false;                     ///< whether there is another model to agree with
 };
 
 /// One picture of a stream and what belongs to it, valid until the next.
@@ -23,7 +22,6 @@ struct Seen {
   std::span<const float> volts, picture;
   std::span<const float> half_widths;  ///< of each pixel's 90 % interval; empty when the model does not say
   std::optional<double> distance;      ///< of its window from those of training (models/inference/novelty.h)
-  std::optional<bool> unfamiliar;      ///< whether it is felt and not recalled (models/inference/committee.h)
 };
 
 }  // namespace supertac

@@ -15,7 +15,6 @@ namespace {
 
 constexpr double kMostLateS = 0.02, kWaitS = 0.05, kFiguresEveryS = 0.5, kShowEveryS = 1.0 / 60,
                  kNameEveryS = 0.1;
-constexpr double kPlateS = 5, kJudgedS = 1;  // of pictures with texture: remembered, before the first verdict
 
 bool has_texture(std::span<const float> picture) {
   return std::ranges::any_of(picture, [](float v) { return v > 0.2F; });
@@ -82,8 +81,7 @@ std::string Stream::summary() const {
          " ms, p99 " + format(milliseconds(0.99), 2) + " ms; lost " + std::to_string(counters.missing) +
          ", dropped " + std::to_string(dropped()) +
          (lines_lost_ > 0 ? ", " + std::to_string(lines_lost_) + " lines not taken by their reader" : "") +
-         (unlike_ > 0 ? ", " + std::to_string(unlike_) + " pictures of signals unlike training" : "") +
-         (unfamiliar_ > 0 ? ", " + std::to_string(unfamiliar_) + " pictures felt and not recalled" : "");
+         (unlike_ > 0 ? ", " + std::to_string(unlike_) + " pictures of signals unlike training" : "");
 }
 
 nlohmann::ordered_json Stream::result() const {
@@ -93,7 +91,6 @@ nlohmann::ordered_json Stream::result() const {
           {"frames", frames_},
           {"pictures", pictures()},
           {"unlike_training", unlike_},
-          {"unfamiliar", unfamiliar_},
           {"lost", counters.missing},
           {"dropped", dropped()},
           {"suspect", counters.suspect},
@@ -129,8 +126,8 @@ bool Stream::take(SensorFrame frame) {
 }
 
 void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
-  const Seen seen{pictures() - 1,       frame.time_s - first_s_, maker_.volts(),     picture,
-                  maker_.half_widths(), maker_.distance(),       maker_.unfamiliar()};
+  const Seen seen{pictures() - 1, frame.time_s - first_s_, maker_.volts(),
+                  picture,        maker_.half_widths(),    maker_.distance()};
   if (log_) log_->add(seen);
   if (recorder_) recorder_->add(seen);
   if (udp_ || pipe_) {
@@ -140,19 +137,9 @@ void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
   }
   state_.number = seen.number, state_.time_s = seen.time_s;
   state_.unlike_training = maker_.unlike_training();
-  if (seen.unfamiliar) judge_plate(picture, *seen.unfamiliar);
-  unlike_ += state_.unlike_training ? 1 : 0, unfamiliar_ += seen.unfamiliar.value_or(false) ? 1 : 0;
+  unlike_ += state_.unlike_training ? 1 : 0;
   state_.picture.assign(picture.begin(), picture.end());
   state_.x_mm = frame.x_mm, state_.y_mm = frame.y_mm;
-}
-
-// A running mean over the last kPlateS of pictures with texture; at first over all there are.
-void Stream::judge_plate(std::span<const float> picture, bool unfamiliar) {
-  if (!has_texture(picture)) return;
-  const double newest = std::max(1.0 / static_cast<double>(++textured_), source_.period_s() / kPlateS);
-  unfamiliar_share_ += newest * ((unfamiliar ? 1.0 : 0.0) - unfamiliar_share_);
-  state_.unfamiliar_plate =
-      static_cast<double>(textured_) * source_.period_s() > kJudgedS && unfamiliar_share_ > kUnfamiliarShare;
 }
 
 double Stream::keep_pace(double time_s) const {

@@ -56,7 +56,6 @@ class Stream {
 
  private:
   bool take(SensorFrame frame);
-  void judge_plate(std::span<const float> picture, bool unfamiliar);
   double keep_pace(double time_s) const;
   void keep(const SensorFrame& frame, std::span<const float> picture);
   void show();
@@ -76,9 +75,7 @@ class Stream {
   std::optional<NamedClassifier> classifier_;
   LatencyHistogram latency_;
   LiveState state_;
-  std::uint64_t frames_ = 0, too_late_ = 0, unlike_ = 0, unfamiliar_ = 0, lines_lost_ = 0,
-                figures_frames_ = 0, textured_ = 0;
-  double unfamiliar_share_ = 0;
+  std::uint64_t frames_ = 0, too_late_ = 0, unlike_ = 0, lines_lost_ = 0, figures_frames_ = 0;
   double first_s_ = 0, last_s_ = 0;  // the sensor's time
   double begin_s_ = 0, figures_s_ = 0, shown_s_ = 0, named_s_ = 0;
 };

@@ -113,10 +113,7 @@ std::string status_line(const LiveState& state, int columns) {
                                        format(static_cast<double>(state.y_mm), 1) + " mm"
                                  : "");
   // Never cut.
-  if (state.unlike_training)
-    line = "UNLIKE TRAINING  " + line;
-  else if (state.unfamiliar_plate)
-    line = "UNFAMILIAR PLATE  " + line;
+  if (state.unlike_training) line = "UNLIKE TRAINING  " + line;
   if (columns > 0) line = line.substr(0, static_cast<std::size_t>(columns));
   return line + "\n";
 }

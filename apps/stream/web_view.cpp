@@ -71,7 +71,6 @@ std::string web_event(const LiveState& state, const Recorder::Status& recorder) 
   }
   if (!state.half_widths.empty()) event["wide"] = levels_base64(state.half_widths);
   if (state.distance) event["distance"] = *state.distance, event["unlike"] = state.unlike_training;
-  if (state.unfamiliar_plate) event["unfamiliar"] = true;
   if (!state.texture.empty())
     event["texture"] = state.texture, event["probability"] = state.texture_probability;
   if (std::isfinite(state.x_mm)) event["x"] = state.x_mm, event["y"] = state.y_mm;

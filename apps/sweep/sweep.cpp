@@ -156,7 +156,8 @@ void Sweep::measure(const GridPoint& point, const std::string& label) {
                         .label = label,
                         .whole = whole_by(point)});
   if (!training.train()) throw Interrupted();
-  const ZoneMetrics scores = score(training.trainer().model(), windows, to_score, interrupted);
+  const ZoneMetrics scores =
+      score(Ensemble({Prepared(training.trainer().model())}), windows, to_score, interrupted);
   stop_if_interrupted();
   const nlohmann::ordered_json measured = row(point, training, scores);
   {

@@ -151,8 +151,8 @@ double TrainingRun::seconds() const {
 void TrainingRun::test(LogLine& line) const {
   const ImageGrid image = task_.examples.image();
   PairMetrics metrics(static_cast<std::size_t>(image.height), static_cast<std::size_t>(image.width));
-  for_each_output(trainer_.model(), task_.examples, spread(task_.split.test, kTestedPerEpoch),
-                  [&](const EvaluatedBatch& b) {
+  for_each_output(Ensemble({Prepared(trainer_.model())}), task_.examples,
+                  spread(task_.split.test, kTestedPerEpoch), [&](const EvaluatedBatch& b) {
                     for (std::size_t n = 0; n < b.size(); ++n)
                       if (in_contact(b.target(n))) metrics.add(b.output(n), b.target(n));
                     return !interrupted();

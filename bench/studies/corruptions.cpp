@@ -218,7 +218,7 @@ double auroc(std::vector<double> usual, std::vector<double> odd) {
 
 Point measure(const std::vector<ModelFile>& files, const Examples& examples,
               std::span<const std::uint32_t> chosen) {
-  const Committee network(files);
+  const Ensemble network = ensemble_of(files);
   const ModelFile& file = files.front();
   Point point(examples.image());
   for_each_output(network, examples, chosen, [&](const EvaluatedBatch& b) {

@@ -94,6 +94,8 @@ void expect_kind(const SafetensorsFile& file, const std::string& path, ModelKind
         (kind.empty() ? "a SuperTac model; give it recordings" : "kind \"" + kind + "\""));
 }
 
+bool predicts_error(const ModelFile& file) { return file.model && file.model->settings().spread; }
+
 template <class Model, class Settings>
 std::unique_ptr<Model> build(const Settings& settings, const SafetensorsFile& file, const std::string& path) {
   Rng rng(0);
@@ -204,6 +206,44 @@ ModelFile load_model(const std::string& path, ModelKind kind) {
   }
   loaded.ranges = ActivationRanges::read(file, path);
   return loaded;
+}
+
+std::vector<ModelFile> load_models(std::span<const std::string> paths, ModelKind kind) {
+  std::vector<ModelFile> files;
+  for (const std::string& path : paths) {
+    files.push_back(load_model(path, kind));
+    const auto ours = files.back().description(), theirs = files.front().description();
+    const bool same_format = files.back().network().format() == files.front().network().format() &&
+                             predicts_error(files.back()) == predicts_error(files.front());
+    for (const char* key : {"input", "settings"})
+      if (key == std::string("input") ? ours.at(key) != theirs.at(key) : !same_format)
+        throw std::runtime_error(path + ": its " + key + " are " + ours.at(key) + ", those of " + paths[0] +
+                                 " " + theirs.at(key) +
+                                 "; average models that take the same windows and draw the same pictures");
+  }
+  return files;
+}
+
+Precision precision_of(const std::string& name) {
+  if (name == "fp32") return Precision::fp32;
+  if (name == "int8") return Precision::int8;
+  throw std::invalid_argument("precision must be fp32 or int8, got \"" + name + "\"");
+}
+
+Ensemble ensemble_of(std::span<const ModelFile> files, Precision precision) {
+  std::vector<Prepared> members;
+  for (const ModelFile& file : files) {
+    if (precision == Precision::fp32) {
+      members.emplace_back(file.network());
+    } else if (file.ranges) {
+      members.emplace_back(file.network(), *file.ranges);
+    } else {
+      throw std::runtime_error(
+          "the model was saved without the ranges of its values, which precision int8 "
+          "needs; train it anew with this version, or take precision fp32");
+    }
+  }
+  return Ensemble(std::move(members));
 }
 
 void save_model(const std::string& path, const SuperTac& model, const InputSettings& input,

@@ -5,11 +5,14 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "data/windows/pairs.h"
 #include "data/windows/windows.h"
 #include "layers/checkpoint.h"
+#include "models/inference/ensemble.h"
 #include "models/inference/novelty.h"
 #include "models/inference/ranges.h"
 #include "models/networks/frame_model.h"
@@ -53,8 +56,6 @@ struct ModelFile {
   std::map<std::string, std::string> description() const;
   /// An entry of the metadata, or what is to stand for one that is missing.
   std::string metadata_or(const std::string& key, const std::string& otherwise) const;
-  /// Whether it was trained beside random plates, and so feels plates that were never recorded.
-  bool knows_random_plates() const { return metadata_or("random_plates", "0") != "0"; }
 
   // Of kind windows:
   /// Half the width of a pixel's interval in units of its spread.
@@ -74,6 +75,22 @@ void set_array(SuperTacSettings& settings, const TaxelArray& array);
 /// Builds the model that the metadata describes, after checking every setting's range, and fills it.
 /// Throws std::runtime_error naming path, what was expected and found; so for a model of another kind.
 ModelFile load_model(const std::string& path, ModelKind kind = ModelKind::windows);
+
+/// The models of an ensemble. Throws std::runtime_error, as load_model, and naming the file that differs from
+/// the first in what it takes, draws or predicts.
+std::vector<ModelFile> load_models(std::span<const std::string> paths, ModelKind kind = ModelKind::windows);
+
+/// What the products of a network are made of.
+enum class Precision {
+  fp32,
+  int8,  ///< bytes: faster, and the pictures differ a little (models/inference/prepared.h)
+};
+/// "fp32" or "int8"; throws std::invalid_argument.
+Precision precision_of(const std::string& name);
+
+/// Of the models of these files, which must outlive it. Throws as Ensemble, and std::runtime_error when one
+/// has no ranges for less than fp32.
+Ensemble ensemble_of(std::span<const ModelFile> files, Precision precision = Precision::fp32);
 
 /// Write parameters and metadata. Throw FileError.
 void save_model(const std::string& path, const SuperTac& model, const InputSettings& input,

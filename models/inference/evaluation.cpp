@@ -14,11 +14,11 @@ constexpr std::size_t kBatchesAtOnce = 4;
 struct Part {
   std::size_t first;
   Tensor inputs, outputs, targets;
-  std::vector<float> spreads, unfamiliar;
+  std::vector<float> spreads;
   std::exception_ptr error;
 };
 
-void compute(const Committee& network, const Examples& data, std::span<const std::uint32_t> indices,
+void compute(const Ensemble& network, const Examples& data, std::span<const std::uint32_t> indices,
              Part& part) {
   const std::size_t input_size = data.input_size(), target_size = data.image().pixels();
   for (std::size_t n = 0; n < indices.size(); ++n) {
@@ -29,7 +29,6 @@ void compute(const Committee& network, const Examples& data, std::span<const std
   const Estimate estimate = network.estimate(part.inputs);
   std::copy_n(estimate.picture.data(), estimate.picture.size(), part.outputs.data());
   part.spreads.assign(estimate.spread.values().begin(), estimate.spread.values().end());
-  part.unfamiliar.assign(estimate.unfamiliar.values().begin(), estimate.unfamiliar.values().end());
 }
 
 std::string text(const NetworkFormat& f) {
@@ -50,7 +49,7 @@ void check_format(const Examples& examples, const Network& network) {
                                 text(network.format()));
 }
 
-void for_each_output(const Committee& network, const Examples& data, std::span<const std::uint32_t> indices,
+void for_each_output(const Ensemble& network, const Examples& data, std::span<const std::uint32_t> indices,
                      const std::function<bool(const EvaluatedBatch&)>& use, std::size_t batch) {
   check_format(data, network.first());
   for (std::size_t start = 0; start < indices.size(); start += batch * kBatchesAtOnce) {
@@ -59,13 +58,8 @@ void for_each_output(const Committee& network, const Examples& data, std::span<c
     for (std::size_t first = start; first < end; first += batch) {
       const auto count = static_cast<Dim>(std::min(batch, end - first));
       const Shape pictures = network.first().picture_shape(count);
-      parts.push_back({first,
-                       Tensor(network.first().input_shape(count)),
-                       Tensor(pictures),
-                       Tensor(pictures),
-                       {},
-                       {},
-                       {}});
+      parts.push_back(
+          {first, Tensor(network.first().input_shape(count)), Tensor(pictures), Tensor(pictures), {}, {}});
     }
 #pragma omp parallel for schedule(static, 1)
     for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -78,12 +72,12 @@ void for_each_output(const Committee& network, const Examples& data, std::span<c
     }
     for (const Part& p : parts) {
       if (p.error) std::rethrow_exception(p.error);
-      if (!use({p.first, p.inputs, p.outputs, p.targets, p.spreads, p.unfamiliar})) return;
+      if (!use({p.first, p.inputs, p.outputs, p.targets, p.spreads})) return;
     }
   }
 }
 
-ZoneMetrics score(const Committee& network, const Examples& windows, std::span<const std::uint32_t> indices,
+ZoneMetrics score(const Ensemble& network, const Examples& windows, std::span<const std::uint32_t> indices,
                   bool (*stop)()) {
   ZoneMetrics metrics(windows.image());
   for_each_output(network, windows, indices, [&](const EvaluatedBatch& b) {

@@ -7,7 +7,7 @@
 
 #include "data/scores/metrics.h"
 #include "data/windows/examples.h"
-#include "models/inference/committee.h"
+#include "models/inference/ensemble.h"
 
 namespace supertac {
 
@@ -15,15 +15,13 @@ namespace supertac {
 void check_format(const Examples& examples, const Network& network);
 
 /// A batch of results: inputs as the network takes them, outputs, spreads and targets [n,H,W,1], and the
-/// first of their places in `indices`. Spreads are empty where the network has none, `unfamiliar` as in
-/// Estimate.
+/// first of their places in `indices`. Spreads are empty where the network has none.
 struct EvaluatedBatch {
   std::size_t first;
   const Tensor& inputs;
   const Tensor& outputs;
   const Tensor& targets;
   std::span<const float> spreads;
-  std::span<const float> unfamiliar;
 
   std::size_t size() const { return static_cast<std::size_t>(inputs.dim(0)); }
   std::span<const float> input(std::size_t n) const { return sample(inputs, n); }
@@ -42,13 +40,13 @@ struct EvaluatedBatch {
 
 /// Calls `use` for the given examples in order, in batches of at most `batch`. `use` returns false to stop
 /// early. Batches are computed on several threads, `use` runs on the caller's. Throws as check_format.
-void for_each_output(const Committee& network, const Examples& examples,
+void for_each_output(const Ensemble& network, const Examples& examples,
                      std::span<const std::uint32_t> indices,
                      const std::function<bool(const EvaluatedBatch&)>& use, std::size_t batch = 64);
 
 /// The metrics of the network's pictures of the given windows. `stop`, if given, is asked between batches;
 /// once it says true, the windows so far are what was measured. Throws as for_each_output.
-ZoneMetrics score(const Committee& network, const Examples& windows, std::span<const std::uint32_t> indices,
+ZoneMetrics score(const Ensemble& network, const Examples& windows, std::span<const std::uint32_t> indices,
                   bool (*stop)() = nullptr);
 
 }  // namespace supertac

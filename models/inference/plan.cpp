@@ -50,8 +50,7 @@ void Plan::copy_out(const Block& block, const Map& map, Tensor& to, Dim first) c
 
 Estimate Plan::run(const Tensor& inputs) const {
   const Dim count = inputs.dim(0), size = count == 0 ? 0 : inputs.size() / count;
-  Estimate out{
-      .picture = Tensor(with_count(picture_shape_, count)), .spread = {}, .latents = {}, .unfamiliar = {}};
+  Estimate out{.picture = Tensor(with_count(picture_shape_, count)), .spread = {}, .latents = {}};
   if (has_spread_) out.spread = Tensor(out.picture.shape());
   if (has_latents_) out.latents = Tensor(with_count(latents_shape_, count));
   const Dim images = std::min(count, block_), bytes = byte_workspace_ * images;

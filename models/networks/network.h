@@ -14,12 +14,10 @@ struct NetworkFormat {
 
 /// Pictures and what is known of their worth.
 struct Estimate {
-  Tensor picture;     ///< [N,rows scale,columns scale,1]
-  Tensor spread;      ///< the same: how far from the truth a pixel is expected to be; undefined where nothing
-                      ///< says so
-  Tensor latents;     ///< [N,latents]; undefined for a network without any
-  Tensor unfamiliar;  ///< [N], 1 for a picture that is felt and not recalled; undefined where networks of one
-                      ///< kind alone draw (models/inference/committee.h)
+  Tensor picture;  ///< [N,rows scale,columns scale,1]
+  Tensor spread;   ///< the same: how far from the truth a pixel is expected to be; undefined where nothing
+                   ///< says so
+  Tensor latents;  ///< [N,latents]; undefined for a network without any
 };
 
 /// The same on the graph.
@@ -53,10 +51,7 @@ inline Estimate Network::estimate(const Tensor& inputs) const {
   const NoGrad no_grad;
   const Drawing drawn = draw(Variable(inputs));
   const auto value = [](const Variable& x) { return x.defined() ? x.value() : Tensor(); };
-  return {.picture = drawn.picture.value(),
-          .spread = value(drawn.spread),
-          .latents = value(drawn.latents),
-          .unfamiliar = {}};
+  return {.picture = drawn.picture.value(), .spread = value(drawn.spread), .latents = value(drawn.latents)};
 }
 
 }  // namespace supertac

@@ -280,10 +280,11 @@ std::vector<StoredTensor> Trainer::novelty() const {
 StoredTensor Trainer::ranges() const {
   constexpr std::size_t kSamples = 1024;
   ActivationRanges ranges;
-  for_each_output(model(), data_, spread(batching_.indices(), kSamples), [&](const EvaluatedBatch& b) {
-    ranges.add(model(), b.inputs);
-    return true;
-  });
+  for_each_output(Ensemble({Prepared(model())}), data_, spread(batching_.indices(), kSamples),
+                  [&](const EvaluatedBatch& b) {
+                    ranges.add(model(), b.inputs);
+                    return true;
+                  });
   return ranges.stored();
 }
 

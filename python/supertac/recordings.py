@@ -34,7 +34,6 @@ class Log:
     pictures: np.ndarray  # [n,height,width]
     half_widths: np.ndarray | None  # the same: of the pixels' 90 % intervals
     distances: np.ndarray | None  # [n], from what the model was trained on
-    unfamiliar: np.ndarray | None  # [n], 1 where two kinds of models do not agree
     metadata: dict
 
 
@@ -51,7 +50,7 @@ def read_pictures(path):
     if "pictures" not in tensors:
         raise ValueError(f"{path}: expected the pictures of supertac-stream --out, found {sorted(tensors)}")
     return Log(tensors["time_s"], tensors["volts"], tensors["pictures"], tensors.get("half_widths"),
-               tensors.get("distances"), tensors.get("unfamiliar"), metadata)
+               tensors.get("distances"), metadata)
 
 
 def _runs(times, max_gap_s):

@@ -26,8 +26,7 @@ Seen seen(std::uint64_t number) {
           .volts = kVolts,
           .picture = kPicture,
           .half_widths = {},
-          .distance = {},
-          .unfamiliar = {}};
+          .distance = {}};
 }
 
 TEST(PictureLine, HoldsWhatIsKnownAndNothingElse) {
@@ -39,12 +38,11 @@ TEST(PictureLine, HoldsWhatIsKnownAndNothingElse) {
   EXPECT_EQ(json["volts"].get<std::vector<float>>(), kVolts);
   EXPECT_EQ(json["picture"].get<std::vector<float>>(), kPicture);
   EXPECT_EQ(json.size(), 4U);
-  one.half_widths = kHalf, one.distance = 1.5, one.unfamiliar = true;
+  one.half_widths = kHalf, one.distance = 1.5;
   json = parse_json_limited(picture_line(one, true));
   EXPECT_EQ(json["half_width"], 0.25);
   EXPECT_EQ(json["distance"], 1.5);
   EXPECT_EQ(json["unlike_training"], 1);
-  EXPECT_EQ(json["unfamiliar"], 1);
   const std::vector<float> strange(16, std::nanf(""));
   one.volts = strange;
   EXPECT_TRUE(parse_json_limited(picture_line(one, true))["volts"][0].is_null());

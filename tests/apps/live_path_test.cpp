@@ -87,18 +87,15 @@ INSTANTIATE_TEST_SUITE_P(Models, LivePath,
                          testing::Combine(testing::Values("tiny", "paper"),
                                           testing::Values(Precision::fp32, Precision::int8)));
 
-// Nor does a second network that is asked whether it agrees.
-TEST(LivePathOfTwoKinds, TakesNoHeapEither) {
+// Nor does a second network.
+TEST(LivePathOfTwo, TakesNoHeapEither) {
   std::vector<ModelFile> models;
-  for (const char* random_plates : {"0", "100"}) {
-    models.push_back(model_of("tiny"));
-    models.back().metadata["random_plates"] = random_plates;
-  }
-  const Committee both(models);
+  for (int m = 0; m < 2; ++m) models.push_back(model_of("tiny"));
+  const Ensemble both = ensemble_of(models);
   const Tensor window = Tensor::full(both.first().input_shape(1), 0.4F);
   for (int warm = 0; warm < 10; ++warm) both.estimate(window);
   const long before = allocations::made;
-  for (int n = 0; n < 50; ++n) EXPECT_TRUE(both.estimate(window).unfamiliar.defined());
+  for (int n = 0; n < 50; ++n) EXPECT_TRUE(both.estimate(window).spread.defined());
   EXPECT_EQ(allocations::made, before);
 }
 

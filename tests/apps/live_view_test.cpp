@@ -45,8 +45,6 @@ TEST(TerminalView, SaysWhereTheFingerIsAndThatSignalsAreStrange) {
   LiveState state;
   state.x_mm = 5.5F, state.y_mm = 62.25F;
   EXPECT_TRUE(status_line(state).ends_with("dropped 0  at x 5.5 y 62.2 mm\n")) << status_line(state);
-  state.unfamiliar_plate = true;
-  EXPECT_EQ(status_line(state, 20), "UNFAMILIAR PLATE  0 \n");
   state.unlike_training = true;
   EXPECT_EQ(status_line(state, 20), "UNLIKE TRAINING  0 f\n");
 }

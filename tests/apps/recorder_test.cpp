@@ -23,17 +23,11 @@ class InFolder : public testing::Test {
 
 using RecorderTest = InFolder;
 
-const PictureFormat kFormat{
-    .signals = 2, .image = {2, 2, 1}, .half_widths = true, .distance = true, .unfamiliar = true};
+const PictureFormat kFormat{.signals = 2, .image = {2, 2, 1}, .half_widths = true, .distance = true};
 
 Seen seen_at(double time_s) {
   static const std::vector<float> volts = {1, 2}, picture = {3, 4, 5, 6}, half = {7, 8, 9, 10};
-  return {.time_s = time_s,
-          .volts = volts,
-          .picture = picture,
-          .half_widths = half,
-          .distance = 11.0,
-          .unfamiliar = time_s > 1};
+  return {.time_s = time_s, .volts = volts, .picture = picture, .half_widths = half, .distance = 11.0};
 }
 
 TEST_F(RecorderTest, KeepsWhatCameBetweenStartAndStop) {
@@ -59,7 +53,6 @@ TEST_F(RecorderTest, KeepsWhatCameBetweenStartAndStop) {
   EXPECT_EQ(file.f32("volts"), (std::vector<float>{1, 2, 1, 2}));
   EXPECT_EQ(file.f32("half_widths"), (std::vector<float>{7, 8, 9, 10, 7, 8, 9, 10}));
   EXPECT_EQ(file.f32("distances"), (std::vector<float>{11, 11}));
-  EXPECT_EQ(file.tensors().at("unfamiliar").dtype, "U8");
 }
 
 TEST_F(RecorderTest, AnEndCompletesTheFile) {

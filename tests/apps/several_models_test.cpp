@@ -1,16 +1,11 @@
-// supertac-evaluate and supertac-stream with several models: averaged, recalled or felt, or refused.
+// supertac-evaluate and supertac-stream with several models: averaged or refused.
 #include <gtest/gtest.h>
 
-#include <filesystem>
-
 #include "io/files/json.h"
-#include "io/files/safetensors.h"
 #include "tests/apps/trained.h"
 
 namespace supertac {
 namespace {
-
-namespace fs = std::filesystem;
 
 using SeveralModels = Training;
 
@@ -46,32 +41,6 @@ TEST_F(SeveralModels, AreAveragedUnlessTheySawEachOthersTest) {
   const double a = ssim(one), b = ssim(two), both = ssim(one + "," + two);
   EXPECT_NE(both, a);
   EXPECT_NE(both, b);
-}
-
-// Live and scored: the same choice, said in both.
-TEST_F(SeveralModels, ANetworkOfRandomPlatesBesideAnotherFeelsWhatThatDoesNotRecall) {
-  ASSERT_EQ(train("recalls.safetensors", {}).code, 0);
-  ASSERT_EQ(train("feels.safetensors", {"--random-plates", "3", "--epochs", "1"}).code, 0);
-  const std::string both = path("recalls.safetensors") + "," + path("feels.safetensors");
-  const ProcessResult scored = run_process(
-      "supertac-evaluate", {"--model", both, "--data", path("data"), "--json", path("both.json")});
-  ASSERT_EQ(scored.code, 0) << scored.error;
-  EXPECT_NE(scored.out.find("of the pictures are felt and not recalled"), std::string::npos) << scored.out;
-  const auto trust = parse_json_limited(bytes("both.json"))["trust"];
-  const double share = trust["unfamiliar"].get<double>();
-  const auto of_pass = trust["unfamiliar_of_pass"].get<std::vector<double>>();
-  EXPECT_LE(*std::ranges::min_element(of_pass), share);
-  EXPECT_GE(*std::ranges::max_element(of_pass), share);
-  std::string recording;
-  for (const auto& entry : fs::directory_iterator(path("data")))
-    if (entry.path().extension() == ".safetensors") recording = entry.path().string();
-  const ProcessResult live =
-      run_process("supertac-stream", {"--model", both, "--recording", recording, "--out",
-                                      path("live.safetensors"), "--json", path("live.json")});
-  ASSERT_EQ(live.code, 0) << live.error;
-  const SafetensorsFile seen = SafetensorsFile::read(path("live.safetensors"));
-  EXPECT_EQ(seen.tensors().at("unfamiliar").shape, seen.tensors().at("time_s").shape);
-  EXPECT_TRUE(parse_json_limited(bytes("live.json")).contains("unfamiliar"));
 }
 
 // What a network left out decides what it is tested on, not its seed.

@@ -255,7 +255,6 @@ function showFigures(event) {
   set("place", event.x === undefined ? "unknown" : `x ${event.x.toFixed(1)}, y ${event.y.toFixed(1)} mm`);
   if (event.distance === undefined) setLamp("lamp", "unknown", event.picture ? "this model knows no doubt" : "filling the first window");
   else if (event.unlike) setLamp("lamp", "alarm", "UNLIKE TRAINING: do not trust this picture");
-  else if (event.unfamiliar) setLamp("lamp", "alarm", "UNFAMILIAR PLATE: felt, not recalled");
   else setLamp("lamp", "", "signals as in training");
   if (event.wide) {
     let guesses = 0, sum = 0;
@@ -345,7 +344,7 @@ function snapshot() {
   g.scale(2, 2);
   const root = document.documentElement.style;
   root.setProperty("--quiet", "#333");
-  const alarm = event.unlike ? "; UNLIKE TRAINING" : event.unfamiliar ? "; UNFAMILIAR PLATE" : "";
+  const alarm = event.unlike ? "; UNLIKE TRAINING" : "";
   const place = event.x === undefined ? "" : `, finger at x ${event.x.toFixed(1)} mm, y ${event.y.toFixed(1)} mm`;
   g.fillStyle = "#111";
   g.textBaseline = "top";

@@ -37,7 +37,7 @@ TEST(Trainer, WithoutSamplingLatentsAreTheMeans) {
   const auto errors = [&](bool sampling) {
     settings.sampling = sampling;
     Trainer trainer(windows, all_of(windows), settings);
-    const ZoneMetrics scores = score(trainer.model(), windows, all_of(windows));
+    const ZoneMetrics scores = score(Ensemble({Prepared(trainer.model())}), windows, all_of(windows));
     const double inferred = std::pow(10, -scores.all().psnr_pooled_db / 10);
     return std::abs(trainer.train_step().l2 - inferred) / inferred;
   };
@@ -137,7 +137,7 @@ TEST(Trainer, LearnsFromPairs) {
   EXPECT_LT(after, before / 10);
   PairMetrics metrics(12, 20);
   const std::vector<std::uint32_t> unseen = {32, 33, 34, 35, 36, 37, 38, 39};
-  for_each_output(trainer.model(), pairs, unseen, [&](const EvaluatedBatch& b) {
+  for_each_output(Ensemble({Prepared(trainer.model())}), pairs, unseen, [&](const EvaluatedBatch& b) {
     for (std::size_t n = 0; n < b.size(); ++n) metrics.add(b.output(n), b.target(n));
     return true;
   });
