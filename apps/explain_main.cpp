@@ -219,7 +219,7 @@ int run(Arguments& a) {
   const Json steps = trace(*file.model, input, arrays);
   const Estimate drawn = Prepared(*file.model).estimate(input);
   arrays.push_back(array("picture", drawn.picture));
-  if (drawn.spread.defined()) arrays.push_back(array("spread", drawn.spread));
+  if (drawn.predicted_error.defined()) arrays.push_back(array("predicted_error", drawn.predicted_error));
 
   std::vector<TensorToWrite> tensors;
   for (const Array& x : arrays) tensors.push_back({x.name, x.dtype, x.shape, x.bytes});

@@ -58,7 +58,7 @@ int train(const Arguments& a, TrainingTask task, const std::vector<std::string>&
 
 int train(const Arguments& a, Ranks& ranks) {
   try {
-    check_lanes(ranks.size(), 8);
+    check_micro_batches(ranks.size(), 8);
   } catch (const std::invalid_argument& error) {
     throw UsageError(error.what());
   }

@@ -178,7 +178,8 @@ std::shared_ptr<M> with_larger_weights(std::shared_ptr<M> model) {
   return model;
 }
 
-// With a spread its head alone is asked for: the loss takes the picture as given there, differences do not.
+// With a predicted error its head alone is asked for: the loss takes the picture as given there, differences
+// do not.
 void supertac_losses(Cases& cases, const std::string& name, const SuperTacSettings& s) {
   Rng rng(11);  // one for which no rectifier is within 1e-6 of its kink
   const Tensor windows = uniform({2, s.timesteps, s.signals()}, 1, 0, 1);
@@ -189,7 +190,9 @@ void supertac_losses(Cases& cases, const std::string& name, const SuperTacSettin
   const auto loss = [=](const SuperTac& model, const Variable&) {
     return supertac_loss(model.forward(windows, eps), truth, {.a = 0.5, .beta = 0.01, .lambda = 0.3}).total;
   };
-  const auto asked = [&](const Parameter& p) { return !s.spread || p.name.starts_with("upsampler.spread."); };
+  const auto asked = [&](const Parameter& p) {
+    return !s.predicted_error || p.name.starts_with("upsampler.spread.");
+  };
   cases.module<SuperTac>(name, with_larger_weights(std::make_shared<SuperTac>(s, rng)), {}, loss, 4, asked);
 }
 
@@ -242,8 +245,8 @@ std::vector<GradientCase> loss_cases() {
   supertac_losses(cases, "SuperTac, 8x8 pixels", small);
   small = {.timesteps = 48, .latent = 2, .grouping = Grouping::vertical, .channels = 8, .rcabs = 1};
   supertac_losses(cases, "SuperTac, 16x16 pixels", small);
-  small.spread = true;
-  supertac_losses(cases, "SuperTac's spread", small);
+  small.predicted_error = true;
+  supertac_losses(cases, "SuperTac's predicted_error", small);
   small = {
       .rows = 3, .columns = 5, .in_channels = 2, .timesteps = 32, .latent = 2, .channels = 4, .rcabs = 1};
   supertac_losses(cases, "SuperTac, 3x5 taxels x 2", small);

@@ -18,21 +18,22 @@ constexpr std::size_t kStrips = 12, kFilmColumns = 24;
 constexpr const char* kParts[] = {"felt", "drawn", "true", "off by"};
 
 /// What is drawn of some windows, and what must outlive the strips.
-struct Drawing {
+struct DrawnWindows {
   std::vector<std::vector<float>> frames;
   std::vector<float> outputs, truths, doubts;
   std::vector<Strip> strips;
   std::vector<std::string> names;  // of the windows, in two lines
 };
 
-Drawing drawing_of(const Ensemble& model, double interval_factor, const WindowSet& windows,
-                   std::span<const std::uint32_t> chosen) {
+DrawnWindows drawing_of(const Ensemble& model, double interval_factor, const WindowSet& windows,
+                        std::span<const std::uint32_t> chosen) {
   const std::size_t pixels = windows.image().pixels();
-  Drawing d;
+  DrawnWindows d;
   for_each_output(model, windows, chosen, [&](const EvaluatedBatch& b) {
     d.outputs.insert(d.outputs.end(), b.outputs.values().begin(), b.outputs.values().end());
     d.truths.insert(d.truths.end(), b.targets.values().begin(), b.targets.values().end());
-    for (const float s : b.spreads) d.doubts.push_back(static_cast<float>(interval_factor) * at_least(s));
+    for (const float s : b.predicted_errors)
+      d.doubts.push_back(static_cast<float>(interval_factor) * at_least(s));
     return true;
   });
   for (const std::uint32_t i : chosen)
@@ -50,7 +51,8 @@ Drawing drawing_of(const Ensemble& model, double interval_factor, const WindowSe
 }
 
 // With headings, units and a colour bar. `down`: windows stand below each other, else side by side.
-Picture figure(const Drawing& d, const WindowSet& windows, int side, bool down, const std::string& title) {
+Picture figure(const DrawnWindows& d, const WindowSet& windows, int side, bool down,
+               const std::string& title) {
   const TaxelArray array = windows.array();
   const StripLayout layout{array.rows, array.columns, windows.settings().scale, side};
   const Picture inside = down ? strip_picture(d.strips, layout) : film_picture(d.strips, layout);
@@ -84,8 +86,8 @@ OutputsFile::OutputsFile(const TaxelArray& array, std::size_t timesteps, const I
       width_(static_cast<std::uint64_t>(image.width)) {}
 
 void OutputsFile::add(std::span<const float> window, std::span<const float> output,
-                      std::span<const float> truth, std::span<const float> spread) {
-  spread_.insert(spread_.end(), spread.begin(), spread.end());
+                      std::span<const float> truth, std::span<const float> predicted_error) {
+  predicted_error_.insert(predicted_error_.end(), predicted_error.begin(), predicted_error.end());
   input_.insert(input_.end(), window.begin(), window.end());
   output_.insert(output_.end(), output.begin(), output.end());
   truth_.insert(truth_.end(), truth.begin(), truth.end());
@@ -97,7 +99,8 @@ void OutputsFile::write(const std::string& path) const {
   std::vector<TensorToWrite> tensors{{"input", "F32", {count_, timesteps_, signals_}, bytes(input_)},
                                      {"output", "F32", {count_, height_, width_}, bytes(output_)},
                                      {"truth", "F32", {count_, height_, width_}, bytes(truth_)}};
-  if (!spread_.empty()) tensors.push_back({"spread", "F32", {count_, height_, width_}, bytes(spread_)});
+  if (!predicted_error_.empty())
+    tensors.push_back({"predicted_error", "F32", {count_, height_, width_}, bytes(predicted_error_)});
   write_safetensors(path, {{"format", "supertac-outputs"}}, tensors);
 }
 

@@ -13,19 +13,19 @@
 namespace supertac {
 
 /// Collects windows [N,T,signals] as the network takes them, outputs [N,H,W], truths [N,H,W] and, where the
-/// network has one, spreads [N,H,W], and writes them as one safetensors file with tensors "input", "output",
-/// "truth" and "spread".
+/// network has one, predicted errors [N,H,W], and writes them as one safetensors file with tensors "input",
+/// "output", "truth" and "predicted_error".
 class OutputsFile {
  public:
   OutputsFile(const TaxelArray& array, std::size_t timesteps, const ImageGrid& image);
   void add(std::span<const float> window, std::span<const float> output, std::span<const float> truth,
-           std::span<const float> spread);
+           std::span<const float> predicted_error);
   /// Throws FileError.
   void write(const std::string& path) const;
 
  private:
   std::uint64_t timesteps_, signals_, height_, width_, count_ = 0;
-  std::vector<float> input_, output_, truth_, spread_;
+  std::vector<float> input_, output_, truth_, predicted_error_;
 };
 
 /// strips.png: windows in contact spread over the test windows, input | output | truth and, where

@@ -143,19 +143,19 @@ void EvaluationPage::add(const Drawn& d) {
                       d.example, 4 * static_cast<std::size_t>(texture) >= d.target.size()});
 }
 
-std::vector<EvaluationPage::Scored> EvaluationPage::extremes(bool best) const {
-  std::vector<Scored> sorted = contact_, chosen;
-  std::sort(sorted.begin(), sorted.end(), [&](const Scored& a, const Scored& b) {
+std::vector<EvaluationPage::ScoredWindow> EvaluationPage::extremes(bool best) const {
+  std::vector<ScoredWindow> sorted = contact_, chosen;
+  std::sort(sorted.begin(), sorted.end(), [&](const ScoredWindow& a, const ScoredWindow& b) {
     return std::pair(best ? -a.ssim : a.ssim, a.window) < std::pair(best ? -b.ssim : b.ssim, b.window);
   });
-  const auto near = [&](const Scored& a, const Scored& b) {
+  const auto near = [&](const ScoredWindow& a, const ScoredWindow& b) {
     return windows_.pass_of(a.window) == windows_.pass_of(b.window) &&
            std::abs(windows_.position(a.window).y_mm - windows_.position(b.window).y_mm) < kApartMm;
   };
-  for (const Scored& one : sorted) {
+  for (const ScoredWindow& one : sorted) {
     if (chosen.size() == kShown) break;
     if (best && !one.full) continue;  // the edge of a texture is drawn well too easily
-    if (std::none_of(chosen.begin(), chosen.end(), [&](const Scored& c) { return near(c, one); }))
+    if (std::none_of(chosen.begin(), chosen.end(), [&](const ScoredWindow& c) { return near(c, one); }))
       chosen.push_back(one);
   }
   return chosen;
@@ -211,7 +211,7 @@ std::string EvaluationPage::by_plate() const {
 }
 
 std::string EvaluationPage::shown(const std::string& title, const std::string& note,
-                                  const std::vector<Scored>& chosen,
+                                  const std::vector<ScoredWindow>& chosen,
                                   const std::map<std::uint32_t, Picture>& pictures) const {
   const TaxelArray array = windows_.array();
   const ImageGrid grid = windows_.image();
@@ -274,11 +274,11 @@ std::string EvaluationPage::films(std::span<const std::uint32_t> frames,
 std::string EvaluationPage::html(const Ensemble& network, std::span<const std::uint32_t> test,
                                  const nlohmann::ordered_json& result,
                                  const std::vector<std::pair<std::string, std::string>>& made_by) const {
-  const std::vector<Scored> best = extremes(true), worst = extremes(false);
+  const std::vector<ScoredWindow> best = extremes(true), worst = extremes(false);
   const std::vector<std::uint32_t> frames = film_frames(test);
   std::vector<std::uint32_t> chosen = frames;
-  for (const std::vector<Scored>* some : {&best, &worst})
-    for (const Scored& one : *some) chosen.push_back(one.window);
+  for (const std::vector<ScoredWindow>* some : {&best, &worst})
+    for (const ScoredWindow& one : *some) chosen.push_back(one.window);
   const std::map<std::uint32_t, Picture> pictures = drawn_again(network, chosen);
 
   std::string content = "<p class=\"quiet\">" + escaped(result["model"].get<std::string>()) + ", split " +

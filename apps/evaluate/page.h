@@ -32,7 +32,7 @@ class EvaluationPage {
   static constexpr std::size_t kShown = 12, kFilmFrames = 2400, kFramesOfPass = 80;
 
  private:
-  struct Scored {
+  struct ScoredWindow {
     double ssim;
     std::uint32_t window;
     bool full;  ///< a quarter of the truth is texture
@@ -40,19 +40,20 @@ class EvaluationPage {
   struct Picture {
     std::vector<float> felt, drawn, truth;
   };
-  std::vector<Scored> extremes(bool best) const;
+  std::vector<ScoredWindow> extremes(bool best) const;
   std::map<std::uint32_t, Picture> drawn_again(const Ensemble& network,
                                                std::vector<std::uint32_t> chosen) const;
   std::vector<std::uint32_t> film_frames(std::span<const std::uint32_t> test) const;
   std::string by_plate() const;
-  std::string shown(const std::string& title, const std::string& note, const std::vector<Scored>& chosen,
+  std::string shown(const std::string& title, const std::string& note,
+                    const std::vector<ScoredWindow>& chosen,
                     const std::map<std::uint32_t, Picture>& pictures) const;
   std::string films(std::span<const std::uint32_t> frames,
                     const std::map<std::uint32_t, Picture>& pictures) const;
   std::string name_of(std::uint32_t window) const;
 
   const WindowSet& windows_;
-  std::vector<Scored> contact_;
+  std::vector<ScoredWindow> contact_;
   std::map<std::string, ZoneMetrics> plates_;
 };
 

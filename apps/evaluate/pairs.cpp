@@ -83,32 +83,32 @@ class PairOutputs {
 int evaluate_on_pairs(const Arguments& a) {
   const std::vector<ModelFile> files = load_models(a.list("model"), ModelKind::frames);
   const Ensemble network = ensemble_of(files, precision_of(a.choice("precision", {"fp32", "int8"})));
-  Scored scored = scored_of(a, files.front(), {"group", "pair", "none"});
+  TestSet tested = test_set_of(a, files.front(), {"group", "pair", "none"});
   PairSet pairs = PairSet::read(a.text("pairs"));
   pairs.set_scaling(files.front().scaling);
   add_model_parents(a.list("model"));
   add_parent_file("pairs", a.text("pairs"));
-  scored.split = split_pairs(pairs, scored.split_name, scored.seed);
-  check_scored(a, files, scored);
+  tested.split = split_pairs(pairs, tested.split_name, tested.seed);
+  check_test_set(a, files, tested);
   remark(a, remarks_on(pairs));
 
   if (const int side = std::min(pairs.image().height, pairs.image().width); side < 7)
     a.note("targets of " + pairs.image().text() + " pixels: SSIM's window is " +
            std::to_string((side - 1) / 2 * 2 + 1) +
            " pixels wide instead of 7; compare it with others of that size only");
-  const Baselines baselines = fit_baselines(pairs, scored.split.train);
+  const Baselines baselines = fit_baselines(pairs, tested.split.train);
   const PairScores none(pairs.image(), baselines);
   PairScores all = none, contact = none;
   std::map<std::int64_t, PairScores> groups;
   PairOutputs outputs;
-  draw_all(a, network, pairs, scored.split.test, baselines, [&](const Drawn& d) {
+  draw_all(a, network, pairs, tested.split.test, baselines, [&](const Drawn& d) {
     all.add(d);
     groups.try_emplace(pairs.group(d.example), none).first->second.add(d);
     if (in_contact(d.target)) contact.add(d);
     if (a.given("outputs")) outputs.add(pairs, d);
   });
 
-  all.print(a, "split " + scored.split_name + ", seed " + std::to_string(scored.seed));
+  all.print(a, "split " + tested.split_name + ", seed " + std::to_string(tested.seed));
   contact.print(a, "targets that are not all 0");
   const Tensor frame = Tensor::full(network.first().input_shape(1), 0.5F);
   const Latency latency = measure_latency([&] { network.infer(frame); });
@@ -122,8 +122,8 @@ int evaluate_on_pairs(const Arguments& a) {
   }
   result["model"] = a.text("model");
   result["data"] = pairs.fingerprint();
-  result["split"] = scored.split_name;
-  result["seed"] = scored.seed;
+  result["split"] = tested.split_name;
+  result["seed"] = tested.seed;
   if (a.given("outputs")) outputs.write(a.text("outputs"), pairs.image());
   a.write_json(result);
   return kExitOk;

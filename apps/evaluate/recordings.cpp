@@ -24,7 +24,7 @@
 namespace supertac {
 namespace {
 
-// What is scored, and by which models, is noted for all that is written.
+// What is tested, and by which models, is noted for all that is written.
 WindowSet load_windows(const Arguments& a, const ModelFile& file) {
   const std::vector<std::string> plates =
       a.given("plates") ? a.list("plates") : comma_list(file.metadata_or("plates", ""));
@@ -55,18 +55,18 @@ struct RecordingScores {
 };
 
 RecordingScores score_all(const Arguments& a, std::span<const ModelFile> files, const WindowSet& windows,
-                          const Scored& scored, const Baselines& baselines, OutputsFile* outputs,
+                          const TestSet& tested, const Baselines& baselines, OutputsFile* outputs,
                           EvaluationPage* page) {
   const Ensemble network = ensemble_of(files, precision_of(a.choice("precision", {"fp32", "int8"})));
   RecordingScores scores(windows, files.front(), 1 + baselines.size());
-  draw_all(a, network, windows, scored.split.test, baselines, [&](const Drawn& d) {
+  draw_all(a, network, windows, tested.split.test, baselines, [&](const Drawn& d) {
     const Zone zone = windows.zone(d.example);
     for (std::size_t m = 0; m < d.pictures.size(); ++m)
       scores.of_method[m].add(d.pictures[m], d.target, zone);
     scores.felt.add(d.example, d.pictures[0], d.target);
     scores.trust.add(d);
     if (page != nullptr) page->add(d);
-    if (outputs != nullptr) outputs->add(d.input, d.pictures[0], d.target, d.spread);
+    if (outputs != nullptr) outputs->add(d.input, d.pictures[0], d.target, d.predicted_error);
   });
   return scores;
 }
@@ -88,13 +88,13 @@ std::vector<std::string> silence_lines(const ZoneMetrics& metrics) {
 }
 
 nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const WindowSet& windows,
-                              const Scored& scored, const Baselines& baselines,
+                              const TestSet& tested, const Baselines& baselines,
                               const RecordingScores& scores) {
   const ZoneMetrics& own = scores.of_method.front();
   nlohmann::ordered_json result = own.to_json();
   result["felt"] = scores.felt.to_json();
   result["trust"] = scores.trust.to_json();
-  a.print("split " + scored.split_name + ", seed " + std::to_string(scored.seed) + ", " +
+  a.print("split " + tested.split_name + ", seed " + std::to_string(tested.seed) + ", " +
           std::to_string(own.all().windows) + " windows, " + std::to_string(own.contact().windows) +
           " in contact");
   a.print("            |- in contact -------------| |- all ---------| |- one -|");
@@ -117,8 +117,8 @@ nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const
   result["latency"] = latencies;
   result["model"] = a.text("model");
   result["data"] = windows.fingerprint();
-  result["split"] = scored.split_name;
-  result["seed"] = scored.seed;
+  result["split"] = tested.split_name;
+  result["seed"] = tested.seed;
   return result;
 }
 
@@ -139,11 +139,11 @@ std::vector<std::pair<std::string, std::string>> made_by(const Arguments& a, con
 int evaluate_on_recordings(const Arguments& a) {
   const std::vector<ModelFile> files = load_models(a.list("model"));
   const Ensemble network = ensemble_of(files, precision_of(a.choice("precision", {"fp32", "int8"})));
-  Scored scored = scored_of(a, files.front(), {"window", "pass", "trial", "texture", "none"});
+  TestSet tested = test_set_of(a, files.front(), {"window", "pass", "trial", "texture", "none"});
   const WindowSet windows = load_windows(a, files.front());
-  scored.split = make_split(windows, split_kind(scored.split_name), scored.seed, scored.leave_out);
-  check_scored(a, files, scored);
-  remark(a, remarks_on(windows, scored.split.test));
+  tested.split = make_split(windows, split_kind(tested.split_name), tested.seed, tested.leave_out);
+  check_test_set(a, files, tested);
+  remark(a, remarks_on(windows, tested.split.test));
 
   std::optional<OutputFolder> pictures, pairs;
   std::string train_pairs, test_pairs;
@@ -153,23 +153,23 @@ int evaluate_on_recordings(const Arguments& a) {
     train_pairs = pairs->add("train.safetensors"), test_pairs = pairs->add("test.safetensors");
   }
   OutputsFile outputs(windows.array(), windows.frames(), windows.image());
-  const Baselines baselines = fit_baselines(windows, scored.split.train);
+  const Baselines baselines = fit_baselines(windows, tested.split.train);
   EvaluationPage page(windows);
   const RecordingScores scores =
-      score_all(a, files, windows, scored, baselines, a.given("outputs") ? &outputs : nullptr,
+      score_all(a, files, windows, tested, baselines, a.given("outputs") ? &outputs : nullptr,
                 a.given("report") ? &page : nullptr);
-  const nlohmann::ordered_json result = report(a, network, windows, scored, baselines, scores);
+  const nlohmann::ordered_json result = report(a, network, windows, tested, baselines, scores);
   if (pictures)
-    write_pictures(network, files.front().interval_factor(), windows, scored.split.test, *pictures);
+    write_pictures(network, files.front().interval_factor(), windows, tested.split.test, *pictures);
   if (pairs) {
-    write_pairs(windows, scored.split.train, train_pairs);
-    write_pairs(windows, scored.split.test, test_pairs);
-    a.print(a.text("write-pairs") + ": " + std::to_string(scored.split.train.size()) +
-            " pairs to train on, " + std::to_string(scored.split.test.size()) + " to test");
+    write_pairs(windows, tested.split.train, train_pairs);
+    write_pairs(windows, tested.split.test, test_pairs);
+    a.print(a.text("write-pairs") + ": " + std::to_string(tested.split.train.size()) +
+            " pairs to train on, " + std::to_string(tested.split.test.size()) + " to test");
   }
   if (a.given("outputs")) outputs.write(a.text("outputs"));
   if (a.given("report"))
-    write_file(a.text("report"), page.html(network, scored.split.test, result, made_by(a, windows)));
+    write_file(a.text("report"), page.html(network, tested.split.test, result, made_by(a, windows)));
   a.write_json(result);
   for (OutputFolder* folder : {pictures ? &*pictures : nullptr, pairs ? &*pairs : nullptr})
     if (folder != nullptr) folder->keep();

@@ -35,24 +35,24 @@ void refuse_leak(const std::vector<ModelFile>& files, const std::string& split_n
 
 }  // namespace
 
-Scored scored_of(const Arguments& a, const ModelFile& file, const std::vector<std::string>& names) {
+TestSet test_set_of(const Arguments& a, const ModelFile& file, const std::vector<std::string>& names) {
   return {a.given("split") ? a.choice("split", names) : file.metadata_or("split", "none"),
           a.given("seed") ? a.seed() : parse_uint(file.metadata_or("seed", "0")).value_or(0),
           comma_list(file.metadata_or("leave_out", "")),
           {}};
 }
 
-void check_scored(const Arguments& a, const std::vector<ModelFile>& files, Scored& scored) {
+void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, TestSet& tested) {
   // Who asks for every window knows what the models have seen.
-  if (!a.given("split") || scored.split_name != "none") refuse_leak(files, scored.split_name);
-  if (!a.given("split") && scored.split_name == "none")
+  if (!a.given("split") || tested.split_name != "none") refuse_leak(files, tested.split_name);
+  if (!a.given("split") && tested.split_name == "none")
     a.note(
         "the model was trained with split none: if these are the recordings of its training, it has seen "
         "every one of them");
   const auto limit =
       static_cast<std::size_t>(a.integer("limit", 0, std::numeric_limits<std::uint32_t>::max()));
-  if (limit > 0) scored.split.test = spread(scored.split.test, limit);
-  if (scored.split.train.empty())
+  if (limit > 0) tested.split.test = spread(tested.split.test, limit);
+  if (tested.split.train.empty())
     throw std::runtime_error(
         "the split leaves nothing to fit the baselines on; --split none fits them to what is tested");
 }
@@ -66,7 +66,7 @@ void draw_all(const Arguments& a, const Ensemble& network, const Examples& examp
       network, examples, test,
       [&](const EvaluatedBatch& b) {
         for (std::size_t n = 0; n < b.size(); ++n) {
-          Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.spread(n), b.input(n)};
+          Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.predicted_error(n), b.input(n)};
           for (std::size_t k = 0; k < baselines.size(); ++k) {
             baselines[k]->predict(b.input(n), plain[k]);
             drawn.pictures.push_back(plain[k]);

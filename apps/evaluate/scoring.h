@@ -1,4 +1,4 @@
-// What is scored, and the one loop that draws it: the same for windows and for pairs.
+// What is tested, and the one loop that draws it: the same for windows and for pairs.
 #pragma once
 
 #include <cstdint>
@@ -10,33 +10,33 @@
 #include "apps/common/command_line/arguments.h"
 #include "data/scores/baselines.h"
 #include "data/windows/split.h"
-#include "models/inference/ensemble.h"
+#include "models/files/model_file.h"
 
 namespace supertac {
 
-/// Which examples are scored; what the first model was trained with, unless the options say otherwise.
-struct Scored {
+/// Which examples are tested; what the first model was trained with, unless the options say otherwise.
+struct TestSet {
   std::string split_name;
   std::uint64_t seed = 0;
   std::vector<std::string> leave_out;  ///< of split texture, the plates tested; none = drawn with the seed
-  Split split;  ///< its test side is scored, the baselines are fitted to its training side
+  Split split;  ///< its test side is tested, the baselines are fitted to its training side
 };
 
 /// --split, one of `names`, and --seed, or the model's own; the split itself is left to the caller.
-Scored scored_of(const Arguments& a, const ModelFile& file, const std::vector<std::string>& names);
+TestSet test_set_of(const Arguments& a, const ModelFile& file, const std::vector<std::string>& names);
 
 /// Cuts the test side to --limit. Throws std::runtime_error when what one model is tested on may be what
 /// another was trained on (not where --split none asks for all of them), or no example is left to fit the
 /// baselines to.
-void check_scored(const Arguments& a, const std::vector<ModelFile>& files, Scored& scored);
+void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, TestSet& tested);
 
 /// One example with its pictures: that of the network first, then those of the baselines.
 struct Drawn {
   std::uint32_t example;
   std::span<const float> target;
   std::vector<std::span<const float>> pictures;
-  std::span<const float> spread;  ///< of the network's; empty where it has none
-  std::span<const float> input;   ///< as the network takes it
+  std::span<const float> predicted_error;  ///< of the network's; empty where it has none
+  std::span<const float> input;            ///< as the network takes it
 };
 
 /// Draws the test side in order, with a progress bar. Throws Interrupted after a signal.

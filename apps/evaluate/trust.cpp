@@ -22,19 +22,21 @@ double mean_of(std::span<const float> values) {
 
 void TrustScores::add(const Drawn& drawn) {
   const std::uint32_t window = drawn.example;
-  const std::span<const float> output = drawn.pictures[0], truth = drawn.target, spread = drawn.spread;
+  const std::span<const float> output = drawn.pictures[0], truth = drawn.target,
+                               predicted_error = drawn.predicted_error;
   if (model_.novelty) {
     ++judged_;
     unlike_ += model_.novelty->unlike_training(signal_features(drawn.input, windows_.array())) ? 1 : 0;
   }
-  if (spread.empty()) return;
+  if (predicted_error.empty()) return;
   if (windows_.pass_of(window) != pass_) {
     pass_ = windows_.pass_of(window);
     passes_.emplace_back();
   }
   Pass& pass = passes_.back();
   for (std::size_t i = 0; i < output.size(); ++i) {
-    const double ratio = std::abs(double{output[i]} - double{truth[i]}) / double{at_least(spread[i])};
+    const double ratio =
+        std::abs(double{output[i]} - double{truth[i]}) / double{at_least(predicted_error[i])};
     ++pass.ratios[std::min(kBins - 1, static_cast<std::size_t>(ratio * kBinsPerUnit))];
   }
   pass.pixels += output.size();
@@ -43,7 +45,7 @@ void TrustScores::add(const Drawn& drawn) {
   if (pass_ != in_contact_of_) in_contact_of_ = pass_, begin_mm_ = y;
   const ImageGrid grid = windows_.image();
   contact_.push_back(
-      {doubt_of(output, spread, grid), mean_of(spread),
+      {doubt_of(output, predicted_error, grid), mean_of(predicted_error),
        ssim(output, truth, static_cast<std::size_t>(grid.height), static_cast<std::size_t>(grid.width)),
        std::abs(y - begin_mm_)});
 }
@@ -94,7 +96,7 @@ double TrustScores::ssim_of_surest(double share) const {
 double TrustScores::width(double from_mm, double to_mm) const {
   double sum = 0, count = 0;
   for (const Window& w : contact_)
-    if (w.felt_mm >= from_mm && w.felt_mm < to_mm) sum += w.spread, ++count;
+    if (w.felt_mm >= from_mm && w.felt_mm < to_mm) sum += w.predicted_error, ++count;
   return count > 0 ? sum / count : Metrics::kNone;
 }
 
@@ -124,8 +126,8 @@ nlohmann::ordered_json TrustScores::to_json() const {
     json["factor_found"] = factor_found();
     json["sure_ssim"] = number(ssim_of_surest(kSure));
     json["auroc"] = number(auroc());
-    json["spread_near"] = number(width(0, kNearMm));
-    json["spread_far"] = number(width(kFarMm, 1e9));
+    json["predicted_error_near"] = number(width(0, kNearMm));
+    json["predicted_error_far"] = number(width(kFarMm, 1e9));
   }
   if (judged_ > 0) json["unlike_training"] = static_cast<double>(unlike_) / static_cast<double>(judged_);
   return json;

@@ -15,7 +15,7 @@
 namespace supertac {
 
 /// What a network says of its own pictures against what is true. An interval of a pixel is
-///   picture +- factor * max(spread, 0.01)
+///   picture +- factor * max(predicted error, 0.01)
 /// and should hold the truth in kCovered of the pixels. The factor that does so is found with the pass as the
 /// unit (windows of one pass are not exchangeable: Dunn, Wasserman, Ramdas 2018): each pass counts the same.
 class TrustScores {
@@ -24,24 +24,24 @@ class TrustScores {
 
   /// `model`: whose factor and novelty are judged; must outlive this, as the windows.
   TrustScores(const WindowSet& windows, const ModelFile& model) : windows_(windows), model_(model) {}
-  /// Windows of a pass come in the order of time. Without a spread nothing is counted of it.
+  /// Windows of a pass come in the order of time. Without a predicted error nothing is counted of it.
   void add(const Drawn& drawn);
 
   /// For people: nothing for a model that says nothing of its pictures.
   std::vector<std::string> lines() const;
-  /// {"factor", "coverage", "factor_found", "sure_ssim", "auroc", "spread_near", "spread_far",
-  /// "unlike_training"}
+  /// {"factor", "coverage", "factor_found", "sure_ssim", "auroc", "predicted_error_near",
+  /// "predicted_error_far", "unlike_training"}
   nlohmann::ordered_json to_json() const;
 
  private:
-  static constexpr std::size_t kBins = 400;  // of |error| / spread
+  static constexpr std::size_t kBins = 400;  // of |error| / predicted error
   static constexpr double kBinsPerUnit = 20;
   struct Pass {
     std::array<std::uint64_t, kBins> ratios{};
     std::uint64_t pixels = 0;
   };
   struct Window {
-    double doubt, spread, ssim, felt_mm;
+    double doubt, predicted_error, ssim, felt_mm;
   };
   double coverage(double factor) const;
   double factor_found() const;

@@ -74,10 +74,10 @@ void PictureMaker::rezero() {
 std::span<const float> PictureMaker::picture() {
   if (!window_.window(input_.values())) return {};
   output_ = network_.estimate(input_);
-  if (output_.spread.defined()) {
+  if (output_.predicted_error.defined()) {
     half_widths_.clear();
-    for (const float spread : output_.spread.values())
-      half_widths_.push_back(static_cast<float>(interval_factor_) * at_least(spread));
+    for (const float predicted_error : output_.predicted_error.values())
+      half_widths_.push_back(static_cast<float>(interval_factor_) * at_least(predicted_error));
   }
   if (model_.novelty) {
     signal_features(input_.values(), model_.array(), features_);
@@ -91,7 +91,7 @@ std::optional<double> PictureMaker::distance_limit() const {
 }
 
 PictureFormat PictureMaker::format() const {
-  return {model_.array().signals(), image(), output_.spread.defined(), model_.novelty.has_value()};
+  return {model_.array().signals(), image(), output_.predicted_error.defined(), model_.novelty.has_value()};
 }
 
 double PictureMaker::window_s() const {

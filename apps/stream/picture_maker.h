@@ -7,7 +7,7 @@
 #include "apps/stream/seen.h"
 #include "apps/stream/sensor_source.h"
 #include "data/windows/live_window.h"
-#include "models/inference/ensemble.h"
+#include "models/files/model_file.h"
 
 namespace supertac {
 

@@ -38,7 +38,7 @@ std::string WebView::hello() const {
                         {"pitch_mm", source_.array.pitch_mm},
                         {"scale", source_.scale},
                         {"height_mm", rig::kTextureHeightMm},
-                        {"has_spread", source_.has_spread},
+                        {"predicts_error", source_.predicts_error},
                         {"names_textures", source_.names_textures},
                         {"map", colour_map_base64()}}
       .dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);

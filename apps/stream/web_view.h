@@ -18,7 +18,7 @@ struct WebSource {
   std::string source;  ///< which
   TaxelArray array;
   int scale = 4;
-  bool has_spread = false, names_textures = false;
+  bool predicts_error = false, names_textures = false;
 };
 
 /// Serves live_page() with the newest state, 30 times a second at most, from a thread of its own.

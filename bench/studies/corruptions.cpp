@@ -19,6 +19,7 @@
 #include "io/numbers/numbers.h"
 #include "io/numbers/random.h"
 #include "io/numbers/text.h"
+#include "models/files/model_file.h"
 #include "models/inference/evaluation.h"
 #include "models/inference/interval.h"
 
@@ -224,12 +225,12 @@ Point measure(const std::vector<ModelFile>& files, const Examples& examples,
   for_each_output(network, examples, chosen, [&](const EvaluatedBatch& b) {
     stop_if_interrupted();
     for (std::size_t n = 0; n < b.size(); ++n) {
-      const auto output = b.output(n), target = b.target(n), spread = b.spread(n);
+      const auto output = b.output(n), target = b.target(n), predicted_error = b.predicted_error(n);
       point.metrics.add(output, target, examples.zone(chosen[b.first + n]));
-      for (std::size_t i = 0; i < spread.size(); ++i)
+      for (std::size_t i = 0; i < predicted_error.size(); ++i)
         point.covered +=
-            std::abs(output[i] - target[i]) <= file.interval_factor() * double{at_least(spread[i])};
-      point.pixels += spread.size();
+            std::abs(output[i] - target[i]) <= file.interval_factor() * double{at_least(predicted_error[i])};
+      point.pixels += predicted_error.size();
       ++point.windows;
       if (!file.novelty) continue;
       const std::vector<float> features = signal_features(b.input(n), examples.array());

@@ -30,7 +30,7 @@ SuperTacSettings read_settings(const JsonEntry& entry) {
   s.scale = entry.integer("scale");
   s.channels = entry.integer("channels");
   s.rcabs = entry.integer("rcabs");
-  s.spread = entry.flag("spread");
+  s.predicted_error = entry.flag("spread");
   if (entry.flag("sub_pixel")) {
     throw std::runtime_error(
         entry.where() +
@@ -94,7 +94,7 @@ void expect_kind(const SafetensorsFile& file, const std::string& path, ModelKind
         (kind.empty() ? "a SuperTac model; give it recordings" : "kind \"" + kind + "\""));
 }
 
-bool predicts_error(const ModelFile& file) { return file.model && file.model->settings().spread; }
+bool predicts_error(const ModelFile& file) { return file.model && file.model->settings().predicted_error; }
 
 template <class Model, class Settings>
 std::unique_ptr<Model> build(const Settings& settings, const SafetensorsFile& file, const std::string& path) {
@@ -116,7 +116,7 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
                    {"scale", s.scale},   {"grouping", name_of(s.grouping)}, {"channels", s.channels},
                    {"rcabs", s.rcabs}};
   // What is as it always was is left out: the text of older files stays the same.
-  if (s.spread) settings["spread"] = true;
+  if (s.predicted_error) settings["spread"] = true;
   if (s.rows != 4 || s.columns != 4 || s.in_channels != 1) {
     settings["rows"] = s.rows;
     settings["columns"] = s.columns;

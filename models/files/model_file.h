@@ -58,7 +58,7 @@ struct ModelFile {
   std::string metadata_or(const std::string& key, const std::string& otherwise) const;
 
   // Of kind windows:
-  /// Half the width of a pixel's interval in units of its spread.
+  /// Half the width of a pixel's interval in units of its predicted error.
   double interval_factor() const;
   /// The sensor it was trained on.
   TaxelArray array() const;

@@ -217,10 +217,10 @@ std::string Exporter::picture_of(const ModelFile& file) {
   names_[input.node()] = network_input(file);
   for (const TracedOp& op : trace.ops()) names_[op.y.node()] = made(op);
   output("picture", drawn.picture, "Heights over the flat plate, 0 to 1; row grows with y, column with x.");
-  if (drawn.spread.defined())
-    output("spread", drawn.spread, "How far from the truth a pixel is expected to be.");
+  if (drawn.predicted_error.defined())
+    output("predicted_error", drawn.predicted_error, "How far from the truth a pixel is expected to be.");
   auto metadata = file.metadata;
-  if (drawn.spread.defined()) metadata.emplace("interval_factor", std::to_string(kIntervalFactor));
+  if (drawn.predicted_error.defined()) metadata.emplace("interval_factor", std::to_string(kIntervalFactor));
   return graph.file(
       "1", file.model ? "SuperTac: volts in, picture out." : "SuperTac: frames in, picture out.", metadata);
 }

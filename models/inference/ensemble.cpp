@@ -19,24 +19,24 @@ Ensemble::Ensemble(std::vector<Prepared> members) : members_(std::move(members))
 Estimate Ensemble::estimate(const Tensor& inputs) const {
   Estimate mean = members_.front().estimate(inputs);
   if (members_.size() == 1) return mean;
-  const bool spread = mean.spread.defined();
+  const bool predicted_error = mean.predicted_error.defined();
   const auto count = static_cast<real>(members_.size());
   const auto pixels = static_cast<std::size_t>(mean.picture.size());
-  std::vector<double> squares(spread ? pixels : 0);
+  std::vector<double> squares(predicted_error ? pixels : 0);
   mean.picture = mean.picture.clone();
   for (std::size_t m = 0; m < members_.size(); ++m) {
     const Estimate one = m == 0 ? mean : members_[m].estimate(inputs);
-    if (one.spread.defined() != spread)
+    if (one.predicted_error.defined() != predicted_error)
       throw std::invalid_argument("Ensemble: some of the networks predict their error, others do not");
     for (std::size_t i = 0; i < squares.size(); ++i)
-      squares[i] += square(one.picture.values()[i]) + square(one.spread.values()[i]);
+      squares[i] += square(one.picture.values()[i]) + square(one.predicted_error.values()[i]);
     for (std::size_t i = 0; m > 0 && i < pixels; ++i) mean.picture.values()[i] += one.picture.values()[i];
   }
   for (real& value : mean.picture.values()) value /= count;
-  if (!spread) return mean;
-  mean.spread = Tensor(mean.picture.shape());
+  if (!predicted_error) return mean;
+  mean.predicted_error = Tensor(mean.picture.shape());
   for (std::size_t i = 0; i < pixels; ++i)
-    mean.spread.values()[i] =
+    mean.predicted_error.values()[i] =
         static_cast<real>(std::sqrt(std::max(0.0, squares[i] / count - square(mean.picture.values()[i]))));
   return mean;
 }

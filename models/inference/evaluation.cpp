@@ -14,7 +14,7 @@ constexpr std::size_t kBatchesAtOnce = 4;
 struct Part {
   std::size_t first;
   Tensor inputs, outputs, targets;
-  std::vector<float> spreads;
+  std::vector<float> predicted_errors;
   std::exception_ptr error;
 };
 
@@ -28,7 +28,8 @@ void compute(const Ensemble& network, const Examples& data, std::span<const std:
   // Copied, so that what this thread took from its pool goes back there.
   const Estimate estimate = network.estimate(part.inputs);
   std::copy_n(estimate.picture.data(), estimate.picture.size(), part.outputs.data());
-  part.spreads.assign(estimate.spread.values().begin(), estimate.spread.values().end());
+  part.predicted_errors.assign(estimate.predicted_error.values().begin(),
+                               estimate.predicted_error.values().end());
 }
 
 std::string text(const NetworkFormat& f) {
@@ -72,7 +73,7 @@ void for_each_output(const Ensemble& network, const Examples& data, std::span<co
     }
     for (const Part& p : parts) {
       if (p.error) std::rethrow_exception(p.error);
-      if (!use({p.first, p.inputs, p.outputs, p.targets, p.spreads})) return;
+      if (!use({p.first, p.inputs, p.outputs, p.targets, p.predicted_errors})) return;
     }
   }
 }

@@ -14,21 +14,21 @@ namespace supertac {
 /// Throws std::invalid_argument that names both when the examples' inputs or pictures are not the network's.
 void check_format(const Examples& examples, const Network& network);
 
-/// A batch of results: inputs as the network takes them, outputs, spreads and targets [n,H,W,1], and the
-/// first of their places in `indices`. Spreads are empty where the network has none.
+/// A batch of results: inputs as the network takes them, outputs, predicted errors and targets [n,H,W,1], and
+/// the first of their places in `indices`. Predicted errors are empty where the network has none.
 struct EvaluatedBatch {
   std::size_t first;
   const Tensor& inputs;
   const Tensor& outputs;
   const Tensor& targets;
-  std::span<const float> spreads;
+  std::span<const float> predicted_errors;
 
   std::size_t size() const { return static_cast<std::size_t>(inputs.dim(0)); }
   std::span<const float> input(std::size_t n) const { return sample(inputs, n); }
   std::span<const float> output(std::size_t n) const { return sample(outputs, n); }
   std::span<const float> target(std::size_t n) const { return sample(targets, n); }
   /// Empty where the network has none.
-  std::span<const float> spread(std::size_t n) const { return sample(spreads, n); }
+  std::span<const float> predicted_error(std::size_t n) const { return sample(predicted_errors, n); }
 
  private:
   std::span<const float> sample(const Tensor& all, std::size_t n) const { return sample(all.values(), n); }

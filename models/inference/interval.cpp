@@ -2,7 +2,8 @@
 
 namespace supertac {
 
-double doubt_of(std::span<const float> picture, std::span<const float> spread, const ImageGrid& grid) {
+double doubt_of(std::span<const float> picture, std::span<const float> predicted_error,
+                const ImageGrid& grid) {
   constexpr double kC = 0.005;
   const int side = std::min({7, grid.height, grid.width});
   const double pixels = side * side;
@@ -14,7 +15,7 @@ double doubt_of(std::span<const float> picture, std::span<const float> spread, c
       for (int row = top; row < top + side; ++row) {
         for (int column = left; column < left + side; ++column) {
           const auto i = static_cast<std::size_t>(row * grid.width + column);
-          const double p = picture[i], s = at_least(spread[i]);
+          const double p = picture[i], s = at_least(predicted_error[i]);
           sum += p, sum_of_squares += p * p, errors += s * s;
         }
       }

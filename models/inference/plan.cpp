@@ -19,7 +19,7 @@ Shape with_count(const Shape& one, Dim count) {
 }  // namespace
 
 template <class T>
-static void fill_margins(const Map& map, Dim images, T value, T* image) {
+static void fill_margins(const FeatureMap& map, Dim images, T value, T* image) {
   if (map.margin_h + map.margin_w == 0) return;
   const Dim ends = map.margin_h * map.line(), side = map.margin_w * map.channels;
   for (T* const last = image + images * map.image(); image < last; image += map.image()) {
@@ -33,13 +33,13 @@ static void fill_margins(const Map& map, Dim images, T value, T* image) {
 }
 
 void Plan::clear_margins(const Block& block) const {
-  for (const Map& map : planes_) std::fill_n(block.begin(map), map.image(), real(0));
-  for (const Map& map : buffers_) fill_margins(map, block.images, real(0), block.begin(map));
-  for (const Map& map : byte_buffers_)
+  for (const FeatureMap& map : planes_) std::fill_n(block.begin(map), map.image(), real(0));
+  for (const FeatureMap& map : buffers_) fill_margins(map, block.images, real(0), block.begin(map));
+  for (const FeatureMap& map : byte_buffers_)
     fill_margins(map, block.images, static_cast<std::uint8_t>(map.zero), block.byte_begin(map));
 }
 
-void Plan::copy_out(const Block& block, const Map& map, Tensor& to, Dim first) const {
+void Plan::copy_out(const Block& block, const FeatureMap& map, Tensor& to, Dim first) const {
   const Dim run = map.width * map.channels;
   real* target = to.data() + first * map.height * run;
   for (Dim n = 0; n < block.images; ++n) {
@@ -50,8 +50,8 @@ void Plan::copy_out(const Block& block, const Map& map, Tensor& to, Dim first) c
 
 Estimate Plan::run(const Tensor& inputs) const {
   const Dim count = inputs.dim(0), size = count == 0 ? 0 : inputs.size() / count;
-  Estimate out{.picture = Tensor(with_count(picture_shape_, count)), .spread = {}, .latents = {}};
-  if (has_spread_) out.spread = Tensor(out.picture.shape());
+  Estimate out{.picture = Tensor(with_count(picture_shape_, count)), .predicted_error = {}, .latents = {}};
+  if (predicts_error_) out.predicted_error = Tensor(out.picture.shape());
   if (has_latents_) out.latents = Tensor(with_count(latents_shape_, count));
   const Dim images = std::min(count, block_), bytes = byte_workspace_ * images;
   Tensor memory(Shape{scratch_ + workspace_ * images + bytes / static_cast<Dim>(sizeof(real)) + 1});
@@ -68,7 +68,7 @@ Estimate Plan::run(const Tensor& inputs) const {
     if (first == 0 || block.images != block_) clear_margins(block);
     for (const PlanStep& step : steps_) step(block);
     copy_out(block, picture_, out.picture, first);
-    if (has_spread_) copy_out(block, spread_, out.spread, first);
+    if (predicts_error_) copy_out(block, predicted_error_, out.predicted_error, first);
     if (has_latents_) copy_out(block, latents_, out.latents, first);
   }
   return out;

@@ -11,7 +11,7 @@ namespace supertac {
 
 /// Where a value lies in the workspace: images [height][width][channels] with a margin of zeros around.
 /// Values that bytes stand for lie among the bytes, with the same layout.
-struct Map {
+struct FeatureMap {
   Dim height = 1, width = 1, channels = 1;
   Dim margin_h = 0, margin_w = 0;
   Dim offset = 0;         ///< of the first image, per image of a block
@@ -22,7 +22,7 @@ struct Map {
   /// From an image's beginning to its first pixel.
   Dim origin() const { return margin_h * line() + margin_w * channels; }
   kernels::Strides strides() const { return {image(), line(), channels}; }
-  bool same_layout(const Map& other) const {
+  bool same_layout(const FeatureMap& other) const {
     return height == other.height && width == other.width && channels == other.channels &&
            margin_h == other.margin_h && margin_w == other.margin_w && zero == other.zero;
   }
@@ -37,10 +37,10 @@ struct Block {
   real* scratch = nullptr;    ///< of the step that runs
   bool filters_anew = false;  ///< Winograd's filters are transformed on the way
 
-  real* begin(const Map& map) const { return workspace + map.offset * images; }
-  real* first_pixel(const Map& map) const { return begin(map) + map.origin(); }
-  std::uint8_t* byte_begin(const Map& map) const { return bytes + map.offset * images; }
-  std::uint8_t* first_byte(const Map& map) const { return byte_begin(map) + map.origin(); }
+  real* begin(const FeatureMap& map) const { return workspace + map.offset * images; }
+  real* first_pixel(const FeatureMap& map) const { return begin(map) + map.origin(); }
+  std::uint8_t* byte_begin(const FeatureMap& map) const { return bytes + map.offset * images; }
+  std::uint8_t* first_byte(const FeatureMap& map) const { return byte_begin(map) + map.origin(); }
 };
 
 using PlanStep = std::function<void(const Block&)>;
@@ -53,9 +53,9 @@ class Plan {
 
  private:
   friend class Planner;
-  Map add_buffer(Map layout);
+  FeatureMap add_buffer(FeatureMap layout);
   void clear_margins(const Block& block) const;
-  void copy_out(const Block& block, const Map& map, Tensor& to, Dim first) const;
+  void copy_out(const Block& block, const FeatureMap& map, Tensor& to, Dim first) const;
 
   /// Images that go through the steps together. They share the weights on their way from memory, but what
   /// they leave behind must stay in the second cache: one of kLargeCache bytes has room for kLargeBlock.
@@ -63,16 +63,16 @@ class Plan {
   static constexpr std::size_t kLargeCache = std::size_t{2} << 20;
 
   std::vector<PlanStep> steps_;
-  std::vector<Map> buffers_;  // each once
-  std::vector<Map> planes_;   // those with margins inside: of one image, channel by channel
-  std::vector<Map> byte_buffers_;
+  std::vector<FeatureMap> buffers_;  // each once
+  std::vector<FeatureMap> planes_;   // those with margins inside: of one image, channel by channel
+  std::vector<FeatureMap> byte_buffers_;
   Dim workspace_ = 0;       // numbers of an image
   Dim byte_workspace_ = 0;  // bytes of an image
   Dim scratch_ = 0;         // numbers
-  Map picture_, spread_, latents_;
+  FeatureMap picture_, predicted_error_, latents_;
   Dim block_ = kBlock;
   bool filters_anew_ = false;
-  bool has_spread_ = false, has_latents_ = false;
+  bool predicts_error_ = false, has_latents_ = false;
   Shape picture_shape_, latents_shape_;  // of one image
 };
 

@@ -15,7 +15,7 @@ struct Product {
   ProductJob job;
   std::vector<Dim> segments;
   Tensor w, bias;
-  Map x, y;
+  FeatureMap x, y;
   Dim x_offset = 0, y_offset = 0;  // from the maps' first pixels
 
   void operator()(const Block& block) const {
@@ -38,8 +38,8 @@ struct ByteProduct {
   std::vector<kernels::BytePlaces> places;
   Tensor w;  // of bytes, from the beginning of a line of the cache
   std::vector<float> scale, bias;
-  Map x;
-  std::optional<Map> y, y_bytes;
+  FeatureMap x;
+  std::optional<FeatureMap> y, y_bytes;
   Dim x_offset = 0, y_offset = 0;
 
   /// For blocks of up to so many images.
@@ -130,7 +130,7 @@ void Planner::add_product(const TracedOp& op, Product product) {
 }
 
 // The memory of what a product makes: numbers, bytes or both.
-Map Planner::new_results(const TracedOp& op) {
+FeatureMap Planner::new_results(const TracedOp& op) {
   const Id y = op.y.node();
   const bool bytes = is_of_bytes(op) && steps_.contains(y);
   if (bytes) new_bytes(op.y);
@@ -141,7 +141,7 @@ Map Planner::new_results(const TracedOp& op) {
 void Planner::add_bytes(const TracedOp& op) {
   const Id id = op.y.node();
   if (!steps_.contains(id) || bytes_.contains(id)) return;
-  const Map x = maps_.at(id), y = new_bytes(op.y);
+  const FeatureMap x = maps_.at(id), y = new_bytes(op.y);
   const kernels::Steps steps = steps_.at(id);
   plan_->steps_.push_back([=](const Block& b) {
     kernels::to_bytes({b.images, x.height, x.width * x.channels, x.strides(), y.strides(), steps},
@@ -151,7 +151,7 @@ void Planner::add_bytes(const TracedOp& op) {
 
 void Planner::direct_conv(const TracedOp& op) {
   const ConvSettings& s = op.settings.map;
-  const Map x = source_of(op), y = new_results(op);
+  const FeatureMap x = source_of(op), y = new_results(op);
   Product step{.job = {.height = y.height,
                        .width = y.width,
                        .from = {x.image(), s.stride_h * x.line(), s.stride_w * x.channels},
@@ -200,7 +200,7 @@ Tensor phase_weights(const ConvSettings& s, const Phase& v, const Phase& h, cons
 
 void Planner::direct_transposed_conv(const TracedOp& op) {
   const ConvSettings& s = op.settings.map;
-  const Map x = source_of(op), y = new_results(op);
+  const FeatureMap x = source_of(op), y = new_results(op);
   for (Dim top = 0; top < s.stride_h; ++top) {
     for (Dim left = 0; left < s.stride_w; ++left) {
       const Phase v(top, y.height, s.kernel_h, s.stride_h, s.padding_h);
@@ -243,7 +243,7 @@ static Tensor with_pixels_outside(const Tensor& t, Dim outer, Dim pixels, Dim in
 }
 
 void Planner::linear(const TracedOp& op) {
-  const Map x = source_of(op), y = new_results(op);
+  const FeatureMap x = source_of(op), y = new_results(op);
   const Dim in = op.inputs[0].dim(1), out = op.y.dim(1);
   if (x.height > 1 && x.margin_w > 0) throw std::logic_error("Prepared: a flattened picture has margins");
   const auto unflatten = pixels_of_unflatten_.find(op.y.node());

@@ -10,7 +10,7 @@ namespace supertac {
 
 void Planner::load_input(const Variable& input) {
   if (maps_.contains(input.node())) return;
-  const Map y = new_map(input);
+  const FeatureMap y = new_map(input);
   plan_->steps_.push_back([y](const Block& b) {
     const real* from = b.input;
     for (Dim n = 0; n < b.images; ++n) {
@@ -27,7 +27,7 @@ static void copy_runs(Dim rows, const real* from, Dim from_step, real* to, Dim t
 }
 
 void Planner::take_runs(const TracedOp& op) {
-  const Map y = new_map(op.y);
+  const FeatureMap y = new_map(op.y);
   const Dim width = op.inputs[0].dim(2), rows = y.width;
   const OpSettings s = op.settings;
   const Dim piece = s.run % 4 == 0 ? 4 : 1;  // a row of the rig's array is one move
@@ -58,10 +58,10 @@ struct PlaneConvs {
   struct Output {
     kernels::PlaneOutput to;
     Tensor w;
-    Map y;
+    FeatureMap y;
   };
   kernels::PlaneJob job;
-  Map x, planes;
+  FeatureMap x, planes;
   std::vector<Output> outputs;
 
   void operator()(const Block& block) const {
@@ -78,11 +78,11 @@ struct PlaneConvs {
       isa().plane_conv(now, first);
     }
   }
-  static constexpr std::size_t kMost = 2;  // picture and spread
+  static constexpr std::size_t kMost = 2;  // picture and predicted error
 };
 
 void Planner::plane_conv(const TracedOp& op) {
-  const Map x = map_of(op.inputs[0]), y = new_map(op.y);
+  const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
   PlaneConvs::Output output{{}, plane_weights(op.inputs[1]), y};
   output.to = {output.w.data(), op.inputs[2].value().data()[0], op.settings.negative_slope};
   PlaneConvs* last = plan_->steps_.empty() ? nullptr : plan_->steps_.back().target<PlaneConvs>();
@@ -90,7 +90,7 @@ void Planner::plane_conv(const TracedOp& op) {
     return last->outputs.push_back(std::move(output));
   const Dim vectors = (x.width + kernels::kWidestVector - 1) / kernels::kWidestVector;
   const Dim line = vectors * kernels::kWidestVector + 2;
-  const Map planes = plan_->add_buffer({.height = x.channels * (x.height + 2), .width = line});
+  const FeatureMap planes = plan_->add_buffer({.height = x.channels * (x.height + 2), .width = line});
   plan_->planes_.push_back(planes);
   plan_->steps_.push_back(PlaneConvs{{.height = x.height, .width = x.width, .cin = x.channels, .line = line},
                                      x,
@@ -101,7 +101,7 @@ void Planner::plane_conv(const TracedOp& op) {
 void Planner::flatten(const TracedOp&) {}  // the linear layer behind it takes the map as it is
 
 void Planner::unflatten(const TracedOp& op) {
-  const Map x = map_of(op.inputs[0]), y = new_map(op.y);
+  const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
   plan_->steps_.push_back([=](const Block& b) {
     const Dim run = y.width * y.channels;
     for (Dim n = 0; n < b.images; ++n) {
@@ -113,10 +113,10 @@ void Planner::unflatten(const TracedOp& op) {
 }
 
 void Planner::concat(const TracedOp& op) {
-  const Map y = new_map(op.y);
+  const FeatureMap y = new_map(op.y);
   Dim at = 0;
   for (const Variable& input : op.inputs) {
-    const Map x = map_of(input);
+    const FeatureMap x = map_of(input);
     plan_->steps_.push_back([=](const Block& b) {
       for (Dim n = 0; n < b.images; ++n)
         std::copy_n(b.begin(x) + n * x.image(), x.channels, b.begin(y) + n * y.image() + at);
@@ -126,22 +126,22 @@ void Planner::concat(const TracedOp& op) {
 }
 
 void Planner::global_mean(const TracedOp& op) {
-  const Map x = map_of(op.inputs[0]), y = new_map(op.y);
+  const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
   plan_->steps_.push_back([=](const Block& b) {
     isa().mean({b.images, x.height, x.width, x.channels, {}, x.strides(), {}}, b.first_pixel(x), b.begin(y));
   });
 }
 
 void Planner::sigmoid(const TracedOp& op) {
-  const Map x = map_of(op.inputs[0]), y = new_map(op.y);
+  const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
   if (op.y.rank() > 2) throw std::logic_error("Prepared: a sigmoid of maps has no step");
   plan_->steps_.push_back(
       [=](const Block& b) { kernels::sigmoid(b.images * x.image(), b.begin(x), b.begin(y)); });
 }
 
 void Planner::gated_sum(const TracedOp& op) {
-  const Map a = map_of(op.inputs[0]), x = map_of(op.inputs[1]), gates = map_of(op.inputs[2]);
-  const Map y = new_map(op.y);
+  const FeatureMap a = map_of(op.inputs[0]), x = map_of(op.inputs[1]), gates = map_of(op.inputs[2]);
+  const FeatureMap y = new_map(op.y);
   plan_->steps_.push_back([=](const Block& b) {
     isa().gate({b.images, x.height, x.width, x.channels, a.strides(), x.strides(), y.strides()},
                b.first_pixel(a), b.first_pixel(x), b.begin(gates), b.first_pixel(y));
@@ -149,7 +149,7 @@ void Planner::gated_sum(const TracedOp& op) {
 }
 
 void Planner::add(const TracedOp& op) {
-  const Map a = map_of(op.inputs[0]), x = map_of(op.inputs[1]), y = new_map(op.y);
+  const FeatureMap a = map_of(op.inputs[0]), x = map_of(op.inputs[1]), y = new_map(op.y);
   plan_->steps_.push_back([=](const Block& b) {
     isa().gate({b.images, x.height, x.width, x.channels, a.strides(), x.strides(), y.strides()},
                b.first_pixel(a), b.first_pixel(x), nullptr, b.first_pixel(y));

@@ -29,7 +29,7 @@ struct Winograd {
   Tensor w, bias;
   Dim place = 0;  // numbers from one place of u to the next
   real negative_slope = 1;
-  Map x, y;
+  FeatureMap x, y;
   std::vector<Filters> filters = {};
 
   Dim side() const { return from.square + 2; }
@@ -100,9 +100,9 @@ void Winograd::operator()(const Block& block) const {
 namespace {
 
 // Tiles of 4x4 take fewer products than those of 2x2, though their weights are four times the direct ones.
-Dim square_of(const Map& x) { return x.height % 4 == 0 && x.width % 4 == 0 ? 4 : 2; }
+Dim square_of(const FeatureMap& x) { return x.height % 4 == 0 && x.width % 4 == 0 ? 4 : 2; }
 
-Winograd winograd_step(const TracedOp& op, const Map& x, const Map& y, kernels::Strides to) {
+Winograd winograd_step(const TracedOp& op, const FeatureMap& x, const FeatureMap& y, kernels::Strides to) {
   constexpr Dim kPadding = 16;  // powers of two apart the places share cache lines
   const Dim square = square_of(x), down = x.height / square, across = x.width / square;
   return {.from = {down, across, x.strides(), x.channels, square},
@@ -169,7 +169,7 @@ void Planner::add_winograd(Winograd step) {
 }
 
 void Planner::winograd(const TracedOp& op) {
-  const Map x = map_of(op.inputs[0]), y = new_map(op.y);
+  const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
   Winograd step = winograd_step(op, x, y, y.strides());
   Filters all;
   for (Dim tap = 0; tap < 9; ++tap) all.taps.push_back(tap * x.channels * y.channels);
@@ -181,7 +181,7 @@ void Planner::winograd(const TracedOp& op) {
 // point of Winograd's transform, 0, sees the first tap alone and the last, infinity, the last one: where
 // these are 0, so is a row or a column of places.
 void Planner::transposed_winograd(const TracedOp& op) {
-  const Map x = map_of(op.inputs[0]), y = new_map(op.y);
+  const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
   Winograd step = winograd_step(op, x, y, {y.image(), 2 * y.line(), 2 * y.channels});
   constexpr Taps kTaps[] = {Taps::first_two, Taps::last_two};
   for (Dim top = 0; top < 2; ++top) {

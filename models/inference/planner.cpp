@@ -39,8 +39,8 @@ std::shared_ptr<const Plan> Planner::plan(const Network& network, const Activati
   plan.filters_anew_ = planner.filters_anew(second_cache);
   plan.picture_ = planner.map_of(drawn.picture);
   plan.picture_shape_ = drawn.picture.shape();
-  plan.has_spread_ = drawn.spread.defined();
-  if (plan.has_spread_) plan.spread_ = planner.map_of(drawn.spread);
+  plan.predicts_error_ = drawn.predicted_error.defined();
+  if (plan.predicts_error_) plan.predicted_error_ = planner.map_of(drawn.predicted_error);
   plan.has_latents_ = drawn.latents.defined();
   if (plan.has_latents_) {
     plan.latents_ = planner.map_of(drawn.latents);
@@ -103,7 +103,7 @@ void Planner::look_ahead(const std::vector<TracedOp>& ops, const Drawing& drawn)
     for (const Variable& x : op.inputs) (of_bytes ? read_as_bytes : read_as_numbers_).insert(owner(x));
   }
   std::erase_if(steps_, [&](const auto& value) { return !read_as_bytes.contains(value.first); });
-  for (const Variable* y : {&drawn.picture, &drawn.spread, &drawn.latents})
+  for (const Variable* y : {&drawn.picture, &drawn.predicted_error, &drawn.latents})
     if (y->defined()) {
       last_use_[owner(*y)] = std::numeric_limits<std::size_t>::max();
       read_as_numbers_.insert(owner(*y));
@@ -140,22 +140,22 @@ Planner::Id Planner::owner(const Variable& x) const {
   return flattened == flattened_.end() ? x.node() : flattened->second;
 }
 
-const Map& Planner::map_of(const Variable& x) const { return maps_.at(owner(x)); }
+const FeatureMap& Planner::map_of(const Variable& x) const { return maps_.at(owner(x)); }
 
-const Map& Planner::source_of(const TracedOp& op) const {
+const FeatureMap& Planner::source_of(const TracedOp& op) const {
   return (is_of_bytes(op) ? bytes_ : maps_).at(owner(op.inputs[0]));
 }
 
-Map Planner::layout_of(const Variable& y) const {
+FeatureMap Planner::layout_of(const Variable& y) const {
   const auto found = margins_.find(y.node());
   const Margin margin = found == margins_.end() ? Margin{} : found->second;
-  Map map{.channels = y.dim(y.rank() - 1), .margin_h = margin.height, .margin_w = margin.width};
+  FeatureMap map{.channels = y.dim(y.rank() - 1), .margin_h = margin.height, .margin_w = margin.width};
   if (y.rank() > 2) map.width = y.dim(y.rank() - 2);
   if (y.rank() > 3) map.height = y.dim(1);
   return map;
 }
 
-static Map append(Map map, std::vector<Map>& all, Dim& size) {
+static FeatureMap append(FeatureMap map, std::vector<FeatureMap>& all, Dim& size) {
   constexpr Dim kLine = 64;  // a line of the cache in bytes
   map.offset = size;
   size += (map.image() + kLine - 1) / kLine * kLine;
@@ -163,29 +163,31 @@ static Map append(Map map, std::vector<Map>& all, Dim& size) {
   return map;
 }
 
-Map Plan::add_buffer(Map layout) { return append(layout, buffers_, workspace_); }
+FeatureMap Plan::add_buffer(FeatureMap layout) { return append(layout, buffers_, workspace_); }
 
 // One of the free buffers with this layout, or a new one.
-static Map take(Map map, std::vector<Map>& free, std::vector<Map>& all, Dim& size) {
-  const auto old = std::find_if(free.begin(), free.end(), [&](const Map& m) { return m.same_layout(map); });
+static FeatureMap take(FeatureMap map, std::vector<FeatureMap>& free, std::vector<FeatureMap>& all,
+                       Dim& size) {
+  const auto old =
+      std::find_if(free.begin(), free.end(), [&](const FeatureMap& m) { return m.same_layout(map); });
   if (old == free.end()) return append(map, all, size);
   map = *old;
   free.erase(old);
   return map;
 }
 
-const Map& Planner::new_map(const Variable& y) {
+const FeatureMap& Planner::new_map(const Variable& y) {
   return maps_[y.node()] = take(layout_of(y), free_, plan_->buffers_, plan_->workspace_);
 }
 
-const Map& Planner::new_bytes(const Variable& y) {
-  Map map = layout_of(y);
+const FeatureMap& Planner::new_bytes(const Variable& y) {
+  FeatureMap map = layout_of(y);
   map.zero = steps_.at(y.node()).zero;
   return bytes_[y.node()] = take(map, free_bytes_, plan_->byte_buffers_, plan_->byte_workspace_);
 }
 
 void Planner::release_after(std::size_t op) {
-  const auto release = [&](std::map<Id, Map>& maps, std::vector<Map>& free) {
+  const auto release = [&](std::map<Id, FeatureMap>& maps, std::vector<FeatureMap>& free) {
     std::erase_if(maps, [&](const auto& value) {
       const auto last = last_use_.find(value.first);
       if (last == last_use_.end() || last->second > op) return false;

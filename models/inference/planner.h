@@ -45,13 +45,13 @@ class Planner {
   Id owner(const Variable& x) const;
 
   bool is_of_bytes(const TracedOp& op) const;
-  const Map& map_of(const Variable& x) const;
+  const FeatureMap& map_of(const Variable& x) const;
   /// Of the first input: its numbers, or the bytes that stand for them.
-  const Map& source_of(const TracedOp& op) const;
-  Map layout_of(const Variable& y) const;
-  const Map& new_map(const Variable& y);
-  const Map& new_bytes(const Variable& y);
-  Map new_results(const TracedOp& op);
+  const FeatureMap& source_of(const TracedOp& op) const;
+  FeatureMap layout_of(const Variable& y) const;
+  const FeatureMap& new_map(const Variable& y);
+  const FeatureMap& new_bytes(const Variable& y);
+  FeatureMap new_results(const TracedOp& op);
   void add_product(const TracedOp& op, struct Product product);
   void add_winograd(struct Winograd step);
   void add_bytes(const TracedOp& op);
@@ -84,8 +84,8 @@ class Planner {
   std::map<Id, Dim> pixels_of_unflatten_;  // value that is unflattened -> pixels
   std::map<Id, std::size_t> last_use_;
   std::map<Id, Margin> margins_;
-  std::map<Id, Map> maps_, bytes_;
-  std::vector<Map> free_, free_bytes_;
+  std::map<Id, FeatureMap> maps_, bytes_;
+  std::vector<FeatureMap> free_, free_bytes_;
   std::map<Id, kernels::Steps> steps_;  // of values that bytes stand for
   std::set<Id> read_as_numbers_;
   std::size_t weights_ = 0, transformed_ = 0;  // bytes: as they are, and Winograd's places of some of them

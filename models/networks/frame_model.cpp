@@ -63,7 +63,7 @@ NetworkFormat FrameModel::format() const {
 }
 
 Drawing FrameModel::draw(const Variable& frames) const {
-  return {.picture = forward(frames), .spread = {}, .latents = {}};
+  return {.picture = forward(frames), .predicted_error = {}, .latents = {}};
 }
 
 }  // namespace supertac

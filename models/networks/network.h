@@ -14,15 +14,15 @@ struct NetworkFormat {
 
 /// Pictures and what is known of their worth.
 struct Estimate {
-  Tensor picture;  ///< [N,rows scale,columns scale,1]
-  Tensor spread;   ///< the same: how far from the truth a pixel is expected to be; undefined where nothing
-                   ///< says so
+  Tensor picture;          ///< [N,rows scale,columns scale,1]
+  Tensor predicted_error;  ///< the same: how far from the truth a pixel is expected to be; undefined where
+                           ///< nothing says so
   Tensor latents;  ///< [N,latents]; undefined for a network without any
 };
 
 /// The same on the graph.
 struct Drawing {
-  Variable picture, spread, latents;
+  Variable picture, predicted_error, latents;
 };
 
 class Network : public Module {
@@ -51,7 +51,9 @@ inline Estimate Network::estimate(const Tensor& inputs) const {
   const NoGrad no_grad;
   const Drawing drawn = draw(Variable(inputs));
   const auto value = [](const Variable& x) { return x.defined() ? x.value() : Tensor(); };
-  return {.picture = drawn.picture.value(), .spread = value(drawn.spread), .latents = value(drawn.latents)};
+  return {.picture = drawn.picture.value(),
+          .predicted_error = value(drawn.predicted_error),
+          .latents = value(drawn.latents)};
 }
 
 }  // namespace supertac

@@ -85,8 +85,9 @@ void SuperTacSettings::check() const {
 }
 
 SuperTacSettings SuperTacSettings::of_preset(const std::string& name) {
-  if (name == "paper") return {.spread = true};
-  if (name == "tiny") return {.preset = "tiny", .timesteps = 128, .channels = 8, .rcabs = 1, .spread = true};
+  if (name == "paper") return {.predicted_error = true};
+  if (name == "tiny")
+    return {.preset = "tiny", .timesteps = 128, .channels = 8, .rcabs = 1, .predicted_error = true};
   throw std::invalid_argument("unknown preset \"" + name + "\"; known: paper, tiny");
 }
 
@@ -107,18 +108,18 @@ Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
       fc_(s.groups() * s.latent, s.channels * s.rows * s.columns, rng),
       rirbs_(make_rirbs(s, rng)),
       out_(s.channels, 1, kSameSize, rng) {
-  if (s.spread) spread_.emplace(s.channels, 1, kSameSize, rng);
+  if (s.predicted_error) predicted_error_.emplace(s.channels, 1, kSameSize, rng);
   add("fc", fc_);
   for (std::size_t i = 0; i < rirbs_.size(); ++i) add("rirb." + std::to_string(i), rirbs_[i]);
   add("out", out_);
-  if (spread_) add("spread", *spread_);
+  if (predicted_error_) add("spread", *predicted_error_);
 }
 
 Upsampler::Output Upsampler::forward(const Variable& latents) const {
   const Dim pixels[] = {rows_, columns_};
   Variable h = unflatten_channels_first(fc_.forward(latents, kLeakyRelu), pixels);
   for (const Rirb& rirb : rirbs_) h = rirb.forward(h);
-  return {out_.forward(h), spread_ ? spread_->forward(h) : Variable()};
+  return {out_.forward(h), predicted_error_ ? predicted_error_->forward(h) : Variable()};
 }
 
 SuperTac::SuperTac(const SuperTacSettings& settings, Rng& rng)
@@ -161,7 +162,7 @@ SuperTac::Output SuperTac::forward(const Tensor& windows, std::span<const Tensor
     out.decoded[i] = decoders_[i].forward(z[i]);
   }
   const Upsampler::Output drawn = upsampler_.forward(concat_groups(z.span()));
-  out.image = drawn.picture, out.spread = drawn.spread;
+  out.image = drawn.picture, out.predicted_error = drawn.predicted_error;
   return out;
 }
 
@@ -185,7 +186,7 @@ Tensor SuperTac::encode(const Tensor& windows) const {
 Drawing SuperTac::draw(const Variable& windows) const {
   const Variable latents = means(windows);
   const Upsampler::Output drawn = upsampler_.forward(latents);
-  return {.picture = drawn.picture, .spread = drawn.spread, .latents = latents};
+  return {.picture = drawn.picture, .predicted_error = drawn.predicted_error, .latents = latents};
 }
 
 }  // namespace supertac

@@ -31,9 +31,9 @@ struct SuperTacSettings {
   Dim latent = 10;            ///< LD: 1 to 256
   Dim scale = 4;  ///< 2, 4, 8: pictures so many times finer than the array, 7 or more pixels a side
   Grouping grouping = Grouping::horizontal;
-  Dim channels = 32;    ///< of the upsampler
-  Dim rcabs = 3;        ///< in each RIRB
-  bool spread = false;  ///< whether it also draws how far off each pixel may be; presets do
+  Dim channels = 32;             ///< of the upsampler
+  Dim rcabs = 3;                 ///< in each RIRB
+  bool predicted_error = false;  ///< whether it also draws how far off each pixel may be; presets do
 
   Dim signals() const { return rows * columns * in_channels; }  ///< numbers in a frame
   Dim groups() const { return grouping == Grouping::horizontal ? rows : columns; }
@@ -73,12 +73,14 @@ class PerGroup {
   std::size_t size_;
 };
 
-/// Latents of the G groups [N,G LD] -> picture and spread [N,rows scale,columns scale,1], linear outputs.
+/// Latents of the G groups [N,G LD] -> picture and predicted error [N,rows scale,columns scale,1], linear
+/// outputs.
 class Upsampler : public Module {
  public:
   struct Output {
     Variable picture;
-    Variable spread;  ///< expected distance of a pixel from the truth; undefined without settings.spread
+    Variable predicted_error;  ///< expected distance of a pixel from the truth; undefined without
+                               ///< settings.predicted_error
   };
   Upsampler(const SuperTacSettings& settings, Rng& rng);
   Output forward(const Variable& latents) const;
@@ -88,7 +90,7 @@ class Upsampler : public Module {
   Linear fc_;
   std::vector<Rirb> rirbs_;
   Conv2d out_;
-  std::optional<Conv2d> spread_;
+  std::optional<Conv2d> predicted_error_;
 };
 
 class SuperTac : public Network {
@@ -101,7 +103,7 @@ class SuperTac : public Network {
     PerGroup<LatentDistribution> latent;  ///< [N,LD]
     PerGroup<Variable> decoded;           ///< [N,T,group_signals]
     Variable image;                       ///< [N,rows scale,columns scale,1]
-    Variable spread;                      ///< the same, or undefined
+    Variable predicted_error;             ///< the same, or undefined
   };
   /// Training: windows [N,T,signals] in [0,1] and eps [N,LD] ~ N(0,1) for each group.
   /// Throws std::invalid_argument on other shapes.

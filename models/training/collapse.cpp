@@ -10,9 +10,9 @@ constexpr double kActiveVariance = 0.01;                  // Burda et al. 2016
 
 }  // namespace
 
-void Spread::clear() { std::fill(values_.begin(), values_.end(), 0.0); }
+void BatchVariance::clear() { std::fill(values_.begin(), values_.end(), 0.0); }
 
-void Spread::add(const Tensor& batch, std::size_t first) {
+void BatchVariance::add(const Tensor& batch, std::size_t first) {
   const Dim samples = batch.dim(0), count = samples > 0 ? batch.size() / samples : 0;
   const real* x = batch.data();
   for (Dim n = 0; n < samples; ++n) {
@@ -25,27 +25,27 @@ void Spread::add(const Tensor& batch, std::size_t first) {
   }
 }
 
-void Spread::add(const Spread& other) {
+void BatchVariance::add(const BatchVariance& other) {
   for (std::size_t i = 0; i < values_.size(); ++i) values_[i] += other.values_[i];
 }
 
-double Spread::variance(std::size_t i, double samples) const {
+double BatchVariance::variance(std::size_t i, double samples) const {
   const double mean = values_[i] / samples;
   return std::max(0.0, values_[entries() + i] / samples - mean * mean);
 }
 
-double Spread::mean_variance(double samples) const {
+double BatchVariance::mean_variance(double samples) const {
   double total = 0;
   for (std::size_t i = 0; i < entries(); ++i) total += variance(i, samples);
   return total / static_cast<double>(entries());
 }
 
-bool senseless(const Spread& pictures, const Spread& truths, double samples) {
+bool is_degenerate(const BatchVariance& pictures, const BatchVariance& truths, double samples) {
   const double own = pictures.mean_variance(samples), due = truths.mean_variance(samples);
   return own < kLeastShare * kLeastShare * due || (due > 0 && own > kLargestShare * kLargestShare * due);
 }
 
-int active_latents(const Spread& means, double samples) {
+int active_latents(const BatchVariance& means, double samples) {
   int active = 0;
   for (std::size_t i = 0; i < means.entries(); ++i) active += means.variance(i, samples) > kActiveVariance;
   return active;

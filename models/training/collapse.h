@@ -9,14 +9,14 @@
 namespace supertac {
 
 /// How much each entry differs within a batch: sums that lanes gather and the trainer adds up.
-class Spread {
+class BatchVariance {
  public:
-  Spread() = default;
-  explicit Spread(std::size_t entries) : values_(2 * entries) {}
+  BatchVariance() = default;
+  explicit BatchVariance(std::size_t entries) : values_(2 * entries) {}
   void clear();
   /// Adds a batch [N,...], whose entries are `first`, first + 1, ... of this object.
   void add(const Tensor& batch, std::size_t first = 0);
-  void add(const Spread& other);
+  void add(const BatchVariance& other);
   /// Variance of entry i over `samples` samples.
   double variance(std::size_t i, double samples) const;
   /// The mean of all entries' variances.
@@ -31,10 +31,10 @@ class Spread {
 
 /// Pictures that say nothing of the truths: their standard deviation over the batch is below 2 % of the
 /// truths' (blank ones, or the mean image for every window) or above ten times it (training has diverged).
-bool senseless(const Spread& pictures, const Spread& truths, double samples);
+bool is_degenerate(const BatchVariance& pictures, const BatchVariance& truths, double samples);
 
 /// Latent numbers that tell windows apart: the variance of the encoder's mean over the batch is above 0.01
 /// (Burda et al. 2016, section 5.1, "active units"). None is posterior collapse: the decoders ignore z.
-int active_latents(const Spread& means, double samples);
+int active_latents(const BatchVariance& means, double samples);
 
 }  // namespace supertac

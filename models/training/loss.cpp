@@ -57,9 +57,9 @@ Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const Lo
     loss.reconstruction = i == 0 ? l2 : add(loss.reconstruction, l2);
     loss.kld = i == 0 ? kld : add(loss.kld, kld);
   }
-  if (output.spread.defined()) {
-    loss.spread = l2_loss(output.spread, error_of(output.image, truth));
-    loss.total = add(loss.total, scale(loss.spread, static_cast<real>(kSpreadWeight)));
+  if (output.predicted_error.defined()) {
+    loss.predicted_error = l2_loss(output.predicted_error, error_of(output.image, truth));
+    loss.total = add(loss.total, scale(loss.predicted_error, static_cast<real>(kPredictedErrorWeight)));
   }
   const auto share = static_cast<real>(w.a), rest = static_cast<real>(1 - w.a);
   const Variable vaes =

@@ -15,14 +15,14 @@ struct LossWeights {
   void check() const;
 };
 
-/// Scalars; reconstruction and kld are sums over the VAEs, undefined where there are none, as is spread.
-/// `total` alone is weighted.
+/// Scalars; reconstruction and kld are sums over the VAEs, undefined where there are none, as is predicted
+/// error. `total` alone is weighted.
 struct Loss {
-  Variable total, reconstruction, kld, l2, ssim, spread;
+  Variable total, reconstruction, kld, l2, ssim, predicted_error;
 };
 
-/// How much the squared error of the spread counts beside that of the picture.
-inline constexpr double kSpreadWeight = 0.1;
+/// How much the squared error of the predicted error counts beside that of the picture.
+inline constexpr double kPredictedErrorWeight = 0.1;
 
 /// A truth whose pixels differ by less is flat.
 inline constexpr real kLeastTexture = 0.01F;
@@ -33,9 +33,10 @@ inline constexpr real kLeastTexture = 0.01F;
 /// differ in shape.
 Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda);
 
-/// To the picture's loss kSpreadWeight times the mean of (spread - |image - truth|)^2 is added, the image
-/// taken as given: the spread learns the error, the picture does not learn to be predictably wrong. truth
-/// [N,H,W,1] in [-1,1]. Throws std::invalid_argument when it does not fit the output's image.
+/// To the picture's loss kPredictedErrorWeight times the mean of (predicted error - |image - truth|)^2 is
+/// added, the image taken as given: the predicted error learns the error, the picture does not learn to be
+/// predictably wrong. truth [N,H,W,1] in [-1,1]. Throws std::invalid_argument when it does not fit the
+/// output's image.
 Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const LossWeights& weights);
 
 }  // namespace supertac

@@ -33,21 +33,21 @@ class WindowObjective : public Objective {
 
   const Network& network() const override { return model_; }
   const TrainingPace& pace() const override { return settings_; }
-  std::unique_ptr<Objective> twin() const override {
+  std::unique_ptr<Objective> clone() const override {
     return std::make_unique<WindowObjective>(settings_, input_, array_, 0);
   }
 
-  Outcome operator()(const Batch& batch) const override {
-    SuperTac::Output output = model_.forward(batch.inputs, eps_of(batch).span());
-    Outcome outcome{supertac_loss(output, batch.targets, settings_.loss), output.image,
-                    PerGroup<Variable>(settings_.model.groups())};
-    for (std::size_t g = 0; g < outcome.means.size(); ++g) outcome.means[g] = output.latent[g].mean;
-    return outcome;
+  BatchOutput operator()(const Batch& batch) const override {
+    const SuperTac::Output drawn = model_.forward(batch.inputs, eps_of(batch).span());
+    BatchOutput output{supertac_loss(drawn, batch.targets, settings_.loss), drawn.image,
+                       PerGroup<Variable>(settings_.model.groups())};
+    for (std::size_t g = 0; g < output.means.size(); ++g) output.means[g] = drawn.latent[g].mean;
+    return output;
   }
   Dim noise() const override { return settings_.sampling ? latents() : 0; }
   Dim latents() const override { return settings_.model.groups() * settings_.model.latent; }
-  void vary(std::uint64_t sample, std::span<float> input) const override {
-    if (settings_.augment.any()) augment(settings_.augment, settings_.seed, sample, input, array_);
+  void augment(std::uint64_t sample, std::span<float> input) const override {
+    if (settings_.augment.any()) supertac::augment(settings_.augment, settings_.seed, sample, input, array_);
   }
 
   std::string text() const override { return to_json(settings_).dump(); }
@@ -83,10 +83,10 @@ class FrameObjective : public Objective {
 
   const Network& network() const override { return model_; }
   const TrainingPace& pace() const override { return settings_; }
-  std::unique_ptr<Objective> twin() const override {
+  std::unique_ptr<Objective> clone() const override {
     return std::make_unique<FrameObjective>(settings_, scaling_, 0);
   }
-  Outcome operator()(const Batch& batch) const override {
+  BatchOutput operator()(const Batch& batch) const override {
     const Variable picture = model_.forward(Variable(batch.inputs));
     return {picture_loss(picture, batch.targets, settings_.lambda), picture, PerGroup<Variable>()};
   }
@@ -124,7 +124,7 @@ nlohmann::ordered_json to_json(const FrameTrainingSettings& s) {
   return json;
 }
 
-void Objective::vary(std::uint64_t, std::span<float>) const {}
+void Objective::augment(std::uint64_t, std::span<float>) const {}
 
 std::unique_ptr<Objective> window_objective(const WindowSet& windows, const TrainingSettings& settings) {
   settings.check();

@@ -36,14 +36,14 @@ struct FrameTrainingSettings : TrainingPace {
 nlohmann::ordered_json to_json(const TrainingSettings& settings);
 nlohmann::ordered_json to_json(const FrameTrainingSettings& settings);
 
-/// One batch, or a lane's share of it.
+/// One batch, or a micro-batch's share of it.
 struct Batch {
   Tensor inputs, targets;
   Tensor noise;  ///< [N,Objective::noise()], ~ N(0,1)
 };
 
 /// Of a batch: the loss, and what tells a collapse (models/training/collapse.h).
-struct Outcome {
+struct BatchOutput {
   Loss loss;
   Variable picture;
   PerGroup<Variable> means;  ///< of the latents, [N,LD] each; none for a network without latents
@@ -55,14 +55,14 @@ class Objective {
   virtual const Network& network() const = 0;
   virtual const TrainingPace& pace() const = 0;
   /// The same over a network of its own, which awaits the values of this one's parameters.
-  virtual std::unique_ptr<Objective> twin() const = 0;
+  virtual std::unique_ptr<Objective> clone() const = 0;
 
-  virtual Outcome operator()(const Batch& batch) const = 0;
+  virtual BatchOutput operator()(const Batch& batch) const = 0;
   /// Numbers of noise and of latents that a sample has.
   virtual Dim noise() const { return 0; }
   virtual Dim latents() const { return 0; }
   /// Changes an input in training: a function of the sample's number since training began.
-  virtual void vary(std::uint64_t sample, std::span<float> input) const;
+  virtual void augment(std::uint64_t sample, std::span<float> input) const;
 
   /// Its settings as JSON text, to compare on resume.
   virtual std::string text() const = 0;

@@ -91,15 +91,15 @@ Ranks& one_process() {
   return alone;
 }
 
-void check_lanes(int ranks, std::size_t batch) {
-  constexpr std::size_t kLanes = 8;
+void check_micro_batches(int ranks, std::size_t batch) {
+  constexpr std::size_t kMicroBatches = 8;
   if (ranks == 1) return;
   if (ranks != 2 && ranks != 4 && ranks != 8)
     throw std::invalid_argument(
         std::to_string(ranks) +
-        " processes cannot share the eight lanes of a batch evenly; start 1, 2, 4 or 8, "
+        " processes cannot share the eight micro-batches of a batch evenly; start 1, 2, 4 or 8, "
         "or train several models at once with supertac-sweep");
-  if (batch < kLanes)
+  if (batch < kMicroBatches)
     throw std::invalid_argument("several processes need a batch of at least 8, got " + std::to_string(batch) +
                                 "; give a larger --batch or start one process");
 }

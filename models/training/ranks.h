@@ -1,6 +1,6 @@
 // Processes that train one model together. Each holds the whole model; rank r of R sums the gradients of its
-// 8/R neighbouring lanes, then R ranks add theirs pairwise. IEEE addition commutes, so both partners of a
-// pair get the same bits, those of a single process (models/training/trainer.h).
+// 8/R neighbouring micro-batches, then R ranks add theirs pairwise. IEEE addition commutes, so both partners
+// of a pair get the same bits, those of a single process (models/training/trainer.h).
 #pragma once
 
 #include <cstddef>
@@ -45,9 +45,9 @@ class Ranks {
 /// A process that is alone.
 Ranks& one_process();
 
-/// Throws std::invalid_argument, with advice, for a number of ranks that cannot share eight lanes evenly, and
-/// for a batch that does not fill them.
-void check_lanes(int ranks, std::size_t batch);
+/// Throws std::invalid_argument, with advice, for a number of ranks that cannot share eight micro-batches
+/// evenly, and for a batch that does not fill them.
+void check_micro_batches(int ranks, std::size_t batch);
 
 /// Where ranks differ: the first entry for which one has another value than most (at a tie: than rank 0).
 struct Disagreement {

@@ -34,11 +34,11 @@ void LossTerms::add(const LossTerms& other) {
   l2 += other.l2, ssim += other.ssim;
 }
 
-void Trainer::Spreads::clear() {
-  for (Spread* spread : all()) spread->clear();
+void Trainer::Variances::clear() {
+  for (BatchVariance* variance : all()) variance->clear();
 }
 
-void Trainer::Spreads::add(const Spreads& other) {
+void Trainer::Variances::add(const Variances& other) {
   pictures.add(other.pictures), targets.add(other.targets), means.add(other.means);
 }
 
@@ -52,12 +52,15 @@ Trainer::Trainer(const Examples& examples, std::vector<std::uint32_t> train,
       ranks_(ranks) {
   check_format(examples, model());
   indices_.resize(batching_.batch_size());
-  check_lanes(ranks.size(), indices_.size());
-  const Dim n = static_cast<Dim>(indices_.size()), lanes = std::min(static_cast<Dim>(kMostLanes), n);
-  const Dim first = lanes * ranks.rank() / ranks.size();
-  for (Dim i = first; i < first + lanes / ranks.size(); ++i)
-    lanes_.emplace_back(*objective_, i * n / lanes, (i + 1) * n / lanes - i * n / lanes);
-  for (const Lane& lane : lanes_) lane_parameters_.push_back(&lane.objective->network().parameters());
+  check_micro_batches(ranks.size(), indices_.size());
+  const Dim n = static_cast<Dim>(indices_.size()),
+            micro_batches = std::min(static_cast<Dim>(kMostMicroBatches), n);
+  const Dim first = micro_batches * ranks.rank() / ranks.size();
+  for (Dim i = first; i < first + micro_batches / ranks.size(); ++i)
+    micro_batches_.emplace_back(*objective_, i * n / micro_batches,
+                                (i + 1) * n / micro_batches - i * n / micro_batches);
+  for (const MicroBatch& micro_batch : micro_batches_)
+    micro_batch_parameters_.push_back(&micro_batch.objective->network().parameters());
   std::vector<Tensor> weights;
   for (const Parameter& p : model().parameters()) weights.push_back(p.value.value());
   forms_ = std::make_unique<kernels::WeightForms>(weights);
@@ -70,29 +73,30 @@ Trainer::Trainer(const PairSet& pairs, std::vector<std::uint32_t> train,
                  const FrameTrainingSettings& settings)
     : Trainer(pairs, std::move(train), frame_objective(pairs, settings)) {}
 
-Trainer::Lane::Lane(const Objective& master, Dim first_sample, Dim count)
+Trainer::MicroBatch::MicroBatch(const Objective& master, Dim first_sample, Dim count)
     : first(first_sample),
-      objective(master.twin()),
+      objective(master.clone()),
       batch{Tensor(master.network().input_shape(count)), Tensor(master.network().picture_shape(count)), {}} {
   if (master.noise() > 0) batch.noise = Tensor(Shape{count, master.noise()});
-  spreads.pictures = spreads.targets = Spread(static_cast<std::size_t>(batch.targets.size() / count));
-  spreads.means = Spread(static_cast<std::size_t>(master.latents()));
+  variances.pictures = variances.targets =
+      BatchVariance(static_cast<std::size_t>(batch.targets.size() / count));
+  variances.means = BatchVariance(static_cast<std::size_t>(master.latents()));
   share_values(master.network().parameters(), objective->network().parameters());
 }
 
-void Trainer::fill(Lane& lane) const {
+void Trainer::fill(MicroBatch& micro_batch) const {
   const auto per_epoch = static_cast<std::uint64_t>(steps_per_epoch());
   const std::uint64_t epoch = static_cast<std::uint64_t>(step()) / per_epoch;
   const std::uint64_t b = static_cast<std::uint64_t>(step()) % per_epoch;
-  const auto count = static_cast<std::size_t>(lane.batch.inputs.dim(0));
-  const std::size_t input_size = lane.batch.inputs.values().size() / count;
-  const std::size_t target_size = lane.batch.targets.values().size() / count;
+  const auto count = static_cast<std::size_t>(micro_batch.batch.inputs.dim(0));
+  const std::size_t input_size = micro_batch.batch.inputs.values().size() / count;
+  const std::size_t target_size = micro_batch.batch.targets.values().size() / count;
   for (std::size_t n = 0; n < count; ++n) {
-    const std::size_t slot = static_cast<std::size_t>(lane.first) + n;
-    const std::span<float> input = lane.batch.inputs.values().subspan(n * input_size, input_size);
+    const std::size_t slot = static_cast<std::size_t>(micro_batch.first) + n;
+    const std::span<float> input = micro_batch.batch.inputs.values().subspan(n * input_size, input_size);
     data_.input(indices_[slot], input);
-    if (data_.may_vary(indices_[slot])) objective_->vary(batching_.sample(epoch, b, slot), input);
-    data_.target(indices_[slot], lane.batch.targets.values().subspan(n * target_size, target_size));
+    if (data_.may_vary(indices_[slot])) objective_->augment(batching_.sample(epoch, b, slot), input);
+    data_.target(indices_[slot], micro_batch.batch.targets.values().subspan(n * target_size, target_size));
   }
 }
 
@@ -100,42 +104,45 @@ void Trainer::fill(Lane& lane) const {
 void Trainer::announce_next() {
   if (step() + 1 >= total_steps()) return;
   batch_of(step() + 1, indices_);
-  const auto first = static_cast<std::size_t>(lanes_.front().first);
-  const auto end = static_cast<std::size_t>(lanes_.back().first + lanes_.back().batch.inputs.dim(0));
+  const auto first = static_cast<std::size_t>(micro_batches_.front().first);
+  const auto end =
+      static_cast<std::size_t>(micro_batches_.back().first + micro_batches_.back().batch.inputs.dim(0));
   for (std::size_t slot = first; slot < end; ++slot) data_.will_read(indices_[slot]);
 }
 
 // The numbers of sample i of step s do not depend on how the batch is cut.
-void Trainer::draw_noise(Lane& lane) const {
+void Trainer::draw_noise(MicroBatch& micro_batch) const {
   const RandomStream random(objective_->pace().seed, kNoiseStream);
   const auto numbers = static_cast<std::uint64_t>(objective_->noise());
   if (numbers == 0) return;
   std::uint64_t next =
-      (static_cast<std::uint64_t>(step()) * indices_.size() + static_cast<std::uint64_t>(lane.first)) *
+      (static_cast<std::uint64_t>(step()) * indices_.size() + static_cast<std::uint64_t>(micro_batch.first)) *
       numbers;
-  for (real& value : lane.batch.noise.values()) value = static_cast<real>(random.normal(next++));
+  for (real& value : micro_batch.batch.noise.values()) value = static_cast<real>(random.normal(next++));
 }
 
-// Forward, loss, backward of one lane, each term weighted by its share of the batch.
-void Trainer::run_lane(Lane& lane) const {
-  const std::vector<Parameter>& parameters = lane.objective->network().parameters();
+// Forward, loss, backward of one micro-batch, each term weighted by its share of the batch.
+void Trainer::run(MicroBatch& micro_batch) const {
+  const std::vector<Parameter>& parameters = micro_batch.objective->network().parameters();
   const kernels::WeightForms::Use use(*forms_);
-  fill(lane);
-  draw_noise(lane);
+  fill(micro_batch);
+  draw_noise(micro_batch);
   drop_gradients(parameters);
-  const Outcome outcome = (*lane.objective)(lane.batch);
-  const double share = static_cast<double>(lane.batch.inputs.dim(0)) / static_cast<double>(indices_.size());
-  lane.terms = values_of(outcome.loss, share);
-  lane.spreads.clear();
-  lane.spreads.pictures.add(outcome.picture.value());
-  lane.spreads.targets.add(lane.batch.targets);
+  const BatchOutput output = (*micro_batch.objective)(micro_batch.batch);
+  const double share =
+      static_cast<double>(micro_batch.batch.inputs.dim(0)) / static_cast<double>(indices_.size());
+  micro_batch.terms = values_of(output.loss, share);
+  micro_batch.variances.clear();
+  micro_batch.variances.pictures.add(output.picture.value());
+  micro_batch.variances.targets.add(micro_batch.batch.targets);
   std::size_t first = 0;
-  for (const Variable& mean : outcome.means.span()) {
-    lane.spreads.means.add(mean.value(), first);
+  for (const Variable& mean : output.means.span()) {
+    micro_batch.variances.means.add(mean.value(), first);
     first += static_cast<std::size_t>(mean.dim(1));
   }
-  if (std::isfinite(lane.terms.total)) return backward(scale(outcome.loss.total, static_cast<real>(share)));
-  lane.trouble = where_not_finite(outcome.loss.total, parameters);
+  if (std::isfinite(micro_batch.terms.total))
+    return backward(scale(output.loss.total, static_cast<real>(share)));
+  micro_batch.trouble = where_not_finite(output.loss.total, parameters);
 }
 
 void Trainer::batch_of(std::int64_t step, std::span<std::uint32_t> out) const {
@@ -151,43 +158,43 @@ StepReport Trainer::train_step(const std::function<bool()>& stop) {
   batch_of(step(), indices_);
   forms_->forget();  // Adam has written the weights since, or restore()
 #pragma omp parallel for schedule(static, 1)
-  for (std::size_t i = 0; i < lanes_.size(); ++i) {
+  for (std::size_t i = 0; i < micro_batches_.size(); ++i) {
     try {
-      run_lane(lanes_[i]);
+      run(micro_batches_[i]);
     } catch (...) {  // an exception must not leave a thread
-      lanes_[i].error = std::current_exception();
+      micro_batches_[i].error = std::current_exception();
     }
   }
   StepReport report;
   report.step = step() + 1;
   report.learning_rate = state_.learning_rate();
-  for (Lane& lane : lanes_) {
-    if (lane.error) std::rethrow_exception(std::exchange(lane.error, nullptr));
+  for (MicroBatch& micro_batch : micro_batches_) {
+    if (micro_batch.error) std::rethrow_exception(std::exchange(micro_batch.error, nullptr));
   }
   report.stop = stop && stop();
   add_up(report);
   check_finite(report);
   look_for_collapse(report);
-  report.gradient_norm = state_.apply(lane_parameters_, ranks_);
+  report.gradient_norm = state_.apply(micro_batch_parameters_, ranks_);
   if (step() % kStepsPerComparison == 0) check_same();
   return report;
 }
 
-// Of lanes, then of processes, as balanced binary trees.
+// Of micro-batches, then of processes, as balanced binary trees.
 void Trainer::add_up(StepReport& report) {
-  for (std::size_t apart = 1; apart < lanes_.size(); apart *= 2) {
-    for (std::size_t lane = 0; lane + apart < lanes_.size(); lane += 2 * apart) {
-      lanes_[lane].terms.add(lanes_[lane + apart].terms);
-      lanes_[lane].spreads.add(lanes_[lane + apart].spreads);
+  for (std::size_t apart = 1; apart < micro_batches_.size(); apart *= 2) {
+    for (std::size_t micro_batch = 0; micro_batch + apart < micro_batches_.size(); micro_batch += 2 * apart) {
+      micro_batches_[micro_batch].terms.add(micro_batches_[micro_batch + apart].terms);
+      micro_batches_[micro_batch].variances.add(micro_batches_[micro_batch + apart].variances);
     }
   }
-  Lane& sum = lanes_.front();
+  MicroBatch& sum = micro_batches_.front();
   if (ranks_.size() > 1) {
     const auto each = [&](const std::function<void(double&)>& use) {
       LossTerms& t = sum.terms;
       for (double* term : {&t.total, &t.reconstruction, &t.kld, &t.l2, &t.ssim}) use(*term);
-      for (Spread* spread : sum.spreads.all())
-        for (double& value : spread->values()) use(value);
+      for (BatchVariance* variance : sum.variances.all())
+        for (double& value : variance->values()) use(value);
     };
     statistics_.assign(1, report.stop ? 1 : 0);
     each([&](double& value) { statistics_.push_back(value); });
@@ -203,8 +210,8 @@ void Trainer::add_up(StepReport& report) {
 void Trainer::check_finite(const LossTerms& t) const {
   if (std::isfinite(t.total)) return;
   std::string where;
-  for (const Lane& lane : lanes_) {
-    if (where.empty()) where = lane.trouble;
+  for (const MicroBatch& micro_batch : micro_batches_) {
+    if (where.empty()) where = micro_batch.trouble;
   }
   for (const std::string& its : ranks_.gather(where)) {
     where = its;
@@ -218,12 +225,12 @@ void Trainer::check_finite(const LossTerms& t) const {
 }
 
 void Trainer::look_for_collapse(StepReport& report) {
-  const Spreads& spreads = lanes_.front().spreads;
+  const Variances& variances = micro_batches_.front().variances;
   if (indices_.size() < 2) return;  // nothing to compare with
   const auto samples = static_cast<double>(indices_.size());
-  report.active_latents = active_latents(spreads.means, samples);
+  report.active_latents = active_latents(variances.means, samples);
   const bool idle = objective_->latents() > 0 && report.active_latents == 0;
-  report.collapsed = state_.collapsed(idle || senseless(spreads.pictures, spreads.targets, samples));
+  report.collapsed = state_.collapsed(idle || is_degenerate(variances.pictures, variances.targets, samples));
 }
 
 // What a saved state must agree in, besides the caller's own metadata.

@@ -5,10 +5,11 @@
 //
 // Every random choice is a function of (seed, step), so that a restored trainer continues to the same bits.
 //
-// A batch is cut into lanes, at most eight, whatever the number of threads. Each lane runs the whole forward
-// and backward pass on its share, on one thread, with gradients of its own; these are added as a balanced
-// binary tree. So threads meet once per step, and which of them ran a lane changes no bit. Several processes
-// share the lanes (models/training/ranks.h), each a subtree, and go on to the same bits as one.
+// A batch is cut into micro-batches, at most eight, whatever the number of threads. Each micro-batch runs the
+// whole forward and backward pass on its share, on one thread, with gradients of its own; these are added as
+// a balanced binary tree. So threads meet once per step, and which of them ran a micro-batch changes no bit.
+// Several processes share the micro-batches (models/training/ranks.h), each a subtree, and go on to the same
+// bits as one.
 #pragma once
 
 #include <array>
@@ -50,8 +51,8 @@ struct StepReport : LossTerms {
 class Trainer {
  public:
   /// `examples` must outlive the trainer. Throws std::invalid_argument for examples of another format than
-  /// the network's, no training example, or as check_lanes(). `ranks` train together: all of them call
-  /// train_step() and save().
+  /// the network's, no training example, or as check_micro-batches(). `ranks` train together: all of them
+  /// call train_step() and save().
   Trainer(const Examples& examples, std::vector<std::uint32_t> train, std::unique_ptr<Objective> objective,
           Ranks& ranks = one_process());
   /// With window_objective() and frame_objective(); throw as these.
@@ -91,26 +92,26 @@ class Trainer {
   void restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata);
 
  private:
-  struct Spreads {
-    Spread pictures, targets, means;
-    std::array<Spread*, 3> all() { return {&pictures, &targets, &means}; }
+  struct Variances {
+    BatchVariance pictures, targets, means;
+    std::array<BatchVariance*, 3> all() { return {&pictures, &targets, &means}; }
     void clear();
-    void add(const Spreads& other);
+    void add(const Variances& other);
   };
-  struct Lane {
-    Lane(const Objective& master, Dim first, Dim count);
+  struct MicroBatch {
+    MicroBatch(const Objective& master, Dim first, Dim count);
     Dim first;                             // its share of the batch: samples first .. first + inputs.dim(0)
     std::unique_ptr<Objective> objective;  // the master's values under gradients of its own
     Batch batch;
     LossTerms terms;
-    Spreads spreads;
+    Variances variances;
     std::string trouble;  // where the loss stopped to be finite
     std::exception_ptr error;
   };
-  void run_lane(Lane& lane) const;
-  void fill(Lane& lane) const;
+  void run(MicroBatch& micro_batch) const;
+  void fill(MicroBatch& micro_batch) const;
   void announce_next();
-  void draw_noise(Lane& lane) const;
+  void draw_noise(MicroBatch& micro_batch) const;
   void add_up(StepReport& report);
   void look_for_collapse(StepReport& report);
   void check_finite(const LossTerms& terms) const;
@@ -124,10 +125,10 @@ class Trainer {
   TrainingState state_;
   Ranks& ranks_;
   std::vector<double> statistics_, of_partner_;
-  std::vector<std::uint32_t> indices_;                          // of the batch
-  std::vector<Lane> lanes_;                                     // of this process
-  std::vector<const std::vector<Parameter>*> lane_parameters_;  // of these models
-  std::unique_ptr<kernels::WeightForms> forms_;                 // of the weights that all lanes share
+  std::vector<std::uint32_t> indices_;                                 // of the batch
+  std::vector<MicroBatch> micro_batches_;                              // of this process
+  std::vector<const std::vector<Parameter>*> micro_batch_parameters_;  // of these models
+  std::unique_ptr<kernels::WeightForms> forms_;  // of the weights that all micro-batches share
 };
 
 }  // namespace supertac

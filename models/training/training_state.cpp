@@ -73,17 +73,17 @@ void TrainingState::add_up_over(Ranks& ranks) {
   }
 }
 
-double TrainingState::apply(const std::vector<const std::vector<Parameter>*>& lanes, Ranks& ranks) {
+double TrainingState::apply(const std::vector<const std::vector<Parameter>*>& micro_batches, Ranks& ranks) {
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t i = 0; i < parameters_.size(); ++i) {
-    std::array<const real*, kMostLanes> parts;
-    for (std::size_t lane = 0; lane < lanes.size(); ++lane)
-      parts[lane] = (*lanes[lane])[i].value.grad().data();
+    std::array<const real*, kMostMicroBatches> parts;
+    for (std::size_t micro_batch = 0; micro_batch < micro_batches.size(); ++micro_batch)
+      parts[micro_batch] = (*micro_batches[micro_batch])[i].value.grad().data();
     Tensor& sum = Variable(parameters_[i].value).mutable_grad();
     if (parts[0] == nullptr) {  // the loss does not depend on it
       sum.fill(0);
     } else {
-      kernels::add_as_tree(sum.size(), std::span(parts).first(lanes.size()), sum.data());
+      kernels::add_as_tree(sum.size(), std::span(parts).first(micro_batches.size()), sum.data());
     }
   }
   if (ranks.size() > 1) add_up_over(ranks);
@@ -152,9 +152,9 @@ void TrainingState::restore(const std::string& path, const std::map<std::string,
   flat_steps_ = static_cast<int>(flat_steps);
 }
 
-void share_values(const std::vector<Parameter>& master, const std::vector<Parameter>& lane) {
+void share_values(const std::vector<Parameter>& master, const std::vector<Parameter>& micro_batch) {
   for (std::size_t i = 0; i < master.size(); ++i) {
-    Variable own = lane[i].value;
+    Variable own = micro_batch[i].value;
     own.mutable_value() = master[i].value.value();  // the same buffer
   }
 }

@@ -31,7 +31,7 @@ struct TrainingPace {
   void check() const;
 };
 
-inline constexpr std::size_t kMostLanes = 8;  ///< that a batch is cut into (models/training/trainer.h)
+inline constexpr std::size_t kMostMicroBatches = 8;  ///< that a batch is cut into (models/training/trainer.h)
 
 /// A value was not finite: step, where, and what to do are in what().
 class TrainingStopped : public std::runtime_error {
@@ -53,10 +53,10 @@ class TrainingState {
   /// chance to learn by then. True from the 100th on.
   bool collapsed(bool looks_so);
 
-  /// Sets the gradients to the sum of the lanes', which is taken as a balanced binary tree (pairs of
+  /// Sets the gradients to the sum of the micro-batches', which is taken as a balanced binary tree (pairs of
   /// neighbours, then pairs of pairs), then over `ranks`; applies Adam; counts the step. Returns the
   /// gradient's norm before clipping. Throws TrainingStopped, with nothing changed, when it is not finite.
-  double apply(const std::vector<const std::vector<Parameter>*>& lanes, Ranks& ranks);
+  double apply(const std::vector<const std::vector<Parameter>*>& micro_batches, Ranks& ranks);
   /// Throws TrainingStopped: step, `what`, and advice.
   [[noreturn]] void stop(const std::string& what) const;
 
@@ -81,8 +81,8 @@ class TrainingState {
   std::vector<real> sum_, of_partner_;  // all gradients in one piece, of several processes
 };
 
-/// Makes a lane's parameters share the master's values under gradients of their own.
-void share_values(const std::vector<Parameter>& master, const std::vector<Parameter>& lane);
+/// Makes a micro-batch's parameters share the master's values under gradients of their own.
+void share_values(const std::vector<Parameter>& master, const std::vector<Parameter>& micro_batch);
 /// So that backward() sets the gradients instead of adding to them.
 void drop_gradients(const std::vector<Parameter>& parameters);
 

@@ -42,7 +42,7 @@ long threads() {
 
 ModelFile model_of(const std::string& preset) {
   SuperTacSettings settings = SuperTacSettings::of_preset(preset);
-  settings.spread = true;
+  settings.predicted_error = true;
   Rng rng(1);
   ModelFile file;
   file.model = std::make_unique<SuperTac>(settings, rng);
@@ -95,7 +95,7 @@ TEST(LivePathOfTwo, TakesNoHeapEither) {
   const Tensor window = Tensor::full(both.first().input_shape(1), 0.4F);
   for (int warm = 0; warm < 10; ++warm) both.estimate(window);
   const long before = allocations::made;
-  for (int n = 0; n < 50; ++n) EXPECT_TRUE(both.estimate(window).spread.defined());
+  for (int n = 0; n < 50; ++n) EXPECT_TRUE(both.estimate(window).predicted_error.defined());
   EXPECT_EQ(allocations::made, before);
 }
 

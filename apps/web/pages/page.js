@@ -189,8 +189,8 @@ function onHello(hello) {
   element("drawn-size").textContent =
     `${hello.rows * hello.scale} × ${hello.columns * hello.scale} pixels of ${hello.pitch_mm / hello.scale} mm`;
   for (const id of ["texture-name", "texture"]) element(id).hidden = !hello.names_textures;
-  element("guess-line").hidden = !hello.has_spread;
-  element("sure").hidden = !hello.has_spread;
+  element("guess-line").hidden = !hello.predicts_error;
+  element("sure").hidden = !hello.predicts_error;
   for (const id of ["felt", "drawn"]) element(id).style.aspectRatio = `${hello.columns} / ${hello.rows}`;
 }
 

@@ -63,7 +63,7 @@ void write_case(const TemporaryFolder& folder, const std::string& name, const Mo
     return out;
   };
   std::vector<TensorToWrite> tensors = {array("volts", volts), array("picture", drawn.picture)};
-  if (drawn.spread.defined()) tensors.push_back(array("spread", drawn.spread));
+  if (drawn.predicted_error.defined()) tensors.push_back(array("predicted_error", drawn.predicted_error));
   write_safetensors(folder.file(name + ".safetensors"), {}, tensors);
   write_file(folder.file(name + ".onnx"), onnx_of(file));
 }

@@ -46,7 +46,9 @@ TEST(Ensemble, AddsTheVarianceOfItsMembersToTheirSpread) {
     Rng rng(m + 1);
     save_model(
         paths[m],
-        SuperTac({.timesteps = 32, .latent = 2, .scale = 2, .channels = 8, .rcabs = 1, .spread = true}, rng),
+        SuperTac(
+            {.timesteps = 32, .latent = 2, .scale = 2, .channels = 8, .rcabs = 1, .predicted_error = true},
+            rng),
         {}, {});
   }
   const std::vector<ModelFile> files = load_models(paths);
@@ -56,8 +58,9 @@ TEST(Ensemble, AddsTheVarianceOfItsMembersToTheirSpread) {
   const Estimate both = ensemble_of(files).estimate(windows);
   for (std::size_t i = 0; i < a.picture.values().size(); ++i) {
     const double half = (a.picture.values()[i] - b.picture.values()[i]) / 2;
-    const double squares = (std::pow(a.spread.values()[i], 2) + std::pow(b.spread.values()[i], 2)) / 2;
-    EXPECT_NEAR(both.spread.values()[i], std::sqrt(squares + half * half), 1e-5);
+    const double squares =
+        (std::pow(a.predicted_error.values()[i], 2) + std::pow(b.predicted_error.values()[i], 2)) / 2;
+    EXPECT_NEAR(both.predicted_error.values()[i], std::sqrt(squares + half * half), 1e-5);
     EXPECT_FLOAT_EQ(both.picture.values()[i], (a.picture.values()[i] + b.picture.values()[i]) / 2);
   }
 }
@@ -84,7 +87,7 @@ TEST(Ensemble, SaysWhichModelsDoNotBelongTogether) {
   save_model(slow, small_model(1), slower, {});
   SuperTacSettings settings = small_model(1).settings();
   Rng rng(1);
-  settings.spread = true;
+  settings.predicted_error = true;
   save_model(unsure, SuperTac(settings, rng), {}, {});
   settings = small_model(1).settings(), settings.scale = 4;
   save_model(fine, SuperTac(settings, rng), {}, {});

@@ -18,7 +18,8 @@ std::vector<float> stripes(float height) {
 
 TEST(Doubt, OfAFlatPictureIsTheErrorsShare) {
   EXPECT_NEAR(doubt_of(all(0.3F), all(0.1F), kGrid), 0.01 / (0.01 + 0.005), 1e-6);
-  EXPECT_NEAR(doubt_of(all(0.3F), all(0), kGrid), 1e-4 / (1e-4 + 0.005), 1e-6) << "no spread is below .01";
+  EXPECT_NEAR(doubt_of(all(0.3F), all(0), kGrid), 1e-4 / (1e-4 + 0.005), 1e-6)
+      << "no predicted_error is below .01";
 }
 
 // Seven lines of stripes 0 and h: variance h^2 12 / 49.
@@ -33,15 +34,15 @@ TEST(Doubt, AnErrorSpoilsAFaintTextureSooner) {
 
 // A wrong corner counts in the squares that hold it.
 TEST(Doubt, OfOneBadPixelIsThatOfItsSquares) {
-  std::vector<float> spread = all(0);
-  spread[0] = 0.7F;
+  std::vector<float> predicted_error = all(0);
+  predicted_error[0] = 0.7F;
   const double usual = 1e-4 / (1e-4 + 0.005), here = (0.49 + 48e-4) / 49 / ((0.49 + 48e-4) / 49 + 0.005);
-  EXPECT_NEAR(doubt_of(all(0), spread, kGrid), (99 * usual + here) / 100, 1e-6);
+  EXPECT_NEAR(doubt_of(all(0), predicted_error, kGrid), (99 * usual + here) / 100, 1e-6);
 }
 
 TEST(Doubt, OfPicturesSmallerThanASquare) {
-  const std::vector<float> four(16, 0.5F), spread(16, 0.1F);
-  EXPECT_NEAR(doubt_of(four, spread, {.height = 4, .width = 4, .pixel_mm = 1}), 0.01 / 0.015, 1e-6);
+  const std::vector<float> four(16, 0.5F), predicted_error(16, 0.1F);
+  EXPECT_NEAR(doubt_of(four, predicted_error, {.height = 4, .width = 4, .pixel_mm = 1}), 0.01 / 0.015, 1e-6);
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ void expect_same_estimate(const Network& network, Dim count, const std::string& 
   const Tensor inputs = uniform(network.input_shape(count), 7);
   const Estimate forward = network.estimate(inputs), prepared = Prepared(network).estimate(inputs);
   expect_close(forward.picture, prepared.picture, what + " picture");
-  expect_close(forward.spread, prepared.spread, what + " spread");
+  expect_close(forward.predicted_error, prepared.predicted_error, what + " predicted_error");
   expect_close(forward.latents, prepared.latents, what + " latents");
 }
 
@@ -57,7 +57,7 @@ SuperTacSettings random_settings(std::uint64_t seed) {
   s.channels = one_of({4, 8, 12, 16, 20, 32});
   s.rcabs = one_of({0, 1, 2});
   s.grouping = one_of({0, 1}) == 0 ? Grouping::horizontal : Grouping::vertical;
-  s.spread = one_of({0, 1}) == 0;
+  s.predicted_error = one_of({0, 1}) == 0;
   return s;
 }
 
@@ -153,7 +153,8 @@ TEST(Prepared, OfAnyCacheHasTheSameBits) {
       const Estimate found = plan->run(windows);
       EXPECT_TRUE(std::ranges::equal(expected.picture.values(), found.picture.values()))
           << megabytes << " MB";
-      EXPECT_TRUE(std::ranges::equal(expected.spread.values(), found.spread.values())) << megabytes << " MB";
+      EXPECT_TRUE(std::ranges::equal(expected.predicted_error.values(), found.predicted_error.values()))
+          << megabytes << " MB";
     }
   }
   EXPECT_EQ(seen.size(), 2U);

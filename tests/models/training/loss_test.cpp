@@ -27,7 +27,7 @@ TEST(SuperTacLoss, IsTheConvexCombinationOfItsTerms) {
   EXPECT_NEAR(loss.total.item(), expected, 1e-6);
 }
 
-// The spread is drawn towards the picture's error, and the picture does not notice.
+// The predicted error is drawn towards the picture's error, and the picture does not notice.
 // One of two pictures has a truth to compare structure with; of the other only the squared error counts.
 TEST(PictureLoss, TheSsimOfAFlatTruthCountsAsOne) {
   const Variable picture(uniform({2, 16, 16, 1}, 1), true);
@@ -49,7 +49,7 @@ TEST(PictureLoss, TheSsimOfAFlatTruthCountsAsOne) {
 
 TEST(SuperTacLoss, TheSpreadLearnsTheError) {
   SuperTacSettings settings = small_settings();
-  settings.spread = true;
+  settings.predicted_error = true;
   Rng rng(1);
   const SuperTac model(settings, rng);
   const SuperTac::Output output = model.forward(uniform({2, 32, 16}, 1), normal_eps(2, 3, 2));
@@ -58,14 +58,15 @@ TEST(SuperTacLoss, TheSpreadLearnsTheError) {
   double expected = 0;
   for (std::size_t i = 0; i < truth.values().size(); ++i) {
     const double error = std::abs(output.image.value().values()[i] - truth.values()[i]);
-    expected += std::pow(output.spread.value().values()[i] - error, 2) / 128;
+    expected += std::pow(output.predicted_error.value().values()[i] - error, 2) / 128;
   }
-  EXPECT_NEAR(loss.spread.item(), expected, 1e-6);
+  EXPECT_NEAR(loss.predicted_error.item(), expected, 1e-6);
   EXPECT_NEAR(loss.total.item(),
               0.2 * (loss.reconstruction.item() + 1e-3 * loss.kld.item()) +
-                  0.8 * (loss.l2.item() + 0.1 * (1 - loss.ssim.item()) + kSpreadWeight * loss.spread.item()),
+                  0.8 * (loss.l2.item() + 0.1 * (1 - loss.ssim.item()) +
+                         kPredictedErrorWeight * loss.predicted_error.item()),
               1e-6);
-  backward(loss.spread);
+  backward(loss.predicted_error);
   for (const Parameter& p : model.parameters()) {
     const bool of_picture = p.name.starts_with("upsampler.out");
     const bool moved = p.value.grad().defined() &&

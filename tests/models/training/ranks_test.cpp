@@ -36,20 +36,20 @@ TEST(Ranks, AddUpAsABalancedTree) {
 }
 
 TEST(Ranks, OnlyNumbersThatShareEightLanesAreTaken) {
-  for (const int ranks : {1, 2, 4, 8}) EXPECT_NO_THROW(check_lanes(ranks, 8));
-  EXPECT_NO_THROW(check_lanes(1, 3));
+  for (const int ranks : {1, 2, 4, 8}) EXPECT_NO_THROW(check_micro_batches(ranks, 8));
+  EXPECT_NO_THROW(check_micro_batches(1, 3));
   for (const int ranks : {3, 5, 6, 7, 9, 16}) {
     try {
-      check_lanes(ranks, 64);
+      check_micro_batches(ranks, 64);
       FAIL() << ranks;
     } catch (const std::invalid_argument& error) {
       EXPECT_EQ(error.what(),
                 std::to_string(ranks) +
-                    " processes cannot share the eight lanes of a batch evenly; start 1, 2, 4 or "
+                    " processes cannot share the eight micro-batches of a batch evenly; start 1, 2, 4 or "
                     "8, or train several models at once with supertac-sweep");
     }
   }
-  EXPECT_THROW(check_lanes(2, 7), std::invalid_argument);
+  EXPECT_THROW(check_micro_batches(2, 7), std::invalid_argument);
 }
 
 TEST(Ranks, TheMajoritySaysWhoDisagrees) {
@@ -75,7 +75,7 @@ class RanksTrain : public testing::Test {
  protected:
   RanksTrain() {
     settings_.augment = {.gain = 0.5, .noise = 0.02};
-    settings_.batch = 12;  // lanes of one and of two samples
+    settings_.batch = 12;  // micro-batches of one and of two samples
   }
   Trainer trainer(Ranks& ranks) const {
     return {windows_, all_of(windows_), window_objective(windows_, settings_), ranks};
