@@ -6,7 +6,6 @@
 #include "apps/common/running/launch.h"
 #include "apps/sweep/chart.h"
 #include "apps/sweep/front.h"
-#include "apps/sweep/shards.h"
 #include "apps/sweep/sweep.h"
 #include "apps/train/training_options.h"
 #include "io/files/file.h"
@@ -21,10 +20,8 @@ void declare(Arguments& a) {
   a.option("data", "DIR", "recordings to train and test on; without it only the table in --out is read");
   a.option("pick", "CONDITIONS",
            "name the fastest model for which they hold, e.g. \"ssim>=0.8,position_mm<=0.5\"");
-  a.option("merge", "DIR,...", "make --out the sweep whose shards these folders are");
   a.only_with("data");
   declare_grid(a);
-  declare_shards(a);
   declare_training(a);
   declare_window_training(a);
   declare_measuring(a.more());
@@ -35,17 +32,13 @@ int run(Arguments& a) {
   const std::string out = a.text("out");
   const std::vector<Condition> conditions =
       a.given("pick") ? conditions_of(a.text("pick")) : std::vector<Condition>{};
-  if (a.given("merge")) {
-    if (a.given("data")) throw UsageError("expected --data DIR or --merge DIR,..., found both");
-    merge_shards(a.list("merge"), out);
-  }
   if (!a.given("data") && !fs::exists(out + "/sweep.csv"))
     throw UsageError("--data is needed: there is no " + out + "/sweep.csv to read");
   make_directories(out);
   SweepTable table(out + "/sweep.csv");
   if (table.dropped_a_cut_line()) a.note(out + "/sweep.csv: the last line was cut off and is left out");
   if (a.given("data")) {
-    const std::vector<GridPoint> grid = shard_of(a, grid_of(a));
+    const std::vector<Recipe> grid = grid_of(a);
     Sweep(a, table).run(grid);
   }
   const FolderLock alone = lock_within(kLongestWriting, out);

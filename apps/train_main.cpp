@@ -5,7 +5,7 @@
 #include "apps/ranks/together.h"
 #include "apps/train/training_options.h"
 #include "apps/train/training_run.h"
-#include "data/windows/signal_remarks.h"
+#include "data/recordings/recording.h"
 #include "io/files/file.h"
 
 namespace supertac {
@@ -30,14 +30,13 @@ void declare(Arguments& a) {
 
 namespace {
 
-// `remarks` and `about` are for a training that has begun: what ends it before says one line only.
-int train(const Arguments& a, TrainingTask task, const std::vector<std::string>& remarks,
-          const std::string& about, Ranks& ranks) {
-  const std::string out = a.text("out");
+int train(const Arguments& a, TrainingTask task, Ranks& ranks) {
+  const std::string out = a.text("out"), about = task.counts;
+  const std::vector<std::string> remarks = task.remarks;
   if (a.flag("strict")) remark(a, remarks);
   TrainingRun training(a, std::move(task),
                        {.out = out, .force = a.force(), .resume = a.text("resume"), .ranks = ranks});
-  a.note(about);
+  a.note(about);  // what ends a training before it has begun says one line only
   remark(a, remarks);
   const bool done = training.train();
   const Trainer& trainer = training.trainer();
@@ -56,34 +55,31 @@ int train(const Arguments& a, TrainingTask task, const std::vector<std::string>&
   return kExitOk;
 }
 
+TrainingTask pairs_of(const Arguments& a) {
+  PairSet pairs = PairSet::read(a.text("pairs"));
+  add_parent_file("pairs", a.text("pairs"));
+  const std::string split = a.given("split")  ? a.choice("split", {"group", "pair", "none"})
+                            : pairs.grouped() ? "group"
+                                              : "pair";
+  return pair_task(frame_recipe_of(a), std::move(pairs), split);
+}
+
+TrainingTask windows_of(const Arguments& a, const Recipe& recipe) {
+  TrainingTask task = window_task(recipe, folders_of(a));
+  add_parent("recordings", hash_of_recordings(a.text("data"), recipe.plates));
+  if (a.given("also")) add_parent("also", hash_of_recordings(a.text("also"), {}));
+  return task;
+}
+
 int train(const Arguments& a, Ranks& ranks) {
   try {
     check_micro_batches(ranks.size(), 8);
   } catch (const std::invalid_argument& error) {
     throw UsageError(error.what());
   }
-  if (a.given("pairs")) {
-    refuse_existing(a.text("out"), a.force());
-    PairSet pairs = PairSet::read(a.text("pairs"));
-    add_parent_file("pairs", a.text("pairs"));
-    TrainingTask task = pair_task(a, pairs);
-    return train(a, std::move(task), remarks_on(pairs), std::to_string(pairs.size()) + " pairs", ranks);
-  }
-  TrainingSettings settings = network_settings(a);
-  training_split(a);
+  const Recipe recipe = a.given("pairs") ? Recipe() : recipe_of(a);
   refuse_existing(a.text("out"), a.force());
-  const WindowSet windows = training_windows(a, settings.model, settings.seed);
-  const auto add_folder = [&](const char* role, const std::string& folder,
-                              const std::vector<std::string>& plates) {
-    const auto known = windows.content(folder);
-    add_parent(role, known ? *known : hash_of_recordings(folder, plates));
-  };
-  add_folder("recordings", a.text("data"), a.list("plates"));
-  if (a.given("also")) add_folder("also", a.text("also"), {});
-  set_array(settings.model, windows.array());
-  TrainingTask task = window_task(a, windows, settings);
-  const std::vector<std::string> remarks = remarks_on(windows, task.split.train);
-  return train(a, std::move(task), remarks, windows.counts().summary(), ranks);
+  return train(a, a.given("pairs") ? pairs_of(a) : windows_of(a, recipe), ranks);
 }
 
 }  // namespace

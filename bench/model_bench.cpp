@@ -34,12 +34,12 @@ BENCHMARK(inference)->ArgName("batch")->Arg(1)->Arg(8)->Arg(64)->UseManualTime()
 // Windows, augmentation, forward, loss, backward, Adam.
 void training_step(benchmark::State& state) {
   omp_set_num_threads(static_cast<int>(state.range(0)));
-  TrainingSettings settings;
+  Recipe settings;
   settings.model = kPaper;
   settings.epochs = 100'000;
   settings.augment = kStandardAugmentation;
   const WindowSet windows = bench::sliding_bumps(kPaper);
-  Trainer trainer(windows, bench::all_of(windows), settings);
+  Trainer trainer(windows, bench::all_of(windows), window_objective(windows, settings));
   for (int i = 0; i < 3; ++i) trainer.train_step();
   const long before = allocations::made;
   for (auto _ : state) trainer.train_step();

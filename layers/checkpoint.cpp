@@ -104,7 +104,8 @@ SafetensorsFile read_checkpoint(const std::string& path) {
 }
 
 void load_parameters(const SafetensorsFile& file, const std::string& path,
-                     const std::vector<Parameter>& parameters) {
+                     const std::vector<Parameter>& parameters,
+                     std::initializer_list<std::string_view> beside) {
   std::vector<std::string> problems;
   std::set<std::string> known;
   for (const Parameter& p : parameters) {
@@ -113,9 +114,9 @@ void load_parameters(const SafetensorsFile& file, const std::string& path,
       problems.push_back(std::move(problem));
   }
   for (const auto& [name, info] : file.tensors()) {
-    const bool beside =
-        name.starts_with("optimizer.") || name.starts_with("novelty.") || name.starts_with("int8.");
-    if (!known.contains(name) && !beside) problems.push_back("unexpected " + name);
+    const auto begins = [&](std::string_view prefix) { return name.starts_with(prefix); };
+    if (!known.contains(name) && std::ranges::none_of(beside, begins))
+      problems.push_back("unexpected " + name);
   }
   if (!problems.empty()) {
     std::string message = path + ": the tensors do not fit the model that its metadata describes: ";

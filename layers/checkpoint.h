@@ -1,8 +1,10 @@
 // Parameters in safetensors files, in PyTorch's layouts and order of axes.
 #pragma once
 
+#include <initializer_list>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/files/safetensors.h"
@@ -33,12 +35,12 @@ void write_checkpoint(const std::string& path, const std::vector<Parameter>& par
 /// Reads and checks format and version. Throws std::runtime_error naming path, expected and found.
 SafetensorsFile read_checkpoint(const std::string& path);
 
-/// Fills the parameters from the file. Names that begin with "optimizer.", "novelty." or "int8." may be there
-/// besides.
+/// Fills the parameters from the file. Tensors whose names begin with one of `beside` may be there too.
 /// Throws std::runtime_error that lists every missing, unexpected and mismatching tensor at once; then
 /// nothing has been changed.
 void load_parameters(const SafetensorsFile& file, const std::string& path,
-                     const std::vector<Parameter>& parameters);
+                     const std::vector<Parameter>& parameters,
+                     std::initializer_list<std::string_view> beside = {});
 
 /// Reads one array stored by to_stored() for that parameter into a tensor in the memory layout.
 /// Throws std::runtime_error when it is missing or of another shape or type.

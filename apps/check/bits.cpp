@@ -36,7 +36,7 @@ Bits bits_here() {
   WindowSet windows(
       {.timesteps = 32, .scale = 4, .rate_hz = 100, .scaling = {.levelled = true}, .stride = 4});
   windows.add(pass, ".");
-  TrainingSettings settings;
+  Recipe settings;
   settings.model = SuperTacSettings::of_preset("tiny");
   settings.model.timesteps = 32;
   settings.epochs = 100;
@@ -44,7 +44,7 @@ Bits bits_here() {
   settings.augment = kStandardAugmentation;
   std::vector<std::uint32_t> all(windows.size());
   for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-  Trainer trainer(windows, all, settings);
+  Trainer trainer(windows, all, window_objective(windows, settings));
   for (int step = 0; step < 10; ++step) trainer.train_step();
   Sha256 training;
   trainer.for_each_tensor([&](const std::string&, std::span<const real> values) { add(training, values); });

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <filesystem>
 
-#include "apps/common/command_line/command_words.h"
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
@@ -12,7 +11,6 @@
 #include "apps/train/ledger_file.h"
 #include "apps/train/run_folder.h"
 #include "apps/train/training_options.h"
-#include "apps/train/training_task.h"
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
@@ -35,28 +33,8 @@ Json provenance_of(const std::string& path) {
   return parse_json_limited(found->second);
 }
 
-// supertac-train's command line as the model has it, with the data as given now.
-Arguments training_arguments(const Arguments& a, const Json& provenance) {
-  Arguments t("supertac-train", "");
-  t.option("data", "DIR", "");
-  t.required("out", "FILE", "");
-  t.option("seed", "N", "", "0");
-  declare_training(t);
-  declare_network(t);
-  std::vector<std::string> words = command_words(provenance.at("command").get<std::string>());
-  if (words.empty() || words.front() != "supertac-train")
-    throw FileError(a.text("FILE"), "was not made by supertac-train");
-  words.insert(words.end(),
-               {"--data", a.text("data"), "--out", a.text("FILE"), "--seed", provenance.value("seed", "0")});
-  if (a.given("also")) words.insert(words.end(), {"--also", a.text("also")});
-  std::vector<const char*> pointers;
-  for (const std::string& word : words) pointers.push_back(word.c_str());
-  t.parse(static_cast<int>(pointers.size()), pointers.data());
-  return t;
-}
-
-void check_recordings(const Arguments& a, const Arguments& t, const Json& provenance) {
-  const std::string found = hash_of_recordings(a.text("data"), t.list("plates"));
+void check_recordings(const Arguments& a, const Recipe& recipe, const Json& provenance) {
+  const std::string found = hash_of_recordings(a.text("data"), recipe.plates);
   const std::string expected = provenance.at("parents").value("recordings", "");
   if (found != expected)
     throw FileError(a.text("data"),
@@ -148,14 +126,11 @@ bool is_of(const std::string& model, const Network& network) {
 int check_training(const Arguments& a) {
   const std::string model = a.text("FILE"), folder = RunFolder::folder_of(model);
   const Json provenance = provenance_of(model);
-  const Arguments t = training_arguments(a, provenance);
+  const Recipe recipe = Recipe::of(load_model(model), model);
   const Ledger ledger = Ledger::read(LedgerFile::path_in(folder));
-  check_recordings(a, t, provenance);
-  TrainingSettings settings = network_settings(t);
-  const WindowSet windows = training_windows(t, settings.model, settings.seed);
-  set_array(settings.model, windows.array());
-  TrainingTask task = window_task(t, windows, settings);
-  Trainer trainer(task.examples, task.split.train, std::move(task.objective));
+  check_recordings(a, recipe, provenance);
+  TrainingTask task = window_task(recipe, folders_of(a));
+  Trainer trainer(*task.examples, task.split.train, std::move(task.objective));
   const std::vector<Segment> all = segments_of(folder, ledger, trainer.total_steps());
   const std::vector<Segment> chosen =
       drawn(all, static_cast<std::size_t>(a.integer("segments", 1, 1000)), a.seed());

@@ -74,38 +74,17 @@ std::string by_zone(const nlohmann::ordered_json& result) {
                       page_table({"zone", "windows", "SSIM", "PSNR dB", "ghosts %", "misses %"}, rows));
 }
 
-// Bars on an axis from 0 to 1, which is as far as SSIM goes.
 std::string by_way(const nlohmann::ordered_json& felt) {
-  constexpr double kLeft = 40, kTop = 10, kHeight = 150, kStep = 90, kBar = 64;
-  const auto text = [](double x, double y, const char* anchor, const std::string& words) {
-    return "<text x=\"" + format(x, 1) + "\" y=\"" + format(y, 1) + "\" text-anchor=\"" + anchor + "\">" +
-           words + "</text>";
-  };
-  std::string svg;
-  for (const double tick : {0.0, 0.25, 0.5, 0.75, 1.0}) {
-    const double y = kTop + kHeight * (1 - tick);
-    svg += "<path d=\"M" + format(kLeft, 1) + " " + format(y, 1) + "h560\" stroke=\"var(--line)\"/>" +
-           text(kLeft - 6, y + 4, "end", format(tick, 2));
-  }
-  double x = kLeft + 12;
-  for (std::size_t i = 0; i < felt.size(); ++i, x += kStep) {
-    const double ssim = std::clamp(felt[i]["ssim"].get<double>(), 0.0, 1.0), height = kHeight * ssim;
-    const std::string from = format(felt[i]["from_mm"].get<double>(), 0);
-    svg += "<rect x=\"" + format(x, 1) + "\" y=\"" + format(kTop + kHeight - height, 1) + "\" width=\"" +
-           format(kBar, 1) + "\" height=\"" + format(height, 1) + "\" fill=\"var(--accent)\"/>" +
-           text(x + kBar / 2, kTop + kHeight - height - 3, "middle", format(ssim, 3)) +
-           text(x + kBar / 2, kTop + kHeight + 15, "middle",
-                i + 1 < felt.size() ? from + " to " + format(felt[i + 1]["from_mm"].get<double>(), 0)
-                                    : from + " on") +
-           text(x + kBar / 2, kTop + kHeight + 29, "middle",
-                std::to_string(felt[i]["windows"].get<long>()) + " windows");
+  ChartSeries series{.name = "network", .points = {}, .dots = true};
+  for (const auto& part : felt) {
+    series.points.emplace_back(part["from_mm"].get<double>(), part["ssim"].get<double>());
+    series.labels.push_back(std::to_string(part["windows"].get<long>()) + " windows");
   }
   return page_section(
       "By way since the first contact",
-      "SSIM against millimetres slid over the texture; what it is cannot be known before two of its elements",
-      "<svg viewBox=\"0 0 610 196\" role=\"img\" aria-label=\"SSIM by millimetres since the first "
-      "contact\">" +
-          svg + "</svg>");
+      "what a texture is cannot be known before two of its elements; windows in contact from there on",
+      chart_svg("Contact SSIM", {.label = "slid over the texture, mm", .least = 0},
+                {.label = "SSIM", .most = 1}, {series}));
 }
 
 std::string png_of(std::span<const float> values, int rows, int columns) {

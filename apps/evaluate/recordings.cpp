@@ -54,11 +54,10 @@ struct RecordingScores {
   TrustScores trust;
 };
 
-RecordingScores score_all(const Arguments& a, std::span<const ModelFile> files, const WindowSet& windows,
-                          const TestSet& tested, const Baselines& baselines, OutputsFile* outputs,
-                          EvaluationPage* page) {
-  const Ensemble network = ensemble_of(files, precision_of(a.choice("precision", {"fp32", "int8"})));
-  RecordingScores scores(windows, files.front(), 1 + baselines.size());
+RecordingScores score_all(const Arguments& a, const Ensemble& network, const ModelFile& file,
+                          const WindowSet& windows, const TestSet& tested, const Baselines& baselines,
+                          OutputsFile* outputs, EvaluationPage* page) {
+  RecordingScores scores(windows, file, 1 + baselines.size());
   draw_all(a, network, windows, tested.split.test, baselines, [&](const Drawn& d) {
     const Zone zone = windows.zone(d.example);
     for (std::size_t m = 0; m < d.pictures.size(); ++m)
@@ -156,8 +155,8 @@ int evaluate_on_recordings(const Arguments& a) {
   const Baselines baselines = fit_baselines(windows, tested.split.train);
   EvaluationPage page(windows);
   const RecordingScores scores =
-      score_all(a, files, windows, tested, baselines, a.given("outputs") ? &outputs : nullptr,
-                a.given("report") ? &page : nullptr);
+      score_all(a, network, files.front(), windows, tested, baselines,
+                a.given("outputs") ? &outputs : nullptr, a.given("report") ? &page : nullptr);
   const nlohmann::ordered_json result = report(a, network, windows, tested, baselines, scores);
   if (pictures)
     write_pictures(network, files.front().interval_factor(), windows, tested.split.test, *pictures);

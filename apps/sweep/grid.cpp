@@ -2,6 +2,8 @@
 
 #include <functional>
 
+#include "apps/train/training_options.h"
+
 namespace supertac {
 namespace {
 
@@ -42,14 +44,21 @@ void expand(const Arguments& a, std::size_t axis, SuperTacSettings settings,
 
 }  // namespace
 
-std::string GridPoint::configuration() const {
+std::string model_name_of(const Recipe& recipe) {
   const auto part = [](const char* letter, Dim value) { return letter + std::to_string(value); };
-  return model.preset + part("_t", model.timesteps) + part("_l", model.latent) + part("_x", model.scale) +
-         part("_c", model.channels) + part("_r", model.rcabs);
+  const SuperTacSettings& m = recipe.model;
+  return m.preset + part("_t", m.timesteps) + part("_l", m.latent) + part("_x", m.scale) +
+         part("_c", m.channels) + part("_r", m.rcabs) + "_s" + std::to_string(recipe.seed);
+}
+
+std::vector<std::string> names_of(const std::vector<Recipe>& grid) {
+  std::vector<std::string> names;
+  for (const Recipe& recipe : grid) names.push_back(model_name_of(recipe));
+  return names;
 }
 
 void declare_grid(Arguments& a) {
-  a.option("preset", "A,B,...", "networks to start from: paper, tiny", "paper");
+  a.option("preset", "A,B,...", "recipes to start from: paper, best, tiny", "paper");
   a.option("timesteps", "T,...", "samples per window, multiples of 16, 32 to 512 (default: the preset's)");
   a.option("latent", "LD,...", "latent numbers per group of taxels (default: the preset's)");
   a.option("scale", "N,...", "pictures N times as fine as the array: 2, 4, 8 (default: the preset's)");
@@ -60,21 +69,25 @@ void declare_grid(Arguments& a) {
   a.more(false);
 }
 
-std::vector<GridPoint> grid_of(const Arguments& a) {
-  std::vector<GridPoint> points;
+std::vector<Recipe> grid_of(const Arguments& a) {
+  std::vector<Recipe> grid;
   try {
     for (const std::string& preset : a.list("preset")) {
-      expand(a, 0, SuperTacSettings::of_preset(preset), [&](const SuperTacSettings& settings) {
-        settings.check();
-        for (const Dim seed : whole_numbers(a, "seeds"))
-          points.push_back({settings, static_cast<std::uint64_t>(seed)});
+      Recipe recipe = recipe_of(a, Recipe::named(preset));
+      expand(a, 0, recipe.model, [&](const SuperTacSettings& settings) {
+        recipe.model = settings;
+        recipe.check();
+        for (const Dim seed : whole_numbers(a, "seeds")) {
+          recipe.seed = static_cast<std::uint64_t>(seed);
+          grid.push_back(recipe);
+        }
       });
     }
   } catch (const std::invalid_argument& error) {
     throw UsageError(error.what());
   }
-  if (points.empty()) throw UsageError("the grid is empty: give --preset and --seeds at least one value");
-  return points;
+  if (grid.empty()) throw UsageError("the grid is empty: give --preset and --seeds at least one value");
+  return grid;
 }
 
 }  // namespace supertac

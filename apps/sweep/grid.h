@@ -5,24 +5,19 @@
 #include <vector>
 
 #include "apps/common/command_line/arguments.h"
-#include "models/networks/supertac_model.h"
+#include "models/training/recipe.h"
 
 namespace supertac {
 
-struct GridPoint {
-  SuperTacSettings model;
-  std::uint64_t seed = 0;
-  /// "paper_t256_l10_x4_c32_r3": the same for all seeds.
-  std::string configuration() const;
-  /// The configuration and "_s0".
-  std::string name() const { return configuration() + "_s" + std::to_string(seed); }
-};
+/// "paper_t256_l10_x4_c32_r3_s0": all but the last part is the same for all seeds.
+std::string model_name_of(const Recipe& recipe);
+std::vector<std::string> names_of(const std::vector<Recipe>& grid);
 
 /// --preset, --timesteps, --latent, --scale, --channels, --rcabs, --seeds: comma lists.
 void declare_grid(Arguments& a);
 
-/// Models of one window length and picture size follow each other; seeds change fastest. Throws UsageError,
-/// also for a combination that no model can have.
-std::vector<GridPoint> grid_of(const Arguments& a);
+/// What supertac-train would train with each combination; seeds change fastest. Throws UsageError, also for a
+/// combination that no model can have.
+std::vector<Recipe> grid_of(const Arguments& a);
 
 }  // namespace supertac

@@ -11,8 +11,8 @@
 #include "apps/common/command_line/version.h"
 #include "apps/common/running/measure.h"
 #include "apps/common/running/signals.h"
-#include "apps/sweep/shards.h"
 #include "apps/train/training_options.h"
+#include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
@@ -36,19 +36,16 @@ void declare_measuring(Arguments& a) {
 
 Sweep::Sweep(const Arguments& a, SweepTable& table) : a_(a), table_(table) { check_settings(); }
 
-// What all rows of a table have in common.
+// What all rows of a table have in common: the recordings, and what the options make of the recipes.
 void Sweep::check_settings() const {
-  const TrainingSettings training = training_settings(a_, {});
-  nlohmann::ordered_json settings = to_json(training);
-  settings.erase("seed");
-  settings["grouping"] = name_of(training.model.grouping);
-  for (const char* option : {"also", "data", "history", "leave-out", "limit", "plates", "random-plates",
-                             "range", "rate", "scaling", "split", "stride"})
-    settings[option] = a_.text(option);
-  for (const auto& [option, key] :
-       {std::pair("epochs", "epochs"), {"learning-rate", "learning_rate"}, {"rate", "rate"}})
-    if (!a_.given(option)) settings[key] = "the preset's";
-  if (a_.given("shard")) settings[kShardKey] = a_.text("shard"), settings[kGridKey] = names_of(grid_of(a_));
+  nlohmann::ordered_json settings;
+  for (const char* option :
+       {"augment",         "autoencoder", "batch",         "beta",      "epochs", "grouping",  "history",
+        "interval-factor", "lambda",      "learning-rate", "leave-out", "limit",  "optimizer", "plates",
+        "random-plates",   "range",       "rate",          "scaling",   "split",  "stride"})
+    settings[option] = a_.given(option) || !a_.text(option).empty() ? a_.text(option) : "the preset's";
+  settings["data"] = hash_of_recordings(a_.text("data"), a_.list("plates"));
+  settings["also"] = a_.given("also") ? hash_of_recordings(a_.text("also"), {}) : "";
   const std::string path = a_.text("out") + "/settings.json";
   const FolderLock alone = lock_within(kLongestWriting, a_.text("out"));
   if (!fs::exists(path)) return write_file(path, settings.dump(2) + "\n");
@@ -61,8 +58,8 @@ void Sweep::check_settings() const {
   }
 }
 
-std::vector<GridPoint> longest_first(std::vector<GridPoint> grid) {
-  std::stable_sort(grid.begin(), grid.end(), [](const GridPoint& a, const GridPoint& b) {
+std::vector<Recipe> longest_first(std::vector<Recipe> grid) {
+  std::stable_sort(grid.begin(), grid.end(), [](const Recipe& a, const Recipe& b) {
     return cost_of(a.model).training > cost_of(b.model).training;
   });
   return grid;
@@ -76,10 +73,11 @@ static fs::file_time_type last_write_in(const std::string& folder) {
   return newest;
 }
 
-void Sweep::run(const std::vector<GridPoint>& grid) {
+void Sweep::run(const std::vector<Recipe>& grid) {
   make_directories(a_.text("out") + "/models");
+  grid_ = grid;
   order_ = names_of(grid);
-  const std::vector<GridPoint> trainings = longest_first(grid);
+  const std::vector<Recipe> trainings = longest_first(grid);
   const auto done = [&] {
     return std::all_of(order_.begin(), order_.end(), [&](const auto& name) { return table_.has(name); });
   };
@@ -106,11 +104,11 @@ void Sweep::wait_for_others() {
 }
 
 // Whoever holds the folder of a model's run has the model; a killed process holds nothing.
-bool Sweep::take_one(const std::vector<GridPoint>& longest_first) {
-  for (const GridPoint& point : longest_first) {
-    if (table_.has(point.name())) continue;
-    const std::string folder =
-        RunFolder::folder_of(a_.text("out") + "/models/" + point.name() + ".safetensors");
+bool Sweep::take_one(const std::vector<Recipe>& longest_first) {
+  for (const Recipe& recipe : longest_first) {
+    const std::string name = model_name_of(recipe);
+    if (table_.has(name)) continue;
+    const std::string folder = RunFolder::folder_of(a_.text("out") + "/models/" + name + ".safetensors");
     make_directories(folder);
     std::optional<FolderLock> mine;
     try {
@@ -119,47 +117,44 @@ bool Sweep::take_one(const std::vector<GridPoint>& longest_first) {
       continue;  // another process has it
     }
     table_.read_again();
-    if (table_.has(point.name())) continue;
-    const auto number = std::find(order_.begin(), order_.end(), point.name()) - order_.begin() + 1;
-    measure(point, std::to_string(number) + " of " + std::to_string(order_.size()) + " " + point.name());
+    if (table_.has(name)) continue;
+    const auto number = std::find(order_.begin(), order_.end(), name) - order_.begin() + 1;
+    measure(recipe, std::to_string(number) + " of " + std::to_string(order_.size()) + " " + name);
     return true;
   }
   return false;
 }
 
-// How many times as long as this point's training all that no table holds takes, by the multiply-adds.
-double Sweep::whole_by(const GridPoint& point) const {
-  const auto work = [&](const GridPoint& p) {
-    return cost_of(p.model).training * training_rate_hz(a_, p.model) *
-           static_cast<double>(training_settings(a_, p.model).epochs);
+// How many times as long as this training all that no table holds take, by the multiply-adds.
+double Sweep::whole_by(const Recipe& recipe) const {
+  const auto work = [](const Recipe& r) {
+    return cost_of(r.model).training * r.rate_hz * static_cast<double>(r.epochs);
   };
   double all = 0;
-  for (const GridPoint& p : shard_of(a_, grid_of(a_))) all += table_.has(p.name()) ? 0 : work(p);
-  return all / work(point);
+  for (const Recipe& r : grid_) all += table_.has(model_name_of(r)) ? 0 : work(r);
+  return all / work(recipe);
 }
 
-void Sweep::measure(const GridPoint& point, const std::string& label) {
+void Sweep::measure(const Recipe& recipe, const std::string& label) {
   reset_peak_memory();
-  const WindowSet& windows = windows_of(point.model);
-  TrainingSettings settings = training_settings(a_, point.model);
-  set_array(settings.model, windows.array());
-  settings.seed = point.seed;
-  const std::string out = a_.text("out") + "/models/" + point.name() + ".safetensors";
+  const std::string out = a_.text("out") + "/models/" + model_name_of(recipe) + ".safetensors";
   const std::string state = RunFolder::folder_of(out) + "/last.safetensors";
   a_.note(label);
-  TrainingTask task = window_task(a_, windows, settings);
-  const std::vector<std::uint32_t> to_score = windows_to_score(windows, task.split);
+  TrainingTask task = window_task(recipe, folders_of(a_));
+  const auto windows = std::static_pointer_cast<const WindowSet>(task.examples);
+  const std::vector<std::uint32_t> to_score = windows_to_score(*windows, task.split);
+  a_.note(task.counts);
   TrainingRun training(a_, std::move(task),
                        {.out = out,
                         .force = true,
                         .resume = fs::exists(state) ? state : "",
                         .label = label,
-                        .whole = whole_by(point)});
+                        .whole = whole_by(recipe)});
   if (!training.train()) throw Interrupted();
   const ZoneMetrics scores =
-      score(Ensemble({Prepared(training.trainer().model())}), windows, to_score, interrupted);
+      score(Ensemble({Prepared(training.trainer().model())}), *windows, to_score, interrupted);
   stop_if_interrupted();
-  const nlohmann::ordered_json measured = row(point, training, scores);
+  const nlohmann::ordered_json measured = row(recipe, training, scores);
   {
     const FolderLock alone = lock_within(kLongestWriting, a_.text("out"));
     table_.read_again();
@@ -181,34 +176,23 @@ std::vector<std::uint32_t> Sweep::windows_to_score(const WindowSet& windows, con
   return limit > 0 ? spread(chosen, limit) : chosen;
 }
 
-// Sets of other lengths, rates and picture sizes are dropped first: one at a time is in memory.
-const WindowSet& Sweep::windows_of(const SuperTacSettings& model) {
-  if (!windows_ || windows_->timesteps() != model.timesteps || windows_->settings().scale != model.scale ||
-      windows_->settings().rate_hz != training_rate_hz(a_, model)) {
-    windows_.reset();
-    windows_.emplace(training_windows(a_, model, 0));  // all seeds share them
-    a_.note(windows_->counts().summary());
-  }
-  return *windows_;
-}
-
-nlohmann::ordered_json Sweep::row(const GridPoint& point, const TrainingRun& training,
+nlohmann::ordered_json Sweep::row(const Recipe& recipe, const TrainingRun& training,
                                   const ZoneMetrics& scores) const {
   const Network& model = training.trainer().model();
-  SuperTacSettings s = point.model;
-  set_array(s, windows_->array());
+  SuperTacSettings s = recipe.model;
+  set_array(s, training.task().examples->array());
   const Tensor window = Tensor::full(model.input_shape(1), real(0.5));
   const Prepared prepared(model);
   const Latency latency = measure_latency([&] { prepared.estimate(window); });
-  nlohmann::ordered_json row = {{"model", point.name()},
+  nlohmann::ordered_json row = {{"model", model_name_of(recipe)},
                                 {"preset", s.preset},
                                 {"timesteps", s.timesteps},
                                 {"latent", s.latent},
                                 {"scale", s.scale},
                                 {"channels", s.channels},
                                 {"rcabs", s.rcabs},
-                                {"seed", point.seed},
-                                {"split", a_.text("split")},
+                                {"seed", recipe.seed},
+                                {"split", name_of(recipe.split)},
                                 {"median_us", latency.median_us},
                                 {"p99_us", latency.p99_us},
                                 {"mmac", cost_of(s).inference * 1e-6},

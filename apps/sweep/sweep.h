@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,7 +19,7 @@ namespace supertac {
 void declare_measuring(Arguments& a);
 
 /// Those of the greatest cost first; equal ones stay in their order.
-std::vector<GridPoint> longest_first(std::vector<GridPoint> grid);
+std::vector<Recipe> longest_first(std::vector<Recipe> grid);
 
 /// How long another process of a sweep may write its table.
 inline constexpr std::chrono::seconds kLongestWriting{30};
@@ -37,22 +36,21 @@ class Sweep {
   /// the longest training that nobody has, the rows stand in the order of the grid, and who finds nothing
   /// left waits, to take over from one that is lost. Throws Interrupted after a signal, UsageError,
   /// std::runtime_error when the others have written nothing for --deadline, and as TrainingRun.
-  void run(const std::vector<GridPoint>& grid);
+  void run(const std::vector<Recipe>& grid);
 
  private:
   void check_settings() const;
-  bool take_one(const std::vector<GridPoint>& longest_first);
+  bool take_one(const std::vector<Recipe>& longest_first);
   void wait_for_others();
-  double whole_by(const GridPoint& point) const;
-  void measure(const GridPoint& point, const std::string& label);
+  double whole_by(const Recipe& recipe) const;
+  void measure(const Recipe& recipe, const std::string& label);
   std::vector<std::uint32_t> windows_to_score(const WindowSet& windows, const Split& split) const;
-  const WindowSet& windows_of(const SuperTacSettings& model);
-  nlohmann::ordered_json row(const GridPoint& point, const TrainingRun& training,
+  nlohmann::ordered_json row(const Recipe& recipe, const TrainingRun& training,
                              const ZoneMetrics& scores) const;
 
   const Arguments& a_;
   SweepTable& table_;
-  std::optional<WindowSet> windows_;
+  std::vector<Recipe> grid_;
   std::vector<std::string> order_;              // of the rows
   std::filesystem::file_time_type last_write_;  // by any process of the sweep
   std::chrono::steady_clock::time_point last_seen_ = std::chrono::steady_clock::now();  // that it changed

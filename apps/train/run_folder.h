@@ -8,18 +8,9 @@
 #include <vector>
 
 #include "io/files/folder_lock.h"
-#include "models/training/trainer.h"
+#include "models/training/train.h"
 
 namespace supertac {
-
-/// One line of log.csv: means over the steps since the line before.
-struct LogLine : LossTerms {
-  double time_s = 0;  ///< since training began, pauses between resumed runs left out
-  std::int64_t step = 0;
-  double gradient_norm = 0, learning_rate = 0;
-  /// Of targets that are not all 0, at the end of an epoch; nothing is chosen by them.
-  std::optional<double> test_ssim, test_psnr_db;
-};
 
 class RunFolder {
  public:

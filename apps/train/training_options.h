@@ -1,9 +1,8 @@
-// The options that programs which train have in common, and what they mean.
+// The options of programs that train: what they change in a recipe (models/training/recipe.h).
 #pragma once
 
 #include "apps/common/command_line/arguments.h"
-#include "data/windows/split.h"
-#include "models/training/objective.h"
+#include "models/training/task.h"
 
 namespace supertac {
 
@@ -11,27 +10,20 @@ namespace supertac {
 void declare_training(Arguments& a);
 /// Recordings, windows, augmentation and the loss of SuperTac: everything else but the network and the seed.
 void declare_window_training(Arguments& a);
-
-/// The network of one training, and declare_window_training(): what stands beside --data only.
+/// --preset and --like, the network of one training, and declare_window_training(): what stands beside --data
+/// only.
 void declare_network(Arguments& a);
-/// What these say, --seed included. Throws UsageError.
-TrainingSettings network_settings(const Arguments& a);
 
-/// What the options of declare_training() say. Throws UsageError.
-void read_pace(const Arguments& a, TrainingPace& pace);
+/// `base` with what the options of declare_training() and declare_window_training() change. Throws
+/// UsageError.
+Recipe recipe_of(const Arguments& a, Recipe base);
+/// The recipe of --preset or of the model --like, with all options over it, --seed included. Throws
+/// UsageError, and as load_model() and Recipe::of().
+Recipe recipe_of(const Arguments& a);
+/// The same for pairs.
+FrameRecipe frame_recipe_of(const Arguments& a);
 
-/// What these options say about training this network; where they are not given, what its preset is best
-/// trained with. --grouping is set in the network; the seed is left to the caller. Throws UsageError.
-TrainingSettings training_settings(const Arguments& a, const SuperTacSettings& model);
-
-/// --rate, or the preset's. Throws UsageError.
-double training_rate_hz(const Arguments& a, const SuperTacSettings& model);
-
-/// --split. Throws UsageError.
-SplitKind training_split(const Arguments& a);
-
-/// The recordings' windows as this network takes them, and those of --random-plates, drawn with `seed`.
-/// Throws as WindowSet::load.
-WindowSet training_windows(const Arguments& a, const SuperTacSettings& model, std::uint64_t seed);
+/// --data and --also, read with a progress bar.
+RecordingFolders folders_of(const Arguments& a);
 
 }  // namespace supertac

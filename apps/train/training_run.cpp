@@ -1,22 +1,15 @@
 #include "apps/train/training_run.h"
 
-#include <optional>
 #include <utility>
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/command_line/version.h"
 #include "apps/common/output/provenance.h"
-#include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
-#include "data/plates/truth.h"
 #include "io/numbers/numbers.h"
-#include "models/inference/evaluation.h"
 
 namespace supertac {
 namespace {
-
-constexpr std::size_t kTestedPerEpoch = 2000;
-constexpr std::int64_t kStepsPerLine = 50;
 
 void check_agreement(const Trainer& trainer, const TrainingTask& task, Ranks& ranks) {
   std::map<std::string, std::string> mine = task.origin;
@@ -33,7 +26,7 @@ void check_agreement(const Trainer& trainer, const TrainingTask& task, Ranks& ra
 
 // Restored before the run folder is touched: a checkpoint that does not fit must leave the folder as it was.
 Trainer make_trainer(TrainingTask& task, const TrainingTarget& target) {
-  Trainer trainer(task.examples, task.split.train, std::move(task.objective), target.ranks);
+  Trainer trainer(*task.examples, task.split.train, std::move(task.objective), target.ranks);
   if (!target.resume.empty()) trainer.restore(target.resume, task.origin);
   if (target.ranks.size() > 1) check_agreement(trainer, task, target.ranks);
   return trainer;
@@ -50,7 +43,10 @@ nlohmann::ordered_json describe(const Arguments& a, const Trainer& trainer, cons
                {"split", task.origin.at("split")},
                {"train_" + task.unit, task.split.train.size()},
                {"test_" + task.unit, task.split.test.size()}};
-  json.update(task.about);
+  if (task.leakage)
+    json.update({{"test_windows_sharing_frames", task.leakage->overlapping},
+                 {"test_windows_duplicated", task.leakage->duplicated},
+                 {"windows", task.counts}});
   json.update({{"data", task.origin.at("data")},
                {"split_fingerprint", task.origin.at("split_fingerprint")},
                {"steps", trainer.total_steps()}});
@@ -79,8 +75,12 @@ bool TrainingRun::train() {
   a_.note("training on " + std::to_string(task_.split.train.size()) + " " + task_.unit + ", " +
           std::to_string(trainer_.total_steps()) + " steps" +
           (target_.resume.empty() ? "" : ", resumed at " + std::to_string(trainer_.step())));
-  if (!task_.warning.empty()) a_.note(task_.warning);
-  step_until_done();
+  for (const std::string& note : task_.notes) a_.note(note);
+  {
+    Progress progress(a_, target_.label, static_cast<std::uint64_t>(trainer_.total_steps()), "steps",
+                      static_cast<std::uint64_t>(trainer_.step()), target_.whole);
+    supertac::train(trainer_, task_, callbacks(progress));
+  }
   if (folder_) write_end();
   return trainer_.done();
 }
@@ -89,38 +89,31 @@ bool TrainingRun::train() {
 void TrainingRun::write_end() {
   description_["provenance"] = full_provenance();
   if (trainer_.done()) {
-    trainer_.save_model(target_.out, task_.origin);
+    save_trained(trainer_, target_.out, task_.origin);
     description_["content"] = hash_of_file(target_.out);
   }
   folder_->write_settings(description_);
   folder_->write_report(description_);
 }
 
-void TrainingRun::step_until_done() {
-  begin_ = std::chrono::steady_clock::now();
-  seconds_before_ = folder_ ? folder_->seconds() : 0;
-  const std::int64_t every = a_.integer("checkpoint-every", 1, 1'000'000'000);
-  Progress progress(a_, target_.label, static_cast<std::uint64_t>(trainer_.total_steps()), "steps",
-                    static_cast<std::uint64_t>(trainer_.step()), target_.whole);
-  LogLine sums;
-  std::int64_t steps = 0;
-  bool stop = target_.ranks.size() == 1 && interrupted();
-  while (!trainer_.done() && !stop) {
-    const StepReport report = trainer_.train_step(interrupted);
+TrainingCallbacks TrainingRun::callbacks(Progress& progress) {
+  TrainingCallbacks callbacks{.stop = interrupted};
+  callbacks.checkpoint_every = a_.integer("checkpoint-every", 1, 1'000'000'000);
+  callbacks.step = [this, &progress](const StepReport& report) {
     if (ledger_) ledger_->after_step();
-    sums.add(report);
-    sums.gradient_norm += report.gradient_norm;
-    ++steps;
     if (report.collapsed && !std::exchange(warned_, true)) warn_of_collapse(report);
-    if (report.step % trainer_.steps_per_epoch() == 0 || report.step % kStepsPerLine == 0) {
-      if (folder_) log(sums, std::exchange(steps, 0), report);
-      sums = {};
-    }
-    if (report.step % every == 0) save();
     progress.update(static_cast<std::uint64_t>(report.step), detail(report));
-    stop = report.stop || (target_.ranks.size() == 1 && interrupted());
-  }
-  save();
+  };
+  if (!folder_) return callbacks;
+  callbacks.checkpoint = folder_->checkpoint_path();
+  callbacks.seconds_before = folder_->seconds();
+  callbacks.log = [this](const LogLine& line) {
+    loss_ = line.total;
+    if (line.step % trainer_.steps_per_epoch() == 0) test_ssim_ = line.test_ssim;
+    if (!folder_->log(line))
+      a_.note(folder_->path() + "/log.csv: cannot write; the log is kept in memory only");
+  };
+  return callbacks;
 }
 
 std::string TrainingRun::detail(const StepReport& report) const {
@@ -135,47 +128,12 @@ std::string TrainingRun::detail(const StepReport& report) const {
 void TrainingRun::warn_of_collapse(const StepReport& report) {
   const bool idle = trainer_.objective().latents() > 0 && report.active_latents == 0;
   const std::string advice =
-      idle ? "no latent number tells windows apart; if that stays so, lower --beta (now " + a_.text("beta") +
-                 ") or "
+      idle ? "no latent number tells windows apart; if that stays so, lower --beta (now " +
+                 format(task_.beta) + ") or "
            : "the pictures are the same for every input, or far too strong; if that stays so, lower ";
   a_.note("step " + std::to_string(report.step) + ": " + advice + "--learning-rate (now " +
           format(trainer_.objective().pace().learning_rate) +
           "); early in a run it often mends itself: watch SSIM");
-}
-
-double TrainingRun::seconds() const {
-  return seconds_before_ + std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-}
-
-// The scores of an even sample of the test side are for the log: nothing is chosen by them.
-void TrainingRun::test(LogLine& line) const {
-  const ImageGrid image = task_.examples.image();
-  PairMetrics metrics(static_cast<std::size_t>(image.height), static_cast<std::size_t>(image.width));
-  for_each_output(Ensemble({Prepared(trainer_.model())}), task_.examples,
-                  spread(task_.split.test, kTestedPerEpoch), [&](const EvaluatedBatch& b) {
-                    for (std::size_t n = 0; n < b.size(); ++n)
-                      if (in_contact(b.target(n))) metrics.add(b.output(n), b.target(n));
-                    return !interrupted();
-                  });
-  if (metrics.result().windows == 0) return;
-  line.test_ssim = metrics.result().ssim;
-  line.test_psnr_db = metrics.result().psnr_mean_db;
-}
-
-void TrainingRun::log(LogLine& line, std::int64_t steps, const StepReport& last) {
-  for (double* sum :
-       {&line.total, &line.reconstruction, &line.kld, &line.l2, &line.ssim, &line.gradient_norm})
-    *sum /= static_cast<double>(steps);
-  line.time_s = seconds();
-  line.step = last.step;
-  line.learning_rate = last.learning_rate;
-  loss_ = line.total;
-  if (last.step % trainer_.steps_per_epoch() == 0) {
-    test(line);
-    test_ssim_ = line.test_ssim;
-  }
-  if (!folder_->log(line))
-    a_.note(folder_->path() + "/log.csv: cannot write; the log is kept in memory only");
 }
 
 }  // namespace supertac

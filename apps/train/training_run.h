@@ -1,15 +1,14 @@
 // One model trained into a file: what supertac-train does once, and supertac-sweep for each model of a grid.
 #pragma once
 
-#include <chrono>
 #include <optional>
 #include <string>
 
 #include "apps/common/command_line/arguments.h"
+#include "apps/common/running/progress.h"
 #include "apps/train/ledger_file.h"
 #include "apps/train/run_folder.h"
-#include "apps/train/training_task.h"
-#include "models/training/trainer.h"
+#include "models/training/train.h"
 
 namespace supertac {
 
@@ -24,8 +23,8 @@ struct TrainingTarget {
 
 class TrainingRun {
  public:
-  /// `a`, which must have what declare_training() declares, and the task's examples must outlive the run.
-  /// Throws as Trainer, Trainer::restore and RunFolder; RanksError when ranks have other data or options.
+  /// `a`, which must have what declare_training() declares, must outlive the run. Throws as Trainer,
+  /// Trainer::restore and RunFolder; RanksError when ranks have other data or options.
   TrainingRun(const Arguments& a, TrainingTask task, TrainingTarget target);
 
   /// Until the last step or a signal. The state is saved either way; after the last step report and model are
@@ -35,19 +34,15 @@ class TrainingRun {
   const Trainer& trainer() const { return trainer_; }
   /// Of the first rank only.
   const RunFolder& folder() const { return *folder_; }
-  const Split& split() const { return task_.split; }
+  const TrainingTask& task() const { return task_; }
   /// What settings.json holds: command, version, commit, settings, data, split.
   const nlohmann::ordered_json& description() const { return description_; }
 
  private:
-  void step_until_done();
+  TrainingCallbacks callbacks(Progress& progress);
   void write_end();
-  double seconds() const;
   std::string detail(const StepReport& report) const;
   void warn_of_collapse(const StepReport& report);
-  void test(LogLine& line) const;
-  void log(LogLine& means, std::int64_t steps, const StepReport& last);
-  void save() { trainer_.save(folder_ ? folder_->checkpoint_path() : "", task_.origin); }
 
   const Arguments& a_;
   TrainingTask task_;
@@ -56,8 +51,6 @@ class TrainingRun {
   std::optional<RunFolder> folder_;
   std::optional<LedgerFile> ledger_;
   nlohmann::ordered_json description_;
-  std::chrono::steady_clock::time_point begin_;
-  double seconds_before_ = 0;  // on the log's clock when this process began
   bool warned_ = false;
   std::optional<double> loss_, test_ssim_;  // as last logged
 };

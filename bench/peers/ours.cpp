@@ -90,10 +90,10 @@ class Ours {
   Trainer& trainer() {
     if (!trainer_) {
       data_ = std::make_unique<WindowSet>(bench::sliding_bumps(model_->settings()));
-      TrainingSettings settings;
+      Recipe settings;
       settings.model = model_->settings();
       settings.epochs = 100'000;
-      trainer_ = std::make_unique<Trainer>(*data_, bench::all_of(*data_), settings);
+      trainer_ = std::make_unique<Trainer>(*data_, bench::all_of(*data_), window_objective(*data_, settings));
     }
     return *trainer_;
   }

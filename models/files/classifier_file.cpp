@@ -46,7 +46,7 @@ NamedClassifier load_classifier(const std::string& path) {
     throw std::runtime_error(path + ": is a " +
                              in_quotes(kind == file.metadata().end() ? "checkpoint" : kind->second) +
                              ", expected a classifier as supertac-classify --out writes it");
-  const JsonEntry settings(file, path, "settings");
+  const JsonEntry settings(file.metadata(), path, "settings");
   NamedClassifier loaded;
   loaded.names = comma_list(settings.text("names"));
   loaded.settings = {.height = settings.integer("height"),

@@ -7,10 +7,11 @@ namespace supertac {
 
 using Json = nlohmann::ordered_json;
 
-JsonEntry::JsonEntry(const SafetensorsFile& file, const std::string& path, const std::string& key)
+JsonEntry::JsonEntry(const std::map<std::string, std::string>& metadata, const std::string& path,
+                     const std::string& key)
     : where_(path + ": metadata \"" + key + "\"") {
-  const auto found = file.metadata().find(key);
-  if (found == file.metadata().end())
+  const auto found = metadata.find(key);
+  if (found == metadata.end())
     throw std::runtime_error(where_ + " is missing; the file is no SuperTac model");
   try {
     json_ = parse_json_limited(found->second);

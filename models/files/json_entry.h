@@ -1,20 +1,22 @@
 // One metadata entry of a model file that is a JSON object, read with checks.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "autograd/tensor.h"
 #include "io/files/json.h"
-#include "io/files/safetensors.h"
 
 namespace supertac {
 
 /// Every accessor throws std::runtime_error that names path, key, what was expected and found.
 class JsonEntry {
  public:
-  JsonEntry(const SafetensorsFile& file, const std::string& path, const std::string& key);
+  /// Of the metadata of the file `path`.
+  JsonEntry(const std::map<std::string, std::string>& metadata, const std::string& path,
+            const std::string& key);
 
   Dim integer(const char* name) const;
   /// true or false; false when it is absent, as in files from before it existed.

@@ -100,7 +100,7 @@ template <class Model, class Settings>
 std::unique_ptr<Model> build(const Settings& settings, const SafetensorsFile& file, const std::string& path) {
   Rng rng(0);
   auto model = std::make_unique<Model>(settings, rng);
-  load_parameters(file, path, model->parameters());
+  load_parameters(file, path, model->parameters(), {"optimizer.", "novelty.", "int8."});
   for (const Parameter& parameter : model->parameters())
     if (!std::ranges::all_of(parameter.value.value().values(), [](real v) { return std::isfinite(v); }))
       throw std::runtime_error(
@@ -189,17 +189,17 @@ void set_array(SuperTacSettings& settings, const TaxelArray& array) {
 ModelFile load_model(const std::string& path, ModelKind kind) {
   const SafetensorsFile file = read_checkpoint(path);
   expect_kind(file, path, kind);
-  const JsonEntry settings(file, path, "settings");
+  const JsonEntry settings(file.metadata(), path, "settings");
   ModelFile loaded;
   loaded.metadata = file.metadata();
   if (kind == ModelKind::windows) {
     const SuperTacSettings read = read_settings(settings);
-    loaded.input = read_input({file, path, "input"});
+    loaded.input = read_input({file.metadata(), path, "input"});
     loaded.model = build<SuperTac>(read, file, path);
     loaded.novelty = Novelty::read(file, path, signal_feature_count(loaded.array()));
   } else {
     const FrameSettings read = read_frame_settings(settings);
-    const JsonEntry input(file, path, "input");
+    const JsonEntry input(file.metadata(), path, "input");
     const auto channels = static_cast<std::size_t>(read.in_channels);
     loaded.scaling = {input.numbers("mean", channels), input.numbers("factor", channels)};
     loaded.frame_model = build<FrameModel>(read, file, path);

@@ -85,21 +85,10 @@ void SuperTacSettings::check() const {
 }
 
 SuperTacSettings SuperTacSettings::of_preset(const std::string& name) {
-  if (name == "paper") return {.predicted_error = true};
+  if (name == "paper" || name == "best") return {.preset = name, .predicted_error = true};
   if (name == "tiny")
     return {.preset = "tiny", .timesteps = 128, .channels = 8, .rcabs = 1, .predicted_error = true};
-  throw std::invalid_argument("unknown preset \"" + name + "\"; known: paper, tiny");
-}
-
-PresetTraining PresetTraining::of_preset(const std::string& name) {
-  constexpr double kWindowS = 2.56;
-  PresetTraining training{.rate_hz =
-                              static_cast<double>(SuperTacSettings::of_preset(name).timesteps) / kWindowS};
-  if (name == "tiny") {
-    training.epochs = 80;
-    training.learning_rate = 2e-3;
-  }
-  return training;
+  throw std::invalid_argument("unknown preset \"" + name + "\"; known: paper, best, tiny");
 }
 
 Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)

@@ -42,20 +42,9 @@ struct SuperTacSettings {
   Dim image_width() const { return columns * scale; }
   /// Throws std::invalid_argument naming the setting, its range and what was given.
   void check() const;
-  /// A preset's settings: "paper", or "tiny", with a ninth of its multiply-adds. Both were made for windows
-  /// of 2.56 s. Throws std::invalid_argument for an unknown name, listing the known ones.
+  /// The network of a named recipe (models/training/recipe.h): "paper" and "best" have the same, "tiny" has a
+  /// ninth of its multiply-adds. Throws std::invalid_argument for an unknown name, listing the known ones.
   static SuperTacSettings of_preset(const std::string& name);
-};
-
-/// How a preset's network is trained to its best on the rig's recordings (measured: bench/results). The
-/// smaller one makes its steps faster and needs more of them.
-struct PresetTraining {
-  double rate_hz = 100;  ///< of the window's samples
-  std::int64_t epochs = 20;
-  double learning_rate = 1e-3;  ///< Adam's peak
-
-  /// Throws as SuperTacSettings::of_preset.
-  static PresetTraining of_preset(const std::string& name);
 };
 
 /// One thing for each group, in place: a warm step must not go to the heap.

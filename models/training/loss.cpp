@@ -8,6 +8,7 @@
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/losses.h"
 #include "autograd/ops/vae.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 
@@ -16,6 +17,25 @@ void LossWeights::check() const {
   throw std::invalid_argument(
       "loss weights: expected 0 <= a <= 1, beta >= 0, lambda >= 0, got a = " + std::to_string(a) +
       ", beta = " + std::to_string(beta) + ", lambda = " + std::to_string(lambda));
+}
+
+void LossTerms::add(const LossTerms& other) {
+  total += other.total, reconstruction += other.reconstruction, kld += other.kld;
+  l2 += other.l2, ssim += other.ssim;
+}
+
+std::string LossTerms::text() const {
+  const bool has_vaes = reconstruction != 0 || kld != 0;
+  return "the loss is " + format(total) + " (" +
+         (has_vaes ? "reconstruction " + format(reconstruction) + ", KLD " + format(kld) + ", " : "") +
+         "L2 " + format(l2) + ", SSIM " + format(ssim) + ")";
+}
+
+LossTerms values_of(const Loss& loss, double share) {
+  const auto value = [share](const Variable& term) {
+    return term.defined() ? share * static_cast<double>(term.item()) : 0;
+  };
+  return {value(loss.total), value(loss.reconstruction), value(loss.kld), value(loss.l2), value(loss.ssim)};
 }
 
 // The pictures with the truth itself in place of those whose truth is flat.

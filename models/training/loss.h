@@ -1,6 +1,9 @@
 // What SuperTac is trained on: the VAEs' losses and the picture's.
 #pragma once
 
+#include <array>
+#include <string>
+
 #include "models/networks/supertac_model.h"
 
 namespace supertac {
@@ -20,6 +23,17 @@ struct LossWeights {
 struct Loss {
   Variable total, reconstruction, kld, l2, ssim, predicted_error;
 };
+
+/// The values of a Loss; 0 for a term that it has not.
+struct LossTerms {
+  double total = 0, reconstruction = 0, kld = 0, l2 = 0, ssim = 0;
+  std::array<double*, 5> all() { return {&total, &reconstruction, &kld, &l2, &ssim}; }
+  void add(const LossTerms& other);
+  /// "the loss is 0.1 (reconstruction 0.2, KLD 3, L2 0.1, SSIM 0.5)"; of pairs without the VAEs' terms.
+  std::string text() const;
+};
+/// `share` times each term.
+LossTerms values_of(const Loss& loss, double share);
 
 /// How much the squared error of the predicted error counts beside that of the picture.
 inline constexpr double kPredictedErrorWeight = 0.1;

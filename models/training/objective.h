@@ -5,36 +5,16 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 
-#include "data/windows/augment.h"
 #include "data/windows/pairs.h"
 #include "data/windows/windows.h"
 #include "models/files/model_file.h"
 #include "models/networks/frame_model.h"
-#include "models/training/loss.h"
-#include "models/training/training_state.h"
+#include "models/training/recipe.h"
 
 namespace supertac {
-
-struct TrainingSettings : TrainingPace {
-  SuperTacSettings model;
-  LossWeights loss;
-  AugmentSettings augment;
-  /// Whether z is drawn around its mean. Without, and with beta 0, the VAEs are plain autoencoders.
-  bool sampling = true;
-};
-
-struct FrameTrainingSettings : TrainingPace {
-  FrameSettings model;
-  double lambda = 0.1;  ///< of 1 - SSIM: loss = L2 + lambda (1 - SSIM), the picture's part of SuperTac's
-};
-
-/// Everything that determines the result besides network and data.
-nlohmann::ordered_json to_json(const TrainingSettings& settings);
-nlohmann::ordered_json to_json(const FrameTrainingSettings& settings);
 
 /// One batch, or a micro-batch's share of it.
 struct Batch {
@@ -71,10 +51,10 @@ class Objective {
 };
 
 /// supertac_loss of windows that are augmented before. Throws std::invalid_argument naming the setting.
-std::unique_ptr<Objective> window_objective(const WindowSet& windows, const TrainingSettings& settings);
+std::unique_ptr<Objective> window_objective(const WindowSet& windows, const Recipe& recipe);
 
 /// Of pairs as they are scaled now. The model's sizes and scale become the pairs'. Throws
 /// std::invalid_argument naming the setting.
-std::unique_ptr<Objective> frame_objective(const PairSet& pairs, FrameTrainingSettings settings);
+std::unique_ptr<Objective> frame_objective(const PairSet& pairs, FrameRecipe recipe);
 
 }  // namespace supertac

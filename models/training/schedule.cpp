@@ -15,10 +15,10 @@ static double series_of_cosine(double x) {
 
 double Schedule::at(std::int64_t step) const {
   if (step < warm_up) return peak * static_cast<double>(step + 1) / static_cast<double>(warm_up);
-  if (!cosine || total <= warm_up) return peak;
+  if (total <= warm_up) return peak;
   const double done =
       std::min(1.0, static_cast<double>(step - warm_up) / static_cast<double>(total - warm_up));
-  return last + (peak - last) * (1 + series_of_cosine(std::numbers::pi * done)) / 2;
+  return peak * (1 + series_of_cosine(std::numbers::pi * done)) / 2;
 }
 
 }  // namespace supertac

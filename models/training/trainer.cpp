@@ -4,15 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "autograd/kernels/fast/weight_forms.h"
 #include "autograd/ops/arithmetic.h"
-#include "data/windows/signal_features.h"
-#include "data/windows/split.h"
 #include "io/numbers/hash.h"
-#include "io/numbers/numbers.h"
-#include "layers/checkpoint.h"
 #include "models/inference/evaluation.h"
-#include "models/inference/novelty.h"
-#include "models/inference/ranges.h"
 #include "models/training/diagnosis.h"
 
 namespace supertac {
@@ -22,17 +17,7 @@ namespace {
 constexpr std::uint64_t kNoiseStream = 0x65707300;
 constexpr std::int64_t kStepsPerComparison = 100;
 
-LossTerms values_of(const Loss& loss, double share) {
-  const auto value = [share](const Variable& term) { return term.defined() ? share * term.item() : 0; };
-  return {value(loss.total), value(loss.reconstruction), value(loss.kld), value(loss.l2), value(loss.ssim)};
-}
-
 }  // namespace
-
-void LossTerms::add(const LossTerms& other) {
-  total += other.total, reconstruction += other.reconstruction, kld += other.kld;
-  l2 += other.l2, ssim += other.ssim;
-}
 
 void Trainer::Variances::clear() {
   for (BatchVariance* variance : all()) variance->clear();
@@ -66,12 +51,8 @@ Trainer::Trainer(const Examples& examples, std::vector<std::uint32_t> train,
   forms_ = std::make_unique<kernels::WeightForms>(weights);
 }
 
-Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, const TrainingSettings& settings)
-    : Trainer(windows, std::move(train), window_objective(windows, settings)) {}
-
-Trainer::Trainer(const PairSet& pairs, std::vector<std::uint32_t> train,
-                 const FrameTrainingSettings& settings)
-    : Trainer(pairs, std::move(train), frame_objective(pairs, settings)) {}
+Trainer::Trainer(Trainer&&) noexcept = default;
+Trainer::~Trainer() = default;
 
 Trainer::MicroBatch::MicroBatch(const Objective& master, Dim first_sample, Dim count)
     : first(first_sample),
@@ -191,8 +172,7 @@ void Trainer::add_up(StepReport& report) {
   MicroBatch& sum = micro_batches_.front();
   if (ranks_.size() > 1) {
     const auto each = [&](const std::function<void(double&)>& use) {
-      LossTerms& t = sum.terms;
-      for (double* term : {&t.total, &t.reconstruction, &t.kld, &t.l2, &t.ssim}) use(*term);
+      for (double* term : sum.terms.all()) use(*term);
       for (BatchVariance* variance : sum.variances.all())
         for (double& value : variance->values()) use(value);
     };
@@ -217,11 +197,7 @@ void Trainer::check_finite(const LossTerms& t) const {
     where = its;
     if (!where.empty()) break;
   }
-  const std::string vaes = objective_->latents() == 0 ? ""
-                                                      : "reconstruction " + format(t.reconstruction) +
-                                                            ", KLD " + format(t.kld) + ", ";
-  state_.stop("the loss is " + format(t.total) + " (" + vaes + "L2 " + format(t.l2) + ", SSIM " +
-              format(t.ssim) + ")" + (where.empty() ? "" : ": " + where));
+  state_.stop(t.text() + (where.empty() ? "" : ": " + where));
 }
 
 void Trainer::look_for_collapse(StepReport& report) {
@@ -234,15 +210,15 @@ void Trainer::look_for_collapse(StepReport& report) {
 }
 
 // What a saved state must agree in, besides the caller's own metadata.
-std::map<std::string, std::string> Trainer::full(std::map<std::string, std::string> metadata) const {
-  metadata.merge(objective_->metadata());
-  metadata["training"] = objective_->text();
-  return metadata;
+std::map<std::string, std::string> Trainer::metadata(std::map<std::string, std::string> origin) const {
+  origin.merge(objective_->metadata());
+  origin["training"] = objective_->text();
+  return origin;
 }
 
 void Trainer::save(const std::string& path, std::map<std::string, std::string> metadata) const {
   check_same();
-  if (ranks_.first()) state_.save(path, full(std::move(metadata)));
+  if (ranks_.first()) state_.save(path, this->metadata(std::move(metadata)));
 }
 
 void Trainer::check_same() const {
@@ -259,44 +235,8 @@ void Trainer::check_same() const {
                    "state with --resume");
 }
 
-void Trainer::save_model(const std::string& path, std::map<std::string, std::string> metadata) const {
-  std::vector<StoredTensor> more = novelty();
-  more.push_back(ranges());
-  write_checkpoint(path, model().parameters(), full(std::move(metadata)), more);
-}
-
-// Of an even sample of the training examples, as they are: augmentation hides what is to be noticed.
-std::vector<StoredTensor> Trainer::novelty() const {
-  constexpr std::size_t kMostSamples = 20'000;
-  if (objective_->latents() == 0) return {};  // a frame alone says nothing of its sensor
-  std::vector<std::uint32_t> usual;
-  std::ranges::copy_if(batching_.indices(), std::back_inserter(usual),
-                       [&](std::uint32_t i) { return data_.usual(i); });
-  const std::vector<std::uint32_t> chosen = spread(usual, kMostSamples);
-  const std::size_t count = signal_feature_count(data_.array());
-  if (chosen.size() <= count) return {};
-  Tensor features(Shape{static_cast<Dim>(chosen.size()), static_cast<Dim>(count)});
-  std::vector<float> window(data_.frames() * data_.array().signals());
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    data_.input(chosen[i], window);
-    signal_features(window, data_.array(), features.values().subspan(i * count, count));
-  }
-  return Novelty(features).stored();
-}
-
-StoredTensor Trainer::ranges() const {
-  constexpr std::size_t kSamples = 1024;
-  ActivationRanges ranges;
-  for_each_output(Ensemble({Prepared(model())}), data_, spread(batching_.indices(), kSamples),
-                  [&](const EvaluatedBatch& b) {
-                    ranges.add(model(), b.inputs);
-                    return true;
-                  });
-  return ranges.stored();
-}
-
 void Trainer::restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata) {
-  state_.restore(path, full(expected_metadata));
+  state_.restore(path, metadata(expected_metadata));
 }
 
 }  // namespace supertac

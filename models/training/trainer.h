@@ -1,6 +1,6 @@
 // Training of any network, one visible step at a time.
 //
-//   Trainer trainer(windows, split.train, settings);
+//   Trainer trainer(windows, split.train, window_objective(windows, recipe));
 //   while (!trainer.done()) report(trainer.train_step());
 //
 // Every random choice is a function of (seed, step), so that a restored trainer continues to the same bits.
@@ -22,7 +22,6 @@
 #include <string>
 #include <vector>
 
-#include "autograd/kernels/fast/weight_forms.h"
 #include "data/windows/batching.h"
 #include "models/training/collapse.h"
 #include "models/training/objective.h"
@@ -31,11 +30,9 @@
 
 namespace supertac {
 
-/// The values of a Loss; 0 for a term that an objective has not.
-struct LossTerms {
-  double total = 0, reconstruction = 0, kld = 0, l2 = 0, ssim = 0;
-  void add(const LossTerms& other);
-};
+namespace kernels {
+class WeightForms;
+}
 
 struct StepReport : LossTerms {
   std::int64_t step = 0;     ///< from 1
@@ -51,13 +48,12 @@ struct StepReport : LossTerms {
 class Trainer {
  public:
   /// `examples` must outlive the trainer. Throws std::invalid_argument for examples of another format than
-  /// the network's, no training example, or as check_micro-batches(). `ranks` train together: all of them
+  /// the network's, no training example, or as check_micro_batches(). `ranks` train together: all of them
   /// call train_step() and save().
   Trainer(const Examples& examples, std::vector<std::uint32_t> train, std::unique_ptr<Objective> objective,
           Ranks& ranks = one_process());
-  /// With window_objective() and frame_objective(); throw as these.
-  Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, const TrainingSettings& settings);
-  Trainer(const PairSet& pairs, std::vector<std::uint32_t> train, const FrameTrainingSettings& settings);
+  Trainer(Trainer&&) noexcept;
+  ~Trainer();
 
   bool done() const { return state_.done(); }
   std::int64_t step() const { return state_.step(); }
@@ -65,6 +61,11 @@ class Trainer {
   std::int64_t steps_per_epoch() const { return static_cast<std::int64_t>(batching_.batches_per_epoch()); }
   const Objective& objective() const { return *objective_; }
   const Network& model() const { return objective_->network(); }
+  const Examples& examples() const { return data_; }
+  /// The examples that are trained on.
+  const std::vector<std::uint32_t>& training_side() const { return batching_.indices(); }
+  /// Number of the processes that train together.
+  int ranks() const { return ranks_.size(); }
 
   /// One batch: forward, loss, backward, Adam. Throws TrainingStopped; the parameters are then still finite.
   /// `stop` is asked before the gradients are added up. With several processes throws as check_same(), which
@@ -84,9 +85,8 @@ class Trainer {
   /// Model and training state, a checkpoint like any other with "optimizer." tensors besides. Of several
   /// processes only the first writes, after check_same(). Throws FileError.
   void save(const std::string& path, std::map<std::string, std::string> metadata) const;
-  /// The model alone, with the same metadata, and, for windows of time, the Novelty of its training
-  /// examples. Throws FileError.
-  void save_model(const std::string& path, std::map<std::string, std::string> metadata) const;
+  /// `origin` with what the objective says of network, input and training.
+  std::map<std::string, std::string> metadata(std::map<std::string, std::string> origin) const;
   /// Continues where the saved trainer stood. Throws std::runtime_error when the file holds no training
   /// state, or was made with other settings or data (naming the difference); nothing is changed then.
   void restore(const std::string& path, const std::map<std::string, std::string>& expected_metadata);
@@ -115,9 +115,6 @@ class Trainer {
   void add_up(StepReport& report);
   void look_for_collapse(StepReport& report);
   void check_finite(const LossTerms& terms) const;
-  std::vector<StoredTensor> novelty() const;
-  StoredTensor ranges() const;
-  std::map<std::string, std::string> full(std::map<std::string, std::string> metadata) const;
 
   const Examples& data_;
   std::unique_ptr<Objective> objective_;

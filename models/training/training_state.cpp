@@ -142,7 +142,7 @@ void TrainingState::restore(const std::string& path, const std::map<std::string,
     m.push_back(load_like(file, path, "optimizer.m." + p.name, p));
     v.push_back(load_like(file, path, "optimizer.v." + p.name, p));
   }
-  load_parameters(file, path, parameters_);
+  load_parameters(file, path, parameters_, {"optimizer."});
   for (std::size_t i = 0; i < parameters_.size(); ++i) {
     copy_into(adam_.first_moments()[i], m[i]);
     copy_into(adam_.second_moments()[i], v[i]);

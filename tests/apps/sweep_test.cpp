@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "io/files/json.h"
+#include "io/files/provenance.h"
 #include "tests/apps/simulated_data.h"
 
 namespace supertac {
@@ -88,7 +89,8 @@ TEST_F(Sweep, WritesARowAModelAndDoesNotRepeatIt) {
   const std::string beginning = "this sweep began with ";
   const ProcessResult longer = sweep("grid", "2"), slower = sweep("grid", "1", {"--rate", "100"});
   EXPECT_EQ(longer.code, 1);
-  EXPECT_NE(longer.error.find(beginning + "epochs 1, now it is 2"), std::string::npos) << longer.error;
+  EXPECT_NE(longer.error.find(beginning + "epochs \"1\", now it is \"2\""), std::string::npos)
+      << longer.error;
   EXPECT_EQ(slower.code, 1);
   EXPECT_NE(slower.error.find(beginning + "rate \"the preset's\", now it is \"100\""), std::string::npos)
       << slower.error;
@@ -226,31 +228,15 @@ TEST_F(Sweep, AFrozenProcessIsGivenUp) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
 }
 
-TEST_F(Sweep, ShardsAreMergedWhenNothingIsMissingOrTwice) {
+// A sweep trains as supertac-train does: one model can be trained again without the others.
+TEST_F(Sweep, ItsModelsAreThoseOfSupertacTrain) {
   ASSERT_EQ(sweep("whole4", "1", kFour).code, 0);
-  for (const char* shard : {"1/3", "2/3", "3/3"})
-    ASSERT_EQ(sweep(std::string("part") + shard[0], "1", {"--seeds", "0,1", "--shard", shard}).code, 0);
-  const auto merge = [](const std::string& folders, const std::string& out) {
-    return run_process("supertac-sweep", {"--out", path(out), "--merge", folders});
-  };
-  const std::string one = path("part1"), two = path("part2"), three = path("part3");
-  const ProcessResult missing = merge(one + "," + three, "merged");
-  EXPECT_EQ(missing.code, 1);
-  EXPECT_NE(missing.error.find("no shard has a row of"), std::string::npos) << missing.error;
-  EXPECT_EQ(std::count(missing.error.begin(), missing.error.end(), '\n'), 1) << missing.error;
-  fs::copy(one, path("copy"), fs::copy_options::recursive);
-  const ProcessResult twice = merge(one + "," + two + "," + three + "," + path("copy"), "merged");
-  EXPECT_EQ(twice.code, 1);
-  EXPECT_NE(twice.error.find("and so has"), std::string::npos) << twice.error;
-  EXPECT_NE(merge(one + "," + path("whole4"), "merged").error.find("did not run with --shard"),
-            std::string::npos);
-  const ProcessResult all = merge(three + "," + one + "," + two, "merged");
-  ASSERT_EQ(all.code, 0) << all.error;
-  EXPECT_EQ(without_times(bytes("merged/sweep.csv")), without_times(bytes("whole4/sweep.csv")));
-  const std::string model = "/models/paper_t64_l2_x2_c8_r1_s1.safetensors";
-  EXPECT_EQ(bytes("merged" + model), bytes("whole4" + model));
-  EXPECT_EQ(sweep("part1", "1", {"--seeds", "0,1", "--shard", "2/3"}).code, 1) << "a folder is of one shard";
-  EXPECT_EQ(sweep("bad3", "1", {"--shard", "4/3"}).code, 2);
+  const ProcessResult trained = run_process(
+      "supertac-train", {"--data", path("data"), "--out", path("same.safetensors"), "--like",
+                         path("whole4/models/paper_t64_l2_x2_c8_r1_s1.safetensors"), "--threads", "1"});
+  ASSERT_EQ(trained.code, 0) << trained.error;
+  EXPECT_EQ(content_hash(SafetensorsFile::read(path("same.safetensors"))),
+            content_hash(SafetensorsFile::read(path("whole4/models/paper_t64_l2_x2_c8_r1_s1.safetensors"))));
 }
 
 TEST_F(Sweep, PicksTheFastestConfigurationThatHolds) {

@@ -6,6 +6,7 @@
 
 #include "data/recordings/recording.h"
 #include "io/files/json.h"
+#include "io/files/provenance.h"
 #include "io/files/safetensors.h"
 #include "tests/apps/trained.h"
 
@@ -188,6 +189,46 @@ TEST_F(Training, RandomPlatesBesideARealFingerAreFeltByOtherFingers) {
   const auto other = weights("other", "real", {"--random-plates", "5"});
   EXPECT_NE(weights("own", "data", {"--random-plates", "5"}), other);
   EXPECT_EQ(weights("other_filed", "real", {"--random-plates", "5", "--memory", "1M"}), other);
+}
+
+// Whoever links the library trains what the program trains.
+TEST_F(Training, TheExampleEndsWithTheProgramsHash) {
+  const ProcessResult program =
+      run_process("supertac-train", {"--data", path("data"), "--out", path("program.safetensors"), "--preset",
+                                     "tiny", "--epochs", "1", "--stride", "64"});
+  ASSERT_EQ(program.code, 0) << program.error;
+  const ProcessResult example =
+      run_process(SUPERTAC_TRAIN_EXAMPLE, {path("data"), path("example.safetensors"), "1", "64"});
+  ASSERT_EQ(example.code, 0) << example.error;
+  const std::string hash = content_hash(SafetensorsFile::read(path("program.safetensors")));
+  EXPECT_NE(example.out.find("content " + hash), std::string::npos) << example.out << hash;
+}
+
+TEST_F(Training, LikeRepeatsATrainingToTheSameContent) {
+  const std::string one = path("one.safetensors"), again = path("again.safetensors");
+  ASSERT_EQ(train("one.safetensors", {"--preset", "best", "--seed", "7", "--split", "pass", "--stride", "32",
+                                      "--random-plates", "2", "--grouping", "vertical", "--lambda", "0.2"})
+                .code,
+            0);
+  const ProcessResult like =
+      run_process("supertac-train", {"--data", path("data"), "--out", again, "--like", one});
+  ASSERT_EQ(like.code, 0) << like.error;
+  EXPECT_EQ(content_hash(SafetensorsFile::read(one)), content_hash(SafetensorsFile::read(again)));
+  const SafetensorsFile file = SafetensorsFile::read(again);
+  EXPECT_NE(file.metadata().at("settings").find("\"preset\":\"best\""), std::string::npos);
+  EXPECT_NE(file.metadata().at("training").find("\"optimizer\":\"muon\""), std::string::npos);
+  const ProcessResult other =
+      run_process("supertac-train",
+                  {"--data", path("data"), "--out", path("other.safetensors"), "--like", one, "--seed", "8"});
+  ASSERT_EQ(other.code, 0) << other.error;
+  EXPECT_NE(content_hash(SafetensorsFile::read(one)),
+            content_hash(SafetensorsFile::read(path("other.safetensors"))));
+  const ProcessResult both = run_process(
+      "supertac-train",
+      {"--data", path("data"), "--out", path("no.safetensors"), "--like", one, "--preset", "tiny"});
+  EXPECT_EQ(both.code, 2);
+  EXPECT_NE(both.error.find("expected --preset NAME or --like MODEL, found both"), std::string::npos)
+      << both.error;
 }
 
 TEST_F(Training, DataThatTeachNothingAreRemarkedOnAndRefusedUnderStrict) {

@@ -19,7 +19,7 @@ class CollapseTest : public ::testing::Test {
   CollapseTest() { omp_set_num_threads(1); }
   ~CollapseTest() override { omp_set_num_threads(before_); }
 
-  TrainingSettings settings = small_training();
+  Recipe settings = small_training();
   WindowSet windows = small_windows(small_settings());
 
   struct End {
@@ -27,8 +27,8 @@ class CollapseTest : public ::testing::Test {
     int active_latents = 0;
     double difference = 0, decoded = 0;  // of two windows' pictures and decoded signals, root mean square
   };
-  End train(const TrainingSettings& s) {
-    Trainer trainer(windows, all_of(windows), s);
+  End train(const Recipe& s) {
+    Trainer trainer(windows, all_of(windows), window_objective(windows, s));
     StepReport report;
     try {
       while (!trainer.done() && !report.collapsed) report = trainer.train_step();
@@ -138,7 +138,7 @@ TEST_F(CollapseTest, F4WarmUpEndsWithoutAJump) {
   for (std::int64_t step = 1; step < 1000; ++step) {
     EXPECT_LE(std::abs(schedule.at(step) - schedule.at(step - 1)), 1e-3 / 50 + 1e-12) << step;
   }
-  const Schedule none{.peak = 1e-3, .warm_up = 0, .total = 1000, .cosine = false};
+  const Schedule none{.peak = 1e-3, .warm_up = 0, .total = 1000};
   EXPECT_EQ(none.at(0), 1e-3);
 }
 

@@ -84,18 +84,18 @@ TEST(Failures, F11ConstantClippedAndDeadSignalsTrainToFiniteNumbers) {
   };
   const WindowSet windows =
       windows_of({recording(constant), recording(clipped, 2), recording(dead_taxel, 3)});
-  TrainingSettings settings = small_training();
+  Recipe settings = small_training();
   settings.epochs = 1;
-  Trainer trainer(windows, all_of(windows), settings);
+  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
   for (int i = 0; i < 10; ++i) EXPECT_TRUE(std::isfinite(trainer.train_step().total));
 }
 
 // A rate a hundred times too high: every loss is finite, or training says which step and layer was the end.
 TEST(Failures, F3ARateAHundredTimesTooHighNeverTrainsOnNan) {
   const WindowSet windows = windows_of({recording([](Recording&) {}), recording([](Recording&) {}, 2)});
-  TrainingSettings settings = small_training();
+  Recipe settings = small_training();
   settings.learning_rate = 0.1;
-  Trainer trainer(windows, all_of(windows), settings);
+  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
   try {
     for (int i = 0; i < 40; ++i) ASSERT_TRUE(std::isfinite(trainer.train_step().total));
   } catch (const TrainingStopped& error) {

@@ -44,7 +44,7 @@ class MemoryTest : public ::testing::Test {
  protected:
   MemoryTest() { omp_set_num_threads(1); }
   ~MemoryTest() override { omp_set_num_threads(before_); }
-  TrainingSettings settings_ = small_training();
+  Recipe settings_ = small_training();
   int before_ = omp_get_max_threads();
 };
 
@@ -64,7 +64,7 @@ TEST_F(MemoryTest, OneTrainingStep) {
   const WindowSet windows = small_windows(settings_.model, 60);
   settings_.batch = 1;  // one lane
   const auto step = [&] {
-    Trainer trainer(windows, all_of(windows), settings_);
+    Trainer trainer(windows, all_of(windows), window_objective(windows, settings_));
     trainer.train_step();
   };
   expect_survival(step);

@@ -6,7 +6,7 @@
 
 #include "data/windows/windows.h"
 #include "io/files/file.h"
-#include "models/training/trainer.h"
+#include "models/training/train.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {
@@ -43,8 +43,8 @@ inline SuperTacSettings small_settings() {
   return s;
 }
 
-inline TrainingSettings small_training() {
-  TrainingSettings s;
+inline Recipe small_training() {
+  Recipe s;
   s.model = small_settings();
   s.epochs = 2;
   s.batch = 8;

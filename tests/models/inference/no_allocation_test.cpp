@@ -10,11 +10,11 @@ namespace supertac {
 namespace {
 
 TEST(NoAllocation, WarmTrainingStep) {
-  TrainingSettings settings = small_training();
+  Recipe settings = small_training();
   settings.epochs = 4;
   settings.augment = kStandardAugmentation;
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), settings);
+  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
   for (int i = 0; i < 3; ++i) trainer.train_step();
   const long before = allocations::made;
   for (int i = 0; i < 5; ++i) trainer.train_step();

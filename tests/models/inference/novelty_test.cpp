@@ -78,13 +78,13 @@ TEST(Novelty, RefusesTooFewFeatures) {
 // A trained model knows its own windows again, and not those of a sensor with a stuck taxel.
 TEST(Novelty, ComesWithATrainedModel) {
   const TemporaryFolder folder;
-  TrainingSettings settings = small_training();
+  Recipe settings = small_training();
   const WindowSet windows = small_windows(settings.model);
   std::vector<std::uint32_t> all(windows.size());
   for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-  Trainer trainer(windows, all, settings);
+  Trainer trainer(windows, all, window_objective(windows, settings));
   while (!trainer.done()) trainer.train_step();
-  trainer.save_model(folder / "m.safetensors", {});
+  save_trained(trainer, folder / "m.safetensors", {});
   const ModelFile file = load_model(folder / "m.safetensors");
   ASSERT_TRUE(file.novelty);
   std::vector<float> window(32 * 16);

@@ -95,7 +95,7 @@ class RanksTrain : public testing::Test {
   }
 
   TemporaryFolder folder_;
-  TrainingSettings settings_ = small_training();
+  Recipe settings_ = small_training();
   const WindowSet windows_ = small_windows(settings_.model);
   std::atomic<double> last_loss_ = 0;
 

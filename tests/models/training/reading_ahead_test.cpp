@@ -33,7 +33,7 @@ struct Watched : Examples {
 
 // Over the end of an epoch too; behind the last step nothing is read.
 TEST(ReadingAhead, AnnouncesTheWindowsOfTheNextStep) {
-  const TrainingSettings settings = small_training();
+  const Recipe settings = small_training();
   const WindowSet windows = small_windows(settings.model);
   const Watched watched(windows);
   Trainer trainer(watched, all_of(windows), window_objective(windows, settings));

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <functional>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "autograd/kernels/fast/isa/isa.h"
+#include "io/files/json.h"
 #include "io/numbers/hash.h"
 #include "models/inference/evaluation.h"
 #include "tests/models/support.h"
@@ -18,10 +18,10 @@ namespace supertac {
 namespace {
 
 TEST(Trainer, Learns) {
-  TrainingSettings settings = small_training();
+  Recipe settings = small_training();
   settings.epochs = 30;
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), settings);
+  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
   const double first = trainer.train_step().l2;
   double last = 0;
   while (!trainer.done()) last = trainer.train_step().l2;
@@ -30,30 +30,30 @@ TEST(Trainer, Learns) {
 
 // Without noise the picture of the first step is that of inference.
 TEST(Trainer, WithoutSamplingLatentsAreTheMeans) {
-  TrainingSettings settings = small_training();
+  Recipe settings = small_training();
   settings.loss.beta = 0;
   const WindowSet windows = small_windows(settings.model);
   settings.batch = static_cast<std::int64_t>(windows.size());
   const auto errors = [&](bool sampling) {
     settings.sampling = sampling;
-    Trainer trainer(windows, all_of(windows), settings);
+    Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
     const ZoneMetrics scores = score(Ensemble({Prepared(trainer.model())}), windows, all_of(windows));
     const double inferred = std::pow(10, -scores.all().psnr_pooled_db / 10);
     return std::abs(trainer.train_step().l2 - inferred) / inferred;
   };
   EXPECT_LT(errors(false), 1e-4);
   EXPECT_GT(errors(true), 1e-3);
-  EXPECT_EQ(to_json(settings)["beta"], 0.0);
+  EXPECT_EQ(parse_json_limited(training_text(settings))["beta"], 0.0);
 }
 
 // Deleting the augmentation, or another sample's, changes the loss; it is that of the windows changed by
 // hand.
 TEST(Trainer, LearnsFromAugmentedWindows) {
-  TrainingSettings settings = small_training();
+  Recipe settings = small_training();
   settings.augment = {.gain = 0.5, .noise = 0.05};
   settings.sampling = false;
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), settings);
+  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
   const Batching batching(all_of(windows), 8, settings.seed);
   std::vector<std::uint32_t> indices(8);
   batching.batch(0, 0, indices);
@@ -67,8 +67,10 @@ TEST(Trainer, LearnsFromAugmentedWindows) {
   const double expected = trainer.objective()(by_hand).loss.total.item();
   EXPECT_NEAR(trainer.train_step().total, expected, 1e-5 * expected);
   settings.augment = {};
-  EXPECT_GT(std::abs(Trainer(windows, all_of(windows), settings).train_step().total - expected),
-            1e-3 * expected);
+  EXPECT_GT(
+      std::abs(Trainer(windows, all_of(windows), window_objective(windows, settings)).train_step().total -
+               expected),
+      1e-3 * expected);
 }
 
 /// Blurred blobs on an array of 3 x 5 taxels with two channels, drawn `scale` times as fine.
@@ -102,8 +104,8 @@ std::string write_pairs(const TemporaryFolder& folder, std::uint64_t scale = 4, 
   return folder / "pairs.safetensors";
 }
 
-FrameTrainingSettings small_frames() {
-  FrameTrainingSettings s;
+FrameRecipe small_frames() {
+  FrameRecipe s;
   s.model.channels = 8;
   s.model.rcabs = 1;
   s.epochs = 3;
@@ -127,10 +129,10 @@ PairSet scaled_pairs(const TemporaryFolder& folder) {
 TEST(Trainer, LearnsFromPairs) {
   const TemporaryFolder folder;
   const PairSet pairs = scaled_pairs(folder);
-  FrameTrainingSettings settings = small_frames();
+  FrameRecipe settings = small_frames();
   settings.epochs = 60;
   settings.learning_rate = 5e-3;
-  Trainer trainer(pairs, first(32), settings);
+  Trainer trainer(pairs, first(32), frame_objective(pairs, settings));
   const double before = trainer.train_step().l2;
   double after = 0;
   while (!trainer.done()) after = trainer.train_step().l2;
@@ -173,12 +175,16 @@ class TrainerBytes : public testing::Test {
     settings_.augment.noise = 0.02;
   }
   const std::vector<MakeTrainer> makers_ = {
-      [this] { return std::make_unique<Trainer>(windows_, all_of(windows_), settings_); },
-      [this] { return std::make_unique<Trainer>(pairs_, first(32), small_frames()); }};
+      [this] {
+        return std::make_unique<Trainer>(windows_, all_of(windows_), window_objective(windows_, settings_));
+      },
+      [this] {
+        return std::make_unique<Trainer>(pairs_, first(32), frame_objective(pairs_, small_frames()));
+      }};
 
  private:
   const TemporaryFolder folder_;
-  TrainingSettings settings_ = small_training();
+  Recipe settings_ = small_training();
   const WindowSet windows_ = small_windows(settings_.model);
   const PairSet pairs_ = scaled_pairs(folder_);
 };
@@ -208,10 +214,10 @@ TEST(Trainer, PinnedBits) {
     kernels::use_isa(*set);
     for (const int threads : {1, 2, 4, 8}) {
       omp_set_num_threads(threads);
-      TrainingSettings settings = small_training();
+      Recipe settings = small_training();
       settings.augment = kStandardAugmentation;
       const WindowSet windows = small_windows(settings.model);
-      Trainer trainer(windows, all_of(windows), settings);
+      Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
       while (!trainer.done()) trainer.train_step();
       std::uint32_t bits = 0;
       for (const Parameter& p : trainer.model().parameters())
@@ -225,14 +231,15 @@ TEST(Trainer, PinnedBits) {
 
 TEST(Trainer, RefusesToResumeAnotherRun) {
   const TemporaryFolder folder;
-  TrainingSettings settings = small_training();
+  Recipe settings = small_training();
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), settings);
+  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
   trainer.train_step();
   trainer.save(folder / "state.safetensors", {{"data", "1234"}});
-  const auto message = [&](const TrainingSettings& other, const std::string& data) -> std::string {
+  const auto message = [&](const Recipe& other, const std::string& data) -> std::string {
     try {
-      Trainer(windows, all_of(windows), other).restore(folder / "state.safetensors", {{"data", data}});
+      Trainer(windows, all_of(windows), window_objective(windows, other))
+          .restore(folder / "state.safetensors", {{"data", data}});
     } catch (const std::runtime_error& error) {
       return error.what();
     }
@@ -247,11 +254,12 @@ TEST(Trainer, RefusesToResumeAnotherRun) {
 
 TEST(Trainer, MuonGoesOnToTheSameBitsOnAnyNumberOfThreads) {
   const TemporaryFolder folder;
-  TrainingSettings settings = small_training();
+  Recipe settings = small_training();
   settings.muon = true;
   const WindowSet windows = small_windows(settings.model);
-  Trainer straight(windows, all_of(windows), settings), first(windows, all_of(windows), settings),
-      resumed(windows, all_of(windows), settings);
+  Trainer straight(windows, all_of(windows), window_objective(windows, settings)),
+      first(windows, all_of(windows), window_objective(windows, settings)),
+      resumed(windows, all_of(windows), window_objective(windows, settings));
   omp_set_num_threads(4);
   for (int step = 0; step < 5; ++step) first.train_step();
   first.save(folder / "state.safetensors", {});
@@ -269,11 +277,11 @@ TEST(Trainer, MuonGoesOnToTheSameBitsOnAnyNumberOfThreads) {
 
 TEST(Trainer, KeepsWithTheModelWhatBytesAndTheAlarmNeed) {
   const TemporaryFolder folder;
-  const TrainingSettings settings = small_training();
+  const Recipe settings = small_training();
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), settings);
+  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
   trainer.train_step();
-  trainer.save_model(folder / "m.safetensors", model_metadata(settings.model, input_of(windows)));
+  save_trained(trainer, folder / "m.safetensors", model_metadata(settings.model, input_of(windows)));
   const ModelFile file = load_model(folder / "m.safetensors");
   EXPECT_TRUE(file.ranges);
   EXPECT_TRUE(file.novelty);
@@ -281,11 +289,11 @@ TEST(Trainer, KeepsWithTheModelWhatBytesAndTheAlarmNeed) {
 
 TEST(Trainer, RefusesToResumeFromAModelWithoutState) {
   const TemporaryFolder folder;
-  const TrainingSettings settings = small_training();
+  const Recipe settings = small_training();
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), settings);
+  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
   save_model(folder / "m.safetensors", dynamic_cast<const SuperTac&>(trainer.model()), {},
-             {{"training", to_json(settings).dump()}});
+             {{"training", training_text(settings)}});
   try {
     trainer.restore(folder / "m.safetensors", {});
     FAIL();
@@ -296,9 +304,9 @@ TEST(Trainer, RefusesToResumeFromAModelWithoutState) {
 
 // The message of the step after `damage` has been done to the parameter of that name.
 std::string stopped(const std::string& name, const std::function<void(Tensor&)>& damage) {
-  const TrainingSettings settings = small_training();
+  const Recipe settings = small_training();
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), settings);
+  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
   trainer.train_step();
   for (const Parameter& p : trainer.model().parameters()) {
     if (p.name == name) damage(Variable(p.value).mutable_value());
@@ -331,12 +339,12 @@ TEST(Trainer, StopsWithStepLayerAndAdviceWhenAValueIsNotFinite) {
 // A network whose last layer is dead draws a flat image and learns nothing any more, and one whose encoders
 // are dead draws the same one for all; the detector must say so, and must keep quiet about a healthy run.
 TEST(Trainer, ReportsPicturesThatAreTheSameForAllAndIdleLatents) {
-  TrainingSettings settings = small_training();
+  Recipe settings = small_training();
   settings.epochs = 10;
   const WindowSet windows = small_windows(settings.model);
   StepReport last;
-  const auto steps_until_reported = [&](const TrainingSettings& s, const std::string& dead) {
-    Trainer trainer(windows, all_of(windows), s);
+  const auto steps_until_reported = [&](const Recipe& s, const std::string& dead) {
+    Trainer trainer(windows, all_of(windows), window_objective(windows, s));
     for (const Parameter& p : trainer.model().parameters()) {
       if (p.name.find(dead) != std::string::npos) Variable(p.value).mutable_value().fill(0);
     }
@@ -356,27 +364,27 @@ TEST(Trainer, ReportsPicturesThatAreTheSameForAllAndIdleLatents) {
 }
 
 TEST(Trainer, RefusesWindowsOfAnotherFormat) {
-  TrainingSettings settings = small_training();
+  Recipe settings = small_training();
   const WindowSet windows = small_windows(settings.model);
   settings.model.timesteps = 48;
   try {
-    Trainer(windows, all_of(windows), settings);
+    Trainer(windows, all_of(windows), window_objective(windows, settings));
     FAIL() << "windows of 32 frames were taken for 48";
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(error.what(),
                  "the data have 32 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8, the model "
                  "expects 48 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8");
   }
-  EXPECT_THROW(Trainer(windows, {}, small_training()), std::invalid_argument);
+  EXPECT_THROW(Trainer(windows, {}, window_objective(windows, small_training())), std::invalid_argument);
 }
 
 TEST(Trainer, NamesTheSettingThatIsOutOfRange) {
   const WindowSet windows = small_windows(small_settings());
-  const auto message = [&](const std::function<void(TrainingSettings&)>& spoil) -> std::string {
-    TrainingSettings settings = small_training();
+  const auto message = [&](const std::function<void(Recipe&)>& spoil) -> std::string {
+    Recipe settings = small_training();
     spoil(settings);
     try {
-      Trainer(windows, all_of(windows), settings);
+      Trainer(windows, all_of(windows), window_objective(windows, settings));
     } catch (const std::invalid_argument& error) {
       return error.what();
     }

@@ -1,0 +1,153 @@
+#include "models/training/recipe.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "io/files/json.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+#include "models/files/json_entry.h"
+#include "models/files/model_file.h"
+
+namespace supertac {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json pace_json(const TrainingPace& p) {
+  Json json{{"epochs", p.epochs},   {"batch", p.batch},
+            {"seed", p.seed},       {"learning_rate", p.learning_rate},
+            {"warm_up", p.warm_up}, {"clip_norm", p.clip_norm}};
+  if (p.muon) json["optimizer"] = "muon";
+  return json;
+}
+
+void require(bool holds, const std::string& what, double found) {
+  if (!holds) throw std::invalid_argument("recipe: expected " + what + ", got " + format(found));
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ",") + word;
+  return text;
+}
+
+void read_training(const JsonEntry& entry, Recipe& r) {
+  r.epochs = entry.integer("epochs");
+  r.batch = entry.integer("batch");
+  r.learning_rate = entry.number("learning_rate");
+  r.warm_up = entry.number("warm_up");
+  r.clip_norm = entry.number("clip_norm");
+  r.muon = entry.has("optimizer") && entry.text("optimizer") == "muon";
+  r.loss = {entry.number("a"), entry.number("beta"), entry.number("lambda")};
+  r.augment = {.lift = entry.number("lift"),
+               .gain = entry.number("gain"),
+               .taxel_gain = entry.number("taxel_gain"),
+               .offset = entry.number("offset"),
+               .noise = entry.number("noise"),
+               .dropped = static_cast<int>(entry.integer("dropped"))};
+  r.sampling = !entry.has("sampling") || entry.flag("sampling");
+}
+
+}  // namespace
+
+void Recipe::check() const {
+  TrainingPace::check();
+  model.check();
+  loss.check();
+  require(rate_hz >= 20 && rate_hz <= 2000, "rate_hz from 20 to 2000", rate_hz);
+  require(stride >= 1 && stride <= 100'000, "stride from 1 to 100000", static_cast<double>(stride));
+  require(random_plates >= 0 && random_plates <= 50'000, "random_plates from 0 to 50000",
+          static_cast<double>(random_plates));
+  require(interval_factor >= 0.1 && interval_factor <= 100, "interval_factor from 0.1 to 100",
+          interval_factor);
+  if (range) require(std::abs(range->span_volts) > 1e-6, "a span that is not 0", range->span_volts);
+  if (!leave_out.empty() && split != SplitKind::texture)
+    throw std::invalid_argument("--leave-out needs --split texture, found --split " + name_of(split));
+}
+
+Recipe Recipe::named(const std::string& name) {
+  constexpr double kWindowS = 2.56;
+  Recipe r;
+  r.model = SuperTacSettings::of_preset(name);
+  r.rate_hz = static_cast<double>(r.model.timesteps) / kWindowS;
+  r.augment = kStandardAugmentation;
+  if (name == "best") {
+    r.sampling = false, r.loss.beta = 0;
+    r.muon = true;
+  } else if (name == "tiny") {
+    r.epochs = 80;
+    r.learning_rate = 2e-3;
+  }
+  return r;
+}
+
+std::string training_text(const Recipe& r) {
+  Json json = pace_json(r);
+  json.update({{"a", r.loss.a},
+               {"beta", r.loss.beta},
+               {"lambda", r.loss.lambda},
+               {"lift", r.augment.lift},
+               {"gain", r.augment.gain},
+               {"taxel_gain", r.augment.taxel_gain},
+               {"offset", r.augment.offset},
+               {"noise", r.augment.noise},
+               {"dropped", r.augment.dropped}});
+  if (!r.sampling) json["sampling"] = false;
+  return json.dump();
+}
+
+std::string training_text(const FrameRecipe& r) {
+  Json json = pace_json(r);
+  json["lambda"] = r.lambda;
+  return json.dump();
+}
+
+std::map<std::string, std::string> metadata_of(const Recipe& r) {
+  std::map<std::string, std::string> entries = {{"training", training_text(r)},
+                                                {"split", name_of(r.split)},
+                                                {"seed", std::to_string(r.seed)},
+                                                {"plates", joined(r.plates)},
+                                                {"stride", std::to_string(r.stride)}};
+  if (r.interval_factor != kIntervalFactor) entries["interval_factor"] = format(r.interval_factor);
+  if (!r.leave_out.empty()) entries["leave_out"] = joined(r.leave_out);
+  if (r.random_plates > 0) entries["random_plates"] = std::to_string(r.random_plates);
+  return entries;
+}
+
+Recipe Recipe::of(const ModelFile& file, const std::string& path) {
+  if (!file.model) throw std::runtime_error(path + ": expected a model of windows, found a frame model");
+  const auto entry = [&](const char* key) {
+    const auto found = file.metadata.find(key);
+    if (found == file.metadata.end())
+      throw std::runtime_error(path + ": does not say its " + key + "; it was trained by an older version");
+    return found->second;
+  };
+  const auto whole = [&](const char* key, const std::string& text) {
+    const auto number = parse_uint(text);
+    if (!number)
+      throw std::runtime_error(path + ": " + key + " expects a whole number, found " + in_quotes(text));
+    return *number;
+  };
+  Recipe r;
+  r.model = file.model->settings();
+  read_training({file.metadata, path, "training"}, r);
+  r.seed = whole("seed", entry("seed"));
+  r.stride = static_cast<std::int64_t>(whole("stride", entry("stride")));
+  r.random_plates = static_cast<std::int64_t>(whole("random_plates", file.metadata_or("random_plates", "0")));
+  r.plates = comma_list(entry("plates"));
+  r.leave_out = comma_list(file.metadata_or("leave_out", ""));
+  r.rate_hz = file.input.rate_hz;
+  r.range = file.input.scaling;
+  r.levelled = file.input.scaling.levelled;
+  r.interval_factor = file.interval_factor();
+  try {
+    r.split = split_kind(entry("split"));
+    r.check();
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(path + ": " + error.what());
+  }
+  return r;
+}
+
+}  // namespace supertac

@@ -1,0 +1,69 @@
+// Everything that decides a trained file besides the recordings: the same recipe and the same recordings make
+// the same bytes, whoever trains.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/windows/augment.h"
+#include "data/windows/split.h"
+#include "models/inference/interval.h"
+#include "models/networks/frame_model.h"
+#include "models/networks/supertac_model.h"
+#include "models/training/loss.h"
+#include "models/training/training_state.h"
+
+namespace supertac {
+
+struct ModelFile;
+
+struct Recipe : TrainingPace {
+  SuperTacSettings model;  ///< rows, columns and in_channels become those of the recordings
+  LossWeights loss;
+  /// Whether z is drawn around its mean. Without, and with beta 0, the VAEs are plain autoencoders.
+  bool sampling = true;
+  /// Of the windows. With any of it passes in which nothing is felt are added (add_silent_passes).
+  AugmentSettings augment;
+
+  std::vector<std::string> plates;     ///< only recordings of these; none: of all
+  SplitKind split = SplitKind::trial;  ///< what is kept for testing
+  std::vector<std::string> leave_out;  ///< of split texture: the plates that are tested
+  double rate_hz = 300;                ///< of the model's samples, 20 to 2000
+  std::int64_t stride = 1;             ///< every stride-th frame of a pass ends a window
+  std::optional<Scaling> range;        ///< rest and span; nothing: SignalRange::fitted()
+  bool levelled = true;                ///< whether a window is brought to its own rest and gain
+  std::int64_t random_plates = 0;      ///< simulated passes besides, each over a plate of its own
+  /// Half the width of a pixel's 90 % interval in units of its predicted error, for the model's file.
+  double interval_factor = kIntervalFactor;
+
+  /// Throws std::invalid_argument naming the setting, its range and what was given.
+  void check() const;
+
+  /// `paper`: as in the paper, at 100 Hz. `best`: what measures best for one network, the same as plain
+  /// autoencoders by Muon. `tiny`: a ninth of the multiply-adds, at 50 Hz. Epochs and rate are what each is
+  /// trained to its best with on the rig's recordings (bench/results). Throws std::invalid_argument for
+  /// another name, listing these.
+  static Recipe named(const std::string& name);
+  /// What `file` (read from `path`) was trained with, its signal range included: the same recordings give the
+  /// same file again. Throws std::runtime_error naming path and entry when the file does not say it.
+  static Recipe of(const ModelFile& file, const std::string& path);
+};
+
+/// What a model file says of its recipe besides the entries "settings" and "input" of model_metadata().
+/// Settings that are as they always were are left out: the text of older files stays the same.
+std::map<std::string, std::string> metadata_of(const Recipe& recipe);
+
+/// Training of a frame model on pairs of images: loss = L2 + lambda (1 - SSIM), the picture's part of
+/// SuperTac's.
+struct FrameRecipe : TrainingPace {
+  FrameSettings model;
+  double lambda = 0.1;
+};
+
+/// The entry "training" of a model file: steps, loss and augmentation as JSON text.
+std::string training_text(const Recipe& recipe);
+std::string training_text(const FrameRecipe& recipe);
+
+}  // namespace supertac

@@ -1,0 +1,122 @@
+#include "models/training/task.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "data/recordings/signal_range.h"
+#include "data/windows/random_passes.h"
+#include "data/windows/signal_remarks.h"
+#include "io/numbers/numbers.h"
+
+namespace supertac {
+namespace {
+
+// Training on signals that are clipped draws zeros without a word.
+Scaling scaling_of(const Recipe& recipe, const SignalRange& range, std::vector<std::string>& notes) {
+  constexpr double kMostClipped = 0.5, kWorthSaying = 0.01;
+  Scaling scaling = recipe.range ? *recipe.range : range.fitted();
+  const std::string text = format(scaling.rest_volts) + "," + format(scaling.span_volts);
+  const double clipped = range.clipped(scaling);
+  const std::string clips = "--range " + text + " clips " + format(100 * clipped, 1) +
+                            " % of the signals, which lie at " + range.text();
+  if (clipped > kMostClipped) throw std::runtime_error(clips + "; give REST,SPAN that hold them, or auto");
+  if (clipped > kWorthSaying || scaling.rest_volts != Scaling().rest_volts) notes.push_back(clips);
+  if (recipe.random_plates > 0 && scaling.rest_volts != Scaling().rest_volts)
+    throw std::invalid_argument("--random-plates imitates the rig, whose signals rest at " +
+                                format(Scaling().rest_volts) + "; those of these recordings rest at " +
+                                format(scaling.rest_volts));
+  scaling.levelled = recipe.levelled;
+  return scaling;
+}
+
+// Of the recordings that are tested; the rig's when they differ.
+double common_speed(const WindowSet& windows) {
+  double speed = 0;
+  for (const WindowSet::Pass& pass : windows.passes()) {
+    if (pass.windows == 0 || pass.aside || pass.speed_mm_s <= 0) continue;
+    if (speed > 0 && pass.speed_mm_s != speed) return rig::kSlideMmS;
+    speed = pass.speed_mm_s;
+  }
+  return speed > 0 ? speed : rig::kSlideMmS;
+}
+
+// Who trains and tests on the simulated finger needs no other one; a real finger is not like it.
+bool all_simulated(const WindowSet& windows) {
+  return std::ranges::all_of(windows.passes(),
+                             [](const WindowSet::Pass& pass) { return pass.source == "simulated"; });
+}
+
+WindowSet windows_of(const Recipe& recipe, const RecordingFolders& folders, std::vector<std::string>& notes) {
+  const auto watch = [&](const std::string& folder) {
+    return folders.watch ? folders.watch(folder) : ReadingWatch();
+  };
+  WindowSettings w;
+  w.timesteps = static_cast<int>(recipe.model.timesteps);
+  w.scale = static_cast<int>(recipe.model.scale);
+  w.rate_hz = recipe.rate_hz;
+  w.stride = static_cast<int>(recipe.stride);
+  w.scaling =
+      scaling_of(recipe, SignalRange::of_folder(folders.data, recipe.plates, watch(folders.data)), notes);
+  WindowSet windows = WindowSet::load(folders.data, recipe.plates, w, watch(folders.data));
+  if (!folders.also.empty()) windows.add_directory(folders.also, {}, true, watch(folders.also));
+  const RandomPasses random{.count = static_cast<std::size_t>(recipe.random_plates),
+                            .seed = recipe.seed,
+                            .speed_mm_s = common_speed(windows),
+                            .filter_s = windows.filter_s().value_or(rig::kFilterS),
+                            .other_fingers = !all_simulated(windows)};
+  add_random_passes(windows, random);
+  if (recipe.augment.any()) add_silent_passes(windows, recipe.seed, random.count > 0 && random.other_fingers);
+  return windows;
+}
+
+void add_data(TrainingTask& task) {
+  task.origin["data"] = task.examples->fingerprint();
+  task.origin["split_fingerprint"] = fingerprint(task.split);
+}
+
+}  // namespace
+
+TrainingTask window_task(const Recipe& given, const RecordingFolders& folders) {
+  given.check();
+  std::vector<std::string> notes;
+  const auto windows = std::make_shared<const WindowSet>(windows_of(given, folders, notes));
+  Recipe recipe = given;
+  set_array(recipe.model, windows->array());
+  TrainingTask task{.examples = windows,
+                    .unit = "windows",
+                    .split = make_split(*windows, recipe.split, recipe.seed, recipe.leave_out),
+                    .objective = window_objective(*windows, recipe)};
+  task.split.train = without_most_silence(*windows, std::move(task.split.train));
+  task.origin = metadata_of(recipe);
+  task.origin.erase("training");  // the objective says it
+  add_data(task);
+  task.beta = recipe.loss.beta;
+  task.counts = windows->counts().summary();
+  task.leakage = find_leakage(*windows, task.split);
+  task.notes = std::move(notes);
+  if (recipe.split != SplitKind::none && !task.leakage->none())
+    task.notes.push_back("split " + name_of(recipe.split) + " leaks: of " +
+                         std::to_string(task.split.test.size()) + " test windows " +
+                         std::to_string(task.leakage->overlapping) + " share frames with training windows, " +
+                         std::to_string(task.leakage->duplicated) +
+                         " repeat one; use --split trial for results");
+  task.remarks = remarks_on(*windows, task.split.train);
+  return task;
+}
+
+TrainingTask pair_task(const FrameRecipe& recipe, PairSet given, const std::string& split) {
+  const auto pairs = std::make_shared<PairSet>(std::move(given));
+  TrainingTask task{
+      .examples = pairs, .unit = "pairs", .split = split_pairs(*pairs, split, recipe.seed), .objective = {}};
+  pairs->fit_scaling(task.split.train);
+  task.objective = frame_objective(*pairs, recipe);
+  task.origin = {{"split", split}, {"seed", std::to_string(recipe.seed)}};
+  add_data(task);
+  task.counts = std::to_string(pairs->size()) + " pairs";
+  if (split == "pair")
+    task.notes.emplace_back("split pair leaks when frames resemble each other; use groups for results");
+  task.remarks = remarks_on(*pairs);
+  return task;
+}
+
+}  // namespace supertac

@@ -1,0 +1,45 @@
+// What is trained on what: the windows that a recipe makes of recordings, or pairs of images.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "models/training/objective.h"
+
+namespace supertac {
+
+/// Where recordings lie.
+struct RecordingFolders {
+  std::string data;       ///< these are split
+  std::string also = {};  ///< these are only trained on; "": none
+  /// Watches the reading of a folder; nothing: nobody does.
+  std::function<ReadingWatch(const std::string& folder)> watch = {};
+};
+
+struct TrainingTask {
+  std::shared_ptr<const Examples> examples;
+  std::string unit;  ///< what they are: "windows" or "pairs"
+  Split split;
+  std::unique_ptr<Objective> objective;
+  /// What the model file says of its origin; the same whatever machine, folder or number of threads.
+  std::map<std::string, std::string> origin = {};
+  double beta = 0;                        ///< of the KL divergence
+  std::string counts = {};                ///< where the frames of the recordings went, for people
+  std::optional<Leakage> leakage = {};    ///< of windows
+  std::vector<std::string> notes = {};    ///< what is to be said before training: a range that clips, a leak
+  std::vector<std::string> remarks = {};  ///< remarks_on() the training windows
+};
+
+/// Reads the recordings, adds random and silent passes, splits. Throws std::invalid_argument as
+/// Recipe::check, std::runtime_error as WindowSet::load, and when the signal range clips most of the signals
+/// or random passes, which have the rig's volts, do not fit the recordings.
+TrainingTask window_task(const Recipe& recipe, const RecordingFolders& folders);
+
+/// Of the split `group`, `pair` or `none`; sets the pairs' scaling. Throws as split_pairs().
+TrainingTask pair_task(const FrameRecipe& recipe, PairSet pairs, const std::string& split);
+
+}  // namespace supertac

@@ -1,0 +1,117 @@
+#include "models/training/train.h"
+
+#include <chrono>
+#include <filesystem>
+#include <utility>
+
+#include "data/plates/truth.h"
+#include "data/scores/metrics.h"
+#include "data/windows/signal_features.h"
+#include "layers/checkpoint.h"
+#include "models/inference/evaluation.h"
+#include "models/inference/novelty.h"
+#include "models/inference/ranges.h"
+
+namespace supertac {
+namespace {
+
+constexpr std::size_t kTestedPerEpoch = 2000;
+constexpr std::int64_t kStepsPerLine = 50;
+
+void test(const Trainer& trainer, const TrainingTask& task, const std::function<bool()>& stop,
+          LogLine& line) {
+  const ImageGrid image = task.examples->image();
+  PairMetrics metrics(static_cast<std::size_t>(image.height), static_cast<std::size_t>(image.width));
+  for_each_output(Ensemble({Prepared(trainer.model())}), *task.examples,
+                  spread(task.split.test, kTestedPerEpoch), [&](const EvaluatedBatch& b) {
+                    for (std::size_t n = 0; n < b.size(); ++n)
+                      if (in_contact(b.target(n))) metrics.add(b.output(n), b.target(n));
+                    return !stop || !stop();
+                  });
+  if (metrics.result().windows == 0) return;
+  line.test_ssim = metrics.result().ssim;
+  line.test_psnr_db = metrics.result().psnr_mean_db;
+}
+
+// Of an even sample of the training examples, as they are: augmentation hides what is to be noticed.
+std::vector<StoredTensor> novelty_of(const Trainer& trainer) {
+  constexpr std::size_t kMostSamples = 20'000;
+  if (trainer.objective().latents() == 0) return {};  // a frame alone says nothing of its sensor
+  const Examples& data = trainer.examples();
+  std::vector<std::uint32_t> usual;
+  std::ranges::copy_if(trainer.training_side(), std::back_inserter(usual),
+                       [&](std::uint32_t i) { return data.usual(i); });
+  const std::vector<std::uint32_t> chosen = spread(usual, kMostSamples);
+  const std::size_t count = signal_feature_count(data.array());
+  if (chosen.size() <= count) return {};
+  Tensor features(Shape{static_cast<Dim>(chosen.size()), static_cast<Dim>(count)});
+  std::vector<float> window(data.input_size());
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    data.input(chosen[i], window);
+    signal_features(window, data.array(), features.values().subspan(i * count, count));
+  }
+  return Novelty(features).stored();
+}
+
+StoredTensor ranges_of(const Trainer& trainer) {
+  constexpr std::size_t kSamples = 1024;
+  ActivationRanges ranges;
+  for_each_output(Ensemble({Prepared(trainer.model())}), trainer.examples(),
+                  spread(trainer.training_side(), kSamples), [&](const EvaluatedBatch& b) {
+                    ranges.add(trainer.model(), b.inputs);
+                    return true;
+                  });
+  return ranges.stored();
+}
+
+}  // namespace
+
+bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& callbacks) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto save = [&] { trainer.save(callbacks.checkpoint, task.origin); };
+  LogLine sums;
+  std::int64_t steps = 0;
+  bool stop = callbacks.stop && trainer.ranks() == 1 && callbacks.stop();
+  while (!trainer.done() && !stop) {
+    const StepReport report = trainer.train_step(callbacks.stop);
+    sums.add(report);
+    sums.gradient_norm += report.gradient_norm;
+    ++steps;
+    if (callbacks.step) callbacks.step(report);
+    const bool epoch_ends = report.step % trainer.steps_per_epoch() == 0;
+    if (callbacks.log && (epoch_ends || report.step % kStepsPerLine == 0)) {
+      for (double* sum : sums.all()) *sum /= static_cast<double>(steps);
+      sums.gradient_norm /= static_cast<double>(steps);
+      sums.time_s = callbacks.seconds_before +
+                    std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      sums.step = report.step, sums.learning_rate = report.learning_rate;
+      if (epoch_ends) test(trainer, task, callbacks.stop, sums);
+      callbacks.log(std::exchange(sums, {}));
+      steps = 0;
+    }
+    if (report.step % callbacks.checkpoint_every == 0) save();
+    stop = report.stop || (callbacks.stop && trainer.ranks() == 1 && callbacks.stop());
+  }
+  save();
+  return trainer.done();
+}
+
+void save_trained(const Trainer& trainer, const std::string& path,
+                  const std::map<std::string, std::string>& origin) {
+  std::vector<StoredTensor> more = novelty_of(trainer);
+  more.push_back(ranges_of(trainer));
+  write_checkpoint(path, trainer.model().parameters(), trainer.metadata(origin), more);
+}
+
+bool train(const Recipe& recipe, const RecordingFolders& folders, const std::string& out,
+           const TrainingCallbacks& callbacks) {
+  TrainingTask task = window_task(recipe, folders);
+  Trainer trainer(*task.examples, task.split.train, std::move(task.objective));
+  if (!callbacks.checkpoint.empty() && std::filesystem::exists(callbacks.checkpoint))
+    trainer.restore(callbacks.checkpoint, task.origin);
+  if (!train(trainer, task, callbacks)) return false;
+  save_trained(trainer, out, task.origin);
+  return true;
+}
+
+}  // namespace supertac

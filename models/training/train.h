@@ -1,0 +1,51 @@
+// The whole training of a recipe: what supertac-train does, for whoever links the library.
+//
+//   train(Recipe::named("tiny"), {"recordings"}, "model.safetensors");
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "models/training/recipe.h"
+#include "models/training/task.h"
+#include "models/training/trainer.h"
+
+namespace supertac {
+
+/// One line of a training's log: means over the steps since the line before.
+struct LogLine : LossTerms {
+  double time_s = 0;  ///< since training began, pauses between resumed runs left out
+  std::int64_t step = 0;
+  double gradient_norm = 0, learning_rate = 0;
+  /// Of an even sample of the test examples in contact, at the end of an epoch; nothing is chosen by them.
+  std::optional<double> test_ssim, test_psnr_db;
+};
+
+struct TrainingCallbacks {
+  std::function<bool()> stop = {};                          ///< asked after every step: whether to end early
+  std::function<void(const StepReport& report)> step = {};  ///< after every step
+  /// Every 50 steps and at the end of every epoch.
+  std::function<void(const LogLine& line)> log = {};
+  /// Where the state is saved, every so many steps and at the end; "": nowhere.
+  std::string checkpoint = {};
+  std::int64_t checkpoint_every = 500;
+  double seconds_before = 0;  ///< on the log's clock when this process began
+};
+
+/// Trains until the last step or a stop; returns whether all steps are done. Throws as Trainer::train_step
+/// and Trainer::save.
+bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& callbacks = {});
+
+/// The model alone, ready for use: with `origin` in its metadata, the ranges of its values for int8 and, for
+/// windows of time, the Novelty of its training examples. Throws FileError.
+void save_trained(const Trainer& trainer, const std::string& path,
+                  const std::map<std::string, std::string>& origin);
+
+/// All of it: reads the recordings, goes on from `callbacks.checkpoint` where that file exists, trains, and
+/// writes the model. Returns whether all steps are done; otherwise no model is written. Throws as
+/// window_task(), Trainer::restore() and the others above.
+bool train(const Recipe& recipe, const RecordingFolders& folders, const std::string& out,
+           const TrainingCallbacks& callbacks = {});
+
+}  // namespace supertac

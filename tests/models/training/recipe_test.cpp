@@ -1,0 +1,99 @@
+#include "models/training/recipe.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "models/files/model_file.h"
+#include "models/networks/cost.h"
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+// What a model trained by this recipe says of itself.
+ModelFile file_of(const Recipe& recipe, const std::string& path) {
+  Rng rng(0);
+  InputSettings input{.rate_hz = recipe.rate_hz, .scaling = recipe.range.value_or(Scaling())};
+  input.scaling.levelled = recipe.levelled;
+  save_model(path, SuperTac(recipe.model, rng), input, metadata_of(recipe));
+  return load_model(path);
+}
+
+TEST(Recipe, ComesBackFromTheModelFile) {
+  const TemporaryFolder folder;
+  for (const char* name : {"paper", "best", "tiny"}) {
+    Recipe recipe = Recipe::named(name);
+    recipe.model.latent = 3, recipe.model.channels = 8, recipe.model.rcabs = 1;
+    recipe.epochs = 7, recipe.batch = 16, recipe.seed = 12'345'678'901;
+    recipe.loss.lambda = 0.25;
+    recipe.plates = {"3_Bumps", "4_Ridges"}, recipe.leave_out = {"4_Ridges"};
+    recipe.split = SplitKind::texture;
+    recipe.stride = 4, recipe.random_plates = 9, recipe.interval_factor = 1.5;
+    recipe.range = Scaling{.rest_volts = 2, .span_volts = 0.5};
+    recipe.augment.dropped = 1;
+    const std::string path = folder / (std::string(name) + ".safetensors");
+    const Recipe back = Recipe::of(file_of(recipe, path), path);
+    EXPECT_EQ(metadata_of(back), metadata_of(recipe)) << name;
+    EXPECT_EQ(model_metadata(back.model, {}), model_metadata(recipe.model, {})) << name;
+    EXPECT_EQ(back.rate_hz, recipe.rate_hz);
+    EXPECT_EQ(back.range->span_volts, 0.5);
+    EXPECT_EQ(back.sampling, recipe.sampling);
+    EXPECT_EQ(back.muon, recipe.muon);
+  }
+}
+
+TEST(Recipe, NamedOnesSeeTwoAndAHalfSeconds) {
+  for (const char* name : {"paper", "best", "tiny"}) {
+    const Recipe recipe = Recipe::named(name);
+    EXPECT_DOUBLE_EQ(static_cast<double>(recipe.model.timesteps) / recipe.rate_hz, 2.56) << name;
+    EXPECT_EQ(recipe.model.preset, name);
+    EXPECT_NO_THROW(recipe.check());
+  }
+  const Recipe paper = Recipe::named("paper"), best = Recipe::named("best"), tiny = Recipe::named("tiny");
+  EXPECT_TRUE(paper.sampling && !paper.muon);
+  EXPECT_TRUE(!best.sampling && best.loss.beta == 0 && best.muon);
+  EXPECT_LT(2 * tiny.rate_hz * static_cast<double>(tiny.epochs) / 9,
+            paper.rate_hz * static_cast<double>(paper.epochs))
+      << "half the work of a training of paper";
+  EXPECT_THROW(Recipe::named("small"), std::invalid_argument);
+}
+
+TEST(Recipe, RefusesWhatNoTrainingHas) {
+  const auto message = [](const std::function<void(Recipe&)>& spoil) -> std::string {
+    Recipe recipe = Recipe::named("tiny");
+    spoil(recipe);
+    try {
+      recipe.check();
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "nothing";
+  };
+  EXPECT_EQ(message([](Recipe& r) { r.stride = 0; }), "recipe: expected stride from 1 to 100000, got 0");
+  EXPECT_EQ(message([](Recipe& r) { r.rate_hz = 5; }), "recipe: expected rate_hz from 20 to 2000, got 5");
+  EXPECT_EQ(message([](Recipe& r) { r.random_plates = -1; }),
+            "recipe: expected random_plates from 0 to 50000, got -1");
+  EXPECT_EQ(message([](Recipe& r) { r.range = Scaling{.rest_volts = 1, .span_volts = 0}; }),
+            "recipe: expected a span that is not 0, got 0");
+  EXPECT_NE(message([](Recipe& r) { r.leave_out = {"3_Bumps"}; }).find("--split texture"), std::string::npos);
+  EXPECT_NE(message([](Recipe& r) { r.epochs = 0; }).find("epochs"), std::string::npos);
+  EXPECT_NE(message([](Recipe& r) { r.model.latent = 0; }).find("latent"), std::string::npos);
+}
+
+TEST(Recipe, AFileThatDoesNotSayItIsRefusedByName) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "old.safetensors";
+  Rng rng(0);
+  save_model(path, SuperTac(small_settings(), rng), {}, {{"seed", "1"}});
+  try {
+    Recipe::of(load_model(path), path);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find(path + ": metadata \"training\" is missing"), std::string::npos)
+        << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace supertac
