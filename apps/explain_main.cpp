@@ -105,7 +105,7 @@ Json step_of(const TracedOp& op, const std::string& y, const Names& names) {
   Json step = {
       {"y", y}, {"op", op.op}, {"inputs", inputs}, {"shape", std::vector<Dim>(dims.begin(), dims.end())}};
   if (op.op.starts_with("conv"))
-    step.update({{"stride", op.settings.map.stride_w}, {"padding", op.settings.map.padding_w}});
+    step.update({{"stride", op.settings.conv.stride_w}, {"padding", op.settings.conv.padding_w}});
   if (op.op.starts_with("conv") || op.op == "linear") step["slope"] = op.settings.negative_slope;
   if (op.op == "take_runs")
     step.update({{"first", op.settings.first}, {"run", op.settings.run}, {"step", op.settings.step}});

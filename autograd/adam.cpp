@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "autograd/kernels/elementwise.h"
-#include "autograd/kernels/fast/loops.h"
+#include "autograd/kernels/fast/each.h"
 #include "autograd/orthogonal.h"
 #include "autograd/pool.h"
 
@@ -24,7 +24,7 @@ struct Update {
 inline real flushed(real x) { return std::abs(x) < real(1e-30) ? real(0) : x; }
 
 void update(Dim n, Update u, const real* gradient, real* x, real* m, real* v) {
-  kernels::each(n, [=](Dim i) SUPERTAC_LOOP {
+  kernels::each(n, [=](Dim i) {
     const real g = u.clip * gradient[i];
     m[i] = flushed(u.b1 * m[i] + u.rest1 * g);
     v[i] = flushed(u.b2 * v[i] + u.rest2 * g * g);
@@ -38,7 +38,7 @@ void move_matrix(const Shape& shape, real clip, double rate, const real* gradien
   const Dim n = shape.elements(), columns = shape[shape.rank() - 1], rows = n / columns;
   Scratch<real> direction(static_cast<std::size_t>(n));
   real* to = direction.data();
-  kernels::each(n, [=](Dim i) SUPERTAC_LOOP {
+  kernels::each(n, [=](Dim i) {
     const real g = clip * gradient[i], moment = flushed(kMomentum * m[i] + kRest * g);
     m[i] = moment;
     to[i] = kMomentum * moment + kRest * g;  // Nesterov's

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "autograd/kernels/elementwise.h"
-#include "autograd/kernels/fast/loops.h"
-#include "autograd/kernels/linear.h"
+#include "autograd/kernels/fast/each.h"
+#include "autograd/ops/linear.h"
 #include "autograd/pool.h"
 
 namespace supertac {
@@ -27,7 +27,8 @@ void orthogonalise(Dim rows, Dim columns, real* x) {
   Scratch<real> start(static_cast<std::size_t>(size)), squares(static_cast<std::size_t>(5 * square));
   real* const from = start.data();
   real *s = squares.data(), *p = s + square, *q = p + square, *next = q + square, *spare = next + square;
-  kernels::scale(size, static_cast<real>(1 / (std::sqrt(kernels::sum_of_squares(size, x)) + 1e-7)), x, from);
+  const auto factor = static_cast<real>(1 / (std::sqrt(kernels::sum_of_squares(size, x)) + 1e-7));
+  kernels::each(size, [=](Dim i) { from[i] = factor * x[i]; });
   if (wide) {
     kernels::linear_grad_x(rows, rows, columns, from, from, Into::overwrite, s);
   } else {
@@ -35,7 +36,7 @@ void orthogonalise(Dim rows, Dim columns, real* x) {
   }
   for (int step = 0; step < kSteps; ++step) {
     multiply(side, s, s, p);
-    kernels::each(square, [=](Dim i) SUPERTAC_LOOP { p[i] = kB * s[i] + kC * p[i]; });
+    kernels::each(square, [=](Dim i) { p[i] = kB * s[i] + kC * p[i]; });
     for (Dim i = 0; i < side; ++i) p[i * side + i] += kA;
     if (step == 0) {
       std::copy_n(p, square, q);

@@ -22,9 +22,6 @@ class ReverseWatch {
   /// again once those and b.gy() are as they were.
   virtual void reverse(const char* op, std::size_t inputs, Backward& b,
                        const std::function<void()>& step) = 0;
-
-  /// The one of this thread, or null.
-  static ReverseWatch* current();
 };
 
 }  // namespace supertac

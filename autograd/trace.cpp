@@ -1,7 +1,6 @@
 #include "autograd/trace.h"
 
 #include <stdexcept>
-#include <utility>
 
 namespace supertac {
 
@@ -15,15 +14,13 @@ Trace::Trace() {
 
 Trace::~Trace() { current = nullptr; }
 
-void Trace::describe(const OpSettings& settings) {
-  if (current != nullptr) current->next_ = settings;
-}
-
-void Trace::note(const char* op, const Variable& y, std::span<const Variable* const> inputs) {
+void Trace::note(const char* op, const Variable& y, std::span<const Variable* const> inputs,
+                 const OpSettings* settings) {
   if (current == nullptr) return;
   const auto now = std::chrono::steady_clock::now();
   const double us = std::chrono::duration<double, std::micro>(now - current->last_).count();
-  TracedOp& traced = current->ops_.emplace_back(TracedOp{op, y, {}, std::exchange(current->next_, {}), us});
+  TracedOp& traced =
+      current->ops_.emplace_back(TracedOp{op, y, {}, settings != nullptr ? *settings : OpSettings{}, us});
   for (const Variable* x : inputs) traced.inputs.push_back(*x);
   current->last_ = std::chrono::steady_clock::now();
 }

@@ -12,9 +12,9 @@
 
 namespace supertac {
 
-/// What an op was told besides its inputs; each op fills in what it has.
+/// What an op was told besides its inputs; each op gives record() what it has.
 struct OpSettings {
-  kernels::ConvSettings map{};       ///< convolutions
+  kernels::ConvSettings conv{};      ///< convolutions
   real negative_slope = 1;           ///< convolutions and linear layers
   Dim first = 0, run = 0, step = 0;  ///< take_runs
 };
@@ -37,14 +37,12 @@ class Trace {
 
   const std::vector<TracedOp>& ops() const { return ops_; }
 
-  /// For ops: settings of the one that is recorded next.
-  static void describe(const OpSettings& settings);
   /// For record(): `y` was made.
-  static void note(const char* op, const Variable& y, std::span<const Variable* const> inputs);
+  static void note(const char* op, const Variable& y, std::span<const Variable* const> inputs,
+                   const OpSettings* settings);
 
  private:
   std::vector<TracedOp> ops_;
-  OpSettings next_;
   std::chrono::steady_clock::time_point last_;
 };
 

@@ -6,61 +6,18 @@
 // as soon as its reverse step has run.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <initializer_list>
-#include <new>
 #include <span>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "autograd/node.h"
 #include "autograd/tensor.h"
 
 namespace supertac {
 
-class Backward;
-
-namespace detail {
-
-/// A reverse step kept inside the node: no heap allocation, moved never.
-class ReverseStep {
- public:
-  ReverseStep() = default;
-  ReverseStep(const ReverseStep&) = delete;
-  ReverseStep& operator=(const ReverseStep&) = delete;
-  ~ReverseStep() { reset(); }
-
-  template <class F>
-  void set(F&& f) {
-    using Step = std::decay_t<F>;
-    static_assert(sizeof(Step) <= sizeof(storage_), "a reverse step captures a few small values only");
-    reset();
-    new (storage_) Step(std::forward<F>(f));
-    call_ = [](void* step, Backward& b) { (*static_cast<Step*>(step))(b); };
-    destroy_ = [](void* step) { static_cast<Step*>(step)->~Step(); };
-  }
-  void reset() {
-    if (destroy_ != nullptr) destroy_(storage_);
-    call_ = nullptr;
-    destroy_ = nullptr;
-  }
-  explicit operator bool() const { return call_ != nullptr; }
-  void operator()(Backward& b) { call_(storage_, b); }
-
- private:
-  alignas(16) std::byte storage_[160];
-  void (*call_)(void*, Backward&) = nullptr;
-  void (*destroy_)(void*) = nullptr;
-};
-
-struct Node;
-void retain(Node* node) noexcept;
-void release(Node* node) noexcept;
-
-}  // namespace detail
-
-/// A handle to one node of the graph (or to a leaf: a parameter or an input).
+/// A handle to one node of the graph (or to a leaf: a parameter or an input). What asks for the value or the
+/// gradient of an empty handle throws std::invalid_argument.
 class Variable {
  public:
   Variable() = default;
@@ -68,25 +25,17 @@ class Variable {
   /// undefined tensor.
   explicit Variable(Tensor value, bool requires_grad = false);
 
-  Variable(const Variable& other) noexcept : node_(other.node_) { detail::retain(node_); }
-  Variable(Variable&& other) noexcept : node_(std::exchange(other.node_, nullptr)) {}
-  Variable& operator=(Variable other) noexcept {
-    std::swap(node_, other.node_);
-    return *this;
-  }
-  ~Variable() { detail::release(node_); }
-
   bool defined() const { return node_ != nullptr; }
-  bool requires_grad() const;
-  /// The op that made it ("conv2d"), or "leaf".
-  const char* op() const;
+  bool requires_grad() const { return defined() && node_->requires_grad; }
+  /// The op that made it ("conv2d"), "leaf", or "none" for an empty handle.
+  const char* op() const { return defined() ? node_->op : "none"; }
 
+  const Tensor& value() const { return checked().value; }
   /// What has been recorded is const; only an optimiser, an initialiser or a loader writes, through this.
-  Tensor& mutable_value();
-  const Tensor& value() const;
+  Tensor& mutable_value() { return checked().value; }
   /// Empty until backward() has reached this variable.
-  const Tensor& grad() const;
-  Tensor& mutable_grad();
+  const Tensor& grad() const { return checked().grad; }
+  Tensor& mutable_grad() { return checked().grad; }
   /// Empties grad(). Its memory is kept for the next gradient, also where another Tensor still shows it:
   /// given to the pool it would go to what the next forward pass makes first, long after it has left the
   /// caches.
@@ -98,23 +47,30 @@ class Variable {
   Dim size() const { return value().size(); }
   real item() const { return value().item(); }
 
+  /// Tells variables apart: two handles of one variable have the same.
   detail::Node* node() const { return node_; }
 
+  Variable(const Variable& other) noexcept : node_(other.node_) { detail::retain(node_); }
+  Variable(Variable&& other) noexcept : node_(std::exchange(other.node_, nullptr)) {}
+  Variable& operator=(Variable other) noexcept {
+    std::swap(node_, other.node_);
+    return *this;
+  }
+  ~Variable() { detail::release(node_); }
+
  private:
-  friend Variable make_result(const char* op, Tensor y, std::span<const Variable* const> inputs);
   friend std::vector<Variable> inputs_of(const Variable& y);
+  detail::Node& checked() const;
   detail::Node* node_ = nullptr;
 };
-
-inline constexpr std::size_t kMaxInputs = 8;
 
 /// What a reverse step sees: dL/dy, the inputs' values, and where to add dL/dx.
 class Backward {
  public:
   explicit Backward(detail::Node& node) : node_(node) {}
-  const Tensor& gy() const;
-  const Tensor& y() const;
-  const Tensor& value(std::size_t input) const;
+  const Tensor& gy() const { return node_.grad; }
+  const Tensor& y() const { return node_.value; }
+  const Tensor& value(std::size_t input) const { return node_.inputs[input]->value; }
   /// The gradient of that input, zero-filled at first use; null when nobody asked for it. Add into it.
   Tensor* grad_of(std::size_t input);
   /// The same without the zeros: at first use the contents are undefined and the step must write all of them.
@@ -126,35 +82,35 @@ class Backward {
   };
   Slot slot_of(std::size_t input);
   /// dL/dy to be changed in place: this step is its only reader.
-  Tensor& mutable_gy();
+  Tensor& mutable_gy() { return node_.grad; }
 
  private:
   detail::Node& node_;
 };
 
-/// The node of an op without its reverse step; used by record() only.
-Variable make_result(const char* op, Tensor y, std::span<const Variable* const> inputs);
-/// Where record() puts the reverse step, or null when no input needs a gradient or recording is off.
-detail::ReverseStep* reverse_step_of(const Variable& y);
+struct OpSettings;  // autograd/trace.h
 
-/// Makes y a node of the graph. `step` is called by backward() with dL/dy at hand.
+/// The node of an op, and where its reverse step goes: null when no input needs a gradient or recording is
+/// off. For record() only.
+std::pair<Variable, detail::ReverseStep*> make_result(const char* op, Tensor y,
+                                                      std::span<const Variable* const> inputs,
+                                                      const OpSettings* settings);
+
+/// Makes y a node of the graph. `step(Backward&)` is called by backward() with dL/dy at hand. `settings` is
+/// what else the op was told, for a Trace.
 template <class Step>
-Variable record(const char* op, Tensor y, std::initializer_list<const Variable*> inputs, Step&& step) {
-  return record(op, std::move(y), std::span<const Variable* const>(inputs.begin(), inputs.size()),
-                std::forward<Step>(step));
+Variable record(const char* op, Tensor y, std::span<const Variable* const> inputs, Step&& step,
+                const OpSettings* settings = nullptr) {
+  auto [result, slot] = make_result(op, std::move(y), inputs, settings);
+  if (slot != nullptr) slot->set(std::forward<Step>(step));
+  return std::move(result);
 }
 template <class Step>
-Variable record(const char* op, Tensor y, std::span<const Variable* const> inputs, Step&& step) {
-  Variable result = make_result(op, std::move(y), inputs);
-  if (detail::ReverseStep* slot = reverse_step_of(result)) slot->set(std::forward<Step>(step));
-  return result;
+Variable record(const char* op, Tensor y, std::initializer_list<const Variable*> inputs, Step&& step,
+                const OpSettings* settings = nullptr) {
+  return record(op, std::move(y), std::span(inputs.begin(), inputs.size()), std::forward<Step>(step),
+                settings);
 }
-
-/// y and every value it was computed from, in the order of computation; leaves (inputs, parameters) come
-/// first. What backward() has freed is missing. For looking into a graph when something has gone wrong.
-std::vector<Variable> history_of(const Variable& y);
-/// The inputs of the op that made y; empty for a leaf and for what is not on a graph.
-std::vector<Variable> inputs_of(const Variable& y);
 
 /// Adds dL/dv into grad() of every leaf v that requires it, for a scalar L, and frees the graph.
 /// Throws std::invalid_argument when L is not a scalar, does not depend on a parameter, or when its
@@ -172,5 +128,11 @@ class NoGrad {
  private:
   bool before_;
 };
+
+/// y and every value it was computed from, in the order of computation; leaves (inputs, parameters) come
+/// first. What backward() has freed is missing. For looking into a graph when something has gone wrong.
+std::vector<Variable> history_of(const Variable& y);
+/// The inputs of the op that made y; empty for a leaf and for what is not on a graph.
+std::vector<Variable> inputs_of(const Variable& y);
 
 }  // namespace supertac

@@ -13,7 +13,7 @@
 #include "autograd/kernels/conv.h"
 
 #include "autograd/kernels/fast/geometry.h"
-#include "autograd/kernels/linear.h"
+#include "autograd/ops/linear.h"
 #include "bench/against_peak.h"
 
 namespace supertac {

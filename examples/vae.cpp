@@ -118,7 +118,7 @@ void train_and_draw(const char* path) {
     if ((step + 1) % 250 == 0)
       std::printf("step %4d  squared error %.5f  KLD %.2f\n", step + 1, error.item(), kld.item());
     adam.zero_grad();
-    backward(add(error, scale(kld, kBeta)));
+    backward(error + kBeta * kld);
     adam.set_learning_rate(schedule.at(step));
     adam.step();
   }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "autograd/ops/activations.h"
+#include "autograd/ops/linear.h"
 #include "layers/module.h"
 
 namespace supertac {
@@ -9,8 +9,12 @@ namespace supertac {
 /// stored as the 1x1 convolution that it also is.
 class Linear : public Module {
  public:
-  Linear(Dim in, Dim out, Rng& rng, Layout layout = Layout::linear);
-  Variable forward(const Variable& x, real negative_slope = kNoActivation) const;
+  Linear(Dim in, Dim out, Rng& rng, Layout layout = Layout::linear)
+      : weight_(add_parameter("weight", uniform_fan_in({in, out}, in, rng), layout)),
+        bias_(add_parameter("bias", uniform_fan_in({out}, in, rng), Layout::plain)) {}
+  Variable forward(const Variable& x, real negative_slope = kNoActivation) const {
+    return linear(x, weight_, bias_, negative_slope);
+  }
 
  private:
   Variable weight_, bias_;

@@ -62,7 +62,7 @@ Rirb::Rirb(const RirbOptions& options, Rng& rng)
 Variable Rirb::forward(const Variable& x) const {
   Variable h = x;
   for (const Rcab& block : blocks_) h = block.forward(h);
-  return up_.forward(supertac::add(x, conv_.forward(h)), kLeakyRelu);
+  return up_.forward(x + conv_.forward(h), kLeakyRelu);
 }
 
 }  // namespace supertac

@@ -43,7 +43,7 @@ class Parser {
     while (at() == '+' || at() == '-') {
       const bool minus = text_[place_++] == '-';
       const Variable x = product();
-      y = add(y, minus ? scale(x, -1) : x);
+      y = minus ? y - x : y + x;
     }
     return y;
   }
@@ -52,7 +52,7 @@ class Parser {
     Variable y = factor();
     while (at() == '*') {
       ++place_;
-      y = multiply(y, factor());
+      y = y * factor();
     }
     return y;
   }

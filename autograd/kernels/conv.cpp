@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "autograd/kernels/fast/conv.h"
+#include "autograd/kernels/fast/each.h"
 #include "autograd/kernels/fast/isa/isa.h"
 
 namespace supertac::kernels {
@@ -24,7 +25,7 @@ namespace {
 // one strides over y: the same pairs with p and q exchanged, and that is all the difference there is.
 template <class Meet>
 void for_each_meeting(const ConvSizes& s, Meet meet) {
-  const ConvSettings& m = s.map;
+  const ConvSettings& m = s.conv;
   const Dim fine_h = m.transposed ? m.out_height() : m.height;
   const Dim fine_w = m.transposed ? m.out_width() : m.width;
   const Dim coarse_h = m.transposed ? m.height : m.out_height();
@@ -63,7 +64,7 @@ void conv(const ConvSizes& s, const real* x, const real* w, const real* bias, re
       }
     }
   });
-  for (Dim i = 0; i < pixels * s.cout; ++i) y[i] = y[i] > 0 ? y[i] : negative_slope * y[i];
+  std::transform(y, y + pixels * s.cout, y, Rectifier(negative_slope));
 }
 
 // gx [p, i] = or += sum of gy[q, o] w[tap, i, o]
@@ -83,7 +84,7 @@ void conv_grad_x(const ConvSizes& s, const real* gy, const real* w, Into into, r
 // gw [tap, i, o] = or += sum of x[p, i] gy[q, o]
 void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, Into into, real* gw) {
   if (!is_plain()) return fast::conv_grad_w(s, x, gy, into, gw);
-  if (into == Into::overwrite) std::fill_n(gw, s.map.taps() * s.cin * s.cout, real(0));
+  if (into == Into::overwrite) std::fill_n(gw, s.conv.taps() * s.cin * s.cout, real(0));
   for_each_meeting(s, [&](Dim tap, Dim p, Dim q) {
     for (Dim i = 0; i < s.cin; ++i) {
       for (Dim o = 0; o < s.cout; ++o) {
@@ -92,6 +93,28 @@ void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, Into into, r
       }
     }
   });
+}
+
+void bias_grad(Dim rows, Dim cout, const real* gy, Into into, real* gb) {
+  constexpr Dim kAtOnce = 16;  // sums that stay in registers
+  if (into == Into::overwrite) std::fill_n(gb, cout, real(0));
+  for (Dim first = 0; first < rows; first += kRowsPerPiece) {
+    const Dim last = std::min(rows, first + kRowsPerPiece);
+    run_loop([=] {
+      for (Dim c = 0; c < cout; c += kAtOnce) {
+        const Dim count = std::min(kAtOnce, cout - c);
+        real sum[kAtOnce] = {};
+        if (count == kAtOnce) {
+          for (Dim row = first; row < last; ++row)
+            for (Dim k = 0; k < kAtOnce; ++k) sum[k] += gy[row * cout + c + k];
+        } else {
+          for (Dim row = first; row < last; ++row)
+            for (Dim k = 0; k < count; ++k) sum[k] += gy[row * cout + c + k];
+        }
+        for (Dim k = 0; k < count; ++k) gb[c + k] += sum[k];
+      }
+    });
+  }
 }
 
 }  // namespace supertac::kernels

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <compare>
+#include <limits>
 
 #include "autograd/tensor.h"
 
@@ -24,22 +25,37 @@ struct ConvSettings {
 };
 
 struct ConvSizes {
-  ConvSettings map;
+  ConvSettings conv;
   Dim images = 0, cin = 0, cout = 0;
-  Dim in_pixels() const { return map.height * map.width; }
-  Dim out_pixels() const { return map.out_height() * map.out_width(); }
+  Dim in_pixels() const { return conv.height * conv.width; }
+  Dim out_pixels() const { return conv.out_height() * conv.out_width(); }
 };
 
 /// The largest number of channels, of x or y.
 inline constexpr Dim kMaxChannels = 4096;
+/// A sum over rows runs over this many before it is added to the total.
+inline constexpr Dim kRowsPerPiece = 256;
+
+/// f(x) = x for x > 0, else slope * x: the activation behind a convolution or a linear layer. With a slope of
+/// 0 an infinite x is taken for the least number that there is, since 0 times infinity is NaN.
+struct Rectifier {
+  real slope, floor;
+  explicit Rectifier(real negative_slope)
+      : slope(negative_slope),
+        floor(negative_slope == 0 ? std::numeric_limits<real>::lowest()
+                                  : -std::numeric_limits<real>::infinity()) {}
+  real operator()(real x) const { return x > 0 ? x : slope * (floor > x ? floor : x); }
+};
 
 /// y [images, out_pixels, cout] = f(bias + sum over taps of x [images, in_pixels, cin] * w [taps, cin,
-/// cout]); bias may be null; f(s) = s for s > 0, else negative_slope * s.
+/// cout]); bias may be null; f is Rectifier(negative_slope).
 void conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias, real negative_slope,
           real* y);
 /// gx = or += the transpose of conv (without f) applied to gy.
 void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into into, real* gx);
 /// gw [taps, cin, cout] = or += x^T gy over all pixels.
 void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Into into, real* gw);
+/// gb [cout] = or += the sum of gy over rows: the pixels of all images.
+void bias_grad(Dim rows, Dim cout, const real* gy, Into into, real* gb);
 
 }  // namespace supertac::kernels

@@ -4,8 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "autograd/kernels/elementwise.h"
-#include "autograd/kernels/fast/sums.h"
+#include "autograd/kernels/fast/each.h"
 #include "autograd/pool.h"
 
 namespace supertac::kernels {
@@ -38,8 +37,8 @@ Window window_for(Dim height, Dim width) {
   return w;
 }
 
-// One image's maps. Moments are taken about the image's own mean: E[x^2] - E[x]^2 of values far from zero
-// cancels in fp32 and can turn negative.
+// Windowed moments of one image and what is made of them. They are taken about the image's own mean: E[x^2] -
+// E[x]^2 of values far from zero cancels in fp32 and can turn negative.
 class SsimImage {
  public:
   SsimImage(const Window& window, Dim height, Dim width)
@@ -50,62 +49,82 @@ class SsimImage {
         ow_(width - window.size + 1),
         store_(static_cast<std::size_t>(kMaps * height * width)) {}
 
-  // The mean over positions; with gx also adds g d ssim / d x.
-  double run(const real* x, const real* t, real g, real* gx) {
-    real *a = map(0), *b = map(1), *product = map(2), *mean_a = map(3), *mean_b = map(4), *aa = map(5),
-         *bb = map(6), *ab = map(7);
-    const real ca = centre(x, a), cb = centre(t, b);
-    blur(a, mean_a);
-    blur(b, mean_b);
-    multiply(h_ * wd_, a, a, product);
-    blur(product, aa);
-    multiply(h_ * wd_, b, b, product);
-    blur(product, bb);
-    multiply(h_ * wd_, a, b, product);
-    blur(product, ab);
+  // The mean over positions.
+  double value(const real* x, const real* target) {
+    take_moments(x, target);
     double total = 0;
-    const real each = g / static_cast<real>(oh_ * ow_);
-    for (Dim i = 0; i < oh_ * ow_; ++i) {
-      const real ma = mean_a[i] + ca, mb = mean_b[i] + cb;
-      const real va = aa[i] - mean_a[i] * mean_a[i], vb = bb[i] - mean_b[i] * mean_b[i];
-      const real cov = ab[i] - mean_a[i] * mean_b[i];
-      const real n1 = 2 * ma * mb + kC1, n2 = 2 * cov + kC2;
-      const real d1 = ma * ma + mb * mb + kC1, d2 = std::max(va, real(0)) + std::max(vb, real(0)) + kC2;
-      const real s = (n1 * n2) / (d1 * d2);
-      total += static_cast<double>(s);
-      if (gx == nullptr) continue;
-      // s as a function of the mean, the variance and the covariance of x
-      const real by_mean = 2 * (mb * n2 / (d1 * d2) - ma * s / d1);
-      const real by_var = va > 0 ? -s / d2 : 0;
-      const real by_cov = 2 * n1 / (d1 * d2);
-      aa[i] = each * (by_mean - 2 * mean_a[i] * by_var - mean_b[i] * by_cov);
-      bb[i] = each * 2 * by_var;
-      ab[i] = each * by_cov;
-    }
-    if (gx != nullptr) {
-      add_transposed_blur(aa, nullptr, gx);
-      add_transposed_blur(bb, a, gx);
-      add_transposed_blur(ab, b, gx);
-    }
+    for (Dim i = 0; i < oh_ * ow_; ++i) total += static_cast<double>(terms_at(i).value());
     return total / static_cast<double>(oh_ * ow_);
   }
 
+  // gx += g d value / d x, by way of the mean, the variance and the covariance of x.
+  void add_gradient(const real* x, const real* target, real g, real* gx) {
+    take_moments(x, target);
+    const real each = g / static_cast<real>(oh_ * ow_);
+    real *by_x = map(8), *by_square = map(9), *by_product = map(10);
+    for (Dim i = 0; i < oh_ * ow_; ++i) {
+      const Terms t = terms_at(i);
+      const real s = t.value();
+      const real by_mean = 2 * (t.mean_b * t.n2 / (t.d1 * t.d2) - t.mean_a * s / t.d1);
+      const real by_var = t.var_a > 0 ? -s / t.d2 : 0;
+      const real by_cov = 2 * t.n1 / (t.d1 * t.d2);
+      by_x[i] = each * (by_mean - 2 * mean_a_[i] * by_var - mean_b_[i] * by_cov);
+      by_square[i] = each * 2 * by_var;
+      by_product[i] = each * by_cov;
+    }
+    add_transposed_blur(by_x, nullptr, gx);
+    add_transposed_blur(by_square, a_, gx);
+    add_transposed_blur(by_product, b_, gx);
+  }
+
  private:
-  static constexpr Dim kMaps = 9;
+  static constexpr Dim kMaps = 12;
   real* map(Dim i) { return store_.data() + i * h_ * wd_; }
-  real* half() { return map(8); }
+
+  // Wang et al. 2004, eq. 13, at one position of the window: n1 n2 / (d1 d2).
+  struct Terms {
+    real mean_a, mean_b, var_a, n1, n2, d1, d2;
+    real value() const { return (n1 * n2) / (d1 * d2); }
+  };
+  Terms terms_at(Dim i) const {
+    const real ma = mean_a_[i] + centre_a_, mb = mean_b_[i] + centre_b_;
+    const real va = aa_[i] - mean_a_[i] * mean_a_[i], vb = bb_[i] - mean_b_[i] * mean_b_[i];
+    const real cov = ab_[i] - mean_a_[i] * mean_b_[i];
+    return {ma,
+            mb,
+            va,
+            2 * ma * mb + kC1,
+            2 * cov + kC2,
+            ma * ma + mb * mb + kC1,
+            std::max(va, real(0)) + std::max(vb, real(0)) + kC2};
+  }
+
+  void take_moments(const real* x, const real* target) {
+    centre_a_ = centre(x, a_);
+    centre_b_ = centre(target, b_);
+    blur(a_, mean_a_);
+    blur(b_, mean_b_);
+    blur_product(a_, a_, aa_);
+    blur_product(b_, b_, bb_);
+    blur_product(a_, b_, ab_);
+  }
 
   real centre(const real* x, real* to) const {
     const auto mean =
-        static_cast<real>(sum_lanes(h_ * wd_, [x](Dim i) { return static_cast<double>(x[i]); }) /
-                          static_cast<double>(h_ * wd_));
+        static_cast<real>(sum_of(h_ * wd_, [x](Dim i) { return x[i]; }) / static_cast<double>(h_ * wd_));
     for (Dim i = 0; i < h_ * wd_; ++i) to[i] = x[i] - mean;
     return mean;
   }
 
+  void blur_product(const real* a, const real* b, real* to) {
+    real* product = map(8);
+    for (Dim i = 0; i < h_ * wd_; ++i) product[i] = a[i] * b[i];
+    blur(product, to);
+  }
+
   // [h, w] -> [oh, ow]: columns first, then rows
   void blur(const real* from, real* __restrict to) {
-    real* __restrict columns = half();
+    real* __restrict columns = map(11);
     std::fill_n(columns, oh_ * wd_, real(0));
     for (Dim y = 0; y < oh_; ++y) {
       for (Dim k = 0; k < w_.size; ++k) {
@@ -124,7 +143,7 @@ class SsimImage {
 
   // gx += factor * blur^T(from), factor per pixel (null: 1)
   void add_transposed_blur(const real* from, const real* factor, real* gx) {
-    real* __restrict columns = half();
+    real* __restrict columns = map(11);
     std::fill_n(columns, oh_ * wd_, real(0));
     for (Dim y = 0; y < oh_; ++y) {
       for (Dim k = 0; k < w_.size; ++k) {
@@ -146,6 +165,10 @@ class SsimImage {
   const Window& w_;
   Dim h_, wd_, oh_, ow_;
   Scratch<real> store_;
+  real *const a_ = map(0), *const b_ = map(1);  // the two images less their means
+  real centre_a_ = 0, centre_b_ = 0;
+  real *const mean_a_ = map(2), *const mean_b_ = map(3), *const aa_ = map(4), *const bb_ = map(5),
+              *const ab_ = map(6);  // windowed
 };
 
 }  // namespace
@@ -155,7 +178,7 @@ double ssim(const ImageSizes& s, const real* x, const real* target) {
   const Dim pixels = s.height * s.width;
   SsimImage image(window, s.height, s.width);
   double total = 0;
-  for (Dim n = 0; n < s.images; ++n) total += image.run(x + n * pixels, target + n * pixels, 0, nullptr);
+  for (Dim n = 0; n < s.images; ++n) total += image.value(x + n * pixels, target + n * pixels);
   return total / static_cast<double>(s.images);
 }
 
@@ -164,7 +187,8 @@ void ssim_grad(const ImageSizes& s, real g, const real* x, const real* target, r
   const Dim pixels = s.height * s.width;
   const real each = g / static_cast<real>(s.images);
   SsimImage image(window, s.height, s.width);
-  for (Dim n = 0; n < s.images; ++n) image.run(x + n * pixels, target + n * pixels, each, gx + n * pixels);
+  for (Dim n = 0; n < s.images; ++n)
+    image.add_gradient(x + n * pixels, target + n * pixels, each, gx + n * pixels);
 }
 
 }  // namespace supertac::kernels

@@ -5,12 +5,14 @@
 
 namespace supertac {
 
-/// y = a + b, elementwise. Both throw std::invalid_argument unless the shapes are equal.
-Variable add(const Variable& a, const Variable& b);
-/// y = a b, elementwise.
-Variable multiply(const Variable& a, const Variable& b);
-/// y = factor x
-Variable scale(const Variable& x, real factor);
+/// Elementwise. All throw std::invalid_argument unless the shapes are equal.
+Variable operator+(const Variable& a, const Variable& b);
+Variable operator-(const Variable& a, const Variable& b);
+Variable operator*(const Variable& a, const Variable& b);
+/// The same number for every element.
+Variable operator*(real factor, const Variable& x);
+Variable operator-(real number, const Variable& x);
+
 /// The sum of all elements, a scalar (rank 0).
 Variable sum(const Variable& x);
 

@@ -1,43 +1,69 @@
 #include "autograd/ops/attention.h"
 
 #include "autograd/checks.h"
-#include "autograd/kernels/channels.h"
-#include "autograd/kernels/elementwise.h"
+#include "autograd/ops/elementwise.h"
 
 namespace supertac {
+namespace {
 
-// gx[n,h,w,c] = gs[n,c] / (H W)
-Variable global_mean(const Variable& x) {
-  check_rank("global_mean", "x", x, 4);
-  const Dim images = x.dim(0), pixels = x.dim(1) * x.dim(2), channels = x.dim(3);
-  if (pixels == 0) refuse("global_mean", "x has no pixels: " + x.shape().text());
-  Tensor y(Shape{images, channels});
-  kernels::channel_mean(images, pixels, channels, x.value().data(), y.data());
-  return record("global_mean", y, {&x}, [=](Backward& b) {
-    if (Tensor* gx = b.grad_of(0)) {
-      kernels::channel_mean_grad(images, pixels, channels, b.gy().data(), gx->data());
+struct Maps {
+  Dim images, pixels, channels;
+};
+
+// Calls body(i, k) for each element i of [images, pixels, channels] and the k of its image and channel in
+// [images, channels].
+template <class Body>
+void each_element(const Maps& maps, Body body) {
+  kernels::run_loop([maps, body] {
+    const Dim channels = maps.channels;
+    for (Dim n = 0, pixel = 0; n < maps.images; ++n) {
+      for (Dim p = 0; p < maps.pixels; ++p, pixel += channels)
+        kernels::each_here(channels, [=](Dim c) { body(pixel + c, n * channels + c); });
     }
+  });
+}
+
+Maps maps_of(const char* op, const Variable& x) {
+  check_rank(op, "x", x, 4);
+  return {x.dim(0), x.dim(1) * x.dim(2), x.dim(3)};
+}
+
+}  // namespace
+
+// gx[n,h,w,c] = gy[n,c] / (H W)
+Variable global_mean(const Variable& x) {
+  const Maps maps = maps_of("global_mean", x);
+  if (maps.pixels == 0) refuse("global_mean", "x has no pixels: " + x.shape().text());
+  const auto pixels = static_cast<real>(maps.pixels);
+  Tensor y = Tensor::zeros({maps.images, maps.channels});
+  real* const mean = y.data();
+  each_element(maps, [=, from = x.value().data()](Dim i, Dim k) { mean[k] += from[i]; });
+  each(y.size(), [=](Dim k) { mean[k] /= pixels; });
+  return record("global_mean", y, {&x}, [=](Backward& b) {
+    Tensor* const gx = b.grad_of(0);
+    if (gx == nullptr) return;
+    each_element(maps, [=, gy = b.gy().data(), to = gx->data()](Dim i, Dim k) { to[i] += gy[k] / pixels; });
   });
 }
 
 // ga = gy     gx = gy s     gs[n,c] = sum over h, w of gy x
 Variable gated_sum(const Variable& a, const Variable& x, const Variable& s) {
-  check_rank("gated_sum", "x", x, 4);
+  const Maps maps = maps_of("gated_sum", x);
   check_same_shape("gated_sum", "a", a, "x", x);
   check_shape("gated_sum", "s", s, {x.dim(0), x.dim(3)});
-  const Dim images = x.dim(0), pixels = x.dim(1) * x.dim(2), channels = x.dim(3);
   Tensor y(x.shape());
-  kernels::gated_sum(images, pixels, channels, a.value().data(), x.value().data(), s.value().data(),
-                     y.data());
+  each_element(maps, [to = y.data(), a = a.value().data(), x = x.value().data(), s = s.value().data()](
+                         Dim i, Dim k) { to[i] = a[i] + x[i] * s[k]; });
   return record("gated_sum", y, {&a, &x, &s}, [=](Backward& b) {
-    const real* gy = b.gy().data();
-    if (const Backward::Slot ga = b.slot_of(0)) kernels::put(b.gy().size(), gy, ga.into, ga.data());
+    const real *gy = b.gy().data(), *from = b.value(1).data(), *gate = b.value(2).data();
+    put_to_gradient(b, 0, [=](Dim i) { return gy[i]; });
     if (const Backward::Slot gx = b.slot_of(1)) {
-      kernels::gated_sum_grad_x(images, pixels, channels, gy, b.value(2).data(), gx.into, gx.data());
+      real* const to = gx.data();
+      gx.into == Into::add ? each_element(maps, [=](Dim i, Dim k) { to[i] += gy[i] * gate[k]; })
+                           : each_element(maps, [=](Dim i, Dim k) { to[i] = gy[i] * gate[k]; });
     }
-    if (Tensor* gs = b.grad_of(2)) {
-      kernels::gated_sum_grad_s(images, pixels, channels, gy, b.value(1).data(), gs->data());
-    }
+    if (Tensor* gs = b.grad_of(2))
+      each_element(maps, [=, to = gs->data()](Dim i, Dim k) { to[k] += gy[i] * from[i]; });
   });
 }
 

@@ -2,7 +2,6 @@
 
 #include "autograd/checks.h"
 #include "autograd/kernels/conv.h"
-#include "autograd/kernels/linear.h"
 #include "autograd/trace.h"
 
 namespace supertac {
@@ -69,19 +68,17 @@ Variable convolve(const char* op, const Variable& x, const Variable& w, const Va
   Tensor y(rank == 3 ? Shape{x.dim(0), s.out_width(), sizes.cout}
                      : Shape{x.dim(0), s.out_height(), s.out_width(), sizes.cout});
   kernels::conv(sizes, x.value().data(), w.value().data(), b.value().data(), o.negative_slope, y.data());
-  Trace::describe({.map = s, .negative_slope = o.negative_slope});
-  return record(op, y, {&x, &w, &b}, [sizes, slope = o.negative_slope](Backward& g) {
+  const auto reverse = [sizes, slope = o.negative_slope](Backward& g) {
     const real* gs = before_activation(g, slope);
-    if (const Backward::Slot gx = g.slot_of(0)) {
+    if (const Backward::Slot gx = g.slot_of(0))
       kernels::conv_grad_x(sizes, gs, g.value(1).data(), gx.into, gx.data());
-    }
-    if (const Backward::Slot gw = g.slot_of(1)) {
+    if (const Backward::Slot gw = g.slot_of(1))
       kernels::conv_grad_w(sizes, g.value(0).data(), gs, gw.into, gw.data());
-    }
-    if (const Backward::Slot gb = g.slot_of(2)) {
+    if (const Backward::Slot gb = g.slot_of(2))
       kernels::bias_grad(sizes.images * sizes.out_pixels(), sizes.cout, gs, gb.into, gb.data());
-    }
-  });
+  };
+  const OpSettings settings{.conv = s, .negative_slope = o.negative_slope};
+  return record(op, y, {&x, &w, &b}, reverse, &settings);
 }
 
 }  // namespace

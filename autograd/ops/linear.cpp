@@ -1,7 +1,11 @@
 #include "autograd/ops/linear.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "autograd/checks.h"
-#include "autograd/kernels/linear.h"
+#include "autograd/kernels/fast/conv.h"
+#include "autograd/kernels/fast/isa/isa.h"
 #include "autograd/trace.h"
 
 namespace supertac {
@@ -20,17 +24,51 @@ Variable linear(const Variable& x, const Variable& w, const Variable& b, real ne
   Tensor y(Shape{rows, out});
   kernels::linear(rows, in, out, x.value().data(), w.value().data(), b.value().data(), negative_slope,
                   y.data());
-  Trace::describe({.negative_slope = negative_slope});
-  return record("linear", y, {&x, &w, &b}, [rows, in, out, negative_slope](Backward& g) {
+  const auto reverse = [rows, in, out, negative_slope](Backward& g) {
     const real* gs = before_activation(g, negative_slope);
-    if (const Backward::Slot gx = g.slot_of(0)) {
+    if (const Backward::Slot gx = g.slot_of(0))
       kernels::linear_grad_x(rows, in, out, gs, g.value(1).data(), gx.into, gx.data());
-    }
-    if (const Backward::Slot gw = g.slot_of(1)) {
+    if (const Backward::Slot gw = g.slot_of(1))
       kernels::linear_grad_w(rows, in, out, g.value(0).data(), gs, gw.into, gw.data());
-    }
     if (const Backward::Slot gb = g.slot_of(2)) kernels::bias_grad(rows, out, gs, gb.into, gb.data());
-  });
+  };
+  const OpSettings settings{.negative_slope = negative_slope};
+  return record("linear", y, {&x, &w, &b}, reverse, &settings);
+}
+
+void kernels::linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias,
+                     real negative_slope, real* y) {
+  if (!kernels::is_plain()) return kernels::fast::linear(rows, cin, cout, x, w, bias, negative_slope, y);
+  for (Dim n = 0; n < rows; ++n) {
+    for (Dim o = 0; o < cout; ++o) {
+      real sum = bias != nullptr ? bias[o] : 0;
+      for (Dim i = 0; i < cin; ++i) sum = std::fma(x[n * cin + i], w[i * cout + o], sum);  // rounds once
+      y[n * cout + o] = kernels::Rectifier(negative_slope)(sum);
+    }
+  }
+}
+
+void kernels::linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx) {
+  if (!kernels::is_plain()) return kernels::fast::linear_grad_x(rows, cin, cout, gy, w, into, gx);
+  for (Dim n = 0; n < rows; ++n) {
+    for (Dim i = 0; i < cin; ++i) {
+      real sum = into == Into::add ? gx[n * cin + i] : 0;
+      for (Dim o = 0; o < cout; ++o) sum = std::fma(gy[n * cout + o], w[i * cout + o], sum);
+      gx[n * cin + i] = sum;
+    }
+  }
+}
+
+void kernels::linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw) {
+  if (!kernels::is_plain()) return kernels::fast::linear_grad_w(rows, cin, cout, x, gy, into, gw);
+  if (into == Into::overwrite) std::fill_n(gw, cin * cout, real(0));
+  for (Dim i = 0; i < cin; ++i) {
+    for (Dim o = 0; o < cout; ++o) {
+      for (Dim n = 0; n < rows; ++n) {
+        gw[i * cout + o] = std::fma(x[n * cin + i], gy[n * cout + o], gw[i * cout + o]);
+      }
+    }
+  }
 }
 
 }  // namespace supertac

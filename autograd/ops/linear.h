@@ -1,3 +1,4 @@
+// A linear layer: the op, and the matrix products that it consists of.
 #pragma once
 
 #include "autograd/ops/activations.h"
@@ -8,4 +9,15 @@ namespace supertac {
 /// std::invalid_argument on other shapes and for a negative slope.
 Variable linear(const Variable& x, const Variable& w, const Variable& b, real negative_slope = kNoActivation);
 
+namespace kernels {
+
+/// The same without a graph: x [rows, cin], w [cin, cout], y [rows, cout]; bias [cout] may be null.
+void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
+            real* y);
+/// gx = or += gy w^T
+void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx);
+/// gw = or += x^T gy
+void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw);
+
+}  // namespace kernels
 }  // namespace supertac

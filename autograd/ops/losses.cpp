@@ -1,11 +1,12 @@
 #include "autograd/ops/losses.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "autograd/checks.h"
-#include "autograd/kernels/elementwise.h"
-#include "autograd/kernels/losses.h"
+#include "autograd/kernels/exp.h"
 #include "autograd/kernels/ssim.h"
+#include "autograd/ops/elementwise.h"
 
 namespace supertac {
 
@@ -14,13 +15,16 @@ Variable l2_loss(const Variable& x, const Variable& target) {
   check_same_shape("l2_loss", "x", x, "target", target);
   const Dim n = x.size();
   if (n == 0) refuse("l2_loss", "x is empty: " + x.shape().text());
-  const double total = kernels::squared_distance(n, x.value().data(), target.value().data());
+  const double total = kernels::sum_of(n, [from = x.value().data(), to = target.value().data()](Dim i) {
+    const double d = static_cast<double>(from[i]) - static_cast<double>(to[i]);
+    return d * d;
+  });
   const auto value = static_cast<real>(total / static_cast<double>(n));
   return record("l2_loss", Tensor::full({}, value), {&x, &target}, [n](Backward& b) {
     const real g = 2 * b.gy().item() / static_cast<real>(n);
     const real *from = b.value(0).data(), *to = b.value(1).data();
-    if (Tensor* gx = b.grad_of(0)) kernels::add_scaled_difference(n, g, from, to, gx->data());
-    if (Tensor* gt = b.grad_of(1)) kernels::add_scaled_difference(n, g, to, from, gt->data());
+    add_to_gradient(b, 0, [=](Dim i) { return g * (from[i] - to[i]); });
+    add_to_gradient(b, 1, [=](Dim i) { return g * (to[i] - from[i]); });
   });
 }
 
@@ -42,6 +46,18 @@ Variable ssim(const Variable& x, const Tensor& target) {
   });
 }
 
+// -log softmax(logits)[label] of one row of classes; `rest` becomes softmax(logits) - onehot(label), its
+// gradient. The largest logit is taken off first: e^x of large numbers overflows.
+static double cross_entropy(Dim classes, const real* logits, Dim label, real* rest) {
+  const real largest = *std::max_element(logits, logits + classes);
+  double norm = 0;
+  for (Dim k = 0; k < classes; ++k)
+    norm += static_cast<double>(rest[k] = kernels::exp_same_bits(logits[k] - largest));
+  for (Dim k = 0; k < classes; ++k) rest[k] = static_cast<real>(static_cast<double>(rest[k]) / norm);
+  rest[label] -= 1;
+  return std::log(norm) - static_cast<double>(logits[label] - largest);
+}
+
 // glogits[n,k] = g (softmax(logits[n])[k] - [k = label n]) / N
 Variable softmax_cross_entropy(const Variable& logits, std::span<const std::int32_t> labels) {
   check_rank("softmax_cross_entropy", "logits", logits, 2);
@@ -58,13 +74,13 @@ Variable softmax_cross_entropy(const Variable& logits, std::span<const std::int3
       refuse("softmax_cross_entropy", "label " + std::to_string(label) + " of row " + std::to_string(n) +
                                           " is not in [0," + std::to_string(classes) + ")");
     }
-    total += kernels::cross_entropy(classes, logits.value().data() + n * classes, label,
-                                    gradient.data() + n * classes);
+    total +=
+        cross_entropy(classes, logits.value().data() + n * classes, label, gradient.data() + n * classes);
   }
   const auto value = static_cast<real>(total / static_cast<double>(rows));
   return record("softmax_cross_entropy", Tensor::full({}, value), {&logits}, [gradient, rows](Backward& b) {
     const real g = b.gy().item() / static_cast<real>(rows);
-    if (Tensor* gx = b.grad_of(0)) kernels::add_scaled(gx->size(), g, gradient.data(), gx->data());
+    add_to_gradient(b, 0, [g, rest = gradient.data()](Dim i) { return g * rest[i]; });
   });
 }
 

@@ -4,8 +4,7 @@
 #include <array>
 
 #include "autograd/checks.h"
-#include "autograd/kernels/elementwise.h"
-#include "autograd/kernels/shaping.h"
+#include "autograd/ops/elementwise.h"
 #include "autograd/trace.h"
 
 namespace supertac {
@@ -18,23 +17,52 @@ Shape with_last(const Shape& shape, Dim last) {
   return Shape(std::span<const Dim>(dims.data(), static_cast<std::size_t>(shape.rank())));
 }
 
+// Columns at .. at + length of an array of rows of this width.
+struct Columns {
+  Dim width, at;
+};
+// to[r, t.at + i] = or += from[r, f.at + i] for each row r and i < length
+void move_columns(Dim rows, Dim length, const real* from, Columns f, Into into, real* to, Columns t) {
+  for (Dim r = 0; r < rows; ++r) {
+    const real* source = from + r * f.width + f.at;
+    real* target = to + r * t.width + t.at;
+    if (into == Into::overwrite && length == 4) {
+      std::copy_n(source, 4, target);  // one move
+    } else if (into == Into::overwrite) {
+      std::copy_n(source, length, target);
+    } else {
+      for (Dim i = 0; i < length; ++i) target[i] += source[i];
+    }
+  }
+}
+
+// to[n, j, i] = or += from[n, i, j]
+void transpose(Dim images, Dim rows, Dim columns, const real* from, Into into, real* to) {
+  for (Dim n = 0; n < images; ++n, from += rows * columns, to += rows * columns) {
+    for (Dim i = 0; i < rows; ++i) {
+      for (Dim j = 0; j < columns; ++j) {
+        real& element = to[j * rows + i];
+        element = from[i * columns + j] + (into == Into::add ? element : 0);
+      }
+    }
+  }
+}
+
 Variable transpose_inner(const char* op, const Variable& x, Dim images, Dim rows, Dim columns,
                          const Shape& shape) {
   Tensor y(shape);
-  kernels::transpose(images, rows, columns, x.value().data(), Into::overwrite, y.data());
+  transpose(images, rows, columns, x.value().data(), Into::overwrite, y.data());
   return record(op, y, {&x}, [=](Backward& b) {
-    if (const Backward::Slot gx = b.slot_of(0)) {
-      kernels::transpose(images, columns, rows, b.gy().data(), gx.into, gx.data());
-    }
+    if (const Backward::Slot gx = b.slot_of(0))
+      transpose(images, columns, rows, b.gy().data(), gx.into, gx.data());
   });
 }
 
 }  // namespace
 
 Variable reshape(const Variable& x, const Shape& shape) {
-  return record("reshape", x.value().reshaped(shape), {&x}, [](Backward& b) {
-    if (Tensor* gx = b.grad_of(0)) kernels::add_scaled(gx->size(), 1, b.gy().data(), gx->data());
-  });
+  return record("reshape", x.value().reshaped(shape), {&x},
+                [](Backward& b) { add_to_gradient(b, 0, [gy = b.gy().data()](Dim i) { return gy[i]; }); });
 }
 
 Variable concat(std::span<const Variable> xs) {
@@ -56,7 +84,7 @@ Variable concat(std::span<const Variable> xs) {
   Dim at = 0;
   for (const Variable& x : xs) {
     const Dim last = x.dim(x.rank() - 1);
-    kernels::move_columns(rows, last, x.value().data(), {last, 0}, Into::overwrite, y.data(), {width, at});
+    move_columns(rows, last, x.value().data(), {last, 0}, Into::overwrite, y.data(), {width, at});
     at += last;
   }
   return record(
@@ -67,29 +95,11 @@ Variable concat(std::span<const Variable> xs) {
           const Shape& shape = b.value(i).shape();
           const Dim last = shape[shape.rank() - 1];
           if (Tensor* gx = b.grad_of(i)) {
-            kernels::move_columns(rows, last, b.gy().data(), {width, from}, Into::add, gx->data(), {last, 0});
+            move_columns(rows, last, b.gy().data(), {width, from}, Into::add, gx->data(), {last, 0});
           }
           from += last;
         }
       });
-}
-
-Variable slice(const Variable& x, Dim begin, Dim length) {
-  if (x.rank() < 1) refuse("slice", "x expects at least rank 1, got " + x.shape().text());
-  const Dim width = x.dim(x.rank() - 1);
-  if (begin < 0 || length < 1 || begin > width - length) {
-    refuse("slice", "columns " + std::to_string(begin) + " to " + std::to_string(begin + length) +
-                        " leave x " + x.shape().text());
-  }
-  const Dim rows = x.size() / width;
-  Tensor y(with_last(x.shape(), length));
-  kernels::move_columns(rows, length, x.value().data(), {width, begin}, Into::overwrite, y.data(),
-                        {length, 0});
-  return record("slice", y, {&x}, [=](Backward& b) {
-    if (Tensor* gx = b.grad_of(0)) {
-      kernels::move_columns(rows, length, b.gy().data(), {length, 0}, Into::add, gx->data(), {width, begin});
-    }
-  });
 }
 
 Variable take_runs(const Variable& x, const Runs& r) {
@@ -104,12 +114,13 @@ Variable take_runs(const Variable& x, const Runs& r) {
   Tensor y(with_last(x.shape(), r.width));
   const Dim rows = x.size() / width;
   for (Dim at = 0; at < r.width; at += r.run) {
-    kernels::move_columns(rows, r.run, x.value().data(), {width, r.first + at / r.run * r.step},
-                          Into::overwrite, y.data(), {r.width, at});
+    move_columns(rows, r.run, x.value().data(), {width, r.first + at / r.run * r.step}, Into::overwrite,
+                 y.data(), {r.width, at});
   }
   if (x.requires_grad()) refuse("take_runs", "x wants a gradient, which this op does not have");
-  Trace::describe({.first = r.first, .run = r.run, .step = r.step});
-  return record("take_runs", y, {&x}, [](Backward&) {});
+  const OpSettings settings{.first = r.first, .run = r.run, .step = r.step};
+  return record(
+      "take_runs", y, {&x}, [](Backward&) {}, &settings);
 }
 
 Variable flatten_channels_first(const Variable& x) {

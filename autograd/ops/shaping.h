@@ -11,9 +11,6 @@ namespace supertac {
 Variable reshape(const Variable& x, const Shape& shape);
 /// Joins along the last axis: [.., a], [.., b] -> [.., a + b]. Up to 8 inputs; all other axes must agree.
 Variable concat(std::span<const Variable> xs);
-/// y = x[..., begin : begin + length] along the last axis. Throws when the range leaves x.
-Variable slice(const Variable& x, Dim begin, Dim length);
-
 /// Which columns of [.., width] take_runs() takes: from `first` on, runs of `run`, `step` apart.
 struct Runs {
   Dim first, run, step, width;  // width of the result: a multiple of run

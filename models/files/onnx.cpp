@@ -141,7 +141,7 @@ std::string Exporter::activated(const std::string& y, real negative_slope) {
 }
 
 std::string Exporter::convolution(const TracedOp& op) {
-  const ConvSettings& s = op.settings.map;
+  const ConvSettings& s = op.settings.conv;
   const bool plane = op.inputs[0].rank() == 4;
   const auto both = [&](Dim height, Dim width) { return plane ? Ints{height, width} : Ints{width}; };
   Ints pads = both(s.padding_h, s.padding_w);

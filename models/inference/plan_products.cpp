@@ -150,7 +150,7 @@ void Planner::add_bytes(const TracedOp& op) {
 }
 
 void Planner::direct_conv(const TracedOp& op) {
-  const ConvSettings& s = op.settings.map;
+  const ConvSettings& s = op.settings.conv;
   const FeatureMap x = source_of(op), y = new_results(op);
   Product step{.job = {.height = y.height,
                        .width = y.width,
@@ -199,7 +199,7 @@ Tensor phase_weights(const ConvSettings& s, const Phase& v, const Phase& h, cons
 }  // namespace
 
 void Planner::direct_transposed_conv(const TracedOp& op) {
-  const ConvSettings& s = op.settings.map;
+  const ConvSettings& s = op.settings.conv;
   const FeatureMap x = source_of(op), y = new_results(op);
   for (Dim top = 0; top < s.stride_h; ++top) {
     for (Dim left = 0; left < s.stride_w; ++left) {

@@ -27,6 +27,8 @@ static void copy_runs(Dim rows, const real* from, Dim from_step, real* to, Dim t
 }
 
 void Planner::take_runs(const TracedOp& op) {
+  if (op.inputs[0].node() != input_)
+    throw std::logic_error("Prepared: take_runs has a step for the network's input only");
   const FeatureMap y = new_map(op.y);
   const Dim width = op.inputs[0].dim(2), rows = y.width;
   const OpSettings s = op.settings;
@@ -118,8 +120,13 @@ void Planner::concat(const TracedOp& op) {
   for (const Variable& input : op.inputs) {
     const FeatureMap x = map_of(input);
     plan_->steps_.push_back([=](const Block& b) {
-      for (Dim n = 0; n < b.images; ++n)
-        std::copy_n(b.begin(x) + n * x.image(), x.channels, b.begin(y) + n * y.image() + at);
+      for (Dim n = 0; n < b.images; ++n) {
+        const real* from = b.first_pixel(x) + n * x.image();
+        real* to = b.first_pixel(y) + n * y.image() + at;
+        for (Dim i = 0; i < x.height; ++i, from += x.line(), to += y.line())
+          for (Dim j = 0; j < x.width; ++j)
+            std::copy_n(from + j * x.channels, x.channels, to + j * y.channels);
+      }
     });
     at += x.channels;
   }

@@ -116,7 +116,7 @@ Winograd winograd_step(const TracedOp& op, const FeatureMap& x, const FeatureMap
 }
 
 bool is_of_tiles(const TracedOp& op) {
-  const ConvSettings& s = op.settings.map;
+  const ConvSettings& s = op.settings.conv;
   const Dim cin = op.inputs[0].dim(op.inputs[0].rank() - 1), cout = op.y.dim(op.y.rank() - 1);
   return cin % kernels::kTransformChannels == 0 && cout % kernels::kTransformChannels == 0 &&
          s.height % 2 == 0 && s.width % 2 == 0;
@@ -136,7 +136,7 @@ std::vector<Dim> quarter_taps(Dim top, Dim left, Dim size) {
 }  // namespace
 
 void Planner::conv(const TracedOp& op) {
-  const ConvSettings& s = op.settings.map;
+  const ConvSettings& s = op.settings.conv;
   const bool same =
       s ==
       ConvSettings{
@@ -146,7 +146,7 @@ void Planner::conv(const TracedOp& op) {
 }
 
 void Planner::transposed_conv(const TracedOp& op) {
-  const ConvSettings& s = op.settings.map;
+  const ConvSettings& s = op.settings.conv;
   const bool doubles = s == ConvSettings{.height = s.height,
                                          .width = s.width,
                                          .kernel_h = 4,

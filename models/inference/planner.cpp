@@ -127,7 +127,7 @@ static Dim reach(Dim size, Dim out, Dim kernel, Dim stride, Dim padding, bool tr
 }
 
 void Planner::need_margin(const TracedOp& op) {
-  const ConvSettings& s = op.settings.map;
+  const ConvSettings& s = op.settings.conv;
   Margin& m = margins_[owner(op.inputs[0])];
   m.height =
       std::max(m.height, reach(s.height, s.out_height(), s.kernel_h, s.stride_h, s.padding_h, s.transposed));

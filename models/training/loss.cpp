@@ -49,15 +49,14 @@ static Variable where_textured(const Variable& picture, const Tensor& truth) {
     std::fill_n(keep.data() + n * pixels, pixels, textured ? real(1) : real(0));
     for (Dim i = n * pixels; i < (n + 1) * pixels; ++i) flat.data()[i] = textured ? 0 : truth.data()[i];
   }
-  return add(multiply(picture, Variable(keep)), Variable(flat));
+  return picture * Variable(keep) + Variable(flat);
 }
 
 Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda) {
   Loss loss;
   loss.l2 = l2_loss(picture, Variable(truth));
   loss.ssim = ssim(where_textured(picture, truth), truth);
-  const Variable one_minus_ssim = add(Variable(Tensor::full({}, 1)), scale(loss.ssim, -1));
-  loss.total = add(loss.l2, scale(one_minus_ssim, static_cast<real>(lambda)));
+  loss.total = loss.l2 + static_cast<real>(lambda) * (1 - loss.ssim);
   return loss;
 }
 
@@ -74,17 +73,16 @@ Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const Lo
   for (std::size_t i = 0; i < output.decoded.size(); ++i) {
     const Variable l2 = l2_loss(output.decoded[i], output.input[i]);
     const Variable kld = kl_divergence(output.latent[i].mean, output.latent[i].log_var);
-    loss.reconstruction = i == 0 ? l2 : add(loss.reconstruction, l2);
-    loss.kld = i == 0 ? kld : add(loss.kld, kld);
+    loss.reconstruction = i == 0 ? l2 : loss.reconstruction + l2;
+    loss.kld = i == 0 ? kld : loss.kld + kld;
   }
   if (output.predicted_error.defined()) {
     loss.predicted_error = l2_loss(output.predicted_error, error_of(output.image, truth));
-    loss.total = add(loss.total, scale(loss.predicted_error, static_cast<real>(kPredictedErrorWeight)));
+    loss.total = loss.total + static_cast<real>(kPredictedErrorWeight) * loss.predicted_error;
   }
   const auto share = static_cast<real>(w.a), rest = static_cast<real>(1 - w.a);
-  const Variable vaes =
-      add(scale(loss.reconstruction, share), scale(loss.kld, share * static_cast<real>(w.beta)));
-  loss.total = add(vaes, scale(loss.total, rest));
+  const Variable vaes = share * loss.reconstruction + share * static_cast<real>(w.beta) * loss.kld;
+  loss.total = vaes + rest * loss.total;
   return loss;
 }
 

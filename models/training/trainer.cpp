@@ -122,7 +122,7 @@ void Trainer::run(MicroBatch& micro_batch) const {
     first += static_cast<std::size_t>(mean.dim(1));
   }
   if (std::isfinite(micro_batch.terms.total))
-    return backward(scale(output.loss.total, static_cast<real>(share)));
+    return backward(static_cast<real>(share) * output.loss.total);
   micro_batch.trouble = where_not_finite(output.loss.total, parameters);
 }
 

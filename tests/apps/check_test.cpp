@@ -21,7 +21,8 @@ namespace {
 // given the name. take_runs has no gradient.
 std::set<std::string> ops_in_sources() {
   std::set<std::string> names;
-  const std::regex recorded(R"re((?:record|rectify|convolve|transpose_inner)\(\s*"([a-z0-9_]+)")re");
+  const std::regex recorded(
+      R"re((?:record|elementwise|rectify|convolve|transpose_inner)\(\s*"([a-z0-9_]+)")re");
   for (const auto& entry : std::filesystem::directory_iterator(SUPERTAC_SOURCE "/autograd/ops")) {
     if (entry.path().extension() != ".cpp") continue;
     const std::string text = read_text_file(entry.path(), 1 << 20);

@@ -8,7 +8,7 @@ namespace {
 
 // y = a b + a with a planted error in the gradient of a: ga = gy (by_b * b + by_one).
 Variable planted(const std::vector<Variable>& in, real by_b, real by_one) {
-  const Tensor y = add(multiply(in[0], in[1]), in[0]).value();
+  const Tensor y = (in[0] * in[1] + in[0]).value();
   return record("planted", y, {&in[0], &in[1]}, [=](Backward& g) {
     for (Dim i = 0; i < g.gy().size(); ++i) {
       const real gy = g.gy().data()[i];
@@ -83,14 +83,14 @@ TEST(GradientChecker, FailsOnNotANumber) {
 
 TEST(GradientChecker, FailsWhenNoGradientArrives) {
   const auto cut = [](const std::vector<Variable>& in) {
-    return add(Variable(scale(in[0], 2).value()), scale(in[1], 1));  // in[0] is cut off from the graph
+    return Variable((2 * in[0]).value()) + 1 * in[1];  // in[0] is cut off from the graph
   };
   EXPECT_GT(check_gradients(cut, {test::numbers({2}), test::numbers({2})}).max_relative_error, 0.1);
 }
 
 TEST(GradientChecker, LeavesTheCallersTensorsAlone) {
   const Tensor x = test::numbers({5}), copy = x.clone();
-  check_gradients([](const auto& in) { return multiply(in[0], in[0]); }, {x});
+  check_gradients([](const auto& in) { return in[0] * in[0]; }, {x});
   for (Dim i = 0; i < 5; ++i) EXPECT_EQ(x.data()[i], copy.data()[i]);
 }
 

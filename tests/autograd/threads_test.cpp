@@ -33,8 +33,8 @@ std::vector<real> train(int threads) {
     h = conv2d(h, p[2], p[3], same);
     h = gated_sum(h, h, sigmoid(global_mean(h)));
     h = leaky_relu(conv_transpose2d(h, p[4], p[5], {.stride = 2, .padding = 1}));
-    const Variable y = scale(conv2d(h, p[6], p[7], same), real(0.01));
-    const Variable loss = add(l2_loss(y, Variable(truth)), scale(ssim(y, truth), -1));
+    const Variable y = real(0.01) * conv2d(h, p[6], p[7], same);
+    const Variable loss = l2_loss(y, Variable(truth)) - ssim(y, truth);
     adam.zero_grad();
     backward(loss);
     all.push_back(loss.item());

@@ -19,8 +19,8 @@ using test::parameter;
 
 TEST(Backward, AddsUpBothSidesOfADiamond) {
   const Variable x = parameter(Tensor::of({2}, {3, -2}));
-  const Variable square = multiply(x, x);
-  backward(sum(add(multiply(square, x), scale(square, 2))));  // x^3 + 2 x^2
+  const Variable square = x * x;
+  backward(sum(square * x + 2 * square));  // x^3 + 2 x^2
   expect_values(x.grad(), {2}, {27 + 12, 12 - 8});
 }
 
@@ -28,24 +28,24 @@ TEST(Backward, AddsUpBothSidesOfADiamond) {
 TEST(Backward, VisitsEveryNodeOnce) {
   const Variable x = parameter(Tensor::full({}, 1));
   Variable y = x;
-  for (int i = 0; i < 60; ++i) y = scale(add(y, y), real(0.5));
+  for (int i = 0; i < 60; ++i) y = real(0.5) * (y + y);
   backward(y);
   EXPECT_EQ(x.grad().item(), 1);
 }
 
 TEST(Backward, ALongSkipWaitsForTheLongWay) {
   const Variable x = parameter(Tensor::full({}, 2));
-  const Variable early = multiply(x, x);  // used at once and 50 ops later
+  const Variable early = x * x;  // used at once and 50 ops later
   Variable late = early;
-  for (int i = 0; i < 50; ++i) late = scale(late, 1);
-  backward(multiply(late, early));  // x^4
+  for (int i = 0; i < 50; ++i) late = 1 * late;
+  backward(late * early);  // x^4
   EXPECT_EQ(x.grad().item(), 32);
 }
 
 TEST(Backward, GradientsOfLeavesAccumulate) {
   const Variable x = parameter(Tensor::full({}, 3));
-  backward(scale(x, 2));
-  backward(scale(x, 5));
+  backward(2 * x);
+  backward(5 * x);
   EXPECT_EQ(x.grad().item(), 7);
   backward(x);  // dx/dx = 1
   EXPECT_EQ(x.grad().item(), 8);
@@ -56,13 +56,13 @@ TEST(Backward, ADroppedGradientLeavesItsMemoryButNoValue) {
   const Variable w = parameter(Tensor::of({1, 1, 1, 1}, {3}));
   const Variable x(Tensor::of({1, 1, 1, 1}, {2}));
   for (const bool by_conv : {true, false, true}) {
-    backward(sum(by_conv ? conv2d(x, w, Variable(Tensor::zeros({1})), {}) : multiply(x, w)));
+    backward(sum(by_conv ? conv2d(x, w, Variable(Tensor::zeros({1})), {}) : x * w));
     ASSERT_EQ(w.grad().item(), 2);
     const real* const memory = w.grad().data();
     Variable(w).drop_grad();
     EXPECT_FALSE(w.grad().defined());
     Variable(w).drop_grad();
-    backward(sum(multiply(x, w)));
+    backward(sum(x * w));
     EXPECT_EQ(w.grad().item(), 2);
     EXPECT_EQ(w.grad().data(), memory);
     Variable(w).drop_grad();
@@ -71,14 +71,14 @@ TEST(Backward, ADroppedGradientLeavesItsMemoryButNoValue) {
 
 TEST(Backward, LeavesThatNeedNoGradientGetNone) {
   const Variable x = parameter(Tensor::full({}, 3)), constant(Tensor::full({}, 4));
-  backward(multiply(x, constant));
+  backward(x * constant);
   EXPECT_EQ(x.grad().item(), 4);
   EXPECT_FALSE(constant.grad().defined());
 }
 
 TEST(Backward, FreesTheGraph) {
   const Variable x = parameter(Tensor::full({2}, 3));
-  const Variable middle = scale(x, 2), loss = sum(middle);
+  const Variable middle = 2 * x, loss = sum(middle);
   backward(loss);
   EXPECT_FALSE(middle.grad().defined());
   expect_refusal(
@@ -87,7 +87,7 @@ TEST(Backward, FreesTheGraph) {
   expect_refusal(
       "backward: scale belongs to a graph that an earlier backward freed; run the forward pass again",
       [&] { backward(sum(middle)); });
-  const Variable fresh = scale(x, 3);
+  const Variable fresh = 3 * x;
   backward(sum(fresh));  // a refused backward leaves nothing in the queue
   expect_values(x.grad(), {2}, {5, 5});
 }
@@ -103,13 +103,18 @@ TEST(Backward, FreesWhatAReverseStepHolds) {
 
 TEST(Backward, RefusesWhatHasNoGradient) {
   const Variable x = parameter(Tensor::full({2}, 3));
-  expect_refusal("backward: the loss must be a scalar, shape is [2]", [&] { backward(scale(x, 1)); });
+  expect_refusal("backward: the loss must be a scalar, shape is [2]", [&] { backward(1 * x); });
   expect_refusal("backward: the loss does not depend on any variable that requires a gradient",
                  [&] { backward(sum(Variable(Tensor::full({2}, 3)))); });
 }
 
 TEST(Variable, RefusesToBeUsedWithoutAValue) {
-  expect_refusal("Variable: used before it was given a value", [] { sum(Variable()); });
+  Variable empty;
+  const std::function<void()> uses[] = {
+      [&] { sum(empty); },           [&] { empty.shape(); },         [&] { empty.grad(); },
+      [&] { empty.mutable_grad(); }, [&] { empty.mutable_value(); }, [&] { empty.drop_grad(); },
+      [&] { backward(empty); },      [&] { inputs_of(empty); }};
+  for (const auto& use : uses) expect_refusal("Variable: used before it was given a value", use);
   expect_refusal("Variable: the tensor is undefined", [] { parameter(Tensor()); });
   EXPECT_STREQ(Variable().op(), "none");
   EXPECT_STREQ(parameter(Tensor::zeros({1})).op(), "leaf");
@@ -117,21 +122,21 @@ TEST(Variable, RefusesToBeUsedWithoutAValue) {
 
 TEST(NoGrad, ComputesTheSameWithoutRecording) {
   const Variable x = parameter(Tensor::full({}, 3));
-  const Variable recorded = multiply(x, x);
+  const Variable recorded = x * x;
   {
     const NoGrad outer;
     { const NoGrad inner; }
-    const Variable y = multiply(x, x);
+    const Variable y = x * x;
     EXPECT_EQ(y.item(), recorded.item());
     EXPECT_FALSE(y.requires_grad());
   }
-  EXPECT_TRUE(multiply(x, x).requires_grad());
+  EXPECT_TRUE((x * x).requires_grad());
 }
 
 TEST(NoGrad, HoldsForItsThreadOnly) {
   const NoGrad here;
   bool recorded = false;
-  std::thread([&] { recorded = scale(parameter(Tensor::full({}, 1)), 2).requires_grad(); }).join();
+  std::thread([&] { recorded = (2 * parameter(Tensor::full({}, 1))).requires_grad(); }).join();
   EXPECT_TRUE(recorded);
 }
 
@@ -140,7 +145,7 @@ TEST(Variable, LongChainsNeedNoStack) {
   const Variable x = parameter(Tensor::full({}, 1));
   const auto chain = [&] {
     Variable y = x;
-    for (int i = 0; i < 200000; ++i) y = scale(y, 1);
+    for (int i = 0; i < 200000; ++i) y = 1 * y;
     return y;
   };
   backward(chain());
@@ -152,15 +157,15 @@ TEST(Variable, LongChainsNeedNoStack) {
 // Creation numbers of two threads may not reverse an edge.
 TEST(Backward, AGraphMayBeContinuedOnAnotherThread) {
   const Variable x = parameter(Tensor::full({}, 3));
-  for (int i = 0; i < 100; ++i) scale(x, 1);  // this thread's numbers run ahead of the new thread's
-  const Variable square = multiply(x, x);
-  std::thread([&] { backward(multiply(square, scale(scale(square, 1), 1))); }).join();  // x^4
+  for (int i = 0; i < 100; ++i) 1 * x;  // this thread's numbers run ahead of the new thread's
+  const Variable square = x * x;
+  std::thread([&] { backward(square * (1 * (1 * square))); }).join();  // x^4
   EXPECT_EQ(x.grad().item(), 108);
 }
 
 TEST(History, ListsWhatAValueWasComputedFromInOrder) {
   const Variable x = parameter(Tensor::of({2}, {3, -2})), constant(Tensor::of({2}, {1, 1}));
-  const Variable square = multiply(x, x), y = sum(add(square, constant));
+  const Variable square = x * x, y = sum(square + constant);
   std::string ops;
   for (const Variable& v : history_of(y)) ops += std::string(v.op()) + " ";
   EXPECT_EQ(ops, "leaf leaf multiply add sum ");

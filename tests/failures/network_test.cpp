@@ -94,7 +94,7 @@ TEST(Failures, F10SaturatedGatesLeaveTheSkip) {
     }
     const Variable x(uniform({1, 4, 4, 8}, 3), true);
     const Variable y = block.forward(x);
-    backward(sum(multiply(y, y)));
+    backward(sum(y * y));
     EXPECT_LT(std::abs(expand.grad().data()[0]), 1e-20);  // nothing moves the gate any more
     EXPECT_GT(std::abs(x.grad().data()[0]), 0);
     if (bias < 0) {

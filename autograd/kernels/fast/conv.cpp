@@ -7,7 +7,6 @@
 #include "autograd/kernels/fast/narrow.h"
 #include "autograd/kernels/fast/weight_forms.h"
 #include "autograd/kernels/fast/winograd.h"
-#include "autograd/kernels/linear.h"
 
 namespace supertac::kernels::fast {
 namespace {
@@ -17,7 +16,7 @@ void gather_batch(const GatherJob& job, Dim images, Dim in_pixels, Dim out_pixel
   for (Dim n = 0; n < images; ++n) gather(job, x + n * in_pixels * job.cin, y + n * out_pixels * job.cout);
 }
 
-ConvTask task_of(const ConvSizes& s) { return {&geometry_of(s.map), s.images, s.cin, s.cout}; }
+ConvTask task_of(const ConvSizes& s) { return {&geometry_of(s.conv), s.images, s.cin, s.cout}; }
 
 }  // namespace
 
@@ -58,7 +57,7 @@ void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into int
 // A chunk of images passes all taps before the next one, while it is in the cache.
 void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Into into, real* gw) {
   const ConvTask s = task_of(sizes);
-  if (s.images == 0 && into == Into::overwrite) std::fill_n(gw, sizes.map.taps() * s.cin * s.cout, real(0));
+  if (s.images == 0 && into == Into::overwrite) std::fill_n(gw, sizes.conv.taps() * s.cin * s.cout, real(0));
   if (is_narrow(s)) return narrow_grad_w(s, x, gy, into, gw);
   if (is_winograd(s)) return winograd_grad_w(s, x, gy, into, gw);
   const auto outer = isa_kernels().outer;

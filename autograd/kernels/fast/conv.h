@@ -1,4 +1,4 @@
-// The same sums as kernels/conv.h and kernels/linear.h, faster: register tiles, instruction sets chosen at
+// The same sums as kernels/conv.h and ops/linear.h, faster: register tiles, instruction sets chosen at
 // run time, Winograd's way for batches of larger maps, one of its own for few outputs. Which way is taken
 // depends on the shapes only, so all processors agree.
 #pragma once
@@ -18,7 +18,7 @@ void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const rea
 void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx);
 void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw);
 
-/// w [taps][cin][cout] -> [taps][cout][cin], for all lanes of a training step once (weight_forms.h).
+/// w [taps][cin][cout] -> [taps][cout][cin], for all micro-batches of a training step once (weight_forms.h).
 Tensor transposed_weights(const real* w, Dim taps, Dim cin, Dim cout);
 
 }  // namespace supertac::kernels::fast

@@ -109,7 +109,7 @@ void add_tiles(const ConvSettings& s, Geometry& g) {
 Geometry build(const ConvSettings& s) {
   const Pairs pairs = pairs_of(s);
   Geometry g;
-  g.map = s;
+  g.conv = s;
   g.in_pixels = s.height * s.width;
   g.out_pixels = s.out_height() * s.out_width();
   g.taps = s.taps();

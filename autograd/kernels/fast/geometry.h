@@ -27,7 +27,7 @@ struct TapPairs {
 };
 
 struct Geometry {
-  ConvSettings map;
+  ConvSettings conv;
   Dim in_pixels = 0, out_pixels = 0, taps = 0;
   std::vector<Phase> forward;   // outputs gather from inputs
   std::vector<Phase> backward;  // inputs gather from outputs: the gradient of x

@@ -21,8 +21,8 @@ constexpr Dim filled_up(Dim n) { return (n + kPart - 1) / kPart * kPart; }
 Dim pixels_of(const ConvTask& s) { return s.geometry->in_pixels; }
 Dim sums_of(const ConvTask& s) { return s.geometry->taps * s.cout; }
 // Of a map with its margin.
-Dim lines_of(const ConvTask& s) { return s.geometry->map.height + s.geometry->map.kernel_h - 1; }
-Dim line_of(const ConvTask& s) { return s.geometry->map.width + kAcross - 1; }
+Dim lines_of(const ConvTask& s) { return s.geometry->conv.height + s.geometry->conv.kernel_h - 1; }
+Dim line_of(const ConvTask& s) { return s.geometry->conv.width + kAcross - 1; }
 
 // [taps][cin][cout] -> [cin][(taps, cout), zeros]
 Tensor with_taps_inside(const ConvTask& s, const real* w) {
@@ -38,10 +38,10 @@ Tensor with_taps_inside(const ConvTask& s, const real* w) {
 // to[p, t, o] = gy[p - t, o], 0 outside the map, for one image. Of `turned`, the map by half a turn with a
 // margin of zeros, the taps of a line lie side by side.
 template <Dim kOutputs>
-void spread(const ConvTask& s, const real* gy, real* turned, real* to) {
+void expanded(const ConvTask& s, const real* gy, real* turned, real* to) {
   constexpr Dim kRun = kAcross * kOutputs;
-  const Dim width = s.geometry->map.width, height = s.geometry->map.height,
-            taps_down = s.geometry->map.kernel_h;
+  const Dim width = s.geometry->conv.width, height = s.geometry->conv.height,
+            taps_down = s.geometry->conv.kernel_h;
   const Dim line = line_of(s) * kOutputs;
   real* inside = turned + (height - 1 + taps_down / 2) * line + width * kOutputs;
   for (Dim i = 0; i < height; ++i, inside -= line) {
@@ -61,12 +61,12 @@ void spread(const ConvTask& s, const real* gy, real* turned, real* to) {
 // y[q, o] = bias[o] + sum over taps of z[q + t, t, o] for one image; z has a margin of zeros.
 template <Dim kOutputs>
 void collect(const ConvTask& s, const real* z, const real* bias, real* y) {
-  const ConvSettings& map = s.geometry->map;
-  for (Dim i = 0; i < map.height; ++i, y += map.width * kOutputs) {
-    for (Dim j = 0; j < map.width * kOutputs; ++j) y[j] = bias != nullptr ? bias[j % kOutputs] : 0;
-    for (Dim k = 0; k < map.kernel_h; ++k) {
+  const ConvSettings& c = s.geometry->conv;
+  for (Dim i = 0; i < c.height; ++i, y += c.width * kOutputs) {
+    for (Dim j = 0; j < c.width * kOutputs; ++j) y[j] = bias != nullptr ? bias[j % kOutputs] : 0;
+    for (Dim k = 0; k < c.kernel_h; ++k) {
       const real* part = z + (i + k) * line_of(s) * kColumns + k * kAcross * kOutputs;
-      for (Dim j = 0; j < map.width; ++j, part += kColumns) {
+      for (Dim j = 0; j < c.width; ++j, part += kColumns) {
         real total[kOutputs];
         for (Dim o = 0; o < kOutputs; ++o) total[o] = y[j * kOutputs + o];
         for (Dim t = 0; t < kAcross; ++t) {
@@ -88,13 +88,13 @@ void with_outputs(Dim outputs, Use use) {
 }
 
 // Of all images.
-Tensor spread(const ConvTask& s, const real* gy) {
+Tensor expanded(const ConvTask& s, const real* gy) {
   Tensor turned = Tensor::zeros({lines_of(s) * line_of(s) * s.cout + kPart});
   Tensor gz(Shape{s.images * pixels_of(s) * sums_of(s) + kPart});
   with_outputs(s.cout, [&](auto outputs) {
     for (Dim n = 0; n < s.images; ++n) {
-      spread<outputs>(s, gy + n * pixels_of(s) * outputs, turned.data(),
-                      gz.data() + n * pixels_of(s) * sums_of(s));
+      expanded<outputs>(s, gy + n * pixels_of(s) * outputs, turned.data(),
+                        gz.data() + n * pixels_of(s) * sums_of(s));
     }
   });
   return gz;
@@ -103,21 +103,21 @@ Tensor spread(const ConvTask& s, const real* gy) {
 }  // namespace
 
 bool is_narrow(const ConvTask& s) {
-  const ConvSettings& map = s.geometry->map;
-  ConvSettings same{.height = map.height, .width = map.width, .kernel_h = map.kernel_h, .kernel_w = kAcross};
-  same.padding_h = map.kernel_h / 2, same.padding_w = kAcross / 2;
-  return map == same && map.kernel_h % 2 == 1 && sums_of(s) <= kColumns && s.cout * 2 < s.cin;
+  const ConvSettings& c = s.geometry->conv;
+  ConvSettings same{.height = c.height, .width = c.width, .kernel_h = c.kernel_h, .kernel_w = kAcross};
+  same.padding_h = c.kernel_h / 2, same.padding_w = kAcross / 2;
+  return c == same && c.kernel_h % 2 == 1 && sums_of(s) <= kColumns && s.cout * 2 < s.cin;
 }
 
 void narrow_conv(const ConvTask& s, const real* x, const real* w, const real* bias, real negative_slope,
                  real* y) {
-  const ConvSettings& map = s.geometry->map;
+  const ConvSettings& c = s.geometry->conv;
   const Tensor inside = with_taps_inside(s, w);
   const Dim line = line_of(s) * kColumns, pixel_itself = 0;
   Tensor z = Tensor::zeros({lines_of(s), line});
-  const ProductJob job{.height = map.height,
-                       .width = map.width,
-                       .from = {0, map.width * s.cin, s.cin},
+  const ProductJob job{.height = c.height,
+                       .width = c.width,
+                       .from = {0, c.width * s.cin, s.cin},
                        .to = {0, line, kColumns},
                        .segments = &pixel_itself,
                        .segment_count = 1,
@@ -126,23 +126,23 @@ void narrow_conv(const ConvTask& s, const real* x, const real* w, const real* bi
                        .cout = kColumns};
   for (Dim n = 0; n < s.images; ++n) {
     isa_kernels().product(job, x + n * pixels_of(s) * s.cin,
-                          z.data() + map.padding_h * line + map.padding_w * kColumns);
+                          z.data() + c.padding_h * line + c.padding_w * kColumns);
     with_outputs(s.cout,
                  [&](auto outputs) { collect<outputs>(s, z.data(), bias, y + n * pixels_of(s) * outputs); });
   }
-  if (negative_slope == 1) return;
-  for (Dim i = 0; i < s.images * pixels_of(s) * s.cout; ++i) y[i] = y[i] > 0 ? y[i] : negative_slope * y[i];
+  if (negative_slope != 1)
+    std::transform(y, y + s.images * pixels_of(s) * s.cout, y, Rectifier(negative_slope));
 }
 
 void narrow_grad_x(const ConvTask& s, const real* gy, const real* w, Into into, real* gx) {
   const Tensor wt = fast::transposed_weights(w, s.geometry->taps, s.cin, s.cout);
-  isa_kernels().gather_rows({nullptr, wt.data(), nullptr, sums_of(s), s.cin, into, 1}, spread(s, gy).data(),
+  isa_kernels().gather_rows({nullptr, wt.data(), nullptr, sums_of(s), s.cin, into, 1}, expanded(s, gy).data(),
                             gx, s.images * pixels_of(s));
 }
 
 void narrow_grad_w(const ConvTask& s, const real* x, const real* gy, Into into, real* gw) {
   Tensor inside(Shape{sums_of(s), s.cin});
-  fast::linear_grad_w(s.images * pixels_of(s), sums_of(s), s.cin, spread(s, gy).data(), x, Into::overwrite,
+  fast::linear_grad_w(s.images * pixels_of(s), sums_of(s), s.cin, expanded(s, gy).data(), x, Into::overwrite,
                       inside.data());
   for (Dim t = 0; t < s.geometry->taps; ++t) {
     for (Dim i = 0; i < s.cin; ++i) {

@@ -1,8 +1,8 @@
 // What the kernels make of weights before they use them: transposed, turned, transformed for Winograd.
 //
 // A kernel makes them anew in every call, as it cannot know whether somebody wrote the weights meanwhile. A
-// training step knows: its weights stand still while the lanes run, so each form need be made once for all of
-// them.
+// training step knows: its weights stand still while its micro-batches run, so each form need be made once
+// for all of them.
 #pragma once
 
 #include <array>

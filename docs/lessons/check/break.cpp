@@ -77,14 +77,14 @@ Chart posterior_collapse() {
     Array path;
     for (int step = 0; step < 200; ++step) {
       const double x = std::sin(0.7 * step);
-      const Variable mean = supertac::scale(gain, x);
+      const Variable mean = x * gain;
       const Variable z = supertac::sample_gaussian(
           mean, width, Tensor::full({1, 1}, random.normal(static_cast<std::uint64_t>(step))));
       const Variable kl = supertac::kl_divergence(mean, width);
       path.push_back(kl.item());
-      const Variable seen = supertac::l2_loss(supertac::multiply(z, out), Variable(Tensor::full({1, 1}, x)));
+      const Variable seen = supertac::l2_loss(z * out, Variable(Tensor::full({1, 1}, x)));
       adam.zero_grad();
-      supertac::backward(supertac::add(seen, supertac::scale(kl, beta)));
+      supertac::backward(seen + beta * kl);
       adam.step();
     }
     return path;
@@ -150,7 +150,7 @@ Chart silent_term() {
     Tensor moved = truth.clone();
     for (Dim i = 0; i < 64; ++i) moved.data()[i] += 0.02 * at * (i % 2 == 0 ? 1 : -1);
     const Variable x(moved, true);
-    supertac::backward(supertac::scale(supertac::ssim(x, truth), -0.1));
+    supertac::backward(-0.1 * supertac::ssim(x, truth));
     double squares = 0;
     for (const double g : x.grad().values()) squares += g * g;
     chart.without.push_back(0), chart.with.push_back(1000 * std::sqrt(squares));
@@ -274,9 +274,8 @@ Chart spike() {
   const auto path = [](double clip) {
     const Variable x = parameter(0);
     const Variable target(Tensor::full({1, 1}, 1));
-    return descend(x, {.learning_rate = 0.02, .clip_norm = clip}, 150, [&](int step) {
-      return supertac::scale(supertac::l2_loss(x, target), step == 20 ? 1e8 : 1);
-    });
+    return descend(x, {.learning_rate = 0.02, .clip_norm = clip}, 150,
+                   [&](int step) { return (step == 20 ? 1e8 : 1) * supertac::l2_loss(x, target); });
   };
   return {"13: a gradient of 1e8 at step 20 stops Adam for good, unless it is clipped", "step",
           "parameter, should be 1", path(0), path(1)};

@@ -92,7 +92,7 @@ Variable Ops::conv_transpose(const Variable& z, const Variable& w, const Variabl
       d = out[i] - d;
     }
   }
-  return supertac::add(ours, Variable(difference));
+  return ours + Variable(difference);
 }
 
 Variable Ops::channel_mean(const Variable& x) const {
@@ -240,11 +240,10 @@ Variable loss_of(const Ops& ops, Parameters& p, const Batch& batch, const Tensor
   const Variable attended = ops.gated_sum(image, image, gates);
   const Variable pixels = dense(supertac::reshape(attended, {kImages * kSide * kSide, kChannels}), 1);
   const Variable picture = supertac::reshape(pixels, {kImages, kSide, kSide, 1});
-  const Variable seen =
-      supertac::add(supertac::l2_loss(decoded, x), supertac::scale(ops.divergence(mean, log_var), 1e-3));
-  const Variable drawn = supertac::add(supertac::l2_loss(picture, Variable(batch.truth)),
-                                       supertac::scale(ops.ssim(picture, batch.truth), -0.1));
-  return supertac::add(seen, drawn);
+  const Variable seen = supertac::l2_loss(decoded, x) + 1e-3 * ops.divergence(mean, log_var);
+  const Variable drawn =
+      supertac::l2_loss(picture, Variable(batch.truth)) - 0.1 * ops.ssim(picture, batch.truth);
+  return seen + drawn;
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include "autograd/kernels/fast/isa/isa.h"
 #include "autograd/kernels/fast/narrow.h"
 #include "autograd/kernels/fast/winograd.h"
-#include "autograd/kernels/linear.h"
+#include "autograd/ops/linear.h"
 #include "tests/autograd/check.h"
 
 namespace supertac::kernels {
@@ -60,9 +60,9 @@ void expect_plain_is_fast(const char* what, bool same_order, Run run) {
 }
 
 void expect_plain_is_fast(const ConvSizes& s) {
-  const ConvTask task{&geometry_of(s.map), s.images, s.cin, s.cout};
+  const ConvTask task{&geometry_of(s.conv), s.images, s.cin, s.cout};
   const bool same_order = !is_narrow(task) && !is_winograd(task);
-  const Dim taps = s.map.taps(), fits = kRowsPerPiece / s.out_pixels();
+  const Dim taps = s.conv.taps(), fits = kRowsPerPiece / s.out_pixels();
   const Tensor x = numbers({s.images, s.in_pixels(), s.cin}), w = numbers({taps, s.cin, s.cout}, 2),
                bias = numbers({s.cout}, 3), gy = numbers({s.images, s.out_pixels(), s.cout}, 4);
   for (const real* b : {bias.data(), static_cast<const real*>(nullptr)}) {
@@ -98,7 +98,7 @@ TEST(ConvKernels, PlainIsFast) {
     for (const bool flat : {false, true}) {
       for (const bool transposed : {false, true}) {
         const ConvSizes s = sizes_of(c, transposed, flat);
-        if (s.map.out_height() < 1 || s.map.out_width() < 1) continue;
+        if (s.conv.out_height() < 1 || s.conv.out_width() < 1) continue;
         SCOPED_TRACE("case " + std::to_string(&c - kConvCases) + (transposed ? " transposed" : "") +
                      (flat ? " 1-D" : " 2-D"));
         expect_plain_is_fast(s);
@@ -112,7 +112,7 @@ TEST(ConvKernels, TheCasesTakeEveryWay) {
   int narrow = 0, winograd = 0, tiles = 0;
   for (const ConvCase& c : kConvCases) {
     const ConvSizes s = sizes_of(c, false, false);
-    const ConvTask task{&geometry_of(s.map), s.images, s.cin, s.cout};
+    const ConvTask task{&geometry_of(s.conv), s.images, s.cin, s.cout};
     ++(is_narrow(task) ? narrow : is_winograd(task) ? winograd : tiles);
   }
   EXPECT_GE(narrow, 2);

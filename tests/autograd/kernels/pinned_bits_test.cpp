@@ -39,7 +39,7 @@ std::uint64_t bits_of(const Op& op, const std::vector<Shape>& shapes) {
   std::vector<Variable> leaves;
   for (std::size_t i = 0; i < shapes.size(); ++i) leaves.push_back(parameter(numbers(shapes[i], i + 1)));
   const Variable y = op(leaves);
-  backward(sum(multiply(y, Variable(numbers(y.shape(), 9)))));
+  backward(sum(y * Variable(numbers(y.shape(), 9))));
   Bits bits;
   bits.add(y.value());
   for (const Variable& leaf : leaves) bits.add(leaf.grad());
@@ -90,7 +90,7 @@ TEST(PinnedBits, Muon) {
   const Variable a(numbers(tall.shape(), 3)), b(numbers(wide.shape(), 4));
   for (int step = 0; step < 20; ++step) {
     muon.zero_grad();
-    backward(add(l2_loss(tall, a), l2_loss(wide, b)));
+    backward(l2_loss(tall, a) + l2_loss(wide, b));
     muon.step();
   }
   Bits bits;
@@ -105,7 +105,7 @@ TEST(PinnedBits, Adam) {
   const Variable target(numbers({500}, 2));
   for (int step = 0; step < 50; ++step) {
     adam.zero_grad();
-    backward(scale(l2_loss(x, target), 100));
+    backward(100 * l2_loss(x, target));
     adam.step();
   }
   Bits bits;

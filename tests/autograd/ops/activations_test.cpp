@@ -5,8 +5,6 @@
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/convolution.h"
 #include "autograd/ops/linear.h"
-
-#include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
 
 namespace supertac {
@@ -45,6 +43,23 @@ TEST(Activations, NotANumberStaysVisible) {
     EXPECT_TRUE(std::isnan(y.item()));
 }
 
+// 0 times infinity is NaN.
+TEST(Activations, MinusInfinityIsRectifiedToZero) {
+  const Tensor least = Tensor::full({1}, -std::numeric_limits<real>::infinity());
+  EXPECT_EQ(relu(Variable(least)).item(), 0);
+  EXPECT_EQ(leaky_relu(Variable(least)).item(), -std::numeric_limits<real>::infinity());
+  for (const Dim out : {1, 5, 16, 40}) {  // paths of few outputs, of partial vectors, of whole ones
+    const Variable b(Tensor::full({out}, -std::numeric_limits<real>::infinity()));
+    const Variable y = linear(Variable(numbers({3, 8})), Variable(numbers({8, out}, 2)), b, kRelu);
+    for (const real at : y.value().values()) EXPECT_EQ(at, 0) << out;
+    for (const Dim side : {5, 8}) {  // eight pixels a side go through Winograd's transform
+      const Variable x(numbers({4, side, side, 32})), w(numbers({3, 3, 32, out}, 2));
+      const Variable map = conv2d(x, w, b, {.padding = 1, .negative_slope = kRelu});
+      for (const real at : map.value().values()) ASSERT_EQ(at, 0) << out << ' ' << side;
+    }
+  }
+}
+
 TEST(Activations, Empty) {
   const Variable x(Tensor::zeros({0, 4}));
   for (const Variable& y : {relu(x), leaky_relu(x), sigmoid(x), clamp(x, -1, 1)}) EXPECT_EQ(y.size(), 0);
@@ -64,7 +79,7 @@ void expect_same_bytes(const std::function<Variable(const std::vector<Variable>&
     std::vector<Variable> leaves;
     for (const Tensor& t : inputs) leaves.push_back(parameter(t));
     const Variable y = layer(leaves, fused);
-    backward(sum(multiply(y, Variable(numbers(y.shape(), 9)))));
+    backward(sum(y * Variable(numbers(y.shape(), 9))));
     std::vector<Tensor>& all = found.emplace_back(std::vector<Tensor>{y.value()});
     for (const Variable& leaf : leaves) all.push_back(leaf.grad());
   }

@@ -10,15 +10,17 @@ using namespace test;
 const Tensor kA = Tensor::of({2, 2}, {1, -2, 3, 0}), kB = Tensor::of({2, 2}, {5, 7, -1, 4});
 
 TEST(Arithmetic, HandComputed) {
-  expect_values(add(Variable(kA), Variable(kB)).value(), {2, 2}, {6, 5, 2, 4});
-  expect_values(multiply(Variable(kA), Variable(kB)).value(), {2, 2}, {5, -14, -3, 0});
-  expect_values(scale(Variable(kA), -2).value(), {2, 2}, {-2, 4, -6, 0});
+  expect_values((Variable(kA) + Variable(kB)).value(), {2, 2}, {6, 5, 2, 4});
+  expect_values((Variable(kA) * Variable(kB)).value(), {2, 2}, {5, -14, -3, 0});
+  expect_values((Variable(kA) - Variable(kB)).value(), {2, 2}, {-4, -9, 4, -4});
+  expect_values((-2 * Variable(kA)).value(), {2, 2}, {-2, 4, -6, 0});
+  expect_values((1 - Variable(kA)).value(), {2, 2}, {0, 3, -2, 1});
   expect_values(sum(Variable(kA)).value(), {}, {2});
 }
 
 TEST(Arithmetic, OneVariableMayBeBothArguments) {
   const Variable x = parameter(kA);
-  backward(sum(add(multiply(x, x), add(x, x))));
+  backward(sum(x * x + (x + x)));
   expect_values(x.grad(), {2, 2}, {4, -2, 8, 2});
 }
 
@@ -29,23 +31,25 @@ TEST(Arithmetic, SumOfManyKeepsItsDigits) {
 
 TEST(Arithmetic, Empty) {
   const Variable x = parameter(Tensor::zeros({0, 3}));
-  EXPECT_EQ(add(x, x).shape().text(), "[0,3]");
-  backward(sum(multiply(scale(x, 2), x)));
+  EXPECT_EQ((x + x).shape().text(), "[0,3]");
+  backward(sum(2 * x * x));
   EXPECT_EQ(sum(x).item(), 0);
 }
 
 TEST(Arithmetic, RefusesOtherShapes) {
   const Variable a(Tensor::zeros({2, 3})), b(Tensor::zeros({3, 2}));
-  expect_refusal("add: a and b must have the same shape, got [2,3] and [3,2]", [&] { add(a, b); });
-  expect_refusal("multiply: a and b must have the same shape, got [2,3] and [3,2]", [&] { multiply(a, b); });
+  expect_refusal("add: a and b must have the same shape, got [2,3] and [3,2]", [&] { a + b; });
+  expect_refusal("multiply: a and b must have the same shape, got [2,3] and [3,2]", [&] { a* b; });
 }
 
 #ifdef SUPERTAC_REAL_IS_DOUBLE
 TEST(Arithmetic, Gradients) {
   const std::vector<Tensor> two{numbers({3, 5, 2}), numbers({3, 5, 2}, 2)};
-  expect_gradients([](const auto& in) { return add(in[0], in[1]); }, two);
-  expect_gradients([](const auto& in) { return multiply(in[0], in[1]); }, two);
-  expect_gradients([](const auto& in) { return scale(in[0], -3); }, {numbers({17})});
+  expect_gradients([](const auto& in) { return in[0] + in[1]; }, two);
+  expect_gradients([](const auto& in) { return in[0] * in[1]; }, two);
+  expect_gradients([](const auto& in) { return in[0] - in[1]; }, two);
+  expect_gradients([](const auto& in) { return -3 * in[0]; }, {numbers({17})});
+  expect_gradients([](const auto& in) { return 1 - in[0]; }, {numbers({17})});
   expect_gradients([](const auto& in) { return sum(in[0]); }, {numbers({3, 7})});
 }
 #endif

@@ -18,9 +18,6 @@ TEST(Shaping, HandComputed) {
   const Variable x(Tensor::of({2, 3}, {1, 2, 3, 4, 5, 6})), y(Tensor::of({2, 1}, {7, 8}));
   expect_values(reshape(x, {3, 2}).value(), {3, 2}, {1, 2, 3, 4, 5, 6});
   expect_values(joined({x, y}).value(), {2, 4}, {1, 2, 3, 7, 4, 5, 6, 8});
-  expect_values(slice(x, 1, 2).value(), {2, 2}, {2, 3, 5, 6});
-  expect_values(slice(x, 0, 1).value(), {2, 1}, {1, 4});
-  expect_values(slice(x, 0, 3).value(), {2, 3}, {1, 2, 3, 4, 5, 6});
   const Variable pixels(Tensor::of({1, 2, 3}, {1, 10, 100, 2, 20, 200}));  // [N,L,C]
   expect_values(flatten_channels_first(pixels).value(), {1, 6}, {1, 2, 10, 20, 100, 200});
 }
@@ -32,23 +29,15 @@ TEST(Shaping, UnflattenUndoesFlatten) {
   for (Dim i = 0; i < x.size(); ++i) ASSERT_EQ(back.value().data()[i], x.data()[i]);
 }
 
-TEST(Shaping, SliceUndoesConcat) {
-  const Variable a(numbers({2, 3, 4})), b(numbers({2, 3, 5}, 2));
-  const Variable back = slice(joined({a, b}), 4, 5);
-  for (Dim i = 0; i < b.size(); ++i) ASSERT_EQ(back.value().data()[i], b.value().data()[i]);
-}
-
-TEST(Shaping, OneAxisIsEnoughToJoinAndToCut) {
+TEST(Shaping, OneAxisIsEnoughToJoin) {
   const Variable joint = joined({Variable(Tensor::of({2}, {1, 2})), Variable(Tensor::of({1}, {3}))});
   expect_values(joint.value(), {3}, {1, 2, 3});
-  expect_values(slice(joint, 1, 2).value(), {2}, {2, 3});
 }
 
 TEST(Shaping, Empty) {
   const Variable x(Tensor::zeros({0, 3, 2}));
   EXPECT_EQ(reshape(x, {2, 0}).shape().text(), "[2,0]");
   EXPECT_EQ(joined({x, x}).shape().text(), "[0,3,4]");
-  EXPECT_EQ(slice(x, 1, 1).shape().text(), "[0,3,1]");
   EXPECT_EQ(flatten_channels_first(x).shape().text(), "[0,6]");
   EXPECT_EQ(unflattened(Variable(Tensor::zeros({0, 6})), {3}).shape().text(), "[0,3,2]");
 }
@@ -73,10 +62,6 @@ TEST(Shaping, RefusesWhatDoesNotFit) {
   expect_refusal("concat: x1 expects [2,4], got [3,4]", [&] {
     joined({x, Variable(Tensor::zeros({3, 4}))});
   });
-  expect_refusal("slice: x expects at least rank 1, got []", [&] { slice(scalar, 0, 1); });
-  for (const Dim begin : {Dim{-1}, Dim{3}}) EXPECT_THROW(slice(x, begin, 1), std::invalid_argument);
-  expect_refusal("slice: columns 2 to 4 leave x [2,3]", [&] { slice(x, 2, 2); });
-  expect_refusal("slice: columns 1 to 1 leave x [2,3]", [&] { slice(x, 1, 0); });
   expect_refusal("flatten_channels_first: x expects rank 3 or 4, got [2,3]",
                  [&] { flatten_channels_first(x); });
   expect_refusal("unflatten_channels_first: x expects rank 2, got []", [&] { unflattened(scalar, {1}); });
@@ -91,7 +76,6 @@ TEST(Shaping, Gradients) {
   expect_gradients([](const auto& in) { return joined(in); },
                    {numbers({2, 3, 1}), numbers({2, 3, 17}, 2), numbers({2, 3, 3}, 3)});
   expect_gradients([](const auto& in) { return joined({in[0], in[0]}); }, {numbers({2, 3})});
-  expect_gradients([](const auto& in) { return slice(in[0], 2, 3); }, {numbers({2, 3, 7})});
   expect_gradients([](const auto& in) { return flatten_channels_first(in[0]); }, {numbers({2, 3, 5, 4})});
   expect_gradients([](const auto& in) { return unflattened(in[0], {2, 3}); }, {numbers({2, 18})});
 }

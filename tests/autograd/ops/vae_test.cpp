@@ -40,7 +40,7 @@ TEST(Vae, ExtremeLogVarianceStaysFinite) {
                  log_var = parameter(Tensor::of({1, 3}, {1000, -1000, 80}));
   const Variable limited = clamp(log_var, -10, 10);
   const Variable z = sample_gaussian(mean, limited, Tensor::full({1, 3}, 4));
-  backward(add(kl_divergence(mean, limited), sum(z)));
+  backward(kl_divergence(mean, limited) + sum(z));
   for (const Tensor& g : {mean.grad(), log_var.grad()}) {
     for (const real x : g.values()) EXPECT_TRUE(std::isfinite(x));
   }

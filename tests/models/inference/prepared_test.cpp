@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "autograd/kernels/fast/isa/isa.h"
+#include "autograd/ops/shaping.h"
 #include "io/numbers/random.h"
+#include "layers/convolution.h"
 #include "models/inference/planner.h"
 #include "models/networks/frame_model.h"
 #include "tests/allocations.h"
@@ -79,6 +81,34 @@ TEST(Prepared, DrawsWhatTheNetworkDrawsForPresetsAndFrames) {
   Rng rng(2);
   expect_same_estimate(
       FrameModel({.in_channels = 3, .height = 5, .width = 4, .channels = 16, .rcabs = 1}, rng), 3, "frames");
+}
+
+// No network of ours joins maps, or takes runs of anything but its input.
+class Joined : public Network {
+ public:
+  explicit Joined(bool takes_runs)
+      : takes_runs_(takes_runs),
+        a_(2, 5, kSameSize, rng_),
+        b_(2, 4, kSameSize, rng_),
+        out_(9, 1, kSameSize, rng_) {}
+  NetworkFormat format() const override { return {.columns = 6, .channels = 2, .scale = 1}; }
+  Shape input_shape(Dim count) const override { return {count, 4, 6, 2}; }
+  Drawing draw(const Variable& x) const override {
+    const Variable maps[] = {a_.forward(x), b_.forward(x, kRelu)};
+    const Variable joined = concat(maps);
+    return {out_.forward(takes_runs_ ? take_runs(joined, {0, 9, 9, 9}) : joined), {}, {}};
+  }
+
+ private:
+  Rng rng_{3};
+  bool takes_runs_;
+  Conv2d a_, b_, out_;
+};
+
+TEST(Prepared, JoinsMaps) { expect_same_estimate(Joined(false), 3, "joined maps"); }
+
+TEST(Prepared, TakesRunsOfTheInputAlone) {
+  EXPECT_THROW({ const Prepared p(Joined(true)); }, std::logic_error);
 }
 
 // All pictures of 64 windows, `batch` at a time.

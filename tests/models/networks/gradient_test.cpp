@@ -83,7 +83,7 @@ TEST(FrameModelGradient, ThroughEveryLayer) {
   const Tensor frames = uniform({2, 2, 5, 2}, 1), truth = uniform({2, 8, 20, 1}, 2);
   const auto loss = [&] {
     const Variable picture = model.forward(Variable(frames));
-    return add(l2_loss(picture, Variable(truth)), scale(ssim(picture, truth), -0.3));
+    return l2_loss(picture, Variable(truth)) - 0.3 * ssim(picture, truth);
   };
   const GradientReport report =
       check_gradients(loss, values_of(model.parameters()),

@@ -83,7 +83,7 @@ void expect_parity(const std::string& op, const std::vector<Input>& inputs, Orde
   for (const Input& in : inputs) leaves.emplace_back(numbers(op + "." + in.name, in.shape, in.order), true);
   const Variable y = f(leaves);
   expect_stored(op + ".y", y.value(), y_order);
-  backward(sum(multiply(y, Variable(numbers(op + ".r", y.shape(), y_order)))));
+  backward(sum(y * Variable(numbers(op + ".r", y.shape(), y_order))));
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     expect_stored(op + "." + inputs[i].name + ".grad", leaves[i].grad(), inputs[i].order);
   }

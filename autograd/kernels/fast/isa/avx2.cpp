@@ -25,9 +25,9 @@ struct Vec {
   static Vec add(Vec a, Vec b) { return {_mm256_add_ps(a.v, b.v)}; }
   static Vec sub(Vec a, Vec b) { return {_mm256_sub_ps(a.v, b.v)}; }
   static Vec fma(Vec a, Vec b, Vec c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
-  static Vec rectify(Vec x, Vec slope) {
+  static Vec rectify(Vec x, Vec slope, Vec floor) {
     const __m256 positive = _mm256_cmp_ps(x.v, _mm256_setzero_ps(), _CMP_GT_OQ);
-    return {_mm256_blendv_ps(_mm256_mul_ps(slope.v, x.v), x.v, positive)};
+    return {_mm256_blendv_ps(_mm256_mul_ps(slope.v, _mm256_max_ps(floor.v, x.v)), x.v, positive)};
   }
   /// to[j * to_step + i] = from[i * from_step + j]
   static void transpose(const real* from, Dim from_step, real* to, Dim to_step) {

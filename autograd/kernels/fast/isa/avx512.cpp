@@ -21,8 +21,9 @@ struct Vec {
   static Vec add(Vec a, Vec b) { return {_mm512_add_ps(a.v, b.v)}; }
   static Vec sub(Vec a, Vec b) { return {_mm512_sub_ps(a.v, b.v)}; }
   static Vec fma(Vec a, Vec b, Vec c) { return {_mm512_fmadd_ps(a.v, b.v, c.v)}; }
-  static Vec rectify(Vec x, Vec slope) {
-    return {_mm512_mask_mul_ps(x.v, _mm512_cmp_ps_mask(x.v, _mm512_setzero_ps(), _CMP_NGT_UQ), slope.v, x.v)};
+  static Vec rectify(Vec x, Vec slope, Vec floor) {
+    const __mmask16 rest = _mm512_cmp_ps_mask(x.v, _mm512_setzero_ps(), _CMP_NGT_UQ);
+    return {_mm512_mask_mul_ps(x.v, rest, slope.v, _mm512_max_ps(floor.v, x.v))};
   }
   /// to[j * to_step + i] = from[i * from_step + j]
   static void transpose(const real* from, Dim from_step, real* to, Dim to_step) {

@@ -51,8 +51,7 @@ inline void product_tile(const ProductJob& job, const real* const (&x)[P], real*
   }
   for (int p = 0; p < P; ++p) {
     for (int j = 0; j < J; ++j) {
-      Vec value = sum[p][j];
-      if (job.negative_slope != 1) value = Vec::rectify(value, Vec::broadcast(job.negative_slope));
+      const Vec value = rectified(sum[p][j], job.negative_slope);
       real* to = y[p] + channel + j * Vec::kLanes;
       if (kPartial && j == J - 1) {
         value.store_part(to, lanes);
@@ -194,10 +193,9 @@ inline void plane_rows(const PlaneJob& job, const PlaneOutput* outputs, const re
     }
   }
   for (int o = 0; o < O; ++o) {
-    const Vec slope = Vec::broadcast(outputs[o].negative_slope);
     real* y = outputs[o].y + at;
     for (int r = 0; r < R; ++r, y += job.width) {
-      const Vec value = outputs[o].negative_slope == 1 ? sum[o][r] : Vec::rectify(sum[o][r], slope);
+      const Vec value = rectified(sum[o][r], outputs[o].negative_slope);
       if (lanes < Vec::kLanes) {
         value.store_part(y, lanes);
       } else {

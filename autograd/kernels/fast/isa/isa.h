@@ -55,7 +55,7 @@ struct FilterJob {
   Into into = Into::add;  // of filter_grads
 };
 
-/// Instructions that plain loops (loops.h) are compiled for.
+/// Instructions that plain loops (each.h) are compiled for.
 enum class Vectors { baseline, avx2, avx512 };
 
 struct IsaKernels {

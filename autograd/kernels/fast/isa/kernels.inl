@@ -8,6 +8,14 @@
 
 #define ALWAYS_INLINE inline __attribute__((always_inline))
 
+// Rectifier(negative_slope)(x)
+ALWAYS_INLINE Vec rectified(Vec x, real negative_slope) {
+  constexpr real kLeast = std::numeric_limits<real>::lowest(),
+                 kInfinite = -std::numeric_limits<real>::infinity();
+  if (negative_slope == 1) return x;
+  return Vec::rectify(x, Vec::broadcast(negative_slope), Vec::broadcast(negative_slope == 0 ? kLeast : kInfinite));
+}
+
 // Which pixels of a tile meet a tap at the border of a map, for the maps that occur: a tile of 8 covers a row
 // of 8 (first or last pixel cut off) or two rows of 4 (first or last column, row, or both).
 template <unsigned... kSets>
@@ -99,8 +107,7 @@ inline void gather_tile(const GatherJob& job, const std::int32_t* taps, Dim tap_
   for (int p = 0; p < P; ++p) {
     real* to = y + outputs[p] * job.cout + channel;
     for (int j = 0; j < J; ++j) {
-      Vec value = Vec::add(tile.sum[p][j], Vec::broadcast(0));
-      if (job.negative_slope != 1) value = Vec::rectify(value, Vec::broadcast(job.negative_slope));
+      const Vec value = rectified(Vec::add(tile.sum[p][j], Vec::broadcast(0)), job.negative_slope);
       if (kPartial && j == J - 1) {
         value.store_part(to + j * Vec::kLanes, lanes);
       } else {
@@ -156,8 +163,8 @@ inline void gather_pixels(const GatherJob& job, const std::int32_t* taps, Dim ta
 
 alignas(64) const real kZeros[kMaxChannels] = {};
 
-void gather(const GatherJob& map, const real* x, real* y) {
-  GatherJob job = map;
+void gather(const GatherJob& whole, const real* x, real* y) {
+  GatherJob job = whole;
   job.x_step = job.cin;
   const Phase* phase = job.phases->data();
   for (std::size_t i = 0; i < job.phases->size(); ++i, ++phase) {

@@ -24,8 +24,9 @@ struct Vec {
   static Vec add(Vec a, Vec b) { return {vaddq_f32(a.v, b.v)}; }
   static Vec sub(Vec a, Vec b) { return {vsubq_f32(a.v, b.v)}; }
   static Vec fma(Vec a, Vec b, Vec c) { return {vfmaq_f32(c.v, a.v, b.v)}; }
-  static Vec rectify(Vec x, Vec slope) {
-    return {vbslq_f32(vcgtq_f32(x.v, vdupq_n_f32(0)), x.v, vmulq_f32(slope.v, x.v))};
+  static Vec rectify(Vec x, Vec slope, Vec floor) {
+    const float32x4_t rest = vmulq_f32(slope.v, vmaxq_f32(floor.v, x.v));
+    return {vbslq_f32(vcgtq_f32(x.v, vdupq_n_f32(0)), x.v, rest)};
   }
   /// to[j * to_step + i] = from[i * from_step + j]
   static void transpose(const real* from, Dim from_step, real* to, Dim to_step) {

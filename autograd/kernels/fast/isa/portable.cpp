@@ -23,7 +23,9 @@ struct Vec {
 #else
   static Vec fma(Vec a, Vec b, Vec c) { return {__builtin_fmaf(a.v, b.v, c.v)}; }
 #endif
-  static Vec rectify(Vec x, Vec slope) { return {x.v > 0 ? x.v : slope.v * x.v}; }
+  static Vec rectify(Vec x, Vec slope, Vec floor) {
+    return {x.v > 0 ? x.v : slope.v * (floor.v > x.v ? floor.v : x.v)};
+  }
   static void transpose(const real* from, Dim, real* to, Dim) { *to = *from; }
   void store(real* p) const { *p = v; }
   void store_part(real* p, Dim) const { *p = v; }

@@ -166,7 +166,6 @@ template <class Transform>
 inline void squares_by(const MapTileJob& job, const real* places, const real* bias, real negative_slope,
                        real* y) {
   constexpr int kSide = Transform::kIn, kSquare = Transform::kOut;
-  const Vec slope = Vec::broadcast(negative_slope);
   for (Dim tile = job.first; tile < job.first + job.count; ++tile, places += job.channels) {
     real* corner = y + tile_corner<kSquare>(job, tile);
     for (Dim c = 0; c < job.channels; c += Vec::kLanes) {
@@ -178,8 +177,7 @@ inline void squares_by(const MapTileJob& job, const real* places, const real* bi
       const Vec start = Vec::load(bias + c);
       for (int i = 0; i < kSquare; ++i) {
         for (int j = 0; j < kSquare; ++j) {
-          Vec value = Vec::add(start, to[i][j]);
-          if (negative_slope != 1) value = Vec::rectify(value, slope);
+          const Vec value = rectified(Vec::add(start, to[i][j]), negative_slope);
           value.store(corner + i * job.map.line + j * job.map.pixel + c);
         }
       }

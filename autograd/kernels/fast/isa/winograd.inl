@@ -216,9 +216,8 @@ void squares(const TileJob& job, const real* places, const real* bias, Into into
       for (int i = 0; i < kSide; ++i) {
         for (int j = 0; j < kSide; ++j) {
           real* pixel = image + pixels[kSide * i + j] * job.channels + c;
-          Vec value = Vec::add(into == Into::add ? Vec::load(pixel) : start, to[i][j]);
-          if (negative_slope != 1) value = Vec::rectify(value, Vec::broadcast(negative_slope));
-          value.store(pixel);
+          const Vec value = Vec::add(into == Into::add ? Vec::load(pixel) : start, to[i][j]);
+          rectified(value, negative_slope).store(pixel);
         }
       }
     }

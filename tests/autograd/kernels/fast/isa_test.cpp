@@ -6,11 +6,13 @@
 #include <limits>
 
 #include "autograd/adam.h"
-#include "autograd/kernels/channels.h"
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/fast/winograd.h"
-#include "autograd/kernels/losses.h"
+#include "autograd/ops/activations.h"
+#include "autograd/ops/arithmetic.h"
+#include "autograd/ops/attention.h"
 #include "autograd/ops/losses.h"
+#include "autograd/ops/vae.h"
 #include "tests/autograd/check.h"
 
 namespace supertac::kernels {
@@ -167,46 +169,50 @@ Tensor awkward(Dim n, std::uint64_t seed) {
   return t;
 }
 
-// What every plain loop makes of n numbers, one row a loop.
+// What the ops without kernels of their own make of n numbers: values and gradients.
 std::vector<Tensor> results_of_loops(Dim n) {
-  const Tensor a = awkward(n, 1), b = awkward(n, 2), start = numbers({n}, 3);
-  const real *x = a.data(), *y = b.data();
+  using Leaves = std::vector<Variable>;
+  const Tensor a = awkward(n, 1), b = awkward(n, 2), c = numbers({n}, 3);
   std::vector<Tensor> rows;
-  const auto row = [&](auto loop) { loop(rows.emplace_back(start.clone()).data()); };
-  row([&](real* to) { leaky_relu(n, 0.01F, x, to); });
-  row([&](real* to) { leaky_relu_grad(n, 0.01F, x, y, to); });
-  row([&](real* to) { rectify_in_place(n, 0.01F, x, to); });
-  row([&](real* to) { sigmoid(n, x, to); });
-  row([&](real* to) { sigmoid_grad(n, x, y, to); });
-  row([&](real* to) { clamp(n, -1, 1, x, to); });
-  row([&](real* to) { clamp_grad(n, -1, 1, x, y, to); });
-  row([&](real* to) { sample_gaussian(n, x, y, start.data(), to); });
-  row([&](real* to) { sample_gaussian_grad_log_var(n, x, y, start.data(), to); });
-  row([&](real* to) { kl_grad_log_var(n, 0.3F, x, to); });
-  row([&](real* to) { add_constant(n, 0.3F, to); });
-  row([&](real* to) { add(n, x, y, to); });
-  row([&](real* to) { multiply(n, x, y, to); });
-  row([&](real* to) { scale(n, 0.3F, x, to); });
-  row([&](real* to) { add_scaled(n, 0.3F, x, to); });
-  row([&](real* to) { add_product(n, x, y, to); });
-  // three pixels of n channels
-  const Tensor pixels = numbers({3, n}, 4), other = numbers({3, n}, 5), gate = numbers({n}, 6);
-  const auto pixels_row = [&](auto loop) { loop(rows.emplace_back(other.clone()).data()); };
-  row([&](real* to) { channel_mean(1, 3, n, pixels.data(), to); });
-  pixels_row([&](real* to) { channel_mean_grad(1, 3, n, gate.data(), to); });
-  pixels_row([&](real* to) { gated_sum(1, 3, n, other.data(), pixels.data(), gate.data(), to); });
-  pixels_row([&](real* to) { gated_sum_grad_x(1, 3, n, pixels.data(), gate.data(), Into::add, to); });
-  row([&](real* to) { gated_sum_grad_s(1, 3, n, pixels.data(), other.data(), to); });
+  const auto run = [&](const std::vector<Tensor>& inputs, const std::function<Variable(const Leaves&)>& op) {
+    Leaves leaves;
+    for (const Tensor& x : inputs) leaves.emplace_back(x, true);
+    for (int twice = 0; twice < 2; ++twice) {  // a first gradient is written, a second one added
+      const Variable y = op(leaves);
+      backward(sum(y * Variable(awkward(y.size(), 8).reshaped(y.shape()))));
+      rows.push_back(y.value());
+    }
+    for (const Variable& x : leaves) rows.push_back(x.grad());
+  };
+  run({a}, [](const Leaves& in) { return leaky_relu(in[0]); });
+  run({a}, [](const Leaves& in) { return relu(in[0]); });
+  run({a}, [](const Leaves& in) { return sigmoid(in[0]); });
+  run({a}, [](const Leaves& in) { return clamp(in[0], -1, 1); });
+  run({a}, [](const Leaves& in) { return 0.3F * in[0]; });
+  run({a, b}, [](const Leaves& in) { return in[0] + in[1]; });
+  run({a, b}, [](const Leaves& in) { return in[0] * in[1]; });
+  const Tensor row_a = a.reshaped({1, n}), row_b = b.reshaped({1, n});
+  run({row_a, row_b}, [&](const Leaves& in) { return sample_gaussian(in[0], in[1], c.reshaped({1, n})); });
+  run({row_a, row_b}, [](const Leaves& in) { return kl_divergence(in[0], in[1]); });
+  const Tensor pixels = numbers({1, 3, 1, n}, 4), others = numbers({1, 3, 1, n}, 5);
+  run({pixels}, [](const Leaves& in) { return global_mean(in[0]); });
+  run({others, pixels, numbers({1, n}, 6)}, [](const Leaves& in) { return gated_sum(in[0], in[1], in[2]); });
   // the gradient of a loss, and two steps of Adam along it
   const Variable parameter(numbers({n}, 7), true);
   Adam adam({parameter}, {.learning_rate = 0.1});
   for (int step = 0; step < 2; ++step) {
     adam.zero_grad();
-    backward(l2_loss(parameter, Variable(gate)));
+    backward(l2_loss(parameter, Variable(c)));
     adam.step();
   }
   rows.push_back(parameter.grad());
   rows.push_back(parameter.value());
+  std::vector<Tensor> parts(8);
+  std::vector<const real*> streams;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    streams.push_back((parts[i] = awkward(n, i)).data());
+    add_as_tree(n, streams, rows.emplace_back(Shape{n}).data());
+  }
   return rows;
 }
 

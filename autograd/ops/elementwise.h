@@ -1,0 +1,45 @@
+// For the sources of ops: what most reverse steps are made of.
+#pragma once
+
+#include <utility>
+
+#include "autograd/kernels/fast/each.h"
+#include "autograd/variable.h"
+
+namespace supertac {
+
+using kernels::each;
+
+/// gx[i] += term(i) where that input wants a gradient.
+template <class Term>
+void add_to_gradient(Backward& b, std::size_t input, Term term) {
+  Tensor* const tensor = b.grad_of(input);
+  if (tensor == nullptr) return;
+  each(tensor->size(), [=, gx = tensor->data()](Dim i) { gx[i] += term(i); });
+}
+
+/// The same without zeros to add to: at first use gx[i] = term(i).
+template <class Term>
+void put_to_gradient(Backward& b, std::size_t input, Term term) {
+  const Backward::Slot slot = b.slot_of(input);
+  if (!slot) return;
+  real* const gx = slot.data();
+  if (slot.into == Into::add) {
+    each(slot.grad->size(), [=](Dim i) { gx[i] += term(i); });
+  } else {
+    each(slot.grad->size(), [=](Dim i) { gx[i] = term(i); });
+  }
+}
+
+/// y[i] = value(x[i]);   gx[i] += gradient(gy[i], x[i], y[i])
+template <class Value, class Gradient>
+Variable elementwise(const char* op, const Variable& x, Value value, Gradient gradient) {
+  Tensor y(x.shape());
+  each(y.size(), [=, from = x.value().data(), to = y.data()](Dim i) { to[i] = value(from[i]); });
+  return record(op, std::move(y), {&x}, [=](Backward& b) {
+    const real *gy = b.gy().data(), *from = b.value(0).data(), *to = b.y().data();
+    add_to_gradient(b, 0, [=](Dim i) { return gradient(gy[i], from[i], to[i]); });
+  });
+}
+
+}  // namespace supertac
