@@ -82,7 +82,9 @@ TEST(MiniSuperTac, HasTheProjectsLossesAndPicture) {
   for (std::size_t i = 0; i < 256; ++i) {
     ASSERT_NEAR(mine.picture->value[i], static_cast<double>(theirs.picture.value().data()[i]), kTolerance)
         << i;
-    ASSERT_NEAR(mine.error->value[i], static_cast<double>(theirs.predicted_error.value().data()[i]), kTolerance) << i;
+    ASSERT_NEAR(mine.error->value[i], static_cast<double>(theirs.predicted_error.value().data()[i]),
+                kTolerance)
+        << i;
   }
 }
 
