@@ -68,7 +68,9 @@ StoredTensor ranges_of(const Trainer& trainer) {
 
 bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& callbacks) {
   const auto begin = std::chrono::steady_clock::now();
-  const auto save = [&] { trainer.save(callbacks.checkpoint, task.origin); };
+  const auto save = [&] {  // of several processes all take part, though the first alone has a file
+    if (!callbacks.checkpoint.empty() || trainer.ranks() > 1) trainer.save(callbacks.checkpoint, task.origin);
+  };
   LogLine sums;
   std::int64_t steps = 0;
   bool stop = callbacks.stop && trainer.ranks() == 1 && callbacks.stop();
