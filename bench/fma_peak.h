@@ -9,8 +9,8 @@ namespace supertac::bench {
 /// turns that other programs take on a busy one.
 double cpu_seconds();
 
-/// GFLOP/s (two per multiply-add) over about 20 us of the calling thread; multiplication and addition apart
-/// on a processor without FMA.
+/// GFLOP/s (two per multiply-add) over about 20 us of the calling thread. Throws std::runtime_error without
+/// AVX2.
 double fma_gflops();
 
 }  // namespace supertac::bench

@@ -1,9 +1,8 @@
 // The convolution and linear kernels at the shapes of preset `paper` (T 256, LD 10, x4), batch 1 and 64:
 // forward, gradient of the input, gradient of the weights.
 //
-// GFLOP/s and share count the usual way, padding as if it were data. `useful` is the share of those
-// multiply-adds that meet data: kernels that skip the padding can exceed the peak by its inverse, Winograd's
-// way (3x3, four maps or more) by up to four times that.
+// GFLOP/s and share count the usual way, padding as if it were data: kernels that skip the padding, and
+// Winograd's way by up to four times, can exceed the peak.
 //
 // `yardstick` is the share of the peak that OpenBLAS's cblas_sgemm reaches, on one thread, with the matrix
 // product of that convolution: the picture's patches laid out as a matrix beforehand, which it is not
@@ -156,8 +155,6 @@ class Product {
 void run_kernel(benchmark::State& state, const Layer& layer, Pass pass) {
   Buffers buffers(layer, state.range(0));
   const kernels::Geometry& g = buffers.geometry;
-  double meeting = 0;
-  for (const kernels::TapPairs& pairs : g.pairs) meeting += static_cast<double>(pairs.inputs.size());
   const auto pixels = static_cast<double>(layer.settings.transposed ? g.in_pixels : g.out_pixels);
   const double all = pixels * static_cast<double>(g.taps);
   const double channels = static_cast<double>(buffers.n * layer.cin * layer.cout);
@@ -165,7 +162,6 @@ void run_kernel(benchmark::State& state, const Layer& layer, Pass pass) {
   openblas_set_num_threads(1);
   bench::run_against_peak(
       state, all * channels, [&] { buffers.run(pass); }, [&] { product.run(); });
-  state.counters["useful"] = meeting / all;
 }
 
 const bool kRegistered = [] {

@@ -13,11 +13,6 @@ namespace {
 
 const SuperTacSettings kPaper = SuperTacSettings::of_preset("paper");
 
-double counted_since(long before, const benchmark::State& state) {
-  return static_cast<double>(allocations::made - before) /
-         static_cast<double>(std::max<std::int64_t>(1, state.iterations()));
-}
-
 void inference(benchmark::State& state) {
   omp_set_num_threads(1);
   Rng rng(1);
@@ -43,7 +38,8 @@ void training_step(benchmark::State& state) {
   for (int i = 0; i < 3; ++i) trainer.train_step();
   const long before = allocations::made;
   for (auto _ : state) trainer.train_step();
-  state.counters["allocations/step"] = counted_since(before, state);
+  state.counters["allocations/step"] =
+      static_cast<double>(allocations::made - before) / static_cast<double>(state.iterations());
   state.SetItemsProcessed(state.iterations() * settings.batch);
 }
 BENCHMARK(training_step)->ArgName("threads")->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);

@@ -18,30 +18,26 @@ inline Tensor random_windows(Dim n, Dim timesteps) {
   return windows;
 }
 
-/// `passes` passes of 6,000 frames of a finger sliding over bumps.
-inline WindowSet sliding_bumps(const SuperTacSettings& model, int passes = 1) {
+/// A pass of 6,000 frames of a finger sliding over bumps.
+inline WindowSet sliding_bumps(const SuperTacSettings& model) {
   WindowSettings settings;
   settings.timesteps = static_cast<int>(model.timesteps);
   settings.scale = static_cast<int>(model.scale);
   WindowSet windows(settings);
   const Plate plate = Plate::named("3_Bumps");
-  for (int pass = 1; pass <= passes; ++pass) {
-    Recording r;
-    r.plate = "3_Bumps";
-    r.trial = 1;
-    r.pass = pass;
-    r.speed_mm_s = 2.5;
-    r.source = "simulated";
-    for (int i = 0; i < 6000; ++i) {
-      const double time = i / 300.0, y = 28 + r.speed_mm_s * time;
-      r.time_s.push_back(time);
-      r.position_mm.insert(r.position_mm.end(), {18, static_cast<float>(y)});
-      for (int k = 0; k < kTaxels; ++k) {
-        r.volts.push_back(static_cast<float>(2.44 - 0.1 * plate.height(18, y - 4.5 + 3 * (k / 4))));
-      }
-    }
-    windows.add(r);
+  Recording r;
+  r.plate = "3_Bumps";
+  r.trial = r.pass = 1;
+  r.speed_mm_s = 2.5;
+  r.source = "simulated";
+  for (int i = 0; i < 6000; ++i) {
+    const double time = i / 300.0, y = 28 + r.speed_mm_s * time;
+    r.time_s.push_back(time);
+    r.position_mm.insert(r.position_mm.end(), {18, static_cast<float>(y)});
+    for (int k = 0; k < kTaxels; ++k)
+      r.volts.push_back(static_cast<float>(2.44 - 0.1 * plate.height(18, y - 4.5 + 3 * (k / 4))));
   }
+  windows.add(r);
   return windows;
 }
 
