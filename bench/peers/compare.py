@@ -44,7 +44,7 @@ TRAINING_BATCH = 64
 
 
 class Drawing(torch.nn.Module):
-    """The package's network on windows as it sees them: [N,T,16] -> [N,1 or 2,S,S], the picture and its spread."""
+    """The package's network on windows as it sees them: [N,T,16] -> [N,1 or 2,S,S], the picture and its predicted error."""
 
     def __init__(self, path):
         super().__init__()
@@ -182,7 +182,7 @@ def check_pictures(ours, model, windows, folder):
         counted = count_macs(lambda: model(windows[:1]))
     inference, training = (float(word) for word in ours("cost"))
     print(f"pictures differ by at most {difference:.1e}; {inference / 1e6:.2f} MMAC a window, PyTorch runs {counted / 1e6:.2f}")
-    # cost_of() leaves out the spread, which PyTorch counts: 1 %.
+    # cost_of() leaves out the predicted error, which PyTorch counts: 1 %.
     if not difference < 1e-4 or abs(counted - inference) > 0.02 * inference:
         sys.exit("compare.py: the two do not compute the same; nothing was timed")
     return inference, training, pictures

@@ -7,8 +7,8 @@ import numpy as np
 from . import recordings
 from .files import read
 
-Pictures = collections.namedtuple("Pictures", "picture spread latents")
-Pictures.__doc__ = "[N,height,width] each, spread is None for a model without; latents [N,groups x latent]."
+Pictures = collections.namedtuple("Pictures", "picture predicted_error latents")
+Pictures.__doc__ = "[N,height,width] each, predicted_error is None for a model without; latents [N,groups x latent]."
 
 # Of levelling (data/windows/levelling.h).
 BINS, LEAST_GAIN, REST_REMOVED, REST_SHARE, TOP_RANK = 256, np.float32(0.15), np.float32(0.5), 20, 3
@@ -142,8 +142,8 @@ class Model:
         h = leaky_relu(self._linear(latents, "upsampler.fc")).reshape(len(x), -1, *self.map)
         for name in self._parts("upsampler.rirb.{}"):
             h = self._rirb(h, name)
-        spread = self._convolve(h, "upsampler.spread")[:, 0] if self.settings.get("spread") else None
-        return self._convolve(h, "upsampler.out")[:, 0], spread, latents
+        error = self._convolve(h, "upsampler.spread")[:, 0] if self.settings.get("spread") else None
+        return self._convolve(h, "upsampler.out")[:, 0], error, latents
 
 
 def load_model(path):

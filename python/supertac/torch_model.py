@@ -142,7 +142,7 @@ def kl_divergence(mean, log_var):
 
 
 def loss_terms(out, truth, a=0.2, beta=1e-3, weight_ssim=0.1):
-    """Of training_outputs(): docs/network.md has the formula; here without the term of the spread."""
+    """Of training_outputs(): docs/network.md has the formula; here without the term of the predicted error."""
     terms = {"reconstruction": sum(F.mse_loss(d, x) for d, x in zip(out["decoded"], out["input"])),
              "kld": sum(kl_divergence(m, v) for m, v in zip(out["mean"], out["log_var"])),
              "l2": F.mse_loss(out["picture"], truth), "ssim": ssim(out["picture"], truth)}

@@ -76,8 +76,9 @@ def compare(folder, data, preset, recording):
     if torch is not None:
         module = model.to_torch().eval()
         with torch.no_grad():
-            good &= check(f"{name}, PyTorch", module(torch.tensor(volts[some])).picture.numpy(), seen.pictures[some])
-            good &= check(f"{name}, spread", module(torch.tensor(volts[some])).spread.numpy(), drawn.spread)
+            by_torch = module(torch.tensor(volts[some]))
+        good &= check(f"{name}, PyTorch", by_torch.picture, seen.pictures[some])
+        good &= check(f"{name}, predicted error", by_torch.predicted_error, drawn.predicted_error)
     if onnxruntime is not None:
         run("supertac-export", path, "--onnx", path.with_suffix(".onnx"))
         session = onnxruntime.InferenceSession(str(path.with_suffix(".onnx")), providers=["CPUExecutionProvider"])
