@@ -64,7 +64,7 @@ Answers all_answers(const Arguments& a, const std::vector<View>& views, const st
       settings.seed = job / views.size();
       const std::size_t m = settings.seed % models.size();
       const View& view = views[job % views.size()];
-      settings.keep = settings.seed == 0 && view.kind == ViewKind::super_resolved ? a.text("out") : "";
+      settings.keep = settings.seed == 0 && view.kind == ViewKind::super_resolved ? a.output("out") : "";
       results[job] = answers(view, *models[m].file.model, windows, exams[m], classes, settings);
     } catch (...) {  // an exception must not leave a thread
 #pragma omp critical
@@ -102,7 +102,6 @@ std::vector<ViewResult> count(const Answers& given, const std::vector<View>& vie
 int run(Arguments& a) {
   const std::vector<View> views = views_of(a);
   if (a.given("out")) {
-    refuse_existing(a.text("out"), a.force());
     if (std::ranges::none_of(views, [](const View& v) { return v.kind == ViewKind::super_resolved; }))
       throw UsageError("--out keeps the classifier of super_resolved pictures, which is not among --views");
   }

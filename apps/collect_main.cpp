@@ -155,12 +155,12 @@ RecorderReport collect(const Arguments& arguments, RecorderSettings settings, co
 /// Recordings, quality report and --json of what was collected, complete or not. Returns what it comes to.
 std::string keep_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
                         const RecorderReport& collected) {
-  OutputFolder folder(out, arguments.force());
+  OutputFolder folder(arguments.output("out"));
   PassesReport report = write_passes(arguments, journal, out, folder);
   report.json["passes_done"] = collected.outcome.passes_done;
   report.json["note"] = collected.outcome.note;
-  arguments.write_json(report.json);
   folder.keep();
+  arguments.write_json(report.json);
   return report.total();
 }
 

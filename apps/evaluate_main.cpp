@@ -3,7 +3,6 @@
 #include "apps/common/output/remarks.h"
 #include "apps/evaluate/pairs.h"
 #include "apps/evaluate/recordings.h"
-#include "io/files/file.h"
 
 namespace supertac {
 
@@ -37,9 +36,6 @@ void declare(Arguments& a) {
            "train.safetensors and test.safetensors with the last frame as the model sees it, and the truth");
 }
 
-int run(Arguments& a) {
-  if (a.given("outputs")) refuse_existing(a.text("outputs"), a.force());
-  return a.given("pairs") ? evaluate_on_pairs(a) : evaluate_on_recordings(a);
-}
+int run(Arguments& a) { return a.given("pairs") ? evaluate_on_pairs(a) : evaluate_on_recordings(a); }
 
 }  // namespace supertac

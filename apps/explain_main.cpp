@@ -133,7 +133,7 @@ Json trace(const SuperTac& model, const Tensor& input, std::vector<Array>& array
 
 int write_graph_out(const Arguments& a, const std::string& dot) {
   read_option("out", [&] {
-    write_graph(a.text("out"), dot);
+    write_graph(a.output("out"), dot);
     return 0;
   });
   a.print(a.text("out") + ": the graph of a training step");
@@ -182,7 +182,6 @@ int draw_expression(const Arguments& a) {
 }  // namespace
 
 int run(Arguments& a) {
-  refuse_existing(a.text("out"), a.force());
   if (is_expression(a.text("FILE"))) return draw_expression(a);
   for (const char* needed : {"recording", "at"})
     if (!a.given(needed)) throw UsageError(std::string("expected --") + needed + " with a model, found none");
@@ -229,7 +228,7 @@ int run(Arguments& a) {
                        {"levelled", w.scaling.levelled},
                        {"least_gain", kLeastGain},
                        {"rest_removed", kRestRemoved}};
-  write_safetensors(a.text("out"),
+  write_safetensors(a.output("out"),
                     {{"kind", "explanation"}, {"steps", steps.dump()}, {"signal", signal.dump()}}, tensors);
   const double end = part.time_s.front() + static_cast<double>(track.frames() - 1) / w.rate_hz;
   a.print(a.text("out") + ": " + std::to_string(arrays.size()) + " arrays, " + std::to_string(steps.size()) +

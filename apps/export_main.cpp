@@ -13,12 +13,11 @@ void declare(Arguments& arguments) {
 
 int run(Arguments& arguments) {
   const std::string path = arguments.text("onnx");
-  refuse_existing(path, arguments.force());
   const std::string model = arguments.text("MODEL");
   const bool frames = SafetensorsFile::read(model).metadata().contains("kind");
   const ModelFile file = load_model(model, frames ? ModelKind::frames : ModelKind::windows);
   const std::string bytes = onnx_of(file);
-  write_file(path, bytes);
+  write_file(arguments.output("onnx"), bytes);
   const NetworkFormat f = file.network().format();
   const auto text = [](Dim size) { return std::to_string(size); };
   const std::string input =

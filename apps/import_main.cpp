@@ -54,13 +54,13 @@ int recover(const Arguments& arguments) {
     if (arguments.given(other))
       throw UsageError(std::string("--journal: stands alone with --out, found with ") + other);
   const std::string out = arguments.text("out");
-  OutputFolder folder(out, arguments.force());
+  OutputFolder folder(arguments.output("out"));
   const PassesReport report = write_passes(arguments, arguments.text("journal"), out, folder);
   if (report.frames == 0)
     throw FileError(arguments.text("journal"),
                     "holds no frame of a pass: it was cut off before the first contact");
-  arguments.write_json(report.json);
   folder.keep();
+  arguments.write_json(report.json);
   arguments.print(report.total() + " recovered" + (report.complete ? "" : "; the collection was cut off"));
   return kExitOk;
 }
@@ -71,9 +71,9 @@ int run(Arguments& arguments) {
   if (arguments.given("journal")) return recover(arguments);
   if (!arguments.given("TEXT_DIR")) throw UsageError("expected TEXT_DIR or --journal FILE, found neither");
   const std::string out = arguments.text("out");
-  OutputFolder folder(out, arguments.force());
+  OutputFolder folder(arguments.output("out"));
   std::optional<OutputFolder> pictures;
-  if (arguments.given("pictures")) pictures.emplace(arguments.text("pictures"), arguments.force());
+  if (arguments.given("pictures")) pictures.emplace(arguments.output("pictures"));
   std::size_t bad = 0, reliable = 0, recordings = 0;
   nlohmann::ordered_json files = nlohmann::ordered_json::array();
   std::optional<Progress> bar;
@@ -96,13 +96,13 @@ int run(Arguments& arguments) {
                      });
   bar.reset();
   if (pictures) write_file(pictures->add("index.html"), page.html(arguments.command_line()));
+  folder.keep();
+  if (pictures) pictures->keep();
   arguments.write_json({{"folder", out},
                         {"recordings", recordings},
                         {"reliable", reliable},
                         {"left_out", bad},
                         {"files", files}});
-  folder.keep();
-  if (pictures) pictures->keep();
   arguments.print(std::to_string(recordings) + " recordings in " + out + ", " + std::to_string(reliable) +
                   " with a reliable registration");
   return kExitOk;

@@ -11,10 +11,9 @@ namespace {
 
 nlohmann::ordered_json write_stl(const Arguments& arguments, const Plate& plate) {
   const std::string path = arguments.text("out");
-  refuse_existing(path, arguments.force());
   const auto triangles = mesh_of(plate, {.resolution_mm = arguments.number("resolution", 0.02, 5),
                                          .base_mm = arguments.number("base", 0.2, 100)});
-  write_file(path, stl_bytes(triangles, "SuperTac plate " + plate.name() + ", mm"));
+  write_file(arguments.output("out"), stl_bytes(triangles, "SuperTac plate " + plate.name() + ", mm"));
   arguments.print(path + ": " + plate.name() + ", heights " + format(plate.min_height(), 2) + " to " +
                   format(plate.max_height(), 2) +
                   " mm, texture from y = " + format(plate.texture_begin(), 2) + " to " +
@@ -29,13 +28,12 @@ nlohmann::ordered_json write_stl(const Arguments& arguments, const Plate& plate)
 
 nlohmann::ordered_json write_gcode(const Arguments& arguments, const Plate& plate) {
   const std::string path = arguments.text("gcode");
-  refuse_existing(path, arguments.force());
   PalpationPlan plan;
   plan.speed = arguments.number("speed", 0.5, rig::kFastestMmS);
   plan.passes = static_cast<int>(arguments.integer("passes", 1, rig::kPasses));
   const std::string title = "SuperTac: " + std::to_string(plan.passes) + " passes over plate " +
                             plate.name() + " at " + format(plan.speed) + " mm/s";
-  write_file(path, palpation_program(plan, rig::kMounted, Limits(), title));
+  write_file(arguments.output("gcode"), palpation_program(plan, rig::kMounted, Limits(), title));
   arguments.print(path + ": " + std::to_string(plan.passes) + " passes at " + format(plan.speed) +
                   " mm/s, from and back to " + describe(rig::kMounted));
   return {{"file", path}, {"passes", plan.passes}, {"speed_mm_s", plan.speed}};

@@ -153,20 +153,20 @@ int run(Arguments& arguments) {
   const auto seed = static_cast<std::uint64_t>(arguments.integer("seed", 0, INT64_MAX));
   if (arguments.list("speeds").empty()) throw UsageError("--speeds: expected at least one speed");
   const std::size_t before = recordings_in(arguments.text("out"));
-  OutputFolder folder(arguments.text("out"), arguments.force());
+  OutputFolder folder(arguments.output("out"));
   const auto jobs = plan(arguments, plates, folder);
   std::size_t frames = 0;
   {
     Progress progress(arguments, "simulating", jobs.size(), "passes");
     frames = simulate(jobs, settings, seed, progress);
   }
+  for (const std::string& plate : arguments.list("plates")) keep_plate_file(plate, folder.path());
+  folder.keep();
   arguments.write_json({{"folder", arguments.text("out")},
                         {"recordings", jobs.size()},
                         {"frames", frames},
                         {"seed", seed},
                         {"command", arguments.command_line()}});
-  for (const std::string& plate : arguments.list("plates")) keep_plate_file(plate, folder.path());
-  folder.keep();
   if (before > 0)
     arguments.note(arguments.text("out") + " held " + std::to_string(before) +
                    " recordings before; those of other names stay and belong to the data set now");

@@ -82,11 +82,10 @@ int run(Arguments& a) {
   const double begin = monotonic_seconds();
   if (!a.given("model")) throw UsageError("--model: expected a file of supertac-train, found none");
   const double speedup = a.number("speedup", 0.1, 100);
-  StreamSettings settings{.out = a.text("out"),
+  StreamSettings settings{.out = a.output("out"),
                           .precision = precision_of(a.choice("precision", {"fp32", "int8"})),
                           .classifier = a.text("classifier"),
                           .udp = a.text("udp"),
-                          .force = a.force(),
                           .view = !a.quiet() && drawable_terminal()};
   if (a.given("seconds")) settings.seconds = a.number("seconds", 0.001, 1e9);
   const std::string origin = source_of(a);
@@ -107,7 +106,7 @@ int run(Arguments& a) {
     error = std::current_exception();  // what was seen before is kept
   }
   stream.finish();
-  if (settings.out == "-")
+  if (settings.out.path == "-")
     a.note(stream.summary());
   else
     a.print(stream.summary());

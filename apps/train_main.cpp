@@ -6,7 +6,6 @@
 #include "apps/train/training_options.h"
 #include "apps/train/training_run.h"
 #include "data/recordings/recording.h"
-#include "io/files/file.h"
 
 namespace supertac {
 
@@ -31,11 +30,11 @@ void declare(Arguments& a) {
 namespace {
 
 int train(const Arguments& a, TrainingTask task, Ranks& ranks) {
-  const std::string out = a.text("out"), about = task.counts;
+  const std::string about = task.counts;
   const std::vector<std::string> remarks = task.remarks;
   if (a.flag("strict")) remark(a, remarks);
   TrainingRun training(a, std::move(task),
-                       {.out = out, .force = a.force(), .resume = a.text("resume"), .ranks = ranks});
+                       {.out = a.output("out"), .force = a.force(), .resume = a.text("resume"), .ranks = ranks});
   a.note(about);  // what ends a training before it has begun says one line only
   remark(a, remarks);
   const bool done = training.train();
@@ -47,10 +46,10 @@ int train(const Arguments& a, TrainingTask task, Ranks& ranks) {
            training.folder().checkpoint_path());
     return kExitFailed;
   }
-  a.print(out + ": " + std::to_string(trainer.model().parameter_count()) + " parameters after " +
+  a.print(training.out() + ": " + std::to_string(trainer.model().parameter_count()) + " parameters after " +
           std::to_string(trainer.step()) + " steps; curves in " + training.folder().path() + "/report.html");
   nlohmann::ordered_json result = training.description();
-  result["out"] = out;
+  result["out"] = training.out();
   a.write_json(result);
   return kExitOk;
 }
@@ -78,7 +77,6 @@ int train(const Arguments& a, Ranks& ranks) {
     throw UsageError(error.what());
   }
   const Recipe recipe = a.given("pairs") ? Recipe() : recipe_of(a);
-  refuse_existing(a.text("out"), a.force());
   return train(a, a.given("pairs") ? pairs_of(a) : windows_of(a, recipe), ranks);
 }
 

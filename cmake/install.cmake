@@ -10,8 +10,6 @@ install(EXPORT supertac NAMESPACE supertac:: DESTINATION ${CMAKE_INSTALL_LIBDIR}
   FILE supertacTargets.cmake COMPONENT development)
 file(WRITE ${PROJECT_BINARY_DIR}/supertacConfig.cmake
 "include(CMakeFindDependencyMacro)\nfind_dependency(OpenMP COMPONENTS CXX)\nfind_dependency(Threads)\nfind_dependency(nlohmann_json)\nfind_dependency(ZLIB)
-set(BLA_VENDOR OpenBLAS)
-find_dependency(BLAS)
 include(\${CMAKE_CURRENT_LIST_DIR}/supertacTargets.cmake)\n")
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/supertacConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/supertacConfig.cmake ${PROJECT_BINARY_DIR}/supertacConfigVersion.cmake
@@ -30,6 +28,6 @@ Name: supertac
 Description: @PROJECT_DESCRIPTION@
 Version: @PROJECT_VERSION@
 Cflags: -I\${prefix}/@CMAKE_INSTALL_INCLUDEDIR@
-Libs: -L\${prefix}/@CMAKE_INSTALL_LIBDIR@ -Wl,--start-group@links@ -Wl,--end-group -lopenblas -lz -fopenmp -pthread
+Libs: -L\${prefix}/@CMAKE_INSTALL_LIBDIR@ -Wl,--start-group@links@ -Wl,--end-group -lz -fopenmp -pthread
 ")
 install(FILES ${PROJECT_BINARY_DIR}/supertac.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)

@@ -6,7 +6,7 @@ add_library(supertac_options INTERFACE)
 # instruction set gives the same bits.
 target_compile_options(supertac_options INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor
   -Wno-restrict -ffp-contract=off -fno-math-errno -fno-trapping-math $<$<BOOL:${SUPERTAC_WERROR}>:-Werror>)
-# A program names only the shared libraries that it calls: OpenBLAS starts its threads in each that names it.
+# A program names only the shared libraries that it calls.
 target_link_options(supertac_options INTERFACE -Wl,--as-needed)
 if(SUPERTAC_SANITIZE)
   target_compile_options(supertac_options INTERFACE -fsanitize=${SUPERTAC_SANITIZE} -fno-omit-frame-pointer

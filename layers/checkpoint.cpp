@@ -1,6 +1,7 @@
 #include "layers/checkpoint.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <stdexcept>
 
@@ -71,7 +72,7 @@ StoredTensor to_stored(const Parameter& p, const Tensor& tensor, const std::stri
 
 StoredTensor to_stored(const Parameter& p) { return to_stored(p, p.value.value(), p.name); }
 
-void write_checkpoint(const std::string& path, const std::vector<Parameter>& parameters,
+void write_checkpoint(const OutputPath& output, const std::vector<Parameter>& parameters,
                       std::map<std::string, std::string> metadata, const std::vector<StoredTensor>& more) {
   metadata["format"] = "supertac-checkpoint";
   metadata["format_version"] = std::to_string(kCheckpointVersion);
@@ -79,9 +80,14 @@ void write_checkpoint(const std::string& path, const std::vector<Parameter>& par
   for (const Parameter& p : parameters) stored.push_back(to_stored(p));
   stored.insert(stored.end(), more.begin(), more.end());
   std::vector<TensorToWrite> list;
-  for (const StoredTensor& s : stored)
+  for (const StoredTensor& s : stored) {
+    if (!std::ranges::all_of(s.values, [](float v) { return std::isfinite(v); }))
+      throw FileError(output.path, "not written: " + s.name +
+                                       " holds values that are not finite; the training "
+                                       "diverged, lower its learning rate");
     list.push_back({s.name, "F32", s.shape, std::as_bytes(std::span(s.values))});
-  write_safetensors(path, std::move(metadata), list);
+  }
+  write_safetensors(output, std::move(metadata), list);
 }
 
 SafetensorsFile read_checkpoint(const std::string& path) {

@@ -27,8 +27,8 @@ StoredTensor to_stored(const Parameter& parameter);
 StoredTensor to_stored(const Parameter& parameter, const Tensor& tensor, const std::string& name);
 
 /// Writes all parameters and `more` behind them, atomically. metadata gains "format" = "supertac-checkpoint"
-/// and "format_version". Throws FileError.
-void write_checkpoint(const std::string& path, const std::vector<Parameter>& parameters,
+/// and "format_version". Throws FileError, also for a value that is not finite: such weights draw nothing.
+void write_checkpoint(const OutputPath& output, const std::vector<Parameter>& parameters,
                       std::map<std::string, std::string> metadata,
                       const std::vector<StoredTensor>& more = {});
 

@@ -72,8 +72,8 @@ expect("recordings" in said["supertac:provenance"], "the model's card does not s
 asked = validated(text) and validated(with_model)
 parts = {entry["ref"]: " ".join(entry["dependsOn"]) for entry in json.loads(text)["dependencies"]}
 expect("libstdc%2B%2B6" in parts["supertac-info"] or "libstdc++6" in parts["supertac-info"], "supertac-info links no C++")
-expect("openblas" in parts["supertac-evaluate"], "supertac-evaluate links OpenBLAS, the list does not say so")
-expect("openblas" not in parts["supertac-info"], "supertac-info does not link OpenBLAS, the list says so")
+expect("microhttpd" in parts["supertac-stream"], "supertac-stream links libmicrohttpd, the list does not say so")
+expect("microhttpd" not in parts["supertac-info"], "supertac-info does not link libmicrohttpd, the list says so")
 jobs = [path.name.removeprefix("supertac-") for path in (build / "bin").glob("supertac-*") if path.name.count("-") == 1]
 expect(set(jobs) <= set(completed("supertac", "")), "completion does not know every job")
 expect(completed("supertac", "simu") == ["simulate"], "supertac simu<TAB>")

@@ -1,8 +1,8 @@
 #!/bin/sh
 # Installs the Debian packages that building needs, those that are missing only. Arguments: more packages.
 set -eu
-packages="g++ cmake ninja-build nlohmann-json3-dev libcxxopts-dev libkissfft-dev libmicrohttpd-dev libopenblas-dev
-  liblapacke-dev libstb-dev zlib1g-dev $*"
+packages="g++ cmake ninja-build nlohmann-json3-dev libcxxopts-dev libkissfft-dev libmicrohttpd-dev libstb-dev
+  zlib1g-dev $*"
 missing=""
 for package in $packages; do
   dpkg-query -W -f '${db:Status-Status}\n' "$package" 2>/dev/null | grep -qx installed || missing="$missing $package"

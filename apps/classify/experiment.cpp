@@ -95,7 +95,7 @@ std::vector<std::int32_t> answers(const View& view, const SuperTac& model, const
   const Tensor sample = show(view, model, data, one, gather(data, one));
   const Classifier classifier = make_classifier(sample.shape(), exam.classes, settings.seed);
   train(classifier, view, model, data, exam, settings);
-  if (!settings.keep.empty())
+  if (!settings.keep.path.empty())
     save_classifier(settings.keep, std::get<TextureClassifier>(classifier),
                     {.height = sample.dim(1), .width = sample.dim(2)}, classes);
   const NoGrad no_grad;

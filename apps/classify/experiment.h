@@ -8,6 +8,7 @@
 #include "apps/classify/exam.h"
 #include "apps/classify/views.h"
 #include "data/windows/augment.h"
+#include "io/files/file.h"
 
 namespace supertac {
 
@@ -17,7 +18,7 @@ struct ExperimentSettings {
   std::int64_t batch = 64;
   double learning_rate = 1e-3;  ///< Adam's, after a warm-up of 5 % and down half a cosine
   std::uint64_t seed = 0;
-  std::string keep = {};  ///< file for the classifier of pictures; empty: none
+  OutputPath keep = "";  ///< file for the classifier of pictures; empty: none
 };
 
 /// Trains a classifier on the view and returns its answer to every test window, in order. `classes` are the

@@ -94,14 +94,14 @@ void OutputsFile::add(std::span<const float> window, std::span<const float> outp
   ++count_;
 }
 
-void OutputsFile::write(const std::string& path) const {
+void OutputsFile::write(const OutputPath& output) const {
   const auto bytes = [](const std::vector<float>& v) { return std::as_bytes(std::span(v)); };
   std::vector<TensorToWrite> tensors{{"input", "F32", {count_, timesteps_, signals_}, bytes(input_)},
                                      {"output", "F32", {count_, height_, width_}, bytes(output_)},
                                      {"truth", "F32", {count_, height_, width_}, bytes(truth_)}};
   if (!predicted_error_.empty())
     tensors.push_back({"predicted_error", "F32", {count_, height_, width_}, bytes(predicted_error_)});
-  write_safetensors(path, {{"format", "supertac-outputs"}}, tensors);
+  write_safetensors(output, {{"format", "supertac-outputs"}}, tensors);
 }
 
 void write_pictures(const Ensemble& model, double interval_factor, const WindowSet& windows,

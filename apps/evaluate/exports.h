@@ -21,7 +21,7 @@ class OutputsFile {
   void add(std::span<const float> window, std::span<const float> output, std::span<const float> truth,
            std::span<const float> predicted_error);
   /// Throws FileError.
-  void write(const std::string& path) const;
+  void write(const OutputPath& output) const;
 
  private:
   std::uint64_t timesteps_, signals_, height_, width_, count_ = 0;

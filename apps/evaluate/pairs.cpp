@@ -62,11 +62,11 @@ class PairOutputs {
     output_.insert(output_.end(), d.pictures[0].begin(), d.pictures[0].end());
     target_.insert(target_.end(), d.target.begin(), d.target.end());
   }
-  void write(const std::string& path, const ImageGrid& image) const {
+  void write(const OutputPath& output, const ImageGrid& image) const {
     const std::uint64_t n = indices_.size(), h = static_cast<std::uint64_t>(image.height),
                         w = static_cast<std::uint64_t>(image.width);
     const auto bytes = [](const auto& values) { return std::as_bytes(std::span(values)); };
-    write_safetensors(path, {{"format", "supertac-outputs"}},
+    write_safetensors(output, {{"format", "supertac-outputs"}},
                       {{"index", "I64", {n}, bytes(indices_)},
                        {"group", "I64", {n}, bytes(groups_)},
                        {"output", "F32", {n, 1, h, w}, bytes(output_)},
@@ -124,7 +124,7 @@ int evaluate_on_pairs(const Arguments& a) {
   result["data"] = pairs.fingerprint();
   result["split"] = tested.split_name;
   result["seed"] = tested.seed;
-  if (a.given("outputs")) outputs.write(a.text("outputs"), pairs.image());
+  if (a.given("outputs")) outputs.write(a.output("outputs"), pairs.image());
   a.write_json(result);
   return kExitOk;
 }

@@ -146,9 +146,9 @@ int evaluate_on_recordings(const Arguments& a) {
 
   std::optional<OutputFolder> pictures, pairs;
   std::string train_pairs, test_pairs;
-  if (a.given("pictures")) pictures.emplace(a.text("pictures"), a.force());
+  if (a.given("pictures")) pictures.emplace(a.output("pictures"));
   if (a.given("write-pairs")) {
-    pairs.emplace(a.text("write-pairs"), a.force());
+    pairs.emplace(a.output("write-pairs"));
     train_pairs = pairs->add("train.safetensors"), test_pairs = pairs->add("test.safetensors");
   }
   OutputsFile outputs(windows.array(), windows.frames(), windows.image());
@@ -166,12 +166,12 @@ int evaluate_on_recordings(const Arguments& a) {
     a.print(a.text("write-pairs") + ": " + std::to_string(tested.split.train.size()) +
             " pairs to train on, " + std::to_string(tested.split.test.size()) + " to test");
   }
-  if (a.given("outputs")) outputs.write(a.text("outputs"));
+  if (a.given("outputs")) outputs.write(a.output("outputs"));
   if (a.given("report"))
-    write_file(a.text("report"), page.html(network, tested.split.test, result, made_by(a, windows)));
+    write_file(a.output("report"), page.html(network, tested.split.test, result, made_by(a, windows)));
+  if (pictures) pictures->keep();
+  if (pairs) pairs->keep();
   a.write_json(result);
-  for (OutputFolder* folder : {pictures ? &*pictures : nullptr, pairs ? &*pairs : nullptr})
-    if (folder != nullptr) folder->keep();
   return kExitOk;
 }
 

@@ -6,12 +6,13 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <map>
 
 #include "autograd/kernels/elementwise.h"
 #include "autograd/reverse_watch.h"
 #include "autograd/trace.h"
-#include "io/files/file.h"
 
 namespace supertac {
 namespace {
@@ -95,21 +96,31 @@ std::string graph_of(const std::function<Variable()>& loss, const std::vector<Pa
   return text + "}\n";
 }
 
-void write_graph(const std::string& path, const std::string& dot) {
-  if (path.ends_with(".dot")) return write_file(path, dot);
-  if (!path.ends_with(".svg")) throw std::invalid_argument("expected FILE.dot or FILE.svg, found " + path);
-  const std::string source = path + ".dot";
-  write_file(source, dot);
-  const pid_t child = ::fork();
-  if (child == 0) {
-    ::execlp("dot", "dot", "-Tsvg", source.c_str(), "-o", path.c_str(), static_cast<char*>(nullptr));
-    ::_exit(127);
+void write_graph(const OutputPath& output, const std::string& dot) {
+  if (output.path.ends_with(".dot")) return write_file(output, dot);
+  if (!output.path.ends_with(".svg"))
+    throw std::invalid_argument("expected FILE.dot or FILE.svg, found " + output.path);
+  std::string folder = output.path + ".XXXXXX";
+  if (::mkdtemp(folder.data()) == nullptr)
+    throw FileError(output.path, "cannot write beside it; choose another place");
+  const std::string source = folder + "/graph.dot", drawn = folder + "/graph.svg";
+  int status = -1;
+  try {
+    write_file(source, dot);
+    const pid_t child = ::fork();
+    if (child == 0) {
+      ::execlp("dot", "dot", "-Tsvg", source.c_str(), "-o", drawn.c_str(), static_cast<char*>(nullptr));
+      ::_exit(127);
+    }
+    if (child > 0) ::waitpid(child, &status, 0);
+    if (status == 0) publish(drawn, output);
+  } catch (const FileError&) {
+    std::filesystem::remove_all(folder);
+    throw;
   }
-  int status = 0;
-  const bool ran = child > 0 && ::waitpid(child, &status, 0) == child && WIFEXITED(status);
-  ::unlink(source.c_str());
-  if (!ran || WEXITSTATUS(status) != 0)
-    throw FileError(path, "dot of Graphviz did not draw it; install graphviz, or ask for FILE.dot");
+  std::filesystem::remove_all(folder);
+  if (status != 0)
+    throw FileError(output.path, "dot of Graphviz did not draw it; install graphviz, or ask for FILE.dot");
 }
 
 }  // namespace supertac

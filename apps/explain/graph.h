@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "autograd/variable.h"
+#include "io/files/file.h"
 #include "layers/module.h"
 
 namespace supertac {
@@ -18,6 +19,6 @@ std::string graph_of(const std::function<Variable()>& loss, const std::vector<Pa
 
 /// Writes it: FILE.dot, or by Graphviz's program dot FILE.svg. Throws FileError, std::invalid_argument for
 /// another ending.
-void write_graph(const std::string& path, const std::string& dot);
+void write_graph(const OutputPath& output, const std::string& dot);
 
 }  // namespace supertac

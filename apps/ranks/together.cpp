@@ -45,6 +45,9 @@ int together(Arguments& a, const std::function<int(Ranks&)>& work) {
   } catch (const Interrupted&) {
     ranks.leave("stopped by a signal");
     throw;
+  } catch (const std::bad_alloc&) {
+    ranks.leave("out of memory");
+    throw;
   } catch (const std::exception& error) {
     if (ranks.leave(error.what())) throw;
     std::this_thread::sleep_for(std::chrono::seconds(1));

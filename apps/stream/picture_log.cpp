@@ -13,9 +13,9 @@
 
 namespace supertac {
 
-PictureLog::PictureLog(const std::string& path, bool force, const PictureFormat& format)
-    : path_(path), format_(format) {
-  refuse_existing(path, force);
+PictureLog::PictureLog(OutputPath output, const PictureFormat& format)
+    : output_(std::move(output)), format_(format) {
+  refuse_existing(output_.path, !output_.when_taken);
   times_ = open_spool();
   volts_ = open_spool();
   pictures_ = open_spool();
@@ -26,11 +26,11 @@ PictureLog::PictureLog(const std::string& path, bool force, const PictureFormat&
 void PictureLog::fail() {
   problem_ = std::string("the pictures cannot be kept: ") + strerror(errno) +
              "; make room, or choose another folder";
-  throw FileError(path_, problem_);
+  throw FileError(output_.path, problem_);
 }
 
 PictureLog::Spool PictureLog::open_spool() {
-  std::string name = (std::filesystem::absolute(path_).parent_path() / ".pictures-XXXXXX").string();
+  std::string name = (std::filesystem::absolute(output_.path).parent_path() / ".pictures-XXXXXX").string();
   const int file = mkostemp(name.data(), O_CLOEXEC);
   if (file < 0) fail();
   unlink(name.c_str());
@@ -62,7 +62,7 @@ void PictureLog::read_back(const Spool& spool, const ByteSink& sink) {
 }
 
 void PictureLog::write(const std::map<std::string, std::string>& metadata) {
-  if (!problem_.empty()) throw FileError(path_, problem_);
+  if (!problem_.empty()) throw FileError(output_.path, problem_);
   const auto from = [this](const Spool& spool) {
     return [this, &spool](const ByteSink& sink) { read_back(spool, sink); };
   };
@@ -74,7 +74,7 @@ void PictureLog::write(const std::map<std::string, std::string>& metadata) {
   if (half_widths_)
     tensors.push_back({"half_widths", "F32", {count_, height, width}, {}, from(half_widths_)});
   if (distances_) tensors.push_back({"distances", "F32", {count_}, {}, from(distances_)});
-  write_safetensors(path_, metadata, tensors);
+  write_safetensors(output_, metadata, tensors);
 }
 
 }  // namespace supertac

@@ -18,8 +18,8 @@ namespace supertac {
 /// nameless temporary files beside the final one.
 class PictureLog {
  public:
-  /// Throws FileError when `path` cannot be made there, or exists without `force`.
-  PictureLog(const std::string& path, bool force, const PictureFormat& format);
+  /// Throws FileError when the file cannot be made there, or exists and is not to be replaced.
+  PictureLog(OutputPath output, const PictureFormat& format);
   /// Throws FileError
   void add(const Seen& seen);
   /// Writes the file, atomically. Throws FileError, again when add() has.
@@ -36,7 +36,7 @@ class PictureLog {
   void read_back(const Spool& spool, const ByteSink& sink);
   [[noreturn]] void fail();
 
-  std::string path_;
+  OutputPath output_;
   PictureFormat format_;
   std::uint64_t count_ = 0;
   std::string problem_;  // of a write that failed: what was kept is not whole

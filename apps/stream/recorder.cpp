@@ -28,7 +28,9 @@ Recorder::~Recorder() {
 std::string Recorder::start() {
   const std::string name = name_of_now();
   try {
-    auto log = std::make_unique<PictureLog>(name, false, format_);
+    // Two recordings may begin within a second.
+    const OutputPath output(name, [this](const std::string& line) { taken_ = line; });
+    auto log = std::make_unique<PictureLog>(output, format_);
     const std::scoped_lock lock(log_mutex_, mutex_);
     if (log_) return "already recording " + status_.recording;
     log_ = std::move(log);
@@ -51,8 +53,10 @@ std::string Recorder::stop() {
 
 void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name) {
   std::string said = "recorded " + name;
+  taken_.clear();
   try {
     log->write(metadata_);
+    if (!taken_.empty()) said = taken_;
   } catch (const std::exception& error) {
     said = error.what();
   }

@@ -55,6 +55,7 @@ class Recorder {
   std::mutex mutex_;  // of status_
   Status status_;
   std::thread writer_;  // of the starting and stopping thread
+  std::string taken_;   // of writer_: its file got another name, and why
 };
 
 }  // namespace supertac

@@ -30,10 +30,10 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   state_.array = source.array();
   state_.scale = maker_.image().height / state_.array.rows;
   const PictureFormat format = maker_.format();
-  if (settings.out == "-")
+  if (settings.out.path == "-")
     pipe_ = std::make_unique<PipeOutput>(STDOUT_FILENO, !source.live());
-  else if (!settings.out.empty())
-    log_ = std::make_unique<PictureLog>(settings.out, settings.force, format);
+  else if (!settings.out.path.empty())
+    log_ = std::make_unique<PictureLog>(settings.out, format);
   if (!settings.udp.empty()) udp_ = std::make_unique<UdpOutput>(settings.udp);
   if (!settings.classifier.empty()) {
     classifier_ = load_classifier(settings.classifier);

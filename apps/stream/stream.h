@@ -20,11 +20,10 @@ namespace supertac {
 
 struct StreamSettings {
   double seconds = std::numeric_limits<double>::infinity();  ///< of signal, after which run() ends
-  std::string out = {};  ///< file that keeps the pictures; "-": a line for each to stdout; empty: none
+  OutputPath out = "";  ///< file that keeps the pictures; "-": a line for each to stdout; empty: none
   Precision precision = Precision::fp32;
   std::string classifier = {};                       ///< file that names the texture; empty: none
   std::string udp = {};                              ///< HOST:PORT that gets a line for each; empty: none
-  bool force = false;                                ///< an existing file is replaced
   bool view = false;                                 ///< draw on the terminal
   std::optional<WebAddress> web = {};                ///< serve the live page
   std::string badge = {}, source = {};               ///< for the page: what is streamed

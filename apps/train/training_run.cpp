@@ -64,7 +64,7 @@ TrainingRun::TrainingRun(const Arguments& a, TrainingTask task, TrainingTarget t
   if (a_.given("ledger") && target_.ranks.size() > 1)
     throw UsageError("--ledger: of one process only; leave it out under mpirun");
   if (!target_.ranks.first()) return;
-  folder_.emplace(target_.out, target_.force,
+  folder_.emplace(target_.out.path, target_.force,
                   target_.resume.empty() ? std::nullopt : std::optional(trainer_.step()));
   folder_->write_settings(description_);
   if (a_.given("ledger"))
@@ -89,8 +89,10 @@ bool TrainingRun::train() {
 void TrainingRun::write_end() {
   description_["provenance"] = full_provenance();
   if (trainer_.done()) {
-    save_trained(trainer_, target_.out, task_.origin);
-    description_["content"] = hash_of_file(target_.out);
+    const std::string finished = folder_->path() + "/model.safetensors";
+    save_trained(trainer_, finished, task_.origin);
+    target_.out.path = publish(finished, target_.out);
+    description_["content"] = hash_of_file(target_.out.path);
   }
   folder_->write_settings(description_);
   folder_->write_report(description_);

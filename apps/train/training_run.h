@@ -13,7 +13,7 @@
 namespace supertac {
 
 struct TrainingTarget {
-  std::string out;                 ///< the model file; its run folder lies beside it
+  OutputPath out;                  ///< the model file; its run folder lies beside it
   bool force = false;              ///< whether an earlier run's folder may be overwritten
   std::string resume;              ///< the checkpoint to continue from; "" = start anew
   std::string label = "training";  ///< of the progress bar
@@ -32,6 +32,8 @@ class TrainingRun {
   bool train();
 
   const Trainer& trainer() const { return trainer_; }
+  /// The model file, under the name that it got.
+  const std::string& out() const { return target_.out.path; }
   /// Of the first rank only.
   const RunFolder& folder() const { return *folder_; }
   const TrainingTask& task() const { return task_; }

@@ -19,12 +19,14 @@
 #include <utility>
 
 #include "apps/web/encode.h"
+#include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
 
 constexpr unsigned kStalledS = 20;
+constexpr unsigned kConnections = WebServer::kMostPeers + 56;  // those that are asked to leave still count
 constexpr std::size_t kRequestBytes = 16 << 10;  // memory of a connection; more than that gets 431
 constexpr int kSendBuffer = 64 << 10;            // what a stalled page may leave unread, and show late
 constexpr double kStillHereS = 1;
@@ -76,12 +78,44 @@ std::string_view header(MHD_Connection* connection, const char* name) {
   return value == nullptr ? std::string_view() : std::string_view(value);
 }
 
+/// "localhost" of "localhost:8080"; empty for what is no port.
+std::string host_without_port(std::string_view host) {
+  const std::size_t colon = host.find(':');
+  const std::string_view port = host.substr(colon == host.npos ? host.size() : colon);
+  const bool fits = port.empty() || (port.size() <= 6 && parse_uint(port.substr(1)).value_or(0) > 0);
+  return std::string(fits ? host.substr(0, colon) : "");
+}
+
 bool is_numeric(const std::string& host) {
   in_addr address{};
   return inet_pton(AF_INET, host.c_str(), &address) == 1;
 }
 
 }  // namespace
+
+/// An open connection.
+struct WebServer::Peer {
+  MHD_Connection* connection;
+  bool asks = false;         // a request is being answered
+  bool leaves = false;       // it was told to
+  Reader* reader = nullptr;  // of a page that gets events
+
+  static Peer& of(MHD_Connection* connection) {
+    return *static_cast<Peer*>(
+        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT)->socket_context);
+  }
+  static void come_or_go(void* self, MHD_Connection* connection, void** peer,
+                         MHD_ConnectionNotificationCode code) {
+    std::list<Peer>& all = static_cast<WebServer*>(self)->peers_;
+    if (code == MHD_CONNECTION_NOTIFY_STARTED)
+      *peer = &all.emplace_back(Peer{connection});
+    else
+      all.remove_if([peer](const Peer& p) { return &p == *peer; });
+  }
+  static void has_answer(void*, MHD_Connection* connection, void**, MHD_RequestTerminationCode) {
+    of(connection).asks = false;
+  }
+};
 
 struct WebServer::Reader {
   WebServer& server;
@@ -95,10 +129,12 @@ struct WebServer::Reader {
   static void end(void* self) {
     auto* reader = static_cast<Reader*>(self);
     std::erase(reader->server.waiting_, reader);
+    Peer::of(reader->connection).reader = nullptr;
     delete reader;
   }
 
   ssize_t take(char* buffer, std::size_t most) {
+    if (Peer::of(connection).leaves) return MHD_CONTENT_READER_END_WITH_ERROR;
     if (left.empty() && server.number_ > seen) {
       left = server.newest_;
       seen = server.number_;
@@ -124,6 +160,7 @@ struct WebRequest {
   static MHD_Result handle(void* server, MHD_Connection* connection, const char* url, const char* method,
                            const char*, const char*, std::size_t*, void**) {
     try {
+      WebServer::Peer::of(connection).asks = true;
       return WebRequest{*static_cast<WebServer*>(server), connection, url, method}.answer();
     } catch (const std::exception&) {
       return MHD_NO;  // closes the connection
@@ -147,12 +184,7 @@ struct WebRequest {
   // Names of this computer only: a foreign name that resolves to it belongs to a foreign page. An address
   // that the network may use is open to numbers, which no foreign page can claim.
   bool is_own_host() const {
-    const std::string host(header(connection, "Host"));
-    const std::string port = ":" + std::to_string(server.address_.port);
-    if (!host.ends_with(port)) return server.address_.port == 80 && is_own_name(host);
-    return is_own_name(host.substr(0, host.size() - port.size()));
-  }
-  bool is_own_name(const std::string& name) const {
+    const std::string name = host_without_port(header(connection, "Host"));
     return name == "localhost" || name == "127.0.0.1" || (!server.address_.is_loopback() && is_numeric(name));
   }
 
@@ -173,6 +205,7 @@ struct WebRequest {
 
   MHD_Result events() {
     auto* reader = new WebServer::Reader{server, connection, 0, server.first_event()};
+    WebServer::Peer::of(connection).reader = reader;
     return send(200, "text/event-stream",
                 MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 4096, &WebServer::Reader::read, reader,
                                                   &WebServer::Reader::end));
@@ -219,7 +252,8 @@ WebServer::WebServer(const WebAddress& address, WebSite site)
   daemon_ = MHD_start_daemon(MHD_ALLOW_SUSPEND_RESUME, 0, nullptr, nullptr, &WebRequest::handle, this,
                              MHD_OPTION_LISTEN_SOCKET, file, MHD_OPTION_CONNECTION_LIMIT, kConnections,
                              MHD_OPTION_CONNECTION_TIMEOUT, kStalledS, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-                             kRequestBytes, MHD_OPTION_END);
+                             kRequestBytes, MHD_OPTION_NOTIFY_CONNECTION, &Peer::come_or_go, this,
+                             MHD_OPTION_NOTIFY_COMPLETED, &Peer::has_answer, nullptr, MHD_OPTION_END);
   if (daemon_ == nullptr) {
     close(file);
     refuse(address_, "the server does not start");
@@ -254,6 +288,26 @@ void WebServer::publish() {
   for (Reader* reader : std::exchange(waiting_, {})) MHD_resume_connection(reader->connection);
 }
 
+// Many that come and say nothing, or take nothing, must not keep out the one who works here.
+void WebServer::make_room() {
+  const auto stays = [](const Peer& p) { return !p.leaves; };
+  const auto silent = [](const Peer& p) { return !p.leaves && !p.asks; };
+  const auto behind = [this](const Peer& p) {
+    return !p.leaves && p.reader != nullptr &&
+           number_ > p.reader->seen + static_cast<std::uint64_t>(kMostEventsPerS);
+  };
+  for (auto open = std::ranges::count_if(peers_, stays); open > static_cast<std::ptrdiff_t>(kMostPeers);
+       --open) {
+    auto peer = std::ranges::find_if(peers_, silent);
+    if (peer == peers_.end()) peer = std::ranges::find_if(peers_, behind);
+    if (peer == peers_.end()) peer = std::ranges::find_if(peers_, stays);
+    peer->leaves = true;
+    shutdown(MHD_get_connection_info(peer->connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd,
+             SHUT_RDWR);
+    if (std::erase(waiting_, peer->reader) > 0) MHD_resume_connection(peer->connection);
+  }
+}
+
 // A page may come late, a frame may not: this thread yields to the others.
 void WebServer::run() {
   const sched_param none{};
@@ -268,6 +322,7 @@ void WebServer::run() {
     }
     const auto wait_ms = static_cast<int>(1e3 * std::max(0.0, due - seconds_now()));
     if (MHD_run_wait(daemon_, std::max(1, wait_ms)) == MHD_NO) break;
+    make_room();
   }
   for (Reader* reader : std::exchange(waiting_, {})) MHD_resume_connection(reader->connection);
   MHD_stop_daemon(daemon_);

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <list>
 #include <map>
 #include <optional>
 #include <string>
@@ -37,14 +38,15 @@ struct WebAddress {
 };
 
 /// Serves a site from a thread of its own. Nobody who publishes waits for a reader: a page that is too slow
-/// misses events, one that takes nothing for 20 s is closed, and so is a connection beyond kConnections.
+/// misses events, and one that takes nothing for 20 s is closed. Who comes when there are kMostPeers already
+/// is let in all the same: of those a silent one leaves, else the page that is behind, else the oldest.
 ///
-/// Who may come in: a Host other than this computer's names for itself gets 421 (a foreign name that was
-/// made to resolve to it), a foreign Origin 403, and an action needs the token that only a page of this
-/// server has read, else 403. Bodies of requests are not read.
+/// Who may come in: a Host other than this computer's names for itself, at any port (of a tunnel), gets 421
+/// (a foreign name that was made to resolve to it), a foreign Origin 403, and an action needs the token that
+/// only a page of this server has read, else 403. Bodies of requests are not read.
 class WebServer {
  public:
-  static constexpr unsigned kConnections = 256;
+  static constexpr std::size_t kMostPeers = 200;
   static constexpr double kMostEventsPerS = 30;
 
   /// Throws std::runtime_error when the address cannot be had.
@@ -59,9 +61,11 @@ class WebServer {
  private:
   friend struct WebRequest;
   struct Reader;
+  struct Peer;
 
   void run();
   void publish();
+  void make_room();
   std::string first_event() const;
 
   WebAddress address_;
@@ -71,6 +75,7 @@ class WebServer {
   std::string newest_;  // as it is sent; empty before the first
   std::uint64_t number_ = 0;
   double told_s_ = 0;
+  std::list<Peer> peers_;  // in the order of their coming
   std::vector<Reader*> waiting_;
   std::atomic<bool> stop_{false};
   std::thread thread_;

@@ -55,6 +55,12 @@ class Segment {
   void append_to(Track& track) {
     const std::size_t signals = recording_.array.signals();
     const std::size_t frames = cell(usable_.size() - 1) + 1;
+    // A file that claims a high rate must not decide how much memory that takes.
+    constexpr std::size_t kMostPerFrame = 64;
+    if (frames > kMostPerFrame * (usable_.size() + 1))
+      throw std::invalid_argument("resample: " + std::to_string(settings_.rate_hz) +
+                                  " samples a second are more than " + std::to_string(kMostPerFrame) +
+                                  " for each recorded frame; the model is of another sensor");
     std::size_t next = 0, before = 0;
     for (std::size_t j = 0; j < frames; ++j) {
       const std::size_t first = next;

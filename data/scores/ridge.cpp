@@ -1,11 +1,9 @@
 #include "data/scores/ridge.h"
 
-#include <cblas.h>
-#include <lapacke.h>
-#include <omp.h>
-
 #include <algorithm>
+#include <cmath>
 #include <functional>
+#include <numeric>
 #include <stdexcept>
 
 #include "data/windows/split.h"
@@ -39,42 +37,43 @@ void fill_features(std::span<const float> window, std::size_t signals, std::span
   out.back() = 1;
 }
 
-// Keeps OpenBLAS to one thread while it lives, so that sums have one order; a build of OpenBLAS with OpenMP
-// takes and changes OpenMP's number of threads.
-class OneThread {
- public:
-  OneThread() { openblas_set_num_threads(1); }
-  ~OneThread() {
-    openblas_set_num_threads(before_);
-    omp_set_num_threads(openmp_before_);
+// y[j] += sign * sum_k factors[k * step] * rows[k * stride + j], for j < count: the one loop of the linear
+// algebra. Four rows at a time, so that y is loaded and stored once for them; a sum's order depends on
+// nothing.
+void add_rows(double* y, std::size_t count, double sign, const double* rows, std::size_t stride,
+              const double* factors, std::size_t step, std::size_t n) {
+  std::size_t k = 0;
+  for (; k + 4 <= n; k += 4) {
+    const double *r0 = rows + k * stride, *r1 = r0 + stride, *r2 = r1 + stride, *r3 = r2 + stride;
+    const double f0 = sign * factors[k * step], f1 = sign * factors[(k + 1) * step],
+                 f2 = sign * factors[(k + 2) * step], f3 = sign * factors[(k + 3) * step];
+    for (std::size_t j = 0; j < count; ++j) y[j] += f0 * r0[j] + f1 * r1[j] + f2 * r2[j] + f3 * r3[j];
   }
-  OneThread(const OneThread&) = delete;
-  OneThread& operator=(const OneThread&) = delete;
-
- private:
-  int before_ = openblas_get_num_threads(), openmp_before_ = omp_get_max_threads();
-};
+  for (; k < n; ++k) {
+    const double f = sign * factors[k * step];
+    for (std::size_t j = 0; j < count; ++j) y[j] += f * rows[k * stride + j];
+  }
+}
 
 // What least squares needs of a set of windows: X'X (its upper triangle), X'Y and Y'Y; all matrices are
 // row-major.
 struct Moments {
-  int features, pixels;
+  std::size_t features, pixels;
   std::vector<double> xx, xy;
   double yy = 0;
 
   Moments(const WindowSet& windows, std::span<const std::uint32_t> indices)
-      : features(static_cast<int>(
-            features_of(static_cast<std::size_t>(windows.timesteps()), windows.array().signals()))),
-        pixels(static_cast<int>(windows.image().pixels())),
-        xx(static_cast<std::size_t>(features) * static_cast<std::size_t>(features)),
-        xy(static_cast<std::size_t>(features) * static_cast<std::size_t>(pixels)) {
-    constexpr std::size_t kBlock = 512;
+      : features(features_of(static_cast<std::size_t>(windows.timesteps()), windows.array().signals())),
+        pixels(windows.image().pixels()),
+        xx(features * features),
+        xy(features * pixels) {
+    constexpr std::size_t kBlock = 64;  // windows whose features stay in the cache
     for (std::size_t first = 0; first < indices.size(); first += kBlock)
       add(windows, indices.subspan(first, std::min(kBlock, indices.size() - first)));
   }
 
   void add(const WindowSet& windows, std::span<const std::uint32_t> part) {
-    const auto f = static_cast<std::size_t>(features), p = static_cast<std::size_t>(pixels);
+    const std::size_t f = features, p = pixels;
     std::vector<double> x(part.size() * f), y;
     std::vector<float> truth(p);
     std::vector<float> window(static_cast<std::size_t>(windows.timesteps()) * windows.array().signals());
@@ -84,11 +83,11 @@ struct Moments {
       windows.truth(part[n], truth);
       y.insert(y.end(), truth.begin(), truth.end());
     }
-    const int n = static_cast<int>(part.size());
-    cblas_dsyrk(CblasRowMajor, CblasUpper, CblasTrans, features, n, 1, x.data(), features, 1, xx.data(),
-                features);
-    cblas_dgemm(CblasRowMajor, CblasTrans, CblasNoTrans, features, pixels, n, 1, x.data(), features, y.data(),
-                pixels, 1, xy.data(), pixels);
+#pragma omp parallel for schedule(dynamic, 8)
+    for (std::size_t i = 0; i < f; ++i) {
+      add_rows(&xx[i * (f + 1)], f - i, 1, &x[i], f, &x[i], f, part.size());
+      add_rows(&xy[i * p], p, 1, y.data(), p, &x[i], f, part.size());
+    }
     yy += dot(y, y);
   }
 
@@ -99,29 +98,45 @@ struct Moments {
     return *this;
   }
 
-  // W [f][pixels]
+  // W [f][pixels], from U'U W = X'Y with the Cholesky factor U of X'X and the penalty
   std::vector<double> solve(double penalty) const {
-    const auto n = static_cast<std::size_t>(features);
+    const std::size_t n = features, p = pixels;
     double mean = 0;
     for (std::size_t i = 0; i + 1 < n; ++i) mean += xx[i * (n + 1)] / static_cast<double>(n - 1);
-    std::vector<double> a = xx, w = xy;
+    std::vector<double> u = xx, w = xy;
     // Taxels that never move leave rows of zeros; the floor keeps the matrix positive definite.
-    for (std::size_t i = 0; i + 1 < n; ++i) a[i * (n + 1)] += penalty * mean + 1e-9;
-    if (LAPACKE_dposv(LAPACK_ROW_MAJOR, 'U', features, pixels, a.data(), features, w.data(), pixels) != 0)
-      throw std::runtime_error("ridge: X'X of the windows is not positive definite");
+    for (std::size_t i = 0; i + 1 < n; ++i) u[i * (n + 1)] += penalty * mean + 1e-9;
+    for (std::size_t i = 0; i < n; ++i) {
+      double* row = &u[i * n];
+      add_rows(row + i, n - i, -1, &u[i], n, &u[i], n, i);
+      if (!(row[i] > 0)) throw std::runtime_error("ridge: X'X of the windows is not positive definite");
+      const double scale = 1 / std::sqrt(row[i]);
+      for (std::size_t j = i; j < n; ++j) row[j] *= scale;
+      add_rows(&w[i * p], p, -1, w.data(), p, &u[i], n, i);
+      for (std::size_t j = 0; j < p; ++j) w[i * p + j] /= row[i];
+    }
+    for (std::size_t i = n; i-- > 0;) {
+      const double* row = &u[i * n];
+      add_rows(&w[i * p], p, -1, w.data() + (i + 1) * p, p, row + i + 1, 1, n - 1 - i);
+      for (std::size_t j = 0; j < p; ++j) w[i * p + j] /= row[i];
+    }
     return w;
   }
 
   // |Y - X W|^2
   double error(const std::vector<double>& w) const {
+    const std::size_t n = features, p = pixels;
     std::vector<double> product(w.size());
-    cblas_dsymm(CblasRowMajor, CblasLeft, CblasUpper, features, pixels, 1, xx.data(), features, w.data(),
-                pixels, 0, product.data(), pixels);
+#pragma omp parallel for
+    for (std::size_t i = 0; i < n; ++i) {
+      add_rows(&product[i * p], p, 1, w.data(), p, &xx[i], n, i);
+      add_rows(&product[i * p], p, 1, &w[i * p], p, &xx[i * (n + 1)], 1, n - i);
+    }
     return yy - 2 * dot(w, xy) + dot(w, product);
   }
 
   static double dot(const std::vector<double>& a, const std::vector<double>& b) {
-    return cblas_ddot(static_cast<int>(a.size()), a.data(), 1, b.data(), 1);
+    return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
   }
 };
 
@@ -152,7 +167,6 @@ Ridge::Ridge(const WindowSet& windows, std::span<const std::uint32_t> train)
   const std::vector<bool> held = held_out(windows, chosen);
   std::vector<std::uint32_t> fit, judge;
   for (std::size_t n = 0; n < chosen.size(); ++n) (held[n] ? judge : fit).push_back(chosen[n]);
-  const OneThread one_thread;
   Moments moments(windows, fit);
   const Moments other(windows, judge);
   double least = 0;

@@ -9,13 +9,11 @@ namespace supertac {
 ///             frame; fewer for more than 128 signals, so that there are at most 2048), and a constant:
 ///             f = 257 for 4x4
 ///   weights   W = (X'X + penalty D)^-1 X'Y in double precision by Cholesky; X [n,f], Y [n,pixels]; D is 1
-///   for
-///             each feature and 0 for the constant (Hoerl & Kennard 1970)
+///             for each feature and 0 for the constant (Hoerl & Kennard 1970)
 ///   penalty   the one of 1e-5 .. 10, times the mean of X'X's diagonal, with the least squared error on every
 ///             fifth pass when fitted to the others (on the last fifth of the windows of a single pass); the
 ///             test side has no part in it
-/// The linear algebra is OpenBLAS's, kept to one thread: the weights depend on the processor's instruction
-/// set, but not on the number of threads (docs/determinism.md).
+/// The weights have the same bits on every processor and for any number of threads (docs/determinism.md).
 class Ridge : public Baseline {
  public:
   /// Fits to at most kFitWindows windows, evenly spread. Throws std::invalid_argument when train is empty.

@@ -73,6 +73,8 @@ void WindowSet::add_directory(const std::string& dir, const std::vector<std::str
     if (!chosen.take(recording.plate)) continue;
     try {
       add(recording, dir, aside);
+    } catch (const std::bad_alloc&) {
+      throw;
     } catch (const std::exception& error) {
       throw std::runtime_error(paths[i] + ": " + error.what());
     }

@@ -142,10 +142,34 @@ std::string read_text_file(const std::string& path, std::uint64_t max_bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-AtomicFile::AtomicFile(const std::string& path) : path_(final_path(path)) {
+std::string publish(const std::string& finished, const OutputPath& output) {
+  if (!output.when_taken) {
+    if (system_calls().rename(finished.c_str(), output.path.c_str()) != 0)
+      fail(output.path, "rename into place", errno);
+    return output.path;
+  }
+  const std::filesystem::path wished(output.path);
+  for (int number = 1; number <= 1000; ++number) {
+    auto name = wished;
+    if (number > 1)
+      name.replace_filename(wished.stem().string() + "-" + std::to_string(number) +
+                            wished.extension().string());
+    if (system_calls().rename_new(finished.c_str(), name.c_str()) == 0) {
+      if (number > 1)
+        output.when_taken(output.path + ": appeared meanwhile and is not replaced; what was made is " +
+                          name.string());
+      return name.string();
+    }
+    if (errno != EEXIST) fail(output.path, "rename into place", errno);
+  }
+  throw FileError(output.path, "is taken, and so are 999 names after it; what was made is " + finished);
+}
+
+AtomicFile::AtomicFile(const OutputPath& output)
+    : output_(output), path_(output.when_taken ? output.path : final_path(output.path)) {
   std::error_code error;
   const auto status = std::filesystem::status(path_, error);
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+  if (!output_.when_taken && std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
     throw FileError(path_, "exists and is not a regular file; choose another name");
   }
   const std::string directory = directory_of(path_);
@@ -203,7 +227,7 @@ void AtomicFile::commit() {
   if (retry([&] { return system_calls().fsync(file_); }) != 0) fail(path_, "sync to disk", errno);
   const int closed = system_calls().close(std::exchange(file_, -1));
   if (closed != 0 && errno != EINTR) fail(path_, "close", errno);
-  if (system_calls().rename(temporary_.c_str(), path_.c_str()) != 0) fail(path_, "rename into place", errno);
+  publish(temporary_, {path_, output_.when_taken});
   temporary_.clear();
   // EINVAL: a file system that has nothing to sync for a directory.
   if (retry([&] { return system_calls().fsync(directory_); }) != 0 && errno != EINVAL) {
@@ -212,14 +236,14 @@ void AtomicFile::commit() {
   close_quietly(directory_);
 }
 
-void write_file(const std::string& path, std::span<const std::byte> bytes) {
-  AtomicFile file(path);
+void write_file(const OutputPath& output, std::span<const std::byte> bytes) {
+  AtomicFile file(output);
   file.write(bytes);
   file.commit();
 }
 
-void write_file(const std::string& path, std::string_view text) {
-  write_file(path, std::as_bytes(std::span(text)));
+void write_file(const OutputPath& output, std::string_view text) {
+  write_file(output, std::as_bytes(std::span(text)));
 }
 
 void refuse_existing(const std::string& path, bool force) {

@@ -3,10 +3,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace supertac {
@@ -50,14 +52,33 @@ class FileReader {
 std::vector<std::byte> read_file(const std::string& path, std::uint64_t max_bytes);
 std::string read_text_file(const std::string& path, std::uint64_t max_bytes);
 
+/// The name that something finished is to get.
+struct OutputPath {
+  // Converts: most files are a program's own, and are replaced.
+  OutputPath(std::string name) : path(std::move(name)) {}
+  OutputPath(const char* name) : path(name) {}
+  OutputPath(std::string name, std::function<void(const std::string& line)> taken)
+      : path(std::move(name)), when_taken(std::move(taken)) {}
+
+  std::string path;
+  /// Empty: what has this name is replaced. Otherwise it stays, even if it appeared only while the program
+  /// worked; what was finished then gets another name, and this is called with a line that says so.
+  std::function<void(const std::string& line)> when_taken;
+};
+
+/// Renames a finished file or folder, on the same file system, to `output`, or to NAME-2, NAME-3, ... before
+/// the extension where that name is taken. Returns the name. Throws FileError; what was finished is then
+/// still where it was.
+std::string publish(const std::string& finished, const OutputPath& output);
+
 /// A file that appears under its name complete or not at all: written to a temporary name in the same
-/// directory (O_EXCL), then commit() does fsync, close, rename and fsync of the directory. An existing file
-/// stays as it is until the rename. A symbolic link stays; the file it points at is replaced. A temporary
-/// that a killed process left of the same file is removed when the file is next written.
+/// directory (O_EXCL), then commit() does fsync, close, publish() and fsync of the directory. An existing
+/// file stays as it is until then. A symbolic link to be replaced stays; the file it points at is replaced. A
+/// temporary that a killed process left of the same file is removed when the file is next written.
 class AtomicFile {
  public:
   /// Throws FileError: no such directory, not writable, or `path` is something else than a regular file.
-  explicit AtomicFile(const std::string& path);
+  explicit AtomicFile(const OutputPath& output);
   /// Removes the temporary when commit() has not succeeded.
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
@@ -75,15 +96,16 @@ class AtomicFile {
   void open_temporary();
   void close_all();
 
-  std::string path_;
+  OutputPath output_;
+  std::string path_;       // of output_, followed to the end where it is a link
   std::string temporary_;  // empty: there is none (yet, or any more)
   int file_ = -1;
   int directory_ = -1;
 };
 
 /// AtomicFile in one call.
-void write_file(const std::string& path, std::span<const std::byte> bytes);
-void write_file(const std::string& path, std::string_view text);
+void write_file(const OutputPath& output, std::span<const std::byte> bytes);
+void write_file(const OutputPath& output, std::string_view text);
 
 /// Throws FileError when `path` exists and `force` is false: nothing is overwritten without --force.
 void refuse_existing(const std::string& path, bool force);

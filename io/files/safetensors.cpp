@@ -223,7 +223,7 @@ std::vector<double> SafetensorsFile::f64(const std::string& name) const {
   return elements<double>(name, "F64");
 }
 
-void write_safetensors(const std::string& path, std::map<std::string, std::string> metadata,
+void write_safetensors(const OutputPath& output, std::map<std::string, std::string> metadata,
                        const std::vector<TensorToWrite>& tensors) {
   if (!provenance().empty()) metadata[kProvenanceKey] = provenance();
   check_writable(metadata, tensors);
@@ -242,7 +242,7 @@ void write_safetensors(const std::string& path, std::map<std::string, std::strin
   text.replace(*checksum_position(text), kChecksumDigits, checksum_digits(checksum_of(text, tensors)));
 
   const std::uint64_t length = text.size();
-  AtomicFile file(path);
+  AtomicFile file(output);
   file.write(std::as_bytes(std::span(&length, 1)));
   file.write(text);
   for (const TensorToWrite& tensor : tensors) {

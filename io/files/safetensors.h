@@ -13,6 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "io/files/file.h"
+
 namespace supertac {
 
 struct TensorInfo {
@@ -76,7 +78,7 @@ struct TensorToWrite {
 /// bytes. Throws std::invalid_argument when bytes and shape disagree, a name appears twice or is
 /// "__metadata__", a dtype is unknown, the metadata holds a field of this layer, or a cap of read() would be
 /// exceeded; FileError when the file cannot be written.
-void write_safetensors(const std::string& path, std::map<std::string, std::string> metadata,
+void write_safetensors(const OutputPath& output, std::map<std::string, std::string> metadata,
                        const std::vector<TensorToWrite>& tensors);
 
 }  // namespace supertac

@@ -2,9 +2,25 @@
 
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
 
 namespace supertac {
+namespace {
+
+int rename_new(const char* from, const char* to) {
+  if (::renameat2(AT_FDCWD, from, AT_FDCWD, to, RENAME_NOREPLACE) == 0) return 0;
+  if (errno != EINVAL && errno != ENOSYS) return -1;
+  // File systems without it (NFS, some of FUSE): a second name for a file. A folder has one name only, but
+  // never takes the place of one that holds anything.
+  if (::link(from, to) == 0) return ::unlink(from);
+  if (errno == EEXIST) return -1;
+  struct stat status {};
+  if (::lstat(to, &status) == 0) return errno = EEXIST, -1;
+  return std::rename(from, to);
+}
+
+}  // namespace
 
 SystemCalls real_system_calls() {
   return {
@@ -16,6 +32,7 @@ SystemCalls real_system_calls() {
       .fsync = ::fsync,
       .close = ::close,
       .rename = [](const char* from, const char* to) { return std::rename(from, to); },
+      .rename_new = rename_new,
       .unlink = ::unlink,
   };
 }

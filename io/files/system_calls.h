@@ -20,6 +20,8 @@ struct SystemCalls {
   int (*fsync)(int file);
   int (*close)(int file);
   int (*rename)(const char* from, const char* to);
+  /// Fails with EEXIST where there is something of the new name.
+  int (*rename_new)(const char* from, const char* to);
   int (*unlink)(const char* path);
 };
 

@@ -30,13 +30,13 @@ NamedClassifier::Answer NamedClassifier::name_of(std::span<const float> picture)
   return {names[static_cast<std::size_t>(best - logits.values().begin())], 1 / sum};
 }
 
-void save_classifier(const std::string& path, const TextureClassifier& network,
+void save_classifier(const OutputPath& output, const TextureClassifier& network,
                      const ClassifierSettings& settings, const std::vector<std::string>& names) {
   std::string list;
   for (const std::string& name : names) list += (list.empty() ? "" : ",") + name;
   const nlohmann::ordered_json json = {
       {"height", settings.height}, {"width", settings.width}, {"names", list}};
-  write_checkpoint(path, network.parameters(), {{"kind", kKind}, {"settings", json.dump()}});
+  write_checkpoint(output, network.parameters(), {{"kind", kKind}, {"settings", json.dump()}});
 }
 
 NamedClassifier load_classifier(const std::string& path) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "io/files/file.h"
 #include "models/networks/classifier.h"
 
 namespace supertac {
@@ -25,7 +26,7 @@ struct NamedClassifier {
 };
 
 /// Writes a classifier of super-resolved pictures. Throws FileError.
-void save_classifier(const std::string& path, const TextureClassifier& network,
+void save_classifier(const OutputPath& output, const TextureClassifier& network,
                      const ClassifierSettings& settings, const std::vector<std::string>& names);
 /// Throws std::runtime_error naming path, what was expected and found.
 NamedClassifier load_classifier(const std::string& path);

@@ -1,5 +1,7 @@
-"""The project's one file format, safetensors, with the checks of io/files/safetensors.h that matter to a reader."""
+"""The project's one file format, safetensors, with the checks of io/files/safetensors.h: a file of
+unknown origin raises ValueError and takes no more memory than it has bytes."""
 import json
+import math
 import pathlib
 import struct
 import zlib
@@ -7,17 +9,46 @@ import zlib
 import numpy as np
 
 TYPES = {"F64": "<f8", "F32": "<f4", "I64": "<i8", "I32": "<i4", "U8": "u1"}
-LARGEST_HEADER = 1 << 20
+LARGEST_HEADER, MOST_TENSORS, MOST_FIELDS, HIGHEST_RANK = 1 << 20, 4096, 4096, 8
 
 
-def _whole(path, raw, header):
+def parse_json(path, text):
+    """JSON without keys that appear twice and without NaN. Raises ValueError naming the file."""
+
+    def unique(pairs):
+        if len(dict(pairs)) != len(pairs):
+            raise ValueError("a key appears twice")
+        return dict(pairs)
+
+    def refuse(constant):
+        raise ValueError(f"{constant} is no JSON")
+
+    try:
+        return json.loads(text, object_pairs_hook=unique, parse_constant=refuse)
+    except (ValueError, RecursionError) as problem:
+        raise ValueError(f"{path}: its JSON cannot be read: {problem}") from None
+
+
+def _whole(path, raw, metadata):
     """Raises ValueError unless header and data have the checksum that the metadata name; other writers name none."""
-    found = header.get("__metadata__", {}).get("checksum")
+    found = metadata.get("checksum")
     if found is None:
         return
     at = raw.find(f'"checksum":"{found}"'.encode(), 8) + len('"checksum":"')
-    if zlib.crc32(raw[8:at] + b"0" * 8 + raw[at + 8 :]) != int(found, 16):
+    if len(found) != 8 or f"{zlib.crc32(raw[at + 8:], zlib.crc32(b'0' * 8, zlib.crc32(raw[8:at]))):08x}" != found:
         raise ValueError(f"{path}: the checksum is not {found}: the file is damaged; copy it again")
+
+
+def _entry(entry):
+    """Type, shape and offsets of a tensor's entry in the header; None where it is not as expected."""
+    if not isinstance(entry, dict) or set(entry) != {"dtype", "shape", "data_offsets"}:
+        return None
+    kind, shape, offsets = entry["dtype"], entry["shape"], entry["data_offsets"]
+    lists = isinstance(shape, list) and isinstance(offsets, list) and len(offsets) == 2 and len(shape) <= HIGHEST_RANK
+    if not lists or kind not in TYPES or not all(type(n) is int and 0 <= n < 1 << 63 for n in shape + offsets):
+        return None
+    size = math.prod(shape) * np.dtype(TYPES[kind]).itemsize
+    return (TYPES[kind], shape, *offsets) if offsets[1] - offsets[0] == size else None
 
 
 def read(path):
@@ -26,14 +57,47 @@ def read(path):
     size = struct.unpack("<Q", raw[:8])[0] if len(raw) >= 8 else len(raw)
     if size > min(LARGEST_HEADER, len(raw) - 8) or raw[8:9] != b"{":
         raise ValueError(f"{path}: expected a safetensors file, found {len(raw)} bytes of something else")
-    header = json.loads(raw[8 : 8 + size])
-    _whole(path, raw, header)
+    header = parse_json(path, raw[8 : 8 + size])
     metadata = header.pop("__metadata__", {})
-    tensors = {}
-    for name, entry in header.items():
-        begin, end = (8 + size + offset for offset in entry["data_offsets"])
-        tensors[name] = np.frombuffer(raw[begin:end], TYPES[entry["dtype"]]).reshape(entry["shape"])
-    return tensors, metadata
+    if not isinstance(metadata, dict) or not all(isinstance(text, str) for text in metadata.values()):
+        raise ValueError(f"{path}: its metadata are not an object of texts")
+    if len(header) > MOST_TENSORS or len(metadata) > MOST_FIELDS:
+        raise ValueError(f"{path}: has {len(header)} tensors and {len(metadata)} fields, expected at most "
+                         f"{MOST_TENSORS} and {MOST_FIELDS}")
+    _whole(path, raw, metadata)
+    entries = {name: _entry(entry) for name, entry in header.items()}
+    bad = [name for name, entry in entries.items() if entry is None]
+    if bad:
+        raise ValueError(f"{path}: tensor {bad[0]!r} has a type, a shape or offsets that cannot be")
+    tensors, at = {}, 0
+    for name, (kind, shape, begin, end) in sorted(entries.items(), key=lambda item: item[1][2:]):
+        if begin != at or end > len(raw) - 8 - size:
+            raise ValueError(f"{path}: tensor {name!r} lies at {begin} to {end}, expected it to begin at {at} and to "
+                             f"end within {len(raw) - 8 - size} bytes")
+        tensors[name] = np.frombuffer(raw, kind, math.prod(shape), 8 + size + begin).reshape(shape)
+        at = end
+    if at != len(raw) - 8 - size:
+        raise ValueError(f"{path}: has {len(raw) - 8 - size - at} bytes behind the last tensor")
+    return {name: tensors[name] for name in header}, metadata
+
+
+def expect(path, tensors, shapes):
+    """The named tensors, None for those that are not there. `shapes`: name to sizes, where None is any size and a text
+    the same size wherever it stands; a name that ends in "?" need not be there. Raises ValueError."""
+    sizes, found = {}, []
+    for key, shape in shapes.items():
+        name = key.rstrip("?")
+        if name not in tensors:
+            if key.endswith("?"):
+                found.append(None)
+                continue
+            raise ValueError(f"{path}: has no tensor {name!r}; found {sorted(tensors)}")
+        have = tensors[name].shape
+        if len(have) != len(shape) or any(size is not None and sizes.setdefault(size, n) != n
+                                          for size, n in zip(shape, have)):
+            raise ValueError(f"{path}: tensor {name!r} has shape {list(have)}, which does not fit the others")
+        found.append(tensors[name])
+    return found
 
 
 def write(path, tensors, metadata=None):

@@ -151,4 +151,7 @@ def load_model(path):
     if metadata.get("format") != "supertac-checkpoint" or "kind" in metadata:
         raise ValueError(f"{path}: expected a model that supertac-train --data wrote, found "
                          + metadata.get("kind", metadata.get("format", "another file")))
-    return Model(tensors, metadata)
+    try:
+        return Model(tensors, metadata)
+    except (AttributeError, KeyError, TypeError) as problem:
+        raise ValueError(f"{path}: its settings are not those of a model: {problem!r}") from None

@@ -1,10 +1,9 @@
 """Recordings of the finger, logs of pictures, and the windows that a network looks at."""
 import dataclasses
-import json
 
 import numpy as np
 
-from .files import read
+from .files import expect, parse_json, read
 
 RIG = {"rows": 4, "columns": 4, "pitch_mm": 3, "channels": 1}
 SLACK = 1e-6  # of a period: time stamps are rounded
@@ -41,16 +40,24 @@ def read_recording(path):
     tensors, metadata = read(path)
     if metadata.get("kind") != "recording":
         raise ValueError(f"{path}: expected a recording, found a {metadata.get('kind', 'file of another kind')}")
-    array = json.loads(metadata["array"]) if "array" in metadata else dict(RIG)
-    return Recording(tensors["time_s"], tensors["volts"], tensors.get("position_mm"), array, metadata)
+    array = parse_json(path, metadata["array"]) if "array" in metadata else dict(RIG)
+    if not isinstance(array, dict) or not all(isinstance(array.get(key), (int, float)) for key in RIG):
+        raise ValueError(f"{path}: its array is {array}, expected such as {RIG}")
+    times, volts, position = expect(path, tensors, {"time_s": ["n"], "volts": ["n", None], "position_mm?": ["n", None]})
+    if volts.shape[1] != array["rows"] * array["columns"] * array["channels"]:
+        raise ValueError(f"{path}: has {volts.shape[1]} signals, its array {array} has others")
+    if not (np.diff(times) > 0).all():
+        raise ValueError(f"{path}: its times do not increase; record or import it again")
+    return Recording(times, volts, position, array, metadata)
 
 
 def read_pictures(path):
     tensors, metadata = read(path)
     if "pictures" not in tensors:
         raise ValueError(f"{path}: expected the pictures of supertac-stream --out, found {sorted(tensors)}")
-    return Log(tensors["time_s"], tensors["volts"], tensors["pictures"], tensors.get("half_widths"),
-               tensors.get("distances"), metadata)
+    picture = ["n", "height", "width"]
+    return Log(*expect(path, tensors, {"time_s": ["n"], "volts": ["n", None], "pictures": picture,
+                                       "half_widths?": picture, "distances?": ["n"]}), metadata)
 
 
 def _runs(times, max_gap_s):

@@ -49,6 +49,9 @@ class FaultInjection {
     calls.rename = [](const char* from, const char* to) {
       return hit("rename") ? -1 : real_system_calls().rename(from, to);
     };
+    calls.rename_new = [](const char* from, const char* to) {
+      return hit("rename") ? -1 : real_system_calls().rename_new(from, to);
+    };
   }
   ~FaultInjection() { system_calls() = real_system_calls(); }
   FaultInjection(const FaultInjection&) = delete;

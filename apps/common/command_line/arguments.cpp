@@ -13,7 +13,6 @@
 #include "apps/common/command_line/nearest.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/threads.h"
-#include "io/files/file.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
@@ -352,6 +351,14 @@ int Arguments::threads() const {
                                                           : default_threads();
 }
 
+OutputPath Arguments::output(const std::string& name) const {
+  if (force()) return text(name);
+  return {text(name), [this](const std::string& line) {
+            displaced_ = true;
+            if (!muted_) std::cerr << program_ + ": " + without_controls(line) + "\n";
+          }};
+}
+
 void Arguments::print(std::string_view line) const {
   if (!muted_ && text("json") != "-") std::cout << without_controls(line) << '\n';
 }
@@ -368,7 +375,7 @@ void Arguments::write_json(const nlohmann::ordered_json& result) const {
   if (text("json") == "-") {
     std::cout << document;
   } else {
-    write_file(text("json"), document);
+    write_file(output("json"), document);
   }
 }
 

@@ -1,6 +1,7 @@
 // The command line of a program: its options are declared, parsed (cxxopts), and read with range checks.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -9,6 +10,8 @@
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "io/files/file.h"
 
 namespace supertac {
 
@@ -89,6 +92,11 @@ class Arguments {
   std::vector<NamedPath> paths() const;
 
   bool force() const { return flag("force"); }
+  /// A file or folder to be written, of the option `name`: what has its name is replaced under --force only.
+  /// Otherwise what was made gets another name, the user is told, and the program fails at its end.
+  OutputPath output(const std::string& name) const;
+  /// Whether that has happened.
+  bool displaced() const { return displaced_; }
   bool quiet() const { return muted_ || flag("quiet"); }
   /// --threads, or what the machine grants (apps/common/running/threads.h).
   int threads() const;
@@ -111,8 +119,7 @@ class Arguments {
   /// A remark on stderr; nothing under --quiet.
   void note(std::string_view line) const;
   /// The machine-readable result and its provenance, to where --json says: a file (atomically) or, for '-',
-  /// stdout. Without
-  /// --json nothing. The wrapper has refused an existing file before the work began.
+  /// stdout. Without --json nothing.
   void write_json(const nlohmann::ordered_json& result) const;
 
  private:
@@ -139,6 +146,7 @@ class Arguments {
   std::vector<std::pair<std::string, std::string>> one_of_;
   std::string only_with_;  // of the options being declared
   bool more_ = false, muted_ = false;
+  mutable std::atomic<bool> displaced_ = false;
   std::map<std::string, std::string> values_;  // as given
 };
 

@@ -1,12 +1,17 @@
 #include "apps/common/command_line/program.h"
 
 #include <omp.h>
+#include <sys/resource.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
+#include <mutex>
 #include <new>
+#include <system_error>
 #include <thread>
+#include <vector>
 
 #include "apps/common/command_line/version.h"
 #include "apps/common/output/outputs.h"
@@ -14,6 +19,7 @@
 #include "apps/common/running/launch.h"
 #include "apps/common/running/signals.h"
 #include "io/files/file.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -42,7 +48,47 @@ int fail(const Program& program, std::string message, int code) {
   return code;
 }
 
+// With less, a thread ends by a segmentation fault.
+void check_stack() {
+  constexpr rlim_t kLeast = 1 << 20;
+  rlimit stack{};
+  if (const char* wish = std::getenv("OMP_STACKSIZE")) {
+    char* unit = nullptr;
+    const auto number = std::strtoull(wish, &unit, 10);  // of kilobytes where nothing else is said
+    if ((*unit == 'b' || *unit == 'B' ? number >> 10 : number) < 64 && *unit != 'm' && *unit != 'M')
+      throw std::runtime_error("OMP_STACKSIZE is " + in_quotes(wish) + ", expected at least 64k; unset it");
+  }
+  if (::getrlimit(RLIMIT_STACK, &stack) != 0 || stack.rlim_cur >= kLeast) return;
+  throw std::runtime_error("the stack may hold " + std::to_string(stack.rlim_cur >> 10) + " kB, expected " +
+                           std::to_string(kLeast >> 10) + "; raise the limit with ulimit -s 8192");
+}
+
+// OpenMP would end the program, with a line of its own, where it cannot start its threads.
+void check_threads(int count) {
+  std::vector<std::thread> threads;
+  std::mutex wait;
+  std::string problem;
+  {
+    const std::lock_guard all_at_once(wait);
+    try {
+      threads.reserve(static_cast<std::size_t>(count));
+      while (static_cast<int>(threads.size()) + 1 < count)
+        threads.emplace_back([&wait] { const std::lock_guard until_all_are_there(wait); });
+    } catch (const std::system_error& error) {
+      problem = error.code().message();
+    }
+  }
+  for (std::thread& thread : threads) thread.join();
+  if (problem.empty()) return;
+  throw std::runtime_error(
+      "cannot start " + std::to_string(count) + " threads: " + problem + " after " +
+      std::to_string(threads.size() + 1) +
+      "; pass fewer with --threads, or raise the limits of processes and memory (ulimit -u, -v)");
+}
+
 int run(const Program& program, Arguments& arguments) {
+  check_stack();
+  check_threads(arguments.threads());
   omp_set_num_threads(arguments.threads());
   catch_signals();
   check_outputs(arguments);
@@ -53,7 +99,8 @@ int run(const Program& program, Arguments& arguments) {
     }
   }
   const int code = program.run(arguments);
-  return interrupted() ? 128 + interrupting_signal() : code;
+  if (interrupted()) return 128 + interrupting_signal();
+  return code == kExitOk && arguments.displaced() ? kExitFailed : code;
 }
 
 int parse_and_run(const Program& program, int argc, const char* const* argv) {
@@ -85,6 +132,11 @@ int catch_all(const Program& program, int argc, const char* const* argv) {
         program,
         error.path1().string() + ": cannot be used: " + error.code().message() + "; choose another name",
         kExitFailed);
+  } catch (const std::system_error& error) {
+    return fail(program,
+                "cannot start a thread: " + error.code().message() +
+                    "; raise the limits of processes and memory (ulimit -u, -v)",
+                kExitFailed);
   } catch (const nlohmann::json::exception& error) {
     const std::string what = error.what();  // "[json.exception.type_error.302] ..."
     return fail(program,

@@ -1,9 +1,14 @@
 #include "apps/common/output/output_folder.h"
 
-#include <filesystem>
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
 
 #include "apps/common/output/provenance.h"
-#include "io/files/file.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 
@@ -11,74 +16,140 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Beside the folder that is to appear; what a killed program left there is written over.
-std::string hidden_name_of(const std::string& path) {
+constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30;
+
+fs::path without_slash(const std::string& path) {
+  const fs::path whole = fs::absolute(path).lexically_normal();
+  return whole.has_filename() ? whole : whole.parent_path();
+}
+
+// Hidden folders are <prefix><process>-<number>, of this process or of others.
+std::string prefix_of(const fs::path& final_path, bool was_there) {
   constexpr std::size_t kMostLetters = 200;
-  fs::path whole = fs::absolute(path).lexically_normal();
-  if (!whole.has_filename()) whole = whole.parent_path();
-  return whole.parent_path() / ("." + whole.filename().string().substr(0, kMostLetters) + ".unfinished");
+  return was_there ? ".unfinished-"
+                   : "." + final_path.filename().string().substr(0, kMostLetters) + ".unfinished-";
+}
+
+bool is_running(const std::string& process) {
+  const auto id = parse_uint(process);
+  return !id || *id > INT32_MAX || ::kill(static_cast<pid_t>(*id), 0) == 0 || errno != ESRCH;
+}
+
+// A hidden folder that somebody fills is locked. One that nobody does is removed if it is a folder of this
+// user, whose process has ended: never what lies behind a link.
+void look_at(const fs::path& hidden, const std::string& process) {
+  struct stat status {};
+  if (::lstat(hidden.c_str(), &status) != 0 || !S_ISDIR(status.st_mode) || status.st_uid != ::geteuid())
+    return;
+  const FolderLock lock(hidden.string());
+  std::error_code ignored;
+  if (!is_running(process)) fs::remove_all(hidden, ignored);
+}
+
+bool is_there(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(fs::symlink_status(path, error));
 }
 
 }  // namespace
 
-OutputFolder::OutputFolder(const std::string& path, bool force) : path_(path), force_(force) {
-  std::error_code error;
-  if (!fs::exists(fs::symlink_status(path, error))) path_ = hidden_name_of(path), final_ = path;
-  for (fs::path folder = fs::absolute(path_, error); !folder.empty() && !fs::exists(folder, error);
-       folder = folder.parent_path()) {
-    folders_.push_back(folder.string());
-    if (folder == folder.parent_path()) break;
-  }
+OutputFolder::OutputFolder(OutputPath output)
+    : output_(std::move(output)), final_(without_slash(output_.path)), was_there_(is_there(final_)) {
+  for (fs::path folder = was_there_ ? final_ : final_.parent_path(); !is_there(folder);
+       folder = folder.parent_path())
+    parents_.push_back(folder);
   try {
-    make_directories(path_);
-    lock_ = std::make_unique<FolderLock>(path_);
-    if (!final_.empty())
-      for (const auto& left : fs::directory_iterator(path_)) fs::remove_all(left.path());
-    // Opens a temporary in the folder and removes it: the permission to write, tried.
-    AtomicFile((fs::path(path_) / ".writable").string());
-  } catch (const FileError& failure) {
-    remove_made();
-    if (final_.empty()) throw;
-    const std::string text = failure.what();  // of the hidden folder, which nobody asked for
-    throw FileError(path, text.starts_with(path_ + ": ") ? text.substr(path_.size() + 2) : text);
+    make_directories(was_there_ ? output_.path : final_.parent_path().string());
+    if (was_there_) final_lock_ = std::make_unique<FolderLock>(final_.string());
+    make_hidden();
   } catch (...) {
     remove_made();
     throw;
   }
 }
 
+void OutputFolder::make_hidden() {
+  const fs::path place = was_there_ ? final_ : final_.parent_path();
+  const std::string prefix = prefix_of(final_, was_there_);
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(place, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(prefix)) continue;
+    const std::string process = name.substr(prefix.size(), name.find('-', prefix.size()) - prefix.size());
+    try {
+      look_at(entry.path(), process);
+    } catch (const FileError&) {  // of a lock: the hidden name is nobody's business
+      throw FileError(output_.path,
+                      "another program is writing there; wait for its end, or choose another folder");
+    }
+  }
+  for (int number = 0;; ++number) {
+    hidden_ = place / (prefix + std::to_string(::getpid()) + "-" + std::to_string(number));
+    if (::mkdir(hidden_.c_str(), 0777) == 0) break;
+    const int why = errno;
+    if (why == EEXIST && number < 100) continue;
+    hidden_.clear();
+    throw FileError(output_.path,
+                    std::string("cannot be written: ") + std::strerror(why) + "; choose another place");
+  }
+  hidden_lock_ = std::make_unique<FolderLock>(hidden_.string());
+}
+
 OutputFolder::~OutputFolder() {
   if (!kept_) remove_made();
 }
 
-void OutputFolder::remove_made() {
+void OutputFolder::remove_made() const {
   std::error_code ignored;
-  if (!final_.empty() && lock_) fs::remove_all(path_, ignored);
-  for (const std::string& file : made_) fs::remove(file, ignored);
-  for (const std::string& folder : folders_) fs::remove(folder, ignored);  // only when empty
+  if (!hidden_.empty()) fs::remove_all(hidden_, ignored);
+  for (const fs::path& folder : parents_) fs::remove(folder, ignored);  // only when empty
 }
 
 void OutputFolder::keep() {
-  constexpr std::uint64_t kMostBytes = 16 << 20;
-  const std::string file = (fs::path(path_) / kFolderProvenance).string();
-  std::error_code error;
-  std::string lines = fs::exists(file, error) ? read_text_file(file, kMostBytes) : "";
+  const fs::path before = final_ / kFolderProvenance;
+  std::string lines = is_there(before) ? read_text_file(before.string(), kMostBytes) : "";
   nlohmann::ordered_json line = full_provenance();
-  line["files"] = added_;
-  write_file(file, lines + line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-  if (!final_.empty()) fs::rename(path_, final_, error);
-  if (!final_.empty() && error)
-    throw FileError(final_, "cannot appear: " + error.message() + "; choose another name");
-  kept_ = true;
+  line["files"] = added_.size();
+  lines += line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  write_file((hidden_ / kFolderProvenance).string(), lines);
+  const bool in_it = was_there_ || (!output_.when_taken && fs::is_directory(final_));
+  if (in_it) check_others();
+  kept_ = true;  // from here on nothing that was made is removed, whatever happens
+  try {
+    if (in_it)
+      move_files();
+    else
+      publish(hidden_.string(), {final_.string(), output_.when_taken});
+  } catch (const FileError& error) {
+    throw FileError(output_.path, std::string(error.what()) + "; what was made is in " + hidden_.string());
+  }
+}
+
+void OutputFolder::check_others() const {
+  for (const auto& entry : fs::directory_iterator(hidden_)) {
+    const fs::path name = entry.path().filename(), place = final_ / name;
+    if (added_.contains(name.string()) || name == kFolderProvenance || !is_there(place)) continue;
+    if (read_file(entry.path().string(), kMostBytes) != read_file(place.string(), kMostBytes))
+      throw FileError(place.string(),
+                      "exists already and is another file; rename it, or choose another folder");
+  }
+}
+
+void OutputFolder::move_files() const {
+  std::vector<fs::path> names;
+  for (const auto& entry : fs::directory_iterator(hidden_)) names.push_back(entry.path().filename());
+  for (const fs::path& name : names) {
+    const bool added = added_.contains(name.string());
+    publish((hidden_ / name).string(), {(final_ / name).string(), added ? output_.when_taken : nullptr});
+  }
+  std::error_code ignored;
+  fs::remove(hidden_, ignored);
 }
 
 std::string OutputFolder::add(const std::string& name) {
-  const std::string file = (fs::path(path_) / name).string();
-  refuse_existing(file, force_);
-  ++added_;
-  std::error_code error;
-  if (!fs::exists(fs::symlink_status(file, error))) made_.push_back(file);
-  return file;
+  if (was_there_) refuse_existing((final_ / name).string(), !output_.when_taken);
+  added_.insert(name);
+  return (hidden_ / name).string();
 }
 
 }  // namespace supertac

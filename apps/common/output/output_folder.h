@@ -1,44 +1,52 @@
 #pragma once
 
+#include <filesystem>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "io/files/file.h"
 #include "io/files/folder_lock.h"
 
 namespace supertac {
 
-/// A folder that a program fills with several files, all or none, and holds alone meanwhile. A folder that is
-/// not there yet is filled under a hidden name (.NAME.unfinished) and appears when keep() is called, so that
-/// not even a killed program leaves a part of it; in one that is there, what was made is removed again unless
-/// keep() is called. Files that were there before are never removed.
+/// A folder that a program fills with several files, all or none. They are written to a hidden folder made
+/// for them, beside the one that is to appear or, where that is there, in it, and get their names when keep()
+/// is called: not even a killed program leaves a part of them. What it does leave, the next one removes.
 class OutputFolder {
  public:
-  /// Creates the folder where it is missing.
-  /// Throws FileError when it cannot be created or written to, so that a program finds out before it works.
-  OutputFolder(const std::string& path, bool force);
+  /// Creates the hidden folder. Throws FileError when it cannot, or when another program fills the same
+  /// folder, so that a program finds out before it works.
+  explicit OutputFolder(OutputPath output);
+  /// Removes everything unless keep() has been called.
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
 
   /// Where the files are written until keep().
-  const std::string& path() const { return path_; }
-  /// Path of a file to be written in the folder. Throws FileError when it exists and force is false.
+  std::string path() const { return hidden_.string(); }
+  /// Path of a file to be written. Throws FileError when it exists and is not to be replaced.
   std::string add(const std::string& name);
-  /// The folder's provenance.jsonl gains a line: what full_provenance() says, and how many files it was.
-  /// Throws FileError, also when the folder cannot appear.
+  /// The folder appears, or the files in it. Where that name, or that of a file added, was taken meanwhile,
+  /// OutputPath::when_taken holds. Of a file that was not added, one with the same bytes may be there
+  /// already. The folder's provenance.jsonl gains a line: what full_provenance() says, and how many files it
+  /// was. Throws FileError; nothing is then lost that was made.
   void keep();
 
  private:
-  void remove_made();
+  void make_hidden();
+  void check_others() const;
+  void move_files() const;
+  void remove_made() const;
 
-  std::string path_, final_;  // final_ is empty when the folder was there
-  std::unique_ptr<FolderLock> lock_;
-  bool force_;
+  OutputPath output_;
+  std::filesystem::path final_, hidden_;
+  bool was_there_;
+  std::unique_ptr<FolderLock> final_lock_, hidden_lock_;
   bool kept_ = false;
-  std::size_t added_ = 0;
-  std::vector<std::string> made_;     // files that were not there before
-  std::vector<std::string> folders_;  // the same, innermost first
+  std::set<std::string> added_;
+  std::vector<std::filesystem::path> parents_;  // that were made, innermost first
 };
 
 }  // namespace supertac

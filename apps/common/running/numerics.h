@@ -4,8 +4,7 @@
 
 namespace supertac {
 
-/// The kernels chosen on this processor and, in programs that link it, the OpenBLAS found; warns where fused
-/// multiply-add is done in software.
+/// The kernels chosen on this processor; warns where fused multiply-add is done in software.
 Numerics numerics();
 
 }  // namespace supertac

@@ -25,7 +25,7 @@
 #include "bench/studies/hostile/readers.h"
 #include "io/files/file.h"
 #include "io/numbers/random.h"
-#include "tests/apps/process.h"
+#include "tests/apps/common/process.h"
 
 namespace supertac {
 namespace {

@@ -26,7 +26,7 @@
 #include "io/files/safetensors.h"
 #include "io/numbers/random.h"
 #include "models/files/model_file.h"
-#include "tests/apps/http_client.h"
+#include "tests/apps/web/http_client.h"
 #include "tests/fuzz/journal_properties.h"
 #include "tests/fuzz/stl_properties.h"
 

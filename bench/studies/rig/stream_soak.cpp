@@ -20,7 +20,7 @@
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
-#include "tests/apps/process.h"
+#include "tests/apps/common/process.h"
 
 namespace supertac {
 namespace {

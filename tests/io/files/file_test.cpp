@@ -55,6 +55,28 @@ TEST(File, NothingAppearsWithoutCommit) {
   EXPECT_EQ(folder.entries(), 0u);
 }
 
+TEST(File, AppearsBesideWhatTookItsName) {
+  TemporaryFolder folder;
+  std::string said;
+  const OutputPath output(folder.file("a.txt"), [&said](const std::string& line) { said = line; });
+  write_file(output, "first");
+  EXPECT_EQ(said, "");
+  write_file(output, "second");
+  EXPECT_EQ(said, folder.file("a.txt") + ": appeared meanwhile and is not replaced; what was made is " +
+                      folder.file("a-2.txt"));
+  std::filesystem::remove(folder.file("a.txt"));
+  std::filesystem::create_symlink("b", folder.file("a.txt"));  // that leads nowhere
+  write_file(output, "third");
+  EXPECT_FALSE(std::filesystem::exists(folder.file("b")));
+  std::filesystem::remove(folder.file("a.txt"));
+  std::filesystem::create_directory(folder.file("a.txt"));
+  write_file(output, "fourth");
+  for (const auto& [name, text] :
+       {std::pair{"a-2.txt", "second"}, {"a-3.txt", "third"}, {"a-4.txt", "fourth"}})
+    EXPECT_EQ(read_text_file(folder.file(name), kPlenty), text);
+  EXPECT_EQ(folder.entries(), 4U);
+}
+
 TEST(File, LeavesNoDescriptorOpen) {
   const TemporaryFolder folder;
   const auto descriptors = [] {

@@ -1,4 +1,4 @@
-// The ledger's file and its comparison; whole trainings are compared in tests/apps/check_test.cpp.
+// The ledger's file and its comparison; whole trainings are compared in tests/apps/models/check_test.cpp.
 #include "models/training/ledger.h"
 
 #include <gtest/gtest.h>

@@ -7,7 +7,7 @@
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "models/files/classifier_file.h"
-#include "tests/apps/process.h"
+#include "tests/apps/common/process.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {

@@ -1,4 +1,7 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
 
 #include "apps/common/command_line/arguments.h"
 #include "apps/common/command_line/command_words.h"
@@ -7,10 +10,13 @@
 #include "apps/common/running/progress.h"
 #include "apps/common/running/threads.h"
 #include "io/files/file.h"
+#include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {
 namespace {
+
+namespace fs = std::filesystem;
 
 Arguments parsed(std::vector<const char*> words) {
   Arguments arguments("supertac-test", "Tests.");
@@ -131,39 +137,98 @@ TEST(CommandWords, AreTheSameAgain) {
   EXPECT_THROW(command_words("a 'b"), std::invalid_argument);
 }
 
+// Not to be replaced; what was said of a name that was taken goes to `said`.
+OutputPath new_at(const std::string& path, std::string& said) {
+  return {path, [&said](const std::string& line) { said = line; }};
+}
+
 TEST(OutputFolder, RemovesWhatItMadeUnlessKept) {
   TemporaryFolder folder;
+  std::string said;
+  const OutputPath place = new_at(folder.file("a/b"), said);
   {
-    OutputFolder output(folder.file("a/b"), false);
+    OutputFolder output(place);
     write_file(output.add("x"), "x");
   }
   EXPECT_EQ(folder.entries(), 0u);
   {
-    OutputFolder output(folder.file("a/b"), false);
+    OutputFolder output(place);
     write_file(output.add("x"), "x");
-    EXPECT_FALSE(std::filesystem::exists(folder.file("a/b"))) << "half a folder is seen";
+    EXPECT_FALSE(fs::exists(folder.file("a/b"))) << "half a folder is seen";
     output.keep();
-    EXPECT_TRUE(std::filesystem::exists(folder.file("a/b/x")));
+    EXPECT_TRUE(fs::exists(folder.file("a/b/x")));
   }
   {
-    OutputFolder output(folder.file("a/b"), true);
+    OutputFolder output(folder.file("a/b"));
     write_file(output.add("x"), "new");
     write_file(output.add("y"), "y");
-    EXPECT_THROW(OutputFolder(folder.file("a/b"), false).add("x"), FileError);
+    EXPECT_THROW(OutputFolder(place).add("x"), FileError);
   }
-  EXPECT_TRUE(std::filesystem::exists(folder.file("a/b/x")));
-  EXPECT_FALSE(std::filesystem::exists(folder.file("a/b/y")));
+  EXPECT_EQ(read_text_file(folder.file("a/b/x"), 9), "x");
+  EXPECT_FALSE(fs::exists(folder.file("a/b/y")));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.file("a/b")), {}), 2) << "x, provenance.jsonl";
+  EXPECT_EQ(said, "");
 }
 
-TEST(OutputFolder, WhatAKilledProgramLeftIsNotKept) {
+TEST(OutputFolder, WhatAKilledProgramLeftIsRemoved) {
   TemporaryFolder folder;
-  std::filesystem::create_directories(folder.file(".a.unfinished"));
-  write_file(folder.file(".a.unfinished/old"), "of a program that was killed");
-  OutputFolder output(folder.file("a/"), false);
+  const std::string left = folder.file(".a.unfinished-4194305-0");  // no process has this number
+  fs::create_directories(left);
+  write_file(left + "/old", "of a program that was killed");
+  OutputFolder output(folder.file("a/"));
+  EXPECT_FALSE(fs::exists(left));
   write_file(output.add("new"), "");
   output.keep();
-  EXPECT_FALSE(std::filesystem::exists(folder.file("a/old")));
-  EXPECT_TRUE(std::filesystem::exists(folder.file("a/new")));
+  EXPECT_TRUE(fs::exists(folder.file("a/new")));
+  EXPECT_EQ(folder.entries(), 1U);
+}
+
+TEST(OutputFolder, NothingThatItHasNotMadeIsFollowedOrEmptied) {
+  TemporaryFolder folder;
+  fs::create_directories(folder.file("home"));
+  write_file(folder.file("home/thesis"), "precious");
+  const std::string own = std::to_string(::getpid());
+  for (const std::string& name : {std::string(), std::string("-4194305-0"), "-" + own + "-0"})
+    fs::create_symlink("home", folder.file(".a.unfinished" + name));
+  write_file(folder.file(".a.unfinished-4194306-0"), "a file");
+  fs::create_directories(folder.file(".b.unfinished"));
+  write_file(folder.file(".b.unfinished/mine"), "precious");
+  for (const char* name : {"a", "b"}) {
+    OutputFolder output(folder.file(name));
+    write_file(output.add("new"), "");
+    output.keep();
+    EXPECT_TRUE(fs::is_directory(fs::symlink_status(folder.file(name))));
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.file("home")), {}), 1);
+  EXPECT_EQ(read_text_file(folder.file("home/thesis"), 9), "precious");
+  EXPECT_EQ(read_text_file(folder.file(".b.unfinished/mine"), 9), "precious");
+}
+
+TEST(OutputFolder, ANameThatWasTakenMeanwhileKeepsWhatItHolds) {
+  TemporaryFolder folder;
+  std::string said;
+  {
+    OutputFolder output(new_at(folder.file("a"), said));
+    write_file(output.add("x"), "work");
+    fs::create_directories(folder.file("a"));
+    output.keep();
+  }
+  EXPECT_TRUE(fs::is_empty(folder.file("a")));
+  EXPECT_EQ(read_text_file(folder.file("a-2/x"), 9), "work");
+  EXPECT_NE(said.find(folder.file("a-2")), std::string::npos) << said;
+  {
+    OutputFolder output(new_at(folder.file("a"), said));
+    write_file(output.add("x.txt"), "work");
+    write_file(output.path() + "/plate.stl", "plate");
+    write_file(folder.file("a/x.txt"), "mine");
+    write_file(folder.file("a/plate.stl"), "plate");
+    output.keep();
+  }
+  EXPECT_EQ(read_text_file(folder.file("a/x.txt"), 9), "mine");
+  EXPECT_EQ(read_text_file(folder.file("a/x-2.txt"), 9), "work");
+  OutputFolder output(folder.file("a"));
+  write_file(output.path() + "/plate.stl", "other");
+  EXPECT_ERROR(output.keep(), FileError, "is another file");
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "io/files/json.h"
-#include "tests/apps/trained.h"
+#include "tests/apps/common/trained.h"
 
 namespace supertac {
 namespace {

@@ -12,7 +12,7 @@
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
-#include "tests/apps/simulated_data.h"
+#include "tests/apps/common/simulated_data.h"
 
 namespace supertac {
 namespace {

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The live page in a real Chromium, on a virtual rig whose finger slides.
 
-    tests/apps/page_test.py BIN [SCREENSHOTS]    BIN: the folder of our programs; SCREENSHOTS: keep some in this folder
+    tests/apps/web/page_test.py BIN [SCREENSHOTS]    BIN: the folder of our programs; SCREENSHOTS: keep some in this folder
 
 Ends with 77, after one line, where Chromium or its driver is not installed.
 """

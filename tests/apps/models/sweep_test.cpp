@@ -9,7 +9,7 @@
 
 #include "io/files/json.h"
 #include "io/files/provenance.h"
-#include "tests/apps/simulated_data.h"
+#include "tests/apps/common/simulated_data.h"
 
 namespace supertac {
 namespace {

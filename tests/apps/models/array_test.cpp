@@ -7,7 +7,7 @@
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
 #include "models/files/model_file.h"
-#include "tests/apps/process.h"
+#include "tests/apps/common/process.h"
 
 namespace supertac {
 namespace {

@@ -6,7 +6,7 @@
 #include <regex>
 
 #include "data/recordings/recording.h"
-#include "tests/apps/simulated_data.h"
+#include "tests/apps/common/simulated_data.h"
 
 namespace supertac {
 namespace {

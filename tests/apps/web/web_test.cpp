@@ -1,5 +1,6 @@
 // The server of the live page: who may come in, what leaves, and what a slow reader costs.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <atomic>
 #include <chrono>
@@ -15,7 +16,7 @@
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/images/images.h"
-#include "tests/apps/http_client.h"
+#include "tests/apps/web/http_client.h"
 #include "tests/fuzz/corpus.h"
 #include "tests/io/temporary_folder.h"
 
@@ -104,12 +105,14 @@ TEST_F(Web, ListensOnLoopbackOnly) {
 
 TEST_F(Web, AForeignHostIsMisdirected) {
   const std::string port = std::to_string(port_);
-  for (const std::string own : {"127.0.0.1:", "localhost:"})
-    EXPECT_EQ(get("/", "Host: " + own + port + "\r\n"), 200) << own;
+  for (const std::string& own :
+       std::vector<std::string>{"127.0.0.1:" + port, "localhost:" + port, "127.0.0.1", "localhost:9000",
+                                "127.0.0.1:1"})  // through a tunnel
+    EXPECT_EQ(get("/", "Host: " + own + "\r\n"), 200) << own;
   for (const std::string& foreign : std::vector<std::string>{
-           "evil.example:" + port, "127.0.0.1", "localhost", "127.0.0.1:1", "127.0.0.1:" + port + "0",
+           "evil.example:" + port, "", "127.0.0.1:", "127.0.0.1:0", "127.0.0.1:" + port + "00", "localhost:x",
            "192.168.0.7:" + port, "127.0.0.1:" + port + ".evil.example", "localhost.:" + port,
-           "evil:127.0.0.1:" + port})
+           "evil:127.0.0.1:" + port, "localhost:1:2"})
     EXPECT_EQ(get("/events", "Host: " + foreign + "\r\n"), 421) << foreign;
   EXPECT_EQ(status_of(port_, "GET / HTTP/1.0\r\n\r\n"), 421);  // without a host
 }
@@ -237,18 +240,33 @@ TEST_F(Web, TheCorpusOfRequestsIsTurnedAway) {
   EXPECT_EQ(records_, 0);
 }
 
-TEST_F(Web, ManyConnectionsThatSayNothingLeaveRoom) {
-  std::vector<std::unique_ptr<HttpClient>> slow;
-  for (int i = 0; i < 60; ++i) {
-    slow.push_back(std::make_unique<HttpClient>(port_));
-    slow.back()->send("GET / HT");
+// Half a request, and pages that take nothing.
+TEST_F(Web, AThousandSlowConnectionsLeaveRoom) {
+  rlimit files{};
+  getrlimit(RLIMIT_NOFILE, &files);
+  files.rlim_cur = files.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &files);
+  letters_ = 8000;
+  for (const std::string& words : {std::string("GET / HT"), "GET /events HTTP/1.1\r\n" + host() + "\r\n"}) {
+    HttpClient owner(port_);
+    owner.send("GET /events HTTP/1.1\r\n" + host() + "\r\n");
+    owner.receive("{\"n\":");
+    std::vector<std::unique_ptr<HttpClient>> slow;
+    for (int i = 0; i < 1000; ++i) {
+      slow.push_back(std::make_unique<HttpClient>(port_, 4096));
+      slow.back()->send(words);
+      if (i % 100 == 99) EXPECT_TRUE(answers()) << i;
+    }
+    const std::string later = "{\"n\":" + std::to_string(count_ + 10) + ",";
+    if (words.ends_with("HT"))
+      EXPECT_NE(owner.receive(later).find(later), std::string::npos) << "silent ones made a page leave";
+    EXPECT_FALSE(token().empty());
   }
-  EXPECT_TRUE(answers());
 }
 
 // Twice as many as may be open at a time: each must be noticed to be gone.
 TEST_F(Web, HalfRequestsThatWereClosedLeaveRoom) {
-  for (unsigned i = 0; i < 2 * WebServer::kConnections; ++i) HttpClient(port_).send("GET / HT");
+  for (std::size_t i = 0; i < 2 * WebServer::kMostPeers; ++i) HttpClient(port_).send("GET / HT");
   EXPECT_TRUE(answers());
 }
 

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "io/files/json.h"
-#include "tests/apps/collect_run.h"
-#include "tests/apps/http_client.h"
+#include "tests/apps/rig/collect_run.h"
+#include "tests/apps/web/http_client.h"
 
 namespace supertac {
 namespace {

@@ -66,6 +66,23 @@ TEST_F(RecorderTest, AnEndCompletesTheFile) {
   EXPECT_EQ(SafetensorsFile::read(name).f64("time_s").size(), 1U);
 }
 
+TEST_F(RecorderTest, AFileThatAppearedMeanwhileStays) {
+  std::string name;
+  {
+    Recorder recorder(kFormat, {});
+    recorder.start();
+    name = recorder.status().recording;
+    recorder.add(seen_at(1));
+    write_file(name, "mine");
+    recorder.stop();
+    recorder.stop();  // waits for the file
+    EXPECT_NE(recorder.status().said.find("-2.safetensors"), std::string::npos) << recorder.status().said;
+  }
+  EXPECT_EQ(read_text_file(name, 9), "mine");
+  name.replace(name.find(".safe"), 0, "-2");
+  EXPECT_EQ(SafetensorsFile::read(name).f64("time_s").size(), 1U);
+}
+
 TEST_F(RecorderTest, AFolderThatIsGoneIsSaid) {
   Recorder recorder(kFormat, {});
   fs::remove_all(fs::current_path());

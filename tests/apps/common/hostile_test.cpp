@@ -18,7 +18,7 @@
 #include "apps/common/output/outputs.h"
 #include "io/files/file.h"
 #include "io/files/folder_lock.h"
-#include "process.h"
+#include "tests/apps/common/process.h"
 
 namespace supertac {
 namespace {
@@ -121,6 +121,27 @@ TEST(Outputs, ASecondWriterOfAFolderIsRefused) {
   EXPECT_EQ(simulate({"--out", folder / "out"}).code, 0) << "a killed program holds nothing";
 }
 
+// Whatever appears while a program works stays, and so does the program's work.
+TEST(Outputs, WhatAppearsMeanwhileIsNotReplaced) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(simulate({"--out", folder / "data"}).code, 0);
+  const std::vector<std::string> names = {"model.safetensors", "json.json"};
+  RunningProcess train("supertac-train",
+                       {"--data", folder / "data", "--split", "window", "--preset", "tiny", "--epochs", "1",
+                        "--out", folder / names[0], "--json", folder / names[1]});
+  wait_for_file(folder / "model.run/settings.json");
+  for (const std::string& name : names) write_file(folder / name, "precious");
+  const ProcessResult result = train.wait();
+  EXPECT_EQ(result.code, 1) << result.error;
+  for (const std::string& name : names) {
+    const std::string other = fs::path(name).stem().string() + "-2" + fs::path(name).extension().string();
+    EXPECT_EQ(text_of(folder / name), "precious");
+    EXPECT_TRUE(fs::exists(folder / other)) << other;
+    EXPECT_NE(result.error.find(folder / other), std::string::npos) << result.error;
+  }
+  EXPECT_NE(result.out.find(folder / "model-2.safetensors"), std::string::npos) << result.out;
+}
+
 TEST(Outputs, EmptyNamesAreRefused) {
   for (const auto& [program, option] :
        {std::pair{"supertac-plate", "--json"}, {"supertac-train", "--resume"}}) {
@@ -215,6 +236,31 @@ TEST(Errors, EvilValuesAreOneClearLineAtOnce) {
     EXPECT_FALSE(fs::exists(out)) << words[0] << ' ' << words[2];
   }
   EXPECT_LT(most_kilobytes(), 1'000'000);
+}
+
+// Batch systems, containers and odd shells grant little: one line, and an end.
+TEST(Limits, AreOneClearLineAtOnce) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(simulate({"--out", folder / "data"}).code, 0);
+  ASSERT_EQ(run_process("supertac-train", {"--data", folder / "data", "--split", "window", "--preset", "tiny",
+                                           "--epochs", "1", "--out", folder / "m"})
+                .code,
+            0);
+  const std::string evaluate =
+      "timeout -k 1 60 $BIN/supertac-evaluate --split none --limit 20 --quiet --model " + (folder / "m") +
+      " --data " + (folder / "data");
+  const auto lines = [&](const std::string& limits, const std::string& more) {
+    const int code = shell(limits + "; " + evaluate + more + " >/dev/null 2>" + (folder / "error"));
+    const std::string error = text_of(folder / "error");
+    EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), code) << limits << code << error;
+    EXPECT_EQ(error.find("bad_alloc"), std::string::npos) << error;
+    return error;
+  };
+  for (const char* kilobytes : {"60000", "100000", "160000"})
+    lines("ulimit -v " + std::string(kilobytes), " --threads 1");
+  EXPECT_NE(lines("ulimit -v 100000", " --threads 64").find("cannot start 64 threads"), std::string::npos);
+  EXPECT_NE(lines("ulimit -s 128", "").find("ulimit -s 8192"), std::string::npos);
+  EXPECT_NE(lines("export OMP_STACKSIZE=16k", "").find("expected at least 64k"), std::string::npos);
 }
 
 TEST(Import, HoldsOnePlateAtATime) {

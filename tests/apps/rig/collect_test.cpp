@@ -10,7 +10,7 @@
 
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
-#include "tests/apps/collect_run.h"
+#include "tests/apps/rig/collect_run.h"
 
 namespace supertac {
 namespace {

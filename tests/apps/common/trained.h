@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/apps/simulated_data.h"
+#include "tests/apps/common/simulated_data.h"
 
 namespace supertac {
 

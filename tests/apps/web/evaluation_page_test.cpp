@@ -4,7 +4,7 @@
 #include "data/recordings/simulator.h"
 #include "io/files/json.h"
 #include "models/files/model_file.h"
-#include "tests/apps/simulated_data.h"
+#include "tests/apps/common/simulated_data.h"
 
 namespace supertac {
 namespace {

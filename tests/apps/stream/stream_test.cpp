@@ -17,7 +17,7 @@
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "models/files/model_file.h"
-#include "tests/apps/process.h"
+#include "tests/apps/common/process.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {

@@ -1,4 +1,4 @@
-#include "tests/apps/process.h"
+#include "tests/apps/common/process.h"
 
 #include <fcntl.h>
 #include <stdlib.h>

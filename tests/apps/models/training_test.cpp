@@ -8,7 +8,7 @@
 #include "io/files/json.h"
 #include "io/files/provenance.h"
 #include "io/files/safetensors.h"
-#include "tests/apps/trained.h"
+#include "tests/apps/common/trained.h"
 
 namespace supertac {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "data/windows/windows.h"
 #include "io/files/file.h"
-#include "tests/apps/process.h"
+#include "tests/apps/common/process.h"
 
 namespace supertac {
 namespace {

@@ -4,7 +4,7 @@
 #include "data/recordings/simulator.h"
 #include "io/files/safetensors.h"
 #include "models/files/model_file.h"
-#include "tests/apps/process.h"
+#include "tests/apps/common/process.h"
 
 namespace supertac {
 namespace {

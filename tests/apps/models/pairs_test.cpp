@@ -10,7 +10,7 @@
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/random.h"
-#include "tests/apps/process.h"
+#include "tests/apps/common/process.h"
 
 namespace supertac {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/apps/collect_run.h"
+#include "tests/apps/rig/collect_run.h"
 
 #include <unistd.h>
 

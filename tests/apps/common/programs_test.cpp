@@ -10,7 +10,7 @@
 
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
-#include "tests/apps/process.h"
+#include "tests/apps/common/process.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {
@@ -337,20 +337,6 @@ TEST(Dispatcher, EveryProgramOfTheListIsThereAndSaysWhatItIsFor) {
     ++programs;
   }
   EXPECT_GE(programs, 10u);
-}
-
-TEST(Programs, ThoseThatLinkOpenBlasNameIt) {
-  const auto names_it = [](const std::string& program) {
-    const bool links =
-        read_text_file(std::string(SUPERTAC_BIN) + "/" + program, kPlenty).find("libopenblas") !=
-        std::string::npos;
-    const bool names = run_process(program, {"--version"}).out.find("OpenBLAS 0.") != std::string::npos;
-    EXPECT_EQ(links, names) << program;
-    return names;
-  };
-  EXPECT_TRUE(names_it("supertac-evaluate"));
-  for (const char* program : {"supertac-import", "supertac-info", "supertac-simulate"})
-    EXPECT_FALSE(names_it(program)) << program;
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 #include <sstream>
 #include <thread>
 
-#include "tests/apps/simulated_data.h"
+#include "tests/apps/common/simulated_data.h"
 
 namespace supertac {
 namespace {

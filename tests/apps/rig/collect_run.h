@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "hardware/virtual_rig/pty_rig.h"
-#include "tests/apps/process.h"
+#include "tests/apps/common/process.h"
 
 namespace supertac {
 
