@@ -24,7 +24,7 @@ KNOWN = {
     "hardware/boards -> hardware/printers", "hardware/printers -> hardware/boards",
     "models/inference -> models/files",
     "circle: hardware/boards, hardware/printers", "circle: models/files, models/inference",
-    "floor: apps/stream", "floor: bench/results", "floor: bench/studies", "floor: data/windows",
+    "floor: apps/stream", "floor: data/windows",
     "floor: models/inference",
 }
 
