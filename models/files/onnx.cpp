@@ -26,7 +26,7 @@ class Exporter {
 
   std::string scaled(const ModelFile& file);
   std::string levelled(const std::string& x, Dim timesteps);
-  std::string percentile(const std::string& x, const std::string& name, std::int64_t rank, bool largest);
+  std::string percentile(const std::string& x, const std::string& name, std::int64_t rank);
   std::string network_input(const ModelFile& file);
 
   const std::string& of(const Variable& x) const { return names_.at(x.node()); }
@@ -62,37 +62,37 @@ std::string Exporter::numbers(const Ints& values) {
   return name;
 }
 
-// In double precision, as Scaling computes.
+// In single precision, since converters know no other; Scaling rounds once, from double.
 std::string Exporter::scaled(const ModelFile& file) {
-  constexpr std::int64_t kF32 = 1, kF64 = 11;
-  const double rest[] = {file.input.scaling.rest_volts}, span[] = {file.input.scaling.span_volts};
-  const std::string volts = graph.node("Cast", {"volts"}, "volts_f64", {{"to", kF64}});
-  const std::string below = graph.node("Sub", {graph.constant("rest_volts", rest), volts}, "below_rest");
-  const std::string share = graph.node("Div", {below, graph.constant("span_volts", span)}, "share_of_span");
-  const std::string x = graph.node("Cast", {share}, "unclipped", {{"to", kF32}});
-  return graph.node("Clip", {x, number(0), number(1)}, "scaled");
+  const auto rest = static_cast<float>(file.input.scaling.rest_volts),
+             span = static_cast<float>(file.input.scaling.span_volts);
+  const std::string below = graph.node("Sub", {number(rest), "volts"}, "below_rest");
+  const std::string share = graph.node("Div", {below, number(span)}, "share_of_span");
+  return graph.node("Clip", {share, number(0), number(1)}, "scaled");
 }
 
-// Lower edge of the bin of 1/256 that holds the rank-th smallest or largest sample of each signal,
-// [N,1,signals].
-std::string Exporter::percentile(const std::string& x, const std::string& name, std::int64_t rank,
-                                 bool largest) {
-  constexpr float kBins = 256;
-  constexpr std::int64_t kTime = 1;
-  graph.node_of_many("TopK", {x, numbers({rank})}, {name + "_sorted", name + "_places"},
-                     {{"axis", kTime}, {"largest", std::int64_t{largest}}, {"sorted", std::int64_t{1}}});
-  const std::string sample =
-      graph.node("Gather", {name + "_sorted", numbers({rank - 1})}, name + "_sample", {{"axis", kTime}});
-  const std::string bins = graph.node("Mul", {sample, number(kBins)}, name + "_in_bins");
-  const std::string bin =
-      graph.node("Floor", {graph.node("Min", {bins, number(kBins - 1)}, name + "_in_range")}, name + "_bin");
-  return graph.node("Mul", {bin, number(1 / kBins)}, name);
+// Lower edge of the bin of 1/256 that holds the rank-th smallest sample of each signal, [N,1,signals]: the
+// highest edge below which fewer samples lie, bit by bit. Not by TopK, of which converters drop the output
+// that is not used.
+std::string Exporter::percentile(const std::string& x, const std::string& name, std::int64_t rank) {
+  constexpr std::int64_t kF32 = 1;
+  std::string low = number(0);
+  for (float step = 0.5F; step >= 1.0F / 256; step /= 2) {
+    const std::string bit = name + "_" + format(1 / step);
+    const std::string edge = graph.node("Add", {low, number(step)}, bit + "_edge");
+    const std::string below =
+        graph.node("Cast", {graph.node("Less", {x, edge}, bit + "_below")}, bit + "_ones", {{"to", kF32}});
+    const std::string count =
+        graph.node("ReduceSum", {below, numbers({1})}, bit + "_count", {{"keepdims", std::int64_t{1}}});
+    const std::string fewer = graph.node("Less", {count, number(static_cast<float>(rank))}, bit + "_fewer");
+    low = graph.node("Where", {fewer, edge, low}, bit + "_low");
+  }
+  return low;
 }
 
-// level(), which counts samples in bins: the bin of the rank-th sample is the rank-th bin.
 std::string Exporter::levelled(const std::string& x, Dim timesteps) {
-  const std::string rest = percentile(x, "rest", timesteps / Dim{kRestShare} + 1, false);
-  const std::string top = percentile(x, "top", kTopRank, true);
+  const std::string rest = percentile(x, "rest", timesteps / Dim{kRestShare} + 1);
+  const std::string top = percentile(x, "top", timesteps + 1 - Dim{kTopRank});
   const std::string removed = graph.node("Mul", {rest, number(kRestRemoved)}, "rest_removed");
   const std::string most = graph.node("ReduceMax", {graph.node("Sub", {top, removed}, "swing")},
                                       "largest_swing", {{"axes", Ints{2}}, {"keepdims", std::int64_t{1}}});

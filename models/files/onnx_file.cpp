@@ -100,20 +100,14 @@ void WireMessage::bytes(unsigned field, std::string_view value) {
 
 std::string OnnxGraph::node(const std::string& op, std::vector<std::string> inputs, const std::string& y,
                             std::vector<OnnxAttribute> attributes) {
-  node_of_many(op, inputs, {y}, attributes);
-  return y;
-}
-
-void OnnxGraph::node_of_many(const std::string& op, const std::vector<std::string>& inputs,
-                             const std::vector<std::string>& outputs,
-                             const std::vector<OnnxAttribute>& attributes) {
   WireMessage out;
   for (const std::string& x : inputs) out.bytes(node::input, x);
-  for (const std::string& y : outputs) out.bytes(node::output, y);
-  out.bytes(node::name, outputs.back());
+  out.bytes(node::output, y);
+  out.bytes(node::name, y);
   out.bytes(node::op_type, op);
   for (const OnnxAttribute& a : attributes) out.message(node::attribute, message_of(a));
   nodes_.message(graph::node, out);
+  return y;
 }
 
 std::string OnnxGraph::constant(const std::string& name, OnnxType type, std::span<const std::int64_t> shape,
@@ -135,10 +129,6 @@ std::string OnnxGraph::constant(const std::string& name, std::span<const std::in
 std::string OnnxGraph::constant(const std::string& name, std::span<const std::int64_t> shape,
                                 std::span<const std::int64_t> values) {
   return constant(name, OnnxType::i64, shape, std::as_bytes(values));
-}
-
-std::string OnnxGraph::constant(const std::string& name, std::span<const double> values) {
-  return constant(name, OnnxType::f64, {}, std::as_bytes(values));
 }
 
 void OnnxGraph::input(const std::string& name, const std::vector<OnnxSize>& shape, const std::string& about) {

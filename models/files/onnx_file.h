@@ -27,7 +27,7 @@ class WireMessage {
   std::string text_;
 };
 
-enum class OnnxType { f32 = 1, i64 = 7, f64 = 11 };
+enum class OnnxType { f32 = 1, i64 = 7 };
 
 struct OnnxAttribute {
   std::string name;
@@ -43,15 +43,11 @@ class OnnxGraph {
   /// y = op(inputs); returns y. Names are the caller's and must differ.
   std::string node(const std::string& op, std::vector<std::string> inputs, const std::string& y,
                    std::vector<OnnxAttribute> attributes = {});
-  /// The same for an op with several results.
-  void node_of_many(const std::string& op, const std::vector<std::string>& inputs,
-                    const std::vector<std::string>& outputs, const std::vector<OnnxAttribute>& attributes);
   // Constants; return their name. An empty shape is a single number.
   std::string constant(const std::string& name, std::span<const std::int64_t> shape,
                        std::span<const float> values);
   std::string constant(const std::string& name, std::span<const std::int64_t> shape,
                        std::span<const std::int64_t> values);
-  std::string constant(const std::string& name, std::span<const double> values);
 
   void input(const std::string& name, const std::vector<OnnxSize>& shape, const std::string& about);
   void output(const std::string& name, const std::vector<OnnxSize>& shape, const std::string& about);
