@@ -1,0 +1,40 @@
+#!/bin/sh
+# What CI has no time for: the whole suite under AddressSanitizer and UndefinedBehaviorSanitizer, what has threads under
+# ThreadSanitizer, clang-tidy over everything, and which files the tests cover by less than 80 %. Some hours on two cores.
+# Each part can be run alone. The last line of each part is added, with date and commit, to scripts/nightly.log.
+#   scripts/nightly.sh [asan] [tsan] [tidy] [coverage]
+set -eu
+cd "$(dirname "$0")/.."
+[ $# -gt 0 ] || set -- asan tsan tidy coverage
+scripts/setup.sh libgtest-dev python3 clang libomp-dev gcovr
+note() { echo "$(date -u +%Y-%m-%d) $(git describe --always --dirty) $1: $2" | tee -a scripts/nightly.log; }
+suite() {  # NAME SANITIZERS PATTERN
+  cmake -S . -B "build-$1" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DSUPERTAC_QUICK_BUILD=ON -DSUPERTAC_MPI=OFF \
+    -DSUPERTAC_SANITIZE="$2" >/dev/null
+  cmake --build "build-$1"
+  ctest --test-dir "build-$1" -R "$3" -j 2 --output-on-failure | tee "build-$1/suite.log" || true
+  note "$1" "$(grep 'tests passed' "build-$1/suite.log")"
+}
+for part in "$@"; do
+  case "$part" in
+    asan) suite asan address,undefined . ;;
+    # libgomp is not instrumented: what OpenMP shares looks like a race.
+    tsan) OMP_NUM_THREADS=1 suite tsan thread 'Journal|Web|Recorder|Stream|Collect|Rig|Serial|Board' ;;
+    tidy)
+      cmake -S . -B build-tidy -G Ninja -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DSUPERTAC_MPI=OFF \
+        >/dev/null
+      cmake --build build-tidy --target supertac_version
+      if scripts/lint.sh build-tidy; then note tidy "no finding"; else note tidy "findings"; fi
+      ;;
+    coverage)
+      cmake -S . -B build-coverage -G Ninja -DCMAKE_BUILD_TYPE=Debug -DSUPERTAC_QUICK_BUILD=ON -DSUPERTAC_MPI=OFF \
+        -DCMAKE_CXX_FLAGS="--coverage -O1" -DCMAKE_EXE_LINKER_FLAGS=--coverage >/dev/null
+      cmake --build build-coverage
+      ctest --test-dir build-coverage -j 2 | tail -3 || true
+      gcovr -r . build-coverage --filter '(io|autograd|layers|data|models|hardware|apps)/' --csv build-coverage/files.csv \
+        --print-summary | tail -3
+      note coverage "below 80 %: $(awk -F, 'NR > 1 && $4 < 0.8 { printf "%s ", $1 }' build-coverage/files.csv)"
+      ;;
+    *) echo "nightly.sh: expected asan, tsan, tidy or coverage, found $part" >&2; exit 2 ;;
+  esac
+done
