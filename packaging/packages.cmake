@@ -5,7 +5,7 @@ foreach(program supertac ${jobs})
   install(FILES ${CMAKE_CURRENT_SOURCE_DIR}/packaging/completion.bash RENAME ${program}
     DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT programs)
 endforeach()
-install(FILES docs/glossary.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT programs)
+install(FILES docs/glossary.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT programs)
 
 find_program(SUPERTAC_HELP2MAN help2man)
 if(SUPERTAC_HELP2MAN)
@@ -32,6 +32,23 @@ if(SUPERTAC_DPKG AND Python3_FOUND)
   add_custom_target(supertac_sbom ALL DEPENDS ${share}/supertac.cdx.json)
   install(FILES ${share}/supertac.cdx.json DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT programs)
 endif()
+
+# What Debian's policy asks of every package.
+string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)
+foreach(package "supertac;programs" "supertac-dev;development")
+  list(GET package 0 name)
+  list(GET package 1 component)
+  set(doc ${share}/doc/${name})
+  file(CONFIGURE OUTPUT ${doc}/changelog CONTENT "supertac (@PROJECT_VERSION@) unstable; urgency=medium
+
+  * CHANGELOG.md of the sources says what is new.
+
+ -- The SuperTac authors <supertac@localhost>  @date@
+")
+  execute_process(COMMAND gzip -9nf ${doc}/changelog)
+  install(FILES ${doc}/changelog.gz DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/${name} COMPONENT ${component})
+  install(FILES LICENSE RENAME copyright DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/${name} COMPONENT ${component})
+endforeach()
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_CONTACT "The SuperTac authors <supertac@localhost>")

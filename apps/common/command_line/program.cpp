@@ -1,9 +1,12 @@
 #include "apps/common/command_line/program.h"
 
 #include <omp.h>
+#include <poll.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
@@ -154,9 +157,11 @@ int run_program(const Program& program, int argc, const char* const* argv) {
   open_standard_descriptors();
   const int code = catch_all(program, argc, argv);
   std::cout.flush();
-  if (std::cout.fail() && code == kExitOk)
-    return fail(program, "stdout: cannot write; has its reader gone, is the disk full?", kExitFailed);
-  return code;
+  if (!std::cout.fail() || code != kExitOk) return code;
+  // Whoever pipes into head wants no more, and no line about it; the code is that of other programs.
+  pollfd out{STDOUT_FILENO, POLLOUT, 0};
+  if (::poll(&out, 1, 0) == 1 && (out.revents & POLLERR) != 0) return 128 + SIGPIPE;
+  return fail(program, "stdout: cannot write; is the disk full?", kExitFailed);
 }
 
 std::string version() { return SUPERTAC_VERSION; }

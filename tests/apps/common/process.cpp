@@ -107,7 +107,7 @@ ProcessResult run_process(const std::string& program, const std::vector<std::str
 }
 
 void wait_for_file(const std::string& path) {
-  for (int i = 0; i < 20'000 && !std::filesystem::exists(path); ++i) usleep(500);
+  for (int i = 0; i < 240'000 && !std::filesystem::exists(path); ++i) usleep(500);
 }
 
 }  // namespace supertac

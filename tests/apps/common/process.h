@@ -51,7 +51,7 @@ class RunningProcess {
 ProcessResult run_process(const std::string& program, const std::vector<std::string>& arguments,
                           const ProcessOptions& options = {});
 
-/// Waits up to ten seconds for a file to appear.
+/// Waits up to two minutes, of a busy machine, for a file to appear.
 void wait_for_file(const std::string& path);
 
 }  // namespace supertac

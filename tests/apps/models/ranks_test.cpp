@@ -100,7 +100,7 @@ class Mpi : public OnSimulatedData {
     if (process > 0) harm(process);
     const auto begin = std::chrono::steady_clock::now();
     ProcessResult result = run.wait();
-    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(200));
     EXPECT_NE(result.code, 0);
     EXPECT_LE(lines(result).size(), 1u) << result.error;
     EXPECT_EQ(run_process("supertac-info", {state}).code, 0);
@@ -175,7 +175,7 @@ TEST_F(Mpi, ARankFrozenAtTheStartIsOneLine) {
   std::this_thread::sleep_for(std::chrono::milliseconds(500));
   kill(first, SIGSTOP);
   expect_one_line(run.wait(), "not all processes of mpirun came to start");
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(200));
 }
 
 // The other rank has ended well, and mpirun waits for this one without a deadline.
@@ -185,7 +185,7 @@ TEST_F(Mpi, ARankFrozenAtTheEndIsOneLine) {
   Words words = ranks(2, options("end.safetensors", {"--epochs", "1", "--deadline", "2"}));
   words.insert(words.begin() + 2, {"env", preload});
   expect_one_line(mpirun(words), "all is written, but a process of mpirun did not end within the deadline");
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(200));
   EXPECT_EQ(run_process("supertac-info", {path("end.safetensors")}).code, 0);
 }
 

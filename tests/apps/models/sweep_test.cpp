@@ -94,6 +94,17 @@ TEST_F(Sweep, WritesARowAModelAndDoesNotRepeatIt) {
   EXPECT_EQ(slower.code, 1);
   EXPECT_NE(slower.error.find(beginning + "rate \"the preset's\", now it is \"100\""), std::string::npos)
       << slower.error;
+
+  fs::rename(path("data"), path("before"));  // the same names, other recordings
+  ASSERT_EQ(run_process("supertac-simulate", {"--out", path("data"), "--plates", "3_Bumps", "--speeds", "10",
+                                              "--passes", "1", "--seed", "2"})
+                .code,
+            0);
+  const ProcessResult other = sweep("grid");
+  fs::remove_all(path("data"));
+  fs::rename(path("before"), path("data"));
+  EXPECT_EQ(other.code, 1);
+  EXPECT_NE(other.error.find(beginning + "data "), std::string::npos) << other.error;
 }
 
 TEST_F(Sweep, HistoryJudgesModelsOnTheSameFrames) {
@@ -225,7 +236,7 @@ TEST_F(Sweep, AFrozenProcessIsGivenUp) {
   EXPECT_EQ(other.code, 1);
   EXPECT_NE(other.error.find("have written nothing for 2 s; end those that are frozen"), std::string::npos)
       << other.error;
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(200));
 }
 
 // A sweep trains as supertac-train does: one model can be trained again without the others.

@@ -32,7 +32,7 @@ TEST(CollectPage, ShowsTheRunAndItsButtonEndsItAsCtrlCDoes) {
   const std::string number = std::to_string(port), host = "Host: 127.0.0.1:" + number + "\r\n";
   RunningProcess program("supertac-collect", run.arguments({"--web", number}));
   std::unique_ptr<HttpClient> client;
-  for (int i = 0; !client && i < 200; ++i, usleep(50'000)) {
+  for (int i = 0; !client && i < 2400; ++i, usleep(50'000)) {
     try {
       client = std::make_unique<HttpClient>(port);
     } catch (const std::runtime_error&) {  // not yet

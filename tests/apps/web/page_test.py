@@ -26,7 +26,7 @@ from browser import Browser, Png
 SLIDES = ["G92 X99.7 Y101.17 Z131.81", "G1 Z91.81 F300", "G1 Y209.17 F600", "G1 Y101.17 F600", "G1 Y155.17 F1200"]
 
 
-def wait_until(what, condition, seconds=60):
+def wait_until(what, condition, seconds=200):
     end = time.monotonic() + seconds
     while not (value := condition()):
         assert time.monotonic() < end, f"not within {seconds} s: {what}"
@@ -107,7 +107,7 @@ class Stream:
 
     def stop(self):
         self.process.terminate()
-        assert self.process.wait(30) == 143
+        assert self.process.wait(200) == 143
 
 
 def shown(browser):
