@@ -1,7 +1,6 @@
 // The command line of a program: its options are declared, parsed (cxxopts), and read with range checks.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -146,7 +145,7 @@ class Arguments {
   std::vector<std::pair<std::string, std::string>> one_of_;
   std::string only_with_;  // of the options being declared
   bool more_ = false, muted_ = false;
-  mutable std::atomic<bool> displaced_ = false;
+  mutable bool displaced_ = false;
   std::map<std::string, std::string> values_;  // as given
 };
 

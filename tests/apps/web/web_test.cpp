@@ -255,11 +255,14 @@ TEST_F(Web, AThousandSlowConnectionsLeaveRoom) {
     for (int i = 0; i < 1000; ++i) {
       slow.push_back(std::make_unique<HttpClient>(port_, 4096));
       slow.back()->send(words);
-      if (i % 100 == 99) EXPECT_TRUE(answers()) << i;
+      if (i % 100 == 99) {
+        EXPECT_TRUE(answers()) << i;
+      }
     }
     const std::string later = "{\"n\":" + std::to_string(count_ + 10) + ",";
-    if (words.ends_with("HT"))
+    if (words.ends_with("HT")) {
       EXPECT_NE(owner.receive(later).find(later), std::string::npos) << "silent ones made a page leave";
+    }
     EXPECT_FALSE(token().empty());
   }
 }
