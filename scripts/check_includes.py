@@ -23,7 +23,7 @@ MOST_FILES = 20
 KNOWN = {
     "hardware/boards -> hardware/printers", "hardware/printers -> hardware/boards",
     "circle: hardware/boards, hardware/printers",
-    "floor: apps/stream", "floor: data/windows",
+    "floor: apps/stream", "floor: autograd", "floor: data/windows",
     "floor: models/inference", "floor: models/training",
 }
 
