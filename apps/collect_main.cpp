@@ -1,11 +1,11 @@
 // supertac-collect: runs the finger over a plate and records every pass with a position for every frame.
 
+#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <iostream>
-#include <thread>
+#include <optional>
 
 #include "apps/collect/collect_view.h"
 #include "apps/collect/origin_mark.h"
@@ -53,6 +53,20 @@ std::string required_text(const Arguments& arguments, const std::string& name) {
   return arguments.text(name);
 }
 
+/// A line from the terminal. std::getline goes on waiting after a signal.
+std::string ask_operator() {
+  std::string answer;
+  for (char c = 0; c != '\n';) {
+    pollfd terminal{STDIN_FILENO, POLLIN, 0};
+    (void)poll(&terminal, 1, 50);
+    stop_if_interrupted();
+    if (terminal.revents == 0) continue;
+    if (read(STDIN_FILENO, &c, 1) != 1) return answer;
+    if (c != '\n' && answer.size() < 100) answer.push_back(c);
+  }
+  return answer;
+}
+
 void confirm(const Arguments& arguments, const RecorderSettings& settings) {
   const PalpationPlan& plan = settings.plan;
   arguments.note("plan: " + std::to_string(plan.passes) + " passes of " + format(plan.slide, 0) + " mm at " +
@@ -63,8 +77,8 @@ void confirm(const Arguments& arguments, const RecorderSettings& settings) {
   std::cerr << (settings.home ? "Is the bed free, so that the printer can home?"
                               : "Is the head at " + describe(settings.origin) + ", the plate below it?")
             << " [yes/no] ";
-  std::string answer;
-  if (!std::getline(std::cin, answer) || (answer != "yes" && answer != "y"))
+  const std::string answer = ask_operator();
+  if (answer != "yes" && answer != "y")
     throw UsageError("expected yes, found " + in_quotes(answer) + "; nothing was moved");
 }
 
@@ -98,16 +112,20 @@ std::string live_text(const Point3& at, const BoardCounters& board) {
 /// A run that may move the head: marked until the head is back, or until it turns out that nothing could be
 /// moved.
 RecorderReport record_marked(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
-                             const RecorderSettings& settings, const OriginMark& mark) {
+                             RecorderSettings settings, const OriginMark& mark) {
   const bool marked_before = mark.is_set();
   mark.set();
-  const FinishDespiteSignals finger_first;
+  std::optional<FinishDespiteSignals> finger_first;
+  settings.contact = [&finger_first](bool contact) {
+    contact ? static_cast<void>(finger_first.emplace()) : finger_first.reset();
+  };
   try {
     RecorderReport report = record_palpation(std::move(board), std::move(printer), settings);
     if (report.outcome.complete) mark.clear();
     return report;
   } catch (...) {
     if (!marked_before && !settings.home) mark.clear();
+    stop_if_interrupted();
     throw;
   }
 }
@@ -139,16 +157,12 @@ RecorderReport collect(const Arguments& arguments, RecorderSettings settings, co
   demand_origin(arguments, mark);
   const std::unique_ptr<CollectView> page = web_view(arguments, settings.plan);
   confirm(arguments, settings);
-  std::atomic<bool> stop{false};
-  settings.stop = &stop;
+  settings.stop = interrupted;
   Progress progress(arguments, "collecting", millimetres(settings.plan, settings.plan.passes, 0), "mm");
   settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters& counters) {
     progress.update(millimetres_at(settings.plan, leg, at), live_text(at, counters));
     if (page) page->update(leg, at, counters);
   };
-  const std::jthread watcher([&stop](const std::stop_token& ended) {
-    for (; !ended.stop_requested(); usleep(20'000)) stop = stop || interrupted();
-  });
   return record_marked(std::move(board), std::move(printer), settings, mark);
 }
 

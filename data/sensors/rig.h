@@ -42,9 +42,6 @@ constexpr double pass_x_mm(int pass) { return kStart.x - kPlate.x + kPassShiftMm
 
 // The printer.
 constexpr unsigned kPrinterBaud = 115'200;
-constexpr double kStartDelayS = 0.1265;  ///< from Marlin's ok to a move into an empty queue to its beginning
-/// Marlin's speed (mm/s) for an ordered one: 9.88 at F600, 4.97 at F300.
-constexpr double true_speed(double ordered) { return ordered * (1 - 0.0012 * std::min(ordered, 100.0)); }
 
 // The tactile board: a frame is 16 ticks, five patches a tick, of which the finger is patch 0.
 constexpr unsigned kBoardBaud = 7'372'800;

@@ -11,7 +11,11 @@ namespace {
 
 constexpr std::size_t kMostPoints = 2048;
 constexpr double kEarly = 0.3;  // periods of jitter that still count as on time
+constexpr std::size_t kLeastBursts = 8;
 constexpr int kTrackBlock = 32;
+constexpr double kLostAtOnce = 16;  // periods
+constexpr double kLiveBlockS = 0.25;
+constexpr std::uint32_t kAnything = 1'000'000'000;  // doubt of frames that waited before anybody looked
 
 struct Line {
   double slope, intercept;
@@ -62,9 +66,13 @@ void ClockEstimator::close_block() {
 
 ClockFit ClockEstimator::fit() const {
   ClockFit fit;
+  const auto nominal_offset = [this] {
+    double offset = earliest_.arrival - rig::kFramePeriodS * earliest_.index;
+    for (const Point& p : points_) offset = std::min(offset, p.arrival - rig::kFramePeriodS * p.index);
+    return offset;
+  };
   if (points_.size() < 8) {
-    const Point first = points_.empty() ? earliest_ : points_.front();
-    fit.offset_s = first.arrival - fit.period_s * first.index;
+    fit.offset_s = nominal_offset();
     return fit;
   }
   std::vector<bool> used(points_.size(), true);
@@ -93,86 +101,138 @@ ClockFit ClockEstimator::fit() const {
   fit.plausible = std::abs(line.slope / rig::kFramePeriodS - 1) <= 0.005;
   if (!fit.plausible) {
     fit.period_s = rig::kFramePeriodS;
-    fit.offset_s = points_.front().arrival - fit.period_s * points_.front().index;
-    for (const Point& p : points_) fit.offset_s = std::min(fit.offset_s, p.arrival - fit.period_s * p.index);
+    fit.offset_s = nominal_offset();
   }
   return fit;
 }
 
-GapCounter::GapCounter(double period_s, std::size_t lookahead) : period_(period_s), lookahead_(lookahead) {}
+std::uint32_t damaged_frames(std::uint64_t discarded) {
+  return static_cast<std::uint32_t>((discarded + rig::kFrameBytes - 1 - 8) / rig::kFrameBytes);
+}
 
-void GapCounter::push(double arrival_s, std::vector<std::uint32_t>& missing_before) {
-  const double late = arrival_s - period_ * static_cast<double>(pushed_);
-  if (pushed_ == 0) envelope_ = late;
-  waiting_.push_back(late);
+bool belongs_to_burst(double frames, double seconds, double period_s) {
+  return frames - seconds / period_s > 0.5 + 0.02 * frames;
+}
+
+FrameNumbering::FrameNumbering(double period_s, std::size_t lookahead)
+    : period_(period_s), lookahead_(lookahead) {}
+
+void FrameNumbering::push(const FrameArrival& arrival, std::vector<FramePlace>& places) {
+  if (!read_.steps.empty() && arrival.time_s != read_.time_s) close_read();
+  const bool first = counted_ == 0;
+  const std::uint32_t damaged = first ? 0 : arrival.damaged;
+  counted_ += 1 + damaged;
+  damaged_ += damaged;
+  read_.time_s = arrival.time_s;
+  read_.last = counted_;
+  read_.more_waited = arrival.more_waited;
+  read_.steps.push_back(first ? 0 : 1 + damaged);
+  while (bursts_.size() > kLeastBursts && waiting_ - bursts_.front().steps.size() >= lookahead_)
+    decide(places);
+}
+
+void FrameNumbering::close_read() {
+  Burst read;
+  std::swap(read, read_);
+  const bool joins =
+      !bursts_.empty() &&
+      (bursts_.back().more_waited || belongs_to_burst(static_cast<double>(read.last - bursts_.back().last),
+                                                      read.time_s - bursts_.back().time_s, period_));
+  waiting_ += read.steps.size();
+  if (joins) {
+    Burst& burst = bursts_.back();
+    if (minimum_.back().first + 1 == closed_) minimum_.pop_back();
+    burst.steps.insert(burst.steps.end(), read.steps.begin(), read.steps.end());
+    burst.time_s = read.time_s, burst.last = read.last, burst.more_waited = read.more_waited;
+  } else {
+    bursts_.push_back(std::move(read));
+    ++closed_;
+  }
+  const double late = lateness(bursts_.back());
   while (!minimum_.empty() && minimum_.back().second >= late) minimum_.pop_back();
-  minimum_.emplace_back(pushed_++, late);
-  if (waiting_.size() >= lookahead_) decide(missing_before);
+  minimum_.emplace_back(closed_ - 1, late);
 }
 
-void GapCounter::finish(std::vector<std::uint32_t>& missing_before) {
-  while (!waiting_.empty()) decide(missing_before);
+void FrameNumbering::finish(std::vector<FramePlace>& places) {
+  if (!read_.steps.empty()) close_read();
+  while (!bursts_.empty()) decide(places);
 }
 
-void GapCounter::decide(std::vector<std::uint32_t>& missing_before) {
-  // Before the first decision the envelope is the earliest of everything seen: the first frame may be a late
-  // one.
+void FrameNumbering::decide(std::vector<FramePlace>& places) {
+  const Burst burst = std::move(bursts_.front());
+  bursts_.pop_front();
+  waiting_ -= burst.steps.size();
+  // Before the first decision the envelope is the earliest of everything seen: the first may be a late one.
   if (decided_ == 0) envelope_ = minimum_.front().second;
   const double periods = std::floor((minimum_.front().second - envelope_) / period_ + kEarly);
   const std::uint64_t total = std::max(missing_, static_cast<std::uint64_t>(std::max(periods, 0.0)));
-  missing_before.push_back(static_cast<std::uint32_t>(total - missing_));
-  missing_ = total;
-  track(waiting_.front() - envelope_ - period_ * static_cast<double>(missing_));
-  waiting_.pop_front();
+  const std::uint64_t lost = total - missing_;
+  const bool alone = burst.steps.size() == 1;
+  const bool unknown = decided_ == 0 && !alone;
+  // That a last burst is late proves no loss: what would have made it good did not come.
+  if (alone || !bursts_.empty()) missing_ = total;
+  if (alone) index_ += lost;
+  for (const std::uint32_t step : burst.steps) {
+    index_ += step;
+    const auto doubt = static_cast<std::uint32_t>(std::min<std::uint64_t>(lost, kAnything));
+    places.push_back({index_, unknown ? kAnything : std::max(doubt, std::exchange(torn_, 0U))});
+  }
+  if (!alone) {
+    index_ += lost;
+    // The frame behind a full port may be half an old one.
+    torn_ = static_cast<std::uint32_t>(std::min<std::uint64_t>(lost, kAnything));
+  }
+  track(lateness(burst) - envelope_ - period_ * static_cast<double>(missing_));
   if (minimum_.front().first == decided_) minimum_.pop_front();
   ++decided_;
 }
 
-// The board's crystal is not exactly the assumed one: the envelope follows the earliest frame of every block.
-void GapCounter::track(double lateness) {
-  block_minimum_ = in_block_ == 0 ? lateness : std::min(block_minimum_, lateness);
+// The board's crystal is not exactly the assumed one: the envelope follows the earliest of every block.
+void FrameNumbering::track(double late) {
+  block_minimum_ = in_block_ == 0 ? late : std::min(block_minimum_, late);
   if (++in_block_ < kTrackBlock) return;
   in_block_ = 0;
   if (std::abs(block_minimum_) < 0.5 * period_) envelope_ += 0.5 * block_minimum_;
 }
 
-namespace {
-
-// A host that did not read finds the oldest frames in the tty, all at once; what is missing vanished behind
-// them.
-void place_behind_bursts(std::span<const double> arrivals, std::vector<std::uint32_t>& missing_before) {
-  std::vector<std::uint32_t> placed = missing_before;
-  for (std::size_t i = 1; i < arrivals.size(); ++i) {
-    if (missing_before[i] == 0) continue;
-    std::size_t end = i + 1;
-    while (end < arrivals.size() && arrivals[end] - arrivals[end - 1] < 0.5 * rig::kFramePeriodS) ++end;
-    if (end < i + 3 || end == arrivals.size()) continue;
-    placed[i] -= missing_before[i];
-    placed[end] += missing_before[i];
+void LiveDates::date(double time_s, bool more_waited, std::span<const std::uint32_t> steps,
+                     std::vector<double>& dates) {
+  dates.clear();
+  if (steps.empty()) return;
+  const double period = rig::kFramePeriodS;
+  double count = 0;
+  for (const std::uint32_t step : steps) count += step;
+  if (first_) last_s_ = time_s - count * period, block_began_s_ = time_s, least_late_s_ = late_s_ = 0;
+  const double late = time_s - last_s_ - count * period;
+  const bool fresh = !first_ && !more_waited_ && !belongs_to_burst(count, time_s - read_s_, period);
+  if (fresh && std::min(late, late_s_) > kLostAtOnce * period) {
+    last_s_ += std::min(late, late_s_);
+  } else if (time_s - block_began_s_ > kLiveBlockS) {
+    last_s_ += std::max(0.0, std::min(late, least_late_s_));
+    least_late_s_ = late, block_began_s_ = time_s;
   }
-  missing_before = std::move(placed);
+  const double step_s = std::min(period, (time_s - last_s_) / count);
+  for (const std::uint32_t step : steps) dates.push_back(last_s_ += step * step_s);
+  late_s_ = time_s - last_s_;
+  least_late_s_ = std::min(least_late_s_, late_s_);
+  read_s_ = time_s;
+  first_ = false, more_waited_ = more_waited;
 }
 
-}  // namespace
-
-FrameTimeline timeline_of(std::span<const double> arrivals) {
+FrameTimeline timeline_of(std::span<const FrameArrival> arrivals) {
   FrameTimeline timeline;
   // Once with the nominal period and a short view, then with the period found and a long one.
   for (const std::size_t lookahead : {std::size_t{64}, std::size_t{1024}}) {
-    GapCounter gaps(timeline.clock.period_s, lookahead);
-    std::vector<std::uint32_t> missing_before;
-    for (const double arrival : arrivals) gaps.push(arrival, missing_before);
-    gaps.finish(missing_before);
-    place_behind_bursts(arrivals, missing_before);
+    FrameNumbering numbering(timeline.clock.period_s, lookahead);
+    timeline.places.clear();
+    for (const FrameArrival& arrival : arrivals) numbering.push(arrival, timeline.places);
+    numbering.finish(timeline.places);
     ClockEstimator estimator;
-    timeline.index.clear();
-    std::uint64_t index = 0;
     for (std::size_t i = 0; i < arrivals.size(); ++i) {
-      index += missing_before[i] + (i == 0 ? 0 : 1);
-      timeline.index.push_back(index);
-      estimator.add(index, arrivals[i]);
+      const bool last = i + 1 == arrivals.size() || arrivals[i + 1].time_s != arrivals[i].time_s;
+      if (last && timeline.places[i].doubt == 0) estimator.add(timeline.places[i].index, arrivals[i].time_s);
     }
-    timeline.missing = gaps.missing();
+    timeline.missing = numbering.missing();
     timeline.clock = estimator.fit();
   }
   return timeline;

@@ -1,5 +1,8 @@
 // The board numbers nothing and stamps nothing. What its clock said is recovered from arrival times: a frame
-// can arrive late but never early, so the board's ticks are the lower envelope of the arrivals.
+// can arrive late but never early, so the board's ticks are the lower envelope of the arrivals. Adapters hand
+// frames on in chunks, and a host that stood still finds in one burst what its port could hold; the frames
+// lost then, and those around them, are known to be dated within bounds only, which are kept with them. Live
+// and collected frames are counted by the same rules.
 #pragma once
 
 #include <cstdint>
@@ -22,13 +25,14 @@ struct ClockFit {
   double at(double index) const { return offset_s + period_s * index; }
 };
 
-/// Robust line under the arrivals: the earliest frame of every block, then least squares that gives up points
-/// more than three median deviations away, three times. Memory is bounded: blocks are merged as they grow in
-/// number.
+/// Robust line under the arrivals: the earliest of every block of frames, then least squares that gives up
+/// points more than three median deviations away, three times. Memory is bounded: blocks are merged as they
+/// grow in number.
 class ClockEstimator {
  public:
+  /// Only of a read's last frame: those before it have waited.
   void add(std::uint64_t index, double arrival_s);
-  /// Nominal period through the first frame until there are 8 blocks of 64 frames.
+  /// Nominal period under all frames until there are 8 blocks of 16.
   ClockFit fit() const;
 
  private:
@@ -38,42 +42,96 @@ class ClockEstimator {
   void close_block();
   std::vector<Point> points_;
   Point earliest_{};
-  std::uint64_t in_block_ = 0, block_ = 64;
+  std::uint64_t in_block_ = 0, block_ = 16;
 };
 
-/// Counts missing frames from arrival times. A lost frame moves every later arrival up by a period for good;
-/// a delay is made good by the burst that follows. So the frames missing before frame i are the whole periods
-/// by which ALL of the next `lookahead` frames are late.
-class GapCounter {
+/// A frame as it came.
+struct FrameArrival {
+  double time_s = 0;          ///< when the read that brought it returned; one time for all of a read
+  std::uint32_t damaged = 0;  ///< frames between the one before and this one that came, but not whole
+  bool more_waited = false;   ///< the read took as much as a terminal holds: what it left is as old
+};
+
+/// How many frames the `discarded` bytes between two whole frames were. A byte or two more or less were put
+/// in or left out by a cable.
+std::uint32_t damaged_frames(std::uint64_t discarded);
+/// A read of more bytes may have left some behind: a terminal holds 4,095.
+constexpr std::size_t kTerminalFull = 4096 - rig::kFrameBytes;
+
+/// Whether `frames` that came `seconds` after a read had emptied the port are more than the board makes in
+/// that time: then they had waited, too, and belong to the burst before.
+bool belongs_to_burst(double frames, double seconds, double period_s);
+
+/// A frame's place among all that the board made.
+struct FramePlace {
+  std::uint64_t index = 0;
+  std::uint32_t doubt = 0;  ///< it may be wrong by so many frames: some were lost about here
+};
+
+/// Numbers the frames, the missing ones counted. A lost frame moves every later arrival up by a period for
+/// good; a delay is made good by the burst that follows. So the frames missing at a burst are the whole
+/// periods by which ALL of the bursts that follow are late (at least 8 bursts and `lookahead` frames). They
+/// vanished before a burst of a single frame, and behind any other, when the port was full.
+class FrameNumbering {
  public:
-  explicit GapCounter(double period_s = rig::kFramePeriodS, std::size_t lookahead = 64);
-  /// Appends to `missing_before` one number for every frame that has become certain.
-  void push(double arrival_s, std::vector<std::uint32_t>& missing_before);
+  explicit FrameNumbering(double period_s = rig::kFramePeriodS, std::size_t lookahead = 64);
+  /// Appends to `places` those of all frames that have become certain.
+  void push(const FrameArrival& arrival, std::vector<FramePlace>& places);
   /// All frames still uncertain, at the end of the stream.
-  void finish(std::vector<std::uint32_t>& missing_before);
-  std::uint64_t missing() const { return missing_; }
+  void finish(std::vector<FramePlace>& places);
+  /// Lost or damaged between the first frame and the last.
+  std::uint64_t missing() const { return missing_ + damaged_; }
 
  private:
-  void decide(std::vector<std::uint32_t>& missing_before);
+  struct Burst {
+    double time_s = 0;       // of its last read
+    std::uint64_t last = 0;  // its last frame, counted with the damaged ones
+    bool more_waited = false;
+    std::vector<std::uint32_t> steps;  // from frame to frame
+  };
+  double lateness(const Burst& burst) const {
+    return burst.time_s - period_ * static_cast<double>(burst.last);
+  }
+  void close_read();
+  void decide(std::vector<FramePlace>& places);
   void track(double lateness);
 
   double period_;
   std::size_t lookahead_;
-  std::deque<double> waiting_;                            // arrival - period * number, not yet decided
-  std::deque<std::pair<std::uint64_t, double>> minimum_;  // increasing: the smallest of waiting_ is in front
-  std::uint64_t pushed_ = 0, decided_ = 0, missing_ = 0;
-  double envelope_ = 0;
-  double block_minimum_ = 0;
+  Burst read_;                                            // the read whose frames come now
+  std::deque<Burst> bursts_;                              // not yet decided
+  std::deque<std::pair<std::uint64_t, double>> minimum_;  // increasing lateness: the smallest is in front
+  std::uint64_t closed_ = 0, decided_ = 0;                // bursts
+  std::size_t waiting_ = 0;                               // frames in bursts_
+  std::uint64_t counted_ = 0, missing_ = 0, damaged_ = 0, index_ = 0;
+  std::uint32_t torn_ = 0;  // doubt of the first frame behind a loss
+  double envelope_ = 0, block_minimum_ = 0;
   int in_block_ = 0;
 };
 
-/// Index (from 0, gaps counted) of every frame, and the clock behind them, from all arrivals of a stream.
+/// Dates frames as they come, by the same rules without a look ahead: a period apart, at the latest when they
+/// are read. Dates jump when frames were lost: at once when two reads of a port that had been empty are both
+/// 16 periods late, else when all of a quarter of a second were late.
+class LiveDates {
+ public:
+  /// When the board finished a read's frames (`steps` from frame to frame, damaged ones counted). Increasing.
+  void date(double time_s, bool more_waited, std::span<const std::uint32_t> steps,
+            std::vector<double>& dates);
+
+ private:
+  double last_s_ = 0, read_s_ = 0;  // the newest frame; the newest read
+  double late_s_ = 0;               // of the read before
+  double least_late_s_ = 0, block_began_s_ = 0;
+  bool first_ = true, more_waited_ = false;
+};
+
+/// Place of every frame of a stream, and the clock behind them.
 struct FrameTimeline {
-  std::vector<std::uint64_t> index;
+  std::vector<FramePlace> places;
   ClockFit clock;
   std::uint64_t missing = 0;
 };
-FrameTimeline timeline_of(std::span<const double> arrivals);
+FrameTimeline timeline_of(std::span<const FrameArrival> arrivals);
 
 /// Flags physically implausible jumps: a taxel that moves more than `limit` ADC steps between two frames. A
 /// flipped bit in a sample passes every check of the format; this is all that can be said about it.

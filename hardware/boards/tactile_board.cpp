@@ -5,20 +5,13 @@
 #include <chrono>
 
 #include "hardware/ports/errors.h"
-#include "hardware/printers/marlin_line.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {
 
 constexpr double kReadSlice = 0.05;
-constexpr std::size_t kReadBytes =
-    2048;  // half of what a terminal holds: a read that fills it left more behind
-
-bool is_text(std::byte byte) {
-  const int c = std::to_integer<int>(byte);
-  return c == '\n' || c == '\r' || (c >= ' ' && c < 127);
-}
+constexpr std::size_t kReadBytes = 8192;  // twice what a terminal holds
 
 }  // namespace
 
@@ -55,9 +48,9 @@ void TactileBoard::run() {
     std::lock_guard lock(mutex_);
     error_ = std::current_exception();
   }
-  gaps_.finish(missing_before_);
+  numbering_.finish(places_);
   std::lock_guard lock(mutex_);
-  date_decided();
+  keep_decided();
   ended_ = true;
   arrived_.notify_all();
 }
@@ -73,7 +66,7 @@ void TactileBoard::read_once(double until) {
   decoder_.push(bytes, [&](const BoardFrame& frame, std::uint64_t discarded) {
     batch_.push_back({frame, discarded});
   });
-  take_batch(got.time_s, got.count == buffer.size());
+  take_batch(got.time_s, got.count >= kTerminalFull);
   check_silence(got.time_s);
   std::lock_guard lock(mutex_);
   counters_.decoder = decoder_.counters();
@@ -96,29 +89,25 @@ void TactileBoard::check_silence(double time) {
       "plug the board out and in again");
 }
 
-void TactileBoard::take_batch(double time, bool more_waits) {
-  const auto count = static_cast<double>(batch_.size());
-  const double step = first_ ? rig::kFramePeriodS : std::min(rig::kFramePeriodS, (time - last_time_) / count);
-  // Frames that have waited follow the last one; what is read as it comes has just been finished.
-  const double begin = more_waits && !first_ ? last_time_ : time - count * step;
-  double number = 0;
-  for (const Decoded& decoded : batch_) {
-    number += 1;
-    take({.frame = decoded.frame, .arrival_s = time, .time_s = begin + number * step}, decoded.discarded);
+void TactileBoard::take_batch(double time, bool more_waited) {
+  steps_.clear();
+  for (const Decoded& decoded : batch_) steps_.push_back(1 + damaged_frames(decoded.discarded));
+  live_.date(time, more_waited, steps_, dates_);
+  for (std::size_t i = 0; i < batch_.size(); ++i) {
+    numbering_.push({time, steps_[i] - 1, more_waited}, places_);
+    undecided_.push_back({time, i + 1 == batch_.size()});
+    StampedFrame frame{.frame = batch_[i].frame, .arrival_s = time, .time_s = dates_[i]};
+    frame.suspect = batch_[i].discarded > 0 || (!first_ && time - last_arrival_ > 1.5 * rig::kFramePeriodS);
+    frame.jump = jumps_.jump(frame.frame);
+    first_ = false;
+    last_arrival_ = time;
+    take(frame);
   }
 }
 
-void TactileBoard::take(StampedFrame frame, std::uint64_t discarded) {
-  frame.suspect = discarded > 0 || (!first_ && frame.arrival_s - last_arrival_ > 1.5 * rig::kFramePeriodS);
-  frame.jump = jumps_.jump(frame.frame);
-  first_ = false;
-  last_arrival_ = frame.arrival_s;
-  last_time_ = frame.time_s;
-  gaps_.push(frame.arrival_s, missing_before_);
-  undecided_.push_back(frame.arrival_s);
-
+void TactileBoard::take(StampedFrame frame) {
   std::unique_lock lock(mutex_);
-  date_decided();
+  keep_decided();
   counters_.suspect += frame.suspect ? 1 : 0;
   counters_.jumps += frame.jump ? 1 : 0;
   if (settings_.wait_for_consumer) {
@@ -131,15 +120,15 @@ void TactileBoard::take(StampedFrame frame, std::uint64_t discarded) {
   arrived_.notify_one();
 }
 
-// With mutex_ held: the frames whose gaps are now certain go to the clock.
-void TactileBoard::date_decided() {
-  for (const std::uint32_t missing : missing_before_) {
-    clock_index_ += missing;
-    clock_.add(clock_index_++, undecided_.front());
+// With mutex_ held: the frames whose place is now certain go to the clock.
+void TactileBoard::keep_decided() {
+  for (const FramePlace& place : places_) {
+    const Undecided frame = undecided_.front();
     undecided_.pop_front();
+    if (frame.last && place.doubt == 0) clock_.add(place.index, frame.time_s);
   }
-  missing_before_.clear();
-  counters_.missing = gaps_.missing();
+  places_.clear();
+  counters_.missing = numbering_.missing();
 }
 
 std::optional<StampedFrame> TactileBoard::next(double wait_s) {

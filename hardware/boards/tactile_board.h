@@ -1,5 +1,5 @@
 // The live board: a thread reads and decodes, a bounded queue hands frames over. The reader never waits for
-// its consumer - the terminal holds 24.8 ms - so a slow consumer loses the oldest frames, and a counter says
+// its consumer, so a slow consumer loses the oldest frames, and a counter says
 // how many.
 #pragma once
 
@@ -21,10 +21,7 @@ namespace supertac {
 struct StampedFrame {
   BoardFrame frame;
   double arrival_s = 0;
-  /// When the board finished the frame, as far as that is known at once: the last frame of a read has just
-  /// been finished and the others a period apart before it, unless the read left more behind: then they
-  /// follow the frame before. Increasing.
-  double time_s = 0;
+  double time_s = 0;     ///< when the board finished the frame, as far as that is known at once (LiveDates)
   bool suspect = false;  ///< first after a pause of 1.5 periods or after discarded bytes: may be torn
   bool jump = false;     ///< implausible change of a taxel
 };
@@ -38,8 +35,8 @@ struct BoardSettings {
 struct BoardCounters {
   FrameDecoder::Counters decoder;
   std::uint64_t dropped = 0;  ///< frames the consumer was too slow for
-  /// Frames that never arrived, counted from the gaps in time; the last 64 gaps are undecided until the
-  /// reader ends.
+  /// Frames that did not arrive whole, counted from the times; the newest are undecided until the reader
+  /// ends.
   std::uint64_t missing = 0;
   std::uint64_t suspect = 0;
   std::uint64_t jumps = 0;
@@ -66,9 +63,9 @@ class TactileBoard {
  private:
   void run();
   void read_once(double until);
-  void take_batch(double time, bool more_waits);
-  void take(StampedFrame frame, std::uint64_t discarded);
-  void date_decided();
+  void take_batch(double time, bool more_waited);
+  void take(StampedFrame frame);
+  void keep_decided();
   void check_silence(double time);
 
   std::unique_ptr<Port> port_;
@@ -79,21 +76,27 @@ class TactileBoard {
   std::exception_ptr error_;
   BoardCounters counters_;
   ClockEstimator clock_;
-  std::uint64_t clock_index_ = 0;
   bool stop_ = false, ended_ = false;
 
   // of the reader's thread alone
   FrameDecoder decoder_;
-  GapCounter gaps_;
+  FrameNumbering numbering_;
+  LiveDates live_;
   JumpDetector jumps_;
   struct Decoded {
     BoardFrame frame;
     std::uint64_t discarded;
   };
   std::vector<Decoded> batch_;  // of one read
-  std::vector<std::uint32_t> missing_before_;
-  std::deque<double> undecided_;
-  double last_arrival_ = 0, last_time_ = 0;
+  std::vector<std::uint32_t> steps_;
+  std::vector<double> dates_;
+  struct Undecided {
+    double time_s;
+    bool last;  // of its read
+  };
+  std::deque<Undecided> undecided_;
+  std::vector<FramePlace> places_;
+  double last_arrival_ = 0;
   bool first_ = true;
   double text_bytes_ = 0;
   std::thread thread_;

@@ -66,7 +66,8 @@ std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
     const std::string text = record.text();
     if (text == kRunComplete) complete = true;
     if (text.starts_with("leg ")) {
-      const auto v = numbers_of<12>(text);
+      auto v = numbers_of<13>(text);
+      if (!v) v = numbers_of<13>(text + " 0");  // before they held when the move was sent
       if (!v) continue;
       const auto& n = *v;
       if (n[1] < 1 || n[2] < 0 || n[2] > static_cast<int>(Phase::reposition)) continue;
@@ -76,7 +77,8 @@ std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
                     {n[6], n[7], n[8]},
                     n[9],
                     n[10],
-                    n[11]};
+                    n[11],
+                    n[12] > 0 ? n[12] : n[10]};
       if (n[0] == 0) {
         legs.push_back({leg, false, {}});
       } else {
@@ -93,22 +95,24 @@ std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
 
 struct Frames {
   std::vector<BoardFrame> frames;
-  std::vector<double> arrivals;
+  std::vector<FrameArrival> arrivals;
   std::vector<std::uint8_t> suspect;
 };
 
 Frames frames_in(const Journal& journal, FrameDecoder::Counters& counters) {
+  constexpr std::size_t kEarlierRead = 2048;  // journals before version 0.3 were read in such pieces
   Frames all;
   FrameDecoder decoder;
   JumpDetector jumps;
   for (const JournalRecord& record : journal.of(Stream::board)) {
     if (record.kind != RecordKind::received) continue;
+    const bool more_waited = record.bytes.size() >= kTerminalFull || record.bytes.size() == kEarlierRead;
     decoder.push(record.bytes, [&](const BoardFrame& frame, std::uint64_t discarded) {
       const bool late =
-          !all.arrivals.empty() && record.time_s - all.arrivals.back() > 1.5 * rig::kFramePeriodS;
+          !all.arrivals.empty() && record.time_s - all.arrivals.back().time_s > 1.5 * rig::kFramePeriodS;
       all.suspect.push_back(discarded > 0 || late || jumps.jump(frame) ? 1 : 0);
       all.frames.push_back(frame);
-      all.arrivals.push_back(record.time_s);
+      all.arrivals.push_back({record.time_s, damaged_frames(discarded), more_waited});
     });
   }
   counters = decoder.counters();
@@ -131,17 +135,52 @@ double median_round_trip(const std::vector<PositionSample>& samples) {
   return median(trips);
 }
 
-// By how much (s) the clock misses the frames first to last: the earliest of every 128 arrives on time.
+// The samples that can all be true, as many as possible. Nothing damaged is believed for its neighbours'
+// sake: what nothing else can be reached from stands alone.
+std::vector<PositionSample> chain_of(const Leg& leg, const std::vector<PositionSample>& samples) {
+  constexpr std::size_t kLookBack = 64;
+  const double slowest_answer = samples.empty() ? 0 : 3 * median_round_trip(samples) + 0.001;
+  std::vector<PositionSample> good = {{leg.sent_s, 0, leg.from}};
+  for (const PositionSample& sample : samples)
+    if (sample.round_trip_s <= slowest_answer && off_leg(leg, sample.position) < 0.05) good.push_back(sample);
+  if (leg.ended_s > 0) good.push_back({leg.ended_s, 0, leg.to});
+  const auto follows = [&](std::size_t before, std::size_t after) {
+    return reachable(leg, good[before], good[after]) &&
+           distance(leg.from, good[before].position) < distance(leg.from, good[after].position) + 0.015;
+  };
+  std::vector<std::size_t> length(good.size(), 0), from(good.size(), 0);  // 0: of no chain from the start
+  length[0] = 1;
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < good.size(); ++i) {
+    const auto extend = [&](std::size_t j) {
+      if (length[j] > 0 && length[j] + 1 > length[i] && follows(j, i)) length[i] = length[j] + 1, from[i] = j;
+    };
+    for (std::size_t j = i > kLookBack ? i - kLookBack : 0; j < i; ++j) extend(j);
+    extend(0);
+    if (length[i] >= length[best]) best = i;
+  }
+  std::vector<PositionSample> chain;
+  for (std::size_t i = best; i > 0; i = from[i]) chain.push_back(good[i]);
+  std::reverse(chain.begin(), chain.end());
+  if (!chain.empty() && leg.ended_s > 0 && chain.back().time_s == leg.ended_s) chain.pop_back();
+  return chain;
+}
+
+// By how much (s) the clock misses the frames first to last: of 128 frames and eight reads one at least was
+// on time.
 double clock_error(const Frames& all, const FrameTimeline& timeline, std::size_t first, std::size_t last) {
-  constexpr std::size_t kWindow = 128;
-  double worst = 0;
-  for (std::size_t begin = first; begin + kWindow <= last; begin += kWindow) {
-    double earliest = kLargest;
-    for (std::size_t i = begin; i < begin + kWindow; ++i) {
-      earliest =
-          std::min(earliest, all.arrivals[i] - timeline.clock.at(static_cast<double>(timeline.index[i])));
-    }
+  constexpr int kFrames = 128, kReads = 8;
+  double worst = 0, earliest = kLargest;
+  int frames = 0, reads = 0;
+  for (std::size_t i = first; i < last; ++i) {
+    if (timeline.places[i].doubt > 0) continue;
+    const double time = all.arrivals[i].time_s;
+    earliest = std::min(earliest, time - timeline.clock.at(static_cast<double>(timeline.places[i].index)));
+    reads += i + 1 == all.arrivals.size() || all.arrivals[i + 1].time_s != time ? 1 : 0;
+    if (++frames < kFrames || reads < kReads) continue;
     worst = std::max(worst, std::abs(earliest));
+    frames = reads = 0;
+    earliest = kLargest;
   }
   return worst;
 }
@@ -163,15 +202,19 @@ CollectedPass pass_of(const Frames& all, const FrameTimeline& timeline, const Po
   std::uint64_t first = 0, last = 0;
   std::size_t begin = 0, end = 0;
   for (std::size_t i = 0; i < all.frames.size(); ++i) {
-    const double time =
-        timeline.clock.at(static_cast<double>(timeline.index[i])) - 0.5 * timeline.clock.period_s;
+    const FramePlace& place = timeline.places[i];
+    const double time = timeline.clock.at(static_cast<double>(place.index)) - 0.5 * timeline.clock.period_s;
     if (time < track.begin() || time > track.end()) continue;
-    if (pass.time_s.empty()) {
-      first = timeline.index[i];
+    if (end == 0) {
+      first = place.index;
       begin = i;
     }
     end = i + 1;
-    last = timeline.index[i];
+    last = place.index;
+    if (place.doubt * timeline.clock.period_s * speed > kTrustedMm) {
+      ++pass.left_out;
+      continue;
+    }
     pass.time_s.push_back(time - track.begin());
     const auto volts = taxel_volts(all.frames[i]);
     pass.volts.insert(pass.volts.end(), volts.begin(), volts.end());
@@ -181,7 +224,7 @@ CollectedPass pass_of(const Frames& all, const FrameTimeline& timeline, const Po
   }
   pass.speed = speed;
   pass.doubt = doubt_of(timeline.clock, clock_error(all, timeline, begin, end), speed, track.doubt_mm());
-  if (!pass.time_s.empty()) pass.missing = last - first + 1 - pass.time_s.size();
+  if (end > 0) pass.missing = last - first + 1 - (end - begin);
   return pass;
 }
 
@@ -190,7 +233,8 @@ CollectedPass pass_of(const Frames& all, const FrameTimeline& timeline, const Po
 std::string event_text(const Leg& leg, bool ended) {
   return std::string("leg ") + (ended ? "1 " : "0 ") + std::to_string(leg.pass) + " " +
          std::to_string(static_cast<int>(leg.phase)) + " " + point_text(leg.from) + " " + point_text(leg.to) +
-         " " + format(leg.speed, 4) + " " + format(leg.accepted_s, 6) + " " + format(leg.ended_s, 6);
+         " " + format(leg.speed, 4) + " " + format(leg.accepted_s, 6) + " " + format(leg.ended_s, 6) + " " +
+         format(leg.sent_s, 6);
 }
 
 std::string event_text(const PositionSample& sample) {
@@ -210,39 +254,60 @@ void PositionTrack::distrust(const Leg& leg) {
   if (way < farthest) doubt_mm_ = std::max(doubt_mm_, way * (1 - way / farthest));
 }
 
-void PositionTrack::model(const Leg& leg, double acceleration) {
-  const double length = distance(leg.from, leg.to);
-  if (leg.speed > 0) {
-    // Longer than ordered: nobody knows where on the way the head was slow.
-    const double ordered =
-        rig::kStartDelayS + trapezoid_duration(length, rig::true_speed(leg.speed), acceleration);
-    const double off_s = std::abs(leg.ended_s - leg.accepted_s - ordered);
-    doubt_mm_ = std::max(doubt_mm_, std::min(length, off_s * leg.speed));
+MoveTiming timing_of(std::span<const Leg> ended) {
+  constexpr std::size_t kEnough = 4, kSlides = 3;
+  constexpr double kMostSlowness = 0.02;
+  const auto took = [](const Leg& leg) { return leg.ended_s - leg.accepted_s; };
+  double slide_speed = 0;
+  for (const Leg& leg : ended) slide_speed = leg.phase == Phase::slide ? leg.speed : slide_speed;
+  std::vector<double> measured, all, slides;
+  for (const Leg& leg : ended) {
+    if (!(leg.speed > 0) || leg.from == leg.to) continue;
+    const double delay = took(leg) - trapezoid_duration(distance(leg.from, leg.to), leg.speed, kModelledMmS2);
+    all.push_back(delay);
+    if (leg.phase == Phase::approach && leg.speed == slide_speed && leg.from.z == leg.to.z)
+      measured.push_back(delay);
   }
-  const double start = std::min(leg.accepted_s + rig::kStartDelayS, leg.ended_s - 1e-6);
+  if (measured.size() < kEnough) measured = all;
+  MoveTiming timing;
+  if (measured.empty()) return timing;
+  std::sort(measured.begin(), measured.end());
+  timing.delay_s = median(measured);
+  if (measured.size() >= kEnough) timing.spread_s = measured[measured.size() - 2] - measured[1];
+  for (const Leg& leg : ended) {
+    if (leg.phase != Phase::slide || !(leg.speed > 0)) continue;
+    slides.push_back((took(leg) - timing.delay_s - leg.speed / kModelledMmS2) / ordered_s(leg));
+  }
+  if (slides.size() < kSlides) return timing;
+  const double slowness = median(slides);
+  if (std::abs(slowness - 1) < kMostSlowness) timing.slowness = slowness;
+  return timing;
+}
+
+void PositionTrack::model(const Leg& leg, const MoveTiming& timing) {
+  const double length = distance(leg.from, leg.to);
+  if (!(leg.speed > 0)) return add(leg.ended_s, leg.to);
+  // Longer or shorter than the run's other moves: nobody knows where on the way the head was slow.
+  const double off_s = leg.ended_s - leg.accepted_s - timing.delay_s -
+                       timing.slowness * trapezoid_duration(length, leg.speed, kModelledMmS2);
+  doubt_mm_ = std::max(doubt_mm_, std::min(length, (std::abs(off_s) + timing.spread_s) * leg.speed));
+  const double start = std::min(std::max(leg.accepted_s + timing.delay_s, leg.sent_s), leg.ended_s - 1e-6);
   const double duration = leg.ended_s - start;
   const int steps = static_cast<int>(std::clamp(duration / 0.005, 1.0, double{kMostSteps}));
   for (int i = 0; i <= steps; ++i) {
     const double t = duration * i / steps;
-    const double part = length > 0 ? trapezoid_position(t, length, duration, acceleration) / length : 1;
+    const double part = length > 0 ? trapezoid_position(t, length, duration, kModelledMmS2) / length : 1;
     add(start + t, between(leg.from, leg.to, part));
   }
 }
 
-void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& samples, double acceleration) {
-  add(leg.accepted_s, leg.from);
-  if (samples.empty() && leg.ended_s > leg.accepted_s) return model(leg, acceleration);
-  const double slowest_answer = samples.empty() ? 0 : 3 * median_round_trip(samples) + 0.001;
-  Knot before = points_.empty() ? Knot{leg.accepted_s, leg.from} : points_.back();
-  for (const PositionSample& sample : samples) {
-    const bool good = sample.round_trip_s <= slowest_answer && off_leg(leg, sample.position) < 0.05 &&
-                      reachable(leg, {before.time_s, 0, before.position}, sample) &&
-                      distance(leg.from, before.position) < distance(leg.from, sample.position) + 0.015;
-    if (!good) {
-      ++rejected_;
-      continue;
-    }
-    before = {sample.time_s, sample.position};
+void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& samples,
+                            const MoveTiming& timing) {
+  add(leg.sent_s, leg.from);
+  if (samples.empty() && leg.ended_s > leg.accepted_s) return model(leg, timing);
+  const std::vector<PositionSample> chain = chain_of(leg, samples);
+  rejected_ += samples.size() - chain.size();
+  for (const PositionSample& sample : chain) {
     add(sample.time_s, sample.position);
     distrust(leg);
     doubt_mm_ = std::max(doubt_mm_, 0.5 * sample.round_trip_s * leg.speed);
@@ -273,6 +338,10 @@ Collection collection_of(const Journal& journal) {
   const std::vector<RecordedLeg> legs = legs_in(journal, collection.complete);
   const Frames all = frames_in(journal, collection.decoder);
   const FrameTimeline timeline = timeline_of(all.arrivals);
+  std::vector<Leg> ended;
+  for (const RecordedLeg& recorded : legs)
+    if (recorded.ended) ended.push_back(recorded.leg);
+  const MoveTiming timing = timing_of(ended);
   collection.frames = all.frames.size();
   collection.missing = timeline.missing;
   collection.clock = timeline.clock;
@@ -287,7 +356,7 @@ Collection collection_of(const Journal& journal) {
     const Phase phase = recorded.leg.phase;
     if (phase != Phase::onset && phase != Phase::slide && phase != Phase::release) continue;
     Parts& part = parts[recorded.leg.pass];
-    part.track.add_leg(recorded.leg, recorded.samples);
+    part.track.add_leg(recorded.leg, recorded.samples, timing);
     part.positions += recorded.samples.size();
     if (phase == Phase::slide) part.speed = recorded.leg.speed;
     if (phase == Phase::release) part.complete = recorded.ended;

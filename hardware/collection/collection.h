@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "hardware/boards/frame_clock.h"
+#include "hardware/boards/frame_decoder.h"
 #include "hardware/collection/journal.h"
 #include "hardware/printers/palpation.h"
 
@@ -17,13 +19,26 @@ std::string event_text(const Leg& leg, bool ended);
 std::string event_text(const PositionSample& sample);
 constexpr const char* kRunComplete = "complete";
 
-/// Where the head was, from the polled positions of one pass. Damaged samples (off the leg, faster than
-/// physics allows, answered late) are left out; between samples the position is linear in time.
+constexpr double kModelledMmS2 = 500;  ///< acceleration of moves that are modelled
+
+/// How the moves of a run took their time where the firmware has no M114 R, measured by the run itself: a
+/// move ends `delay_s` + `slowness` * length / speed + speed / kModelledMmS2 after the firmware's ok to it.
+struct MoveTiming {
+  double delay_s = 0;   ///< of the start; another acceleration than the modelled one is in it
+  double slowness = 1;  ///< of slides; measured from three on and within 2 %
+  double spread_s = 0;  ///< how far the measurements of delay_s lie apart
+};
+/// From the short moves in the air that Palpation makes at the slide's speed; in their absence from all legs.
+MoveTiming timing_of(std::span<const Leg> ended);
+
+/// Where the head was, from the polled positions of one pass. Of the samples the longest chain is kept in
+/// which each can be reached from the one before; the others were damaged, answered late, or dated wrong by a
+/// host that stood still. Between samples the position is linear in time.
 class PositionTrack {
  public:
-  /// Adds a leg's samples; without samples the leg is modelled: rig::kStartDelayS, then a trapezoid of
-  /// speed with `acceleration` (mm/s^2) that ends when M400 was answered.
-  void add_leg(const Leg& leg, const std::vector<PositionSample>& samples, double acceleration = 500);
+  /// Adds a leg's samples; without samples the leg is modelled as a trapezoid of speed that begins by
+  /// `timing` and ends when M400 was answered.
+  void add_leg(const Leg& leg, const std::vector<PositionSample>& samples, const MoveTiming& timing);
   Point3 at(double time_s) const;
   double begin() const { return points_.empty() ? 0 : points_.front().time_s; }
   double end() const { return points_.empty() ? 0 : points_.back().time_s; }
@@ -38,7 +53,7 @@ class PositionTrack {
     Point3 position;
   };
   void add(double time_s, const Point3& position);
-  void model(const Leg& leg, double acceleration);
+  void model(const Leg& leg, const MoveTiming& timing);
   void distrust(const Leg& leg);
   std::vector<Knot> points_;
   std::uint64_t rejected_ = 0;
@@ -55,6 +70,9 @@ struct CollectedPass {
   std::vector<double> position;       ///< n x 3, printer coordinates of the head (mm)
   std::vector<std::uint8_t> suspect;  ///< n; 1: may be torn, or an implausible jump
   std::uint64_t missing = 0;          ///< frames that did not arrive between the first and the last
+  /// Frames that did arrive, but whose place among lost ones is uncertain by more than kTrustedMm: after the
+  /// host or the board stood still. They are in the journal only.
+  std::uint64_t left_out = 0;
   std::uint64_t positions = 0, rejected_positions = 0;
   std::string doubt;  ///< why positions may be wrong by more than kTrustedMm; empty: they are not
 };

@@ -6,6 +6,18 @@
 namespace supertac {
 namespace {
 
+// Of a run whose printer says that it is busy for ever, or whose board sends more than a board can.
+double longest_run_s(const RecorderSettings& settings) {
+  double planned = 0;
+  for (const Leg& leg : legs_of(settings.plan, settings.origin)) planned += ordered_s(leg);
+  return 3 * planned + 300;
+}
+
+void check_stop(const RecorderSettings& settings, JournalWriter& journal) {
+  if (settings.stop()) throw OperatorStop("stopped by the operator");
+  journal.check();
+}
+
 PalpationObserver observer_for(const RecorderSettings& settings, JournalWriter& journal,
                                TactileBoard& board) {
   PalpationObserver observer;
@@ -16,24 +28,28 @@ PalpationObserver observer_for(const RecorderSettings& settings, JournalWriter& 
     if (settings.progress) settings.progress(leg, sample.position, board.counters());
   };
   observer.check = [&] {
-    if (settings.stop != nullptr && *settings.stop) throw OperatorStop("stopped by the operator");
-    journal.check();
+    check_stop(settings, journal);
     if (!settings.replay) board.check();
   };
+  observer.contact = settings.contact;
   return observer;
 }
 
 // Nothing moves before the board has been heard: a wrong port would otherwise be found with the finger on its
 // way. The wait is a fixed one, so that a replay waits the same.
-void hear_board(TactileBoard& board, Printer& printer, const RecorderSettings& settings) {
+void hear_board(TactileBoard& board, Printer& printer, const RecorderSettings& settings,
+                JournalWriter& journal) {
   printer.link().idle(settings.board.silence_s + 0.1);
-  if (!settings.replay) (void)board.next(2);  // throws what ended the board instead
+  if (settings.replay) return;
+  for (int i = 0; i < 100 && !board.next(0.02); ++i) check_stop(settings, journal);  // throws what ended it
 }
 
 RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> printer_port,
                       const RecorderSettings& settings, JournalWriter& journal) {
   CapturedPort captured(std::move(printer_port), journal, Stream::printer);
   Printer printer(captured, settings.printer);
+  printer.link().set_watch([&] { check_stop(settings, journal); });
+  printer.link().give_up_at(captured.now() + longest_run_s(settings));
   printer.connect();
   if (settings.home) {
     printer.home();
@@ -42,7 +58,7 @@ RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> pr
   }
   TactileBoard board(std::make_unique<CapturedPort>(std::move(board_port), journal, Stream::board),
                      settings.board);
-  hear_board(board, printer, settings);
+  hear_board(board, printer, settings, journal);
   RecorderReport report;
   report.outcome = Palpation(printer, settings.plan, observer_for(settings, journal, board)).run();
   if (settings.replay) {
@@ -65,7 +81,9 @@ RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> pr
 
 RecorderReport record_palpation(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
                                 const RecorderSettings& settings) {
-  JournalWriter journal(settings.journal, settings.header);
+  constexpr double kBytesPerS = 400e3;  // of both ports, nearly twice what they have to say
+  JournalWriter journal(settings.journal, settings.header,
+                        static_cast<std::uint64_t>(kBytesPerS * longest_run_s(settings)));
   try {
     return record(std::move(board), std::move(printer), settings, journal);
   } catch (...) {

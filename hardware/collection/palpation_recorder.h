@@ -2,7 +2,6 @@
 // What supertac-collect does, without its talk.
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <memory>
 #include <string>
@@ -17,11 +16,14 @@ struct RecorderSettings {
   PalpationPlan plan;
   PrinterSettings printer;
   BoardSettings board;
-  Point3 origin = rig::kMounted;            ///< where the operator confirms the head to be
-  bool home = false;                        ///< home instead
-  std::string journal;                      ///< path; must not exist
-  std::string header;                       ///< one line that says what is collected
-  const std::atomic<bool>* stop = nullptr;  ///< set by a signal handler: lift the finger and end
+  Point3 origin = rig::kMounted;  ///< where the operator confirms the head to be
+  bool home = false;              ///< home instead
+  std::string journal;            ///< path; must not exist
+  std::string header;             ///< one line that says what is collected
+  /// True: lift the finger and end, by OperatorStop. Asked for every 0.02 s from the first moment on.
+  std::function<bool()> stop = [] { return false; };
+  /// Told before the finger may touch, and when it cannot any more.
+  std::function<void(bool)> contact = [](bool) {};
   /// The ports replay a journal: the board's is read to its end, which is no error.
   bool replay = false;
   /// Called for every polled position; for a live line.
@@ -34,9 +36,10 @@ struct RecorderReport {
   MarlinLink::Counters printer;
 };
 
-/// Runs the plan and journals everything. Throws while nothing has been recorded - no device, the wrong one,
-/// a plan outside the limits, a homing that failed - and then leaves no journal; later failures are in the
-/// outcome. When this returns the journal is complete on disk, or outcome.error says why not.
+/// Runs the plan and journals everything, in at most three times the plan's time and five minutes. Throws
+/// while nothing has been recorded - no device, the wrong one, a plan outside the limits, a homing that
+/// failed - and then leaves no journal; later failures are in the outcome. When this returns the journal is
+/// complete on disk, or outcome.error says why not.
 RecorderReport record_palpation(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
                                 const RecorderSettings& settings);
 

@@ -9,6 +9,12 @@
 
 namespace supertac {
 
+/// Printable, or a line break: a firmware says little else, a board's frames are mostly something else.
+constexpr bool is_text(std::byte byte) {
+  const int c = std::to_integer<int>(byte);
+  return c == '\n' || c == '\r' || (c >= ' ' && c < 127);
+}
+
 /// What a read brought: `count` bytes (0: the deadline passed) that had arrived by `time_s`.
 struct Received {
   std::size_t count = 0;

@@ -49,8 +49,9 @@ std::optional<Point3> position_in(std::string_view text) {
 }
 
 bool is_fatal(std::string_view text) {
-  for (const std::string_view mark : {"kill() called", "Printer halted", "Thermal Runaway", "THERMAL RUNAWAY",
-                                      "Heating failed", "MAXTEMP", "MINTEMP", "Printer stopped"}) {
+  for (const std::string_view mark :
+       {"kill() called", "Printer halted", "Thermal Runaway", "THERMAL RUNAWAY", "Heating failed", "MAXTEMP",
+        "MINTEMP", "Printer stopped", "Printer is not ready", "Printer is shutdown", "Shutdown due to"}) {
     if (contains(text, mark)) return true;
   }
   return false;
@@ -117,7 +118,9 @@ Reply parse_reply(std::string_view line) {
   if (is_fatal(line)) return kind(ReplyKind::fatal);
   if (line.starts_with("echo:busy: paused")) return kind(ReplyKind::paused);
   if (line.starts_with("echo:busy:")) return kind(ReplyKind::busy);
-  if (line.starts_with("echo:Unknown command")) return kind(ReplyKind::unknown_command);
+  if (line.starts_with("echo:Unknown command") || line.starts_with("// Unknown command"))
+    return kind(ReplyKind::unknown_command);
+  if (line.starts_with("!! ")) return kind(ReplyKind::error);
   if (const auto position = position_in(line)) {
     return {ReplyKind::position, {}, *position, std::string(line)};
   }

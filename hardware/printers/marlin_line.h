@@ -38,7 +38,7 @@ enum class ReplyKind {
   resend,           ///< Resend: number
   line_fault,       ///< Error:... about checksum or line number; number = Last Line when it could be read
   fatal,            ///< kill(), halt, thermal: nothing more may be sent
-  error,            ///< any other Error:
+  error,            ///< any other Error:, and Klipper's !!
   unknown_command,  ///< acknowledged but not run
   busy,             ///< echo:busy: processing
   paused,           ///< echo:busy: paused for user

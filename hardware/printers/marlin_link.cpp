@@ -15,6 +15,11 @@ constexpr double kWatchInterval = 0.02;  // a fifth of the 0.1 s in which an unp
 // With one line in flight the firmware is never honestly more than a line or two behind. A number further
 // back is damaged text, or a firmware that restarted; the second time in a row it is believed.
 constexpr std::int64_t kPlausibleLag = 4;
+constexpr std::int64_t kFarAhead = 1000;  // no firmware takes such a number for a repetition
+
+bool is_number(std::string_view text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+}
 
 }  // namespace
 
@@ -22,10 +27,13 @@ struct MarlinLink::Exchange {
   std::int64_t number;  // of the command
   std::int64_t cursor;  // line now in flight: earlier than `number` while catching up
   double deadline_s;
-  double until = 0;
+  double until = 0;  // for the next answer
+  double limit = 0;  // for all of them
   Answer answer = {};
   int repeats = 0;     // of the line at `cursor`
+  int copies = 0;      // of all lines; progress does not reset it
   bool fault = false;  // the next ok acknowledges nothing
+  bool asked = false;  // an ok may be that of the question
   bool done = false;
   bool proven = false;         // by Last Line, not by an ok
   std::int64_t fallback = -1;  // implausibly old line the firmware named last
@@ -51,8 +59,8 @@ void MarlinLink::connect() {
   number_ = 0;
   kept_.clear();
   connected_ = true;
-  switch_reports_off();
   read_capabilities();
+  switch_reports_off();
 }
 
 void MarlinLink::switch_reports_off() {
@@ -67,59 +75,87 @@ void MarlinLink::switch_reports_off() {
 void MarlinLink::nobody_answered() const {
   const std::string expected = "port " + port_.name() + ": expected a Marlin firmware, found ";
   const std::string within = " answer to M110 within " + format(settings_.connect_deadline_s, 0) + " s; ";
-  if (sniffer_.counters().bytes > 0) {
-    throw WrongDevice(expected + std::to_string(sniffer_.counters().bytes) + " bytes that are no" + within +
+  if (bytes_ > 0) {
+    throw WrongDevice(expected + std::to_string(bytes_) + " bytes that are no" + within +
                       "check that it is the printer's port (--list-ports) and that its baud rate is " +
-                      std::to_string(rig::kPrinterBaud));
+                      std::to_string(rig::kPrinterBaud) +
+                      (complaint_.empty() ? "" : "; it said " + in_quotes(complaint_)));
   }
   throw PrinterSilent(expected + "no" + within + "check that the printer is on and the port is right");
 }
 
+// GRBL answers "error:20" and "ALARM:1"; Marlin's errors are words.
+void MarlinLink::refuse_grbl(const std::string& line) const {
+  const std::string_view text = line;
+  const bool is_grbl = text.starts_with("Grbl ") ||
+                       (text.starts_with("error:") && is_number(text.substr(6))) ||
+                       (text.starts_with("ALARM:") && is_number(text.substr(6)));
+  if (!is_grbl) return;
+  throw WrongDevice("port " + port_.name() + ": expected Marlin or Klipper, found GRBL (" + in_quotes(line) +
+                    "), which has no line numbers and no M400; use a printer with one of the two");
+}
+
 bool MarlinLink::probe(double until) {
+  constexpr std::size_t kFewFrames = 3 * 164;
   send("\n" + numbered_line(0, "M110 N0"));
   std::string line;
-  while (read_line(until, line)) {
+  while (input_time_ < until && read_line(until, line)) {
     const Reply reply = parse_reply(line);
     if (reply.kind == ReplyKind::fatal) check_alarm(reply);
+    refuse_grbl(line);
+    if (reply.kind == ReplyKind::other || reply.kind == ReplyKind::error) complaint_ = line;
     if (reply.kind != ReplyKind::ok) continue;
     settle();
     return true;
   }
-  if (sniffer_.counters().frames >= 3) {
-    throw WrongDevice(
-        "port " + port_.name() +
-        ": expected a Marlin printer, found the frames of a tactile board; exchange the two ports");
+  if (bytes_ > kFewFrames && 3 * no_text_ > bytes_) {
+    throw WrongDevice("port " + port_.name() +
+                      ": expected a Marlin printer, found no text, as from a tactile board; exchange the two "
+                      "ports");
   }
   return false;
 }
 
 void MarlinLink::read_capabilities() {
-  for (int attempt = 0; attempt < 2 && capabilities_.firmware.empty(); ++attempt) {
+  bool known = false;  // what it has for a parser
+  for (int attempt = 0; attempt < 2 && !known; ++attempt) {
     for (const Reply& reply : command("M115").replies) {
       constexpr std::string_view kName = "FIRMWARE_NAME:";
-      if (reply.text.starts_with(kName)) capabilities_.firmware = reply.text.substr(kName.size());
+      const std::size_t at = reply.text.find(kName);
+      if (at != std::string::npos) capabilities_.firmware = reply.text.substr(at + kName.size());
+      known = known || reply.text.starts_with("Cap:EMERGENCY_PARSER:");
       if (reply.text == "Cap:EMERGENCY_PARSER:1") capabilities_.emergency_parser = true;
     }
+    capabilities_.klipper = capabilities_.firmware.starts_with("Klipper");
+    known = known || capabilities_.klipper;
   }
 }
 
 MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s) {
   if (halted_) throw PrinterHalted("printer " + port_.name() + ": halted earlier; reset it and start again");
-  kept_.push_back(numbered_line(number_ + 1, shielded(code)));
+  const std::string text = capabilities_.emergency_parser ? shielded(code) : std::string(code);
+  kept_.push_back(numbered_line(number_ + 1, text));
   ++number_;
   if (kept_.size() > settings_.kept_lines) kept_.pop_front();
   ++counters_.lines;
   Exchange exchange{number_, number_, deadline_s > 0 ? deadline_s : settings_.ok_deadline_s};
-  exchange.code = shielded(code);
+  exchange.code = text;
   exchange.answer.sent_s = send(kept_.back());
   exchange.until = exchange.answer.sent_s + exchange.deadline_s;
-  std::string text;
+  exchange.limit = exchange.answer.sent_s + std::max(exchange.deadline_s, settings_.longest_wait_s);
+  std::string line;
   while (!exchange.done) {
-    if (read_line(exchange.until, text)) {
-      on_reply(exchange, parse_reply(text));
+    if (read_line(std::min(exchange.until, exchange.limit), line)) {
+      on_reply(exchange, parse_reply(line));
     } else {
       ++counters_.timeouts;
-      repeat(exchange, "no answer");
+      ask(exchange);
+    }
+    if (!exchange.done && input_time_ > exchange.limit) {
+      throw PrinterSilent("printer " + port_.name() + ": expected the end of " + in_quotes(code) +
+                          " within " + format(exchange.limit - exchange.answer.sent_s, 0) +
+                          " s, found other answers (" + in_quotes(line) +
+                          " last); check the printer and start again");
     }
   }
   finish(exchange);
@@ -137,26 +173,37 @@ void MarlinLink::finish(const Exchange& exchange) {
   if (exchange.error_stands) {
     throw PrinterRefused("printer " + port_.name() + ": refused " +
                          in_quotes(kept_.back().substr(0, kept_.back().size() - 1)) + ": " +
-                         printable(exchange.error));
+                         printable(exchange.error, 200));
   }
 }
 
-void MarlinLink::repeat(Exchange& exchange, const std::string& why) {
-  const std::string& line = kept_[kept_.size() - 1 - static_cast<std::size_t>(number_ - exchange.cursor)];
-  if (++exchange.repeats > settings_.max_repeats) {
+void MarlinLink::count_copy(Exchange& exchange, const std::string& why) {
+  const bool loop = ++exchange.copies > 4 * settings_.max_repeats;
+  if (++exchange.repeats > settings_.max_repeats || loop) {
     const std::string text = "printer " + port_.name() + ": line " + std::to_string(exchange.cursor) +
-                             " repeated " + std::to_string(settings_.max_repeats) +
+                             " repeated " + std::to_string(exchange.repeats - 1) +
                              " times without success (" + why + ")";
-    if (exchange.fault) throw ResendLoop(text + ": resend loop; check the cable and start again");
-    throw PrinterSilent(text + "; check the printer and the cable");
+    if (exchange.fault || loop) throw ResendLoop(text + ": resend loop; check the cable and start again");
+    throw PrinterSilent(text + (complaint_.empty() ? "" : ", it said " + in_quotes(complaint_)) +
+                        "; check the printer and the cable");
   }
   exchange.answer.repeated = true;
-  exchange.fault = false;
+  exchange.fault = exchange.asked = false;
   ++counters_.repeats;
   input_.clear();  // half an answer, such as an ok whose line break was lost
+}
+
+void MarlinLink::repeat(Exchange& exchange, const std::string& why) {
+  count_copy(exchange, why);
   // The line break ends what may be left of a damaged line; Marlin ignores empty ones.
-  exchange.answer.sent_s = send("\n" + line);
-  exchange.until = exchange.answer.sent_s + exchange.deadline_s;
+  exchange.until = exchange.deadline_s +
+                   send("\n" + kept_[kept_.size() - 1 - static_cast<std::size_t>(number_ - exchange.cursor)]);
+}
+
+void MarlinLink::ask(Exchange& exchange) {
+  count_copy(exchange, "no answer");
+  exchange.asked = !capabilities_.klipper;
+  exchange.until = settings_.ok_deadline_s + send("\n" + numbered_line(number_ + kFarAhead, "M105"));
 }
 
 void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
@@ -164,6 +211,7 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
   switch (reply.kind) {
     case ReplyKind::ok:
       on_ok(exchange);
+      if (reply.text.size() > 2) exchange.answer.replies.push_back(std::move(reply));  // Klipper's M115
       break;
     case ReplyKind::busy:
       exchange.until = std::max(exchange.until, input_time_ + settings_.busy_deadline_s);
@@ -179,18 +227,13 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
       // A line never sent cannot be sent again. What ran is known from Last Line, not from here.
       if (reply.number && *reply.number <= exchange.number) on_last_line(exchange, *reply.number - 1);
       break;
-    case ReplyKind::unknown_command:  // acknowledged by the ok that follows, but not run
-      if (reply.text.find('"' + exchange.code + '"') != std::string::npos) {
-        exchange.error = reply.text;  // the whole line came through: the firmware does not know it
-        exchange.error_stands = true;
-        break;
-      }
-      ++counters_.faults;
-      exchange.fault = true;
+    case ReplyKind::unknown_command:
+      on_unknown_command(exchange, reply);
       break;
     case ReplyKind::error:
       exchange.error = reply.text;
-      exchange.fault = true;
+      // Klipper complains of what it has read right, once.
+      (capabilities_.klipper ? exchange.error_stands : exchange.fault) = true;
       break;
     case ReplyKind::wait:
     case ReplyKind::temperature:
@@ -200,9 +243,24 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
   }
 }
 
+// Acknowledged by the ok that follows, but not run. Marlin quotes the whole line, Klipper its first word:
+// where that came through the firmware does not know it, otherwise the line was damaged.
+void MarlinLink::on_unknown_command(Exchange& exchange, const Reply& reply) {
+  const std::string word = exchange.code.substr(0, exchange.code.find(' '));
+  exchange.error_stands = reply.text.find('"' + exchange.code + '"') != std::string::npos ||
+                          reply.text.find('"' + word + '"') != std::string::npos;
+  if (exchange.error_stands) {
+    exchange.error = reply.text;
+    return;
+  }
+  ++counters_.faults;
+  exchange.fault = true;
+}
+
 void MarlinLink::on_ok(Exchange& exchange) {
   exchange.answer.answered_s = input_time_;
   if (exchange.done) return;
+  if (exchange.asked && !exchange.fault) return;  // late, or the question's: the last line taken decides
   if (exchange.fault) {
     repeat(exchange,
            exchange.error.empty() ? "the firmware reports damaged lines" : printable(exchange.error));
@@ -252,14 +310,14 @@ void MarlinLink::emergency(std::string_view code) { send("\n" + std::string(code
 void MarlinLink::idle(double seconds) {
   const double until = port_.now() + seconds;
   std::string line;
-  while (read_line(until, line)) check_alarm(parse_reply(line));
+  while (input_time_ < until && read_line(until, line)) check_alarm(parse_reply(line));
 }
 
 void MarlinLink::settle() {
   const double limit = port_.now() + 2;
   std::string line;
   double quiet_until = port_.now() + settings_.quiet_s;
-  while (read_line(std::min(quiet_until, limit), line)) {
+  while (input_time_ < limit && read_line(std::min(quiet_until, limit), line)) {
     const Reply reply = parse_reply(line);
     if (reply.kind == ReplyKind::start || reply.kind == ReplyKind::fatal) check_alarm(reply);
     // Reports come for ever; what is waited for is the end of answers.
@@ -271,7 +329,8 @@ void MarlinLink::settle() {
 
 void MarlinLink::check_alarm(const Reply& reply) {
   if (reply.kind == ReplyKind::ok) complaint_.clear();
-  if (reply.kind == ReplyKind::other && reply.text.starts_with("echo:")) complaint_ = reply.text;
+  for (const char* mark : {"echo:", "// ", "!! "})
+    if (reply.text.starts_with(mark) && reply.kind != ReplyKind::fatal) complaint_ = reply.text;
   if (reply.kind == ReplyKind::fatal) {
     halted_ = true;
     throw PrinterHalted("printer " + port_.name() + ": the firmware halted (" +
@@ -291,7 +350,9 @@ void MarlinLink::check_alarm(const Reply& reply) {
 }
 
 double MarlinLink::send(const std::string& text) {
-  return port_.write(std::as_bytes(std::span(text)), port_.now() + kWriteDeadline);
+  const double before = port_.now();
+  port_.write(std::as_bytes(std::span(text)), before + kWriteDeadline);
+  return before;
 }
 
 bool MarlinLink::take_line(std::string& line) {
@@ -312,13 +373,19 @@ bool MarlinLink::read_line(double until, std::string& line) {
     if (watch_) watch_();
     const double slice = watch_ ? std::min(until, port_.now() + kWatchInterval) : until;
     const Received got = port_.read(buffer, slice);
+    if (got.time_s > give_up_s_) {
+      throw PrinterSilent("printer " + port_.name() + ": did not come to an end in time" +
+                          (complaint_.empty() ? "" : ", it said " + in_quotes(complaint_)) +
+                          "; check the printer and start again");
+    }
     if (got.count == 0) {
       if (got.time_s >= until) return false;
       continue;
     }
     input_time_ = got.time_s;
     const auto bytes = std::span(buffer).first(got.count);
-    if (!connected_) sniffer_.push(bytes, [](const BoardFrame&, std::uint64_t) {});
+    bytes_ += bytes.size();
+    for (const std::byte byte : bytes) no_text_ += is_text(byte) ? 0 : 1;
     input_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     if (input_.size() > kLongestInput && input_.find_first_of("\r\n") == std::string::npos) input_.clear();
   }

@@ -1,16 +1,18 @@
 // Marlin's line protocol over any port: numbered lines with checksums, one in flight, repeated until the
-// firmware is known to have run them, and never run twice - a repetition carries the same number, and Marlin
-// runs a number once.
+// firmware is known to have run them, and never run twice: a number runs once. Marlin since 2.1.2 ignores a
+// repeated line in silence, older ones complain; both answer a line numbered far ahead with the last number
+// that they took, and that is how a lost answer is asked for. Klipper takes the same lines and checks no
+// number.
 #pragma once
 
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "hardware/boards/frame_decoder.h"
 #include "hardware/ports/errors.h"
 #include "hardware/ports/port.h"
 #include "hardware/printers/marlin_line.h"
@@ -22,8 +24,9 @@ struct MarlinSettings {
   double probe_interval_s = 1;     ///< between two M110 N0 while connecting
   double ok_deadline_s = 2.5;      ///< of an ordinary command; Marlin's first echo:busy comes after 2 s
   double busy_deadline_s = 6;      ///< after echo:busy (Marlin repeats it every 2 s)
+  double longest_wait_s = 60;      ///< for one command without a longer deadline, whatever is said meanwhile
   double quiet_s = 0.05;           ///< silence that ends a disturbance
-  int max_repeats = 8;             ///< of one line, for any reason
+  int max_repeats = 8;             ///< of one line, for any reason; four times as many while catching up
   std::size_t kept_lines = 64;     ///< for Resend; RIG asks for 50
 };
 
@@ -31,6 +34,7 @@ struct MarlinSettings {
 struct MarlinCapabilities {
   std::string firmware;           ///< the text of FIRMWARE_NAME, empty when not told
   bool emergency_parser = false;  ///< M112, M410 act ahead of the queue
+  bool klipper = false;           ///< no line is ever asked for again, no M410, no M114 R
 };
 
 class MarlinLink {
@@ -44,17 +48,17 @@ class MarlinLink {
   /// What a command brought back; times are those of the port's clock.
   struct Answer {
     std::vector<Reply> replies;  ///< everything but ok, in order
-    double sent_s = 0;           ///< when the last copy of the line was handed over
+    double sent_s = 0;           ///< before the first copy of the line was written
     double answered_s = 0;       ///< when its ok (or the proof that it ran) arrived
-    bool repeated = false;       ///< sent more than once: `sent_s` says little about when it ran
+    bool repeated = false;       ///< sent or asked for again: the times say little about when it ran
   };
 
   /// `port` must outlive the link.
   explicit MarlinLink(Port& port, const MarlinSettings& settings = {});
 
-  /// Finds a fresh (`start` banner) or a running firmware, sets its line number to 0, switches off the
-  /// reports that an earlier host may have left on (M154, M155), reads M115. Throws PrinterSilent;
-  /// WrongDevice when what comes is no firmware's answer; PrinterHalted.
+  /// Finds a fresh (`start` banner) or a running firmware, sets its line number to 0, reads M115, switches
+  /// off the reports that an earlier host may have left on (M154, M155). Throws PrinterSilent; WrongDevice
+  /// when what comes is no such firmware's answer (a GRBL controller is named); PrinterHalted.
   void connect();
 
   /// Runs one command and returns when the firmware has acknowledged it. `deadline_s` 0: ok_deadline_s;
@@ -65,6 +69,9 @@ class MarlinLink {
   /// Sends `code` (M410, M112, M108) without number, ahead of everything: only the emergency parser sees it
   /// in time.
   void emergency(std::string_view code);
+
+  /// From this time of the port's clock on every wait ends in PrinterSilent: the bound of a whole run.
+  void give_up_at(double time_s) { give_up_s_ = time_s; }
 
   /// Reads and forgets replies for `seconds`; the way to wait while the port's clock runs.
   /// Throws PrinterReset, PrinterHalted when one of the replies says so.
@@ -86,13 +93,20 @@ class MarlinLink {
 
   bool probe(double until);
   [[noreturn]] void nobody_answered() const;
+  void refuse_grbl(const std::string& line) const;
   void switch_reports_off();
   void read_capabilities();
+  /// Returns the time before the write.
   double send(const std::string& text);
-  /// Sends the exchange's current line (again), counting and limiting the repetitions.
+  /// Sends the exchange's current line again.
   void repeat(Exchange& exchange, const std::string& why);
+  /// Asks for the last line taken, by one numbered far ahead.
+  void ask(Exchange& exchange);
+  /// Counts and limits what is sent again.
+  void count_copy(Exchange& exchange, const std::string& why);
   void on_reply(Exchange& exchange, Reply reply);
   void on_ok(Exchange& exchange);
+  void on_unknown_command(Exchange& exchange, const Reply& reply);
   void on_last_line(Exchange& exchange, std::int64_t last);
   void finish(const Exchange& exchange);
   void check_alarm(const Reply& reply);
@@ -105,12 +119,13 @@ class MarlinLink {
   MarlinCapabilities capabilities_;
   Counters counters_;
   std::function<void()> watch_;
-  FrameDecoder sniffer_;          // tells a tactile board from a printer while connecting
-  std::string input_;             // received, not yet a whole line
-  double input_time_ = 0;         // arrival of its last byte
-  std::string complaint_;         // the last echo: since an ok; a halt's reason stands before it
+  std::size_t bytes_ = 0, no_text_ = 0;  // received while connecting: a tactile board is not a printer
+  std::string input_;                    // received, not yet a whole line
+  double input_time_ = 0;                // arrival of its last byte
+  std::string complaint_;         // the last echo:, // or !! since an ok; a halt's reason stands before it
   std::deque<std::string> kept_;  // lines number_ - kept_.size() + 1 ... number_
   std::int64_t number_ = 0;       // of the newest line
+  double give_up_s_ = std::numeric_limits<double>::infinity();
   bool connected_ = false;
   bool halted_ = false;
 };

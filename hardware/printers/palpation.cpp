@@ -7,6 +7,9 @@ namespace supertac {
 namespace {
 
 constexpr double kProgressDeadline = 6;
+constexpr double kStopWithin = 1.6;  // in the air: of the 2 s in which Ctrl-C ends a program
+constexpr double kLiftWithin = 60;   // in contact
+constexpr int kMeasuredPairs = 3;    // of short moves to and fro
 constexpr int kClaims = 3;  // of having arrived at once, before a firmware is taken for one without M114 R
 
 }  // namespace
@@ -27,8 +30,11 @@ const char* name_of(Phase phase) {
 }
 
 bool reachable(const Leg& leg, const PositionSample& from, const PositionSample& to) {
-  return distance(from.position, to.position) < 1.5 * leg.speed * (to.time_s - from.time_s) + 0.05;
+  const double seconds = 1.05 * (to.time_s - from.time_s) + 0.5 * (from.round_trip_s + to.round_trip_s);
+  return to.time_s > from.time_s && distance(from.position, to.position) < leg.speed * seconds + 0.05;
 }
+
+double ordered_s(const Leg& leg) { return distance(leg.from, leg.to) / leg.speed; }
 
 std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
   const auto usable = [](double value) { return value > 0 && std::isfinite(value); };
@@ -94,13 +100,17 @@ PalpationOutcome Palpation::run() {
         "palpation: the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
   }
   for (const Leg& leg : legs) printer_.limits().check_path(leg.from, leg.to);
+  for (const Leg& leg : legs) longest_leg_s_ = std::max(longest_leg_s_, ordered_s(leg));
   PalpationOutcome outcome;
   printer_.link().set_watch(observer_.check);
   try {
     for (Leg& leg : legs) {
-      in_contact_ = leg.phase == Phase::onset || leg.phase == Phase::slide || leg.phase == Phase::release;
+      if (leg.phase == Phase::onset && leg.pass == 1) measure_start(leg);
+      if (leg.phase == Phase::onset) touch(true);
       run_leg(leg);
-      if (leg.phase == Phase::release) ++outcome.passes_done;
+      if (leg.phase != Phase::release) continue;
+      touch(false);
+      ++outcome.passes_done;
     }
     outcome.complete = true;
   } catch (...) {
@@ -109,12 +119,37 @@ PalpationOutcome Palpation::run() {
   printer_.link().set_watch(nullptr);
   outcome.realtime_position = realtime_;
   if (!outcome.complete) recover(outcome);
+  if (in_contact_) touch(false);
   return outcome;
+}
+
+void Palpation::touch(bool contact) {
+  in_contact_ = contact;
+  observer_.contact(contact);
+}
+
+// Without M114 R nothing but M400 tells where the head is in time. How long short moves at the slide's speed
+// take beyond their length over it - the delay of their start and their acceleration - holds for the slide as
+// well.
+void Palpation::measure_start(Leg onset) {
+  // Of different lengths: a firmware that answers M400 every 0.1 s would be late by the same time at all of
+  // them.
+  const Point3 here = onset.from;
+  for (int pair = 0; pair < kMeasuredPairs && !(realtime_ && realtime_known_); ++pair) {
+    const double way = std::max(2.0, plan_.speed * plan_.speed / 250) + 0.035 * pair * plan_.speed;
+    const Point3 there{here.x, here.y + way, here.z};
+    for (const auto& [from, to] : {std::pair{here, there}, {there, here}}) {
+      Leg leg{onset.pass, Phase::approach, from, to, plan_.speed};
+      run_leg(leg);
+    }
+  }
 }
 
 void Palpation::run_leg(Leg& leg) {
   observer_.check();
-  leg.accepted_s = printer_.start_move(leg.to, leg.speed);
+  const MarlinLink::Answer answer = printer_.start_move(leg.to, leg.speed);
+  leg.sent_s = answer.sent_s;
+  leg.accepted_s = answer.answered_s;
   observer_.leg_started(leg);
   if (realtime_) follow(leg);
   leg.ended_s = printer_.finish_move();
@@ -126,11 +161,10 @@ void Palpation::run_leg(Leg& leg) {
 // M154's report in the place of a damaged answer.
 void Palpation::follow(const Leg& leg) {
   const double length = distance(leg.from, leg.to);
-  const double expected = length / leg.speed;
-  const double until = leg.accepted_s + 1.5 * expected + kProgressDeadline;
+  const double until = leg.accepted_s + 1.5 * ordered_s(leg) + kProgressDeadline;
   double next = leg.accepted_s;
   int claims = 0;
-  PositionSample before{leg.accepted_s, 0, leg.from};
+  PositionSample before{leg.sent_s, 0, leg.from};
   for (double time = next; time < until;) {
     const auto sample = printer_.sample_position();
     time = printer_.link().port().now();
@@ -171,9 +205,12 @@ void Palpation::recover(PalpationOutcome& outcome) {
   } catch (...) {  // everything else leaves a printer that can be talked to, or one that is gone: see below
   }
   try {
+    MarlinLink& link = printer_.link();
+    link.give_up_at(link.port().now() + (in_contact_ ? kLiftWithin + 1.5 * longest_leg_s_ : kStopWithin));
     const Printer::Stop stop = printer_.quick_stop();
-    if (stop.confirmed) outcome.finger = Finger::stopped;
     outcome.note = stop.text;
+    if (!in_contact_) return;
+    if (stop.confirmed) outcome.finger = Finger::stopped;
     printer_.lift(plan_.lift, plan_.speed_z);
     outcome.finger = Finger::lifted;
     outcome.note = "the finger was lifted";

@@ -36,19 +36,24 @@ struct Leg {
   double speed = 0;
   double accepted_s = 0;  ///< the firmware's ok to the move
   double ended_s = 0;     ///< the firmware's ok to M400
+  double sent_s = 0;      ///< before the move was sent: until then the head stood at `from`
 };
 
-/// Whether the head can have come from the one sample to the other at the leg's speed; the delay of answers
-/// and their rounding allowed for.
+/// The leg's length over its speed (s).
+double ordered_s(const Leg& leg);
+
+/// Whether the head can have come from the one sample to the other at the leg's speed; how long the answers
+/// took and their rounding allowed for, and 5 % for the printer's clock.
 bool reachable(const Leg& leg, const PositionSample& from, const PositionSample& to);
 
 /// What a run tells while it runs. `check` may throw: the operator's Ctrl-C, a board that is gone, a full
-/// disk.
+/// disk. `contact` is told before the finger may touch, and when it cannot any more or nothing can be done.
 struct PalpationObserver {
   std::function<void(const Leg&)> leg_started = [](const Leg&) {};
   std::function<void(const Leg&)> leg_ended = [](const Leg&) {};
   std::function<void(const Leg&, const PositionSample&)> position = [](const Leg&, const PositionSample&) {};
   std::function<void()> check = [] {};
+  std::function<void(bool)> contact = [](bool) {};
 };
 
 struct PalpationOutcome {
@@ -61,8 +66,8 @@ struct PalpationOutcome {
   std::exception_ptr error;  ///< why, when not complete
 };
 
-/// All legs of the plan, from `here` and back (at lifting height or above). Throws std::invalid_argument for
-/// a plan that makes no sense.
+/// All legs of the plan, from `here` and back (at lifting height or above). Palpation adds some short ones in
+/// the air where a firmware has no M114 R. Throws std::invalid_argument for a plan that makes no sense.
 std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here);
 
 /// The palpation run as G-code, for people who send it from another host: the moves of Palpation::run, in
@@ -85,6 +90,8 @@ class Palpation {
 
  private:
   void run_leg(Leg& leg);
+  void measure_start(Leg onset);
+  void touch(bool contact);
   void follow(const Leg& leg);
   void recover(PalpationOutcome& outcome);
 
@@ -93,6 +100,7 @@ class Palpation {
   PalpationObserver observer_;
   bool realtime_known_ = false, realtime_ = true;
   bool in_contact_ = false;
+  double longest_leg_s_ = 0;  // that a firmware may have to come to the end of
 };
 
 }  // namespace supertac

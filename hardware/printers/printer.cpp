@@ -9,7 +9,8 @@ namespace supertac {
 namespace {
 
 constexpr double kHomeDeadline = 180;
-constexpr double kMoveMargin = 8;  // start delay, acceleration, and a firmware that is slower than ordered
+constexpr double kStopWithin = 1.6;  // of the 2 s in which Ctrl-C ends a program; M410 takes one of them
+constexpr double kMoveMargin = 8;    // start delay, acceleration, and a firmware that is slower than ordered
 
 std::string coordinates(const Point3& p) {
   return " X" + format(p.x, 3) + " Y" + format(p.y, 3) + " Z" + format(p.z, 3);
@@ -42,10 +43,24 @@ void Printer::connect() {
 }
 
 void Printer::home() {
-  link_.command("G91");
-  link_.command("G1 Z10.000 F300");  // relative: wherever z is, first away from the plate
-  link_.command("G90");
-  link_.command("G28", kHomeDeadline);
+  try {
+    // Klipper moves nothing before it knows where it is: it is told a place, for the lift alone.
+    if (link_.capabilities().klipper) link_.command("SET_KINEMATIC_POSITION Z=0");
+    link_.command("G91");
+    link_.command("G1 Z10.000 F300");  // relative: wherever z is, first away from the plate
+    link_.command("G90");
+    link_.command("G28", kHomeDeadline);
+  } catch (const PrinterRefused&) {
+    throw;  // and so it stands
+  } catch (const PrinterHalted&) {
+    throw;
+  } catch (...) {
+    link_.set_watch(nullptr);
+    link_.give_up_at(link_.port().now() + kStopWithin);
+    // Nothing else stops a Klipper that homes; it has to be restarted.
+    (void)(link_.capabilities().klipper ? emergency_stop() : quick_stop());
+    throw;
+  }
   target_ = agreed_position();
   origin_ = Origin::homed;
   const double missing = settings_.limits.clearance_z - target_.z;
@@ -55,7 +70,9 @@ void Printer::home() {
 void Printer::confirm_origin(const Point3& here) {
   settings_.limits.check_target(here);
   link_.command("M400", kHomeDeadline);
-  link_.command(origin_command(here));
+  link_.command(link_.capabilities().klipper ? "SET_KINEMATIC_POSITION X=" + format(here.x, 3) +
+                                                   " Y=" + format(here.y, 3) + " Z=" + format(here.z, 3)
+                                             : origin_command(here));
   target_ = here;
   Point3 found = queue_position();
   for (int attempt = 0; attempt < 2 && distance(found, here) > settings_.tolerance_mm; ++attempt) {
@@ -69,7 +86,7 @@ void Printer::confirm_origin(const Point3& here) {
   origin_ = Origin::confirmed;
 }
 
-double Printer::start_move(const Point3& target, double speed_mm_s) {
+MarlinLink::Answer Printer::start_move(const Point3& target, double speed_mm_s) {
   if (origin_ == Origin::unknown) {
     throw OriginUnknown(
         "printer: the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
@@ -78,10 +95,10 @@ double Printer::start_move(const Point3& target, double speed_mm_s) {
     throw std::invalid_argument("printer: expected a speed above 0 mm/s, got " + format(speed_mm_s));
   settings_.limits.check_path(target_, target);
   const double length = distance(target_, target);
-  const double sent = link_.command(move_command(target, speed_mm_s)).answered_s;
+  MarlinLink::Answer answer = link_.command(move_command(target, speed_mm_s));
   target_ = target;
   expected_seconds_ += length / speed_mm_s + 0.5;
-  return sent;
+  return answer;
 }
 
 double Printer::finish_move() {
@@ -145,7 +162,23 @@ bool Printer::stands_still() {
   return same >= 3;
 }
 
+Printer::Stop Printer::stop_by_waiting() {
+  Stop stop;
+  try {
+    link_.settle();
+    link_.command("M400", 1.5 * expected_seconds_ + kMoveMargin);
+    target_ = agreed_position();
+    expected_seconds_ = 0;
+    stop.confirmed = true;
+    stop.text = "the head stands at the end of its move (Klipper ends what it has begun)";
+  } catch (const HardwareError& error) {
+    stop.text = error.what();
+  }
+  return stop;
+}
+
 Printer::Stop Printer::quick_stop() {
+  if (link_.capabilities().klipper) return stop_by_waiting();
   Stop stop;
   stop.ahead_of_queue = link_.capabilities().emergency_parser;
   try {
@@ -161,7 +194,8 @@ Printer::Stop Printer::quick_stop() {
     stop.confirmed = true;
   } catch (const HardwareError& error) {
     stop.confirmed = false;
-    stop.text = error.what();
+    stop.text = std::string("the head could not be shown to stand still, switch the printer off (") +
+                error.what() + ")";
     return stop;
   }
   stop.text = stop.confirmed ? "the head stands still"

@@ -43,16 +43,17 @@ class Printer {
   /// Finds the firmware. The origin stays unknown: Marlin cannot tell whether its coordinates mean anything.
   void connect();
 
-  /// Lifts, homes, and lifts again when the limits say so. Never homes x and y with z low.
+  /// Lifts, homes, and lifts again when the limits say so. Never homes x and y with z low. Whatever ends it
+  /// early stops the head.
   void home();
   /// The operator's word that the head is at `here` (G92). Checked against the limits.
   void confirm_origin(const Point3& here);
   Origin origin() const { return origin_; }
 
-  /// Sends one straight move and returns when the firmware has taken it (it starts about 126 ms later).
+  /// Sends one straight move and returns when the firmware has taken it (it starts some 0.1 s later).
   /// Throws OriginUnknown, OutsideLimits before anything is sent; then whatever MarlinLink::command throws.
-  /// Returns the time of the firmware's ok.
-  double start_move(const Point3& target, double speed_mm_s);
+  /// Returns when it was sent and when the firmware said ok.
+  MarlinLink::Answer start_move(const Point3& target, double speed_mm_s);
 
   /// Waits until the head stands (M400), then compares M114 with the last target. Throws PositionError when
   /// they differ by more than the tolerance three times running. Returns the time at which M400 was answered.
@@ -66,7 +67,8 @@ class Printer {
   /// M114 until two answers in a row agree: a lost digit must never become a target. Throws PositionError.
   Point3 agreed_position();
 
-  /// M410: stops where it is. Never throws for a firmware that does not answer; says so in the result.
+  /// M410: stops where it is; Klipper, which has none, comes to the end of its move. Never throws for a
+  /// firmware that does not answer; says so in the result.
   Stop quick_stop();
   /// M112: kills the firmware; afterwards only a reset helps.
   Stop emergency_stop();
@@ -79,6 +81,7 @@ class Printer {
 
  private:
   bool stands_still();
+  Stop stop_by_waiting();
 
   PrinterSettings settings_;
   MarlinLink link_;

@@ -10,7 +10,7 @@
 
 namespace supertac {
 
-/// Rates of everything the virtual rig can do wrong. All 0: a perfect rig.
+/// Rates of everything that can go wrong around the virtual rig. All 0: a perfect rig.
 struct RigFaults {
   double byte_rate = 0;     ///< per byte and direction: dropped, flipped (one bit) or inserted, a third each
   double lost_ok_rate = 0;  ///< per ok
@@ -19,8 +19,9 @@ struct RigFaults {
   double unplug_rate = 0;        ///< per line: the printer's port goes away
   double stall_rate =
       0;  ///< per line: the firmware answers 50 ms late; per frame: the board sends 20 ms late
-  double freeze_rate = 0;      ///< per line and per frame: 0.3 to 2 s without motion and answers, or frames
-  double lost_frame_rate = 0;  ///< per frame: USB was busy, the frame vanishes
+  double freeze_rate = 0;       ///< per line and per frame: 0.3 to 2 s without motion and answers, or frames
+  double lost_frame_rate = 0;   ///< per frame: USB was busy, the frame vanishes
+  double host_freeze_rate = 0;  ///< per call of the printer's port: the host stands still for 0.1 to 2 s
 
   /// The mix of `--faults RATE`: bytes at `rate`, every other fault scaled so that resets and unplugs stay
   /// rare enough for some collections to finish.

@@ -14,7 +14,7 @@ Point3 MotionQueue::at(double t) {
   if (blocks_.empty() || t <= blocks_.front().start) return rest_;
   const Block& block = blocks_.front();
   const double length = distance(block.from, block.to);
-  const double done = trapezoid_position(t - block.start, length, block.end - block.start, acceleration_);
+  const double done = trapezoid_position(t - block.start, length, block.end - block.start, kAcceleration);
   return between(block.from, block.to, length > 0 ? done / length : 1);
 }
 
@@ -27,9 +27,8 @@ void MotionQueue::move_to(const Point3& to, double speed_mm_s, double t) {
   rest_ = blocks_.empty() ? at(t) : rest_;
   const Point3 from = target();
   if (from == to) return;
-  const double start = blocks_.empty() ? t + rig::kStartDelayS : blocks_.back().end;
-  end_ =
-      start + slowness_ * trapezoid_duration(distance(from, to), rig::true_speed(speed_mm_s), acceleration_);
+  const double start = blocks_.empty() ? t + start_delay_s_ : blocks_.back().end;
+  end_ = start + slowness_ * trapezoid_duration(distance(from, to), speed_mm_s, kAcceleration);
   blocks_.push_back({from, to, start, end_});
 }
 

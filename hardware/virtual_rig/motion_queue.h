@@ -1,6 +1,5 @@
 // The planner of the virtual printer: straight moves with acceleration, one after the other, each stopping at
-// its end. As measured on Marlin, a move that finds the queue empty starts rig::kStartDelayS late, and the
-// true speed is a little below the ordered one (9.88 mm/s at F600, 4.97 at F300).
+// its end. A move that finds the queue empty starts late.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +14,8 @@ class MotionQueue {
   static constexpr std::size_t kBlocks = 16;
 
   /// `slowness`: moves take this many times as long.
-  explicit MotionQueue(const Point3& start, double acceleration = 500, double slowness = 1)
-      : rest_(start), acceleration_(acceleration), slowness_(slowness) {}
+  MotionQueue(const Point3& start, double start_delay_s, double slowness)
+      : rest_(start), start_delay_s_(start_delay_s), slowness_(slowness) {}
 
   /// Where the head is at time t. Forgets moves that ended before t, so t may not go backwards.
   Point3 at(double t);
@@ -39,7 +38,8 @@ class MotionQueue {
     double start, end;
   };
   Point3 rest_;
-  double acceleration_, slowness_;
+  static constexpr double kAcceleration = 500;
+  double start_delay_s_, slowness_;
   double end_ = -1;
   std::deque<Block> blocks_;
 };

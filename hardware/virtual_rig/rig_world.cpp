@@ -27,23 +27,38 @@ RigWorld::RigWorld(const RigSettings& settings, double t, BoardSink sink)
       printer_(printer_settings(settings), t, settings.printer_running),
       board_(board_settings(settings), t),
       sink_(std::move(sink)),
+      chunk_s_(settings.chunk_s),
+      chunk_due_(t),
+      chunk_dice_(settings.seed, 14),
       to_printer_bytes_(settings.faults.byte_rate, settings.seed, 11),
       from_printer_bytes_(settings.faults.byte_rate, settings.seed, 12),
       board_bytes_(settings.faults.byte_rate, settings.seed, 13) {}
 
-double RigWorld::next_event() const { return std::min(printer_.next_event(), board_.next_frame()); }
+double RigWorld::next_event() const {
+  return std::min(
+      {printer_.next_event(), board_.next_frame(), chunk_.empty() ? board_.next_frame() : chunk_due_});
+}
+
+void RigWorld::hand_on(double t) {
+  if (!chunk_.empty() && sink_ && !sink_(chunk_, t)) board_.refuse_last();
+  chunk_.clear();
+  chunk_due_ = t + 0.002 + (chunk_s_ - 0.002) * chunk_dice_.uniform();
+}
 
 void RigWorld::advance(double t) {
   while (board_.next_frame() <= t) {
     const double end = board_.next_frame();
+    if (chunk_s_ > 0 && chunk_due_ < end) hand_on(chunk_due_);
     const double middle = std::max(now_, end - 0.5 * board_.period());
     printer_.advance(middle);
     const Point3 head = printer_.head(middle);
     printer_.advance(end);
     now_ = end;
     const std::vector<std::byte> bytes = board_bytes_.apply(board_.make_frame(head));
-    if (!bytes.empty() && sink_ && !sink_(bytes, end)) board_.refuse_last();
+    chunk_.insert(chunk_.end(), bytes.begin(), bytes.end());
+    if (chunk_s_ <= 0) hand_on(end);
   }
+  if (chunk_s_ > 0 && chunk_due_ <= t) hand_on(chunk_due_);
   printer_.advance(t);
   now_ = std::max(now_, t);
 }

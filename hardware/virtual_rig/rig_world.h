@@ -19,6 +19,7 @@ struct RigSettings {
   VirtualBoardSettings board{};
   bool printer_running = false;  ///< booted long ago
   RigFaults faults{};            ///< replaces those of printer and board
+  double chunk_s = 0;            ///< an adapter hands the board's bytes on every 2 ms to so long; 0: at once
   std::uint64_t seed = 1;        ///< replaces those of printer and board
 };
 
@@ -42,10 +43,15 @@ class RigWorld {
   VirtualBoard& board() { return board_; }
 
  private:
+  void hand_on(double t);
+
   double now_;
   VirtualPrinter printer_;
   VirtualBoard board_;
   BoardSink sink_;
+  double chunk_s_, chunk_due_;
+  Dice chunk_dice_;
+  std::vector<std::byte> chunk_;  // of an adapter
   ByteFaults to_printer_bytes_, from_printer_bytes_, board_bytes_;
 };
 

@@ -37,10 +37,13 @@ std::string_view emergency_code(std::string_view line) {
 
 VirtualPrinter::VirtualPrinter(const VirtualPrinterSettings& settings, double t, bool already_running)
     : settings_(settings),
-      motion_(settings.head, 500, settings.slowness),
+      motion_(settings.head,
+              settings.start_delay_s > 0 ? settings.start_delay_s : (klipper() ? 0.253 : 0.107),
+              settings.slowness),
       dice_(settings.seed, 101),
       now_(t),
       boot_end_(t) {
+  if (klipper()) settings_.emergency_parser = settings_.keepalive = settings_.realtime_position = false;
   reset(t);
   if (already_running) {
     booting_ = false;
@@ -58,7 +61,7 @@ void VirtualPrinter::reset(double t) {
   received_.clear();
   partial_.clear();
   emergency_.clear();
-  blocked_ = repeat_after_block_ = homed_ = halted_ = relative_ = false;
+  blocked_ = repeat_after_block_ = homed_ = halted_ = relative_ = may_move_ = false;
   command_due_ = -1;
   last_line_ = 0;
   booting_ = true;
@@ -69,14 +72,14 @@ void VirtualPrinter::reset(double t) {
 
 void VirtualPrinter::receive(std::string_view bytes, double t) {
   advance(t);
-  if (booting_ || halted_ || unplugged_) return;
+  if (booting_ || (halted_ && !klipper()) || unplugged_) return;
   for (const char c : bytes) on_character(c, t);
   advance(t);
 }
 
 void VirtualPrinter::on_character(char c, double t) {
   if (settings_.emergency_parser) watch_for_emergency(c, t);
-  if (halted_) return;
+  if (halted_ && !klipper()) return;
   if (c != '\n' && c != '\r') {
     if (partial_.size() < kMaxLineBytes - 1) partial_.push_back(c);  // Marlin drops what does not fit
     return;
@@ -118,6 +121,7 @@ void VirtualPrinter::act_on_critical(std::string_view code, double t) {
 }
 
 void VirtualPrinter::accept_line(const std::string& line, double t) {
+  if (klipper()) return take_klipper_line(line, t);
   std::string command = line;
   if (line[0] == 'N') {
     if (!check_numbered(line, command)) return;
@@ -135,6 +139,22 @@ void VirtualPrinter::accept_line(const std::string& line, double t) {
   if (command_due_ < 0 && !blocked_) command_due_ = t + settings_.reply_delay_s;
 }
 
+// The number and the checksum are passed over. M112 acts ahead of the queue; then every line is refused.
+void VirtualPrinter::take_klipper_line(const std::string& line, double t) {
+  std::string command = line.substr(0, line.find('*'));
+  if (command[0] == 'N') command.erase(0, std::min(command.size(), command.find(' ')) + 1);
+  if (hook_) hook_(++last_line_, command, t);
+  if (command == "M112") halted_ = true, motion_.stop(t);
+  if (halted_) {
+    output_ +=
+        "// Shutdown due to M112 command\n// Once the underlying issue is corrected, use the\n"
+        "// \"FIRMWARE_RESTART\" command to reset the firmware\n!! Shutdown due to M112 command\nok\n";
+    return;
+  }
+  queue_.push_back(command);
+  if (command_due_ < 0 && !blocked_) command_due_ = t + settings_.reply_delay_s;
+}
+
 bool VirtualPrinter::check_numbered(const std::string& line, std::string& command) {
   const bool sets_number = line.find("M110") != std::string::npos;
   std::size_t digits = 1;
@@ -143,6 +163,8 @@ bool VirtualPrinter::check_numbered(const std::string& line, std::string& comman
     if (second != std::string::npos) digits = second + 1;
   }
   const std::int64_t number = integer_at(line, digits);
+  const bool repetition = number == last_line_ || number == last_line_ - 1;
+  if (repetition && !sets_number && settings_.firmware == Firmware::marlin) return false;
   if (number != last_line_ + 1 && !sets_number) {
     complain("Line Number is not Last Line Number+1");
     return false;
@@ -175,7 +197,7 @@ void VirtualPrinter::advance(double t) {
     now_ = std::max(now_, next_event());
     if (booting_) {
       booting_ = false;
-      output_ += marlin_banner();
+      if (!klipper()) output_ += marlin_banner();
     } else if (std::min(position_due_, temperature_due_) <= now_) {
       automatic_report(now_);
     } else if (blocked_ && blocked_until_ <= now_) {

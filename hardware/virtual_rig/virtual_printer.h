@@ -1,7 +1,8 @@
 // A printer that behaves like Marlin, as far as a host can tell: banner, line numbers, checksums, resend,
 // busy, M114 and M114 R, M400, M410, M112, motion with acceleration, soft limits that do nothing until homed
-// and clamp silently afterwards. A state machine on a time that its owner advances: no threads, no clock of
-// its own.
+// and clamp silently afterwards. Or like Klipper's host, which checks no number, reports the end of its
+// queue, moves nothing before it is homed or told a position, and answers M400 at its next look, every 0.1 s.
+// A state machine on a time that its owner advances: no threads, no clock of its own.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,11 @@
 
 namespace supertac {
 
+/// Marlin ignores a repeated line since 2.1.2; before, it complained of its number.
+enum class Firmware { marlin, marlin_before_2_1_2, klipper };
+
 struct VirtualPrinterSettings {
+  Firmware firmware = Firmware::marlin;
   Point3 head = rig::kMounted;    ///< where the head really is at power-on; the firmware believes 0, 0, 0
   Point3 bed = rig::kBed;         ///< soft limits once homed: 0 ... bed
   bool realtime_position = true;  ///< M114 R reports the head, not the end of the queue
@@ -29,10 +34,11 @@ struct VirtualPrinterSettings {
   double auto_position_s = 0;  ///< M154 as an earlier host left it on a running firmware; 0: off
   bool deaf_to_m154 = false;   ///< these reports cannot be switched off
   double auto_temperature_s = 0;
-  double quick_stop_s = 1;  ///< for which M410 holds the firmware
-  double slowness = 1;      ///< moves take this many times as long: a starved board
-  bool keepalive = true;    ///< echo:busy every 2 s
-  bool heartbeat = false;   ///< `wait` every second when idle
+  double quick_stop_s = 1;   ///< for which M410 holds the firmware
+  double start_delay_s = 0;  ///< from ok to a move's beginning; 0: what was measured, 0.107, Klipper 0.253
+  double slowness = 1;       ///< moves take this many times as long: a starved board
+  bool keepalive = true;     ///< echo:busy every 2 s
+  bool heartbeat = false;    ///< `wait` every second when idle
   double reply_delay_s = 0.0003;
   double boot_s = 0.4;         ///< power-on to `start`
   std::string boot_garbage{};  ///< bytes sent before the banner
@@ -92,12 +98,16 @@ class VirtualPrinter {
   void accept_line(const std::string& line, double t);
   bool check_numbered(const std::string& line, std::string& command);
   void complain(const std::string& what);
+  void take_klipper_line(const std::string& line, double t);
   void start_next(double t);
+  bool klipper() const { return settings_.firmware == Firmware::klipper; }
+  void unknown(const std::string& command);
   void run(const std::string& command, double t);
   void run_g(int code, const std::string& command, double t);
   void run_m(int code, const std::string& command, double t);
   void move(const std::string& command, double t);
   void home(double t);
+  void set_position(const std::string& command);
   void report(const Point3& physical);
   void block_until(double time, double now);
   void finish_block(double t);
@@ -133,7 +143,8 @@ class VirtualPrinter {
        relative_ = false;
   bool repeat_after_block_ = false;  // what holds the firmware is no command: no ok at its end
   bool waits_for_user_ = false;
-  std::string ok_text_;  // behind the next ok
+  bool may_move_ = false;  // Klipper was told a position
+  std::string ok_text_;    // behind the next ok
 };
 
 }  // namespace supertac

@@ -14,23 +14,32 @@ namespace supertac {
 namespace {
 
 // The number behind a letter, as Marlin's parser reads it.
-std::optional<double> parameter(const std::string& command, char letter) {
-  const std::size_t at = command.find(letter, 1);
+std::optional<double> parameter(const std::string& command, const std::string& name) {
+  const std::size_t at = command.find(name, 1);
   if (at == std::string::npos) return std::nullopt;
   double value = 0;
   const char* last = command.data() + command.size();
-  const auto [end, error] = std::from_chars(command.data() + at + 1, last, value, std::chars_format::fixed);
+  const auto [end, error] =
+      std::from_chars(command.data() + at + name.size(), last, value, std::chars_format::fixed);
   return error == std::errc{} ? std::optional(value) : std::nullopt;
 }
 
 }  // namespace
 
+void VirtualPrinter::unknown(const std::string& command) {
+  output_ += klipper() ? "// Unknown command:\"" + command.substr(0, command.find(' ')) + "\"\n"
+                       : "echo:Unknown command: \"" + command + "\"\n";
+}
+
 void VirtualPrinter::run(const std::string& command, double t) {
+  if (klipper() && command.starts_with("SET_KINEMATIC_POSITION")) return set_position(command);
+  // Klipper knows commands by their text, not by their number: M0114 is none of them.
+  if (klipper() && command.size() > 2 && command[1] == '0') return unknown(command);
   int code = -1;
   (void)std::from_chars(command.data() + 1, command.data() + command.size(), code);
   if (command[0] == 'G' && code >= 0) return run_g(code, command, t);
   if (command[0] == 'M' && code >= 0) return run_m(code, command, t);
-  output_ += "echo:Unknown command: \"" + command + "\"\n";
+  unknown(command);
 }
 
 void VirtualPrinter::run_g(int code, const std::string& command, double t) {
@@ -40,8 +49,8 @@ void VirtualPrinter::run_g(int code, const std::string& command, double t) {
     case 1:
       return move(command, t);
     case 4:
-      return block_until(std::max(t, motion_.end_time()) + parameter(command, 'S').value_or(0) +
-                             1e-3 * parameter(command, 'P').value_or(0),
+      return block_until(std::max(t, motion_.end_time()) + parameter(command, "S").value_or(0) +
+                             1e-3 * parameter(command, "P").value_or(0),
                          t);
     case 28:
       return home(t);
@@ -51,20 +60,30 @@ void VirtualPrinter::run_g(int code, const std::string& command, double t) {
     case 91:
       relative_ = code == 91;
       return;
-    case 92: {
-      const Point3 at = motion_.target();
-      if (const auto x = parameter(command, 'X')) offset_.x = at.x - *x;
-      if (const auto y = parameter(command, 'Y')) offset_.y = at.y - *y;
-      if (const auto z = parameter(command, 'Z')) offset_.z = at.z - *z;
-      return;
-    }
+    case 92:
+      return set_position(command);
     default:
       executed_.pop_back();
-      output_ += "echo:Unknown command: \"" + command + "\"\n";
+      unknown(command);
   }
 }
 
+void VirtualPrinter::set_position(const std::string& command) {
+  const Point3 at = motion_.target();
+  const bool kinematic = command[0] == 'S';
+  const auto named = [&](char axis) {
+    return parameter(command, kinematic ? std::string{' ', axis, '='} : std::string{axis});
+  };
+  if (const auto x = named('X')) offset_.x = at.x - *x;
+  if (const auto y = named('Y')) offset_.y = at.y - *y;
+  if (const auto z = named('Z')) offset_.z = at.z - *z;
+  may_move_ = may_move_ || kinematic;
+}
+
 void VirtualPrinter::run_m(int code, const std::string& command, double t) {
+  const bool only_marlin =
+      code == 0 || code == 17 || code == 108 || code == 154 || code == 155 || code == 211 || code == 410;
+  if (klipper() && only_marlin) return unknown(command);
   executed_.push_back({t, command});
   switch (code) {
     case 0:
@@ -74,9 +93,9 @@ void VirtualPrinter::run_m(int code, const std::string& command, double t) {
       return;
     case 154:
       if (settings_.deaf_to_m154) return;
-      return report_every(parameter(command, 'S').value_or(position_every_), temperature_every_);
+      return report_every(parameter(command, "S").value_or(position_every_), temperature_every_);
     case 155:
-      return report_every(position_every_, parameter(command, 'S').value_or(temperature_every_));
+      return report_every(position_every_, parameter(command, "S").value_or(temperature_every_));
     case 110:
     case 17:
     case 84:
@@ -89,24 +108,35 @@ void VirtualPrinter::run_m(int code, const std::string& command, double t) {
       return report(settings_.realtime_position && command.find('R') != std::string::npos ? motion_.at(t)
                                                                                           : motion_.target());
     case 115:
+      if (klipper()) {
+        ok_text_ = " FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.12.0-virtual";
+        return;
+      }
       output_ += marlin_capabilities(settings_.emergency_parser);
       return;
-    case 400:
-      return block_until(std::max(t, motion_.end_time()), t);
+    case 400: {
+      const double end = std::max(t, motion_.end_time());
+      return block_until(klipper() ? t + 0.1 * std::ceil((end - t) / 0.1) : end, t);
+    }
     case 410:
       motion_.stop(t);
       return block_until(t + settings_.quick_stop_s, t);
     default:
       executed_.pop_back();
-      output_ += "echo:Unknown command: \"" + command + "\"\n";
+      unknown(command);
   }
 }
 
 void VirtualPrinter::move(const std::string& command, double t) {
-  if (const auto f = parameter(command, 'F'); f && *f > 0) feed_ = *f / 60;
+  if (klipper() && !homed_ && !may_move_) {
+    executed_.pop_back();
+    output_ += "!! Must home axis first: 0.000 0.000 0.000 [0.000]\n";
+    return;
+  }
+  if (const auto f = parameter(command, "F"); f && *f > 0) feed_ = *f / 60;
   const Point3 from = motion_.target();
   const auto axis = [&](char letter, double physical, double offset, double limit) {
-    const auto value = parameter(command, letter);
+    const auto value = parameter(command, {letter});
     if (!value) return physical;
     double logical = relative_ ? physical - offset + *value : *value;
     if (homed_) logical = std::clamp(logical, 0.0, limit);  // silently, and before homing not at all
@@ -133,10 +163,15 @@ void VirtualPrinter::home(double t) {
 }
 
 void VirtualPrinter::report(const Point3& physical) {
-  const auto text = [](double v) { return format(std::abs(v) < 0.005 ? 0.0 : v, 2); };
+  const int digits = klipper() ? 3 : 2;
+  const auto text = [digits](double v) { return format(std::abs(v) < 0.005 ? 0.0 : v, digits); };
   const Point3 p{physical.x - offset_.x, physical.y - offset_.y, physical.z - offset_.z};
-  output_ += "X:" + text(p.x) + " Y:" + text(p.y) + " Z:" + text(p.z) +
-             " E:0.00 Count X:" + std::to_string(std::llround(80 * (physical.x - steps_zero_.x))) +
+  output_ += "X:" + text(p.x) + " Y:" + text(p.y) + " Z:" + text(p.z) + " E:" + text(0);
+  if (klipper()) {
+    output_ += "\n";
+    return;
+  }
+  output_ += " Count X:" + std::to_string(std::llround(80 * (physical.x - steps_zero_.x))) +
              " Y:" + std::to_string(std::llround(80 * (physical.y - steps_zero_.y))) +
              " Z:" + std::to_string(std::llround(400 * (physical.z - steps_zero_.z))) + "\n";
 }
@@ -162,7 +197,7 @@ void VirtualPrinter::automatic_report(double t) {
 void VirtualPrinter::pause(const std::string& command, double t) {
   if (!settings_.display && !settings_.emergency_parser) {
     executed_.pop_back();
-    output_ += "echo:Unknown command: \"" + command + "\"\n";
+    unknown(command);
     return;
   }
   waits_for_user_ = true;

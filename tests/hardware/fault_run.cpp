@@ -1,11 +1,13 @@
-#include "fault_run.h"
+#include "tests/hardware/fault_run.h"
 
-#include <cmath>
+#include <algorithm>
+#include <array>
+#include <map>
 
 #include "hardware/collection/collection.h"
 #include "hardware/ports/errors.h"
 #include "io/numbers/numbers.h"
-#include "rig_support.h"
+#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {
@@ -39,25 +41,82 @@ std::string check_moves(const std::vector<std::string>& ran, const std::vector<s
   return {};
 }
 
-// Frame number of an arrival: it is at most a fifth of a period late.
-std::int64_t frame_of(double arrival) {
-  return std::llround(std::floor((arrival - kWorldBegin) / rig::kFramePeriodS)) - 1;
-}
+constexpr std::uint64_t kWord = rig::kAdcCodes;  // of a sample
 
-std::string check_frames(const Journal& journal, FaultVerdict& verdict) {
-  std::vector<double> arrivals;
+/// Where the head was in the middle of every frame, by the frame's number, which the taxels carry eight
+/// times.
+class NumberedBoard {
+ public:
+  explicit NumberedBoard(RigSettings& settings) {
+    settings.board.noise_adc = 0;
+    settings.board.signals = [this](double, double, double, double) {
+      std::array<double, rig::kTaxels> volts{};
+      const std::uint64_t number = heads_.size() - 1;
+      for (std::size_t k = 0; k < volts.size(); k += 2) {
+        volts[k] = rig::volts_of(static_cast<int>(number % kWord));
+        volts[k + 1] = rig::volts_of(static_cast<int>(number / kWord));
+      }
+      return volts;
+    };
+  }
+  void watch(VirtualBoard& board) {
+    board.on_frame([this](std::uint64_t, double, const Point3& head, bool) { heads_.push_back(head); });
+  }
+  /// The numbers that two copies at least agree on: none in a damaged frame, two in a torn one.
+  std::vector<std::uint64_t> numbers_in(const std::function<int(std::size_t)>& taxel) const {
+    std::map<std::uint64_t, int> copies;
+    for (std::size_t k = 0; k < rig::kTaxels; k += 2)
+      ++copies[static_cast<std::uint64_t>(taxel(k)) + kWord * static_cast<std::uint64_t>(taxel(k + 1))];
+    std::vector<std::uint64_t> numbers;
+    for (const auto& [number, count] : copies)
+      if (count >= 2 && number < heads_.size()) numbers.push_back(number);
+    return numbers;
+  }
+  const Point3& head(std::uint64_t number) const { return heads_[number]; }
+
+ private:
+  std::vector<Point3> heads_;
+};
+
+// Every frame between the first and the last is received or missing.
+std::string check_frames(const Journal& journal, const NumberedBoard& board, const Collection& collection) {
+  std::vector<std::uint64_t> numbers;
   FrameDecoder decoder;
   for (const JournalRecord& record : journal.of(Stream::board)) {
-    decoder.push(record.bytes, [&](const BoardFrame&, std::uint64_t) { arrivals.push_back(record.time_s); });
+    decoder.push(record.bytes, [&](const BoardFrame& frame, std::uint64_t) {
+      for (const std::uint64_t number :
+           board.numbers_in([&](std::size_t k) { return frame.taxel(static_cast<int>(k)); }))
+        numbers.push_back(number);
+    });
   }
-  if (arrivals.empty()) return "no frames";
-  const FrameTimeline timeline = timeline_of(arrivals);
-  verdict.frames = arrivals.size();
-  verdict.missing = timeline.missing;
-  const std::int64_t made = frame_of(arrivals.back()) - frame_of(arrivals.front()) + 1;
-  const auto told = static_cast<std::int64_t>(verdict.frames + verdict.missing);
+  if (numbers.empty()) return "no frames";
+  const std::uint64_t made = numbers.back() - numbers.front() + 1;
+  const std::uint64_t told = collection.frames + collection.missing;
   if (made == told) return {};
   return "the board made " + std::to_string(made) + " frames, " + std::to_string(told) + " are accounted for";
+}
+
+// Compares every recorded frame with the truth, by its number.
+void judge_passes(const Collection& collection, const NumberedBoard& board, FaultVerdict& verdict) {
+  for (const CollectedPass& pass : collection.passes) {
+    verdict.doubt += pass.doubt + (pass.complete ? "" : "incomplete");
+    verdict.left_out += pass.left_out;
+    double worst = 0;
+    for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
+      const double* p = pass.position.data() + 3 * i;
+      const auto taxel = [&](std::size_t k) {
+        return rig::adc_of(static_cast<double>(pass.volts[rig::kTaxels * i + k]));
+      };
+      for (const std::uint64_t number : board.numbers_in(taxel))
+        worst = std::max(worst, distance(board.head(number), {p[0], p[1], p[2]}));
+    }
+    verdict.worst_mm = std::max(verdict.worst_mm, worst);
+    if (!pass.doubt.empty() || !pass.complete) continue;
+    verdict.worst_trusted_mm = std::max(verdict.worst_trusted_mm, worst);
+    if (worst > kTrustedMm && verdict.broken.empty())
+      verdict.broken = "pass " + std::to_string(pass.pass) + " is wrong by " + format(worst, 2) +
+                       " mm and does not say so";
+  }
 }
 
 std::string check_finger(const PalpationOutcome& outcome, SimulatedRig& rig, const Point3& head,
@@ -75,32 +134,47 @@ std::string check_finger(const PalpationOutcome& outcome, SimulatedRig& rig, con
 
 }  // namespace
 
-FaultVerdict run_faulty_collection(const RigFaults& faults, std::uint64_t seed, int passes) {
+FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan& plan,
+                                   const Point3& origin) {
   FaultVerdict verdict;
   const TemporaryFolder folder;
-  RigSettings rig_settings = running_rig();
-  rig_settings.faults = faults;
-  rig_settings.seed = seed;
+  rig_settings.printer.head = origin;
+  NumberedBoard board(rig_settings);
   SimulatedRig rig(rig_settings);
+  board.watch(rig.world().board());
   RecorderSettings settings;
-  settings.plan.passes = passes;
+  settings.plan = plan;
+  settings.origin = origin;
   settings.journal = folder / "journal";
   settings.header = "fault run";
+  settings.board.queue_frames = 16;
+  settings.board.silence_s = 5;
   const std::vector<std::string> planned = planned_moves(settings.plan, settings.origin);
   const std::vector<Leg> legs = legs_of(settings.plan, settings.origin);
   try {
     const RecorderReport report = record_palpation(rig.board_port(), rig.printer_port(), settings);
     const Point3 head = rig.world().printer().head(rig.now());
     verdict.complete = report.outcome.complete;
+    verdict.realtime = report.outcome.realtime_position;
     verdict.printer = report.printer;
-    verdict.broken = check_moves(moves_of(rig.world().printer()), planned, verdict);
+    if (verdict.realtime)  // otherwise Palpation measures moves in the air
+      verdict.broken = check_moves(moves_of(rig.world().printer()), planned, verdict);
     if (verdict.complete && distance(head, legs.back().to) > 0.05) {
       verdict.broken = "false done: the head is at " + describe(head);
     }
     if (!verdict.complete && verdict.broken.empty()) {
       verdict.broken = check_finger(report.outcome, rig, head, settings.plan.start.z);
     }
-    if (verdict.broken.empty()) verdict.broken = check_frames(read_journal(settings.journal), verdict);
+    const Journal journal = read_journal(settings.journal);
+    const Collection collection = collection_of(journal);
+    verdict.frames = collection.frames;
+    verdict.missing = collection.missing;
+    judge_passes(collection, board, verdict);
+    // Nobody can count frames to one that waited among lost ones.
+    const RigFaults& faults = rig_settings.faults;
+    const bool countable =
+        rig_settings.chunk_s == 0 && faults.host_freeze_rate == 0 && faults.freeze_rate == 0;
+    if (verdict.broken.empty() && countable) verdict.broken = check_frames(journal, board, collection);
     if (report.outcome.error) std::rethrow_exception(report.outcome.error);
   } catch (const HardwareError& error) {
     verdict.error = error.what();

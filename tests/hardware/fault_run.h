@@ -16,12 +16,18 @@ struct FaultVerdict {
   std::string error;      ///< of a run that was not complete
   double simulated_s = 0;
   MarlinLink::Counters printer;
-  std::uint64_t frames = 0, missing = 0;
+  bool realtime = true;  ///< M114 R
+  std::uint64_t frames = 0, missing = 0, left_out = 0;
+  std::string doubt;            ///< what the recordings say of themselves; "incomplete" where that is all
+  double worst_mm = 0;          ///< how far a recorded frame is from where it was made, at worst
+  double worst_trusted_mm = 0;  ///< the same of recordings without doubt
 };
 
-/// Runs the whole plan. Promises: complete with the head where it should be, every planned move run once and
-/// in order, every frame accounted for as received or missing; or a typed error with the finger lifted or the
-/// stop confirmed.
-FaultVerdict run_faulty_collection(const RigFaults& faults, std::uint64_t seed, int passes);
+/// Runs the whole plan on a rig whose frames carry their own number, by which they are compared with the
+/// truth. Promises: complete with the head where it should be, every planned move run once and in order,
+/// every frame accounted for as received or missing; or a typed error with the finger lifted or the stop
+/// confirmed. No recording is wrong by more than kTrustedMm without saying so.
+FaultVerdict run_faulty_collection(RigSettings rig, const PalpationPlan& plan,
+                                   const Point3& origin = rig::kMounted);
 
 }  // namespace supertac

@@ -24,6 +24,7 @@ class SimulatedRig::PrinterPort : public Port {
 
   Received read(std::span<std::byte> buffer, double until) override {
     std::unique_lock lock(rig_.mutex_);
+    rig_.maybe_freeze(lock);
     for (;;) {
       check();
       const std::vector<std::byte> fresh = rig_.world_.from_printer();
@@ -38,14 +39,17 @@ class SimulatedRig::PrinterPort : public Port {
     std::copy_n(rig_.printer_bytes_.begin(), count, buffer.begin());
     rig_.printer_bytes_.erase(rig_.printer_bytes_.begin(),
                               rig_.printer_bytes_.begin() + static_cast<std::ptrdiff_t>(count));
+    rig_.maybe_freeze(lock);
     return {count, rig_.world_.now()};
   }
 
   double write(std::span<const std::byte> bytes, double) override {
     std::unique_lock lock(rig_.mutex_);
+    rig_.maybe_freeze(lock);
     check();
     rig_.advance(lock, rig_.world_.now() + static_cast<double>(bytes.size()) * kByteSeconds);
     rig_.world_.to_printer(bytes);
+    rig_.maybe_freeze(lock);
     return rig_.world_.now();
   }
 
@@ -109,6 +113,8 @@ class SimulatedRig::BoardPort : public Port {
 
 SimulatedRig::SimulatedRig(const RigSettings& settings)
     : latency_(settings.seed, 303),
+      freezes_(settings.seed, 304),
+      freeze_rate_(settings.faults.host_freeze_rate),
       world_(settings, 1000.0,
              [this](std::span<const std::byte> bytes, double t) { return take_board_bytes(bytes, t); }) {}
 
@@ -119,9 +125,41 @@ std::unique_ptr<Port> SimulatedRig::board_port() { return std::make_unique<Board
 
 bool SimulatedRig::take_board_bytes(std::span<const std::byte> bytes, double t) {
   if (!board_listens_ || board_gone_) return true;  // nobody looks
+  if (frozen_until_ > t) return hold(bytes);
   board_time_ = std::max(board_time_, t + kUsbLatency * latency_.uniform());
   board_chunks_.push_back({board_time_, {bytes.begin(), bytes.end()}});
   return true;
+}
+
+// A port of a host that stands still: full, it takes what fits of a frame, and nothing of the next.
+bool SimulatedRig::hold(std::span<const std::byte> bytes) {
+  const std::size_t count = std::min(bytes.size(), room_);
+  room_ -= count;
+  if (count > 0)
+    board_chunks_.push_back(
+        {frozen_until_, {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count)}});
+  if (count < bytes.size()) room_ = 0;
+  return count == bytes.size();
+}
+
+// SIGSTOP: both ports' clocks go on, nothing is read. Afterwards the kernel hands on what its buffers held, a
+// terminal's worth at a time.
+void SimulatedRig::maybe_freeze(std::unique_lock<std::mutex>& lock) {
+  if (!freezes_.hit(freeze_rate_)) return;
+  constexpr std::size_t kTerminal = 4095, kTerminals = 6;
+  frozen_until_ = world_.now() + 0.1 + 1.9 * freezes_.uniform();
+  room_ = kTerminal * (1 + freezes_.below(kTerminals - 1)) - freezes_.below(rig::kFrameBytes);
+  const std::size_t before = board_chunks_.size();
+  world_.advance(frozen_until_);
+  board_time_ = std::max(board_time_, frozen_until_);
+  std::size_t held = 0;
+  for (std::size_t i = before; i < board_chunks_.size(); ++i) {
+    held += board_chunks_[i].bytes.size();
+    if (held > kTerminal) held = 0, board_time_ += 5e-5 + 2e-4 * freezes_.uniform();
+    board_chunks_[i].time_s = board_time_;
+  }
+  changed_.notify_all();
+  advance(lock, board_time_);
 }
 
 void SimulatedRig::advance(std::unique_lock<std::mutex>& lock, double t) {

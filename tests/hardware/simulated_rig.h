@@ -44,13 +44,17 @@ class SimulatedRig {
     std::vector<std::byte> bytes;
   };
   bool take_board_bytes(std::span<const std::byte> bytes, double t);
+  bool hold(std::span<const std::byte> bytes);
+  void maybe_freeze(std::unique_lock<std::mutex>& lock);
   void advance(std::unique_lock<std::mutex>& lock, double t);
 
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Chunk> board_chunks_;
   std::vector<std::byte> printer_bytes_;
-  Dice latency_;
+  Dice latency_, freezes_;
+  double freeze_rate_, frozen_until_ = 0;
+  std::size_t room_ = 0;  // in the kernel's buffers while the host stands still
   double board_time_ = 0;
   bool board_listens_ = false, board_gone_ = false, printer_gone_ = false;
   RigWorld world_;

@@ -1,4 +1,4 @@
-#include "unplug_run.h"
+#include "tests/hardware/unplug_run.h"
 
 #include <algorithm>
 #include <atomic>
@@ -11,7 +11,7 @@
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
 #include "hardware/virtual_rig/pty_rig.h"
-#include "rig_support.h"
+#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {

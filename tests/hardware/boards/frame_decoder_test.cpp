@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "rig_support.h"
+#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {

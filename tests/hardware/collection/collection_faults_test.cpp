@@ -8,7 +8,7 @@
 #include "hardware/collection/collection.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "hardware/ports/errors.h"
-#include "rig_support.h"
+#include "tests/hardware/rig_support.h"
 #include "tests/io/faults.h"
 
 namespace supertac {

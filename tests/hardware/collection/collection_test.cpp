@@ -8,8 +8,8 @@
 #include "hardware/collection/capture.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "hardware/ports/errors.h"
-#include "rig_support.h"
 #include "tests/expect_error.h"
+#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {
@@ -217,7 +217,7 @@ TEST(Collection, ABoardThatGoesAwayInContactEndsWithTheFingerUp) {
 TEST(Collection, TheOperatorsStopLiftsTheFinger) {
   CollectionBench bench(running_rig());
   std::atomic<bool> stop{false};
-  bench.settings.stop = &stop;
+  bench.settings.stop = [&stop] { return stop.load(); };
   bench.settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters&) {
     if (leg.phase == Phase::slide && at.y > 120) stop = true;
   };

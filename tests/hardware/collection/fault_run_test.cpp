@@ -1,23 +1,37 @@
-#include "fault_run.h"
+#include "tests/hardware/fault_run.h"
 
 #include <gtest/gtest.h>
+
+#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {
 
-// The 200 runs of the promise are a program of their own: rig_fault_runs.
+RigSettings faulty(const RigFaults& faults, std::uint64_t seed, Firmware firmware = Firmware::marlin) {
+  RigSettings rig = running_rig();
+  rig.faults = faults;
+  rig.seed = seed;
+  rig.printer.firmware = firmware;
+  return rig;
+}
+
+// The 1,000 runs of the promise are a program of their own: rig_fault_runs.
 TEST(FaultRun, TwoPassesAtTwoPerMilleOfTheBytes) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    const FaultVerdict verdict = run_faulty_collection({.byte_rate = 0.002}, seed, 2);
-    EXPECT_EQ(verdict.broken, "") << "seed " << seed;
-    EXPECT_TRUE(verdict.complete) << "seed " << seed << ": " << verdict.error;
-    EXPECT_GT(verdict.printer.faults + verdict.printer.timeouts, 10U) << "no faults were injected";
+    for (const Firmware firmware : {Firmware::marlin, Firmware::marlin_before_2_1_2}) {
+      const FaultVerdict verdict =
+          run_faulty_collection(faulty({.byte_rate = 0.002}, seed, firmware), {.passes = 2});
+      EXPECT_EQ(verdict.broken, "") << "seed " << seed;
+      EXPECT_TRUE(verdict.complete) << "seed " << seed << ": " << verdict.error;
+      EXPECT_GT(verdict.printer.faults + verdict.printer.timeouts, 10U) << "no faults were injected";
+    }
   }
 }
 
 TEST(FaultRun, EverythingAtOnceIsNeverAFalseDone) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    EXPECT_EQ(run_faulty_collection(RigFaults::mixed(0.002), seed, 2).broken, "") << "seed " << seed;
+    EXPECT_EQ(run_faulty_collection(faulty(RigFaults::mixed(0.002), seed), {.passes = 2}).broken, "")
+        << "seed " << seed;
   }
 }
 

@@ -12,8 +12,8 @@
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
 #include "io/numbers/hash.h"
-#include "rig_support.h"
 #include "tests/expect_error.h"
+#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {

@@ -1,4 +1,4 @@
-#include "unplug_run.h"
+#include "tests/hardware/unplug_run.h"
 
 #include <gtest/gtest.h>
 

@@ -18,8 +18,8 @@
 #include "hardware/ports/port_list.h"
 #include "hardware/ports/serial_termios.h"
 #include "hardware/virtual_rig/pty_rig.h"
-#include "rig_support.h"
 #include "tests/expect_error.h"
+#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {

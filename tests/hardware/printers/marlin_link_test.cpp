@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "rig_support.h"
 #include "tests/expect_error.h"
+#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {

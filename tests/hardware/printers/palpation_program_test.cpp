@@ -7,8 +7,8 @@
 
 #include "hardware/ports/errors.h"
 #include "hardware/printers/marlin_link.h"
-#include "rig_support.h"
 #include "tests/expect_error.h"
+#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "rig_support.h"
 #include "tests/expect_error.h"
+#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {

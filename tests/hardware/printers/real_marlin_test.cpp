@@ -4,8 +4,8 @@
 #include <sstream>
 
 #include "hardware/printers/palpation.h"
-#include "rig_support.h"
 #include "tests/expect_error.h"
+#include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {
