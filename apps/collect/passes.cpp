@@ -63,6 +63,7 @@ Recording recording_of(const CollectedPass& pass, const Header& header, const st
   recording.metadata = {{"complete", pass.complete ? "true" : "false"},
                         {"missing_frames", std::to_string(pass.missing)},
                         {"time_base", pass.positions > 0 ? "M114 R" : "modelled motion"}};
+  if (pass.left_out > 0) recording.metadata["left_out_frames"] = std::to_string(pass.left_out);
   if (!damage.empty()) recording.metadata["damage"] = damage;
   if (!pass.doubt.empty()) recording.metadata["doubt"] = pass.doubt;
   return recording;
@@ -82,11 +83,17 @@ Quality quality_of(const CollectedPass& pass) {
 
 nlohmann::ordered_json to_json(const CollectedPass& pass, const std::string& file) {
   const Quality quality = quality_of(pass);
-  return {{"pass", pass.pass},           {"file", file},
-          {"complete", pass.complete},   {"seconds", quality.seconds},
-          {"frames", quality.frames},    {"frames_per_s", quality.rate_hz},
-          {"missing", pass.missing},     {"suspect", quality.suspect},
-          {"positions", pass.positions}, {"rejected_positions", pass.rejected_positions},
+  return {{"pass", pass.pass},
+          {"file", file},
+          {"complete", pass.complete},
+          {"seconds", quality.seconds},
+          {"frames", quality.frames},
+          {"frames_per_s", quality.rate_hz},
+          {"missing", pass.missing},
+          {"left_out", pass.left_out},
+          {"suspect", quality.suspect},
+          {"positions", pass.positions},
+          {"rejected_positions", pass.rejected_positions},
           {"doubt", pass.doubt}};
 }
 
@@ -94,6 +101,7 @@ std::string to_line(const CollectedPass& pass) {
   const Quality quality = quality_of(pass);
   return "pass " + std::to_string(pass.pass) + ": " + std::to_string(quality.frames) + " frames (" +
          format(quality.rate_hz, 1) + "/s), " + std::to_string(pass.missing) + " missing, " +
+         (pass.left_out > 0 ? std::to_string(pass.left_out) + " left out of uncertain time, " : "") +
          std::to_string(quality.suspect) + " suspect, " + std::to_string(pass.positions) + " positions" +
          (pass.complete ? "" : ", incomplete") + (pass.doubt.empty() ? "" : ", doubtful: " + pass.doubt);
 }
@@ -112,6 +120,7 @@ std::string journal_path(const std::string& folder, const std::string& plate, in
 
 std::string PassesReport::total() const {
   return std::to_string(frames) + " frames" +
+         (left_out > 0 ? ", " + std::to_string(left_out) + " left out, their time being uncertain" : "") +
          (doubtful > 0 ? ", " + std::to_string(doubtful) + " passes with doubtful positions" : "") +
          (damage.empty() ? "" : ", " + damage);
 }
@@ -131,6 +140,7 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
     arguments.print(to_line(pass));
     passes.push_back(to_json(pass, name));
     report.frames += pass.time_s.size();
+    report.left_out += pass.left_out;
     report.doubtful += pass.doubt.empty() ? 0 : 1;
   }
   if (Plate::is_file(header.plate))
@@ -151,6 +161,7 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
                  {"board_period_us", 1e6 * clock.measured_s},
                  {"board_period_plausible", clock.plausible},
                  {"frames", report.frames},
+                 {"left_out", report.left_out},
                  {"doubtful_passes", report.doubtful},
                  {"passes", passes}};
   return report;

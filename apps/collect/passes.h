@@ -15,6 +15,7 @@ std::string journal_path(const std::string& folder, const std::string& plate, in
 /// What a journal held, for the reader and for --json.
 struct PassesReport {
   std::size_t frames = 0;    ///< in the recordings
+  std::size_t left_out = 0;  ///< frames whose time is uncertain
   std::size_t doubtful = 0;  ///< passes whose positions may be wrong
   bool complete = false;     ///< the run ended as planned
   std::string damage = {};   ///< of the journal, in words; empty: none
