@@ -168,21 +168,26 @@ void FrameNumbering::decide(std::vector<FramePlace>& places) {
   const std::uint64_t total = std::max(missing_, static_cast<std::uint64_t>(std::max(periods, 0.0)));
   const std::uint64_t lost = total - missing_;
   const bool alone = burst.steps.size() == 1;
-  const bool unknown = decided_ == 0 && !alone;
   // That a last burst is late proves no loss: what would have made it good did not come.
   if (alone || !bursts_.empty()) missing_ = total;
+  // What waited among lost frames may be any of them, up to a burst that has all frames of its time and is
+  // not late. The first of that one may still be half an old frame.
+  const double made = (burst.time_s - decided_s_) / period_;
+  const double late = lateness(burst) - envelope_ - period_ * static_cast<double>(missing_);
+  const bool settled =
+      static_cast<double>(burst.last - decided_last_) > 0.9 * made - 1.5 && late < 1.5 * period_;
+  doubt_ = static_cast<std::uint32_t>(std::min<std::uint64_t>(doubt_ + lost, kAnything));
+  if (decided_ == 0 && !alone) doubt_ = kAnything;
   if (alone) index_ += lost;
   for (const std::uint32_t step : burst.steps) {
     index_ += step;
-    const auto doubt = static_cast<std::uint32_t>(std::min<std::uint64_t>(lost, kAnything));
-    places.push_back({index_, unknown ? kAnything : std::max(doubt, std::exchange(torn_, 0U))});
+    places.push_back({index_, doubt_});
+    if (lost == 0 && settled && decided_ > 0) doubt_ = 0;
   }
-  if (!alone) {
-    index_ += lost;
-    // The frame behind a full port may be half an old one.
-    torn_ = static_cast<std::uint32_t>(std::min<std::uint64_t>(lost, kAnything));
-  }
-  track(lateness(burst) - envelope_ - period_ * static_cast<double>(missing_));
+  if (!alone) index_ += lost;
+  decided_s_ = burst.time_s;
+  decided_last_ = burst.last;
+  track(late);
   if (minimum_.front().first == decided_) minimum_.pop_front();
   ++decided_;
 }

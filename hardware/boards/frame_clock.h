@@ -104,7 +104,9 @@ class FrameNumbering {
   std::uint64_t closed_ = 0, decided_ = 0;                // bursts
   std::size_t waiting_ = 0;                               // frames in bursts_
   std::uint64_t counted_ = 0, missing_ = 0, damaged_ = 0, index_ = 0;
-  std::uint32_t torn_ = 0;  // doubt of the first frame behind a loss
+  std::uint32_t doubt_ = 0;  // of what comes next
+  double decided_s_ = 0;     // when the newest decided burst was read, and its last frame
+  std::uint64_t decided_last_ = 0;
   double envelope_ = 0, block_minimum_ = 0;
   int in_block_ = 0;
 };

@@ -142,21 +142,23 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
   exchange.code = text;
   exchange.answer.sent_s = send(kept_.back());
   exchange.until = exchange.answer.sent_s + exchange.deadline_s;
-  exchange.limit = exchange.answer.sent_s + std::max(exchange.deadline_s, settings_.longest_wait_s);
-  std::string line;
+  // Behind its deadline a long command may still have to be asked for.
+  const double usual_s = deadline_s > settings_.ok_deadline_s ? deadline_s : 0;
+  exchange.limit = exchange.answer.sent_s + usual_s + settings_.longest_wait_s;
+  std::string line = "nothing";
   while (!exchange.done) {
-    if (read_line(std::min(exchange.until, exchange.limit), line)) {
-      on_reply(exchange, parse_reply(line));
-    } else {
-      ++counters_.timeouts;
-      ask(exchange);
-    }
-    if (!exchange.done && input_time_ > exchange.limit) {
+    const bool answered = read_line(std::min(exchange.until, exchange.limit), line);
+    if (answered) on_reply(exchange, parse_reply(line));
+    const double now = answered ? input_time_ : port_.now();
+    if (!exchange.done && now >= exchange.limit) {
       throw PrinterSilent("printer " + port_.name() + ": expected the end of " + in_quotes(code) +
                           " within " + format(exchange.limit - exchange.answer.sent_s, 0) +
                           " s, found other answers (" + in_quotes(line) +
                           " last); check the printer and start again");
     }
+    if (answered) continue;
+    ++counters_.timeouts;
+    ask(exchange);
   }
   finish(exchange);
   if (exchange.proven && deadline_s > settings_.ok_deadline_s) {
@@ -181,7 +183,7 @@ void MarlinLink::count_copy(Exchange& exchange, const std::string& why) {
   const bool loop = ++exchange.copies > 4 * settings_.max_repeats;
   if (++exchange.repeats > settings_.max_repeats || loop) {
     const std::string text = "printer " + port_.name() + ": line " + std::to_string(exchange.cursor) +
-                             " repeated " + std::to_string(exchange.repeats - 1) +
+                             " repeated " + std::to_string((loop ? exchange.copies : exchange.repeats) - 1) +
                              " times without success (" + why + ")";
     if (exchange.fault || loop) throw ResendLoop(text + ": resend loop; check the cable and start again");
     throw PrinterSilent(text + (complaint_.empty() ? "" : ", it said " + in_quotes(complaint_)) +
@@ -371,9 +373,10 @@ bool MarlinLink::read_line(double until, std::string& line) {
   std::array<std::byte, 1024> buffer{};
   while (!take_line(line)) {
     if (watch_) watch_();
-    const double slice = watch_ ? std::min(until, port_.now() + kWatchInterval) : until;
+    const double wait = std::min(until, give_up_s_);
+    const double slice = watch_ ? std::min(wait, port_.now() + kWatchInterval) : wait;
     const Received got = port_.read(buffer, slice);
-    if (got.time_s > give_up_s_) {
+    if (got.time_s >= give_up_s_) {
       throw PrinterSilent("printer " + port_.name() + ": did not come to an end in time" +
                           (complaint_.empty() ? "" : ", it said " + in_quotes(complaint_)) +
                           "; check the printer and start again");

@@ -24,7 +24,7 @@ struct MarlinSettings {
   double probe_interval_s = 1;     ///< between two M110 N0 while connecting
   double ok_deadline_s = 2.5;      ///< of an ordinary command; Marlin's first echo:busy comes after 2 s
   double busy_deadline_s = 6;      ///< after echo:busy (Marlin repeats it every 2 s)
-  double longest_wait_s = 60;      ///< for one command without a longer deadline, whatever is said meanwhile
+  double longest_wait_s = 60;      ///< for one command, behind a longer deadline of its own, whatever is said
   double quiet_s = 0.05;           ///< silence that ends a disturbance
   int max_repeats = 8;             ///< of one line, for any reason; four times as many while catching up
   std::size_t kept_lines = 64;     ///< for Resend; RIG asks for 50

@@ -86,6 +86,7 @@ void VirtualPrinter::on_character(char c, double t) {
   }
   const std::string line = std::move(partial_);
   partial_.clear();
+  if (klipper() && line.find("M112") != std::string::npos) return take_klipper_line(line, t);
   // What arrives while a command holds the firmware waits in the receive buffer, and is lost when that is
   // full.
   if (!line.empty() && received_.size() < kReceiveLines) received_.push_back(line);

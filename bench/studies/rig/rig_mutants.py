@@ -8,6 +8,7 @@ the copy is built once, and each mutant is run against the tests that are to cat
 exit code 1 when one survives.
 """
 
+import glob
 import os
 import shutil
 import subprocess
@@ -25,14 +26,12 @@ MUTANTS = [
      "if (line.size() > kMaxLineBytes && !MUTANT) {", "MarlinLine.RefusesWhat*"),
     (3, "the ok of a resend acknowledges", "marlin_link.cpp", "  if (exchange.fault) {", "  if (exchange.fault && !MUTANT) {",
      "MarlinLink.DamagedLine*"),
-    (3, "no end to resending", "marlin_link.cpp", "if (++exchange.repeats > settings_.max_repeats) {",
-     "if (++exchange.repeats > settings_.max_repeats && !MUTANT) {", "MarlinLink.SameLineTooOften*"),
-    (4, "repeats without the number", "marlin_link.cpp", 'exchange.answer.sent_s = send("\\n" + line);',
-     'exchange.answer.sent_s = send("\\n" + (MUTANT ? line.substr(line.find(\' \') + 1) : line));',
+    (3, "no end to resending", "marlin_link.cpp", "if (++exchange.repeats > settings_.max_repeats || loop) {",
+     "if ((++exchange.repeats > settings_.max_repeats || loop) && !MUTANT) {", "MarlinLink.SameLineTooOften*"),
+    (4, "asks by the same line", "marlin_link.cpp", "numbered_line(number_ + kFarAhead,", "numbered_line(number_ + (MUTANT ? 0 : kFarAhead),",
      "MarlinLink.LostOk*:MarlinLink.EveryLineRunsOnce*"),
     (5, "an unknown command counts as run", "marlin_link.cpp",
-     "case ReplyKind::unknown_command:  // acknowledged by the ok that follows, but not run\n      ++counters_.faults;\n      exchange.fault = true;",
-     "case ReplyKind::unknown_command:\n      ++counters_.faults;\n      exchange.fault = !MUTANT;",
+     "  ++counters_.faults;\n  exchange.fault = true;\n}", "  ++counters_.faults;\n  exchange.fault = !MUTANT;\n}",
      "MarlinLink.LostLeadingN*"),
     (6, "busy renews nothing", "marlin_link.cpp", "exchange.until = std::max(exchange.until, input_time_",
      "if (!MUTANT) exchange.until = std::max(exchange.until, input_time_", "MarlinLink.BusyRenews*"),
@@ -72,7 +71,7 @@ MUTANTS = [
      "BoardFrame.EveryHighByte*:FrameDecoder.AcceptsHardly*"),
     (15, "jumps are not flagged", "frame_clock.cpp", "const bool flag = far && flagged_ < 3;", "const bool flag = far && flagged_ < 3 && !MUTANT;",
      "JumpDetector.*"),
-    (16, "gaps are not counted", "frame_clock.cpp", "  missing_ = total;", "  if (!MUTANT) missing_ = total;", "FrameTimeline.*"),
+    (16, "gaps are not counted", "frame_clock.cpp", "missing_ = total;", "missing_ = MUTANT ? missing_ : total;", "FrameTimeline.*"),
     (16, "nothing is suspect after a stall", "tactile_board.cpp", "> 1.5 * rig::kFramePeriodS", "> (MUTANT ? 1e9 : 1.5) * rig::kFramePeriodS",
      "TactileBoard.LostFrames*"),
     (17, "the queue has no end", "tactile_board.cpp", "} else if (queue_.size() >= settings_.queue_frames) {",
@@ -92,7 +91,7 @@ SWITCH = "#include <cstdlib>\n#define MUTANT(number) (std::getenv(\"SUPERTAC_MUT
 def plant(tree):
     """Puts every mutant into the copy, switched by its number from 1."""
     for number, (_, what, file, old, new, _) in enumerate(MUTANTS, 1):
-        path = os.path.join(tree, "hardware", file)
+        path, = glob.glob(os.path.join(tree, "hardware", "*", file))
         with open(path) as source:
             text = source.read()
         if text.count(old) < 1:

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <functional>
+
 #include "tests/expect_error.h"
 #include "tests/hardware/rig_support.h"
 
@@ -32,7 +35,10 @@ struct Bench {
 };
 
 struct TamperedBench {
-  TamperedBench() : rig(running_rig()), port(rig.printer_port()), link(port) { link.connect(); }
+  explicit TamperedBench(const RigSettings& settings = running_rig())
+      : rig(settings), port(rig.printer_port()), link(port) {
+    link.connect();
+  }
   VirtualPrinter& printer() { return rig.world().printer(); }
   void go(int count) {
     for (int i = 1; i <= count; ++i) link.command("G1 X" + std::to_string(i));
@@ -102,14 +108,27 @@ TEST(MarlinLink, SameLineTooOftenIsAResendLoop) {
   EXPECT_TRUE(moves_of(bench.printer()).empty());
 }
 
-TEST(MarlinLink, LostOkIsAskedForWithTheSameLineAndNothingRunsTwice) {
-  for (const char* damage : {"", "ok\x0e", "o\n", "k\n", "\xefk\n"}) {
-    TamperedBench bench;
-    bench.port.from_printer = {{"ok\n", damage}};
-    bench.go(5);
-    EXPECT_EQ(moves_of(bench.printer()), bench.expected(5)) << "ok became \"" << damage << '"';
-    EXPECT_GE(bench.link.counters().repeats, 1U);
+TEST(MarlinLink, LostOkIsAskedForAndNothingRunsTwice) {
+  for (const Firmware firmware : {Firmware::marlin, Firmware::marlin_before_2_1_2}) {
+    for (const char* damage : {"", "ok\x0e", "o\n", "k\n", "\xefk\n"}) {
+      RigSettings settings = running_rig();
+      settings.printer.firmware = firmware;
+      TamperedBench bench(settings);
+      bench.port.from_printer = {{"ok\n", damage}};
+      const double begin = bench.rig.now();
+      bench.go(5);
+      EXPECT_EQ(moves_of(bench.printer()), bench.expected(5)) << "ok became \"" << damage << '"';
+      EXPECT_EQ(bench.link.counters().repeats, 1U);
+      EXPECT_LT(bench.rig.now() - begin, 4);
+    }
   }
+}
+
+TEST(MarlinLink, ALineThatNeverArrivedIsSentAgain) {
+  TamperedBench bench;
+  bench.port.to_printer = {{"N6 G1 X3*", "\n;"}};
+  bench.go(5);
+  EXPECT_EQ(moves_of(bench.printer()), bench.expected(5));
 }
 
 TEST(MarlinLink, LostLeadingNIsAcknowledgedButNotRun) {
@@ -185,6 +204,90 @@ TEST(MarlinLink, ARefusedCommandIsNotSentForEver) {
   bench.before_line(1, [](VirtualPrinter& printer, double) { printer.inject("Error:Probing failed\n"); });
   EXPECT_ERROR(bench.link.command("G1 X1"), PrinterRefused, ": Error:Probing failed");
   EXPECT_NO_THROW(bench.link.command("M114"));
+}
+
+/// A device that answers every line by a rule of its own, in a time that passes while it is read.
+class ScriptedPrinter : public Port {
+ public:
+  using Answer = std::function<std::string(const std::string& line)>;
+  explicit ScriptedPrinter(Answer answer, std::string always = {})
+      : answer_(std::move(answer)), always_(std::move(always)) {}
+  const std::string& name() const override { return name_; }
+  double now() override { return now_; }
+  Received read(std::span<std::byte> buffer, double until) override {
+    now_ += always_.empty() && waiting_.empty() ? std::max(0.0, until - now_) : 0.01;
+    waiting_ += always_;
+    const std::size_t count = std::min(buffer.size(), waiting_.size());
+    std::copy_n(std::as_bytes(std::span(waiting_)).begin(), count, buffer.begin());
+    waiting_.erase(0, count);
+    return {count, now_};
+  }
+  double write(std::span<const std::byte> bytes, double) override {
+    const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    for (std::size_t at = 0; at < text.size();) {
+      const std::size_t end = std::min(text.find('\n', at), text.size());
+      if (end > at) waiting_ += answer_(text.substr(at, end - at));
+      at = end + 1;
+    }
+    ++writes_;
+    return now_;
+  }
+  int writes() const { return writes_; }
+
+ private:
+  Answer answer_;
+  std::string name_ = "script", waiting_, always_;
+  double now_ = 0;
+  int writes_ = 0;
+};
+
+std::string connects(const std::string& line) { return line.starts_with("N0 ") ? "ok\n" : ""; }
+
+TEST(MarlinLink, APrinterThatAsksForLineOneForEverIsAResendLoop) {
+  ScriptedPrinter port([](const std::string& line) -> std::string {
+    if (line.starts_with("N0 ") || line.starts_with("N1 ")) return "ok\n";
+    return "Error:Line Number is not Last Line Number+1, Last Line: 0\nResend: 1\nok\n";
+  });
+  MarlinLink link(port);
+  EXPECT_ERROR(link.connect(), ResendLoop, "resend loop; check the cable");
+  EXPECT_LT(port.now(), 60);
+  EXPECT_LT(port.writes(), 200);
+}
+
+TEST(MarlinLink, BusyForEverEnds) {
+  ScriptedPrinter port(connects, "echo:busy: processing\n");
+  MarlinLink link(port);
+  EXPECT_ERROR(link.connect(), PrinterSilent,
+               "within 60 s, found other answers ('echo:busy: processing' last)");
+  EXPECT_LT(port.now(), 90);
+}
+
+TEST(MarlinLink, AnswersWithoutProgressEnd) {
+  ScriptedPrinter talker(connects, "T:25.0\n");
+  MarlinLink link(talker);
+  EXPECT_ERROR(link.connect(), PrinterSilent, "within 60 s");
+  EXPECT_LT(talker.now(), 90);
+  ScriptedPrinter stranger([](const std::string&) { return ""; }, "hello\n");
+  MarlinLink other(stranger);
+  EXPECT_ERROR(other.connect(), WrongDevice, "it said 'hello'");
+  EXPECT_LT(stranger.now(), 25);
+}
+
+TEST(MarlinLink, ARunHasABoundOfItsOwn) {
+  ScriptedPrinter port(connects, "echo:busy: processing\n");
+  MarlinLink link(port);
+  link.give_up_at(5);
+  EXPECT_ERROR(link.connect(), PrinterSilent, "did not come to an end in time");
+  EXPECT_LT(port.now(), 5.1);
+}
+
+TEST(MarlinLink, GrblIsRefusedByName) {
+  for (const char* answer : {"error:20\n", "Grbl 1.1h ['$' for help]\n", "ALARM:1\n"}) {
+    ScriptedPrinter port([answer](const std::string&) { return answer; });
+    MarlinLink link(port);
+    EXPECT_ERROR(link.connect(), WrongDevice, "expected Marlin or Klipper, found GRBL");
+    EXPECT_LT(port.now(), 5);
+  }
 }
 
 TEST(MarlinLink, EveryLineRunsOnceInOrderAtFiftyTimesTheUsualFaults) {

@@ -1,6 +1,7 @@
 // What real Marlin firmware did and the drivers did not expect.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <sstream>
 
 #include "hardware/printers/palpation.h"
@@ -104,6 +105,55 @@ TEST(RealMarlin, AdvancedOkAndTemperatureBehindTheOkAreUnderstood) {
   bench.printer.confirm_origin(rig::kMounted);
   for (const char* code : {"G21", "M105", "M155 S0"}) bench.printer.link().command(code);
   EXPECT_EQ(bench.printer.link().counters().repeats, 0U);
+}
+
+RigSettings klipper_rig() {
+  RigSettings settings = running_rig();
+  settings.printer.firmware = Firmware::klipper;
+  return settings;
+}
+
+TEST(Klipper, IsConnectedConfirmedAndMoved) {
+  PrinterBench bench(klipper_rig());
+  EXPECT_TRUE(bench.printer.link().capabilities().klipper);
+  bench.printer.confirm_origin(rig::kMounted);
+  bench.printer.start_move({120, 110, 131.81}, 20);
+  bench.printer.finish_move();
+  EXPECT_LT(distance(bench.head(), {120, 110, 131.81}), 1e-6);
+  EXPECT_EQ(bench.printer.link().counters().repeats, 0U);
+  EXPECT_TRUE(bench.printer.quick_stop().confirmed);
+}
+
+TEST(Klipper, IsHomedWithTheFingerUp) {
+  PrinterBench bench(klipper_rig());
+  bench.printer.home();
+  const auto& executed = bench.firmware().executed();
+  const auto at = [&](const std::string& command) {
+    return std::find_if(executed.begin(), executed.end(),
+                        [&](const auto& e) { return e.command.starts_with(command); });
+  };
+  EXPECT_LT(at("G1 Z10"), at("G28"));
+  EXPECT_NE(at("G28"), executed.end());
+}
+
+TEST(Klipper, WhatItSaysReachesTheUser) {
+  PrinterBench bench(klipper_rig());
+  EXPECT_ERROR(bench.printer.link().command("G1 X10"), PrinterRefused, "!! Must home axis first");
+  EXPECT_ERROR(bench.printer.link().command("M410"), PrinterRefused, "// Unknown command:\"M410\"");
+  EXPECT_TRUE(bench.printer.emergency_stop().confirmed);
+}
+
+TEST(RealMarlin, AStopWhileItHomesStopsTheHead) {
+  for (const bool klipper : {false, true}) {
+    PrinterBench bench(klipper ? klipper_rig() : running_rig());
+    const double begin = bench.rig.now();
+    bench.printer.link().set_watch([&] {
+      if (bench.rig.now() > begin + 4) throw OperatorStop("asked to stop");
+    });
+    EXPECT_THROW(bench.printer.home(), OperatorStop);
+    EXPECT_LT(bench.rig.now() - begin, 5.7);
+    EXPECT_FALSE(bench.firmware().moving(bench.rig.now()));
+  }
 }
 
 /// Sends the program as a simple host does: line by line, each after the ok of the one before.
