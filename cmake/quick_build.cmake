@@ -1,7 +1,5 @@
-# -DSUPERTAC_QUICK_BUILD=ON, as scripts/demo.sh and scripts/test.sh have it: neighbouring files are compiled six at a time,
-# and headers of the standard library, JSON and GoogleTest are parsed once. Together they take away more than half of the
-# time. Off by default, since a file that forgets an #include would compile with it, and one that is changed takes five
-# others along.
+# -DSUPERTAC_QUICK_BUILD=ON, as scripts/demo.sh and scripts/test.sh have it: headers of the standard library, JSON and
+# GoogleTest are parsed once for all files. Off by default, since a file that forgets an #include would compile with it.
 if(NOT SUPERTAC_QUICK_BUILD)
   return()
 endif()
@@ -19,7 +17,7 @@ file(WRITE ${PROJECT_BINARY_DIR}/precompiled.cpp "int main() {}\n")
 # Files for one instruction set have flags with which a header compiled without them is of no use, and names in common.
 file(GLOB_RECURSE own_flags ${PROJECT_SOURCE_DIR}/autograd/kernels/fast/*.cpp)
 set_source_files_properties(${own_flags} TARGET_DIRECTORY supertac_autograd supertac_autograd_f64
-  PROPERTIES SKIP_PRECOMPILE_HEADERS ON SKIP_UNITY_BUILD_INCLUSION ON)
+  PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
 
 # A library (-fPIC) and a program (-fPIE) cannot share a header, nor can files with OpenMP and without, nor examples, which
 # have none of our options.
