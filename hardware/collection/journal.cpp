@@ -137,12 +137,12 @@ void JournalWriter::append(Stream stream, RecordKind kind, double time_s, std::s
     flush_due_ = true;
     wake_.notify_all();
   }
-  Pending& pending = pending_[stream];
+  std::vector<std::byte>& payload = pending_[stream];
   pending_bytes_ += kRecordHeader + bytes.size();
-  pending.payload.push_back(static_cast<std::byte>(kind));
-  put(pending.payload, time_s);
-  put(pending.payload, static_cast<std::uint32_t>(bytes.size()));
-  pending.payload.insert(pending.payload.end(), bytes.begin(), bytes.end());
+  payload.push_back(static_cast<std::byte>(kind));
+  put(payload, time_s);
+  put(payload, static_cast<std::uint32_t>(bytes.size()));
+  payload.insert(payload.end(), bytes.begin(), bytes.end());
 }
 
 void JournalWriter::event(double time_s, std::string_view text) {
@@ -188,7 +188,7 @@ void JournalWriter::failed(const std::string& what) {
 }
 
 void JournalWriter::flush() {
-  std::map<Stream, Pending> chunks;
+  std::map<Stream, std::vector<std::byte>> chunks;
   {
     std::lock_guard lock(mutex_);
     chunks.swap(pending_);
@@ -196,8 +196,8 @@ void JournalWriter::flush() {
     flush_due_ = false;
     if (!error_.empty()) return;  // after a failed write nothing behind it would be read anyway
   }
-  for (const auto& [stream, pending] : chunks) {
-    for (const std::span<const std::byte> part : parts_of(pending.payload))
+  for (const auto& [stream, payload] : chunks) {
+    for (const std::span<const std::byte> part : parts_of(payload))
       write_chunk(stream, get<double>(part, 1), part);
   }
 }

@@ -53,9 +53,6 @@ class JournalWriter {
   const std::string& path() const { return path_; }
 
  private:
-  struct Pending {
-    std::vector<std::byte> payload;
-  };
   void run();
   void run_sync();
   void flush();
@@ -67,7 +64,7 @@ class JournalWriter {
   int descriptor_ = -1;
   std::mutex mutex_;
   std::condition_variable wake_, stopping_;
-  std::map<Stream, Pending> pending_;
+  std::map<Stream, std::vector<std::byte>> pending_;  // payloads
   std::size_t pending_bytes_ = 0;
   std::uint64_t bytes_ = 0, most_bytes_;
   double oldest_pending_ = 0;  // recorded time of the first record in pending_

@@ -17,10 +17,6 @@ constexpr double kWatchInterval = 0.02;  // a fifth of the 0.1 s in which an unp
 constexpr std::int64_t kPlausibleLag = 4;
 constexpr std::int64_t kFarAhead = 1000;  // no firmware takes such a number for a repetition
 
-bool is_number(std::string_view text) {
-  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
-}
-
 }  // namespace
 
 struct MarlinLink::Exchange {
@@ -86,11 +82,9 @@ void MarlinLink::nobody_answered() const {
 
 // GRBL answers "error:20" and "ALARM:1"; Marlin's errors are words.
 void MarlinLink::refuse_grbl(const std::string& line) const {
-  const std::string_view text = line;
-  const bool is_grbl = text.starts_with("Grbl ") ||
-                       (text.starts_with("error:") && is_number(text.substr(6))) ||
-                       (text.starts_with("ALARM:") && is_number(text.substr(6)));
-  if (!is_grbl) return;
+  const bool numbered = line.starts_with("error:") || line.starts_with("ALARM:");
+  if (!line.starts_with("Grbl ") && !(numbered && line.size() > 6 && line[6] >= '0' && line[6] <= '9'))
+    return;
   throw WrongDevice("port " + port_.name() + ": expected Marlin or Klipper, found GRBL (" + in_quotes(line) +
                     "), which has no line numbers and no M400; use a printer with one of the two");
 }

@@ -162,45 +162,30 @@ bool Printer::stands_still() {
   return same >= 3;
 }
 
-Printer::Stop Printer::stop_by_waiting() {
-  Stop stop;
-  try {
-    link_.settle();
-    link_.command("M400", 1.5 * expected_seconds_ + kMoveMargin);
-    target_ = agreed_position();
-    expected_seconds_ = 0;
-    stop.confirmed = true;
-    stop.text = "the head stands at the end of its move (Klipper ends what it has begun)";
-  } catch (const HardwareError& error) {
-    stop.text = error.what();
-  }
-  return stop;
-}
-
 Printer::Stop Printer::quick_stop() {
-  if (link_.capabilities().klipper) return stop_by_waiting();
+  const bool klipper = link_.capabilities().klipper;
   Stop stop;
   stop.ahead_of_queue = link_.capabilities().emergency_parser;
   try {
-    link_.emergency("M410");
+    if (!klipper) link_.emergency("M410");
     link_.settle();
-    stop.confirmed = stands_still();
+    const bool stands = klipper || stands_still();
     // The position of the queue is that of the head only once nothing moves any more.
     link_.command("M400",
                   stop.ahead_of_queue ? settings_.stop_deadline_s : 1.5 * expected_seconds_ + kMoveMargin);
     target_ = agreed_position();
     expected_seconds_ = 0;
+    stop.confirmed = stands;
   } catch (const PrinterHalted&) {
     stop.confirmed = true;
   } catch (const HardwareError& error) {
-    stop.confirmed = false;
     stop.text = std::string("the head could not be shown to stand still, switch the printer off (") +
                 error.what() + ")";
     return stop;
   }
   stop.text = stop.confirmed ? "the head stands still"
                              : "the head could not be shown to stand still; switch the printer off";
-  if (!stop.ahead_of_queue)
+  if (!stop.ahead_of_queue && !klipper)
     stop.text +=
         " (this firmware has no emergency parser: a stop acts when its line is read, not before an M400 "
         "ends)";

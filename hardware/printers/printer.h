@@ -81,7 +81,6 @@ class Printer {
 
  private:
   bool stands_still();
-  Stop stop_by_waiting();
 
   PrinterSettings settings_;
   MarlinLink link_;

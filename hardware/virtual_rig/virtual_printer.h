@@ -71,7 +71,6 @@ class VirtualPrinter {
   bool moving(double t) { return motion_.end_time() > t; }
   bool halted() const { return halted_; }
   bool unplugged() const { return unplugged_; }
-  bool homed() const { return homed_; }
   /// Restarts the firmware at time t: the position is forgotten, moves stop where they are.
   void reset(double t);
   /// Called with every numbered line that is about to run, and its time; the tests' hook for planting faults.

@@ -65,14 +65,14 @@ class NumberedBoard {
   void watch(VirtualBoard& board) {
     board.on_frame([this](std::uint64_t, double, const Point3& head, bool) { heads_.push_back(head); });
   }
-  /// The numbers that two copies at least agree on: none in a damaged frame, two in a torn one.
+  /// The numbers that three copies at least agree on: two in a torn frame. Two copies may be flipped alike.
   std::vector<std::uint64_t> numbers_in(const std::function<int(std::size_t)>& taxel) const {
     std::map<std::uint64_t, int> copies;
     for (std::size_t k = 0; k < rig::kTaxels; k += 2)
       ++copies[static_cast<std::uint64_t>(taxel(k)) + kWord * static_cast<std::uint64_t>(taxel(k + 1))];
     std::vector<std::uint64_t> numbers;
     for (const auto& [number, count] : copies)
-      if (count >= 2 && number < heads_.size()) numbers.push_back(number);
+      if (count >= 3 && number < heads_.size()) numbers.push_back(number);
     return numbers;
   }
   const Point3& head(std::uint64_t number) const { return heads_[number]; }

@@ -45,6 +45,22 @@ TEST(CollectProgram, SignalsInContactLiftTheFingerAndKeepWhatWasRecorded) {
   }
 }
 
+// A printer that says nothing is waited for 20 s; nothing moves, so that a signal ends the program at once.
+TEST(CollectProgram, ASignalWhileItConnectsEndsItWithoutATrace) {
+  CollectRun run(1);
+  const TemporaryFolder folder;
+  const PseudoTerminal silent(folder / "silent");
+  for (const int signal : {SIGINT, SIGTERM}) {
+    RunningProcess process("supertac-collect", run.arguments({"--printer", folder / "silent"}));
+    wait_for_file(run.journal());
+    process.send(signal);
+    const ProcessResult result = process.wait();
+    EXPECT_EQ(result.code, 128 + signal) << result.error;
+    EXPECT_TRUE(is_one_line(result.error)) << result.error;
+    EXPECT_EQ(run.files(), "");
+  }
+}
+
 TEST(CollectProgram, AfterAKillTheJournalIsRecoveredAndTheOriginMustBeConfirmed) {
   CollectRun run;
   RunningProcess process("supertac-collect", run.arguments());
