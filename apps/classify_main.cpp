@@ -18,7 +18,7 @@ void declare(Arguments& a) {
   a.required("data", "DIR", "recordings to train the classifiers on and to test them with");
   a.option("plates", "A,B,...", "the classes (default: the plates the first model was trained on)");
   a.option("views", "A,B,...",
-           "what the classifiers see: frame (the last one, levelled as the network sees it), bicubic, "
+           "what the classifiers see: frame (the last one, normalised as the network sees it), bicubic, "
            "super_resolved, latents, historyN (the last N "
            "frames), truth; each is compared with the first",
            "frame,super_resolved,latents,history32");
@@ -122,8 +122,8 @@ int run(Arguments& a) {
 
   const Answers given = all_answers(a, views, models, exams, windows, classes, settings);
   const auto results = count(given, views, exams, windows, classes, a.text("data"));
-  const std::string frames = windows.settings().scaling.levelled
-                                 ? "levelled to the window's own rest and gain"
+  const std::string frames = windows.settings().scaling.per_window
+                                 ? "normalised to the window's own rest and gain"
                                  : "scaled by the model's fixed range";
   a.print("frame: the last frame of the window as the network sees it, " + frames + ", not the raw voltages");
   for (const std::string& line : tables(results, classes)) a.print(line);

@@ -10,7 +10,7 @@
 #include "data/plates/plate_file.h"
 #include "data/plates/truth.h"
 #include "data/recordings/recording.h"
-#include "data/windows/levelling.h"
+#include "data/windows/normalise_window.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
 #include "models/files/model_file.h"
@@ -208,7 +208,7 @@ int run(Arguments& a) {
   const auto scaled = std::span(track.samples).last(frames * signals);
   Tensor input(file.model->input_shape(1));
   std::copy(scaled.begin(), scaled.end(), input.data());
-  if (w.scaling.levelled) level(input.values(), signals);
+  if (w.scaling.per_window) normalise_window(input.values(), signals);
   if (!a.text("out").ends_with(".safetensors")) return draw_graph(a, file, recording, input, track);
   const std::uint64_t n = part.frames(), t = frames, s = signals;
   std::vector<Array> arrays{array("time_s", {n}, std::span<const double>(part.time_s)),
@@ -225,7 +225,7 @@ int run(Arguments& a) {
   const Json signal = {{"rate_hz", w.rate_hz},
                        {"rest_volts", w.scaling.rest_volts},
                        {"span_volts", w.scaling.span_volts},
-                       {"levelled", w.scaling.levelled},
+                       {"levelled", w.scaling.per_window},
                        {"least_gain", kLeastGain},
                        {"rest_removed", kRestRemoved}};
   write_safetensors(a.output("out"),

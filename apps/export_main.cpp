@@ -8,7 +8,7 @@ namespace supertac {
 
 void declare(Arguments& arguments) {
   arguments.positional("MODEL", "a model that supertac-train wrote, for recordings or for pairs")
-      .required("onnx", "FILE", "the network as ONNX: volts in, picture out, scaling and levelling inside");
+      .required("onnx", "FILE", "the network as ONNX: volts in, picture out, scaling and normalisation inside");
 }
 
 int run(Arguments& arguments) {

@@ -28,7 +28,7 @@ void declare(Arguments& arguments) {
       .option("speed", "MM_PER_S", "sliding speed of the passes in mm/s", "10")
       .option("pictures", "DIR",
               "write index.html: the signals of each pass under the plate they were fitted to")
-      .flag("skip-bad", "leave out files that are no recordings instead of giving up");
+      .flag("skip-bad", "leave out files and folders that are no recordings instead of giving up");
 }
 
 namespace {

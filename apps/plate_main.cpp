@@ -13,7 +13,11 @@ nlohmann::ordered_json write_stl(const Arguments& arguments, const Plate& plate)
   const std::string path = arguments.text("out");
   const auto triangles = mesh_of(plate, {.resolution_mm = arguments.number("resolution", 0.02, 5),
                                          .base_mm = arguments.number("base", 0.2, 100)});
-  write_file(arguments.output("out"), stl_bytes(triangles, "SuperTac plate " + plate.name() + ", mm"));
+  // Named after no file: the same plate, however it is called, gives the same bytes.
+  const std::string name = Plate::is_file(plate.name()) ? "read from STL" : plate.name();
+  const auto bytes =
+      read_option("resolution", [&] { return stl_bytes(triangles, "SuperTac plate " + name + ", mm"); });
+  write_file(arguments.output("out"), bytes);
   arguments.print(path + ": " + plate.name() + ", heights " + format(plate.min_height(), 2) + " to " +
                   format(plate.max_height(), 2) +
                   " mm, texture from y = " + format(plate.texture_begin(), 2) + " to " +

@@ -34,7 +34,7 @@ Bits bits_here() {
   add(recording, std::span(pass.volts));
   add(recording, std::span(pass.time_s));
   WindowSet windows(
-      {.timesteps = 32, .scale = 4, .rate_hz = 100, .scaling = {.levelled = true}, .stride = 4});
+      {.timesteps = 32, .scale = 4, .rate_hz = 100, .scaling = {.per_window = true}, .stride = 4});
   windows.add(pass, ".");
   Recipe settings;
   settings.model = SuperTacSettings::of_preset("tiny");

@@ -11,7 +11,7 @@
 namespace supertac {
 
 enum class ViewKind {
-  frame,    ///< the last frame as the network sees it: rows x columns, levelled when its windows are
+  frame,    ///< the last frame as the network sees it: rows x columns, normalised when its windows are
   bicubic,  ///< the same enlarged to the picture's size, so that only its content differs from a picture
   super_resolved,  ///< the network's picture
   latents,         ///< the means of the latent distributions

@@ -115,14 +115,14 @@ void write_pictures(const Ensemble& model, double interval_factor, const WindowS
   const auto drawing = [&](std::span<const std::uint32_t> chosen) {
     return drawing_of(model, interval_factor, windows, chosen);
   };
-  const std::vector<std::uint32_t> strips = spread(touching.empty() ? test : touching, kStrips);
+  const std::vector<std::uint32_t> strips = evenly_spaced(touching.empty() ? test : touching, kStrips);
   write_png(folder.add("strips.png"), figure(drawing(strips), windows, 96, true, "Windows in contact"));
   for (const auto& [pass, list] : by_pass) {
     const WindowSet::Pass& p = windows.passes()[pass];
     const std::string name = p.plate + "_t" + std::to_string(p.trial) + "_p" + std::to_string(p.pass) + "_v" +
                              std::to_string(static_cast<int>(p.speed_mm_s));
     write_png(folder.add("film_" + name + ".png"),
-              figure(drawing(spread(list, kFilmColumns)), windows, 48, false,
+              figure(drawing(evenly_spaced(list, kFilmColumns)), windows, 48, false,
                      p.plate + ", trial " + std::to_string(p.trial) + ", pass " + std::to_string(p.pass) +
                          ", " + format(p.speed_mm_s) + " mm/s"));
   }

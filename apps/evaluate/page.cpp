@@ -165,7 +165,7 @@ std::vector<std::uint32_t> EvaluationPage::film_frames(std::span<const std::uint
   const std::size_t most =
       std::clamp<std::size_t>(kFilmFrames / std::max<std::size_t>(1, of_pass.size()), 1, kFramesOfPass);
   for (const auto& [pass, all] : of_pass) {
-    const std::vector<std::uint32_t> some = spread(all, most);
+    const std::vector<std::uint32_t> some = evenly_spaced(all, most);
     frames.insert(frames.end(), some.begin(), some.end());
   }
   return frames;

@@ -51,7 +51,7 @@ void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, Tes
         "every one of them");
   const auto limit =
       static_cast<std::size_t>(a.integer("limit", 0, std::numeric_limits<std::uint32_t>::max()));
-  if (limit > 0) tested.split.test = spread(tested.split.test, limit);
+  if (limit > 0) tested.split.test = evenly_spaced(tested.split.test, limit);
   if (tested.split.train.empty())
     throw std::runtime_error(
         "the split leaves nothing to fit the baselines on; --split none fits them to what is tested");

@@ -173,7 +173,7 @@ std::vector<std::uint32_t> Sweep::windows_to_score(const WindowSet& windows, con
   if (chosen.empty())
     throw UsageError("--history " + a_.text("history") + " leaves none of the " +
                      std::to_string(split.test.size()) + " test windows; give a smaller number");
-  return limit > 0 ? spread(chosen, limit) : chosen;
+  return limit > 0 ? evenly_spaced(chosen, limit) : chosen;
 }
 
 nlohmann::ordered_json Sweep::row(const Recipe& recipe, const TrainingRun& training,

@@ -9,7 +9,8 @@ namespace supertac {
 
 void declare_training(Arguments& a) {
   a.option("split", "NAME",
-           "what is kept for testing: window, pass, trial, texture or none; with --pairs group, pair or none "
+           "what is kept for testing: window, pass, trial, texture, group or none; with --pairs group, pair "
+           "or none "
            "(default: group, or pair for a file without groups)",
            "trial");
   a.option("epochs", "N", "passes over the training examples (default: the preset's 20; tiny: 80)");
@@ -54,10 +55,11 @@ void declare_window_training(Arguments& a) {
       "a signal V becomes clip((REST - V) / SPAN, 0, 1), in volts or whatever the recordings hold; auto: "
       "the rig's 2.45,0.36, or where it does not fit what the recordings show",
       "auto");
-  a.option("scaling", "NAME",
-           "of the signals: levelled (each window to its own rest and gain, so that a finger pressed harder "
-           "is seen like any other) or fixed",
-           "levelled");
+  a.option(
+      "scaling", "NAME",
+      "of the signals: per-window (each window to its own rest and gain, so that a finger pressed harder "
+      "is seen like any other) or fixed",
+      "per-window");
   a.option("augment", "NAME",
            "standard: random gains, offsets, noise, dropped taxels and a finger lifted a little, for unseen "
            "trials, and signals in which nothing is felt; none",
@@ -110,14 +112,14 @@ static std::optional<Scaling> stated_range(const Arguments& a) {
 Recipe recipe_of(const Arguments& a, Recipe r) {
   read_pace(a, r);
   if (a.given("split"))
-    r.split = split_kind(a.choice("split", {"window", "pass", "trial", "texture", "none"}));
+    r.split = split_kind(a.choice("split", {"window", "pass", "trial", "texture", "group", "none"}));
   if (a.given("leave-out")) r.leave_out = a.list("leave-out");
   if (a.given("plates")) r.plates = a.list("plates");
   if (a.given("stride")) r.stride = a.integer("stride", 1, 100'000);
   if (a.given("random-plates")) r.random_plates = a.integer("random-plates", 0, 50'000);
   if (a.given("rate")) r.rate_hz = a.number("rate", 20, 2000);
   if (a.given("range")) r.range = stated_range(a);
-  if (a.given("scaling")) r.levelled = a.choice("scaling", {"levelled", "fixed"}) == "levelled";
+  if (a.given("scaling")) r.per_window = a.choice("scaling", {"per-window", "fixed"}) == "per-window";
   if (a.given("augment"))
     r.augment =
         a.choice("augment", {"standard", "none"}) == "standard" ? kStandardAugmentation : AugmentSettings{};

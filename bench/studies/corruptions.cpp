@@ -12,7 +12,7 @@
 #include "apps/common/running/signals.h"
 #include "data/scores/metrics.h"
 #include "data/sensors/rig.h"
-#include "data/windows/levelling.h"
+#include "data/windows/normalise_window.h"
 #include "data/windows/signal_features.h"
 #include "data/windows/split.h"
 #include "io/files/file.h"
@@ -189,7 +189,7 @@ class CorruptedWindows : public Examples {
   void input(std::size_t i, std::span<float> out) const override {
     std::ranges::copy(windows_.window(i), out.begin());
     if (corruption_ != nullptr) corruption_->apply(severity_, i, out);
-    if (windows_.settings().scaling.levelled) level(out, kTaxels);
+    if (windows_.settings().scaling.per_window) normalise_window(out, kTaxels);
   }
   void target(std::size_t i, std::span<float> out) const override { windows_.target(i, out); }
   Zone zone(std::size_t i) const override { return windows_.zone(i); }
@@ -265,7 +265,7 @@ int run(Arguments& a) {
   const Split split = make_split(windows, split_kind(file.metadata_or("split", "none")),
                                  parse_uint(file.metadata_or("seed", "0")).value_or(0),
                                  comma_list(file.metadata_or("leave_out", "")));
-  const auto chosen = spread(split.test, static_cast<std::size_t>(a.integer("limit", 1, 100'000'000)));
+  const auto chosen = evenly_spaced(split.test, static_cast<std::size_t>(a.integer("limit", 1, 100'000'000)));
   const Point usual = measure(files, CorruptedWindows(windows, nullptr, 0), chosen);
   const std::string name = a.text("name");
   std::string text =

@@ -162,8 +162,8 @@ void HeightMap::measure() {
     min_height_ = std::min(min_height_, double{low});
     if (double{high} - mean > kUniformMm || mean - double{low} > kUniformMm) uniform_in_x_ = false;
     if (low == 0 && high == 0) continue;
-    if (!textured) texture_begin_ = static_cast<double>(row) * kCellMm;
-    texture_end_ = static_cast<double>(row) * kCellMm;
+    if (!textured) texture_begin_ = static_cast<double>(std::max<std::size_t>(row, 1) - 1) * kCellMm;
+    texture_end_ = static_cast<double>(std::min(row + 1, rows_ - 1)) * kCellMm;
     textured = true;
   }
 }

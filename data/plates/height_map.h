@@ -27,7 +27,8 @@ class HeightMap : public Surface {
 
   double max_height() const override { return max_height_; }
   double min_height() const override { return min_height_; }
-  /// First and last y at which something differs from the flat part; the middle when nothing does.
+  /// The nodes before the first and behind the last that differ from the flat part; the middle when none
+  /// does.
   double texture_begin() const override { return texture_begin_; }
   double texture_end() const override { return texture_end_; }
   /// True when no height differs by more than 0.05 mm from the mean of its row.

@@ -67,7 +67,25 @@ double distance_to_nearest(double at, double first, double pitch, int count) {
   return at - (first + index * pitch);
 }
 
+std::string in_lower_case(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+// The name that differs by the case of letters only; empty when none does.
+std::string meant(const std::string& name) {
+  for (const RigPlate& plate : kRigPlates)
+    if (in_lower_case(plate.name) == in_lower_case(name)) return plate.name;
+  for (const TextureKind& kind : kKinds)
+    if (in_lower_case(name).starts_with(kind.word)) return in_lower_case(name);
+  return in_lower_case(name) == "plain" ? "plain" : "";
+}
+
 [[noreturn]] void refuse(const std::string& name, const std::string& why) {
+  const std::string other = meant(name);
+  if (!other.empty() && other != name)
+    throw std::invalid_argument("plate \"" + name + "\": names are case-sensitive, is " + other + " meant?");
   std::string words;
   for (const TextureKind& kind : kKinds) words += (words.empty() ? "" : "|") + std::string(kind.word);
   throw std::invalid_argument("plate \"" + name + "\": " + why +
@@ -116,7 +134,9 @@ std::string generic_name(const std::string& name) {
 
 }  // namespace
 
-bool Plate::is_file(const std::string& name) { return name.ends_with(".stl") || name.ends_with(".STL"); }
+bool Plate::is_file(const std::string& name) {
+  return name.size() > 4 && in_lower_case(name.substr(name.size() - 4)) == ".stl";
+}
 
 Plate Plate::named(const std::string& name) {
   if (is_file(name))

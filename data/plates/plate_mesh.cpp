@@ -56,11 +56,20 @@ struct Top {
   const Vertex& at(std::size_t row, std::size_t column) const { return points[row * xs.size() + column]; }
 };
 
+// Surfaces that were read count as uniform within more than a solid may be off.
+bool is_same_along_x(const Plate& plate, const std::vector<double>& xs, const std::vector<double>& ys) {
+  constexpr double kSameMm = 1e-3;
+  return plate.uniform_in_x() && std::ranges::all_of(ys, [&](double y) {
+           return std::ranges::all_of(
+               xs, [&](double x) { return std::abs(plate.height(x, y) - plate.height(0, y)) <= kSameMm; });
+         });
+}
+
 Top top_of(const Plate& plate, double step) {
   Top top;
-  top.xs = plate.uniform_in_x() ? std::vector<double>{0, Plate::kWidthMm}
-                                : without_slivers(lattice(0, Plate::kWidthMm, step));
+  top.xs = without_slivers(lattice(0, Plate::kWidthMm, step));
   top.ys = lines_along_y(plate, step);
+  if (is_same_along_x(plate, top.xs, top.ys)) top.xs = {0, Plate::kWidthMm};
   for (const double y : top.ys)
     for (const double x : top.xs)
       top.points.push_back(

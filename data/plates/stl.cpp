@@ -4,7 +4,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <stdexcept>
 
 #include "io/files/file.h"
@@ -47,12 +46,19 @@ class Words {
 
   /// The next word; empty at the end.
   std::string_view next() {
-    while (at_ < text_.size() && is_space(text_[at_])) line_ += text_[at_++] == '\n';
+    for (; at_ < text_.size() && is_space(text_[at_]); ++at_)
+      line_ += text_[at_] == '\n' || (text_[at_] == '\r' && text_.substr(at_ + 1, 1) != "\n");
     const std::size_t begin = at_;
     while (at_ < text_.size() && !is_space(text_[at_])) ++at_;
     return text_.substr(begin, at_ - begin);
   }
-  void skip_line() { at_ = std::min(text_.find('\n', at_), text_.size()); }
+  void skip_line() { at_ = std::min(text_.find_first_of("\r\n", at_), text_.size()); }
+  /// Whether the word comes anywhere behind this place.
+  bool any_left(std::string_view word) {
+    for (auto found = next(); !found.empty(); found = next())
+      if (same(found, word)) return true;
+    return false;
+  }
 
   void expect(std::string_view word) {
     if (const auto found = next(); !same(found, word)) reject(std::string(word), found);
@@ -99,7 +105,11 @@ std::vector<Triangle> parse_text(std::string_view text, const std::string& name)
   std::vector<Triangle> triangles;
   Words words(text, name);
   for (auto word = words.next(); !word.empty(); word = words.next()) {
-    if (!Words::same(word, "solid")) words.reject("solid", word);
+    if (!Words::same(word, "solid")) {
+      // Remarks of the exporter behind the last solid; but not a solid whose first word is damaged.
+      if (triangles.empty() || words.any_left("facet")) words.reject("solid", word);
+      break;
+    }
     words.skip_line();  // the solid's name
     for (word = words.next(); Words::same(word, "facet"); word = words.next())
       triangles.push_back(parse_facet(words));
@@ -126,14 +136,15 @@ std::array<float, 3> normal_of(const Triangle& t) {
 }  // namespace
 
 std::vector<Triangle> parse_stl(std::span<const std::byte> bytes, const std::string& name) {
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // byte-order mark
   std::uint32_t count = 0;
   if (bytes.size() >= kHeadBytes) std::memcpy(&count, bytes.data() + kTitleBytes, sizeof count);
   const std::uint64_t length = kHeadBytes + std::uint64_t{kFacetBytes} * count;
   std::vector<Triangle> triangles;
   if (bytes.size() >= kHeadBytes && length == bytes.size()) {
     triangles = parse_binary(bytes, name);
-  } else if (text.starts_with("solid") && text.find('\0') == std::string_view::npos) {
+  } else if (Words::same(Words(text, name).next().substr(0, 5), "solid") && text.find('\0') == std::string_view::npos) {
     triangles = parse_text(text, name);
   } else if (bytes.size() < kHeadBytes) {
     throw FileError(name, "has " + std::to_string(bytes.size()) +
@@ -154,9 +165,11 @@ std::vector<Triangle> read_stl(const std::string& path) {
 std::vector<std::byte> stl_bytes(const std::vector<Triangle>& triangles, std::string_view title) {
   if (title.starts_with("solid"))
     throw std::invalid_argument("stl_bytes: the title begins with \"solid\", which marks a text file");
-  if (triangles.size() > std::numeric_limits<std::uint32_t>::max())
-    throw std::invalid_argument("stl_bytes: an STL file counts its triangles in 32 bits, got " +
-                                std::to_string(triangles.size()));
+  if (kHeadBytes + kFacetBytes * triangles.size() > kMaxStlBytes)
+    throw std::invalid_argument(std::to_string(triangles.size()) + " triangles are " +
+                                std::to_string(kFacetBytes * triangles.size() >> 20) +
+                                " MiB of STL, and no program here reads more than " +
+                                std::to_string(kMaxStlBytes >> 20) + "; try a coarser resolution");
   std::vector<std::byte> bytes(kHeadBytes + kFacetBytes * triangles.size());
   std::memcpy(bytes.data(), title.data(), std::min(title.size(), kTitleBytes));
   const auto count = static_cast<std::uint32_t>(triangles.size());

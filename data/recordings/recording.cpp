@@ -1,6 +1,7 @@
 #include "data/recordings/recording.h"
 
 #include <algorithm>
+#include <climits>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -21,8 +22,27 @@ namespace {
 constexpr char kKind[] = "recording";
 // What no rig does; a model file has the same limit for its filter.
 constexpr double kFastest = 1e4, kLongestFilter = 10, kLongest = 1e10;
+constexpr int kMostTruthPixels = 1024;
+constexpr const char* kTensors[] = {"time_s", "volts", "position_mm", "lift_mm", "truth"};
 constexpr const char* kFields[] = {"kind",       "plate",  "trial", "pass",
                                    "speed_mm_s", "source", "array", "signals"};
+
+std::optional<std::string> problem_of_truth(const Recording& recording) {
+  const int height = recording.truth_height, width = recording.truth_width;
+  if (recording.truth.empty() && height == 0 && width == 0) return std::nullopt;
+  if (height < 1 || width < 1 || height > kMostTruthPixels || width > kMostTruthPixels)
+    return "truth has frames of " + std::to_string(height) + "x" + std::to_string(width) +
+           " pixels, expected 1 to " + std::to_string(kMostTruthPixels) + " a side";
+  const std::size_t pixels = static_cast<std::size_t>(height) * static_cast<std::size_t>(width);
+  if (recording.truth.size() != recording.frames() * pixels)
+    return "truth has " + std::to_string(recording.truth.size()) + " values, expected " +
+           std::to_string(recording.frames() * pixels);
+  const auto odd = std::ranges::find_if_not(recording.truth, [](float v) { return v >= 0 && v <= 1; });
+  if (odd == recording.truth.end()) return std::nullopt;
+  return "truth of frame " +
+         std::to_string(static_cast<std::size_t>(odd - recording.truth.begin()) / pixels) + " holds " +
+         format(*odd) + ", expected 0 to 1: scale it";
+}
 
 /// What is wrong with the recording, or nothing.
 std::optional<std::string> problem_of(const Recording& recording) {
@@ -59,6 +79,7 @@ std::optional<std::string> problem_of(const Recording& recording) {
   }
   if (!std::all_of(recording.lift_mm.begin(), recording.lift_mm.end(), finite))
     return "lift_mm is not finite";
+  if (const auto problem = problem_of_truth(recording)) return problem;
   if (recording.trial < 0 || recording.pass < 0) return "trial and pass must not be negative";
   if (!(recording.speed_mm_s >= 0 && recording.speed_mm_s <= kFastest))
     return "speed_mm_s is " + format(recording.speed_mm_s) + ", expected 0 to " + format(kFastest);
@@ -163,6 +184,11 @@ Recording recording_of(const SafetensorsFile& file) {
   recording.array = take_array(recording.metadata, path);
   recording.signal_scale = take_scale(recording.metadata, path);
 
+  for (const auto& [name, tensor] : file.tensors())
+    if (std::ranges::find(kTensors, name) == std::end(kTensors))
+      throw FileError(path, "holds a tensor " + in_quotes(name) +
+                                ", which nobody reads; expected time_s, volts and, where known, position_mm, "
+                                "lift_mm and truth: rename it or leave it out");
   recording.time_s = file.f64("time_s");
   recording.volts = file.f32("volts");
   const std::uint64_t n = recording.frames();
@@ -175,6 +201,14 @@ Recording recording_of(const SafetensorsFile& file) {
   if (file.tensors().contains("lift_mm")) {
     recording.lift_mm = file.f32("lift_mm");
     check_shape(file, "lift_mm", {n});
+  }
+  if (const auto found = file.tensors().find("truth"); found != file.tensors().end()) {
+    const std::vector<std::uint64_t>& shape = found->second.shape;
+    const auto side = [&](std::size_t axis) {
+      return shape.size() == 3 ? static_cast<int>(std::min<std::uint64_t>(shape[axis], INT_MAX)) : 0;
+    };
+    recording.truth = file.f32("truth");
+    recording.truth_height = side(1), recording.truth_width = side(2);
   }
   if (const auto problem = problem_of(recording))
     throw FileError(path, *problem + "; record or import it again");
@@ -216,6 +250,11 @@ void write_recording(const std::string& path, const Recording& recording) {
   }
   if (!recording.lift_mm.empty())
     tensors.push_back({"lift_mm", "F32", {n}, std::as_bytes(std::span(recording.lift_mm))});
+  if (!recording.truth.empty()) {
+    const auto height = static_cast<std::uint64_t>(recording.truth_height);
+    const auto width = static_cast<std::uint64_t>(recording.truth_width);
+    tensors.push_back({"truth", "F32", {n, height, width}, std::as_bytes(std::span(recording.truth))});
+  }
   write_safetensors(path, std::move(metadata), tensors);
 }
 

@@ -17,6 +17,10 @@ struct Recording {
   std::vector<float>
       position_mm;  ///< n x 2: (x, y) of the finger's centre on the plate; empty, or NaN where unknown
   std::vector<float> lift_mm;  ///< n: how far the finger is above its slide; empty: it slides throughout
+  /// n x height x width in [0,1]: what a finer sensor saw of each frame, row 0 and column 0 as the array's;
+  /// empty: the truth follows from plate and position (data/plates/truth.h).
+  std::vector<float> truth;
+  int truth_height = 0, truth_width = 0;
   TaxelArray array;
   SignalScale signal_scale;                     ///< unit, polarity and range of the signals
   std::string plate;                            ///< name as Plate::named takes it
@@ -34,13 +38,13 @@ struct Recording {
 void restate(Recording& recording, const SignalScale& scale);
 
 /// Reads a safetensors file with tensors time_s F64 [n], volts F32 [n,signals] and, where known,
-/// position_mm F32 [n,2] and lift_mm F32 [n]. Metadata "array" says what the signals are, {"rows": 6,
-/// "columns": 6, "pitch_mm": 2, "channels": 1}; without it they are the rig's 4x4 taxels at 3 mm. Metadata
-/// "signals" says what they mean, {"unit": "counts", "pressed": "higher", "range": [40, 900]}; without it
-/// they are the rig's volts. Throws FileError when the file is damaged (io/files/safetensors.h), is no
-/// recording, or breaks a rule of Recording: sizes that do not match, values that are not finite (position_mm
-/// may be NaN), time stamps that do not increase, a speed, a moving average (metadata "filter_s", s) or a
-/// time that no rig has.
+/// position_mm F32 [n,2], lift_mm F32 [n] and truth F32 [n,height,width]. Metadata "array" says what the
+/// signals are, {"rows": 6, "columns": 6, "pitch_mm": 2, "channels": 1}; without it they are the rig's 4x4
+/// taxels at 3 mm. Metadata "signals" says what they mean, {"unit": "counts", "pressed": "higher", "range":
+/// [40, 900]}; without it they are the rig's volts. Throws FileError when the file is damaged
+/// (io/files/safetensors.h), is no recording, or breaks a rule of Recording: sizes that do not match, values
+/// that are not finite (position_mm may be NaN), a truth outside [0,1], a tensor that nobody reads, time stamps
+/// that do not increase, a speed, a moving average (metadata "filter_s", s) or a time that no rig has.
 Recording read_recording(const std::string& path);
 /// The same of a file that has been read.
 Recording recording_of(const SafetensorsFile& file);

@@ -28,12 +28,14 @@ void check(const Recording& recording, const ResampleSettings& settings) {
                                 std::to_string(settings.rate_hz) + ", " + std::to_string(settings.max_gap_s) +
                                 " and " + std::to_string(span_volts));
   const std::size_t n = recording.time_s.size(), values = n * recording.array.signals();
-  const std::size_t positions = recording.position_mm.size();
-  if (recording.volts.size() != values || (positions != 0 && positions != 2 * n))
+  const std::size_t positions = recording.position_mm.size(), lifts = recording.lift_mm.size();
+  if (recording.volts.size() != values || (positions != 0 && positions != 2 * n) ||
+      (lifts != 0 && lifts != n))
     throw std::runtime_error("recording: " + std::to_string(n) + " time stamps need " +
-                             std::to_string(values) + " voltages and 0 or " + std::to_string(2 * n) +
-                             " coordinates, got " + std::to_string(recording.volts.size()) + " and " +
-                             std::to_string(positions) + "; record or import the pass again");
+                             std::to_string(values) + " voltages, 0 or " + std::to_string(2 * n) +
+                             " coordinates and 0 or " + std::to_string(n) + " lifts, got " +
+                             std::to_string(recording.volts.size()) + ", " + std::to_string(positions) +
+                             " and " + std::to_string(lifts) + "; record or import the pass again");
   for (std::size_t i = 0; i < n; ++i)
     if (!std::isfinite(recording.time_s[i]) || (i > 0 && recording.time_s[i] <= recording.time_s[i - 1]))
       throw std::runtime_error("recording: time stamps must increase, frame " + std::to_string(i) +
@@ -98,12 +100,13 @@ class Segment {
 
   // `before` moves along with the time: the last recorded frame at or before it.
   void append_position(Track& track, double at, std::size_t& before) const {
+    while (before + 1 < usable_.size() && time(before + 1) <= at) ++before;
+    track.recorded.push_back(static_cast<std::uint32_t>(usable_[before]));
     if (recording_.position_mm.empty()) {
       track.position_mm.insert(track.position_mm.end(), 2, kUnknown);
       track.lift_mm.push_back(0);
       return;
     }
-    while (before + 1 < usable_.size() && time(before + 1) <= at) ++before;
     const std::size_t after = std::min(before + 1, usable_.size() - 1);
     const double span = time(after) - time(before);
     const double part = span > 0 ? std::clamp((at - time(before)) / span, 0.0, 1.0) : 0.0;

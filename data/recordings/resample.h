@@ -13,7 +13,7 @@ namespace supertac {
 /// pressing raises the signal.
 struct Scaling {
   double rest_volts = SignalScale{}.rest, span_volts = SignalScale{}.span;
-  bool levelled = false;  ///< whole windows are then brought to their own rest and gain: level()
+  bool per_window = false;  ///< each window is then brought to its own rest and gain: normalise_window()
   float operator()(float volts) const;
   /// Scales every value in place.
   void operator()(std::span<float> volts) const;
@@ -45,6 +45,8 @@ struct Track {
   std::vector<float> samples;      ///< [frames][signals], scaled
   std::vector<float> position_mm;  ///< [frames][2] (x, y), NaN where unknown
   std::vector<float> lift_mm;      ///< [frames], as Recording's; 0 where it has none
+  std::vector<std::uint32_t>
+      recorded;  ///< [frames]: the last recorded frame at or before it, whose truth it has
   std::vector<std::uint32_t>
       run;                  ///< [frames]: frames since the pass began or since the last gap, itself included
   std::size_t held = 0;     ///< frames for which no sample arrived: they repeat the one before

@@ -24,6 +24,9 @@ constexpr double kSlowest = 0.6, kFastest = 2.2, kRateStep = 0.01;
 
 // When a pass is believed.
 constexpr int kMinContacts = 8, kMinElements = 3;
+// A clock that counts lines runs slow by the frames that were lost and not seen: by a few per cent, and by up
+// to twice the share that was seen. It never runs fast: the board sends no more frames than it measures.
+constexpr double kSlowestClock = 0.97, kUnseenLoss = 0.05, kUnseenPerSeen = 2, kTimedClock = 0.05;
 constexpr double kMinMatched = 0.4, kMinCoverage = 0.3, kMaxResidualMm = 0.55, kMinMargin = 0.03;
 
 struct Event {
@@ -207,6 +210,41 @@ class Fit {
   std::vector<Event> events_;
 };
 
+// The speed that is stated against the one that was fitted, and both against what the signals can show.
+std::string why_implausible(const Registration& r, const Recording& recording, const Plate& plate) {
+  const double speed = recording.speed_mm_s > 0 ? recording.speed_mm_s : rig::kSlideMmS;
+  const auto text_of = [&](const char* key) {
+    const auto found = recording.metadata.find(key);
+    return found == recording.metadata.end() ? std::string() : found->second;
+  };
+  const bool counted = text_of("time_base") == "nominal";
+  const double lost = parse_double(text_of("lost_frames")).value_or(0);
+  const double seen = recording.frames() > 0 ? lost / static_cast<double>(recording.frames()) : 0;
+  const double clock = r.rate / speed;  // true seconds in one of the recording's
+  const std::string both =
+      "the signals show " + format(r.rate, 1) + " mm/s, the stated speed is " + format(speed, 1) + " mm/s";
+  if (clock < (counted ? kSlowestClock : 1 - kTimedClock))
+    return both + (counted ? ": the board would have sent " + format(rig::kFrameRateHz / clock, 0) +
+                                 " frames a second, it sends " + format(rig::kFrameRateHz, 0)
+                           : "");
+  if (clock > 1 + (counted ? kUnseenLoss + kUnseenPerSeen * seen : kTimedClock))
+    return both + (counted ? ": more frames would be missing than can be (" + format(100 * seen, 0) +
+                                 " % were seen to be lost)"
+                           : "");
+  const double texture = plate.texture_end() - plate.texture_begin();
+  const double gone = (lost / rig::kFrameRateHz + r.lost_s) * speed;
+  if (gone > texture)
+    return "frames of " + format(gone, 0) + " mm were lost, the texture is " + format(texture, 0) +
+           " mm long";
+  const std::vector<double> crests = plate.crests();
+  double pitch = texture;
+  for (std::size_t j = 1; j < crests.size(); ++j) pitch = std::min(pitch, crests[j] - crests[j - 1]);
+  if (recording.filter_s() * speed > pitch)
+    return "the board's filter averages over " + format(recording.filter_s() * speed, 1) +
+           " mm, the elements lie " + format(pitch, 1) + " mm apart; slide slower";
+  return "";
+}
+
 }  // namespace
 
 std::string why_unreliable(const Registration& r) {
@@ -222,6 +260,12 @@ std::string why_unreliable(const Registration& r) {
   if (r.residual > kMaxResidualMm) return "contacts lie " + format(r.residual, 2) + " mm (rms) off the plate";
   if (r.margin < kMinMargin) return "another start fits as well (off by a pitch?)";
   return "";
+}
+
+void judge(Registration& r, const Recording& recording, const Plate& plate) {
+  r.reason = why_unreliable(r);
+  if (r.reason.empty()) r.reason = why_implausible(r, recording, plate);
+  r.reliable = r.reason.empty();
 }
 
 Registration register_pass(const Recording& recording, const Plate& plate) {
@@ -245,8 +289,7 @@ Registration register_pass(const Recording& recording, const Plate& plate) {
   result.start_mm = best.middle_mm - best.rate * fit.middle_s() + fit.speed() * recording.filter_s() / 2;
   result.valid_from_s = fit.stretch().begin_s;
   result.valid_until_s = fit.stretch().end_s;
-  result.reason = why_unreliable(result);
-  result.reliable = result.reason.empty();
+  judge(result, recording, plate);
   return result;
 }
 

@@ -53,8 +53,14 @@ constexpr double row_contact_mm(std::size_t row) {
 /// does.
 Registration register_pass(const Recording& recording, const Plate& plate);
 
-/// What speaks against believing it, or nothing: fewer than 8 contacts or 3 elements, less than 0.4 matched
-/// or 0.3 covered, a residual above 0.55 mm, a margin below 0.03. Chosen on the rig's 96 passes.
+/// What speaks against believing the fit, or nothing: fewer than 8 contacts or 3 elements, less than 0.4
+/// matched or 0.3 covered, a residual above 0.55 mm, a margin below 0.03. Chosen on the rig's 96 passes.
 std::string why_unreliable(const Registration& registration);
+
+/// Sets reason, to why_unreliable() or to what else speaks against believing it, and reliable. The stated
+/// speed against the fitted rate: a clock that counts lines ("time_base" nominal) may be slow by 5 % and
+/// twice the share of frames seen to be lost, and fast by 3 %; any other clock is right to 5 %. What was
+/// lost, longer than the texture; a moving average longer than the distance of two elements.
+void judge(Registration& registration, const Recording& recording, const Plate& plate);
 
 }  // namespace supertac

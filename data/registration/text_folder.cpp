@@ -57,27 +57,41 @@ ImportedPass found_pass(const fs::path& folder, const std::string& plate_file) {
   }
 }
 
-std::vector<ImportedPass> find_passes(const std::string& root) {
-  std::vector<ImportedPass> passes;
-  for (const fs::path& folder : entries_of(root, true)) {
-    const std::string stl = folder.string() + ".stl";
-    ImportedPass found = found_pass(folder, fs::exists(stl) ? stl : "");
-    std::map<std::pair<int, int>, std::string> named;  // trial and pass
-    for (const fs::path& trial : entries_of(folder, true)) {
-      found.recording.trial = number_of(trial, trial.filename().string());
-      for (const fs::path& pass : entries_of(trial, false)) {
-        if (pass.extension() != ".txt") continue;
-        found.path = pass.string();
-        found.recording.pass = number_of(pass, pass.stem().string());
-        const auto [twin, is_new] =
-            named.emplace(std::pair(found.recording.trial, found.recording.pass), found.path);
-        if (!is_new)
-          throw FileError(found.path,
-                          "is the same trial and pass as " + twin->second + "; rename one of them");
-        passes.push_back(found);
-      }
-    }
+/// Does it, or leaves it out with its FileError.
+void take_or_leave(const FolderImport& settings, const auto& act) {
+  try {
+    act();
+  } catch (const FileError& error) {
+    if (!settings.left_out) throw;
+    settings.left_out(error);
   }
+}
+
+void find_passes_of(const fs::path& folder, const FolderImport& settings, std::vector<ImportedPass>& passes) {
+  const std::string stl = folder.string() + ".stl";
+  ImportedPass found = found_pass(folder, fs::exists(stl) ? stl : "");
+  std::map<std::pair<int, int>, std::string> named;  // trial and pass
+  const auto take_pass = [&](const fs::path& pass) {
+    found.path = pass.string();
+    found.recording.pass = number_of(pass, pass.stem().string());
+    const auto [first, is_new] =
+        named.emplace(std::pair(found.recording.trial, found.recording.pass), found.path);
+    if (!is_new)
+      throw FileError(found.path, "is the same trial and pass as " + first->second + "; rename one of them");
+    passes.push_back(found);
+  };
+  const auto take_trial = [&](const fs::path& trial) {
+    found.recording.trial = number_of(trial, trial.filename().string());
+    for (const fs::path& pass : entries_of(trial, false))
+      if (pass.extension() == ".txt") take_or_leave(settings, [&] { take_pass(pass); });
+  };
+  for (const fs::path& trial : entries_of(folder, true)) take_or_leave(settings, [&] { take_trial(trial); });
+}
+
+std::vector<ImportedPass> find_passes(const std::string& root, const FolderImport& settings) {
+  std::vector<ImportedPass> passes;
+  for (const fs::path& folder : entries_of(root, true))
+    take_or_leave(settings, [&] { find_passes_of(folder, settings, passes); });
   if (passes.empty())
     throw FileError(root, "holds no <plate>/<trial>/<pass>.txt; name the folder above the plates");
   return passes;
@@ -98,13 +112,15 @@ void align(std::vector<ImportedPass>& plate) {
   std::vector<RegisteredPass> passes;
   for (ImportedPass& pass : plate) passes.push_back({&pass.recording, &pass.registration});
   align_passes(passes);
+  for (ImportedPass& pass : plate)  // it may have changed rates and found losses
+    if (pass.registration.reliable) judge(pass.registration, pass.recording, pass.plate);
 }
 
 }  // namespace
 
 void import_text_folder(const std::string& root, const FolderImport& settings,
                         const std::function<void(std::vector<ImportedPass>)>& take) {
-  const std::vector<ImportedPass> found = find_passes(root);
+  const std::vector<ImportedPass> found = find_passes(root, settings);
   const auto progress = [&](std::size_t done) {
     if (settings.progress) settings.progress(done, found.size());
   };
@@ -112,14 +128,11 @@ void import_text_folder(const std::string& root, const FolderImport& settings,
   std::vector<ImportedPass> plate;
   for (std::size_t i = 0; i < found.size(); ++i) {
     progress(i);
-    try {
+    take_or_leave(settings, [&] {
       ImportedPass pass = found[i];
       read_and_register(pass, settings.speed_mm_s);
       plate.push_back(std::move(pass));
-    } catch (const FileError& error) {
-      if (!settings.left_out) throw;
-      settings.left_out(error);
-    }
+    });
     const bool last = i + 1 == found.size() || found[i + 1].recording.plate != found[i].recording.plate;
     if (!last || plate.empty()) continue;
     any = true;

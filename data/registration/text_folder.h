@@ -29,8 +29,8 @@ struct ImportedPass {
 
 struct FolderImport {
   double speed_mm_s = 10;  ///< as commanded, of all passes
-  /// Told of every file that is no recording, which is then left out; it may throw to end the import. Unset:
-  /// the first such file's FileError ends it.
+  /// Told of every file and folder that is no recording, or of no known plate, trial or pass; it is then left
+  /// out. It may throw to end the import. Unset: the first such FileError ends it.
   std::function<void(const FileError&)> left_out = {};
   /// Told before each file and before the passes of each plate are aligned, which takes seconds; it may throw
   /// to stop.

@@ -12,7 +12,7 @@ namespace {
 
 std::vector<std::uint32_t> fitted_on(std::span<const std::uint32_t> train) {
   if (train.empty()) throw std::invalid_argument("baseline: there is no example to fit to");
-  return spread(train, kFitWindows);
+  return evenly_spaced(train, kFitWindows);
 }
 
 void check_size(const char* what, std::size_t got, std::size_t expected) {

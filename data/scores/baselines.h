@@ -11,7 +11,7 @@
 namespace supertac {
 
 /// A way to an image that does without a network, so that a reader sees what the network buys. It sees the
-/// input as the network does (a window levelled when the scaling says so) and nothing else.
+/// input as the network does (a window normalised when the scaling says so) and nothing else.
 class Baseline {
  public:
   virtual ~Baseline() = default;

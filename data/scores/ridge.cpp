@@ -163,7 +163,7 @@ Ridge::Ridge(const WindowSet& windows, std::span<const std::uint32_t> train)
       signals_(windows.array().signals()),
       pixels_(windows.image().pixels()) {
   if (train.empty()) throw std::invalid_argument("ridge: there is no window to fit to");
-  const std::vector<std::uint32_t> chosen = spread(train, kFitWindows);
+  const std::vector<std::uint32_t> chosen = evenly_spaced(train, kFitWindows);
   const std::vector<bool> held = held_out(windows, chosen);
   std::vector<std::uint32_t> fit, judge;
   for (std::size_t n = 0; n < chosen.size(); ++n) (held[n] ? judge : fit).push_back(chosen[n]);

@@ -33,11 +33,11 @@ class Examples {
   virtual void will_read(std::size_t) const {}
   /// What is scored together. By its target alone an example is in contact or flat.
   virtual Zone zone(std::size_t i) const;
-  /// Whether training may change the input to imitate other days: where every example is another day, it only
-  /// blurs.
-  virtual bool may_vary(std::size_t) const { return true; }
-  /// Whether the example shows what the network will be used on, by which an alarm knows what is not usual.
-  virtual bool usual(std::size_t) const { return true; }
+  /// Whether training may change the input to imitate other days: of simulated passes every one is another
+  /// day already, and changes only blur.
+  virtual bool augmentable(std::size_t) const { return true; }
+  /// Whether the example shows what the network will be used on: the novelty alarm learns from such.
+  virtual bool in_distribution(std::size_t) const { return true; }
   /// Examples of one group (a pass, a surface, a day) resemble each other.
   virtual std::int64_t group(std::size_t i) const = 0;
 

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "data/windows/levelling.h"
+#include "data/windows/normalise_window.h"
 
 namespace supertac {
 namespace {
@@ -131,7 +131,7 @@ bool LiveWindow::window_until(double end_s, std::span<float> out) {
     std::copy(held.begin(), held.end(),
               out.begin() + (timesteps - 1 - k) * static_cast<std::ptrdiff_t>(signals));
   }
-  if (settings_.scaling.levelled) level(out, settings_.signals);
+  if (settings_.scaling.per_window) normalise_window(out, settings_.signals);
   return true;
 }
 

@@ -116,7 +116,8 @@ void add_silent_passes(WindowSet& windows, std::uint64_t seed, bool many) {
   const int stride = std::max(1, windows.settings().timesteps / kWindowsOfAPass);
   for (std::uint64_t i = 0; i < count; ++i) {
     const RandomStream random(seed, kSilentStream + i);
-    windows.add_one_of_many(silent_pass(random, windows.settings(), i >= kFewSilentPasses), stride, false);
+    windows.add(silent_pass(random, windows.settings(), i >= kFewSilentPasses), ".",
+                {.training_only = true, .augmentable = false, .in_distribution = false, .stride = stride});
   }
 }
 
@@ -138,7 +139,8 @@ void add_random_passes(WindowSet& windows, const RandomPasses& passes) {
       }
     }
     if (failure) std::rethrow_exception(failure);
-    for (const Recording& recording : recordings) windows.add_one_of_many(recording, stride);
+    for (const Recording& recording : recordings)
+      windows.add(recording, ".", {.training_only = true, .augmentable = false, .stride = stride});
   }
 }
 

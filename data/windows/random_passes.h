@@ -22,8 +22,8 @@ constexpr std::uint32_t kFirstTrainingPlate = 1'000'000;
 /// Adds `count` passes, each over a plate of its own with a mounting of its own: gains, tilt, depth, and
 /// where the slide begins and ends are drawn about what the rig's passes show. With other_fingers mount, dome
 /// and pad are drawn as well, for each taxel the load below which it feels nothing, and how much the finger
-/// rocks on its way. They are set aside: no split tests them. Computed when called, on all threads, and kept
-/// in memory only. A pure function of the arguments.
+/// rocks on its way. They are for training only: no split tests them. Computed when called, on all
+/// threads. A pure function of the arguments.
 void add_random_passes(WindowSet& windows, const RandomPasses& passes);
 
 /// Adds passes in which nothing is felt, over a plain plate: taxel k, scaled, stands at
@@ -32,9 +32,10 @@ void add_random_passes(WindowSet& windows, const RandomPasses& passes);
 /// a twentieth, all drawn for each pass. A tenth as many windows as there are already, 2,400 at most unless
 /// `many` are wanted: beside other fingers, where what is faint may be a texture, the whole tenth is, and all
 /// beyond those 2,400 are of a finger that hardly touches. Without them networks drew textures on signals
-/// that stand, drift or are noisy (bench/results/sensor_faults.md): levelling shows a finger's noise
-/// as large as another's texture. Set aside like random passes, and not usual(): an alarm must not take them
-/// for what a finger feels. Of the windows' array, rate and range. A pure function of the arguments.
+/// that stand, drift or are noisy (bench/results/sensor_faults.md): normalised windows show a finger's noise
+/// as large as another's texture. For training only, like random passes, and not in_distribution(): an alarm
+/// must not take them for what a finger feels. Of the windows' array, rate and range. A pure function of the
+/// arguments.
 void add_silent_passes(WindowSet& windows, std::uint64_t seed, bool many = false);
 
 }  // namespace supertac

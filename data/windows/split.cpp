@@ -20,10 +20,11 @@ constexpr double kTestShare = 0.2;
 constexpr std::size_t kMostHashed = std::size_t{1} << 22;
 constexpr std::uint64_t kWindowStream = 0, kPlateStream = 1, kPassStream = 2;
 
-constexpr std::array<std::pair<const char*, SplitKind>, 5> kNames{{{"window", SplitKind::window},
+constexpr std::array<std::pair<const char*, SplitKind>, 6> kNames{{{"window", SplitKind::window},
                                                                    {"pass", SplitKind::pass},
                                                                    {"trial", SplitKind::trial},
                                                                    {"texture", SplitKind::texture},
+                                                                   {"group", SplitKind::group},
                                                                    {"none", SplitKind::none}}};
 
 enum class Side : std::uint8_t { neither, train, test };
@@ -32,7 +33,7 @@ enum class Side : std::uint8_t { neither, train, test };
 std::map<std::string, std::vector<std::size_t>> passes_by_plate(const WindowSet& windows) {
   std::map<std::string, std::vector<std::size_t>> plates;
   for (std::size_t p = 0; p < windows.passes().size(); ++p)
-    if (windows.passes()[p].windows > 0 && !windows.passes()[p].aside)
+    if (windows.passes()[p].windows > 0 && !windows.passes()[p].use.training_only)
       plates[windows.passes()[p].plate].push_back(p);
   return plates;
 }
@@ -57,10 +58,33 @@ std::vector<Side> split_passes(const WindowSet& windows, std::uint64_t seed) {
 
 std::vector<Side> split_trials(const WindowSet& windows) {
   std::vector<Side> sides;
-  for (const WindowSet::Pass& pass : windows.passes())
-    sides.push_back(pass.aside || pass.trial == 1 ? Side::train
-                    : pass.trial == 2             ? Side::test
-                                                  : Side::neither);
+  for (const WindowSet::Pass& pass : windows.passes()) {
+    if (pass.windows > 0 && pass.trial == 0)
+      throw std::invalid_argument("split trial: pass " + std::to_string(pass.pass) + " over '" + pass.plate +
+                                  "' has no trial; use split pass, or record it with one");
+    sides.push_back(pass.use.training_only || pass.trial == 1 ? Side::train : Side::test);
+  }
+  return sides;
+}
+
+std::vector<Side> split_groups(const WindowSet& windows, std::uint64_t seed) {
+  std::map<std::string, std::vector<std::size_t>> groups;
+  for (std::size_t p = 0; p < windows.passes().size(); ++p) {
+    const WindowSet::Pass& pass = windows.passes()[p];
+    if (pass.windows > 0 && !pass.use.training_only) groups[pass.group].push_back(p);
+  }
+  if (groups.size() < 2 || groups.contains(""))
+    throw std::invalid_argument(
+        "split group: every recording needs metadata 'group' and there must be two groups, one to train on, "
+        "one "
+        "to test on; " +
+        std::string(groups.contains("") ? "some have none: use split pass"
+                                        : "there is one: use split window"));
+  std::vector<Side> sides(windows.passes().size(), Side::train);
+  const EpochOrder order(groups.size(), seed, kWindowStream);
+  for (std::size_t i = 0; i < test_count(groups.size()); ++i)
+    for (const std::size_t p : std::next(groups.begin(), static_cast<std::ptrdiff_t>(order[i]))->second)
+      sides[p] = Side::test;
   return sides;
 }
 
@@ -91,9 +115,9 @@ std::vector<Side> split_plates(const WindowSet& windows, std::uint64_t seed,
 }
 
 Split split_windows(const WindowSet& windows, std::uint64_t seed) {
-  std::vector<std::uint32_t> own;  // not set aside
+  std::vector<std::uint32_t> own;  // not for training only
   for (std::uint32_t i = 0; i < windows.size(); ++i)
-    if (!windows.passes()[windows.pass_of(i)].aside) own.push_back(i);
+    if (!windows.passes()[windows.pass_of(i)].use.training_only) own.push_back(i);
   if (own.size() < 2)
     throw std::invalid_argument("split window: the data has " + std::to_string(own.size()) +
                                 " window, needs two: one to train on, one to test on");
@@ -239,7 +263,8 @@ std::set<std::int64_t> test_groups(const PairSet& pairs, std::uint64_t seed) {
 SplitKind split_kind(const std::string& name) {
   for (const auto& [known, kind] : kNames)
     if (name == known) return kind;
-  throw std::invalid_argument("split: expects window, pass, trial, texture or none, got '" + name + "'");
+  throw std::invalid_argument("split: expects window, pass, trial, texture, group or none, got '" + name +
+                              "'");
 }
 
 std::string name_of(SplitKind kind) {
@@ -264,10 +289,13 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
     case SplitKind::texture:
       split = split_by_pass(windows, split_plates(windows, seed, leave_out));
       break;
+    case SplitKind::group:
+      split = split_by_pass(windows, split_groups(windows, seed));
+      break;
     case SplitKind::none:
       for (std::uint32_t i = 0; i < windows.size(); ++i) {
         split.train.push_back(i);
-        if (!windows.passes()[windows.pass_of(i)].aside) split.test.push_back(i);
+        if (!windows.passes()[windows.pass_of(i)].use.training_only) split.test.push_back(i);
       }
       break;
   }
@@ -281,7 +309,7 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
   return split;
 }
 
-std::vector<std::uint32_t> without_most_silence(const WindowSet& windows, std::vector<std::uint32_t> list) {
+std::vector<std::uint32_t> subsample_no_contact(const WindowSet& windows, std::vector<std::uint32_t> list) {
   constexpr std::size_t kSilentApart = 4;
   std::size_t end = 0, silent = 0;  // of the pass
   bool whole = true;
@@ -291,7 +319,7 @@ std::vector<std::uint32_t> without_most_silence(const WindowSet& windows, std::v
       const WindowSet::Pass& pass = windows.passes()[number];
       const Plate& plate = windows.plate(number);
       end = pass.first_window + pass.windows, silent = 0;
-      whole = pass.varied || plate.max_height() == plate.min_height();
+      whole = pass.use.augmentable || plate.max_height() == plate.min_height();
     }
     return !whole && !windows.contact(i) && silent++ % kSilentApart != 0;
   };
@@ -324,13 +352,7 @@ Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t s
 }
 
 Leakage find_leakage(const WindowSet& windows, const Split& split) {
-  const std::string counts = windows.recall("leakage " + fingerprint(split), [&] {
-    return std::to_string(count_overlapping(windows, split)) + " " +
-           std::to_string(count_duplicated(windows, split));
-  });
-  const std::size_t space = counts.find(' ');
-  return {.overlapping = parse_uint(counts.substr(0, space)).value_or(0),
-          .duplicated = parse_uint(counts.substr(space + 1)).value_or(0)};
+  return {.overlapping = count_overlapping(windows, split), .duplicated = count_duplicated(windows, split)};
 }
 
 std::string fingerprint(const Split& split) {
@@ -340,7 +362,7 @@ std::string fingerprint(const Split& split) {
   return hash.hex();
 }
 
-std::vector<std::uint32_t> spread(std::span<const std::uint32_t> list, std::size_t count) {
+std::vector<std::uint32_t> evenly_spaced(std::span<const std::uint32_t> list, std::size_t count) {
   std::vector<std::uint32_t> chosen(std::min(count, list.size()));
   for (std::size_t i = 0; i < chosen.size(); ++i) chosen[i] = list[i * list.size() / chosen.size()];
   return chosen;

@@ -16,13 +16,15 @@ namespace supertac {
 ///   compare
 ///            with the literature.
 ///   pass     of each plate a random fifth of its passes (rounded, at least one) is tested: unseen slides.
-///   trial    trial 1 is trained on, trial 2 tested; other trials are in neither.
+///   trial    trial 1 is trained on, later trials are tested: other days. Every pass needs a trial.
 ///   texture  the named plates, or one drawn at random, are tested; the others are trained on, but for
-///            those that resemble() one of them, passes set aside included: unseen surfaces.
+///            those that resemble() one of them, passes for training only included: unseen surfaces.
+///   group    a random fifth of the groups (rounded, at least one) is tested: unseen people, objects, days
+///            (WindowSet::Pass::group), of which every pass needs one.
 ///   none     all windows are in both: for models that are tested on other data.
-/// Windows of passes set aside (WindowSet::Pass::aside) are trained on in every kind (but for such as split
-/// texture leaves out), and tested in none.
-enum class SplitKind { window, pass, trial, texture, none };
+/// Windows of passes for training only (PassUse) are trained on in every kind (but for such as split texture
+/// leaves out), and tested in none.
+enum class SplitKind { window, pass, trial, texture, group, none };
 
 /// Throws std::invalid_argument listing the names.
 SplitKind split_kind(const std::string& name);
@@ -32,12 +34,11 @@ struct Split {
   std::vector<std::uint32_t> train, test;  ///< indices of examples, ascending
 };
 
-/// The random choices are EpochOrder(count, seed, stream) with stream 0 for windows, 1 for plates, and 2 + p
-/// for the passes of plate p; the first of the order are tested. Plates are counted in alphabetical order,
-/// passes as in WindowSet::passes(); those without windows do not count. A pure function of the set, kind and
-/// seed; trial and none do not use the seed.
-/// Throws std::invalid_argument when a side would be empty, saying what the data lacks.
-/// `leave_out`: of split texture, the plates that are tested.
+/// The random choices are EpochOrder(count, seed, stream) with stream 0 for windows and groups, 1 for plates,
+/// and 2 + p for the passes of plate p; the first of the order are tested. Plates and groups are counted in
+/// alphabetical order, passes as in WindowSet::passes(); those without windows do not count. A pure function
+/// of the set, kind and seed; trial and none do not use the seed. Throws std::invalid_argument when a side
+/// would be empty, saying what the data lacks. `leave_out`: of split texture, the plates that are tested.
 Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
                  const std::vector<std::string>& leave_out = {});
 
@@ -49,12 +50,12 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
 /// Throws std::invalid_argument for another name, no groups, or a side that would be empty.
 Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t seed);
 
-/// Of these windows, ascending, without three of four that are not in contact, if they are of one of many
-/// passes (add_one_of_many): two of three windows of a whole pass show a flat plate or the air, which is soon
-/// learnt. Passes over a plain plate, on which a finger is pressed as hard as elsewhere on a texture, are
-/// kept whole. So are recorded ones: without three quarters of their silence a network of four plates drew
-/// ghosts on .8 % of the flat plate instead of .1 %.
-std::vector<std::uint32_t> without_most_silence(const WindowSet& windows, std::vector<std::uint32_t> list);
+/// Of these windows, ascending, drops 75 % of those without contact of passes that are not augmentable
+/// (simulated ones over random plates): two of three windows of a whole pass show a flat plate or the air,
+/// which is soon learnt. Passes over a plain plate, on which a finger is pressed as hard as elsewhere on a
+/// texture, are kept whole. So are recorded ones: without 75 % of their windows without contact a network of
+/// four plates drew ghosts on 0.8 % of the flat plate instead of 0.1 %.
+std::vector<std::uint32_t> subsample_no_contact(const WindowSet& windows, std::vector<std::uint32_t> list);
 
 /// What the test windows share with the training windows.
 struct Leakage {
@@ -73,7 +74,7 @@ Leakage find_leakage(const WindowSet& windows, const Split& split);
 /// 16 hexadecimal digits over both index lists.
 std::string fingerprint(const Split& split);
 
-/// `count` elements spread evenly over the list, in its order; the whole list when it is not longer.
-std::vector<std::uint32_t> spread(std::span<const std::uint32_t> list, std::size_t count);
+/// `count` elements at even distances in the list, in its order; the whole list when it is not longer.
+std::vector<std::uint32_t> evenly_spaced(std::span<const std::uint32_t> list, std::size_t count);
 
 }  // namespace supertac

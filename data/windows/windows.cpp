@@ -1,8 +1,8 @@
 #include "data/windows/windows.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -10,7 +10,7 @@
 #include "data/plates/plate_file.h"
 #include "data/plates/truth.h"
 #include "data/windows/chosen_plates.h"
-#include "data/windows/levelling.h"
+#include "data/windows/normalise_window.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/text.h"
 
@@ -19,6 +19,7 @@ namespace {
 
 void check(const WindowSettings& s) {
   const auto fail = [](const std::string& what) { throw std::invalid_argument("windows: " + what); };
+  s.array.value_or(TaxelArray{}).check();
   if (s.timesteps < 1) fail("timesteps must be at least 1, got " + std::to_string(s.timesteps));
   if (s.scale != 2 && s.scale != 4 && s.scale != 8)
     fail("scale must be 2, 4 or 8, got " + std::to_string(s.scale));
@@ -27,6 +28,35 @@ void check(const WindowSettings& s) {
     fail("rate_hz and max_gap_s must be positive, span_volts not 0, got " + std::to_string(s.rate_hz) + ", " +
          std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span_volts));
 }
+
+// Lifted further than this, a finger is in the air: a measured height is never quite that of the slide.
+// Pressed as deep as rigs press it, it is clear of the plate when lifted by so much more than the highest
+// element.
+constexpr double kLiftedMm = 0.1, kClearanceMm = 1.5;
+constexpr std::size_t kFingerNumbers = 3;  // x, y, lift
+
+// Why a frame of a track can end no window: the count it adds to; null when it can.
+class WhyNone {
+ public:
+  WhyNone(const Recording& recording, const Track& track, const Plate& plate)
+      : track_(track), measured_(!recording.truth.empty()), clear_mm_(plate.max_height() + kClearanceMm) {
+    const auto flag = recording.metadata.find("registration_reliable");
+    reliable_ = flag == recording.metadata.end() || flag->second != "no";
+  }
+  std::size_t WindowCounts::*operator()(std::size_t frame) const {
+    if (measured_) return nullptr;
+    if (!reliable_) return &WindowCounts::unreliable;
+    if (!std::isfinite(track_.position_mm[2 * frame]) || !std::isfinite(track_.position_mm[2 * frame + 1]))
+      return &WindowCounts::no_position;
+    const float lift = track_.lift_mm[frame];
+    return lift > kLiftedMm && lift < clear_mm_ ? &WindowCounts::lifting : nullptr;
+  }
+
+ private:
+  const Track& track_;
+  bool measured_, reliable_;
+  double clear_mm_;
+};
 
 void check_size(const char* what, std::size_t got, std::size_t expected) {
   if (got != expected)
@@ -52,19 +82,30 @@ std::string WindowCounts::summary() const {
 WindowSet WindowSet::load(const std::string& dir, const std::vector<std::string>& plates,
                           const WindowSettings& settings, const ReadingWatch& watch) {
   WindowSet set(settings);
-  set.add_directory(dir, plates, false, watch);
+  set.add_directory(dir, plates, {}, watch);
   set.check_any(dir);
   return set;
 }
 
 void WindowSet::check_any(const std::string& dir) const {
   if (size() > 0) return;
+  const std::size_t most = std::max(
+      {counts_.unreliable, counts_.no_position, counts_.lifting, counts_.too_early, counts_.off_stride});
+  const char* advice = "give recordings that hold frames";
+  if (most > 0 && most == counts_.unreliable)
+    advice = "import the passes again with their right plate and --speed";
+  else if (most > 0 && most == counts_.no_position)
+    advice = "truth needs positions or a tensor 'truth': import or collect passes over a known plate";
+  else if (most > 0 && most == counts_.lifting)
+    advice = "give passes in which the finger slides";
+  else if (most > 0)
+    advice = most == counts_.too_early ? "try fewer timesteps or longer passes" : "try a smaller stride";
   throw std::runtime_error(dir + ": no window of " + std::to_string(settings_.timesteps) +
-                           " frames: " + counts_.summary() + "; try fewer timesteps or longer passes");
+                           " frames: " + counts_.summary() + "; " + advice);
 }
 
-void WindowSet::add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside,
-                              const ReadingWatch& watch) {
+void WindowSet::add_directory(const std::string& dir, const std::vector<std::string>& plates,
+                              const PassUse& use, const ReadingWatch& watch) {
   ChosenPlates chosen(plates);
   const std::vector<std::string> paths = list_recordings(dir);
   for (std::size_t i = 0; i < paths.size(); ++i) {
@@ -72,7 +113,7 @@ void WindowSet::add_directory(const std::string& dir, const std::vector<std::str
     const Recording recording = read_recording(paths[i]);
     if (!chosen.take(recording.plate)) continue;
     try {
-      add(recording, dir, aside);
+      add(recording, dir, use);
     } catch (const std::bad_alloc&) {
       throw;
     } catch (const std::exception& error) {
@@ -82,31 +123,32 @@ void WindowSet::add_directory(const std::string& dir, const std::vector<std::str
   chosen.check(dir);
 }
 
-WindowSet::WindowSet(const WindowSettings& settings) : settings_(settings) {
-  check(settings);
+WindowSet::WindowSet(const WindowSettings& settings)
+    : settings_((check(settings), settings)), file_(std::make_shared<ScratchFile>()) {
   array().check();
 }
 
-std::size_t WindowSet::plate_index(const std::string& name, const std::string& folder) {
+std::size_t WindowSet::plate_index(const Recording& recording, const std::string& folder) {
+  const bool measured = !recording.truth.empty();
   for (std::size_t i = 0; i < plates_.size(); ++i)
-    if (plates_[i].name() == name) return i;
-  plates_.push_back(plate_in_folder(name, folder));
+    if (plates_[i].plate.name() == recording.plate && plates_[i].measured == measured) return i;
+  plates_.push_back(
+      {measured ? Plate(recording.plate, std::vector<Texture>{}) : plate_in_folder(recording.plate, folder),
+       measured});
   return plates_.size() - 1;
 }
 
-void WindowSet::add(const Recording& recording, const std::string& folder, bool aside) {
-  append(recording, folder, {.aside = aside, .varied = true, .stride = settings_.stride});
-}
-
-void WindowSet::add_one_of_many(const Recording& recording, int stride, bool usual) {
-  append(recording, ".", {.aside = true, .varied = false, .stride = stride, .usual = usual});
-}
-
-void WindowSet::expect_array(const TaxelArray& found) {
-  if (!settings_.array) settings_.array = found;
-  if (found != array())
-    throw std::runtime_error("was recorded with " + found.text() + ", expected " + array().text() +
+void WindowSet::expect_array(const Recording& recording) {
+  if (!settings_.array) settings_.array = recording.array;
+  if (recording.array != array())
+    throw std::runtime_error("was recorded with " + recording.array.text() + ", expected " + array().text() +
                              "; give recordings of the array the model is for, and no others");
+  const ImageGrid expected = image();
+  if (!recording.truth.empty() &&
+      (recording.truth_height != expected.height || recording.truth_width != expected.width))
+    throw std::runtime_error("has a truth of " + std::to_string(recording.truth_height) + "x" +
+                             std::to_string(recording.truth_width) + " pixels, expected " + expected.text() +
+                             " for " + array().text() + " at scale " + std::to_string(scale()));
 }
 
 void WindowSet::expect_unit(const SignalScale& found) {
@@ -120,77 +162,77 @@ void WindowSet::expect_unit(const SignalScale& found) {
                            ", as in the others; give recordings of one sensor");
 }
 
-void WindowSet::append(const Recording& recording, const std::string& folder, const Use& use) {
-  expect_array(recording.array);
+void WindowSet::add(const Recording& recording, const std::string& folder, const PassUse& use) {
+  expect_array(recording);
   expect_unit(recording.signal_scale);
-  const std::size_t plate = plate_index(recording.plate, folder);
-  Track track = resample(
-      recording,
-      {.rate_hz = settings_.rate_hz, .max_gap_s = settings_.max_gap_s, .scaling = settings_.scaling});
-  append(card_of(recording, track, plates_[plate]), plate, use);
-  track.run = {};
-  track.samples.shrink_to_fit();
-  track.position_mm.shrink_to_fit();
-  track.lift_mm.shrink_to_fit();
-  if (passes_.back().windows == 0) track = {};  // nothing will read it
-  sources_.push_back({std::move(track), nullptr, 0});
-}
-
-void WindowSet::add(std::shared_ptr<const TrackFile> file, bool aside) {
-  expect_array(file->index().array);
-  const std::vector<TrackCard>& cards = file->index().cards;
-  for (std::size_t i = 0; i < cards.size(); ++i) {
-    append(cards[i], plate_index(cards[i].plate, file->folder()),
-           {.aside = aside, .varied = true, .stride = settings_.stride});
-    sources_.push_back({{}, file, i});
-  }
-}
-
-void WindowSet::append(const TrackCard& card, std::size_t plate, const Use& use) {
-  Pass pass{.plate = card.plate,
-            .trial = card.trial,
-            .pass = card.pass,
-            .speed_mm_s = card.speed_mm_s,
-            .source = card.source,
-            .filter_s = card.filter_s,
-            .frames = card.frames,
+  Stored stored{.plate = plate_index(recording, folder)};
+  const bool alone = settings_.timesteps == 1;  // then nothing lies between two frames
+  const Track track =
+      resample(recording, {.rate_hz = settings_.rate_hz,
+                           .max_gap_s = alone ? std::numeric_limits<double>::min() : settings_.max_gap_s,
+                           .scaling = settings_.scaling});
+  const auto group = recording.metadata.find("group");
+  Pass pass{.plate = recording.plate,
+            .trial = recording.trial,
+            .pass = recording.pass,
+            .speed_mm_s = recording.speed_mm_s,
+            .source = recording.source,
+            .group = group == recording.metadata.end() ? "" : group->second,
+            .filter_s = recording.filter_s(),
+            .frames = track.frames(),
             .first_window = size(),
             .windows = 0,
-            .aside = use.aside,
-            .varied = use.varied,
-            .usual = use.usual};
-  for (const FrameRange& stretch : card.stretches)
-    append(card, stretch, static_cast<std::uint32_t>(use.stride));
+            .use = use};
+  const auto stride = static_cast<std::uint32_t>(use.stride > 0 ? use.stride : settings_.stride);
+  const WhyNone why_none(recording, track, plates_[stored.plate].plate);
+  for (std::size_t first = 0, end = 0; first < track.frames(); first = end) {
+    const auto why = why_none(first);
+    for (end = first + 1; end < track.frames() && track.run[end] > 1 && why_none(end) == why;) ++end;
+    if (why != nullptr)
+      counts_.*why += end - first;
+    else
+      add_windows(track, first, end, stride);
+  }
   pass.windows = size() - pass.first_window;
+  if (pass.windows > 0) store(recording, track, stored);
   ++counts_.recordings;
-  counts_.frames += card.frames;
-  counts_.held += card.held;
-  counts_.gaps += card.gaps;
-  counts_.damaged += card.damaged;
+  counts_.frames += track.frames();
+  counts_.held += track.held;
+  counts_.gaps += alone ? 0 : track.gaps;
+  counts_.damaged += track.damaged;
   passes_.push_back(std::move(pass));
-  plate_of_.push_back(plate);
+  stored_.push_back(stored);
 }
 
-// The windows that end in the stretch, and why its other frames end none.
-void WindowSet::append(const TrackCard& card, const FrameRange& stretch, std::uint32_t stride) {
-  if (!card.reliable) {
-    counts_.unreliable += stretch.frames;
-  } else if (stretch.kind != FrameRange::usable) {
-    (stretch.kind == FrameRange::lifting ? counts_.lifting : counts_.no_position) += stretch.frames;
-  } else {
-    const auto timesteps = static_cast<std::uint32_t>(settings_.timesteps);
-    const std::uint32_t early = stretch.run < timesteps ? timesteps - stretch.run : 0;
-    const std::uint32_t skipped = std::min(early, stretch.frames);
-    const std::uint32_t begin = stretch.first + skipped, end = stretch.first + stretch.frames;
-    const std::uint32_t last = (begin + stride - 1) / stride * stride;
-    const std::uint32_t windows = last < end ? (end - last + stride - 1) / stride : 0;
-    counts_.too_early += skipped;
-    counts_.off_stride += end - begin - windows;
-    if (windows == 0) return;
-    rows_.push_back({static_cast<std::uint32_t>(passes_.size()), last, stretch.run + last - stretch.first,
-                     stride, counts_.windows});
-    counts_.windows += windows;
+// The windows that end in [first, end), and why its other frames end none.
+void WindowSet::add_windows(const Track& track, std::size_t first, std::size_t end, std::uint32_t stride) {
+  const auto timesteps = static_cast<std::size_t>(settings_.timesteps);
+  const std::size_t early = track.run[first] < timesteps ? timesteps - track.run[first] : 0;
+  const std::size_t begin = std::min(first + early, end);
+  const std::size_t last = (begin + stride - 1) / stride * stride;
+  const std::size_t windows = last < end ? (end - last + stride - 1) / stride : 0;
+  counts_.too_early += begin - first;
+  counts_.off_stride += end - begin - windows;
+  if (windows == 0) return;
+  rows_.push_back({static_cast<std::uint32_t>(passes_.size()), static_cast<std::uint32_t>(last),
+                   track.run[last], stride, counts_.windows});
+  counts_.windows += windows;
+}
+
+void WindowSet::store(const Recording& recording, const Track& track, Stored& stored) {
+  std::vector<float> fingers;
+  for (std::size_t i = 0; i < track.frames(); ++i)
+    fingers.insert(fingers.end(), {track.position_mm[2 * i], track.position_mm[2 * i + 1], track.lift_mm[i]});
+  stored.samples = file_->append(track.samples);
+  stored.fingers = file_->append(fingers);
+  if (recording.truth.empty()) return;
+  const std::size_t pixels = image().pixels();
+  std::vector<float> truths;
+  for (const std::uint32_t frame : track.recorded) {
+    const auto truth = std::span(recording.truth).subspan(frame * pixels, pixels);
+    truths.insert(truths.end(), truth.begin(), truth.end());
   }
+  stored.truths = file_->append(truths);
 }
 
 WindowSet::Place WindowSet::place_of(std::size_t i) const {
@@ -199,58 +241,54 @@ WindowSet::Place WindowSet::place_of(std::size_t i) const {
   return {row.pass, row.last + further, row.run + further};
 }
 
-void WindowSet::samples(std::size_t pass, std::size_t first, std::span<float> out) const {
-  const Source& source = sources_[pass];
-  if (source.file) {
-    source.file->volts(source.card, first, out);
-    settings_.scaling(out);
-  } else {
-    std::copy_n(&source.track.samples[first * array().signals()], out.size(), out.begin());
-  }
-}
-
 // Its (x, y, lift) at the end of a window.
 std::array<float, 3> WindowSet::finger(const Place& place) const {
-  const Source& source = sources_[place.pass];
-  if (source.file) return source.file->place(source.card, place.last);
-  const Track& track = source.track;
-  return {track.position_mm[2 * place.last], track.position_mm[2 * place.last + 1],
-          track.lift_mm[place.last]};
+  std::array<float, kFingerNumbers> finger;
+  file_->read(stored_[place.pass].fingers + place.last * kFingerNumbers, finger);
+  return finger;
 }
 
 Track WindowSet::track(std::size_t pass) const {
-  const Source& source = sources_[pass];
-  if (!source.file || passes_[pass].windows == 0) return source.track;
-  Track track = source.file->track(source.card);
-  settings_.scaling(track.samples);
+  Track track;
+  if (passes_[pass].windows == 0) return track;
+  const std::size_t frames = passes_[pass].frames;
+  track.samples.resize(frames * array().signals());
+  file_->read(stored_[pass].samples, track.samples);
+  std::vector<float> fingers(frames * kFingerNumbers);
+  file_->read(stored_[pass].fingers, fingers);
+  for (std::size_t i = 0; i < fingers.size(); i += kFingerNumbers) {
+    track.position_mm.insert(track.position_mm.end(), {fingers[i], fingers[i + 1]});
+    track.lift_mm.push_back(fingers[i + 2]);
+  }
   return track;
 }
 
 void WindowSet::window(std::size_t i, std::span<float> out) const {
-  const std::size_t values = frames() * array().signals();
-  check_size("a window", out.size(), values);
+  check_size("a window", out.size(), input_size());
   const Place place = place_of(i);
-  samples(place.pass, place.last + 1 - frames(), out);
-  if (settings_.scaling.levelled) level(out, array().signals());
+  file_->read(stored_[place.pass].samples + (place.last + 1 - frames()) * array().signals(), out);
+  if (settings_.scaling.per_window) normalise_window(out, array().signals());
 }
 
 void WindowSet::will_read(std::size_t i) const {
   const Place place = place_of(i);
-  const Source& source = sources_[place.pass];
-  if (source.file) source.file->will_read(source.card, place.last + 1 - frames(), frames());
+  const Stored& stored = stored_[place.pass];
+  file_->will_read(stored.samples + (place.last + 1 - frames()) * array().signals(), input_size());
+  file_->will_read(stored.fingers + place.last * kFingerNumbers, kFingerNumbers);
+  if (measured(place.pass)) file_->will_read(stored.truths + place.last * image().pixels(), image().pixels());
 }
 
 std::vector<float> WindowSet::window(std::size_t i) const {
-  std::vector<float> values(frames() * array().signals());
+  std::vector<float> values(input_size());
   const Place place = place_of(i);
-  samples(place.pass, place.last + 1 - frames(), values);
+  file_->read(stored_[place.pass].samples + (place.last + 1 - frames()) * array().signals(), values);
   return values;
 }
 
 std::vector<float> WindowSet::last_frame(std::size_t i) const {
   std::vector<float> values(array().signals());
   const Place place = place_of(i);
-  samples(place.pass, place.last, values);
+  file_->read(stored_[place.pass].samples + place.last * array().signals(), values);
   return values;
 }
 
@@ -262,6 +300,7 @@ WindowSet::Position WindowSet::position(std::size_t i) const {
 void WindowSet::truth(std::size_t i, std::span<float> out) const {
   check_size("a truth image", out.size(), image().pixels());
   const Place place = place_of(i);
+  if (measured(place.pass)) return file_->read(stored_[place.pass].truths + place.last * out.size(), out);
   const auto [x, y, lift] = finger(place);
   // While it is lifted there are no windows.
   if (lift > kLiftedMm) return std::fill(out.begin(), out.end(), 0.0F);
@@ -270,14 +309,9 @@ void WindowSet::truth(std::size_t i, std::span<float> out) const {
 
 Zone WindowSet::zone(std::size_t i) const {
   const Place place = place_of(i);
+  if (measured(place.pass)) return Examples::zone(i);
   const auto [x, y, lift] = finger(place);
   return lift > kLiftedMm ? Zone::air : zone_of(plate(place.pass), x, y, image());
-}
-
-std::optional<std::string> WindowSet::content(const std::string& folder) const {
-  for (const Source& source : sources_)
-    if (source.file && source.file->folder() == folder) return source.file->index().content;
-  return std::nullopt;
 }
 
 std::optional<double> WindowSet::filter_s() const {
@@ -290,29 +324,13 @@ std::optional<double> WindowSet::filter_s() const {
   return common;
 }
 
-std::string WindowSet::recall(const std::string& key, const std::function<std::string()>& compute) const {
-  const std::shared_ptr<const TrackFile> file = sources_.empty() ? nullptr : sources_.front().file;
-  const bool one = file && passes_.size() == file->index().cards.size() &&
-                   std::ranges::all_of(sources_, [&](const Source& s) { return s.file == file; });
-  if (!one) return compute();
-  Hash settings;
-  for (const int number : {settings_.timesteps, settings_.scale, settings_.stride}) settings.add(number);
-  for (const double volts : {settings_.scaling.rest_volts, settings_.scaling.span_volts})
-    settings.add(std::bit_cast<std::uint64_t>(volts));
-  return file->recall(key + " " + settings.hex(), compute);
-}
-
 std::string WindowSet::fingerprint() const {
-  return recall("fingerprint", [this] { return compute_fingerprint(); });
-}
-
-std::string WindowSet::compute_fingerprint() const {
   Hash hash;
   hash.add(settings_.timesteps);
   hash.add(settings_.scale);
   if (array() != TaxelArray{}) hash.add(array().text());
-  for (const Plate& plate : plates_) {
-    if (!Plate::is_file(plate.name())) continue;  // elsewhere the name is the plate
+  for (const auto& [plate, measured] : plates_) {
+    if (measured || !Plate::is_file(plate.name())) continue;  // elsewhere the name is the plate
     for (double y = 0; y <= Plate::kLengthMm; y += HeightMap::kCellMm)
       for (double x = 0; x <= Plate::kWidthMm; x += HeightMap::kCellMm)
         hash.add(static_cast<float>(plate.height(x, y)));
@@ -323,6 +341,12 @@ std::string WindowSet::compute_fingerprint() const {
     const Track all = track(p);
     for (const auto* values : {&all.samples, &all.position_mm, &all.lift_mm})
       for (const float v : *values) hash.add(v);
+    if (!measured(p)) continue;
+    std::vector<float> truth(image().pixels());
+    for (std::size_t i = 0; i < all.lift_mm.size(); ++i) {
+      file_->read(stored_[p].truths + i * truth.size(), truth);
+      for (const float v : truth) hash.add(v);
+    }
   }
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     const std::size_t end = r + 1 < rows_.size() ? rows_[r + 1].first_window : size();

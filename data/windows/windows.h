@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -12,9 +11,10 @@
 #include "data/plates/plate.h"
 #include "data/recordings/recording.h"
 #include "data/recordings/resample.h"
+#include "data/recordings/signal_range.h"
 #include "data/sensors/taxel_array.h"
 #include "data/windows/examples.h"
-#include "data/windows/track_file.h"
+#include "io/files/scratch_file.h"
 
 namespace supertac {
 
@@ -44,11 +44,19 @@ struct WindowCounts {
   std::string summary() const;
 };
 
-/// The windows of a set of recordings. Nothing is copied per window: a recording is resampled once onto
-/// rate_hz and kept as scaled floats, or read from a TrackFile each time, with the same bits. A window is a
-/// number, from which pass and last frame follow, and none crosses the edge of a pass or a gap. Memory: 4
-/// bytes per signal of a frame and 12 per frame, nothing of a TrackFile's. Reading is const and safe from
-/// many threads.
+/// What the windows of a pass are for.
+struct PassUse {
+  bool training_only = false;   ///< no split tests them: simulated passes beside real ones
+  bool augmentable = true;      ///< Examples::augmentable()
+  bool in_distribution = true;  ///< Examples::in_distribution()
+  int stride = 0;               ///< every stride-th frame ends a window; 0: that of the settings
+};
+
+/// The windows of a set of recordings. Nothing is copied per window: a recording is brought to rate_hz once,
+/// scaled, and kept in a ScratchFile, so that data sets may be larger than memory. A window is a number, from
+/// which pass and last frame follow, and none crosses the edge of a pass or a gap. T = 1: every recorded
+/// frame is a window, as it is, whatever the rate. Memory: 24 bytes for each stretch of frames without a gap.
+/// Reading is const and safe from many threads.
 class WindowSet : public Examples {
  public:
   struct Pass {
@@ -56,12 +64,11 @@ class WindowSet : public Examples {
     int trial = 0, pass = 0;
     double speed_mm_s = 0;
     std::string source;
+    std::string group;       ///< person, object, day (metadata "group"): what split group keeps together
     double filter_s = 0;     ///< length of the moving average the signals went through; 0 = none
     std::size_t frames = 0;  ///< on the model's rate
     std::size_t first_window = 0, windows = 0;  ///< its windows are consecutive, in order of time
-    bool aside = false;  ///< only ever trained on: no split tests it (simulated passes beside real ones)
-    bool varied = true;  ///< may_vary() of its windows
-    bool usual = true;   ///< usual() of its windows
+    PassUse use;
   };
   struct Position {
     double x_mm = 0, y_mm = 0;
@@ -78,19 +85,16 @@ class WindowSet : public Examples {
   /// An empty set, to be filled by add().
   /// Throws std::invalid_argument on settings out of range.
   explicit WindowSet(const WindowSettings& settings);
-  /// Appends the windows of one recording. `folder`: where the recording lies, for a plate that is an
-  /// STL file beside it. Throws as plate_in_folder() and resample(), std::runtime_error for another array.
-  void add(const Recording& recording, const std::string& folder = ".", bool aside = false);
-  /// The same for one of many passes that differ in everything: set aside, may_vary() is false, every
-  /// stride-th frame ends a window. `usual`: usual() of its windows.
-  void add_one_of_many(const Recording& recording, int stride, bool usual = true);
+  /// Appends the windows of one recording. `folder`: where the recording lies, for a plate that is an STL
+  /// file beside it. Throws as plate_in_folder() and resample(), std::runtime_error for another array, or a
+  /// measured truth that is not scale() times as fine as the array; FileError as ScratchFile.
+  void add(const Recording& recording, const std::string& folder = ".", const PassUse& use = {});
   /// Appends those of all recordings in a directory, of these plates (empty: all). Throws as load, but for
   /// the missing windows.
-  void add_directory(const std::string& dir, const std::vector<std::string>& plates, bool aside = false,
+  void add_directory(const std::string& dir, const std::vector<std::string>& plates, const PassUse& use = {},
                      const ReadingWatch& watch = {});
-  /// The same of a file of tracks, which must have this set's rate_hz and max_gap_s.
-  void add(std::shared_ptr<const TrackFile> file, bool aside = false);
-  /// Throws std::runtime_error, saying where the frames of `dir` went, when there is no window.
+  /// Throws std::runtime_error, saying where the frames of `dir` went and what helps, when there is no
+  /// window.
   void check_any(const std::string& dir) const;
 
   std::size_t size() const override { return counts_.windows; }
@@ -103,22 +107,24 @@ class WindowSet : public Examples {
   const WindowSettings& settings() const { return settings_; }
   const WindowCounts& counts() const { return counts_; }
   const std::vector<Pass>& passes() const { return passes_; }
-  const Plate& plate(std::size_t pass) const { return plates_[plate_of_[pass]]; }
+  /// Under the finger of a pass; a plain one where the truth was measured.
+  const Plate& plate(std::size_t pass) const { return plates_[stored_[pass].plate].plate; }
 
   // i < size() throughout, unchecked: these run for every sample of training.
-  // Throws std::invalid_argument when `out` has another size; FileError as TrackFile.
-  /// Window i as a network takes it, [T][signals], oldest frame first; levelled when the scaling says so.
+  // Throws std::invalid_argument when `out` has another size; FileError as ScratchFile.
+  /// Window i as a network takes it, [T][signals], oldest frame first; normalised when the scaling says so.
   void window(std::size_t i, std::span<float> out) const;
-  /// The window, not levelled.
+  /// The window, not normalised.
   std::vector<float> window(std::size_t i) const;
-  /// Truth of its last frame, [height][width] of image(), as truth_image; 0 in the air.
+  /// Truth of its last frame, [height][width] of image(): as measured, or truth_image; 0 in the air.
   void truth(std::size_t i, std::span<float> out) const;
   /// The last frame, [signals].
   std::vector<float> last_frame(std::size_t i) const;
+  /// NaN where it is unknown.
   Position position(std::size_t i) const;
   Zone zone(std::size_t i) const override;
-  bool may_vary(std::size_t i) const override { return passes_[pass_of(i)].varied; }
-  bool usual(std::size_t i) const override { return passes_[pass_of(i)].usual; }
+  bool augmentable(std::size_t i) const override { return passes_[pass_of(i)].use.augmentable; }
+  bool in_distribution(std::size_t i) const override { return passes_[pass_of(i)].use.in_distribution; }
   bool contact(std::size_t i) const { return zone(i) == Zone::contact; }
   std::size_t pass_of(std::size_t i) const { return place_of(i).pass; }
   void input(std::size_t i, std::span<float> out) const override { window(i, out); }
@@ -129,20 +135,15 @@ class WindowSet : public Examples {
   std::size_t frame_of(std::size_t i) const { return place_of(i).last; }
   /// Frames since its pass began or since the last gap, the last frame included: at least timesteps().
   std::size_t history(std::size_t i) const { return place_of(i).run; }
-  /// The frames of a whole pass, but for `run`; none when no window ends in it.
+  /// Samples, positions and lifts of a whole pass; none when no window ends in it.
   Track track(std::size_t pass) const;
 
-  /// hash_of_recordings() of a folder that was added as a TrackFile; nothing of any other.
-  std::optional<std::string> content(const std::string& folder) const;
   /// The filter_s of all passes with windows, or nothing when they differ.
   std::optional<double> filter_s() const;
 
   /// 16 hexadecimal digits over samples, positions, plates and index: the same data and settings, the same
   /// text.
   std::string fingerprint() const override;
-  /// What `compute` returns; when all windows are of one TrackFile, as its recall(), with `key` and the
-  /// settings for its key.
-  std::string recall(const std::string& key, const std::function<std::string()>& compute) const;
 
  private:
   /// Windows that end at every stride-th frame.
@@ -153,34 +154,30 @@ class WindowSet : public Examples {
   struct Place {
     std::size_t pass, last, run;
   };
-  struct Source {
-    Track track;                            // without `run`; empty for those of a file
-    std::shared_ptr<const TrackFile> file;  // or nothing
-    std::size_t card;
+  struct Stored {  // of a pass: places in the file, and whose plate it is
+    std::uint64_t samples = 0, fingers = 0, truths = 0;
+    std::size_t plate = 0;  // in plates_
   };
-  struct Use {
-    bool aside, varied;
-    int stride;
-    bool usual = true;
+  struct KnownPlate {
+    Plate plate;
+    bool measured;  // its recordings have truths of their own: nothing is known of its shape
   };
-  void append(const Recording& recording, const std::string& folder, const Use& use);
-  void expect_array(const TaxelArray& array);
+  void expect_array(const Recording& recording);
   void expect_unit(const SignalScale& found);
-  std::size_t plate_index(const std::string& name, const std::string& folder);
-  void append(const TrackCard& card, std::size_t plate, const Use& use);
-  void append(const TrackCard& card, const FrameRange& stretch, std::uint32_t stride);
+  std::size_t plate_index(const Recording& recording, const std::string& folder);
+  void add_windows(const Track& track, std::size_t first, std::size_t end, std::uint32_t stride);
+  void store(const Recording& recording, const Track& track, Stored& stored);
   Place place_of(std::size_t i) const;
-  void samples(std::size_t pass, std::size_t first, std::span<float> out) const;
   std::array<float, 3> finger(const Place& place) const;
-  std::string compute_fingerprint() const;
+  bool measured(std::size_t pass) const { return plates_[stored_[pass].plate].measured; }
 
   WindowSettings settings_;
   WindowCounts counts_;
-  std::vector<Plate> plates_;
+  std::vector<KnownPlate> plates_;
   std::vector<Pass> passes_;
-  std::vector<Source> sources_;        // per pass
-  std::vector<std::size_t> plate_of_;  // per pass, into plates_
+  std::vector<Stored> stored_;  // per pass
   std::vector<Row> rows_;
+  std::shared_ptr<ScratchFile> file_;  // of copies too: all append to it
 };
 
 }  // namespace supertac

@@ -127,7 +127,7 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
                   {"span_volts", input.scaling.span_volts},
                   {"filter_s", input.filter_s ? Json(*input.filter_s) : Json(nullptr)},
                   {"formula", "clip((rest_volts - V) / span_volts, 0, 1)"}};
-  if (input.scaling.levelled) scaling["levelled"] = true;
+  if (input.scaling.per_window) scaling["levelled"] = true;
   if (input.pitch_mm != InputSettings{}.pitch_mm) scaling["pitch_mm"] = input.pitch_mm;
   if (input.signal_scale != SignalScale{}) scaling["signals"] = json_of(input.signal_scale);
   return {{"settings", settings.dump()}, {"input", scaling.dump()}};

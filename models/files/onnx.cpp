@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "autograd/trace.h"
-#include "data/windows/levelling.h"
+#include "data/windows/normalise_window.h"
 #include "io/numbers/numbers.h"
 #include "models/files/onnx_file.h"
 #include "models/inference/interval.h"
@@ -111,7 +111,7 @@ std::string Exporter::network_input(const ModelFile& file) {
         "volts", {any, s.timesteps, s.signals()},
         "Volts of every signal, oldest sample first; taxel k lies in row k / columns, column k % columns.");
     const std::string x = scaled(file);
-    return file.input.scaling.levelled ? levelled(x, s.timesteps) : x;
+    return file.input.scaling.per_window ? levelled(x, s.timesteps) : x;
   }
   const FrameSettings& s = file.frame_model->settings();
   graph.input("frames", {any, s.in_channels, s.height, s.width}, "Frames in the sensor's numbers.");

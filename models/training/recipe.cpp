@@ -139,7 +139,7 @@ Recipe Recipe::of(const ModelFile& file, const std::string& path) {
   r.leave_out = comma_list(file.metadata_or("leave_out", ""));
   r.rate_hz = file.input.rate_hz;
   r.range = file.input.scaling;
-  r.levelled = file.input.scaling.levelled;
+  r.per_window = file.input.scaling.per_window;
   r.interval_factor = file.interval_factor();
   try {
     r.split = split_kind(entry("split"));

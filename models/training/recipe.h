@@ -33,7 +33,7 @@ struct Recipe : TrainingPace {
   double rate_hz = 300;                ///< of the model's samples, 20 to 2000
   std::int64_t stride = 1;             ///< every stride-th frame of a pass ends a window
   std::optional<Scaling> range;        ///< rest and span; nothing: SignalRange::fitted()
-  bool levelled = true;                ///< whether a window is brought to its own rest and gain
+  bool per_window = true;              ///< whether a window is brought to its own rest and gain
   std::int64_t random_plates = 0;      ///< simulated passes besides, each over a plate of its own
   /// Half the width of a pixel's 90 % interval in units of its predicted error, for the model's file.
   double interval_factor = kIntervalFactor;

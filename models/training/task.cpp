@@ -25,7 +25,7 @@ Scaling scaling_of(const Recipe& recipe, const SignalRange& range, std::vector<s
     throw std::invalid_argument("--random-plates imitates the rig, whose signals rest at " +
                                 format(Scaling().rest_volts) + "; those of these recordings rest at " +
                                 format(scaling.rest_volts));
-  scaling.levelled = recipe.levelled;
+  scaling.per_window = recipe.per_window;
   return scaling;
 }
 
@@ -33,7 +33,7 @@ Scaling scaling_of(const Recipe& recipe, const SignalRange& range, std::vector<s
 double common_speed(const WindowSet& windows) {
   double speed = 0;
   for (const WindowSet::Pass& pass : windows.passes()) {
-    if (pass.windows == 0 || pass.aside || pass.speed_mm_s <= 0) continue;
+    if (pass.windows == 0 || pass.use.training_only || pass.speed_mm_s <= 0) continue;
     if (speed > 0 && pass.speed_mm_s != speed) return rig::kSlideMmS;
     speed = pass.speed_mm_s;
   }
@@ -58,7 +58,8 @@ WindowSet windows_of(const Recipe& recipe, const RecordingFolders& folders, std:
   w.scaling =
       scaling_of(recipe, SignalRange::of_folder(folders.data, recipe.plates, watch(folders.data)), notes);
   WindowSet windows = WindowSet::load(folders.data, recipe.plates, w, watch(folders.data));
-  if (!folders.also.empty()) windows.add_directory(folders.also, {}, true, watch(folders.also));
+  if (!folders.also.empty())
+    windows.add_directory(folders.also, {}, {.training_only = true}, watch(folders.also));
   const RandomPasses random{.count = static_cast<std::size_t>(recipe.random_plates),
                             .seed = recipe.seed,
                             .speed_mm_s = common_speed(windows),
@@ -86,7 +87,7 @@ TrainingTask window_task(const Recipe& given, const RecordingFolders& folders) {
                     .unit = "windows",
                     .split = make_split(*windows, recipe.split, recipe.seed, recipe.leave_out),
                     .objective = window_objective(*windows, recipe)};
-  task.split.train = without_most_silence(*windows, std::move(task.split.train));
+  task.split.train = subsample_no_contact(*windows, std::move(task.split.train));
   task.origin = metadata_of(recipe);
   task.origin.erase("training");  // the objective says it
   add_data(task);

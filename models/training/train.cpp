@@ -23,7 +23,7 @@ void test(const Trainer& trainer, const TrainingTask& task, const std::function<
   const ImageGrid image = task.examples->image();
   PairMetrics metrics(static_cast<std::size_t>(image.height), static_cast<std::size_t>(image.width));
   for_each_output(Ensemble({Prepared(trainer.model())}), *task.examples,
-                  spread(task.split.test, kTestedPerEpoch), [&](const EvaluatedBatch& b) {
+                  evenly_spaced(task.split.test, kTestedPerEpoch), [&](const EvaluatedBatch& b) {
                     for (std::size_t n = 0; n < b.size(); ++n)
                       if (in_contact(b.target(n))) metrics.add(b.output(n), b.target(n));
                     return !stop || !stop();
@@ -38,10 +38,10 @@ std::vector<StoredTensor> novelty_of(const Trainer& trainer) {
   constexpr std::size_t kMostSamples = 20'000;
   if (trainer.objective().latents() == 0) return {};  // a frame alone says nothing of its sensor
   const Examples& data = trainer.examples();
-  std::vector<std::uint32_t> usual;
-  std::ranges::copy_if(trainer.training_side(), std::back_inserter(usual),
-                       [&](std::uint32_t i) { return data.usual(i); });
-  const std::vector<std::uint32_t> chosen = spread(usual, kMostSamples);
+  std::vector<std::uint32_t> in_distribution;
+  std::ranges::copy_if(trainer.training_side(), std::back_inserter(in_distribution),
+                       [&](std::uint32_t i) { return data.in_distribution(i); });
+  const std::vector<std::uint32_t> chosen = evenly_spaced(in_distribution, kMostSamples);
   const std::size_t count = signal_feature_count(data.array());
   if (chosen.size() <= count) return {};
   Tensor features(Shape{static_cast<Dim>(chosen.size()), static_cast<Dim>(count)});
@@ -57,7 +57,7 @@ StoredTensor ranges_of(const Trainer& trainer) {
   constexpr std::size_t kSamples = 1024;
   ActivationRanges ranges;
   for_each_output(Ensemble({Prepared(trainer.model())}), trainer.examples(),
-                  spread(trainer.training_side(), kSamples), [&](const EvaluatedBatch& b) {
+                  evenly_spaced(trainer.training_side(), kSamples), [&](const EvaluatedBatch& b) {
                     ranges.add(trainer.model(), b.inputs);
                     return true;
                   });

@@ -76,7 +76,7 @@ void Trainer::fill(MicroBatch& micro_batch) const {
     const std::size_t slot = static_cast<std::size_t>(micro_batch.first) + n;
     const std::span<float> input = micro_batch.batch.inputs.values().subspan(n * input_size, input_size);
     data_.input(indices_[slot], input);
-    if (data_.may_vary(indices_[slot])) objective_->augment(batching_.sample(epoch, b, slot), input);
+    if (data_.augmentable(indices_[slot])) objective_->augment(batching_.sample(epoch, b, slot), input);
     data_.target(indices_[slot], micro_batch.batch.targets.values().subspan(n * target_size, target_size));
   }
 }

@@ -10,7 +10,7 @@ from .files import read
 Pictures = collections.namedtuple("Pictures", "picture predicted_error latents")
 Pictures.__doc__ = "[N,height,width] each, predicted_error is None for a model without; latents [N,groups x latent]."
 
-# Of levelling (data/windows/levelling.h).
+# Of normalised windows (data/windows/normalise_window.h).
 BINS, LEAST_GAIN, REST_REMOVED, REST_SHARE, TOP_RANK = 256, np.float32(0.15), np.float32(0.5), 20, 3
 
 

@@ -236,7 +236,7 @@ TEST_F(PairsOfRecordings, AreTheWindowsOfTheModelAndItsSplit) {
                       {.timesteps = 32,
                        .scale = 2,
                        .rate_hz = 50,
-                       .scaling = {.rest_volts = 2.5, .span_volts = 0.4, .levelled = true}});
+                       .scaling = {.rest_volts = 2.5, .span_volts = 0.4, .per_window = true}});
   const Split split = make_split(windows, SplitKind::pass, 1);
   expect_pairs_of(folder_ / "pairs/train.safetensors", windows, split.train);
   expect_pairs_of(folder_ / "pairs/test.safetensors", windows, split.test);

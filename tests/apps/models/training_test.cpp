@@ -42,17 +42,14 @@ TEST_F(Training, SaysWhyAFinishedRunIsNotResumed) {
       << resumed.error;
 }
 
-TEST_F(Training, GivesTheSameBytesHoweverMuchIsHeldInMemory) {
-  ASSERT_EQ(train("held.safetensors").code, 0);
-  for (const std::string memory : {"0", "500K", "1G"}) {
-    const std::string name = "memory" + memory;
-    const ProcessResult result = train(name + ".safetensors", {"--memory", memory});
-    ASSERT_EQ(result.code, 0) << result.error;
-    EXPECT_TRUE(bytes("held.safetensors") == bytes(name + ".safetensors")) << memory;
-    EXPECT_TRUE(bytes("held.run/last.safetensors") == bytes(name + ".run/last.safetensors")) << memory;
-  }
-  EXPECT_NE(train("half.safetensors", {"--memory", "half"}).error.find("--memory expects a size"),
-            std::string::npos);
+TEST_F(Training, SaysWhereItsTemporaryFileCannotBeMade) {
+  ::setenv("TMPDIR", path("nowhere").c_str(), 1);
+  const ProcessResult result = train("nowhere.safetensors");
+  ::unsetenv("TMPDIR");
+  EXPECT_EQ(result.code, 1);
+  EXPECT_NE(result.error.find("cannot make a temporary file there: No such file or directory; set TMPDIR"),
+            std::string::npos)
+      << result.error;
 }
 
 TEST_F(Training, AWarningOfCollapseSaysThatItOftenMendsItself) {
@@ -188,7 +185,6 @@ TEST_F(Training, RandomPlatesBesideARealFingerAreFeltByOtherFingers) {
   EXPECT_EQ(weights("one", "data", {}), weights("another", "real", {}));
   const auto other = weights("other", "real", {"--random-plates", "5"});
   EXPECT_NE(weights("own", "data", {"--random-plates", "5"}), other);
-  EXPECT_EQ(weights("other_filed", "real", {"--random-plates", "5", "--memory", "1M"}), other);
 }
 
 // Whoever links the library trains what the program trains.

@@ -49,8 +49,8 @@ TEST(HeightMap, HeightIsThatOfTheHighestTriangleAboveTheOutline) {
   EXPECT_EQ(map.height(25, 40.5), 0);
   EXPECT_EQ(map.max_height(), 2.5);
   EXPECT_EQ(map.min_height(), 0);
-  EXPECT_EQ(map.texture_begin(), 40);
-  EXPECT_EQ(map.texture_end(), 50);
+  EXPECT_EQ(map.texture_begin(), 39.875);
+  EXPECT_EQ(map.texture_end(), 50.125);
   EXPECT_FALSE(map.uniform_in_x());
 }
 

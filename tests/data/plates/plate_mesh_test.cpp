@@ -96,6 +96,29 @@ TEST(PlateMesh, RigPlatesComeBackExactlyAtTheNodes) {
   }
 }
 
+// A block with upright sides, one with a slope across that is less than what counts as uniform, a hill that
+// ends at the plate's edge: read, written and read again, twice.
+TEST(PlateMesh, APlateThatWasReadIsWrittenAsItIs) {
+  const auto box = [](float from, float to, float low, float high) {
+    const Point a{0, from, low}, b{36, from, high}, c{36, to, high}, d{0, to, low};
+    return std::vector<Triangle>{{a, b, c}, {a, c, d}};
+  };
+  const std::vector<Triangle> ground = box(0, 108, 0, 0);
+  for (const auto& top : {box(40, 50, 2, 2), box(40.05F, 50, 2, 2.04F), box(60, 108, 1, 1)}) {
+    std::vector<Triangle> triangles = ground;
+    triangles.insert(triangles.end(), top.begin(), top.end());
+    const auto read = [](const std::vector<Triangle>& solid) {
+      return Plate("p", std::make_shared<const HeightMap>(solid, Plate::kWidthMm, Plate::kLengthMm, "p"));
+    };
+    const Plate first = read(triangles), second = read(mesh_of(first));
+    for (double y = 0; y <= 108; y += 0.11)
+      for (double x = 0; x <= 36; x += 0.6)
+        ASSERT_NEAR(second.height(x, y), first.height(x, y), 0.01) << x << " " << y;
+    EXPECT_EQ(second.height(18, 20), 0);
+    EXPECT_EQ(mesh_of(second), mesh_of(first));
+  }
+}
+
 TEST(PlateMesh, UniformPlatesAreSmallAndSettingsAreChecked) {
   EXPECT_LT(mesh_of(Plate::named("6_Bumps")).size(), 3000u);
   EXPECT_THROW(mesh_of(Plate::named("plain"), {.resolution_mm = 0}), std::invalid_argument);

@@ -83,6 +83,18 @@ TEST(Plate, MixedPlatesShareTheLength) {
   EXPECT_GT(plate.texture_end(), 66);
 }
 
+TEST(Plate, ANameInOtherLettersIsHintedAt) {
+  for (const auto& [name, meant] :
+       {std::pair{"Plain", "plain"}, {"3_bumps", "3_Bumps"}, {"Ridges6", "ridges6"}})
+    try {
+      Plate::named(name);
+      ADD_FAILURE() << name;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_EQ(error.what(),
+                std::string("plate \"") + name + "\": names are case-sensitive, is " + meant + " meant?");
+    }
+}
+
 TEST(Plate, RefusesNamesItCannotRead) {
   const std::pair<const char*, const char*> cases[] = {
       {"", "unknown texture \"\""},

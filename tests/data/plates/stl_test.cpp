@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cstring>
 #include <ctime>
 #include <filesystem>
@@ -63,6 +65,21 @@ TEST(Stl, BinaryComesBackExactly) {
 TEST(Stl, TextIsReadWhateverItsSpacesAndCase) {
   EXPECT_EQ(parse_stl(bytes_of(text_stl()), "plate.stl"), two_triangles());
   EXPECT_EQ(parse_stl(bytes_of(text_stl() + text_stl()), "plate.stl").size(), 4u);  // several solids
+}
+
+TEST(Stl, TextIsRecognisedAsFarAsItIsRead) {
+  std::string capitals = text_stl(), old_mac = text_stl();
+  for (char& c : capitals) c = static_cast<char>(std::toupper(c));
+  std::ranges::replace(old_mac, '\n', '\r');
+  for (const std::string& text : {capitals, " \n\t" + text_stl(), "\xEF\xBB\xBF" + text_stl(), old_mac,
+                                  text_stl() + "exported by hand\n2026\n"})
+    EXPECT_EQ(parse_stl(bytes_of(text), "plate.stl"), two_triangles()) << text;
+  expect_refused(bytes_of(text_stl() + "sold next\n facet normal 0 0 1\n"), "expected solid, found 'sold'");
+  expect_refused(bytes_of("solid\r\nfacet normal 0 0 1\r\nouter lop"), "line 3: expected loop");
+}
+
+TEST(Stl, NothingIsWrittenThatIsTooLargeToBeRead) {
+  EXPECT_THROW(stl_bytes(std::vector<Triangle>(kMaxStlBytes / 50), "title"), std::invalid_argument);
 }
 
 TEST(Stl, LengthTellsBinaryFromTextWhateverTheFirstWord) {

@@ -136,6 +136,28 @@ TEST(TextFolder, FilesThatAreNoRecordingsAreLeftOutWhenAskedTo) {
   EXPECT_TRUE(left_out[1].starts_with(bad + ": 1 of 1 lines are not 16 voltages")) << left_out[1];
 }
 
+// A published folder: remarks beside the passes, a plate in other letters, one that nobody knows.
+TEST(TextFolder, WhatIsNoPassIsLeftOutByName) {
+  const TemporaryFolder folder;
+  const std::string text = as_text(full_pass("plain", 2, 1));
+  put(folder, "plain/1/2.txt", text);
+  const std::string others[] = {put(folder, "plain/1/InitTime.txt", "start? ENTER\n"),
+                                put(folder, "plain/1/02.txt", text), put(folder, "plain/notes/1.txt", text),
+                                put(folder, "Plain/1/1.txt", text), put(folder, "Test/1/1.txt", text)};
+  std::string left_out;
+  const auto imported = import_text_folder(folder.path(), {.left_out = [&](const FileError& error) {
+                                             left_out += std::string(error.what()) + "\n";
+                                           }});
+  EXPECT_EQ(imported.size(), 1u);
+  EXPECT_EQ(std::ranges::count(left_out, '\n'), 5) << left_out;
+  for (const char* reason :
+       {"InitTime.txt: expected a number", "is the same trial and pass as", "notes: expected a number",
+        "Plain: unknown plate: plate \"Plain\": names are "
+        "case-sensitive, is plain meant?",
+        "Test: unknown plate"})
+    EXPECT_NE(left_out.find(reason), std::string::npos) << reason << "\n" << left_out;
+}
+
 TEST(TextFolder, TwoFilesOfOnePassAreNamed) {
   const TemporaryFolder folder;
   const std::string first = put(folder, "plain/1/01.txt", ""), second = put(folder, "plain/1/1.txt", "");

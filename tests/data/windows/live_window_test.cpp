@@ -41,7 +41,7 @@ void feed(LiveWindow& live, const Recording& recording,
 // were.
 std::size_t expect_windows_of_set(const Recording& recording, LiveWindow live, bool levelled = false) {
   WindowSettings settings = wide_settings(kTimesteps);
-  settings.scaling.levelled = levelled;
+  settings.scaling.per_window = levelled;
   WindowSet set(settings);
   Recording sliding = recording;
   sliding.lift_mm.clear();  // or frames between air and plate would end no window
@@ -109,7 +109,7 @@ TEST(LiveWindow, GivesTheWindowsOfTrainingBitForBit) {
 TEST(LiveWindow, IsLevelledLikeOneOfTraining) {
   const Recording recording = rough_recording(300, 0.05, 5);
   LiveWindowSettings settings = live_settings(300);
-  settings.scaling.levelled = true;
+  settings.scaling.per_window = true;
   EXPECT_GT(expect_windows_of_set(recording, LiveWindow(settings), true), 400U);
 }
 

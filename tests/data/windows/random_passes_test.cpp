@@ -43,8 +43,8 @@ TEST(RandomPasses, AreTrainedOnAsTheyAreAndNeverTested) {
   const Split split = make_split(windows, SplitKind::trial, 0);
   for (const std::uint32_t i : split.test) EXPECT_LT(i, own);
   EXPECT_GT(split.train.size(), own / 2 + 100);
-  EXPECT_TRUE(windows.may_vary(0));
-  EXPECT_FALSE(windows.may_vary(own));
+  EXPECT_TRUE(windows.augmentable(0));
+  EXPECT_FALSE(windows.augmentable(own));
 }
 
 // The whole pass: in the air, on the flat plate, over texture.
@@ -90,11 +90,11 @@ TEST(SilentPasses, ShowNothingAndAreNotUsual) {
   const Split split = make_split(windows, SplitKind::none, 0);
   for (const std::uint32_t i : split.test) EXPECT_LT(i, own);
   EXPECT_GT(split.train.size(), own + 2000);
-  EXPECT_TRUE(windows.usual(0));
+  EXPECT_TRUE(windows.in_distribution(0));
   std::vector<float> input(windows.input_size()), target(windows.image().pixels());
   int standing = 0, moving = 0;
   for (std::size_t i = own; i < windows.size(); ++i) {
-    EXPECT_FALSE(windows.usual(i) || windows.may_vary(i));
+    EXPECT_FALSE(windows.in_distribution(i) || windows.augmentable(i));
     EXPECT_EQ(windows.zone(i), Zone::flat);
     windows.target(i, target);
     EXPECT_TRUE(std::ranges::all_of(target, [](float z) { return z == 0; }));
@@ -120,7 +120,7 @@ float typical_level(const WindowSet& windows, std::size_t begin, std::size_t end
 
 TEST(SilentPasses, BeyondTheFirst300AreOfAFingerThatHardlyTouches) {
   WindowSettings settings = small();
-  settings.scaling.levelled = false;
+  settings.scaling.per_window = false;
   WindowSet windows = many(settings, 60'000);
   const std::size_t own = windows.passes().size();
   add_silent_passes(windows, 0, true);
@@ -135,7 +135,7 @@ TEST(SilentPasses, AreTheSameForTheSameSeedAndFitAnyArrayAndRange) {
   WindowSettings settings = small();
   settings.array = TaxelArray{.rows = 3, .columns = 5};
   settings.scaling = {.rest_volts = 40, .span_volts = 40};
-  settings.scaling.levelled = false;
+  settings.scaling.per_window = false;
   const WindowSet others = many(settings, 24'000);
   WindowSet a = others, b = others, c = others;
   add_silent_passes(a, 5);

@@ -15,6 +15,9 @@
 namespace supertac {
 namespace {
 
+constexpr PassUse kTrainingOnly{.training_only = true};
+constexpr PassUse kOneOfMany{.training_only = true, .augmentable = false, .stride = 8};
+
 // Two plates, two trials, four passes of 40 frames: 16 passes with 25 windows each. Every pass has its own
 // level.
 WindowSet make_set() {
@@ -45,13 +48,13 @@ bool disjoint(const Split& split) {
 }
 
 TEST(SplitKind, HasANameBothWays) {
-  for (const char* name : {"window", "pass", "trial", "texture", "none"})
+  for (const char* name : {"window", "pass", "trial", "texture", "group", "none"})
     EXPECT_EQ(name_of(split_kind(name)), name);
   try {
     split_kind("trails");
     FAIL() << "took a name that is none";
   } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "split: expects window, pass, trial, texture or none, got 'trails'");
+    EXPECT_STREQ(error.what(), "split: expects window, pass, trial, texture, group or none, got 'trails'");
   }
 }
 
@@ -79,16 +82,6 @@ TEST(Split, PassTestsUnseenPassesOfEveryPlate) {
   EXPECT_TRUE(find_leakage(set, split).none());
 }
 
-TEST(Split, TrialTrainsOnOneAndTestsOnTwo) {
-  WindowSet set = make_set();
-  set.add(make_recording({.trial = 3, .frames = 40, .level = 2.9F}));
-  const Split split = make_split(set, SplitKind::trial, 1);
-  for (const std::size_t p : passes_of(set, split.train)) EXPECT_EQ(set.passes()[p].trial, 1);
-  for (const std::size_t p : passes_of(set, split.test)) EXPECT_EQ(set.passes()[p].trial, 2);
-  EXPECT_EQ(split.train.size() + split.test.size(), set.size() - 25);
-  EXPECT_TRUE(find_leakage(set, split).none());
-}
-
 TEST(Split, TextureTestsAnUnseenPlate) {
   const WindowSet set = make_set();
   std::set<std::string> held_out;
@@ -104,13 +97,13 @@ TEST(Split, TextureTestsAnUnseenPlate) {
   EXPECT_EQ(held_out.size(), 2U);  // the seed chooses
 }
 
-// What resembles the plate left out is not trained on either, set aside or not.
+// What resembles the plate left out is not trained on either, for training only or not.
 TEST(Split, TextureLeavesOutTheNamedPlateAndItsLikes) {
   WindowSet set(wide_settings(16));
   for (const char* plate : {"3_Bumps", "bumps6", "4_Ridges"})
     set.add(
         make_recording({.plate = plate, .frames = 40, .level = 1.0F + static_cast<float>(set.size()) / 100}));
-  set.add(make_recording({.plate = "bumps12", .frames = 40, .level = 2.5F}), ".", true);
+  set.add(make_recording({.plate = "bumps12", .frames = 40, .level = 2.5F}), ".", kTrainingOnly);
   const Split split = make_split(set, SplitKind::texture, 7, {"3_Bumps"});
   std::set<std::string> train, test;
   for (const std::size_t p : passes_of(set, split.train)) train.insert(set.passes()[p].plate);
@@ -125,7 +118,8 @@ TEST(Split, TextureLeavesOutTheNamedPlateAndItsLikes) {
   }
 }
 
-// With all of them left out only passes set aside are trained on, and none that resembles any of them.
+// With all of them left out only passes for training only are trained on, and none that resembles any of
+// them.
 TEST(Split, TextureLeavesOutAllPlatesThatAreNamed) {
   WindowSet set(wide_settings(16));
   for (const char* plate : {"3_Bumps", "4_Ridges", "bumps6"})
@@ -134,7 +128,7 @@ TEST(Split, TextureLeavesOutAllPlatesThatAreNamed) {
   for (const char* plate : {"bumps12", "ridges9", "bumps8"})
     set.add(
         make_recording({.plate = plate, .frames = 40, .level = 2.0F + static_cast<float>(set.size()) / 100}),
-        ".", true);
+        ".", kTrainingOnly);
   const Split split = make_split(set, SplitKind::texture, 7, {"3_Bumps", "4_Ridges", "bumps6"});
   std::set<std::string> train, test;
   for (const std::size_t p : passes_of(set, split.train)) train.insert(set.passes()[p].plate);
@@ -220,15 +214,15 @@ TEST(Leakage, RestIsNoDuplicate) {
   EXPECT_TRUE(find_leakage(set, make_split(set, SplitKind::trial, 1)).none());
 }
 
-TEST(Split, WhatIsSetAsideIsTrainedOnAndNeverTested) {
+TEST(Split, WhatIsForTrainingOnlyIsNeverTested) {
   WindowSet set(wide_settings(16));
   for (int trial = 1; trial <= 2; ++trial)
     for (const char* plate : {"ridges6", "bumps6"})
       for (int pass = 1; pass <= 2; ++pass)
         set.add(make_recording({.plate = plate, .trial = trial, .pass = pass, .frames = 30}));
   const std::size_t own = set.size();
-  set.add(make_recording({.plate = "ridges6", .trial = 2, .pass = 3, .frames = 30}), ".", true);
-  set.add(make_recording({.plate = "bumps12", .trial = 1, .pass = 1, .frames = 30}), ".", true);
+  set.add(make_recording({.plate = "ridges6", .trial = 2, .pass = 3, .frames = 30}), ".", kTrainingOnly);
+  set.add(make_recording({.plate = "bumps12", .trial = 1, .pass = 1, .frames = 30}), ".", kTrainingOnly);
   ASSERT_EQ(set.size(), own + 30);
   for (const SplitKind kind : {SplitKind::window, SplitKind::pass, SplitKind::trial, SplitKind::none}) {
     const Split split = make_split(set, kind, 3);
@@ -239,26 +233,26 @@ TEST(Split, WhatIsSetAsideIsTrainedOnAndNeverTested) {
   }
 }
 
-TEST(Split, SpreadTakesEvenlyOrAll) {
+TEST(Split, TakesEvenlySpacedOrAll) {
   const std::vector<std::uint32_t> list{2, 3, 5, 7, 11, 13, 17};
-  EXPECT_EQ(spread(list, 3), (std::vector<std::uint32_t>{2, 5, 11}));
-  EXPECT_EQ(spread(list, 7), list);
-  EXPECT_EQ(spread(list, 100), list);
-  EXPECT_TRUE(spread({}, 3).empty());
+  EXPECT_EQ(evenly_spaced(list, 3), (std::vector<std::uint32_t>{2, 5, 11}));
+  EXPECT_EQ(evenly_spaced(list, 7), list);
+  EXPECT_EQ(evenly_spaced(list, 100), list);
+  EXPECT_TRUE(evenly_spaced({}, 3).empty());
 }
 
-TEST(Split, OfManyPassesAFourthOfTheSilenceIsKept) {
+TEST(Split, OfSimulatedPassesAFourthOfTheWindowsWithoutContactIsKept) {
   WindowSet windows({.timesteps = 32, .rate_hz = 100, .stride = 8});
-  windows.add_one_of_many(simulate_pass(Plate::named("3_Bumps"), {}), 8);
+  windows.add(simulate_pass(Plate::named("3_Bumps"), {}), ".", kOneOfMany);
   const std::size_t textured = windows.size();
-  windows.add_one_of_many(simulate_pass(Plate::named("plain"), {}), 8);
+  windows.add(simulate_pass(Plate::named("plain"), {}), ".", kOneOfMany);
   windows.add(simulate_pass(Plate::named("6_Bumps"), {}));
   std::vector<std::uint32_t> all(windows.size());
   for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
   std::size_t contact = 0, silent = 0, kept_silent = 0, kept_whole = 0;
   for (std::uint32_t i = 0; i < textured; ++i) ++(windows.contact(i) ? contact : silent);
   std::size_t kept_contact = 0;
-  for (const std::uint32_t i : without_most_silence(windows, all)) {
+  for (const std::uint32_t i : subsample_no_contact(windows, all)) {
     if (i >= textured)
       ++kept_whole;
     else
@@ -268,6 +262,36 @@ TEST(Split, OfManyPassesAFourthOfTheSilenceIsKept) {
   EXPECT_EQ(kept_contact, contact);
   EXPECT_EQ(kept_silent, (silent + 3) / 4);
   EXPECT_EQ(kept_whole, windows.size() - textured);
+}
+
+TEST(Split, TrialTestsAllTrialsButTheFirst) {
+  WindowSet set = make_set();
+  set.add(make_recording({.trial = 3, .frames = 40, .level = 2.9F}));
+  const Split split = make_split(set, SplitKind::trial, 1);
+  for (const std::size_t p : passes_of(set, split.train)) EXPECT_EQ(set.passes()[p].trial, 1);
+  for (const std::size_t p : passes_of(set, split.test)) EXPECT_GT(set.passes()[p].trial, 1);
+  EXPECT_EQ(split.train.size() + split.test.size(), set.size());
+  EXPECT_TRUE(find_leakage(set, split).none());
+  set.add(make_recording({.trial = 0, .pass = 7, .frames = 30}));
+  EXPECT_THROW(make_split(set, SplitKind::trial, 0), std::invalid_argument);
+}
+
+TEST(Split, GroupKeepsGroupsTogether) {
+  WindowSet set(wide_settings(16));
+  for (int pass = 1; pass <= 20; ++pass) {
+    Recording recording = make_recording({.pass = pass, .frames = 30});
+    recording.metadata["group"] = "person " + std::to_string(pass % 5);
+    set.add(recording);
+  }
+  const Split split = make_split(set, SplitKind::group, 3);
+  std::set<std::string> train, test;
+  for (const std::size_t p : passes_of(set, split.train)) train.insert(set.passes()[p].group);
+  for (const std::size_t p : passes_of(set, split.test)) test.insert(set.passes()[p].group);
+  EXPECT_EQ(train.size(), 4U);
+  EXPECT_EQ(test.size(), 1U);
+  EXPECT_FALSE(train.contains(*test.begin()));
+  set.add(make_recording({.pass = 21, .frames = 30}));
+  EXPECT_THROW(make_split(set, SplitKind::group, 3), std::invalid_argument);
 }
 
 }  // namespace

@@ -234,6 +234,9 @@ TEST(Windows, RefuseOutputsOfAnotherSizeAndUnknownPlates) {
             "windows: a window needs room for 256 values, got 255");
   EXPECT_THROW(set.truth(0, small), std::invalid_argument);
   EXPECT_THROW(set.add(make_recording({.plate = "carpet"})), std::invalid_argument);
+  Recording torn = make_recording({});
+  torn.lift_mm.assign(99, 0);
+  EXPECT_THROW(set.add(torn), std::runtime_error);
   EXPECT_EQ(set.size(), 85U);
 }
 
@@ -247,6 +250,79 @@ TEST(Windows, FingerprintTellsDataApart) {
   EXPECT_NE(a.fingerprint(), c.fingerprint());
   EXPECT_NE(a.fingerprint(), d.fingerprint());
   EXPECT_EQ(a.fingerprint().size(), 16U);
+}
+
+// What a finer sensor saw: frame i is i / 1000 in its first pixel, 0.5 elsewhere.
+Recording with_truth(std::size_t frames, const TaxelArray& array) {
+  Recording recording = make_recording({.plate = "a sponge", .frames = frames});
+  recording.array = array;
+  recording.volts.resize(frames * array.signals());
+  recording.position_mm.clear();
+  recording.truth_height = 4 * array.rows, recording.truth_width = 4 * array.columns;
+  recording.truth.assign(frames * array.picture(4).pixels(), 0.5F);
+  for (std::size_t i = 0; i < frames; ++i)
+    recording.truth[i * array.picture(4).pixels()] = static_cast<float>(i) / 1000;
+  return recording;
+}
+
+TEST(Windows, HaveTheTruthThatWasMeasured) {
+  const TaxelArray array{.rows = 2, .columns = 3};
+  for (const double rate_hz : {300.0, 150.0}) {
+    WindowSettings settings = wide_settings(16);
+    settings.rate_hz = rate_hz;
+    WindowSet set(settings);
+    set.add(with_truth(100, array));
+    ASSERT_EQ(set.size(), rate_hz == 300 ? 85U : 35U);
+    std::vector<float> truth(8 * 12);
+    for (std::size_t i = 0; i < set.size(); ++i) {
+      set.truth(i, truth);
+      const double recorded = static_cast<double>(set.frame_of(i)) * 300 / rate_hz;
+      ASSERT_EQ(truth[0], static_cast<float>(recorded) / 1000) << i;
+      ASSERT_EQ(truth[95], 0.5F);
+      ASSERT_EQ(set.zone(i), Zone::contact);
+    }
+  }
+  WindowSet set(wide_settings(16)), other(wide_settings(16));
+  set.add(with_truth(100, array));
+  Recording changed = with_truth(100, array);
+  changed.truth[50 * 96] = 0.9F;
+  other.add(changed);
+  EXPECT_NE(set.fingerprint(), other.fingerprint());
+  Recording coarse = with_truth(100, array);
+  coarse.truth_height = 4, coarse.truth_width = 6, coarse.truth.resize(100 * 24UL);
+  EXPECT_EQ(message_of<std::runtime_error>([&] { set.add(coarse); }),
+            "has a truth of 4x6 pixels, expected 8x12 for 2x3 taxels at 3 mm at scale 4");
+}
+
+TEST(Windows, OfOneFrameAreTheRecordedFrames) {
+  WindowSet set(WindowSettings{.timesteps = 1});
+  Recording recording = with_truth(100, {.rows = 2, .columns = 3});
+  for (std::size_t i = 0; i < 100; ++i) recording.time_s[i] = static_cast<double>(i * i);
+  set.add(recording);
+  ASSERT_EQ(set.size(), 100U);
+  std::vector<float> truth(96);
+  for (std::size_t i = 0; i < 100; ++i) {
+    EXPECT_EQ(set.window(i)[0], set.settings().scaling(recording.volts[6 * i]));
+    set.truth(i, truth);
+    EXPECT_EQ(truth[0], recording.truth[96 * i]);
+  }
+}
+
+TEST(Windows, SayWhatHelpsWhenThereIsNone) {
+  const auto message = [](const auto& change) {
+    Recording recording = make_recording({});
+    change(recording);
+    WindowSet set(wide_settings(128));
+    set.add(recording);
+    return message_of<std::runtime_error>([&] { set.check_any("here"); });
+  };
+  EXPECT_NE(message([](Recording&) {}).find("try fewer timesteps"), std::string::npos);
+  EXPECT_NE(message([](Recording& r) { r.position_mm.clear(); }).find("truth needs positions"),
+            std::string::npos);
+  EXPECT_NE(message([](Recording& r) {
+              r.metadata["registration_reliable"] = "no";
+            }).find("import the passes again"),
+            std::string::npos);
 }
 
 class WindowFiles : public ::testing::Test {

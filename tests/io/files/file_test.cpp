@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -10,7 +9,6 @@
 #include <fstream>
 #include <set>
 
-#include "io/files/positioned_file.h"
 #include "tests/io/faults.h"
 #include "tests/io/temporary_folder.h"
 
@@ -268,29 +266,6 @@ TEST(FileCrash, AlwaysOldOrNew) {
     EXPECT_FALSE(states_after(calls, length).contains("torn")) << "power cut after " << length << " calls";
   }
   EXPECT_EQ(states_after(calls, calls.size()), std::set<std::string>{"new"});
-}
-
-// A file system in memory always has the page.
-TEST(PositionedFile, FetchesWhatWillBeRead) {
-  TemporaryFolder folder;
-  write_file(folder / "large", std::string(1 << 20, 'x'));
-  const int file = ::open((folder / "large").c_str(), O_RDONLY);
-  ASSERT_GE(file, 0);
-  void* page = ::mmap(nullptr, 4096, PROT_READ, MAP_SHARED, file, 1 << 19);
-  ASSERT_NE(page, MAP_FAILED);
-  const auto resident = [&] {
-    unsigned char there = 0;
-    EXPECT_EQ(::mincore(page, 4096, &there), 0);
-    return (there & 1) != 0;
-  };
-  ASSERT_EQ(::posix_fadvise(file, 0, 0, POSIX_FADV_DONTNEED), 0);
-  const bool in_memory = resident();
-  PositionedFile(folder / "large").will_read(1 << 19, 100);
-  for (int i = 0; i < 500 && !resident(); ++i) ::usleep(10'000);
-  EXPECT_TRUE(resident());
-  if (in_memory) std::printf("this file system forgets nothing: the test shows nothing here\n");
-  ::munmap(page, 4096);
-  ::close(file);
 }
 
 }  // namespace

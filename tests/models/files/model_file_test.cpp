@@ -27,7 +27,7 @@ TEST(ModelFile, ComesBackWithItsSettingsInputAndPictures) {
   EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
   EXPECT_EQ(file.model->settings().latent, 3);
   EXPECT_EQ(file.input.scaling.rest_volts, 2.5);
-  EXPECT_TRUE(file.input.scaling.levelled);
+  EXPECT_TRUE(file.input.scaling.per_window);
   EXPECT_EQ(file.input.filter_s, 0.0992);
   EXPECT_EQ(file.metadata.at("split"), "trial");
   const Tensor x = uniform({2, 32, 16}, 1), a = model.infer(x), b = file.model->infer(x);
@@ -55,7 +55,7 @@ TEST(ModelFile, KeepsTheArrayAndSaysNothingOfTheRigs) {
 TEST(ModelFile, ReadsTheGoldenFileOfVersion1) {
   const ModelFile file = load_model(std::string(SUPERTAC_GOLDEN_DIR) + "/model_v1.safetensors");
   EXPECT_EQ(file.model->settings().channels, 4);
-  EXPECT_FALSE(file.input.scaling.levelled) << "a setting younger than the file";
+  EXPECT_FALSE(file.input.scaling.per_window) << "a setting younger than the file";
   EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
   const Tensor picture = file.model->infer(uniform({1, 32, 16}, 1));
   EXPECT_NEAR(picture.data()[0], 0.116217159, 1e-6);

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "data/windows/levelling.h"
+#include "data/windows/normalise_window.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/hash.h"
 #include "models/files/onnx.h"
@@ -23,7 +23,7 @@ ModelFile model_of(const std::string& preset, const TaxelArray& array, Grouping 
   Rng rng(7);
   ModelFile file;
   file.model = std::make_unique<SuperTac>(settings, rng);
-  file.input.scaling.levelled = true;
+  file.input.scaling.per_window = true;
   file.metadata = file.description();
   return file;
 }
@@ -53,9 +53,9 @@ void write_case(const TemporaryFolder& folder, const std::string& name, const Mo
   Tensor windows = volts.clone();
   file.input.scaling(windows.values());
   const auto size = static_cast<std::size_t>(windows.dim(1) * windows.dim(2));
-  for (Dim n = 0; n < count && file.input.scaling.levelled; ++n)
-    level(windows.values().subspan(static_cast<std::size_t>(n) * size, size),
-          static_cast<std::size_t>(windows.dim(2)));
+  for (Dim n = 0; n < count && file.input.scaling.per_window; ++n)
+    normalise_window(windows.values().subspan(static_cast<std::size_t>(n) * size, size),
+                     static_cast<std::size_t>(windows.dim(2)));
   const Estimate drawn = Prepared(*file.model).estimate(windows);
   const auto array = [](const std::string& called, const Tensor& t) {
     TensorToWrite out{called, "F32", {}, std::as_bytes(std::span<const real>(t.values()))};
@@ -77,7 +77,7 @@ TEST(Onnx, OnnxruntimeDrawsOurPictures) {
     write_case(folder, name + "_3x5x2", model_of(name, other, Grouping::vertical), kWindows);
   }
   ModelFile plain = model_of("tiny", rig, Grouping::horizontal);
-  plain.input.scaling.levelled = false;
+  plain.input.scaling.per_window = false;
   write_case(folder, "not_levelled", plain, 50);
   const char* python = std::getenv("SUPERTAC_PYTHON");
   const std::string log = folder.file("log");

@@ -15,7 +15,7 @@ namespace {
 ModelFile file_of(const Recipe& recipe, const std::string& path) {
   Rng rng(0);
   InputSettings input{.rate_hz = recipe.rate_hz, .scaling = recipe.range.value_or(Scaling())};
-  input.scaling.levelled = recipe.levelled;
+  input.scaling.per_window = recipe.per_window;
   save_model(path, SuperTac(recipe.model, rng), input, metadata_of(recipe));
   return load_model(path);
 }

@@ -1,4 +1,4 @@
-#include "data/windows/levelling.h"
+#include "data/windows/normalise_window.h"
 
 #include <algorithm>
 #include <array>
@@ -49,11 +49,11 @@ std::array<Range, kAtOnce> ranges_of(std::span<const float> window, std::size_t 
 
 }  // namespace
 
-void level(std::span<float> window, std::size_t taxels) {
+void normalise_window(std::span<float> window, std::size_t taxels) {
   if (taxels == 0 || window.empty() || window.size() % taxels != 0 || window.size() / taxels > kMostFrames)
-    throw std::invalid_argument("level: a window is [T][" + std::to_string(taxels) + "], T up to " +
-                                std::to_string(kMostFrames) + ", got " + std::to_string(window.size()) +
-                                " values");
+    throw std::invalid_argument("normalise_window: a window is [T][" + std::to_string(taxels) +
+                                "], T up to " + std::to_string(kMostFrames) + ", got " +
+                                std::to_string(window.size()) + " values");
   float gain = kLeastGain;
   for (std::size_t first = 0; first < taxels; first += kAtOnce) {
     const std::size_t count = std::min(kAtOnce, taxels - first);

@@ -1,0 +1,73 @@
+#include "io/files/scratch_file.h"
+
+#include <fcntl.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <random>
+
+#include "io/files/file.h"
+#include "io/files/system_calls.h"
+
+namespace supertac {
+namespace {
+
+[[noreturn]] void fail(const std::string& folder, const char* what, int error) {
+  throw FileError(folder, std::string("cannot ") + what + " a temporary file there: " + std::strerror(error) +
+                              "; set TMPDIR to a folder on a disk with room");
+}
+
+std::string temporary_folder() {
+  const char* chosen = std::getenv("TMPDIR");
+  return chosen != nullptr && *chosen != '\0' ? chosen : "/var/tmp";
+}
+
+// In turn, so that every process and thread tries a name of its own; O_EXCL refuses one that somebody
+// planted.
+std::string name_in(const std::string& folder) {
+  std::random_device random;
+  return folder + "/.supertac-" + std::to_string(random()) + std::to_string(random());
+}
+
+}  // namespace
+
+ScratchFile::ScratchFile() : folder_(temporary_folder()) {
+  const std::string name = name_in(folder_);
+  file_ = system_calls().open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+  if (file_ < 0) fail(folder_, "make", errno);
+  system_calls().unlink(name.c_str());
+}
+
+ScratchFile::~ScratchFile() { system_calls().close(file_); }
+
+std::uint64_t ScratchFile::append(std::span<const float> numbers) {
+  for (auto bytes = std::as_bytes(numbers); !bytes.empty();) {
+    const ssize_t count = system_calls().write(file_, bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) fail(folder_, "write", count < 0 ? errno : ENOSPC);
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  const std::uint64_t place = count_;
+  count_ += numbers.size();
+  return place;
+}
+
+void ScratchFile::read(std::uint64_t place, std::span<float> numbers) const {
+  std::uint64_t offset = place * sizeof(float);
+  for (auto bytes = std::as_writable_bytes(numbers); !bytes.empty();) {
+    const ssize_t count = system_calls().pread(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) fail(folder_, "read", count < 0 ? errno : EIO);
+    offset += static_cast<std::uint64_t>(count);
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+}
+
+// A hint: what comes of it does not matter.
+void ScratchFile::will_read(std::uint64_t place, std::uint64_t count) const {
+  (void)::posix_fadvise(file_, static_cast<off_t>(place * sizeof(float)),
+                        static_cast<off_t>(count * sizeof(float)), POSIX_FADV_WILLNEED);
+}
+
+}  // namespace supertac
