@@ -1,6 +1,7 @@
 #include "data/scores/phase_correlation.h"
 
-#include <kissfft/kiss_fftndr.h>
+#include <kissfft/kiss_fft.h>
+#include <kissfft/kiss_fftr.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,11 +17,11 @@ namespace {
 
 static_assert(sizeof(kiss_fft_cpx) == 2 * sizeof(float), "kissfft must be its single-precision build");
 
-kiss_fftndr_state* make_plan(int height, int width, bool inverse) {
-  const int dims[2] = {height, width};
-  kiss_fftndr_state* plan = kiss_fftndr_alloc(dims, 2, inverse ? 1 : 0, nullptr, nullptr);
-  if (plan == nullptr) throw std::bad_alloc();
-  return plan;
+kiss_fft_cpx* complex(std::vector<float>& numbers, std::size_t at = 0) {
+  return reinterpret_cast<kiss_fft_cpx*>(&numbers[2 * at]);
+}
+const kiss_fft_cpx* complex(const std::vector<float>& numbers, std::size_t at = 0) {
+  return reinterpret_cast<const kiss_fft_cpx*>(&numbers[2 * at]);
 }
 
 std::vector<float> hann(int size) {
@@ -38,19 +39,52 @@ double parabola_top(double before, double top, double after) {
 
 }  // namespace
 
-void PhaseCorrelator::Free::operator()(kiss_fftndr_state* plan) const { std::free(plan); }
+void PhaseCorrelator::Free::operator()(void* plan) const { std::free(plan); }
 
-PhaseCorrelator::PhaseCorrelator(int height, int width) : height_(height), width_(width) {
+// One axis after the other: kissfft's own plan for two axes asks for too little memory at most sizes and then
+// gives none.
+PhaseCorrelator::Plans::Plans(int height, int width, bool inverse) {
   if (height < 4 || width < 4 || height % 2 != 0 || width % 2 != 0)
     throw std::invalid_argument("phase correlation: sides must be even and at least 4, got " +
                                 std::to_string(height) + "x" + std::to_string(width));
-  forward_.reset(make_plan(height, width, false));
-  inverse_.reset(make_plan(height, width, true));
+  along_rows.reset(kiss_fftr_alloc(width, inverse ? 1 : 0, nullptr, nullptr));
+  along_columns.reset(kiss_fft_alloc(height, inverse ? 1 : 0, nullptr, nullptr));
+  if (!along_rows || !along_columns) throw std::bad_alloc();
+}
+
+PhaseCorrelator::PhaseCorrelator(int height, int width)
+    : height_(height), width_(width), forward_(height, width, false), inverse_(height, width, true) {
   down_ = hann(height);
   across_ = hann(width);
   surface_.resize(down_.size() * across_.size());
   const auto bins = static_cast<std::size_t>(height) * static_cast<std::size_t>(width / 2 + 1);
-  for (Spectrum* spectrum : {&a_, &b_, &cross_}) spectrum->resize(2 * bins);
+  for (Spectrum* spectrum : {&a_, &b_, &cross_, &turned_}) spectrum->resize(2 * bins);
+  row_.resize(2 * bins / down_.size());
+  column_.resize(2 * down_.size());
+}
+
+void PhaseCorrelator::to_spectrum(Spectrum& out) {
+  const std::size_t height = down_.size(), bins = row_.size() / 2;
+  for (std::size_t r = 0; r < height; ++r) {
+    kiss_fftr(forward_.along_rows.get(), &surface_[r * across_.size()], complex(row_));
+    for (std::size_t c = 0; c < bins; ++c) *complex(turned_, c * height + r) = *complex(row_, c);
+  }
+  for (std::size_t c = 0; c < bins; ++c) {
+    kiss_fft(forward_.along_columns.get(), complex(turned_, c * height), complex(column_));
+    for (std::size_t r = 0; r < height; ++r) *complex(out, r * bins + c) = *complex(column_, r);
+  }
+}
+
+void PhaseCorrelator::to_surface(const Spectrum& spectrum) {
+  const std::size_t height = down_.size(), bins = row_.size() / 2;
+  for (std::size_t c = 0; c < bins; ++c) {
+    for (std::size_t r = 0; r < height; ++r) *complex(column_, r) = *complex(spectrum, r * bins + c);
+    kiss_fft(inverse_.along_columns.get(), complex(column_), complex(turned_, c * height));
+  }
+  for (std::size_t r = 0; r < height; ++r) {
+    for (std::size_t c = 0; c < bins; ++c) *complex(row_, c) = *complex(turned_, c * height + r);
+    kiss_fftri(inverse_.along_rows.get(), complex(row_), &surface_[r * across_.size()]);
+  }
 }
 
 // False when the image is flat.
@@ -67,7 +101,7 @@ bool PhaseCorrelator::transform(std::span<const float> image, Spectrum& out) {
     deviation = std::max(deviation, std::abs(centred));
     surface_[i] = static_cast<float>(centred) * down_[i / across_.size()] * across_[i % across_.size()];
   }
-  kiss_fftndr(forward_.get(), surface_.data(), reinterpret_cast<kiss_fft_cpx*>(out.data()));
+  to_spectrum(out);
   return deviation > kFlat;
 }
 
@@ -84,7 +118,7 @@ void PhaseCorrelator::correlate(double epsilon) {
     cross_[i] = static_cast<float>(re * scale);
     cross_[i + 1] = static_cast<float>(im * scale);
   }
-  kiss_fftndri(inverse_.get(), reinterpret_cast<const kiss_fft_cpx*>(cross_.data()), surface_.data());
+  to_surface(cross_);
 }
 
 PhaseCorrelation PhaseCorrelator::operator()(std::span<const float> a, std::span<const float> b) {

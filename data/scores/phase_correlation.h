@@ -4,7 +4,8 @@
 #include <span>
 #include <vector>
 
-struct kiss_fftndr_state;
+struct kiss_fft_state;
+struct kiss_fftr_state;
 
 namespace supertac {
 
@@ -42,18 +43,26 @@ class PhaseCorrelator {
 
  private:
   struct Free {
-    void operator()(kiss_fftndr_state* plan) const;
+    void operator()(void* plan) const;
+  };
+  struct Plans {  // of both axes, one way
+    Plans(int height, int width, bool inverse);
+    std::unique_ptr<kiss_fftr_state, Free> along_rows;
+    std::unique_ptr<kiss_fft_state, Free> along_columns;
   };
   using Spectrum = std::vector<float>;  // re, im interleaved, [height][width/2 + 1]
 
   bool transform(std::span<const float> image, Spectrum& out);
   void correlate(double epsilon);
+  void to_spectrum(Spectrum& out);
+  void to_surface(const Spectrum& spectrum);
 
   int height_, width_;
-  std::unique_ptr<kiss_fftndr_state, Free> forward_, inverse_;
+  Plans forward_, inverse_;
   std::vector<float> down_, across_;  // Hann windows of both axes
   std::vector<float> surface_;        // [height][width]
   Spectrum a_, b_, cross_;
+  Spectrum row_, column_, turned_;  // of one row and one column; [width/2 + 1][height]
 };
 
 }  // namespace supertac

@@ -124,5 +124,31 @@ TEST(PhaseCorrelation, RefusesOtherSizes) {
   }
 }
 
+// Every size that an array of up to 64x64 taxels and a scale of 2, 4 or 8 can give, but for the largest,
+// which take long: each finds the shift of a blob.
+TEST(PhaseCorrelation, TakesEverySizeOfPicture) {
+  for (int height = 4; height <= 512; height += height < 72 ? 2 : 88)
+    for (const int width : {4, 6, 14, 18, 34, 54, 56, 64, 96, 128, 200, 512}) {
+      PhaseCorrelator correlator(height, width);
+      const auto blob = [&](double x, double y) {
+        std::vector<float> image(static_cast<std::size_t>(height) * static_cast<std::size_t>(width));
+        for (std::size_t i = 0; i < image.size(); ++i) {
+          const double dx = static_cast<double>(i % static_cast<std::size_t>(width)) - x;
+          const double dy = static_cast<double>(i / static_cast<std::size_t>(width)) - y;
+          image[i] = static_cast<float>(1 / (1 + dx * dx + dy * dy));
+        }
+        return image;
+      };
+      const double x = width / 2.0, y = height / 2.0;
+      const PhaseCorrelation same = correlator(blob(x, y), blob(x, y));
+      ASSERT_TRUE(same.defined) << height << "x" << width;
+      ASSERT_NEAR(same.dx_px, 0, 1e-3) << height << "x" << width;
+      if (height < 12 || width < 12) continue;
+      const PhaseCorrelation moved = correlator(blob(x + 1, y), blob(x, y + 1));
+      ASSERT_NEAR(moved.dx_px, 1, 0.6) << height << "x" << width;
+      ASSERT_NEAR(moved.dy_px, -1, 0.6) << height << "x" << width;
+    }
+}
+
 }  // namespace
 }  // namespace supertac
