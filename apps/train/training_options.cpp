@@ -1,5 +1,8 @@
 #include "apps/train/training_options.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "apps/common/running/progress.h"
 #include "io/numbers/numbers.h"
 #include "models/files/model_file.h"
@@ -103,10 +106,17 @@ static void read_pace(const Arguments& a, TrainingPace& pace) {
 
 static std::optional<Scaling> stated_range(const Arguments& a) {
   if (a.text("range") == "auto") return std::nullopt;
-  const std::vector<double> numbers = a.numbers("range", -1e6, 1e6);
-  if (numbers.size() != 2 || numbers[1] <= 1e-6)
-    throw UsageError("--range expects REST,SPAN with a SPAN above 0, found " + a.text("range"));
-  return Scaling{.rest_volts = numbers[0], .span_volts = numbers[1]};
+  constexpr double kMost = 1e9;
+  const std::string text = a.text("range");
+  const std::size_t comma = std::min(text.find(','), text.size());
+  const auto rest = parse_double(text.substr(0, comma));
+  const auto span = parse_double(text.substr(std::min(comma + 1, text.size())));
+  if (!rest || !span || !(std::abs(*rest) <= kMost) || !(std::abs(*span) > 1e-6 && std::abs(*span) <= kMost))
+    throw UsageError(
+        "--range expects REST,SPAN with a SPAN that is not 0 (below 0 where pressing raises the signals), "
+        "found " +
+        text);
+  return Scaling{.rest_volts = *rest, .span_volts = *span};
 }
 
 Recipe recipe_of(const Arguments& a, Recipe r) {

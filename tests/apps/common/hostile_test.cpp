@@ -295,5 +295,15 @@ TEST(Import, HoldsOnePlateAtATime) {
   EXPECT_LT(most_kilobytes(), one + one / 4);
 }
 
+// An output in a folder that is called like a plate or a preset replaces no input.
+TEST(Outputs, InAFolderOfAPlatesNameReplaceNoInput) {
+  const TemporaryFolder folder;
+  fs::create_directory(folder / "bumps6");
+  write_file(folder / "bumps6/plate.stl", std::string("old"));
+  EXPECT_EQ(shell("cd " + folder.path() +
+                  " && $BIN/supertac-plate --plate bumps6 --resolution 5 --out bumps6/plate.stl --force"),
+            0);
+}
+
 }  // namespace
 }  // namespace supertac

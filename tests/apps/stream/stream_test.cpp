@@ -340,12 +340,16 @@ TEST_F(Streaming, AnOldCaptureStaysUntilTheNewOneIsComplete) {
 
 TEST_F(Streaming, AModelThatDrawsNoNumbersIsRefused) {
   Rng rng(1);
-  SuperTac broken({.timesteps = kTimesteps, .latent = 3, .scale = 2, .channels = 8, .rcabs = 1}, rng);
-  for (const Parameter& parameter : broken.parameters()) {
-    const auto values = Variable(parameter.value).mutable_value().values();
-    std::fill(values.begin(), values.end(), std::nanf(""));
-  }
-  save_model(model(), broken, {300, {}, SimulatorSettings().filter_s}, {});
+  save_model(model(),
+             SuperTac({.timesteps = kTimesteps, .latent = 3, .scale = 2, .channels = 8, .rcabs = 1}, rng),
+             {300, {}, SimulatorSettings().filter_s}, {});
+  const SafetensorsFile good = SafetensorsFile::read(model());
+  const std::vector<float> nothing(1 << 20, std::nanf(""));
+  std::vector<TensorToWrite> broken;
+  for (const auto& [name, info] : good.tensors())
+    broken.push_back(
+        {name, info.dtype, info.shape, std::as_bytes(std::span(nothing)).first(info.end - info.begin)});
+  write_safetensors(model(), good.metadata(), broken);
   write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 40}));
   expect_failure(stream({"--recording", path("recording")}), 1, " holds NaN or infinity");
 }
