@@ -1,4 +1,4 @@
-// supertac-simulate: recordings as the rig would make them, without a rig.
+// supertac-simulate: recordings as the rig or another sensor would make them, without one.
 
 #include <omp.h>
 
@@ -50,9 +50,18 @@ TaxelArray read_array(const Arguments& arguments) {
           .pitch_mm = arguments.number("pitch", 0.1, 100)};
 }
 
-SimulatorSettings read_settings(const Arguments& arguments) {
+SimulatorSettings read_settings(const Arguments& arguments, const Sensor& sensor) {
   SimulatorSettings settings;
-  settings.array = read_array(arguments);
+  if (arguments.given("sensor")) {
+    for (const char* other : {"array", "pitch"})
+      if (arguments.given(other))
+        throw UsageError(std::string("--sensor: its file says what --") + other + " would; leave that out");
+    settings.array = sensor.array;
+    settings.rate_hz = sensor.rate_hz;
+    settings.with_filter = settings.with_adc = false;  // the rig's board has these
+  } else {
+    settings.array = read_array(arguments);
+  }
   for (const std::string& term : arguments.list("without")) {
     settings = read_option("without", [&] { return without_term(settings, term); });
   }
@@ -87,8 +96,8 @@ std::vector<Job> plan(const Arguments& arguments, const std::vector<Plate>& plat
 
 /// Simulates and writes all passes, several at a time; each depends on its own settings and the seed only.
 /// Returns frames written
-std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& settings, std::uint64_t seed,
-                     Progress& progress) {
+std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& settings,
+                     const SignalScale& scale, std::uint64_t seed, Progress& progress) {
   std::size_t frames = 0;
   std::size_t done = 0;
   std::exception_ptr failure;
@@ -99,7 +108,8 @@ std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& sett
     stop = stop || failure != nullptr;
     if (stop) continue;
     try {
-      const Recording recording = simulate_pass(*jobs[i].plate, jobs[i].pass, settings, seed);
+      Recording recording = simulate_pass(*jobs[i].plate, jobs[i].pass, settings, seed);
+      restate(recording, scale);
       write_recording(jobs[i].path, recording);
 #pragma omp critical
       {
@@ -129,6 +139,9 @@ void declare(Arguments& arguments) {
       .option("from", "MM", "where the finger's centre begins to slide; T samples before a window are needed",
               "0")
       .option("to", "MM", "where the slide ends", format(Plate::kLengthMm))
+      .option("sensor", "FILE",
+              "a sensor's file, or rig: its array, rate, unit, polarity and range instead of the rig's",
+              "rig")
       .option("array", "ROWSxCOLUMNS", "taxels of the finger, 2 to 16 either way", "4x4")
       .option("pitch", "MM", "from taxel to taxel", "3")
       .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms(), ", "))
@@ -149,7 +162,8 @@ std::size_t recordings_in(const std::string& folder) {
 
 int run(Arguments& arguments) {
   const auto plates = read_plates(arguments);
-  const auto settings = read_settings(arguments);
+  const Sensor sensor = read_sensor(arguments.text("sensor"));
+  const auto settings = read_settings(arguments, sensor);
   const auto seed = static_cast<std::uint64_t>(arguments.integer("seed", 0, INT64_MAX));
   if (arguments.list("speeds").empty()) throw UsageError("--speeds: expected at least one speed");
   const std::size_t before = recordings_in(arguments.text("out"));
@@ -158,7 +172,7 @@ int run(Arguments& arguments) {
   std::size_t frames = 0;
   {
     Progress progress(arguments, "simulating", jobs.size(), "passes");
-    frames = simulate(jobs, settings, seed, progress);
+    frames = simulate(jobs, settings, sensor.scale, seed, progress);
   }
   for (const std::string& plate : arguments.list("plates")) keep_plate_file(plate, folder.path());
   folder.keep();

@@ -246,7 +246,8 @@ std::vector<NamedPath> Arguments::paths() const {
     for (const std::string& path : comma_list(text)) {
       std::error_code error;
       // Of what has a name only plates lie in files; a folder that is called like a preset is nobody's.
-      const bool may_lie_there = option.value != "NAME" || path.ends_with(".stl") || path.ends_with(".STL");
+      const bool may_lie_there =
+          !option.value.starts_with("NAME") || path.ends_with(".stl") || path.ends_with(".STL");
       if (may_lie_there && std::filesystem::exists(path, error)) paths.push_back({name, path, false, false});
     }
   }
