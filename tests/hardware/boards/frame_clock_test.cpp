@@ -115,7 +115,8 @@ TEST(FrameTimeline, DamagedFramesKeepTheirPlaceInAChunk) {
   EXPECT_EQ(damaged_frames(327), 2U);
   std::vector<FrameArrival> arrivals;
   for (int i = 0; i < 5000; ++i)
-    if (i % 50 != 25) arrivals.push_back({100 + 50 * rig::kFramePeriodS * std::ceil(i / 50.0), i % 50 == 26 ? 1U : 0U});
+    if (i % 50 != 25)
+      arrivals.push_back({100 + 50 * rig::kFramePeriodS * std::ceil(i / 50.0), i % 50 == 26 ? 1U : 0U});
   const FrameTimeline timeline = timeline_of(arrivals);
   EXPECT_EQ(timeline.places[120].index - timeline.places[20].index, 102U);
   EXPECT_EQ(timeline.missing, 100U);
