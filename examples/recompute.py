@@ -92,6 +92,7 @@ def computed(step, x, shape):
         return activated(added(np.broadcast_to(x[2], (len(x[0]), len(x[2]))), x[0], w.T), step)
     return {
         "concat": lambda: np.concatenate(x, axis=-1),
+        "last_frame": lambda: x[0][:, -1].reshape(-1, *shape[1:]),
         "flatten_channels_first": lambda: np.moveaxis(x[0], -1, 1).reshape(len(x[0]), -1),
         "unflatten_channels_first":
             lambda: np.moveaxis(x[0].reshape(len(x[0]), shape[-1], *shape[1:-1]), 1, -1),

@@ -44,6 +44,7 @@ void Sweep::check_settings() const {
         "interval-factor", "lambda",      "learning-rate", "leave-out", "limit",  "optimizer", "plates",
         "random-plates",   "range",       "rate",          "scaling",   "split",  "stride"})
     settings[option] = a_.given(option) || !a_.text(option).empty() ? a_.text(option) : "the preset's";
+  settings["last-frame"] = a_.flag("last-frame");
   settings["data"] = hash_of_recordings(a_.text("data"), a_.list("plates"));
   settings["also"] = a_.given("also") ? hash_of_recordings(a_.text("also"), {}) : "";
   const std::string path = a_.text("out") + "/settings.json";

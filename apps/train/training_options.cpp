@@ -74,6 +74,10 @@ void declare_window_training(Arguments& a) {
            "that the network has not seen",
            format(kIntervalFactor));
   a.option("grouping", "NAME", "taxels of one VAE: horizontal (rows) or vertical (columns)", "horizontal");
+  a.flag(
+      "last-frame",
+      "give the last frame a way of its own into the picture, beside the latents: for sensors of which one "
+      "frame says more than the latents keep");
   a.option("beta", "X", "weight of the KL divergence of variational autoencoders (default: 0.001)");
   a.option("autoencoder", "NAME",
            "variational, as in the paper; or plain: latents without noise and KL divergence (default: the "
@@ -135,6 +139,7 @@ Recipe recipe_of(const Arguments& a, Recipe r) {
         a.choice("augment", {"standard", "none"}) == "standard" ? kStandardAugmentation : AugmentSettings{};
   if (a.given("interval-factor")) r.interval_factor = a.number("interval-factor", 0.1, 100);
   if (a.given("grouping")) r.model.grouping = grouping_of(a.choice("grouping", {"horizontal", "vertical"}));
+  if (a.flag("last-frame")) r.model.last_frame_path = true;
   if (a.given("autoencoder")) {
     r.sampling = a.choice("autoencoder", {"variational", "plain"}) == "variational";
     r.loss.beta = r.sampling ? LossWeights{}.beta : 0;

@@ -123,6 +123,17 @@ Variable take_runs(const Variable& x, const Runs& r) {
       "take_runs", y, {&x}, [](Backward&) {}, &settings);
 }
 
+Variable last_frame(const Variable& x, Dim rows, Dim columns, Dim channels) {
+  check_rank("last_frame", "windows", x, 3);
+  const Dim images = x.dim(0), frames = x.dim(1), signals = rows * columns * channels;
+  check_shape("last_frame", "windows", x, {images, std::max<Dim>(frames, 1), signals});
+  if (x.requires_grad()) refuse("last_frame", "windows want a gradient, which this op does not have");
+  Tensor y(Shape{images, rows, columns, channels});
+  move_columns(images, signals, x.value().data(), {frames * signals, (frames - 1) * signals}, Into::overwrite,
+               y.data(), {signals, 0});
+  return record("last_frame", y, {&x}, [](Backward&) {});
+}
+
 Variable flatten_channels_first(const Variable& x) {
   if (x.rank() < 3) refuse("flatten_channels_first", "x expects rank 3 or 4, got " + x.shape().text());
   const Dim channels = x.dim(x.rank() - 1), images = x.dim(0);

@@ -17,6 +17,9 @@ struct Runs {
 };
 /// y[.., k] = x[.., first + k / run * step + k % run]. Throws when that leaves x. No gradient: for inputs.
 Variable take_runs(const Variable& x, const Runs& runs);
+/// Windows [N,T,S] -> their last frames [N,rows,columns,channels], S = rows columns channels. Throws
+/// std::invalid_argument when they have others. No gradient: for inputs.
+Variable last_frame(const Variable& windows, Dim rows, Dim columns, Dim channels);
 
 /// [N, P..., C] -> [N, C P]: the order in which PyTorch flattens [N,C,P...], so that the weights of the
 /// following linear layer mean the same there.

@@ -31,6 +31,7 @@ SuperTacSettings read_settings(const JsonEntry& entry) {
   s.channels = entry.integer("channels");
   s.rcabs = entry.integer("rcabs");
   s.predicted_error = entry.flag("spread");
+  s.last_frame_path = entry.flag("last_frame_path");
   if (entry.flag("sub_pixel")) {
     throw std::runtime_error(
         entry.where() +
@@ -117,6 +118,7 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
                    {"rcabs", s.rcabs}};
   // What is as it always was is left out: the text of older files stays the same.
   if (s.predicted_error) settings["spread"] = true;
+  if (s.last_frame_path) settings["last_frame_path"] = true;
   if (s.rows != 4 || s.columns != 4 || s.in_channels != 1) {
     settings["rows"] = s.rows;
     settings["columns"] = s.columns;

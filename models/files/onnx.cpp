@@ -182,6 +182,13 @@ std::string Exporter::made(const TracedOp& op) {
         graph.node("Gather", {x, numbers(columns)}, new_name("group"), {{"axis", std::int64_t{2}}});
     return graph.node("Transpose", {taken}, taken + "_channels_first", {{"perm", Ints{0, 2, 1}}});
   }
+  if (kind == "last_frame") {
+    const std::string last = graph.node("Gather", {x, numbers({op.inputs[0].dim(1) - 1})}, "last_frame",
+                                        {{"axis", std::int64_t{1}}});
+    const std::string plane = graph.node(
+        "Reshape", {last, numbers({-1, op.y.dim(1), op.y.dim(2), op.y.dim(3)})}, "last_frame_of_array");
+    return graph.node("Transpose", {plane}, "last_frame_channels_first", {{"perm", Ints{0, 3, 1, 2}}});
+  }
   if (kind == "flatten_channels_first") return graph.node("Flatten", {x}, new_name("flat"));
   if (kind == "unflatten_channels_first") {
     Ints shape = {-1, op.y.dim(op.y.rank() - 1)};

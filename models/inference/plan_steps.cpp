@@ -11,9 +11,19 @@ namespace supertac {
 void Planner::load_input(const Variable& input) {
   if (maps_.contains(input.node())) return;
   const FeatureMap y = new_map(input);
-  plan_->steps_.push_back([y](const Block& b) {
-    const real* from = b.input;
+  load(y, y.height * y.width * y.channels, 0);
+}
+
+void Planner::last_frame(const TracedOp& op) {
+  const Variable& windows = op.inputs[0];
+  load(new_map(op.y), windows.dim(1) * windows.dim(2), (windows.dim(1) - 1) * windows.dim(2));
+}
+
+// Of each window, so many numbers long, what lies from `first` on.
+void Planner::load(const FeatureMap& y, Dim window, Dim first) {
+  plan_->steps_.push_back([=](const Block& b) {
     for (Dim n = 0; n < b.images; ++n) {
+      const real* from = b.input + n * window + first;
       real* line = b.first_pixel(y) + n * y.image();
       for (Dim i = 0; i < y.height; ++i, line += y.line(), from += y.width * y.channels)
         std::copy_n(from, y.width * y.channels, line);

@@ -52,6 +52,7 @@ std::shared_ptr<const Plan> Planner::plan(const Network& network, const Activati
 const std::map<std::string_view, Planner::Make>& Planner::makers() {
   static const std::map<std::string_view, Make> known{
       {"take_runs", &Planner::take_runs},
+      {"last_frame", &Planner::last_frame},
       {"conv1d", &Planner::conv},
       {"conv2d", &Planner::conv},
       {"conv_transpose1d", &Planner::transposed_conv},
@@ -82,7 +83,8 @@ Planner::Planner(const Variable& input, const std::vector<TracedOp>& ops, const 
     if (make == makers().end())
       throw std::logic_error("Prepared: no step computes the op " + std::string(ops[i].op) +
                              "; models/inference/planner.h lists those that have one");
-    if (ops[i].op != "take_runs" && ops[i].inputs[0].node() == input_) load_input(ops[i].inputs[0]);
+    const bool takes_input = ops[i].op == "take_runs" || ops[i].op == "last_frame";
+    if (!takes_input && ops[i].inputs[0].node() == input_) load_input(ops[i].inputs[0]);
     (this->*make->second)(ops[i]);
     add_bytes(ops[i]);
     release_after(i);

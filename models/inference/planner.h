@@ -58,6 +58,7 @@ class Planner {
   void release_after(std::size_t op);
 
   void take_runs(const TracedOp& op);
+  void last_frame(const TracedOp& op);
   void conv(const TracedOp& op);
   void winograd(const TracedOp& op);
   void plane_conv(const TracedOp& op);
@@ -74,6 +75,7 @@ class Planner {
   void gated_sum(const TracedOp& op);
   void add(const TracedOp& op);
   void load_input(const Variable& input);
+  void load(const FeatureMap& y, Dim window, Dim first);
 
   struct Margin {
     Dim height = 0, width = 0;

@@ -23,7 +23,7 @@ double decoder_macs(Dim timesteps, Dim signals, Dim latent) {
 double upsampler_macs(const SuperTacSettings& s) {
   const Dim c = s.channels;
   Dim pixels = s.rows * s.columns;
-  Dim macs = s.groups() * s.latent * c * pixels;
+  Dim macs = s.groups() * s.latent * c * pixels + (s.last_frame_path ? pixels * 9 * s.in_channels * c : 0);
   for (Dim size = 1; size < s.scale; size *= 2, pixels *= 4) {
     const Dim conv = pixels * 9 * c * c, attention = 2 * c * (c / RirbOptions{}.reduction);
     macs += s.rcabs * (2 * conv + attention) + conv + pixels * 16 * c * c;

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "autograd/ops/activations.h"
+#include "autograd/ops/arithmetic.h"
 #include "autograd/ops/shaping.h"
 #include "autograd/ops/vae.h"
 
@@ -94,19 +95,24 @@ SuperTacSettings SuperTacSettings::of_preset(const std::string& name) {
 Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
     : rows_(s.rows),
       columns_(s.columns),
+      in_channels_(s.in_channels),
       fc_(s.groups() * s.latent, s.channels * s.rows * s.columns, rng),
       rirbs_(make_rirbs(s, rng)),
       out_(s.channels, 1, kSameSize, rng) {
   if (s.predicted_error) predicted_error_.emplace(s.channels, 1, kSameSize, rng);
+  if (s.last_frame_path) last_frame_.emplace(s.in_channels, s.channels, kSameSize, rng);
   add("fc", fc_);
   for (std::size_t i = 0; i < rirbs_.size(); ++i) add("rirb." + std::to_string(i), rirbs_[i]);
   add("out", out_);
   if (predicted_error_) add("spread", *predicted_error_);
+  if (last_frame_) add("last_frame", *last_frame_);
 }
 
-Upsampler::Output Upsampler::forward(const Variable& latents) const {
+Upsampler::Output Upsampler::forward(const Variable& latents, const Variable& windows) const {
   const Dim pixels[] = {rows_, columns_};
   Variable h = unflatten_channels_first(fc_.forward(latents, kLeakyRelu), pixels);
+  if (last_frame_)
+    h = h + last_frame_->forward(supertac::last_frame(windows, rows_, columns_, in_channels_), kLeakyRelu);
   for (const Rirb& rirb : rirbs_) h = rirb.forward(h);
   return {out_.forward(h), predicted_error_ ? predicted_error_->forward(h) : Variable()};
 }
@@ -150,7 +156,7 @@ SuperTac::Output SuperTac::forward(const Tensor& windows, std::span<const Tensor
     z[i] = sample_gaussian(out.latent[i].mean, out.latent[i].log_var, eps[i]);
     out.decoded[i] = decoders_[i].forward(z[i]);
   }
-  const Upsampler::Output drawn = upsampler_.forward(concat_groups(z.span()));
+  const Upsampler::Output drawn = upsampler_.forward(concat_groups(z.span()), Variable(windows));
   out.image = drawn.picture, out.predicted_error = drawn.predicted_error;
   return out;
 }
@@ -174,7 +180,7 @@ Tensor SuperTac::encode(const Tensor& windows) const {
 
 Drawing SuperTac::draw(const Variable& windows) const {
   const Variable latents = means(windows);
-  const Upsampler::Output drawn = upsampler_.forward(latents);
+  const Upsampler::Output drawn = upsampler_.forward(latents, windows);
   return {.picture = drawn.picture, .predicted_error = drawn.predicted_error, .latents = latents};
 }
 

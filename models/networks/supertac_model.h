@@ -31,8 +31,11 @@ struct SuperTacSettings {
   Dim latent = 10;            ///< LD: 1 to 256
   Dim scale = 4;  ///< 2, 4, 8: pictures so many times finer than the array, 7 or more pixels a side
   Grouping grouping = Grouping::horizontal;
-  Dim channels = 32;             ///< of the upsampler
-  Dim rcabs = 3;                 ///< in each RIRB
+  Dim channels = 32;  ///< of the upsampler
+  Dim rcabs = 3;      ///< in each RIRB
+  /// Whether the last frame has a way of its own into the picture. The latents of a window keep what the past
+  /// says; with few of them, or fast sensors, they lose what the array feels now.
+  bool last_frame_path = false;
   bool predicted_error = false;  ///< whether it also draws how far off each pixel may be; presets do
 
   Dim signals() const { return rows * columns * in_channels; }  ///< numbers in a frame
@@ -72,14 +75,16 @@ class Upsampler : public Module {
                                ///< settings.predicted_error
   };
   Upsampler(const SuperTacSettings& settings, Rng& rng);
-  Output forward(const Variable& latents) const;
+  /// `windows` [N,T,signals] as the network takes them: their last frames, by a convolution at the array's
+  /// own resolution, are added to the map that the latents make where settings.last_frame_path says so.
+  Output forward(const Variable& latents, const Variable& windows) const;
 
  private:
-  Dim rows_, columns_;  // the map it starts from
+  Dim rows_, columns_, in_channels_;  // the map it starts from, and of the last frame
   Linear fc_;
   std::vector<Rirb> rirbs_;
   Conv2d out_;
-  std::optional<Conv2d> predicted_error_;
+  std::optional<Conv2d> predicted_error_, last_frame_;
 };
 
 class SuperTac : public Network {

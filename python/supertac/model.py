@@ -140,6 +140,9 @@ class Model:
         latents = np.concatenate([self._encode(x[:, :, group].swapaxes(1, 2), f"encoder.{i}")
                                   for i, group in enumerate(self.groups)], axis=1)
         h = leaky_relu(self._linear(latents, "upsampler.fc")).reshape(len(x), -1, *self.map)
+        if self.settings.get("last_frame_path"):
+            frame = np.moveaxis(x[:, -1].reshape(len(x), *self.map, -1), -1, 1)
+            h = h + leaky_relu(self._convolve(frame, "upsampler.last_frame"))
         for name in self._parts("upsampler.rirb.{}"):
             h = self._rirb(h, name)
         error = self._convolve(h, "upsampler.spread")[:, 0] if self.settings.get("spread") else None

@@ -53,6 +53,8 @@ class SuperTac(nn.Module):
                                 out=nn.Conv2d(channels, 1, 3, padding=1))
         if s.get("spread"):
             self.upsampler["spread"] = nn.Conv2d(channels, 1, 3, padding=1)
+        if s.get("last_frame_path"):
+            self.upsampler["last_frame"] = nn.Conv2d(s.get("in_channels", 1), channels, 3, padding=1)
 
     def scale(self, volts):
         """Volts [N,T,S] -> what the network takes."""
@@ -88,9 +90,11 @@ class SuperTac(nn.Module):
             h = F.leaky_relu(conv(h), 0.01)
         return torch.sigmoid(part["out"](h)).transpose(1, 2)
 
-    def upsample(self, latents):
+    def upsample(self, latents, x):
         up = self.upsampler
         h = F.leaky_relu(up["fc"](latents), 0.01).reshape(len(latents), -1, *self.map)
+        if "last_frame" in up:
+            h = h + F.leaky_relu(up["last_frame"](x[:, -1].reshape(len(x), *self.map, -1).movedim(-1, 1)), 0.01)
         for part in up["rirb"]:
             skip = h
             for block in part["rcab"]:
@@ -106,7 +110,7 @@ class SuperTac(nn.Module):
     def draw(self, x):
         """Pictures of windows [N,T,S] that were scaled and normalised."""
         latents = torch.cat([mean for mean, _ in self.distributions(x)], 1)
-        return Pictures(*self.upsample(latents), latents)
+        return Pictures(*self.upsample(latents, x), latents)
 
     def training_outputs(self, x, eps=None):
         """What a training step looks at: lists over the groups, and the picture. eps [groups,N,latent]; None: z = mean."""
@@ -116,7 +120,7 @@ class SuperTac(nn.Module):
             latents.append(mean if eps is None else mean + torch.exp(log_var / 2) * eps[i])
             for key, value in (("mean", mean), ("log_var", log_var), ("decoded", self.decode(latents[i], i))):
                 out[key].append(value)
-        return out | {"picture": self.upsample(torch.cat(latents, 1))[0]}
+        return out | {"picture": self.upsample(torch.cat(latents, 1), x)[0]}
 
 
 def ssim(x, y):

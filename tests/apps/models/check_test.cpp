@@ -18,7 +18,7 @@ namespace supertac {
 namespace {
 
 // The ops whose results are recorded, by the sources themselves: record("name", ...), or a function that is
-// given the name. take_runs has no gradient.
+// given the name. What takes inputs apart has no gradient.
 std::set<std::string> ops_in_sources() {
   std::set<std::string> names;
   const std::regex recorded(
@@ -29,7 +29,7 @@ std::set<std::string> ops_in_sources() {
     for (std::sregex_iterator i(text.begin(), text.end(), recorded), end; i != end; ++i)
       names.insert((*i)[1]);
   }
-  names.erase("take_runs");
+  names.erase("take_runs"), names.erase("last_frame");
   return names;
 }
 

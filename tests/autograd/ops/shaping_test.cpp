@@ -53,6 +53,18 @@ TEST(Shaping, TakesRunsOfColumns) {
   });
 }
 
+TEST(Shaping, TakesTheLastFrameOfEachWindow) {
+  const Variable x(Tensor::of({2, 2, 2}, {0, 1, 2, 3, 10, 11, 12, 13}));
+  const Variable y = last_frame(x, 1, 2, 1);
+  EXPECT_EQ(y.shape().text(), "[2,1,2,1]");
+  EXPECT_EQ(std::vector<real>(y.value().values().begin(), y.value().values().end()),
+            (std::vector<real>{2, 3, 12, 13}));
+  expect_refusal("last_frame: windows expects [2,2,6], got [2,2,2]", [&] { last_frame(x, 3, 2, 1); });
+  expect_refusal("last_frame: windows want a gradient, which this op does not have", [&] {
+    last_frame(Variable(Tensor::zeros({1, 2, 2}), true), 1, 2, 1);
+  });
+}
+
 TEST(Shaping, RefusesWhatDoesNotFit) {
   const Variable x(Tensor::zeros({2, 3})), scalar(Tensor::zeros({}));
   expect_refusal("reshape: [2,3] has 6 elements, the new shape [4] needs 4", [&] { reshape(x, {4}); });

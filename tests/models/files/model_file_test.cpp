@@ -21,11 +21,13 @@ TEST(ModelFile, ComesBackWithItsSettingsInputAndPictures) {
   Rng rng(1);
   SuperTacSettings settings = small_settings();
   settings.grouping = Grouping::vertical;
+  settings.last_frame_path = true;
   const SuperTac model(settings, rng);
   save_model(folder / "m.safetensors", model, {300, {2.5, 0.4, true}, 0.0992}, {{"split", "trial"}});
   const ModelFile file = load_model(folder / "m.safetensors");
   EXPECT_EQ(file.model->settings().grouping, Grouping::vertical);
   EXPECT_EQ(file.model->settings().latent, 3);
+  EXPECT_TRUE(file.model->settings().last_frame_path);
   EXPECT_EQ(file.input.scaling.rest_volts, 2.5);
   EXPECT_TRUE(file.input.scaling.per_window);
   EXPECT_EQ(file.input.filter_s, 0.0992);

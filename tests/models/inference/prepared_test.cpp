@@ -60,6 +60,7 @@ SuperTacSettings random_settings(std::uint64_t seed) {
   s.rcabs = one_of({0, 1, 2});
   s.grouping = one_of({0, 1}) == 0 ? Grouping::horizontal : Grouping::vertical;
   s.predicted_error = one_of({0, 1}) == 0;
+  s.last_frame_path = one_of({0, 1}) == 0;
   return s;
 }
 

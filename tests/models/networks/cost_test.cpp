@@ -14,6 +14,7 @@ Dim uses(const std::string& name, const SuperTacSettings& s) {
     return std::stoi(name.substr(name.find(mark) + std::string(mark).size()));
   };
   if (name.find("attention") != std::string::npos || name.find("fc") != std::string::npos) return 1;
+  if (name.find("last_frame") != std::string::npos) return s.rows * s.columns;
   if (name.find("rirb.") != std::string::npos) return s.rows * s.columns << (2 * level("rirb."));
   if (name.find("upsampler.out") != std::string::npos) return s.image_height() * s.image_width();
   if (name.find("encoder") != std::string::npos && name.find("conv.") != std::string::npos)
@@ -34,7 +35,8 @@ TEST(Cost, AgreesWithTheWeightsOfTheModel) {
                        .latent = 5,
                        .scale = scale,
                        .channels = 12,
-                       .rcabs = 2};
+                       .rcabs = 2,
+                       .last_frame_path = scale == 8};
     Rng rng(0);
     const SuperTac model(s, rng);
     double inference = 0, forward = 0;

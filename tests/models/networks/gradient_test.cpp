@@ -51,6 +51,17 @@ TEST(SuperTacGradient, PictureOfEightPixels) {
   expect_right_gradients(s);
 }
 
+TEST(SuperTacGradient, WithAWayForTheLastFrame) {
+  SuperTacSettings s;
+  s.timesteps = 32;
+  s.latent = 2;
+  s.scale = 2;
+  s.channels = 8;
+  s.rcabs = 1;
+  s.last_frame_path = true;
+  expect_right_gradients(s);
+}
+
 TEST(SuperTacGradient, PictureOfSixteenPixelsVerticalGroups) {
   SuperTacSettings s;
   s.timesteps = 48;
