@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
-
-#include "autograd/kernels/fast/int8/int8.h"
 
 namespace supertac {
 namespace {
@@ -18,25 +15,22 @@ Shape with_count(const Shape& one, Dim count) {
 
 }  // namespace
 
-template <class T>
-static void fill_margins(const FeatureMap& map, Dim images, T value, T* image) {
+static void clear_margin(const FeatureMap& map, Dim images, real* image) {
   if (map.margin_h + map.margin_w == 0) return;
   const Dim ends = map.margin_h * map.line(), side = map.margin_w * map.channels;
-  for (T* const last = image + images * map.image(); image < last; image += map.image()) {
-    std::fill_n(image, ends, value);
-    std::fill_n(image + map.image() - ends, ends, value);
-    for (T* line = image + ends; line < image + map.image() - ends; line += map.line()) {
-      std::fill_n(line, side, value);
-      std::fill_n(line + map.line() - side, side, value);
+  for (real* const last = image + images * map.image(); image < last; image += map.image()) {
+    std::fill_n(image, ends, real(0));
+    std::fill_n(image + map.image() - ends, ends, real(0));
+    for (real* line = image + ends; line < image + map.image() - ends; line += map.line()) {
+      std::fill_n(line, side, real(0));
+      std::fill_n(line + map.line() - side, side, real(0));
     }
   }
 }
 
 void Plan::clear_margins(const Block& block) const {
   for (const FeatureMap& map : planes_) std::fill_n(block.begin(map), map.image(), real(0));
-  for (const FeatureMap& map : buffers_) fill_margins(map, block.images, real(0), block.begin(map));
-  for (const FeatureMap& map : byte_buffers_)
-    fill_margins(map, block.images, static_cast<std::uint8_t>(map.zero), block.byte_begin(map));
+  for (const FeatureMap& map : buffers_) clear_margin(map, block.images, block.begin(map));
 }
 
 void Plan::copy_out(const Block& block, const FeatureMap& map, Tensor& to, Dim first) const {
@@ -53,17 +47,11 @@ Estimate Plan::run(const Tensor& inputs) const {
   Estimate out{.picture = Tensor(with_count(picture_shape_, count)), .predicted_error = {}, .latents = {}};
   if (predicts_error_) out.predicted_error = Tensor(out.picture.shape());
   if (has_latents_) out.latents = Tensor(with_count(latents_shape_, count));
-  const Dim images = std::min(count, block_), bytes = byte_workspace_ * images;
-  Tensor memory(Shape{scratch_ + workspace_ * images + bytes / static_cast<Dim>(sizeof(real)) + 1});
+  const Dim images = std::min(count, block_);
+  Tensor memory(Shape{scratch_ + workspace_ * images});
   real* const workspace = memory.data() + scratch_;
-  std::optional<kernels::ByteProducts> byte_products;  // of tiles, for which a process asks the system
-  if (byte_workspace_ > 0) byte_products.emplace();
   for (Dim first = 0; first < count; first += block_) {
-    const Block block{inputs.data() + first * size,
-                      std::min(block_, count - first),
-                      workspace,
-                      reinterpret_cast<std::uint8_t*>(workspace + workspace_ * images),
-                      memory.data(),
+    const Block block{inputs.data() + first * size, std::min(block_, count - first), workspace, memory.data(),
                       filters_anew_};
     if (first == 0 || block.images != block_) clear_margins(block);
     for (const PlanStep& step : steps_) step(block);

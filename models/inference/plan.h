@@ -10,12 +10,10 @@
 namespace supertac {
 
 /// Where a value lies in the workspace: images [height][width][channels] with a margin of zeros around.
-/// Values that bytes stand for lie among the bytes, with the same layout.
 struct FeatureMap {
   Dim height = 1, width = 1, channels = 1;
   Dim margin_h = 0, margin_w = 0;
-  Dim offset = 0;         ///< of the first image, per image of a block
-  std::int32_t zero = 0;  ///< what fills the margin: of bytes, the one that stands for 0
+  Dim offset = 0;  ///< of the first image, per image of a block
 
   Dim line() const { return (width + 2 * margin_w) * channels; }
   Dim image() const { return (height + 2 * margin_h) * line(); }
@@ -24,7 +22,7 @@ struct FeatureMap {
   kernels::Strides strides() const { return {image(), line(), channels}; }
   bool same_layout(const FeatureMap& other) const {
     return height == other.height && width == other.width && channels == other.channels &&
-           margin_h == other.margin_h && margin_w == other.margin_w && zero == other.zero;
+           margin_h == other.margin_h && margin_w == other.margin_w;
   }
 };
 
@@ -33,14 +31,11 @@ struct Block {
   const real* input = nullptr;
   Dim images = 0;
   real* workspace = nullptr;
-  std::uint8_t* bytes = nullptr;
   real* scratch = nullptr;    ///< of the step that runs
   bool filters_anew = false;  ///< Winograd's filters are transformed on the way
 
   real* begin(const FeatureMap& map) const { return workspace + map.offset * images; }
   real* first_pixel(const FeatureMap& map) const { return begin(map) + map.origin(); }
-  std::uint8_t* byte_begin(const FeatureMap& map) const { return bytes + map.offset * images; }
-  std::uint8_t* first_byte(const FeatureMap& map) const { return byte_begin(map) + map.origin(); }
 };
 
 using PlanStep = std::function<void(const Block&)>;
@@ -59,16 +54,14 @@ class Plan {
 
   /// Images that go through the steps together. They share the weights on their way from memory, but what
   /// they leave behind must stay in the second cache: one of kLargeCache bytes has room for kLargeBlock.
-  static constexpr Dim kBlock = 8, kLargeBlock = 16, kByteBlock = 4;
+  static constexpr Dim kBlock = 8, kLargeBlock = 16;
   static constexpr std::size_t kLargeCache = std::size_t{2} << 20;
 
   std::vector<PlanStep> steps_;
   std::vector<FeatureMap> buffers_;  // each once
   std::vector<FeatureMap> planes_;   // those with margins inside: of one image, channel by channel
-  std::vector<FeatureMap> byte_buffers_;
-  Dim workspace_ = 0;       // numbers of an image
-  Dim byte_workspace_ = 0;  // bytes of an image
-  Dim scratch_ = 0;         // numbers
+  Dim workspace_ = 0;         // numbers of an image
+  Dim scratch_ = 0;           // numbers
   FeatureMap picture_, predicted_error_, latents_;
   Dim block_ = kBlock;
   bool filters_anew_ = false;

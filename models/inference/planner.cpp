@@ -26,16 +26,14 @@ bool Planner::filters_anew(std::size_t second_cache) const {
   return weights_ + maps <= second_cache && weights_ + transformed_ + maps > second_cache;
 }
 
-std::shared_ptr<const Plan> Planner::plan(const Network& network, const ActivationRanges* ranges,
-                                          std::size_t second_cache) {
+std::shared_ptr<const Plan> Planner::plan(const Network& network, std::size_t second_cache) {
   const NoGrad no_grad;
   const Variable input(Tensor::zeros(network.input_shape(1)));
   const Trace trace;
   const Drawing drawn = network.draw(input);
-  Planner planner(input, trace.ops(), drawn, ranges);
+  Planner planner(input, trace.ops(), drawn);
   Plan& plan = *planner.plan_;
   if (second_cache >= Plan::kLargeCache) plan.block_ = Plan::kLargeBlock;
-  if (ranges != nullptr) plan.block_ = Plan::kByteBlock;
   plan.filters_anew_ = planner.filters_anew(second_cache);
   plan.picture_ = planner.map_of(drawn.picture);
   plan.picture_shape_ = drawn.picture.shape();
@@ -69,14 +67,8 @@ const std::map<std::string_view, Planner::Make>& Planner::makers() {
   return known;
 }
 
-Planner::Planner(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn,
-                 const ActivationRanges* ranges)
+Planner::Planner(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn)
     : input_(input.node()) {
-  if (ranges != nullptr && ranges->ops() != ops.size())
-    throw std::invalid_argument("Prepared: the ranges are those of " + std::to_string(ranges->ops()) +
-                                " ops, the network has " + std::to_string(ops.size()));
-  for (std::size_t i = 0; ranges != nullptr && i < ops.size(); ++i)
-    steps_[ops[i].y.node()] = ranges->steps(i);
   look_ahead(ops, drawn);
   for (std::size_t i = 0; i < ops.size(); ++i) {
     const auto make = makers().find(ops[i].op);
@@ -86,55 +78,21 @@ Planner::Planner(const Variable& input, const std::vector<TracedOp>& ops, const 
     const bool takes_input = ops[i].op == "take_runs" || ops[i].op == "last_frame";
     if (!takes_input && ops[i].inputs[0].node() == input_) load_input(ops[i].inputs[0]);
     (this->*make->second)(ops[i]);
-    add_bytes(ops[i]);
     release_after(i);
   }
 }
 
 void Planner::look_ahead(const std::vector<TracedOp>& ops, const Drawing& drawn) {
-  std::set<Id> read_as_bytes;
   for (std::size_t i = 0; i < ops.size(); ++i) {
     const TracedOp& op = ops[i];
     if (op.op == "flatten_channels_first") flattened_[op.y.node()] = owner(op.inputs[0]);
     if (op.op == "unflatten_channels_first")
       pixels_of_unflatten_[op.inputs[0].node()] = op.inputs[0].dim(1) / op.y.dim(op.y.rank() - 1);
-    if (op.op.starts_with("conv")) need_margin(op);
+    if (op.op.starts_with("conv")) margins_[owner(op.inputs[0])].widen(op.settings.conv);
     for (const Variable& x : op.inputs) last_use_[owner(x)] = i;
-    if (op.op == "flatten_channels_first") continue;
-    const bool of_bytes = is_of_bytes(op);
-    for (const Variable& x : op.inputs) (of_bytes ? read_as_bytes : read_as_numbers_).insert(owner(x));
   }
-  std::erase_if(steps_, [&](const auto& value) { return !read_as_bytes.contains(value.first); });
   for (const Variable* y : {&drawn.picture, &drawn.predicted_error, &drawn.latents})
-    if (y->defined()) {
-      last_use_[owner(*y)] = std::numeric_limits<std::size_t>::max();
-      read_as_numbers_.insert(owner(*y));
-    }
-}
-
-// Where whole quads of channels meet enough outputs to repay the way into bytes and back. The input and the
-// picture itself are not rounded: measured, that costs the most (bench/results).
-bool Planner::is_of_bytes(const TracedOp& op) const {
-  if (!steps_.contains(owner(op.inputs[0])) || op.settings.negative_slope > 1) return false;  // Outcome
-  if (op.op == "linear") return owner(op.inputs[0]) != op.inputs[0].node();
-  return op.op.starts_with("conv") && op.inputs[0].dim(op.inputs[0].rank() - 1) % kernels::kQuad == 0 &&
-         op.y.dim(op.y.rank() - 1) > 1;
-}
-
-// How far the taps reach over the edges of x.
-static Dim reach(Dim size, Dim out, Dim kernel, Dim stride, Dim padding, bool transposed) {
-  const Dim before = transposed ? (kernel - 1 - padding + stride - 1) / stride : padding;
-  const Dim last = transposed ? (out - 1 + padding) / stride : (out - 1) * stride + kernel - 1 - padding;
-  return std::max<Dim>({0, before, last - (size - 1)});
-}
-
-void Planner::need_margin(const TracedOp& op) {
-  const ConvSettings& s = op.settings.conv;
-  Margin& m = margins_[owner(op.inputs[0])];
-  m.height =
-      std::max(m.height, reach(s.height, s.out_height(), s.kernel_h, s.stride_h, s.padding_h, s.transposed));
-  m.width =
-      std::max(m.width, reach(s.width, s.out_width(), s.kernel_w, s.stride_w, s.padding_w, s.transposed));
+    if (y->defined()) last_use_[owner(*y)] = std::numeric_limits<std::size_t>::max();
 }
 
 Planner::Id Planner::owner(const Variable& x) const {
@@ -143,10 +101,6 @@ Planner::Id Planner::owner(const Variable& x) const {
 }
 
 const FeatureMap& Planner::map_of(const Variable& x) const { return maps_.at(owner(x)); }
-
-const FeatureMap& Planner::source_of(const TracedOp& op) const {
-  return (is_of_bytes(op) ? bytes_ : maps_).at(owner(op.inputs[0]));
-}
 
 FeatureMap Planner::layout_of(const Variable& y) const {
   const auto found = margins_.find(y.node());
@@ -182,23 +136,13 @@ const FeatureMap& Planner::new_map(const Variable& y) {
   return maps_[y.node()] = take(layout_of(y), free_, plan_->buffers_, plan_->workspace_);
 }
 
-const FeatureMap& Planner::new_bytes(const Variable& y) {
-  FeatureMap map = layout_of(y);
-  map.zero = steps_.at(y.node()).zero;
-  return bytes_[y.node()] = take(map, free_bytes_, plan_->byte_buffers_, plan_->byte_workspace_);
-}
-
 void Planner::release_after(std::size_t op) {
-  const auto release = [&](std::map<Id, FeatureMap>& maps, std::vector<FeatureMap>& free) {
-    std::erase_if(maps, [&](const auto& value) {
-      const auto last = last_use_.find(value.first);
-      if (last == last_use_.end() || last->second > op) return false;
-      free.push_back(value.second);
-      return true;
-    });
-  };
-  release(maps_, free_);
-  release(bytes_, free_bytes_);
+  std::erase_if(maps_, [&](const auto& value) {
+    const auto last = last_use_.find(value.first);
+    if (last == last_use_.end() || last->second > op) return false;
+    free_.push_back(value.second);
+    return true;
+  });
 }
 
 }  // namespace supertac

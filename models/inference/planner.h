@@ -3,29 +3,25 @@
 
 #include <map>
 #include <memory>
-#include <set>
 #include <string>
 
 #include "autograd/kernels/fast/isa/isa.h"
 #include "autograd/trace.h"
 #include "models/inference/plan.h"
-#include "models/inference/ranges.h"
+#include "models/inference/taps.h"
 
 namespace supertac {
 
-/// What the steps run on. Without the fast kernels only networks of bytes are prepared: on the portable ones.
-inline const kernels::IsaKernels& isa() {
-  return kernels::is_plain() ? kernels::kPortableKernels : kernels::isa_kernels();
-}
+/// What the steps run on.
+inline const kernels::IsaKernels& isa() { return kernels::isa_kernels(); }
 
 /// One step for each op, in the order in which they ran; a map's memory is taken again behind its last
 /// reader.
 class Planner {
  public:
-  /// With `ranges` the convolutions and the linear layers behind them are products of bytes. Throws
-  /// std::logic_error naming an op that has no step, std::invalid_argument for the ranges of another network.
-  /// `second_cache`: of the processor, in bytes; 0: not known.
-  static std::shared_ptr<const Plan> plan(const Network& network, const ActivationRanges* ranges = nullptr,
+  /// Throws std::logic_error naming an op that has no step. `second_cache`: of the processor, in bytes; 0:
+  /// not known.
+  static std::shared_ptr<const Plan> plan(const Network& network,
                                           std::size_t second_cache = second_cache_bytes());
 
  private:
@@ -35,26 +31,18 @@ class Planner {
   static std::size_t second_cache_bytes();
   static std::size_t bytes_of(const Tensor& t) { return static_cast<std::size_t>(t.size()) * sizeof(real); }
   bool filters_anew(std::size_t second_cache) const;
-  Planner(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn,
-          const ActivationRanges* ranges);
+  Planner(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn);
   static const std::map<std::string_view, Make>& makers();
 
   // Before the steps are made: who reads what until when, and how wide its margin must be.
   void look_ahead(const std::vector<TracedOp>& ops, const Drawing& drawn);
-  void need_margin(const TracedOp& conv);
   Id owner(const Variable& x) const;
 
-  bool is_of_bytes(const TracedOp& op) const;
   const FeatureMap& map_of(const Variable& x) const;
-  /// Of the first input: its numbers, or the bytes that stand for them.
-  const FeatureMap& source_of(const TracedOp& op) const;
   FeatureMap layout_of(const Variable& y) const;
   const FeatureMap& new_map(const Variable& y);
-  const FeatureMap& new_bytes(const Variable& y);
-  FeatureMap new_results(const TracedOp& op);
-  void add_product(const TracedOp& op, struct Product product);
+  void add_product(struct Product product);
   void add_winograd(struct Winograd step);
-  void add_bytes(const TracedOp& op);
   void release_after(std::size_t op);
 
   void take_runs(const TracedOp& op);
@@ -77,19 +65,14 @@ class Planner {
   void load_input(const Variable& input);
   void load(const FeatureMap& y, Dim window, Dim first);
 
-  struct Margin {
-    Dim height = 0, width = 0;
-  };
   std::shared_ptr<Plan> plan_ = std::make_shared<Plan>();
   Id input_;
   std::map<Id, Id> flattened_;             // value -> the map whose numbers it has
   std::map<Id, Dim> pixels_of_unflatten_;  // value that is unflattened -> pixels
   std::map<Id, std::size_t> last_use_;
   std::map<Id, Margin> margins_;
-  std::map<Id, FeatureMap> maps_, bytes_;
-  std::vector<FeatureMap> free_, free_bytes_;
-  std::map<Id, kernels::Steps> steps_;  // of values that bytes stand for
-  std::set<Id> read_as_numbers_;
+  std::map<Id, FeatureMap> maps_;
+  std::vector<FeatureMap> free_;
   std::size_t weights_ = 0, transformed_ = 0;  // bytes: as they are, and Winograd's places of some of them
 };
 

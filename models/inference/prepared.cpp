@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "autograd/kernels/fast/isa/isa.h"
+#include "models/inference/integer_plan.h"
 #include "models/inference/planner.h"
 
 namespace supertac {
@@ -12,14 +13,14 @@ Prepared::Prepared(const Network& network) : network_(&network) {
 }
 
 Prepared::Prepared(const Network& network, const ActivationRanges& ranges)
-    : network_(&network), plan_(Planner::plan(network, &ranges)) {}
+    : network_(&network), integers_(IntegerPlan::of(network, ranges)) {}
 
 Estimate Prepared::estimate(const Tensor& inputs) const {
-  if (plan_ == nullptr) return network_->estimate(inputs);
+  if (plan_ == nullptr && integers_ == nullptr) return network_->estimate(inputs);
   if (inputs.rank() < 1 || inputs.shape() != network_->input_shape(inputs.dim(0)))
     throw std::invalid_argument("Prepared: inputs expects " + network_->input_shape(0).text() +
                                 " with any first size, got " + inputs.shape().text());
-  return plan_->run(inputs);
+  return integers_ ? integers_->run(inputs) : plan_->run(inputs);
 }
 
 }  // namespace supertac

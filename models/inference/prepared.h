@@ -11,6 +11,7 @@
 namespace supertac {
 
 class Plan;
+struct IntegerPlan;
 
 /// Draws the network's pictures up to rounding (1e-5 of the largest value). A picture has the same bits alone
 /// and in any batch, on every processor. Copies share their weights; any thread may call.
@@ -19,9 +20,10 @@ class Prepared {
   /// Takes the weights as they are now. The network must outlive this: with SUPERTAC_ISA=plain its own
   /// forward step draws. Throws std::logic_error naming an op that has no step.
   explicit Prepared(const Network& network);
-  /// In bytes (int8): the convolutions are exact sums of products of bytes, the pictures differ by what the
-  /// ranges' steps are coarse. On every processor and in any batch they have the same bits. Throws
-  /// std::invalid_argument when the ranges are another network's.
+  /// In whole numbers (int8): products of bytes, and numbers of 16 bits where bytes would be too coarse
+  /// (models/inference/integer_plan.h). The pictures differ by what the ranges' steps are coarse. They have
+  /// the same bits on every processor, a microcontroller too, and in any batch. Throws std::invalid_argument
+  /// when the ranges are another network's.
   Prepared(const Network& network, const ActivationRanges& ranges);
 
   const Network& network() const { return *network_; }
@@ -31,6 +33,7 @@ class Prepared {
  private:
   const Network* network_;
   std::shared_ptr<const Plan> plan_;
+  std::shared_ptr<const IntegerPlan> integers_;  // instead
 };
 
 }  // namespace supertac

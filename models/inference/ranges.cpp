@@ -50,7 +50,7 @@ StoredTensor ActivationRanges::stored() const {
   return stored;
 }
 
-kernels::Steps ActivationRanges::steps(std::size_t op) const {
+Scale ActivationRanges::scale(std::size_t op) const {
   constexpr float kSteps = 255;
   const float width = high_.at(op) - low_.at(op);
   if (!(width > 0)) return {};

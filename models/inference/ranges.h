@@ -1,12 +1,13 @@
 // Between which values the results of a network's ops lie: what a network prepared in bytes needs to know.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "autograd/kernels/fast/int8/int8.h"
 #include "layers/checkpoint.h"
+#include "models/inference/quantise.h"
 #include "models/networks/network.h"
 
 namespace supertac {
@@ -21,8 +22,10 @@ class ActivationRanges {
   StoredTensor stored() const;
 
   std::size_t ops() const { return low_.size(); }
-  /// The bytes that stand for the values of an op: 0 is one of them. Throws std::out_of_range.
-  kernels::Steps steps(std::size_t op) const;
+  /// How bytes stand for the values of an op: 0 is one of them. Throws std::out_of_range.
+  Scale scale(std::size_t op) const;
+  /// The largest magnitude of the values of an op. Throws std::out_of_range.
+  double largest(std::size_t op) const { return std::max(-low_.at(op), high_.at(op)); }
 
  private:
   std::vector<float> low_, high_;

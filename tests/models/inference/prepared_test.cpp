@@ -177,9 +177,9 @@ TEST(Prepared, OfAnyCacheHasTheSameBits) {
   std::set<bool> seen;
   for (const Dim count : {1, 2, 3, 17}) {
     const Tensor windows = uniform(network.input_shape(count), 6);
-    const Estimate expected = Planner::plan(network, nullptr, 0)->run(windows);
+    const Estimate expected = Planner::plan(network, 0)->run(windows);
     for (const std::size_t megabytes : {1, 2, 3, 4, 64}) {
-      const auto plan = Planner::plan(network, nullptr, megabytes << 20);
+      const auto plan = Planner::plan(network, megabytes << 20);
       seen.insert(plan->filters_anew());
       const Estimate found = plan->run(windows);
       EXPECT_TRUE(std::ranges::equal(expected.picture.values(), found.picture.values()))

@@ -29,17 +29,17 @@ struct alignas(64) TileShapes {
 // A product of J times sixteen outputs from `channel` on. Two times sixteen places are summed at a time, and
 // those before finished in the meantime: tiles work beside vectors, but only as far as the processor looks
 // ahead.
-template <int J, bool kNumbers, bool kBytes>
+template <int J, bool kNumbers>
 class TiledProduct {
  public:
-  TiledProduct(const ByteProductJob& job, std::span<const Dim> parts, Dim chunk, Dim channel, float* y,
+  TiledProduct(const ByteProductJob& job, std::span<const Dim> parts, Dim chunk, Dim channel, std::int16_t* y,
                std::uint8_t* bytes)
       : job_(job),
         parts_(parts),
         w_(job.w + channel * kQuad),
         w_part_(chunk * job.cout),
         y_(kNumbers ? y + channel : nullptr),
-        bytes_(kBytes ? bytes + channel : nullptr),
+        bytes_(kNumbers ? nullptr : bytes + channel),
         pixels_of_part_(kPlaces / static_cast<std::int32_t>(parts.size()) + 1) {
     for (int j = 0; j < J; ++j) finish_[j] = Finish(job.outcome, channel + j * kOutputs);
   }
@@ -106,7 +106,8 @@ class TiledProduct {
         const Dim to = image + pixel.to;
         for (int j = 0; j < J; ++j)
           with[j](_mm512_load_si512(sums_[2 * p + j] + pixel.place * kOutputs),
-                  kNumbers ? y_ + to + j * kOutputs : nullptr, kBytes ? bytes_ + to + j * kOutputs : nullptr);
+                  kNumbers ? y_ + to + j * kOutputs : nullptr,
+                  kNumbers ? nullptr : bytes_ + to + j * kOutputs);
       }
     }
     done_ += pixels;
@@ -121,7 +122,7 @@ class TiledProduct {
   const std::span<const Dim> parts_;
   const std::int8_t* const w_;
   const Dim w_part_;
-  float* const y_;
+  std::int16_t* const y_;
   std::uint8_t* const bytes_;
   const std::int32_t pixels_of_part_;
   std::array<Finish, J> finish_;
@@ -130,13 +131,13 @@ class TiledProduct {
   Dim image_ = 0, place_ = 0;
 };
 
-template <bool kNumbers, bool kBytes>
+template <bool kNumbers>
 void all_outputs(const ByteProductJob& job, const std::uint8_t* x, std::span<const Dim> parts, Dim chunk,
-                 float* y, std::uint8_t* bytes) {
+                 std::int16_t* y, std::uint8_t* bytes) {
   Dim channel = 0;
   for (; channel + kOutputs < job.kept; channel += 2 * kOutputs)
-    TiledProduct<2, kNumbers, kBytes>(job, parts, chunk, channel, y, bytes).run(x);
-  if (channel < job.kept) TiledProduct<1, kNumbers, kBytes>(job, parts, chunk, channel, y, bytes).run(x);
+    TiledProduct<2, kNumbers>(job, parts, chunk, channel, y, bytes).run(x);
+  if (channel < job.kept) TiledProduct<1, kNumbers>(job, parts, chunk, channel, y, bytes).run(x);
 }
 
 // The longest equal parts of a segment that fit into a row of a tile.
@@ -161,7 +162,7 @@ void release_tiles() {
   shaped_for = 0;
 }
 
-void run(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes) {
+void run(const ByteProductJob& job, const std::uint8_t* x, std::int16_t* y, std::uint8_t* bytes) {
   constexpr Dim kShortestChunk = 32, kMostParts = 64;
   const Dim chunk = chunk_of(job.length), count = job.segment_count * job.length / chunk;
   if (job.place_count == 0 || chunk < kShortestChunk || count > kMostParts || job.kept % kOutputs != 0)
@@ -172,14 +173,13 @@ void run(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_
   }
   const std::span<const Dim> parts(offsets, static_cast<std::size_t>(count));
   shape_tiles(chunk);
-  if (y && bytes) all_outputs<true, true>(job, x, parts, chunk, y, bytes);
-  if (y && !bytes) all_outputs<true, false>(job, x, parts, chunk, y, bytes);
-  if (!y && bytes) all_outputs<false, true>(job, x, parts, chunk, y, bytes);
+  if (y != nullptr) return all_outputs<true>(job, x, parts, chunk, y, bytes);
+  all_outputs<false>(job, x, parts, chunk, y, bytes);
 }
 
 }  // namespace
 
-const ByteKernels kAmxByteKernels{run, kVnniByteKernels.line_to_bytes, release_tiles};
+const ByteKernels kAmxByteKernels{run, release_tiles};
 
 }  // namespace supertac::kernels
 

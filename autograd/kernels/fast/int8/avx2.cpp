@@ -12,19 +12,14 @@ constexpr int kVectors = P < 4 ? 4 / P : 1;  // few pixels need more vectors to 
 
 alignas(32) const std::int32_t kLaneMask[16] = {-1, -1, -1, -1, -1, -1, -1, -1, 0, 0, 0, 0, 0, 0, 0, 0};
 
-inline __m256i mask_of(Dim lanes) {
-  return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(kLaneMask + 8 - (lanes < 8 ? lanes : 8)));
+// The first of eight numbers of 32 bits.
+inline __m256i load_part(const std::int32_t* p, Dim lanes) {
+  const std::int32_t* mask = kLaneMask + 8 - (lanes < 8 ? lanes : 8);
+  return _mm256_maskload_epi32(p, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(mask)));
 }
 
-inline void store_bytes(__m256 value, __m256 per_step, __m256 first, Dim lanes, std::uint8_t* bytes) {
-  const __m256 level = _mm256_fmadd_ps(value, per_step, first);  // not a number counts as 0
-  const __m256 within = _mm256_min_ps(_mm256_max_ps(level, _mm256_setzero_ps()), _mm256_set1_ps(255));
-  const __m256i whole = _mm256_cvtps_epi32(within);
-  const __m128i halves = _mm_packs_epi32(_mm256_castsi256_si128(whole), _mm256_extracti128_si256(whole, 1));
-  const __m128i all = _mm_packus_epi16(halves, halves);
-  if (lanes == 8) return _mm_storel_epi64(reinterpret_cast<__m128i*>(bytes), all);
-  const std::int64_t some = _mm_cvtsi128_si64(all);
-  __builtin_memcpy(bytes, &some, static_cast<std::size_t>(lanes));
+inline __m128i halves_together(__m256i whole) {
+  return _mm_packs_epi32(_mm256_castsi256_si128(whole), _mm256_extracti128_si256(whole, 1));
 }
 
 // Eight outputs. Bytes are widened to 16 bits, since the instruction that multiplies bytes saturates: weights
@@ -54,34 +49,34 @@ struct Sums {
   __m256i whole() const { return _mm256_permute4x64_epi64(_mm256_hadd_epi32(first, second), 0xD8); }
 
   struct Finish {
-    Finish(const Outcome& o, Dim left, __m256 s, __m256 b)
-        : lanes(left < kLanes ? left : kLanes),
-          mask(mask_of(left)),
-          scale(s),
-          bias(b),
-          slope(_mm256_set1_ps(o.negative_slope)),
-          per_step(_mm256_set1_ps(o.steps.per_step)),
-          first(_mm256_set1_ps(static_cast<float>(o.steps.zero))),
-          rectifies(o.negative_slope != 1) {}
     /// Of outputs from `channel` on, of which so many are left.
     Finish(const Outcome& o, Dim channel, Dim left)
-        : Finish(o, left, _mm256_maskload_ps(o.scale + channel, mask_of(left)),
-                 _mm256_maskload_ps(o.bias + channel, mask_of(left))) {}
-    void operator()(Sums sum, float* y, std::uint8_t* bytes) const {
-      __m256 value = _mm256_fmadd_ps(_mm256_cvtepi32_ps(sum.whole()), scale, bias);
-      const __m256 nothing = _mm256_setzero_ps();
+        : lanes(static_cast<std::size_t>(left < kLanes ? left : kLanes)),
+          multiplier(load_part(o.multiplier + channel, left)),
+          offset(load_part(o.offset + channel, left)),
+          shift(load_part(o.shift + channel, left)),
+          slope(_mm256_set1_epi32(o.negative_slope)),
+          zero(_mm256_set1_epi32(o.zero)),
+          rectifies(o.negative_slope != Outcome::kNoSlope) {}
+    void operator()(Sums sum, std::int16_t* y, std::uint8_t* bytes) const {
+      __m256i v = _mm256_mullo_epi32(sum.whole(), multiplier);
+      v = _mm256_srav_epi32(_mm256_add_epi32(v, offset), shift);
       if (rectifies) {
-        const __m256 positive = _mm256_cmp_ps(value, nothing, _CMP_GT_OQ);
-        value = _mm256_blendv_ps(_mm256_mul_ps(slope, value), value, positive);
+        const __m256i sloped =
+            _mm256_add_epi32(_mm256_mullo_epi32(v, slope), _mm256_set1_epi32(Outcome::kSlopeHalf));
+        v = _mm256_max_epi32(v, _mm256_srai_epi32(sloped, Outcome::kSlopeBits));
       }
-      if (y != nullptr && lanes == kLanes) _mm256_storeu_ps(y, value);
-      if (y != nullptr && lanes < kLanes) _mm256_maskstore_ps(y, mask, value);
-      if (bytes == nullptr) return;
-      store_bytes(value, per_step, first, lanes, bytes);
+      if (y != nullptr) {
+        const __m128i numbers = halves_together(v);
+        __builtin_memcpy(y, &numbers, lanes * sizeof *y);
+        return;
+      }
+      const __m128i words = halves_together(_mm256_add_epi32(v, zero));
+      const __m128i all = _mm_packus_epi16(words, words);
+      __builtin_memcpy(bytes, &all, lanes);
     }
-    Dim lanes;
-    __m256i mask;
-    __m256 scale, bias, slope, per_step, first;
+    std::size_t lanes;
+    __m256i multiplier, offset, shift, slope, zero;
     bool rectifies;
   };
 };
@@ -96,7 +91,7 @@ void widen(Dim n, const std::uint8_t* from, std::int16_t* to) {
   for (; i < n; ++i) to[i] = from[i];
 }
 
-void run_widened(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes) {
+void run_widened(const ByteProductJob& job, const std::uint8_t* x, std::int16_t* y, std::uint8_t* bytes) {
   const ByteReach reach = reach_of(job);
   for (Dim n = 0; n < job.images; ++n)
     widen(reach.count, x + n * job.from.image - reach.before, job.scratch + n * reach.count);
@@ -105,18 +100,9 @@ void run_widened(const ByteProductJob& job, const std::uint8_t* x, float* y, std
   run(wide, job.scratch + reach.before, y, bytes);
 }
 
-void line_to_bytes(Dim n, const float* x, Steps steps, std::uint8_t* bytes) {
-  const __m256 per_step = _mm256_set1_ps(steps.per_step),
-               first = _mm256_set1_ps(static_cast<float>(steps.zero));
-  for (Dim i = 0; i < n; i += 8) {
-    const Dim lanes = n - i < 8 ? n - i : 8;
-    store_bytes(_mm256_maskload_ps(x + i, mask_of(lanes)), per_step, first, lanes, bytes + i);
-  }
-}
-
 }  // namespace
 
-const ByteKernels kAvx2ByteKernels{run_widened, line_to_bytes};
+const ByteKernels kAvx2ByteKernels{run_widened};
 
 }  // namespace supertac::kernels
 

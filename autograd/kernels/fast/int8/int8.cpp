@@ -1,7 +1,6 @@
 #include "autograd/kernels/fast/int8/int8.h"
 
 #include <algorithm>
-#include <cmath>
 #include <span>
 
 #if defined(__x86_64__) && defined(__linux__)
@@ -15,22 +14,16 @@
 namespace supertac::kernels {
 namespace {
 
-std::uint8_t to_byte(float x, Steps s) {
-  float level = std::fma(x, s.per_step, static_cast<float>(s.zero));
-  level = level > 0 ? level : 0;  // not a number counts as 0
-  level = level < 255 ? level : 255;
-  return static_cast<std::uint8_t>(std::lrint(level));  // to the nearest, halves to the even one
-}
-
-void finish(const Outcome& to, Dim o, std::int32_t sum, float* y, std::uint8_t* bytes) {
-  float value = std::fma(static_cast<float>(sum), to.scale[o], to.bias[o]);
-  value = value > 0 || to.negative_slope == 1 ? value : to.negative_slope * value;
-  if (y != nullptr) y[o] = value;
-  if (bytes != nullptr) bytes[o] = to_byte(value, to.steps);
+void finish(const Outcome& to, Dim o, std::int32_t sum, std::int16_t* y, std::uint8_t* bytes) {
+  std::int32_t v = (sum * to.multiplier[o] + to.offset[o]) >> to.shift[o];
+  if (to.negative_slope != Outcome::kNoSlope)
+    v = std::max(v, (v * to.negative_slope + Outcome::kSlopeHalf) >> Outcome::kSlopeBits);
+  if (y != nullptr) y[o] = static_cast<std::int16_t>(std::clamp(v, -32768, 32767));
+  if (bytes != nullptr) bytes[o] = static_cast<std::uint8_t>(std::clamp(v + to.zero, 0, 255));
 }
 
 // Whole sums of one pixel, then what becomes of them.
-void plain_pixel(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes) {
+void plain_pixel(const ByteProductJob& job, const std::uint8_t* x, std::int16_t* y, std::uint8_t* bytes) {
   std::int32_t sum[kMaxChannels + kByteOutputs];
   for (Dim o = 0; o < job.cout; ++o) sum[o] = 0;
   const std::int8_t* w = job.w;
@@ -44,7 +37,7 @@ void plain_pixel(const ByteProductJob& job, const std::uint8_t* x, float* y, std
   for (Dim o = 0; o < job.kept; ++o) finish(job.outcome, o, sum[o], y, bytes);
 }
 
-void product(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes) {
+void product(const ByteProductJob& job, const std::uint8_t* x, std::int16_t* y, std::uint8_t* bytes) {
   for (Dim n = 0; n < job.images; ++n) {
     for (Dim i = 0; i < job.height; ++i) {
       for (Dim j = 0; j < job.width; ++j) {
@@ -54,10 +47,6 @@ void product(const ByteProductJob& job, const std::uint8_t* x, float* y, std::ui
       }
     }
   }
-}
-
-void line_to_bytes(Dim n, const float* x, Steps steps, std::uint8_t* bytes) {
-  for (Dim i = 0; i < n; ++i) bytes[i] = to_byte(x[i], steps);
 }
 
 #if defined(__x86_64__) && !defined(SUPERTAC_REAL_IS_DOUBLE)
@@ -105,16 +94,7 @@ ByteReach reach_of(const ByteProductJob& job) {
   return {-lowest, last_pixel + highest + job.length - lowest};
 }
 
-const ByteKernels kPlainByteKernels{product, line_to_bytes};
-
-void to_bytes(const ToBytesJob& job, const float* x, std::uint8_t* bytes) {
-  const auto run = byte_kernels().line_to_bytes;
-  for (Dim n = 0; n < job.images; ++n) {
-    for (Dim i = 0; i < job.height; ++i)
-      run(job.line, x + n * job.from.image + i * job.from.line, job.steps,
-          bytes + n * job.to.image + i * job.to.line);
-  }
-}
+const ByteKernels kPlainByteKernels{product};
 
 const ByteKernels& byte_kernels() {
 #if defined(__x86_64__) && !defined(SUPERTAC_REAL_IS_DOUBLE)

@@ -10,20 +10,18 @@
 
 namespace supertac::kernels {
 
-/// A number x stands for the byte round(x / step) + zero, limited to 0 .. 255.
-struct Steps {
-  float step = 1;
-  std::int32_t zero = 0;
-  float per_step = 1 / step;  ///< divided once, not for every tile
-};
-
-/// What becomes of a sum s of output o: y = f(s * scale[o] + bias[o]), f as in ProductJob, written as a float
-/// and, where asked for, as the byte that stands for it.
+/// What becomes of a sum s of output o. Whole numbers throughout, so that a microcontroller makes the same of
+/// it (models/files/c_code.h writes this formula):
+///   v = (s * multiplier[o] + offset[o]) >> shift[o]
+///   v = max(v, (v * negative_slope + 2048) >> 12)        unless negative_slope is kNoSlope
+///   a byte:   clip(v + zero, 0, 255)
+///   a number: clip(v, -32768, 32767)
+/// Nothing overflows: the multipliers are chosen so (models/inference/quantise.h).
 struct Outcome {
-  const float* scale = nullptr;  // [cout]
-  const float* bias = nullptr;   // [cout]
-  float negative_slope = 1;      // at most 1
-  Steps steps;
+  const std::int32_t *multiplier = nullptr, *offset = nullptr, *shift = nullptr;  // [cout]
+  std::int32_t negative_slope = kNoSlope;                                         // of 4096
+  std::int32_t zero = 0;
+  static constexpr std::int32_t kNoSlope = 4096, kSlopeBits = 12, kSlopeHalf = 2048;
 };
 
 /// Sixteen places of an image one behind the other, from.pixel bytes apart. Where lines follow each other,
@@ -64,12 +62,12 @@ struct ByteReach {
 };
 ByteReach reach_of(const ByteProductJob& job);
 
-/// A kernel of one instruction set; either result may be null.
-using ByteProduct = void (*)(const ByteProductJob& job, const std::uint8_t* x, float* y, std::uint8_t* bytes);
+/// A kernel of one instruction set. It writes numbers or bytes: the other pointer is null.
+using ByteProduct = void (*)(const ByteProductJob& job, const std::uint8_t* x, std::int16_t* y,
+                             std::uint8_t* bytes);
 
 struct ByteKernels {
   ByteProduct product;
-  void (*line_to_bytes)(Dim n, const float* x, Steps steps, std::uint8_t* bytes);
   /// Gives back what the processor keeps between products of a thread; may be null.
   void (*release)() = nullptr;
 };
@@ -88,14 +86,6 @@ class ByteProducts {
 
 /// The best that this processor has within the set that isa_kernels() has chosen.
 const ByteKernels& byte_kernels();
-
-/// bytes = the bytes that stand for the numbers of maps [height][line], x and bytes each with its strides.
-struct ToBytesJob {
-  Dim images = 1, height = 1, line = 0;
-  Strides from, to;
-  Steps steps;
-};
-void to_bytes(const ToBytesJob& job, const float* x, std::uint8_t* bytes);
 
 extern const ByteKernels kPlainByteKernels;
 // Built for x86 alone, in single precision.

@@ -6,7 +6,7 @@
 
 template <int P, int J>
 ALWAYS_INLINE void byte_tile(const ByteProductJob& job, const Sums::Value* const (&x)[P], const Dim (&at)[P],
-                             Dim channel, float* y, std::uint8_t* bytes) {
+                             Dim channel, std::int16_t* y, std::uint8_t* bytes) {
   Sums sum[P][J];
   for (int p = 0; p < P; ++p) {
     for (int j = 0; j < J; ++j) sum[p][j] = Sums::zero();
@@ -54,7 +54,7 @@ struct ByteCursor {
 };
 
 template <int P>
-inline void byte_pixels(const ByteProductJob& job, ByteCursor& cursor, float* y, std::uint8_t* bytes) {
+inline void byte_pixels(const ByteProductJob& job, ByteCursor& cursor, std::int16_t* y, std::uint8_t* bytes) {
   const Sums::Value* x[P];
   Dim at[P];
   for (int p = 0; p < P; ++p, cursor.next()) x[p] = cursor.x, at[p] = cursor.at;
@@ -70,7 +70,7 @@ inline void byte_pixels(const ByteProductJob& job, ByteCursor& cursor, float* y,
   for (; channel < job.kept; channel += Sums::kLanes) byte_tile<P, 1>(job, x, at, channel, y, bytes);
 }
 
-inline void run(const ByteProductJob& job, const Sums::Value* x, float* y, std::uint8_t* bytes) {
+inline void run(const ByteProductJob& job, const Sums::Value* x, std::int16_t* y, std::uint8_t* bytes) {
   ByteCursor cursor{job, x};
   Dim left = job.images * job.height * job.width;
   for (; left >= kTile; left -= kTile) byte_pixels<kTile>(job, cursor, y, bytes);

@@ -24,30 +24,19 @@ struct Sums {
   }
   void dot(Values x, Weights w) { v = _mm512_dpbusd_epi32(v, x, w); }
 
-  struct Finish : PartFinish {
-    using PartFinish::PartFinish;
-    void operator()(Sums sum, float* y, std::uint8_t* bytes) const {
-      PartFinish::operator()(sum.v, y, bytes);
+  struct Finish : kernels::Finish {
+    using kernels::Finish::Finish;
+    void operator()(Sums sum, std::int16_t* y, std::uint8_t* bytes) const {
+      kernels::Finish::operator()(sum.v, y, bytes);
     }
   };
 };
 
 #include "autograd/kernels/fast/int8/loops.inl"
 
-void line_to_bytes(Dim n, const float* x, Steps steps, std::uint8_t* bytes) {
-  const __m512 per_step = _mm512_set1_ps(steps.per_step),
-               first = _mm512_set1_ps(static_cast<float>(steps.zero));
-  Dim i = 0;
-  for (; i + 16 <= n; i += 16) store_bytes(to_steps(_mm512_loadu_ps(x + i), per_step, first), bytes + i);
-  if (i == n) return;
-  const __mmask16 mask = mask_of(n - i);
-  const __m512i whole = to_steps(_mm512_maskz_loadu_ps(mask, x + i), per_step, first);
-  _mm512_mask_cvtusepi32_storeu_epi8(bytes + i, mask, whole);
-}
-
 }  // namespace
 
-const ByteKernels kVnniByteKernels{run, line_to_bytes};
+const ByteKernels kVnniByteKernels{run};
 
 }  // namespace supertac::kernels
 

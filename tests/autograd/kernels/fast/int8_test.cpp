@@ -1,4 +1,4 @@
-#include "autograd/kernels/fast/int8/int8.h"
+#include "autograd/kernels/fast/int8/numbers.h"
 
 #include <gtest/gtest.h>
 
@@ -53,7 +53,8 @@ void expect_bits_of_the_plain_kernel(const Layout& map, Dim length, Dim kept, bo
   const Dim weights = 2 * length * cout;
   const auto w = extreme ? std::vector<std::int8_t>(static_cast<std::size_t>(weights), -127)
                          : numbers<std::int8_t>(weights, -127, 127);
-  const auto scale = numbers<float>(cout, 1, 9), bias = numbers<float>(cout, -9, 9);
+  const auto multiplier = numbers<std::int32_t>(cout, 1, 64), shift = numbers<std::int32_t>(cout, 6, 20),
+             offset = numbers<std::int32_t>(cout, -1'000'000, 1'000'000);
   ByteProductJob job{.images = map.images,
                      .height = map.height,
                      .width = map.width,
@@ -65,28 +66,26 @@ void expect_bits_of_the_plain_kernel(const Layout& map, Dim length, Dim kept, bo
                      .w = w.data(),
                      .cout = cout,
                      .kept = kept,
-                     .outcome = {scale.data(), bias.data(), 0.01F, {700.0F, 100}}};
+                     .outcome = {multiplier.data(), offset.data(), shift.data(), 41, 100}};
   const auto size = static_cast<std::size_t>(map.images * map.height * map.width * kept);
-  std::vector<float> expected(size);
+  std::vector<std::int16_t> expected(size);
   std::vector<std::uint8_t> expected_bytes(size);
   std::vector<std::int16_t> scratch(static_cast<std::size_t>(map.images * reach_of(job).count));
   job.scratch = scratch.data();
   const std::vector<BytePlaces> places = places_of(job);
   job.places = places.data(), job.place_count = static_cast<Dim>(places.size());
-  kPlainByteKernels.product(job, x.data(), expected.data(), expected_bytes.data());
+  kPlainByteKernels.product(job, x.data(), expected.data(), nullptr);
+  kPlainByteKernels.product(job, x.data(), nullptr, expected_bytes.data());
   const std::string what = std::to_string(map.height) + "x" + std::to_string(map.width) + ", " +
                            std::to_string(length) + " bytes, " + std::to_string(kept) + " outputs";
   for (const ByteKernels& set : kernels_here()) {
-    std::vector<float> y(size), y_alone(size);
-    std::vector<std::uint8_t> bytes(size), bytes_alone(size);
+    std::vector<std::int16_t> y(size);
+    std::vector<std::uint8_t> bytes(size);
     const ByteProducts products;
-    set.product(job, x.data(), y.data(), bytes.data());
-    set.product(job, x.data(), y_alone.data(), nullptr);
-    set.product(job, x.data(), nullptr, bytes_alone.data());
+    set.product(job, x.data(), y.data(), nullptr);
+    set.product(job, x.data(), nullptr, bytes.data());
     EXPECT_EQ(y, expected) << what;
-    EXPECT_EQ(y_alone, expected) << what;
     EXPECT_EQ(bytes, expected_bytes) << what;
-    EXPECT_EQ(bytes_alone, expected_bytes) << what;
   }
 }
 
@@ -120,15 +119,49 @@ TEST(Bytes, PlacesHoldEachPixelOnce) {
     }
 }
 
-TEST(Bytes, RoundToTheNearestAndStayInRange) {
+TEST(Bytes, NumbersAreRoundedAndStayInRange) {
   const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
-  const std::vector<float> x{0, 0.24F, 0.25F, 0.75F, -5.25F, 400, -400, nan, inf, -inf, 1};
-  const std::vector<std::uint8_t> expected{10, 10, 10, 12, 0, 255, 0, 0, 255, 0, 12};
-  for (const ByteKernels& set : kernels_here()) {
-    std::vector<std::uint8_t> bytes(x.size());
-    set.line_to_bytes(static_cast<Dim>(x.size()), x.data(), {0.5F, 10}, bytes.data());
-    EXPECT_EQ(bytes, expected);
-  }
+  const std::vector<float> x{0, 0.124F, 0.125F, 0.375F, -5.25F, 1e6F, -1e6F, nan, inf, -inf, 1};
+  std::vector<std::int16_t> numbers(x.size());
+  to_numbers(static_cast<Dim>(x.size()), x.data(), 4, numbers.data());
+  EXPECT_EQ(numbers, (std::vector<std::int16_t>{0, 0, 1, 2, -21, 32767, -32768, -32768, 32767, -32768, 4}));
+  std::vector<std::uint8_t> bytes(x.size());
+  to_bytes(static_cast<Dim>(x.size()), numbers.data(), 3, 1, 1, 10, bytes.data());  // by 1.5
+  EXPECT_EQ(bytes, (std::vector<std::uint8_t>{10, 10, 12, 13, 0, 255, 0, 0, 255, 0, 16}));
+}
+
+// Two pixels of three numbers that meet two outputs: 2 * 3 taps with one segment.
+TEST(Bytes, NumbersMakeTheSumsThatAreCountedByHand) {
+  const std::array<Dim, 1> segment{0};
+  const std::array<std::int16_t, 6> x{1000, -2, 3, 30000, 30000, 30000};
+  const std::array<std::int8_t, 6> w{1, 2, 3, -4, 5, 127};
+  const std::array<std::int32_t, 2> multiplier{1, 64}, offset{1, 32}, shift{1, 6};
+  const ByteProductJob job{.images = 1,
+                           .height = 1,
+                           .width = 2,
+                           .from = {6, 6, 3},
+                           .to = {4, 4, 2},
+                           .segments = segment.data(),
+                           .segment_count = 1,
+                           .length = 3,
+                           .w = w.data(),
+                           .cout = 2,
+                           .kept = 2,
+                           .outcome = {multiplier.data(), offset.data(), shift.data(), 41}};
+  std::array<std::int16_t, 4> y{};
+  product_of_numbers(job, x.data(), y.data());
+  // (1000 - 6 + 15 + 1) / 2;  2000 + 8 + 381;  30000 * 9 and 30000 * 125 are too large
+  EXPECT_EQ(y, (std::array<std::int16_t, 4>{505, 2389, 32767, 32767}));
+}
+
+TEST(Bytes, GatedSumsRoundAndSaturate) {
+  const std::array<std::int16_t, 4> a{10, -10, 32000, -32000}, x{5, 5, 32000, 32000},
+      gates{4096, 2048, 4096, 0};
+  std::array<std::int16_t, 4> y{};
+  gated_sum(1, 4, a.data(), x.data(), gates.data(), y.data());
+  EXPECT_EQ(y, (std::array<std::int16_t, 4>{15, -7, 32767, -32000}));
+  gated_sum(1, 4, a.data(), x.data(), nullptr, y.data());
+  EXPECT_EQ(y, (std::array<std::int16_t, 4>{15, -5, 32767, 0}));
 }
 
 }  // namespace

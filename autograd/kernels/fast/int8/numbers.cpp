@@ -1,0 +1,106 @@
+#include "autograd/kernels/fast/int8/numbers.h"
+
+#include <algorithm>
+
+#include "autograd/kernels/exp.h"
+#include "autograd/kernels/fast/each.h"
+
+namespace supertac::kernels {
+namespace {
+
+std::int16_t clip(std::int64_t v) {
+  return static_cast<std::int16_t>(std::clamp<std::int64_t>(v, -32768, 32767));
+}
+
+std::int16_t finish(const Outcome& to, Dim o, std::int32_t sum) {
+  const std::int32_t v = clip((std::int64_t{sum} * to.multiplier[o] + to.offset[o]) >> to.shift[o]);
+  if (to.negative_slope == Outcome::kNoSlope) return clip(v);
+  return clip(std::max(v, (v * to.negative_slope + Outcome::kSlopeHalf) >> Outcome::kSlopeBits));
+}
+
+// Of one output, such as a picture's: neighbours of x meet neighbours of w.
+std::int32_t single_sum(const ByteProductJob& job, const std::int16_t* x) {
+  std::int32_t sum = 0;
+  const std::int8_t* w = job.w;
+  for (Dim s = 0; s < job.segment_count; ++s, w += job.length) {
+    const std::int16_t* v = x + job.segments[s];
+    run_loop([&, v, w, n = job.length]() {
+      std::int32_t part = 0;
+      for (Dim k = 0; k < n; ++k) part += static_cast<std::int32_t>(v[k]) * static_cast<std::int16_t>(w[k]);
+      sum += part;
+    });
+  }
+  return sum;
+}
+
+void sums(const ByteProductJob& job, const std::int16_t* x, std::int32_t* sum) {
+  std::fill_n(sum, job.cout, 0);
+  const std::int8_t* w = job.w;
+  for (Dim s = 0; s < job.segment_count; ++s) {
+    for (Dim k = 0; k < job.length; ++k, w += job.cout) {
+      const std::int32_t v = x[job.segments[s] + k];
+      const std::int8_t* const row = w;
+      each(job.cout, [=](Dim o) { sum[o] += v * row[o]; });
+    }
+  }
+}
+
+}  // namespace
+
+void product_of_numbers(const ByteProductJob& job, const std::int16_t* x, std::int16_t* y) {
+  std::int32_t sum[kMaxChannels];
+  for (Dim n = 0; n < job.images; ++n) {
+    for (Dim i = 0; i < job.height; ++i) {
+      for (Dim j = 0; j < job.width; ++j) {
+        const std::int16_t* from = x + n * job.from.image + i * job.from.line + j * job.from.pixel;
+        std::int16_t* to = y + n * job.to.image + i * job.to.line + j * job.to.pixel;
+        if (job.cout == 1) {
+          *to = finish(job.outcome, 0, single_sum(job, from));
+          continue;
+        }
+        sums(job, from, sum);
+        for (Dim o = 0; o < job.cout; ++o) to[o] = finish(job.outcome, o, sum[o]);
+      }
+    }
+  }
+}
+
+void to_bytes(Dim n, const std::int16_t* x, std::int32_t multiplier, std::int32_t offset, std::int32_t shift,
+              std::int32_t zero, std::uint8_t* y) {
+  each(n, [=](Dim i) {
+    const std::int32_t v = ((x[i] * multiplier + offset) >> shift) + zero;
+    y[i] = static_cast<std::uint8_t>(v < 0 ? 0 : v > 255 ? 255 : v);
+  });
+}
+
+void to_numbers(Dim n, const float* x, float per_step, std::int16_t* y) {
+  each(n, [=](Dim i) {
+    float v = x[i] * per_step;
+    v = v > -32768.0F ? v : -32768.0F;  // not a number counts as the least
+    v = v < 32767.0F ? v : 32767.0F;
+    y[i] = static_cast<std::int16_t>(static_cast<std::int32_t>(v + 32768.5F) - 32768);
+  });
+}
+
+void gated_sum(Dim pixels, Dim channels, const std::int16_t* a, const std::int16_t* x,
+               const std::int16_t* gates, std::int16_t* y) {
+  for (Dim p = 0; p < pixels; ++p, a += channels, x += channels, y += channels) {
+    const std::int16_t *b = a, *h = x;
+    std::int16_t* const to = y;
+    each(channels, [=](Dim c) {
+      const std::int32_t gated = gates == nullptr ? h[c] : (h[c] * gates[c] + 2048) >> kGateBits;
+      const std::int32_t v = b[c] + gated;
+      to[c] = static_cast<std::int16_t>(v < -32768 ? -32768 : v > 32767 ? 32767 : v);
+    });
+  }
+}
+
+void gates(Dim n, const std::int16_t* x, float step, std::int16_t* y) {
+  for (Dim i = 0; i < n; ++i) {
+    const auto gate =
+        static_cast<float>(sigmoid_same_bits(static_cast<real>(static_cast<float>(x[i]) * step)));
+    y[i] = static_cast<std::int16_t>(gate * 4096.0F + 0.5F);
+  }
+}
+
+}  // namespace supertac::kernels
