@@ -1,0 +1,298 @@
+#include "models/files/c_code.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <set>
+#include <stdexcept>
+
+#include "c99_text.h"
+#include "data/windows/levelling.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+#include "models/inference/integer_plan.h"
+
+namespace supertac {
+namespace {
+
+using Kind = IntegerStep::Kind;
+
+std::string text(Dim value) { return std::to_string(value); }
+
+// As C has it: 0.05, or 50.0, with all digits that tell it from its neighbours.
+std::string number(double value) {
+  std::string out = format(value);
+  return out.find_first_of(".en") == std::string::npos ? out + ".0" : out;
+}
+
+std::string replaced(std::string in, const std::string& what, const std::string& with) {
+  for (std::size_t at = in.find(what); at != std::string::npos; at = in.find(what, at + with.size()))
+    in.replace(at, what.size(), with);
+  return in;
+}
+
+std::string define(const std::string& name, const std::string& value, const std::string& about = "") {
+  return "#define " + name + " " + value + (about.empty() ? "" : " /* " + about + " */") + "\n";
+}
+
+class Writer {
+ public:
+  explicit Writer(const IntegerPlan& plan) : plan_(plan) {}
+
+  std::string maps() const;
+  std::string products();
+  std::string draw() const;
+  std::size_t weights() const { return weights_; }  // bytes
+
+ private:
+  const IntegerMap& map(int i) const { return plan_.maps[static_cast<std::size_t>(i)]; }
+  static std::string at(int i) { return "&maps[" + std::to_string(i) + "]"; }
+  std::string shape_of(int i) const;
+  std::string product(const IntegerStep& s, const std::string& name);
+  std::string call_of(const IntegerStep& s, const std::string& product) const;
+
+  const IntegerPlan& plan_;
+  std::map<const IntegerStep*, std::string> names_;
+  std::size_t weights_ = 0;
+};
+
+std::string Writer::shape_of(int i) const {
+  const IntegerMap& m = map(i);
+  return (m.height > 1 ? "[" + text(m.height) + "]" : "") +
+         (m.height * m.width > 1 ? "[" + text(m.width) + "]" : "") + "[" + text(m.channels) + "] " +
+         (m.bytes ? "bytes" : "numbers");
+}
+
+std::string Writer::maps() const {
+  std::string out = "static const struct map maps[] = {\n";
+  for (std::size_t i = 0; i < plan_.maps.size(); ++i) {
+    const IntegerMap& m = plan_.maps[i];
+    const auto writer = std::ranges::find(plan_.steps, static_cast<int>(i), &IntegerStep::y);
+    out += "    {" + text(m.offset) + ", " + text(m.height) + ", " + text(m.width) + ", " + text(m.channels) +
+           ", " + text(m.margin_h) + ", " + text(m.margin_w) + ", " + (m.bytes ? "1" : "0") + ", " +
+           text(m.bytes ? m.scale.zero : 0) + "}, /* " + std::to_string(i) + ": " + writer->name + ", " +
+           shape_of(static_cast<int>(i)) + " */\n";
+  }
+  return out + "};\n";
+}
+
+// The weights in the order in which the kernels of kernels.c take them.
+std::vector<int> in_order(const IntegerStep& s, bool bytes) {
+  constexpr Dim kFour = 4;
+  const QuantisedProduct& q = s.weights;
+  const auto of = [&](Dim k, Dim o) {
+    const int w = o < q.outputs ? q.w[static_cast<std::size_t>(k * q.outputs + o)] : 0;
+    return bytes ? w + 128 : w;
+  };
+  std::vector<int> out;
+  for (Dim first = 0; first < q.outputs; first += bytes ? kFour : 1) {
+    for (Dim k = 0; k < q.rows; k += bytes ? kFour : 1)
+      for (Dim o = first; o < first + (bytes ? kFour : 1); ++o)
+        for (Dim i = k; i < k + (bytes ? kFour : 1); ++i) out.push_back(of(i, o));
+  }
+  return out;
+}
+
+std::string Writer::product(const IntegerStep& s, const std::string& name) {
+  const bool bytes = map(s.x).bytes;
+  const std::vector<int> w = in_order(s, bytes);
+  const QuantisedProduct& q = s.weights;
+  weights_ += w.size() + 8 * q.offset.size();
+  std::string out = "/* " + s.name + ": " + shape_of(s.x) + " -> " + shape_of(s.y) + ", " + text(q.rows) +
+                    " weights an output */\n";
+  constexpr std::size_t kPerLine = 24;
+  out += std::string(bytes ? "static const uint8_t " : "static const int8_t ") + name + "_weights[" +
+         std::to_string(w.size()) + "] = {";
+  for (std::size_t i = 0; i < w.size(); ++i)
+    out += (i % kPerLine == 0 ? "\n    " : " ") + std::to_string(w[i]) + ",";
+  out +=
+      "\n};\nstatic const struct outcome " + name + "_outcomes[" + std::to_string(q.offset.size()) + "] = {";
+  for (std::size_t o = 0; o < q.offset.size(); ++o)
+    out += (o % 4 == 0 ? "\n    {" : " {") + std::to_string(q.offset[o]) + ", " +
+           std::to_string(q.multiplier[o]) + ", " + std::to_string(q.shift[o]) + "},";
+  if (s.segments.size() > 4) throw std::runtime_error("C code: a kernel of over four rows is not supported");
+  const kernels::ByteProductJob& job = s.job;
+  out += "\n};\nstatic const struct product " + name + " = {" + name + "_weights, " + name + "_outcomes, " +
+         text(job.height) + ", " + text(job.width) + ", " + text(q.outputs) + ", " + text(job.length) + ", " +
+         std::to_string(s.segments.size()) + ", " + std::to_string(job.outcome.negative_slope) + ", " +
+         text(job.from.line) + ", " + text(job.from.pixel) + ", " + text(job.to.line) + ", " +
+         text(job.to.pixel) + ", " + text(s.y_offset) + ", {";
+  for (std::size_t i = 0; i < s.segments.size(); ++i) out += (i > 0 ? ", " : "") + text(s.segments[i]);
+  return out + "}};\n\n";
+}
+
+std::string Writer::products() {
+  std::string out;
+  std::set<std::string> taken;
+  for (const IntegerStep& s : plan_.steps) {
+    if (s.kind != Kind::product) continue;
+    std::string name = replaced(s.name, ".", "_");
+    for (int part = 1; !taken.insert(name).second; ++part)
+      name = replaced(s.name, ".", "_") + "_" + std::to_string(part);
+    names_[&s] = name;
+    out += product(s, name);
+  }
+  return out;
+}
+
+std::string Writer::call_of(const IntegerStep& s, const std::string& product) const {
+  const auto scale = [&] {
+    return text(s.scale.multiplier) + ", " + text(s.scale.offset) + ", " + text(s.scale.shift);
+  };
+  switch (s.kind) {
+    case Kind::input:
+      return "take_input(from, " + at(s.y) + ", " + text(s.first) + ", " + text(s.run) + ", " +
+             text(s.apart) + ", " + scale() + ")";
+    case Kind::to_bytes:
+      return "to_bytes(" + at(s.x) + ", " + at(s.y) + ", " + scale() + ")";
+    case Kind::product:
+      return (map(s.x).bytes ? "product_of_bytes(&" : "product_of_numbers(&") + product + ", " + at(s.x) +
+             ", " + at(s.y) + ")";
+    case Kind::copy:
+      return "copy(" + at(s.x) + ", " + at(s.y) + ", " + text(s.at) + ")";
+    case Kind::mean:
+      return "mean(" + at(s.x) + ", " + at(s.y) + ")";
+    case Kind::gates:
+      return "gates(" + at(s.x) + ", " + at(s.y) + ")";
+    case Kind::gated_sum:
+      return "gated_sum(" + at(s.a) + ", " + at(s.x) + ", " + (s.gates < 0 ? "0" : at(s.gates)) + ", " +
+             at(s.y) + ")";
+  }
+  return {};
+}
+
+std::string Writer::draw() const {
+  std::string out =
+      "void NAME_draw(const float from[TIMESTEPS * SIGNALS], float picture[PIXELS], float "
+      "predicted_error[PIXELS]) {\n";
+  for (const IntegerStep& s : plan_.steps) {
+    if (s.writes_margin) out += "  fill_margin(" + at(s.y) + ");\n";
+    const auto name = names_.find(&s);
+    out += "  " + call_of(s, name == names_.end() ? "" : name->second) + "; /* " + s.name + " */\n";
+  }
+  out += "  give(" + at(plan_.picture) + ", picture);\n";
+  if (plan_.predicted_error >= 0)
+    out += "  if (predicted_error) give(" + at(plan_.predicted_error) + ", predicted_error);\n";
+  else
+    out += "  (void)predicted_error; /* the model predicts none */\n";
+  return out + "}\n\n";
+}
+
+// What stands before the network, as LiveWindow has it.
+std::string window_constants(const ModelFile& file, double sensor_hz) {
+  constexpr double kLookBackS = 0.1, kRoom = 1.25;  // frames may come a quarter faster
+  const WindowSettings w = file.windows();
+  const double period = 1 / sensor_hz, filter = file.input.filter_s.value_or(0);
+  const double span = w.timesteps / w.rate_hz + w.max_gap_s + 2 / w.rate_hz + kLookBackS;
+  const double raw_span = std::max(0.0, filter - 0.5 * period);
+  const auto frames = [&](double seconds) {
+    return text(static_cast<Dim>(std::ceil(kRoom * seconds * sensor_hz)) + 2);
+  };
+  return define("RATE_HZ", number(w.rate_hz), "of the window's samples") +
+         define("PERIOD_S", number(period), "of the sensor's frames") +
+         define("HALF_PERIOD_S", "(0.5 * " + number(std::min(period, 1 / w.rate_hz)) + ")") +
+         define("MAX_GAP_S", number(w.max_gap_s), "a longer silence begins a new window") +
+         define("CELL_SLACK", number(kCellSlack), "of a sample: time stamps are rounded") +
+         define("HISTORY_SPAN_S", number(span)) + define("HISTORY_FRAMES", frames(span)) +
+         define("RAW_SPAN_S", number(raw_span), "of the moving average") +
+         define("RAW_FRAMES", filter > 0 ? frames(raw_span) : "0") +
+         define("REST", number(w.scaling.rest_volts), "a sample is (REST - value) / SPAN, 0 to 1") +
+         define("SPAN", number(w.scaling.span_volts)) +
+         define("NORMALISED", w.scaling.levelled ? "1" : "0",
+                "windows are brought to their own rest and gain") +
+         define("LEAST_GAIN", number(kLeastGain) + "f") + define("REST_REMOVED", number(kRestRemoved) + "f") +
+         define("REST_SHARE", text(kRestShare)) + define("TOP_RANK", text(kTopRank));
+}
+
+std::string header_of(const ModelFile& file, const IntegerPlan& plan, std::size_t weights,
+                      const std::string& top) {
+  const NetworkFormat f = file.network().format();
+  const std::string pixels = "UPPER_HEIGHT * UPPER_WIDTH";
+  return top +
+         "#ifndef UPPER_H\n#define UPPER_H\n\n#include <stdint.h>\n\n#ifdef __cplusplus\nextern \"C\" "
+         "{\n#endif\n\n" +
+         define("UPPER_SIGNALS", text(f.rows * f.columns * f.channels),
+                "of a frame: " + text(f.rows) + " rows of " + text(f.columns) + " taxels, " +
+                    text(f.channels) + " each") +
+         define("UPPER_TIMESTEPS", text(f.frames), "samples of a window") +
+         define("UPPER_HEIGHT", text(f.rows * f.scale), "of the picture, in pixels") +
+         define("UPPER_WIDTH", text(f.columns * f.scale)) +
+         define("UPPER_WORK_BYTES", text(plan.work_area),
+                "of RAM for the network; its window takes 4 bytes a value") +
+         define("UPPER_WEIGHT_BYTES", std::to_string(weights), "of flash") + R"(
+/* One frame of the sensor, in its unit, row by row. 1 where a picture can be drawn, 0 while the window fills, and for
+   a frame that is not finite or not later than the one before. */
+int NAME_push(const float frame[UPPER_SIGNALS]);                    /* one period after the one before */
+int NAME_push_at(double time_s, const float frame[UPPER_SIGNALS]);  /* with its time, where the sensor has a clock */
+
+/* Draws the window that ends with the newest frame; 0 and nothing else while there is none.
+   picture: [height][width], 0 is the flat plate and 1 its highest point. predicted_error: the same, how far from the
+   truth a pixel is expected to be; may be null. */
+int NAME_picture(float picture[)" +
+         pixels + "], float predicted_error[" + pixels + R"(]);
+
+/* The same for a window of your own: [timesteps][signals], scaled as in training. */
+void NAME_draw(const float window[UPPER_TIMESTEPS * UPPER_SIGNALS], float picture[)" +
+         pixels + "],\n               float predicted_error[" + pixels + R"(]);
+
+/* Forgets all frames. */
+void NAME_reset(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
+)";
+}
+
+void check(const ModelFile& file, const std::string& name, double sensor_hz) {
+  const bool identifier =
+      !name.empty() && std::isdigit(static_cast<unsigned char>(name[0])) == 0 &&
+      std::ranges::all_of(name, [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
+  if (!identifier)
+    throw std::invalid_argument("C code: the name must be an identifier of C, such as finger, got " +
+                                in_quotes(name));
+  if (!(sensor_hz >= 1 && sensor_hz <= 100'000))
+    throw std::invalid_argument("C code: the sensor's rate must be 1 to 100000 Hz, got " + format(sensor_hz));
+  if (!file.model)
+    throw std::runtime_error("C code: expected a model of windows, found one of single frames");
+  if (!file.ranges)
+    throw std::runtime_error(
+        "the model was saved without the ranges of its values, which C code in int8 needs; train it anew "
+        "with "
+        "this version");
+}
+
+}  // namespace
+
+CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz,
+                const std::string& written_by) {
+  check(file, name, sensor_hz);
+  const auto plan = IntegerPlan::of(file.network(), *file.ranges);
+  Writer writer(*plan);
+  const std::string top = "/* " + name + ": tactile super-resolution, written by " + written_by + ". */\n";
+  std::string products = writer.products();
+  const std::string source =
+      top + "#include \"NAME.h\"\n\n#include <string.h>\n\n" +
+      "/* Floats are multiplied and added one after the other: the bits are then those of a PC. */\n"
+      "#if defined(__clang__)\n#pragma STDC FP_CONTRACT OFF\n#elif defined(__GNUC__)\n"
+      "#pragma GCC optimize(\"fp-contract=off\")\n#endif\n\n" +
+      define("SIGNALS", "UPPER_SIGNALS") + define("TIMESTEPS", "UPPER_TIMESTEPS") +
+      define("PIXELS", "(UPPER_HEIGHT * UPPER_WIDTH)") + define("WORK_BYTES", "UPPER_WORK_BYTES") +
+      define("NUMBER_STEP", "(1.0f / " + text(Dim{1} << plan->fraction_bits) + ")") +
+      window_constants(file, sensor_hz) + "\n" + kKernels + "\n/* ---- The network. ---- */\n\n" +
+      writer.maps() + "\n" + products + writer.draw() + kWindow;
+  std::string upper = name;
+  std::ranges::transform(upper, upper.begin(), [](unsigned char c) { return std::toupper(c); });
+  const auto named = [&](const std::string& in) {
+    return replaced(replaced(in, "NAME_", name + "_"), "UPPER_", upper + "_");
+  };
+  return {named(replaced(header_of(file, *plan, writer.weights(), top), "NAME.h", name + ".h")),
+          named(replaced(source, "NAME.h", name + ".h")), writer.weights(),
+          static_cast<std::size_t>(plan->work_area)};
+}
+
+}  // namespace supertac

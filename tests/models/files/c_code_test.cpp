@@ -1,0 +1,143 @@
+#include "models/files/c_code.h"
+
+#include <dlfcn.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "data/windows/live_window.h"
+#include "io/files/file.h"
+#include "models/inference/prepared.h"
+#include "tests/io/temporary_folder.h"
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+// What was written, compiled by the C compiler of this machine as somebody might who wants it fast.
+class Compiled {
+ public:
+  Compiled(const CCode& code, const std::string& flags) {
+    write_file(folder_ / "finger.h", code.header);
+    write_file(folder_ / "finger.c", code.source);
+    const std::string library = folder_ / "finger.so";
+    const std::string command = "cc -std=gnu99 -Wall -Wextra -Werror " + flags + " -shared -fPIC -o " +
+                                library + " " + (folder_ / "finger.c");
+    if (std::system(command.c_str()) == 0) library_ = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
+  }
+  ~Compiled() {
+    if (library_ != nullptr) dlclose(library_);
+  }
+  Compiled(const Compiled&) = delete;
+  Compiled& operator=(const Compiled&) = delete;
+  explicit operator bool() const { return library_ != nullptr; }
+  template <class Function>
+  Function* function(const char* name) const {
+    return reinterpret_cast<Function*>(dlsym(library_, name));
+  }
+
+ private:
+  TemporaryFolder folder_;
+  void* library_ = nullptr;
+};
+
+ModelFile model_of(const SuperTacSettings& settings, const InputSettings& input) {
+  Rng rng(3);
+  ModelFile file;
+  file.model = std::make_unique<SuperTac>(settings, rng);
+  file.input = input;
+  file.ranges.emplace();
+  file.ranges->add(*file.model, uniform(file.model->input_shape(16), 5));
+  return file;
+}
+
+SuperTacSettings tiny() { return SuperTacSettings::of_preset("tiny"); }
+
+std::vector<SuperTacSettings> all_settings() {
+  std::vector<SuperTacSettings> all{tiny(), tiny(), tiny(), SuperTacSettings::of_preset("paper")};
+  all[1].rows = 3, all[1].columns = 5, all[1].in_channels = 3, all[1].scale = 8;
+  all[1].grouping = Grouping::vertical, all[1].timesteps = 48;
+  all[2].channels = 12, all[2].rcabs = 0, all[2].spread = false, all[2].latent = 3, all[2].timesteps = 32;
+  return all;
+}
+
+TEST(CCode, DrawsTheBitsOfAPreparedNetwork) {
+  for (const SuperTacSettings& settings : all_settings())
+    for (const char* flags : {"-O3 -march=native", "-O1 -fsanitize=undefined -fno-sanitize-recover"}) {
+      const ModelFile file = model_of(settings, {});
+      const Compiled code(c_code_of(file, "finger", 100, "a test"), flags);
+      if (!code) GTEST_SKIP() << "no C compiler";
+      const auto draw = code.function<void(const float*, float*, float*)>("finger_draw");
+      const Tensor windows = uniform(file.model->input_shape(5), 7);
+      const Estimate expected = Prepared(*file.model, *file.ranges).estimate(windows);
+      const auto pixels = static_cast<std::size_t>(expected.picture.size() / 5);
+      std::vector<float> picture(pixels), predicted_error(pixels);
+      for (std::size_t n = 0; n < 5; ++n) {
+        draw(windows.data() + n * static_cast<std::size_t>(windows.size() / 5), picture.data(),
+             predicted_error.data());
+        EXPECT_TRUE(std::ranges::equal(picture, expected.picture.values().subspan(n * pixels, pixels)));
+        if (settings.spread)
+          EXPECT_TRUE(
+              std::ranges::equal(predicted_error, expected.spread.values().subspan(n * pixels, pixels)));
+      }
+    }
+}
+
+// Frames that jitter, are lost, come twice, are no numbers, and a silence in which all begins anew.
+TEST(CCode, DrawsWhatLiveWindowsDraw) {
+  SuperTacSettings settings = tiny();
+  settings.timesteps = 32;
+  for (const bool levelled : {false, true})
+    for (const double filter_s : {0.0, 0.05}) {
+      const ModelFile file =
+          model_of(settings, {.rate_hz = 50, .scaling = {.levelled = levelled}, .filter_s = filter_s});
+      constexpr double kHz = 120;
+      const Compiled code(c_code_of(file, "finger", kHz, "a test"), "-O3 -march=native");
+      if (!code) GTEST_SKIP() << "no C compiler";
+      const auto push = code.function<int(double, const float*)>("finger_push_at");
+      const auto draw = code.function<int(float*, float*)>("finger_picture");
+      LiveWindow live({.timesteps = 32,
+                       .signals = 16,
+                       .rate_hz = 50,
+                       .scaling = file.input.scaling,
+                       .filter_s = filter_s,
+                       .frame_period_s = 1 / kHz});
+      const Prepared prepared(*file.model, *file.ranges);
+      Tensor window(file.model->input_shape(1));
+      const Tensor noise = uniform(Shape{400, 17}, 11);
+      std::vector<float> picture(256), predicted_error(256), frame(16);
+      int pictures = 0;
+      double time_s = 3;
+      for (int i = 0; i < 400; ++i) {
+        const real* random = noise.data() + 17 * i;
+        time_s += (1 + 0.3 * (static_cast<double>(random[16]) - 0.5)) / kHz;
+        if (i == 230) time_s += 0.2;
+        if (i % 37 == 5) continue;
+        for (std::size_t k = 0; k < 16; ++k)
+          frame[k] = 2.45F - 0.3F * static_cast<float>(random[k]) * static_cast<float>(i % 90) / 90;
+        if (i == 150) frame[3] = NAN;
+        live.push(time_s, frame);
+        push(time_s, frame.data());
+        if (i % 41 == 0) live.push(time_s, frame), push(time_s, frame.data());
+        const bool due = live.window(window.values());
+        ASSERT_EQ(draw(picture.data(), predicted_error.data()) == 1, due) << "frame " << i;
+        if (!due) continue;
+        ++pictures;
+        const Estimate expected = prepared.estimate(window);
+        ASSERT_TRUE(std::ranges::equal(picture, expected.picture.values())) << "frame " << i;
+      }
+      EXPECT_GT(pictures, 150);
+    }
+}
+
+TEST(CCode, RefusesWhatIsNoNameOrRateOrHasNoRanges) {
+  ModelFile file = model_of(tiny(), {});
+  EXPECT_THROW(c_code_of(file, "1st", 100, ""), std::invalid_argument);
+  EXPECT_THROW(c_code_of(file, "a b", 100, ""), std::invalid_argument);
+  EXPECT_THROW(c_code_of(file, "finger", 0, ""), std::invalid_argument);
+  file.ranges.reset();
+  EXPECT_THROW(c_code_of(file, "finger", 100, ""), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace supertac
