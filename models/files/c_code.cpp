@@ -279,7 +279,9 @@ CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz
       top + "#include \"NAME.h\"\n\n#include <string.h>\n\n" +
       "/* Floats are multiplied and added one after the other: the bits are then those of a PC. */\n"
       "#if defined(__clang__)\n#pragma STDC FP_CONTRACT OFF\n#elif defined(__GNUC__)\n"
-      "#pragma GCC optimize(\"fp-contract=off\")\n#endif\n\n" +
+      "#pragma GCC optimize(\"fp-contract=off\")\n"
+      "#pragma GCC diagnostic ignored \"-Wunused-function\" /* kernels that this network does not need */\n"
+      "#endif\n\n" +
       define("SIGNALS", "UPPER_SIGNALS") + define("TIMESTEPS", "UPPER_TIMESTEPS") +
       define("PIXELS", "(UPPER_HEIGHT * UPPER_WIDTH)") + define("WORK_BYTES", "UPPER_WORK_BYTES") +
       define("NUMBER_STEP", "(1.0f / " + text(Dim{1} << plan->fraction_bits) + ")") +

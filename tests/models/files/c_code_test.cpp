@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <stdexcept>
 
 #include "data/windows/live_window.h"
 #include "io/files/file.h"
@@ -24,13 +25,13 @@ class Compiled {
     const std::string command = "cc -std=gnu99 -Wall -Wextra -Werror " + flags + " -shared -fPIC -o " +
                                 library + " " + (folder_ / "finger.c");
     if (std::system(command.c_str()) == 0) library_ = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (library_ == nullptr) throw std::runtime_error("not compiled: " + command);
   }
   ~Compiled() {
     if (library_ != nullptr) dlclose(library_);
   }
   Compiled(const Compiled&) = delete;
   Compiled& operator=(const Compiled&) = delete;
-  explicit operator bool() const { return library_ != nullptr; }
   template <class Function>
   Function* function(const char* name) const {
     return reinterpret_cast<Function*>(dlsym(library_, name));
@@ -40,6 +41,8 @@ class Compiled {
   TemporaryFolder folder_;
   void* library_ = nullptr;
 };
+
+bool has_compiler() { return std::system("cc --version > /dev/null 2>&1") == 0; }
 
 ModelFile model_of(const SuperTacSettings& settings, const InputSettings& input) {
   Rng rng(3);
@@ -62,11 +65,11 @@ std::vector<SuperTacSettings> all_settings() {
 }
 
 TEST(CCode, DrawsTheBitsOfAPreparedNetwork) {
+  if (!has_compiler()) GTEST_SKIP() << "no C compiler";
   for (const SuperTacSettings& settings : all_settings())
     for (const char* flags : {"-O3 -march=native", "-O1 -fsanitize=undefined -fno-sanitize-recover"}) {
       const ModelFile file = model_of(settings, {});
       const Compiled code(c_code_of(file, "finger", 100, "a test"), flags);
-      if (!code) GTEST_SKIP() << "no C compiler";
       const auto draw = code.function<void(const float*, float*, float*)>("finger_draw");
       const Tensor windows = uniform(file.model->input_shape(5), 7);
       const Estimate expected = Prepared(*file.model, *file.ranges).estimate(windows);
@@ -76,15 +79,17 @@ TEST(CCode, DrawsTheBitsOfAPreparedNetwork) {
         draw(windows.data() + n * static_cast<std::size_t>(windows.size() / 5), picture.data(),
              predicted_error.data());
         EXPECT_TRUE(std::ranges::equal(picture, expected.picture.values().subspan(n * pixels, pixels)));
-        if (settings.spread)
+        if (settings.spread) {
           EXPECT_TRUE(
               std::ranges::equal(predicted_error, expected.spread.values().subspan(n * pixels, pixels)));
+        }
       }
     }
 }
 
 // Frames that jitter, are lost, come twice, are no numbers, and a silence in which all begins anew.
 TEST(CCode, DrawsWhatLiveWindowsDraw) {
+  if (!has_compiler()) GTEST_SKIP() << "no C compiler";
   SuperTacSettings settings = tiny();
   settings.timesteps = 32;
   for (const bool levelled : {false, true})
@@ -93,7 +98,6 @@ TEST(CCode, DrawsWhatLiveWindowsDraw) {
           model_of(settings, {.rate_hz = 50, .scaling = {.levelled = levelled}, .filter_s = filter_s});
       constexpr double kHz = 120;
       const Compiled code(c_code_of(file, "finger", kHz, "a test"), "-O3 -march=native");
-      if (!code) GTEST_SKIP() << "no C compiler";
       const auto push = code.function<int(double, const float*)>("finger_push_at");
       const auto draw = code.function<int(float*, float*)>("finger_picture");
       LiveWindow live({.timesteps = 32,

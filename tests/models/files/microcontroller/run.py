@@ -1,0 +1,167 @@
+"""One hash of pictures on this computer and on emulated microcontrollers.
+
+    run.py --bin build/bin [--model FILE --data DIR] [--windows N] [--frames N] [--csv FILE]
+
+Without a model a small one is simulated and trained. Exits with 77 where arm-none-eabi-gcc or qemu-system-arm is
+missing.
+"""
+import argparse
+import csv
+import glob
+import json
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+# name, qemu's machine, what the compiler is told
+PARTS = [
+    ("Cortex-M7", "mps2-an500", "-mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard"),
+    ("Cortex-M4F", "mps2-an386", "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard"),
+    ("Cortex-M3", "mps2-an385", "-mcpu=cortex-m3"),
+    ("Cortex-M0+", "mps2-an385", "-mcpu=cortex-m0plus"),  # its code, on an M3
+]
+CC = ["arm-none-eabi-gcc", "-mthumb", "-std=gnu99", "-O2", "-Wall", "-Wextra", "-Werror", "-ffunction-sections"]
+
+
+def tensors_of(path):
+    """name -> (shape, bytes) of a safetensors file."""
+    with open(path, "rb") as file:
+        data = file.read()
+    length = struct.unpack("<Q", data[:8])[0]
+    header = json.loads(data[8:8 + length])
+    begin = 8 + length
+    return {name: (t["shape"], data[begin + t["data_offsets"][0]:begin + t["data_offsets"][1]])
+            for name, t in header.items() if name != "__metadata__"}
+
+
+def fnv(blocks):
+    value = 14695981039346656037
+    for block in blocks:
+        for byte in block:
+            value = ((value ^ byte) * 1099511628211) & 0xFFFFFFFFFFFFFFFF
+    return value
+
+
+def slices(tensor, count):
+    shape, data = tensor
+    size = len(data) // shape[0]
+    return [data[i * size:(i + 1) * size] for i in range(count)]
+
+
+def trained(tools, folder):
+    data, model = folder + "/recordings", folder + "/model.safetensors"
+    subprocess.run([tools + "/supertac-simulate", "--out", data, "--speeds", "10", "--passes", "1", "--trials", "2",
+                    "--plates", "ridges6,plain", "--quiet"], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([tools + "/supertac-train", "--data", data, "--out", model, "--preset", "tiny", "--epochs", "1",
+                    "--stride", "8", "--split", "trial", "--quiet"], check=True, stdout=subprocess.DEVNULL)
+    return model, data
+
+
+def windows_of(args, folder):
+    """What the devices are given, and the hash of what this computer draws of it."""
+    out = folder + "/outputs.safetensors"
+    subprocess.run([args.bin + "/supertac-evaluate", "--model", args.model, "--data", args.data, "--precision", "int8",
+                    "--limit", str(args.windows), "--outputs", out, "--quiet"], check=True, stdout=subprocess.DEVNULL)
+    tensors = tensors_of(out)
+    error = next((tensors[name] for name in ("predicted_error", "spread") if name in tensors))
+    count = tensors["input"][0][0]
+    drawn = [part for pair in zip(slices(tensors["output"], count), slices(error, count)) for part in pair]
+    return struct.pack("<ii", 0, count) + tensors["input"][1], count, fnv(drawn)
+
+
+def frames_of(args, folder):
+    """The same, frame by frame, of what supertac-stream draws of a recording."""
+    recording = sorted(glob.glob(args.data + "/*.safetensors"))[0]
+    out = folder + "/streamed.safetensors"
+    tensors = tensors_of(recording)
+    count = min(args.frames, tensors["time_s"][0][0])
+    times, values = slices(tensors["time_s"], count), slices(tensors.get("volts") or tensors["signals"], count)
+    seconds = struct.unpack("<d", times[-1])[0] - struct.unpack("<d", times[0])[0] + 1e-6
+    subprocess.run([args.bin + "/supertac-stream", "--model", args.model, "--recording", recording, "--precision",
+                    "int8", "--seconds", str(seconds), "--out", out, "--quiet"], check=True, stdout=subprocess.DEVNULL)
+    drawn = tensors_of(out)
+    pictures = next(drawn[name] for name in ("picture", "pictures") if name in drawn)
+    frames = b"".join(t + v for t, v in zip(times, values))
+    return struct.pack("<ii", 1, count) + frames, pictures[0][0], fnv(slices(pictures, pictures[0][0]))
+
+
+def rate_of(recording):
+    shape, times = tensors_of(recording)["time_s"]
+    times = struct.unpack("<%dd" % shape[0], times)
+    steps = sorted(b - a for a, b in zip(times, times[1:]))
+    return 1 / steps[len(steps) // 2]
+
+
+def built(flags, folder, name):
+    """The program, bytes of flash and RAM of the exported file alone, and of its instructions."""
+    program = folder + "/" + name + ".elf"
+    sources = [HERE + "/firmware.c", HERE + "/startup.c", folder + "/finger.c"]
+    subprocess.run(CC + flags.split() + ["-I" + folder, *sources, "-nostartfiles", "--specs=nano.specs", "-T",
+                                         HERE + "/mps2.ld", "-Wl,--gc-sections", "-o", program], check=True)
+    subprocess.run(CC + flags.split() + ["-c", folder + "/finger.c", "-o", program + ".o"], check=True)
+    size = subprocess.run(["arm-none-eabi-size", "-A", program + ".o"], check=True, capture_output=True, text=True)
+    sections = [line.split() for line in size.stdout.splitlines() if line.startswith(".")]
+
+    def total(*prefixes):
+        return sum(int(s[1]) for s in sections if s[0].startswith(prefixes))
+    return program, total(".text", ".rodata"), total(".bss", ".data"), total(".text")
+
+
+def run(machine, program, folder, given):
+    with open(folder + "/input", "wb") as file:
+        file.write(given)
+    ran = subprocess.run(["qemu-system-arm", "-M", machine, "-kernel", program, "-icount", "shift=0",
+                          "-semihosting-config", "enable=on,target=native", "-nographic", "-monitor", "none", "-serial",
+                          "none"], cwd=folder, capture_output=True, text=True, timeout=1800)
+    said = dict(line.split() for line in (ran.stdout + ran.stderr).splitlines() if len(line.split()) == 2)
+    return {key: int(said[key]) for key in ("pictures", "hash", "instructions")}
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--bin", required=True)
+    parser.add_argument("--model")
+    parser.add_argument("--data")
+    parser.add_argument("--windows", type=int, default=1000)
+    parser.add_argument("--frames", type=int, default=1200)
+    parser.add_argument("--csv")
+    args = parser.parse_args()
+    if shutil.which("arm-none-eabi-gcc") is None or shutil.which("qemu-system-arm") is None:
+        print("skipped: needs arm-none-eabi-gcc (gcc-arm-none-eabi, libnewlib-arm-none-eabi) and qemu-system-arm")
+        return 77
+    wrong, rows = 0, []
+    with tempfile.TemporaryDirectory() as folder:
+        if args.model is None:
+            args.model, args.data = trained(args.bin, folder)
+        recording = sorted(glob.glob(args.data + "/*.safetensors"))[0]
+        subprocess.run([args.bin + "/supertac-export", args.model, "--c99", folder, "--name", "finger", "--sensor-hz",
+                        repr(rate_of(recording)), "--force"], check=True, stdout=subprocess.DEVNULL)
+        given = {"windows": windows_of(args, folder), "frames": frames_of(args, folder)}
+        for name, machine, flags in PARTS:
+            program, flash, ram, code = built(flags, folder, name)
+            row = {"part": name, "flash_bytes": flash, "code_bytes": code, "ram_bytes": ram}
+            for what, (data, count, expected) in given.items():
+                found = run(machine, program, folder, data)
+                same = found["hash"] == expected and found["pictures"] == count
+                wrong += not same
+                row.update({what: count, what + "_hash": f"{found['hash']:016x}",
+                            what + "_instructions": found["instructions"]})
+                print(f"{name}: {found['pictures']} pictures of {what}, hash {found['hash']:016x}"
+                      f"{'' if same else f', expected {expected:016x} of {count}'}, "
+                      f"at most {found['instructions']} instructions a picture")
+            print(f"{name}: {flash} bytes of flash, {code} of them code, {ram} of RAM with the history")
+            rows.append(row)
+    if args.csv:
+        with open(args.csv, "w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, rows[0].keys())
+            writer.writeheader()
+            writer.writerows(rows)
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
