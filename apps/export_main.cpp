@@ -49,7 +49,7 @@ static int export_c(Arguments& arguments, const ModelFile& file) {
                      "supertac-export of " + std::filesystem::path(model).filename().string() + " (SHA-256 " +
                          hash_of_file(model).substr(0, 16) + ")");
   });
-  OutputFolder folder(arguments.text("c99"), arguments.force());
+  OutputFolder folder(arguments.output("c99"));
   const std::string header = folder.add(name + ".h"), source = folder.add(name + ".c");
   write_file(header, code.header);
   write_file(source, code.source);

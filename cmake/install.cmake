@@ -1,7 +1,11 @@
-# cmake --install and find_package(supertac)
+# cmake --install, find_package(supertac) and pkg-config, right in any prefix.
 include(CMakePackageConfigHelpers)
 get_property(libraries GLOBAL PROPERTY SUPERTAC_LIBRARIES)
 install(TARGETS ${libraries} EXPORT supertac ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
+# The C library: programs need the file with the soname, who compiles them the link and the header.
+install(TARGETS supertac_c EXPORT supertac LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT programs
+  NAMELINK_COMPONENT development)
+install(FILES library/supertac.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/supertac COMPONENT development)
 install(CODE "set(SUPERTAC_SOURCE [[${PROJECT_SOURCE_DIR}]])
 set(SUPERTAC_BUILD [[${PROJECT_BINARY_DIR}]])
 set(SUPERTAC_INCLUDEDIR [[${CMAKE_INSTALL_INCLUDEDIR}]])" COMPONENT development)
@@ -15,19 +19,26 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/supertacConfigVersion.cma
 install(FILES ${PROJECT_BINARY_DIR}/supertacConfig.cmake ${PROJECT_BINARY_DIR}/supertacConfigVersion.cmake
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supertac COMPONENT development)
 
-# The same for pkg-config; static libraries need each other in turn.
+# For pkg-config: `supertac` is the C library, `supertac-cpp` the static ones, which need each other in turn. What these
+# need of others is named only where it is called: --as-needed leaves the rest out.
 foreach(library ${libraries})
   get_target_property(type ${library} TYPE)
   if(type STREQUAL "STATIC_LIBRARY")
     string(APPEND links " -l${library}")
   endif()
 endforeach()
-file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/supertac.pc @ONLY CONTENT
-"prefix=@CMAKE_INSTALL_PREFIX@
-Name: supertac
-Description: @PROJECT_DESCRIPTION@
-Version: @PROJECT_VERSION@
-Cflags: -I\${prefix}/@CMAKE_INSTALL_INCLUDEDIR@
-Libs: -L\${prefix}/@CMAKE_INSTALL_LIBDIR@ -Wl,--start-group@links@ -Wl,--end-group -lz -fopenmp -pthread
-")
-install(FILES ${PROJECT_BINARY_DIR}/supertac.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
+file(RELATIVE_PATH to_prefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+set(head "prefix=\${pcfiledir}/${to_prefix}
+libdir=\${prefix}/${CMAKE_INSTALL_LIBDIR}
+includedir=\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}
+Version: ${PROJECT_VERSION}\n")
+file(WRITE ${PROJECT_BINARY_DIR}/supertac.pc "${head}Name: supertac
+Description: ${PROJECT_DESCRIPTION}: the C library
+Cflags: -I\${includedir}
+Libs: -L\${libdir} -lsupertac\n")
+file(WRITE ${PROJECT_BINARY_DIR}/supertac-cpp.pc "${head}Name: supertac-cpp
+Description: ${PROJECT_DESCRIPTION}: the C++ libraries
+Cflags: -I\${includedir} ${SUPERTAC_SAME_BITS}
+Libs: -L\${libdir} -Wl,--as-needed -Wl,--start-group${links} -Wl,--end-group -lkissfft-float -lz -fopenmp -pthread\n")
+install(FILES ${PROJECT_BINARY_DIR}/supertac.pc ${PROJECT_BINARY_DIR}/supertac-cpp.pc
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)

@@ -2,10 +2,11 @@
 
 add_library(supertac_options INTERFACE)
 # -Wno-restrict: GCC 12 warns about its own std::string.
-# -ffp-contract=off: a product and a sum are only fused where the source says so, so that every
-# instruction set gives the same bits.
+# SUPERTAC_SAME_BITS: a product and a sum are only fused where the source says so, so that every instruction set gives
+# the same bits. Whoever links a library gets it too: its headers are compiled with the user's flags.
+set(SUPERTAC_SAME_BITS -ffp-contract=off)
 target_compile_options(supertac_options INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor
-  -Wno-restrict -ffp-contract=off -fno-math-errno -fno-trapping-math $<$<BOOL:${SUPERTAC_WERROR}>:-Werror>)
+  -Wno-restrict ${SUPERTAC_SAME_BITS} -fno-math-errno -fno-trapping-math $<$<BOOL:${SUPERTAC_WERROR}>:-Werror>)
 # A program names only the shared libraries that it calls.
 target_link_options(supertac_options INTERFACE -Wl,--as-needed)
 if(SUPERTAC_SANITIZE)
@@ -26,6 +27,7 @@ function(supertac_library name)
   target_include_directories(${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_features(${name} PUBLIC cxx_std_20)
+  target_compile_options(${name} INTERFACE ${SUPERTAC_SAME_BITS})
   target_link_libraries(${name} PUBLIC ${arg_USES} PRIVATE $<BUILD_INTERFACE:supertac_options> ${arg_PRIVATE_USES})
   set_property(GLOBAL APPEND PROPERTY SUPERTAC_LIBRARIES ${name})
 endfunction()

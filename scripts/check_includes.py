@@ -17,7 +17,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 FOLDERS = ("io", "autograd", "layers", "data", "models", "hardware", "apps")
 WITH_ROOMS = ("io", "data", "models", "hardware", "apps")
 USERS = ("tests", "bench", "examples", "docs", "library", "python")  # may use everything
-MADE_BY_THE_BUILD = ("programs.inc", "glossary.inc")
+MADE_BY_THE_BUILD = ("programs.inc", "glossary.inc", "c99_text.h")
 MOST_FILES = 20
 # What still has to be mended: this table only shrinks, and an entry that is true no longer is an error.
 KNOWN = {

@@ -60,7 +60,8 @@ std::vector<SuperTacSettings> all_settings() {
   std::vector<SuperTacSettings> all{tiny(), tiny(), tiny(), SuperTacSettings::of_preset("paper")};
   all[1].rows = 3, all[1].columns = 5, all[1].in_channels = 3, all[1].scale = 8;
   all[1].grouping = Grouping::vertical, all[1].timesteps = 48;
-  all[2].channels = 12, all[2].rcabs = 0, all[2].spread = false, all[2].latent = 3, all[2].timesteps = 32;
+  all[2].channels = 12, all[2].rcabs = 0, all[2].predicted_error = false, all[2].latent = 3,
+  all[2].timesteps = 32;
   return all;
 }
 
@@ -79,9 +80,9 @@ TEST(CCode, DrawsTheBitsOfAPreparedNetwork) {
         draw(windows.data() + n * static_cast<std::size_t>(windows.size() / 5), picture.data(),
              predicted_error.data());
         EXPECT_TRUE(std::ranges::equal(picture, expected.picture.values().subspan(n * pixels, pixels)));
-        if (settings.spread) {
-          EXPECT_TRUE(
-              std::ranges::equal(predicted_error, expected.spread.values().subspan(n * pixels, pixels)));
+        if (settings.predicted_error) {
+          EXPECT_TRUE(std::ranges::equal(predicted_error,
+                                         expected.predicted_error.values().subspan(n * pixels, pixels)));
         }
       }
     }

@@ -35,14 +35,16 @@ std::int32_t single_sum(const ByteProductJob& job, const std::int16_t* x) {
 
 void sums(const ByteProductJob& job, const std::int16_t* x, std::int32_t* sum) {
   std::fill_n(sum, job.cout, 0);
-  const std::int8_t* w = job.w;
-  for (Dim s = 0; s < job.segment_count; ++s) {
-    for (Dim k = 0; k < job.length; ++k, w += job.cout) {
-      const std::int32_t v = x[job.segments[s] + k];
-      const std::int8_t* const row = w;
-      each(job.cout, [=](Dim o) { sum[o] += v * row[o]; });
+  run_loop([&job, x, sum] {
+    const std::int8_t* w = job.w;
+    for (Dim s = 0; s < job.segment_count; ++s) {
+      for (Dim k = 0; k < job.length; ++k, w += job.cout) {
+        const std::int32_t v = x[job.segments[s] + k];
+        const std::int8_t* const row = w;
+        each_here(job.cout, [=](Dim o) { sum[o] += v * row[o]; });
+      }
     }
-  }
+  });
 }
 
 }  // namespace

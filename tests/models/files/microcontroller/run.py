@@ -111,6 +111,16 @@ def built(flags, folder, name):
     return program, total(".text", ".rodata"), total(".bss", ".data"), total(".text")
 
 
+def sketch_compiles(folder):
+    """The Arduino sketch against a stub of Arduino's functions."""
+    sketch = os.path.join(HERE, "../../../../examples/microcontroller/finger/finger.ino")
+    ran = subprocess.run(["arm-none-eabi-g++", "-mcpu=cortex-m7", "-mthumb", "-std=gnu++17", "-O2", "-Wall", "-Wextra",
+                          "-Werror", "-I" + HERE, "-I" + folder, "-include", "Arduino.h", "-x", "c++", "-c", sketch,
+                          "-o", folder + "/sketch.o"], check=False)
+    print("the sketch compiles" if ran.returncode == 0 else "the sketch does not compile")
+    return ran.returncode == 0
+
+
 def run(machine, program, folder, given):
     with open(folder + "/input", "wb") as file:
         file.write(given)
@@ -141,6 +151,7 @@ def main():
         subprocess.run([args.bin + "/supertac-export", args.model, "--c99", folder, "--name", "finger", "--sensor-hz",
                         repr(rate_of(recording)), "--force"], check=True, stdout=subprocess.DEVNULL)
         given = {"windows": windows_of(args, folder), "frames": frames_of(args, folder)}
+        wrong += not sketch_compiles(folder)
         for name, machine, flags in PARTS:
             program, flash, ram, code = built(flags, folder, name)
             row = {"part": name, "flash_bytes": flash, "code_bytes": code, "ram_bytes": ram}

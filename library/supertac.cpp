@@ -1,0 +1,234 @@
+#include "library/supertac.h"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <limits>
+#include <new>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "data/windows/live_window.h"
+#include "models/files/model_file.h"
+#include "models/inference/prepared.h"
+
+using namespace supertac;
+
+struct supertac_model {
+  ModelFile file;
+  Prepared prepared;
+};
+
+struct supertac_live {
+  const supertac_model* model;
+  LiveWindow window;
+  Tensor input;
+};
+
+namespace {
+
+constexpr std::size_t kBatch = 16;  // windows that a thread draws at once
+
+thread_local std::string last_error;
+
+// What `work` returns, or `failed` when it throws; supertac_error() then has the message.
+template <class Result, class Work>
+Result guarded(Result failed, Work work) noexcept {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    last_error = "not enough memory";
+  } catch (const std::exception& error) {
+    last_error = error.what();
+  } catch (...) {
+    last_error = "unknown error";
+  }
+  return failed;
+}
+
+void expect(bool holds, const char* what) {
+  if (!holds) throw std::invalid_argument(what);
+}
+
+supertac_model* opened(const std::string& path, int precision) {
+  expect(precision == SUPERTAC_FP32 || precision == SUPERTAC_INT8,
+         "precision: expected SUPERTAC_FP32 or SUPERTAC_INT8");
+  ModelFile file = load_model(path);
+  if (precision == SUPERTAC_INT8 && !file.ranges)
+    throw std::runtime_error(path + ": saved without the ranges that SUPERTAC_INT8 needs; train it anew");
+  Prepared prepared =
+      precision == SUPERTAC_INT8 ? Prepared(*file.model, *file.ranges) : Prepared(*file.model);
+  return new supertac_model{std::move(file), std::move(prepared)};
+}
+
+// A file without a name, which ends with this.
+class MemoryFile {
+ public:
+  MemoryFile(const void* bytes, std::size_t size) : file_(memfd_create("supertac", MFD_CLOEXEC)) {
+    expect(file_ >= 0, "model in memory: the system gives no file in memory");
+    const char* from = static_cast<const char*>(bytes);
+    while (size > 0) {
+      const ssize_t written = write(file_, from, size);
+      if (written <= 0) close(file_), throw std::bad_alloc();
+      from += written, size -= static_cast<std::size_t>(written);
+    }
+  }
+  ~MemoryFile() { close(file_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+  std::string path() const { return "/proc/self/fd/" + std::to_string(file_); }
+
+ private:
+  int file_;
+};
+
+void copy_out(const Tensor& from, float* to) {
+  if (to != nullptr) std::copy_n(from.data(), from.size(), to);
+}
+
+}  // namespace
+
+const char* supertac_version(void) { return SUPERTAC_VERSION; }
+
+const char* supertac_error(void) { return last_error.c_str(); }
+
+supertac_model* supertac_open(const char* path, int precision) {
+  return guarded<supertac_model*>(nullptr, [&] {
+    expect(path != nullptr, "supertac_open: path is NULL");
+    return opened(path, precision);
+  });
+}
+
+supertac_model* supertac_open_memory(const void* bytes, std::size_t size, int precision) {
+  return guarded<supertac_model*>(nullptr, [&] {
+    expect(bytes != nullptr, "supertac_open_memory: bytes is NULL");
+    const MemoryFile file(bytes, size);
+    try {
+      return opened(file.path(), precision);
+    } catch (const std::exception& error) {
+      std::string text = error.what();
+      for (std::size_t at = text.find(file.path()); at != std::string::npos; at = text.find(file.path()))
+        text.replace(at, file.path().size(), "model in memory");
+      throw std::runtime_error(text);
+    }
+  });
+}
+
+void supertac_close(supertac_model* model) { delete model; }
+
+int supertac_describe(const supertac_model* model, supertac_description* description) {
+  return guarded(-1, [&] {
+    expect(model != nullptr && description != nullptr, "supertac_describe: a pointer is NULL");
+    expect(description->size >= sizeof(std::size_t), "supertac_describe: set description.size first");
+    const SuperTacSettings& s = model->file.model->settings();
+    const InputSettings& input = model->file.input;
+    const supertac_description full{.size = std::min(description->size, sizeof(supertac_description)),
+                                    .rows = static_cast<int>(s.rows),
+                                    .columns = static_cast<int>(s.columns),
+                                    .channels = static_cast<int>(s.in_channels),
+                                    .signals = static_cast<int>(s.signals()),
+                                    .timesteps = static_cast<int>(s.timesteps),
+                                    .height = static_cast<int>(s.image_height()),
+                                    .width = static_cast<int>(s.image_width()),
+                                    .predicts_error = s.predicted_error ? 1 : 0,
+                                    .rate_hz = input.rate_hz,
+                                    .pitch_mm = input.pitch_mm,
+                                    .pixel_mm = input.pitch_mm / static_cast<double>(s.scale),
+                                    .filter_s = input.filter_s.value_or(-1),
+                                    .rest = input.scaling.rest_volts,
+                                    .span = input.scaling.span_volts};
+    std::memcpy(description, &full, full.size);
+    return 0;
+  });
+}
+
+int supertac_draw(const supertac_model* model, std::size_t count, const float* windows, float* pictures,
+                  float* predicted_errors, int threads) {
+  return guarded(-1, [&] {
+    expect(model != nullptr, "supertac_draw: model is NULL");
+    expect(count == 0 || (windows != nullptr && pictures != nullptr),
+           "supertac_draw: windows or pictures is NULL");
+    expect(threads >= 1 && threads <= 1024, "supertac_draw: threads must be 1 to 1024");
+    const SuperTac& network = *model->file.model;
+    expect(predicted_errors == nullptr || network.settings().predicted_error,
+           "supertac_draw: the model predicts no error");
+    const auto window = static_cast<std::size_t>(network.input_shape(1).size());
+    const auto picture = static_cast<std::size_t>(network.picture_shape(1).size());
+    expect(count <= std::numeric_limits<std::size_t>::max() / sizeof(float) / std::max(window, picture),
+           "supertac_draw: more windows than memory can hold");
+    const auto batches = static_cast<std::int64_t>((count + kBatch - 1) / kBatch);
+    std::exception_ptr failure;
+#pragma omp parallel for schedule(dynamic) num_threads(threads) if (threads > 1 && batches > 1)
+    for (std::int64_t batch = 0; batch < batches; ++batch) {
+      try {
+        const std::size_t first = static_cast<std::size_t>(batch) * kBatch,
+                          n = std::min(kBatch, count - first);
+        Tensor input(network.input_shape(static_cast<Dim>(n)));
+        std::copy_n(windows + first * window, n * window, input.data());
+        const Estimate drawn = model->prepared.estimate(input);
+        copy_out(drawn.picture, pictures + first * picture);
+        if (predicted_errors != nullptr) copy_out(drawn.predicted_error, predicted_errors + first * picture);
+      } catch (...) {
+#pragma omp critical
+        failure = std::current_exception();
+      }
+    }
+    if (failure) std::rethrow_exception(failure);
+    return 0;
+  });
+}
+
+supertac_live* supertac_live_new(const supertac_model* model, double frame_hz, double filter_s) {
+  return guarded<supertac_live*>(nullptr, [&] {
+    expect(model != nullptr, "supertac_live_new: model is NULL");
+    expect(frame_hz >= 1 && frame_hz <= 100'000, "supertac_live_new: frame_hz must be 1 to 100000");
+    expect(filter_s >= 0 && filter_s <= 10, "supertac_live_new: filter_s must be 0 to 10");
+    const InputSettings& input = model->file.input;
+    const double trained_s = input.filter_s.value_or(filter_s);
+    const bool same = std::abs(trained_s - filter_s) < 1e-4;
+    expect(same || filter_s == 0,
+           "supertac_live_new: the frames have gone through another moving average than the model's training "
+           "signals; give it frames without");
+    return new supertac_live{
+        model,
+        LiveWindow({.timesteps = static_cast<int>(model->file.model->settings().timesteps),
+                    .signals = model->file.array().signals(),
+                    .rate_hz = input.rate_hz,
+                    .scaling = input.scaling,
+                    .filter_s = same ? 0 : trained_s,
+                    .frame_period_s = 1 / frame_hz}),
+        Tensor(model->file.model->input_shape(1))};
+  });
+}
+
+void supertac_live_free(supertac_live* live) { delete live; }
+
+int supertac_live_push(supertac_live* live, double time_s, const float* frame) {
+  return guarded(-1, [&] {
+    expect(live != nullptr && frame != nullptr, "supertac_live_push: a pointer is NULL");
+    live->window.push(time_s, std::span(frame, live->model->file.array().signals()));
+    return 0;
+  });
+}
+
+int supertac_live_window(supertac_live* live, float* window) {
+  return guarded(-1, [&] {
+    expect(live != nullptr && window != nullptr, "supertac_live_window: a pointer is NULL");
+    return live->window.window(std::span(window, static_cast<std::size_t>(live->input.size()))) ? 1 : 0;
+  });
+}
+
+int supertac_live_picture(supertac_live* live, float* picture, float* predicted_error) {
+  return guarded(-1, [&] {
+    expect(live != nullptr && picture != nullptr, "supertac_live_picture: a pointer is NULL");
+    if (!live->window.window(live->input.values())) return 0;
+    const int drawn = supertac_draw(live->model, 1, live->input.data(), picture, predicted_error, 1);
+    return drawn == 0 ? 1 : -1;
+  });
+}
