@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "data/windows/levelling.h"
 #include "data/windows/live_window.h"
 #include "models/files/model_file.h"
 #include "models/inference/prepared.h"
@@ -144,6 +145,22 @@ int supertac_describe(const supertac_model* model, supertac_description* descrip
                                     .rest = input.scaling.rest_volts,
                                     .span = input.scaling.span_volts};
     std::memcpy(description, &full, full.size);
+    return 0;
+  });
+}
+
+int supertac_scale(const supertac_model* model, std::size_t count, const float* values, float* windows) {
+  return guarded(-1, [&] {
+    expect(model != nullptr && (count == 0 || (values != nullptr && windows != nullptr)),
+           "supertac_scale: a pointer is NULL");
+    const auto size = static_cast<std::size_t>(model->file.model->input_shape(1).size());
+    const Scaling& scaling = model->file.input.scaling;
+    for (std::size_t n = 0; n < count; ++n, values += size, windows += size) {
+      const std::span<float> window(windows, size);
+      if (values != windows) std::copy_n(values, size, windows);
+      scaling(window);
+      if (scaling.levelled) level(window, model->file.array().signals());
+    }
     return 0;
   });
 }

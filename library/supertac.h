@@ -62,8 +62,12 @@ SUPERTAC_API void supertac_close(supertac_model *model);
 /* 0, or -1. */
 SUPERTAC_API int supertac_describe(const supertac_model *model, supertac_description *description);
 
-/* Draws `count` windows [count][timesteps][signals], each as training had it (supertac_live_window), oldest frame
-   first.
+/* `count` windows [count][timesteps][signals] in the sensor's unit, already at the model's rate, as training had them:
+   scaled, and normalised where the model is. `windows` may be `values`. 0, or -1. */
+SUPERTAC_API int supertac_scale(const supertac_model *model, size_t count, const float *values, float *windows);
+
+/* Draws `count` windows [count][timesteps][signals], each as training had it (supertac_scale, supertac_live_window),
+   oldest frame first.
    pictures: [count][height][width], 0 is the flat plate and 1 its highest point.
    predicted_errors: the same shape, how far from the truth a pixel is expected to be; NULL where it is not wanted.
    threads: at least 1. A picture does not depend on it, nor on the windows beside its own.

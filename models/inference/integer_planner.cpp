@@ -90,7 +90,7 @@ IntegerPlanner::IntegerPlanner(const Network& network, const ActivationRanges& r
     release(i);
   }
   plan_->picture = number_of(drawn.picture), plan_->picture_shape = drawn.picture.shape();
-  if (drawn.predicted_error.defined()) plan_->predicted_error = number_of(drawn.spread);
+  if (drawn.predicted_error.defined()) plan_->predicted_error = number_of(drawn.predicted_error);
   if (drawn.latents.defined()) {
     plan_->latents = number_of(drawn.latents);
     plan_->latents_shape = drawn.latents.shape();

@@ -7,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "data/windows/levelling.h"
 #include "data/windows/live_window.h"
 #include "io/files/file.h"
 #include "io/numbers/random.h"
@@ -114,6 +115,20 @@ TEST_F(Library, DrawsFramesAsLiveWindowsDo) {
     ASSERT_TRUE(std::ranges::equal(picture, expected(input, SUPERTAC_INT8).picture.values()));
   }
   EXPECT_GT(drawn, 30);
+}
+
+TEST_F(Library, ScalesWindowsAsTrainingDid) {
+  const Model model(supertac_open(path_.c_str(), SUPERTAC_FP32));
+  Tensor values = windows(2);
+  for (real& v : values.values()) v = 2.45F - 0.4F * v;
+  std::vector<float> found(values.values().begin(), values.values().end()), expected(found);
+  ASSERT_EQ(supertac_scale(model.get(), 2, values.data(), found.data()), 0);
+  const std::size_t size = expected.size() / 2;
+  file_.input.scaling(expected);
+  for (std::size_t n = 0; n < 2; ++n) level(std::span(expected).subspan(n * size, size), 16);
+  EXPECT_EQ(found, expected);
+  ASSERT_EQ(supertac_scale(model.get(), 2, values.data(), values.data()), 0);
+  EXPECT_TRUE(std::ranges::equal(values.values(), expected));
 }
 
 TEST_F(Library, SaysWhatWasWrongToTheThreadThatAsked) {

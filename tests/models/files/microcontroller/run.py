@@ -138,7 +138,8 @@ def main():
     parser.add_argument("--data")
     parser.add_argument("--windows", type=int, default=1000)
     parser.add_argument("--frames", type=int, default=1200)
-    parser.add_argument("--csv")
+    parser.add_argument("--csv", help="adds a line for each part to this file")
+    parser.add_argument("--preset", default="tiny", help="for the table")
     args = parser.parse_args()
     if shutil.which("arm-none-eabi-gcc") is None or shutil.which("qemu-system-arm") is None:
         print("skipped: needs arm-none-eabi-gcc (gcc-arm-none-eabi, libnewlib-arm-none-eabi) and qemu-system-arm")
@@ -167,10 +168,15 @@ def main():
             print(f"{name}: {flash} bytes of flash, {code} of them code, {ram} of RAM with the history")
             rows.append(row)
     if args.csv:
-        with open(args.csv, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, rows[0].keys())
-            writer.writeheader()
-            writer.writerows(rows)
+        commit = subprocess.run(["git", "-C", HERE, "rev-parse", "--short=12", "HEAD"], check=True, capture_output=True,
+                                text=True).stdout.strip()
+        command = f"tests/models/files/microcontroller/run.py --windows {args.windows} --frames {args.frames}"
+        new = not os.path.exists(args.csv)
+        with open(args.csv, "a", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, ["preset", *rows[0].keys(), "command", "commit"], lineterminator="\n")
+            if new:
+                writer.writeheader()
+            writer.writerows({"preset": args.preset, **row, "command": command, "commit": commit} for row in rows)
     return 1 if wrong else 0
 
 
