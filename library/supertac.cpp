@@ -153,7 +153,7 @@ int supertac_scale(const supertac_model* model, std::size_t count, const float* 
   return guarded(-1, [&] {
     expect(model != nullptr && (count == 0 || (values != nullptr && windows != nullptr)),
            "supertac_scale: a pointer is NULL");
-    const auto size = static_cast<std::size_t>(model->file.model->input_shape(1).size());
+    const auto size = static_cast<std::size_t>(model->file.model->input_shape(1).elements());
     const Scaling& scaling = model->file.input.scaling;
     for (std::size_t n = 0; n < count; ++n, values += size, windows += size) {
       const std::span<float> window(windows, size);
@@ -175,8 +175,8 @@ int supertac_draw(const supertac_model* model, std::size_t count, const float* w
     const SuperTac& network = *model->file.model;
     expect(predicted_errors == nullptr || network.settings().predicted_error,
            "supertac_draw: the model predicts no error");
-    const auto window = static_cast<std::size_t>(network.input_shape(1).size());
-    const auto picture = static_cast<std::size_t>(network.picture_shape(1).size());
+    const auto window = static_cast<std::size_t>(network.input_shape(1).elements());
+    const auto picture = static_cast<std::size_t>(network.picture_shape(1).elements());
     expect(count <= std::numeric_limits<std::size_t>::max() / sizeof(float) / std::max(window, picture),
            "supertac_draw: more windows than memory can hold");
     const auto batches = static_cast<std::int64_t>((count + kBatch - 1) / kBatch);

@@ -7,7 +7,9 @@
     pictures = model.draw(volts).picture        # [N, height, width]
 """
 from .files import read, write
-from .model import Model, Pictures, load_model
+from .library import LiveWindow
+from .model import Model, Pictures, load_model, save_model
 from .recordings import Log, Recording, read_pictures, read_recording, windows
 
-__all__ = ["Log", "Model", "Pictures", "Recording", "load_model", "read", "read_pictures", "read_recording", "windows", "write"]
+__all__ = ["LiveWindow", "Log", "Model", "Pictures", "Recording", "load_model", "read", "read_pictures", "read_recording",
+           "save_model", "windows", "write"]

@@ -100,8 +100,10 @@ def expect(path, tensors, shapes):
     return found
 
 
-def write(path, tensors, metadata=None):
-    """Writes arrays by name, as a program of another maker would: without our checksum."""
+def write(path, tensors, metadata=None, checksum=False):
+    """Writes arrays by name; without our checksum, as a program of another maker would, or with it."""
+    if checksum:
+        metadata = {"checksum": "0" * 8, **(metadata or {}), "supertac_format": "1"}
     header, at = {} if metadata is None else {"__metadata__": metadata}, 0
     names = {np.dtype(text): name for name, text in TYPES.items()}
     for name, array in tensors.items():
@@ -110,4 +112,7 @@ def write(path, tensors, metadata=None):
     text = json.dumps(header, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 8)
     parts = [struct.pack("<Q", len(text)), text, *(array.tobytes() for array in tensors.values())]
-    pathlib.Path(path).write_bytes(b"".join(parts))
+    whole = b"".join(parts)
+    if checksum:
+        whole = whole.replace(b'"checksum":"00000000"', b'"checksum":"%08x"' % zlib.crc32(whole), 1)
+    pathlib.Path(path).write_bytes(whole)

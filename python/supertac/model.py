@@ -1,17 +1,20 @@
 """A model file and its forward pass in NumPy (docs/network.md has the layers)."""
 import collections
+import hashlib
 import json
 
 import numpy as np
 
-from . import recordings
-from .files import read
+from . import library, recordings
+from .files import read, write
 
 Pictures = collections.namedtuple("Pictures", "picture predicted_error latents")
 Pictures.__doc__ = "[N,height,width] each, predicted_error is None for a model without; latents [N,groups x latent]."
 
 # Of normalised windows (data/windows/normalise_window.h).
 BINS, LEAST_GAIN, REST_REMOVED, REST_SHARE, TOP_RANK = 256, np.float32(0.15), np.float32(0.5), 20, 3
+
+OWN = ("encoder.", "decoder.", "upsampler.")  # tensors of the network; others belong to what stands beside it
 
 
 def leaky_relu(x):
@@ -71,8 +74,8 @@ def groups_of(settings):
 class Model:
     """The tensors and settings of a model file."""
 
-    def __init__(self, tensors, metadata):
-        self.tensors, self.metadata = tensors, metadata
+    def __init__(self, tensors, metadata, path=None):
+        self.tensors, self.metadata, self.path, self._drawers = tensors, metadata, path, {}
         self.settings, self.input = json.loads(metadata["settings"]), json.loads(metadata["input"])
         self.groups = groups_of(self.settings)
         self.map = tuple(self.settings.get(name, 4) for name in ("rows", "columns"))
@@ -87,8 +90,17 @@ class Model:
         x = np.clip(share, 0, 1).astype(np.float32)
         return level(x) if self.input.get("levelled") else x
 
-    def draw(self, volts, batch=64):
-        """Pictures of windows [N,T,S] in volts."""
+    def drawer(self, precision="fp32", threads=1):
+        """The same network in the C library (library.py). Raises ValueError where it is not installed."""
+        if (precision, threads) not in self._drawers:
+            self._drawers[precision, threads] = library.Drawer(self.path, self.settings, precision, threads)
+        return self._drawers[precision, threads]
+
+    def draw(self, volts, batch=64, precision=None, threads=1):
+        """Pictures of windows [N,T,S] in volts. With a precision, "fp32" or "int8", the C library draws them, to the
+        bits of the programs and without latents; otherwise NumPy does."""
+        if precision is not None:
+            return Pictures(*self.drawer(precision, threads).draw(volts), None)
         parts = [self._draw(self.scale(volts[i : i + batch])) for i in range(0, len(volts), batch)]
         return Pictures(*(None if part[0] is None else np.concatenate(part) for part in zip(*parts)))
 
@@ -99,8 +111,7 @@ class Model:
         from .torch_model import SuperTac
 
         module = SuperTac(self.settings, self.input, self.groups)
-        own = ("encoder.", "decoder.", "upsampler.")
-        module.load_state_dict({name: torch.tensor(t) for name, t in self.tensors.items() if name.startswith(own)})
+        module.load_state_dict({name: torch.tensor(t) for name, t in self.tensors.items() if name.startswith(OWN)})
         return module
 
     def _of(self, name):
@@ -155,6 +166,21 @@ def load_model(path):
         raise ValueError(f"{path}: expected a model that supertac-train --data wrote, found "
                          + metadata.get("kind", metadata.get("format", "another file")))
     try:
-        return Model(tensors, metadata)
+        return Model(tensors, metadata, path)
     except (AttributeError, KeyError, TypeError) as problem:
         raise ValueError(f"{path}: its settings are not those of a model: {problem!r}") from None
+
+
+def save_model(path, module, parent):
+    """Writes a module of to_torch(), trained further, as a model file. `parent`: the Model that it came from, whose
+    settings it has, and which the provenance names by its content. Ranges for int8 and the alarm for signals unlike
+    training are left out: they were those of other weights."""
+    tensors = {name: np.ascontiguousarray(value.detach().cpu().numpy().astype(np.float32))
+               for name, value in module.state_dict().items()}
+    missing = {name for name in parent.tensors if name.startswith(OWN)} ^ set(tensors)
+    if missing:
+        raise ValueError(f"{path}: expected the tensors of the model that it came from, {sorted(missing)[0]} differs")
+    digest = hashlib.sha256(b"".join(t.tobytes() for t in parent.tensors.values())).hexdigest()
+    provenance = {"command": "supertac.save_model", "version": "0.2.0", "parents": {"model": digest}}
+    metadata = {key: value for key, value in parent.metadata.items() if key not in ("checksum", "supertac_format")}
+    write(path, tensors, metadata | {"provenance": json.dumps(provenance, separators=(",", ":"))}, checksum=True)

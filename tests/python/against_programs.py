@@ -9,6 +9,7 @@ to_torch() likewise; where onnxruntime is, what supertac-export writes.
 """
 import importlib
 import json
+import os
 import pathlib
 import subprocess
 import sys
@@ -33,6 +34,8 @@ def installed(name):
         return None
 
 
+LIBRARY = pathlib.Path(sys.argv[1]).parent / "library/libsupertac.so"
+os.environ.setdefault("SUPERTAC_LIBRARY", str(LIBRARY))
 torch, onnxruntime = installed("torch"), installed("onnxruntime")
 TOLERANCE = 1e-5
 WINDOWS = int(sys.argv[2]) if len(sys.argv) > 2 else 100
@@ -60,6 +63,35 @@ def check(name, ours, theirs):
     return difference <= TOLERANCE
 
 
+def same_bits(name, ours, theirs):
+    print(f"{name}: {len(theirs)}, {'the same bits' if np.array_equal(ours, theirs) else 'OTHER BITS'}")
+    return np.array_equal(ours, theirs)
+
+
+def live_pictures(model, recording):
+    live = supertac.LiveWindow(model, 1 / recording.period_s, float(recording.metadata.get("filter_s", 0)))
+    drawn = (live.push(*frame) for frame in zip(recording.time_s, recording.volts))
+    return np.array([picture for picture in drawn if picture is not None])
+
+
+def comes_back(name, model, data, folder):
+    """Five steps of training in PyTorch, saved: supertac-evaluate draws what the module draws."""
+    module, path, outputs = model.to_torch(), folder / "tuned.safetensors", folder / "tuned.outputs.safetensors"
+    volts = torch.tensor(model.windows(supertac.read_recording(sorted(data.glob("*.safetensors"))[0]))[1][:64])
+    adam = torch.optim.Adam(module.parameters(), 1e-3)
+    for _ in range(5):
+        adam.zero_grad()
+        (module(volts).picture ** 2).mean().backward()
+        adam.step()
+    supertac.save_model(path, module, model)
+    run("supertac-evaluate", "--model", path, "--data", data, "--split", "none", "--limit", 64, "--outputs", outputs,
+        "--quiet", "--force")
+    tensors = supertac.read(outputs)[0]
+    with torch.no_grad():
+        drawn = module.draw(torch.tensor(tensors["input"]))
+    return check(f"{name}, trained further and saved", drawn.picture, tensors["output"])
+
+
 def compare(folder, data, preset, recording):
     name, log = f"{preset} {data.name}", folder / f"{preset}{data.name}.log.safetensors"
     path = folder / f"{preset}{data.name}.safetensors"
@@ -73,7 +105,12 @@ def compare(folder, data, preset, recording):
     some = slice(None, None, max(1, len(times) // WINDOWS))
     drawn = model.draw(volts[some])
     good = check(f"{name}, NumPy", drawn.picture, seen.pictures[some])
+    if LIBRARY.exists():
+        good &= same_bits(f"{name}, C library", model.draw(volts[some], precision="fp32").picture, seen.pictures[some])
+        good &= same_bits(f"{name}, C library live", live_pictures(model, supertac.read_recording(recording)),
+                          seen.pictures)
     if torch is not None:
+        good &= comes_back(name, model, data, folder)
         module = model.to_torch().eval()
         with torch.no_grad():
             by_torch = module(torch.tensor(volts[some]))

@@ -1,0 +1,102 @@
+"""Draws with the C library (library/supertac.h), at the speed of the programs.
+
+It is looked for at the path in SUPERTAC_LIBRARY, then where the system keeps its libraries.
+"""
+import ctypes
+import ctypes.util
+import functools
+import os
+import pathlib
+
+import numpy as np
+
+PRECISIONS = {"fp32": 0, "int8": 1}
+POINTER, SIZE = ctypes.c_void_p, ctypes.c_size_t
+SIGNATURES = {  # result, arguments
+    "supertac_error": (ctypes.c_char_p, []),
+    "supertac_open_memory": (POINTER, [ctypes.c_char_p, SIZE, ctypes.c_int]),
+    "supertac_close": (None, [POINTER]),
+    "supertac_scale": (ctypes.c_int, [POINTER, SIZE, POINTER, POINTER]),
+    "supertac_draw": (ctypes.c_int, [POINTER, SIZE, POINTER, POINTER, POINTER, ctypes.c_int]),
+    "supertac_live_new": (POINTER, [POINTER, ctypes.c_double, ctypes.c_double]),
+    "supertac_live_free": (None, [POINTER]),
+    "supertac_live_push": (ctypes.c_int, [POINTER, ctypes.c_double, POINTER]),
+    "supertac_live_picture": (ctypes.c_int, [POINTER, POINTER, POINTER]),
+}
+
+
+@functools.cache
+def library():
+    """The C library. Raises ValueError where it is not installed."""
+    path = os.environ.get("SUPERTAC_LIBRARY") or ctypes.util.find_library("supertac")
+    if path is None:
+        raise ValueError("the C library is not installed: build SuperTac and set SUPERTAC_LIBRARY to libsupertac.so")
+    loaded = ctypes.CDLL(path)
+    for name, (result, arguments) in SIGNATURES.items():
+        function = getattr(loaded, name)
+        function.restype, function.argtypes = result, arguments
+    return loaded
+
+
+def checked(result, failed=-1):
+    """The result of a call. Raises ValueError with the library's own words when it failed."""
+    if result == failed:
+        raise ValueError(library().supertac_error().decode())
+    return result
+
+
+class Drawer:
+    """A model file's network, as the programs run it: windows [N,T,S] in the sensor's unit to pictures."""
+
+    def __init__(self, path, settings, precision="fp32", threads=1):
+        content = pathlib.Path(path).read_bytes()
+        self.model = checked(library().supertac_open_memory(content, len(content), PRECISIONS[precision]), None)
+        array = [settings.get(name, value) for name, value in (("rows", 4), ("columns", 4), ("in_channels", 1))]
+        self.window = settings["timesteps"], array[0] * array[1] * array[2]
+        self.picture = array[0] * settings["scale"], array[1] * settings["scale"]
+        self.predicts_error, self.threads = bool(settings.get("spread")), threads
+
+    def __del__(self):
+        if getattr(self, "model", None) is not None:
+            library().supertac_close(self.model)
+
+    def draw(self, values):
+        """Pictures and predicted errors [N,height,width]; these are None for a model without."""
+        windows = np.array(values, np.float32, order="C")
+        if windows.shape[1:] != self.window:
+            raise ValueError(f"windows are [N,{self.window[0]},{self.window[1]}], got {list(windows.shape)}")
+        pictures = np.empty((len(windows), *self.picture), np.float32)
+        errors = np.empty_like(pictures) if self.predicts_error else None
+        checked(library().supertac_scale(self.model, len(windows), windows.ctypes.data, windows.ctypes.data))
+        checked(library().supertac_draw(self.model, len(windows), windows.ctypes.data, pictures.ctypes.data,
+                                        None if errors is None else errors.ctypes.data, self.threads))
+        return pictures, errors
+
+
+class LiveWindow:
+    """Frames as a sensor gives them, in its unit; push() gives a picture for each as soon as a window is full.
+
+    live = supertac.LiveWindow(supertac.load_model("model.safetensors"), frame_hz=300)
+    for time_s, frame in sensor:
+        picture = live.push(time_s, frame)
+    """
+
+    def __init__(self, model, frame_hz, filter_s=0.0, precision="fp32"):
+        """filter_s: moving average that the frames have gone through already."""
+        self.drawer = model.drawer(precision)
+        self.live = checked(library().supertac_live_new(self.drawer.model, frame_hz, filter_s), None)
+        self.predicted_error = np.zeros(self.drawer.picture, np.float32)
+
+    def __del__(self):
+        if getattr(self, "live", None) is not None:
+            library().supertac_live_free(self.live)
+
+    def push(self, time_s, frame):
+        """The picture [height,width] that ends with this frame, or None; predicted_error is then its own."""
+        values = np.ascontiguousarray(frame, np.float32)
+        if values.size != self.drawer.window[1]:
+            raise ValueError(f"a frame has {self.drawer.window[1]} values, got {values.size}")
+        checked(library().supertac_live_push(self.live, time_s, values.ctypes.data))
+        picture = np.empty(self.drawer.picture, np.float32)
+        error = self.predicted_error.ctypes.data if self.drawer.predicts_error else None
+        return picture if checked(library().supertac_live_picture(self.live, picture.ctypes.data, error)) else None
