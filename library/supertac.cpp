@@ -14,8 +14,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "data/windows/levelling.h"
 #include "data/windows/live_window.h"
+#include "data/windows/normalise_window.h"
 #include "models/files/model_file.h"
 #include "models/inference/prepared.h"
 
@@ -159,7 +159,7 @@ int supertac_scale(const supertac_model* model, std::size_t count, const float* 
       const std::span<float> window(windows, size);
       if (values != windows) std::copy_n(values, size, windows);
       scaling(window);
-      if (scaling.levelled) level(window, model->file.array().signals());
+      if (scaling.per_window) normalise_window(window, model->file.array().signals());
     }
     return 0;
   });

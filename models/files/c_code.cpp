@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "c99_text.h"
-#include "data/windows/levelling.h"
+#include "data/windows/normalise_window.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 #include "models/inference/integer_plan.h"
@@ -200,7 +200,7 @@ std::string window_constants(const ModelFile& file, double sensor_hz) {
          define("RAW_FRAMES", filter > 0 ? frames(raw_span) : "0") +
          define("REST", number(w.scaling.rest_volts), "a sample is (REST - value) / SPAN, 0 to 1") +
          define("SPAN", number(w.scaling.span_volts)) +
-         define("NORMALISED", w.scaling.levelled ? "1" : "0",
+         define("NORMALISED", w.scaling.per_window ? "1" : "0",
                 "windows are brought to their own rest and gain") +
          define("LEAST_GAIN", number(kLeastGain) + "f") + define("REST_REMOVED", number(kRestRemoved) + "f") +
          define("REST_SHARE", text(kRestShare)) + define("TOP_RANK", text(kTopRank));

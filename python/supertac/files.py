@@ -114,5 +114,5 @@ def write(path, tensors, metadata=None, checksum=False):
     parts = [struct.pack("<Q", len(text)), text, *(array.tobytes() for array in tensors.values())]
     whole = b"".join(parts)
     if checksum:
-        whole = whole.replace(b'"checksum":"00000000"', b'"checksum":"%08x"' % zlib.crc32(whole), 1)
+        whole = whole.replace(b'"checksum":"00000000"', b'"checksum":"%08x"' % zlib.crc32(whole[8:]), 1)
     pathlib.Path(path).write_bytes(whole)

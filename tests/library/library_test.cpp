@@ -7,8 +7,8 @@
 #include <thread>
 #include <vector>
 
-#include "data/windows/levelling.h"
 #include "data/windows/live_window.h"
+#include "data/windows/normalise_window.h"
 #include "io/files/file.h"
 #include "io/numbers/random.h"
 #include "models/files/model_file.h"
@@ -28,8 +28,8 @@ class Library : public testing::Test {
     const SuperTac network(settings, rng);
     ActivationRanges ranges;
     ranges.add(network, uniform(network.input_shape(16), 5));
-    std::map<std::string, std::string> metadata =
-        model_metadata(network.settings(), {.rate_hz = 50, .scaling = {.levelled = true}, .filter_s = 0.05});
+    std::map<std::string, std::string> metadata = model_metadata(
+        network.settings(), {.rate_hz = 50, .scaling = {.per_window = true}, .filter_s = 0.05});
     write_checkpoint(path_, network.parameters(), metadata, {ranges.stored()});
     file_ = load_model(path_);
   }
@@ -125,7 +125,7 @@ TEST_F(Library, ScalesWindowsAsTrainingDid) {
   ASSERT_EQ(supertac_scale(model.get(), 2, values.data(), found.data()), 0);
   const std::size_t size = expected.size() / 2;
   file_.input.scaling(expected);
-  for (std::size_t n = 0; n < 2; ++n) level(std::span(expected).subspan(n * size, size), 16);
+  for (std::size_t n = 0; n < 2; ++n) normalise_window(std::span(expected).subspan(n * size, size), 16);
   EXPECT_EQ(found, expected);
   ASSERT_EQ(supertac_scale(model.get(), 2, values.data(), values.data()), 0);
   EXPECT_TRUE(std::ranges::equal(values.values(), expected));

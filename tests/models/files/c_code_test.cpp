@@ -93,10 +93,10 @@ TEST(CCode, DrawsWhatLiveWindowsDraw) {
   if (!has_compiler()) GTEST_SKIP() << "no C compiler";
   SuperTacSettings settings = tiny();
   settings.timesteps = 32;
-  for (const bool levelled : {false, true})
+  for (const bool per_window : {false, true})
     for (const double filter_s : {0.0, 0.05}) {
       const ModelFile file =
-          model_of(settings, {.rate_hz = 50, .scaling = {.levelled = levelled}, .filter_s = filter_s});
+          model_of(settings, {.rate_hz = 50, .scaling = {.per_window = per_window}, .filter_s = filter_s});
       constexpr double kHz = 120;
       const Compiled code(c_code_of(file, "finger", kHz, "a test"), "-O3 -march=native");
       const auto push = code.function<int(double, const float*)>("finger_push_at");
