@@ -1,5 +1,6 @@
 #include "models/files/onnx.h"
 
+#include <cmath>
 #include <set>
 #include <stdexcept>
 
@@ -25,8 +26,9 @@ class Exporter {
   using Id = const detail::Node*;
 
   std::string scaled(const ModelFile& file);
-  std::string levelled(const std::string& x, Dim timesteps);
-  std::string percentile(const std::string& x, const std::string& name, std::int64_t rank);
+  std::string levelled(const std::string& x, const Scaling& scaling, Dim timesteps);
+  void bin_edges(const Scaling& scaling);
+  std::string percentile(const Scaling& scaling, const std::string& name, std::int64_t rank);
   std::string network_input(const ModelFile& file);
 
   const std::string& of(const Variable& x) const { return names_.at(x.node()); }
@@ -62,7 +64,7 @@ std::string Exporter::numbers(const Ints& values) {
   return name;
 }
 
-// In single precision, since converters know no other; Scaling rounds once, from double.
+// In single precision, since converters know no other.
 std::string Exporter::scaled(const ModelFile& file) {
   const auto rest = static_cast<float>(file.input.scaling.rest_volts),
              span = static_cast<float>(file.input.scaling.span_volts);
@@ -71,28 +73,48 @@ std::string Exporter::scaled(const ModelFile& file) {
   return graph.node("Clip", {share, number(0), number(1)}, "scaled");
 }
 
-// Lower edge of the bin of 1/256 that holds the rank-th smallest sample of each signal, [N,1,signals]: the
-// highest edge below which fewer samples lie, bit by bit. Not by TopK, of which converters drop the output
-// that is not used.
-std::string Exporter::percentile(const std::string& x, const std::string& name, std::int64_t rank) {
-  constexpr std::int64_t kF32 = 1;
-  std::string low = number(0);
-  for (float step = 0.5F; step >= 1.0F / 256; step /= 2) {
-    const std::string bit = name + "_" + format(1 / step);
-    const std::string edge = graph.node("Add", {low, number(step)}, bit + "_edge");
-    const std::string below =
-        graph.node("Cast", {graph.node("Less", {x, edge}, bit + "_below")}, bit + "_ones", {{"to", kF32}});
-    const std::string count =
-        graph.node("ReduceSum", {below, numbers({1})}, bit + "_count", {{"keepdims", std::int64_t{1}}});
-    const std::string fewer = graph.node("Less", {count, number(static_cast<float>(rank))}, bit + "_fewer");
-    low = graph.node("Where", {fewer, edge, low}, bit + "_low");
+// For each bin of 1/256 the last volts, from pressed hard to not at all, that Scaling counts in it or in a
+// higher one: bins by comparison, which no rounding of the runtime's can change.
+void Exporter::bin_edges(const Scaling& scaling) {
+  const float away = scaling.span_volts > 0 ? HUGE_VALF : -HUGE_VALF;
+  std::vector<float> edges(256);
+  for (std::size_t bin = 0; bin < edges.size(); ++bin) {
+    const float least = static_cast<float>(bin) / 256;
+    float& v = edges[bin] =
+        static_cast<float>(scaling.rest_volts - scaling.span_volts * static_cast<double>(least));
+    while (bin > 0 && scaling(v) >= least) v = std::nextafter(v, away);
+    while (scaling(v) < least) v = std::nextafter(v, -away);
   }
-  return low;
+  const std::int64_t shape[] = {256};
+  graph.constant("bin_edges", shape, edges);
 }
 
-std::string Exporter::levelled(const std::string& x, Dim timesteps) {
-  const std::string rest = percentile(x, "rest", timesteps / Dim{kRestShare} + 1);
-  const std::string top = percentile(x, "top", timesteps + 1 - Dim{kTopRank});
+// Lower edge of the bin that holds the rank-th smallest sample of each signal, [N,1,signals]: the highest bin
+// below which fewer samples lie, bit by bit. Not by TopK, of which converters drop the output that is not
+// used.
+std::string Exporter::percentile(const Scaling& scaling, const std::string& name, std::int64_t rank) {
+  constexpr std::int64_t kF32 = 1, kI64 = 7;
+  std::string low = number(0);
+  for (int step = 128; step >= 1; step /= 2) {
+    const std::string bit = name + "_" + std::to_string(step);
+    const std::string bin = graph.node("Add", {low, number(static_cast<float>(step))}, bit + "_bin");
+    const std::string place = graph.node("Cast", {bin}, bit + "_place", {{"to", kI64}});
+    const std::string edge = graph.node("Gather", {"bin_edges", place}, bit + "_edge");
+    const std::string less =
+        graph.node(scaling.span_volts > 0 ? "Greater" : "Less", {"volts", edge}, bit + "_below");
+    const std::string ones = graph.node("Cast", {less}, bit + "_ones", {{"to", kF32}});
+    const std::string count =
+        graph.node("ReduceSum", {ones, numbers({1})}, bit + "_count", {{"keepdims", std::int64_t{1}}});
+    const std::string fewer = graph.node("Less", {count, number(static_cast<float>(rank))}, bit + "_fewer");
+    low = graph.node("Where", {fewer, bin, low}, bit + "_low");
+  }
+  return graph.node("Mul", {low, number(1.0F / 256)}, name);
+}
+
+std::string Exporter::levelled(const std::string& x, const Scaling& scaling, Dim timesteps) {
+  bin_edges(scaling);
+  const std::string rest = percentile(scaling, "rest", timesteps / Dim{kRestShare} + 1);
+  const std::string top = percentile(scaling, "top", timesteps + 1 - Dim{kTopRank});
   const std::string removed = graph.node("Mul", {rest, number(kRestRemoved)}, "rest_removed");
   const std::string most = graph.node("ReduceMax", {graph.node("Sub", {top, removed}, "swing")},
                                       "largest_swing", {{"axes", Ints{2}}, {"keepdims", std::int64_t{1}}});
@@ -111,7 +133,11 @@ std::string Exporter::network_input(const ModelFile& file) {
         "volts", {any, s.timesteps, s.signals()},
         "Volts of every signal, oldest sample first; taxel k lies in row k / columns, column k % columns.");
     const std::string x = scaled(file);
+<<<<<<< HEAD
     return file.input.scaling.per_window ? levelled(x, s.timesteps) : x;
+=======
+    return file.input.scaling.levelled ? levelled(x, file.input.scaling, s.timesteps) : x;
+>>>>>>> 487620d (ONNX: bins by their exact edges in volts, in single precision)
   }
   const FrameSettings& s = file.frame_model->settings();
   graph.input("frames", {any, s.in_channels, s.height, s.width}, "Frames in the sensor's numbers.");
