@@ -8,7 +8,7 @@ onnxruntime is not installed. With the package onnx its checker looks at every f
 import pathlib
 import sys
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "python"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "python"))
 try:
     import numpy as np
     import onnxruntime
