@@ -133,11 +133,7 @@ std::string Exporter::network_input(const ModelFile& file) {
         "volts", {any, s.timesteps, s.signals()},
         "Volts of every signal, oldest sample first; taxel k lies in row k / columns, column k % columns.");
     const std::string x = scaled(file);
-<<<<<<< HEAD
-    return file.input.scaling.per_window ? levelled(x, s.timesteps) : x;
-=======
-    return file.input.scaling.levelled ? levelled(x, file.input.scaling, s.timesteps) : x;
->>>>>>> 487620d (ONNX: bins by their exact edges in volts, in single precision)
+    return file.input.scaling.per_window ? levelled(x, file.input.scaling, s.timesteps) : x;
   }
   const FrameSettings& s = file.frame_model->settings();
   graph.input("frames", {any, s.in_channels, s.height, s.width}, "Frames in the sensor's numbers.");
