@@ -20,16 +20,18 @@ namespace {
 std::string source_of(const Arguments& a) {
   std::string source;
   int sources = 0;
-  for (const char* name : {"board", "replay", "recording"}) {
+  for (const char* name : {"sensor", "board", "replay", "recording"}) {
     if (!a.given(name)) continue;
     source = std::string(name) + " " + a.text(name);
     ++sources;
   }
   if (sources != 1) {
-    throw UsageError("expected one of --board PORT, --replay JOURNAL and --recording FILE, found " +
-                     std::to_string(sources));
+    throw UsageError(
+        "expected one of --sensor FILE, --board PORT, --replay JOURNAL and --recording FILE, found " +
+        std::to_string(sources));
   }
   if (a.text("out") == "-" && a.text("json") == "-") throw UsageError("--out and --json: only one to stdout");
+  if (a.given("plate") && !a.given("record")) throw UsageError("--plate: only with --record");
   if (a.given("capture") && !a.given("board")) throw UsageError("--capture: only with --board");
   return source;
 }
@@ -37,6 +39,7 @@ std::string source_of(const Arguments& a) {
 std::unique_ptr<SensorSource> open_source(const Arguments& a, double speedup) {
   if (a.given("replay")) return open_replay(a.text("replay"));
   if (a.given("recording")) return open_recording(a.text("recording"));
+  if (a.given("sensor")) return open_sensor(read_sensor(a.text("sensor")), speedup);
   const std::string capture = a.text("capture");
   return open_board(a.text("board"), speedup, capture);
 }
@@ -45,6 +48,7 @@ std::unique_ptr<SensorSource> open_source(const Arguments& a, double speedup) {
 std::string badge_of(const Arguments& a) {
   if (a.given("replay")) return "replay";
   if (a.given("recording")) return "recording";
+  if (a.given("sensor")) return "sensor";
   std::error_code error;
   const std::string device = std::filesystem::canonical(a.text("board"), error).string();
   return device.starts_with("/dev/pts/") ? "virtual rig" : "board";
@@ -53,8 +57,10 @@ std::string badge_of(const Arguments& a) {
 }  // namespace
 
 void declare(Arguments& a) {
-  a.option("model", "FILE,...", "model of supertac-train; of several as supertac-evaluate")
-      .option("board", "PORT", "port of the tactile board; auto finds it by its USB number")
+  a.option("model", "FILE,...",
+           "model of supertac-train; of several as supertac-evaluate; without one the array itself is shown")
+      .option("sensor", "FILE", "the sensor that this file describes (docs/sensors.md), or 'rig'")
+      .option("board", "PORT", "port of the rig's tactile board; auto finds it by its USB number")
       .option("replay", "JOURNAL",
               "the raw bytes of --capture, or of a supertac-collect run, instead of a board")
       .option("recording", "FILE", "a recording instead of a board")
@@ -62,6 +68,8 @@ void declare(Arguments& a) {
       .option("out", "FILE",
               "keep time, voltages and picture of every frame (safetensors, 2.2 MB/s at 16x16); '-': a line "
               "of JSON for each on stdout")
+      .option("record", "DIR", "keep the signals as a recording in this folder, the next pass of its plate")
+      .option("plate", "NAME", "what the recording slides over", "unknown")
       .option("udp", "HOST:PORT",
               "send a datagram of JSON for each picture, e.g. to PlotJuggler at 127.0.0.1:9870")
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
@@ -70,8 +78,35 @@ void declare(Arguments& a) {
       .option("precision", "NAME", "fp32, or int8: faster on processors with AVX-512 VNNI, slower on others",
               "fp32")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
+      .flag("probe",
+            "listen to --sensor FILE, or to an address such as serial:/dev/ttyACM0@115200, udp::PORT, "
+            "tcp:HOST:PORT, for --seconds (5), say what comes, and write a sensor's file to --out")
       .flag("list-ports", "list the serial ports and end");
   declare_web(a);
+}
+
+/// Says what a port sends; --sensor names a sensor's file, or an address alone.
+int probe_port(const Arguments& a) {
+  const std::string& named = a.text("sensor");
+  std::error_code error;
+  const bool described = named == "rig" || std::filesystem::is_regular_file(named, error);
+  Sensor sensor;
+  if (described) sensor = read_sensor(named);
+  if (!described) sensor.port = named;
+  const double seconds = a.given("seconds") ? a.number("seconds", 0.1, 3600) : 5;
+  a.note("listening for " + format(seconds) + " s: press here and there, and let go");
+  const ProbeReport report = listen(sensor, described, seconds);
+  for (const std::string& line : report.says) a.print(line);
+  if (!report.draft) throw std::runtime_error(sensor.port + ": no frames of a sensor were found");
+  Sensor draft = *report.draft;
+  if (described) draft.name = sensor.name, draft.array = sensor.array;
+  if (a.given("out")) {
+    write_sensor(a.output("out"), draft);
+  } else {
+    a.print(json_of(draft).dump(2));
+  }
+  a.write_json({{"says", report.says}, {"draft", json_of(draft)}});
+  return kExitOk;
 }
 
 int run(Arguments& a) {
@@ -79,25 +114,37 @@ int run(Arguments& a) {
     print_ports(a);
     return kExitOk;
   }
+  if (a.flag("probe")) {
+    if (!a.given("sensor"))
+      throw UsageError("--probe: expected --sensor with a file or an address, found none");
+    return probe_port(a);
+  }
   const double begin = monotonic_seconds();
-  if (!a.given("model")) throw UsageError("--model: expected a file of supertac-train, found none");
   const double speedup = a.number("speedup", 0.1, 100);
   StreamSettings settings{.out = a.output("out"),
                           .precision = precision_of(a.choice("precision", {"fp32", "int8"})),
                           .classifier = a.text("classifier"),
+                          .record = a.text("record"),
+                          .plate = a.text("plate"),
                           .udp = a.text("udp"),
                           .view = !a.quiet() && drawable_terminal()};
   if (a.given("seconds")) settings.seconds = a.number("seconds", 0.001, 1e9);
   const std::string origin = source_of(a);
   settings.web = web_address(a);
   settings.badge = badge_of(a), settings.source = origin;
+  const bool drawn = a.given("model");
+  if (!drawn && a.given("classifier"))
+    throw UsageError("--classifier: only with --model, whose pictures it names");
   settings.metadata = {{"kind", "pictures"}, {"model", a.text("model")}, {"source", origin}};
-  const std::vector<ModelFile> models = load_models(a.list("model"));
-  add_model_parents(a.list("model"));
+  std::vector<ModelFile> models;
+  if (drawn) models = load_models(a.list("model"));
+  if (drawn) add_model_parents(a.list("model"));
   const auto source = open_source(a, speedup);
   Stream stream(settings, models, *source);
   const double ready_ms = 1e3 * (monotonic_seconds() - begin);
-  a.note("ready: " + origin + "; a picture needs " + format(stream.window_s(), 2) + " s of signal");
+  a.note(
+      "ready: " + origin +
+      (drawn ? "; a picture needs " + format(stream.window_s(), 2) + " s of signal" : "; the array itself"));
   if (!stream.url().empty()) a.note("live page: " + stream.url());
   std::exception_ptr error;
   try {
@@ -114,6 +161,8 @@ int run(Arguments& a) {
   result.update(stream.result());
   a.write_json(result);
   if (error) std::rethrow_exception(error);
+  if (stream.pictures() == 0 && !interrupted() && !drawn)
+    throw std::runtime_error(origin + ": no frame came; supertac-stream --probe says what does");
   if (stream.pictures() == 0 && !interrupted()) {
     throw std::runtime_error(origin + ": no picture, expected " + format(stream.window_s(), 2) +
                              " s of signal without a gap of 0.05 s; stream for longer");

@@ -43,7 +43,7 @@ std::string picture_line(const Seen& seen, bool unlike_training) {
   std::string line =
       "{\"timestamp\":" + format(seen.time_s, 6) + ",\"number\":" + std::to_string(seen.number);
   append(line, "volts", seen.volts);
-  append(line, "picture", seen.picture);
+  if (!seen.picture.empty()) append(line, "picture", seen.picture);
   if (!seen.half_widths.empty()) {
     double sum = 0;
     for (const float half : seen.half_widths) sum += static_cast<double>(half);

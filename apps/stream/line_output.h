@@ -12,9 +12,9 @@
 namespace supertac {
 
 /// {"timestamp":s,"number":n,"volts":[...],"picture":[...]} with the numbers of Seen, four decimals of volts
-/// and pictures, and a line feed; of a model that says how sure it is also "half_width", the mean over the
-/// pixels, "distance" and "unlike_training", 0 or 1. PlotJuggler (JSON over UDP, field
-/// "timestamp" as time) makes a curve of every number.
+/// and pictures, and a line feed; without a model no "picture"; of one that says how sure it is also
+/// "half_width", the mean over the pixels, "distance" and "unlike_training", 0 or 1.
+/// PlotJuggler (JSON over UDP, field "timestamp" as time) makes a curve of every number.
 std::string picture_line(const Seen& seen, bool unlike_training);
 
 /// Sends each line as a datagram; one that does not fit into the socket's buffer is lost.

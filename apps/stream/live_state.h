@@ -17,6 +17,8 @@ struct LiveState {
   std::uint64_t number = 0;        ///< of the picture, as Seen
   double time_s = 0;               ///
   std::vector<float> taxels;       ///< [rows][columns] in [0,1]; empty before the first
+  double top = 0;                  ///< without a model: what 1 is, in the sensor's unit
+  std::string unit;                ///< of top
   std::vector<float> picture;      ///< [rows * scale][columns * scale]; empty before the first
   std::vector<float> half_widths;  ///< the same, as Seen
   std::optional<double> distance;  ///

@@ -18,7 +18,7 @@ PictureLog::PictureLog(OutputPath output, const PictureFormat& format)
   refuse_existing(output_.path, !output_.when_taken);
   times_ = open_spool();
   volts_ = open_spool();
-  pictures_ = open_spool();
+  if (format.image.pixels() > 0) pictures_ = open_spool();
   if (format.half_widths) half_widths_ = open_spool();
   if (format.distance) distances_ = open_spool();
 }
@@ -46,7 +46,7 @@ void PictureLog::append(const Spool& spool, std::span<const std::byte> bytes) {
 void PictureLog::add(const Seen& seen) {
   append(times_, std::as_bytes(std::span(&seen.time_s, 1)));
   append(volts_, std::as_bytes(seen.volts));
-  append(pictures_, std::as_bytes(seen.picture));
+  if (pictures_) append(pictures_, std::as_bytes(seen.picture));
   if (half_widths_) append(half_widths_, std::as_bytes(seen.half_widths));
   const auto distance = static_cast<float>(seen.distance.value_or(0));
   if (distances_) append(distances_, std::as_bytes(std::span(&distance, 1)));
@@ -69,8 +69,8 @@ void PictureLog::write(const std::map<std::string, std::string>& metadata) {
   const auto height = static_cast<std::uint64_t>(format_.image.height),
              width = static_cast<std::uint64_t>(format_.image.width);
   std::vector<TensorToWrite> tensors = {{"time_s", "F64", {count_}, {}, from(times_)},
-                                        {"volts", "F32", {count_, format_.signals}, {}, from(volts_)},
-                                        {"pictures", "F32", {count_, height, width}, {}, from(pictures_)}};
+                                        {"volts", "F32", {count_, format_.signals}, {}, from(volts_)}};
+  if (pictures_) tensors.push_back({"pictures", "F32", {count_, height, width}, {}, from(pictures_)});
   if (half_widths_)
     tensors.push_back({"half_widths", "F32", {count_, height, width}, {}, from(half_widths_)});
   if (distances_) tensors.push_back({"distances", "F32", {count_}, {}, from(distances_)});

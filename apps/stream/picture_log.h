@@ -11,11 +11,12 @@
 
 namespace supertac {
 
-/// Keeps pictures for a safetensors file of tensors time_s F64 [n], volts F32 [n,signals] and pictures F32
-/// [n,height,width]; of a model that says how sure it is also half_widths F32 [n,height,width], of its
-/// pixels' 90 % intervals, and distances F32 [n] from its training.
-/// How many there will be is not known before the end, and they do not fit into memory (1 MB/s): they wait in
-/// nameless temporary files beside the final one.
+/// Keeps the signals of a stream, or its pictures, for a safetensors file. Signals alone make a recording
+/// (data/recordings/recording.h): time_s and volts. With pictures it has tensors time_s F64 [n], volts F32
+/// [n,signals] and pictures F32 [n,height,width]; of a model that says how sure it is also half_widths F32
+/// [n,height,width], of its pixels' 90 % intervals, and distances F32 [n] from its training. How many there
+/// will be is not known before the end, and they do not fit into memory (1 MB/s): they wait in nameless
+/// temporary files beside the final one.
 class PictureLog {
  public:
   /// Throws FileError when the file cannot be made there, or exists and is not to be replaced.

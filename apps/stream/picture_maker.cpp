@@ -41,6 +41,7 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
       window_(window_settings(model_, source)),
       input_(network_.first().input_shape(1)),
       output_(network_.estimate(input_)),  // the first run takes memory and chooses kernels
+      source_scale_(source.signal_scale()),
       period_s_(source.period_s()),
       interval_factor_(model_.interval_factor()) {
   features_.resize(signal_feature_count(model_.array()));
@@ -56,10 +57,13 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
 void PictureMaker::push(const SensorFrame& frame) {
   const double share = std::min(1.0, period_s_ / kRestS);
   resting_.resize(frame.volts.size()), move_.resize(frame.volts.size());
-  for (std::size_t s = 0; s < resting_.size(); ++s)
-    if (std::isfinite(frame.volts[s]))
-      resting_[s] += (volts_.empty() ? 1 : share) * (static_cast<double>(frame.volts[s]) - resting_[s]);
+  const bool first = volts_.empty();
   volts_.assign(frame.volts.begin(), frame.volts.end());
+  if (const SignalScale& own = model_.input.signal_scale; source_scale_ != own)
+    for (float& value : volts_) value = static_cast<float>(source_scale_.in(own, double{value}));
+  for (std::size_t s = 0; s < resting_.size(); ++s)
+    if (std::isfinite(volts_[s]))
+      resting_[s] += (first ? 1 : share) * (static_cast<double>(volts_[s]) - resting_[s]);
   for (std::size_t s = 0; s < volts_.size(); ++s) volts_[s] += move_[s];
   window_.push(frame.time_s, volts_);
 }

@@ -14,9 +14,10 @@ namespace supertac {
 /// Frames in, pictures out: the signal path the model was trained behind, then the model. Used by one thread.
 class PictureMaker {
  public:
-  /// For the frames of this source. The `models` are averaged and must outlive this. Throws
-  /// std::runtime_error when they were trained on another array, or behind another moving average than the
-  /// frames have gone through, which cannot be taken back.
+  /// For the frames of this source, which may speak another unit or polarity than the model's recordings.
+  /// The `models` are averaged and must outlive this. Throws std::runtime_error when they were trained on
+  /// another array, or behind another moving average than the frames have gone through, which cannot be taken
+  /// back.
   PictureMaker(std::span<const ModelFile> models, const SensorSource& source,
                Precision precision = Precision::fp32);
 
@@ -51,6 +52,7 @@ class PictureMaker {
   Tensor input_;
   Estimate output_;
   std::vector<float> features_;
+  SignalScale source_scale_;
   double period_s_, interval_factor_;
   std::vector<float> half_widths_;
   std::optional<double> distance_;

@@ -9,13 +9,13 @@
 namespace supertac {
 namespace {
 
-std::string name_of_now() {
+std::string name_of_now(const char* kind) {
   const std::time_t now = std::time(nullptr);
   std::tm local{};
   localtime_r(&now, &local);
   char text[64];
-  const std::size_t size = std::strftime(text, sizeof text, "pictures_%Y%m%d_%H%M%S.safetensors", &local);
-  return {text, size};
+  const std::size_t size = std::strftime(text, sizeof text, "_%Y%m%d_%H%M%S.safetensors", &local);
+  return kind + std::string(text, size);
 }
 
 }  // namespace
@@ -26,7 +26,7 @@ Recorder::~Recorder() {
 }
 
 std::string Recorder::start() {
-  const std::string name = name_of_now();
+  const std::string name = name_of_now(format_.image.pixels() > 0 ? "pictures" : "recording");
   try {
     // Two recordings may begin within a second.
     const OutputPath output(name, [this](const std::string& line) { taken_ = line; });

@@ -14,8 +14,8 @@
 
 namespace supertac {
 
-/// Picture logs in the current folder, started and stopped from one thread and fed from another, which never
-/// waits for a file to be completed.
+/// Logs of pictures, or of signals where there are none, in the current folder, started and stopped from one
+/// thread and fed from another, which never waits for a file to be completed.
 class Recorder {
  public:
   Recorder(const PictureFormat& format, std::map<std::string, std::string> metadata)

@@ -8,7 +8,7 @@
 
 namespace supertac {
 
-/// What the pictures of a stream hold.
+/// What the pictures of a stream hold; without pixels there are none, only signals.
 struct PictureFormat {
   std::size_t signals = 0;  ///< in a frame
   ImageGrid image;

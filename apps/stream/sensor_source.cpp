@@ -5,12 +5,13 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "apps/common/running/signals.h"
+#include "hardware/boards/sensor_reader.h"
 #include "hardware/collection/capture.h"
 #include "hardware/ports/errors.h"
 #include "hardware/ports/port_list.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
-#include "io/numbers/median.h"
 
 namespace supertac {
 namespace {
@@ -82,18 +83,42 @@ class ReplaySource : public SensorSource {
   bool ended_ = false;
 };
 
-// Not the mean: lost frames leave a gap.
-double median_period(const Recording& recording) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < recording.frames(); ++i)
-    steps.push_back(recording.time_s[i] - recording.time_s[i - 1]);
-  return median(steps);
-}
+class ReaderSource : public SensorSource {
+ public:
+  ReaderSource(OpenedPort opened, const Sensor& sensor)
+      : SensorSource(1 / sensor.rate_hz, 0, opened.live, sensor.array, sensor.scale, sensor.silent()),
+        reader_(std::move(opened), sensor) {}
+
+  std::optional<SensorFrame> next(double wait_s) override {
+    auto frame = reader_.next(wait_s);
+    if (!frame) return std::nullopt;
+    frame_ = std::move(*frame);
+    return SensorFrame{frame_.time_s, frame_.signals, frame_.arrival_s};
+  }
+  bool ended() const override { return reader_.ended(); }
+  BoardCounters counters() override {
+    const ReaderCounters counted = reader_.counters();
+    BoardCounters counters;
+    counters.decoder.bytes = counted.decoder.bytes, counters.decoder.frames = counted.decoder.frames;
+    counters.decoder.discarded_bytes = counted.decoder.discarded_bytes;
+    counters.dropped = counted.dropped;
+    counters.missing = counted.missing;
+    counters.suspect = counted.decoder.torn + counted.damaged + counted.late;
+    counters.clock.period_s = counted.period_s;
+    return counters;
+  }
+  void finish() override { reader_.stop(); }
+
+ private:
+  ReadFrame frame_;
+  SensorReader reader_;
+};
 
 class RecordingSource : public SensorSource {
  public:
   explicit RecordingSource(Recording recording)
-      : SensorSource(median_period(recording), recording.filter_s(), false, recording.array),
+      : SensorSource(recording.period_s(), recording.filter_s(), false, recording.array,
+                     recording.signal_scale),
         recording_(std::move(recording)) {}
 
   std::optional<SensorFrame> next(double) override {
@@ -129,6 +154,34 @@ std::unique_ptr<SensorSource> open_board(const std::string& port, double speedup
   const std::string name = std::filesystem::exists(capture, error) ? capture + ".new" : capture;
   auto journal = capture.empty() ? nullptr : std::make_unique<JournalWriter>(name, kCaptureHeader);
   return std::make_unique<BoardSource>(std::move(serial), std::move(journal), capture, speedup);
+}
+
+ProbeReport listen(const Sensor& sensor, bool known_array, double seconds) {
+  constexpr std::size_t kMostBytes = std::size_t{16} << 20;
+  const OpenedPort opened = open_port(sensor.port);
+  std::vector<Heard> heard;
+  std::vector<std::byte> buffer(65536);
+  std::size_t bytes = 0;
+  const double until = opened.port->now() + seconds;
+  try {
+    while (!interrupted() && opened.port->now() < until && bytes < kMostBytes) {
+      const Received got = opened.port->read(buffer, std::min(until, opened.port->now() + 0.05));
+      if (got.count == 0) continue;
+      heard.push_back({got.time_s, {reinterpret_cast<const char*>(buffer.data()), got.count}});
+      bytes += got.count;
+    }
+  } catch (const PortUnplugged&) {  // what came until then is what there is
+  }
+  return probe(heard, sensor.port, known_array ? std::optional(sensor.array) : std::nullopt);
+}
+
+std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup) {
+  constexpr std::string_view kSerial = "serial:";
+  if (sensor.frame.kind == FrameKind::board && sensor.port.starts_with(kSerial))
+    return open_board(sensor.port.substr(kSerial.size(), sensor.port.rfind('@') - kSerial.size()), speedup,
+                      "");
+  const bool lines = sensor.frame.kind == FrameKind::text || sensor.frame.kind == FrameKind::json;
+  return std::make_unique<ReaderSource>(open_port(sensor.port, lines, speedup), sensor);
 }
 
 std::unique_ptr<SensorSource> open_replay(const std::string& journal) {

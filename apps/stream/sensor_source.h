@@ -1,5 +1,4 @@
-// Where the frames come from: a board, the raw capture of one, or a recording. Board and capture go through
-// the same driver.
+// Where the frames come from: a sensor, the raw capture of the rig's board, or a recording.
 #pragma once
 
 #include <cmath>
@@ -9,13 +8,14 @@
 #include <string>
 
 #include "data/recordings/recording.h"
+#include "hardware/boards/probe.h"
 #include "hardware/boards/tactile_board.h"
 
 namespace supertac {
 
 struct SensorFrame {
   double time_s = 0;             ///< of the sensor, from any zero
-  std::span<const float> volts;  ///< valid until the next call
+  std::span<const float> volts;  ///< in the unit of signal_scale(); valid until the next call
   double arrived_s = 0;          ///< on this computer's clock (monotonic_seconds)
   float x_mm = NAN, y_mm = NAN;  ///< of the finger's centre on the plate, where known
 };
@@ -34,18 +34,34 @@ class SensorSource {
   double period_s() const { return period_s_; }  ///< between two frames
   double filter_s() const { return filter_s_; }  ///< moving average the frames have gone through already
   const TaxelArray& array() const { return array_; }
+  const SignalScale& signal_scale() const { return signal_scale_; }
+  /// Taxels that say nothing: their signals are made of those around them.
+  const std::vector<int>& silent() const { return silent_; }
   /// It waits for nobody: when frames are not taken in time they are lost.
   bool live() const { return live_; }
 
  protected:
-  SensorSource(double period_s, double filter_s, bool live, const TaxelArray& array = {})
-      : period_s_(period_s), filter_s_(filter_s), live_(live), array_(array) {}
+  SensorSource(double period_s, double filter_s, bool live, const TaxelArray& array = {},
+               const SignalScale& signal_scale = {}, std::vector<int> silent = {})
+      : period_s_(period_s),
+        filter_s_(filter_s),
+        live_(live),
+        array_(array),
+        signal_scale_(signal_scale),
+        silent_(std::move(silent)) {}
 
  private:
   double period_s_, filter_s_;
   bool live_;
   TaxelArray array_;
+  SignalScale signal_scale_;
+  std::vector<int> silent_;
 };
+
+/// What its port sends within `seconds`, and a draft that reads it. Throws as open_port().
+ProbeReport listen(const Sensor& sensor, bool known_array, double seconds);
+/// Any sensor at its port. Throws as open_port().
+std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup);
 
 /// The board at `port` ("auto" finds it). With `capture` every byte also goes to a journal of that path.
 std::unique_ptr<SensorSource> open_board(const std::string& port, double speedup, const std::string& capture);

@@ -3,11 +3,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "apps/common/running/signals.h"
 #include "hardware/ports/serial_port.h"
+#include "io/files/file.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
@@ -25,11 +28,18 @@ bool has_texture(std::span<const float> picture) {
 Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models, SensorSource& source)
     : settings_(settings),
       source_(source),
-      maker_(models, source, settings.precision),
+      maker_(models.empty() ? nullptr : std::make_unique<PictureMaker>(models, source, settings.precision)),
+      raw_(source),
       figures_s_(monotonic_seconds()) {
   state_.array = source.array();
-  state_.scale = maker_.image().height / state_.array.rows;
-  const PictureFormat format = maker_.format();
+  state_.scale = maker_ ? maker_->image().height / state_.array.rows : 1;
+  state_.unit = source.signal_scale().unit;
+  const PictureFormat signals{.signals = source.array().signals(), .image = {0, 0}};
+  const PictureFormat format = maker_ ? maker_->format() : signals;
+  describe_recording();
+  // Two programs may record the same pass: both are kept.
+  const OutputPath record(record_path_, [this](const std::string& line) { record_remark_ = line; });
+  if (!settings.record.empty()) record_ = std::make_unique<PictureLog>(record, signals);
   if (settings.out.path == "-")
     pipe_ = std::make_unique<PipeOutput>(STDOUT_FILENO, !source.live());
   else if (!settings.out.path.empty())
@@ -37,7 +47,7 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   if (!settings.udp.empty()) udp_ = std::make_unique<UdpOutput>(settings.udp);
   if (!settings.classifier.empty()) {
     classifier_ = load_classifier(settings.classifier);
-    const ImageGrid image = maker_.image();
+    const ImageGrid image = maker_->image();
     if (classifier_->settings.height != image.height || classifier_->settings.width != image.width)
       throw std::runtime_error(settings.classifier + ": names pictures of " +
                                std::to_string(classifier_->settings.height) + "x" +
@@ -45,11 +55,29 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
                                image.text() + "; give a classifier that was trained with this model");
   }
   if (!settings.web) return;
-  recorder_ = std::make_unique<Recorder>(format, settings.metadata);
-  web_ = std::make_unique<WebView>(*settings.web,
-                                   WebSource{settings.badge, settings.source, source.array(), state_.scale,
-                                             format.half_widths, classifier_.has_value()},
-                                   *recorder_);
+  recorder_ = std::make_unique<Recorder>(format, maker_ ? settings.metadata : recording_);
+  web_ = std::make_unique<WebView>(
+      *settings.web,
+      WebSource{settings.badge, settings.source, source.array(), state_.scale, format.half_widths,
+                classifier_.has_value(), maker_ ? "" : state_.unit, source.silent()},
+      *recorder_);
+}
+
+// The next pass of this plate in the folder.
+void Stream::describe_recording() {
+  Recording about;
+  about.array = source_.array(), about.signal_scale = source_.signal_scale();
+  about.plate = settings_.plate, about.trial = 1, about.source = "streamed";
+  if (source_.filter_s() > 0) about.metadata["filter_s"] = format(source_.filter_s());
+  if (!source_.silent().empty()) about.metadata["silent_taxels"] = nlohmann::json(source_.silent()).dump();
+  about.metadata["origin"] = settings_.source;
+  if (!settings_.record.empty()) make_directories(settings_.record);
+  std::error_code error;
+  do {
+    ++about.pass;
+    record_path_ = settings_.record + "/" + recording_file_name(about);
+  } while (!settings_.record.empty() && std::filesystem::exists(record_path_, error));
+  recording_ = metadata_of(about);
 }
 
 void Stream::run() {
@@ -70,39 +98,43 @@ void Stream::finish() {
   lines_lost_ = (udp_ ? udp_->lost() : 0) + (pipe_ ? pipe_->lost() : 0);
   udp_.reset();
   pipe_.reset();
-  if (log_) log_->write(settings_.metadata);
+  if (log_) log_->write(maker_ ? settings_.metadata : recording_);
+  if (record_) record_->write(recording_);
   source_.finish();
 }
 
 std::string Stream::summary() const {
   const BoardCounters counters = source_.counters();
   return std::to_string(frames_) + " frames in " + format(last_s_ - first_s_, 1) + " s, " +
-         std::to_string(pictures()) + " pictures, latency median " + format(milliseconds(0.5), 2) +
-         " ms, p99 " + format(milliseconds(0.99), 2) + " ms; lost " + std::to_string(counters.missing) +
-         ", dropped " + std::to_string(dropped()) +
+         std::to_string(pictures()) + (maker_ ? " pictures" : " shown") + ", latency median " +
+         format(milliseconds(0.5), 2) + " ms, p99 " + format(milliseconds(0.99), 2) + " ms; lost " +
+         std::to_string(counters.missing) + ", dropped " + std::to_string(dropped()) +
          (lines_lost_ > 0 ? ", " + std::to_string(lines_lost_) + " lines not taken by their reader" : "") +
-         (unlike_ > 0 ? ", " + std::to_string(unlike_) + " pictures of signals unlike training" : "");
+         (unlike_ > 0 ? ", " + std::to_string(unlike_) + " pictures of signals unlike training" : "") +
+         (record_ ? "; recorded " + record_path_ : "") +
+         (record_remark_.empty() ? "" : "; " + record_remark_);
 }
 
 nlohmann::ordered_json Stream::result() const {
   const BoardCounters counters = source_.counters();
-  const LiveWindow::Counters& window = maker_.window().counters();
-  return {{"seconds", last_s_ - first_s_},
-          {"frames", frames_},
-          {"pictures", pictures()},
-          {"unlike_training", unlike_},
-          {"lost", counters.missing},
-          {"dropped", dropped()},
-          {"suspect", counters.suspect},
-          {"jumps", counters.jumps},
-          {"gaps", window.gaps},
-          {"lines_lost", lines_lost_},
-          {"board_period_us", 1e6 * counters.clock.period_s},
-          {"latency_ms",
-           {{"median", milliseconds(0.5)},
-            {"p99", milliseconds(0.99)},
-            {"p99.9", milliseconds(0.999)},
-            {"max", 1e3 * latency_.max()}}}};
+  nlohmann::ordered_json result = {{"seconds", last_s_ - first_s_},
+                                   {"frames", frames_},
+                                   {"pictures", pictures()},
+                                   {"unlike_training", unlike_},
+                                   {"lost", counters.missing},
+                                   {"dropped", dropped()},
+                                   {"suspect", counters.suspect},
+                                   {"jumps", counters.jumps},
+                                   {"gaps", maker_ ? maker_->window().counters().gaps : 0},
+                                   {"lines_lost", lines_lost_},
+                                   {"board_period_us", 1e6 * counters.clock.period_s},
+                                   {"latency_ms",
+                                    {{"median", milliseconds(0.5)},
+                                     {"p99", milliseconds(0.99)},
+                                     {"p99.9", milliseconds(0.999)},
+                                     {"max", 1e3 * latency_.max()}}}};
+  if (record_) result["recording"] = record_remark_.empty() ? record_path_ : record_remark_;
+  return result;
 }
 
 // False when the time is over.
@@ -112,31 +144,52 @@ bool Stream::take(SensorFrame frame) {
   if ((view_ || web_ || udp_) && !source_.live()) frame.arrived_s = keep_pace(frame.time_s);
   ++frames_;
   last_s_ = frame.time_s;
-  if (web_ && web_->take_rezero()) maker_.rezero();
-  maker_.push(frame);
+  const bool rezero = web_ && web_->take_rezero();
+  raw_.push(frame.volts);
+  if (rezero) raw_.rezero();
+  if (rezero && maker_) maker_->rezero();
+  if (record_ || !maker_) keep_raw(frame);
+  if (!maker_) return true;
+  maker_->push(frame);
   if (source_.live() && monotonic_seconds() - frame.arrived_s > kMostLateS) {
     ++too_late_;
     return true;
   }
-  const std::span<const float> picture = maker_.picture();
+  const std::span<const float> picture = maker_->picture();
   if (picture.empty()) return true;
   latency_.add(monotonic_seconds() - frame.arrived_s);
   keep(frame, picture);
   return true;
 }
 
-void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
-  const Seen seen{pictures() - 1, frame.time_s - first_s_, maker_.volts(),
-                  picture,        maker_.half_widths(),    maker_.distance()};
+// A frame with a signal that is no number has no place in a recording.
+void Stream::keep_raw(const SensorFrame& frame) {
+  if (!std::ranges::all_of(frame.volts, [](float v) { return std::isfinite(v); })) return;
+  Seen seen;
+  seen.number = frames_ - 1, seen.time_s = frame.time_s - first_s_, seen.volts = frame.volts;
+  if (record_) record_->add(seen);
+  if (maker_) return;
+  latency_.add(monotonic_seconds() - frame.arrived_s);
+  output(seen);
+  state_.number = seen.number, state_.time_s = seen.time_s;
+  state_.x_mm = frame.x_mm, state_.y_mm = frame.y_mm;
+}
+
+void Stream::output(const Seen& seen) {
   if (log_) log_->add(seen);
   if (recorder_) recorder_->add(seen);
-  if (udp_ || pipe_) {
-    std::string line = picture_line(seen, maker_.unlike_training());
-    if (udp_) udp_->send(line);
-    if (pipe_) pipe_->send(std::move(line));
-  }
+  if (!udp_ && !pipe_) return;
+  std::string line = picture_line(seen, state_.unlike_training);
+  if (udp_) udp_->send(line);
+  if (pipe_) pipe_->send(std::move(line));
+}
+
+void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
+  const Seen seen{pictures() - 1, frame.time_s - first_s_, maker_->volts(),
+                  picture,        maker_->half_widths(),   maker_->distance()};
+  state_.unlike_training = maker_->unlike_training();
+  output(seen);
   state_.number = seen.number, state_.time_s = seen.time_s;
-  state_.unlike_training = maker_.unlike_training();
   unlike_ += state_.unlike_training ? 1 : 0;
   state_.picture.assign(picture.begin(), picture.end());
   state_.x_mm = frame.x_mm, state_.y_mm = frame.y_mm;
@@ -167,9 +220,13 @@ void Stream::show() {
     state_.lost = counters.missing, state_.dropped = dropped();
     figures_s_ = now, figures_frames_ = frames_;
   }
-  state_.half_widths.assign(maker_.half_widths().begin(), maker_.half_widths().end());
-  state_.distance = maker_.distance();
-  state_.taxels = mean_of_channels(state_.array, maker_.window().newest());
+  if (maker_) {
+    state_.half_widths.assign(maker_->half_widths().begin(), maker_->half_widths().end());
+    state_.distance = maker_->distance();
+    state_.taxels = mean_of_channels(state_.array, maker_->window().newest());
+  } else if (frames_ > 0) {
+    state_.taxels = raw_.taxels(), state_.top = raw_.top();
+  }
   if (classifier_ && now - named_s_ >= kNameEveryS) named_s_ = now, name_texture();
   if (view_) view_->update(state_);
   if (web_) web_->update(state_);

@@ -12,6 +12,7 @@
 #include "apps/stream/line_output.h"
 #include "apps/stream/picture_log.h"
 #include "apps/stream/picture_maker.h"
+#include "apps/stream/raw_array.h"
 #include "apps/stream/terminal_view.h"
 #include "apps/stream/web_view.h"
 #include "models/files/classifier_file.h"
@@ -23,6 +24,8 @@ struct StreamSettings {
   OutputPath out = "";  ///< file that keeps the pictures; "-": a line for each to stdout; empty: none
   Precision precision = Precision::fp32;
   std::string classifier = {};                       ///< file that names the texture; empty: none
+  std::string record = {};                           ///< folder that gets a recording; empty: none
+  std::string plate = "unknown";                     ///< of the recording
   std::string udp = {};                              ///< HOST:PORT that gets a line for each; empty: none
   bool view = false;                                 ///< draw on the terminal
   std::optional<WebAddress> web = {};                ///< serve the live page
@@ -31,12 +34,14 @@ struct StreamSettings {
 };
 
 /// From a source's frames to pictures, on the terminal, on a page and in a file; counts what was lost and how
-/// long a picture took. A picture of a live source that would be older than 20 ms is not made: where the
-/// machine is too slow, or was busy, the newest count.
+/// long a picture took. Without a model the array's own signals are what is shown and kept. A picture of a
+/// live source that would be older than 20 ms is not made: where the machine is too slow, or was busy, the
+/// newest count.
 class Stream {
  public:
-  /// `models` and `source` must outlive this. Throws as PictureMaker, PictureLog, load_classifier() and
-  /// WebServer; std::runtime_error for a classifier of other pictures than the models'.
+  /// `models`, of which there may be none, and `source` must outlive this. Throws as PictureMaker,
+  /// PictureLog, load_classifier() and WebServer; std::runtime_error for a classifier of other pictures than
+  /// the models'.
   Stream(const StreamSettings& settings, std::span<const ModelFile> models, SensorSource& source);
 
   /// Until the source ends, `seconds` are over, or a signal comes. What is recorded passes as fast as it
@@ -48,7 +53,8 @@ class Stream {
   std::uint64_t pictures() const { return latency_.count(); }
   /// Of the live page; empty without.
   std::string url() const { return web_ ? web_->url() : std::string(); }
-  double window_s() const { return maker_.window_s(); }
+  /// Seconds of signal before the first picture.
+  double window_s() const { return maker_ ? maker_->window_s() : 0; }
   /// A line for people, and the same for --json.
   std::string summary() const;
   nlohmann::ordered_json result() const;
@@ -57,6 +63,9 @@ class Stream {
   bool take(SensorFrame frame);
   double keep_pace(double time_s) const;
   void keep(const SensorFrame& frame, std::span<const float> picture);
+  void keep_raw(const SensorFrame& frame);
+  void output(const Seen& seen);
+  void describe_recording();
   void show();
   void name_texture();
   double milliseconds(double quantile) const { return 1e3 * latency_.quantile(quantile); }
@@ -64,8 +73,11 @@ class Stream {
 
   StreamSettings settings_;
   SensorSource& source_;
-  PictureMaker maker_;
-  std::unique_ptr<PictureLog> log_;
+  std::unique_ptr<PictureMaker> maker_;  // nothing without a model
+  RawArray raw_;
+  std::map<std::string, std::string> recording_;  // metadata of a recording
+  std::string record_path_, record_remark_;
+  std::unique_ptr<PictureLog> log_, record_;
   std::unique_ptr<TerminalView> view_;
   std::unique_ptr<UdpOutput> udp_;
   std::unique_ptr<PipeOutput> pipe_;

@@ -39,8 +39,8 @@ struct Raster {
 // The longer side of the array gets kSide pixels of the terminal, the other its share, an even number.
 Raster raster_of(std::span<const float> values, const TaxelArray& array, int scale) {
   const int longer = std::max(array.rows, array.columns);
-  return {values, array.rows * scale, array.columns * scale, kSide * array.rows / longer / 2 * 2,
-          kSide * array.columns / longer};
+  return {values, array.rows * scale, array.columns * scale, std::max(2, kSide * array.rows / longer / 2 * 2),
+          std::max(1, kSide * array.columns / longer)};
 }
 
 // Row 0 is on top: that is the largest y.
@@ -73,7 +73,7 @@ std::string padded(std::string text, int columns) {
 }
 
 // 0 [a step of each colour] 1
-std::string scale_line(bool colour, int columns) {
+std::string scale_line(bool colour, int columns, const std::string& meaning) {
   std::string text = "0 ";
   if (colour) {
     for (const int code : kHeat) text += "\x1b[48;5;" + std::to_string(code) + "m ";
@@ -83,7 +83,7 @@ std::string scale_line(bool colour, int columns) {
   }
   text += " 1";
   const bool room = columns == 0 || columns > kSide + 24;
-  return text + (room ? "  pressed hard; the plate's highest\n" : "\n");
+  return text + (room ? "  " + meaning : "") + "\n";
 }
 
 std::string heading(const char* name, const TaxelArray& array, int scale) {
@@ -125,23 +125,27 @@ std::string render(const LiveState& state, bool colour, const TerminalSize& size
     return (size.columns == 0 || size.columns >= columns) && (size.lines == 0 || size.lines > lines);
   };
   const int lines = seen.lines / 2 + 3, gap = static_cast<int>(kGap.size());
-  const bool both = fits(felt.columns + gap + seen.columns, lines), one = fits(seen.columns, lines);
+  const bool raw = state.top > 0, one = fits(seen.columns, lines);
+  const bool both = !raw && fits(felt.columns + gap + seen.columns, lines);
   if (!one) {
     const std::string note = "too small a window for pictures\n";
     return (fits(static_cast<int>(note.size()), 2) ? note : "") + status_line(state, size.columns);
   }
   std::string text;
   if (both) text += padded(heading("felt", state.array, 1), felt.columns) + std::string(kGap);
-  text += heading("drawn", state.array, state.scale) + "\n";
+  text += raw ? heading("felt", state.array, 1) : heading("drawn", state.array, state.scale);
+  text += '\n';
   for (int line = 0; line < seen.lines / 2; ++line) {
     if (both) {
       append_row(text, felt, line, colour);
       text += kGap;
     }
-    append_row(text, seen, line, colour);
+    append_row(text, raw ? felt : seen, line, colour);
     text += '\n';
   }
-  return text + scale_line(colour, size.columns) + status_line(state, size.columns);
+  const std::string meaning = raw ? "1 is " + format(state.top, 4) + " " + state.unit + " from rest"
+                                  : "pressed hard; the plate's highest";
+  return text + scale_line(colour, size.columns, meaning) + status_line(state, size.columns);
 }
 
 // Opened anew: O_NONBLOCK on stderr itself would change it for the shell and everybody else who shares it.

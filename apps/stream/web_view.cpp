@@ -40,6 +40,8 @@ std::string WebView::hello() const {
                         {"height_mm", rig::kTextureHeightMm},
                         {"predicts_error", source_.predicts_error},
                         {"names_textures", source_.names_textures},
+                        {"unit", source_.unit},
+                        {"silent", source_.silent},
                         {"map", colour_map_base64()}}
       .dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
 }
@@ -65,10 +67,10 @@ std::string web_event(const LiveState& state, const Recorder::Status& recorder) 
                           {"recording", recorder.recording},
                           {"recorded_s", recorder.seconds},
                           {"files", recorder.files}};
-  if (!state.picture.empty()) {
-    event["felt"] = levels_base64(state.taxels);
-    event["picture"] = levels_base64(state.picture);
-  }
+  const bool raw = state.top > 0;
+  if (!state.taxels.empty() && (raw || !state.picture.empty())) event["felt"] = levels_base64(state.taxels);
+  if (!state.picture.empty()) event["picture"] = levels_base64(state.picture);
+  if (raw) event["top"] = state.top;
   if (!state.half_widths.empty()) event["wide"] = levels_base64(state.half_widths);
   if (state.distance) event["distance"] = *state.distance, event["unlike"] = state.unlike_training;
   if (!state.texture.empty())

@@ -12,6 +12,7 @@
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/files/provenance.h"
+#include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/sha256.h"
 #include "io/numbers/text.h"
@@ -163,6 +164,12 @@ void restate(Recording& recording, const SignalScale& scale) {
   recording.signal_scale = scale;
 }
 
+double Recording::period_s() const {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < frames(); ++i) steps.push_back(time_s[i] - time_s[i - 1]);
+  return steps.empty() ? 0 : median(steps);
+}
+
 Recording read_recording(const std::string& path) { return recording_of(SafetensorsFile::read(path)); }
 
 Recording recording_of(const SafetensorsFile& file) {
@@ -217,8 +224,26 @@ Recording recording_of(const SafetensorsFile& file) {
 
 void write_recording(const std::string& path, const Recording& recording) {
   if (const auto problem = problem_of(recording)) throw std::invalid_argument("write_recording: " + *problem);
+  recording.array.check();
+  const std::uint64_t n = recording.frames();
+  std::vector<TensorToWrite> tensors = {
+      {"time_s", "F64", {n}, std::as_bytes(std::span(recording.time_s))},
+      {"volts", "F32", {n, recording.array.signals()}, std::as_bytes(std::span(recording.volts))}};
+  if (!recording.position_mm.empty()) {
+    tensors.push_back({"position_mm", "F32", {n, 2}, std::as_bytes(std::span(recording.position_mm))});
+  }
+  if (!recording.lift_mm.empty())
+    tensors.push_back({"lift_mm", "F32", {n}, std::as_bytes(std::span(recording.lift_mm))});
+  if (!recording.truth.empty()) {
+    const auto height = static_cast<std::uint64_t>(recording.truth_height);
+    const auto width = static_cast<std::uint64_t>(recording.truth_width);
+    tensors.push_back({"truth", "F32", {n, height, width}, std::as_bytes(std::span(recording.truth))});
+  }
+  write_safetensors(path, metadata_of(recording), tensors);
+}
+
+std::map<std::string, std::string> metadata_of(const Recording& recording) {
   const TaxelArray& array = recording.array;
-  array.check();
   auto metadata = recording.metadata;
   for (const char* field : kFields) {
     if (metadata.contains(field)) {
@@ -241,21 +266,7 @@ void write_recording(const std::string& path, const Recording& recording) {
          array.channels}}.dump();
   }
   if (recording.signal_scale != SignalScale{}) metadata["signals"] = json_of(recording.signal_scale).dump();
-  const std::uint64_t n = recording.frames();
-  std::vector<TensorToWrite> tensors = {
-      {"time_s", "F64", {n}, std::as_bytes(std::span(recording.time_s))},
-      {"volts", "F32", {n, array.signals()}, std::as_bytes(std::span(recording.volts))}};
-  if (!recording.position_mm.empty()) {
-    tensors.push_back({"position_mm", "F32", {n, 2}, std::as_bytes(std::span(recording.position_mm))});
-  }
-  if (!recording.lift_mm.empty())
-    tensors.push_back({"lift_mm", "F32", {n}, std::as_bytes(std::span(recording.lift_mm))});
-  if (!recording.truth.empty()) {
-    const auto height = static_cast<std::uint64_t>(recording.truth_height);
-    const auto width = static_cast<std::uint64_t>(recording.truth_width);
-    tensors.push_back({"truth", "F32", {n, height, width}, std::as_bytes(std::span(recording.truth))});
-  }
-  write_safetensors(path, std::move(metadata), tensors);
+  return metadata;
 }
 
 std::string recording_file_name(const Recording& recording) {

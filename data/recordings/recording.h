@@ -30,6 +30,8 @@ struct Recording {
   std::map<std::string, std::string> metadata;  ///< whatever else is worth keeping (filter, time base, ...)
 
   std::size_t frames() const { return time_s.size(); }
+  /// Between two frames: the median, since lost frames leave gaps; 0 of fewer than two.
+  double period_s() const;
   /// Length of the moving average the voltages went through (s); 0 when the metadata names none.
   double filter_s() const;
 };
@@ -54,6 +56,10 @@ Recording recording_of(const SafetensorsFile& file);
 /// has a key this function writes (kind, plate, trial, pass, speed_mm_s, source, array, signals); FileError
 /// when it cannot be written.
 void write_recording(const std::string& path, const Recording& recording);
+
+/// The metadata of its file: its own and the members that are no tensor. Throws std::invalid_argument when
+/// its own have a key of these.
+std::map<std::string, std::string> metadata_of(const Recording& recording);
 
 /// "<plate>_t<trial>_p<pass>_v<speed>.safetensors", the name a recording has in a folder of recordings.
 std::string recording_file_name(const Recording& recording);

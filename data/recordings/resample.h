@@ -55,9 +55,14 @@ struct Track {
   std::size_t frames() const { return run.size(); }
 };
 
+/// A silence within so many periods of a slow sensor is no gap.
+constexpr double kGapPeriods = 3;
+
 struct ResampleSettings {
   double rate_hz = 300;
-  double max_gap_s = 0.05;  ///< longer silence between two recorded frames is a gap, never filled
+  /// Longer silence between two recorded frames is a gap, never filled; at least kGapPeriods of the
+  /// recording.
+  double max_gap_s = 0.05;
   std::optional<Scaling> scaling = Scaling{};  ///< nothing: the samples stay in volts
 };
 

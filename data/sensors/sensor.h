@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "data/sensors/taxel_array.h"
+#include "io/files/file.h"
 
 namespace supertac {
 
@@ -86,7 +87,7 @@ Sensor read_sensor(const std::string& name_or_path);
 Sensor sensor_of_json(const std::string& text, const std::string& where);
 nlohmann::ordered_json json_of(const Sensor& sensor);
 /// Throws std::invalid_argument as check(), FileError.
-void write_sensor(const std::string& path, const Sensor& sensor);
+void write_sensor(const OutputPath& output, const Sensor& sensor);
 
 /// Of one line each, for a recording's or model's metadata. Throws FileError as sensor_of_json().
 nlohmann::ordered_json json_of(const SignalScale& scale);

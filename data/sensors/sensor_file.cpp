@@ -296,9 +296,9 @@ Json json_of(const Sensor& sensor) {
   return json;
 }
 
-void write_sensor(const std::string& path, const Sensor& sensor) {
+void write_sensor(const OutputPath& output, const Sensor& sensor) {
   sensor.check();
-  write_file(path, json_of(sensor).dump(2, ' ', true) + "\n");
+  write_file(output, json_of(sensor).dump(2, ' ', true) + "\n");
 }
 
 }  // namespace supertac

@@ -28,6 +28,12 @@ void check(const LiveWindowSettings& s) {
 
 double window_s(const LiveWindowSettings& s) { return s.timesteps / s.rate_hz; }
 
+LiveWindowSettings checked(LiveWindowSettings s) {
+  check(s);
+  s.max_gap_s = std::max(s.max_gap_s, kGapPeriods * s.frame_period_s);
+  return s;
+}
+
 }  // namespace
 
 void LiveWindow::Recent::push(double time_s, std::span<const float> volts) {
@@ -48,9 +54,9 @@ void LiveWindow::Recent::clear() {
 
 // A sample without frames repeats an older one, whose frames may lie a gap and a period before the window.
 LiveWindow::LiveWindow(const LiveWindowSettings& settings)
-    : settings_((check(settings), settings)),
+    : settings_(checked(settings)),
       raw_(std::max(0.0, settings.filter_s - 0.5 * settings.frame_period_s), settings.signals),
-      filtered_(window_s(settings) + settings.max_gap_s + 2 / settings.rate_hz + kLookBackS,
+      filtered_(window_s(settings) + settings_.max_gap_s + 2 / settings.rate_hz + kLookBackS,
                 settings.signals),
       mean_(settings.signals),
       average_(settings.signals) {}

@@ -16,7 +16,7 @@ struct LiveWindowSettings {
   Scaling scaling = {};
   double filter_s = 0;                ///< moving average to apply to the frames; 0 = none
   double frame_period_s = 1.0 / 300;  ///< of the sensor
-  double max_gap_s = 0.05;            ///< longer silence is a gap no window crosses
+  double max_gap_s = 0.05;            ///< longer silence is a gap no window crosses; at least kGapPeriods
 };
 
 /// From a sensor's frames to a network's window, as they come: filter, rate and scaling that training saw,

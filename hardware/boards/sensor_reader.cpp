@@ -174,7 +174,7 @@ std::optional<ReadFrame> SensorReader::next(double wait_s) {
   return std::nullopt;
 }
 
-bool SensorReader::ended() {
+bool SensorReader::ended() const {
   const std::lock_guard lock(mutex_);
   return ended_ && queue_.empty() && !error_;
 }

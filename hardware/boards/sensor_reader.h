@@ -63,7 +63,7 @@ class SensorReader {
   /// (PortUnplugged, BoardSilent, WrongDevice) once the frames before it have been taken.
   std::optional<ReadFrame> next(double wait_s);
   /// The source is at its end and all frames have been taken.
-  bool ended();
+  bool ended() const;
   bool live() const { return live_; }
   ReaderCounters counters();
 
@@ -82,7 +82,7 @@ class SensorReader {
   std::string beginning_;  // of what came before the first frame
   double last_frame_s_;
 
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable arrived_, taken_;
   std::deque<ReadFrame> queue_;
   std::exception_ptr error_;

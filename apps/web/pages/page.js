@@ -96,7 +96,24 @@ function drawPicture(g, w, h, levels, rows, columns, pixelMm, wide) {
   return box;
 }
 
-function drawBar(g, w, left = 30) {
+// Over taxels that say nothing.
+function cross(g, box, silent, rows, columns) {
+  const dx = box.w / columns, dy = box.h / rows;
+  g.strokeStyle = "#f33";
+  g.lineWidth = 2;
+  g.beginPath();
+  for (const k of silent) {
+    const x = box.x + (k % columns) * dx, y = box.y + (rows - 1 - Math.floor(k / columns)) * dy;
+    g.moveTo(x, y);
+    g.lineTo(x + dx, y + dy);
+    g.moveTo(x, y + dy);
+    g.lineTo(x + dx, y);
+  }
+  g.stroke();
+}
+
+// Without a model 1 is `top`, in the sensor's unit.
+function drawBar(g, w, top, left = 30) {
   const map = supertac.hello.map, width = w - left - 6;
   for (let i = 0; i < 256; ++i) {
     g.fillStyle = `rgb(${map[3 * i]},${map[3 * i + 1]},${map[3 * i + 2]})`;
@@ -105,8 +122,9 @@ function drawBar(g, w, left = 30) {
   g.fillStyle = style("--quiet");
   g.font = "11px system-ui, sans-serif";
   g.textBaseline = "top";
-  const mm = supertac.hello.height_mm, narrow = w < 480;
-  const labels = [["0", "left", 0, narrow ? "not pressed" : "not pressed, flat plate"], ["0.5", "center", .5, (mm / 2) + " mm"],
+  const mm = supertac.hello.height_mm, narrow = w < 480, unit = supertac.hello.unit;
+  const labels = unit ? [["0", "left", 0, "at rest"], ["0.5", "center", .5, ""],
+                         ["1", "right", 1, top ? `${top.toPrecision(4)} ${unit} from rest` : ""]] : [["0", "left", 0, narrow ? "not pressed" : "not pressed, flat plate"], ["0.5", "center", .5, (mm / 2) + " mm"],
                   ["1", "right", 1, narrow ? `hard, ${mm} mm` : `pressed hard; ${mm} mm on the rig's plates`]];
   for (const [value, align, at, meaning] of labels) {
     g.textAlign = align;
@@ -166,6 +184,7 @@ function remember(event) {
     const slot = c % COLUMNS;
     strips.times[slot] = c;
     strips.felt.set(event.felt, slot * taxels);
+    if (!event.picture) continue;
     for (let r = 0; r < height; ++r) {
       let sum = 0;
       for (let k = 0; k < width; ++k) sum += event.picture[r * width + k];
@@ -191,12 +210,14 @@ function onHello(hello) {
   for (const id of ["texture-name", "texture"]) element(id).hidden = !hello.names_textures;
   element("guess-line").hidden = !hello.predicts_error;
   element("sure").hidden = !hello.predicts_error;
+  for (const id of ["drawn", "profile"]) element(id).hidden = hello.unit !== "";
+  element("drawn").closest("figure").hidden = element("profile").previousElementSibling.hidden = hello.unit !== "";
   for (const id of ["felt", "drawn"]) element(id).style.aspectRatio = `${hello.columns} / ${hello.rows}`;
 }
 
 function onPicture(event) {
   for (const name of ["felt", "picture", "wide"]) event[name] = event[name] ? bytes(event[name]) : null;
-  if (event.felt && event.picture) remember(event);
+  if (event.felt) remember(event);
   supertac.newest = event;
 }
 
@@ -232,14 +253,17 @@ function setLamp(id, kind, text) {
 
 function drawPictures(event) {
   const h = supertac.hello, rows = h.rows * h.scale, columns = h.columns * h.scale;
-  const felt = prepared(element("felt")), drawn = prepared(element("drawn"));
-  drawPicture(felt.g, felt.w, felt.h, event && event.felt, h.rows, h.columns, h.pitch_mm, null);
+  const felt = prepared(element("felt"));
+  const box = drawPicture(felt.g, felt.w, felt.h, event && event.felt, h.rows, h.columns, h.pitch_mm, null);
+  cross(felt.g, box, h.silent, h.rows, h.columns);
+  const bar = prepared(element("bar"));
+  drawBar(bar.g, bar.w, event && event.top);
+  drawStrip(element("taxels"), strips.felt, h.rows * h.columns, [["0", 0], [String(h.rows * h.columns - 1), 1]], h.unit !== "");
+  if (h.unit) return;
+  const drawn = prepared(element("drawn"));
   const wide = element("guess").checked && event ? event.wide : null;
   supertac.box = drawPicture(drawn.g, drawn.w, drawn.h, event && event.picture, rows, columns, h.pitch_mm / h.scale, wide);
-  const bar = prepared(element("bar"));
-  drawBar(bar.g, bar.w);
   const half = h.rows * h.pitch_mm / 2;
-  drawStrip(element("taxels"), strips.felt, h.rows * h.columns, [["0", 0], [String(h.rows * h.columns - 1), 1]], false);
   drawStrip(element("profile"), strips.profile, rows, [[-half, 0], ["0", .5], [half, 1]], true);
 }
 
@@ -253,7 +277,8 @@ function showFigures(event) {
   set("dropped", String(event.dropped));
   set("time", event.t.toFixed(1) + " s");
   set("place", event.x === undefined ? "unknown" : `x ${event.x.toFixed(1)}, y ${event.y.toFixed(1)} mm`);
-  if (event.distance === undefined) setLamp("lamp", "unknown", event.picture ? "this model knows no doubt" : "filling the first window");
+  if (supertac.hello.unit) setLamp("lamp", "", "no model: the array itself");
+  else if (event.distance === undefined) setLamp("lamp", "unknown", event.picture ? "this model knows no doubt" : "filling the first window");
   else if (event.unlike) setLamp("lamp", "alarm", "UNLIKE TRAINING: do not trust this picture");
   else setLamp("lamp", "", "signals as in training");
   if (event.wide) {
@@ -304,11 +329,11 @@ function frame(now) {
     figures = now;
     showFigures(event);
   }
-  if (event && event.picture && now - described > 1000) {
+  if (event && event.felt && now - described > 1000) {
     described = now;
     const h = supertac.hello;
     element("felt").setAttribute("aria-label", describe("felt", event.felt, h.rows, h.columns, h.pitch_mm));
-    element("drawn").setAttribute("aria-label",
+    if (event.picture) element("drawn").setAttribute("aria-label",
         describe("drawn", event.picture, h.rows * h.scale, h.columns * h.scale, h.pitch_mm / h.scale));
   }
 }
@@ -335,7 +360,7 @@ function pause() {
 // Both pictures with headings, axes, colour bar and what is known of them, on paper white.
 function snapshot() {
   const event = supertac.shown, h = supertac.hello;
-  if (!event || !event.picture) return;
+  if (!event || !event.felt) return;
   const page = document.createElement("canvas"), g = page.getContext("2d");
   page.width = 1640;
   page.height = 1000;
@@ -350,7 +375,7 @@ function snapshot() {
   g.textBaseline = "top";
   g.font = "600 15px system-ui, sans-serif";
   g.fillText("The array feels", 40, 10);
-  g.fillText("The network draws", 450, 10);
+  if (event.picture) g.fillText("The network draws", 450, 10);
   const panel = (x, levels, rows, columns, mm) => {
     g.save();
     g.translate(x, 34);
@@ -358,10 +383,10 @@ function snapshot() {
     g.restore();
   };
   panel(10, event.felt, h.rows, h.columns, h.pitch_mm);
-  panel(420, event.picture, h.rows * h.scale, h.columns * h.scale, h.pitch_mm / h.scale);
+  if (event.picture) panel(420, event.picture, h.rows * h.scale, h.columns * h.scale, h.pitch_mm / h.scale);
   g.save();
   g.translate(10, 430);
-  drawBar(g, 800);
+  drawBar(g, 800, event.top);
   g.restore();
   g.fillStyle = "#333";
   g.font = "11px system-ui, sans-serif";

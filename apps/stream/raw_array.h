@@ -1,0 +1,35 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "apps/stream/sensor_source.h"
+
+namespace supertac {
+
+/// The array as it is, without a model: how far each taxel is from its own rest, on a scale that grows with
+/// what is seen.
+class RawArray {
+ public:
+  explicit RawArray(const SensorSource& source);
+  void push(std::span<const float> signals);
+  /// What the array has felt in the last moments (kRestS) is its rest from now on.
+  void rezero() { rest_ = newest_mean_; }
+  /// [rows][columns] in [0,1]: the mean of a taxel's channels, as far in the pressed direction as top() is.
+  /// Three axes of a field have no direction: there it is the length of the change.
+  std::vector<float> taxels() const;
+  /// What 1 stands for, in the sensor's unit: the most that was seen, and a twentieth of the stated range.
+  double top() const { return top_; }
+
+ private:
+  static constexpr double kRestS = 0.2, kLeastTop = 0.05;
+  double pressed(std::size_t taxel) const;
+
+  TaxelArray array_;
+  double direction_, period_s_, top_;
+  std::size_t frames_ = 0;
+  std::vector<double> rest_, newest_mean_;
+  std::vector<float> newest_;
+};
+
+}  // namespace supertac

@@ -1,0 +1,283 @@
+// Every file of examples/sensors/ against a device that sends such frames: probed, viewed, recorded, read
+// back. Then from simulated passes of one of them to live pictures.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <pty.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "data/recordings/recording.h"
+#include "data/recordings/simulator.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
+#include "io/numbers/random.h"
+#include "io/numbers/text.h"
+#include "tests/apps/process.h"
+#include "tests/hardware/fake_sensor.h"
+
+namespace supertac {
+namespace {
+
+/// Sends a sensor's frames in real time, over the kind of port that its file names, until it is destroyed.
+class FakeDevice {
+ public:
+  explicit FakeDevice(const Sensor& sensor) : sensor_(sensor) {
+    std::signal(SIGPIPE, SIG_IGN);
+    if (sensor.port.starts_with("serial:"))
+      open_terminal();
+    else if (sensor.port.starts_with("udp:"))
+      open_socket(SOCK_DGRAM, "udp:127.0.0.1:");
+    else if (sensor.port.starts_with("tcp:"))
+      open_socket(SOCK_STREAM, "tcp:127.0.0.1:");
+    else
+      open_fifo();
+    thread_ = std::thread([this] { run(); });
+  }
+  ~FakeDevice() {
+    stop_ = true;
+    thread_.join();
+    for (const int file : {listening_, out_, slave_})
+      if (file >= 0) close(file);
+  }
+  const std::string& port() const { return port_; }
+
+  /// Whole numbers in the sensor's range: rest and noise, and for 0.3 s of every second a finger.
+  std::vector<double> values(int n) const {
+    const RandomStream random(5, static_cast<std::uint64_t>(n));
+    const bool pressed = std::fmod(n / sensor_.rate_hz, 1.0) > 0.7 || (sensor_.rate_hz < 10 && n % 4 == 3);
+    std::vector<double> values;
+    for (std::size_t i = 0; i < sensor_.values(); ++i) {
+      const double noise = 0.005 * random.uniform(i), press = pressed && i % 5 == 1 ? 0.6 : 0;
+      values.push_back(std::round(sensor_.scale.rest - sensor_.scale.span * (0.02 + noise + press)));
+    }
+    return values;
+  }
+
+ private:
+  void open_terminal() {
+    char name[100];
+    ASSERT_EQ(openpty(&out_, &slave_, name, nullptr, nullptr), 0);
+    fcntl(out_, F_SETFL, O_NONBLOCK);
+    port_ = "serial:" + std::string(name) + sensor_.port.substr(sensor_.port.rfind('@'));
+  }
+  void open_socket(int type, const std::string& prefix) {
+    const int file = socket(AF_INET, type | SOCK_NONBLOCK, 0);
+    address_.sin_family = AF_INET, address_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address_;
+    ASSERT_EQ(bind(file, reinterpret_cast<sockaddr*>(&address_), size), 0);
+    ASSERT_EQ(getsockname(file, reinterpret_cast<sockaddr*>(&address_), &size), 0);
+    port_ = prefix + std::to_string(ntohs(address_.sin_port));
+    if (type == SOCK_STREAM) {
+      ASSERT_EQ(listen(file, 1), 0);
+      listening_ = file;
+      return;
+    }
+    close(file);  // the program listens there
+    out_ = socket(AF_INET, SOCK_DGRAM, 0);
+  }
+  void open_fifo() {
+    port_ = folder_ / "fifo";
+    ASSERT_EQ(mkfifo(port_.c_str(), 0600), 0);
+  }
+  bool connected() {
+    if (out_ < 0 && listening_ >= 0) out_ = accept(listening_, nullptr, nullptr);
+    if (out_ < 0 && listening_ < 0) out_ = open(port_.c_str(), O_WRONLY | O_NONBLOCK);
+    if (out_ >= 0 && listening_ < 0 && port_.starts_with("/")) fcntl(out_, F_SETFL, 0);
+    return out_ >= 0;
+  }
+  void run() {
+    const auto begin = std::chrono::steady_clock::now();
+    for (int n = 0; !stop_; ++n) {
+      std::this_thread::sleep_until(begin + std::chrono::duration<double>(n / sensor_.rate_hz));
+      if (!left_.empty() || !connected()) continue;
+      left_ = sent_frame(sensor_, values(n), n / sensor_.rate_hz);
+      while (!left_.empty() && !stop_) {
+        const bool datagram = listening_ < 0 && port_.starts_with("udp:");
+        const ssize_t count = datagram ? sendto(out_, left_.data(), left_.size(), 0,
+                                                reinterpret_cast<const sockaddr*>(&address_), sizeof address_)
+                                       : write(out_, left_.data(), left_.size());
+        if (count > 0) left_.erase(0, static_cast<std::size_t>(count));
+        if (count > 0) continue;
+        if (errno == EAGAIN) {
+          usleep(1000);
+          continue;
+        }
+        left_.clear();
+        if (datagram || slave_ >= 0) break;
+        close(out_);
+        out_ = -1;  // the next client
+        break;
+      }
+    }
+  }
+
+  Sensor sensor_;
+  TemporaryFolder folder_;
+  std::string port_, left_;
+  sockaddr_in address_{};
+  int listening_ = -1, out_ = -1, slave_ = -1;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+Sensor example(const std::string& name) {
+  return read_sensor(SUPERTAC_SOURCE "/examples/sensors/" + name + ".json");
+}
+
+// Every recorded frame is one that was sent, in the order of sending.
+void expect_sent(const Recording& recording, const FakeDevice& device, const Sensor& arranged) {
+  std::map<std::vector<float>, int> sent;
+  for (int n = 0; n < 20'000 && static_cast<double>(n) < 120 * arranged.rate_hz; ++n) {
+    const std::vector<double> values = device.values(n);
+    std::vector<float> signals(arranged.array.signals());
+    arranged.arrange(std::vector<float>(values.begin(), values.end()), signals);
+    sent.emplace(signals, n);
+  }
+  const std::size_t signals = arranged.array.signals();
+  int before = -1;
+  for (std::size_t i = 0; i < recording.frames(); ++i) {
+    const auto first = recording.volts.begin() + static_cast<std::ptrdiff_t>(i * signals);
+    const auto found = sent.find({first, first + static_cast<std::ptrdiff_t>(signals)});
+    ASSERT_NE(found, sent.end()) << "frame " << i << " was never sent";
+    EXPECT_GT(found->second, before);
+    before = found->second;
+  }
+}
+
+class SensorFile : public testing::TestWithParam<const char*> {};
+
+TEST_P(SensorFile, IsProbedViewedRecordedAndReadBack) {
+  const TemporaryFolder folder;
+  Sensor sensor = example(GetParam());
+  const bool slow = sensor.rate_hz < 10;
+  const std::string seconds = slow ? "6" : "2.5";
+  const FakeDevice device(sensor);
+  sensor.port = device.port();
+
+  const std::string draft_path = folder / "draft.json";
+  const auto probed = run_process("supertac-stream", {"--sensor", device.port(), "--probe", "--seconds",
+                                                      seconds, "--out", draft_path, "--quiet"});
+  ASSERT_EQ(probed.code, 0) << probed.error << probed.out;
+  Sensor draft = read_sensor(draft_path);
+  EXPECT_EQ(draft.values(), sensor.values()) << probed.out;
+  EXPECT_EQ(draft.frame.kind, sensor.frame.kind);
+  EXPECT_EQ(draft.scale.rises(), sensor.scale.rises()) << probed.out;
+  EXPECT_EQ(draft.frame.time.has_value(), sensor.frame.time.has_value()) << probed.out;
+  EXPECT_NEAR(draft.rate_hz, sensor.rate_hz, 0.2 * sensor.rate_hz) << probed.out;
+
+  draft.dead.clear();
+  write_sensor(folder / "sensor.json", sensor);
+  write_sensor(draft_path, draft);
+  for (const auto& [file, described] :
+       std::map<std::string, Sensor>{{"draft.json", draft}, {"sensor.json", sensor}}) {
+    SCOPED_TRACE(file);
+    const std::string kept = folder / file + ".recordings", json = folder / file + ".result";
+    const auto streamed = run_process(
+        "supertac-stream", {"--sensor", folder / file, "--record", kept, "--plate", "ridges6", "--seconds",
+                            slow ? "3.5" : "1", "--out", "-", "--json", json, "--quiet"});
+    ASSERT_EQ(streamed.code, 0) << streamed.error;
+    const Recording recording = read_recording(kept + "/ridges6_t1_p1_v0.safetensors");
+    EXPECT_GE(recording.frames(), slow ? 3U : 20U);
+    EXPECT_EQ(recording.array, described.array);
+    EXPECT_EQ(recording.signal_scale, described.scale);
+    EXPECT_NEAR(recording.period_s(), 1 / sensor.rate_hz, 0.3 / sensor.rate_hz);
+    Sensor arranged = described;
+    arranged.rate_hz = sensor.rate_hz;
+    expect_sent(recording, device, arranged);
+    // What a reader of lines sees is what is recorded.
+    const std::string line = streamed.out.substr(0, streamed.out.find('\n'));
+    EXPECT_EQ(parse_json_limited(line).at("volts").size(), described.array.signals());
+    EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(streamed.out, '\n')), recording.frames());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Examples, SensorFile,
+                         testing::Values("csv_arduino", "json_lines", "binary_header", "flexitac_12x32",
+                                         "uskin_4x4x3", "anyskin", "mat_32x64"),
+                         [](const auto& info) { return std::string(info.param); });
+
+TEST(SensorFiles, OthersAtThePortAreToldApart) {
+  const TemporaryFolder folder;
+  std::string noise, log;
+  const RandomStream random(1, 2);
+  for (std::size_t i = 0; i < 40'000; ++i) noise += static_cast<char>(random.bits(i));
+  for (int i = 0; i < 50; ++i)
+    log += "[info] the weather is " + std::string(i % 2 == 0 ? "fine" : "not so fine") + "\n";
+  std::string printer = "start\necho:Marlin 2.1.2\n";
+  for (int i = 0; i < 20; ++i) printer += "ok T:20.1 /0.0\n";
+  const std::map<std::string, std::string> heard = {{noise, "binary without a period"},
+                                                    {log, "a log, or words"},
+                                                    {printer, "a printer's firmware answers here"},
+                                                    {"", "nothing came"}};
+  for (const auto& [bytes, words] : heard) {
+    write_file(folder / "port", bytes);
+    const auto probed = run_process("supertac-stream", {"--sensor", folder / "port", "--probe", "--quiet"});
+    EXPECT_EQ(probed.code, 1) << words;
+    EXPECT_NE((probed.out + probed.error).find(words), std::string::npos) << probed.out << probed.error;
+  }
+}
+
+// Simulated passes of the mat train a model that draws what the mat feels; the same signals in volts that
+// fall, in another order and unit, give the same pictures.
+TEST(SensorFiles, FromSimulatedPassesToLivePictures) {
+  const TemporaryFolder folder;
+  Sensor mat = example("csv_arduino");
+  mat.array.rows = mat.array.columns = 4, mat.array.pitch_mm = 3, mat.dead.clear(), mat.rate_hz = 100;
+  for (int pass = 1; pass <= 2; ++pass) {
+    Recording recording =
+        simulate_pass(Plate::named("bumps12"), {.pass = pass}, {.array = mat.array, .rate_hz = 100});
+    restate(recording, mat.scale);
+    write_recording(folder / ("p" + std::to_string(pass) + ".safetensors"), recording);
+  }
+  const std::string model = folder / "model" + ".st";
+  const auto trained = run_process(
+      "supertac-train", {"--data", folder.path(), "--out", model, "--preset", "tiny", "--timesteps", "32",
+                         "--epochs", "1", "--stride", "20", "--split", "none"});
+  ASSERT_EQ(trained.code, 0) << trained.error;
+
+  Sensor volts = mat;  // column by column, falling, in millivolts
+  volts.scale = {.unit = "mV", .rest = 3300, .span = 2500};
+  volts.order = {0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15};
+  volts.frame = {.kind = FrameKind::binary, .header = "\xAA\x55", .type = "f32"};
+  volts.frame.time = FrameTime{.type = "u32", .unit_s = 1e-3};
+  const Recording pass =
+      simulate_pass(Plate::named("bumps12"), {.pass = 3}, {.array = mat.array, .rate_hz = 100});
+  std::vector<std::vector<float>> pictures;
+  for (Sensor sensor : {mat, volts}) {
+    std::string bytes;
+    for (std::size_t i = 0; i < 400; ++i) {
+      std::vector<double> values(16);
+      for (std::size_t k = 0; k < 16; ++k) {
+        const std::size_t place = sensor.order.empty() ? k : static_cast<std::size_t>(sensor.order[k]);
+        values[place] = SignalScale{}.in(sensor.scale, double{pass.volts[i * 16 + k]});
+      }
+      bytes += sent_frame(sensor, values, 0.01 * static_cast<double>(i));
+    }
+    sensor.port = folder / (sensor.scale.unit + ".bytes");
+    write_file(sensor.port, bytes);
+    write_sensor(folder / (sensor.scale.unit + ".json"), sensor);
+    const std::string out = folder / (sensor.scale.unit + ".pictures");
+    const auto streamed = run_process("supertac-stream", {"--sensor", folder / (sensor.scale.unit + ".json"),
+                                                          "--model", model, "--out", out, "--quiet"});
+    ASSERT_EQ(streamed.code, 0) << streamed.error;
+    pictures.push_back(SafetensorsFile::read(out).f32("pictures"));
+  }
+  ASSERT_EQ(pictures[0].size(), pictures[1].size());
+  ASSERT_GT(pictures[0].size(), 256U * 300);
+  float worst = 0;
+  for (std::size_t i = 0; i < pictures[0].size(); ++i)
+    worst = std::max(worst, std::abs(pictures[0][i] - pictures[1][i]));
+  EXPECT_LT(worst, 1e-5F);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,106 @@
+#include "hardware/boards/probe.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/hardware/fake_sensor.h"
+
+namespace supertac {
+namespace {
+
+Sensor sensor_of(const std::string& json) { return sensor_of_json(json, "test"); }
+
+// What a sensor sends in so many seconds, a taxel pressed now and then.
+std::vector<Heard> sent(const Sensor& sensor, double seconds, bool pressed = true) {
+  std::vector<Heard> heard;
+  std::uint64_t state = 1;
+  for (int n = 0; n < seconds * sensor.rate_hz; ++n) {
+    std::vector<double> values;
+    for (std::size_t i = 0; i < sensor.values(); ++i) {
+      state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+      const double press = pressed && i == 3 && n % 40 > 30 ? 0.8 : 0;
+      values.push_back(std::round(sensor.scale.rest - sensor.scale.span * (0.05 + press) +
+                                  static_cast<double>(state >> 60)));
+      if (i == 5) values.back() = 0;  // dead
+    }
+    heard.push_back({100 + n / sensor.rate_hz, sent_frame(sensor, values, 3 + n / sensor.rate_hz)});
+  }
+  return heard;
+}
+
+std::string all(const ProbeReport& report) {
+  std::string text;
+  for (const std::string& line : report.says) text += line + "\n";
+  return text;
+}
+
+TEST(Probe, FindsBinaryFormats) {
+  const std::string array =
+      R"({"rows":6,"columns":7,"pressed":"lower","range":[500,3900],"rate_hz":100,"frame":)";
+  for (
+      const char* frame :
+      {R"({"kind":"binary","header":"AA55","type":"u16"})",
+       R"({"kind":"binary","header":"AA55","type":"u16","endian":"big","checksum":"crc16-ccitt"})",
+       R"({"kind":"binary","header":"24","trailer":"21","type":"u16","time":{"type":"u32","unit":"us"}})",
+       R"({"kind":"binary","header":"A5A5","type":"f32","time":{"type":"u32","unit":"ms"},"checksum":"sum8"})"}) {
+    const Sensor sensor = sensor_of(array + frame + "}");
+    const ProbeReport report = probe(sent(sensor, 4), "here", {});
+    ASSERT_TRUE(report.draft) << frame << all(report);
+    const Sensor& draft = *report.draft;
+    EXPECT_EQ(draft.values(), 42U) << frame << all(report);
+    EXPECT_EQ(draft.frame.type, sensor.frame.type) << frame;
+    EXPECT_EQ(draft.frame.big_endian, sensor.frame.big_endian) << frame;
+    EXPECT_EQ(draft.frame.checksum, sensor.frame.checksum) << frame;
+    EXPECT_EQ(draft.frame.time.has_value(), sensor.frame.time.has_value()) << frame << all(report);
+    EXPECT_FALSE(draft.scale.rises()) << frame << all(report);
+    EXPECT_EQ(draft.dead, std::vector{5}) << frame;
+    EXPECT_NEAR(draft.rate_hz, 100, 1) << frame;
+    EXPECT_EQ(draft.port, "here");
+  }
+}
+
+TEST(Probe, SaysWhatItAssumes) {
+  const Sensor sensor = sensor_of(R"({"rows":2,"columns":6,"pressed":"higher","range":[100,900],"rate_hz":50,
+    "frame":{"kind":"text","separator":";","skip":[1],"time":{"column":0,"unit":"ms"}}})");
+  const ProbeReport report = probe(sent(sensor, 3, false), "here", {});
+  ASSERT_TRUE(report.draft) << all(report);
+  EXPECT_EQ(report.draft->frame.skip, std::vector{1});
+  EXPECT_EQ(report.draft->frame.time->unit_s, 1e-3);
+  EXPECT_NE(all(report).find("assumed: 3x4 taxels"), std::string::npos) << all(report);
+  EXPECT_NE(all(report).find("nothing was pressed"), std::string::npos) << all(report);
+  EXPECT_NE(all(report).find("stuck or dead, since they never changed: taxels [5]"), std::string::npos);
+  EXPECT_NE(all(report).find("columns that are no signal (words, or a counter) are skipped: [1]"),
+            std::string::npos);
+  const ProbeReport known = probe(sent(sensor, 3), "here", sensor.array);
+  ASSERT_TRUE(known.draft) << all(known);
+  EXPECT_EQ(known.draft->array, sensor.array);
+  EXPECT_TRUE(known.draft->scale.rises());
+  EXPECT_EQ(all(known).find("assumed"), std::string::npos) << all(known);
+  const ProbeReport other = probe(sent(sensor, 3), "here", TaxelArray{.rows = 5, .columns = 5});
+  EXPECT_FALSE(other.draft);
+  EXPECT_NE(all(other).find("frames of 12 values, expected the 25 of 5x5 taxels"), std::string::npos)
+      << all(other);
+}
+
+TEST(Probe, OfAnythingEndsAndHasADraftThatReads) {
+  std::uint64_t state = 9;
+  const auto random = [&](std::uint64_t below) {
+    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+    return (state >> 33) % below;
+  };
+  const Sensor mat =
+      sensor_of(R"({"rows":4,"columns":4,"pressed":"higher","range":[0,900],"frame":{"kind":"text"}})");
+  for (int run = 0; run < 60; ++run) {
+    std::vector<Heard> heard = sent(mat, 0.5);
+    for (Heard& chunk : heard)
+      for (std::size_t n = random(4); n > 0 && !chunk.bytes.empty(); --n)
+        chunk.bytes[random(chunk.bytes.size())] = static_cast<char>(random(run % 2 == 0 ? 256 : 64));
+    const ProbeReport report = probe(heard, "here", {});
+    EXPECT_FALSE(report.says.empty());
+    if (report.draft) report.draft->check();  // throws nothing
+  }
+}
+
+}  // namespace
+}  // namespace supertac
