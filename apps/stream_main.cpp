@@ -85,11 +85,10 @@ void declare(Arguments& a) {
   declare_web(a);
 }
 
-/// Says what a port sends; --sensor names a sensor's file, or an address alone.
+/// Says what a port sends; --sensor names a sensor's file (*.json), or an address alone.
 int probe_port(const Arguments& a) {
   const std::string& named = a.text("sensor");
-  std::error_code error;
-  const bool described = named == "rig" || std::filesystem::is_regular_file(named, error);
+  const bool described = named == "rig" || named.ends_with(".json");
   Sensor sensor;
   if (described) sensor = read_sensor(named);
   if (!described) sensor.port = named;

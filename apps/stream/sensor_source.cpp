@@ -168,6 +168,11 @@ ProbeReport listen(const Sensor& sensor, bool known_array, double seconds) {
       const Received got = opened.port->read(buffer, std::min(until, opened.port->now() + 0.05));
       if (got.count == 0) continue;
       heard.push_back({got.time_s, {reinterpret_cast<const char*>(buffer.data()), got.count}});
+      // A datagram of text is a line, as open_port() makes one of it for a sensor that is known to send text.
+      std::string& text = heard.back().bytes;
+      if (sensor.port.starts_with("udp:") &&
+          std::ranges::all_of(text, [](char c) { return c >= ' ' && c <= '~'; }))
+        text += '\n';
       bytes += got.count;
     }
   } catch (const PortUnplugged&) {  // what came until then is what there is

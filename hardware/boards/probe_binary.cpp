@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <vector>
 
 #include "hardware/boards/binary_decoder.h"
 #include "hardware/boards/probe.h"
@@ -42,11 +43,15 @@ std::optional<Period> constant_run(const std::string& bytes, std::size_t from, s
   };
   std::array<std::size_t, 256> total{};
   const auto count_of = [&total](char c) -> std::size_t& { return total[static_cast<unsigned char>(c)]; };
-  for (std::size_t phase = 0; phase < period; ++phase) ++count_of(at(phase));
+  std::vector<bool> stays(period);
+  for (std::size_t phase = 0; phase < period; ++phase) {
+    stays[phase] = constant(phase);
+    if (stays[phase]) ++count_of(at(phase));
+  }
   Period best{period};
   std::size_t run = 0;
   for (std::size_t i = 0; i <= 2 * period && run < period; ++i) {
-    if (constant(i)) {
+    if (stays[i % period]) {
       ++run;
       continue;
     }

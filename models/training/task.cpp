@@ -20,10 +20,11 @@ Scaling scaling_of(const Recipe& recipe, const SignalRange& range, std::vector<s
   const std::string clips = "--range " + text + " clips " + format(100 * clipped, 1) +
                             " % of the signals, which lie at " + range.text();
   if (clipped > kMostClipped) throw std::runtime_error(clips + "; give REST,SPAN that hold them, or auto");
-  if (clipped > kWorthSaying || scaling.rest_volts != Scaling().rest_volts) notes.push_back(clips);
-  if (recipe.random_plates > 0 && scaling.rest_volts != Scaling().rest_volts)
-    throw std::invalid_argument("--random-plates imitates the rig, whose signals rest at " +
-                                format(Scaling().rest_volts) + "; those of these recordings rest at " +
+  const double stated = range.stated().rest_volts;
+  if (clipped > kWorthSaying || scaling.rest_volts != stated) notes.push_back(clips);
+  if (recipe.random_plates > 0 && scaling.rest_volts != stated)
+    throw std::invalid_argument("--random-plates imitates a sensor whose signals rest at " + format(stated) +
+                                ", as the recordings state; those of these recordings rest at " +
                                 format(scaling.rest_volts));
   scaling.per_window = recipe.per_window;
   return scaling;

@@ -1,10 +1,11 @@
 // A device that sends frames as a Sensor describes them, written down apart from the decoders.
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <span>
 #include <string>
 
@@ -22,6 +23,12 @@ inline std::uint64_t bits_of(double value, const std::string& type) {
   if (type == "f32") return std::bit_cast<std::uint32_t>(static_cast<float>(value));
   if (type == "f64") return std::bit_cast<std::uint64_t>(value);
   return static_cast<std::uint64_t>(std::llround(value));
+}
+
+/// How many mutations a test tries: few, or SUPERTAC_MUTATIONS, for a study.
+inline int mutations(int quick) {
+  const char* wanted = std::getenv("SUPERTAC_MUTATIONS");
+  return wanted == nullptr ? quick : std::atoi(wanted);
 }
 
 /// One frame of so many values, in the order of the frame.
