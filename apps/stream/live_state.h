@@ -18,7 +18,7 @@ struct LiveState {
   double time_s = 0;               ///
   std::vector<float> taxels;       ///< [rows][columns] in [0,1]; empty before the first
   double top = 0;                  ///< without a model: what 1 is, in the sensor's unit
-  std::string unit;                ///< of top
+  std::string unit = {};           ///< of top
   std::vector<float> picture;      ///< [rows * scale][columns * scale]; empty before the first
   std::vector<float> half_widths;  ///< the same, as Seen
   std::optional<double> distance;  ///

@@ -19,8 +19,8 @@ struct WebSource {
   TaxelArray array;
   int scale = 4;
   bool predicts_error = false, names_textures = false;
-  std::string unit;         ///< without a model, of the signals; empty: there is one
-  std::vector<int> silent;  ///< taxels that say nothing
+  std::string unit = {};         ///< without a model, of the signals; empty: there is one
+  std::vector<int> silent = {};  ///< taxels that say nothing
 };
 
 /// Serves live_page() with the newest state, 30 times a second at most, from a thread of its own.

@@ -12,7 +12,7 @@ namespace supertac {
 namespace {
 
 constexpr std::size_t kLongestPeriod = 20'000, kLeastPeriod = 4, kFewPeriods = 4, kLongestHeader = 4;
-constexpr double kAgree = 0.95;
+constexpr double kAgree = 0.8;  // some may have been torn
 
 std::span<const std::byte> bytes_in(const std::string& text, std::size_t at, std::size_t count) {
   return std::as_bytes(std::span(text)).subspan(at, count);
@@ -71,7 +71,6 @@ std::optional<Period> constant_run(const std::string& bytes, std::size_t from, s
   const double expected = static_cast<double>(bytes.size()) / static_cast<double>(period);
   const auto found = static_cast<double>(occurrences(bytes, pattern));
   if (found < 0.8 * expected - 1 || found > 1.1 * expected + 1) return std::nullopt;
-  best.at %= period;
   return best;
 }
 
@@ -126,7 +125,9 @@ std::optional<BinaryFinding> find_binary_format(const std::string& bytes, double
                                                 std::optional<std::size_t> values) {
   const auto period = period_of(bytes);
   if (!period) return std::nullopt;
+  // From where the period was found: a terminal may have changed what came before it was opened.
   const std::size_t frames = (bytes.size() - period->at) / period->length;
+  seconds *= static_cast<double>(frames * period->length) / static_cast<double>(bytes.size());
   const auto agrees = [&](std::size_t header, const std::string& kind, bool big) {
     const std::size_t width = checksum_bytes(kind);
     if (period->length <= header + width) return false;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/hardware/fake_sensor.h"
@@ -59,6 +60,19 @@ TEST(Probe, FindsBinaryFormats) {
     EXPECT_NEAR(draft.rate_hz, 100, 1) << frame;
     EXPECT_EQ(draft.port, "here");
   }
+}
+
+// A terminal that was not yet raw has made line feeds of carriage returns.
+TEST(Probe, TheBeginningMayBeDamaged) {
+  const Sensor sensor =
+      sensor_of(R"({"rows":3,"columns":5,"pressed":"higher","range":[-2000,2000],"rate_hz":100,
+    "frame":{"kind":"binary","header":"C3","trailer":"0D0A","type":"f32"}})");
+  std::vector<Heard> heard = sent(sensor, 3);
+  for (std::size_t n = 0; n < 30; ++n) std::ranges::replace(heard[n].bytes, '\r', '\n');
+  const ProbeReport report = probe(heard, "here", {});
+  ASSERT_TRUE(report.draft) << all(report);
+  EXPECT_EQ(report.draft->frame.header, "\r\n\xC3");
+  EXPECT_EQ(report.draft->values(), 15U);
 }
 
 TEST(Probe, SaysWhatItAssumes) {
