@@ -22,7 +22,7 @@
 #include "io/files/json.h"
 #include "io/numbers/random.h"
 #include "io/numbers/text.h"
-#include "tests/apps/process.h"
+#include "tests/apps/common/process.h"
 #include "tests/hardware/fake_sensor.h"
 
 namespace supertac {
