@@ -144,7 +144,7 @@ std::string Writer::call_of(const IntegerStep& s, const std::string& product) co
   switch (s.kind) {
     case Kind::input:
       return "take_input(from, " + at(s.y) + ", " + text(s.first) + ", " + text(s.run) + ", " +
-             text(s.apart) + ", " + scale() + ")";
+             text(s.apart) + ", " + text(s.step) + ", " + scale() + ")";
     case Kind::to_bytes:
       return "to_bytes(" + at(s.x) + ", " + at(s.y) + ", " + scale() + ")";
     case Kind::product:

@@ -44,20 +44,19 @@ void fill_margin(const IntegerMap& map, const Memory& m) {
   fill_margin(map, m.images, std::int16_t{0}, reinterpret_cast<std::int16_t*>(m.begin(map)));
 }
 
-// Runs of a frame's values, a frame being a pixel of y.
-void take_runs(const IntegerStep& s, Dim input_width, const IntegerMap& y, const real* input, real* out) {
-  for (Dim pixel = 0; pixel < y.height * y.width; ++pixel, input += input_width)
+void take_runs(const IntegerStep& s, const IntegerMap& y, const real* input, real* out) {
+  for (Dim pixel = 0; pixel < y.height * y.width; ++pixel, input += s.step)
     for (Dim k = 0; k < y.channels; k += s.run)
       out = std::copy_n(input + s.first + k / s.run * s.apart, s.run, out);
 }
 
 void run_input(const IntegerStep& s, const Memory& m) {
   const IntegerMap& y = m.plan.maps[static_cast<std::size_t>(s.y)];
-  const Dim pixels = y.height * y.width, row = y.width * y.channels, size = pixels * m.plan.input_width;
+  const Dim pixels = y.height * y.width, row = y.width * y.channels;
   auto* const values = reinterpret_cast<real*>(m.scratch);
   auto* const numbers = reinterpret_cast<std::int16_t*>(values + pixels * y.channels);
   for (Dim n = 0; n < m.images; ++n) {
-    take_runs(s, m.plan.input_width, y, m.input + n * size, values);
+    take_runs(s, y, m.input + n * m.plan.input_size, values);
     kernels::to_numbers(pixels * y.channels, values, 1 / m.plan.number_step(), numbers);
     for (Dim line = 0; line < y.height; ++line) {
       const Dim at = n * y.image() + line * y.line();

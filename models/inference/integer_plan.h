@@ -32,7 +32,7 @@ struct IntegerMap {
 
 struct IntegerStep {
   enum class Kind {
-    input,      ///< y = the network's input, or of each frame `count` runs of `run` values from `first` on
+    input,      ///< y = the network's input, or of it, for each pixel, runs of `run` numbers from `first` on
     to_bytes,   ///< y = x in another scale
     product,    ///< a convolution or linear layer, or every second pixel of a transposed convolution
     copy,       ///< y, from channel `at` on, = x without its margin
@@ -45,8 +45,10 @@ struct IntegerStep {
   int x = -1, a = -1, gates = -1, y = -1;  ///< maps
   bool writes_margin = false;              ///< the first step that writes y: its margin is filled before
 
-  Requantise scale = {};                      ///< input, to_bytes
-  Dim first = 0, run = 0, apart = 0, at = 0;  ///< input, copy
+  Requantise scale = {};  ///< input, to_bytes
+  Dim first = 0, run = 0, apart = 0,
+      step = 0;  ///< input; `step`: from one pixel's first number to the next's
+  Dim at = 0;    ///< copy
 
   // product: `job` has all but pointers and images; offsets are from the maps' first pixels.
   kernels::ByteProductJob job = {};
@@ -68,9 +70,9 @@ struct IntegerPlan {
   std::vector<IntegerMap> maps;
   std::vector<IntegerStep> steps;
   int fraction_bits = 0;
-  Dim work_area = 0;    ///< bytes of an image
-  Dim input_width = 0;  ///< of the network's input, the numbers of a frame
-  Dim scratch = 0;      ///< bytes of a block, for kernels that widen what they multiply
+  Dim work_area = 0;   ///< bytes of an image
+  Dim input_size = 0;  ///< numbers of the network's input
+  Dim scratch = 0;     ///< bytes of a block, for kernels that widen what they multiply
   int picture = -1, predicted_error = -1, latents = -1;  ///< maps; -1: the network has none
   Shape picture_shape, latents_shape;                    ///< of one image
 };

@@ -41,7 +41,7 @@ class IntegerPlanner {
   void transposed_conv(const TracedOp& op, int x, int y);
   void linear(const TracedOp& op, int x, int y);
   void concat(const TracedOp& op, int y);
-  void take_input(const TracedOp* runs, const Variable& y);
+  void take_input(const TracedOp* op, const Variable& y);
 
   Id owner(const Variable& x) const {
     const auto found = flattened_.find(x.node());
@@ -82,7 +82,7 @@ IntegerPlanner::IntegerPlanner(const Network& network, const ActivationRanges& r
   for (const Parameter& p : network.parameters())
     layers_[p.value.node()] = p.name.substr(0, p.name.rfind('.'));
   for (std::size_t i = 0; i < ops.size(); ++i) scales_[ops[i].y.node()] = ranges.scale(i);
-  plan_->input_width = input.dim(input.rank() - 1);
+  plan_->input_size = input.value().size();
   look_ahead(ops, drawn);
   choose_fraction_bits(ops, ranges);
   for (std::size_t i = 0; i < ops.size(); ++i) {
@@ -184,9 +184,11 @@ std::string IntegerPlanner::layer_of(const TracedOp& op) const {
 
 void IntegerPlanner::make(const TracedOp& op) {
   if (op.op == "flatten_channels_first") return;  // the linear layer behind it takes the map as it is
-  if (op.op == "take_runs" && op.inputs[0].node() != input_)
-    throw std::logic_error("Prepared: take_runs has a step for the network's input only");
-  if (op.op == "take_runs") return take_input(&op, op.y);
+  if (op.op == "take_runs" || op.op == "last_frame") {
+    if (op.inputs[0].node() != input_)
+      throw std::logic_error("Prepared: " + std::string(op.op) + " has a step for the network's input only");
+    return take_input(&op, op.y);
+  }
   if (op.inputs[0].node() == input_ && !numbers_.contains(input_) && !bytes_.contains(input_))
     take_input(nullptr, op.inputs[0]);
   const bool product = op.op.starts_with("conv") || op.op == "linear";
@@ -228,12 +230,15 @@ void IntegerPlanner::add_bytes(const Variable& y) {
   add(Kind::to_bytes, "to bytes", x, to).scale = requantise(map(x).scale.step, map(to).scale.step);
 }
 
-void IntegerPlanner::take_input(const TracedOp* runs, const Variable& y) {
+void IntegerPlanner::take_input(const TracedOp* op, const Variable& y) {
   const bool bytes = as_bytes(y.node()) && !as_numbers(y.node());
   const int to = new_map(y, bytes);
   IntegerStep& step = add(Kind::input, "input", -1, to);
-  step.run = runs == nullptr ? y.dim(y.rank() - 1) : runs->settings.run;
-  if (runs != nullptr) step.first = runs->settings.first, step.apart = runs->settings.step;
+  step.run = step.step = y.dim(y.rank() - 1);
+  if (op != nullptr && op->op == "last_frame") step.first = plan_->input_size - y.value().size();
+  if (op != nullptr && op->op == "take_runs")
+    step.first = op->settings.first, step.run = op->settings.run, step.apart = op->settings.step,
+    step.step = op->inputs[0].dim(2);
   if (bytes) step.scale = requantise(plan_->number_step(), map(to).scale.step);
   const Dim values = y.size() / y.dim(0);
   plan_->scratch = std::max(plan_->scratch, (values * 6 + 63) / 64 * 64);

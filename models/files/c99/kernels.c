@@ -246,23 +246,27 @@ static void gated_sum(const struct map *a, const struct map *x, const struct map
     }
 }
 
-/* y = of each frame runs of `run` values from `first` on, `apart` from one to the next. */
-static void take_input(const float *window, const struct map *y, int32_t first, int32_t run, int32_t apart,
+/* y = of the window, for each pixel, runs of `run` values from `first` on, `apart` from one to the next; a pixel's first
+   value is `step` behind that of the one before. */
+static void take_input(const float *from, const struct map *y, int32_t first, int32_t run, int32_t apart, int32_t step,
                        int32_t multiplier, int32_t offset, int32_t shift) {
-  int32_t to = first_of(y), frame, k, i, end;
-  for (frame = 0; frame < y->height * y->width; ++frame, window += SIGNALS)
-    for (k = 0; k < y->channels; k += run)
-      for (i = first + k / run * apart, end = i + run; i < end; ++i, ++to) {
-        float v = window[i] * (1 / NUMBER_STEP);
-        int32_t number;
-        v = v > -32768.0f ? v : -32768.0f;
-        v = v < 32767.0f ? v : 32767.0f;
-        number = (int32_t)(v + 32768.5f) - 32768;
-        if (y->bytes)
-          bytes_of(y)[to] = (uint8_t)clip(((number * multiplier + offset) >> shift) + y->zero, 0, 255);
-        else
-          numbers_of(y)[to] = (int16_t)number;
-      }
+  int32_t line, pixel, k, i, end;
+  for (line = 0; line < y->height; ++line) {
+    int32_t to = first_of(y) + line * line_of(y);
+    for (pixel = 0; pixel < y->width; ++pixel, from += step)
+      for (k = 0; k < y->channels; k += run)
+        for (i = first + k / run * apart, end = i + run; i < end; ++i, ++to) {
+          float v = from[i] * (1 / NUMBER_STEP);
+          int32_t number;
+          v = v > -32768.0f ? v : -32768.0f;
+          v = v < 32767.0f ? v : 32767.0f;
+          number = (int32_t)(v + 32768.5f) - 32768;
+          if (y->bytes)
+            bytes_of(y)[to] = (uint8_t)clip(((number * multiplier + offset) >> shift) + y->zero, 0, 255);
+          else
+            numbers_of(y)[to] = (int16_t)number;
+        }
+  }
 }
 
 static void give(const struct map *x, float *to) {

@@ -62,6 +62,8 @@ std::vector<SuperTacSettings> all_settings() {
   all[1].grouping = Grouping::vertical, all[1].timesteps = 48;
   all[2].channels = 12, all[2].rcabs = 0, all[2].predicted_error = false, all[2].latent = 3,
   all[2].timesteps = 32;
+  all.push_back(tiny());
+  all.back().last_frame_path = true, all.back().timesteps = 32;
   return all;
 }
 
