@@ -10,12 +10,12 @@
 #include "data/plates/plate_file.h"
 #include "data/plates/truth.h"
 #include "data/recordings/recording.h"
-#include "data/windows/normalise_window.h"
+#include "data/windows/transforms/normalise_window.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
 #include "models/files/model_file.h"
-#include "models/inference/prepared.h"
-#include "models/training/loss.h"
+#include "models/inference/prepared/prepared.h"
+#include "models/training/loss/loss.h"
 
 namespace supertac {
 

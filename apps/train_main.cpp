@@ -33,8 +33,9 @@ int train(const Arguments& a, TrainingTask task, Ranks& ranks) {
   const std::string about = task.counts;
   const std::vector<std::string> remarks = task.remarks;
   if (a.flag("strict")) remark(a, remarks);
-  TrainingRun training(a, std::move(task),
-                       {.out = a.output("out"), .force = a.force(), .resume = a.text("resume"), .ranks = ranks});
+  TrainingRun training(
+      a, std::move(task),
+      {.out = a.output("out"), .force = a.force(), .resume = a.text("resume"), .ranks = ranks});
   a.note(about);  // what ends a training before it has begun says one line only
   remark(a, remarks);
   const bool done = training.train();

@@ -1,5 +1,5 @@
 // Trace: notes which ops ran, on what and with which settings, for those who compute the same in another way
-// (models/inference/prepared.h).
+// (models/inference/prepared/prepared.h).
 #pragma once
 
 #include <chrono>

@@ -3,7 +3,7 @@
 
 #include "bench/against_peak.h"
 #include "bench/windows.h"
-#include "models/inference/prepared.h"
+#include "models/inference/prepared/prepared.h"
 #include "models/networks/cost.h"
 #include "models/training/trainer.h"
 #include "tests/allocations.h"

@@ -4,10 +4,10 @@
 #include <cstdio>
 #include <numbers>
 
-#include <supertac/autograd/adam.h>
 #include <supertac/autograd/ops/losses.h>
+#include <supertac/autograd/optimisers/adam.h>
 #include <supertac/layers/linear.h>
-#include <supertac/models/training/schedule.h>
+#include <supertac/models/training/loss/schedule.h>
 
 using namespace supertac;
 

@@ -8,15 +8,15 @@
 #include <exception>
 #include <vector>
 
-#include <supertac/autograd/adam.h>
 #include <supertac/autograd/ops/arithmetic.h>
 #include <supertac/autograd/ops/losses.h>
 #include <supertac/autograd/ops/shaping.h>
 #include <supertac/autograd/ops/vae.h>
+#include <supertac/autograd/optimisers/adam.h>
 #include <supertac/io/images/images.h>
 #include <supertac/layers/convolution.h>
 #include <supertac/layers/linear.h>
-#include <supertac/models/training/schedule.h>
+#include <supertac/models/training/loss/schedule.h>
 
 using namespace supertac;
 

@@ -15,9 +15,9 @@
 #include <string>
 
 #include "data/windows/live_window.h"
-#include "data/windows/normalise_window.h"
+#include "data/windows/transforms/normalise_window.h"
 #include "models/files/model_file.h"
-#include "models/inference/prepared.h"
+#include "models/inference/prepared/prepared.h"
 
 using namespace supertac;
 

@@ -1,5 +1,5 @@
-/* SuperTac for C, and for every language that can call C: a trained model draws super-resolved tactile pictures, of
-   windows that you have or of frames as a sensor gives them.
+/* SuperTac for C, and for every language that can call C: a trained model draws super-resolved tactile
+   pictures, of windows that you have or of frames as a sensor gives them.
 
      supertac_model *model = supertac_open("model.safetensors", SUPERTAC_FP32);
      supertac_live *live = supertac_live_new(model, 300, 0);
@@ -7,10 +7,10 @@
        supertac_live_push(live, time_s, frame);
        if (supertac_live_picture(live, picture, NULL) == 1) show(picture);
 
-   Link with `pkg-config --cflags --libs supertac`, or find_package(supertac) and supertac::c. Functions that can fail
-   return NULL or -1, and supertac_error() then says in one line what was wrong. Nothing is printed, and no exception
-   leaves the library. The pictures have the same bits as those of the programs, on every processor and with any number
-   of threads. */
+   Link with `pkg-config --cflags --libs supertac`, or find_package(supertac) and supertac::c. Functions that
+   can fail return NULL or -1, and supertac_error() then says in one line what was wrong. Nothing is printed,
+   and no exception leaves the library. The pictures have the same bits as those of the programs, on every
+   processor and with any number of threads. */
 #ifndef SUPERTAC_H
 #define SUPERTAC_H
 
@@ -32,63 +32,64 @@ typedef struct supertac_live supertac_live;   /* one sensor; used by one thread 
 enum { SUPERTAC_FP32 = 0, SUPERTAC_INT8 = 1 };
 
 typedef struct {
-  size_t size;           /* set it to sizeof(supertac_description) before the call: later versions have more */
-  int rows, columns;     /* of the array of taxels */
-  int channels;          /* numbers that a taxel gives */
-  int signals;           /* rows * columns * channels, the numbers of a frame */
-  int timesteps;         /* frames of a window */
-  int height, width;     /* of a picture, in pixels */
-  int predicts_error;    /* 1: the model also says how far off it may be */
-  double rate_hz;        /* of a window's frames */
-  double pitch_mm;       /* from taxel to taxel */
-  double pixel_mm;       /* the size of a pixel */
-  double filter_s;       /* moving average that the training signals went through; 0: none; -1: of several lengths */
-  double rest, span;     /* a sample is clip((rest - value) / span, 0, 1), value in the sensor's unit */
+  size_t size;        /* set it to sizeof(supertac_description) before the call: later versions have more */
+  int rows, columns;  /* of the array of taxels */
+  int channels;       /* numbers that a taxel gives */
+  int signals;        /* rows * columns * channels, the numbers of a frame */
+  int timesteps;      /* frames of a window */
+  int height, width;  /* of a picture, in pixels */
+  int predicts_error; /* 1: the model also says how far off it may be */
+  double rate_hz;     /* of a window's frames */
+  double pitch_mm;    /* from taxel to taxel */
+  double pixel_mm;    /* the size of a pixel */
+  double
+      filter_s; /* moving average that the training signals went through; 0: none; -1: of several lengths */
+  double rest, span; /* a sample is clip((rest - value) / span, 0, 1), value in the sensor's unit */
 } supertac_description;
 
 /* "0.2.0" */
-SUPERTAC_API const char *supertac_version(void);
+SUPERTAC_API const char* supertac_version(void);
 
 /* Of this thread's last call that failed; "" before. Valid until its next call. */
-SUPERTAC_API const char *supertac_error(void);
+SUPERTAC_API const char* supertac_error(void);
 
 /* A model that supertac-train wrote, from a file or from memory, which may be freed afterwards. `precision`:
    SUPERTAC_FP32 or SUPERTAC_INT8. NULL on failure. */
-SUPERTAC_API supertac_model *supertac_open(const char *path, int precision);
-SUPERTAC_API supertac_model *supertac_open_memory(const void *bytes, size_t size, int precision);
+SUPERTAC_API supertac_model* supertac_open(const char* path, int precision);
+SUPERTAC_API supertac_model* supertac_open_memory(const void* bytes, size_t size, int precision);
 /* What was opened; NULL is allowed. Its supertac_live have to be freed before. */
-SUPERTAC_API void supertac_close(supertac_model *model);
+SUPERTAC_API void supertac_close(supertac_model* model);
 
 /* 0, or -1. */
-SUPERTAC_API int supertac_describe(const supertac_model *model, supertac_description *description);
+SUPERTAC_API int supertac_describe(const supertac_model* model, supertac_description* description);
 
-/* `count` windows [count][timesteps][signals] in the sensor's unit, already at the model's rate, as training had them:
-   scaled, and normalised where the model is. `windows` may be `values`. 0, or -1. */
-SUPERTAC_API int supertac_scale(const supertac_model *model, size_t count, const float *values, float *windows);
+/* `count` windows [count][timesteps][signals] in the sensor's unit, already at the model's rate, as training
+   had them: scaled, and normalised where the model is. `windows` may be `values`. 0, or -1. */
+SUPERTAC_API int supertac_scale(const supertac_model* model, size_t count, const float* values,
+                                float* windows);
 
-/* Draws `count` windows [count][timesteps][signals], each as training had it (supertac_scale, supertac_live_window),
-   oldest frame first.
-   pictures: [count][height][width], 0 is the flat plate and 1 its highest point.
-   predicted_errors: the same shape, how far from the truth a pixel is expected to be; NULL where it is not wanted.
-   threads: at least 1. A picture does not depend on it, nor on the windows beside its own.
-   0, or -1; -1 also where predicted errors are wanted of a model without. */
-SUPERTAC_API int supertac_draw(const supertac_model *model, size_t count, const float *windows, float *pictures,
-                               float *predicted_errors, int threads);
+/* Draws `count` windows [count][timesteps][signals], each as training had it (supertac_scale,
+   supertac_live_window), oldest frame first. pictures: [count][height][width], 0 is the flat plate and 1 its
+   highest point. predicted_errors: the same shape, how far from the truth a pixel is expected to be; NULL
+   where it is not wanted. threads: at least 1. A picture does not depend on it, nor on the windows beside its
+   own. 0, or -1; -1 also where predicted errors are wanted of a model without. */
+SUPERTAC_API int supertac_draw(const supertac_model* model, size_t count, const float* windows,
+                               float* pictures, float* predicted_errors, int threads);
 
 /* Frames of a sensor to windows: moving average, resampling, scaling and normalisation, as in training.
-   frame_hz: the sensor's rate. filter_s: moving average that its frames have gone through already, 0 for none.
-   NULL on failure. */
-SUPERTAC_API supertac_live *supertac_live_new(const supertac_model *model, double frame_hz, double filter_s);
-SUPERTAC_API void supertac_live_free(supertac_live *live);
+   frame_hz: the sensor's rate. filter_s: moving average that its frames have gone through already, 0 for
+   none. NULL on failure. */
+SUPERTAC_API supertac_live* supertac_live_new(const supertac_model* model, double frame_hz, double filter_s);
+SUPERTAC_API void supertac_live_free(supertac_live* live);
 
-/* One frame [signals], row by row, in the sensor's unit; time_s is the sensor's clock. 0, or -1 for a null pointer. A
-   frame that is not finite or not later than the one before counts as lost. */
-SUPERTAC_API int supertac_live_push(supertac_live *live, double time_s, const float *frame);
+/* One frame [signals], row by row, in the sensor's unit; time_s is the sensor's clock. 0, or -1 for a null
+   pointer. A frame that is not finite or not later than the one before counts as lost. */
+SUPERTAC_API int supertac_live_push(supertac_live* live, double time_s, const float* frame);
 
-/* The window or the picture that ends with the newest frame. 1: written; 0: there is none yet, or a gap was just
-   before; -1: failed. */
-SUPERTAC_API int supertac_live_window(supertac_live *live, float *window);
-SUPERTAC_API int supertac_live_picture(supertac_live *live, float *picture, float *predicted_error);
+/* The window or the picture that ends with the newest frame. 1: written; 0: there is none yet, or a gap was
+   just before; -1: failed. */
+SUPERTAC_API int supertac_live_window(supertac_live* live, float* window);
+SUPERTAC_API int supertac_live_picture(supertac_live* live, float* picture, float* predicted_error);
 
 #ifdef __cplusplus
 }

@@ -5,7 +5,7 @@
 #include "autograd/kernels/fast/isa/isa.h"
 #include "data/recordings/simulator.h"
 #include "io/numbers/sha256.h"
-#include "models/inference/prepared.h"
+#include "models/inference/prepared/prepared.h"
 #include "models/training/trainer.h"
 
 namespace supertac {

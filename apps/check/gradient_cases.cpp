@@ -16,7 +16,7 @@
 #include "layers/residual.h"
 #include "models/networks/classifier.h"
 #include "models/networks/frame_model.h"
-#include "models/training/loss.h"
+#include "models/training/loss/loss.h"
 
 namespace supertac {
 namespace {

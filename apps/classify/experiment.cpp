@@ -6,11 +6,11 @@
 #include <variant>
 
 #include "apps/common/running/signals.h"
-#include "autograd/adam.h"
 #include "autograd/ops/losses.h"
+#include "autograd/optimisers/adam.h"
 #include "data/windows/batching.h"
 #include "models/files/classifier_file.h"
-#include "models/training/schedule.h"
+#include "models/training/loss/schedule.h"
 
 namespace supertac {
 namespace {

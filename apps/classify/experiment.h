@@ -7,7 +7,7 @@
 
 #include "apps/classify/exam.h"
 #include "apps/classify/views.h"
-#include "data/windows/augment.h"
+#include "data/windows/transforms/augment.h"
 #include "io/files/file.h"
 
 namespace supertac {

@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "data/scores/metrics.h"
-#include "data/windows/signal_features.h"
+#include "data/windows/transforms/signal_features.h"
 #include "io/numbers/numbers.h"
 #include "models/inference/interval.h"
 

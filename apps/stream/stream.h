@@ -9,12 +9,12 @@
 #include <string>
 
 #include "apps/stream/latency_histogram.h"
-#include "apps/stream/line_output.h"
 #include "apps/stream/picture_log.h"
 #include "apps/stream/picture_maker.h"
 #include "apps/stream/raw_array.h"
-#include "apps/stream/terminal_view.h"
-#include "apps/stream/web_view.h"
+#include "apps/stream/views/line_output.h"
+#include "apps/stream/views/terminal_view.h"
+#include "apps/stream/views/web_view.h"
 #include "models/files/classifier_file.h"
 
 namespace supertac {

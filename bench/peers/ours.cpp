@@ -21,7 +21,7 @@
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 #include "models/files/model_file.h"
-#include "models/inference/prepared.h"
+#include "models/inference/prepared/prepared.h"
 #include "models/networks/cost.h"
 #include "models/training/trainer.h"
 

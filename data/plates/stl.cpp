@@ -144,7 +144,8 @@ std::vector<Triangle> parse_stl(std::span<const std::byte> bytes, const std::str
   std::vector<Triangle> triangles;
   if (bytes.size() >= kHeadBytes && length == bytes.size()) {
     triangles = parse_binary(bytes, name);
-  } else if (Words::same(Words(text, name).next().substr(0, 5), "solid") && text.find('\0') == std::string_view::npos) {
+  } else if (Words::same(Words(text, name).next().substr(0, 5), "solid") &&
+             text.find('\0') == std::string_view::npos) {
     triangles = parse_text(text, name);
   } else if (bytes.size() < kHeadBytes) {
     throw FileError(name, "has " + std::to_string(bytes.size()) +

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "data/windows/normalise_window.h"
+#include "data/windows/transforms/normalise_window.h"
 
 namespace supertac {
 namespace {

@@ -11,7 +11,7 @@
 #include "data/plates/plate_file.h"
 #include "data/plates/truth.h"
 #include "data/windows/chosen_plates.h"
-#include "data/windows/normalise_window.h"
+#include "data/windows/transforms/normalise_window.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/text.h"
 

@@ -9,10 +9,10 @@
 #include <stdexcept>
 
 #include "c99_text.h"
-#include "data/windows/normalise_window.h"
+#include "data/windows/transforms/normalise_window.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
-#include "models/inference/integer_plan.h"
+#include "models/inference/prepared/integer_plan.h"
 
 namespace supertac {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "data/windows/signal_features.h"
+#include "data/windows/transforms/signal_features.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 #include "models/files/json_entry.h"

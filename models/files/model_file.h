@@ -14,7 +14,7 @@
 #include "layers/checkpoint.h"
 #include "models/inference/ensemble.h"
 #include "models/inference/novelty.h"
-#include "models/inference/ranges.h"
+#include "models/inference/prepared/ranges.h"
 #include "models/networks/frame_model.h"
 #include "models/networks/supertac_model.h"
 
@@ -83,7 +83,7 @@ std::vector<ModelFile> load_models(std::span<const std::string> paths, ModelKind
 /// What the products of a network are made of.
 enum class Precision {
   fp32,
-  int8,  ///< bytes: faster, and the pictures differ a little (models/inference/prepared.h)
+  int8,  ///< bytes: faster, and the pictures differ a little (models/inference/prepared/prepared.h)
 };
 /// "fp32" or "int8"; throws std::invalid_argument.
 Precision precision_of(const std::string& name);

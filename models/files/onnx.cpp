@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "autograd/trace.h"
-#include "data/windows/normalise_window.h"
+#include "data/windows/transforms/normalise_window.h"
 #include "io/numbers/numbers.h"
 #include "models/files/onnx_file.h"
 #include "models/inference/interval.h"

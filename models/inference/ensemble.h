@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "models/inference/prepared.h"
+#include "models/inference/prepared/prepared.h"
 
 namespace supertac {
 

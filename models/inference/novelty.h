@@ -10,8 +10,8 @@
 
 namespace supertac {
 
-/// The Mahalanobis distance of a window's features z (data/windows/signal_features.h) from those of the
-/// training windows (Lee et al. 2018, with one class):
+/// The Mahalanobis distance of a window's features z (data/windows/transforms/signal_features.h) from those
+/// of the training windows (Lee et al. 2018, with one class):
 ///   distance = |L^-1 (z - mean)| / sqrt(D),   covariance = L L^T
 /// about 1 for a window like those of training. The network's own latents would not do: training with dropped
 /// taxels makes them blind to these. Nor would a likelihood of the VAEs: it is high for flat signals whether

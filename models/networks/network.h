@@ -17,7 +17,7 @@ struct Estimate {
   Tensor picture;          ///< [N,rows scale,columns scale,1]
   Tensor predicted_error;  ///< the same: how far from the truth a pixel is expected to be; undefined where
                            ///< nothing says so
-  Tensor latents;  ///< [N,latents]; undefined for a network without any
+  Tensor latents;          ///< [N,latents]; undefined for a network without any
 };
 
 /// The same on the graph.

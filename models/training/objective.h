@@ -22,7 +22,7 @@ struct Batch {
   Tensor noise;  ///< [N,Objective::noise()], ~ N(0,1)
 };
 
-/// Of a batch: the loss, and what tells a collapse (models/training/collapse.h).
+/// Of a batch: the loss, and what tells a collapse (models/training/loss/collapse.h).
 struct BatchOutput {
   Loss loss;
   Variable picture;

@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "data/windows/augment.h"
 #include "data/windows/split.h"
+#include "data/windows/transforms/augment.h"
 #include "models/inference/interval.h"
 #include "models/networks/frame_model.h"
 #include "models/networks/supertac_model.h"
-#include "models/training/loss.h"
+#include "models/training/loss/loss.h"
 #include "models/training/training_state.h"
 
 namespace supertac {

@@ -6,11 +6,11 @@
 
 #include "data/plates/truth.h"
 #include "data/scores/metrics.h"
-#include "data/windows/signal_features.h"
+#include "data/windows/transforms/signal_features.h"
 #include "layers/checkpoint.h"
 #include "models/inference/evaluation.h"
 #include "models/inference/novelty.h"
-#include "models/inference/ranges.h"
+#include "models/inference/prepared/ranges.h"
 
 namespace supertac {
 namespace {

@@ -8,7 +8,7 @@
 #include "autograd/ops/arithmetic.h"
 #include "io/numbers/hash.h"
 #include "models/inference/evaluation.h"
-#include "models/training/diagnosis.h"
+#include "models/training/loss/diagnosis.h"
 
 namespace supertac {
 namespace {
@@ -121,8 +121,7 @@ void Trainer::run(MicroBatch& micro_batch) const {
     micro_batch.variances.means.add(mean.value(), first);
     first += static_cast<std::size_t>(mean.dim(1));
   }
-  if (std::isfinite(micro_batch.terms.total))
-    return backward(static_cast<real>(share) * output.loss.total);
+  if (std::isfinite(micro_batch.terms.total)) return backward(static_cast<real>(share) * output.loss.total);
   micro_batch.trouble = where_not_finite(output.loss.total, parameters);
 }
 

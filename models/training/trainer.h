@@ -23,7 +23,7 @@
 #include <vector>
 
 #include "data/windows/batching.h"
-#include "models/training/collapse.h"
+#include "models/training/loss/collapse.h"
 #include "models/training/objective.h"
 #include "models/training/ranks.h"
 #include "models/training/training_state.h"
@@ -38,9 +38,9 @@ struct StepReport : LossTerms {
   std::int64_t step = 0;     ///< from 1
   double gradient_norm = 0;  ///< before clipping
   double learning_rate = 0;
-  int active_latents = 0;  ///< of all groups, in this batch (models/training/collapse.h)
+  int active_latents = 0;  ///< of all groups, in this batch (models/training/loss/collapse.h)
   /// For the last 100 steps after warm-up the pictures said nothing of the truths, or no latent number was
-  /// active (models/training/collapse.h). Lower the learning rate or, when no latent is active, beta.
+  /// active (models/training/loss/collapse.h). Lower the learning rate or, when no latent is active, beta.
   bool collapsed = false;
   bool stop = false;  ///< whether a process wishes to stop after this step
 };

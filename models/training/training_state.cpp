@@ -9,7 +9,7 @@
 #include "autograd/kernels/elementwise.h"
 #include "io/numbers/numbers.h"
 #include "layers/checkpoint.h"
-#include "models/training/diagnosis.h"
+#include "models/training/loss/diagnosis.h"
 
 namespace supertac {
 namespace {

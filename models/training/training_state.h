@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "autograd/adam.h"
+#include "autograd/optimisers/adam.h"
 #include "layers/module.h"
+#include "models/training/loss/schedule.h"
 #include "models/training/ranks.h"
-#include "models/training/schedule.h"
 
 namespace supertac {
 

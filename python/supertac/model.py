@@ -11,7 +11,7 @@ from .files import read, write
 Pictures = collections.namedtuple("Pictures", "picture predicted_error latents")
 Pictures.__doc__ = "[N,height,width] each, predicted_error is None for a model without; latents [N,groups x latent]."
 
-# Of normalised windows (data/windows/normalise_window.h).
+# Of normalised windows (data/windows/transforms/normalise_window.h).
 BINS, LEAST_GAIN, REST_REMOVED, REST_SHARE, TOP_RANK = 256, np.float32(0.15), np.float32(0.5), 20, 3
 
 OWN = ("encoder.", "decoder.", "upsampler.")  # tensors of the network; others belong to what stands beside it

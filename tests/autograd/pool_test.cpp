@@ -6,10 +6,10 @@
 #include <thread>
 #include <vector>
 
-#include "autograd/adam.h"
 #include "autograd/ops/activations.h"
 #include "autograd/ops/convolution.h"
 #include "autograd/ops/losses.h"
+#include "autograd/optimisers/adam.h"
 #include "tests/autograd/check.h"
 
 namespace supertac {

@@ -3,12 +3,12 @@
 
 #include <cstring>
 
-#include "autograd/adam.h"
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/attention.h"
 #include "autograd/ops/convolution.h"
 #include "autograd/ops/losses.h"
+#include "autograd/optimisers/adam.h"
 #include "tests/autograd/check.h"
 
 namespace supertac {

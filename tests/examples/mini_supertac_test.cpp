@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <fstream>
 
-#include "autograd/adam.h"
+#include "autograd/optimisers/adam.h"
 #include "layers/checkpoint.h"
-#include "models/training/loss.h"
+#include "models/training/loss/loss.h"
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wreturn-type"  // main() alone may do without

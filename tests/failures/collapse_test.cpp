@@ -7,7 +7,7 @@
 
 #include "autograd/ops/activations.h"
 #include "autograd/ops/losses.h"
-#include "models/training/schedule.h"
+#include "models/training/loss/schedule.h"
 #include "tests/models/support.h"
 
 namespace supertac {

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "data/windows/live_window.h"
-#include "data/windows/normalise_window.h"
+#include "data/windows/transforms/normalise_window.h"
 #include "io/files/file.h"
 #include "io/numbers/random.h"
 #include "models/files/model_file.h"
-#include "models/inference/prepared.h"
+#include "models/inference/prepared/prepared.h"
 #include "tests/io/temporary_folder.h"
 #include "tests/models/support.h"
 

@@ -4,8 +4,8 @@ namespace supertac {
 
 /// Takes SIGINT, SIGTERM and SIGHUP as a wish to stop: the first one sets a flag that long work looks at, a
 /// second one of the same kind ends the program at once. A SIGHUP ignored by the caller (nohup) stays
-/// ignored; a SIGINT that a script ignores for what it starts in the background does not: a printer that moves
-/// must be stoppable.
+/// ignored; a SIGINT that a script ignores for what it starts in the background does not: a printer that
+/// moves must be stoppable.
 void catch_signals();
 
 /// While it lives a second signal does not end the program either: there is something that may not be left as

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <functional>
 
-#include "autograd/adam.h"
+#include "autograd/optimisers/adam.h"
 
 namespace lessons {
 namespace {

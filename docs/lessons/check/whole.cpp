@@ -2,7 +2,6 @@
 #include <cmath>
 #include <memory>
 
-#include "autograd/adam.h"
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/attention.h"
@@ -11,6 +10,7 @@
 #include "autograd/ops/losses.h"
 #include "autograd/ops/shaping.h"
 #include "autograd/ops/vae.h"
+#include "autograd/optimisers/adam.h"
 #include "docs/lessons/check/check.h"
 #include "io/numbers/random.h"
 

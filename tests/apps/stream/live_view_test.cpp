@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "apps/stream/latency_histogram.h"
-#include "apps/stream/terminal_view.h"
+#include "apps/stream/views/terminal_view.h"
 
 namespace supertac {
 namespace {

@@ -9,7 +9,7 @@
 #include <filesystem>
 
 #include "apps/stream/stream.h"
-#include "apps/stream/terminal_view.h"
+#include "apps/stream/views/terminal_view.h"
 #include "data/recordings/simulator.h"
 #include "data/windows/windows.h"
 #include "hardware/ports/serial_port.h"

@@ -9,7 +9,7 @@
 #include <random>
 #include <span>
 
-#include "apps/stream/web_view.h"
+#include "apps/stream/views/web_view.h"
 #include "apps/web/encode.h"
 #include "apps/web/pages.h"
 #include "apps/web/web_server.h"

@@ -5,13 +5,13 @@
 
 #include <bit>
 
-#include "autograd/adam.h"
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/convolution.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/losses.h"
 #include "autograd/ops/vae.h"
+#include "autograd/optimisers/adam.h"
 #include "tests/autograd/check.h"
 
 namespace supertac {

@@ -8,7 +8,7 @@
 
 #include "data/windows/live_window.h"
 #include "io/files/file.h"
-#include "models/inference/prepared.h"
+#include "models/inference/prepared/prepared.h"
 #include "tests/io/temporary_folder.h"
 #include "tests/models/support.h"
 

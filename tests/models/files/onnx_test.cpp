@@ -3,12 +3,12 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "data/windows/normalise_window.h"
+#include "data/windows/transforms/normalise_window.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/hash.h"
 #include "models/files/onnx.h"
 #include "models/files/onnx_file.h"
-#include "models/inference/prepared.h"
+#include "models/inference/prepared/prepared.h"
 #include "tests/models/support.h"
 
 namespace supertac {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "data/windows/signal_features.h"
+#include "data/windows/transforms/signal_features.h"
 #include "tests/models/support.h"
 
 namespace supertac {

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "autograd/adam.h"
 #include "autograd/ops/losses.h"
+#include "autograd/optimisers/adam.h"
 #include "tests/models/support.h"
 
 namespace supertac {

@@ -5,7 +5,7 @@
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/losses.h"
 #include "models/networks/frame_model.h"
-#include "models/training/loss.h"
+#include "models/training/loss/loss.h"
 
 namespace supertac {
 namespace {

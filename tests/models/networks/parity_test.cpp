@@ -5,10 +5,10 @@
 
 #include <map>
 
-#include "autograd/adam.h"
+#include "autograd/optimisers/adam.h"
 #include "layers/checkpoint.h"
 #include "models/networks/supertac_model.h"
-#include "models/training/loss.h"
+#include "models/training/loss/loss.h"
 #include "tests/parity/parity.h"
 
 namespace supertac {

@@ -1,5 +1,6 @@
-// Products of bytes, for networks that are prepared with less than fp32 (models/inference/prepared.h). Sums
-// of integers are exact: every instruction set, and every order, gives the same bits.
+// Products of bytes, for networks that are prepared with less than fp32
+// (models/inference/prepared/prepared.h). Sums of integers are exact: every instruction set, and every order,
+// gives the same bits.
 #pragma once
 
 #include <array>
@@ -16,7 +17,7 @@ namespace supertac::kernels {
 ///   v = max(v, (v * negative_slope + 2048) >> 12)        unless negative_slope is kNoSlope
 ///   a byte:   clip(v + zero, 0, 255)
 ///   a number: clip(v, -32768, 32767)
-/// Nothing overflows: the multipliers are chosen so (models/inference/quantise.h).
+/// Nothing overflows: the multipliers are chosen so (models/inference/prepared/quantise.h).
 struct Outcome {
   const std::int32_t *multiplier = nullptr, *offset = nullptr, *shift = nullptr;  // [cout]
   std::int32_t negative_slope = kNoSlope;                                         // of 4096

@@ -13,7 +13,8 @@ ALWAYS_INLINE Vec rectified(Vec x, real negative_slope) {
   constexpr real kLeast = std::numeric_limits<real>::lowest(),
                  kInfinite = -std::numeric_limits<real>::infinity();
   if (negative_slope == 1) return x;
-  return Vec::rectify(x, Vec::broadcast(negative_slope), Vec::broadcast(negative_slope == 0 ? kLeast : kInfinite));
+  return Vec::rectify(x, Vec::broadcast(negative_slope),
+                      Vec::broadcast(negative_slope == 0 ? kLeast : kInfinite));
 }
 
 // Which pixels of a tile meet a tap at the border of a map, for the maps that occur: a tile of 8 covers a row

@@ -5,7 +5,6 @@
 #include <cstring>
 #include <limits>
 
-#include "autograd/adam.h"
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/fast/winograd.h"
 #include "autograd/ops/activations.h"
@@ -13,6 +12,7 @@
 #include "autograd/ops/attention.h"
 #include "autograd/ops/losses.h"
 #include "autograd/ops/vae.h"
+#include "autograd/optimisers/adam.h"
 #include "tests/autograd/check.h"
 
 namespace supertac::kernels {

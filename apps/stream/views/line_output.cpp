@@ -1,0 +1,155 @@
+#include "apps/stream/views/line_output.h"
+
+#include <fcntl.h>
+#include <netdb.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+
+#include "apps/common/running/signals.h"
+#include "hardware/ports/serial_port.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kLastWaitS = 1;
+constexpr int kWaitMs = 50;
+
+// JSON has no word for what is not a number.
+void append(std::string& line, double value, int decimals) {
+  line += std::isfinite(value) ? format(value, decimals) : "null";
+}
+
+void append(std::string& line, const char* name, std::span<const float> values) {
+  line += std::string(",\"") + name + "\":[";
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (i > 0) line += ',';
+    append(line, static_cast<double>(values[i]), 4);
+  }
+  line += ']';
+}
+
+}  // namespace
+
+std::string picture_line(const Seen& seen, bool unlike_training) {
+  std::string line =
+      "{\"timestamp\":" + format(seen.time_s, 6) + ",\"number\":" + std::to_string(seen.number);
+  append(line, "volts", seen.volts);
+  if (!seen.picture.empty()) append(line, "picture", seen.picture);
+  if (!seen.half_widths.empty()) {
+    double sum = 0;
+    for (const float half : seen.half_widths) sum += static_cast<double>(half);
+    line += ",\"half_width\":";
+    append(line, sum / static_cast<double>(seen.half_widths.size()), 4);
+  }
+  if (seen.distance) {
+    line += ",\"distance\":";
+    append(line, *seen.distance, 4);
+    line += std::string(",\"unlike_training\":") + (unlike_training ? "1" : "0");
+  }
+  return line + "}\n";
+}
+
+UdpOutput::UdpOutput(const std::string& address) {
+  const std::size_t colon = address.rfind(':');
+  const std::string host = address.substr(0, colon),
+                    port = colon < address.size() ? address.substr(colon + 1) : "";
+  const auto number = parse_uint(port);
+  if (host.empty() || !number || *number < 1 || *number > 65535)
+    throw std::runtime_error("--udp: expected HOST:PORT, such as 127.0.0.1:9870, found " +
+                             in_quotes(address));
+  addrinfo wanted{}, *found = nullptr;
+  wanted.ai_socktype = SOCK_DGRAM;
+  if (const int error = getaddrinfo(host.c_str(), port.c_str(), &wanted, &found); error != 0)
+    throw std::runtime_error("--udp: " + in_quotes(host) + ": " + gai_strerror(error));
+  socket_ = socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const bool connected = socket_ >= 0 && connect(socket_, found->ai_addr, found->ai_addrlen) == 0;
+  freeaddrinfo(found);
+  if (connected) return;
+  const std::string why = printable(std::generic_category().message(errno));
+  if (socket_ >= 0) close(socket_);
+  throw std::runtime_error("--udp: " + in_quotes(address) + ": " + why);
+}
+
+UdpOutput::~UdpOutput() { close(socket_); }
+
+// A refused one tells that nobody listened to the datagram before: somebody may by now.
+void UdpOutput::send(const std::string& line) {
+  const auto sent = [&] { return ::send(socket_, line.data(), line.size(), MSG_NOSIGNAL) >= 0; };
+  if (!sent() && !(errno == ECONNREFUSED && sent())) ++lost_;
+}
+
+PipeOutput::PipeOutput(int file, bool patient) : file_(file), patient_(patient), thread_([this] { run(); }) {}
+
+PipeOutput::~PipeOutput() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+    stopped_s_ = monotonic_seconds();
+  }
+  changed_.notify_one();
+  thread_.join();
+}
+
+void PipeOutput::send(std::string line) {
+  {
+    std::unique_lock lock(mutex_);
+    while (patient_ && !gone_ && waiting_.size() == kWaiting && !interrupted())
+      changed_.wait_for(lock, std::chrono::milliseconds(kWaitMs));
+    if (gone_) throw std::runtime_error("stdout: nobody reads it any more");
+    if (waiting_.size() == kWaiting) {
+      ++lost_;
+      return;
+    }
+    waiting_.push_back(std::move(line));
+  }
+  changed_.notify_one();
+}
+
+void PipeOutput::run() {
+  for (std::unique_lock lock(mutex_);;) {
+    changed_.wait(lock, [this] { return stop_ || !waiting_.empty(); });
+    if (waiting_.empty()) return;
+    std::string text;
+    for (const std::string& line : waiting_) text += line;
+    waiting_.clear();
+    lock.unlock();
+    changed_.notify_one();
+    const bool written = write_all(text);
+    lock.lock();
+    if (!written) {
+      gone_ = true;
+      return;
+    }
+  }
+}
+
+// Waits in steps, so that the end of the program need not wait for a reader that has stopped. The descriptor
+// is shared with other programs and may not be made non-blocking; a pipe that polls ready takes PIPE_BUF
+// bytes.
+bool PipeOutput::write_all(const std::string& text) {
+  constexpr std::size_t kAtOnce = 4096;
+  for (std::size_t at = 0; at < text.size();) {
+    pollfd ready{file_, POLLOUT, 0};
+    const int polled = poll(&ready, 1, kWaitMs);
+    {
+      const std::lock_guard lock(mutex_);
+      if (stop_ && monotonic_seconds() - stopped_s_ > kLastWaitS) return false;
+    }
+    if (polled <= 0) continue;
+    const ssize_t count = ::write(file_, text.data() + at, std::min(kAtOnce, text.size() - at));
+    if (count < 0 && errno != EINTR && errno != EAGAIN) return false;
+    if (count > 0) at += static_cast<std::size_t>(count);
+  }
+  return true;
+}
+
+}  // namespace supertac

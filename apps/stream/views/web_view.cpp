@@ -1,0 +1,82 @@
+#include "apps/stream/views/web_view.h"
+
+#include <nlohmann/json.hpp>
+
+#include "apps/web/encode.h"
+#include "apps/web/pages.h"
+#include "data/sensors/rig.h"
+
+namespace supertac {
+
+WebView::WebView(const WebAddress& address, const WebSource& source, Recorder& recorder)
+    : source_(source), recorder_(recorder), server_(address, site()) {}
+
+WebSite WebView::site() {
+  return {.page = live_page(),
+          .hello = [this] { return hello(); },
+          .news = [this] { return news(); },
+          .actions = {{"rezero",
+                       [this] {
+                         rezero_ = true;
+                         return std::string("what the array feels now counts as nothing");
+                       }},
+                      {"record", [this] { return recorder_.start(); }},
+                      {"stop", [this] { return recorder_.stop(); }}},
+          .file = [this](const std::string& name) { return recorder_.file(name); }};
+}
+
+void WebView::update(const LiveState& state) {
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (lock) newest_ = state;
+}
+
+std::string WebView::hello() const {
+  return nlohmann::json{{"badge", source_.badge},
+                        {"source", source_.source},
+                        {"rows", source_.array.rows},
+                        {"columns", source_.array.columns},
+                        {"pitch_mm", source_.array.pitch_mm},
+                        {"scale", source_.scale},
+                        {"height_mm", rig::kTextureHeightMm},
+                        {"predicts_error", source_.predicts_error},
+                        {"names_textures", source_.names_textures},
+                        {"unit", source_.unit},
+                        {"silent", source_.silent},
+                        {"map", colour_map_base64()}}
+      .dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+}
+
+std::string WebView::news() {
+  std::optional<LiveState> state;
+  {
+    const std::lock_guard lock(mutex_);
+    state.swap(newest_);
+  }
+  return state ? web_event(*state, recorder_.status()) : std::string();
+}
+
+std::string web_event(const LiveState& state, const Recorder::Status& recorder) {
+  nlohmann::json event = {{"n", state.number},
+                          {"t", state.time_s},
+                          {"rate", state.frames_per_s},
+                          {"p50", state.median_ms},
+                          {"p99", state.p99_ms},
+                          {"lost", state.lost},
+                          {"dropped", state.dropped},
+                          {"said", recorder.said},
+                          {"recording", recorder.recording},
+                          {"recorded_s", recorder.seconds},
+                          {"files", recorder.files}};
+  const bool raw = state.top > 0;
+  if (!state.taxels.empty() && (raw || !state.picture.empty())) event["felt"] = levels_base64(state.taxels);
+  if (!state.picture.empty()) event["picture"] = levels_base64(state.picture);
+  if (raw) event["top"] = state.top;
+  if (!state.half_widths.empty()) event["wide"] = levels_base64(state.half_widths);
+  if (state.distance) event["distance"] = *state.distance, event["unlike"] = state.unlike_training;
+  if (!state.texture.empty())
+    event["texture"] = state.texture, event["probability"] = state.texture_probability;
+  if (std::isfinite(state.x_mm)) event["x"] = state.x_mm, event["y"] = state.y_mm;
+  return event.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace supertac

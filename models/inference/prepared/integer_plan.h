@@ -1,0 +1,80 @@
+// A network in whole numbers (int8), as data: the steps that this machine runs and that supertac-export
+// writes as C for microcontrollers (models/files/c_code.h), so that both draw the same bits.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "autograd/kernels/fast/int8/int8.h"
+#include "models/inference/prepared/quantise.h"
+#include "models/inference/prepared/ranges.h"
+#include "models/networks/network.h"
+
+namespace supertac {
+
+/// Images [height][width][channels] with a margin around whose value stands for 0, in memory that is used
+/// again behind the last step that reads them. Either bytes, each map with a scale of its own, or numbers of
+/// 16 bits in steps of 2^-fraction_bits, for what bytes would be too coarse for: sums of residual blocks,
+/// latents, the picture.
+struct IntegerMap {
+  Dim height = 1, width = 1, channels = 1;
+  Dim margin_h = 0, margin_w = 0;
+  bool bytes = false;
+  Scale scale;
+  Dim offset = 0;  // bytes from the beginning of an image's work area
+
+  Dim line() const { return (width + 2 * margin_w) * channels; }
+  Dim image() const { return (height + 2 * margin_h) * line(); }  // elements
+  Dim origin() const { return margin_h * line() + margin_w * channels; }
+  Dim size() const { return image() * (bytes ? 1 : 2); }  // bytes
+};
+
+struct IntegerStep {
+  enum class Kind {
+    input,      ///< y = the network's input, or of it, for each pixel, runs of `run` numbers from `first` on
+    to_bytes,   ///< y = x in another scale
+    product,    ///< a convolution or linear layer, or every second pixel of a transposed convolution
+    copy,       ///< y, from channel `at` on, = x without its margin
+    mean,       ///< y = mean over the pixels of x
+    gates,      ///< y = sigmoid(x), in 4096ths
+    gated_sum,  ///< y = a + x * gates, or a + x
+  };
+  Kind kind = Kind::copy;
+  std::string name;                        ///< "encoder.0.conv.1", or what it computes
+  int x = -1, a = -1, gates = -1, y = -1;  ///< maps
+  bool writes_margin = false;              ///< the first step that writes y: its margin is filled before
+
+  Requantise scale = {};  ///< input, to_bytes
+  Dim first = 0, run = 0, apart = 0,
+      step = 0;  ///< input; `step`: from one pixel's first number to the next's
+  Dim at = 0;    ///< copy
+
+  // product: `job` has all but pointers and images; offsets are from the maps' first pixels.
+  kernels::ByteProductJob job = {};
+  std::vector<Dim> segments = {};
+  Dim x_offset = 0, y_offset = 0;
+  QuantisedProduct weights = {};  // [segments * length][cout]
+  Tensor packed = {};             // as the kernels take the weights of bytes
+  std::vector<kernels::BytePlaces> places = {};
+};
+
+struct IntegerPlan {
+  /// Throws std::logic_error naming an op that has no step, std::invalid_argument for the ranges of another
+  /// network.
+  static std::shared_ptr<const IntegerPlan> of(const Network& network, const ActivationRanges& ranges);
+  /// Throws nothing; inputs as Network::estimate.
+  Estimate run(const Tensor& inputs) const;
+  float number_step() const;
+
+  std::vector<IntegerMap> maps;
+  std::vector<IntegerStep> steps;
+  int fraction_bits = 0;
+  Dim work_area = 0;   ///< bytes of an image
+  Dim input_size = 0;  ///< numbers of the network's input
+  Dim scratch = 0;     ///< bytes of a block, for kernels that widen what they multiply
+  int picture = -1, predicted_error = -1, latents = -1;  ///< maps; -1: the network has none
+  Shape picture_shape, latents_shape;                    ///< of one image
+};
+
+}  // namespace supertac

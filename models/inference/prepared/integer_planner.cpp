@@ -1,0 +1,360 @@
+// From what an inference was seen to do (autograd/trace.h) to the steps of
+// models/inference/prepared/integer_plan.h.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <stdexcept>
+
+#include "autograd/trace.h"
+#include "models/inference/prepared/integer_plan.h"
+#include "models/inference/prepared/taps.h"
+
+namespace supertac {
+namespace {
+
+using kernels::ConvSettings;
+using Kind = IntegerStep::Kind;
+using Id = const detail::Node*;
+
+// A product before its weights are whole: w [segments * length][cout], and where its taps lie.
+struct Taps {
+  Dim height = 1, width = 1;
+  kernels::Strides from, to;
+  std::vector<Dim> segments;
+  Dim length = 0;
+  Dim y_offset = 0;
+  Tensor w, bias;
+};
+
+class IntegerPlanner {
+ public:
+  IntegerPlanner(const Network& network, const ActivationRanges& ranges, const Variable& input,
+                 const std::vector<TracedOp>& ops, const Drawing& drawn);
+  std::shared_ptr<IntegerPlan> plan() { return std::move(plan_); }
+
+ private:
+  void look_ahead(const std::vector<TracedOp>& ops, const Drawing& drawn);
+  void choose_fraction_bits(const std::vector<TracedOp>& ops, const ActivationRanges& ranges);
+  void make(const TracedOp& op);
+  void conv(const TracedOp& op, int x, int y);
+  void transposed_conv(const TracedOp& op, int x, int y);
+  void linear(const TracedOp& op, int x, int y);
+  void concat(const TracedOp& op, int y);
+  void take_input(const TracedOp* op, const Variable& y);
+
+  Id owner(const Variable& x) const {
+    const auto found = flattened_.find(x.node());
+    return found == flattened_.end() ? x.node() : found->second;
+  }
+  bool is_of_bytes(const TracedOp& op) const;
+  bool as_bytes(Id id) const { return read_as_bytes_.contains(id); }
+  bool as_numbers(Id id) const { return read_as_numbers_.contains(id); }
+  int new_map(const Variable& y, bool bytes);
+  IntegerMap& map(int i) { return plan_->maps[static_cast<std::size_t>(i)]; }
+  int number_of(const Variable& x) const { return numbers_.at(owner(x)); }
+  IntegerStep& add(Kind kind, std::string name, int x, int y);
+  void add_product(const TracedOp& op, int x, int y, Taps taps);
+  void add_bytes(const Variable& y);
+  void release(std::size_t op);
+  std::string layer_of(const TracedOp& op) const;
+
+  std::shared_ptr<IntegerPlan> plan_ = std::make_shared<IntegerPlan>();
+  Id input_;
+  std::map<Id, std::string> layers_;       // by weight
+  std::map<Id, Id> flattened_;             // value -> the map whose numbers it has
+  std::map<Id, Dim> pixels_of_unflatten_;  // value that is unflattened -> pixels
+  std::map<Id, std::size_t> last_use_;
+  std::map<Id, Margin> margins_;
+  std::map<Id, Scale> scales_;  // as bytes
+  std::set<Id> read_as_bytes_, read_as_numbers_;
+  std::map<Id, int> numbers_, bytes_;
+  std::set<int> live_, written_;
+  std::map<int, Id> value_of_;
+};
+
+IntegerPlanner::IntegerPlanner(const Network& network, const ActivationRanges& ranges, const Variable& input,
+                               const std::vector<TracedOp>& ops, const Drawing& drawn)
+    : input_(input.node()) {
+  if (ranges.ops() != ops.size())
+    throw std::invalid_argument("Prepared: the ranges are those of " + std::to_string(ranges.ops()) +
+                                " ops, the network has " + std::to_string(ops.size()));
+  for (const Parameter& p : network.parameters())
+    layers_[p.value.node()] = p.name.substr(0, p.name.rfind('.'));
+  for (std::size_t i = 0; i < ops.size(); ++i) scales_[ops[i].y.node()] = ranges.scale(i);
+  plan_->input_size = input.value().size();
+  look_ahead(ops, drawn);
+  choose_fraction_bits(ops, ranges);
+  for (std::size_t i = 0; i < ops.size(); ++i) {
+    make(ops[i]);
+    release(i);
+  }
+  plan_->picture = number_of(drawn.picture), plan_->picture_shape = drawn.picture.shape();
+  if (drawn.predicted_error.defined()) plan_->predicted_error = number_of(drawn.predicted_error);
+  if (drawn.latents.defined()) {
+    plan_->latents = number_of(drawn.latents);
+    plan_->latents_shape = drawn.latents.shape();
+  }
+}
+
+void IntegerPlanner::look_ahead(const std::vector<TracedOp>& ops, const Drawing& drawn) {
+  for (std::size_t i = 0; i < ops.size(); ++i) {
+    const TracedOp& op = ops[i];
+    if (op.op == "flatten_channels_first") flattened_[op.y.node()] = owner(op.inputs[0]);
+    if (op.op == "unflatten_channels_first")
+      pixels_of_unflatten_[op.inputs[0].node()] = op.inputs[0].dim(1) / op.y.dim(op.y.rank() - 1);
+    if (op.op.starts_with("conv")) margins_[owner(op.inputs[0])].widen(op.settings.conv);
+    for (const Variable& x : op.inputs) last_use_[owner(x)] = i;
+    if (op.op == "flatten_channels_first") continue;
+    const bool of_bytes = is_of_bytes(op);
+    for (const Variable& x : op.inputs) (of_bytes ? read_as_bytes_ : read_as_numbers_).insert(owner(x));
+  }
+  for (const Variable* y : {&drawn.picture, &drawn.predicted_error, &drawn.latents})
+    if (y->defined()) {
+      last_use_[owner(*y)] = std::numeric_limits<std::size_t>::max();
+      read_as_numbers_.insert(owner(*y));
+    }
+}
+
+// Twice the largest number fits; sums of residual blocks may be larger than they were seen to be.
+void IntegerPlanner::choose_fraction_bits(const std::vector<TracedOp>& ops, const ActivationRanges& ranges) {
+  constexpr double kRoom = 16384;
+  double largest = 1;
+  for (std::size_t i = 0; i < ops.size(); ++i)
+    if (as_numbers(ops[i].y.node())) largest = std::max(largest, ranges.largest(i));
+  plan_->fraction_bits = static_cast<int>(std::clamp(std::floor(std::log2(kRoom / largest)), 0.0, 14.0));
+}
+
+// Where whole quads of channels meet enough outputs to repay the way into bytes and back. The picture's own
+// convolution reads numbers: measured, rounding its input costs the most (bench/results).
+bool IntegerPlanner::is_of_bytes(const TracedOp& op) const {
+  if (!scales_.contains(owner(op.inputs[0]))) return false;
+  if (op.op == "linear") return owner(op.inputs[0]) != op.inputs[0].node();
+  return op.op.starts_with("conv") && op.inputs[0].dim(op.inputs[0].rank() - 1) % kernels::kQuad == 0 &&
+         op.y.dim(op.y.rank() - 1) > 1;
+}
+
+// In the first gap between the maps that are still read.
+int IntegerPlanner::new_map(const Variable& y, bool bytes) {
+  constexpr Dim kLine = 64;  // of the cache, in bytes
+  const Margin margin = margins_.contains(y.node()) ? margins_.at(y.node()) : Margin{};
+  IntegerMap m{.channels = y.dim(y.rank() - 1),
+               .margin_h = margin.height,
+               .margin_w = margin.width,
+               .bytes = bytes,
+               .scale = bytes ? scales_.at(y.node()) : Scale{plan_->number_step(), 0, 32768}};
+  if (y.rank() > 2) m.width = y.dim(y.rank() - 2);
+  if (y.rank() > 3) m.height = y.dim(1);
+  const auto rounded = [](Dim size) { return (size + kLine - 1) / kLine * kLine; };
+  std::vector<std::pair<Dim, Dim>> taken;
+  for (const int i : live_) taken.emplace_back(map(i).offset, map(i).offset + rounded(map(i).size()));
+  std::ranges::sort(taken);
+  for (const auto& [begin, end] : taken) {
+    if (begin >= m.offset + rounded(m.size())) break;
+    m.offset = std::max(m.offset, end);
+  }
+  plan_->work_area = std::max(plan_->work_area, m.offset + rounded(m.size()));
+  plan_->maps.push_back(m);
+  const int index = static_cast<int>(plan_->maps.size()) - 1;
+  live_.insert(index);
+  value_of_[index] = y.node();
+  (bytes ? bytes_ : numbers_)[y.node()] = index;
+  return index;
+}
+
+void IntegerPlanner::release(std::size_t op) {
+  std::erase_if(live_, [&](int i) {
+    const auto last = last_use_.find(value_of_.at(i));
+    return last == last_use_.end() || last->second <= op;
+  });
+}
+
+IntegerStep& IntegerPlanner::add(Kind kind, std::string name, int x, int y) {
+  IntegerStep step;
+  step.kind = kind, step.name = std::move(name), step.x = x, step.y = y;
+  step.writes_margin = written_.insert(y).second && map(y).margin_h + map(y).margin_w > 0;
+  plan_->steps.push_back(std::move(step));
+  return plan_->steps.back();
+}
+
+std::string IntegerPlanner::layer_of(const TracedOp& op) const {
+  const auto found = op.inputs.size() > 1 ? layers_.find(op.inputs[1].node()) : layers_.end();
+  return found == layers_.end() ? std::string(op.op) : found->second;
+}
+
+void IntegerPlanner::make(const TracedOp& op) {
+  if (op.op == "flatten_channels_first") return;  // the linear layer behind it takes the map as it is
+  if (op.op == "take_runs" || op.op == "last_frame") {
+    if (op.inputs[0].node() != input_)
+      throw std::logic_error("Prepared: " + std::string(op.op) + " has a step for the network's input only");
+    return take_input(&op, op.y);
+  }
+  if (op.inputs[0].node() == input_ && !numbers_.contains(input_) && !bytes_.contains(input_))
+    take_input(nullptr, op.inputs[0]);
+  const bool product = op.op.starts_with("conv") || op.op == "linear";
+  if (product) {
+    const bool bytes_in = is_of_bytes(op);
+    // Sums of bytes become what is read; what is read as both, or sums of numbers, numbers first.
+    const bool bytes_out = bytes_in && as_bytes(op.y.node()) && !as_numbers(op.y.node());
+    const int x = bytes_in ? bytes_.at(owner(op.inputs[0])) : number_of(op.inputs[0]);
+    const int y = new_map(op.y, bytes_out);
+    if (op.op == "linear")
+      linear(op, x, y);
+    else if (op.settings.conv.transposed)
+      transposed_conv(op, x, y);
+    else
+      conv(op, x, y);
+    if (bytes_out) return;
+  } else if (op.op == "unflatten_channels_first") {
+    add(Kind::copy, "unflatten", number_of(op.inputs[0]), new_map(op.y, false));
+  } else if (op.op == "concat") {
+    concat(op, new_map(op.y, false));
+  } else if (op.op == "global_mean") {
+    add(Kind::mean, "mean over the pixels", number_of(op.inputs[0]), new_map(op.y, false));
+  } else if (op.op == "sigmoid" && op.y.rank() == 2) {
+    add(Kind::gates, "sigmoid", number_of(op.inputs[0]), new_map(op.y, false));
+  } else if (op.op == "gated_sum" || op.op == "add") {
+    IntegerStep& step = add(Kind::gated_sum, op.op == "add" ? "sum" : "gated sum", number_of(op.inputs[1]),
+                            new_map(op.y, false));
+    step.a = number_of(op.inputs[0]);
+    if (op.op == "gated_sum") step.gates = number_of(op.inputs[2]);
+  } else {
+    throw std::logic_error("Prepared: no step in whole numbers computes the op " + std::string(op.op));
+  }
+  add_bytes(op.y);
+}
+
+void IntegerPlanner::add_bytes(const Variable& y) {
+  if (!as_bytes(y.node())) return;
+  const int x = numbers_.at(y.node()), to = new_map(y, true);
+  add(Kind::to_bytes, "to bytes", x, to).scale = requantise(map(x).scale.step, map(to).scale.step);
+}
+
+void IntegerPlanner::take_input(const TracedOp* op, const Variable& y) {
+  const bool bytes = as_bytes(y.node()) && !as_numbers(y.node());
+  const int to = new_map(y, bytes);
+  IntegerStep& step = add(Kind::input, "input", -1, to);
+  step.run = step.step = y.dim(y.rank() - 1);
+  if (op != nullptr && op->op == "last_frame") step.first = plan_->input_size - y.value().size();
+  if (op != nullptr && op->op == "take_runs")
+    step.first = op->settings.first, step.run = op->settings.run, step.apart = op->settings.step,
+    step.step = op->inputs[0].dim(2);
+  if (bytes) step.scale = requantise(plan_->number_step(), map(to).scale.step);
+  const Dim values = y.size() / y.dim(0);
+  plan_->scratch = std::max(plan_->scratch, (values * 6 + 63) / 64 * 64);
+  if (!bytes) add_bytes(y);
+}
+
+void IntegerPlanner::concat(const TracedOp& op, int y) {
+  Dim at = 0;
+  for (const Variable& input : op.inputs) {
+    const int x = number_of(input);
+    if (op.y.rank() > 2) throw std::logic_error("Prepared: a concat of maps has no step in whole numbers");
+    add(Kind::copy, "concat", x, y).at = at;
+    at += map(x).channels;
+  }
+}
+
+void IntegerPlanner::add_product(const TracedOp& op, int x, int y, Taps t) {
+  constexpr double kSlopes = kernels::Outcome::kNoSlope;
+  const auto slope = static_cast<std::int32_t>(std::lrint(op.settings.negative_slope * kSlopes));
+  if (slope != kernels::Outcome::kNoSlope && (slope < 0 || slope > 63))
+    throw std::logic_error("Prepared: a negative slope of " + std::to_string(op.settings.negative_slope) +
+                           " has no step in whole numbers");
+  IntegerStep& s = add(Kind::product, layer_of(op), x, y);
+  const Dim rows = static_cast<Dim>(t.segments.size()) * t.length, cout = t.bias.size();
+  s.weights = quantise(rows, t.w.values(), t.bias.values(), map(x).scale, map(y).scale);
+  s.segments = std::move(t.segments), s.y_offset = t.y_offset;
+  const bool bytes = map(x).bytes;
+  const Dim padded = (cout + kernels::kByteOutputs - 1) / kernels::kByteOutputs * kernels::kByteOutputs;
+  s.job = {.images = 1,
+           .height = t.height,
+           .width = t.width,
+           .from = t.from,
+           .to = t.to,
+           .length = t.length,
+           .cout = bytes ? padded : cout,
+           .kept = cout,
+           .outcome = {.negative_slope = slope, .zero = map(y).bytes ? map(y).scale.zero : 0}};
+  if (!bytes) return;
+  s.packed = Tensor::zeros(Shape{(rows * padded + 3) / 4});
+  auto* const packed = reinterpret_cast<std::int8_t*>(s.packed.data());
+  for (Dim k = 0; k < rows; ++k)
+    for (Dim o = 0; o < cout; ++o)
+      packed[(k / kernels::kQuad * padded + o) * kernels::kQuad + k % kernels::kQuad] =
+          s.weights.w[static_cast<std::size_t>(k * cout + o)];
+  s.places = places_of(s.job);
+  kernels::ByteProductJob job = s.job;
+  job.segments = s.segments.data(), job.segment_count = static_cast<Dim>(s.segments.size());
+  constexpr Dim kBlock = 4, kWide = 2;
+  plan_->scratch = std::max(plan_->scratch, (kernels::reach_of(job).count * kBlock * kWide + 63) / 64 * 64);
+}
+
+void IntegerPlanner::conv(const TracedOp& op, int to_read, int to_write) {
+  const ConvSettings& s = op.settings.conv;
+  const IntegerMap &x = map(to_read), &y = map(to_write);
+  Taps taps{.height = y.height,
+            .width = y.width,
+            .from = {x.image(), s.stride_h * x.line(), s.stride_w * x.channels},
+            .to = {y.image(), y.line(), y.channels},
+            .segments = {},
+            .length = s.kernel_w * x.channels,
+            .w = op.inputs[1].value(),
+            .bias = op.inputs[2].value()};
+  for (Dim ky = 0; ky < s.kernel_h; ++ky)
+    taps.segments.push_back((ky - s.padding_h) * x.line() - s.padding_w * x.channels);
+  add_product(op, to_read, to_write, std::move(taps));
+}
+
+void IntegerPlanner::transposed_conv(const TracedOp& op, int to_read, int to_write) {
+  const ConvSettings& s = op.settings.conv;
+  for (Dim top = 0; top < s.stride_h; ++top) {
+    for (Dim left = 0; left < s.stride_w; ++left) {
+      const IntegerMap &x = map(to_read), &y = map(to_write);
+      const Phase v(top, y.height, s.kernel_h, s.stride_h, s.padding_h);
+      const Phase h(left, y.width, s.kernel_w, s.stride_w, s.padding_w);
+      if (v.count == 0 || h.count == 0) continue;
+      Taps taps{.height = v.count,
+                .width = h.count,
+                .from = {x.image(), x.line(), x.channels},
+                .to = {y.image(), s.stride_h * y.line(), s.stride_w * y.channels},
+                .segments = {},
+                .length = h.taps * x.channels,
+                .y_offset = top * y.line() + left * y.channels,
+                .w = phase_weights(s, v, h, op.inputs[1]),
+                .bias = op.inputs[2].value()};
+      for (Dim jy = v.taps - 1; jy >= 0; --jy)
+        taps.segments.push_back((v.base - jy) * x.line() + (h.base - h.taps + 1) * x.channels);
+      add_product(op, to_read, to_write, std::move(taps));
+    }
+  }
+}
+
+void IntegerPlanner::linear(const TracedOp& op, int to_read, int to_write) {
+  const IntegerMap &x = map(to_read), &y = map(to_write);
+  const Dim in = op.inputs[0].dim(1), out = op.y.dim(1);
+  if (x.margin_h + x.margin_w > 0) throw std::logic_error("Prepared: a flattened picture has margins");
+  const auto unflatten = pixels_of_unflatten_.find(op.y.node());
+  const Dim pixels = unflatten == pixels_of_unflatten_.end() ? 1 : unflatten->second;
+  const Tensor w = with_pixels_outside(op.inputs[1].value(), 1, in / x.channels, out);
+  add_product(op, to_read, to_write,
+              {.from = {x.image(), 0, 0},
+               .to = {y.image(), 0, 0},
+               .segments = {0},
+               .length = in,
+               .w = with_pixels_outside(w, in, pixels, 1),
+               .bias = with_pixels_outside(op.inputs[2].value(), 1, pixels, 1)});
+}
+
+}  // namespace
+
+std::shared_ptr<const IntegerPlan> IntegerPlan::of(const Network& network, const ActivationRanges& ranges) {
+  const NoGrad no_grad;
+  const Variable input(Tensor::zeros(network.input_shape(1)));
+  const Trace trace;
+  const Drawing drawn = network.draw(input);
+  return IntegerPlanner(network, ranges, input, trace.ops(), drawn).plan();
+}
+
+}  // namespace supertac

@@ -1,0 +1,65 @@
+#include "models/inference/prepared/plan.h"
+
+#include <algorithm>
+#include <array>
+
+namespace supertac {
+namespace {
+
+Shape with_count(const Shape& one, Dim count) {
+  std::array<Dim, kMaxRank> dims{};
+  std::copy(one.dims().begin(), one.dims().end(), dims.begin());
+  dims[0] = count;
+  return Shape(std::span<const Dim>(dims.data(), one.dims().size()));
+}
+
+}  // namespace
+
+static void clear_margin(const FeatureMap& map, Dim images, real* image) {
+  if (map.margin_h + map.margin_w == 0) return;
+  const Dim ends = map.margin_h * map.line(), side = map.margin_w * map.channels;
+  for (real* const last = image + images * map.image(); image < last; image += map.image()) {
+    std::fill_n(image, ends, real(0));
+    std::fill_n(image + map.image() - ends, ends, real(0));
+    for (real* line = image + ends; line < image + map.image() - ends; line += map.line()) {
+      std::fill_n(line, side, real(0));
+      std::fill_n(line + map.line() - side, side, real(0));
+    }
+  }
+}
+
+void Plan::clear_margins(const Block& block) const {
+  for (const FeatureMap& map : planes_) std::fill_n(block.begin(map), map.image(), real(0));
+  for (const FeatureMap& map : buffers_) clear_margin(map, block.images, block.begin(map));
+}
+
+void Plan::copy_out(const Block& block, const FeatureMap& map, Tensor& to, Dim first) const {
+  const Dim run = map.width * map.channels;
+  real* target = to.data() + first * map.height * run;
+  for (Dim n = 0; n < block.images; ++n) {
+    const real* line = block.first_pixel(map) + n * map.image();
+    for (Dim y = 0; y < map.height; ++y, line += map.line(), target += run) std::copy_n(line, run, target);
+  }
+}
+
+Estimate Plan::run(const Tensor& inputs) const {
+  const Dim count = inputs.dim(0), size = count == 0 ? 0 : inputs.size() / count;
+  Estimate out{.picture = Tensor(with_count(picture_shape_, count)), .predicted_error = {}, .latents = {}};
+  if (predicts_error_) out.predicted_error = Tensor(out.picture.shape());
+  if (has_latents_) out.latents = Tensor(with_count(latents_shape_, count));
+  const Dim images = std::min(count, block_);
+  Tensor memory(Shape{scratch_ + workspace_ * images});
+  real* const workspace = memory.data() + scratch_;
+  for (Dim first = 0; first < count; first += block_) {
+    const Block block{inputs.data() + first * size, std::min(block_, count - first), workspace, memory.data(),
+                      filters_anew_};
+    if (first == 0 || block.images != block_) clear_margins(block);
+    for (const PlanStep& step : steps_) step(block);
+    copy_out(block, picture_, out.picture, first);
+    if (predicts_error_) copy_out(block, predicted_error_, out.predicted_error, first);
+    if (has_latents_) copy_out(block, latents_, out.latents, first);
+  }
+  return out;
+}
+
+}  // namespace supertac

@@ -1,0 +1,39 @@
+// A network made ready to draw many pictures: what its module description does, noted once
+// (autograd/trace.h), as a list of steps on planned memory. Weights are packed and transformed once, nothing
+// is on a graph, and a warm call takes no memory from the heap and no lock.
+#pragma once
+
+#include <memory>
+
+#include "models/inference/prepared/ranges.h"
+#include "models/networks/network.h"
+
+namespace supertac {
+
+class Plan;
+struct IntegerPlan;
+
+/// Draws the network's pictures up to rounding (1e-5 of the largest value). A picture has the same bits alone
+/// and in any batch, on every processor. Copies share their weights; any thread may call.
+class Prepared {
+ public:
+  /// Takes the weights as they are now. The network must outlive this: with SUPERTAC_ISA=plain its own
+  /// forward step draws. Throws std::logic_error naming an op that has no step.
+  explicit Prepared(const Network& network);
+  /// In whole numbers (int8): products of bytes, and numbers of 16 bits where bytes would be too coarse
+  /// (models/inference/prepared/integer_plan.h). The pictures differ by what the ranges' steps are coarse.
+  /// They have the same bits on every processor, a microcontroller too, and in any batch. Throws
+  /// std::invalid_argument when the ranges are another network's.
+  Prepared(const Network& network, const ActivationRanges& ranges);
+
+  const Network& network() const { return *network_; }
+  /// Throws as Network::draw.
+  Estimate estimate(const Tensor& inputs) const;
+
+ private:
+  const Network* network_;
+  std::shared_ptr<const Plan> plan_;
+  std::shared_ptr<const IntegerPlan> integers_;  // instead
+};
+
+}  // namespace supertac

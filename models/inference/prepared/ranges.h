@@ -1,0 +1,34 @@
+// Between which values the results of a network's ops lie: what a network prepared in bytes needs to know.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "layers/checkpoint.h"
+#include "models/inference/prepared/quantise.h"
+#include "models/networks/network.h"
+
+namespace supertac {
+
+/// Smallest and largest value of each op of an inference, in their order, over the inputs that were added.
+class ActivationRanges {
+ public:
+  /// Runs the network on these inputs.
+  void add(const Network& network, const Tensor& inputs);
+  /// As stored() wrote it; nothing for a file without. Throws std::runtime_error naming path and tensor.
+  static std::optional<ActivationRanges> read(const SafetensorsFile& file, const std::string& path);
+  StoredTensor stored() const;
+
+  std::size_t ops() const { return low_.size(); }
+  /// How bytes stand for the values of an op: 0 is one of them. Throws std::out_of_range.
+  Scale scale(std::size_t op) const;
+  /// The largest magnitude of the values of an op. Throws std::out_of_range.
+  double largest(std::size_t op) const { return std::max(-low_.at(op), high_.at(op)); }
+
+ private:
+  std::vector<float> low_, high_;
+};
+
+}  // namespace supertac

@@ -1,0 +1,144 @@
+// Pictures for other programs: each line and datagram is parsed as its reader would, and who does not read
+// costs nothing.
+#include "apps/stream/views/line_output.h"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <fstream>
+
+#include "io/files/json.h"
+
+namespace supertac {
+namespace {
+
+const std::vector<float> kVolts(16, 2.4F), kPicture(256, 0.5F), kHalf(256, 0.25F);
+
+Seen seen(std::uint64_t number) {
+  return {.number = number,
+          .time_s = static_cast<double>(number) / 1008,
+          .volts = kVolts,
+          .picture = kPicture,
+          .half_widths = {},
+          .distance = {}};
+}
+
+TEST(PictureLine, HoldsWhatIsKnownAndNothingElse) {
+  Seen one = seen(3);
+  const std::string line = picture_line(one, false);
+  EXPECT_TRUE(line.ends_with("}\n"));
+  auto json = parse_json_limited(line);
+  EXPECT_NEAR(json["timestamp"].get<double>(), 3.0 / 1008, 1e-6);
+  EXPECT_EQ(json["volts"].get<std::vector<float>>(), kVolts);
+  EXPECT_EQ(json["picture"].get<std::vector<float>>(), kPicture);
+  EXPECT_EQ(json.size(), 4U);
+  one.half_widths = kHalf, one.distance = 1.5;
+  json = parse_json_limited(picture_line(one, true));
+  EXPECT_EQ(json["half_width"], 0.25);
+  EXPECT_EQ(json["distance"], 1.5);
+  EXPECT_EQ(json["unlike_training"], 1);
+  const std::vector<float> strange(16, std::nanf(""));
+  one.volts = strange;
+  EXPECT_TRUE(parse_json_limited(picture_line(one, true))["volts"][0].is_null());
+}
+
+// What PlotJuggler's JSON parser takes: one object a datagram, "timestamp" a number, all else numbers,
+// objects or arrays of them, which it flattens.
+TEST(UdpOutput, EveryDatagramIsWhatPlotJugglerTakesAndNoneIsLost) {
+  const int receiver = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof place;
+  ASSERT_EQ(bind(receiver, reinterpret_cast<sockaddr*>(&place), size), 0);
+  getsockname(receiver, reinterpret_cast<sockaddr*>(&place), &size);
+  UdpOutput output("127.0.0.1:" + std::to_string(ntohs(place.sin_port)));
+  char buffer[65536];
+  for (std::uint64_t i = 0; i < 1008; ++i) {
+    output.send(picture_line(seen(i), false));
+    const ssize_t count = recv(receiver, buffer, sizeof buffer, 0);
+    ASSERT_GT(count, 0);
+    const auto json = parse_json_limited({buffer, static_cast<std::size_t>(count)});
+    ASSERT_EQ(json["number"], i);
+    ASSERT_TRUE(json["timestamp"].is_number());
+    for (const auto& [name, value] : json.items())
+      for (const auto& part : value.is_array() ? value : nlohmann::ordered_json::array({value}))
+        ASSERT_TRUE(part.is_number()) << name;
+  }
+  EXPECT_EQ(output.lost(), 0U);
+  close(receiver);
+  for (int i = 0; i < 10; ++i) output.send("nobody listens\n");  // and nothing happens
+}
+
+TEST(UdpOutput, AnAddressThatIsNoneIsNamed) {
+  for (const char* address :
+       {"", "127.0.0.1", "127.0.0.1:", ":9870", "127.0.0.1:0", "127.0.0.1:65536", "[::1]"}) {
+    try {
+      const UdpOutput output(address);
+      FAIL() << address;
+    } catch (const std::runtime_error& error) {
+      EXPECT_NE(std::string(error.what()).find("expected HOST:PORT"), std::string::npos) << error.what();
+    }
+  }
+}
+
+class Pipe : public testing::Test {
+ protected:
+  Pipe() {
+    signal(SIGPIPE, SIG_IGN);
+    EXPECT_EQ(pipe2(ends_, O_CLOEXEC), 0);
+  }
+  ~Pipe() override {
+    for (const int end : ends_)
+      if (end >= 0) close(end);
+  }
+  int ends_[2] = {-1, -1};
+};
+
+TEST_F(Pipe, WhoDoesNotReadLosesLinesAndHoldsUpNobody) {
+  const auto begin = std::chrono::steady_clock::now();
+  {
+    PipeOutput output(ends_[1], false);
+    for (std::uint64_t i = 0; i < 5000; ++i) output.send(picture_line(seen(i), false));
+    EXPECT_GT(output.lost(), 500U);
+  }
+  EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 200);
+}
+
+TEST_F(Pipe, APatientOneLosesNothing) {
+  std::thread reader;
+  std::string all;
+  {
+    PipeOutput output(ends_[1], true);
+    reader = std::thread([&] {
+      char buffer[4096];
+      for (ssize_t count; (count = read(ends_[0], buffer, sizeof buffer)) > 0;)
+        all.append(buffer, static_cast<std::size_t>(count));
+    });
+    for (int i = 0; i < 20'000; ++i) output.send(std::to_string(i) + "\n");
+    EXPECT_EQ(output.lost(), 0U);
+  }
+  close(std::exchange(ends_[1], -1));
+  reader.join();
+  std::string expected;
+  for (int i = 0; i < 20'000; ++i) expected += std::to_string(i) + "\n";
+  EXPECT_EQ(all, expected);
+}
+
+TEST_F(Pipe, AReaderThatLeavesIsNoticed) {
+  PipeOutput output(ends_[1], false);
+  close(std::exchange(ends_[0], -1));
+  const auto send_on = [&] {
+    for (int i = 0; i < 10'000; ++i, usleep(500)) output.send("line\n");
+  };
+  EXPECT_THROW(send_on(), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace supertac

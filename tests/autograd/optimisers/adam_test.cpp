@@ -1,0 +1,202 @@
+#include "autograd/optimisers/adam.h"
+
+#include <limits>
+
+#include "autograd/optimisers/orthogonal.h"
+#include "tests/autograd/check.h"
+
+namespace supertac {
+namespace {
+
+using namespace test;
+
+struct Single {
+  Variable x = parameter(Tensor::full({1}, 1));
+  Adam adam;
+  explicit Single(const AdamOptions& options) : adam({x}, options) {}
+  double step(double gradient) {
+    x.mutable_grad().fill(static_cast<real>(gradient));
+    return adam.step();
+  }
+  double value() const { return static_cast<double>(x.item()); }
+};
+
+// The formula in double precision.
+struct Reference {
+  double x = 1, m = 0, v = 0;
+  int t = 0;
+  void step(double g, const AdamOptions& o) {
+    ++t;
+    m = o.beta1 * m + (1 - o.beta1) * g;
+    v = o.beta2 * v + (1 - o.beta2) * g * g;
+    x -= o.learning_rate * (m / (1 - std::pow(o.beta1, t))) /
+         (std::sqrt(v / (1 - std::pow(o.beta2, t))) + o.epsilon);
+  }
+};
+
+TEST(Adam, TheFirstStepIsTheLearningRateWhateverTheGradient) {
+  for (const double g : {1e-5, -1e-3, 1.0, 1e5}) {
+    Single s({.learning_rate = 0.1});
+    s.step(g);
+    EXPECT_NEAR(s.value(), 1 - (g > 0 ? 0.1 : -0.1) / (1 + 1e-8 / std::abs(g)), 1e-6) << g;
+  }
+}
+
+TEST(Adam, FollowsTheFormula) {
+  const AdamOptions options{.learning_rate = 0.05, .beta1 = 0.8, .beta2 = 0.99, .epsilon = 1e-2};
+  Single s(options);
+  Reference r;
+  for (int i = 0; i < 200; ++i) {
+    const double g = std::sin(0.3 * i) + 0.2;
+    s.step(g);
+    r.step(g, options);
+    ASSERT_NEAR(s.value(), r.x, 2e-5) << "step " << i;
+  }
+}
+
+// 1 - 0.999f is off by 1.3e-5; with constant gradients the bias-corrected moments are g and g^2 exactly.
+TEST(Adam, SecondMomentCarriesNoBias) {
+  Single s({});
+  s.step(1);
+  EXPECT_NEAR(static_cast<double>(s.adam.second_moments()[0].item()), 1e-3, 1e-9);
+  EXPECT_NEAR(static_cast<double>(s.adam.first_moments()[0].item()), 0.1, 1e-8);
+}
+
+TEST(Adam, ZeroGradientsForALongTimeChangeNothing) {
+  Single s({.learning_rate = 0.1});
+  for (int i = 0; i < 100; ++i) s.step(1);
+  for (int i = 0; i < 100'000; ++i) s.step(0);
+  const double rested = s.value();
+  for (int i = 0; i < 1000; ++i) s.step(0);
+  EXPECT_EQ(s.value(), rested);
+  EXPECT_TRUE(std::isfinite(rested));
+  EXPECT_EQ(s.adam.first_moments()[0].item(), 0);  // not a denormal number, which would be slow for ever
+  EXPECT_EQ(s.adam.second_moments()[0].item(), 0);
+  s.step(1);
+  EXPECT_NEAR(s.value(), rested - 0.1 * 0.1 / std::sqrt(1e-3), 1e-3);  // a fresh start, bias correction gone
+}
+
+TEST(Adam, OneSpikeIsSurvived) {
+  Single s({.learning_rate = 1e-3});
+  for (int i = 0; i < 100; ++i) s.step(1);
+  const double before = s.value();
+  s.step(1e8);
+  EXPECT_LT(std::abs(s.value() - before), 1e-2);  // one step is bounded by rate (1-b1)/sqrt(1-b2) = 3.2 rates
+  for (int i = 0; i < 45'000; ++i) s.step(1);
+  EXPECT_TRUE(std::isfinite(s.value()));
+  const double late = s.value();
+  s.step(1);
+  EXPECT_NEAR(late - s.value(), 1e-3, 1e-4);  // v has forgotten it
+}
+
+// g^2 beyond fp32 would make the second moment infinite and the parameter immovable for ever.
+TEST(Adam, AGradientWhoseSquareOverflowsIsRefusedLikeInfinity) {
+  Single s({});
+  EXPECT_FALSE(std::isfinite(s.step(1e30)));
+  EXPECT_EQ(s.value(), 1);
+  EXPECT_EQ(s.adam.steps(), 0);
+  Single clipped({.clip_norm = 1});
+  EXPECT_NEAR(clipped.step(1e30) / 1e30, 1, 1e-6);
+  EXPECT_NEAR(clipped.value(), 1 - 1e-3, 1e-6);
+}
+
+TEST(Adam, NonFiniteGradientsLeaveEverythingUnchanged) {
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    const Variable a = parameter(Tensor::full({3}, 1)), b = parameter(Tensor::full({2}, 2));
+    Adam adam({a, b}, {.clip_norm = 1});
+    Variable handle_a = a, handle_b = b;
+    handle_a.mutable_grad().fill(1);
+    handle_b.mutable_grad().data()[1] = static_cast<real>(bad);
+    EXPECT_FALSE(std::isfinite(adam.step()));
+    EXPECT_EQ(adam.steps(), 0);
+    expect_values(a.value(), {3}, {1, 1, 1});
+    expect_values(b.value(), {2}, {2, 2});
+    expect_values(adam.first_moments()[0], {3}, {0, 0, 0});
+    expect_values(adam.second_moments()[0], {3}, {0, 0, 0});
+  }
+}
+
+TEST(Adam, ClipsTheNormOverAllParameters) {
+  const Variable a = parameter(Tensor::zeros({1})), b = parameter(Tensor::zeros({1}));
+  Adam adam({a, b}, {.clip_norm = 1});
+  Variable(a).mutable_grad().fill(3);
+  Variable(b).mutable_grad().fill(4);
+  EXPECT_NEAR(adam.step(), 5, 1e-12);  // the norm before clipping
+  EXPECT_NEAR(static_cast<double>(adam.first_moments()[0].item()), 0.1 * 0.6, 1e-7);
+  EXPECT_NEAR(static_cast<double>(adam.first_moments()[1].item()), 0.1 * 0.8, 1e-7);
+  Single below({.clip_norm = 1});
+  below.step(0.5);
+  EXPECT_NEAR(static_cast<double>(below.adam.first_moments()[0].item()), 0.05, 1e-8);
+}
+
+TEST(Adam, ContinuesFromSavedState) {
+  Single straight({}), first({});
+  for (int i = 0; i < 5; ++i) straight.step(i), first.step(i);
+  Single resumed({});
+  resumed.x.mutable_value() = first.x.value().clone();
+  resumed.adam.first_moments()[0] = first.adam.first_moments()[0].clone();
+  resumed.adam.second_moments()[0] = first.adam.second_moments()[0].clone();
+  resumed.adam.set_steps(first.adam.steps());
+  for (int i = 0; i < 5; ++i) straight.step(i), resumed.step(i);
+  EXPECT_EQ(straight.value(), resumed.value());
+}
+
+TEST(Adam, RefusesBadOptions) {
+  const std::string text =
+      "Adam: expects learning_rate >= 0, beta1 and beta2 in [0,1), epsilon > 0, clip_norm >= 0";
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const AdamOptions& o :
+       {AdamOptions{.learning_rate = -1}, AdamOptions{.learning_rate = nan}, AdamOptions{.beta1 = 1},
+        AdamOptions{.beta2 = -0.1}, AdamOptions{.epsilon = 0}, AdamOptions{.clip_norm = -1}}) {
+    expect_refusal(text, [&] { Adam({parameter(Tensor::zeros({1}))}, o); });
+  }
+  expect_refusal("Adam: a parameter does not require a gradient",
+                 [] { Adam({Variable(Tensor::zeros({1}))}, {}); });
+}
+
+TEST(Muon, MovesMatricesAlongTheOrthogonalFactorAndTheRestAsAdam) {
+  const Tensor start = numbers({16, 24}), gradient = numbers({16, 24}, 2);
+  const Variable w = parameter(start.clone()), b = parameter(Tensor::zeros({24}));
+  const Variable alone = parameter(Tensor::zeros({24}));
+  Adam muon({w, b}, {.learning_rate = 0.01, .muon = true}), adam({alone}, {.learning_rate = 0.01});
+  for (int step = 0; step < 3; ++step) {  // of one gradient: the momentum points along it
+    Variable(w).mutable_grad() = gradient.clone();
+    Variable(b).mutable_grad() = Variable(alone).mutable_grad() = numbers({24}, 3);
+    muon.step(), adam.step();
+  }
+  EXPECT_TRUE(same_bytes(b.value(), alone.value()));
+  Tensor along = gradient.clone();
+  orthogonalise(16, 24, along.data());
+  const double length = 3 * kMuonLength * 0.01 * std::sqrt(24.0);
+  for (Dim i = 0; i < start.size(); ++i) {
+    ASSERT_NEAR(static_cast<double>(w.value().data()[i]),
+                static_cast<double>(start.data()[i]) - length * static_cast<double>(along.data()[i]), 1e-5);
+  }
+  for (const real v : muon.second_moments()[0].values()) ASSERT_EQ(v, 0);
+}
+
+TEST(Muon, WithoutAGradientNothingMoves) {
+  const Variable w = parameter(numbers({8, 9}));
+  Adam muon({w}, {.learning_rate = 0.1, .muon = true});
+  for (int step = 0; step < 10; ++step) muon.step();
+  EXPECT_TRUE(same_bytes(w.value(), numbers({8, 9})));
+  Variable(w).mutable_grad() = numbers({8, 9}, 2);
+  muon.step();
+  Variable(w).mutable_grad().fill(0);
+  for (int step = 0; step < 3000; ++step) muon.step();  // the momentum dies away, and with it the steps
+  const Tensor rested = w.value().clone();
+  for (int step = 0; step < 100; ++step) muon.step();
+  EXPECT_TRUE(same_bytes(w.value(), rested));
+  EXPECT_EQ(muon.first_moments()[0].data()[0], 0);
+}
+
+TEST(Muon, TakesForMatricesWhatHasEightRowsAndColumns) {
+  for (const Shape& shape : {Shape{8, 8}, Shape{3, 3, 1, 32}, Shape{4, 4, 16}})
+    EXPECT_TRUE(is_matrix(shape)) << shape.text();
+  for (const Shape& shape : {Shape{64}, Shape{64, 7}, Shape{7, 64}, Shape{3, 3, 32, 1}, Shape{}})
+    EXPECT_FALSE(is_matrix(shape)) << shape.text();
+}
+
+}  // namespace
+}  // namespace supertac

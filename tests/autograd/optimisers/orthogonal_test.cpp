@@ -1,0 +1,95 @@
+#include "autograd/optimisers/orthogonal.h"
+
+#include <vector>
+
+#include "tests/autograd/check.h"
+
+namespace supertac {
+namespace {
+
+using namespace test;
+using Matrix = std::vector<double>;
+
+Matrix product(Dim n, Dim k, Dim m, const Matrix& a, const Matrix& b) {
+  Matrix y(static_cast<std::size_t>(n * m));
+  for (Dim i = 0; i < n; ++i) {
+    for (Dim j = 0; j < m; ++j) {
+      for (Dim l = 0; l < k; ++l)
+        y[static_cast<std::size_t>(i * m + j)] +=
+            a[static_cast<std::size_t>(i * k + l)] * b[static_cast<std::size_t>(l * m + j)];
+    }
+  }
+  return y;
+}
+Matrix transposed(Dim rows, Dim columns, const Matrix& x) {
+  Matrix y(x.size());
+  for (Dim i = 0; i < rows; ++i) {
+    for (Dim j = 0; j < columns; ++j)
+      y[static_cast<std::size_t>(j * rows + i)] = x[static_cast<std::size_t>(i * columns + j)];
+  }
+  return y;
+}
+
+// The steps as the header has them, on x itself, in double precision.
+Matrix reference(Dim rows, Dim columns, Matrix x) {
+  double squares = 0;
+  for (const double v : x) squares += v * v;
+  for (double& v : x) v /= std::sqrt(squares) + 1e-7;
+  for (int step = 0; step < 5; ++step) {
+    const Matrix s = product(rows, columns, rows, x, transposed(rows, columns, x));
+    const Matrix sx = product(rows, rows, columns, s, x), ssx = product(rows, rows, columns, s, sx);
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] = 3.4445 * x[i] - 4.7750 * sx[i] + 2.0315 * ssx[i];
+  }
+  return x;
+}
+
+Matrix values_of(const Tensor& x) { return {x.values().begin(), x.values().end()}; }
+
+TEST(Orthogonal, TakesTheStepsOfItsFormula) {
+  for (const auto& [rows, columns] : {std::pair<Dim, Dim>{288, 32}, {64, 512}, {8, 8}, {12, 16}, {80, 9}}) {
+    Tensor x = numbers({rows, columns}, 7);
+    const Matrix expected = reference(rows, columns, values_of(x));
+    orthogonalise(rows, columns, x.data());
+    const Matrix found = values_of(x);
+    for (std::size_t i = 0; i < found.size(); ++i)
+      ASSERT_NEAR(found[i], expected[i], 2e-4) << rows << " x " << columns << ", element " << i;
+  }
+}
+
+// Directions twenty times fainter than the loudest come out nearly as long: X^T X is nearly the identity.
+TEST(Orthogonal, EvensOutWhatIsLoudAndWhatIsFaint) {
+  constexpr Dim kRows = 96, kColumns = 16;
+  Tensor x = numbers({kRows, kColumns}, 3);
+  for (Dim i = 0; i < kRows; ++i) {
+    for (Dim j = 0; j < kColumns; ++j) x.data()[i * kColumns + j] *= static_cast<real>(j < 2 ? 1 : 0.05);
+  }
+  orthogonalise(kRows, kColumns, x.data());
+  const Matrix found = values_of(x);
+  const Matrix squares = product(kColumns, kRows, kColumns, transposed(kRows, kColumns, found), found);
+  for (Dim i = 0; i < kColumns; ++i) {
+    for (Dim j = 0; j < kColumns; ++j) {
+      const double value = squares[static_cast<std::size_t>(i * kColumns + j)];
+      if (i == j) {
+        EXPECT_TRUE(value > 0.36 && value < 1.7) << value;
+      } else {
+        EXPECT_LT(std::abs(value), 0.35);
+      }
+    }
+  }
+}
+
+TEST(Orthogonal, SizeMattersNotAndNothingStaysNothing) {
+  const Tensor x = numbers({16, 24}, 5);
+  Tensor small = x.clone(), large = x.clone(), nothing = Tensor::zeros({16, 24});
+  for (real& v : small.values()) v *= real(0.0078125);
+  for (real& v : large.values()) v *= real(65536);
+  for (Tensor* t : {&small, &large, &nothing}) orthogonalise(16, 24, t->data());
+  for (Dim i = 0; i < x.size(); ++i) ASSERT_NEAR(small.data()[i], large.data()[i], 1e-5);
+  for (const real v : nothing.values()) ASSERT_EQ(v, 0);
+  Tensor faint = Tensor::full({16, 24}, real(1e-12));  // far below the 1e-7 beside its norm
+  orthogonalise(16, 24, faint.data());
+  for (const real v : faint.values()) ASSERT_LT(std::abs(v), 0.01);
+}
+
+}  // namespace
+}  // namespace supertac

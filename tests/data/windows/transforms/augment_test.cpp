@@ -1,0 +1,164 @@
+#include "data/windows/transforms/augment.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace supertac {
+namespace {
+
+constexpr std::size_t kFrames = 256;
+
+std::vector<float> changed(const AugmentSettings& settings, std::uint64_t sample, float level = 0.5F) {
+  std::vector<float> window(kFrames * 16, level);
+  augment(settings, 1, sample, window);
+  return window;
+}
+
+// Highest and lowest value over taxels and samples 0..199 of frame 0.
+std::pair<float, float> range(const AugmentSettings& settings, float level) {
+  float low = 1, high = 0;
+  for (std::uint64_t sample = 0; sample < 200; ++sample) {
+    const auto window = changed(settings, sample, level);
+    low = std::min(low, *std::min_element(window.begin(), window.end()));
+    high = std::max(high, *std::max_element(window.begin(), window.end()));
+  }
+  return {low, high};
+}
+
+TEST(Augment, OffChangesNothing) { EXPECT_EQ(changed({}, 3), std::vector<float>(kFrames * 16, 0.5F)); }
+
+TEST(Augment, GainIsOneFactorPerWindow) {
+  const AugmentSettings settings{.gain = 0.5};
+  const auto window = changed(settings, 3);
+  EXPECT_EQ(*std::min_element(window.begin(), window.end()), *std::max_element(window.begin(), window.end()));
+  EXPECT_NE(window, changed(settings, 4));
+  const auto [low, high] = range(settings, 0.6F);
+  EXPECT_NEAR(low, 0.6 / 1.5, 0.01);
+  EXPECT_NEAR(high, 0.9, 0.01);
+}
+
+TEST(Augment, LiftTakesTheSameFromEverySignalAndEndsAtRest) {
+  const AugmentSettings settings{.lift = 0.4};
+  float least = 1;
+  for (std::uint64_t sample = 0; sample < 200; ++sample) {
+    std::vector<float> window(kFrames * 16, 0.5F);
+    for (std::size_t i = 0; i < window.size(); i += 16) window[i] = 0.1F, window[i + 1] = 0.9F;
+    augment(settings, 1, sample, window);
+    const float lift = 0.5F - window[2];
+    ASSERT_GE(lift, 0);
+    EXPECT_NEAR(window[1], 0.9F - lift, 1e-6);
+    EXPECT_NEAR(window[0], std::max(0.1F - lift, 0.0F), 1e-6);
+    for (std::size_t i = 16; i < window.size(); ++i) ASSERT_EQ(window[i], window[i - 16]);
+    least = std::min(least, window[2]);
+  }
+  EXPECT_NEAR(least, 0.1, 0.01);
+}
+
+TEST(Augment, TaxelGainAndOffsetAreConstantInTime) {
+  for (const AugmentSettings& settings :
+       {AugmentSettings{.taxel_gain = 0.2}, AugmentSettings{.offset = 0.1}}) {
+    const auto window = changed(settings, 3);
+    std::set<float> values(window.begin(), window.begin() + 16);
+    EXPECT_EQ(values.size(), 16U);
+    for (std::size_t i = 16; i < window.size(); ++i) ASSERT_EQ(window[i], window[i - 16]);
+  }
+  const auto [low, high] = range({.offset = 0.1}, 0.5F);
+  EXPECT_NEAR(low, 0.4, 1e-3);
+  EXPECT_NEAR(high, 0.6, 1e-3);
+}
+
+TEST(Augment, DropsNoneToAllAllowedTaxelsEquallyOften) {
+  int seen[4] = {};
+  for (std::uint64_t sample = 0; sample < 4000; ++sample) {
+    const auto window = changed({.dropped = 3}, sample);
+    const auto zeros = std::count(window.begin(), window.begin() + 16, 0.0F);
+    ASSERT_LE(zeros, 3);
+    ASSERT_EQ(std::count(window.begin(), window.end(), 0.0F), zeros * static_cast<long>(kFrames));
+    ++seen[zeros];
+  }
+  for (const int count : seen) EXPECT_NEAR(count, 1000, 120);
+}
+
+TEST(Augment, EveryTaxelIsDroppedEquallyOften) {
+  std::vector<int> seen(16);
+  for (std::uint64_t sample = 0; sample < 8000; ++sample) {
+    const auto window = changed({.dropped = 3}, sample);
+    for (std::size_t k = 0; k < 16; ++k) seen[k] += window[k] == 0 ? 1 : 0;
+  }
+  for (const int count : seen) EXPECT_NEAR(count, 8000 * 1.5 / 16, 120);
+}
+
+TEST(Augment, NoiseHasTheStatedDeviationAndNoMemory) {
+  const auto window = changed({.noise = 0.05}, 3);
+  double sum = 0, squares = 0, product = 0;
+  for (std::size_t i = 0; i < window.size(); ++i) {
+    const double v = window[i] - 0.5;
+    sum += v;
+    squares += v * v;
+    if (i >= 16) product += v * (window[i - 16] - 0.5);
+  }
+  const auto n = static_cast<double>(window.size());
+  EXPECT_NEAR(sum / n, 0, 4 * 0.05 / std::sqrt(n));
+  EXPECT_NEAR(std::sqrt(squares / n), 0.05, 0.002);
+  EXPECT_NEAR(product / squares, 0, 4 / std::sqrt(n));
+}
+
+TEST(Augment, IsAPureFunctionOfSeedAndSample) {
+  const AugmentSettings settings{
+      .lift = 0.2, .gain = 0.3, .taxel_gain = 0.1, .offset = 0.05, .noise = 0.02, .dropped = 2};
+  EXPECT_EQ(changed(settings, 3), changed(settings, 3));
+  EXPECT_NE(changed(settings, 3), changed(settings, 4));
+  std::vector<float> other(kFrames * 16, 0.5F);
+  augment(settings, 2, 3, other);
+  EXPECT_NE(other, changed(settings, 3));
+}
+
+TEST(Augment, StaysInRange) {
+  const auto [low, high] = range({.gain = 3, .taxel_gain = 1, .offset = 0.5, .noise = 1}, 0.7F);
+  EXPECT_EQ(low, 0);
+  EXPECT_EQ(high, 1);
+}
+
+TEST(Augment, RefusesNegativeMagnitudes) {
+  for (const AugmentSettings& settings :
+       {AugmentSettings{.gain = -1}, AugmentSettings{.noise = std::numeric_limits<double>::quiet_NaN()},
+        AugmentSettings{.dropped = 17}, AugmentSettings{.dropped = -1}})
+    EXPECT_THROW(check(settings), std::invalid_argument);
+  std::vector<float> window(17);
+  EXPECT_THROW(augment({.gain = 1}, 1, 1, window), std::invalid_argument);
+  EXPECT_NO_THROW(check(AugmentSettings{}));
+}
+
+// More signals than the rig has: every term has numbers of its own, and a dropped taxel loses all channels.
+TEST(Augment, AnyArray) {
+  const TaxelArray array{.rows = 3, .columns = 5, .channels = 3};
+  std::set<float> levels;
+  std::size_t dropped = 0;
+  for (std::uint64_t sample = 0; sample < 50; ++sample) {
+    std::vector<float> window(8 * array.signals(), 0.5F);
+    augment({.gain = 0.5, .taxel_gain = 0.3, .offset = 0.02, .dropped = 2}, 1, sample, window, array);
+    for (std::size_t k = 0; k < array.signals(); k += 3) {
+      const bool silent = window[k] == 0;
+      dropped += silent;
+      for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(window[k + c] == 0, silent);
+    }
+    for (std::size_t k = 0; k < array.signals(); ++k) {
+      levels.insert(window[k]);
+      EXPECT_EQ(window[7 * array.signals() + k], window[k]);
+    }
+  }
+  EXPECT_NEAR(static_cast<double>(dropped), 50, 20);
+  EXPECT_GT(levels.size(), 1800U);  // of 2250, some of which are clipped or dropped
+  std::vector<float> window(array.signals());
+  EXPECT_THROW(augment({.dropped = 16}, 1, 1, window, array), std::invalid_argument);
+  EXPECT_THROW(augment({.gain = 1}, 1, 1, std::span(window).first(44), array), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace supertac

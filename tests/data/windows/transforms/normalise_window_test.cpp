@@ -1,0 +1,102 @@
+#include "data/windows/transforms/normalise_window.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace supertac {
+namespace {
+
+constexpr std::size_t kTimes = 100, kChannels = 2;
+constexpr float kStep = 1.0F / 256;
+
+// Taxel 0 swings between rest and rest + swing, ten samples each; taxel 1 stays at `other`.
+std::vector<float> window(float rest, float swing, float other = 0) {
+  std::vector<float> x;
+  for (std::size_t t = 0; t < kTimes; ++t) {
+    x.push_back(rest + (t / 10 % 2 == 1 ? swing : 0));
+    x.push_back(other);
+  }
+  return x;
+}
+
+std::vector<float> normalised(std::vector<float> x) {
+  normalise_window(x, kChannels);
+  return x;
+}
+
+TEST(NormaliseWindow, TakesHalfTheRestAndDividesByWhatIsLeft) {
+  const std::vector<float> x = normalised(window(0.25F, 0.5F, 0.125F));
+  EXPECT_FLOAT_EQ(x[0], 0.125F / 0.625F) << "at rest";
+  EXPECT_FLOAT_EQ(x[10 * kChannels], 1) << "0.625 / 0.625: nothing is clipped";
+  EXPECT_FLOAT_EQ(x[1], 0.0625F / 0.625F) << "a taxel that is pressed throughout keeps half of it";
+}
+
+// 100 frames, each of its own bin: six samples lie at or below the rest, three at or above the top.
+TEST(NormaliseWindow, RestAndTopAreTheStatedPercentiles) {
+  std::vector<float> x;
+  for (std::size_t t = 0; t < kTimes; ++t) {
+    x.push_back(static_cast<float>(2 * t) * kStep);
+    x.push_back(0);
+  }
+  normalise_window(x, kChannels);
+  const float rest = 10 * kStep, top = 194 * kStep;
+  for (const std::size_t t : {10U, 40U, 90U})
+    EXPECT_FLOAT_EQ(x[t * kChannels],
+                    (static_cast<float>(2 * t) * kStep - kRestRemoved * rest) / (top - kRestRemoved * rest))
+        << t;
+}
+
+TEST(NormaliseWindow, AFingerPressedHarderLooksTheSame) {
+  const std::vector<float> soft = normalised(window(0, 0.2F)), hard = normalised(window(0, 0.8F));
+  for (std::size_t i = 0; i < soft.size(); ++i) EXPECT_NEAR(soft[i], hard[i], kStep / 0.2F) << i;
+}
+
+// Pressed hard on a flat plate: a small swing upon a large rest is no texture at full gain.
+TEST(NormaliseWindow, ASmallSwingOnALargeRestStaysSmall) {
+  const std::vector<float> x = normalised(window(0.8F, 0.04F));
+  EXPECT_NEAR(x[10 * kChannels] - x[0], 0.04F / 0.44F, 2 * kStep);
+}
+
+TEST(NormaliseWindow, AQuietWindowIsNotMadeLouder) {
+  const std::vector<float> x = normalised(window(0, 0.03F));
+  EXPECT_FLOAT_EQ(x[10 * kChannels], 0.03F / kLeastGain);
+  for (const float value : normalised(std::vector<float>(kTimes * kChannels, 0))) EXPECT_EQ(value, 0);
+}
+
+TEST(NormaliseWindow, TwoGlitchesDoNotSetTheGain) {
+  std::vector<float> x = window(0, 0.25F);
+  const std::vector<float> clean = normalised(x);
+  x[3 * kChannels] = x[47 * kChannels] = 1;
+  const std::vector<float> glitchy = normalised(x);
+  EXPECT_EQ(glitchy[3 * kChannels], 1);
+  for (std::size_t t = 0; t < kTimes; ++t) {
+    if (t == 3 || t == 47) continue;
+    EXPECT_EQ(glitchy[t * kChannels], clean[t * kChannels]) << t;
+  }
+}
+
+TEST(NormaliseWindow, SaturatedDeadAndShortWindowsStayInRange) {
+  for (const float value : {0.0F, 0.5F, 1.0F}) {
+    for (const std::size_t frames : {std::size_t{1}, std::size_t{2}, std::size_t{512}}) {
+      std::vector<float> x(frames * kChannels, value);
+      normalise_window(x, kChannels);
+      for (const float y : x) ASSERT_TRUE(y >= 0 && y <= 1) << value << " x " << frames << ": " << y;
+    }
+  }
+}
+
+TEST(NormaliseWindow, RefusesWhatIsNoWindow) {
+  std::vector<float> x(7);
+  EXPECT_THROW(normalise_window(x, 2), std::invalid_argument);
+  EXPECT_THROW(normalise_window(x, 0), std::invalid_argument);
+  EXPECT_THROW(normalise_window({}, 2), std::invalid_argument);
+  std::vector<float> too_long(60'001);
+  EXPECT_THROW(normalise_window(too_long, 1), std::invalid_argument) << "its counts would not fit";
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,242 @@
+#include "models/inference/prepared/prepared.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <cmath>
+#include <set>
+#include <vector>
+
+#include "autograd/kernels/fast/isa/isa.h"
+#include "autograd/ops/shaping.h"
+#include "io/numbers/random.h"
+#include "layers/convolution.h"
+#include "models/inference/prepared/planner.h"
+#include "models/networks/frame_model.h"
+#include "tests/allocations.h"
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+using kernels::isa_kernels;
+using kernels::supported_sets;
+using kernels::use_isa;
+
+void expect_close(const Tensor& a, const Tensor& b, const std::string& what) {
+  ASSERT_EQ(a.defined(), b.defined()) << what;
+  if (!a.defined()) return;
+  ASSERT_EQ(a.shape(), b.shape()) << what;
+  double largest = 0, difference = 0;
+  for (Dim i = 0; i < a.size(); ++i) {
+    largest = std::max(largest, static_cast<double>(std::abs(a.data()[i])));
+    difference = std::max(difference, static_cast<double>(std::abs(a.data()[i] - b.data()[i])));
+  }
+  EXPECT_LE(difference, 1e-5 * std::max(1.0, largest)) << what;
+}
+
+void expect_same_estimate(const Network& network, Dim count, const std::string& what) {
+  const Tensor inputs = uniform(network.input_shape(count), 7);
+  const Estimate forward = network.estimate(inputs), prepared = Prepared(network).estimate(inputs);
+  expect_close(forward.picture, prepared.picture, what + " picture");
+  expect_close(forward.predicted_error, prepared.predicted_error, what + " predicted_error");
+  expect_close(forward.latents, prepared.latents, what + " latents");
+}
+
+SuperTacSettings random_settings(std::uint64_t seed) {
+  const RandomStream random(seed, 0);
+  std::uint64_t at = 0;
+  const auto one_of = [&](std::vector<Dim> values) {
+    return values[static_cast<std::size_t>(random.uniform(at++) * static_cast<double>(values.size()))];
+  };
+  SuperTacSettings s;
+  s.rows = one_of({2, 3, 4, 5, 8});
+  s.columns = one_of({4, 5, 6, 10});
+  s.in_channels = one_of({1, 1, 2, 3});
+  s.timesteps = one_of({32, 48, 64});
+  s.latent = one_of({1, 3, 10});
+  s.scale = one_of({4, 4, 8});
+  s.channels = one_of({4, 8, 12, 16, 20, 32});
+  s.rcabs = one_of({0, 1, 2});
+  s.grouping = one_of({0, 1}) == 0 ? Grouping::horizontal : Grouping::vertical;
+  s.predicted_error = one_of({0, 1}) == 0;
+  s.last_frame_path = one_of({0, 1}) == 0;
+  return s;
+}
+
+TEST(Prepared, DrawsWhatTheNetworkDrawsForAnySettings) {
+  for (std::uint64_t seed = 0; seed < 24; ++seed) {
+    const SuperTacSettings s = random_settings(seed);
+    Rng rng(seed);
+    expect_same_estimate(SuperTac(s, rng), 1 + static_cast<Dim>(seed % 10),
+                         "seed " + std::to_string(seed) + ": " + std::to_string(s.rows) + "x" +
+                             std::to_string(s.columns) + " channels " + std::to_string(s.channels));
+  }
+}
+
+TEST(Prepared, DrawsWhatTheNetworkDrawsForPresetsAndFrames) {
+  for (const char* preset : {"paper", "tiny"}) {
+    Rng rng(1);
+    expect_same_estimate(SuperTac(SuperTacSettings::of_preset(preset), rng), 9, preset);
+  }
+  Rng rng(2);
+  expect_same_estimate(
+      FrameModel({.in_channels = 3, .height = 5, .width = 4, .channels = 16, .rcabs = 1}, rng), 3, "frames");
+}
+
+// No network of ours joins maps, or takes runs of anything but its input.
+class Joined : public Network {
+ public:
+  explicit Joined(bool takes_runs)
+      : takes_runs_(takes_runs),
+        a_(2, 5, kSameSize, rng_),
+        b_(2, 4, kSameSize, rng_),
+        out_(9, 1, kSameSize, rng_) {}
+  NetworkFormat format() const override { return {.columns = 6, .channels = 2, .scale = 1}; }
+  Shape input_shape(Dim count) const override { return {count, 4, 6, 2}; }
+  Drawing draw(const Variable& x) const override {
+    const Variable maps[] = {a_.forward(x), b_.forward(x, kRelu)};
+    const Variable joined = concat(maps);
+    return {out_.forward(takes_runs_ ? take_runs(joined, {0, 9, 9, 9}) : joined), {}, {}};
+  }
+
+ private:
+  Rng rng_{3};
+  bool takes_runs_;
+  Conv2d a_, b_, out_;
+};
+
+TEST(Prepared, JoinsMaps) { expect_same_estimate(Joined(false), 3, "joined maps"); }
+
+TEST(Prepared, TakesRunsOfTheInputAlone) {
+  EXPECT_THROW({ const Prepared p(Joined(true)); }, std::logic_error);
+}
+
+// All pictures of 64 windows, `batch` at a time.
+Tensor in_batches(const Prepared& network, const Tensor& windows, Dim batch) {
+  Tensor all(network.network().picture_shape(windows.dim(0)));
+  const Dim size = windows.size() / windows.dim(0), pixels = all.size() / windows.dim(0);
+  for (Dim first = 0; first < windows.dim(0); first += batch) {
+    const Dim count = std::min(batch, windows.dim(0) - first);
+    const Tensor part = Tensor::of(network.network().input_shape(count),
+                                   windows.values().subspan(static_cast<std::size_t>(first * size),
+                                                            static_cast<std::size_t>(count * size)));
+    const Estimate e = network.estimate(part);
+    std::copy_n(e.picture.data(), e.picture.size(), all.data() + first * pixels);
+  }
+  return all;
+}
+
+Prepared prepare(const Network& network, bool bytes) {
+  if (!bytes) return Prepared(network);
+  ActivationRanges ranges;
+  ranges.add(network, uniform(network.input_shape(16), 5));
+  return Prepared(network, ranges);
+}
+
+class PreparedBits : public testing::TestWithParam<std::tuple<const char*, bool>> {};
+
+TEST_P(PreparedBits, AreOneForBatchesInstructionSetsAndThreads) {
+  const char* const preset = std::get<0>(GetParam());
+  const bool bytes = std::get<1>(GetParam());
+  {
+    Rng rng(3);
+    const SuperTac network(SuperTacSettings::of_preset(preset), rng);
+    const Tensor windows = uniform(network.input_shape(64), 1);
+    const kernels::IsaKernels& before = isa_kernels();
+    const std::vector<real> expected = [&] {
+      const Tensor t = in_batches(prepare(network, bytes), windows, 64);
+      return std::vector<real>(t.values().begin(), t.values().end());
+    }();
+    for (const kernels::IsaKernels* set : supported_sets()) {
+      if (set == &kernels::kPlainKernels || set == &kernels::kPortableKernels) continue;  // far slower
+      use_isa(*set);
+      const Prepared prepared = prepare(network, bytes);
+      for (const Dim batch : {1, 7, 8, 64}) {
+        for (const int threads : {1, 2, 4}) {
+          omp_set_num_threads(threads);
+          const Tensor pictures = in_batches(prepared, windows, batch);
+          EXPECT_TRUE(std::equal(expected.begin(), expected.end(), pictures.data()))
+              << preset << " " << set->name << ", batch " << batch << ", threads " << threads;
+        }
+      }
+    }
+    use_isa(before);
+    omp_set_num_threads(1);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, PreparedBits,
+                         testing::Combine(testing::Values("paper", "tiny"), testing::Bool()));
+
+// On the second cache depend how many pictures are drawn at once and whether few have their filters
+// transformed on the way.
+TEST(Prepared, OfAnyCacheHasTheSameBits) {
+  Rng rng(4);
+  const SuperTac network(SuperTacSettings::of_preset("paper"), rng);
+  std::set<bool> seen;
+  for (const Dim count : {1, 2, 3, 17}) {
+    const Tensor windows = uniform(network.input_shape(count), 6);
+    const Estimate expected = Planner::plan(network, 0)->run(windows);
+    for (const std::size_t megabytes : {1, 2, 3, 4, 64}) {
+      const auto plan = Planner::plan(network, megabytes << 20);
+      seen.insert(plan->filters_anew());
+      const Estimate found = plan->run(windows);
+      EXPECT_TRUE(std::ranges::equal(expected.picture.values(), found.picture.values()))
+          << megabytes << " MB";
+      EXPECT_TRUE(std::ranges::equal(expected.predicted_error.values(), found.predicted_error.values()))
+          << megabytes << " MB";
+    }
+  }
+  EXPECT_EQ(seen.size(), 2U);
+}
+
+TEST(Prepared, InBytesDrawsNearlyTheSame) {
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    Rng rng(seed);
+    const SuperTac network(random_settings(seed), rng);
+    const Tensor inputs = uniform(network.input_shape(9), 5);
+    const Estimate exact = network.estimate(inputs), bytes = prepare(network, true).estimate(inputs);
+    const auto [low, high] = std::ranges::minmax(exact.picture.values());
+    for (Dim i = 0; i < exact.picture.size(); ++i)
+      ASSERT_NEAR(exact.picture.data()[i], bytes.picture.data()[i], 0.1 * (high - low)) << "seed " << seed;
+  }
+}
+
+TEST(Prepared, RefusesTheRangesOfAnotherNetwork) {
+  Rng rng(1);
+  const SuperTac network(small_settings(), rng);
+  EXPECT_THROW(Prepared(network, ActivationRanges()), std::invalid_argument);
+}
+
+TEST(Prepared, RefusesRangesThatAreNotFinite) {
+  const TemporaryFolder folder;
+  const auto read = [&](float high) {
+    write_checkpoint(folder / "m.safetensors", {}, {}, {{"int8.ranges", {2, 2}, {0, 1, -1, high}}});
+    return ActivationRanges::read(SafetensorsFile::read(folder / "m.safetensors"), "m");
+  };
+  EXPECT_EQ(read(2)->ops(), 2U);
+  for (const float high : {-1.0F, std::numeric_limits<float>::infinity(), std::nanf("")})
+    EXPECT_THROW(read(high), std::runtime_error) << high;
+}
+
+TEST(Prepared, RefusesInputsOfAnotherShape) {
+  Rng rng(1);
+  const SuperTac network(small_settings(), rng);
+  EXPECT_THROW(Prepared(network).estimate(Tensor::zeros({1, 3, 16})), std::invalid_argument);
+  EXPECT_EQ(Prepared(network).estimate(Tensor::zeros(network.input_shape(0))).picture.dim(0), 0);
+}
+
+TEST(Prepared, TakesNoMemoryFromTheHeapOnceWarm) {
+  Rng rng(1);
+  const SuperTac network(SuperTacSettings::of_preset("paper"), rng);
+  const Prepared prepared(network);
+  const Tensor one = uniform(network.input_shape(1), 1), many = uniform(network.input_shape(9), 1);
+  for (int i = 0; i < 2; ++i) prepared.estimate(one), prepared.estimate(many);
+  const long before = allocations::made;
+  for (int i = 0; i < 5; ++i) prepared.estimate(one), prepared.estimate(many);
+  EXPECT_EQ(allocations::made - before, 0);
+}
+
+}  // namespace
+}  // namespace supertac

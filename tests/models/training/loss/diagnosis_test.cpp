@@ -1,0 +1,65 @@
+#include "models/training/loss/diagnosis.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "models/training/loss/loss.h"
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+constexpr real kNan = std::numeric_limits<real>::quiet_NaN();
+
+struct Sample {
+  Rng rng{1};
+  SuperTac model{small_settings(), rng};
+  Tensor windows = uniform({2, 32, 16}, 1), truth = uniform({2, 8, 8, 1}, 3);
+
+  std::string where() const {
+    const SuperTac::Output output = model.forward(windows, normal_eps(2, 3, 2));
+    return where_not_finite(supertac_loss(output, truth, {}).total, model.parameters());
+  }
+};
+
+TEST(Diagnosis, SaysNothingOfAFiniteLoss) { EXPECT_EQ(Sample().where(), ""); }
+
+TEST(Diagnosis, NamesAnInput) {
+  Sample s;
+  s.windows.data()[16 * 5 + 9] = kNan;  // taxel 9 belongs to group 2
+  EXPECT_EQ(s.where(), "an input of conv1d in encoder.2.conv.0 is not finite");
+}
+
+TEST(Diagnosis, NamesTheTruth) {
+  Sample s;
+  s.truth.data()[70] = kNan;
+  EXPECT_EQ(s.where(), "an input of l2_loss behind upsampler.out is not finite");
+}
+
+TEST(Diagnosis, NamesAParameterAndALayer) {
+  Sample s;
+  const auto fill = [&](const std::string& name, real value) {
+    for (const Parameter& p : s.model.parameters()) {
+      if (p.name == name) Variable(p.value).mutable_value().fill(value);
+    }
+  };
+  fill("upsampler.fc.weight", real(3e38));
+  EXPECT_EQ(s.where(), "the output of linear in upsampler.fc is the first that is not finite");
+  fill("upsampler.out.bias", kNan);
+  EXPECT_EQ(s.where(), "parameter upsampler.out.bias is not finite");
+}
+
+TEST(Diagnosis, NamesTheGradientNearestToTheLoss) {
+  Sample s;
+  backward(supertac_loss(s.model.forward(s.windows, normal_eps(2, 3, 2)), s.truth, {}).total);
+  EXPECT_EQ(gradient_not_finite(s.model.parameters()), "");
+  for (const Parameter& p : s.model.parameters()) {
+    if (p.name.starts_with("encoder.") || p.name == "upsampler.fc.weight")
+      Variable(p.value).mutable_grad().fill(kNan);
+  }
+  EXPECT_EQ(gradient_not_finite(s.model.parameters()), "upsampler.fc.weight");
+}
+
+}  // namespace
+}  // namespace supertac

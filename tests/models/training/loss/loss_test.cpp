@@ -1,0 +1,130 @@
+#include "models/training/loss/loss.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "autograd/ops/losses.h"
+#include "tests/models/support.h"
+
+namespace supertac {
+namespace {
+
+struct Sample {
+  Rng rng{1};
+  SuperTac model{small_settings(), rng};
+  SuperTac::Output output = model.forward(uniform({2, 32, 16}, 1), normal_eps(2, 3, 2));
+  Tensor truth = uniform({2, 8, 8, 1}, 3);
+};
+
+TEST(SuperTacLoss, IsTheConvexCombinationOfItsTerms) {
+  const Sample s;
+  const Loss loss = supertac_loss(s.output, s.truth, {.a = 0.3, .beta = 0.02, .lambda = 0.5});
+  const double expected = 0.3 * (loss.reconstruction.item() + 0.02 * loss.kld.item()) +
+                          0.7 * (loss.l2.item() + 0.5 * (1 - loss.ssim.item()));
+  EXPECT_NEAR(loss.total.item(), expected, 1e-6);
+}
+
+// The predicted error is drawn towards the picture's error, and the picture does not notice.
+// One of two pictures has a truth to compare structure with; of the other only the squared error counts.
+TEST(PictureLoss, TheSsimOfAFlatTruthCountsAsOne) {
+  const Variable picture(uniform({2, 16, 16, 1}, 1), true);
+  Tensor truth = uniform({2, 16, 16, 1}, 2), one(Shape{1, 16, 16, 1}), its(Shape{1, 16, 16, 1});
+  std::copy_n(picture.value().data(), 256, one.data());
+  std::copy_n(truth.data(), 256, its.data());
+  std::fill_n(truth.data() + 256, 256, 0.25F);
+  const Loss loss = picture_loss(picture, truth, 0.5);
+  EXPECT_NEAR(loss.ssim.item(), (ssim(Variable(one), its).item() + 1) / 2, 1e-6);
+  backward(loss.ssim);
+  const auto sum = [&](Dim from) {
+    double total = 0;
+    for (Dim i = from; i < from + 256; ++i) total += std::abs(picture.grad().data()[i]);
+    return total;
+  };
+  EXPECT_GT(sum(0), 0);
+  EXPECT_EQ(sum(256), 0);
+}
+
+TEST(SuperTacLoss, TheSpreadLearnsTheError) {
+  SuperTacSettings settings = small_settings();
+  settings.predicted_error = true;
+  Rng rng(1);
+  const SuperTac model(settings, rng);
+  const SuperTac::Output output = model.forward(uniform({2, 32, 16}, 1), normal_eps(2, 3, 2));
+  const Tensor truth = uniform({2, 8, 8, 1}, 3);
+  const Loss loss = supertac_loss(output, truth, {});
+  double expected = 0;
+  for (std::size_t i = 0; i < truth.values().size(); ++i) {
+    const double error = std::abs(output.image.value().values()[i] - truth.values()[i]);
+    expected += std::pow(output.predicted_error.value().values()[i] - error, 2) / 128;
+  }
+  EXPECT_NEAR(loss.predicted_error.item(), expected, 1e-6);
+  EXPECT_NEAR(loss.total.item(),
+              0.2 * (loss.reconstruction.item() + 1e-3 * loss.kld.item()) +
+                  0.8 * (loss.l2.item() + 0.1 * (1 - loss.ssim.item()) +
+                         kPredictedErrorWeight * loss.predicted_error.item()),
+              1e-6);
+  backward(loss.predicted_error);
+  for (const Parameter& p : model.parameters()) {
+    const bool of_picture = p.name.starts_with("upsampler.out");
+    const bool moved = p.value.grad().defined() &&
+                       std::ranges::any_of(p.value.grad().values(), [](real g) { return g != 0; });
+    EXPECT_TRUE(!of_picture || !moved) << p.name;
+    EXPECT_TRUE(moved || !p.name.starts_with("upsampler.spread")) << p.name;
+  }
+}
+
+// Setting one weight to 0 must change the gradients: each term really acts.
+TEST(SuperTacLoss, EveryTermActsOnTheGradient) {
+  const auto gradient = [](const LossWeights& weights) {
+    Sample s;
+    backward(supertac_loss(s.output, s.truth, weights).total);
+    std::vector<real> all;
+    for (const Parameter& p : s.model.parameters()) {
+      const Tensor& g = p.value.grad();
+      if (g.defined()) all.insert(all.end(), g.values().begin(), g.values().end());
+    }
+    return all;
+  };
+  const auto largest_difference = [](const std::vector<real>& a, const std::vector<real>& b) {
+    real largest = 0, scale = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      largest = std::max(largest, std::abs(a[i] - b[i]));
+      scale = std::max(scale, std::abs(a[i]));
+    }
+    return largest / scale;
+  };
+  const LossWeights all{.a = 0.5, .beta = 1e-2, .lambda = 0.1};
+  LossWeights no_kld = all, no_ssim = all, no_vae = all, no_picture = all;
+  no_kld.beta = 0;
+  no_ssim.lambda = 0;
+  no_vae.a = 0;
+  no_picture.a = 1;
+  for (const LossWeights& other : {no_kld, no_ssim, no_vae, no_picture}) {
+    EXPECT_GT(largest_difference(gradient(all), gradient(other)), 1e-4);
+  }
+}
+
+TEST(SuperTacLoss, StaysFiniteForInputsAThousandTimesTooLarge) {
+  Rng rng(1);
+  const SuperTac model(small_settings(), rng);
+  Tensor windows = uniform({2, 32, 16}, 1);
+  for (real& x : windows.values()) x *= 1000;
+  const Loss loss = supertac_loss(model.forward(windows, normal_eps(2, 3, 2)), uniform({2, 8, 8, 1}, 3), {});
+  EXPECT_TRUE(std::isfinite(loss.total.item()));
+  backward(loss.total);
+  for (const Parameter& p : model.parameters()) {
+    for (const real g : p.value.grad().values()) ASSERT_TRUE(std::isfinite(g)) << p.name;
+  }
+}
+
+TEST(SuperTacLoss, RefusesTruthOfAnotherSizeAndNegativeWeights) {
+  const Sample s;
+  EXPECT_THROW(supertac_loss(s.output, uniform({2, 16, 16, 1}, 3), {}), std::invalid_argument);
+  EXPECT_THROW(LossWeights{.a = 2}.check(), std::invalid_argument);
+  EXPECT_THROW(LossWeights{.beta = -1}.check(), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace supertac
