@@ -104,25 +104,26 @@ GradientReport check_gradients(const Function& f, std::vector<Variable> inputs,
       const Dim index = i * size / count;
       const double analytic = grad.defined() ? static_cast<double>(grad.data()[index]) / kTimes : 0;
       const double numeric = nearest_derivative(f, inputs[k], index, options.step, analytic);
-      report.worst.push_back({k, index, analytic, numeric, 0, {}});
+      report.all.push_back({k, index, analytic, numeric, 0, {}});
       largest[k] = std::max(largest[k], std::abs(numeric));
     }
   }
-  report.entries = static_cast<Dim>(report.worst.size());
-  if (report.worst.empty()) return report;
+  report.entries = static_cast<Dim>(report.all.size());
+  if (report.all.empty()) return report;
   const double largest_of_all = *std::max_element(largest.begin(), largest.end());
-  for (GradientEntry& e : report.worst) {
+  for (GradientEntry& e : report.all) {
     const double scale =
         std::max(std::abs(e.analytic), std::abs(e.numeric)) + 1e-3 * largest[e.input] + 1e-5 * largest_of_all;
     e.relative_error = std::abs(e.analytic - e.numeric) / std::max(scale, 1e-10);
     if (!std::isfinite(e.relative_error)) e.relative_error = 1e30;
+    e.place = place_of(e, inputs[e.input].shape(), options.names);
   }
+  report.worst = report.all;
   std::sort(report.worst.begin(), report.worst.end(), [](const GradientEntry& a, const GradientEntry& b) {
     return a.relative_error > b.relative_error;
   });
   report.max_relative_error = report.worst.front().relative_error;
   if (report.worst.size() > 10) report.worst.resize(10);
-  for (GradientEntry& e : report.worst) e.place = place_of(e, inputs[e.input].shape(), options.names);
   return report;
 }
 

@@ -24,6 +24,7 @@ struct GradientReport {
   std::vector<GradientEntry> worst;  // the largest errors first, at most ten
   double max_relative_error = 0;
   Dim entries = 0;
+  std::vector<GradientEntry> all = {};  // by input and index
   /// One line per entry of `worst`, for a failing test to print:
   /// "encoder.2.conv.1.weight [3,0,7]: analytic 0.25, numeric 0.5, relative error 0.5"
   std::string text() const;

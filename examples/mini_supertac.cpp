@@ -16,7 +16,17 @@
 #include <string>
 #include <vector>
 
-// ---- The engine. A tensor is an array [c][h][w] and its gradient; signals have h = 1, vectors h = w = 1.
+// ---- 1. Scalars. A term is a number made of others, a[0], a[1], ..., and its derivatives by them.
+using In = const double*;
+using Term = std::array<double, 6>;
+Term same(In a) { return {a[0], 1}; }
+Term relu(In a) { return a[0] > 0 ? Term{a[0], 1} : Term{0, 0}; }
+Term leaky_relu(In a) { return a[0] > 0 ? Term{a[0], 1} : Term{0.01 * a[0], 0.01}; }
+Term limited(In a) { return std::abs(a[0]) <= 10 ? Term{a[0], 1} : Term{std::copysign(10, a[0]), 0}; }
+Term sigmoid(In a) { return {1 / (1 + std::exp(-a[0])), 1 / (2 + std::exp(a[0]) + std::exp(-a[0]))}; }
+Term product(In a) { return {a[0] * a[1], a[1], a[0]}; }
+
+// ---- 2. Tensors: an array [c][h][w] and its gradient. Signals have h = 1, vectors h = w = 1.
 using Array = std::vector<double>;
 struct Shape {
   int c, h = 1, w = 1;
@@ -26,28 +36,23 @@ struct Node : Shape {
   Array value = Array(std::size_t(size())), grad = value, m = value, v = value;  // m, v: Adam's, of weights
 };
 using Tensor = std::shared_ptr<Node>;
-// The reverse steps of the ops, in the order of the ops. A step runs when the gradient of its op's result is
-// complete, and adds to the gradients of what that was made from: a value that is used twice has two of them.
-std::vector<std::function<void()>> tape;
-
 Tensor tensor(Shape shape, const Array& values = {}) {
   auto x = std::make_shared<Node>(Node{shape});
   std::copy(values.begin(), values.end(), x->value.begin());
   return x;
 }
 const Tensor one = tensor({1}, {1});
-// The chain rule: a step needs the gradient of its own result only, so the ops' order reversed will do.
+
+// ---- 3. The chain rule: the reverse steps of the ops, in their order. A step runs when the gradient of its
+// result is complete, and adds to those of what that was made from: a value used twice has two of them.
+std::vector<std::function<void()>> tape;
 void backward(const Tensor& loss) {
   loss->grad[0] = 1;
   for (auto step = tape.rbegin(); step != tape.rend(); ++step) (*step)();
   tape.clear();
 }
-
-// ---- The ops. Nearly all meet elements one by one: `term` makes a number of the i-th element of each input,
-// and its derivatives by them. Smaller inputs are repeated, and terms of smaller results are added up: a gate
-// serves all pixels of its channel, a loss is one number.
-using In = const double*;
-using Term = std::array<double, 6>;  // the number, then its derivatives
+// Most ops meet elements one by one: a term of the i-th element of each input. Smaller inputs are repeated,
+// and terms of smaller results are added up: a gate serves all pixels of its channel, a loss is one number.
 template <class F>
 Tensor each(Shape shape, const std::vector<Tensor>& xs, F term) {
   int n = shape.size();
@@ -68,24 +73,11 @@ Tensor each(Shape shape, const std::vector<Tensor>& xs, F term) {
   });
   return y;
 }
-Term same(In a) { return {a[0], 1}; }
-Term relu(In a) { return a[0] > 0 ? Term{a[0], 1} : Term{0, 0}; }
-Term leaky_relu(In a) { return a[0] > 0 ? Term{a[0], 1} : Term{0.01 * a[0], 0.01}; }
-Term limited(In a) { return std::abs(a[0]) <= 10 ? Term{a[0], 1} : Term{std::copysign(10, a[0]), 0}; }
-Term sigmoid(In a) { return {1 / (1 + std::exp(-a[0])), 1 / (2 + std::exp(a[0]) + std::exp(-a[0]))}; }
-Term product(In a) { return {a[0] * a[1], a[1], a[0]}; }
-Term gated(In a) { return {a[0] + a[1] * a[2], 1, a[2], a[1]}; }
-Term squared_difference(In a) { return {std::pow(a[0] - a[1], 2), 2 * (a[0] - a[1]), 2 * (a[1] - a[0])}; }
-// Of a = mean, log_var, a number of N(0, 1): a sample of N(mean, exp(log_var)), its divergence from N(0, 1).
-Term sample(In a) { return {a[0] + std::exp(a[1] / 2) * a[2], 1, std::exp(a[1] / 2) * a[2] / 2}; }
-Term divergence(In a) {
-  return {(a[0] * a[0] + std::exp(a[1]) - 1 - a[1]) / 2, a[0], std::exp(a[1]) / 2 - .5};
-}
 Tensor add(const Tensor& x, double k, const Tensor& y) {  // x + k y
   return each(*x, {x, y}, [k](In a) { return Term{a[0] + k * a[1], 1, k}; });
 }
 
-// y[c] += w[a] x[b] for each {a, b, c}: what convolutions, linear layers and windowed means consist of.
+// ---- 4. Products: y[c] += w[a] x[b] for each {a, b, c}. Linear layers and convolutions consist of them.
 using Products = std::vector<std::array<int, 3>>;
 Tensor bilinear(Shape shape, const Tensor& w, const Tensor& x, const Products& products) {
   const Tensor y = tensor(shape);
@@ -99,10 +91,9 @@ Tensor bilinear(Shape shape, const Tensor& w, const Tensor& x, const Products& p
   return y;
 }
 
-// Convolution: place p of x meets place q of y under tap k where p = q stride + k - pad:
+// ---- 5. Convolution: place p of x meets place q of y under tap k where p = q stride + k - pad:
 //   y[o][q] = sum over i, k of w[o][i][k] x[i][q stride + k - pad].
-// Its transpose has the same pairs with x and y exchanged, and w[i][o][k]. Along time (h = 1) the kernel has
-// one row; of a vector it has one tap, and the convolution is a linear layer.
+// The transpose exchanges x and y, and has w[i][o][k]. Along time a kernel is a row; kOne is a linear layer.
 struct Kernel {
   int size, stride = 1, pad = 0;
   bool up = false;  // the transpose
@@ -128,15 +119,25 @@ Tensor convolve(const std::string& name, const Tensor& w, const Tensor& x, int o
   return bilinear(y, w, x, products);
 }
 
-// SSIM (Wang et al. 2004): windowed by a Gaussian of 11x11, sigma 1.5, the mean over the window's places of
-// n1 n2 / (d1 d2), n1 = 2 mx my + C1, n2 = 2 cov + C2, d1 = mx^2 + my^2 + C1, d2 = vx + vy + C2.
+// ---- 6. Channel attention: each channel is looked at by its mean, and weighed.
+Term gated(In a) { return {a[0] + a[1] * a[2], 1, a[2], a[1]}; }
+Tensor channel_mean(const Tensor& x) {
+  return add(tensor({x->c}), 1. / (x->h * x->w), each({x->c}, {x}, same));
+}
+
+// ---- 7. Of a = mean, log_var, eps: a sample of N(mean, exp(log_var)), and how far that is from N(0, 1).
+Term sample(In a) { return {a[0] + std::exp(a[1] / 2) * a[2], 1, std::exp(a[1] / 2) * a[2] / 2}; }
+Term kld(In a) { return {(a[0] * a[0] + std::exp(a[1]) - 1 - a[1]) / 2, a[0], std::exp(a[1]) / 2 - .5}; }
+
+// ---- 8. SSIM (Wang et al. 2004): windowed by a Gaussian of 11x11, sigma 1.5, the mean over the window's
+// places of n1 n2 / (d1 d2), n1 = 2 mx my + C1, n2 = 2 cov + C2, d1 = mx^2 + my^2 + C1, d2 = vx + vy + C2.
 Tensor ssim(const Tensor& x, const Tensor& y) {
   const Tensor gauss = tensor({121});
   double all = 0;
-  const auto bell = [](int d) { return std::exp(-d * d / 4.5); };
-  for (int i = 0; i < 121; ++i) all += gauss->value[i] = bell(i / 11 - 5) * bell(i % 11 - 5);
+  for (int i = 0; i < 121; ++i)
+    all += gauss->value[i] = std::exp(-(std::pow(i / 11 - 5, 2) + std::pow(i % 11 - 5, 2)) / 4.5);
   for (double& g : gauss->value) g /= all;
-  const auto blur = [=](const Tensor& a, const Tensor& b) {  // of the product
+  const auto blur = [=](auto a, auto b) {
     return convolve("ssim", gauss, each(*a, {a, b}, product), 1, {11});
   };
   const auto term = [](In a) {
@@ -149,8 +150,19 @@ Tensor ssim(const Tensor& x, const Tensor& y) {
   const Tensor mx = blur(x, one), my = blur(y, one);
   return add(tensor({1}), 1. / mx->size(), each({1}, {mx, my, blur(x, x), blur(y, y), blur(x, y)}, term));
 }
+Term squared_difference(In a) { return {std::pow(a[0] - a[1], 2), 2 * (a[0] - a[1]), 2 * (a[1] - a[0])}; }
 
-// ---- The weights by their names in a checkpoint: made when first asked for, within 1 / sqrt(fan_in).
+// ---- 9. Adam (Kingma & Ba 2015), of one tensor whose gradient is multiplied by `clip`, then forgotten.
+void adam(Node& w, double clip, double rate, int step) {
+  for (int i = 0; i < w.size(); ++i) {
+    const double g = clip * w.grad[i];
+    w.m[i] += 0.1 * (g - w.m[i]), w.v[i] += 0.001 * (g * g - w.v[i]), w.grad[i] = 0;
+    const double m = w.m[i] / (1 - std::pow(0.9, step)), v = w.v[i] / (1 - std::pow(0.999, step));
+    w.value[i] -= rate * m / (std::sqrt(v) + 1e-8);
+  }
+}
+
+// ---- 10. The weights by their names in a checkpoint: made when first asked for, within 1 / sqrt(fan_in).
 std::map<std::string, Tensor> weights;
 std::mt19937_64 bits(1);
 double uniform() { return double(bits() >> 11) * 0x1p-53; }
@@ -167,7 +179,6 @@ Tensor layer(const std::string& name, const Tensor& x, int outputs, Kernel k, Te
   const Tensor y = convolve(name, weight(name + ".weight", outputs * x->c * taps, fan_in), x, outputs, k);
   return each(*y, {add(y, 1, weight(name + ".bias", outputs, fan_in))}, f);
 }
-
 // A safetensors file: 8 bytes, the length of a JSON object that says where tensors lie, and their bytes.
 void load(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -186,7 +197,7 @@ void load(const std::string& path) {
   }
 }
 
-// ---- The network: four autoencoders, one for each row of taxels, and an upsampler of what they know.
+// ---- 11. The network: four autoencoders, one for each row of taxels, and an upsampler of what they know.
 constexpr int kSide = 4, kTime = 128, kLatent = 10, kMaps = 8;
 struct Example {
   Array window[kSide], eps[kSide];  // of a row of taxels: [taxel][time], 1: pressed; for sample()
@@ -197,8 +208,7 @@ struct Drawn {
 };
 Tensor attended(const std::string& name, const Tensor& x) {  // RCAB: a block with channel attention
   const Tensor h = layer(name + "conv.1", layer(name + "conv.0", x, kMaps, kSame, relu), kMaps, kSame);
-  const Tensor mean = add(tensor({kMaps}), 1. / (h->h * h->w), each({kMaps}, {h}, same));
-  const Tensor s = layer(name + "attention.squeeze", mean, kMaps / 4, kOne, relu);
+  const Tensor s = layer(name + "attention.squeeze", channel_mean(h), kMaps / 4, kOne, relu);
   return each(*x, {x, h, layer(name + "attention.expand", s, kMaps, kOne, sigmoid)}, gated);
 }
 Drawn draw(const Example& e) {
@@ -212,7 +222,7 @@ Drawn draw(const Example& e) {
     h = layer(in + ".fc", each({h->size()}, {h}, same), 64, kOne, relu);
     const Tensor mean = layer(in + ".mean", h, kLatent, kOne);
     const Tensor log_var = layer(in + ".log_var", h, kLatent, kOne, limited);
-    loss = add(loss, 0.2 * 1e-3, each({1}, {mean, log_var}, divergence));
+    loss = add(loss, 0.2 * 1e-3, each({1}, {mean, log_var}, kld));
     const Tensor z = each(*mean, {mean, log_var, eps}, sample);
     for (int i = int(places[g].size()); i < kLatent; ++i) places[g].push_back({0, i, g * kLatent + i});
     latents = add(latents, 1, bilinear(*latents, one, z, places[g]));
@@ -235,12 +245,10 @@ Drawn draw(const Example& e) {
   loss = add(loss, 0.8 / off->size(), each({1}, {picture, truth}, squared_difference));
   loss = add(loss, 0.08 / off->size(), each({1}, {error, off}, squared_difference));
   const auto [low, high] = std::minmax_element(e.truth.begin(), e.truth.end());
-  if (*high - *low >= 0.01)  // where there is structure to compare
-    loss = add(add(loss, 0.08, one), -0.08, ssim(picture, truth));
+  if (*high - *low >= 0.01) loss = add(add(loss, 0.08, one), -0.08, ssim(picture, truth));  // not if flat
   return {picture, error, loss};
 }
-
-// ---- Training: Adam (Kingma & Ba 2015), the gradient no longer than 1, the rate rising over 50 steps.
+// The gradient is no longer than 1, and the rate rises over 50 steps.
 double train_step(const std::vector<Example>& batch, int step) {
   double loss = 0, squares = 0, n = double(batch.size());
   for (const Example& e : batch) {
@@ -251,18 +259,10 @@ double train_step(const std::vector<Example>& batch, int step) {
   for (auto& [name, w] : weights)
     for (double& g : w->grad) g /= n, squares += g * g;
   const double clip = std::min(1.0, 1 / std::sqrt(squares)), rate = 2e-3 * std::min(1.0, step / 50.0);
-  for (auto& [name, w] : weights)
-    for (int i = 0; i < w->size(); ++i) {
-      const double g = clip * w->grad[i];
-      w->m[i] += 0.1 * (g - w->m[i]), w->v[i] += 0.001 * (g * g - w->v[i]), w->grad[i] = 0;
-      const double m = w->m[i] / (1 - std::pow(0.9, step)), v = w->v[i] / (1 - std::pow(0.999, step));
-      w->value[i] -= rate * m / (std::sqrt(v) + 1e-8);
-    }
+  for (auto& [name, w] : weights) adam(*w, clip, rate, step);
   return loss;
 }
-
-// A finger of 4x4 taxels slides along x over waves or bumps; a taxel feels the mean height under it, and
-// noise.
+// A finger of 4x4 taxels slides along x over waves or bumps. A taxel feels the mean height, and noise.
 Example touch() {
   const double pitch = 2 + 3 * uniform(), x0 = pitch * uniform(), y0 = pitch * uniform(), round = uniform();
   const auto wave = [=](double at) { return 0.5 + 0.5 * std::cos(2 * M_PI * at / pitch); };
@@ -282,16 +282,16 @@ Example touch() {
 
 int main(int count, char** arguments) try {
   if (count > 1) load(arguments[1]);
-  for (int step = 1; step <= 600; ++step) {
+  for (int step = 1; step <= 400; ++step) {
     std::vector<Example> batch(16);
     for (Example& e : batch) e = touch();
     const double loss = train_step(batch, step);
     if (step % 50 == 0 || step == 1) std::printf("step %3d  loss %.5f\n", step, loss), std::fflush(stdout);
   }
-  const Example unseen = touch();  // the truth, the picture, and the error that is expected of it
+  const Example unseen = touch();
   const Drawn drawn = draw(unseen);
   std::ofstream file("mini_supertac.pgm", std::ios::binary);
-  file << "P5 16 48 255\n";
+  file << "P5 16 48 255\n";  // the truth, the picture, and the error that is expected of it
   for (const Array& pixels : {unseen.truth, drawn.picture->value, drawn.error->value})
     for (const double p : pixels) file.put(char(255 * std::clamp(p, 0.0, 1.0)));
 } catch (const std::exception& e) {
