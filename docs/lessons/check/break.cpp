@@ -3,28 +3,34 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <numbers>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
+#include "autograd/adam.h"
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/losses.h"
 #include "autograd/ops/vae.h"
-#include "autograd/optimisers/adam.h"
-#include "docs/lessons/check/check.h"
+#include "io/files/file.h"
 #include "io/numbers/random.h"
 #include "layers/residual.h"
-#include "models/training/loss/schedule.h"
+#include "models/training/schedule.h"
 
 namespace lessons {
 namespace {
 
+using Array = std::vector<double>;
 using supertac::Adam;
 using supertac::AdamOptions;
 using supertac::Dim;
 using supertac::RandomStream;
 using supertac::Rng;
 using supertac::Shape;
+using supertac::Tensor;
+using supertac::Variable;
 
 struct Chart {
   std::string title, across, up;
@@ -94,7 +100,7 @@ Chart posterior_collapse() {
 }
 
 Chart log_variance() {
-  Chart chart{"3: the spread of a log variance that runs away, and of a clamped one",
+  Chart chart{"3: the standard deviation of a log variance that runs away, and of a clamped one",
               "log variance",
               "log10 of exp(log_var / 2)",
               {},
@@ -181,9 +187,9 @@ Chart cancelling() {
 Chart checkerboard() {
   Chart chart{"8: a constant doubled by kernel 3 and by kernel 4", "pixel", "value", {}, {}};
   const auto doubled = [](std::size_t kernel) {
-    const Line s{16, 1, 1, kernel, 2, 1};
-    Array row(s.transposed_length());
-    for (std::size_t l = 0; l < s.length; ++l)
+    constexpr std::size_t kLength = 16;
+    Array row((kLength - 1) * 2 + kernel - 2);
+    for (std::size_t l = 0; l < kLength; ++l)
       for (std::size_t k = 0; k < kernel; ++k)
         if (2 * l + k >= 1 && 2 * l + k - 1 < row.size())
           row[2 * l + k - 1] += 2.0 / static_cast<double>(kernel);
@@ -323,8 +329,7 @@ std::string drawn(const Chart& chart) {
          line(chart.with, low, high, "#2050c0") + "</svg>\n";
 }
 
-}  // namespace
-
+// Failure 1 to 13 as a chart: what happens without the safeguard and with it.
 std::string break_it(int failure) {
   constexpr Chart (*kFailures[])() = {
       all_zero,     posterior_collapse, log_variance,   warm_up, noise,   silent_term, cancelling,
@@ -343,4 +348,13 @@ std::string break_it(int failure) {
   return drawn(chart);
 }
 
+}  // namespace
 }  // namespace lessons
+
+int main(int argc, char** argv) try {
+  if (argc != 3) return std::fputs("usage: lessons_break 1 to 13 PICTURE.svg\n", stderr), 2;
+  supertac::write_file(argv[2], lessons::break_it(std::atoi(argv[1])));
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "lessons_break: %s\n", error.what());
+  return 1;
+}
