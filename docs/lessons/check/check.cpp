@@ -127,6 +127,9 @@ void check(Report& report) {
   check_op(report, "each, added up to one number", {"x"}, {{2, 3}}, [](const auto& x) {
     return each({1}, {x[0], x[0]}, product);
   });
+  check_op(report, "each, added up for each channel", {"x"}, {{2, 1, 3}}, [](const auto& x) {
+    return each({2}, {x[0], x[0]}, product);
+  });
   tape.clear();
   const Tensor x = tensor({1}, {3}), y = each({1}, {x, x}, product), z = each({1}, {y, x}, product);
   backward(add(z, 1, y));
@@ -195,7 +198,7 @@ void check(Report& report) {
 #elif LESSON == 6
 void check(Report& report) {
   check_term(report, "gated", gated, 3);
-  const Tensor m = channel_mean(tensor({2, 1, 3}, {1, 2, 6, -1, 0, 4}));
+  const Tensor m = channel_mean(tensor({2, 2, 2}, {1, 2, 6, 3, -1, 0, 4, 1}));
   report.add("channel_mean", {"value", {2}, m->value, {3, 1}});
   check_op(report, "channel_mean", {"x"}, {{2, 3, 4}}, [](const auto& x) { return channel_mean(x[0]); });
 }
