@@ -9,15 +9,15 @@
 #include <string>
 #include <vector>
 
-#include "autograd/adam.h"
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/losses.h"
 #include "autograd/ops/vae.h"
+#include "autograd/optimisers/adam.h"
 #include "io/files/file.h"
 #include "io/numbers/random.h"
 #include "layers/residual.h"
-#include "models/training/schedule.h"
+#include "models/training/loss/schedule.h"
 
 namespace lessons {
 namespace {
