@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "autograd/optimisers/adam.h"
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/losses.h"
 #include "autograd/ops/vae.h"
+#include "autograd/optimisers/adam.h"
 #include "io/files/file.h"
 #include "io/numbers/random.h"
 #include "layers/residual.h"
