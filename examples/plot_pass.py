@@ -30,7 +30,7 @@ inputs = model.scale(volts[chosen])
 drawn = model.draw(volts[chosen])
 print(f"{len(times)} windows of {model.settings['timesteps']} samples; drawn: {len(chosen)} of {drawn.picture[0].shape}")
 
-# %% Voltages over time, and under them the pictures: input, output, spread.
+# %% Voltages over time, and under them the pictures: input, output, predicted error.
 figure = pyplot.figure(figsize=(14, 6), layout="constrained")
 rows = figure.subfigures(2, 1, height_ratios=(1, 1.6))
 axes = rows[0].subplots()

@@ -9,7 +9,7 @@ namespace supertac {
 
 /// The columns of sweep.csv in order; `text` ones hold no number.
 ///   model ... seed       the model's name and settings
-///   windows ... position_mm          scores of the test windows in contact (data/metrics.h)
+///   windows ... position_mm          scores of the test windows in contact (data/scores/metrics.h)
 ///   all_windows ... all_position_mm  of all test windows
 ///   median_us, p99_us    processor time of one window at batch 1 on one thread
 ///   mmac, parameters     millions of multiply-adds per window, values in the checkpoint

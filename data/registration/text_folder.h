@@ -45,18 +45,16 @@ struct FolderImport {
 ///
 /// The files hold no clock. It is rewritten four times, and each step needs what the one before left:
 ///   1. import_text_pass() counts the lines: frame i at i / rig::kFrameRateHz. A dropped line keeps its
-///   place.
+///      place.
 ///   2. restore_clock() puts back the time of frames that the host lost, seen as steps of all signals. A
-///   registration
-///      fits a straight line through the clock, and through a clock with holes none fits within a millimetre.
+///      registration fits a straight line through the clock, and through a clock with holes none fits within
+///      a millimetre.
 ///   3. register_pass() finds start and rate against the plate, from this pass alone.
 ///   4. align_passes() compares the reliable passes of a plate (one that feels the same along every line) and
-///   moves
-///      them onto each other; so it needs all their registrations. It finds losses of frames where nothing
-///      moves, which left no step for 2.
+///      moves them onto each other; so it needs all their registrations. It finds losses of frames where
+///      nothing moves, which left no step for 2.
 ///   5. apply() writes positions, then the losses that 4 found, then stretches the clock to the commanded
-///   speed. It is
-///      last, since the registrations count by the clock of step 2.
+///      speed. It is last, since the registrations count by the clock of step 2.
 /// Throws FileError when the folder cannot be read, holds no pass, a plate is unknown, a trial or pass is no
 /// number, two files are the same pass, or no file is a recording.
 /// `take` gets the passes of one plate after the other, so that no more than these are in memory.

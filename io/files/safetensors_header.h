@@ -1,4 +1,4 @@
-// The header of a safetensors file: rules, parsing and writing. Internal to io/safetensors.*.
+// The header of a safetensors file: rules, parsing and writing. Internal to io/files/safetensors.*.
 #pragma once
 
 #include <cstdint>

@@ -21,7 +21,7 @@ constexpr std::size_t kTopRank = 3;     ///< two samples may lie above the top: 
 ///   g      = max(kLeastGain, max_k (top_k - kRestRemoved rest_k))
 ///   x[t,k] <- clip((x[t,k] - kRestRemoved rest_k) / g, 0, 1)
 /// The gain leaves room for the rest that stays: a finger that is pressed hard on a flat plate looks like
-/// that, and not like noise at full gain (ghosts on plates never felt: 20 % of the flat pictures with top_k -
+/// that, and not like noise at full gain (ghosts on unseen plates: 20 % of the flat pictures with top_k -
 /// rest_k, 7 % so). Percentiles are taken in steps of 1/256. Nothing but the window is used: a live window is
 /// normalised like one of training, and no state has to settle after a start. What is lost is how hard the
 /// finger is pressed. `window`: [T][taxels], values in [0,1] Throws std::invalid_argument when the window is

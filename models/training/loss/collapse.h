@@ -8,7 +8,7 @@
 
 namespace supertac {
 
-/// How much each entry differs within a batch: sums that lanes gather and the trainer adds up.
+/// How much each entry differs within a batch: sums that micro-batches gather and the trainer adds up.
 class BatchVariance {
  public:
   BatchVariance() = default;

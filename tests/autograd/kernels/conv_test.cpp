@@ -1,4 +1,4 @@
-// The plain loops of kernels/conv.cpp and kernels/linear.cpp against those of kernels/fast: the same bits
+// The plain loops of kernels/conv.cpp and ops/linear.cpp against those of kernels/fast: the same bits
 // where both add in the same order.
 #include "autograd/kernels/conv.h"
 

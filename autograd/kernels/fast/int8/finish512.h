@@ -1,4 +1,4 @@
-// What becomes of sums of bytes in vectors of 16, for int8_vnni.cpp and int8_amx.cpp.
+// What becomes of sums of bytes in vectors of 16, for vnni.cpp and amx.cpp.
 #pragma once
 
 #include <immintrin.h>

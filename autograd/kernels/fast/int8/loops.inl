@@ -1,4 +1,4 @@
-// The register-tiled loop over bytes. Each of int8_avx2.cpp and int8_vnni.cpp defines in an anonymous
+// The register-tiled loop over bytes. Each of avx2.cpp and vnni.cpp defines in an anonymous
 // namespace `Sums` (kLanes integers: zero, dot, finish, below; of Values, bytes or wider), kTile and kVectors
 // of P pixels, then includes this file.
 

@@ -1,5 +1,5 @@
-// The loops of prepared networks (inference.h), over the same vector type as isa_kernels.inl and included
-// behind isa_winograd.inl.
+// The loops of prepared networks (inference.h), over the same vector type as kernels.inl and included
+// behind winograd.inl.
 
 // The pixels of a job one after another.
 struct Cursor {

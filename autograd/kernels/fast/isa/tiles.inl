@@ -1,5 +1,5 @@
-// Winograd's products of prepared networks (inference.h), over the same vector type as isa_kernels.inl and
-// included behind isa_winograd.inl.
+// Winograd's products of prepared networks (inference.h), over the same vector type as kernels.inl and
+// included behind winograd.inl.
 
 template <int kSquare>
 ALWAYS_INLINE Dim tile_corner(const MapTileJob& job, Dim tile) {
