@@ -165,8 +165,8 @@ Track resample(const Recording& recording, const ResampleSettings& settings) {
   const double most_s = std::max(settings.max_gap_s, kGapPeriods * recording.period_s());
   std::size_t first = 0;
   for (std::size_t i = 1; i <= usable.size(); ++i) {
-    const bool ends =
-        i == usable.size() || recording.time_s[usable[i]] - recording.time_s[usable[i - 1]] > most_s;
+    const bool ends = i == usable.size() || settings.frames_apart ||
+                      recording.time_s[usable[i]] - recording.time_s[usable[i - 1]] > most_s;
     if (!ends) continue;
     Segment(recording, settings, std::span(usable).subspan(first, i - first)).append_to(track);
     if (i < usable.size()) ++track.gaps;

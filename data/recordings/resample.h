@@ -63,6 +63,7 @@ struct ResampleSettings {
   /// Longer silence between two recorded frames is a gap, never filled; at least kGapPeriods of the
   /// recording.
   double max_gap_s = 0.05;
+  bool frames_apart = false;  ///< each recorded frame is one sample of its own, whatever lies between
   std::optional<Scaling> scaling = Scaling{};  ///< nothing: the samples stay in volts
 };
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <new>
 #include <stdexcept>
 #include <utility>
@@ -167,11 +166,10 @@ void WindowSet::add(const Recording& recording, const std::string& folder, const
   expect_array(recording);
   expect_unit(recording.signal_scale);
   Stored stored{.plate = plate_index(recording, folder)};
-  const bool alone = settings_.timesteps == 1;  // then nothing lies between two frames
-  const Track track =
-      resample(recording, {.rate_hz = settings_.rate_hz,
-                           .max_gap_s = alone ? std::numeric_limits<double>::min() : settings_.max_gap_s,
-                           .scaling = settings_.scaling});
+  const Track track = resample(recording, {.rate_hz = settings_.rate_hz,
+                                           .max_gap_s = settings_.max_gap_s,
+                                           .frames_apart = settings_.timesteps == 1,
+                                           .scaling = settings_.scaling});
   const auto group = recording.metadata.find("group");
   Pass pass{.plate = recording.plate,
             .trial = recording.trial,
@@ -199,7 +197,7 @@ void WindowSet::add(const Recording& recording, const std::string& folder, const
   ++counts_.recordings;
   counts_.frames += track.frames();
   counts_.held += track.held;
-  counts_.gaps += alone ? 0 : track.gaps;
+  if (settings_.timesteps > 1) counts_.gaps += track.gaps;
   counts_.damaged += track.damaged;
   passes_.push_back(std::move(pass));
   stored_.push_back(stored);

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "autograd/pool.h"
+
 namespace supertac {
 
 static double square(real x) { return static_cast<double>(x) * static_cast<double>(x); }
@@ -22,13 +24,15 @@ Estimate Ensemble::estimate(const Tensor& inputs) const {
   const bool predicted_error = mean.predicted_error.defined();
   const auto count = static_cast<real>(members_.size());
   const auto pixels = static_cast<std::size_t>(mean.picture.size());
-  std::vector<double> squares(predicted_error ? pixels : 0);
+  const std::size_t errors = predicted_error ? pixels : 0;
+  Scratch<double> squares(errors);  // from the pool: a picture takes no heap
+  std::fill_n(squares.data(), errors, 0.0);
   mean.picture = mean.picture.clone();
   for (std::size_t m = 0; m < members_.size(); ++m) {
     const Estimate one = m == 0 ? mean : members_[m].estimate(inputs);
     if (one.predicted_error.defined() != predicted_error)
       throw std::invalid_argument("Ensemble: some of the networks predict their error, others do not");
-    for (std::size_t i = 0; i < squares.size(); ++i)
+    for (std::size_t i = 0; i < errors; ++i)
       squares[i] += square(one.picture.values()[i]) + square(one.predicted_error.values()[i]);
     for (std::size_t i = 0; m > 0 && i < pixels; ++i) mean.picture.values()[i] += one.picture.values()[i];
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -19,6 +20,12 @@ class HttpClient {
   /// Connects to 127.0.0.1. `receive_buffer`: bytes that the kernel may hold for it; 0: its own choice.
   explicit HttpClient(int port, int receive_buffer = 0)
       : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    // Out of the way of a server in this process, which cannot have descriptors above FD_SETSIZE: a client is
+    // another program elsewhere.
+    if (const int high = fcntl(socket_, F_DUPFD_CLOEXEC, FD_SETSIZE); high >= 0) {
+      close(socket_);
+      socket_ = high;
+    }
     if (receive_buffer > 0)
       setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
     sockaddr_in place{};
