@@ -11,10 +11,9 @@ void declare(Arguments& a) {
   a.option("data", "DIR", "recordings to test on");
   a.option("pairs", "FILE", "instead of --data: pairs to test a model trained with --pairs on");
   a.one_of("data", "pairs");
-  a.option(
-      "split", "NAME",
-      "window, pass, trial, texture or none; with --pairs group, pair or none (default: the model's own); "
-      "its test side is scored");
+  a.option("split", "NAME",
+           "window, pass, trial, texture, group or none; with --pairs group, pair or none (default: the "
+           "model's own); its test side is scored");
   a.option("seed", "N", "of the split (default: the model's own)");
   a.option("limit", "N", "score at most N examples, evenly spread; 0 = all", "0");
   a.option("precision", "NAME", "fp32, or int8: products of bytes, faster on processors with AVX-512 VNNI",

@@ -38,17 +38,26 @@ constexpr std::size_t kBatch = 16;  // windows that a thread draws at once
 
 thread_local std::string last_error;
 
+// Of an error that leaves no memory for its words the short ones remain, which take none.
+void keep(const char* text) noexcept {
+  try {
+    last_error = text;
+  } catch (...) {
+    last_error.assign("no memory");
+  }
+}
+
 // What `work` returns, or `failed` when it throws; supertac_error() then has the message.
 template <class Result, class Work>
 Result guarded(Result failed, Work work) noexcept {
   try {
     return work();
   } catch (const std::bad_alloc&) {
-    last_error = "not enough memory";
+    keep("not enough memory");
   } catch (const std::exception& error) {
-    last_error = error.what();
+    keep(error.what());
   } catch (...) {
-    last_error = "unknown error";
+    keep("unknown error");
   }
   return failed;
 }

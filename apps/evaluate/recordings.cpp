@@ -138,7 +138,7 @@ std::vector<std::pair<std::string, std::string>> made_by(const Arguments& a, con
 int evaluate_on_recordings(const Arguments& a) {
   const std::vector<ModelFile> files = load_models(a.list("model"));
   const Ensemble network = ensemble_of(files, precision_of(a.choice("precision", {"fp32", "int8"})));
-  TestSet tested = test_set_of(a, files.front(), {"window", "pass", "trial", "texture", "none"});
+  TestSet tested = test_set_of(a, files.front(), {"window", "pass", "trial", "texture", "group", "none"});
   const WindowSet windows = load_windows(a, files.front());
   tested.split = make_split(windows, split_kind(tested.split_name), tested.seed, tested.leave_out);
   check_test_set(a, files, tested);

@@ -43,8 +43,7 @@ std::optional<double> FrameDates::date(std::optional<double> stamp_s, double arr
   if (count_ > 0 && time <= last_s_) return std::nullopt;
   if (count_ > 0) {
     const double periods = (time - last_s_) / period_s_;
-    if (periods > 1.5)
-      missing_ += static_cast<std::uint64_t>(std::min(std::lround(periods - 1), 1'000'000'000L));
+    if (periods > 1.5) missing_ += static_cast<std::uint64_t>(std::lround(std::min(periods - 1, 1e9)));
     if (stamp_s && periods < 1.5) period_s_ += (time - last_s_ - period_s_) / 64;
   }
   ++count_;

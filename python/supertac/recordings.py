@@ -82,6 +82,7 @@ def windows(recording, timesteps, rate_hz, max_gap_s=0.05):
     supertac-stream draws (data/windows/live_window.h)."""
     finite = np.isfinite(recording.volts).all(axis=1) & np.isfinite(recording.time_s)
     times, volts = recording.time_s[finite], recording.volts[finite]
+    max_gap_s = max(max_gap_s, 3 * recording.period_s)  # a silence within so many periods of a slow sensor is none
     half_s = 0.5 * min(recording.period_s, 1 / rate_hz)
     reach_s = timesteps / rate_hz + max_gap_s + 2 / rate_hz
     out_times, out = [], []

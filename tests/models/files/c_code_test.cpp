@@ -96,11 +96,10 @@ TEST(CCode, DrawsWhatLiveWindowsDraw) {
   SuperTacSettings settings = tiny();
   settings.timesteps = 32;
   for (const bool per_window : {false, true})
-    for (const double filter_s : {0.0, 0.05}) {
+    for (const auto& [filter_s, sensor_hz] : {std::pair(0.0, 120.0), {0.05, 120.0}, {0.0, 15.0}}) {
       const ModelFile file =
           model_of(settings, {.rate_hz = 50, .scaling = {.per_window = per_window}, .filter_s = filter_s});
-      constexpr double kHz = 120;
-      const Compiled code(c_code_of(file, "finger", kHz, "a test"), "-O3 -march=native");
+      const Compiled code(c_code_of(file, "finger", sensor_hz, "a test"), "-O3 -march=native");
       const auto push = code.function<int(double, const float*)>("finger_push_at");
       const auto draw = code.function<int(float*, float*)>("finger_picture");
       LiveWindow live({.timesteps = 32,
@@ -108,7 +107,7 @@ TEST(CCode, DrawsWhatLiveWindowsDraw) {
                        .rate_hz = 50,
                        .scaling = file.input.scaling,
                        .filter_s = filter_s,
-                       .frame_period_s = 1 / kHz});
+                       .frame_period_s = 1 / sensor_hz});
       const Prepared prepared(*file.model, *file.ranges);
       Tensor window(file.model->input_shape(1));
       const Tensor noise = uniform(Shape{400, 17}, 11);
@@ -117,8 +116,8 @@ TEST(CCode, DrawsWhatLiveWindowsDraw) {
       double time_s = 3;
       for (int i = 0; i < 400; ++i) {
         const real* random = noise.data() + 17 * i;
-        time_s += (1 + 0.3 * (static_cast<double>(random[16]) - 0.5)) / kHz;
-        if (i == 230) time_s += 0.2;
+        time_s += (1 + 0.3 * (static_cast<double>(random[16]) - 0.5)) / sensor_hz;
+        if (i == 230) time_s += 24 / sensor_hz;
         if (i % 37 == 5) continue;
         for (std::size_t k = 0; k < 16; ++k)
           frame[k] = 2.45F - 0.3F * static_cast<float>(random[k]) * static_cast<float>(i % 90) / 90;
