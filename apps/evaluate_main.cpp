@@ -21,7 +21,7 @@ void declare(Arguments& a) {
   a.option("batch", "N", "examples that are drawn at once; their pictures do not depend on it", "64");
   a.decides_nothing();
   a.option("outputs", "FILE",
-           "write inputs as the network takes them, outputs, truths and spreads as safetensors");
+           "write inputs as the network takes them, outputs, truths and predicted errors as safetensors");
   declare_strict(a);
   a.only_with("data");
   a.option("plates", "A,B,...", "only recordings of these plates (default: the model's own)");

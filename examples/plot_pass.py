@@ -39,7 +39,7 @@ axes.set(xlabel="time (s)", ylabel="volts", title=f"{recording.metadata['plate']
 axes.vlines(times[chosen], *axes.get_ylim(), colors="0.8", linewidth=0.5)
 array = recording.array
 lines = {"felt": inputs[:, -1].reshape(-1, array["rows"], array["columns"], array["channels"]).mean(3),
-         "drawn": drawn.picture, "spread": drawn.predicted_error}
+         "drawn": drawn.picture, "predicted error": drawn.predicted_error}
 lines = {name: pictures for name, pictures in lines.items() if pictures is not None}
 for line, (name, pictures) in zip(rows[1].subplots(len(lines), len(chosen), squeeze=False), lines.items()):
     for axes, picture in zip(line, pictures):

@@ -27,7 +27,7 @@ score() { # title, name of its JSON, folder, more options
 }
 score "the six plates on trial 2, which the network has not seen" known recordings --plates "$plates" --limit 10000 \
   --pictures "$out/pictures"
-score "eight plates it has never felt" never never --split none --plates "" --limit 5000
+score "eight unseen plates" never never --split none --plates "" --limit 5000
 score "the plain plate on trial 2" plain recordings --plates plain
 echo "pictures: $out/pictures/strips.png and a film of each pass beside it; scores: $out/*.json;"
 echo "training curves: $out/model.run/report.html"

@@ -1,11 +1,11 @@
 #!/bin/sh
-# What CI has no time for: the whole suite under AddressSanitizer and UndefinedBehaviorSanitizer, what has threads under
+# What CI has no time for: a build by clang, the whole suite under AddressSanitizer and UndefinedBehaviorSanitizer, what has threads under
 # ThreadSanitizer, clang-tidy over everything, and which files the tests cover by less than 80 %. Some hours on two cores.
 # Each part can be run alone. The last line of each part is added, with date and commit, to scripts/nightly.log.
-#   scripts/nightly.sh [asan] [tsan] [tidy] [coverage]
+#   scripts/nightly.sh [clang] [asan] [tsan] [tidy] [coverage]
 set -eu
 cd "$(dirname "$0")/.."
-[ $# -gt 0 ] || set -- asan tsan tidy coverage
+[ $# -gt 0 ] || set -- clang asan tsan tidy coverage
 scripts/setup.sh libgtest-dev python3 clang libomp-dev gcovr
 note() { echo "$(date -u +%Y-%m-%d) $(git describe --always --dirty) $1: $2" | tee -a scripts/nightly.log; }
 suite() {  # NAME SANITIZERS PATTERN
@@ -17,6 +17,13 @@ suite() {  # NAME SANITIZERS PATTERN
 }
 for part in "$@"; do
   case "$part" in
+    clang)
+      cmake -S . -B build-clang -G Ninja -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_BUILD_TYPE=Release \
+        -DSUPERTAC_QUICK_BUILD=ON -DSUPERTAC_WERROR=ON -DSUPERTAC_MPI=OFF >/dev/null
+      cmake --build build-clang
+      ctest --test-dir build-clang -L quick -j 2 --output-on-failure | tee build-clang/suite.log || true
+      note clang "$(grep 'tests passed' build-clang/suite.log)"
+      ;;
     asan) suite asan address,undefined . ;;
     # libgomp is not instrumented: what OpenMP shares looks like a race.
     tsan) OMP_NUM_THREADS=1 suite tsan thread 'Journal|Web|Recorder|Stream|Collect|Rig|Serial|Board' ;;
@@ -35,6 +42,6 @@ for part in "$@"; do
         --print-summary | tail -3
       note coverage "below 80 %: $(awk -F, 'NR > 1 && $4 < 0.8 { printf "%s ", $1 }' build-coverage/files.csv)"
       ;;
-    *) echo "nightly.sh: expected asan, tsan, tidy or coverage, found $part" >&2; exit 2 ;;
+    *) echo "nightly.sh: expected clang, asan, tsan, tidy or coverage, found $part" >&2; exit 2 ;;
   esac
 done

@@ -69,9 +69,8 @@ void declare_window_training(Arguments& a) {
            "standard");
   a.option("also", "DIR", "more recordings to train on, never tested: simulated ones, say");
   a.option("interval-factor", "X",
-           "half the width of a pixel's 90 % interval in units of its spread, as supertac-evaluate finds it "
-           "on passes "
-           "that the network has not seen",
+           "half the width of a pixel's 90 % interval in units of its predicted error, as supertac-evaluate "
+           "finds it on passes that the network has not seen",
            format(kIntervalFactor));
   a.option("grouping", "NAME", "taxels of one VAE: horizontal (rows) or vertical (columns)", "horizontal");
   a.flag(

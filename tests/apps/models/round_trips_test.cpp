@@ -71,7 +71,7 @@ TEST_F(RoundTrips, OfEveryKindOfFileGiveTheSameBytes) {
        "--json", path("evaluate.json")});
   run("supertac-explain",
       {model, "--recording", recording, "--at", "6", "--out", path("explained.safetensors")});
-  run("supertac-explain", {"a*b", "--out", path("graph.dot")});
+  run("supertac-explain", {"a=2; b=-3; a*b", "--out", path("graph.dot")});
   run("supertac-export", {model, "--onnx", path("m.onnx")});
   run("supertac-stream", {"--recording", recording, "--model", model, "--out", path("stream.safetensors"),
                           "--json", path("stream.json"), "--quiet"});

@@ -278,7 +278,7 @@ TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
   const SafetensorsFile outputs = SafetensorsFile::read(path("outputs.safetensors"));
   EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<std::uint64_t>{40, 32, 16}));
   EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<std::uint64_t>{40, 8, 8}));
-  EXPECT_EQ(outputs.tensors().at("spread").shape, (std::vector<std::uint64_t>{40, 8, 8}));
+  EXPECT_EQ(outputs.tensors().at("predicted_error").shape, (std::vector<std::uint64_t>{40, 8, 8}));
   EXPECT_TRUE(fs::exists(path("pictures/strips.png")));
 }
 
@@ -316,7 +316,7 @@ TEST_F(Training, BadInputIsOneLineAndLeavesNothingBehind) {
       {{"supertac-evaluate", "--model", path("absent"), "--data", data}, 1, "absent"},
       {{"supertac-train", "--data", data, "--out", out, "--autoencoder", "plain", "--beta", "1"},
        2,
-       "--beta: has no part in --autoencoder plain"},
+       "--beta: has no part in a plain autoencoder"},
       {{"supertac-evaluate", "--model", good}, 2, "expected --data DIR or --pairs FILE, found neither"},
   };
   for (const Bad& bad : cases) {
