@@ -28,7 +28,8 @@ SignalRange SignalRange::of_folder(const std::string& dir, const std::vector<std
 }
 
 void SignalRange::add(const Recording& recording) {
-  stated_ = {.rest_volts = recording.signal_scale.rest, .span_volts = recording.signal_scale.span};
+  if (values_.empty())
+    stated_ = {.rest_volts = recording.signal_scale.rest, .span_volts = recording.signal_scale.span};
   const std::size_t signals = recording.array.signals(), frames = recording.frames();
   for (; next_ < frames; next_ += apart_)
     for (std::size_t k = 0; k < signals; ++k) {

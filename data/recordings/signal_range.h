@@ -31,7 +31,7 @@ class SignalRange {
   /// Share of the signals that the scaling makes all the same: those below rest - span, and those more than
   /// a quarter of the span above rest.
   double clipped(const Scaling& scaling) const;
-  /// Rest and span that the last recording states: the rig's in older ones.
+  /// Rest and span that the first recording states: the rig's in older ones.
   const Scaling& stated() const { return stated_; }
   /// The range that the recordings state (the rig's in older ones) where it clips no more than a twentieth
   /// and the signals fill a tenth of it; otherwise rest is the level that one signal in 200 exceeds, and span

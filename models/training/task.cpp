@@ -25,7 +25,9 @@ Scaling scaling_of(const Recipe& recipe, const SignalRange& range, std::vector<s
   if (recipe.random_plates > 0 && scaling.rest_volts != stated)
     throw std::invalid_argument("--random-plates imitates a sensor whose signals rest at " + format(stated) +
                                 ", as the recordings state; those of these recordings rest at " +
-                                format(scaling.rest_volts));
+                                format(scaling.rest_volts) +
+                                "; record them with a sensor's file that states their range, or leave "
+                                "--random-plates out");
   scaling.per_window = recipe.per_window;
   return scaling;
 }

@@ -35,8 +35,8 @@ struct TrainingTask {
 };
 
 /// Reads the recordings, adds random and silent passes, splits. Throws std::invalid_argument as
-/// Recipe::check, std::runtime_error as WindowSet::load, and when the signal range clips most of the signals
-/// or random passes, which have the rig's volts, do not fit the recordings.
+/// Recipe::check, and when random passes, which speak as the recordings state, do not fit their signals;
+/// std::runtime_error as WindowSet::load, and when the signal range clips most of the signals.
 TrainingTask window_task(const Recipe& recipe, const RecordingFolders& folders);
 
 /// Of the split `group`, `pair` or `none`; sets the pairs' scaling. Throws as split_pairs().

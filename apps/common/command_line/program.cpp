@@ -12,6 +12,7 @@
 #include <iostream>
 #include <mutex>
 #include <new>
+#include <string_view>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -58,7 +59,10 @@ void check_stack() {
   if (const char* wish = std::getenv("OMP_STACKSIZE")) {
     char* unit = nullptr;
     const auto number = std::strtoull(wish, &unit, 10);  // of kilobytes where nothing else is said
-    if ((*unit == 'b' || *unit == 'B' ? number >> 10 : number) < 64 && *unit != 'm' && *unit != 'M')
+    const bool is_number = unit != wish;                 // the runtime passes over what is none
+    while (*unit == ' ') ++unit;
+    const bool large = *unit != '\0' && std::string_view("mMgG").find(*unit) != std::string_view::npos;
+    if (is_number && !large && (*unit == 'b' || *unit == 'B' ? number >> 10 : number) < 64)
       throw std::runtime_error("OMP_STACKSIZE is " + in_quotes(wish) + ", expected at least 64k; unset it");
   }
   if (::getrlimit(RLIMIT_STACK, &stack) != 0 || stack.rlim_cur >= kLeast) return;
