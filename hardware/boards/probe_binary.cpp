@@ -12,7 +12,8 @@ namespace supertac {
 namespace {
 
 constexpr std::size_t kLongestPeriod = 20'000, kLeastPeriod = 4, kFewPeriods = 4, kLongestHeader = 4;
-constexpr double kAgree = 0.8;  // some may have been torn
+constexpr double kAgree = 0.8;                        // some may have been torn
+constexpr std::size_t kMostCompared = 4'000'000'000;  // bytes, some seconds: megabytes that hardly change
 
 std::span<const std::byte> bytes_in(const std::string& text, std::size_t at, std::size_t count) {
   return std::as_bytes(std::span(text)).subspan(at, count);
@@ -32,12 +33,13 @@ struct Period {
 // The longest run of bytes that stay the same from period to period and stand nowhere else; nothing when
 // there is none. A resting signal's high bytes stay the same, too, and so does a dead taxel: what is 0, or
 // stands elsewhere in the frame as well, is no part of a header.
-std::optional<Period> constant_run(const std::string& bytes, std::size_t from, std::size_t period) {
+std::optional<Period> constant_run(const std::string& bytes, std::size_t from, std::size_t period,
+                                   std::size_t& compared) {
   // All periods in a third of the bytes: whole values repeat themselves, too, but not over a header.
   const std::size_t count = bytes.size() / 3 / period;
   const auto at = [&](std::size_t phase) { return bytes[from + phase % period]; };
   const auto constant = [&](std::size_t phase) {
-    for (std::size_t k = 1; k < count; ++k)
+    for (std::size_t k = 1; k < count; ++k, ++compared)
       if (bytes[from + phase % period + k * period] != at(phase)) return false;
     return true;
   };
@@ -75,10 +77,11 @@ std::optional<Period> constant_run(const std::string& bytes, std::size_t from, s
 }
 
 std::optional<Period> period_of(const std::string& bytes) {
-  for (std::size_t period = kLeastPeriod; period <= std::min(kLongestPeriod, bytes.size() / 3 / kFewPeriods);
-       ++period)
+  const std::size_t longest = std::min(kLongestPeriod, bytes.size() / 3 / kFewPeriods);
+  std::size_t compared = 0;
+  for (std::size_t period = kLeastPeriod; period <= longest && compared < kMostCompared; ++period)
     for (const std::size_t third : {1, 2, 0})  // bytes may have been lost in one of them
-      if (const auto found = constant_run(bytes, third * (bytes.size() / 3), period)) return found;
+      if (const auto found = constant_run(bytes, third * (bytes.size() / 3), period, compared)) return found;
   return std::nullopt;
 }
 
