@@ -33,15 +33,16 @@ std::int32_t single_sum(const ByteProductJob& job, const std::int16_t* x) {
   return sum;
 }
 
-void sums(const ByteProductJob& job, const std::int16_t* x, std::int32_t* sum) {
-  std::fill_n(sum, job.cout, 0);
-  run_loop([&job, x, sum] {
-    const std::int8_t* w = job.w;
+// Of `count` outputs from `first` on.
+void sums(const ByteProductJob& job, const std::int16_t* x, Dim first, Dim count, std::int32_t* sum) {
+  std::fill_n(sum, count, 0);
+  run_loop([&job, x, first, count, sum] {
+    const std::int8_t* w = job.w + first;
     for (Dim s = 0; s < job.segment_count; ++s) {
       for (Dim k = 0; k < job.length; ++k, w += job.cout) {
         const std::int32_t v = x[job.segments[s] + k];
         const std::int8_t* const row = w;
-        each_here(job.cout, [=](Dim o) { sum[o] += v * row[o]; });
+        each_here(count, [=](Dim o) { sum[o] += v * row[o]; });
       }
     }
   });
@@ -50,7 +51,7 @@ void sums(const ByteProductJob& job, const std::int16_t* x, std::int32_t* sum) {
 }  // namespace
 
 void product_of_numbers(const ByteProductJob& job, const std::int16_t* x, std::int16_t* y) {
-  std::int32_t sum[kMaxChannels];
+  std::int32_t sum[kMaxChannels];  // a linear layer has more outputs: channels of all pixels
   for (Dim n = 0; n < job.images; ++n) {
     for (Dim i = 0; i < job.height; ++i) {
       for (Dim j = 0; j < job.width; ++j) {
@@ -60,8 +61,11 @@ void product_of_numbers(const ByteProductJob& job, const std::int16_t* x, std::i
           *to = finish(job.outcome, 0, single_sum(job, from));
           continue;
         }
-        sums(job, from, sum);
-        for (Dim o = 0; o < job.cout; ++o) to[o] = finish(job.outcome, o, sum[o]);
+        for (Dim first = 0; first < job.cout; first += kMaxChannels) {
+          const Dim count = std::min(kMaxChannels, job.cout - first);
+          sums(job, from, first, count, sum);
+          for (Dim o = 0; o < count; ++o) to[first + o] = finish(job.outcome, first + o, sum[o]);
+        }
       }
     }
   }

@@ -154,6 +154,29 @@ TEST(Bytes, NumbersMakeTheSumsThatAreCountedByHand) {
   EXPECT_EQ(y, (std::array<std::int16_t, 4>{505, 2389, 32767, 32767}));
 }
 
+// 32 channels of 16x16 pixels from two latents: more outputs than a map has channels.
+TEST(Bytes, NumbersMakeAnyNumberOfOutputs) {
+  constexpr Dim kOutputs = 2 * kMaxChannels + 5;
+  const Dim segment = 0;
+  const std::array<std::int16_t, 2> x{100, 1};
+  const std::vector<std::int32_t> multiplier(kOutputs, 1), offset(kOutputs, 1), shift(kOutputs, 1);
+  std::vector<std::int8_t> w(2 * kOutputs);
+  std::vector<std::int16_t> y(kOutputs), expected;
+  for (Dim o = 0; o < kOutputs; ++o) {
+    const int a = static_cast<int>(o % 251) - 125, b = static_cast<int>(o % 7);
+    w[static_cast<std::size_t>(o)] = static_cast<std::int8_t>(a);
+    w[static_cast<std::size_t>(kOutputs + o)] = static_cast<std::int8_t>(b);
+    expected.push_back(static_cast<std::int16_t>((100 * a + b + 1) >> 1));
+  }
+  ByteProductJob job;
+  job.segments = &segment, job.segment_count = 1, job.length = 2;
+  job.w = w.data(), job.cout = job.kept = kOutputs;
+  job.outcome.multiplier = multiplier.data(), job.outcome.offset = offset.data();
+  job.outcome.shift = shift.data();
+  product_of_numbers(job, x.data(), y.data());
+  EXPECT_EQ(y, expected);
+}
+
 TEST(Bytes, GatedSumsRoundAndSaturate) {
   const std::array<std::int16_t, 4> a{10, -10, 32000, -32000}, x{5, 5, 32000, 32000},
       gates{4096, 2048, 4096, 0};
