@@ -106,8 +106,20 @@ ProcessResult run_process(const std::string& program, const std::vector<std::str
   return process.wait();
 }
 
+static bool has_files(const std::string& folder) {
+  std::error_code gone;  // a program may be at work there
+  for (std::filesystem::recursive_directory_iterator entry(folder, gone), end; !gone && entry != end;
+       entry.increment(gone))
+    if (entry->is_regular_file(gone)) return true;
+  return false;
+}
+
 void wait_for_file(const std::string& path) {
-  for (int i = 0; i < 240'000 && !std::filesystem::exists(path); ++i) usleep(500);
+  const bool any = path.ends_with("/*");
+  const auto there = [&] {
+    return any ? has_files(path.substr(0, path.size() - 2)) : std::filesystem::exists(path);
+  };
+  for (int i = 0; i < 240'000 && !there(); ++i) usleep(500);
 }
 
 }  // namespace supertac

@@ -16,7 +16,7 @@ struct ProcessResult {
 };
 
 struct ProcessOptions {
-  int signal = 0;  ///< sent once the file `signal_when` exists
+  int signal = 0;  ///< sent once the file `signal_when` exists; of "FOLDER/*" any file under it
   std::string signal_when{};
   long max_file_bytes = -1;  ///< limit on the size of files written; -1: none
   bool terminal = false;     ///< stderr is a terminal of 100 columns
