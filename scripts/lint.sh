@@ -1,20 +1,14 @@
 #!/bin/sh
 # What reads the sources without running them; any finding is an error: clang-format, shellcheck, the arrows of the
-# includes, cppcheck and clang-tidy (.clang-tidy says which checks). The last needs BUILD, a folder that was configured for
+# includes, and clang-tidy (.clang-tidy says which checks). The last needs BUILD, a folder that was configured for
 # clang with -DCMAKE_EXPORT_COMPILE_COMMANDS=ON; without it clang-tidy is left out. FILES: only these for clang-tidy.
 #   scripts/lint.sh [BUILD [FILES]]
 set -eu
 cd "$(dirname "$0")/.."
-scripts/setup.sh clang-format clang-tidy cppcheck shellcheck python3
+scripts/setup.sh clang-format clang-tidy shellcheck python3
 git ls-files '*.h' '*.cpp' '*.inl' | xargs clang-format --dry-run -Werror
 git ls-files '*.sh' .ci/run | xargs shellcheck --severity=warning
 scripts/check_includes.py
-# Unused functions and the like are the compiler's and the reader's business; these are the checks for real faults. Suppressed is
-# what version 2.10 does not understand of C++20.
-cppcheck --quiet --error-exitcode=1 --enable=warning,portability --inline-suppr --std=c++20 --language=c++ -I . -j 2 \
-  --suppress=missingIncludeSystem --suppress=cppcheckError --suppress=constStatement --suppress=accessMoved \
-  --suppress=internalAstError --suppress=syntaxError --suppress=unknownMacro \
-  io autograd layers data models hardware apps
 [ $# -ge 1 ] || exit 0
 build="$1"
 shift

@@ -1,5 +1,6 @@
 #include "models/files/json_entry.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -53,9 +54,9 @@ std::vector<float> JsonEntry::numbers(const char* name, std::size_t count) const
     for (const Json& element : value)
       if (element.is_number()) values.push_back(element.get<float>());
   }
-  for (const float v : values)
-    if (!std::isfinite(v)) values.clear();
-  if (values.size() != count || count == 0) wrong(name, std::to_string(count) + " finite numbers", value);
+  const bool finite = std::ranges::all_of(values, [](float v) { return std::isfinite(v); });
+  if (values.size() != count || count == 0 || !finite)
+    wrong(name, std::to_string(count) + " finite numbers", value);
   return values;
 }
 

@@ -121,6 +121,13 @@ void OutputFolder::keep() {
     else
       publish(hidden_.string(), {final_.string(), output_.when_taken});
   } catch (const FileError& error) {
+    // Under a name that the next program does not take for something unfinished.
+    std::string name = hidden_.filename().string();
+    if (const std::size_t at = name.rfind(".unfinished-"); at != std::string::npos)
+      name.replace(at, 12, ".kept-");
+    std::error_code failed;
+    fs::rename(hidden_, hidden_.parent_path() / name, failed);
+    if (!failed) hidden_ = hidden_.parent_path() / name;
     throw FileError(output_.path, std::string(error.what()) + "; what was made is in " + hidden_.string());
   }
 }
