@@ -14,12 +14,13 @@ static int fail(const char *what) {
 }
 
 int main(int argc, char **argv) {
-  supertac_description about = {sizeof about};
+  supertac_description about;
   supertac_model *model;
   supertac_live *live;
   float *frame, *picture;
   double time_s;
   int i, drawn;
+  about.size = sizeof about;
   if (argc != 3) return fail("expects MODEL FRAMES_PER_SECOND");
   model = supertac_open(argv[1], SUPERTAC_INT8);
   if (model == NULL || supertac_describe(model, &about) != 0) return fail(supertac_error());

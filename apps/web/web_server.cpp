@@ -26,6 +26,7 @@ namespace supertac {
 namespace {
 
 constexpr unsigned kStalledS = 20;
+constexpr double kToAskS = 0.5;                                // of a new connection
 constexpr unsigned kConnections = WebServer::kMostPeers + 56;  // those that are asked to leave still count
 constexpr std::size_t kRequestBytes = 16 << 10;  // memory of a connection; more than that gets 431
 constexpr int kSendBuffer = 64 << 10;            // what a stalled page may leave unread, and show late
@@ -96,6 +97,7 @@ bool is_numeric(const std::string& host) {
 /// An open connection.
 struct WebServer::Peer {
   MHD_Connection* connection;
+  double came_s;
   bool asks = false;         // a request is being answered
   bool leaves = false;       // it was told to
   Reader* reader = nullptr;  // of a page that gets events
@@ -108,7 +110,7 @@ struct WebServer::Peer {
                          MHD_ConnectionNotificationCode code) {
     std::list<Peer>& all = static_cast<WebServer*>(self)->peers_;
     if (code == MHD_CONNECTION_NOTIFY_STARTED)
-      *peer = &all.emplace_back(Peer{connection});
+      *peer = &all.emplace_back(Peer{connection, seconds_now()});
     else
       all.remove_if([peer](const Peer& p) { return &p == *peer; });
   }
@@ -288,10 +290,13 @@ void WebServer::publish() {
   for (Reader* reader : std::exchange(waiting_, {})) MHD_resume_connection(reader->connection);
 }
 
-// Many that come and say nothing, or take nothing, must not keep out the one who works here.
+// Many that come and say nothing, or take nothing, must not keep out the one who works here. Whoever has just
+// come has not had the time to ask.
 void WebServer::make_room() {
   const auto stays = [](const Peer& p) { return !p.leaves; };
-  const auto silent = [](const Peer& p) { return !p.leaves && !p.asks; };
+  const double now = seconds_now();
+  const auto silent = [now](const Peer& p) { return !p.leaves && !p.asks && now - p.came_s > kToAskS; };
+  const auto not_asking = [this](const Peer& p) { return !p.leaves && !p.asks && &p != &peers_.back(); };
   const auto behind = [this](const Peer& p) {
     return !p.leaves && p.reader != nullptr &&
            number_ > p.reader->seen + static_cast<std::uint64_t>(kMostEventsPerS);
@@ -300,6 +305,7 @@ void WebServer::make_room() {
        --open) {
     auto peer = std::ranges::find_if(peers_, silent);
     if (peer == peers_.end()) peer = std::ranges::find_if(peers_, behind);
+    if (peer == peers_.end()) peer = std::ranges::find_if(peers_, not_asking);
     if (peer == peers_.end()) peer = std::ranges::find_if(peers_, stays);
     peer->leaves = true;
     shutdown(MHD_get_connection_info(peer->connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd,
