@@ -1,11 +1,11 @@
 #!/bin/sh
-# What CI has no time for: a build by clang, the whole suite under AddressSanitizer and UndefinedBehaviorSanitizer, what has threads under
+# What CI has no time for: a build by clang, one for aarch64, the whole suite under AddressSanitizer and UndefinedBehaviorSanitizer, what has threads under
 # ThreadSanitizer, clang-tidy over everything, and which files the tests cover by less than 80 %. Some hours on two cores.
 # Each part can be run alone. The last line of each part is added, with date and commit, to scripts/nightly.log.
-#   scripts/nightly.sh [clang] [asan] [tsan] [tidy] [cppcheck] [coverage]
+#   scripts/nightly.sh [clang] [aarch64] [asan] [tsan] [tidy] [cppcheck] [coverage]
 set -eu
 cd "$(dirname "$0")/.."
-[ $# -gt 0 ] || set -- clang asan tsan tidy cppcheck coverage
+[ $# -gt 0 ] || set -- clang aarch64 asan tsan tidy cppcheck coverage
 scripts/setup.sh libgtest-dev python3 clang libomp-dev gcovr
 note() { echo "$(date -u +%Y-%m-%d) $(git describe --always --dirty) $1: $2" | tee -a scripts/nightly.log; }
 suite() {  # NAME SANITIZERS PATTERN
@@ -23,6 +23,9 @@ for part in "$@"; do
       cmake --build build-clang
       ctest --test-dir build-clang -L quick -j 2 --output-on-failure | tee build-clang/suite.log || true
       note clang "$(grep 'tests passed' build-clang/suite.log)"
+      ;;
+    aarch64)
+      if scripts/aarch64.sh; then note aarch64 "quick tests and hashes pass"; else note aarch64 "fails or cannot be had"; fi
       ;;
     asan) suite asan address,undefined . ;;
     # libgomp is not instrumented: what OpenMP shares looks like a race.
@@ -50,6 +53,6 @@ for part in "$@"; do
         --print-summary | tail -3
       note coverage "below 80 %: $(awk -F, 'NR > 1 && $4 < 0.8 { printf "%s ", $1 }' build-coverage/files.csv)"
       ;;
-    *) echo "nightly.sh: expected clang, asan, tsan, tidy, cppcheck or coverage, found $part" >&2; exit 2 ;;
+    *) echo "nightly.sh: expected clang, aarch64, asan, tsan, tidy, cppcheck or coverage, found $part" >&2; exit 2 ;;
   esac
 done

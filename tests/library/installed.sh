@@ -20,7 +20,7 @@ c++ -std=c++20 -O1 "$source/examples/load_and_draw.cpp" -o load_and_draw $(pkg-c
 grep -q "missing.safetensors" said || fail "the error does not name the file: $(cat said)"
 # shellcheck disable=SC2046
 c++ -std=c++20 -O1 "$source/examples/train.cpp" -o train $(pkg-config --cflags --libs supertac-cpp)
-./train missing out.safetensors 2> said && fail "a missing folder is no error"
+./train missing out.safetensors 1 8 2> said && fail "a missing folder is no error"
 grep -q "missing" said || fail "the error does not name the folder: $(cat said)"
 flags=$(pkg-config --cflags supertac-cpp)
 # shellcheck disable=SC2086

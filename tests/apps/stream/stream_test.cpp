@@ -254,7 +254,7 @@ TEST_F(Streaming, FilesThatAreMissingOrOfAnotherKindAreNamed) {
 }
 
 TEST_F(Streaming, WrongUsageIsExitCode2) {
-  expect_failure(stream({}), 2, "expected one of --board");
+  expect_failure(stream({}), 2, "expected one of --sensor FILE, --board PORT");
   expect_failure(stream({"--board", "a", "--replay", "b"}), 2, "found 2");
   expect_failure(stream({"--replay", "a", "--capture", "b"}), 2, "--capture: only with --board");
   expect_failure(stream({"--recording", "a", "--seconds", "0"}), 2, "--seconds");
