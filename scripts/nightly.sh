@@ -1,6 +1,7 @@
 #!/bin/sh
-# What CI has no time for: a build by clang, one for aarch64, the whole suite under AddressSanitizer and UndefinedBehaviorSanitizer, what has threads under
-# ThreadSanitizer, clang-tidy over everything, and which files the tests cover by less than 80 %. Some hours on two cores.
+# What CI has no time for: a build by clang, one for aarch64, the whole suite under AddressSanitizer and
+# UndefinedBehaviorSanitizer, what has threads under ThreadSanitizer, clang-tidy and cppcheck over everything, and which
+# files the tests cover by less than 80 %. Some hours on two cores.
 # Each part can be run alone. The last line of each part is added, with date and commit, to scripts/nightly.log.
 #   scripts/nightly.sh [clang] [aarch64] [asan] [tsan] [tidy] [cppcheck] [coverage]
 set -eu
