@@ -3,10 +3,10 @@
 # UndefinedBehaviorSanitizer, what has threads under ThreadSanitizer, clang-tidy and cppcheck over everything, and which
 # files the tests cover by less than 80 %. Some hours on two cores.
 # Each part can be run alone. The last line of each part is added, with date and commit, to scripts/nightly.log.
-#   scripts/nightly.sh [clang] [aarch64] [asan] [tsan] [tidy] [cppcheck] [coverage]
+#   scripts/nightly.sh [clang] [aarch64] [asan] [tsan] [tidy] [cppcheck] [lintian] [coverage]
 set -eu
 cd "$(dirname "$0")/.."
-[ $# -gt 0 ] || set -- clang aarch64 asan tsan tidy cppcheck coverage
+[ $# -gt 0 ] || set -- clang aarch64 asan tsan tidy cppcheck lintian coverage
 scripts/setup.sh libgtest-dev python3 clang libomp-dev gcovr
 note() { echo "$(date -u +%Y-%m-%d) $(git describe --always --dirty) $1: $2" | tee -a scripts/nightly.log; }
 suite() {  # NAME SANITIZERS PATTERN
@@ -45,6 +45,13 @@ for part in "$@"; do
         --suppress=unknownMacro io autograd layers data models hardware apps library 2>&1 | tee build-cppcheck.log
       note cppcheck "$(grep -cE '(error|warning|portability):' build-cppcheck.log) remarks"
       ;;
+    lintian)
+      scripts/setup.sh lintian help2man
+      cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release >/dev/null
+      cmake --build build
+      (cd build && cpack -G DEB >/dev/null && lintian ./*.deb >lintian.log) || true
+      note lintian "$(grep -c '^E:' build/lintian.log) errors"
+      ;;
     coverage)
       cmake -S . -B build-coverage -G Ninja -DCMAKE_BUILD_TYPE=Debug -DSUPERTAC_QUICK_BUILD=ON -DSUPERTAC_MPI=OFF \
         -DCMAKE_CXX_FLAGS="--coverage -O1" -DCMAKE_EXE_LINKER_FLAGS=--coverage >/dev/null
@@ -54,6 +61,6 @@ for part in "$@"; do
         --print-summary | tail -3
       note coverage "below 80 %: $(awk -F, 'NR > 1 && $4 < 0.8 { printf "%s ", $1 }' build-coverage/files.csv)"
       ;;
-    *) echo "nightly.sh: expected clang, aarch64, asan, tsan, tidy, cppcheck or coverage, found $part" >&2; exit 2 ;;
+    *) echo "nightly.sh: expected clang, aarch64, asan, tsan, tidy, cppcheck, lintian or coverage, found $part" >&2; exit 2 ;;
   esac
 done
