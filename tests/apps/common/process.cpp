@@ -122,4 +122,14 @@ void wait_for_file(const std::string& path) {
   for (int i = 0; i < 240'000 && !there(); ++i) usleep(500);
 }
 
+void wait_for_growth(const std::string& path, std::uintmax_t bytes) {
+  wait_for_file(path);
+  std::error_code gone;
+  const std::uintmax_t before = std::filesystem::file_size(path);
+  for (int i = 0; i < 240'000; ++i, usleep(500)) {
+    const std::uintmax_t now = std::filesystem::file_size(path, gone);
+    if (!gone && now >= before + bytes) return;
+  }
+}
+
 }  // namespace supertac

@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -53,5 +54,7 @@ ProcessResult run_process(const std::string& program, const std::vector<std::str
 
 /// Waits up to two minutes, of a busy machine, for a file to appear.
 void wait_for_file(const std::string& path);
+/// The same for a file to appear and to become longer by `bytes`, as a program writes what it reads.
+void wait_for_growth(const std::string& path, std::uintmax_t bytes);
 
 }  // namespace supertac

@@ -217,14 +217,24 @@ TEST_F(Streaming, UnpluggingIsOneClearLineAndKeepsWhatWasSeen) {
   EXPECT_EQ(stream({"--replay", path("capture")}).code, 0);
 }
 
-TEST_F(Streaming, ABoardThatPausesStartsANewWindow) {
+// A terminal holds 25 ms of frames; what the board sends beyond while nobody reads is lost.
+TEST_F(Streaming, AProgramThatWasStoppedStartsANewWindow) {
   PtyRig& rig = plug_in();
-  RunningProcess running("supertac-stream", words({"--board", board(), "--seconds", "2", "--json",
-                                                   path("json"), "--capture", path("capture")}));
-  wait_for_file(path("capture"));
-  usleep(500'000);
-  rig.with_world([](RigWorld&) { usleep(300'000); });
-  ASSERT_EQ(running.wait().code, 0);
+  RunningProcess running("supertac-stream",
+                         words({"--board", board(), "--json", path("json"), "--capture", path("capture")}));
+  const int some_hundred_frames = 8192;
+  wait_for_growth(path("capture"), some_hundred_frames);
+  running.send(SIGSTOP);
+  const auto sent_s = [&] {
+    double now = 0;
+    rig.with_world([&](RigWorld& world) { now = world.now(); });
+    return now;
+  };
+  for (const double stopped = sent_s(); sent_s() < stopped + 0.4;) usleep(1000);
+  running.send(SIGCONT);
+  wait_for_growth(path("capture"), some_hundred_frames);
+  running.send(SIGINT);
+  ASSERT_EQ(running.wait().code, 130);
   EXPECT_GE(result("json").at("gaps"), 1);
   EXPECT_GE(result("json").at("suspect"), 1);
 }
