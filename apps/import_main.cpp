@@ -1,5 +1,5 @@
-// supertac-import: the rig's text recordings as our recordings, each registered against its plate; or those
-// of a collection that was cut off, from its journal.
+// supertac-import: the rig's text recordings as our recordings, each registered against its plate; tables of
+// any sensor's frames; or the passes of a collection that was cut off, from its journal.
 
 #include <filesystem>
 #include <optional>
@@ -11,6 +11,7 @@
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "apps/import/page.h"
+#include "apps/import/tables.h"
 #include "data/plates/plate_file.h"
 #include "data/registration/text_folder.h"
 
@@ -19,16 +20,17 @@ namespace supertac {
 void declare(Arguments& arguments) {
   arguments
       .positional(
-          "TEXT_DIR",
-          "folder with <plate>/<trial>/<pass>.txt, 16 voltages a line; a plate of your own as <plate>.stl "
-          "beside its folder",
+          "INPUT",
+          "folder with <plate>/<trial>/<pass>.txt, 16 voltages of the rig a line; a plate of your own as "
+          "<plate>.stl beside its folder. With --sensor: a table, or a folder of them",
           false)
-      .option("journal", "FILE", "instead of TEXT_DIR: recover a collection that was cut off")
+      .option("journal", "FILE", "instead of INPUT: recover a collection that was cut off")
       .required("out", "DIR", "folder for the recordings, one file per pass")
-      .option("speed", "MM_PER_S", "sliding speed of the passes in mm/s", "10")
+      .option("speed", "MM_PER_S", "sliding speed of the rig's passes in mm/s", "10")
       .option("pictures", "DIR",
               "write index.html: the signals of each pass under the plate they were fitted to")
       .flag("skip-bad", "leave out files and folders that are no recordings instead of giving up");
+  declare_tables(arguments);
 }
 
 namespace {
@@ -50,7 +52,7 @@ FolderImport import_settings(const Arguments& arguments, std::optional<Progress>
 }
 
 int recover(const Arguments& arguments) {
-  for (const char* other : {"TEXT_DIR", "speed", "skip-bad", "pictures"})
+  for (const char* other : {"INPUT", "speed", "skip-bad", "pictures", "sensor"})
     if (arguments.given(other))
       throw UsageError(std::string("--journal: stands alone with --out, found with ") + other);
   const std::string out = arguments.text("out");
@@ -69,7 +71,13 @@ int recover(const Arguments& arguments) {
 
 int run(Arguments& arguments) {
   if (arguments.given("journal")) return recover(arguments);
-  if (!arguments.given("TEXT_DIR")) throw UsageError("expected TEXT_DIR or --journal FILE, found neither");
+  if (!arguments.given("INPUT")) throw UsageError("expected INPUT or --journal FILE, found neither");
+  if (arguments.given("sensor")) {
+    for (const char* other : {"speed", "pictures"})
+      if (arguments.given(other))
+        throw UsageError(std::string("--") + other + ": of the rig's text files only");
+    return import_tables(arguments, arguments.text("INPUT"));
+  }
   const std::string out = arguments.text("out");
   OutputFolder folder(arguments.output("out"));
   std::optional<OutputFolder> pictures;
@@ -89,7 +97,7 @@ int run(Arguments& arguments) {
     ++recordings;
   };
   // A plate at a time: no more is in memory, and what is done is on the disk.
-  import_text_folder(arguments.text("TEXT_DIR"), import_settings(arguments, bar, bad),
+  import_text_folder(arguments.text("INPUT"), import_settings(arguments, bar, bad),
                      [&](const std::vector<ImportedPass>& plate) {
                        for (const ImportedPass& pass : plate) keep(pass);
                        keep_plate_file(plate.front().plate_file, folder.path());

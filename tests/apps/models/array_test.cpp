@@ -7,6 +7,7 @@
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
+#include "io/numbers/numbers.h"
 #include "models/files/model_file.h"
 #include "tests/apps/common/process.h"
 
@@ -155,6 +156,62 @@ TEST(Array, IsSimulatedAsASensorsFileSays) {
   EXPECT_LT(high, 910);
   words.insert(words.end(), {"--array", "4x4"});
   EXPECT_EQ(run_process("supertac-simulate", words).code, 2);
+}
+
+// A log that another program kept: milliseconds, positions, names, a file for every second or so.
+TEST(Array, AHundredTablesAreImportedTrainedAndScored) {
+  const TemporaryFolder folder;
+  const std::string sensor = folder / "mat.json", model = folder / "m.safetensors";
+  write_file(sensor, std::string(R"({"name": "mat", "rows": 4, "columns": 4, "pitch_mm": 3, "unit": "counts",
+                                     "pressed": "higher", "range": [40, 900], "rate_hz": 100,
+                                     "frame": {"kind": "text"}})"));
+  const auto made =
+      run_process("supertac-simulate", {"--plates", "ridges6", "--speeds", "10", "--trials", "1", "--passes",
+                                        "5", "--sensor", sensor, "--out", folder / "sim"});
+  ASSERT_EQ(made.code, 0) << made.error;
+  int tables = 0;
+  for (const std::string& path : list_recordings(folder / "sim")) {
+    const Recording r = read_recording(path);
+    const std::string day = folder / "log/day" + std::to_string(r.pass % 5 + 1);
+    make_directories(day);
+    for (std::size_t part = 0; part < 20; ++part) {
+      std::string text = "ms;x;y;";
+      for (int k = 0; k < 16; ++k) text += "taxel" + std::to_string(k) + (k < 15 ? ";" : "\n");
+      for (std::size_t i = part * r.frames() / 20; i < (part + 1) * r.frames() / 20; ++i) {
+        text += format(1e3 * r.time_s[i]) + ";" + format(r.position_mm[2 * i]) + ";" +
+                format(r.position_mm[2 * i + 1]);
+        for (std::size_t k = 0; k < 16; ++k) text += ";" + format(r.volts[16 * i + k]);
+        text += "\n";
+      }
+      write_file(day + "/" + std::to_string(r.pass) + "_" + std::to_string(part) + ".csv", text);
+      ++tables;
+    }
+  }
+  ASSERT_EQ(tables, 100);
+  const std::string data = folder / "data";
+  const auto imported = run_process(
+      "supertac-import", {folder / "log", "--sensor", sensor, "--columns",
+                          "time=ms:ms,x=x,y=y,values=taxel0-taxel15", "--plate", "ridges6", "--out", data});
+  ASSERT_EQ(imported.code, 0) << imported.error;
+  EXPECT_NE(imported.out.find("100 recordings in"), std::string::npos);
+  const Recording first = read_recording(data + "/ridges6_t1_p1_v0.safetensors");
+  EXPECT_EQ(first.metadata.at("group"), "day1");
+  const auto trained =
+      run_process("supertac-train", {"--data", data, "--out", model, "--preset", "tiny", "--timesteps", "32",
+                                     "--epochs", "1", "--stride", "8", "--batch", "8", "--split", "group"});
+  ASSERT_EQ(trained.code, 0) << trained.error;
+  EXPECT_EQ(evaluate(folder, data, model).at("all").at("windows"), 40);
+
+  write_file(folder / "log/day1/odd.csv", std::string("not a table\n"));
+  std::vector<std::string> again = {folder / "log", "--sensor", sensor,  "--columns",    "time=ms:ms,x=x,y=y",
+                                    "--plate",      "ridges6",  "--out", folder / "more"};
+  const auto refused = run_process("supertac-import", again);
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_NE(refused.error.find("odd.csv: holds no line of numbers"), std::string::npos) << refused.error;
+  again.emplace_back("--skip-bad");
+  EXPECT_EQ(run_process("supertac-import", again).code, 0);
+  again = {folder / "log", "--out", folder / "none", "--columns", "time=ms"};
+  EXPECT_EQ(run_process("supertac-import", again).code, 2);
 }
 
 }  // namespace

@@ -1,0 +1,229 @@
+#include "data/recordings/table.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <map>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+
+namespace supertac {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+constexpr std::uint64_t kMaxBytes = std::uint64_t{4} << 30;
+constexpr std::size_t kMostColumns = std::size_t{1} << 20;
+
+// --- NumPy's files: "\x93NUMPY", version, length of the header, a Python dictionary, the values.
+
+template <class T>
+void convert(std::span<const std::byte> bytes, std::vector<double>& to) {
+  for (std::size_t i = 0; i + sizeof(T) <= bytes.size(); i += sizeof(T)) {
+    T value;
+    std::memcpy(&value, bytes.data() + i, sizeof(T));
+    to.push_back(static_cast<double>(value));
+  }
+}
+
+struct NumberType {
+  std::size_t bytes;
+  void (*convert)(std::span<const std::byte> from, std::vector<double>& to);
+};
+const std::map<std::string_view, NumberType> kNumberTypes = {
+    {"<f4", {4, convert<float>}},         {"<f8", {8, convert<double>}},
+    {"|u1", {1, convert<std::uint8_t>}},  {"|i1", {1, convert<std::int8_t>}},
+    {"<u2", {2, convert<std::uint16_t>}}, {"<i2", {2, convert<std::int16_t>}},
+    {"<u4", {4, convert<std::uint32_t>}}, {"<i4", {4, convert<std::int32_t>}},
+    {"<u8", {8, convert<std::uint64_t>}}, {"<i8", {8, convert<std::int64_t>}}};
+
+/// What stands behind 'key': in the header, up to `end`.
+std::string_view entry(std::string_view header, const std::string& key, std::string_view begin, char end) {
+  std::size_t at = header.find("'" + key + "':");
+  if (at == std::string_view::npos) return {};
+  at = header.find(begin, at + key.size() + 3);
+  if (at == std::string_view::npos) return {};
+  header.remove_prefix(at + begin.size());
+  return header.substr(0, header.find(end));
+}
+
+Table numpy_table(const std::string& path, FileReader& file) {
+  const auto refuse = [&](const std::string& problem) { throw FileError(path, problem); };
+  std::array<unsigned char, 12> start{};
+  file.read(std::as_writable_bytes(std::span(start).first(std::min<std::uint64_t>(12, file.size()))));
+  if (std::memcmp(start.data(), "\x93NUMPY", 6) != 0 || start[6] < 1 || start[6] > 3)
+    refuse("expected a file of numpy.save, found other bytes");
+  std::size_t length = start[8] + 256U * start[9], prefix = 10;
+  if (start[6] > 1) length += 65536U * start[10] + (std::size_t{start[11]} << 24), prefix = 12;
+  if (length > 65536 || length + prefix > file.size() || length < 2) refuse("its header is cut or too long");
+  // Of version 1 two bytes of the header have been read.
+  std::string header(reinterpret_cast<const char*>(start.data()) + prefix, 12 - prefix);
+  header.resize(length);
+  file.read(std::as_writable_bytes(std::span(header).subspan(12 - prefix)));
+
+  const std::string_view type = entry(header, "descr", "'", '\'');
+  const auto number = kNumberTypes.find(type);
+  if (number == kNumberTypes.end())
+    refuse("holds numbers of type " + in_quotes(type) +
+           ", expected one of f4, f8, i1 to i8, u1 to u8, little endian: save array.astype('f4')");
+  if (header.find("'fortran_order': True") != std::string::npos)
+    refuse("is in Fortran's order: save numpy.ascontiguousarray(array)");
+  std::vector<std::size_t> shape;
+  for (std::string_view text = entry(header, "shape", "(", ')'); !text.empty();) {
+    std::string_view dim = text.substr(0, text.find(','));
+    text.remove_prefix(std::min(text.size(), dim.size() + 1));
+    while (dim.starts_with(' ')) dim.remove_prefix(1);
+    if (dim.empty()) continue;
+    const auto value = parse_uint(dim);
+    if (!value || *value < 1 || *value > kMaxBytes)
+      refuse("has a side of " + in_quotes(dim) + ", expected 1 or more");
+    shape.push_back(*value);
+  }
+  if (shape.size() < 1 || shape.size() > 4)
+    refuse("is of rank " + std::to_string(shape.size()) + ", expected 1 to 4: rows first");
+  Table table;
+  table.shape.assign(shape.begin() + 1, shape.end());
+  table.columns = 1;
+  for (const std::size_t side : table.shape) {
+    table.columns *= side;
+    if (table.columns > kMostColumns)
+      refuse("has more than " + std::to_string(kMostColumns) + " numbers in a row");
+  }
+  const std::uint64_t left = file.size() - prefix - length;
+  const std::size_t row_bytes = table.columns * number->second.bytes;
+  if (left % row_bytes != 0 || left / row_bytes != shape[0])
+    refuse("holds " + std::to_string(left) + " bytes of values, its shape needs " + std::to_string(shape[0]) +
+           " x " + std::to_string(row_bytes) + "; it is cut or damaged");
+  table.values.reserve(shape[0] * table.columns);
+  std::vector<std::byte> row(row_bytes);
+  for (std::size_t i = 0; i < shape[0]; ++i) {
+    file.read(row);
+    number->second.convert(row, table.values);
+  }
+  return table;
+}
+
+// --- text
+
+std::string_view trimmed(std::string_view text) {
+  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
+  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+  return text;
+}
+
+/// The first of , ; tab that the line has; else, and where a line of numbers mixes them, blanks and tabs.
+char separator_of(std::string_view line) {
+  for (const char c : {',', ';'})
+    if (line.find(c) != std::string_view::npos) return c;
+  const bool names = line.find_first_not_of("0123456789+-.eE \t\r") != std::string_view::npos;
+  return names && line.find('\t') != std::string_view::npos ? '\t' : ' ';
+}
+
+std::vector<std::string_view> cells_of(std::string_view line, char separator) {
+  std::vector<std::string_view> cells;
+  for (line = trimmed(line); !line.empty();) {
+    const std::size_t end =
+        std::min(separator == ' ' ? line.find_first_of(" \t") : line.find(separator), line.size());
+    cells.push_back(trimmed(line.substr(0, end)));
+    const bool more = end < line.size();
+    line.remove_prefix(end + (more ? 1 : 0));
+    if (separator == ' ') line = trimmed(line);
+    if (more && line.empty()) cells.emplace_back();
+  }
+  return cells;
+}
+
+/// How many columns most of the first lines have.
+std::size_t usual_columns(std::string_view text, char separator) {
+  std::map<std::size_t, int> counts;
+  for (int i = 0; i < 1000 && !text.empty(); ++i) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(text.size(), line.size() + 1));
+    if (const std::size_t cells = cells_of(line, separator).size(); cells > 0) ++counts[cells];
+  }
+  const auto most = std::ranges::max_element(counts, {}, [](const auto& c) { return c.second; });
+  return most == counts.end() ? 0 : most->first;
+}
+
+bool append_numbers(const std::vector<std::string_view>& cells, std::vector<double>& values) {
+  const std::size_t before = values.size();
+  for (const std::string_view cell : cells) {
+    const auto value = parse_double(cell.starts_with('+') ? cell.substr(1) : cell);
+    if (value) values.push_back(*value);
+  }
+  if (values.size() == before + cells.size()) return true;
+  values.resize(before);
+  return false;
+}
+
+Table text_table(const std::string& path) {
+  const std::string whole = read_text_file(path, kMaxBytes);
+  std::string_view text = whole;
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  Table table;
+  char separator = 0;
+  std::size_t number = 0, lines = 0;
+  while (!text.empty()) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    const std::string_view rest = text.substr(std::min(text.size(), line.size() + 1));
+    ++number;
+    if (const std::string_view content = trimmed(line); !content.empty() && content.front() != '#') {
+      if (separator == 0) {
+        separator = separator_of(content);
+        table.columns = usual_columns(text, separator);
+        table.shape = {table.columns};
+      }
+      const auto cells = cells_of(content, separator);
+      ++lines;
+      const bool fits = cells.size() == table.columns;
+      if (fits && append_numbers(cells, table.values)) {
+        table.lines.push_back(number);
+      } else if (fits && lines == 1) {
+        table.names.assign(cells.begin(), cells.end());
+      } else {
+        ++table.dropped;
+      }
+    }
+    text = rest;
+  }
+  if (table.rows() == 0)
+    throw FileError(path,
+                    "holds no line of numbers; expected a row a line, separated by commas, tabs or blanks");
+  if (table.dropped * 10 > table.rows() + table.dropped)
+    throw FileError(path, std::to_string(table.dropped) + " of " + std::to_string(lines) + " lines are not " +
+                              std::to_string(table.columns) +
+                              " numbers, expected at most a tenth; is it a table of numbers?");
+  return table;
+}
+
+}  // namespace
+
+std::size_t Table::column(const std::string& name) const {
+  if (const auto found = std::ranges::find(names, name); found != names.end())
+    return static_cast<std::size_t>(found - names.begin());
+  if (const auto number = parse_uint(name); number && *number < columns) return *number;
+  std::string known = names.empty() ? "no names" : "the names";
+  for (std::size_t i = 0; i < std::min<std::size_t>(names.size(), 12); ++i)
+    known += (i == 0 ? " " : ", ") + printable(names[i]);
+  if (names.size() > 12) known += ", ...";
+  throw std::invalid_argument("there is no column " + in_quotes(name) + ": the file has columns 0 to " +
+                              std::to_string(columns - 1) + " and " + known);
+}
+
+Table read_table(const std::string& path) {
+  if (!path.ends_with(".npy")) return text_table(path);
+  FileReader file(path);
+  if (file.size() > kMaxBytes) throw FileError(path, "is larger than 4 GiB; cut it into several");
+  return numpy_table(path, file);
+}
+
+}  // namespace supertac

@@ -1,0 +1,249 @@
+#include "data/recordings/table_import.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "io/files/file.h"
+#include "io/numbers/median.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+
+namespace supertac {
+namespace {
+
+double unit_s(const std::string& unit) {
+  if (unit == "s") return 1;
+  if (unit == "ms") return 1e-3;
+  if (unit == "us") return 1e-6;
+  throw std::invalid_argument("time is in " + in_quotes(unit) + ", expected s, ms or us");
+}
+
+/// The columns that "8-71", "s0-s63" or a single name stand for.
+void append_columns(const Table& table, const std::string& text, std::vector<std::size_t>& columns) {
+  // A name may hold a '-' of its own.
+  for (std::size_t dash = text.find('-'); dash != std::string::npos; dash = text.find('-', dash + 1)) {
+    const std::string first = text.substr(0, dash), last = text.substr(dash + 1);
+    const auto known = [&](const std::string& name) {
+      return std::ranges::find(table.names, name) != table.names.end() || parse_uint(name).has_value();
+    };
+    if (!known(first) || !known(last)) continue;
+    const std::size_t from = table.column(first), to = table.column(last);
+    if (to < from) throw std::invalid_argument("values " + in_quotes(text) + " end before they begin");
+    for (std::size_t c = from; c <= to; ++c) columns.push_back(c);
+    return;
+  }
+  columns.push_back(table.column(text));
+}
+
+struct Columns {
+  static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  std::size_t time = kNone, x = kNone, y = kNone;
+  std::vector<std::size_t> values;
+};
+
+Columns columns_of(const Table& table, const ColumnMap& map, std::size_t expected) {
+  Columns columns;
+  const auto find = [&](const std::string& name) {
+    return name.empty() ? Columns::kNone : table.column(name);
+  };
+  columns.time = find(map.time), columns.x = find(map.x), columns.y = find(map.y);
+  for (const std::string& text : map.values) append_columns(table, text, columns.values);
+  for (std::size_t c = 0; c < table.columns && map.values.empty(); ++c)
+    if (c != columns.time && c != columns.x && c != columns.y) columns.values.push_back(c);
+  if (columns.values.size() != expected)
+    throw std::invalid_argument(std::to_string(columns.values.size()) + " columns hold values" +
+                                (map.values.empty() ? ", all that --columns does not name" : "") +
+                                "; a frame of the sensor has " + std::to_string(expected) +
+                                ": name them, --columns values=FIRST-LAST, and time=, x=, y=");
+  return columns;
+}
+
+std::string name_of(const Table& table, std::size_t column) {
+  return "column " + std::to_string(column) +
+         (table.names.empty() ? "" : " (" + printable(table.names[column]) + ")");
+}
+std::string place(const Table& table, std::size_t row) {
+  return table.lines.empty() ? "row " + std::to_string(row) : "line " + std::to_string(table.lines[row]);
+}
+
+/// Equal stamps, of a clock that is coarser than the frames, over the time to the next one.
+void spread_equal_stamps(std::vector<double>& time_s, double step) {
+  for (std::size_t begin = 0, end = 0; begin < time_s.size(); begin = end) {
+    end = begin + 1;
+    while (end < time_s.size() && time_s[end] == time_s[begin]) ++end;
+    const double count = static_cast<double>(end - begin);
+    if (end < time_s.size()) step = (time_s[end] - time_s[begin]) / count;
+    for (std::size_t i = begin + 1; i < end; ++i)
+      time_s[i] = time_s[begin] + step * static_cast<double>(i - begin);
+  }
+}
+
+std::vector<double> times_of(const std::string& path, const Table& table, std::size_t column, double unit,
+                             double rate_hz) {
+  // A line that was dropped leaves its time empty.
+  const auto number = [&](std::size_t i) { return table.dropped > 0 ? table.lines[i] - table.lines[0] : i; };
+  std::vector<double> time_s;
+  for (std::size_t i = 0; i < table.rows(); ++i) {
+    const double t =
+        column == Columns::kNone ? static_cast<double>(number(i)) / rate_hz : table.row(i)[column] * unit;
+    if (!std::isfinite(t))
+      throw FileError(path, name_of(table, column) + " as time: no number in " + place(table, i));
+    if (i > 0 && t < time_s.back())
+      throw FileError(path, name_of(table, column) + " as time falls in " + place(table, i) + ", from " +
+                                format(time_s.back() / unit) + " to " + format(t / unit) +
+                                "; name another column, --columns time=NAME");
+    time_s.push_back(t);
+  }
+  if (column == Columns::kNone || time_s.size() < 2) return time_s;
+  const double span = time_s.back() - time_s.front();
+  spread_equal_stamps(time_s, span > 0 ? span / static_cast<double>(time_s.size() - 1) : 1);
+  return time_s;
+}
+
+void check_rate(const std::string& path, const Table& table, std::size_t column,
+                const std::vector<double>& time_s, double rate_hz) {
+  if (column == Columns::kNone || time_s.size() < 2) return;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < time_s.size(); ++i) steps.push_back(time_s[i] - time_s[i - 1]);
+  const double found = 1 / median(steps);
+  if (!(found > 0.5 * rate_hz && found < 2 * rate_hz))
+    throw FileError(path, name_of(table, column) + " as time has " + format(found, 1) +
+                              " frames/s, the sensor is said to send " + format(rate_hz, 1) +
+                              "; is it in s, ms or us (--columns time=NAME:ms)?");
+}
+
+/// Refuses a column that most of the time says what the sensor cannot say.
+void check_taxel(const std::string& path, const Table& table, std::size_t column, std::size_t value,
+                 const SignalScale& scale) {
+  const double margin = 0.25 * (scale.high() - scale.low());
+  std::size_t outside = 0;
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (std::size_t i = 0; i < table.rows(); ++i) {
+    const double v = table.row(i)[column];
+    if (!std::isfinite(v) || std::abs(v) > std::numeric_limits<float>::max())
+      throw FileError(path, name_of(table, column) + " as value " + std::to_string(value) +
+                                " of the frame is " + format(v) + " in " + place(table, i) +
+                                ", expected a finite number");
+    outside += v < scale.low() - margin || v > scale.high() + margin;
+    low = std::min(low, v), high = std::max(high, v);
+  }
+  if (2 * outside > table.rows())
+    throw FileError(path, name_of(table, column) + " as value " + std::to_string(value) +
+                              " of the frame runs from " + format(low) + " to " + format(high) +
+                              ", the sensor's range is " + format(scale.low()) + " to " +
+                              format(scale.high()) + " " + scale.unit +
+                              "; name another column, or mend the sensor's file");
+}
+
+float interpolated(const Table& log, std::size_t before, std::size_t column, double share) {
+  const double a = log.row(before)[column], b = log.row(before + 1)[column];
+  return static_cast<float>(a + share * (b - a));
+}
+
+}  // namespace
+
+ColumnMap column_map(const std::string& text) {
+  ColumnMap map;
+  for (const std::string& entry : comma_list(text)) {
+    const std::size_t equals = entry.find('=');
+    const std::string key = entry.substr(0, equals);
+    std::string value = equals == std::string::npos ? "" : entry.substr(equals + 1);
+    if (value.empty() || (key != "time" && key != "x" && key != "y" && key != "values"))
+      throw std::invalid_argument("found " + in_quotes(entry) +
+                                  ", expected time=COLUMN[:s|ms|us], x=COLUMN, y=COLUMN, values=FIRST-LAST");
+    if (const std::size_t colon = value.rfind(':'); key == "time" && colon != std::string::npos) {
+      map.time_unit_s = unit_s(value.substr(colon + 1));
+      value.resize(colon);
+    }
+    if (key == "values")
+      map.values.push_back(value);
+    else
+      (key == "time" ? map.time : key == "x" ? map.x : map.y) = value;
+  }
+  if (map.x.empty() != map.y.empty())
+    throw std::invalid_argument("names only one of x and y; a position has both");
+  return map;
+}
+
+Recording recording_of_table(const std::string& path, const Table& table, const ColumnMap& map,
+                             const Sensor& sensor) {
+  Columns columns;
+  try {
+    columns = columns_of(table, map, sensor.values());
+  } catch (const std::invalid_argument& error) {
+    throw FileError(path, error.what());
+  }
+  Recording recording;
+  recording.array = sensor.array, recording.signal_scale = sensor.scale, recording.source = "imported";
+  recording.time_s = times_of(path, table, columns.time, map.time_unit_s, sensor.rate_hz);
+  check_rate(path, table, columns.time, recording.time_s, sensor.rate_hz);
+  for (std::size_t k = 0; k < columns.values.size(); ++k)
+    check_taxel(path, table, columns.values[k], k, sensor.scale);
+  const std::size_t signals = sensor.array.signals();
+  recording.volts.resize(table.rows() * signals);
+  std::vector<float> sent(sensor.values());
+  for (std::size_t i = 0; i < table.rows(); ++i) {
+    for (std::size_t k = 0; k < sent.size(); ++k)
+      sent[k] = static_cast<float>(table.row(i)[columns.values[k]]);
+    sensor.arrange(sent, std::span(recording.volts).subspan(i * signals, signals));
+    if (columns.x == Columns::kNone) continue;
+    recording.position_mm.push_back(static_cast<float>(table.row(i)[columns.x]));
+    recording.position_mm.push_back(static_cast<float>(table.row(i)[columns.y]));
+  }
+  if (std::ranges::any_of(recording.position_mm, [](float mm) { return std::abs(mm) > 1e5F; }))
+    throw FileError(path, name_of(table, columns.x) + " and " + name_of(table, columns.y) +
+                              " as positions lie beyond 100 m; expected mm on the plate");
+  return recording;
+}
+
+void add_positions(Recording& recording, const std::string& path, const Table& log, double time_unit_s) {
+  const bool named = !log.names.empty();
+  std::size_t time = 0, x = 1, y = 2;
+  try {
+    time = log.column(named ? "time" : "0"), x = log.column(named ? "x" : "1"),
+    y = log.column(named ? "y" : "2");
+  } catch (const std::invalid_argument& error) {
+    throw FileError(path, std::string(error.what()) + "; expected time, x and y");
+  }
+  if (log.rows() < 2) throw FileError(path, "holds one position, expected two or more with their times");
+  const std::vector<double> time_s = times_of(path, log, time, time_unit_s, 1);
+  recording.position_mm.assign(2 * recording.frames(), std::numeric_limits<float>::quiet_NaN());
+  std::size_t known = 0;
+  for (std::size_t i = 0; i < recording.frames(); ++i) {
+    const double t = recording.time_s[i];
+    const auto after = std::ranges::upper_bound(time_s, t);
+    if (after == time_s.begin() || (after == time_s.end() && t > time_s.back())) continue;
+    const auto before = static_cast<std::size_t>(std::min(after, time_s.end() - 1) - time_s.begin()) - 1;
+    const double share = (t - time_s[before]) / (time_s[before + 1] - time_s[before]);
+    recording.position_mm[2 * i] = interpolated(log, before, x, share);
+    recording.position_mm[2 * i + 1] = interpolated(log, before, y, share);
+    ++known;
+  }
+  if (known == 0)
+    throw FileError(path, "has times from " + format(time_s.front()) + " to " + format(time_s.back()) +
+                              " s, the frames from " + format(recording.time_s.front()) + " to " +
+                              format(recording.time_s.back()) + " s; are both of one clock?");
+}
+
+void add_truth(Recording& recording, const std::string& path, const Table& images, double low, double high) {
+  if (images.shape.size() < 2)
+    throw FileError(path, "has rows of " + std::to_string(images.columns) +
+                              " numbers, expected images: an array [frames, height, width] in a .npy file");
+  if (images.rows() != recording.frames())
+    throw FileError(path, "holds " + std::to_string(images.rows()) + " images, the recording has " +
+                              std::to_string(recording.frames()) + " frames; expected one for each");
+  recording.truth_height = static_cast<int>(images.shape[0]);
+  recording.truth_width = static_cast<int>(images.columns / images.shape[0]);
+  recording.truth.clear();
+  for (const double value : images.values) {
+    const double scaled = (value - low) / (high - low);
+    if (!(scaled >= -1e-6 && scaled <= 1 + 1e-6))
+      throw FileError(path, "holds " + format(value) + ", expected " + format(low) + " to " + format(high) +
+                                ": say what is 0 and what is 1 with --truth-range LOW,HIGH");
+    recording.truth.push_back(static_cast<float>(std::clamp(scaled, 0.0, 1.0)));
+  }
+}
+
+}  // namespace supertac

@@ -1,0 +1,195 @@
+#include "data/recordings/table_import.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+/// Two by two taxels whose counts rise, 100 frames/s.
+Sensor mat() {
+  Sensor sensor;
+  sensor.name = "mat";
+  sensor.array = {2, 2, 5, 1};
+  sensor.scale = {"counts", 40, -860};
+  sensor.rate_hz = 100;
+  return sensor;
+}
+
+class TableImport : public testing::Test {
+ protected:
+  std::string file(const std::string& text, const std::string& name = "a.csv") {
+    write_file(folder_.file(name), text);
+    return folder_.file(name);
+  }
+  Recording import(const std::string& path, const std::string& map = "", const Sensor& sensor = mat()) {
+    return recording_of_table(path, read_table(path), column_map(map), sensor);
+  }
+  std::string refusal(const std::string& path, const std::string& map = "") {
+    try {
+      import(path, map);
+    } catch (const FileError& error) {
+      return error.what();
+    }
+    return "taken";
+  }
+  void expect_refusal(const std::string& path, const std::string& map, const std::string& text) {
+    const std::string found = refusal(path, map);
+    EXPECT_NE(found.find(text), std::string::npos) << found;
+  }
+
+  /// numpy.save of an array, version 1.
+  std::string npy(const std::string& name, const std::string& type, const std::string& shape,
+                  const std::vector<float>& values, const std::string& order = "False") {
+    std::string header =
+        "{'descr': '" + type + "', 'fortran_order': " + order + ", 'shape': (" + shape + "), }";
+    header.resize((10 + header.size() + 64) / 64 * 64 - 10 - 1, ' ');
+    header += '\n';
+    std::string bytes = std::string("\x93NUMPY\x01\x00", 8) + static_cast<char>(header.size() % 256) +
+                        static_cast<char>(header.size() / 256) + header;
+    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
+    return file(bytes, name);
+  }
+
+  /// `rows` of "time_ms,a,b,c,d,x,y".
+  static std::string csv(int rows, const std::string& names = "t_ms,a,b,c,d,px,py\n") {
+    std::string text = names;
+    for (int i = 0; i < rows; ++i)
+      text += std::to_string(10 * i) + "," + std::to_string(100 + i) + ",200,300,400," + format(0.5 * i) +
+              ",20\n";
+    return text;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(TableImport, ColumnsByNameMillisecondsAndPositions) {
+  const Recording r = import(file(csv(50)), "time=t_ms:ms,x=px,y=py");
+  ASSERT_EQ(r.frames(), 50U);
+  EXPECT_DOUBLE_EQ(r.time_s[49], 0.49);
+  EXPECT_EQ(std::vector<float>(r.volts.begin() + 4, r.volts.begin() + 8),
+            (std::vector<float>{101, 200, 300, 400}));
+  EXPECT_EQ(r.position_mm[2], 0.5F);
+  EXPECT_EQ(r.position_mm[3], 20.0F);
+  EXPECT_EQ(r.signal_scale, mat().scale);
+  EXPECT_EQ(r.array, mat().array);
+}
+
+TEST_F(TableImport, ColumnsByNumberRangesAndOtherSeparators) {
+  std::string text = csv(50, "");
+  for (char& c : text) c = c == ',' ? ';' : c;
+  const Recording r =
+      import(file("\xEF\xBB\xBF# made by hand\r\n\r\n" + text), "time=0:ms,values=4-4,values=1-3");
+  EXPECT_EQ(std::vector<float>(r.volts.begin(), r.volts.begin() + 4),
+            (std::vector<float>{400, 100, 200, 300}));
+  std::string blanks;
+  for (int i = 0; i < 20; ++i) blanks += " 50   60\t70 80\n";
+  EXPECT_EQ(import(file(blanks)).volts[2], 70.0F);
+  EXPECT_DOUBLE_EQ(import(file(blanks)).time_s[19], 0.19);  // the sensor's rate
+}
+
+TEST_F(TableImport, TaxelsStandInTheSensorsOrder) {
+  Sensor sensor = mat();
+  std::string text;
+  for (int i = 0; i < 20; ++i) text += "50,60,70,80\n";
+  sensor.order = {3, 2, 1, 0};
+  EXPECT_EQ(import(file(text), "", sensor).volts[0], 80.0F);
+}
+
+TEST_F(TableImport, ACoarseClockIsSpread) {
+  std::string text;
+  for (int i = 0; i < 40; ++i) text += std::to_string(i / 4 * 40) + ",50,60,70,80\n";
+  const Recording r = import(file(text), "time=0:ms");
+  for (int i = 0; i < 40; ++i) EXPECT_NEAR(r.time_s[static_cast<std::size_t>(i)], 0.01 * i, 2e-4) << i;
+}
+
+TEST_F(TableImport, ALineThatIsCutLeavesItsTimeEmpty) {
+  std::string text;
+  for (int i = 0; i < 30; ++i) text += i == 10 ? "50,6\n" : "50,60,70,80\n";
+  const Table table = read_table(file(text));
+  EXPECT_EQ(table.dropped, 1U);
+  const Recording r = import(folder_.file("a.csv"));
+  EXPECT_EQ(r.frames(), 29U);
+  EXPECT_DOUBLE_EQ(r.time_s[10], 0.11);
+}
+
+TEST_F(TableImport, WrongColumnsAreNamedWithTheReason) {
+  const std::string path = file(csv(50));
+  expect_refusal(path, "time=stamp",
+                 "there is no column 'stamp': the file has columns 0 to 6 and the names t_ms, a");
+  expect_refusal(path, "time=9", "there is no column '9'");
+  expect_refusal(path, "",
+                 "7 columns hold values, all that --columns does not name; a frame of the sensor has 4");
+  expect_refusal(
+      path, "time=t_ms,x=px,y=py",
+      "column 0 (t_ms) as time has 0.1 frames/s, the sensor is said to send 100.0; is it in s, ms or us");
+  expect_refusal(path, "time=t_ms:ms,values=b-d,values=t_ms", "taken");  // 0 to 490 may be counts
+  expect_refusal(path, "time=t_ms:ms,values=d-a", "values 'd-a' end before they begin");
+}
+
+TEST_F(TableImport, ImpossibleValuesAreNamed) {
+  std::string text;
+  for (int i = 0; i < 30; ++i) text += std::to_string(i == 7 ? 3 : i) + ",50,60,70,4.5\n";
+  expect_refusal(file(text), "time=0", "column 0 as time falls in line 8, from 6 to 3");
+  std::string volts;
+  for (int i = 0; i < 30; ++i) volts += "50,60,70,4095\n";
+  expect_refusal(
+      file(volts), "",
+      "column 3 as value 3 of the frame runs from 4095 to 4095, the sensor's range is 40 to 900 counts");
+  std::string nan;
+  for (int i = 0; i < 30; ++i) nan += i == 3 ? "50,60,nan,80\n" : "50,60,70,80\n";
+  expect_refusal(file(nan), "", "column 2 as value 2 of the frame is nan in line 4");
+  expect_refusal(file("a b\nc d\n"), "", "holds no line of numbers");
+  EXPECT_THROW(column_map("time=0:h"), std::invalid_argument);
+  EXPECT_THROW(column_map("x=0"), std::invalid_argument);
+  EXPECT_THROW(column_map("z=0"), std::invalid_argument);
+}
+
+TEST_F(TableImport, NumpyArraysAndWhatTheyMayNotBe) {
+  std::vector<float> values(40);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = 50 + static_cast<float>(i);
+  EXPECT_EQ(import(npy("a.npy", "<f4", "10, 4", values)).volts, values);
+  EXPECT_EQ(import(npy("a.npy", "<f4", "10, 2, 2", values)).volts, values);
+  expect_refusal(npy("a.npy", ">f4", "10, 4", values), "", "holds numbers of type '>f4', expected one of f4");
+  expect_refusal(npy("a.npy", "<f4", "10, 4", values, "True"), "", "Fortran's order");
+  expect_refusal(npy("a.npy", "<f4", "11, 4", values), "", "it is cut or damaged");
+  expect_refusal(npy("a.npy", "<f4", "", values), "", "is of rank 0");
+  expect_refusal(file("no array", "a.npy"), "", "expected a file of numpy.save");
+  expect_refusal(file("", "a.npy"), "", "expected a file of numpy.save");
+}
+
+TEST_F(TableImport, PositionsOfAnotherLogAreInterpolated) {
+  Recording r = import(file(csv(50)), "time=t_ms:ms,values=a-d");
+  add_positions(r, "log", read_table(file("time,y,x\n100,20,0\n300,40,10\n", "log.csv")), 1e-3);
+  EXPECT_TRUE(std::isnan(r.position_mm[2 * 9]));
+  EXPECT_NEAR(r.position_mm[2 * 20], 5, 1e-4);
+  EXPECT_NEAR(r.position_mm[2 * 20 + 1], 30, 1e-4);
+  EXPECT_NEAR(r.position_mm[2 * 30], 10, 1e-4);
+  EXPECT_TRUE(std::isnan(r.position_mm[2 * 31]));
+  const Table other_clock = read_table(file("100000,0,0\n100001,0,0\n", "log.csv"));
+  EXPECT_THROW(add_positions(r, "log", other_clock, 1), FileError);
+}
+
+TEST_F(TableImport, TruthIsScaledAndCounted) {
+  Recording r = import(file(csv(3)), "time=t_ms:ms,values=a-d");
+  std::vector<float> images(3 * 4 * 6, 100);
+  images[0] = 300;
+  const Table table = read_table(npy("t.npy", "<f4", "3, 4, 6", images));
+  EXPECT_THROW(add_truth(r, "t", table, 0, 1), FileError);
+  add_truth(r, "t", table, 100, 300);
+  EXPECT_EQ(r.truth_height, 4);
+  EXPECT_EQ(r.truth_width, 6);
+  EXPECT_EQ(r.truth[0], 1.0F);
+  EXPECT_EQ(r.truth[1], 0.0F);
+  EXPECT_THROW(add_truth(r, "t", read_table(npy("t.npy", "<f4", "2, 4, 6", std::vector<float>(48))), 0, 1),
+               FileError);
+}
+
+}  // namespace
+}  // namespace supertac
