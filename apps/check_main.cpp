@@ -16,7 +16,8 @@ void declare(Arguments& a) {
   a.positional(
       "WHAT",
       "gradients: all of them against finite differences, in double precision; bits: the hashes that every "
-      "processor has to give; machine: processor, disk, ports; file FILE [OTHER]: checksum, provenance, and "
+      "processor has to give; machine: processor, disk, ports; udev: prints a rule that opens the ports of "
+      "USB devices; file FILE [OTHER]: checksum, provenance, and "
       "whether OTHER (recordings or a file) is what it was made from; training FILE --data DIR: repeats "
       "parts "
       "of a training that kept a ledger; ledgers FILE OTHER: the first difference of two");
@@ -57,10 +58,12 @@ void need(const Arguments& a, const char* name) {
 }  // namespace
 
 int run(Arguments& a) {
-  const std::string what = a.choice("WHAT", {"gradients", "bits", "machine", "file", "training", "ledgers"});
+  const std::string what =
+      a.choice("WHAT", {"gradients", "bits", "machine", "udev", "file", "training", "ledgers"});
   if (what == "gradients") return check_gradients(a);
   if (what == "bits") return check_bits(a);
   if (what == "machine") return check_machine(a);
+  if (what == "udev") return print_udev_rule(a);
   need(a, "FILE");
   if (what == "file") return check_file(a);
   need(a, what == "training" ? "data" : "OTHER");

@@ -10,7 +10,7 @@ void declare(Arguments& a) {
   a.required("model", "FILE,...", "a model written by supertac-train; of several the pictures are averaged");
   a.option("data", "DIR", "recordings to test on");
   a.option("pairs", "FILE", "instead of --data: pairs to test a model trained with --pairs on");
-  a.one_of("data", "pairs");
+  a.one_of({"data", "pairs"});
   a.option("split", "NAME",
            "window, pass, trial, texture, group or none; with --pairs group, pair or none (default: the "
            "model's own); its test side is scored");

@@ -68,6 +68,10 @@ void declare(Arguments& a) {
       .option("out", "FILE",
               "keep time, voltages and picture of every frame (safetensors, 2.2 MB/s at 16x16); '-': a line "
               "of JSON for each on stdout")
+      .option("mcap", "FILE",
+              "keep taxels and pictures as ROS 2 messages in an MCAP file, which Foxglove, Rerun, "
+              "PlotJuggler and "
+              "ros2 bag open")
       .option("record", "DIR", "keep the signals as a recording in this folder, the next pass of its plate")
       .option("plate", "NAME", "what the recording slides over", "unknown")
       .option("udp", "HOST:PORT",
@@ -123,6 +127,7 @@ int run(Arguments& a) {
   StreamSettings settings{.out = a.output("out"),
                           .precision = precision_of(a.choice("precision", {"fp32", "int8"})),
                           .classifier = a.text("classifier"),
+                          .mcap = a.output("mcap"),
                           .record = a.text("record"),
                           .plate = a.text("plate"),
                           .udp = a.text("udp"),

@@ -15,7 +15,7 @@ void declare(Arguments& a) {
       "pairs", "FILE",
       "instead of --data: images of any sensor, safetensors with input [N,C,H,W], target [N,1,sH,sW] in 0 "
       "to 1, optional group [N]; trains a network of single frames");
-  a.one_of("data", "pairs");
+  a.one_of({"data", "pairs"});
   a.required("out", "FILE",
              "the model; FILE's run folder beside it (.run) holds log, report and the state to resume");
   a.option("resume", "FILE", "continue from the last.safetensors of an interrupted run, same options");

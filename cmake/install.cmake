@@ -5,6 +5,9 @@ install(TARGETS ${libraries} EXPORT supertac ARCHIVE DESTINATION ${CMAKE_INSTALL
 # The C library: programs need the file with the soname, who compiles them the link and the header.
 install(TARGETS supertac_c EXPORT supertac LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT programs
   NAMELINK_COMPONENT development)
+if(SKBUILD)  # python/pyproject.toml: the wheel of the Python package
+  install(PROGRAMS $<TARGET_FILE:supertac_c> DESTINATION supertac RENAME libsupertac.so COMPONENT python)
+endif()
 install(FILES library/supertac.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/supertac COMPONENT development)
 install(CODE "set(SUPERTAC_SOURCE [[${PROJECT_SOURCE_DIR}]])
 set(SUPERTAC_BUILD [[${PROJECT_BINARY_DIR}]])

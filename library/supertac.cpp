@@ -18,6 +18,7 @@
 #include "data/windows/transforms/normalise_window.h"
 #include "models/files/model_file.h"
 #include "models/inference/prepared/prepared.h"
+#include "models/training/train.h"
 
 using namespace supertac;
 
@@ -98,8 +99,21 @@ class MemoryFile {
   int file_;
 };
 
-void copy_out(const Tensor& from, float* to) {
-  if (to != nullptr) std::copy_n(from.data(), from.size(), to);
+// Windows in the sensor's unit to what the network takes.
+void scale(const ModelFile& file, std::span<float> windows) {
+  file.input.scaling(windows);
+  if (!file.input.scaling.per_window) return;
+  const auto size = static_cast<std::size_t>(file.model->input_shape(1).elements());
+  for (; !windows.empty(); windows = windows.subspan(size))
+    normalise_window(windows.first(size), file.array().signals());
+}
+
+void draw(const supertac_model& model, const Tensor& inputs, float* pictures, float* predicted_errors) {
+  const Estimate drawn = model.prepared.estimate(inputs);
+  expect(predicted_errors == nullptr || drawn.predicted_error.size() > 0, "the model predicts no error");
+  std::copy_n(drawn.picture.data(), drawn.picture.size(), pictures);
+  if (predicted_errors != nullptr)
+    std::copy_n(drawn.predicted_error.data(), drawn.predicted_error.size(), predicted_errors);
 }
 
 }  // namespace
@@ -158,22 +172,6 @@ int supertac_describe(const supertac_model* model, supertac_description* descrip
   });
 }
 
-int supertac_scale(const supertac_model* model, std::size_t count, const float* values, float* windows) {
-  return guarded(-1, [&] {
-    expect(model != nullptr && (count == 0 || (values != nullptr && windows != nullptr)),
-           "supertac_scale: a pointer is NULL");
-    const auto size = static_cast<std::size_t>(model->file.model->input_shape(1).elements());
-    const Scaling& scaling = model->file.input.scaling;
-    for (std::size_t n = 0; n < count; ++n, values += size, windows += size) {
-      const std::span<float> window(windows, size);
-      if (values != windows) std::copy_n(values, size, windows);
-      scaling(window);
-      if (scaling.per_window) normalise_window(window, model->file.array().signals());
-    }
-    return 0;
-  });
-}
-
 int supertac_draw(const supertac_model* model, std::size_t count, const float* windows, float* pictures,
                   float* predicted_errors, int threads) {
   return guarded(-1, [&] {
@@ -182,8 +180,6 @@ int supertac_draw(const supertac_model* model, std::size_t count, const float* w
            "supertac_draw: windows or pictures is NULL");
     expect(threads >= 1 && threads <= 1024, "supertac_draw: threads must be 1 to 1024");
     const SuperTac& network = *model->file.model;
-    expect(predicted_errors == nullptr || network.settings().predicted_error,
-           "supertac_draw: the model predicts no error");
     const auto window = static_cast<std::size_t>(network.input_shape(1).elements());
     const auto picture = static_cast<std::size_t>(network.picture_shape(1).elements());
     expect(count <= std::numeric_limits<std::size_t>::max() / sizeof(float) / std::max(window, picture),
@@ -197,9 +193,9 @@ int supertac_draw(const supertac_model* model, std::size_t count, const float* w
                           n = std::min(kBatch, count - first);
         Tensor input(network.input_shape(static_cast<Dim>(n)));
         std::copy_n(windows + first * window, n * window, input.data());
-        const Estimate drawn = model->prepared.estimate(input);
-        copy_out(drawn.picture, pictures + first * picture);
-        if (predicted_errors != nullptr) copy_out(drawn.predicted_error, predicted_errors + first * picture);
+        scale(model->file, input.values());
+        draw(*model, input, pictures + first * picture,
+             predicted_errors == nullptr ? nullptr : predicted_errors + first * picture);
       } catch (...) {
 #pragma omp critical
         failure = std::current_exception();
@@ -243,18 +239,32 @@ int supertac_live_push(supertac_live* live, double time_s, const float* frame) {
   });
 }
 
-int supertac_live_window(supertac_live* live, float* window) {
-  return guarded(-1, [&] {
-    expect(live != nullptr && window != nullptr, "supertac_live_window: a pointer is NULL");
-    return live->window.window(std::span(window, static_cast<std::size_t>(live->input.size()))) ? 1 : 0;
-  });
-}
-
 int supertac_live_picture(supertac_live* live, float* picture, float* predicted_error) {
   return guarded(-1, [&] {
     expect(live != nullptr && picture != nullptr, "supertac_live_picture: a pointer is NULL");
     if (!live->window.window(live->input.values())) return 0;
-    const int drawn = supertac_draw(live->model, 1, live->input.data(), picture, predicted_error, 1);
-    return drawn == 0 ? 1 : -1;
+    draw(*live->model, live->input, picture, predicted_error);
+    return 1;
+  });
+}
+
+int supertac_train(const char* recipe, const char* recordings, const char* out,
+                   const supertac_training* settings, supertac_progress progress, void* user) {
+  return guarded(-1, [&] {
+    expect(recipe != nullptr && recordings != nullptr && out != nullptr, "supertac_train: a pointer is NULL");
+    Recipe wanted = Recipe::named(recipe);
+    if (settings != nullptr) {
+      expect(settings->size == sizeof(supertac_training), "supertac_train: set settings.size first");
+      if (settings->epochs != 0) wanted.epochs = settings->epochs;
+      if (settings->stride != 0) wanted.stride = settings->stride;
+      if (settings->split != nullptr) wanted.split = split_kind(settings->split);
+      wanted.seed = settings->seed;
+    }
+    bool stop = false;
+    TrainingCallbacks callbacks;
+    callbacks.stop = [&] { return stop; };
+    if (progress != nullptr)
+      callbacks.step = [&](const StepReport& step) { stop = progress(user, step.step, step.total) != 0; };
+    return train(wanted, {.data = recordings}, out, callbacks) ? 1 : 0;
   });
 }

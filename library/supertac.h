@@ -1,5 +1,5 @@
 /* SuperTac for C, and for every language that can call C: a trained model draws super-resolved tactile
-   pictures, of windows that you have or of frames as a sensor gives them.
+   pictures, of windows that you have or of frames as a sensor gives them; and recordings train a model.
 
      supertac_model *model = supertac_open("model.safetensors", SUPERTAC_FP32);
      supertac_live *live = supertac_live_new(model, 300, 0);
@@ -63,16 +63,11 @@ SUPERTAC_API void supertac_close(supertac_model* model);
 /* 0, or -1. */
 SUPERTAC_API int supertac_describe(const supertac_model* model, supertac_description* description);
 
-/* `count` windows [count][timesteps][signals] in the sensor's unit, already at the model's rate, as training
-   had them: scaled, and normalised where the model is. `windows` may be `values`. 0, or -1. */
-SUPERTAC_API int supertac_scale(const supertac_model* model, size_t count, const float* values,
-                                float* windows);
-
-/* Draws `count` windows [count][timesteps][signals], each as training had it (supertac_scale,
-   supertac_live_window), oldest frame first. pictures: [count][height][width], 0 is the flat plate and 1 its
-   highest point. predicted_errors: the same shape, how far from the truth a pixel is expected to be; NULL
-   where it is not wanted. threads: at least 1. A picture does not depend on it, nor on the windows beside its
-   own. 0, or -1; -1 also where predicted errors are wanted of a model without. */
+/* Draws `count` windows [count][timesteps][signals] in the sensor's unit, at the model's rate, oldest frame
+   first. pictures: [count][height][width], 0 is the flat plate and 1 its highest point. predicted_errors: the
+   same shape, how far from the truth a pixel is expected to be; NULL where it is not wanted. threads: at
+   least 1. A picture does not depend on it, nor on the windows beside its own. 0, or -1; -1 also where
+   predicted errors are wanted of a model without. */
 SUPERTAC_API int supertac_draw(const supertac_model* model, size_t count, const float* windows,
                                float* pictures, float* predicted_errors, int threads);
 
@@ -86,10 +81,23 @@ SUPERTAC_API void supertac_live_free(supertac_live* live);
    pointer. A frame that is not finite or not later than the one before counts as lost. */
 SUPERTAC_API int supertac_live_push(supertac_live* live, double time_s, const float* frame);
 
-/* The window or the picture that ends with the newest frame. 1: written; 0: there is none yet, or a gap was
-   just before; -1: failed. */
-SUPERTAC_API int supertac_live_window(supertac_live* live, float* window);
+/* The picture that ends with the newest frame, and its predicted error unless that is NULL. 1: written; 0:
+   there is none yet, or a gap was just before; -1: failed. */
 SUPERTAC_API int supertac_live_picture(supertac_live* live, float* picture, float* predicted_error);
+
+/* Trains a network on a folder of recordings and writes the model, as supertac-train does: the same settings
+   make the same content. recipe: "paper", "best" or "tiny". settings: NULL, or what differs from the recipe.
+   progress: NULL, or called after every step; another result than 0 ends the training. 1: written, 0: ended
+   early and nothing written, -1: failed. */
+typedef struct {
+  size_t size;              /* sizeof(supertac_training) */
+  long long epochs, stride; /* 0: the recipe's; every stride-th frame ends a window */
+  unsigned long long seed;
+  const char* split; /* "trial" (NULL), "none", "pass", ...: what is kept for testing */
+} supertac_training;
+typedef int (*supertac_progress)(void* user, long long step, double loss);
+SUPERTAC_API int supertac_train(const char* recipe, const char* recordings, const char* out,
+                                const supertac_training* settings, supertac_progress progress, void* user);
 
 #ifdef __cplusplus
 }

@@ -2,8 +2,10 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/threads.h"
@@ -62,13 +64,34 @@ Finding disk() {
           gigabytes < kWanted ? "recordings and runs want " + format(kWanted, 0) + " GB; free some" : ""};
 }
 
+// The group that opens serial ports: dialout in Debian and Fedora, uucp in Arch. Read from the file itself,
+// since a static program has no other way.
+Finding group() {
+  std::map<std::string, std::uint64_t> numbers;
+  std::ifstream groups("/etc/group");
+  for (std::string name, word, number, members; std::getline(groups, name, ':');) {
+    std::getline(groups, word, ':'), std::getline(groups, number, ':'), std::getline(groups, members);
+    if (const auto gid = parse_uint(number)) numbers[name] = *gid;
+  }
+  const std::string rule =
+      "sudo sh -c 'supertac check udev > /etc/udev/rules.d/60-supertac.rules', then plug the sensor in anew";
+  const std::string name = numbers.contains("dialout") ? "dialout" : "uucp";
+  if (!numbers.contains(name)) return {"serial ports' group", "none", ::geteuid() == 0 ? "" : rule};
+  std::vector<gid_t> mine(static_cast<std::size_t>(std::max(0, ::getgroups(0, nullptr))));
+  if (::getgroups(static_cast<int>(mine.size()), mine.data()) < 0) mine.clear();
+  if (::geteuid() == 0 || std::ranges::find(mine, numbers[name]) != mine.end())
+    return {"serial ports' group", name, ""};
+  return {"serial ports' group", "not in " + name,
+          "ports cannot be opened: sudo usermod -aG " + name + " $USER, then log in anew; or " + rule};
+}
+
 void ports(std::vector<Finding>& findings) {
   bool board = false;
   for (const PortInfo& port : list_ports()) {
     board = board || port.usb_id == rig::kBoardUsbId;
     const bool allowed = ::access(port.path.c_str(), R_OK | W_OK) == 0;
     findings.push_back({"port " + port.path, port.product.empty() ? port.usb_id : port.product,
-                        allowed ? "" : "no permission: sudo usermod -aG dialout $USER, then log in anew"});
+                        allowed ? "" : "no permission: see the serial ports' group"});
   }
   findings.push_back(
       {"tactile board", board ? "found" : "not found",
@@ -93,8 +116,15 @@ void services(std::vector<Finding>& findings) {
 
 }  // namespace
 
+int print_udev_rule(const Arguments& a) {
+  a.print(
+      R"(# Serial ports of USB devices: whoever sits at this machine may open them, and ModemManager lets them be.
+SUBSYSTEM=="tty", SUBSYSTEMS=="usb", TAG+="uaccess", ENV{ID_MM_DEVICE_IGNORE}="1")");
+  return kExitOk;
+}
+
 int check_machine(const Arguments& a) {
-  std::vector<Finding> findings{processor(), threads(), memory(), disk()};
+  std::vector<Finding> findings{processor(), threads(), memory(), disk(), group()};
   ports(findings);
   services(findings);
   Json rows = Json::array();

@@ -4,9 +4,12 @@
 
 namespace supertac {
 
-/// `supertac-check machine`: processor, threads, memory, disk, serial ports and who else may take them, and
+/// `supertac-check machine`: processor, threads, memory, disk, serial ports, who may open them and who takes
+/// them, and
 /// what to do about each.
 int check_machine(const Arguments& a);
+/// `supertac-check udev`: the text of a file for /etc/udev/rules.d.
+int print_udev_rule(const Arguments& a);
 
 /// `supertac-check bits`: the hashes of a simulated pass, of ten training steps and of pictures in fp32 and
 /// int8, on every instruction set that this processor has, against those that every processor has to give.

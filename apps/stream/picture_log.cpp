@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "io/files/file.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 
@@ -44,6 +45,7 @@ void PictureLog::append(const Spool& spool, std::span<const std::byte> bytes) {
 }
 
 void PictureLog::add(const Seen& seen) {
+  if (count_ == 0) began_s_ = seen.wall_s - seen.time_s;
   append(times_, std::as_bytes(std::span(&seen.time_s, 1)));
   append(volts_, std::as_bytes(seen.volts));
   if (pictures_) append(pictures_, std::as_bytes(seen.picture));
@@ -61,8 +63,9 @@ void PictureLog::read_back(const Spool& spool, const ByteSink& sink) {
   if (std::ferror(spool.get()) != 0) fail();
 }
 
-void PictureLog::write(const std::map<std::string, std::string>& metadata) {
+void PictureLog::write(std::map<std::string, std::string> metadata) {
   if (!problem_.empty()) throw FileError(output_.path, problem_);
+  if (!std::isnan(began_s_)) metadata["began_s"] = supertac::format(began_s_);
   const auto from = [this](const Spool& spool) {
     return [this, &spool](const ByteSink& sink) { read_back(spool, sink); };
   };

@@ -14,9 +14,10 @@ namespace supertac {
 /// Keeps the signals of a stream, or its pictures, for a safetensors file. Signals alone make a recording
 /// (data/recordings/recording.h): time_s and volts. With pictures it has tensors time_s F64 [n], volts F32
 /// [n,signals] and pictures F32 [n,height,width]; of a model that says how sure it is also half_widths F32
-/// [n,height,width], of its pixels' 90 % intervals, and distances F32 [n] from its training. How many there
-/// will be is not known before the end, and they do not fit into memory (1 MB/s): they wait in nameless
-/// temporary files beside the final one.
+/// [n,height,width], of its pixels' 90 % intervals, and distances F32 [n] from its training. Metadata
+/// "began_s" is the wall-clock time of time_s 0 (s since 1970), where it is known. How many there will be is
+/// not known before the end, and they do not fit into memory (1 MB/s): they wait in nameless temporary files
+/// beside the final one.
 class PictureLog {
  public:
   /// Throws FileError when the file cannot be made there, or exists and is not to be replaced.
@@ -24,7 +25,7 @@ class PictureLog {
   /// Throws FileError
   void add(const Seen& seen);
   /// Writes the file, atomically. Throws FileError, again when add() has.
-  void write(const std::map<std::string, std::string>& metadata);
+  void write(std::map<std::string, std::string> metadata);
 
  private:
   struct Close {
@@ -40,7 +41,8 @@ class PictureLog {
   OutputPath output_;
   PictureFormat format_;
   std::uint64_t count_ = 0;
-  std::string problem_;  // of a write that failed: what was kept is not whole
+  double began_s_ = NAN;  // Seen::wall_s of Seen::time_s 0
+  std::string problem_;   // of a write that failed: what was kept is not whole
   Spool times_, volts_, pictures_, half_widths_, distances_;
 };
 

@@ -125,7 +125,7 @@ class RecordingSource : public SensorSource {
     if (ended()) return std::nullopt;
     const std::size_t i = at_++, signals = array().signals();
     SensorFrame frame{recording_.time_s[i], std::span(recording_.volts).subspan(i * signals, signals),
-                      monotonic_seconds()};
+                      monotonic_seconds(), recording_.began_s() + recording_.time_s[i]};
     if (!recording_.position_mm.empty())
       frame.x_mm = recording_.position_mm[2 * i], frame.y_mm = recording_.position_mm[2 * i + 1];
     return frame;

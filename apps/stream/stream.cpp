@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -18,6 +19,10 @@ namespace {
 
 constexpr double kMostLateS = 0.02, kWaitS = 0.05, kFiguresEveryS = 0.5, kShowEveryS = 1.0 / 60,
                  kNameEveryS = 0.1;
+
+double wall_clock_seconds() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
 
 bool has_texture(std::span<const float> picture) {
   return std::ranges::any_of(picture, [](float v) { return v > 0.2F; });
@@ -37,6 +42,8 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   const PictureFormat signals{.signals = source.array().signals(), .image = {0, 0}};
   const PictureFormat format = maker_ ? maker_->format() : signals;
   describe_recording();
+  settings_.metadata.merge(metadata_of(source.array(), source.signal_scale()));
+  if (maker_) settings_.metadata["pixel_mm"] = supertac::format(maker_->image().pixel_mm);
   // Two programs may record the same pass: both are kept.
   const OutputPath record(record_path_, [this](const std::string& line) { record_remark_ = line; });
   if (!settings.record.empty()) record_ = std::make_unique<PictureLog>(record, signals);
@@ -44,6 +51,10 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
     pipe_ = std::make_unique<PipeOutput>(STDOUT_FILENO, !source.live());
   else if (!settings.out.path.empty())
     log_ = std::make_unique<PictureLog>(settings.out, format);
+  if (!settings.mcap.path.empty())
+    mcap_ = std::make_unique<McapLog>(settings.mcap, source.array(), source.signal_scale().unit, format.image,
+                                      format.half_widths);
+  about_lines_ = about_lines(source.array(), source.signal_scale().unit, format.image);
   if (!settings.udp.empty()) udp_ = std::make_unique<UdpOutput>(settings.udp);
   if (!settings.classifier.empty()) {
     classifier_ = load_classifier(settings.classifier);
@@ -55,7 +66,7 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
                                image.text() + "; give a classifier that was trained with this model");
   }
   if (!settings.web) return;
-  recorder_ = std::make_unique<Recorder>(format, maker_ ? settings.metadata : recording_);
+  recorder_ = std::make_unique<Recorder>(format, maker_ ? settings_.metadata : recording_);
   web_ = std::make_unique<WebView>(
       *settings.web,
       WebSource{settings.badge, settings.source, source.array(), state_.scale, format.half_widths,
@@ -100,6 +111,7 @@ void Stream::finish() {
   pipe_.reset();
   if (log_) log_->write(maker_ ? settings_.metadata : recording_);
   if (record_) record_->write(recording_);
+  if (mcap_) mcap_->close();
   source_.finish();
 }
 
@@ -142,6 +154,7 @@ bool Stream::take(SensorFrame frame) {
   if (frames_ == 0) first_s_ = frame.time_s, begin_s_ = monotonic_seconds();
   if (frame.time_s - first_s_ >= settings_.seconds) return false;
   if ((view_ || web_ || udp_) && !source_.live()) frame.arrived_s = keep_pace(frame.time_s);
+  if (source_.live()) frame.wall_s = wall_clock_seconds() - (monotonic_seconds() - frame.arrived_s);
   ++frames_;
   last_s_ = frame.time_s;
   const bool rezero = web_ && web_->take_rezero();
@@ -167,6 +180,7 @@ void Stream::keep_raw(const SensorFrame& frame) {
   if (!std::ranges::all_of(frame.volts, [](float v) { return std::isfinite(v); })) return;
   Seen seen;
   seen.number = frames_ - 1, seen.time_s = frame.time_s - first_s_, seen.volts = frame.volts;
+  seen.wall_s = frame.wall_s;
   if (record_) record_->add(seen);
   if (maker_) return;
   latency_.add(monotonic_seconds() - frame.arrived_s);
@@ -178,14 +192,15 @@ void Stream::keep_raw(const SensorFrame& frame) {
 void Stream::output(const Seen& seen) {
   if (log_) log_->add(seen);
   if (recorder_) recorder_->add(seen);
+  if (mcap_) mcap_->add(seen.time_s, seen.wall_s, seen.volts, seen.picture, seen.half_widths);
   if (!udp_ && !pipe_) return;
-  std::string line = picture_line(seen, state_.unlike_training);
+  std::string line = picture_line(seen, state_.unlike_training, about_lines_);
   if (udp_) udp_->send(line);
   if (pipe_) pipe_->send(std::move(line));
 }
 
 void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
-  const Seen seen{pictures() - 1, frame.time_s - first_s_, maker_->volts(),
+  const Seen seen{pictures() - 1, frame.time_s - first_s_, frame.wall_s,      maker_->volts(),
                   picture,        maker_->half_widths(),   maker_->distance()};
   state_.unlike_training = maker_->unlike_training();
   output(seen);

@@ -15,6 +15,7 @@
 #include "apps/stream/views/line_output.h"
 #include "apps/stream/views/terminal_view.h"
 #include "apps/stream/views/web_view.h"
+#include "data/recordings/mcap_log.h"
 #include "models/files/classifier_file.h"
 
 namespace supertac {
@@ -23,13 +24,14 @@ struct StreamSettings {
   double seconds = std::numeric_limits<double>::infinity();  ///< of signal, after which run() ends
   OutputPath out = "";  ///< file that keeps the pictures; "-": a line for each to stdout; empty: none
   Precision precision = Precision::fp32;
-  std::string classifier = {};                       ///< file that names the texture; empty: none
-  std::string record = {};                           ///< folder that gets a recording; empty: none
-  std::string plate = "unknown";                     ///< of the recording
-  std::string udp = {};                              ///< HOST:PORT that gets a line for each; empty: none
-  bool view = false;                                 ///< draw on the terminal
-  std::optional<WebAddress> web = {};                ///< serve the live page
-  std::string badge = {}, source = {};               ///< for the page: what is streamed
+  std::string classifier = {};          ///< file that names the texture; empty: none
+  OutputPath mcap = "";                 ///< MCAP file that keeps frames and pictures; empty: none
+  std::string record = {};              ///< folder that gets a recording; empty: none
+  std::string plate = "unknown";        ///< of the recording
+  std::string udp = {};                 ///< HOST:PORT that gets a line for each; empty: none
+  bool view = false;                    ///< draw on the terminal
+  std::optional<WebAddress> web = {};   ///< serve the live page
+  std::string badge = {}, source = {};  ///< for the page: what is streamed
   std::map<std::string, std::string> metadata = {};  ///< of files with pictures
 };
 
@@ -77,7 +79,9 @@ class Stream {
   RawArray raw_;
   std::map<std::string, std::string> recording_;  // metadata of a recording
   std::string record_path_, record_remark_;
+  std::string about_lines_;
   std::unique_ptr<PictureLog> log_, record_;
+  std::unique_ptr<McapLog> mcap_;
   std::unique_ptr<TerminalView> view_;
   std::unique_ptr<UdpOutput> udp_;
   std::unique_ptr<PipeOutput> pipe_;

@@ -87,6 +87,9 @@ std::optional<std::string> problem_of(const Recording& recording) {
   if (const auto filter = recording.metadata.find("filter_s"); filter != recording.metadata.end())
     if (const auto s = parse_double(filter->second); !s || !(*s >= 0 && *s <= kLongestFilter))
       return "filter_s is " + in_quotes(filter->second) + ", expected 0 to " + format(kLongestFilter) + " s";
+  if (recording.metadata.contains("began_s") &&
+      !(recording.began_s() >= 0 && recording.began_s() <= kLongest))
+    return "began_s is " + in_quotes(recording.metadata.at("began_s")) + ", expected seconds since 1970";
   if (n > 0 &&
       !(std::abs(recording.time_s.front()) <= kLongest && std::abs(recording.time_s.back()) <= kLongest))
     return "time_s lies beyond " + format(kLongest) + " s";
@@ -111,33 +114,6 @@ int take_count(std::map<std::string, std::string>& metadata, const std::string& 
   return static_cast<int>(*value);
 }
 
-TaxelArray take_array(std::map<std::string, std::string>& metadata, const std::string& path) {
-  const auto node = metadata.extract("array");
-  if (node.empty()) return {};
-  try {
-    const auto json = parse_json_limited(node.mapped());
-    const TaxelArray array{json.at("rows").get<int>(), json.at("columns").get<int>(),
-                           json.at("pitch_mm").get<double>(), json.at("channels").get<int>()};
-    array.check();
-    return array;
-  } catch (const std::invalid_argument& error) {
-    throw FileError(path, error.what());
-  } catch (const std::exception&) {
-    throw FileError(path, "array is " + in_quotes(node.mapped()) +
-                              ", expected {\"rows\": 4, \"columns\": 4, \"pitch_mm\": 3, \"channels\": 1}");
-  }
-}
-
-SignalScale take_scale(std::map<std::string, std::string>& metadata, const std::string& path) {
-  const auto node = metadata.extract("signals");
-  if (node.empty()) return {};
-  try {
-    return scale_of_json(parse_json_limited(node.mapped()), path);
-  } catch (const JsonError& error) {
-    throw FileError(path, std::string("signals: ") + error.what());
-  }
-}
-
 void check_shape(const SafetensorsFile& file, const std::string& name, std::vector<std::uint64_t> expected) {
   const auto& shape = file.tensors().at(name).shape;
   if (shape == expected) return;
@@ -155,6 +131,11 @@ void check_shape(const SafetensorsFile& file, const std::string& name, std::vect
 double Recording::filter_s() const {
   const auto found = metadata.find("filter_s");
   return found == metadata.end() ? 0 : parse_double(found->second).value_or(0);
+}
+
+double Recording::began_s() const {
+  const auto found = metadata.find("began_s");
+  return found == metadata.end() ? NAN : parse_double(found->second).value_or(NAN);
 }
 
 void restate(Recording& recording, const SignalScale& scale) {
@@ -188,8 +169,9 @@ Recording recording_of(const SafetensorsFile& file) {
   if (!speed_value) throw FileError(path, "speed_mm_s is " + in_quotes(speed) + ", expected a number");
   recording.speed_mm_s = *speed_value;
 
-  recording.array = take_array(recording.metadata, path);
-  recording.signal_scale = take_scale(recording.metadata, path);
+  recording.array = array_of(file);
+  recording.signal_scale = signal_scale_of(file);
+  recording.metadata.erase("array"), recording.metadata.erase("signals");
 
   for (const auto& [name, tensor] : file.tensors())
     if (std::ranges::find(kTensors, name) == std::end(kTensors))
@@ -242,6 +224,43 @@ void write_recording(const std::string& path, const Recording& recording) {
   write_safetensors(path, metadata_of(recording), tensors);
 }
 
+TaxelArray array_of(const SafetensorsFile& file) {
+  const std::string& path = file.path();
+  const auto found = file.metadata().find("array");
+  if (found == file.metadata().end()) return {};
+  try {
+    const auto json = parse_json_limited(found->second);
+    const TaxelArray array{json.at("rows").get<int>(), json.at("columns").get<int>(),
+                           json.at("pitch_mm").get<double>(), json.at("channels").get<int>()};
+    array.check();
+    return array;
+  } catch (const std::invalid_argument& error) {
+    throw FileError(path, error.what());
+  } catch (const std::exception&) {
+    throw FileError(path, "array is " + in_quotes(found->second) +
+                              ", expected {\"rows\": 4, \"columns\": 4, \"pitch_mm\": 3, \"channels\": 1}");
+  }
+}
+
+SignalScale signal_scale_of(const SafetensorsFile& file) {
+  const std::string& path = file.path();
+  const auto found = file.metadata().find("signals");
+  if (found == file.metadata().end()) return {};
+  try {
+    return scale_of_json(parse_json_limited(found->second), path);
+  } catch (const JsonError& error) {
+    throw FileError(path, std::string("signals: ") + error.what());
+  }
+}
+
+std::map<std::string, std::string> metadata_of(const TaxelArray& array, const SignalScale& scale) {
+  const nlohmann::ordered_json json = {{"rows", array.rows},
+                                       {"columns", array.columns},
+                                       {"pitch_mm", array.pitch_mm},
+                                       {"channels", array.channels}};
+  return {{"array", json.dump()}, {"signals", json_of(scale).dump()}};
+}
+
 std::map<std::string, std::string> metadata_of(const Recording& recording) {
   const TaxelArray& array = recording.array;
   auto metadata = recording.metadata;
@@ -257,15 +276,10 @@ std::map<std::string, std::string> metadata_of(const Recording& recording) {
   metadata["pass"] = std::to_string(recording.pass);
   metadata["speed_mm_s"] = format(recording.speed_mm_s);
   metadata["source"] = recording.source;
-  if (array != TaxelArray{}) {  // files of the rig's array have gone without from the start
-    metadata["array"] = nlohmann::ordered_json{
-        {"rows", array.rows},
-        {"columns", array.columns},
-        {"pitch_mm", array.pitch_mm},
-        {"channels",
-         array.channels}}.dump();
-  }
-  if (recording.signal_scale != SignalScale{}) metadata["signals"] = json_of(recording.signal_scale).dump();
+  // Files of the rig's array have gone without from the start.
+  const auto of_sensor = metadata_of(array, recording.signal_scale);
+  if (array != TaxelArray{}) metadata["array"] = of_sensor.at("array");
+  if (recording.signal_scale != SignalScale{}) metadata["signals"] = of_sensor.at("signals");
   return metadata;
 }
 

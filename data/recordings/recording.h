@@ -34,6 +34,8 @@ struct Recording {
   double period_s() const;
   /// Length of the moving average the voltages went through (s); 0 when the metadata names none.
   double filter_s() const;
+  /// Wall-clock time of time_s 0 (s since 1970); NaN when the metadata name none ("began_s").
+  double began_s() const;
 };
 
 /// States the signals in another sensor's unit, polarity and range: they say the same.
@@ -46,7 +48,8 @@ void restate(Recording& recording, const SignalScale& scale);
 /// [40, 900]}; without it they are the rig's volts. Throws FileError when the file is damaged
 /// (io/files/safetensors.h), is no recording, or breaks a rule of Recording: sizes that do not match, values
 /// that are not finite (position_mm may be NaN), a truth outside [0,1], a tensor that nobody reads, time
-/// stamps that do not increase, a speed, a moving average (metadata "filter_s", s) or a time that no rig has.
+/// stamps that do not increase, a speed, a moving average (metadata "filter_s", s) or a time (also
+/// metadata "began_s") that no rig has.
 Recording read_recording(const std::string& path);
 /// The same of a file that has been read.
 Recording recording_of(const SafetensorsFile& file);
@@ -60,6 +63,12 @@ void write_recording(const std::string& path, const Recording& recording);
 /// The metadata of its file: its own and the members that are no tensor. Throws std::invalid_argument when
 /// its own have a key of these.
 std::map<std::string, std::string> metadata_of(const Recording& recording);
+
+/// "array" and "signals" of a file's metadata, which recordings and logs of pictures have, and back; a file
+/// without them has the rig's. Throw FileError.
+TaxelArray array_of(const SafetensorsFile& file);
+SignalScale signal_scale_of(const SafetensorsFile& file);
+std::map<std::string, std::string> metadata_of(const TaxelArray& array, const SignalScale& scale);
 
 /// "<plate>_t<trial>_p<pass>_v<speed>.safetensors", the name a recording has in a folder of recordings.
 std::string recording_file_name(const Recording& recording);

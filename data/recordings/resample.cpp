@@ -134,7 +134,10 @@ float Scaling::operator()(float volts) const {
 }
 
 void Scaling::operator()(std::span<float> volts) const {
-  for (float& v : volts) v = (*this)(v);
+  // The same in the form that the compiler makes vectors of.
+  const double rest = rest_volts, span = span_volts;
+  for (float& v : volts)
+    v = static_cast<float>(std::min(std::max((rest - static_cast<double>(v)) / span, 0.0), 1.0));
 }
 
 void FrameMean::clear() {

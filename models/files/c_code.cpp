@@ -267,12 +267,25 @@ void check(const ModelFile& file, const std::string& name, double sensor_hz) {
         "this version");
 }
 
+// The C code counts in 16 bits, which saves flash.
+void check_sizes(const IntegerPlan& plan) {
+  constexpr Dim kMost = 32767;
+  Dim largest = 0;
+  for (const IntegerMap& m : plan.maps) largest = std::max({largest, m.height, m.width, m.channels});
+  for (const IntegerStep& s : plan.steps)
+    if (s.kind == Kind::product) largest = std::max({largest, s.weights.outputs, s.job.length});
+  if (largest > kMost)
+    throw std::runtime_error("C code: a layer has " + text(largest) + " outputs, expected at most " +
+                             text(kMost) + "; train a network of fewer channels, or for a smaller array");
+}
+
 }  // namespace
 
 CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz,
                 const std::string& written_by) {
   check(file, name, sensor_hz);
   const auto plan = IntegerPlan::of(file.network(), *file.ranges);
+  check_sizes(*plan);
   Writer writer(*plan);
   const std::string top = "/* " + name + ": tactile super-resolution, written by " + written_by + ". */\n";
   std::string products = writer.products();

@@ -7,9 +7,9 @@
     pictures = model.draw(volts).picture        # [N, height, width]
 """
 from .files import read, write
-from .library import LiveWindow
+from .library import LiveWindow, train
 from .model import Model, Pictures, load_model, save_model
-from .recordings import Log, Recording, read_pictures, read_recording, windows
+from .recordings import Log, Recording, read_pictures, read_recording, windows, write_recording
 
 __all__ = ["LiveWindow", "Log", "Model", "Pictures", "Recording", "load_model", "read", "read_pictures", "read_recording",
-           "save_model", "windows", "write"]
+           "save_model", "train", "windows", "write", "write_recording"]

@@ -1,7 +1,10 @@
 """The project's one file format, safetensors, with the checks of io/files/safetensors.h: a file of
 unknown origin raises ValueError and takes no more memory than it has bytes."""
+from __future__ import annotations
+
 import json
 import math
+import os
 import pathlib
 import struct
 import zlib
@@ -12,7 +15,7 @@ TYPES = {"F64": "<f8", "F32": "<f4", "I64": "<i8", "I32": "<i4", "U8": "u1"}
 LARGEST_HEADER, MOST_TENSORS, MOST_FIELDS, HIGHEST_RANK = 1 << 20, 4096, 4096, 8
 
 
-def parse_json(path, text):
+def parse_json(path: str | os.PathLike, text: str | bytes):
     """JSON without keys that appear twice and without NaN. Raises ValueError naming the file."""
 
     def unique(pairs):
@@ -51,7 +54,7 @@ def _entry(entry):
     return (TYPES[kind], shape, *offsets) if offsets[1] - offsets[0] == size else None
 
 
-def read(path):
+def read(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Tensors by name and metadata of a safetensors file. Raises ValueError naming the file and what is wrong."""
     raw = pathlib.Path(path).read_bytes()
     size = struct.unpack("<Q", raw[:8])[0] if len(raw) >= 8 else len(raw)
@@ -81,7 +84,7 @@ def read(path):
     return {name: tensors[name] for name in header}, metadata
 
 
-def expect(path, tensors, shapes):
+def expect(path: str | os.PathLike, tensors: dict[str, np.ndarray], shapes: dict[str, list]) -> list:
     """The named tensors, None for those that are not there. `shapes`: name to sizes, where None is any size and a text
     the same size wherever it stands; a name that ends in "?" need not be there. Raises ValueError."""
     sizes, found = {}, []
@@ -100,8 +103,9 @@ def expect(path, tensors, shapes):
     return found
 
 
-def write(path, tensors, metadata=None, checksum=False):
-    """Writes arrays by name; without our checksum, as a program of another maker would, or with it."""
+def write(path: str | os.PathLike, tensors: dict[str, np.ndarray], metadata: dict[str, str] | None = None,
+          checksum: bool = False) -> None:
+    """Writes arrays by name, the file complete or not at all; without our checksum, as a program of another maker would, or with it."""
     if checksum:
         metadata = {"checksum": "0" * 8, **(metadata or {}), "supertac_format": "1"}
     header, at = {} if metadata is None else {"__metadata__": metadata}, 0
@@ -115,4 +119,9 @@ def write(path, tensors, metadata=None, checksum=False):
     whole = b"".join(parts)
     if checksum:
         whole = whole.replace(b'"checksum":"00000000"', b'"checksum":"%08x"' % zlib.crc32(whole[8:]), 1)
-    pathlib.Path(path).write_bytes(whole)
+    unfinished = pathlib.Path(f"{path}.{os.getpid()}.tmp")
+    try:
+        unfinished.write_bytes(whole)
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)

@@ -1,36 +1,49 @@
 """Draws with the C library (library/supertac.h), at the speed of the programs.
 
-It is looked for at the path in SUPERTAC_LIBRARY, then where the system keeps its libraries.
+It is looked for at the path in SUPERTAC_LIBRARY, then in this package, whose wheel holds it, then where the system keeps
+its libraries.
 """
+from __future__ import annotations
+
 import ctypes
 import ctypes.util
 import functools
 import os
 import pathlib
+from collections.abc import Callable
 
 import numpy as np
 
 PRECISIONS = {"fp32": 0, "int8": 1}
 POINTER, SIZE = ctypes.c_void_p, ctypes.c_size_t
+PROGRESS = ctypes.CFUNCTYPE(ctypes.c_int, POINTER, ctypes.c_longlong, ctypes.c_double)
 SIGNATURES = {  # result, arguments
     "supertac_error": (ctypes.c_char_p, []),
     "supertac_open_memory": (POINTER, [ctypes.c_char_p, SIZE, ctypes.c_int]),
     "supertac_close": (None, [POINTER]),
-    "supertac_scale": (ctypes.c_int, [POINTER, SIZE, POINTER, POINTER]),
     "supertac_draw": (ctypes.c_int, [POINTER, SIZE, POINTER, POINTER, POINTER, ctypes.c_int]),
     "supertac_live_new": (POINTER, [POINTER, ctypes.c_double, ctypes.c_double]),
     "supertac_live_free": (None, [POINTER]),
     "supertac_live_push": (ctypes.c_int, [POINTER, ctypes.c_double, POINTER]),
     "supertac_live_picture": (ctypes.c_int, [POINTER, POINTER, POINTER]),
+    "supertac_train": (ctypes.c_int, [ctypes.c_char_p] * 3 + [POINTER, PROGRESS, POINTER]),
 }
 
 
+class Settings(ctypes.Structure):
+    """supertac_training"""
+    _fields_ = [("size", SIZE), ("epochs", ctypes.c_longlong), ("stride", ctypes.c_longlong),
+                ("seed", ctypes.c_ulonglong), ("split", ctypes.c_char_p)]
+
+
 @functools.cache
-def library():
+def library() -> ctypes.CDLL:
     """The C library. Raises ValueError where it is not installed."""
-    path = os.environ.get("SUPERTAC_LIBRARY") or ctypes.util.find_library("supertac")
+    ours = pathlib.Path(__file__).with_name("libsupertac.so")
+    path = os.environ.get("SUPERTAC_LIBRARY") or (ours if ours.exists() else ctypes.util.find_library("supertac"))
     if path is None:
-        raise ValueError("the C library is not installed: build SuperTac and set SUPERTAC_LIBRARY to libsupertac.so")
+        raise ValueError("the C library is not installed: pip install ./python compiles it; or set SUPERTAC_LIBRARY to "
+                         "libsupertac.so")
     loaded = ctypes.CDLL(path)
     for name, (result, arguments) in SIGNATURES.items():
         function = getattr(loaded, name)
@@ -48,7 +61,7 @@ def checked(result, failed=-1):
 class Drawer:
     """A model file's network, as the programs run it: windows [N,T,S] in the sensor's unit to pictures."""
 
-    def __init__(self, path, settings, precision="fp32", threads=1):
+    def __init__(self, path: str | os.PathLike, settings: dict, precision: str = "fp32", threads: int = 1):
         content = pathlib.Path(path).read_bytes()
         self.model = checked(library().supertac_open_memory(content, len(content), PRECISIONS[precision]), None)
         array = [settings.get(name, value) for name, value in (("rows", 4), ("columns", 4), ("in_channels", 1))]
@@ -60,14 +73,13 @@ class Drawer:
         if getattr(self, "model", None) is not None:
             library().supertac_close(self.model)
 
-    def draw(self, values):
+    def draw(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """Pictures and predicted errors [N,height,width]; these are None for a model without."""
-        windows = np.array(values, np.float32, order="C")
+        windows = np.ascontiguousarray(values, np.float32)
         if windows.shape[1:] != self.window:
             raise ValueError(f"windows are [N,{self.window[0]},{self.window[1]}], got {list(windows.shape)}")
         pictures = np.empty((len(windows), *self.picture), np.float32)
         errors = np.empty_like(pictures) if self.predicts_error else None
-        checked(library().supertac_scale(self.model, len(windows), windows.ctypes.data, windows.ctypes.data))
         checked(library().supertac_draw(self.model, len(windows), windows.ctypes.data, pictures.ctypes.data,
                                         None if errors is None else errors.ctypes.data, self.threads))
         return pictures, errors
@@ -81,7 +93,7 @@ class LiveWindow:
         picture = live.push(time_s, frame)
     """
 
-    def __init__(self, model, frame_hz, filter_s=0.0, precision="fp32"):
+    def __init__(self, model, frame_hz: float, filter_s: float = 0.0, precision: str = "fp32"):
         """filter_s: moving average that the frames have gone through already."""
         self.drawer = model.drawer(precision)
         self.live = checked(library().supertac_live_new(self.drawer.model, frame_hz, filter_s), None)
@@ -91,7 +103,7 @@ class LiveWindow:
         if getattr(self, "live", None) is not None:
             library().supertac_live_free(self.live)
 
-    def push(self, time_s, frame):
+    def push(self, time_s: float, frame: np.ndarray) -> np.ndarray | None:
         """The picture [height,width] that ends with this frame, or None; predicted_error is then its own."""
         values = np.ascontiguousarray(frame, np.float32)
         if values.size != self.drawer.window[1]:
@@ -100,3 +112,28 @@ class LiveWindow:
         picture = np.empty(self.drawer.picture, np.float32)
         error = self.predicted_error.ctypes.data if self.drawer.predicts_error else None
         return picture if checked(library().supertac_live_picture(self.live, picture.ctypes.data, error)) else None
+
+
+def train(recipe: str, folder: str | os.PathLike, out: str | os.PathLike,
+          callback: Callable[[int, float], object] | None = None, *, epochs: int = 0, stride: int = 0, seed: int = 0,
+          split: str | None = None) -> bool:
+    """Trains as supertac-train does, to the same content: recipe "paper", "best" or "tiny", on a folder of recordings.
+
+    callback(step, loss) is called after every step; when it returns something true, training ends early, and False is
+    returned and nothing written. epochs and stride: 0 for the recipe's. split: what is kept for testing, "trial" or
+    "none", ... Raises ValueError, and whatever the callback raises, KeyboardInterrupt too."""
+    raised = []
+
+    def progress(_, step, loss):
+        try:
+            return 1 if callback is not None and callback(step, loss) else 0
+        except BaseException as problem:  # noqa: BLE001: it goes on behind the library
+            raised.append(problem)
+            return 1
+
+    settings = Settings(ctypes.sizeof(Settings), epochs, stride, seed, None if split is None else split.encode())
+    done = library().supertac_train(recipe.encode(), os.fsencode(folder), os.fsencode(out), ctypes.byref(settings),
+                                    PROGRESS(progress), None)
+    if raised:
+        raise raised[0]
+    return checked(done) == 1

@@ -1,7 +1,10 @@
 """A model file and its forward pass in NumPy (docs/network.md has the layers)."""
+from __future__ import annotations
+
 import collections
 import hashlib
 import json
+import os
 
 import numpy as np
 
@@ -80,23 +83,23 @@ class Model:
         self.groups = groups_of(self.settings)
         self.map = tuple(self.settings.get(name, 4) for name in ("rows", "columns"))
 
-    def windows(self, recording):
+    def windows(self, recording: recordings.Recording) -> tuple[np.ndarray, np.ndarray]:
         """Times and windows in volts of a recording that was filtered as the training was."""
         return recordings.windows(recording, self.settings["timesteps"], self.input["rate_hz"])
 
-    def scale(self, volts):
+    def scale(self, volts: np.ndarray) -> np.ndarray:
         """Volts [N,T,S] -> what the network takes."""
         share = (self.input["rest_volts"] - volts.astype(np.float64)) / self.input["span_volts"]
         x = np.clip(share, 0, 1).astype(np.float32)
         return level(x) if self.input.get("levelled") else x
 
-    def drawer(self, precision="fp32", threads=1):
+    def drawer(self, precision: str = "fp32", threads: int = 1) -> library.Drawer:
         """The same network in the C library (library.py). Raises ValueError where it is not installed."""
         if (precision, threads) not in self._drawers:
             self._drawers[precision, threads] = library.Drawer(self.path, self.settings, precision, threads)
         return self._drawers[precision, threads]
 
-    def draw(self, volts, batch=64, precision=None, threads=1):
+    def draw(self, volts: np.ndarray, batch: int = 64, precision: str | None = None, threads: int = 1) -> Pictures:
         """Pictures of windows [N,T,S] in volts. With a precision, "fp32" or "int8", the C library draws them, to the
         bits of the programs and without latents; otherwise NumPy does."""
         if precision is not None:
@@ -160,7 +163,8 @@ class Model:
         return self._convolve(h, "upsampler.out")[:, 0], error, latents
 
 
-def load_model(path):
+def load_model(path: str | os.PathLike) -> Model:
+    """A model that supertac-train wrote. Raises ValueError naming the file and what is wrong."""
     tensors, metadata = read(path)
     if metadata.get("format") != "supertac-checkpoint" or "kind" in metadata:
         raise ValueError(f"{path}: expected a model that supertac-train --data wrote, found "
@@ -171,7 +175,7 @@ def load_model(path):
         raise ValueError(f"{path}: its settings are not those of a model: {problem!r}") from None
 
 
-def save_model(path, module, parent):
+def save_model(path: str | os.PathLike, module, parent: Model) -> None:
     """Writes a module of to_torch(), trained further, as a model file. `parent`: the Model that it came from, whose
     settings it has, and which the provenance names by its content. Ranges for int8 and the alarm for signals unlike
     training are left out: they were those of other weights."""

@@ -1,9 +1,13 @@
 """Recordings of the finger, logs of pictures, and the windows that a network looks at."""
+from __future__ import annotations
+
 import dataclasses
+import json
+import os
 
 import numpy as np
 
-from .files import expect, parse_json, read
+from .files import expect, parse_json, read, write
 
 RIG = {"rows": 4, "columns": 4, "pitch_mm": 3, "channels": 1}
 SLACK = 1e-6  # of a period: time stamps are rounded
@@ -14,13 +18,15 @@ class Recording:
     """One pass of the finger; n frames of S signals."""
 
     time_s: np.ndarray  # [n], increasing
-    volts: np.ndarray  # [n,S]; pressure lowers them
-    position_mm: np.ndarray | None  # [n,2], x and y of the finger's centre; NaN where unknown
-    array: dict  # rows, columns, pitch_mm, channels; taxel k lies in row k // columns, column k % columns
-    metadata: dict  # plate, trial, pass, ..., as text
+    volts: np.ndarray  # [n,S], in the sensor's unit
+    position_mm: np.ndarray | None = None  # [n,2], x and y of the finger's centre; NaN where unknown
+    array: dict = dataclasses.field(default_factory=lambda: dict(RIG))  # taxel k: row k // columns, column k % columns
+    metadata: dict[str, str] = dataclasses.field(default_factory=dict)  # plate, trial, pass, signals, ...
+    lift_mm: np.ndarray | None = None  # [n], of the finger above its slide
+    truth: np.ndarray | None = None  # [n,H,W] in 0 to 1, what a finer sensor saw
 
     @property
-    def period_s(self):
+    def period_s(self) -> float:
         return float(np.median(np.diff(self.time_s)))
 
 
@@ -36,22 +42,55 @@ class Log:
     metadata: dict
 
 
-def read_recording(path):
-    tensors, metadata = read(path)
-    if metadata.get("kind") != "recording":
-        raise ValueError(f"{path}: expected a recording, found a {metadata.get('kind', 'file of another kind')}")
-    array = parse_json(path, metadata["array"]) if "array" in metadata else dict(RIG)
+SHAPES = {"time_s": ["n"], "volts": ["n", None], "position_mm?": ["n", None], "lift_mm?": ["n"], "truth?": ["n", None, None]}
+
+
+def _check(path, recording: Recording) -> None:
+    array, times, volts = recording.array, recording.time_s, recording.volts
     if not isinstance(array, dict) or not all(isinstance(array.get(key), (int, float)) for key in RIG):
         raise ValueError(f"{path}: its array is {array}, expected such as {RIG}")
-    times, volts, position = expect(path, tensors, {"time_s": ["n"], "volts": ["n", None], "position_mm?": ["n", None]})
     if volts.shape[1] != array["rows"] * array["columns"] * array["channels"]:
         raise ValueError(f"{path}: has {volts.shape[1]} signals, its array {array} has others")
     if not (np.diff(times) > 0).all():
         raise ValueError(f"{path}: its times do not increase; record or import it again")
-    return Recording(times, volts, position, array, metadata)
 
 
-def read_pictures(path):
+def read_recording(path: str | os.PathLike) -> Recording:
+    """A recording of any of our programs. Raises ValueError naming the file and what is wrong."""
+    tensors, metadata = read(path)
+    if metadata.get("kind") != "recording":
+        raise ValueError(f"{path}: expected a recording, found a {metadata.get('kind', 'file of another kind')}")
+    array = parse_json(path, metadata["array"]) if "array" in metadata else dict(RIG)
+    times, volts, position, lift, truth = expect(path, tensors, SHAPES)
+    recording = Recording(times, volts, position, array, metadata, lift, truth)
+    _check(path, recording)
+    return recording
+
+
+def write_recording(path: str | os.PathLike, recording: Recording) -> None:
+    """A file that our programs train on. Of the metadata, plate ("unknown"), trial and pass (1), speed_mm_s (0) and
+    source ("python") have defaults; "signals" states unit, polarity and range of another sensor than the rig, as in
+    {"unit": "counts", "pressed": "higher", "range": [40, 900]} (JSON). Raises ValueError for what they would refuse."""
+    tensors = {"time_s": np.asarray(recording.time_s, "<f8")}
+    tensors |= {name: np.asarray(value, "<f4") for name in ("volts", "position_mm", "lift_mm", "truth")
+                if (value := getattr(recording, name)) is not None}
+    expect(path, tensors, SHAPES)
+    for name, values in tensors.items():
+        bad = np.isinf(values) if name == "position_mm" else ~np.isfinite(values)
+        if bad.any():
+            raise ValueError(f"{path}: {name} of frame {np.argwhere(bad)[0][0]} is not finite; leave the frame out")
+    if "truth" in tensors and not ((tensors["truth"] >= 0) & (tensors["truth"] <= 1)).all():
+        raise ValueError(f"{path}: truth must lie in 0 to 1; scale it")
+    _check(path, dataclasses.replace(recording, **tensors))
+    fields = {"plate": "unknown", "trial": "1", "pass": "1", "speed_mm_s": "0", "source": "python"} | recording.metadata
+    fields = {key: str(value) for key, value in fields.items() if key not in ("checksum", "supertac_format")}
+    if recording.array != RIG:
+        fields["array"] = json.dumps(recording.array)
+    write(path, tensors, fields | {"kind": "recording"}, checksum=True)
+
+
+def read_pictures(path: str | os.PathLike) -> Log:
+    """What supertac-stream --out wrote. Raises ValueError naming the file and what is wrong."""
     tensors, metadata = read(path)
     if "pictures" not in tensors:
         raise ValueError(f"{path}: expected the pictures of supertac-stream --out, found {sorted(tensors)}")
@@ -77,7 +116,8 @@ def _window(times, volts, end_s, timesteps, rate_hz):
     return means[last_not_younger]
 
 
-def windows(recording, timesteps, rate_hz, max_gap_s=0.05):
+def windows(recording: Recording, timesteps: int, rate_hz: float,
+            max_gap_s: float = 0.05) -> tuple[np.ndarray, np.ndarray]:
     """Times [N] and windows [N,timesteps,S] in volts, one for each frame that has a whole window behind it: what
     supertac-stream draws (data/windows/live_window.h)."""
     finite = np.isfinite(recording.volts).all(axis=1) & np.isfinite(recording.time_s)

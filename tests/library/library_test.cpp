@@ -7,12 +7,16 @@
 #include <thread>
 #include <vector>
 
+#include "data/recordings/recording.h"
 #include "data/windows/live_window.h"
 #include "data/windows/transforms/normalise_window.h"
 #include "io/files/file.h"
+#include "io/files/provenance.h"
 #include "io/numbers/random.h"
 #include "models/files/model_file.h"
 #include "models/inference/prepared/prepared.h"
+#include "models/training/train.h"
+#include "tests/data/test_recordings.h"
 #include "tests/io/temporary_folder.h"
 #include "tests/models/support.h"
 
@@ -33,8 +37,22 @@ class Library : public testing::Test {
     write_checkpoint(path_, network.parameters(), metadata, {ranges.stored()});
     file_ = load_model(path_);
   }
-  Tensor windows(Dim count) const { return uniform(file_.model->input_shape(count), 7); }
-  Estimate expected(const Tensor& inputs, int precision) const {
+  // In volts.
+  Tensor windows(Dim count) const {
+    Tensor values = uniform(file_.model->input_shape(count), 7);
+    for (real& v : values.values()) v = 2.45F - 0.4F * v;
+    return values;
+  }
+  // Of windows in volts.
+  Estimate expected(const Tensor& volts, int precision) const {
+    Tensor inputs = volts.clone();
+    file_.input.scaling(inputs.values());
+    const auto size = static_cast<std::size_t>(file_.model->input_shape(1).elements());
+    for (std::size_t at = 0; at < inputs.values().size(); at += size)
+      normalise_window(inputs.values().subspan(at, size), 16);
+    return drawn_of(inputs, precision);
+  }
+  Estimate drawn_of(const Tensor& inputs, int precision) const {
     return (precision == SUPERTAC_INT8 ? Prepared(*file_.model, *file_.ranges) : Prepared(*file_.model))
         .estimate(inputs);
   }
@@ -112,23 +130,39 @@ TEST_F(Library, DrawsFramesAsLiveWindowsDo) {
     ASSERT_EQ(supertac_live_picture(live.get(), picture.data(), nullptr), due ? 1 : 0);
     if (!due) continue;
     ++drawn;
-    ASSERT_TRUE(std::ranges::equal(picture, expected(input, SUPERTAC_INT8).picture.values()));
+    ASSERT_TRUE(std::ranges::equal(picture, drawn_of(input, SUPERTAC_INT8).picture.values()));
   }
   EXPECT_GT(drawn, 30);
 }
 
-TEST_F(Library, ScalesWindowsAsTrainingDid) {
-  const Model model(supertac_open(path_.c_str(), SUPERTAC_FP32));
-  Tensor values = windows(2);
-  for (real& v : values.values()) v = 2.45F - 0.4F * v;
-  std::vector<float> found(values.values().begin(), values.values().end()), expected(found);
-  ASSERT_EQ(supertac_scale(model.get(), 2, values.data(), found.data()), 0);
-  const std::size_t size = expected.size() / 2;
-  file_.input.scaling(expected);
-  for (std::size_t n = 0; n < 2; ++n) normalise_window(std::span(expected).subspan(n * size, size), 16);
-  EXPECT_EQ(found, expected);
-  ASSERT_EQ(supertac_scale(model.get(), 2, values.data(), values.data()), 0);
-  EXPECT_TRUE(std::ranges::equal(values.values(), expected));
+TEST_F(Library, TrainsWhatTheCppLibraryTrains) {
+  make_directories(folder_ / "data");
+  write_recording(folder_ / "data/a.safetensors", make_recording({.frames = 3000}));
+  Recipe recipe = Recipe::named("tiny");
+  recipe.epochs = 2, recipe.stride = 4, recipe.seed = 5, recipe.split = SplitKind::none;
+  train(recipe, {.data = folder_ / "data"}, folder_ / "cpp.safetensors");
+  const supertac_training settings{
+      .size = sizeof(supertac_training), .epochs = 2, .stride = 4, .seed = 5, .split = "none"};
+  const std::string data = folder_ / "data", out = folder_ / "c.safetensors";
+  const auto train_c = [&](const char* recipe_name, supertac_progress progress, void* user) {
+    return supertac_train(recipe_name, data.c_str(), out.c_str(), &settings, progress, user);
+  };
+  long long steps = 0;
+  const supertac_progress end_at_once = [](void* user, long long step, double loss) {
+    *static_cast<long long*>(user) = step;
+    return loss > 0 ? 1 : 0;
+  };
+  ASSERT_EQ(train_c("tiny", end_at_once, &steps), 0) << supertac_error();
+  EXPECT_EQ(steps, 1);
+  EXPECT_THROW(read_file(out, 1 << 26), FileError);
+  ASSERT_EQ(train_c("tiny", nullptr, nullptr), 1) << supertac_error();
+  EXPECT_EQ(content_hash(SafetensorsFile::read(out)),
+            content_hash(SafetensorsFile::read(folder_ / "cpp.safetensors")));
+  EXPECT_EQ(train_c("huge", nullptr, nullptr), -1);
+  EXPECT_NE(std::string(supertac_error()).find("huge"), std::string::npos);
+  EXPECT_EQ(supertac_train("tiny", nullptr, "x", nullptr, nullptr, nullptr), -1);
+  const supertac_training no_size{};
+  EXPECT_EQ(supertac_train("tiny", data.c_str(), "x", &no_size, nullptr, nullptr), -1);
 }
 
 TEST_F(Library, SaysWhatWasWrongToTheThreadThatAsked) {

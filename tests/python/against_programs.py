@@ -7,6 +7,7 @@ to_torch() likewise; where onnxruntime is, what supertac-export writes.
 
 77 when NumPy is not installed.
 """
+import dataclasses
 import importlib
 import json
 import os
@@ -92,6 +93,41 @@ def comes_back(name, model, data, folder):
     return check(f"{name}, trained further and saved", drawn.picture, tensors["output"])
 
 
+def trains(folder, recording):
+    """A recording written here, trained by the library and by the program: the same content."""
+    if not LIBRARY.exists():
+        return True
+    data, by_library, by_program = (folder / name for name in ("written", "library.safetensors", "program.safetensors"))
+    data.mkdir()
+    part = supertac.Recording(recording.time_s, recording.volts, recording.position_mm, metadata={"plate": "6_Ridges"})
+    supertac.write_recording(data / "a.safetensors", part)
+    losses, settings = [], {"epochs": 2, "stride": 2, "split": "none"}
+    assert supertac.train("tiny", data, by_library, lambda step, loss: losses.append(loss), **settings)
+    assert not supertac.train("tiny", data, folder / "early", lambda step, loss: step == 2, **settings)
+    run("supertac-train", "--data", data, "--out", by_program, "--preset", "tiny", "--quiet",
+        *(word for key, value in settings.items() for word in (f"--{key}", value)))
+    ours, theirs = (supertac.read(path)[0] for path in (by_library, by_program))
+    same = ours.keys() == theirs.keys() and all(np.array_equal(ours[name], theirs[name]) for name in ours)
+    print(f"trained in {len(losses)} steps, {'the same bits' if same else 'OTHER BITS'}")
+    return same and not (folder / "early").exists() and len(losses) > 2
+
+
+def refuses_what_programs_refuse(folder, recording):
+    """ValueError, and no file."""
+    volts = recording.volts.copy()
+    volts[3, 2] = np.nan
+    bad = ({"volts": volts}, {"volts": recording.volts[:, :15]}, {"time_s": recording.time_s[::-1]}, {"time_s": recording.time_s[1:]},
+           {"truth": np.full((len(volts), 2, 2), 1.5)}, {"array": {"rows": 4}})
+    for change in bad:
+        try:
+            supertac.write_recording(folder / "bad.safetensors", dataclasses.replace(recording, **change))
+        except ValueError:
+            continue
+        print(f"written: {list(change)}")
+        return False
+    return not list(folder.glob("bad*"))
+
+
 def compare(folder, data, preset, recording):
     name, log = f"{preset} {data.name}", folder / f"{preset}{data.name}.log.safetensors"
     path = folder / f"{preset}{data.name}.safetensors"
@@ -157,6 +193,8 @@ def main():
         for preset in ("tiny", "paper"):
             for data in (rig, other):
                 good &= compare(folder, data, preset, data / recordings[0].name)
+        recording = supertac.read_recording(recordings[0])
+        good &= trains(folder, recording) and refuses_what_programs_refuse(folder, recording)
         good &= refuses_damage(recordings[0])
     sys.exit(0 if good else 1)
 

@@ -107,8 +107,8 @@ Arguments& Arguments::flag(const std::string& name, const std::string& help) {
   return *this;
 }
 
-Arguments& Arguments::one_of(const std::string& first, const std::string& second) {
-  one_of_.emplace_back(first, second);
+Arguments& Arguments::one_of(std::vector<std::string> names) {
+  one_of_.push_back(std::move(names));
   return *this;
 }
 
@@ -267,10 +267,16 @@ std::string Arguments::deciding_options() const {
 }
 
 void Arguments::check_together() const {
-  for (const auto& [first, second] : one_of_) {
-    if (given(first) != given(second)) continue;
-    throw UsageError("expected --" + first + " " + options_.at(first).value + " or --" + second + " " +
-                     options_.at(second).value + ", found " + (given(first) ? "both" : "neither"));
+  for (const std::vector<std::string>& names : one_of_) {
+    const auto count = std::ranges::count_if(names, [this](const std::string& name) { return given(name); });
+    if (count == 1) continue;
+    std::string expected;
+    for (const std::string& name : names)
+      expected += (expected.empty()       ? "--"
+                   : name == names.back() ? " or --"
+                                          : ", --") +
+                  name + " " + options_.at(name).value;
+    throw UsageError("expected " + expected + ", found " + (count == 0 ? "none" : std::to_string(count)));
   }
   for (const std::string& name : order_) {
     const std::string& needed = options_.at(name).only_with;

@@ -55,8 +55,8 @@ class Arguments {
   Arguments& option_alone(const std::string& name, const std::string& value, const std::string& help,
                           const std::string& alone);
   Arguments& flag(const std::string& name, const std::string& help);
-  /// Exactly one of these two options has to be given.
-  Arguments& one_of(const std::string& first, const std::string& second);
+  /// Exactly one of these options has to be given.
+  Arguments& one_of(std::vector<std::string> names);
   /// The options declared from here on say something beside `option` only and are refused without it; "" ends
   /// this.
   Arguments& only_with(const std::string& option);
@@ -142,7 +142,7 @@ class Arguments {
   std::vector<std::string> order_;        // of declaration
   std::vector<std::string> positionals_;  // value names
   std::map<std::string, Option> options_;
-  std::vector<std::pair<std::string, std::string>> one_of_;
+  std::vector<std::vector<std::string>> one_of_;
   std::string only_with_;  // of the options being declared
   bool more_ = false, muted_ = false;
   mutable bool displaced_ = false;

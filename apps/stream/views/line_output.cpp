@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "apps/common/running/signals.h"
@@ -39,9 +40,10 @@ void append(std::string& line, const char* name, std::span<const float> values) 
 
 }  // namespace
 
-std::string picture_line(const Seen& seen, bool unlike_training) {
-  std::string line =
-      "{\"timestamp\":" + format(seen.time_s, 6) + ",\"number\":" + std::to_string(seen.number);
+std::string picture_line(const Seen& seen, bool unlike_training, const std::string& about) {
+  std::string line = "{\"timestamp\":" + format(seen.time_s, 6);
+  if (!std::isnan(seen.wall_s)) line += ",\"wall_s\":" + format(seen.wall_s, 6);
+  line += ",\"number\":" + std::to_string(seen.number) + "," + about;
   append(line, "volts", seen.volts);
   if (!seen.picture.empty()) append(line, "picture", seen.picture);
   if (!seen.half_widths.empty()) {
@@ -56,6 +58,19 @@ std::string picture_line(const Seen& seen, bool unlike_training) {
     line += std::string(",\"unlike_training\":") + (unlike_training ? "1" : "0");
   }
   return line + "}\n";
+}
+
+std::string about_lines(const TaxelArray& array, const std::string& unit, const ImageGrid& image) {
+  nlohmann::ordered_json about;
+  if (image.pixels() > 0)
+    about = {{"height", image.height}, {"width", image.width}, {"pixel_mm", image.pixel_mm}};
+  about.update({{"rows", array.rows},
+                {"columns", array.columns},
+                {"channels", array.channels},
+                {"pitch_mm", array.pitch_mm},
+                {"unit", unit}});
+  const std::string text = about.dump();
+  return text.substr(1, text.size() - 2);
 }
 
 UdpOutput::UdpOutput(const std::string& address) {

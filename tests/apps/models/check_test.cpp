@@ -78,8 +78,22 @@ TEST(Check, TheMachineIsDescribed) {
   std::set<std::string> found;
   const auto described = nlohmann::json::parse(result.out);
   for (const auto& row : described["findings"]) found.insert(row["what"]);
-  for (const char* what : {"processor", "threads", "memory", "disk", "tactile board"})
+  for (const char* what : {"processor", "threads", "memory", "disk", "serial ports' group", "tactile board"})
     EXPECT_TRUE(found.contains(what)) << what;
+}
+
+TEST(Check, PrintsAUdevRule) {
+  const auto result = run_process("supertac-check", {"udev"});
+  ASSERT_EQ(result.code, 0) << result.error;
+  int rules = 0;
+  std::istringstream lines(result.out);
+  for (std::string line; std::getline(lines, line);)  // a comment, or conditions and assignments
+    if (!line.starts_with('#')) {
+      ++rules;
+      EXPECT_TRUE(line.starts_with("SUBSYSTEM==\"tty\", ")) << line;
+      EXPECT_NE(line.find("TAG+=\"uaccess\""), std::string::npos) << line;
+    }
+  EXPECT_EQ(rules, 1);
 }
 
 class Audit : public OnSimulatedData {

@@ -163,11 +163,11 @@ TEST(Pairs, RefusesWhatIsAboutRecordingsAndTheOtherModel) {
            option + ": says something beside --data only, which is not given; leave it out");
   }
   expect(run_process("supertac-train", training(folder, "m.safetensors", {"--data", "d"})), 2,
-         "expected --data DIR or --pairs FILE, found both");
+         "expected --data DIR or --pairs FILE, found 2");
   expect(run_process("supertac-train", training(folder, "m.safetensors", {"--split", "trial"})), 2,
          "expected one of group, pair, none");
   expect(run_process("supertac-train", {"--out", model}), 2,
-         "expected --data DIR or --pairs FILE, found neither");
+         "expected --data DIR or --pairs FILE, found none");
   const auto loose = write_pairs(folder, false);
   expect(run_process("supertac-train", {"--pairs", loose, "--out", model, "--split", "group"}), 1,
          "needs a tensor 'group'");
@@ -178,7 +178,7 @@ TEST(Pairs, RefusesWhatIsAboutRecordingsAndTheOtherModel) {
   expect(run_process("supertac-evaluate", {"--model", model, "--data", folder.path()}), 1,
          "found a frame model");
   expect(run_process("supertac-evaluate", {"--model", model}), 2,
-         "expected --data DIR or --pairs FILE, found neither");
+         "expected --data DIR or --pairs FILE, found none");
   for (const char* option : {"--plates", "--pictures", "--write-pairs"})
     expect(run_process("supertac-evaluate", {"--model", model, "--pairs", pairs, option, folder / "p"}), 2,
            std::string(option) + ": says something beside --data only");

@@ -164,6 +164,10 @@ TEST(Recording, ReadsNoneThatBreaksARule) {
   for (const char* impossible : {"-1", "1e300", "nan", "long"})
     EXPECT_EQ(with("filter_s", impossible),
               "filter_s is '" + std::string(impossible) + "', expected 0 to 10 s; record or import it again");
+  for (const char* impossible : {"-1", "1e300", "nan", "yesterday"})
+    EXPECT_EQ(with("began_s", impossible), "began_s is '" + std::string(impossible) +
+                                               "', expected seconds since 1970; record or import it again");
+  EXPECT_EQ(with("began_s", "1700000000.5"), "nothing thrown");
   Parts parts;
   parts.time_s = {0, 1e300};
   EXPECT_EQ(message_of_parts(parts), "time_s lies beyond 1e+10 s; record or import it again");

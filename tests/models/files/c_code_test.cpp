@@ -9,6 +9,7 @@
 #include "data/windows/live_window.h"
 #include "io/files/file.h"
 #include "models/inference/prepared/prepared.h"
+#include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"
 #include "tests/models/support.h"
 
@@ -143,6 +144,15 @@ TEST(CCode, RefusesWhatIsNoNameOrRateOrHasNoRanges) {
   EXPECT_THROW(c_code_of(file, "finger", 0, ""), std::invalid_argument);
   file.ranges.reset();
   EXPECT_THROW(c_code_of(file, "finger", 100, ""), std::runtime_error);
+}
+
+TEST(CCode, RefusesLayersThatItsSixteenBitsCannotCount) {
+  SuperTacSettings wide = tiny();
+  wide.rows = wide.columns = 16, wide.channels = 128, wide.latent = 1, wide.rcabs = 0, wide.scale = 2;
+  wide.timesteps = 32;
+  EXPECT_ERROR(
+      c_code_of(model_of(wide, {}), "finger", 100, ""), std::runtime_error,
+      "C code: a layer has 32768 outputs, expected at most 32767; train a network of fewer channels");
 }
 
 }  // namespace

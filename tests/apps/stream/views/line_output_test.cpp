@@ -20,9 +20,12 @@ namespace {
 
 const std::vector<float> kVolts(16, 2.4F), kPicture(256, 0.5F), kHalf(256, 0.25F);
 
+const std::string kAbout = about_lines({}, "V", {});
+
 Seen seen(std::uint64_t number) {
   return {.number = number,
           .time_s = static_cast<double>(number) / 1008,
+          .wall_s = NAN,
           .volts = kVolts,
           .picture = kPicture,
           .half_widths = {},
@@ -31,25 +34,35 @@ Seen seen(std::uint64_t number) {
 
 TEST(PictureLine, HoldsWhatIsKnownAndNothingElse) {
   Seen one = seen(3);
-  const std::string line = picture_line(one, false);
+  const std::string about = about_lines({.rows = 2, .columns = 8, .pitch_mm = 5}, "N", {8, 32, 1.25});
+  const std::string line = picture_line(one, false, about);
   EXPECT_TRUE(line.ends_with("}\n"));
   auto json = parse_json_limited(line);
   EXPECT_NEAR(json["timestamp"].get<double>(), 3.0 / 1008, 1e-6);
   EXPECT_EQ(json["volts"].get<std::vector<float>>(), kVolts);
   EXPECT_EQ(json["picture"].get<std::vector<float>>(), kPicture);
-  EXPECT_EQ(json.size(), 4U);
-  one.half_widths = kHalf, one.distance = 1.5;
-  json = parse_json_limited(picture_line(one, true));
+  EXPECT_EQ(json["height"], 8);
+  EXPECT_EQ(json["width"], 32);
+  EXPECT_EQ(json["pixel_mm"], 1.25);
+  EXPECT_EQ(json["rows"], 2);
+  EXPECT_EQ(json["columns"], 8);
+  EXPECT_EQ(json["channels"], 1);
+  EXPECT_EQ(json["pitch_mm"], 5);
+  EXPECT_EQ(json["unit"], "N");
+  EXPECT_EQ(json.size(), 12U);
+  one.half_widths = kHalf, one.distance = 1.5, one.wall_s = 1.7e9;
+  json = parse_json_limited(picture_line(one, true, about));
+  EXPECT_EQ(json["wall_s"], 1.7e9);
   EXPECT_EQ(json["half_width"], 0.25);
   EXPECT_EQ(json["distance"], 1.5);
   EXPECT_EQ(json["unlike_training"], 1);
   const std::vector<float> strange(16, std::nanf(""));
   one.volts = strange;
-  EXPECT_TRUE(parse_json_limited(picture_line(one, true))["volts"][0].is_null());
+  EXPECT_TRUE(parse_json_limited(picture_line(one, true, about))["volts"][0].is_null());
 }
 
 // What PlotJuggler's JSON parser takes: one object a datagram, "timestamp" a number, all else numbers,
-// objects or arrays of them, which it flattens.
+// objects or arrays of them, which it flattens, or texts, of which it makes no curve.
 TEST(UdpOutput, EveryDatagramIsWhatPlotJugglerTakesAndNoneIsLost) {
   const int receiver = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_in place{};
@@ -61,7 +74,7 @@ TEST(UdpOutput, EveryDatagramIsWhatPlotJugglerTakesAndNoneIsLost) {
   UdpOutput output("127.0.0.1:" + std::to_string(ntohs(place.sin_port)));
   char buffer[65536];
   for (std::uint64_t i = 0; i < 1008; ++i) {
-    output.send(picture_line(seen(i), false));
+    output.send(picture_line(seen(i), false, kAbout));
     const ssize_t count = recv(receiver, buffer, sizeof buffer, 0);
     ASSERT_GT(count, 0);
     const auto json = parse_json_limited({buffer, static_cast<std::size_t>(count)});
@@ -69,7 +82,7 @@ TEST(UdpOutput, EveryDatagramIsWhatPlotJugglerTakesAndNoneIsLost) {
     ASSERT_TRUE(json["timestamp"].is_number());
     for (const auto& [name, value] : json.items())
       for (const auto& part : value.is_array() ? value : nlohmann::ordered_json::array({value}))
-        ASSERT_TRUE(part.is_number()) << name;
+        ASSERT_TRUE(part.is_number() || name == "unit") << name;
   }
   EXPECT_EQ(output.lost(), 0U);
   close(receiver);
@@ -105,7 +118,7 @@ TEST_F(Pipe, WhoDoesNotReadLosesLinesAndHoldsUpNobody) {
   const auto begin = std::chrono::steady_clock::now();
   {
     PipeOutput output(ends_[1], false);
-    for (std::uint64_t i = 0; i < 5000; ++i) output.send(picture_line(seen(i), false));
+    for (std::uint64_t i = 0; i < 5000; ++i) output.send(picture_line(seen(i), false, kAbout));
     EXPECT_GT(output.lost(), 500U);
   }
   EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 200);

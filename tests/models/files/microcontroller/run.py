@@ -19,6 +19,7 @@ import tempfile
 HERE = os.path.dirname(os.path.abspath(__file__))
 # name, qemu's machine, what the compiler is told
 PARTS = [
+    ("Cortex-M55", "mps3-an547", "-mcpu=cortex-m55 -mfloat-abi=hard"),
     ("Cortex-M7", "mps2-an500", "-mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard"),
     ("Cortex-M4F", "mps2-an386", "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard"),
     ("Cortex-M3", "mps2-an385", "-mcpu=cortex-m3"),
@@ -52,11 +53,11 @@ def slices(tensor, count):
     return [data[i * size:(i + 1) * size] for i in range(count)]
 
 
-def trained(tools, folder):
+def trained(tools, folder, preset):
     data, model = folder + "/recordings", folder + "/model.safetensors"
     subprocess.run([tools + "/supertac-simulate", "--out", data, "--speeds", "10", "--passes", "1", "--trials", "2",
                     "--plates", "ridges6,plain", "--quiet"], check=True, stdout=subprocess.DEVNULL)
-    subprocess.run([tools + "/supertac-train", "--data", data, "--out", model, "--preset", "tiny", "--epochs", "1",
+    subprocess.run([tools + "/supertac-train", "--data", data, "--out", model, "--preset", preset, "--epochs", "1",
                     "--stride", "8", "--split", "trial", "--quiet"], check=True, stdout=subprocess.DEVNULL)
     return model, data
 
@@ -139,7 +140,7 @@ def main():
     parser.add_argument("--windows", type=int, default=1000)
     parser.add_argument("--frames", type=int, default=1200)
     parser.add_argument("--csv", help="adds a line for each part to this file")
-    parser.add_argument("--preset", default="tiny", help="for the table")
+    parser.add_argument("--preset", default="tiny", help="of the small one")
     args = parser.parse_args()
     if shutil.which("arm-none-eabi-gcc") is None or shutil.which("qemu-system-arm") is None:
         print("skipped: needs arm-none-eabi-gcc (gcc-arm-none-eabi, libnewlib-arm-none-eabi) and qemu-system-arm")
@@ -147,7 +148,7 @@ def main():
     wrong, rows = 0, []
     with tempfile.TemporaryDirectory() as folder:
         if args.model is None:
-            args.model, args.data = trained(args.bin, folder)
+            args.model, args.data = trained(args.bin, folder, args.preset)
         recording = sorted(glob.glob(args.data + "/*.safetensors"))[0]
         subprocess.run([args.bin + "/supertac-export", args.model, "--c99", folder, "--name", "finger", "--sensor-hz",
                         repr(rate_of(recording)), "--force"], check=True, stdout=subprocess.DEVNULL)
@@ -170,7 +171,8 @@ def main():
     if args.csv:
         commit = subprocess.run(["git", "-C", HERE, "rev-parse", "--short=12", "HEAD"], check=True, capture_output=True,
                                 text=True).stdout.strip()
-        command = f"tests/models/files/microcontroller/run.py --windows {args.windows} --frames {args.frames}"
+        command = (f"tests/models/files/microcontroller/run.py --preset {args.preset} --windows {args.windows} --frames "
+                   f"{args.frames}")
         new = not os.path.exists(args.csv)
         with open(args.csv, "a", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, ["preset", *rows[0].keys(), "command", "commit"], lineterminator="\n")
