@@ -1,5 +1,5 @@
 // The file is read as the specification says (https://mcap.dev/spec), by an index and without;
-// tests/python/mcap_test.py asks the public readers.
+// tests/python/tools_test.py asks the public readers.
 #include "io/files/mcap_file.h"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Looks at what is packaged beside the programs of a build: the list of what they link, completion, man pages.
 
-    packaging/check.py BUILD
+    tests/packaging/check.py BUILD
 
 77 where this is no Debian.
 """
@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 
-HERE = pathlib.Path(__file__).resolve().parent
+HERE = pathlib.Path(__file__).resolve().parents[2] / "packaging"
 build = pathlib.Path(sys.argv[1]).resolve()
 if shutil.which("dpkg-query") is None or shutil.which("bash") is None:
     print("skipped: no dpkg-query or no bash")

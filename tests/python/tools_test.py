@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
 """What --mcap writes, opened by the public readers (PyPI: mcap, mcap-ros2-support; rosbags has the definitions of the ROS
-messages): the taxels and pictures of supertac-stream --out, with sizes, times and units.
+messages; rerun-sdk): the taxels and pictures of supertac-stream --out, with sizes, times and units. Where h5py is
+installed, what examples/to_hdf5.py makes of the same file.
 
-    tests/python/mcap_test.py BIN
+    tests/python/tools_test.py BIN
 
 77 where a reader is not installed.
 """
+import os
 import pathlib
+import shutil
 import socket
 import subprocess
 import sys
@@ -78,6 +81,27 @@ def check_pictures(path, log, array, pixel_mm, began_s):
     print(f"{path.name}: {len(log.time_s)} of each topic, the same bits")
 
 
+def check_rerun(path):
+    """Its own checker: indexes, schemas, order of times."""
+    if rerun := shutil.which("rerun", path=f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"):
+        said = subprocess.run([rerun, "mcap", "check", path], capture_output=True, text=True)
+        assert said.returncode == 0 and said.stdout.count("ok ") == 3, said.stdout + said.stderr
+        print(f"{path.name}: nothing for Rerun to complain of")
+
+
+def check_hdf5(folder, log, seen):
+    try:
+        import h5py
+    except ImportError:
+        print("not converted: h5py is not installed")
+        return
+    subprocess.run([sys.executable, ROOT / "examples/to_hdf5.py", folder / "all.h5", log], check=True,
+                   stdout=subprocess.DEVNULL, env=os.environ | {"PYTHONPATH": str(ROOT / "python")})
+    with h5py.File(folder / "all.h5") as file:
+        assert np.array_equal(file["log/pictures"][:], seen.pictures) and file["log"].attrs["pixel_mm"] == "0.75"
+    print(f"all.h5: {len(seen.pictures)} pictures, the same bits")
+
+
 def check_live(folder):
     """An array alone, as it comes: the wall clock is that of its arrival."""
     sensor, out = folder / "mat.json", folder / "live.mcap"
@@ -123,6 +147,8 @@ def main():
         run("supertac-stream", "--recording", recording, "--model", model, "--mcap", streamed, "--quiet", "--force")
         check_pictures(streamed, seen, [("rows", 4), ("columns", 4), ("channels", 1)], "0.75", 1700000000.5)
         check_live(folder)
+        check_rerun(streamed)
+        check_hdf5(folder, log, seen)
 
 
 if __name__ == "__main__":
