@@ -19,17 +19,25 @@ void declare(Arguments& a) {
       "processor has to give; machine: processor, disk, ports; udev: prints a rule that opens the ports of "
       "USB devices; file FILE [OTHER]: checksum, provenance, and "
       "whether OTHER (recordings or a file) is what it was made from; training FILE --data DIR: repeats "
-      "parts "
-      "of a training that kept a ledger; ledgers FILE OTHER: the first difference of two");
+      "parts of a training that kept a ledger; step FILE --data DIR --at N: opens one step of it, with every "
+      "operator; ledgers FILE OTHER: the first difference of two, with --data down to an operator and entry; "
+      "or of two steps that were opened with --json");
   a.positional("FILE", "what is checked", false);
   a.positional("OTHER", "what it is compared with", false);
   a.option("break", "OP",
            "gradients: plant errors in the reverse step of this op, or of 'all', one after the other: wrong "
            "sign, doubled, without a term, at the wrong index; each has to be found");
-  a.option("data", "DIR", "training: the recordings that the model was trained on");
-  a.option("also", "DIR", "training: those of its --also");
+  a.option("data", "DIR", "training, step, ledgers: the recordings that the model was trained on");
+  a.option("also", "DIR", "those of its --also");
   a.option("segments", "K", "training: how many of its twenty parts are repeated", "1");
   a.option("seed", "N", "training: draws them", "0");
+  a.option("at", "N", "step: which one, from 1");
+  a.option(
+      "operator", "NAME",
+      "step: the arrays of those whose name begins so are written to --out (3/ is the fourth micro-batch, "
+      "update/ what the optimiser did)");
+  a.option("out", "FILE",
+           "step, ledgers: arrays as safetensors, which examples/referee.py computes again with NumPy");
 }
 
 namespace {
@@ -59,15 +67,18 @@ void need(const Arguments& a, const char* name) {
 
 int run(Arguments& a) {
   const std::string what =
-      a.choice("WHAT", {"gradients", "bits", "machine", "udev", "file", "training", "ledgers"});
+      a.choice("WHAT", {"gradients", "bits", "machine", "udev", "file", "training", "step", "ledgers"});
   if (what == "gradients") return check_gradients(a);
   if (what == "bits") return check_bits(a);
   if (what == "machine") return check_machine(a);
   if (what == "udev") return print_udev_rule(a);
   need(a, "FILE");
   if (what == "file") return check_file(a);
-  need(a, what == "training" ? "data" : "OTHER");
-  return what == "training" ? check_training(a) : check_ledgers(a);
+  need(a, what == "ledgers" ? "OTHER" : "data");
+  if (what == "ledgers") return check_ledgers(a);
+  if (what == "training") return check_training(a);
+  need(a, "at");
+  return check_step(a);
 }
 
 }  // namespace supertac

@@ -22,6 +22,7 @@ void Trace::note(const char* op, const Variable& y, std::span<const Variable* co
   TracedOp& traced =
       current->ops_.emplace_back(TracedOp{op, y, {}, settings != nullptr ? *settings : OpSettings{}, us});
   for (const Variable* x : inputs) traced.inputs.push_back(*x);
+  current->noted(traced);
   current->last_ = std::chrono::steady_clock::now();
 }
 

@@ -1,5 +1,5 @@
 // Trace: notes which ops ran, on what and with which settings, for those who compute the same in another way
-// (models/inference/prepared/prepared.h).
+// (models/inference/prepared/prepared.h) or let others do so (models/training/opened_step.h).
 #pragma once
 
 #include <chrono>
@@ -15,8 +15,11 @@ namespace supertac {
 /// What an op was told besides its inputs; each op gives record() what it has.
 struct OpSettings {
   kernels::ConvSettings conv{};      ///< convolutions
-  real negative_slope = 1;           ///< convolutions and linear layers
+  real negative_slope = 1;           ///< convolutions, linear layers, relu and leaky_relu
   Dim first = 0, run = 0, step = 0;  ///< take_runs
+  real factor = 1;                   ///< scale
+  real low = 0, high = 0;            ///< clamp
+  Tensor constant{};                 ///< sample_gaussian's noise, the target of ssim
 };
 
 struct TracedOp {
@@ -31,7 +34,7 @@ struct TracedOp {
 class Trace {
  public:
   Trace();
-  ~Trace();
+  virtual ~Trace();
   Trace(const Trace&) = delete;
   Trace& operator=(const Trace&) = delete;
 
@@ -40,6 +43,10 @@ class Trace {
   /// For record(): `y` was made.
   static void note(const char* op, const Variable& y, std::span<const Variable* const> inputs,
                    const OpSettings* settings);
+
+ protected:
+  /// An op was noted, whose gradient nobody has asked for yet.
+  virtual void noted(TracedOp&) {}
 
  private:
   std::vector<TracedOp> ops_;

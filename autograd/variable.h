@@ -68,6 +68,8 @@ class Variable {
 class Backward {
  public:
   explicit Backward(detail::Node& node) : node_(node) {}
+  /// Of y.
+  const detail::Node& node() const { return node_; }
   const Tensor& gy() const { return node_.grad; }
   const Tensor& y() const { return node_.value; }
   const Tensor& value(std::size_t input) const { return node_.inputs[input]->value; }

@@ -11,7 +11,7 @@ namespace supertac {
 static Variable rectify(const char* op, const Variable& x, real slope) {
   return elementwise(
       op, x, [f = kernels::Rectifier(slope)](real at) { return f(at); },
-      [slope](real gy, real, real y) { return y > 0 ? gy : slope * gy; });
+      [slope](real gy, real, real y) { return y > 0 ? gy : slope * gy; }, {.negative_slope = slope});
 }
 
 Variable relu(const Variable& x) { return rectify("relu", x, 0); }
@@ -43,7 +43,7 @@ Variable clamp(const Variable& x, real low, real high) {
     refuse("clamp", "low must not exceed high, got " + std::to_string(low) + " and " + std::to_string(high));
   return elementwise(
       "clamp", x, [=](real at) { return at < low ? low : (at > high ? high : at); },
-      [=](real gy, real at, real) { return at >= low && at <= high ? gy : 0; });
+      [=](real gy, real at, real) { return at >= low && at <= high ? gy : 0; }, {.low = low, .high = high});
 }
 
 }  // namespace supertac

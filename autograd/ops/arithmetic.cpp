@@ -33,7 +33,7 @@ Variable operator*(const Variable& a, const Variable& b) {
 Variable operator*(real factor, const Variable& x) {
   return elementwise(
       "scale", x, [factor](real at) { return factor * at; },
-      [factor](real gy, real, real) { return factor * gy; });
+      [factor](real gy, real, real) { return factor * gy; }, {.factor = factor});
 }
 
 Variable operator-(const Variable& a, const Variable& b) { return a + -1 * b; }

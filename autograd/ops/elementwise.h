@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "autograd/kernels/fast/each.h"
+#include "autograd/trace.h"
 #include "autograd/variable.h"
 
 namespace supertac {
@@ -33,13 +34,15 @@ void put_to_gradient(Backward& b, std::size_t input, Term term) {
 
 /// y[i] = value(x[i]);   gx[i] += gradient(gy[i], x[i], y[i])
 template <class Value, class Gradient>
-Variable elementwise(const char* op, const Variable& x, Value value, Gradient gradient) {
+Variable elementwise(const char* op, const Variable& x, Value value, Gradient gradient,
+                     const OpSettings& settings = {}) {
   Tensor y(x.shape());
   each(y.size(), [=, from = x.value().data(), to = y.data()](Dim i) { to[i] = value(from[i]); });
-  return record(op, std::move(y), {&x}, [=](Backward& b) {
+  const auto reverse = [=](Backward& b) {
     const real *gy = b.gy().data(), *from = b.value(0).data(), *to = b.y().data();
     add_to_gradient(b, 0, [=](Dim i) { return gradient(gy[i], from[i], to[i]); });
-  });
+  };
+  return record(op, std::move(y), {&x}, reverse, &settings);
 }
 
 }  // namespace supertac

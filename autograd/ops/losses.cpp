@@ -39,11 +39,13 @@ Variable ssim(const Variable& x, const Tensor& target) {
   }
   const kernels::ImageSizes sizes{x.dim(0), x.dim(1), x.dim(2)};
   const double value = kernels::ssim(sizes, x.value().data(), target.data());
-  return record("ssim", Tensor::full({}, static_cast<real>(value)), {&x}, [sizes, target](Backward& b) {
+  const auto reverse = [sizes, target](Backward& b) {
     if (Tensor* gx = b.grad_of(0)) {
       kernels::ssim_grad(sizes, b.gy().item(), b.value(0).data(), target.data(), gx->data());
     }
-  });
+  };
+  const OpSettings settings{.constant = target};
+  return record("ssim", Tensor::full({}, static_cast<real>(value)), {&x}, reverse, &settings);
 }
 
 // -log softmax(logits)[label] of one row of classes; `rest` becomes softmax(logits) - onehot(label), its

@@ -19,11 +19,13 @@ Variable sample_gaussian(const Variable& mean, const Variable& log_var, const Te
   each(z.size(), [m = mean.value().data(), v = log_var.value().data(), e = eps.data(), to = z.data()](Dim i) {
     to[i] = m[i] + exp_same_bits(v[i] / 2) * e[i];
   });
-  return record("sample_gaussian", z, {&mean, &log_var}, [](Backward& b) {
+  const auto reverse = [](Backward& b) {
     const real *gz = b.gy().data(), *sample = b.y().data(), *m = b.value(0).data();
     add_to_gradient(b, 0, [=](Dim i) { return gz[i]; });
     add_to_gradient(b, 1, [=](Dim i) { return gz[i] * (sample[i] - m[i]) / 2; });
-  });
+  };
+  const OpSettings settings{.constant = eps};
+  return record("sample_gaussian", z, {&mean, &log_var}, reverse, &settings);
 }
 
 // gmean = g mean / N     glog_var = g (exp(log_var) - 1) / (2 N)

@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kFormat = "supertac-ledger-1";
+constexpr const char* kFormat = "supertac-ledger-2";
 constexpr JsonLimits kLimits{.max_bytes = std::size_t{4} << 20};
 
 std::string chained(const std::string& before, const std::string& text) { return sha256(before + text); }
@@ -40,6 +40,8 @@ Ledger Ledger::read(const std::string& path) {
   try {
     std::getline(in, text);
     const Json header = parse_json_limited(text, kLimits);
+    if (header.at("format") == "supertac-ledger-1")
+      throw FileError(path, "has hashes of 64 bits, as version 0.1 wrote them; train again with --ledger N");
     if (header.at("format") != kFormat) throw FileError(path, "is no ledger of supertac-train --ledger");
     ledger.every = header.at("every").get<std::int64_t>();
     ledger.names = header.at("tensors").get<std::vector<std::string>>();
@@ -69,12 +71,11 @@ const LedgerLine* Ledger::at(std::int64_t step) const {
 }
 
 std::vector<std::string> hashes_of(const Trainer& trainer) {
-  constexpr std::size_t kDigits = 16;  // the chain has all of its own
   std::vector<std::string> hashes;
   trainer.for_each_tensor([&](const std::string&, std::span<const real> values) {
     Sha256 hash;
     hash.add(std::as_bytes(values));
-    hashes.push_back(hash.hex().substr(0, kDigits));
+    hashes.push_back(hash.hex());
   });
   return hashes;
 }
@@ -104,8 +105,10 @@ std::optional<LedgerLine> LedgerWriter::after_step() {
 }
 
 std::optional<LedgerDifference> difference(const Ledger& header, const LedgerLine& a, const LedgerLine& b) {
-  LedgerDifference d{
-      .after = a.step - header.every, .step = a.step, .what = {}, .batches = a.batches != b.batches};
+  LedgerDifference d{.after = (a.step - 1) / header.every * header.every,
+                     .step = a.step,
+                     .what = {},
+                     .batches = a.batches != b.batches};
   for (std::size_t i = 0; i < a.tensors.size() && d.what.empty(); ++i)
     if (a.tensors[i] != b.tensors[i]) d.what = header.names[i];
   if (d.what.empty() && !d.batches) return std::nullopt;

@@ -131,7 +131,7 @@ void Trainer::batch_of(std::int64_t step, std::span<std::uint32_t> out) const {
   batching_.batch(number / per_epoch, number % per_epoch, out);
 }
 
-StepReport Trainer::train_step(const std::function<bool()>& stop) {
+StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMicroBatch& around) {
   if (done())
     throw std::invalid_argument("train_step: all " + std::to_string(total_steps()) + " steps are done");
   announce_next();
@@ -140,7 +140,12 @@ StepReport Trainer::train_step(const std::function<bool()>& stop) {
 #pragma omp parallel for schedule(static, 1)
   for (std::size_t i = 0; i < micro_batches_.size(); ++i) {
     try {
-      run(micro_batches_[i]);
+      MicroBatch& micro_batch = micro_batches_[i];
+      if (!around) {
+        run(micro_batch);
+      } else {
+        around(i, {micro_batch.batch, *micro_batch_parameters_[i]}, [&] { run(micro_batch); });
+      }
     } catch (...) {  // an exception must not leave a thread
       micro_batches_[i].error = std::current_exception();
     }

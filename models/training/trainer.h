@@ -45,6 +45,15 @@ struct StepReport : LossTerms {
   bool stop = false;  ///< whether a process wishes to stop after this step
 };
 
+/// Stands around each micro-batch of a step, on its thread: must call `run`, which fills the batch and goes
+/// forward and backward. For those who look on (models/training/opened_step.h).
+struct MicroBatchView {
+  const Batch& batch;
+  const std::vector<Parameter>& parameters;  ///< the model's values under gradients of their own
+};
+using AroundMicroBatch =
+    std::function<void(std::size_t number, const MicroBatchView&, const std::function<void()>& run)>;
+
 class Trainer {
  public:
   /// `examples` must outlive the trainer. Throws std::invalid_argument for examples of another format than
@@ -70,7 +79,7 @@ class Trainer {
   /// One batch: forward, loss, backward, Adam. Throws TrainingStopped; the parameters are then still finite.
   /// `stop` is asked before the gradients are added up. With several processes throws as check_same(), which
   /// is called every 100 steps.
-  StepReport train_step(const std::function<bool()>& stop = {});
+  StepReport train_step(const std::function<bool()>& stop = {}, const AroundMicroBatch& around = {});
   /// Throws RanksError naming rank and tensor when the processes' parameters are not the same to the bit.
   void check_same() const;
 

@@ -12,6 +12,7 @@
 #include "data/recordings/recording.h"
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
+#include "io/numbers/sha256.h"
 #include "tests/apps/common/simulated_data.h"
 
 namespace supertac {
@@ -211,6 +212,97 @@ TEST_F(Audit, ALedgerThatWasChangedIsRefused) {
   const auto result = audit("told.safetensors", "1");
   EXPECT_EQ(result.code, 1);
   EXPECT_NE(result.error.find("the chain is broken"), std::string::npos) << result.error;
+}
+
+// Two trainings of the same recordings by recipes that differ in one number.
+TEST_F(Audit, TwoTrainingsPartAtAnOperator) {
+  ASSERT_EQ(train("first.safetensors").code, 0);
+  ASSERT_EQ(train("second.safetensors", {"--beta", "0.002"}).code, 0);
+  const auto compare = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"ledgers", path("first.run/ledger.jsonl"),
+                                   path("second.run/ledger.jsonl")};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_process("supertac-check", words);
+  };
+  const auto parted = compare({"--data", path("data"), "--out", path("parted.safetensors")});
+  EXPECT_EQ(parted.code, 1) << parted.error;
+  EXPECT_TRUE(std::regex_search(parted.out, std::regex("step 1, 0/[0-9]+\\.scale, the settings")))
+      << parted.out;
+  EXPECT_EQ(compare({}).code, 1);
+
+  // The same step of both, each opened for itself.
+  for (const std::string name : {"first", "second"})
+    ASSERT_EQ(run_process("supertac-check", {"step", path(name + ".safetensors"), "--data", path("data"),
+                                             "--at", "1", "--json", path(name + ".json")})
+                  .code,
+              0);
+  const auto opened = run_process("supertac-check", {"ledgers", path("first.json"), path("second.json")});
+  EXPECT_EQ(opened.code, 1);
+  EXPECT_NE(opened.out.find("scale, the settings"), std::string::npos) << opened.out;
+  const auto same = run_process("supertac-check", {"ledgers", path("first.json"), path("first.json")});
+  EXPECT_EQ(same.code, 0) << same.error;
+
+  // A training whose machine computed otherwise: from the states that it kept another line comes out here.
+  std::filesystem::copy(path("first.run"), path("faulty.run"), std::filesystem::copy_options::recursive);
+  std::filesystem::copy(path("second.run/ledger.jsonl"), path("faulty.run/ledger.jsonl"),
+                        std::filesystem::copy_options::overwrite_existing);
+  const auto faulty = run_process(
+      "supertac-check",
+      {"ledgers", path("first.run/ledger.jsonl"), path("faulty.run/ledger.jsonl"), "--data", path("data")});
+  EXPECT_EQ(faulty.code, 1);
+  EXPECT_NE(faulty.out.find("faulty.run/ledger.jsonl comes out otherwise here"), std::string::npos)
+      << faulty.out;
+  EXPECT_NE(faulty.out.find("open this step there, too"), std::string::npos) << faulty.out;
+}
+
+// Every operator of a step once more by NumPy, to the bit, and one of which a bit was changed.
+TEST_F(Audit, ARefereeComputesAStepAgain) {
+  ASSERT_EQ(train("judged.safetensors", {"--batch", "32"}).code, 0);
+  const auto open = [&](const std::string& name, const std::string& out) {
+    return run_process("supertac-check", {"step", path("judged.safetensors"), "--data", path("data"), "--at",
+                                          "3", "--operator", name, "--out", out});
+  };
+  EXPECT_EQ(open("9/", path("none.safetensors")).code, 2);
+  if (std::system(SUPERTAC_PYTHON " -c 'import numpy' 2>/dev/null") != 0)
+    GTEST_SKIP() << "there is no Debian Python with NumPy here";
+  const auto judge = [&](const std::string& file) {
+    const std::string command = SUPERTAC_PYTHON " " SUPERTAC_SOURCE "/examples/referee.py " + file + " > " +
+                                path("judged.txt") + " 2>&1";
+    return std::system(command.c_str());
+  };
+  for (const std::string name : {"0/", "7/", "sum/", "norm", "update/"}) {
+    const std::string file = path("judged_" + name.substr(0, 1) + ".safetensors");
+    const auto opened = open(name, file);
+    ASSERT_EQ(opened.code, 0) << opened.out << opened.error;
+    EXPECT_EQ(judge(file), 0) << bytes("judged.txt");
+    EXPECT_TRUE(bytes("judged.txt").ends_with(" 0 differ\n")) << bytes("judged.txt");
+  }
+  const SafetensorsFile file = SafetensorsFile::read(path("judged_0.safetensors"));
+  const auto operators = nlohmann::json::parse(file.metadata().at("operators"));
+  for (const auto& ran : operators) {
+    if (ran["op"] != "conv_transpose2d" || ran.contains("gy")) continue;
+    const std::string name = ran["outputs"][0];
+    std::vector<float> values = file.f32(name);
+    values[5] = std::nextafter(values[5], 1e9F);
+    Sha256 sum;
+    sum.add(std::as_bytes(std::span(values)));
+    const std::string changed = sum.hex() + name.substr(64);
+    std::vector<TensorToWrite> tensors{
+        {changed, "F32", file.tensors().at(name).shape, std::as_bytes(std::span(values))}};
+    for (const std::string input : ran["inputs"])
+      tensors.push_back({input, "F32", file.tensors().at(input).shape, file.bytes(input)});
+    nlohmann::json wrong = ran;
+    wrong["outputs"][0] = changed;
+    write_safetensors(path("wrong.safetensors"), {{"operators", nlohmann::json::array({wrong}).dump()}},
+                      tensors);
+  }
+  EXPECT_NE(judge(path("wrong.safetensors")), 0);
+  EXPECT_NE(bytes("judged.txt").find("(conv_transpose2d), output 0: 1 of "), std::string::npos)
+      << bytes("judged.txt");
+  EXPECT_NE(bytes("judged.txt").find("first [0, 0, 0, 5]"), std::string::npos) << bytes("judged.txt");
+  const std::string command = SUPERTAC_PYTHON " " SUPERTAC_SOURCE "/examples/verify_ledger.py " +
+                              path("judged.run") + " > " + path("verified.txt");
+  EXPECT_EQ(std::system(command.c_str()), 0) << bytes("verified.txt");
 }
 
 // Every step from volts to pixels, once more by NumPy; without it there is nothing to compare with.

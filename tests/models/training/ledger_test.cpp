@@ -19,7 +19,7 @@ struct Entry {
 std::string ledger_of(const std::vector<Entry>& entries) {
   using Json = nlohmann::ordered_json;
   const std::string header =
-      Json{{"format", "supertac-ledger-1"}, {"every", 5}, {"tensors", {"a", "b"}}}.dump();
+      Json{{"format", "supertac-ledger-2"}, {"every", 5}, {"tensors", {"a", "b"}}}.dump();
   std::string file = header + "\n", chain = sha256(header);
   std::int64_t step = 0;
   for (const Entry& e : entries) {

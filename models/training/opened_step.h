@@ -1,0 +1,56 @@
+// A step of a training, opened: every operator that ran, forward and in reverse, with the SHA-256 of all that
+// went into it and came out, from the state before the step to the state behind it. So two trainings that
+// should be the same can be compared down to the operator where they part, and whoever doubts an operator
+// computes this one alone again.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "autograd/trace.h"
+#include "models/training/trainer.h"
+
+namespace supertac {
+
+/// What docs/audit.md calls the settings of an operator.
+nlohmann::ordered_json operator_settings(const TracedOp& op);
+
+struct OpenedStep {
+  std::int64_t step = 0;  ///< from 1
+  /// In the order in which they ran; docs/audit.md has their fields.
+  nlohmann::ordered_json operators;
+  /// Those that were to be kept, by what the operators call them: SHA-256 and shape.
+  std::map<std::string, Tensor> arrays;
+};
+
+struct OpeningOptions {
+  /// The arrays of the operators whose name begins so are kept; nothing: none are.
+  std::optional<std::string> keep = {};
+  /// Sees each result (output `index` of the operator `name`) before it is hashed and used, and may change
+  /// it: so tests plant what is to be found. Called by several threads.
+  std::function<void(const std::string& name, std::size_t index, const TracedOp& op, Tensor& result)> touch =
+      {};
+};
+
+/// Makes the next step of this trainer, which must train in one process. Throws as Trainer::train_step().
+OpenedStep open_step(Trainer& trainer, const OpeningOptions& options = {});
+
+/// The first entry whose bits differ; nothing where none do, or the sizes differ.
+std::optional<Dim> first_different_entry(const Tensor& one, const Tensor& other);
+
+/// The first operator in which two openings of the same step differ.
+struct OperatorDifference {
+  std::string name, op;
+  /// "output 0", "input 1" where an input differs that no operator made, "the settings".
+  std::string what;
+  std::string one, other;  ///< what they call the arrays, or the settings
+};
+/// Nothing when all is the same. Throws std::invalid_argument when they have other operators: of another
+/// network.
+std::optional<OperatorDifference> first_difference(const nlohmann::ordered_json& one,
+                                                   const nlohmann::ordered_json& other);
+
+}  // namespace supertac
