@@ -163,7 +163,18 @@ RecorderReport collect(const Arguments& arguments, RecorderSettings settings, co
     progress.update(millimetres_at(settings.plan, leg, at), live_text(at, counters));
     if (page) page->update(leg, at, counters);
   };
-  return record_marked(std::move(board), std::move(printer), settings, mark);
+  try {
+    RecorderReport report = record_marked(std::move(board), std::move(printer), settings, mark);
+    const bool complete = report.outcome.complete;
+    const std::string passes = std::to_string(report.outcome.passes_done) + " passes";
+    if (page)
+      page->end(complete ? "done: " + passes : "incomplete after " + passes + "; " + report.outcome.note,
+                !complete);
+    return report;
+  } catch (const std::exception& error) {
+    if (page) page->end(error.what(), true);
+    throw;
+  }
 }
 
 /// Recordings, quality report and --json of what was collected, complete or not. Returns what it comes to.

@@ -151,12 +151,14 @@ int run(Arguments& a) {
       (drawn ? "; a picture needs " + format(stream.window_s(), 2) + " s of signal" : "; the array itself"));
   if (!stream.url().empty()) a.note("live page: " + stream.url());
   std::exception_ptr error;
+  std::string failure;
   try {
     stream.run();
-  } catch (...) {
+  } catch (const std::exception& thrown) {
     error = std::current_exception();  // what was seen before is kept
+    failure = thrown.what();
   }
-  stream.finish();
+  stream.finish(failure);
   if (settings.out.path == "-")
     a.note(stream.summary());
   else

@@ -73,7 +73,7 @@ def model_component(path, info):
                 "inputs": [{"format": "volts of a tactile array, a window of time"}],
                 "outputs": [{"format": "heights of the surface under the array, 0 to 1"}]},
             "considerations": {"technicalLimitations": [
-                "Draws well what it was trained on; a texture it never felt it may draw as one that it knows.",
+                "Draws well what it was trained on; an unseen texture may be drawn as one that it knows.",
                 "A picture is only as good as the position of the recordings that it learnt from."]}},
         "properties": [{"name": f"supertac:{key}", "value": text} for key, text in sorted(said.items())]}
 

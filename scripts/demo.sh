@@ -2,9 +2,14 @@
 # From nothing to super-resolved pictures: installs what is missing, builds, simulates, trains, evaluates.
 # Takes about six minutes on two cores. Everything it makes is in out/demo; of the programs it builds those it needs, and
 # scripts/test.sh or `cmake --build build` goes on from there.
+#   scripts/demo.sh [--no-install]     with --no-install it ends where a package is missing, and says which
 set -eu
 cd "$(dirname "$0")/.."
-scripts/setup.sh
+case "$*" in
+  "" | --no-install) ;;
+  *) echo "demo.sh: expected no argument or --no-install, found: $*" >&2; exit 2 ;;
+esac
+scripts/setup.sh "$@"
 cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DSUPERTAC_QUICK_BUILD=ON -DSUPERTAC_TESTS=OFF >/dev/null
 cmake --build build --target supertac-simulate supertac-train supertac-evaluate supertac-info
 bin=build/bin

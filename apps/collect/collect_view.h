@@ -23,6 +23,8 @@ class CollectView {
   /// Never waits.
   void update(const Leg& leg, const Point3& at, const BoardCounters& board);
   std::string url() const { return server_.url(); }
+  /// As WebServer.
+  void end(const std::string& outcome, bool failed) { server_.end(outcome, failed); }
 
  private:
   struct State {

@@ -53,7 +53,7 @@ std::string by_method(const nlohmann::ordered_json& result) {
   std::string rows = method_row("network", result, result["latency"]["network"]);
   for (const auto& [name, scores] : result["baselines"].items())
     rows += method_row(name, scores, result["latency"][name]);
-  return page_section("Scores beside the baselines", "in contact: the truth has a pixel that is not 0",
+  return page_section("Scores beside the baselines", "contact windows: some texture lies under the array",
                       page_table({"method", "contact SSIM", "PSNR dB", "position mm", "all SSIM", "PSNR dB",
                                   "one picture, us"},
                                  rows)) +
@@ -70,7 +70,8 @@ std::string by_zone(const nlohmann::ordered_json& result) {
             cell_of(m.value("miss_rate", nlohmann::ordered_json()), 2, 100) + "</tr>";
   }
   return page_section("Contact, flat plate, air",
-                      "ghosts show what is not there, misses show nothing of what is",
+                      "ghosts: pictures that show a texture where the plate is flat; misses: pictures that "
+                      "show nothing of one",
                       page_table({"zone", "windows", "SSIM", "PSNR dB", "ghosts %", "misses %"}, rows));
 }
 
@@ -82,7 +83,7 @@ std::string by_way(const nlohmann::ordered_json& felt) {
   }
   return page_section(
       "By way since the first contact",
-      "what a texture is cannot be known before two of its elements; windows in contact from there on",
+      "a texture cannot be known before its second element is under the array; contact windows",
       chart_svg("Contact SSIM", {.label = "slid over the texture, mm", .least = 0},
                 {.label = "SSIM", .most = 1}, {series}));
 }

@@ -9,7 +9,8 @@ RawArray::RawArray(const SensorSource& source)
     : array_(source.array()),
       direction_(source.signal_scale().rises() ? 1 : -1),
       period_s_(source.period_s()),
-      top_(kLeastTop * std::abs(source.signal_scale().span)),
+      least_top_(kLeastTop * std::abs(source.signal_scale().span)),
+      top_(least_top_),
       rest_(array_.signals()),
       newest_mean_(array_.signals()),
       newest_(array_.signals()) {}
@@ -26,6 +27,7 @@ void RawArray::push(std::span<const float> signals) {
     if (settling) rest_[s] = newest_mean_[s];
   }
   if (settling) return;
+  top_ = std::max(least_top_, top_ * (1 - std::min(1.0, period_s_ / kForgetS)));
   for (std::size_t k = 0; k < static_cast<std::size_t>(array_.taxels()); ++k)
     top_ = std::max(top_, pressed(k));
 }

@@ -7,8 +7,7 @@
 
 namespace supertac {
 
-/// The array as it is, without a model: how far each taxel is from its own rest, on a scale that grows with
-/// what is seen.
+/// The array as it is: how far each taxel is from its own rest, on a scale that follows what is seen.
 class RawArray {
  public:
   explicit RawArray(const SensorSource& source);
@@ -18,15 +17,16 @@ class RawArray {
   /// [rows][columns] in [0,1]: the mean of a taxel's channels, as far in the pressed direction as top() is.
   /// Three axes of a field have no direction: there it is the length of the change.
   std::vector<float> taxels() const;
-  /// What 1 stands for, in the sensor's unit: the most that was seen, and a twentieth of the stated range.
+  /// What 1 stands for, in the sensor's unit: the most that was seen, which is forgotten within kForgetS; at
+  /// least a twentieth of the stated range.
   double top() const { return top_; }
 
  private:
-  static constexpr double kRestS = 0.2, kLeastTop = 0.05;
+  static constexpr double kRestS = 0.2, kForgetS = 20, kLeastTop = 0.05;
   double pressed(std::size_t taxel) const;
 
   TaxelArray array_;
-  double direction_, period_s_, top_;
+  double direction_, period_s_, least_top_, top_;
   std::size_t frames_ = 0;
   std::vector<double> rest_, newest_mean_;
   std::vector<float> newest_;

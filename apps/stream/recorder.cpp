@@ -9,24 +9,25 @@
 namespace supertac {
 namespace {
 
-std::string name_of_now(const char* kind) {
+std::string name_of_now() {
   const std::time_t now = std::time(nullptr);
   std::tm local{};
   localtime_r(&now, &local);
   char text[64];
-  const std::size_t size = std::strftime(text, sizeof text, "_%Y%m%d_%H%M%S.safetensors", &local);
-  return kind + std::string(text, size);
+  const std::size_t size = std::strftime(text, sizeof text, "recording_%Y%m%d_%H%M%S.safetensors", &local);
+  return {text, size};
 }
 
 }  // namespace
 
-Recorder::~Recorder() {
+std::string Recorder::finish() {
   stop();
   if (writer_.joinable()) writer_.join();
+  return status().said;
 }
 
 std::string Recorder::start() {
-  const std::string name = name_of_now(format_.image.pixels() > 0 ? "pictures" : "recording");
+  const std::string name = name_of_now();
   try {
     // Two recordings may begin within a second.
     const OutputPath output(name, [this](const std::string& line) { taken_ = line; });

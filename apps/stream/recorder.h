@@ -14,20 +14,21 @@
 
 namespace supertac {
 
-/// Logs of pictures, or of signals where there are none, in the current folder, started and stopped from one
-/// thread and fed from another, which never waits for a file to be completed.
+/// Recordings of the signals in the current folder, which train as those of --record do, started and stopped
+/// from one thread and fed from another, which never waits for a file to be completed.
 class Recorder {
  public:
   Recorder(const PictureFormat& format, std::map<std::string, std::string> metadata)
       : format_(format), metadata_(std::move(metadata)) {}
-  /// Stops; waits until the last file is written.
-  ~Recorder();
+  ~Recorder() { finish(); }
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
   // These answer with a line for people.
   std::string start();
   std::string stop();
+  /// Stops, and waits until the last file is written; empty when there was none.
+  std::string finish();
   /// Of the stream's thread: nothing unless it is recording. A recording that cannot be kept ends.
   void add(const Seen& seen);
 

@@ -38,7 +38,7 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
       figures_s_(monotonic_seconds()) {
   state_.array = source.array();
   state_.scale = maker_ ? maker_->image().height / state_.array.rows : 1;
-  state_.unit = source.signal_scale().unit;
+  state_.unit = source.signal_scale().unit, state_.draws = maker_ != nullptr;
   const PictureFormat signals{.signals = source.array().signals(), .image = {0, 0}};
   const PictureFormat format = maker_ ? maker_->format() : signals;
   describe_recording();
@@ -66,11 +66,11 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
                                image.text() + "; give a classifier that was trained with this model");
   }
   if (!settings.web) return;
-  recorder_ = std::make_unique<Recorder>(format, maker_ ? settings_.metadata : recording_);
+  recorder_ = std::make_unique<Recorder>(signals, recording_);
   web_ = std::make_unique<WebView>(
       *settings.web,
       WebSource{settings.badge, settings.source, source.array(), state_.scale, format.half_widths,
-                classifier_.has_value(), maker_ ? "" : state_.unit, source.silent()},
+                classifier_.has_value(), state_.unit, state_.draws, source.silent()},
       *recorder_);
 }
 
@@ -102,10 +102,24 @@ void Stream::run() {
   view_.reset();
 }
 
-void Stream::finish() {
+void Stream::finish(const std::string& failure) {
   view_.reset();
-  web_.reset();
-  recorder_.reset();
+  const auto tell = [this](const std::string& outcome, bool failed) {
+    const std::string kept = recorder_ ? recorder_->finish() : "";
+    if (web_) web_->end(outcome + (kept.empty() ? "" : "; " + kept), failed);
+    web_.reset();
+    recorder_.reset();
+  };
+  try {
+    complete();
+  } catch (const std::exception& error) {
+    tell(error.what(), true);
+    throw;
+  }
+  tell(failure.empty() ? "done: " + summary() : failure, !failure.empty());
+}
+
+void Stream::complete() {
   lines_lost_ = (udp_ ? udp_->lost() : 0) + (pipe_ ? pipe_->lost() : 0);
   udp_.reset();
   pipe_.reset();
@@ -161,7 +175,7 @@ bool Stream::take(SensorFrame frame) {
   raw_.push(frame.volts);
   if (rezero) raw_.rezero();
   if (rezero && maker_) maker_->rezero();
-  if (record_ || !maker_) keep_raw(frame);
+  if (record_ || recorder_ || !maker_) keep_raw(frame);
   if (!maker_) return true;
   maker_->push(frame);
   if (source_.live() && monotonic_seconds() - frame.arrived_s > kMostLateS) {
@@ -182,6 +196,7 @@ void Stream::keep_raw(const SensorFrame& frame) {
   seen.number = frames_ - 1, seen.time_s = frame.time_s - first_s_, seen.volts = frame.volts;
   seen.wall_s = frame.wall_s;
   if (record_) record_->add(seen);
+  if (recorder_) recorder_->add(seen);
   if (maker_) return;
   latency_.add(monotonic_seconds() - frame.arrived_s);
   output(seen);
@@ -191,7 +206,6 @@ void Stream::keep_raw(const SensorFrame& frame) {
 
 void Stream::output(const Seen& seen) {
   if (log_) log_->add(seen);
-  if (recorder_) recorder_->add(seen);
   if (mcap_) mcap_->add(seen.time_s, seen.wall_s, seen.volts, seen.picture, seen.half_widths);
   if (!udp_ && !pipe_) return;
   std::string line = picture_line(seen, state_.unlike_training, about_lines_);
@@ -238,10 +252,8 @@ void Stream::show() {
   if (maker_) {
     state_.half_widths.assign(maker_->half_widths().begin(), maker_->half_widths().end());
     state_.distance = maker_->distance();
-    state_.taxels = mean_of_channels(state_.array, maker_->window().newest());
-  } else if (frames_ > 0) {
-    state_.taxels = raw_.taxels(), state_.top = raw_.top();
   }
+  if (frames_ > 0) state_.taxels = raw_.taxels(), state_.top = raw_.top();
   if (classifier_ && now - named_s_ >= kNameEveryS) named_s_ = now, name_texture();
   if (view_) view_->update(state_);
   if (web_) web_->update(state_);

@@ -49,8 +49,9 @@ class Stream {
   /// Until the source ends, `seconds` are over, or a signal comes. What is recorded passes as fast as it
   /// happened where somebody watches, else as fast as it can.
   void run();
-  /// Writes the file and ends the source.
-  void finish();
+  /// Writes the files, ends the source, and tells the page what became of the run: `failure`, or that it is
+  /// done when that is empty.
+  void finish(const std::string& failure = {});
 
   std::uint64_t pictures() const { return latency_.count(); }
   /// Of the live page; empty without.
@@ -67,6 +68,7 @@ class Stream {
   void keep(const SensorFrame& frame, std::span<const float> picture);
   void keep_raw(const SensorFrame& frame);
   void output(const Seen& seen);
+  void complete();
   void describe_recording();
   void show();
   void name_texture();

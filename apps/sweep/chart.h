@@ -7,9 +7,8 @@
 
 namespace supertac {
 
-/// A page with accuracy against latency, every configuration a point, the Pareto front a line with names; and
-/// the table of the front. It loads nothing from elsewhere.
-std::string sweep_page(const std::vector<Configuration>& all, const std::string& command,
-                       const std::string& commit);
+/// A page with accuracy against latency, every configuration a point and the Pareto front a line; a heat map
+/// where two settings were swept; and the table of all. It loads nothing from elsewhere.
+std::string sweep_page(std::vector<Configuration> all, const std::string& command, const std::string& commit);
 
 }  // namespace supertac

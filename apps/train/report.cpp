@@ -1,11 +1,13 @@
 #include "apps/train/report.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
 #include "apps/train/run_folder.h"
 #include "apps/web/chart.h"
 #include "apps/web/result_page.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {
@@ -52,6 +54,31 @@ constexpr Other kOthers[] = {
     {"PSNR of test pictures in contact, dB", [](const LogLine& l) { return l.test_psnr_db; }, false},
     {"Gradient norm before clipping", [](const LogLine& l) { return std::optional(l.gradient_norm); }, true}};
 
+// {"model": {"latent": 10}} as the rows model latent | 10; lists of words or numbers on one line.
+void add_facts(std::vector<std::pair<std::string, std::string>>& facts, const std::string& name,
+               const nlohmann::ordered_json& value) {
+  const auto words = [](std::string text) {
+    if (text == "spread") return std::string("predicted error");  // the key of old files
+    std::ranges::replace(text, '_', ' ');
+    return text;
+  };
+  if (value.is_object()) {
+    for (const auto& [key, part] : value.items())
+      add_facts(facts, (name.empty() ? "" : name + " ") + words(key), part);
+  } else if (value.is_array()) {
+    std::string list;
+    for (const auto& part : value)
+      list += (list.empty() ? "" : ", ") + (part.is_string() ? part.get<std::string>() : part.dump());
+    facts.emplace_back(name, list);
+  } else if (value.is_boolean()) {
+    facts.emplace_back(name, value.get<bool>() ? "yes" : "no");
+  } else {
+    facts.emplace_back(name, value.is_string()         ? value.get<std::string>()
+                             : value.is_number_float() ? format(value.get<double>())
+                                                       : value.dump());
+  }
+}
+
 }  // namespace
 
 std::string report_page(const nlohmann::ordered_json& settings, const std::vector<LogLine>& lines) {
@@ -60,8 +87,10 @@ std::string report_page(const nlohmann::ordered_json& settings, const std::vecto
     others += chart_svg(other.title, {.label = "step"}, {.label = "", .logarithmic = other.logarithmic},
                         {curve("", lines, other.value)});
   std::vector<std::pair<std::string, std::string>> facts;
-  for (const auto& [name, value] : settings.items())
-    facts.emplace_back(name, value.is_string() ? value.get<std::string>() : value.dump(2));
+  nlohmann::ordered_json once = settings;
+  if (once.contains("provenance"))
+    for (const auto& [name, value] : settings.items()) once["provenance"].erase(name);
+  add_facts(facts, "", once);
   return result_page(
       "SuperTac training",
       page_section("Learning curves",

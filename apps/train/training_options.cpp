@@ -44,7 +44,7 @@ void declare_window_training(Arguments& a) {
   a.option(
       "random-plates", "N",
       "also train on N simulated passes, each over a random plate (beside recordings of a real finger with a "
-      "finger of its own), so that plates are felt that were never trained on",
+      "finger of its own), for plates that the network has not seen",
       "0");
   a.option("leave-out", "A,B,...",
            "with --split texture: the plates that are tested (default: one drawn with the seed)");

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "apps/web/result_page.h"
+#include "io/images/images.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
@@ -47,6 +48,46 @@ std::string text(double x, double y, const char* anchor, const std::string& word
 std::string path(double x, double y, const char* way) {
   return "<path d=\"M" + format(x, 1) + " " + format(y, 1) + way + "\" stroke=\"var(--line)\"/>";
 }
+
+/// A rectangle of the chart.
+struct Box {
+  double left, top, right, bottom;
+  bool meets(const Box& o) const {
+    return left < o.right && o.left < right && top < o.bottom && o.top < bottom;
+  }
+};
+
+/// Places labels beside their points, off all points and off each other where there is room.
+class Labels {
+ public:
+  void keep_off(double x, double y) { taken_.push_back({x - 4, y - 4, x + 4, y + 4}); }
+  void keep_off_line(std::pair<double, double> from, std::pair<double, double> to) {
+    const double steps = std::ceil(std::hypot(to.first - from.first, to.second - from.second) / 5);
+    for (double i = 1; i < steps; ++i)
+      keep_off(std::lerp(from.first, to.first, i / steps), std::lerp(from.second, to.second, i / steps));
+  }
+  std::string add(double x, double y, const std::string& words) {
+    const double width = kLetter * static_cast<double>(words.size());
+    Box best{};
+    for (const double down : {-4.0, 13.0, 4.0, -16.0, 25.0, -28.0, 37.0, -40.0}) {
+      for (const double left : {x + 7, x - 7 - width}) {
+        const Box box{left, y + down - 10, left + width, y + down + 2};
+        if (best.right == 0) best = box;
+        if (box.left < kLeft || box.right > kWidth || box.top < kTop - 12 || box.bottom > kHeight - kBottom)
+          continue;
+        if (std::ranges::any_of(taken_, [&](const Box& b) { return b.meets(box); })) continue;
+        taken_.push_back(box);
+        return text(left, y + down, "start", words);
+      }
+    }
+    taken_.push_back(best);
+    return text(best.left, best.bottom - 2, "start", words);
+  }
+
+ private:
+  static constexpr double kLetter = 7;
+  std::vector<Box> taken_;
+};
 
 // digits 10^exponent as the number that is written so: 3 and -1 give 0.3, which 3 * 0.1 is not.
 double shifted(double digits, double exponent) {
@@ -123,22 +164,31 @@ std::string chart_svg(const std::string& title, const ChartAxis& x, const ChartA
                     "\" role=\"img\" aria-label=\"" + escaped(title) + "\">" +
                     text(kLeft, 13, "start", title, " class=\"title\"") + axes(x, y, across, up);
   double legend = kLeft;
+  const auto place = [&](const std::pair<double, double>& point) {
+    return std::pair(kLeft + (kWidth - kLeft - kRight) * across(point.first),
+                     kHeight - kBottom - (kHeight - kTop - kBottom) * up(point.second));
+  };
+  Labels labels;
+  for (const ChartSeries& s : series) {
+    const Points some = s.labels.empty() ? Points() : shown(x, y, s.points);
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      const auto at = place(some[k]);
+      labels.keep_off(at.first, at.second);
+      if (s.line && k > 0) labels.keep_off_line(place(some[k - 1]), at);
+    }
+  }
   for (std::size_t i = 0; i < series.size(); ++i) {
     const ChartSeries& s = series[i];
     const std::string colour = kColours[i % std::size(kColours)];
     std::string line, marks;
     for (std::size_t k = 0; k < s.points.size(); ++k) {
       if (shown(x, y, {s.points[k]}).empty()) continue;
-      const double px = kLeft + (kWidth - kLeft - kRight) * across(s.points[k].first);
-      const double py = kHeight - kBottom - (kHeight - kTop - kBottom) * up(s.points[k].second);
+      const auto [px, py] = place(s.points[k]);
       line += format(px, 1) + "," + format(py, 1) + " ";
       if (s.dots)
         marks += "<circle cx=\"" + format(px, 1) + "\" cy=\"" + format(py, 1) + "\" r=\"3.5\" fill=\"" +
                  colour + "\"/>";
-      const bool at_the_right = px > 0.6 * kWidth;
-      if (k < s.labels.size())
-        marks += text(px + (at_the_right ? -7 : 7), py + (k % 2 == 0 ? -5 : 14),
-                      at_the_right ? "end" : "start", s.labels[k]);
+      if (k < s.labels.size()) marks += labels.add(px, py, s.labels[k]);
     }
     if (s.line)
       svg +=
@@ -147,9 +197,44 @@ std::string chart_svg(const std::string& title, const ChartAxis& x, const ChartA
     if (series.size() == 1) continue;
     svg += "<rect x=\"" + format(legend, 1) + "\" y=\"22\" width=\"14\" height=\"4\" fill=\"" + colour +
            "\"/>" + text(legend + 19, 28, "start", s.name);
-    legend += 34 + 6.3 * static_cast<double>(s.name.size());
+    legend += 34 + 7 * static_cast<double>(s.name.size());
   }
   return svg + "</svg>\n";
+}
+
+std::string heat_map_svg(const std::string& title, const HeatMapAxis& x, const HeatMapAxis& y,
+                         const std::vector<double>& values) {
+  double low = INFINITY, high = -INFINITY;
+  for (const double v : values)
+    if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
+  if (!(low <= high)) return {};
+  constexpr double kCell = 34;
+  const double width = (kWidth - kLeft - kRight) / static_cast<double>(x.names.size());
+  const double height = kTop + kCell * static_cast<double>(y.names.size()) + kBottom;
+  std::string svg = "<svg viewBox=\"0 0 " + format(kWidth) + " " + format(height) +
+                    "\" role=\"img\" aria-label=\"" + escaped(title) + "\">" +
+                    text(kLeft, 13, "start", title, " class=\"title\"");
+  for (std::size_t r = 0; r < y.names.size(); ++r) {
+    const double top = height - kBottom - kCell * static_cast<double>(r + 1);
+    svg += text(kLeft - 6, top + kCell / 2 + 4, "end", y.names[r]);
+    for (std::size_t c = 0; c < x.names.size(); ++c) {
+      const double value = values[r * x.names.size() + c], left = kLeft + width * static_cast<double>(c);
+      if (!std::isfinite(value)) continue;
+      const auto share = static_cast<float>(high > low ? (value - low) / (high - low) : 1);
+      const Rgb colour = colour_of(share);
+      svg += "<rect x=\"" + format(left, 1) + "\" y=\"" + format(top, 1) + "\" width=\"" + format(width, 1) +
+             "\" height=\"" + format(kCell, 1) + "\" fill=\"rgb(" + std::to_string(colour[0]) + "," +
+             std::to_string(colour[1]) + "," + std::to_string(colour[2]) + ")\"/>" +
+             text(left + width / 2, top + kCell / 2 + 4, "middle", format(value, 3),
+                  share > 0.55F ? " style=\"fill:#111\"" : " style=\"fill:#fff\"");
+    }
+  }
+  for (std::size_t c = 0; c < x.names.size(); ++c)
+    svg += text(kLeft + width * (static_cast<double>(c) + 0.5), height - kBottom + 16, "middle", x.names[c]);
+  return svg + text(kLeft + (kWidth - kLeft - kRight) / 2, height - 6, "middle", x.label) +
+         text(0, 0, "middle", y.label,
+              " transform=\"translate(12 " + format((kTop + height - kBottom) / 2, 1) + ") rotate(-90)\"") +
+         "</svg>\n";
 }
 
 }  // namespace supertac

@@ -22,11 +22,23 @@ struct ChartSeries {
   std::vector<std::string> labels = {};  ///< beside the points; empty, or one for each
 };
 
-/// A chart with a title, its legend under the title and off the points, and round numbers on axes that hold
-/// the data and no more. Points that are not finite, or not positive on a logarithmic axis, are left out;
-/// empty when none is left. At most four series have colours of their own.
+/// A chart with a title, its legend under the title and off the points, labels that do not overprint while
+/// there is room, and round numbers on axes that hold the data and no more. Points that are not finite, or
+/// not positive on a logarithmic axis, are left out; empty when none is left. At most four series have
+/// colours of their own.
 std::string chart_svg(const std::string& title, const ChartAxis& x, const ChartAxis& y,
                       const std::vector<ChartSeries>& series);
+
+struct HeatMapAxis {
+  std::string label;
+  std::vector<std::string> names;
+};
+
+/// A cell for each pair of names, its value in it and its colour between the least and the most of all;
+/// values are [y][x], from the bottom. One that is not finite leaves its cell empty; without any there is no
+/// chart.
+std::string heat_map_svg(const std::string& title, const HeatMapAxis& x, const HeatMapAxis& y,
+                         const std::vector<double>& values);
 
 /// Round numbers from `low` to `high`, at most some eight: what an axis is labelled with.
 std::vector<double> round_numbers(double low, double high, bool logarithmic);

@@ -15,6 +15,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
@@ -270,6 +271,12 @@ WebServer::~WebServer() {
 
 std::string WebServer::url() const { return "http://" + address_.bind + ":" + std::to_string(address_.port); }
 
+void WebServer::end(const std::string& outcome, bool failed) {
+  const nlohmann::json event = {{"outcome", outcome}, {"failed", failed}};
+  farewell_ =
+      "event: end\ndata: " + event.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + "\n\n";
+}
+
 std::string WebServer::first_event() const {
   std::string hello = site_.hello();
   hello.insert(1, "\"token\":\"" + token_ + "\",");
@@ -330,8 +337,22 @@ void WebServer::run() {
     if (MHD_run_wait(daemon_, std::max(1, wait_ms)) == MHD_NO) break;
     make_room();
   }
+  if (!farewell_.empty()) say_farewell();
   for (Reader* reader : std::exchange(waiting_, {})) MHD_resume_connection(reader->connection);
   MHD_stop_daemon(daemon_);
+}
+
+// A page that has taken the farewell waits for more.
+void WebServer::say_farewell() {
+  newest_ = farewell_;
+  ++number_;
+  for (Reader* reader : std::exchange(waiting_, {})) MHD_resume_connection(reader->connection);
+  const auto readers = [this] {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(peers_, [](const Peer& p) { return p.reader != nullptr; }));
+  };
+  for (const double until = seconds_now() + kFarewellS; waiting_.size() < readers() && seconds_now() < until;)
+    if (MHD_run_wait(daemon_, 10) == MHD_NO) return;
 }
 
 }  // namespace supertac

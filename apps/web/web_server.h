@@ -47,7 +47,7 @@ struct WebAddress {
 class WebServer {
  public:
   static constexpr std::size_t kMostPeers = 200;
-  static constexpr double kMostEventsPerS = 30;
+  static constexpr double kMostEventsPerS = 30, kFarewellS = 0.5;
 
   /// Throws std::runtime_error when the address cannot be had.
   WebServer(const WebAddress& address, WebSite site);
@@ -57,6 +57,9 @@ class WebServer {
 
   /// "http://127.0.0.1:8080"
   std::string url() const;
+  /// What became of the run: the last that pages hear, when this is destroyed, which waits kFarewellS at most
+  /// until all have it. At most once.
+  void end(const std::string& outcome, bool failed);
 
  private:
   friend struct WebRequest;
@@ -66,13 +69,15 @@ class WebServer {
   void run();
   void publish();
   void make_room();
+  void say_farewell();
   std::string first_event() const;
 
   WebAddress address_;
   WebSite site_;
   std::string token_;
   MHD_Daemon* daemon_ = nullptr;
-  std::string newest_;  // as it is sent; empty before the first
+  std::string newest_;    // as it is sent; empty before the first
+  std::string farewell_;  // likewise; read when stop_ is set
   std::uint64_t number_ = 0;
   double told_s_ = 0;
   std::list<Peer> peers_;  // in the order of their coming

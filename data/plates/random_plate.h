@@ -9,8 +9,8 @@
 
 namespace supertac {
 
-/// The plate called "random<number>": what a generalist is trained and tested on. Kinds, layouts and sizes
-/// are drawn from the number alone:
+/// The plate called "random<number>": what networks for unseen plates are trained and tested on. Kinds,
+/// layouts and sizes are drawn from the number alone:
 ///   plain                                                            1 in 16
 ///   equal elements in rows (ridges, bumps, blobs, waves), or two such textures one behind the other
 ///   lines with a pitch of their own each, some oblique; single lines; scattered round elements; smooth hills

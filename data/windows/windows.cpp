@@ -72,6 +72,7 @@ std::string WindowCounts::summary() const {
   };
   return std::to_string(windows) + " windows from " + std::to_string(frames) + " frames of " +
          std::to_string(recordings) + " recordings" +
+         (added > 0 ? " and " + std::to_string(added) + " simulated passes" : "") +
          part(unreliable, "in passes with unreliable registration") + part(no_position, "without position") +
          part(lifting, "while the finger was lifted or lowered") +
          part(too_early, "too close to the start of a pass or to a gap") +
@@ -194,7 +195,7 @@ void WindowSet::add(const Recording& recording, const std::string& folder, const
   }
   pass.windows = size() - pass.first_window;
   if (pass.windows > 0) store(recording, track, stored);
-  ++counts_.recordings;
+  ++(use.augmentable ? counts_.recordings : counts_.added);
   counts_.frames += track.frames();
   counts_.held += track.held;
   if (settings_.timesteps > 1) counts_.gaps += track.gaps;

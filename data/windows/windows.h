@@ -31,7 +31,8 @@ struct WindowSettings {
 
 /// Where the frames of the recordings went: frames is the sum of all that follow down to windows.
 struct WindowCounts {
-  std::size_t recordings = 0, frames = 0;
+  std::size_t recordings = 0, added = 0;  ///< files, and passes that training simulates beside them
+  std::size_t frames = 0;                 ///< of both
   std::size_t unreliable = 0;   ///< of passes that registration flagged (metadata registration_reliable = no)
   std::size_t no_position = 0;  ///< position unknown: no truth
   std::size_t lifting = 0;      ///< between the plate and the air: what is felt there has no truth

@@ -10,8 +10,8 @@ namespace supertac {
 
 inline constexpr int kLetterHeight = 14, kLineHeight = 20;
 
-/// Writes lines (parted by '\n') in a plain pixel font from (left, top) on; letters outside ASCII become '?',
-/// and what leaves the picture is cut.
+/// Writes lines (parted by '\n') in letters of 5x7 dots from (left, top) on; letters outside ASCII become
+/// '?', and what leaves the picture is cut.
 void draw_text(Picture& picture, int left, int top, const std::string& text, Rgb colour = {0, 0, 0});
 /// Pixels of its longest line.
 int text_width(const std::string& text);

@@ -26,7 +26,7 @@ class Exporter {
   using Id = const detail::Node*;
 
   std::string scaled(const ModelFile& file);
-  std::string levelled(const std::string& x, const Scaling& scaling, Dim timesteps);
+  std::string normalised_per_window(const std::string& x, const Scaling& scaling, Dim timesteps);
   void bin_edges(const Scaling& scaling);
   std::string percentile(const Scaling& scaling, const std::string& name, std::int64_t rank);
   std::string network_input(const ModelFile& file);
@@ -111,7 +111,7 @@ std::string Exporter::percentile(const Scaling& scaling, const std::string& name
   return graph.node("Mul", {low, number(1.0F / 256)}, name);
 }
 
-std::string Exporter::levelled(const std::string& x, const Scaling& scaling, Dim timesteps) {
+std::string Exporter::normalised_per_window(const std::string& x, const Scaling& scaling, Dim timesteps) {
   bin_edges(scaling);
   const std::string rest = percentile(scaling, "rest", timesteps / Dim{kRestShare} + 1);
   const std::string top = percentile(scaling, "top", timesteps + 1 - Dim{kTopRank});
@@ -122,7 +122,7 @@ std::string Exporter::levelled(const std::string& x, const Scaling& scaling, Dim
   const std::string factor = graph.node("Div", {number(1), gain}, "factor");
   const std::string apart = graph.node("Sub", {x, removed}, "without_rest");
   const std::string full = graph.node("Mul", {apart, factor}, "at_full_gain");
-  return graph.node("Clip", {full, number(0), number(1)}, "levelled");
+  return graph.node("Clip", {full, number(0), number(1)}, "normalised_per_window");
 }
 
 std::string Exporter::network_input(const ModelFile& file) {
@@ -133,7 +133,7 @@ std::string Exporter::network_input(const ModelFile& file) {
         "volts", {any, s.timesteps, s.signals()},
         "Volts of every signal, oldest sample first; taxel k lies in row k / columns, column k % columns.");
     const std::string x = scaled(file);
-    return file.input.scaling.per_window ? levelled(x, file.input.scaling, s.timesteps) : x;
+    return file.input.scaling.per_window ? normalised_per_window(x, file.input.scaling, s.timesteps) : x;
   }
   const FrameSettings& s = file.frame_model->settings();
   graph.input("frames", {any, s.in_channels, s.height, s.width}, "Frames in the sensor's numbers.");

@@ -125,7 +125,7 @@ std::string render(const LiveState& state, bool colour, const TerminalSize& size
     return (size.columns == 0 || size.columns >= columns) && (size.lines == 0 || size.lines > lines);
   };
   const int lines = seen.lines / 2 + 3, gap = static_cast<int>(kGap.size());
-  const bool raw = state.top > 0, one = fits(seen.columns, lines);
+  const bool raw = !state.draws, one = fits(seen.columns, lines);
   const bool both = !raw && fits(felt.columns + gap + seen.columns, lines);
   if (!one) {
     const std::string note = "too small a window for pictures\n";
@@ -143,8 +143,10 @@ std::string render(const LiveState& state, bool colour, const TerminalSize& size
     append_row(text, raw ? felt : seen, line, colour);
     text += '\n';
   }
-  const std::string meaning = raw ? "1 is " + format(state.top, 4) + " " + state.unit + " from rest"
-                                  : "pressed hard; the plate's highest";
+  const std::string of_felt = format(state.top, 4) + " " + state.unit + " from rest";
+  const std::string meaning = raw    ? "1 is " + of_felt
+                              : both ? "felt: " + of_felt + "; drawn: the plate's highest"
+                                     : "the plate's highest";
   return text + scale_line(colour, size.columns, meaning) + status_line(state, size.columns);
 }
 

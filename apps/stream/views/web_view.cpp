@@ -4,7 +4,6 @@
 
 #include "apps/web/encode.h"
 #include "apps/web/pages.h"
-#include "data/sensors/rig.h"
 
 namespace supertac {
 
@@ -37,10 +36,10 @@ std::string WebView::hello() const {
                         {"columns", source_.array.columns},
                         {"pitch_mm", source_.array.pitch_mm},
                         {"scale", source_.scale},
-                        {"height_mm", rig::kTextureHeightMm},
                         {"predicts_error", source_.predicts_error},
                         {"names_textures", source_.names_textures},
                         {"unit", source_.unit},
+                        {"draws", source_.draws},
                         {"silent", source_.silent},
                         {"map", colour_map_base64()}}
       .dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
@@ -67,10 +66,8 @@ std::string web_event(const LiveState& state, const Recorder::Status& recorder) 
                           {"recording", recorder.recording},
                           {"recorded_s", recorder.seconds},
                           {"files", recorder.files}};
-  const bool raw = state.top > 0;
-  if (!state.taxels.empty() && (raw || !state.picture.empty())) event["felt"] = levels_base64(state.taxels);
+  if (!state.taxels.empty()) event["felt"] = levels_base64(state.taxels), event["top"] = state.top;
   if (!state.picture.empty()) event["picture"] = levels_base64(state.picture);
-  if (raw) event["top"] = state.top;
   if (!state.half_widths.empty()) event["wide"] = levels_base64(state.half_widths);
   if (state.distance) event["distance"] = *state.distance, event["unlike"] = state.unlike_training;
   if (!state.texture.empty())

@@ -19,7 +19,8 @@ struct WebSource {
   TaxelArray array;
   int scale = 4;
   bool predicts_error = false, names_textures = false;
-  std::string unit = {};         ///< without a model, of the signals; empty: there is one
+  std::string unit = {};         ///< of the signals
+  bool draws = false;            ///< there is a model
   std::vector<int> silent = {};  ///< taxels that say nothing
 };
 
@@ -34,6 +35,8 @@ class WebView {
   /// Whether somebody has wished to re-zero since the last call.
   bool take_rezero() { return rezero_.exchange(false); }
   std::string url() const { return server_.url(); }
+  /// As WebServer.
+  void end(const std::string& outcome, bool failed) { server_.end(outcome, failed); }
 
  private:
   WebSite site();

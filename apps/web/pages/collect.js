@@ -1,5 +1,5 @@
 // The page of a collection: where the finger is, and a button that does what Ctrl-C does. Nothing here moves it.
-let hello = null, newest = null, alive = 0, texture = null;
+let hello = null, newest = null, alive = 0, texture = null, ended = null;
 
 // The plate's heights as an image, y to the right.
 function textureOf(h) {
@@ -78,10 +78,10 @@ function show() {
 
 function frame(now) {
   requestAnimationFrame(frame);
-  const away = !hello || now - alive > 3000, link = element("link");
+  const away = !ended && (!hello || now - alive > 3000), link = element("link");
   document.body.classList.toggle("away", away);
-  link.className = away ? "lamp alarm" : "lamp";
-  link.textContent = away ? "no connection: the run has ended, or the program is gone" : "live";
+  link.className = away || ended && ended.failed ? "lamp alarm" : "lamp";
+  link.textContent = ended ? ended.outcome : away ? "no connection, trying again" : "live";
   if (!hello || !dirty) return;
   dirty = false;
   draw();
@@ -96,13 +96,14 @@ function connect() {
   source.addEventListener("hello", (e) => {
     hello = JSON.parse(e.data);
     texture = textureOf(hello);
-    newest = null;
+    newest = ended = null;
     dirty = true;
     element("badge").textContent = hello.plate;
     element("source").textContent = hello.source;
     element("plan").textContent = hello.plan;
   });
   source.onmessage = (e) => { alive = performance.now(); newest = JSON.parse(e.data); dirty = true; };
+  source.addEventListener("end", (e) => { ended = JSON.parse(e.data); });
   source.onerror = () => { if (source.readyState === EventSource.CLOSED) setTimeout(connect, 1000); };
 }
 

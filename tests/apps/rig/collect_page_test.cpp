@@ -56,6 +56,8 @@ TEST(CollectPage, ShowsTheRunAndItsButtonEndsItAsCtrlCDoes) {
   act("stop");  // an impatient hand
   const ProcessResult result = program.wait();
   EXPECT_EQ(result.code, 130) << result.error;
+  const auto end = event_after(client->receive("what never comes"), "event: end\ndata: ");
+  EXPECT_TRUE(end["outcome"].get<std::string>().starts_with("incomplete after 0 passes")) << end;
   run.wait_for_rest();
   EXPECT_GT(run.head().z, kLiftedZ - 0.1);
 }

@@ -26,6 +26,7 @@ TEST(TerminalView, YGrowsUpwardsAndBothPicturesHaveTheSameSize) {
   state.taxels[12] = 1;  // largest y, smallest x: top left
   state.picture.assign(256, 0.0F);
   state.picture[15] = 1;  // smallest y, largest x: bottom right
+  state.top = 0.25, state.unit = "V";
   const std::string text = render(state, false);
   std::vector<std::string> lines;
   for (std::size_t at = 0; at < text.size(); at = text.find('\n', at) + 1)
@@ -37,7 +38,7 @@ TEST(TerminalView, YGrowsUpwardsAndBothPicturesHaveTheSameSize) {
   EXPECT_EQ(lines[4], lines[1]);
   EXPECT_EQ(lines[5], std::string(67, ' '));
   EXPECT_EQ(lines[16], std::string(65, ' ') + "@@");
-  EXPECT_EQ(lines[17], "0  .:-=+*#%@ 1  pressed hard; the plate's highest");
+  EXPECT_EQ(lines[17], "0  .:-=+*#%@ 1  felt: 0.2500 V from rest; drawn: the plate's highest");
   EXPECT_EQ(lines[18], "0 frames/s  latency 0.00 ms (p99 0.00)  lost 0  dropped 0");
 }
 

@@ -1,4 +1,4 @@
-// Picture logs at somebody's wish.
+// Recordings at somebody's wish.
 #include "apps/stream/recorder.h"
 
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ TEST_F(RecorderTest, KeepsWhatCameBetweenStartAndStop) {
     Recorder recorder(kFormat, {{"kind", "pictures"}});
     recorder.add(seen_at(0));
     EXPECT_EQ(recorder.stop(), "nothing is being recorded");
-    EXPECT_TRUE(recorder.start().starts_with("recording pictures_2"));
+    EXPECT_TRUE(recorder.start().starts_with("recording recording_2"));
     name = recorder.status().recording;
     recorder.add(seen_at(1));
     recorder.add(seen_at(1.5));

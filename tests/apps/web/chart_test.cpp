@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "apps/web/result_page.h"
@@ -45,6 +46,44 @@ TEST(Chart, EqualFactorsAreEqualStepsOnALogarithmicAxis) {
   ASSERT_EQ(y.size(), 3U);
   EXPECT_NEAR(y[0] - y[1], y[1] - y[2], 0.11);
   EXPECT_GT(y[0], y[1]);
+}
+
+// Where the labels of points stand, from the text elements that hold them.
+std::vector<std::array<double, 2>> places(const std::string& svg, const std::vector<std::string>& labels) {
+  std::vector<std::array<double, 2>> found;
+  for (const std::string& label : labels) {
+    const std::size_t end = svg.find("\">" + label + "<"), begin = svg.rfind("<text x=\"", end) + 9;
+    const std::size_t y = svg.find(" y=\"", begin) + 4;
+    found.push_back({*parse_double(svg.substr(begin, svg.find('"', begin) - begin)),
+                     *parse_double(svg.substr(y, svg.find('"', y) - y))});
+  }
+  return found;
+}
+
+TEST(Chart, LabelsOfPointsThatLieTogetherDoNotOverprint) {
+  std::vector<std::string> labels;
+  ChartSeries series{
+      .name = "a", .points = {{0, 0}, {100, 1}}, .line = false, .dots = true, .labels = {"first", "last"}};
+  for (int i = 0; i < 5; ++i) {
+    series.points.emplace_back(50 + 0.2 * i, 0.5), series.labels.push_back("crowded_" + std::to_string(i));
+  }
+  const std::string svg = chart_svg("", {.label = "x"}, {.label = "y"}, {series});
+  const auto at = places(svg, series.labels);
+  for (std::size_t a = 0; a < at.size(); ++a)
+    for (std::size_t b = a + 1; b < at.size(); ++b)
+      EXPECT_TRUE(std::abs(at[a][0] - at[b][0]) > 50 || std::abs(at[a][1] - at[b][1]) >= 11.5)
+          << series.labels[a] << " " << series.labels[b];
+}
+
+TEST(Chart, AHeatMapHasACellForEachPairThatIsKnown) {
+  const std::string svg =
+      heat_map_svg("SSIM", {"T", {"32", "64", "128"}}, {"LD", {"3", "10"}}, {0.5, 0.6, 0.7, NAN, 0.8, 0.9});
+  std::size_t cells = 0;
+  for (std::size_t at = 0; (at = svg.find("<rect", at)) != std::string::npos; ++at) ++cells;
+  EXPECT_EQ(cells, 5U);
+  for (const char* words : {">32<", ">10<", ">0.500<", ">0.900<", ">T<", ">LD<"})
+    EXPECT_NE(svg.find(words), std::string::npos) << words;
+  EXPECT_EQ(heat_map_svg("", {"", {"1"}}, {"", {"1"}}, {NAN}), "");
 }
 
 TEST(Chart, NamesAreNoMarkup) {

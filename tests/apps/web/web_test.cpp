@@ -273,6 +273,28 @@ TEST_F(Web, HalfRequestsThatWereClosedLeaveRoom) {
   EXPECT_TRUE(answers());
 }
 
+// Who has read all gets it, and who reads nothing holds up nobody for longer than is said.
+TEST(WebServer, TheLastThatPagesHearIsWhatBecameOfTheRun) {
+  std::optional<WebServer> server;
+  server.emplace(WebAddress{.port = 0},
+                 WebSite{.page = live_page(),
+                         .hello = [] { return std::string("{\"a\":1}"); },
+                         .news = [] { return "{\"n\":\"" + std::string(20'000, 'x') + "\"}"; },
+                         .actions = {},
+                         .file = {}});
+  const int port = std::stoi(server->url().substr(17));
+  const std::string ask = "GET /events HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) + "\r\n\r\n";
+  HttpClient stalled(port, 4096), reader(port);
+  for (HttpClient* client : {&stalled, &reader}) client->send(ask);
+  reader.receive("{\"n\":");
+  server->end("the plate \"a\" was\nlost", true);
+  std::thread goes([&] { server.reset(); });
+  const std::string last = reader.receive(
+      "event: end\ndata: {\"failed\":true,\"outcome\":\"the plate \\\"a\\\" was\\nlost\"}\n\n");
+  EXPECT_NE(last.find("event: end"), std::string::npos);
+  goes.join();
+}
+
 TEST(WebServer, AnAddressThatCannotBeHadIsNamed) {
   const WebSite nothing{
       .page = "", .hello = [] { return "{}"; }, .news = [] { return ""; }, .actions = {}, .file = {}};

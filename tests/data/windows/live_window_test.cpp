@@ -39,9 +39,9 @@ void feed(LiveWindow& live, const Recording& recording,
 
 // Every window of WindowSet, asked for as soon as a frame has come that lies behind it, and how many there
 // were.
-std::size_t expect_windows_of_set(const Recording& recording, LiveWindow live, bool levelled = false) {
+std::size_t expect_windows_of_set(const Recording& recording, LiveWindow live, bool per_window = false) {
   WindowSettings settings = wide_settings(kTimesteps);
-  settings.scaling.per_window = levelled;
+  settings.scaling.per_window = per_window;
   WindowSet set(settings);
   Recording sliding = recording;
   sliding.lift_mm.clear();  // or frames between air and plate would end no window
@@ -106,7 +106,7 @@ TEST(LiveWindow, GivesTheWindowsOfTrainingBitForBit) {
   }
 }
 
-TEST(LiveWindow, IsLevelledLikeOneOfTraining) {
+TEST(LiveWindow, IsNormalisedLikeOneOfTraining) {
   const Recording recording = rough_recording(300, 0.05, 5);
   LiveWindowSettings settings = live_settings(300);
   settings.scaling.per_window = true;

@@ -81,7 +81,7 @@ TEST(Onnx, OnnxruntimeDrawsOurPictures) {
   write_case(folder, "last_frame", model_of("tiny", other, Grouping::vertical, true), 50);
   ModelFile plain = model_of("tiny", rig, Grouping::horizontal);
   plain.input.scaling.per_window = false;
-  write_case(folder, "not_levelled", plain, 50);
+  write_case(folder, "not_normalised", plain, 50);
   const char* python = std::getenv("SUPERTAC_PYTHON");
   const std::string log = folder.file("log");
   const std::string command = std::string(python == nullptr ? "python3" : python) +

@@ -1,0 +1,54 @@
+#!/usr/bin/env python3
+"""The paper's Figure 8: the latent dimension LD, here as a heat map of LD and T, and what an analysis of variance says.
+
+    bench/paper/figure8.py --text TEXT_DIR | --simulated
+
+As in Table 1, networks have the size of `tiny` and are judged on frames with 512 samples of their pass behind them.
+Needs gnuplot and python3-scipy.
+"""
+import pathlib
+import subprocess
+
+import table1
+from paper import SPLITS, Study, splits
+from tables import chosen, mean, over_seeds, rows, table
+
+LATENTS = (3, 10, 30)
+
+
+def figure8(folder="paper"):
+    lines = []
+    for latent in LATENTS:
+        both = splits(chosen(rows(f"{folder}/figure8.csv"), latent=str(latent), timesteps="256"))
+        lines.append([str(latent), *(over_seeds(of, "ssim") for of in both.values())])
+    return table(["LD at T 256", "SSIM, unseen trial", "`window`"], lines)
+
+
+def variance(folder="paper"):
+    lines = [[f"`{r['split']}`", r["source"], r["degrees"], f"{float(r['f']):.1f}", f"{float(r['p']):.1g}"]
+             for r in rows(f"{folder}/variance.csv")]
+    return table(["split", "source of variance", "degrees of freedom", "F", "p"], lines)
+
+
+def heat_map(found, png):
+    cells = "".join(f"{j} {i} {mean(of, 'ssim'):.4f}\n" for i, latent in enumerate(LATENTS)
+                    for j, length in enumerate(sorted(table1.LENGTHS))
+                    if (of := chosen(found, latent=str(latent), timesteps=str(length))))
+    script = pathlib.Path(__file__).with_name("heat_map.gp").read_text()
+    names = lambda values: ", ".join(f'"{v}" {i}' for i, v in enumerate(values))
+    program = (f"set output '{png}'\nset ytics ({names(LATENTS)})\nset xtics ({names(sorted(table1.LENGTHS))})\n"
+               f"$cells << EOD\n{cells}EOD\n{script}")
+    subprocess.run(["gnuplot"], input=program, text=True, check=True)
+
+
+if __name__ == "__main__":
+    from significance import anova
+    study = Study(__doc__)
+    found = study.sweep("grid", "tiny", **table1.GRID, latent=LATENTS)
+    study.keep_sweep("figure8", found, "timesteps", "latent")
+    for split, of in splits(found).items():
+        heat_map(of, study.kept / f"figure8_{split}.png")
+    print(figure8(study.kept))
+    study.keep("variance", [{"split": split} | line for split, of in splits(found).items() for line in anova(of)])
+    print(variance(study.kept))
+    print(f"heat maps: {study.kept}/figure8_*.png")
