@@ -35,7 +35,7 @@ struct supertac_live {
 
 namespace {
 
-constexpr std::size_t kBatch = 16;  // windows that a thread draws at once
+constexpr std::size_t kBatch = 32;  // windows that a thread draws at once
 
 thread_local std::string last_error;
 

@@ -26,11 +26,10 @@ if [ ! -e "$parts/lib/libmicrohttpd.a" ]; then
     cp libmicrohttpd-*/src/microhttpd/.libs/libmicrohttpd.a lib/
   ) >"$parts/log" 2>&1 || { tail -20 "$parts/log"; exit 1; }
 fi
-static() { c++ -print-file-name="lib$1.a"; }
 cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSUPERTAC_TESTS=OFF -DSUPERTAC_MPI=OFF -DSUPERTAC_WERROR=ON \
   -DCMAKE_EXE_LINKER_FLAGS="-static -L$parts/lib" -DCMAKE_SHARED_LINKER_FLAGS="-L$parts/lib" \
-  -DMICROHTTPD_LIBRARY="$parts/lib/libmicrohttpd.a" -DOpenMP_gomp_LIBRARY="$(static gomp)" \
-  -DOpenMP_pthread_LIBRARY="$(static pthread)" -DZLIB_LIBRARY="$(static z)" -DCMAKE_DISABLE_FIND_PACKAGE_Python3=ON >/dev/null
+  -DMICROHTTPD_LIBRARY="$parts/lib/libmicrohttpd.a" -DOpenMP_gomp_LIBRARY=-lgomp \
+  -DOpenMP_pthread_LIBRARY=-lpthread -DZLIB_LIBRARY="$(c++ -print-file-name=libz.a)" -DCMAKE_DISABLE_FIND_PACKAGE_Python3=ON >/dev/null
 cmake --build "$build"
 version=$(sed -n 's/^project(supertac VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt)
 name="supertac-$version"

@@ -195,6 +195,9 @@ def main():
                 good &= compare(folder, data, preset, data / recordings[0].name)
         recording = supertac.read_recording(recordings[0])
         good &= trains(folder, recording) and refuses_what_programs_refuse(folder, recording)
+        if LIBRARY.exists():
+            subprocess.run([sys.executable, ROOT / "examples/tour.py", rig], check=True,
+                           env=os.environ | {"PYTHONPATH": str(ROOT / "python")})
         good &= refuses_damage(recordings[0])
     sys.exit(0 if good else 1)
 
