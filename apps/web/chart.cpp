@@ -60,11 +60,11 @@ struct Box {
 /// Places labels beside their points, off all points and off each other where there is room.
 class Labels {
  public:
-  void keep_off(double x, double y) { taken_.push_back({x - 4, y - 4, x + 4, y + 4}); }
+  void keep_off(double x, double y, double by = 4) { taken_.push_back({x - by, y - by, x + by, y + by}); }
   void keep_off_line(std::pair<double, double> from, std::pair<double, double> to) {
     const double steps = std::ceil(std::hypot(to.first - from.first, to.second - from.second) / 5);
     for (double i = 1; i < steps; ++i)
-      keep_off(std::lerp(from.first, to.first, i / steps), std::lerp(from.second, to.second, i / steps));
+      keep_off(std::lerp(from.first, to.first, i / steps), std::lerp(from.second, to.second, i / steps), 2);
   }
   std::string add(double x, double y, const std::string& words) {
     const double width = kLetter * static_cast<double>(words.size());
@@ -72,9 +72,9 @@ class Labels {
     for (const double down : {-4.0, 13.0, 4.0, -16.0, 25.0, -28.0, 37.0, -40.0}) {
       for (const double left : {x + 7, x - 7 - width}) {
         const Box box{left, y + down - 10, left + width, y + down + 2};
-        if (best.right == 0) best = box;
         if (box.left < kLeft || box.right > kWidth || box.top < kTop - 12 || box.bottom > kHeight - kBottom)
           continue;
+        if (best.right == 0) best = box;
         if (std::ranges::any_of(taken_, [&](const Box& b) { return b.meets(box); })) continue;
         taken_.push_back(box);
         return text(left, y + down, "start", words);

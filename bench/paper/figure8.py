@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The paper's Figure 8: the latent dimension LD, here as a heat map of LD and T, and what an analysis of variance says.
+"""The paper's Figure 8: SSIM against the latent dimension LD, here as a heat map of LD and T, with an analysis of variance.
 
     bench/paper/figure8.py --text TEXT_DIR | --simulated
 
@@ -10,7 +10,7 @@ import pathlib
 import subprocess
 
 import table1
-from paper import SPLITS, Study, splits
+from paper import Study, splits
 from tables import chosen, mean, over_seeds, rows, table
 
 LATENTS = (3, 10, 30)
@@ -22,12 +22,6 @@ def figure8(folder="paper"):
         both = splits(chosen(rows(f"{folder}/figure8.csv"), latent=str(latent), timesteps="256"))
         lines.append([str(latent), *(over_seeds(of, "ssim") for of in both.values())])
     return table(["LD at T 256", "SSIM, unseen trial", "`window`"], lines)
-
-
-def variance(folder="paper"):
-    lines = [[f"`{r['split']}`", r["source"], r["degrees"], f"{float(r['f']):.1f}", f"{float(r['p']):.1g}"]
-             for r in rows(f"{folder}/variance.csv")]
-    return table(["split", "source of variance", "degrees of freedom", "F", "p"], lines)
 
 
 def heat_map(found, png):
@@ -42,13 +36,11 @@ def heat_map(found, png):
 
 
 if __name__ == "__main__":
-    from significance import anova
     study = Study(__doc__)
     found = study.sweep("grid", "tiny", **table1.GRID, latent=LATENTS)
     study.keep_sweep("figure8", found, "timesteps", "latent")
     for split, of in splits(found).items():
         heat_map(of, study.kept / f"figure8_{split}.png")
     print(figure8(study.kept))
-    study.keep("variance", [{"split": split} | line for split, of in splits(found).items() for line in anova(of)])
-    print(variance(study.kept))
+    study.test("figure8")
     print(f"heat maps: {study.kept}/figure8_*.png")

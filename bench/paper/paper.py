@@ -12,6 +12,7 @@ import sys
 BENCH = pathlib.Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(BENCH))
 from source import source  # noqa: E402
+from tables import rows, table  # noqa: E402
 
 SPLITS = ("trial", "window")
 PLATES = "3_Bumps,6_Bumps,4_Ridges,6_Ridges"
@@ -57,8 +58,8 @@ class Study:
         found = []
         for split in SPLITS:
             where = self.out / f"{folder}_{split}"
-            self.run("sweep", "--data", self.data, "--plates", PLATES, "--preset", preset, "--rate", 100, *pace, "--history", history, "--split", split,
-                     *augment(split), "--seeds", ",".join(self.seeds), "--threads", 1, "--out", where, *grid)
+            self.run("sweep", "--data", self.data, "--plates", PLATES, "--preset", preset, "--rate", 100, *pace, "--history", history,
+                     "--split", split, *augment(split), "--seeds", ",".join(self.seeds), "--threads", 1, "--out", where, *grid)
             with open(where / "sweep.csv", newline="") as file:  # other items may have added to it
                 found += [row for row in csv.DictReader(file) if row["seed"] in self.seeds and
                           all(row[axis] in map(str, values) for axis, values in axes.items())]
@@ -75,17 +76,30 @@ class Study:
             self.run("evaluate", "--model", self.models(split)[0], "--data", self.data, "--limit", 200, "--pictures", folder)
         return folder
 
-    def keep(self, name, rows):
+    def keep(self, name, lines):
         """Writes NAME.csv, each line with its command, the commit of the tree, and that of the programs if it is known."""
         with open(self.kept / f"{name}.csv", "w", newline="") as file:
-            table = csv.DictWriter(file, [*rows[0], "command", "commit"], lineterminator="\n")
-            table.writeheader()
-            for number, row in enumerate(rows):
-                table.writerow(row | (source() if number == 0 else {"command": "", "commit": ""}))
+            out = csv.DictWriter(file, [*lines[0], "command", "commit"], lineterminator="\n")
+            out.writeheader()
+            for number, line in enumerate(lines):
+                out.writerow(line | (source() if number == 0 else {"command": "", "commit": ""}))
 
-    def keep_sweep(self, name, rows, *settings):
+    def test(self, name):
+        """Tests of significance on NAME.csv, where it has several seeds; needs python3-scipy."""
+        import significance
+        for line in significance.write(self.kept / f"{name}.csv"):
+            print(*line.values(), sep=", ")
+
+    def keep_sweep(self, name, models, *settings):
         self.keep(name, [{key: row[key] for key in ("split", *settings, "seed", *SCORES)} | {"programs": row["commit"][:7]}
-                         for row in rows])
+                         for row in models])
+
+
+def significance_table(name, folder="paper"):
+    """What NAME_tests.csv says of the two splits."""
+    lines = [[f"`{r['split']}`", r["compared"], r["test"], r["difference"], str(r["seeds"]), r["p"]]
+             for r in rows(f"{folder}/{name}_tests.csv") if r["split"] in SPLITS]
+    return table(["split", "compared", "test", "SSIM", "seeds", "p"], lines)
 
 
 def augment(split):
@@ -93,5 +107,5 @@ def augment(split):
     return ["--augment", "none"] if split == "window" else []
 
 
-def splits(rows):
-    return {split: [row for row in rows if row["split"] == split] for split in SPLITS}
+def splits(models):
+    return {split: [row for row in models if row["split"] == split] for split in SPLITS}

@@ -1,36 +1,81 @@
-"""Tests of significance on rows of a sweep (Debian: python3-scipy), which the paper asks for."""
+#!/usr/bin/env python3
+"""Tests of significance on the CSV of an item, which the paper asks for (Debian: python3-scipy).
+
+    bench/paper/significance.py bench/results/paper/table2.csv     writes table2_tests.csv beside it
+
+Over the seeds: a paired t-test of each setting against the next; where LD and T were varied together, a two-way analysis
+of variance.
+"""
+import csv
+import pathlib
+import sys
+
 import numpy as np
 from scipy import stats
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from source import source  # noqa: E402
 
-def by_seed(rows, figure):
-    return {row["seed"]: float(row[figure]) for row in rows}
-
-
-def paired(a, b, figure="ssim"):
-    """The paired t-test over the seeds that both configurations have."""
-    x, y = by_seed(a, figure), by_seed(b, figure)
-    seeds = sorted(x.keys() & y.keys())
-    difference = np.array([x[seed] - y[seed] for seed in seeds])
-    p = f", p = {stats.ttest_1samp(difference, 0).pvalue:.2g}" if len(seeds) > 1 else ""
-    return f"{figure} {difference.mean():+.4f} over {len(seeds)} seeds{p}"
+SETTINGS = {"scale": "scale", "timesteps": "T", "latent": "LD"}
 
 
-def anova(rows, figure="ssim"):
-    """Two-way analysis of variance over latent dimension and T; every cell must be full. The error is what seeds differ by
-    within a cell; where there is one seed, it is what the two do together beyond their sum."""
-    axes = [sorted({row[key] for row in rows}, key=int) for key in ("latent", "timesteps", "seed")]
-    values = {(row["latent"], row["timesteps"], row["seed"]): float(row[figure]) for row in rows}
-    cells = np.array([[[values[x, t, s] for s in axes[2]] for t in axes[1]] for x in axes[0]])
-    a, b, n = cells.shape
-    grand, latents, lengths, means = cells.mean(), cells.mean((1, 2)), cells.mean((0, 2)), cells.mean(2)
-    within = ((cells - means[:, :, None]) ** 2).sum()
-    interaction = means - latents[:, None] - lengths[None, :] + grand
-    parts = [("LD", b * n * ((latents - grand) ** 2).sum(), a - 1), ("T", a * n * ((lengths - grand) ** 2).sum(), b - 1),
-             ("LD and T together", n * (interaction**2).sum(), (a - 1) * (b - 1))]
+def paired(a, b):
+    """Two configurations' values by seed."""
+    seeds = sorted(a.keys() & b.keys())
+    difference = np.array([a[seed] - b[seed] for seed in seeds])
+    result = stats.ttest_1samp(difference, 0)
+    return {"test": "paired t-test", "difference": f"{difference.mean():+.4f}", "seeds": len(seeds),
+            "statistic": f"{result.statistic:.3g}", "p": f"{result.pvalue:.2g}"}
+
+
+def anova(values):
+    """values [latents][timesteps][seeds]: sums of squares of a balanced two-way layout with replication."""
+    a, b, n = values.shape
+    grand, latents, lengths, means = values.mean(), values.mean((1, 2)), values.mean((0, 2)), values.mean(2)
     freedom = a * b * (n - 1)
-    if n == 1:
-        _, within, freedom = parts.pop()
-    for source, squares, degrees in parts:
-        f = squares / degrees / (within / freedom)
-        yield {"source": source, "degrees": f"{degrees}, {freedom}", "f": f"{f:.4g}", "p": f"{stats.f.sf(f, degrees, freedom):.3g}"}
+    within = ((values - means[:, :, None]) ** 2).sum() / freedom
+    interaction = means - latents[:, None] - lengths[None, :] + grand
+    for source_of, squares, degrees in (("LD", b * n * ((latents - grand) ** 2).sum(), a - 1),
+                                        ("T", a * n * ((lengths - grand) ** 2).sum(), b - 1),
+                                        ("LD and T together", n * (interaction**2).sum(), (a - 1) * (b - 1))):
+        f = squares / degrees / within
+        yield {"compared": source_of, "test": "analysis of variance", "difference": "", "seeds": n, "statistic": f"{f:.3g}",
+               "p": f"{stats.f.sf(f, degrees, freedom):.2g}"}
+
+
+def tests_of(rows, figure="ssim"):
+    """One line for each test that the rows, of one split, have seeds for."""
+    varied = [key for key in SETTINGS if len({row.get(key) for row in rows}) > 1]
+    values = {}
+    for row in rows:
+        values.setdefault(tuple(int(row[key]) for key in varied), {})[row["seed"]] = float(row[figure])
+    order = sorted(values)
+    if len(varied) == 1:
+        for one, other in zip(order, order[1:]):
+            if len(values[one].keys() & values[other].keys()) > 1:
+                yield {"compared": f"{SETTINGS[varied[0]]} {other[0]} against {one[0]}", **paired(values[other], values[one])}
+    if len(varied) == 2:
+        axes = [sorted({key[i] for key in order}) for i in (1, 0)]  # LD, T
+        seeds = set.intersection(*(set(v) for v in values.values()))
+        if len(order) == len(axes[0]) * len(axes[1]) and len(seeds) > 1:
+            yield from anova(np.array([[[values[t, x][s] for s in sorted(seeds)] for t in axes[1]] for x in axes[0]]))
+
+
+def write(path):
+    """PATH_tests.csv; nothing where no test has two seeds. Returns its lines."""
+    with open(path, newline="") as file:
+        rows = list(csv.DictReader(file))
+    splits = dict.fromkeys(row["split"] for row in rows)
+    lines = [{"split": split} | line for split in splits for line in tests_of([r for r in rows if r["split"] == split])]
+    if lines:
+        with open(path.with_name(path.stem + "_tests.csv"), "w", newline="") as file:
+            table = csv.DictWriter(file, [*lines[0], "command", "commit"], lineterminator="\n")
+            table.writeheader()
+            table.writerows(line | (source() if number == 0 else {}) for number, line in enumerate(lines))
+    return lines
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:] or sys.exit(__doc__):
+        for found in write(pathlib.Path(name)):
+            print(*found.values(), sep=", ")

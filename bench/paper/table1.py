@@ -29,3 +29,4 @@ if __name__ == "__main__":
     study = Study(__doc__)
     study.keep_sweep("table1", study.sweep("grid", "tiny", **GRID, latent=[10]), "timesteps")
     print(table1(study.kept))
+    study.test("table1")

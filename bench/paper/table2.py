@@ -3,7 +3,7 @@
 
     bench/paper/table2.py --text TEXT_DIR | --simulated
 """
-from paper import Study, splits
+from paper import Study, significance_table, splits
 from tables import chosen, over_seeds, rows, table
 
 SIZES = {2: (0.77, 24.02), 4: (0.81, 27.3), 8: (0.74, 23.09)}
@@ -18,12 +18,12 @@ def table2(folder="paper"):
     return table(["pixels", "SSIM, paper", "unseen trial", "`window`", "PSNR dB, paper", "unseen trial", "`window`"], lines)
 
 
+def table2_tests(folder="paper"):
+    return significance_table("table2", folder)
+
+
 if __name__ == "__main__":
-    from significance import paired
     study = Study(__doc__)
-    found = study.sweep("pixels", "paper", scale=SIZES)
-    study.keep_sweep("table2", found, "scale")
+    study.keep_sweep("table2", study.sweep("pixels", "paper", scale=SIZES), "scale")
     print(table2(study.kept))
-    for split, of in splits(found).items():
-        for other in "28":
-            print(f"{split}: 16x16 against {4 * int(other)}x{4 * int(other)}:", paired(chosen(of, scale="4"), chosen(of, scale=other)))
+    study.test("table2")
