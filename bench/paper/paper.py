@@ -30,7 +30,9 @@ class Study:
         parser.add_argument("--bin", default="build/bin", help="folder of the programs (default: %(default)s)")
         parser.add_argument("--out", default="out/paper", help="recordings and models (default: %(default)s)")
         parser.add_argument("--seeds", default="0,1,2,3,4", help="of the trainings (default: %(default)s)")
+        parser.add_argument("--so-far", action="store_true", help="train nothing: what there is by now")
         options = parser.parse_args()
+        self.so_far = options.so_far
         self.simulated, self.bin, self.seeds = options.simulated, pathlib.Path(options.bin), options.seeds.split(",")
         self.out = pathlib.Path(options.out + ("_simulated" if self.simulated else "")).resolve()
         self.kept = self.out if self.simulated else BENCH / "results" / "paper"
@@ -58,8 +60,10 @@ class Study:
         found = []
         for split in SPLITS:
             where = self.out / f"{folder}_{split}"
-            self.run("sweep", "--data", self.data, "--plates", PLATES, "--preset", preset, "--rate", 100, *pace, "--history", history,
-                     "--split", split, *augment(split), "--seeds", ",".join(self.seeds), "--threads", 1, "--out", where, *grid)
+            if not self.so_far:
+                self.run("sweep", "--data", self.data, "--plates", PLATES, "--preset", preset, "--rate", 100, *pace,
+                         "--history", history, "--split", split, *augment(split), "--seeds", ",".join(self.seeds), "--threads", 1,
+                         "--out", where, *grid)
             with open(where / "sweep.csv", newline="") as file:  # other items may have added to it
                 found += [row for row in csv.DictReader(file) if row["seed"] in self.seeds and
                           all(row[axis] in map(str, values) for axis, values in axes.items())]
