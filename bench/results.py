@@ -4,7 +4,7 @@
     bench/results.py            rewrites what stands between <!-- NAME --> and <!-- /NAME -->
     bench/results.py --check    changes nothing; exit code 1 and one line for everything that is stale
 
-A table's name is that of its function in bench/tables.py. Every CSV has the columns `command` and `commit`, which say how
+A table's name is that of its function in bench/tables.py, or of its item in bench/paper. Every CSV has the columns `command` and `commit`, which say how
 its lines were made; where they are empty those of the line above hold.
 """
 import pathlib
@@ -14,9 +14,18 @@ import sys
 import tables
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "bench/paper"))
+from figure7 import figure7  # noqa: E402
+from figure8 import figure8  # noqa: E402
+from figure10 import figure10  # noqa: E402
+from figure11 import figure11  # noqa: E402
+from table1 import table1  # noqa: E402
+from table2 import table2, table2_tests  # noqa: E402
+
 TABLES = {
     "README.md": [tables.beside_the_paper, tables.fastest],
-    "bench/results/accuracy.md": [tables.reached, tables.pixels, tables.textures, tables.first_contact, tables.demo],
+    "bench/results/accuracy.md": [tables.reached, tables.first_contact, tables.demo],
+    "docs/paper.md": [table1, table2, table2_tests, figure7, figure8, figure10, figure11],
     "bench/results/unseen_plates.md": [tables.left_out],
     "bench/results/sensor_faults.md": [tables.corruptions, tables.silence],
     "bench/results/speed.md": [tables.speed, tables.precision],

@@ -55,7 +55,7 @@ def over_seeds(found, column, digits=3):
 def beside_the_paper():
     whole, window = rows("accuracy/whole_passes.csv"), chosen(rows("accuracy/textured_windows.csv"), split="window")[0]
     best = chosen(whole, network="best", registered="aligned")
-    inside, contact = (chosen(rows("accuracy/textures.csv"), split="trial", view="super_resolved", part=part)[0]["accuracy"]
+    inside, contact = (chosen(rows("paper/figure11.csv"), split="trial", view="super_resolved", part=part)[0]["accuracy"]
                        for part in ("inside", "contact"))
     held_out = lambda column, digits: plus_minus(window[column], window[column + "_ci95"], digits)
     return table(["figure", "paper", "ours, split `window`", "ours, unseen trial"], [
@@ -81,27 +81,6 @@ def reached():
                       over_seeds(alone, "contact_psnr_db", 1)])
     return table(["network", "contact SSIM", "PSNR dB", "position error mm", "ghost rate", "miss rate",
                   "registered independently: SSIM", "PSNR dB"], lines)
-
-
-def pixels():
-    found = rows("accuracy/pixels.csv")
-    cell = lambda r: f"{over_seeds(r, 'ssim')}, {mean(r, 'psnr_db'):.1f} dB"
-    return table(["split", "8x8", "16x16", "32x32"],
-                 [[f"`{split}`"] + [cell(chosen(found, split=split, scale=scale)) for scale in "248"]
-                  for split in ("trial", "pass", "window")])
-
-
-VIEWS = {"frame": "last 4x4 frame", "history32": "last 32 frames", "latents": "latents",
-         "super_resolved": "super-resolved 16x16", "truth": "the plate itself"}
-
-
-def textures():
-    found, lines = rows("accuracy/textures.csv"), []
-    for view, name in VIEWS.items():
-        cells = [chosen(found, split="trial", view=view, part=part)[0] for part in ("inside", "contact")]
-        lines.append([name] + [f"{100 * float(c['accuracy']):.1f} ({100 * float(c['passes_ci95_low']):.0f} to "
-                               f"{100 * float(c['passes_ci95_high']):.0f})" for c in cells])
-    return table(["what the classifier sees", "inside the texture, %", "all contact, %"], lines)
 
 
 def first_contact():
