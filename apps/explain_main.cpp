@@ -16,6 +16,7 @@
 #include "models/files/model_file.h"
 #include "models/inference/prepared/prepared.h"
 #include "models/training/loss/loss.h"
+#include "models/training/opened_step.h"
 
 namespace supertac {
 
@@ -101,14 +102,8 @@ class Names {
 Json step_of(const TracedOp& op, const std::string& y, const Names& names) {
   Json inputs = Json::array();
   for (const Variable& x : op.inputs) inputs.push_back(names.of(x));
-  const auto dims = op.y.shape().dims();
-  Json step = {
-      {"y", y}, {"op", op.op}, {"inputs", inputs}, {"shape", std::vector<Dim>(dims.begin(), dims.end())}};
-  if (op.op.starts_with("conv"))
-    step.update({{"stride", op.settings.conv.stride_w}, {"padding", op.settings.conv.padding_w}});
-  if (op.op.starts_with("conv") || op.op == "linear") step["slope"] = op.settings.negative_slope;
-  if (op.op == "take_runs")
-    step.update({{"first", op.settings.first}, {"run", op.settings.run}, {"step", op.settings.step}});
+  Json step = {{"y", y}, {"op", op.op}, {"inputs", inputs}};
+  step.update(operator_settings(op));
   return step;
 }
 

@@ -58,10 +58,10 @@ std::optional<LedgerDifference> Repetition::start(std::int64_t step) {
   const std::int64_t total = trainer_->total_steps(), apart = LedgerFile::apart(ledger_.every, total);
   const std::int64_t kept = step == total ? total : step / apart * apart;
   trainer_->restore(LedgerFile::state_path(folder_, kept), task_.origin);
-  const LedgerLine* line = ledger_.at(kept);
-  writer_.emplace(*trainer_, ledger_.every, line);
+  const std::optional<LedgerLine> line = ledger_.at(kept);
+  writer_.emplace(*trainer_, ledger_.every, line ? &*line : nullptr);
   line_.reset();
-  if (line == nullptr) return std::nullopt;  // the beginning, which follows from the seed
+  if (!line) return std::nullopt;  // the beginning, which follows from the seed
   LedgerLine mine = *line;
   mine.tensors = hashes_of(*trainer_);
   return difference(ledger_, *line, mine);
@@ -77,8 +77,8 @@ std::optional<LedgerDifference> Repetition::make_step(const std::function<void()
   }
   line_ = writer_->after_step();
   if (!line_) return std::nullopt;
-  const LedgerLine* theirs = ledger_.at(line_->step);
-  if (theirs == nullptr) return LedgerDifference{before, line_->step, "a line that is missing", false};
+  const std::optional<LedgerLine> theirs = ledger_.at(line_->step);
+  if (!theirs) return LedgerDifference{before, line_->step, "a line that is missing", false};
   return difference(ledger_, *theirs, *line_);
 }
 

@@ -3,6 +3,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -56,8 +57,11 @@ class Clock : public ReverseWatch {
 
 std::string label(const TracedOp& op, const std::map<const real*, const Parameter*>& parameters,
                   const std::map<Key, Reverse>& reverse) {
-  std::string text = std::string(op.op) + " " + op.y.shape().text() + "\\n" +
-                     number("%.1f kB", static_cast<double>(op.y.size()) * sizeof(real) / 1000);
+  // Bytes and times of single numbers say nothing.
+  const bool of_numbers =
+      op.y.size() == 1 && std::ranges::all_of(op.inputs, [](const Variable& x) { return x.size() == 1; });
+  std::string text = std::string(op.op) + " " + op.y.shape().text();
+  if (!of_numbers) text += "\\n" + number("%.1f kB", static_cast<double>(op.y.size()) * sizeof(real) / 1000);
   for (const Variable& x : op.inputs) {
     const auto p = parameters.find(x.value().data());
     if (p == parameters.end()) continue;
@@ -67,6 +71,7 @@ std::string label(const TracedOp& op, const std::map<const real*, const Paramete
   text += "\\n" + said("y", op.y.value());
   const auto r = reverse.find({std::string(op.op), op.y.value().data()});
   if (r != reverse.end()) text += "  " + r->second.gradient;
+  if (of_numbers) return text;
   text += "\\n" + number("%.0f us", op.us);
   if (r != reverse.end()) text += " forward, " + number("%.0f us", r->second.us) + " back";
   return text;

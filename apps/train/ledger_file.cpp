@@ -6,16 +6,6 @@
 #include "io/files/file.h"
 
 namespace supertac {
-namespace {
-
-std::string with_chain(const LedgerLine& line) {
-  std::string text = line.text();
-  text.back() = ',';
-  return text + "\"chain\":\"" + line.chain + "\"}\n";
-}
-
-}  // namespace
-
 LedgerFile::LedgerFile(const std::string& run_folder, std::int64_t every, const Trainer& trainer,
                        std::map<std::string, std::string> origin)
     : folder_(run_folder),
@@ -39,9 +29,10 @@ LedgerWriter LedgerFile::continued(const std::string& run_folder) const {
                              ": the run that is resumed has one of every " + std::to_string(ledger.every) +
                              " steps; give the same");
   while (!ledger.lines.empty() && ledger.lines.back().step > trainer_.step()) ledger.lines.pop_back();
-  LedgerWriter writer(trainer_, every_, ledger.lines.empty() ? nullptr : &ledger.lines.back());
+  const LedgerLine last = ledger.lines.empty() ? LedgerLine() : LedgerLine::of(ledger.lines.back().text);
+  LedgerWriter writer(trainer_, every_, ledger.lines.empty() ? nullptr : &last);
   std::string text = writer.header() + "\n";
-  for (const LedgerLine& line : ledger.lines) text += with_chain(line);
+  for (const Ledger::Line& line : ledger.lines) text += line.text + "\n";
   write_file(path_in(run_folder), text);
   return writer;
 }
@@ -60,7 +51,7 @@ void LedgerFile::after_step() {
   const std::optional<LedgerLine> line = writer_.after_step();
   if (!line) return;
   std::ofstream out(path_in(folder_), std::ios::app);
-  out << with_chain(*line) << std::flush;
+  out << line->text() << "\n" << std::flush;
   if (!out) throw FileError(path_in(folder_), "cannot be written; is the disk full?");
   if (line->step % apart(every_, trainer_.total_steps()) == 0 || trainer_.done()) keep_state();
 }

@@ -1,7 +1,10 @@
 #include "models/training/ledger.h"
 
 #include <algorithm>
+#include <charconv>
 #include <fstream>
+#include <stdexcept>
+#include <string_view>
 
 #include "io/files/file.h"
 #include "io/files/json.h"
@@ -14,60 +17,83 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kFormat = "supertac-ledger-2";
 constexpr JsonLimits kLimits{.max_bytes = std::size_t{4} << 20};
 
-std::string chained(const std::string& before, const std::string& text) { return sha256(before + text); }
+constexpr std::string_view kChain = ",\"chain\":\"", kStep = "{\"step\":";
+constexpr std::size_t kHashDigits = 64;
 
-LedgerLine line_of(const std::string& text) {
-  const Json json = parse_json_limited(text, kLimits);
-  LedgerLine line;
-  line.step = json.at("step").get<std::int64_t>();
-  line.batches = json.at("batches").get<std::string>();
-  line.tensors = json.at("tensors").get<std::vector<std::string>>();
-  line.chain = json.at("chain").get<std::string>();
+// A line in its parts, without looking at its tensors: of a long training there are gigabytes. Nothing when
+// it is none.
+std::optional<Ledger::Line> line_in(const std::string& text) {
+  const std::size_t cut = text.rfind(kChain);
+  Ledger::Line line{0, {}, text};
+  if (!text.starts_with(kStep) || cut == std::string::npos ||
+      text.size() != cut + kChain.size() + kHashDigits + 2 ||
+      std::from_chars(text.data() + kStep.size(), text.data() + cut, line.step).ec != std::errc())
+    return std::nullopt;
+  line.chain = text.substr(cut + kChain.size(), kHashDigits);
   return line;
+}
+
+std::string chained(const std::string& before, const std::string& content) {
+  return sha256(before + content);
 }
 
 }  // namespace
 
-std::string LedgerLine::text() const {
-  return Json{{"step", step}, {"batches", batches}, {"tensors", tensors}}.dump();
+std::string LedgerLine::text(bool with_chain) const {
+  Json json{{"step", step}, {"batches", batches}, {"tensors", tensors}};
+  if (with_chain) json["chain"] = chain;
+  return json.dump();
+}
+
+LedgerLine LedgerLine::of(const std::string& text) {
+  try {
+    const Json json = parse_json_limited(text, kLimits);
+    return {json.at("step").get<std::int64_t>(), json.at("batches").get<std::string>(),
+            json.at("tensors").get<std::vector<std::string>>(), json.at("chain").get<std::string>()};
+  } catch (const std::exception& error) {
+    throw std::runtime_error(std::string("a ledger's line is damaged: ") + error.what());
+  }
 }
 
 Ledger Ledger::read(const std::string& path) {
+  const std::string none = "is no ledger of supertac-train --ledger, or damaged";
   std::ifstream in(path);
   if (!in) throw FileError(path, "cannot be read; train with --ledger N to have one");
   Ledger ledger;
   std::string text;
+  std::getline(in, text);
   try {
-    std::getline(in, text);
     const Json header = parse_json_limited(text, kLimits);
     if (header.at("format") == "supertac-ledger-1")
       throw FileError(path, "has hashes of 64 bits, as version 0.1 wrote them; train again with --ledger N");
-    if (header.at("format") != kFormat) throw FileError(path, "is no ledger of supertac-train --ledger");
+    if (header.at("format") != kFormat) throw FileError(path, none);
     ledger.every = header.at("every").get<std::int64_t>();
     ledger.names = header.at("tensors").get<std::vector<std::string>>();
-    std::string chain = sha256(text);
-    while (std::getline(in, text)) {
-      if (in.eof()) break;  // torn off in the middle: the run was killed as it wrote
-      LedgerLine line = line_of(text);
-      chain = chained(chain, line.text());
-      if (line.chain != chain || line.tensors.size() != ledger.names.size())
-        throw FileError(path, "step " + std::to_string(line.step) +
-                                  ": the chain is broken; a line was changed after it had been written");
-      ledger.lines.push_back(std::move(line));
-    }
   } catch (const Json::exception&) {
-    throw FileError(path, "is no ledger of supertac-train --ledger, or damaged");
+    throw FileError(path, none);
   } catch (const JsonError& error) {
-    throw FileError(path,
-                    std::string("is no ledger of supertac-train --ledger, or damaged: ") + error.what());
+    throw FileError(path, none + ": " + error.what());
+  }
+  if (ledger.every < 1) throw FileError(path, none);
+  std::string chain = sha256(text);
+  while (std::getline(in, text)) {
+    if (in.eof()) break;  // torn off in the middle: the run was killed as it wrote
+    std::optional<Line> line = line_in(text);
+    if (!line) throw FileError(path, none);
+    chain = chained(chain, text.substr(0, text.rfind(kChain)) + "}");
+    if (line->chain != chain)
+      throw FileError(path, "step " + std::to_string(line->step) +
+                                ": the chain is broken; a line was changed after it had been written");
+    ledger.lines.push_back(std::move(*line));
   }
   return ledger;
 }
 
-const LedgerLine* Ledger::at(std::int64_t step) const {
+std::optional<LedgerLine> Ledger::at(std::int64_t step) const {
   const auto found = std::lower_bound(lines.begin(), lines.end(), step,
-                                      [](const LedgerLine& line, std::int64_t s) { return line.step < s; });
-  return found != lines.end() && found->step == step ? &*found : nullptr;
+                                      [](const Line& line, std::int64_t s) { return line.step < s; });
+  if (found == lines.end() || found->step != step) return std::nullopt;
+  return LedgerLine::of(found->text);
 }
 
 std::vector<std::string> hashes_of(const Trainer& trainer) {
@@ -99,12 +125,14 @@ std::optional<LedgerLine> LedgerWriter::after_step() {
   if (trainer_.step() % every_ != 0 && !trainer_.done()) return std::nullopt;
   LedgerLine line{
       .step = trainer_.step(), .batches = batches_.hex(), .tensors = hashes_of(trainer_), .chain = {}};
-  line.chain = chain_ = chained(chain_, line.text());
+  line.chain = chain_ = chained(chain_, line.text(false));
   batches_ = {};
   return line;
 }
 
 std::optional<LedgerDifference> difference(const Ledger& header, const LedgerLine& a, const LedgerLine& b) {
+  if (a.tensors.size() != header.names.size() || b.tensors.size() != header.names.size())
+    throw std::runtime_error("a ledger's line has other tensors than its header names");
   LedgerDifference d{.after = (a.step - 1) / header.every * header.every,
                      .step = a.step,
                      .what = {},
@@ -130,7 +158,8 @@ std::optional<LedgerDifference> first_difference(const Ledger& a, const Ledger& 
       high = middle;
     }
   }
-  return low == both ? std::nullopt : difference(a, a.lines[low], b.lines[low]);
+  return low == both ? std::nullopt
+                     : difference(a, LedgerLine::of(a.lines[low].text), LedgerLine::of(b.lines[low].text));
 }
 
 }  // namespace supertac

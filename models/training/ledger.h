@@ -21,19 +21,25 @@ struct LedgerLine {
   std::vector<std::string> tensors;  ///< of each parameter and of Adam's moments, in the order of the header
   std::string chain;                 ///< over all that stands here and the chain before
 
-  /// The line without its chain as JSON text.
-  std::string text() const;
+  /// Of a line of the file. Throws std::runtime_error when it is none.
+  static LedgerLine of(const std::string& text);
+  /// As the file has it; without its chain: what is chained.
+  std::string text(bool with_chain = true) const;
 };
 
 struct Ledger {
   std::int64_t every = 0;          ///< steps from line to line
   std::vector<std::string> names;  ///< of the tensors
-  std::vector<LedgerLine> lines;
+  struct Line {
+    std::int64_t step;
+    std::string chain, text;
+  };
+  std::vector<Line> lines;
 
   /// Throws FileError when the file is no ledger, or a line's chain is not that of what stands before it
   /// (naming the line): it was changed after it had been written.
   static Ledger read(const std::string& path);
-  const LedgerLine* at(std::int64_t step) const;
+  std::optional<LedgerLine> at(std::int64_t step) const;
 };
 
 /// Of every array of a trainer's state, as a line has them.

@@ -24,8 +24,8 @@ std::string ledger_of(const std::vector<Entry>& entries) {
   std::int64_t step = 0;
   for (const Entry& e : entries) {
     const LedgerLine line{step += 5, e.batches, {e.first, e.second}, {}};
-    chain = sha256(chain + line.text());
-    Json json = Json::parse(line.text());
+    chain = sha256(chain + line.text(false));
+    Json json = Json::parse(line.text(false));
     json["chain"] = chain;
     file += json.dump() + "\n";
   }
