@@ -10,10 +10,8 @@ trap 'rm -rf "$work"' EXIT
 name=$(tar -tf "$archive" | head -1 | cut -d/ -f1)
 tar -C "$work" -xf "$archive"
 
-# newcomer HOME RUNNER...: what each program says of its bits and of what was made in HOME; RUNNER runs bin/supertac-JOB.
+# newcomer RUNNER...: what the programs say of their bits and of what was made in $home; RUNNER runs bin/supertac-JOB.
 newcomer() {
-  home=$1
-  shift
   "$@" check bits
   "$@" simulate --out "$home/d" --plates 6_Ridges --passes 2 --speeds 10 --quiet
   "$@" train --data "$home/d" --out "$home/m.safetensors" --preset tiny --split none --epochs 1 --stride 64 --quiet
@@ -28,7 +26,7 @@ hashes() { grep -oE '\b[0-9a-f]{16,64}\b' | sort -u | sha256sum; }
 inside() {  # ROOT JOB OPTION...
   root=$1 job=$2
   shift 2
-  chroot "$root" "/opt/$name/bin/supertac-$job" "$@"
+  TMPDIR=/tmp chroot "$root" "/opt/$name/bin/supertac-$job" "$@"
 }
 emulated() {
   job=$1
@@ -36,18 +34,20 @@ emulated() {
   qemu-x86_64 -cpu Nehalem "$work/$name/bin/supertac-$job" "$@"
 }
 
-mkdir -p "$work/empty" "$work/emulated"
+home=/tmp/newcomer  # everywhere, since files name their source
+mkdir "$work/empty" "$home"
+trap 'rm -rf "$work" "$home"' EXIT
 expected=""
 for place in "$work/empty" "$@" emulated; do
   case "$place" in
-    emulated) newcomer "$work/emulated" emulated >"$work/said" ;;
+    emulated) newcomer emulated >"$work/said" ;;
     *)
       mkdir -p "$place/opt" "$place/tmp"
-      rm -rf "$place/tmp/newcomer" "$place/opt/$name"
-      mkdir "$place/tmp/newcomer"
+      rm -rf "$place$home" "$place/opt/$name"
+      mkdir "$place$home"
       cp -r "$work/$name" "$place/opt/"
-      newcomer /tmp/newcomer inside "$place" >"$work/said"
-      rm -rf "$place/tmp/newcomer" "$place/opt/$name"
+      newcomer inside "$place" >"$work/said"
+      rm -rf "$place$home" "$place/opt/$name"
       ;;
   esac
   found=$(hashes <"$work/said")
