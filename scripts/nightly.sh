@@ -3,10 +3,10 @@
 # UndefinedBehaviorSanitizer, what has threads under ThreadSanitizer, clang-tidy and cppcheck over everything, and which
 # files the tests cover by less than 80 %. Some hours on two cores.
 # Each part can be run alone. The last line of each part is added, with date and commit, to scripts/nightly.log.
-#   scripts/nightly.sh [clang] [aarch64] [asan] [tsan] [tidy] [cppcheck] [lintian] [coverage]
+#   scripts/nightly.sh [clang] [aarch64] [asan] [tsan] [tidy] [cppcheck] [lintian] [portable] [wheel] [coverage]
 set -eu
 cd "$(dirname "$0")/.."
-[ $# -gt 0 ] || set -- clang aarch64 asan tsan tidy cppcheck lintian coverage
+[ $# -gt 0 ] || set -- clang aarch64 asan tsan tidy cppcheck lintian portable wheel coverage
 scripts/setup.sh libgtest-dev python3 clang libomp-dev gcovr
 note() { echo "$(date -u +%Y-%m-%d) $(git describe --always --dirty) $1: $2" | tee -a scripts/nightly.log; }
 suite() {  # NAME SANITIZERS PATTERN
@@ -52,6 +52,19 @@ for part in "$@"; do
       (cd build && cpack -G DEB >/dev/null && lintian ./*.deb >lintian.log) || true
       note lintian "$(grep -c '^E:' build/lintian.log) errors"
       ;;
+    portable)
+      scripts/setup.sh qemu-user
+      if scripts/portable.sh && packaging/portable_test.sh supertac-*.tar.xz; then
+        note portable "the same bits in an empty folder and without AVX"
+      else note portable "fails"; fi
+      ;;
+    wheel)  # Python's package as pip makes it
+      scripts/setup.sh python3-venv
+      python3 -m venv build-venv
+      build-venv/bin/pip install -q ./python
+      build/bin/supertac-simulate --out build-venv/data --plates 6_Ridges --passes 1 --speeds 10 --quiet --force
+      if build-venv/bin/python examples/tour.py build-venv/data; then note wheel "trains and draws"; else note wheel "fails"; fi
+      ;;
     coverage)
       cmake -S . -B build-coverage -G Ninja -DCMAKE_BUILD_TYPE=Debug -DSUPERTAC_QUICK_BUILD=ON -DSUPERTAC_MPI=OFF \
         -DCMAKE_CXX_FLAGS="--coverage -O1" -DCMAKE_EXE_LINKER_FLAGS=--coverage >/dev/null
@@ -61,6 +74,6 @@ for part in "$@"; do
         --print-summary | tail -3
       note coverage "below 80 %: $(awk -F, 'NR > 1 && $4 < 0.8 { printf "%s ", $1 }' build-coverage/files.csv)"
       ;;
-    *) echo "nightly.sh: expected clang, aarch64, asan, tsan, tidy, cppcheck, lintian or coverage, found $part" >&2; exit 2 ;;
+    *) echo "nightly.sh: expected clang, aarch64, asan, tsan, tidy, cppcheck, lintian, portable, wheel or coverage, found $part" >&2; exit 2 ;;
   esac
 done
