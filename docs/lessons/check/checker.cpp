@@ -51,7 +51,7 @@ double common_factor(const Compared& c, const std::vector<std::size_t>& wrong) {
 }
 
 std::string about_factor(double f) {
-  if (f == 0) return "nothing arrives there: is there a line that adds to it?";
+  if (f == 0) return "nothing arrives there: is a line missing, or a slope 0?";
   if (std::abs(f + 1) < 1e-4) return "the sign is turned.";
   if (std::abs(f - 0.5) < 1e-4)
     return "half of what it should be: is it set (=) where it should be added (+=), or is a factor 2 "
@@ -60,7 +60,7 @@ std::string about_factor(double f) {
   const double n = std::abs(f) > 1 ? f : 1 / f;
   if (std::abs(n - std::round(n)) < 1e-3)
     return number(std::abs(n)) + " times too " + (std::abs(f) > 1 ? "large" : "small") +
-           (f < 0 ? ", with the wrong sign" : "") + ": is the 1/n there, and once only?";
+           (f < 0 ? ", with the wrong sign" : "") + ": is a factor missing (1/n, a side), or there twice?";
   return "all by the same factor, " + number(f) + ".";
 }
 
@@ -86,9 +86,10 @@ std::string cause_of(const Compared& c, const std::vector<std::size_t>& wrong) {
   const auto finite = [](double x) { return std::isfinite(x); };
   if (!std::ranges::all_of(c.yours, finite))
     return "a number is not finite: a division by 0, or exp of a large one?";
+  if (!c.hint.empty()) return c.hint;
   if (const double f = common_factor(c, wrong);
       !std::isnan(f) && (all || n == 1 || wrong.size() > 1 || f != 0))
-    return (all ? "" : "of the wrong ones, ") + about_factor(f);
+    return about_factor(f);
   std::vector<double> mine = c.yours, right = c.right;
   std::ranges::sort(mine), std::ranges::sort(right);
   const bool same_numbers =
@@ -111,7 +112,7 @@ std::string cause_of(const Compared& c, const std::vector<std::size_t>& wrong) {
   const bool constant = std::ranges::all_of(
       wrong, [&](std::size_t i) { return std::abs(c.yours[i] - c.right[i] - off) < 1e-6 * scale; });
   if (constant && wrong.size() > 1) return "all are off by the same number, " + number(off) + ".";
-  return "a term or a sum is missing, or has a factor that differs from entry to entry.";
+  return "not one factor for all: is a term of the sum missing (= for +=), or another index or value meant?";
 }
 
 std::string finding(const Compared& c, const std::string& from) {
@@ -159,6 +160,17 @@ void Report::gradients(const std::string& what, const std::vector<std::string>& 
     // What differences leave behind of rounding is no gradient.
     arrays[e.input].right.push_back(e.relative_error < 1e-6 ? e.analytic : e.numeric);
   }
+  gradients(what, arrays);
+}
+
+void Report::gradients(const std::string& what, std::vector<Compared> arrays) {
+  const auto as = [](const Compared& mine, const Compared& other) {
+    return finding({"", {}, mine.yours, other.right}, "").empty();
+  };
+  for (Compared& mine : arrays)
+    for (const Compared& other : arrays)
+      if (&mine != &other && !as(mine, mine) && as(mine, other) && as(other, mine))
+        mine.hint = "these are the numbers of " + other.name + ": are the two exchanged?";
   for (const Compared& c : arrays) add(what, c, "differences give");
 }
 
@@ -178,7 +190,8 @@ void name_aborts(const char* lesson) {
   lesson_name = lesson;
   std::signal(SIGABRT, [](int) {
     const char text[] =
-        ": an index outside its array, or an exception (the line above); the lesson ends here\n";
+        ": an index outside its array, or an exception, in the check after the last line above; the lesson "
+        "ends here\n";
     std::fflush(stdout);
     [[maybe_unused]] ssize_t n = ::write(1, "  wrong: ", 9);
     n = ::write(1, lesson_name, std::strlen(lesson_name));

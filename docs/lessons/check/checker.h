@@ -14,6 +14,7 @@ struct Compared {
   std::string name;        ///< "gw"
   std::vector<int> shape;  ///< row-major
   std::vector<double> yours, right;
+  std::string hint = {};  ///< what to say if it is wrong; empty: what the pattern suggests
 };
 
 /// "gw [1,0]: yours 0, differences give 4.42 (22 of 22 entries are wrong): nothing arrives ..."; empty when
@@ -31,6 +32,8 @@ class Report {
   void gradients(const std::string& what, const std::vector<std::string>& names,
                  const std::vector<supertac::Tensor>& inputs,
                  const std::function<supertac::Variable(const std::vector<supertac::Variable>&)>& f);
+  /// The same of gradients that are known. Says so when two of them are exchanged.
+  void gradients(const std::string& what, std::vector<Compared> arrays);
   int wrong() const { return wrong_; }
 
  private:
