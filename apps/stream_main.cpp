@@ -11,6 +11,7 @@
 #include "apps/web/web_options.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
+#include "io/files/json.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
@@ -89,10 +90,31 @@ void declare(Arguments& a) {
   declare_web(a);
 }
 
-/// Says what a port sends; --sensor names a sensor's file (*.json), or an address alone.
+/// Whether it names a sensor's file, whatever its ending, and no address: a file is one as well where a
+/// sensor's bytes were kept, of which every line may be an object.
+bool describes_sensor(const std::string& named) {
+  constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 20;
+  if (named == "rig" || named.ends_with(".json")) return true;
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(named, error) ||
+      std::filesystem::file_size(named, error) > kMostBytes)
+    return false;
+  const std::string text = read_text_file(named, kMostBytes);
+  const std::size_t begin = text.find_first_not_of(" \t\r\n"), end = text.find('\n', begin);
+  if (begin == std::string::npos || text[begin] != '{') return false;
+  if (text.find_first_not_of(" \t\r\n", end) == std::string::npos) return true;
+  try {
+    (void)parse_json_limited(std::string_view(text).substr(begin, end - begin));
+    return false;
+  } catch (const JsonError&) {  // goes on in the next line
+    return true;
+  }
+}
+
+/// Says what a port sends; --sensor names a sensor's file, or an address alone.
 int probe_port(const Arguments& a) {
   const std::string& named = a.text("sensor");
-  const bool described = named == "rig" || named.ends_with(".json");
+  const bool described = describes_sensor(named);
   Sensor sensor;
   if (described) sensor = read_sensor(named);
   if (!described) sensor.port = named;

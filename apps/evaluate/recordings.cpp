@@ -30,7 +30,8 @@ WindowSet load_windows(const Arguments& a, const ModelFile& file) {
       a.given("plates") ? a.list("plates") : comma_list(file.metadata_or("plates", ""));
   add_model_parents(a.list("model"));
   add_parent("recordings", hash_of_recordings(a.text("data"), plates));
-  return WindowSet::load(a.text("data"), plates, file.windows(), reading_of(a, a.text("data")));
+  return WindowSet::load(a.text("data"), plates, file.windows(),
+                         progress_of(a, "reading " + a.text("data"), "recordings"));
 }
 
 std::string row(const std::string& name, const ZoneMetrics& metrics, const Latency& latency) {
@@ -152,7 +153,8 @@ int evaluate_on_recordings(const Arguments& a) {
     train_pairs = pairs->add("train.safetensors"), test_pairs = pairs->add("test.safetensors");
   }
   OutputsFile outputs(windows.array(), windows.frames(), windows.image());
-  const Baselines baselines = fit_baselines(windows, tested.split.train);
+  const Baselines baselines =
+      fit_baselines(windows, tested.split.train, progress_of(a, "fitting the baselines", "parts"));
   EvaluationPage page(windows);
   const RecordingScores scores =
       score_all(a, network, files.front(), windows, tested, baselines,

@@ -6,17 +6,22 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
 
+#include "apps/common/running/signals.h"
 #include "autograd/kernels/elementwise.h"
 #include "autograd/reverse_watch.h"
 #include "autograd/trace.h"
 
 namespace supertac {
 namespace {
+
+constexpr int kPatienceS = 120;  // of the largest network's graph dot makes a drawing in seconds
+constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30;
 
 double norm(const Tensor& t) { return std::sqrt(kernels::sum_of_squares(t.size(), t.data())); }
 
@@ -77,6 +82,19 @@ std::string label(const TracedOp& op, const std::map<const real*, const Paramete
   return text;
 }
 
+// Its status; -1 of a program that did not end in time. A signal ends it, and the wait.
+int wait_for(pid_t child) {
+  int status = -1;
+  for (int i = 0; i < kPatienceS * 100 && !interrupted(); ++i) {
+    if (::waitpid(child, &status, WNOHANG) != 0) return status;
+    ::usleep(10'000);
+  }
+  ::kill(child, SIGKILL);
+  ::waitpid(child, &status, 0);
+  stop_if_interrupted();
+  return -1;
+}
+
 }  // namespace
 
 std::string graph_of(const std::function<Variable()>& loss, const std::vector<Parameter>& parameters) {
@@ -117,15 +135,16 @@ void write_graph(const OutputPath& output, const std::string& dot) {
       ::execlp("dot", "dot", "-Tsvg", source.c_str(), "-o", drawn.c_str(), static_cast<char*>(nullptr));
       ::_exit(127);
     }
-    if (child > 0) ::waitpid(child, &status, 0);
-    if (status == 0) publish(drawn, output);
-  } catch (const FileError&) {
+    if (child > 0) status = wait_for(child);
+    if (status == 0) write_file(output, read_text_file(drawn, kMostBytes));
+  } catch (...) {
     std::filesystem::remove_all(folder);
     throw;
   }
   std::filesystem::remove_all(folder);
   if (status != 0)
-    throw FileError(output.path, "dot of Graphviz did not draw it; install graphviz, or ask for FILE.dot");
+    throw FileError(output.path, "dot of Graphviz did not draw it within " + std::to_string(kPatienceS) +
+                                     " s; install graphviz, or ask for FILE.dot");
 }
 
 }  // namespace supertac

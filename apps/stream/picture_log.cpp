@@ -6,6 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 
@@ -52,7 +53,38 @@ void PictureLog::add(const Seen& seen) {
   if (half_widths_) append(half_widths_, std::as_bytes(seen.half_widths));
   const auto distance = static_cast<float>(seen.distance.value_or(0));
   if (distances_) append(distances_, std::as_bytes(std::span(&distance, 1)));
+  if (seen.arrival && !pictures_) arrivals_.push_back(*seen.arrival);
   ++count_;
+}
+
+// What the board's clock said, now that all frames are known.
+std::vector<std::byte> PictureLog::dated_times() {
+  const FrameTimeline timeline = timeline_of(arrivals_);
+  std::vector<double> times;
+  for (const FramePlace& place : timeline.places) {
+    kept_.push_back(place.doubt * timeline.clock.period_s <= kTrustedS);
+    const auto from_first = static_cast<double>(place.index - timeline.places.front().index);
+    if (kept_.back()) times.push_back(timeline.clock.period_s * from_first);
+  }
+  if (times.empty()) return {};
+  left_out_ = count_ - times.size();
+  const auto bytes = std::as_bytes(std::span(times));
+  return {bytes.begin(), bytes.end()};
+}
+
+void PictureLog::read_rows(const Spool& spool, std::size_t row_bytes, const ByteSink& sink) {
+  std::vector<std::byte> row;
+  std::size_t number = 0;
+  read_back(spool, [&](std::span<const std::byte> bytes) {
+    for (; !bytes.empty();) {
+      const auto part = bytes.first(std::min(bytes.size(), row_bytes - row.size()));
+      row.insert(row.end(), part.begin(), part.end());
+      bytes = bytes.subspan(part.size());
+      if (row.size() < row_bytes) return;
+      if (kept_[number++]) sink(row);
+      row.clear();
+    }
+  });
 }
 
 void PictureLog::read_back(const Spool& spool, const ByteSink& sink) {
@@ -66,6 +98,17 @@ void PictureLog::read_back(const Spool& spool, const ByteSink& sink) {
 void PictureLog::write(std::map<std::string, std::string> metadata) {
   if (!problem_.empty()) throw FileError(output_.path, problem_);
   if (!std::isnan(began_s_)) metadata["began_s"] = supertac::format(began_s_);
+  if (count_ > 0 && arrivals_.size() == count_) {
+    const std::vector<std::byte> times = dated_times();
+    const std::uint64_t kept = count_ - left_out_, row = format_.signals * sizeof(float);
+    if (left_out_ > 0) metadata["left_out_frames"] = std::to_string(left_out_);
+    if (times.empty()) metadata["doubt"] = "too short to know the board's clock: dated as the frames came";
+    const auto rows = [&](const ByteSink& sink) { read_rows(volts_, row, sink); };
+    if (!times.empty())
+      return write_safetensors(
+          output_, metadata,
+          {{"time_s", "F64", {kept}, times, {}}, {"volts", "F32", {kept, format_.signals}, {}, rows}});
+  }
   const auto from = [this](const Spool& spool) {
     return [this, &spool](const ByteSink& sink) { read_back(spool, sink); };
   };

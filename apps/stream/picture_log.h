@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "apps/stream/seen.h"
 #include "io/files/safetensors.h"
@@ -18,6 +19,9 @@ namespace supertac {
 /// "began_s" is the wall-clock time of time_s 0 (s since 1970), where it is known. How many there will be is
 /// not known before the end, and they do not fit into memory (1 MB/s): they wait in nameless temporary files
 /// beside the final one.
+/// A recording of a board is dated at its end, by the clock that collections have
+/// (hardware/boards/frame_clock.h); frames whose time is uncertain by more than kTrustedS, because the host
+/// or the board stood still, are left out, and metadata left_out_frames counts them.
 class PictureLog {
  public:
   /// Throws FileError when the file cannot be made there, or exists and is not to be replaced.
@@ -26,6 +30,9 @@ class PictureLog {
   void add(const Seen& seen);
   /// Writes the file, atomically. Throws FileError, again when add() has.
   void write(std::map<std::string, std::string> metadata);
+  /// Frames that write() left out.
+  std::uint64_t left_out() const { return left_out_; }
+  static constexpr double kTrustedS = 0.03;  ///< in which a finger of 10 mm/s goes 0.3 mm
 
  private:
   struct Close {
@@ -36,13 +43,17 @@ class PictureLog {
   Spool open_spool();
   void append(const Spool& spool, std::span<const std::byte> bytes);
   void read_back(const Spool& spool, const ByteSink& sink);
+  std::vector<std::byte> dated_times();
+  void read_rows(const Spool& spool, std::size_t row_bytes, const ByteSink& sink);
   [[noreturn]] void fail();
 
   OutputPath output_;
   PictureFormat format_;
-  std::uint64_t count_ = 0;
-  double began_s_ = NAN;  // Seen::wall_s of Seen::time_s 0
-  std::string problem_;   // of a write that failed: what was kept is not whole
+  std::uint64_t count_ = 0, left_out_ = 0;
+  double began_s_ = NAN;                // Seen::wall_s of Seen::time_s 0
+  std::vector<FrameArrival> arrivals_;  // of a recording of a board
+  std::vector<bool> kept_;              // of its frames
+  std::string problem_;                 // of a write that failed: what was kept is not whole
   Spool times_, volts_, pictures_, half_widths_, distances_;
 };
 

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "data/sensors/taxel_array.h"
+#include "hardware/boards/frame_clock.h"
 
 namespace supertac {
 
@@ -24,7 +25,8 @@ struct Seen {
       NAN;  ///< when it arrived (s since 1970); NaN of a recording that does not say when it began
   std::span<const float> volts, picture;
   std::span<const float> half_widths;  ///< of each pixel's 90 % interval; empty when the model does not say
-  std::optional<double> distance;      ///< of its window from those of training (models/inference/novelty.h)
+  std::optional<FrameArrival> arrival = {};  ///< of a board's frame
+  std::optional<double> distance;  ///< of its window from those of training (models/inference/novelty.h)
 };
 
 }  // namespace supertac

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <filesystem>
 
 #include "apps/common/running/signals.h"
@@ -35,7 +34,10 @@ class BoardSource : public SensorSource {
     const auto frame = board_.next(wait_s);
     if (!frame) return std::nullopt;
     volts_ = taxel_volts(frame->frame);
-    return SensorFrame{frame->time_s, volts_, frame->arrival_s / speedup_};
+    return SensorFrame{.time_s = frame->time_s,
+                       .volts = volts_,
+                       .arrived_s = frame->arrival.time_s / speedup_,
+                       .arrival = frame->arrival};
   }
   bool ended() const override { return false; }
   BoardCounters counters() override { return board_.counters(); }
@@ -43,8 +45,7 @@ class BoardSource : public SensorSource {
     board_.stop();
     if (!capture_) return;
     capture_->close();
-    if (capture_->path() != final_name_ && std::rename(capture_->path().c_str(), final_name_.c_str()) != 0)
-      throw FileError(final_name_, "cannot be replaced; the capture is " + capture_->path());
+    if (capture_->path() != final_name_) publish(capture_->path(), final_name_);
   }
 
  private:
@@ -67,7 +68,10 @@ class ReplaySource : public SensorSource {
       const auto frame = board_.next(wait_s);
       if (!frame) return std::nullopt;
       volts_ = taxel_volts(frame->frame);
-      return SensorFrame{frame->time_s, volts_, monotonic_seconds()};
+      return SensorFrame{.time_s = frame->time_s,
+                         .volts = volts_,
+                         .arrived_s = monotonic_seconds(),
+                         .arrival = frame->arrival};
     } catch (const PortUnplugged&) {  // how a capture ends
       ended_ = true;
       return std::nullopt;
@@ -93,7 +97,7 @@ class ReaderSource : public SensorSource {
     auto frame = reader_.next(wait_s);
     if (!frame) return std::nullopt;
     frame_ = std::move(*frame);
-    return SensorFrame{frame_.time_s, frame_.signals, frame_.arrival_s};
+    return SensorFrame{.time_s = frame_.time_s, .volts = frame_.signals, .arrived_s = frame_.arrival_s};
   }
   bool ended() const override { return reader_.ended(); }
   BoardCounters counters() override {
@@ -124,8 +128,10 @@ class RecordingSource : public SensorSource {
   std::optional<SensorFrame> next(double) override {
     if (ended()) return std::nullopt;
     const std::size_t i = at_++, signals = array().signals();
-    SensorFrame frame{recording_.time_s[i], std::span(recording_.volts).subspan(i * signals, signals),
-                      monotonic_seconds(), recording_.began_s() + recording_.time_s[i]};
+    SensorFrame frame{.time_s = recording_.time_s[i],
+                      .volts = std::span(recording_.volts).subspan(i * signals, signals),
+                      .arrived_s = monotonic_seconds(),
+                      .wall_s = recording_.began_s() + recording_.time_s[i]};
     if (!recording_.position_mm.empty())
       frame.x_mm = recording_.position_mm[2 * i], frame.y_mm = recording_.position_mm[2 * i + 1];
     return frame;

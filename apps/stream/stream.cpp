@@ -138,6 +138,9 @@ std::string Stream::summary() const {
          (lines_lost_ > 0 ? ", " + std::to_string(lines_lost_) + " lines not taken by their reader" : "") +
          (unlike_ > 0 ? ", " + std::to_string(unlike_) + " pictures of signals unlike training" : "") +
          (record_ ? "; recorded " + record_path_ : "") +
+         (record_ && record_->left_out() > 0
+              ? ", " + std::to_string(record_->left_out()) + " frames left out, their time being uncertain"
+              : "") +
          (record_remark_.empty() ? "" : "; " + record_remark_);
 }
 
@@ -160,6 +163,7 @@ nlohmann::ordered_json Stream::result() const {
                                      {"p99.9", milliseconds(0.999)},
                                      {"max", 1e3 * latency_.max()}}}};
   if (record_) result["recording"] = record_remark_.empty() ? record_path_ : record_remark_;
+  if (record_) result["left_out"] = record_->left_out();
   return result;
 }
 
@@ -195,6 +199,7 @@ void Stream::keep_raw(const SensorFrame& frame) {
   Seen seen;
   seen.number = frames_ - 1, seen.time_s = frame.time_s - first_s_, seen.volts = frame.volts;
   seen.wall_s = frame.wall_s;
+  seen.arrival = frame.arrival;
   if (record_) record_->add(seen);
   if (recorder_) recorder_->add(seen);
   if (maker_) return;
@@ -214,8 +219,13 @@ void Stream::output(const Seen& seen) {
 }
 
 void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
-  const Seen seen{pictures() - 1, frame.time_s - first_s_, frame.wall_s,      maker_->volts(),
-                  picture,        maker_->half_widths(),   maker_->distance()};
+  const Seen seen{.number = pictures() - 1,
+                  .time_s = frame.time_s - first_s_,
+                  .wall_s = frame.wall_s,
+                  .volts = maker_->volts(),
+                  .picture = picture,
+                  .half_widths = maker_->half_widths(),
+                  .distance = maker_->distance()};
   state_.unlike_training = maker_->unlike_training();
   output(seen);
   state_.number = seen.number, state_.time_s = seen.time_s;

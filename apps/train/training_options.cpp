@@ -181,7 +181,7 @@ FrameRecipe frame_recipe_of(const Arguments& a) {
 
 RecordingFolders folders_of(const Arguments& a) {
   return {.data = a.text("data"), .also = a.text("also"), .watch = [&a](const std::string& folder) {
-            return reading_of(a, folder);
+            return progress_of(a, "reading " + folder, "recordings");
           }};
 }
 

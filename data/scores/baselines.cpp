@@ -147,9 +147,10 @@ Baselines fit_baselines(const Examples& examples, std::span<const std::uint32_t>
   return baselines;
 }
 
-Baselines fit_baselines(const WindowSet& windows, std::span<const std::uint32_t> train) {
+Baselines fit_baselines(const WindowSet& windows, std::span<const std::uint32_t> train,
+                        const FitProgress& progress) {
   Baselines baselines = fit_baselines(static_cast<const Examples&>(windows), train);
-  baselines.push_back(std::make_unique<Ridge>(windows, train));
+  baselines.push_back(std::make_unique<Ridge>(windows, train, progress));
   return baselines;
 }
 

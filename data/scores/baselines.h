@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -77,11 +78,15 @@ class UpsampledFrame : public Baseline {
 
 using Baselines = std::vector<std::unique_ptr<Baseline>>;
 
+/// Told how much of `all` is done, some times a second; may throw to end the fit.
+using FitProgress = std::function<void(std::size_t done, std::size_t all)>;
+
 /// mean_image, nearest and bicubic, in this order; for windows ridge (data/scores/ridge.h) besides. Each is
 /// fitted to at most kFitWindows training examples, evenly spread over the list. Throws std::invalid_argument
 /// when train is empty.
 constexpr std::size_t kFitWindows = 20000;
 Baselines fit_baselines(const Examples& examples, std::span<const std::uint32_t> train);
-Baselines fit_baselines(const WindowSet& windows, std::span<const std::uint32_t> train);
+Baselines fit_baselines(const WindowSet& windows, std::span<const std::uint32_t> train,
+                        const FitProgress& progress = {});
 
 }  // namespace supertac

@@ -55,6 +55,20 @@ void add_rows(double* y, std::size_t count, double sign, const double* rows, std
   }
 }
 
+constexpr std::size_t kBlock = 64;  // windows whose features stay in the cache; rows between two looks
+
+// How many of the blocks of a whole fit are done.
+struct Fit {
+  const FitProgress& progress;
+  std::size_t done = 0, all = 0;
+  void block() {
+    ++done;
+    if (progress) progress(done, all);
+  }
+};
+
+std::size_t blocks_of(std::size_t count) { return (count + kBlock - 1) / kBlock; }
+
 // What least squares needs of a set of windows: X'X (its upper triangle), X'Y and Y'Y; all matrices are
 // row-major.
 struct Moments {
@@ -62,13 +76,12 @@ struct Moments {
   std::vector<double> xx, xy;
   double yy = 0;
 
-  Moments(const WindowSet& windows, std::span<const std::uint32_t> indices)
+  Moments(const WindowSet& windows, std::span<const std::uint32_t> indices, Fit& fit)
       : features(features_of(static_cast<std::size_t>(windows.timesteps()), windows.array().signals())),
         pixels(windows.image().pixels()),
         xx(features * features),
         xy(features * pixels) {
-    constexpr std::size_t kBlock = 64;  // windows whose features stay in the cache
-    for (std::size_t first = 0; first < indices.size(); first += kBlock)
+    for (std::size_t first = 0; first < indices.size(); first += kBlock, fit.block())
       add(windows, indices.subspan(first, std::min(kBlock, indices.size() - first)));
   }
 
@@ -99,7 +112,7 @@ struct Moments {
   }
 
   // W [f][pixels], from U'U W = X'Y with the Cholesky factor U of X'X and the penalty
-  std::vector<double> solve(double penalty) const {
+  std::vector<double> solve(double penalty, Fit& fit) const {
     const std::size_t n = features, p = pixels;
     double mean = 0;
     for (std::size_t i = 0; i + 1 < n; ++i) mean += xx[i * (n + 1)] / static_cast<double>(n - 1);
@@ -114,23 +127,27 @@ struct Moments {
       for (std::size_t j = i; j < n; ++j) row[j] *= scale;
       add_rows(&w[i * p], p, -1, w.data(), p, &u[i], n, i);
       for (std::size_t j = 0; j < p; ++j) w[i * p + j] /= row[i];
+      if (i % kBlock == 0) fit.block();
     }
     for (std::size_t i = n; i-- > 0;) {
       const double* row = &u[i * n];
       add_rows(&w[i * p], p, -1, w.data() + (i + 1) * p, p, row + i + 1, 1, n - 1 - i);
       for (std::size_t j = 0; j < p; ++j) w[i * p + j] /= row[i];
+      if (i % kBlock == 0) fit.block();
     }
     return w;
   }
 
   // |Y - X W|^2
-  double error(const std::vector<double>& w) const {
+  double error(const std::vector<double>& w, Fit& fit) const {
     const std::size_t n = features, p = pixels;
     std::vector<double> product(w.size());
+    for (std::size_t first = 0; first < n; first += kBlock, fit.block()) {
 #pragma omp parallel for
-    for (std::size_t i = 0; i < n; ++i) {
-      add_rows(&product[i * p], p, 1, w.data(), p, &xx[i], n, i);
-      add_rows(&product[i * p], p, 1, &w[i * p], p, &xx[i * (n + 1)], 1, n - i);
+      for (std::size_t i = first; i < std::min(n, first + kBlock); ++i) {
+        add_rows(&product[i * p], p, 1, w.data(), p, &xx[i], n, i);
+        add_rows(&product[i * p], p, 1, &w[i * p], p, &xx[i * (n + 1)], 1, n - i);
+      }
     }
     return yy - 2 * dot(w, xy) + dot(w, product);
   }
@@ -158,7 +175,7 @@ std::vector<bool> held_out(const WindowSet& windows, std::span<const std::uint32
 
 }  // namespace
 
-Ridge::Ridge(const WindowSet& windows, std::span<const std::uint32_t> train)
+Ridge::Ridge(const WindowSet& windows, std::span<const std::uint32_t> train, const FitProgress& progress)
     : timesteps_(static_cast<std::size_t>(windows.timesteps())),
       signals_(windows.array().signals()),
       pixels_(windows.image().pixels()) {
@@ -167,17 +184,20 @@ Ridge::Ridge(const WindowSet& windows, std::span<const std::uint32_t> train)
   const std::vector<bool> held = held_out(windows, chosen);
   std::vector<std::uint32_t> fit, judge;
   for (std::size_t n = 0; n < chosen.size(); ++n) (held[n] ? judge : fit).push_back(chosen[n]);
-  Moments moments(windows, fit);
-  const Moments other(windows, judge);
+  const std::size_t rows = blocks_of(features_of(timesteps_, signals_));
+  Fit looks{progress};
+  looks.all = blocks_of(fit.size()) + blocks_of(judge.size()) + (3 * std::size(kPenalties) + 2) * rows;
+  Moments moments(windows, fit, looks);
+  const Moments other(windows, judge, looks);
   double least = 0;
   for (const double penalty : kPenalties) {
-    const double error = other.error(moments.solve(penalty));
+    const double error = other.error(moments.solve(penalty, looks), looks);
     if (penalty_ == 0 || error < least) {
       penalty_ = penalty;
       least = error;
     }
   }
-  const std::vector<double> w = (moments += other).solve(penalty_);
+  const std::vector<double> w = (moments += other).solve(penalty_, looks);
   weights_.assign(w.begin(), w.end());
 }
 

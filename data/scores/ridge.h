@@ -17,7 +17,7 @@ namespace supertac {
 class Ridge : public Baseline {
  public:
   /// Fits to at most kFitWindows windows, evenly spread. Throws std::invalid_argument when train is empty.
-  Ridge(const WindowSet& windows, std::span<const std::uint32_t> train);
+  Ridge(const WindowSet& windows, std::span<const std::uint32_t> train, const FitProgress& progress = {});
   std::string name() const override { return "ridge"; }
   void predict(std::span<const float> window, std::span<float> out) const override;
   /// As chosen, in units of the mean of X'X's diagonal.

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <vector>
 
 #include "hardware/boards/binary_decoder.h"
@@ -85,9 +84,10 @@ std::optional<Period> period_of(const std::string& bytes) {
   return std::nullopt;
 }
 
-// Little or big endian by which byte of each pair moves less; single bytes where both move alike.
+// Little or big endian by which byte of each pair moves less, where nothing has proven it; single bytes where
+// both move alike.
 void guess_type(const std::string& bytes, const Period& period, std::size_t values_at, std::size_t count,
-                FrameFormat& f) {
+                std::optional<bool> big_endian, FrameFormat& f) {
   std::array<double, 2> moved{};
   bool negative = true, positive = false, all = true;
   std::size_t real = 0, reals = 0;
@@ -100,19 +100,17 @@ void guess_type(const std::string& bytes, const Period& period, std::size_t valu
       moved[i % 2] += std::abs(step);
     }
     for (std::size_t i = 0; i + 4 <= count; i += 4, ++reals) {
-      float value = 0;
-      std::memcpy(&value, &bytes[at + i], sizeof value);
-      real +=
-          std::isfinite(value) && (value == 0 || (std::abs(value) > 1e-6F && std::abs(value) < 1e7F)) ? 1 : 0;
+      const double value = number_at(bytes_in(bytes, at + i, 4).data(), "f32", big_endian.value_or(false));
+      real += value == 0 || (std::abs(value) > 1e-6 && std::abs(value) < 1e7) ? 1 : 0;
     }
   }
   f.type = "u8";
   if (count % 4 == 0 && reals > 0 && static_cast<double>(real) > kAgree * static_cast<double>(reals)) {
-    f.type = "f32", f.big_endian = false;
+    f.type = "f32", f.big_endian = big_endian.value_or(false);
     return;
   }
   if (count % 2 != 0 || std::max(moved[0], moved[1]) < 3 * std::min(moved[0], moved[1])) return;
-  f.type = "u16", f.big_endian = moved[0] < moved[1];
+  f.type = "u16", f.big_endian = big_endian.value_or(moved[0] < moved[1]);
   negative = false;
   for (std::size_t i = f.big_endian ? 0 : 1; i < count; i += 2) {
     const char high = bytes[period.at + period.length + values_at + i];
@@ -152,22 +150,24 @@ std::optional<BinaryFinding> find_binary_format(const std::string& bytes, double
       for (const bool big : {false, true})
         if (f.checksum == "none" && agrees(h, kind, big)) header = h, f.checksum = kind, f.big_endian = big;
   const std::size_t behind = checksum_bytes(f.checksum);
+  std::optional<bool> proven;  // by a checksum of two bytes, or a clock
+  if (behind == 2) proven = f.big_endian;
   if (values && f.checksum == "none")
     for (std::size_t h = header; h >= 1; --h)
       if ((period->length - h) % *values == 0) header = h, h = 1;
   std::size_t values_at = header;
   for (const bool big : {false, true}) {
-    if (period->length < header + 4 + behind || f.time) continue;
+    if (period->length < header + 4 + behind || f.time || big != proven.value_or(big)) continue;
     std::vector<double> stamps;
     for (std::size_t n = 0; n < frames; ++n)
       stamps.push_back(
           number_at(bytes_in(bytes, period->at + n * period->length + header, 4).data(), "u32", big));
     if (const auto unit = unit_of_clock(stamps, seconds); unit && *unit < 1)
-      f.time = FrameTime{.type = "u32", .unit_s = *unit}, f.big_endian = big, values_at += 4;
+      f.time = FrameTime{.type = "u32", .unit_s = *unit}, f.big_endian = big, proven = big, values_at += 4;
   }
   f.header = bytes.substr(period->at, header);
   const std::size_t count = period->length - values_at - behind;
-  guess_type(bytes, *period, values_at, count, f);
+  guess_type(bytes, *period, values_at, count, proven, f);
   if (values && *values > 0 && count % *values == 0) {
     const std::size_t width = count / *values;
     if (width != bytes_of(f.type)) f.type = width == 1 ? "u8" : width == 2 ? "u16" : "u32";

@@ -15,7 +15,8 @@ namespace {
 constexpr double kReadSlice = 0.05, kSilenceS = 3, kSilentPeriods = 10;
 constexpr std::size_t kReadBytes = 65536;  // no datagram is longer
 constexpr double kChunkS = 0.12;  // an adapter hands bytes on up to 0.1 s late: frames are lost beyond
-constexpr double kRestartS = 1;   // a clock that goes back by more has started anew
+constexpr double kJumpS = 1, kJumpPeriods = 10;  // stamps farther from the one before are a jump
+constexpr double kMostStampS = 1e11;             // three thousand years; a double still tells 20 us apart
 constexpr std::uint64_t kBlock = 64;
 constexpr std::size_t kShown = 120;
 
@@ -32,15 +33,9 @@ FrameDates::FrameDates(const Sensor& sensor) : nominal_s_(1 / sensor.rate_hz), p
 }
 
 std::optional<double> FrameDates::date(std::optional<double> stamp_s, double arrival_s) {
-  double time = stamp_s ? *stamp_s + offset_s_ : by_arrival(arrival_s);
-  if (count_ > 0 && stamp_s && time <= last_s_) {
-    const double back = last_s_ - time;
-    if (wraps_s_ > 0 && back > 0.5 * wraps_s_)
-      offset_s_ += wraps_s_, time += wraps_s_;
-    else if (back > kRestartS)
-      offset_s_ += back + std::max(arrival_s - last_arrival_s_, nominal_s_), time = *stamp_s + offset_s_;
-  }
-  if (count_ > 0 && time <= last_s_) return std::nullopt;
+  const auto dated = stamp_s ? by_stamp(*stamp_s, arrival_s) : std::optional(by_arrival(arrival_s));
+  if (!dated || (count_ > 0 && *dated <= last_s_)) return std::nullopt;
+  const double time = *dated;
   if (count_ > 0) {
     const double periods = (time - last_s_) / period_s_;
     if (periods > 1.5) missing_ += static_cast<std::uint64_t>(std::lround(std::min(periods - 1, 1e9)));
@@ -49,6 +44,26 @@ std::optional<double> FrameDates::date(std::optional<double> stamp_s, double arr
   ++count_;
   last_s_ = time, last_arrival_s_ = arrival_s;
   return time;
+}
+
+// A damaged stamp may be anything, and what it said would hold for all that follow. So a jump is believed
+// when the next stamp goes on from it: then frames were lost, or the sensor has started anew.
+std::optional<double> FrameDates::by_stamp(double stamp_s, double arrival_s) {
+  if (!(std::abs(stamp_s) < kMostStampS)) return std::nullopt;
+  if (count_ == 0) return stamp_s;
+  const double farthest = std::max(kJumpS, kJumpPeriods * nominal_s_);
+  double ahead = stamp_s + offset_s_ - last_s_;
+  const bool runs_over = wraps_s_ > 0 && ahead < -0.5 * wraps_s_;
+  if (runs_over) ahead += wraps_s_;
+  if (ahead > farthest || ahead < -kJumpS) {
+    const double from_jump = jumped_s_ ? stamp_s - *jumped_s_ : 0;
+    jumped_s_ = stamp_s;
+    if (from_jump <= 0 || from_jump > farthest) return std::nullopt;
+    if (ahead < 0) offset_s_ += std::max(arrival_s - last_arrival_s_, nominal_s_) - ahead;
+  }
+  jumped_s_.reset();
+  if (runs_over) offset_s_ += wraps_s_;
+  return stamp_s + offset_s_;
 }
 
 // The rate that a sensor's file names is a word, not a clock: the least lateness of every block moves the

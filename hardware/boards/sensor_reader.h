@@ -24,27 +24,30 @@ struct ReadFrame {
 struct ReaderCounters {
   SensorDecoder::Counters decoder;
   std::uint64_t damaged = 0;  ///< frames with a signal that is no number; not handed over
-  std::uint64_t late = 0;     ///< frames not later than the one before, by the sensor's clock; neither
+  std::uint64_t late = 0;     ///< frames that FrameDates gives no date; neither
   std::uint64_t missing = 0;  ///< frames that never arrived, by the gaps in time
   std::uint64_t dropped = 0;  ///< frames that nobody took in time
   double period_s = 0;        ///< from frame to frame, as they came
 };
 
 /// Dates frames in the order they come: by the sensor's stamps where it sends any (a counter of 16 or 32 bits
-/// may run over; a sensor that starts anew goes on where it was), else by arrival. A frame can come late, not
-/// early, so without stamps the frames are a period apart below the earliest arrivals.
+/// may run over; a sensor that starts anew goes on where it was; a stamp that nothing goes on from costs its
+/// own frame, and so does the first one after a pause of seconds), else by arrival. A frame can come late,
+/// not early, so without stamps the frames are a period apart below the earliest arrivals.
 class FrameDates {
  public:
   explicit FrameDates(const Sensor& sensor);
-  /// Nothing for a frame that is not later than the one before.
+  /// Nothing for a frame that is not later than the one before, or whose stamp jumps.
   std::optional<double> date(std::optional<double> stamp_s, double arrival_s);
   std::uint64_t missing() const { return missing_; }
   double period_s() const { return period_s_; }
 
  private:
+  std::optional<double> by_stamp(double stamp_s, double arrival_s);
   double by_arrival(double arrival_s);
   double nominal_s_, period_s_, wraps_s_ = 0;
   double offset_s_ = 0, last_s_ = 0, last_arrival_s_ = 0, least_late_s_ = 0;
+  std::optional<double> jumped_s_;  // a stamp that was not believed
   std::uint64_t count_ = 0, in_block_ = 0, missing_ = 0;
 };
 

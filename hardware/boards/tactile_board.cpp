@@ -94,9 +94,10 @@ void TactileBoard::take_batch(double time, bool more_waited) {
   for (const Decoded& decoded : batch_) steps_.push_back(1 + damaged_frames(decoded.discarded));
   live_.date(time, more_waited, steps_, dates_);
   for (std::size_t i = 0; i < batch_.size(); ++i) {
-    numbering_.push({time, steps_[i] - 1, more_waited}, places_);
+    const FrameArrival arrival{time, steps_[i] - 1, more_waited};
+    numbering_.push(arrival, places_);
     undecided_.push_back({time, i + 1 == batch_.size()});
-    StampedFrame frame{.frame = batch_[i].frame, .arrival_s = time, .time_s = dates_[i]};
+    StampedFrame frame{.frame = batch_[i].frame, .arrival = arrival, .time_s = dates_[i]};
     frame.suspect = batch_[i].discarded > 0 || (!first_ && time - last_arrival_ > 1.5 * rig::kFramePeriodS);
     frame.jump = jumps_.jump(frame.frame);
     first_ = false;

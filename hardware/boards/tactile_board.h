@@ -20,7 +20,7 @@ namespace supertac {
 
 struct StampedFrame {
   BoardFrame frame;
-  double arrival_s = 0;
+  FrameArrival arrival;
   double time_s = 0;     ///< when the board finished the frame, as far as that is known at once (LiveDates)
   bool suspect = false;  ///< first after a pause of 1.5 periods or after discarded bytes: may be torn
   bool jump = false;     ///< implausible change of a taxel

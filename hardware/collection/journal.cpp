@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 #include <utility>
 
 #include "hardware/ports/errors.h"
@@ -73,20 +72,6 @@ std::vector<std::span<const std::byte>> parts_of(std::span<const std::byte> payl
   return parts;
 }
 
-// So that a power cut does not take the new file's name. False with errno set.
-bool sync_directory(const std::string& file) {
-  const std::filesystem::path parent = std::filesystem::path(file).parent_path();
-  const int directory =
-      system_calls().open(parent.empty() ? "." : parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC, 0);
-  if (directory < 0) return false;
-  // EINVAL: a file system that has nothing to sync for a directory.
-  const bool synced = system_calls().fsync(directory) == 0 || errno == EINVAL;
-  const int error = errno;
-  (void)system_calls().close(directory);  // nothing was written through it
-  errno = error;
-  return synced;
-}
-
 }  // namespace
 
 JournalWriter::JournalWriter(const std::string& path, std::string_view header, std::uint64_t most_bytes)
@@ -102,7 +87,7 @@ JournalWriter::JournalWriter(const std::string& path, std::string_view header, s
     append(Stream::header, RecordKind::text, 0, std::as_bytes(std::span(header)));
     flush();
   }
-  if (error_.empty() && !sync_directory(path)) failed("its folder cannot be synced");
+  if (error_.empty() && !sync_folder_of(path)) failed("its folder cannot be synced");
   if (!error_.empty()) {
     (void)system_calls().close(descriptor_);
     (void)system_calls().unlink(path.c_str());

@@ -2,7 +2,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <netdb.h>
 #include <poll.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -14,6 +13,7 @@
 #include <optional>
 
 #include "hardware/ports/errors.h"
+#include "hardware/ports/host_addresses.h"
 #include "hardware/ports/port_list.h"
 #include "hardware/ports/serial_port.h"
 #include "io/numbers/numbers.h"
@@ -22,8 +22,8 @@
 namespace supertac {
 namespace {
 
-constexpr int kConnectMs = 5000, kSocketBytes = 4 << 20;
-constexpr double kNoWriterWaitS = 0.02;
+constexpr int kSocketBytes = 4 << 20;
+constexpr double kConnectS = 5, kNoWriterWaitS = 0.02;
 
 /// Bytes of a descriptor that are only read.
 class DescriptorPort : public Port {
@@ -96,8 +96,8 @@ OpenedPort open_serial(const std::string& address, const std::string& rest, doub
   return {std::make_unique<SerialPort>(resolve_board_port(rest.substr(0, at)), settings)};
 }
 
-/// Bound, or connected within kConnectMs; nothing, and errno, when that fails.
-std::optional<int> open_socket(const addrinfo& at, bool datagrams) {
+/// Bound, or connected in time; nothing, and errno, when that fails or a signal comes.
+std::optional<int> open_socket(const addrinfo& at, bool datagrams, double until) {
   const int type = at.ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK;
   const int descriptor = socket(at.ai_family, type, at.ai_protocol);
   if (descriptor < 0) return std::nullopt;
@@ -110,7 +110,9 @@ std::optional<int> open_socket(const addrinfo& at, bool datagrams) {
     error = errno;
     pollfd entry{descriptor, POLLOUT, 0};
     socklen_t size = sizeof error;
-    if (error == EINPROGRESS && poll(&entry, 1, kConnectMs) != 1) error = ETIMEDOUT;
+    const auto wait_ms = static_cast<int>(1e3 * std::max(0.0, until - monotonic_seconds()));
+    const int ready = error == EINPROGRESS ? poll(&entry, 1, wait_ms) : 0;
+    if (error == EINPROGRESS && ready != 1) error = ready == 0 ? ETIMEDOUT : errno;
     if (error == EINPROGRESS) (void)getsockopt(descriptor, SOL_SOCKET, SO_ERROR, &error, &size);
   }
   if (error == 0) return descriptor;
@@ -125,20 +127,16 @@ OpenedPort open_network(const std::string& address, const std::string& rest, boo
   const auto number = colon == std::string::npos ? std::nullopt : parse_uint(rest.substr(colon + 1));
   if (!number || *number < 1 || *number > 65535 || (host.empty() && !datagrams))
     fail(address, "expected udp:[HOST]:PORT or tcp:HOST:PORT, such as udp::5005");
-  addrinfo wanted{}, *found = nullptr;
-  wanted.ai_socktype = datagrams ? SOCK_DGRAM : SOCK_STREAM;
-  wanted.ai_flags = datagrams ? AI_PASSIVE : 0;
-  wanted.ai_family = host.empty() ? AF_INET : AF_UNSPEC;
-  const std::string service = std::to_string(*number);
-  if (const int error = getaddrinfo(host.empty() ? nullptr : host.c_str(), service.c_str(), &wanted, &found))
-    fail(address, std::string(gai_strerror(error)) + "; see whether the host is right");
+  const HostAddresses found = host_addresses("port " + printable(address), host, static_cast<int>(*number),
+                                             datagrams ? SOCK_DGRAM : SOCK_STREAM);
   std::optional<int> descriptor;
-  for (const addrinfo* at = found; at != nullptr && !descriptor; at = at->ai_next)
-    descriptor = open_socket(*at, datagrams);
-  const int error = errno;
-  freeaddrinfo(found);
+  const double until = monotonic_seconds() + kConnectS;
+  errno = ETIMEDOUT;
+  for (const addrinfo* at = found.get(); at != nullptr && !descriptor && monotonic_seconds() < until;
+       at = at->ai_next)
+    descriptor = open_socket(*at, datagrams, until);
   if (!descriptor)
-    fail(address, std::string(strerror(error)) + (datagrams ? "; another program may listen there"
+    fail(address, std::string(strerror(errno)) + (datagrams ? "; another program may listen there"
                                                             : "; see whether the sensor serves there"));
   using Kind = DescriptorPort::Kind;
   const Kind kind = !datagrams ? Kind::stream : lines ? Kind::lines : Kind::datagrams;

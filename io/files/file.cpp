@@ -86,6 +86,30 @@ void remove_leftovers(const std::string& path) {
   }
 }
 
+// publish() before the sync.
+std::string rename_to(const std::string& finished, const OutputPath& output) {
+  if (!output.when_taken) {
+    if (system_calls().rename(finished.c_str(), output.path.c_str()) != 0)
+      fail(output.path, "rename into place", errno);
+    return output.path;
+  }
+  const std::filesystem::path wished(output.path);
+  for (int number = 1; number <= 1000; ++number) {
+    auto name = wished;
+    if (number > 1)
+      name.replace_filename(wished.stem().string() + "-" + std::to_string(number) +
+                            wished.extension().string());
+    if (system_calls().rename_new(finished.c_str(), name.c_str()) == 0) {
+      if (number > 1)
+        output.when_taken(output.path + ": appeared meanwhile and is not replaced; what was made is " +
+                          name.string());
+      return name.string();
+    }
+    if (errno != EEXIST) fail(output.path, "rename into place", errno);
+  }
+  throw FileError(output.path, "is taken, and so are 999 names after it; what was made is " + finished);
+}
+
 }  // namespace
 
 FileError::FileError(const std::string& path, const std::string& problem)
@@ -143,26 +167,10 @@ std::string read_text_file(const std::string& path, std::uint64_t max_bytes) {
 }
 
 std::string publish(const std::string& finished, const OutputPath& output) {
-  if (!output.when_taken) {
-    if (system_calls().rename(finished.c_str(), output.path.c_str()) != 0)
-      fail(output.path, "rename into place", errno);
-    return output.path;
-  }
-  const std::filesystem::path wished(output.path);
-  for (int number = 1; number <= 1000; ++number) {
-    auto name = wished;
-    if (number > 1)
-      name.replace_filename(wished.stem().string() + "-" + std::to_string(number) +
-                            wished.extension().string());
-    if (system_calls().rename_new(finished.c_str(), name.c_str()) == 0) {
-      if (number > 1)
-        output.when_taken(output.path + ": appeared meanwhile and is not replaced; what was made is " +
-                          name.string());
-      return name.string();
-    }
-    if (errno != EEXIST) fail(output.path, "rename into place", errno);
-  }
-  throw FileError(output.path, "is taken, and so are 999 names after it; what was made is " + finished);
+  const std::string name = rename_to(finished, output);
+  if (!sync_folder_of(name))
+    fail(name, "sync the directory (it is written, a power cut may yet lose it)", errno);
+  return name;
 }
 
 AtomicFile::AtomicFile(const OutputPath& output)
@@ -227,7 +235,7 @@ void AtomicFile::commit() {
   if (retry([&] { return system_calls().fsync(file_); }) != 0) fail(path_, "sync to disk", errno);
   const int closed = system_calls().close(std::exchange(file_, -1));
   if (closed != 0 && errno != EINTR) fail(path_, "close", errno);
-  publish(temporary_, {path_, output_.when_taken});
+  rename_to(temporary_, {path_, output_.when_taken});
   temporary_.clear();
   // EINVAL: a file system that has nothing to sync for a directory.
   if (retry([&] { return system_calls().fsync(directory_); }) != 0 && errno != EINVAL) {

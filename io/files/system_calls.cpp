@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <filesystem>
 
 namespace supertac {
 namespace {
@@ -35,6 +36,22 @@ SystemCalls real_system_calls() {
       .rename_new = rename_new,
       .unlink = ::unlink,
   };
+}
+
+bool sync_folder_of(const std::string& path) {
+  const std::string parent = std::filesystem::path(path).parent_path();
+  const int flags = O_RDONLY | O_DIRECTORY | O_CLOEXEC;
+  const int folder = system_calls().open(parent.empty() ? "." : parent.c_str(), flags, 0);
+  if (folder < 0) return false;
+  int result = 0;
+  do result = system_calls().fsync(folder);
+  while (result != 0 && errno == EINTR);
+  // EINVAL: a file system that has nothing to sync for a folder.
+  const bool synced = result == 0 || errno == EINVAL;
+  const int error = errno;
+  (void)system_calls().close(folder);  // nothing was written through it
+  errno = error;
+  return synced;
 }
 
 SystemCalls& system_calls() {

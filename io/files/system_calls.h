@@ -7,6 +7,7 @@
 #include <sys/types.h>
 
 #include <cstddef>
+#include <string>
 
 namespace supertac {
 
@@ -27,6 +28,9 @@ struct SystemCalls {
 
 /// The real calls.
 SystemCalls real_system_calls();
+
+/// So that a power cut does not take away the name of a file or folder. False with errno set.
+bool sync_folder_of(const std::string& path);
 
 /// The table in use. Replaced by tests only; not to be changed while another thread uses files.
 SystemCalls& system_calls();

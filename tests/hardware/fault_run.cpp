@@ -1,12 +1,11 @@
 #include "tests/hardware/fault_run.h"
 
 #include <algorithm>
-#include <array>
-#include <map>
 
 #include "hardware/collection/collection.h"
 #include "hardware/ports/errors.h"
 #include "io/numbers/numbers.h"
+#include "tests/hardware/numbered_board.h"
 #include "tests/hardware/rig_support.h"
 
 namespace supertac {
@@ -44,43 +43,6 @@ std::string check_moves(std::vector<std::string> ran, std::vector<std::string> p
   return {};
 }
 
-constexpr std::uint64_t kWord = rig::kAdcCodes;  // of a sample
-
-/// Where the head was in the middle of every frame, by the frame's number, which the taxels carry eight
-/// times.
-class NumberedBoard {
- public:
-  explicit NumberedBoard(RigSettings& settings) {
-    settings.board.noise_adc = 0;
-    settings.board.signals = [this](double, double, double, double) {
-      std::array<double, rig::kTaxels> volts{};
-      const std::uint64_t number = heads_.size() - 1;
-      for (std::size_t k = 0; k < volts.size(); k += 2) {
-        volts[k] = rig::volts_of(static_cast<int>(number % kWord));
-        volts[k + 1] = rig::volts_of(static_cast<int>(number / kWord));
-      }
-      return volts;
-    };
-  }
-  void watch(VirtualBoard& board) {
-    board.on_frame([this](std::uint64_t, double, const Point3& head, bool) { heads_.push_back(head); });
-  }
-  /// The numbers that three copies at least agree on: two in a torn frame. Two copies may be flipped alike.
-  std::vector<std::uint64_t> numbers_in(const std::function<int(std::size_t)>& taxel) const {
-    std::map<std::uint64_t, int> copies;
-    for (std::size_t k = 0; k < rig::kTaxels; k += 2)
-      ++copies[static_cast<std::uint64_t>(taxel(k)) + kWord * static_cast<std::uint64_t>(taxel(k + 1))];
-    std::vector<std::uint64_t> numbers;
-    for (const auto& [number, count] : copies)
-      if (count >= 3 && number < heads_.size()) numbers.push_back(number);
-    return numbers;
-  }
-  const Point3& head(std::uint64_t number) const { return heads_[number]; }
-
- private:
-  std::vector<Point3> heads_;
-};
-
 // Every frame between the first and the last is received or missing.
 std::string check_frames(const Journal& journal, const NumberedBoard& board, const Collection& collection) {
   std::vector<std::uint64_t> numbers;
@@ -107,10 +69,7 @@ void judge_passes(const Collection& collection, const NumberedBoard& board, Faul
     double worst = 0;
     for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
       const double* p = pass.position.data() + 3 * i;
-      const auto taxel = [&](std::size_t k) {
-        return rig::adc_of(static_cast<double>(pass.volts[rig::kTaxels * i + k]));
-      };
-      for (const std::uint64_t number : board.numbers_in(taxel))
+      for (const std::uint64_t number : board.numbers_in(pass.volts, i))
         worst = std::max(worst, distance(board.head(number), {p[0], p[1], p[2]}));
     }
     verdict.worst_mm = std::max(verdict.worst_mm, worst);
@@ -137,8 +96,8 @@ std::string check_finger(const PalpationOutcome& outcome, SimulatedRig& rig, con
 
 }  // namespace
 
-FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan& plan,
-                                   const Point3& origin) {
+FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan& plan, const Point3& origin,
+                                   const PortBetween& printer) {
   FaultVerdict verdict;
   const TemporaryFolder folder;
   rig_settings.printer.head = origin;
@@ -159,7 +118,9 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
   const std::vector<std::string> planned = planned_moves(settings.plan, settings.origin);
   const std::vector<Leg> legs = legs_of(settings.plan, settings.origin);
   try {
-    const RecorderReport report = record_palpation(rig.board_port(), rig.printer_port(), settings);
+    auto port = rig.printer_port();
+    if (printer) port = printer(std::move(port));
+    const RecorderReport report = record_palpation(rig.board_port(), std::move(port), settings);
     const Point3 head = rig.world().printer().head(rig.now());
     verdict.complete = report.outcome.complete;
     verdict.realtime = report.outcome.realtime_position;

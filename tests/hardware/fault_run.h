@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <string>
 
 #include "hardware/collection/palpation_recorder.h"
@@ -26,8 +28,10 @@ struct FaultVerdict {
 /// Runs the whole plan on a rig whose frames carry their own number, by which they are compared with the
 /// truth. Promises: complete with the head where it should be, every planned move run once and in order,
 /// every frame accounted for as received or missing; or a typed error with the finger lifted or the stop
-/// confirmed. No recording is wrong by more than kTrustedMm without saying so.
+/// confirmed. No recording is wrong by more than kTrustedMm without saying so. `printer`: what the driver
+/// gets in the place of the printer's port.
+using PortBetween = std::function<std::unique_ptr<Port>(std::unique_ptr<Port> printer)>;
 FaultVerdict run_faulty_collection(RigSettings rig, const PalpationPlan& plan,
-                                   const Point3& origin = rig::kMounted);
+                                   const Point3& origin = rig::kMounted, const PortBetween& printer = {});
 
 }  // namespace supertac

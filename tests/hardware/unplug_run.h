@@ -2,6 +2,7 @@
 // finger was left.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 
@@ -18,13 +19,16 @@ struct UnplugVerdict {
   double hanging_up_s = 0;  ///< that the kernel took to hang the terminal up; allowed for
   std::string finger;       ///< what the outcome says
   std::string broken;       ///< the promise that was broken; empty when all held
+
+  /// How late the notice itself was, which depends on what else the machine does.
+  double late_s() const { return noticed_s - std::max(stall_s, hanging_up_s); }
 };
 
 /// Pulls the plug of a port that is only read from.
 UnplugVerdict unplug_idle(Plug plug, std::uint64_t seed);
 
-/// Pulls it at a random moment of a short collection. Promises: a typed error, noticed within 0.1 s; with the
-/// printer still there the finger ends lifted, without it the note says to lift it by hand.
+/// Pulls it at a random moment of a short collection. Promises: a typed error; with the printer still there
+/// the finger ends lifted, without it the note says to lift it by hand.
 UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed);
 
 }  // namespace supertac

@@ -5,6 +5,7 @@
 
 77 where this is no Debian.
 """
+import gzip
 import json
 import os
 import pathlib
@@ -82,7 +83,7 @@ expect(completed("supertac-train", "--pres") == ["--preset"], "supertac-train --
 pages = build / "share/man"
 if shutil.which("help2man"):
     for job in jobs:
-        page = (pages / f"supertac-{job}.1").read_text()
+        page = gzip.decompress((pages / f"supertac-{job}.1.gz").read_bytes()).decode()
         expect("\\-\\-json" in page and ".SH NAME" in page, f"the man page of {job} lacks its options")
 print("CycloneDX's schema accepts the list" if asked else "cyclonedx is not installed: its schema was not asked")
-print(f"{len(parts)} programs listed, {len(jobs)} completed" + (f", {len(list(pages.glob('*.1')))} man pages" if pages.exists() else ""))
+print(f"{len(parts)} programs listed, {len(jobs)} completed" + (f", {len(list(pages.glob('*.1.gz')))} man pages" if pages.exists() else ""))

@@ -151,7 +151,11 @@ int catch_all(const Program& program, int argc, const char* const* argv) {
                     "; is it the right file, is its name UTF-8?",
                 kExitFailed);
   } catch (const std::exception& error) {
-    return fail(program, error.what(), kExitFailed);
+    // Whatever a signal cut short, such as a wait for a host, fails because of it.
+    const int signal = interrupting_signal();
+    return signal == 0 ? fail(program, error.what(), kExitFailed)
+                       : fail(program, "stopped by signal " + std::to_string(signal) + "; " + error.what(),
+                              128 + signal);
   }
 }
 

@@ -121,6 +121,7 @@ void OutputFolder::keep() {
     else
       publish(hidden_.string(), {final_.string(), output_.when_taken});
   } catch (const FileError& error) {
+    if (!is_there(hidden_)) throw;  // everything has its name
     // Under a name that the next program does not take for something unfinished.
     std::string name = hidden_.filename().string();
     if (const std::size_t at = name.rfind(".unfinished-"); at != std::string::npos)

@@ -88,13 +88,14 @@ void Progress::draw(const std::string& line) {
   width_ = line.size();
 }
 
-std::function<void(std::size_t, std::size_t)> reading_of(const Arguments& arguments,
-                                                         const std::string& folder) {
-  return [&arguments, folder, bar = std::shared_ptr<Progress>()](std::size_t done, std::size_t all) mutable {
-    stop_if_interrupted();
-    if (!bar) bar = std::make_shared<Progress>(arguments, "reading " + folder, all, "recordings");
-    bar->update(done);
-  };
+std::function<void(std::size_t, std::size_t)> progress_of(const Arguments& arguments, const std::string& what,
+                                                          const std::string& unit) {
+  return
+      [&arguments, what, unit, bar = std::shared_ptr<Progress>()](std::size_t done, std::size_t all) mutable {
+        stop_if_interrupted();
+        if (!bar) bar = std::make_shared<Progress>(arguments, what, all, unit);
+        bar->update(done);
+      };
 }
 
 std::string progress_line(const std::string& what, std::uint64_t done, std::uint64_t total,

@@ -44,10 +44,11 @@ class Progress {
   std::chrono::steady_clock::time_point begin_, last_;
 };
 
-/// To be called for each of many recordings of a folder: shows how far the reading is, and ends it by
-/// Interrupted after a signal.
-std::function<void(std::size_t done, std::size_t all)> reading_of(const Arguments& arguments,
-                                                                  const std::string& folder);
+/// To be called for each part of long work that knows nothing of programs: shows how far `what` is, in
+/// `unit`, and ends it by Interrupted after a signal.
+std::function<void(std::size_t done, std::size_t all)> progress_of(const Arguments& arguments,
+                                                                   const std::string& what,
+                                                                   const std::string& unit);
 
 /// The bar's text, e.g. "training  [#####.....]  50 %  1200 steps/s  0:41 left"; `rate` is in units a second,
 /// `detail` replaces it.

@@ -1,7 +1,6 @@
 #include "apps/stream/views/line_output.h"
 
 #include <fcntl.h>
-#include <netdb.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -14,6 +13,7 @@
 #include <stdexcept>
 
 #include "apps/common/running/signals.h"
+#include "hardware/ports/host_addresses.h"
 #include "hardware/ports/serial_port.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
@@ -81,13 +81,10 @@ UdpOutput::UdpOutput(const std::string& address) {
   if (host.empty() || !number || *number < 1 || *number > 65535)
     throw std::runtime_error("--udp: expected HOST:PORT, such as 127.0.0.1:9870, found " +
                              in_quotes(address));
-  addrinfo wanted{}, *found = nullptr;
-  wanted.ai_socktype = SOCK_DGRAM;
-  if (const int error = getaddrinfo(host.c_str(), port.c_str(), &wanted, &found); error != 0)
-    throw std::runtime_error("--udp: " + in_quotes(host) + ": " + gai_strerror(error));
+  const HostAddresses found =
+      host_addresses("--udp: " + in_quotes(host), host, static_cast<int>(*number), SOCK_DGRAM);
   socket_ = socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const bool connected = socket_ >= 0 && connect(socket_, found->ai_addr, found->ai_addrlen) == 0;
-  freeaddrinfo(found);
   if (connected) return;
   const std::string why = printable(std::generic_category().message(errno));
   if (socket_ >= 0) close(socket_);

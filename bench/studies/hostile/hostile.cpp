@@ -1,8 +1,10 @@
 // hostile lines N SEED: N command lines of evil values for every option of every program.
 // hostile mutants N SEED: N seeded mutants through every reader, in this process; build it with the preset
 // asan. hostile signals N SEED: N simulations, imports and trainings ended by a signal at a random moment.
-// One table of counts on stdout; exit 1 when anything was found. Run it as an ordinary user or as root: as
-// root the programs run as nobody, since evil values are also names of outputs.
+// hostile files N SEED: N files that are valid and lie. hostile devices N SEED: N collections, in simulated
+// time, with printers that lie, boards that send in bursts and hosts that stall. One table of counts on
+// stdout; exit 1 when anything was found. Run it as an ordinary user or as root: as root the programs run as
+// nobody, since evil values are also names of outputs.
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
@@ -22,6 +24,8 @@
 #include <regex>
 #include <span>
 
+#include "bench/studies/hostile/evil_value.h"
+#include "bench/studies/hostile/liars.h"
 #include "bench/studies/hostile/readers.h"
 #include "io/files/file.h"
 #include "io/numbers/random.h"
@@ -73,64 +77,6 @@ struct Run {
   long kilobytes = 0;
   std::string error;
 };
-
-std::string evil_value(const RandomStream& random, std::uint64_t at) {
-  static const std::vector<std::string> values = {"",
-                                                  "0",
-                                                  "-1",
-                                                  "1",
-                                                  "2",
-                                                  "nan",
-                                                  "inf",
-                                                  "1e308",
-                                                  "1e-308",
-                                                  "18446744073709551616",
-                                                  "0x10",
-                                                  "1,,2",
-                                                  ",",
-                                                  "plain",
-                                                  "ridges6",
-                                                  "ridges0.0000001",
-                                                  "ridgesinf",
-                                                  "bumps-1",
-                                                  "precious",
-                                                  "precious.stl",
-                                                  "data",
-                                                  "data/1",
-                                                  "data/good",
-                                                  "model",
-                                                  "new",
-                                                  "new/er",
-                                                  "loop",
-                                                  "fifo",
-                                                  "empty",
-                                                  "link",
-                                                  "/dev/null",
-                                                  "/dev/zero",
-                                                  "/dev/full",
-                                                  "/proc/self/mem",
-                                                  "/",
-                                                  ".",
-                                                  "..",
-                                                  "-",
-                                                  "--",
-                                                  "q'; system('touch PWNED'); x='",
-                                                  "$(touch PWNED)",
-                                                  "`touch PWNED`",
-                                                  "a;touch PWNED",
-                                                  "x\ny",
-                                                  "\x1b[31mred",
-                                                  "\xff\xfe",
-                                                  std::string(300, 'x'),
-                                                  std::string(5000, 'y'),
-                                                  "4x4",
-                                                  "16x16",
-                                                  "window",
-                                                  "paper",
-                                                  "%s%n%x",
-                                                  "precious,precious"};
-  return values[random.bits(at) % values.size()];
-}
 
 void prepare(const fs::path& folder) {
   fs::create_directories(folder / "data" / "1");
@@ -372,6 +318,8 @@ int main_of(const std::string& mode, std::uint64_t n, std::uint64_t seed) {
   if (mode == "lines") counts = command_lines(folder, kept, n, seed);
   if (mode == "signals") counts = signals(folder, kept, n, seed);
   if (mode == "mutants") counts = mutants_of_readers(folder.string(), n, seed);
+  if (mode == "files") counts = lying_files(folder.string(), n, seed);
+  if (mode == "devices") counts = lying_devices(n, seed);
   fs::remove_all(folder);
   const auto print = [&](std::initializer_list<const char*> names) {
     std::uint64_t sum = 0;
@@ -382,9 +330,10 @@ int main_of(const std::string& mode, std::uint64_t n, std::uint64_t seed) {
     return sum;
   };
   print({"command lines", "with --force", "exit 0", "exit 1", "exit 2", "exit 129", "exit 130", "exit 143",
-         "signals", "mutants"});
-  const std::uint64_t findings = print({"slow mutants", "crashes", "hangs", "above 1 GB", "raw exceptions",
-                                        "control codes", "shells", "files overwritten", "half folders"});
+         "signals", "mutants", "lying files", "collections", "complete", "typed errors"});
+  const std::uint64_t findings =
+      print({"broken promises", "slow mutants", "crashes", "hangs", "above 1 GB", "raw exceptions",
+             "control codes", "shells", "files overwritten", "half folders"});
   return findings == 0 ? 0 : 1;
 }
 
@@ -393,7 +342,8 @@ int main_of(const std::string& mode, std::uint64_t n, std::uint64_t seed) {
 
 int main(int argc, char** argv) {
   if (argc != 4) {
-    std::cerr << "hostile: expected lines|mutants|signals N SEED, found " << argc - 1 << " words\n";
+    std::cerr << "hostile: expected lines|mutants|signals|files|devices N SEED, found " << argc - 1
+              << " words\n";
     return 2;
   }
   return supertac::main_of(argv[1], std::stoull(argv[2]), std::stoull(argv[3]));

@@ -81,20 +81,53 @@ double processor_seconds() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-Bytes good_model(const std::string& path) {
+}  // namespace
+
+Bytes good_recording(const std::string& folder) {
+  write_recording(folder + "/recording", short_recording());
+  return read_file(folder + "/recording", 1 << 24);
+}
+
+Bytes good_model(const std::string& folder) {
+  const std::string path = folder + "/model";
   Rng rng(1);
   const SuperTac model({.timesteps = 32, .latent = 3, .scale = 2, .channels = 8, .rcabs = 1}, rng);
   save_model(path, model, {}, {});
   return read_file(path, 1 << 24);
 }
 
-Bytes good_pairs(const std::string& path) {
+Bytes good_pairs(const std::string& folder) {
+  const std::string path = folder + "/pairs";
   const std::vector<float> input(4 * 16, 0.5F), target(4 * 256, 0.25F);
   write_safetensors(path, {},
                     {{"input", "F32", {4, 1, 4, 4}, std::as_bytes(std::span(input))},
                      {"target", "F32", {4, 1, 16, 16}, std::as_bytes(std::span(target))}});
   return read_file(path, 1 << 20);
 }
+
+void judge_reading(const std::string& what, const std::function<void()>& read,
+                   std::map<std::string, std::uint64_t>& counts) {
+  const auto found = [&](const char* kind, const std::string& why) {
+    ++counts[kind];
+    std::cerr << what << ": " << why << '\n';
+  };
+  const double begin = processor_seconds();
+  try {
+    read();
+  } catch (const FileError&) {
+  } catch (const HardwareError&) {
+  } catch (const JsonError&) {
+  } catch (const std::invalid_argument&) {
+  } catch (const std::logic_error& error) {
+    found("crashes", error.what());
+  } catch (const std::exception& error) {
+    found("raw exceptions", error.what());
+  }
+  const double took = processor_seconds() - begin;
+  if (took > 0.1) found("slow mutants", std::to_string(took) + " s");
+}
+
+namespace {
 
 /// The live page's server, asked with bytes; it must go on answering.
 class AskedServer {
@@ -122,11 +155,10 @@ class AskedServer {
 
 std::vector<Reader> readers(const std::string& folder) {
   const std::string file = folder + "/mutant";
-  write_recording(folder + "/recording", short_recording());
   std::string lines;
   for (int i = 0; i < 20; ++i)
     lines += "2.40 2.41 2.42 2.43 2.44 2.45 2.40 2.41 2.42 2.43 2.44 2.45 2.40 2.41 2.42 2.43\n";
-  const Bytes recording = read_file(folder + "/recording", 1 << 24);
+  const Bytes recording = good_recording(folder);
   const auto from_file = [file](auto read) {
     return [file, read](const Bytes& bytes) {
       // Not write_file(): a million syncs.
@@ -162,15 +194,14 @@ std::vector<Reader> readers(const std::string& folder) {
              const std::string name(text_of(b));
              if (!Plate::is_file(name)) (void)Plate::named(name);
            }},
-          {"model", good_model(folder + "/model"), from_file([](const std::string& f) {
+          {"model", good_model(folder), from_file([](const std::string& f) {
              try {
                (void)load_model(f);
              } catch (const std::runtime_error& error) {
                if (!std::string(error.what()).starts_with(f)) throw;  // it names the file, else it is raw
              }
            })},
-          {"pairs", good_pairs(folder + "/pairs"),
-           from_file([](const std::string& f) { (void)PairSet::read(f); })},
+          {"pairs", good_pairs(folder), from_file([](const std::string& f) { (void)PairSet::read(f); })},
           {"requests", bytes_of(server->good()), [server](const Bytes& b) { server->ask(b); }}};
 }
 
@@ -216,25 +247,8 @@ std::map<std::string, std::uint64_t> mutants_of_readers(const std::string& folde
   for (std::uint64_t i = 0; i < n; ++i) {
     const Reader& reader = all[i % all.size()];
     const Bytes mutant = mutant_of(reader.good, RandomStream(seed, i));
-    const double begin = processor_seconds();
-    try {
-      reader.read(mutant);
-    } catch (const FileError&) {
-    } catch (const HardwareError&) {
-    } catch (const JsonError&) {
-    } catch (const std::invalid_argument&) {
-    } catch (const std::logic_error& error) {
-      ++counts["crashes"];
-      std::cerr << reader.name << " " << i << ": " << error.what() << '\n';
-    } catch (const std::exception& error) {
-      ++counts["raw exceptions"];
-      std::cerr << reader.name << " " << i << ": " << error.what() << '\n';
-    }
-    const double took = processor_seconds() - begin;
-    if (took > 0.1) {
-      ++counts["slow mutants"];
-      std::cerr << reader.name << " " << i << ": " << took << " s\n";
-    }
+    judge_reading(
+        std::string(reader.name) + " " + std::to_string(i), [&] { reader.read(mutant); }, counts);
     ++counts["mutants"];
   }
   return counts;

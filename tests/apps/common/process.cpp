@@ -114,22 +114,21 @@ static bool has_files(const std::string& folder) {
   return false;
 }
 
-void wait_for_file(const std::string& path) {
+void wait_for_file(const std::string& path, std::uintmax_t bytes) {
   const bool any = path.ends_with("/*");
   const auto there = [&] {
-    return any ? has_files(path.substr(0, path.size() - 2)) : std::filesystem::exists(path);
+    if (any) return has_files(path.substr(0, path.size() - 2));
+    std::error_code missing;
+    if (bytes == 0) return std::filesystem::exists(path, missing);
+    const std::uintmax_t size = std::filesystem::file_size(path, missing);
+    return !missing && size >= bytes;
   };
   for (int i = 0; i < 240'000 && !there(); ++i) usleep(500);
 }
 
 void wait_for_growth(const std::string& path, std::uintmax_t bytes) {
   wait_for_file(path);
-  std::error_code gone;
-  const std::uintmax_t before = std::filesystem::file_size(path);
-  for (int i = 0; i < 240'000; ++i, usleep(500)) {
-    const std::uintmax_t now = std::filesystem::file_size(path, gone);
-    if (!gone && now >= before + bytes) return;
-  }
+  wait_for_file(path, std::filesystem::file_size(path) + bytes);
 }
 
 }  // namespace supertac

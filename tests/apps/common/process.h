@@ -52,9 +52,9 @@ class RunningProcess {
 ProcessResult run_process(const std::string& program, const std::vector<std::string>& arguments,
                           const ProcessOptions& options = {});
 
-/// Waits up to two minutes, of a busy machine, for a file to appear.
-void wait_for_file(const std::string& path);
-/// The same for a file to appear and to become longer by `bytes`, as a program writes what it reads.
+/// Waits up to two minutes, of a busy machine, for a file to appear and to have so many bytes.
+void wait_for_file(const std::string& path, std::uintmax_t bytes = 0);
+/// The same for it to become longer by `bytes`, as a program writes what it reads.
 void wait_for_growth(const std::string& path, std::uintmax_t bytes);
 
 }  // namespace supertac

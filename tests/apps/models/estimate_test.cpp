@@ -30,12 +30,12 @@ class Estimate : public OnSimulatedData {
     const std::regex estimate(what + ": about [0-9.]+ (seconds|minutes|hours) to go\n");
     std::string said;
     const auto found = [&] { return std::regex_search(said, estimate); };
-    for (int i = 0; i < 1200 && !found() && !process.ended(); ++i) {
+    for (int i = 0; i < 4000 && !found() && !process.ended(); ++i) {
       ::usleep(50'000);
       if (std::filesystem::exists(file)) said = read_text_file(file, 1 << 20);
     }
     if (found()) return;
-    // Who ends within that minute never had long to go: parts that only look short are no promise broken.
+    // Who ends within these minutes never had long to go: parts that only look short are no promise broken.
     EXPECT_TRUE(process.ended() && process.wait().code == 0) << program << ": " << said;
   }
 };

@@ -77,10 +77,7 @@ TEST_F(RigTest, CollectShowsALiveLineAndReportsEveryPass) {
 TEST_F(RigTest, ACollectionThatWasKilledIsRecoveredByImport) {
   RunningProcess process("supertac-collect", collect("out", "10"));
   const std::string journal = folder_ / "out/my.stl_t1_v10.journal";
-  wait_for_file(journal);
-  std::error_code missing;
-  for (int i = 0; i < 4000 && !(std::filesystem::file_size(journal, missing) >= 2'500'000 && !missing); ++i)
-    usleep(5000);
+  wait_for_file(journal, 2'500'000);
   process.send(SIGKILL);
   EXPECT_EQ(process.wait().code, 128 + SIGKILL);
   const ProcessResult recovered =

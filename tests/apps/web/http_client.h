@@ -41,7 +41,7 @@ class HttpClient {
 
   void send(std::string_view bytes) { (void)::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL); }
   /// What has come so far, once it holds `part` or nothing more comes for `wait_ms`.
-  std::string receive(std::string_view part, int wait_ms = 5000) {
+  std::string receive(std::string_view part, int wait_ms = 60'000) {
     char buffer[4096];
     pollfd ready{socket_, POLLIN, 0};
     while (got_.find(part) == std::string::npos && poll(&ready, 1, wait_ms) > 0) {

@@ -55,6 +55,23 @@ TEST(Ridge, UsesWhatTheWindowHoldsBetterThanTheLastFrame) {
             0.5 * error_of(set, split.test, UpsampledFrame(Upsampling::Kind::bicubic, set, split.train)));
 }
 
+TEST(Ridge, SaysHowFarItIsAndCanBeEnded) {
+  const WindowSet set = make_set(0.01);
+  const auto train = make_split(set, SplitKind::none, 1).train;
+  std::size_t last = 0, all = 0;
+  const Ridge whole(set, train, [&](std::size_t done, std::size_t parts) {
+    EXPECT_EQ(done, last + 1);
+    last = done, all = parts;
+  });
+  EXPECT_EQ(last, all);
+  for (const std::size_t at : {std::size_t{1}, all / 2, all}) {
+    const auto stop = [at](std::size_t done, std::size_t) {
+      if (done == at) throw std::runtime_error("ended");
+    };
+    EXPECT_THROW(Ridge(set, train, stop), std::runtime_error) << at;
+  }
+}
+
 TEST(Ridge, IsLinearInTheWindow) {
   const WindowSet set = make_set(0);
   const auto train = make_split(set, SplitKind::none, 1).train;

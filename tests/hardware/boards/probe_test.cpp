@@ -45,6 +45,8 @@ TEST(Probe, FindsBinaryFormats) {
        R"({"kind":"binary","header":"AA55","type":"u16","endian":"big","checksum":"crc16-ccitt"})",
        R"({"kind":"binary","header":"24","trailer":"21","type":"u16","time":{"type":"u32","unit":"us"}})",
        R"({"kind":"binary","header":"C3","trailer":"0D0A","type":"f32"})",
+       R"({"kind":"binary","header":"C3","type":"f32","endian":"big","checksum":"crc16-modbus"})",
+       R"({"kind":"binary","header":"AA55","type":"f32","endian":"big","time":{"type":"u32","unit":"us"}})",
        R"({"kind":"binary","header":"A5A5","type":"f32","time":{"type":"u32","unit":"ms"},"checksum":"sum8"})"}) {
     const Sensor sensor = sensor_of(array + frame + "}");
     const ProbeReport report = probe(sent(sensor, 4), "here", {});

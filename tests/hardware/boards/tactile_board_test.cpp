@@ -47,7 +47,7 @@ TEST(TactileBoard, ASlowConsumerLosesTheOldestAndIsTold) {
   std::uint64_t taken = 0;
   double first = 0;
   while (const auto frame = board.next(0)) {
-    if (taken++ == 0) first = frame->arrival_s;
+    if (taken++ == 0) first = frame->arrival.time_s;
   }
   EXPECT_EQ(taken, 100U);
   EXPECT_EQ(board.counters().dropped + taken, rig.world().board().counters().sent);
@@ -163,9 +163,9 @@ TEST(TactileBoard, LostFramesAreCountedAndTheNextIsSuspect) {
   std::uint64_t suspect = 0;
   double before = 0;
   while (const auto frame = board.next(0)) {
-    const bool after_gap = before > 0 && frame->arrival_s - before > 1.5 * rig::kFramePeriodS;
+    const bool after_gap = before > 0 && frame->arrival.time_s - before > 1.5 * rig::kFramePeriodS;
     EXPECT_EQ(frame->suspect, after_gap);
-    before = frame->arrival_s;
+    before = frame->arrival.time_s;
     suspect += frame->suspect ? 1 : 0;
   }
   EXPECT_GE(suspect, truth.torn);

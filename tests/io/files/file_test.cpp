@@ -75,6 +75,24 @@ TEST(File, AppearsBesideWhatTookItsName) {
   EXPECT_EQ(folder.entries(), 4U);
 }
 
+// Models, folders and captures are renamed by it.
+TEST(File, APublishedNameIsSyncedAndAFailedSyncSaysThatItIsThere) {
+  const TemporaryFolder folder;
+  write_file(folder.file("done"), kNew);
+  {
+    FaultInjection record(1 << 30, 0, false);  // only listens
+    EXPECT_EQ(publish(folder.file("done"), folder.file("a")), folder.file("a"));
+    const std::vector<std::string> expected = {"rename", "open", "fsync", "close"};
+    EXPECT_EQ(FaultInjection::calls(), expected);
+  }
+  FaultInjection injection(3, EIO, false);
+  EXPECT_EQ(error_of([&] { publish(folder.file("a"), folder.file("b")); }),
+            folder.file("b") +
+                ": cannot sync the directory (it is written, a power cut may yet lose it): "
+                "Input/output error; check the disk");
+  EXPECT_EQ(read_text_file(folder.file("b"), kPlenty), kNew);
+}
+
 TEST(File, LeavesNoDescriptorOpen) {
   const TemporaryFolder folder;
   const auto descriptors = [] {

@@ -148,7 +148,7 @@ TEST_F(Pipe, AReaderThatLeavesIsNoticed) {
   PipeOutput output(ends_[1], false);
   close(std::exchange(ends_[0], -1));
   const auto send_on = [&] {
-    for (int i = 0; i < 10'000; ++i, usleep(500)) output.send("line\n");
+    for (int i = 0; i < 240'000; ++i, usleep(500)) output.send("line\n");
   };
   EXPECT_THROW(send_on(), std::runtime_error);
 }

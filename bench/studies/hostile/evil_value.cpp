@@ -1,0 +1,65 @@
+#include "bench/studies/hostile/evil_value.h"
+
+#include <vector>
+
+namespace supertac {
+
+std::string evil_value(const RandomStream& random, std::uint64_t at) {
+  static const std::vector<std::string> values = {"",
+                                                  "0",
+                                                  "-1",
+                                                  "1",
+                                                  "2",
+                                                  "nan",
+                                                  "inf",
+                                                  "1e308",
+                                                  "1e-308",
+                                                  "18446744073709551616",
+                                                  "0x10",
+                                                  "1,,2",
+                                                  ",",
+                                                  "plain",
+                                                  "ridges6",
+                                                  "ridges0.0000001",
+                                                  "ridgesinf",
+                                                  "bumps-1",
+                                                  "precious",
+                                                  "precious.stl",
+                                                  "data",
+                                                  "data/1",
+                                                  "data/good",
+                                                  "model",
+                                                  "new",
+                                                  "new/er",
+                                                  "loop",
+                                                  "fifo",
+                                                  "empty",
+                                                  "link",
+                                                  "/dev/null",
+                                                  "/dev/zero",
+                                                  "/dev/full",
+                                                  "/proc/self/mem",
+                                                  "/",
+                                                  ".",
+                                                  "..",
+                                                  "-",
+                                                  "--",
+                                                  "q'; system('touch PWNED'); x='",
+                                                  "$(touch PWNED)",
+                                                  "`touch PWNED`",
+                                                  "a;touch PWNED",
+                                                  "x\ny",
+                                                  "\x1b[31mred",
+                                                  "\xff\xfe",
+                                                  std::string(300, 'x'),
+                                                  std::string(5000, 'y'),
+                                                  "4x4",
+                                                  "16x16",
+                                                  "window",
+                                                  "paper",
+                                                  "%s%n%x",
+                                                  "precious,precious"};
+  return values[random.bits(at) % values.size()];
+}
+
+}  // namespace supertac

@@ -1,0 +1,124 @@
+#include <algorithm>
+#include <array>
+#include <iostream>
+
+#include "bench/studies/hostile/liars.h"
+#include "tests/hardware/fault_run.h"
+#include "tests/hardware/rig_support.h"
+
+namespace supertac {
+namespace {
+
+/// A printer's port that says something else than the printer did, from line to line or, once it begins, for
+/// ever.
+class LyingPort : public Port {
+ public:
+  LyingPort(std::unique_ptr<Port> inner, std::uint64_t seed)
+      : inner_(std::move(inner)),
+        dice_(seed, 77),
+        kind_(dice_.below(kKinds)),
+        rate_(0.002 + 0.02 * dice_.uniform()),
+        from_line_(dice_.below(400)) {}
+
+  const std::string& name() const override { return inner_->name(); }
+  double now() override { return inner_->now(); }
+  double write(std::span<const std::byte> bytes, double until) override {
+    return inner_->write(bytes, until);
+  }
+
+  Received read(std::span<std::byte> buffer, double until) override {
+    while (out_.empty()) {
+      const double next = for_ever() ? std::min(until, said_s_ + 1) : until;
+      std::array<std::byte, 1024> raw{};
+      const Received got = inner_->read(raw, next);
+      for (std::size_t i = 0; i < got.count; ++i) take(std::to_integer<char>(raw[i]));
+      time_ = got.time_s;
+      if (for_ever() && time_ >= said_s_ + 1)
+        say(kind_ == 0   ? "echo:busy: processing"
+            : kind_ == 1 ? "Resend: 2\nok"
+                         : "// still at it"),
+            said_s_ = time_;
+      if (out_.empty() && time_ >= until) return {0, time_};
+    }
+    const std::size_t count = std::min(buffer.size(), out_.size());
+    std::copy_n(std::as_bytes(std::span(out_)).begin(), count, buffer.begin());
+    out_.erase(0, count);
+    return {count, time_};
+  }
+
+ private:
+  static constexpr std::uint32_t kKinds = 16;
+  // Kinds 0 to 3: from some line on nothing but this.
+  bool for_ever() const { return kind_ < 4 && lines_ > from_line_; }
+  void say(const std::string& line) { out_ += line + "\n"; }
+
+  void take(char c) {
+    line_ += c;
+    if (c != '\n') return;
+    ++lines_;
+    if (for_ever()) {
+      line_.clear();
+      return;
+    }
+    const bool lies = kind_ >= 4 && dice_.hit(rate_);
+    if (lies) lie();
+    if (!(lies && kind_ == 4)) out_ += line_;
+    line_.clear();
+  }
+
+  // Ahead of the printer's own line; kind 4 is a line that is lost.
+  void lie() {
+    const std::string number = std::to_string(dice_.below(200));
+    const std::string said[] = {
+        "",
+        "ok",
+        "ok\nok",
+        "Resend: " + number,
+        "Error:Line Number is not Last Line Number+1, Last Line: " + number + "\nResend: " + number,
+        "!! Move out of range",
+        "// Unknown command:\"M114\"",
+        "echo:Unknown command: \"M400\"",
+        "start",
+        "X:1e308 Y:nan Z:-500 E:0 Count X:0 Y:0 Z:0",
+        "echo:busy: paused for user",
+        std::string(5000, 'x')};
+    if (kind_ - 4 < std::size(said)) out_ += said[kind_ - 4] + (kind_ == 4 ? "" : "\n");
+  }
+
+  std::unique_ptr<Port> inner_;
+  Dice dice_;
+  std::uint32_t kind_;
+  double rate_;
+  std::uint32_t from_line_, lines_ = 0;
+  std::string line_, out_;
+  double time_ = 0, said_s_ = 0;
+};
+
+}  // namespace
+
+std::map<std::string, std::uint64_t> lying_devices(std::uint64_t n, std::uint64_t seed) {
+  std::map<std::string, std::uint64_t> counts;
+  for (std::uint64_t i = 0; i < n; ++i, ++counts["collections"]) {
+    const RandomStream random(seed, i);
+    RigSettings rig = running_rig();
+    rig.seed = seed + i;
+    rig.printer.firmware =
+        std::array{Firmware::marlin, Firmware::marlin_before_2_1_2, Firmware::klipper}[random.bits(0) % 3];
+    rig.printer.realtime_position = random.bits(1) % 4 != 0;
+    rig.chunk_s = std::array{0.0, 0.0, 0.01, 0.1}[random.bits(2) % 4];
+    rig.faults.freeze_rate = random.bits(3) % 4 == 0 ? 0.0003 : 0;
+    rig.faults.host_freeze_rate = random.bits(4) % 4 == 0 ? 0.0005 : 0;
+    const auto lie = [&](std::unique_ptr<Port> port) -> std::unique_ptr<Port> {
+      return std::make_unique<LyingPort>(std::move(port), seed + i);
+    };
+    const FaultVerdict verdict =
+        run_faulty_collection(rig, {.passes = 1, .slide = 40}, {99.7, 101.17, 99.81}, lie);
+    ++counts[verdict.complete ? "complete" : "typed errors"];
+    if (verdict.broken.empty()) continue;
+    ++counts["broken promises"];
+    std::cerr << "collection " << i << ": " << verdict.broken << " (" << verdict.error << ")\n";
+  }
+  return counts;
+}
+
+}  // namespace supertac
