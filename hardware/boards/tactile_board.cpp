@@ -38,12 +38,14 @@ void TactileBoard::run() {
       }
       read_once(port_->now() + kReadSlice);
     }
-    // What had arrived when the stop was asked for still counts; bounded, in case the board never pauses.
-    for (int i = 0; i < 10000; ++i) {
-      const std::uint64_t before = decoder_.counters().bytes;
+    // What had arrived when the stop was asked for still counts. Where the machine is busy more comes with every
+    // read: a port holds a tenth of a second at most.
+    const double end = port_->now() + kReadSlice;
+    std::uint64_t before = 0;
+    do {
+      before = decoder_.counters().bytes;
       read_once(port_->now());
-      if (decoder_.counters().bytes == before) break;
-    }
+    } while (decoder_.counters().bytes > before && port_->now() < end);
   } catch (...) {
     std::lock_guard lock(mutex_);
     error_ = std::current_exception();
