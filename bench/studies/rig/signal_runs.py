@@ -4,7 +4,8 @@
     bench/studies/rig/signal_runs.py BUILD [RUNS [FIRST_SEED]] > bench/results/rig/signals.csv
 
 Each program must end within 2 s with 128 + signal; in contact it may take longer, and must say that the finger was
-lifted. A second signal outside contact must end it within 0.2 s.
+lifted. A second signal outside contact must end it within 0.2 s. Programs that end by themselves, and collections that
+a starved rig has ended, may do so before the signal; they are counted apart.
 Exit code 1 when one does not. The stalls of this machine are measured beside each run and deducted.
 """
 
@@ -134,6 +135,16 @@ def wait_for(condition, seconds):
     return False
 
 
+def is_pending(process, number):
+    """Whether a signal has not reached it yet; a second one would be lost in the first."""
+    try:
+        with open(f"/proc/{process}/status") as status:
+            pending = [int(line.split()[1], 16) for line in status if line.startswith(("SigPnd", "ShdPnd"))]
+    except OSError:
+        return False
+    return any(mask >> (number - 1) & 1 for mask in pending)
+
+
 def write_to(fifo):
     """A writer of a FIFO, who waits for its reader."""
     def run():
@@ -185,7 +196,7 @@ def command_of(phase, programs, folder, network):
 def judge(run):
     """What was wrong with a run."""
     number, code, text = run["signal"], run["code"], run["text"].strip()[-200:]
-    if code not in (128 + number, OWN_ENDS.get(run["phase"])):
+    if code not in (128 + number, OWN_ENDS.get(run["phase"])) and not (run["ended_before"] and code == 1):
         return f"exit code {code}, expected {128 + number}: {text}"
     if run["seconds"] - run["stall_s"] > (0.2 if run["twice"] else 2) and "the finger was lifted" not in text:
         return f"took {run['seconds']:.2f} s: {text}"
@@ -220,6 +231,7 @@ def run_once(phase, seed, programs):
             program.send_signal(run["signal"])
             if run["twice"]:
                 time.sleep(0.1)
+                wait_for(lambda: not is_pending(program.pid, run["signal"]), 10)
                 begin = time.monotonic()
                 program.send_signal(run["signal"])
             try:
@@ -247,7 +259,7 @@ def main():
         sys.exit(__doc__)
     runs = int(sys.argv[2]) if len(sys.argv) > 2 else 300
     first = int(sys.argv[3]) if len(sys.argv) > 3 else 1
-    broken = 0
+    broken = late = 0
     columns = ["phase", "seed", "moment_s", "signal", "twice", "seconds", "stall_s", "code", "ended_before", "broken", "command", "commit"]
     out = csv.DictWriter(sys.stdout, columns, extrasaction="ignore", lineterminator="\n")
     out.writeheader()
@@ -257,11 +269,12 @@ def main():
         run = run_once(phase, seed, sys.argv[1] + "/bin")
         wrong = " ".join(judge(run).split())
         broken += wrong != ""
+        late += run["ended_before"]
         numbers = {name: f"{run[name]:.3f}" for name in ("moment_s", "seconds", "stall_s")}
         out.writerow({**run, **numbers, "signal": int(run["signal"]), "ended_before": int(run["ended_before"]), "broken": wrong, **made})
         sys.stdout.flush()
         made = {"command": "", "commit": ""}
-    print(f"{runs} signals, {broken} broken promises", file=sys.stderr)
+    print(f"{runs - late} signals to running programs, {late} programs had ended, {broken} broken promises", file=sys.stderr)
     sys.exit(1 if broken else 0)
 
 
