@@ -199,6 +199,11 @@ void Palpation::recover(PalpationOutcome& outcome) {
     outcome.note = "the firmware halted and takes no more commands; lift the finger by hand";
     return;
   } catch (const PrinterReset&) {
+    // Should it only have said so, it still moves: a stop does no harm to one that has just started.
+    try {
+      printer_.link().emergency("M410");
+    } catch (const HardwareError&) {  // that it restarted
+    }
     outcome.finger = Finger::stopped;
     outcome.note = "the firmware restarted and stands; its position is unknown, lift the finger by hand";
     return;
