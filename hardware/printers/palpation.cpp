@@ -201,7 +201,7 @@ void Palpation::recover(PalpationOutcome& outcome) {
   } catch (const PrinterReset&) {
     // Should it only have said so, it still moves: a stop does no harm to one that has just started.
     try {
-      printer_.link().emergency("M410");
+      printer_.link().emergency(printer_.link().capabilities().klipper ? "M112" : "M410");
     } catch (const HardwareError&) {  // that it restarted
     }
     outcome.finger = Finger::stopped;

@@ -123,6 +123,8 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
     const RecorderReport report = record_palpation(rig.board_port(), std::move(port), settings);
     const Point3 head = rig.world().printer().head(rig.now());
     verdict.complete = report.outcome.complete;
+    // One that says it did not run a line gets it again; targets are absolute, so that nothing moves.
+    if (printer) numbered.erase(std::unique(numbered.begin(), numbered.end()), numbered.end());
     verdict.realtime = report.outcome.realtime_position;
     verdict.printer = report.printer;
     verdict.broken =
