@@ -46,7 +46,7 @@ void PictureLog::append(const Spool& spool, std::span<const std::byte> bytes) {
 }
 
 void PictureLog::add(const Seen& seen) {
-  if (count_ == 0) began_s_ = seen.wall_s - seen.time_s;
+  if (count_ == 0) began_s_ = seen.wall_s - seen.time_s, first_s_ = seen.time_s;
   append(times_, std::as_bytes(std::span(&seen.time_s, 1)));
   append(volts_, std::as_bytes(seen.volts));
   if (pictures_) append(pictures_, std::as_bytes(seen.picture));
@@ -64,7 +64,7 @@ std::vector<std::byte> PictureLog::dated_times() {
   for (const FramePlace& place : timeline.places) {
     kept_.push_back(place.doubt * timeline.clock.period_s <= kTrustedS);
     const auto from_first = static_cast<double>(place.index - timeline.places.front().index);
-    if (kept_.back()) times.push_back(timeline.clock.period_s * from_first);
+    if (kept_.back()) times.push_back(first_s_ + timeline.clock.period_s * from_first);
   }
   if (times.empty()) return {};
   left_out_ = count_ - times.size();

@@ -51,6 +51,7 @@ class PictureLog {
   PictureFormat format_;
   std::uint64_t count_ = 0, left_out_ = 0;
   double began_s_ = NAN;                // Seen::wall_s of Seen::time_s 0
+  double first_s_ = 0;                  // Seen::time_s of the first
   std::vector<FrameArrival> arrivals_;  // of a recording of a board
   std::vector<bool> kept_;              // of its frames
   std::string problem_;                 // of a write that failed: what was kept is not whole

@@ -63,6 +63,13 @@ class Fit {
       if (inside(c, stretch_))
         events_.push_back(
             {.row = c.taxel / rig::kTaxelColumns, .time = c.time_s - middle_s_, .weight = weight_of(c)});
+    // A recording that goes on long after the pass, or begins long before it, has its middle beside the plate.
+    if (events_.empty()) return;
+    const auto [first, last] = std::ranges::minmax(events_, {}, &Event::time);
+    if (first.time <= 0 && last.time >= 0) return;
+    const double shift = (first.time + last.time) / 2;
+    middle_s_ += shift;
+    for (Event& event : events_) event.time -= shift;
   }
 
   std::size_t events() const { return events_.size(); }

@@ -99,6 +99,7 @@ class RoundTrips : public Training {
   // How many records a chunk has is a matter of when its writer woke: the same records, not the same bytes.
   static void journal(const std::string& from, const std::string& to) {
     const Journal read = read_journal(from);
+    fs::remove(to + ".journal");
     {
       JournalWriter writer(to + ".journal", read.header);
       for (const auto& [stream, records] : read.streams)
