@@ -206,8 +206,10 @@ def studies():
     soak = {r["quantity"]: r["measured"] for r in rows("rig/soak.csv")}
     mutants, ranks = rows("reliability/mutation.csv"), rows("reliability/rank_faults.csv")
     attacks = rows("reliability/hostile.csv")
-    kinds = ("command lines", "mutants", "signals")
-    harm = ("crashes", "hangs", "above 1 GB", "raw exceptions", "control codes", "shells", "files overwritten", "half folders")
+    kinds = ("command lines", "mutants", "signals", "lying files", "collections")
+    signals = rows("rig/signals.csv")
+    heard = [r for r in signals if r["ended_before"] == "0"]
+    harm = ("broken promises", "crashes", "hangs", "above 1 GB", "raw exceptions", "control codes", "shells", "files overwritten", "half folders")
     findings = sum(int(r["count"]) for r in attacks if r["what"] in harm)
     lines = [[f"`rig/{name}.csv`", what, f"{len(found)} runs", f"{broken(found)} ended otherwise than promised"]
              for name, what, found in (("kill", "a collecting program is killed", kill), ("ends", "signals and full disks", ends),
@@ -224,7 +226,9 @@ def studies():
          f"99th percentile {statistics.median(p['with'] / p['without'] for p in p99):.2f} times that without"],
         ["`rig/page_hour.csv`", "the live page, an hour", f"{float(hour[-1]['seconds']):.0f} s",
          f"the program's memory grew by {float(hour[-1]['program_resident_kb']) - float(hour[0]['program_resident_kb']):.0f} kB"],
-        ["`reliability/hostile.csv`", "evil options, mutated files, signals",
+        ["`rig/signals.csv`", f"a signal in {len({r['phase'] for r in signals})} phases of what touches a port", f"{len(heard)} runs",
+         f"{broken(heard)} ended otherwise than promised; {max(float(r['seconds']) for r in heard):.2f} s at most"],
+        ["`reliability/hostile.csv`", "evil options, mutated and lying files, lying devices, signals",
          f"{sum(int(r['count']) for r in attacks if r['what'] in kinds):,}", f"{findings} crashes, hangs or overwritten files"],
         ["`reliability/rank_faults.csv`", "kills, freezes, full disks with several ranks", f"{len(ranks)} runs",
          f"{sum(r['in_time'] == 'True' for r in ranks)} ended in time, with one line"],

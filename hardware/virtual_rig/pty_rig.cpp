@@ -20,6 +20,8 @@
 namespace supertac {
 namespace {
 
+constexpr std::size_t kAdapterBytes = 65536;
+
 [[noreturn]] void failed(const std::string& what) {
   throw PortError("virtual rig: " + what + ": " + strerror(errno));
 }
@@ -63,7 +65,7 @@ void PseudoTerminal::unplug() {
 
 PtyRig::PtyRig(const RigSettings& settings, const std::string& board_link, const std::string& printer_link,
                double speedup)
-    : speedup_(speedup), board_(board_link), printer_(printer_link) {
+    : speedup_(speedup), adapter_(settings.chunk_s > 0), board_(board_link), printer_(printer_link) {
   world_ = std::make_unique<RigWorld>(
       settings, monotonic_seconds() * speedup_,
       [this](std::span<const std::byte> bytes, double) { return send_frame(bytes); });
@@ -97,6 +99,7 @@ void PtyRig::run() {
     {
       std::lock_guard lock(mutex_);
       serve_printer();
+      serve_adapter();
       const double next = std::clamp((world_->next_event() / speedup_) - monotonic_seconds(), 1e-4, 0.01);
       wait.tv_nsec = static_cast<long>(1e9 * next);
       printer.fd = printer_.descriptor();
@@ -120,8 +123,21 @@ void PtyRig::serve_printer() {
   if (printer_out_.size() > 65536) printer_out_.clear();  // nobody listens
 }
 
+// What an adapter could not hand on yet.
+void PtyRig::serve_adapter() {
+  if (board_.descriptor() < 0 || board_out_.empty()) return;
+  const ssize_t sent = ::write(board_.descriptor(), board_out_.data(), board_out_.size());
+  if (sent > 0) board_out_.erase(board_out_.begin(), board_out_.begin() + sent);
+}
+
 bool PtyRig::send_frame(std::span<const std::byte> bytes) {
   if (board_.descriptor() < 0) return true;
+  if (adapter_) {  // has a memory of its own
+    if (board_out_.size() > kAdapterBytes) return false;
+    board_out_.insert(board_out_.end(), bytes.begin(), bytes.end());
+    serve_adapter();
+    return true;
+  }
   // When the terminal is full (4095 bytes, 24.8 ms) a frame vanishes; one that went in half is completed by
   // nothing, as on a stalled USB line.
   return ::write(board_.descriptor(), bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size());

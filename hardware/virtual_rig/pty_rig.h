@@ -48,12 +48,14 @@ class PtyRig {
   void run();
   bool send_frame(std::span<const std::byte> bytes);
   void serve_printer();
+  void serve_adapter();
 
   double speedup_;
+  bool adapter_;  // between board and host (RigSettings::chunk_s)
   std::mutex mutex_;
   PseudoTerminal board_, printer_;
   std::unique_ptr<RigWorld> world_;
-  std::vector<std::byte> printer_out_;
+  std::vector<std::byte> printer_out_, board_out_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

@@ -239,6 +239,19 @@ TEST_F(Streaming, AProgramThatWasStoppedStartsANewWindow) {
   EXPECT_GE(result("json").at("suspect"), 1);
 }
 
+TEST_F(Streaming, ChunksOfAnAdapterCostLatencyAndNoPicture) {
+  RigSettings settings = touching_rig();
+  settings.chunk_s = 0.1;
+  plug_in(settings);
+  ASSERT_EQ(stream({"--board", board(), "--seconds", "5", "--json", path("json")}).code, 0);
+  const auto json = result("json");
+  EXPECT_EQ(json.at("gaps"), 0);
+  // All but those of the first window, and of the burst that had waited for somebody to listen.
+  const double made = json.at("pictures").get<double>() + json.at("dropped").get<double>();
+  EXPECT_GT(made, json.at("frames").get<double>() - 32 / 300.0 / rig::kFramePeriodS - 450);
+  EXPECT_GT(json.at("pictures"), 0);
+}
+
 // Stopped as by Ctrl-Z, or on a machine that swaps: what is recorded is dated right, or left out and counted.
 // SUPERTAC_MUTATIONS says how often.
 TEST_F(Streaming, StoppedForAWhileItRecordsWhatItCanDate) {
