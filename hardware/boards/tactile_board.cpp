@@ -38,14 +38,17 @@ void TactileBoard::run() {
       }
       read_once(port_->now() + kReadSlice);
     }
-    // What had arrived when the stop was asked for still counts. Where the machine is busy more comes with every
-    // read: a port holds a tenth of a second at most.
-    const double end = port_->now() + kReadSlice;
+    // What had arrived when the stop was asked for still counts. Where the machine is busy more comes with
+    // every read: a port holds a tenth of a second at most.
     std::uint64_t before = 0;
+    double now = port_->now();
+    const double end = now + kReadSlice;
     do {
       before = decoder_.counters().bytes;
-      read_once(port_->now());
-    } while (decoder_.counters().bytes > before && port_->now() < end);
+      read_once(now);
+      if (decoder_.counters().bytes == before) break;
+      now = port_->now();
+    } while (now < end);
   } catch (...) {
     std::lock_guard lock(mutex_);
     error_ = std::current_exception();

@@ -395,7 +395,8 @@ TEST_F(Streaming, AnOldCaptureStaysUntilTheNewOneIsComplete) {
   plug_in();
   ASSERT_EQ(stream({"--board", board(), "--seconds", "0.5", "--capture", path("capture"), "--force"}).code,
             0);
-  EXPECT_EQ(stream({"--replay", path("capture")}).code, 0);
+  const ProcessResult replayed = stream({"--replay", path("capture")});
+  EXPECT_EQ(replayed.code, 0) << replayed.error;
   EXPECT_FALSE(fs::exists(path("capture.new")));
 }
 
