@@ -87,7 +87,8 @@ def read(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]
 def expect(path: str | os.PathLike, tensors: dict[str, np.ndarray], shapes: dict[str, list]) -> list:
     """The named tensors, None for those that are not there. `shapes`: name to sizes, where None is any size and a text
     the same size wherever it stands; a name that ends in "?" need not be there. Raises ValueError."""
-    sizes, found = {}, []
+    sizes: dict[str, int] = {}
+    found: list = []
     for key, shape in shapes.items():
         name = key.rstrip("?")
         if name not in tensors:
@@ -105,10 +106,12 @@ def expect(path: str | os.PathLike, tensors: dict[str, np.ndarray], shapes: dict
 
 def write(path: str | os.PathLike, tensors: dict[str, np.ndarray], metadata: dict[str, str] | None = None,
           checksum: bool = False) -> None:
-    """Writes arrays by name, the file complete or not at all; without our checksum, as a program of another maker would, or with it."""
+    """Writes arrays by name, the file complete or not at all; without our checksum, as a program of another maker would,
+    or with it."""
     if checksum:
         metadata = {"checksum": "0" * 8, **(metadata or {}), "supertac_format": "1"}
-    header, at = {} if metadata is None else {"__metadata__": metadata}, 0
+    header: dict = {} if metadata is None else {"__metadata__": metadata}
+    at = 0
     names = {np.dtype(text): name for name, text in TYPES.items()}
     for name, array in tensors.items():
         header[name] = {"dtype": names[array.dtype], "shape": list(array.shape), "data_offsets": [at, at + array.nbytes]}

@@ -44,7 +44,7 @@ def library() -> ctypes.CDLL:
     if path is None:
         raise ValueError("the C library is not installed: pip install ./python compiles it; or set SUPERTAC_LIBRARY to "
                          "libsupertac.so")
-    loaded = ctypes.CDLL(path)
+    loaded = ctypes.CDLL(str(path))
     for name, (result, arguments) in SIGNATURES.items():
         function = getattr(loaded, name)
         function.restype, function.argtypes = result, arguments

@@ -42,7 +42,8 @@ class Log:
     metadata: dict
 
 
-SHAPES = {"time_s": ["n"], "volts": ["n", None], "position_mm?": ["n", None], "lift_mm?": ["n"], "truth?": ["n", None, None]}
+SHAPES: dict[str, list] = {"time_s": ["n"], "volts": ["n", None], "position_mm?": ["n", None], "lift_mm?": ["n"],
+                           "truth?": ["n", None, None]}
 
 
 def _check(path, recording: Recording) -> None:
