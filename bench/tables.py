@@ -209,7 +209,8 @@ def studies():
     kinds = ("command lines", "mutants", "signals", "lying files", "collections")
     signals = rows("rig/signals.csv")
     heard = [r for r in signals if r["ended_before"] == "0"]
-    harm = ("broken promises", "crashes", "hangs", "above 1 GB", "raw exceptions", "control codes", "shells", "files overwritten", "half folders")
+    lies = {r["what"]: r["count"] for r in attacks if r["campaign"] == "lying devices"}
+    harm = ("crashes", "hangs", "above 1 GB", "raw exceptions", "control codes", "shells", "files overwritten", "half folders")
     findings = sum(int(r["count"]) for r in attacks if r["what"] in harm)
     lines = [[f"`rig/{name}.csv`", what, f"{len(found)} runs", f"{broken(found)} ended otherwise than promised"]
              for name, what, found in (("kill", "a collecting program is killed", kill), ("ends", "signals and full disks", ends),
@@ -229,7 +230,8 @@ def studies():
         ["`rig/signals.csv`", f"a signal in {len({r['phase'] for r in signals})} phases of what touches a port", f"{len(heard)} runs",
          f"{broken(heard)} ended otherwise than promised; {max(float(r['seconds']) for r in heard):.2f} s at most"],
         ["`reliability/hostile.csv`", "evil options, mutated and lying files, lying devices, signals",
-         f"{sum(int(r['count']) for r in attacks if r['what'] in kinds):,}", f"{findings} crashes, hangs or overwritten files"],
+         f"{sum(int(r['count']) for r in attacks if r['what'] in kinds):,}", f"{findings} crashes, hangs or overwritten files; {lies['broken promises']} of {lies['collections']} lying devices "
+         "led to a wrong word"],
         ["`reliability/rank_faults.csv`", "kills, freezes, full disks with several ranks", f"{len(ranks)} runs",
          f"{sum(r['in_time'] == 'True' for r in ranks)} ended in time, with one line"],
         ["`reliability/ledger_tampering.csv`", "a training is falsified", f"{len(rows('reliability/ledger_tampering.csv'))}",
