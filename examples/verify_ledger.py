@@ -1,10 +1,5 @@
 #!/usr/bin/env python3
-"""Checks a training's ledger without any of our programs: every line's chain, and every kept state against its line.
-
-    examples/verify_ledger.py model.run
-
-docs/audit.md says which bytes are hashed. The states need NumPy, which turns a file's order of axes into memory's.
-"""
+"""Checks a training's ledger, MODEL.run, by docs/audit.md alone: the chain of its lines, and every kept state's hashes."""
 import hashlib
 import json
 import pathlib
@@ -24,28 +19,21 @@ def in_memory(name, array):
     return array.reshape(array.shape[-2:]) if "attention" in name else array
 
 
-def main(folder):
-    with open(folder / "ledger.jsonl", encoding="utf-8") as file:
-        lines = file.read().splitlines()
-    header, states = json.loads(lines[0]), 0
-    chain = hashlib.sha256(lines[0].encode()).hexdigest()
-    for text in lines[1:]:
-        line = json.loads(text)
-        content = text[:text.rindex(',"chain"')] + "}"
-        chain = hashlib.sha256((chain + content).encode()).hexdigest()
-        assert chain == line["chain"], f"step {line['step']}: the chain is broken"
-        path = folder / "states" / f"{line['step']}.safetensors"
-        if path.exists():
-            data = path.read_bytes()
-            begin = 8 + struct.unpack("<Q", data[:8])[0]
-            arrays = {name: np.frombuffer(data[begin + info["data_offsets"][0]:begin + info["data_offsets"][1]], "<f4")
-                      .reshape(info["shape"]) for name, info in json.loads(data[8:begin]).items() if "shape" in info}
-            for name, expected in zip(header["tensors"], line["tensors"]):
-                found = hashlib.sha256(in_memory(name, arrays[name]).tobytes()).hexdigest()
-                assert found == expected, f"step {line['step']}: {name} of the kept state is not the line's"
-            states += 1
-    print(f"{len(lines) - 1} lines, {states} kept states: as they were written; last chain {chain}")
-
-
-if __name__ == "__main__":
-    main(pathlib.Path(sys.argv[1]))
+folder, states = pathlib.Path(sys.argv[1]), 0
+lines = (folder / "ledger.jsonl").read_text(encoding="utf-8").splitlines()
+names, chain = json.loads(lines[0])["tensors"], hashlib.sha256(lines[0].encode()).hexdigest()
+for text in lines[1:]:
+    line = json.loads(text)
+    chain = hashlib.sha256((chain + text[:text.rindex(',"chain"')] + "}").encode()).hexdigest()
+    assert chain == line["chain"], f"step {line['step']}: the chain is broken"
+    path = folder / "states" / f"{line['step']}.safetensors"
+    if path.exists():
+        data, states = path.read_bytes(), states + 1
+        begin = 8 + struct.unpack("<Q", data[:8])[0]
+        header = json.loads(data[8:begin])
+        for name, expected in zip(names, line["tensors"]):
+            first, last = header[name]["data_offsets"]
+            array = np.frombuffer(data[begin + first:begin + last], "<f4").reshape(header[name]["shape"])
+            found = hashlib.sha256(in_memory(name, array).tobytes()).hexdigest()
+            assert found == expected, f"step {line['step']}: {name} of the kept state is not the line's"
+print(f"{len(lines) - 1} lines and {states} kept states are as they were written; the last chain is {chain}")
