@@ -17,11 +17,12 @@ void declare(Arguments& a) {
   a.required("model", "FILE,...", "models by supertac-train; run i uses the i-th, and again from the first");
   a.required("data", "DIR", "recordings to train the classifiers on and to test them with");
   a.option("plates", "A,B,...", "the classes (default: the plates the first model was trained on)");
-  a.option("views", "A,B,...",
-           "what the classifiers see: frame (the last one, normalised as the network sees it), bicubic, "
-           "super_resolved, latents, historyN (the last N "
-           "frames), truth; each is compared with the first",
-           "frame,super_resolved,latents,history32");
+  a.option(
+      "views", "A,B,...",
+      "what the classifiers see: frame (the last one, normalised as the network sees it), bicubic, "
+      "super_resolved, latents, historyN (the last N "
+      "frames), truth; each is compared with the first (default: frame,super_resolved,latents,history32; of "
+      "a model of single frames the first two)");
   a.option("seeds", "N", "runs: seeds 0 to N - 1 of classifier and order", "5");
   a.option("epochs", "N", "passes over the training windows", "8");
   a.option("stride", "N", "train on every N-th window in contact; tested are all", "1");
@@ -35,6 +36,8 @@ void declare(Arguments& a) {
 namespace {
 
 std::vector<View> views_of(const Arguments& a) {
+  if (!a.given("views"))
+    return {{ViewKind::frame}, {ViewKind::super_resolved}, {ViewKind::latents}, {ViewKind::history, 32}};
   std::vector<View> views;
   for (const std::string& name : a.list("views")) {
     try {
@@ -78,14 +81,13 @@ Answers all_answers(const Arguments& a, const std::vector<View>& views, const st
 }
 
 std::vector<ViewResult> count(const Answers& given, const std::vector<View>& views,
-                              const std::vector<Exam>& exams, const WindowSet& windows,
-                              const std::vector<std::string>& classes, const std::string& folder) {
+                              const std::vector<Exam>& exams, const WindowSet& windows) {
   std::vector<ViewResult> results;
   for (const View& view : views)
     results.push_back({view, std::vector<Tally>(std::size(kParts), Tally(exams.front().classes))});
   for (std::size_t job = 0; job < given.size(); ++job) {
     const Exam& exam = exams[job / views.size() % exams.size()];
-    const std::vector<Part> parts = parts_of(windows, exam, classes, folder);
+    const std::vector<Part> parts = parts_of(windows, exam);
     std::vector<Tally>& tallies = results[job % views.size()].parts;
     for (std::size_t n = 0; n < exam.test.size(); ++n) {
       const std::size_t pass = windows.pass_of(exam.test[n]);
@@ -100,7 +102,7 @@ std::vector<ViewResult> count(const Answers& given, const std::vector<View>& vie
 }  // namespace
 
 int run(Arguments& a) {
-  const std::vector<View> views = views_of(a);
+  std::vector<View> views = views_of(a);
   if (a.given("out")) {
     if (std::ranges::none_of(views, [](const View& v) { return v.kind == ViewKind::super_resolved; }))
       throw UsageError("--out keeps the classifier of super_resolved pictures, which is not among --views");
@@ -113,6 +115,7 @@ int run(Arguments& a) {
   const std::int64_t stride = a.integer("stride", 1, 100'000);
   const std::vector<Candidate> models = load_candidates(a.list("model"));
   add_model_parents(a.list("model"));
+  if (models.front().file.model->settings().timesteps == 1 && !a.given("views")) views.resize(2);
   const WindowSet windows = exam_windows(a.text("data"), a.list("plates"), models.front());
   const std::vector<std::string> classes = classes_of(windows);
   std::vector<Exam> exams;
@@ -121,7 +124,7 @@ int run(Arguments& a) {
          " training windows, " + std::to_string(exams.front().test.size()) + " test windows");
 
   const Answers given = all_answers(a, views, models, exams, windows, classes, settings);
-  const auto results = count(given, views, exams, windows, classes, a.text("data"));
+  const auto results = count(given, views, exams, windows);
   const std::string frames = windows.settings().scaling.per_window
                                  ? "normalised to the window's own rest and gain"
                                  : "scaled by the model's fixed range";

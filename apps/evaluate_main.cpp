@@ -1,40 +1,195 @@
-// supertac-evaluate: how good a model is on a data set, beside what does without a network.
+// supertac-evaluate: how good a model is on recordings, beside what does without a network.
+#include <cmath>
+#include <optional>
+
 #include "apps/common/command_line/program.h"
+#include "apps/common/command_line/version.h"
+#include "apps/common/output/provenance.h"
 #include "apps/common/output/remarks.h"
-#include "apps/evaluate/pairs.h"
-#include "apps/evaluate/recordings.h"
+#include "apps/common/running/measure.h"
+#include "apps/common/running/progress.h"
+#include "apps/evaluate/exports.h"
+#include "apps/evaluate/felt.h"
+#include "apps/evaluate/page.h"
+#include "apps/evaluate/scoring.h"
+#include "apps/evaluate/trust.h"
+#include "data/recordings/recording.h"
+#include "data/scores/metrics.h"
+#include "data/windows/signal_remarks.h"
+#include "io/files/file.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
+namespace {
+
+constexpr int kSsimWindow = 7;  // pixels, of pictures below 11
+
+// What is tested, and by which models, is noted for all that is written.
+WindowSet load_windows(const Arguments& a, const ModelFile& file) {
+  const std::vector<std::string> plates =
+      a.given("plates") ? a.list("plates") : comma_list(file.metadata_or("plates", ""));
+  add_model_parents(a.list("model"));
+  add_parent("recordings", hash_of_recordings(a.text("data"), plates));
+  return WindowSet::load(a.text("data"), plates, file.windows(),
+                         progress_of(a, "reading " + a.text("data"), "recordings"));
+}
+
+std::string row(const std::string& name, const ZoneMetrics& metrics, const Latency& latency) {
+  const Metrics c = metrics.contact(), all = metrics.all();
+  const auto number = [](double value, int decimals) {
+    return cell(std::isfinite(value) ? format(value, decimals) : "-", 9);
+  };
+  return name + std::string(name.size() < 12 ? 12 - name.size() : 0, ' ') + number(c.ssim, 3) +
+         number(c.psnr_mean_db, 2) + number(c.position_error_mm, 2) + number(all.ssim, 3) +
+         number(all.psnr_mean_db, 2) + number(latency.median_us, 1);
+}
+
+/// The scores of the network and of every baseline over the same windows.
+struct RecordingScores {
+  RecordingScores(const WindowSet& windows, const ModelFile& model, std::size_t methods)
+      : felt(windows), trust(windows, model) {
+    for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
+  }
+  std::vector<ZoneMetrics> of_method;
+  FeltScores felt;
+  TrustScores trust;
+};
+
+RecordingScores score_all(const Arguments& a, const Ensemble& network, const ModelFile& file,
+                          const WindowSet& windows, const TestSet& tested, const Baselines& baselines,
+                          OutputsFile* outputs, EvaluationPage* page) {
+  RecordingScores scores(windows, file, 1 + baselines.size());
+  draw_all(a, network, windows, tested.split.test, baselines, [&](const Drawn& d) {
+    const Zone zone = windows.zone(d.example);
+    for (std::size_t m = 0; m < d.pictures.size(); ++m)
+      scores.of_method[m].add(d.pictures[m], d.target, zone);
+    scores.felt.add(d.example, d.pictures[0], d.target);
+    scores.trust.add(d);
+    if (page != nullptr) page->add(d);
+    if (outputs != nullptr) outputs->add(d.input, d.pictures[0], d.target, d.predicted_error);
+  });
+  return scores;
+}
+
+/// What was drawn where nothing is, and not drawn where something is.
+std::vector<std::string> silence_lines(const ZoneMetrics& metrics) {
+  std::vector<std::string> lines;
+  const auto add = [&](const std::string& where, const Metrics& m) {
+    if (m.windows > 0)
+      lines.push_back(where + ": " + format(100 * m.ghost_rate, 2) + " % of " + std::to_string(m.windows) +
+                      " pictures show what is not there, PSNR " + format(m.psnr_mean_db, 1) + " dB");
+  };
+  add("flat", metrics.flat());
+  add("air", metrics.air());
+  if (std::isfinite(metrics.contact().miss_rate))
+    lines.push_back("in contact " + format(100 * metrics.contact().miss_rate, 2) +
+                    " % show nothing of what is there");
+  return lines;
+}
+
+nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const WindowSet& windows,
+                              const TestSet& tested, const Baselines& baselines,
+                              const RecordingScores& scores) {
+  const ZoneMetrics& own = scores.of_method.front();
+  nlohmann::ordered_json result = own.to_json();
+  result["felt"] = scores.felt.to_json();
+  result["trust"] = scores.trust.to_json();
+  a.print("split " + tested.split_name + ", seed " + std::to_string(tested.seed) + ", " +
+          std::to_string(own.all().windows) + " windows, " + std::to_string(own.contact().windows) +
+          " in contact");
+  a.print("            |- in contact -------------| |- all ---------| |- one -|");
+  a.print("                 SSIM  PSNR dB   pos mm     SSIM  PSNR dB       us");
+  const Tensor window = Tensor::full(network.first().input_shape(1), 0.5F);
+  std::vector<float> image(windows.image().pixels());
+  const Latency latency = measure_latency([&] { network.infer(window); });
+  a.print(row("network", own, latency));
+  nlohmann::ordered_json latencies = {{"network", latency.to_json()}};
+  for (std::size_t k = 0; k < baselines.size(); ++k) {
+    const std::string name = baselines[k]->name();
+    const Latency l = measure_latency([&] { baselines[k]->predict(window.values(), image); });
+    a.print(row(name, scores.of_method[k + 1], l));
+    latencies[name] = l.to_json();
+    result["baselines"][name] = scores.of_method[k + 1].to_json();
+  }
+  for (const std::string& line : silence_lines(own)) a.print(line);
+  for (const std::string& line : scores.felt.lines()) a.print(line);
+  for (const std::string& line : scores.trust.lines()) a.print(line);
+  result["latency"] = latencies;
+  result["model"] = a.text("model");
+  result["data"] = windows.fingerprint();
+  result["split"] = tested.split_name;
+  result["seed"] = tested.seed;
+  return result;
+}
+
+/// What the page was made with and of.
+std::vector<std::pair<std::string, std::string>> made_by(const Arguments& a, const WindowSet& windows) {
+  std::vector<std::pair<std::string, std::string>> lines = {{"command", a.command_line()},
+                                                            {"version", version() + ", commit " + commit()}};
+  const nlohmann::ordered_json whole = full_provenance();
+  lines.emplace_back("began", whole["began"].get<std::string>() + ", took " +
+                                  format(whole["seconds"].get<double>(), 1) + " s");
+  for (const auto& [name, hash] : whole["parents"].items()) lines.emplace_back(name, hash.get<std::string>());
+  lines.emplace_back("windows", a.text("data") + ", hash " + windows.fingerprint());
+  return lines;
+}
+
+}  // namespace
 
 void declare(Arguments& a) {
   a.required("model", "FILE,...", "a model written by supertac-train; of several the pictures are averaged");
-  a.option("data", "DIR", "recordings to test on");
-  a.option("pairs", "FILE", "instead of --data: pairs to test a model trained with --pairs on");
-  a.one_of({"data", "pairs"});
+  a.required("data", "DIR", "recordings to test on");
   a.option("split", "NAME",
-           "window, pass, trial, texture, group or none; with --pairs group, pair or none (default: the "
-           "model's own); its test side is scored");
+           "window, pass, trial, texture, group or none (default: the model's own); its test side is scored");
   a.option("seed", "N", "of the split (default: the model's own)");
-  a.option("limit", "N", "score at most N examples, evenly spread; 0 = all", "0");
+  a.option("limit", "N", "score at most N windows, evenly spread; 0 = all", "0");
   a.option("precision", "NAME", "fp32, or int8: products of bytes, faster on processors with AVX-512 VNNI",
            "fp32");
-  a.option("batch", "N", "examples that are drawn at once; their pictures do not depend on it", "64");
+  a.option("batch", "N", "windows that are drawn at once; their pictures do not depend on it", "64");
   a.decides_nothing();
   a.option("outputs", "FILE",
            "write inputs as the network takes them, outputs, truths and predicted errors as safetensors");
   declare_strict(a);
-  a.only_with("data");
   a.option("plates", "A,B,...", "only recordings of these plates (default: the model's own)");
   a.option(
       "pictures", "DIR",
       "write PNG pictures: input | output | truth | how far off it may be, and a film of each test pass");
   a.option("report", "FILE",
            "write one page with scores, the best and worst windows and a film of each test pass (HTML)");
-  a.option("write-pairs", "DIR",
-           "write the split's windows as pairs for networks that know no time (supertac-train --pairs): "
-           "train.safetensors and test.safetensors with the last frame as the model sees it, and the truth");
 }
 
-int run(Arguments& a) { return a.given("pairs") ? evaluate_on_pairs(a) : evaluate_on_recordings(a); }
+int run(Arguments& a) {
+  const std::vector<ModelFile> files = load_models(a.list("model"));
+  const Ensemble network = ensemble_of(files, precision_of(a.choice("precision", {"fp32", "int8"})));
+  TestSet tested = test_set_of(a, files.front());
+  const WindowSet windows = load_windows(a, files.front());
+  tested.split = make_split(windows, split_kind(tested.split_name), tested.seed, tested.leave_out);
+  check_test_set(a, files, tested);
+  remark(a, remarks_on(windows, tested.split.test));
+  if (const int side = std::min(windows.image().height, windows.image().width); side < kSsimWindow)
+    a.note("pictures of " + windows.image().text() + " pixels: SSIM's window is " +
+           std::to_string((side - 1) / 2 * 2 + 1) + " pixels wide instead of " + std::to_string(kSsimWindow) +
+           "; compare it with others of that size only");
+
+  std::optional<OutputFolder> pictures;
+  if (a.given("pictures")) pictures.emplace(a.output("pictures"));
+  OutputsFile outputs(windows.array(), windows.frames(), windows.image());
+  const Baselines baselines =
+      fit_baselines(windows, tested.split.train, progress_of(a, "fitting the baselines", "parts"));
+  EvaluationPage page(windows);
+  const RecordingScores scores =
+      score_all(a, network, files.front(), windows, tested, baselines,
+                a.given("outputs") ? &outputs : nullptr, a.given("report") ? &page : nullptr);
+  const nlohmann::ordered_json result = report(a, network, windows, tested, baselines, scores);
+  if (pictures)
+    write_pictures(network, files.front().interval_factor(), windows, tested.split.test, *pictures);
+  if (a.given("outputs")) outputs.write(a.output("outputs"));
+  if (a.given("report"))
+    write_file(a.output("report"), page.html(network, tested.split.test, result, made_by(a, windows)));
+  if (pictures) pictures->keep();
+  a.write_json(result);
+  return kExitOk;
+}
 
 }  // namespace supertac

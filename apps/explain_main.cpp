@@ -186,13 +186,15 @@ int run(Arguments& a) {
     throw FileError(a.text("recording"), "was recorded with " + recording.array.text() +
                                              ", the model expects " + file.array().text());
   const WindowSettings w = file.windows();
-  Recording part = heard(recording, a.number("at", 0, 1e9), w.max_gap_s);
-  end_by(part, a.number("at", 0, 1e9), w.rate_hz);
+  const double at = a.number("at", 0, 1e9), gap_s = std::max(w.max_gap_s, kGapPeriods * recording.period_s());
+  Recording part = heard(recording, at, gap_s);
+  if (w.timesteps > 1) end_by(part, at, w.rate_hz);
   const std::size_t signals = part.array.signals(), frames = static_cast<std::size_t>(w.timesteps);
-  const Track track =
-      part.frames() == 0
-          ? Track()
-          : resample(part, {.rate_hz = w.rate_hz, .max_gap_s = w.max_gap_s, .scaling = w.scaling});
+  const Track track = part.frames() == 0 ? Track()
+                                         : resample(part, {.rate_hz = w.rate_hz,
+                                                           .max_gap_s = w.max_gap_s,
+                                                           .frames_apart = w.timesteps == 1,
+                                                           .scaling = w.scaling});
   if (track.frames() < frames)
     throw std::runtime_error("--at " + a.text("at") + ": the model needs " + std::to_string(frames) +
                              " samples at " + format(w.rate_hz) + "/s without a gap before it, found " +

@@ -19,10 +19,10 @@ namespace supertac {
 
 void declare(Arguments& arguments) {
   arguments
-      .positional("FILE",
-                  "a model that supertac-train wrote, of pairs with --onnx alone; with --mcap a recording, "
-                  "or pictures "
-                  "of supertac-stream --out")
+      .positional(
+          "FILE",
+          "a model that supertac-train wrote; with --mcap a recording, or pictures of supertac-stream "
+          "--out")
       .option("onnx", "FILE", "the network as ONNX: volts in, picture out, scaling and normalisation inside")
       .option("c99", "DIR",
               "the int8 network as C99 for microcontrollers, with all that stands before it when it is live: "
@@ -42,12 +42,10 @@ int export_onnx(Arguments& arguments, const ModelFile& file) {
   const std::string path = arguments.text("onnx");
   const std::string bytes = onnx_of(file);
   write_file(arguments.output("onnx"), bytes);
-  const NetworkFormat f = file.network().format();
+  const SuperTacSettings& s = file.model->settings();
   const auto text = [](Dim size) { return std::to_string(size); };
-  const std::string input =
-      file.frame_model ? "frames [N," + text(f.channels) + "," + text(f.rows) + "," + text(f.columns) + "]"
-                       : "volts [N," + text(f.frames) + "," + text(f.rows * f.columns * f.channels) + "]";
-  const std::string output = "picture [N," + text(f.rows * f.scale) + "," + text(f.columns * f.scale) + "]";
+  const std::string input = "volts [N," + text(s.timesteps) + "," + text(s.signals()) + "]";
+  const std::string output = "picture [N," + text(s.image_height()) + "," + text(s.image_width()) + "]";
   arguments.print(path + ": " + input + " -> " + output + ", " + std::to_string(bytes.size()) + " bytes");
   arguments.write_json({{"file", path}, {"input", input}, {"output", output}, {"bytes", bytes.size()}});
   return kExitOk;
@@ -125,10 +123,8 @@ int export_mcap(Arguments& arguments, const SafetensorsFile& file) {
 
 int run(Arguments& arguments) {
   const std::string path = arguments.text("FILE");
-  const SafetensorsFile file = SafetensorsFile::read(path);
-  if (arguments.given("mcap")) return export_mcap(arguments, file);
-  const ModelFile model =
-      load_model(path, file.metadata().contains("kind") ? ModelKind::frames : ModelKind::windows);
+  if (arguments.given("mcap")) return export_mcap(arguments, SafetensorsFile::read(path));
+  const ModelFile model = load_model(path);
   return arguments.given("c99") ? export_c(arguments, model) : export_onnx(arguments, model);
 }
 

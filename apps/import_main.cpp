@@ -1,5 +1,5 @@
 // supertac-import: the rig's text recordings as our recordings, each registered against its plate; tables of
-// any sensor's frames; or the passes of a collection that was cut off, from its journal.
+// any sensor's frames; pairs of images; or the passes of a collection that was cut off, from its journal.
 
 #include <filesystem>
 #include <optional>
@@ -13,6 +13,7 @@
 #include "apps/import/page.h"
 #include "apps/import/tables.h"
 #include "data/plates/plate_file.h"
+#include "data/recordings/table_import.h"
 #include "data/registration/text_folder.h"
 
 namespace supertac {
@@ -22,7 +23,11 @@ void declare(Arguments& arguments) {
       .positional(
           "INPUT",
           "folder with <plate>/<trial>/<pass>.txt, 16 voltages of the rig a line; a plate of your own as "
-          "<plate>.stl beside its folder. With --sensor: a table, or a folder of them",
+          "<plate>.stl beside its folder. With --sensor: a table, or a folder of them. FILE.safetensors: "
+          "frames of "
+          "any array and what a finer sensor saw of each, input [N,C,H,W], target [N,1,sH,sW] in 0 to 1, "
+          "optional "
+          "group [N]",
           false)
       .option("journal", "FILE", "instead of INPUT: recover a collection that was cut off")
       .required("out", "DIR", "folder for the recordings, one file per pass")
@@ -51,6 +56,31 @@ FolderImport import_settings(const Arguments& arguments, std::optional<Progress>
   return settings;
 }
 
+int convert_pairs(const Arguments& arguments, const std::string& path) {
+  std::optional<Sensor> sensor;
+  if (arguments.given("sensor")) sensor = read_sensor(arguments.text("sensor"));
+  const std::vector<Recording> recordings = import_pairs(path, sensor);
+  add_parent_file("pairs", path);
+  OutputFolder folder(arguments.output("out"));
+  std::size_t frames = 0;
+  for (const Recording& recording : recordings) {
+    stop_if_interrupted();
+    frames += recording.frames();
+    try {
+      write_recording(folder.add(recording_file_name(recording)), recording);
+    } catch (const std::invalid_argument& error) {
+      throw FileError(path, error.what());
+    }
+  }
+  folder.keep();
+  arguments.print(std::to_string(recordings.size()) + " recordings of " + std::to_string(frames) +
+                  " frames in " + arguments.text("out") + "; train with --preset frame --split " +
+                  (recordings.front().metadata.contains("group") ? "group" : "window"));
+  arguments.write_json(
+      {{"folder", arguments.text("out")}, {"recordings", recordings.size()}, {"frames", frames}});
+  return kExitOk;
+}
+
 int recover(const Arguments& arguments) {
   for (const char* other : {"INPUT", "speed", "skip-bad", "pictures", "sensor"})
     if (arguments.given(other))
@@ -72,11 +102,13 @@ int recover(const Arguments& arguments) {
 int run(Arguments& arguments) {
   if (arguments.given("journal")) return recover(arguments);
   if (!arguments.given("INPUT")) throw UsageError("expected INPUT or --journal FILE, found neither");
-  if (arguments.given("sensor")) {
+  const std::string input = arguments.text("INPUT");
+  const bool pairs = std::filesystem::path(input).extension() == ".safetensors";
+  if (pairs || arguments.given("sensor")) {
     for (const char* other : {"speed", "pictures"})
       if (arguments.given(other))
         throw UsageError(std::string("--") + other + ": of the rig's text files only");
-    return import_tables(arguments, arguments.text("INPUT"));
+    return pairs ? convert_pairs(arguments, input) : import_tables(arguments, input);
   }
   const std::string out = arguments.text("out");
   OutputFolder folder(arguments.output("out"));

@@ -1,4 +1,4 @@
-// supertac-train: recordings (or pairs of images) in, a model out.
+// supertac-train: recordings in, a model out.
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/output/remarks.h"
@@ -10,12 +10,7 @@
 namespace supertac {
 
 void declare(Arguments& a) {
-  a.option("data", "DIR", "recordings to train on (supertac-simulate, -import, -collect)");
-  a.option(
-      "pairs", "FILE",
-      "instead of --data: images of any sensor, safetensors with input [N,C,H,W], target [N,1,sH,sW] in 0 "
-      "to 1, optional group [N]; trains a network of single frames");
-  a.one_of({"data", "pairs"});
+  a.required("data", "DIR", "recordings to train on (supertac-simulate, -import, -collect)");
   a.required("out", "FILE",
              "the model; FILE's run folder beside it (.run) holds log, report and the state to resume");
   a.option("resume", "FILE", "continue from the last.safetensors of an interrupted run, same options");
@@ -23,7 +18,6 @@ void declare(Arguments& a) {
   declare_strict(a);
   declare_training(a);
   declare_network(a);
-  a.only_with("");
   declare_together(a);
 }
 
@@ -55,15 +49,6 @@ int train(const Arguments& a, TrainingTask task, Ranks& ranks) {
   return kExitOk;
 }
 
-TrainingTask pairs_of(const Arguments& a) {
-  PairSet pairs = PairSet::read(a.text("pairs"));
-  add_parent_file("pairs", a.text("pairs"));
-  const std::string split = a.given("split")  ? a.choice("split", {"group", "pair", "none"})
-                            : pairs.grouped() ? "group"
-                                              : "pair";
-  return pair_task(frame_recipe_of(a), std::move(pairs), split);
-}
-
 TrainingTask windows_of(const Arguments& a, const Recipe& recipe) {
   TrainingTask task = window_task(recipe, folders_of(a));
   add_parent("recordings", hash_of_recordings(a.text("data"), recipe.plates));
@@ -77,8 +62,7 @@ int train(const Arguments& a, Ranks& ranks) {
   } catch (const std::invalid_argument& error) {
     throw UsageError(error.what());
   }
-  const Recipe recipe = a.given("pairs") ? Recipe() : recipe_of(a);
-  return train(a, a.given("pairs") ? pairs_of(a) : windows_of(a, recipe), ranks);
+  return train(a, windows_of(a, recipe_of(a)), ranks);
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ void training_step(benchmark::State& state) {
   settings.epochs = 100'000;
   settings.augment = kStandardAugmentation;
   const WindowSet windows = bench::sliding_bumps(kPaper);
-  Trainer trainer(windows, bench::all_of(windows), window_objective(windows, settings));
+  Trainer trainer(windows, bench::all_of(windows), Objective(windows, settings));
   for (int i = 0; i < 3; ++i) trainer.train_step();
   const long before = allocations::made;
   for (auto _ : state) trainer.train_step();

@@ -15,7 +15,6 @@
 #include "autograd/ops/vae.h"
 #include "layers/residual.h"
 #include "models/networks/classifier.h"
-#include "models/networks/frame_model.h"
 #include "models/training/loss/loss.h"
 
 namespace supertac {
@@ -249,14 +248,8 @@ std::vector<GradientCase> loss_cases() {
   small = {
       .rows = 3, .columns = 5, .in_channels = 2, .timesteps = 32, .latent = 2, .channels = 4, .rcabs = 1};
   supertac_losses(cases, "SuperTac, 3x5 taxels x 2", small);
-  Rng rng(6);
-  const FrameSettings frame{.in_channels = 2, .height = 2, .width = 5, .channels = 8, .rcabs = 1};
-  const Variable frames(uniform({2, 2, 5, 2}, 1, 0, 1));
-  const Tensor truth = uniform({2, 8, 20, 1}, 2, 0, 1);
-  cases.module<FrameModel>(
-      "FrameModel", std::make_shared<FrameModel>(frame, rng), {},
-      [=](const FrameModel& m, const Variable&) { return picture_loss(m.forward(frames), truth, 0.3).total; },
-      4);
+  small = {.rows = 2, .columns = 5, .in_channels = 2, .timesteps = 1, .channels = 8, .rcabs = 1};
+  supertac_losses(cases, "SuperTac, single frames", small);
   return cases.take();
 }
 

@@ -40,7 +40,7 @@ Repetition::Repetition(const Arguments& a, const std::string& run_folder, const 
     : folder_(run_folder),
       ledger_(Ledger::read(LedgerFile::path_in(run_folder))),
       task_(task_of(a, described_by)) {
-  trainer_.emplace(*task_.examples, task_.split.train, std::move(task_.objective));
+  trainer_.emplace(*task_.windows, task_.split.train, std::move(task_.objective));
 }
 
 std::vector<Repetition::Segment> Repetition::segments() const {

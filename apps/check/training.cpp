@@ -35,7 +35,7 @@ std::vector<Segment> drawn(std::vector<Segment> segments, std::size_t count, std
 bool is_of(const std::string& model, const Network& network) {
   const ModelFile file = load_model(model);
   const auto& a = network.parameters();
-  const auto& b = file.network().parameters();
+  const auto& b = file.model->parameters();
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Parameter& x, const Parameter& y) {
     const auto p = std::as_bytes(x.value.value().values()), q = std::as_bytes(y.value.value().values());
     return x.name == y.name && std::equal(p.begin(), p.end(), q.begin(), q.end());

@@ -1,10 +1,10 @@
 #include "apps/classify/exam.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
-#include "data/plates/plate_file.h"
 #include "data/plates/truth.h"
 #include "data/windows/split.h"
 #include "io/numbers/numbers.h"
@@ -97,17 +97,16 @@ Exam make_exam(const WindowSet& windows, const Candidate& model, const std::vect
   return exam;
 }
 
-std::vector<Part> parts_of(const WindowSet& windows, const Exam& exam,
-                           const std::vector<std::string>& classes, const std::string& folder) {
-  std::vector<Plate> plates;
-  for (const std::string& name : classes) plates.push_back(plate_in_folder(name, folder));
+std::vector<Part> parts_of(const WindowSet& windows, const Exam& exam) {
   std::vector<Part> parts;
   for (const std::uint32_t i : exam.test) {
-    const Plate& plate = plates[static_cast<std::size_t>(exam.label_of_pass[windows.pass_of(i)])];
+    const Plate& plate = windows.plate(windows.pass_of(i));
     const double y = windows.position(i).y_mm;
     const double half = windows.image().height_mm() / 2;
-    const bool inside = y - half >= plate.texture_begin() && y + half <= plate.texture_end();
-    parts.push_back(inside ? Part::inside : windows.contact(i) ? Part::contact : Part::all);
+    const bool contact = windows.contact(i);
+    const bool inside =
+        std::isnan(y) ? contact : y - half >= plate.texture_begin() && y + half <= plate.texture_end();
+    parts.push_back(inside ? Part::inside : contact ? Part::contact : Part::all);
   }
   return parts;
 }

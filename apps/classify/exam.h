@@ -51,8 +51,7 @@ std::vector<std::string> classes_of(const WindowSet& windows);
 Exam make_exam(const WindowSet& windows, const Candidate& model, const std::vector<std::string>& classes,
                std::int64_t stride);
 
-/// The narrowest part that each test window belongs to. `folder` is where plates that are STL files lie.
-std::vector<Part> parts_of(const WindowSet& windows, const Exam& exam,
-                           const std::vector<std::string>& classes, const std::string& folder);
+/// The narrowest part that each test window belongs to; without positions all in contact are inside.
+std::vector<Part> parts_of(const WindowSet& windows, const Exam& exam);
 
 }  // namespace supertac

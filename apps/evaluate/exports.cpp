@@ -45,7 +45,7 @@ DrawnWindows drawing_of(const Ensemble& model, double interval_factor, const Win
     d.strips.push_back({d.frames[i], part(d.outputs), part(d.truths), part(d.doubts)});
     const WindowSet::Pass& pass = windows.passes()[windows.pass_of(chosen[i])];
     d.names.push_back(pass.plate + " t" + std::to_string(pass.trial) + " p" + std::to_string(pass.pass) +
-                      "\ny " + format(windows.position(chosen[i]).y_mm, 1) + " mm");
+                      "\n" + windows.place_text(chosen[i]));
   }
   return d;
 }
@@ -68,11 +68,11 @@ Picture figure(const DrawnWindows& d, const WindowSet& windows, int side, bool d
         .push_back({middle(down ? inside.width : inside.height, parts, i), kParts[i]});
   for (int i = 0; i < count; ++i) {
     const std::string& name = d.names[static_cast<std::size_t>(i)];
-    const std::string y = name.substr(name.find('\n') + 3);  // of a film the pass is in the title
+    const std::string place = name.substr(name.find('\n') + 1);  // of a film the pass is in the title
     if (down)
       captions.rows.push_back({middle(inside.height, count, i), name});
     else if (i % 3 == 0)
-      captions.columns.push_back({middle(inside.width, count, i), "y " + y});
+      captions.columns.push_back({middle(inside.width, count, i), place});
   }
   return captioned(inside, captions);
 }
@@ -126,32 +126,6 @@ void write_pictures(const Ensemble& model, double interval_factor, const WindowS
                      p.plate + ", trial " + std::to_string(p.trial) + ", pass " + std::to_string(p.pass) +
                          ", " + format(p.speed_mm_s) + " mm/s"));
   }
-}
-
-void write_pairs(const WindowSet& windows, std::span<const std::uint32_t> indices, const std::string& path) {
-  const ImageGrid image = windows.image();
-  const TaxelArray array = windows.array();
-  const auto channels = static_cast<std::size_t>(array.channels);
-  std::vector<float> window(windows.input_size()), input, target(indices.size() * image.pixels());
-  std::vector<std::int64_t> group;
-  for (std::size_t n = 0; n < indices.size(); ++n) {
-    windows.input(indices[n], window);
-    const auto frame = std::span<const float>(window).last(array.signals());
-    for (std::size_t c = 0; c < channels; ++c)
-      for (std::size_t at = c; at < frame.size(); at += channels) input.push_back(frame[at]);
-    windows.target(indices[n], std::span(target).subspan(n * image.pixels(), image.pixels()));
-    group.push_back(windows.group(indices[n]));
-  }
-  const auto size = [](auto value) { return static_cast<std::uint64_t>(value); };
-  const std::uint64_t count = indices.size();
-  write_safetensors(
-      path, {{"format", "supertac-pairs"}, {"data", windows.fingerprint()}},
-      {{"input",
-        "F32",
-        {count, channels, size(array.rows), size(array.columns)},
-        std::as_bytes(std::span(input))},
-       {"target", "F32", {count, 1, size(image.height), size(image.width)}, std::as_bytes(std::span(target))},
-       {"group", "I64", {count}, std::as_bytes(std::span(group))}});
 }
 
 }  // namespace supertac

@@ -34,8 +34,4 @@ class OutputsFile {
 void write_pictures(const Ensemble& model, double interval_factor, const WindowSet& windows,
                     std::span<const std::uint32_t> test, OutputFolder& folder);
 
-/// Windows as pairs (data/windows/pairs.h): the last frame as a network sees it, [N,channels,rows,columns];
-/// the truth [N,1,H,W]; and as group [N] the number of the pass. Throws FileError.
-void write_pairs(const WindowSet& windows, std::span<const std::uint32_t> indices, const std::string& path);
-
 }  // namespace supertac

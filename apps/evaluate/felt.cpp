@@ -15,6 +15,7 @@ void FeltScores::add(std::uint32_t window, std::span<const float> output, std::s
     begin_ = here;
   }
   const double felt = std::hypot(here.x_mm - begin_.x_mm, here.y_mm - begin_.y_mm);
+  if (!std::isfinite(felt)) return;  // nobody knows where it was
   std::size_t p = parts_.size() - 1;
   while (p > 0 && felt < parts_[p].from_mm) --p;
   const ImageGrid grid = windows_.image();

@@ -200,9 +200,7 @@ std::string EvaluationPage::shown(const std::string& title, const std::string& n
     const Picture& p = pictures.at(window);
     std::vector<float> difference;
     for (std::size_t i = 0; i < p.drawn.size(); ++i) difference.push_back(std::abs(p.drawn[i] - p.truth[i]));
-    const WindowSet::Position at = windows_.position(window);
-    const std::string name =
-        name_of(window) + ", x " + format(at.x_mm, 1) + ", y " + format(at.y_mm, 1) + " mm";
+    const std::string name = name_of(window) + ", " + windows_.place_text(window);
     cards += "<figure class=\"window\"><p>" + escaped(name) + "<br>SSIM " + format(score, 3) + ", PSNR " +
              format(psnr_db(mean_squared_error(p.drawn, p.truth)), 1) + " dB</p><div>";
     const auto add = [&](const char* what, std::span<const float> values, int rows, int columns) {
@@ -232,9 +230,7 @@ std::string EvaluationPage::films(std::span<const std::uint32_t> frames,
     std::vector<float> all = p.felt;
     all.insert(all.end(), p.drawn.begin(), p.drawn.end());
     all.insert(all.end(), p.truth.begin(), p.truth.end());
-    const WindowSet::Position at = windows_.position(window);
-    passes.back()["frames"].push_back({{"x", at.x_mm},
-                                       {"y", at.y_mm},
+    passes.back()["frames"].push_back({{"place", windows_.place_text(window)},
                                        {"zone", word_of(windows_.zone(window))},
                                        {"ssim", ssim(p.drawn, p.truth, static_cast<std::size_t>(grid.height),
                                                      static_cast<std::size_t>(grid.width))},

@@ -35,8 +35,9 @@ void refuse_leak(const std::vector<ModelFile>& files, const std::string& split_n
 
 }  // namespace
 
-TestSet test_set_of(const Arguments& a, const ModelFile& file, const std::vector<std::string>& names) {
-  return {a.given("split") ? a.choice("split", names) : file.metadata_or("split", "none"),
+TestSet test_set_of(const Arguments& a, const ModelFile& file) {
+  return {a.given("split") ? a.choice("split", {"window", "pass", "trial", "texture", "group", "none"})
+                           : file.metadata_or("split", "none"),
           a.given("seed") ? a.seed() : parse_uint(file.metadata_or("seed", "0")).value_or(0),
           comma_list(file.metadata_or("leave_out", "")),
           {}};
@@ -57,13 +58,13 @@ void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, Tes
         "the split leaves nothing to fit the baselines on; --split none fits them to what is tested");
 }
 
-void draw_all(const Arguments& a, const Ensemble& network, const Examples& examples,
+void draw_all(const Arguments& a, const Ensemble& network, const WindowSet& windows,
               std::span<const std::uint32_t> test, const Baselines& baselines,
               const std::function<void(const Drawn&)>& use) {
-  std::vector<std::vector<float>> plain(baselines.size(), std::vector<float>(examples.image().pixels()));
+  std::vector<std::vector<float>> plain(baselines.size(), std::vector<float>(windows.image().pixels()));
   Progress progress(a, "evaluating", test.size(), "pictures");
   for_each_output(
-      network, examples, test,
+      network, windows, test,
       [&](const EvaluatedBatch& b) {
         for (std::size_t n = 0; n < b.size(); ++n) {
           Drawn drawn{test[b.first + n], b.target(n), {b.output(n)}, b.predicted_error(n), b.input(n)};

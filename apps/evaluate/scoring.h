@@ -1,4 +1,4 @@
-// What is tested, and the one loop that draws it: the same for windows and for pairs.
+// What is tested, and the one loop that draws it.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +22,8 @@ struct TestSet {
   Split split;  ///< its test side is tested, the baselines are fitted to its training side
 };
 
-/// --split, one of `names`, and --seed, or the model's own; the split itself is left to the caller.
-TestSet test_set_of(const Arguments& a, const ModelFile& file, const std::vector<std::string>& names);
+/// --split and --seed, or the model's own; the split itself is left to the caller.
+TestSet test_set_of(const Arguments& a, const ModelFile& file);
 
 /// Cuts the test side to --limit. Throws std::runtime_error when what one model is tested on may be what
 /// another was trained on (not where --split none asks for all of them), or no example is left to fit the
@@ -40,7 +40,7 @@ struct Drawn {
 };
 
 /// Draws the test side in order, with a progress bar. Throws Interrupted after a signal.
-void draw_all(const Arguments& a, const Ensemble& network, const Examples& examples,
+void draw_all(const Arguments& a, const Ensemble& network, const WindowSet& windows,
               std::span<const std::uint32_t> test, const Baselines& baselines,
               const std::function<void(const Drawn&)>& use);
 

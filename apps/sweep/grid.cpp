@@ -58,10 +58,11 @@ std::vector<std::string> names_of(const std::vector<Recipe>& grid) {
 }
 
 void declare_grid(Arguments& a) {
-  a.option("preset", "A,B,...", "recipes to start from: paper, best, tiny", "paper");
-  a.option("timesteps", "T,...", "samples per window, multiples of 16, 32 to 512 (default: the preset's)");
+  a.option("preset", "A,B,...", "recipes to start from: paper, best, tiny, frame", "paper");
+  a.option("timesteps", "T,...",
+           "samples per window, multiples of 16, 32 to 512, or 1 (default: the preset's)");
   a.option("latent", "LD,...", "latent numbers per group of taxels (default: the preset's)");
-  a.option("scale", "N,...", "pictures N times as fine as the array: 2, 4, 8 (default: the preset's)");
+  a.option("scale", "N,...", "pictures N times as fine as the array: 2, 4, 8, 16 (default: the preset's)");
   a.option("seeds", "N,...", "of split, initial weights, order, noise", "0");
   a.more();
   a.option("channels", "N,...", "of the upsampler (default: the preset's)");

@@ -142,7 +142,7 @@ void Sweep::measure(const Recipe& recipe, const std::string& label) {
   const std::string state = RunFolder::folder_of(out) + "/last.safetensors";
   a_.note(label);
   TrainingTask task = window_task(recipe, folders_of(a_));
-  const auto windows = std::static_pointer_cast<const WindowSet>(task.examples);
+  const auto windows = task.windows;
   const std::vector<std::uint32_t> to_score = windows_to_score(*windows, task.split);
   a_.note(task.counts);
   TrainingRun training(a_, std::move(task),
@@ -181,7 +181,7 @@ nlohmann::ordered_json Sweep::row(const Recipe& recipe, const TrainingRun& train
                                   const ZoneMetrics& scores) const {
   const Network& model = training.trainer().model();
   SuperTacSettings s = recipe.model;
-  set_array(s, training.task().examples->array());
+  set_array(s, training.task().windows->array());
   const Tensor window = Tensor::full(model.input_shape(1), real(0.5));
   const Prepared prepared(model);
   const Latency latency = measure_latency([&] { prepared.estimate(window); });

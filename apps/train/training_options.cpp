@@ -11,17 +11,13 @@
 namespace supertac {
 
 void declare_training(Arguments& a) {
-  a.option("split", "NAME",
-           "what is kept for testing: window, pass, trial, texture, group or none; with --pairs group, pair "
-           "or none "
-           "(default: group, or pair for a file without groups)",
-           "trial");
-  a.option("epochs", "N", "passes over the training examples (default: the preset's 20; tiny: 80)");
+  a.option("split", "NAME", "what is kept for testing: window, pass, trial, texture, group or none", "trial");
+  a.option("epochs", "N", "passes over the training windows (default: the preset's 20; tiny: 80)");
   a.more();
-  a.option("batch", "N", "examples per step", "64");
-  a.option(
-      "learning-rate", "X",
-      "peak of the rate, after warm-up and before the cosine (default: the preset's 0.001; tiny: 0.002)");
+  a.option("batch", "N", "windows per step", "64");
+  a.option("learning-rate", "X",
+           "peak of the rate, after warm-up and before the cosine (default: the preset's 0.001; tiny, frame: "
+           "0.002)");
   a.option(
       "optimizer", "NAME",
       "adam, as in the paper; or muon: matrices of weights move by the orthogonal factor of their momentum, "
@@ -85,26 +81,20 @@ void declare_window_training(Arguments& a) {
 }
 
 void declare_network(Arguments& a) {
-  a.only_with("data");
   a.option("preset", "NAME",
            "recipe to begin with: paper (as in the paper), best (what measures best for one network: plain "
-           "autoencoders by Muon) or tiny (a ninth of the multiply-adds, a third of the time)",
+           "autoencoders by Muon), tiny (a ninth of the multiply-adds, a third of the time) or frame (single "
+           "frames as they are, without a window of time: for sensors that press or lie still)",
            "paper");
   a.option(
       "like", "MODEL",
       "begin with the recipe of this model instead: with the same recordings and no other option the same "
       "network comes out again, byte for byte");
-  a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512 (default: the preset's)");
-  a.option("scale", "N", "pictures N times as fine as the array, which the recordings name: 2, 4 or 8", "4");
+  a.option("timesteps", "T", "samples per window, a multiple of 16, 32 to 512, or 1 (default: the preset's)");
+  a.option("scale", "N", "pictures N times as fine as the array, which the recordings name: 2, 4, 8 or 16",
+           "4");
   declare_window_training(a);
   a.more().option("latent", "LD", "latent numbers per group of taxels", "10");
-}
-
-static void read_pace(const Arguments& a, TrainingPace& pace) {
-  if (a.given("epochs")) pace.epochs = a.integer("epochs", 1, 100'000);
-  if (a.given("learning-rate")) pace.learning_rate = a.number("learning-rate", 1e-9, 1);
-  if (a.given("batch")) pace.batch = a.integer("batch", 1, 4096);
-  if (a.given("optimizer")) pace.muon = a.choice("optimizer", {"adam", "muon"}) == "muon";
 }
 
 static std::optional<Scaling> stated_range(const Arguments& a) {
@@ -123,7 +113,10 @@ static std::optional<Scaling> stated_range(const Arguments& a) {
 }
 
 Recipe recipe_of(const Arguments& a, Recipe r) {
-  read_pace(a, r);
+  if (a.given("epochs")) r.epochs = a.integer("epochs", 1, 100'000);
+  if (a.given("learning-rate")) r.learning_rate = a.number("learning-rate", 1e-9, 1);
+  if (a.given("batch")) r.batch = a.integer("batch", 1, 4096);
+  if (a.given("optimizer")) r.muon = a.choice("optimizer", {"adam", "muon"}) == "muon";
   if (a.given("split"))
     r.split = split_kind(a.choice("split", {"window", "pass", "trial", "texture", "group", "none"}));
   if (a.given("leave-out")) r.leave_out = a.list("leave-out");
@@ -162,21 +155,13 @@ Recipe recipe_of(const Arguments& a) {
   if (a.given("like")) {
     r = Recipe::of(load_model(a.text("like")), a.text("like"));
   } else {
-    r = Recipe::named(a.choice("preset", {"paper", "best", "tiny"}));
+    r = Recipe::named(a.choice("preset", {"paper", "best", "tiny", "frame"}));
   }
-  if (a.given("timesteps")) r.model.timesteps = a.integer("timesteps", 32, 512);
+  if (a.given("timesteps")) r.model.timesteps = a.integer("timesteps", 1, 512);
   if (a.given("latent")) r.model.latent = a.integer("latent", 1, 256);
-  if (a.given("scale")) r.model.scale = std::stoi(a.choice("scale", {"2", "4", "8"}));
+  if (a.given("scale")) r.model.scale = std::stoi(a.choice("scale", {"2", "4", "8", "16"}));
   if (a.given("seed")) r.seed = a.seed();
   return recipe_of(a, r);
-}
-
-FrameRecipe frame_recipe_of(const Arguments& a) {
-  FrameRecipe r;
-  read_pace(a, r);
-  r.seed = a.seed();
-  if (a.given("lambda")) r.lambda = a.number("lambda", 0, 1e6);
-  return r;
 }
 
 RecordingFolders folders_of(const Arguments& a) {

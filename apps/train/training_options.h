@@ -10,8 +10,7 @@ namespace supertac {
 void declare_training(Arguments& a);
 /// Recordings, windows, augmentation and the loss of SuperTac: everything else but the network and the seed.
 void declare_window_training(Arguments& a);
-/// --preset and --like, the network of one training, and declare_window_training(): what stands beside --data
-/// only.
+/// --preset and --like, the network of one training, and declare_window_training().
 void declare_network(Arguments& a);
 
 /// `base` with what the options of declare_training() and declare_window_training() change. Throws
@@ -20,8 +19,6 @@ Recipe recipe_of(const Arguments& a, Recipe base);
 /// The recipe of --preset or of the model --like, with all options over it, --seed included. Throws
 /// UsageError, and as load_model() and Recipe::of().
 Recipe recipe_of(const Arguments& a);
-/// The same for pairs.
-FrameRecipe frame_recipe_of(const Arguments& a);
 
 /// --data and --also, read with a progress bar.
 RecordingFolders folders_of(const Arguments& a);

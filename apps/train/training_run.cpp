@@ -26,7 +26,7 @@ void check_agreement(const Trainer& trainer, const TrainingTask& task, Ranks& ra
 
 // Restored before the run folder is touched: a checkpoint that does not fit must leave the folder as it was.
 Trainer make_trainer(TrainingTask& task, const TrainingTarget& target) {
-  Trainer trainer(*task.examples, task.split.train, std::move(task.objective), target.ranks);
+  Trainer trainer(*task.windows, task.split.train, std::move(task.objective), target.ranks);
   if (!target.resume.empty()) trainer.restore(target.resume, task.origin);
   if (target.ranks.size() > 1) check_agreement(trainer, task, target.ranks);
   return trainer;
@@ -41,15 +41,14 @@ nlohmann::ordered_json describe(const Arguments& a, const Trainer& trainer, cons
                {"model", Json::parse(trainer.objective().metadata().at("settings"))},
                {"parameters", trainer.model().parameter_count()},
                {"split", task.origin.at("split")},
-               {"train_" + task.unit, task.split.train.size()},
-               {"test_" + task.unit, task.split.test.size()}};
-  if (task.leakage)
-    json.update({{"test_windows_sharing_frames", task.leakage->overlapping},
-                 {"test_windows_duplicated", task.leakage->duplicated},
-                 {"windows", task.counts}});
-  json.update({{"data", task.origin.at("data")},
+               {"train_windows", task.split.train.size()},
+               {"test_windows", task.split.test.size()},
+               {"test_windows_sharing_frames", task.leakage.overlapping},
+               {"test_windows_duplicated", task.leakage.duplicated},
+               {"windows", task.counts},
+               {"data", task.origin.at("data")},
                {"split_fingerprint", task.origin.at("split_fingerprint")},
-               {"steps", trainer.total_steps()}});
+               {"steps", trainer.total_steps()}};
   return json;
 }
 
@@ -72,7 +71,7 @@ TrainingRun::TrainingRun(const Arguments& a, TrainingTask task, TrainingTarget t
 }
 
 bool TrainingRun::train() {
-  a_.note("training on " + std::to_string(task_.split.train.size()) + " " + task_.unit + ", " +
+  a_.note("training on " + std::to_string(task_.split.train.size()) + " windows, " +
           std::to_string(trainer_.total_steps()) + " steps" +
           (target_.resume.empty() ? "" : ", resumed at " + std::to_string(trainer_.step())));
   for (const std::string& note : task_.notes) a_.note(note);
@@ -131,10 +130,10 @@ void TrainingRun::warn_of_collapse(const StepReport& report) {
   const bool idle = trainer_.objective().latents() > 0 && report.active_latents == 0;
   const std::string advice =
       idle ? "no latent number tells windows apart; if that stays so, lower --beta (now " +
-                 format(task_.beta) + ") or "
+                 format(trainer_.objective().recipe().loss.beta) + ") or "
            : "the pictures are the same for every input, or far too strong; if that stays so, lower ";
   a_.note("step " + std::to_string(report.step) + ": " + advice + "--learning-rate (now " +
-          format(trainer_.objective().pace().learning_rate) +
+          format(trainer_.objective().recipe().learning_rate) +
           "); early in a run it often mends itself: watch SSIM");
 }
 

@@ -93,7 +93,7 @@ class Ours {
       Recipe settings;
       settings.model = model_->settings();
       settings.epochs = 100'000;
-      trainer_ = std::make_unique<Trainer>(*data_, bench::all_of(*data_), window_objective(*data_, settings));
+      trainer_ = std::make_unique<Trainer>(*data_, bench::all_of(*data_), Objective(*data_, settings));
     }
     return *trainer_;
   }

@@ -178,26 +178,17 @@ void declare(Arguments& a) {
 }
 
 /// Windows as a worse sensor gives them: corrupted before they are normalised.
-class CorruptedWindows : public Examples {
+class CorruptedWindows : public WindowSet {
  public:
   CorruptedWindows(const WindowSet& windows, const Corruption* corruption, double severity)
-      : windows_(windows), corruption_(corruption), severity_(severity) {}
-  std::size_t size() const override { return windows_.size(); }
-  std::size_t frames() const override { return windows_.frames(); }
-  TaxelArray array() const override { return windows_.array(); }
-  int scale() const override { return windows_.scale(); }
-  void input(std::size_t i, std::span<float> out) const override {
-    std::ranges::copy(windows_.window(i), out.begin());
+      : WindowSet(windows), corruption_(corruption), severity_(severity) {}
+  void window(std::size_t i, std::span<float> out) const override {
+    std::ranges::copy(WindowSet::window(i), out.begin());
     if (corruption_ != nullptr) corruption_->apply(severity_, i, out);
-    if (windows_.settings().scaling.per_window) normalise_window(out, kTaxels);
+    if (settings().scaling.per_window) normalise_window(out, kTaxels);
   }
-  void target(std::size_t i, std::span<float> out) const override { windows_.target(i, out); }
-  Zone zone(std::size_t i) const override { return windows_.zone(i); }
-  std::int64_t group(std::size_t i) const override { return windows_.group(i); }
-  std::string fingerprint() const override { return windows_.fingerprint(); }
 
  private:
-  const WindowSet& windows_;
   const Corruption* corruption_;
   double severity_;
 };
@@ -217,23 +208,23 @@ double auroc(std::vector<double> usual, std::vector<double> odd) {
   return below / (static_cast<double>(usual.size()) * static_cast<double>(odd.size()));
 }
 
-Point measure(const std::vector<ModelFile>& files, const Examples& examples,
+Point measure(const std::vector<ModelFile>& files, const WindowSet& windows,
               std::span<const std::uint32_t> chosen) {
   const Ensemble network = ensemble_of(files);
   const ModelFile& file = files.front();
-  Point point(examples.image());
-  for_each_output(network, examples, chosen, [&](const EvaluatedBatch& b) {
+  Point point(windows.image());
+  for_each_output(network, windows, chosen, [&](const EvaluatedBatch& b) {
     stop_if_interrupted();
     for (std::size_t n = 0; n < b.size(); ++n) {
       const auto output = b.output(n), target = b.target(n), predicted_error = b.predicted_error(n);
-      point.metrics.add(output, target, examples.zone(chosen[b.first + n]));
+      point.metrics.add(output, target, windows.zone(chosen[b.first + n]));
       for (std::size_t i = 0; i < predicted_error.size(); ++i)
         point.covered +=
             std::abs(output[i] - target[i]) <= file.interval_factor() * double{at_least(predicted_error[i])};
       point.pixels += predicted_error.size();
       ++point.windows;
       if (!file.novelty) continue;
-      const std::vector<float> features = signal_features(b.input(n), examples.array());
+      const std::vector<float> features = signal_features(b.input(n), windows.array());
       point.distances.push_back(file.novelty->distance(features));
       point.alarms += file.novelty->unlike_training(features) ? 1 : 0;
     }

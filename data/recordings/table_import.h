@@ -1,6 +1,7 @@
-// Tables of a sensor's frames as recordings.
+// Tables of a sensor's frames, and pairs of images, as recordings.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,5 +40,16 @@ void add_positions(Recording& recording, const std::string& path, const Table& l
 /// Takes a table with as many rows as the recording has frames, each an image of `shape`, for the truth;
 /// `low` to `high` become 0 to 1. Throws FileError.
 void add_truth(Recording& recording, const std::string& path, const Table& images, double low, double high);
+
+/// Recordings with measured truth from pairs of a low- and a high-resolution image, a safetensors file with
+///   input   F32 [N,C,H,W]    what the sensor gave: N frames of H x W taxels, C channels
+///   target  F32 [N,1,sH,sW]  what a finer sensor saw of each, in [0,1]; s is 2, 4, 8 or 16
+///   group   I64 or I32 [N]   optional: frames of one person, object or day belong together
+/// Each group becomes a recording, whose plate and metadata "group" are the group's number with as many
+/// digits as the longest; without groups there is one, and its plate is "pairs". Nobody knows when the frames
+/// were taken: they are one second apart, and there is no trial. `sensor` says what the numbers mean; without
+/// it pressing raises them, from the lowest value of the file to the highest, and taxels are 1 mm apart.
+/// Throws FileError naming the tensor, what was expected and found.
+std::vector<Recording> import_pairs(const std::string& path, const std::optional<Sensor>& sensor = {});
 
 }  // namespace supertac

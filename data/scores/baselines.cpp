@@ -37,13 +37,13 @@ double keys_kernel(double distance) {
 
 }  // namespace
 
-MeanImage::MeanImage(const Examples& examples, std::span<const std::uint32_t> train)
-    : array_(examples.array()), image_(examples.image().pixels()) {
+MeanImage::MeanImage(const WindowSet& windows, std::span<const std::uint32_t> train)
+    : array_(windows.array()), image_(windows.image().pixels()) {
   std::vector<double> sum(image_.size());
   std::vector<float> truth(image_.size());
   const std::vector<std::uint32_t> chosen = fitted_on(train);
   for (const std::uint32_t i : chosen) {
-    examples.target(i, truth);
+    windows.truth(i, truth);
     for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += truth[p];
   }
   for (std::size_t p = 0; p < sum.size(); ++p)
@@ -102,20 +102,18 @@ void Upsampling::operator()(std::span<const float> frame, std::span<float> out) 
   }
 }
 
-UpsampledFrame::UpsampledFrame(Upsampling::Kind kind, const Examples& examples,
+UpsampledFrame::UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows,
                                std::span<const std::uint32_t> train)
-    : kind_(kind),
-      array_(examples.array()),
-      upsampling_(kind, array_.rows, array_.columns, examples.scale()) {
-  const std::size_t pixels = examples.image().pixels();
+    : kind_(kind), array_(windows.array()), upsampling_(kind, array_.rows, array_.columns, windows.scale()) {
+  const std::size_t pixels = windows.image().pixels();
   std::vector<float> image(pixels), truth(pixels);
   double sx = 0, sy = 0, sxx = 0, sxy = 0;
   const std::vector<std::uint32_t> chosen = fitted_on(train);
-  std::vector<float> input(examples.input_size());
+  std::vector<float> input(windows.input_size());
   for (const std::uint32_t i : chosen) {
-    examples.input(i, input);
+    windows.window(i, input);
     upsampling_(mean_of_channels(array_, std::span(input).last(array_.signals())), image);
-    examples.target(i, truth);
+    windows.truth(i, truth);
     for (std::size_t p = 0; p < pixels; ++p) {
       sx += image[p];
       sy += truth[p];
@@ -139,17 +137,12 @@ void UpsampledFrame::predict(std::span<const float> input, std::span<float> out)
   for (float& v : out) v = static_cast<float>(slope_ * v + intercept_);
 }
 
-Baselines fit_baselines(const Examples& examples, std::span<const std::uint32_t> train) {
-  Baselines baselines;
-  baselines.push_back(std::make_unique<MeanImage>(examples, train));
-  for (const auto kind : {Upsampling::Kind::nearest, Upsampling::Kind::bicubic})
-    baselines.push_back(std::make_unique<UpsampledFrame>(kind, examples, train));
-  return baselines;
-}
-
 Baselines fit_baselines(const WindowSet& windows, std::span<const std::uint32_t> train,
                         const FitProgress& progress) {
-  Baselines baselines = fit_baselines(static_cast<const Examples&>(windows), train);
+  Baselines baselines;
+  baselines.push_back(std::make_unique<MeanImage>(windows, train));
+  for (const auto kind : {Upsampling::Kind::nearest, Upsampling::Kind::bicubic})
+    baselines.push_back(std::make_unique<UpsampledFrame>(kind, windows, train));
   baselines.push_back(std::make_unique<Ridge>(windows, train, progress));
   return baselines;
 }

@@ -26,7 +26,7 @@ class Baseline {
 class MeanImage : public Baseline {
  public:
   /// Throws std::invalid_argument when train is empty.
-  MeanImage(const Examples& examples, std::span<const std::uint32_t> train);
+  MeanImage(const WindowSet& windows, std::span<const std::uint32_t> train);
   std::string name() const override { return "mean_image"; }
   void predict(std::span<const float> input, std::span<float> out) const override;
 
@@ -63,7 +63,7 @@ class Upsampling {
 class UpsampledFrame : public Baseline {
  public:
   /// Throws std::invalid_argument when train is empty.
-  UpsampledFrame(Upsampling::Kind kind, const Examples& examples, std::span<const std::uint32_t> train);
+  UpsampledFrame(Upsampling::Kind kind, const WindowSet& windows, std::span<const std::uint32_t> train);
   std::string name() const override;
   void predict(std::span<const float> input, std::span<float> out) const override;
   double slope() const { return slope_; }
@@ -81,11 +81,10 @@ using Baselines = std::vector<std::unique_ptr<Baseline>>;
 /// Told how much of `all` is done, some times a second; may throw to end the fit.
 using FitProgress = std::function<void(std::size_t done, std::size_t all)>;
 
-/// mean_image, nearest and bicubic, in this order; for windows ridge (data/scores/ridge.h) besides. Each is
-/// fitted to at most kFitWindows training examples, evenly spread over the list. Throws std::invalid_argument
-/// when train is empty.
+/// mean_image, nearest, bicubic and ridge (data/scores/ridge.h), in this order. Each is fitted to at most
+/// kFitWindows training examples, evenly spread over the list. Throws std::invalid_argument when train is
+/// empty.
 constexpr std::size_t kFitWindows = 20000;
-Baselines fit_baselines(const Examples& examples, std::span<const std::uint32_t> train);
 Baselines fit_baselines(const WindowSet& windows, std::span<const std::uint32_t> train,
                         const FitProgress& progress = {});
 

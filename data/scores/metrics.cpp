@@ -121,10 +121,7 @@ nlohmann::ordered_json to_json(const Metrics& metrics) {
   return json;
 }
 
-ImageScorer::ImageScorer(const ImageGrid& grid) : grid_(grid), correlator_(grid.height, grid.width) {
-  if (std::min(grid.height, grid.width) < kUniformSize)
-    throw std::invalid_argument("metrics: sides must be at least 7, got " + grid.text());
-}
+ImageScorer::ImageScorer(const ImageGrid& grid) : grid_(grid), correlator_(grid.height, grid.width) {}
 
 ImageScores ImageScorer::operator()(std::span<const float> output, std::span<const float> truth) {
   for (std::size_t i = 0; i < output.size(); ++i)
@@ -244,26 +241,6 @@ nlohmann::ordered_json ZoneMetrics::to_json() const {
   json["flat"] = supertac::to_json(flat());
   json["air"] = supertac::to_json(air());
   return json;
-}
-
-void PairMetrics::add(std::span<const float> output, std::span<const float> target) {
-  for (const float value : output)
-    if (!std::isfinite(value)) throw std::invalid_argument("pair metrics: the output is not finite");
-  const double mse = mean_squared_error(output, target);
-  ssim_ += ssim(output, target, height_, width_);
-  psnr_ += psnr_db(mse);
-  mse_ += mse;
-  ++pairs_;
-}
-
-Metrics PairMetrics::result() const {
-  Metrics metrics{.windows = pairs_};
-  if (pairs_ == 0) return metrics;
-  const auto n = static_cast<double>(pairs_);
-  metrics.psnr_mean_db = psnr_ / n;
-  metrics.psnr_pooled_db = psnr_db(mse_ / n);
-  metrics.ssim = ssim_ / n;
-  return metrics;
 }
 
 }  // namespace supertac

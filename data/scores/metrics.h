@@ -74,7 +74,7 @@ nlohmann::ordered_json to_json(const Metrics& metrics);
 /// Scores image pairs of one size. One object serves one thread.
 class ImageScorer {
  public:
-  /// Throws std::invalid_argument when a side is odd or below 7.
+  /// Throws std::invalid_argument when a side is odd or below 4.
   explicit ImageScorer(const ImageGrid& grid);
   /// Throws std::invalid_argument when a size is wrong or a value of the output is not finite.
   ImageScores operator()(std::span<const float> output, std::span<const float> truth);
@@ -126,21 +126,6 @@ class ZoneMetrics {
  private:
   ImageScorer scorer_;
   MetricsAccumulator all_, contact_, flat_, air_;
-};
-
-/// Scores of pictures of any shape: pairs (as `windows`), PSNR and SSIM of Metrics; what needs a position
-/// stays NaN, for nothing is known of the pixels' size.
-class PairMetrics {
- public:
-  PairMetrics(std::size_t height, std::size_t width) : height_(height), width_(width) {}
-  /// Throws std::invalid_argument when a size is wrong or a value of the output is not finite.
-  void add(std::span<const float> output, std::span<const float> target);
-  Metrics result() const;
-
- private:
-  std::size_t height_, width_;
-  std::uint64_t pairs_ = 0;
-  double psnr_ = 0, mse_ = 0, ssim_ = 0;  // sums
 };
 
 }  // namespace supertac

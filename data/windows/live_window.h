@@ -10,7 +10,7 @@
 namespace supertac {
 
 struct LiveWindowSettings {
-  int timesteps = 256;            ///< T, samples per window
+  int timesteps = 256;            ///< T, samples per window; 1: each frame as it is, whatever rate_hz
   std::size_t signals = kTaxels;  ///< in a frame
   double rate_hz = 300;
   Scaling scaling = {};

@@ -47,10 +47,6 @@ std::string numbers(const std::vector<std::size_t>& all) {
   return text;
 }
 
-void remark_on_truths(bool any, std::vector<std::string>& remarks) {
-  if (!any) remarks.emplace_back("every truth is 0 everywhere: nothing can be learnt or scored in contact");
-}
-
 }  // namespace
 
 std::vector<std::string> remarks_on(const WindowSet& windows, std::span<const std::uint32_t> chosen) {
@@ -69,26 +65,8 @@ std::vector<std::string> remarks_on(const WindowSet& windows, std::span<const st
   if (swings.share_at_the_end() >= kAtTheEnd)
     remarks.push_back(format(100 * swings.share_at_the_end(), 1) +
                       " % of the signals lie at the end of the model's range: saturated, or clipped");
-  remark_on_truths(touched, remarks);
-  return remarks;
-}
-
-std::vector<std::string> remarks_on(const PairSet& pairs) {
-  const std::size_t every = 1 + pairs.size() / kLookedAt;
-  std::vector<float> input(pairs.array().signals()), target(pairs.image().pixels());
-  SwingRanges swings(input.size());
-  bool touched = false;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    pairs.target(i, target);
-    touched = touched || std::ranges::any_of(target, [](float v) { return v > 0; });
-    if (i % every != 0) continue;
-    pairs.input(i, input);
-    swings.add(input);
-  }
-  std::vector<std::string> remarks;
-  if (pairs.size() > 1 && swings.still().size() == input.size())
-    remarks.emplace_back("no input changes from pair to pair");
-  remark_on_truths(touched, remarks);
+  if (!touched)
+    remarks.emplace_back("every truth is 0 everywhere: nothing can be learnt or scored in contact");
   return remarks;
 }
 

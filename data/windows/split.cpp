@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -61,7 +60,7 @@ std::vector<Side> split_trials(const WindowSet& windows) {
   for (const WindowSet::Pass& pass : windows.passes()) {
     if (pass.windows > 0 && pass.trial == 0)
       throw std::invalid_argument("split trial: pass " + std::to_string(pass.pass) + " over '" + pass.plate +
-                                  "' has no trial; use split pass, or record it with one");
+                                  "' has no trial; use split group or pass, or record it with one");
     sides.push_back(pass.use.training_only || pass.trial == 1 ? Side::train : Side::test);
   }
   return sides;
@@ -76,8 +75,7 @@ std::vector<Side> split_groups(const WindowSet& windows, std::uint64_t seed) {
   if (groups.size() < 2 || groups.contains(""))
     throw std::invalid_argument(
         "split group: every recording needs metadata 'group' and there must be two groups, one to train on, "
-        "one "
-        "to test on; " +
+        "one to test on; " +
         std::string(groups.contains("") ? "some have none: use split pass"
                                         : "there is one: use split window"));
   std::vector<Side> sides(windows.passes().size(), Side::train);
@@ -244,20 +242,6 @@ std::size_t count_overlapping(const WindowSet& windows, const Split& split) {
   return count;
 }
 
-std::set<std::int64_t> test_groups(const PairSet& pairs, std::uint64_t seed) {
-  std::set<std::int64_t> all;
-  for (std::size_t i = 0; i < pairs.size(); ++i) all.insert(pairs.group(i));
-  if (!pairs.grouped() || all.size() < 2)
-    throw std::invalid_argument(
-        "split group: the file needs a tensor 'group' with two groups, one to train on, one to test on; "
-        "without one use split pair");
-  const std::vector<std::int64_t> ordered(all.begin(), all.end());
-  const EpochOrder order(ordered.size(), seed, 0);
-  std::set<std::int64_t> tested;
-  for (std::size_t i = 0; i < test_count(ordered.size()); ++i) tested.insert(ordered[order[i]]);
-  return tested;
-}
-
 }  // namespace
 
 SplitKind split_kind(const std::string& name) {
@@ -329,26 +313,6 @@ std::vector<std::uint32_t> subsample_no_contact(const WindowSet& windows, std::v
     if (!is_left_out(i)) list[kept++] = i;
   list.resize(kept);
   return list;
-}
-
-Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t seed) {
-  Split split;
-  std::vector<bool> tested(pairs.size());
-  if (kind == "group") {
-    const std::set<std::int64_t> groups = test_groups(pairs, seed);
-    for (std::size_t i = 0; i < pairs.size(); ++i) tested[i] = groups.contains(pairs.group(i));
-  } else if (kind == "pair") {
-    if (pairs.size() < 2) throw std::invalid_argument("split pair: the file has one pair, needs two");
-    const EpochOrder order(pairs.size(), seed, 0);
-    for (std::size_t i = 0; i < test_count(pairs.size()); ++i) tested[order[i]] = true;
-  } else if (kind != "none") {
-    throw std::invalid_argument("split of pairs must be group, pair or none, got \"" + kind + "\"");
-  }
-  for (std::uint32_t i = 0; i < pairs.size(); ++i) {
-    if (kind == "none" || tested[i]) split.test.push_back(i);
-    if (!tested[i]) split.train.push_back(i);
-  }
-  return split;
 }
 
 Leakage find_leakage(const WindowSet& windows, const Split& split) {

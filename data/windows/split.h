@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "data/windows/pairs.h"
 #include "data/windows/windows.h"
 
 namespace supertac {
@@ -31,7 +30,7 @@ SplitKind split_kind(const std::string& name);
 std::string name_of(SplitKind kind);
 
 struct Split {
-  std::vector<std::uint32_t> train, test;  ///< indices of examples, ascending
+  std::vector<std::uint32_t> train, test;  ///< indices of windows, ascending
 };
 
 /// The random choices are EpochOrder(count, seed, stream) with stream 0 for windows and groups, 1 for plates,
@@ -41,14 +40,6 @@ struct Split {
 /// would be empty, saying what the data lacks. `leave_out`: of split texture, the plates that are tested.
 Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
                  const std::vector<std::string>& leave_out = {});
-
-/// How pairs are divided:
-///   group  a random fifth of the groups (rounded, at least one) is tested: unseen passes, surfaces, days
-///   pair   a random fifth of the pairs is tested. Leaky when neighbours resemble each other.
-///   none   all pairs are in both
-/// Random choices are EpochOrder(count, seed, 0); groups are counted in ascending order.
-/// Throws std::invalid_argument for another name, no groups, or a side that would be empty.
-Split split_pairs(const PairSet& pairs, const std::string& kind, std::uint64_t seed);
 
 /// Of these windows, ascending, drops 75 % of those without contact of passes that are not augmentable
 /// (simulated ones over random plates): two of three windows of a whole pass show a flat plate or the air,

@@ -12,6 +12,7 @@
 #include "data/windows/chosen_plates.h"
 #include "data/windows/transforms/normalise_window.h"
 #include "io/numbers/hash.h"
+#include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
 namespace supertac {
@@ -21,8 +22,8 @@ void check(const WindowSettings& s) {
   const auto fail = [](const std::string& what) { throw std::invalid_argument("windows: " + what); };
   s.array.value_or(TaxelArray{}).check();
   if (s.timesteps < 1) fail("timesteps must be at least 1, got " + std::to_string(s.timesteps));
-  if (s.scale != 2 && s.scale != 4 && s.scale != 8)
-    fail("scale must be 2, 4 or 8, got " + std::to_string(s.scale));
+  if (s.scale != 2 && s.scale != 4 && s.scale != 8 && s.scale != 16)
+    fail("scale must be 2, 4, 8 or 16, got " + std::to_string(s.scale));
   if (s.stride < 1) fail("stride must be at least 1, got " + std::to_string(s.stride));
   if (!(s.rate_hz > 0) || !(s.max_gap_s > 0) || !(std::abs(s.scaling.span_volts) > 0))
     fail("rate_hz and max_gap_s must be positive, span_volts not 0, got " + std::to_string(s.rate_hz) + ", " +
@@ -297,6 +298,12 @@ WindowSet::Position WindowSet::position(std::size_t i) const {
   return {x, y};
 }
 
+std::string WindowSet::place_text(std::size_t i) const {
+  const auto [x, y] = position(i);
+  if (!std::isfinite(x) || !std::isfinite(y)) return "frame " + std::to_string(frame_of(i));
+  return "x " + format(x, 1) + ", y " + format(y, 1) + " mm";
+}
+
 void WindowSet::truth(std::size_t i, std::span<float> out) const {
   check_size("a truth image", out.size(), image().pixels());
   const Place place = place_of(i);
@@ -309,7 +316,11 @@ void WindowSet::truth(std::size_t i, std::span<float> out) const {
 
 Zone WindowSet::zone(std::size_t i) const {
   const Place place = place_of(i);
-  if (measured(place.pass)) return Examples::zone(i);
+  if (measured(place.pass)) {
+    std::vector<float> pixels(image().pixels());
+    truth(i, pixels);
+    return in_contact(pixels) ? Zone::contact : Zone::flat;
+  }
   const auto [x, y, lift] = finger(place);
   return lift > kLiftedMm ? Zone::air : zone_of(plate(place.pass), x, y, image());
 }

@@ -9,18 +9,18 @@
 #include <vector>
 
 #include "data/plates/plate.h"
+#include "data/plates/truth.h"
 #include "data/recordings/recording.h"
 #include "data/recordings/resample.h"
 #include "data/recordings/signal_range.h"
 #include "data/sensors/taxel_array.h"
-#include "data/windows/examples.h"
 #include "io/files/scratch_file.h"
 
 namespace supertac {
 
 struct WindowSettings {
   int timesteps = 256;                   ///< T, frames per window
-  int scale = 4;                         ///< 2, 4 or 8: truths that many times finer than the array
+  int scale = 4;                         ///< 2, 4, 8 or 16: truths that many times finer than the array
   double rate_hz = 300;                  ///< the model's rate
   Scaling scaling = {};                  ///< volts to [0,1]
   std::optional<TaxelArray> array = {};  ///< that every recording must have; nothing: that of the first
@@ -47,10 +47,13 @@ struct WindowCounts {
 
 /// What the windows of a pass are for.
 struct PassUse {
-  bool training_only = false;   ///< no split tests them: simulated passes beside real ones
-  bool augmentable = true;      ///< Examples::augmentable()
-  bool in_distribution = true;  ///< Examples::in_distribution()
-  int stride = 0;               ///< every stride-th frame ends a window; 0: that of the settings
+  bool training_only = false;  ///< no split tests them: simulated passes beside real ones
+  /// Whether training may change a window to imitate other days: of simulated passes every one is another
+  /// day already, and changes only blur.
+  bool augmentable = true;
+  /// Whether a window shows what the network will be used on: the novelty alarm learns from such.
+  bool in_distribution = true;
+  int stride = 0;  ///< every stride-th frame ends a window; 0: that of the settings
 };
 
 /// The windows of a set of recordings. Nothing is copied per window: a recording is brought to rate_hz once,
@@ -58,7 +61,7 @@ struct PassUse {
 /// which pass and last frame follow, and none crosses the edge of a pass or a gap. T = 1: every recorded
 /// frame is a window, as it is, whatever the rate. Memory: 24 bytes for each stretch of frames without a gap.
 /// Reading is const and safe from many threads.
-class WindowSet : public Examples {
+class WindowSet {
  public:
   struct Pass {
     std::string plate;
@@ -83,6 +86,8 @@ class WindowSet : public Examples {
   static WindowSet load(const std::string& dir, const std::vector<std::string>& plates,
                         const WindowSettings& settings, const ReadingWatch& watch = {});
 
+  WindowSet(const WindowSet&) = default;
+  virtual ~WindowSet() = default;  // studies and tests change or watch what is read
   /// An empty set, to be filled by add().
   /// Throws std::invalid_argument on settings out of range.
   explicit WindowSet(const WindowSettings& settings);
@@ -98,13 +103,15 @@ class WindowSet : public Examples {
   /// window.
   void check_any(const std::string& dir) const;
 
-  std::size_t size() const override { return counts_.windows; }
-  std::size_t frames() const override { return static_cast<std::size_t>(settings_.timesteps); }
+  std::size_t size() const { return counts_.windows; }
+  std::size_t frames() const { return static_cast<std::size_t>(settings_.timesteps); }
   int timesteps() const { return settings_.timesteps; }
   /// Of the recordings; the rig's while there is none.
-  TaxelArray array() const override { return settings_.array.value_or(TaxelArray{}); }
+  TaxelArray array() const { return settings_.array.value_or(TaxelArray{}); }
   SignalScale signal_scale() const { return settings_.signal_scale.value_or(SignalScale{}); }
-  int scale() const override { return settings_.scale; }
+  int scale() const { return settings_.scale; }
+  std::size_t input_size() const { return frames() * array().signals(); }
+  ImageGrid image() const { return array().picture(scale()); }
   const WindowSettings& settings() const { return settings_; }
   const WindowCounts& counts() const { return counts_; }
   const std::vector<Pass>& passes() const { return passes_; }
@@ -114,24 +121,25 @@ class WindowSet : public Examples {
   // i < size() throughout, unchecked: these run for every sample of training.
   // Throws std::invalid_argument when `out` has another size; FileError as ScratchFile.
   /// Window i as a network takes it, [T][signals], oldest frame first; normalised when the scaling says so.
-  void window(std::size_t i, std::span<float> out) const;
+  virtual void window(std::size_t i, std::span<float> out) const;
   /// The window, not normalised.
   std::vector<float> window(std::size_t i) const;
   /// Truth of its last frame, [height][width] of image(): as measured, or truth_image; 0 in the air.
-  void truth(std::size_t i, std::span<float> out) const;
+  virtual void truth(std::size_t i, std::span<float> out) const;
   /// The last frame, [signals].
   std::vector<float> last_frame(std::size_t i) const;
   /// NaN where it is unknown.
   Position position(std::size_t i) const;
-  Zone zone(std::size_t i) const override;
-  bool augmentable(std::size_t i) const override { return passes_[pass_of(i)].use.augmentable; }
-  bool in_distribution(std::size_t i) const override { return passes_[pass_of(i)].use.in_distribution; }
+  /// "x 18.0, y 43.5 mm", or where that is unknown "frame 17".
+  std::string place_text(std::size_t i) const;
+  /// What is scored together. By its measured truth alone a window is in contact or flat.
+  Zone zone(std::size_t i) const;
+  bool augmentable(std::size_t i) const { return passes_[pass_of(i)].use.augmentable; }
+  bool in_distribution(std::size_t i) const { return passes_[pass_of(i)].use.in_distribution; }
   bool contact(std::size_t i) const { return zone(i) == Zone::contact; }
   std::size_t pass_of(std::size_t i) const { return place_of(i).pass; }
-  void input(std::size_t i, std::span<float> out) const override { window(i, out); }
-  void target(std::size_t i, std::span<float> out) const override { truth(i, out); }
-  void will_read(std::size_t i) const override;
-  std::int64_t group(std::size_t i) const override { return static_cast<std::int64_t>(pass_of(i)); }
+  /// Window i is wanted soon: it may be fetched from the file.
+  virtual void will_read(std::size_t i) const;
   /// Number of the last frame within its pass.
   std::size_t frame_of(std::size_t i) const { return place_of(i).last; }
   /// Frames since its pass began or since the last gap, the last frame included: at least timesteps().
@@ -144,7 +152,7 @@ class WindowSet : public Examples {
 
   /// 16 hexadecimal digits over samples, positions, plates and index: the same data and settings, the same
   /// text.
-  std::string fingerprint() const override;
+  std::string fingerprint() const;
 
  private:
   /// Windows that end at every stride-th frame.

@@ -209,7 +209,7 @@ std::string window_constants(const ModelFile& file, double sensor_hz) {
 
 std::string header_of(const ModelFile& file, const IntegerPlan& plan, std::size_t weights,
                       const std::string& top) {
-  const NetworkFormat f = file.network().format();
+  const NetworkFormat f = file.model->format();
   const std::string pixels = "UPPER_HEIGHT * UPPER_WIDTH";
   return top +
          "#ifndef UPPER_H\n#define UPPER_H\n\n#include <stdint.h>\n\n#ifdef __cplusplus\nextern \"C\" "
@@ -284,7 +284,7 @@ void check_sizes(const IntegerPlan& plan) {
 CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz,
                 const std::string& written_by) {
   check(file, name, sensor_hz);
-  const auto plan = IntegerPlan::of(file.network(), *file.ranges);
+  const auto plan = IntegerPlan::of(*file.model, *file.ranges);
   check_sizes(*plan);
   Writer writer(*plan);
   const std::string top = "/* " + name + ": tactile super-resolution, written by " + written_by + ". */\n";

@@ -1,6 +1,5 @@
 #include "models/files/json_entry.h"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -45,19 +44,6 @@ double JsonEntry::number(const char* name) const {
 
 std::optional<double> JsonEntry::number_or_null(const char* name) const {
   return field(name).is_null() ? std::nullopt : std::optional(number(name));
-}
-
-std::vector<float> JsonEntry::numbers(const char* name, std::size_t count) const {
-  const Json& value = field(name);
-  std::vector<float> values;
-  if (value.is_array() && value.size() == count) {
-    for (const Json& element : value)
-      if (element.is_number()) values.push_back(element.get<float>());
-  }
-  const bool finite = std::ranges::all_of(values, [](float v) { return std::isfinite(v); });
-  if (values.size() != count || count == 0 || !finite)
-    wrong(name, std::to_string(count) + " finite numbers", value);
-  return values;
 }
 
 std::string JsonEntry::text(const char* name) const {

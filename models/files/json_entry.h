@@ -4,7 +4,6 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "autograd/tensor.h"
 #include "io/files/json.h"
@@ -25,7 +24,6 @@ class JsonEntry {
   bool has(const char* name) const;
   double number(const char* name) const;
   std::optional<double> number_or_null(const char* name) const;
-  std::vector<float> numbers(const char* name, std::size_t count) const;
   std::string text(const char* name) const;
   /// A value as it stands, to be checked by whoever reads it.
   const nlohmann::ordered_json& object(const char* name) const { return field(name); }

@@ -15,8 +15,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kFrameKind = "frame-checkpoint";
-
 SuperTacSettings read_settings(const JsonEntry& entry) {
   SuperTacSettings s;
   s.preset = entry.text("preset");
@@ -66,41 +64,23 @@ InputSettings read_input(const JsonEntry& entry) {
   return input;
 }
 
-FrameSettings read_frame_settings(const JsonEntry& entry) {
-  FrameSettings s;
-  s.in_channels = entry.integer("in_channels");
-  s.height = entry.integer("height");
-  s.width = entry.integer("width");
-  s.scale = entry.integer("scale");
-  s.channels = entry.integer("channels");
-  s.rcabs = entry.integer("rcabs");
-  try {
-    s.check();
-  } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(entry.where() + ": " + error.what());
-  }
-  return s;
+// Older versions trained networks of single frames on files of pairs.
+void refuse_other_kinds(const SafetensorsFile& file, const std::string& path) {
+  const auto kind = file.metadata().find("kind");
+  if (kind == file.metadata().end()) return;
+  if (kind->second != "frame-checkpoint")
+    throw std::runtime_error(path + ": expected a model, found kind " + in_quotes(kind->second));
+  throw std::runtime_error(
+      path +
+      ": is a frame model of supertac-train --pairs, which is gone; turn its pairs into recordings "
+      "(supertac-import FILE.safetensors --out DIR) and train again (supertac-train --data DIR --preset "
+      "frame)");
 }
 
-void expect_kind(const SafetensorsFile& file, const std::string& path, ModelKind expected) {
-  const auto entry = file.metadata().find("kind");
-  const std::string kind = entry == file.metadata().end() ? "" : entry->second;
-  if (expected == ModelKind::windows && kind == kFrameKind)
-    throw std::runtime_error(path +
-                             ": expected a SuperTac model, found a frame model (trained with --pairs); "
-                             "use it with supertac-evaluate --pairs");
-  if (expected == ModelKind::frames && kind != kFrameKind)
-    throw std::runtime_error(
-        path + ": expected a frame model (trained with --pairs), found " +
-        (kind.empty() ? "a SuperTac model; give it recordings" : "kind \"" + kind + "\""));
-}
-
-bool predicts_error(const ModelFile& file) { return file.model && file.model->settings().predicted_error; }
-
-template <class Model, class Settings>
-std::unique_ptr<Model> build(const Settings& settings, const SafetensorsFile& file, const std::string& path) {
+std::unique_ptr<SuperTac> build(const SuperTacSettings& settings, const SafetensorsFile& file,
+                                const std::string& path) {
   Rng rng(0);
-  auto model = std::make_unique<Model>(settings, rng);
+  auto model = std::make_unique<SuperTac>(settings, rng);
   load_parameters(file, path, model->parameters(), {"optimizer.", "novelty.", "int8."});
   for (const Parameter& parameter : model->parameters())
     if (!std::ranges::all_of(parameter.value.value().values(), [](real v) { return std::isfinite(v); }))
@@ -133,22 +113,6 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
   if (input.pitch_mm != InputSettings{}.pitch_mm) scaling["pitch_mm"] = input.pitch_mm;
   if (input.signal_scale != SignalScale{}) scaling["signals"] = json_of(input.signal_scale);
   return {{"settings", settings.dump()}, {"input", scaling.dump()}};
-}
-
-std::map<std::string, std::string> model_metadata(const FrameSettings& s, const ChannelScaling& scaling) {
-  const Json settings = {
-      {"in_channels", s.in_channels}, {"height", s.height}, {"width", s.width}, {"scale", s.scale},
-      {"channels", s.channels},       {"rcabs", s.rcabs}};
-  const Json input = {{"mean", scaling.mean}, {"factor", scaling.factor}, {"formula", "(x - mean) * factor"}};
-  return {{"kind", kFrameKind}, {"settings", settings.dump()}, {"input", input.dump()}};
-}
-
-const Network& ModelFile::network() const {
-  return model ? static_cast<const Network&>(*model) : *frame_model;
-}
-
-std::map<std::string, std::string> ModelFile::description() const {
-  return model ? model_metadata(model->settings(), input) : model_metadata(frame_model->settings(), scaling);
 }
 
 std::string ModelFile::metadata_or(const std::string& key, const std::string& otherwise) const {
@@ -188,35 +152,30 @@ void set_array(SuperTacSettings& settings, const TaxelArray& array) {
   settings.in_channels = array.channels;
 }
 
-ModelFile load_model(const std::string& path, ModelKind kind) {
+ModelFile load_model(const std::string& path) {
   const SafetensorsFile file = read_checkpoint(path);
-  expect_kind(file, path, kind);
-  const JsonEntry settings(file.metadata(), path, "settings");
+  refuse_other_kinds(file, path);
+  const SuperTacSettings settings = read_settings({file.metadata(), path, "settings"});
   ModelFile loaded;
   loaded.metadata = file.metadata();
-  if (kind == ModelKind::windows) {
-    const SuperTacSettings read = read_settings(settings);
-    loaded.input = read_input({file.metadata(), path, "input"});
-    loaded.model = build<SuperTac>(read, file, path);
-    loaded.novelty = Novelty::read(file, path, signal_feature_count(loaded.array()));
-  } else {
-    const FrameSettings read = read_frame_settings(settings);
-    const JsonEntry input(file.metadata(), path, "input");
-    const auto channels = static_cast<std::size_t>(read.in_channels);
-    loaded.scaling = {input.numbers("mean", channels), input.numbers("factor", channels)};
-    loaded.frame_model = build<FrameModel>(read, file, path);
-  }
+  loaded.input = read_input({file.metadata(), path, "input"});
+  loaded.model = build(settings, file, path);
+  loaded.novelty = Novelty::read(file, path, signal_feature_count(loaded.array()));
   loaded.ranges = ActivationRanges::read(file, path);
   return loaded;
 }
 
-std::vector<ModelFile> load_models(std::span<const std::string> paths, ModelKind kind) {
+std::vector<ModelFile> load_models(std::span<const std::string> paths) {
   std::vector<ModelFile> files;
   for (const std::string& path : paths) {
-    files.push_back(load_model(path, kind));
-    const auto ours = files.back().description(), theirs = files.front().description();
-    const bool same_format = files.back().network().format() == files.front().network().format() &&
-                             predicts_error(files.back()) == predicts_error(files.front());
+    files.push_back(load_model(path));
+    const auto said = [](const ModelFile& file) {
+      return model_metadata(file.model->settings(), file.input);
+    };
+    const auto ours = said(files.back()), theirs = said(files.front());
+    const SuperTac &model = *files.back().model, &first = *files.front().model;
+    const bool same_format = model.format() == first.format() &&
+                             model.settings().predicted_error == first.settings().predicted_error;
     for (const char* key : {"input", "settings"})
       if (key == std::string("input") ? ours.at(key) != theirs.at(key) : !same_format)
         throw std::runtime_error(path + ": its " + key + " are " + ours.at(key) + ", those of " + paths[0] +
@@ -236,9 +195,9 @@ Ensemble ensemble_of(std::span<const ModelFile> files, Precision precision) {
   std::vector<Prepared> members;
   for (const ModelFile& file : files) {
     if (precision == Precision::fp32) {
-      members.emplace_back(file.network());
+      members.emplace_back(*file.model);
     } else if (file.ranges) {
-      members.emplace_back(file.network(), *file.ranges);
+      members.emplace_back(*file.model, *file.ranges);
     } else {
       throw std::runtime_error(
           "the model was saved without the ranges of its values, which precision int8 "
@@ -251,12 +210,6 @@ Ensemble ensemble_of(std::span<const ModelFile> files, Precision precision) {
 void save_model(const std::string& path, const SuperTac& model, const InputSettings& input,
                 std::map<std::string, std::string> metadata) {
   metadata.merge(model_metadata(model.settings(), input));
-  write_checkpoint(path, model.parameters(), std::move(metadata));
-}
-
-void save_model(const std::string& path, const FrameModel& model, const ChannelScaling& scaling,
-                std::map<std::string, std::string> metadata) {
-  metadata.merge(model_metadata(model.settings(), scaling));
   write_checkpoint(path, model.parameters(), std::move(metadata));
 }
 

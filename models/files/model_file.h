@@ -1,5 +1,4 @@
-// A model on disk: its parameters, and in the metadata everything needed to run an input through it. Two
-// kinds share the form: SuperTac, and frame models, whose metadata say "kind": "frame-checkpoint".
+// A model on disk: its parameters, and in the metadata everything needed to run a window through it.
 #pragma once
 
 #include <map>
@@ -9,13 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "data/windows/pairs.h"
 #include "data/windows/windows.h"
 #include "layers/checkpoint.h"
 #include "models/inference/ensemble.h"
 #include "models/inference/novelty.h"
 #include "models/inference/prepared/ranges.h"
-#include "models/networks/frame_model.h"
 #include "models/networks/supertac_model.h"
 
 namespace supertac {
@@ -31,33 +28,19 @@ struct InputSettings {
   SignalScale signal_scale = {};  ///< as the recordings state it: unit, polarity and range of the signals
 };
 
-/// The metadata keys "settings" and "input", JSON texts; of a frame model "kind" besides.
+/// The metadata keys "settings" and "input", JSON texts.
 std::map<std::string, std::string> model_metadata(const SuperTacSettings& settings,
                                                   const InputSettings& input);
-std::map<std::string, std::string> model_metadata(const FrameSettings& settings,
-                                                  const ChannelScaling& scaling);
-
-enum class ModelKind {
-  windows,  ///< SuperTac
-  frames,   ///< a frame model, trained with --pairs
-};
 
 struct ModelFile {
-  std::unique_ptr<SuperTac> model;          ///< of kind windows, with its input
-  InputSettings input;                      //
-  std::optional<Novelty> novelty;           ///< of its training windows; nothing in older files
-  std::optional<ActivationRanges> ranges;   ///< likewise, for less than fp32
-  std::unique_ptr<FrameModel> frame_model;  ///< of kind frames, with its scaling
-  ChannelScaling scaling;                   //
+  std::unique_ptr<SuperTac> model;
+  InputSettings input;
+  std::optional<Novelty> novelty;  ///< of its training windows; nothing of single frames and in older files
+  std::optional<ActivationRanges> ranges;  ///< for less than fp32; nothing in older files
   std::map<std::string, std::string> metadata;
 
-  const Network& network() const;
-  /// model_metadata() of what was loaded.
-  std::map<std::string, std::string> description() const;
   /// An entry of the metadata, or what is to stand for one that is missing.
   std::string metadata_or(const std::string& key, const std::string& otherwise) const;
-
-  // Of kind windows:
   /// Half the width of a pixel's interval in units of its predicted error.
   double interval_factor() const;
   /// The sensor it was trained on.
@@ -73,12 +56,12 @@ InputSettings input_of(const WindowSet& windows);
 void set_array(SuperTacSettings& settings, const TaxelArray& array);
 
 /// Builds the model that the metadata describes, after checking every setting's range, and fills it.
-/// Throws std::runtime_error naming path, what was expected and found; so for a model of another kind.
-ModelFile load_model(const std::string& path, ModelKind kind = ModelKind::windows);
+/// Throws std::runtime_error naming path, what was expected and found.
+ModelFile load_model(const std::string& path);
 
 /// The models of an ensemble. Throws std::runtime_error, as load_model, and naming the file that differs from
 /// the first in what it takes, draws or predicts.
-std::vector<ModelFile> load_models(std::span<const std::string> paths, ModelKind kind = ModelKind::windows);
+std::vector<ModelFile> load_models(std::span<const std::string> paths);
 
 /// What the products of a network are made of.
 enum class Precision {
@@ -92,10 +75,8 @@ Precision precision_of(const std::string& name);
 /// has no ranges for less than fp32.
 Ensemble ensemble_of(std::span<const ModelFile> files, Precision precision = Precision::fp32);
 
-/// Write parameters and metadata. Throw FileError.
+/// Writes parameters and metadata. Throws FileError.
 void save_model(const std::string& path, const SuperTac& model, const InputSettings& input,
-                std::map<std::string, std::string> metadata);
-void save_model(const std::string& path, const FrameModel& model, const ChannelScaling& scaling,
                 std::map<std::string, std::string> metadata);
 
 }  // namespace supertac

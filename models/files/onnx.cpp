@@ -126,23 +126,12 @@ std::string Exporter::normalised_per_window(const std::string& x, const Scaling&
 }
 
 std::string Exporter::network_input(const ModelFile& file) {
-  const std::string any = "N";
-  if (file.model) {
-    const SuperTacSettings& s = file.model->settings();
-    graph.input(
-        "volts", {any, s.timesteps, s.signals()},
-        "Volts of every signal, oldest sample first; taxel k lies in row k / columns, column k % columns.");
-    const std::string x = scaled(file);
-    return file.input.scaling.per_window ? normalised_per_window(x, file.input.scaling, s.timesteps) : x;
-  }
-  const FrameSettings& s = file.frame_model->settings();
-  graph.input("frames", {any, s.in_channels, s.height, s.width}, "Frames in the sensor's numbers.");
-  const std::int64_t shape[] = {s.in_channels, 1, 1};
-  const std::vector<float> mean(file.scaling.mean.begin(), file.scaling.mean.end());
-  const std::vector<float> factor(file.scaling.factor.begin(), file.scaling.factor.end());
-  const std::string apart =
-      graph.node("Sub", {"frames", graph.constant("mean", shape, mean)}, "without_mean");
-  return graph.node("Mul", {apart, graph.constant("factor", shape, factor)}, "scaled");
+  const SuperTacSettings& s = file.model->settings();
+  graph.input(
+      "volts", {"N", s.timesteps, s.signals()},
+      "Volts of every signal, oldest sample first; taxel k lies in row k / columns, column k % columns.");
+  const std::string x = scaled(file);
+  return file.input.scaling.per_window ? normalised_per_window(x, file.input.scaling, s.timesteps) : x;
 }
 
 std::string Exporter::weight(const Variable& x) {
@@ -237,7 +226,7 @@ void Exporter::output(const char* name, const Variable& y, const char* about) {
 }
 
 std::string Exporter::picture_of(const ModelFile& file) {
-  const Network& network = file.network();
+  const Network& network = *file.model;
   for (const Parameter& p : network.parameters()) parameters_.emplace(p.value.node(), to_stored(p));
   const NoGrad no_grad;
   const Variable input(Tensor::zeros(network.input_shape(1)));
@@ -250,8 +239,7 @@ std::string Exporter::picture_of(const ModelFile& file) {
     output("predicted_error", drawn.predicted_error, "How far from the truth a pixel is expected to be.");
   auto metadata = file.metadata;
   if (drawn.predicted_error.defined()) metadata.emplace("interval_factor", std::to_string(kIntervalFactor));
-  return graph.file(
-      "1", file.model ? "SuperTac: volts in, picture out." : "SuperTac: frames in, picture out.", metadata);
+  return graph.file("1", "SuperTac: volts in, picture out.", metadata);
 }
 
 }  // namespace

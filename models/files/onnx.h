@@ -7,13 +7,12 @@
 
 namespace supertac {
 
-/// The file's bytes. A model of windows takes "volts" [N,T,signals], each sample the mean of what was felt in
-/// a period of its rate; scaling and normalisation are part of the graph. A frame model takes "frames"
-/// [N,channels,H,W], as files of pairs have them. Both draw "picture" [N,height,width] and, where the network
-/// says so, "predicted_error", the same shape: `interval_factor` of the metadata times it is half the width
-/// of a pixel's 90 % interval. The file's metadata are those of the model. The ops are those that one
-/// inference was seen to run (autograd/trace.h). Throws std::logic_error naming an op that has no
-/// counterpart.
+/// The file's bytes. The model takes "volts" [N,T,signals], each sample the mean of what was felt in a period
+/// of its rate; scaling and normalisation are part of the graph. It draws "picture" [N,height,width] and,
+/// where the network says so, "predicted_error", the same shape: `interval_factor` of the metadata times it
+/// is half the width of a pixel's 90 % interval. The file's metadata are those of the model. The ops are
+/// those that one inference was seen to run (autograd/trace.h). Throws std::logic_error naming an op that has
+/// no counterpart.
 std::string onnx_of(const ModelFile& model);
 
 }  // namespace supertac

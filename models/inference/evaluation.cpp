@@ -18,12 +18,12 @@ struct Part {
   std::exception_ptr error;
 };
 
-void compute(const Ensemble& network, const Examples& data, std::span<const std::uint32_t> indices,
+void compute(const Ensemble& network, const WindowSet& data, std::span<const std::uint32_t> indices,
              Part& part) {
   const std::size_t input_size = data.input_size(), target_size = data.image().pixels();
   for (std::size_t n = 0; n < indices.size(); ++n) {
-    data.input(indices[n], part.inputs.values().subspan(n * input_size, input_size));
-    data.target(indices[n], part.targets.values().subspan(n * target_size, target_size));
+    data.window(indices[n], part.inputs.values().subspan(n * input_size, input_size));
+    data.truth(indices[n], part.targets.values().subspan(n * target_size, target_size));
   }
   // Copied, so that what this thread took from its pool goes back there.
   const Estimate estimate = network.estimate(part.inputs);
@@ -41,16 +41,16 @@ std::string text(const NetworkFormat& f) {
 
 }  // namespace
 
-void check_format(const Examples& examples, const Network& network) {
-  const TaxelArray array = examples.array();
-  const NetworkFormat own{static_cast<Dim>(examples.frames()), array.rows, array.columns, array.channels,
-                          examples.scale()};
+void check_format(const WindowSet& windows, const Network& network) {
+  const TaxelArray array = windows.array();
+  const NetworkFormat own{static_cast<Dim>(windows.frames()), array.rows, array.columns, array.channels,
+                          windows.scale()};
   if (own != network.format())
     throw std::invalid_argument("the data have " + text(own) + ", the model expects " +
                                 text(network.format()));
 }
 
-void for_each_output(const Ensemble& network, const Examples& data, std::span<const std::uint32_t> indices,
+void for_each_output(const Ensemble& network, const WindowSet& data, std::span<const std::uint32_t> indices,
                      const std::function<bool(const EvaluatedBatch&)>& use, std::size_t batch) {
   check_format(data, network.first());
   for (std::size_t start = 0; start < indices.size(); start += batch * kBatchesAtOnce) {
@@ -78,13 +78,13 @@ void for_each_output(const Ensemble& network, const Examples& data, std::span<co
   }
 }
 
-ZoneMetrics score(const Ensemble& network, const Examples& windows, std::span<const std::uint32_t> indices,
-                  bool (*stop)()) {
+ZoneMetrics score(const Ensemble& network, const WindowSet& windows, std::span<const std::uint32_t> indices,
+                  const std::function<bool()>& stop) {
   ZoneMetrics metrics(windows.image());
   for_each_output(network, windows, indices, [&](const EvaluatedBatch& b) {
     for (std::size_t n = 0; n < b.size(); ++n)
       metrics.add(b.output(n), b.target(n), windows.zone(indices[b.first + n]));
-    return stop == nullptr || !stop();
+    return !stop || !stop();
   });
   return metrics;
 }

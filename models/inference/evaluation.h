@@ -1,4 +1,4 @@
-// Runs a network over examples.
+// Runs a network over windows.
 #pragma once
 
 #include <cstdint>
@@ -6,13 +6,13 @@
 #include <span>
 
 #include "data/scores/metrics.h"
-#include "data/windows/examples.h"
+#include "data/windows/windows.h"
 #include "models/inference/ensemble.h"
 
 namespace supertac {
 
-/// Throws std::invalid_argument that names both when the examples' inputs or pictures are not the network's.
-void check_format(const Examples& examples, const Network& network);
+/// Throws std::invalid_argument that names both when the windows or their truths are not the network's.
+void check_format(const WindowSet& windows, const Network& network);
 
 /// A batch of results: inputs as the network takes them, outputs, predicted errors and targets [n,H,W,1], and
 /// the first of their places in `indices`. Predicted errors are empty where the network has none.
@@ -38,15 +38,15 @@ struct EvaluatedBatch {
   }
 };
 
-/// Calls `use` for the given examples in order, in batches of at most `batch`. `use` returns false to stop
+/// Calls `use` for the given windows in order, in batches of at most `batch`. `use` returns false to stop
 /// early. Batches are computed on several threads, `use` runs on the caller's. Throws as check_format.
-void for_each_output(const Ensemble& network, const Examples& examples,
+void for_each_output(const Ensemble& network, const WindowSet& windows,
                      std::span<const std::uint32_t> indices,
                      const std::function<bool(const EvaluatedBatch&)>& use, std::size_t batch = 64);
 
 /// The metrics of the network's pictures of the given windows. `stop`, if given, is asked between batches;
 /// once it says true, the windows so far are what was measured. Throws as for_each_output.
-ZoneMetrics score(const Ensemble& network, const Examples& windows, std::span<const std::uint32_t> indices,
-                  bool (*stop)() = nullptr);
+ZoneMetrics score(const Ensemble& network, const WindowSet& windows, std::span<const std::uint32_t> indices,
+                  const std::function<bool()>& stop = {});
 
 }  // namespace supertac

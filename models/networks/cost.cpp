@@ -23,7 +23,7 @@ double decoder_macs(Dim timesteps, Dim signals, Dim latent) {
 double upsampler_macs(const SuperTacSettings& s) {
   const Dim c = s.channels;
   Dim pixels = s.rows * s.columns;
-  Dim macs = s.groups() * s.latent * c * pixels + (s.last_frame_path ? pixels * 9 * s.in_channels * c : 0);
+  Dim macs = s.latents() * c * pixels + (s.sees_last_frame() ? pixels * 9 * s.in_channels * c : 0);
   for (Dim size = 1; size < s.scale; size *= 2, pixels *= 4) {
     const Dim conv = pixels * 9 * c * c, attention = 2 * c * (c / RirbOptions{}.reduction);
     macs += s.rcabs * (2 * conv + attention) + conv + pixels * 16 * c * c;
@@ -36,6 +36,7 @@ double upsampler_macs(const SuperTacSettings& s) {
 Cost cost_of(const SuperTacSettings& s) {
   s.check();
   const double upsampler = upsampler_macs(s), head = head_macs(s.latent);
+  if (s.groups() == 0) return {.inference = upsampler, .training = 3 * upsampler};
   const double encoder = encoder_macs(s.timesteps, s.group_signals());
   const double decoder = decoder_macs(s.timesteps, s.group_signals(), s.latent);
   const auto groups = static_cast<double>(s.groups());

@@ -33,6 +33,11 @@ std::vector<Part> make_parts(const SuperTacSettings& s, Rng& rng) {
   return parts;
 }
 
+std::optional<Linear> fc_of(const SuperTacSettings& s, Rng& rng) {
+  if (s.latents() == 0) return std::nullopt;
+  return Linear(s.latents(), s.channels * s.rows * s.columns, rng);
+}
+
 std::vector<Rirb> make_rirbs(const SuperTacSettings& s, Rng& rng) {
   std::vector<Rirb> rirbs;
   for (Dim size = 1; size < s.scale; size *= 2) {
@@ -41,9 +46,10 @@ std::vector<Rirb> make_rirbs(const SuperTacSettings& s, Rng& rng) {
   return rirbs;
 }
 
-// concat() takes eight at most.
+// concat() takes eight at most. Of no groups undefined.
 Variable concat_groups(std::span<const Variable> groups) {
   constexpr std::size_t kAtOnce = 8;
+  if (groups.empty()) return {};
   if (groups.size() <= kAtOnce) return concat(groups);
   const Variable halves[] = {concat(groups.first(kAtOnce)), concat(groups.subspan(kAtOnce))};
   return concat(halves);
@@ -62,25 +68,25 @@ std::string name_of(Grouping grouping) {
 }
 
 void SuperTacSettings::check() const {
-  check_range("rows", rows, 2, 16);
-  check_range("columns", columns, 2, 16);
+  const bool frames = timesteps == 1;
+  check_range("rows", rows, frames ? 1 : 2, frames ? 64 : 16);
+  check_range("columns", columns, frames ? 1 : 2, frames ? 64 : 16);
   check_range("in_channels", in_channels, 1, 8);
-  check_range("timesteps", timesteps, 32, 512);
-  if (timesteps % 16 != 0) {
+  if (!frames) check_range("timesteps", timesteps, 32, 512);
+  if (!frames && timesteps % 16 != 0) {
     throw std::invalid_argument(
-        "model settings: timesteps must be a multiple of 16 (the encoder halves four times), got " +
+        "model settings: timesteps must be a multiple of 16 (the encoder halves four times) or 1, got " +
         std::to_string(timesteps));
   }
   check_range("latent", latent, 1, 256);
-  if (scale != 2 && scale != 4 && scale != 8) {
-    throw std::invalid_argument("model settings: scale must be 2, 4 or 8, got " + std::to_string(scale));
-  }
-  if (std::min(image_height(), image_width()) < 7) {
-    throw std::invalid_argument(
-        "model settings: scale " + std::to_string(scale) + " of an array of " + std::to_string(rows) + "x" +
-        std::to_string(columns) +
-        " makes pictures with a side below 7 pixels, too small for SSIM; raise scale");
-  }
+  if (scale != 2 && scale != 4 && scale != 8 && scale != 16)
+    throw std::invalid_argument("model settings: scale must be 2, 4, 8 or 16, got " + std::to_string(scale));
+  const auto [least, most] = std::minmax({image_height(), image_width()});
+  if (least < 3 || most > 1024)
+    throw std::invalid_argument("model settings: scale " + std::to_string(scale) + " of an array of " +
+                                std::to_string(rows) + "x" + std::to_string(columns) + " makes pictures of " +
+                                std::to_string(image_height()) + "x" + std::to_string(image_width()) +
+                                " pixels, expected 3 to 1024 a side");
   check_range("channels", channels, 4, 256);
   check_range("rcabs", rcabs, 0, 16);
 }
@@ -89,30 +95,38 @@ SuperTacSettings SuperTacSettings::of_preset(const std::string& name) {
   if (name == "paper" || name == "best") return {.preset = name, .predicted_error = true};
   if (name == "tiny")
     return {.preset = "tiny", .timesteps = 128, .channels = 8, .rcabs = 1, .predicted_error = true};
-  throw std::invalid_argument("unknown preset \"" + name + "\"; known: paper, best, tiny");
+  if (name == "frame") return {.preset = name, .timesteps = 1, .predicted_error = true};
+  throw std::invalid_argument("unknown preset \"" + name + "\"; known: paper, best, tiny, frame");
 }
 
 Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
     : rows_(s.rows),
       columns_(s.columns),
       in_channels_(s.in_channels),
-      fc_(s.groups() * s.latent, s.channels * s.rows * s.columns, rng),
+      fc_(fc_of(s, rng)),
       rirbs_(make_rirbs(s, rng)),
       out_(s.channels, 1, kSameSize, rng) {
   if (s.predicted_error) predicted_error_.emplace(s.channels, 1, kSameSize, rng);
-  if (s.last_frame_path) last_frame_.emplace(s.in_channels, s.channels, kSameSize, rng);
-  add("fc", fc_);
+  if (s.sees_last_frame()) last_frame_.emplace(s.in_channels, s.channels, kSameSize, rng);
+  if (fc_) add("fc", *fc_);
   for (std::size_t i = 0; i < rirbs_.size(); ++i) add("rirb." + std::to_string(i), rirbs_[i]);
   add("out", out_);
   if (predicted_error_) add("spread", *predicted_error_);
   if (last_frame_) add("last_frame", *last_frame_);
 }
 
-Upsampler::Output Upsampler::forward(const Variable& latents, const Variable& windows) const {
+Variable Upsampler::map_of(const Variable& latents, const Variable& windows) const {
   const Dim pixels[] = {rows_, columns_};
-  Variable h = unflatten_channels_first(fc_.forward(latents, kLeakyRelu), pixels);
+  Variable past, present;
+  if (fc_) past = unflatten_channels_first(fc_->forward(latents, kLeakyRelu), pixels);
   if (last_frame_)
-    h = h + last_frame_->forward(supertac::last_frame(windows, rows_, columns_, in_channels_), kLeakyRelu);
+    present = last_frame_->forward(last_frame(windows, rows_, columns_, in_channels_), kLeakyRelu);
+  if (!fc_) return present;
+  return last_frame_ ? past + present : past;
+}
+
+Upsampler::Output Upsampler::forward(const Variable& latents, const Variable& windows) const {
+  Variable h = map_of(latents, windows);
   for (const Rirb& rirb : rirbs_) h = rirb.forward(h);
   return {out_.forward(h), predicted_error_ ? predicted_error_->forward(h) : Variable()};
 }
@@ -174,6 +188,8 @@ Variable SuperTac::means(const Variable& windows) const {
 }
 
 Tensor SuperTac::encode(const Tensor& windows) const {
+  if (encoders_.empty())
+    throw std::invalid_argument("SuperTac: a model of single frames has no latents; choose one of windows");
   const NoGrad no_grad;
   return means(Variable(windows)).value();
 }

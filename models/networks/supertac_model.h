@@ -1,5 +1,5 @@
 // SuperTac (Front. Robot. AI 12:1552922, 2025): VAEs over groups of taxels, residual upsampling of their
-// latents.
+// latents; of single frames (T = 1) residual upsampling alone.
 #pragma once
 
 #include <array>
@@ -25,11 +25,11 @@ std::string name_of(Grouping grouping);
 
 struct SuperTacSettings {
   std::string preset = "paper";
-  Dim rows = 4, columns = 4;  ///< of the array: 2 to 16
+  Dim rows = 4, columns = 4;  ///< of the array: 2 to 16; of single frames 1 to 64
   Dim in_channels = 1;        ///< numbers a taxel gives: 1 to 8
-  Dim timesteps = 256;        ///< T: 32 to 512, a multiple of 16
-  Dim latent = 10;            ///< LD: 1 to 256
-  Dim scale = 4;  ///< 2, 4, 8: pictures so many times finer than the array, 7 or more pixels a side
+  Dim timesteps = 256;  ///< T: 32 to 512, a multiple of 16; or 1, single frames, for which there are no VAEs
+  Dim latent = 10;      ///< LD: 1 to 256; of no meaning for single frames
+  Dim scale = 4;        ///< 2, 4, 8, 16: pictures so many times finer than the array, 3 to 1024 pixels a side
   Grouping grouping = Grouping::horizontal;
   Dim channels = 32;  ///< of the upsampler
   Dim rcabs = 3;      ///< in each RIRB
@@ -37,16 +37,21 @@ struct SuperTacSettings {
   /// says; with few of them, or fast sensors, they lose what the array feels now.
   bool last_frame_path = false;
   bool predicted_error = false;  ///< whether it also draws how far off each pixel may be; presets do
+  /// Single frames have no other way.
+  bool sees_last_frame() const { return last_frame_path || timesteps == 1; }
 
   Dim signals() const { return rows * columns * in_channels; }  ///< numbers in a frame
-  Dim groups() const { return grouping == Grouping::horizontal ? rows : columns; }
+  /// VAEs: one for each group of taxels.
+  Dim groups() const { return timesteps == 1 ? 0 : grouping == Grouping::horizontal ? rows : columns; }
+  Dim latents() const { return groups() * latent; }  ///< of all groups
   Dim group_signals() const { return signals() / groups(); }
   Dim image_height() const { return rows * scale; }
   Dim image_width() const { return columns * scale; }
   /// Throws std::invalid_argument naming the setting, its range and what was given.
   void check() const;
   /// The network of a named recipe (models/training/recipe.h): "paper" and "best" have the same, "tiny" has a
-  /// ninth of its multiply-adds. Throws std::invalid_argument for an unknown name, listing the known ones.
+  /// ninth of its multiply-adds, "frame" its upsampler alone. Throws std::invalid_argument for an unknown
+  /// name, listing the known ones.
   static SuperTacSettings of_preset(const std::string& name);
 };
 
@@ -65,8 +70,9 @@ class PerGroup {
   std::size_t size_;
 };
 
-/// Latents of the G groups [N,G LD] -> picture and predicted error [N,rows scale,columns scale,1], linear
-/// outputs.
+/// Latents of the G groups [N,G LD], and where settings.sees_last_frame() the last frame of the windows ->
+/// picture and predicted error [N,rows scale,columns scale,1], linear outputs. A linear layer makes a map
+/// [N,rows,columns,channels] of the latents, a convolution one of the frame; of both the sum.
 class Upsampler : public Module {
  public:
   struct Output {
@@ -75,13 +81,14 @@ class Upsampler : public Module {
                                ///< settings.predicted_error
   };
   Upsampler(const SuperTacSettings& settings, Rng& rng);
-  /// `windows` [N,T,signals] as the network takes them: their last frames, by a convolution at the array's
-  /// own resolution, are added to the map that the latents make where settings.last_frame_path says so.
+  /// `windows` [N,T,signals] as the network takes them; latents are undefined where there are none.
   Output forward(const Variable& latents, const Variable& windows) const;
 
  private:
+  Variable map_of(const Variable& latents, const Variable& windows) const;
+
   Dim rows_, columns_, in_channels_;  // the map it starts from, and of the last frame
-  Linear fc_;
+  std::optional<Linear> fc_;
   std::vector<Rirb> rirbs_;
   Conv2d out_;
   std::optional<Conv2d> predicted_error_, last_frame_;
@@ -104,7 +111,7 @@ class SuperTac : public Network {
   Output forward(const Tensor& windows, std::span<const Tensor> eps) const;
   /// Evaluation: z = mean, no decoders.
   Drawing draw(const Variable& windows) const override;
-  /// The latent means [N,G LD].
+  /// The latent means [N,G LD]. Throws std::invalid_argument for single frames, which have none.
   Tensor encode(const Tensor& windows) const;
 
   const SuperTacSettings& settings() const { return settings_; }

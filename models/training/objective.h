@@ -1,17 +1,13 @@
-// What a network is trained on: from a batch to the named terms of its loss. SuperTac learns from windows, a
-// frame model from pairs; Trainer (models/training/trainer.h) knows neither.
+// What a network is trained on: from a batch of windows to the named terms of its loss.
 #pragma once
 
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <span>
 #include <string>
 
-#include "data/windows/pairs.h"
 #include "data/windows/windows.h"
 #include "models/files/model_file.h"
-#include "models/networks/frame_model.h"
 #include "models/training/recipe.h"
 
 namespace supertac {
@@ -29,32 +25,36 @@ struct BatchOutput {
   PerGroup<Variable> means;  ///< of the latents, [N,LD] each; none for a network without latents
 };
 
+/// supertac_loss() of a recipe's network over windows that are augmented before.
 class Objective {
  public:
-  virtual ~Objective() = default;
-  virtual const Network& network() const = 0;
-  virtual const TrainingPace& pace() const = 0;
+  /// Of windows like these. Throws std::invalid_argument naming the setting of the recipe.
+  Objective(const WindowSet& windows, const Recipe& recipe);
+  const SuperTac& network() const { return model_; }
+  const Recipe& recipe() const { return recipe_; }
   /// The same over a network of its own, which awaits the values of this one's parameters.
-  virtual std::unique_ptr<Objective> clone() const = 0;
+  Objective clone() const { return {recipe_, input_, array_, 0}; }
 
-  virtual BatchOutput operator()(const Batch& batch) const = 0;
+  BatchOutput operator()(const Batch& batch) const;
   /// Numbers of noise and of latents that a sample has.
-  virtual Dim noise() const { return 0; }
-  virtual Dim latents() const { return 0; }
-  /// Changes an input in training: a function of the sample's number since training began.
-  virtual void augment(std::uint64_t sample, std::span<float> input) const;
+  Dim noise() const { return recipe_.sampling ? latents() : 0; }
+  Dim latents() const { return recipe_.model.latents(); }
+  /// Changes a window in training: a function of the sample's number since training began.
+  void augment(std::uint64_t sample, std::span<float> window) const;
 
   /// Its settings as JSON text, to compare on resume.
-  virtual std::string text() const = 0;
+  std::string text() const { return training_text(recipe_); }
   /// What the checkpoint says of the network and its input.
-  virtual std::map<std::string, std::string> metadata() const = 0;
+  std::map<std::string, std::string> metadata() const { return model_metadata(recipe_.model, input_); }
+
+ private:
+  Objective(const Recipe& recipe, const InputSettings& input, const TaxelArray& array, std::uint64_t seed);
+  PerGroup<Tensor> eps_of(const Batch& batch) const;
+
+  Recipe recipe_;
+  InputSettings input_;
+  TaxelArray array_;
+  SuperTac model_;
 };
-
-/// supertac_loss of windows that are augmented before. Throws std::invalid_argument naming the setting.
-std::unique_ptr<Objective> window_objective(const WindowSet& windows, const Recipe& recipe);
-
-/// Of pairs as they are scaled now. The model's sizes and scale become the pairs'. Throws
-/// std::invalid_argument naming the setting.
-std::unique_ptr<Objective> frame_objective(const PairSet& pairs, FrameRecipe recipe);
 
 }  // namespace supertac

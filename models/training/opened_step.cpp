@@ -211,7 +211,7 @@ class Update {
   Json applied(const StepReport& report) {
     const State after(trainer_);
     const std::vector<Parameter>& parameters = trainer_.model().parameters();
-    const TrainingPace& pace = trainer_.objective().pace();
+    const TrainingPace& pace = trainer_.objective().recipe();
     const AdamOptions adam;
     const double norm = report.gradient_norm;
     Json all = Json::array();

@@ -14,14 +14,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json pace_json(const TrainingPace& p) {
-  Json json{{"epochs", p.epochs},   {"batch", p.batch},
-            {"seed", p.seed},       {"learning_rate", p.learning_rate},
-            {"warm_up", p.warm_up}, {"clip_norm", p.clip_norm}};
-  if (p.muon) json["optimizer"] = "muon";
-  return json;
-}
-
 void require(bool holds, const std::string& what, double found) {
   if (!holds) throw std::invalid_argument("recipe: expected " + what + ", got " + format(found));
 }
@@ -62,6 +54,11 @@ void Recipe::check() const {
   require(interval_factor >= 0.1 && interval_factor <= 100, "interval_factor from 0.1 to 100",
           interval_factor);
   if (range) require(std::abs(range->span_volts) > 1e-6, "a span that is not 0", range->span_volts);
+  if (per_window && model.timesteps == 1)
+    throw std::invalid_argument(
+        "recipe: single frames (--timesteps 1) say nothing of their own rest and gain; give --scaling fixed, "
+        "or "
+        "--preset frame");
   if (!leave_out.empty() && split != SplitKind::texture)
     throw std::invalid_argument("--leave-out needs --split texture, found --split " + name_of(split));
 }
@@ -70,6 +67,12 @@ Recipe Recipe::named(const std::string& name) {
   constexpr double kWindowS = 2.56;
   Recipe r;
   r.model = SuperTacSettings::of_preset(name);
+  if (name == "frame") {
+    r.rate_hz = 100;  // of no meaning
+    r.per_window = false;
+    r.learning_rate = 2e-3;
+    return r;
+  }
   r.rate_hz = static_cast<double>(r.model.timesteps) / kWindowS;
   r.augment = kStandardAugmentation;
   if (name == "best") {
@@ -83,7 +86,10 @@ Recipe Recipe::named(const std::string& name) {
 }
 
 std::string training_text(const Recipe& r) {
-  Json json = pace_json(r);
+  Json json{{"epochs", r.epochs},   {"batch", r.batch},
+            {"seed", r.seed},       {"learning_rate", r.learning_rate},
+            {"warm_up", r.warm_up}, {"clip_norm", r.clip_norm}};
+  if (r.muon) json["optimizer"] = "muon";
   json.update({{"a", r.loss.a},
                {"beta", r.loss.beta},
                {"lambda", r.loss.lambda},
@@ -94,12 +100,6 @@ std::string training_text(const Recipe& r) {
                {"noise", r.augment.noise},
                {"dropped", r.augment.dropped}});
   if (!r.sampling) json["sampling"] = false;
-  return json.dump();
-}
-
-std::string training_text(const FrameRecipe& r) {
-  Json json = pace_json(r);
-  json["lambda"] = r.lambda;
   return json.dump();
 }
 
@@ -116,7 +116,6 @@ std::map<std::string, std::string> metadata_of(const Recipe& r) {
 }
 
 Recipe Recipe::of(const ModelFile& file, const std::string& path) {
-  if (!file.model) throw std::runtime_error(path + ": expected a model of windows, found a frame model");
   const auto entry = [&](const char* key) {
     const auto found = file.metadata.find(key);
     if (found == file.metadata.end())

@@ -10,7 +10,6 @@
 #include "data/windows/split.h"
 #include "data/windows/transforms/augment.h"
 #include "models/inference/interval.h"
-#include "models/networks/frame_model.h"
 #include "models/networks/supertac_model.h"
 #include "models/training/loss/loss.h"
 #include "models/training/training_state.h"
@@ -43,8 +42,8 @@ struct Recipe : TrainingPace {
 
   /// `paper`: as in the paper, at 100 Hz. `best`: what measures best for one network, the same as plain
   /// autoencoders by Muon. `tiny`: a ninth of the multiply-adds, at 50 Hz. Epochs and rate are what each is
-  /// trained to its best with on the rig's recordings (bench/results). Throws std::invalid_argument for
-  /// another name, listing these.
+  /// trained to its best with on the rig's recordings (bench/results). `frame`: single frames as they are, of
+  /// sensors that press or lie still. Throws std::invalid_argument for another name, listing these.
   static Recipe named(const std::string& name);
   /// What `file` (read from `path`) was trained with, its signal range included: the same recordings give the
   /// same file again. Throws std::runtime_error naming path and entry when the file does not say it.
@@ -55,15 +54,7 @@ struct Recipe : TrainingPace {
 /// Settings that are as they always were are left out: the text of older files stays the same.
 std::map<std::string, std::string> metadata_of(const Recipe& recipe);
 
-/// Training of a frame model on pairs of images: loss = L2 + lambda (1 - SSIM), the picture's part of
-/// SuperTac's.
-struct FrameRecipe : TrainingPace {
-  FrameSettings model;
-  double lambda = 0.1;
-};
-
 /// The entry "training" of a model file: steps, loss and augmentation as JSON text.
 std::string training_text(const Recipe& recipe);
-std::string training_text(const FrameRecipe& recipe);
 
 }  // namespace supertac

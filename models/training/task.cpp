@@ -73,11 +73,6 @@ WindowSet windows_of(const Recipe& recipe, const RecordingFolders& folders, std:
   return windows;
 }
 
-void add_data(TrainingTask& task) {
-  task.origin["data"] = task.examples->fingerprint();
-  task.origin["split_fingerprint"] = fingerprint(task.split);
-}
-
 }  // namespace
 
 TrainingTask window_task(const Recipe& given, const RecordingFolders& folders) {
@@ -86,40 +81,27 @@ TrainingTask window_task(const Recipe& given, const RecordingFolders& folders) {
   const auto windows = std::make_shared<const WindowSet>(windows_of(given, folders, notes));
   Recipe recipe = given;
   set_array(recipe.model, windows->array());
-  TrainingTask task{.examples = windows,
-                    .unit = "windows",
+  TrainingTask task{.windows = windows,
                     .split = make_split(*windows, recipe.split, recipe.seed, recipe.leave_out),
-                    .objective = window_objective(*windows, recipe)};
+                    .objective = Objective(*windows, recipe)};
   task.split.train = subsample_no_contact(*windows, std::move(task.split.train));
   task.origin = metadata_of(recipe);
   task.origin.erase("training");  // the objective says it
-  add_data(task);
-  task.beta = recipe.loss.beta;
+  task.origin["data"] = windows->fingerprint();
+  task.origin["split_fingerprint"] = fingerprint(task.split);
   task.counts = windows->counts().summary();
   task.leakage = find_leakage(*windows, task.split);
   task.notes = std::move(notes);
-  if (recipe.split != SplitKind::none && !task.leakage->none())
+  if (recipe.split != SplitKind::none && !task.leakage.none())
     task.notes.push_back("split " + name_of(recipe.split) + " leaks: of " +
                          std::to_string(task.split.test.size()) + " test windows " +
-                         std::to_string(task.leakage->overlapping) + " share frames with training windows, " +
-                         std::to_string(task.leakage->duplicated) +
+                         std::to_string(task.leakage.overlapping) + " share frames with training windows, " +
+                         std::to_string(task.leakage.duplicated) +
                          " repeat one; use --split trial for results");
+  if (recipe.split == SplitKind::window && recipe.model.timesteps == 1)
+    task.notes.emplace_back(
+        "split window leaks when frames resemble each other; use --split group for results");
   task.remarks = remarks_on(*windows, task.split.train);
-  return task;
-}
-
-TrainingTask pair_task(const FrameRecipe& recipe, PairSet given, const std::string& split) {
-  const auto pairs = std::make_shared<PairSet>(std::move(given));
-  TrainingTask task{
-      .examples = pairs, .unit = "pairs", .split = split_pairs(*pairs, split, recipe.seed), .objective = {}};
-  pairs->fit_scaling(task.split.train);
-  task.objective = frame_objective(*pairs, recipe);
-  task.origin = {{"split", split}, {"seed", std::to_string(recipe.seed)}};
-  add_data(task);
-  task.counts = std::to_string(pairs->size()) + " pairs";
-  if (split == "pair")
-    task.notes.emplace_back("split pair leaks when frames resemble each other; use groups for results");
-  task.remarks = remarks_on(*pairs);
   return task;
 }
 

@@ -1,10 +1,9 @@
-// What is trained on what: the windows that a recipe makes of recordings, or pairs of images.
+// What is trained on what: the windows that a recipe makes of recordings.
 #pragma once
 
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,15 +20,13 @@ struct RecordingFolders {
 };
 
 struct TrainingTask {
-  std::shared_ptr<const Examples> examples;
-  std::string unit;  ///< what they are: "windows" or "pairs"
+  std::shared_ptr<const WindowSet> windows;
   Split split;
-  std::unique_ptr<Objective> objective;
+  Objective objective;
   /// What the model file says of its origin; the same whatever machine, folder or number of threads.
   std::map<std::string, std::string> origin = {};
-  double beta = 0;                        ///< of the KL divergence
-  std::string counts = {};                ///< where the frames of the recordings went, for people
-  std::optional<Leakage> leakage = {};    ///< of windows
+  std::string counts = {};  ///< where the frames of the recordings went, for people
+  Leakage leakage = {};
   std::vector<std::string> notes = {};    ///< what is to be said before training: a range that clips, a leak
   std::vector<std::string> remarks = {};  ///< remarks_on() the training windows
 };
@@ -38,8 +35,5 @@ struct TrainingTask {
 /// Recipe::check, and when random passes, which speak as the recordings state, do not fit their signals;
 /// std::runtime_error as WindowSet::load, and when the signal range clips most of the signals.
 TrainingTask window_task(const Recipe& recipe, const RecordingFolders& folders);
-
-/// Of the split `group`, `pair` or `none`; sets the pairs' scaling. Throws as split_pairs().
-TrainingTask pair_task(const FrameRecipe& recipe, PairSet pairs, const std::string& split);
 
 }  // namespace supertac

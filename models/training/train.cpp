@@ -4,8 +4,6 @@
 #include <filesystem>
 #include <utility>
 
-#include "data/plates/truth.h"
-#include "data/scores/metrics.h"
 #include "data/windows/transforms/signal_features.h"
 #include "layers/checkpoint.h"
 #include "models/inference/evaluation.h"
@@ -20,24 +18,19 @@ constexpr std::int64_t kStepsPerLine = 50;
 
 void test(const Trainer& trainer, const TrainingTask& task, const std::function<bool()>& stop,
           LogLine& line) {
-  const ImageGrid image = task.examples->image();
-  PairMetrics metrics(static_cast<std::size_t>(image.height), static_cast<std::size_t>(image.width));
-  for_each_output(Ensemble({Prepared(trainer.model())}), *task.examples,
-                  evenly_spaced(task.split.test, kTestedPerEpoch), [&](const EvaluatedBatch& b) {
-                    for (std::size_t n = 0; n < b.size(); ++n)
-                      if (in_contact(b.target(n))) metrics.add(b.output(n), b.target(n));
-                    return !stop || !stop();
-                  });
-  if (metrics.result().windows == 0) return;
-  line.test_ssim = metrics.result().ssim;
-  line.test_psnr_db = metrics.result().psnr_mean_db;
+  const Metrics contact = score(Ensemble({Prepared(trainer.model())}), *task.windows,
+                                evenly_spaced(task.split.test, kTestedPerEpoch), stop)
+                              .contact();
+  if (contact.windows == 0) return;
+  line.test_ssim = contact.ssim;
+  line.test_psnr_db = contact.psnr_mean_db;
 }
 
 // Of an even sample of the training examples, as they are: augmentation hides what is to be noticed.
 std::vector<StoredTensor> novelty_of(const Trainer& trainer) {
   constexpr std::size_t kMostSamples = 20'000;
   if (trainer.objective().latents() == 0) return {};  // a frame alone says nothing of its sensor
-  const Examples& data = trainer.examples();
+  const WindowSet& data = trainer.windows();
   std::vector<std::uint32_t> in_distribution;
   std::ranges::copy_if(trainer.training_side(), std::back_inserter(in_distribution),
                        [&](std::uint32_t i) { return data.in_distribution(i); });
@@ -47,7 +40,7 @@ std::vector<StoredTensor> novelty_of(const Trainer& trainer) {
   Tensor features(Shape{static_cast<Dim>(chosen.size()), static_cast<Dim>(count)});
   std::vector<float> window(data.input_size());
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    data.input(chosen[i], window);
+    data.window(chosen[i], window);
     signal_features(window, data.array(), features.values().subspan(i * count, count));
   }
   return Novelty(features).stored();
@@ -56,7 +49,7 @@ std::vector<StoredTensor> novelty_of(const Trainer& trainer) {
 StoredTensor ranges_of(const Trainer& trainer) {
   constexpr std::size_t kSamples = 1024;
   ActivationRanges ranges;
-  for_each_output(Ensemble({Prepared(trainer.model())}), trainer.examples(),
+  for_each_output(Ensemble({Prepared(trainer.model())}), trainer.windows(),
                   evenly_spaced(trainer.training_side(), kSamples), [&](const EvaluatedBatch& b) {
                     ranges.add(trainer.model(), b.inputs);
                     return true;
@@ -108,7 +101,7 @@ void save_trained(const Trainer& trainer, const std::string& path,
 bool train(const Recipe& recipe, const RecordingFolders& folders, const std::string& out,
            const TrainingCallbacks& callbacks) {
   TrainingTask task = window_task(recipe, folders);
-  Trainer trainer(*task.examples, task.split.train, std::move(task.objective));
+  Trainer trainer(*task.windows, task.split.train, std::move(task.objective));
   if (!callbacks.checkpoint.empty() && std::filesystem::exists(callbacks.checkpoint))
     trainer.restore(callbacks.checkpoint, task.origin);
   if (!train(trainer, task, callbacks)) return false;

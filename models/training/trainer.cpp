@@ -27,25 +27,25 @@ void Trainer::Variances::add(const Variances& other) {
   pictures.add(other.pictures), targets.add(other.targets), means.add(other.means);
 }
 
-Trainer::Trainer(const Examples& examples, std::vector<std::uint32_t> train,
-                 std::unique_ptr<Objective> objective, Ranks& ranks)
-    : data_(examples),
+Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, Objective objective,
+                 Ranks& ranks)
+    : windows_(windows),
       objective_(std::move(objective)),
-      batching_(std::move(train), static_cast<std::size_t>(objective_->pace().batch),
-                objective_->pace().seed),
-      state_(model().parameters(), objective_->pace(), objective_->pace().epochs * steps_per_epoch()),
+      batching_(std::move(train), static_cast<std::size_t>(objective_.recipe().batch),
+                objective_.recipe().seed),
+      state_(model().parameters(), objective_.recipe(), objective_.recipe().epochs * steps_per_epoch()),
       ranks_(ranks) {
-  check_format(examples, model());
+  check_format(windows, model());
   indices_.resize(batching_.batch_size());
   check_micro_batches(ranks.size(), indices_.size());
   const Dim n = static_cast<Dim>(indices_.size()),
             micro_batches = std::min(static_cast<Dim>(kMostMicroBatches), n);
   const Dim first = micro_batches * ranks.rank() / ranks.size();
   for (Dim i = first; i < first + micro_batches / ranks.size(); ++i)
-    micro_batches_.emplace_back(*objective_, i * n / micro_batches,
+    micro_batches_.emplace_back(objective_, i * n / micro_batches,
                                 (i + 1) * n / micro_batches - i * n / micro_batches);
   for (const MicroBatch& micro_batch : micro_batches_)
-    micro_batch_parameters_.push_back(&micro_batch.objective->network().parameters());
+    micro_batch_parameters_.push_back(&micro_batch.objective.network().parameters());
   std::vector<Tensor> weights;
   for (const Parameter& p : model().parameters()) weights.push_back(p.value.value());
   forms_ = std::make_unique<kernels::WeightForms>(weights);
@@ -62,7 +62,7 @@ Trainer::MicroBatch::MicroBatch(const Objective& master, Dim first_sample, Dim c
   variances.pictures = variances.targets =
       BatchVariance(static_cast<std::size_t>(batch.targets.size() / count));
   variances.means = BatchVariance(static_cast<std::size_t>(master.latents()));
-  share_values(master.network().parameters(), objective->network().parameters());
+  share_values(master.network().parameters(), objective.network().parameters());
 }
 
 void Trainer::fill(MicroBatch& micro_batch) const {
@@ -75,9 +75,9 @@ void Trainer::fill(MicroBatch& micro_batch) const {
   for (std::size_t n = 0; n < count; ++n) {
     const std::size_t slot = static_cast<std::size_t>(micro_batch.first) + n;
     const std::span<float> input = micro_batch.batch.inputs.values().subspan(n * input_size, input_size);
-    data_.input(indices_[slot], input);
-    if (data_.augmentable(indices_[slot])) objective_->augment(batching_.sample(epoch, b, slot), input);
-    data_.target(indices_[slot], micro_batch.batch.targets.values().subspan(n * target_size, target_size));
+    windows_.window(indices_[slot], input);
+    if (windows_.augmentable(indices_[slot])) objective_.augment(batching_.sample(epoch, b, slot), input);
+    windows_.truth(indices_[slot], micro_batch.batch.targets.values().subspan(n * target_size, target_size));
   }
 }
 
@@ -88,13 +88,13 @@ void Trainer::announce_next() {
   const auto first = static_cast<std::size_t>(micro_batches_.front().first);
   const auto end =
       static_cast<std::size_t>(micro_batches_.back().first + micro_batches_.back().batch.inputs.dim(0));
-  for (std::size_t slot = first; slot < end; ++slot) data_.will_read(indices_[slot]);
+  for (std::size_t slot = first; slot < end; ++slot) windows_.will_read(indices_[slot]);
 }
 
 // The numbers of sample i of step s do not depend on how the batch is cut.
 void Trainer::draw_noise(MicroBatch& micro_batch) const {
-  const RandomStream random(objective_->pace().seed, kNoiseStream);
-  const auto numbers = static_cast<std::uint64_t>(objective_->noise());
+  const RandomStream random(objective_.recipe().seed, kNoiseStream);
+  const auto numbers = static_cast<std::uint64_t>(objective_.noise());
   if (numbers == 0) return;
   std::uint64_t next =
       (static_cast<std::uint64_t>(step()) * indices_.size() + static_cast<std::uint64_t>(micro_batch.first)) *
@@ -104,12 +104,12 @@ void Trainer::draw_noise(MicroBatch& micro_batch) const {
 
 // Forward, loss, backward of one micro-batch, each term weighted by its share of the batch.
 void Trainer::run(MicroBatch& micro_batch) const {
-  const std::vector<Parameter>& parameters = micro_batch.objective->network().parameters();
+  const std::vector<Parameter>& parameters = micro_batch.objective.network().parameters();
   const kernels::WeightForms::Use use(*forms_);
   fill(micro_batch);
   draw_noise(micro_batch);
   drop_gradients(parameters);
-  const BatchOutput output = (*micro_batch.objective)(micro_batch.batch);
+  const BatchOutput output = micro_batch.objective(micro_batch.batch);
   const double share =
       static_cast<double>(micro_batch.batch.inputs.dim(0)) / static_cast<double>(indices_.size());
   micro_batch.terms = values_of(output.loss, share);
@@ -209,14 +209,14 @@ void Trainer::look_for_collapse(StepReport& report) {
   if (indices_.size() < 2) return;  // nothing to compare with
   const auto samples = static_cast<double>(indices_.size());
   report.active_latents = active_latents(variances.means, samples);
-  const bool idle = objective_->latents() > 0 && report.active_latents == 0;
+  const bool idle = objective_.latents() > 0 && report.active_latents == 0;
   report.collapsed = state_.collapsed(idle || is_degenerate(variances.pictures, variances.targets, samples));
 }
 
 // What a saved state must agree in, besides the caller's own metadata.
 std::map<std::string, std::string> Trainer::metadata(std::map<std::string, std::string> origin) const {
-  origin.merge(objective_->metadata());
-  origin["training"] = objective_->text();
+  origin.merge(objective_.metadata());
+  origin["training"] = objective_.text();
   return origin;
 }
 

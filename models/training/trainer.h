@@ -1,6 +1,6 @@
-// Training of any network, one visible step at a time.
+// Training of a network, one visible step at a time.
 //
-//   Trainer trainer(windows, split.train, window_objective(windows, recipe));
+//   Trainer trainer(windows, split.train, Objective(windows, recipe));
 //   while (!trainer.done()) report(trainer.train_step());
 //
 // Every random choice is a function of (seed, step), so that a restored trainer continues to the same bits.
@@ -56,10 +56,10 @@ using AroundMicroBatch =
 
 class Trainer {
  public:
-  /// `examples` must outlive the trainer. Throws std::invalid_argument for examples of another format than
-  /// the network's, no training example, or as check_micro_batches(). `ranks` train together: all of them
-  /// call train_step() and save().
-  Trainer(const Examples& examples, std::vector<std::uint32_t> train, std::unique_ptr<Objective> objective,
+  /// `windows` must outlive the trainer. Throws std::invalid_argument for windows of another format than the
+  /// network's, no training window, or as check_micro_batches(). `ranks` train together: all of them call
+  /// train_step() and save().
+  Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, Objective objective,
           Ranks& ranks = one_process());
   Trainer(Trainer&&) noexcept;
   ~Trainer();
@@ -68,10 +68,10 @@ class Trainer {
   std::int64_t step() const { return state_.step(); }
   std::int64_t total_steps() const { return state_.total_steps(); }
   std::int64_t steps_per_epoch() const { return static_cast<std::int64_t>(batching_.batches_per_epoch()); }
-  const Objective& objective() const { return *objective_; }
-  const Network& model() const { return objective_->network(); }
-  const Examples& examples() const { return data_; }
-  /// The examples that are trained on.
+  const Objective& objective() const { return objective_; }
+  const SuperTac& model() const { return objective_.network(); }
+  const WindowSet& windows() const { return windows_; }
+  /// The windows that are trained on.
   const std::vector<std::uint32_t>& training_side() const { return batching_.indices(); }
   /// Number of the processes that train together.
   int ranks() const { return ranks_.size(); }
@@ -109,8 +109,8 @@ class Trainer {
   };
   struct MicroBatch {
     MicroBatch(const Objective& master, Dim first, Dim count);
-    Dim first;                             // its share of the batch: samples first .. first + inputs.dim(0)
-    std::unique_ptr<Objective> objective;  // the master's values under gradients of its own
+    Dim first;            // its share of the batch: samples first .. first + inputs.dim(0)
+    Objective objective;  // the master's values under gradients of its own
     Batch batch;
     LossTerms terms;
     Variances variances;
@@ -125,8 +125,8 @@ class Trainer {
   void look_for_collapse(StepReport& report);
   void check_finite(const LossTerms& terms) const;
 
-  const Examples& data_;
-  std::unique_ptr<Objective> objective_;
+  const WindowSet& windows_;
+  Objective objective_;
   Batching batching_;
   TrainingState state_;
   Ranks& ranks_;

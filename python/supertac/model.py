@@ -66,7 +66,9 @@ def level(windows):
 
 
 def groups_of(settings):
-    """The signals of each VAE: a row of the array, or a column."""
+    """The signals of each VAE: a row of the array, or a column; single frames have none."""
+    if settings["timesteps"] == 1:
+        return []
     rows, columns, channels = (settings.get(name, value) for name, value in
                                (("rows", 4), ("columns", 4), ("in_channels", 1)))
     signals = np.arange(rows * columns * channels).reshape(rows, columns, channels)
@@ -85,7 +87,8 @@ class Model:
 
     def windows(self, recording: recordings.Recording) -> tuple[np.ndarray, np.ndarray]:
         """Times and windows in volts of a recording that was filtered as the training was."""
-        return recordings.windows(recording, self.settings["timesteps"], self.input["rate_hz"])
+        frames = self.settings["timesteps"]
+        return recordings.windows(recording, frames, self.input["rate_hz"] if frames > 1 else 1000 / recording.period_s)
 
     def scale(self, volts: np.ndarray) -> np.ndarray:
         """Volts [N,T,S] -> what the network takes."""
@@ -151,10 +154,12 @@ class Model:
         return leaky_relu(convolve_transposed(x + self._convolve(h, name + ".conv"), *self._of(name + ".up")))
 
     def _draw(self, x):
-        latents = np.concatenate([self._encode(x[:, :, group].swapaxes(1, 2), f"encoder.{i}")
-                                  for i, group in enumerate(self.groups)], axis=1)
-        h = leaky_relu(self._linear(latents, "upsampler.fc")).reshape(len(x), -1, *self.map)
-        if self.settings.get("last_frame_path"):
+        latents, h = None, 0
+        if self.groups:
+            latents = np.concatenate([self._encode(x[:, :, group].swapaxes(1, 2), f"encoder.{i}")
+                                      for i, group in enumerate(self.groups)], axis=1)
+            h = leaky_relu(self._linear(latents, "upsampler.fc")).reshape(len(x), -1, *self.map)
+        if self.settings.get("last_frame_path") or not self.groups:
             frame = np.moveaxis(x[:, -1].reshape(len(x), *self.map, -1), -1, 1)
             h = h + leaky_relu(self._convolve(frame, "upsampler.last_frame"))
         for name in self._parts("upsampler.rirb.{}"):
@@ -167,7 +172,7 @@ def load_model(path: str | os.PathLike) -> Model:
     """A model that supertac-train wrote. Raises ValueError naming the file and what is wrong."""
     tensors, metadata = read(path)
     if metadata.get("format") != "supertac-checkpoint" or "kind" in metadata:
-        raise ValueError(f"{path}: expected a model that supertac-train --data wrote, found "
+        raise ValueError(f"{path}: expected a model that supertac-train wrote, found "
                          + metadata.get("kind", metadata.get("format", "another file")))
     try:
         return Model(tensors, metadata, path)

@@ -43,17 +43,18 @@ class SuperTac(nn.Module):
         super().__init__()
         s, self.input, self.map = settings, input_of_model, tuple(settings.get(name, 4) for name in ("rows", "columns"))
         self.groups = [torch.tensor(group) for group in groups]
-        vae = len(groups[0]), s["timesteps"], s["latent"]
         channels, count = s["channels"], len(groups)
+        vae = len(groups[0]) if groups else 0, s["timesteps"], s["latent"]
         self.encoder = nn.ModuleList(encoder(*vae) for _ in range(count))
         self.decoder = nn.ModuleList(decoder(*vae) for _ in range(count))
-        self.upsampler = layers(fc=nn.Linear(count * s["latent"], channels * self.map[0] * self.map[1]),
-                                rirb=nn.ModuleList(rirb(channels, channels // REDUCTION, s["rcabs"])
+        self.upsampler = layers(rirb=nn.ModuleList(rirb(channels, channels // REDUCTION, s["rcabs"])
                                                    for _ in range(s["scale"].bit_length() - 1)),
                                 out=nn.Conv2d(channels, 1, 3, padding=1))
+        if groups:
+            self.upsampler["fc"] = nn.Linear(count * s["latent"], channels * self.map[0] * self.map[1])
         if s.get("spread"):
             self.upsampler["spread"] = nn.Conv2d(channels, 1, 3, padding=1)
-        if s.get("last_frame_path"):
+        if s.get("last_frame_path") or not groups:
             self.upsampler["last_frame"] = nn.Conv2d(s.get("in_channels", 1), channels, 3, padding=1)
 
     def scale(self, volts):
@@ -91,8 +92,9 @@ class SuperTac(nn.Module):
         return torch.sigmoid(part["out"](h)).transpose(1, 2)
 
     def upsample(self, latents, x):
-        up = self.upsampler
-        h = F.leaky_relu(up["fc"](latents), 0.01).reshape(len(latents), -1, *self.map)
+        up, h = self.upsampler, 0
+        if "fc" in up:
+            h = F.leaky_relu(up["fc"](latents), 0.01).reshape(len(latents), -1, *self.map)
         if "last_frame" in up:
             h = h + F.leaky_relu(up["last_frame"](x[:, -1].reshape(len(x), *self.map, -1).movedim(-1, 1)), 0.01)
         for part in up["rirb"]:
@@ -109,7 +111,7 @@ class SuperTac(nn.Module):
 
     def draw(self, x):
         """Pictures of windows [N,T,S] that were scaled and normalised."""
-        latents = torch.cat([mean for mean, _ in self.distributions(x)], 1)
+        latents = torch.cat([mean for mean, _ in self.distributions(x)], 1) if self.groups else None
         return Pictures(*self.upsample(latents, x), latents)
 
     def training_outputs(self, x, eps=None):

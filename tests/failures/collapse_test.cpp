@@ -27,15 +27,14 @@ class CollapseTest : public ::testing::Test {
     double difference = 0, decoded = 0;  // of two windows' pictures and decoded signals, root mean square
   };
   End train(const Recipe& s) {
-    Trainer trainer(windows, all_of(windows), window_objective(windows, s));
+    Trainer trainer(windows, all_of(windows), Objective(windows, s));
     StepReport report;
     try {
       while (!trainer.done() && !report.collapsed) report = trainer.train_step();
     } catch (const TrainingStopped&) {
       return {.stopped = true};
     }
-    const SuperTac::Output output =
-        dynamic_cast<const SuperTac&>(trainer.model()).forward(two_windows(), zero_eps());
+    const SuperTac::Output output = trainer.model().forward(two_windows(), zero_eps());
     return {report.collapsed, false, report.active_latents, difference(output.image.value()),
             difference(output.decoded[3].value())};
   }

@@ -86,7 +86,7 @@ TEST(Failures, F11ConstantClippedAndDeadSignalsTrainToFiniteNumbers) {
       windows_of({recording(constant), recording(clipped, 2), recording(dead_taxel, 3)});
   Recipe settings = small_training();
   settings.epochs = 1;
-  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
+  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
   for (int i = 0; i < 10; ++i) EXPECT_TRUE(std::isfinite(trainer.train_step().total));
 }
 
@@ -95,7 +95,7 @@ TEST(Failures, F3ARateAHundredTimesTooHighNeverTrainsOnNan) {
   const WindowSet windows = windows_of({recording([](Recording&) {}), recording([](Recording&) {}, 2)});
   Recipe settings = small_training();
   settings.learning_rate = 0.1;
-  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
+  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
   try {
     for (int i = 0; i < 40; ++i) ASSERT_TRUE(std::isfinite(trainer.train_step().total));
   } catch (const TrainingStopped& error) {

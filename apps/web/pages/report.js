@@ -21,7 +21,7 @@ function show() {
   draw(element("film-felt"), levels.subarray(0, taxels), rows, columns);
   draw(element("film-drawn"), levels.subarray(taxels, taxels + pixels), rows * scale, columns * scale);
   draw(element("film-true"), levels.subarray(taxels + pixels), rows * scale, columns * scale);
-  element("film-label").textContent = `${pass.name}: finger at x ${frame.x.toFixed(1)}, y ${frame.y.toFixed(1)} mm, ` +
+  element("film-label").textContent = `${pass.name}: ${frame.place}, ` +
       `${frame.zone}, SSIM ${frame.ssim.toFixed(3)}`;
 }
 

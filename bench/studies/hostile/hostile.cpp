@@ -61,9 +61,8 @@ constexpr double kPatienceS = 1, kHangS = 10;
 constexpr long kMostKilobytes = 1 << 20;
 constexpr std::uint64_t kMost = 1 << 26;  // bytes of a file that is compared
 // By --force a user gives up what these name, and nothing else.
-constexpr const char* kOutputs[] = {"--out",        "--json",         "--gcode",      "--outputs",
-                                    "--capture",    "--report",       "--pictures",   "--onnx",
-                                    "--board-link", "--printer-link", "--write-pairs"};
+constexpr const char* kOutputs[] = {"--out",    "--json",     "--gcode", "--outputs",    "--capture",
+                                    "--report", "--pictures", "--onnx",  "--board-link", "--printer-link"};
 // What no program may change.
 constexpr const char* kKept[] = {"precious", "precious.stl", "model", "data/good"};
 

@@ -6,13 +6,14 @@
 #include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <typeinfo>
 
 #include "bench/studies/hostile/evil_value.h"
 #include "bench/studies/hostile/readers.h"
 #include "data/recordings/recording.h"
+#include "data/recordings/table_import.h"
 #include "data/scores/baselines.h"
-#include "data/windows/pairs.h"
 #include "data/windows/windows.h"
 #include "hardware/boards/sensor_decoder.h"
 #include "hardware/boards/sensor_reader.h"
@@ -161,10 +162,11 @@ void use_model(const std::string& path) {
 }
 
 void use_pairs(const std::string& path) {
-  const PairSet pairs = PairSet::read(path);
-  std::vector<std::uint32_t> all(pairs.size());
-  for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-  (void)fit_baselines(pairs, all);
+  WindowSet frames({.timesteps = 1});
+  for (const Recording& recording : import_pairs(path)) frames.add(recording);
+  std::vector<std::uint32_t> all(frames.size());
+  std::iota(all.begin(), all.end(), 0U);
+  (void)fit_baselines(frames, all);
 }
 
 void use_sensor(const RandomStream& random) {

@@ -16,8 +16,8 @@
 #include "data/plates/stl.h"
 #include "data/recordings/recording.h"
 #include "data/recordings/simulator.h"
+#include "data/recordings/table_import.h"
 #include "data/recordings/text_import.h"
-#include "data/windows/pairs.h"
 #include "hardware/boards/frame_decoder.h"
 #include "hardware/collection/collection.h"
 #include "hardware/ports/errors.h"
@@ -201,7 +201,7 @@ std::vector<Reader> readers(const std::string& folder) {
                if (!std::string(error.what()).starts_with(f)) throw;  // it names the file, else it is raw
              }
            })},
-          {"pairs", good_pairs(folder), from_file([](const std::string& f) { (void)PairSet::read(f); })},
+          {"pairs", good_pairs(folder), from_file([](const std::string& f) { (void)import_pairs(f); })},
           {"requests", bytes_of(server->good()), [server](const Bytes& b) { server->ask(b); }}};
 }
 

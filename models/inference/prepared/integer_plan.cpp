@@ -152,13 +152,6 @@ void copy_out(const Memory& m, int of, Dim first, Tensor& to) {
             static_cast<real>(m.numbers(map)[n * map.image() + line * map.line() + i]) * m.plan.number_step();
 }
 
-Shape with_count(const Shape& one, Dim count) {
-  std::array<Dim, kMaxRank> dims{};
-  std::copy(one.dims().begin(), one.dims().end(), dims.begin());
-  dims[0] = count;
-  return Shape(std::span<const Dim>(dims.data(), one.dims().size()));
-}
-
 }  // namespace
 
 float IntegerPlan::number_step() const { return std::ldexp(1.0F, -fraction_bits); }
@@ -166,9 +159,10 @@ float IntegerPlan::number_step() const { return std::ldexp(1.0F, -fraction_bits)
 Estimate IntegerPlan::run(const Tensor& inputs) const {
   const Dim count = inputs.dim(0), size = count == 0 ? 0 : inputs.size() / count;
   Estimate out;
-  out.picture = Tensor(with_count(picture_shape, count));
+  const auto map_of = [&](int i) { return maps[static_cast<std::size_t>(i)]; };
+  out.picture = Tensor(Shape{count, map_of(picture).height, map_of(picture).width, 1});
   if (predicted_error >= 0) out.predicted_error = Tensor(out.picture.shape());
-  if (latents >= 0) out.latents = Tensor(with_count(latents_shape, count));
+  if (latents >= 0) out.latents = Tensor(Shape{count, map_of(latents).channels});
   const Dim bytes = scratch + work_area * std::min(count, kBlock);
   Tensor memory(Shape{bytes / static_cast<Dim>(sizeof(real)) + 1});
   auto* const begin = reinterpret_cast<std::uint8_t*>(memory.data());

@@ -74,7 +74,6 @@ struct IntegerPlan {
   Dim input_size = 0;  ///< numbers of the network's input
   Dim scratch = 0;     ///< bytes of a block, for kernels that widen what they multiply
   int picture = -1, predicted_error = -1, latents = -1;  ///< maps; -1: the network has none
-  Shape picture_shape, latents_shape;                    ///< of one image
 };
 
 }  // namespace supertac

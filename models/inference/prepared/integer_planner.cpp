@@ -2,12 +2,10 @@
 // models/inference/prepared/integer_plan.h.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <set>
 #include <stdexcept>
 
-#include "autograd/trace.h"
 #include "models/inference/prepared/integer_plan.h"
 #include "models/inference/prepared/taps.h"
 
@@ -16,7 +14,6 @@ namespace {
 
 using kernels::ConvSettings;
 using Kind = IntegerStep::Kind;
-using Id = const detail::Node*;
 
 // A product before its weights are whole: w [segments * length][cout], and where its taps lie.
 struct Taps {
@@ -28,26 +25,21 @@ struct Taps {
   Tensor w, bias;
 };
 
-class IntegerPlanner {
+class IntegerPlanner : TraceWalk {
  public:
   IntegerPlanner(const Network& network, const ActivationRanges& ranges, const Variable& input,
                  const std::vector<TracedOp>& ops, const Drawing& drawn);
   std::shared_ptr<IntegerPlan> plan() { return std::move(plan_); }
 
  private:
-  void look_ahead(const std::vector<TracedOp>& ops, const Drawing& drawn);
   void choose_fraction_bits(const std::vector<TracedOp>& ops, const ActivationRanges& ranges);
   void make(const TracedOp& op);
   void conv(const TracedOp& op, int x, int y);
   void transposed_conv(const TracedOp& op, int x, int y);
   void linear(const TracedOp& op, int x, int y);
   void concat(const TracedOp& op, int y);
-  void take_input(const TracedOp* op, const Variable& y);
+  void take_input(const TracedOp& op);
 
-  Id owner(const Variable& x) const {
-    const auto found = flattened_.find(x.node());
-    return found == flattened_.end() ? x.node() : found->second;
-  }
   bool is_of_bytes(const TracedOp& op) const;
   bool as_bytes(Id id) const { return read_as_bytes_.contains(id); }
   bool as_numbers(Id id) const { return read_as_numbers_.contains(id); }
@@ -61,13 +53,8 @@ class IntegerPlanner {
   std::string layer_of(const TracedOp& op) const;
 
   std::shared_ptr<IntegerPlan> plan_ = std::make_shared<IntegerPlan>();
-  Id input_;
-  std::map<Id, std::string> layers_;       // by weight
-  std::map<Id, Id> flattened_;             // value -> the map whose numbers it has
-  std::map<Id, Dim> pixels_of_unflatten_;  // value that is unflattened -> pixels
-  std::map<Id, std::size_t> last_use_;
-  std::map<Id, Margin> margins_;
-  std::map<Id, Scale> scales_;  // as bytes
+  std::map<Id, std::string> layers_;  // by weight
+  std::map<Id, Scale> scales_;        // as bytes
   std::set<Id> read_as_bytes_, read_as_numbers_;
   std::map<Id, int> numbers_, bytes_;
   std::set<int> live_, written_;
@@ -76,7 +63,7 @@ class IntegerPlanner {
 
 IntegerPlanner::IntegerPlanner(const Network& network, const ActivationRanges& ranges, const Variable& input,
                                const std::vector<TracedOp>& ops, const Drawing& drawn)
-    : input_(input.node()) {
+    : TraceWalk(input, ops, drawn) {
   if (ranges.ops() != ops.size())
     throw std::invalid_argument("Prepared: the ranges are those of " + std::to_string(ranges.ops()) +
                                 " ops, the network has " + std::to_string(ops.size()));
@@ -84,37 +71,21 @@ IntegerPlanner::IntegerPlanner(const Network& network, const ActivationRanges& r
     layers_[p.value.node()] = p.name.substr(0, p.name.rfind('.'));
   for (std::size_t i = 0; i < ops.size(); ++i) scales_[ops[i].y.node()] = ranges.scale(i);
   plan_->input_size = input.value().size();
-  look_ahead(ops, drawn);
-  choose_fraction_bits(ops, ranges);
-  for (std::size_t i = 0; i < ops.size(); ++i) {
-    make(ops[i]);
-    release(i);
-  }
-  plan_->picture = number_of(drawn.picture), plan_->picture_shape = drawn.picture.shape();
-  if (drawn.predicted_error.defined()) plan_->predicted_error = number_of(drawn.predicted_error);
-  if (drawn.latents.defined()) {
-    plan_->latents = number_of(drawn.latents);
-    plan_->latents_shape = drawn.latents.shape();
-  }
-}
-
-void IntegerPlanner::look_ahead(const std::vector<TracedOp>& ops, const Drawing& drawn) {
-  for (std::size_t i = 0; i < ops.size(); ++i) {
-    const TracedOp& op = ops[i];
-    if (op.op == "flatten_channels_first") flattened_[op.y.node()] = owner(op.inputs[0]);
-    if (op.op == "unflatten_channels_first")
-      pixels_of_unflatten_[op.inputs[0].node()] = op.inputs[0].dim(1) / op.y.dim(op.y.rank() - 1);
-    if (op.op.starts_with("conv")) margins_[owner(op.inputs[0])].widen(op.settings.conv);
-    for (const Variable& x : op.inputs) last_use_[owner(x)] = i;
+  for (const TracedOp& op : ops) {
     if (op.op == "flatten_channels_first") continue;
     const bool of_bytes = is_of_bytes(op);
     for (const Variable& x : op.inputs) (of_bytes ? read_as_bytes_ : read_as_numbers_).insert(owner(x));
   }
   for (const Variable* y : {&drawn.picture, &drawn.predicted_error, &drawn.latents})
-    if (y->defined()) {
-      last_use_[owner(*y)] = std::numeric_limits<std::size_t>::max();
-      read_as_numbers_.insert(owner(*y));
-    }
+    if (y->defined()) read_as_numbers_.insert(owner(*y));
+  choose_fraction_bits(ops, ranges);
+  for (std::size_t i = 0; i < ops.size(); ++i) {
+    make(ops[i]);
+    release(i);
+  }
+  plan_->picture = number_of(drawn.picture);
+  if (drawn.predicted_error.defined()) plan_->predicted_error = number_of(drawn.predicted_error);
+  if (drawn.latents.defined()) plan_->latents = number_of(drawn.latents);
 }
 
 // Twice the largest number fits; sums of residual blocks may be larger than they were seen to be.
@@ -138,7 +109,7 @@ bool IntegerPlanner::is_of_bytes(const TracedOp& op) const {
 // In the first gap between the maps that are still read.
 int IntegerPlanner::new_map(const Variable& y, bool bytes) {
   constexpr Dim kLine = 64;  // of the cache, in bytes
-  const Margin margin = margins_.contains(y.node()) ? margins_.at(y.node()) : Margin{};
+  const Margin margin = margin_of(y);
   IntegerMap m{.channels = y.dim(y.rank() - 1),
                .margin_h = margin.height,
                .margin_w = margin.width,
@@ -164,10 +135,7 @@ int IntegerPlanner::new_map(const Variable& y, bool bytes) {
 }
 
 void IntegerPlanner::release(std::size_t op) {
-  std::erase_if(live_, [&](int i) {
-    const auto last = last_use_.find(value_of_.at(i));
-    return last == last_use_.end() || last->second <= op;
-  });
+  std::erase_if(live_, [&](int i) { return !read_after(value_of_.at(i), op); });
 }
 
 IntegerStep& IntegerPlanner::add(Kind kind, std::string name, int x, int y) {
@@ -185,13 +153,7 @@ std::string IntegerPlanner::layer_of(const TracedOp& op) const {
 
 void IntegerPlanner::make(const TracedOp& op) {
   if (op.op == "flatten_channels_first") return;  // the linear layer behind it takes the map as it is
-  if (op.op == "take_runs" || op.op == "last_frame") {
-    if (op.inputs[0].node() != input_)
-      throw std::logic_error("Prepared: " + std::string(op.op) + " has a step for the network's input only");
-    return take_input(&op, op.y);
-  }
-  if (op.inputs[0].node() == input_ && !numbers_.contains(input_) && !bytes_.contains(input_))
-    take_input(nullptr, op.inputs[0]);
+  if (takes_input(op)) return take_input(op);
   const bool product = op.op.starts_with("conv") || op.op == "linear";
   if (product) {
     const bool bytes_in = is_of_bytes(op);
@@ -231,15 +193,16 @@ void IntegerPlanner::add_bytes(const Variable& y) {
   add(Kind::to_bytes, "to bytes", x, to).scale = requantise(map(x).scale.step, map(to).scale.step);
 }
 
-void IntegerPlanner::take_input(const TracedOp* op, const Variable& y) {
+void IntegerPlanner::take_input(const TracedOp& op) {
+  const Variable& y = op.y;
   const bool bytes = as_bytes(y.node()) && !as_numbers(y.node());
   const int to = new_map(y, bytes);
   IntegerStep& step = add(Kind::input, "input", -1, to);
   step.run = step.step = y.dim(y.rank() - 1);
-  if (op != nullptr && op->op == "last_frame") step.first = plan_->input_size - y.value().size();
-  if (op != nullptr && op->op == "take_runs")
-    step.first = op->settings.first, step.run = op->settings.run, step.apart = op->settings.step,
-    step.step = op->inputs[0].dim(2);
+  if (op.op == "last_frame") step.first = plan_->input_size - y.value().size();
+  if (op.op == "take_runs")
+    step.first = op.settings.first, step.run = op.settings.run, step.apart = op.settings.step,
+    step.step = op.inputs[0].dim(2);
   if (bytes) step.scale = requantise(plan_->number_step(), map(to).scale.step);
   const Dim values = y.size() / y.dim(0);
   plan_->scratch = std::max(plan_->scratch, (values * 6 + 63) / 64 * 64);
@@ -335,8 +298,7 @@ void IntegerPlanner::linear(const TracedOp& op, int to_read, int to_write) {
   const IntegerMap &x = map(to_read), &y = map(to_write);
   const Dim in = op.inputs[0].dim(1), out = op.y.dim(1);
   if (x.margin_h + x.margin_w > 0) throw std::logic_error("Prepared: a flattened picture has margins");
-  const auto unflatten = pixels_of_unflatten_.find(op.y.node());
-  const Dim pixels = unflatten == pixels_of_unflatten_.end() ? 1 : unflatten->second;
+  const Dim pixels = pixels_of_unflatten(op.y);
   const Tensor w = with_pixels_outside(op.inputs[1].value(), 1, in / x.channels, out);
   add_product(op, to_read, to_write,
               {.from = {x.image(), 0, 0},

@@ -1,20 +1,8 @@
 #include "models/inference/prepared/plan.h"
 
 #include <algorithm>
-#include <array>
 
 namespace supertac {
-namespace {
-
-Shape with_count(const Shape& one, Dim count) {
-  std::array<Dim, kMaxRank> dims{};
-  std::copy(one.dims().begin(), one.dims().end(), dims.begin());
-  dims[0] = count;
-  return Shape(std::span<const Dim>(dims.data(), one.dims().size()));
-}
-
-}  // namespace
-
 static void clear_margin(const FeatureMap& map, Dim images, real* image) {
   if (map.margin_h + map.margin_w == 0) return;
   const Dim ends = map.margin_h * map.line(), side = map.margin_w * map.channels;
@@ -44,9 +32,11 @@ void Plan::copy_out(const Block& block, const FeatureMap& map, Tensor& to, Dim f
 
 Estimate Plan::run(const Tensor& inputs) const {
   const Dim count = inputs.dim(0), size = count == 0 ? 0 : inputs.size() / count;
-  Estimate out{.picture = Tensor(with_count(picture_shape_, count)), .predicted_error = {}, .latents = {}};
+  Estimate out{.picture = Tensor(Shape{count, picture_.height, picture_.width, 1}),
+               .predicted_error = {},
+               .latents = {}};
   if (predicts_error_) out.predicted_error = Tensor(out.picture.shape());
-  if (has_latents_) out.latents = Tensor(with_count(latents_shape_, count));
+  if (has_latents_) out.latents = Tensor(Shape{count, latents_.channels});
   const Dim images = std::min(count, block_);
   Tensor memory(Shape{scratch_ + workspace_ * images});
   real* const workspace = memory.data() + scratch_;

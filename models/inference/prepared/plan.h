@@ -66,7 +66,6 @@ class Plan {
   Dim block_ = kBlock;
   bool filters_anew_ = false;
   bool predicts_error_ = false, has_latents_ = false;
-  Shape picture_shape_, latents_shape_;  // of one image
 };
 
 }  // namespace supertac

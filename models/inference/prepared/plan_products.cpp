@@ -85,8 +85,7 @@ void Planner::linear(const TracedOp& op) {
   const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
   const Dim in = op.inputs[0].dim(1), out = op.y.dim(1);
   if (x.height > 1 && x.margin_w > 0) throw std::logic_error("Prepared: a flattened picture has margins");
-  const auto unflatten = pixels_of_unflatten_.find(op.y.node());
-  const Dim pixels = unflatten == pixels_of_unflatten_.end() ? 1 : unflatten->second;
+  const Dim pixels = pixels_of_unflatten(op.y);
   const Tensor w = with_pixels_outside(op.inputs[1].value(), 1, in / x.channels, out);
   add_product(Product{.job = {.from = {x.image(), 0, 0},
                               .to = {y.image(), 0, 0},

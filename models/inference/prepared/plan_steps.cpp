@@ -8,22 +8,12 @@
 
 namespace supertac {
 
-void Planner::load_input(const Variable& input) {
-  if (maps_.contains(input.node())) return;
-  const FeatureMap y = new_map(input);
-  load(y, y.height * y.width * y.channels, 0);
-}
-
 void Planner::last_frame(const TracedOp& op) {
-  const Variable& windows = op.inputs[0];
-  load(new_map(op.y), windows.dim(1) * windows.dim(2), (windows.dim(1) - 1) * windows.dim(2));
-}
-
-// Of each window, so many numbers long, what lies from `first` on.
-void Planner::load(const FeatureMap& y, Dim window, Dim first) {
+  const FeatureMap y = new_map(op.y);
+  const Dim frame = op.inputs[0].dim(2), window = op.inputs[0].dim(1) * frame;
   plan_->steps_.push_back([=](const Block& b) {
     for (Dim n = 0; n < b.images; ++n) {
-      const real* from = b.input + n * window + first;
+      const real* from = b.input + (n + 1) * window - frame;
       real* line = b.first_pixel(y) + n * y.image();
       for (Dim i = 0; i < y.height; ++i, line += y.line(), from += y.width * y.channels)
         std::copy_n(from, y.width * y.channels, line);
@@ -37,8 +27,6 @@ static void copy_runs(Dim rows, const real* from, Dim from_step, real* to, Dim t
 }
 
 void Planner::take_runs(const TracedOp& op) {
-  if (op.inputs[0].node() != input_)
-    throw std::logic_error("Prepared: take_runs has a step for the network's input only");
   const FeatureMap y = new_map(op.y);
   const Dim width = op.inputs[0].dim(2), rows = y.width;
   const OpSettings s = op.settings;
@@ -125,18 +113,14 @@ void Planner::unflatten(const TracedOp& op) {
 }
 
 void Planner::concat(const TracedOp& op) {
+  if (op.y.rank() > 2) throw std::logic_error("Prepared: a concat of maps has no step");
   const FeatureMap y = new_map(op.y);
   Dim at = 0;
   for (const Variable& input : op.inputs) {
     const FeatureMap x = map_of(input);
     plan_->steps_.push_back([=](const Block& b) {
-      for (Dim n = 0; n < b.images; ++n) {
-        const real* from = b.first_pixel(x) + n * x.image();
-        real* to = b.first_pixel(y) + n * y.image() + at;
-        for (Dim i = 0; i < x.height; ++i, from += x.line(), to += y.line())
-          for (Dim j = 0; j < x.width; ++j)
-            std::copy_n(from + j * x.channels, x.channels, to + j * y.channels);
-      }
+      for (Dim n = 0; n < b.images; ++n)
+        std::copy_n(b.begin(x) + n * x.channels, x.channels, b.begin(y) + n * y.channels + at);
     });
     at += x.channels;
   }

@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <limits>
 #include <stdexcept>
 
 namespace supertac {
@@ -36,14 +35,10 @@ std::shared_ptr<const Plan> Planner::plan(const Network& network, std::size_t se
   if (second_cache >= Plan::kLargeCache) plan.block_ = Plan::kLargeBlock;
   plan.filters_anew_ = planner.filters_anew(second_cache);
   plan.picture_ = planner.map_of(drawn.picture);
-  plan.picture_shape_ = drawn.picture.shape();
   plan.predicts_error_ = drawn.predicted_error.defined();
   if (plan.predicts_error_) plan.predicted_error_ = planner.map_of(drawn.predicted_error);
   plan.has_latents_ = drawn.latents.defined();
-  if (plan.has_latents_) {
-    plan.latents_ = planner.map_of(drawn.latents);
-    plan.latents_shape_ = drawn.latents.shape();
-  }
+  if (plan.has_latents_) plan.latents_ = planner.map_of(drawn.latents);
   return planner.plan_;
 }
 
@@ -68,43 +63,22 @@ const std::map<std::string_view, Planner::Make>& Planner::makers() {
 }
 
 Planner::Planner(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn)
-    : input_(input.node()) {
-  look_ahead(ops, drawn);
+    : TraceWalk(input, ops, drawn) {
   for (std::size_t i = 0; i < ops.size(); ++i) {
     const auto make = makers().find(ops[i].op);
     if (make == makers().end())
       throw std::logic_error("Prepared: no step computes the op " + std::string(ops[i].op) +
                              "; models/inference/prepared/planner.h lists those that have one");
-    const bool takes_input = ops[i].op == "take_runs" || ops[i].op == "last_frame";
-    if (!takes_input && ops[i].inputs[0].node() == input_) load_input(ops[i].inputs[0]);
+    takes_input(ops[i]);  // or throws
     (this->*make->second)(ops[i]);
     release_after(i);
   }
 }
 
-void Planner::look_ahead(const std::vector<TracedOp>& ops, const Drawing& drawn) {
-  for (std::size_t i = 0; i < ops.size(); ++i) {
-    const TracedOp& op = ops[i];
-    if (op.op == "flatten_channels_first") flattened_[op.y.node()] = owner(op.inputs[0]);
-    if (op.op == "unflatten_channels_first")
-      pixels_of_unflatten_[op.inputs[0].node()] = op.inputs[0].dim(1) / op.y.dim(op.y.rank() - 1);
-    if (op.op.starts_with("conv")) margins_[owner(op.inputs[0])].widen(op.settings.conv);
-    for (const Variable& x : op.inputs) last_use_[owner(x)] = i;
-  }
-  for (const Variable* y : {&drawn.picture, &drawn.predicted_error, &drawn.latents})
-    if (y->defined()) last_use_[owner(*y)] = std::numeric_limits<std::size_t>::max();
-}
-
-Planner::Id Planner::owner(const Variable& x) const {
-  const auto flattened = flattened_.find(x.node());
-  return flattened == flattened_.end() ? x.node() : flattened->second;
-}
-
 const FeatureMap& Planner::map_of(const Variable& x) const { return maps_.at(owner(x)); }
 
 FeatureMap Planner::layout_of(const Variable& y) const {
-  const auto found = margins_.find(y.node());
-  const Margin margin = found == margins_.end() ? Margin{} : found->second;
+  const Margin margin = margin_of(y);
   FeatureMap map{.channels = y.dim(y.rank() - 1), .margin_h = margin.height, .margin_w = margin.width};
   if (y.rank() > 2) map.width = y.dim(y.rank() - 2);
   if (y.rank() > 3) map.height = y.dim(1);
@@ -138,8 +112,7 @@ const FeatureMap& Planner::new_map(const Variable& y) {
 
 void Planner::release_after(std::size_t op) {
   std::erase_if(maps_, [&](const auto& value) {
-    const auto last = last_use_.find(value.first);
-    if (last == last_use_.end() || last->second > op) return false;
+    if (read_after(value.first, op)) return false;
     free_.push_back(value.second);
     return true;
   });

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "autograd/kernels/fast/isa/isa.h"
-#include "autograd/trace.h"
 #include "models/inference/prepared/plan.h"
 #include "models/inference/prepared/taps.h"
 
@@ -17,7 +16,7 @@ inline const kernels::IsaKernels& isa() { return kernels::isa_kernels(); }
 
 /// One step for each op, in the order in which they ran; a map's memory is taken again behind its last
 /// reader.
-class Planner {
+class Planner : TraceWalk {
  public:
   /// Throws std::logic_error naming an op that has no step. `second_cache`: of the processor, in bytes; 0:
   /// not known.
@@ -25,7 +24,6 @@ class Planner {
                                           std::size_t second_cache = second_cache_bytes());
 
  private:
-  using Id = const detail::Node*;
   using Make = void (Planner::*)(const TracedOp&);
 
   static std::size_t second_cache_bytes();
@@ -33,10 +31,6 @@ class Planner {
   bool filters_anew(std::size_t second_cache) const;
   Planner(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn);
   static const std::map<std::string_view, Make>& makers();
-
-  // Before the steps are made: who reads what until when, and how wide its margin must be.
-  void look_ahead(const std::vector<TracedOp>& ops, const Drawing& drawn);
-  Id owner(const Variable& x) const;
 
   const FeatureMap& map_of(const Variable& x) const;
   FeatureMap layout_of(const Variable& y) const;
@@ -62,15 +56,8 @@ class Planner {
   void sigmoid(const TracedOp& op);
   void gated_sum(const TracedOp& op);
   void add(const TracedOp& op);
-  void load_input(const Variable& input);
-  void load(const FeatureMap& y, Dim window, Dim first);
 
   std::shared_ptr<Plan> plan_ = std::make_shared<Plan>();
-  Id input_;
-  std::map<Id, Id> flattened_;             // value -> the map whose numbers it has
-  std::map<Id, Dim> pixels_of_unflatten_;  // value that is unflattened -> pixels
-  std::map<Id, std::size_t> last_use_;
-  std::map<Id, Margin> margins_;
   std::map<Id, FeatureMap> maps_;
   std::vector<FeatureMap> free_;
   std::size_t weights_ = 0, transformed_ = 0;  // bytes: as they are, and Winograd's places of some of them

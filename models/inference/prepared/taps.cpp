@@ -1,6 +1,9 @@
 #include "models/inference/prepared/taps.h"
 
 #include <algorithm>
+#include <limits>
+#include <stdexcept>
+#include <string>
 
 namespace supertac {
 
@@ -41,6 +44,48 @@ Tensor with_pixels_outside(const Tensor& t, Dim outer, Dim pixels, Dim inner) {
     }
   }
   return out;
+}
+
+TraceWalk::TraceWalk(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn)
+    : input_(input.node()) {
+  for (std::size_t i = 0; i < ops.size(); ++i) {
+    const TracedOp& op = ops[i];
+    if (op.op == "flatten_channels_first") flattened_[op.y.node()] = owner(op.inputs[0]);
+    if (op.op == "unflatten_channels_first")
+      pixels_of_unflatten_[op.inputs[0].node()] = op.inputs[0].dim(1) / op.y.dim(op.y.rank() - 1);
+    if (op.op.starts_with("conv")) margins_[owner(op.inputs[0])].widen(op.settings.conv);
+    for (const Variable& x : op.inputs) last_use_[owner(x)] = i;
+  }
+  for (const Variable* y : {&drawn.picture, &drawn.predicted_error, &drawn.latents})
+    if (y->defined()) last_use_[owner(*y)] = std::numeric_limits<std::size_t>::max();
+}
+
+TraceWalk::Id TraceWalk::owner(const Variable& x) const {
+  const auto flattened = flattened_.find(x.node());
+  return flattened == flattened_.end() ? x.node() : flattened->second;
+}
+
+Margin TraceWalk::margin_of(const Variable& y) const {
+  const auto found = margins_.find(y.node());
+  return found == margins_.end() ? Margin{} : found->second;
+}
+
+Dim TraceWalk::pixels_of_unflatten(const Variable& y) const {
+  const auto found = pixels_of_unflatten_.find(y.node());
+  return found == pixels_of_unflatten_.end() ? 1 : found->second;
+}
+
+bool TraceWalk::read_after(Id value, std::size_t op) const {
+  const auto last = last_use_.find(value);
+  return last != last_use_.end() && last->second > op;
+}
+
+bool TraceWalk::takes_input(const TracedOp& op) const {
+  const bool takes = op.op == "take_runs" || op.op == "last_frame";
+  if (takes != (op.inputs[0].node() == input_))
+    throw std::logic_error("Prepared: " + std::string(op.op) + " has a step for " +
+                           (takes ? "the network's input only" : "anything but the network's input"));
+  return takes;
 }
 
 }  // namespace supertac

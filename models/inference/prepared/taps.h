@@ -1,8 +1,12 @@
-// Where the taps of convolutions lie, for plans in numbers and in whole numbers.
+// What plans in numbers and in whole numbers have in common: who reads what an inference was seen to make,
+// and where the taps of convolutions lie.
 #pragma once
 
-#include "autograd/kernels/conv.h"
-#include "autograd/variable.h"
+#include <map>
+#include <vector>
+
+#include "autograd/trace.h"
+#include "models/networks/network.h"
 
 namespace supertac {
 
@@ -31,5 +35,30 @@ Tensor phase_weights(const kernels::ConvSettings& s, const Phase& down, const Ph
 /// [outer][channels][pixels][inner], take the numbers in the order in which they lie,
 /// [outer][pixels][channels][inner].
 Tensor with_pixels_outside(const Tensor& t, Dim outer, Dim pixels, Dim inner);
+
+/// The ops that an inference was seen to run: who reads which value until when, how wide its margin must be,
+/// and whose numbers it shares.
+class TraceWalk {
+ protected:
+  using Id = const detail::Node*;
+
+  TraceWalk(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn);
+
+  /// The value itself, or the map that it is the flattened form of.
+  Id owner(const Variable& x) const;
+  Margin margin_of(const Variable& y) const;
+  /// Of the map that this value is unflattened into; 1 where it is not.
+  Dim pixels_of_unflatten(const Variable& y) const;
+  bool read_after(Id value, std::size_t op) const;
+  /// take_runs and last_frame: what reads the network's input, and nothing else may. Throws std::logic_error.
+  bool takes_input(const TracedOp& op) const;
+
+ private:
+  Id input_;
+  std::map<Id, Id> flattened_;
+  std::map<Id, Dim> pixels_of_unflatten_;
+  std::map<Id, std::size_t> last_use_;
+  std::map<Id, Margin> margins_;
+};
 
 }  // namespace supertac

@@ -80,6 +80,7 @@ Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const Lo
     loss.predicted_error = l2_loss(output.predicted_error, error_of(output.image, truth));
     loss.total = loss.total + static_cast<real>(kPredictedErrorWeight) * loss.predicted_error;
   }
+  if (output.decoded.size() == 0) return loss;
   const auto share = static_cast<real>(w.a), rest = static_cast<real>(1 - w.a);
   const Variable vaes = share * loss.reconstruction + share * static_cast<real>(w.beta) * loss.kld;
   loss.total = vaes + rest * loss.total;

@@ -9,7 +9,8 @@
 namespace supertac {
 
 /// total = a * sum over the VAEs of (reconstruction + beta KLD) + (1 - a) * (L2 + lambda (1 - SSIM)),
-/// the paper's convex combination; reconstruction and L2 are mean squared errors.
+/// the paper's convex combination; reconstruction and L2 are mean squared errors. Without VAEs
+/// L2 + lambda (1 - SSIM).
 struct LossWeights {
   double a = 0.2;       ///< share of the VAEs, 0..1
   double beta = 1e-3;   ///< of the Kullback-Leibler divergence
@@ -29,7 +30,7 @@ struct LossTerms {
   double total = 0, reconstruction = 0, kld = 0, l2 = 0, ssim = 0;
   std::array<double*, 5> all() { return {&total, &reconstruction, &kld, &l2, &ssim}; }
   void add(const LossTerms& other);
-  /// "the loss is 0.1 (reconstruction 0.2, KLD 3, L2 0.1, SSIM 0.5)"; of pairs without the VAEs' terms.
+  /// "the loss is 0.1 (reconstruction 0.2, KLD 3, L2 0.1, SSIM 0.5)"; without VAEs without their terms.
   std::string text() const;
 };
 /// `share` times each term.

@@ -139,8 +139,7 @@ TEST_F(RoundTrips, OfEveryKindOfFileGiveTheSameBytes) {
                          path("plate.gcode"), "--json", path("plate.json")});
   run("supertac-evaluate",
       {"--model", model, "--data", path("data"), "--limit", "30", "--outputs", path("outputs.safetensors"),
-       "--pictures", path("pictures"), "--report", path("report.html"), "--write-pairs", path("pairs"),
-       "--json", path("evaluate.json")});
+       "--pictures", path("pictures"), "--report", path("report.html"), "--json", path("evaluate.json")});
   run("supertac-explain",
       {model, "--recording", recording, "--at", "6", "--out", path("explained.safetensors")});
   run("supertac-explain", {"a=2; b=-3; a*b", "--out", path("graph.dot")});
@@ -154,8 +153,6 @@ TEST_F(RoundTrips, OfEveryKindOfFileGiveTheSameBytes) {
   run("supertac-classify",
       {"--model", path("m4.safetensors"), "--data", path("data"), "--views", "super_resolved", "--seeds", "1",
        "--epochs", "1", "--stride", "64", "--out", path("classes.safetensors")});
-  run("supertac-train", {"--pairs", path("pairs/train.safetensors"), "--out", path("frame.safetensors"),
-                         "--epochs", "1", "--batch", "8"});
   run("supertac-sweep", options("sweep", {"--epochs", "1", "--seeds", "0"}));
   import_texts();
   collect_and_probe();
@@ -182,8 +179,7 @@ TEST_F(RoundTrips, OfEveryKindOfFileGiveTheSameBytes) {
   }
   for (const auto& [kind, rewrite] : again) EXPECT_GT(seen[kind], 0) << kind;
   for (const std::string& kind : not_read) EXPECT_GT(seen[kind], 0) << kind;
-  for (const char* kind :
-       {"recording", "texture-classifier", "frame-checkpoint", "pictures", ""})  // "": a model, pairs
+  for (const char* kind : {"recording", "texture-classifier", "pictures", ""})  // "": a model
     EXPECT_GT(kinds_[kind], 0) << kind;
 
   // What a finished run is resumed from, its log and its model.

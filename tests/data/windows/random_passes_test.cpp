@@ -96,9 +96,9 @@ TEST(SilentPasses, ShowNothingAndAreNotUsual) {
   for (std::size_t i = own; i < windows.size(); ++i) {
     EXPECT_FALSE(windows.in_distribution(i) || windows.augmentable(i));
     EXPECT_EQ(windows.zone(i), Zone::flat);
-    windows.target(i, target);
+    windows.truth(i, target);
     EXPECT_TRUE(std::ranges::all_of(target, [](float z) { return z == 0; }));
-    windows.input(i, input);
+    windows.window(i, input);
     float most = 0;
     for (std::size_t k = 16; k < input.size(); ++k) most = std::max(most, std::abs(input[k] - input[k % 16]));
     (most < 0.01F ? standing : moving) += 1;
@@ -111,7 +111,7 @@ TEST(SilentPasses, ShowNothingAndAreNotUsual) {
 float typical_level(const WindowSet& windows, std::size_t begin, std::size_t end) {
   std::vector<float> levels, input(windows.input_size());
   for (std::size_t pass = begin; pass < end; ++pass) {
-    windows.input(windows.passes()[pass].first_window, input);
+    windows.window(windows.passes()[pass].first_window, input);
     levels.push_back(*std::max_element(input.begin(), input.begin() + kTaxels));
   }
   std::ranges::sort(levels);
@@ -146,7 +146,7 @@ TEST(SilentPasses, AreTheSameForTheSameSeedAndFitAnyArrayAndRange) {
   std::vector<float> input(a.input_size());
   float highest = 0;
   for (std::size_t i = others.size(); i < a.size(); ++i) {
-    a.input(i, input);
+    a.window(i, input);
     highest = std::max(highest, std::ranges::max(input));
   }
   EXPECT_GT(highest, 0.9F);

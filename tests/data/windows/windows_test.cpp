@@ -223,7 +223,7 @@ TEST(Windows, APassShorterThanTheWindowGivesNone) {
 }
 
 TEST(Windows, RefuseSettingsOutOfRange) {
-  EXPECT_EQ(message_of([] { WindowSet({.scale = 3}); }), "windows: scale must be 2, 4 or 8, got 3");
+  EXPECT_EQ(message_of([] { WindowSet({.scale = 3}); }), "windows: scale must be 2, 4, 8 or 16, got 3");
   EXPECT_THROW(WindowSet({.timesteps = 0}), std::invalid_argument);
   EXPECT_THROW(WindowSet({.stride = 0}), std::invalid_argument);
   EXPECT_THROW(WindowSet({.rate_hz = 0}), std::invalid_argument);

@@ -14,7 +14,7 @@ TEST(NoAllocation, WarmTrainingStep) {
   settings.epochs = 4;
   settings.augment = kStandardAugmentation;
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
+  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
   for (int i = 0; i < 3; ++i) trainer.train_step();
   const long before = allocations::made;
   for (int i = 0; i < 5; ++i) trainer.train_step();

@@ -82,7 +82,7 @@ TEST(Novelty, ComesWithATrainedModel) {
   const WindowSet windows = small_windows(settings.model);
   std::vector<std::uint32_t> all(windows.size());
   for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-  Trainer trainer(windows, all, window_objective(windows, settings));
+  Trainer trainer(windows, all, Objective(windows, settings));
   while (!trainer.done()) trainer.train_step();
   save_trained(trainer, folder / "m.safetensors", {});
   const ModelFile file = load_model(folder / "m.safetensors");

@@ -4,7 +4,6 @@
 #include "autograd/gradient_checker.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/losses.h"
-#include "models/networks/frame_model.h"
 #include "models/training/loss/loss.h"
 
 namespace supertac {
@@ -39,7 +38,7 @@ void expect_right_gradients(const SuperTacSettings& settings) {
       check_gradients(loss, values_of(model.parameters()),
                       {.max_entries_per_input = 4, .names = names_of(model.parameters())});
   EXPECT_LE(report.max_relative_error, 1e-6) << report.text();
-  EXPECT_GT(report.entries, 300);
+  EXPECT_GT(report.entries, 100);
 }
 
 TEST(SuperTacGradient, PictureOfEightPixels) {
@@ -87,19 +86,9 @@ TEST(SuperTacGradient, ThreeByFiveTaxelsOfTwoChannels) {
   }
 }
 
-TEST(FrameModelGradient, ThroughEveryLayer) {
-  Rng rng(6);
-  const FrameModel model({.in_channels = 2, .height = 2, .width = 5, .scale = 4, .channels = 8, .rcabs = 1},
-                         rng);
-  const Tensor frames = uniform({2, 2, 5, 2}, 1), truth = uniform({2, 8, 20, 1}, 2);
-  const auto loss = [&] {
-    const Variable picture = model.forward(Variable(frames));
-    return l2_loss(picture, Variable(truth)) - 0.3 * ssim(picture, truth);
-  };
-  const GradientReport report =
-      check_gradients(loss, values_of(model.parameters()),
-                      {.max_entries_per_input = 4, .names = names_of(model.parameters())});
-  EXPECT_LE(report.max_relative_error, 1e-6) << report.text();
+TEST(SuperTacGradient, SingleFrames) {
+  expect_right_gradients(
+      {.rows = 2, .columns = 5, .in_channels = 2, .timesteps = 1, .channels = 8, .rcabs = 1});
 }
 
 }  // namespace

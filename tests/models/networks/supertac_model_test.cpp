@@ -38,6 +38,30 @@ TEST(SuperTac, PicturesOfAllSizes) {
   }
 }
 
+// No VAEs: the last frame's way alone, for arrays and pictures that windows do not have.
+TEST(SuperTac, SingleFramesOfAnyArrayAtEveryScale) {
+  for (const Dim scale : {2, 4, 8, 16}) {
+    Rng rng(1);
+    const SuperTac model({.rows = 2,
+                          .columns = 5,
+                          .in_channels = 3,
+                          .timesteps = 1,
+                          .scale = scale,
+                          .channels = 8,
+                          .rcabs = 1},
+                         rng);
+    EXPECT_EQ(model.infer(uniform({2, 1, 30}, 1)).shape(), (Shape{2, 2 * scale, 5 * scale, 1}));
+    EXPECT_THROW(model.infer(uniform({2, 2, 30}, 1)), std::invalid_argument);
+    EXPECT_THROW((void)model.encode(uniform({2, 1, 30}, 1)), std::invalid_argument);
+    EXPECT_EQ(model.format().frames, 1);
+    EXPECT_EQ(model.settings().latents(), 0);
+    for (const Parameter& p : model.parameters()) EXPECT_TRUE(p.name.starts_with("upsampler.")) << p.name;
+  }
+  Rng rng(1);
+  EXPECT_THROW(SuperTac({.rows = 65, .timesteps = 1}, rng), std::invalid_argument);
+  EXPECT_THROW(SuperTac({.rows = 1, .timesteps = 1, .scale = 2}, rng), std::invalid_argument) << "2 pixels";
+}
+
 TEST(SuperTac, DecodesTheWindowsOfItsGroups) {
   Rng rng(1);
   const SuperTac model(small_settings(), rng);
@@ -147,21 +171,22 @@ TEST(SuperTac, RefusesSettingsAndWindowsThatDoNotFit) {
   };
   SuperTacSettings s = small_settings();
   s.timesteps = 40;
-  EXPECT_EQ(message(s),
-            "model settings: timesteps must be a multiple of 16 (the encoder halves four times), got 40");
+  EXPECT_EQ(
+      message(s),
+      "model settings: timesteps must be a multiple of 16 (the encoder halves four times) or 1, got 40");
   s.timesteps = 1024;
   EXPECT_EQ(message(s), "model settings: timesteps must be 32 to 512, got 1024");
   s = small_settings();
   s.scale = 3;
-  EXPECT_EQ(message(s), "model settings: scale must be 2, 4 or 8, got 3");
+  EXPECT_EQ(message(s), "model settings: scale must be 2, 4, 8 or 16, got 3");
   s = small_settings();
   s.columns = 17;
   EXPECT_EQ(message(s), "model settings: columns must be 2 to 16, got 17");
-  s.columns = 4, s.rows = 3;
+  s = {.rows = 1, .columns = 64, .timesteps = 1, .scale = 2};
   EXPECT_EQ(
       message(s),
-      "model settings: scale 2 of an array of 3x4 makes pictures with a side below 7 pixels, too small for "
-      "SSIM; raise scale");
+      "model settings: scale 2 of an array of 1x64 makes pictures of 2x128 pixels, expected 3 to 1024 a "
+      "side");
   Rng rng(1);
   const SuperTac model(small_settings(), rng);
   try {

@@ -18,23 +18,16 @@
 namespace supertac {
 namespace {
 
-/// The same examples, two of them exchanged.
-class Exchanged : public Examples {
+/// The same windows, two of them exchanged.
+class Exchanged : public WindowSet {
  public:
   Exchanged(const WindowSet& of, std::uint32_t one, std::uint32_t other)
-      : of_(of), one_(one), other_(other) {}
-  std::size_t size() const override { return of_.size(); }
-  std::size_t frames() const override { return of_.frames(); }
-  TaxelArray array() const override { return of_.array(); }
-  int scale() const override { return of_.scale(); }
-  void input(std::size_t i, std::span<float> out) const override { of_.input(at(i), out); }
-  void target(std::size_t i, std::span<float> out) const override { of_.target(at(i), out); }
-  std::int64_t group(std::size_t i) const override { return of_.group(i); }
-  std::string fingerprint() const override { return of_.fingerprint(); }
+      : WindowSet(of), one_(one), other_(other) {}
+  void window(std::size_t i, std::span<float> out) const override { WindowSet::window(at(i), out); }
+  void truth(std::size_t i, std::span<float> out) const override { WindowSet::truth(at(i), out); }
 
  private:
   std::size_t at(std::size_t i) const { return i == one_ ? other_ : i; }
-  const WindowSet& of_;
   std::size_t one_, other_;
 };
 
@@ -82,11 +75,11 @@ class OpenedSteps : public testing::Test {
     trainer.save(state(), {});
   }
   std::string state() const { return folder_.file("state.safetensors"); }
-  Trainer trainer_on(const Examples& examples) const {
-    return {examples, all_of(windows_), window_objective(windows_, recipe_)};
+  Trainer trainer_on(const WindowSet& windows) const {
+    return {windows, all_of(windows_), Objective(windows_, recipe_)};
   }
-  OpenedStep opened(const Examples& examples, const OpeningOptions& options = {}) const {
-    Trainer trainer = trainer_on(examples);
+  OpenedStep opened(const WindowSet& windows, const OpeningOptions& options = {}) const {
+    Trainer trainer = trainer_on(windows);
     trainer.restore(state(), {});
     return open_step(trainer, options);
   }
@@ -257,7 +250,7 @@ TEST_F(OpenedSteps, WhatIsPlantedIsFoundWithOperatorAndEntry) {
 TEST_F(OpenedSteps, OtherNetworksAreRefused) {
   Recipe other = recipe_;
   other.model.channels = 4;
-  Trainer trainer(windows_, all_of(windows_), window_objective(windows_, other));
+  Trainer trainer(windows_, all_of(windows_), Objective(windows_, other));
   OpenedStep fewer = opened(windows_), step = open_step(trainer);
   const auto difference = first_difference(fewer.operators, step.operators);
   ASSERT_TRUE(difference);

@@ -78,7 +78,7 @@ class RanksTrain : public testing::Test {
     settings_.batch = 12;  // micro-batches of one and of two samples
   }
   Trainer trainer(Ranks& ranks) const {
-    return {windows_, all_of(windows_), window_objective(windows_, settings_), ranks};
+    return {windows_, all_of(windows_), Objective(windows_, settings_), ranks};
   }
   /// From the state in `from` ("" = start) by `ranks` for `steps` steps; the state's file.
   std::string train(int size, const std::string& from, std::int64_t steps) {

@@ -12,22 +12,15 @@ namespace supertac {
 namespace {
 
 // Windows that note which of them is announced, and which is read.
-struct Watched : Examples {
-  explicit Watched(const WindowSet& set) : windows(set) {}
-  std::size_t size() const override { return windows.size(); }
-  std::size_t frames() const override { return windows.frames(); }
-  TaxelArray array() const override { return windows.array(); }
-  int scale() const override { return windows.scale(); }
-  void input(std::size_t i, std::span<float> out) const override {
+struct Watched : WindowSet {
+  explicit Watched(const WindowSet& windows) : WindowSet(windows) {}
+  using WindowSet::window;
+  void window(std::size_t i, std::span<float> out) const override {
 #pragma omp critical
     read.insert(i);
-    windows.input(i, out);
+    WindowSet::window(i, out);
   }
-  void target(std::size_t i, std::span<float> out) const override { windows.target(i, out); }
   void will_read(std::size_t i) const override { announced.insert(i); }
-  std::int64_t group(std::size_t i) const override { return windows.group(i); }
-  std::string fingerprint() const override { return windows.fingerprint(); }
-  const WindowSet& windows;
   mutable std::multiset<std::size_t> announced, read;
 };
 
@@ -36,7 +29,7 @@ TEST(ReadingAhead, AnnouncesTheWindowsOfTheNextStep) {
   const Recipe settings = small_training();
   const WindowSet windows = small_windows(settings.model);
   const Watched watched(windows);
-  Trainer trainer(watched, all_of(windows), window_objective(windows, settings));
+  Trainer trainer(watched, all_of(windows), Objective(windows, settings));
   std::multiset<std::size_t> before;
   for (; !trainer.done(); before = std::exchange(watched.announced, {})) {
     watched.read.clear();

@@ -21,7 +21,7 @@ TEST(Trainer, Learns) {
   Recipe settings = small_training();
   settings.epochs = 30;
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
+  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
   const double first = trainer.train_step().l2;
   double last = 0;
   while (!trainer.done()) last = trainer.train_step().l2;
@@ -36,7 +36,7 @@ TEST(Trainer, WithoutSamplingLatentsAreTheMeans) {
   settings.batch = static_cast<std::int64_t>(windows.size());
   const auto errors = [&](bool sampling) {
     settings.sampling = sampling;
-    Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
+    Trainer trainer(windows, all_of(windows), Objective(windows, settings));
     const ZoneMetrics scores = score(Ensemble({Prepared(trainer.model())}), windows, all_of(windows));
     const double inferred = std::pow(10, -scores.all().psnr_pooled_db / 10);
     return std::abs(trainer.train_step().l2 - inferred) / inferred;
@@ -53,7 +53,7 @@ TEST(Trainer, LearnsFromAugmentedWindows) {
   settings.augment = {.gain = 0.5, .noise = 0.05};
   settings.sampling = false;
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
+  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
   const Batching batching(all_of(windows), 8, settings.seed);
   std::vector<std::uint32_t> indices(8);
   batching.batch(0, 0, indices);
@@ -68,44 +68,39 @@ TEST(Trainer, LearnsFromAugmentedWindows) {
   EXPECT_NEAR(trainer.train_step().total, expected, 1e-5 * expected);
   settings.augment = {};
   EXPECT_GT(
-      std::abs(Trainer(windows, all_of(windows), window_objective(windows, settings)).train_step().total -
-               expected),
+      std::abs(Trainer(windows, all_of(windows), Objective(windows, settings)).train_step().total - expected),
       1e-3 * expected);
 }
 
-/// Blurred blobs on an array of 3 x 5 taxels with two channels, drawn `scale` times as fine.
-std::string write_pairs(const TemporaryFolder& folder, std::uint64_t scale = 4, std::uint64_t count = 40) {
-  const std::uint64_t height = 3 * scale, width = 5 * scale;
-  std::vector<float> input(count * 2 * 15), target(count * height * width);
-  std::vector<std::int64_t> group;
+/// Blurred blobs on an array of 3 x 5 taxels with two channels, drawn four times as fine: five recordings
+/// with measured truths.
+WindowSet blobs() {
+  WindowSet frames({.timesteps = 1, .scale = 4, .scaling = {.rest_volts = 1000, .span_volts = 200}});
   const RandomStream random(4, 0);
-  for (std::uint64_t n = 0; n < count; ++n) {
-    const double y = 3 * random.uniform(2 * n), x = 5 * random.uniform(2 * n + 1);
-    const auto blob = [&](double row, double column, double width_of) {
-      return static_cast<float>(std::exp(-((row - y) * (row - y) + (column - x) * (column - x)) / width_of));
-    };
-    for (std::uint64_t k = 0; k < 15; ++k) {
-      const float v = blob(static_cast<double>(k / 5) + 0.5, static_cast<double>(k % 5) + 0.5, 2);
-      input[n * 30 + k] = 1000 - 200 * v;  // falls when pressed, far from 0
-      input[n * 30 + 15 + k] = 0.01F * v;
-    }
-    for (std::uint64_t p = 0; p < height * width; ++p) {
-      const auto at = [&](std::uint64_t i) {
-        return (static_cast<double>(i) + 0.5) / static_cast<double>(scale);
+  for (std::uint64_t group = 0; group < 5; ++group) {
+    Recording r;
+    r.truth_height = 12, r.truth_width = 20, r.array = {3, 5, 1, 2}, r.plate = std::to_string(group);
+    for (std::uint64_t i = 0; i < 8; ++i) {
+      const std::uint64_t n = 8 * group + i;
+      const double y = 3 * random.uniform(2 * n), x = 5 * random.uniform(2 * n + 1);
+      const auto blob = [&](double row, double column, double width) {
+        return static_cast<float>(std::exp(-((row - y) * (row - y) + (column - x) * (column - x)) / width));
       };
-      target[n * height * width + p] = blob(at(p / width), at(p % width), 0.5);
+      r.time_s.push_back(static_cast<double>(i));
+      for (int k = 0; k < 15; ++k) {
+        const float v = blob(k / 5 + 0.5, k % 5 + 0.5, 2);
+        r.volts.insert(r.volts.end(), {1000 - 200 * v, 900 - 100 * v});
+      }
+      for (int p = 0; p < 240; ++p) r.truth.push_back(blob((p / 20 + 0.5) / 4, (p % 20 + 0.5) / 4, 0.5));
     }
-    group.push_back(static_cast<std::int64_t>(n / 8));
+    frames.add(r);
   }
-  write_safetensors(folder / "pairs.safetensors", {},
-                    {{"input", "F32", {count, 2, 3, 5}, std::as_bytes(std::span(input))},
-                     {"target", "F32", {count, 1, height, width}, std::as_bytes(std::span(target))},
-                     {"group", "I64", {count}, std::as_bytes(std::span(group))}});
-  return folder / "pairs.safetensors";
+  return frames;
 }
 
-FrameRecipe small_frames() {
-  FrameRecipe s;
+Recipe small_frames() {
+  Recipe s = Recipe::named("frame");
+  s.model.rows = 3, s.model.columns = 5, s.model.in_channels = 2;
   s.model.channels = 8;
   s.model.rcabs = 1;
   s.epochs = 3;
@@ -120,31 +115,20 @@ std::vector<std::uint32_t> first(std::uint32_t count) {
   return indices;
 }
 
-PairSet scaled_pairs(const TemporaryFolder& folder) {
-  PairSet pairs = PairSet::read(write_pairs(folder));
-  pairs.fit_scaling(first(32));
-  return pairs;
-}
-
-TEST(Trainer, LearnsFromPairs) {
-  const TemporaryFolder folder;
-  const PairSet pairs = scaled_pairs(folder);
-  FrameRecipe settings = small_frames();
+TEST(Trainer, LearnsFromSingleFrames) {
+  const WindowSet frames = blobs();
+  Recipe settings = small_frames();
   settings.epochs = 60;
   settings.learning_rate = 5e-3;
-  Trainer trainer(pairs, first(32), frame_objective(pairs, settings));
+  Trainer trainer(frames, first(32), Objective(frames, settings));
   const double before = trainer.train_step().l2;
   double after = 0;
   while (!trainer.done()) after = trainer.train_step().l2;
   EXPECT_LT(after, before / 10);
-  PairMetrics metrics(12, 20);
   const std::vector<std::uint32_t> unseen = {32, 33, 34, 35, 36, 37, 38, 39};
-  for_each_output(Ensemble({Prepared(trainer.model())}), pairs, unseen, [&](const EvaluatedBatch& b) {
-    for (std::size_t n = 0; n < b.size(); ++n) metrics.add(b.output(n), b.target(n));
-    return true;
-  });
-  EXPECT_EQ(metrics.result().windows, 8u);
-  EXPECT_GT(metrics.result().psnr_mean_db, 18);
+  const Metrics scores = score(Ensemble({Prepared(trainer.model())}), frames, unseen).contact();
+  EXPECT_EQ(scores.windows, 8u);
+  EXPECT_GT(scores.psnr_mean_db, 18);
 }
 
 using MakeTrainer = std::function<std::unique_ptr<Trainer>()>;
@@ -167,7 +151,7 @@ std::string checkpoint_of(const MakeTrainer& make, int threads, std::int64_t int
   return file_text(folder / "end.safetensors");
 }
 
-// Windows and pairs, whoever trains them.
+// Windows and single frames.
 class TrainerBytes : public testing::Test {
  protected:
   TrainerBytes() {
@@ -176,17 +160,13 @@ class TrainerBytes : public testing::Test {
   }
   const std::vector<MakeTrainer> makers_ = {
       [this] {
-        return std::make_unique<Trainer>(windows_, all_of(windows_), window_objective(windows_, settings_));
+        return std::make_unique<Trainer>(windows_, all_of(windows_), Objective(windows_, settings_));
       },
-      [this] {
-        return std::make_unique<Trainer>(pairs_, first(32), frame_objective(pairs_, small_frames()));
-      }};
+      [this] { return std::make_unique<Trainer>(frames_, first(32), Objective(frames_, small_frames())); }};
 
  private:
-  const TemporaryFolder folder_;
   Recipe settings_ = small_training();
-  const WindowSet windows_ = small_windows(settings_.model);
-  const PairSet pairs_ = scaled_pairs(folder_);
+  const WindowSet windows_ = small_windows(settings_.model), frames_ = blobs();
 };
 
 TEST_F(TrainerBytes, AreTheSameForAnyNumberOfThreads) {
@@ -217,7 +197,7 @@ TEST(Trainer, PinnedBits) {
       Recipe settings = small_training();
       settings.augment = kStandardAugmentation;
       const WindowSet windows = small_windows(settings.model);
-      Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
+      Trainer trainer(windows, all_of(windows), Objective(windows, settings));
       while (!trainer.done()) trainer.train_step();
       std::uint32_t bits = 0;
       for (const Parameter& p : trainer.model().parameters())
@@ -233,12 +213,12 @@ TEST(Trainer, RefusesToResumeAnotherRun) {
   const TemporaryFolder folder;
   Recipe settings = small_training();
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
+  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
   trainer.train_step();
   trainer.save(folder / "state.safetensors", {{"data", "1234"}});
   const auto message = [&](const Recipe& other, const std::string& data) -> std::string {
     try {
-      Trainer(windows, all_of(windows), window_objective(windows, other))
+      Trainer(windows, all_of(windows), Objective(windows, other))
           .restore(folder / "state.safetensors", {{"data", data}});
     } catch (const std::runtime_error& error) {
       return error.what();
@@ -257,9 +237,9 @@ TEST(Trainer, MuonGoesOnToTheSameBitsOnAnyNumberOfThreads) {
   Recipe settings = small_training();
   settings.muon = true;
   const WindowSet windows = small_windows(settings.model);
-  Trainer straight(windows, all_of(windows), window_objective(windows, settings)),
-      first(windows, all_of(windows), window_objective(windows, settings)),
-      resumed(windows, all_of(windows), window_objective(windows, settings));
+  Trainer straight(windows, all_of(windows), Objective(windows, settings)),
+      first(windows, all_of(windows), Objective(windows, settings)),
+      resumed(windows, all_of(windows), Objective(windows, settings));
   omp_set_num_threads(4);
   for (int step = 0; step < 5; ++step) first.train_step();
   first.save(folder / "state.safetensors", {});
@@ -279,7 +259,7 @@ TEST(Trainer, KeepsWithTheModelWhatBytesAndTheAlarmNeed) {
   const TemporaryFolder folder;
   const Recipe settings = small_training();
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
+  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
   trainer.train_step();
   save_trained(trainer, folder / "m.safetensors", model_metadata(settings.model, input_of(windows)));
   const ModelFile file = load_model(folder / "m.safetensors");
@@ -291,9 +271,8 @@ TEST(Trainer, RefusesToResumeFromAModelWithoutState) {
   const TemporaryFolder folder;
   const Recipe settings = small_training();
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
-  save_model(folder / "m.safetensors", dynamic_cast<const SuperTac&>(trainer.model()), {},
-             {{"training", training_text(settings)}});
+  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
+  save_model(folder / "m.safetensors", trainer.model(), {}, {{"training", training_text(settings)}});
   try {
     trainer.restore(folder / "m.safetensors", {});
     FAIL();
@@ -306,7 +285,7 @@ TEST(Trainer, RefusesToResumeFromAModelWithoutState) {
 std::string stopped(const std::string& name, const std::function<void(Tensor&)>& damage) {
   const Recipe settings = small_training();
   const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), window_objective(windows, settings));
+  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
   trainer.train_step();
   for (const Parameter& p : trainer.model().parameters()) {
     if (p.name == name) damage(Variable(p.value).mutable_value());
@@ -344,7 +323,7 @@ TEST(Trainer, ReportsPicturesThatAreTheSameForAllAndIdleLatents) {
   const WindowSet windows = small_windows(settings.model);
   StepReport last;
   const auto steps_until_reported = [&](const Recipe& s, const std::string& dead) {
-    Trainer trainer(windows, all_of(windows), window_objective(windows, s));
+    Trainer trainer(windows, all_of(windows), Objective(windows, s));
     for (const Parameter& p : trainer.model().parameters()) {
       if (p.name.find(dead) != std::string::npos) Variable(p.value).mutable_value().fill(0);
     }
@@ -368,14 +347,14 @@ TEST(Trainer, RefusesWindowsOfAnotherFormat) {
   const WindowSet windows = small_windows(settings.model);
   settings.model.timesteps = 48;
   try {
-    Trainer(windows, all_of(windows), window_objective(windows, settings));
+    Trainer(windows, all_of(windows), Objective(windows, settings));
     FAIL() << "windows of 32 frames were taken for 48";
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(error.what(),
                  "the data have 32 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8, the model "
                  "expects 48 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8");
   }
-  EXPECT_THROW(Trainer(windows, {}, window_objective(windows, small_training())), std::invalid_argument);
+  EXPECT_THROW(Trainer(windows, {}, Objective(windows, small_training())), std::invalid_argument);
 }
 
 TEST(Trainer, NamesTheSettingThatIsOutOfRange) {
@@ -384,7 +363,7 @@ TEST(Trainer, NamesTheSettingThatIsOutOfRange) {
     Recipe settings = small_training();
     spoil(settings);
     try {
-      Trainer(windows, all_of(windows), window_objective(windows, settings));
+      Trainer(windows, all_of(windows), Objective(windows, settings));
     } catch (const std::invalid_argument& error) {
       return error.what();
     }

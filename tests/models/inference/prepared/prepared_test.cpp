@@ -12,7 +12,6 @@
 #include "io/numbers/random.h"
 #include "layers/convolution.h"
 #include "models/inference/prepared/planner.h"
-#include "models/networks/frame_model.h"
 #include "tests/allocations.h"
 #include "tests/models/support.h"
 
@@ -74,42 +73,38 @@ TEST(Prepared, DrawsWhatTheNetworkDrawsForAnySettings) {
   }
 }
 
-TEST(Prepared, DrawsWhatTheNetworkDrawsForPresetsAndFrames) {
-  for (const char* preset : {"paper", "tiny"}) {
+TEST(Prepared, DrawsWhatTheNetworkDrawsForPresets) {
+  for (const char* preset : {"paper", "tiny", "frame"}) {
     Rng rng(1);
     expect_same_estimate(SuperTac(SuperTacSettings::of_preset(preset), rng), 9, preset);
   }
-  Rng rng(2);
-  expect_same_estimate(
-      FrameModel({.in_channels = 3, .height = 5, .width = 4, .channels = 16, .rcabs = 1}, rng), 3, "frames");
 }
 
-// No network of ours joins maps, or takes runs of anything but its input.
-class Joined : public Network {
+// No network of ours joins maps, convolves its input as it is, or takes runs of anything but that.
+class Odd : public Network {
  public:
-  explicit Joined(bool takes_runs)
-      : takes_runs_(takes_runs),
-        a_(2, 5, kSameSize, rng_),
-        b_(2, 4, kSameSize, rng_),
-        out_(9, 1, kSameSize, rng_) {}
+  enum Kind { joins_maps, convolves_input, takes_runs };
+  explicit Odd(Kind kind) : kind_(kind), a_(2, 5, kSameSize, rng_) {}
   NetworkFormat format() const override { return {.columns = 6, .channels = 2, .scale = 1}; }
-  Shape input_shape(Dim count) const override { return {count, 4, 6, 2}; }
+  Shape input_shape(Dim count) const override {
+    return kind_ == convolves_input ? Shape{count, 4, 6, 2} : Shape{count, 1, 48};
+  }
   Drawing draw(const Variable& x) const override {
-    const Variable maps[] = {a_.forward(x), b_.forward(x, kRelu)};
-    const Variable joined = concat(maps);
-    return {out_.forward(takes_runs_ ? take_runs(joined, {0, 9, 9, 9}) : joined), {}, {}};
+    if (kind_ == convolves_input) return {a_.forward(x), {}, {}};
+    const Variable frame = last_frame(x, 4, 6, 2), maps[] = {a_.forward(frame), a_.forward(frame, kRelu)};
+    if (kind_ == joins_maps) return {concat(maps), {}, {}};
+    return {take_runs(maps[0], {0, 5, 5, 5}), {}, {}};
   }
 
  private:
   Rng rng_{3};
-  bool takes_runs_;
-  Conv2d a_, b_, out_;
+  Kind kind_;
+  Conv2d a_;
 };
 
-TEST(Prepared, JoinsMaps) { expect_same_estimate(Joined(false), 3, "joined maps"); }
-
-TEST(Prepared, TakesRunsOfTheInputAlone) {
-  EXPECT_THROW({ const Prepared p(Joined(true)); }, std::logic_error);
+TEST(Prepared, RefusesWhatNoNetworkOfOursDoes) {
+  for (const Odd::Kind kind : {Odd::joins_maps, Odd::convolves_input, Odd::takes_runs})
+    EXPECT_THROW({ const Prepared p{Odd(kind)}; }, std::logic_error) << kind;
 }
 
 // All pictures of 64 windows, `batch` at a time.

@@ -1,0 +1,123 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "data/recordings/table_import.h"
+#include "data/windows/split.h"
+#include "io/files/file.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+namespace {
+
+/// A file of pairs that a test can spoil before it is written.
+struct PairFile {
+  std::vector<std::uint64_t> input_shape = {10, 2, 3, 5}, target_shape = {10, 1, 12, 20};
+  std::vector<float> input = std::vector<float>(10 * 2 * 3 * 5), target = std::vector<float>(10 * 12 * 20);
+  std::vector<std::int64_t> group = {7, 7, 3, 3, 7, 9, 9, 12, 12, 40};
+  bool with_group = true;
+  std::string dtype = "F32";
+
+  PairFile() {
+    for (std::size_t i = 0; i < input.size(); ++i) input[i] = static_cast<float>(i);
+    for (std::size_t i = 0; i < target.size(); ++i) target[i] = static_cast<float>(i % 101) / 100;
+  }
+  std::string write(const TemporaryFolder& folder) const {
+    std::vector<TensorToWrite> tensors = {{"input", dtype, input_shape, std::as_bytes(std::span(input))},
+                                          {"target", "F32", target_shape, std::as_bytes(std::span(target))}};
+    if (with_group) tensors.push_back({"group", "I64", {group.size()}, std::as_bytes(std::span(group))});
+    write_safetensors(folder / "pairs.safetensors", {}, tensors);
+    return folder / "pairs.safetensors";
+  }
+};
+
+TEST(PairImport, ARecordingForEachGroupWithChannelsLastAndItsTruth) {
+  const TemporaryFolder folder;
+  const std::vector<Recording> recordings = import_pairs(PairFile().write(folder));
+  ASSERT_EQ(recordings.size(), 5u);
+  std::vector<std::string> names;
+  for (const Recording& r : recordings) names.push_back(r.plate);
+  EXPECT_EQ(names, (std::vector<std::string>{"03", "07", "09", "12", "40"})) << "sorted as numbers are";
+  const Recording& seven = recordings[1];
+  EXPECT_EQ(seven.metadata.at("group"), "07");
+  EXPECT_EQ(seven.frames(), 3u);
+  EXPECT_EQ(seven.array, (TaxelArray{3, 5, 1, 2}));
+  EXPECT_TRUE(seven.signal_scale.rises());
+  EXPECT_EQ(seven.signal_scale.low(), 0);
+  EXPECT_EQ(seven.signal_scale.high(), 299);
+  // The third frame of group 7 is pair 4, which begins at 120; row 1, column 2 of its channels:
+  EXPECT_EQ(seven.volts[2 * 30 + (1 * 5 + 2) * 2], 120 + 7);
+  EXPECT_EQ(seven.volts[2 * 30 + (1 * 5 + 2) * 2 + 1], 120 + 15 + 7);
+  EXPECT_EQ(seven.truth[2 * 240 + 3], static_cast<float>((4 * 240 + 3) % 101) / 100);
+  write_recording(folder / "r.safetensors", seven);
+  EXPECT_EQ(read_recording(folder / "r.safetensors").truth, seven.truth);
+}
+
+TEST(PairImport, GroupsStayTogetherInASplit) {
+  const TemporaryFolder folder;
+  PairFile file;
+  WindowSet frames({.timesteps = 1});
+  for (const Recording& r : import_pairs(file.write(folder))) frames.add(r);
+  const Split split = make_split(frames, SplitKind::group, 1);
+  EXPECT_EQ(split.train.size() + split.test.size(), 10u);
+  for (const std::uint32_t a : split.test)
+    for (const std::uint32_t b : split.train) EXPECT_NE(frames.pass_of(a), frames.pass_of(b));
+  file.with_group = false;
+  const std::vector<Recording> loose = import_pairs(file.write(folder));
+  ASSERT_EQ(loose.size(), 1u);
+  EXPECT_EQ(loose.front().plate, "pairs");
+  EXPECT_FALSE(loose.front().metadata.contains("group"));
+}
+
+TEST(PairImport, ASensorSaysWhatTheNumbersMean) {
+  const TemporaryFolder folder;
+  Sensor sensor{.array = {3, 5, 2.5, 2}, .scale = {.unit = "mV", .rest = 300, .span = 250}};
+  const Recording first = import_pairs(PairFile().write(folder), sensor).front();
+  EXPECT_EQ(first.signal_scale, sensor.scale);
+  EXPECT_EQ(first.array, sensor.array);
+  sensor.array.rows = 4;
+  EXPECT_THROW((void)import_pairs(folder / "pairs.safetensors", sensor), FileError);
+}
+
+TEST(PairImport, RefusesWhatDoesNotFitTogether) {
+  const auto expect_refused = [](const PairFile& file, const std::string& expected) {
+    const TemporaryFolder folder;
+    try {
+      for (const Recording& r : import_pairs(file.write(folder))) write_recording(folder / "r", r);
+      ADD_FAILURE() << "accepted; expected: " << expected;
+    } catch (const std::exception& error) {
+      EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
+    }
+  };
+  PairFile file;
+  file.target_shape = {10, 1, 20, 12};
+  expect_refused(file, "input [10,2,3,5], target [10,1,20,12]: expected target's height and width to be 2");
+  file = {};
+  file.target_shape = {5, 2, 12, 20};
+  expect_refused(file, "as many targets as inputs");
+  file = {};
+  file.input_shape = {10, 30, 1};
+  expect_refused(file, "tensor 'input' is F32 [10,30,1], expected F32 [N,C,H,W]");
+  file = {};
+  file.dtype = "I32";
+  expect_refused(file, "tensor 'input' is I32");
+  file = {};
+  file.input[65] = std::nanf("");
+  expect_refused(file, "volts are not finite");
+  file = {};
+  file.target[0] = 1.5F;
+  expect_refused(file, "holds 1.5, expected 0 to 1");
+  file = {};
+  file.input_shape = {10, 10, 3, 1};
+  expect_refused(file, "expected 1 to 8 channels");
+  file = {};
+  file.group.resize(3);
+  expect_refused(file, "tensor 'group' is I64 [3], expected I64 [10]");
+  const TemporaryFolder folder;
+  write_safetensors(folder / "a", {},
+                    {{"input", "F32", {10, 2, 3, 5}, std::as_bytes(std::span(file.input))}});
+  EXPECT_THROW((void)import_pairs(folder / "a"), FileError);
+}
+
+}  // namespace
+}  // namespace supertac
