@@ -63,7 +63,8 @@ class Fit {
       if (inside(c, stretch_))
         events_.push_back(
             {.row = c.taxel / rig::kTaxelColumns, .time = c.time_s - middle_s_, .weight = weight_of(c)});
-    // A recording that goes on long after the pass, or begins long before it, has its middle beside the plate.
+    // A recording that goes on long after the pass, or begins long before it, has its middle beside the
+    // plate.
     if (events_.empty()) return;
     const auto [first, last] = std::ranges::minmax(events_, {}, &Event::time);
     if (first.time <= 0 && last.time >= 0) return;
@@ -246,7 +247,9 @@ std::string why_implausible(const Registration& r, const Recording& recording, c
   const std::vector<double> crests = plate.crests();
   double pitch = texture;
   for (std::size_t j = 1; j < crests.size(); ++j) pitch = std::min(pitch, crests[j] - crests[j - 1]);
-  if (recording.filter_s() * speed > pitch)
+  // Beyond half a pitch the first and last elements may vanish, and what is left fits a pitch further as
+  // well.
+  if (recording.filter_s() * speed > 0.5 * pitch)
     return "the board's filter averages over " + format(recording.filter_s() * speed, 1) +
            " mm, the elements lie " + format(pitch, 1) + " mm apart; slide slower";
   return "";

@@ -72,31 +72,13 @@ TEST(Array, SixBySixFromSimulationToScores) {
       << mismatch.error;
 }
 
-// What is drawn means nothing; that it is scored is the point. Of one frame, since a ridge of 2,049 features
-// takes minutes.
+// What is drawn means nothing.
 void write_model(const std::string& path, const TaxelArray& array, Dim timesteps, Dim scale) {
   SuperTacSettings settings{.timesteps = timesteps, .latent = 3, .scale = scale, .channels = 8, .rcabs = 1};
   set_array(settings, array);
   Rng rng(1);
   save_model(path, SuperTac(settings, rng),
              {.scaling = {}, .filter_s = std::nullopt, .pitch_mm = array.pitch_mm}, {{"split", "none"}});
-}
-
-TEST(Array, SixteenBySixteenIsEvaluatedAtEveryScale) {
-  const TemporaryFolder folder;
-  simulate(folder / "data", {"--array", "16x16", "--pitch", "2"});
-  for (const Dim scale : {2, 4, 8}) {
-    const std::string model = folder / ("m" + std::to_string(scale) + ".safetensors");
-    write_model(model, {.rows = 16, .columns = 16, .pitch_mm = 2}, 1, scale);
-    const std::string json = folder / (std::to_string(scale) + ".json");
-    const auto done = run_process("supertac-evaluate", {"--data", folder / "data", "--model", model,
-                                                        "--split", "none", "--limit", "40", "--json", json});
-    ASSERT_EQ(done.code, 0) << scale << done.error;
-    const auto scores = nlohmann::json::parse(read_text_file(json, 1 << 20));
-    EXPECT_EQ(scores.at("all").at("windows"), 40) << scale;
-    EXPECT_TRUE(scores.at("baselines").at("ridge").at("contact").at("ssim").is_number()) << scale;
-    EXPECT_TRUE(scores.at("contact").at("position_error_mm").is_number()) << scale;
-  }
 }
 
 // The ridge of a large array says how long it takes, and hears Ctrl-C.

@@ -66,8 +66,8 @@ TEST(Registration, FindsEveryPlateWithoutBias) {
   EXPECT_LT(std::abs(bias / n), 0.1);
 }
 
-// Simulated passes come back in the air; at 50 mm/s that takes as long as the slide, and the middle of the recording
-// is behind the plate. All were off by a pitch, and reliable.
+// Simulated passes come back in the air; at 50 mm/s that takes as long as the slide, and the middle of the
+// recording is behind the plate. All were off by a pitch, and reliable.
 TEST(Registration, AFastPassWithALongEndIsNotAPitchOff) {
   int reliable = 0;
   for (const char* plate : {"4_Ridges", "4_Waves", "6_Bumps", "6_Ridges", "6_Waves"})
@@ -206,6 +206,10 @@ TEST(Registration, AStatedSpeedThatTheSignalsContradictIsFlagged) {
   judge(good, fast, Plate::named("6_Ridges"));
   EXPECT_EQ(good.reason,
             "the board's filter averages over 9.8 mm, the elements lie 6.0 mm apart; slide slower");
+  judge(good, fast, Plate::named("3_Bumps"));
+  EXPECT_EQ(good.reason,
+            "the board's filter averages over 9.8 mm, the elements lie 12.0 mm apart; slide slower");
+  fast.metadata["filter_s"] = "0.05";
   judge(good, fast, Plate::named("3_Bumps"));
   EXPECT_TRUE(good.reliable) << good.reason;
 }
