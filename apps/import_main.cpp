@@ -66,11 +66,7 @@ int convert_pairs(const Arguments& arguments, const std::string& path) {
   for (const Recording& recording : recordings) {
     stop_if_interrupted();
     frames += recording.frames();
-    try {
-      write_recording(folder.add(recording_file_name(recording)), recording);
-    } catch (const std::invalid_argument& error) {
-      throw FileError(path, error.what());
-    }
+    write_recording(folder.add(recording_file_name(recording)), recording);
   }
   folder.keep();
   arguments.print(std::to_string(recordings.size()) + " recordings of " + std::to_string(frames) +

@@ -1,11 +1,12 @@
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <map>
 #include <stdexcept>
 
 #include "data/recordings/table_import.h"
 #include "io/files/file.h"
-#include "io/numbers/text.h"
+#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {
@@ -43,6 +44,15 @@ TaxelArray array_of(const SafetensorsFile& file, const Shape& input, const Shape
     refuse("expected target's height and width to be 2, 4, 8 or 16 times input's");
   const auto whole = [](std::uint64_t size) { return static_cast<int>(size); };
   return {whole(input[2]), whole(input[3]), 1, whole(input[1])};
+}
+
+void check_values(const SafetensorsFile& file, const char* name, std::span<const float> values,
+                  std::uint64_t count, bool (*right)(float), const char* expected) {
+  const auto odd = std::ranges::find_if_not(values, right);
+  if (odd == values.end()) return;
+  const std::size_t pair = static_cast<std::size_t>(odd - values.begin()) / (values.size() / count);
+  throw FileError(file.path(), std::string(name) + " of pair " + std::to_string(pair) + " holds " +
+                                   format(*odd) + ", expected " + expected);
 }
 
 template <class Whole>
@@ -89,6 +99,11 @@ std::vector<Recording> import_pairs(const std::string& path, const std::optional
   like.source = "imported";
   like.truth_height = static_cast<int>(target[2]), like.truth_width = static_cast<int>(target[3]);
   const std::vector<float> inputs = file.f32("input"), targets = file.f32("target");
+  check_values(
+      file, "input", inputs, input[0], [](float v) { return std::isfinite(v); }, "finite values");
+  check_values(
+      file, "target", targets, target[0], [](float v) { return v >= 0 && v <= 1; },
+      "0 to 1; scale the targets");
   const auto [low, high] = std::ranges::minmax(inputs);
   like.signal_scale = {.unit = "1", .rest = low, .span = low < high ? double{low} - double{high} : -1};
   if (sensor) {

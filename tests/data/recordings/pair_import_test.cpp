@@ -83,9 +83,9 @@ TEST(PairImport, RefusesWhatDoesNotFitTogether) {
   const auto expect_refused = [](const PairFile& file, const std::string& expected) {
     const TemporaryFolder folder;
     try {
-      for (const Recording& r : import_pairs(file.write(folder))) write_recording(folder / "r", r);
+      (void)import_pairs(file.write(folder));
       ADD_FAILURE() << "accepted; expected: " << expected;
-    } catch (const std::exception& error) {
+    } catch (const FileError& error) {
       EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
     }
   };
@@ -103,10 +103,10 @@ TEST(PairImport, RefusesWhatDoesNotFitTogether) {
   expect_refused(file, "tensor 'input' is I32");
   file = {};
   file.input[65] = std::nanf("");
-  expect_refused(file, "volts are not finite");
+  expect_refused(file, "input of pair 2 holds nan, expected finite values");
   file = {};
   file.target[0] = 1.5F;
-  expect_refused(file, "holds 1.5, expected 0 to 1");
+  expect_refused(file, "target of pair 0 holds 1.5, expected 0 to 1");
   file = {};
   file.input_shape = {10, 10, 3, 1};
   expect_refused(file, "expected 1 to 8 channels");
