@@ -37,6 +37,12 @@ std::vector<Plate> read_plates(const Arguments& arguments) {
   return plates;
 }
 
+Pitch pitch_of(const Arguments& arguments) {
+  const std::vector<double> mm = arguments.numbers("pitch", 0.1, 100);
+  if (mm.empty() || mm.size() > 2) throw UsageError("--pitch: expected one number of mm, or two");
+  return {mm.front(), mm.back()};
+}
+
 TaxelArray read_array(const Arguments& arguments) {
   const std::string text = arguments.text("array");
   const std::size_t x = std::min(text.find('x'), text.size());
@@ -47,7 +53,7 @@ TaxelArray read_array(const Arguments& arguments) {
     throw UsageError("--array expects ROWSxCOLUMNS, 2 to 16 each, found " + text);
   return {.rows = static_cast<int>(*rows),
           .columns = static_cast<int>(*columns),
-          .pitch_mm = arguments.number("pitch", 0.1, 100)};
+          .pitch_mm = pitch_of(arguments)};
 }
 
 SimulatorSettings read_settings(const Arguments& arguments, const Sensor& sensor) {
@@ -143,7 +149,7 @@ void declare(Arguments& arguments) {
               "a sensor's file, or rig: its array, rate, unit, polarity and range instead of the rig's",
               "rig")
       .option("array", "ROWSxCOLUMNS", "taxels of the finger, 2 to 16 either way", "4x4")
-      .option("pitch", "MM", "from taxel to taxel", "3")
+      .option("pitch", "MM", "from taxel to taxel: one number, or along a row and from row to row, 3,4", "3")
       .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms(), ", "))
       .option("seed", "N", "the same seed gives the same files", "1");
 }

@@ -152,6 +152,7 @@ int supertac_describe(const supertac_model* model, supertac_description* descrip
     expect(description->size >= sizeof(std::size_t), "supertac_describe: set description.size first");
     const SuperTacSettings& s = model->file.model->settings();
     const InputSettings& input = model->file.input;
+    const Pitch pixel = input.pitch_mm / static_cast<double>(s.scale);
     const supertac_description full{.size = std::min(description->size, sizeof(supertac_description)),
                                     .rows = static_cast<int>(s.rows),
                                     .columns = static_cast<int>(s.columns),
@@ -162,8 +163,8 @@ int supertac_describe(const supertac_model* model, supertac_description* descrip
                                     .width = static_cast<int>(s.image_width()),
                                     .predicts_error = s.predicted_error ? 1 : 0,
                                     .rate_hz = input.rate_hz,
-                                    .pitch_mm = input.pitch_mm,
-                                    .pixel_mm = input.pitch_mm / static_cast<double>(s.scale),
+                                    .pitch_mm = {input.pitch_mm.x, input.pitch_mm.y},
+                                    .pixel_mm = {pixel.x, pixel.y},
                                     .filter_s = input.filter_s.value_or(-1),
                                     .rest = input.scaling.rest_volts,
                                     .span = input.scaling.span_volts};

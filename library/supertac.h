@@ -40,8 +40,8 @@ typedef struct {
   int height, width;  /* of a picture, in pixels */
   int predicts_error; /* 1: the model also says how far off it may be */
   double rate_hz;     /* of a window's frames */
-  double pitch_mm;    /* from taxel to taxel */
-  double pixel_mm;    /* the size of a pixel */
+  double pitch_mm[2]; /* along a row, and from row to row */
+  double pixel_mm[2]; /* the size of a pixel, likewise */
   double
       filter_s; /* moving average that the training signals went through; 0: none; -1: of several lengths */
   double rest, span; /* a sample is clip((rest - value) / span, 0, 1), value in the sensor's unit */

@@ -43,7 +43,7 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   const PictureFormat format = maker_ ? maker_->format() : signals;
   describe_recording();
   settings_.metadata.merge(metadata_of(source.array(), source.signal_scale()));
-  if (maker_) settings_.metadata["pixel_mm"] = supertac::format(maker_->image().pixel_mm);
+  if (maker_) settings_.metadata["pixel_mm"] = json_of(maker_->image().pixel_mm).dump();
   // Two programs may record the same pass: both are kept.
   const OutputPath record(record_path_, [this](const std::string& line) { record_remark_ = line; });
   if (!settings.record.empty()) record_ = std::make_unique<PictureLog>(record, signals);

@@ -21,14 +21,14 @@ void truth_image(const Plate& plate, double x_mm, double y_mm, const ImageGrid& 
   const bool uniform = plate.uniform_in_x();  // then a row has one height
   const auto width = static_cast<std::size_t>(grid.width);
   for (int r = 0; r < grid.height; ++r) {
-    const double y = y_mm - grid.height_mm() / 2 + (r + 0.5) * grid.pixel_mm;
+    const double y = y_mm - grid.height_mm() / 2 + (r + 0.5) * grid.pixel_mm.y;
     const std::span<float> row = image.subspan(static_cast<std::size_t>(r) * width, width);
     if (uniform) {
       std::fill(row.begin(), row.end(), static_cast<float>(truth_value(plate, x_mm, y)));
       continue;
     }
     for (int c = 0; c < grid.width; ++c) {
-      const double x = x_mm - grid.width_mm() / 2 + (c + 0.5) * grid.pixel_mm;
+      const double x = x_mm - grid.width_mm() / 2 + (c + 0.5) * grid.pixel_mm.x;
       row[static_cast<std::size_t>(c)] = static_cast<float>(truth_value(plate, x, y));
     }
   }
@@ -36,8 +36,9 @@ void truth_image(const Plate& plate, double x_mm, double y_mm, const ImageGrid& 
 
 Zone zone_of(const Plate& plate, double x_mm, double y_mm, const ImageGrid& grid) {
   constexpr double kAroundMm = 3;
-  const auto around = static_cast<int>(std::lround(kAroundMm / grid.pixel_mm));
-  const ImageGrid larger{grid.height + 2 * around, grid.width + 2 * around, grid.pixel_mm};
+  const auto pixels = [](double pixel_mm) { return static_cast<int>(std::lround(kAroundMm / pixel_mm)); };
+  const ImageGrid larger{grid.height + 2 * pixels(grid.pixel_mm.y), grid.width + 2 * pixels(grid.pixel_mm.x),
+                         grid.pixel_mm};
   std::vector<float> image(larger.pixels());
   truth_image(plate, x_mm, y_mm, larger, image);
   if (!in_contact(image)) return Zone::flat;

@@ -142,10 +142,10 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
 void FingerModel::shape_pad(double slope_x, double slope_y) {
   const double sigma = settings_.with_pad ? settings_.pad_sigma_mm : kNoPadSigmaMm;
   const auto [rows, columns, pitch, channels] = settings_.array;
-  across_ = points_of(columns, pitch, kBeyondAcrossMm, kAcrossMm);
-  along_ = points_of(rows, pitch, kBeyondAlongMm, kAlongMm);
-  across_weight_ = taxel_weights(columns, pitch, across_, kAcrossMm, sigma);
-  along_weight_ = taxel_weights(rows, pitch, along_, kAlongMm, sigma);
+  across_ = points_of(columns, pitch.x, kBeyondAcrossMm, kAcrossMm);
+  along_ = points_of(rows, pitch.y, kBeyondAlongMm, kAlongMm);
+  across_weight_ = taxel_weights(columns, pitch.x, across_, kAcrossMm, sigma);
+  along_weight_ = taxel_weights(rows, pitch.y, along_, kAlongMm, sigma);
   const double curvature = settings_.with_dome ? 1 / (2 * settings_.dome_radius_mm) : 0;
   double lowest = 0;
   for (int i = 0; i < across_; ++i)

@@ -231,7 +231,7 @@ TaxelArray array_of(const SafetensorsFile& file) {
   try {
     const auto json = parse_json_limited(found->second);
     const TaxelArray array{json.at("rows").get<int>(), json.at("columns").get<int>(),
-                           json.at("pitch_mm").get<double>(), json.at("channels").get<int>()};
+                           pitch_of_json(json.at("pitch_mm")), json.at("channels").get<int>()};
     array.check();
     return array;
   } catch (const std::invalid_argument& error) {
@@ -256,7 +256,7 @@ SignalScale signal_scale_of(const SafetensorsFile& file) {
 std::map<std::string, std::string> metadata_of(const TaxelArray& array, const SignalScale& scale) {
   const nlohmann::ordered_json json = {{"rows", array.rows},
                                        {"columns", array.columns},
-                                       {"pitch_mm", array.pitch_mm},
+                                       {"pitch_mm", json_of(array.pitch_mm)},
                                        {"channels", array.channels}};
   return {{"array", json.dump()}, {"signals", json_of(scale).dump()}};
 }

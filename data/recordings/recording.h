@@ -43,7 +43,8 @@ void restate(Recording& recording, const SignalScale& scale);
 
 /// Reads a safetensors file with tensors time_s F64 [n], volts F32 [n,signals] and, where known,
 /// position_mm F32 [n,2], lift_mm F32 [n] and truth F32 [n,height,width]. Metadata "array" says what the
-/// signals are, {"rows": 6, "columns": 6, "pitch_mm": 2, "channels": 1}; without it they are the rig's 4x4
+/// signals are, {"rows": 6, "columns": 6, "pitch_mm": 2, "channels": 1}
+/// (pitch_mm may be [x, y]); without it they are the rig's 4x4
 /// taxels at 3 mm. Metadata "signals" says what they mean, {"unit": "counts", "pressed": "higher", "range":
 /// [40, 900]}; without it they are the rig's volts. Throws FileError when the file is damaged
 /// (io/files/safetensors.h), is no recording, or breaks a rule of Recording: sizes that do not match, values

@@ -136,8 +136,15 @@ ImageScores ImageScorer::operator()(std::span<const float> output, std::span<con
   if (!scores.has_position) return scores;
   const PhaseCorrelation phase = correlator_(output, truth);
   scores.phase_correlation = phase.peak;
+  const Pitch pixel = grid_.pixel_mm;
   scores.position_error_px =
       phase.defined ? std::hypot(phase.dx_px, phase.dy_px) : std::min(grid_.height, grid_.width) / 2.0;
+  // Of square pixels the same digits as ever.
+  if (pixel.x == pixel.y)
+    scores.position_error_mm = scores.position_error_px * pixel.x;
+  else
+    scores.position_error_mm = phase.defined ? std::hypot(phase.dx_px * pixel.x, phase.dy_px * pixel.y)
+                                             : std::min(grid_.height_mm(), grid_.width_mm()) / 2;
   return scores;
 }
 
@@ -163,6 +170,7 @@ void MetricsAccumulator::add(std::span<const float> output, std::span<const floa
   ++positions_;
   peak_ += scores.phase_correlation;
   distance_px_ += scores.position_error_px;
+  distance_mm_ += scores.position_error_mm;
 }
 
 // Reservoir sampling (algorithm R): after n windows each is in the sample with the same probability.
@@ -218,7 +226,7 @@ Metrics MetricsAccumulator::result() const {
     metrics.phase_correlation = peak_ / n;
     metrics.phase_correlation_floor = floor();
     metrics.position_error_px = distance_px_ / n;
-    metrics.position_error_mm = metrics.position_error_px * grid_.pixel_mm;
+    metrics.position_error_mm = distance_mm_ / n;
   }
   return metrics;
 }

@@ -47,6 +47,7 @@ struct ImageScores {
   double phase_correlation = 0;  ///< 0 when the output is flat
   double position_error_px = 0;  ///< length of the displacement; half the shorter side when the output
                                  ///< is flat
+  double position_error_mm = 0;  ///< likewise, where pixels need not be square
 };
 
 /// What is reported about a set of windows. Figures over no windows at all are NaN (null in JSON).
@@ -106,8 +107,8 @@ class MetricsAccumulator {
   ImageScorer scorer_;
   std::uint64_t windows_ = 0, positions_ = 0;
   std::uint64_t silent_ = 0, ghosts_ = 0, felt_ = 0, misses_ = 0;
-  double psnr_ = 0, mse_ = 0, ssim_ = 0, peak_ = 0, distance_px_ = 0;  // sums
-  std::vector<float> sampled_outputs_, sampled_truths_;                // up to kFloorPairs images each
+  double psnr_ = 0, mse_ = 0, ssim_ = 0, peak_ = 0, distance_px_ = 0, distance_mm_ = 0;  // sums
+  std::vector<float> sampled_outputs_, sampled_truths_;  // up to kFloorPairs images each
 };
 
 /// All windows, and apart those of each zone: a flat truth is easy and would flatter the mean.

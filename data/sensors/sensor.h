@@ -91,6 +91,9 @@ void write_sensor(const OutputPath& output, const Sensor& sensor);
 
 /// Of one line each, for a recording's or model's metadata. Throws FileError as sensor_of_json().
 nlohmann::ordered_json json_of(const SignalScale& scale);
+/// A number, or [x, y] where they differ. Throws std::invalid_argument for anything else.
+nlohmann::ordered_json json_of(const Pitch& pitch);
+Pitch pitch_of_json(const nlohmann::ordered_json& json);
 SignalScale scale_of_json(const nlohmann::ordered_json& json, const std::string& where);
 
 }  // namespace supertac

@@ -195,7 +195,13 @@ TaxelArray take_array(Keys& keys) {
   array.rows = keys.integer("rows", array.rows);
   array.columns = keys.integer("columns", array.columns);
   array.channels = keys.integer("channels", 1);
-  array.pitch_mm = keys.number("pitch_mm", array.pitch_mm);
+  if (const Json* pitch = keys.find("pitch_mm")) {
+    try {
+      array.pitch_mm = pitch_of_json(*pitch);
+    } catch (const std::invalid_argument&) {
+      keys.wrong("pitch_mm", "a number, or [along a row, from row to row]", *pitch);
+    }
+  }
   array.check();
   return array;
 }
@@ -280,12 +286,21 @@ Sensor read_sensor(const std::string& name_or_path) {
   return sensor_of_json(read_text_file(name_or_path, kMostBytes), name_or_path);
 }
 
+Json json_of(const Pitch& pitch) { return pitch.x == pitch.y ? Json(pitch.x) : Json{pitch.x, pitch.y}; }
+
+Pitch pitch_of_json(const Json& json) {
+  if (json.is_number()) return json.get<double>();
+  if (json.is_array() && json.size() == 2 && json[0].is_number() && json[1].is_number())
+    return {json[0].get<double>(), json[1].get<double>()};
+  throw std::invalid_argument("expected a number, or [along a row, from row to row]");
+}
+
 Json json_of(const Sensor& sensor) {
   const TaxelArray& array = sensor.array;
   Json json = {{"name", sensor.name},
                {"rows", array.rows},
                {"columns", array.columns},
-               {"pitch_mm", array.pitch_mm},
+               {"pitch_mm", json_of(array.pitch_mm)},
                {"channels", array.channels}};
   json.update(json_of(sensor.scale));
   json["rate_hz"] = sensor.rate_hz;

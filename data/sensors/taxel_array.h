@@ -12,34 +12,46 @@ namespace supertac {
 /// Signals of the rig's array, the default one.
 constexpr int kTaxels = rig::kTaxels;
 
+/// A distance along a row (x) and from row to row (y). Converts from one number that is both.
+struct Pitch {
+  double x, y;
+  Pitch(double both) : x(both), y(both) {}
+  Pitch(double along_a_row, double from_row_to_row) : x(along_a_row), y(from_row_to_row) {}
+
+  Pitch operator/(double parts) const { return {x / parts, y / parts}; }
+  /// "3", or "2 x 4" (x first)
+  std::string text() const;
+  bool operator==(const Pitch&) const = default;
+};
+
 /// A picture of the surface under the array: pixels, and how large they are.
 struct ImageGrid {
   int height = 16, width = 16;
-  double pixel_mm = 0.75;
+  Pitch pixel_mm = 0.75;
 
   std::size_t pixels() const { return static_cast<std::size_t>(height) * static_cast<std::size_t>(width); }
-  double height_mm() const { return height * pixel_mm; }
-  double width_mm() const { return width * pixel_mm; }
+  double height_mm() const { return height * pixel_mm.y; }
+  double width_mm() const { return width * pixel_mm.x; }
   /// "16x16"
   std::string text() const;
   bool operator==(const ImageGrid&) const = default;
 };
 
-/// What a sensor is: rows x columns taxels, pitch_mm apart both ways, each of which gives `channels` numbers
+/// What a sensor is: rows x columns taxels, pitch_mm apart, each of which gives `channels` numbers
 /// a frame (one voltage; three axes of a magnetic field). Number s of a frame is channel s % channels of
 /// taxel s / channels; taxel k lies in row k / columns (y) and column k % columns (x).
 struct TaxelArray {
   int rows = rig::kTaxelRows, columns = rig::kTaxelColumns;
-  double pitch_mm = rig::kTaxelPitchMm;
+  Pitch pitch_mm = rig::kTaxelPitchMm;
   int channels = 1;
 
   int taxels() const { return rows * columns; }
   /// Place of taxel k from the array's centre.
-  double x_mm(int k) const { return (k % columns - (columns - 1) / 2.0) * pitch_mm; }
-  double y_mm(int k) const { return (k / columns - (rows - 1) / 2.0) * pitch_mm; }
+  double x_mm(int k) const { return (k % columns - (columns - 1) / 2.0) * pitch_mm.x; }
+  double y_mm(int k) const { return (k / columns - (rows - 1) / 2.0) * pitch_mm.y; }
   /// Numbers in a frame.
   std::size_t signals() const { return static_cast<std::size_t>(taxels() * channels); }
-  /// The square around each taxel, cut into scale x scale pixels.
+  /// The rectangle around each taxel, cut into scale x scale pixels.
   ImageGrid picture(int scale) const { return {rows * scale, columns * scale, pitch_mm / scale}; }
   /// "4x4 taxels at 3 mm", "2x6 taxels at 2.5 mm with 3 channels"
   std::string text() const;

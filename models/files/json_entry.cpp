@@ -3,6 +3,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "data/sensors/sensor.h"
+
 namespace supertac {
 
 using Json = nlohmann::ordered_json;
@@ -44,6 +46,14 @@ double JsonEntry::number(const char* name) const {
 
 std::optional<double> JsonEntry::number_or_null(const char* name) const {
   return field(name).is_null() ? std::nullopt : std::optional(number(name));
+}
+
+Pitch JsonEntry::pitch(const char* name) const {
+  try {
+    return pitch_of_json(field(name));
+  } catch (const std::invalid_argument&) {
+    wrong(name, "a number, or two", field(name));
+  }
 }
 
 std::string JsonEntry::text(const char* name) const {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "autograd/tensor.h"
+#include "data/sensors/taxel_array.h"
 #include "io/files/json.h"
 
 namespace supertac {
@@ -24,6 +25,8 @@ class JsonEntry {
   bool has(const char* name) const;
   double number(const char* name) const;
   std::optional<double> number_or_null(const char* name) const;
+  /// A number, or [x, y].
+  Pitch pitch(const char* name) const;
   std::string text(const char* name) const;
   /// A value as it stands, to be checked by whoever reads it.
   const nlohmann::ordered_json& object(const char* name) const { return field(name); }

@@ -50,12 +50,13 @@ InputSettings read_input(const JsonEntry& entry) {
       entry.number("rate_hz"),
       {entry.number("rest_volts"), entry.number("span_volts"), entry.flag("levelled")},
       entry.number_or_null("filter_s"),
-      entry.has("pitch_mm") ? entry.number("pitch_mm") : InputSettings{}.pitch_mm,
+      entry.has("pitch_mm") ? entry.pitch("pitch_mm") : InputSettings{}.pitch_mm,
       entry.has("signals") ? scale_of_json(entry.object("signals"), entry.where()) : SignalScale{}};
   const double span = std::abs(input.scaling.span_volts);
   if (input.rate_hz < 1 || input.rate_hz > 100'000 || std::abs(input.scaling.rest_volts) > 2e9 ||
       span <= 1e-6 || span > 2e9 || input.filter_s.value_or(0) < 0 || input.filter_s.value_or(0) > 10 ||
-      input.pitch_mm < 0.1 || input.pitch_mm > 100) {
+      std::min(input.pitch_mm.x, input.pitch_mm.y) < 0.1 ||
+      std::max(input.pitch_mm.x, input.pitch_mm.y) > 100) {
     throw std::runtime_error(
         entry.where() +
         ": expected rate_hz 1 to 100000, |rest_volts| <= 2e9, |span_volts| 1e-6 to 2e9, filter_s 0 to 10, "
@@ -110,7 +111,7 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
                   {"filter_s", input.filter_s ? Json(*input.filter_s) : Json(nullptr)},
                   {"formula", "clip((rest_volts - V) / span_volts, 0, 1)"}};
   if (input.scaling.per_window) scaling["levelled"] = true;
-  if (input.pitch_mm != InputSettings{}.pitch_mm) scaling["pitch_mm"] = input.pitch_mm;
+  if (input.pitch_mm != InputSettings{}.pitch_mm) scaling["pitch_mm"] = json_of(input.pitch_mm);
   if (input.signal_scale != SignalScale{}) scaling["signals"] = json_of(input.signal_scale);
   return {{"settings", settings.dump()}, {"input", scaling.dump()}};
 }

@@ -24,7 +24,7 @@ struct InputSettings {
   /// Length of the moving average (s) that the training signals went through, 0 = none; nothing when they
   /// differed.
   std::optional<double> filter_s = 0.0;
-  double pitch_mm = 3;            ///< of the array
+  Pitch pitch_mm = 3;             ///< of the array
   SignalScale signal_scale = {};  ///< as the recordings state it: unit, polarity and range of the signals
 };
 

@@ -80,7 +80,8 @@ TEST_F(Library, DescribesTheModel) {
   EXPECT_EQ(about.timesteps, 32);
   EXPECT_EQ(about.height, 16);
   EXPECT_EQ(about.predicts_error, 1);
-  EXPECT_EQ(about.pixel_mm, 0.75);
+  EXPECT_EQ(about.pixel_mm[0], 0.75);
+  EXPECT_EQ(about.pixel_mm[1], 0.75);
   EXPECT_EQ(about.filter_s, 0.05);
   supertac_description older{};
   older.size = offsetof(supertac_description, rate_hz);

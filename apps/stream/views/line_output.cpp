@@ -63,11 +63,11 @@ std::string picture_line(const Seen& seen, bool unlike_training, const std::stri
 std::string about_lines(const TaxelArray& array, const std::string& unit, const ImageGrid& image) {
   nlohmann::ordered_json about;
   if (image.pixels() > 0)
-    about = {{"height", image.height}, {"width", image.width}, {"pixel_mm", image.pixel_mm}};
+    about = {{"height", image.height}, {"width", image.width}, {"pixel_mm", json_of(image.pixel_mm)}};
   about.update({{"rows", array.rows},
                 {"columns", array.columns},
                 {"channels", array.channels},
-                {"pitch_mm", array.pitch_mm},
+                {"pitch_mm", json_of(array.pitch_mm)},
                 {"unit", unit}});
   const std::string text = about.dump();
   return text.substr(1, text.size() - 2);

@@ -168,7 +168,7 @@ TEST(Array, RefusesWhatIsNoArray) {
 TEST(Array, IsSimulatedAsASensorsFileSays) {
   const TemporaryFolder folder;
   write_file(folder / "mat.json",
-             std::string(R"({"name": "mat", "rows": 4, "columns": 6, "pitch_mm": 4, "unit": "counts",
+             std::string(R"({"name": "mat", "rows": 4, "columns": 6, "pitch_mm": [4, 2.5], "unit": "counts",
                              "pressed": "higher", "range": [40, 900], "rate_hz": 100, "frame": {"kind": "text"}})"));
   const std::vector<std::string> common = {
       "--plates", "3_Bumps",  "--speeds", "10",       "--trials",
@@ -178,13 +178,16 @@ TEST(Array, IsSimulatedAsASensorsFileSays) {
   const auto made = run_process("supertac-simulate", words);
   ASSERT_EQ(made.code, 0) << made.error;
   const Recording recording = read_recording(list_recordings(folder / "sim").front());
-  EXPECT_EQ(recording.array, (TaxelArray{.rows = 4, .columns = 6, .pitch_mm = 4}));
+  EXPECT_EQ(recording.array, (TaxelArray{.rows = 4, .columns = 6, .pitch_mm = {4, 2.5}}));
   EXPECT_EQ(recording.signal_scale, (SignalScale{.unit = "counts", .rest = 40, .span = -860}));
   EXPECT_NEAR(recording.time_s[1] - recording.time_s[0], 0.01, 1e-9);
   const auto [low, high] = std::ranges::minmax(recording.volts);
   EXPECT_GT(low, 0);
   EXPECT_GT(high, 300);
   EXPECT_LT(high, 910);
+  train(folder / "sim", folder / "m.safetensors");
+  EXPECT_EQ(load_model(folder / "m.safetensors").array(), recording.array);
+  EXPECT_TRUE(evaluate(folder, folder / "sim", folder / "m.safetensors").at("all").at("ssim").is_number());
   words.insert(words.end(), {"--array", "4x4"});
   EXPECT_EQ(run_process("supertac-simulate", words).code, 2);
 }

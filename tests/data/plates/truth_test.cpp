@@ -103,6 +103,17 @@ TEST(Truth, CoversEveryTaxelsSquareOfAnyArray) {
                       static_cast<float>(one_blob().height(9.25 + 0.5 * c, 50.25 + 0.5 * r) / 1.5));
 }
 
+TEST(Truth, PixelsNeedNotBeSquare) {
+  const ImageGrid grid = TaxelArray{.rows = 2, .columns = 3, .pitch_mm = {4, 2}}.picture(4);
+  EXPECT_EQ(grid, (ImageGrid{8, 12, {1, 0.5}}));
+  std::vector<float> image(grid.pixels());
+  truth_image(one_blob(), 15, 52, grid, image);  // x 9 .. 21, y 50 .. 54
+  for (int r = 0; r < 8; ++r)
+    for (int c = 0; c < 12; ++c)
+      EXPECT_FLOAT_EQ(image[static_cast<std::size_t>(12 * r + c)],
+                      static_cast<float>(one_blob().height(9.5 + c, 50.25 + 0.5 * r) / 1.5));
+}
+
 TEST(Truth, RefusesAnImageOfTheWrongSize) {
   std::vector<float> image(255);
   EXPECT_THROW(truth_image(Plate::named("plain"), 0, 0, ImageGrid{}, image), std::invalid_argument);

@@ -54,14 +54,14 @@ TEST(Recording, CarriesItsArrayUnlessItIsTheRigs) {
   write_recording(folder.file("rig"), example());
   EXPECT_FALSE(SafetensorsFile::read(folder.file("rig")).metadata().contains("array"));
   Recording written = example();
-  written.array = {.rows = 2, .columns = 3, .pitch_mm = 2.5, .channels = 3};
+  written.array = {.rows = 2, .columns = 3, .pitch_mm = {2.5, 4}, .channels = 3};
   written.volts.resize(written.frames() * 18);
   write_recording(folder.file("other"), written);
   const Recording read = read_recording(folder.file("other"));
   EXPECT_EQ(read.array, written.array);
   EXPECT_EQ(read.volts, written.volts);
   EXPECT_EQ(read.metadata, written.metadata);
-  EXPECT_EQ(read.array.text(), "2x3 taxels at 2.5 mm with 3 channels");
+  EXPECT_EQ(read.array.text(), "2x3 taxels at 2.5 x 4 mm with 3 channels");
 }
 
 TEST(Recording, RefusesAnArrayThatIsNone) {

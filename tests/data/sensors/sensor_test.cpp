@@ -51,6 +51,22 @@ TEST(Sensor, IsReadFromAFile) {
   EXPECT_EQ(mat.dead, std::vector{5});
 }
 
+TEST(Sensor, PitchMayDifferAlongARowAndAcross) {
+  const auto with = [](const std::string& pitch) {
+    return sensor_of_json(R"({"name": "a", "rows": 2, "columns": 3, "unit": "counts", "pressed": "higher",
+                              "range": [0, 1], "frame": {"kind": "text"}, "pitch_mm": )" +
+                              pitch + "}",
+                          "a.json");
+  };
+  const Sensor sensor = with("[4, 2.5]");
+  EXPECT_EQ(sensor.array.x_mm(2), 4);
+  EXPECT_EQ(sensor.array.y_mm(3), 1.25);
+  EXPECT_EQ(sensor.array.text(), "2x3 taxels at 4 x 2.5 mm");
+  EXPECT_EQ(sensor_of_json(json_of(sensor).dump(), "a.json"), sensor);
+  for (const char* wrong : {"[4]", "[4, 2, 1]", "\"4\"", "[4, 0]", "[4, 200]"})
+    EXPECT_THROW(with(wrong), std::exception);
+}
+
 TEST(Sensor, RigIsBuiltInAndItsFileGivesTheSameNumbers) {
   EXPECT_EQ(read_sensor("rig"), Sensor{});
   EXPECT_EQ(sensor_of_json(json_of(Sensor{}).dump(), "rig.json"), Sensor{});
