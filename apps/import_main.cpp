@@ -24,14 +24,12 @@ void declare(Arguments& arguments) {
           "INPUT",
           "folder with <plate>/<trial>/<pass>.txt, 16 voltages of the rig a line; a plate of your own as "
           "<plate>.stl beside its folder. With --sensor: a table, or a folder of them. FILE.safetensors: "
-          "frames of "
-          "any array and what a finer sensor saw of each, input [N,C,H,W], target [N,1,sH,sW] in 0 to 1, "
-          "optional "
-          "group [N]",
+          "frames of any array and what a finer sensor saw of each, input [N,C,H,W], target [N,1,sH,sW] in 0 "
+          "to 1, optional group [N]",
           false)
       .option("journal", "FILE", "instead of INPUT: recover a collection that was cut off")
       .required("out", "DIR", "folder for the recordings, one file per pass")
-      .option("speed", "MM_PER_S", "sliding speed of the rig's passes in mm/s", "10")
+      .option("speed", "MM_PER_S", "sliding speed of the passes in mm/s", "10")
       .option("pictures", "DIR",
               "write index.html: the signals of each pass under the plate they were fitted to")
       .flag("skip-bad", "leave out files and folders that are no recordings instead of giving up");
@@ -54,6 +52,14 @@ FolderImport import_settings(const Arguments& arguments, std::optional<Progress>
     bar->update(done);
   };
   return settings;
+}
+
+/// A file of tensors that is no recording.
+bool holds_pairs(const std::string& input) {
+  if (!input.ends_with(".safetensors") || !std::filesystem::is_regular_file(input)) return false;
+  const auto metadata = SafetensorsFile::read(input).metadata();
+  const auto kind = metadata.find("kind");
+  return kind == metadata.end() || kind->second != "recording";
 }
 
 int convert_pairs(const Arguments& arguments, const std::string& path) {
@@ -99,11 +105,10 @@ int run(Arguments& arguments) {
   if (arguments.given("journal")) return recover(arguments);
   if (!arguments.given("INPUT")) throw UsageError("expected INPUT or --journal FILE, found neither");
   const std::string input = arguments.text("INPUT");
-  const bool pairs = std::filesystem::path(input).extension() == ".safetensors";
+  const bool pairs = holds_pairs(input);
   if (pairs || arguments.given("sensor")) {
-    for (const char* other : {"speed", "pictures"})
-      if (arguments.given(other))
-        throw UsageError(std::string("--") + other + ": of the rig's text files only");
+    if (arguments.given("pictures")) throw UsageError("--pictures: of the rig's text files only");
+    if (pairs && arguments.given("speed")) throw UsageError("--speed: of passes only");
     return pairs ? convert_pairs(arguments, input) : import_tables(arguments, input);
   }
   const std::string out = arguments.text("out");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <set>
 
 #include "apps/common/command_line/program.h"
@@ -11,6 +12,8 @@
 #include "apps/common/running/signals.h"
 #include "data/plates/plate_file.h"
 #include "data/recordings/table_import.h"
+#include "data/registration/apply_registration.h"
+#include "data/registration/registration.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
@@ -52,6 +55,50 @@ std::string companion(const Arguments& arguments, const std::string& option, con
   throw FileError(named, "holds no table of the name " + table.stem().string() + " for --" + option);
 }
 
+/// What all tables of an import have in common.
+struct TableImport {
+  explicit TableImport(const Arguments& a)
+      : arguments(a),
+        sensor(read_sensor(a.text("sensor"))),
+        map(read_option("columns", [&] { return column_map(a.text("columns")); })),
+        truth_range(a.numbers("truth-range", -1e30, 1e30)),
+        plate_name(a.text("plate")),
+        speed_mm_s(a.number("speed", 0.1, 1000)) {
+    if (truth_range.size() != 2) throw UsageError("--truth-range: expected two different numbers, LOW,HIGH");
+    if (is_unknown_plate(plate_name)) return;
+    plate = read_option("plate", [&] { return Plate::named(plate_name); });
+    plate_name = fs::path(plate_name).filename().string();
+  }
+
+  /// Positions that no column and no log holds are found from the signals, over a known plate.
+  Recording import(const TableFile& file, const Table& table, int pass,
+                   std::optional<Registration>& fit) const {
+    const std::string path = file.path.string();
+    Recording recording = recording_of_table(path, table, map, sensor);
+    recording.plate = plate_name, recording.trial = 1, recording.pass = pass;
+    recording.metadata["file"] = file.path.filename().string();
+    if (!file.group.empty()) recording.metadata["group"] = file.group;
+    if (const std::string log = companion(arguments, "positions", path); !log.empty())
+      add_positions(recording, log, read_table(log), map.time_unit_s);
+    if (const std::string images = companion(arguments, "truth", path); !images.empty())
+      add_truth(recording, images, read_table(images), truth_range[0], truth_range[1]);
+    if (plate && recording.position_mm.empty() && recording.truth.empty()) {
+      recording.speed_mm_s = speed_mm_s;
+      fit = register_pass(recording, *plate);
+      apply(*fit, recording);
+    }
+    return recording;
+  }
+
+  const Arguments& arguments;
+  Sensor sensor;
+  ColumnMap map;
+  std::vector<double> truth_range;
+  std::string plate_name;
+  double speed_mm_s;
+  std::optional<Plate> plate;
+};
+
 }  // namespace
 
 void declare_tables(Arguments& arguments) {
@@ -63,7 +110,10 @@ void declare_tables(Arguments& arguments) {
       .option("columns", "MAP",
               "time=COLUMN:ms,x=COLUMN,y=COLUMN,values=FIRST-LAST; by name or number from 0; without time "
               "rows come at the sensor's rate")
-      .option("plate", "NAME", "what the passes slide over: a plate's name, or an STL file", "unknown")
+      .option("plate", "NAME",
+              "what the passes slide over: a plate's name, or an STL file; where no positions are given they "
+              "are found from the signals, for slides towards larger y",
+              "unknown")
       .option("positions", "FILE", "table of time, x and y (mm) by the same clock; or a folder of them")
       .option("truth", "FILE",
               "array [frames,height,width] of what a finer sensor saw (.npy); or a folder of them")
@@ -73,46 +123,36 @@ void declare_tables(Arguments& arguments) {
 }
 
 int import_tables(const Arguments& arguments, const std::string& input) {
-  const Sensor sensor = read_sensor(arguments.text("sensor"));
-  const ColumnMap map = read_option("columns", [&] { return column_map(arguments.text("columns")); });
-  const std::vector<double> range = arguments.numbers("truth-range", -1e30, 1e30);
-  if (range.size() != 2 || range[0] == range[1])
-    throw UsageError("--truth-range: expected two different numbers, LOW,HIGH");
-  const std::string plate = arguments.text("plate");
-  const bool is_stl = plate.ends_with(".stl");
-  if (!is_stl && !is_unknown_plate(plate)) read_option("plate", [&] { return Plate::named(plate); });
+  const TableImport settings(arguments);
   OutputFolder folder(arguments.output("out"));
-  if (is_stl) keep_plate_file(plate, folder.path());
+  keep_plate_file(arguments.text("plate"), folder.path());
   std::optional<Progress> bar;
   nlohmann::ordered_json files = nlohmann::ordered_json::array();
   const std::vector<TableFile> tables = tables_of(input, arguments.text("group"));
   std::size_t left_out = 0;
-  for (std::size_t i = 0; i < tables.size(); ++i) {
+  for (const TableFile& file : tables) {
     stop_if_interrupted();
     if (!bar) bar.emplace(arguments, "importing", tables.size(), "files");
-    bar->update(i);
-    const std::string path = tables[i].path.string();
+    bar->update(files.size() + left_out);
+    const std::string path = file.path.string();
     try {
       const Table table = read_table(path);
-      Recording recording = recording_of_table(path, table, map, sensor);
-      if (const std::string file = companion(arguments, "positions", path); !file.empty())
-        add_positions(recording, file, read_table(file), map.time_unit_s);
-      if (const std::string file = companion(arguments, "truth", path); !file.empty())
-        add_truth(recording, file, read_table(file), range[0], range[1]);
-      recording.plate = is_stl ? fs::path(plate).filename().string() : plate;
-      recording.trial = 1, recording.pass = static_cast<int>(files.size()) + 1;
-      recording.metadata["file"] = tables[i].path.filename().string();
-      if (!tables[i].group.empty()) recording.metadata["group"] = tables[i].group;
+      std::optional<Registration> fit;
+      const Recording recording = settings.import(file, table, static_cast<int>(files.size()) + 1, fit);
       add_parent_file("table", path);
       write_recording(folder.add(recording_file_name(recording)), recording);
       arguments.print(path + ": " + std::to_string(recording.frames()) + " frames in " +
                       format(recording.time_s.back() - recording.time_s.front(), 2) + " s" +
-                      (table.dropped > 0 ? ", " + std::to_string(table.dropped) + " lines dropped" : ""));
+                      (table.dropped > 0 ? ", " + std::to_string(table.dropped) + " lines dropped" : "") +
+                      (!fit            ? ""
+                       : fit->reliable ? ", positions found, residual " + format(fit->residual, 2) + " mm"
+                                       : ", not reliable: " + fit->reason));
       files.push_back({{"file", path},
                        {"frames", recording.frames()},
                        {"dropped", table.dropped},
                        {"positions", !recording.position_mm.empty()},
                        {"truth", !recording.truth.empty()}});
+      if (fit) files.back()["reliable"] = fit->reliable, files.back()["residual_mm"] = fit->residual;
     } catch (const FileError& error) {
       if (!arguments.flag("skip-bad"))
         throw FileError(error.path(), std::string(error.what()).substr(error.path().size() + 2) +

@@ -47,7 +47,8 @@ void apply(const Registration& registration, Recording& recording) {
   const bool nominal = base != recording.metadata.end() && base->second == "nominal";
   const std::size_t n = recording.frames();
   recording.position_mm.resize(2 * n);
-  const auto x = static_cast<float>(rig::pass_x_mm(recording.pass));
+  const bool of_the_rig = recording.array == TaxelArray{};
+  const auto x = static_cast<float>(of_the_rig ? rig::pass_x_mm(recording.pass) : Plate::kWidthMm / 2);
   for (std::size_t i = 0; i < n; ++i) {
     const double y = registration.y_mm(recording.time_s[i]);
     const bool known =

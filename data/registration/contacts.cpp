@@ -15,9 +15,16 @@ constexpr double kFlatV = 1e-6;  // a saturated dip is flat up to rounding
 
 // One taxel's signal as means over bins of kBinS, pressing upwards; empty bins are bridged by straight lines.
 std::vector<double> binned(const Recording& recording, int taxel, std::size_t bins) {
+  const auto channels = static_cast<std::size_t>(recording.array.channels);
+  const SignalScale rig;
   std::vector<double> sum(bins), count(bins);
   for (std::size_t i = 0; i < recording.frames(); ++i) {
-    const double volts = recording.volts[i * kTaxels + static_cast<std::size_t>(taxel)];
+    const float* const signals =
+        recording.volts.data() + i * recording.array.signals() + static_cast<std::size_t>(taxel) * channels;
+    double volts = 0;
+    for (std::size_t c = 0; c < channels; ++c) volts += signals[c];
+    volts /= static_cast<double>(channels);
+    if (recording.signal_scale != rig) volts = recording.signal_scale.in(rig, volts);
     if (!std::isfinite(volts)) continue;
     const auto bin = static_cast<std::size_t>((recording.time_s[i] - recording.time_s[0]) / kBinS);
     if (bin >= bins) continue;
@@ -94,12 +101,10 @@ void find_in(const std::vector<double>& x, int taxel, double start_s, double rea
 
 std::vector<Contact> find_contacts(const Recording& recording, double reach_s) {
   const std::size_t n = recording.frames();
-  if (recording.array != TaxelArray{})
-    throw std::invalid_argument("find_contacts: expected the rig's " + TaxelArray{}.text() + ", got " +
-                                recording.array.text());
-  if (recording.volts.size() != n * kTaxels)
+  const std::size_t signals = recording.array.signals();
+  if (recording.volts.size() != n * signals)
     throw std::invalid_argument("find_contacts: " + std::to_string(n) + " frames need " +
-                                std::to_string(n * kTaxels) + " voltages, got " +
+                                std::to_string(n * signals) + " signals, got " +
                                 std::to_string(recording.volts.size()));
   std::vector<Contact> found;
   if (n < 3) return found;
@@ -108,7 +113,7 @@ std::vector<Contact> find_contacts(const Recording& recording, double reach_s) {
     throw std::invalid_argument("find_contacts: time stamps must increase and span at most " +
                                 std::to_string(static_cast<int>(kMaxBins * kBinS)) + " s");
   const auto bins = static_cast<std::size_t>(duration / kBinS);
-  for (int k = 0; k < kTaxels; ++k)
+  for (int k = 0; k < recording.array.taxels(); ++k)
     find_in(binned(recording, k, bins), k, recording.time_s[0], reach_s, found);
   return found;
 }

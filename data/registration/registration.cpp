@@ -1,7 +1,6 @@
 #include "data/registration/registration.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -30,7 +29,7 @@ constexpr double kSlowestClock = 0.97, kUnseenLoss = 0.05, kUnseenPerSeen = 2, k
 constexpr double kMinMatched = 0.4, kMinCoverage = 0.3, kMaxResidualMm = 0.55, kMinMargin = 0.03;
 
 struct Event {
-  int row = 0;
+  std::size_t row = 0;
   double time = 0, weight = 0;
 };
 
@@ -52,6 +51,8 @@ class Fit {
         troughs_(plate.min_height() < 0),
         speed_(recording.speed_mm_s > 0 ? recording.speed_mm_s : rig::kSlideMmS),
         middle_s_((recording.time_s.front() + recording.time_s.back()) / 2) {
+    for (int row = 0; row < recording.array.rows; ++row)
+      row_mm_.push_back(row_contact_mm(recording.array, static_cast<std::size_t>(row)));
     const std::vector<Contact> contacts = find_contacts(recording, 0.6 * pitch() / speed_);
     double most = 0;
     for (const Stretch& stretch : stretches_of(recording)) {
@@ -61,8 +62,9 @@ class Fit {
     }
     for (const Contact& c : contacts)
       if (inside(c, stretch_))
-        events_.push_back(
-            {.row = c.taxel / rig::kTaxelColumns, .time = c.time_s - middle_s_, .weight = weight_of(c)});
+        events_.push_back({.row = static_cast<std::size_t>(c.taxel / recording.array.columns),
+                           .time = c.time_s - middle_s_,
+                           .weight = weight_of(c)});
     // A recording that goes on long after the pass, or begins long before it, has its middle beside the
     // plate.
     if (events_.empty()) return;
@@ -110,13 +112,12 @@ class Fit {
   }
 
   Match match(const Event& event, const Line& line) const {
-    const double y =
-        line.middle_mm + line.rate * event.time + row_contact_mm(static_cast<std::size_t>(event.row));
+    const double y = line.middle_mm + line.rate * event.time + row_mm_[event.row];
     std::size_t nearest = 0;
     for (std::size_t j = 1; j < crests_.size(); ++j)
       if (std::abs(crests_[j] - y) < std::abs(crests_[nearest] - y)) nearest = j;
     Match m{.crest = nearest, .distance_mm = crests_[nearest] - y, .weight = event.weight};
-    const bool leading_alone = event.row == rig::kTaxelRows - 1 && nearest == 0;
+    const bool leading_alone = event.row + 1 == row_mm_.size() && nearest == 0;
     const bool trailing_alone = event.row == 0 && nearest + 1 == crests_.size();
     if (leading_alone) m.distance_mm -= kAloneShiftMm;
     if (trailing_alone) m.distance_mm += kAloneShiftMm;
@@ -172,17 +173,17 @@ class Fit {
 
   Line scored(double middle_mm, double rate) const {
     Line line{.middle_mm = middle_mm, .rate = rate};
-    std::vector<std::array<double, rig::kTaxelRows>> felt(crests_.size());
+    std::vector<double> felt(crests_.size() * row_mm_.size());  // [element][row]
     double total = 0, agree = 0;
     for (const Event& event : events_) {
-      const double y = middle_mm + rate * event.time + row_contact_mm(static_cast<std::size_t>(event.row));
+      const double y = middle_mm + rate * event.time + row_mm_[event.row];
       std::size_t nearest = 0;
       double distance = std::abs(crests_[0] - y);
       for (std::size_t j = 1; j < crests_.size(); ++j)
         if (const double d = std::abs(crests_[j] - y); d < distance) distance = d, nearest = j;
       const double fit = std::max(0.0, 1 - distance / kScanReachMm);
       total += event.weight, agree += event.weight * fit;
-      double& best = felt[nearest][static_cast<std::size_t>(event.row)];
+      double& best = felt[nearest * row_mm_.size() + event.row];
       best = std::max(best, fit);
     }
     line.matched = total > 0 ? agree / total : 0;
@@ -194,16 +195,15 @@ class Fit {
 
   // Of the (element, row) pairs the stretch reached: share felt (line.coverage), and share of elements felt
   // by a row.
-  void felt_shares(const std::vector<std::array<double, rig::kTaxelRows>>& felt, Line& line,
-                   double& elements) const {
+  void felt_shares(const std::vector<double>& felt, Line& line, double& elements) const {
     double pairs = 0, felt_pairs = 0, reached = 0, felt_elements = 0;
     for (std::size_t j = 0; j < crests_.size(); ++j) {
       double best = -1;
-      for (std::size_t row = 0; row < rig::kTaxelRows; ++row) {
-        const double time = (crests_[j] - row_contact_mm(row) - line.middle_mm) / line.rate + middle_s_;
+      for (std::size_t row = 0; row < row_mm_.size(); ++row) {
+        const double time = (crests_[j] - row_mm_[row] - line.middle_mm) / line.rate + middle_s_;
         if (time < stretch_.begin_s || time > stretch_.end_s) continue;
-        pairs += 1, felt_pairs += felt[j][row];
-        best = std::max(best, felt[j][row]);
+        pairs += 1, felt_pairs += felt[j * row_mm_.size() + row];
+        best = std::max(best, felt[j * row_mm_.size() + row]);
       }
       if (best >= 0) reached += 1, felt_elements += best;
     }
@@ -211,7 +211,7 @@ class Fit {
     elements = reached > 0 ? felt_elements / reached : 0;
   }
 
-  std::vector<double> crests_;
+  std::vector<double> crests_, row_mm_;
   bool troughs_;
   Stretch stretch_;
   double speed_, middle_s_;
@@ -256,6 +256,11 @@ std::string why_implausible(const Registration& r, const Recording& recording, c
 }
 
 }  // namespace
+
+double row_contact_mm(const TaxelArray& array, std::size_t row) {
+  constexpr double kRigMm[] = {-3.5, -1.3, 1.3, 3.5};  // medians over the rig's 96 passes
+  return array == TaxelArray{} ? kRigMm[row] : array.y_mm(static_cast<int>(row) * array.columns);
+}
 
 std::string why_unreliable(const Registration& r) {
   if (r.contacts < kMinContacts)

@@ -33,12 +33,9 @@ struct Registration {
   double y_mm(double t) const { return start_mm + rate * (t + (t >= lost_at_s ? lost_s : 0)); }
 };
 
-/// Where, from the finger's centre along y, a row of taxels (0 trailing to 3 leading) feels an element best:
-/// not rig::kTaxelPitchMm apart, for the pad is round.
-constexpr double row_contact_mm(std::size_t row) {
-  constexpr double kMm[] = {-3.5, -1.3, 1.3, 3.5};  // medians over the rig's 96 passes
-  return kMm[row];
-}
+/// Where, from the centre along y, a row of taxels (0 trailing) feels an element best. The rig's rows do so
+/// nearer together than they lie, for its pad is round; those of another array where they are.
+double row_contact_mm(const TaxelArray& array, std::size_t row);
 
 /// Fits start and rate of a pass to its plate. Each element of the texture that passes a taxel row makes a
 /// contact (find_contacts); the fit is the line that puts the contacts of all rows onto the plate's elements:
@@ -49,6 +46,7 @@ constexpr double row_contact_mm(std::size_t row) {
 /// stretch with most contacts is used. Row offsets are symmetric about the finger's centre, so an outline
 /// that is felt early by the leading rows and late by the trailing ones does not move the centre. The delay
 /// of the recording's moving average (metadata filter_s) is taken out.
+/// Any array and sensor will do whose rows lie across the slide, which goes towards larger y.
 /// Never throws for a pass that does not fit: it is flagged. Throws std::invalid_argument as find_contacts
 /// does.
 Registration register_pass(const Recording& recording, const Plate& plate);

@@ -30,7 +30,7 @@ std::vector<float> depths(const Recording& recording, std::size_t taxel) {
   std::vector<float> sum(kWidth), mean(kWidth, -1);
   std::vector<int> count(kWidth);
   for (std::size_t i = 0; i < recording.frames(); ++i) {
-    const double y = recording.position_mm[2 * i + 1] + row_contact_mm(taxel / 4);
+    const double y = recording.position_mm[2 * i + 1] + row_contact_mm(recording.array, taxel / 4);
     const float v = recording.volts[i * kTaxels + taxel];
     if (!recording.lift_mm.empty() && recording.lift_mm[i] > 0) continue;
     if (!std::isfinite(y) || !std::isfinite(v) || y < kFromMm || y >= kToMm) continue;

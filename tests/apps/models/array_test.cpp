@@ -248,5 +248,33 @@ TEST(Array, AHundredTablesAreImportedTrainedAndScored) {
   EXPECT_EQ(run_process("supertac-import", again).code, 2);
 }
 
+// A person slides the mat over a known plate: nothing says where it was but what it felt.
+TEST(Array, ATableWithoutPositionsIsRegisteredAgainstItsPlate) {
+  const TemporaryFolder folder;
+  const std::string sensor = folder / "mat.json";
+  write_file(sensor,
+             std::string(R"({"name": "mat", "rows": 6, "columns": 6, "pitch_mm": 2.5, "unit": "counts",
+                                     "pressed": "higher", "range": [40, 900], "rate_hz": 100,
+                                     "frame": {"kind": "text"}})"));
+  const auto made =
+      run_process("supertac-simulate", {"--plates", "3_Bumps", "--speeds", "12", "--trials", "1", "--passes",
+                                        "1", "--sensor", sensor, "--out", folder / "sim"});
+  ASSERT_EQ(made.code, 0) << made.error;
+  const Recording truth = read_recording(list_recordings(folder / "sim").front());
+  std::string text;
+  for (std::size_t i = 0; i < truth.frames(); ++i)
+    for (std::size_t k = 0; k < 36; ++k) text += format(truth.volts[36 * i + k]) + (k < 35 ? " " : "\n");
+  write_file(folder / "slide.txt", text);
+  const auto done = run_process("supertac-import", {folder / "slide.txt", "--sensor", sensor, "--plate",
+                                                    "3_Bumps", "--speed", "12", "--out", folder / "data"});
+  ASSERT_EQ(done.code, 0) << done.error;
+  EXPECT_NE(done.out.find("positions found, residual"), std::string::npos) << done.out;
+  const Recording found = read_recording(list_recordings(folder / "data").front());
+  EXPECT_EQ(found.metadata.at("registration_reliable"), "yes");
+  for (std::size_t i = 0; i < truth.frames(); ++i)
+    if (const double y = truth.position_mm[2 * i + 1]; y > 30 && y < 80 && truth.lift_mm[i] == 0)
+      EXPECT_NEAR(found.position_mm[2 * i + 1], y, 0.6) << i;
+}
+
 }  // namespace
 }  // namespace supertac

@@ -22,7 +22,8 @@ inline Recording slide_of(const Recording& whole) {
     if (whole.lift_mm[i] > kTouchingMm) continue;
     if (begin < 0) begin = whole.time_s[i];
     slide.time_s.push_back(whole.time_s[i] - begin);
-    for (std::size_t k = 0; k < kTaxels; ++k) slide.volts.push_back(whole.volts[i * kTaxels + k]);
+    const std::size_t signals = whole.array.signals();
+    for (std::size_t k = 0; k < signals; ++k) slide.volts.push_back(whole.volts[i * signals + k]);
     for (std::size_t axis = 0; axis < 2; ++axis) slide.position_mm.push_back(whole.position_mm[2 * i + axis]);
   }
   return slide;

@@ -255,5 +255,25 @@ TEST(Registration, RealPasses) {
   EXPECT_LT(residual / reliable, 0.42);
 }
 
+// Counts that rise, of eight rows, of rows nearer together than columns, and of two rows.
+TEST(Registration, FindsPassesOfAnyArray) {
+  for (const TaxelArray& array : {TaxelArray{.rows = 8, .columns = 8, .pitch_mm = 3},
+                                  TaxelArray{.rows = 6, .columns = 3, .pitch_mm = {4, 2}},
+                                  TaxelArray{.rows = 2, .columns = 6, .pitch_mm = 2.5}}) {
+    for (const char* name : {"3_Bumps", "6_Ridges"}) {
+      SimulatorSettings settings;
+      settings.array = array, settings.rate_hz = 100, settings.with_filter = settings.with_adc = false;
+      Recording truth = slide_of(simulate_pass(Plate::named(name), {}, settings, 3));
+      restate(truth, {.unit = "counts", .rest = 40, .span = -860});
+      Recording signals = truth;
+      signals.position_mm.clear();
+      const Registration r = register_pass(signals, Plate::named(name));
+      EXPECT_TRUE(r.reliable) << array.text() << ' ' << name << ' ' << r.reason;
+      EXPECT_LT(std::abs(error_of(r, truth).mean), 0.3) << array.text() << ' ' << name;
+      EXPECT_LT(error_of(r, truth).worst, kWorstMm) << array.text() << ' ' << name;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace supertac
