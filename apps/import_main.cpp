@@ -13,7 +13,7 @@
 #include "apps/import/page.h"
 #include "apps/import/tables.h"
 #include "data/plates/plate_file.h"
-#include "data/recordings/table_import.h"
+#include "data/recordings/imports/table_import.h"
 #include "data/registration/text_folder.h"
 
 namespace supertac {

@@ -11,7 +11,7 @@
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "data/plates/plate_file.h"
-#include "data/recordings/table_import.h"
+#include "data/recordings/imports/table_import.h"
 #include "data/registration/apply_registration.h"
 #include "data/registration/registration.h"
 #include "io/numbers/numbers.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "data/plates/plate.h"
-#include "data/recordings/text_import.h"
+#include "data/recordings/imports/text_import.h"
 #include "data/registration/registration.h"
 #include "io/files/file.h"
 

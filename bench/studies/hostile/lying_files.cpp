@@ -11,8 +11,8 @@
 
 #include "bench/studies/hostile/evil_value.h"
 #include "bench/studies/hostile/readers.h"
+#include "data/recordings/imports/table_import.h"
 #include "data/recordings/recording.h"
-#include "data/recordings/table_import.h"
 #include "data/scores/baselines.h"
 #include "data/windows/windows.h"
 #include "hardware/boards/sensor_decoder.h"

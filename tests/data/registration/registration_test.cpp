@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "data/recordings/text_import.h"
+#include "data/recordings/imports/text_import.h"
 #include "data/registration/apply_registration.h"
 #include "data/registration/lost_frames.h"
 #include "tests/data/registration/lossy_pass.h"

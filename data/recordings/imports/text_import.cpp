@@ -1,4 +1,4 @@
-#include "data/recordings/text_import.h"
+#include "data/recordings/imports/text_import.h"
 
 #include <array>
 #include <cmath>

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "data/recordings/table_import.h"
+#include "data/recordings/imports/table_import.h"
 #include "data/windows/split.h"
 #include "io/files/file.h"
 #include "tests/io/temporary_folder.h"

@@ -1,4 +1,4 @@
-#include "data/recordings/table_import.h"
+#include "data/recordings/imports/table_import.h"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "data/recordings/imports/table.h"
 #include "data/recordings/recording.h"
-#include "data/recordings/table.h"
 
 namespace supertac {
 

@@ -1,4 +1,4 @@
-#include "data/recordings/table.h"
+#include "data/recordings/imports/table.h"
 
 #include <algorithm>
 #include <bit>

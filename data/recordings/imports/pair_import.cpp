@@ -4,7 +4,7 @@
 #include <map>
 #include <stdexcept>
 
-#include "data/recordings/table_import.h"
+#include "data/recordings/imports/table_import.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
 
