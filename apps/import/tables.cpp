@@ -27,7 +27,7 @@ struct TableFile {
 };
 
 bool is_table(const fs::path& path) {
-  static const std::set<std::string> kinds = {".csv", ".txt", ".tsv", ".npy"};
+  static const std::set<std::string> kinds = {".csv", ".txt", ".tsv", ".npy", ".safetensors"};
   return kinds.contains(path.extension().string());
 }
 
@@ -42,7 +42,8 @@ std::vector<TableFile> tables_of(const std::string& input, const std::string& gr
         tables.push_back({below.path(), group.empty() ? entry.path().filename().string() : group});
   }
   std::ranges::sort(tables, {}, &TableFile::path);
-  if (tables.empty()) throw FileError(input, "holds no table: expected *.csv, *.txt, *.tsv or *.npy");
+  if (tables.empty())
+    throw FileError(input, "holds no table: expected *.csv, *.txt, *.tsv, *.npy or recordings");
   return tables;
 }
 
@@ -70,12 +71,28 @@ struct TableImport {
     plate_name = fs::path(plate_name).filename().string();
   }
 
+  /// What a table holds, or a recording of this sensor that supertac-stream kept.
+  Recording read(const std::string& path, std::size_t& dropped) const {
+    if (!path.ends_with(".safetensors")) {
+      const Table table = read_table(path);
+      dropped = table.dropped;
+      return recording_of_table(path, table, map, sensor);
+    }
+    Recording recording = read_recording(path);
+    if (recording.array != sensor.array || recording.signal_scale != sensor.scale)
+      throw FileError(path, "was recorded with " + recording.array.text() + " in " +
+                                recording.signal_scale.unit + ", the sensor's file says " +
+                                sensor.array.text() + " in " + sensor.scale.unit);
+    return recording;
+  }
+
   /// Positions that no column and no log holds are found from the signals, over a known plate.
-  Recording import(const TableFile& file, const Table& table, int pass,
+  Recording import(const TableFile& file, int pass, std::size_t& dropped,
                    std::optional<Registration>& fit) const {
     const std::string path = file.path.string();
-    Recording recording = recording_of_table(path, table, map, sensor);
-    recording.plate = plate_name, recording.trial = 1, recording.pass = pass;
+    Recording recording = read(path, dropped);
+    if (plate || recording.plate.empty()) recording.plate = plate_name;
+    recording.trial = std::max(1, recording.trial), recording.pass = pass;
     recording.metadata["file"] = file.path.filename().string();
     if (!file.group.empty()) recording.metadata["group"] = file.group;
     if (const std::string log = companion(arguments, "positions", path); !log.empty())
@@ -104,8 +121,8 @@ struct TableImport {
 void declare_tables(Arguments& arguments) {
   arguments
       .option("sensor", "FILE",
-              "the input is tables of this sensor's frames: a row a frame, *.csv, *.txt, *.tsv or *.npy "
-              "(docs/sensors.md)")
+              "the input is tables of this sensor's frames, a row a frame (*.csv, *.txt, *.tsv, *.npy), or "
+              "recordings of supertac-stream (docs/sensors.md)")
       .only_with("sensor")
       .option("columns", "MAP",
               "time=COLUMN:ms,x=COLUMN,y=COLUMN,values=FIRST-LAST; by name or number from 0; without time "
@@ -136,20 +153,20 @@ int import_tables(const Arguments& arguments, const std::string& input) {
     bar->update(files.size() + left_out);
     const std::string path = file.path.string();
     try {
-      const Table table = read_table(path);
+      std::size_t dropped = 0;
       std::optional<Registration> fit;
-      const Recording recording = settings.import(file, table, static_cast<int>(files.size()) + 1, fit);
+      const Recording recording = settings.import(file, static_cast<int>(files.size()) + 1, dropped, fit);
       add_parent_file("table", path);
       write_recording(folder.add(recording_file_name(recording)), recording);
       arguments.print(path + ": " + std::to_string(recording.frames()) + " frames in " +
                       format(recording.time_s.back() - recording.time_s.front(), 2) + " s" +
-                      (table.dropped > 0 ? ", " + std::to_string(table.dropped) + " lines dropped" : "") +
+                      (dropped > 0 ? ", " + std::to_string(dropped) + " lines dropped" : "") +
                       (!fit            ? ""
                        : fit->reliable ? ", positions found, residual " + format(fit->residual, 2) + " mm"
                                        : ", not reliable: " + fit->reason));
       files.push_back({{"file", path},
                        {"frames", recording.frames()},
-                       {"dropped", table.dropped},
+                       {"dropped", dropped},
                        {"positions", !recording.position_mm.empty()},
                        {"truth", !recording.truth.empty()}});
       if (fit) files.back()["reliable"] = fit->reliable, files.back()["residual_mm"] = fit->residual;

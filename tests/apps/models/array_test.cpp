@@ -274,6 +274,16 @@ TEST(Array, ATableWithoutPositionsIsRegisteredAgainstItsPlate) {
   for (std::size_t i = 0; i < truth.frames(); ++i)
     if (const double y = truth.position_mm[2 * i + 1]; y > 30 && y < 80 && truth.lift_mm[i] == 0)
       EXPECT_NEAR(found.position_mm[2 * i + 1], y, 0.6) << i;
+
+  // The same from what supertac-stream --record would have kept.
+  Recording kept = truth;
+  kept.position_mm.clear(), kept.lift_mm.clear();
+  write_recording(folder / "kept.safetensors", kept);
+  const auto again =
+      run_process("supertac-import", {folder / "kept.safetensors", "--sensor", sensor, "--plate", "3_Bumps",
+                                      "--speed", "12", "--out", folder / "again"});
+  ASSERT_EQ(again.code, 0) << again.error;
+  EXPECT_EQ(read_recording(list_recordings(folder / "again").front()).position_mm, found.position_mm);
 }
 
 }  // namespace
