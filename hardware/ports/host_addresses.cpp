@@ -37,7 +37,8 @@ HostAddresses host_addresses(const std::string& what, const std::string& host, i
   if (error == EAI_INPROGRESS) {
     // Who cannot be stopped goes on writing there.
     if (gai_cancel(&entry) == EAI_NOTCANCELED) (void)question.release();
-    throw PortError(what + ": the name server does not answer; see whether the host is right, or give its number");
+    throw PortError(what +
+                    ": the name server does not answer; see whether the host is right, or give its number");
   }
   HostAddresses found(entry.ar_result);
   if (error != 0) throw PortError(what + ": " + gai_strerror(error) + "; see whether the host is right");

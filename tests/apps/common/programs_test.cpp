@@ -75,7 +75,8 @@ TEST(Export, SaysWhatItCannotExport) {
   expect_failure(run_process("supertac-export", {recording, "--onnx", folder.file("m.onnx")}), 1,
                  "give a file that supertac-train wrote");
   EXPECT_FALSE(std::filesystem::exists(folder.file("m.onnx")));
-  expect_failure(run_process("supertac-export", {recording}), 2, "expected --onnx FILE, --c99 DIR or --mcap FILE, found none");
+  expect_failure(run_process("supertac-export", {recording}), 2,
+                 "expected --onnx FILE, --c99 DIR or --mcap FILE, found none");
 }
 
 TEST(Simulate, SameSeedSameBytesForAnyThreads) {
