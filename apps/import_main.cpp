@@ -15,6 +15,7 @@
 #include "data/plates/plate_file.h"
 #include "data/recordings/imports/table_import.h"
 #include "data/registration/text_folder.h"
+#include "io/files/safetensors.h"
 
 namespace supertac {
 

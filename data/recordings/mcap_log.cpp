@@ -121,7 +121,7 @@ std::vector<McapChannel> channels_of(const TaxelArray& array, const std::string&
                        picture ? kImage : kArray,
                        {{"unit", of},
                         {"array", array.text()},
-                        {"pixel_mm", json_of(picture && drawn ? image.pixel_mm : array.pitch_mm).dump()}}};
+                        {"pixel_mm", (picture && drawn ? image.pixel_mm : array.pitch_mm).text()}}};
   };
   const std::string heights = "1: the plate's highest point";
   std::vector<McapChannel> channels = {channel("taxels", false, unit),

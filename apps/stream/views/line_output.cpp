@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include "apps/common/running/signals.h"
+#include "data/sensors/sensor.h"
 #include "hardware/ports/host_addresses.h"
 #include "hardware/ports/serial_port.h"
 #include "io/numbers/numbers.h"

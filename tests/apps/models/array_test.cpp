@@ -272,8 +272,9 @@ TEST(Array, ATableWithoutPositionsIsRegisteredAgainstItsPlate) {
   const Recording found = read_recording(list_recordings(folder / "data").front());
   EXPECT_EQ(found.metadata.at("registration_reliable"), "yes");
   for (std::size_t i = 0; i < truth.frames(); ++i)
-    if (const double y = truth.position_mm[2 * i + 1]; y > 30 && y < 80 && truth.lift_mm[i] == 0)
+    if (const double y = truth.position_mm[2 * i + 1]; y > 30 && y < 80 && truth.lift_mm[i] == 0) {
       EXPECT_NEAR(found.position_mm[2 * i + 1], y, 0.6) << i;
+    }
 
   // The same from what supertac-stream --record would have kept.
   Recording kept = truth;
