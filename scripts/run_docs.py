@@ -11,6 +11,7 @@ A comment before a block, which a reader of the page does not see, says what is 
     <!-- run; A => B; C => D -->      the same with text A replaced by B: what takes long is shortened
     <!-- run real; ... -->            only where SUPERTAC_RECORDINGS names the folder of the real recordings, here $TEXT_DIR
     <!-- run python; ... -->          as doctest; only where python3 has the package safetensors
+    <!-- run after python; ... -->    as run, on what such a block has written
     <!-- not run: WHY -->             not at all
 
 Every block without a language needs one.
@@ -163,7 +164,7 @@ def run_page(page, environment):
             about = f"{page.relative_to(ROOT)}: {len(texts)} blocks '{kind}'"
             if kind == "run real" and "TEXT_DIR" not in environment:
                 print(f"{about} not run: SUPERTAC_RECORDINGS is not set")
-            elif kind == "run python" and importlib.util.find_spec("safetensors") is None:
+            elif kind.endswith("python") and importlib.util.find_spec("safetensors") is None:
                 print(f"{about} not run: python3 has no package safetensors")
             else:
                 begin = time.monotonic()

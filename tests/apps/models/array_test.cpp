@@ -172,7 +172,7 @@ TEST(Array, IsSimulatedAsASensorsFileSays) {
                              "pressed": "higher", "range": [40, 900], "rate_hz": 100, "frame": {"kind": "text"}})"));
   const std::vector<std::string> common = {
       "--plates", "3_Bumps",  "--speeds", "10",       "--trials",
-      "1",        "--passes", "1",        "--sensor", folder / "mat.json"};
+      "2",        "--passes", "1",        "--sensor", folder / "mat.json"};
   std::vector<std::string> words = common;
   words.insert(words.end(), {"--out", folder / "sim"});
   const auto made = run_process("supertac-simulate", words);

