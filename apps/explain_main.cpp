@@ -25,6 +25,8 @@ void declare(Arguments& a) {
                "the model; or an expression on numbers, \"a=2; b=-3; relu(a*b+10)\", whose graph is drawn");
   a.option("recording", "FILE", "what was felt");
   a.option("at", "SECONDS", "on the recording's clock: the last window that ends by then");
+  a.option("precision", "NAME", "fp32 or int8: of the maps that the programs' own drawing goes through",
+           "fp32");
   a.required(
       "out", "FILE",
       "every array, safetensors, which examples/recompute.py computes again with NumPy; .dot or .svg: the "
@@ -126,6 +128,18 @@ Json trace(const SuperTac& model, const Tensor& input, std::vector<Array>& array
   return steps;
 }
 
+// The maps of the network as programs draw it, prepared: the same numbers up to rounding, or in whole
+// numbers.
+Estimate draw(const ModelFile& file, bool in_int8, const Tensor& input, std::vector<Array>& arrays) {
+  if (in_int8 && !file.ranges)
+    throw std::runtime_error("--precision int8: the model's file holds no ranges; train it again");
+  const Prepared prepared = in_int8 ? Prepared(*file.model, *file.ranges) : Prepared(*file.model);
+  std::size_t count = 0;
+  return prepared.watched(input, [&](const std::string& step, const Tensor& map) {
+    arrays.push_back(array("drawn." + std::to_string(1000 + count++).substr(1) + "." + step, map));
+  });
+}
+
 int write_graph_out(const Arguments& a, const std::string& dot) {
   read_option("out", [&] {
     write_graph(a.output("out"), dot);
@@ -213,7 +227,7 @@ int run(Arguments& a) {
                             array("scaled", {t, s}, scaled)};
   arrays.push_back(array("input", input));
   const Json steps = trace(*file.model, input, arrays);
-  const Estimate drawn = Prepared(*file.model).estimate(input);
+  const Estimate drawn = draw(file, a.choice("precision", {"fp32", "int8"}) == "int8", input, arrays);
   arrays.push_back(array("picture", drawn.picture));
   if (drawn.predicted_error.defined()) arrays.push_back(array("predicted_error", drawn.predicted_error));
 

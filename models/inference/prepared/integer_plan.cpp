@@ -147,16 +147,27 @@ void copy_out(const Memory& m, int of, Dim first, Tensor& to) {
   real* target = to.data() + first * map.height * map.width * map.channels;
   for (Dim n = 0; n < m.images; ++n)
     for (Dim line = 0; line < map.height; ++line)
-      for (Dim i = 0; i < map.width * map.channels; ++i)
-        *target++ =
-            static_cast<real>(m.numbers(map)[n * map.image() + line * map.line() + i]) * m.plan.number_step();
+      for (Dim i = 0; i < map.width * map.channels; ++i) {
+        const Dim at = n * map.image() + line * map.line() + i;
+        *target++ = map.bytes ? static_cast<real>(map.scale.step * (m.bytes(map)[at] - map.scale.zero))
+                              : static_cast<real>(m.numbers(map)[at]) * m.plan.number_step();
+      }
+}
+
+void show(const StepWatch& watch, const Memory& m, const IntegerStep& step) {
+  const IntegerMap& y = m.plan.maps[static_cast<std::size_t>(step.y)];
+  Tensor map(Shape{y.height, y.width, y.channels});
+  copy_out(m, step.y, 0, map);
+  if (step.kind == IntegerStep::Kind::gates)  // in 4096ths
+    for (real& gate : map.values()) gate *= 1 / (4096 * m.plan.number_step());
+  watch(step.name, map);
 }
 
 }  // namespace
 
 float IntegerPlan::number_step() const { return std::ldexp(1.0F, -fraction_bits); }
 
-Estimate IntegerPlan::run(const Tensor& inputs) const {
+Estimate IntegerPlan::run(const Tensor& inputs, const StepWatch* watch) const {
   const Dim count = inputs.dim(0), size = count == 0 ? 0 : inputs.size() / count;
   Estimate out;
   const auto map_of = [&](int i) { return maps[static_cast<std::size_t>(i)]; };
@@ -170,7 +181,12 @@ Estimate IntegerPlan::run(const Tensor& inputs) const {
   for (Dim first = 0; first < count; first += kBlock) {
     const Memory block{*this, inputs.data() + first * size, std::min(kBlock, count - first), begin,
                        begin + scratch};
-    for (const IntegerStep& step : steps) run_step(step, block);
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+      run_step(steps[i], block);
+      const bool complete =
+          i + 1 == steps.size() || steps[i + 1].y != steps[i].y;  // by several steps at times
+      if (watch != nullptr && complete) show(*watch, block, steps[i]);
+    }
     copy_out(block, picture, first, out.picture);
     if (predicted_error >= 0) copy_out(block, predicted_error, first, out.predicted_error);
     if (latents >= 0) copy_out(block, latents, first, out.latents);

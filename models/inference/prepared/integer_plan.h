@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "autograd/kernels/fast/int8/int8.h"
+#include "models/inference/prepared/prepared.h"
 #include "models/inference/prepared/quantise.h"
 #include "models/inference/prepared/ranges.h"
 #include "models/networks/network.h"
@@ -64,7 +65,7 @@ struct IntegerPlan {
   /// network.
   static std::shared_ptr<const IntegerPlan> of(const Network& network, const ActivationRanges& ranges);
   /// Throws nothing; inputs as Network::estimate.
-  Estimate run(const Tensor& inputs) const;
+  Estimate run(const Tensor& inputs, const StepWatch* watch = nullptr) const;
   float number_step() const;
 
   std::vector<IntegerMap> maps;

@@ -71,6 +71,8 @@ Planner::Planner(const Variable& input, const std::vector<TracedOp>& ops, const 
                              "; models/inference/prepared/planner.h lists those that have one");
     takes_input(ops[i]);  // or throws
     (this->*make->second)(ops[i]);
+    if (maps_.contains(ops[i].y.node()))
+      plan_->made_.push_back({plan_->steps_.size(), std::string(ops[i].op), map_of(ops[i].y)});
     release_after(i);
   }
 }

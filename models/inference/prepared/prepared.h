@@ -3,7 +3,9 @@
 // is on a graph, and a warm call takes no memory from the heap and no lock.
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <string>
 
 #include "models/inference/prepared/ranges.h"
 #include "models/networks/network.h"
@@ -12,6 +14,10 @@ namespace supertac {
 
 class Plan;
 struct IntegerPlan;
+
+/// Is shown a map of one window, [height,width,channels], as soon as it is there: what computed it
+/// ("conv2d", "encoder.0.conv.1"), and its numbers; those of an int8 network as what they stand for.
+using StepWatch = std::function<void(const std::string& step, const Tensor& map)>;
 
 /// Draws the network's pictures up to rounding (1e-5 of the largest value). A picture has the same bits alone
 /// and in any batch, on every processor. Copies share their weights; any thread may call.
@@ -29,8 +35,14 @@ class Prepared {
   const Network& network() const { return *network_; }
   /// Throws as Network::draw.
   Estimate estimate(const Tensor& inputs) const;
+  /// The same of one window, every map shown on the way. A map whose memory has been taken again is another
+  /// step's. With SUPERTAC_ISA=plain nothing is shown. Throws std::invalid_argument for more windows than
+  /// one.
+  Estimate watched(const Tensor& input, const StepWatch& watch) const;
 
  private:
+  Estimate run(const Tensor& inputs, const StepWatch* watch) const;
+
   const Network* network_;
   std::shared_ptr<const Plan> plan_;
   std::shared_ptr<const IntegerPlan> integers_;  // instead

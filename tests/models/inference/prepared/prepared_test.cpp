@@ -198,6 +198,55 @@ TEST(Prepared, InBytesDrawsNearlyTheSame) {
   }
 }
 
+// Each op's map, in the order of the ops; a linear layer before a map leaves its numbers pixel by pixel.
+TEST(Prepared, ShowsEveryMapOnItsWay) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    Rng rng(seed);
+    const SuperTac network(random_settings(seed), rng);
+    const Tensor input = uniform(network.input_shape(1), 5);
+    std::vector<std::pair<std::string, std::vector<real>>> ops, shown;
+    {
+      const NoGrad no_grad;
+      const Trace trace;
+      network.draw(Variable(input));
+      for (const TracedOp& op : trace.ops())
+        if (op.op != "flatten_channels_first")
+          ops.emplace_back(op.op, std::vector(op.y.value().values().begin(), op.y.value().values().end()));
+    }
+    const Prepared prepared(network);
+    const Estimate drawn = prepared.watched(input, [&](const std::string& step, const Tensor& map) {
+      shown.emplace_back(step, std::vector(map.values().begin(), map.values().end()));
+    });
+    EXPECT_TRUE(std::ranges::equal(drawn.picture.values(), prepared.estimate(input).picture.values()));
+    ASSERT_EQ(ops.size(), shown.size());
+    for (std::size_t i = 0; i < ops.size(); ++i) {
+      EXPECT_EQ(ops[i].first, shown[i].first);
+      if (ops[i].first == "linear")
+        for (auto* values : {&ops[i].second, &shown[i].second}) std::ranges::sort(*values);
+      ASSERT_EQ(ops[i].second.size(), shown[i].second.size()) << i << ' ' << ops[i].first;
+      for (std::size_t k = 0; k < ops[i].second.size(); ++k)
+        ASSERT_NEAR(ops[i].second[k], shown[i].second[k], 1e-4) << i << ' ' << ops[i].first;
+    }
+  }
+}
+
+TEST(Prepared, InBytesShowsItsMapsAsWhatTheyStandFor) {
+  Rng rng(1);
+  const SuperTac network(random_settings(1), rng);
+  const Tensor input = uniform(network.input_shape(1), 5);
+  std::map<std::string, std::vector<real>> bytes;
+  const auto into = [](auto& maps) {
+    return [&maps](const std::string& step, const Tensor& map) {
+      maps[step] = std::vector(map.values().begin(), map.values().end());
+    };
+  };
+  const Prepared in_bytes = prepare(network, true);
+  const Estimate drawn = in_bytes.watched(input, into(bytes));
+  EXPECT_TRUE(std::ranges::equal(bytes.at("upsampler.out"), drawn.picture.values()));
+  EXPECT_TRUE(std::ranges::equal(in_bytes.estimate(input).picture.values(), drawn.picture.values()));
+  EXPECT_THROW(in_bytes.watched(uniform(network.input_shape(2), 5), into(bytes)), std::invalid_argument);
+}
+
 TEST(Prepared, RefusesTheRangesOfAnotherNetwork) {
   Rng rng(1);
   const SuperTac network(small_settings(), rng);
