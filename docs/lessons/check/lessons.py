@@ -3,7 +3,8 @@
 
     lessons.py engine N PIECE OUT [--mine]    writes OUT: pieces 1 to N - 1 of the file, or of the reader, and PIECE
     lessons.py prove CXX ARCHIVE [N ...]      every stub fails and names an entry, every solution passes, and each
-                                              mistake of planted.txt is found and named; of lessons N only
+                                              mistake of planted.txt is found and named; of lessons N only. What
+                                              the README shows of a stub is what it says
 """
 import pathlib
 import re
@@ -64,6 +65,12 @@ def planted():
             yield int(n), old, new, expected
 
 
+def quoted(n):
+    """What the README shows of a stub's output."""
+    found = re.search(rf"```text\nlesson {n}\n(.*?)```", (HERE.parent / "README.md").read_text(), re.S)
+    return " ".join(found.group(1).split()) if found else ""
+
+
 def prove(compiler, archive, *only):
     solutions, jobs = pieces(), {}
     for n, solution in enumerate(solutions, 1):
@@ -85,6 +92,8 @@ def prove(compiler, archive, *only):
             ran = subprocess.run([program, str(k)], capture_output=True, text=True, timeout=600)
             text = ran.stdout + ran.stderr
             good = ran.returncode == code and re.search(expected, text)
+            if name == "stub":
+                good = good and quoted(n) in " ".join(text.split())
             said = [line.strip() for line in text.splitlines() if "wrong:" in line or "passed" in line]
             done.append((good, f"lesson {n}, {name}: " + " | ".join(said[:3])))
         return done
