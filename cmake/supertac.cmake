@@ -60,27 +60,33 @@ if(SUPERTAC_SANITIZE)
   set(SUPERTAC_TEST_TIMEOUT 1800)
 endif()
 
-# supertac_cases(NAME [PREFIX text] [SLOW pattern ...]): every case of a GoogleTest program as a ctest case, labelled `slow`
-# where a pattern of SLOW matches (as in --gtest_filter), else `quick`: `ctest -L quick` ends within half a minute.
+# supertac_cases(NAME [PREFIX text] [SLOW pattern ...] [SERIAL pattern ...]): every case of a GoogleTest program as a ctest
+# case, labelled `slow` where a pattern of SLOW matches (as in --gtest_filter), else `quick`: `ctest -L quick` ends within
+# half a minute. What SERIAL matches, which SLOW may match too, runs alone.
 function(supertac_cases name)
-  cmake_parse_arguments(arg "" "PREFIX" "SLOW" ${ARGN})
+  cmake_parse_arguments(arg "" "PREFIX" "SLOW;SERIAL" ${ARGN})
   get_target_property(sources ${name} SOURCES)
   list(TRANSFORM sources PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
   set_property(GLOBAL APPEND PROPERTY SUPERTAC_TEST_SOURCES ${sources})
   list(JOIN arg_SLOW ":" slow)
+  list(JOIN arg_SERIAL ":" serial)
   set(properties DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${SUPERTAC_TEST_TIMEOUT} LABELS)
   if(NOT slow STREQUAL "*")
-    gtest_discover_tests(${name} TEST_PREFIX "${arg_PREFIX}" TEST_FILTER "-${slow}" ${properties} quick)
+    gtest_discover_tests(${name} TEST_PREFIX "${arg_PREFIX}" TEST_FILTER "-${slow}:${serial}" ${properties} quick)
   endif()
   if(slow)
-    gtest_discover_tests(${name} TEST_PREFIX "${arg_PREFIX}" TEST_FILTER "${slow}" ${properties} slow)
+    gtest_discover_tests(${name} TEST_PREFIX "${arg_PREFIX}" TEST_FILTER "${slow}-${serial}" ${properties} slow)
+  endif()
+  # A virtual rig in real time: what else runs would starve it.
+  if(serial)
+    gtest_discover_tests(${name} TEST_PREFIX "${arg_PREFIX}" TEST_FILTER "${serial}" ${properties} slow RUN_SERIAL ON)
   endif()
 endfunction()
 
 # supertac_test(NAME SOURCES a_test.cpp ... USES target ... [SLOW pattern ...]): one GoogleTest program.
 function(supertac_test name)
-  cmake_parse_arguments(arg "" "" "SOURCES;USES;SLOW" ${ARGN})
+  cmake_parse_arguments(arg "" "" "SOURCES;USES;SLOW;SERIAL" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_USES} supertac_options GTest::gtest GTest::gtest_main)
-  supertac_cases(${name} SLOW ${arg_SLOW})
+  supertac_cases(${name} SLOW ${arg_SLOW} SERIAL ${arg_SERIAL})
 endfunction()
