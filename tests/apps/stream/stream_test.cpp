@@ -1,7 +1,7 @@
-// Stream, and supertac-stream as a process: boards on a virtual rig in the test's own process, captures,
-// recordings.
+// What supertac-stream draws of replays, recordings and a board, and what becomes of files and options.
+#include "tests/apps/stream/streaming.h"
+
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -14,77 +14,11 @@
 #include "data/recordings/simulator.h"
 #include "data/windows/windows.h"
 #include "hardware/ports/serial_port.h"
-#include "hardware/virtual_rig/pty_rig.h"
-#include "io/files/file.h"
-#include "io/files/json.h"
-#include "models/files/model_file.h"
-#include "tests/apps/common/process.h"
-#include "tests/hardware/fake_sensor.h"
-#include "tests/hardware/numbered_board.h"
-#include "tests/io/temporary_folder.h"
 
 namespace supertac {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr Dim kTimesteps = 32;
-constexpr std::uintmax_t kTwoSeconds = 330'000;  // bytes of a capture
-
-// A model of random weights: what it draws means nothing, but it is the same on every way.
-void write_model(const std::string& path, Dim timesteps = kTimesteps, std::optional<double> filter_s = 0.0) {
-  Rng rng(1);
-  const SuperTac model({.timesteps = timesteps, .latent = 3, .scale = 2, .channels = 8, .rcabs = 1}, rng);
-  save_model(path, model, {300, {}, filter_s}, {});
-}
-
-RigSettings touching_rig() {
-  RigSettings settings;
-  settings.printer_running = true;
-  settings.board.signals = [](double, double, double, double t) {
-    std::array<double, 16> volts{};
-    for (std::size_t k = 0; k < volts.size(); ++k)
-      volts[k] = 2.3 + 0.1 * std::sin(20 * t + static_cast<double>(k));
-    return volts;
-  };
-  return settings;
-}
-
-class Streaming : public testing::Test {
- protected:
-  Streaming() { write_model(model()); }
-
-  std::string path(const std::string& name) const { return folder_ / name; }
-  std::string model() const { return path("model"); }
-  std::string board() const { return path("board"); }
-
-  std::vector<std::string> words(const std::vector<std::string>& more) const {
-    std::vector<std::string> all = {"--model", model(), "--quiet"};
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
-  }
-  ProcessResult stream(const std::vector<std::string>& more, const ProcessOptions& options = {}) const {
-    return run_process("supertac-stream", words(more), options);
-  }
-  // Starts the rig; a board that streams before anyone listens is what a program finds.
-  PtyRig& plug_in(const RigSettings& settings = touching_rig()) {
-    rig_ = std::make_unique<PtyRig>(settings, board(), path("printer"));
-    return *rig_;
-  }
-  SafetensorsFile kept(const std::string& name) const { return SafetensorsFile::read(path(name)); }
-  nlohmann::ordered_json result(const std::string& name) const {
-    return parse_json_limited(read_text_file(path(name), 1 << 20));
-  }
-
-  TemporaryFolder folder_;
-  std::unique_ptr<PtyRig> rig_;
-};
-
-void expect_failure(const ProcessResult& result, int code, const std::string& part) {
-  EXPECT_EQ(result.code, code) << result.error;
-  EXPECT_NE(result.error.find(part), std::string::npos) << result.error;
-  EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
-}
 
 TEST_F(Streaming, AReplayGivesThePicturesThatLiveHad) {
   plug_in();
@@ -205,105 +139,6 @@ TEST_F(Streaming, TakesModelsOfAnyWindowAndRefusesWhatWasFilteredOtherwise) {
   EXPECT_EQ(stream({"--recording", path("recording")}).code, 0);
 }
 
-TEST_F(Streaming, UnpluggingIsOneClearLineAndKeepsWhatWasSeen) {
-  PtyRig& rig = plug_in();
-  RunningProcess running("supertac-stream",
-                         words({"--board", board(), "--out", path("out"), "--capture", path("capture")}));
-  wait_for_file(path("capture"), kTwoSeconds);
-  rig.unplug_board();
-  const ProcessResult result = running.wait();
-  expect_failure(result, 1, "the device is gone");
-  EXPECT_GT(kept("out").f64("time_s").size(), 0U);
-  EXPECT_EQ(stream({"--replay", path("capture")}).code, 0);
-}
-
-// A terminal holds 25 ms of frames; what the board sends beyond while nobody reads is lost.
-TEST_F(Streaming, AProgramThatWasStoppedStartsANewWindow) {
-  PtyRig& rig = plug_in();
-  RunningProcess running("supertac-stream",
-                         words({"--board", board(), "--json", path("json"), "--capture", path("capture")}));
-  wait_for_growth(path("capture"), kTwoSeconds);  // it draws by now
-  running.send(SIGSTOP);
-  const auto sent_s = [&] {
-    double now = 0;
-    rig.with_world([&](RigWorld& world) { now = world.now(); });
-    return now;
-  };
-  for (const double stopped = sent_s(); sent_s() < stopped + 0.4;) usleep(1000);
-  running.send(SIGCONT);
-  wait_for_growth(path("capture"), kTwoSeconds / 2);
-  running.send(SIGINT);
-  ASSERT_EQ(running.wait().code, 130);
-  EXPECT_GE(result("json").at("gaps"), 1);
-  EXPECT_GE(result("json").at("suspect"), 1);
-}
-
-TEST_F(Streaming, ChunksOfAnAdapterCostLatencyAndNoPicture) {
-  RigSettings settings = touching_rig();
-  settings.chunk_s = 0.1;
-  plug_in(settings);
-  ASSERT_EQ(stream({"--board", board(), "--seconds", "5", "--json", path("json")}).code, 0);
-  const auto json = result("json");
-  EXPECT_EQ(json.at("gaps"), 0);
-  // All but those of the first window, and of the burst that had waited for somebody to listen.
-  const double made = json.at("pictures").get<double>() + json.at("dropped").get<double>();
-  EXPECT_GT(made, json.at("frames").get<double>() - 32 / 300.0 / rig::kFramePeriodS - 450);
-  EXPECT_GT(json.at("pictures"), 0);
-}
-
-// Stopped as by Ctrl-Z, or on a machine that swaps: what is recorded is dated right, or left out and counted.
-// SUPERTAC_MUTATIONS says how often.
-TEST_F(Streaming, StoppedForAWhileItRecordsWhatItCanDate) {
-  for (int seed = 1; seed <= mutations(2); ++seed) {
-    const RandomStream draw(static_cast<std::uint64_t>(seed), 3);
-    RigSettings settings = touching_rig();
-    NumberedBoard numbers(settings);
-    PtyRig& rig = plug_in(settings);
-    rig.with_world([&](RigWorld& world) { numbers.watch(world.board()); });
-    RunningProcess running("supertac-stream",
-                           {"--board", board(), "--record", path("kept"), "--capture", path("capture"),
-                            "--json", path("json"), "--quiet", "--force"});
-    wait_for_file(path("capture"), kTwoSeconds);
-    running.send(SIGSTOP);
-    usleep(static_cast<useconds_t>(1e6 * (0.05 + 1.5 * draw.uniform(1))));
-    running.send(SIGCONT);
-    wait_for_growth(path("capture"), kTwoSeconds);
-    running.send(SIGINT);
-    const ProcessResult ended = running.wait();
-    ASSERT_EQ(ended.code, 130) << ended.error;
-    const Recording recording = read_recording(result("json").at("recording"));
-    std::vector<double> off_s;  // from the board's own time, as far as the clocks' zeros are apart
-    for (std::size_t i = 0; i < recording.frames(); ++i)
-      for (const std::uint64_t n : numbers.numbers_in(recording.volts, i))
-        off_s.push_back(recording.time_s[i] - static_cast<double>(n) * rig::kFramePeriodS);
-    ASSERT_GT(off_s.size(), 1000U);
-    const auto [least, most] = std::ranges::minmax(off_s);
-    EXPECT_LT(most - least, 2 * PictureLog::kTrustedS) << "seed " << seed;
-    const std::string left_out = std::to_string(result("json").at("left_out").get<int>());
-    EXPECT_EQ(recording.metadata.contains("left_out_frames") ? recording.metadata.at("left_out_frames") : "0",
-              left_out);
-    EXPECT_EQ(ended.out.find("frames left out, their time being uncertain") == std::string::npos,
-              left_out == "0")
-        << ended.out;
-    rig_.reset();
-    fs::remove(path("capture"));
-  }
-}
-
-TEST_F(Streaming, PortsThatAreNotABoardAreNamed) {
-  expect_failure(stream({"--board", path("nowhere")}), 1, "no such port");
-  write_file(path("file"), "not a port");
-  expect_failure(stream({"--board", path("file")}), 1, "expected a serial port");
-  RigSettings settings = touching_rig();
-  settings.printer.heartbeat = true;
-  plug_in(settings);
-  const SerialPort first(board());
-  expect_failure(stream({"--board", board()}), 1, "already open in another program");
-  const ProcessResult printer = stream({"--board", path("printer")});
-  EXPECT_EQ(printer.code, 1);
-  EXPECT_NE(printer.error.find("expected"), std::string::npos) << printer.error;
-}
-
 TEST_F(Streaming, FilesThatAreMissingOrOfAnotherKindAreNamed) {
   expect_failure(stream({"--recording", path("none")}), 1, path("none"));
   expect_failure(stream({"--replay", path("none")}), 1, path("none"));
@@ -321,21 +156,6 @@ TEST_F(Streaming, WrongUsageIsExitCode2) {
   expect_failure(stream({"--recording", "a", "--seconds", "0"}), 2, "--seconds");
   expect_failure(run_process("supertac-stream", {"--board", "a"}), 1, "port a: no such port");
   EXPECT_EQ(run_process("supertac-stream", {"--list-ports"}).code, 0);
-}
-
-TEST_F(Streaming, ASignalEndsItCleanly) {
-  plug_in();
-  for (const int signal : {SIGINT, SIGTERM}) {
-    RunningProcess running("supertac-stream", words({"--board", board(), "--out", path("out"), "--json",
-                                                     path("json"), "--capture", path("capture"), "--force"}));
-    wait_for_file(path("capture"), kTwoSeconds);
-    running.send(signal);
-    const ProcessResult result = running.wait();
-    EXPECT_EQ(result.code, 128 + signal);
-    EXPECT_EQ(result.error, "");
-    EXPECT_EQ(kept("out").f64("time_s").size(), this->result("json").at("pictures"));
-    fs::remove(path("capture"));
-  }
 }
 
 TEST_F(Streaming, TooShortASignalSaysHowMuchIsNeeded) {

@@ -1,0 +1,134 @@
+// supertac-stream beside devices and hosts that pause, hand on late, vanish or are the wrong ones.
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+
+#include "apps/stream/picture_log.h"
+#include "data/recordings/recording.h"
+#include "hardware/ports/serial_port.h"
+#include "tests/apps/stream/streaming.h"
+#include "tests/hardware/fake_sensor.h"
+#include "tests/hardware/numbered_board.h"
+
+namespace supertac {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST_F(Streaming, UnpluggingIsOneClearLineAndKeepsWhatWasSeen) {
+  PtyRig& rig = plug_in();
+  RunningProcess running("supertac-stream",
+                         words({"--board", board(), "--out", path("out"), "--capture", path("capture")}));
+  wait_for_file(path("capture"), kTwoSeconds);
+  rig.unplug_board();
+  const ProcessResult result = running.wait();
+  expect_failure(result, 1, "the device is gone");
+  EXPECT_GT(kept("out").f64("time_s").size(), 0U);
+  EXPECT_EQ(stream({"--replay", path("capture")}).code, 0);
+}
+
+// A terminal holds 25 ms of frames; what the board sends beyond while nobody reads is lost.
+TEST_F(Streaming, AProgramThatWasStoppedStartsANewWindow) {
+  PtyRig& rig = plug_in();
+  RunningProcess running("supertac-stream",
+                         words({"--board", board(), "--json", path("json"), "--capture", path("capture")}));
+  wait_for_file(path("capture"), kTwoSeconds);  // it draws by now
+  running.send(SIGSTOP);
+  const auto sent_s = [&] {
+    double now = 0;
+    rig.with_world([&](RigWorld& world) { now = world.now(); });
+    return now;
+  };
+  for (const double stopped = sent_s(); sent_s() < stopped + 0.4;) usleep(1000);
+  running.send(SIGCONT);
+  wait_for_growth(path("capture"), kTwoSeconds / 2);
+  running.send(SIGINT);
+  ASSERT_EQ(running.wait().code, 130);
+  EXPECT_GE(result("json").at("gaps"), 1);
+  EXPECT_GE(result("json").at("suspect"), 1);
+}
+
+TEST_F(Streaming, ChunksOfAnAdapterCostLatencyAndNoPicture) {
+  RigSettings settings = touching_rig();
+  settings.chunk_s = 0.1;
+  plug_in(settings);
+  ASSERT_EQ(stream({"--board", board(), "--seconds", "5", "--json", path("json")}).code, 0);
+  const auto json = result("json");
+  EXPECT_EQ(json.at("gaps"), 0);
+  // All but those of the first window, and of the burst that had waited for somebody to listen.
+  const double made = json.at("pictures").get<double>() + json.at("dropped").get<double>();
+  EXPECT_GT(made, json.at("frames").get<double>() - 32 / 300.0 / rig::kFramePeriodS - 450);
+  EXPECT_GT(json.at("pictures"), 0);
+}
+
+// Stopped as by Ctrl-Z, or on a machine that swaps: what is recorded is dated right, or left out and counted.
+// SUPERTAC_MUTATIONS says how often.
+TEST_F(Streaming, StoppedForAWhileItRecordsWhatItCanDate) {
+  for (int seed = 1; seed <= mutations(2); ++seed) {
+    const RandomStream draw(static_cast<std::uint64_t>(seed), 3);
+    RigSettings settings = touching_rig();
+    NumberedBoard numbers(settings);
+    PtyRig& rig = plug_in(settings);
+    rig.with_world([&](RigWorld& world) { numbers.watch(world.board()); });
+    RunningProcess running("supertac-stream",
+                           {"--board", board(), "--record", path("kept"), "--capture", path("capture"),
+                            "--json", path("json"), "--quiet", "--force"});
+    wait_for_file(path("capture"), kTwoSeconds);
+    running.send(SIGSTOP);
+    usleep(static_cast<useconds_t>(1e6 * (0.05 + 1.5 * draw.uniform(1))));
+    running.send(SIGCONT);
+    wait_for_growth(path("capture"), kTwoSeconds);
+    running.send(SIGINT);
+    const ProcessResult ended = running.wait();
+    ASSERT_EQ(ended.code, 130) << ended.error;
+    const Recording recording = read_recording(result("json").at("recording"));
+    std::vector<double> off_s;  // from the board's own time, as far as the clocks' zeros are apart
+    for (std::size_t i = 0; i < recording.frames(); ++i)
+      for (const std::uint64_t n : numbers.numbers_in(recording.volts, i))
+        off_s.push_back(recording.time_s[i] - static_cast<double>(n) * rig::kFramePeriodS);
+    ASSERT_GT(off_s.size(), 1000U);
+    const auto [least, most] = std::ranges::minmax(off_s);
+    EXPECT_LT(most - least, 2 * PictureLog::kTrustedS) << "seed " << seed;
+    const std::string left_out = std::to_string(result("json").at("left_out").get<int>());
+    EXPECT_EQ(recording.metadata.contains("left_out_frames") ? recording.metadata.at("left_out_frames") : "0",
+              left_out);
+    EXPECT_EQ(ended.out.find("frames left out, their time being uncertain") == std::string::npos,
+              left_out == "0")
+        << ended.out;
+    rig_.reset();
+    fs::remove(path("capture"));
+  }
+}
+
+TEST_F(Streaming, PortsThatAreNotABoardAreNamed) {
+  expect_failure(stream({"--board", path("nowhere")}), 1, "no such port");
+  write_file(path("file"), "not a port");
+  expect_failure(stream({"--board", path("file")}), 1, "expected a serial port");
+  RigSettings settings = touching_rig();
+  settings.printer.heartbeat = true;
+  plug_in(settings);
+  const SerialPort first(board());
+  expect_failure(stream({"--board", board()}), 1, "already open in another program");
+  const ProcessResult printer = stream({"--board", path("printer")});
+  EXPECT_EQ(printer.code, 1);
+  EXPECT_NE(printer.error.find("expected"), std::string::npos) << printer.error;
+}
+
+TEST_F(Streaming, ASignalEndsItCleanly) {
+  plug_in();
+  for (const int signal : {SIGINT, SIGTERM}) {
+    RunningProcess running("supertac-stream", words({"--board", board(), "--out", path("out"), "--json",
+                                                     path("json"), "--capture", path("capture"), "--force"}));
+    wait_for_file(path("capture"), kTwoSeconds);
+    running.send(signal);
+    const ProcessResult result = running.wait();
+    EXPECT_EQ(result.code, 128 + signal);
+    EXPECT_EQ(result.error, "");
+    EXPECT_EQ(kept("out").f64("time_s").size(), this->result("json").at("pictures"));
+    fs::remove(path("capture"));
+  }
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,83 @@
+// supertac-stream, run on a virtual rig with a model of random weights.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hardware/virtual_rig/pty_rig.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
+#include "io/files/safetensors.h"
+#include "models/files/model_file.h"
+#include "tests/apps/common/process.h"
+#include "tests/io/temporary_folder.h"
+
+namespace supertac {
+
+constexpr Dim kTimesteps = 32;
+constexpr std::uintmax_t kTwoSeconds = 330'000;  // bytes of a capture
+
+// A model of random weights: what it draws means nothing, but it is the same on every way.
+inline void write_model(const std::string& path, Dim timesteps = kTimesteps,
+                        std::optional<double> filter_s = 0.0) {
+  Rng rng(1);
+  const SuperTac model({.timesteps = timesteps, .latent = 3, .scale = 2, .channels = 8, .rcabs = 1}, rng);
+  save_model(path, model, {300, {}, filter_s}, {});
+}
+
+inline RigSettings touching_rig() {
+  RigSettings settings;
+  settings.printer_running = true;
+  settings.board.signals = [](double, double, double, double t) {
+    std::array<double, 16> volts{};
+    for (std::size_t k = 0; k < volts.size(); ++k)
+      volts[k] = 2.3 + 0.1 * std::sin(20 * t + static_cast<double>(k));
+    return volts;
+  };
+  return settings;
+}
+
+class Streaming : public testing::Test {
+ protected:
+  Streaming() { write_model(model()); }
+
+  std::string path(const std::string& name) const { return folder_ / name; }
+  std::string model() const { return path("model"); }
+  std::string board() const { return path("board"); }
+
+  std::vector<std::string> words(const std::vector<std::string>& more) const {
+    std::vector<std::string> all = {"--model", model(), "--quiet"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+  ProcessResult stream(const std::vector<std::string>& more, const ProcessOptions& options = {}) const {
+    return run_process("supertac-stream", words(more), options);
+  }
+  // Starts the rig; a board that streams before anyone listens is what a program finds.
+  PtyRig& plug_in(const RigSettings& settings = touching_rig()) {
+    rig_ = std::make_unique<PtyRig>(settings, board(), path("printer"));
+    return *rig_;
+  }
+  SafetensorsFile kept(const std::string& name) const { return SafetensorsFile::read(path(name)); }
+  nlohmann::ordered_json result(const std::string& name) const {
+    return parse_json_limited(read_text_file(path(name), 1 << 20));
+  }
+
+  TemporaryFolder folder_;
+  std::unique_ptr<PtyRig> rig_;
+};
+
+inline void expect_failure(const ProcessResult& result, int code, const std::string& part) {
+  EXPECT_EQ(result.code, code) << result.error;
+  EXPECT_NE(result.error.find(part), std::string::npos) << result.error;
+  EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
+}
+
+}  // namespace supertac
