@@ -15,8 +15,8 @@ namespace {
 constexpr double kReadSlice = 0.05, kSilenceS = 3, kSilentPeriods = 10;
 constexpr std::size_t kReadBytes = 65536;  // no datagram is longer
 constexpr double kChunkS = 0.12;  // an adapter hands bytes on up to 0.1 s late: frames are lost beyond
-constexpr double kJumpS = 1, kJumpPeriods = 10;  // stamps farther from the one before are a jump
-constexpr double kMostStampS = 1e11;             // three thousand years; a double still tells 20 us apart
+constexpr double kJumpS = 0.1, kJumpPeriods = 10;  // stamps farther from the one before are a jump
+constexpr double kMostStampS = 1e11;               // three thousand years; a double still tells 20 us apart
 constexpr std::uint64_t kBlock = 64;
 constexpr std::size_t kShown = 120;
 
@@ -71,6 +71,7 @@ std::optional<double> FrameDates::by_stamp(double stamp_s, double arrival_s) {
 double FrameDates::by_arrival(double arrival_s) {
   if (count_ == 0) return arrival_s;
   const double due = last_s_ + period_s_, late = arrival_s - due;
+  const double earliest = last_s_ + 0.01 * period_s_;  // frames that arrive at once follow each other still
   if (late > std::max(kChunkS, 3 * period_s_)) {
     in_block_ = 0;
     return arrival_s;
@@ -80,10 +81,9 @@ double FrameDates::by_arrival(double arrival_s) {
     const double drift = least_late_s_ / static_cast<double>(kBlock);
     period_s_ = std::clamp(period_s_ + 0.5 * drift, 0.5 * nominal_s_, 2 * nominal_s_);
     in_block_ = 0;
-    return std::min(arrival_s, due + std::min(0.5 * least_late_s_, 0.4 * period_s_));
+    return std::max(earliest, std::min(arrival_s, due + std::min(0.5 * least_late_s_, 0.4 * period_s_)));
   }
-  // Not early, and later than the one before.
-  return late >= 0 ? due : std::max(arrival_s, last_s_ + 0.01 * period_s_);
+  return late >= 0 ? due : std::max(arrival_s, earliest);
 }
 
 SensorReader::SensorReader(OpenedPort opened, const Sensor& sensor)

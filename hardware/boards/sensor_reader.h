@@ -32,8 +32,9 @@ struct ReaderCounters {
 
 /// Dates frames in the order they come: by the sensor's stamps where it sends any (a counter of 16 or 32 bits
 /// may run over; a sensor that starts anew goes on where it was; a stamp that nothing goes on from costs its
-/// own frame, and so does the first one after a pause of seconds), else by arrival. A frame can come late,
-/// not early, so without stamps the frames are a period apart below the earliest arrivals.
+/// own frame, one less than 0.1 s or 10 periods ahead those that it overtakes; and so costs one the first
+/// frame after a longer pause), else by arrival. A frame can come late, not early, so without stamps the
+/// frames are a period apart below the earliest arrivals.
 class FrameDates {
  public:
   explicit FrameDates(const Sensor& sensor);

@@ -146,7 +146,7 @@ TEST(SensorReader, AWildStampIsBelievedByNobody) {
     return R"({"kind":"binary","header":"AA","type":"u16","time":{"type":")" + type + R"(","unit":"ms"}})";
   };
   for (const std::string type : {"u32", "u64", "f64"}) {
-    for (const double wild_s : {1e300, -1e300, 4e9, 1e7, 100.0, 3.0, -4.0}) {
+    for (const double wild_s : {1e300, -1e300, 4e9, 1e7, 100.0, 3.0, 0.5, -4.0}) {
       for (const int at : {0, 50}) {
         FrameDates dates(mat(1, 2, 100, format_of(type)));
         std::vector<double> times;
@@ -190,6 +190,20 @@ TEST(SensorReader, DatesByArrivalWhereNothingIsStamped) {
   EXPECT_NEAR(static_cast<double>(dates.missing()), 60, 12);
 }
 
+TEST(SensorReader, FramesThatArriveAtOnceAreAllDated) {
+  for (const double rate_hz : {10.0, 1000.0}) {
+    FrameDates dates(mat(1, 2, rate_hz, R"({"kind":"text"})"));
+    double last = -1;
+    for (int n = 0; n < 1000; ++n) {
+      const auto time = dates.date(std::nullopt, n < 500 ? 5 : 5.0001);
+      ASSERT_TRUE(time) << n;
+      ASSERT_GT(*time, last);
+      last = *time;
+    }
+    EXPECT_LT(last, 5 + 11 / rate_hz);
+  }
+}
+
 TEST(SensorReader, LosesNothingOfAThousandFramesOf16x16OverUdp) {
   const Sensor sensor = mat(16, 16, 1000, R"({"kind":"binary","header":"AA55","type":"u16"})");
   const int port = free_port(SOCK_DGRAM);
@@ -198,16 +212,14 @@ TEST(SensorReader, LosesNothingOfAThousandFramesOf16x16OverUdp) {
   const sockaddr_in to = at_port(port);
   // The kernel keeps some 200 kB for a reader: one whose machine is busy elsewhere is waited for.
   constexpr std::uint64_t kUnderWay = 64;
-  std::thread sender([&] {
+  const std::jthread sender([&](const std::stop_token& over) {
     for (std::uint64_t n = 0; n < 2000; ++n) {
-      while (n > reader.counters().decoder.frames + kUnderWay) usleep(1000);
+      while (!over.stop_requested() && n > reader.counters().decoder.frames + kUnderWay) usleep(1000);
       const std::string frame = sent_frame(sensor, numbered(sensor, static_cast<int>(n)), 0);
       sendto(out, frame.data(), frame.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
     }
   });
   const std::vector<ReadFrame> frames = all_of(reader, 2000);
-  sender.join();
-  close(out);
   ASSERT_EQ(frames.size(), 2000U);
   for (int n = 0; n < 2000; ++n) ASSERT_EQ(frames[static_cast<std::size_t>(n)].signals.front(), n);
 }
