@@ -39,14 +39,16 @@ void declare(Arguments& arguments) {
 
 namespace {
 
+void refuse_others(const Arguments& arguments, const std::string& reason,
+                   const std::vector<std::string>& others) {
+  for (const std::string& other : others)
+    if (arguments.given(other))
+      throw UsageError(reason + ", found with " + (other == "INPUT" ? "" : "--") + other);
+}
+
 FolderImport import_settings(const Arguments& arguments, std::optional<Progress>& bar, std::size_t& bad) {
   FolderImport settings{.speed_mm_s = arguments.number("speed", 0.1, 1000)};
-  settings.left_out = [&](const FileError& error) {
-    if (!arguments.flag("skip-bad"))
-      throw std::runtime_error(std::string(error.what()) + " (--skip-bad leaves such files out)");
-    arguments.note(std::string("left out: ") + error.what());
-    ++bad;
-  };
+  settings.left_out = [&](const FileError& error) { leave_out(arguments, error, bad); };
   settings.progress = [&](std::size_t done, std::size_t files) {
     stop_if_interrupted();
     if (!bar) bar.emplace(arguments, "importing", files, "files");
@@ -55,19 +57,23 @@ FolderImport import_settings(const Arguments& arguments, std::optional<Progress>
   return settings;
 }
 
-/// A file of tensors that is no recording.
-bool holds_pairs(const std::string& input) {
-  if (!input.ends_with(".safetensors") || !std::filesystem::is_regular_file(input)) return false;
-  const auto metadata = SafetensorsFile::read(input).metadata();
-  const auto kind = metadata.find("kind");
-  return kind == metadata.end() || kind->second != "recording";
+/// A file of tensors that is no recording; nothing where the input is anything else.
+std::optional<SafetensorsFile> pairs_of(const std::string& input) {
+  if (!input.ends_with(".safetensors") || !std::filesystem::is_regular_file(input)) return std::nullopt;
+  SafetensorsFile file = SafetensorsFile::read(input);
+  const auto kind = file.metadata().find("kind");
+  if (kind != file.metadata().end() && kind->second == "recording") return std::nullopt;
+  return file;
 }
 
-int convert_pairs(const Arguments& arguments, const std::string& path) {
+int convert_pairs(const Arguments& arguments, const SafetensorsFile& file) {
+  refuse_others(
+      arguments, "a file of pairs is converted as it is",
+      {"speed", "pictures", "skip-bad", "columns", "plate", "positions", "truth", "truth-range", "group"});
   std::optional<Sensor> sensor;
   if (arguments.given("sensor")) sensor = read_sensor(arguments.text("sensor"));
-  const std::vector<Recording> recordings = import_pairs(path, sensor);
-  add_parent_file("pairs", path);
+  const std::vector<Recording> recordings = import_pairs(file, sensor);
+  add_parent_file("pairs", file.path());
   OutputFolder folder(arguments.output("out"));
   std::size_t frames = 0;
   for (const Recording& recording : recordings) {
@@ -85,9 +91,8 @@ int convert_pairs(const Arguments& arguments, const std::string& path) {
 }
 
 int recover(const Arguments& arguments) {
-  for (const char* other : {"INPUT", "speed", "skip-bad", "pictures", "sensor"})
-    if (arguments.given(other))
-      throw UsageError(std::string("--journal: stands alone with --out, found with ") + other);
+  refuse_others(arguments, "--journal stands alone with --out",
+                {"INPUT", "speed", "skip-bad", "pictures", "sensor"});
   const std::string out = arguments.text("out");
   OutputFolder folder(arguments.output("out"));
   const PassesReport report = write_passes(arguments, arguments.text("journal"), out, folder);
@@ -106,11 +111,10 @@ int run(Arguments& arguments) {
   if (arguments.given("journal")) return recover(arguments);
   if (!arguments.given("INPUT")) throw UsageError("expected INPUT or --journal FILE, found neither");
   const std::string input = arguments.text("INPUT");
-  const bool pairs = holds_pairs(input);
-  if (pairs || arguments.given("sensor")) {
-    if (arguments.given("pictures")) throw UsageError("--pictures: of the rig's text files only");
-    if (pairs && arguments.given("speed")) throw UsageError("--speed: of passes only");
-    return pairs ? convert_pairs(arguments, input) : import_tables(arguments, input);
+  if (const auto pairs = pairs_of(input)) return convert_pairs(arguments, *pairs);
+  if (arguments.given("sensor")) {
+    refuse_others(arguments, "pictures are of the rig's text files", {"pictures"});
+    return import_tables(arguments, input);
   }
   const std::string out = arguments.text("out");
   OutputFolder folder(arguments.output("out"));

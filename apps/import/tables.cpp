@@ -15,6 +15,7 @@
 #include "data/registration/apply_registration.h"
 #include "data/registration/registration.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -23,23 +24,26 @@ namespace fs = std::filesystem;
 
 struct TableFile {
   fs::path path;
+  std::string folder;  // below the input
   std::string group;
 };
 
+bool is_recording(const fs::path& path) { return path.extension() == ".safetensors"; }
 bool is_table(const fs::path& path) {
-  static const std::set<std::string> kinds = {".csv", ".txt", ".tsv", ".npy", ".safetensors"};
-  return kinds.contains(path.extension().string());
+  static const std::set<std::string> kinds = {".csv", ".txt", ".tsv", ".npy"};
+  return is_recording(path) || kinds.contains(path.extension().string());
 }
 
 std::vector<TableFile> tables_of(const std::string& input, const std::string& group) {
-  if (!fs::is_directory(input)) return {{input, group}};
+  if (!fs::is_directory(input)) return {{input, "", group}};
   std::vector<TableFile> tables;
   for (const auto& entry : fs::directory_iterator(input)) {
-    if (!entry.is_directory() && is_table(entry.path())) tables.push_back({entry.path(), group});
+    if (!entry.is_directory() && is_table(entry.path())) tables.push_back({entry.path(), "", group});
     if (!entry.is_directory()) continue;
     for (const auto& below : fs::directory_iterator(entry.path()))
       if (is_table(below.path()))
-        tables.push_back({below.path(), group.empty() ? entry.path().filename().string() : group});
+        tables.push_back({below.path(), entry.path().filename().string(),
+                          group.empty() ? entry.path().filename().string() : group});
   }
   std::ranges::sort(tables, {}, &TableFile::path);
   if (tables.empty())
@@ -47,13 +51,25 @@ std::vector<TableFile> tables_of(const std::string& input, const std::string& gr
   return tables;
 }
 
-/// What stands beside a table: FILE itself, or the file of the table's name in the folder FILE.
-std::string companion(const Arguments& arguments, const std::string& option, const fs::path& table) {
+/// What stands beside a table: FILE itself, or the table of its name in the folder FILE, where tables of a
+/// folder have a folder of that name.
+std::string companion(const Arguments& arguments, const std::string& option, const TableFile& table) {
   const std::string named = arguments.text(option);
   if (named.empty() || !fs::is_directory(named)) return named;
-  for (const auto& entry : fs::directory_iterator(named))
-    if (is_table(entry.path()) && entry.path().stem() == table.stem()) return entry.path().string();
-  throw FileError(named, "holds no table of the name " + table.stem().string() + " for --" + option);
+  const fs::path folder = fs::path(named) / table.folder;
+  std::string found;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    if (!is_table(entry->path()) || is_recording(entry->path()) || entry->path().stem() != table.path.stem())
+      continue;
+    if (!found.empty())
+      throw FileError(folder.string(), "holds two tables of the name " + table.path.stem().string());
+    found = entry->path().string();
+  }
+  if (found.empty())
+    throw FileError(folder.string(),
+                    "holds no table of the name " + table.path.stem().string() + " for --" + option);
+  return found;
 }
 
 /// What all tables of an import have in common.
@@ -65,7 +81,8 @@ struct TableImport {
         truth_range(a.numbers("truth-range", -1e30, 1e30)),
         plate_name(a.text("plate")),
         speed_mm_s(a.number("speed", 0.1, 1000)) {
-    if (truth_range.size() != 2) throw UsageError("--truth-range: expected two different numbers, LOW,HIGH");
+    if (truth_range.size() != 2 || truth_range[0] == truth_range[1])
+      throw UsageError("--truth-range: expected two different numbers, LOW,HIGH");
     if (is_unknown_plate(plate_name)) return;
     plate = read_option("plate", [&] { return Plate::named(plate_name); });
     plate_name = fs::path(plate_name).filename().string();
@@ -73,7 +90,7 @@ struct TableImport {
 
   /// What a table holds, or a recording of this sensor that supertac-stream kept.
   Recording read(const std::string& path, std::size_t& dropped) const {
-    if (!path.ends_with(".safetensors")) {
+    if (!is_recording(path)) {
       const Table table = read_table(path);
       dropped = table.dropped;
       return recording_of_table(path, table, map, sensor);
@@ -83,6 +100,9 @@ struct TableImport {
       throw FileError(path, "was recorded with " + recording.array.text() + " in " +
                                 recording.signal_scale.unit + ", the sensor's file says " +
                                 sensor.array.text() + " in " + sensor.scale.unit);
+    if (recording.plate.find('/') != std::string::npos)
+      throw FileError(path,
+                      "names the plate " + in_quotes(recording.plate) + ", expected a name without '/'");
     return recording;
   }
 
@@ -95,9 +115,9 @@ struct TableImport {
     recording.trial = std::max(1, recording.trial), recording.pass = pass;
     recording.metadata["file"] = file.path.filename().string();
     if (!file.group.empty()) recording.metadata["group"] = file.group;
-    if (const std::string log = companion(arguments, "positions", path); !log.empty())
+    if (const std::string log = companion(arguments, "positions", file); !log.empty())
       add_positions(recording, log, read_table(log), map.time_unit_s);
-    if (const std::string images = companion(arguments, "truth", path); !images.empty())
+    if (const std::string images = companion(arguments, "truth", file); !images.empty())
       add_truth(recording, images, read_table(images), truth_range[0], truth_range[1]);
     if (plate && recording.position_mm.empty() && recording.truth.empty()) {
       recording.speed_mm_s = speed_mm_s;
@@ -117,6 +137,13 @@ struct TableImport {
 };
 
 }  // namespace
+
+void leave_out(const Arguments& arguments, const FileError& error, std::size_t& left_out) {
+  if (!arguments.flag("skip-bad"))
+    throw std::runtime_error(std::string(error.what()) + " (--skip-bad leaves such files out)");
+  arguments.note(std::string("left out: ") + error.what());
+  ++left_out;
+}
 
 void declare_tables(Arguments& arguments) {
   arguments
@@ -171,11 +198,9 @@ int import_tables(const Arguments& arguments, const std::string& input) {
                        {"truth", !recording.truth.empty()}});
       if (fit) files.back()["reliable"] = fit->reliable, files.back()["residual_mm"] = fit->residual;
     } catch (const FileError& error) {
-      if (!arguments.flag("skip-bad"))
-        throw FileError(error.path(), std::string(error.what()).substr(error.path().size() + 2) +
-                                          (tables.size() > 1 ? " (--skip-bad leaves such files out)" : ""));
-      arguments.note(std::string("left out: ") + error.what());
-      ++left_out;
+      leave_out(arguments, error, left_out);
+    } catch (const std::invalid_argument& error) {  // of a recording that breaks a rule of its own
+      leave_out(arguments, FileError(path, error.what()), left_out);
     }
   }
   bar.reset();

@@ -5,6 +5,9 @@
 
 namespace supertac {
 
+/// Counts and names a file that is no recording under --skip-bad. Throws std::runtime_error without it.
+void leave_out(const Arguments& arguments, const FileError& error, std::size_t& left_out);
+
 /// Declares --sensor and what belongs to it.
 void declare_tables(Arguments& arguments);
 

@@ -10,19 +10,12 @@
 #include "hardware/boards/sensor_decoder.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
 
 constexpr std::size_t kBytesOfNumber = 32, kBytesBesides = 4096;  // of the longest line
-
-bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
-
-std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
-  return text;
-}
 
 /// Cuts the stream into lines; one that is too long to be a frame is thrown away as it comes.
 class LineDecoder : public SensorDecoder {
@@ -124,24 +117,6 @@ class RigDecoder : public SensorDecoder {
 };
 
 }  // namespace
-
-std::vector<std::string_view> split_line(std::string_view line, char separator) {
-  std::vector<std::string_view> columns;
-  line = trimmed(line);
-  while (!line.empty()) {
-    const std::size_t end =
-        std::min(separator == ' ' ? line.find_first_of(" \t") : line.find(separator), line.size());
-    columns.push_back(trimmed(line.substr(0, end)));
-    line.remove_prefix(std::min(end + 1, line.size()));
-    if (separator == ' ') line = trimmed(line);
-  }
-  return columns;
-}
-
-std::optional<double> number_of(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);
-  return parse_double(text);
-}
 
 bool flatten(const nlohmann::ordered_json& json, std::vector<float>& numbers) {
   if (json.is_number()) {

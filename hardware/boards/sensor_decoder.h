@@ -40,12 +40,6 @@ class SensorDecoder {
 /// one.
 std::unique_ptr<SensorDecoder> make_decoder(const Sensor& sensor);
 
-// The numbers and time stamps in a line, as the probe looks at them too.
-/// What stands between the separators, without blanks around it; ' ' is any white space. An empty last one is
-/// left out.
-std::vector<std::string_view> split_line(std::string_view line, char separator);
-/// A number, with or without a leading '+'; nothing when it is none.
-std::optional<double> number_of(std::string_view text);
 /// All numbers of a JSON value, nested arrays in turn; false when it holds anything else.
 bool flatten(const nlohmann::ordered_json& json, std::vector<float>& numbers);
 

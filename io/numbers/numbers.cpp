@@ -28,6 +28,11 @@ std::optional<double> parse_double(std::string_view text) { return parse<double>
 std::optional<std::int64_t> parse_int(std::string_view text) { return parse<std::int64_t>(text); }
 std::optional<std::uint64_t> parse_uint(std::string_view text) { return parse<std::uint64_t>(text); }
 
+std::optional<double> number_of(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  return parse_double(text);
+}
+
 std::string format(double value) { return to_text(value); }
 std::string format(float value) { return to_text(value); }
 std::string format(double value, int decimals) { return to_text(value, std::chars_format::fixed, decimals); }

@@ -12,6 +12,27 @@ std::string printable(std::string_view text, std::size_t longest) {
 
 std::string in_quotes(std::string_view text) { return "'" + printable(text) + "'"; }
 
+static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+std::vector<std::string_view> split_line(std::string_view line, char separator) {
+  std::vector<std::string_view> columns;
+  line = trimmed(line);
+  while (!line.empty()) {
+    const std::size_t end =
+        std::min(separator == ' ' ? line.find_first_of(" \t") : line.find(separator), line.size());
+    columns.push_back(trimmed(line.substr(0, end)));
+    line.remove_prefix(std::min(end + 1, line.size()));
+    if (separator == ' ') line = trimmed(line);
+  }
+  return columns;
+}
+
 std::vector<std::string> comma_list(const std::string& text) {
   std::vector<std::string> words;
   for (std::size_t at = 0; at < text.size();) {

@@ -15,6 +15,13 @@ std::string printable(std::string_view text, std::size_t longest = 60);
 /// printable() in single quotes.
 std::string in_quotes(std::string_view text);
 
+/// Without blanks, tabs and carriage returns at either end.
+std::string_view trimmed(std::string_view text);
+
+/// The columns of a line of text, each trimmed; an empty last one is left out. ' ' stands for any white
+/// space.
+std::vector<std::string_view> split_line(std::string_view line, char separator);
+
 /// What stands between the commas; nothing of an empty text.
 std::vector<std::string> comma_list(const std::string& text);
 

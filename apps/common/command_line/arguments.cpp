@@ -33,8 +33,8 @@ void add(cxxopts::Options& parser, const std::string& group, const std::string& 
 }
 
 // What programs write, and the values that may name a file to be read.
-constexpr std::array<std::string_view, 8> kOutputs = {"capture", "gcode",   "json",     "onnx",
-                                                      "out",     "outputs", "pictures", "report"};
+constexpr std::array<std::string_view, 10> kOutputs = {"c99",  "capture", "gcode",   "json",     "mcap",
+                                                       "onnx", "out",     "outputs", "pictures", "report"};
 constexpr std::array<std::string_view, 5> kPathValues = {"FILE", "DIR", "JOURNAL", "INPUT", "NAME"};
 
 bool names_path(const std::string& value) {

@@ -90,8 +90,7 @@ std::map<std::string, std::vector<std::size_t>> groups_of(const SafetensorsFile&
 
 }  // namespace
 
-std::vector<Recording> import_pairs(const std::string& path, const std::optional<Sensor>& sensor) {
-  const SafetensorsFile file = SafetensorsFile::read(path);
+std::vector<Recording> import_pairs(const SafetensorsFile& file, const std::optional<Sensor>& sensor) {
   const Shape &input = shape_of(file, "input", "[N,C,H,W]"),
               &target = shape_of(file, "target", "[N,1,sH,sW]");
   Recording like;
@@ -109,8 +108,8 @@ std::vector<Recording> import_pairs(const std::string& path, const std::optional
   if (sensor) {
     like.array.pitch_mm = sensor->array.pitch_mm, like.signal_scale = sensor->scale;
     if (like.array != sensor->array)
-      throw FileError(path, "holds frames of " + like.array.text() + ", expected those of the sensor, " +
-                                sensor->array.text());
+      throw FileError(file.path(), "holds frames of " + like.array.text() +
+                                       ", expected those of the sensor, " + sensor->array.text());
   }
   const auto channels = static_cast<std::size_t>(like.array.channels),
              taxels = static_cast<std::size_t>(like.array.taxels()),

@@ -101,24 +101,20 @@ Table numpy_table(const std::string& path, FileReader& file) {
   if (left % row_bytes != 0 || left / row_bytes != shape[0])
     refuse("holds " + std::to_string(left) + " bytes of values, its shape needs " + std::to_string(shape[0]) +
            " x " + std::to_string(row_bytes) + "; it is cut or damaged");
+  if (shape[0] * table.columns > kMaxBytes / sizeof(double))
+    refuse("holds more than " + std::to_string(kMaxBytes / sizeof(double)) + " numbers; cut it into several");
   table.values.reserve(shape[0] * table.columns);
-  std::vector<std::byte> row(row_bytes);
-  for (std::size_t i = 0; i < shape[0]; ++i) {
-    file.read(row);
-    number->second.convert(row, table.values);
+  const std::size_t rows_at_once = std::max<std::size_t>(1, (std::size_t{1} << 20) / row_bytes);
+  std::vector<std::byte> rows;
+  for (std::size_t i = 0; i < shape[0]; i += rows_at_once) {
+    rows.resize(std::min(rows_at_once, shape[0] - i) * row_bytes);
+    file.read(rows);
+    number->second.convert(rows, table.values);
   }
   return table;
 }
 
 // --- text
-
-std::string_view trimmed(std::string_view text) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
-  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
-  return text;
-}
 
 /// The first of , ; tab that the line has; else, and where a line of numbers mixes them, blanks and tabs.
 char separator_of(std::string_view line) {
@@ -129,17 +125,16 @@ char separator_of(std::string_view line) {
 }
 
 std::vector<std::string_view> cells_of(std::string_view line, char separator) {
-  std::vector<std::string_view> cells;
-  for (line = trimmed(line); !line.empty();) {
-    const std::size_t end =
-        std::min(separator == ' ' ? line.find_first_of(" \t") : line.find(separator), line.size());
-    cells.push_back(trimmed(line.substr(0, end)));
-    const bool more = end < line.size();
-    line.remove_prefix(end + (more ? 1 : 0));
-    if (separator == ' ') line = trimmed(line);
-    if (more && line.empty()) cells.emplace_back();
-  }
+  std::vector<std::string_view> cells = split_line(line, separator);
+  for (std::string_view& cell : cells)
+    if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
   return cells;
+}
+
+/// Empty lines and remarks hold none.
+bool holds_row(std::string_view line) {
+  const std::string_view content = trimmed(line);
+  return !content.empty() && content.front() != '#';
 }
 
 /// How many columns most of the first lines have.
@@ -148,7 +143,7 @@ std::size_t usual_columns(std::string_view text, char separator) {
   for (int i = 0; i < 1000 && !text.empty(); ++i) {
     const std::string_view line = text.substr(0, text.find('\n'));
     text.remove_prefix(std::min(text.size(), line.size() + 1));
-    if (const std::size_t cells = cells_of(line, separator).size(); cells > 0) ++counts[cells];
+    if (holds_row(line)) ++counts[cells_of(line, separator).size()];
   }
   const auto most = std::ranges::max_element(counts, {}, [](const auto& c) { return c.second; });
   return most == counts.end() ? 0 : most->first;
@@ -156,10 +151,8 @@ std::size_t usual_columns(std::string_view text, char separator) {
 
 bool append_numbers(const std::vector<std::string_view>& cells, std::vector<double>& values) {
   const std::size_t before = values.size();
-  for (const std::string_view cell : cells) {
-    const auto value = parse_double(cell.starts_with('+') ? cell.substr(1) : cell);
-    if (value) values.push_back(*value);
-  }
+  for (const std::string_view cell : cells)
+    if (const auto value = number_of(cell)) values.push_back(*value);
   if (values.size() == before + cells.size()) return true;
   values.resize(before);
   return false;
@@ -176,18 +169,19 @@ Table text_table(const std::string& path) {
     const std::string_view line = text.substr(0, text.find('\n'));
     const std::string_view rest = text.substr(std::min(text.size(), line.size() + 1));
     ++number;
-    if (const std::string_view content = trimmed(line); !content.empty() && content.front() != '#') {
+    if (holds_row(line)) {
       if (separator == 0) {
-        separator = separator_of(content);
+        separator = separator_of(trimmed(line));
         table.columns = usual_columns(text, separator);
         table.shape = {table.columns};
       }
-      const auto cells = cells_of(content, separator);
+      const auto cells = cells_of(line, separator);
       ++lines;
       const bool fits = cells.size() == table.columns;
       if (fits && append_numbers(cells, table.values)) {
-        table.lines.push_back(number);
-      } else if (fits && lines == 1) {
+        table.lines.push_back(number), table.places.push_back(lines);
+      } else if (fits && lines == 1 &&
+                 std::ranges::none_of(cells, [](auto cell) { return number_of(cell).has_value(); })) {
         table.names.assign(cells.begin(), cells.end());
       } else {
         ++table.dropped;

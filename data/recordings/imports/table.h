@@ -9,12 +9,13 @@
 namespace supertac {
 
 struct Table {
-  std::vector<std::string> names;  ///< of the columns; empty where the file names none
-  std::vector<std::size_t> shape;  ///< of a row: {columns}, or of an array's {height, width, ...}
-  std::size_t columns = 0;         ///< numbers in a row
-  std::vector<double> values;      ///< row after row
-  std::vector<std::size_t> lines;  ///< of a text: the line that each row stands in, from 1
-  std::size_t dropped = 0;         ///< lines of a text that have other columns, or no numbers
+  std::vector<std::string> names;   ///< of the columns; empty where the file names none
+  std::vector<std::size_t> shape;   ///< of a row: {columns}, or of an array's {height, width, ...}
+  std::size_t columns = 0;          ///< numbers in a row
+  std::vector<double> values;       ///< row after row
+  std::vector<std::size_t> lines;   ///< of a text: the line that each row stands in, from 1
+  std::vector<std::size_t> places;  ///< of a text: the same, remarks and empty lines not counted
+  std::size_t dropped = 0;          ///< lines of a text that have other columns, or no numbers
 
   std::size_t rows() const { return columns == 0 ? 0 : values.size() / columns; }
   std::span<const double> row(std::size_t i) const { return {values.data() + i * columns, columns}; }

@@ -83,7 +83,9 @@ void spread_equal_stamps(std::vector<double>& time_s, double step) {
 std::vector<double> times_of(const std::string& path, const Table& table, std::size_t column, double unit,
                              double rate_hz) {
   // A line that was dropped leaves its time empty.
-  const auto number = [&](std::size_t i) { return table.dropped > 0 ? table.lines[i] - table.lines[0] : i; };
+  const auto number = [&](std::size_t i) {
+    return table.places.empty() ? i : table.places[i] - table.places[0];
+  };
   std::vector<double> time_s;
   for (std::size_t i = 0; i < table.rows(); ++i) {
     const double t =
@@ -137,9 +139,18 @@ void check_taxel(const std::string& path, const Table& table, std::size_t column
                               "; name another column, or mend the sensor's file");
 }
 
-float interpolated(const Table& log, std::size_t before, std::size_t column, double share) {
+/// NaN is a position that is not known.
+float checked_mm(const std::string& path, const Table& table, std::size_t column, double mm) {
+  constexpr double kFarthestMm = 1e5;
+  if (std::isnan(mm) || std::abs(mm) <= kFarthestMm) return static_cast<float>(mm);
+  throw FileError(
+      path, name_of(table, column) + " as a position holds " + format(mm) + ", expected mm on the plate");
+}
+
+float interpolated(const std::string& path, const Table& log, std::size_t before, std::size_t column,
+                   double share) {
   const double a = log.row(before)[column], b = log.row(before + 1)[column];
-  return static_cast<float>(a + share * (b - a));
+  return checked_mm(path, log, column, a + share * (b - a));
 }
 
 }  // namespace
@@ -189,12 +200,9 @@ Recording recording_of_table(const std::string& path, const Table& table, const 
       sent[k] = static_cast<float>(table.row(i)[columns.values[k]]);
     sensor.arrange(sent, std::span(recording.volts).subspan(i * signals, signals));
     if (columns.x == Columns::kNone) continue;
-    recording.position_mm.push_back(static_cast<float>(table.row(i)[columns.x]));
-    recording.position_mm.push_back(static_cast<float>(table.row(i)[columns.y]));
+    for (const std::size_t column : {columns.x, columns.y})
+      recording.position_mm.push_back(checked_mm(path, table, column, table.row(i)[column]));
   }
-  if (std::ranges::any_of(recording.position_mm, [](float mm) { return std::abs(mm) > 1e5F; }))
-    throw FileError(path, name_of(table, columns.x) + " and " + name_of(table, columns.y) +
-                              " as positions lie beyond 100 m; expected mm on the plate");
   return recording;
 }
 
@@ -217,8 +225,8 @@ void add_positions(Recording& recording, const std::string& path, const Table& l
     if (after == time_s.begin() || (after == time_s.end() && t > time_s.back())) continue;
     const auto before = static_cast<std::size_t>(std::min(after, time_s.end() - 1) - time_s.begin()) - 1;
     const double share = (t - time_s[before]) / (time_s[before + 1] - time_s[before]);
-    recording.position_mm[2 * i] = interpolated(log, before, x, share);
-    recording.position_mm[2 * i + 1] = interpolated(log, before, y, share);
+    recording.position_mm[2 * i] = interpolated(path, log, before, x, share);
+    recording.position_mm[2 * i + 1] = interpolated(path, log, before, y, share);
     ++known;
   }
   if (known == 0)
@@ -228,14 +236,14 @@ void add_positions(Recording& recording, const std::string& path, const Table& l
 }
 
 void add_truth(Recording& recording, const std::string& path, const Table& images, double low, double high) {
-  if (images.shape.size() < 2)
-    throw FileError(path, "has rows of " + std::to_string(images.columns) +
-                              " numbers, expected images: an array [frames, height, width] in a .npy file");
+  if (images.shape.size() != 2)
+    throw FileError(path, "has rows of rank " + std::to_string(images.shape.size()) +
+                              ", expected images: an array [frames, height, width] in a .npy file");
   if (images.rows() != recording.frames())
     throw FileError(path, "holds " + std::to_string(images.rows()) + " images, the recording has " +
                               std::to_string(recording.frames()) + " frames; expected one for each");
   recording.truth_height = static_cast<int>(images.shape[0]);
-  recording.truth_width = static_cast<int>(images.columns / images.shape[0]);
+  recording.truth_width = static_cast<int>(images.shape[1]);
   recording.truth.clear();
   for (const double value : images.values) {
     const double scaled = (value - low) / (high - low);

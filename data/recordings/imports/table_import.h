@@ -50,6 +50,6 @@ void add_truth(Recording& recording, const std::string& path, const Table& image
 /// were taken: they are one second apart, and there is no trial. `sensor` says what the numbers mean; without
 /// it pressing raises them, from the lowest value of the file to the highest, and taxels are 1 mm apart.
 /// Throws FileError naming the tensor, what was expected and found.
-std::vector<Recording> import_pairs(const std::string& path, const std::optional<Sensor>& sensor = {});
+std::vector<Recording> import_pairs(const SafetensorsFile& file, const std::optional<Sensor>& sensor = {});
 
 }  // namespace supertac

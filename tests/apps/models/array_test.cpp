@@ -287,5 +287,48 @@ TEST(Array, ATableWithoutPositionsIsRegisteredAgainstItsPlate) {
   EXPECT_EQ(read_recording(list_recordings(folder / "again").front()).position_mm, found.position_mm);
 }
 
+// Tables of two days have the same names; what stands beside them is in folders of theirs.
+TEST(Array, CompanionsBelongToTheirOwnTable) {
+  const TemporaryFolder folder;
+  const std::string sensor = folder / "mat.json";
+  write_file(sensor, std::string(R"({"name": "mat", "rows": 2, "columns": 2, "pitch_mm": 3, "unit": "counts",
+                                     "pressed": "higher", "range": [0, 100], "rate_hz": 100,
+                                     "frame": {"kind": "text"}})"));
+  std::string frames;
+  for (int i = 0; i < 50; ++i) frames += "1,2,3,4\n";
+  for (const int day : {1, 2}) {
+    const std::string name = "day" + std::to_string(day);
+    make_directories(folder / ("log/" + name)), make_directories(folder / ("stage/" + name));
+    write_file(folder / ("log/" + name + "/1.csv"), frames);
+    write_file(folder / ("stage/" + name + "/1.csv"),
+               "0,0," + std::to_string(10 * day) + "\n1,0," + std::to_string(10 * day) + "\n");
+  }
+  const std::vector<std::string> words = {folder / "log",   "--sensor", sensor,         "--positions",
+                                          folder / "stage", "--out",    folder / "data"};
+  const auto done = run_process("supertac-import", words);
+  ASSERT_EQ(done.code, 0) << done.error;
+  for (const std::string& path : list_recordings(folder / "data")) {
+    const Recording r = read_recording(path);
+    EXPECT_EQ(r.position_mm[1], r.metadata.at("group") == "day1" ? 10.0F : 20.0F);
+  }
+  write_file(folder / "stage/day1/1.txt", std::string("0,0,1\n1,0,1\n"));
+  auto again = words;
+  again.back() = folder / "more";
+  EXPECT_NE(run_process("supertac-import", again).error.find("holds two tables of the name 1"),
+            std::string::npos);
+
+  Recording elsewhere = read_recording(list_recordings(folder / "data").front());
+  elsewhere.plate = "../unknown";
+  write_recording(folder / "elsewhere.safetensors", elsewhere);
+  const auto refused = run_process(
+      "supertac-import", {folder / "elsewhere.safetensors", "--sensor", sensor, "--out", folder / "none"});
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_NE(refused.error.find("expected a name without '/'"), std::string::npos) << refused.error;
+  EXPECT_EQ(run_process("supertac-import", {folder / "log", "--sensor", sensor, "--truth-range", "5,5",
+                                            "--out", folder / "none"})
+                .code,
+            2);
+}
+
 }  // namespace
 }  // namespace supertac

@@ -139,7 +139,7 @@ TEST_F(Frames, AreRefusedWhereTheyDoNotFit) {
                  "has a truth of 16x24 pixels, expected 8x12");
   expect_refused("supertac-train", with({"--pairs", "p"}), 2, "pairs");
   expect_refused("supertac-import", {path("pairs.safetensors"), "--out", path("o"), "--speed", "3"}, 2,
-                 "--speed: of passes only");
+                 "as it is, found with --speed");
 }
 
 TEST_F(Frames, PicturesBelowSevenPixelsAreJudgedByASmallerWindowAndItIsSaid) {

@@ -187,6 +187,9 @@ TEST_F(Streaming, NothingIsOverwrittenWithoutForce) {
   plug_in();
   write_file(path("capture"), "mine");
   expect_failure(stream({"--board", board(), "--capture", path("capture")}), 1, "--force");
+  const auto recording = read_text_file(path("recording"), 1 << 26);
+  EXPECT_NE(stream({"--recording", path("recording"), "--mcap", path("recording"), "--force"}).code, 0);
+  EXPECT_EQ(read_text_file(path("recording"), 1 << 26), recording);
 }
 
 TEST_F(Streaming, DrawsOnATerminalOnly) {

@@ -33,7 +33,7 @@ struct PairFile {
 
 TEST(PairImport, ARecordingForEachGroupWithChannelsLastAndItsTruth) {
   const TemporaryFolder folder;
-  const std::vector<Recording> recordings = import_pairs(PairFile().write(folder));
+  const std::vector<Recording> recordings = import_pairs(SafetensorsFile::read(PairFile().write(folder)));
   ASSERT_EQ(recordings.size(), 5u);
   std::vector<std::string> names;
   for (const Recording& r : recordings) names.push_back(r.plate);
@@ -57,13 +57,13 @@ TEST(PairImport, GroupsStayTogetherInASplit) {
   const TemporaryFolder folder;
   PairFile file;
   WindowSet frames({.timesteps = 1});
-  for (const Recording& r : import_pairs(file.write(folder))) frames.add(r);
+  for (const Recording& r : import_pairs(SafetensorsFile::read(file.write(folder)))) frames.add(r);
   const Split split = make_split(frames, SplitKind::group, 1);
   EXPECT_EQ(split.train.size() + split.test.size(), 10u);
   for (const std::uint32_t a : split.test)
     for (const std::uint32_t b : split.train) EXPECT_NE(frames.pass_of(a), frames.pass_of(b));
   file.with_group = false;
-  const std::vector<Recording> loose = import_pairs(file.write(folder));
+  const std::vector<Recording> loose = import_pairs(SafetensorsFile::read(file.write(folder)));
   ASSERT_EQ(loose.size(), 1u);
   EXPECT_EQ(loose.front().plate, "pairs");
   EXPECT_FALSE(loose.front().metadata.contains("group"));
@@ -72,18 +72,18 @@ TEST(PairImport, GroupsStayTogetherInASplit) {
 TEST(PairImport, ASensorSaysWhatTheNumbersMean) {
   const TemporaryFolder folder;
   Sensor sensor{.array = {3, 5, 2.5, 2}, .scale = {.unit = "mV", .rest = 300, .span = 250}};
-  const Recording first = import_pairs(PairFile().write(folder), sensor).front();
+  const Recording first = import_pairs(SafetensorsFile::read(PairFile().write(folder)), sensor).front();
   EXPECT_EQ(first.signal_scale, sensor.scale);
   EXPECT_EQ(first.array, sensor.array);
   sensor.array.rows = 4;
-  EXPECT_THROW((void)import_pairs(folder / "pairs.safetensors", sensor), FileError);
+  EXPECT_THROW((void)import_pairs(SafetensorsFile::read(folder / "pairs.safetensors"), sensor), FileError);
 }
 
 TEST(PairImport, RefusesWhatDoesNotFitTogether) {
   const auto expect_refused = [](const PairFile& file, const std::string& expected) {
     const TemporaryFolder folder;
     try {
-      (void)import_pairs(file.write(folder));
+      (void)import_pairs(SafetensorsFile::read(file.write(folder)));
       ADD_FAILURE() << "accepted; expected: " << expected;
     } catch (const FileError& error) {
       EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
@@ -116,7 +116,7 @@ TEST(PairImport, RefusesWhatDoesNotFitTogether) {
   const TemporaryFolder folder;
   write_safetensors(folder / "a", {},
                     {{"input", "F32", {10, 2, 3, 5}, std::as_bytes(std::span(file.input))}});
-  EXPECT_THROW((void)import_pairs(folder / "a"), FileError);
+  EXPECT_THROW((void)import_pairs(SafetensorsFile::read(folder / "a")), FileError);
 }
 
 }  // namespace

@@ -94,6 +94,26 @@ TEST_F(TableImport, ColumnsByNumberRangesAndOtherSeparators) {
   EXPECT_DOUBLE_EQ(import(file(blanks)).time_s[19], 0.19);  // the sensor's rate
 }
 
+TEST_F(TableImport, QuotesAndTrailingSeparatorsAreNoPartOfACell) {
+  std::string quoted = "\"t\",\"a\",\"b\",\"c\",\"d\"\n", trailing;
+  for (int i = 0; i < 30; ++i) {
+    quoted += "\"" + std::to_string(10 * i) + "\",\"50\",60,70,\"80\"\n";
+    trailing += "50,60,70,+80,\n";
+  }
+  EXPECT_EQ(import(file(quoted), "time=t:ms,values=a-d").volts[3], 80.0F);
+  EXPECT_EQ(import(file(trailing)).volts[3], 80.0F);
+}
+
+TEST_F(TableImport, RemarksAndEmptyLinesTakeNoTime) {
+  std::string text;
+  for (int i = 0; i < 30; ++i) text += i == 10 ? "50,6\n\n" : "50,60,70,80\n\n# a remark\n";
+  EXPECT_DOUBLE_EQ(import(file(text)).time_s[28], 0.29);
+  std::string odd = "50,60,?,80\n";  // a number that is missing, and no names
+  for (int i = 0; i < 30; ++i) odd += "50,60,70,80\n";
+  EXPECT_EQ(read_table(file(odd)).dropped, 1U);
+  EXPECT_TRUE(read_table(file(odd)).names.empty());
+}
+
 TEST_F(TableImport, TaxelsStandInTheSensorsOrder) {
   Sensor sensor = mat();
   std::string text;
@@ -172,6 +192,8 @@ TEST_F(TableImport, PositionsOfAnotherLogAreInterpolated) {
   EXPECT_NEAR(r.position_mm[2 * 20 + 1], 30, 1e-4);
   EXPECT_NEAR(r.position_mm[2 * 30], 10, 1e-4);
   EXPECT_TRUE(std::isnan(r.position_mm[2 * 31]));
+  const Table afar = read_table(file("0,0,0\n300,1e300,40\n", "log.csv"));
+  EXPECT_THROW(add_positions(r, "log", afar, 1e-3), FileError);
   const Table other_clock = read_table(file("100000,0,0\n100001,0,0\n", "log.csv"));
   EXPECT_THROW(add_positions(r, "log", other_clock, 1), FileError);
 }
@@ -187,6 +209,7 @@ TEST_F(TableImport, TruthIsScaledAndCounted) {
   EXPECT_EQ(r.truth_width, 6);
   EXPECT_EQ(r.truth[0], 1.0F);
   EXPECT_EQ(r.truth[1], 0.0F);
+  EXPECT_THROW(add_truth(r, "t", read_table(npy("t.npy", "<f4", "3, 4, 3, 2", images)), 100, 300), FileError);
   EXPECT_THROW(add_truth(r, "t", read_table(npy("t.npy", "<f4", "2, 4, 6", std::vector<float>(48))), 0, 1),
                FileError);
 }
