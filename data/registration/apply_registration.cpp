@@ -42,13 +42,12 @@ void fill_loss(const Registration& registration, Recording& recording) {
 
 }  // namespace
 
-void apply(const Registration& registration, Recording& recording) {
+void apply(const Registration& registration, Recording& recording, double x_mm) {
   const auto base = recording.metadata.find("time_base");
   const bool nominal = base != recording.metadata.end() && base->second == "nominal";
   const std::size_t n = recording.frames();
   recording.position_mm.resize(2 * n);
-  const bool of_the_rig = recording.array == TaxelArray{};
-  const auto x = static_cast<float>(of_the_rig ? rig::pass_x_mm(recording.pass) : Plate::kWidthMm / 2);
+  const auto x = static_cast<float>(x_mm);
   for (std::size_t i = 0; i < n; ++i) {
     const double y = registration.y_mm(recording.time_s[i]);
     const bool known =

@@ -65,13 +65,17 @@ Steps steps_before(const Recording& recording, std::size_t i, std::span<const Us
   return {.count = agreement / information, .uncertainty = 1 / std::sqrt(information)};
 }
 
-// Sum of the taxels' changes before each frame.
+// Sum of the signals' changes before each frame, as that of the rig's sixteen taxels in volts that say the
+// same.
 std::vector<double> changes(const Recording& recording) {
+  const std::size_t signals = recording.array.signals();
+  const double share = std::abs(SignalScale{}.span / recording.signal_scale.span) *
+                       static_cast<double>(kTaxels) / static_cast<double>(signals);  // of the rig: 1
   std::vector<double> change(recording.frames());
   for (std::size_t i = 1; i < change.size(); ++i)
-    for (std::size_t k = 0; k < kTaxels; ++k) {
-      const double step = std::abs(recording.volts[i * kTaxels + k] - recording.volts[(i - 1) * kTaxels + k]);
-      if (std::isfinite(step)) change[i] += step;
+    for (std::size_t s = 0; s < signals; ++s) {
+      const double step = std::abs(recording.volts[i * signals + s] - recording.volts[(i - 1) * signals + s]);
+      if (std::isfinite(step)) change[i] += share * step;
     }
   return change;
 }

@@ -52,7 +52,7 @@ class Fit {
         speed_(recording.speed_mm_s > 0 ? recording.speed_mm_s : rig::kSlideMmS),
         middle_s_((recording.time_s.front() + recording.time_s.back()) / 2) {
     for (int row = 0; row < recording.array.rows; ++row)
-      row_mm_.push_back(row_contact_mm(recording.array, static_cast<std::size_t>(row)));
+      row_mm_.push_back(row_contact_mm(recording, static_cast<std::size_t>(row)));
     const std::vector<Contact> contacts = find_contacts(recording, 0.6 * pitch() / speed_);
     double most = 0;
     for (const Stretch& stretch : stretches_of(recording)) {
@@ -257,9 +257,11 @@ std::string why_implausible(const Registration& r, const Recording& recording, c
 
 }  // namespace
 
-double row_contact_mm(const TaxelArray& array, std::size_t row) {
+double row_contact_mm(const Recording& recording, std::size_t row) {
   constexpr double kRigMm[] = {-3.5, -1.3, 1.3, 3.5};  // medians over the rig's 96 passes
-  return array == TaxelArray{} ? kRigMm[row] : array.y_mm(static_cast<int>(row) * array.columns);
+  const TaxelArray& array = recording.array;
+  const bool of_the_rig = array == TaxelArray{} && recording.signal_scale == SignalScale{};
+  return of_the_rig ? kRigMm[row] : array.y_mm(static_cast<int>(row) * array.columns);
 }
 
 std::string why_unreliable(const Registration& r) {

@@ -34,8 +34,9 @@ struct Registration {
 };
 
 /// Where, from the centre along y, a row of taxels (0 trailing) feels an element best. The rig's rows do so
-/// nearer together than they lie, for its pad is round; those of another array where they are.
-double row_contact_mm(const TaxelArray& array, std::size_t row);
+/// nearer together than they lie, for its pad is round; those of another sensor, of the same array too, where
+/// they are.
+double row_contact_mm(const Recording& recording, std::size_t row);
 
 /// Fits start and rate of a pass to its plate. Each element of the texture that passes a taxel row makes a
 /// contact (find_contacts); the fit is the line that puts the contacts of all rows onto the plate's elements:

@@ -30,7 +30,7 @@ std::vector<float> depths(const Recording& recording, std::size_t taxel) {
   std::vector<float> sum(kWidth), mean(kWidth, -1);
   std::vector<int> count(kWidth);
   for (std::size_t i = 0; i < recording.frames(); ++i) {
-    const double y = recording.position_mm[2 * i + 1] + row_contact_mm(recording.array, taxel / 4);
+    const double y = recording.position_mm[2 * i + 1] + row_contact_mm(recording, taxel / 4);
     const float v = recording.volts[i * kTaxels + taxel];
     if (!recording.lift_mm.empty() && recording.lift_mm[i] > 0) continue;
     if (!std::isfinite(y) || !std::isfinite(v) || y < kFromMm || y >= kToMm) continue;
@@ -47,6 +47,9 @@ std::vector<float> depths(const Recording& recording, std::size_t taxel) {
 Picture registration_picture(const Recording& recording, const Plate& plate) {
   if (recording.position_mm.size() != 2 * recording.frames() || recording.frames() == 0)
     throw std::invalid_argument("registration_picture: the recording has no positions; register it first");
+  if (recording.array != TaxelArray{})
+    throw std::invalid_argument("registration_picture: expected the rig's " + TaxelArray{}.text() + ", got " +
+                                recording.array.text());
   Picture picture(kWidth, kPlateHeight + 4 * (kRowGap + 4 * kBandHeight));
   const double x_mm = recording.position_mm[0];
   for (int x = 0; x < kWidth; ++x) {

@@ -139,7 +139,7 @@ void import_text_folder(const std::string& root, const FolderImport& settings,
     progress(i + 1);
     if (found[i].plate.uniform_in_x() && !found[i].unknown) align(plate);
     for (ImportedPass& pass : plate)
-      if (!pass.unknown) apply(pass.registration, pass.recording);
+      if (!pass.unknown) apply(pass.registration, pass.recording, rig::pass_x_mm(pass.recording.pass));
     take(std::exchange(plate, {}));
   }
   if (!any) throw FileError(root, "none of " + std::to_string(found.size()) + " files is a recording");

@@ -14,7 +14,7 @@ TEST(ApplyRegistration, FillsPositionsAndStretchesANominalClock) {
   recording.metadata["time_base"] = "nominal";
   const Registration r = register_pass(recording, Plate::named("3_Bumps"));
   ASSERT_TRUE(r.reliable) << r.reason;
-  apply(r, recording);
+  apply(r, recording, 15.5);
   EXPECT_EQ(recording.metadata.at("registration_reliable"), "yes");
   EXPECT_EQ(recording.metadata.at("time_base"), "registered");
   EXPECT_EQ(recording.position_mm[0], 15.5F);
@@ -41,7 +41,7 @@ Registration lost(double at_s, double seconds) {
 
 TEST(ApplyRegistration, ALossIsFilledWithALine) {
   Recording r = step_at_frame_5();
-  apply(lost(1.25, 1), r);
+  apply(lost(1.25, 1), r, 5.5);
   ASSERT_EQ(r.frames(), 14u);
   const float line[] = {2, 1.8F, 1.6F, 1.4F, 1.2F, 1};
   for (std::size_t i = 4; i < 10; ++i)

@@ -255,24 +255,39 @@ TEST(Registration, RealPasses) {
   EXPECT_LT(residual / reliable, 0.42);
 }
 
-// Counts that rise, of eight rows, of rows nearer together than columns, and of two rows.
+/// A slide of another sensor, whose counts rise.
+Recording slide_in_counts(const TaxelArray& array, const char* plate, double rate_hz, bool filtered) {
+  SimulatorSettings settings;
+  settings.array = array, settings.rate_hz = rate_hz;
+  settings.with_filter = settings.with_adc = filtered;
+  Recording slide = slide_of(simulate_pass(Plate::named(plate), {}, settings, 3));
+  restate(slide, {.unit = "counts", .rest = 40, .span = -860});
+  return slide;
+}
+
+// Of eight rows, of the rig's, of rows nearer together than columns, and of two rows.
 TEST(Registration, FindsPassesOfAnyArray) {
-  for (const TaxelArray& array : {TaxelArray{.rows = 8, .columns = 8, .pitch_mm = 3},
+  for (const TaxelArray& array : {TaxelArray{.rows = 8, .columns = 8, .pitch_mm = 3}, TaxelArray{},
                                   TaxelArray{.rows = 6, .columns = 3, .pitch_mm = {4, 2}},
                                   TaxelArray{.rows = 2, .columns = 6, .pitch_mm = 2.5}}) {
     for (const char* name : {"3_Bumps", "6_Ridges"}) {
-      SimulatorSettings settings;
-      settings.array = array, settings.rate_hz = 100, settings.with_filter = settings.with_adc = false;
-      Recording truth = slide_of(simulate_pass(Plate::named(name), {}, settings, 3));
-      restate(truth, {.unit = "counts", .rest = 40, .span = -860});
-      Recording signals = truth;
-      signals.position_mm.clear();
-      const Registration r = register_pass(signals, Plate::named(name));
+      const Recording truth = slide_in_counts(array, name, 100, false);
+      const Registration r = register_pass(truth, Plate::named(name));
       EXPECT_TRUE(r.reliable) << array.text() << ' ' << name << ' ' << r.reason;
       EXPECT_LT(std::abs(error_of(r, truth).mean), 0.3) << array.text() << ' ' << name;
       EXPECT_LT(error_of(r, truth).worst, kWorstMm) << array.text() << ' ' << name;
     }
   }
+}
+
+TEST(Registration, ABurstCutsPassesOfOtherArraysToo) {
+  Recording cut = slide_in_counts({.rows = 2, .columns = 6, .pitch_mm = 2.5}, "6_Ridges", 1000, true);
+  const auto at = static_cast<std::ptrdiff_t>(cut.frames() * 6 / 10), lost = std::ptrdiff_t{630};
+  cut.volts.erase(cut.volts.begin() + at * 12, cut.volts.begin() + (at + lost) * 12);
+  cut.position_mm.erase(cut.position_mm.begin() + at * 2, cut.position_mm.begin() + (at + lost) * 2);
+  cut.time_s.resize(cut.time_s.size() - static_cast<std::size_t>(lost));
+  const Registration r = register_pass(cut, Plate::named("6_Ridges"));
+  EXPECT_NEAR(r.valid_until_s, cut.time_s[static_cast<std::size_t>(at)], 0.02);
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ TEST(TextFolder, EveryFrameGetsItsPlaceAndTheOrderIsTheStatedOne) {
   for (ImportedPass& pass : by_hand) together.push_back({&pass.recording, &pass.registration});
   align_passes(together);
   for (std::size_t i = 0; i < imported.size(); ++i) {
-    apply(by_hand[i].registration, by_hand[i].recording);
+    apply(by_hand[i].registration, by_hand[i].recording, rig::pass_x_mm(by_hand[i].recording.pass));
     const Recording& r = imported[i].recording;
     EXPECT_EQ(r.time_s, by_hand[i].recording.time_s);
     EXPECT_EQ(r.volts, by_hand[i].recording.volts);
