@@ -58,6 +58,11 @@ struct Track {
 /// A silence within so many periods of a slow sensor is no gap.
 constexpr double kGapPeriods = 3;
 
+/// Samples a second of a window: of single frames so many that no two frames fall into one.
+inline double sample_rate_hz(int timesteps, double rate_hz, double frame_period_s) {
+  return timesteps == 1 ? 1000 / frame_period_s : rate_hz;
+}
+
 struct ResampleSettings {
   double rate_hz = 300;
   /// Longer silence between two recorded frames is a gap, never filled; at least kGapPeriods of the

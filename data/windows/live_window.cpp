@@ -31,7 +31,7 @@ double window_s(const LiveWindowSettings& s) { return s.timesteps / s.rate_hz; }
 LiveWindowSettings checked(LiveWindowSettings s) {
   check(s);
   s.max_gap_s = std::max(s.max_gap_s, kGapPeriods * s.frame_period_s);
-  if (s.timesteps == 1) s.rate_hz = 1000 / s.frame_period_s;  // no two frames fall into one sample
+  s.rate_hz = sample_rate_hz(s.timesteps, s.rate_hz, s.frame_period_s);
   return s;
 }
 

@@ -184,16 +184,17 @@ std::string Writer::draw() const {
 std::string window_constants(const ModelFile& file, double sensor_hz) {
   constexpr double kLookBackS = 0.1, kRoom = 1.25;  // frames may come a quarter faster
   const WindowSettings w = file.windows();
-  const double period = 1 / sensor_hz, filter = file.input.filter_s.value_or(0);
+  const double period = 1 / sensor_hz, rate = sample_rate_hz(w.timesteps, w.rate_hz, period),
+               filter = file.input.filter_s.value_or(0);
   const double gap = std::max(w.max_gap_s, kGapPeriods * period);
-  const double span = w.timesteps / w.rate_hz + gap + 2 / w.rate_hz + kLookBackS;
+  const double span = w.timesteps / rate + gap + 2 / rate + kLookBackS;
   const double raw_span = std::max(0.0, filter - 0.5 * period);
   const auto frames = [&](double seconds) {
     return text(static_cast<Dim>(std::ceil(kRoom * seconds * sensor_hz)) + 2);
   };
-  return define("RATE_HZ", number(w.rate_hz), "of the window's samples") +
+  return define("RATE_HZ", number(rate), "of the window's samples") +
          define("PERIOD_S", number(period), "of the sensor's frames") +
-         define("HALF_PERIOD_S", "(0.5 * " + number(std::min(period, 1 / w.rate_hz)) + ")") +
+         define("HALF_PERIOD_S", "(0.5 * " + number(std::min(period, 1 / rate)) + ")") +
          define("MAX_GAP_S", number(gap), "a longer silence begins a new window") +
          define("CELL_SLACK", number(kCellSlack), "of a sample: time stamps are rounded") +
          define("HISTORY_SPAN_S", number(span)) + define("HISTORY_FRAMES", frames(span)) +
@@ -258,8 +259,6 @@ void check(const ModelFile& file, const std::string& name, double sensor_hz) {
                                 in_quotes(name));
   if (!(sensor_hz >= 1 && sensor_hz <= 100'000))
     throw std::invalid_argument("C code: the sensor's rate must be 1 to 100000 Hz, got " + format(sensor_hz));
-  if (!file.model)
-    throw std::runtime_error("C code: expected a model of windows, found one of single frames");
   if (!file.ranges)
     throw std::runtime_error(
         "the model was saved without the ranges of its values, which C code in int8 needs; train it anew "

@@ -17,8 +17,8 @@ struct CCode {
 /// size, no heap, of the C library memcpy alone. NAME_picture() after NAME_push_at() of a recording's frames
 /// draws the bits that supertac-stream --precision int8 draws of it, NAME_draw() those of a Prepared network.
 /// `name`: an identifier of C. `sensor_hz`: of the frames; `written_by`: for the comment at the top. Throws
-/// std::invalid_argument for another name or rate, std::runtime_error for a model of frames or one without
-/// the ranges that int8 needs.
+/// std::invalid_argument for another name or rate, std::runtime_error for a model without the ranges that
+/// int8 needs.
 CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz,
                 const std::string& written_by);
 

@@ -65,6 +65,8 @@ std::vector<SuperTacSettings> all_settings() {
   all[2].timesteps = 32;
   all.push_back(tiny());
   all.back().last_frame_path = true, all.back().timesteps = 32;
+  all.push_back(all.back());
+  all.back().timesteps = 1;
   return all;
 }
 
@@ -94,16 +96,18 @@ TEST(CCode, DrawsTheBitsOfAPreparedNetwork) {
 // Frames that jitter, are lost, come twice, are no numbers, and a silence in which all begins anew.
 TEST(CCode, DrawsWhatLiveWindowsDraw) {
   if (!has_compiler()) GTEST_SKIP() << "no C compiler";
-  SuperTacSettings settings = tiny();
-  settings.timesteps = 32;
-  for (const bool per_window : {false, true})
-    for (const auto& [filter_s, sensor_hz] : {std::pair(0.0, 120.0), {0.05, 120.0}, {0.0, 15.0}}) {
+  for (const Dim timesteps : {32, 1})
+    for (const auto& [filter_s, sensor_hz, per_window] :
+         {std::tuple(0.0, 120.0, false), {0.05, 120.0, timesteps > 1}, {0.0, 15.0, false}}) {
+      SuperTacSettings settings = tiny();
+      settings.timesteps = timesteps;
+      settings.last_frame_path = timesteps == 1;
       const ModelFile file =
           model_of(settings, {.rate_hz = 50, .scaling = {.per_window = per_window}, .filter_s = filter_s});
       const Compiled code(c_code_of(file, "finger", sensor_hz, "a test"), "-O3 -march=native");
       const auto push = code.function<int(double, const float*)>("finger_push_at");
       const auto draw = code.function<int(float*, float*)>("finger_picture");
-      LiveWindow live({.timesteps = 32,
+      LiveWindow live({.timesteps = static_cast<int>(timesteps),
                        .signals = 16,
                        .rate_hz = 50,
                        .scaling = file.input.scaling,
