@@ -304,7 +304,7 @@ void PositionTrack::model(const Leg& leg, const MoveTiming& timing) {
 void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& samples,
                             const MoveTiming& timing) {
   add(leg.sent_s, leg.from);
-  if (samples.empty() && leg.ended_s > leg.accepted_s) return model(leg, timing);
+  if (samples.empty() && leg.ended_s > 0) return model(leg, timing);
   const std::vector<PositionSample> chain = chain_of(leg, samples);
   rejected_ += samples.size() - chain.size();
   for (const PositionSample& sample : chain) {

@@ -131,10 +131,13 @@ OpenedPort open_network(const std::string& address, const std::string& rest, boo
                                              datagrams ? SOCK_DGRAM : SOCK_STREAM);
   std::optional<int> descriptor;
   const double until = monotonic_seconds() + kConnectS;
+  std::ptrdiff_t left = 0;
+  for (const addrinfo* at = found.get(); at != nullptr; at = at->ai_next) ++left;
   errno = ETIMEDOUT;
-  for (const addrinfo* at = found.get(); at != nullptr && !descriptor && monotonic_seconds() < until;
-       at = at->ai_next)
-    descriptor = open_socket(*at, datagrams, until);
+  for (const addrinfo* at = found.get(); at != nullptr && !descriptor && errno != EINTR; at = at->ai_next) {
+    const double now = monotonic_seconds();  // a silent address leaves time for the next
+    descriptor = open_socket(*at, datagrams, now + std::max(0.0, until - now) / static_cast<double>(left--));
+  }
   if (!descriptor)
     fail(address, std::string(strerror(errno)) + (datagrams ? "; another program may listen there"
                                                             : "; see whether the sensor serves there"));

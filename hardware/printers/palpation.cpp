@@ -189,6 +189,14 @@ void Palpation::follow(const Leg& leg) {
                       "); check the printer");
 }
 
+bool Palpation::stops() {
+  try {
+    return printer_.quick_stop().confirmed;
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
 void Palpation::recover(PalpationOutcome& outcome) {
   using Finger = PalpationOutcome::Finger;
   outcome.finger = in_contact_ ? Finger::unknown : Finger::lifted;
@@ -223,6 +231,8 @@ void Palpation::recover(PalpationOutcome& outcome) {
     outcome.note = "the printer cannot be reached; the finger may be in contact, lift it by hand";
   } catch (const std::exception& error) {
     outcome.note += std::string("; the lift failed: ") + error.what();
+    if (outcome.finger == Finger::stopped && !stops())
+      outcome.finger = Finger::unknown;  // it may do the lift yet
   }
 }
 

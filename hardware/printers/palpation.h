@@ -94,6 +94,7 @@ class Palpation {
   void touch(bool contact);
   void follow(const Leg& leg);
   void recover(PalpationOutcome& outcome);
+  bool stops();
 
   Printer& printer_;
   PalpationPlan plan_;
