@@ -50,11 +50,11 @@ function hatch(g, wide, rows, columns, box) {
   g.restore();
 }
 
-// A picture with axes in mm from the finger's centre. Returns where the picture lies.
-function drawPicture(g, w, h, levels, rows, columns, pixelMm, wide) {
+// A picture with axes in mm from the finger's centre; a pixel is mmX by mmY. Returns where the picture lies.
+function drawPicture(g, w, h, levels, rows, columns, [mmX, mmY], wide) {
   const left = 30, bottom = 32, top = 6, right = 6;
-  const side = Math.min((w - left - right) / columns, (h - top - bottom) / rows);
-  const box = {x: left, y: top, w: side * columns, h: side * rows};
+  const unit = Math.min((w - left - right) / (columns * mmX), (h - top - bottom) / (rows * mmY));
+  const box = {x: left, y: top, w: unit * columns * mmX, h: unit * rows * mmY};
   g.imageSmoothingEnabled = false;
   if (levels) g.drawImage(image(levels, rows, columns), box.x, box.y, box.w, box.h);
   if (levels && wide) hatch(g, wide, rows, columns, box);
@@ -62,20 +62,20 @@ function drawPicture(g, w, h, levels, rows, columns, pixelMm, wide) {
   g.lineWidth = 1;
   g.strokeRect(box.x - .5, box.y - .5, box.w + 1, box.h + 1);
   g.font = "11px system-ui, sans-serif";
-  const longer = Math.max(rows, columns) * pixelMm, step = [1, 2, 3, 5, 10, 20, 50].find((s) => longer / s <= 5) || 100;
+  const longer = Math.max(rows * mmY, columns * mmX), step = [1, 2, 3, 5, 10, 20, 50].find((s) => longer / s <= 5) || 100;
   const ticks = (mm, draw) => { for (let v = -Math.floor(mm / 2 / step) * step; v <= mm / 2 + 1e-9; v += step) draw(v); };
   g.textAlign = "center";
   g.textBaseline = "top";
-  ticks(columns * pixelMm, (v) => {
-    const x = box.x + (v / pixelMm + columns / 2) * side;
+  ticks(columns * mmX, (v) => {
+    const x = box.x + box.w / 2 + v * unit;
     g.fillRect(x - .5, box.y + box.h, 1, 4);
     g.fillText(v, x, box.y + box.h + 5);
   });
   g.fillText("x, mm", box.x + box.w / 2, box.y + box.h + 19);
   g.textAlign = "right";
   g.textBaseline = "middle";
-  ticks(rows * pixelMm, (v) => {
-    const y = box.y + box.h - (v / pixelMm + rows / 2) * side;
+  ticks(rows * mmY, (v) => {
+    const y = box.y + box.h / 2 - v * unit;
     g.fillRect(box.x - 4, y - .5, 4, 1);
     g.fillText(v, box.x - 6, y);
   });
@@ -120,7 +120,7 @@ function drawBar(g, w, [low, high], left = 30) {
   }
 }
 const feltEnds = (event, w) =>
-    ["at rest", event ? `${event.top.toPrecision(3)} ${supertac.hello.unit}${w < 240 ? "" : " from rest"}` : ""];
+    ["at rest", event && event.felt ? `${event.top.toPrecision(3)} ${supertac.hello.unit}${w < 240 ? "" : " from rest"}` : ""];
 const drawnEnds = (w) => w < 240 ? ["flat", "highest"] : ["0, flat", "1, the plate's highest"];
 
 // values [column][row] up to `top`, oldest first, the newest at the right edge.
@@ -163,30 +163,30 @@ function drawStrip(canvas, values, top, rows, labels, withTime) {
 
 function drawMap() {
   if (element("slide").hidden || stitched.cells.size === 0) return;
-  const canvas = element("map"), mm = supertac.hello.pitch_mm / supertac.hello.scale, map = supertac.hello.map;
+  const canvas = element("map"), [mmX, mmY] = supertac.hello.pixel_mm, map = supertac.hello.map;
   const at = [...stitched.cells].map(([key, cell]) => [key % 8192 - 4096, Math.floor(key / 8192) - 4096, cell[0] / cell[1]]);
   const ends = (k) => at.reduce(([low, high], one) => [Math.min(low, one[k]), Math.max(high, one[k] + 1)], [Infinity, -Infinity]);
   const [x0, x1] = ends(0), [y0, y1] = ends(1), left = 34, bottom = 32;
-  const unit = Math.min((canvas.clientWidth - left - 6) / (y1 - y0), 160 / (x1 - x0));
-  canvas.style.height = `${Math.ceil((x1 - x0) * unit + bottom + 4)}px`;
+  const unit = Math.min((canvas.clientWidth - left - 6) / ((y1 - y0) * mmY), 160 / ((x1 - x0) * mmX));  // dots a mm
+  canvas.style.height = `${Math.ceil((x1 - x0) * mmX * unit + bottom + 4)}px`;
   const {g} = prepared(canvas);
-  const X = (y) => left + (y - y0) * unit, Y = (x) => 4 + (x1 - x) * unit;
+  const X = (y) => left + (y - y0) * mmY * unit, Y = (x) => 4 + (x1 - x) * mmX * unit;
   for (const [x, y, value] of at) {
     const level = 3 * Math.round(value);
     g.fillStyle = `rgb(${map[level]},${map[level + 1]},${map[level + 2]})`;
-    g.fillRect(X(y), Y(x + 1), unit + 1, unit + 1);
+    g.fillRect(X(y), Y(x + 1), mmY * unit + 1, mmX * unit + 1);
   }
   g.fillStyle = style("--quiet");
   g.font = "11px system-ui, sans-serif";
   g.textAlign = "center";
   g.textBaseline = "top";
-  const step = [1, 2, 5, 10, 20, 50, 100].find((s) => (y1 - y0) * mm / s <= 8) || 200;
-  for (let v = Math.ceil(y0 * mm / step) * step; v <= y1 * mm; v += step) g.fillText(v, X(v / mm), Y(x0) + 3);
+  const step = [1, 2, 5, 10, 20, 50, 100].find((s) => (y1 - y0) * mmY / s <= 8) || 200;
+  for (let v = Math.ceil(y0 * mmY / step) * step; v <= y1 * mmY; v += step) g.fillText(v, X(v / mmY), Y(x0) + 3);
   g.fillText("y, mm", X((y0 + y1) / 2), Y(x0) + 17);
   g.textAlign = "right";
   for (const [x, base] of [[x0, "bottom"], [x1, "top"]]) {
     g.textBaseline = base;
-    g.fillText((x * mm).toFixed(0), left - 5, Y(x));
+    g.fillText((x * mmX).toFixed(0), left - 5, Y(x));
   }
   g.textBaseline = "middle";
   g.fillText("x", left - 5, Y((x0 + x1) / 2));

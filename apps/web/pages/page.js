@@ -33,8 +33,8 @@ function stitch(event) {
   if (last && event.t < last.t) stitched.cells.clear();  // another run
   if (last && event.t >= last.t && Math.hypot(event.x - last.x, event.y - last.y) < .05) return;  // it stands
   stitched.last = event;
-  const h = supertac.hello, rows = h.rows * h.scale, columns = h.columns * h.scale, mm = h.pitch_mm / h.scale;
-  const left = Math.round(event.x / mm - columns / 2), bottom = Math.round(event.y / mm - rows / 2);
+  const h = supertac.hello, rows = h.rows * h.scale, columns = h.columns * h.scale, [mmX, mmY] = h.pixel_mm;
+  const left = Math.round(event.x / mmX - columns / 2), bottom = Math.round(event.y / mmY - rows / 2);
   for (let i = 0; i < event.picture.length; ++i) {
     const key = (bottom + Math.floor(i / columns) + 4096) * 8192 + left + i % columns + 4096;
     const cell = stitched.cells.get(key) || [0, 0];
@@ -42,8 +42,11 @@ function stitch(event) {
   }
 }
 
+const sizeText = ([x, y]) => x === y ? `${x}` : `${x} × ${y}`;
+
 function onHello(hello) {
   hello.map = bytes(hello.map);
+  hello.pixel_mm = hello.pitch_mm.map((mm) => mm / hello.scale);
   supertac.hello = hello;
   supertac.newest = null;
   strips.felt = new Float32Array(COLUMNS * hello.rows * hello.columns);
@@ -52,9 +55,9 @@ function onHello(hello) {
   strips.end = 0;
   element("badge").textContent = hello.badge;
   element("source").textContent = hello.source;
-  element("felt-size").textContent = `${hello.rows} × ${hello.columns} taxels, ${hello.pitch_mm} mm apart`;
+  element("felt-size").textContent = `${hello.rows} × ${hello.columns} taxels, ${sizeText(hello.pitch_mm)} mm apart`;
   element("drawn-size").textContent =
-    `${hello.rows * hello.scale} × ${hello.columns * hello.scale} pixels of ${hello.pitch_mm / hello.scale} mm`;
+    `${hello.rows * hello.scale} × ${hello.columns * hello.scale} pixels of ${sizeText(hello.pixel_mm)} mm`;
   for (const id of ["texture-name", "texture"]) element(id).hidden = !hello.names_textures;
   element("guess-line").hidden = !hello.predicts_error;
   element("sure").hidden = !hello.predicts_error;
@@ -65,7 +68,8 @@ function onHello(hello) {
   for (const button of document.querySelectorAll("nav button")) button.disabled = false;
   stitched.cells.clear();
   stitched.last = ended = null;
-  for (const id of ["felt", "drawn"]) element(id).style.aspectRatio = `${hello.columns} / ${hello.rows}`;
+  const ratio = `${hello.columns * hello.pitch_mm[0]} / ${hello.rows * hello.pitch_mm[1]}`;
+  for (const id of ["felt", "drawn"]) element(id).style.aspectRatio = ratio;
 }
 
 function onPicture(event) {
@@ -98,15 +102,15 @@ let alive = 0, ended = null;
 
 // --- What is shown -------------------------------------------------------------------------------------------
 
-function describe(name, levels, rows, columns, pixelMm) {
+function describe(name, levels, rows, columns, [mmX, mmY]) {
   let best = 0, sum = 0;
   for (let i = 0; i < levels.length; ++i) {
     sum += levels[i];
     if (levels[i] > levels[best]) best = i;
   }
-  const mm = (i, n) => ((i + .5 - n / 2) * pixelMm).toFixed(1);
-  return `${name}: highest ${(levels[best] / 255).toFixed(2)} at x ${mm(best % columns, columns)} mm, y ` +
-         `${mm(Math.floor(best / columns), rows)} mm, mean ${(sum / levels.length / 255).toFixed(2)}`;
+  const mm = (i, n, pixel) => ((i + .5 - n / 2) * pixel).toFixed(1);
+  return `${name}: highest ${(levels[best] / 255).toFixed(2)} at x ${mm(best % columns, columns, mmX)} mm, y ` +
+         `${mm(Math.floor(best / columns), rows, mmY)} mm, mean ${(sum / levels.length / 255).toFixed(2)}`;
 }
 
 function setLamp(id, kind, text) {
@@ -122,16 +126,16 @@ function drawPictures(event) {
   cross(felt.g, box, h.silent, h.rows, h.columns);
   const feltBar = prepared(element("felt-bar"));
   drawBar(feltBar.g, feltBar.w, feltEnds(event, feltBar.w));
-  drawStrip(element("taxels"), strips.felt, event ? event.top : 1, h.rows * h.columns,
+  drawStrip(element("taxels"), strips.felt, event && event.felt ? event.top : 1, h.rows * h.columns,
             [["0", 0], [String(h.rows * h.columns - 1), 1]], !h.draws);
   if (!h.draws) return;
   const drawn = prepared(element("drawn"));
   const wide = element("guess").checked && event ? event.wide : null;
-  supertac.box = drawPicture(drawn.g, drawn.w, drawn.h, event && event.picture, rows, columns, h.pitch_mm / h.scale, wide);
+  supertac.box = drawPicture(drawn.g, drawn.w, drawn.h, event && event.picture, rows, columns, h.pixel_mm, wide);
   const drawnBar = prepared(element("drawn-bar"));
   drawBar(drawnBar.g, drawnBar.w, drawnEnds(drawnBar.w));
   drawMap();
-  const half = h.rows * h.pitch_mm / 2;
+  const half = h.rows * h.pitch_mm[1] / 2;
   drawStrip(element("profile"), strips.profile, 255, rows, [[-half, 0], ["0", .5], [half, 1]], true);
 }
 
@@ -204,7 +208,7 @@ function frame(now) {
     const h = supertac.hello;
     element("felt").setAttribute("aria-label", describe("felt", event.felt, h.rows, h.columns, h.pitch_mm));
     if (event.picture) element("drawn").setAttribute("aria-label",
-        describe("drawn", event.picture, h.rows * h.scale, h.columns * h.scale, h.pitch_mm / h.scale));
+        describe("drawn", event.picture, h.rows * h.scale, h.columns * h.scale, h.pixel_mm));
   }
 }
 let resized = true;
@@ -253,7 +257,7 @@ function snapshot() {
     g.restore();
   };
   panel(10, event.felt, h.rows, h.columns, h.pitch_mm);
-  if (event.picture) panel(420, event.picture, h.rows * h.scale, h.columns * h.scale, h.pitch_mm / h.scale);
+  if (event.picture) panel(420, event.picture, h.rows * h.scale, h.columns * h.scale, h.pixel_mm);
   g.save();
   g.translate(10, 430);
   drawBar(g, 390, feltEnds(event, 390));
