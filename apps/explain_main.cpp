@@ -122,7 +122,7 @@ Json trace(const SuperTac& model, const Tensor& input, std::vector<Array>& array
     const std::string number = std::to_string(1000 + steps.size()).substr(1);
     const std::string name = number + "." + std::string(op.op);
     steps.push_back(step_of(op, name, names));
-    if (op.op != "reshape") arrays.push_back(array(name, op.y.value()));
+    arrays.push_back(array(name, op.y.value()));
     names.add(op.y.value(), name);
   }
   return steps;
@@ -241,7 +241,9 @@ int run(Arguments& a) {
                        {"rest_removed", kRestRemoved}};
   write_safetensors(a.output("out"),
                     {{"kind", "explanation"}, {"steps", steps.dump()}, {"signal", signal.dump()}}, tensors);
-  const double end = part.time_s.front() + static_cast<double>(track.frames() - 1) / w.rate_hz;
+  const double end = w.timesteps == 1
+                         ? part.time_s.back()
+                         : part.time_s.front() + static_cast<double>(track.frames() - 1) / w.rate_hz;
   a.print(a.text("out") + ": " + std::to_string(arrays.size()) + " arrays, " + std::to_string(steps.size()) +
           " steps, of the window that ends at " + format(end, 3) + " s");
   a.write_json({{"arrays", arrays.size()}, {"steps", steps.size()}, {"window_ends_s", end}});

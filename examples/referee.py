@@ -392,7 +392,7 @@ def main():
                       f" entries differ, first {list(at)}: {expected[at]}, computed {result[at]}")
     muon = "; what Muon moved is not judged" if any(ran["op"] == "muon" for ran in operators) else ""
     print(f"{judged} operators, {entries} entries, {wrong} differ{muon}")
-    sys.exit(1 if wrong else 0)
+    sys.exit(1 if wrong or not judged else 0)  # nothing judged is no agreement
 
 
 if __name__ == "__main__":

@@ -25,15 +25,17 @@ names, chain = json.loads(lines[0])["tensors"], hashlib.sha256(lines[0].encode()
 for text in lines[1:]:
     line = json.loads(text)
     chain = hashlib.sha256((chain + text[:text.rindex(',"chain"')] + "}").encode()).hexdigest()
-    assert chain == line["chain"], f"step {line['step']}: the chain is broken"
+    if chain != line["chain"]:
+        sys.exit(f"step {line['step']}: the chain is broken")
     path = folder / "states" / f"{line['step']}.safetensors"
     if path.exists():
         data, states = path.read_bytes(), states + 1
         begin = 8 + struct.unpack("<Q", data[:8])[0]
         header = json.loads(data[8:begin])
-        for name, expected in zip(names, line["tensors"]):
+        for name, expected in zip(names, line["tensors"], strict=True):
             first, last = header[name]["data_offsets"]
             array = np.frombuffer(data[begin + first:begin + last], "<f4").reshape(header[name]["shape"])
             found = hashlib.sha256(in_memory(name, array).tobytes()).hexdigest()
-            assert found == expected, f"step {line['step']}: {name} of the kept state is not the line's"
+            if found != expected:
+                sys.exit(f"step {line['step']}: {name} of the kept state is not the line's")
 print(f"{len(lines) - 1} lines and {states} kept states are as they were written; the last chain is {chain}")

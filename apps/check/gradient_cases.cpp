@@ -134,9 +134,6 @@ void shaping(Cases& cases) {
   Tensor apart({2, 5, 4, 3});
   for (Dim i = 0; i < apart.size(); ++i) apart.data()[i] = static_cast<real>(0.05 * double(i * 7919 % 120));
   cases.op("max_pool2d", {"x"}, {apart}, [](const Leaves& in) { return max_pool2d(in[0]); }, {.step = 1e-4});
-  cases.op("reshape", {"x"}, {uniform({2, 3, 7}, 1)}, [](const Leaves& in) {
-    return reshape(in[0], {3, 14});
-  });
   cases.op("concat", {"x0", "x1", "x2"},
            {uniform({2, 3, 1}, 1), uniform({2, 3, 17}, 2), uniform({2, 3, 3}, 3)},
            [](const Leaves& in) { return concat(in); });

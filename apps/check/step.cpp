@@ -73,7 +73,10 @@ Json to_json(const OperatorDifference& d) {
 // differs.
 int part(const Arguments& a, const LedgerDifference& lines, Json result) {
   const auto folder = [&](const char* name) {
-    return std::filesystem::path(a.text(name)).parent_path().string();
+    const std::filesystem::path file = a.text(name);
+    if (file.filename() != std::filesystem::path(LedgerFile::path_in("")).filename())
+      throw UsageError(a.text(name) + ": with --data expected the ledger in a run's own folder");
+    return file.has_parent_path() ? file.parent_path().string() : std::string(".");
   };
   const auto described = [&](const char* name) { return LedgerFile::state_path(folder(name), 0); };
   Repetition one(a, folder("FILE"), described("FILE")), other(a, folder("OTHER"), described("OTHER"));
@@ -137,6 +140,8 @@ Json opened_in(const std::string& path) {
 }  // namespace
 
 int check_step(const Arguments& a) {
+  if (a.given("out") != a.given("operator"))
+    throw UsageError("step: --operator says whose arrays --out holds; give both or neither");
   const std::string model = a.text("FILE");
   Repetition training(a, RunFolder::folder_of(model), model);
   Trainer& trainer = training.trainer();
@@ -156,6 +161,8 @@ int check_step(const Arguments& a) {
     throw UsageError("--operator " + a.text("operator") +
                      ": no operator of this step has a name that begins so; --json "
                      "FILE lists them");
+  if (a.given("out") && opened.arrays.empty() && !d)
+    throw UsageError("--operator " + a.text("operator") + ": what begins so is computed from nothing");
   if (a.given("out")) write_arrays(a.output("out"), opened.arrays, kept);
   const LedgerLine line = training.line().value_or(LedgerLine());
   a.print(

@@ -4,7 +4,6 @@
 #include <array>
 
 #include "autograd/checks.h"
-#include "autograd/ops/elementwise.h"
 #include "autograd/trace.h"
 
 namespace supertac {
@@ -59,11 +58,6 @@ Variable transpose_inner(const char* op, const Variable& x, Dim images, Dim rows
 }
 
 }  // namespace
-
-Variable reshape(const Variable& x, const Shape& shape) {
-  return record("reshape", x.value().reshaped(shape), {&x},
-                [](Backward& b) { add_to_gradient(b, 0, [gy = b.gy().data()](Dim i) { return gy[i]; }); });
-}
 
 Variable concat(std::span<const Variable> xs) {
   if (xs.empty() || xs.size() > kMaxInputs) {

@@ -7,8 +7,6 @@
 
 namespace supertac {
 
-/// The same numbers under another shape. Throws std::invalid_argument when the element counts differ.
-Variable reshape(const Variable& x, const Shape& shape);
 /// Joins along the last axis: [.., a], [.., b] -> [.., a + b]. Up to 8 inputs; all other axes must agree.
 Variable concat(std::span<const Variable> xs);
 /// Which columns of [.., width] take_runs() takes: from `first` on, runs of `run`, `step` apart.

@@ -219,14 +219,17 @@ class Update {
     all.back()["value"] = norm;
     all.back()["inputs"] = sums_;
     all.back()["outputs"] = {hash_of(std::span(&norm, 1))};
-    const Json settings = {{"norm", norm},           {"clip_norm", pace.clip_norm},
-                           {"step", report.step},    {"learning_rate", report.learning_rate},
-                           {"beta1", adam.beta1},    {"beta2", adam.beta2},
-                           {"epsilon", adam.epsilon}};
+    const Json settings = {{"norm", norm},
+                           {"clip_norm", pace.clip_norm},
+                           {"step", report.step},
+                           {"learning_rate", report.learning_rate}};
     for (std::size_t i = 0; i < parameters.size(); ++i) {
       const bool muon = pace.muon && is_matrix(parameters[i].value.shape());
       all.push_back(operator_of("update/" + parameters[i].name, muon ? "muon" : "adam"));
       all.back()["settings"] = settings;
+      if (!muon)
+        all.back()["settings"].update(
+            {{"beta1", adam.beta1}, {"beta2", adam.beta2}, {"epsilon", adam.epsilon}});
       for (const std::size_t place : State::places(i, parameters.size())) {
         all.back()["inputs"].push_back(before_.references[place]);
         all.back()["outputs"].push_back(after.references[place]);

@@ -16,7 +16,6 @@ Variable unflattened(const Variable& x, std::initializer_list<Dim> pixels) {
 
 TEST(Shaping, HandComputed) {
   const Variable x(Tensor::of({2, 3}, {1, 2, 3, 4, 5, 6})), y(Tensor::of({2, 1}, {7, 8}));
-  expect_values(reshape(x, {3, 2}).value(), {3, 2}, {1, 2, 3, 4, 5, 6});
   expect_values(joined({x, y}).value(), {2, 4}, {1, 2, 3, 7, 4, 5, 6, 8});
   const Variable pixels(Tensor::of({1, 2, 3}, {1, 10, 100, 2, 20, 200}));  // [N,L,C]
   expect_values(flatten_channels_first(pixels).value(), {1, 6}, {1, 2, 10, 20, 100, 200});
@@ -36,7 +35,6 @@ TEST(Shaping, OneAxisIsEnoughToJoin) {
 
 TEST(Shaping, Empty) {
   const Variable x(Tensor::zeros({0, 3, 2}));
-  EXPECT_EQ(reshape(x, {2, 0}).shape().text(), "[2,0]");
   EXPECT_EQ(joined({x, x}).shape().text(), "[0,3,4]");
   EXPECT_EQ(flatten_channels_first(x).shape().text(), "[0,6]");
   EXPECT_EQ(unflattened(Variable(Tensor::zeros({0, 6})), {3}).shape().text(), "[0,3,2]");
@@ -67,7 +65,6 @@ TEST(Shaping, TakesTheLastFrameOfEachWindow) {
 
 TEST(Shaping, RefusesWhatDoesNotFit) {
   const Variable x(Tensor::zeros({2, 3})), scalar(Tensor::zeros({}));
-  expect_refusal("reshape: [2,3] has 6 elements, the new shape [4] needs 4", [&] { reshape(x, {4}); });
   expect_refusal("concat: takes 1 to 8 inputs, got 0", [] { joined({}); });
   expect_refusal("concat: takes 1 to 8 inputs, got 9", [&] { joined(std::vector<Variable>(9, x)); });
   expect_refusal("concat: x expects at least rank 1, got []", [&] { joined({scalar}); });
@@ -84,7 +81,6 @@ TEST(Shaping, RefusesWhatDoesNotFit) {
 
 #ifdef SUPERTAC_REAL_IS_DOUBLE
 TEST(Shaping, Gradients) {
-  expect_gradients([](const auto& in) { return reshape(in[0], {3, 14}); }, {numbers({2, 3, 7})});
   expect_gradients([](const auto& in) { return joined(in); },
                    {numbers({2, 3, 1}), numbers({2, 3, 17}, 2), numbers({2, 3, 3}, 3)});
   expect_gradients([](const auto& in) { return joined({in[0], in[0]}); }, {numbers({2, 3})});
