@@ -86,8 +86,8 @@ SUPERTAC_API int supertac_live_push(supertac_live* live, double time_s, const fl
 SUPERTAC_API int supertac_live_picture(supertac_live* live, float* picture, float* predicted_error);
 
 /* Trains a network on a folder of recordings and writes the model, as supertac-train does: the same settings
-   make the same content. recipe: "paper", "best" or "tiny". settings: NULL, or what differs from the recipe.
-   progress: NULL, or called after every step; another result than 0 ends the training. 1: written, 0: ended
+   make the same content. recipe: "paper", "best", "tiny" or "frame". settings: NULL, or what differs from the
+   recipe. progress: NULL, or called after every step; another result than 0 ends the training. 1: written, 0: ended
    early and nothing written, -1: failed. */
 typedef struct {
   size_t size;              /* sizeof(supertac_training) */

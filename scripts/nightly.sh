@@ -62,6 +62,8 @@ for part in "$@"; do
       scripts/setup.sh python3-venv
       python3 -m venv build-venv
       build-venv/bin/pip install -q ./python
+      cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release >/dev/null
+      cmake --build build --target supertac-simulate
       build/bin/supertac-simulate --out build-venv/data --plates 6_Ridges --passes 1 --speeds 10 --quiet --force
       if build-venv/bin/python examples/tour.py build-venv/data; then note wheel "trains and draws"; else note wheel "fails"; fi
       ;;

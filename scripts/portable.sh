@@ -20,9 +20,10 @@ if [ ! -e "$parts/lib/libmicrohttpd.a" ]; then
     apt-get "$@" update
     apt-get "$@" source --download-only libmicrohttpd kissfft
     for archive in *.orig.tar.*; do tar -xf "$archive"; done
-    (cd kissfft-*/ && cc -O2 -fPIC -ffp-contract=off -c kiss_fft.c kiss_fftr.c && ar rcs ../lib/libkissfft-float.a kiss_*.o)
+    # "set -e" is off here, left of ||.
+    (cd kissfft-*/ && cc -O2 -fPIC -ffp-contract=off -c kiss_fft.c kiss_fftr.c && ar rcs ../lib/libkissfft-float.a kiss_*.o) || exit 1
     (cd libmicrohttpd-*/ && ./configure --quiet --disable-shared --disable-https --disable-curl --disable-doc \
-      --disable-examples --with-pic CFLAGS=-O2 && make -s -C src/microhttpd)
+      --disable-examples --with-pic CFLAGS=-O2 && make -s -C src/microhttpd) || exit 1
     cp libmicrohttpd-*/src/microhttpd/.libs/libmicrohttpd.a lib/
   ) >"$parts/log" 2>&1 || { tail -20 "$parts/log"; exit 1; }
 fi

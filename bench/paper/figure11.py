@@ -38,7 +38,7 @@ if __name__ == "__main__":
     study, lines = Study(__doc__), []
     study.sweep("pixels", "paper", scale=[4])
     for split in SPLITS:
-        out = study.out / f"classify_{split}_{len(study.seeds)}.json"
+        out = study.out / f"classify_{split}_{'-'.join(study.seeds)}.json"
         if not out.exists():
             study.run("classify", "--model", ",".join(map(str, study.models(split))), "--data", study.data, "--seeds",
                       len(study.seeds), "--views", ",".join(VIEWS), "--threads", 1, "--json", out, *augment(split),

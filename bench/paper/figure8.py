@@ -30,9 +30,9 @@ def heat_map(found, png):
                     if (of := chosen(found, latent=str(latent), timesteps=str(length))))
     script = pathlib.Path(__file__).with_name("heat_map.gp").read_text()
     names = lambda values: ", ".join(f'"{v}" {i}' for i, v in enumerate(values))
-    program = (f"set output '{png}'\nset ytics ({names(LATENTS)})\nset xtics ({names(sorted(table1.LENGTHS))})\n"
+    program = (f"set output '{png.name}'\nset ytics ({names(LATENTS)})\nset xtics ({names(sorted(table1.LENGTHS))})\n"
                f"$cells << EOD\n{cells}EOD\n{script}")
-    subprocess.run(["gnuplot"], input=program, text=True, check=True)
+    subprocess.run(["gnuplot"], cwd=png.parent, input=program, text=True, check=True)
 
 
 if __name__ == "__main__":

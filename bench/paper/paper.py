@@ -75,7 +75,7 @@ class Study:
 
     def pictures(self, split):
         """The folder of pictures that the first seed's network draws of its test windows."""
-        folder = self.out / f"pictures_{split}"
+        folder = self.out / f"pictures_{split}_{self.seeds[0]}"
         if not folder.exists():
             self.run("evaluate", "--model", self.models(split)[0], "--data", self.data, "--limit", 200, "--pictures", folder)
         return folder

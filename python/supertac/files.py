@@ -97,8 +97,9 @@ def expect(path: str | os.PathLike, tensors: dict[str, np.ndarray], shapes: dict
                 continue
             raise ValueError(f"{path}: has no tensor {name!r}; found {sorted(tensors)}")
         have = tensors[name].shape
-        if len(have) != len(shape) or any(size is not None and sizes.setdefault(size, n) != n
-                                          for size, n in zip(shape, have)):
+        if len(have) != len(shape) or any(
+                size is not None and n != (size if isinstance(size, int) else sizes.setdefault(size, n))
+                for size, n in zip(shape, have)):
             raise ValueError(f"{path}: tensor {name!r} has shape {list(have)}, which does not fit the others")
         found.append(tensors[name])
     return found

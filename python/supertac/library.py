@@ -117,7 +117,8 @@ class LiveWindow:
 def train(recipe: str, folder: str | os.PathLike, out: str | os.PathLike,
           callback: Callable[[int, float], object] | None = None, *, epochs: int = 0, stride: int = 0, seed: int = 0,
           split: str | None = None) -> bool:
-    """Trains as supertac-train does, to the same content: recipe "paper", "best" or "tiny", on a folder of recordings.
+    """Trains as supertac-train does, to the same content: recipe "paper", "best", "tiny" or "frame", on a folder of
+    recordings.
 
     callback(step, loss) is called after every step; when it returns something true, training ends early, and False is
     returned and nothing written. epochs and stride: 0 for the recipe's. split: what is kept for testing, "trial" or

@@ -42,13 +42,16 @@ class Log:
     metadata: dict
 
 
-SHAPES: dict[str, list] = {"time_s": ["n"], "volts": ["n", None], "position_mm?": ["n", None], "lift_mm?": ["n"],
+SHAPES: dict[str, list] = {"time_s": ["n"], "volts": ["n", None], "position_mm?": ["n", 2], "lift_mm?": ["n"],
                            "truth?": ["n", None, None]}
 
 
 def _check(path, recording: Recording) -> None:
     array, times, volts = recording.array, recording.time_s, recording.volts
-    if not isinstance(array, dict) or not all(isinstance(array.get(key), (int, float)) for key in RIG):
+    pitch = array.get("pitch_mm") if isinstance(array, dict) else None  # or [along a row, from row to row]
+    numbers = [*pitch] if isinstance(pitch, list) and len(pitch) == 2 else [pitch]
+    if not isinstance(array, dict) or not all(
+            isinstance(n, (int, float)) for n in numbers + [array.get(key) for key in ("rows", "columns", "channels")]):
         raise ValueError(f"{path}: its array is {array}, expected such as {RIG}")
     if volts.shape[1] != array["rows"] * array["columns"] * array["channels"]:
         raise ValueError(f"{path}: has {volts.shape[1]} signals, its array {array} has others")

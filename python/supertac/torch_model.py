@@ -122,14 +122,15 @@ class SuperTac(nn.Module):
             latents.append(mean if eps is None else mean + torch.exp(log_var / 2) * eps[i])
             for key, value in (("mean", mean), ("log_var", log_var), ("decoded", self.decode(latents[i], i))):
                 out[key].append(value)
-        return out | {"picture": self.upsample(torch.cat(latents, 1), x)[0]}
+        return out | {"picture": self.upsample(torch.cat(latents, 1) if latents else None, x)[0]}
 
 
 def ssim(x, y):
-    """Mean SSIM of pictures [N,H,W] after Wang 2004: Gaussian of 11x11 and sigma 1.5, 7x7 uniform on smaller ones, data
-    range 1, places where the window fits."""
+    """Mean SSIM of pictures [N,H,W] after Wang 2004: Gaussian of 11x11 and sigma 1.5; on smaller ones uniform, of the
+    largest odd size up to 7 that fits; data range 1, places where the window fits."""
     if min(x.shape[1:]) < 11:
-        window = torch.full((7, 7), 1 / 49, dtype=x.dtype)
+        size = min(7, (min(x.shape[1:]) - 1) // 2 * 2 + 1)
+        window = torch.full((size, size), 1 / size**2, dtype=x.dtype)
     else:
         g = torch.exp(-(torch.arange(11, dtype=x.dtype) - 5) ** 2 / (2 * 1.5**2))
         window = torch.outer(g, g) / g.sum() ** 2
@@ -148,9 +149,12 @@ def kl_divergence(mean, log_var):
 
 
 def loss_terms(out, truth, a=0.2, beta=1e-3, weight_ssim=0.1):
-    """Of training_outputs(): docs/network.md has the formula; here without the term of the predicted error."""
+    """Of training_outputs(): docs/network.md has the formula; here without the term of the predicted error. Without VAEs
+    the picture's part is all."""
     terms = {"reconstruction": sum(F.mse_loss(d, x) for d, x in zip(out["decoded"], out["input"])),
              "kld": sum(kl_divergence(m, v) for m, v in zip(out["mean"], out["log_var"])),
              "l2": F.mse_loss(out["picture"], truth), "ssim": ssim(out["picture"], truth)}
     picture = terms["l2"] + weight_ssim * (1 - terms["ssim"])
+    if not out["decoded"]:
+        return terms | {"total": picture}
     return terms | {"total": a * (terms["reconstruction"] + beta * terms["kld"]) + (1 - a) * picture}

@@ -61,8 +61,9 @@ constexpr double kPatienceS = 1, kHangS = 10;
 constexpr long kMostKilobytes = 1 << 20;
 constexpr std::uint64_t kMost = 1 << 26;  // bytes of a file that is compared
 // By --force a user gives up what these name, and nothing else.
-constexpr const char* kOutputs[] = {"--out",    "--json",     "--gcode", "--outputs",    "--capture",
-                                    "--report", "--pictures", "--onnx",  "--board-link", "--printer-link"};
+constexpr const char* kOutputs[] = {"--out",        "--json",         "--gcode",    "--outputs",
+                                    "--capture",    "--report",       "--pictures", "--onnx",
+                                    "--board-link", "--printer-link", "--mcap",     "--c99"};
 // What no program may change.
 constexpr const char* kKept[] = {"precious", "precious.stl", "model", "data/good"};
 
@@ -142,7 +143,7 @@ void run_whole(const fs::path& folder, std::vector<std::string> words) {
 std::vector<Option> options_of(const std::string& program) {
   std::vector<Option> options;
   const std::string help = run_process(fs::path(program).filename(), {"--help"}).out;
-  const std::regex shape(R"((?:^|\n)\s+(?:-h, )?--([a-z-]+)( [A-Z][^ ]*)?)");
+  const std::regex shape(R"((?:^|\n)\s+(?:-h, )?--([a-z0-9-]+)( [A-Z][^ ]*)?)");
   for (std::sregex_iterator match(help.begin(), help.end(), shape), end; match != end; ++match)
     options.push_back({(*match)[1], (*match)[2]});
   return options;

@@ -22,6 +22,7 @@ class LyingPort : public Port {
         rate_(0.002 + 0.02 * dice_.uniform()),
         from_line_(dice_.below(400)) {}
 
+  static std::uint32_t kind_of(std::uint64_t seed) { return Dice(seed, 77).below(kKinds); }
   const std::string& name() const override { return inner_->name(); }
   double now() override { return inner_->now(); }
   double write(std::span<const std::byte> bytes, double until) override {
@@ -122,7 +123,10 @@ std::map<std::string, std::uint64_t> lying_devices(std::uint64_t n, std::uint64_
     if (mute && verdict.broken.find("switch the printer off") != std::string::npos) verdict.broken.clear();
     if (verdict.broken.empty()) continue;
     ++counts["broken promises"];
-    std::cerr << "collection " << i << ": " << verdict.broken << " (" << verdict.error << ")\n";
+    std::cerr << "collection " << i << ", firmware " << random.bits(0) % 3 << ", M114 R "
+              << rig.printer.realtime_position << ", chunks of " << rig.chunk_s << " s, board stands still "
+              << rig.faults.freeze_rate << ", host " << rig.faults.host_freeze_rate << ", lie "
+              << LyingPort::kind_of(seed + i) << ": " << verdict.broken << " (" << verdict.error << ")\n";
   }
   return counts;
 }

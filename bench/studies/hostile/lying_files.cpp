@@ -163,7 +163,7 @@ void use_model(const std::string& path) {
 
 void use_pairs(const std::string& path) {
   WindowSet frames({.timesteps = 1});
-  for (const Recording& recording : import_pairs(path)) frames.add(recording);
+  for (const Recording& recording : import_pairs(SafetensorsFile::read(path))) frames.add(recording);
   std::vector<std::uint32_t> all(frames.size());
   std::iota(all.begin(), all.end(), 0U);
   (void)fit_baselines(frames, all);

@@ -65,6 +65,12 @@ Bytes good_journal(const std::string& path) {
   return read_file(path, 1 << 20);
 }
 
+std::string numpy_file() {
+  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (8, 2, 3), }";
+  header.resize(117, ' ');
+  return std::string("\x93NUMPY\x01\x00\x76\x00", 10) + header + "\n" + std::string(8 * 6 * 4, '\x3f');
+}
+
 // Its file is some kilobytes, so that most mutants hit what is read first.
 Recording short_recording() {
   constexpr std::size_t kFrames = 40;
@@ -171,38 +177,48 @@ std::vector<Reader> readers(const std::string& folder) {
   Bytes frames(4 * rig::kFrameBytes);
   for (int i = 0; i < 4; ++i)
     write_frame({}, std::span(frames).subspan(i * rig::kFrameBytes).first<rig::kFrameBytes>());
-  return {{"journal", good_journal(folder + "/journal"), [](const Bytes& b) { check_journal(b); }},
-          {"stl", stl_bytes(mesh_of(Plate::named("ridges6"), {.resolution_mm = 5}), "x"),
-           [](const Bytes& b) { check_stl(b); }},
-          {"safetensors", recording, from_file([](const std::string& f) { (void)SafetensorsFile::read(f); })},
-          {"recording", recording, from_file([](const std::string& f) { (void)read_recording(f); })},
-          {"text", bytes_of(lines), from_file([](const std::string& f) {
-             ImportReport report;
-             (void)import_text_pass(f, report);
-           })},
-          {"json", bytes_of(R"({"a":[1,2,{"b":"c"}],"d":1e5,"e":null})"),
-           [](const Bytes& b) { (void)parse_json_limited(text_of(b)); }},
-          {"reply", bytes_of("X:99.70 Y:101.17 Z:91.81 E:0.00 Count X:1 Y:2 Z:3"),
-           [](const Bytes& b) { (void)parse_reply(text_of(b)); }},
-          {"frames", frames,
-           [](const Bytes& b) {
-             FrameDecoder decoder;
-             decoder.push(b, [](const BoardFrame&, std::uint64_t) {});
-           }},
-          {"plate", bytes_of("bumps12+ridges6h1.5"),
-           [](const Bytes& b) {
-             const std::string name(text_of(b));
-             if (!Plate::is_file(name)) (void)Plate::named(name);
-           }},
-          {"model", good_model(folder), from_file([](const std::string& f) {
-             try {
-               (void)load_model(f);
-             } catch (const std::runtime_error& error) {
-               if (!std::string(error.what()).starts_with(f)) throw;  // it names the file, else it is raw
-             }
-           })},
-          {"pairs", good_pairs(folder), from_file([](const std::string& f) { (void)import_pairs(f); })},
-          {"requests", bytes_of(server->good()), [server](const Bytes& b) { server->ask(b); }}};
+  return {
+      {"journal", good_journal(folder + "/journal"), [](const Bytes& b) { check_journal(b); }},
+      {"stl", stl_bytes(mesh_of(Plate::named("ridges6"), {.resolution_mm = 5}), "x"),
+       [](const Bytes& b) { check_stl(b); }},
+      {"safetensors", recording, from_file([](const std::string& f) { (void)SafetensorsFile::read(f); })},
+      {"recording", recording, from_file([](const std::string& f) { (void)read_recording(f); })},
+      {"text", bytes_of(lines), from_file([](const std::string& f) {
+         ImportReport report;
+         (void)import_text_pass(f, report);
+       })},
+      {"table", bytes_of("ms,a,b,\"c\"\n# a remark\n0,1,2,3\n10,+1,2,3\n20,1,nan,3\n"),
+       from_file([](const std::string& f) { (void)read_table(f); })},
+      {"array", bytes_of(numpy_file()),
+       [folder](const Bytes& b) {
+         const std::string name = folder + "/mutant.npy";
+         std::ofstream(name, std::ios::binary).write(reinterpret_cast<const char*>(b.data()), std::ssize(b));
+         (void)read_table(name);
+       }},
+      {"json", bytes_of(R"({"a":[1,2,{"b":"c"}],"d":1e5,"e":null})"),
+       [](const Bytes& b) { (void)parse_json_limited(text_of(b)); }},
+      {"reply", bytes_of("X:99.70 Y:101.17 Z:91.81 E:0.00 Count X:1 Y:2 Z:3"),
+       [](const Bytes& b) { (void)parse_reply(text_of(b)); }},
+      {"frames", frames,
+       [](const Bytes& b) {
+         FrameDecoder decoder;
+         decoder.push(b, [](const BoardFrame&, std::uint64_t) {});
+       }},
+      {"plate", bytes_of("bumps12+ridges6h1.5"),
+       [](const Bytes& b) {
+         const std::string name(text_of(b));
+         if (!Plate::is_file(name)) (void)Plate::named(name);
+       }},
+      {"model", good_model(folder), from_file([](const std::string& f) {
+         try {
+           (void)load_model(f);
+         } catch (const std::runtime_error& error) {
+           if (!std::string(error.what()).starts_with(f)) throw;  // it names the file, else it is raw
+         }
+       })},
+      {"pairs", good_pairs(folder),
+       from_file([](const std::string& f) { (void)import_pairs(SafetensorsFile::read(f)); })},
+      {"requests", bytes_of(server->good()), [server](const Bytes& b) { server->ask(b); }}};
 }
 
 Bytes mutant_of(const Bytes& good, const RandomStream& random) {

@@ -81,6 +81,7 @@ TEST_F(Streaming, StoppedForAWhileItRecordsWhatItCanDate) {
     wait_for_growth(path("capture"), kTwoSeconds);
     running.send(SIGINT);
     const ProcessResult ended = running.wait();
+    rig_.reset();  // whose thread counts frames until here
     ASSERT_EQ(ended.code, 130) << ended.error;
     const Recording recording = read_recording(result("json").at("recording"));
     std::vector<double> off_s;  // from the board's own time, as far as the clocks' zeros are apart
@@ -96,7 +97,6 @@ TEST_F(Streaming, StoppedForAWhileItRecordsWhatItCanDate) {
     EXPECT_EQ(ended.out.find("frames left out, their time being uncertain") == std::string::npos,
               left_out == "0")
         << ended.out;
-    rig_.reset();
     fs::remove(path("capture"));
   }
 }

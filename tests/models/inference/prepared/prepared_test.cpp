@@ -232,7 +232,7 @@ TEST(Prepared, ShowsEveryMapOnItsWay) {
 
 TEST(Prepared, InBytesShowsItsMapsAsWhatTheyStandFor) {
   Rng rng(1);
-  const SuperTac network(random_settings(1), rng);
+  const SuperTac network({.timesteps = 32, .latent = 3, .scale = 4, .channels = 8, .rcabs = 1}, rng);
   const Tensor input = uniform(network.input_shape(1), 5);
   std::map<std::string, std::vector<real>> bytes;
   const auto into = [](auto& maps) {
@@ -244,6 +244,25 @@ TEST(Prepared, InBytesShowsItsMapsAsWhatTheyStandFor) {
   const Estimate drawn = in_bytes.watched(input, into(bytes));
   EXPECT_TRUE(std::ranges::equal(bytes.at("upsampler.out"), drawn.picture.values()));
   EXPECT_TRUE(std::ranges::equal(in_bytes.estimate(input).picture.values(), drawn.picture.values()));
+  std::map<const void*, std::string> names;
+  for (const Parameter& p : network.parameters()) names[p.value.node()] = p.name;
+  std::size_t compared = 0;
+  const NoGrad no_grad;
+  const Trace trace;
+  network.draw(Variable(input));
+  for (const TracedOp& op : trace.ops()) {
+    std::string layer = op.inputs.size() < 2 ? "" : names[op.inputs[1].node()];
+    layer = layer.substr(0, layer.rfind('.'));
+    if (!bytes.contains(layer) || layer == "upsampler.fc") continue;  // whose numbers lie pixel by pixel
+    const auto exact = op.y.value().values();
+    const auto [low, high] = std::ranges::minmax(exact);
+    ASSERT_EQ(bytes.at(layer).size(), exact.size()) << layer;
+    for (std::size_t i = 0; i < exact.size(); ++i)
+      ASSERT_NEAR(bytes.at(layer)[i], exact[i], 0.1F * (high - low) + 0.01F) << layer << ' ' << i;
+    ++compared;
+  }
+  EXPECT_GT(compared, 20U);
+  for (const real gate : bytes.at("sigmoid")) EXPECT_TRUE(gate > 0.2F && gate < 0.8F) << gate;
   EXPECT_THROW(in_bytes.watched(uniform(network.input_shape(2), 5), into(bytes)), std::invalid_argument);
 }
 
