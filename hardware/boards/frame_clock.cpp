@@ -141,16 +141,21 @@ void FrameNumbering::close_read() {
   waiting_ += read.steps.size();
   if (joins) {
     Burst& burst = bursts_.back();
-    if (minimum_.back().first + 1 == closed_) minimum_.pop_back();
     burst.steps.insert(burst.steps.end(), read.steps.begin(), read.steps.end());
     burst.time_s = read.time_s, burst.last = read.last, burst.more_waited = read.more_waited;
-  } else {
-    bursts_.push_back(std::move(read));
-    ++closed_;
+    return;
   }
-  const double late = lateness(bursts_.back());
-  while (!minimum_.empty() && minimum_.back().second >= late) minimum_.pop_back();
-  minimum_.emplace_back(closed_ - 1, late);
+  if (!bursts_.empty()) {
+    const double late = lateness(bursts_.back());
+    while (!minimum_.empty() && minimum_.back().second >= late) minimum_.pop_back();
+    minimum_.emplace_back(closed_++, late);
+  }
+  bursts_.push_back(std::move(read));
+}
+
+double FrameNumbering::least_lateness() const {
+  const double last = lateness(bursts_.back());
+  return minimum_.empty() ? last : std::min(last, minimum_.front().second);
 }
 
 void FrameNumbering::finish(std::vector<FramePlace>& places) {
@@ -159,12 +164,13 @@ void FrameNumbering::finish(std::vector<FramePlace>& places) {
 }
 
 void FrameNumbering::decide(std::vector<FramePlace>& places) {
+  const double least = least_lateness();
   const Burst burst = std::move(bursts_.front());
   bursts_.pop_front();
   waiting_ -= burst.steps.size();
   // Before the first decision the envelope is the earliest of everything seen: the first may be a late one.
-  if (decided_ == 0) envelope_ = minimum_.front().second;
-  const double periods = std::floor((minimum_.front().second - envelope_) / period_ + kEarly);
+  if (decided_ == 0) envelope_ = least;
+  const double periods = std::floor((least - envelope_) / period_ + kEarly);
   const std::uint64_t total = std::max(missing_, static_cast<std::uint64_t>(std::max(periods, 0.0)));
   const std::uint64_t lost = total - missing_;
   const bool alone = burst.steps.size() == 1;
@@ -188,7 +194,7 @@ void FrameNumbering::decide(std::vector<FramePlace>& places) {
   decided_s_ = burst.time_s;
   decided_last_ = burst.last;
   track(late);
-  if (minimum_.front().first == decided_) minimum_.pop_front();
+  if (!minimum_.empty() && minimum_.front().first == decided_) minimum_.pop_front();
   ++decided_;
 }
 

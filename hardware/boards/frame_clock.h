@@ -93,16 +93,18 @@ class FrameNumbering {
     return burst.time_s - period_ * static_cast<double>(burst.last);
   }
   void close_read();
+  double least_lateness() const;  // of all bursts not yet decided
   void decide(std::vector<FramePlace>& places);
   void track(double lateness);
 
   double period_;
   std::size_t lookahead_;
-  Burst read_;                                            // the read whose frames come now
-  std::deque<Burst> bursts_;                              // not yet decided
-  std::deque<std::pair<std::uint64_t, double>> minimum_;  // increasing lateness: the smallest is in front
-  std::uint64_t closed_ = 0, decided_ = 0;                // bursts
-  std::size_t waiting_ = 0;                               // frames in bursts_
+  Burst read_;                // the read whose frames come now
+  std::deque<Burst> bursts_;  // not yet decided
+  // Increasing lateness, the smallest in front, of all bursts but the last, which may still grow.
+  std::deque<std::pair<std::uint64_t, double>> minimum_;
+  std::uint64_t closed_ = 0, decided_ = 0;  // bursts
+  std::size_t waiting_ = 0;                 // frames in bursts_
   std::uint64_t counted_ = 0, missing_ = 0, damaged_ = 0, index_ = 0;
   std::uint32_t doubt_ = 0;  // of what comes next
   double decided_s_ = 0;     // when the newest decided burst was read, and its last frame

@@ -206,6 +206,9 @@ void MarlinLink::ask(Exchange& exchange) {
 
 void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
   check_alarm(reply);
+  // Klipper numbers nothing, and would run again what is sent again.
+  const bool of_lines = reply.kind == ReplyKind::line_fault || reply.kind == ReplyKind::resend;
+  if (capabilities_.klipper && of_lines) return;
   switch (reply.kind) {
     case ReplyKind::ok:
       on_ok(exchange);

@@ -107,6 +107,28 @@ TEST(FrameTimeline, ChunksAreNoLoss) {
   }
 }
 
+// What waited before a loss is read by and by, so that a burst which began in time ends late.
+TEST(FrameTimeline, ALossWithinABurstMovesNothingBeforeIt) {
+  std::vector<FrameArrival> arrivals;
+  std::vector<std::uint64_t> numbers;
+  const auto read = [&](std::uint64_t first, std::uint64_t last, double late_s, bool more_waited) {
+    const double time = 100 + rig::kFramePeriodS * static_cast<double>(last) + late_s;
+    for (std::uint64_t i = first; i <= last; ++i)
+      arrivals.push_back({time, 0, more_waited}), numbers.push_back(i);
+  };
+  for (std::uint64_t i = 0; i < 400; ++i) read(50 * i, 50 * i + 49, i % 2 == 0 ? 0.004 : 1e-4, false);
+  read(20'000, 20'049, 0, true);
+  read(20'700, 20'749, 0, false);
+  for (std::uint64_t i = 415; i < 600; ++i) read(50 * i, 50 * i + 49, i % 2 == 0 ? 0.004 : 1e-4, false);
+  const FrameTimeline timeline = timeline_of(arrivals);
+  EXPECT_EQ(timeline.missing, 650U);
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    ASSERT_LE(std::abs(static_cast<double>(timeline.places[i].index) - static_cast<double>(numbers[i])),
+              timeline.places[i].doubt)
+        << "frame " << i;
+  EXPECT_EQ(timeline.places[19'000].doubt, 0U);
+}
+
 TEST(FrameTimeline, DamagedFramesKeepTheirPlaceInAChunk) {
   EXPECT_EQ(damaged_frames(0), 0U);
   EXPECT_EQ(damaged_frames(1), 0U);

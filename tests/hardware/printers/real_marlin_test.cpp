@@ -124,6 +124,21 @@ TEST(Klipper, IsConnectedConfirmedAndMoved) {
   EXPECT_TRUE(bench.printer.quick_stop().confirmed);
 }
 
+// It would run it again.
+TEST(Klipper, IsSentNoLineAgain) {
+  PrinterBench bench(klipper_rig());
+  bench.printer.confirm_origin(rig::kMounted);
+  std::vector<std::string> moves;
+  bench.firmware().on_line([&](std::int64_t number, const std::string& command, double) {
+    if (!command.starts_with("G1")) return;
+    moves.push_back(command);
+    if (moves.size() == 2) bench.firmware().inject("Resend: " + std::to_string(number - 1) + "\n");
+  });
+  const std::vector<std::string> sent = {"G1 X110", "G1 X112", "G1 X114"};
+  for (const std::string& move : sent) bench.printer.link().command(move);
+  EXPECT_EQ(moves, sent);
+}
+
 TEST(Klipper, IsHomedWithTheFingerUp) {
   PrinterBench bench(klipper_rig());
   bench.printer.home();
