@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What --mcap writes, opened by the public readers (PyPI: mcap, mcap-ros2-support; rosbags has the definitions of the ROS
-messages; rerun-sdk): the taxels and pictures of supertac-stream --out, with sizes, times and units. Where h5py is
-installed, what examples/to_hdf5.py makes of the same file.
+messages; rerun-sdk): the taxels and pictures of supertac-stream --out, with sizes, times and units. Where h5py and
+lerobot are installed, what examples/to_hdf5.py and examples/to_lerobot.py make of the same file.
 
     tests/python/tools_test.py BIN
 
@@ -89,17 +89,39 @@ def check_rerun(path):
         print(f"{path.name}: nothing for Rerun to complain of")
 
 
+def convert(script, *words):
+    subprocess.run([sys.executable, ROOT / "examples" / script, *map(str, words)], check=True, stdout=subprocess.DEVNULL,
+                   stderr=subprocess.DEVNULL, env=os.environ | {"PYTHONPATH": str(ROOT / "python")})
+
+
 def check_hdf5(folder, log, seen):
     try:
         import h5py
     except ImportError:
         print("not converted: h5py is not installed")
         return
-    subprocess.run([sys.executable, ROOT / "examples/to_hdf5.py", folder / "all.h5", log], check=True,
-                   stdout=subprocess.DEVNULL, env=os.environ | {"PYTHONPATH": str(ROOT / "python")})
+    convert("to_hdf5.py", folder / "all.h5", log)
     with h5py.File(folder / "all.h5") as file:
         assert np.array_equal(file["log/pictures"][:], seen.pictures) and file["log"].attrs["pixel_mm"] == "0.75"
     print(f"all.h5: {len(seen.pictures)} pictures, the same bits")
+
+
+def check_lerobot(folder, log, seen):
+    try:
+        from lerobot.datasets.lerobot_dataset import LeRobotDataset
+    except ImportError:
+        print("not converted: lerobot is not installed")
+        return
+    convert("to_lerobot.py", folder / "episodes", 50, log, log)
+    data = LeRobotDataset("local/tactile", root=folder / "episodes")
+    assert data.num_episodes == 2 and data.fps == 50 and len(data) % 2 == 0
+    times, middle = seen.time_s - seen.time_s[0], len(data) // 2
+    for i in (0, 7, middle - 1, middle, len(data) - 1):
+        frame = data[i]
+        nearest = np.abs(times - frame["frame_index"].item() / 50).argmin()
+        assert np.array_equal(frame["observation.taxels"], seen.volts[nearest])
+        assert np.array_equal(frame["observation.picture"], seen.pictures[nearest])
+    print(f"episodes: {len(data)} frames, the same bits")
 
 
 def check_live(folder):
@@ -149,6 +171,7 @@ def main():
         check_live(folder)
         check_rerun(streamed)
         check_hdf5(folder, log, seen)
+        check_lerobot(folder, log, seen)
 
 
 if __name__ == "__main__":
