@@ -1,5 +1,5 @@
-// The steps of models/inference/prepared/planner.h: each packs its op's weights and returns what runs for a
-// block of images.
+// The steps of a plan: each function packs its op's weights and adds what runs for a block of images. The
+// table at the end has one for every op that networks draw with.
 #include <algorithm>
 #include <array>
 
@@ -8,10 +8,10 @@
 
 namespace supertac {
 
-void Planner::last_frame(const TracedOp& op) {
-  const FeatureMap y = new_map(op.y);
+static void last_frame_step(Planner& planner, const TracedOp& op) {
+  const FeatureMap y = planner.new_map(op.y);
   const Dim frame = op.inputs[0].dim(2), window = op.inputs[0].dim(1) * frame;
-  plan_->steps_.push_back([=](const Block& b) {
+  planner.add_step([=](const Block& b) {
     for (Dim n = 0; n < b.images; ++n) {
       const real* from = b.input + (n + 1) * window - frame;
       real* line = b.first_pixel(y) + n * y.image();
@@ -26,12 +26,12 @@ static void copy_runs(Dim rows, const real* from, Dim from_step, real* to, Dim t
   for (Dim r = 0; r < rows; ++r, from += from_step, to += to_step) std::copy_n(from, kRun, to);
 }
 
-void Planner::take_runs(const TracedOp& op) {
-  const FeatureMap y = new_map(op.y);
+static void take_runs_step(Planner& planner, const TracedOp& op) {
+  const FeatureMap y = planner.new_map(op.y);
   const Dim width = op.inputs[0].dim(2), rows = y.width;
   const OpSettings s = op.settings;
   const Dim piece = s.run % 4 == 0 ? 4 : 1;  // a row of the rig's array is one move
-  plan_->steps_.push_back([=](const Block& b) {
+  planner.add_step([=](const Block& b) {
     for (Dim n = 0; n < b.images; ++n) {
       const real* from = b.input + n * rows * width + s.first;
       real* to = b.first_pixel(y) + n * y.image();
@@ -98,11 +98,12 @@ void Planner::plane_conv(const TracedOp& op) {
                                      {std::move(output)}});
 }
 
-void Planner::flatten(const TracedOp&) {}  // the linear layer behind it takes the map as it is
+// The linear layer behind it takes the map as it is.
+static void flatten_step(Planner&, const TracedOp&) {}
 
-void Planner::unflatten(const TracedOp& op) {
-  const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
-  plan_->steps_.push_back([=](const Block& b) {
+static void unflatten_step(Planner& planner, const TracedOp& op) {
+  const FeatureMap x = planner.map_of(op.inputs[0]), y = planner.new_map(op.y);
+  planner.add_step([=](const Block& b) {
     const Dim run = y.width * y.channels;
     for (Dim n = 0; n < b.images; ++n) {
       const real* from = b.begin(x) + n * x.image();
@@ -112,13 +113,13 @@ void Planner::unflatten(const TracedOp& op) {
   });
 }
 
-void Planner::concat(const TracedOp& op) {
+static void concat_step(Planner& planner, const TracedOp& op) {
   if (op.y.rank() > 2) throw std::logic_error("Prepared: a concat of maps has no step");
-  const FeatureMap y = new_map(op.y);
+  const FeatureMap y = planner.new_map(op.y);
   Dim at = 0;
   for (const Variable& input : op.inputs) {
-    const FeatureMap x = map_of(input);
-    plan_->steps_.push_back([=](const Block& b) {
+    const FeatureMap x = planner.map_of(input);
+    planner.add_step([=](const Block& b) {
       for (Dim n = 0; n < b.images; ++n)
         std::copy_n(b.begin(x) + n * x.channels, x.channels, b.begin(y) + n * y.channels + at);
     });
@@ -126,35 +127,56 @@ void Planner::concat(const TracedOp& op) {
   }
 }
 
-void Planner::global_mean(const TracedOp& op) {
-  const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
-  plan_->steps_.push_back([=](const Block& b) {
+static void global_mean_step(Planner& planner, const TracedOp& op) {
+  const FeatureMap x = planner.map_of(op.inputs[0]), y = planner.new_map(op.y);
+  planner.add_step([=](const Block& b) {
     isa().mean({b.images, x.height, x.width, x.channels, {}, x.strides(), {}}, b.first_pixel(x), b.begin(y));
   });
 }
 
-void Planner::sigmoid(const TracedOp& op) {
-  const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
+static void sigmoid_step(Planner& planner, const TracedOp& op) {
+  const FeatureMap x = planner.map_of(op.inputs[0]), y = planner.new_map(op.y);
   if (op.y.rank() > 2) throw std::logic_error("Prepared: a sigmoid of maps has no step");
-  plan_->steps_.push_back(
-      [=](const Block& b) { kernels::sigmoid(b.images * x.image(), b.begin(x), b.begin(y)); });
+  planner.add_step([=](const Block& b) { kernels::sigmoid(b.images * x.image(), b.begin(x), b.begin(y)); });
 }
 
-void Planner::gated_sum(const TracedOp& op) {
-  const FeatureMap a = map_of(op.inputs[0]), x = map_of(op.inputs[1]), gates = map_of(op.inputs[2]);
-  const FeatureMap y = new_map(op.y);
-  plan_->steps_.push_back([=](const Block& b) {
+static void gated_sum_step(Planner& planner, const TracedOp& op) {
+  const FeatureMap a = planner.map_of(op.inputs[0]), x = planner.map_of(op.inputs[1]),
+                   gates = planner.map_of(op.inputs[2]);
+  const FeatureMap y = planner.new_map(op.y);
+  planner.add_step([=](const Block& b) {
     isa().gate({b.images, x.height, x.width, x.channels, a.strides(), x.strides(), y.strides()},
                b.first_pixel(a), b.first_pixel(x), b.begin(gates), b.first_pixel(y));
   });
 }
 
-void Planner::add(const TracedOp& op) {
-  const FeatureMap a = map_of(op.inputs[0]), x = map_of(op.inputs[1]), y = new_map(op.y);
-  plan_->steps_.push_back([=](const Block& b) {
+static void sum_step(Planner& planner, const TracedOp& op) {
+  const FeatureMap a = planner.map_of(op.inputs[0]), x = planner.map_of(op.inputs[1]),
+                   y = planner.new_map(op.y);
+  planner.add_step([=](const Block& b) {
     isa().gate({b.images, x.height, x.width, x.channels, a.strides(), x.strides(), y.strides()},
                b.first_pixel(a), b.first_pixel(x), nullptr, b.first_pixel(y));
   });
+}
+
+const std::map<std::string_view, Planner::Make>& Planner::makers() {
+  static const std::map<std::string_view, Make> known{
+      {"take_runs", take_runs_step},
+      {"last_frame", last_frame_step},
+      {"conv1d", [](Planner& planner, const TracedOp& op) { planner.conv(op); }},
+      {"conv2d", [](Planner& planner, const TracedOp& op) { planner.conv(op); }},
+      {"conv_transpose1d", [](Planner& planner, const TracedOp& op) { planner.transposed_conv(op); }},
+      {"conv_transpose2d", [](Planner& planner, const TracedOp& op) { planner.transposed_conv(op); }},
+      {"linear", [](Planner& planner, const TracedOp& op) { planner.linear(op); }},
+      {"flatten_channels_first", flatten_step},
+      {"unflatten_channels_first", unflatten_step},
+      {"concat", concat_step},
+      {"global_mean", global_mean_step},
+      {"sigmoid", sigmoid_step},
+      {"gated_sum", gated_sum_step},
+      {"add", sum_step},
+  };
+  return known;
 }
 
 }  // namespace supertac

@@ -42,35 +42,15 @@ std::shared_ptr<const Plan> Planner::plan(const Network& network, std::size_t se
   return planner.plan_;
 }
 
-const std::map<std::string_view, Planner::Make>& Planner::makers() {
-  static const std::map<std::string_view, Make> known{
-      {"take_runs", &Planner::take_runs},
-      {"last_frame", &Planner::last_frame},
-      {"conv1d", &Planner::conv},
-      {"conv2d", &Planner::conv},
-      {"conv_transpose1d", &Planner::transposed_conv},
-      {"conv_transpose2d", &Planner::transposed_conv},
-      {"linear", &Planner::linear},
-      {"flatten_channels_first", &Planner::flatten},
-      {"unflatten_channels_first", &Planner::unflatten},
-      {"concat", &Planner::concat},
-      {"global_mean", &Planner::global_mean},
-      {"sigmoid", &Planner::sigmoid},
-      {"gated_sum", &Planner::gated_sum},
-      {"add", &Planner::add},
-  };
-  return known;
-}
-
 Planner::Planner(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn)
     : TraceWalk(input, ops, drawn) {
   for (std::size_t i = 0; i < ops.size(); ++i) {
     const auto make = makers().find(ops[i].op);
     if (make == makers().end())
       throw std::logic_error("Prepared: no step computes the op " + std::string(ops[i].op) +
-                             "; models/inference/prepared/planner.h lists those that have one");
+                             "; models/inference/prepared/plan_steps.cpp lists those that have one");
     takes_input(ops[i]);  // or throws
-    (this->*make->second)(ops[i]);
+    make->second(*this, ops[i]);
     if (maps_.contains(ops[i].y.node()))
       plan_->made_.push_back({plan_->steps_.size(), std::string(ops[i].op), map_of(ops[i].y)});
     release_after(i);

@@ -23,24 +23,26 @@ class Planner : TraceWalk {
   static std::shared_ptr<const Plan> plan(const Network& network,
                                           std::size_t second_cache = second_cache_bytes());
 
+  // For the steps.
+  const FeatureMap& map_of(const Variable& x) const;
+  const FeatureMap& new_map(const Variable& y);
+  void add_step(PlanStep step) { plan_->steps_.push_back(std::move(step)); }
+
  private:
-  using Make = void (Planner::*)(const TracedOp&);
+  using Make = void (*)(Planner&, const TracedOp&);
 
   static std::size_t second_cache_bytes();
   static std::size_t bytes_of(const Tensor& t) { return static_cast<std::size_t>(t.size()) * sizeof(real); }
   bool filters_anew(std::size_t second_cache) const;
   Planner(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn);
+  /// In plan_steps.cpp: what makes the step of each op.
   static const std::map<std::string_view, Make>& makers();
 
-  const FeatureMap& map_of(const Variable& x) const;
   FeatureMap layout_of(const Variable& y) const;
-  const FeatureMap& new_map(const Variable& y);
   void add_product(struct Product product);
   void add_winograd(struct Winograd step);
   void release_after(std::size_t op);
 
-  void take_runs(const TracedOp& op);
-  void last_frame(const TracedOp& op);
   void conv(const TracedOp& op);
   void winograd(const TracedOp& op);
   void plane_conv(const TracedOp& op);
@@ -49,13 +51,6 @@ class Planner : TraceWalk {
   void transposed_winograd(const TracedOp& op);
   void direct_transposed_conv(const TracedOp& op);
   void linear(const TracedOp& op);
-  void flatten(const TracedOp& op);
-  void unflatten(const TracedOp& op);
-  void concat(const TracedOp& op);
-  void global_mean(const TracedOp& op);
-  void sigmoid(const TracedOp& op);
-  void gated_sum(const TracedOp& op);
-  void add(const TracedOp& op);
 
   std::shared_ptr<Plan> plan_ = std::make_shared<Plan>();
   std::map<Id, FeatureMap> maps_;
