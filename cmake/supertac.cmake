@@ -55,9 +55,9 @@ function(supertac_library_both name)
 endfunction()
 
 # Seconds; a sanitizer makes some tests ten times as slow.
-set(SUPERTAC_TEST_TIMEOUT 300)
+set(SUPERTAC_TEST_TIMEOUT 1500)
 if(SUPERTAC_SANITIZE)
-  set(SUPERTAC_TEST_TIMEOUT 1800)
+  set(SUPERTAC_TEST_TIMEOUT 3600)
 endif()
 
 # supertac_cases(NAME [PREFIX text] [SLOW pattern ...] [SERIAL pattern ...]): every case of a GoogleTest program as a ctest

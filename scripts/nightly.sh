@@ -5,6 +5,7 @@
 # Each part can be run alone. The last line of each part is added, with date and commit, to scripts/nightly.log.
 #   scripts/nightly.sh [clang] [aarch64] [asan] [tsan] [tidy] [cppcheck] [lintian] [portable] [wheel] [coverage]
 set -eu
+export OMP_WAIT_POLICY=passive  # tests run side by side
 cd "$(dirname "$0")/.."
 [ $# -gt 0 ] || set -- clang aarch64 asan tsan tidy cppcheck lintian portable wheel coverage
 scripts/setup.sh libgtest-dev python3 clang libomp-dev gcovr

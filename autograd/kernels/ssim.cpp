@@ -57,7 +57,10 @@ class SsimImage {
     return total / static_cast<double>(oh_ * ow_);
   }
 
-  // gx += g d value / d x, by way of the mean, the variance and the covariance of x.
+  // S = n1 n2 / (d1 d2) of a position depends on x by its windowed mean m, variance v and covariance c:
+  //   dS/dm = 2 (mean_b n2 / (d1 d2) - mean_a S / d1),  dS/dv = -S / d2,  dS/dc = 2 n1 / (d1 d2)
+  // and with blur the windowed sum, m = blur(x), v = blur(x^2) - m^2, c = blur(x target) - m blur(target):
+  //   gx += blur^T(by_x) + x blur^T(by_square) + target blur^T(by_product)
   void add_gradient(const real* x, const real* target, real g, real* gx) {
     take_moments(x, target);
     const real each = g / static_cast<real>(oh_ * ow_);

@@ -7,7 +7,7 @@
 
 namespace supertac {
 
-// The gradient reads the sign of y, which is the sign of x for slope >= 0.
+// y = x > 0 ? x : slope x;  gx = y > 0 ? gy : slope gy: the sign of y is that of x for slope >= 0.
 static Variable rectify(const char* op, const Variable& x, real slope) {
   return elementwise(
       op, x, [f = kernels::Rectifier(slope)](real at) { return f(at); },
@@ -25,6 +25,7 @@ void check_slope(const char* op, real slope) {
   if (!(slope >= 0)) refuse(op, "slope must not be negative, got " + std::to_string(slope));
 }
 
+// gy becomes the gradient before y = f(s), gs = y > 0 ? gy : slope gy.
 const real* before_activation(Backward& b, real slope) {
   const real* y = b.y().data();
   real* g = b.mutable_gy().data();
@@ -32,12 +33,14 @@ const real* before_activation(Backward& b, real slope) {
   return g;
 }
 
+// y = 1 / (1 + e^-x);  gx = gy y (1 - y)
 Variable sigmoid(const Variable& x) {
   return elementwise(
       "sigmoid", x, [](real at) { return kernels::sigmoid_same_bits(at); },
       [](real gy, real, real y) { return gy * y * (1 - y); });
 }
 
+// y = min(max(x, low), high);  gx = gy within the limits, which belong to it, 0 beyond
 Variable clamp(const Variable& x, real low, real high) {
   if (!(low <= high))
     refuse("clamp", "low must not exceed high, got " + std::to_string(low) + " and " + std::to_string(high));

@@ -36,6 +36,7 @@ Variable linear(const Variable& x, const Variable& w, const Variable& b, real ne
   return record("linear", y, {&x, &w, &b}, reverse, &settings);
 }
 
+// y[n,o] = f(bias[o] + sum over i of x[n,i] w[i,o])
 void kernels::linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias,
                      real negative_slope, real* y) {
   if (!kernels::is_plain()) return kernels::fast::linear(rows, cin, cout, x, w, bias, negative_slope, y);
@@ -48,6 +49,7 @@ void kernels::linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, 
   }
 }
 
+// gx[n,i] = or += sum over o of gy[n,o] w[i,o]
 void kernels::linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx) {
   if (!kernels::is_plain()) return kernels::fast::linear_grad_x(rows, cin, cout, gy, w, into, gx);
   for (Dim n = 0; n < rows; ++n) {
@@ -59,6 +61,7 @@ void kernels::linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const r
   }
 }
 
+// gw[i,o] = or += sum over n of x[n,i] gy[n,o]
 void kernels::linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw) {
   if (!kernels::is_plain()) return kernels::fast::linear_grad_w(rows, cin, cout, x, gy, into, gw);
   if (into == Into::overwrite) std::fill_n(gw, cin * cout, real(0));

@@ -10,7 +10,7 @@
 
 namespace supertac {
 
-// gx = 2 g (x - target) / n,  gtarget = -gx
+// value = mean over the n elements of (x - target)^2;  gx = 2 g (x - target) / n,  gtarget = -gx
 Variable l2_loss(const Variable& x, const Variable& target) {
   check_same_shape("l2_loss", "x", x, "target", target);
   const Dim n = x.size();
@@ -28,6 +28,8 @@ Variable l2_loss(const Variable& x, const Variable& target) {
   });
 }
 
+// x, target [N,H,W,1];  value = mean over images and positions of SSIM (autograd/kernels/ssim.h)
+// gx = g d value / dx; the target is a constant
 Variable ssim(const Variable& x, const Tensor& target) {
   check_rank("ssim", "x", x, 4);
   if (target.shape() != x.shape()) {
@@ -60,13 +62,15 @@ static double cross_entropy(Dim classes, const real* logits, Dim label, real* re
   return std::log(norm) - static_cast<double>(logits[label] - largest);
 }
 
+// logits [N,K];  value = mean over n of -log softmax(logits[n])[label n]
 // glogits[n,k] = g (softmax(logits[n])[k] - [k = label n]) / N
 Variable softmax_cross_entropy(const Variable& logits, std::span<const std::int32_t> labels) {
   check_rank("softmax_cross_entropy", "logits", logits, 2);
   const Dim rows = logits.dim(0), classes = logits.dim(1);
-  if (static_cast<Dim>(labels.size()) != rows || rows == 0) {
+  if (rows == 0) refuse("softmax_cross_entropy", "logits is empty: " + logits.shape().text());
+  if (static_cast<Dim>(labels.size()) != rows) {
     refuse("softmax_cross_entropy",
-           "labels expects " + std::to_string(rows) + " > 0 entries, got " + std::to_string(labels.size()));
+           "labels expects " + std::to_string(rows) + " entries, got " + std::to_string(labels.size()));
   }
   Tensor gradient(logits.shape());  // softmax - one-hot, kept for the reverse step
   double total = 0;

@@ -59,12 +59,13 @@ Variable transpose_inner(const char* op, const Variable& x, Dim images, Dim rows
 
 }  // namespace
 
+// xs[i] [...,last i] -> y [..., sum of last i], side by side;  gx[i] += its columns of gy
 Variable concat(std::span<const Variable> xs) {
   if (xs.empty() || xs.size() > kMaxInputs) {
     refuse("concat",
            "takes 1 to " + std::to_string(kMaxInputs) + " inputs, got " + std::to_string(xs.size()));
   }
-  if (xs[0].rank() < 1) refuse("concat", "x expects at least rank 1, got " + xs[0].shape().text());
+  if (xs[0].rank() < 1) refuse("concat", "x0 expects at least rank 1, got " + xs[0].shape().text());
   std::array<const Variable*, kMaxInputs> inputs{};
   Dim width = 0;
   for (std::size_t i = 0; i < xs.size(); ++i) {
@@ -96,6 +97,7 @@ Variable concat(std::span<const Variable> xs) {
       });
 }
 
+// x [...,columns] -> y [...,width]: from column `first` on `run` columns, and so on every `step` columns
 Variable take_runs(const Variable& x, const Runs& r) {
   if (x.rank() < 1) refuse("take_runs", "x expects at least rank 1, got " + x.shape().text());
   const Dim width = x.dim(x.rank() - 1);
@@ -117,6 +119,7 @@ Variable take_runs(const Variable& x, const Runs& r) {
       "take_runs", y, {&x}, [](Backward&) {}, &settings);
 }
 
+// windows [N,T,rows * columns * channels] -> y [N,rows,columns,channels], the last of T
 Variable last_frame(const Variable& x, Dim rows, Dim columns, Dim channels) {
   check_rank("last_frame", "windows", x, 3);
   const Dim images = x.dim(0), frames = x.dim(1), signals = rows * columns * channels;
@@ -128,6 +131,7 @@ Variable last_frame(const Variable& x, Dim rows, Dim columns, Dim channels) {
   return record("last_frame", y, {&x}, [](Backward&) {});
 }
 
+// x [N,P...,C] -> y [N, C * pixels];  gx is gy the other way
 Variable flatten_channels_first(const Variable& x) {
   if (x.rank() < 3) refuse("flatten_channels_first", "x expects rank 3 or 4, got " + x.shape().text());
   const Dim channels = x.dim(x.rank() - 1), images = x.dim(0);
@@ -135,9 +139,12 @@ Variable flatten_channels_first(const Variable& x) {
   return transpose_inner("flatten_channels_first", x, images, pixels, channels, {images, channels * pixels});
 }
 
+// x [N, C * pixels] -> y [N,P...,C];  gx is gy the other way
 Variable unflatten_channels_first(const Variable& x, std::span<const Dim> pixels) {
   check_rank("unflatten_channels_first", "x", x, 2);
-  if (pixels.empty() || pixels.size() > 2) refuse("unflatten_channels_first", "pixels must be {L} or {H,W}");
+  if (pixels.empty() || pixels.size() > 2)
+    refuse("unflatten_channels_first",
+           "pixels must be {L} or {H,W}, got " + std::to_string(pixels.size()) + " sizes");
   const Dim count = pixels.size() == 1 ? pixels[0] : pixels[0] * pixels[1];
   if (count < 1 || x.dim(1) % count != 0) {
     refuse("unflatten_channels_first",

@@ -68,15 +68,21 @@ bool is_matrix(const Shape& shape) {
 
 Adam::Adam(std::vector<Variable> parameters, const AdamOptions& options)
     : parameters_(std::move(parameters)), options_(options) {
+  const auto require = [](bool holds, const char* what, double got) {
+    if (!holds)
+      throw std::invalid_argument("Adam: expects " + std::string(what) + ", got " + std::to_string(got));
+  };
   const auto in_unit = [](double beta) { return beta >= 0 && beta < 1; };
-  if (!(options.learning_rate >= 0) || !in_unit(options.beta1) || !in_unit(options.beta2) ||
-      !(options.epsilon > 0) || !(options.clip_norm >= 0)) {
-    throw std::invalid_argument(
-        "Adam: expects learning_rate >= 0, beta1 and beta2 in [0,1), epsilon > 0, clip_norm >= 0");
-  }
+  require(options.learning_rate >= 0, "learning_rate >= 0", options.learning_rate);
+  require(in_unit(options.beta1), "beta1 in [0,1)", options.beta1);
+  require(in_unit(options.beta2), "beta2 in [0,1)", options.beta2);
+  require(options.epsilon > 0, "epsilon > 0", options.epsilon);
+  require(options.clip_norm >= 0, "clip_norm >= 0", options.clip_norm);
   for (std::size_t k = 0; k < parameters_.size(); ++k) {
     Variable& p = parameters_[k];
-    if (!p.requires_grad()) throw std::invalid_argument("Adam: a parameter does not require a gradient");
+    if (!p.requires_grad())
+      throw std::invalid_argument("Adam: parameter " + std::to_string(k) + ", " + p.shape().text() +
+                                  ", does not require a gradient");
     (options.muon && is_matrix(p.shape()) ? matrices_ : others_).push_back(k);
     p.mutable_grad() = Tensor::zeros(p.shape());
     m_.push_back(Tensor::zeros(p.shape()));

@@ -43,7 +43,7 @@ struct FolderImport {
 /// have plate, trial, pass, speed, positions, a clock in seconds and the metadata of apply(); they are in the
 /// order of their names.
 ///
-/// The files hold no clock. It is rewritten four times, and each step needs what the one before left:
+/// The files hold no clock. Steps 1, 2 and 5 write it, and each step needs what the one before left:
 ///   1. import_text_pass() counts the lines: frame i at i / rig::kFrameRateHz. A dropped line keeps its
 ///      place.
 ///   2. restore_clock() puts back the time of frames that the host lost, seen as steps of all signals. A

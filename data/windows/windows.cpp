@@ -309,7 +309,7 @@ void WindowSet::truth(std::size_t i, std::span<float> out) const {
   const Place place = place_of(i);
   if (measured(place.pass)) return file_->read(stored_[place.pass].truths + place.last * out.size(), out);
   const auto [x, y, lift] = finger(place);
-  // While it is lifted there are no windows.
+  // A finger that is lifted halfway ends no window (why_none()); here it is clear of the plate, in the air.
   if (lift > kLiftedMm) return std::fill(out.begin(), out.end(), 0.0F);
   truth_image(plate(place.pass), x, y, image(), out);
 }

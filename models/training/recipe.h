@@ -1,5 +1,5 @@
-// Everything that decides a trained file besides the recordings: the same recipe and the same recordings make
-// the same bytes, whoever trains.
+// Everything that decides a trained file besides the recordings and the order of their file names: the same
+// recipe and the same recordings make the same bytes, whoever trains.
 #pragma once
 
 #include <map>

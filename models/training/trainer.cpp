@@ -81,7 +81,8 @@ void Trainer::fill(MicroBatch& micro_batch) const {
   }
 }
 
-// While this step is computed, a disk may fetch this process's share of the next batch.
+// While this step is computed, a disk may fetch this process's share of the next batch. `indices_` holds it
+// until the step chooses its own.
 void Trainer::announce_next() {
   if (step() + 1 >= total_steps()) return;
   batch_of(step() + 1, indices_);
@@ -157,7 +158,7 @@ StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMi
     if (micro_batch.error) std::rethrow_exception(std::exchange(micro_batch.error, nullptr));
   }
   report.stop = stop && stop();
-  add_up(report);
+  add_up_statistics(report);
   check_finite(report);
   look_for_collapse(report);
   report.gradient_norm = state_.apply(micro_batch_parameters_, ranks_);
@@ -165,8 +166,9 @@ StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMi
   return report;
 }
 
-// Of micro-batches, then of processes, as balanced binary trees.
-void Trainer::add_up(StepReport& report) {
+// Loss terms and variances of micro-batches, then of processes, as balanced binary trees; gradients are added
+// in TrainingState::apply().
+void Trainer::add_up_statistics(StepReport& report) {
   for (std::size_t apart = 1; apart < micro_batches_.size(); apart *= 2) {
     for (std::size_t micro_batch = 0; micro_batch + apart < micro_batches_.size(); micro_batch += 2 * apart) {
       micro_batches_[micro_batch].terms.add(micro_batches_[micro_batch + apart].terms);
@@ -213,7 +215,8 @@ void Trainer::look_for_collapse(StepReport& report) {
   report.collapsed = state_.collapsed(idle || is_degenerate(variances.pictures, variances.targets, samples));
 }
 
-// What a saved state must agree in, besides the caller's own metadata.
+// Of a model file and of a saved state: the caller's, the network's and the training's, in which a state that
+// is resumed must agree.
 std::map<std::string, std::string> Trainer::metadata(std::map<std::string, std::string> origin) const {
   origin.merge(objective_.metadata());
   origin["training"] = objective_.text();

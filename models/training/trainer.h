@@ -121,7 +121,7 @@ class Trainer {
   void fill(MicroBatch& micro_batch) const;
   void announce_next();
   void draw_noise(MicroBatch& micro_batch) const;
-  void add_up(StepReport& report);
+  void add_up_statistics(StepReport& report);
   void look_for_collapse(StepReport& report);
   void check_finite(const LossTerms& terms) const;
 

@@ -33,14 +33,17 @@ void expect_same(const SafetensorsFile& file, const std::string& path,
 }  // namespace
 
 void TrainingPace::check() const {
-  const auto require = [](bool holds, const char* what) {
-    if (!holds) throw std::invalid_argument(std::string("training settings: ") + what);
+  const auto require = [](bool holds, const char* what, double got) {
+    if (!holds)
+      throw std::invalid_argument(std::string("training settings: ") + what + ", got " + format(got));
   };
-  require(epochs >= 1 && epochs <= 100'000, "epochs must be 1 to 100000");
-  require(batch >= 1 && batch <= 4096, "batch must be 1 to 4096");
-  require(learning_rate > 0 && learning_rate <= 1, "learning rate must be above 0 and at most 1");
-  require(warm_up >= 0 && warm_up < 1, "warm-up must be a share of all steps, 0 to below 1");
-  require(clip_norm >= 0 && std::isfinite(clip_norm), "clip norm must not be negative (0 = never)");
+  require(epochs >= 1 && epochs <= 100'000, "epochs must be 1 to 100000", static_cast<double>(epochs));
+  require(batch >= 1 && batch <= 4096, "batch must be 1 to 4096", static_cast<double>(batch));
+  require(learning_rate > 0 && learning_rate <= 1, "learning rate must be above 0 and at most 1",
+          learning_rate);
+  require(warm_up >= 0 && warm_up < 1, "warm-up must be a share of all steps, 0 to below 1", warm_up);
+  require(clip_norm >= 0 && std::isfinite(clip_norm), "clip norm must not be negative (0 = never)",
+          clip_norm);
 }
 
 TrainingState::TrainingState(const std::vector<Parameter>& parameters, const TrainingPace& pace,

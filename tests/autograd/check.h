@@ -8,6 +8,7 @@
 #include <cstring>
 #include <functional>
 #include <initializer_list>
+#include <source_location>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -49,8 +50,20 @@ inline bool same_bytes(const Tensor& a, const Tensor& b) {
 inline Variable constant(const Tensor& t) { return Variable(t); }
 inline Variable parameter(const Tensor& t) { return Variable(t, true); }
 
+/// What fails below names the line of the test that asked.
+class At {
+ public:
+  explicit At(const std::source_location& place)
+      : trace_(place.file_name(), static_cast<int>(place.line()), "asked for here") {}
+
+ private:
+  testing::ScopedTrace trace_;
+};
+using Place = std::source_location;
+
 inline void expect_values(const Tensor& found, const Shape& shape, std::initializer_list<double> expected,
-                          double tolerance = kRounding) {
+                          double tolerance = kRounding, const Place& place = Place::current()) {
+  const At at(place);
   ASSERT_EQ(found.shape().text(), shape.text());
   ASSERT_EQ(static_cast<std::size_t>(found.size()), expected.size());
   Dim i = 0;
@@ -62,7 +75,9 @@ inline void expect_values(const Tensor& found, const Shape& shape, std::initiali
 }
 
 /// `action` must throw std::invalid_argument with exactly this text.
-inline void expect_refusal(const std::string& text, const std::function<void()>& action) {
+inline void expect_refusal(const std::string& text, const std::function<void()>& action,
+                           const Place& place = Place::current()) {
+  const At at(place);
   try {
     action();
     ADD_FAILURE() << "accepted, expected: " << text;
@@ -82,7 +97,9 @@ inline double dot(const Tensor& a, const Tensor& b) {
 #ifdef SUPERTAC_REAL_IS_DOUBLE
 /// The gradient of every input agrees with finite differences to 1e-6.
 inline void expect_gradients(const std::function<Variable(const std::vector<Variable>&)>& f,
-                             const std::vector<Tensor>& inputs, const GradientCheckOptions& options = {}) {
+                             const std::vector<Tensor>& inputs, const GradientCheckOptions& options = {},
+                             const Place& place = Place::current()) {
+  const At at(place);
   const GradientReport report = check_gradients(f, inputs, options);
   EXPECT_GT(report.entries, 0);
   EXPECT_LE(report.max_relative_error, 1e-6) << report.text();

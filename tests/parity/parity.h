@@ -43,17 +43,22 @@ struct Difference {
   double by_entry = 0;
   /// |a - b| / max|b|: what fp32 can promise.
   double by_tensor = 0;
+  std::string worst;  ///< the entry that differs most by its own size, and both its values
 };
 
 inline Difference difference(std::span<const double> found, std::span<const double> expected) {
   double largest = 0;
   for (const double b : expected) largest = std::max(largest, std::abs(b));
   Difference d;
-  if (found.size() != expected.size()) return {1e30, 1e30};
+  if (found.size() != expected.size()) return {1e30, 1e30, "another number of entries"};
   for (std::size_t i = 0; i < found.size(); ++i) {
     const double error = std::abs(found[i] - expected[i]);
     const double floor = std::max({std::abs(expected[i]), 1e-3 * largest, 1e-30});
-    d.by_entry = std::isfinite(error) ? std::max(d.by_entry, error / floor) : 1e30;
+    const double by_entry = std::isfinite(error) ? error / floor : 1e30;
+    if (by_entry > d.by_entry || d.worst.empty())
+      d.worst = "entry " + std::to_string(i) + ": found " + std::to_string(found[i]) + ", expected " +
+                std::to_string(expected[i]);
+    d.by_entry = std::max(d.by_entry, by_entry);
     d.by_tensor = std::isfinite(error) ? std::max(d.by_tensor, error / std::max(largest, 1e-30)) : 1e30;
   }
   return d;

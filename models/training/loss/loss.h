@@ -10,7 +10,7 @@ namespace supertac {
 
 /// total = a * sum over the VAEs of (reconstruction + beta KLD) + (1 - a) * (L2 + lambda (1 - SSIM)),
 /// the paper's convex combination; reconstruction and L2 are mean squared errors. Without VAEs
-/// L2 + lambda (1 - SSIM).
+/// L2 + lambda (1 - SSIM). supertac_loss() adds the predicted error's term.
 struct LossWeights {
   double a = 0.2;       ///< share of the VAEs, 0..1
   double beta = 1e-3;   ///< of the Kullback-Leibler divergence
@@ -25,7 +25,8 @@ struct Loss {
   Variable total, reconstruction, kld, l2, ssim, predicted_error;
 };
 
-/// The values of a Loss; 0 for a term that it has not.
+/// The values of a Loss but for the predicted error's, which only `total` holds; 0 for a term that it has
+/// not.
 struct LossTerms {
   double total = 0, reconstruction = 0, kld = 0, l2 = 0, ssim = 0;
   std::array<double*, 5> all() { return {&total, &reconstruction, &kld, &l2, &ssim}; }
@@ -42,7 +43,7 @@ inline constexpr double kPredictedErrorWeight = 0.1;
 /// A truth whose pixels differ by less is flat.
 inline constexpr real kLeastTexture = 0.01F;
 
-/// The picture's part alone: total = L2 + lambda (1 - SSIM). picture and truth [N,H,W,1], truth in [0,1].
+/// The picture's part alone: total = L2 + lambda (1 - SSIM). picture and truth [N,H,W,1], truth in [-1,1].
 /// Where the truth is flat the SSIM counts as 1: with no structure to compare it measures how large the noise
 /// is beside nothing, and pulls harder than all textures together. Throws std::invalid_argument when they
 /// differ in shape.

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
 
 namespace supertac {
@@ -122,8 +123,13 @@ TEST(ConvTranspose2d, KernelFourMakesNoCheckerboard) {
 TEST(Conv, AnEmptyBatchIsFine) {
   const Variable x = parameter(Tensor::zeros({0, 6, 2})), w = parameter(numbers({3, 2, 5})),
                  b = parameter(numbers({5}));
-  EXPECT_EQ(conv1d(x, w, b, {.padding = 1}).shape().text(), "[0,6,5]");
-  EXPECT_EQ(conv_transpose1d(x, w, b, {.stride = 2}).shape().text(), "[0,13,5]");
+  const Variable y = conv1d(x, w, b, {.padding = 1}), wide = conv_transpose1d(x, w, b, {.stride = 2});
+  EXPECT_EQ(y.shape().text(), "[0,6,5]");
+  EXPECT_EQ(wide.shape().text(), "[0,13,5]");
+  backward(sum(y));
+  backward(sum(wide));
+  EXPECT_TRUE(same_bytes(w.grad(), Tensor::zeros({3, 2, 5})));
+  EXPECT_TRUE(same_bytes(b.grad(), Tensor::zeros({5})));
 }
 
 TEST(Conv, RefusesWithNames) {

@@ -1,5 +1,6 @@
 #include "autograd/ops/linear.h"
 
+#include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
 
 namespace supertac {
@@ -15,7 +16,11 @@ TEST(Linear, HandComputed) {
 
 TEST(Linear, Empty) {
   const Variable x(Tensor::zeros({0, 4})), w = parameter(numbers({4, 2})), b = parameter(numbers({2}));
-  EXPECT_EQ(linear(x, w, b).shape().text(), "[0,2]");
+  const Variable y = linear(x, w, b);
+  EXPECT_EQ(y.shape().text(), "[0,2]");
+  backward(sum(y));
+  EXPECT_TRUE(same_bytes(w.grad(), Tensor::zeros({4, 2})));
+  EXPECT_TRUE(same_bytes(b.grad(), Tensor::zeros({2})));
 }
 
 TEST(Linear, RefusesOtherShapes) {

@@ -67,14 +67,16 @@ TEST(Shaping, RefusesWhatDoesNotFit) {
   const Variable x(Tensor::zeros({2, 3})), scalar(Tensor::zeros({}));
   expect_refusal("concat: takes 1 to 8 inputs, got 0", [] { joined({}); });
   expect_refusal("concat: takes 1 to 8 inputs, got 9", [&] { joined(std::vector<Variable>(9, x)); });
-  expect_refusal("concat: x expects at least rank 1, got []", [&] { joined({scalar}); });
+  expect_refusal("concat: x0 expects at least rank 1, got []", [&] { joined({scalar}); });
   expect_refusal("concat: x1 expects [2,4], got [3,4]", [&] {
     joined({x, Variable(Tensor::zeros({3, 4}))});
   });
   expect_refusal("flatten_channels_first: x expects rank 3 or 4, got [2,3]",
                  [&] { flatten_channels_first(x); });
   expect_refusal("unflatten_channels_first: x expects rank 2, got []", [&] { unflattened(scalar, {1}); });
-  expect_refusal("unflatten_channels_first: pixels must be {L} or {H,W}", [&] { unflattened(x, {1, 1, 1}); });
+  expect_refusal("unflatten_channels_first: pixels must be {L} or {H,W}, got 3 sizes", [&] {
+    unflattened(x, {1, 1, 1});
+  });
   expect_refusal("unflatten_channels_first: x [2,3] does not divide into 2 pixels",
                  [&] { unflattened(x, {2}); });
 }

@@ -143,15 +143,18 @@ TEST(Adam, ContinuesFromSavedState) {
 }
 
 TEST(Adam, RefusesBadOptions) {
-  const std::string text =
-      "Adam: expects learning_rate >= 0, beta1 and beta2 in [0,1), epsilon > 0, clip_norm >= 0";
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (const AdamOptions& o :
-       {AdamOptions{.learning_rate = -1}, AdamOptions{.learning_rate = nan}, AdamOptions{.beta1 = 1},
-        AdamOptions{.beta2 = -0.1}, AdamOptions{.epsilon = 0}, AdamOptions{.clip_norm = -1}}) {
-    expect_refusal(text, [&] { Adam({parameter(Tensor::zeros({1}))}, o); });
+  for (const auto& [options, text] :
+       {std::pair(AdamOptions{.learning_rate = -1}, "learning_rate >= 0, got -1.000000"),
+        {AdamOptions{.learning_rate = nan}, "learning_rate >= 0, got nan"},
+        {AdamOptions{.beta1 = 1}, "beta1 in [0,1), got 1.000000"},
+        {AdamOptions{.beta2 = -0.1}, "beta2 in [0,1), got -0.100000"},
+        {AdamOptions{.epsilon = 0}, "epsilon > 0, got 0.000000"},
+        {AdamOptions{.clip_norm = -1}, "clip_norm >= 0, got -1.000000"}}) {
+    expect_refusal("Adam: expects " + std::string(text),
+                   [&, o = options] { Adam({parameter(Tensor::zeros({1}))}, o); });
   }
-  expect_refusal("Adam: a parameter does not require a gradient",
+  expect_refusal("Adam: parameter 0, [1], does not require a gradient",
                  [] { Adam({Variable(Tensor::zeros({1}))}, {}); });
 }
 

@@ -53,7 +53,7 @@ class Comparison {
   }
   void expect(const std::string& name, std::span<const double> found, std::span<const double> expected) {
     const Difference d = test::difference(found, expected);
-    EXPECT_LE(kDouble ? d.by_entry : d.by_tensor, tolerance_) << name;
+    EXPECT_LE(kDouble ? d.by_entry : d.by_tensor, tolerance_) << name << ", " << d.worst;
     if (d.by_entry > worst_.by_entry) entry_name_ = name, worst_.by_entry = d.by_entry;
     if (d.by_tensor > worst_.by_tensor) tensor_name_ = name, worst_.by_tensor = d.by_tensor;
   }

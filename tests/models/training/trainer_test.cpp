@@ -369,14 +369,14 @@ TEST(Trainer, NamesTheSettingThatIsOutOfRange) {
     }
     return "no error";
   };
-  EXPECT_EQ(message([](auto& s) { s.epochs = 0; }), "training settings: epochs must be 1 to 100000");
-  EXPECT_EQ(message([](auto& s) { s.batch = 5000; }), "training settings: batch must be 1 to 4096");
+  EXPECT_EQ(message([](auto& s) { s.epochs = 0; }), "training settings: epochs must be 1 to 100000, got 0");
+  EXPECT_EQ(message([](auto& s) { s.batch = 5000; }), "training settings: batch must be 1 to 4096, got 5000");
   EXPECT_EQ(message([](auto& s) { s.learning_rate = 2; }),
-            "training settings: learning rate must be above 0 and at most 1");
+            "training settings: learning rate must be above 0 and at most 1, got 2");
   EXPECT_EQ(message([](auto& s) { s.warm_up = 1; }),
-            "training settings: warm-up must be a share of all steps, 0 to below 1");
+            "training settings: warm-up must be a share of all steps, 0 to below 1, got 1");
   EXPECT_EQ(message([](auto& s) { s.clip_norm = -1; }),
-            "training settings: clip norm must not be negative (0 = never)");
+            "training settings: clip norm must not be negative (0 = never), got -1");
   EXPECT_NE(message([](auto& s) { s.loss.beta = -1; }).find("beta = -1"), std::string::npos);
   EXPECT_NE(message([](auto& s) { s.augment.dropped = 17; }), "no error");
 }
