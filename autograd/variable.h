@@ -72,7 +72,7 @@ class Backward {
   const Tensor& gy() const { return node_.grad; }
   const Tensor& y() const { return node_.value; }
   const Tensor& value(std::size_t input) const { return node_.inputs[input]->value; }
-  /// The gradient of that input, zero-filled at first use; null when nobody asked for it. Add into it.
+  /// The gradient of that input, zero-filled at first use; null when that input requires none. Add into it.
   Tensor* grad_of(std::size_t input);
   /// The same without the zeros: at first use the contents are undefined and the step must write all of them.
   struct Slot {

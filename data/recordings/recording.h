@@ -48,9 +48,9 @@ void restate(Recording& recording, const SignalScale& scale);
 /// taxels at 3 mm. Metadata "signals" says what they mean, {"unit": "counts", "pressed": "higher", "range":
 /// [40, 900]}; without it they are the rig's volts. Throws FileError when the file is damaged
 /// (io/files/safetensors.h), is no recording, or breaks a rule of Recording: sizes that do not match, values
-/// that are not finite (position_mm may be NaN), a truth outside [0,1], a tensor that nobody reads, time
-/// stamps that do not increase, a speed outside 0 to 1e4 mm/s, a moving average (metadata "filter_s") outside
-/// 0 to 10 s, or a time (also metadata "began_s") beyond 1e10 s.
+/// that are not finite (position_mm may be NaN), a truth outside [0,1], an unknown tensor, time stamps that
+/// do not increase, a speed outside 0 to 1e4 mm/s, a moving average (metadata "filter_s") outside 0 to 10 s,
+/// or a time (also metadata "began_s") beyond 1e10 s.
 Recording read_recording(const std::string& path);
 /// The same from a file that has been read.
 Recording recording_of(const SafetensorsFile& file);
