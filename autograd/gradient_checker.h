@@ -14,7 +14,7 @@ struct GradientEntry {
   Dim index;          // which of its elements, in row-major order
   double analytic, numeric;
   /// |analytic - numeric| / (max(|analytic|, |numeric|) + 1e-3 * the largest gradient of that input
-  ///                         + 1e-5 * the largest gradient of all inputs)
+  ///                         + 1e-5 * the largest gradient of all inputs); 1e30 when it is not finite
   double relative_error;
   std::string
       place;  // "encoder.2.conv.1.weight [3,0,7]": the input's name and the element's indices in memory
@@ -38,12 +38,12 @@ struct GradientCheckOptions {
 
 /// `f` computes a result of any shape from the leaves, deterministically, whenever it is called. The result
 /// is reduced to the scalar sum(y * r) with fixed weights r that differ from element to element, so that no
-/// gradient hides in a symmetry. The leaves (parameters, say) are moved and put back; their gradients are
-/// overwritten.
+/// gradient hides in a symmetry. The leaves (parameters, for example) are shifted and put back; their
+/// gradients are overwritten.
 GradientReport check_gradients(const std::function<Variable()>& f, std::vector<Variable> leaves,
                                const GradientCheckOptions& options = {});
 
-/// The same for a function of inputs that are made for the check.
+/// The same for a function of inputs; its leaves are copies, and `inputs` stay as they are.
 GradientReport check_gradients(const std::function<Variable(const std::vector<Variable>&)>& f,
                                const std::vector<Tensor>& inputs, const GradientCheckOptions& options = {});
 

@@ -1,5 +1,5 @@
-// ReverseWatch: stands between backward() and the reverse steps, for those who measure them or spoil one to
-// see whether a check notices (apps/check/planted_error.h).
+// ReverseWatch: stands between backward() and the reverse steps, to measure them or to plant an error that a
+// check has to notice (apps/check/planted_error.h).
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ class ReverseWatch {
   ReverseWatch& operator=(const ReverseWatch&) = delete;
 
   /// Must call `step`, which reads b.gy() and adds into the gradients of the op's inputs; it may be called
-  /// again once those and b.gy() are as they were.
+  /// again once those gradients and b.gy() have been restored.
   virtual void reverse(const char* op, std::size_t inputs, Backward& b,
                        const std::function<void()>& step) = 0;
 };

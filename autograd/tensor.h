@@ -74,6 +74,7 @@ class Tensor {
   std::span<real> values() { return {values_, static_cast<std::size_t>(size_)}; }
   std::span<const real> values() const { return {values_, static_cast<std::size_t>(size_)}; }
 
+  /// The only deep copy.
   Tensor clone() const;
   /// The same buffer under another shape. Throws std::invalid_argument when the element counts differ.
   Tensor reshaped(const Shape& shape) const;

@@ -1,5 +1,5 @@
-// Trace: notes which ops ran, on what and with which settings, for those who compute the same in another way
-// (models/inference/prepared/prepared.h) or let others do so (models/training/opened_step.h).
+// Trace: records which ops ran, with which inputs and settings. Prepared networks are built from it
+// (models/inference/prepared/prepared.h), opened training steps list it (models/training/opened_step.h).
 #pragma once
 
 #include <chrono>
@@ -12,7 +12,7 @@
 
 namespace supertac {
 
-/// What an op was told besides its inputs; each op gives record() what it has.
+/// The settings of an op besides its inputs; each op fills in those that it has.
 struct OpSettings {
   kernels::ConvSettings conv{};      ///< convolutions
   real negative_slope = 1;           ///< convolutions, linear layers, relu and leaky_relu
@@ -27,12 +27,13 @@ struct TracedOp {
   Variable y;
   std::vector<Variable> inputs;
   OpSettings settings;
-  double us = 0;  ///< since the op before was noted: its time, where nothing else is done between ops
+  double us = 0;  ///< microseconds since the op before: its time, where nothing else is done between ops
 };
 
-/// While one lives, the ops of this thread are noted in their order. One at a time.
+/// While one lives, the ops of this thread are recorded in their order, and their values stay in memory.
 class Trace {
  public:
+  /// Throws std::logic_error where this thread has one already.
   Trace();
   virtual ~Trace();
   Trace(const Trace&) = delete;
@@ -40,12 +41,12 @@ class Trace {
 
   const std::vector<TracedOp>& ops() const { return ops_; }
 
-  /// For record(): `y` was made.
+  /// Called by record() when `y` was computed.
   static void note(const char* op, const Variable& y, std::span<const Variable* const> inputs,
                    const OpSettings* settings);
 
  protected:
-  /// An op was noted, whose gradient nobody has asked for yet.
+  /// Called for each op before anything uses its result, which may be changed here.
   virtual void noted(TracedOp&) {}
 
  private:

@@ -36,9 +36,8 @@ class Variable {
   /// Empty until backward() has reached this variable.
   const Tensor& grad() const { return checked().grad; }
   Tensor& mutable_grad() { return checked().grad; }
-  /// Empties grad(). Its memory is kept for the next gradient, also where another Tensor still shows it:
-  /// given to the pool it would go to what the next forward pass makes first, long after it has left the
-  /// caches.
+  /// Empties grad() but keeps its buffer for the next gradient, which overwrites it under any Tensor that
+  /// still shares it. From the pool it would go to the next forward pass, when it has long left the caches.
   void drop_grad();
 
   const Shape& shape() const { return value().shape(); }
@@ -68,12 +67,12 @@ class Variable {
 class Backward {
  public:
   explicit Backward(detail::Node& node) : node_(node) {}
-  /// Of y.
+  /// The node of y.
   const detail::Node& node() const { return node_; }
   const Tensor& gy() const { return node_.grad; }
   const Tensor& y() const { return node_.value; }
   const Tensor& value(std::size_t input) const { return node_.inputs[input]->value; }
-  /// The gradient of that input, zero-filled at first use; null when nobody asked for it. Add into it.
+  /// The gradient of that input, zero-filled at first use; null when that input requires none. Add into it.
   Tensor* grad_of(std::size_t input);
   /// The same without the zeros: at first use the contents are undefined and the step must write all of them.
   struct Slot {
@@ -93,13 +92,13 @@ class Backward {
 struct OpSettings;  // autograd/trace.h
 
 /// The node of an op, and where its reverse step goes: null when no input needs a gradient or recording is
-/// off. For record() only.
+/// off. For record() only. Throws std::invalid_argument for more than kMaxInputs inputs.
 std::pair<Variable, detail::ReverseStep*> make_result(const char* op, Tensor y,
                                                       std::span<const Variable* const> inputs,
                                                       const OpSettings* settings);
 
-/// Makes y a node of the graph. `step(Backward&)` is called by backward() with dL/dy at hand. `settings` is
-/// what else the op was told, for a Trace.
+/// Makes y a node of the graph. `step(Backward&)` is called by backward() with dL/dy at hand. `settings`:
+/// those of the op, for a Trace.
 template <class Step>
 Variable record(const char* op, Tensor y, std::span<const Variable* const> inputs, Step&& step,
                 const OpSettings* settings = nullptr) {
@@ -115,8 +114,8 @@ Variable record(const char* op, Tensor y, std::initializer_list<const Variable*>
 }
 
 /// Adds dL/dv into grad() of every leaf v that requires it, for a scalar L, and frees the graph.
-/// Throws std::invalid_argument when L is not a scalar, does not depend on a parameter, or when its
-/// graph was freed by an earlier backward().
+/// Throws std::invalid_argument when L has not exactly one element, depends on nothing that requires a
+/// gradient, or when a part of its graph was freed by an earlier backward().
 void backward(const Variable& loss);
 
 /// While one lives on this thread, ops compute values only: the inference mode of the same code.

@@ -27,7 +27,7 @@ StoredTensor to_stored(const Parameter& parameter);
 StoredTensor to_stored(const Parameter& parameter, const Tensor& tensor, const std::string& name);
 
 /// Writes all parameters and `more` behind them, atomically. metadata gains "format" = "supertac-checkpoint"
-/// and "format_version". Throws FileError, also for a value that is not finite: such weights draw nothing.
+/// and "format_version". Throws FileError, also for a value that is not finite.
 void write_checkpoint(const OutputPath& output, const std::vector<Parameter>& parameters,
                       std::map<std::string, std::string> metadata,
                       const std::vector<StoredTensor>& more = {});
@@ -35,7 +35,7 @@ void write_checkpoint(const OutputPath& output, const std::vector<Parameter>& pa
 /// Reads and checks format and version. Throws std::runtime_error naming path, expected and found.
 SafetensorsFile read_checkpoint(const std::string& path);
 
-/// Fills the parameters from the file. Tensors whose names begin with one of `beside` may be there too.
+/// Fills the parameters from the file. Other tensors are allowed when their names begin with one of `beside`.
 /// Throws std::runtime_error that lists every missing, unexpected and mismatching tensor at once; then
 /// nothing has been changed.
 void load_parameters(const SafetensorsFile& file, const std::string& path,

@@ -12,10 +12,11 @@ struct ConvLayerOptions {
   Dim stride = 1;
   Dim padding = 0;
 };
-/// A map keeps its size.
+/// The output is as large as the input.
 inline constexpr ConvLayerOptions kSameSize{.kernel = 3, .stride = 1, .padding = 1};
 
-/// A weight [kernel..., in, out] and a bias [out].
+/// A weight [kernel..., in, out] and a bias [out], drawn by uniform_fan_in() with a fan-in of taps * in
+/// (transposed: taps * out, as in PyTorch); the constructor throws as that does.
 template <int kDimensions, bool kTransposed>
 class ConvLayer : public Module {
  public:
@@ -28,8 +29,8 @@ class ConvLayer : public Module {
 };
 
 using Conv1d = ConvLayer<1, false>;  ///< x [N,L,in] -> [N, (L + 2 padding - kernel) / stride + 1, out]
-using Conv2d = ConvLayer<2, false>;  ///< x [N,H,W,in] -> [N,H',W',out]
+using Conv2d = ConvLayer<2, false>;  ///< x [N,H,W,in] -> [N,H',W',out], each side as Conv1d's
 using ConvTranspose1d = ConvLayer<1, true>;  ///< x [N,L,in] -> [N, (L - 1) stride - 2 padding + kernel, out]
-using ConvTranspose2d = ConvLayer<2, true>;  ///< x [N,H,W,in] -> [N,H',W',out]
+using ConvTranspose2d = ConvLayer<2, true>;  ///< x [N,H,W,in] -> [N,H',W',out], likewise
 
 }  // namespace supertac

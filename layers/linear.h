@@ -5,8 +5,8 @@
 
 namespace supertac {
 
-/// y = f(x w + b), f as autograd/ops/activations.h says: x [N,in] -> [N,out]. With Layout::pointwise it is
-/// stored as the 1x1 convolution that it also is.
+/// y = f(x w + b), f as autograd/ops/activations.h says: x [N,in] -> [N,out]. Weights as uniform_fan_in().
+/// With Layout::pointwise it is stored as the 1x1 convolution that it also is.
 class Linear : public Module {
  public:
   Linear(Dim in, Dim out, Rng& rng, Layout layout = Layout::linear)

@@ -1,4 +1,5 @@
-// Module: something with named parameters. Layers are plain values made of other layers.
+// Module: something with named parameters. Layers are values made of other layers; a copy shares the
+// parameters.
 #pragma once
 
 #include <cstdint>
@@ -49,7 +50,7 @@ class Module {
  protected:
   ~Module() = default;  // not virtual: a layer is never deleted as a mere Module
   Variable add_parameter(const std::string& name, Tensor value, Layout layout);
-  /// Lists the parameters of a part of this module as "name.its_name".
+  /// Adds the parameters of a part of this module to the list, as "name.its_name".
   void add(const std::string& name, const Module& part);
 
  private:

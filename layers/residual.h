@@ -34,7 +34,7 @@ class Rcab : public Module {
 
 struct RirbOptions {
   Dim channels = 32;
-  Dim reduction = 4;  ///< of the channels inside channel attention
+  Dim reduction = 4;  ///< channel attention squeezes to channels / reduction
   Dim blocks = 3;     ///< RCABs
 };
 

@@ -38,7 +38,7 @@ typedef struct {
   int signals;        /* rows * columns * channels, the numbers of a frame */
   int timesteps;      /* frames of a window */
   int height, width;  /* of a picture, in pixels */
-  int predicts_error; /* 1: the model also says how far off it may be */
+  int predicts_error; /* 1: the model has predicted errors; 0: not */
   double rate_hz;     /* of a window's frames */
   double pitch_mm[2]; /* along a row, and from row to row */
   double pixel_mm[2]; /* the size of a pixel, likewise */
@@ -65,15 +65,15 @@ SUPERTAC_API int supertac_describe(const supertac_model* model, supertac_descrip
 
 /* Draws `count` windows [count][timesteps][signals] in the sensor's unit, at the model's rate, oldest frame
    first. pictures: [count][height][width], 0 is the flat plate and 1 its highest point. predicted_errors: the
-   same shape, how far from the truth a pixel is expected to be; NULL where it is not wanted. threads: at
-   least 1. A picture does not depend on it, nor on the windows beside its own. 0, or -1; -1 also where
+   same shape, how far from the truth a pixel is expected to be; NULL where it is not wanted. threads: 1 to
+   1024. A picture does not depend on it, nor on the windows beside its own. 0, or -1; -1 also where
    predicted errors are wanted of a model without. */
 SUPERTAC_API int supertac_draw(const supertac_model* model, size_t count, const float* windows,
                                float* pictures, float* predicted_errors, int threads);
 
 /* Frames of a sensor to windows: moving average, resampling, scaling and normalisation, as in training.
-   frame_hz: the sensor's rate. filter_s: moving average that its frames have gone through already, 0 for
-   none. NULL on failure. */
+   frame_hz: the sensor's rate, 1 to 100,000. filter_s: moving average (s) that its frames have gone through,
+   0 to 10: none, or that of the model's training signals. `model` must outlive it. NULL on failure. */
 SUPERTAC_API supertac_live* supertac_live_new(const supertac_model* model, double frame_hz, double filter_s);
 SUPERTAC_API void supertac_live_free(supertac_live* live);
 
@@ -86,14 +86,14 @@ SUPERTAC_API int supertac_live_push(supertac_live* live, double time_s, const fl
 SUPERTAC_API int supertac_live_picture(supertac_live* live, float* picture, float* predicted_error);
 
 /* Trains a network on a folder of recordings and writes the model, as supertac-train does: the same settings
-   make the same content. recipe: "paper", "best", "tiny" or "frame". settings: NULL, or what differs from the
-   recipe. progress: NULL, or called after every step; another result than 0 ends the training. 1: written, 0: ended
-   early and nothing written, -1: failed. */
+   make the same content. recipe: "paper", "best", "tiny" or "frame". settings: NULL, or what differs from
+   the recipe. progress: NULL, or called after every step; another result than 0 ends the training. 1:
+   written, 0: ended early and nothing written, -1: failed. */
 typedef struct {
-  size_t size;              /* sizeof(supertac_training) */
+  size_t size;              /* set it to sizeof(supertac_training); elsewhere 0 or NULL: the recipe's */
   long long epochs, stride; /* 0: the recipe's; every stride-th frame ends a window */
   unsigned long long seed;
-  const char* split; /* "trial" (NULL), "none", "pass", ...: what is kept for testing */
+  const char* split; /* what is kept for testing: NULL, the recipe's "trial"; "pass", "texture", "none" ... */
 } supertac_training;
 typedef int (*supertac_progress)(void* user, long long step, double loss);
 SUPERTAC_API int supertac_train(const char* recipe, const char* recordings, const char* out,

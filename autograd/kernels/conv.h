@@ -1,5 +1,5 @@
 // Convolution and transposed convolution over a batch, with both gradients, callable without a graph.
-// Everything is channels-last: the channels of one pixel lie side by side.
+// Everything is channels-last: the channels of one pixel lie side by side. "= or +=" is what `into` says.
 #pragma once
 
 #include <compare>
@@ -9,7 +9,8 @@
 
 namespace supertac::kernels {
 
-/// Two-dimensional; a 1-D convolution has height 1, kernel_h 1, padding_h 0, stride_h 1.
+/// Sizes in pixels, height and width those of x. A 1-D convolution has height 1, kernel_h 1, padding_h 0,
+/// stride_h 1.
 struct ConvSettings {
   Dim height = 1, width = 1;
   Dim kernel_h = 1, kernel_w = 1;
@@ -33,11 +34,11 @@ struct ConvSizes {
 
 /// The largest number of channels, of x or y.
 inline constexpr Dim kMaxChannels = 4096;
-/// A sum over rows runs over this many before it is added to the total.
+/// A sum over rows is taken in pieces of this many, which are added in order.
 inline constexpr Dim kRowsPerPiece = 256;
 
 /// f(x) = x for x > 0, else slope * x: the activation behind a convolution or a linear layer. With a slope of
-/// 0 an infinite x is taken for the least number that there is, since 0 times infinity is NaN.
+/// 0 minus infinity counts as the lowest finite number, since 0 times infinity is NaN.
 struct Rectifier {
   real slope, floor;
   explicit Rectifier(real negative_slope)
@@ -51,11 +52,12 @@ struct Rectifier {
 /// cout]); bias may be null; f is Rectifier(negative_slope).
 void conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias, real negative_slope,
           real* y);
-/// gx = or += the transpose of conv (without f) applied to gy.
+/// gx [images, in_pixels, cin] = or += the transpose of conv (without f) applied to gy [images, out_pixels,
+/// cout].
 void conv_grad_x(const ConvSizes& sizes, const real* gy, const real* w, Into into, real* gx);
-/// gw [taps, cin, cout] = or += x^T gy over all pixels.
+/// gw [tap, i, o] = or += the sum of x[p, i] gy[q, o] over all images and the pixels p, q that the tap joins.
 void conv_grad_w(const ConvSizes& sizes, const real* x, const real* gy, Into into, real* gw);
-/// gb [cout] = or += the sum of gy over rows: the pixels of all images.
+/// gb [cout] = or += the sum of gy [rows, cout] over rows: the pixels of all images.
 void bias_grad(Dim rows, Dim cout, const real* gy, Into into, real* gb);
 
 }  // namespace supertac::kernels

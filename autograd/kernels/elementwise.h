@@ -1,4 +1,4 @@
-// Loops over single elements that others than ops need besides, callable without a graph.
+// Loops over n elements that are used outside ops too, callable without a graph.
 #pragma once
 
 #include <span>
@@ -11,8 +11,8 @@ namespace supertac::kernels {
 void sigmoid(Dim n, const real* x, real* y);
 /// y += factor * x
 void add_scaled(Dim n, real factor, const real* x, real* y);
-/// y = 0 + the sum of all parts as a balanced binary tree: neighbours, then pairs of pairs. At least one
-/// part.
+/// y = the sum of all parts (at least one) as a balanced binary tree: neighbours, then pairs of pairs; -0
+/// becomes +0.
 void add_as_tree(Dim n, std::span<const real* const> parts, real* y);
 /// The sum of the squares of all elements in double precision.
 double sum_of_squares(Dim n, const real* x);

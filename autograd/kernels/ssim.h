@@ -11,7 +11,8 @@ struct ImageSizes {
   Dim images, height, width;
 };
 
-/// The mean over images and valid window positions; see ops/losses.h for window and constants.
+/// The mean over images and valid window positions of x, target [images, height, width]; sides are at least
+/// kSmallestSsimImage. See autograd/ops/losses.h for window and constants.
 double ssim(const ImageSizes& sizes, const real* x, const real* target);
 /// gx += g * d ssim / d x
 void ssim_grad(const ImageSizes& sizes, real g, const real* x, const real* target, real* gx);

@@ -1,4 +1,4 @@
-// Elementwise non-linearities; any shape. All throw std::invalid_argument as their text says.
+// Elementwise non-linearities; any shape. What throws, throws std::invalid_argument.
 #pragma once
 
 #include "autograd/variable.h"
@@ -15,7 +15,7 @@ Variable relu(const Variable& x);
 Variable leaky_relu(const Variable& x, real slope = kLeakyRelu);
 /// For the ops that end in f: throws std::invalid_argument for a negative slope.
 void check_slope(const char* op, real negative_slope);
-/// dL/ds = dL/dy f'(s), which is left in place of dL/dy.
+/// Replaces b's dL/dy by dL/ds = dL/dy f'(s), f' taken from the sign of y, and returns it.
 const real* before_activation(Backward& b, real negative_slope);
 
 /// y = 1 / (1 + exp(-x))

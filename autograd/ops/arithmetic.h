@@ -9,7 +9,7 @@ namespace supertac {
 Variable operator+(const Variable& a, const Variable& b);
 Variable operator-(const Variable& a, const Variable& b);
 Variable operator*(const Variable& a, const Variable& b);
-/// The same number for every element.
+/// y[i] = factor x[i] and y[i] = number - x[i].
 Variable operator*(real factor, const Variable& x);
 Variable operator-(real number, const Variable& x);
 

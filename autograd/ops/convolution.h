@@ -16,17 +16,19 @@ struct ConvOptions {
 
 /// y[n,l,o] = f(b[o] + sum over k, i of x[n, l stride + k - padding, i] w[k,i,o]),   f as activations.h says
 /// x [N,L,in], w [K,in,out], b [out]; y [N, (L + 2 padding - K) / stride + 1, out].
-/// All four throw std::invalid_argument naming the argument when a rank, a channel count or the output size
-/// is impossible.
+/// All four throw std::invalid_argument naming the argument when a rank, a shape, a channel count (1 to
+/// 4096), an option or the output size is impossible.
 Variable conv1d(const Variable& x, const Variable& w, const Variable& b, const ConvOptions& options);
-/// The same over two dimensions: x [N,H,W,in], w [K,K,in,out] (the two kernel sizes may differ), b [out].
+/// The same over two dimensions: x [N,H,W,in], w [K,K,in,out] (the two kernel sizes may differ), b [out]; y
+/// [N,H',W',out], each side as conv1d's.
 Variable conv2d(const Variable& x, const Variable& w, const Variable& b, const ConvOptions& options);
 
-/// The transpose of conv1d as a linear map, plus b, then f: x [N,L,in], w [K,in,out]; y [N, (L - 1) stride -
-/// 2 padding + K, out]. Kernels that the stride divides (4 for stride 2) cover every output equally often: no
-/// checkerboard.
+/// The transpose of conv1d as a linear map, plus b, then f: x [N,L,in], w [K,in,out], b [out]; y [N, (L - 1)
+/// stride - 2 padding + K, out]. Kernels that the stride divides (4 for stride 2) cover every output equally
+/// often: no checkerboard.
 Variable conv_transpose1d(const Variable& x, const Variable& w, const Variable& b,
                           const ConvOptions& options);
+/// The same over two dimensions, with the shapes of conv2d and each side as conv_transpose1d's.
 Variable conv_transpose2d(const Variable& x, const Variable& w, const Variable& b,
                           const ConvOptions& options);
 

@@ -1,4 +1,4 @@
-// For the sources of ops: what most reverse steps are made of.
+// Building blocks for the sources of ops and their reverse steps; any shape.
 #pragma once
 
 #include <utility>
@@ -19,7 +19,7 @@ void add_to_gradient(Backward& b, std::size_t input, Term term) {
   each(tensor->size(), [=, gx = tensor->data()](Dim i) { gx[i] += term(i); });
 }
 
-/// The same without zeros to add to: at first use gx[i] = term(i).
+/// The same, but at first use gx[i] = term(i), without zeros being written and read again.
 template <class Term>
 void put_to_gradient(Backward& b, std::size_t input, Term term) {
   const Backward::Slot slot = b.slot_of(input);

@@ -14,9 +14,9 @@ namespace kernels {
 /// The same without a graph: x [rows, cin], w [cin, cout], y [rows, cout]; bias [cout] may be null.
 void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
             real* y);
-/// gx = or += gy w^T
+/// gx [rows, cin] = or += gy [rows, cout] w^T, as `into` says
 void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx);
-/// gw = or += x^T gy
+/// gw [cin, cout] = or += x^T gy
 void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw);
 
 }  // namespace kernels

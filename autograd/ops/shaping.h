@@ -1,4 +1,4 @@
-// Ops that move numbers without changing them.
+// Ops that move numbers without changing them. All throw std::invalid_argument on shapes that do not fit.
 #pragma once
 
 #include <span>
@@ -13,10 +13,10 @@ Variable concat(std::span<const Variable> xs);
 struct Runs {
   Dim first, run, step, width;  // width of the result: a multiple of run
 };
-/// y[.., k] = x[.., first + k / run * step + k % run]. Throws when that leaves x. No gradient: for inputs.
+/// y[.., k] = x[.., first + k / run * step + k % run]. No gradient: throws for an x that requires one.
 Variable take_runs(const Variable& x, const Runs& runs);
-/// Windows [N,T,S] -> their last frames [N,rows,columns,channels], S = rows columns channels. Throws
-/// std::invalid_argument when they have others. No gradient: for inputs.
+/// Windows [N,T,S] -> their last frames [N,rows,columns,channels], S = rows columns channels. No gradient:
+/// throws for windows that require one.
 Variable last_frame(const Variable& windows, Dim rows, Dim columns, Dim channels);
 
 /// [N, P..., C] -> [N, C P]: the order in which PyTorch flattens [N,C,P...], so that the weights of the

@@ -1,5 +1,5 @@
-// Adam (Kingma & Ba 2015, algorithm 1) with bias correction and clipping of the gradient norm; and Muon, by
-// which matrices of weights move on request.
+// Adam (Kingma & Ba 2015, algorithm 1) with bias correction and clipping of the gradient norm; and Muon
+// (Jordan et al. 2024) for matrices of weights, as an option.
 #pragma once
 
 #include <cstdint>
@@ -16,13 +16,12 @@ struct AdamOptions {
   double epsilon = 1e-8;
   /// The gradient is scaled down to this L2 norm over all parameters when it is longer; 0 = never.
   double clip_norm = 0;
-  /// Matrices move as Muon has it, whatever else there is as Adam has it.
+  /// Matrices (is_matrix) take Muon's step, all other parameters Adam's.
   bool muon = false;
 };
 
-/// How long a weight's step by Muon is (root mean square), in learning rates: as long as Adam's usually are
-/// (Liu et al. 2025). Short trainings learn more with longer ones, unseen trials are drawn worse
-/// (bench/results).
+/// Root mean square of a weight's step by Muon, in learning rates: about that of Adam's steps (Liu et al.
+/// 2025). Longer steps do better on the same trial and worse on others (bench/results/parts.md).
 inline constexpr double kMuonLength = 0.2;
 
 /// Whether Muon moves it: [..., columns], eight or more columns (the outputs of a convolution or a linear
@@ -31,16 +30,17 @@ bool is_matrix(const Shape& shape);
 
 class Adam {
  public:
-  /// Throws std::invalid_argument for rates outside their ranges or parameters without gradients.
+  /// Keeps handles to the parameters. Throws std::invalid_argument unless learning_rate, clip_norm >= 0, 0 <=
+  /// beta < 1, epsilon > 0, and every parameter requires a gradient.
   Adam(std::vector<Variable> parameters, const AdamOptions& options);
 
   /// Sets every gradient to zero; call it before backward().
   void zero_grad();
   /// m = b1 m + (1-b1) g;  v = b2 v + (1-b2) g^2;  x -= lr (m / (1-b1^t)) / (sqrt(v / (1-b2^t)) + epsilon).
   ///
-  /// Of a matrix [R,C] with `muon`, where O makes it orthogonal (autograd/optimisers/orthogonal.h):
+  /// For a matrix [R,C] with `muon`, O(X) the orthogonal factor of X (autograd/optimisers/orthogonal.h):
   /// m = .95 m + .05 g;  x -= kMuonLength lr sqrt(max(R,C)) O(.95 m + .05 g)
-  /// (Jordan et al. 2024; the root, by which matrices of any shape take steps of one length: Liu et al. 2025,
+  /// (Jordan et al. 2024; the root, which gives matrices of any shape steps of one length: Liu et al. 2025,
   /// arXiv 2502.16982, eq. 4). Its second moment stays 0.
   ///
   /// Returns the gradient's norm before clipping, infinity when the square of the clipped one overflows

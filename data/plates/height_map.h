@@ -12,13 +12,13 @@ namespace supertac {
 /// part, taken as the median height along its outline; what is less than 1 um from it counts as flat.
 class HeightMap : public Surface {
  public:
-  static constexpr double kCellMm = 0.125;  ///< spacing of the grid, a third of a pixel of 32 a side
+  static constexpr double kCellMm = 0.125;  ///< spacing of the grid
 
   /// The highest point of the triangles above every node of the grid, walls and overhangs included. The
   /// model may lie anywhere; its extent must be width x length, within 0.1 mm.
   /// `name`: of the file, for messages
   /// Throws FileError naming found and expected extent; a hole (nodes below no triangle); or triangles that
-  /// cover each other so often that no printed part needs it.
+  /// lie over each other more often than those of any printed part.
   HeightMap(const std::vector<Triangle>& triangles, double width_mm, double length_mm,
             const std::string& name);
 

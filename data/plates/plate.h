@@ -9,12 +9,12 @@
 
 namespace supertac {
 
-struct TextureKind;  // what an element looks like: a row of the table in plate.cpp
+struct TextureKind;  // what an element looks like (plate.cpp)
 
-/// One texture of a plate: equal elements, pitch_mm apart, each as the table in plate.cpp draws it, 0 between
-/// them.
+/// One texture of a plate: equal elements, pitch_mm apart, 0 between them. Ridges are triangular, 2.5 mm wide
+/// at most; bumps half cylinders, blobs half spheres, twice as wide as high; waves a cosine.
 struct Texture {
-  std::string kind = "plain";  ///< or ridges, bumps, waves, blobs, ...
+  std::string kind = "plain";  ///< or ridges, bumps, waves (lines along x) or blobs
   double pitch_mm = 0;         ///< distance between neighbouring centres
   double height_mm = 0;        ///< of the highest point above the plate's base
   /// The texture is laid out in [from, to], centred, as many elements as fit whole.
@@ -27,22 +27,22 @@ class Plate {
  public:
   static constexpr double kWidthMm = rig::kPlateWidthMm, kLengthMm = rig::kPlateLengthMm;
 
-  /// A plate by name. Plates of the rig (RIG plates): 3_Bumps, 6_Bumps, 4_Ridges, 6_Ridges, 4_Waves,
-  /// 6_Waves, 4_Blob, 6_Blob. Others: "plain", or KIND PITCH [h HEIGHT] in mm ("bumps12", "ridges6h1.5"), or
-  /// several joined by '+', which share the length equally ("bumps12+ridges4"), or "random" and a number, the
-  /// plate that random_plate() draws for it. Default height
-  /// rig::kTextureHeightMm, for round elements (bumps, blobs) at most pitch / 2. Or the path of an STL file
-  /// of a plate's size (data/plates/height_map.h), whose plate has the file's name without folders. Throws
-  /// std::invalid_argument naming the part that could not be read; FileError for an STL file.
+  /// A plate by name. Plates of the rig: 3_Bumps, 6_Bumps, 4_Ridges, 6_Ridges, 4_Waves, 6_Waves, 4_Blob,
+  /// 6_Blob. Others: "plain", or KIND PITCH [h HEIGHT] in mm ("bumps12", "ridges6h1.5"), or several joined by
+  /// '+', which share the length equally ("bumps12+ridges4"), or "random" and a number, the plate that
+  /// random_plate() draws for it. Default height rig::kTextureHeightMm, for round elements (bumps, blobs) at
+  /// most pitch / 2. Or the path of an STL file of a plate's size (data/plates/height_map.h), whose plate has
+  /// the file's name without folders. Throws std::invalid_argument naming the part that could not be read;
+  /// FileError for an STL file.
   static Plate named(const std::string& name);
   /// True when the name is that of an STL file: it ends with ".stl".
   static bool is_file(const std::string& name);
 
-  /// `textures`: may overlap nowhere; empty means plain.
-  /// Throws std::invalid_argument when pitch or height are not positive or do not fit.
+  /// `textures` must not overlap; empty means plain. Throws std::invalid_argument when pitch or height are
+  /// not positive or do not fit.
   Plate(std::string name, const std::vector<Texture>& textures);
 
-  /// A plate of kWidthMm x kLengthMm that is no row of textures.
+  /// A plate of kWidthMm x kLengthMm that is no row of textures. Copies share the surface.
   Plate(std::string name, std::shared_ptr<const Surface> surface);
 
   /// Surface height z (mm) at (x, y); negative in the troughs of waves, 0 outside the texture.

@@ -17,11 +17,11 @@ namespace supertac {
 /// Pitches 4 to 15 mm, heights .5 to 3 mm; more than half of the lines and rounds have the size of the rig's.
 Plate random_plate(std::uint32_t number);
 
-/// The number in "random<number>", nothing for any other text.
+/// The number in "random<number>"; empty for any other text.
 std::optional<std::uint32_t> random_plate_number(std::string_view name);
 
-/// True when both have a texture of the same kind whose pitches differ by less than half a millimetre: who
-/// has learnt one knows the other.
+/// True when both have a texture of the same kind whose pitches differ by less than half a millimetre: a
+/// network that is trained on one has seen the other.
 bool resemble(const Plate& a, const Plate& b);
 
 }  // namespace supertac

@@ -15,7 +15,7 @@ namespace supertac {
 using Triangle = std::array<std::array<float, 3>, 3>;
 
 constexpr std::uint64_t kMaxStlBytes = 512 << 20;  ///< read and written
-constexpr float kMaxStlCoordinateMm = 1e6F;        ///< farther out nobody prints, and a sum could overflow
+constexpr float kMaxStlCoordinateMm = 1e6F;        ///< beyond any printer, and a sum could overflow
 
 /// The triangles of an STL file held in memory. A file is binary when its length is that of its count,
 /// 84 + 50 n bytes, whatever its first word; else it is text when it begins with "solid", whatever case,

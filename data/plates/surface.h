@@ -4,8 +4,8 @@
 
 namespace supertac {
 
-/// What a plate that is no row of equal elements looks like from above: an STL file's height map, or what
-/// random_surface() draws. Lengths in mm; the words are those of Plate.
+/// The shape of a plate that is no row of equal elements: the height map of an STL file, or what
+/// random_plate() draws. Lengths in mm; members mean what they mean in Plate.
 class Surface {
  public:
   virtual ~Surface() = default;

@@ -10,7 +10,7 @@ namespace supertac {
 
 /// Height by the plate's own scale: z / max(max_height, -min_height). 0 is the flat plate, whatever else is
 /// on it, 1 its highest point; the troughs of waves are negative. How deep the finger is pressed is not
-/// known, so millimetres cannot be felt.
+/// known, so signals do not tell millimetres.
 double truth_value(const Plate& plate, double x_mm, double y_mm);
 
 /// The plate under the finger as an image [height][width] of truth_value at the centres of its pixels:
@@ -19,8 +19,8 @@ double truth_value(const Plate& plate, double x_mm, double y_mm);
 /// Throws std::invalid_argument when a side is below 1 or image does not hold height * width elements.
 void truth_image(const Plate& plate, double x_mm, double y_mm, const ImageGrid& grid, std::span<float> image);
 
-/// Where the finger is, as far as its picture is concerned. Scores are reported for each apart: a flat
-/// picture is easy where nothing is, and what is drawn there is a ghost.
+/// What lies under the finger. Scores are reported for each zone apart: a flat picture is easy where there is
+/// no texture, and any texture drawn there is a ghost.
 enum class Zone : std::uint8_t {
   contact,  ///< the picture holds texture
   near,     ///< it holds none, but the 3 mm around it do: the finger may feel some

@@ -61,7 +61,7 @@ struct FingerPose {
   double slope_x = 0, slope_y = 0;  ///< added to the mounting's tilt, in mm per mm: the pad is higher there
 };
 
-/// Which sensor, on which day: the same identity gives the same finger.
+/// Which finger, in which pass: the same identity gives the same gains, depth and noise.
 struct FingerIdentity {
   std::uint64_t seed = 1;
   int trial = 1, pass = 1;
@@ -84,17 +84,17 @@ class FingerModel {
   /// Throws std::invalid_argument for an array out of range or with more than one channel.
   FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& identity);
 
-  /// Voltages before ADC, filter and saturation.
+  /// Voltages [taxels] before ADC, filter and saturation.
   std::vector<double> volts(const FingerPose& pose, double time_s) const;
 
-  /// Load on every taxel (mm): what `volts` senses, without gains and disturbances.
+  /// Load on every taxel, load_k above (mm).
   std::vector<double> loads(const FingerPose& pose) const;
 
   /// This pass's path height during the slide: minus the indentation. Positive when the finger rides above
   /// the flat plate and touches only the texture.
   double slide_z_mm() const { return -indentation_mm_; }
 
-  /// Random stream of this pass, for whatever else happens to it.
+  /// Random stream of this pass, for what the simulator adds: rocking, jitter, losses.
   std::uint64_t noise_stream() const { return noise_stream_; }
 
  private:

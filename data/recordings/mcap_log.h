@@ -18,7 +18,7 @@ namespace supertac {
 /// mm.
 class McapLog {
  public:
-  /// `image` without pixels: there are no pictures. Throws FileError.
+  /// `image` without pixels: there are no pictures. `half_widths`: whether add() gets any. Throws FileError.
   McapLog(const OutputPath& output, const TaxelArray& array, const std::string& unit, const ImageGrid& image,
           bool half_widths);
   /// `time_s` >= 0, of the sensor; `wall_s` since 1970, NaN where it is not known: the sensor's then stands

@@ -38,7 +38,7 @@ struct Recording {
   double began_s() const;
 };
 
-/// States the signals in another sensor's unit, polarity and range: they say the same.
+/// Converts the signals to another unit, polarity and range.
 void restate(Recording& recording, const SignalScale& scale);
 
 /// Reads a safetensors file with tensors time_s F64 [n], volts F32 [n,signals] and, where known,
@@ -48,11 +48,11 @@ void restate(Recording& recording, const SignalScale& scale);
 /// taxels at 3 mm. Metadata "signals" says what they mean, {"unit": "counts", "pressed": "higher", "range":
 /// [40, 900]}; without it they are the rig's volts. Throws FileError when the file is damaged
 /// (io/files/safetensors.h), is no recording, or breaks a rule of Recording: sizes that do not match, values
-/// that are not finite (position_mm may be NaN), a truth outside [0,1], a tensor that nobody reads, time
-/// stamps that do not increase, a speed, a moving average (metadata "filter_s", s) or a time (also
-/// metadata "began_s") that no rig has.
+/// that are not finite (position_mm may be NaN), a truth outside [0,1], an unknown tensor, time stamps that
+/// do not increase, a speed outside 0 to 1e4 mm/s, a moving average (metadata "filter_s") outside 0 to 10 s,
+/// or a time (also metadata "began_s") beyond 1e10 s.
 Recording read_recording(const std::string& path);
-/// The same of a file that has been read.
+/// The same from a file that has been read.
 Recording recording_of(const SafetensorsFile& file);
 
 /// Writes it atomically; the same recording gives the same bytes.
@@ -78,9 +78,8 @@ std::string recording_file_name(const Recording& recording);
 /// Throws FileError when the folder cannot be read or has none.
 std::vector<std::string> list_recordings(const std::string& folder);
 
-/// Names the content of a folder's recordings (of these plates; all when empty), whatever windows are cut
-/// from them, however the files are called and whoever made them: SHA-256 over their sorted content hashes
-/// (io/files/provenance.h). Throws FileError.
+/// Names the content of a folder's recordings (of these plates; all when empty), independent of windows, file
+/// names and provenance: SHA-256 over their sorted content hashes (io/files/provenance.h). Throws FileError.
 std::string hash_of_recordings(const std::string& folder, const std::vector<std::string>& plates);
 /// The same from the content hashes.
 std::string hash_of_contents(std::vector<std::string> hashes);

@@ -23,7 +23,7 @@ struct Scaling {
 /// LiveWindow make a sample of, so that both give the same bits.
 class FrameMean {
  public:
-  /// Of frames of so many signals.
+  /// `signals`: in a frame.
   explicit FrameMean(std::size_t signals) : sum_(signals) {}
   void clear();
   void add(std::span<const float> volts);
@@ -55,10 +55,11 @@ struct Track {
   std::size_t frames() const { return run.size(); }
 };
 
-/// A silence within so many periods of a slow sensor is no gap.
+/// A silence of at most so many periods is never a gap, however slow the sensor.
 constexpr double kGapPeriods = 3;
 
-/// Samples a second of a window: of single frames so many that no two frames fall into one.
+/// Sample rate of a window; for single frames 1000 times the sensor's, so that no two frames fall into one
+/// sample.
 inline double sample_rate_hz(int timesteps, double rate_hz, double frame_period_s) {
   return timesteps == 1 ? 1000 / frame_period_s : rate_hz;
 }
@@ -69,7 +70,7 @@ struct ResampleSettings {
   /// recording.
   double max_gap_s = 0.05;
   bool frames_apart = false;  ///< each recorded frame is one sample of its own, whatever lies between
-  std::optional<Scaling> scaling = Scaling{};  ///< nothing: the samples stay in volts
+  std::optional<Scaling> scaling = Scaling{};  ///< empty: the samples stay as recorded
 };
 
 /// Puts a recording onto rate_hz. Between two gaps frame j stands for the time c = t_first + j / rate:

@@ -20,7 +20,7 @@ using ReadingWatch = std::function<void(std::size_t done, std::size_t all)>;
 class SignalRange {
  public:
   SignalRange() = default;
-  /// From the values() of one that took in all its recordings.
+  /// From the values() of a SignalRange to which all recordings were added.
   explicit SignalRange(std::vector<float> values) : values_(std::move(values)), sorted_(false) {}
   /// Of a folder's recordings, only these plates when any are named. Throws as list_recordings() and
   /// read_recording().

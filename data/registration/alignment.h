@@ -22,17 +22,17 @@ struct RegisteredPass {
 ///   y' = y + a + b (y - 54) / 26,
 /// for the largest
 ///   mean over r of corr(p_r, mean of the other passes' p_r) - 0.002 ((a / 0.5)^2 + b^2),
-/// six rounds over all passes. The medians of a and b over the passes are taken off in each round: where the
-/// plate as a whole lies remains the registrations' word.
+/// six rounds over all passes. The medians of a and b over the passes are subtracted in each round, so that
+/// the plate as a whole stays where the registrations put it.
 ///
 /// A pass that agrees badly (correlation below 0.9) is tried with frames lost at one place: 0.1 to 0.8 s, at
-/// every 0.2 s. Where nothing moves such a loss leaves no step for find_lost_frames() to see. It is believed
-/// when the correlation rises by 0.05, and all passes are aligned once more.
+/// every 0.2 s. Where the signals stand still such a loss leaves no step for find_lost_frames() to see. It is
+/// accepted when the correlation rises by 0.05, and all passes are aligned once more.
 ///
 /// Passes that are not reliable take no part; with fewer than three nothing changes, nor does a pass whose
 /// correlation stays below a half. Sets start_mm, rate, shift_mm, stretch_mm, lost_at_s, lost_s and agreement
-/// (the correlation). No truth, split or network has a part in it. Throws std::invalid_argument when a
-/// recording is not of the rig's array.
+/// (the correlation). It uses no truth, split or network. Throws std::invalid_argument when a recording is
+/// not of the rig's array.
 void align_passes(std::span<const RegisteredPass> passes);
 
 }  // namespace supertac

@@ -7,7 +7,7 @@
 namespace supertac {
 
 /// Frames that a host lost without a trace, found in the signals. n numbers: how many are missing between
-/// frame i - 1 and frame i, beyond those its time stamps tell of; a fraction where nothing can be seen.
+/// frame i - 1 and frame i, beyond those that its time stamps show; a fraction where the signals stand still.
 ///
 /// Behind the board's moving average signals are smooth: around frame i each of them takes about the same
 /// step u_s from frame to frame (the median of 81). Where k frames are missing, all take k + 1 of these steps

@@ -13,7 +13,7 @@ namespace supertac {
 constexpr std::size_t kProfileRows = rig::kTaxelRows, kProfilePoints = 701;
 using Profile = std::array<std::array<double, kProfilePoints>, kProfileRows>;
 
-/// The signals of a pass, ready to be laid along the plate again and again.
+/// The signals of a pass, prepared for many calls of along().
 class PassSignals {
  public:
   /// Those between the registration's valid_from_s and valid_until_s.

@@ -18,7 +18,7 @@ struct Registration {
   int elements = 0;         ///< of the texture that they belong to
   double matched = 0;       ///< share of all contacts, by weight, that agree with the plate
   double coverage = 0;      ///< share of the (taxel row, element) pairs in reach that were felt
-  double margin = 0;        ///< by how much the score beats the next best start, a pitch off, say
+  double margin = 0;        ///< by how much the score beats the next best start, a pitch off for example
   double valid_from_s = 0;  ///< the stretch that was fitted: a recording is cut at bursts of lost frames
   double valid_until_s = 0;
   bool reliable = false;
@@ -52,14 +52,14 @@ double row_contact_mm(const Recording& recording, std::size_t row);
 /// does.
 Registration register_pass(const Recording& recording, const Plate& plate);
 
-/// What speaks against believing the fit, or nothing: fewer than 8 contacts or 3 elements, less than 0.4
-/// matched or 0.3 covered, a residual above 0.55 mm, a margin below 0.03. Chosen on the rig's 96 passes.
+/// Why the fit is not reliable, "" when it is: fewer than 8 contacts or 3 elements, less than 0.4 matched or
+/// 0.3 covered, a residual above 0.55 mm, a margin below 0.03. Chosen on the rig's 96 passes.
 std::string why_unreliable(const Registration& registration);
 
-/// Sets reason, to why_unreliable() or to what else speaks against believing it, and reliable. The stated
-/// speed against the fitted rate: a clock that counts lines ("time_base" nominal) may be slow by 5 % and
-/// twice the share of frames seen to be lost, and fast by 3 %; any other clock is right to 5 %. What was
-/// lost, longer than the texture; a moving average longer than the distance of two elements.
+/// Sets reliable and reason: why_unreliable(), or one of the following. The stated speed against the fitted
+/// rate: a clock that counts lines ("time_base" nominal) may be slow by 5 % and twice the share of frames
+/// seen to be lost, and fast by 3 %; any other clock is right to 5 %. Frames lost over more than the
+/// texture's length; a moving average over more than half the least distance of two elements.
 void judge(Registration& registration, const Recording& recording, const Plate& plate);
 
 }  // namespace supertac

@@ -13,7 +13,8 @@ inline constexpr double kPictureFromMm = 20, kPictureToMm = 88;  ///< of the pla
 /// row 3 (leading) first, each drawn where its row feels contact: at the finger's y plus row_contact_mm(row).
 /// In a pass that fits, the bright patches of all rows stand under the plate's elements; off by a pitch, a
 /// row of patches is missing at one end; a wrong rate slants them. Each taxel is scaled by its own deepest
-/// dip; where nothing is known it is white. Throws std::invalid_argument when the recording has no positions.
+/// dip; where nothing is known it is white. Throws std::invalid_argument when the recording has no positions
+/// or is not of the rig's array.
 Picture registration_picture(const Recording& recording, const Plate& plate);
 
 }  // namespace supertac

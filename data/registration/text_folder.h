@@ -39,9 +39,9 @@ struct FolderImport {
 
 /// Imports a folder of the rig's text recordings, `PLATE/TRIAL/PASS.txt` with PLATE a name that
 /// Plate::named takes, or `PLATE.stl` beside its folder, or any name that begins with "unknown": passes over
-/// a shape that nobody knows are not registered and have no positions (is_unknown_plate()). The recordings
-/// have plate, trial, pass, speed, positions, a clock in seconds and the metadata of apply(); they are in the
-/// order of their names.
+/// an unknown shape are not registered and have no positions (is_unknown_plate()). The recordings have plate,
+/// trial, pass, speed, positions, a clock in seconds and the metadata of apply(); they are in the order of
+/// their names.
 ///
 /// The files hold no clock. Steps 1, 2 and 5 write it, and each step needs what the one before left:
 ///   1. import_text_pass() counts the lines: frame i at i / rig::kFrameRateHz. A dropped line keeps its
@@ -60,6 +60,7 @@ struct FolderImport {
 /// `take` gets the passes of one plate after the other, so that no more than these are in memory.
 void import_text_folder(const std::string& root, const FolderImport& settings,
                         const std::function<void(std::vector<ImportedPass>)>& take);
+/// The same, all passes at once.
 std::vector<ImportedPass> import_text_folder(const std::string& root, const FolderImport& settings);
 
 }  // namespace supertac

@@ -11,8 +11,8 @@
 
 namespace supertac {
 
-/// A way to an image that does without a network, so that a reader sees what the network buys. It sees the
-/// input as the network does (a window normalised when the scaling says so) and nothing else.
+/// A way to a picture without a network, to show what the network gains. It gets the network's input (a
+/// window, normalised when the scaling says so) and nothing else.
 class Baseline {
  public:
   virtual ~Baseline() = default;
@@ -58,8 +58,8 @@ class Upsampling {
 };
 
 /// Upsampling of the last frame (the mean of each taxel's channels), followed by a x + b: the line that fits
-/// the targets of the training examples best (least squares over all pixels). It turns voltage into height,
-/// as fairly as two numbers can.
+/// the targets of the training examples best (least squares over all pixels). It turns voltage into height as
+/// well as two numbers can.
 class UpsampledFrame : public Baseline {
  public:
   /// Throws std::invalid_argument when train is empty.

@@ -16,8 +16,8 @@ namespace supertac {
 /// nothing is clipped here.
 
 /// PSNR values are capped here: an error of 60 dB (0.1 % of the range) is what rounding to 8 bits costs, so
-/// two images above it are the same picture. Without a cap identical images are infinitely good and flat ones
-/// decide every mean.
+/// two images above it are the same picture. Without a cap identical images have an infinite PSNR, and flat
+/// ones decide every mean.
 constexpr double kPsnrCapDb = 60;
 
 /// Mean squared error over all pixels. Throws std::invalid_argument when the sizes differ or are 0.

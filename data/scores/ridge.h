@@ -16,7 +16,8 @@ namespace supertac {
 /// The weights have the same bits on every processor and for any number of threads (docs/determinism.md).
 class Ridge : public Baseline {
  public:
-  /// Fits to at most kFitWindows windows, evenly spread. Throws std::invalid_argument when train is empty.
+  /// Fits to at most kFitWindows windows, evenly spread. Throws std::invalid_argument when train is empty,
+  /// std::runtime_error when X'X + penalty D is not positive definite.
   Ridge(const WindowSet& windows, std::span<const std::uint32_t> train, const FitProgress& progress = {});
   std::string name() const override { return "ridge"; }
   void predict(std::span<const float> window, std::span<float> out) const override;

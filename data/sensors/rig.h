@@ -1,5 +1,5 @@
-// The rig's geometry and timing, each number once. Uses nothing of ours, so that data/, which imitates the
-// rig and reads its recordings, and hardware/, which drives it, share it: the target supertac_rig.
+// The rig's geometry and timing, each number once. It includes nothing else of the library, so that data/
+// (simulation, recordings) and hardware/ (the drivers) share it as the target supertac_rig.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace rig {
 constexpr double kPlateWidthMm = 36, kPlateLengthMm = 108;  ///< in x and y
 constexpr double kTextureFromMm = 36, kTextureToMm = 72;    ///< along y
 constexpr double kTextureHeightMm = 2.5;
-constexpr double kRidgeBaseMm = 2.5;
+constexpr double kRidgeBaseMm = 2.5;  ///< width of a ridge
 
 // The finger. Taxel k lies in row k / kTaxelColumns (along y) and column k % kTaxelColumns (along x).
 constexpr int kTaxelRows = 4, kTaxelColumns = 4, kTaxels = kTaxelRows * kTaxelColumns;

@@ -22,7 +22,7 @@ struct SignalScale {
   bool rises() const { return span < 0; }
   double low() const { return rises() ? rest : rest - span; }
   double high() const { return rises() ? rest - span : rest; }
-  /// The signal of another sensor that says the same.
+  /// The signal of a sensor of scale `other` that means the same load.
   double in(const SignalScale& other, double signal) const {
     return other.rest - other.span * ((rest - signal) / span);
   }
@@ -89,11 +89,12 @@ nlohmann::ordered_json json_of(const Sensor& sensor);
 /// Throws std::invalid_argument as check(), FileError.
 void write_sensor(const OutputPath& output, const Sensor& sensor);
 
-/// Of one line each, for a recording's or model's metadata. Throws FileError as sensor_of_json().
+/// For a recording's or model's metadata.
 nlohmann::ordered_json json_of(const SignalScale& scale);
-/// A number, or [x, y] where they differ. Throws std::invalid_argument for anything else.
+/// A number, or [x, y] where they differ; pitch_of_json() throws std::invalid_argument for anything else.
 nlohmann::ordered_json json_of(const Pitch& pitch);
 Pitch pitch_of_json(const nlohmann::ordered_json& json);
+/// Throws FileError as sensor_of_json().
 SignalScale scale_of_json(const nlohmann::ordered_json& json, const std::string& where);
 
 }  // namespace supertac

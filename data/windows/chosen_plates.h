@@ -9,11 +9,12 @@ namespace supertac {
 
 class ChosenPlates {
  public:
-  /// All when there is none.
+  /// All plates when `plates` is empty.
   explicit ChosenPlates(const std::vector<std::string>& plates);
   /// Whether a recording of this plate is used.
   bool take(const std::string& plate);
-  /// After all recordings of the folder: throws std::invalid_argument naming a plate that none was of.
+  /// To be called after all recordings of the folder: throws std::invalid_argument naming a chosen plate
+  /// without one.
   void check(const std::string& folder) const;
 
  private:

@@ -1,4 +1,4 @@
-// What is wrong with a data set though every file of it is in order.
+// Faults of a data set that no single file shows.
 #pragma once
 
 #include <span>

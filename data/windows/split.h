@@ -1,4 +1,4 @@
-// What is trained on and what is tested: a result without its split is meaningless.
+// Which windows are trained on and which are tested.
 #pragma once
 
 #include <cstdint>

@@ -48,10 +48,10 @@ struct WindowCounts {
 /// What the windows of a pass are for.
 struct PassUse {
   bool training_only = false;  ///< no split tests them: simulated passes beside real ones
-  /// Whether training may change a window to imitate other days: of simulated passes every one is another
-  /// day already, and changes only blur.
+  /// Whether training may augment its windows. Each simulated pass has a finger of its own already, and
+  /// changes would only blur it.
   bool augmentable = true;
-  /// Whether a window shows what the network will be used on: the novelty alarm learns from such.
+  /// Whether its windows resemble those in use: the novelty alarm is fitted to these alone.
   bool in_distribution = true;
   int stride = 0;  ///< every stride-th frame ends a window; 0: that of the settings
 };
@@ -128,7 +128,7 @@ class WindowSet {
   virtual void truth(std::size_t i, std::span<float> out) const;
   /// The last frame, [signals].
   std::vector<float> last_frame(std::size_t i) const;
-  /// NaN where it is unknown.
+  /// The finger's centre on the plate; NaN where it is unknown.
   Position position(std::size_t i) const;
   /// "x 18.0, y 43.5 mm", or where that is unknown "frame 17".
   std::string place_text(std::size_t i) const;
@@ -138,7 +138,7 @@ class WindowSet {
   bool in_distribution(std::size_t i) const { return passes_[pass_of(i)].use.in_distribution; }
   bool contact(std::size_t i) const { return zone(i) == Zone::contact; }
   std::size_t pass_of(std::size_t i) const { return place_of(i).pass; }
-  /// Window i is wanted soon: it may be fetched from the file.
+  /// A hint that window i is read soon: the system may fetch it from the file.
   virtual void will_read(std::size_t i) const;
   /// Number of the last frame within its pass.
   std::size_t frame_of(std::size_t i) const { return place_of(i).last; }

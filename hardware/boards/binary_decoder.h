@@ -8,10 +8,12 @@
 
 namespace supertac {
 
-/// Bytes of a number of FrameFormat::type or FrameTime::type; and the number, of so many bytes.
+/// Size in bytes of a number of this FrameFormat::type or FrameTime::type; and the number that begins at
+/// `bytes`.
 std::size_t bytes_of(const std::string& type);
 double number_at(const std::byte* bytes, const std::string& type, bool big_endian);
-/// Of FrameFormat::checksum; as many bytes as checksum_bytes() count, sums in one, CRCs in two.
+/// The checksum `kind` (FrameFormat::checksum) of these bytes; and its size in a frame: 0 bytes for "none", 1
+/// for "sum8" and "xor8", 2 for CRCs.
 std::uint32_t checksum_of(const std::string& kind, std::span<const std::byte> bytes);
 std::size_t checksum_bytes(const std::string& kind);
 
@@ -19,7 +21,7 @@ class BinaryDecoder : public SensorDecoder {
  public:
   explicit BinaryDecoder(const Sensor& sensor);
   void push(std::span<const std::byte> bytes, const Sink& sink) override;
-  /// Of a whole frame.
+  /// Bytes of a whole frame.
   std::size_t size() const { return size_; }
 
  private:

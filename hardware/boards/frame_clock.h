@@ -1,8 +1,8 @@
-// The board numbers nothing and stamps nothing. What its clock said is recovered from arrival times: a frame
+// The board's frames have neither numbers nor time stamps. Its clock is recovered from arrival times: a frame
 // can arrive late but never early, so the board's ticks are the lower envelope of the arrivals. Adapters hand
-// frames on in chunks, and a host that stood still finds in one burst what its port could hold; the frames
-// lost then, and those around them, are known to be dated within bounds only, which are kept with them. Live
-// and collected frames are counted by the same rules.
+// frames on in chunks, and a host that stood still finds in one burst what its port could hold; frames near
+// such a loss can be dated within bounds only, which are kept with them. Live and collected frames are
+// counted by the same rules.
 #pragma once
 
 #include <cstdint>
@@ -30,9 +30,9 @@ struct ClockFit {
 /// grow in number.
 class ClockEstimator {
  public:
-  /// Only of a read's last frame: those before it have waited.
+  /// To be called for the last frame of a read only: those before it have waited in the port.
   void add(std::uint64_t index, double arrival_s);
-  /// Nominal period under all frames until there are 8 blocks of 16.
+  /// Before there are 8 blocks of 16 frames: the nominal period, in a line below all arrivals.
   ClockFit fit() const;
 
  private:
@@ -49,11 +49,11 @@ class ClockEstimator {
 struct FrameArrival {
   double time_s = 0;          ///< when the read that brought it returned; one time for all of a read
   std::uint32_t damaged = 0;  ///< frames between the one before and this one that came, but not whole
-  bool more_waited = false;   ///< the read took as much as a terminal holds: what it left is as old
+  bool more_waited = false;   ///< the read took as much as a terminal holds, and may have left more
 };
 
-/// How many frames the `discarded` bytes between two whole frames were. A byte or two more or less were put
-/// in or left out by a cable.
+/// How many frames the `discarded` bytes between two whole frames were. A byte or two too many or too few are
+/// a cable's errors.
 std::uint32_t damaged_frames(std::uint64_t discarded);
 /// A read of more bytes may have left some behind: a terminal holds 4,095.
 constexpr std::size_t kTerminalFull = 4096 - rig::kFrameBytes;
@@ -68,10 +68,10 @@ struct FramePlace {
   std::uint32_t doubt = 0;  ///< it may be wrong by so many frames: some were lost about here
 };
 
-/// Numbers the frames, the missing ones counted. A lost frame moves every later arrival up by a period for
-/// good; a delay is made good by the burst that follows. So the frames missing at a burst are the whole
+/// Numbers the frames, the missing ones counted. A lost frame makes every later arrival late by a period for
+/// good; the burst that follows a delay makes up for it. So the frames missing at a burst are the whole
 /// periods by which ALL of the bursts that follow are late (at least 8 bursts and `lookahead` frames). They
-/// vanished before a burst of a single frame, and behind any other, when the port was full.
+/// were lost before a burst of a single frame, and behind any other, when the port was full.
 class FrameNumbering {
  public:
   explicit FrameNumbering(double period_s = rig::kFramePeriodS, std::size_t lookahead = 64);
@@ -138,7 +138,7 @@ struct FrameTimeline {
 FrameTimeline timeline_of(std::span<const FrameArrival> arrivals);
 
 /// Flags physically implausible jumps: a taxel that moves more than `limit` ADC steps between two frames. A
-/// flipped bit in a sample passes every check of the format; this is all that can be said about it.
+/// flipped bit in a sample passes every check of the format; only this can show it.
 class JumpDetector {
  public:
   /// 0.1 V in a period: at 10 mm/s the finger has moved 0.01 mm.

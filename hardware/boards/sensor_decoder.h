@@ -36,7 +36,7 @@ class SensorDecoder {
 };
 
 /// Looks again from the next line, or the next byte, where something is no frame: at 1e-3 lost bytes all
-/// undamaged frames come through. Of text and JSON nobody can tell a number that lost a digit from a right
+/// undamaged frames come through. In text and JSON a number that lost a digit cannot be told from a right
 /// one.
 std::unique_ptr<SensorDecoder> make_decoder(const Sensor& sensor);
 

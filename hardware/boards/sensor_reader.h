@@ -24,21 +24,21 @@ struct ReadFrame {
 struct ReaderCounters {
   SensorDecoder::Counters decoder;
   std::uint64_t damaged = 0;  ///< frames with a signal that is no number; not handed over
-  std::uint64_t late = 0;     ///< frames that FrameDates gives no date; neither
+  std::uint64_t late = 0;     ///< frames that FrameDates gives no date; not handed over
   std::uint64_t missing = 0;  ///< frames that never arrived, by the gaps in time
-  std::uint64_t dropped = 0;  ///< frames that nobody took in time
+  std::uint64_t dropped = 0;  ///< oldest frames of a full queue
   double period_s = 0;        ///< from frame to frame, as they came
 };
 
-/// Dates frames in the order they come: by the sensor's stamps where it sends any (a counter of 16 or 32 bits
-/// may run over; a sensor that starts anew goes on where it was; a stamp that nothing goes on from costs its
-/// own frame, one less than 0.1 s or 10 periods ahead those that it overtakes; and so costs one the first
-/// frame after a longer pause), else by arrival. A frame can come late, not early, so without stamps the
-/// frames are a period apart below the earliest arrivals.
+/// Dates frames in the order they come: by the sensor's stamps where it sends any, else by arrival. Counters
+/// of 16 or 32 bits may wrap, and a sensor may start anew. A stamp over 0.1 s and 10 periods ahead, or over
+/// 0.1 s back, is believed when the next one goes on from it; so each such jump costs a frame. A damaged
+/// stamp that is less far ahead costs the frames that it overtakes. A frame can come late, not early: without
+/// stamps frames are a period apart below the earliest arrivals.
 class FrameDates {
  public:
   explicit FrameDates(const Sensor& sensor);
-  /// Nothing for a frame that is not later than the one before, or whose stamp jumps.
+  /// Empty for a frame that is not later than the one before, or whose stamp jumps.
   std::optional<double> date(std::optional<double> stamp_s, double arrival_s);
   std::uint64_t missing() const { return missing_; }
   double period_s() const { return period_s_; }
@@ -56,14 +56,14 @@ class SensorReader {
  public:
   static constexpr std::size_t kQueueFrames = 4096;
 
-  /// Starts to read. From a port that is not live nothing is dropped: it waits instead.
+  /// Starts to read. A full queue drops the oldest frame; from a port that is not live it waits instead.
   SensorReader(OpenedPort opened, const Sensor& sensor);
   ~SensorReader();
   SensorReader(const SensorReader&) = delete;
   SensorReader& operator=(const SensorReader&) = delete;
   void stop();
 
-  /// The next frame, oldest first; nothing after `wait_s`, or at the end. Rethrows what ended the reader
+  /// The next frame, oldest first; empty after `wait_s`, or at the end. Rethrows what ended the reader
   /// (PortUnplugged, BoardSilent, WrongDevice) once the frames before it have been taken.
   std::optional<ReadFrame> next(double wait_s);
   /// The source is at its end and all frames have been taken.

@@ -1,6 +1,5 @@
 // The live board: a thread reads and decodes, a bounded queue hands frames over. The reader never waits for
-// its consumer, so a slow consumer loses the oldest frames, and a counter says
-// how many.
+// its consumer (but for replays), so a slow consumer loses the oldest frames; a counter says how many.
 #pragma once
 
 #include <condition_variable>
@@ -51,7 +50,7 @@ class TactileBoard {
   ~TactileBoard();
   void stop();
 
-  /// The next frame, oldest first; nothing after `wait_s` of wall time. Rethrows what ended the reader
+  /// The next frame, oldest first; empty after `wait_s` of wall time. Rethrows what ended the reader
   /// (PortUnplugged, BoardSilent, WrongDevice) once the frames before it have been taken.
   std::optional<StampedFrame> next(double wait_s);
   /// Rethrows what ended the reader, without waiting and without taking frames.

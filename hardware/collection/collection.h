@@ -32,8 +32,8 @@ struct MoveTiming {
 MoveTiming timing_of(std::span<const Leg> ended);
 
 /// Where the head was, from the polled positions of one pass. Of the samples the longest chain is kept in
-/// which each can be reached from the one before; the others were damaged, answered late, or dated wrong by a
-/// host that stood still. Between samples the position is linear in time.
+/// which each can be reached from the one before; the others were damaged, late, or misdated while the host
+/// stood still. Between samples the position is linear in time.
 class PositionTrack {
  public:
   /// Adds a leg's samples; without samples the leg is modelled as a trapezoid of speed that begins by

@@ -36,19 +36,19 @@ class JournalWriter {
   /// `most_bytes` are an error: some device talks without end. Throws JournalError.
   JournalWriter(const std::string& path, std::string_view header,
                 std::uint64_t most_bytes = std::uint64_t{1} << 36);
-  /// Writes what is left; errors are lost here, call close() to see them.
+  /// Writes what is left. Errors are lost here: call close() to see them.
   ~JournalWriter();
   JournalWriter(const JournalWriter&) = delete;
   JournalWriter& operator=(const JournalWriter&) = delete;
 
-  /// Never waits for the disk.
+  /// Never waits for the disk; what goes wrong is in check().
   void append(Stream stream, RecordKind kind, double time_s, std::span<const std::byte> bytes);
   void event(double time_s, std::string_view text);
   /// Throws JournalError when a write has failed: the disk is full, or gone.
   void check();
   /// Writes and syncs everything. Throws JournalError.
   void close();
-  /// Closes and removes the file: nothing was recorded that anybody could want back.
+  /// Closes and removes the file, for a run in which nothing was recorded.
   void discard();
   const std::string& path() const { return path_; }
 

@@ -1,5 +1,5 @@
 // A whole collection against two ports: captured bytes, journal events, board and palpation run together.
-// What supertac-collect does, without its talk.
+// What supertac-collect does, without its output.
 #pragma once
 
 #include <functional>
@@ -22,7 +22,7 @@ struct RecorderSettings {
   std::string header;             ///< one line that says what is collected
   /// True: lift the finger and end, by OperatorStop. Asked for every 0.02 s from the first moment on.
   std::function<bool()> stop = [] { return false; };
-  /// Told before the finger may touch, and when it cannot any more.
+  /// Called with true before the finger may touch, with false when it no longer can.
   std::function<void(bool)> contact = [](bool) {};
   /// The ports replay a journal: the board's is read to its end, which is no error.
   bool replay = false;

@@ -10,7 +10,7 @@ namespace supertac {
 
 struct OpenedPort {
   std::unique_ptr<Port> port;
-  bool live = true;  ///< nobody waits for its reader: a serial line or a socket, not a file or a pipe
+  bool live = true;  ///< the sender does not wait: a serial line or a socket, not a file or a pipe
 };
 
 /// `serial:DEVICE@BAUD` ("auto" finds the rig's board), udp:[HOST]:PORT (listens), tcp:HOST:PORT (connects,

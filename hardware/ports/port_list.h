@@ -19,9 +19,9 @@ std::vector<PortInfo> list_ports();
 /// more than one.
 std::string resolve_board_port(const std::string& path);
 
-/// A path that names the device behind `path` tomorrow too, whatever it was plugged in after: its link in
-/// `links` (which has the device's USB name and serial number), else the device. A pseudo-terminal has
-/// no name of its own, its number goes to the next one opened; there it is `path`, absolute.
+/// A path that still names the device behind `path` after it was plugged in again: its link in `links` (which
+/// has the device's USB name and serial number), else the device. A pseudo-terminal has no name of its own,
+/// its number goes to the next one opened; there it is `path`, absolute.
 std::string lasting_port_name(const std::string& path, const std::string& links = "/dev/serial/by-id");
 
 }  // namespace supertac

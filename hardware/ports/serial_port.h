@@ -1,5 +1,5 @@
 // A serial port or pseudo-terminal: raw, exclusive, with monotonic deadlines and typed errors.
-// libserialport 0.1.1 refuses pseudo-terminals, and the virtual rig is made of them; so this one is ours.
+// Not libserialport: its version 0.1.1 refuses pseudo-terminals, of which the virtual rig is made.
 #pragma once
 
 #include <cstddef>

@@ -27,7 +27,7 @@ struct MarlinSettings {
   double longest_wait_s = 60;      ///< for one command, behind a longer deadline of its own, whatever is said
   double quiet_s = 0.05;           ///< silence that ends a disturbance
   int max_repeats = 8;             ///< of one line, for any reason; four times as many while catching up
-  std::size_t kept_lines = 64;     ///< for Resend; RIG asks for 50
+  std::size_t kept_lines = 64;     ///< of the newest lines, for Resend
 };
 
 /// Firmware facts from M115.
@@ -70,7 +70,7 @@ class MarlinLink {
   /// in time.
   void emergency(std::string_view code);
 
-  /// From this time of the port's clock on every wait ends in PrinterSilent: the bound of a whole run.
+  /// From this time of the port's clock on every wait throws PrinterSilent, which bounds a whole run.
   void give_up_at(double time_s) { give_up_s_ = time_s; }
 
   /// Reads and forgets replies for `seconds`; the way to wait while the port's clock runs.

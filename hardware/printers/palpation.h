@@ -47,7 +47,8 @@ double ordered_s(const Leg& leg);
 bool reachable(const Leg& leg, const PositionSample& from, const PositionSample& to);
 
 /// What a run tells while it runs. `check` may throw: the operator's Ctrl-C, a board that is gone, a full
-/// disk. `contact` is told before the finger may touch, and when it cannot any more or nothing can be done.
+/// disk. `contact` is called with true before the finger may touch, with false when it no longer can, or when
+/// nothing can be done.
 struct PalpationObserver {
   std::function<void(const Leg&)> leg_started = [](const Leg&) {};
   std::function<void(const Leg&)> leg_ended = [](const Leg&) {};
@@ -72,16 +73,16 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here);
 
 /// The palpation run as G-code, for people who send it from another host: the moves of Palpation::run, in
 /// the same lines, with M400 behind each. It begins with a pause (M0) in which the operator confirms that the
-/// head is at `origin`, then sets the coordinates (G92): what a host of ours asks before it moves. All
-/// coordinates are absolute, in mm; between passes and at the end the finger is lifted, and the head returns
-/// to the origin.
-/// `title` is one line for the reader. Throws OutsideLimits when a target or the way to it is not allowed,
-/// std::invalid_argument for a plan that makes no sense or a title with a line break.
+/// head is at `origin`, then sets the coordinates (G92): as Printer::confirm_origin() does. All coordinates
+/// are absolute, in mm; between passes and at the end the finger is lifted, and the head returns to the
+/// origin. `title` is one line for the reader. Throws OutsideLimits when a target or the way to it is not
+/// allowed, std::invalid_argument for a plan that makes no sense or a title with a line break.
 std::string palpation_program(const PalpationPlan& plan, const Point3& origin, const Limits& limits,
                               const std::string& title);
 
 class Palpation {
  public:
+  /// `printer` must outlive it.
   Palpation(Printer& printer, const PalpationPlan& plan, PalpationObserver observer = {});
 
   /// Throws OutsideLimits, OriginUnknown or std::invalid_argument before anything moves; after that every

@@ -40,26 +40,28 @@ class Printer {
   /// `port` must outlive the printer.
   explicit Printer(Port& port, const PrinterSettings& settings = {});
 
-  /// Finds the firmware. The origin stays unknown: Marlin cannot tell whether its coordinates mean anything.
+  /// Finds the firmware; throws as MarlinLink::connect. The origin is unknown then: Marlin cannot tell
+  /// whether its coordinates mean anything.
   void connect();
 
   /// Lifts, homes, and lifts again when the limits say so. Never homes x and y with z low. Whatever ends it
   /// early stops the head.
   void home();
-  /// The operator's word that the head is at `here` (G92). Checked against the limits.
+  /// The operator's word that the head is at `here` (G92). Throws OutsideLimits, PositionError when M114
+  /// differs.
   void confirm_origin(const Point3& here);
   Origin origin() const { return origin_; }
 
   /// Sends one straight move and returns when the firmware has taken it (it starts some 0.1 s later).
-  /// Throws OriginUnknown, OutsideLimits before anything is sent; then whatever MarlinLink::command throws.
-  /// Returns when it was sent and when the firmware said ok.
+  /// Throws OriginUnknown, OutsideLimits, or std::invalid_argument for a speed that is not positive before
+  /// anything is sent; then as MarlinLink::command. Returns when it was sent and when the firmware said ok.
   MarlinLink::Answer start_move(const Point3& target, double speed_mm_s);
 
   /// Waits until the head stands (M400), then compares M114 with the last target. Throws PositionError when
   /// they differ by more than the tolerance three times running. Returns the time at which M400 was answered.
   double finish_move();
 
-  /// M114 R; nothing when the answer was damaged or later than `deadline_s` (0: poll_deadline_s).
+  /// M114 R; empty when the answer was damaged or later than `deadline_s` (0: poll_deadline_s).
   std::optional<PositionSample> sample_position(double deadline_s = 0);
   /// M114: the end of the queue, which is the head's position only after M400.
   Point3 queue_position();

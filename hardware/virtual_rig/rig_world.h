@@ -19,8 +19,8 @@ struct RigSettings {
   VirtualBoardSettings board{};
   bool printer_running = false;  ///< booted long ago
   RigFaults faults{};            ///< replaces those of printer and board
-  double chunk_s = 0;            ///< an adapter hands the board's bytes on every 2 ms to so long; 0: at once
-  std::uint64_t seed = 1;        ///< replaces those of printer and board
+  double chunk_s = 0;      ///< longest wait of an adapter that hands the board's bytes on in chunks; 0: none
+  std::uint64_t seed = 1;  ///< replaces those of printer and board
 };
 
 class RigWorld {

@@ -48,7 +48,7 @@ struct VirtualPrinterSettings {
 
 class VirtualPrinter {
  public:
-  /// A command that ran: what it was and when. The tests' proof that nothing runs twice.
+  /// A command that ran: what it was and when. Tests prove by it that nothing runs twice.
   struct Executed {
     double time_s;
     std::string command;

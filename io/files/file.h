@@ -84,7 +84,8 @@ class AtomicFile {
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// Appends. Throws FileError; the old file is then intact, and the temporary goes with this object.
+  /// Appends. Throws FileError; the old file is then intact, and the temporary goes with this object. After
+  /// commit() both throw std::invalid_argument.
   void write(std::span<const std::byte> bytes);
   void write(std::string_view text);
   /// Throws FileError as write() does. A failed fsync is final: the kernel may have dropped the pages, and a

@@ -21,7 +21,7 @@ class FolderLock {
 };
 
 /// The lock of a folder, once nobody else holds it; `meanwhile` is called while it waits, and ends the wait
-/// when it throws. Throws FileError after so long.
+/// when it throws. Throws FileError when `most` has passed.
 FolderLock lock_within(std::chrono::seconds most, const std::string& folder,
                        const std::function<void()>& meanwhile = {});
 

@@ -1,5 +1,5 @@
-// Provenance: what a file says of how it was made, in its metadata as JSON. It is no part of the content: two
-// files are the same when their content hashes are.
+// Provenance: what a file says of how it was made, in its metadata as JSON. It does not count as content: two
+// files with equal content hashes hold the same.
 #pragma once
 
 #include <string>

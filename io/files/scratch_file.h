@@ -19,11 +19,12 @@ class ScratchFile {
   ScratchFile(const ScratchFile&) = delete;
   ScratchFile& operator=(const ScratchFile&) = delete;
 
-  /// Appends the numbers and returns the place of the first. Throws FileError, when the disk is full for one.
+  /// Appends the numbers and returns the place of the first. Throws FileError, for example when the disk is
+  /// full.
   std::uint64_t append(std::span<const float> numbers);
   /// Fills all of `numbers` with those from `place` on. Throws FileError on an I/O error.
   void read(std::uint64_t place, std::span<float> numbers) const;
-  /// So many numbers are read from there soon: the system may fetch them meanwhile.
+  /// A hint that `count` numbers from `place` on are read soon: the system may fetch them.
   void will_read(std::uint64_t place, std::uint64_t count) const;
 
  private:

@@ -29,7 +29,7 @@ struct SystemCalls {
 /// The real calls.
 SystemCalls real_system_calls();
 
-/// So that a power cut does not take away the name of a file or folder. False with errno set.
+/// fsync of the folder that holds `path`, so that a power cut does not lose a new name. False with errno set.
 bool sync_folder_of(const std::string& path);
 
 /// The table in use. Replaced by tests only; not to be changed while another thread uses files.

@@ -25,6 +25,7 @@ struct Picture {
 
   /// A picture of one colour. Throws std::invalid_argument unless both sides are 1..65535.
   Picture(int width, int height, Rgb background = {255, 255, 255});
+  /// (x, y) must lie in the picture; past its last pixel both throw std::out_of_range.
   Rgb at(int x, int y) const;
   void set(int x, int y, Rgb colour);
 };

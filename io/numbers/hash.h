@@ -1,4 +1,4 @@
-// The hashes of the project: one for what must be told apart (fingerprints, streams), one sum against damage.
+// Hashes that tell contents apart (fingerprints, random streams), and a checksum against damage.
 #pragma once
 
 #include <bit>

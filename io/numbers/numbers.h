@@ -12,7 +12,7 @@ namespace supertac {
 /// not, or when the value does not fit. "nan" and "inf" are numbers here; the caller decides whether they may
 /// be.
 std::optional<double> parse_double(std::string_view text);
-/// The same, a leading '+' left out.
+/// The same, but one leading '+' is allowed.
 std::optional<double> number_of(std::string_view text);
 std::optional<std::int64_t> parse_int(std::string_view text);
 std::optional<std::uint64_t> parse_uint(std::string_view text);

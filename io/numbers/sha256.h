@@ -1,5 +1,5 @@
-// SHA-256 (FIPS 180-4): the name of a content that nobody can give to another one. io/numbers/hash.h is
-// faster where nobody would try.
+// SHA-256 (FIPS 180-4): names a content so that nobody can forge another one of that name. io/numbers/hash.h
+// is faster where forgery is no concern.
 #pragma once
 
 #include <array>

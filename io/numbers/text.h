@@ -22,7 +22,7 @@ std::string_view trimmed(std::string_view text);
 /// space.
 std::vector<std::string_view> split_line(std::string_view line, char separator);
 
-/// What stands between the commas; nothing of an empty text.
+/// The parts between the commas, untrimmed; none for an empty text.
 std::vector<std::string> comma_list(const std::string& text);
 
 }  // namespace supertac

@@ -20,8 +20,8 @@ struct NamedClassifier {
     std::string name;
     double probability = 0;
   };
-  /// What a picture [height][width] most probably shows.
-  /// Throws std::invalid_argument for a picture of another size.
+  /// The most probable class of a picture [height][width], and its softmax probability. Throws
+  /// std::invalid_argument for a picture of another size.
   Answer name_of(std::span<const float> picture) const;
 };
 

@@ -14,7 +14,7 @@ namespace supertac {
 /// Every accessor throws std::runtime_error that names path, key, what was expected and found.
 class JsonEntry {
  public:
-  /// Of the metadata of the file `path`.
+  /// The entry `key` of the metadata of the file `path`.
   JsonEntry(const std::map<std::string, std::string>& metadata, const std::string& path,
             const std::string& key);
 
@@ -28,7 +28,7 @@ class JsonEntry {
   /// A number, or [x, y].
   Pitch pitch(const char* name) const;
   std::string text(const char* name) const;
-  /// A value as it stands, to be checked by whoever reads it.
+  /// A value as it stands, which the caller has to check.
   const nlohmann::ordered_json& object(const char* name) const { return field(name); }
   const std::string& where() const { return where_; }
 

@@ -17,11 +17,11 @@
 
 namespace supertac {
 
-/// What stands between the sensor and SuperTac's input.
+/// How a sensor's signals become the input of SuperTac.
 struct InputSettings {
   double rate_hz = 300;
   Scaling scaling;
-  /// Length of the moving average (s) that the training signals went through, 0 = none; nothing when they
+  /// Length of the moving average (s) that the training signals went through, 0 = none; empty when they
   /// differed.
   std::optional<double> filter_s = 0.0;
   Pitch pitch_mm = 3;             ///< of the array
@@ -35,11 +35,11 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& settin
 struct ModelFile {
   std::unique_ptr<SuperTac> model;
   InputSettings input;
-  std::optional<Novelty> novelty;  ///< of its training windows; nothing of single frames and in older files
-  std::optional<ActivationRanges> ranges;  ///< for less than fp32; nothing in older files
+  std::optional<Novelty> novelty;  ///< of its training windows; empty for single frames and in older files
+  std::optional<ActivationRanges> ranges;  ///< what int8 needs; empty in older files
   std::map<std::string, std::string> metadata;
 
-  /// An entry of the metadata, or what is to stand for one that is missing.
+  /// An entry of the metadata, `otherwise` when it is missing.
   std::string metadata_or(const std::string& key, const std::string& otherwise) const;
   /// Half the width of a pixel's interval in units of its predicted error.
   double interval_factor() const;
@@ -49,10 +49,10 @@ struct ModelFile {
   WindowSettings windows() const;
 };
 
-/// What the windows of a model trained on these have gone through.
+/// The input settings of a model that is trained on these windows.
 InputSettings input_of(const WindowSet& windows);
 
-/// The settings of a model for another array than the default one.
+/// Sets rows, columns and in_channels to those of the array.
 void set_array(SuperTacSettings& settings, const TaxelArray& array);
 
 /// Builds the model that the metadata describes, after checking every setting's range, and fills it.
@@ -63,7 +63,7 @@ ModelFile load_model(const std::string& path);
 /// the first in what it takes, draws or predicts.
 std::vector<ModelFile> load_models(std::span<const std::string> paths);
 
-/// What the products of a network are made of.
+/// The number format of a network's products.
 enum class Precision {
   fp32,
   int8,  ///< bytes: faster, and the pictures differ a little (models/inference/prepared/prepared.h)
@@ -72,7 +72,7 @@ enum class Precision {
 Precision precision_of(const std::string& name);
 
 /// Of the models of these files, which must outlive it. Throws as Ensemble, and std::runtime_error when one
-/// has no ranges for less than fp32.
+/// has no ranges for int8.
 Ensemble ensemble_of(std::span<const ModelFile> files, Precision precision = Precision::fp32);
 
 /// Writes parameters and metadata. Throws FileError.

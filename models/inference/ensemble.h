@@ -6,9 +6,9 @@
 
 namespace supertac {
 
-/// Several networks that draw one picture, the mean of theirs: what each made up where the signals leave it
-/// open mostly differs between seeds, and is averaged away (Lakshminarayanan 2017). Costs as much as all of
-/// them.
+/// Several networks that draw one picture, the mean of theirs: where the signals leave the picture open,
+/// networks of different seeds mostly err differently, which averages out (Lakshminarayanan et al. 2017).
+/// Costs as much as all of them. The networks must outlive it.
 class Ensemble {
  public:
   /// Throws std::invalid_argument when there is none, or when they differ in the inputs that they take or in

@@ -11,7 +11,7 @@
 
 namespace supertac {
 
-/// Throws std::invalid_argument that names both when the windows or their truths are not the network's.
+/// Throws std::invalid_argument naming both formats when windows or truths are not those of the network.
 void check_format(const WindowSet& windows, const Network& network);
 
 /// A batch of results: inputs as the network takes them, outputs, predicted errors and targets [n,H,W,1], and

@@ -13,15 +13,15 @@ namespace supertac {
 /// The Mahalanobis distance of a window's features z (data/windows/transforms/signal_features.h) from those
 /// of the training windows (Lee et al. 2018, with one class):
 ///   distance = |L^-1 (z - mean)| / sqrt(D),   covariance = L L^T
-/// about 1 for a window like those of training. The network's own latents would not do: training with dropped
-/// taxels makes them blind to these. Nor would a likelihood of the VAEs: it is high for flat signals whether
-/// they were trained on or not (Xiao et al. 2020).
+/// about 1 for a window like those of training. The network's own latents would not serve: training with
+/// dropped taxels makes them blind to these. Nor would the VAEs' likelihood, which is high for any flat
+/// signal (Xiao et al. 2020).
 class Novelty {
  public:
-  /// Of features [N,D]. Numbers that do not vary count as if they varied a little. Throws
-  /// std::invalid_argument unless N > D.
+  /// Of features [N,D]. Features that do not vary get a small variance. Throws std::invalid_argument unless N
+  /// > D.
   explicit Novelty(const Tensor& features);
-  /// As stored() wrote it; nothing for a file without. Throws std::runtime_error naming path and tensor when
+  /// As stored() wrote it; empty for a file without. Throws std::runtime_error naming path and tensor when
   /// the shapes are not those of so many features.
   static std::optional<Novelty> read(const SafetensorsFile& file, const std::string& path,
                                      std::size_t features);

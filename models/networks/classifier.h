@@ -8,9 +8,9 @@
 namespace supertac {
 
 struct ClassifierSettings {
-  Dim height = 16, width = 16;  ///< pixels, at least 4
+  Dim height = 16, width = 16;  ///< pixels, 4 to 2048
   Dim channels = 1;             ///< of the input, at least 1
-  Dim classes = 6;              ///< at least 2
+  Dim classes = 6;              ///< 2 to 1024
 };
 
 /// Two blocks (3x3 convolution, ReLU, max-pool 2) of 16 and 32 channels, then a linear layer.
@@ -30,7 +30,7 @@ class TextureClassifier : public Module {
 /// x [N,features] -> logits [N,classes].
 class FeatureClassifier : public Module {
  public:
-  /// Throws std::invalid_argument for no feature or less than 2 classes.
+  /// Throws std::invalid_argument for no feature, or unless there are 2 to 1024 classes.
   FeatureClassifier(Dim features, Dim classes, Rng& rng);
   Variable forward(const Variable& x) const;
 

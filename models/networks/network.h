@@ -1,4 +1,4 @@
-// What all networks that draw have in common.
+// The interface of networks that draw pictures.
 #pragma once
 
 #include "layers/module.h"
@@ -12,7 +12,7 @@ struct NetworkFormat {
   bool operator==(const NetworkFormat&) const = default;
 };
 
-/// Pictures and what is known of their worth.
+/// Pictures, with the predicted errors and latents of networks that have them.
 struct Estimate {
   Tensor picture;          ///< [N,rows scale,columns scale,1]
   Tensor predicted_error;  ///< the same: how far from the truth a pixel is expected to be; undefined where
@@ -33,15 +33,16 @@ class Network : public Module {
   virtual ~Network() = default;
 
   virtual NetworkFormat format() const = 0;
-  /// Of a batch.
+  /// Of a batch of `count` inputs; likewise picture_shape().
   virtual Shape input_shape(Dim count) const = 0;
   Shape picture_shape(Dim count) const {
     const NetworkFormat f = format();
     return {count, f.rows * f.scale, f.columns * f.scale, 1};
   }
-  /// Inputs -> pictures and what is known of them. Throws std::invalid_argument on another shape.
+  /// Throws std::invalid_argument unless inputs have the input_shape() of some count.
   virtual Drawing draw(const Variable& inputs) const = 0;
-  /// The same, nothing recorded. Who draws many pictures prepares the network (prepared.h).
+  /// The same without recording. For many pictures use Prepared (models/inference/prepared/prepared.h), which
+  /// is faster.
   Estimate estimate(const Tensor& inputs) const;
   /// The pictures alone, [N,rows scale,columns scale,1].
   Tensor infer(const Tensor& inputs) const { return estimate(inputs).picture; }

@@ -19,7 +19,7 @@ enum class Grouping {
   horizontal,  ///< the rows: of a 4x4 array group i = taxels 4i .. 4i+3
   vertical,    ///< the columns: of a 4x4 array group i = taxels i, i+4, i+8, i+12
 };
-/// Both throw std::invalid_argument / return "horizontal" or "vertical".
+/// From and to "horizontal" and "vertical"; throws std::invalid_argument for another name.
 Grouping grouping_of(const std::string& name);
 std::string name_of(Grouping grouping);
 
@@ -31,13 +31,13 @@ struct SuperTacSettings {
   Dim latent = 10;      ///< LD: 1 to 256; of no meaning for single frames
   Dim scale = 4;        ///< 2, 4, 8, 16: pictures so many times finer than the array, 3 to 1024 pixels a side
   Grouping grouping = Grouping::horizontal;
-  Dim channels = 32;  ///< of the upsampler
-  Dim rcabs = 3;      ///< in each RIRB
-  /// Whether the last frame has a way of its own into the picture. The latents of a window keep what the past
-  /// says; with few of them, or fast sensors, they lose what the array feels now.
+  Dim channels = 32;  ///< of the upsampler: 4 to 256
+  Dim rcabs = 3;      ///< in each RIRB: 0 to 16
+  /// Whether the upsampler also sees the last frame itself. With few latents, or fast sensors, those of a
+  /// window lose what the array feels now.
   bool last_frame_path = false;
   bool predicted_error = false;  ///< whether it also draws how far off each pixel may be; presets do
-  /// Single frames have no other way.
+  /// Whether the upsampler sees the last frame: of single frames there is nothing else to see.
   bool sees_last_frame() const { return last_frame_path || timesteps == 1; }
 
   Dim signals() const { return rows * columns * in_channels; }  ///< numbers in a frame
@@ -55,7 +55,7 @@ struct SuperTacSettings {
   static SuperTacSettings of_preset(const std::string& name);
 };
 
-/// One thing for each group, in place: a warm step must not go to the heap.
+/// One T for each group, at most 16, stored in place: a warm step must not go to the heap.
 template <class T>
 class PerGroup {
  public:

@@ -20,7 +20,8 @@ struct LatentDistribution {
   Variable mean, log_var;
 };
 
-/// x [N,T,C] -> four strided convolutions -> [N,T/16,32] -> 64 -> mean and log variance.
+/// x [N,T,C] -> four convolutions (kernel 3, stride 2, leaky ReLU) to 16, 32, 32, 32 channels, [N,T/16,32] ->
+/// linear layer to 64, ReLU -> linear layers to mean and log variance.
 class Encoder : public Module {
  public:
   Encoder(const VaeOptions& options, Rng& rng);
@@ -34,7 +35,8 @@ class Encoder : public Module {
   Linear fc_, mean_, log_var_;
 };
 
-/// z [N,LD] -> 64 -> [N,T/16,32] -> four transposed convolutions -> [N,T,C] in (0,1).
+/// z [N,LD] -> linear layers to 64 and [N,T/16,32], ReLU -> four transposed convolutions (kernel 4, stride 2,
+/// leaky ReLU) to 32, 32, 16, 16 channels -> convolution of kernel 3, sigmoid: [N,T,C] in (0,1).
 class Decoder : public Module {
  public:
   Decoder(const VaeOptions& options, Rng& rng);

@@ -1,6 +1,6 @@
 // The ledger of a training: every N steps a line that names the whole state by hashes, each line chained to
-// the one before, and now and then the state itself. Equal bits make a training checkable: whoever repeats a
-// piece of it from a kept state has to get the same lines.
+// the one before; from time to time the state itself is kept, too. Equal bits make a training checkable:
+// a piece of it, repeated from a kept state, has to give the same lines.
 #pragma once
 
 #include <cstdint>
@@ -51,7 +51,7 @@ class LedgerWriter {
   /// `previous`: the line it continues behind, at or before the trainer's step; null: the training's
   /// beginning. The trainer must outlive it.
   LedgerWriter(const Trainer& trainer, std::int64_t every, const LedgerLine* previous = nullptr);
-  /// After every step: takes note of its batch, and gives a line where one is due.
+  /// To be called after every step: hashes its batch; returns a line every `every` steps and after the last.
   std::optional<LedgerLine> after_step();
   /// The ledger's first line.
   const std::string& header() const { return header_; }
@@ -70,10 +70,11 @@ struct LedgerDifference {
   std::string what;
   bool batches = false;  ///< whether other batches were taken
 };
-/// Nothing when they agree as far as both go. Throws std::invalid_argument when they are of other tensors or
+/// Empty when they agree as far as both go. Throws std::invalid_argument when they are of other tensors or
 /// have no step in common.
 std::optional<LedgerDifference> first_difference(const Ledger& a, const Ledger& b);
-/// The same of one line.
+/// The same for one line of each, at the same step. Throws std::runtime_error when their number of tensors is
+/// not the header's.
 std::optional<LedgerDifference> difference(const Ledger& header, const LedgerLine& a, const LedgerLine& b);
 
 }  // namespace supertac

@@ -14,8 +14,8 @@ namespace supertac {
 
 /// One batch, or a micro-batch's share of it.
 struct Batch {
-  Tensor inputs, targets;
-  Tensor noise;  ///< [N,Objective::noise()], ~ N(0,1)
+  Tensor inputs, targets;  ///< as Network::input_shape() and picture_shape() have it
+  Tensor noise;            ///< [N,Objective::noise()], ~ N(0,1)
 };
 
 /// Of a batch: the loss, and what tells a collapse (models/training/loss/collapse.h).
@@ -28,18 +28,18 @@ struct BatchOutput {
 /// supertac_loss() of a recipe's network over windows that are augmented before.
 class Objective {
  public:
-  /// Of windows like these. Throws std::invalid_argument naming the setting of the recipe.
+  /// For windows of this format. Throws std::invalid_argument naming the setting of the recipe.
   Objective(const WindowSet& windows, const Recipe& recipe);
   const SuperTac& network() const { return model_; }
   const Recipe& recipe() const { return recipe_; }
-  /// The same over a network of its own, which awaits the values of this one's parameters.
+  /// The same with a network of its own, not yet with this one's values: share_values() gives it them.
   Objective clone() const { return {recipe_, input_, array_, 0}; }
 
   BatchOutput operator()(const Batch& batch) const;
-  /// Numbers of noise and of latents that a sample has.
+  /// How many numbers of noise and of latents a sample has.
   Dim noise() const { return recipe_.sampling ? latents() : 0; }
   Dim latents() const { return recipe_.model.latents(); }
-  /// Changes a window in training: a function of the sample's number since training began.
+  /// Augments a window in place; `sample` is its number since training began.
   void augment(std::uint64_t sample, std::span<float> window) const;
 
   /// Its settings as JSON text, to compare on resume.

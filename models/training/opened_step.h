@@ -1,7 +1,7 @@
 // A step of a training, opened: every operator that ran, forward and in reverse, with the SHA-256 of all that
 // went into it and came out, from the state before the step to the state behind it. So two trainings that
-// should be the same can be compared down to the operator where they part, and whoever doubts an operator
-// computes this one alone again.
+// should be the same can be compared down to the operator where they part, and a single operator can be
+// computed again.
 #pragma once
 
 #include <functional>
@@ -27,7 +27,7 @@ struct OpenedStep {
 };
 
 struct OpeningOptions {
-  /// The arrays of the operators whose name begins so are kept; nothing: none are.
+  /// The arrays of the operators whose name begins so are kept; empty: none are.
   std::optional<std::string> keep = {};
   /// Sees each result (output `index` of the operator `name`) before it is hashed and used, and may change
   /// it: so tests plant what is to be found. Called by several threads.
@@ -35,10 +35,11 @@ struct OpeningOptions {
       {};
 };
 
-/// Makes the next step of this trainer, which must train in one process. Throws as Trainer::train_step().
+/// Makes the next step of this trainer. Throws as Trainer::train_step(), and std::invalid_argument when it
+/// trains in several processes.
 OpenedStep open_step(Trainer& trainer, const OpeningOptions& options = {});
 
-/// The first entry whose bits differ; nothing where none do, or the sizes differ.
+/// The first entry whose bits differ; empty where none do, or the sizes differ.
 std::optional<Dim> first_different_entry(const Tensor& one, const Tensor& other);
 
 /// The first operator in which two openings of the same step differ.
@@ -46,9 +47,9 @@ struct OperatorDifference {
   std::string name, op;
   /// "output 0", "input 1" where an input differs that no operator made, "the settings".
   std::string what;
-  std::string one, other;  ///< what they call the arrays, or the settings
+  std::string one, other;  ///< SHA-256 and shape of the arrays, or the settings
 };
-/// Nothing when all is the same. Throws std::invalid_argument when they have other operators: of another
+/// Empty when all is the same. Throws std::invalid_argument when they have other operators: of another
 /// network.
 std::optional<OperatorDifference> first_difference(const nlohmann::ordered_json& one,
                                                    const nlohmann::ordered_json& other);

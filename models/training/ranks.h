@@ -32,7 +32,7 @@ class Ranks {
   /// when the partner does not answer.
   virtual void exchange(int partner, std::span<const std::byte> mine, std::span<std::byte> theirs) = 0;
 
-  /// Everybody's text, by rank. For sizes that are powers of two.
+  /// The texts of all ranks, by rank. For sizes that are powers of two.
   std::vector<std::string> gather(const std::string& mine);
   /// Makes `values` the sum over all ranks, a balanced binary tree; `buffer` is of the same size.
   void add_up(std::span<double> values, std::span<double> buffer);
@@ -45,11 +45,11 @@ class Ranks {
 /// A process that is alone.
 Ranks& one_process();
 
-/// Throws std::invalid_argument, with advice, for a number of ranks that cannot share eight micro-batches
-/// evenly, and for a batch that does not fill them.
+/// Throws std::invalid_argument, with advice, unless ranks is 1, 2, 4 or 8, or when several share a batch
+/// below 8.
 void check_micro_batches(int ranks, std::size_t batch);
 
-/// Where ranks differ: the first entry for which one has another value than most (at a tie: than rank 0).
+/// The first entry for which a rank has another value, `its`, than most, `usual` (at a tie: than rank 0).
 struct Disagreement {
   int rank = 0;
   std::string entry, its, usual;

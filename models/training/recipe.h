@@ -23,7 +23,7 @@ struct Recipe : TrainingPace {
   LossWeights loss;
   /// Whether z is drawn around its mean. Without, and with beta 0, the VAEs are plain autoencoders.
   bool sampling = true;
-  /// Of the windows. With any of it passes in which nothing is felt are added (add_silent_passes).
+  /// Of the windows. With any of it, passes in which nothing is felt are added (add_silent_passes).
   AugmentSettings augment;
 
   std::vector<std::string> plates;     ///< only recordings of these; none: of all
@@ -31,7 +31,7 @@ struct Recipe : TrainingPace {
   std::vector<std::string> leave_out;  ///< of split texture: the plates that are tested
   double rate_hz = 300;                ///< of the model's samples, 20 to 2000
   std::int64_t stride = 1;             ///< every stride-th frame of a pass ends a window
-  std::optional<Scaling> range;        ///< rest and span; nothing: SignalRange::fitted()
+  std::optional<Scaling> range;        ///< rest and span; empty: SignalRange::fitted()
   bool per_window = true;              ///< whether a window is brought to its own rest and gain
   std::int64_t random_plates = 0;      ///< simulated passes besides, each over a plate of its own
   /// Half the width of a pixel's 90 % interval in units of its predicted error, for the model's file.
@@ -41,8 +41,8 @@ struct Recipe : TrainingPace {
   void check() const;
 
   /// `paper`: as in the paper, at 100 Hz. `best`: what measures best for one network, the same as plain
-  /// autoencoders by Muon. `tiny`: a ninth of the multiply-adds, at 50 Hz. Epochs and rate are what each is
-  /// trained to its best with on the rig's recordings (bench/results). `frame`: single frames as they are, of
+  /// autoencoders by Muon. `tiny`: a ninth of the multiply-adds, at 50 Hz. Epochs and learning rate are those
+  /// that measured best on the rig's recordings (bench/results). `frame`: single frames as they are, of
   /// sensors that press or lie still. Throws std::invalid_argument for another name, listing these.
   static Recipe named(const std::string& name);
   /// What `file` (read from `path`) was trained with, its signal range included: the same recordings give the
@@ -51,7 +51,7 @@ struct Recipe : TrainingPace {
 };
 
 /// What a model file says of its recipe besides the entries "settings" and "input" of model_metadata().
-/// Settings that are as they always were are left out: the text of older files stays the same.
+/// Newer settings at their defaults are left out, so that older files keep their text.
 std::map<std::string, std::string> metadata_of(const Recipe& recipe);
 
 /// The entry "training" of a model file: steps, loss and augmentation as JSON text.

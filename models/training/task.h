@@ -15,7 +15,7 @@ namespace supertac {
 struct RecordingFolders {
   std::string data;       ///< these are split
   std::string also = {};  ///< these are only trained on; "": none
-  /// Watches the reading of a folder; nothing: nobody does.
+  /// Gives the watch of a folder's reading; empty: none.
   std::function<ReadingWatch(const std::string& folder)> watch = {};
 };
 
@@ -32,8 +32,9 @@ struct TrainingTask {
 };
 
 /// Reads the recordings, adds random and silent passes, splits. Throws std::invalid_argument as
-/// Recipe::check, and when random passes, which speak as the recordings state, do not fit their signals;
-/// std::runtime_error as WindowSet::load, and when the signal range clips most of the signals.
+/// Recipe::check, and when random plates are asked for though the signals rest at another level than the
+/// recordings state; std::runtime_error as WindowSet::load, and when the signal range clips most of the
+/// signals.
 TrainingTask window_task(const Recipe& recipe, const RecordingFolders& folders);
 
 }  // namespace supertac

@@ -1,4 +1,4 @@
-// The whole training of a recipe: what supertac-train does, for whoever links the library.
+// The whole training of a recipe: what supertac-train does, as a function of the library.
 //
 //   train(Recipe::named("tiny"), {"recordings"}, "model.safetensors");
 #pragma once
@@ -18,12 +18,13 @@ struct LogLine : LossTerms {
   double time_s = 0;  ///< since training began, pauses between resumed runs left out
   std::int64_t step = 0;
   double gradient_norm = 0, learning_rate = 0;
-  /// Of an even sample of the test examples in contact, at the end of an epoch; nothing is chosen by them.
+  /// Means over the test windows in contact among 2,000 evenly spaced ones, at the end of an epoch; training
+  /// does not use them.
   std::optional<double> test_ssim, test_psnr_db;
 };
 
 struct TrainingCallbacks {
-  std::function<bool()> stop = {};                          ///< asked after every step: whether to end early
+  std::function<bool()> stop = {};  ///< asked during and after every step: whether to end early
   std::function<void(const StepReport& report)> step = {};  ///< after every step
   /// Every 50 steps and at the end of every epoch.
   std::function<void(const LogLine& line)> log = {};
@@ -33,12 +34,12 @@ struct TrainingCallbacks {
   double seconds_before = 0;  ///< on the log's clock when this process began
 };
 
-/// Trains until the last step or a stop; returns whether all steps are done. Throws as Trainer::train_step
-/// and Trainer::save.
+/// Trains until the last step, or to the end of the step in which `stop` returns true; returns whether all
+/// steps are done. Throws as Trainer::train_step and Trainer::save.
 bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& callbacks = {});
 
-/// The model alone, ready for use: with `origin` in its metadata, the ranges of its values for int8 and, for
-/// windows of time, the Novelty of its training examples. Throws FileError.
+/// The model alone, ready for use: with `origin` in its metadata, the ranges of its values for int8 and,
+/// unless it takes single frames or has too few windows, its Novelty. Throws FileError.
 void save_trained(const Trainer& trainer, const std::string& path,
                   const std::map<std::string, std::string>& origin);
 

@@ -39,14 +39,14 @@ struct StepReport : LossTerms {
   double gradient_norm = 0;  ///< before clipping
   double learning_rate = 0;
   int active_latents = 0;  ///< of all groups, in this batch (models/training/loss/collapse.h)
-  /// For the last 100 steps after warm-up the pictures said nothing of the truths, or no latent number was
-  /// active (models/training/loss/collapse.h). Lower the learning rate or, when no latent is active, beta.
+  /// For the last 100 steps after warm-up is_degenerate() was true, or no latent number was active
+  /// (models/training/loss/collapse.h). Lower the learning rate or, when no latent is active, beta.
   bool collapsed = false;
-  bool stop = false;  ///< whether a process wishes to stop after this step
+  bool stop = false;  ///< whether a process asked to stop after this step
 };
 
 /// Stands around each micro-batch of a step, on its thread: must call `run`, which fills the batch and goes
-/// forward and backward. For those who look on (models/training/opened_step.h).
+/// forward and backward. For observers (models/training/opened_step.h).
 struct MicroBatchView {
   const Batch& batch;
   const std::vector<Parameter>& parameters;  ///< the model's values under gradients of their own
@@ -56,9 +56,9 @@ using AroundMicroBatch =
 
 class Trainer {
  public:
-  /// `windows` must outlive the trainer. Throws std::invalid_argument for windows of another format than the
-  /// network's, no training window, or as check_micro_batches(). `ranks` train together: all of them call
-  /// train_step() and save().
+  /// `windows` and `ranks` must outlive the trainer. Throws std::invalid_argument for windows of another
+  /// format than the network's, no training window, or as check_micro_batches(). `ranks` train together: all
+  /// of them call train_step() and save().
   Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, Objective objective,
           Ranks& ranks = one_process());
   Trainer(Trainer&&) noexcept;
@@ -76,9 +76,9 @@ class Trainer {
   /// Number of the processes that train together.
   int ranks() const { return ranks_.size(); }
 
-  /// One batch: forward, loss, backward, Adam. Throws TrainingStopped; the parameters are then still finite.
-  /// `stop` is asked before the gradients are added up. With several processes throws as check_same(), which
-  /// is called every 100 steps.
+  /// One batch: forward, loss, backward, Adam. Throws TrainingStopped, the parameters then still being
+  /// finite; std::invalid_argument after the last step. `stop` is asked before the gradients are added up.
+  /// With several processes throws as check_same(), which is called every 100 steps.
   StepReport train_step(const std::function<bool()>& stop = {}, const AroundMicroBatch& around = {});
   /// Throws RanksError naming rank and tensor when the processes' parameters are not the same to the bit.
   void check_same() const;

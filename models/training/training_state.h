@@ -1,5 +1,5 @@
-// What a training run has besides its network and data: Adam, the rate's schedule, the step; saved and
-// restored to the bit.
+// What a training run has besides its network and data: Adam, the learning rate's schedule, the step; saved
+// and restored to the bit.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@
 
 namespace supertac {
 
-/// How long, in what steps, how fast: whatever is trained.
+/// Length, batches and learning rate of a training, whatever the network.
 struct TrainingPace {
   std::int64_t epochs = 20;  ///< 1 to 100,000
   std::int64_t batch = 64;   ///< 1 to 4096
@@ -25,7 +25,7 @@ struct TrainingPace {
   double learning_rate = 1e-3;  ///< Adam's peak, above 0 and at most 1
   double warm_up = 0.05;        ///< share of all steps in which the rate rises; then half a cosine to 0
   double clip_norm = 1;         ///< 0 = never
-  bool muon = false;            ///< matrices of weights move as AdamOptions::muon has it
+  bool muon = false;            ///< as AdamOptions::muon
 
   /// Throws std::invalid_argument naming the setting.
   void check() const;
@@ -49,8 +49,7 @@ class TrainingState {
   bool done() const { return step_ >= schedule_.total; }
   double learning_rate() const { return schedule_.at(step_); }
 
-  /// Counts steps in a row that look collapsed, not while the rate still rises: a network has not had its
-  /// chance to learn by then. True from the 100th on.
+  /// Counts the steps in a row that look collapsed, from the end of the warm-up on. True from the 100th on.
   bool collapsed(bool looks_so);
 
   /// Sets the gradients to the sum of the micro-batches', which is taken as a balanced binary tree (pairs of

@@ -1,6 +1,6 @@
-// The same sums as kernels/conv.h and ops/linear.h, faster: register tiles, instruction sets chosen at
-// run time, Winograd's way for batches of larger maps, one of its own for few outputs. Which way is taken
-// depends on the shapes only, so all processors agree.
+// The same sums as autograd/kernels/conv.h and autograd/ops/linear.h, faster: register tiles, instruction
+// sets chosen at run time, Winograd's algorithm for batches of larger maps (winograd.h), another one for few
+// output channels (narrow.h). The shapes alone decide which one runs, so all processors agree.
 #pragma once
 
 #include "autograd/kernels/conv.h"
@@ -18,7 +18,7 @@ void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const rea
 void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx);
 void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw);
 
-/// w [taps][cin][cout] -> [taps][cout][cin], for all micro-batches of a training step once (weight_forms.h).
+/// w [taps][cin][cout] -> [taps][cout][cin], once for all micro-batches of a training step (weight_forms.h).
 Tensor transposed_weights(const real* w, Dim taps, Dim cin, Dim cout);
 
 }  // namespace supertac::kernels::fast

@@ -21,7 +21,7 @@ __attribute__((flatten, target("avx512f"))) void run_on_avx512(Loop loop) {
 }
 #endif
 
-/// run_loop([=] { any loops });
+/// Calls loop() as compiled for the chosen set: run_loop([=] { any loops });
 template <class Loop>
 void run_loop(Loop loop) {
 #ifdef __x86_64__
@@ -32,7 +32,7 @@ void run_loop(Loop loop) {
   loop();
 }
 
-/// each() inside run_loop().
+/// The loop of each(), for use inside run_loop().
 template <class Body>
 void each_here(Dim n, Body body) {
 #ifdef __clang__
@@ -43,7 +43,8 @@ void each_here(Dim n, Body body) {
   for (Dim i = 0; i < n; ++i) body(i);
 }
 
-/// each(n, [=](Dim i) { y[i] = a[i] + b[i]; }) for all i below n. No turn may read what another one writes.
+/// each(n, [=](Dim i) { y[i] = a[i] + b[i]; }) for all i below n. No iteration may read what another one
+/// writes.
 template <class Body>
 void each(Dim n, Body body) {
   run_loop([=] { each_here(n, body); });

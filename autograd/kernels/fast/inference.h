@@ -12,8 +12,9 @@ struct Strides {
 };
 
 /// y[pixel, :] = f(bias + sum over segments, k of x[pixel + segment + k] * w[segment, k, :]) for the pixels
-/// of a map, f(s) = s for s > 0, else negative_slope * s. Neighbours in a line lie side by side, so a row of
-/// taps is one segment. A linear layer is the map of one pixel.
+/// of a map, f(s) = s for s > 0, else negative_slope * s. Strides `from` are those of x, `to` those of y.
+/// Neighbours in a line lie side by side, so a row of taps is one segment. A linear layer is the map of one
+/// pixel.
 struct ProductJob {
   Dim images = 1, height = 1, width = 1;  // of y
   Strides from, to;
@@ -46,9 +47,9 @@ struct PlacesJob {
 /// Taps of a 3x3 filter along one axis: all, or all but the last or the first, which is 0.
 enum class Taps { three, first_two, last_two };
 
-/// The same of a few tiles of 4x4, from the filters themselves: u = G g G^T is made of a few rows of cin at a
-/// time, which the first cache holds. Tap (i, j), of those that are there, is g[taps[i, j] + k], k < cin *
-/// cout. m is written where u is not 0 throughout. v and m have [6][6] places.
+/// PlacesJob for a few tiles of 4x4, from the filters themselves: u = G g G^T is computed on the way, for as
+/// many rows of cin as the first-level cache holds. Tap (i, j), where there is one, is g[taps[i, j] + k], k <
+/// cin * cout. Only the places of m where u is not all 0 are written. v and m have [6][6] places.
 struct FilteredPlacesJob {
   Taps down = Taps::three, across = Taps::three;
   const Dim* taps = nullptr;
@@ -56,7 +57,8 @@ struct FilteredPlacesJob {
 };
 inline constexpr Dim kFilterChannels = 32;
 
-/// y[pixel, c] = a[pixel, c] + x[pixel, c] * gate[image, c], without gates a + x; and means over pixels.
+/// `gate`: y[pixel, c] = a[pixel, c] + x[pixel, c] * gates[image, c], or a + x where gates is null; `mean`:
+/// means[image, c] = the mean over pixels of x.
 struct MapJob {
   Dim images = 0, height = 0, width = 0, channels = 0;
   Strides a, x, y;

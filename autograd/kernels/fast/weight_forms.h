@@ -1,8 +1,8 @@
-// What the kernels make of weights before they use them: transposed, turned, transformed for Winograd.
+// The forms that kernels bring weights into before they use them: transposed (transposed_weights()),
+// Winograd's filters G g G^T, and those of the turned kernels, for the gradient of x.
 //
-// A kernel makes them anew in every call, as it cannot know whether somebody wrote the weights meanwhile. A
-// training step knows: its weights stand still while its micro-batches run, so each form need be made once
-// for all of them.
+// A kernel makes them anew in every call, as it cannot know whether the weights have changed. In a training
+// step they are constant while its micro-batches run, so each form need be made only once for all of them.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ inline constexpr std::size_t kWeightForms = 3;
 /// The forms of the weights of one model, each made when it is first asked for.
 class WeightForms {
  public:
-  /// Of weights whose buffers stay where they are. What other weights there are is unknown to it.
+  /// For these weights, whose buffers it keeps alive.
   explicit WeightForms(const std::vector<Tensor>& weights);
   /// To be called after the weights were written and before they are used. Not while a Use lives.
   void forget();
@@ -31,9 +31,10 @@ class WeightForms {
     bool made = false;
     Tensor values;
   };
+  /// Null for other weights than these.
   Slot* slot_of(const real* weights, WeightForm form);
 
-  /// While one lives the kernels of this thread take the forms, and nobody may write the weights.
+  /// While one lives the kernels of this thread take the forms, and the weights must not be written.
   class Use {
    public:
     explicit Use(WeightForms& forms);
@@ -41,7 +42,7 @@ class WeightForms {
     Use(const Use&) = delete;
     Use& operator=(const Use&) = delete;
   };
-  /// Of this thread, or null.
+  /// The forms in use on this thread, or null.
   static WeightForms* in_use();
 
  private:
@@ -49,7 +50,7 @@ class WeightForms {
   std::unordered_map<const real*, std::array<std::unique_ptr<Slot>, kWeightForms>> slots_;
 };
 
-/// The form of these weights, which make(real* to) writes where it is not there yet.
+/// The form of these weights; make(real* to) writes it unless it is in use and made already.
 template <class Make>
 Tensor weight_form(const real* weights, WeightForm form, const Shape& shape, Make make) {
   WeightForms* forms = WeightForms::in_use();

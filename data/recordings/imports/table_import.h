@@ -32,7 +32,7 @@ ColumnMap column_map(const std::string& text);
 Recording recording_of_table(const std::string& path, const Table& table, const ColumnMap& map,
                              const Sensor& sensor);
 
-/// Gives positions from a log of its own, columns time (of the same clock and unit), x and y in mm: by these
+/// Sets the positions from a separate log, columns time (of the same clock and unit), x and y in mm: by these
 /// names, or 0, 1 and 2. Between its rows they are interpolated, before and after it unknown. Throws
 /// FileError.
 void add_positions(Recording& recording, const std::string& path, const Table& log, double time_unit_s);
@@ -46,10 +46,10 @@ void add_truth(Recording& recording, const std::string& path, const Table& image
 ///   target  F32 [N,1,sH,sW]  what a finer sensor saw of each, in [0,1]; s is 2, 4, 8 or 16
 ///   group   I64 or I32 [N]   optional: frames of one person, object or day belong together
 /// Each group becomes a recording, whose plate and metadata "group" are the group's number with as many
-/// digits as the longest; without groups there is one, and its plate is "pairs". Nobody knows when the frames
-/// were taken: they are one second apart, and there is no trial. `sensor` says what the numbers mean; without
-/// it pressing raises them, from the lowest value of the file to the highest, and taxels are 1 mm apart.
-/// Throws FileError naming the tensor, what was expected and found.
+/// digits as the longest; without groups there is one, and its plate is "pairs". The times of the frames are
+/// unknown: they are set one second apart, and there is no trial. `sensor` says what the numbers mean;
+/// without it pressing raises them, from the lowest value of the file to the highest, and taxels are 1 mm
+/// apart. Throws FileError naming the tensor, what was expected and found.
 std::vector<Recording> import_pairs(const SafetensorsFile& file, const std::optional<Sensor>& sensor = {});
 
 }  // namespace supertac

@@ -31,8 +31,7 @@ struct ImportReport {
 /// the host lost without leaving a line - 5 to 20 % of the frames - is for restore_clock
 /// (data/registration/lost_frames.h). Positions are unknown. plate, trial, pass are left for the caller;
 /// source is "imported". Throws FileError when the file cannot be read, is empty or over 64 MiB, or more than
-/// a tenth of its lines are not frames: then it is another kind of file. The report is filled in that case
-/// too.
+/// a tenth of its lines are not frames: then it is another kind of file. `report` is filled even then.
 Recording import_text_pass(const std::string& path, ImportReport& report);
 
 }  // namespace supertac

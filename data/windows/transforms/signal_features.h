@@ -1,4 +1,4 @@
-// What a window says of the sensor itself, whatever it feels.
+// Features of a window that tell of the sensor, not of the texture under it.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@ namespace supertac {
 /// Numbers of signal_features(): two for each signal, one for each pair of neighbouring rows.
 std::size_t signal_feature_count(const TaxelArray& array);
 
-/// Of a window x [T][signals] as a network takes it:
+/// The features of a window x [T][signals] as a network takes it, in this order:
 ///   mean_k, for each signal
 ///   log(sd_k + 0.0005): a dead taxel is stiller than any that is pressed
 ///   lead_r = sum_k in row r of (x[t,k] x[t+L,k'] - x[t+L,k] x[t,k']), mean over t, the means taken off, as a

@@ -14,9 +14,9 @@
 
 namespace supertac {
 
-/// Images [height][width][channels] with a margin around whose value stands for 0, in memory that is used
-/// again behind the last step that reads them. Either bytes, each map with a scale of its own, or numbers of
-/// 16 bits in steps of 2^-fraction_bits, for what bytes would be too coarse for: sums of residual blocks,
+/// Images [height][width][channels] with a margin around whose value stands for 0, in memory that is reused
+/// behind the last step that reads them. Either bytes, each map with a scale of its own, or numbers of 16
+/// bits in steps of 2^-fraction_bits, for what bytes would be too coarse for: sums of residual blocks,
 /// latents, the picture.
 struct IntegerMap {
   Dim height = 1, width = 1, channels = 1;

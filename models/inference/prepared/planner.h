@@ -1,4 +1,4 @@
-// From what an inference was seen to do to a plan.
+// Makes a Plan of the ops that one inference ran.
 #pragma once
 
 #include <map>
@@ -14,8 +14,7 @@ namespace supertac {
 /// What the steps run on.
 inline const kernels::IsaKernels& isa() { return kernels::isa_kernels(); }
 
-/// One step for each op, in the order in which they ran; a map's memory is taken again behind its last
-/// reader.
+/// One step for each op, in the order in which they ran; a map's memory is reused behind its last reader.
 class Planner : TraceWalk {
  public:
   /// Throws std::logic_error naming an op that has no step. `second_cache`: of the processor, in bytes; 0:

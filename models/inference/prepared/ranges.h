@@ -1,4 +1,4 @@
-// Between which values the results of a network's ops lie: what a network prepared in bytes needs to know.
+// The ranges of the results of a network's ops, from which int8 takes its scales.
 #pragma once
 
 #include <algorithm>
@@ -15,9 +15,10 @@ namespace supertac {
 /// Smallest and largest value of each op of an inference, in their order, over the inputs that were added.
 class ActivationRanges {
  public:
-  /// Runs the network on these inputs.
+  /// Runs the network on these inputs and widens the ranges, which begin with 0. Throws as Network::draw, and
+  /// std::invalid_argument for a network of another number of ops.
   void add(const Network& network, const Tensor& inputs);
-  /// As stored() wrote it; nothing for a file without. Throws std::runtime_error naming path and tensor.
+  /// As stored() wrote it; empty for a file without. Throws std::runtime_error naming path and tensor.
   static std::optional<ActivationRanges> read(const SafetensorsFile& file, const std::string& path);
   StoredTensor stored() const;
 

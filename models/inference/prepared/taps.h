@@ -1,5 +1,4 @@
-// What plans in numbers and in whole numbers have in common: who reads what an inference was seen to make,
-// and where the taps of convolutions lie.
+// What plans of fp32 and of int8 share: which op reads which value, and where the taps of convolutions lie.
 #pragma once
 
 #include <map>
@@ -10,7 +9,7 @@
 
 namespace supertac {
 
-/// Of a map: as far as the taps of all convolutions that read it reach over its edges.
+/// The margin of a map: as far as the taps of all convolutions that read it reach over its edges.
 struct Margin {
   Dim height = 0, width = 0;
   void widen(const kernels::ConvSettings& reader);
@@ -36,8 +35,8 @@ Tensor phase_weights(const kernels::ConvSettings& s, const Phase& down, const Ph
 /// [outer][pixels][channels][inner].
 Tensor with_pixels_outside(const Tensor& t, Dim outer, Dim pixels, Dim inner);
 
-/// The ops that an inference was seen to run: who reads which value until when, how wide its margin must be,
-/// and whose numbers it shares.
+/// The traced ops of one inference: which op reads a value last, how wide the value's margin must be, and
+/// which map's memory it shares.
 class TraceWalk {
  protected:
   using Id = const detail::Node*;
@@ -50,7 +49,8 @@ class TraceWalk {
   /// Of the map that this value is unflattened into; 1 where it is not.
   Dim pixels_of_unflatten(const Variable& y) const;
   bool read_after(Id value, std::size_t op) const;
-  /// take_runs and last_frame: what reads the network's input, and nothing else may. Throws std::logic_error.
+  /// Whether it is take_runs or last_frame. Throws std::logic_error when another op reads the network's
+  /// input.
   bool takes_input(const TracedOp& op) const;
 
  private:

@@ -22,7 +22,7 @@ class BatchVariance {
   /// The mean of all entries' variances.
   double mean_variance(double samples) const;
   std::size_t entries() const { return values_.size() / 2; }
-  /// The sums themselves, for who adds up those of several processes.
+  /// The sums themselves, to be added up over several processes.
   std::span<double> values() { return values_; }
 
  private:

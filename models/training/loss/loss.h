@@ -44,9 +44,8 @@ inline constexpr double kPredictedErrorWeight = 0.1;
 inline constexpr real kLeastTexture = 0.01F;
 
 /// The picture's part alone: total = L2 + lambda (1 - SSIM). picture and truth [N,H,W,1], truth in [-1,1].
-/// Where the truth is flat the SSIM counts as 1: with no structure to compare it measures how large the noise
-/// is beside nothing, and pulls harder than all textures together. Throws std::invalid_argument when they
-/// differ in shape.
+/// Where the truth is flat the SSIM counts as 1: with no structure to compare, SSIM measures noise alone, and
+/// its gradient would outweigh that of all textures. Throws std::invalid_argument when they differ in shape.
 Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda);
 
 /// To the picture's loss kPredictedErrorWeight times the mean of (predicted error - |image - truth|)^2 is

@@ -1,4 +1,4 @@
-// What becomes of sums of bytes in vectors of 16, for vnni.cpp and amx.cpp.
+// The formula of Outcome (int8.h) for vectors of 16 sums, for vnni.cpp and amx.cpp.
 #pragma once
 
 #include <immintrin.h>

@@ -11,8 +11,8 @@
 
 namespace supertac::kernels {
 
-/// What becomes of a sum s of output o. Whole numbers throughout, so that a microcontroller makes the same of
-/// it (models/files/c_code.h writes this formula):
+/// How the sum s of output o becomes a value of the next map. Whole numbers throughout, so that a
+/// microcontroller computes the same (models/files/c_code.h writes this formula):
 ///   v = (s * multiplier[o] + offset[o]) >> shift[o]
 ///   v = max(v, (v * negative_slope + 2048) >> 12)        unless negative_slope is kNoSlope
 ///   a byte:   clip(v + zero, 0, 255)
@@ -45,7 +45,7 @@ struct ByteProductJob {
   const Dim* segments = nullptr;
   Dim segment_count = 0, length = 0;
   const std::int8_t* w = nullptr;
-  Dim cout = 0, kept = 0;  // of cout outputs the first are kept
+  Dim cout = 0, kept = 0;  // the first `kept` of cout outputs are written
   Outcome outcome = {};
   const BytePlaces* places = nullptr;  // of an image, places_of()
   Dim place_count = 0;
@@ -53,8 +53,9 @@ struct ByteProductJob {
 };
 inline constexpr Dim kQuad = 4, kByteOutputs = 16;
 
-/// All places of an image, sixteen at a time, each pixel once: the last sixteen begin sooner where they are
-/// no multiple. None where there are fewer or lines are no multiple of from.pixel apart.
+/// All places of an image, sixteen at a time, each pixel once: the last sixteen overlap those before where
+/// the number is no multiple. Empty for fewer than sixteen, or where lines are no multiple of from.pixel
+/// apart.
 std::vector<BytePlaces> places_of(const ByteProductJob& job);
 
 /// The bytes of an image that a job reads: from `before` bytes before x on.
@@ -73,7 +74,8 @@ struct ByteKernels {
   void (*release)() = nullptr;
 };
 
-/// While it lives its thread runs products, with whatever they keep; products need one.
+/// A thread must hold one while it runs products; the destructor releases what the processor keeps between
+/// them (AMX tiles).
 class ByteProducts {
  public:
   ByteProducts();
