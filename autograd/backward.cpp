@@ -1,59 +1,14 @@
-// backward(), and what it and the handles leave behind: nodes are deleted here.
+// backward(): the chain rule.
 #include <algorithm>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "autograd/pool.h"
+#include "autograd/record.h"
 #include "autograd/reverse_watch.h"
-#include "autograd/variable.h"
 
 namespace supertac {
-namespace detail {
-namespace {
-
-bool drop(Node* node) { return node != nullptr && node->users.fetch_sub(1, std::memory_order_acq_rel) == 1; }
-
-// Forgets how the node was computed; inputs that nobody else holds are put on `dead`.
-void forget_inputs(Node& node, Node*& dead) {
-  node.step.reset();
-  for (std::size_t i = 0; i < node.input_count; ++i) {
-    Node* input = std::exchange(node.inputs[i], nullptr);
-    if (drop(input)) {
-      input->next_to_delete = dead;
-      dead = input;
-    }
-  }
-  node.input_count = 0;
-}
-
-// A chain of nodes is deleted in a loop: a destructor that deletes its inputs would recurse as deep as the
-// graph.
-void delete_all(Node* dead) {
-  while (dead != nullptr) {
-    Node* node = dead;
-    dead = node->next_to_delete;
-    forget_inputs(*node, dead);
-    node->~Node();
-    pool_release(node, sizeof(Node));
-  }
-}
-
-}  // namespace
-
-Node* new_node() { return new (pool_allocate(sizeof(Node))) Node; }
-
-void retain(Node* node) noexcept {
-  if (node != nullptr) node->users.fetch_add(1, std::memory_order_relaxed);
-}
-
-void release(Node* node) noexcept {
-  if (drop(node)) delete_all(node);
-}
-
-}  // namespace detail
-
 using detail::Node;
 
 static thread_local ReverseWatch* reverse_watch = nullptr;

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "autograd/variable.h"
+#include "autograd/record.h"
 
 namespace supertac {
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "autograd/record.h"
+
 namespace supertac {
 namespace {
 

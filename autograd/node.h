@@ -67,6 +67,9 @@ struct Node {
 Node* new_node();
 void retain(Node* node) noexcept;
 void release(Node* node) noexcept;
+/// Forgets how the node was computed; inputs that nobody else holds are put on `dead`, for delete_all().
+void forget_inputs(Node& node, Node*& dead);
+void delete_all(Node* dead);
 
 }  // namespace detail
 }  // namespace supertac

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <functional>
 
-#include "autograd/variable.h"
+#include "autograd/record.h"
 
 namespace supertac {
 

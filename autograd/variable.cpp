@@ -5,6 +5,7 @@
 #include <string>
 #include <unordered_set>
 
+#include "autograd/record.h"
 #include "autograd/trace.h"
 
 namespace supertac {

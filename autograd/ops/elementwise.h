@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "autograd/kernels/fast/each.h"
+#include "autograd/record.h"
 #include "autograd/trace.h"
-#include "autograd/variable.h"
 
 namespace supertac {
 

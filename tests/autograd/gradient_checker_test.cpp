@@ -1,6 +1,7 @@
 #include "autograd/gradient_checker.h"
 
 #include "autograd/ops/arithmetic.h"
+#include "autograd/record.h"
 #include "tests/autograd/check.h"
 
 namespace supertac {

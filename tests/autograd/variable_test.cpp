@@ -8,6 +8,7 @@
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/convolution.h"
 #include "autograd/ops/shaping.h"
+#include "autograd/record.h"
 #include "tests/autograd/check.h"
 
 namespace supertac {

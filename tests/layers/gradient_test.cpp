@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "autograd/gradient_checker.h"
+#include "autograd/record.h"
 #include "layers/convolution.h"
 #include "layers/linear.h"
 #include "layers/residual.h"

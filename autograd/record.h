@@ -1,0 +1,64 @@
+// For the sources of ops: record() makes an op's result a node of the graph, and Backward is what its reverse
+// step works on.
+#pragma once
+
+#include <initializer_list>
+#include <span>
+#include <utility>
+
+#include "autograd/node.h"
+#include "autograd/variable.h"
+
+namespace supertac {
+
+/// What a reverse step sees: dL/dy, the inputs' values, and where to add dL/dx.
+class Backward {
+ public:
+  explicit Backward(detail::Node& node) : node_(node) {}
+  /// The node of y.
+  const detail::Node& node() const { return node_; }
+  const Tensor& gy() const { return node_.grad; }
+  const Tensor& y() const { return node_.value; }
+  const Tensor& value(std::size_t input) const { return node_.inputs[input]->value; }
+  /// The gradient of that input, zero-filled at first use; null when that input requires none. Add into it.
+  Tensor* grad_of(std::size_t input);
+  /// The same without the zeros: at first use the contents are undefined and the step must write all of them.
+  struct Slot {
+    Tensor* grad = nullptr;
+    Into into = Into::add;
+    explicit operator bool() const { return grad != nullptr; }
+    real* data() const { return grad->data(); }
+  };
+  Slot slot_of(std::size_t input);
+  /// dL/dy to be changed in place: this step is its only reader.
+  Tensor& mutable_gy() { return node_.grad; }
+
+ private:
+  detail::Node& node_;
+};
+
+struct OpSettings;  // autograd/trace.h
+
+/// The node of an op, and where its reverse step goes: null when no input needs a gradient or recording is
+/// off. For record() only. Throws std::invalid_argument for more than kMaxInputs inputs.
+std::pair<Variable, detail::ReverseStep*> make_result(const char* op, Tensor y,
+                                                      std::span<const Variable* const> inputs,
+                                                      const OpSettings* settings);
+
+/// Makes y a node of the graph. `step(Backward&)` is called by backward() with dL/dy at hand. `settings`:
+/// those of the op, for a Trace.
+template <class Step>
+Variable record(const char* op, Tensor y, std::span<const Variable* const> inputs, Step&& step,
+                const OpSettings* settings = nullptr) {
+  auto [result, slot] = make_result(op, std::move(y), inputs, settings);
+  if (slot != nullptr) slot->set(std::forward<Step>(step));
+  return std::move(result);
+}
+template <class Step>
+Variable record(const char* op, Tensor y, std::initializer_list<const Variable*> inputs, Step&& step,
+                const OpSettings* settings = nullptr) {
+  return record(op, std::move(y), std::span(inputs.begin(), inputs.size()), std::forward<Step>(step),
+                settings);
+}
+
+}  // namespace supertac
