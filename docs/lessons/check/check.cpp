@@ -6,6 +6,7 @@
 #include <exception>
 #include <memory>
 
+#include "autograd/record.h"
 #include "docs/lessons/check/checker.h"
 
 namespace {
