@@ -6,7 +6,7 @@ add_library(supertac_options INTERFACE)
 # the same bits. Whoever links a library gets it too: its headers are compiled with the user's flags.
 set(SUPERTAC_SAME_BITS -ffp-contract=off)
 target_compile_options(supertac_options INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor
-  -Wno-restrict ${SUPERTAC_SAME_BITS} -fno-math-errno -fno-trapping-math $<$<BOOL:${SUPERTAC_WERROR}>:-Werror>)
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> ${SUPERTAC_SAME_BITS} -fno-math-errno -fno-trapping-math $<$<BOOL:${SUPERTAC_WERROR}>:-Werror>)
 # A program names only the shared libraries that it calls.
 target_link_options(supertac_options INTERFACE -Wl,--as-needed)
 if(SUPERTAC_SANITIZE)

@@ -6,7 +6,6 @@
 #include <exception>
 #include <memory>
 
-#include "autograd/record.h"
 #include "docs/lessons/check/checker.h"
 
 namespace {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "autograd/gradient_checker.h"
+#include "autograd/record.h"
 
 namespace lessons {
 
