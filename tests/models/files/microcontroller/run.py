@@ -127,7 +127,7 @@ def run(machine, program, folder, given):
         file.write(given)
     ran = subprocess.run(["qemu-system-arm", "-M", machine, "-kernel", program, "-icount", "shift=0",
                           "-semihosting-config", "enable=on,target=native", "-nographic", "-monitor", "none", "-serial",
-                          "none"], cwd=folder, capture_output=True, text=True, timeout=1800)
+                          "none"], cwd=folder, capture_output=True, text=True, timeout=7200)
     said = dict(line.split() for line in (ran.stdout + ran.stderr).splitlines() if len(line.split()) == 2)
     return {key: int(said[key]) for key in ("pictures", "hash", "instructions")}
 
