@@ -249,6 +249,9 @@ TEST(Errors, EvilValuesAreOneClearLineAtOnce) {
 
 // Batch systems, containers and odd shells grant little: one line, and an end.
 TEST(Limits, AreOneClearLineAtOnce) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer needs terabytes of addresses";
+#endif
   const TemporaryFolder folder;
   ASSERT_EQ(simulate({"--out", folder / "data"}).code, 0);
   ASSERT_EQ(run_process("supertac-train", {"--data", folder / "data", "--split", "window", "--preset", "tiny",
