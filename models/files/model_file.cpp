@@ -161,7 +161,8 @@ ModelFile load_model(const std::string& path) {
   loaded.metadata = file.metadata();
   loaded.input = read_input({file.metadata(), path, "input"});
   if (settings.timesteps == 1 && loaded.input.scaling.per_window)
-    throw std::runtime_error(path + ": input: a single frame has no rest and gain of its own, found levelled");
+    throw std::runtime_error(path +
+                             ": input: a single frame has no rest and gain of its own, found levelled");
   loaded.model = build(settings, file, path);
   loaded.novelty = Novelty::read(file, path, signal_feature_count(loaded.array()));
   loaded.ranges = ActivationRanges::read(file, path);
