@@ -10,18 +10,12 @@
 #include "io/numbers/random.h"
 #include "tests/io/faults.h"
 #include "tests/io/temporary_folder.h"
+#include "tests/sanitized.h"
 
 namespace supertac {
 namespace {
 
 constexpr std::uint64_t kPlenty = 1 << 26;
-
-// Under a sanitizer memory says nothing.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSlowBuild = true;
-#else
-constexpr bool kSlowBuild = false;
-#endif
 
 std::string golden(const std::string& name) { return std::string(SUPERTAC_GOLDEN) + "/" + name; }
 
@@ -290,7 +284,7 @@ TEST(SafetensorsHostile, BombsCostLittle) {
       best = std::min(best, static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
     }
     EXPECT_LT(best, 1.0) << header.substr(0, 40);
-    EXPECT_LT(peak_kilobytes() - before, kSlowBuild ? 1 << 20 : 16 * 1024) << header.substr(0, 40);
+    EXPECT_LT(peak_kilobytes() - before, kSanitized ? 1 << 20 : 16 * 1024) << header.substr(0, 40);
   }
 }
 
