@@ -73,7 +73,8 @@ std::vector<SuperTacSettings> all_settings() {
 TEST(CCode, DrawsTheBitsOfAPreparedNetwork) {
   if (!has_compiler()) GTEST_SKIP() << "no C compiler";
   for (const SuperTacSettings& settings : all_settings())
-    for (const char* flags : {"-O3 -march=native", "-O1 -fsanitize=undefined -fno-sanitize-recover"}) {
+    for (const char* flags :
+         {"-O1", "-O2", "-Os", "-O3 -march=native", "-O1 -fsanitize=undefined -fno-sanitize-recover"}) {
       const ModelFile file = model_of(settings, {});
       const Compiled code(c_code_of(file, "finger", 100, "a test"), flags);
       const auto draw = code.function<void(const float*, float*, float*)>("finger_draw");
@@ -84,7 +85,8 @@ TEST(CCode, DrawsTheBitsOfAPreparedNetwork) {
       for (std::size_t n = 0; n < 5; ++n) {
         draw(windows.data() + n * static_cast<std::size_t>(windows.size() / 5), picture.data(),
              predicted_error.data());
-        EXPECT_TRUE(std::ranges::equal(picture, expected.picture.values().subspan(n * pixels, pixels)));
+        EXPECT_TRUE(std::ranges::equal(picture, expected.picture.values().subspan(n * pixels, pixels)))
+            << flags;
         if (settings.predicted_error) {
           EXPECT_TRUE(std::ranges::equal(predicted_error,
                                          expected.predicted_error.values().subspan(n * pixels, pixels)));
