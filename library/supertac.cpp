@@ -102,6 +102,8 @@ class MemoryFile {
 // Windows in the sensor's unit to what the network takes.
 void scale(const ModelFile& file, std::span<float> windows) {
   file.input.scaling(windows);
+  expect(std::ranges::none_of(windows, [](float v) { return std::isnan(v); }),
+         "supertac_draw: a window has a value that is NaN");
   if (!file.input.scaling.per_window) return;
   const auto size = static_cast<std::size_t>(file.model->input_shape(1).elements());
   for (; !windows.empty(); windows = windows.subspan(size))

@@ -2,7 +2,7 @@
    pictures, of windows that you have or of frames as a sensor gives them; and recordings train a model.
 
      supertac_model *model = supertac_open("model.safetensors", SUPERTAC_FP32);
-     supertac_live *live = supertac_live_new(model, 300, 0);
+     supertac_live *live = supertac_live_new(model, 300, 0);      // 300 frames/s, as the sensor gives them
      for each frame:
        supertac_live_push(live, time_s, frame);
        if (supertac_live_picture(live, picture, NULL) == 1) show(picture);
@@ -67,13 +67,14 @@ SUPERTAC_API int supertac_describe(const supertac_model* model, supertac_descrip
    first. pictures: [count][height][width], 0 is the flat plate and 1 its highest point. predicted_errors: the
    same shape, how far from the truth a pixel is expected to be; NULL where it is not wanted. threads: 1 to
    1024. A picture does not depend on it, nor on the windows beside its own. 0, or -1; -1 also where
-   predicted errors are wanted of a model without. */
+   predicted errors are wanted of a model without, or a value is NaN. */
 SUPERTAC_API int supertac_draw(const supertac_model* model, size_t count, const float* windows,
                                float* pictures, float* predicted_errors, int threads);
 
 /* Frames of a sensor to windows: moving average, resampling, scaling and normalisation, as in training.
    frame_hz: the sensor's rate, 1 to 100,000. filter_s: moving average (s) that its frames have gone through,
-   0 to 10: none, or that of the model's training signals. `model` must outlive it. NULL on failure. */
+   0 to 10: none, or that of the model's training signals (any, where those had several). `model` must outlive
+   it. NULL on failure. */
 SUPERTAC_API supertac_live* supertac_live_new(const supertac_model* model, double frame_hz, double filter_s);
 SUPERTAC_API void supertac_live_free(supertac_live* live);
 
@@ -85,10 +86,10 @@ SUPERTAC_API int supertac_live_push(supertac_live* live, double time_s, const fl
    there is none yet, or a gap was just before; -1: failed. */
 SUPERTAC_API int supertac_live_picture(supertac_live* live, float* picture, float* predicted_error);
 
-/* Trains a network on a folder of recordings and writes the model, as supertac-train does: the same settings
-   make the same content. recipe: "paper", "best", "tiny" or "frame". settings: NULL, or what differs from
-   the recipe. progress: NULL, or called after every step; another result than 0 ends the training. 1:
-   written, 0: ended early and nothing written, -1: failed. */
+/* Trains a network on a folder of recordings and writes the model, in the place of an older file `out`, as
+   supertac-train does: the same settings make the same content. recipe: "paper", "best", "tiny" or "frame".
+   settings: NULL, or what differs from the recipe. progress: NULL, or called after every step; another result
+   than 0 ends the training. 1: written, 0: ended early and nothing written, -1: failed. */
 typedef struct {
   size_t size;              /* set it to sizeof(supertac_training); elsewhere 0 or NULL: the recipe's */
   long long epochs, stride; /* 0: the recipe's; every stride-th frame ends a window */

@@ -98,8 +98,18 @@ void save_trained(const Trainer& trainer, const std::string& path,
   write_checkpoint(path, trainer.model().parameters(), trainer.metadata(origin), more);
 }
 
+// A wrong name is better found before the training than behind it.
+static void check_output(const std::string& out) {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::path(out).parent_path();
+  if (out.empty() || fs::is_directory(out)) throw FileError(out, "is no name of a file to write a model to");
+  if (!folder.empty() && !fs::is_directory(folder))
+    throw FileError(out, "cannot be written: its folder is missing");
+}
+
 bool train(const Recipe& recipe, const RecordingFolders& folders, const std::string& out,
            const TrainingCallbacks& callbacks) {
+  check_output(out);
   TrainingTask task = window_task(recipe, folders);
   Trainer trainer(*task.windows, task.split.train, std::move(task.objective));
   if (!callbacks.checkpoint.empty() && std::filesystem::exists(callbacks.checkpoint))

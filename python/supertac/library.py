@@ -58,10 +58,20 @@ def checked(result, failed=-1):
     return result
 
 
+def checked_windows(values, window: tuple[int, int]) -> np.ndarray:
+    """float32 [N,T,S]. Raises ValueError for another shape."""
+    windows = np.ascontiguousarray(values, np.float32)
+    if windows.shape[1:] != window:
+        raise ValueError(f"windows are [N,{window[0]},{window[1]}], got {list(windows.shape)}")
+    return windows
+
+
 class Drawer:
     """A model file's network, as the programs run it: windows [N,T,S] in the sensor's unit to pictures."""
 
     def __init__(self, path: str | os.PathLike, settings: dict, precision: str = "fp32", threads: int = 1):
+        if precision not in PRECISIONS:
+            raise ValueError(f"precision {precision!r}: expected one of {', '.join(PRECISIONS)}")
         content, self.library = pathlib.Path(path).read_bytes(), library()
         self.model = checked(self.library.supertac_open_memory(content, len(content), PRECISIONS[precision]), None)
         array = [settings.get(name, value) for name, value in (("rows", 4), ("columns", 4), ("in_channels", 1))]
@@ -75,9 +85,7 @@ class Drawer:
 
     def draw(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """Pictures and predicted errors [N,height,width]; these are None for a model without."""
-        windows = np.ascontiguousarray(values, np.float32)
-        if windows.shape[1:] != self.window:
-            raise ValueError(f"windows are [N,{self.window[0]},{self.window[1]}], got {list(windows.shape)}")
+        windows = checked_windows(values, self.window)
         maps = np.empty((2 if self.predicts_error else 1, len(windows), *self.picture), np.float32)
         at = maps.ctypes.data  # it costs a microsecond each time
         errors_at = at + maps.nbytes // 2 if self.predicts_error else None
@@ -98,27 +106,28 @@ class LiveWindow:
         self.drawer = model.drawer(precision)
         self.live = checked(library().supertac_live_new(self.drawer.model, frame_hz, filter_s), None)
         self.predicted_error = np.zeros(self.drawer.picture, np.float32)
+        self.error_at = self.predicted_error.ctypes.data if self.drawer.predicts_error else None
 
     def __del__(self):
         if getattr(self, "live", None) is not None:
-            library().supertac_live_free(self.live)
+            self.drawer.library.supertac_live_free(self.live)
 
     def push(self, time_s: float, frame: np.ndarray) -> np.ndarray | None:
         """The picture [height,width] that ends with this frame, or None; predicted_error is then its own."""
         values = np.ascontiguousarray(frame, np.float32)
         if values.size != self.drawer.window[1]:
             raise ValueError(f"a frame has {self.drawer.window[1]} values, got {values.size}")
-        checked(library().supertac_live_push(self.live, time_s, values.ctypes.data))
+        checked(self.drawer.library.supertac_live_push(self.live, time_s, values.ctypes.data))
         picture = np.empty(self.drawer.picture, np.float32)
-        error = self.predicted_error.ctypes.data if self.drawer.predicts_error else None
-        return picture if checked(library().supertac_live_picture(self.live, picture.ctypes.data, error)) else None
+        drawn = checked(self.drawer.library.supertac_live_picture(self.live, picture.ctypes.data, self.error_at))
+        return picture if drawn else None
 
 
 def train(recipe: str, folder: str | os.PathLike, out: str | os.PathLike,
           callback: Callable[[int, float], object] | None = None, *, epochs: int = 0, stride: int = 0, seed: int = 0,
           split: str | None = None) -> bool:
-    """Trains as supertac-train does, to the same content: recipe "paper", "best", "tiny" or "frame", on a folder of
-    recordings.
+    """Trains as supertac-train does, to the same content, on a folder of recordings, and replaces `out`. recipe:
+    "paper", "best", "tiny" or "frame".
 
     callback(step, loss) is called after every step; when it returns something true, training ends early, and False is
     returned and nothing written. epochs and stride: 0 for the recipe's. split: what is kept for testing, "trial" or

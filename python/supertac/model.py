@@ -84,6 +84,7 @@ class Model:
         self.settings, self.input = json.loads(metadata["settings"]), json.loads(metadata["input"])
         self.groups = groups_of(self.settings)
         self.map = tuple(self.settings.get(name, 4) for name in ("rows", "columns"))
+        self.window = self.settings["timesteps"], self.map[0] * self.map[1] * self.settings.get("in_channels", 1)
 
     def windows(self, recording: recordings.Recording) -> tuple[np.ndarray, np.ndarray]:
         """Times and windows in volts of a recording that was filtered as the training was."""
@@ -107,7 +108,8 @@ class Model:
         bits of the programs and without latents; otherwise NumPy does."""
         if precision is not None:
             return Pictures(*self.drawer(precision, threads).draw(volts), None)
-        parts = [self._draw(self.scale(volts[i : i + batch])) for i in range(0, len(volts), batch)]
+        volts = library.checked_windows(volts, self.window)
+        parts = [self._draw(self.scale(volts[i : i + batch])) for i in range(0, max(len(volts), 1), batch)]
         return Pictures(*(None if part[0] is None else np.concatenate(part) for part in zip(*parts)))
 
     def to_torch(self):

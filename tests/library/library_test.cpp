@@ -159,6 +159,11 @@ TEST_F(Library, TrainsWhatTheCppLibraryTrains) {
   ASSERT_EQ(train_c("tiny", nullptr, nullptr), 1) << supertac_error();
   EXPECT_EQ(content_hash(SafetensorsFile::read(out)),
             content_hash(SafetensorsFile::read(folder_ / "cpp.safetensors")));
+  for (const std::string& name : {std::string(folder_ / "data"), folder_ / "none/m.safetensors"}) {
+    steps = 0;
+    EXPECT_EQ(supertac_train("tiny", data.c_str(), name.c_str(), &settings, end_at_once, &steps), -1);
+    EXPECT_EQ(steps, 0) << "found behind the training: " << supertac_error();
+  }
   EXPECT_EQ(train_c("huge", nullptr, nullptr), -1);
   EXPECT_NE(std::string(supertac_error()).find("huge"), std::string::npos);
   EXPECT_EQ(supertac_train("tiny", nullptr, "x", nullptr, nullptr, nullptr), -1);
@@ -181,6 +186,13 @@ TEST_F(Library, SaysWhatWasWrongToTheThreadThatAsked) {
   EXPECT_EQ(supertac_draw(model.get(), 1, &one, &one, nullptr, 0), -1);
   EXPECT_EQ(supertac_draw(model.get(), ~std::size_t{0}, &one, &one, nullptr, 1), -1);
   EXPECT_EQ(supertac_draw(model.get(), 0, nullptr, nullptr, nullptr, 1), 0);
+  const std::unique_ptr<SuperTac> network = load_model(path_).model;
+  std::vector<float> window(static_cast<std::size_t>(network->input_shape(1).elements()), 2.3F),
+      picture(static_cast<std::size_t>(network->picture_shape(1).elements()));
+  ASSERT_EQ(supertac_draw(model.get(), 1, window.data(), picture.data(), nullptr, 1), 0) << supertac_error();
+  window[5] = NAN;
+  EXPECT_EQ(supertac_draw(model.get(), 1, window.data(), picture.data(), nullptr, 1), -1);
+  EXPECT_NE(std::string(supertac_error()).find("NaN"), std::string::npos) << supertac_error();
   EXPECT_EQ(supertac_live_new(model.get(), 0, 0), nullptr);
   EXPECT_EQ(supertac_live_new(model.get(), 100, 0.5), nullptr);
   EXPECT_NE(std::string(supertac_error()).find("moving average"), std::string::npos);

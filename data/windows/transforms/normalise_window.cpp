@@ -30,15 +30,15 @@ Range range_of(std::span<const std::uint16_t, kBins> counts, std::size_t frames)
 
 constexpr std::size_t kAtOnce = 16;
 
-// Of `count` taxels from `first` on. Counting costs a tenth of sorting; taking turns lets one count be
-// written while the next is read.
+// NaN counts as 0. Of `count` taxels from `first` on. Counting costs a tenth of sorting; taking turns lets
+// one count be written while the next is read.
 std::array<Range, kAtOnce> ranges_of(std::span<const float> window, std::size_t taxels, std::size_t first,
                                      std::size_t count) {
   std::array<std::uint16_t, kAtOnce * kBins> counts{};
   for (std::size_t frame = first; frame < window.size(); frame += taxels) {
     std::array<std::int32_t, kAtOnce> bins;
     for (std::size_t k = 0; k < count; ++k)
-      bins[k] = static_cast<std::int32_t>(std::min(std::max(window[frame + k], 0.0F) * kBins, kBins - 1.0F));
+      bins[k] = static_cast<std::int32_t>(std::min(std::max(0.0F, window[frame + k]) * kBins, kBins - 1.0F));
     for (std::size_t k = 0; k < count; ++k) ++counts[k * kBins + static_cast<std::size_t>(bins[k])];
   }
   std::array<Range, kAtOnce> ranges;

@@ -92,6 +92,9 @@ TEST(NormaliseWindow, SaturatedDeadAndShortWindowsStayInRange) {
 TEST(NormaliseWindow, RefusesWhatIsNoWindow) {
   std::vector<float> x(7);
   EXPECT_THROW(normalise_window(x, 2), std::invalid_argument);
+  std::vector<float> broken(2 * 64, 0.5F);
+  broken[7] = NAN;
+  normalise_window(broken, 2);  // counts within its bins
   EXPECT_THROW(normalise_window(x, 0), std::invalid_argument);
   EXPECT_THROW(normalise_window({}, 2), std::invalid_argument);
   std::vector<float> too_long(60'001);
