@@ -84,11 +84,9 @@ void visit(Node& node, Queue& queue) {
     const bool leaf = input->input_count == 0 && !input->freed;
     if (!leaf && input->requires_grad && input->grad.defined()) queue.add(input);
   }
-  Node* dead = nullptr;
-  detail::forget_inputs(node, dead);
   node.grad = Tensor();
   node.freed = true;
-  detail::delete_all(dead);
+  detail::forget_inputs(node);
 }
 
 }  // namespace

@@ -11,8 +11,7 @@ namespace {
 
 bool drop(Node* node) { return node != nullptr && node->users.fetch_sub(1, std::memory_order_acq_rel) == 1; }
 
-}  // namespace
-
+// Inputs that nobody else holds are put on `dead`.
 void forget_inputs(Node& node, Node*& dead) {
   node.step.reset();
   for (std::size_t i = 0; i < node.input_count; ++i) {
@@ -35,6 +34,14 @@ void delete_all(Node* dead) {
     node->~Node();
     pool_release(node, sizeof(Node));
   }
+}
+
+}  // namespace
+
+void forget_inputs(Node& node) noexcept {
+  Node* dead = nullptr;
+  forget_inputs(node, dead);
+  delete_all(dead);
 }
 
 Node* new_node() { return new (pool_allocate(sizeof(Node))) Node; }

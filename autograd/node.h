@@ -1,4 +1,4 @@
-// What stands behind a Variable: the graph's nodes. Only variable.h and its sources need it.
+// What stands behind a Variable: the nodes of the graph. Only variable.h, record.h and their sources need it.
 #pragma once
 
 #include <array>
@@ -67,9 +67,8 @@ struct Node {
 Node* new_node();
 void retain(Node* node) noexcept;
 void release(Node* node) noexcept;
-/// Forgets how the node was computed; inputs that nobody else holds are put on `dead`, for delete_all().
-void forget_inputs(Node& node, Node*& dead);
-void delete_all(Node* dead);
+/// Forgets how the node was computed, and deletes the inputs that nobody else holds.
+void forget_inputs(Node& node) noexcept;
 
 }  // namespace detail
 }  // namespace supertac

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <optional>
-#include <set>
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/output_folder.h"
@@ -15,7 +14,6 @@
 #include "data/registration/apply_registration.h"
 #include "data/registration/registration.h"
 #include "io/numbers/numbers.h"
-#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -28,10 +26,10 @@ struct TableFile {
   std::string group;
 };
 
+constexpr const char* kTables[] = {".csv", ".txt", ".tsv", ".npy"};
 bool is_recording(const fs::path& path) { return path.extension() == ".safetensors"; }
 bool is_table(const fs::path& path) {
-  static const std::set<std::string> kinds = {".csv", ".txt", ".tsv", ".npy"};
-  return is_recording(path) || kinds.contains(path.extension().string());
+  return is_recording(path) || std::ranges::find(kTables, path.extension().string()) != std::end(kTables);
 }
 
 std::vector<TableFile> tables_of(const std::string& input, const std::string& group) {
@@ -57,18 +55,16 @@ std::string companion(const Arguments& arguments, const std::string& option, con
   const std::string named = arguments.text(option);
   if (named.empty() || !fs::is_directory(named)) return named;
   const fs::path folder = fs::path(named) / table.folder;
+  const std::string stem = table.path.stem().string();
   std::string found;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    if (!is_table(entry->path()) || is_recording(entry->path()) || entry->path().stem() != table.path.stem())
-      continue;
-    if (!found.empty())
-      throw FileError(folder.string(), "holds two tables of the name " + table.path.stem().string());
-    found = entry->path().string();
+  for (const char* kind : kTables) {
+    const std::string path = (folder / (stem + kind)).string();
+    if (!fs::exists(path)) continue;
+    if (!found.empty()) throw FileError(folder.string(), "holds two tables of the name " + stem);
+    found = path;
   }
   if (found.empty())
-    throw FileError(folder.string(),
-                    "holds no table of the name " + table.path.stem().string() + " for --" + option);
+    throw FileError(folder.string(), "holds no table of the name " + stem + " for --" + option);
   return found;
 }
 
@@ -100,9 +96,6 @@ struct TableImport {
       throw FileError(path, "was recorded with " + recording.array.text() + " in " +
                                 recording.signal_scale.unit + ", the sensor's file says " +
                                 sensor.array.text() + " in " + sensor.scale.unit);
-    if (recording.plate.find('/') != std::string::npos)
-      throw FileError(path,
-                      "names the plate " + in_quotes(recording.plate) + ", expected a name without '/'");
     return recording;
   }
 
@@ -179,12 +172,18 @@ int import_tables(const Arguments& arguments, const std::string& input) {
     if (!bar) bar.emplace(arguments, "importing", tables.size(), "files");
     bar->update(files.size() + left_out);
     const std::string path = file.path.string();
+    std::size_t dropped = 0;
+    std::optional<Registration> fit;
+    Recording recording;
     try {
-      std::size_t dropped = 0;
-      std::optional<Registration> fit;
-      const Recording recording = settings.import(file, static_cast<int>(files.size()) + 1, dropped, fit);
-      add_parent_file("table", path);
+      recording = settings.import(file, static_cast<int>(files.size()) + 1, dropped, fit);
+    } catch (const FileError& error) {
+      leave_out(arguments, error, left_out);
+      continue;
+    }
+    try {
       write_recording(folder.add(recording_file_name(recording)), recording);
+      add_parent_file("table", path);
       arguments.print(path + ": " + std::to_string(recording.frames()) + " frames in " +
                       format(recording.time_s.back() - recording.time_s.front(), 2) + " s" +
                       (dropped > 0 ? ", " + std::to_string(dropped) + " lines dropped" : "") +
@@ -197,8 +196,6 @@ int import_tables(const Arguments& arguments, const std::string& input) {
                        {"positions", !recording.position_mm.empty()},
                        {"truth", !recording.truth.empty()}});
       if (fit) files.back()["reliable"] = fit->reliable, files.back()["residual_mm"] = fit->residual;
-    } catch (const FileError& error) {
-      leave_out(arguments, error, left_out);
     } catch (const std::invalid_argument& error) {  // of a recording that breaks a rule of its own
       leave_out(arguments, FileError(path, error.what()), left_out);
     }

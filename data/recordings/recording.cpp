@@ -284,6 +284,9 @@ std::map<std::string, std::string> metadata_of(const Recording& recording) {
 }
 
 std::string recording_file_name(const Recording& recording) {
+  if (recording.plate.find('/') != std::string::npos)
+    throw std::invalid_argument("recording: expected a plate's name without '/', found " +
+                                in_quotes(recording.plate));
   return recording.plate + "_t" + std::to_string(recording.trial) + "_p" + std::to_string(recording.pass) +
          "_v" + format(recording.speed_mm_s) + ".safetensors";
 }

@@ -57,7 +57,7 @@ void LiveWindow::Recent::clear() {
 LiveWindow::LiveWindow(const LiveWindowSettings& settings)
     : settings_(checked(settings)),
       raw_(std::max(0.0, settings.filter_s - 0.5 * settings.frame_period_s), settings.signals),
-      filtered_(window_s(settings) + settings_.max_gap_s + 2 / settings.rate_hz + kLookBackS,
+      filtered_(window_s(settings_) + settings_.max_gap_s + 2 / settings_.rate_hz + kLookBackS,
                 settings.signals),
       mean_(settings.signals),
       average_(settings.signals) {}

@@ -127,7 +127,7 @@ void MarlinLink::read_capabilities() {
 
 MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s) {
   if (halted_) throw PrinterHalted("printer " + port_.name() + ": halted earlier; reset it and start again");
-  std::string early;  // what was said before a question is no answer to it
+  std::string early;  // what was read before a question is no answer to it
   while (take_line(early)) check_alarm(parse_reply(early));
   const std::string text = capabilities_.emergency_parser ? shielded(code) : std::string(code);
   kept_.push_back(numbered_line(number_ + 1, text));

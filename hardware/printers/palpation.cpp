@@ -189,14 +189,6 @@ void Palpation::follow(const Leg& leg) {
                       "); check the printer");
 }
 
-bool Palpation::stops() {
-  try {
-    return printer_.quick_stop().confirmed;
-  } catch (const std::exception&) {
-    return false;
-  }
-}
-
 void Palpation::recover(PalpationOutcome& outcome) {
   using Finger = PalpationOutcome::Finger;
   outcome.finger = in_contact_ ? Finger::unknown : Finger::lifted;
@@ -228,10 +220,11 @@ void Palpation::recover(PalpationOutcome& outcome) {
     outcome.finger = Finger::lifted;
     outcome.note = "the finger was lifted";
   } catch (const PortUnplugged&) {
+    if (in_contact_) outcome.finger = Finger::unknown;  // it may be doing the lift
     outcome.note = "the printer cannot be reached; the finger may be in contact, lift it by hand";
   } catch (const std::exception& error) {
     outcome.note += std::string("; the lift failed: ") + error.what();
-    if (outcome.finger == Finger::stopped && !stops())
+    if (outcome.finger == Finger::stopped && !printer_.quick_stop().confirmed)
       outcome.finger = Finger::unknown;  // it may do the lift yet
   }
 }

@@ -95,7 +95,6 @@ class Palpation {
   void touch(bool contact);
   void follow(const Leg& leg);
   void recover(PalpationOutcome& outcome);
-  bool stops();
 
   Printer& printer_;
   PalpationPlan plan_;

@@ -29,7 +29,7 @@ std::optional<std::int64_t> parse_int(std::string_view text) { return parse<std:
 std::optional<std::uint64_t> parse_uint(std::string_view text) { return parse<std::uint64_t>(text); }
 
 std::optional<double> number_of(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   return parse_double(text);
 }
 

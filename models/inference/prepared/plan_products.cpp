@@ -30,7 +30,7 @@ struct Product {
 
 void Planner::add_product(Product product) {
   weights_ += bytes_of(product.w);
-  plan_->steps_.push_back(std::move(product));
+  add_step(std::move(product));
 }
 
 void Planner::direct_conv(const TracedOp& op) {

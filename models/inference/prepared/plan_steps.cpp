@@ -92,10 +92,10 @@ void Planner::plane_conv(const TracedOp& op) {
   const Dim line = vectors * kernels::kWidestVector + 2;
   const FeatureMap planes = plan_->add_buffer({.height = x.channels * (x.height + 2), .width = line});
   plan_->planes_.push_back(planes);
-  plan_->steps_.push_back(PlaneConvs{{.height = x.height, .width = x.width, .cin = x.channels, .line = line},
-                                     x,
-                                     planes,
-                                     {std::move(output)}});
+  add_step(PlaneConvs{{.height = x.height, .width = x.width, .cin = x.channels, .line = line},
+                      x,
+                      planes,
+                      {std::move(output)}});
 }
 
 // The linear layer behind it takes the map as it is.

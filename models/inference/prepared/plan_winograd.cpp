@@ -165,7 +165,7 @@ void Planner::add_winograd(Winograd step) {
   if (either) weights_ += bytes_of(step.w);
   for (const Filters& f : step.filters) (either ? transformed_ : weights_) += bytes_of(f.u);
   plan_->scratch_ = std::max(plan_->scratch_, step.scratch());
-  plan_->steps_.push_back(std::move(step));
+  add_step(std::move(step));
 }
 
 void Planner::winograd(const TracedOp& op) {

@@ -323,7 +323,7 @@ TEST(Array, CompanionsBelongToTheirOwnTable) {
   const auto refused = run_process(
       "supertac-import", {folder / "elsewhere.safetensors", "--sensor", sensor, "--out", folder / "none"});
   EXPECT_EQ(refused.code, 1);
-  EXPECT_NE(refused.error.find("expected a name without '/'"), std::string::npos) << refused.error;
+  EXPECT_NE(refused.error.find("expected a plate's name without '/'"), std::string::npos) << refused.error;
   EXPECT_EQ(run_process("supertac-import", {folder / "log", "--sensor", sensor, "--truth-range", "5,5",
                                             "--out", folder / "none"})
                 .code,

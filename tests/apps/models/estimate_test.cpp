@@ -99,12 +99,12 @@ TEST_F(Estimate, TheBarOfATrainingShowsEpochLossAndTestSsim) {
   ProcessOptions options;
   options.terminal = true;
   const auto made = run_process("supertac-train",
-                                training({"--out", path("shown.safetensors"), "--epochs", "60"}), options);
+                                training({"--out", path("shown.safetensors"), "--epochs", "500"}), options);
   ASSERT_EQ(made.code, 0) << made.error;
   EXPECT_TRUE(std::regex_search(
       made.error,
       std::regex(
-          R"(training  \[#+\.*\]  \d+ %  epoch \d+/60 loss \d*\.\d+ test SSIM -?\d*\.\d+  \d+:\d\d left)")))
+          R"(training  \[#+\.*\]  \d+ %  epoch \d+/500 loss \d*\.\d+ test SSIM -?\d*\.\d+  \d+:\d\d left)")))
       << made.error;
 }
 
