@@ -7,7 +7,6 @@
 #include "data/scores/metrics.h"
 #include "data/windows/transforms/signal_features.h"
 #include "io/numbers/numbers.h"
-#include "models/inference/interval.h"
 
 namespace supertac {
 namespace {
@@ -29,43 +28,16 @@ void TrustScores::add(const Drawn& drawn) {
     unlike_ += model_.novelty->unlike_training(signal_features(drawn.input, windows_.array())) ? 1 : 0;
   }
   if (predicted_error.empty()) return;
-  if (windows_.pass_of(window) != pass_) {
-    pass_ = windows_.pass_of(window);
-    passes_.emplace_back();
-  }
-  Pass& pass = passes_.back();
-  for (std::size_t i = 0; i < output.size(); ++i) {
-    const double ratio =
-        std::abs(double{output[i]} - double{truth[i]}) / double{at_least(predicted_error[i])};
-    ++pass.ratios[std::min(kBins - 1, static_cast<std::size_t>(ratio * kBinsPerUnit))];
-  }
-  pass.pixels += output.size();
+  const std::size_t pass = windows_.pass_of(window);
+  coverage_.add(pass, output, truth, predicted_error);
   if (!windows_.contact(window)) return;
   const double y = windows_.position(window).y_mm;
-  if (pass_ != in_contact_of_) in_contact_of_ = pass_, begin_mm_ = y;
+  if (pass != in_contact_of_) in_contact_of_ = pass, begin_mm_ = y;
   const ImageGrid grid = windows_.image();
   contact_.push_back(
       {doubt_of(output, predicted_error, grid), mean_of(predicted_error),
        ssim(output, truth, static_cast<std::size_t>(grid.height), static_cast<std::size_t>(grid.width)),
        std::abs(y - begin_mm_)});
-}
-
-double TrustScores::coverage(double factor) const {
-  const auto bins = std::min(kBins, static_cast<std::size_t>(factor * kBinsPerUnit));
-  double sum = 0;
-  for (const Pass& pass : passes_)
-    sum +=
-        static_cast<double>(std::accumulate(
-            pass.ratios.begin(), pass.ratios.begin() + static_cast<std::ptrdiff_t>(bins), std::uint64_t{0})) /
-        static_cast<double>(pass.pixels);
-  return sum / static_cast<double>(passes_.size());
-}
-
-double TrustScores::factor_found() const {
-  for (std::size_t bins = 1; bins < kBins; ++bins)
-    if (coverage(static_cast<double>(bins) / kBinsPerUnit) >= kCovered)
-      return static_cast<double>(bins) / kBinsPerUnit;
-  return static_cast<double>(kBins) / kBinsPerUnit;
 }
 
 // The chance that of two windows, one good and one bad, the bad one is doubted more (Mann-Whitney).
@@ -103,10 +75,10 @@ double TrustScores::width(double from_mm, double to_mm) const {
 std::vector<std::string> TrustScores::lines() const {
   std::vector<std::string> lines;
   const auto percent = [](double share) { return format(100 * share, 1) + " %"; };
-  if (!passes_.empty())
-    lines.push_back("intervals hold " + percent(coverage(model_.interval_factor())) +
+  if (!coverage_.empty())
+    lines.push_back("intervals hold " + percent(coverage_.of(model_.interval_factor())) +
                     " of the pixels (factor " + format(model_.interval_factor(), 2) + "; " +
-                    format(factor_found(), 2) + " would hold " + percent(kCovered) + ")");
+                    format(coverage_.factor(), 2) + " would hold " + percent(IntervalCoverage::kCovered) + ")");
   if (!contact_.empty())
     lines.push_back("in contact, the surest " + percent(kSure) + " have SSIM " +
                     format(ssim_of_surest(kSure), 3) + "; doubt tells SSIM below 0.8 with AUROC " +
@@ -120,10 +92,10 @@ std::vector<std::string> TrustScores::lines() const {
 nlohmann::ordered_json TrustScores::to_json() const {
   const auto number = [](double v) { return std::isfinite(v) ? nlohmann::ordered_json(v) : nullptr; };
   nlohmann::ordered_json json;
-  if (!passes_.empty()) {
+  if (!coverage_.empty()) {
     json["factor"] = model_.interval_factor();
-    json["coverage"] = coverage(model_.interval_factor());
-    json["factor_found"] = factor_found();
+    json["coverage"] = coverage_.of(model_.interval_factor());
+    json["factor_found"] = coverage_.factor();
     json["sure_ssim"] = number(ssim_of_surest(kSure));
     json["auroc"] = number(auroc());
     json["predicted_error_near"] = number(width(0, kNearMm));

@@ -59,15 +59,17 @@ void declare_window_training(Arguments& a) {
       "of the signals: per-window (each window to its own rest and gain, so that a finger pressed harder "
       "is seen like any other) or fixed",
       "per-window");
-  a.option("augment", "NAME",
-           "standard: random gains, offsets, noise, dropped taxels and a finger lifted a little, for unseen "
-           "trials, and signals in which nothing is felt; none",
-           "standard");
+  a.option(
+      "augment", "NAME",
+      "standard: random gains, offsets, noise, dropped taxels and a finger lifted a little, for unseen "
+      "trials, and signals in which nothing is felt; mirror: windows and truths turned round, left to right "
+      "and top to bottom, for arrays that feel alike everywhere; none",
+      "standard; frame: none");
   a.option("also", "DIR", "more recordings to train on, never tested: simulated ones, say");
   a.option("interval-factor", "X",
            "half the width of a pixel's 90 % interval in units of its predicted error, as supertac-evaluate "
            "finds it on passes that the network has not seen",
-           format(kIntervalFactor));
+           format(kIntervalFactor) + "; --split group: found on the tested groups");
   a.option("grouping", "NAME", "taxels of one VAE: horizontal (rows) or vertical (columns)", "horizontal");
   a.flag(
       "last-frame",
@@ -126,9 +128,11 @@ Recipe recipe_of(const Arguments& a, Recipe r) {
   if (a.given("rate")) r.rate_hz = a.number("rate", 20, 2000);
   if (a.given("range")) r.range = stated_range(a);
   if (a.given("scaling")) r.per_window = a.choice("scaling", {"per-window", "fixed"}) == "per-window";
-  if (a.given("augment"))
-    r.augment =
-        a.choice("augment", {"standard", "none"}) == "standard" ? kStandardAugmentation : AugmentSettings{};
+  if (a.given("augment")) {
+    const std::string name = a.choice("augment", {"standard", "mirror", "none"});
+    r.augment = name == "standard" ? kStandardAugmentation : AugmentSettings{};
+    r.mirror = name == "mirror";
+  }
   if (a.given("interval-factor")) r.interval_factor = a.number("interval-factor", 0.1, 100);
   if (a.given("grouping")) r.model.grouping = grouping_of(a.choice("grouping", {"horizontal", "vertical"}));
   if (a.flag("last-frame")) r.model.last_frame_path = true;

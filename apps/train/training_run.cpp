@@ -89,7 +89,7 @@ void TrainingRun::write_end() {
   description_["provenance"] = full_provenance();
   if (trainer_.done()) {
     const std::string finished = folder_->path() + "/model.safetensors";
-    save_trained(trainer_, finished, task_.origin);
+    save_trained(trainer_, finished, trained_origin(trainer_, task_));
     target_.out.path = publish(finished, target_.out);
     description_["content"] = hash_of_file(target_.out.path);
   }

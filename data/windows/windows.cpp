@@ -328,7 +328,7 @@ Zone WindowSet::zone(std::size_t i) const {
 std::optional<double> WindowSet::filter_s() const {
   std::optional<double> common;
   for (const Pass& pass : passes_) {
-    if (pass.windows == 0) continue;
+    if (pass.windows == 0 || !pass.use.in_distribution) continue;  // silence has gone through no filter
     if (common && *common != pass.filter_s) return std::nullopt;
     common = pass.filter_s;
   }

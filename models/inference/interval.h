@@ -2,7 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <span>
+#include <vector>
 
 #include "data/sensors/taxel_array.h"
 
@@ -24,5 +28,31 @@ double doubt_of(std::span<const float> picture, std::span<const float> predicted
 /// error: the largest of those found (1.1 to 1.45) on 6_Ridges and 4_Ridges, each left out of the training
 /// (trial 1, one seed each).
 inline constexpr double kIntervalFactor = 1.45;
+
+/// How many pixels' truths lie within picture +- factor * at_least(predicted error). Passes are the unit, each
+/// counts the same: windows of one pass are not exchangeable (Dunn, Wasserman, Ramdas 2018).
+class IntervalCoverage {
+ public:
+  static constexpr double kCovered = 0.9;
+
+  /// One picture, all three [pixels]; windows of a pass come one behind the other.
+  void add(std::size_t pass, std::span<const float> picture, std::span<const float> truth,
+           std::span<const float> predicted_error);
+  bool empty() const { return passes_.empty(); }
+  /// The share of pixels, 0 to 1, in steps of 0.05 of the factor. Not of none.
+  double of(double factor) const;
+  /// The least factor, at most 20, that covers kCovered of the pixels.
+  double factor() const;
+
+ private:
+  static constexpr std::size_t kBins = 400;  // of |error| / predicted error
+  static constexpr double kBinsPerUnit = 20;
+  struct Pass {
+    std::size_t number;
+    std::array<std::uint64_t, kBins> ratios{};
+    std::uint64_t pixels = 0;
+  };
+  std::vector<Pass> passes_;
+};
 
 }  // namespace supertac

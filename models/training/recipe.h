@@ -25,6 +25,9 @@ struct Recipe : TrainingPace {
   bool sampling = true;
   /// Of the windows. With any of it, passes in which nothing is felt are added (add_silent_passes).
   AugmentSettings augment;
+  /// Whether windows and truths are turned round at random, left to right and top to bottom: for arrays that
+  /// feel alike everywhere, of one number a taxel.
+  bool mirror = false;
 
   std::vector<std::string> plates;     ///< only recordings of these; none: of all
   SplitKind split = SplitKind::trial;  ///< what is kept for testing
@@ -34,8 +37,9 @@ struct Recipe : TrainingPace {
   std::optional<Scaling> range;        ///< rest and span; empty: SignalRange::fitted()
   bool per_window = true;              ///< whether a window is brought to its own rest and gain
   std::int64_t random_plates = 0;      ///< simulated passes besides, each over a plate of its own
-  /// Half the width of a pixel's 90 % interval in units of its predicted error, for the model's file.
-  double interval_factor = kIntervalFactor;
+  /// Half the width of a pixel's 90 % interval in units of its predicted error, for the model's file; empty:
+  /// of split group found on the tested groups, else kIntervalFactor.
+  std::optional<double> interval_factor;
 
   /// Throws std::invalid_argument naming the setting, its range and what was given.
   void check() const;

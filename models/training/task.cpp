@@ -89,6 +89,7 @@ TrainingTask window_task(const Recipe& given, const RecordingFolders& folders) {
   task.origin.erase("training");  // the objective says it
   task.origin["data"] = windows->fingerprint();
   task.origin["split_fingerprint"] = fingerprint(task.split);
+  task.finds_interval_factor = recipe.split == SplitKind::group && !recipe.interval_factor;
   task.counts = windows->counts().summary();
   task.leakage = find_leakage(*windows, task.split);
   task.notes = std::move(notes);

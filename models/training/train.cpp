@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "data/windows/transforms/signal_features.h"
+#include "io/numbers/numbers.h"
 #include "layers/checkpoint.h"
 #include "models/inference/evaluation.h"
 #include "models/inference/novelty.h"
@@ -91,6 +92,21 @@ bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& 
   return trainer.done();
 }
 
+std::map<std::string, std::string> trained_origin(const Trainer& trainer, const TrainingTask& task) {
+  std::map<std::string, std::string> origin = task.origin;
+  if (!task.finds_interval_factor) return origin;
+  constexpr std::size_t kMostWindows = 20'000;
+  const std::vector<std::uint32_t> tested = evenly_spaced(task.split.test, kMostWindows);
+  IntervalCoverage coverage;
+  for_each_output(Ensemble({Prepared(trainer.model())}), *task.windows, tested, [&](const EvaluatedBatch& b) {
+    for (std::size_t n = 0; n < b.size() && !b.predicted_errors.empty(); ++n)
+      coverage.add(task.windows->pass_of(tested[b.first + n]), b.output(n), b.target(n), b.predicted_error(n));
+    return true;
+  });
+  if (!coverage.empty()) origin["interval_factor"] = format(coverage.factor());
+  return origin;
+}
+
 void save_trained(const Trainer& trainer, const std::string& path,
                   const std::map<std::string, std::string>& origin) {
   std::vector<StoredTensor> more = novelty_of(trainer);
@@ -115,7 +131,7 @@ bool train(const Recipe& recipe, const RecordingFolders& folders, const std::str
   if (!callbacks.checkpoint.empty() && std::filesystem::exists(callbacks.checkpoint))
     trainer.restore(callbacks.checkpoint, task.origin);
   if (!train(trainer, task, callbacks)) return false;
-  save_trained(trainer, out, task.origin);
+  save_trained(trainer, out, trained_origin(trainer, task));
   return true;
 }
 

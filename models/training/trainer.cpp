@@ -76,8 +76,11 @@ void Trainer::fill(MicroBatch& micro_batch) const {
     const std::size_t slot = static_cast<std::size_t>(micro_batch.first) + n;
     const std::span<float> input = micro_batch.batch.inputs.values().subspan(n * input_size, input_size);
     windows_.window(indices_[slot], input);
-    if (windows_.augmentable(indices_[slot])) objective_.augment(batching_.sample(epoch, b, slot), input);
-    windows_.truth(indices_[slot], micro_batch.batch.targets.values().subspan(n * target_size, target_size));
+    const std::span<float> target = micro_batch.batch.targets.values().subspan(n * target_size, target_size);
+    windows_.truth(indices_[slot], target);
+    const std::uint64_t sample = batching_.sample(epoch, b, slot);
+    if (windows_.augmentable(indices_[slot])) objective_.augment(sample, input);
+    objective_.mirror(sample, input, target);
   }
 }
 

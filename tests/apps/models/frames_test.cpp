@@ -85,6 +85,8 @@ TEST_F(Frames, TrainScoreDrawAndReport) {
   EXPECT_GT(scores["baselines"]["bicubic"]["all"]["psnr_mean_db"],
             scores["baselines"]["mean_image"]["all"]["psnr_mean_db"]);
   EXPECT_TRUE(scores["felt"].empty()) << "nobody knows where it was";
+  EXPECT_GE(scores["trust"]["coverage"], 0.9) << "training found the factor on these groups";
+  EXPECT_EQ(scores["trust"]["factor"], scores["trust"]["factor_found"]);
   const auto outputs = SafetensorsFile::read(path("outputs.safetensors"));
   EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<std::uint64_t>{12, 16, 24}));
   EXPECT_EQ(read_text_file(path("report.html"), kPlenty).find("nan"), std::string::npos);

@@ -82,6 +82,19 @@ TEST(SilentPasses, AreATenthOfTheOthersAndUnlessManyAreWantedNeverMoreThan2400Wi
   EXPECT_EQ(nothing.size(), 0U);
 }
 
+// A sensor's own frames go through the filter that the training signals went through: it must be known.
+TEST(SilentPasses, LeaveTheFilterOfTheOthersKnown) {
+  WindowSet windows = many(small(), 3000);
+  const std::size_t own = windows.passes().size();
+  add_silent_passes(windows, 0);
+  ASSERT_GT(windows.passes().size(), own);
+  EXPECT_EQ(windows.filter_s(), SimulatorSettings().filter_s);
+  Recording other = simulate_pass(Plate::named("3_Bumps"), {});
+  other.metadata["filter_s"] = "0.05";
+  windows.add(other);
+  EXPECT_EQ(windows.filter_s(), std::nullopt);
+}
+
 // Signals that stand, drift or are noisy, with the truth of a plain plate.
 TEST(SilentPasses, ShowNothingAndAreNotUsual) {
   WindowSet windows = many(small(), 24'000);

@@ -31,7 +31,7 @@ TEST(Recipe, ComesBackFromTheModelFile) {
     recipe.split = SplitKind::texture;
     recipe.stride = 4, recipe.random_plates = 9, recipe.interval_factor = 1.5;
     recipe.range = Scaling{.rest_volts = 2, .span_volts = 0.5};
-    recipe.augment.dropped = 1;
+    recipe.augment.dropped = 1, recipe.mirror = true;
     const std::string path = folder / (std::string(name) + ".safetensors");
     const Recipe back = Recipe::of(file_of(recipe, path), path);
     EXPECT_EQ(metadata_of(back), metadata_of(recipe)) << name;

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "autograd/kernels/fast/isa/isa.h"
+#include "data/windows/transforms/mirror.h"
 #include "io/files/json.h"
 #include "io/numbers/hash.h"
 #include "models/inference/evaluation.h"
@@ -46,11 +47,12 @@ TEST(Trainer, WithoutSamplingLatentsAreTheMeans) {
   EXPECT_EQ(parse_json_limited(training_text(settings))["beta"], 0.0);
 }
 
-// Deleting the augmentation, or another sample's, changes the loss; it is that of the windows changed by
-// hand.
-TEST(Trainer, LearnsFromAugmentedWindows) {
+// Deleting the augmentation, or another sample's, changes the loss; it is that of windows and truths changed
+// by hand.
+TEST(Trainer, LearnsFromAugmentedAndMirroredWindows) {
   Recipe settings = small_training();
   settings.augment = {.gain = 0.5, .noise = 0.05};
+  settings.mirror = true;
   settings.sampling = false;
   const WindowSet windows = small_windows(settings.model);
   Trainer trainer(windows, all_of(windows), Objective(windows, settings));
@@ -62,14 +64,22 @@ TEST(Trainer, LearnsFromAugmentedWindows) {
     const auto window = by_hand.inputs.values().subspan(n * windows.input_size(), windows.input_size());
     windows.window(indices[n], window);
     augment(settings.augment, settings.seed, batching.sample(0, 0, n), window);
-    windows.truth(indices[n], by_hand.targets.values().subspan(n * 64, 64));
+    const auto truth = by_hand.targets.values().subspan(n * 64, 64);
+    windows.truth(indices[n], truth);
+    const Mirroring turned = Mirroring::drawn(settings.seed, batching.sample(0, 0, n));
+    mirror(turned, window, 4, 4);
+    mirror(turned, truth, 8, 8);
   }
   const double expected = trainer.objective()(by_hand).loss.total.item();
   EXPECT_NEAR(trainer.train_step().total, expected, 1e-5 * expected);
+  const auto loss = [&] {
+    return Trainer(windows, all_of(windows), Objective(windows, settings)).train_step().total;
+  };
+  settings.mirror = false;
+  EXPECT_GT(std::abs(loss() - expected), 1e-3 * expected);
   settings.augment = {};
-  EXPECT_GT(
-      std::abs(Trainer(windows, all_of(windows), Objective(windows, settings)).train_step().total - expected),
-      1e-3 * expected);
+  settings.mirror = true;
+  EXPECT_GT(std::abs(loss() - expected), 1e-3 * expected);
 }
 
 /// Blurred blobs on an array of 3 x 5 taxels with two channels, drawn four times as fine: five recordings
