@@ -47,21 +47,26 @@ std::optional<double> FrameDates::date(std::optional<double> stamp_s, double arr
 }
 
 // A damaged stamp may be anything, and what it said would hold for all that follow. So a jump is believed
-// when the next stamp goes on from it: then frames were lost, or the sensor has started anew.
+// when the arrivals bear it out, or the next stamp goes on from it: then frames were lost, or the sensor has
+// started anew. A sensor that is far slower than its file says jumps as far every time.
 std::optional<double> FrameDates::by_stamp(double stamp_s, double arrival_s) {
   if (!(std::abs(stamp_s) < kMostStampS)) return std::nullopt;
   if (count_ == 0) return stamp_s;
-  const double farthest = std::max(kJumpS, kJumpPeriods * nominal_s_);
+  const double farthest = std::max(kJumpS, kJumpPeriods * std::max(nominal_s_, step_s_));
   double ahead = stamp_s + offset_s_ - last_s_;
   const bool runs_over = wraps_s_ > 0 && ahead < -0.5 * wraps_s_;
   if (runs_over) ahead += wraps_s_;
   if (ahead > farthest || ahead < -kJumpS) {
     const double from_jump = jumped_s_ ? stamp_s - *jumped_s_ : 0;
-    jumped_s_ = stamp_s;
-    if (from_jump <= 0 || from_jump > farthest) return std::nullopt;
+    const bool arrived = ahead > 0 && std::abs(ahead - (arrival_s - last_arrival_s_)) < kJumpS;
+    const bool again = from_jump > 0 && std::abs(from_jump - jump_step_s_) < 0.5 * jump_step_s_;
+    jumped_s_ = stamp_s, jump_step_s_ = from_jump;
+    if (!arrived && !again && (from_jump <= 0 || from_jump > farthest)) return std::nullopt;
+    if (again) step_s_ = from_jump;
     if (ahead < 0) offset_s_ += std::max(arrival_s - last_arrival_s_, nominal_s_) - ahead;
   }
   jumped_s_.reset();
+  jump_step_s_ = 0;
   if (runs_over) offset_s_ += wraps_s_;
   return stamp_s + offset_s_;
 }
@@ -155,6 +160,22 @@ void SensorReader::check_silence(double time_s) {
                     format(silence_s, 1) + " s; see whether it is switched on and sends to this port");
 }
 
+// Right after the start: a clock in another unit than the file says is a thousand times too fast or too slow.
+// Frames that come faster than they were made are a log that somebody sends.
+void SensorReader::check_clock(double time_s, double arrival_s) {
+  constexpr double kLongEnoughS = 1, kMostOff = 300, kMostHaste = 3;
+  if (checked_frames_++ == 0) first_time_s_ = time_s, first_arrival_s_ = arrival_s;
+  const double elapsed = arrival_s - first_arrival_s_;
+  if (elapsed < kLongEnoughS || checked_frames_ < 5) return;
+  clock_checked_ = true;
+  const double ratio = (time_s - first_time_s_) / elapsed;
+  const bool log = static_cast<double>(checked_frames_) / elapsed > kMostHaste * sensor_.rate_hz;
+  if (log || (ratio < kMostOff && ratio > 1 / kMostOff)) return;
+  throw WrongDevice("sensor " + sensor_.name + " at " + port_->name() + ": its time stamps go " +
+                    format(ratio, ratio < 1 ? 6 : 0) +
+                    " s a second; see whether its file names the right column and unit (s, ms, us) of time");
+}
+
 void SensorReader::take(const DecodedFrame& decoded, double arrival_s) {
   last_frame_s_ = arrival_s;
   sensor_.arrange(decoded.values, signals_);
@@ -164,6 +185,11 @@ void SensorReader::take(const DecodedFrame& decoded, double arrival_s) {
   std::unique_lock lock(mutex_);
   counters_.damaged += damaged ? 1 : 0, counters_.late += !damaged && !time ? 1 : 0;
   if (!time) return;
+  if (live_ && decoded.time_s && !clock_checked_) {
+    lock.unlock();
+    check_clock(*time, arrival_s);
+    lock.lock();
+  }
   if (!live_) {
     taken_.wait(lock, [&] { return queue_.size() < kQueueFrames || stop_; });
     if (stop_) return;

@@ -31,10 +31,11 @@ struct ReaderCounters {
 };
 
 /// Dates frames in the order they come: by the sensor's stamps where it sends any, else by arrival. Counters
-/// of 16 or 32 bits may wrap, and a sensor may start anew. A stamp over 0.1 s and 10 periods ahead, or over
-/// 0.1 s back, is believed when the next one goes on from it; so each such jump costs a frame. A damaged
-/// stamp that is less far ahead costs the frames that it overtakes. A frame can come late, not early: without
-/// stamps frames are a period apart below the earliest arrivals.
+/// of 16 or 32 bits may wrap, and a sensor may start anew. A stamp over 0.1 s and 10 periods ahead is
+/// believed when it arrives as much later; so is one, or one over 0.1 s back, when the next goes on from it,
+/// which costs a frame, or when three jump as far. A damaged stamp that is less far ahead costs the frames
+/// that it overtakes. A frame can come late, not early: without stamps frames are a period apart below the
+/// earliest arrivals.
 class FrameDates {
  public:
   explicit FrameDates(const Sensor& sensor);
@@ -48,7 +49,8 @@ class FrameDates {
   double by_arrival(double arrival_s);
   double nominal_s_, period_s_, wraps_s_ = 0;
   double offset_s_ = 0, last_s_ = 0, last_arrival_s_ = 0, least_late_s_ = 0;
-  std::optional<double> jumped_s_;  // a stamp that was not believed
+  std::optional<double> jumped_s_;       // a stamp that was not believed
+  double jump_step_s_ = 0, step_s_ = 0;  // from the one before that to it, and where these are always as long
   std::uint64_t count_ = 0, in_block_ = 0, missing_ = 0;
 };
 
@@ -64,7 +66,8 @@ class SensorReader {
   void stop();
 
   /// The next frame, oldest first; empty after `wait_s`, or at the end. Rethrows what ended the reader
-  /// (PortUnplugged, BoardSilent, WrongDevice) once the frames before it have been taken.
+  /// (PortUnplugged, BoardSilent; WrongDevice, also of a clock in another unit than the file says) once the
+  /// frames before it have been taken.
   std::optional<ReadFrame> next(double wait_s);
   /// The source is at its end and all frames have been taken.
   bool ended() const;
@@ -76,6 +79,7 @@ class SensorReader {
   void read_once();
   void take(const DecodedFrame& decoded, double arrival_s);
   void check_silence(double time_s);
+  void check_clock(double time_s, double arrival_s);
 
   std::unique_ptr<Port> port_;
   bool live_;
@@ -85,6 +89,9 @@ class SensorReader {
   std::vector<float> signals_;
   std::string beginning_;  // of what came before the first frame
   double last_frame_s_;
+  double first_time_s_ = 0, first_arrival_s_ = 0;
+  std::uint64_t checked_frames_ = 0;
+  bool clock_checked_ = false;
 
   mutable std::mutex mutex_;
   std::condition_variable arrived_, taken_;

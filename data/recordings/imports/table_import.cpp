@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <stdexcept>
 
 #include "io/files/file.h"
@@ -57,6 +58,12 @@ Columns columns_of(const Table& table, const ColumnMap& map, std::size_t expecte
                                 (map.values.empty() ? ", all that --columns does not name" : "") +
                                 "; a frame of the sensor has " + std::to_string(expected) +
                                 ": name them, --columns values=FIRST-LAST, and time=, x=, y=");
+  std::set<std::size_t> named(columns.values.begin(), columns.values.end());
+  std::size_t count = columns.values.size();
+  for (const std::size_t c : {columns.time, columns.x, columns.y})
+    if (c != Columns::kNone) named.insert(c), ++count;
+  if (named.size() != count)
+    throw std::invalid_argument("a column has two meanings: expected one of time, x, y and values for each");
   return columns;
 }
 

@@ -171,6 +171,44 @@ TEST(SensorReader, AWildStampIsBelievedByNobody) {
   EXPECT_NEAR(times.back() - times[198], 61, 1e-9) << "it paused";
 }
 
+// Each of its stamps is more than ten of the stated periods ahead: one frame came, and then none for ever.
+TEST(SensorReader, ASensorFarSlowerThanItsFileSaysLosesNothing) {
+  const std::string frame = R"({"kind":"text","time":{"column":0,"unit":"ms"}})";
+  FrameDates live(mat(1, 2, 100, frame)), from_file(mat(1, 2, 100, frame));
+  int dated = 0, read = 0;
+  for (int n = 0; n < 100; ++n) {
+    dated += live.date(0.2 * n, 50 + 0.2 * n + 0.03 * (n % 3)) ? 1 : 0;
+    read += from_file.date(0.2 * n, 50 + 1e-5 * n) ? 1 : 0;
+  }
+  EXPECT_EQ(dated, 100);
+  EXPECT_GE(read, 98) << "of a file all comes at once: two frames are doubted";
+}
+
+// Milliseconds that the file calls seconds or microseconds.
+TEST(SensorReader, AClockInAnotherUnitIsRefused) {
+  for (const std::string unit : {"s", "us", "ms"}) {
+    const Sensor sensor = mat(1, 2, 100, R"({"kind":"text","time":{"column":0,"unit":")" + unit + "\"}}");
+    int a, b;
+    ASSERT_EQ(openpty(&a, &b, nullptr, nullptr, nullptr), 0);
+    const std::string device = ptsname(a);
+    SensorReader reader(open_port("serial:" + device + "@115200"), sensor);
+    std::string said = "nothing";
+    try {
+      const double begin = monotonic_seconds();
+      for (int n = 0; monotonic_seconds() < begin + 2; ++n) {
+        const std::string line = std::to_string(std::lround(1000 * (monotonic_seconds() - begin))) + ",1,2\n";
+        ASSERT_EQ(write(a, line.data(), line.size()), static_cast<ssize_t>(line.size()));
+        while (reader.next(0.01)) continue;
+      }
+    } catch (const WrongDevice& error) {
+      said = error.what();
+    }
+    EXPECT_EQ(said.find("unit (s, ms, us) of time") == std::string::npos, unit == "ms")
+        << unit << ": " << said;
+    close(a), close(b);
+  }
+}
+
 // Chunks of a tenth of a second, a rate that is not the stated one, and frames that were lost.
 TEST(SensorReader, DatesByArrivalWhereNothingIsStamped) {
   const double rate_hz = 103;
