@@ -50,6 +50,8 @@ void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, Tes
     a.note(
         "the model was trained with split none: if these are the recordings of its training, it has seen "
         "every one of them");
+  if (!a.given("split") && files.front().metadata.contains("interval_factor_found"))
+    a.note("the factor of the intervals was found on these groups: that they hold here is no measurement");
   const auto limit =
       static_cast<std::size_t>(a.integer("limit", 0, std::numeric_limits<std::uint32_t>::max()));
   if (limit > 0) tested.split.test = evenly_spaced(tested.split.test, limit);

@@ -78,7 +78,8 @@ std::vector<std::string> TrustScores::lines() const {
   if (!coverage_.empty())
     lines.push_back("intervals hold " + percent(coverage_.of(model_.interval_factor())) +
                     " of the pixels (factor " + format(model_.interval_factor(), 2) + "; " +
-                    format(coverage_.factor(), 2) + " would hold " + percent(IntervalCoverage::kCovered) + ")");
+                    format(coverage_.factor(), 2) + " would hold " + percent(IntervalCoverage::kCovered) +
+                    ")");
   if (!contact_.empty())
     lines.push_back("in contact, the surest " + percent(kSure) + " have SSIM " +
                     format(ssim_of_surest(kSure), 3) + "; doubt tells SSIM below 0.8 with AUROC " +

@@ -59,7 +59,8 @@ std::string companion(const Arguments& arguments, const std::string& option, con
   std::string found;
   for (const char* kind : kTables) {
     const std::string path = (folder / (stem + kind)).string();
-    if (!fs::exists(path)) continue;
+    std::error_code none;
+    if (!fs::exists(path, none)) continue;
     if (!found.empty()) throw FileError(folder.string(), "holds two tables of the name " + stem);
     found = path;
   }
@@ -175,30 +176,31 @@ int import_tables(const Arguments& arguments, const std::string& input) {
     std::size_t dropped = 0;
     std::optional<Registration> fit;
     Recording recording;
+    std::string name;
     try {
       recording = settings.import(file, static_cast<int>(files.size()) + 1, dropped, fit);
+      name = recording_file_name(recording);
+      add_parent_file("table", path);
     } catch (const FileError& error) {
       leave_out(arguments, error, left_out);
       continue;
-    }
-    try {
-      write_recording(folder.add(recording_file_name(recording)), recording);
-      add_parent_file("table", path);
-      arguments.print(path + ": " + std::to_string(recording.frames()) + " frames in " +
-                      format(recording.time_s.back() - recording.time_s.front(), 2) + " s" +
-                      (dropped > 0 ? ", " + std::to_string(dropped) + " lines dropped" : "") +
-                      (!fit            ? ""
-                       : fit->reliable ? ", positions found, residual " + format(fit->residual, 2) + " mm"
-                                       : ", not reliable: " + fit->reason));
-      files.push_back({{"file", path},
-                       {"frames", recording.frames()},
-                       {"dropped", dropped},
-                       {"positions", !recording.position_mm.empty()},
-                       {"truth", !recording.truth.empty()}});
-      if (fit) files.back()["reliable"] = fit->reliable, files.back()["residual_mm"] = fit->residual;
-    } catch (const std::invalid_argument& error) {  // of a recording that breaks a rule of its own
+    } catch (const std::invalid_argument& error) {  // of a table that breaks a rule of recordings
       leave_out(arguments, FileError(path, error.what()), left_out);
+      continue;
     }
+    write_recording(folder.add(name), recording);
+    arguments.print(path + ": " + std::to_string(recording.frames()) + " frames in " +
+                    format(recording.time_s.back() - recording.time_s.front(), 2) + " s" +
+                    (dropped > 0 ? ", " + std::to_string(dropped) + " lines dropped" : "") +
+                    (!fit            ? ""
+                     : fit->reliable ? ", positions found, residual " + format(fit->residual, 2) + " mm"
+                                     : ", not reliable: " + fit->reason));
+    files.push_back({{"file", path},
+                     {"frames", recording.frames()},
+                     {"dropped", dropped},
+                     {"positions", !recording.position_mm.empty()},
+                     {"truth", !recording.truth.empty()}});
+    if (fit) files.back()["reliable"] = fit->reliable, files.back()["residual_mm"] = fit->residual;
   }
   bar.reset();
   if (files.empty()) throw FileError(input, "holds no table that could be imported");

@@ -62,14 +62,15 @@ void declare_window_training(Arguments& a) {
   a.option(
       "augment", "NAME",
       "standard: random gains, offsets, noise, dropped taxels and a finger lifted a little, for unseen "
-      "trials, and signals in which nothing is felt; mirror: windows and truths turned round, left to right "
-      "and top to bottom, for arrays that feel alike everywhere; none",
-      "standard; frame: none");
+      "trials, and signals in which nothing is felt; mirror: none of these, but windows and truths turned "
+      "round, left to right and top to bottom, for arrays that feel alike everywhere; none, as in preset "
+      "frame",
+      "standard");
   a.option("also", "DIR", "more recordings to train on, never tested: simulated ones, say");
   a.option("interval-factor", "X",
            "half the width of a pixel's 90 % interval in units of its predicted error, as supertac-evaluate "
-           "finds it on passes that the network has not seen",
-           format(kIntervalFactor) + "; --split group: found on the tested groups");
+           "finds it on passes that the network has not seen; split group finds it on the tested groups",
+           format(kIntervalFactor));
   a.option("grouping", "NAME", "taxels of one VAE: horizontal (rows) or vertical (columns)", "horizontal");
   a.flag(
       "last-frame",

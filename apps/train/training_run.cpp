@@ -89,7 +89,11 @@ void TrainingRun::write_end() {
   description_["provenance"] = full_provenance();
   if (trainer_.done()) {
     const std::string finished = folder_->path() + "/model.safetensors";
-    save_trained(trainer_, finished, trained_origin(trainer_, task_));
+    const auto origin = trained_origin(trainer_, task_);
+    if (task_.finds_interval_factor && origin.contains("interval_factor"))
+      a_.note("90 % of the tested groups' pixels lie within " + origin.at("interval_factor") +
+              " predicted errors: the width of the intervals");
+    save_trained(trainer_, finished, origin);
     target_.out.path = publish(finished, target_.out);
     description_["content"] = hash_of_file(target_.out.path);
   }

@@ -101,7 +101,8 @@ class Segment {
   // `before` moves along with the time: the last recorded frame at or before it.
   void append_position(Track& track, double at, std::size_t& before) const {
     while (before + 1 < usable_.size() && time(before + 1) <= at) ++before;
-    track.recorded.push_back(static_cast<std::uint32_t>(usable_[before]));
+    const bool next = before + 1 < usable_.size() && time(before + 1) - at < at - time(before);
+    track.recorded.push_back(static_cast<std::uint32_t>(usable_[before + (next ? 1 : 0)]));
     if (recording_.position_mm.empty()) {
       track.position_mm.insert(track.position_mm.end(), 2, kUnknown);
       track.lift_mm.push_back(0);

@@ -42,11 +42,10 @@ constexpr double kCellSlack = 1e-6;
 
 /// A recording on an even time grid.
 struct Track {
-  std::vector<float> samples;      ///< [frames][signals], scaled
-  std::vector<float> position_mm;  ///< [frames][2] (x, y), NaN where unknown
-  std::vector<float> lift_mm;      ///< [frames], as Recording's; 0 where it has none
-  std::vector<std::uint32_t>
-      recorded;  ///< [frames]: the last recorded frame at or before it, whose truth it has
+  std::vector<float> samples;           ///< [frames][signals], scaled
+  std::vector<float> position_mm;       ///< [frames][2] (x, y), NaN where unknown
+  std::vector<float> lift_mm;           ///< [frames], as Recording's; 0 where it has none
+  std::vector<std::uint32_t> recorded;  ///< [frames]: the recorded frame nearest in time, whose truth it has
   std::vector<std::uint32_t>
       run;                  ///< [frames]: frames since the pass began or since the last gap, itself included
   std::size_t held = 0;     ///< frames for which no sample arrived: they repeat the one before

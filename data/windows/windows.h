@@ -147,7 +147,7 @@ class WindowSet {
   /// Samples, positions and lifts of a whole pass; none when no window ends in it.
   Track track(std::size_t pass) const;
 
-  /// The filter_s of all passes with windows that resemble those in use, or nothing when they differ.
+  /// The filter_s of all passes but those that are not in_distribution, or nothing when they differ.
   std::optional<double> filter_s() const;
 
   /// 16 hexadecimal digits over samples, positions, plates and index: the same data and settings, the same

@@ -36,7 +36,8 @@ void IntervalCoverage::add(std::size_t pass, std::span<const float> picture, std
   for (std::size_t i = 0; i < picture.size(); ++i) {
     const double ratio =
         std::abs(double{picture[i]} - double{truth[i]}) / double{at_least(predicted_error[i])};
-    ++counts.ratios[std::min(kBins - 1, static_cast<std::size_t>(ratio * kBinsPerUnit))];
+    const double bin = ratio * kBinsPerUnit;
+    if (bin < double{kBins}) ++counts.ratios[static_cast<std::size_t>(bin)];
   }
   counts.pixels += picture.size();
 }

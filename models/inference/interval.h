@@ -29,8 +29,8 @@ double doubt_of(std::span<const float> picture, std::span<const float> predicted
 /// (trial 1, one seed each).
 inline constexpr double kIntervalFactor = 1.45;
 
-/// How many pixels' truths lie within picture +- factor * at_least(predicted error). Passes are the unit, each
-/// counts the same: windows of one pass are not exchangeable (Dunn, Wasserman, Ramdas 2018).
+/// How many pixels' truths lie within picture +- factor * at_least(predicted error). Passes are the unit,
+/// each counts the same: windows of one pass are not exchangeable (Dunn, Wasserman, Ramdas 2018).
 class IntervalCoverage {
  public:
   static constexpr double kCovered = 0.9;
@@ -39,13 +39,14 @@ class IntervalCoverage {
   void add(std::size_t pass, std::span<const float> picture, std::span<const float> truth,
            std::span<const float> predicted_error);
   bool empty() const { return passes_.empty(); }
-  /// The share of pixels, 0 to 1, in steps of 0.05 of the factor. Not of none.
+  /// The share of pixels, 0 to 1, in steps of 0.05 of the factor; farther than 20 is never within. Not to be
+  /// asked when empty().
   double of(double factor) const;
-  /// The least factor, at most 20, that covers kCovered of the pixels.
+  /// The least factor that covers kCovered of the pixels; 20 where none does.
   double factor() const;
 
  private:
-  static constexpr std::size_t kBins = 400;  // of |error| / predicted error
+  static constexpr std::size_t kBins = 400;  // of |error| / predicted error below 20
   static constexpr double kBinsPerUnit = 20;
   struct Pass {
     std::size_t number;

@@ -17,8 +17,8 @@ const Recipe& checked(const Recipe& recipe, const TaxelArray& array) {
   recipe.check();
   check(recipe.augment, array);
   if (recipe.mirror && array.channels != 1)  // an axis of a field would have to change its sign
-    throw std::invalid_argument("--augment mirror is for arrays of one number a taxel, found " +
-                                std::to_string(array.channels) + "; leave it out");
+    throw std::invalid_argument("recipe: mirror is for arrays of one number a taxel, found " +
+                                std::to_string(array.channels));
   return recipe;
 }
 

@@ -141,7 +141,8 @@ Recipe Recipe::of(const ModelFile& file, const std::string& path) {
   r.rate_hz = file.input.rate_hz;
   r.range = file.input.scaling;
   r.per_window = file.input.scaling.per_window;
-  if (file.metadata.contains("interval_factor")) r.interval_factor = file.interval_factor();
+  if (file.metadata.contains("interval_factor") && !file.metadata.contains("interval_factor_found"))
+    r.interval_factor = file.interval_factor();
   try {
     r.split = split_kind(entry("split"));
     r.check();

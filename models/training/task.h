@@ -25,7 +25,7 @@ struct TrainingTask {
   Objective objective;
   /// What the model file says of its origin; the same whatever machine, folder or number of threads.
   std::map<std::string, std::string> origin = {};
-  std::string counts = {};  ///< where the frames of the recordings went, for people
+  std::string counts = {};             ///< where the frames of the recordings went, for people
   bool finds_interval_factor = false;  ///< on the tested windows, after training
   Leakage leakage = {};
   std::vector<std::string> notes = {};    ///< what is to be said before training: a range that clips, a leak

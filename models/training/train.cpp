@@ -95,15 +95,17 @@ bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& 
 std::map<std::string, std::string> trained_origin(const Trainer& trainer, const TrainingTask& task) {
   std::map<std::string, std::string> origin = task.origin;
   if (!task.finds_interval_factor) return origin;
-  constexpr std::size_t kMostWindows = 20'000;
-  const std::vector<std::uint32_t> tested = evenly_spaced(task.split.test, kMostWindows);
+  const std::vector<std::uint32_t> tested = evenly_spaced(task.split.test, kTestedPerEpoch);
   IntervalCoverage coverage;
   for_each_output(Ensemble({Prepared(trainer.model())}), *task.windows, tested, [&](const EvaluatedBatch& b) {
     for (std::size_t n = 0; n < b.size() && !b.predicted_errors.empty(); ++n)
-      coverage.add(task.windows->pass_of(tested[b.first + n]), b.output(n), b.target(n), b.predicted_error(n));
+      coverage.add(task.windows->pass_of(tested[b.first + n]), b.output(n), b.target(n),
+                   b.predicted_error(n));
     return true;
   });
-  if (!coverage.empty()) origin["interval_factor"] = format(coverage.factor());
+  if (coverage.empty()) return origin;
+  origin["interval_factor"] = format(coverage.factor());
+  origin["interval_factor_found"] = "tested groups";
   return origin;
 }
 

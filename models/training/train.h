@@ -38,9 +38,9 @@ struct TrainingCallbacks {
 /// steps are done. Throws as Trainer::train_step and Trainer::save.
 bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& callbacks = {});
 
-/// What the model file says of its origin after training: task.origin, and where the recipe leaves it open the
-/// factor of the intervals, IntervalCoverage::factor() of at most 20,000 tested windows. Of people or objects
-/// never seen a picture is further off than training has taught the network to say.
+/// What the model file says of its origin after training: task.origin, and where the recipe leaves it open
+/// the factor of the intervals, IntervalCoverage::factor() of at most 2,000 tested windows. A network that
+/// draws people or objects for the first time is further off than it has learnt to say.
 std::map<std::string, std::string> trained_origin(const Trainer& trainer, const TrainingTask& task);
 
 /// The model alone, ready for use: with `origin` in its metadata, the ranges of its values for int8 and,

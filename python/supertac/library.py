@@ -105,8 +105,8 @@ class LiveWindow:
         """filter_s: moving average that the frames have gone through already."""
         self.drawer = model.drawer(precision)
         self.live = checked(library().supertac_live_new(self.drawer.model, frame_hz, filter_s), None)
-        self.predicted_error = np.zeros(self.drawer.picture, np.float32)
-        self.error_at = self.predicted_error.ctypes.data if self.drawer.predicts_error else None
+        self._predicted_error = np.zeros(self.drawer.picture, np.float32)
+        self._error_at = self._predicted_error.ctypes.data if self.drawer.predicts_error else None  # costs a microsecond
 
     def __del__(self):
         if getattr(self, "live", None) is not None:
@@ -119,8 +119,13 @@ class LiveWindow:
             raise ValueError(f"a frame has {self.drawer.window[1]} values, got {values.size}")
         checked(self.drawer.library.supertac_live_push(self.live, time_s, values.ctypes.data))
         picture = np.empty(self.drawer.picture, np.float32)
-        drawn = checked(self.drawer.library.supertac_live_picture(self.live, picture.ctypes.data, self.error_at))
+        drawn = checked(self.drawer.library.supertac_live_picture(self.live, picture.ctypes.data, self._error_at))
         return picture if drawn else None
+
+    @property
+    def predicted_error(self) -> np.ndarray:
+        """[height,width], of the last picture; the next one is written over it."""
+        return self._predicted_error
 
 
 def train(recipe: str, folder: str | os.PathLike, out: str | os.PathLike,

@@ -109,6 +109,8 @@ class Model:
         if precision is not None:
             return Pictures(*self.drawer(precision, threads).draw(volts), None)
         volts = library.checked_windows(volts, self.window)
+        if np.isnan(volts).any():
+            raise ValueError("windows hold NaN; leave these out")
         parts = [self._draw(self.scale(volts[i : i + batch])) for i in range(0, max(len(volts), 1), batch)]
         return Pictures(*(None if part[0] is None else np.concatenate(part) for part in zip(*parts)))
 

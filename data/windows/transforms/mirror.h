@@ -3,8 +3,6 @@
 #include <cstdint>
 #include <span>
 
-#include "data/sensors/taxel_array.h"
-
 namespace supertac {
 
 /// Which way round an array is looked at.

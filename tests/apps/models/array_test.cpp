@@ -11,6 +11,7 @@
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/sha256.h"
 #include "models/files/model_file.h"
 #include "tests/apps/common/process.h"
 
@@ -299,7 +300,7 @@ TEST(Array, CompanionsBelongToTheirOwnTable) {
   for (const int day : {1, 2}) {
     const std::string name = "day" + std::to_string(day);
     make_directories(folder / ("log/" + name)), make_directories(folder / ("stage/" + name));
-    write_file(folder / ("log/" + name + "/1.csv"), frames);
+    write_file(folder / ("log/" + name + "/1.csv"), frames + std::to_string(day) + ",2,3,4\n");
     write_file(folder / ("stage/" + name + "/1.csv"),
                "0,0," + std::to_string(10 * day) + "\n1,0," + std::to_string(10 * day) + "\n");
   }
@@ -309,7 +310,12 @@ TEST(Array, CompanionsBelongToTheirOwnTable) {
   ASSERT_EQ(done.code, 0) << done.error;
   for (const std::string& path : list_recordings(folder / "data")) {
     const Recording r = read_recording(path);
-    EXPECT_EQ(r.position_mm[1], r.metadata.at("group") == "day1" ? 10.0F : 20.0F);
+    const std::string day = r.metadata.at("group");
+    EXPECT_EQ(r.position_mm[1], day == "day1" ? 10.0F : 20.0F);
+    Sha256 hash;
+    hash.add(read_text_file(folder / ("log/" + day + "/1.csv"), 1 << 20));
+    const auto made = nlohmann::json::parse(SafetensorsFile::read(path).metadata().at("provenance"));
+    EXPECT_EQ(made["parents"]["table"], hash.hex());
   }
   write_file(folder / "stage/day1/1.txt", std::string("0,0,1\n1,0,1\n"));
   auto again = words;

@@ -76,9 +76,10 @@ TEST_F(Frames, TrainScoreDrawAndReport) {
   EXPECT_EQ(json("train.json")["split"], "group");
   EXPECT_EQ(json("train.json")["train_windows"], 48);
   EXPECT_EQ(json("train.json")["model"]["timesteps"], 1);
-  run("supertac-evaluate",
-      {"--model", path("m.safetensors"), "--data", path("data"), "--json", path("scores.json"), "--outputs",
-       path("outputs.safetensors"), "--report", path("report.html"), "--pictures", path("pictures")});
+  const ProcessResult scored =
+      run("supertac-evaluate", {"--model", path("m.safetensors"), "--data", path("data"), "--json",
+                                path("scores.json"), "--outputs", path("outputs.safetensors"), "--report",
+                                path("report.html"), "--pictures", path("pictures")});
   const nlohmann::json scores = json("scores.json");
   EXPECT_EQ(scores["all"]["windows"], 12) << "a fifth of five groups";
   EXPECT_GT(scores["all"]["psnr_mean_db"], scores["baselines"]["bicubic"]["all"]["psnr_mean_db"]);
@@ -87,6 +88,7 @@ TEST_F(Frames, TrainScoreDrawAndReport) {
   EXPECT_TRUE(scores["felt"].empty()) << "nobody knows where it was";
   EXPECT_GE(scores["trust"]["coverage"], 0.9) << "training found the factor on these groups";
   EXPECT_EQ(scores["trust"]["factor"], scores["trust"]["factor_found"]);
+  EXPECT_NE(scored.error.find("found on these groups"), std::string::npos) << scored.error;
   const auto outputs = SafetensorsFile::read(path("outputs.safetensors"));
   EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<std::uint64_t>{12, 16, 24}));
   EXPECT_EQ(read_text_file(path("report.html"), kPlenty).find("nan"), std::string::npos);
@@ -102,6 +104,23 @@ TEST_F(Frames, SameBytesForAnyThreadsAndAfterAPause) {
   run("supertac-train",
       {"--data", path("data"), "--like", path("1.safetensors"), "--out", path("4.safetensors")});
   EXPECT_EQ(json("1.run/settings.json")["content"], json("4.run/settings.json")["content"]);
+}
+
+// Other groups, another factor; a stated one is kept.
+TEST_F(Frames, TheFactorOfTheIntervalsIsFoundOrStated) {
+  const auto factor = [&](const std::string& name) {
+    const SafetensorsFile file = SafetensorsFile::read(path(name));
+    return file.metadata().contains("interval_factor") ? file.metadata().at("interval_factor") : "none";
+  };
+  train("a.safetensors");
+  run("supertac-train", {"--data", path("data"), "--like", path("a.safetensors"), "--seed", "3", "--out",
+                         path("b.safetensors")});
+  train("c.safetensors", {"--interval-factor", "1.7"});
+  train("d.safetensors", {"--split", "none"});
+  EXPECT_GT(std::stod(factor("a.safetensors")), 0);
+  EXPECT_NE(factor("b.safetensors"), factor("a.safetensors"));
+  EXPECT_EQ(factor("c.safetensors"), "1.7");
+  EXPECT_EQ(factor("d.safetensors"), "none");
 }
 
 // What windows have single frames have too.

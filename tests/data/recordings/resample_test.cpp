@@ -123,6 +123,15 @@ TEST(Resample, KeepsUnknownPositionsUnknown) {
   EXPECT_EQ(none.position_mm.size(), 200U);
 }
 
+// A frame that comes late fills the sample of its place, and its truth goes with it.
+TEST(Resample, ATruthIsThatOfTheNearestFrame) {
+  Recording recording = make_recording({});
+  for (std::size_t i = 1; i < recording.time_s.size(); ++i) recording.time_s[i] += i % 2 == 0 ? 1e-9 : 1e-3;
+  const Track track = resample(recording, kWide);
+  ASSERT_GT(track.frames(), 50U);
+  for (std::size_t j = 0; j < 50; ++j) ASSERT_EQ(track.recorded[j], j);
+}
+
 TEST(Resample, OfNothingIsNothing) { EXPECT_EQ(resample(Recording{}, kWide).frames(), 0U); }
 
 TEST(Resample, RefusesTimesThatDoNotIncreaseAndSizesThatDisagree) {

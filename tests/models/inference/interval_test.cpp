@@ -63,6 +63,8 @@ TEST(IntervalCoverage, PassesCountTheSame) {
   for (int i = 0; i < 9; ++i) coverage.add(0, right, right, predicted);
   coverage.add(1, right, wrong, predicted);
   EXPECT_DOUBLE_EQ(coverage.of(1), 0.5);
+  EXPECT_DOUBLE_EQ(coverage.of(20), 0.5);
+  EXPECT_DOUBLE_EQ(coverage.of(50), 0.5);
   EXPECT_DOUBLE_EQ(coverage.factor(), 20) << "50 least predicted errors are beyond the last bin";
 }
 

@@ -389,6 +389,11 @@ TEST(Trainer, NamesTheSettingThatIsOutOfRange) {
             "training settings: clip norm must not be negative (0 = never), got -1");
   EXPECT_NE(message([](auto& s) { s.loss.beta = -1; }).find("beta = -1"), std::string::npos);
   EXPECT_NE(message([](auto& s) { s.augment.dropped = 17; }), "no error");
+  Recipe mirrored = Recipe::named("frame");
+  mirrored.mirror = true;
+  const WindowSet two_numbers = blobs();
+  set_array(mirrored.model, two_numbers.array());
+  EXPECT_THROW(Objective(two_numbers, mirrored), std::invalid_argument);
 }
 
 }  // namespace

@@ -89,12 +89,19 @@ TEST(NormaliseWindow, SaturatedDeadAndShortWindowsStayInRange) {
   }
 }
 
+// It was counted beside the bins.
+TEST(NormaliseWindow, NanStaysWhereItIs) {
+  std::vector<float> broken(2 * 64);
+  for (std::size_t i = 0; i < broken.size(); ++i) broken[i] = static_cast<float>(i) / 128;
+  broken[7] = NAN;
+  normalise_window(broken, 2);
+  for (std::size_t i = 0; i < broken.size(); ++i)
+    ASSERT_TRUE(i == 7 || (broken[i] >= 0 && broken[i] <= 1)) << i;
+}
+
 TEST(NormaliseWindow, RefusesWhatIsNoWindow) {
   std::vector<float> x(7);
   EXPECT_THROW(normalise_window(x, 2), std::invalid_argument);
-  std::vector<float> broken(2 * 64, 0.5F);
-  broken[7] = NAN;
-  normalise_window(broken, 2);  // counts within its bins
   EXPECT_THROW(normalise_window(x, 0), std::invalid_argument);
   EXPECT_THROW(normalise_window({}, 2), std::invalid_argument);
   std::vector<float> too_long(60'001);

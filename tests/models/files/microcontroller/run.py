@@ -53,10 +53,15 @@ def slices(tensor, count):
     return [data[i * size:(i + 1) * size] for i in range(count)]
 
 
+def simulated(tools, folder, *words):
+    subprocess.run([tools + "/supertac-simulate", "--out", folder, "--speeds", "10", "--passes", "1", "--quiet", *words],
+                   check=True, stdout=subprocess.DEVNULL)
+    return folder
+
+
 def trained(tools, folder, preset):
     data, model = folder + "/recordings", folder + "/model.safetensors"
-    subprocess.run([tools + "/supertac-simulate", "--out", data, "--speeds", "10", "--passes", "1", "--trials", "2",
-                    "--plates", "ridges6,plain", "--quiet"], check=True, stdout=subprocess.DEVNULL)
+    simulated(tools, data, "--trials", "2", "--plates", "ridges6,plain")
     subprocess.run([tools + "/supertac-train", "--data", data, "--out", model, "--preset", preset, "--epochs", "1",
                     "--stride", "8", "--split", "trial", "--quiet"], check=True, stdout=subprocess.DEVNULL)
     return model, data
@@ -76,7 +81,7 @@ def windows_of(args, folder):
 
 def frames_of(args, folder):
     """The same, frame by frame, of what supertac-stream draws of a recording."""
-    recording = sorted(glob.glob(args.data + "/*.safetensors"))[0]
+    recording = first_of(args.raw)
     out = folder + "/streamed.safetensors"
     tensors = tensors_of(recording)
     count = min(args.frames, tensors["time_s"][0][0])
@@ -88,6 +93,10 @@ def frames_of(args, folder):
     pictures = next(drawn[name] for name in ("picture", "pictures") if name in drawn)
     frames = b"".join(t + v for t, v in zip(times, values))
     return struct.pack("<ii", 1, count) + frames, pictures[0][0], fnv(slices(pictures, pictures[0][0]))
+
+
+def first_of(folder):
+    return sorted(glob.glob(folder + "/*.safetensors"))[0]
 
 
 def rate_of(recording):
@@ -136,7 +145,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--bin", required=True)
     parser.add_argument("--model")
-    parser.add_argument("--data")
+    parser.add_argument("--data", help="recordings for MODEL, of signals that have gone through no filter")
     parser.add_argument("--windows", type=int, default=1000)
     parser.add_argument("--frames", type=int, default=1200)
     parser.add_argument("--csv", help="adds a line for each part to this file")
@@ -147,9 +156,11 @@ def main():
         return 77
     wrong, rows = 0, []
     with tempfile.TemporaryDirectory() as folder:
+        args.raw = args.data  # frames as a sensor gives them: the device filters them as the training signals were
         if args.model is None:
             args.model, args.data = trained(args.bin, folder, args.preset)
-        recording = sorted(glob.glob(args.data + "/*.safetensors"))[0]
+            args.raw = simulated(args.bin, folder + "/raw", "--trials", "1", "--plates", "ridges6", "--without", "filter")
+        recording = first_of(args.raw)
         subprocess.run([args.bin + "/supertac-export", args.model, "--c99", folder, "--name", "finger", "--sensor-hz",
                         repr(rate_of(recording)), "--force"], check=True, stdout=subprocess.DEVNULL)
         given = {"windows": windows_of(args, folder), "frames": frames_of(args, folder)}
