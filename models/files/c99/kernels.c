@@ -170,7 +170,8 @@ static void product_of_numbers(const struct product *p, const struct map *x, con
     }
 }
 
-/* y = x in another scale. The pointers walk: of to[i] GCC 12 makes nothing at -O1 and -O2, since it sees no store. */
+/* y = x in another scale. The pointers walk: to[i] becomes an address (pass ivopts) in which GCC 12, at -O1 and -O2,
+   sees no memory of others (pass pure-const), so that it took the function for pure and left out its calls. */
 static void to_bytes(const struct map *x, const struct map *y, int32_t multiplier, int32_t offset, int32_t shift) {
   const int32_t n = x->width * x->channels;
   int32_t line, i;

@@ -73,8 +73,8 @@ std::vector<SuperTacSettings> all_settings() {
 TEST(CCode, DrawsTheBitsOfAPreparedNetwork) {
   if (!has_compiler()) GTEST_SKIP() << "no C compiler";
   for (const SuperTacSettings& settings : all_settings())
-    for (const char* flags :
-         {"-O1", "-O2", "-Os", "-O3 -march=native", "-O1 -fsanitize=undefined -fno-sanitize-recover"}) {
+    for (const char* flags : {"-Og", "-O1", "-O2", "-Os", "-O3 -march=native",
+                              "-O1 -fsanitize=undefined -fno-sanitize-recover"}) {
       const ModelFile file = model_of(settings, {});
       const Compiled code(c_code_of(file, "finger", 100, "a test"), flags);
       const auto draw = code.function<void(const float*, float*, float*)>("finger_draw");
