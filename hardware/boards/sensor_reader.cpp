@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "hardware/ports/errors.h"
 #include "io/numbers/numbers.h"
@@ -161,16 +162,18 @@ void SensorReader::check_silence(double time_s) {
 }
 
 // Right after the start: a clock in another unit than the file says is a thousand times too fast or too slow.
-// Frames that come faster than they were made are a log that somebody sends.
+// A single jump says nothing: old frames may have waited, or a clock may just have been set. Frames that come
+// faster than they were made are a log that somebody sends.
 void SensorReader::check_clock(double time_s, double arrival_s) {
   constexpr double kLongEnoughS = 1, kMostOff = 300, kMostHaste = 3;
-  if (checked_frames_++ == 0) first_time_s_ = time_s, first_arrival_s_ = arrival_s;
+  if (checked_frames_++ == 0) first_time_s_ = checked_time_s_ = time_s, first_arrival_s_ = arrival_s;
+  longest_step_s_ = std::max(longest_step_s_, time_s - std::exchange(checked_time_s_, time_s));
   const double elapsed = arrival_s - first_arrival_s_;
   if (elapsed < kLongEnoughS || checked_frames_ < 5) return;
   clock_checked_ = true;
-  const double ratio = (time_s - first_time_s_) / elapsed;
+  const double ratio = (time_s - first_time_s_) / elapsed, steady = ratio - longest_step_s_ / elapsed;
   const bool log = static_cast<double>(checked_frames_) / elapsed > kMostHaste * sensor_.rate_hz;
-  if (log || (ratio < kMostOff && ratio > 1 / kMostOff)) return;
+  if (log || (steady < kMostOff && ratio > 1 / kMostOff)) return;
   throw WrongDevice("sensor " + sensor_.name + " at " + port_->name() + ": its time stamps go " +
                     format(ratio, ratio < 1 ? 6 : 0) +
                     " s a second; see whether its file names the right column and unit (s, ms, us) of time");
@@ -182,14 +185,10 @@ void SensorReader::take(const DecodedFrame& decoded, double arrival_s) {
   const bool damaged = !std::ranges::all_of(signals_, [](float v) { return std::isfinite(v); }) ||
                        (decoded.time_s && !std::isfinite(*decoded.time_s));
   const auto time = damaged ? std::nullopt : dates_.date(decoded.time_s, arrival_s);
+  if (time && live_ && decoded.time_s && !clock_checked_) check_clock(*time, arrival_s);
   std::unique_lock lock(mutex_);
   counters_.damaged += damaged ? 1 : 0, counters_.late += !damaged && !time ? 1 : 0;
   if (!time) return;
-  if (live_ && decoded.time_s && !clock_checked_) {
-    lock.unlock();
-    check_clock(*time, arrival_s);
-    lock.lock();
-  }
   if (!live_) {
     taken_.wait(lock, [&] { return queue_.size() < kQueueFrames || stop_; });
     if (stop_) return;

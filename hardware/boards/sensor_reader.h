@@ -89,7 +89,7 @@ class SensorReader {
   std::vector<float> signals_;
   std::string beginning_;  // of what came before the first frame
   double last_frame_s_;
-  double first_time_s_ = 0, first_arrival_s_ = 0;
+  double first_time_s_ = 0, first_arrival_s_ = 0, checked_time_s_ = 0, longest_step_s_ = 0;
   std::uint64_t checked_frames_ = 0;
   bool clock_checked_ = false;
 

@@ -184,29 +184,34 @@ TEST(SensorReader, ASensorFarSlowerThanItsFileSaysLosesNothing) {
   EXPECT_GE(read, 98) << "of a file all comes at once: two frames are doubted";
 }
 
-// Milliseconds that the file calls seconds or microseconds.
-TEST(SensorReader, AClockInAnotherUnitIsRefused) {
-  for (const std::string unit : {"s", "us", "ms"}) {
-    const Sensor sensor = mat(1, 2, 100, R"({"kind":"text","time":{"column":0,"unit":")" + unit + "\"}}");
-    int a, b;
-    ASSERT_EQ(openpty(&a, &b, nullptr, nullptr, nullptr), 0);
-    const std::string device = ptsname(a);
-    SensorReader reader(open_port("serial:" + device + "@115200"), sensor);
-    std::string said = "nothing";
-    try {
-      const double begin = monotonic_seconds();
-      for (int n = 0; monotonic_seconds() < begin + 2; ++n) {
-        const std::string line = std::to_string(std::lround(1000 * (monotonic_seconds() - begin))) + ",1,2\n";
-        ASSERT_EQ(write(a, line.data(), line.size()), static_cast<ssize_t>(line.size()));
-        while (reader.next(0.01)) continue;
-      }
-    } catch (const WrongDevice& error) {
-      said = error.what();
+// What the reader says of a device that sends milliseconds for two seconds, which its file calls `unit`;
+// those of the first half second are `off_ms` off.
+std::string said_of_clock(const std::string& unit, long off_ms) {
+  int device, other;
+  EXPECT_EQ(openpty(&device, &other, nullptr, nullptr, nullptr), 0);
+  const std::string port = ptsname(device);
+  std::string said = "nothing";
+  try {
+    SensorReader reader(open_port("serial:" + port + "@115200"),
+                        mat(1, 2, 100, R"({"kind":"text","time":{"column":0,"unit":")" + unit + "\"}}"));
+    const double begin = monotonic_seconds();
+    for (double now = 0; now < 2; now = monotonic_seconds() - begin) {
+      const std::string line = std::to_string(std::lround(1000 * now) + (now < 0.5 ? off_ms : 0)) + ",1,2\n";
+      EXPECT_EQ(write(device, line.data(), line.size()), static_cast<ssize_t>(line.size()));
+      while (reader.next(0.01)) continue;
     }
-    EXPECT_EQ(said.find("unit (s, ms, us) of time") == std::string::npos, unit == "ms")
-        << unit << ": " << said;
-    close(a), close(b);
+  } catch (const WrongDevice& error) {
+    said = error.what();
   }
+  close(device), close(other);
+  return said;
+}
+
+TEST(SensorReader, AClockInAnotherUnitIsRefused) {
+  for (const char* unit : {"s", "us"})
+    EXPECT_NE(said_of_clock(unit, 0).find("unit (s, ms, us) of time"), std::string::npos) << unit;
+  EXPECT_EQ(said_of_clock("ms", 0), "nothing");
+  EXPECT_EQ(said_of_clock("ms", -5'000'000), "nothing") << "it was set after half a second";
 }
 
 // Chunks of a tenth of a second, a rate that is not the stated one, and frames that were lost.
