@@ -167,6 +167,10 @@ int run(Arguments& a) {
   tested.split = make_split(windows, split_kind(tested.split_name), tested.seed, tested.leave_out);
   check_test_set(a, files, tested);
   remark(a, remarks_on(windows, tested.split.test));
+  if (windows.filter_s() && files.front().input.filter_left(*windows.filter_s()) != 0)
+    remark(a, {"the recordings' signals have gone through a moving average of " +
+               format(*windows.filter_s()) + " s, those of the training through one of " +
+               format(*files.front().input.filter_s) + " s: the network does not know such signals"});
   if (const int side = std::min(windows.image().height, windows.image().width); side < kSsimWindow)
     a.note("pictures of " + windows.image().text() + " pixels: SSIM's window is " +
            std::to_string((side - 1) / 2 * 2 + 1) + " pixels wide instead of " + std::to_string(kSsimWindow) +

@@ -23,12 +23,14 @@ namespace {
 // The samples before `seconds`, filtered, resampled and scaled as the model's training was: [1,T,signals].
 Tensor window_at(const ModelFile& file, const Recording& recording, double seconds) {
   const SuperTacSettings& settings = file.model->settings();
-  const double trained_behind_s = file.input.filter_s.value_or(recording.filter_s());
+  const std::optional<double> filter_s = file.input.filter_left(recording.filter_s());
+  if (!filter_s)
+    throw std::runtime_error("the recording's signals were filtered otherwise than the training's");
   LiveWindow live({.timesteps = static_cast<int>(settings.timesteps),
                    .signals = recording.array.signals(),
                    .rate_hz = file.input.rate_hz,
                    .scaling = file.input.scaling,
-                   .filter_s = recording.filter_s() > 0 ? 0 : trained_behind_s,
+                   .filter_s = *filter_s,
                    .frame_period_s = (recording.time_s.back() - recording.time_s.front()) /
                                      static_cast<double>(recording.frames() - 1)});
   for (std::size_t i = 0; i < recording.frames() && recording.time_s[i] <= seconds; ++i)

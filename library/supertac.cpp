@@ -215,9 +215,8 @@ supertac_live* supertac_live_new(const supertac_model* model, double frame_hz, d
     expect(frame_hz >= 1 && frame_hz <= 100'000, "supertac_live_new: frame_hz must be 1 to 100000");
     expect(filter_s >= 0 && filter_s <= 10, "supertac_live_new: filter_s must be 0 to 10");
     const InputSettings& input = model->file.input;
-    const double trained_s = input.filter_s.value_or(filter_s);
-    const bool same = std::abs(trained_s - filter_s) < 1e-4;
-    expect(same || filter_s == 0,
+    const std::optional<double> left_s = input.filter_left(filter_s);
+    expect(left_s.has_value(),
            "supertac_live_new: the frames have gone through another moving average than the model's training "
            "signals; give it frames without");
     return new supertac_live{
@@ -226,7 +225,7 @@ supertac_live* supertac_live_new(const supertac_model* model, double frame_hz, d
                     .signals = model->file.array().signals(),
                     .rate_hz = input.rate_hz,
                     .scaling = input.scaling,
-                    .filter_s = same ? 0 : trained_s,
+                    .filter_s = *left_s,
                     .frame_period_s = 1 / frame_hz}),
         Tensor(model->file.model->input_shape(1))};
   });

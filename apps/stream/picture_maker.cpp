@@ -17,19 +17,18 @@ LiveWindowSettings window_settings(const ModelFile& model, const SensorSource& s
                              ", the model was trained on " + model.array().text() +
                              "; choose signals and model of one array (supertac-info tells)");
   }
-  const double filter_s = source.filter_s();
-  const double trained_s = model.input.filter_s.value_or(filter_s);
-  const bool same = std::abs(trained_s - filter_s) < 1e-4;
-  if (!same && filter_s > 0) {
-    throw std::runtime_error("the signals have gone through a moving average of " + format(filter_s) +
-                             " s, the model was trained behind one of " + format(trained_s) +
+  const std::optional<double> filter_s = model.input.filter_left(source.filter_s());
+  if (!filter_s) {
+    throw std::runtime_error("the signals have gone through a moving average of " +
+                             format(source.filter_s()) + " s, the model was trained behind one of " +
+                             format(*model.input.filter_s) +
                              " s; choose signals and model of one kind (supertac-info tells)");
   }
   return {.timesteps = static_cast<int>(model.model->settings().timesteps),
           .signals = model.array().signals(),
           .rate_hz = model.input.rate_hz,
           .scaling = model.input.scaling,
-          .filter_s = same ? 0 : trained_s,
+          .filter_s = *filter_s,
           .frame_period_s = source.period_s()};
 }
 

@@ -121,6 +121,13 @@ std::string ModelFile::metadata_or(const std::string& key, const std::string& ot
   return found == metadata.end() ? otherwise : found->second;
 }
 
+std::optional<double> InputSettings::filter_left(double done_s) const {
+  constexpr double kSameS = 1e-4;
+  const double wanted_s = filter_s.value_or(done_s);
+  if (std::abs(wanted_s - done_s) < kSameS) return 0;
+  return done_s > 0 ? std::nullopt : std::optional(wanted_s);
+}
+
 double ModelFile::interval_factor() const {
   return parse_double(metadata_or("interval_factor", "")).value_or(kIntervalFactor);
 }

@@ -24,6 +24,9 @@ struct InputSettings {
   /// Length of the moving average (s) that the training signals went through, 0 = none; empty when they
   /// differed.
   std::optional<double> filter_s = 0.0;
+  /// The moving average (s) that signals still need, to be like those of the training, after one of `done_s`;
+  /// empty when that was another one.
+  std::optional<double> filter_left(double done_s) const;
   Pitch pitch_mm = 3;             ///< of the array
   SignalScale signal_scale = {};  ///< as the recordings state it: unit, polarity and range of the signals
 };

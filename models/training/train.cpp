@@ -58,6 +58,17 @@ StoredTensor ranges_of(const Trainer& trainer) {
   return ranges.stored();
 }
 
+// A wrong name is better found before the training than behind it.
+void check_output(const std::string& out) {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::path(out).parent_path();
+  std::error_code none;
+  if (out.empty() || fs::is_directory(out, none))
+    throw FileError(out, "is no name of a file to write a model to");
+  if (!folder.empty() && !fs::is_directory(folder, none))
+    throw FileError(out, "cannot be written: its folder is missing");
+}
+
 }  // namespace
 
 bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& callbacks) {
@@ -114,15 +125,6 @@ void save_trained(const Trainer& trainer, const std::string& path,
   std::vector<StoredTensor> more = novelty_of(trainer);
   more.push_back(ranges_of(trainer));
   write_checkpoint(path, trainer.model().parameters(), trainer.metadata(origin), more);
-}
-
-// A wrong name is better found before the training than behind it.
-static void check_output(const std::string& out) {
-  namespace fs = std::filesystem;
-  const fs::path folder = fs::path(out).parent_path();
-  if (out.empty() || fs::is_directory(out)) throw FileError(out, "is no name of a file to write a model to");
-  if (!folder.empty() && !fs::is_directory(folder))
-    throw FileError(out, "cannot be written: its folder is missing");
 }
 
 bool train(const Recipe& recipe, const RecordingFolders& folders, const std::string& out,

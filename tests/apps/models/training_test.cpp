@@ -91,6 +91,22 @@ TEST_F(Training, EvaluationSaysThatSplitNoneHasSeenItAll) {
   EXPECT_NE(result.error.find("it has seen every one of them"), std::string::npos) << result.error;
 }
 
+TEST_F(Training, EvaluationWarnsOfSignalsThroughAnotherFilter) {
+  const ProcessResult trained = train("filtered.safetensors", {"--epochs", "1"});
+  ASSERT_EQ(trained.code, 0) << trained.error;
+  const ProcessResult made =
+      run_process("supertac-simulate", {"--out", path("raw"), "--plates", "3_Bumps", "--speeds", "10",
+                                        "--passes", "1", "--without", "filter"});
+  ASSERT_EQ(made.code, 0) << made.error;
+  const auto warning_on = [](const std::string& data) {
+    return run_process("supertac-evaluate",
+                       {"--model", path("filtered.safetensors"), "--data", path(data), "--limit", "20"})
+        .error.find("a moving average of 0 s, those of the training through one of 0.0992 s");
+  };
+  EXPECT_NE(warning_on("raw"), std::string::npos);
+  EXPECT_EQ(warning_on("data"), std::string::npos);
+}
+
 TEST_F(Training, HelpSaysWhatTinyCosts) {
   EXPECT_NE(run_process("supertac-train", {"--help"}).out.find("a ninth of the"), std::string::npos);
 }

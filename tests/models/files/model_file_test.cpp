@@ -127,5 +127,16 @@ TEST(ModelFile, AFrameModelOfPairsIsRefusedByName) {
   EXPECT_EQ(load_error(path), path + ": expected a model, found kind 'cheese'");
 }
 
+TEST(ModelFile, KnowsWhichFilterSignalsStillNeed) {
+  const InputSettings filtered{100, {}, 0.1}, raw{100, {}, 0.0}, mixed{100, {}, std::nullopt};
+  EXPECT_EQ(filtered.filter_left(0), 0.1);
+  EXPECT_EQ(filtered.filter_left(0.10005), 0.0);
+  EXPECT_EQ(filtered.filter_left(0.05), std::nullopt);
+  EXPECT_EQ(raw.filter_left(0), 0.0);
+  EXPECT_EQ(raw.filter_left(0.1), std::nullopt);
+  EXPECT_EQ(mixed.filter_left(0.1), 0.0);
+  EXPECT_EQ(mixed.filter_left(0), 0.0);
+}
+
 }  // namespace
 }  // namespace supertac
