@@ -51,7 +51,8 @@ function(supertac_precompile target)
     target_precompile_headers(${header} PRIVATE ${headers_${kind}})
   endif()
   # GCC 12 forgets in a precompiled header where it may not warn of its own std::string.
-  target_compile_options(${target} PRIVATE ${OpenMP_CXX_FLAGS} -Wno-stringop-overflow -Wno-stringop-overread -Wno-array-bounds)
+  target_compile_options(${target} PRIVATE ${OpenMP_CXX_FLAGS}
+    "$<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow;-Wno-stringop-overread;-Wno-array-bounds>")
   target_precompile_headers(${target} REUSE_FROM ${header})
 endfunction()
 
