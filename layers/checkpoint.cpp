@@ -119,7 +119,8 @@ void load_parameters(const SafetensorsFile& file, const std::string& path,
     if (std::string problem = mismatch(file, p.name, p); !problem.empty())
       problems.push_back(std::move(problem));
   }
-  for (const auto& [name, info] : file.tensors()) {
+  for (const auto& entry : file.tensors()) {
+    const std::string& name = entry.first;  // a lambda of Clang 14 captures no structured binding
     const auto begins = [&](std::string_view prefix) { return name.starts_with(prefix); };
     if (!known.contains(name) && std::ranges::none_of(beside, begins))
       problems.push_back("unexpected " + name);

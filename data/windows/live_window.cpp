@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
 #include <stdexcept>
 #include <string>
 
@@ -116,10 +115,14 @@ bool LiveWindow::window_until(double end_s, std::span<float> out) {
     const double periods = (end_s - filtered_.time_s(frame)) * settings_.rate_hz;
     return static_cast<std::ptrdiff_t>(std::floor(periods + kCellSlack));
   };
-  const auto all = std::views::iota(std::size_t{0}, frames);
-  std::size_t at = static_cast<std::size_t>(
-      std::ranges::partition_point(all, [&](std::size_t frame) { return sample(frame) >= timesteps; }) -
-      all.begin());
+  std::size_t at = 0;  // the first frame that is not older than the window
+  for (std::size_t end = frames; at < end;) {
+    const std::size_t middle = at + (end - at) / 2;
+    if (sample(middle) >= timesteps)
+      at = middle + 1;
+    else
+      end = middle;
+  }
   if (at != 0 && (at == frames || sample(at) < timesteps - 1)) {
     // The oldest sample has no frames: it repeats the last one before the window.
     const std::ptrdiff_t before = sample(at - 1);

@@ -8,7 +8,6 @@
 #include <cstring>
 #include <functional>
 #include <initializer_list>
-#include <source_location>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -50,16 +49,23 @@ inline bool same_bytes(const Tensor& a, const Tensor& b) {
 inline Variable constant(const Tensor& t) { return Variable(t); }
 inline Variable parameter(const Tensor& t) { return Variable(t, true); }
 
+/// A line of a test; std::source_location is more than Clang 14 can do with this standard library.
+struct Place {
+  const char* file;
+  int line;
+  static Place current(const char* file = __builtin_FILE(), int line = __builtin_LINE()) {
+    return {file, line};
+  }
+};
+
 /// What fails below names the line of the test that asked.
 class At {
  public:
-  explicit At(const std::source_location& place)
-      : trace_(place.file_name(), static_cast<int>(place.line()), "asked for here") {}
+  explicit At(const Place& place) : trace_(place.file, place.line, "asked for here") {}
 
  private:
   testing::ScopedTrace trace_;
 };
-using Place = std::source_location;
 
 inline void expect_values(const Tensor& found, const Shape& shape, std::initializer_list<double> expected,
                           double tolerance = kRounding, const Place& place = Place::current()) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
 
 namespace supertac {
 namespace {
@@ -59,10 +58,10 @@ std::string where_not_finite(const Variable& loss, const std::vector<Parameter>&
 }
 
 std::string gradient_not_finite(const std::vector<Parameter>& parameters) {
-  for (const Parameter& p : parameters | std::views::reverse) {
-    if (p.value.grad().defined() && !finite(p.value.grad())) return p.name;
-  }
-  return {};
+  const auto last = std::find_if(parameters.rbegin(), parameters.rend(), [](const Parameter& p) {
+    return p.value.grad().defined() && !finite(p.value.grad());
+  });
+  return last == parameters.rend() ? "" : last->name;
 }
 
 }  // namespace supertac
