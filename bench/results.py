@@ -27,6 +27,7 @@ TABLES = {
     "bench/results/accuracy.md": [tables.reached, tables.first_contact, tables.demo],
     "docs/paper.md": [table1, table2, table2_tests, figure7, figure8, figure10, figure11],
     "bench/results/unseen_plates.md": [tables.left_out],
+    "bench/results/sensors.md": [tables.other_sensors],
     "bench/results/sensor_faults.md": [tables.corruptions, tables.silence],
     "bench/results/speed.md": [tables.speed, tables.precision],
     "bench/results/reliability.md": [tables.studies],

@@ -37,6 +37,12 @@ def percent(found, column, digits=1):
     return f"{100 * mean(found, column):.{digits}f} %"
 
 
+def spans(found, column, digits):
+    """The mean and, of few lines, the least and the largest."""
+    values = [float(r[column]) for r in found]
+    return f"{statistics.fmean(values):.{digits}f} ({min(values):.{digits}f} to {max(values):.{digits}f})"
+
+
 def plus_minus(value, half, digits):
     return f"{float(value):.{digits}f}" + (f" ± {float(half):.{digits}f}" if float(half or 0) > 0 else "")
 
@@ -121,6 +127,23 @@ def left_out():
     return table(["plate left out", "contact SSIM", "PSNR dB", "ghost rate", "miss rate", "intervals hold", "SSIM on trial 2",
                   "without random plates"],
                  [line(plate, of) for plate, of in plates.items()] + [line("mean of the first four", list(by_seed()))])
+
+
+# Other sensors --------------------------------------------------------------------------------------------------------
+
+def other_sensors():
+    found = rows("sensors.csv")
+
+    def line(name, method):
+        of = chosen(found, set=name, method=method)
+        optional = lambda text, column: text(of, column) if of[0][column] else ""
+        figures = lambda digits: lambda of, column: f"{mean(of, column):.{digits}f}"
+        return [name, method, spans(of, "ssim", 3), spans(of, "psnr_db", 1), optional(figures(3), "contact_ssim"),
+                optional(figures(3), "peak_ssim"), optional(figures(1), "peak_psnr_db"), optional(percent, "coverage")]
+
+    sets, methods = (dict.fromkeys(r[column] for r in found) for column in ("set", "method"))
+    return table(["set", "method", "SSIM", "PSNR dB", "contact SSIM", "peak SSIM", "peak PSNR dB", "intervals hold"],
+                 [line(name, method) for name in sets for method in methods if chosen(found, set=name, method=method)])
 
 
 # When the sensor misbehaves -------------------------------------------------------------------------------------------

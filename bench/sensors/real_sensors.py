@@ -28,7 +28,7 @@ KEPT = BENCH / "results" / "sensors.csv"
 COLUMNS = ("set", "seed", "method", "frames", "ssim", "psnr_db", "peak_ssim", "peak_psnr_db", "contact_ssim",
            "contact_psnr_db", "coverage", "command", "commit")
 SEEDS = (0, 1, 2)
-EPOCHS = {"press": 15, "soles": 8, "soles_x2": 8, "mat": 60, "covers": 20, "sessions": 10}
+EPOCHS = {"press": 15, "soles": 40, "soles_x2": 40, "mat": 60, "covers": 20, "sessions": 10}
 RATE = {"press": 55, "soles": 62.5, "covers": 100, "sessions": 100}
 
 
@@ -126,7 +126,7 @@ def keep(row):
         writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
         writer.writeheader()
         writer.writerows(lines)
-    print(row, flush=True)
+    print(*lines[-1].values(), flush=True)
 
 
 def main():
