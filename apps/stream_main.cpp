@@ -9,6 +9,7 @@
 #include "apps/common/running/signals.h"
 #include "apps/stream/stream.h"
 #include "apps/web/web_options.h"
+#include "data/plates/plate_file.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
@@ -33,6 +34,7 @@ std::string source_of(const Arguments& a) {
   }
   if (a.text("out") == "-" && a.text("json") == "-") throw UsageError("--out and --json: only one to stdout");
   if (a.given("plate") && !a.given("record")) throw UsageError("--plate: only with --record");
+  if (!is_unknown_plate(a.text("plate"))) read_option("plate", [&] { return Plate::named(a.text("plate")); });
   if (a.given("capture") && !a.given("board")) throw UsageError("--capture: only with --board");
   return source;
 }
@@ -74,7 +76,7 @@ void declare(Arguments& a) {
               "PlotJuggler and "
               "ros2 bag open")
       .option("record", "DIR", "keep the signals as a recording in this folder, the next pass of its plate")
-      .option("plate", "NAME", "what the recording slides over", "unknown")
+      .option("plate", "NAME", "what the recording slides over: a plate's name, or an STL file", "unknown")
       .option("udp", "HOST:PORT",
               "send a datagram of JSON for each picture, e.g. to PlotJuggler at 127.0.0.1:9870")
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")

@@ -1,6 +1,8 @@
 #include "apps/import/tables.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 
@@ -100,6 +102,33 @@ struct TableImport {
     return recording;
   }
 
+  /// Refuses positions that cannot be those of the array on the plate.
+  void check_places(const std::string& path, const Recording& recording) const {
+    constexpr float kMetresMm = 0.5F;
+    const ImageGrid reach = sensor.array.picture(1);
+    const double reach_x = reach.width_mm() / 2, reach_y = reach.height_mm() / 2;
+    std::array<float, 2> low{1e30F, 1e30F}, high{-1e30F, -1e30F};
+    std::size_t known = 0, on = 0, on_exchanged = 0;
+    const auto over = [&](double x, double y) {
+      return x > -reach_x && x < Plate::kWidthMm + reach_x && y > -reach_y && y < Plate::kLengthMm + reach_y;
+    };
+    for (std::size_t i = 0; i + 1 < recording.position_mm.size(); i += 2) {
+      const float x = recording.position_mm[i], y = recording.position_mm[i + 1];
+      if (!std::isfinite(x) || !std::isfinite(y)) continue;
+      ++known, on += over(x, y), on_exchanged += over(y, x);
+      low = {std::min(low[0], x), std::min(low[1], y)}, high = {std::max(high[0], x), std::max(high[1], y)};
+    }
+    const bool corner = std::max({-low[0], -low[1], high[0], high[1]}) < kMetresMm;
+    if (known == 0 || (2 * on >= known && !corner)) return;
+    throw FileError(path, "the array's centre goes from x " + format(low[0], 2) + " to " +
+                              format(high[0], 2) + " and y " + format(low[1], 2) + " to " +
+                              format(high[1], 2) + ", expected mm on a plate of " + format(Plate::kWidthMm) +
+                              " x " + format(Plate::kLengthMm) +
+                              (corner                      ? "; are these metres?"
+                               : 2 * on_exchanged >= known ? "; are x and y exchanged?"
+                                                           : "; take off the plate's origin"));
+  }
+
   /// Positions that no column and no log holds are found from the signals, over a known plate.
   Recording import(const TableFile& file, int pass, std::size_t& dropped,
                    std::optional<Registration>& fit) const {
@@ -111,6 +140,7 @@ struct TableImport {
     if (!file.group.empty()) recording.metadata["group"] = file.group;
     if (const std::string log = companion(arguments, "positions", file); !log.empty())
       add_positions(recording, log, read_table(log), map.time_unit_s);
+    if (plate) check_places(path, recording);
     if (const std::string images = companion(arguments, "truth", file); !images.empty())
       add_truth(recording, images, read_table(images), truth_range[0], truth_range[1]);
     if (plate && recording.position_mm.empty() && recording.truth.empty()) {

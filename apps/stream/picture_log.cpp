@@ -14,6 +14,11 @@
 #include "io/numbers/numbers.h"
 
 namespace supertac {
+namespace {
+
+constexpr std::uint64_t kCheckBytes = 64 << 10, kSpareBytes = 256 << 10;  // of room for the file
+
+}  // namespace
 
 PictureLog::PictureLog(OutputPath output, const PictureFormat& format)
     : output_(std::move(output)), format_(format) {
@@ -26,8 +31,8 @@ PictureLog::PictureLog(OutputPath output, const PictureFormat& format)
 }
 
 void PictureLog::fail() {
-  problem_ = std::string("the pictures cannot be kept: ") + strerror(errno) +
-             "; make room, or choose another folder";
+  problem_ =
+      std::string("nothing can be kept there: ") + strerror(errno) + "; make room, or choose another folder";
   throw FileError(output_.path, problem_);
 }
 
@@ -43,9 +48,22 @@ PictureLog::Spool PictureLog::open_spool() {
 
 void PictureLog::append(const Spool& spool, std::span<const std::byte> bytes) {
   if (std::fwrite(bytes.data(), 1, bytes.size(), spool.get()) != bytes.size()) fail();
+  bytes_ += bytes.size();
+}
+
+// The file is as large as the temporary ones, which go only when it is complete.
+void PictureLog::check_room() {
+  if (bytes_ < checked_bytes_ + kCheckBytes) return;
+  checked_bytes_ = bytes_;
+  std::error_code error;
+  const auto space = std::filesystem::space(std::filesystem::absolute(output_.path).parent_path(), error);
+  if (error || space.available > bytes_ + kSpareBytes) return;
+  throw FileError(output_.path, "the disk is nearly full: the " + std::to_string(count_) +
+                                    " frames until here are kept; make room, or choose another folder");
 }
 
 void PictureLog::add(const Seen& seen) {
+  check_room();
   if (count_ == 0) began_s_ = seen.wall_s - seen.time_s, first_s_ = seen.time_s;
   append(times_, std::as_bytes(std::span(&seen.time_s, 1)));
   append(volts_, std::as_bytes(seen.volts));

@@ -26,7 +26,7 @@ class PictureLog {
  public:
   /// Throws FileError when the file cannot be made there, or exists and is not to be replaced.
   PictureLog(OutputPath output, const PictureFormat& format);
-  /// Throws FileError
+  /// Throws FileError; where there is room for no more than writing what it has, write() still can.
   void add(const Seen& seen);
   /// Writes the file, atomically. Throws FileError, again when add() has.
   void write(std::map<std::string, std::string> metadata);
@@ -42,6 +42,7 @@ class PictureLog {
 
   Spool open_spool();
   void append(const Spool& spool, std::span<const std::byte> bytes);
+  void check_room();
   void read_back(const Spool& spool, const ByteSink& sink);
   std::vector<std::byte> dated_times();
   void read_rows(const Spool& spool, std::size_t row_bytes, const ByteSink& sink);
@@ -50,11 +51,12 @@ class PictureLog {
   OutputPath output_;
   PictureFormat format_;
   std::uint64_t count_ = 0, left_out_ = 0;
-  double began_s_ = NAN;                // Seen::wall_s of Seen::time_s 0
-  double first_s_ = 0;                  // Seen::time_s of the first
-  std::vector<FrameArrival> arrivals_;  // of a recording of a board
-  std::vector<bool> kept_;              // of its frames
-  std::string problem_;                 // of a write that failed: what was kept is not whole
+  std::uint64_t bytes_ = 0, checked_bytes_ = 0;  // in the temporary files
+  double began_s_ = NAN;                         // Seen::wall_s of Seen::time_s 0
+  double first_s_ = 0;                           // Seen::time_s of the first
+  std::vector<FrameArrival> arrivals_;           // of a recording of a board
+  std::vector<bool> kept_;                       // of its frames
+  std::string problem_;                          // of a write that failed: what was kept is not whole
   Spool times_, volts_, pictures_, half_widths_, distances_;
 };
 

@@ -48,11 +48,12 @@ std::string Recorder::stop() {
   const std::scoped_lock lock(log_mutex_, mutex_);
   if (!log_) return "nothing is being recorded";
   status_.said = "writing " + status_.recording;
-  writer_ = std::thread(&Recorder::complete, this, std::move(log_), std::exchange(status_.recording, ""));
+  writer_ = std::thread(&Recorder::complete, this, std::move(log_), std::exchange(status_.recording, ""), "");
   return status_.said;
 }
 
-void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name) {
+void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name, const std::string& why) {
+  const std::lock_guard writing(write_mutex_);
   std::string said = "recorded " + name;
   taken_.clear();
   try {
@@ -63,7 +64,7 @@ void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name) {
   }
   const std::lock_guard lock(mutex_);
   if (said == "recorded " + name) status_.files.push_back(name);
-  status_.said = said;
+  status_.said = said + (why.empty() || said == why ? "" : "; " + why);
 }
 
 void Recorder::add(const Seen& seen) {
@@ -74,10 +75,12 @@ void Recorder::add(const Seen& seen) {
   try {
     log_->add(seen);
   } catch (const FileError& error) {
-    log_.reset();
-    const std::lock_guard status_lock(mutex_);
-    status_.said = error.what();
-    status_.recording.clear();
+    std::string name;
+    {
+      const std::lock_guard status_lock(mutex_);
+      name = std::exchange(status_.recording, "");
+    }
+    complete(std::move(log_), name, error.what());
   }
 }
 

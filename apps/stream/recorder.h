@@ -29,7 +29,8 @@ class Recorder {
   std::string stop();
   /// Stops, and waits until the last file is written; empty when there was none.
   std::string finish();
-  /// Of the stream's thread: nothing unless it is recording. A recording that cannot be kept ends.
+  /// Of the stream's thread: nothing unless it is recording. When the disk is full a recording ends, and what
+  /// it has is written at once.
   void add(const Seen& seen);
 
   struct Status {
@@ -43,7 +44,7 @@ class Recorder {
   std::optional<std::string> file(const std::string& name);
 
  private:
-  void complete(std::unique_ptr<PictureLog> log, std::string name);
+  void complete(std::unique_ptr<PictureLog> log, std::string name, const std::string& why);
 
   PictureFormat format_;
   std::map<std::string, std::string> metadata_;
@@ -56,7 +57,8 @@ class Recorder {
   std::mutex mutex_;  // of status_
   Status status_;
   std::thread writer_;  // of the starting and stopping thread
-  std::string taken_;   // of writer_: its file got another name, and why
+  std::mutex write_mutex_;
+  std::string taken_;  // of what complete() writes: the file got another name, and why
 };
 
 }  // namespace supertac

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "apps/common/running/signals.h"
+#include "data/plates/plate_file.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
@@ -78,11 +79,15 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
 void Stream::describe_recording() {
   Recording about;
   about.array = source_.array(), about.signal_scale = source_.signal_scale();
-  about.plate = settings_.plate, about.trial = 1, about.source = "streamed";
+  about.plate = std::filesystem::path(settings_.plate).filename().string(), about.trial = 1,
+  about.source = "streamed";
   if (source_.filter_s() > 0) about.metadata["filter_s"] = format(source_.filter_s());
   if (!source_.silent().empty()) about.metadata["silent_taxels"] = nlohmann::json(source_.silent()).dump();
   about.metadata["origin"] = settings_.source;
-  if (!settings_.record.empty()) make_directories(settings_.record);
+  if (!settings_.record.empty()) {
+    make_directories(settings_.record);
+    keep_plate_file(settings_.plate, settings_.record);
+  }
   std::error_code error;
   do {
     ++about.pass;
@@ -129,6 +134,16 @@ void Stream::complete() {
   source_.finish();
 }
 
+// Empty where frames come as often as the source says, to a quarter.
+std::string Stream::rate_remark() const {
+  constexpr double kLongEnoughS = 1, kMostOff = 1.25;
+  const double seconds = last_s_ - first_s_, stated = 1 / source_.period_s();
+  const double found = static_cast<double>(frames_ - 1) / seconds;
+  if (!source_.live() || seconds < kLongEnoughS || (found < kMostOff * stated && stated < kMostOff * found))
+    return "";
+  return "; " + format(found, 1) + " frames came a second, the sensor is said to send " + format(stated, 1);
+}
+
 std::string Stream::summary() const {
   const BoardCounters counters = source_.counters();
   return std::to_string(frames_) + " frames in " + format(last_s_ - first_s_, 1) + " s, " +
@@ -141,7 +156,7 @@ std::string Stream::summary() const {
          (record_ && record_->left_out() > 0
               ? ", " + std::to_string(record_->left_out()) + " frames left out, their time being uncertain"
               : "") +
-         (record_remark_.empty() ? "" : "; " + record_remark_);
+         (record_remark_.empty() ? "" : "; " + record_remark_) + rate_remark();
 }
 
 nlohmann::ordered_json Stream::result() const {

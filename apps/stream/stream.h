@@ -27,7 +27,7 @@ struct StreamSettings {
   std::string classifier = {};          ///< file that names the texture; empty: none
   OutputPath mcap = "";                 ///< MCAP file that keeps frames and pictures; empty: none
   std::string record = {};              ///< folder that gets a recording; empty: none
-  std::string plate = "unknown";        ///< of the recording
+  std::string plate = "unknown";        ///< of the recording: a plate's name or an STL file
   std::string udp = {};                 ///< HOST:PORT that gets a line for each; empty: none
   bool view = false;                    ///< draw on the terminal
   std::optional<WebAddress> web = {};   ///< serve the live page
@@ -70,6 +70,7 @@ class Stream {
   void output(const Seen& seen);
   void complete();
   void describe_recording();
+  std::string rate_remark() const;
   void show();
   void name_texture();
   double milliseconds(double quantile) const { return 1e3 * latency_.quantile(quantile); }

@@ -286,7 +286,7 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
   if (split.train.empty() || split.test.empty())
     throw std::invalid_argument(
         "split " + name_of(kind) + ": no window to " + (split.train.empty() ? "train on" : "test on") +
-        (kind == SplitKind::trial     ? "; the data needs trials 1 and 2"
+        (kind == SplitKind::trial     ? "; the data needs trials 1 and 2; split pass or group does without"
          : kind == SplitKind::texture ? "; the data has nothing unlike what is left out: train beside random "
                                         "plates, score with split none"
                                       : ""));

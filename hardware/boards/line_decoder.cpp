@@ -82,6 +82,14 @@ class TextDecoder : public LineDecoder {
   }
 };
 
+/// What stands at `path`: a key, or keys of objects within objects, "finger.taxels". Throws where nothing
+/// does.
+const nlohmann::ordered_json& at_path(const nlohmann::ordered_json& json, const std::string& path) {
+  const std::size_t dot = path.find('.');
+  if (dot == std::string::npos || json.contains(path)) return json.at(path);
+  return at_path(json.at(path.substr(0, dot)), path.substr(dot + 1));
+}
+
 class JsonDecoder : public LineDecoder {
  public:
   using LineDecoder::LineDecoder;
@@ -91,8 +99,8 @@ class JsonDecoder : public LineDecoder {
     if (line.empty() || (line.front() != '{' && line.front() != '[')) return false;
     try {
       const auto json = parse_json_limited(line);
-      if (format_.time) frame.time_s = json.at(format_.time->key).get<double>() * format_.time->unit_s;
-      return flatten(format_.values.empty() ? json : json.at(format_.values), values_);
+      if (format_.time) frame.time_s = at_path(json, format_.time->key).get<double>() * format_.time->unit_s;
+      return flatten(format_.values.empty() ? json : at_path(json, format_.values), values_);
     } catch (const std::exception&) {  // of the parser, or a key that is missing or no number
       return false;
     }

@@ -18,8 +18,10 @@ namespace {
 
 constexpr double kMostly = 0.9, kText = 0.98;
 constexpr double kClock = 0.25;  // how far the host's clock and the sensor's may differ in a probe
-constexpr double kPressed = 12;  // times the noise: more than that is a finger
-constexpr double kAtOnceS = 0.2;
+constexpr std::size_t kMostRestarts = 2;
+constexpr double kRestarted = 0.3;  // of the time at least a clock runs that starts anew meanwhile
+constexpr double kPressed = 12;     // times the noise: more than that is a finger
+constexpr double kAtOnceS = 0.2, kAssumedHz = 100;
 constexpr std::size_t kFewLines = 3;  // of which nothing can be said
 
 struct Lines {
@@ -125,18 +127,19 @@ std::optional<Candidate> objects_of(const Lines& lines) {
   std::vector<std::size_t> nested;
   Candidate candidate{.format = {.kind = FrameKind::json}, .array = {}, .remark = {}};
   std::size_t most = 0, parsed = 0;
-  for (const auto line : lines.text) try {
-      const auto json = parse_json_limited(line);
-      const auto look = [&](const std::string& key, const nlohmann::ordered_json& value) {
+  const std::function<void(const std::string&, const nlohmann::ordered_json&)> look =
+      [&](const std::string& key, const nlohmann::ordered_json& value) {
+        if (value.is_object())
+          for (const auto& [inner, of] : value.items()) look(key.empty() ? inner : key + "." + inner, of);
         std::vector<float> numbers;
         if (value.is_number()) scalars[key].push_back(value.get<double>());
         if (!value.is_array() || !flatten(value, numbers) || numbers.size() <= most) return;
         most = numbers.size(), candidate.format.values = key, nested.clear();
         sizes_of(value, nested);
       };
-      if (json.is_array()) look("", json);
-      if (json.is_object())
-        for (const auto& [key, value] : json.items()) look(key, value);
+  for (const auto line : lines.text) try {
+      const auto json = parse_json_limited(line);
+      if (json.is_structured()) look("", json);
       ++parsed;
     } catch (const JsonError&) {  // no line of this kind
     }
@@ -153,18 +156,20 @@ std::optional<Candidate> objects_of(const Lines& lines) {
 
 struct Frames {
   std::vector<std::vector<float>> values;  // [value][frame]
-  std::size_t count = 0;
-  double first_s = 0, last_s = 0, frame_bytes = 0;
+  std::size_t count = 0, steps = 0;
+  double seconds = 0, frame_bytes = 0;  // of the steps in which time went on
 };
 
 Frames frames_of(const Sensor& sensor, std::span<const Heard> heard) {
   const auto decoder = make_decoder(sensor);
   Frames frames;
   frames.values.resize(sensor.values());
+  double before = 0;
   for (const Heard& chunk : heard)
     decoder->push(std::as_bytes(std::span(chunk.bytes)), [&](const DecodedFrame& frame) {
       const double time = frame.time_s.value_or(chunk.time_s);
-      (frames.count++ == 0 ? frames.first_s : frames.last_s) = time;
+      if (frames.count++ > 0 && time >= before) ++frames.steps, frames.seconds += time - before;
+      before = time;
       for (std::size_t k = 0; k < frame.values.size(); ++k) frames.values[k].push_back(frame.values[k]);
     });
   const auto counted = decoder->counters();
@@ -242,6 +247,14 @@ std::optional<Candidate> candidate_of(const std::string& bytes, std::span<const 
       return found;
     }
     found = objects_of(lines);
+    const bool json = 2 * std::ranges::count_if(lines.text, [](auto line) { return line.front() == '{'; }) >
+                      std::ssize(lines.text);
+    if (!found && json) {
+      says.push_back(
+          "objects of JSON without an array of numbers: the sensor has to send its taxels as one, "
+          "such as {\"values\": [1, 2, 3, 4]}");
+      return found;
+    }
     if (!found) found = columns_of(lines);
     if (!found)
       says.push_back(
@@ -262,16 +275,23 @@ std::optional<Candidate> candidate_of(const std::string& bytes, std::span<const 
 
 std::optional<double> unit_of_clock(std::span<const double> stamps, double seconds) {
   if (stamps.size() < kFewLines) return std::nullopt;
-  for (std::size_t i = 1; i < stamps.size(); ++i)
-    if (!(stamps[i] > stamps[i - 1])) return std::nullopt;
-  const double went = stamps.back() - stamps.front();
+  // A clock may start anew while one listens, and stands still meanwhile.
+  double went = 0;
+  std::size_t fell = 0;
+  for (std::size_t i = 1; i < stamps.size(); ++i) {
+    const double step = stamps[i] - stamps[i - 1];
+    if (!(step > 0) && ++fell > kMostRestarts) return std::nullopt;
+    went += std::max(step, 0.0);
+  }
   if (seconds < kAtOnceS) {  // a file says nothing of the time it took: a clock of milliseconds, or a counter
     const bool whole = std::ranges::all_of(stamps, [](double v) { return v == std::round(v); });
-    if (went == static_cast<double>(stamps.size() - 1)) return std::nullopt;
+    if (fell > 0 || went == static_cast<double>(stamps.size() - 1)) return std::nullopt;
     return whole ? 1e-3 : 1;
   }
-  for (const double unit : {1.0, 1e-3, 1e-6})
-    if (std::abs(went * unit / seconds - 1) < kClock) return unit;
+  for (const double unit : {1.0, 1e-3, 1e-6}) {
+    const double ratio = went * unit / seconds;
+    if (ratio > (fell > 0 ? kRestarted : 1 - kClock) && ratio < 1 + kClock) return unit;
+  }
   return std::nullopt;
 }
 
@@ -307,12 +327,16 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port,
     return report;
   }
   if (!found->remark.empty()) report.says.push_back(found->remark);
-  const double rate = static_cast<double>(frames.count - 1) / std::max(frames.last_s - frames.first_s, 1e-6);
-  draft.rate_hz = std::clamp(std::round(rate * 100) / 100, 1.0, 100'000.0);
-  report.says.push_back(
-      "frames of " + std::to_string(values) + " values, " + format(draft.rate_hz) + " a second" +
-      (draft.frame.time ? ", with a time stamp in " + format(draft.frame.time->unit_s) + " s"
-                        : ", without a time stamp"));
+  const double rate = static_cast<double>(frames.steps) / std::max(frames.seconds, 1e-6);
+  const bool unknown_rate = seconds < kAtOnceS && !draft.frame.time;
+  draft.rate_hz = unknown_rate ? kAssumedHz : std::clamp(std::round(rate * 100) / 100, 1.0, 100'000.0);
+  report.says.push_back("frames of " + std::to_string(values) + " values, " +
+                        (unknown_rate ? "all at once" : format(draft.rate_hz) + " a second") +
+                        (draft.frame.time
+                             ? ", with a time stamp in " + format(draft.frame.time->unit_s) + " s"
+                             : ", without a time stamp"));
+  if (unknown_rate)
+    report.says.push_back("assumed: " + format(kAssumedHz) + " frames a second; set \"rate_hz\"");
   if (!array)
     report.says.push_back("assumed: " + draft.array.text() +
                           "; set \"rows\", \"columns\", \"channels\" and \"pitch_mm\"");

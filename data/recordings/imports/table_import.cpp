@@ -67,6 +67,21 @@ Columns columns_of(const Table& table, const ColumnMap& map, std::size_t expecte
   return columns;
 }
 
+/// Refuses images that are no frames of the array; where the taxels have an order of their own, any may be.
+void check_shape(const Table& table, const Sensor& sensor) {
+  const auto side = [](int n) { return static_cast<std::size_t>(n); };
+  const std::size_t rows = side(sensor.array.rows), columns = side(sensor.array.columns),
+                    channels = side(sensor.array.channels);
+  std::vector<std::size_t> found = table.shape;
+  std::erase(found, 1U);
+  std::vector<std::size_t> expected = {rows, columns, channels}, flat = {rows * columns, channels};
+  std::erase(expected, 1U), std::erase(flat, 1U);
+  if (table.shape.size() < 2 || !sensor.order.empty() || found == expected || found == flat) return;
+  std::string text;
+  for (const std::size_t n : table.shape) text += (text.empty() ? "" : "x") + std::to_string(n);
+  throw std::invalid_argument("holds frames of " + text + ", the sensor's file says " + sensor.array.text());
+}
+
 std::string name_of(const Table& table, std::size_t column) {
   return "column " + std::to_string(column) +
          (table.names.empty() ? "" : " (" + printable(table.names[column]) + ")");
@@ -87,6 +102,15 @@ void spread_equal_stamps(std::vector<double>& time_s, double step) {
   }
 }
 
+/// What a counter lost of its units that ran over from one row to the next; 0 where it did not.
+double ran_over(double before, double now) {
+  for (const double range : {65536.0, 4294967296.0})
+    if (before < range && now >= 0 && now < before && now + range - before < range / 4 &&
+        before == std::round(before))
+      return range;
+  return 0;
+}
+
 std::vector<double> times_of(const std::string& path, const Table& table, std::size_t column, double unit,
                              double rate_hz) {
   // A line that was dropped leaves its time empty.
@@ -94,9 +118,11 @@ std::vector<double> times_of(const std::string& path, const Table& table, std::s
     return table.places.empty() ? i : table.places[i] - table.places[0];
   };
   std::vector<double> time_s;
+  double over = 0;
   for (std::size_t i = 0; i < table.rows(); ++i) {
-    const double t =
-        column == Columns::kNone ? static_cast<double>(number(i)) / rate_hz : table.row(i)[column] * unit;
+    if (column != Columns::kNone && i > 0) over += ran_over(table.row(i - 1)[column], table.row(i)[column]);
+    const double t = column == Columns::kNone ? static_cast<double>(number(i)) / rate_hz
+                                              : (table.row(i)[column] + over) * unit;
     if (!std::isfinite(t))
       throw FileError(path, name_of(table, column) + " as time: no number in " + place(table, i));
     if (i > 0 && t < time_s.back())
@@ -190,6 +216,7 @@ Recording recording_of_table(const std::string& path, const Table& table, const 
   Columns columns;
   try {
     columns = columns_of(table, map, sensor.values());
+    check_shape(table, sensor);
   } catch (const std::invalid_argument& error) {
     throw FileError(path, error.what());
   }

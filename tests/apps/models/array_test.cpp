@@ -237,6 +237,20 @@ TEST(Array, AHundredTablesAreImportedTrainedAndScored) {
   ASSERT_EQ(trained.code, 0) << trained.error;
   EXPECT_EQ(evaluate(folder, data, model).at("all").at("windows"), 40);
 
+  const auto refusal_of = [&](const std::string& columns) {
+    return run_process("supertac-import", {folder / "log/day1", "--sensor", sensor, "--columns", columns,
+                                           "--plate", "ridges6", "--out", folder / "refused"})
+        .error;
+  };
+  EXPECT_NE(refusal_of("time=ms:ms,x=y,y=x,values=taxel0-taxel15").find("are x and y exchanged?"),
+            std::string::npos);
+  write_file(folder / "metres.csv", std::string("time,x,y\n0,0.018,0.02\n100000,0.018,0.08\n"));
+  const auto metres =
+      run_process("supertac-import",
+                  {folder / "log/day1", "--sensor", sensor, "--columns", "time=ms:ms,values=taxel0-taxel15",
+                   "--positions", folder / "metres.csv", "--plate", "ridges6", "--out", folder / "refused"});
+  EXPECT_NE(metres.error.find("are these metres?"), std::string::npos) << metres.error;
+
   write_file(folder / "log/day1/odd.csv", std::string("not a table\n"));
   std::vector<std::string> again = {folder / "log", "--sensor", sensor,  "--columns",    "time=ms:ms,x=x,y=y",
                                     "--plate",      "ridges6",  "--out", folder / "more"};

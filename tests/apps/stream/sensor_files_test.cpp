@@ -213,6 +213,23 @@ INSTANTIATE_TEST_SUITE_P(Examples, SensorFile,
                                          "uskin_4x4x3", "anyskin", "mat_32x64"),
                          [](const auto& file) { return std::string(file.param); });
 
+TEST(SensorFiles, AnotherRateThanTheFileSaysIsSaid) {
+  const TemporaryFolder folder;
+  Sensor sensor = example("json_lines");
+  sensor.rate_hz = 40;
+  const FakeDevice device(sensor);
+  sensor.port = device.port();
+  const auto said = [&](double stated_hz) {
+    sensor.rate_hz = stated_hz;
+    write_sensor(folder / "sensor.json", sensor);
+    return run_process("supertac-stream", {"--sensor", folder / "sensor.json", "--seconds", "2", "--quiet"})
+        .out;
+  };
+  EXPECT_EQ(said(40).find("is said to send"), std::string::npos);
+  const std::string slow = said(100);
+  EXPECT_NE(slow.find(" frames came a second, the sensor is said to send 100.0"), std::string::npos) << slow;
+}
+
 TEST(SensorFiles, OthersAtThePortAreToldApart) {
   const TemporaryFolder folder;
   std::string noise, log;

@@ -177,6 +177,27 @@ TEST_F(Streaming, AFullDiskIsOneLineAndLeavesNothing) {
   EXPECT_TRUE(fs::is_empty(path("full")));
 }
 
+// A real one, where the kernel lets anybody have one.
+TEST_F(Streaming, ADiskThatBecomesFullEndsTheRecordingAndKeepsIt) {
+  if (run_process("/usr/bin/unshare", {"-rm", "mount", "-t", "tmpfs", "none", "/mnt"}).code != 0)
+    GTEST_SKIP() << "no file system of one's own here";
+  write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.speed_mm_s = 4}));
+  fs::create_directory(path("full"));
+  const std::string script =
+      "mount -t tmpfs -o size=400k none \"$0/full\" || exit 9\n"
+      "\"$1\" --recording \"$0/recording\" --record \"$0/full\" --quiet\n"
+      "code=$?; cp \"$0/full/\"*.safetensors \"$0/kept\"; exit $code";
+  const ProcessResult result =
+      run_process("/usr/bin/unshare", {"-rm", "sh", "-c", script, path(""), SUPERTAC_BIN "/supertac-stream"});
+  expect_failure(result, 1, "the disk is nearly full");
+  const Recording all = read_recording(path("recording")), kept = read_recording(path("kept"));
+  ASSERT_LT(kept.frames(), all.frames());
+  EXPECT_NE(result.error.find("the " + std::to_string(kept.frames()) + " frames until here are kept"),
+            std::string::npos)
+      << result.error;
+  EXPECT_TRUE(std::equal(kept.volts.begin(), kept.volts.end(), all.volts.begin()));
+}
+
 TEST_F(Streaming, NothingIsOverwrittenWithoutForce) {
   write_model(model(), kTimesteps, SimulatorSettings().filter_s);
   write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 32}));

@@ -173,7 +173,9 @@ TEST(Split, SaysWhatTheDataLacks) {
   EXPECT_EQ(
       message(SplitKind::pass),
       "split pass: plate 'bumps12' has one pass with windows, needs two: one to train on, one to test on");
-  EXPECT_EQ(message(SplitKind::trial), "split trial: no window to test on; the data needs trials 1 and 2");
+  EXPECT_EQ(
+      message(SplitKind::trial),
+      "split trial: no window to test on; the data needs trials 1 and 2; split pass or group does without");
   EXPECT_EQ(message(SplitKind::texture),
             "split texture: the data has 1 plate, needs two: one to train on, one to test on");
   EXPECT_EQ(message(SplitKind::texture, {"bumps12"}),

@@ -77,6 +77,57 @@ TEST(Probe, TheBeginningMayBeDamaged) {
   EXPECT_EQ(report.draft->values(), 15U);
 }
 
+TEST(Probe, KnowsAClockThatStartsAnewMeanwhile) {
+  const std::string array =
+      R"({"rows":3,"columns":3,"pressed":"higher","range":[0,900],"rate_hz":100,"frame":)";
+  for (const char* frame :
+       {R"({"kind":"text","separator":",","time":{"column":0,"unit":"ms"}})",
+        R"({"kind":"binary","header":"AA55","type":"u16","time":{"type":"u32","unit":"ms"}})",
+        R"({"kind":"json","values":"v","time":{"key":"t","unit":"ms"}})"}) {
+    const Sensor sensor = sensor_of(array + frame + "}");
+    std::vector<Heard> heard = sent(sensor, 2);
+    for (Heard chunk : sent(sensor, 2))
+      heard.push_back({chunk.time_s + 3, chunk.bytes});  // a second to start
+    const ProbeReport report = probe(heard, "here", {});
+    ASSERT_TRUE(report.draft) << frame << all(report);
+    ASSERT_TRUE(report.draft->frame.time) << frame << all(report);
+    EXPECT_EQ(report.draft->frame.time->unit_s, 1e-3) << frame;
+    EXPECT_EQ(report.draft->values(), 9U) << frame;
+    EXPECT_NEAR(report.draft->rate_hz, 100, 1) << frame;
+  }
+}
+
+TEST(Probe, FindsAnArrayWithinAnObject) {
+  std::vector<Heard> heard;
+  for (int n = 0; n < 60; ++n) {
+    const std::string stamp = std::to_string(50 + 10 * n), value = std::to_string(30 + n % 3);
+    heard.push_back(
+        {0.01 * n, R"({"finger":{"ms":)" + stamp + R"(,"taxels":[[1,)" + value + "],[3,4]]},\"n\":7}\n"});
+  }
+  const ProbeReport report = probe(heard, "here", {});
+  ASSERT_TRUE(report.draft) << all(report);
+  EXPECT_EQ(report.draft->frame.values, "finger.taxels");
+  EXPECT_EQ(report.draft->frame.time->key, "finger.ms");
+  EXPECT_EQ(report.draft->array.rows, 2);
+  for (Heard& chunk : heard)
+    chunk.bytes = R"({"s0":1,"s1":2,"s2":3})"
+                  "\n";
+  const ProbeReport refused = probe(heard, "here", {});
+  EXPECT_FALSE(refused.draft);
+  EXPECT_NE(all(refused).find("JSON without an array"), std::string::npos) << all(refused);
+}
+
+TEST(Probe, InventsNoRateForAFileWithoutClock) {
+  const Sensor sensor = sensor_of(
+      R"({"rows":3,"columns":3,"range":[0,900],"rate_hz":100,"frame":{"kind":"text","separator":","}})");
+  std::vector<Heard> heard = sent(sensor, 2);
+  for (Heard& chunk : heard) chunk.time_s = 5;
+  const ProbeReport report = probe(heard, "here", {});
+  ASSERT_TRUE(report.draft) << all(report);
+  EXPECT_NE(all(report).find("assumed: 100 frames a second; set \"rate_hz\""), std::string::npos)
+      << all(report);
+}
+
 TEST(Probe, SaysWhatItAssumes) {
   const Sensor sensor = sensor_of(R"({"rows":2,"columns":6,"pressed":"higher","range":[100,900],"rate_hz":50,
     "frame":{"kind":"text","separator":";","skip":[1],"time":{"column":0,"unit":"ms"}}})");

@@ -129,6 +129,14 @@ TEST_F(TableImport, ACoarseClockIsSpread) {
   for (int i = 0; i < 40; ++i) EXPECT_NEAR(r.time_s[static_cast<std::size_t>(i)], 0.01 * i, 2e-4) << i;
 }
 
+TEST_F(TableImport, ACounterMayRunOver) {
+  std::string text;
+  for (std::uint64_t i = 0; i < 60; ++i)
+    text += std::to_string((65'000 + 10 * i) % 65'536) + ",50,60,70,80\n";
+  const Recording r = import(file(text), "time=0:ms");
+  for (std::size_t i = 1; i < 60; ++i) EXPECT_NEAR(r.time_s[i] - r.time_s[i - 1], 0.01, 1e-9) << i;
+}
+
 TEST_F(TableImport, ALineThatIsCutLeavesItsTimeEmpty) {
   std::string text;
   for (int i = 0; i < 30; ++i) text += i == 10 ? "50,6\n" : "50,60,70,80\n";
@@ -176,6 +184,12 @@ TEST_F(TableImport, NumpyArraysAndWhatTheyMayNotBe) {
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = 50 + static_cast<float>(i);
   EXPECT_EQ(import(npy("a.npy", "<f4", "10, 4", values)).volts, values);
   EXPECT_EQ(import(npy("a.npy", "<f4", "10, 2, 2", values)).volts, values);
+  Sensor row = mat();
+  row.array.rows = 1, row.array.columns = 4;
+  const std::string path = npy("a.npy", "<f4", "10, 2, 2", values);
+  EXPECT_THROW(recording_of_table(path, read_table(path), {}, row), FileError);
+  row.order = {3, 2, 1, 0};
+  EXPECT_EQ(recording_of_table(path, read_table(path), {}, row).frames(), 10U);
   expect_refusal(npy("a.npy", ">f4", "10, 4", values), "", "holds numbers of type '>f4', expected one of f4");
   expect_refusal(npy("a.npy", "<f4", "10, 4", values, "True"), "", "Fortran's order");
   expect_refusal(npy("a.npy", "<f4", "11, 4", values), "", "it is cut or damaged");
