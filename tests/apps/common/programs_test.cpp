@@ -332,8 +332,7 @@ TEST(Dispatcher, EveryProgramOfTheListIsThereAndSaysWhatItIsFor) {
     EXPECT_NE(help.out.find("Usage:\n  " + program), std::string::npos) << help.out;
     const auto version = run_process(program, {"--version"});
     EXPECT_TRUE(version.out.starts_with(program + " ")) << version.out;
-    for (const char* text : {"commit ", "compiler  "})
-      EXPECT_NE(version.out.find(text), std::string::npos);
+    for (const char* text : {"commit ", "compiler  "}) EXPECT_NE(version.out.find(text), std::string::npos);
     ++programs;
   }
   EXPECT_GE(programs, 10u);
