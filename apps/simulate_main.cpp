@@ -48,9 +48,9 @@ TaxelArray read_array(const Arguments& arguments) {
   const std::size_t x = std::min(text.find('x'), text.size());
   const auto rows = parse_int(text.substr(0, x)),
              columns = parse_int(text.substr(std::min(x + 1, text.size())));
-  const auto within = [](const std::optional<std::int64_t>& n) { return n && *n >= 2 && *n <= 16; };
+  const auto within = [](const std::optional<std::int64_t>& n) { return n && *n >= 1 && *n <= 64; };
   if (!within(rows) || !within(columns))
-    throw UsageError("--array expects ROWSxCOLUMNS, 2 to 16 each, found " + text);
+    throw UsageError("--array expects ROWSxCOLUMNS, 1 to 64 each, found " + text);
   return {.rows = static_cast<int>(*rows),
           .columns = static_cast<int>(*columns),
           .pitch_mm = pitch_of(arguments)};
@@ -102,8 +102,8 @@ std::vector<Job> plan(const Arguments& arguments, const std::vector<Plate>& plat
 
 /// Simulates and writes all passes, several at a time; each depends on its own settings and the seed only.
 /// Returns frames written
-std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& settings,
-                     const SignalScale& scale, std::uint64_t seed, Progress& progress) {
+std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& settings, const Sensor& sensor,
+                     std::uint64_t seed, Progress& progress) {
   std::size_t frames = 0;
   std::size_t done = 0;
   std::exception_ptr failure;
@@ -115,7 +115,10 @@ std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& sett
     if (stop) continue;
     try {
       Recording recording = simulate_pass(*jobs[i].plate, jobs[i].pass, settings, seed);
-      restate(recording, scale);
+      restate(recording, sensor.scale);
+      const std::size_t signals = recording.array.signals();
+      for (std::size_t f = 0; sensor.array == recording.array && f < recording.frames(); ++f)
+        sensor.fill_silent(std::span(recording.volts).subspan(f * signals, signals));
       write_recording(jobs[i].path, recording);
 #pragma omp critical
       {
@@ -148,7 +151,7 @@ void declare(Arguments& arguments) {
       .option("sensor", "FILE",
               "a sensor's file, or rig: its array, rate, unit, polarity and range instead of the rig's",
               "rig")
-      .option("array", "ROWSxCOLUMNS", "taxels of the finger, 2 to 16 either way", "4x4")
+      .option("array", "ROWSxCOLUMNS", "taxels of the finger, 1 to 64 either way", "4x4")
       .option("pitch", "MM", "from taxel to taxel: one number, or along a row and from row to row, 3,4", "3")
       .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms(), ", "))
       .option("seed", "N", "the same seed gives the same files", "1");
@@ -178,7 +181,7 @@ int run(Arguments& arguments) {
   std::size_t frames = 0;
   {
     Progress progress(arguments, "simulating", jobs.size(), "passes");
-    frames = simulate(jobs, settings, sensor.scale, seed, progress);
+    frames = simulate(jobs, settings, sensor, seed, progress);
   }
   for (const std::string& plate : arguments.list("plates")) keep_plate_file(plate, folder.path());
   folder.keep();

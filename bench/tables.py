@@ -252,6 +252,10 @@ def studies():
          f"the program's memory grew by {float(hour[-1]['program_resident_kb']) - float(hour[0]['program_resident_kb']):.0f} kB"],
         ["`rig/signals.csv`", f"a signal in {len({r['phase'] for r in signals})} phases of what touches a port", f"{len(heard)} runs",
          f"{broken(heard)} ended otherwise than promised; {max(float(r['seconds']) for r in heard):.2f} s at most"],
+        *([f"`reliability/sensors.csv`", f"{r['array']} taxels at {int(r['rate_hz']):,} Hz over {r['port']}",
+           f"{float(r['seconds']):.0f} s", f"{int(r['sent']) - int(r['shown']):,} of {int(r['sent']):,} frames lost; "
+           f"{float(r['p99_ms']):.1f} ms from sending to the raw array, 99th percentile"]
+          for r in rows("reliability/sensors.csv")),
         ["`reliability/hostile.csv`", "evil options, mutated and lying files, lying devices, signals",
          f"{sum(int(r['count']) for r in attacks if r['what'] in kinds):,}", f"{findings} crashes, hangs or overwritten files; {lies['broken promises']} of {lies['collections']} lying devices "
          "led to a wrong word"],

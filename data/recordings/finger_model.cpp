@@ -16,6 +16,9 @@ constexpr double kGain[kTaxels] = {0.90, 0.18, 0.10, 0.15, 1.60, 0.60, 0.20, 0.6
                                    0.27, 0.55, 0.20, 0.65, 0.50, 0.40, 0.10, 0.80};
 constexpr double kUnknownGain = 0.5;
 constexpr double kRestSpreadVolts = 0.003;
+// Of three axes: how far below rest those along the plate are where nothing leans, and the skin that is
+// dragged.
+constexpr double kMiddleVolts = (rig::kRestVolts - rig::kFloorVolts) / 2, kFriction = 0.3;
 constexpr std::uint64_t kThresholds = 2000;   // numbers of a mounting that nothing else has taken
 constexpr double kLeastIndentationMm = -1.8;  // of 2.5 mm of texture the finger then still touches the top
 
@@ -67,6 +70,17 @@ std::vector<double> taxel_weights(int lines, double pitch, int points, double st
   return weights;
 }
 
+// The same weights, each times how many sigmas its place lies from the line, which sums to the lean of a
+// load.
+std::vector<double> leaning(std::vector<double> weights, int lines, double pitch, double step, double sigma) {
+  const auto points = static_cast<int>(weights.size()) / lines;
+  for (int line = 0; line < lines; ++line)
+    for (int i = 0; i < points; ++i)
+      weights[static_cast<std::size_t>(line * points + i)] *=
+          (step * (i - points / 2) - (line - (lines - 1) / 2.0) * pitch) / sigma;
+  return weights;
+}
+
 // Streams: what belongs to the sensor, to a trial of a plate (one mounting), to a pass, and to a sample.
 std::uint64_t mounting_stream(const Plate& plate, int trial) {
   return stream_of(plate.name() + "/" + std::to_string(trial));
@@ -102,8 +116,9 @@ SimulatorSettings without_term(SimulatorSettings settings, const std::string& na
 FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& id)
     : settings_(settings), noise_seed_(id.seed), noise_stream_(pass_stream(plate, id) + 1) {
   settings.array.check();
-  if (settings.array.channels != 1)
-    throw std::invalid_argument("simulator: expected an array of one channel, got " + settings.array.text());
+  if (settings.array.channels != 1 && settings.array.channels != 3)
+    throw std::invalid_argument("simulator: expected an array of one channel or three axes, got " +
+                                settings.array.text());
   const RandomStream sensor(id.seed, 0), trial(id.seed, mounting_stream(plate, id.trial));
   const RandomStream pass(id.seed, pass_stream(plate, id));
   const double variation = settings.with_variation ? 1 : 0;
@@ -146,6 +161,8 @@ void FingerModel::shape_pad(double slope_x, double slope_y) {
   along_ = points_of(rows, pitch.y, kBeyondAlongMm, kAlongMm);
   across_weight_ = taxel_weights(columns, pitch.x, across_, kAcrossMm, sigma);
   along_weight_ = taxel_weights(rows, pitch.y, along_, kAlongMm, sigma);
+  across_lean_ = leaning(across_weight_, columns, pitch.x, kAcrossMm, sigma);
+  along_lean_ = leaning(along_weight_, rows, pitch.y, kAlongMm, sigma);
   const double curvature = settings_.with_dome ? 1 / (2 * settings_.dome_radius_mm) : 0;
   double lowest = 0;
   for (int i = 0; i < across_; ++i)
@@ -169,6 +186,10 @@ double FingerModel::surface(double x_mm, double y_mm) const {
 }
 
 std::vector<double> FingerModel::loads(const FingerPose& pose) const {
+  return felt(indented(pose), across_weight_, along_weight_);
+}
+
+std::vector<double> FingerModel::indented(const FingerPose& pose) const {
   std::vector<double> depth(rise_.size());
   for (int i = 0; i < across_; ++i)
     for (int j = 0; j < along_; ++j) {
@@ -192,19 +213,25 @@ std::vector<double> FingerModel::loads(const FingerPose& pose) const {
     last_slope = slope;
     lift += excess / slope;
   }
+  for (double& d : depth) d -= lift;
+  return depth;
+}
+
+std::vector<double> FingerModel::felt(const std::vector<double>& indented,
+                                      const std::vector<double>& across_weight,
+                                      const std::vector<double>& along_weight) const {
   const auto across = static_cast<std::size_t>(across_), along = static_cast<std::size_t>(along_);
   const auto columns = static_cast<std::size_t>(settings_.array.columns);
   std::vector<double> load(gain_.size()), rows(static_cast<std::size_t>(settings_.array.rows));
   for (std::size_t i = 0; i < across; ++i) {
     std::fill(rows.begin(), rows.end(), 0.0);
     for (std::size_t j = 0; j < along; ++j) {
-      const double indented = depth[i * along + j] - lift;
-      if (indented <= 0) continue;
-      for (std::size_t row = 0; row < rows.size(); ++row)
-        rows[row] += along_weight_[row * along + j] * indented;
+      const double depth = indented[i * along + j];
+      if (depth <= 0) continue;
+      for (std::size_t row = 0; row < rows.size(); ++row) rows[row] += along_weight[row * along + j] * depth;
     }
     for (std::size_t k = 0; k < load.size(); ++k)
-      load[k] += across_weight_[k % columns * across + i] * rows[k / columns];
+      load[k] += across_weight[k % columns * across + i] * rows[k / columns];
   }
   return load;
 }
@@ -214,19 +241,29 @@ std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) co
   if (settings_.with_vibration)
     shaken.z_mm +=
         settings_.vibration_mm * same_bits::rough_sine(settings_.vibration_hz * time_s + vibration_phase_);
-  const std::vector<double> load = loads(shaken);
+  const std::vector<double> depth = indented(shaken), load = felt(depth, across_weight_, along_weight_);
   const double emi = settings_.with_emi
                          ? settings_.emi_volts * same_bits::rough_sine(settings_.emi_hz * time_s + emi_phase_)
                          : 0;
+  const auto channels = static_cast<std::size_t>(settings_.array.channels);
+  std::vector<double> volts(load.size() * channels);
+  const auto disturbed = [&](std::size_t k, double drop) {
+    return rest_[k] + drift_[k] * time_s + emi - settings_.volts_per_load * gain_[k] * drop;
+  };
+  for (std::size_t k = 0; k < load.size(); ++k)
+    volts[k * channels + channels - 1] = disturbed(k, std::max(0.0, load[k] - threshold_[k]));
+  if (channels == 3) {
+    const std::vector<double> lean_x = felt(depth, across_lean_, along_weight_),
+                              lean_y = felt(depth, across_weight_, along_lean_);
+    for (std::size_t k = 0; k < load.size(); ++k) {
+      volts[3 * k] = disturbed(k, lean_x[k]) - kMiddleVolts;
+      volts[3 * k + 1] = disturbed(k, lean_y[k] - kFriction * load[k]) - kMiddleVolts;
+    }
+  }
   const RandomStream noise(noise_seed_, noise_stream_);
   const auto tick = static_cast<std::uint64_t>(std::llround(std::max(0.0, time_s) * 1e6));
-  const std::uint64_t taxels = load.size();
-  std::vector<double> volts(taxels);
-  for (std::size_t k = 0; k < taxels; ++k) {
-    const double felt = std::max(0.0, load[k] - threshold_[k]);
-    volts[k] = rest_[k] + drift_[k] * time_s + emi - settings_.volts_per_load * gain_[k] * felt;
-    if (settings_.with_noise) volts[k] += settings_.noise_volts * noise.normal(tick * taxels + k);
-  }
+  for (std::size_t s = 0; settings_.with_noise && s < volts.size(); ++s)
+    volts[s] += settings_.noise_volts * noise.normal(tick * volts.size() + s);
   return volts;
 }
 

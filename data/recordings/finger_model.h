@@ -12,7 +12,7 @@ namespace supertac {
 /// What the simulated sensor does to the scene. Every term has a switch (with_...); the other numbers say how
 /// strong it is. Defaults resemble the rig's recordings; data/README.md shows what each term changes.
 struct SimulatorSettings {
-  TaxelArray array;  ///< of one channel; gains and pad are the rig's whatever the array
+  TaxelArray array;  ///< of one channel or three axes; gains and pad are the rig's whatever the array
   double rate_hz = 300;
   double indentation_mm = 0.2;  ///< how far the slide's path lies below first contact with the flat plate
   double volts_per_load = 0.9;  ///< drop of a taxel of gain 1 per unit load; load = mean indentation (mm)
@@ -78,13 +78,18 @@ struct FingerIdentity {
 /// the mount yields until stiffness * lift = integral of d, and taxel k feels the mean of d around it:
 ///   load_k = sum_u w(u - u_k) d(u),  w a bell of standard deviation pad_sigma, sum 1,
 ///   V_k = rest_k - volts_per_load * gain_k * max(0, load_k - threshold_k) + disturbances.
+/// A taxel of three axes (x, y, z) has this for z. A skin whose magnets or markers move leans away from where
+/// it is pressed, and is dragged along the slide: x and y lie in the middle of the range and have, for the
+/// load,
+///   lean_x = sum_u w(u - u_k) (u - u_k)_x / sigma d(u)   and   lean_y - 0.3 load_k;
+/// not fitted to any sensor.
 /// Radius, sigma, stiffness, slope and the linear law were fitted to the rig's recordings (data/README.md).
 class FingerModel {
  public:
-  /// Throws std::invalid_argument for an array out of range or with more than one channel.
+  /// Throws std::invalid_argument for an array out of range or of other than one or three channels.
   FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& identity);
 
-  /// Voltages [taxels] before ADC, filter and saturation.
+  /// Voltages [taxels,channels] before ADC, filter and saturation.
   std::vector<double> volts(const FingerPose& pose, double time_s) const;
 
   /// Load on every taxel, load_k above (mm).
@@ -99,6 +104,9 @@ class FingerModel {
 
  private:
   double surface(double x_mm, double y_mm) const;
+  std::vector<double> indented(const FingerPose& pose) const;  // d(u), negative where nothing touches
+  std::vector<double> felt(const std::vector<double>& indented, const std::vector<double>& across_weight,
+                           const std::vector<double>& along_weight) const;
   void shape_pad(double slope_x, double slope_y);
 
   SimulatorSettings settings_;
@@ -109,6 +117,7 @@ class FingerModel {
   std::vector<double> rise_;                          // of the pad's points above its lowest, [across][along]
   int across_ = 0, along_ = 0;                        // the pad's points across and along the slide
   std::vector<double> across_weight_, along_weight_;  // bell of each taxel column and row, [lines][points]
+  std::vector<double> across_lean_, along_lean_;      // the same times the place, in sigmas, from the taxel
 };
 
 }  // namespace supertac

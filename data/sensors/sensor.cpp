@@ -84,6 +84,11 @@ void Sensor::arrange(std::span<const float> sent, std::span<float> signals) cons
     if (from >= 0)
       std::copy_n(&sent[static_cast<std::size_t>(from) * channels], channels, &signals[k * channels]);
   }
+  fill_silent(signals);
+}
+
+void Sensor::fill_silent(std::span<float> signals) const {
+  const auto channels = static_cast<std::size_t>(array.channels);
   const std::vector<int> silent_ = silent();
   if (silent_.empty()) return;
   std::vector<bool> speaks(static_cast<std::size_t>(array.taxels()), true);

@@ -73,9 +73,11 @@ struct Sensor {
   std::size_t values() const;
   /// dead, and the places without taxel.
   std::vector<int> silent() const;
-  /// From the values of a frame to [rows][columns][channels]; a silent taxel gets the mean of the others
-  /// around it, of all when there is none. `sent` has values() numbers, `signals` array.signals().
+  /// From the values of a frame to [rows][columns][channels], then fill_silent(). `sent` has values()
+  /// numbers, `signals` array.signals().
   void arrange(std::span<const float> sent, std::span<float> signals) const;
+  /// A silent taxel gets the mean of the others around it, of all when there is none.
+  void fill_silent(std::span<float> signals) const;
   /// Throws std::invalid_argument where a member is out of its range, with its key in the file.
   void check() const;
   bool operator==(const Sensor&) const = default;

@@ -49,10 +49,14 @@ std::vector<Rirb> make_rirbs(const SuperTacSettings& s, Rng& rng) {
 // concat() takes eight at most. Of no groups undefined.
 Variable concat_groups(std::span<const Variable> groups) {
   constexpr std::size_t kAtOnce = 8;
+  static_assert(kMostLines <= kAtOnce * kAtOnce);
   if (groups.empty()) return {};
   if (groups.size() <= kAtOnce) return concat(groups);
-  const Variable halves[] = {concat(groups.first(kAtOnce)), concat(groups.subspan(kAtOnce))};
-  return concat(halves);
+  std::array<Variable, kAtOnce> parts;
+  std::size_t count = 0;
+  for (; !groups.empty(); groups = groups.subspan(std::min(kAtOnce, groups.size())))
+    parts[count++] = concat(groups.first(std::min(kAtOnce, groups.size())));
+  return concat(std::span<const Variable>(parts).first(count));
 }
 
 }  // namespace
@@ -69,8 +73,8 @@ std::string name_of(Grouping grouping) {
 
 void SuperTacSettings::check() const {
   const bool frames = timesteps == 1;
-  check_range("rows", rows, frames ? 1 : 2, frames ? 64 : 16);
-  check_range("columns", columns, frames ? 1 : 2, frames ? 64 : 16);
+  check_range("rows", rows, 1, kMostLines);
+  check_range("columns", columns, 1, kMostLines);
   check_range("in_channels", in_channels, 1, 8);
   if (!frames) check_range("timesteps", timesteps, 32, 512);
   if (!frames && timesteps % 16 != 0) {
@@ -89,6 +93,10 @@ void SuperTacSettings::check() const {
                                 " pixels, expected 3 to 1024 a side");
   check_range("channels", channels, 4, 256);
   check_range("rcabs", rcabs, 0, 16);
+  if (latents() * channels * rows * columns > kMostWeights)
+    throw std::invalid_argument("model settings: " + std::to_string(latents()) + " latents of an array of " +
+                                std::to_string(rows) + "x" + std::to_string(columns) +
+                                " make a layer of more than 2^28 weights; choose fewer latents or channels");
 }
 
 SuperTacSettings SuperTacSettings::of_preset(const std::string& name) {

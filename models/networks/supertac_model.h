@@ -23,9 +23,11 @@ enum class Grouping {
 Grouping grouping_of(const std::string& name);
 std::string name_of(Grouping grouping);
 
+constexpr Dim kMostLines = 64, kMostWeights = Dim{1} << 28;
+
 struct SuperTacSettings {
   std::string preset = "paper";
-  Dim rows = 4, columns = 4;  ///< of the array: 2 to 16; of single frames 1 to 64
+  Dim rows = 4, columns = 4;  ///< of the array: 1 to kMostLines
   Dim in_channels = 1;        ///< numbers a taxel gives: 1 to 8
   Dim timesteps = 256;  ///< T: 32 to 512, a multiple of 16; or 1, single frames, for which there are no VAEs
   Dim latent = 10;      ///< LD: 1 to 256; of no meaning for single frames
@@ -55,7 +57,7 @@ struct SuperTacSettings {
   static SuperTacSettings of_preset(const std::string& name);
 };
 
-/// One T for each group, at most 16, stored in place: a warm step must not go to the heap.
+/// One T for each group, stored in place: a warm step must not go to the heap.
 template <class T>
 class PerGroup {
  public:
@@ -66,7 +68,7 @@ class PerGroup {
   std::span<const T> span() const { return std::span(items_).first(size_); }
 
  private:
-  std::array<T, 16> items_;
+  std::array<T, kMostLines> items_;
   std::size_t size_;
 };
 

@@ -208,6 +208,33 @@ TEST_P(SensorFile, IsProbedViewedRecordedAndReadBack) {
   }
 }
 
+TEST_P(SensorFile, LearnsFromSimulatedPassesAndDrawsLive) {
+  const TemporaryFolder folder;
+  Sensor sensor = example(GetParam());
+  const bool slow = sensor.rate_hz < 10;  // a window of 32 frames would take half a minute
+  const std::string passes = folder / "passes", model = folder / "model";
+  write_sensor(folder / "sensor.json", sensor);
+  const auto simulated =
+      run_process("supertac-simulate", {"--sensor", folder / "sensor.json", "--plates", "ridges6", "--passes",
+                                        "2", "--trials", "1", "--speeds", "10", "--out", passes});
+  ASSERT_EQ(simulated.code, 0) << simulated.error;
+  std::vector<std::string> words = {"--data",   passes, "--out",    model, "--split", "none",
+                                    "--epochs", "1",    "--stride", "16",  "--preset"};
+  words.emplace_back(slow ? "frame" : "tiny");
+  if (!slow) words.insert(words.end(), {"--timesteps", "32"});
+  const auto trained = run_process("supertac-train", words);
+  ASSERT_EQ(trained.code, 0) << trained.error;
+  const FakeDevice device(sensor);
+  sensor.port = device.port();
+  write_sensor(folder / "sensor.json", sensor);
+  const auto streamed =
+      run_process("supertac-stream", {"--sensor", folder / "sensor.json", "--model", model, "--seconds",
+                                      slow ? "3.5" : "1.5", "--out", "-", "--quiet"});
+  ASSERT_EQ(streamed.code, 0) << streamed.error;
+  const auto line = parse_json_limited(streamed.out.substr(0, streamed.out.find('\n')));
+  EXPECT_EQ(line.at("picture").size(), 16U * static_cast<std::size_t>(sensor.array.taxels()));
+}
+
 INSTANTIATE_TEST_SUITE_P(Examples, SensorFile,
                          testing::Values("csv_arduino", "json_lines", "binary_header", "flexitac_12x32",
                                          "uskin_4x4x3", "anyskin", "mat_32x64"),

@@ -86,6 +86,27 @@ TEST(Simulator, AnyArrayFeelsTheRidgeWhereItIs) {
   EXPECT_THROW(simulate_pass(plate, {}, settings), std::invalid_argument);
 }
 
+TEST(Simulator, ThreeAxesAreWhereTheLoadLeansAndTheLoad) {
+  SimulatorSettings settings = clean();
+  settings.with_pad = true;
+  settings.array = {.rows = 3, .columns = 1, .pitch_mm = 2};
+  const Plate plate("one", {{"ridges", 40, 2.5}});
+  const FingerModel one(plate, settings, {});
+  settings.array.channels = 3;
+  const FingerModel three(plate, settings, {});
+  const FingerPose pose{
+      .x_mm = 18, .y_mm = plate.crests()[0], .z_mm = 2.4};  // the ridge under the middle row
+  const std::vector<double> load = one.volts(pose, 0), axes = three.volts(pose, 0);
+  ASSERT_EQ(axes.size(), 9U);
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(axes[3 * k + 2], load[k]) << k;
+  const auto y = [&](std::size_t row) { return axes[3 * row + 1]; };
+  EXPECT_NEAR(axes[3], axes[0], 1e-9) << "nothing leans along a ridge";
+  EXPECT_LT(y(0), axes[0]) << "the ridge lies behind the first row";
+  EXPECT_GT(y(2), axes[0]);
+  const double drop = one.volts({.x_mm = 18, .y_mm = 54, .z_mm = 10}, 0)[0] - load[0];
+  EXPECT_NEAR(y(0) + y(2) - 2 * axes[0], 2 * 0.3 * drop, 1e-9) << "the skin is dragged";
+}
+
 // What a threshold takes from a taxel grows with its load up to that threshold and stays there.
 TEST(Simulator, AThresholdTakesNoMoreThanItself) {
   SimulatorSettings settings = clean();

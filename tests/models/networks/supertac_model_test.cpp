@@ -180,8 +180,13 @@ TEST(SuperTac, RefusesSettingsAndWindowsThatDoNotFit) {
   s.scale = 3;
   EXPECT_EQ(message(s), "model settings: scale must be 2, 4, 8 or 16, got 3");
   s = small_settings();
-  s.columns = 17;
-  EXPECT_EQ(message(s), "model settings: columns must be 2 to 16, got 17");
+  s.columns = 65;
+  EXPECT_EQ(message(s), "model settings: columns must be 1 to 64, got 65");
+  s = {.rows = 64, .columns = 64, .latent = 100};
+  EXPECT_EQ(
+      message(s),
+      "model settings: 6400 latents of an array of 64x64 make a layer of more than 2^28 weights; choose "
+      "fewer latents or channels");
   s = {.rows = 1, .columns = 64, .timesteps = 1, .scale = 2};
   EXPECT_EQ(
       message(s),
