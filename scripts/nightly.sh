@@ -9,7 +9,8 @@ export OMP_WAIT_POLICY=passive  # tests run side by side
 cd "$(dirname "$0")/.."
 [ $# -gt 0 ] || set -- clang aarch64 asan tsan tidy cppcheck lintian portable wheel coverage
 scripts/setup.sh libgtest-dev python3 clang libomp-dev gcovr
-note() { echo "$(date -u +%Y-%m-%d) $(git describe --always --dirty) $1: $2" | tee -a scripts/nightly.log; }
+commit="$(git describe --always --dirty)"  # before the log makes it dirty
+note() { echo "$(date -u +%Y-%m-%d) $commit $1: $2" | tee -a scripts/nightly.log; }
 suite() {  # NAME SANITIZERS PATTERN
   cmake -S . -B "build-$1" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DSUPERTAC_QUICK_BUILD=ON -DSUPERTAC_MPI=OFF \
     -DSUPERTAC_SANITIZE="$2" >/dev/null
