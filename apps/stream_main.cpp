@@ -82,7 +82,8 @@ void declare(Arguments& a) {
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
       .option("classifier", "FILE",
               "name the texture on the page, with a classifier by supertac-classify --out")
-      .option("precision", "NAME", "fp32, or int8: faster on processors with AVX-512 VNNI, slower on others",
+      .option("precision", "NAME",
+              "fp32; int8: faster on processors with AVX-512 VNNI, slower on others; or auto: the faster one",
               "fp32")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
       .flag("probe",
@@ -149,7 +150,6 @@ int run(Arguments& a) {
   const double begin = monotonic_seconds();
   const double speedup = a.number("speedup", 0.1, 100);
   StreamSettings settings{.out = a.output("out"),
-                          .precision = precision_of(a.choice("precision", {"fp32", "int8"})),
                           .classifier = a.text("classifier"),
                           .mcap = a.output("mcap"),
                           .record = a.text("record"),
@@ -166,6 +166,9 @@ int run(Arguments& a) {
   settings.metadata = {{"kind", "pictures"}, {"model", a.text("model")}, {"source", origin}};
   std::vector<ModelFile> models;
   if (drawn) models = load_models(a.list("model"));
+  const std::string precision = a.choice("precision", {"fp32", "int8", "auto"});
+  settings.precision = precision_of(precision, models);
+  if (drawn && precision == "auto") a.note("precision: " + name_of(settings.precision));
   if (drawn) add_model_parents(a.list("model"));
   const auto source = open_source(a, speedup);
   Stream stream(settings, models, *source);
@@ -187,7 +190,10 @@ int run(Arguments& a) {
     a.note(stream.summary());
   else
     a.print(stream.summary());
-  nlohmann::ordered_json result = {{"source", origin}, {"model", a.text("model")}, {"ready_ms", ready_ms}};
+  nlohmann::ordered_json result = {{"source", origin},
+                                   {"model", a.text("model")},
+                                   {"precision", name_of(settings.precision)},
+                                   {"ready_ms", ready_ms}};
   result.update(stream.result());
   a.write_json(result);
   if (error) std::rethrow_exception(error);

@@ -71,8 +71,10 @@ enum class Precision {
   fp32,
   int8,  ///< bytes: faster, and the pictures differ a little (models/inference/prepared/prepared.h)
 };
-/// "fp32" or "int8"; throws std::invalid_argument.
-Precision precision_of(const std::string& name);
+/// "fp32", "int8", or "auto": int8 where all files hold its ranges and this processor draws faster so
+/// (AVX-512 VNNI, AMX; without them fp32 is faster). Throws std::invalid_argument.
+Precision precision_of(const std::string& name, std::span<const ModelFile> files = {});
+std::string name_of(Precision precision);
 
 /// Of the models of these files, which must outlive it. Throws as Ensemble, and std::runtime_error when one
 /// has no ranges for int8.

@@ -19,6 +19,9 @@ struct IntegerPlan;
 /// ("conv2d", of int8 "encoder.0.conv.1"), and its values, those of int8 converted to real numbers.
 using StepWatch = std::function<void(const std::string& step, const Tensor& map)>;
 
+/// Whether this processor multiplies bytes so fast that a picture takes less time in int8 than in fp32.
+bool int8_is_faster();
+
 /// Draws the network's pictures up to rounding (1e-5 of the largest value). A picture has the same bits alone
 /// and in any batch, on every processor. Copies share their weights; any thread may call.
 class Prepared {

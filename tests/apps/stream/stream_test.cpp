@@ -77,6 +77,15 @@ TEST_F(Streaming, ARecordingGivesThePicturesOfItsWindows) {
   EXPECT_GT(compared, recording.frames() - 2 * kTimesteps);
 }
 
+TEST_F(Streaming, PrecisionAutoIsFp32WithoutTheRangesOfInt8) {
+  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
+  write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 32}));
+  const ProcessResult done =
+      stream({"--recording", path("recording"), "--precision", "auto", "--json", path("json")});
+  ASSERT_EQ(done.code, 0) << done.error;
+  EXPECT_EQ(result("json").at("precision"), "fp32");
+}
+
 // The same without a process.
 TEST_F(Streaming, EndsWhenItsTimeIsOverAndCounts) {
   write_model(model(), kTimesteps, SimulatorSettings().filter_s);

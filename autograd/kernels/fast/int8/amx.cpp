@@ -179,7 +179,7 @@ void run(const ByteProductJob& job, const std::uint8_t* x, std::int16_t* y, std:
 
 }  // namespace
 
-const ByteKernels kAmxByteKernels{run, release_tiles};
+const ByteKernels kAmxByteKernels{run, true, release_tiles};
 
 }  // namespace supertac::kernels
 

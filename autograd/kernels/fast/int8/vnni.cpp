@@ -36,7 +36,7 @@ struct Sums {
 
 }  // namespace
 
-const ByteKernels kVnniByteKernels{run};
+const ByteKernels kVnniByteKernels{run, true};
 
 }  // namespace supertac::kernels
 
