@@ -44,7 +44,7 @@ Tally::Tally(std::int32_t classes)
 
 void Tally::add(std::size_t pass, std::int32_t truth, std::int32_t answer) {
   const double right = truth == answer ? 1 : 0;
-  ++confusion_[static_cast<std::size_t>(truth * classes_ + answer)];
+  ++confusion_[cell(truth, answer)];
   for (ClusterCount* c : {&clusters_[pass], &run_}) {
     c->correct += right;
     c->total += 1;
@@ -70,7 +70,7 @@ double Tally::p_against(const Tally& other) const {
 }
 
 std::uint64_t Tally::count(std::int32_t truth, std::int32_t answer) const {
-  return confusion_[static_cast<std::size_t>(truth * classes_ + answer)];
+  return confusion_[cell(truth, answer)];
 }
 
 std::uint64_t Tally::windows() const {

@@ -39,6 +39,10 @@ class Tally {
 
  private:
   std::vector<ClusterCount> clusters() const;
+  std::size_t cell(std::int32_t truth, std::int32_t answer) const {
+    return static_cast<std::size_t>(truth) * static_cast<std::size_t>(classes_) +
+           static_cast<std::size_t>(answer);
+  }
 
   std::int32_t classes_;
   std::vector<std::uint64_t> confusion_;          // [label][answer]

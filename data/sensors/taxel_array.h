@@ -48,9 +48,14 @@ struct TaxelArray {
   int taxels() const { return rows * columns; }
   /// Place of taxel k from the array's centre.
   double x_mm(int k) const { return (k % columns - (columns - 1) / 2.0) * pitch_mm.x; }
-  double y_mm(int k) const { return (k / columns - (rows - 1) / 2.0) * pitch_mm.y; }
+  double y_mm(int k) const {
+    const int row = k / columns;
+    return (row - (rows - 1) / 2.0) * pitch_mm.y;
+  }
   /// Numbers in a frame.
-  std::size_t signals() const { return static_cast<std::size_t>(taxels() * channels); }
+  std::size_t signals() const {
+    return static_cast<std::size_t>(taxels()) * static_cast<std::size_t>(channels);
+  }
   /// The rectangle around each taxel, cut into scale x scale pixels.
   ImageGrid picture(int scale) const { return {rows * scale, columns * scale, pitch_mm / scale}; }
   /// "4x4 taxels at 3 mm", "2x6 taxels at 2.5 mm with 3 channels"

@@ -24,7 +24,9 @@ struct BoardFrame {
   bool operator==(const BoardFrame&) const = default;
 
   /// ADC value of the finger's taxel k.
-  std::uint16_t taxel(int k) const { return samples[static_cast<std::size_t>(rig::kPatches * k)]; }
+  std::uint16_t taxel(int k) const {
+    return samples[std::size_t{rig::kPatches} * static_cast<std::size_t>(k)];
+  }
 };
 
 /// The finger's taxels in volts, rig::volts_of() in single precision.
