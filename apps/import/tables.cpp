@@ -119,14 +119,15 @@ struct TableImport {
       low = {std::min(low[0], x), std::min(low[1], y)}, high = {std::max(high[0], x), std::max(high[1], y)};
     }
     const bool corner = std::max({-low[0], -low[1], high[0], high[1]}) < kMetresMm;
-    if (known == 0 || (2 * on >= known && !corner)) return;
+    constexpr std::size_t kFew = 20;  // one in so many: an array may have been parked beside the plate
+    if (known == 0 || (kFew * on >= known && on >= on_exchanged && !corner)) return;
     throw FileError(path, "the array's centre goes from x " + format(low[0], 2) + " to " +
                               format(high[0], 2) + " and y " + format(low[1], 2) + " to " +
                               format(high[1], 2) + ", expected mm on a plate of " + format(Plate::kWidthMm) +
                               " x " + format(Plate::kLengthMm) +
-                              (corner                      ? "; are these metres?"
-                               : 2 * on_exchanged >= known ? "; are x and y exchanged?"
-                                                           : "; take off the plate's origin"));
+                              (corner              ? "; are these metres?"
+                               : on_exchanged > on ? "; are x and y exchanged?"
+                                                   : "; take off the plate's origin"));
   }
 
   /// Positions that no column and no log holds are found from the signals, over a known plate.

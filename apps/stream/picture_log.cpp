@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <filesystem>
 
 #include "io/files/file.h"
@@ -16,7 +17,9 @@
 namespace supertac {
 namespace {
 
-constexpr std::uint64_t kCheckBytes = 64 << 10, kSpareBytes = 256 << 10;  // of room for the file
+constexpr std::uint64_t kCheckBytes = 64 << 10, kSpareBytes = 256 << 10;  // of room for the files
+std::atomic<std::uint64_t> waiting_bytes{
+    0};  // in the temporary files of all logs, which become as large files
 
 }  // namespace
 
@@ -29,6 +32,8 @@ PictureLog::PictureLog(OutputPath output, const PictureFormat& format)
   if (format.half_widths) half_widths_ = open_spool();
   if (format.distance) distances_ = open_spool();
 }
+
+PictureLog::~PictureLog() { waiting_bytes -= bytes_; }
 
 void PictureLog::fail() {
   problem_ =
@@ -48,22 +53,24 @@ PictureLog::Spool PictureLog::open_spool() {
 
 void PictureLog::append(const Spool& spool, std::span<const std::byte> bytes) {
   if (std::fwrite(bytes.data(), 1, bytes.size(), spool.get()) != bytes.size()) fail();
-  bytes_ += bytes.size();
+  bytes_ += bytes.size(), waiting_bytes += bytes.size();
 }
 
-// The file is as large as the temporary ones, which go only when it is complete.
-void PictureLog::check_room() {
-  if (bytes_ < checked_bytes_ + kCheckBytes) return;
-  checked_bytes_ = bytes_;
+// A file is as large as the temporary ones, which go only when it is complete.
+void PictureLog::check_room(const Seen& next) {
+  const std::uint64_t row =
+      64 + sizeof(float) * (next.volts.size() + next.picture.size() + next.half_widths.size());
+  if (bytes_ + row < checked_bytes_ + kCheckBytes) return;
+  checked_bytes_ = bytes_ + row;
   std::error_code error;
   const auto space = std::filesystem::space(std::filesystem::absolute(output_.path).parent_path(), error);
-  if (error || space.available > bytes_ + kSpareBytes) return;
+  if (error || space.available > waiting_bytes + 2 * row + kSpareBytes) return;
   throw FileError(output_.path, "the disk is nearly full: the " + std::to_string(count_) +
                                     " frames until here are kept; make room, or choose another folder");
 }
 
 void PictureLog::add(const Seen& seen) {
-  check_room();
+  check_room(seen);
   if (count_ == 0) began_s_ = seen.wall_s - seen.time_s, first_s_ = seen.time_s;
   append(times_, std::as_bytes(std::span(&seen.time_s, 1)));
   append(volts_, std::as_bytes(seen.volts));

@@ -26,6 +26,9 @@ class PictureLog {
  public:
   /// Throws FileError when the file cannot be made there, or exists and is not to be replaced.
   PictureLog(OutputPath output, const PictureFormat& format);
+  ~PictureLog();
+  PictureLog(const PictureLog&) = delete;
+  PictureLog& operator=(const PictureLog&) = delete;
   /// Throws FileError; where there is room for no more than writing what it has, write() still can.
   void add(const Seen& seen);
   /// Writes the file, atomically. Throws FileError, again when add() has.
@@ -42,7 +45,7 @@ class PictureLog {
 
   Spool open_spool();
   void append(const Spool& spool, std::span<const std::byte> bytes);
-  void check_room();
+  void check_room(const Seen& next);
   void read_back(const Spool& spool, const ByteSink& sink);
   std::vector<std::byte> dated_times();
   void read_rows(const Spool& spool, std::size_t row_bytes, const ByteSink& sink);

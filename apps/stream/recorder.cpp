@@ -22,7 +22,8 @@ std::string name_of_now() {
 
 std::string Recorder::finish() {
   stop();
-  if (writer_.joinable()) writer_.join();
+  for (std::thread* writer : {&writer_, &full_writer_})
+    if (writer->joinable()) writer->join();
   return status().said;
 }
 
@@ -54,7 +55,8 @@ std::string Recorder::stop() {
 
 void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name, const std::string& why) {
   const std::lock_guard writing(write_mutex_);
-  std::string said = "recorded " + name;
+  const std::string recorded = "recorded " + name;
+  std::string said = recorded;
   taken_.clear();
   try {
     log->write(metadata_);
@@ -63,8 +65,8 @@ void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name, const
     said = error.what();
   }
   const std::lock_guard lock(mutex_);
-  if (said == "recorded " + name) status_.files.push_back(name);
-  status_.said = said + (why.empty() || said == why ? "" : "; " + why);
+  if (said == recorded) status_.files.push_back(name);
+  status_.said = said + (why.empty() || said != recorded ? "" : "; " + why);
 }
 
 void Recorder::add(const Seen& seen) {
@@ -80,7 +82,8 @@ void Recorder::add(const Seen& seen) {
       const std::lock_guard status_lock(mutex_);
       name = std::exchange(status_.recording, "");
     }
-    complete(std::move(log_), name, error.what());
+    if (full_writer_.joinable()) full_writer_.join();  // of a disk that was full before
+    full_writer_ = std::thread(&Recorder::complete, this, std::move(log_), name, error.what());
   }
 }
 

@@ -29,8 +29,8 @@ class Recorder {
   std::string stop();
   /// Stops, and waits until the last file is written; empty when there was none.
   std::string finish();
-  /// Of the stream's thread: nothing unless it is recording. When the disk is full a recording ends, and what
-  /// it has is written at once.
+  /// Of the stream's thread: nothing unless it is recording. When the disk is full a recording ends and is
+  /// written.
   void add(const Seen& seen);
 
   struct Status {
@@ -56,7 +56,8 @@ class Recorder {
   std::atomic<double> seconds_ = 0;
   std::mutex mutex_;  // of status_
   Status status_;
-  std::thread writer_;  // of the starting and stopping thread
+  std::thread writer_;       // of the starting and stopping thread
+  std::thread full_writer_;  // of the stream's thread, then of finish()
   std::mutex write_mutex_;
   std::string taken_;  // of what complete() writes: the file got another name, and why
 };

@@ -128,10 +128,19 @@ void Stream::complete() {
   lines_lost_ = (udp_ ? udp_->lost() : 0) + (pipe_ ? pipe_->lost() : 0);
   udp_.reset();
   pipe_.reset();
-  if (log_) log_->write(maker_ ? settings_.metadata : recording_);
-  if (record_) record_->write(recording_);
-  if (mcap_) mcap_->close();
-  source_.finish();
+  std::exception_ptr first;  // what goes wrong with one file is no reason to lose another
+  const auto attempt = [&first](const auto& work) {
+    try {
+      work();
+    } catch (const std::exception&) {
+      if (!first) first = std::current_exception();
+    }
+  };
+  if (record_) attempt([&] { record_->write(recording_); });
+  if (log_) attempt([&] { log_->write(maker_ ? settings_.metadata : recording_); });
+  if (mcap_) attempt([&] { mcap_->close(); });
+  attempt([&] { source_.finish(); });
+  if (first) std::rethrow_exception(first);
 }
 
 // Empty where frames come as often as the source says, to a quarter.

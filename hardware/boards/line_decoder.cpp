@@ -85,9 +85,10 @@ class TextDecoder : public LineDecoder {
 /// What stands at `path`: a key, or keys of objects within objects, "finger.taxels". Throws where nothing
 /// does.
 const nlohmann::ordered_json& at_path(const nlohmann::ordered_json& json, const std::string& path) {
-  const std::size_t dot = path.find('.');
-  if (dot == std::string::npos || json.contains(path)) return json.at(path);
-  return at_path(json.at(path.substr(0, dot)), path.substr(dot + 1));
+  for (std::size_t dot = path.find('.'); dot != std::string::npos; dot = path.find('.', dot + 1))
+    if (const auto found = json.find(path.substr(0, dot)); found != json.end())
+      return at_path(*found, path.substr(dot + 1));
+  return json.at(path);
 }
 
 class JsonDecoder : public LineDecoder {

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kMostly = 0.9, kText = 0.98;
 constexpr double kClock = 0.25;  // how far the host's clock and the sensor's may differ in a probe
-constexpr std::size_t kMostRestarts = 2;
+constexpr std::size_t kMostRestarts = 2, kStepsOfRestart = 20;  // noise falls far more often
 constexpr double kRestarted = 0.3;  // of the time at least a clock runs that starts anew meanwhile
 constexpr double kPressed = 12;     // times the noise: more than that is a finger
 constexpr double kAtOnceS = 0.2, kAssumedHz = 100;
@@ -148,10 +148,25 @@ std::optional<Candidate> objects_of(const Lines& lines) {
   const auto array = array_of(most, nested);
   if (!array) return std::nullopt;
   candidate.array = *array;
-  for (const auto& [key, stamps] : scalars)
-    if (const auto unit = stamps.size() == parsed ? unit_of_clock(stamps, lines.seconds) : std::nullopt)
-      candidate.format.time = FrameTime{.key = key, .unit_s = *unit};
+  // The clock beside the array rather than another.
+  const auto folder = [](const std::string& key) { return key.substr(0, key.rfind('.') + 1); };
+  for (const auto& [key, stamps] : scalars) {
+    const auto unit = stamps.size() == parsed ? unit_of_clock(stamps, lines.seconds) : std::nullopt;
+    const bool beside = folder(key) == folder(candidate.format.values);
+    if (!unit || (candidate.format.time &&
+                  (!beside || folder(candidate.format.time->key) == folder(candidate.format.values))))
+      continue;
+    candidate.format.time = FrameTime{.key = key, .unit_s = *unit};
+  }
   return candidate;
+}
+
+bool is_object(std::string_view line) {
+  try {
+    return parse_json_limited(line).is_object();
+  } catch (const JsonError&) {
+    return false;
+  }
 }
 
 struct Frames {
@@ -247,11 +262,10 @@ std::optional<Candidate> candidate_of(const std::string& bytes, std::span<const 
       return found;
     }
     found = objects_of(lines);
-    const bool json = 2 * std::ranges::count_if(lines.text, [](auto line) { return line.front() == '{'; }) >
-                      std::ssize(lines.text);
-    if (!found && json) {
+    if (!found && 2 * std::ranges::count_if(lines.text, is_object) > std::ssize(lines.text)) {
       says.push_back(
-          "objects of JSON without an array of numbers: the sensor has to send its taxels as one, "
+          "objects of JSON without an array of numbers that makes rows and columns: the sensor has to send "
+          "its taxels as one, "
           "such as {\"values\": [1, 2, 3, 4]}");
       return found;
     }
@@ -280,7 +294,7 @@ std::optional<double> unit_of_clock(std::span<const double> stamps, double secon
   std::size_t fell = 0;
   for (std::size_t i = 1; i < stamps.size(); ++i) {
     const double step = stamps[i] - stamps[i - 1];
-    if (!(step > 0) && ++fell > kMostRestarts) return std::nullopt;
+    if (!(step > 0) && ++fell > std::min(kMostRestarts, stamps.size() / kStepsOfRestart)) return std::nullopt;
     went += std::max(step, 0.0);
   }
   if (seconds < kAtOnceS) {  // a file says nothing of the time it took: a clock of milliseconds, or a counter

@@ -13,7 +13,7 @@
 namespace supertac::safetensors {
 
 constexpr std::uint64_t kMaxHeaderBytes = std::uint64_t{1} << 20;
-constexpr std::size_t kMaxTensors = 4096;
+constexpr std::size_t kMaxTensors = 8192;
 constexpr std::size_t kMaxFields = 4096;  // of the metadata
 constexpr std::size_t kMaxRank = 16;
 constexpr char kMetadataKey[] = "__metadata__";

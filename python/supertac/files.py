@@ -12,7 +12,7 @@ import zlib
 import numpy as np
 
 TYPES = {"F64": "<f8", "F32": "<f4", "I64": "<i8", "I32": "<i4", "U8": "u1"}
-LARGEST_HEADER, MOST_TENSORS, MOST_FIELDS, HIGHEST_RANK = 1 << 20, 4096, 4096, 8
+LARGEST_HEADER, MOST_TENSORS, MOST_FIELDS, HIGHEST_RANK = 1 << 20, 8192, 4096, 8
 
 
 def parse_json(path: str | os.PathLike, text: str | bytes):

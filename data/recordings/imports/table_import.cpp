@@ -74,9 +74,15 @@ void check_shape(const Table& table, const Sensor& sensor) {
                     channels = side(sensor.array.channels);
   std::vector<std::size_t> found = table.shape;
   std::erase(found, 1U);
-  std::vector<std::size_t> expected = {rows, columns, channels}, flat = {rows * columns, channels};
-  std::erase(expected, 1U), std::erase(flat, 1U);
-  if (table.shape.size() < 2 || !sensor.order.empty() || found == expected || found == flat) return;
+  const std::vector<std::size_t> forms[] = {{rows, columns, channels},
+                                            {rows * columns, channels},
+                                            {rows, columns * channels},
+                                            {rows * columns * channels}};
+  for (std::vector<std::size_t> form : forms) {
+    std::erase(form, 1U);
+    if (found == form) return;
+  }
+  if (table.shape.size() < 2 || !sensor.order.empty()) return;
   std::string text;
   for (const std::size_t n : table.shape) text += (text.empty() ? "" : "x") + std::to_string(n);
   throw std::invalid_argument("holds frames of " + text + ", the sensor's file says " + sensor.array.text());
@@ -102,12 +108,11 @@ void spread_equal_stamps(std::vector<double>& time_s, double step) {
   }
 }
 
-/// What a counter lost of its units that ran over from one row to the next; 0 where it did not.
-double ran_over(double before, double now) {
+/// What a counter lost of its units that ran over from one row to the next, at most `most` apart; 0 where it
+/// did not.
+double ran_over(double before, double now, double most) {
   for (const double range : {65536.0, 4294967296.0})
-    if (before < range && now >= 0 && now < before && now + range - before < range / 4 &&
-        before == std::round(before))
-      return range;
+    if (before < range && now >= 0 && now < before && now + range - before < most) return range;
   return 0;
 }
 
@@ -118,9 +123,11 @@ std::vector<double> times_of(const std::string& path, const Table& table, std::s
     return table.places.empty() ? i : table.places[i] - table.places[0];
   };
   std::vector<double> time_s;
+  const double most = std::max(1.0, 10 / rate_hz) / unit;
   double over = 0;
   for (std::size_t i = 0; i < table.rows(); ++i) {
-    if (column != Columns::kNone && i > 0) over += ran_over(table.row(i - 1)[column], table.row(i)[column]);
+    if (column != Columns::kNone && i > 0)
+      over += ran_over(table.row(i - 1)[column], table.row(i)[column], most);
     const double t = column == Columns::kNone ? static_cast<double>(number(i)) / rate_hz
                                               : (table.row(i)[column] + over) * unit;
     if (!std::isfinite(t))
@@ -216,7 +223,7 @@ Recording recording_of_table(const std::string& path, const Table& table, const 
   Columns columns;
   try {
     columns = columns_of(table, map, sensor.values());
-    check_shape(table, sensor);
+    if (map.values.empty()) check_shape(table, sensor);
   } catch (const std::invalid_argument& error) {
     throw FileError(path, error.what());
   }

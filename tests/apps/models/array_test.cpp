@@ -166,6 +166,20 @@ TEST(Array, RefusesWhatIsNoArray) {
   }
 }
 
+TEST(Array, WindowsOf64RowsAreTrainedAndKept) {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data", model = folder / "m.safetensors";
+  ASSERT_EQ(run_process("supertac-simulate", {"--out", data, "--array", "64x1", "--pitch", "1", "--plates",
+                                              "ridges6", "--speeds", "20", "--trials", "1", "--passes", "1"})
+                .code,
+            0);
+  const auto trained =
+      run_process("supertac-train", {"--data", data, "--out", model, "--preset", "tiny", "--timesteps", "32",
+                                     "--epochs", "1", "--stride", "64", "--split", "none"});
+  ASSERT_EQ(trained.code, 0) << trained.error;
+  EXPECT_EQ(load_model(model).model->settings().groups(), 64);
+}
+
 TEST(Array, IsSimulatedAsASensorsFileSays) {
   const TemporaryFolder folder;
   write_file(folder / "mat.json",

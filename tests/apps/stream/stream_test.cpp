@@ -194,7 +194,7 @@ TEST_F(Streaming, ADiskThatBecomesFullEndsTheRecordingAndKeepsIt) {
   fs::create_directory(path("full"));
   const std::string script =
       "mount -t tmpfs -o size=400k none \"$0/full\" || exit 9\n"
-      "\"$1\" --recording \"$0/recording\" --record \"$0/full\" --quiet\n"
+      "\"$1\" --recording \"$0/recording\" --record \"$0/full\" --out \"$0/full/log\" --quiet\n"
       "code=$?; cp \"$0/full/\"*.safetensors \"$0/kept\"; exit $code";
   const ProcessResult result =
       run_process("/usr/bin/unshare", {"-rm", "sh", "-c", script, path(""), SUPERTAC_BIN "/supertac-stream"});

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/numbers/random.h"
 #include "tests/hardware/fake_sensor.h"
 
 namespace supertac {
@@ -94,6 +95,22 @@ TEST(Probe, KnowsAClockThatStartsAnewMeanwhile) {
     EXPECT_EQ(report.draft->frame.time->unit_s, 1e-3) << frame;
     EXPECT_EQ(report.draft->values(), 9U) << frame;
     EXPECT_NEAR(report.draft->rate_hz, 100, 1) << frame;
+  }
+}
+
+TEST(Probe, TakesNoNoiseOfFewLinesForAClock) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const RandomStream random(seed, 7);
+    std::vector<Heard> heard;
+    for (std::uint64_t n = 0; n < 6; ++n) {
+      std::string line;
+      for (std::uint64_t k = 0; k < 16; ++k)
+        line += std::to_string(static_cast<int>(4 * random.uniform(16 * n + k))) + (k < 15 ? "\t" : "\n");
+      heard.push_back({static_cast<double>(n), line});
+    }
+    const ProbeReport report = probe(heard, "here", {});
+    ASSERT_TRUE(report.draft) << all(report);
+    EXPECT_EQ(report.draft->values(), 16U) << all(report);
   }
 }
 

@@ -135,6 +135,9 @@ TEST_F(TableImport, ACounterMayRunOver) {
     text += std::to_string((65'000 + 10 * i) % 65'536) + ",50,60,70,80\n";
   const Recording r = import(file(text), "time=0:ms");
   for (std::size_t i = 1; i < 60; ++i) EXPECT_NEAR(r.time_s[i] - r.time_s[i - 1], 0.01, 1e-9) << i;
+  std::string restarted;  // 13 s would have gone by
+  for (int i = 0; i < 60; ++i) restarted += std::to_string((i < 30 ? 52'000 : 0) + 10 * i) + ",50,60,70,80\n";
+  expect_refusal(file(restarted), "time=0:ms", "column 0 as time falls in line 31");
 }
 
 TEST_F(TableImport, ALineThatIsCutLeavesItsTimeEmpty) {
@@ -188,6 +191,7 @@ TEST_F(TableImport, NumpyArraysAndWhatTheyMayNotBe) {
   row.array.rows = 1, row.array.columns = 4;
   const std::string path = npy("a.npy", "<f4", "10, 2, 2", values);
   EXPECT_THROW(recording_of_table(path, read_table(path), {}, row), FileError);
+  EXPECT_EQ(import(npy("b.npy", "<f4", "10, 1, 4", values)).frames(), 10U);
   row.order = {3, 2, 1, 0};
   EXPECT_EQ(recording_of_table(path, read_table(path), {}, row).frames(), 10U);
   expect_refusal(npy("a.npy", ">f4", "10, 4", values), "", "holds numbers of type '>f4', expected one of f4");
