@@ -17,6 +17,7 @@ struct ConvSettings {
   Dim stride_h = 1, stride_w = 1;
   Dim padding_h = 0, padding_w = 0;
   bool transposed = false;
+  // NOLINTNEXTLINE(modernize-use-nullptr): Clang 14 sees a 0 there
   auto operator<=>(const ConvSettings&) const = default;
 
   /// conv: (size + 2 padding - kernel) / stride + 1;  transposed: (size - 1) stride - 2 padding + kernel
