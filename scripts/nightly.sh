@@ -74,8 +74,9 @@ for part in "$@"; do
         -DCMAKE_CXX_FLAGS="--coverage -O1" -DCMAKE_EXE_LINKER_FLAGS=--coverage >/dev/null
       cmake --build build-coverage
       ctest --test-dir build-coverage -j 2 | tail -3 || true
-      gcovr -r . build-coverage --filter '(io|autograd|layers|data|models|hardware|apps)/' --csv build-coverage/files.csv \
-        --print-summary | tail -3
+      # Not the kernels of each instruction set: gcovr 5 cannot add up a file that is compiled several times.
+      gcovr -r . build-coverage --filter '(io|autograd|layers|data|models|hardware|apps)/' \
+        --exclude autograd/kernels/fast/isa/ --csv build-coverage/files.csv --print-summary | tail -3
       note coverage "below 80 %: $(awk -F, 'NR > 1 && $4 < 0.8 { printf "%s ", $1 }' build-coverage/files.csv)"
       ;;
     *) echo "nightly.sh: expected clang, aarch64, asan, tsan, tidy, cppcheck, lintian, portable, wheel or coverage, found $part" >&2; exit 2 ;;
