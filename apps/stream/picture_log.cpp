@@ -18,8 +18,8 @@ namespace supertac {
 namespace {
 
 constexpr std::uint64_t kCheckBytes = 64 << 10, kSpareBytes = 256 << 10;  // of room for the files
-std::atomic<std::uint64_t> waiting_bytes{
-    0};  // in the temporary files of all logs, which become as large files
+// In the temporary files of all logs, which may lie on one disk and become as large files.
+std::atomic<std::uint64_t> waiting_bytes{0};
 
 }  // namespace
 

@@ -22,8 +22,12 @@ std::string name_of_now() {
 
 std::string Recorder::finish() {
   stop();
-  for (std::thread* writer : {&writer_, &full_writer_})
-    if (writer->joinable()) writer->join();
+  std::vector<std::thread> writers;
+  {
+    const std::lock_guard lock(log_mutex_);
+    writers.swap(writers_);
+  }
+  for (std::thread& writer : writers) writer.join();
   return status().said;
 }
 
@@ -45,16 +49,19 @@ std::string Recorder::start() {
 }
 
 std::string Recorder::stop() {
-  if (writer_.joinable()) writer_.join();  // of the recording before
-  const std::scoped_lock lock(log_mutex_, mutex_);
-  if (!log_) return "nothing is being recorded";
-  status_.said = "writing " + status_.recording;
-  writer_ = std::thread(&Recorder::complete, this, std::move(log_), std::exchange(status_.recording, ""), "");
-  return status_.said;
+  const std::lock_guard lock(log_mutex_);
+  return log_ ? close("") : "nothing is being recorded";
+}
+
+std::string Recorder::close(const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  const std::string name = std::exchange(status_.recording, "");
+  writers_.emplace_back(&Recorder::complete, this, std::move(log_), name, why);
+  return status_.said = "writing " + name;
 }
 
 void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name, const std::string& why) {
-  const std::lock_guard writing(write_mutex_);
+  const std::lock_guard writing(write_mutex_);  // one after the other
   const std::string recorded = "recorded " + name;
   std::string said = recorded;
   taken_.clear();
@@ -77,13 +84,7 @@ void Recorder::add(const Seen& seen) {
   try {
     log_->add(seen);
   } catch (const FileError& error) {
-    std::string name;
-    {
-      const std::lock_guard status_lock(mutex_);
-      name = std::exchange(status_.recording, "");
-    }
-    if (full_writer_.joinable()) full_writer_.join();  // of a disk that was full before
-    full_writer_ = std::thread(&Recorder::complete, this, std::move(log_), name, error.what());
+    close(error.what());
   }
 }
 

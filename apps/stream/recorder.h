@@ -44,22 +44,22 @@ class Recorder {
   std::optional<std::string> file(const std::string& name);
 
  private:
+  std::string close(const std::string& why);  // under log_mutex_: a thread writes it; what that says
   void complete(std::unique_ptr<PictureLog> log, std::string name, const std::string& why);
 
   PictureFormat format_;
   std::map<std::string, std::string> metadata_;
   // Two, so that the stream's thread never waits for one that is asked how things stand, 30 times a second
   // and with no hurry: log_mutex_ is otherwise held for a moment at a start and a stop only.
-  std::mutex log_mutex_;  // of log_ and begin_s_
+  std::mutex log_mutex_;  // of log_, begin_s_ and writers_
   std::unique_ptr<PictureLog> log_;
   double begin_s_ = -1;
   std::atomic<double> seconds_ = 0;
   std::mutex mutex_;  // of status_
   Status status_;
-  std::thread writer_;       // of the starting and stopping thread
-  std::thread full_writer_;  // of the stream's thread, then of finish()
-  std::mutex write_mutex_;
-  std::string taken_;  // of what complete() writes: the file got another name, and why
+  std::vector<std::thread> writers_;  // under log_mutex_; joined by finish()
+  std::mutex write_mutex_;            // of taken_
+  std::string taken_;                 // of what complete() writes: the file got another name, and why
 };
 
 }  // namespace supertac

@@ -7,6 +7,7 @@ STREAM is the program supertac-stream. Frames are made here, at their times; wha
 received here, so a time goes from before a frame is sent until after its raw picture has come. Every hundredth picture
 is compared with its frame. Keeps a line for each array in bench/results/reliability/sensors.csv.
 """
+import binascii
 import csv
 import json
 import os
@@ -45,11 +46,11 @@ class Device:
         return {"name": "endurance", "rows": self.rows, "columns": self.columns, "pitch_mm": 2, "unit": "counts",
                 "pressed": "higher", "range": [0, 4000], "rate_hz": self.rate_hz, "port": port,
                 "frame": {"kind": "binary", "header": HEADER.hex(), "type": "u16", "endian": "little",
-                          "time": {"type": "u32", "unit": "us"}, "checksum": "crc16-modbus"}}
+                          "time": {"type": "u32", "unit": "us"}, "checksum": "crc16-ccitt"}}
 
     def bytes_of(self, number):
         body = np.uint32(number * 1_000_000 // self.rate_hz % 2**32).tobytes() + frame(number, self.rows * self.columns).tobytes()
-        return HEADER + body + crc16(body).to_bytes(2, "little")
+        return HEADER + body + binascii.crc_hqx(body, 0xFFFF).to_bytes(2, "little")
 
     def run(self, send, seconds):
         begin = time.monotonic()
@@ -59,21 +60,6 @@ class Device:
             time.sleep(max(0.0, due - time.monotonic()))
             self.sent_s.append(time.monotonic())
             send(bytes_)
-
-
-TABLE = []
-for byte in range(256):
-    crc = byte
-    for _ in range(8):
-        crc = crc >> 1 ^ (0xA001 if crc & 1 else 0)
-    TABLE.append(crc)
-
-
-def crc16(data):
-    crc = 0xFFFF
-    for byte in data:
-        crc = crc >> 8 ^ TABLE[(crc ^ byte) & 0xFF]
-    return crc
 
 
 class Pictures(threading.Thread):

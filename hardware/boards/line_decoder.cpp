@@ -82,13 +82,9 @@ class TextDecoder : public LineDecoder {
   }
 };
 
-/// What stands at `path`: a key, or keys of objects within objects, "finger.taxels". Throws where nothing
-/// does.
-const nlohmann::ordered_json& at_path(const nlohmann::ordered_json& json, const std::string& path) {
-  for (std::size_t dot = path.find('.'); dot != std::string::npos; dot = path.find('.', dot + 1))
-    if (const auto found = json.find(path.substr(0, dot)); found != json.end())
-      return at_path(*found, path.substr(dot + 1));
-  return json.at(path);
+/// What stands at a key, or at a JSON Pointer (RFC 6901) such as "/finger/taxels". Throws where nothing does.
+const nlohmann::ordered_json& at(const nlohmann::ordered_json& json, const std::string& key) {
+  return key.starts_with('/') ? json.at(nlohmann::ordered_json::json_pointer(key)) : json.at(key);
 }
 
 class JsonDecoder : public LineDecoder {
@@ -100,8 +96,8 @@ class JsonDecoder : public LineDecoder {
     if (line.empty() || (line.front() != '{' && line.front() != '[')) return false;
     try {
       const auto json = parse_json_limited(line);
-      if (format_.time) frame.time_s = at_path(json, format_.time->key).get<double>() * format_.time->unit_s;
-      return flatten(format_.values.empty() ? json : at_path(json, format_.values), values_);
+      if (format_.time) frame.time_s = at(json, format_.time->key).get<double>() * format_.time->unit_s;
+      return flatten(format_.values.empty() ? json : at(json, format_.values), values_);
     } catch (const std::exception&) {  // of the parser, or a key that is missing or no number
       return false;
     }

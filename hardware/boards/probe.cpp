@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -127,10 +128,14 @@ std::optional<Candidate> objects_of(const Lines& lines) {
   std::vector<std::size_t> nested;
   Candidate candidate{.format = {.kind = FrameKind::json}, .array = {}, .remark = {}};
   std::size_t most = 0, parsed = 0;
-  const std::function<void(const std::string&, const nlohmann::ordered_json&)> look =
-      [&](const std::string& key, const nlohmann::ordered_json& value) {
+  using Pointer = nlohmann::ordered_json::json_pointer;
+  const std::function<void(const Pointer&, const nlohmann::ordered_json&)> look =
+      [&](const Pointer& place, const nlohmann::ordered_json& value) {
         if (value.is_object())
-          for (const auto& [inner, of] : value.items()) look(key.empty() ? inner : key + "." + inner, of);
+          for (const auto& [inner, of] : value.items()) look(place / inner, of);
+        const bool outermost = !place.empty() && place.parent_pointer().empty();
+        const std::string key =
+            outermost && !place.back().starts_with('/') ? place.back() : place.to_string();
         std::vector<float> numbers;
         if (value.is_number()) scalars[key].push_back(value.get<double>());
         if (!value.is_array() || !flatten(value, numbers) || numbers.size() <= most) return;
@@ -139,7 +144,7 @@ std::optional<Candidate> objects_of(const Lines& lines) {
       };
   for (const auto line : lines.text) try {
       const auto json = parse_json_limited(line);
-      if (json.is_structured()) look("", json);
+      if (json.is_structured()) look(Pointer(), json);
       ++parsed;
     } catch (const JsonError&) {  // no line of this kind
     }
@@ -149,7 +154,7 @@ std::optional<Candidate> objects_of(const Lines& lines) {
   if (!array) return std::nullopt;
   candidate.array = *array;
   // The clock beside the array rather than another.
-  const auto folder = [](const std::string& key) { return key.substr(0, key.rfind('.') + 1); };
+  const auto folder = [](const std::string& key) { return key.substr(0, key.rfind('/') + 1); };
   for (const auto& [key, stamps] : scalars) {
     const auto unit = stamps.size() == parsed ? unit_of_clock(stamps, lines.seconds) : std::nullopt;
     const bool beside = folder(key) == folder(candidate.format.values);

@@ -69,6 +69,7 @@ Columns columns_of(const Table& table, const ColumnMap& map, std::size_t expecte
 
 /// Refuses images that are no frames of the array; where the taxels have an order of their own, any may be.
 void check_shape(const Table& table, const Sensor& sensor) {
+  if (table.shape.size() < 2 || !sensor.order.empty()) return;
   const auto side = [](int n) { return static_cast<std::size_t>(n); };
   const std::size_t rows = side(sensor.array.rows), columns = side(sensor.array.columns),
                     channels = side(sensor.array.channels);
@@ -82,7 +83,6 @@ void check_shape(const Table& table, const Sensor& sensor) {
     std::erase(form, 1U);
     if (found == form) return;
   }
-  if (table.shape.size() < 2 || !sensor.order.empty()) return;
   std::string text;
   for (const std::size_t n : table.shape) text += (text.empty() ? "" : "x") + std::to_string(n);
   throw std::invalid_argument("holds frames of " + text + ", the sensor's file says " + sensor.array.text());

@@ -44,8 +44,8 @@ TEST_F(RecorderTest, KeepsWhatCameBetweenStartAndStop) {
     EXPECT_EQ(recorder.file(name), std::nullopt);  // not before it is complete
     EXPECT_EQ(recorder.stop(), "writing " + name);
     recorder.add(seen_at(2));
-    EXPECT_EQ(recorder.stop(), "nothing is being recorded");  // waits for the file
-    EXPECT_EQ(recorder.status().said, "recorded " + name);
+    EXPECT_EQ(recorder.stop(), "nothing is being recorded");
+    EXPECT_EQ(recorder.finish(), "recorded " + name);
     EXPECT_EQ(recorder.file(name), name);
   }
   const SafetensorsFile file = SafetensorsFile::read(name);
@@ -74,9 +74,8 @@ TEST_F(RecorderTest, AFileThatAppearedMeanwhileStays) {
     name = recorder.status().recording;
     recorder.add(seen_at(1));
     write_file(name, "mine");
-    recorder.stop();
-    recorder.stop();  // waits for the file
-    EXPECT_NE(recorder.status().said.find("-2.safetensors"), std::string::npos) << recorder.status().said;
+    const std::string said = recorder.finish();
+    EXPECT_NE(said.find("-2.safetensors"), std::string::npos) << said;
   }
   EXPECT_EQ(read_text_file(name, 9), "mine");
   name.replace(name.find(".safe"), 0, "-2");

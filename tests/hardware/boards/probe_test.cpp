@@ -123,8 +123,8 @@ TEST(Probe, FindsAnArrayWithinAnObject) {
   }
   const ProbeReport report = probe(heard, "here", {});
   ASSERT_TRUE(report.draft) << all(report);
-  EXPECT_EQ(report.draft->frame.values, "finger.taxels");
-  EXPECT_EQ(report.draft->frame.time->key, "finger.ms");
+  EXPECT_EQ(report.draft->frame.values, "/finger/taxels");
+  EXPECT_EQ(report.draft->frame.time->key, "/finger/ms");
   EXPECT_EQ(report.draft->array.rows, 2);
   for (Heard& chunk : heard)
     chunk.bytes = R"({"s0":1,"s1":2,"s2":3})"
