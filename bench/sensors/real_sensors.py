@@ -68,9 +68,9 @@ class Study:
         if subprocess.run(command, stdout=subprocess.DEVNULL).returncode != 0:
             sys.exit(f"real_sensors.py: this command failed, see above: {' '.join(command)}")
 
-    def network(self, name, seed, passes, window, *words):
+    def network(self, name, seed, kind, passes, window, *words):
         """Trained on the first passes, with the factor that split `group` finds, and what it draws of the second."""
-        scale, where = sets.SETS[name][1], self.out / f"{name}_{seed}_{window}"
+        scale, where = sets.SETS[name][1], self.out / f"{name}_{seed}_{kind}"
         if not where.exists():
             new = where.with_suffix(".new")
             shutil.rmtree(new, ignore_errors=True)
@@ -100,14 +100,15 @@ class Study:
         yield "bicubic", scores(name, baselines.bicubic(frames[1], scale), passes[1])
         yield "back-projection", scores(name, baselines.back_projection(frames[1], scale), passes[1])
         yield "A+", scores(name, baselines.APlus(frames[0], truths[0], scale, seed=seed)(frames[1]), passes[1])
-        yield "one frame", self.network(name, seed, passes, 1, "--preset", "frame")
+        yield "one frame", self.network(name, seed, "frame", passes, 1, "--preset", "frame")
         if name == "mat":  # whoever lies on it may lie the other way round
-            yield "one frame, mirrored", self.network(name, seed, passes, 1, "--preset", "frame", "--augment", "mirror")
+            yield "one frame, mirrored", self.network(name, seed, "mirrored", passes, 1, "--preset", "frame", "--augment",
+                                                      "mirror")
 
     def windows(self, name, seed):
         read, _, in_time = sets.SETS[name]
         if in_time:
-            yield "window", self.network(name, seed, split(list(read(self.folder)), seed), 32, "--preset", "best",
+            yield "window", self.network(name, seed, "window", split(list(read(self.folder)), seed), 32, "--preset", "best",
                                          "--last-frame", "--rate", RATE[name], "--scaling", "fixed", "--augment", "none")
 
 
