@@ -58,6 +58,10 @@ class Stream {
   std::string url() const { return web_ ? web_->url() : std::string(); }
   /// Seconds of signal before the first picture.
   double window_s() const { return maker_ ? maker_->window_s() : 0; }
+  /// Silences that no window crosses.
+  std::uint64_t gaps() const { return maker_ ? maker_->window().counters().gaps : 0; }
+  /// "; ..." where frames come more or less often than the source says, else empty.
+  std::string rate_remark() const;
   /// A line for people, and the same for --json.
   std::string summary() const;
   nlohmann::ordered_json result() const;
@@ -70,7 +74,6 @@ class Stream {
   void output(const Seen& seen);
   void complete();
   void describe_recording();
-  std::string rate_remark() const;
   void show();
   void name_texture();
   double milliseconds(double quantile) const { return 1e3 * latency_.quantile(quantile); }

@@ -20,6 +20,7 @@ constexpr double kJumpS = 0.1, kJumpPeriods = 10;  // stamps farther from the on
 constexpr double kMostStampS = 1e11;               // three thousand years; a double still tells 20 us apart
 constexpr std::uint64_t kBlock = 64;
 constexpr std::size_t kShown = 120;
+constexpr int kMostReads = 64;  // of what waited
 
 }  // namespace
 
@@ -33,18 +34,33 @@ FrameDates::FrameDates(const Sensor& sensor) : nominal_s_(1 / sensor.rate_hz), p
   if (bits > 0) wraps_s_ = std::exp2(bits) * sensor.frame.time->unit_s;
 }
 
-std::optional<double> FrameDates::date(std::optional<double> stamp_s, double arrival_s) {
-  const auto dated = stamp_s ? by_stamp(*stamp_s, arrival_s) : std::optional(by_arrival(arrival_s));
+std::optional<double> FrameDates::date(std::optional<double> stamp_s, double arrival_s, std::size_t behind) {
+  resynchronised_ = false;
+  const auto dated = stamp_s ? by_stamp(*stamp_s, arrival_s) : std::optional(by_arrival(arrival_s, behind));
   if (!dated || (count_ > 0 && *dated <= last_s_)) return std::nullopt;
   const double time = *dated;
-  if (count_ > 0) {
-    const double periods = (time - last_s_) / period_s_;
-    if (periods > 1.5) missing_ += static_cast<std::uint64_t>(std::lround(std::min(periods - 1, 1e9)));
-    if (stamp_s && periods < 1.5) period_s_ += (time - last_s_ - period_s_) / 64;
-  }
+  if (count_ > 0 && !resynchronised_) count_missing(time - last_s_, stamp_s.has_value());
   ++count_;
   last_s_ = time, last_arrival_s_ = arrival_s;
   return time;
+}
+
+// Stamps that are always as far apart are a slower sensor than its file says, which loses nothing.
+void FrameDates::count_missing(double step_s, bool stamped) {
+  constexpr std::uint64_t kAlways = 8;
+  const double periods = step_s / period_s_;
+  const auto missing =
+      periods > 1.5 ? static_cast<std::uint64_t>(std::lround(std::min(periods - 1, 1e9))) : 0;
+  missing_ += missing;
+  if (!stamped) return;
+  if (periods < 1.5) period_s_ += (step_s - period_s_) / 64;
+  const bool as_before = std::abs(step_s - regular_step_s_) < 0.25 * regular_step_s_;
+  regular_ = as_before ? regular_ + 1 : 0;
+  regular_missing_ = as_before ? regular_missing_ + missing : missing;
+  regular_step_s_ = step_s;
+  if (regular_ < kAlways || missing == 0) return;
+  period_s_ = step_s;
+  missing_ -= std::exchange(regular_missing_, 0);
 }
 
 // A damaged stamp may be anything, and what it said would hold for all that follow. So a jump is believed
@@ -73,23 +89,38 @@ std::optional<double> FrameDates::by_stamp(double stamp_s, double arrival_s) {
 }
 
 // The rate that a sensor's file names is a word, not a clock: the least lateness of every block moves the
-// dates, and its drift the period.
-double FrameDates::by_arrival(double arrival_s) {
-  if (count_ == 0) return arrival_s;
-  const double due = last_s_ + period_s_, late = arrival_s - due;
+// dates, and its drift the period. Frames that come late without a silence before them are made more slowly
+// than was said; none is lost. Those behind a silence, in the same burst, make up for it.
+double FrameDates::by_arrival(double arrival_s, std::size_t behind) {
+  const double waited_s = static_cast<double>(behind) * period_s_;
+  ++since_sync_;
+  if (count_ == 0) {
+    synchronised_s_ = arrival_s, since_sync_ = 0;
+    return arrival_s - waited_s;
+  }
+  const double due = last_s_ + period_s_, late = arrival_s - waited_s - due;
   const double earliest = last_s_ + 0.01 * period_s_;  // frames that arrive at once follow each other still
-  if (late > std::max(kChunkS, 3 * period_s_)) {
-    in_block_ = 0;
-    return arrival_s;
+  const double most_late = std::max(kChunkS, 3 * period_s_);
+  const bool silent = arrival_s - last_arrival_s_ > most_late;
+  if (late > most_late && (silent || behind == 0)) {
+    if (!silent) {
+      const double found = (arrival_s - synchronised_s_) / static_cast<double>(since_sync_);
+      period_s_ = std::clamp(found, 0.1 * nominal_s_, 10 * nominal_s_);
+      resynchronised_ = true;
+    }
+    synchronised_s_ = arrival_s, since_sync_ = 0, in_block_ = 0;
+    return arrival_s - waited_s;
   }
   least_late_s_ = in_block_ == 0 ? late : std::min(least_late_s_, late);
+  most_late_s_ = in_block_ == 0 ? late : std::max(most_late_s_, late);
   if (++in_block_ == kBlock) {
-    const double drift = least_late_s_ / static_cast<double>(kBlock);
+    // Frames that are early are dated by their arrival, so that each is early anew.
+    const double drift = most_late_s_ < 0 ? most_late_s_ : least_late_s_ / static_cast<double>(kBlock);
     period_s_ = std::clamp(period_s_ + 0.5 * drift, 0.5 * nominal_s_, 2 * nominal_s_);
     in_block_ = 0;
     return std::max(earliest, std::min(arrival_s, due + std::min(0.5 * least_late_s_, 0.4 * period_s_)));
   }
-  return late >= 0 ? due : std::max(arrival_s, earliest);
+  return late >= 0 ? due : std::max(arrival_s - waited_s, earliest);
 }
 
 SensorReader::SensorReader(OpenedPort opened, const Sensor& sensor)
@@ -123,7 +154,7 @@ void SensorReader::run() {
   } catch (const PortEnded&) {  // nothing is wrong, and the last line may have no end
     const std::byte end{'\n'};
     if (sensor_.frame.kind == FrameKind::text || sensor_.frame.kind == FrameKind::json)
-      decoder_->push({&end, 1}, [&](const DecodedFrame& frame) { take(frame, port_->now()); });
+      decoder_->push({&end, 1}, [&](const DecodedFrame& frame) { take(frame, port_->now(), 0); });
     const std::lock_guard lock(mutex_);
     counters_.decoder = decoder_->counters();
   } catch (...) {
@@ -137,11 +168,27 @@ void SensorReader::run() {
 
 void SensorReader::read_once() {
   std::array<std::byte, kReadBytes> buffer;
-  const Received got = port_->read(buffer, port_->now() + kReadSlice);
+  Received got = port_->read(buffer, port_->now() + kReadSlice);
   const auto bytes = std::span(buffer).first(got.count);
   if (decoder_->counters().frames == 0 && beginning_.size() < kShown)
     for (const std::byte byte : bytes) beginning_ += std::to_integer<char>(byte);
-  decoder_->push(bytes, [&](const DecodedFrame& frame) { take(frame, got.time_s); });
+  read_.clear();
+  const auto keep = [&](const DecodedFrame& frame) {
+    read_.times_s.push_back(frame.time_s);
+    read_.values.insert(read_.values.end(), frame.values.begin(), frame.values.end());
+  };
+  decoder_->push(bytes, keep);
+  // A host that stood still finds what waited meanwhile in several reads.
+  const bool stood_still = got.time_s - std::exchange(last_read_s_, got.time_s) > kChunkS;
+  for (int more = 0; stood_still && live_ && more < kMostReads; ++more) {
+    const Received rest = port_->read(buffer, port_->now());
+    if (rest.count == 0) break;
+    decoder_->push(std::span(buffer).first(rest.count), keep);
+    got.time_s = rest.time_s;
+  }
+  for (std::size_t n = 0, size = sensor_.values(); n < read_.times_s.size(); ++n)
+    take({std::span(read_.values).subspan(n * size, size), read_.times_s[n]}, got.time_s,
+         read_.times_s.size() - 1 - n);
   check_silence(got.time_s);
   const std::lock_guard lock(mutex_);
   counters_.decoder = decoder_->counters();
@@ -179,12 +226,12 @@ void SensorReader::check_clock(double time_s, double arrival_s) {
                     " s a second; see whether its file names the right column and unit (s, ms, us) of time");
 }
 
-void SensorReader::take(const DecodedFrame& decoded, double arrival_s) {
+void SensorReader::take(const DecodedFrame& decoded, double arrival_s, std::size_t behind) {
   last_frame_s_ = arrival_s;
   sensor_.arrange(decoded.values, signals_);
   const bool damaged = !std::ranges::all_of(signals_, [](float v) { return std::isfinite(v); }) ||
                        (decoded.time_s && !std::isfinite(*decoded.time_s));
-  const auto time = damaged ? std::nullopt : dates_.date(decoded.time_s, arrival_s);
+  const auto time = damaged ? std::nullopt : dates_.date(decoded.time_s, arrival_s, behind);
   if (time && live_ && decoded.time_s && !clock_checked_) check_clock(*time, arrival_s);
   std::unique_lock lock(mutex_);
   counters_.damaged += damaged ? 1 : 0, counters_.late += !damaged && !time ? 1 : 0;

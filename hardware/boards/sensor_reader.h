@@ -35,23 +35,30 @@ struct ReaderCounters {
 /// believed when it arrives as much later; so is one, or one over 0.1 s back, when the next goes on from it,
 /// which costs a frame, or when three jump as far. A damaged stamp that is less far ahead costs the frames
 /// that it overtakes. A frame can come late, not early: without stamps frames are a period apart below the
-/// earliest arrivals.
+/// earliest arrivals; so are those of a burst behind a silence, when they are as many as it lasted periods.
 class FrameDates {
  public:
   explicit FrameDates(const Sensor& sensor);
   /// Empty for a frame that is not later than the one before, or whose stamp jumps.
-  std::optional<double> date(std::optional<double> stamp_s, double arrival_s);
+  /// `behind`: how many frames came behind it in the same burst; they are dated with the same arrival.
+  std::optional<double> date(std::optional<double> stamp_s, double arrival_s, std::size_t behind = 0);
   std::uint64_t missing() const { return missing_; }
   double period_s() const { return period_s_; }
 
  private:
   std::optional<double> by_stamp(double stamp_s, double arrival_s);
-  double by_arrival(double arrival_s);
+  double by_arrival(double arrival_s, std::size_t behind);
+  void count_missing(double step_s, bool stamped);
   double nominal_s_, period_s_, wraps_s_ = 0;
-  double offset_s_ = 0, last_s_ = 0, last_arrival_s_ = 0, least_late_s_ = 0;
+  double offset_s_ = 0, last_s_ = 0, last_arrival_s_ = 0, least_late_s_ = 0, most_late_s_ = 0;
   std::optional<double> jumped_s_;       // a stamp that was not believed
   double jump_step_s_ = 0, step_s_ = 0;  // from the one before that to it, and where these are always as long
-  std::uint64_t count_ = 0, in_block_ = 0, missing_ = 0;
+  double synchronised_s_ = 0;            // when dates were set to the arrivals
+  std::uint64_t count_ = 0, in_block_ = 0, missing_ = 0, since_sync_ = 0;
+  double regular_step_s_ =
+      0;  // the step before, how often in a row it was as long, and what was missing in it
+  std::uint64_t regular_ = 0, regular_missing_ = 0;
+  bool resynchronised_ = false;  // at this frame, and nothing was lost
 };
 
 class SensorReader {
@@ -77,7 +84,7 @@ class SensorReader {
  private:
   void run();
   void read_once();
-  void take(const DecodedFrame& decoded, double arrival_s);
+  void take(const DecodedFrame& decoded, double arrival_s, std::size_t behind);
   void check_silence(double time_s);
   void check_clock(double time_s, double arrival_s);
 
@@ -87,6 +94,12 @@ class SensorReader {
   std::unique_ptr<SensorDecoder> decoder_;
   FrameDates dates_;
   std::vector<float> signals_;
+  struct {
+    std::vector<std::optional<double>> times_s;
+    std::vector<float> values;
+    void clear() { times_s.clear(), values.clear(); }
+  } read_;  // frames that came at once
+  double last_read_s_;
   std::string beginning_;  // of what came before the first frame
   double last_frame_s_;
   double first_time_s_ = 0, first_arrival_s_ = 0, checked_time_s_ = 0, longest_step_s_ = 0;

@@ -255,6 +255,8 @@ TEST(SensorFiles, AnotherRateThanTheFileSaysIsSaid) {
   EXPECT_EQ(said(40).find("is said to send"), std::string::npos);
   const std::string slow = said(100);
   EXPECT_NE(slow.find(" frames came a second, the sensor is said to send 100.0"), std::string::npos) << slow;
+  EXPECT_NE(said(45).find("is said to send 45.0: correct rate_hz in its file"), std::string::npos);
+  EXPECT_NE(slow.find("lost 0,"), std::string::npos) << slow;
 }
 
 TEST(SensorFiles, OthersAtThePortAreToldApart) {

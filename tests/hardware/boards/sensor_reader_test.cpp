@@ -181,6 +181,7 @@ TEST(SensorReader, ASensorFarSlowerThanItsFileSaysLosesNothing) {
     read += from_file.date(0.2 * n, 50 + 1e-5 * n) ? 1 : 0;
   }
   EXPECT_EQ(dated, 100);
+  EXPECT_EQ(live.missing(), 0U);
   EXPECT_GE(read, 98) << "of a file all comes at once: two frames are doubted";
 }
 
@@ -231,6 +232,46 @@ TEST(SensorReader, DatesByArrivalWhereNothingIsStamped) {
   EXPECT_LT(worst_s, 0.1);
   EXPECT_NEAR(dates.period_s(), 1 / rate_hz, 3e-4);
   EXPECT_NEAR(static_cast<double>(dates.missing()), 60, 12);
+}
+
+// A sensor that its file calls faster lost frames that were never made, and no window was without a gap.
+TEST(SensorReader, AnotherRateThanTheStatedOneIsNoLoss) {
+  for (const double made_hz : {50.0, 80.0, 88.0, 92.0, 108.0, 125.0, 200.0}) {
+    FrameDates dates(mat(1, 2, 100, R"({"kind":"text"})"));
+    double last = 0;
+    int gaps = 0;
+    for (int n = 0; n < 1000; ++n) {
+      const auto time = dates.date(std::nullopt, 7 + n / made_hz);
+      ASSERT_TRUE(time);
+      gaps += n > 0 && *time - last > 0.05;
+      EXPECT_TRUE(n < 2 * made_hz || *time - last < 2 / made_hz) << made_hz << ' ' << n;
+      last = *time;
+    }
+    EXPECT_LE(gaps, 1) << made_hz;
+    EXPECT_EQ(dates.missing(), 0U) << made_hz;
+    EXPECT_NEAR(dates.period_s(), 1 / made_hz, 0.03 / made_hz) << made_hz;
+    EXPECT_NEAR(last, 7 + 999 / made_hz, 0.12) << made_hz;
+  }
+}
+
+// The frames of a burst make up for the silence before it; of a longer silence the rest is lost.
+TEST(SensorReader, WhatWaitedWhileTheHostStoodStillIsNotLost) {
+  for (const int lost : {0, 30}) {
+    FrameDates dates(mat(1, 2, 100, R"({"kind":"text"})"));
+    double last = 0, longest = 0;
+    for (int n = 0; n < 600; ++n) {
+      const bool waited = n >= 300 && n < 340;
+      if (waited && n < 300 + lost) continue;
+      const auto time =
+          dates.date(std::nullopt, 0.01 * (waited ? 340 : n), waited ? std::size_t(339 - n) : 0);
+      ASSERT_TRUE(time);
+      if (n > 0) longest = std::max(longest, *time - last);
+      last = *time;
+    }
+    EXPECT_NEAR(last, 5.99, 0.02);
+    EXPECT_LT(longest, 0.01 * lost + 0.025);
+    EXPECT_NEAR(static_cast<double>(dates.missing()), lost, 1);
+  }
 }
 
 TEST(SensorReader, FramesThatArriveAtOnceAreAllDated) {
