@@ -32,7 +32,7 @@ void declare(Arguments& arguments) {
       .required("out", "DIR", "folder for the recordings, one file per pass")
       .option("speed", "MM_PER_S", "sliding speed of the passes in mm/s", "10")
       .option("pictures", "DIR",
-              "write index.html: the signals of each pass under the plate they were fitted to")
+              "write index.html: the signals of each pass of the rig's text files under the plate they were fitted to")
       .flag("skip-bad", "leave out files and folders that are no recordings instead of giving up");
   declare_tables(arguments);
 }
@@ -113,7 +113,7 @@ int run(Arguments& arguments) {
   const std::string input = arguments.text("INPUT");
   if (const auto pairs = pairs_of(input)) return convert_pairs(arguments, *pairs);
   if (arguments.given("sensor")) {
-    refuse_others(arguments, "pictures are of the rig's text files", {"pictures"});
+    refuse_others(arguments, "pictures are made of the rig's text files only", {"pictures"});
     return import_tables(arguments, input);
   }
   const std::string out = arguments.text("out");

@@ -130,23 +130,37 @@ struct TableImport {
                                                    : "; take off the plate's origin"));
   }
 
+  /// The plate of --plate, or the one that a recording names; empty for an unknown one.
+  std::optional<Plate> plate_of(const Recording& recording, const fs::path& path) const {
+    const bool named = !recording.plate.empty() && !is_unknown_plate(recording.plate) &&
+                       recording.plate.find('/') == std::string::npos;  // writing it refuses such a name
+    if (plate && named && recording.plate != plate_name)
+      throw FileError(path.string(), "was recorded over " + recording.plate + ", --plate says " + plate_name +
+                                         "; leave --plate out, and each recording's own plate is taken");
+    if (plate || !named) return plate;
+    return plate_in_folder(recording.plate, path.parent_path().string());
+  }
+
   /// Positions that no column and no log holds are found from the signals, over a known plate.
   Recording import(const TableFile& file, int pass, std::size_t& dropped,
                    std::optional<Registration>& fit) const {
     const std::string path = file.path.string();
     Recording recording = read(path, dropped);
+    const std::optional<Plate> over = plate_of(recording, file.path);
+    if (over && !plate) keep_plate_file((file.path.parent_path() / recording.plate).string(), out);
     if (plate || recording.plate.empty()) recording.plate = plate_name;
     recording.trial = std::max(1, recording.trial), recording.pass = pass;
     recording.metadata["file"] = file.path.filename().string();
     if (!file.group.empty()) recording.metadata["group"] = file.group;
     if (const std::string log = companion(arguments, "positions", file); !log.empty())
       add_positions(recording, log, read_table(log), map.time_unit_s);
-    if (plate) check_places(path, recording);
+    if (over) check_places(path, recording);
     if (const std::string images = companion(arguments, "truth", file); !images.empty())
       add_truth(recording, images, read_table(images), truth_range[0], truth_range[1]);
-    if (plate && recording.position_mm.empty() && recording.truth.empty()) {
+    const bool registers = plate || (over && !over->crests().empty());
+    if (registers && recording.position_mm.empty() && recording.truth.empty()) {
       recording.speed_mm_s = speed_mm_s;
-      fit = register_pass(recording, *plate);
+      fit = register_pass(recording, *over);
       apply(*fit, recording);
     }
     return recording;
@@ -158,8 +172,23 @@ struct TableImport {
   std::vector<double> truth_range;
   std::string plate_name;
   double speed_mm_s;
+  std::string out;  ///< where the recordings go
   std::optional<Plate> plate;
 };
+
+/// What is known of where the array was.
+std::string about_positions(const Recording& recording, const std::optional<Registration>& fit) {
+  if (fit)
+    return fit->reliable ? "positions found, residual " + format(fit->residual, 2) + " mm"
+                         : "not reliable: " + fit->reason;
+  if (recording.position_mm.empty())
+    return recording.truth.empty() ? "no positions: name its plate (--plate), or give --positions or --truth"
+                                   : "truth as measured";
+  std::size_t known = 0;
+  for (std::size_t i = 0; i + 1 < recording.position_mm.size(); i += 2)
+    known += std::isfinite(recording.position_mm[i]) && std::isfinite(recording.position_mm[i + 1]);
+  return "positions for " + std::to_string(known) + " of " + std::to_string(recording.frames()) + " frames";
+}
 
 }  // namespace
 
@@ -192,8 +221,9 @@ void declare_tables(Arguments& arguments) {
 }
 
 int import_tables(const Arguments& arguments, const std::string& input) {
-  const TableImport settings(arguments);
+  TableImport settings(arguments);
   OutputFolder folder(arguments.output("out"));
+  settings.out = folder.path();
   keep_plate_file(arguments.text("plate"), folder.path());
   std::optional<Progress> bar;
   nlohmann::ordered_json files = nlohmann::ordered_json::array();
@@ -222,10 +252,8 @@ int import_tables(const Arguments& arguments, const std::string& input) {
     write_recording(folder.add(name), recording);
     arguments.print(path + ": " + std::to_string(recording.frames()) + " frames in " +
                     format(recording.time_s.back() - recording.time_s.front(), 2) + " s" +
-                    (dropped > 0 ? ", " + std::to_string(dropped) + " lines dropped" : "") +
-                    (!fit            ? ""
-                     : fit->reliable ? ", positions found, residual " + format(fit->residual, 2) + " mm"
-                                     : ", not reliable: " + fit->reason));
+                    (dropped > 0 ? ", " + std::to_string(dropped) + " lines dropped" : "") + ", " +
+                    about_positions(recording, fit));
     files.push_back({{"file", path},
                      {"frames", recording.frames()},
                      {"dropped", dropped},

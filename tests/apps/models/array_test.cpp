@@ -314,6 +314,18 @@ TEST(Array, ATableWithoutPositionsIsRegisteredAgainstItsPlate) {
                                       "--speed", "12", "--out", folder / "again"});
   ASSERT_EQ(again.code, 0) << again.error;
   EXPECT_EQ(read_recording(list_recordings(folder / "again").front()).position_mm, found.position_mm);
+  // It names its plate: that is enough, and another plate a contradiction.
+  std::vector<std::string> named{
+      folder / "kept.safetensors", "--sensor", sensor, "--speed", "12", "--out", folder / "named"};
+  EXPECT_EQ(run_process("supertac-import", named).code, 0);
+  EXPECT_EQ(read_recording(list_recordings(folder / "named").front()).position_mm, found.position_mm);
+  named.insert(named.end(), {"--plate", "6_Bumps"});
+  EXPECT_NE(
+      run_process("supertac-import", named).error.find("was recorded over 3_Bumps, --plate says 6_Bumps"),
+      std::string::npos);
+  const auto nowhere =
+      run_process("supertac-import", {folder / "slide.txt", "--sensor", sensor, "--out", folder / "nowhere"});
+  EXPECT_NE(nowhere.out.find(" s, no positions: name its plate (--plate)"), std::string::npos) << nowhere.out;
 }
 
 // Tables of two days have the same names; what stands beside them is in folders of theirs.
