@@ -18,6 +18,16 @@ std::string drawn_by(const ModelFile& file) {
   return plate.empty() ? "seed " + file.metadata_or("seed", "0") : "left-out plate " + plate;
 }
 
+// A split as a person would say it; a seed decides nothing about trials and plates.
+std::string drawn(const std::string& split, std::uint64_t seed) {
+  const bool by_seed = split == "window" || split == "pass" || split == "group";
+  return by_seed ? split + " of seed " + std::to_string(seed) : split;
+}
+
+std::string kept_away_by(const ModelFile& file) {
+  return drawn(file.metadata_or("split", "none"), parse_uint(file.metadata_or("seed", "0")).value_or(0));
+}
+
 void refuse_leak(const std::vector<ModelFile>& files, const std::string& split_name) {
   const std::string split = files.front().metadata_or("split", "none");
   for (const ModelFile& file : files)
@@ -50,6 +60,13 @@ void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, Tes
     a.note(
         "the model was trained with split none: if these are the recordings of its training, it has seen "
         "every one of them");
+  if (const std::string own = kept_away_by(files.front());
+      tested.split_name != "none" && own != "none" && own != drawn(tested.split_name, tested.seed))
+    a.note(
+        "the model was trained with split " + own + ", tested is split " +
+        drawn(tested.split_name, tested.seed) +
+        ": if these are the recordings of its training, it has seen some of these windows; without --split "
+        "and --seed those that it has not seen are tested");
   if (!a.given("split") && files.front().metadata.contains("interval_factor_found"))
     a.note("the factor of the intervals was found on these groups: that they hold here is no measurement");
   const auto limit =
