@@ -38,6 +38,7 @@ Tensor uniform_fan_in(const Shape& shape, Dim fan_in, Rng& rng) {
         "uniform_fan_in: expects at least one input (and a kernel of at least 1), got " + shape.text() +
         " with a fan-in of " + std::to_string(fan_in));
   }
+  if (rng.draws_zeros()) return Tensor::zeros(shape);
   Tensor t(shape);
   const double bound = 1 / std::sqrt(static_cast<double>(fan_in));
   for (real& x : t.values()) x = rng.uniform(bound);

@@ -15,12 +15,22 @@ namespace supertac {
 class Rng {
  public:
   explicit Rng(std::uint64_t seed) : stream_(seed, 0) {}
+  /// Draws zeros, in no time: for layers whose values come from a file.
+  static Rng zeros() {
+    Rng rng(0);
+    rng.zeros_ = true;
+    return rng;
+  }
+  bool draws_zeros() const { return zeros_; }
   /// Uniform in [-bound, bound).
-  real uniform(double bound) { return static_cast<real>(bound * (2 * stream_.uniform(counter_++) - 1)); }
+  real uniform(double bound) {
+    return zeros_ ? 0 : static_cast<real>(bound * (2 * stream_.uniform(counter_++) - 1));
+  }
 
  private:
   RandomStream stream_;
   std::uint64_t counter_ = 0;
+  bool zeros_ = false;
 };
 
 /// How a parameter lies in memory against how PyTorch names its axes (the layout of our checkpoints).

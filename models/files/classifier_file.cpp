@@ -52,7 +52,7 @@ NamedClassifier load_classifier(const std::string& path) {
   loaded.settings = {.height = settings.integer("height"),
                      .width = settings.integer("width"),
                      .classes = static_cast<Dim>(loaded.names.size())};
-  Rng rng(0);
+  Rng rng = Rng::zeros();
   try {
     loaded.network = std::make_unique<TextureClassifier>(loaded.settings, rng);
   } catch (const std::invalid_argument& error) {

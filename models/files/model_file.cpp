@@ -80,7 +80,7 @@ void refuse_other_kinds(const SafetensorsFile& file, const std::string& path) {
 
 std::unique_ptr<SuperTac> build(const SuperTacSettings& settings, const SafetensorsFile& file,
                                 const std::string& path) {
-  Rng rng(0);
+  Rng rng = Rng::zeros();
   auto model = std::make_unique<SuperTac>(settings, rng);
   load_parameters(file, path, model->parameters(), {"optimizer.", "novelty.", "int8."});
   for (const Parameter& parameter : model->parameters())
