@@ -7,8 +7,10 @@
 A table's name is that of its function in bench/tables.py, or of its item in bench/paper. Every CSV has the columns `command` and `commit`, which say how
 its lines were made; where they are empty those of the line above hold.
 """
+import functools
 import pathlib
 import re
+import subprocess
 import sys
 
 import tables
@@ -57,6 +59,15 @@ def without_source():
             if not row.get("command") or not re.fullmatch("[0-9a-f]{7,40}", row.get("commit") or ""):
                 yield f"bench/results/{name}:{number}: columns `command` and `commit` must say how it was made"
                 break
+            for script in re.findall(r"\S+\.(?:py|sh)\b", row["command"]):
+                if in_git(row["commit"]) and not in_git(f"{row['commit']}:{script}"):
+                    yield f"bench/results/{name}:{number}: {script} is not in commit {row['commit']}"
+
+
+@functools.cache
+def in_git(name):
+    """Whether this clone has such a commit, or file of a commit."""
+    return subprocess.run(["git", "-C", ROOT, "cat-file", "-e", name], capture_output=True).returncode == 0
 
 
 def main():

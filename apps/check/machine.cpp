@@ -94,7 +94,7 @@ void ports(std::vector<Finding>& findings) {
                         allowed ? "" : "no permission: see the serial ports' group"});
   }
   findings.push_back(
-      {"tactile board", board ? "found" : "not found",
+      {"the rig's board", board ? "found" : "not found",
        board ? "" : "plug it in for collecting and streaming; recordings and the virtual rig need none"});
 }
 

@@ -89,7 +89,8 @@ TEST(Check, TheMachineIsDescribed) {
   std::set<std::string> found;
   const auto described = nlohmann::json::parse(result.out);
   for (const auto& row : described["findings"]) found.insert(row["what"]);
-  for (const char* what : {"processor", "threads", "memory", "disk", "serial ports' group", "tactile board"})
+  for (const char* what :
+       {"processor", "threads", "memory", "disk", "serial ports' group", "the rig's board"})
     EXPECT_TRUE(found.contains(what)) << what;
 }
 
