@@ -6,7 +6,7 @@ pictures stand beside the plate, which the paper gives as 0.8 pixels or 0.65 mm.
 """
 import shutil
 
-from paper import PLATES, SPLITS, Study, splits
+from paper import PIXELS, PLATES, SPLITS, Study, splits
 from tables import over_seeds, rows, table
 
 
@@ -18,7 +18,7 @@ def figure10(folder="paper"):
 
 if __name__ == "__main__":
     study = Study(__doc__)
-    study.keep_sweep("figure10", study.sweep("pixels", "paper", scale=[4]))
+    study.keep_sweep("figure10", study.sweep("pixels", "paper", **PIXELS, scale=[4]))
     for split in SPLITS:
         for plate in PLATES.split(","):
             film = sorted(study.pictures(split).glob(f"film_{plate}_*.png"))[0]

@@ -7,7 +7,7 @@ A classifier for each seed and kind of input learns from the training windows in
 """
 import json
 
-from paper import SPLITS, Study, augment
+from paper import PIXELS, SPLITS, Study, augment
 from tables import chosen, rows, table
 
 VIEWS = {"frame": ("last 4x4 frame", "76.3"), "latents": ("latents", ""), "super_resolved": ("super-resolved 16x16", "93.1"),
@@ -36,7 +36,7 @@ def lines_of(split, result):
 
 if __name__ == "__main__":
     study, lines = Study(__doc__), []
-    study.sweep("pixels", "paper", scale=[4])
+    study.sweep("pixels", "paper", **PIXELS, scale=[4])
     for split in SPLITS:
         out = study.out / f"classify_{split}_{'-'.join(study.seeds)}.json"
         if not out.exists():

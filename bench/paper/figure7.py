@@ -5,7 +5,7 @@
 """
 import shutil
 
-from paper import SPLITS, Study, splits
+from paper import PIXELS, SPLITS, Study, splits
 from tables import over_seeds, rows, table
 
 
@@ -18,7 +18,7 @@ def figure7(folder="paper"):
 
 if __name__ == "__main__":
     study = Study(__doc__)
-    study.keep_sweep("figure7", study.sweep("pixels", "paper", scale=[4]))
+    study.keep_sweep("figure7", study.sweep("pixels", "paper", **PIXELS, scale=[4]))
     for split in SPLITS:
         shutil.copy(study.pictures(split) / "strips.png", study.kept / f"figure7_{split}.png")
     print(figure7(study.kept))

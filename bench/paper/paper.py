@@ -1,7 +1,8 @@
 """What the commands of this folder share: options, recordings, trained models, and what is kept of them.
 
-Models learn from four plates of the paper at 100 Hz, for about 600 steps by Muon: enough to compare settings, not for
-the best picture. What is there is not made again.
+Models learn from four plates of the paper at 100 Hz by Muon, those of preset `tiny` for about 600 steps, those of preset
+`paper`, whose larger pictures need them, for 1,200 at half the rate: enough to compare settings, not for the best
+picture. What is there is not made again.
 """
 import argparse
 import csv
@@ -16,6 +17,7 @@ from tables import rows, table  # noqa: E402
 
 SPLITS = ("trial", "window")
 PLATES = "3_Bumps,6_Bumps,4_Ridges,6_Ridges"
+PIXELS = {"epochs": 10, "learning_rate": 0.004}
 SCORES = ("windows", "ssim", "psnr_db", "phase", "phase_floor", "position_mm", "median_us")
 
 
@@ -51,11 +53,11 @@ class Study:
         if subprocess.run(command, stdout=subprocess.DEVNULL).returncode != 0:
             sys.exit(f"{pathlib.Path(sys.argv[0]).name}: this command failed, see above: {' '.join(command)}")
 
-    def sweep(self, folder, preset, history=0, **axes):
+    def sweep(self, folder, preset, history=0, epochs=5, learning_rate=0.008, **axes):
         """Trains the grid on both splits; one row for each model, with scores of its test windows in contact."""
         grid = [word for axis, values in axes.items() for word in (f"--{axis}", ",".join(map(str, values)))]
-        length = {"stride": 16, "epochs": 2, "limit": 200} if self.simulated else {"stride": 4, "epochs": 5, "limit": 1500}
-        length |= {"optimizer": "muon", "learning-rate": 0.008}
+        length = {"stride": 16, "epochs": 2, "limit": 200} if self.simulated else {"stride": 4, "epochs": epochs, "limit": 1500}
+        length |= {"optimizer": "muon", "learning-rate": learning_rate}
         pace = [word for option, value in length.items() for word in (f"--{option}", value)]
         found = []
         for split in SPLITS:

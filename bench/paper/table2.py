@@ -3,7 +3,7 @@
 
     bench/paper/table2.py --text TEXT_DIR | --simulated
 """
-from paper import Study, significance_table, splits
+from paper import PIXELS, Study, significance_table, splits
 from tables import chosen, over_seeds, rows, table
 
 SIZES = {2: (0.77, 24.02), 4: (0.81, 27.3), 8: (0.74, 23.09)}
@@ -24,6 +24,6 @@ def table2_tests(folder="paper"):
 
 if __name__ == "__main__":
     study = Study(__doc__)
-    study.keep_sweep("table2", study.sweep("pixels", "paper", scale=SIZES), "scale")
+    study.keep_sweep("table2", study.sweep("pixels", "paper", **PIXELS, scale=SIZES), "scale")
     print(table2(study.kept))
     study.test("table2")

@@ -1,7 +1,10 @@
 """The engines that users would pick: name -> a call that draws a batch on one thread. Those that are not installed are
 skipped with one line each."""
 import importlib
+import importlib.metadata
 import pathlib
+import subprocess
+import sys
 
 import torch
 
@@ -15,8 +18,8 @@ def installed(name):
 
 
 def versions():
-    names = ("torch", "onnxruntime", "openvino", "nncf")
-    return {name: getattr(module, "__version__", "?").split("-")[0] for name in names if (module := installed(name))}
+    names = ("torch", "onnxruntime", "openvino", "nncf", "MNN")
+    return {name.lower(): importlib.metadata.version(name).split("+")[0] for name in names if installed(name)}
 
 
 def export_onnx(model, windows, folder):
@@ -83,10 +86,30 @@ def open_vino(path, windows, calibration):
     return calls
 
 
+def mnn_file(path, windows, folder):
+    """The ONNX file in MNN's own form."""
+    beside, converted = pathlib.Path(sys.executable).with_name("mnnconvert"), pathlib.Path(folder) / f"batch{len(windows)}.mnn"
+    words = ["-f", "ONNX", "--modelFile", path, "--MNNModel", converted, "--bizCode", "supertac"]
+    subprocess.run([beside if beside.exists() else "mnnconvert", *map(str, words)], check=True, capture_output=True)
+    return converted
+
+
+def mnn(path, windows, folder):
+    module = installed("MNN")
+    if module is None:
+        return {}
+    threads = module.nn.create_runtime_manager(({"backend": "CPU", "numThread": 1, "precision": "high"},))
+    converted = str(mnn_file(path, windows, folder))
+    network = module.nn.load_module_from_file(converted, ["windows"], ["pictures"], runtime_manager=threads)
+    array = module.expr.const(windows.numpy(), list(windows.shape), module.expr.NCHW)
+    return {"mnn": lambda: network.forward([array])[0].read()}
+
+
 def inference(model, windows, calibration, folder, compiled_too):
     """All of them for one batch; `calibration` are windows for the quantisers."""
     calls = pytorch(model, windows, compiled_too)
     if installed("onnx") is None:
         return calls
     path = export_onnx(model, windows, folder)
-    return calls | onnx_runtime(path, windows, calibration, folder) | open_vino(path, windows, calibration)
+    return (calls | onnx_runtime(path, windows, calibration, folder) | open_vino(path, windows, calibration)
+            | mnn(path, windows, folder))

@@ -7,7 +7,11 @@
 //   cost                   -> multiply-adds of inference, of training, per window
 //   infer|int8 BATCH SECONDS    -> median processor time, median wall time of a call (s), median FMA peak
 //   (GFLOP/s) train THREADS SECONDS  the same for a training step of 64 windows
+//   each COUNT FILE        the wall time of so many pictures one by one, `seconds` [COUNT]  -> page faults on
+//   the way spin COUNT FILE        the same for additions that take about as long and need no memory
+#include <benchmark/benchmark.h>
 #include <omp.h>
+#include <sys/resource.h>
 
 #include <chrono>
 #include <ctime>
@@ -50,19 +54,34 @@ class Ours {
     }
     if ((what == "infer" || what == "int8") && words >> number >> seconds && number <= windows_.dim(0)) {
       omp_set_num_threads(1);
-      const Dim values = model_->settings().timesteps * kTaxels;
-      const Tensor batch = Tensor::of({number, model_->settings().timesteps, kTaxels},
-                                      windows_.values().first(static_cast<std::size_t>(number * values)));
+      const Tensor batch = first_windows(number);
       return timed(seconds, [&] { (what == "infer" ? prepared_ : bytes_).estimate(batch); });
     }
     if (what == "train" && words >> number >> seconds) {
       omp_set_num_threads(number);
       return timed(seconds, [this] { trainer().train_step(); });
     }
+    if (what == "each" && words >> number >> file) {
+      omp_set_num_threads(1);
+      const Tensor window = first_windows(1);
+      return each(number, file, [&] { prepared_.estimate(window); });
+    }
+    if (what == "spin" && words >> number >> file)
+      return each(number, file, [] {
+        float sum = 0;
+        for (int i = 0; i < 75'000; ++i) sum += static_cast<float>(i);
+        benchmark::DoNotOptimize(sum);
+      });
     throw std::runtime_error("unknown order: " + order);
   }
 
  private:
+  Tensor first_windows(Dim count) const {
+    const Dim values = count * model_->settings().timesteps * kTaxels;
+    return Tensor::of({count, model_->settings().timesteps, kTaxels},
+                      windows_.values().first(static_cast<std::size_t>(values)));
+  }
+
   static ActivationRanges ranges_of(const SuperTac& model, const Tensor& windows) {
     ActivationRanges ranges;
     ranges.add(model, windows);
@@ -96,6 +115,28 @@ class Ours {
       trainer_ = std::make_unique<Trainer>(*data_, bench::all_of(*data_), Objective(*data_, settings));
     }
     return *trainer_;
+  }
+
+  static long page_faults() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_minflt + usage.ru_majflt;
+  }
+
+  template <class Work>
+  static std::string each(int count, const std::string& path, Work&& work) {
+    using Clock = std::chrono::steady_clock;
+    std::vector<float> seconds(static_cast<std::size_t>(count), 1);  // the pages are there before
+    for (int i = 0; i < 100; ++i) work();
+    const long before = page_faults();
+    for (float& one : seconds) {
+      const Clock::time_point begin = Clock::now();
+      work();
+      one = std::chrono::duration<float>(Clock::now() - begin).count();
+    }
+    const long faults = page_faults() - before;
+    write_safetensors(path, {}, {{"seconds", "F32", {seconds.size()}, std::as_bytes(std::span(seconds))}});
+    return std::to_string(faults);
   }
 
   template <class Work>
