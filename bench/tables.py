@@ -173,7 +173,7 @@ def silence():
 # How fast -------------------------------------------------------------------------------------------------------------
 
 TASKS = {"infer": "batch {}", "int8": "int8, batch {}", "train": "training step, {} threads"}
-PACKAGES = {"pytorch": "torch", "torch.compile": "torch", "onnx": "onnxruntime", "openvino": "openvino"}
+PACKAGES = {"pytorch": "torch", "torch.compile": "torch", "onnx": "onnxruntime", "openvino": "openvino", "mnn": "mnn"}
 
 
 def duration(us):
@@ -206,9 +206,30 @@ def fastest():
 
 def speed():
     machines = [rows(f"speed/{name}.csv") for name in ("peers", "peers_avx512", "peers_avx2")]
-    return table(["task", "compared with", "ours, AMX", "times as fast, AMX", "AVX-512", "AVX2"],
-                 [[task(r), with_version(r), duration(r["ours_us"])] +
-                  [ratio(chosen(found, task=r["task"], peer=r["peer"])[0]) for found in machines] for r in machines[0]])
+    lines = []
+    for kind, peer in sorted({(r["task"], r["peer"]) for found in machines for r in found}, key=in_order):
+        of = [chosen(found, task=kind, peer=peer) for found in machines]
+        lines.append([task({"task": kind}), with_version(next(r[0] for r in of if r))] +
+                     [duration(r[0]["ours_us"]) if r else "" for r in of[:2]] + [ratio(r[0]) if r else "" for r in of])
+    return table(["task", "compared with", "ours, AMX", "AVX-512", "times as fast, AMX", "AVX-512", "AVX2"], lines)
+
+
+def in_order(pair):
+    (kind, number), peer = pair[0].split(), pair[1]
+    return kind == "train", int(number), kind, list(PACKAGES).index(peer.split()[0]) if peer.split()[0] in PACKAGES else 0, peer
+
+
+def tail():
+    loads = {"idle": "nothing else runs", "compiler": "beside a compiler"}
+    return table(["beside it", "", "median", "99 %", "99.9 %", "slowest", "above 1 ms"],
+                 [[loads[r["load"]], r["engine"], duration(r["p50_us"]), duration(r["p99_us"]), duration(r["p99.9_us"]),
+                   duration(r["worst_us"]), r["above_1_ms"]] for r in rows("speed/tail.csv")])
+
+
+def cold_start():
+    return table(["preset", "", "median ms", "slowest ms", "memory MB"],
+                 [[f"`{r['model']}`", r["engine"], f"{float(r['median_ms']):.1f}", f"{float(r['worst_ms']):.1f}", r["memory_mb"]]
+                  for r in rows("speed/cold_start.csv")])
 
 
 def precision():
