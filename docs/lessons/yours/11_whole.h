@@ -47,7 +47,7 @@ Drawn draw(const Example& e) {
   if (*high - *low >= 0.01) loss = add(add(loss, 0.08, one), -0.08, ssim(picture, truth));  // not if flat
   return {picture, error, loss};
 }
-// The gradient is no longer than 1, and the rate rises over 50 steps.
+// The gradient is no longer than 1, and the rate rises over 50 steps to 2e-3.
 double train_step(const std::vector<Example>& batch, int step) {
   double loss = 0, squares = 0, n = double(batch.size());
   // Your part: the loss and the gradients of each example, the length of the whole gradient, Adam
@@ -85,7 +85,7 @@ int main(int count, char** arguments) try {
   std::ofstream file("mini_supertac.pgm", std::ios::binary);
   file << "P5 16 48 255\n";  // the truth, the picture, and the error that is expected of it
   for (const Array& pixels : {unseen.truth, drawn.picture->value, drawn.error->value})
-    for (const double p : pixels) file.put(char(255 * std::clamp(p, 0.0, 1.0)));
+    for (const double p : pixels) file.put(char(int(255 * std::clamp(p, 0.0, 1.0))));
 } catch (const std::exception& e) {
   std::fprintf(stderr, "mini_supertac: %s\n", e.what());
   return 1;
