@@ -10,6 +10,7 @@
 
 namespace {
 
+using lessons::Compared;
 using lessons::numbers;
 using lessons::Report;
 using Leaves = std::vector<supertac::Variable>;
@@ -18,7 +19,7 @@ using supertac::Variable;
 // A term's slopes at seven places beside differences of its value.
 [[maybe_unused]] void check_term(Report& report, const std::string& name, Term (*term)(In), int inputs,
                                  double low = -2, double high = 2) {
-  std::vector<lessons::Compared> slopes;
+  std::vector<Compared> slopes;
   for (int k = 0; k < inputs; ++k)
     slopes.push_back({"the slope by a[" + std::to_string(k) + "]", {7}, {}, {}});
   for (int i = 0; i < 7; ++i) {
@@ -97,6 +98,10 @@ void check(Report& report) {
   check_term(report, "leaky_relu", leaky_relu, 1);
   check_term(report, "limited", limited, 1, -17, 17);
   check_term(report, "sigmoid", sigmoid, 1, -4, 4);
+  // e^800 is infinite.
+  Compared far{"the slope at a[0] = -800 and 800", {2}, {}, {0, 0}};
+  for (const double a : {-800., 800.}) far.yours.push_back(sigmoid(&a)[1]);
+  report.add("sigmoid", far);
   check_term(report, "product", product, 2);
 }
 #elif LESSON == 2
@@ -187,8 +192,10 @@ void check(Report& report) {
     const Shape w{3 * c.x.c * taps};
     const Tensor weights_of = made(w, -0.9), x = made(c.x);
     const Tensor y = convolve(c.name, weights_of, x, 3, c.k);
+    const int wrong = report.wrong();
     report.add(c.name, {"y", {y->c, y->h, y->w}, y->value, by_formula(weights_of, x, *y, c.k)},
                "the formula gives");
+    if (report.wrong() > wrong) continue;  // right gradients of a wrong value are nothing to praise
     check_op(report, c.name, {"w", "x"}, {w, c.x},
              [c](const auto& in) { return convolve(c.name, in[0], in[1], 3, c.k); });
   }
@@ -196,8 +203,10 @@ void check(Report& report) {
 #elif LESSON == 6
 void check(Report& report) {
   check_term(report, "gated", gated, 3);
+  const int wrong = report.wrong();
   const Tensor m = channel_mean(tensor({2, 2, 2}, {1, 2, 6, 3, -1, 0, 4, 1}));
   report.add("channel_mean", {"value", {2}, m->value, {3, 1}});
+  if (report.wrong() > wrong) return;
   check_op(report, "channel_mean", {"x"}, {{2, 3, 4}}, [](const auto& x) { return channel_mean(x[0]); });
 }
 #elif LESSON == 7
@@ -236,6 +245,14 @@ void check(Report& report) {
   }
 }
 #elif LESSON == 10
+// Uniform numbers within `bound`: none is beyond it, and of so many one is near it.
+void check_drawn(Report& report, const std::string& name, const std::string& bound_text, double bound) {
+  double largest = 0;
+  for (const double at : weights[name]->value) largest = std::max(largest, std::abs(at));
+  report.add(name + ", numbers of it beyond " + bound_text, largest > bound ? 1 : 0, 0);
+  report.add(name + ", is its largest below 0.8 of " + bound_text, largest < 0.8 * bound ? 1 : 0, 0);
+}
+
 void check(Report& report) {
   const Tensor x = tensor({2, 1, 6}, {0.1, 0.7, -0.3, 0.4, 0.9, 0.2, -0.5, 0.6, 0.8, -0.1, 0.3, 0.5});
   const Tensor y = layer("conv", x, 3, kHalve, leaky_relu);
@@ -247,10 +264,7 @@ void check(Report& report) {
   if (report.wrong() > 0) return;
   Tensor b = weights["conv.bias"], w = weights["conv.weight"];
   const double bound = 1 / std::sqrt(6.);
-  double largest = 0;
-  for (const double at : w->value) largest = std::max(largest, std::abs(at));
-  report.add("conv.weight, numbers of it beyond 1 / sqrt(fan_in)", largest > bound ? 1 : 0, 0);
-  report.add("conv.weight, is its largest below half of 1 / sqrt(fan_in)", largest < bound / 2 ? 1 : 0, 0);
+  check_drawn(report, "conv.weight", "1 / sqrt(fan_in)", bound);
   const Tensor sums = convolve("reference", w, x, 3, kHalve);
   Array right = sums->value;
   for (std::size_t i = 0; i < right.size(); ++i) {
@@ -260,10 +274,77 @@ void check(Report& report) {
   report.add("layer", {"y", {3, 1, 3}, y->value, right});
   layer("up", x, 5, kDouble);
   report.add("layer, transposed, up.weight: its numbers", weights["up.weight"]->size(), 40);
+  layer("wide", x, 200, kHalve);
+  check_drawn(report, "wide.bias", "1 / sqrt(fan_in), fan_in that of its weight", bound);
+  layer("wide_up", x, 200, kDouble);
+  check_drawn(report, "wide_up.weight", "1 / sqrt(fan_in), transposed: outputs times taps",
+              1 / std::sqrt(800.));
+  check_drawn(report, "wide_up.bias", "1 / sqrt(fan_in), fan_in that of its weight", 1 / std::sqrt(800.));
   layer("conv", x, 3, kHalve);
-  report.add("layer, asked a second time: weights in all", double(weights.size()), 4);
+  report.add("layer, asked a second time: weights in all", double(weights.size()), 8);
 }
 #elif LESSON == 11
+// What may have become of a gradient of this length, of which that of length `mine` is left.
+std::string cause_of_length(double length, double mine) {
+  const auto is = [mine](double other) { return std::abs(mine - other) < 1e-6 * other; };
+  const double sum = 2 * length;  // of the two examples
+  if (is(std::min(1.0, 1 / length) * length)) return {};
+  if (is(1)) return "it is made as long as 1, but only a longer one is to be clipped.";
+  if (length > 1 && is(length)) return "it keeps its length: is it clipped?";
+  if (is(sum))
+    return length > 1 ? "it is the sum over the batch as it is: is it divided by n, and clipped?"
+                      : "it is the sum over the batch: is it divided by n?";
+  if (is(length * length) || is(sum * sum))
+    return "it is multiplied by its length: by which factor does it become as long as 1?";
+  return {};
+}
+
+// One training step of new weights beside the formula: Adam's m, which has a tenth of the gradient, and the
+// moves. `truths`: the factor by which truths and so the gradient are larger.
+void check_step(Report& report, const std::string& what, double truths, int step) {
+  weights.clear(), tape.clear(), bits.seed(1);
+  std::vector<Example> batch{touch(), touch()};
+  for (Example& e : batch)
+    for (double& t : e.truth) t *= truths;
+  double loss = 0, squares = 0, left = 0, along = 0, all = 0;
+  for (const Example& e : batch) {
+    const Tensor l = draw(e).loss;
+    loss += l->value[0] / 2;
+    backward(l);
+  }
+  std::map<std::string, Node> before;
+  for (auto& [name, w] : weights) {
+    Node& kept = before.emplace(name, *w).first->second;
+    for (double& g : kept.grad) g /= 2, squares += g * g;
+    std::fill(w->grad.begin(), w->grad.end(), 0);
+  }
+  const double length = std::sqrt(squares), rate = 2e-3 * std::min(1.0, step / 50.0);
+  report.add(what + ", the loss of a batch", train_step(batch, step), loss);
+  Compared m{"Adam's m of all weights"},
+      moves{"what a rate of " + std::to_string(rate) + " takes off all weights"};
+  for (const auto& [name, kept] : before) {
+    const Node& mine = *weights[name];
+    Node right = kept;
+    adam(right, std::min(1.0, 1 / length), rate, step);
+    for (std::size_t i = 0; i < right.value.size(); ++i) {
+      m.yours.push_back(mine.m[i]), m.right.push_back(right.m[i]);
+      moves.yours.push_back(kept.value[i] - mine.value[i]);
+      moves.right.push_back(kept.value[i] - right.value[i]);
+      left += 100 * mine.m[i] * mine.m[i];
+      along += moves.yours.back() * moves.right.back(), all += moves.right.back() * moves.right.back();
+    }
+  }
+  m.shape = moves.shape = {int(m.right.size())};
+  m.hint = cause_of_length(length, std::sqrt(left));
+  double off = 0;
+  for (std::size_t i = 0; i < moves.right.size(); ++i)
+    off += std::pow(moves.yours[i] - along / all * moves.right[i], 2);
+  if (along != 0 && off < 1e-12 * along * along / all)
+    moves.hint = "they are those of a rate of " + std::to_string(along / all * rate) + ": does it rise?";
+  report.add(what, m, "the formula gives");
+  report.add(what, moves, "the formula gives");
+}
+
 void check(Report& report) {
   const Tensor x = tensor({kMaps, 4, 4});
   for (double& at : x->value) at = 2 * uniform() - 1;
@@ -272,18 +353,15 @@ void check(Report& report) {
   const Tensor s = layer("block.attention.squeeze", channel_mean(h), kMaps / 4, kOne, relu);
   const Tensor right = each(*x, {x, h, layer("block.attention.expand", s, kMaps, kOne, sigmoid)}, gated);
   report.add("attended", {"y", {kMaps, 4, 4}, mine->value, right->value});
+  check_step(report, "train_step 1, a gradient longer than 1", 10, 1);
+  check_step(report, "train_step 60, a gradient shorter than 1", 1, 60);
+  if (report.wrong() > 0) return;
   weights.clear(), tape.clear(), bits.seed(1);
   double first = 0, last = 0;
   for (int step = 1; step <= 60; ++step) {
     std::vector<Example> batch(2);
     for (Example& e : batch) e = touch();
-    double alone = 0;
-    if (step == 1) {
-      for (const Example& e : batch) alone += draw(e).loss->value[0] / 2;
-      tape.clear();
-    }
     const double loss = train_step(batch, step);
-    if (step == 1) report.add("train_step, the loss of a batch", loss, alone);
     (step <= 10 ? first : last) += step <= 10 || step > 50 ? loss / 10 : 0;
   }
   std::printf("  the loss of ten steps: %.3f at first, %.3f after 50 steps\n", first, last);

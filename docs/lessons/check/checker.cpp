@@ -41,8 +41,9 @@ bool close(double a, double b, double scale) { return std::abs(a - b) <= 1e-6 * 
 // The factor that all wrong entries share, or NaN.
 double common_factor(const Compared& c, const std::vector<std::size_t>& wrong) {
   double factor = std::nan("");
+  const double least = 1e-6 * largest_of(c);
   for (const std::size_t i : wrong) {
-    if (std::abs(c.right[i]) < 1e-6 * largest_of(c)) return std::nan("");
+    if (std::abs(c.right[i]) < least) return std::nan("");
     const double f = c.yours[i] / c.right[i];
     if (std::isnan(factor)) factor = f;
     if (!(std::abs(f - factor) <= 1e-4 * std::max(1.0, std::abs(factor)))) return std::nan("");
@@ -121,12 +122,13 @@ std::string finding(const Compared& c, const std::string& from) {
            " are expected: look at the shape.";
   std::vector<std::size_t> wrong;
   std::size_t worst = 0;
+  const double tolerance = 1e-6 * largest_of(c);
   const auto error = [&](std::size_t i) {
     const double e = std::abs(c.yours[i] - c.right[i]);
     return std::isfinite(e) ? e : 1e300;
   };
   for (std::size_t i = 0; i < c.right.size(); ++i) {
-    if (error(i) <= 1e-6 * largest_of(c)) continue;
+    if (error(i) <= tolerance) continue;
     if (wrong.empty() || error(i) > error(worst)) worst = i;
     wrong.push_back(i);
   }
