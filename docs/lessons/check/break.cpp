@@ -34,7 +34,8 @@ using supertac::Variable;
 
 struct Chart {
   std::string title, across, up;
-  Array without, with;  // the safeguard
+  Array without, with;         // the safeguard
+  double first = 0, step = 1;  // across: of the first number, and from one to the next
 };
 
 Variable parameter(double value, Dim n = 1) { return Variable(Tensor::full({n, 1}, value), true); }
@@ -104,7 +105,9 @@ Chart log_variance() {
               "log variance",
               "log10 of exp(log_var / 2)",
               {},
-              {}};
+              {},
+              -20,
+              4};
   for (int log_var = -20; log_var <= 200; log_var += 4) {
     chart.without.push_back(log_var / 2.0 / std::numbers::ln10);
     chart.with.push_back(std::clamp(log_var, -10, 10) / 2.0 / std::numbers::ln10);
@@ -128,10 +131,12 @@ Chart warm_up() {
 
 Chart noise() {
   Chart chart{"5: uniform noise has a third of the variance that the divergence assumes",
-              "draws x 10",
+              "draws",
               "variance so far",
               {},
-              {}};
+              {},
+              10,
+              10};
   const RandomStream random(1, 0);
   double uniform = 0, normal = 0;
   for (std::uint64_t n = 1; n <= 1000; ++n) {
@@ -146,10 +151,12 @@ Chart noise() {
 // How much each of two terms moves a pixel that is `distance` off a textured truth.
 Chart silent_term() {
   Chart chart{"6: SSIM with a weight of 0 does not act; with .1 it pulls beside L2",
-              "distance from the truth x 50",
-              "length of SSIM's gradient x 1000",
+              "distance from the truth",
+              "length of SSIM's gradient, in thousandths",
               {},
-              {}};
+              {},
+              0.02,
+              0.02};
   Tensor truth(Shape{1, 8, 8, 1});
   for (Dim i = 0; i < 64; ++i) truth.data()[i] = 0.5 + 0.5 * std::sin(static_cast<double>(i / 8));
   for (int at = 1; at <= 50; ++at) {
@@ -166,10 +173,12 @@ Chart silent_term() {
 
 Chart cancelling() {
   Chart chart{"7: the variance of 49 pixels in single precision, as E[x^2] - E[x]^2 and about their mean",
-              "level x 10",
+              "level of the pixels",
               "variance, should be .0039",
               {},
-              {}};
+              {},
+              0,
+              10};
   for (int level = 0; level < 60; ++level) {
     std::vector<float> x;
     for (int i = 0; i < 49; ++i)
@@ -185,7 +194,7 @@ Chart cancelling() {
 
 // How many taps reach each output of a transposed convolution of stride 2.
 Chart checkerboard() {
-  Chart chart{"8: a constant doubled by kernel 3 and by kernel 4", "pixel", "value", {}, {}};
+  Chart chart{"8: a constant doubled by kernel 3 and by kernel 4", "pixel", "value", {}, {}, 1};
   const auto doubled = [](std::size_t kernel) {
     constexpr std::size_t kLength = 16;
     Array row((kLength - 1) * 2 + kernel - 2);
@@ -204,7 +213,8 @@ Chart deep_stack() {
               "blocks",
               "log10 of variance",
               {},
-              {}};
+              {},
+              1};
   const auto grow = [](double factor) {
     Rng rng(5);
     Tensor x(Shape{1, 8, 8, 16});
@@ -228,10 +238,11 @@ Chart deep_stack() {
 
 Chart saturated_gate() {
   Chart chart{"10: the gradient through a gate alone, and with the skip beside it",
-              "bias of the gate + 20",
+              "bias of the gate",
               "dy / dx",
               {},
-              {}};
+              {},
+              -20};
   for (int bias = -20; bias <= 20; ++bias) {
     const double gate = 1 / (1 + std::exp(-bias));
     chart.without.push_back(gate), chart.with.push_back(1 + gate);
@@ -258,7 +269,8 @@ Chart leakage() {
       "frames between windows",
       "share",
       {},
-      {}};
+      {},
+      1};
   const RandomStream random(1, 0);
   for (int stride = 1; stride <= 40; ++stride) {
     int tested = 0, leaked = 0;
@@ -316,15 +328,19 @@ std::string drawn(const Chart& chart) {
   for (const Array* values : {&chart.without, &chart.with})
     for (const double v : *values)
       if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
-  char range[2][32];
-  std::snprintf(range[0], sizeof range[0], "%.3g", low),
-      std::snprintf(range[1], sizeof range[1], "%.3g", high);
+  const auto number = [](double value) {
+    char digits[32];
+    std::snprintf(digits, sizeof digits, "%.3g", value);
+    return std::string(digits);
+  };
+  const double last = chart.first + chart.step * static_cast<double>(chart.without.size() - 1);
   return "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 640 310' font-family='sans-serif' "
          "font-size='12'>\n"
          "<rect width='640' height='310' fill='white'/><rect x='60' y='50' width='520' height='200' "
          "fill='none' stroke='#999'/>\n" +
          text(10, 20, chart.title) + text(60, 42, chart.up) + text(250, 285, chart.across) +
-         text(8, 250, range[0]) + text(8, 58, range[1]) + text(60, 302, "without the safeguard", "#c02020") +
+         text(8, 250, number(low)) + text(8, 58, number(high)) + text(60, 266, number(chart.first)) +
+         text(560, 266, number(last)) + text(60, 302, "without the safeguard", "#c02020") +
          text(250, 302, "with it", "#2050c0") + line(chart.without, low, high, "#c02020") +
          line(chart.with, low, high, "#2050c0") + "</svg>\n";
 }
