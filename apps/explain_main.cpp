@@ -21,8 +21,10 @@
 namespace supertac {
 
 void declare(Arguments& a) {
-  a.positional("FILE",
-               "the model; or an expression on numbers, \"a=2; b=-3; relu(a*b+10)\", whose graph is drawn");
+  a.positional(
+      "FILE",
+      "the model; or an expression on numbers, \"a=2; b=-3; relu(a*b+10)\", whose graph is drawn: + - * "
+      "( ), relu( ), sigmoid( ), numbers, and names of letters that NAME=...; gives a value");
   a.option("recording", "FILE", "what was felt");
   a.option("at", "SECONDS", "on the recording's clock: the last window that ends by then");
   a.option("precision", "NAME", "fp32 or int8: of the maps that the programs' own drawing goes through",
@@ -30,7 +32,8 @@ void declare(Arguments& a) {
   a.required(
       "out", "FILE",
       "every array, safetensors, which examples/recompute.py computes again with NumPy; .dot or .svg: the "
-      "graph of one training step on this window, with shapes, values, gradients and times");
+      "graph of one training step on this window, or of the expression, with shapes, values y, gradients g "
+      "and times. |y| and |g| are norms; shapes are memory's, where supertac-info prints the file's");
 }
 
 namespace {
@@ -140,12 +143,12 @@ Estimate draw(const ModelFile& file, bool in_int8, const Tensor& input, std::vec
   });
 }
 
-int write_graph_out(const Arguments& a, const std::string& dot) {
+int write_graph_out(const Arguments& a, const std::string& what, const std::string& dot) {
   read_option("out", [&] {
     write_graph(a.output("out"), dot);
     return 0;
   });
-  a.print(a.text("out") + ": the graph of a training step");
+  a.print(a.text("out") + ": the graph of " + what);
   a.write_json({{"out", a.text("out")}});
   return kExitOk;
 }
@@ -165,8 +168,9 @@ int draw_graph(const Arguments& a, const ModelFile& file, const Recording& recor
   truth_image(plate_in_folder(recording.plate, folder), x, y, image, truth.values());
   const std::vector<Tensor> eps(static_cast<std::size_t>(s.groups()), Tensor::zeros({1, s.latent}));
   return write_graph_out(
-      a, graph_of([&] { return supertac_loss(file.model->forward(input, eps), truth, {}).total; },
-                  file.model->parameters()));
+      a, "a training step",
+      graph_of([&] { return supertac_loss(file.model->forward(input, eps), truth, {}).total; },
+               file.model->parameters()));
 }
 
 bool is_expression(const std::string& text) {
@@ -185,7 +189,7 @@ int draw_expression(const Arguments& a) {
       throw UsageError(error.what());
     }
   };
-  return write_graph_out(a, graph_of(result, e.leaves));
+  return write_graph_out(a, "the expression", graph_of(result, e.leaves));
 }
 
 }  // namespace
@@ -193,7 +197,12 @@ int draw_expression(const Arguments& a) {
 int run(Arguments& a) {
   if (is_expression(a.text("FILE"))) return draw_expression(a);
   for (const char* needed : {"recording", "at"})
-    if (!a.given(needed)) throw UsageError(std::string("expected --") + needed + " with a model, found none");
+    if (!a.given(needed))
+      throw UsageError(
+          std::string("expected --") + needed + " with a model, found none" +
+          (std::filesystem::exists(a.text("FILE"))
+               ? ""
+               : "; " + a.text("FILE") + " is no file, and no expression, which has one of + * ( ) ="));
   const ModelFile file = load_model(a.text("FILE"));
   const Recording recording = read_recording(a.text("recording"));
   if (recording.array != file.array())

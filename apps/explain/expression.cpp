@@ -20,7 +20,7 @@ class Parser {
     while (assignment()) expect(';');
     leaf_name_.clear();
     Variable result = sum();
-    if (at() != 0) refuse("the end");
+    if (at() != 0) refuse("+, -, * or the end");
     return {std::move(result), std::move(leaves_)};
   }
 
@@ -83,7 +83,10 @@ class Parser {
       ++end;
     const std::string digits(text_.substr(place_, end - place_));
     const auto value = parse_double(digits);
-    if (!value) refuse("a number");
+    if (!value)
+      refuse(
+          "a number, a name that has one, (, relu( or sigmoid(; a minus stands before a number, or between "
+          "two parts (0 - a)");
     place_ = end;
     const bool alone = !leaf_name_.empty() && at() == ';';
     leaves_.push_back(

@@ -15,7 +15,8 @@ struct Expression {
 };
 
 /// "a = 2; b = -3; relu(a * b + 10)": names for numbers or expressions, then one expression of + - * ( ),
-/// relu and sigmoid. Throws std::invalid_argument that says where it is none.
+/// relu and sigmoid. A name consists of letters; a minus in front stands before a number only. Throws
+/// std::invalid_argument that says where it is none.
 Expression parse_expression(std::string_view text);
 
 }  // namespace supertac

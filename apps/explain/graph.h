@@ -13,8 +13,8 @@
 namespace supertac {
 
 /// Runs `loss` forward and backward and returns the graph as Graphviz's text. Parameters are part of the op
-/// that they go into; `loss` may still make
-/// them.
+/// that they go into, each with its whole gradient wherever it is used. `parameters` is read after `loss` has
+/// run, so `loss` may be what fills it, as an expression does. Throws what `loss` and backward() throw.
 std::string graph_of(const std::function<Variable()>& loss, const std::vector<Parameter>& parameters);
 
 /// Writes it: FILE.dot, or by Graphviz's program dot FILE.svg. Throws FileError, std::invalid_argument for

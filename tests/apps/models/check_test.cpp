@@ -178,6 +178,7 @@ TEST_F(Audit, TheGraphOfATrainingStepHasEveryParametersGradient) {
                            "--at", "4", "--out", path("step.dot")});
   ASSERT_EQ(result.code, 0) << result.error;
   const std::string dot = bytes("step.dot");
+  EXPECT_NE(result.out.find("step.dot: the graph of a training step\n"), std::string::npos) << result.out;
   for (const char* text : {"encoder.0.conv.0.weight [3,4,16] |value| ", "upsampler.out.bias [1] value ",
                            " us forward, ", " us back", "|y| ", "|g| ", " kB"})
     EXPECT_NE(dot.find(text), std::string::npos) << text << dot.substr(0, 2000);
@@ -195,6 +196,16 @@ TEST_F(Audit, TheGraphOfAnExpressionHasValuesAndGradients) {
     EXPECT_NE(dot.find(text), std::string::npos) << text << dot;
   EXPECT_NE(draw("a=2; a*c").error.find("expected a number, a name that has one, relu( or sigmoid( at 'c'"),
             std::string::npos);
+  EXPECT_NE(result.out.find("expression.dot: the graph of the expression\n"), std::string::npos)
+      << result.out;
+  for (const char* divided : {"a=2; a/2", "a=2; b=3; relu(a)/b"})
+    EXPECT_NE(draw(divided).error.find("expected +, -, * or the end at '/"), std::string::npos) << divided;
+  EXPECT_NE(draw("a/2").error.find("a/2 is no file, and no expression, which has one of + * ( ) ="),
+            std::string::npos);
+  for (const char* negated : {"a=2; -a", "a=2; 3*-(a+1)"})
+    EXPECT_NE(draw(negated).error.find("a minus stands before a number, or between two parts (0 - a) at '-"),
+              std::string::npos)
+        << negated;
   EXPECT_NE(draw("(1+2").error.find("expected ) at ''"), std::string::npos);
   EXPECT_EQ(draw("1 + 2 3").code, 2);
 }
