@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""Checks a training's ledger, MODEL.run, by docs/audit.md alone: the chain of its lines, and every kept state's hashes."""
+"""Checks a training's ledger by docs/audit.md alone: the chain of its lines, and every kept state's hashes.
+
+    examples/verify_ledger.py MODEL.run      needs NumPy
+"""
 import hashlib
 import json
 import pathlib
@@ -7,7 +10,12 @@ import re
 import struct
 import sys
 
-import numpy as np
+try:
+    import numpy as np
+except ImportError:
+    sys.exit("verify_ledger.py: expected NumPy, found none; install it (Debian: apt-get install python3-numpy)")
+if len(sys.argv) != 2:
+    sys.exit(__doc__)
 
 
 def in_memory(name, array):
