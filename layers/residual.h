@@ -8,7 +8,7 @@
 
 namespace supertac {
 
-/// Weighs channels: sigmoid(expand(relu(squeeze(mean over pixels)))), RCAN eq. 6-9. x [N,H,W,C] -> [N,C].
+/// Weighs channels: sigmoid(expand(relu(squeeze(mean over pixels)))), RCAN section 3.3. x [N,H,W,C] -> [N,C].
 class ChannelAttention : public Module {
  public:
   /// Throws std::invalid_argument unless 1 <= reduction <= channels.
@@ -20,8 +20,8 @@ class ChannelAttention : public Module {
   Linear squeeze_, expand_;
 };
 
-/// x + h gates(h), h = conv(relu(conv(x))), both convolutions 3x3 (RCAN eq. 10); no batch norm. x [N,H,W,C]
-/// -> same.
+/// x + h gates(h), h = conv(relu(conv(x))), both convolutions 3x3 (RCAN section 3.4); no batch norm.
+/// x [N,H,W,C] -> same.
 class Rcab : public Module {
  public:
   Rcab(Dim channels, Dim reduction, Rng& rng);

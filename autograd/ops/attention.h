@@ -1,5 +1,5 @@
-// The two halves of a block with channel attention (Zhang et al. 2018, RCAN, eq. 6-10): look at each
-// channel's mean; scale the channels and add what the block began with.
+// The two halves of a block with channel attention (Zhang et al. 2018, RCAN, sections 3.3 and 3.4): look at
+// each channel's mean; scale the channels and add what the block began with.
 #pragma once
 
 #include "autograd/variable.h"

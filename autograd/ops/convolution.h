@@ -23,9 +23,10 @@ Variable conv1d(const Variable& x, const Variable& w, const Variable& b, const C
 /// [N,H',W',out], each side as conv1d's.
 Variable conv2d(const Variable& x, const Variable& w, const Variable& b, const ConvOptions& options);
 
-/// The transpose of conv1d as a linear map, plus b, then f: x [N,L,in], w [K,in,out], b [out]; y [N, (L - 1)
-/// stride - 2 padding + K, out]. Kernels that the stride divides (4 for stride 2) cover every output equally
-/// often: no checkerboard.
+/// y[n,t,o] = f(b[o] + sum over l, k with l stride + k - padding = t, and over i, of x[n,l,i] w[k,i,o]): the
+/// transpose of conv1d as a linear map, plus b, then f.
+/// x [N,L,in], w [K,in,out], b [out]; y [N, (L - 1) stride - 2 padding + K, out]. Kernels that the stride
+/// divides (4 for stride 2) cover every output equally often: no checkerboard.
 Variable conv_transpose1d(const Variable& x, const Variable& w, const Variable& b,
                           const ConvOptions& options);
 /// The same over two dimensions, with the shapes of conv2d and each side as conv_transpose1d's.

@@ -1,3 +1,4 @@
+// The truth of a picture: the plate under the finger, and what a picture holds of its texture.
 #pragma once
 
 #include <cstdint>
@@ -14,9 +15,10 @@ namespace supertac {
 double truth_value(const Plate& plate, double x_mm, double y_mm);
 
 /// The plate under the finger as an image [height][width] of truth_value at the centres of its pixels:
-///   image[r * width + c] at x = x_mm - width p / 2 + (c + 1/2) p, y = y_mm - height p / 2 + (r + 1/2) p
-/// with p = pixel_mm. Row r grows with y, column c with x; (x_mm, y_mm) is the finger's centre on the plate.
-/// Throws std::invalid_argument when a side is below 1 or image does not hold height * width elements.
+///   image[r * width + c] at x = x_mm - width p / 2 + (c + 1/2) p, y = y_mm - height q / 2 + (r + 1/2) q
+/// with (p, q) = pixel_mm, a pixel's width and height. Row r grows with y, column c with x; (x_mm, y_mm) is
+/// the finger's centre on the plate. Throws std::invalid_argument when a side is below 1 or image does not
+/// hold height * width elements.
 void truth_image(const Plate& plate, double x_mm, double y_mm, const ImageGrid& grid, std::span<float> image);
 
 /// What lies under the finger. Scores are reported for each zone apart: a flat picture is easy where there is
