@@ -6,7 +6,7 @@
 The network has the size of preset `tiny`. All lengths are judged on the same frames: those with 512 samples of their pass
 behind them, which the longest needs.
 """
-from paper import Study, splits
+from paper import Study, significance_table, splits
 from tables import chosen, mean, over_seeds, rows, table
 
 LENGTHS = {512: (0.84, 88.76, 48.89), 256: (0.80, 94.32, 50.79), 128: (0.76, 93.32, 51.24), 64: (0.70, 86.27, 51.83),
@@ -23,6 +23,10 @@ def table1(folder="paper"):
                       f"{1e6 / mean(both['trial'], 'median_us'):,.0f}"])
     return table(["T", "SSIM, paper", "unseen trial", "`window`", "phase correlation, paper", "unseen trial (floor)",
                   "`window` (floor)", "pictures a second, paper", "ours"], lines)
+
+
+def table1_tests(folder="paper"):
+    return significance_table("table1", folder)
 
 
 if __name__ == "__main__":

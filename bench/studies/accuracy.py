@@ -2,11 +2,10 @@
 """The figures of bench/results/accuracy.md and unseen_plates.md, from the real recordings as text.
 
     bench/studies/accuracy.py known  BIN TEXT_DIR OUT_DIR [SEEDS]    presets paper, best and tiny, and four of best averaged
-    bench/studies/accuracy.py window BIN TEXT_DIR OUT_DIR [SEEDS]    preset best on split window
     bench/studies/accuracy.py unseen BIN TEXT_DIR OUT_DIR [SEEDS]    one plate left out of trial 1, random plates beside it
 
 SEEDS: 0,1,2,3,4. About six minutes a network on one core; what is there in OUT_DIR is not made again, so a run can be
-interrupted. Writes OUT_DIR/whole_passes.csv, held_out_windows.csv or left_out.csv, whose lines replace those of bench/results. Choices are
+interrupted. Writes OUT_DIR/whole_passes.csv or left_out.csv, whose lines replace those of bench/results. Choices are
 made on trial 1 (bench/README.md); this looks at trial 2.
 """
 import csv
@@ -94,17 +93,6 @@ def known(study):
     study.write("whole_passes.csv", lines)
 
 
-def window(study):
-    """Held out are windows whose neighbours are in the training; so nothing is augmented."""
-    lines = []
-    for seed in study.seeds:
-        name = f"best_window_s{seed}"
-        model = study.train(name, study.all, "--preset", "best", "--split", "window", "--seed", seed, "--augment", "none",
-                            "--plates", ",".join(KNOWN))
-        lines.append({"network": "best", "seed": seed, **study.scores(name, [model], study.all)})
-    study.write("held_out_windows.csv", lines)
-
-
 def unseen(study):
     lines = []
     for plate in PLATES:
@@ -124,6 +112,6 @@ def unseen(study):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) not in (5, 6) or sys.argv[1] not in ("known", "window", "unseen"):
+    if len(sys.argv) not in (5, 6) or sys.argv[1] not in ("known", "unseen"):
         sys.exit(__doc__)
-    {"known": known, "window": window, "unseen": unseen}[sys.argv[1]](Study(*sys.argv[2:]))
+    {"known": known, "unseen": unseen}[sys.argv[1]](Study(*sys.argv[2:]))

@@ -95,16 +95,9 @@ void run_copy(const IntegerStep& s, const IntegerMap& x, const IntegerMap& y, co
 }
 
 void run_mean(const IntegerMap& x, const IntegerMap& y, const Memory& m) {
-  const std::int32_t pixels = static_cast<std::int32_t>(x.height * x.width);
   for (Dim n = 0; n < m.images; ++n)
-    for (Dim c = 0; c < x.channels; ++c) {
-      std::int32_t sum = 0;
-      for (Dim line = 0; line < x.height; ++line)
-        for (Dim i = 0; i < x.width; ++i)
-          sum += m.numbers(x)[n * x.image() + line * x.line() + i * x.channels + c];
-      m.numbers(y)[n * y.image() + c] =
-          static_cast<std::int16_t>((sum < 0 ? sum - pixels / 2 : sum + pixels / 2) / pixels);
-    }
+    kernels::means(x.height, x.width, x.channels, x.line(), m.numbers(x) + n * x.image(),
+                   m.numbers(y) + n * y.image());
 }
 
 void run_lines(const IntegerStep& s, const IntegerMap& x, const IntegerMap& y, const Memory& m) {

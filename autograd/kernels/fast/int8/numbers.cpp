@@ -18,19 +18,26 @@ std::int16_t finish(const Outcome& to, Dim o, std::int32_t sum) {
   return clip(std::max(v, (v * to.negative_slope + Outcome::kSlopeHalf) >> Outcome::kSlopeBits));
 }
 
-// Of one output, such as a picture's: neighbours of x meet neighbours of w.
-std::int32_t single_sum(const ByteProductJob& job, const std::int16_t* x) {
-  std::int32_t sum = 0;
-  const std::int8_t* w = job.w;
-  for (Dim s = 0; s < job.segment_count; ++s, w += job.length) {
-    const std::int16_t* v = x + job.segments[s];
-    run_loop([&, v, w, n = job.length]() {
-      std::int32_t part = 0;
-      for (Dim k = 0; k < n; ++k) part += static_cast<std::int32_t>(v[k]) * static_cast<std::int16_t>(w[k]);
-      sum += part;
-    });
-  }
-  return sum;
+constexpr Dim kMostWidened = 4096;
+
+// Of one output, such as a picture's: neighbours of x meet neighbours of w, which are widened once.
+void product_of_one(const ByteProductJob& job, const std::int16_t* x, std::int16_t* y) {
+  std::int16_t wide[kMostWidened];
+  std::copy_n(job.w, job.segment_count * job.length, wide);
+  run_loop([&job, x, y, &wide] {
+    for (Dim n = 0; n < job.images; ++n)
+      for (Dim i = 0; i < job.height; ++i)
+        for (Dim j = 0; j < job.width; ++j) {
+          const std::int16_t* from = x + n * job.from.image + i * job.from.line + j * job.from.pixel;
+          const std::int16_t* w = wide;
+          std::int32_t sum = 0;
+          for (Dim s = 0; s < job.segment_count; ++s, w += job.length) {
+            const std::int16_t* const v = from + job.segments[s];
+            for (Dim k = 0; k < job.length; ++k) sum += static_cast<std::int32_t>(v[k]) * w[k];
+          }
+          y[n * job.to.image + i * job.to.line + j * job.to.pixel] = finish(job.outcome, 0, sum);
+        }
+  });
 }
 
 // Of `count` outputs from `first` on.
@@ -51,16 +58,13 @@ void sums(const ByteProductJob& job, const std::int16_t* x, Dim first, Dim count
 }  // namespace
 
 void product_of_numbers(const ByteProductJob& job, const std::int16_t* x, std::int16_t* y) {
+  if (job.cout == 1 && job.segment_count * job.length <= kMostWidened) return product_of_one(job, x, y);
   std::int32_t sum[kMaxChannels];  // a linear layer has more outputs: channels of all pixels
   for (Dim n = 0; n < job.images; ++n) {
     for (Dim i = 0; i < job.height; ++i) {
       for (Dim j = 0; j < job.width; ++j) {
         const std::int16_t* from = x + n * job.from.image + i * job.from.line + j * job.from.pixel;
         std::int16_t* to = y + n * job.to.image + i * job.to.line + j * job.to.pixel;
-        if (job.cout == 1) {
-          *to = finish(job.outcome, 0, single_sum(job, from));
-          continue;
-        }
         for (Dim first = 0; first < job.cout; first += kMaxChannels) {
           const Dim count = std::min(kMaxChannels, job.cout - first);
           sums(job, from, first, count, sum);
@@ -68,6 +72,25 @@ void product_of_numbers(const ByteProductJob& job, const std::int16_t* x, std::i
         }
       }
     }
+  }
+}
+
+void means(Dim height, Dim width, Dim channels, Dim line, const std::int16_t* x, std::int16_t* y) {
+  const auto pixels = static_cast<std::int32_t>(height * width);
+  constexpr Dim kAtOnce = 64;
+  for (Dim first = 0; first < channels; first += kAtOnce) {
+    const Dim count = std::min(kAtOnce, channels - first);
+    run_loop([=] {
+      std::int32_t sum[kAtOnce] = {};
+      for (Dim i = 0; i < height; ++i)
+        for (Dim j = 0; j < width; ++j) {
+          const std::int16_t* const pixel = x + i * line + j * channels + first;
+          each_here(count, [&sum, pixel](Dim c) { sum[c] += pixel[c]; });
+        }
+      for (Dim c = 0; c < count; ++c)
+        y[first + c] =
+            static_cast<std::int16_t>((sum[c] < 0 ? sum[c] - pixels / 2 : sum[c] + pixels / 2) / pixels);
+    });
   }
 }
 
@@ -90,15 +113,18 @@ void to_numbers(Dim n, const float* x, float per_step, std::int16_t* y) {
 
 void gated_sum(Dim pixels, Dim channels, const std::int16_t* a, const std::int16_t* x,
                const std::int16_t* gates, std::int16_t* y) {
-  for (Dim p = 0; p < pixels; ++p, a += channels, x += channels, y += channels) {
-    const std::int16_t *b = a, *h = x;
-    std::int16_t* const to = y;
-    each(channels, [=](Dim c) {
-      const std::int32_t gated = gates == nullptr ? h[c] : (h[c] * gates[c] + 2048) >> kGateBits;
-      const std::int32_t v = b[c] + gated;
-      to[c] = static_cast<std::int16_t>(v < -32768 ? -32768 : v > 32767 ? 32767 : v);
-    });
-  }
+  const auto clipped = [](std::int32_t v) {
+    return static_cast<std::int16_t>(v < -32768 ? -32768 : v > 32767 ? 32767 : v);
+  };
+  if (gates == nullptr)
+    return each(pixels * channels, [=](Dim i) { y[i] = clipped(std::int32_t{a[i]} + x[i]); });
+  run_loop([=] {
+    for (Dim p = 0; p < pixels; ++p) {
+      const std::int16_t *b = a + p * channels, *h = x + p * channels;
+      std::int16_t* const to = y + p * channels;
+      each_here(channels, [=](Dim c) { to[c] = clipped(b[c] + ((h[c] * gates[c] + 2048) >> kGateBits)); });
+    }
+  });
 }
 
 void gates(Dim n, const std::int16_t* x, float step, std::int16_t* y) {

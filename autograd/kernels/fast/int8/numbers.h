@@ -11,6 +11,9 @@ namespace supertac::kernels {
 /// its product with the multiplier in 64; the result is clipped to 16 before the slope.
 void product_of_numbers(const ByteProductJob& job, const std::int16_t* x, std::int16_t* y);
 
+/// y [channels] = the mean over height x width pixels of x, whose lines are `line` apart, halves away from 0.
+void means(Dim height, Dim width, Dim channels, Dim line, const std::int16_t* x, std::int16_t* y);
+
 /// y = clip(((x * multiplier + offset) >> shift) + zero, 0, 255) for n numbers.
 void to_bytes(Dim n, const std::int16_t* x, std::int32_t multiplier, std::int32_t offset, std::int32_t shift,
               std::int32_t zero, std::uint8_t* y);
