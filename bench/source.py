@@ -1,5 +1,6 @@
 """Where a line of a study's CSV comes from: the columns `command` and `commit` that bench/results.py asks for."""
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -11,5 +12,5 @@ def source():
     git = ["git", "-C", ROOT, "describe", "--always", "--abbrev=7", "--exclude=*", "--dirty"]
     commit = subprocess.run(git, capture_output=True, text=True).stdout.strip()
     program = pathlib.Path(sys.argv[0]).resolve().relative_to(ROOT).as_posix()
-    words = [pathlib.Path(word).name if word.startswith("/") else word for word in sys.argv[1:]]  # no paths of a machine
+    words = [re.sub(r"(?<![^=])/\S*/", "", word) for word in sys.argv[1:]]  # no paths of a machine
     return {"command": " ".join([program, *words]), "commit": commit or "unknown"}

@@ -84,11 +84,12 @@ class Study:
 
     def keep(self, name, lines):
         """Writes NAME.csv, each line with its command, the commit of the tree, and that of the programs if it is known."""
+        made = source()  # before the file changes the tree
         with open(self.kept / f"{name}.csv", "w", newline="") as file:
             out = csv.DictWriter(file, [*lines[0], "command", "commit"], lineterminator="\n")
             out.writeheader()
             for number, line in enumerate(lines):
-                out.writerow(line | (source() if number == 0 else {"command": "", "commit": ""}))
+                out.writerow(line | (made if number == 0 else {"command": "", "commit": ""}))
 
     def test(self, name):
         """Tests of significance on NAME.csv, where it has several seeds; needs python3-scipy."""

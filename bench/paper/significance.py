@@ -68,10 +68,11 @@ def write(path):
     splits = dict.fromkeys(row["split"] for row in rows)
     lines = [{"split": split} | line for split in splits for line in tests_of([r for r in rows if r["split"] == split])]
     if lines:
+        made = source()  # before the file changes the tree
         with open(path.with_name(path.stem + "_tests.csv"), "w", newline="") as file:
             table = csv.DictWriter(file, [*lines[0], "command", "commit"], lineterminator="\n")
             table.writeheader()
-            table.writerows(line | (source() if number == 0 else {}) for number, line in enumerate(lines))
+            table.writerows(line | (made if number == 0 else {}) for number, line in enumerate(lines))
     return lines
 
 
