@@ -12,5 +12,5 @@ def source():
     git = ["git", "-C", ROOT, "describe", "--always", "--abbrev=7", "--exclude=*", "--dirty"]
     commit = subprocess.run(git, capture_output=True, text=True).stdout.strip()
     program = pathlib.Path(sys.argv[0]).resolve().relative_to(ROOT).as_posix()
-    words = [re.sub(r"(?<![^=])/\S*/", "", word) for word in sys.argv[1:]]  # no paths of a machine
+    words = [re.sub(r"(^|[=,])/[^,\s]*/", r"\1", word) for word in sys.argv[1:]]  # no paths of a machine
     return {"command": " ".join([program, *words]), "commit": commit or "unknown"}

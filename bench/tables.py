@@ -234,7 +234,7 @@ def cold_start():
 
 def precision():
     found, lines = rows("speed/precision.csv"), []
-    for network in ("tiny", "best", "four of best"):
+    for network in ("tiny", "paper", "four of paper"):
         fp32, int8 = ([r for r in found if r["name"].rsplit(" ", 1)[0] == network and r["precision"] == p] for p in ("fp32", "int8"))
         lost = max(float(a["contact_ssim"]) - float(b["contact_ssim"]) for a, b in zip(fp32, int8))
         lines.append([network, f"{mean(fp32, 'contact_ssim'):.4f}", f"{mean(int8, 'contact_ssim'):.4f}", f"{lost:.4f}",

@@ -116,7 +116,7 @@ double FrameDates::by_arrival(double arrival_s, std::size_t behind) {
   if (++in_block_ == kBlock) {
     // Frames that are early are dated by their arrival, so that each is early anew.
     const double drift = most_late_s_ < 0 ? most_late_s_ : least_late_s_ / static_cast<double>(kBlock);
-    period_s_ = std::clamp(period_s_ + 0.5 * drift, 0.5 * nominal_s_, 2 * nominal_s_);
+    period_s_ = std::clamp(period_s_ + 0.5 * drift, 0.1 * nominal_s_, 10 * nominal_s_);
     in_block_ = 0;
     return std::max(earliest, std::min(arrival_s, due + std::min(0.5 * least_late_s_, 0.4 * period_s_)));
   }
