@@ -36,7 +36,7 @@ def heat_map(found, png):
 
 
 if __name__ == "__main__":
-    study = Study(__doc__)
+    study = Study(__doc__, tests=True)
     found = study.sweep("grid", "tiny", **table1.GRID, latent=LATENTS)
     study.keep_sweep("figure8", found, "timesteps", "latent")
     for split, of in splits(found).items():

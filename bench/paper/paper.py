@@ -6,6 +6,7 @@ picture. What is there is not made again.
 """
 import argparse
 import csv
+import importlib.util
 import pathlib
 import subprocess
 import sys
@@ -24,7 +25,8 @@ SCORES = ("windows", "ssim", "psnr_db", "phase", "phase_floor", "position_mm", "
 class Study:
     """One item: its options from the command line, and the folder that keeps its CSV and pictures."""
 
-    def __init__(self, about):
+    def __init__(self, about, tests=False):
+        """`tests`: whether it ends with tests of significance."""
         parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
         where = parser.add_mutually_exclusive_group(required=True)
         where.add_argument("--text", metavar="TEXT_DIR", help="the authors' recordings, <plate>/<trial>/<pass>.txt")
@@ -34,6 +36,9 @@ class Study:
         parser.add_argument("--seeds", default="0,1,2,3,4", help="of the trainings (default: %(default)s)")
         parser.add_argument("--so-far", action="store_true", help="train nothing: what there is by now")
         options = parser.parse_args()
+        if missing := [name for name in ("numpy", "scipy") if tests and importlib.util.find_spec(name) is None]:
+            sys.exit(f"{pathlib.Path(sys.argv[0]).name}: the tests of significance need {' and '.join(missing)}: "
+                     f"install python3-{' python3-'.join(missing)}")
         self.so_far = options.so_far
         self.simulated, self.bin, self.seeds = options.simulated, pathlib.Path(options.bin), options.seeds.split(",")
         self.out = pathlib.Path(options.out + ("_simulated" if self.simulated else "")).resolve()

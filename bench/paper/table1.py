@@ -30,7 +30,7 @@ def table1_tests(folder="paper"):
 
 
 if __name__ == "__main__":
-    study = Study(__doc__)
+    study = Study(__doc__, tests=True)
     study.keep_sweep("table1", study.sweep("grid", "tiny", **GRID, latent=[10]), "timesteps")
     print(table1(study.kept))
     study.test("table1")

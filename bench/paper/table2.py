@@ -23,7 +23,7 @@ def table2_tests(folder="paper"):
 
 
 if __name__ == "__main__":
-    study = Study(__doc__)
+    study = Study(__doc__, tests=True)
     study.keep_sweep("table2", study.sweep("pixels", "paper", **PIXELS, scale=SIZES), "scale")
     print(table2(study.kept))
     study.test("table2")

@@ -71,14 +71,15 @@ std::string WindowCounts::summary() const {
   const auto part = [](std::size_t count, const char* what) {
     return count > 0 ? ", " + std::to_string(count) + " " + what : std::string();
   };
-  return std::to_string(windows) + " windows from " + std::to_string(frames) + " frames of " +
+  return std::to_string(windows) + " windows from " + std::to_string(frames) + " samples of " +
          std::to_string(recordings) + " recordings" +
          (added > 0 ? " and " + std::to_string(added) + " simulated passes" : "") +
          part(unreliable, "in passes with unreliable registration") + part(no_position, "without position") +
          part(lifting, "while the finger was lifted or lowered") +
          part(too_early, "too close to the start of a pass or to a gap") +
-         part(off_stride, "between strides") + part(held, "held for lack of a sample") + part(gaps, "gaps") +
-         part(damaged, "damaged");
+         part(off_stride, "between strides") +
+         (held > 0 ? "; " + std::to_string(held) + " samples without a frame repeat the one before" : "") +
+         part(gaps, "gaps") + part(damaged, "damaged");
 }
 
 WindowSet WindowSet::load(const std::string& dir, const std::vector<std::string>& plates,

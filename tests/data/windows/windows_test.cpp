@@ -115,7 +115,7 @@ TEST(Windows, CountEveryFrameOnce) {
   EXPECT_EQ(counts.summary().find("gaps"), std::string::npos);
   set.add(make_recording({.pass = 4}), ".",
           {.training_only = true, .augmentable = false});  // as training adds
-  EXPECT_NE(counts.summary().find("400 frames of 3 recordings and 1 simulated passes"), std::string::npos);
+  EXPECT_NE(counts.summary().find("400 samples of 3 recordings and 1 simulated passes"), std::string::npos);
 }
 
 TEST(Windows, InTheAirTheTruthIsFlat) {
