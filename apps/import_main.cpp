@@ -32,7 +32,8 @@ void declare(Arguments& arguments) {
       .required("out", "DIR", "folder for the recordings, one file per pass")
       .option("speed", "MM_PER_S", "sliding speed of the passes in mm/s", "10")
       .option("pictures", "DIR",
-              "write index.html: the signals of each pass of the rig's text files under the plate they were fitted to")
+              "write index.html: the signals of each pass of the rig's text files under the plate they were "
+              "fitted to")
       .flag("skip-bad", "leave out files and folders that are no recordings instead of giving up");
   declare_tables(arguments);
 }

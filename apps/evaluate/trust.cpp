@@ -81,11 +81,10 @@ std::vector<std::string> TrustScores::lines() const {
                     format(coverage_.factor(), 2) + " would hold " + percent(IntervalCoverage::kCovered) +
                     ")");
   if (!contact_.empty())
-    lines.push_back("in contact, the surest " + percent(kSure) + " have SSIM " +
-                    format(ssim_of_surest(kSure), 3) +
-                    (std::isfinite(auroc())
-                         ? "; predicted errors tell SSIM below 0.8 with AUROC " + format(auroc(), 3)
-                         : "; none, or every one, has SSIM below 0.8"));
+    lines.push_back(
+        "in contact, the surest " + percent(kSure) + " have SSIM " + format(ssim_of_surest(kSure), 3) +
+        (std::isfinite(auroc()) ? "; predicted errors tell SSIM below 0.8 with AUROC " + format(auroc(), 3)
+                                : "; none, or every one, has SSIM below 0.8"));
   if (judged_ > 0)
     lines.push_back(percent(static_cast<double>(unlike_) / static_cast<double>(judged_)) +
                     " of the windows are unlike training");
