@@ -172,23 +172,29 @@ void SensorReader::read_once() {
   const auto bytes = std::span(buffer).first(got.count);
   if (decoder_->counters().frames == 0 && beginning_.size() < kShown)
     for (const std::byte byte : bytes) beginning_ += std::to_integer<char>(byte);
-  read_.clear();
+  times_read_s_.clear(), values_read_.clear();
   const auto keep = [&](const DecodedFrame& frame) {
-    read_.times_s.push_back(frame.time_s);
-    read_.values.insert(read_.values.end(), frame.values.begin(), frame.values.end());
+    times_read_s_.push_back(frame.time_s);
+    values_read_.insert(values_read_.end(), frame.values.begin(), frame.values.end());
   };
   decoder_->push(bytes, keep);
   // A host that stood still finds what waited meanwhile in several reads.
   const bool stood_still = got.time_s - std::exchange(last_read_s_, got.time_s) > kChunkS;
-  for (int more = 0; stood_still && live_ && more < kMostReads; ++more) {
-    const Received rest = port_->read(buffer, port_->now());
-    if (rest.count == 0) break;
-    decoder_->push(std::span(buffer).first(rest.count), keep);
-    got.time_s = rest.time_s;
+  std::exception_ptr end;  // what came before it is handed over first
+  try {
+    for (int more = 0; stood_still && live_ && more < kMostReads; ++more) {
+      const Received rest = port_->read(buffer, port_->now());
+      if (rest.count == 0) break;
+      decoder_->push(std::span(buffer).first(rest.count), keep);
+      got.time_s = rest.time_s;
+    }
+  } catch (...) {
+    end = std::current_exception();
   }
-  for (std::size_t n = 0, size = sensor_.values(); n < read_.times_s.size(); ++n)
-    take({std::span(read_.values).subspan(n * size, size), read_.times_s[n]}, got.time_s,
-         read_.times_s.size() - 1 - n);
+  const std::size_t count = times_read_s_.size(), size = sensor_.values();
+  for (std::size_t n = 0; n < count; ++n)
+    take({std::span(values_read_).subspan(n * size, size), times_read_s_[n]}, got.time_s, count - 1 - n);
+  if (end) std::rethrow_exception(end);
   check_silence(got.time_s);
   const std::lock_guard lock(mutex_);
   counters_.decoder = decoder_->counters();

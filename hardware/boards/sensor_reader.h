@@ -94,12 +94,9 @@ class SensorReader {
   std::unique_ptr<SensorDecoder> decoder_;
   FrameDates dates_;
   std::vector<float> signals_;
-  struct {
-    std::vector<std::optional<double>> times_s;
-    std::vector<float> values;
-    void clear() { times_s.clear(), values.clear(); }
-  } read_;  // frames that came at once
-  double last_read_s_;
+  std::vector<std::optional<double>> times_read_s_;  // of frames that came at once, and their values
+  std::vector<float> values_read_;
+  double last_read_s_ = 0;
   std::string beginning_;  // of what came before the first frame
   double last_frame_s_;
   double first_time_s_ = 0, first_arrival_s_ = 0, checked_time_s_ = 0, longest_step_s_ = 0;
