@@ -18,14 +18,13 @@ std::string drawn_by(const ModelFile& file) {
   return plate.empty() ? "seed " + file.metadata_or("seed", "0") : "left-out plate " + plate;
 }
 
-// A split as a person would say it; a seed decides nothing about trials and plates.
-std::string drawn(const std::string& split, std::uint64_t seed) {
-  const bool by_seed = split == "window" || split == "pass" || split == "group";
-  return by_seed ? split + " of seed " + std::to_string(seed) : split;
-}
+bool is_drawn(const std::string& split) { return split != "trial" && split != "none"; }
 
-std::string kept_away_by(const ModelFile& file) {
-  return drawn(file.metadata_or("split", "none"), parse_uint(file.metadata_or("seed", "0")).value_or(0));
+// Whether the windows that are tested are not those that this model's training kept away.
+bool is_another(const TestSet& tested, const ModelFile& file) {
+  const bool by_seed = is_drawn(tested.split_name) && file.metadata_or("leave_out", "").empty();
+  return tested.split_name != file.metadata_or("split", "none") ||
+         (by_seed && std::to_string(tested.seed) != file.metadata_or("seed", "0"));
 }
 
 void refuse_leak(const std::vector<ModelFile>& files, const std::string& split_name) {
@@ -35,7 +34,7 @@ void refuse_leak(const std::vector<ModelFile>& files, const std::string& split_n
       throw std::runtime_error(
           "one model was trained with split " + split + ", another with " + other +
           ": what one is tested on the other may have seen; average models of one split");
-  if (split_name == "trial" || split_name == "none") return;  // these are drawn by nothing
+  if (!is_drawn(split_name)) return;
   for (const ModelFile& file : files)
     if (drawn_by(file) != drawn_by(files.front()))
       throw std::runtime_error("split " + split_name + " of one model was drawn by " +
@@ -60,11 +59,14 @@ void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, Tes
     a.note(
         "the model was trained with split none: if these are the recordings of its training, it has seen "
         "every one of them");
-  if (const std::string own = kept_away_by(files.front());
-      tested.split_name != "none" && own != "none" && own != drawn(tested.split_name, tested.seed))
+  const std::string own = files.front().metadata_or("split", "none");
+  const auto said = [](const std::string& split, const std::string& by) {
+    return is_drawn(split) ? split + " (" + by + ")" : split;
+  };
+  if (own != "none" && tested.split_name != "none" && is_another(tested, files.front()))
     a.note(
-        "the model was trained with split " + own + ", tested is split " +
-        drawn(tested.split_name, tested.seed) +
+        "the model was trained with split " + said(own, drawn_by(files.front())) + ", tested is split " +
+        said(tested.split_name, "seed " + std::to_string(tested.seed)) +
         ": if these are the recordings of its training, it has seen some of these windows; without --split "
         "and --seed those that it has not seen are tested");
   if (!a.given("split") && files.front().metadata.contains("interval_factor_found"))
