@@ -8,8 +8,9 @@
 namespace supertac::kernels {
 namespace {
 
-std::int16_t clip(std::int64_t v) {
-  return static_cast<std::int16_t>(std::clamp<std::int64_t>(v, -32768, 32767));
+template <class Whole>
+std::int16_t clip(Whole v) {
+  return static_cast<std::int16_t>(v < -32768 ? -32768 : v > 32767 ? 32767 : v);
 }
 
 std::int16_t finish(const Outcome& to, Dim o, std::int32_t sum) {
@@ -113,16 +114,13 @@ void to_numbers(Dim n, const float* x, float per_step, std::int16_t* y) {
 
 void gated_sum(Dim pixels, Dim channels, const std::int16_t* a, const std::int16_t* x,
                const std::int16_t* gates, std::int16_t* y) {
-  const auto clipped = [](std::int32_t v) {
-    return static_cast<std::int16_t>(v < -32768 ? -32768 : v > 32767 ? 32767 : v);
-  };
   if (gates == nullptr)
-    return each(pixels * channels, [=](Dim i) { y[i] = clipped(std::int32_t{a[i]} + x[i]); });
+    return each(pixels * channels, [=](Dim i) { y[i] = clip(std::int32_t{a[i]} + x[i]); });
   run_loop([=] {
     for (Dim p = 0; p < pixels; ++p) {
       const std::int16_t *b = a + p * channels, *h = x + p * channels;
       std::int16_t* const to = y + p * channels;
-      each_here(channels, [=](Dim c) { to[c] = clipped(b[c] + ((h[c] * gates[c] + 2048) >> kGateBits)); });
+      each_here(channels, [=](Dim c) { to[c] = clip(b[c] + ((h[c] * gates[c] + 2048) >> kGateBits)); });
     }
   });
 }
