@@ -24,7 +24,8 @@ constexpr int kMostReads = 64;  // of what waited
 
 }  // namespace
 
-FrameDates::FrameDates(const Sensor& sensor) : nominal_s_(1 / sensor.rate_hz), period_s_(nominal_s_) {
+FrameDates::FrameDates(const Sensor& sensor, bool stored)
+    : stored_(stored), nominal_s_(1 / sensor.rate_hz), period_s_(nominal_s_) {
   if (!sensor.frame.time) return;
   const std::string& type = sensor.frame.time->type;
   // millis() and micros() of lines and JSON have 32 bits.
@@ -92,6 +93,7 @@ std::optional<double> FrameDates::by_stamp(double stamp_s, double arrival_s) {
 // dates, and its drift the period. Frames that come late without a silence before them are made more slowly
 // than was said; none is lost. Those behind a silence, in the same burst, make up for it.
 double FrameDates::by_arrival(double arrival_s, std::size_t behind) {
+  if (stored_) return count_ == 0 ? arrival_s : last_s_ + nominal_s_;
   const double waited_s = static_cast<double>(behind) * period_s_;
   ++since_sync_;
   if (count_ == 0) {
@@ -128,7 +130,7 @@ SensorReader::SensorReader(OpenedPort opened, const Sensor& sensor)
       live_(opened.live),
       sensor_(sensor),
       decoder_(make_decoder(sensor)),
-      dates_(sensor),
+      dates_(sensor, opened.stored),
       signals_(sensor.array.signals()),
       last_frame_s_(port_->now()),
       thread_([this] { run(); }) {}

@@ -38,7 +38,8 @@ struct ReaderCounters {
 /// earliest arrivals; so are those of a burst behind a silence, when they are as many as it lasted periods.
 class FrameDates {
  public:
-  explicit FrameDates(const Sensor& sensor);
+  /// `stored`: the frames are those of a file; without stamps they are a period apart.
+  explicit FrameDates(const Sensor& sensor, bool stored = false);
   /// Empty for a frame that is not later than the one before, or whose stamp jumps.
   /// `behind`: how many frames came behind it in the same burst; they are dated with the same arrival.
   std::optional<double> date(std::optional<double> stamp_s, double arrival_s, std::size_t behind = 0);
@@ -49,14 +50,15 @@ class FrameDates {
   std::optional<double> by_stamp(double stamp_s, double arrival_s);
   double by_arrival(double arrival_s, std::size_t behind);
   void count_missing(double step_s, bool stamped);
+  bool stored_;
   double nominal_s_, period_s_, wraps_s_ = 0;
   double offset_s_ = 0, last_s_ = 0, last_arrival_s_ = 0, least_late_s_ = 0, most_late_s_ = 0;
   std::optional<double> jumped_s_;       // a stamp that was not believed
   double jump_step_s_ = 0, step_s_ = 0;  // from the one before that to it, and where these are always as long
   double synchronised_s_ = 0;            // when dates were set to the arrivals
   std::uint64_t count_ = 0, in_block_ = 0, missing_ = 0, since_sync_ = 0;
-  double regular_step_s_ =
-      0;  // the step before, how often in a row it was as long, and what was missing in it
+  // The step before, how often in a row it was as long, and what was missing in these.
+  double regular_step_s_ = 0;
   std::uint64_t regular_ = 0, regular_missing_ = 0;
   bool resynchronised_ = false;  // at this frame, and nothing was lost
 };

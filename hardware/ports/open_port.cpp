@@ -160,7 +160,7 @@ OpenedPort open_file(const std::string& path) {
   if (S_ISDIR(status.st_mode)) fail(path, "expected a file or FIFO, found a folder");
   if (S_ISCHR(status.st_mode) && !input && isatty(descriptor) != 0)
     fail(path, "is a serial port, whose speed must be said: serial:" + path + "@115200");
-  return {std::move(port), false};
+  return {std::move(port), false, S_ISREG(status.st_mode)};
 }
 
 }  // namespace

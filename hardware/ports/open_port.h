@@ -10,7 +10,8 @@ namespace supertac {
 
 struct OpenedPort {
   std::unique_ptr<Port> port;
-  bool live = true;  ///< the sender does not wait: a serial line or a socket, not a file or a pipe
+  bool live = true;     ///< the sender does not wait: a serial line or a socket, not a file or a pipe
+  bool stored = false;  ///< a file: when its bytes arrive says nothing
 };
 
 /// `serial:DEVICE@BAUD` ("auto" finds the rig's board), udp:[HOST]:PORT (listens), tcp:HOST:PORT (connects,

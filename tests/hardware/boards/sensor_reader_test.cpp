@@ -254,6 +254,19 @@ TEST(SensorReader, AnotherRateThanTheStatedOneIsNoLoss) {
   }
 }
 
+// They were dated by the speed at which the file was read.
+TEST(SensorReader, FramesOfAFileWithoutStampsAreAPeriodApart) {
+  const TemporaryFolder folder;
+  std::string lines;
+  for (int n = 0; n < 30'000; ++n) lines += std::to_string(n) + ",7\n";
+  write_file(folder / "frames.csv", lines);
+  SensorReader reader(open_port(folder / "frames.csv"), mat(1, 2, 100, R"({"kind":"text"})"));
+  const std::vector<ReadFrame> frames = all_of(reader);
+  ASSERT_EQ(frames.size(), 30'000U);
+  EXPECT_NEAR(frames.back().time_s - frames.front().time_s, 299.99, 1e-6);
+  EXPECT_EQ(reader.counters().missing, 0U);
+}
+
 // The frames of a burst make up for the silence before it; of a longer silence the rest is lost.
 TEST(SensorReader, WhatWaitedWhileTheHostStoodStillIsNotLost) {
   for (const int lost : {0, 30}) {
