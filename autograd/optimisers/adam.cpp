@@ -4,6 +4,7 @@
 #include <cmath>
 #include <exception>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 
 #include "autograd/kernels/elementwise.h"
@@ -88,6 +89,7 @@ Adam::Adam(std::vector<Variable> parameters, const AdamOptions& options)
     m_.push_back(Tensor::zeros(p.shape()));
     v_.push_back(Tensor::zeros(p.shape()));
   }
+  squares_.resize(parameters_.size());
 }
 
 void Adam::zero_grad() {
@@ -112,8 +114,10 @@ void Adam::move_matrices(real clip) {
 }
 
 double Adam::step() {
-  double squares = 0;
-  for (const Variable& p : parameters_) squares += kernels::sum_of_squares(p.size(), p.grad().data());
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t k = 0; k < parameters_.size(); ++k)
+    squares_[k] = kernels::sum_of_squares(parameters_[k].size(), parameters_[k].grad().data());
+  const double squares = std::accumulate(squares_.begin(), squares_.end(), 0.0);
   const double norm = std::sqrt(squares);
   if (!std::isfinite(norm)) return norm;
   const double factor = options_.clip_norm > 0 && norm > options_.clip_norm ? options_.clip_norm / norm : 1;
@@ -130,6 +134,7 @@ double Adam::step() {
                  static_cast<real>(options_.learning_rate / (1 - power(options_.beta1, steps_))),
                  static_cast<real>(1 / std::sqrt(1 - power(options_.beta2, steps_))),
                  static_cast<real>(options_.epsilon)};
+#pragma omp parallel for schedule(dynamic)
   for (const std::size_t k : others_) {
     Variable& p = parameters_[k];
     update(p.size(), u, p.grad().data(), p.mutable_value().data(), m_[k].data(), v_[k].data());

@@ -6,7 +6,7 @@
 //   pictures8 FILE         the same in int8, with the ranges of these windows         -> done
 //   cost                   -> multiply-adds of inference, of training, per window
 //   infer|int8 BATCH SECONDS    -> median processor time, median wall time of a call (s), median FMA peak
-//   (GFLOP/s) train THREADS SECONDS  the same for a training step of 64 windows
+//   (GFLOP/s) train THREADS SECONDS [BATCH]  the same for a training step of 64 windows, or so many
 //   each COUNT FILE        the wall time of so many pictures one by one, `seconds` [COUNT]  -> page faults on
 //   the way spin COUNT FILE        the same for additions that take about as long and need no memory
 #include <benchmark/benchmark.h>
@@ -16,6 +16,7 @@
 #include <chrono>
 #include <ctime>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <sstream>
 
@@ -59,7 +60,10 @@ class Ours {
     }
     if (what == "train" && words >> number >> seconds) {
       omp_set_num_threads(number);
-      return timed(seconds, [this] { trainer().train_step(); });
+      int batch = 0;
+      if (!(words >> batch)) batch = 64;
+      Trainer& of_batch = trainer(batch);
+      return timed(seconds, [&] { of_batch.train_step(); });
     }
     if (what == "each" && words >> number >> file) {
       omp_set_num_threads(1);
@@ -106,15 +110,17 @@ class Ours {
     return "done";
   }
 
-  Trainer& trainer() {
-    if (!trainer_) {
-      data_ = std::make_unique<WindowSet>(bench::sliding_bumps(model_->settings()));
+  Trainer& trainer(int batch) {
+    std::unique_ptr<Trainer>& trainer = trainers_[batch];
+    if (!trainer) {
+      if (!data_) data_ = std::make_unique<WindowSet>(bench::sliding_bumps(model_->settings()));
       Recipe settings;
+      settings.batch = batch;
       settings.model = model_->settings();
       settings.epochs = 100'000;
-      trainer_ = std::make_unique<Trainer>(*data_, bench::all_of(*data_), Objective(*data_, settings));
+      trainer = std::make_unique<Trainer>(*data_, bench::all_of(*data_), Objective(*data_, settings));
     }
-    return *trainer_;
+    return *trainer;
   }
 
   static long page_faults() {
@@ -169,7 +175,7 @@ class Ours {
   Tensor windows_;
   Prepared bytes_;
   std::unique_ptr<WindowSet> data_;
-  std::unique_ptr<Trainer> trainer_;
+  std::map<int, std::unique_ptr<Trainer>> trainers_;  // by batch
 };
 
 }  // namespace

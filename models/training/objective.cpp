@@ -8,11 +8,6 @@
 namespace supertac {
 namespace {
 
-SuperTac make_model(const SuperTacSettings& settings, std::uint64_t seed) {
-  Rng rng(seed);
-  return {settings, rng};
-}
-
 const Recipe& checked(const Recipe& recipe, const TaxelArray& array) {
   recipe.check();
   check(recipe.augment, array);
@@ -25,11 +20,10 @@ const Recipe& checked(const Recipe& recipe, const TaxelArray& array) {
 }  // namespace
 
 Objective::Objective(const WindowSet& windows, const Recipe& recipe)
-    : Objective(checked(recipe, windows.array()), input_of(windows), windows.array(), recipe.seed) {}
+    : Objective(checked(recipe, windows.array()), input_of(windows), windows.array(), Rng(recipe.seed)) {}
 
-Objective::Objective(const Recipe& recipe, const InputSettings& input, const TaxelArray& array,
-                     std::uint64_t seed)
-    : recipe_(recipe), input_(input), array_(array), model_(make_model(recipe.model, seed)) {}
+Objective::Objective(const Recipe& recipe, const InputSettings& input, const TaxelArray& array, Rng rng)
+    : recipe_(recipe), input_(input), array_(array), model_(recipe.model, rng) {}
 
 BatchOutput Objective::operator()(const Batch& batch) const {
   const SuperTac::Output drawn = model_.forward(batch.inputs, eps_of(batch).span());

@@ -33,7 +33,7 @@ class Objective {
   const SuperTac& network() const { return model_; }
   const Recipe& recipe() const { return recipe_; }
   /// The same with a network of its own, not yet with this one's values: share_values() gives it them.
-  Objective clone() const { return {recipe_, input_, array_, 0}; }
+  Objective clone() const { return {recipe_, input_, array_, Rng::zeros()}; }
 
   BatchOutput operator()(const Batch& batch) const;
   /// How many numbers of noise and of latents a sample has.
@@ -50,7 +50,7 @@ class Objective {
   std::map<std::string, std::string> metadata() const { return model_metadata(recipe_.model, input_); }
 
  private:
-  Objective(const Recipe& recipe, const InputSettings& input, const TaxelArray& array, std::uint64_t seed);
+  Objective(const Recipe& recipe, const InputSettings& input, const TaxelArray& array, Rng rng);
   PerGroup<Tensor> eps_of(const Batch& batch) const;
 
   Recipe recipe_;

@@ -1,6 +1,7 @@
 #include "models/training/ranks.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
@@ -92,16 +93,17 @@ Ranks& one_process() {
 }
 
 void check_micro_batches(int ranks, std::size_t batch) {
-  constexpr std::size_t kMicroBatches = 8;
   if (ranks == 1) return;
-  if (ranks != 2 && ranks != 4 && ranks != 8)
-    throw std::invalid_argument(
-        std::to_string(ranks) +
-        " processes cannot share the eight micro-batches of a batch evenly; start 1, 2, 4 or 8, "
-        "or train several models at once with supertac-sweep");
-  if (batch < kMicroBatches)
+  if (batch < 8)
     throw std::invalid_argument("several processes need a batch of at least 8, got " + std::to_string(batch) +
                                 "; give a larger --batch or start one process");
+  const std::size_t micro_batches = micro_batches_of(batch);
+  if (std::has_single_bit(static_cast<unsigned>(ranks)) && static_cast<std::size_t>(ranks) <= micro_batches)
+    return;
+  throw std::invalid_argument(
+      std::to_string(ranks) + " processes cannot share the " + std::to_string(micro_batches) +
+      " micro-batches of a batch of " + std::to_string(batch) + " evenly; start 1, 2, 4" +
+      (micro_batches > 8 ? ", 8 or 16" : " or 8") + ", or train several models at once with supertac-sweep");
 }
 
 std::optional<Disagreement> find_disagreement(Ranks& ranks, const std::map<std::string, std::string>& mine) {

@@ -1,8 +1,9 @@
 // Processes that train one model together. Each holds the whole model; rank r of R sums the gradients of its
-// 8/R neighbouring micro-batches, then R ranks add theirs pairwise. IEEE addition commutes, so both partners
+// neighbouring micro-batches, then R ranks add theirs pairwise. IEEE addition commutes, so both partners
 // of a pair get the same bits, those of a single process (models/training/trainer.h).
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <map>
 #include <optional>
@@ -45,8 +46,15 @@ class Ranks {
 /// A process that is alone.
 Ranks& one_process();
 
-/// Throws std::invalid_argument, with advice, unless ranks is 1, 2, 4 or 8, or when several share a batch
-/// below 8.
+inline constexpr std::size_t kMostMicroBatches = 16;
+/// How many micro-batches a batch is cut into: 16 where each then has eight samples or more, else 8, or one a
+/// sample. With four samples each, a step of preset `paper` on one thread would take 4 % longer, as the
+/// weights of linear layers are fetched for every micro-batch (bench/results/speed.md).
+constexpr std::size_t micro_batches_of(std::size_t batch) {
+  return batch >= 8 * kMostMicroBatches ? kMostMicroBatches : std::min<std::size_t>(batch, 8);
+}
+/// Throws std::invalid_argument, with advice, unless ranks is a power of two, at most
+/// micro_batches_of(batch), or when several share a batch below 8.
 void check_micro_batches(int ranks, std::size_t batch);
 
 /// The first entry for which a rank has another value, `its`, than most, `usual` (at a tie: than rank 0).

@@ -39,7 +39,7 @@ Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, Obj
   indices_.resize(batching_.batch_size());
   check_micro_batches(ranks.size(), indices_.size());
   const Dim n = static_cast<Dim>(indices_.size()),
-            micro_batches = std::min(static_cast<Dim>(kMostMicroBatches), n);
+            micro_batches = static_cast<Dim>(micro_batches_of(indices_.size()));
   const Dim first = micro_batches * ranks.rank() / ranks.size();
   for (Dim i = first; i < first + micro_batches / ranks.size(); ++i)
     micro_batches_.emplace_back(objective_, i * n / micro_batches,
@@ -140,7 +140,7 @@ StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMi
     throw std::invalid_argument("train_step: all " + std::to_string(total_steps()) + " steps are done");
   announce_next();
   batch_of(step(), indices_);
-  forms_->forget();  // Adam has written the weights since, or restore()
+  forms_->renew();  // Adam has written the weights since, or restore()
 #pragma omp parallel for schedule(static, 1)
   for (std::size_t i = 0; i < micro_batches_.size(); ++i) {
     try {

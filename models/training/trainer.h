@@ -5,11 +5,11 @@
 //
 // Every random choice is a function of (seed, step), so that a restored trainer continues to the same bits.
 //
-// A batch is cut into micro-batches, at most eight, whatever the number of threads. Each micro-batch runs the
-// whole forward and backward pass on its share, on one thread, with gradients of its own; these are added as
-// a balanced binary tree. So threads meet once per step, and which of them ran a micro-batch changes no bit.
-// Several processes share the micro-batches (models/training/ranks.h), each a subtree, and go on to the same
-// bits as one.
+// A batch is cut into micro-batches, at most sixteen, whatever the number of threads. Each micro-batch runs
+// the whole forward and backward pass on its share, on one thread, with gradients of its own; these are added
+// as a balanced binary tree. So threads meet once per step, and which of them ran a micro-batch changes no
+// bit. Several processes share the micro-batches (models/training/ranks.h), each a subtree, and go on to the
+// same bits as one.
 #pragma once
 
 #include <array>

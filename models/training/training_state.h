@@ -31,8 +31,6 @@ struct TrainingPace {
   void check() const;
 };
 
-inline constexpr std::size_t kMostMicroBatches = 8;  ///< that a batch is cut into (models/training/trainer.h)
-
 /// A value was not finite: step, where, and what to do are in what().
 class TrainingStopped : public std::runtime_error {
  public:

@@ -20,19 +20,10 @@ ConvTask task_of(const ConvSizes& s) { return {&geometry_of(s.conv), s.images, s
 
 }  // namespace
 
-// In strips of a cache line's width.
 Tensor transposed_weights(const real* weights, Dim taps, Dim cin, Dim cout) {
-  constexpr Dim kStrip = 16;
-  return weight_form(weights, WeightForm::transposed, {taps, cout, cin}, [&](real* to) {
-    const real* w = weights;
-    for (Dim t = 0; t < taps; ++t, w += cin * cout, to += cin * cout) {
-      for (Dim first = 0; first < cout; first += kStrip) {
-        const Dim last = std::min(cout, first + kStrip);
-        for (Dim i = 0; i < cin; ++i) {
-          for (Dim o = first; o < last; ++o) to[o * cin + i] = w[i * cout + o];
-        }
-      }
-    }
+  return weight_form(weights, WeightForm::transposed, {taps, cout, cin}, [=](real* to) {
+    for (Dim t = 0, at = 0; t < taps; ++t, at += cin * cout)
+      isa_kernels().transpose(cin, cout, weights + at, cout, to + at, cin);
   });
 }
 

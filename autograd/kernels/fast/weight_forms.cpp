@@ -12,9 +12,13 @@ WeightForms::WeightForms(const std::vector<Tensor>& weights) : weights_(weights)
     for (auto& slot : slots_[tensor.data()]) slot = std::make_unique<Slot>();
 }
 
-void WeightForms::forget() {
+void WeightForms::renew() {
+  std::vector<Slot*> asked_for;
   for (auto& [weights, slots] : slots_)
-    for (const auto& slot : slots) slot->made = false;
+    for (const auto& slot : slots)
+      if (slot->make) asked_for.push_back(slot.get());
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t i = 0; i < asked_for.size(); ++i) asked_for[i]->make(asked_for[i]->values.data());
 }
 
 WeightForms::Slot* WeightForms::slot_of(const real* weights, WeightForm form) {

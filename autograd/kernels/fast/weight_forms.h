@@ -2,10 +2,13 @@
 // Winograd's filters G g G^T, and those of the turned kernels, for the gradient of x.
 //
 // A kernel makes them anew in every call, as it cannot know whether the weights have changed. In a training
-// step they are constant while its micro-batches run, so each form need be made only once for all of them.
+// step they are constant while its micro-batches run, so each form need be made only once for all of them, by
+// whichever thread comes first; in later steps by all threads, before the micro-batches, as else each thread
+// would wait for the one that makes the next form.
 #pragma once
 
 #include <array>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <unordered_map>
@@ -23,13 +26,14 @@ class WeightForms {
  public:
   /// For these weights, whose buffers it keeps alive.
   explicit WeightForms(const std::vector<Tensor>& weights);
-  /// To be called after the weights were written and before they are used. Not while a Use lives.
-  void forget();
+  /// To be called after the weights were written and before they are used: makes the forms anew that were
+  /// asked for so far. Not while a Use lives.
+  void renew();
 
   struct Slot {
     std::mutex making;
-    bool made = false;
-    Tensor values;
+    Tensor values;  // once asked for
+    std::function<void(real*)> make;
   };
   /// Null for other weights than these.
   Slot* slot_of(const real* weights, WeightForm form);
@@ -50,7 +54,8 @@ class WeightForms {
   std::unordered_map<const real*, std::array<std::unique_ptr<Slot>, kWeightForms>> slots_;
 };
 
-/// The form of these weights; make(real* to) writes it unless it is in use and made already.
+/// The form of these weights; make(real* to) writes it unless it is in use and made already. What `make`
+/// refers to must live as long as the weights.
 template <class Make>
 Tensor weight_form(const real* weights, WeightForm form, const Shape& shape, Make make) {
   WeightForms* forms = WeightForms::in_use();
@@ -61,9 +66,11 @@ Tensor weight_form(const real* weights, WeightForm form, const Shape& shape, Mak
     return values;
   }
   const std::lock_guard lock(slot->making);
-  if (!slot->values.defined()) slot->values = Tensor(shape);
-  if (!slot->made) make(slot->values.data());
-  slot->made = true;
+  if (!slot->values.defined()) {
+    slot->values = Tensor(shape);
+    slot->make = make;
+    make(slot->values.data());
+  }
   return slot->values;
 }
 

@@ -23,12 +23,8 @@ Dim place_of(const ConvTask& s) { return s.cin * s.cout + kPadding; }
 Tensor turned(Dim cin, Dim cout, const real* w) {
   constexpr Dim kTaps = 9;
   Tensor out(Shape{kTaps, cout, cin});
-  for (Dim t = 0; t < kTaps; ++t, w += cin * cout) {
-    real* to = out.data() + (kTaps - 1 - t) * cin * cout;
-    for (Dim o = 0; o < cout; ++o) {
-      for (Dim i = 0; i < cin; ++i) *to++ = w[i * cout + o];
-    }
-  }
+  for (Dim t = 0; t < kTaps; ++t, w += cin * cout)
+    isa_kernels().transpose(cin, cout, w, cout, out.data() + (kTaps - 1 - t) * cin * cout, cin);
   return out;
 }
 
@@ -64,14 +60,14 @@ bool is_winograd(const ConvTask& s) {
 
 void winograd_conv(const ConvTask& s, const real* x, const real* w, const real* bias, real negative_slope,
                    real* y) {
-  const Tensor u = weight_form(w, WeightForm::filters, {kPlaces, place_of(s)}, [&](real* to) {
+  const Tensor u = weight_form(w, WeightForm::filters, {kPlaces, place_of(s)}, [=](real* to) {
     isa_kernels().filters({s.cin * s.cout, place_of(s)}, w, to);
   });
   filter(s, x, u, bias, Into::overwrite, negative_slope, y);
 }
 
 void winograd_grad_x(const ConvTask& s, const real* gy, const real* w, Into into, real* gx) {
-  const Tensor u = weight_form(w, WeightForm::turned_filters, {kPlaces, place_of(s)}, [&](real* to) {
+  const Tensor u = weight_form(w, WeightForm::turned_filters, {kPlaces, place_of(s)}, [=](real* to) {
     isa_kernels().filters({s.cin * s.cout, place_of(s)}, turned(s.cin, s.cout, w).data(), to);
   });
   filter({s.geometry, s.images, s.cout, s.cin}, gy, u, nullptr, into, 1, gx);

@@ -35,21 +35,33 @@ TEST(Ranks, AddUpAsABalancedTree) {
   });
 }
 
-TEST(Ranks, OnlyNumbersThatShareEightLanesAreTaken) {
+TEST(Ranks, OnlyNumbersThatShareTheMicroBatchesAreTaken) {
   for (const int ranks : {1, 2, 4, 8}) EXPECT_NO_THROW(check_micro_batches(ranks, 8));
   EXPECT_NO_THROW(check_micro_batches(1, 3));
-  for (const int ranks : {3, 5, 6, 7, 9, 16}) {
+  EXPECT_NO_THROW(check_micro_batches(16, 128));
+  const auto refusal = [](int ranks, std::size_t batch) -> std::string {
     try {
-      check_micro_batches(ranks, 64);
-      FAIL() << ranks;
+      check_micro_batches(ranks, batch);
+      return {};
     } catch (const std::invalid_argument& error) {
-      EXPECT_EQ(error.what(),
-                std::to_string(ranks) +
-                    " processes cannot share the eight micro-batches of a batch evenly; start 1, 2, 4 or "
-                    "8, or train several models at once with supertac-sweep");
+      return error.what();
     }
-  }
-  EXPECT_THROW(check_micro_batches(2, 7), std::invalid_argument);
+  };
+  for (const int ranks : {3, 5, 6, 7, 9, 16})
+    EXPECT_EQ(refusal(ranks, 64),
+              std::to_string(ranks) +
+                  " processes cannot share the 8 micro-batches of a batch of 64 evenly; "
+                  "start 1, 2, 4 or 8, or train several models at once with supertac-sweep");
+  EXPECT_TRUE(refusal(32, 128).starts_with(
+      "32 processes cannot share the 16 micro-batches of a batch of 128 evenly; start 1, 2, 4, 8 or 16,"));
+  EXPECT_TRUE(refusal(2, 7).starts_with("several processes need a batch of at least 8, got 7"));
+}
+
+TEST(MicroBatches, HaveEightSamplesWhereThereAreSixteenOfThem) {
+  const std::pair<std::size_t, std::size_t> expected[] = {{1, 1},   {7, 7},    {8, 8},
+                                                          {127, 8}, {128, 16}, {4096, 16}};
+  for (const auto& [batch, micro_batches] : expected)
+    EXPECT_EQ(micro_batches_of(batch), micro_batches) << batch;
 }
 
 TEST(Ranks, TheMajoritySaysWhoDisagrees) {
@@ -113,6 +125,13 @@ TEST_F(RanksTrain, TheSameBytesForAnyNumberOfThem) {
   std::string state;
   for (const int size : {4, 2, 1, 8}) state = train(size, state, 4);
   EXPECT_TRUE(alone == file_text(train(2, state, 1000))) << "stopped and resumed with other numbers";
+}
+
+TEST_F(RanksTrain, SixteenShareABatchOf128) {
+  settings_.batch = 128;
+  const std::string alone = file_text(train(1, "", 2));
+  EXPECT_TRUE(alone == file_text(train(16, "", 2)));
+  EXPECT_TRUE(alone == file_text(train(2, "", 2)));
 }
 
 TEST_F(RanksTrain, StopTogetherWhenOneWishesTo) {

@@ -61,10 +61,10 @@ struct Vec {
 
 }  // namespace
 
-const IsaKernels kAvx2Kernels{"avx2",  Vectors::avx2, gather,  gather_rows,     outer,
-                              filters, filter_grads,  patches, squares,         square_grads,
-                              product, map_patches,   places,  filtered_places, map_squares,
-                              gate,    mean,          planes,  plane_conv};
+const IsaKernels kAvx2Kernels{"avx2",      Vectors::avx2, gather,      gather_rows, outer,
+                              filters,     filter_grads,  patches,     squares,     square_grads,
+                              transpose,   product,       map_patches, places,      filtered_places,
+                              map_squares, gate,          mean,        planes,      plane_conv};
 
 }  // namespace supertac::kernels
 

@@ -149,24 +149,25 @@ void mean(const MapJob& job, const real* x, real* to) {
       });
 }
 
-// Planes of one image [height][width][channels]: x and to point at the map's first pixel.
-void planes(const PlaneJob& job, Dim x_line, const real* x, real* to) {
-  const Dim plane = (job.height + 2) * job.line;
-  for (Dim row = 0; row < job.height; ++row, x += x_line, to += job.line) {
-    for (Dim column = 0; column < job.width; column += Vec::kLanes) {
-      for (Dim c = 0; c < job.cin; c += Vec::kLanes) {
-        if (column + Vec::kLanes <= job.width && c + Vec::kLanes <= job.cin) {
-          Vec::transpose(x + column * job.cin + c, job.cin, to + c * plane + column, plane);
-          continue;
-        }
-        for (Dim k = c; k < c + Vec::kLanes && k < job.cin; ++k) {
-          for (Dim p = column; p < column + Vec::kLanes && p < job.width; ++p) {
-            to[k * plane + p] = x[p * job.cin + k];
-          }
-        }
+// to[j * to_step + i] = from[i * from_step + j] for i < rows, j < columns
+void transpose(Dim rows, Dim columns, const real* from, Dim from_step, real* to, Dim to_step) {
+  for (Dim i = 0; i < rows; i += Vec::kLanes) {
+    for (Dim j = 0; j < columns; j += Vec::kLanes) {
+      if (i + Vec::kLanes <= rows && j + Vec::kLanes <= columns) {
+        Vec::transpose(from + i * from_step + j, from_step, to + j * to_step + i, to_step);
+        continue;
+      }
+      for (Dim c = j; c < j + Vec::kLanes && c < columns; ++c) {
+        for (Dim r = i; r < i + Vec::kLanes && r < rows; ++r) to[c * to_step + r] = from[r * from_step + c];
       }
     }
   }
+}
+
+// Planes of one image [height][width][channels]: x and to point at the map's first pixel.
+void planes(const PlaneJob& job, Dim x_line, const real* x, real* to) {
+  for (Dim row = 0; row < job.height; ++row, x += x_line, to += job.line)
+    transpose(job.width, job.cin, x, job.cin, to, (job.height + 2) * job.line);
 }
 
 // R rows of a vector of pixels; each pixel's sum runs over channels, then columns, then rows of the kernel.

@@ -76,6 +76,9 @@ struct IsaKernels {
   /// places = A g A^T of the squares g of gy
   void (*square_grads)(const TileJob& job, const real* gy, real* places) = nullptr;
 
+  /// to[j * to_step + i] = from[i * from_step + j] for i < rows, j < columns
+  void (*transpose)(Dim rows, Dim columns, const real* from, Dim from_step, real* to, Dim to_step) = nullptr;
+
   // Of prepared networks, see inference.h. `x` of patches and plane_conv begins with the margin.
   void (*product)(const ProductJob& job, const real* x, real* y) = nullptr;
   void (*map_patches)(const MapTileJob& job, const real* x, real* places) = nullptr;

@@ -55,10 +55,9 @@ struct Vec {
 }  // namespace
 
 const IsaKernels kNeonKernels{
-    "neon",       Vectors::baseline, gather,      gather_rows,  outer,   filters,
-    filter_grads, patches,           squares,     square_grads, product, map_patches,
-    places,       filtered_places,   map_squares, gate,         mean,    planes,
-    plane_conv};
+    "neon",          Vectors::baseline, gather,       gather_rows, outer,   filters,     filter_grads,
+    patches,         squares,           square_grads, transpose,   product, map_patches, places,
+    filtered_places, map_squares,       gate,         mean,        planes,  plane_conv};
 
 }  // namespace supertac::kernels
 

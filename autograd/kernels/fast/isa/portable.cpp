@@ -42,16 +42,14 @@ struct Vec {
 
 #ifdef SUPERTAC_SCALAR_FMA
 const IsaKernels kPortableFmaKernels{
-    "portable",   Vectors::baseline, gather,      gather_rows,  outer,   filters,
-    filter_grads, patches,           squares,     square_grads, product, map_patches,
-    places,       filtered_places,   map_squares, gate,         mean,    planes,
-    plane_conv};
+    "portable",      Vectors::baseline, gather,       gather_rows, outer,   filters,     filter_grads,
+    patches,         squares,           square_grads, transpose,   product, map_patches, places,
+    filtered_places, map_squares,       gate,         mean,        planes,  plane_conv};
 #else
 const IsaKernels kPortableKernels{
-    "portable",   Vectors::baseline, gather,      gather_rows,  outer,   filters,
-    filter_grads, patches,           squares,     square_grads, product, map_patches,
-    places,       filtered_places,   map_squares, gate,         mean,    planes,
-    plane_conv};
+    "portable",      Vectors::baseline, gather,       gather_rows, outer,   filters,     filter_grads,
+    patches,         squares,           square_grads, transpose,   product, map_patches, places,
+    filtered_places, map_squares,       gate,         mean,        planes,  plane_conv};
 #endif
 
 }  // namespace supertac::kernels

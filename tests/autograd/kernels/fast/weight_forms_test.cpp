@@ -60,7 +60,7 @@ TEST(WeightForms, KeptOnesGiveTheSameBitsUntilTheWeightsChange) {
   EXPECT_FALSE(same(after, before));
   const WeightForms::Use use(forms);
   EXPECT_FALSE(same(results(conv_w, linear_w), after)) << "nothing was kept";
-  forms.forget();
+  forms.renew();
   EXPECT_TRUE(same(results(conv_w, linear_w), after));
 }
 
