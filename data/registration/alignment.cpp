@@ -117,6 +117,7 @@ void take_medians_off(std::vector<Aligned>& passes) {
 void align(std::vector<Aligned>& passes) {
   for (int round = 0; round < kRounds; ++round) {
     const std::vector<Profile> profiles = profiles_of(passes);
+#pragma omp parallel for schedule(dynamic)
     for (std::size_t i = 0; i < passes.size(); ++i) {
       Aligned& pass = passes[i];
       const Loss loss = pass.found.loss;

@@ -1,10 +1,14 @@
 #include "data/registration/text_folder.h"
 
+#include <omp.h>
+
 #include <algorithm>
+#include <exception>
 #include <filesystem>
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -108,6 +112,26 @@ void read_and_register(ImportedPass& pass, double speed_mm_s) {
   pass.recording = std::move(recording);
 }
 
+/// Passes that are read and registered at a time, by all threads; an error is that of its pass.
+struct ReadPass {
+  ImportedPass pass;
+  std::exception_ptr error;
+};
+
+std::vector<ReadPass> read_and_register(std::span<const ImportedPass> found, double speed_mm_s) {
+  std::vector<ReadPass> passes;
+  for (const ImportedPass& pass : found) passes.push_back({pass, {}});
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    try {
+      read_and_register(passes[i].pass, speed_mm_s);
+    } catch (...) {  // an exception must not leave a thread
+      passes[i].error = std::current_exception();
+    }
+  }
+  return passes;
+}
+
 void align(std::vector<ImportedPass>& plate) {
   std::vector<RegisteredPass> passes;
   for (ImportedPass& pass : plate) passes.push_back({&pass.recording, &pass.registration});
@@ -124,20 +148,25 @@ void import_text_folder(const std::string& root, const FolderImport& settings,
   const auto progress = [&](std::size_t done) {
     if (settings.progress) settings.progress(done, found.size());
   };
+  const auto at_a_time = static_cast<std::size_t>(omp_get_max_threads());
   bool any = false;
   std::vector<ImportedPass> plate;
-  for (std::size_t i = 0; i < found.size(); ++i) {
+  for (std::size_t i = 0; i < found.size();) {
     progress(i);
-    take_or_leave(settings, [&] {
-      ImportedPass pass = found[i];
-      read_and_register(pass, settings.speed_mm_s);
-      plate.push_back(std::move(pass));
-    });
-    const bool last = i + 1 == found.size() || found[i + 1].recording.plate != found[i].recording.plate;
+    const std::string& name = found[i].recording.plate;
+    std::size_t end = i;
+    while (end < found.size() && end < i + at_a_time && found[end].recording.plate == name) ++end;
+    for (ReadPass& read : read_and_register(std::span(found).subspan(i, end - i), settings.speed_mm_s))
+      take_or_leave(settings, [&] {
+        if (read.error) std::rethrow_exception(read.error);
+        plate.push_back(std::move(read.pass));
+      });
+    i = end;
+    const bool last = end == found.size() || found[end].recording.plate != name;
     if (!last || plate.empty()) continue;
     any = true;
-    progress(i + 1);
-    if (found[i].plate.uniform_in_x() && !found[i].unknown) align(plate);
+    progress(end);
+    if (plate.front().plate.uniform_in_x() && !plate.front().unknown) align(plate);
     for (ImportedPass& pass : plate)
       if (!pass.unknown) apply(pass.registration, pass.recording, rig::pass_x_mm(pass.recording.pass));
     take(std::exchange(plate, {}));
