@@ -173,7 +173,8 @@ def silence():
 # How fast -------------------------------------------------------------------------------------------------------------
 
 TASKS = {"infer": "batch {}", "int8": "int8, batch {}", "train": "training step, {} threads"}
-PACKAGES = {"pytorch": "torch", "torch.compile": "torch", "onnx": "onnxruntime", "openvino": "openvino", "mnn": "mnn"}
+PACKAGES = {"pytorch": "torch", "torch.compile": "torch", "onnx": "onnxruntime", "openvino": "openvino", "mnn": "mnn",
+            "litert": "ai_edge_litert", "executorch": "executorch", "ncnn": "ncnn"}
 
 
 def duration(us):
@@ -230,6 +231,25 @@ def cold_start():
     return table(["preset", "", "median ms", "slowest ms", "memory MB"],
                  [[f"`{r['model']}`", r["engine"], f"{float(r['median_ms']):.1f}", f"{float(r['worst_ms']):.1f}", r["memory_mb"]]
                   for r in rows("speed/cold_start.csv")])
+
+
+def threads():
+    """Times one thread, and what the machine gives to trainings that share nothing."""
+    found = rows("speed/threads.csv")
+    of = lambda r, name: f"{float(r[name]):.1f} ({float(r[name + '_low']):.1f} to {float(r[name + '_high']):.1f})"
+    return table(["batch", "threads", "a step", "times one thread", "as many trainings apart"],
+                 [[r["batch"], r["threads"], f"{float(r['step_ms']):.1f} ms", of(r, "together"), of(r, "apart")]
+                  for r in found if r["threads"] != "1"])
+
+
+def whole_job():
+    found, lines = rows("speed/whole_job.csv"), []
+    for job in dict.fromkeys(r["job"] for r in found):
+        of = chosen(found, job=job)
+        whole = sum(float(r["seconds"]) for r in of)
+        lines += [[job if r is of[0] else "", r["phase"], f"{float(r['seconds']):.1f} s", f"{100 * float(r['seconds']) / whole:.0f} %"]
+                  for r in of]
+    return table(["job", "", "seconds", "share"], lines)
 
 
 def precision():

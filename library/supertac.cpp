@@ -16,6 +16,7 @@
 
 #include "data/windows/live_window.h"
 #include "data/windows/transforms/normalise_window.h"
+#include "io/numbers/numbers.h"
 #include "models/files/model_file.h"
 #include "models/inference/prepared/prepared.h"
 #include "models/training/train.h"
@@ -65,6 +66,12 @@ Result guarded(Result failed, Work work) noexcept {
 
 void expect(bool holds, const char* what) {
   if (!holds) throw std::invalid_argument(what);
+}
+
+void expect_within(const char* what, double found, double least, double most) {
+  if (found >= least && found <= most) return;
+  throw std::invalid_argument(std::string(what) + " must be " + format(least) + " to " + format(most) +
+                              ", got " + format(found));
 }
 
 supertac_model* opened(const std::string& path, int precision) {
@@ -181,7 +188,7 @@ int supertac_draw(const supertac_model* model, std::size_t count, const float* w
     expect(model != nullptr, "supertac_draw: model is NULL");
     expect(count == 0 || (windows != nullptr && pictures != nullptr),
            "supertac_draw: windows or pictures is NULL");
-    expect(threads >= 1 && threads <= 1024, "supertac_draw: threads must be 1 to 1024");
+    expect_within("supertac_draw: threads", threads, 1, 1024);
     const SuperTac& network = *model->file.model;
     const auto window = static_cast<std::size_t>(network.input_shape(1).elements());
     const auto picture = static_cast<std::size_t>(network.picture_shape(1).elements());
@@ -212,8 +219,8 @@ int supertac_draw(const supertac_model* model, std::size_t count, const float* w
 supertac_live* supertac_live_new(const supertac_model* model, double frame_hz, double filter_s) {
   return guarded<supertac_live*>(nullptr, [&] {
     expect(model != nullptr, "supertac_live_new: model is NULL");
-    expect(frame_hz >= 1 && frame_hz <= 100'000, "supertac_live_new: frame_hz must be 1 to 100000");
-    expect(filter_s >= 0 && filter_s <= 10, "supertac_live_new: filter_s must be 0 to 10");
+    expect_within("supertac_live_new: frame_hz", frame_hz, 1, 100'000);
+    expect_within("supertac_live_new: filter_s", filter_s, 0, 10);
     const InputSettings& input = model->file.input;
     const std::optional<double> left_s = input.filter_left(filter_s);
     expect(left_s.has_value(),
