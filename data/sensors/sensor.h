@@ -68,13 +68,14 @@ struct Sensor {
   std::vector<int> order =
       {};                      ///< taxel k is the order[k]-th of a frame, -1: a place without taxel; empty: k
   std::vector<int> dead = {};  ///< taxels that say nothing
+  std::vector<float> rest = {};  ///< of each signal where nothing touches; empty: scale.rest of all
 
   /// Values in a frame: fewer than array.signals() where the array has places without taxel.
   std::size_t values() const;
   /// dead, and the places without taxel.
   std::vector<int> silent() const;
-  /// From the values of a frame to [rows][columns][channels], then fill_silent(). `sent` has values()
-  /// numbers, `signals` array.signals().
+  /// From the values of a frame to [rows][columns][channels], each moved so that it rests at scale.rest, then
+  /// fill_silent(). `sent` has values() numbers, `signals` array.signals().
   void arrange(std::span<const float> sent, std::span<float> signals) const;
   /// A silent taxel gets the mean of the others around it, of all when there is none.
   void fill_silent(std::span<float> signals) const;

@@ -60,6 +60,16 @@ class Keys {
     const Json* value = find(name);
     return value == nullptr ? std::vector<int>() : integers(name, *value);
   }
+  std::vector<float> numbers(const char* name) {
+    const Json* value = find(name);
+    if (value == nullptr) return {};
+    std::vector<float> list;
+    for (const Json& element : value->is_array() ? *value : Json::array({nullptr})) {
+      if (!element.is_number()) wrong(name, "a list of numbers", *value);
+      list.push_back(element.get<float>());
+    }
+    return list;
+  }
   /// One of the names of a table; its value.
   template <class Table>
   auto one_of(const char* name, const Table& table, const std::string& fallback) {
@@ -270,6 +280,7 @@ Sensor sensor_of_json(const std::string& text, const std::string& where) {
     sensor.frame = format_of(*frame, where);
     sensor.order = take_order(keys, sensor.array);
     sensor.dead = keys.integers("dead");
+    sensor.rest = keys.numbers("rest");
     keys.no_others();
     sensor.check();
     return sensor;
@@ -308,6 +319,7 @@ Json json_of(const Sensor& sensor) {
   json["frame"] = json_of(sensor.frame);
   if (!sensor.order.empty()) json["order"] = sensor.order;
   if (!sensor.dead.empty()) json["dead"] = sensor.dead;
+  for (const float rest : sensor.rest) json["rest"].push_back(rounded(double{rest}));
   return json;
 }
 

@@ -22,6 +22,7 @@ constexpr double kClock = 0.25;  // how far the host's clock and the sensor's ma
 constexpr std::size_t kMostRestarts = 2, kStepsOfRestart = 20;  // noise falls far more often
 constexpr double kRestarted = 0.3;  // of the time at least a clock runs that starts anew meanwhile
 constexpr double kPressed = 12;     // times the noise: more than that is a finger
+constexpr double kUneven = 0.02;    // of the range: what signals may rest apart
 constexpr double kAtOnceS = 0.2, kAssumedHz = 100;
 constexpr std::size_t kFewLines = 3;  // of which nothing can be said
 
@@ -199,7 +200,7 @@ Frames frames_of(const Sensor& sensor, std::span<const Heard> heard) {
 
 // Polarity, range, noise and what never moves; into the draft where they are known.
 void look_at_signals(Sensor& draft, const Frames& frames, std::vector<std::string>& says) {
-  std::vector<double> rests, noises;
+  std::vector<double> rests, moving, noises;
   std::vector<int> still;
   double up = 0, down = 0;
   bool whole = true;
@@ -213,12 +214,14 @@ void look_at_signals(Sensor& draft, const Frames& frames, std::vector<std::strin
     const auto [low, high] = std::ranges::minmax(values);
     if (low == high && k % channels == 0) still.push_back(static_cast<int>(k / channels));
     const double rest = double{median(values)};
+    if (low < high) moving.push_back(rest);
     rests.push_back(rest), noises.push_back(steps.empty() ? 0 : quantile(steps, 0.75));
     up = std::max(up, double{high} - rest), down = std::max(down, rest - double{low});
   }
   std::vector<double> sorted = rests;
   const double rest = median(sorted), noise = std::max(median(noises), whole ? 1.0 : 1e-6 * std::abs(rest));
   const auto [lowest, highest] = std::ranges::minmax(rests);
+  const double uneven = moving.empty() ? 0 : std::ranges::max(moving) - std::ranges::min(moving);
   draft.scale.unit = whole ? "counts" : "unknown unit";
   says.push_back("at rest " + format(lowest) + " to " + format(highest) + ", median " + format(rest) +
                  ", noise " + format(noise, 3) + " from frame to frame" +
@@ -226,6 +229,11 @@ void look_at_signals(Sensor& draft, const Frames& frames, std::vector<std::strin
   const bool pressed = std::max(up, down) > kPressed * noise, rises = up >= down || !pressed;
   const double most = pressed ? 1.1 * std::max(up, down) : std::max(20 * noise, 0.1 * std::abs(rest));
   draft.scale.rest = rest, draft.scale.span = rises ? -most : most;
+  if (pressed && uneven > kUneven * most) {
+    draft.rest.assign(rests.begin(), rests.end());
+    says.push_back("signals rest up to " + format(uneven, 3) +
+                   " apart: \"rest\" moves each to the median; probe again when they have drifted");
+  }
   says.push_back(pressed
                      ? std::string("pressing ") + (rises ? "raises" : "lowers") + " the signals, by up to " +
                            format(std::max(up, down), 3)

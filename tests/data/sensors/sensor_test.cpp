@@ -77,6 +77,7 @@ TEST(Sensor, WritesWhatItReads) {
   Sensor sensor = sensor_of_json(kMat, "mat.json");
   for (int kind = 1; kind < 4; ++kind) {
     sensor.frame = {.kind = static_cast<FrameKind>(kind)};
+    sensor.rest.assign(12, 0.1F * static_cast<float>(kind));
     if (kind == 2) sensor.frame.values = "taxels", sensor.frame.time = FrameTime{.key = "t", .unit_s = 1e-6};
     if (kind == 3)
       sensor.frame.header = "\xAA\x55", sensor.frame.trailer = "\n", sensor.frame.type = "i16",
@@ -105,7 +106,7 @@ TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
   EXPECT_EQ(refusal("rate_hz", 0.5), "mat.json: \"rate_hz\" must be 1 to 100000, found 0.5");
   EXPECT_EQ(refusal("pich_mm", 5),
             "mat.json: knows no key 'pich_mm'; it may have name, rows, columns, channels, pitch_mm, unit, "
-            "pressed, range, rate_hz, port, frame, order, dead");
+            "pressed, range, rate_hz, port, frame, order, dead, rest");
   EXPECT_EQ(refusal("frame", nullptr),
             "mat.json: has no \"frame\", such as {\"kind\": \"text\"}; supertac-stream --probe finds it");
   EXPECT_EQ(refusal("frame.kind", "csv"),
@@ -128,6 +129,10 @@ TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
       "mat.json: \"order\" must be row-major, column-major, or for each of the 12 taxels its place in the "
       "frame, from 0 and each once, -1 where there is none, found 3 places, 3 different");
   EXPECT_EQ(refusal("dead", Json{12}), "mat.json: \"dead\" must be taxels 0 to 11, found 12");
+  EXPECT_EQ(refusal("rest", Json{40, 41}),
+            "mat.json: \"rest\" must be a number for each of the 12 signals, found 2");
+  EXPECT_EQ(refusal("rest", Json{"40"}), "mat.json: \"rest\" must be a list of numbers, found [\"40\"]");
+  EXPECT_EQ(refusal("rest", 40), "mat.json: \"rest\" must be a list of numbers, found 40");
   EXPECT_EQ(refusal("name", "a\nb"), "mat.json: \"name\" must be 1 to 200 printable characters, found 'a?b'");
 }
 
@@ -146,6 +151,20 @@ TEST(Sensor, ArrangesTheTaxelsAndFillsTheSilentFromTheirNeighbours) {
   EXPECT_EQ(signals[2], 3);               // row 0, column 1
   EXPECT_EQ(signals[3], 103);             //
   EXPECT_FLOAT_EQ(signals[0], 4.0F / 3);  // the mean of 0, 1 and 3 around it
+}
+
+TEST(Sensor, TaxelsThatRestAtOtherValuesAreMadeAlike) {
+  Sensor mat = sensor_of_json(kMat, "mat.json"), offset = mat;
+  for (int k = 0; k < 12; ++k) offset.rest.push_back(static_cast<float>(30 + 2 * k));
+  std::vector<float> frame, moved, signals(12), of_moved(12);
+  for (int k = 0; k < 12; ++k) frame.push_back(static_cast<float>(40 + 7 * k));
+  mat.arrange(frame, signals);
+  for (std::size_t k = 0; k < 12; ++k) {  // column-major
+    const std::size_t place = k % 3 * 4 + k / 3;
+    moved.push_back(frame[k] - 40 + offset.rest[place]);
+  }
+  offset.arrange(moved, of_moved);
+  EXPECT_EQ(of_moved, signals) << "the dead taxel as well, from its neighbours";
 }
 
 TEST(Sensor, MutatedFilesAreTakenOrRefusedInOneLine) {

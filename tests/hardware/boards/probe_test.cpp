@@ -22,8 +22,9 @@ std::vector<Heard> sent(const Sensor& sensor, double seconds, bool pressed = tru
     for (std::size_t i = 0; i < sensor.values(); ++i) {
       state = state * 6364136223846793005ULL + 1442695040888963407ULL;
       const double press = pressed && i == 3 && n % 40 > 30 ? 0.8 : 0;
-      values.push_back(std::round(sensor.scale.rest - sensor.scale.span * (0.05 + press) +
-                                  static_cast<double>(state >> 60)));
+      const double rest = sensor.rest.empty() ? sensor.scale.rest : double{sensor.rest[i]};
+      values.push_back(
+          std::round(rest - sensor.scale.span * (0.05 + press) + static_cast<double>(state >> 60)));
       if (i == 5) values.back() = 0;  // dead
     }
     heard.push_back({100 + n / sensor.rate_hz, sent_frame(sensor, values, 3 + n / sensor.rate_hz)});
@@ -166,6 +167,21 @@ TEST(Probe, SaysWhatItAssumes) {
   EXPECT_FALSE(other.draft);
   EXPECT_NE(all(other).find("frames of 12 values, expected the 25 of 5x5 taxels"), std::string::npos)
       << all(other);
+}
+
+TEST(Probe, WritesWhereEachTaxelRests) {
+  Sensor sensor = sensor_of(R"({"rows":3,"columns":4,"pressed":"higher","range":[100,900],"rate_hz":50,
+    "frame":{"kind":"text"}})");
+  const ProbeReport even = probe(sent(sensor, 3), "here", sensor.array);
+  ASSERT_TRUE(even.draft) << all(even);
+  EXPECT_TRUE(even.draft->rest.empty()) << all(even);
+  for (int k = 0; k < 12; ++k) sensor.rest.push_back(static_cast<float>(100 + 10 * k));
+  const ProbeReport report = probe(sent(sensor, 3), "here", sensor.array);
+  ASSERT_TRUE(report.draft) << all(report);
+  ASSERT_EQ(report.draft->rest.size(), 12U);
+  for (const std::size_t k : {0U, 1U, 4U, 6U, 11U})  // the fifth is dead; noise is 0 to 15
+    EXPECT_NEAR(report.draft->rest[k], sensor.rest[k] + 0.05F * 800, 16) << k;
+  EXPECT_NE(all(report).find("signals rest up to 1"), std::string::npos) << all(report);
 }
 
 TEST(Probe, OfAnythingEndsAndHasADraftThatReads) {
