@@ -238,7 +238,7 @@ def threads():
     found = rows("speed/threads.csv")
     of = lambda r, name: f"{float(r[name]):.1f} ({float(r[name + '_low']):.1f} to {float(r[name + '_high']):.1f})"
     return table(["batch", "threads", "a step", "times one thread", "as many trainings apart"],
-                 [[r["batch"], r["threads"], f"{float(r['step_ms']):.1f} ms", of(r, "together"), of(r, "apart")]
+                 [[r["batch"], r["threads"], f"{float(r['step_ms']):.1f} ms", of(r, "together"), f"{float(r['apart']):.1f}"]
                   for r in found if r["threads"] != "1"])
 
 
