@@ -5,7 +5,6 @@
 #include <filesystem>
 
 #include "apps/common/command_line/program.h"
-#include "apps/common/command_line/version.h"
 #include "apps/common/output/output_folder.h"
 #include "apps/common/output/provenance.h"
 #include "data/recordings/mcap_log.h"

@@ -5,7 +5,6 @@
 #include "apps/check/repetition.h"
 #include "apps/check/training.h"
 #include "apps/common/command_line/program.h"
-#include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
 #include "apps/train/run_folder.h"
 #include "io/files/file.h"

@@ -1,11 +1,9 @@
 #include "apps/check/training.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "apps/check/repetition.h"
 #include "apps/common/command_line/program.h"
-#include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
 #include "apps/train/run_folder.h"
 #include "io/numbers/hash.h"

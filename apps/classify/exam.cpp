@@ -5,7 +5,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "data/plates/truth.h"
 #include "data/windows/split.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/command_line/version.h"

@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-
-#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "data/sensors/taxel_array.h"
 #include "io/files/mcap_file.h"

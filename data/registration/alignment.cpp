@@ -1,6 +1,5 @@
 #include "data/registration/alignment.h"
 
-#include <algorithm>
 #include <stdexcept>
 #include <vector>
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "data/plates/plate.h"
 #include "data/recordings/recording.h"

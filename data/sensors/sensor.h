@@ -1,7 +1,6 @@
 // A sensor is a file: what its array is, what its numbers mean, and how its frames arrive.
 #pragma once
 
-#include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>

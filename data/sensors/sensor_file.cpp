@@ -1,7 +1,5 @@
 // A Sensor as JSON.
 #include <charconv>
-#include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "data/sensors/sensor.h"

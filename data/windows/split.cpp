@@ -10,7 +10,6 @@
 #include "data/plates/random_plate.h"
 #include "data/windows/batching.h"
 #include "io/numbers/hash.h"
-#include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {

@@ -6,7 +6,6 @@
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <numeric>
 
 #include "hardware/boards/sensor_decoder.h"
 #include "io/files/json.h"

@@ -7,7 +7,6 @@
 
 #include <condition_variable>
 #include <cstdint>
-#include <exception>
 #include <map>
 #include <mutex>
 #include <span>

@@ -1,7 +1,6 @@
 #include "hardware/printers/limits.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
 

@@ -1,7 +1,6 @@
 #include "hardware/virtual_rig/motion_queue.h"
 
-#include <algorithm>
-
+#include "hardware/printers/marlin_line.h"
 #include "hardware/printers/motion_model.h"
 
 namespace supertac {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <deque>
 
-#include "hardware/printers/marlin_line.h"
+#include "data/sensors/rig.h"
 
 namespace supertac {
 

@@ -4,9 +4,7 @@
 #pragma once
 
 #include <functional>
-#include <memory>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "hardware/virtual_rig/virtual_board.h"

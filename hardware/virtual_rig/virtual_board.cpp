@@ -1,7 +1,6 @@
 #include "hardware/virtual_rig/virtual_board.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace supertac {

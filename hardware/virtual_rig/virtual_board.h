@@ -5,12 +5,10 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <span>
-#include <string_view>
 #include <vector>
 
+#include "data/sensors/rig.h"
 #include "hardware/boards/board_frame.h"
-#include "hardware/printers/marlin_line.h"
 #include "hardware/virtual_rig/faults.h"
 
 namespace supertac {

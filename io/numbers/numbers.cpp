@@ -1,7 +1,6 @@
 #include "io/numbers/numbers.h"
 
 #include <charconv>
-#include <cmath>
 
 namespace supertac {
 namespace {

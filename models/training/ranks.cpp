@@ -1,6 +1,5 @@
 #include "models/training/ranks.h"
 
-#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <nlohmann/json.hpp>

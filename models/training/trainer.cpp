@@ -1,6 +1,5 @@
 #include "models/training/trainer.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 

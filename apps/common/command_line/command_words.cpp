@@ -1,6 +1,5 @@
 #include "apps/common/command_line/command_words.h"
 
-#include <algorithm>
 #include <stdexcept>
 
 namespace supertac {

@@ -2,7 +2,6 @@
 #include <cmath>
 #include <cstring>
 #include <map>
-#include <stdexcept>
 
 #include "data/recordings/imports/table_import.h"
 #include "io/files/file.h"

@@ -2,12 +2,8 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstring>
-#include <functional>
 #include <map>
-#include <numeric>
-#include <optional>
 #include <stdexcept>
 #include <string_view>
 

@@ -1,7 +1,6 @@
 #include "models/inference/prepared/integer_plan.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "autograd/kernels/fast/int8/numbers.h"

@@ -1,5 +1,4 @@
 // The steps of models/inference/prepared/planner.h that are products.
-#include <algorithm>
 
 #include "models/inference/prepared/planner.h"
 #include "models/inference/prepared/taps.h"
