@@ -37,7 +37,7 @@ nlohmann::ordered_json write_gcode(const Arguments& arguments, const Plate& plat
   plan.passes = static_cast<int>(arguments.integer("passes", 1, rig::kPasses));
   const std::string title = "SuperTac: " + std::to_string(plan.passes) + " passes over plate " +
                             plate.name() + " at " + format(plan.speed) + " mm/s";
-  write_file(arguments.output("gcode"), palpation_program(plan, rig::kMounted, Limits(), title));
+  write_file(arguments.output("gcode"), palpation_program(plan, rig::kMounted, title));
   arguments.print(path + ": " + std::to_string(plan.passes) + " passes at " + format(plan.speed) +
                   " mm/s, from and back to " + describe(rig::kMounted));
   return {{"file", path}, {"passes", plan.passes}, {"speed_mm_s", plan.speed}};

@@ -78,25 +78,16 @@ ClockFit ClockEstimator::fit() const {
   std::vector<bool> used(points_.size(), true);
   Line line = least_squares(points_, used);
   std::vector<double> deviation(points_.size());
-  const auto off = [&](std::size_t i) {
-    return points_[i].arrival - line.intercept - line.slope * points_[i].index;
-  };
   for (int round = 0; round < 3; ++round) {
-    for (std::size_t i = 0; i < points_.size(); ++i) deviation[i] = std::abs(off(i));
+    for (std::size_t i = 0; i < points_.size(); ++i)
+      deviation[i] = std::abs(points_[i].arrival - line.intercept - line.slope * points_[i].index);
     std::vector<double> sorted = deviation;
     const double most = std::max(3 * median(sorted), 1e-9);
     for (std::size_t i = 0; i < points_.size(); ++i) used[i] = deviation[i] <= most;
     line = least_squares(points_, used);
   }
-  double squares = 0, n = 0;
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (!used[i]) continue;
-    squares += off(i) * off(i);
-    n += 1;
-  }
   fit.period_s = line.slope;
   fit.offset_s = line.intercept;
-  fit.residual_s = std::sqrt(squares / n);
   fit.measured_s = line.slope;
   fit.plausible = std::abs(line.slope / rig::kFramePeriodS - 1) <= 0.005;
   if (!fit.plausible) {
@@ -252,7 +243,7 @@ FrameTimeline timeline_of(std::span<const FrameArrival> arrivals) {
 bool JumpDetector::jump(const BoardFrame& frame) {
   bool far = false;
   for (int k = 0; k < rig::kTaxels && !first_; ++k) {
-    far = far || std::abs(frame.taxel(k) - last_[static_cast<std::size_t>(k)]) > limit_;
+    far = far || std::abs(frame.taxel(k) - last_[static_cast<std::size_t>(k)]) > kLimit;
   }
   first_ = false;
   // Three in a row are a change of the world, not of a byte.

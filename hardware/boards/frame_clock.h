@@ -18,7 +18,6 @@ namespace supertac {
 struct ClockFit {
   double period_s = rig::kFramePeriodS;
   double offset_s = 0;
-  double residual_s = 0;                   ///< RMS of the envelope's points about the line
   double measured_s = rig::kFramePeriodS;  ///< the period that the arrivals say
   bool plausible = true;  ///< measured_s within 0.5 % of the nominal one; otherwise frames were
                           ///< miscounted or it is another board, and period_s is the nominal one
@@ -137,16 +136,14 @@ struct FrameTimeline {
 };
 FrameTimeline timeline_of(std::span<const FrameArrival> arrivals);
 
-/// Flags physically implausible jumps: a taxel that moves more than `limit` ADC steps between two frames. A
+/// Flags physically implausible jumps: a taxel that moves more than 124 ADC steps between two frames. A
 /// flipped bit in a sample passes every check of the format; only this can show it.
 class JumpDetector {
  public:
-  /// 0.1 V in a period: at 10 mm/s the finger has moved 0.01 mm.
-  explicit JumpDetector(int limit = 124) : limit_(limit) {}
   bool jump(const BoardFrame& frame);
 
  private:
-  int limit_;
+  static constexpr int kLimit = 124;  // 0.1 V in a period: at 10 mm/s the finger has moved 0.01 mm
   std::array<int, rig::kTaxels> last_{};
   int flagged_ = 0;
   bool first_ = true;

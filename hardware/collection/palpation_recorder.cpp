@@ -47,7 +47,7 @@ void hear_board(TactileBoard& board, Printer& printer, const RecorderSettings& s
 RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> printer_port,
                       const RecorderSettings& settings, JournalWriter& journal) {
   CapturedPort captured(std::move(printer_port), journal, Stream::printer);
-  Printer printer(captured, settings.printer);
+  Printer printer(captured);
   printer.link().set_watch([&] { check_stop(settings, journal); });
   printer.link().give_up_at(captured.now() + longest_run_s(settings));
   printer.connect();
@@ -65,7 +65,6 @@ RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> pr
     board.wait_for_end(60);
   }
   board.stop();
-  report.board = board.counters();
   report.printer = printer.link().counters();
   if (report.outcome.complete) journal.event(captured.now(), kRunComplete);
   try {

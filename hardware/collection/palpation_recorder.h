@@ -14,7 +14,6 @@ namespace supertac {
 
 struct RecorderSettings {
   PalpationPlan plan;
-  PrinterSettings printer;
   BoardSettings board;
   Point3 origin = rig::kMounted;  ///< where the operator confirms the head to be
   bool home = false;              ///< home instead
@@ -32,7 +31,6 @@ struct RecorderSettings {
 
 struct RecorderReport {
   PalpationOutcome outcome;
-  BoardCounters board;
   MarlinLink::Counters printer;
 };
 

@@ -10,6 +10,14 @@
 namespace supertac {
 namespace {
 
+// Seconds: for a board that boots, and between two M110 N0 meanwhile; of an ordinary command (Marlin's first
+// echo:busy comes after 2 s); after echo:busy (repeated every 2 s); for one command, behind a longer deadline
+// of its own, whatever is said; of silence that ends a disturbance.
+constexpr double kConnectDeadline = 20, kProbeInterval = 1, kOkDeadline = 2.5, kBusyDeadline = 6,
+                 kLongestWait = 60;
+constexpr double kQuiet = 0.05;
+constexpr int kMaxRepeats = 8;          // of one line, for any reason; four times as many while catching up
+constexpr std::size_t kKeptLines = 64;  // of the newest lines, for Resend
 constexpr double kWriteDeadline = 2;
 constexpr double kWatchInterval = 0.02;  // a fifth of the 0.1 s in which an unplugged board must be noticed
 // With one line in flight the firmware is never honestly more than a line or two behind. A number further
@@ -38,11 +46,9 @@ struct MarlinLink::Exchange {
   bool error_stands = false;   // and the firmware did run it
 };
 
-MarlinLink::MarlinLink(Port& port, const MarlinSettings& settings) : port_(port), settings_(settings) {}
-
 void MarlinLink::connect() {
   connected_ = false;
-  const double until = port_.now() + settings_.connect_deadline_s;
+  const double until = port_.now() + kConnectDeadline;
   // Two answers in a row: the first ok may belong to something an earlier program sent.
   int answers = 0;
   while (answers < 2) {
@@ -50,7 +56,7 @@ void MarlinLink::connect() {
     if (now >= until) {
       nobody_answered();
     }
-    answers = probe(std::min(until, now + settings_.probe_interval_s)) ? answers + 1 : 0;
+    answers = probe(std::min(until, now + kProbeInterval)) ? answers + 1 : 0;
   }
   number_ = 0;
   kept_.clear();
@@ -70,7 +76,7 @@ void MarlinLink::switch_reports_off() {
 
 void MarlinLink::nobody_answered() const {
   const std::string expected = "port " + port_.name() + ": expected a Marlin firmware, found ";
-  const std::string within = " answer to M110 within " + format(settings_.connect_deadline_s, 0) + " s; ";
+  const std::string within = " answer to M110 within " + format(kConnectDeadline, 0) + " s; ";
   if (bytes_ > 0) {
     throw WrongDevice(expected + std::to_string(bytes_) + " bytes that are no" + within +
                       "check that it is the printer's port (--list-ports) and that its baud rate is " +
@@ -132,15 +138,15 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
   const std::string text = capabilities_.emergency_parser ? shielded(code) : std::string(code);
   kept_.push_back(numbered_line(number_ + 1, text));
   ++number_;
-  if (kept_.size() > settings_.kept_lines) kept_.pop_front();
+  if (kept_.size() > kKeptLines) kept_.pop_front();
   ++counters_.lines;
-  Exchange exchange{number_, number_, deadline_s > 0 ? deadline_s : settings_.ok_deadline_s};
+  Exchange exchange{number_, number_, deadline_s > 0 ? deadline_s : kOkDeadline};
   exchange.code = text;
   exchange.answer.sent_s = send(kept_.back());
   exchange.until = exchange.answer.sent_s + exchange.deadline_s;
   // Behind its deadline a long command may still have to be asked for.
-  const double usual_s = deadline_s > settings_.ok_deadline_s ? deadline_s : 0;
-  exchange.limit = exchange.answer.sent_s + usual_s + settings_.longest_wait_s;
+  const double usual_s = deadline_s > kOkDeadline ? deadline_s : 0;
+  exchange.limit = exchange.answer.sent_s + usual_s + kLongestWait;
   std::string line = "nothing";
   while (!exchange.done) {
     const bool answered = read_line(std::min(exchange.until, exchange.limit), line);
@@ -157,7 +163,7 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
     ask(exchange);
   }
   finish(exchange);
-  if (exchange.proven && deadline_s > settings_.ok_deadline_s) {
+  if (exchange.proven && deadline_s > kOkDeadline) {
     // Taken is not finished: the ok of a command behind it in the queue tells when a long one has ended.
     exchange.answer.answered_s = command("M400", deadline_s).answered_s;
   }
@@ -176,8 +182,8 @@ void MarlinLink::finish(const Exchange& exchange) {
 }
 
 void MarlinLink::count_copy(Exchange& exchange, const std::string& why) {
-  const bool loop = ++exchange.copies > 4 * settings_.max_repeats;
-  if (++exchange.repeats > settings_.max_repeats || loop) {
+  const bool loop = ++exchange.copies > 4 * kMaxRepeats;
+  if (++exchange.repeats > kMaxRepeats || loop) {
     const std::string text = "printer " + port_.name() + ": line " + std::to_string(exchange.cursor) +
                              " repeated " + std::to_string((loop ? exchange.copies : exchange.repeats) - 1) +
                              " times without success (" + why + ")";
@@ -201,7 +207,7 @@ void MarlinLink::repeat(Exchange& exchange, const std::string& why) {
 void MarlinLink::ask(Exchange& exchange) {
   count_copy(exchange, "no answer");
   exchange.asked = !capabilities_.klipper;
-  exchange.until = settings_.ok_deadline_s + send("\n" + numbered_line(number_ + kFarAhead, "M105"));
+  exchange.until = kOkDeadline + send("\n" + numbered_line(number_ + kFarAhead, "M105"));
 }
 
 void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
@@ -215,7 +221,7 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
       if (reply.text.size() > 2) exchange.answer.replies.push_back(std::move(reply));  // Klipper's M115
       break;
     case ReplyKind::busy:
-      exchange.until = std::max(exchange.until, input_time_ + settings_.busy_deadline_s);
+      exchange.until = std::max(exchange.until, input_time_ + kBusyDeadline);
       break;
     case ReplyKind::line_fault:
       ++counters_.faults;
@@ -317,13 +323,13 @@ void MarlinLink::idle(double seconds) {
 void MarlinLink::settle() {
   const double limit = port_.now() + 2;
   std::string line;
-  double quiet_until = port_.now() + settings_.quiet_s;
+  double quiet_until = port_.now() + kQuiet;
   while (input_time_ < limit && read_line(std::min(quiet_until, limit), line)) {
     const Reply reply = parse_reply(line);
     if (reply.kind == ReplyKind::start || reply.kind == ReplyKind::fatal) check_alarm(reply);
     // Reports come for ever; what is waited for is the end of answers.
     const bool report = reply.kind == ReplyKind::position || reply.kind == ReplyKind::temperature;
-    if (!report) quiet_until = input_time_ + settings_.quiet_s;
+    if (!report) quiet_until = input_time_ + kQuiet;
   }
   input_.clear();
 }

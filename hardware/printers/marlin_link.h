@@ -19,17 +19,6 @@
 
 namespace supertac {
 
-struct MarlinSettings {
-  double connect_deadline_s = 20;  ///< for a board that boots
-  double probe_interval_s = 1;     ///< between two M110 N0 while connecting
-  double ok_deadline_s = 2.5;      ///< of an ordinary command; Marlin's first echo:busy comes after 2 s
-  double busy_deadline_s = 6;      ///< after echo:busy (Marlin repeats it every 2 s)
-  double longest_wait_s = 60;      ///< for one command, behind a longer deadline of its own, whatever is said
-  double quiet_s = 0.05;           ///< silence that ends a disturbance
-  int max_repeats = 8;             ///< of one line, for any reason; four times as many while catching up
-  std::size_t kept_lines = 64;     ///< of the newest lines, for Resend
-};
-
 /// Firmware facts from M115.
 struct MarlinCapabilities {
   std::string firmware;           ///< the text of FIRMWARE_NAME, empty when not told
@@ -54,14 +43,14 @@ class MarlinLink {
   };
 
   /// `port` must outlive the link.
-  explicit MarlinLink(Port& port, const MarlinSettings& settings = {});
+  explicit MarlinLink(Port& port) : port_(port) {}
 
   /// Finds a fresh (`start` banner) or a running firmware, sets its line number to 0, reads M115, switches
   /// off the reports that an earlier host may have left on (M154, M155). Throws PrinterSilent; WrongDevice
   /// when what comes is no such firmware's answer (a GRBL controller is named); PrinterHalted.
   void connect();
 
-  /// Runs one command and returns when the firmware has acknowledged it. `deadline_s` 0: ok_deadline_s;
+  /// Runs one command and returns when the firmware has acknowledged it. `deadline_s` 0: 2.5 s;
   /// commands that take long (M400, G4, G28) need their own. Throws PrinterSilent, PrinterReset,
   /// PrinterHalted, ResendLoop, PrinterPaused, PrinterRefused, PortUnplugged, PortTimeout.
   Answer command(std::string_view code, double deadline_s = 0);
@@ -77,7 +66,7 @@ class MarlinLink {
   /// Throws PrinterReset, PrinterHalted when one of the replies says so.
   void idle(double seconds);
 
-  /// Reads replies until for quiet_s none came but automatic reports (at most 2 s).
+  /// Reads replies until for 0.05 s none came but automatic reports (at most 2 s).
   void settle();
 
   /// Called at least every 0.02 s while waiting for the firmware; what it throws ends the wait.
@@ -115,7 +104,6 @@ class MarlinLink {
   bool take_line(std::string& line);
 
   Port& port_;
-  MarlinSettings settings_;
   MarlinCapabilities capabilities_;
   Counters counters_;
   std::function<void()> watch_;

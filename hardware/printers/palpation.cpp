@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hardware/printers/limits.h"
+
 namespace supertac {
 namespace {
 
@@ -69,12 +71,11 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
   return legs;
 }
 
-std::string palpation_program(const PalpationPlan& plan, const Point3& origin, const Limits& limits,
-                              const std::string& title) {
+std::string palpation_program(const PalpationPlan& plan, const Point3& origin, const std::string& title) {
   if (title.find_first_of("\r\n") != std::string::npos)
     throw std::invalid_argument("palpation_program: the title has a line break, which would end its comment");
   const std::vector<Leg> legs = legs_of(plan, origin);
-  for (const Leg& leg : legs) limits.check_path(leg.from, leg.to);
+  for (const Leg& leg : legs) limits::check_path(leg.from, leg.to);
   std::string text =
       "; " + title + "\n; Lengths in mm, F in mm/min. The finger is lifted before every way " +
       "to another pass.\n; Send it only with the head at " + describe(origin) +
@@ -99,7 +100,7 @@ PalpationOutcome Palpation::run() {
     throw OriginUnknown(
         "palpation: the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
   }
-  for (const Leg& leg : legs) printer_.limits().check_path(leg.from, leg.to);
+  for (const Leg& leg : legs) limits::check_path(leg.from, leg.to);
   for (const Leg& leg : legs) longest_leg_s_ = std::max(longest_leg_s_, ordered_s(leg));
   PalpationOutcome outcome;
   printer_.link().set_watch(observer_.check);

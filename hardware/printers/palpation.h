@@ -77,8 +77,7 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here);
 /// are absolute, in mm; between passes and at the end the finger is lifted, and the head returns to the
 /// origin. `title` is one line for the reader. Throws OutsideLimits when a target or the way to it is not
 /// allowed, std::invalid_argument for a plan that makes no sense or a title with a line break.
-std::string palpation_program(const PalpationPlan& plan, const Point3& origin, const Limits& limits,
-                              const std::string& title);
+std::string palpation_program(const PalpationPlan& plan, const Point3& origin, const std::string& title);
 
 class Palpation {
  public:

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hardware/printers/limits.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {
 
-constexpr double kHomeDeadline = 180;
+constexpr double kToleranceMm = 0.05;
+constexpr double kHomeDeadline = 180, kStopDeadline = 3, kPollDeadline = 0.25;
 constexpr double kStopWithin = 1.6;  // of the 2 s in which Ctrl-C ends a program; M410 takes one of them
 constexpr double kMoveMargin = 8;    // start delay, acceleration, and a firmware that is slower than ordered
 
@@ -32,9 +34,6 @@ std::string move_command(const Point3& target, double speed_mm_s) {
 }
 
 std::string origin_command(const Point3& here) { return "G92" + coordinates(here); }
-
-Printer::Printer(Port& port, const PrinterSettings& settings)
-    : settings_(settings), link_(port, settings.marlin) {}
 
 void Printer::connect() {
   origin_ = Origin::unknown;
@@ -63,23 +62,23 @@ void Printer::home() {
   }
   target_ = agreed_position();
   origin_ = Origin::homed;
-  const double missing = settings_.limits.clearance_z - target_.z;
+  const double missing = limits::kClearanceZ - target_.z;
   if (missing > 0) lift(missing);
 }
 
 void Printer::confirm_origin(const Point3& here) {
-  settings_.limits.check_target(here);
+  limits::check_target(here);
   link_.command("M400", kHomeDeadline);
   link_.command(link_.capabilities().klipper ? "SET_KINEMATIC_POSITION X=" + format(here.x, 3) +
                                                    " Y=" + format(here.y, 3) + " Z=" + format(here.z, 3)
                                              : origin_command(here));
   target_ = here;
   Point3 found = queue_position();
-  for (int attempt = 0; attempt < 2 && distance(found, here) > settings_.tolerance_mm; ++attempt) {
+  for (int attempt = 0; attempt < 2 && distance(found, here) > kToleranceMm; ++attempt) {
     link_.settle();
     found = queue_position();  // the answer may have been damaged
   }
-  if (distance(found, here) > settings_.tolerance_mm) {
+  if (distance(found, here) > kToleranceMm) {
     throw PositionError("printer: after G92 expected " + describe(here) + ", found " + describe(found) +
                         "; confirm the origin again");
   }
@@ -93,7 +92,7 @@ MarlinLink::Answer Printer::start_move(const Point3& target, double speed_mm_s) 
   }
   if (!(speed_mm_s > 0) || !std::isfinite(speed_mm_s))
     throw std::invalid_argument("printer: expected a speed above 0 mm/s, got " + format(speed_mm_s));
-  settings_.limits.check_path(target_, target);
+  limits::check_path(target_, target);
   const double length = distance(target_, target);
   MarlinLink::Answer answer = link_.command(move_command(target, speed_mm_s));
   target_ = target;
@@ -107,7 +106,7 @@ double Printer::finish_move() {
   Point3 found;
   for (int attempt = 0; attempt < 3; ++attempt) {
     found = queue_position();
-    if (distance(found, target_) <= settings_.tolerance_mm) return end;
+    if (distance(found, target_) <= kToleranceMm) return end;
     link_.settle();
     link_.command("M400", kMoveMargin);
   }
@@ -117,8 +116,7 @@ double Printer::finish_move() {
 }
 
 std::optional<PositionSample> Printer::sample_position(double deadline_s) {
-  const MarlinLink::Answer answer =
-      link_.command("M114 R", deadline_s > 0 ? deadline_s : settings_.poll_deadline_s);
+  const MarlinLink::Answer answer = link_.command("M114 R", deadline_s > 0 ? deadline_s : kPollDeadline);
   const Reply* reply = position_in(answer);
   if (answer.repeated || reply == nullptr) return std::nullopt;
   return PositionSample{0.5 * (answer.sent_s + answer.answered_s), answer.answered_s - answer.sent_s,
@@ -149,10 +147,10 @@ Point3 Printer::agreed_position() {
 bool Printer::stands_still() {
   Point3 before;
   int same = 0;
-  const double until = link_.port().now() + settings_.stop_deadline_s;
+  const double until = link_.port().now() + kStopDeadline;
   while (link_.port().now() < until) {
     // M410 holds Marlin for a second, in which it answers nothing.
-    const auto sample = sample_position(settings_.stop_deadline_s);
+    const auto sample = sample_position(kStopDeadline);
     if (!sample) continue;
     same = same > 0 && distance(before, sample->position) < 0.005 ? same + 1 : 1;
     before = sample->position;
@@ -171,8 +169,7 @@ Printer::Stop Printer::quick_stop() {
     link_.settle();
     const bool stands = klipper || stands_still();
     // The position of the queue is that of the head only once nothing moves any more.
-    link_.command("M400",
-                  stop.ahead_of_queue ? settings_.stop_deadline_s : 1.5 * expected_seconds_ + kMoveMargin);
+    link_.command("M400", stop.ahead_of_queue ? kStopDeadline : 1.5 * expected_seconds_ + kMoveMargin);
     target_ = agreed_position();
     expected_seconds_ = 0;
     stop.confirmed = stands;
@@ -198,7 +195,7 @@ Printer::Stop Printer::emergency_stop() {
   origin_ = Origin::unknown;
   try {
     link_.emergency("M112");
-    link_.idle(settings_.stop_deadline_s);
+    link_.idle(kStopDeadline);
     stop.text = "no answer to the emergency stop; switch the printer off";
   } catch (const PrinterHalted&) {
     stop.confirmed = true;
@@ -213,7 +210,7 @@ Printer::Stop Printer::emergency_stop() {
 void Printer::lift(double mm, double speed_mm_s) {
   const Point3 here = agreed_position();
   Point3 above = here;
-  above.z = std::min(here.z + mm, settings_.limits.high.z);
+  above.z = std::min(here.z + mm, limits::kHigh.z);
   // Not through start_move(): a lift is the way out of a position that the limits forbid.
   link_.command("G1 Z" + format(above.z, 3) + " F" + format(60 * speed_mm_s, 1));
   target_ = above;

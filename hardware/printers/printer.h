@@ -4,7 +4,6 @@
 #include <optional>
 #include <string>
 
-#include "hardware/printers/limits.h"
 #include "hardware/printers/marlin_link.h"
 
 namespace supertac {
@@ -12,14 +11,6 @@ namespace supertac {
 /// The line that makes a straight move, and the one that says where the head is.
 std::string move_command(const Point3& target, double speed_mm_s);
 std::string origin_command(const Point3& here);
-
-struct PrinterSettings {
-  Limits limits;
-  MarlinSettings marlin;
-  double tolerance_mm = 0.05;
-  double stop_deadline_s = 3;
-  double poll_deadline_s = 0.25;
-};
 
 /// Where the head was (M114 R), and when: the middle of question and answer.
 struct PositionSample {
@@ -38,7 +29,7 @@ class Printer {
   };
 
   /// `port` must outlive the printer.
-  explicit Printer(Port& port, const PrinterSettings& settings = {});
+  explicit Printer(Port& port) : link_(port) {}
 
   /// Finds the firmware; throws as MarlinLink::connect. The origin is unknown then: Marlin cannot tell
   /// whether its coordinates mean anything.
@@ -61,7 +52,7 @@ class Printer {
   /// they differ by more than the tolerance three times running. Returns the time at which M400 was answered.
   double finish_move();
 
-  /// M114 R; empty when the answer was damaged or later than `deadline_s` (0: poll_deadline_s).
+  /// M114 R; empty when the answer was damaged or later than `deadline_s` (0: 0.25 s).
   std::optional<PositionSample> sample_position(double deadline_s = 0);
   /// M114: the end of the queue, which is the head's position only after M400.
   Point3 queue_position();
@@ -78,13 +69,11 @@ class Printer {
   void lift(double mm, double speed_mm_s = rig::kLiftMmS);
 
   const Point3& target() const { return target_; }
-  const Limits& limits() const { return settings_.limits; }
   MarlinLink& link() { return link_; }
 
  private:
   bool stands_still();
 
-  PrinterSettings settings_;
   MarlinLink link_;
   Origin origin_ = Origin::unknown;
   Point3 target_;

@@ -185,7 +185,6 @@ TEST(ClockEstimator, LowerEnvelopeWithOutliers) {
   const ClockFit fit = estimator.fit();
   EXPECT_NEAR(fit.period_s, 9.93e-4, 1e-9);
   EXPECT_NEAR(fit.offset_s, 50, 5e-5);
-  EXPECT_LT(fit.residual_s, 5e-5);
   EXPECT_TRUE(fit.plausible);
 }
 

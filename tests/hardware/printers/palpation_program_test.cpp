@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "hardware/ports/errors.h"
+#include "hardware/printers/limits.h"
 #include "hardware/printers/marlin_link.h"
 #include "tests/expect_error.h"
 #include "tests/hardware/rig_support.h"
@@ -43,13 +44,12 @@ TEST(PalpationProgram, MovesAreThoseTheRunSends) {
   printer.confirm_origin(kMounted);
   const PalpationPlan plan{.passes = 3, .speed = 5};
   ASSERT_TRUE(Palpation(printer, plan).run().complete);
-  EXPECT_EQ(moves_in(palpation_program(plan, kMounted, {}, "x")), moves_of(rig.world().printer()));
+  EXPECT_EQ(moves_in(palpation_program(plan, kMounted, "x")), moves_of(rig.world().printer()));
 }
 
 TEST(PalpationProgram, IsAbsoluteWithinLimitsAndEndsLifted) {
   const PalpationPlan plan;
-  const Limits limits;
-  const std::string program = palpation_program(plan, kMounted, limits, "6_Ridges");
+  const std::string program = palpation_program(plan, kMounted, "6_Ridges");
   const auto lines = lines_of(program);
   EXPECT_EQ(lines[0], "; 6_Ridges");
   const auto at = [&](const std::string& line) {
@@ -65,12 +65,12 @@ TEST(PalpationProgram, IsAbsoluteWithinLimitsAndEndsLifted) {
   int slides = 0;
   for (const std::string& move : moves_in(program)) {
     const Point3 to = target_of(move);
-    EXPECT_NO_THROW(limits.check_path(here, to)) << move;
+    EXPECT_NO_THROW(limits::check_path(here, to)) << move;
     const bool sideways = here.x != to.x;
     if (sideways) {
       EXPECT_GE(std::min(here.z, to.z), plan.start.z + plan.lift) << move;
     }
-    if (here.y != to.y && to.z < limits.clearance_z) {
+    if (here.y != to.y && to.z < limits::kClearanceZ) {
       ++slides;
       EXPECT_NEAR(to.y - here.y, 108, 1e-9);
       EXPECT_TRUE(move.ends_with(" F600.0")) << move;
@@ -95,7 +95,7 @@ TEST(PalpationProgram, PausesBeforeTheFirstMoveAlsoWhereM0IsUnknown) {
   const auto port = rig.printer_port();
   MarlinLink link(*port);
   link.connect();
-  const std::string program = palpation_program({}, kMounted, {}, "x");
+  const std::string program = palpation_program({}, kMounted, "x");
   EXPECT_NE(program.find("G4 leaves 20 s to switch it off"), std::string::npos);
   EXPECT_NE(program.find("until the host sends M108"), std::string::npos);
   double asked_s = 0;
@@ -117,13 +117,13 @@ TEST(PalpationProgram, PausesBeforeTheFirstMoveAlsoWhereM0IsUnknown) {
 }
 
 TEST(PalpationProgram, RefusesWhatTheRunRefuses) {
-  EXPECT_ERROR(palpation_program({.passes = 40}, kMounted, {}, "x"), OutsideLimits,
+  EXPECT_ERROR(palpation_program({.passes = 40}, kMounted, "x"), OutsideLimits,
                "below Z95.00 and beside the plate; nothing was sent, lift first");
-  EXPECT_ERROR(palpation_program({.passes = 0}, kMounted, {}, "x"), std::invalid_argument,
+  EXPECT_ERROR(palpation_program({.passes = 0}, kMounted, "x"), std::invalid_argument,
                "expected 1 to 1000 passes");
-  EXPECT_ERROR(palpation_program({}, {99.7, 101.17, 500}, {}, "x"), OutsideLimits,
+  EXPECT_ERROR(palpation_program({}, {99.7, 101.17, 500}, "x"), OutsideLimits,
                "Z expected 0.00 to 250.00 mm, found 500.00; nothing was sent");
-  EXPECT_ERROR(palpation_program({}, kMounted, {}, "a\nG28"), std::invalid_argument,
+  EXPECT_ERROR(palpation_program({}, kMounted, "a\nG28"), std::invalid_argument,
                "the title has a line break");
 }
 

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "hardware/printers/limits.h"
 #include "tests/expect_error.h"
 #include "tests/hardware/rig_support.h"
 
@@ -13,20 +14,19 @@ namespace {
 using rig::kMounted;
 
 TEST(Limits, NameTheAxisAndCheckTheWay) {
-  const Limits limits;
   EXPECT_ERROR(
-      limits.check_target({500, 100, 100}), OutsideLimits,
+      limits::check_target({500, 100, 100}), OutsideLimits,
       "limits: X expected 0.00 to 235.00 mm, found 500.00; nothing was sent, correct the plan or the limits");
-  EXPECT_ERROR(limits.check_target({100, -1, 100}), OutsideLimits,
+  EXPECT_ERROR(limits::check_target({100, -1, 100}), OutsideLimits,
                "Y expected 0.00 to 235.00 mm, found -1.00");
-  EXPECT_ERROR(limits.check_target({100, 100, NAN}), OutsideLimits,
+  EXPECT_ERROR(limits::check_target({100, 100, NAN}), OutsideLimits,
                "Z expected 0.00 to 250.00 mm, found no number");
-  EXPECT_NO_THROW(limits.check_path({99.7, 101.17, 91.81}, {99.7, 209.17, 91.81}));
+  EXPECT_NO_THROW(limits::check_path({99.7, 101.17, 91.81}, {99.7, 209.17, 91.81}));
   // Both ends are allowed, the way between them runs through the plate's side.
-  EXPECT_ERROR(limits.check_path({50, 101.17, 96}, {99.7, 101.17, 91.81}), OutsideLimits,
+  EXPECT_ERROR(limits::check_path({50, 101.17, 96}, {99.7, 101.17, 91.81}), OutsideLimits,
                "the way from X50.00 Y101.17 Z96.00 to X99.70 Y101.17 Z91.81 passes");
   try {
-    limits.check_target({500, 100, 100});
+    limits::check_target({500, 100, 100});
   } catch (const OutsideLimits& error) {
     EXPECT_NE(std::string(error.what()).find("X expected 0.00 to 235.00 mm, found 500.00"),
               std::string::npos);

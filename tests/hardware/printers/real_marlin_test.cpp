@@ -175,7 +175,7 @@ TEST(RealMarlin, AStopWhileItHomesStopsTheHead) {
 struct ProgramRun {
   explicit ProgramRun(bool parser, bool display = false)
       : rig(rig_without(parser, display)), port(rig.printer_port()) {
-    std::istringstream lines(palpation_program({.passes = 1}, rig::kMounted, {}, "x"));
+    std::istringstream lines(palpation_program({.passes = 1}, rig::kMounted, "x"));
     for (std::string line; std::getline(lines, line);) {
       if (line.starts_with(';')) continue;
       line += '\n';
@@ -212,7 +212,7 @@ TEST(RealMarlin, TheProgramPausesOnEveryFirmware) {
 }
 
 TEST(RealMarlin, TheProgramSaysWhatItsPauseNeeds) {
-  const std::string program = palpation_program({.passes = 1}, rig::kMounted, {}, "x");
+  const std::string program = palpation_program({.passes = 1}, rig::kMounted, "x");
   EXPECT_NE(program.find("M108"), std::string::npos);
   EXPECT_LT(program.find("\nG4 S"), program.find("\nG92"));
 }
