@@ -6,7 +6,6 @@
 #include "apps/classify/experiment.h"
 #include "apps/classify/report.h"
 #include "apps/common/command_line/program.h"
-#include "apps/common/command_line/version.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
 #include "io/files/file.h"

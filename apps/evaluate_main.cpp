@@ -3,7 +3,6 @@
 #include <optional>
 
 #include "apps/common/command_line/program.h"
-#include "apps/common/command_line/version.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/output/remarks.h"
 #include "apps/common/running/measure.h"
@@ -28,7 +27,7 @@ constexpr int kSsimWindow = 7;  // pixels, of pictures below 11
 // What is tested, and by which models, is noted for all that is written.
 WindowSet load_windows(const Arguments& a, const ModelFile& file) {
   const std::vector<std::string> plates =
-      a.given("plates") ? a.list("plates") : comma_list(file.metadata_or("plates", ""));
+      a.given("plates") ? a.list("plates") : comma_list(value_or(file.metadata, "plates"));
   add_model_parents(a.list("model"));
   add_parent("recordings", hash_of_recordings(a.text("data"), plates));
   return WindowSet::load(a.text("data"), plates, file.windows(),

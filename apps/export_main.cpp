@@ -74,8 +74,7 @@ int export_c(Arguments& arguments, const ModelFile& file) {
 
 // A recording, or pictures: what PictureLog writes, which has a recording's frames and "began_s".
 int export_mcap(Arguments& arguments, const SafetensorsFile& file) {
-  const auto kind = file.metadata().find("kind"), began = file.metadata().find("began_s");
-  const bool drawn = kind != file.metadata().end() && kind->second == "pictures";
+  const bool drawn = value_or(file.metadata(), "kind") == "pictures";
   if (!drawn) recording_of(file);  // checks it
   const TaxelArray array = array_of(file);
   const std::vector<double> times = file.f64("time_s");
@@ -102,7 +101,7 @@ int export_mcap(Arguments& arguments, const SafetensorsFile& file) {
   }
   if (!std::ranges::all_of(times, [](double t) { return std::isfinite(t); }))
     throw FileError(file.path(), "a time is not finite; stream it again");
-  const double began_s = began == file.metadata().end() ? NAN : parse_double(began->second).value_or(NAN);
+  const double began_s = parse_double(value_or(file.metadata(), "began_s")).value_or(NAN);
   McapLog log(arguments.output("mcap"), array, signal_scale_of(file).unit, image, !half_widths.empty());
   const auto part = [](const std::vector<float>& of, std::size_t i, std::size_t size) {
     return of.empty() ? std::span<const float>{} : std::span(of).subspan(i * size, size);

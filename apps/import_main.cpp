@@ -47,14 +47,10 @@ void refuse_others(const Arguments& arguments, const std::string& reason,
       throw UsageError(reason + ", found with " + (other == "INPUT" ? "" : "--") + other);
 }
 
-FolderImport import_settings(const Arguments& arguments, std::optional<Progress>& bar, std::size_t& bad) {
+FolderImport import_settings(const Arguments& arguments, std::size_t& bad) {
   FolderImport settings{.speed_mm_s = arguments.number("speed", 0.1, 1000)};
   settings.left_out = [&](const FileError& error) { leave_out(arguments, error, bad); };
-  settings.progress = [&](std::size_t done, std::size_t files) {
-    stop_if_interrupted();
-    if (!bar) bar.emplace(arguments, "importing", files, "files");
-    bar->update(done);
-  };
+  settings.progress = progress_of(arguments, "importing", "files");
   return settings;
 }
 
@@ -62,8 +58,7 @@ FolderImport import_settings(const Arguments& arguments, std::optional<Progress>
 std::optional<SafetensorsFile> pairs_of(const std::string& input) {
   if (!input.ends_with(".safetensors") || !std::filesystem::is_regular_file(input)) return std::nullopt;
   SafetensorsFile file = SafetensorsFile::read(input);
-  const auto kind = file.metadata().find("kind");
-  if (kind != file.metadata().end() && kind->second == "recording") return std::nullopt;
+  if (value_or(file.metadata(), "kind") == "recording") return std::nullopt;
   return file;
 }
 
@@ -123,7 +118,6 @@ int run(Arguments& arguments) {
   if (arguments.given("pictures")) pictures.emplace(arguments.output("pictures"));
   std::size_t bad = 0, reliable = 0, recordings = 0;
   nlohmann::ordered_json files = nlohmann::ordered_json::array();
-  std::optional<Progress> bar;
   ImportPage page;
   const auto keep = [&](const ImportedPass& pass) {
     const std::string name = recording_file_name(pass.recording);
@@ -136,12 +130,11 @@ int run(Arguments& arguments) {
     ++recordings;
   };
   // A plate at a time: no more is in memory, and what is done is on the disk.
-  import_text_folder(arguments.text("INPUT"), import_settings(arguments, bar, bad),
+  import_text_folder(arguments.text("INPUT"), import_settings(arguments, bad),
                      [&](const std::vector<ImportedPass>& plate) {
                        for (const ImportedPass& pass : plate) keep(pass);
                        keep_plate_file(plate.front().plate_file, folder.path());
                      });
-  bar.reset();
   if (pictures) write_file(pictures->add("index.html"), page.html(arguments.command_line()));
   folder.keep();
   if (pictures) pictures->keep();

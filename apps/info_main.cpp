@@ -22,12 +22,6 @@ void declare(Arguments& arguments) {
 
 namespace {
 
-std::string shape_text(const std::vector<std::uint64_t>& shape) {
-  std::string text;
-  for (const std::uint64_t size : shape) text += (text.empty() ? "" : ",") + std::to_string(size);
-  return "[" + text + "]";
-}
-
 std::uint64_t elements(const TensorInfo& tensor) {
   std::uint64_t count = 1;
   for (const std::uint64_t size : tensor.shape) count *= size;
@@ -36,10 +30,9 @@ std::uint64_t elements(const TensorInfo& tensor) {
 
 std::string kind_of(const SafetensorsFile& file) {
   const auto& metadata = file.metadata();
-  if (const auto kind = metadata.find("kind"); kind != metadata.end()) return kind->second;
-  const auto format = metadata.find("format");
-  if (format != metadata.end() && format->second.starts_with("supertac-")) return format->second.substr(9);
-  return "safetensors of another program";
+  const std::string format = value_or(metadata, "format");
+  return value_or(metadata, "kind",
+                  format.starts_with("supertac-") ? format.substr(9) : "safetensors of another program");
 }
 
 /// Metadata values are text; those that hold a JSON object are shown as one, the rest as they are.

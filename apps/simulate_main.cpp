@@ -12,6 +12,7 @@
 #include "data/plates/plate_file.h"
 #include "data/recordings/simulator.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -21,12 +22,6 @@ struct Job {
   PassSettings pass;
   std::string path;
 };
-
-std::string joined(const std::vector<std::string>& names, const char* between = ",") {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : between) + name;
-  return text;
-}
 
 std::vector<Plate> read_plates(const Arguments& arguments) {
   std::vector<Plate> plates;
@@ -173,7 +168,7 @@ int run(Arguments& arguments) {
   const auto plates = read_plates(arguments);
   const Sensor sensor = read_sensor(arguments.text("sensor"));
   const auto settings = read_settings(arguments, sensor);
-  const auto seed = static_cast<std::uint64_t>(arguments.integer("seed", 0, INT64_MAX));
+  const std::uint64_t seed = arguments.seed();
   if (arguments.list("speeds").empty()) throw UsageError("--speeds: expected at least one speed");
   const std::size_t before = recordings_in(arguments.text("out"));
   OutputFolder folder(arguments.output("out"));

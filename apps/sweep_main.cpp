@@ -2,7 +2,6 @@
 #include <filesystem>
 
 #include "apps/common/command_line/program.h"
-#include "apps/common/command_line/version.h"
 #include "apps/common/running/launch.h"
 #include "apps/sweep/chart.h"
 #include "apps/sweep/front.h"

@@ -1,9 +1,10 @@
 #include "bench/fma_peak.h"
 
 #include <immintrin.h>
-#include <time.h>
 
 #include <stdexcept>
+
+#include "io/numbers/clock.h"
 
 namespace supertac::bench {
 namespace {
@@ -50,11 +51,7 @@ Loop best_loop() {
 
 }  // namespace
 
-double cpu_seconds() {
-  timespec t{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
+double cpu_seconds() { return seconds_of(CLOCK_THREAD_CPUTIME_ID); }
 
 double fma_gflops() {
   constexpr int kCalls = 8;

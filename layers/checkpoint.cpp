@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -36,20 +37,14 @@ void for_each_element(const Parameter& p, F f) {
   }
 }
 
-std::string text_of(const std::vector<std::uint64_t>& shape) {
-  std::string out = "[";
-  for (std::size_t i = 0; i < shape.size(); ++i) out += (i ? "," : "") + std::to_string(shape[i]);
-  return out + "]";
-}
-
 // Empty when the tensor in the file is what the parameter needs, else what is wrong with it.
 std::string mismatch(const SafetensorsFile& file, const std::string& name, const Parameter& p) {
   const auto found = file.tensors().find(name);
   if (found == file.tensors().end()) return "missing " + name;
   const TensorInfo& info = found->second;
   if (info.dtype == "F32" && info.shape == file_shape(p)) return {};
-  return name + " expected F32 " + text_of(file_shape(p)) + ", found " + info.dtype + " " +
-         text_of(info.shape);
+  return name + " expected F32 " + shape_text(file_shape(p)) + ", found " + info.dtype + " " +
+         shape_text(info.shape);
 }
 
 Tensor to_memory(const std::vector<float>& values, const Parameter& p) {
@@ -92,15 +87,13 @@ void write_checkpoint(const OutputPath& output, const std::vector<Parameter>& pa
 
 SafetensorsFile read_checkpoint(const std::string& path) {
   SafetensorsFile file = SafetensorsFile::read(path);
-  const auto& metadata = file.metadata();
-  const auto format = metadata.find("format");
-  if (format == metadata.end() || format->second != "supertac-checkpoint") {
+  const auto format = file.metadata().find("format");
+  if (format == file.metadata().end() || format->second != "supertac-checkpoint") {
     throw std::runtime_error(path + ": not a SuperTac checkpoint: metadata \"format\" is " +
-                             (format == metadata.end() ? "missing" : "\"" + format->second + "\"") +
+                             (format == file.metadata().end() ? "missing" : "\"" + format->second + "\"") +
                              "; give a file that supertac-train wrote");
   }
-  const auto version = metadata.find("format_version");
-  const std::string text = version == metadata.end() ? "" : version->second;
+  const std::string text = value_or(file.metadata(), "format_version");
   const auto number = parse_int(text);
   if (!number || *number < 1 || *number > kCheckpointVersion) {
     throw std::runtime_error(path + ": checkpoint version \"" + text + "\", this program reads 1 to " +
@@ -126,9 +119,8 @@ void load_parameters(const SafetensorsFile& file, const std::string& path,
       problems.push_back("unexpected " + name);
   }
   if (!problems.empty()) {
-    std::string message = path + ": the tensors do not fit the model that its metadata describes: ";
-    for (std::size_t i = 0; i < problems.size(); ++i) message += (i ? "; " : "") + problems[i];
-    throw std::runtime_error(message);
+    throw std::runtime_error(
+        path + ": the tensors do not fit the model that its metadata describes: " + joined(problems, "; "));
   }
   for (const Parameter& p : parameters) {
     Variable handle = p.value;

@@ -15,16 +15,13 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json provenance_in(const SafetensorsFile& file) {
-  const auto found = file.metadata().find(kProvenanceKey);
-  return found == file.metadata().end() ? Json::object() : parse_json_limited(found->second);
+  return parse_json_limited(value_or(file.metadata(), kProvenanceKey, "{}"));
 }
 
 // Recordings are those of the plates that the model names.
 std::string hash_of_data(const SafetensorsFile& file, const std::string& data) {
   if (!std::filesystem::is_directory(data)) return hash_of_file(data);
-  const auto plates = file.metadata().find("plates");
-  return hash_of_recordings(
-      data, plates == file.metadata().end() ? std::vector<std::string>{} : comma_list(plates->second));
+  return hash_of_recordings(data, comma_list(value_or(file.metadata(), "plates")));
 }
 
 }  // namespace

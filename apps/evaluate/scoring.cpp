@@ -14,23 +14,23 @@ namespace {
 
 // What decides which windows a split tests.
 std::string drawn_by(const ModelFile& file) {
-  const std::string plate = file.metadata_or("leave_out", "");
-  return plate.empty() ? "seed " + file.metadata_or("seed", "0") : "left-out plate " + plate;
+  const std::string plate = value_or(file.metadata, "leave_out");
+  return plate.empty() ? "seed " + value_or(file.metadata, "seed", "0") : "left-out plate " + plate;
 }
 
 bool is_drawn(const std::string& split) { return split != "trial" && split != "none"; }
 
 // Whether the windows that are tested are not those that this model's training kept away.
 bool is_another(const TestSet& tested, const ModelFile& file) {
-  const bool by_seed = is_drawn(tested.split_name) && file.metadata_or("leave_out", "").empty();
-  return tested.split_name != file.metadata_or("split", "none") ||
-         (by_seed && std::to_string(tested.seed) != file.metadata_or("seed", "0"));
+  const bool by_seed = is_drawn(tested.split_name) && value_or(file.metadata, "leave_out").empty();
+  return tested.split_name != value_or(file.metadata, "split", "none") ||
+         (by_seed && std::to_string(tested.seed) != value_or(file.metadata, "seed", "0"));
 }
 
 void refuse_leak(const std::vector<ModelFile>& files, const std::string& split_name) {
-  const std::string split = files.front().metadata_or("split", "none");
+  const std::string split = value_or(files.front().metadata, "split", "none");
   for (const ModelFile& file : files)
-    if (const std::string other = file.metadata_or("split", "none"); other != split)
+    if (const std::string other = value_or(file.metadata, "split", "none"); other != split)
       throw std::runtime_error(
           "one model was trained with split " + split + ", another with " + other +
           ": what one is tested on the other may have seen; average models of one split");
@@ -46,9 +46,9 @@ void refuse_leak(const std::vector<ModelFile>& files, const std::string& split_n
 
 TestSet test_set_of(const Arguments& a, const ModelFile& file) {
   return {a.given("split") ? a.choice("split", {"window", "pass", "trial", "texture", "group", "none"})
-                           : file.metadata_or("split", "none"),
-          a.given("seed") ? a.seed() : parse_uint(file.metadata_or("seed", "0")).value_or(0),
-          comma_list(file.metadata_or("leave_out", "")),
+                           : value_or(file.metadata, "split", "none"),
+          a.given("seed") ? a.seed() : parse_uint(value_or(file.metadata, "seed", "0")).value_or(0),
+          comma_list(value_or(file.metadata, "leave_out")),
           {}};
 }
 
@@ -59,7 +59,7 @@ void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, Tes
     a.note(
         "the model was trained with split none: if these are the recordings of its training, it has seen "
         "every one of them");
-  const std::string own = files.front().metadata_or("split", "none");
+  const std::string own = value_or(files.front().metadata, "split", "none");
   const auto said = [](const std::string& split, const std::string& by) {
     return is_drawn(split) ? split + " (" + by + ")" : split;
   };

@@ -1,6 +1,6 @@
 #include "apps/import/page.h"
 
-#include "apps/common/command_line/version.h"
+#include "apps/common/command_line/program.h"
 #include "apps/web/result_page.h"
 #include "data/registration/registration_picture.h"
 #include "io/numbers/numbers.h"

@@ -225,14 +225,12 @@ int import_tables(const Arguments& arguments, const std::string& input) {
   OutputFolder folder(arguments.output("out"));
   settings.out = folder.path();
   keep_plate_file(arguments.text("plate"), folder.path());
-  std::optional<Progress> bar;
+  auto progress = progress_of(arguments, "importing", "files");
   nlohmann::ordered_json files = nlohmann::ordered_json::array();
   const std::vector<TableFile> tables = tables_of(input, arguments.text("group"));
   std::size_t left_out = 0;
   for (const TableFile& file : tables) {
-    stop_if_interrupted();
-    if (!bar) bar.emplace(arguments, "importing", tables.size(), "files");
-    bar->update(files.size() + left_out);
+    progress(files.size() + left_out, tables.size());
     const std::string path = file.path.string();
     std::size_t dropped = 0;
     std::optional<Registration> fit;
@@ -261,7 +259,7 @@ int import_tables(const Arguments& arguments, const std::string& input) {
                      {"truth", !recording.truth.empty()}});
     if (fit) files.back()["reliable"] = fit->reliable, files.back()["residual_mm"] = fit->residual;
   }
-  bar.reset();
+  progress = nullptr;
   if (files.empty()) throw FileError(input, "holds no table that could be imported");
   folder.keep();
   arguments.write_json({{"folder", arguments.text("out")},

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <csignal>
-#include <ctime>
 #include <thread>
 
 #include "apps/common/running/signals.h"
+#include "io/numbers/clock.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
@@ -27,16 +27,10 @@ std::chrono::steady_clock::duration seconds(double s) {
 // When the alarm is due, in seconds of the monotonic clock.
 volatile double alarm_due_s = 0;
 
-double monotonic_s() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 // A process that was frozen gets its alarm when the others have ended and said why, so it says nothing.
 void not_together(int) {
   constexpr double kLateS = 0.8;
-  if (monotonic_s() > alarm_due_s + kLateS) _exit(1);
+  if (seconds_of(CLOCK_MONOTONIC) > alarm_due_s + kLateS) _exit(1);
   static const char kText[] =
       "supertac: not all processes of mpirun came to start and to end together within the deadline; start "
       "again\n";
@@ -52,7 +46,7 @@ class Alarm {
     std::signal(SIGALRM, not_together);
     const unsigned wait_s =
         static_cast<unsigned>(std::min(deadline_s, 1e6)) + static_cast<unsigned>(kApartS * rank);
-    alarm_due_s = monotonic_s() + wait_s;
+    alarm_due_s = seconds_of(CLOCK_MONOTONIC) + wait_s;
     alarm(wait_s);
   }
   ~Alarm() { alarm(0); }

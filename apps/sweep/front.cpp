@@ -4,6 +4,7 @@
 
 #include "apps/common/command_line/arguments.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 
@@ -45,9 +46,7 @@ bool Condition::holds(const Configuration& c) const {
 
 std::vector<Condition> conditions_of(const std::string& text) {
   std::vector<Condition> conditions;
-  for (std::size_t at = 0; at <= text.size();) {
-    const std::size_t comma = std::min(text.find(',', at), text.size());
-    const std::string part = text.substr(at, comma - at);
+  for (const std::string& part : comma_list(text + ",")) {
     const std::size_t sign = part.find_first_of("<>");
     const std::size_t value = sign == std::string::npos ? sign : part.find_first_not_of("<>=", sign);
     Condition c;
@@ -67,7 +66,6 @@ std::vector<Condition> conditions_of(const std::string& text) {
           part + "\"");
     }
     conditions.push_back(std::move(c));
-    at = comma + 1;
   }
   return conditions;
 }

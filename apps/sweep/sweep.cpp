@@ -8,7 +8,7 @@
 #include <thread>
 #include <utility>
 
-#include "apps/common/command_line/version.h"
+#include "apps/common/command_line/program.h"
 #include "apps/common/running/measure.h"
 #include "apps/common/running/signals.h"
 #include "apps/train/training_options.h"

@@ -15,11 +15,7 @@ namespace {
 
 constexpr std::uint64_t kMaxBytes = 64 << 20;
 
-std::string header() {
-  std::string line;
-  for (const SweepColumn& column : sweep_columns()) line += (line.empty() ? "" : ",") + column.name;
-  return line;
-}
+std::string header() { return joined(sweep_columns(), ",", &SweepColumn::name); }
 
 std::size_t index_of(const std::string& name) {
   const auto& columns = sweep_columns();
@@ -107,10 +103,6 @@ void SweepTable::add(const nlohmann::ordered_json& values, const std::vector<std
       throw std::invalid_argument("SweepTable: no value for column " + column.name);
     row.push_back(cell(values[column.name]));
   }
-  add(row, order);
-}
-
-void SweepTable::add(const Row& row, const std::vector<std::string>& order) {
   const auto place = [&](const Row& r) {
     const auto found = std::find(order.begin(), order.end(), r[0]);
     return found == order.end() ? -1 : found - order.begin();
@@ -118,10 +110,7 @@ void SweepTable::add(const Row& row, const std::vector<std::string>& order) {
   rows_.insert(std::find_if(rows_.begin(), rows_.end(), [&](const Row& r) { return place(r) > place(row); }),
                row);
   std::string content = header() + "\n";
-  for (const Row& r : rows_) {
-    for (std::size_t i = 0; i < r.size(); ++i) content += (i > 0 ? "," : "") + r[i];
-    content += "\n";
-  }
+  for (const Row& r : rows_) content += joined(r) + "\n";
   write_file(path_, content);
 }
 

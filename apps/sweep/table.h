@@ -39,8 +39,6 @@ class SweepTable {
   /// Adds a row, keys as sweep_columns(), and writes the file atomically: rows of models in `order` stand in
   /// that order, after all others. Throws FileError, std::invalid_argument when a column is missing.
   void add(const nlohmann::ordered_json& values, const std::vector<std::string>& order);
-  /// The same for a row of another table.
-  void add(const Row& row, const std::vector<std::string>& order);
 
   const std::vector<Row>& rows() const { return rows_; }
   static const std::string& text(const Row& row, const std::string& column);

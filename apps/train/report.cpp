@@ -8,6 +8,7 @@
 #include "apps/web/chart.h"
 #include "apps/web/result_page.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -66,10 +67,9 @@ void add_facts(std::vector<std::pair<std::string, std::string>>& facts, const st
     for (const auto& [key, part] : value.items())
       add_facts(facts, (name.empty() ? "" : name + " ") + words(key), part);
   } else if (value.is_array()) {
-    std::string list;
-    for (const auto& part : value)
-      list += (list.empty() ? "" : ", ") + (part.is_string() ? part.get<std::string>() : part.dump());
-    facts.emplace_back(name, list);
+    facts.emplace_back(name, joined(value, ", ", [](const nlohmann::ordered_json& part) {
+                         return part.is_string() ? part.get<std::string>() : part.dump();
+                       }));
   } else if (value.is_boolean()) {
     facts.emplace_back(name, value.get<bool>() ? "yes" : "no");
   } else {

@@ -7,6 +7,7 @@
 #include "apps/train/report.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -29,8 +30,7 @@ std::string csv(const LogLine& line) {
 // A damaged line (the last one of a killed run) is left out.
 std::optional<LogLine> parse(const std::string& text) {
   std::vector<std::optional<double>> v;
-  std::stringstream in(text + ",");
-  for (std::string field; std::getline(in, field, ',');) v.push_back(parse_double(field));
+  for (const std::string& field : comma_list(text + ",")) v.push_back(parse_double(field));
   if (v.size() != 11) return std::nullopt;
   for (std::size_t i = 0; i < 9; ++i) {
     if (!v[i]) return std::nullopt;

@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "apps/common/command_line/program.h"
-#include "apps/common/command_line/version.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/signals.h"
 #include "io/numbers/numbers.h"

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "apps/common/command_line/program.h"
-#include "apps/common/command_line/version.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "data/scores/metrics.h"
@@ -252,9 +251,9 @@ int run(Arguments& a) {
   const std::vector<ModelFile> files = load_models(a.list("model"));
   const ModelFile& file = files.front();
   const WindowSet windows = WindowSet::load(a.text("data"), a.list("plates"), file.windows());
-  const Split split = make_split(windows, split_kind(file.metadata_or("split", "none")),
-                                 parse_uint(file.metadata_or("seed", "0")).value_or(0),
-                                 comma_list(file.metadata_or("leave_out", "")));
+  const Split split = make_split(windows, split_kind(value_or(file.metadata, "split", "none")),
+                                 parse_uint(value_or(file.metadata, "seed", "0")).value_or(0),
+                                 comma_list(value_or(file.metadata, "leave_out")));
   const auto chosen = evenly_spaced(split.test, static_cast<std::size_t>(a.integer("limit", 1, 100'000'000)));
   const Point usual = measure(files, CorruptedWindows(windows, nullptr, 0), chosen);
   const std::string name = a.text("name");

@@ -10,6 +10,7 @@
 #include "data/plates/height_map.h"
 #include "data/plates/random_plate.h"
 #include "io/numbers/same_bits.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 
@@ -86,10 +87,9 @@ std::string meant(const std::string& name) {
   const std::string other = meant(name);
   if (!other.empty() && other != name)
     throw std::invalid_argument("plate \"" + name + "\": names are case-sensitive, is " + other + " meant?");
-  std::string words;
-  for (const TextureKind& kind : kKinds) words += (words.empty() ? "" : "|") + std::string(kind.word);
   throw std::invalid_argument("plate \"" + name + "\": " + why +
-                              "; expected a rig plate such as 3_Bumps, or plain, or " + words +
+                              "; expected a rig plate such as 3_Bumps, or plain, or " +
+                              joined(kKinds, "|", &TextureKind::word) +
                               " with a pitch in mm such as bumps12 or ridges6h1.5, several joined by +, or "
                               "random and a number, or an STL file");
 }

@@ -7,6 +7,7 @@
 #include "io/numbers/hash.h"
 #include "io/numbers/random.h"
 #include "io/numbers/same_bits.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -102,15 +103,13 @@ const std::vector<std::string>& simulator_terms() {
 }
 
 SimulatorSettings without_term(SimulatorSettings settings, const std::string& name) {
-  std::string known;
   for (const Term& term : kTerms) {
-    if (name == term.name) {
-      settings.*term.on = false;
-      return settings;
-    }
-    known += known.empty() ? term.name : std::string(", ") + term.name;
+    if (name != term.name) continue;
+    settings.*term.on = false;
+    return settings;
   }
-  throw std::invalid_argument("simulator: unknown term \"" + name + "\"; known are " + known);
+  throw std::invalid_argument("simulator: unknown term \"" + name + "\"; known are " +
+                              joined(simulator_terms(), ", "));
 }
 
 FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, const FingerIdentity& id)
@@ -124,9 +123,8 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
   const double variation = settings.with_variation ? 1 : 0;
   const double spread = variation * settings.gain_spread;
   const double common_gain = factor(spread * pass.normal(1000));
-  const double tilt = settings.with_tilt ? settings.tilt_mm_per_mm : 0;
   const double tilt_spread = settings.with_tilt ? variation * settings.tilt_spread : 0;
-  const double slope_y = tilt + tilt_spread * trial.normal(1001), slope_x = tilt_spread * trial.normal(1002);
+  const double slope_y = tilt_spread * trial.normal(1001), slope_x = tilt_spread * trial.normal(1002);
   const bool rig = settings.array.rows == rig::kTaxelRows && settings.array.columns == rig::kTaxelColumns;
   const auto taxels = static_cast<std::uint64_t>(settings.array.taxels());
   const std::uint64_t drifts = 100 * (1 + taxels / 100);  // numbers that no gain has taken

@@ -27,7 +27,7 @@ struct SimulatorSettings {
   double dome_radius_mm = 47;
   bool with_edges = true;  ///< beside the plate there is nothing to touch
   bool with_tilt = true;   ///< the finger's rear rows ride lower
-  double tilt_mm_per_mm = 0.0, tilt_spread = 0.01;
+  double tilt_spread = 0.01;
   bool with_gains = true;      ///< taxels differ: the outer columns feel most
   bool with_variation = true;  ///< gain and indentation differ from trial to trial and pass to pass
   double gain_spread = 0.4, indentation_spread_mm = 0.5;

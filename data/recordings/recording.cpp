@@ -117,26 +117,15 @@ int take_count(std::map<std::string, std::string>& metadata, const std::string& 
 void check_shape(const SafetensorsFile& file, const std::string& name, std::vector<std::uint64_t> expected) {
   const auto& shape = file.tensors().at(name).shape;
   if (shape == expected) return;
-  const auto text = [](const std::vector<std::uint64_t>& sizes) {
-    std::string result;
-    for (const std::uint64_t size : sizes) result += (result.empty() ? "" : ",") + std::to_string(size);
-    return "[" + result + "]";
-  };
-  throw FileError(file.path(),
-                  "tensor " + in_quotes(name) + " has shape " + text(shape) + ", expected " + text(expected));
+  throw FileError(file.path(), "tensor " + in_quotes(name) + " has shape " + shape_text(shape) +
+                                   ", expected " + shape_text(expected));
 }
 
 }  // namespace
 
-double Recording::filter_s() const {
-  const auto found = metadata.find("filter_s");
-  return found == metadata.end() ? 0 : parse_double(found->second).value_or(0);
-}
+double Recording::filter_s() const { return parse_double(value_or(metadata, "filter_s")).value_or(0); }
 
-double Recording::began_s() const {
-  const auto found = metadata.find("began_s");
-  return found == metadata.end() ? NAN : parse_double(found->second).value_or(NAN);
-}
+double Recording::began_s() const { return parse_double(value_or(metadata, "began_s")).value_or(NAN); }
 
 void restate(Recording& recording, const SignalScale& scale) {
   if (recording.signal_scale == scale) return;

@@ -43,8 +43,7 @@ void fill_loss(const Registration& registration, Recording& recording) {
 }  // namespace
 
 void apply(const Registration& registration, Recording& recording, double x_mm) {
-  const auto base = recording.metadata.find("time_base");
-  const bool nominal = base != recording.metadata.end() && base->second == "nominal";
+  const bool nominal = value_or(recording.metadata, "time_base") == "nominal";
   const std::size_t n = recording.frames();
   recording.position_mm.resize(2 * n);
   const auto x = static_cast<float>(x_mm);

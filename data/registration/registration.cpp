@@ -221,12 +221,8 @@ class Fit {
 // The speed that is stated against the one that was fitted, and both against what the signals can show.
 std::string why_implausible(const Registration& r, const Recording& recording, const Plate& plate) {
   const double speed = recording.speed_mm_s > 0 ? recording.speed_mm_s : rig::kSlideMmS;
-  const auto text_of = [&](const char* key) {
-    const auto found = recording.metadata.find(key);
-    return found == recording.metadata.end() ? std::string() : found->second;
-  };
-  const bool counted = text_of("time_base") == "nominal";
-  const double lost = parse_double(text_of("lost_frames")).value_or(0);
+  const bool counted = value_or(recording.metadata, "time_base") == "nominal";
+  const double lost = parse_double(value_or(recording.metadata, "lost_frames")).value_or(0);
   const double seen = recording.frames() > 0 ? lost / static_cast<double>(recording.frames()) : 0;
   const double clock = r.rate / speed;  // true seconds in one of the recording's
   const std::string both =

@@ -72,12 +72,9 @@ class Keys {
   template <class Table>
   auto one_of(const char* name, const Table& table, const std::string& fallback) {
     const std::string word = text(name, fallback);
-    std::string words;
-    for (const auto& [known, value] : table) {
+    for (const auto& [known, value] : table)
       if (word == known) return value;
-      words += (words.empty() ? "" : ", ") + std::string(known);
-    }
-    wrong(name, "one of " + words, Json(word));
+    wrong(name, "one of " + joined(table, ", ", [](const auto& entry) { return entry.first; }), Json(word));
   }
   void no_others() const {
     for (const auto& [name, value] : json_.items())

@@ -5,6 +5,7 @@
 #include "data/windows/split.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -41,12 +42,6 @@ class SwingRanges {
   std::size_t at_the_end_ = 0, count_ = 0;
 };
 
-std::string numbers(const std::vector<std::size_t>& all) {
-  std::string text;
-  for (const std::size_t n : all) text += (text.empty() ? "" : ", ") + std::to_string(n);
-  return text;
-}
-
 }  // namespace
 
 std::vector<std::string> remarks_on(const WindowSet& windows, std::span<const std::uint32_t> chosen) {
@@ -61,7 +56,7 @@ std::vector<std::string> remarks_on(const WindowSet& windows, std::span<const st
     remarks.emplace_back(
         "no signal changes: the sensor is dead, or its signals lie outside the model's range");
   else if (!still.empty())
-    remarks.push_back("signals " + numbers(still) + " never change: dead taxels, or stuck ones");
+    remarks.push_back("signals " + joined(still, ", ") + " never change: dead taxels, or stuck ones");
   if (swings.share_at_the_end() >= kAtTheEnd)
     remarks.push_back(format(100 * swings.share_at_the_end(), 1) +
                       " % of the signals lie at the end of the model's range: saturated, or clipped");

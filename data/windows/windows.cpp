@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
 #include "data/plates/height_map.h"
 #include "data/plates/plate_file.h"
 #include "data/plates/truth.h"
-#include "data/windows/chosen_plates.h"
 #include "data/windows/transforms/normalise_window.h"
 #include "io/numbers/hash.h"
 #include "io/numbers/numbers.h"
@@ -41,8 +41,7 @@ class WhyNone {
  public:
   WhyNone(const Recording& recording, const Track& track, const Plate& plate)
       : track_(track), measured_(!recording.truth.empty()), clear_mm_(plate.max_height() + kClearanceMm) {
-    const auto flag = recording.metadata.find("registration_reliable");
-    reliable_ = flag == recording.metadata.end() || flag->second != "no";
+    reliable_ = value_or(recording.metadata, "registration_reliable") != "no";
   }
   std::size_t WindowCounts::*operator()(std::size_t frame) const {
     if (measured_) return nullptr;
@@ -109,12 +108,14 @@ void WindowSet::check_any(const std::string& dir) const {
 
 void WindowSet::add_directory(const std::string& dir, const std::vector<std::string>& plates,
                               const PassUse& use, const ReadingWatch& watch) {
-  ChosenPlates chosen(plates);
+  std::set<std::string> missing(plates.begin(), plates.end()), found;
   const std::vector<std::string> paths = list_recordings(dir);
   for (std::size_t i = 0; i < paths.size(); ++i) {
     if (watch) watch(i, paths.size());
     const Recording recording = read_recording(paths[i]);
-    if (!chosen.take(recording.plate)) continue;
+    found.insert(recording.plate);
+    missing.erase(recording.plate);
+    if (!plates.empty() && std::ranges::find(plates, recording.plate) == plates.end()) continue;
     try {
       add(recording, dir, use);
     } catch (const std::bad_alloc&) {
@@ -123,7 +124,9 @@ void WindowSet::add_directory(const std::string& dir, const std::vector<std::str
       throw std::runtime_error(paths[i] + ": " + error.what());
     }
   }
-  chosen.check(dir);
+  if (!missing.empty())
+    throw std::invalid_argument("windows: plate '" + *missing.begin() + "' has no recording in " + dir +
+                                "; it has those of " + joined(found, ", "));
 }
 
 WindowSet::WindowSet(const WindowSettings& settings)
@@ -173,13 +176,12 @@ void WindowSet::add(const Recording& recording, const std::string& folder, const
                                            .max_gap_s = settings_.max_gap_s,
                                            .frames_apart = settings_.timesteps == 1,
                                            .scaling = settings_.scaling});
-  const auto group = recording.metadata.find("group");
   Pass pass{.plate = recording.plate,
             .trial = recording.trial,
             .pass = recording.pass,
             .speed_mm_s = recording.speed_mm_s,
             .source = recording.source,
-            .group = group == recording.metadata.end() ? "" : group->second,
+            .group = value_or(recording.metadata, "group"),
             .filter_s = recording.filter_s(),
             .frames = track.frames(),
             .first_window = size(),

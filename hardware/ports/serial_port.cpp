@@ -7,7 +7,6 @@
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <termios.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,6 +14,7 @@
 
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_termios.h"
+#include "io/numbers/clock.h"
 
 namespace supertac {
 namespace {
@@ -48,11 +48,7 @@ void raise_modem_lines(int descriptor) {
 
 }  // namespace
 
-double monotonic_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
+double monotonic_seconds() { return seconds_of(CLOCK_MONOTONIC); }
 
 SerialPort::SerialPort(const std::string& path, const SerialSettings& settings)
     : path_(path), speedup_(settings.speedup) {

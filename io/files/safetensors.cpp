@@ -251,4 +251,12 @@ void write_safetensors(const OutputPath& output, std::map<std::string, std::stri
   file.commit();
 }
 
+std::string shape_text(const std::vector<std::uint64_t>& shape) { return "[" + joined(shape) + "]"; }
+
+std::string value_or(const std::map<std::string, std::string>& metadata, const std::string& key,
+                     const std::string& otherwise) {
+  const auto found = metadata.find(key);
+  return found == metadata.end() ? otherwise : found->second;
+}
+
 }  // namespace supertac

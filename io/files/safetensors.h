@@ -62,6 +62,13 @@ class SafetensorsFile {
   ChecksumState checksum_ = ChecksumState::absent;
 };
 
+/// "[2,3,40]".
+std::string shape_text(const std::vector<std::uint64_t>& shape);
+
+/// A field of the metadata, or `otherwise` where there is none.
+std::string value_or(const std::map<std::string, std::string>& metadata, const std::string& key,
+                     const std::string& otherwise = "");
+
 using ByteSink = std::function<void(std::span<const std::byte>)>;
 
 struct TensorToWrite {

@@ -1,6 +1,7 @@
 #include "io/files/safetensors_header.h"
 
 #include "io/files/json.h"
+#include "io/numbers/hash.h"
 #include "io/numbers/text.h"
 
 namespace supertac::safetensors {
@@ -118,11 +119,6 @@ std::optional<std::size_t> checksum_position(std::string_view text) {
   return digits;
 }
 
-std::string checksum_digits(std::uint32_t checksum) {
-  std::string digits(kChecksumDigits, '0');
-  for (std::size_t i = kChecksumDigits; i-- > 0; checksum >>= 4)
-    digits[i] = "0123456789abcdef"[checksum & 15];
-  return digits;
-}
+std::string checksum_digits(std::uint32_t checksum) { return hex_digits(checksum, kChecksumDigits); }
 
 }  // namespace supertac::safetensors

@@ -4,9 +4,9 @@
 
 namespace supertac {
 
-std::string Hash::hex() const {
-  std::string text(16, '0');
-  for (std::size_t i = 0; i < 16; ++i) text[i] = "0123456789abcdef"[(state_ >> (60 - 4 * i)) & 15];
+std::string hex_digits(std::uint64_t value, std::size_t digits) {
+  std::string text(digits, '0');
+  for (; digits-- > 0; value >>= 4) text[digits] = "0123456789abcdef"[value & 15];
   return text;
 }
 

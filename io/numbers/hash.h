@@ -22,6 +22,9 @@ constexpr std::uint64_t mix64(std::uint64_t z) {
 constexpr std::uint64_t kGolden64 =
     0x9e3779b97f4a7c15ULL;  ///< odd step that keeps counters apart before mix64
 
+/// The last `digits` hexadecimal digits of a number, in lower case.
+std::string hex_digits(std::uint64_t value, std::size_t digits);
+
 /// Words one after the other: state = mix64(state * kGolden64 + word). Fingerprints in checkpoints are made
 /// of it.
 class Hash {
@@ -35,7 +38,7 @@ class Hash {
   }
   std::uint64_t value() const { return state_; }
   /// 16 lower-case hexadecimal digits.
-  std::string hex() const;
+  std::string hex() const { return hex_digits(value(), 16); }
 
  private:
   std::uint64_t state_;

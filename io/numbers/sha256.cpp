@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "io/numbers/hash.h"
+
 namespace supertac {
 namespace {
 
@@ -67,9 +69,7 @@ std::string Sha256::hex() const {
   for (std::size_t i = 0; i < 8; ++i) rest[1 + zeros + i] = static_cast<std::byte>(bits >> (56 - 8 * i));
   end.add(std::span(rest).first(zeros + 9));
   std::string text;
-  for (const std::uint32_t word : end.state_) {
-    for (int shift = 28; shift >= 0; shift -= 4) text += "0123456789abcdef"[word >> shift & 15];
-  }
+  for (const std::uint32_t word : end.state_) text += hex_digits(word, 8);
   return text;
 }
 

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 namespace supertac {
@@ -24,5 +26,19 @@ std::vector<std::string_view> split_line(std::string_view line, char separator);
 
 /// The parts between the commas, untrimmed; none for an empty text.
 std::vector<std::string> comma_list(const std::string& text);
+
+/// The words or numbers, or that member or function of each, with `between` between them.
+template <class Range, class Part = std::identity>
+std::string joined(const Range& all, std::string_view between = ",", Part part = {}) {
+  std::string text;
+  for (const auto& one : all) {
+    if (!text.empty()) text += between;
+    if constexpr (std::is_arithmetic_v<std::remove_cvref_t<std::invoke_result_t<Part&, decltype(one)>>>)
+      text += std::to_string(std::invoke(part, one));
+    else
+      text += std::invoke(part, one);
+  }
+  return text;
+}
 
 }  // namespace supertac

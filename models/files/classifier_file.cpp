@@ -32,19 +32,16 @@ NamedClassifier::Answer NamedClassifier::name_of(std::span<const float> picture)
 
 void save_classifier(const OutputPath& output, const TextureClassifier& network,
                      const ClassifierSettings& settings, const std::vector<std::string>& names) {
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "" : ",") + name;
   const nlohmann::ordered_json json = {
-      {"height", settings.height}, {"width", settings.width}, {"names", list}};
+      {"height", settings.height}, {"width", settings.width}, {"names", joined(names)}};
   write_checkpoint(output, network.parameters(), {{"kind", kKind}, {"settings", json.dump()}});
 }
 
 NamedClassifier load_classifier(const std::string& path) {
   const SafetensorsFile file = read_checkpoint(path);
-  const auto kind = file.metadata().find("kind");
-  if (kind == file.metadata().end() || kind->second != kKind)
-    throw std::runtime_error(path + ": is a " +
-                             in_quotes(kind == file.metadata().end() ? "checkpoint" : kind->second) +
+  const std::string kind = value_or(file.metadata(), "kind", "checkpoint");
+  if (kind != kKind)
+    throw std::runtime_error(path + ": is a " + in_quotes(kind) +
                              ", expected a classifier as supertac-classify --out writes it");
   const JsonEntry settings(file.metadata(), path, "settings");
   NamedClassifier loaded;

@@ -116,11 +116,6 @@ std::map<std::string, std::string> model_metadata(const SuperTacSettings& s, con
   return {{"settings", settings.dump()}, {"input", scaling.dump()}};
 }
 
-std::string ModelFile::metadata_or(const std::string& key, const std::string& otherwise) const {
-  const auto found = metadata.find(key);
-  return found == metadata.end() ? otherwise : found->second;
-}
-
 std::optional<double> InputSettings::filter_left(double done_s) const {
   constexpr double kSameS = 1e-4;
   const double wanted_s = filter_s.value_or(done_s);
@@ -129,7 +124,7 @@ std::optional<double> InputSettings::filter_left(double done_s) const {
 }
 
 double ModelFile::interval_factor() const {
-  return parse_double(metadata_or("interval_factor", "")).value_or(kIntervalFactor);
+  return parse_double(value_or(metadata, "interval_factor")).value_or(kIntervalFactor);
 }
 
 TaxelArray ModelFile::array() const {

@@ -42,8 +42,6 @@ struct ModelFile {
   std::optional<ActivationRanges> ranges;  ///< what int8 needs; empty in older files
   std::map<std::string, std::string> metadata;
 
-  /// An entry of the metadata, `otherwise` when it is missing.
-  std::string metadata_or(const std::string& key, const std::string& otherwise) const;
   /// Half the width of a pixel's interval in units of its predicted error.
   double interval_factor() const;
   /// The sensor it was trained on.

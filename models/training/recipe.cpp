@@ -18,12 +18,6 @@ void require(bool holds, const std::string& what, double found) {
   if (!holds) throw std::invalid_argument("recipe: expected " + what + ", got " + format(found));
 }
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ",") + word;
-  return text;
-}
-
 void read_training(const JsonEntry& entry, Recipe& r) {
   r.epochs = entry.integer("epochs");
   r.batch = entry.integer("batch");
@@ -135,9 +129,10 @@ Recipe Recipe::of(const ModelFile& file, const std::string& path) {
   read_training({file.metadata, path, "training"}, r);
   r.seed = whole("seed", entry("seed"));
   r.stride = static_cast<std::int64_t>(whole("stride", entry("stride")));
-  r.random_plates = static_cast<std::int64_t>(whole("random_plates", file.metadata_or("random_plates", "0")));
+  r.random_plates =
+      static_cast<std::int64_t>(whole("random_plates", value_or(file.metadata, "random_plates", "0")));
   r.plates = comma_list(entry("plates"));
-  r.leave_out = comma_list(file.metadata_or("leave_out", ""));
+  r.leave_out = comma_list(value_or(file.metadata, "leave_out"));
   r.rate_hz = file.input.rate_hz;
   r.range = file.input.scaling;
   r.per_window = file.input.scaling.per_window;

@@ -131,8 +131,7 @@ void TrainingState::restore(const std::string& path, const std::map<std::string,
   const SafetensorsFile file = read_checkpoint(path);
   expect_same(file, path, expected);
   const auto integer = [&](const char* key) {
-    const auto found = file.metadata().find(key);
-    const auto value = found == file.metadata().end() ? std::nullopt : parse_int(found->second);
+    const auto value = parse_int(value_or(file.metadata(), key));
     if (!value || *value < 0 || *value > total_steps()) {
       throw std::runtime_error(path + ": holds no training state (metadata \"" + key +
                                "\"); resume from the last.safetensors of the run's folder");

@@ -9,7 +9,6 @@
 #include <limits>
 #include <set>
 
-#include "apps/common/command_line/command_words.h"
 #include "apps/common/command_line/nearest.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/threads.h"
@@ -53,6 +52,16 @@ std::string without_controls(std::string_view line) {
       text.begin(), text.end(),
       [](unsigned char c) { return (c < ' ' && c != '\t' && c != '\n') || c == 0x7F; }, '?');
   return text;
+}
+
+// The word as a shell takes it: in single quotes where it holds more than letters, digits and -_./,:=+%@.
+std::string quoted_word(std::string_view word) {
+  constexpr std::string_view kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_./,:=+%@";
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string_view::npos) return std::string(word);
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
 }
 
 }  // namespace
@@ -301,13 +310,9 @@ std::string Arguments::text(const std::string& name) const {
 
 std::string Arguments::choice(const std::string& name, const std::vector<std::string>& words) const {
   const std::string word = text(name);
-  std::string all;
-  for (const std::string& known : words) {
-    if (word == known) return word;
-    all += (all.empty() ? "" : ", ") + known;
-  }
+  if (std::ranges::find(words, word) != words.end()) return word;
   const std::string hint = nearest_name(word, words);
-  throw UsageError("--" + name + ": expected one of " + all + ", found " + in_quotes(word) +
+  throw UsageError("--" + name + ": expected one of " + joined(words, ", ") + ", found " + in_quotes(word) +
                    (hint.empty() ? "" : "; did you mean '" + hint + "'?"));
 }
 
@@ -329,18 +334,15 @@ double Arguments::number(const std::string& name, double lowest, double highest)
 }
 
 std::vector<std::string> Arguments::list(const std::string& name) const {
-  std::vector<std::string> elements;
   std::set<std::string> seen;
   const std::string value = text(name);
-  if (value.empty()) return elements;
-  for (std::string_view rest = value;; rest.remove_prefix(1)) {
-    const std::string element(rest.substr(0, rest.find(',')));
+  const std::vector<std::string> elements = comma_list(value);
+  for (const std::string& element : elements) {
     if (element.empty()) reject(name, "a list without empty elements", value);
     if (!seen.insert(element).second) reject(name, "every element once", value);
-    elements.push_back(element);
-    rest.remove_prefix(element.size());
-    if (rest.empty()) return elements;
   }
+  if (value.ends_with(',')) reject(name, "a list without empty elements", value);
+  return elements;
 }
 
 std::vector<double> Arguments::numbers(const std::string& name, double lowest, double highest) const {

@@ -103,7 +103,7 @@ class Arguments {
   /// The whole command line, words quoted as a shell takes them, for a run's settings.
   const std::string& command_line() const { return command_line_; }
   /// Program and options that decide what it makes, in the order of declaration: no files and folders, and
-  /// nothing of how it is computed, shown or kept. command_words() has the words again.
+  /// nothing of how it is computed, shown or kept.
   std::string deciding_options() const;
   bool declares(const std::string& name) const { return options_.contains(name); }
   std::string help() const;

@@ -17,7 +17,6 @@
 #include <thread>
 #include <vector>
 
-#include "apps/common/command_line/version.h"
 #include "apps/common/output/outputs.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/launch.h"

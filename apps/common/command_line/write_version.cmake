@@ -10,7 +10,7 @@ if(git)
   endif()
 endif()
 file(CONFIGURE OUTPUT ${OUTPUT} @ONLY CONTENT
-"#include \"apps/common/command_line/version.h\"
+"namespace supertac { const char* commit(); }
 
 const char* supertac::commit() { return \"@commit@\"; }
 ")

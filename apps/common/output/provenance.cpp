@@ -4,7 +4,6 @@
 #include <ctime>
 
 #include "apps/common/command_line/program.h"
-#include "apps/common/command_line/version.h"
 #include "io/files/file.h"
 #include "io/files/provenance.h"
 #include "io/numbers/sha256.h"

@@ -1,11 +1,10 @@
 #include "apps/common/running/measure.h"
 
-#include <time.h>
-
 #include <fstream>
 #include <sstream>
 #include <vector>
 
+#include "io/numbers/clock.h"
 #include "io/numbers/median.h"
 
 namespace supertac {
@@ -13,11 +12,7 @@ namespace {
 
 constexpr int kWarmUp = 50, kPictures = 1000;
 
-double thread_seconds() {
-  timespec t{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
+double thread_seconds() { return seconds_of(CLOCK_THREAD_CPUTIME_ID); }
 
 }  // namespace
 

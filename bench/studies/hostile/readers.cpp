@@ -1,7 +1,6 @@
 #include "bench/studies/hostile/readers.h"
 
 #include <cstring>
-#include <ctime>
 #include <fstream>
 #include <functional>
 #include <iostream>
@@ -24,6 +23,7 @@
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/files/safetensors.h"
+#include "io/numbers/clock.h"
 #include "io/numbers/random.h"
 #include "models/files/model_file.h"
 #include "tests/apps/web/http_client.h"
@@ -81,11 +81,7 @@ Recording short_recording() {
 }
 
 // Of this thread: other work of the machine is no reader's fault.
-double processor_seconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
+double processor_seconds() { return seconds_of(CLOCK_THREAD_CPUTIME_ID); }
 
 }  // namespace
 

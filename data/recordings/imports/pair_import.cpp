@@ -12,12 +12,6 @@ namespace {
 
 using Shape = std::vector<std::uint64_t>;
 
-std::string text_of(const Shape& shape) {
-  std::string all;
-  for (const std::uint64_t size : shape) all += (all.empty() ? "" : ",") + std::to_string(size);
-  return "[" + all + "]";
-}
-
 const Shape& shape_of(const SafetensorsFile& file, const char* name, const char* expected) {
   const auto found = file.tensors().find(name);
   if (found == file.tensors().end())
@@ -25,14 +19,15 @@ const Shape& shape_of(const SafetensorsFile& file, const char* name, const char*
                                      "'; expected input F32 [N,C,H,W] and target F32 [N,1,sH,sW]");
   const auto& [dtype, shape, begin, end] = found->second;
   if (dtype != "F32" || shape.size() != 4 || std::ranges::find(shape, 0U) != shape.end())
-    throw FileError(file.path(), std::string("tensor '") + name + "' is " + dtype + " " + text_of(shape) +
+    throw FileError(file.path(), std::string("tensor '") + name + "' is " + dtype + " " + shape_text(shape) +
                                      ", expected F32 " + expected + "; convert it before saving");
   return shape;
 }
 
 TaxelArray array_of(const SafetensorsFile& file, const Shape& input, const Shape& target) {
   const auto refuse = [&](const std::string& what) {
-    throw FileError(file.path(), "input " + text_of(input) + ", target " + text_of(target) + ": " + what);
+    throw FileError(file.path(),
+                    "input " + shape_text(input) + ", target " + shape_text(target) + ": " + what);
   };
   if (target[0] != input[0] || target[1] != 1) refuse("expected as many targets as inputs, of one channel");
   if (input[1] > 8 || input[2] > 64 || input[3] > 64)
@@ -75,7 +70,7 @@ std::map<std::string, std::vector<std::size_t>> groups_of(const SafetensorsFile&
   }
   const auto& [dtype, shape, begin, end] = found->second;
   if (shape != Shape{count} || (dtype != "I64" && dtype != "I32"))
-    throw FileError(file.path(), "tensor 'group' is " + dtype + " " + text_of(shape) + ", expected I64 [" +
+    throw FileError(file.path(), "tensor 'group' is " + dtype + " " + shape_text(shape) + ", expected I64 [" +
                                      std::to_string(count) + "]");
   const std::vector<std::int64_t> numbers = dtype == "I64" ? whole_numbers<std::int64_t>(file.bytes("group"))
                                                            : whole_numbers<std::int32_t>(file.bytes("group"));

@@ -83,9 +83,8 @@ void check_shape(const Table& table, const Sensor& sensor) {
     std::erase(form, 1U);
     if (found == form) return;
   }
-  std::string text;
-  for (const std::size_t n : table.shape) text += (text.empty() ? "" : "x") + std::to_string(n);
-  throw std::invalid_argument("holds frames of " + text + ", the sensor's file says " + sensor.array.text());
+  throw std::invalid_argument("holds frames of " + joined(table.shape, "x") + ", the sensor's file says " +
+                              sensor.array.text());
 }
 
 std::string name_of(const Table& table, std::size_t column) {

@@ -4,7 +4,6 @@
 #include <filesystem>
 
 #include "apps/common/command_line/arguments.h"
-#include "apps/common/command_line/command_words.h"
 #include "apps/common/command_line/nearest.h"
 #include "apps/common/output/output_folder.h"
 #include "apps/common/running/progress.h"
@@ -126,15 +125,6 @@ TEST(Progress, SaysAboutHowLong) {
   EXPECT_EQ(about(38), "40 seconds");
   EXPECT_EQ(about(700), "12 minutes");
   EXPECT_EQ(about(9000), "2.5 hours");
-}
-
-TEST(CommandWords, AreTheSameAgain) {
-  const std::vector<std::string> words = {"supertac-train", "--data", "my data", "", "it's", "a\\b", "x,y=1"};
-  std::string line;
-  for (const std::string& word : words) line += (line.empty() ? "" : " ") + quoted_word(word);
-  EXPECT_EQ(command_words(line), words) << line;
-  EXPECT_EQ(quoted_word("plain-word_1.5"), "plain-word_1.5");
-  EXPECT_THROW(command_words("a 'b"), std::invalid_argument);
 }
 
 // Not to be replaced; what was said of a name that was taken goes to `said`.
