@@ -36,9 +36,9 @@ std::vector<Variable> parameters_of(const Classifier& classifier) {
 }
 
 Tensor gather(const WindowSet& data, std::span<const std::uint32_t> indices) {
-  Tensor windows(
-      Shape{static_cast<Dim>(indices.size()), data.timesteps(), static_cast<Dim>(data.array().signals())});
-  const auto size = static_cast<std::size_t>(data.timesteps()) * data.array().signals();
+  Tensor windows(Shape{static_cast<Dim>(indices.size()), static_cast<Dim>(data.frames()),
+                       static_cast<Dim>(data.array().signals())});
+  const std::size_t size = data.input_size();
   for (std::size_t n = 0; n < indices.size(); ++n) {
     data.window(indices[n], windows.values().subspan(n * size, size));
   }

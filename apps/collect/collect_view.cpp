@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "apps/common/running/signals.h"
@@ -12,14 +11,13 @@
 #include "apps/web/pages.h"
 #include "data/plates/truth.h"
 #include "data/sensors/rig.h"
+#include "hardware/printers/marlin_line.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {
 
 constexpr int kWidth = static_cast<int>(rig::kPlateWidthMm), kLength = static_cast<int>(rig::kPlateLengthMm);
-
-double way(const Point3& a, const Point3& b) { return std::hypot(a.x - b.x, a.y - b.y, a.z - b.z); }
 
 // A run that lifts the finger is under way after the first wish; a second one would end it at once.
 std::string stop_as_ctrl_c() {
@@ -75,10 +73,10 @@ std::string CollectView::hello() const {
 }
 
 double CollectView::seconds_left(const State& state) const {
-  double seconds = way(state.at, state.leg.to) / state.leg.speed;
+  double seconds = distance(state.at, state.leg.to) / state.leg.speed;
   bool later = false;
   for (const Leg& leg : legs_) {
-    if (later) seconds += way(leg.from, leg.to) / leg.speed;
+    if (later) seconds += distance(leg.from, leg.to) / leg.speed;
     later = later || (leg.pass == state.leg.pass && leg.phase == state.leg.phase);
   }
   return seconds / speedup_;

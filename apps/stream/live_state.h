@@ -13,20 +13,20 @@ namespace supertac {
 
 struct LiveState {
   TaxelArray array;
-  int scale = 4;                   ///< of the picture
-  std::uint64_t number = 0;        ///< of the picture, as Seen
-  double time_s = 0;               ///
+  int scale = 4;             ///< of the picture
+  std::uint64_t number = 0;  ///< of the picture, as Seen
+  double time_s = 0;
   std::vector<float> taxels;       ///< [rows][columns] in [0,1], as RawArray; empty before the first
   double top = 0;                  ///< what 1 is, in the sensor's unit from rest
   std::string unit = {};           ///< of top
   bool draws = true;               ///< there is a model
   std::vector<float> picture;      ///< [rows * scale][columns * scale]; empty before the first
   std::vector<float> half_widths;  ///< the same, as Seen
-  std::optional<double> distance;  ///
-  bool unlike_training = false;    ///< the signals are not such as the model has learnt from
-  std::string texture;             ///< that the picture shows, by a classifier; empty: none, or no texture
-  double texture_probability = 0;  ///
-  float x_mm = NAN, y_mm = NAN;    ///< of the finger's centre on the plate, where known
+  std::optional<double> distance;
+  bool unlike_training = false;  ///< the signals are not such as the model has learnt from
+  std::string texture;           ///< that the picture shows, by a classifier; empty: none, or no texture
+  double texture_probability = 0;
+  float x_mm = NAN, y_mm = NAN;  ///< of the finger's centre on the plate, where known
   double frames_per_s = 0;
   double median_ms = 0, p99_ms = 0;  ///< latency
   std::uint64_t lost = 0, dropped = 0;

@@ -20,26 +20,33 @@ constexpr char kCaptureHeader[] = R"({"version":1,"kind":"stream"})";
 class BoardSource : public SensorSource {
  public:
   /// The capture takes the name `final_name` when it is complete.
-  BoardSource(std::unique_ptr<Port> port, std::unique_ptr<JournalWriter> capture, std::string final_name,
-              double speedup)
-      : SensorSource(rig::kFramePeriodS, 0, true),
+  BoardSource(std::unique_ptr<Port> port, bool live, double speedup = 1,
+              std::unique_ptr<JournalWriter> capture = nullptr, std::string final_name = {})
+      : SensorSource(rig::kFramePeriodS, 0, live),
         final_name_(std::move(final_name)),
         speedup_(speedup),
         capture_(std::move(capture)),
         board_(capture_ ? std::make_unique<CapturedPort>(std::move(port), *capture_, Stream::board)
-                        : std::move(port)) {}
+                        : std::move(port),
+               {.wait_for_consumer = !live}) {}
 
   std::optional<SensorFrame> next(double wait_s) override {
     if (capture_) capture_->check();
-    const auto frame = board_.next(wait_s);
-    if (!frame) return std::nullopt;
-    volts_ = taxel_volts(frame->frame);
-    return SensorFrame{.time_s = frame->time_s,
-                       .volts = volts_,
-                       .arrived_s = frame->arrival.time_s / speedup_,
-                       .arrival = frame->arrival};
+    try {
+      const auto frame = board_.next(wait_s);
+      if (!frame) return std::nullopt;
+      volts_ = taxel_volts(frame->frame);
+      return SensorFrame{.time_s = frame->time_s,
+                         .volts = volts_,
+                         .arrived_s = live() ? frame->arrival.time_s / speedup_ : monotonic_seconds(),
+                         .arrival = frame->arrival};
+    } catch (const PortUnplugged&) {  // how a capture that is replayed ends
+      if (live()) throw;
+      ended_ = true;
+      return std::nullopt;
+    }
   }
-  bool ended() const override { return false; }
+  bool ended() const override { return ended_; }
   BoardCounters counters() override { return board_.counters(); }
   void finish() override {
     board_.stop();
@@ -52,36 +59,6 @@ class BoardSource : public SensorSource {
   std::string final_name_;
   double speedup_;
   std::unique_ptr<JournalWriter> capture_;  // outlives the board, whose port writes to it
-  TactileBoard board_;
-  std::array<float, kTaxels> volts_{};
-};
-
-class ReplaySource : public SensorSource {
- public:
-  explicit ReplaySource(const std::string& journal)
-      : SensorSource(rig::kFramePeriodS, 0, false),
-        board_(std::make_unique<ReplayPort>(read_journal(journal).of(Stream::board), journal),
-               {.wait_for_consumer = true}) {}
-
-  std::optional<SensorFrame> next(double wait_s) override {
-    try {
-      const auto frame = board_.next(wait_s);
-      if (!frame) return std::nullopt;
-      volts_ = taxel_volts(frame->frame);
-      return SensorFrame{.time_s = frame->time_s,
-                         .volts = volts_,
-                         .arrived_s = monotonic_seconds(),
-                         .arrival = frame->arrival};
-    } catch (const PortUnplugged&) {  // how a capture ends
-      ended_ = true;
-      return std::nullopt;
-    }
-  }
-  bool ended() const override { return ended_; }
-  BoardCounters counters() override { return board_.counters(); }
-  void finish() override { board_.stop(); }
-
- private:
   TactileBoard board_;
   std::array<float, kTaxels> volts_{};
   bool ended_ = false;
@@ -159,7 +136,7 @@ std::unique_ptr<SensorSource> open_board(const std::string& port, double speedup
   std::error_code error;
   const std::string name = std::filesystem::exists(capture, error) ? capture + ".new" : capture;
   auto journal = capture.empty() ? nullptr : std::make_unique<JournalWriter>(name, kCaptureHeader);
-  return std::make_unique<BoardSource>(std::move(serial), std::move(journal), capture, speedup);
+  return std::make_unique<BoardSource>(std::move(serial), true, speedup, std::move(journal), capture);
 }
 
 ProbeReport listen(const Sensor& sensor, bool known_array, double seconds) {
@@ -196,7 +173,8 @@ std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup) 
 }
 
 std::unique_ptr<SensorSource> open_replay(const std::string& journal) {
-  return std::make_unique<ReplaySource>(journal);
+  return std::make_unique<BoardSource>(
+      std::make_unique<ReplayPort>(read_journal(journal).of(Stream::board), journal), false);
 }
 
 std::unique_ptr<SensorSource> open_recording(const std::string& path) {

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <functional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "data/recordings/resample.h"
@@ -19,9 +18,6 @@ using ReadingWatch = std::function<void(std::size_t done, std::size_t all)>;
 /// frames fewer.
 class SignalRange {
  public:
-  SignalRange() = default;
-  /// From the values() of a SignalRange to which all recordings were added.
-  explicit SignalRange(std::vector<float> values) : values_(std::move(values)), sorted_(false) {}
   /// Of a folder's recordings, only these plates when any are named. Throws as list_recordings() and
   /// read_recording().
   static SignalRange of_folder(const std::string& dir, const std::vector<std::string>& plates,

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <exception>
 #include <filesystem>
-#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -172,14 +171,6 @@ void import_text_folder(const std::string& root, const FolderImport& settings,
     take(std::exchange(plate, {}));
   }
   if (!any) throw FileError(root, "none of " + std::to_string(found.size()) + " files is a recording");
-}
-
-std::vector<ImportedPass> import_text_folder(const std::string& root, const FolderImport& settings) {
-  std::vector<ImportedPass> all;
-  import_text_folder(root, settings, [&all](std::vector<ImportedPass> plate) {
-    std::move(plate.begin(), plate.end(), std::back_inserter(all));
-  });
-  return all;
 }
 
 std::string ImportedPass::summary() const {

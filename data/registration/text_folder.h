@@ -60,7 +60,5 @@ struct FolderImport {
 /// `take` gets the passes of one plate after the other, so that no more than these are in memory.
 void import_text_folder(const std::string& root, const FolderImport& settings,
                         const std::function<void(std::vector<ImportedPass>)>& take);
-/// The same, all passes at once.
-std::vector<ImportedPass> import_text_folder(const std::string& root, const FolderImport& settings);
 
 }  // namespace supertac

@@ -148,12 +148,6 @@ ImageScores ImageScorer::operator()(std::span<const float> output, std::span<con
   return scores;
 }
 
-MetricsAccumulator::MetricsAccumulator(const ImageGrid& grid) : grid_(grid), scorer_(grid) {}
-
-void MetricsAccumulator::add(std::span<const float> output, std::span<const float> truth) {
-  add(output, truth, scorer_(output, truth));
-}
-
 void MetricsAccumulator::add(std::span<const float> output, std::span<const float> truth,
                              const ImageScores& scores) {
   ++windows_;

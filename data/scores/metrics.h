@@ -92,10 +92,8 @@ class MetricsAccumulator {
  public:
   static constexpr std::size_t kFloorPairs = 256;
 
-  /// Throws as ImageScorer.
-  explicit MetricsAccumulator(const ImageGrid& grid);
-  void add(std::span<const float> output, std::span<const float> truth);
-  /// The same for scores that `ImageScorer` has given for this pair.
+  explicit MetricsAccumulator(const ImageGrid& grid) : grid_(grid) {}
+  /// `scores`: what an ImageScorer gave for this pair.
   void add(std::span<const float> output, std::span<const float> truth, const ImageScores& scores);
   Metrics result() const;
 
@@ -104,7 +102,6 @@ class MetricsAccumulator {
   double floor() const;
 
   ImageGrid grid_;
-  ImageScorer scorer_;
   std::uint64_t windows_ = 0, positions_ = 0;
   std::uint64_t silent_ = 0, ghosts_ = 0, felt_ = 0, misses_ = 0;
   double psnr_ = 0, mse_ = 0, ssim_ = 0, peak_ = 0, distance_px_ = 0, distance_mm_ = 0;  // sums

@@ -77,7 +77,7 @@ struct Moments {
   double yy = 0;
 
   Moments(const WindowSet& windows, std::span<const std::uint32_t> indices, Fit& fit)
-      : features(features_of(static_cast<std::size_t>(windows.timesteps()), windows.array().signals())),
+      : features(features_of(windows.frames(), windows.array().signals())),
         pixels(windows.image().pixels()),
         xx(features * features),
         xy(features * pixels) {
@@ -89,7 +89,7 @@ struct Moments {
     const std::size_t f = features, p = pixels;
     std::vector<double> x(part.size() * f), y;
     std::vector<float> truth(p);
-    std::vector<float> window(static_cast<std::size_t>(windows.timesteps()) * windows.array().signals());
+    std::vector<float> window(windows.frames() * windows.array().signals());
     for (std::size_t n = 0; n < part.size(); ++n) {
       windows.window(part[n], window);
       fill_features(window, windows.array().signals(), std::span(x).subspan(n * f, f));
@@ -176,9 +176,7 @@ std::vector<bool> held_out(const WindowSet& windows, std::span<const std::uint32
 }  // namespace
 
 Ridge::Ridge(const WindowSet& windows, std::span<const std::uint32_t> train, const FitProgress& progress)
-    : timesteps_(static_cast<std::size_t>(windows.timesteps())),
-      signals_(windows.array().signals()),
-      pixels_(windows.image().pixels()) {
+    : timesteps_(windows.frames()), signals_(windows.array().signals()), pixels_(windows.image().pixels()) {
   if (train.empty()) throw std::invalid_argument("ridge: there is no window to fit to");
   const std::vector<std::uint32_t> chosen = evenly_spaced(train, kFitWindows);
   const std::vector<bool> held = held_out(windows, chosen);

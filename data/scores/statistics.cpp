@@ -27,12 +27,12 @@ double share(std::span<const ClusterCount> clusters) {
   return total > 0 ? correct / total : std::numeric_limits<double>::quiet_NaN();
 }
 
-Interval bootstrap_interval(std::span<const ClusterCount> clusters, std::uint64_t seed) {
+Interval bootstrap_interval(std::span<const ClusterCount> clusters) {
   if (clusters.empty()) throw std::invalid_argument("bootstrap_interval: there is no cluster");
   for (const ClusterCount& c : clusters) {
     if (!(c.total > 0)) throw std::invalid_argument("bootstrap_interval: a cluster holds nothing");
   }
-  const RandomStream random(seed, kBootstrapStream);
+  const RandomStream random(0, kBootstrapStream);
   const auto count = static_cast<double>(clusters.size());
   std::vector<ClusterCount> drawn(clusters.size());
   std::vector<double> shares(kDraws);
@@ -45,7 +45,7 @@ Interval bootstrap_interval(std::span<const ClusterCount> clusters, std::uint64_
   return {shares[kDraws / 40], shares[kDraws - 1 - kDraws / 40]};
 }
 
-double sign_flip_p(std::span<const double> differences, std::uint64_t seed) {
+double sign_flip_p(std::span<const double> differences) {
   if (differences.empty()) throw std::invalid_argument("sign_flip_p: there is no difference");
   double observed = 0, size = 0;
   for (const double d : differences) {
@@ -57,7 +57,7 @@ double sign_flip_p(std::span<const double> differences, std::uint64_t seed) {
   const double least = std::abs(observed) - 1e-9 * size;
   const bool exact = differences.size() <= kMostExact;
   const std::uint64_t patterns = exact ? std::uint64_t{1} << differences.size() : kRandomPatterns;
-  const RandomStream random(seed, kSignStream);
+  const RandomStream random(0, kSignStream);
   std::uint64_t extreme = 0;
   for (std::uint64_t pattern = 0; pattern < patterns; ++pattern) {
     double sum = 0;

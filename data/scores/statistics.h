@@ -20,15 +20,15 @@ struct Interval {
 double share(std::span<const ClusterCount> clusters);
 
 /// 95 % percentile bootstrap interval of share() over clusters drawn with replacement (Efron & Tibshirani
-/// 1993, ch. 13; 10,000 draws from the given seed: the same counts, the same interval).
+/// 1993, ch. 13; 10,000 draws: the same counts, the same interval).
 /// Throws std::invalid_argument when there is no cluster or one holds nothing.
-Interval bootstrap_interval(std::span<const ClusterCount> clusters, std::uint64_t seed = 0);
+Interval bootstrap_interval(std::span<const ClusterCount> clusters);
 
 /// Two-sided p-value of the paired permutation test: if two methods did not differ, exchanging their results
 /// within a pass, which flips the sign of that pass's difference, would change nothing. p is the share of the
 /// sign patterns whose |sum| is at least the observed one: of all 2^n for n <= 20, else of 100,000 random
 /// ones and the observed one. The smallest p for n passes is 2 / 2^n.
 /// Throws std::invalid_argument when there is no difference or one is not finite.
-double sign_flip_p(std::span<const double> differences, std::uint64_t seed = 0);
+double sign_flip_p(std::span<const double> differences);
 
 }  // namespace supertac

@@ -145,13 +145,4 @@ bool LiveWindow::window_until(double end_s, std::span<float> out) {
   return true;
 }
 
-std::vector<float> LiveWindow::newest() const {
-  std::vector<float> frame(settings_.signals);
-  if (filtered_.count() == 0) return frame;
-  const std::span<const float> volts = filtered_.volts(filtered_.count() - 1);
-  std::copy(volts.begin(), volts.end(), frame.begin());
-  settings_.scaling(frame);
-  return frame;
-}
-
 }  // namespace supertac

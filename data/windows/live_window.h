@@ -55,9 +55,6 @@ class LiveWindow {
   /// The same for a window that ends at `end_s`, at most 0.1 s before the newest frame.
   bool window_until(double end_s, std::span<float> out);
 
-  /// The newest frame's sample as the network sees it without resampling: filtered and scaled; zeros before
-  /// the first frame.
-  std::vector<float> newest() const;
   const Counters& counters() const { return counters_; }
 
  private:

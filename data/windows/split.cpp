@@ -187,8 +187,7 @@ std::vector<HashedWindow> hash_windows(const WindowSet& windows, std::uint64_t e
   for (std::size_t p = 0; p < windows.passes().size(); ++p) {
     const WindowSet::Pass& pass = windows.passes()[p];
     if (pass.windows == 0) continue;
-    const PassHashes of_pass(windows.track(p).samples, windows.array().signals(),
-                             static_cast<std::size_t>(windows.timesteps()));
+    const PassHashes of_pass(windows.track(p).samples, windows.array().signals(), windows.frames());
     for (std::size_t i = pass.first_window; i < pass.first_window + pass.windows; ++i) {
       const std::size_t frame = windows.frame_of(i);
       const std::uint64_t hash = of_pass.window(frame);
@@ -219,7 +218,7 @@ std::size_t count_duplicated(const WindowSet& windows, const Split& split) {
 }
 
 std::size_t count_overlapping(const WindowSet& windows, const Split& split) {
-  const auto timesteps = static_cast<std::size_t>(windows.timesteps());
+  const std::size_t timesteps = windows.frames();
   std::size_t count = 0, begin = 0, end = 0;  // windows of the pass
   const auto touches = [&](std::uint32_t a, std::uint32_t b) {
     if (b < begin || b >= end) return false;

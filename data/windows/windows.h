@@ -105,7 +105,6 @@ class WindowSet {
 
   std::size_t size() const { return counts_.windows; }
   std::size_t frames() const { return static_cast<std::size_t>(settings_.timesteps); }
-  int timesteps() const { return settings_.timesteps; }
   /// Of the recordings; the rig's while there is none.
   TaxelArray array() const { return settings_.array.value_or(TaxelArray{}); }
   SignalScale signal_scale() const { return settings_.signal_scale.value_or(SignalScale{}); }
@@ -142,7 +141,7 @@ class WindowSet {
   virtual void will_read(std::size_t i) const;
   /// Number of the last frame within its pass.
   std::size_t frame_of(std::size_t i) const { return place_of(i).last; }
-  /// Frames since its pass began or since the last gap, the last frame included: at least timesteps().
+  /// Frames since its pass began or since the last gap, the last frame included: at least frames().
   std::size_t history(std::size_t i) const { return place_of(i).run; }
   /// Samples, positions and lifts of a whole pass; none when no window ends in it.
   Track track(std::size_t pass) const;

@@ -67,11 +67,6 @@ std::string final_path(const std::string& path) {
 
 constexpr std::string_view kTemporary = ".tmp-";  // <file>.tmp-<process>-<number>
 
-bool is_running(std::uint64_t process) {
-  const auto id = static_cast<pid_t>(process);
-  return static_cast<std::uint64_t>(id) != process || id < 1 || ::kill(id, 0) == 0 || errno != ESRCH;
-}
-
 // What writers of this file left that were ended by kill -9 or a power cut. Failures do not matter here.
 void remove_leftovers(const std::string& path) {
   const std::string prefix = std::filesystem::path(path).filename().string() + std::string(kTemporary);
@@ -111,6 +106,11 @@ std::string rename_to(const std::string& finished, const OutputPath& output) {
 }
 
 }  // namespace
+
+bool is_running(std::uint64_t process) {
+  const auto id = static_cast<pid_t>(process);
+  return static_cast<std::uint64_t>(id) != process || id < 1 || ::kill(id, 0) == 0 || errno != ESRCH;
+}
 
 FileError::FileError(const std::string& path, const std::string& problem)
     : std::runtime_error(path + ": " + problem), path_(path) {}

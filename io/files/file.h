@@ -111,6 +111,9 @@ void write_file(const OutputPath& output, std::string_view text);
 /// Throws FileError when `path` exists and `force` is false: nothing is overwritten without --force.
 void refuse_existing(const std::string& path, bool force);
 
+/// False when no process has this number any more.
+bool is_running(std::uint64_t process);
+
 /// Creates the directory and its parents where they are missing. Throws FileError.
 void make_directories(const std::string& path);
 

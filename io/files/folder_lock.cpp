@@ -37,15 +37,13 @@ FolderLock::FolderLock(const std::string& folder) {
   known = held_;
 }
 
-FolderLock lock_within(std::chrono::seconds most, const std::string& folder,
-                       const std::function<void()>& meanwhile) {
+FolderLock lock_within(std::chrono::seconds most, const std::string& folder) {
   for (const auto limit = std::chrono::steady_clock::now() + most;;) {
     try {
       return FolderLock(folder);
     } catch (const FileError&) {
       if (std::chrono::steady_clock::now() > limit) throw;
     }
-    if (meanwhile) meanwhile();
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
 }

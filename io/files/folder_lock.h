@@ -2,7 +2,6 @@
 #pragma once
 
 #include <chrono>
-#include <functional>
 #include <memory>
 #include <string>
 
@@ -20,9 +19,7 @@ class FolderLock {
   std::shared_ptr<const int> held_;
 };
 
-/// The lock of a folder, once nobody else holds it; `meanwhile` is called while it waits, and ends the wait
-/// when it throws. Throws FileError when `most` has passed.
-FolderLock lock_within(std::chrono::seconds most, const std::string& folder,
-                       const std::function<void()>& meanwhile = {});
+/// The lock of a folder, once nobody else holds it. Throws FileError when `most` has passed.
+FolderLock lock_within(std::chrono::seconds most, const std::string& folder);
 
 }  // namespace supertac

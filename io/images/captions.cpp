@@ -45,7 +45,7 @@ void paste(Picture& onto, const Picture& picture, int left, int top) {
 
 }  // namespace
 
-void draw_text(Picture& picture, int left, int top, const std::string& text, Rgb colour) {
+void draw_text(Picture& picture, int left, int top, const std::string& text) {
   int x = left;
   for (const char c : plain(text)) {
     if (c == '\n') {
@@ -56,7 +56,7 @@ void draw_text(Picture& picture, int left, int top, const std::string& text, Rgb
       if ((kLetters[c - ' '] >> dot & 1) == 0) continue;
       for (int i = 0; i < kDot * kDot; ++i) {
         const int px = x + kDot * (dot / 8) + i % kDot, py = top + kDot * (dot % 8) + i / kDot;
-        if (px >= 0 && py >= 0 && px < picture.width && py < picture.height) picture.set(px, py, colour);
+        if (px >= 0 && py >= 0 && px < picture.width && py < picture.height) picture.set(px, py, {0, 0, 0});
       }
     }
     x += kDot * kStep;

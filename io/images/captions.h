@@ -8,11 +8,11 @@
 
 namespace supertac {
 
-inline constexpr int kLetterHeight = 14, kLineHeight = 20;
+inline constexpr int kLineHeight = 20;
 
 /// Writes lines (separated by '\n') in letters of 5x7 dots from (left, top) on; letters outside ASCII become
 /// '?', and what lies outside the picture is cut.
-void draw_text(Picture& picture, int left, int top, const std::string& text, Rgb colour = {0, 0, 0});
+void draw_text(Picture& picture, int left, int top, const std::string& text);
 /// Width of the longest line in pixels.
 int text_width(const std::string& text);
 

@@ -41,7 +41,7 @@ class CollapseTest : public ::testing::Test {
 
  private:
   Tensor two_windows() const {
-    Tensor two(Shape{2, windows.timesteps(), kTaxels});
+    Tensor two(Shape{2, static_cast<Dim>(windows.frames()), kTaxels});
     const auto half = static_cast<std::size_t>(two.size() / 2);
     windows.window(0, two.values().first(half));
     windows.window(windows.size() / 4, two.values().last(half));
@@ -96,7 +96,7 @@ TEST_F(CollapseTest, F1ATooHighRateWithoutClippingAndWarmUpIsReported) {
 
 // The largest eigenvalue of the covariance of group 3's windows, by power iteration.
 double largest_eigenvalue(const WindowSet& windows) {
-  const auto entries = static_cast<std::size_t>(windows.timesteps()) * 4;
+  const auto entries = windows.frames() * 4;
   const auto n = static_cast<double>(windows.size());
   std::vector<double> rows, mean(entries), v(entries, 1);
   for (std::size_t i = 0; i < windows.size(); ++i) {
@@ -125,7 +125,7 @@ TEST_F(CollapseTest, F2PosteriorCollapsesAboveTheThresholdOfBetaAndIsReported) {
   settings.epochs = 8;
   settings.loss.a = 1;  // the VAEs alone: nothing else draws on the latents
   settings.learning_rate = 3e-3;
-  const double threshold = 2 * largest_eigenvalue(windows) / (4.0 * windows.timesteps());
+  const double threshold = 2 * largest_eigenvalue(windows) / (4.0 * static_cast<double>(windows.frames()));
   settings.loss.beta = threshold / 20;
   const End below = train(settings);
   EXPECT_FALSE(below.collapsed);

@@ -1,6 +1,5 @@
 #include "apps/common/output/output_folder.h"
 
-#include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -30,11 +29,6 @@ std::string prefix_of(const fs::path& final_path, bool was_there) {
                    : "." + final_path.filename().string().substr(0, kMostLetters) + ".unfinished-";
 }
 
-bool is_running(const std::string& process) {
-  const auto id = parse_uint(process);
-  return !id || *id > INT32_MAX || ::kill(static_cast<pid_t>(*id), 0) == 0 || errno != ESRCH;
-}
-
 // A hidden folder that somebody fills is locked. One that nobody does is removed if it is a folder of this
 // user, whose process has ended: never what lies behind a link.
 void look_at(const fs::path& hidden, const std::string& process) {
@@ -43,7 +37,7 @@ void look_at(const fs::path& hidden, const std::string& process) {
     return;
   const FolderLock lock(hidden.string());
   std::error_code ignored;
-  if (!is_running(process)) fs::remove_all(hidden, ignored);
+  if (const auto id = parse_uint(process); id && !is_running(*id)) fs::remove_all(hidden, ignored);
 }
 
 bool is_there(const fs::path& path) {

@@ -140,22 +140,15 @@ static void sigmoid_step(Planner& planner, const TracedOp& op) {
   planner.add_step([=](const Block& b) { kernels::sigmoid(b.images * x.image(), b.begin(x), b.begin(y)); });
 }
 
-static void gated_sum_step(Planner& planner, const TracedOp& op) {
-  const FeatureMap a = planner.map_of(op.inputs[0]), x = planner.map_of(op.inputs[1]),
-                   gates = planner.map_of(op.inputs[2]);
+// a + gates * x, or a + x.
+static void sum_step(Planner& planner, const TracedOp& op) {
+  const FeatureMap a = planner.map_of(op.inputs[0]), x = planner.map_of(op.inputs[1]);
+  const bool gated = op.inputs.size() == 3;
+  const FeatureMap gates = gated ? planner.map_of(op.inputs[2]) : FeatureMap();
   const FeatureMap y = planner.new_map(op.y);
   planner.add_step([=](const Block& b) {
     isa().gate({b.images, x.height, x.width, x.channels, a.strides(), x.strides(), y.strides()},
-               b.first_pixel(a), b.first_pixel(x), b.begin(gates), b.first_pixel(y));
-  });
-}
-
-static void sum_step(Planner& planner, const TracedOp& op) {
-  const FeatureMap a = planner.map_of(op.inputs[0]), x = planner.map_of(op.inputs[1]),
-                   y = planner.new_map(op.y);
-  planner.add_step([=](const Block& b) {
-    isa().gate({b.images, x.height, x.width, x.channels, a.strides(), x.strides(), y.strides()},
-               b.first_pixel(a), b.first_pixel(x), nullptr, b.first_pixel(y));
+               b.first_pixel(a), b.first_pixel(x), gated ? b.begin(gates) : nullptr, b.first_pixel(y));
   });
 }
 
@@ -173,7 +166,7 @@ const std::map<std::string_view, Planner::Make>& Planner::makers() {
       {"concat", concat_step},
       {"global_mean", global_mean_step},
       {"sigmoid", sigmoid_step},
-      {"gated_sum", gated_sum_step},
+      {"gated_sum", sum_step},
       {"add", sum_step},
   };
   return known;

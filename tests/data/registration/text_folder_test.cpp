@@ -1,8 +1,8 @@
 #include "data/registration/text_folder.h"
 
 #include <gtest/gtest.h>
-#include <algorithm>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -17,6 +17,14 @@
 
 namespace supertac {
 namespace {
+
+std::vector<ImportedPass> import_all(const std::string& root, const FolderImport& settings) {
+  std::vector<ImportedPass> all;
+  import_text_folder(root, settings, [&all](std::vector<ImportedPass> plate) {
+    std::move(plate.begin(), plate.end(), std::back_inserter(all));
+  });
+  return all;
+}
 
 std::string as_text(const Recording& recording) {
   std::string text;
@@ -42,9 +50,9 @@ TEST(TextFolder, EveryFrameGetsItsPlaceAndTheOrderIsTheStatedOne) {
     put(folder, "6_Ridges/1/" + std::to_string(pass) + ".txt", as_text(truth.back()));
   }
   std::vector<std::pair<std::size_t, std::size_t>> told;
-  const auto imported = import_text_folder(
-      folder.path(),
-      {.progress = [&](std::size_t done, std::size_t files) { told.emplace_back(done, files); }});
+  const auto imported =
+      import_all(folder.path(),
+                 {.progress = [&](std::size_t done, std::size_t files) { told.emplace_back(done, files); }});
   ASSERT_EQ(imported.size(), 3u);
   ASSERT_GE(told.size(), 2u);  // as many files at a time as there are threads
   EXPECT_TRUE(std::ranges::is_sorted(told));
@@ -89,10 +97,10 @@ TEST(TextFolder, APlateOfYourOwnLiesBesideItsFolder) {
   put(folder, "my/3/notes.md", "not looked at");
   put(folder, ".hidden/1/1.txt", "not looked at");
   put(folder, "my.stl", "solid nothing\nendsolid");
-  EXPECT_THROW(import_text_folder(folder.path(), {}), FileError) << "a plate without a triangle";
+  EXPECT_THROW(import_all(folder.path(), {}), FileError) << "a plate without a triangle";
   std::filesystem::remove(folder.file("my.stl"));
   std::filesystem::rename(folder.file("my"), folder.file("plain"));
-  const auto imported = import_text_folder(folder.path(), {.speed_mm_s = 7});
+  const auto imported = import_all(folder.path(), {.speed_mm_s = 7});
   ASSERT_EQ(imported.size(), 1u);
   EXPECT_EQ(recording_file_name(imported[0].recording), "plain_t3_p7_v7.safetensors");
   EXPECT_EQ(imported[0].plate_file, "");
@@ -102,7 +110,7 @@ TEST(TextFolder, APlateOfYourOwnLiesBesideItsFolder) {
 TEST(TextFolder, APlateOfUnknownShapeIsImportedWithoutPositions) {
   const TemporaryFolder folder;
   put(folder, "unknown_felt/2/5.txt", as_text(full_pass("3_Bumps", 5, 1)));
-  const auto imported = import_text_folder(folder.path(), {});
+  const auto imported = import_all(folder.path(), {});
   ASSERT_EQ(imported.size(), 1u);
   const Recording& recording = imported[0].recording;
   EXPECT_EQ(recording_file_name(recording), "unknown_felt_t2_p5_v10.safetensors");
@@ -125,17 +133,17 @@ TEST(TextFolder, APlateOfUnknownShapeIsImportedWithoutPositions) {
 TEST(TextFolder, FilesThatAreNoRecordingsAreLeftOutWhenAskedTo) {
   const TemporaryFolder folder;
   const std::string bad = put(folder, "plain/1/1.txt", "no numbers at all\n");
-  EXPECT_THROW(import_text_folder(folder.path(), {}), FileError);
+  EXPECT_THROW(import_all(folder.path(), {}), FileError);
   std::vector<std::string> left_out;
   const FolderImport lenient{.left_out = [&](const FileError& error) { left_out.push_back(error.what()); }};
   try {
-    import_text_folder(folder.path(), lenient);
+    import_all(folder.path(), lenient);
     ADD_FAILURE() << "nothing was left";
   } catch (const FileError& error) {
     EXPECT_EQ(std::string(error.what()), folder.path() + ": none of 1 files is a recording");
   }
   put(folder, "plain/1/2.txt", as_text(full_pass("plain", 2, 1)));
-  EXPECT_EQ(import_text_folder(folder.path(), lenient).size(), 1u);
+  EXPECT_EQ(import_all(folder.path(), lenient).size(), 1u);
   ASSERT_EQ(left_out.size(), 2u);
   EXPECT_TRUE(left_out[1].starts_with(bad + ": 1 of 1 lines are not 16 voltages")) << left_out[1];
 }
@@ -149,9 +157,9 @@ TEST(TextFolder, WhatIsNoPassIsLeftOutByName) {
                                 put(folder, "plain/1/02.txt", text), put(folder, "plain/notes/1.txt", text),
                                 put(folder, "Plain/1/1.txt", text), put(folder, "Test/1/1.txt", text)};
   std::string left_out;
-  const auto imported = import_text_folder(folder.path(), {.left_out = [&](const FileError& error) {
-                                             left_out += std::string(error.what()) + "\n";
-                                           }});
+  const auto imported =
+      import_all(folder.path(),
+                 {.left_out = [&](const FileError& error) { left_out += std::string(error.what()) + "\n"; }});
   EXPECT_EQ(imported.size(), 1u);
   EXPECT_EQ(std::ranges::count(left_out, '\n'), 5) << left_out;
   for (const char* reason :
@@ -166,7 +174,7 @@ TEST(TextFolder, TwoFilesOfOnePassAreNamed) {
   const TemporaryFolder folder;
   const std::string first = put(folder, "plain/1/01.txt", ""), second = put(folder, "plain/1/1.txt", "");
   try {
-    import_text_folder(folder.path(), {});
+    import_all(folder.path(), {});
     ADD_FAILURE() << "one would replace the other";
   } catch (const FileError& error) {
     EXPECT_EQ(std::string(error.what()),
@@ -186,7 +194,7 @@ TEST(TextFolder, AFolderOfAnotherShapeIsNamed) {
     const TemporaryFolder folder;
     put(folder, file, "");
     try {
-      import_text_folder(folder.path(), {});
+      import_all(folder.path(), {});
       ADD_FAILURE() << file;
     } catch (const FileError& error) {
       const std::string where = named.empty() ? folder.path() : folder.file(named);
@@ -195,7 +203,7 @@ TEST(TextFolder, AFolderOfAnotherShapeIsNamed) {
   }
   const TemporaryFolder folder;
   try {
-    import_text_folder(folder.file("none"), {});
+    import_all(folder.file("none"), {});
     ADD_FAILURE();
   } catch (const FileError& error) {
     EXPECT_EQ(std::string(error.what()),

@@ -36,6 +36,17 @@ Image mapped(Image image, float gain, float offset) {
   return image;
 }
 
+class ScoredPairs : public MetricsAccumulator {
+ public:
+  explicit ScoredPairs(const ImageGrid& grid = {}) : MetricsAccumulator(grid), scorer_(grid) {}
+  void add(std::span<const float> output, std::span<const float> truth) {
+    MetricsAccumulator::add(output, truth, scorer_(output, truth));
+  }
+
+ private:
+  ImageScorer scorer_;
+};
+
 TEST(Psnr, IsTheLogarithmOfTheMeanSquaredErrorOnRangeOne) {
   EXPECT_NEAR(mean_squared_error(flat(0.5F), flat(0.25F)), 0.0625, 1e-12);
   EXPECT_NEAR(psnr_db(0.01), 20, 1e-9);
@@ -49,7 +60,7 @@ TEST(Psnr, OfIdenticalImagesIsCapped) {
 }
 
 TEST(Psnr, PooledAndPerImageMeansDiffer) {
-  MetricsAccumulator metrics{ImageGrid{}};
+  ScoredPairs metrics;
   metrics.add(flat(0.1F), flat(0));    // 20 dB
   metrics.add(flat(0.001F), flat(0));  // 60 dB
   EXPECT_NEAR(metrics.result().psnr_mean_db, 40, 1e-4);
@@ -141,7 +152,7 @@ TEST(MetricsAccumulator, OfNothingIsNull) {
 }
 
 TEST(MetricsAccumulator, PerfectOutputsStandAboveTheFloor) {
-  MetricsAccumulator metrics{ImageGrid{}};
+  ScoredPairs metrics;
   for (int i = 0; i < 60; ++i) {
     const Image truth = plate("bumps12", 42 + 0.4 * i);
     metrics.add(truth, truth);
@@ -155,7 +166,7 @@ TEST(MetricsAccumulator, PerfectOutputsStandAboveTheFloor) {
 }
 
 TEST(MetricsAccumulator, PositionErrorIsTheDisplacementInPixelsAndMillimetres) {
-  MetricsAccumulator metrics{ImageGrid{}};
+  ScoredPairs metrics;
   metrics.add(plate("bumps12", 54 - 1.5), plate("bumps12", 54));
   EXPECT_NEAR(metrics.result().position_error_px, 2, 0.2);
   EXPECT_DOUBLE_EQ(metrics.result().position_error_mm, metrics.result().position_error_px * 0.75);
@@ -164,26 +175,26 @@ TEST(MetricsAccumulator, PositionErrorIsTheDisplacementInPixelsAndMillimetres) {
 // A collapsed network must not look as if it knew where things are.
 TEST(MetricsAccumulator, MeasuresPixelsOfAnySize) {
   const ImageGrid grid{8, 24, 0.5};
-  MetricsAccumulator metrics(grid);
+  ScoredPairs metrics(grid);
   std::vector<float> truth(grid.pixels()), moved(grid.pixels());
   truth_image(Plate::named("4_Blob"), 18, 52, grid, truth);
   truth_image(Plate::named("4_Blob"), 17, 52, grid, moved);
   metrics.add(moved, truth);
   EXPECT_NEAR(metrics.result().position_error_mm, 1, 0.2);
-  MetricsAccumulator of_flat(grid);
+  ScoredPairs of_flat(grid);
   of_flat.add(std::vector<float>(grid.pixels(), 0.5F), truth);
   EXPECT_EQ(of_flat.result().position_error_px, 4);  // half the shorter side
 }
 
 TEST(MetricsAccumulator, FlatOutputHasTheWorstPosition) {
-  MetricsAccumulator metrics{ImageGrid{}};
+  ScoredPairs metrics;
   metrics.add(flat(0), plate("bumps12", 54));
   EXPECT_EQ(metrics.result().position_error_px, 8);
   EXPECT_EQ(metrics.result().phase_correlation, 0);
 }
 
 TEST(MetricsAccumulator, KeepsTheFloorOfManyWindowsFromASample) {
-  MetricsAccumulator metrics{ImageGrid{}}, again{ImageGrid{}};
+  ScoredPairs metrics, again;
   for (std::uint64_t i = 0; i < 3 * MetricsAccumulator::kFloorPairs; ++i) {
     metrics.add(noise(2 * i), noise(2 * i + 1));
     again.add(noise(2 * i), noise(2 * i + 1));
@@ -194,7 +205,7 @@ TEST(MetricsAccumulator, KeepsTheFloorOfManyWindowsFromASample) {
 
 // Late windows are in the sample as often as early ones: three of four pictures here are the same.
 TEST(MetricsAccumulator, SamplesLateWindowsForTheFloorToo) {
-  MetricsAccumulator metrics{ImageGrid{}};
+  ScoredPairs metrics;
   const Image same = plate("bumps12", 54);
   for (std::uint64_t i = 0; i < 4 * MetricsAccumulator::kFloorPairs; ++i) {
     const Image picture = i < MetricsAccumulator::kFloorPairs ? noise(i) : same;
@@ -204,7 +215,7 @@ TEST(MetricsAccumulator, SamplesLateWindowsForTheFloorToo) {
 }
 
 TEST(MetricsAccumulator, RefusesValuesThatAreNotFinite) {
-  MetricsAccumulator metrics{ImageGrid{}};
+  ScoredPairs metrics;
   Image output = flat(0);
   output[7] = std::nanf("");
   try {

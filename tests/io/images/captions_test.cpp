@@ -18,7 +18,7 @@ int black(const Picture& picture) {
 
 TEST(Text, IsDrawnWithinItsSize) {
   const std::string word = "SSIM .85";
-  Picture picture(text_width(word) + 8, kLetterHeight + 8);
+  Picture picture(text_width(word) + 8, kLineHeight + 8);
   draw_text(picture, 4, 4, word);
   EXPECT_GT(black(picture), 100);
   for (int x = 0; x < picture.width; ++x)
