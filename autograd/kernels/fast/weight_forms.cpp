@@ -9,16 +9,16 @@ thread_local WeightForms* used_here = nullptr;
 
 WeightForms::WeightForms(const std::vector<Tensor>& weights) : weights_(weights) {
   for (const Tensor& tensor : weights_)
-    for (auto& slot : slots_[tensor.data()]) slot = std::make_unique<Slot>();
+    for (auto& slot : slots_[tensor.data()]) {
+      slot = std::make_unique<Slot>();
+      all_.push_back(slot.get());
+    }
 }
 
 void WeightForms::renew() {
-  std::vector<Slot*> asked_for;
-  for (auto& [weights, slots] : slots_)
-    for (const auto& slot : slots)
-      if (slot->make) asked_for.push_back(slot.get());
 #pragma omp parallel for schedule(dynamic)
-  for (std::size_t i = 0; i < asked_for.size(); ++i) asked_for[i]->make(asked_for[i]->values.data());
+  for (Slot* slot : all_)
+    if (slot->make) slot->make(slot->values.data());
 }
 
 WeightForms::Slot* WeightForms::slot_of(const real* weights, WeightForm form) {

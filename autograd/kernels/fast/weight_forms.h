@@ -52,6 +52,7 @@ class WeightForms {
  private:
   std::vector<Tensor> weights_;  // keeps their buffers from being given to anything else
   std::unordered_map<const real*, std::array<std::unique_ptr<Slot>, kWeightForms>> slots_;
+  std::vector<Slot*> all_;
 };
 
 /// The form of these weights; make(real* to) writes it unless it is in use and made already. What `make`
