@@ -1,7 +1,6 @@
 // supertac-classify: which plate is under the finger? Asked of single frames and of super-resolved pictures
 // (Figure 11 of the paper), and of what lies between.
 #include <algorithm>
-#include <exception>
 
 #include "apps/classify/experiment.h"
 #include "apps/classify/report.h"
@@ -9,6 +8,7 @@
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
 #include "io/files/file.h"
+#include "io/numbers/parallel.h"
 
 namespace supertac {
 
@@ -55,27 +55,20 @@ using Answers = std::vector<std::vector<std::int32_t>>;
 
 Answers all_answers(const Arguments& a, const std::vector<View>& views, const std::vector<Candidate>& models,
                     const std::vector<Exam>& exams, const WindowSet& windows,
-                    const std::vector<std::string>& classes, ExperimentSettings settings) {
+                    const std::vector<std::string>& classes, const ExperimentSettings& same) {
   Answers results(views.size() * static_cast<std::size_t>(a.integer("seeds", 1, 1000)));
-  std::exception_ptr error;
   std::size_t done = 0;
   Progress progress(a, "classifying", results.size(), "classifiers");
-#pragma omp parallel for schedule(dynamic, 1) firstprivate(settings)
-  for (std::size_t job = 0; job < results.size(); ++job) {
-    try {
-      settings.seed = job / views.size();
-      const std::size_t m = settings.seed % models.size();
-      const View& view = views[job % views.size()];
-      settings.keep = settings.seed == 0 && view.kind == ViewKind::super_resolved ? a.output("out") : "";
-      results[job] = answers(view, *models[m].file.model, windows, exams[m], classes, settings);
-    } catch (...) {  // an exception must not leave a thread
-#pragma omp critical
-      error = std::current_exception();
-    }
+  parallel_for(results.size(), [&](std::size_t job) {
+    ExperimentSettings settings = same;
+    settings.seed = job / views.size();
+    const std::size_t m = settings.seed % models.size();
+    const View& view = views[job % views.size()];
+    settings.keep = settings.seed == 0 && view.kind == ViewKind::super_resolved ? a.output("out") : "";
+    results[job] = answers(view, *models[m].file.model, windows, exams[m], classes, settings);
 #pragma omp critical
     progress.update(++done);
-  }
-  if (error) std::rethrow_exception(error);
+  });
   return results;
 }
 

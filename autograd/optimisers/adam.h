@@ -60,7 +60,7 @@ class Adam {
   std::vector<Variable> parameters_;
   AdamOptions options_;
   std::vector<std::size_t> matrices_, others_;  // of parameters_
-  std::vector<double> squares_;                 // the sum of each gradient's
+  std::vector<double> squares_;                 // summed, of each gradient
   std::vector<Tensor> m_, v_;
   std::int64_t steps_ = 0;
 };

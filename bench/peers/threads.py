@@ -24,9 +24,7 @@ BATCHES = (64, 128)
 
 
 def steps_per_second(process, threads, batch, seconds):
-    process.process.stdin.write(f"train {threads} {seconds} {batch}\n")
-    process.process.stdin.flush()
-    return 1 / float(process.process.stdout.readline().split()[1])
+    return 1 / float(process(f"train {threads} {seconds} {batch}")[1])
 
 
 def one_round(processes, batch, counts, seconds):

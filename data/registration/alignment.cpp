@@ -5,6 +5,7 @@
 
 #include "data/registration/profile.h"
 #include "io/numbers/median.h"
+#include "io/numbers/parallel.h"
 
 namespace supertac {
 namespace {
@@ -116,14 +117,13 @@ void take_medians_off(std::vector<Aligned>& passes) {
 void align(std::vector<Aligned>& passes) {
   for (int round = 0; round < kRounds; ++round) {
     const std::vector<Profile> profiles = profiles_of(passes);
-#pragma omp parallel for schedule(dynamic)
-    for (std::size_t i = 0; i < passes.size(); ++i) {
+    parallel_for(passes.size(), [&](std::size_t i) {
       Aligned& pass = passes[i];
       const Loss loss = pass.found.loss;
       pass.found =
           best_change(pass.signals, pass.registration, mean_of_others(profiles, i), pass.found.change);
       pass.found.loss = loss;
-    }
+    });
     take_medians_off(passes);
   }
 }

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
 
 #include "data/plates/random_plate.h"
 #include "data/recordings/simulator.h"
+#include "io/numbers/parallel.h"
 #include "io/numbers/random.h"
 #include "io/numbers/same_bits.h"
 
@@ -127,18 +127,10 @@ void add_random_passes(WindowSet& windows, const RandomPasses& passes) {
   const std::size_t first_plate = kFirstTrainingPlate + passes.seed % kSeeds * kPlatesOfASeed;
   for (std::size_t first = 0; first < passes.count; first += kAtOnce) {
     std::vector<Recording> recordings(std::min(kAtOnce, passes.count - first));
-    std::exception_ptr failure;
-#pragma omp parallel for schedule(dynamic)
-    for (std::size_t i = 0; i < recordings.size(); ++i) {
-      try {
-        recordings[i] =
-            simulate(static_cast<std::uint32_t>(first_plate + first + i), passes, windows.settings());
-      } catch (...) {  // an exception must not leave a thread
-#pragma omp critical
-        failure = std::current_exception();
-      }
-    }
-    if (failure) std::rethrow_exception(failure);
+    parallel_for(recordings.size(), [&](std::size_t i) {
+      recordings[i] =
+          simulate(static_cast<std::uint32_t>(first_plate + first + i), passes, windows.settings());
+    });
     for (const Recording& recording : recordings)
       windows.add(recording, ".", {.training_only = true, .augmentable = false, .stride = stride});
   }

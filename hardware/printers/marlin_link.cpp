@@ -14,8 +14,7 @@ namespace {
 // echo:busy comes after 2 s); after echo:busy (repeated every 2 s); for one command, behind a longer deadline
 // of its own, whatever is said; of silence that ends a disturbance.
 constexpr double kConnectDeadline = 20, kProbeInterval = 1, kOkDeadline = 2.5, kBusyDeadline = 6,
-                 kLongestWait = 60;
-constexpr double kQuiet = 0.05;
+                 kLongestWait = 60, kQuiet = 0.05;
 constexpr int kMaxRepeats = 8;          // of one line, for any reason; four times as many while catching up
 constexpr std::size_t kKeptLines = 64;  // of the newest lines, for Resend
 constexpr double kWriteDeadline = 2;
@@ -53,9 +52,7 @@ void MarlinLink::connect() {
   int answers = 0;
   while (answers < 2) {
     const double now = port_.now();
-    if (now >= until) {
-      nobody_answered();
-    }
+    if (now >= until) nobody_answered();
     answers = probe(std::min(until, now + kProbeInterval)) ? answers + 1 : 0;
   }
   number_ = 0;

@@ -1,5 +1,7 @@
 #include "autograd/kernels/fast/weight_forms.h"
 
+#include <exception>
+
 namespace supertac::kernels {
 namespace {
 
@@ -15,10 +17,19 @@ WeightForms::WeightForms(const std::vector<Tensor>& weights) : weights_(weights)
     }
 }
 
+// By turns, so that a thread asks its pool for the same blocks in every step.
 void WeightForms::renew() {
-#pragma omp parallel for schedule(dynamic)
-  for (Slot* slot : all_)
-    if (slot->make) slot->make(slot->values.data());
+  std::exception_ptr error;  // one that must not leave a thread: no memory
+#pragma omp parallel for schedule(static, 1)
+  for (Slot* slot : all_) {
+    try {
+      if (slot->make) slot->make(slot->values.data());
+    } catch (...) {
+#pragma omp critical
+      error = std::current_exception();
+    }
+  }
+  if (error) std::rethrow_exception(error);
 }
 
 WeightForms::Slot* WeightForms::slot_of(const real* weights, WeightForm form) {

@@ -2,9 +2,9 @@
 // Winograd's filters G g G^T, and those of the turned kernels, for the gradient of x.
 //
 // A kernel makes them anew in every call, as it cannot know whether the weights have changed. In a training
-// step they are constant while its micro-batches run, so each form need be made only once for all of them, by
-// whichever thread comes first; in later steps by all threads, before the micro-batches, as else each thread
-// would wait for the one that makes the next form.
+// step they are constant while its micro-batches run, so each form need be made only once for all of them.
+// In the first step the thread that asks first makes it. Before every later step all threads share this work,
+// so that none waits for another within the step.
 #pragma once
 
 #include <array>
