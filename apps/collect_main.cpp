@@ -184,7 +184,8 @@ std::string keep_passes(const Arguments& arguments, const std::string& journal, 
   PassesReport report = write_passes(arguments, journal, out, folder);
   report.json["passes_done"] = collected.outcome.passes_done;
   report.json["note"] = collected.outcome.note;
-  folder.keep();
+  constexpr bool kDespiteSignals = true;
+  folder.keep(kDespiteSignals);
   arguments.write_json(report.json);
   return report.total();
 }

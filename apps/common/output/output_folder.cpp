@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "apps/common/output/provenance.h"
+#include "apps/common/running/signals.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
@@ -99,7 +100,8 @@ void OutputFolder::remove_made() const {
   for (const fs::path& folder : parents_) fs::remove(folder, ignored);  // only when empty
 }
 
-void OutputFolder::keep() {
+void OutputFolder::keep(bool despite_signals) {
+  if (!despite_signals) stop_if_interrupted();
   const fs::path before = final_ / kFolderProvenance;
   std::string lines = is_there(before) ? read_text_file(before.string(), kMostBytes) : "";
   nlohmann::ordered_json line = full_provenance();

@@ -31,8 +31,9 @@ class OutputFolder {
   /// The folder appears, or the files in it. Where that name, or that of a file added, was taken meanwhile,
   /// OutputPath::when_taken holds. Of a file that was not added, one with the same bytes may be there
   /// already. The folder's provenance.jsonl gains a line: what full_provenance() says, and how many files it
-  /// was. Throws FileError; nothing is then lost that was made.
-  void keep();
+  /// was. Throws FileError; nothing is then lost that was made. Throws Interrupted after a signal, unless
+  /// what was made could not be made again.
+  void keep(bool despite_signals = false);
 
  private:
   void make_hidden();
