@@ -1,7 +1,6 @@
 #include "hardware/printers/marlin_link.h"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "io/numbers/numbers.h"
@@ -17,8 +16,6 @@ constexpr double kConnectDeadline = 20, kProbeInterval = 1, kOkDeadline = 2.5, k
                  kLongestWait = 60, kQuiet = 0.05;
 constexpr int kMaxRepeats = 8;          // of one line, for any reason; four times as many while catching up
 constexpr std::size_t kKeptLines = 64;  // of the newest lines, for Resend
-constexpr double kWriteDeadline = 2;
-constexpr double kWatchInterval = 0.02;  // a fifth of the 0.1 s in which an unplugged board must be noticed
 // With one line in flight the firmware is never honestly more than a line or two behind. A number further
 // back is damaged text, or a firmware that restarted; the second time in a row it is believed.
 constexpr std::int64_t kPlausibleLag = 4;
@@ -47,11 +44,11 @@ struct MarlinLink::Exchange {
 
 void MarlinLink::connect() {
   connected_ = false;
-  const double until = port_.now() + kConnectDeadline;
+  const double until = lines_.port().now() + kConnectDeadline;
   // Two answers in a row: the first ok may belong to something an earlier program sent.
   int answers = 0;
   while (answers < 2) {
-    const double now = port_.now();
+    const double now = lines_.port().now();
     if (now >= until) nobody_answered();
     answers = probe(std::min(until, now + kProbeInterval)) ? answers + 1 : 0;
   }
@@ -72,10 +69,10 @@ void MarlinLink::switch_reports_off() {
 }
 
 void MarlinLink::nobody_answered() const {
-  const std::string expected = "port " + port_.name() + ": expected a Marlin firmware, found ";
+  const std::string expected = "port " + lines_.name() + ": expected a Marlin firmware, found ";
   const std::string within = " answer to M110 within " + format(kConnectDeadline, 0) + " s; ";
-  if (bytes_ > 0) {
-    throw WrongDevice(expected + std::to_string(bytes_) + " bytes that are no" + within +
+  if (lines_.bytes() > 0) {
+    throw WrongDevice(expected + std::to_string(lines_.bytes()) + " bytes that are no" + within +
                       "check that it is the printer's port (--list-ports) and that its baud rate is " +
                       std::to_string(rig::kPrinterBaud) +
                       (complaint_.empty() ? "" : "; it said " + in_quotes(complaint_)));
@@ -88,15 +85,22 @@ void MarlinLink::refuse_grbl(const std::string& line) const {
   const bool numbered = line.starts_with("error:") || line.starts_with("ALARM:");
   if (!line.starts_with("Grbl ") && !(numbered && line.size() > 6 && line[6] >= '0' && line[6] <= '9'))
     return;
-  throw WrongDevice("port " + port_.name() + ": expected Marlin or Klipper, found GRBL (" + in_quotes(line) +
+  throw WrongDevice("port " + lines_.name() + ": expected Marlin or Klipper, found GRBL (" + in_quotes(line) +
                     "), which has no line numbers and no M400; use a printer with one of the two");
 }
 
+void MarlinLink::refuse_board() const {
+  constexpr std::size_t kFewFrames = 3 * rig::kFrameBytes;
+  if (lines_.bytes() <= kFewFrames || 3 * lines_.no_text() <= lines_.bytes()) return;
+  throw WrongDevice("port " + lines_.name() +
+                    ": expected a Marlin printer, found no text, as from a tactile board; exchange the two "
+                    "ports");
+}
+
 bool MarlinLink::probe(double until) {
-  constexpr std::size_t kFewFrames = 3 * 164;
-  send("\n" + numbered_line(0, "M110 N0"));
+  lines_.send("\n" + numbered_line(0, "M110 N0"));
   std::string line;
-  while (input_time_ < until && read_line(until, line)) {
+  while (lines_.arrival_s() < until && read_line(until, line)) {
     const Reply reply = parse_reply(line);
     if (reply.kind == ReplyKind::fatal) check_alarm(reply);
     refuse_grbl(line);
@@ -105,11 +109,7 @@ bool MarlinLink::probe(double until) {
     settle();
     return true;
   }
-  if (bytes_ > kFewFrames && 3 * no_text_ > bytes_) {
-    throw WrongDevice("port " + port_.name() +
-                      ": expected a Marlin printer, found no text, as from a tactile board; exchange the two "
-                      "ports");
-  }
+  refuse_board();
   return false;
 }
 
@@ -129,9 +129,9 @@ void MarlinLink::read_capabilities() {
 }
 
 MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s) {
-  if (halted_) throw PrinterHalted("printer " + port_.name() + ": halted earlier; reset it and start again");
+  if (halted_) throw PrinterHalted("printer " + lines_.name() + ": halted earlier; reset it and start again");
   std::string early;  // what was read before a question is no answer to it
-  while (take_line(early)) check_alarm(parse_reply(early));
+  while (lines_.take(early)) check_alarm(parse_reply(early));
   const std::string text = capabilities_.emergency_parser ? shielded(code) : std::string(code);
   kept_.push_back(numbered_line(number_ + 1, text));
   ++number_;
@@ -139,7 +139,7 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
   ++counters_.lines;
   Exchange exchange{number_, number_, deadline_s > 0 ? deadline_s : kOkDeadline};
   exchange.code = text;
-  exchange.answer.sent_s = send(kept_.back());
+  exchange.answer.sent_s = lines_.send(kept_.back());
   exchange.until = exchange.answer.sent_s + exchange.deadline_s;
   // Behind its deadline a long command may still have to be asked for.
   const double usual_s = deadline_s > kOkDeadline ? deadline_s : 0;
@@ -148,9 +148,9 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
   while (!exchange.done) {
     const bool answered = read_line(std::min(exchange.until, exchange.limit), line);
     if (answered) on_reply(exchange, parse_reply(line));
-    const double now = answered ? input_time_ : port_.now();
+    const double now = answered ? lines_.arrival_s() : lines_.port().now();
     if (!exchange.done && now >= exchange.limit) {
-      throw PrinterSilent("printer " + port_.name() + ": expected the end of " + in_quotes(code) +
+      throw PrinterSilent("printer " + lines_.name() + ": expected the end of " + in_quotes(code) +
                           " within " + format(exchange.limit - exchange.answer.sent_s, 0) +
                           " s, found other answers (" + in_quotes(line) +
                           " last); check the printer and start again");
@@ -172,7 +172,7 @@ void MarlinLink::finish(const Exchange& exchange) {
   // every later answer by one.
   if (exchange.answer.repeated) settle();
   if (exchange.error_stands) {
-    throw PrinterRefused("printer " + port_.name() + ": refused " +
+    throw PrinterRefused("printer " + lines_.name() + ": refused " +
                          in_quotes(kept_.back().substr(0, kept_.back().size() - 1)) + ": " +
                          printable(exchange.error, 200));
   }
@@ -181,7 +181,7 @@ void MarlinLink::finish(const Exchange& exchange) {
 void MarlinLink::count_copy(Exchange& exchange, const std::string& why) {
   const bool loop = ++exchange.copies > 4 * kMaxRepeats;
   if (++exchange.repeats > kMaxRepeats || loop) {
-    const std::string text = "printer " + port_.name() + ": line " + std::to_string(exchange.cursor) +
+    const std::string text = "printer " + lines_.name() + ": line " + std::to_string(exchange.cursor) +
                              " repeated " + std::to_string((loop ? exchange.copies : exchange.repeats) - 1) +
                              " times without success (" + why + ")";
     if (exchange.fault || loop) throw ResendLoop(text + ": resend loop; check the cable and start again");
@@ -191,20 +191,21 @@ void MarlinLink::count_copy(Exchange& exchange, const std::string& why) {
   exchange.answer.repeated = true;
   exchange.fault = exchange.asked = false;
   ++counters_.repeats;
-  input_.clear();  // half an answer, such as an ok whose line break was lost
+  lines_.forget();  // half an answer, such as an ok whose line break was lost
 }
 
 void MarlinLink::repeat(Exchange& exchange, const std::string& why) {
   count_copy(exchange, why);
   // The line break ends what may be left of a damaged line; Marlin ignores empty ones.
-  exchange.until = exchange.deadline_s +
-                   send("\n" + kept_[kept_.size() - 1 - static_cast<std::size_t>(number_ - exchange.cursor)]);
+  exchange.until =
+      exchange.deadline_s +
+      lines_.send("\n" + kept_[kept_.size() - 1 - static_cast<std::size_t>(number_ - exchange.cursor)]);
 }
 
 void MarlinLink::ask(Exchange& exchange) {
   count_copy(exchange, "no answer");
   exchange.asked = !capabilities_.klipper;
-  exchange.until = kOkDeadline + send("\n" + numbered_line(number_ + kFarAhead, "M105"));
+  exchange.until = kOkDeadline + lines_.send("\n" + numbered_line(number_ + kFarAhead, "M105"));
 }
 
 void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
@@ -218,7 +219,7 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
       if (reply.text.size() > 2) exchange.answer.replies.push_back(std::move(reply));  // Klipper's M115
       break;
     case ReplyKind::busy:
-      exchange.until = std::max(exchange.until, input_time_ + kBusyDeadline);
+      exchange.until = std::max(exchange.until, lines_.arrival_s() + kBusyDeadline);
       break;
     case ReplyKind::line_fault:
       ++counters_.faults;
@@ -262,7 +263,7 @@ void MarlinLink::on_unknown_command(Exchange& exchange, const Reply& reply) {
 }
 
 void MarlinLink::on_ok(Exchange& exchange) {
-  exchange.answer.answered_s = input_time_;
+  exchange.answer.answered_s = lines_.arrival_s();
   if (exchange.done) return;
   if (exchange.asked && !exchange.fault) return;  // late, or the question's: the last line taken decides
   if (exchange.fault) {
@@ -284,7 +285,7 @@ void MarlinLink::on_last_line(Exchange& exchange, std::int64_t last) {
     if (last > exchange.number) return;  // damaged text
     exchange.done = true;                // it was taken: its ok was lost
     exchange.proven = true;
-    exchange.answer.answered_s = input_time_;
+    exchange.answer.answered_s = lines_.arrival_s();
     exchange.answer.repeated = true;
     exchange.error_stands = !exchange.error.empty();
     return;
@@ -295,13 +296,13 @@ void MarlinLink::on_last_line(Exchange& exchange, std::int64_t last) {
     exchange.fallback = next;
     if (!believed) return;
     if (next <= 1) {
-      throw PrinterReset("printer " + port_.name() + ": its line number fell back from " +
+      throw PrinterReset("printer " + lines_.name() + ": its line number fell back from " +
                          std::to_string(exchange.number - 1) +
                          " to 0, so it restarted; its position is unknown");
     }
   }
   if (next <= number_ - static_cast<std::int64_t>(kept_.size())) {
-    throw ResendLoop("printer " + port_.name() + ": asks for line " + std::to_string(next) + ", kept are " +
+    throw ResendLoop("printer " + lines_.name() + ": asks for line " + std::to_string(next) + ", kept are " +
                      std::to_string(number_ - static_cast<std::int64_t>(kept_.size()) + 1) + " to " +
                      std::to_string(number_) + "; start again");
   }
@@ -309,26 +310,26 @@ void MarlinLink::on_last_line(Exchange& exchange, std::int64_t last) {
   exchange.cursor = next;
 }
 
-void MarlinLink::emergency(std::string_view code) { send("\n" + std::string(code) + "\n"); }
+void MarlinLink::emergency(std::string_view code) { lines_.send("\n" + std::string(code) + "\n"); }
 
 void MarlinLink::idle(double seconds) {
-  const double until = port_.now() + seconds;
+  const double until = lines_.port().now() + seconds;
   std::string line;
-  while (input_time_ < until && read_line(until, line)) check_alarm(parse_reply(line));
+  while (lines_.arrival_s() < until && read_line(until, line)) check_alarm(parse_reply(line));
 }
 
 void MarlinLink::settle() {
-  const double limit = port_.now() + 2;
+  const double limit = lines_.port().now() + 2;
   std::string line;
-  double quiet_until = port_.now() + kQuiet;
-  while (input_time_ < limit && read_line(std::min(quiet_until, limit), line)) {
+  double quiet_until = lines_.port().now() + kQuiet;
+  while (lines_.arrival_s() < limit && read_line(std::min(quiet_until, limit), line)) {
     const Reply reply = parse_reply(line);
     if (reply.kind == ReplyKind::start || reply.kind == ReplyKind::fatal) check_alarm(reply);
     // Reports come for ever; what is waited for is the end of answers.
     const bool report = reply.kind == ReplyKind::position || reply.kind == ReplyKind::temperature;
-    if (!report) quiet_until = input_time_ + kQuiet;
+    if (!report) quiet_until = lines_.arrival_s() + kQuiet;
   }
-  input_.clear();
+  lines_.forget();
 }
 
 void MarlinLink::check_alarm(const Reply& reply) {
@@ -337,64 +338,29 @@ void MarlinLink::check_alarm(const Reply& reply) {
     if (reply.text.starts_with(mark) && reply.kind != ReplyKind::fatal) complaint_ = reply.text;
   if (reply.kind == ReplyKind::fatal) {
     halted_ = true;
-    throw PrinterHalted("printer " + port_.name() + ": the firmware halted (" +
+    throw PrinterHalted("printer " + lines_.name() + ": the firmware halted (" +
                         (complaint_.empty() ? "" : in_quotes(complaint_) + ", ") + in_quotes(reply.text) +
                         "); nothing more is sent, reset the printer and check it");
   }
   if (reply.kind == ReplyKind::start && connected_) {
     connected_ = false;
     throw PrinterReset(
-        "printer " + port_.name() +
+        "printer " + lines_.name() +
         ": the firmware restarted in use; its position is unknown, confirm the origin and start again");
   }
   if (reply.kind == ReplyKind::paused && connected_) {
-    throw PrinterPaused("printer " + port_.name() +
+    throw PrinterPaused("printer " + lines_.name() +
                         ": waits for its user; look at the printer's display and start again");
   }
 }
 
-double MarlinLink::send(const std::string& text) {
-  const double before = port_.now();
-  port_.write(std::as_bytes(std::span(text)), before + kWriteDeadline);
-  return before;
-}
-
-bool MarlinLink::take_line(std::string& line) {
-  for (;;) {
-    const std::size_t end = input_.find_first_of("\r\n");
-    if (end == std::string::npos) return false;
-    line.assign(input_, 0, end);
-    input_.erase(0, end + 1);
-    while (!line.empty() && line.back() == ' ') line.pop_back();
-    if (!line.empty()) return true;
-  }
-}
-
 bool MarlinLink::read_line(double until, std::string& line) {
-  constexpr std::size_t kLongestInput = 4096;
-  std::array<std::byte, 1024> buffer{};
-  while (!take_line(line)) {
-    if (watch_) watch_();
-    const double wait = std::min(until, give_up_s_);
-    const double slice = watch_ ? std::min(wait, port_.now() + kWatchInterval) : wait;
-    const Received got = port_.read(buffer, slice);
-    if (got.time_s >= give_up_s_) {
-      throw PrinterSilent("printer " + port_.name() + ": did not come to an end in time" +
-                          (complaint_.empty() ? "" : ", it said " + in_quotes(complaint_)) +
-                          "; check the printer and start again");
-    }
-    if (got.count == 0) {
-      if (got.time_s >= until) return false;
-      continue;
-    }
-    input_time_ = got.time_s;
-    const auto bytes = std::span(buffer).first(got.count);
-    bytes_ += bytes.size();
-    for (const std::byte byte : bytes) no_text_ += is_text(byte) ? 0 : 1;
-    input_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    if (input_.size() > kLongestInput && input_.find_first_of("\r\n") == std::string::npos) input_.clear();
-  }
-  return true;
+  const bool answered = lines_.read(std::min(until, give_up_s_), line);
+  const double now = answered ? lines_.arrival_s() : std::min(until, give_up_s_);
+  if (now < give_up_s_) return answered;
+  throw PrinterSilent("printer " + lines_.name() + ": did not come to an end in time" +
+                      (complaint_.empty() ? "" : ", it said " + in_quotes(complaint_)) +
+                      "; check the printer and start again");
 }
 
 }  // namespace supertac

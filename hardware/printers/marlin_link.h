@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "hardware/ports/errors.h"
-#include "hardware/ports/port.h"
+#include "hardware/printers/line_port.h"
 #include "hardware/printers/marlin_line.h"
 
 namespace supertac {
@@ -43,7 +43,7 @@ class MarlinLink {
   };
 
   /// `port` must outlive the link.
-  explicit MarlinLink(Port& port) : port_(port) {}
+  explicit MarlinLink(Port& port) : lines_(port) {}
 
   /// Finds a fresh (`start` banner) or a running firmware, sets its line number to 0, reads M115, switches
   /// off the reports that an earlier host may have left on (M154, M155). Throws PrinterSilent; WrongDevice
@@ -70,12 +70,12 @@ class MarlinLink {
   void settle();
 
   /// Called at least every 0.02 s while waiting for the firmware; what it throws ends the wait.
-  void set_watch(std::function<void()> watch) { watch_ = std::move(watch); }
+  void set_watch(std::function<void()> watch) { lines_.set_watch(std::move(watch)); }
 
   const MarlinCapabilities& capabilities() const { return capabilities_; }
   const Counters& counters() const { return counters_; }
   bool halted() const { return halted_; }
-  Port& port() { return port_; }
+  Port& port() { return lines_.port(); }
 
  private:
   struct Exchange;
@@ -83,10 +83,9 @@ class MarlinLink {
   bool probe(double until);
   [[noreturn]] void nobody_answered() const;
   void refuse_grbl(const std::string& line) const;
+  void refuse_board() const;
   void switch_reports_off();
   void read_capabilities();
-  /// Returns the time before the write.
-  double send(const std::string& text);
   /// Sends the exchange's current line again.
   void repeat(Exchange& exchange, const std::string& why);
   /// Asks for the last line taken, by one numbered far ahead.
@@ -99,17 +98,12 @@ class MarlinLink {
   void on_last_line(Exchange& exchange, std::int64_t last);
   void finish(const Exchange& exchange);
   void check_alarm(const Reply& reply);
-  /// The next line, without its break; false when `until` passes first.
+  /// As LinePort::read(), and gives up when it is time to.
   bool read_line(double until, std::string& line);
-  bool take_line(std::string& line);
 
-  Port& port_;
+  LinePort lines_;
   MarlinCapabilities capabilities_;
   Counters counters_;
-  std::function<void()> watch_;
-  std::size_t bytes_ = 0, no_text_ = 0;  // received while connecting: a tactile board is not a printer
-  std::string input_;                    // received, not yet a whole line
-  double input_time_ = 0;                // arrival of its last byte
   std::string complaint_;         // the last echo:, // or !! since an ok; a halt's reason stands before it
   std::deque<std::string> kept_;  // lines number_ - kept_.size() + 1 ... number_
   std::int64_t number_ = 0;       // of the newest line
