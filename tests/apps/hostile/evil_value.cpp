@@ -1,4 +1,4 @@
-#include "bench/studies/hostile/evil_value.h"
+#include "tests/apps/hostile/evil_value.h"
 
 #include <vector>
 

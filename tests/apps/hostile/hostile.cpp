@@ -25,12 +25,12 @@
 #include <set>
 #include <span>
 
-#include "bench/studies/hostile/evil_value.h"
-#include "bench/studies/hostile/liars.h"
-#include "bench/studies/hostile/readers.h"
 #include "io/files/file.h"
 #include "io/numbers/random.h"
 #include "tests/apps/common/process.h"
+#include "tests/apps/hostile/evil_value.h"
+#include "tests/apps/hostile/liars.h"
+#include "tests/apps/hostile/readers.h"
 
 namespace supertac {
 namespace {

@@ -1,4 +1,4 @@
-#include "bench/studies/hostile/readers.h"
+#include "tests/apps/hostile/readers.h"
 
 #include <cstring>
 #include <fstream>

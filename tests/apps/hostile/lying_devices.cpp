@@ -2,7 +2,7 @@
 #include <array>
 #include <iostream>
 
-#include "bench/studies/hostile/liars.h"
+#include "tests/apps/hostile/liars.h"
 #include "tests/hardware/fault_run.h"
 #include "tests/hardware/rig_support.h"
 

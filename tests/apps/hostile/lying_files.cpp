@@ -1,4 +1,4 @@
-#include "bench/studies/hostile/liars.h"
+#include "tests/apps/hostile/liars.h"
 
 #include <algorithm>
 #include <array>
@@ -9,8 +9,6 @@
 #include <numeric>
 #include <typeinfo>
 
-#include "bench/studies/hostile/evil_value.h"
-#include "bench/studies/hostile/readers.h"
 #include "data/recordings/imports/table_import.h"
 #include "data/recordings/recording.h"
 #include "data/scores/baselines.h"
@@ -22,6 +20,8 @@
 #include "io/files/json.h"
 #include "io/files/safetensors.h"
 #include "models/files/model_file.h"
+#include "tests/apps/hostile/evil_value.h"
+#include "tests/apps/hostile/readers.h"
 #include "tests/fuzz/journal_properties.h"
 
 namespace supertac {
