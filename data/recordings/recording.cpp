@@ -214,32 +214,21 @@ void write_recording(const std::string& path, const Recording& recording) {
 }
 
 TaxelArray array_of(const SafetensorsFile& file) {
-  const std::string& path = file.path();
-  const auto found = file.metadata().find("array");
-  if (found == file.metadata().end()) return {};
+  if (!file.metadata().contains("array")) return {};
+  JsonObject keys(file.metadata(), file.path(), "array");
+  const TaxelArray array{keys.integer("rows"), keys.integer("columns"), pitch_of(keys),
+                         keys.integer("channels")};
   try {
-    const auto json = parse_json_limited(found->second);
-    const TaxelArray array{json.at("rows").get<int>(), json.at("columns").get<int>(),
-                           pitch_of_json(json.at("pitch_mm")), json.at("channels").get<int>()};
     array.check();
-    return array;
   } catch (const std::invalid_argument& error) {
-    throw FileError(path, error.what());
-  } catch (const std::exception&) {
-    throw FileError(path, "array is " + in_quotes(found->second) +
-                              ", expected {\"rows\": 4, \"columns\": 4, \"pitch_mm\": 3, \"channels\": 1}");
+    throw FileError(file.path(), error.what());
   }
+  return array;
 }
 
 SignalScale signal_scale_of(const SafetensorsFile& file) {
-  const std::string& path = file.path();
-  const auto found = file.metadata().find("signals");
-  if (found == file.metadata().end()) return {};
-  try {
-    return scale_of_json(parse_json_limited(found->second), path);
-  } catch (const JsonError& error) {
-    throw FileError(path, std::string("signals: ") + error.what());
-  }
+  if (!file.metadata().contains("signals")) return {};
+  return scale_of({file.metadata(), file.path(), "signals"});
 }
 
 std::map<std::string, std::string> metadata_of(const TaxelArray& array, const SignalScale& scale) {

@@ -11,6 +11,8 @@
 
 namespace supertac {
 
+class JsonObject;
+
 /// What a signal says: (rest - signal) / span is 0 where nothing touches and 1 where a taxel is pressed hard.
 /// As JSON {"unit": "counts", "pressed": "higher", "range": [40, 900]}; the default is the rig's.
 struct SignalScale {
@@ -93,10 +95,10 @@ void write_sensor(const OutputPath& output, const Sensor& sensor);
 
 /// For a recording's or model's metadata.
 nlohmann::ordered_json json_of(const SignalScale& scale);
-/// A number, or [x, y] where they differ; pitch_of_json() throws std::invalid_argument for anything else.
+/// A number, or [x, y] where they differ.
 nlohmann::ordered_json json_of(const Pitch& pitch);
-Pitch pitch_of_json(const nlohmann::ordered_json& json);
-/// Throws FileError as sensor_of_json().
-SignalScale scale_of_json(const nlohmann::ordered_json& json, const std::string& where);
+/// That of the key pitch_mm. This and scale_of() throw FileError as sensor_of_json().
+Pitch pitch_of(JsonObject& keys, std::optional<Pitch> fallback = {});
+SignalScale scale_of(JsonObject keys);
 
 }  // namespace supertac

@@ -6,7 +6,6 @@
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
-#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -20,86 +19,6 @@ constexpr std::pair<const char*, FrameKind> kKinds[] = {{"board", FrameKind::boa
                                                         {"binary", FrameKind::binary}};
 constexpr std::pair<const char*, double> kUnits[] = {{"s", 1}, {"ms", 1e-3}, {"us", 1e-6}};
 
-/// The keys of one object, each read once; others are refused when it ends.
-class Keys {
- public:
-  Keys(const Json& json, std::string where, std::string prefix = {})
-      : json_(json), where_(std::move(where)), prefix_(std::move(prefix)) {
-    if (!json.is_object()) throw FileError(where_, "expected an object {...}, found " + shown(json));
-  }
-
-  const Json* find(const char* name) {
-    known_ += (known_.empty() ? "" : ", ") + std::string(name);
-    return json_.contains(name) ? &json_.at(name) : nullptr;
-  }
-  double number(const char* name, double fallback) {
-    const Json* value = find(name);
-    if (value == nullptr) return fallback;
-    if (!value->is_number()) wrong(name, "a number", *value);
-    return value->get<double>();
-  }
-  int integer(const char* name, int fallback) {
-    const Json* value = find(name);
-    return value == nullptr ? fallback : whole(name, *value);
-  }
-  std::string text(const char* name, const std::string& fallback) {
-    const Json* value = find(name);
-    if (value == nullptr) return fallback;
-    if (!value->is_string()) wrong(name, "a text", *value);
-    return value->get<std::string>();
-  }
-  std::vector<int> integers(const char* name, const Json& value) {
-    if (!value.is_array()) wrong(name, "a list of whole numbers", value);
-    std::vector<int> list;
-    for (const Json& element : value) list.push_back(whole(name, element));
-    return list;
-  }
-  std::vector<int> integers(const char* name) {
-    const Json* value = find(name);
-    return value == nullptr ? std::vector<int>() : integers(name, *value);
-  }
-  std::vector<float> numbers(const char* name) {
-    const Json* value = find(name);
-    if (value == nullptr) return {};
-    std::vector<float> list;
-    for (const Json& element : value->is_array() ? *value : Json::array({nullptr})) {
-      if (!element.is_number()) wrong(name, "a list of numbers", *value);
-      list.push_back(element.get<float>());
-    }
-    return list;
-  }
-  /// One of the names of a table; its value.
-  template <class Table>
-  auto one_of(const char* name, const Table& table, const std::string& fallback) {
-    const std::string word = text(name, fallback);
-    for (const auto& [known, value] : table)
-      if (word == known) return value;
-    wrong(name, "one of " + joined(table, ", ", [](const auto& entry) { return entry.first; }), Json(word));
-  }
-  void no_others() const {
-    for (const auto& [name, value] : json_.items())
-      if ((", " + known_ + ", ").find(", " + name + ", ") == std::string::npos)
-        throw FileError(where_, "knows no key " + in_quotes(prefix_ + name) + "; it may have " + known_);
-  }
-  [[noreturn]] void wrong(const char* name, const std::string& expected, const Json& found) const {
-    throw FileError(where_, "\"" + prefix_ + name + "\" must be " + expected + ", found " + shown(found));
-  }
-  const std::string& where() const { return where_; }
-
- private:
-  static std::string shown(const Json& json) {
-    return printable(json.dump(-1, ' ', true, Json::error_handler_t::replace));
-  }
-  int whole(const char* name, const Json& value) const {
-    if (!value.is_number_integer() || value < -1'000'000 || value > 1'000'000)
-      wrong(name, "a whole number", value);
-    return value.get<int>();
-  }
-
-  const Json& json_;
-  std::string where_, prefix_, known_;
-};
-
 // So that 2.09 and 2.45 are 0.36 apart, as they are for a reader.
 double rounded(double value) {
   char text[40];
@@ -107,7 +26,7 @@ double rounded(double value) {
   return parse_double({text, end}).value_or(value);
 }
 
-SignalScale take_scale(Keys& keys) {
+SignalScale take_scale(JsonObject& keys) {
   SignalScale scale;
   scale.unit = keys.text("unit", scale.unit);
   constexpr std::pair<const char*, bool> kPolarities[] = {{"higher", true}, {"lower", false}};
@@ -125,7 +44,7 @@ SignalScale take_scale(Keys& keys) {
   return scale;
 }
 
-std::string bytes_of_hex(Keys& keys, const char* name) {
+std::string bytes_of_hex(JsonObject& keys, const char* name) {
   const std::string hex = keys.text(name, "");
   std::string bytes;
   for (std::size_t at = 0; at < hex.size(); at += 2) {
@@ -149,7 +68,7 @@ std::string hex_of_bytes(const std::string& bytes) {
 }
 
 FrameTime time_of(const Json& json, FrameKind kind, const std::string& where) {
-  Keys keys(json, where, "frame.time.");
+  JsonObject keys(json, where, "frame.time.");
   FrameTime time;
   if (kind == FrameKind::text) time.column = keys.integer("column", 0);
   if (kind == FrameKind::json) time.key = keys.text("key", "time");
@@ -160,7 +79,7 @@ FrameTime time_of(const Json& json, FrameKind kind, const std::string& where) {
 }
 
 FrameFormat format_of(const Json& json, const std::string& where) {
-  Keys keys(json, where, "frame.");
+  JsonObject keys(json, where, "frame.");
   FrameFormat f;
   f.kind = keys.one_of("kind", kKinds, "");
   if (const Json* time = f.kind == FrameKind::board ? nullptr : keys.find("time"))
@@ -184,10 +103,10 @@ FrameFormat format_of(const Json& json, const std::string& where) {
   return f;
 }
 
-std::vector<int> take_order(Keys& keys, const TaxelArray& array) {
+std::vector<int> take_order(JsonObject& keys, const TaxelArray& array) {
   const Json* value = keys.find("order");
   if (value == nullptr || *value == "row-major") return {};
-  if (value->is_array()) return keys.integers("order", *value);
+  if (value->is_array()) return keys.integers("order");
   if (*value != "column-major") keys.wrong("order", "row-major, column-major, or a list of places", *value);
   std::vector<int> order;
   for (int k = 0; k < array.taxels(); ++k)
@@ -195,18 +114,12 @@ std::vector<int> take_order(Keys& keys, const TaxelArray& array) {
   return order;
 }
 
-TaxelArray take_array(Keys& keys) {
+TaxelArray take_array(JsonObject& keys) {
   TaxelArray array;
   array.rows = keys.integer("rows", array.rows);
   array.columns = keys.integer("columns", array.columns);
   array.channels = keys.integer("channels", 1);
-  if (const Json* pitch = keys.find("pitch_mm")) {
-    try {
-      array.pitch_mm = pitch_of_json(*pitch);
-    } catch (const std::invalid_argument&) {
-      keys.wrong("pitch_mm", "a number, or [along a row, from row to row]", *pitch);
-    }
-  }
+  array.pitch_mm = pitch_of(keys, array.pitch_mm);
   array.check();
   return array;
 }
@@ -245,23 +158,21 @@ Json json_of(const SignalScale& scale) {
           {"range", {rounded(scale.low()), rounded(scale.high())}}};
 }
 
-SignalScale scale_of_json(const Json& json, const std::string& where) {
-  Keys keys(json, where);
+SignalScale scale_of(JsonObject keys) {
   Sensor sensor;
   sensor.scale = take_scale(keys);
   keys.no_others();
   try {
     sensor.check();
   } catch (const std::invalid_argument& error) {
-    throw FileError(where, error.what());
+    throw FileError(keys.where(), error.what());
   }
   return sensor.scale;
 }
 
 Sensor sensor_of_json(const std::string& text, const std::string& where) {
   try {
-    const Json json = parse_json_limited(text, {.max_bytes = kMostBytes});
-    Keys keys(json, where);
+    JsonObject keys(parse_json_limited(text, {.max_bytes = kMostBytes}), where);
     Sensor sensor;
     sensor.name = keys.text("name", "sensor");
     sensor.array = take_array(keys);
@@ -294,11 +205,13 @@ Sensor read_sensor(const std::string& name_or_path) {
 
 Json json_of(const Pitch& pitch) { return pitch.x == pitch.y ? Json(pitch.x) : Json{pitch.x, pitch.y}; }
 
-Pitch pitch_of_json(const Json& json) {
-  if (json.is_number()) return json.get<double>();
-  if (json.is_array() && json.size() == 2 && json[0].is_number() && json[1].is_number())
-    return {json[0].get<double>(), json[1].get<double>()};
-  throw std::invalid_argument("expected a number, or [along a row, from row to row]");
+Pitch pitch_of(JsonObject& keys, std::optional<Pitch> fallback) {
+  const Json* json = keys.find("pitch_mm", !fallback);
+  if (json == nullptr) return *fallback;
+  if (json->is_number()) return json->get<double>();
+  if (json->is_array() && json->size() == 2 && json->at(0).is_number() && json->at(1).is_number())
+    return {json->at(0).get<double>(), json->at(1).get<double>()};
+  keys.wrong("pitch_mm", "a number, or [along a row, from row to row]", *json);
 }
 
 Json json_of(const Sensor& sensor) {

@@ -1,10 +1,8 @@
 #include "io/files/json.h"
 
+#include <algorithm>
 #include <set>
 #include <utility>
-#include <vector>
-
-#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -90,6 +88,21 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
   std::string problem_;
 };
 
+std::string shown(const Tree& json) {
+  return printable(json.dump(-1, ' ', true, Tree::error_handler_t::replace));
+}
+
+Tree parsed_entry(const std::map<std::string, std::string>& metadata, const std::string& path,
+                  const std::string& key) {
+  const auto found = metadata.find(key);
+  try {
+    if (found != metadata.end()) return parse_json_limited(found->second);
+  } catch (const JsonError& error) {
+    throw FileError(path, "metadata \"" + key + "\": " + error.what());
+  }
+  throw FileError(path, "metadata \"" + key + "\" is missing; the file is no SuperTac model");
+}
+
 }  // namespace
 
 nlohmann::ordered_json parse_json_limited(std::string_view text, const JsonLimits& limits) {
@@ -101,6 +114,85 @@ nlohmann::ordered_json parse_json_limited(std::string_view text, const JsonLimit
   TreeBuilder builder(limits);
   if (!nlohmann::json::sax_parse(text.begin(), text.end(), &builder)) throw JsonError(builder.problem());
   return builder.take();
+}
+
+JsonObject::JsonObject(Tree json, std::string where, std::string prefix)
+    : json_(std::move(json)), where_(std::move(where)), prefix_(std::move(prefix)) {
+  if (!json_.is_object()) throw FileError(where_, "expected an object {...}, found " + shown(json_));
+}
+
+JsonObject::JsonObject(const std::map<std::string, std::string>& metadata, const std::string& path,
+                       const std::string& key)
+    : JsonObject(parsed_entry(metadata, path, key), path + ": metadata \"" + key + "\"") {}
+
+const Tree* JsonObject::find(const char* name, bool required) {
+  if (std::ranges::find(known_, name) == known_.end()) known_.emplace_back(name);
+  if (json_.contains(name)) return &json_.at(name);
+  if (required) throw FileError(where_, "expected a key \"" + prefix_ + name + "\", found none");
+  return nullptr;
+}
+
+int JsonObject::integer(const char* name, std::optional<int> fallback) {
+  const Tree* value = find(name, !fallback);
+  return value == nullptr ? *fallback : whole(name, *value);
+}
+
+double JsonObject::number(const char* name, std::optional<double> fallback) {
+  const Tree* value = find(name, !fallback);
+  if (value == nullptr) return *fallback;
+  if (!value->is_number()) wrong(name, "a number", *value);
+  return value->get<double>();
+}
+
+std::string JsonObject::text(const char* name, const std::optional<std::string>& fallback) {
+  const Tree* value = find(name, !fallback);
+  if (value == nullptr) return *fallback;
+  if (!value->is_string()) wrong(name, "a text", *value);
+  return value->get<std::string>();
+}
+
+bool JsonObject::flag(const char* name, bool fallback) {
+  const Tree* value = find(name);
+  if (value == nullptr) return fallback;
+  if (!value->is_boolean()) wrong(name, "true or false", *value);
+  return value->get<bool>();
+}
+
+std::vector<int> JsonObject::integers(const char* name) {
+  const Tree* value = find(name);
+  if (value == nullptr) return {};
+  if (!value->is_array()) wrong(name, "a list of whole numbers", *value);
+  std::vector<int> list;
+  for (const Tree& element : *value) list.push_back(whole(name, element));
+  return list;
+}
+
+std::vector<float> JsonObject::numbers(const char* name) {
+  const Tree* value = find(name);
+  if (value == nullptr) return {};
+  std::vector<float> list;
+  for (const Tree& element : value->is_array() ? *value : Tree::array({nullptr})) {
+    if (!element.is_number()) wrong(name, "a list of numbers", *value);
+    list.push_back(element.get<float>());
+  }
+  return list;
+}
+
+void JsonObject::no_others() const {
+  for (const auto& [name, value] : json_.items())
+    if (std::ranges::find(known_, name) == known_.end())
+      throw FileError(where_,
+                      "knows no key " + in_quotes(prefix_ + name) + "; it may have " + joined(known_, ", "));
+}
+
+void JsonObject::wrong(const char* name, const std::string& expected, const Tree& found) const {
+  throw FileError(where_, "\"" + prefix_ + name + "\" must be " + expected + ", found " + shown(found));
+}
+
+int JsonObject::whole(const char* name, const Tree& value) const {
+  if (!value.is_number_integer() || value < -1'000'000 || value > 1'000'000)
+    wrong(name, "a whole number", value);
+  return value.get<int>();
 }
 
 }  // namespace supertac

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "io/files/json.h"
 #include "io/numbers/text.h"
 #include "layers/checkpoint.h"
-#include "models/files/json_entry.h"
 
 namespace supertac {
 namespace {
@@ -43,7 +43,7 @@ NamedClassifier load_classifier(const std::string& path) {
   if (kind != kKind)
     throw std::runtime_error(path + ": is a " + in_quotes(kind) +
                              ", expected a classifier as supertac-classify --out writes it");
-  const JsonEntry settings(file.metadata(), path, "settings");
+  JsonObject settings(file.metadata(), path, "settings");
   NamedClassifier loaded;
   loaded.names = comma_list(settings.text("names"));
   loaded.settings = {.height = settings.integer("height"),

@@ -5,9 +5,9 @@
 #include <stdexcept>
 
 #include "data/windows/transforms/signal_features.h"
+#include "io/files/json.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
-#include "models/files/json_entry.h"
 #include "models/inference/interval.h"
 
 namespace supertac {
@@ -15,10 +15,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-SuperTacSettings read_settings(const JsonEntry& entry) {
+SuperTacSettings read_settings(JsonObject entry) {
   SuperTacSettings s;
   s.preset = entry.text("preset");
-  if (entry.has("rows")) {
+  if (entry.find("rows") != nullptr) {
     s.rows = entry.integer("rows");
     s.columns = entry.integer("columns");
     s.in_channels = entry.integer("in_channels");
@@ -28,9 +28,9 @@ SuperTacSettings read_settings(const JsonEntry& entry) {
   s.scale = entry.integer("scale");
   s.channels = entry.integer("channels");
   s.rcabs = entry.integer("rcabs");
-  s.predicted_error = entry.flag("spread");
-  s.last_frame_path = entry.flag("last_frame_path");
-  if (entry.flag("sub_pixel")) {
+  s.predicted_error = entry.flag("spread", false);
+  s.last_frame_path = entry.flag("last_frame_path", false);
+  if (entry.flag("sub_pixel", false)) {
     throw std::runtime_error(
         entry.where() +
         ": expected transposed convolution, found \"sub_pixel\", which SuperTac no longer "
@@ -45,13 +45,15 @@ SuperTacSettings read_settings(const JsonEntry& entry) {
   return s;
 }
 
-InputSettings read_input(const JsonEntry& entry) {
+InputSettings read_input(JsonObject entry) {
+  const Json *filter = entry.find("filter_s"), *signals = entry.find("signals");
+  const bool filtered = filter == nullptr || !filter->is_null();
   const InputSettings input{
       entry.number("rate_hz"),
-      {entry.number("rest_volts"), entry.number("span_volts"), entry.flag("levelled")},
-      entry.number_or_null("filter_s"),
-      entry.has("pitch_mm") ? entry.pitch("pitch_mm") : InputSettings{}.pitch_mm,
-      entry.has("signals") ? scale_of_json(entry.object("signals"), entry.where()) : SignalScale{}};
+      {entry.number("rest_volts"), entry.number("span_volts"), entry.flag("levelled", false)},
+      filtered ? std::optional(entry.number("filter_s")) : std::nullopt,
+      pitch_of(entry, InputSettings{}.pitch_mm),
+      signals != nullptr ? scale_of({*signals, entry.where()}) : SignalScale{}};
   const double span = std::abs(input.scaling.span_volts);
   if (input.rate_hz < 1 || input.rate_hz > 100'000 || std::abs(input.scaling.rest_volts) > 2e9 ||
       span <= 1e-6 || span > 2e9 || input.filter_s.value_or(0) < 0 || input.filter_s.value_or(0) > 10 ||

@@ -6,7 +6,6 @@
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
-#include "models/files/json_entry.h"
 #include "models/files/model_file.h"
 
 namespace supertac {
@@ -18,22 +17,22 @@ void require(bool holds, const std::string& what, double found) {
   if (!holds) throw std::invalid_argument("recipe: expected " + what + ", got " + format(found));
 }
 
-void read_training(const JsonEntry& entry, Recipe& r) {
+void read_training(JsonObject entry, Recipe& r) {
   r.epochs = entry.integer("epochs");
   r.batch = entry.integer("batch");
   r.learning_rate = entry.number("learning_rate");
   r.warm_up = entry.number("warm_up");
   r.clip_norm = entry.number("clip_norm");
-  r.muon = entry.has("optimizer") && entry.text("optimizer") == "muon";
+  r.muon = entry.text("optimizer", "adam") == "muon";
   r.loss = {entry.number("a"), entry.number("beta"), entry.number("lambda")};
   r.augment = {.lift = entry.number("lift"),
                .gain = entry.number("gain"),
                .taxel_gain = entry.number("taxel_gain"),
                .offset = entry.number("offset"),
                .noise = entry.number("noise"),
-               .dropped = static_cast<int>(entry.integer("dropped"))};
-  r.mirror = entry.has("mirror") && entry.flag("mirror");
-  r.sampling = !entry.has("sampling") || entry.flag("sampling");
+               .dropped = entry.integer("dropped")};
+  r.mirror = entry.flag("mirror", false);
+  r.sampling = entry.flag("sampling", true);
 }
 
 }  // namespace

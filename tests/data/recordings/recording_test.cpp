@@ -79,13 +79,18 @@ TEST(Recording, RefusesAnArrayThatIsNone) {
   std::map<std::string, std::string> metadata{{"kind", "recording"}, {"plate", "3_Bumps"},
                                               {"trial", "1"},        {"pass", "1"},
                                               {"speed_mm_s", "10"},  {"source", "other"}};
-  for (const char* array :
-       {"4x4", R"({"rows": 4})", R"({"rows": 0, "columns": 4, "pitch_mm": 3, "channels": 1})"}) {
+  constexpr std::pair<const char*, const char*> kArrays[] = {
+      {"4x4", "metadata \"array\": not valid JSON at byte 2"},
+      {"4", "metadata \"array\": expected an object {...}, found 4"},
+      {R"({"rows": 4})", "metadata \"array\": expected a key \"columns\", found none"},
+      {R"({"rows": 4, "columns": 4, "channels": 1, "pitch_mm": [3]})",
+       "metadata \"array\": \"pitch_mm\" must be a number, or [along a row, from row to row], found [3]"},
+      {R"({"rows": 0, "columns": 4, "pitch_mm": 3, "channels": 1})", "rows must be 1 to 64, got 0"}};
+  for (const auto& [array, refusal] : kArrays) {
     metadata["array"] = array;
     write_safetensors(folder.file("a"), metadata, {});
-    EXPECT_NE(message_of<FileError>([&] { read_recording(folder.file("a")); }).find("expected"),
-              std::string::npos)
-        << array;
+    EXPECT_EQ(message_of<FileError>([&] { read_recording(folder.file("a")); }),
+              folder.file("a") + ": " + refusal);
   }
 }
 
