@@ -125,6 +125,7 @@ HeightMap::HeightMap(const std::vector<Triangle>& triangles, double width_mm, do
   }
   level();
   measure();
+  find_crests();
 }
 
 // Moves the surface so that its flat part is at 0.
@@ -149,7 +150,7 @@ double HeightMap::row_mean(std::size_t row) const {
 }
 
 void HeightMap::measure() {
-  texture_begin_ = texture_end_ = static_cast<double>(rows_ - 1) * kCellMm / 2;
+  extent_.texture_begin = extent_.texture_end = static_cast<double>(rows_ - 1) * kCellMm / 2;
   bool textured = false;
   for (std::size_t row = 0; row < rows_; ++row) {
     const double mean = row_mean(row);
@@ -158,12 +159,12 @@ void HeightMap::measure() {
       low = std::min(low, at(row, column));
       high = std::max(high, at(row, column));
     }
-    max_height_ = std::max(max_height_, double{high});
-    min_height_ = std::min(min_height_, double{low});
-    if (double{high} - mean > kUniformMm || mean - double{low} > kUniformMm) uniform_in_x_ = false;
+    extent_.max_height = std::max(extent_.max_height, double{high});
+    extent_.min_height = std::min(extent_.min_height, double{low});
+    if (double{high} - mean > kUniformMm || mean - double{low} > kUniformMm) extent_.uniform_in_x = false;
     if (low == 0 && high == 0) continue;
-    if (!textured) texture_begin_ = static_cast<double>(std::max<std::size_t>(row, 1) - 1) * kCellMm;
-    texture_end_ = static_cast<double>(std::min(row + 1, rows_ - 1)) * kCellMm;
+    if (!textured) extent_.texture_begin = static_cast<double>(std::max<std::size_t>(row, 1) - 1) * kCellMm;
+    extent_.texture_end = static_cast<double>(std::min(row + 1, rows_ - 1)) * kCellMm;
     textured = true;
   }
 }
@@ -181,12 +182,11 @@ double HeightMap::height(double x_mm, double y_mm) const {
   return along(row) + fv * (along(row + 1) - along(row));
 }
 
-std::vector<double> HeightMap::crests() const {
+void HeightMap::find_crests() {
   std::vector<double> profile(rows_);
   for (std::size_t row = 0; row < rows_; ++row) profile[row] = row_mean(row);
   const double half = *std::max_element(profile.begin(), profile.end()) / 2;
-  std::vector<double> crests;
-  if (half <= 0) return crests;
+  if (half <= 0) return;
   for (std::size_t row = 0; row < rows_; ++row) {
     if (profile[row] <= half) continue;
     std::size_t end = row;
@@ -195,10 +195,9 @@ std::vector<double> HeightMap::crests() const {
     std::size_t first = row, last = end - 1;
     while (profile[first] < top) ++first;
     while (profile[last] < top) --last;
-    crests.push_back(static_cast<double>(first + last) * kCellMm / 2);
+    extent_.crests.push_back(static_cast<double>(first + last) * kCellMm / 2);
     row = end;
   }
-  return crests;
 }
 
 }  // namespace supertac

@@ -9,7 +9,14 @@
 namespace supertac {
 
 /// The upper surface of a model read from triangles, on a grid, as a surface to slide over. z = 0 is its flat
-/// part, taken as the median height along its outline; what is less than 1 um from it counts as flat.
+/// part, taken as the median height along its outline; what is less than 1 um from it counts as flat. Its
+/// extent():
+///   texture_begin, _end  the nodes before the first and behind the last that differ from the flat part; the
+///                        middle when none does
+///   uniform_in_x         no height differs by more than 0.05 mm from the mean of its row
+///   crests               where the mean height over x, as a function of y, stays above half its maximum: the
+///                        middle of each such stretch's highest part. Elements that run into each other above
+///                        half their height count as one.
 class HeightMap : public Surface {
  public:
   static constexpr double kCellMm = 0.125;  ///< spacing of the grid
@@ -25,28 +32,15 @@ class HeightMap : public Surface {
   /// Bilinear between the nodes; 0 outside.
   double height(double x_mm, double y_mm) const override;
 
-  double max_height() const override { return max_height_; }
-  double min_height() const override { return min_height_; }
-  /// The nodes before the first and behind the last that differ from the flat part; the middle when none
-  /// does.
-  double texture_begin() const override { return texture_begin_; }
-  double texture_end() const override { return texture_end_; }
-  /// True when no height differs by more than 0.05 mm from the mean of its row.
-  bool uniform_in_x() const override { return uniform_in_x_; }
-  /// Where the mean height over x, as a function of y, stays above half its maximum: the middle of each such
-  /// stretch's highest part. Elements that run into each other above half their height count as one.
-  std::vector<double> crests() const override;
-
  private:
   std::size_t columns_ = 0, rows_ = 0;
   std::vector<float> z_;  // [rows][columns]
-  double max_height_ = 0, min_height_ = 0, texture_begin_ = 0, texture_end_ = 0;
-  bool uniform_in_x_ = true;
 
   float at(std::size_t row, std::size_t column) const { return z_[row * columns_ + column]; }
   double row_mean(std::size_t row) const;
   void level();
   void measure();
+  void find_crests();
 };
 
 }  // namespace supertac

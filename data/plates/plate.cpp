@@ -14,6 +14,8 @@
 
 namespace supertac {
 
+namespace {
+
 /// All that is particular to a texture. One row of kKinds adds one; nothing else names it.
 struct TextureKind {
   std::string_view word;            // in a plate's name, before the pitch
@@ -24,8 +26,6 @@ struct TextureKind {
   bool round = false;  // half as high as wide, so that the height is at most half the pitch
   double lowest = 0;   // trough, in heights
 };
-
-namespace {
 
 constexpr double kFinestMm = 0.05, kWidestMm = 1000;
 constexpr double kFitSlackMm = 1e-9;  // an element that fits exactly still fits after rounding
@@ -67,6 +67,56 @@ double distance_to_nearest(double at, double first, double pitch, int count) {
   const double index = std::clamp(std::round((at - first) / pitch), 0.0, count - 1.0);
   return at - (first + index * pitch);
 }
+
+// One texture with its layout worked out.
+struct Band {
+  const TextureKind* kind;
+  Texture texture;
+  int count_y, count_x;
+  double first_y, first_x;  // centre of the first element
+  double begin, end;        // extent along y
+
+  Band(const Texture& t, const TextureKind& k) : kind(&k), texture(t) {
+    const double width = k.width(t), pitch = t.pitch_mm;
+    count_y = elements_that_fit(t.to_mm - t.from_mm, pitch, width);
+    count_x = elements_that_fit(Plate::kWidthMm, pitch, width);
+    first_y = (t.from_mm + t.to_mm) / 2 - (count_y - 1) * pitch / 2;
+    first_x = Plate::kWidthMm / 2 - (count_x - 1) * pitch / 2;
+    begin = first_y - width / 2;
+    end = first_y + (count_y - 1) * pitch + width / 2;
+  }
+  double height(double x_mm, double y_mm) const {
+    if (y_mm <= begin || y_mm >= end) return 0;
+    const double dy = distance_to_nearest(y_mm, first_y, texture.pitch_mm, count_y);
+    const double dx = kind->lines ? 0 : distance_to_nearest(x_mm, first_x, texture.pitch_mm, count_x);
+    return kind->height(texture, dx, dy);
+  }
+};
+
+class Bands : public Surface {
+ public:
+  explicit Bands(std::vector<Band> bands) : bands_(std::move(bands)) {
+    auto& [highest, lowest, begin, end, uniform, crests] = extent_;
+    begin = bands_.empty() ? Plate::kLengthMm / 2 : bands_.front().begin;
+    end = bands_.empty() ? Plate::kLengthMm / 2 : bands_.front().end;
+    for (const Band& band : bands_) {
+      begin = std::min(begin, band.begin), end = std::max(end, band.end);
+      highest = std::max(highest, band.texture.height_mm);
+      lowest = std::min(lowest, band.kind->lowest * band.texture.height_mm);
+      uniform = uniform && band.kind->lines;
+      for (int i = 0; i < band.count_y; ++i) crests.push_back(band.first_y + i * band.texture.pitch_mm);
+    }
+    std::ranges::sort(crests);
+  }
+  double height(double x_mm, double y_mm) const override {
+    double z = 0;  // textures do not overlap, so at most one term differs from 0
+    for (const Band& band : bands_) z += band.height(x_mm, y_mm);
+    return z;
+  }
+
+ private:
+  std::vector<Band> bands_;
+};
 
 std::string in_lower_case(std::string text) {
   for (char& c : text)
@@ -159,7 +209,7 @@ Plate Plate::named(const std::string& name) {
 }
 
 Plate::Plate(std::string name, const std::vector<Texture>& textures) : name_(std::move(name)) {
-  texture_begin_ = texture_end_ = kLengthMm / 2;
+  std::vector<Band> bands;
   for (const Texture& texture : textures) {
     const TextureKind* kind = kind_of(texture.kind, name_);
     if (kind == nullptr) continue;
@@ -170,69 +220,15 @@ Plate::Plate(std::string name, const std::vector<Texture>& textures) : name_(std
       refuse(name_, "pitch and height must be numbers from 0.05 to 1000 mm");
     if (kind->round && 2 * texture.height_mm > texture.pitch_mm + kFitSlackMm)
       refuse(name_, texture.kind + " are twice as wide as high and overlap at this pitch");
-    const Band band = lay_out(texture, *kind);
-    if (band.count_y < 1) refuse(name_, "no element fits between its ends");
-    texture_begin_ = bands_.empty() ? band.begin : std::min(texture_begin_, band.begin);
-    texture_end_ = bands_.empty() ? band.end : std::max(texture_end_, band.end);
-    max_height_ = std::max(max_height_, texture.height_mm);
-    min_height_ = std::min(min_height_, kind->lowest * texture.height_mm);
-    bands_.push_back(band);
+    bands.emplace_back(texture, *kind);
+    if (bands.back().count_y < 1) refuse(name_, "no element fits between its ends");
+    textures_.push_back(texture);
   }
+  surface_ = std::make_shared<const Bands>(std::move(bands));
 }
 
 Plate::Plate(std::string name, std::shared_ptr<const Surface> surface)
-    : name_(std::move(name)),
-      surface_(std::move(surface)),
-      max_height_(surface_->max_height()),
-      min_height_(surface_->min_height()),
-      texture_begin_(surface_->texture_begin()),
-      texture_end_(surface_->texture_end()) {}
-
-Plate::Band Plate::lay_out(const Texture& texture, const TextureKind& kind) {
-  Band band{.texture = texture, .kind = &kind};
-  const double width = kind.width(texture), pitch = texture.pitch_mm;
-  band.count_y = elements_that_fit(texture.to_mm - texture.from_mm, pitch, width);
-  band.count_x = elements_that_fit(kWidthMm, pitch, width);
-  band.first_y = (texture.from_mm + texture.to_mm) / 2 - (band.count_y - 1) * pitch / 2;
-  band.first_x = kWidthMm / 2 - (band.count_x - 1) * pitch / 2;
-  band.begin = band.first_y - width / 2;
-  band.end = band.first_y + (band.count_y - 1) * pitch + width / 2;
-  return band;
-}
-
-double Plate::Band::height(double x_mm, double y_mm) const {
-  if (y_mm <= begin || y_mm >= end) return 0;
-  const double dy = distance_to_nearest(y_mm, first_y, texture.pitch_mm, count_y);
-  const double dx = kind->lines ? 0 : distance_to_nearest(x_mm, first_x, texture.pitch_mm, count_x);
-  return kind->height(texture, dx, dy);
-}
-
-double Plate::height(double x_mm, double y_mm) const {
-  if (surface_) return surface_->height(x_mm, y_mm);
-  double z = 0;  // textures do not overlap, so at most one term differs from 0
-  for (const Band& band : bands_) z += band.height(x_mm, y_mm);
-  return z;
-}
-
-std::vector<double> Plate::crests() const {
-  if (surface_) return surface_->crests();
-  std::vector<double> crests;
-  for (const Band& band : bands_)
-    for (int i = 0; i < band.count_y; ++i) crests.push_back(band.first_y + i * band.texture.pitch_mm);
-  std::sort(crests.begin(), crests.end());
-  return crests;
-}
-
-std::vector<Texture> Plate::textures() const {
-  std::vector<Texture> textures;
-  for (const Band& band : bands_) textures.push_back(band.texture);
-  return textures;
-}
-
-bool Plate::uniform_in_x() const {
-  if (surface_) return surface_->uniform_in_x();
-  return std::all_of(bands_.begin(), bands_.end(), [](const Band& b) { return b.kind->lines; });
-}
+    : name_(std::move(name)), surface_(std::move(surface)) {}
 
 std::vector<std::string> rig_plates() {
   std::vector<std::string> names;

@@ -9,8 +9,6 @@
 
 namespace supertac {
 
-struct TextureKind;  // what an element looks like (plate.cpp)
-
 /// One texture of a plate: equal elements, pitch_mm apart, 0 between them. Ridges are triangular, 2.5 mm wide
 /// at most; bumps half cylinders, blobs half spheres, twice as wide as high; waves a cosine.
 struct Texture {
@@ -42,46 +40,35 @@ class Plate {
   /// not positive or do not fit.
   Plate(std::string name, const std::vector<Texture>& textures);
 
-  /// A plate of kWidthMm x kLengthMm that is no row of textures. Copies share the surface.
+  /// A plate of kWidthMm x kLengthMm. Copies share the surface.
   Plate(std::string name, std::shared_ptr<const Surface> surface);
 
   /// Surface height z (mm) at (x, y); negative in the troughs of waves, 0 outside the texture.
-  double height(double x_mm, double y_mm) const;
+  double height(double x_mm, double y_mm) const { return surface_->height(x_mm, y_mm); }
 
   /// Highest and lowest z of the plate (mm): 0 and 0 when plain; lowest is -h for waves, else 0.
-  double max_height() const { return max_height_; }
-  double min_height() const { return min_height_; }
+  double max_height() const { return surface_->extent().max_height; }
+  double min_height() const { return surface_->extent().min_height; }
 
   /// Where the texture begins and ends along y (mm); both the middle of the plate when plain.
-  double texture_begin() const { return texture_begin_; }
-  double texture_end() const { return texture_end_; }
+  double texture_begin() const { return surface_->extent().texture_begin; }
+  double texture_end() const { return surface_->extent().texture_end; }
 
-  /// Where the elements' highest lines or rows of centres (maps: HeightMap::crests) lie along y (mm),
+  /// Where the elements' highest lines or rows of centres (maps: HeightMap) lie along y (mm),
   /// ascending; empty when plain.
-  std::vector<double> crests() const;
+  const std::vector<double>& crests() const { return surface_->extent().crests; }
 
   /// True when the height depends on y only (a map: within 0.05 mm).
-  bool uniform_in_x() const;
+  bool uniform_in_x() const { return surface_->extent().uniform_in_x; }
 
   const std::string& name() const { return name_; }
-  /// Regular textures, one after the other; empty for a Surface.
-  std::vector<Texture> textures() const;
+  /// Regular textures, one after the other, plain ones left out; empty for another surface.
+  const std::vector<Texture>& textures() const { return textures_; }
 
  private:
-  struct Band {  // one texture with its layout worked out
-    Texture texture;
-    const TextureKind* kind = nullptr;
-    int count_y = 0, count_x = 0;
-    double first_y = 0, first_x = 0;  // centre of the first element
-    double begin = 0, end = 0;        // extent along y
-    double height(double x_mm, double y_mm) const;
-  };
-  static Band lay_out(const Texture& texture, const TextureKind& kind);
-
   std::string name_;
-  std::vector<Band> bands_;
-  std::shared_ptr<const Surface> surface_;  // instead of bands
-  double max_height_ = 0, min_height_ = 0, texture_begin_ = 0, texture_end_ = 0;
+  std::shared_ptr<const Surface> surface_;
+  std::vector<Texture> textures_ = {};
 };
 
 /// Names of the eight plates of the rig, and of the six that simulations use by default (the paper's bumps

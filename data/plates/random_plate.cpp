@@ -58,35 +58,25 @@ struct Element {
 class Elements : public Surface {
  public:
   explicit Elements(std::vector<Element> elements) : elements_(std::move(elements)) {
-    begin_ = end_ = elements_.front().y_mm;
+    auto& [highest, lowest, begin, end, uniform, crests] = extent_;
+    begin = end = elements_.front().y_mm;
     for (const Element& e : elements_) {
-      begin_ = std::min(begin_, std::max(0.0, e.y_mm - e.reach_mm()));
-      end_ = std::max(end_, std::min(Plate::kLengthMm, e.y_mm + e.reach_mm()));
-      highest_ = std::max(highest_, e.height_mm);
+      begin = std::min(begin, std::max(0.0, e.y_mm - e.reach_mm()));
+      end = std::max(end, std::min(Plate::kLengthMm, e.y_mm + e.reach_mm()));
+      highest = std::max(highest, e.height_mm);
+      uniform = uniform && e.line && e.across_x == 0;
+      crests.push_back(e.y_mm);
     }
+    std::ranges::sort(crests);
   }
   double height(double x_mm, double y_mm) const override {
     double z = 0;
     for (const Element& e : elements_) z = std::max(z, e.height(x_mm, y_mm));
     return z;
   }
-  double max_height() const override { return highest_; }
-  double min_height() const override { return 0; }
-  double texture_begin() const override { return begin_; }
-  double texture_end() const override { return end_; }
-  bool uniform_in_x() const override {
-    return std::ranges::all_of(elements_, [](const Element& e) { return e.line && e.across_x == 0; });
-  }
-  std::vector<double> crests() const override {
-    std::vector<double> crests;
-    for (const Element& e : elements_) crests.push_back(e.y_mm);
-    std::ranges::sort(crests);
-    return crests;
-  }
 
  private:
   std::vector<Element> elements_;
-  double begin_ = 0, end_ = 0, highest_ = 0;
 };
 
 /// A line or a round element: more than half have the rig's size.

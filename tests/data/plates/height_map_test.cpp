@@ -47,11 +47,11 @@ TEST(HeightMap, HeightIsThatOfTheHighestTriangleAboveTheOutline) {
   EXPECT_NEAR(map.height(20, 40), 2.5, 1e-5);
   EXPECT_NEAR(map.height(25, 40), 1.25, 1e-5);
   EXPECT_EQ(map.height(25, 40.5), 0);
-  EXPECT_EQ(map.max_height(), 2.5);
-  EXPECT_EQ(map.min_height(), 0);
-  EXPECT_EQ(map.texture_begin(), 39.875);
-  EXPECT_EQ(map.texture_end(), 50.125);
-  EXPECT_FALSE(map.uniform_in_x());
+  EXPECT_EQ(map.extent().max_height, 2.5);
+  EXPECT_EQ(map.extent().min_height, 0);
+  EXPECT_EQ(map.extent().texture_begin, 39.875);
+  EXPECT_EQ(map.extent().texture_end, 50.125);
+  EXPECT_FALSE(map.extent().uniform_in_x);
 }
 
 TEST(HeightMap, ATipThatOnlyTouchesANodeCounts) {
@@ -82,17 +82,17 @@ TEST(HeightMap, OutsideIsFlat) {
   for (const double x : {-0.01, 36.01, 1e300, std::nan("")}) EXPECT_EQ(map.height(x, 45), 0);
   EXPECT_EQ(map.height(18, -1), 0);
   EXPECT_EQ(map.height(18, 109), 0);
-  EXPECT_TRUE(map.uniform_in_x());
-  ASSERT_EQ(map.crests().size(), 1u);
-  EXPECT_NEAR(map.crests()[0], 45, 1e-9);
+  EXPECT_TRUE(map.extent().uniform_in_x);
+  ASSERT_EQ(map.extent().crests.size(), 1u);
+  EXPECT_NEAR(map.extent().crests[0], 45, 1e-9);
 }
 
 TEST(HeightMap, AFlatPlateHasNoTexture) {
   const HeightMap map = map_of(sheet(3));
-  EXPECT_EQ(map.max_height(), 0);
-  EXPECT_EQ(map.texture_begin(), 54);
-  EXPECT_EQ(map.texture_end(), 54);
-  EXPECT_TRUE(map.crests().empty());
+  EXPECT_EQ(map.extent().max_height, 0);
+  EXPECT_EQ(map.extent().texture_begin, 54);
+  EXPECT_EQ(map.extent().texture_end, 54);
+  EXPECT_TRUE(map.extent().crests.empty());
 }
 
 TEST(HeightMap, RefusesOtherSizesHolesAndOverlaps) {
