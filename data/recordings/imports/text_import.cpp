@@ -13,7 +13,8 @@ namespace {
 constexpr std::uint64_t kMaxBytes = std::uint64_t{64} << 20;
 constexpr std::string_view kSeparators = " \t,\r";
 
-enum class Line { frame, empty, too_few, too_many, not_numeric, non_finite, out_of_range };
+/// What a line is: the counter that it belongs to.
+using Line = std::size_t ImportReport::*;
 
 /// Cuts the next column off the line; empty when there is none.
 std::string_view next_column(std::string_view& line) {
@@ -31,7 +32,7 @@ Line parse_line(std::string_view line, std::array<float, kTaxels>& volts) {
   bool finite = true;
   bool in_range = true;
   for (auto column = next_column(line); !column.empty(); column = next_column(line), ++columns) {
-    if (columns >= kTaxels) return Line::too_many;
+    if (columns >= kTaxels) return &ImportReport::too_many;
     const auto value = parse_double(column);
     numeric = numeric && value.has_value();
     if (!value) continue;
@@ -39,31 +40,11 @@ Line parse_line(std::string_view line, std::array<float, kTaxels>& volts) {
     in_range = in_range && *value >= 0 && *value <= rig::kAdcVolts;
     volts[columns] = static_cast<float>(*value);
   }
-  if (columns == 0) return Line::empty;
-  if (columns < kTaxels) return Line::too_few;
-  if (!numeric) return Line::not_numeric;
-  if (!finite) return Line::non_finite;
-  return in_range ? Line::frame : Line::out_of_range;
-}
-
-std::size_t& counter(ImportReport& report, Line line) {
-  switch (line) {
-    case Line::frame:
-      return report.frames;
-    case Line::empty:
-      return report.empty;
-    case Line::too_few:
-      return report.too_few;
-    case Line::too_many:
-      return report.too_many;
-    case Line::not_numeric:
-      return report.not_numeric;
-    case Line::non_finite:
-      return report.non_finite;
-    case Line::out_of_range:
-      break;
-  }
-  return report.out_of_range;
+  if (columns == 0) return &ImportReport::empty;
+  if (columns < kTaxels) return &ImportReport::too_few;
+  if (!numeric) return &ImportReport::not_numeric;
+  if (!finite) return &ImportReport::non_finite;
+  return in_range ? &ImportReport::frames : &ImportReport::out_of_range;
 }
 
 void refuse_other_files(const std::string& path, const ImportReport& report) {
@@ -95,8 +76,8 @@ Recording import_text_pass(const std::string& path, ImportReport& report) {
     rest.remove_prefix(std::min(rest.size(), line.size() + 1));
     const Line kind = parse_line(line, volts);
     ++report.lines;
-    ++counter(report, kind);
-    if (kind != Line::frame) continue;
+    ++(report.*kind);
+    if (kind != &ImportReport::frames) continue;
     recording.time_s.push_back(static_cast<double>(report.lines - report.empty - 1) / rig::kFrameRateHz);
     recording.volts.insert(recording.volts.end(), volts.begin(), volts.end());
   }
