@@ -73,15 +73,24 @@ int parts_of(std::span<const Strip> strips) {
   return std::ranges::any_of(strips, [](const Strip& s) { return !s.doubt.empty(); }) ? 4 : 3;
 }
 
-// The panels of a strip, each (step_x, step_y) further than the one before.
-void draw_strip(Picture& picture, const Strip& strip, const StripLayout& l, Panel panel, int step_x,
-                int step_y) {
-  draw_panel(picture, panel, strip.input, l.rows, l.columns);
-  for (const std::span<const float> part : {strip.output, strip.truth, strip.doubt}) {
-    if (part.empty()) continue;
-    panel.left += step_x, panel.top += step_y;
-    draw_panel(picture, panel, part, l.rows * l.scale, l.columns * l.scale);
+// Strips below each other, their parts side by side; `turned`: the other way round.
+Picture picture_of(const char* where, std::span<const Strip> strips, const StripLayout& l, bool turned) {
+  check_strips(where, strips, l);
+  const int gap = gap_of(l.side), count = static_cast<int>(strips.size()), parts = parts_of(strips);
+  Panel panel = panel_of(l);
+  const int step_x = panel.width + gap, step_y = panel.height + gap;
+  Picture picture((turned ? count : parts) * step_x + gap, (turned ? parts : count) * step_y + gap);
+  for (int i = 0; i < count; ++i) {
+    const Strip& strip = strips[static_cast<std::size_t>(i)];
+    panel.left = gap + (turned ? i * step_x : 0), panel.top = gap + (turned ? 0 : i * step_y);
+    draw_panel(picture, panel, strip.input, l.rows, l.columns);
+    for (const std::span<const float> part : {strip.output, strip.truth, strip.doubt}) {
+      if (part.empty()) continue;
+      (turned ? panel.top : panel.left) += turned ? step_y : step_x;
+      draw_panel(picture, panel, part, l.rows * l.scale, l.columns * l.scale);
+    }
   }
+  return picture;
 }
 
 }  // namespace
@@ -139,31 +148,11 @@ void draw_panel(Picture& picture, const Panel& panel, std::span<const float> val
 }
 
 Picture strip_picture(std::span<const Strip> strips, const StripLayout& layout) {
-  check_strips("strip_picture", strips, layout);
-  const int gap = gap_of(layout.side), count = static_cast<int>(strips.size());
-  Panel panel = panel_of(layout);
-  const int step_x = panel.width + gap, step_y = panel.height + gap;
-  Picture picture(parts_of(strips) * step_x + gap, count * step_y + gap);
-  panel.left = panel.top = gap;
-  for (const Strip& strip : strips) {
-    draw_strip(picture, strip, layout, panel, step_x, 0);
-    panel.top += step_y;
-  }
-  return picture;
+  return picture_of("strip_picture", strips, layout, false);
 }
 
 Picture film_picture(std::span<const Strip> strips, const StripLayout& layout) {
-  check_strips("film_picture", strips, layout);
-  const int gap = gap_of(layout.side), count = static_cast<int>(strips.size());
-  Panel panel = panel_of(layout);
-  const int step_x = panel.width + gap, step_y = panel.height + gap;
-  Picture picture(count * step_x + gap, parts_of(strips) * step_y + gap);
-  panel.left = panel.top = gap;
-  for (const Strip& strip : strips) {
-    draw_strip(picture, strip, layout, panel, 0, step_y);
-    panel.left += step_x;
-  }
-  return picture;
+  return picture_of("film_picture", strips, layout, true);
 }
 
 std::vector<std::byte> encode_png(const Picture& picture) {
