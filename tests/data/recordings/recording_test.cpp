@@ -85,7 +85,9 @@ TEST(Recording, RefusesAnArrayThatIsNone) {
       {R"({"rows": 4})", "metadata \"array\": expected a key \"columns\", found none"},
       {R"({"rows": 4, "columns": 4, "channels": 1, "pitch_mm": [3]})",
        "metadata \"array\": \"pitch_mm\" must be a number, or [along a row, from row to row], found [3]"},
-      {R"({"rows": 0, "columns": 4, "pitch_mm": 3, "channels": 1})", "rows must be 1 to 64, got 0"}};
+      {R"({"rows": 0, "columns": 4, "pitch_mm": 3, "channels": 1})",
+       "array: expected 1 to 64 rows and columns, 1 to 8 channels, a pitch of 0.1 to 100 mm; got 0x4 taxels "
+       "at 3 mm"}};
   for (const auto& [array, refusal] : kArrays) {
     metadata["array"] = array;
     write_safetensors(folder.file("a"), metadata, {});
