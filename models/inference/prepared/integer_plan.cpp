@@ -24,21 +24,7 @@ struct Memory {
   std::uint8_t* bytes(const IntegerMap& map) const { return begin(map) + map.origin(); }
 };
 
-template <class T>
-void fill_margin(const IntegerMap& map, Dim images, T value, T* image) {
-  const Dim ends = map.margin_h * map.line(), side = map.margin_w * map.channels;
-  for (T* const last = image + images * map.image(); image < last; image += map.image()) {
-    std::fill_n(image, ends, value);
-    std::fill_n(image + map.image() - ends, ends, value);
-    for (T* line = image + ends; line < image + map.image() - ends; line += map.line()) {
-      std::fill_n(line, side, value);
-      std::fill_n(line + map.line() - side, side, value);
-    }
-  }
-}
-
 void fill_margin(const IntegerMap& map, const Memory& m) {
-  if (map.margin_h + map.margin_w == 0) return;
   if (map.bytes) return fill_margin(map, m.images, static_cast<std::uint8_t>(map.scale.zero), m.begin(map));
   fill_margin(map, m.images, std::int16_t{0}, reinterpret_cast<std::int16_t*>(m.begin(map)));
 }

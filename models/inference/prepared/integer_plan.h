@@ -10,24 +10,19 @@
 #include "models/inference/prepared/prepared.h"
 #include "models/inference/prepared/quantise.h"
 #include "models/inference/prepared/ranges.h"
+#include "models/inference/prepared/taps.h"
 #include "models/networks/network.h"
 
 namespace supertac {
 
-/// Images [height][width][channels] with a margin around whose value stands for 0, in memory that is reused
-/// behind the last step that reads them. Either bytes, each map with a scale of its own, or numbers of 16
-/// bits in steps of 2^-fraction_bits, for what bytes would be too coarse for: sums of residual blocks,
-/// latents, the picture.
-struct IntegerMap {
-  Dim height = 1, width = 1, channels = 1;
-  Dim margin_h = 0, margin_w = 0;
+/// A map, whose offset is in bytes and whose margin has the value that stands for 0, in memory that is reused
+/// behind the last step that reads it. Either bytes, each map with a scale of its own, or numbers of 16 bits
+/// in steps of 2^-fraction_bits, for what bytes would be too coarse for: sums of residual blocks, latents,
+/// the picture.
+struct IntegerMap : FeatureMap {
   bool bytes = false;
   Scale scale;
-  Dim offset = 0;  // bytes from the beginning of an image's work area
 
-  Dim line() const { return (width + 2 * margin_w) * channels; }
-  Dim image() const { return (height + 2 * margin_h) * line(); }  // elements
-  Dim origin() const { return margin_h * line() + margin_w * channels; }
   Dim size() const { return image() * (bytes ? 1 : 2); }  // bytes
 };
 

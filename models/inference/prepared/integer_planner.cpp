@@ -7,23 +7,11 @@
 #include <stdexcept>
 
 #include "models/inference/prepared/integer_plan.h"
-#include "models/inference/prepared/taps.h"
 
 namespace supertac {
 namespace {
 
-using kernels::ConvSettings;
 using Kind = IntegerStep::Kind;
-
-// A product before its weights are whole: w [segments * length][cout], and where its taps lie.
-struct Taps {
-  Dim height = 1, width = 1;
-  kernels::Strides from, to;
-  std::vector<Dim> segments;
-  Dim length = 0;
-  Dim y_offset = 0;
-  Tensor w, bias;
-};
 
 class IntegerPlanner : TraceWalk {
  public:
@@ -34,9 +22,6 @@ class IntegerPlanner : TraceWalk {
  private:
   void choose_fraction_bits(const std::vector<TracedOp>& ops, const ActivationRanges& ranges);
   void make(const TracedOp& op);
-  void conv(const TracedOp& op, int x, int y);
-  void transposed_conv(const TracedOp& op, int x, int y);
-  void linear(const TracedOp& op, int x, int y);
   void concat(const TracedOp& op, int y);
   void take_input(const TracedOp& op);
 
@@ -45,9 +30,9 @@ class IntegerPlanner : TraceWalk {
   bool as_numbers(Id id) const { return read_as_numbers_.contains(id); }
   int new_map(const Variable& y, bool bytes);
   IntegerMap& map(int i) { return plan_->maps[static_cast<std::size_t>(i)]; }
-  int number_of(const Variable& x) const { return numbers_.at(owner(x)); }
+  int numbers_of(const Variable& x) const { return numbers_.at(owner(x)); }
   IntegerStep& add(Kind kind, std::string name, int x, int y);
-  void add_product(const TracedOp& op, int x, int y, Taps taps);
+  void add_product(const TracedOp& op, int x, int y, ProductTaps taps);
   void add_bytes(const Variable& y);
   void release(std::size_t op);
   std::string layer_of(const TracedOp& op) const;
@@ -83,9 +68,9 @@ IntegerPlanner::IntegerPlanner(const Network& network, const ActivationRanges& r
     make(ops[i]);
     release(i);
   }
-  plan_->picture = number_of(drawn.picture);
-  if (drawn.predicted_error.defined()) plan_->predicted_error = number_of(drawn.predicted_error);
-  if (drawn.latents.defined()) plan_->latents = number_of(drawn.latents);
+  plan_->picture = numbers_of(drawn.picture);
+  if (drawn.predicted_error.defined()) plan_->predicted_error = numbers_of(drawn.predicted_error);
+  if (drawn.latents.defined()) plan_->latents = numbers_of(drawn.latents);
 }
 
 // Twice the largest number fits; sums of residual blocks may be larger than they were seen to be.
@@ -109,14 +94,7 @@ bool IntegerPlanner::is_of_bytes(const TracedOp& op) const {
 // In the first gap between the maps that are still read.
 int IntegerPlanner::new_map(const Variable& y, bool bytes) {
   constexpr Dim kLine = 64;  // of the cache, in bytes
-  const Margin margin = margin_of(y);
-  IntegerMap m{.channels = y.dim(y.rank() - 1),
-               .margin_h = margin.height,
-               .margin_w = margin.width,
-               .bytes = bytes,
-               .scale = bytes ? scales_.at(y.node()) : Scale{plan_->number_step(), 0, 32768}};
-  if (y.rank() > 2) m.width = y.dim(y.rank() - 2);
-  if (y.rank() > 3) m.height = y.dim(1);
+  IntegerMap m{layout_of(y), bytes, bytes ? scales_.at(y.node()) : Scale{plan_->number_step(), 0, 32768}};
   const auto rounded = [](Dim size) { return (size + kLine - 1) / kLine * kLine; };
   std::vector<std::pair<Dim, Dim>> taken;
   for (const int i : live_) taken.emplace_back(map(i).offset, map(i).offset + rounded(map(i).size()));
@@ -159,28 +137,23 @@ void IntegerPlanner::make(const TracedOp& op) {
     const bool bytes_in = is_of_bytes(op);
     // Sums of bytes become what is read; what is read as both, or sums of numbers, numbers first.
     const bool bytes_out = bytes_in && as_bytes(op.y.node()) && !as_numbers(op.y.node());
-    const int x = bytes_in ? bytes_.at(owner(op.inputs[0])) : number_of(op.inputs[0]);
+    const int x = bytes_in ? bytes_.at(owner(op.inputs[0])) : numbers_of(op.inputs[0]);
     const int y = new_map(op.y, bytes_out);
-    if (op.op == "linear")
-      linear(op, x, y);
-    else if (op.settings.conv.transposed)
-      transposed_conv(op, x, y);
-    else
-      conv(op, x, y);
+    for (ProductTaps& taps : products_of(op, map(x), map(y))) add_product(op, x, y, std::move(taps));
     if (bytes_out) return;
   } else if (op.op == "unflatten_channels_first") {
-    add(Kind::copy, "unflatten", number_of(op.inputs[0]), new_map(op.y, false));
+    add(Kind::copy, "unflatten", numbers_of(op.inputs[0]), new_map(op.y, false));
   } else if (op.op == "concat") {
     concat(op, new_map(op.y, false));
   } else if (op.op == "global_mean") {
-    add(Kind::mean, "mean over the pixels", number_of(op.inputs[0]), new_map(op.y, false));
+    add(Kind::mean, "mean over the pixels", numbers_of(op.inputs[0]), new_map(op.y, false));
   } else if (op.op == "sigmoid" && op.y.rank() == 2) {
-    add(Kind::gates, "sigmoid", number_of(op.inputs[0]), new_map(op.y, false));
+    add(Kind::gates, "sigmoid", numbers_of(op.inputs[0]), new_map(op.y, false));
   } else if (op.op == "gated_sum" || op.op == "add") {
-    IntegerStep& step = add(Kind::gated_sum, op.op == "add" ? "sum" : "gated sum", number_of(op.inputs[1]),
+    IntegerStep& step = add(Kind::gated_sum, op.op == "add" ? "sum" : "gated sum", numbers_of(op.inputs[1]),
                             new_map(op.y, false));
-    step.a = number_of(op.inputs[0]);
-    if (op.op == "gated_sum") step.gates = number_of(op.inputs[2]);
+    step.a = numbers_of(op.inputs[0]);
+    if (op.op == "gated_sum") step.gates = numbers_of(op.inputs[2]);
   } else {
     throw std::logic_error("Prepared: no step in whole numbers computes the op " + std::string(op.op));
   }
@@ -212,14 +185,14 @@ void IntegerPlanner::take_input(const TracedOp& op) {
 void IntegerPlanner::concat(const TracedOp& op, int y) {
   Dim at = 0;
   for (const Variable& input : op.inputs) {
-    const int x = number_of(input);
+    const int x = numbers_of(input);
     if (op.y.rank() > 2) throw std::logic_error("Prepared: a concat of maps has no step in whole numbers");
     add(Kind::copy, "concat", x, y).at = at;
     at += map(x).channels;
   }
 }
 
-void IntegerPlanner::add_product(const TracedOp& op, int x, int y, Taps t) {
+void IntegerPlanner::add_product(const TracedOp& op, int x, int y, ProductTaps t) {
   constexpr double kSlopes = kernels::Outcome::kNoSlope;
   const auto slope = static_cast<std::int32_t>(std::lrint(op.settings.negative_slope * kSlopes));
   if (slope != kernels::Outcome::kNoSlope && (slope < 0 || slope > 63))
@@ -252,61 +225,6 @@ void IntegerPlanner::add_product(const TracedOp& op, int x, int y, Taps t) {
   job.segments = s.segments.data(), job.segment_count = static_cast<Dim>(s.segments.size());
   constexpr Dim kBlock = 4, kWide = 2;
   plan_->scratch = std::max(plan_->scratch, (kernels::reach_of(job).count * kBlock * kWide + 63) / 64 * 64);
-}
-
-void IntegerPlanner::conv(const TracedOp& op, int to_read, int to_write) {
-  const ConvSettings& s = op.settings.conv;
-  const IntegerMap &x = map(to_read), &y = map(to_write);
-  Taps taps{.height = y.height,
-            .width = y.width,
-            .from = {x.image(), s.stride_h * x.line(), s.stride_w * x.channels},
-            .to = {y.image(), y.line(), y.channels},
-            .segments = {},
-            .length = s.kernel_w * x.channels,
-            .w = op.inputs[1].value(),
-            .bias = op.inputs[2].value()};
-  for (Dim ky = 0; ky < s.kernel_h; ++ky)
-    taps.segments.push_back((ky - s.padding_h) * x.line() - s.padding_w * x.channels);
-  add_product(op, to_read, to_write, std::move(taps));
-}
-
-void IntegerPlanner::transposed_conv(const TracedOp& op, int to_read, int to_write) {
-  const ConvSettings& s = op.settings.conv;
-  for (Dim top = 0; top < s.stride_h; ++top) {
-    for (Dim left = 0; left < s.stride_w; ++left) {
-      const IntegerMap &x = map(to_read), &y = map(to_write);
-      const Phase v(top, y.height, s.kernel_h, s.stride_h, s.padding_h);
-      const Phase h(left, y.width, s.kernel_w, s.stride_w, s.padding_w);
-      if (v.count == 0 || h.count == 0) continue;
-      Taps taps{.height = v.count,
-                .width = h.count,
-                .from = {x.image(), x.line(), x.channels},
-                .to = {y.image(), s.stride_h * y.line(), s.stride_w * y.channels},
-                .segments = {},
-                .length = h.taps * x.channels,
-                .y_offset = top * y.line() + left * y.channels,
-                .w = phase_weights(s, v, h, op.inputs[1]),
-                .bias = op.inputs[2].value()};
-      for (Dim jy = v.taps - 1; jy >= 0; --jy)
-        taps.segments.push_back((v.base - jy) * x.line() + (h.base - h.taps + 1) * x.channels);
-      add_product(op, to_read, to_write, std::move(taps));
-    }
-  }
-}
-
-void IntegerPlanner::linear(const TracedOp& op, int to_read, int to_write) {
-  const IntegerMap &x = map(to_read), &y = map(to_write);
-  const Dim in = op.inputs[0].dim(1), out = op.y.dim(1);
-  if (x.margin_h + x.margin_w > 0) throw std::logic_error("Prepared: a flattened picture has margins");
-  const Dim pixels = pixels_of_unflatten(op.y);
-  const Tensor w = with_pixels_outside(op.inputs[1].value(), 1, in / x.channels, out);
-  add_product(op, to_read, to_write,
-              {.from = {x.image(), 0, 0},
-               .to = {y.image(), 0, 0},
-               .segments = {0},
-               .length = in,
-               .w = with_pixels_outside(w, in, pixels, 1),
-               .bias = with_pixels_outside(op.inputs[2].value(), 1, pixels, 1)});
 }
 
 }  // namespace

@@ -3,22 +3,10 @@
 #include <algorithm>
 
 namespace supertac {
-static void clear_margin(const FeatureMap& map, Dim images, real* image) {
-  if (map.margin_h + map.margin_w == 0) return;
-  const Dim ends = map.margin_h * map.line(), side = map.margin_w * map.channels;
-  for (real* const last = image + images * map.image(); image < last; image += map.image()) {
-    std::fill_n(image, ends, real(0));
-    std::fill_n(image + map.image() - ends, ends, real(0));
-    for (real* line = image + ends; line < image + map.image() - ends; line += map.line()) {
-      std::fill_n(line, side, real(0));
-      std::fill_n(line + map.line() - side, side, real(0));
-    }
-  }
-}
 
 void Plan::clear_margins(const Block& block) const {
   for (const FeatureMap& map : planes_) std::fill_n(block.begin(map), map.image(), real(0));
-  for (const FeatureMap& map : buffers_) clear_margin(map, block.images, block.begin(map));
+  for (const FeatureMap& map : buffers_) fill_margin(map, block.images, real(0), block.begin(map));
 }
 
 void Plan::copy_out(const Block& block, const FeatureMap& map, Tensor& to, Dim first) const {

@@ -7,26 +7,10 @@
 
 #include "autograd/kernels/fast/inference.h"
 #include "models/inference/prepared/prepared.h"
+#include "models/inference/prepared/taps.h"
 #include "models/networks/network.h"
 
 namespace supertac {
-
-/// Where a value lies in the workspace: images [height][width][channels] with a margin of zeros around.
-struct FeatureMap {
-  Dim height = 1, width = 1, channels = 1;
-  Dim margin_h = 0, margin_w = 0;
-  Dim offset = 0;  ///< of the first image, per image of a block
-
-  Dim line() const { return (width + 2 * margin_w) * channels; }
-  Dim image() const { return (height + 2 * margin_h) * line(); }
-  /// From an image's beginning to its first pixel.
-  Dim origin() const { return margin_h * line() + margin_w * channels; }
-  kernels::Strides strides() const { return {image(), line(), channels}; }
-  bool same_layout(const FeatureMap& other) const {
-    return height == other.height && width == other.width && channels == other.channels &&
-           margin_h == other.margin_h && margin_w == other.margin_w;
-  }
-};
 
 /// One block of images on its way through the steps.
 struct Block {

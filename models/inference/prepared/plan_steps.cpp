@@ -160,7 +160,7 @@ const std::map<std::string_view, Planner::Make>& Planner::makers() {
       {"conv2d", [](Planner& planner, const TracedOp& op) { planner.conv(op); }},
       {"conv_transpose1d", [](Planner& planner, const TracedOp& op) { planner.transposed_conv(op); }},
       {"conv_transpose2d", [](Planner& planner, const TracedOp& op) { planner.transposed_conv(op); }},
-      {"linear", [](Planner& planner, const TracedOp& op) { planner.linear(op); }},
+      {"linear", [](Planner& planner, const TracedOp& op) { planner.product(op); }},
       {"flatten_channels_first", flatten_step},
       {"unflatten_channels_first", unflatten_step},
       {"concat", concat_step},

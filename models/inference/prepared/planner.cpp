@@ -59,14 +59,6 @@ Planner::Planner(const Variable& input, const std::vector<TracedOp>& ops, const 
 
 const FeatureMap& Planner::map_of(const Variable& x) const { return maps_.at(owner(x)); }
 
-FeatureMap Planner::layout_of(const Variable& y) const {
-  const Margin margin = margin_of(y);
-  FeatureMap map{.channels = y.dim(y.rank() - 1), .margin_h = margin.height, .margin_w = margin.width};
-  if (y.rank() > 2) map.width = y.dim(y.rank() - 2);
-  if (y.rank() > 3) map.height = y.dim(1);
-  return map;
-}
-
 static FeatureMap append(FeatureMap map, std::vector<FeatureMap>& all, Dim& size) {
   constexpr Dim kLine = 64;  // a line of the cache in bytes
   map.offset = size;

@@ -7,7 +7,6 @@
 
 #include "autograd/kernels/fast/isa/isa.h"
 #include "models/inference/prepared/plan.h"
-#include "models/inference/prepared/taps.h"
 
 namespace supertac {
 
@@ -37,19 +36,15 @@ class Planner : TraceWalk {
   /// In plan_steps.cpp: what makes the step of each op.
   static const std::map<std::string_view, Make>& makers();
 
-  FeatureMap layout_of(const Variable& y) const;
-  void add_product(struct Product product);
   void add_winograd(struct Winograd step);
   void release_after(std::size_t op);
 
   void conv(const TracedOp& op);
   void winograd(const TracedOp& op);
   void plane_conv(const TracedOp& op);
-  void direct_conv(const TracedOp& op);
+  void product(const TracedOp& op);
   void transposed_conv(const TracedOp& op);
   void transposed_winograd(const TracedOp& op);
-  void direct_transposed_conv(const TracedOp& op);
-  void linear(const TracedOp& op);
 
   std::shared_ptr<Plan> plan_ = std::make_shared<Plan>();
   std::map<Id, FeatureMap> maps_;

@@ -7,19 +7,33 @@
 
 namespace supertac {
 
+using kernels::ConvSettings;
+
 static Dim reach(Dim size, Dim out, Dim kernel, Dim stride, Dim padding, bool transposed) {
   const Dim before = transposed ? (kernel - 1 - padding + stride - 1) / stride : padding;
   const Dim last = transposed ? (out - 1 + padding) / stride : (out - 1) * stride + kernel - 1 - padding;
   return std::max<Dim>({0, before, last - (size - 1)});
 }
 
-void Margin::widen(const kernels::ConvSettings& s) {
+void Margin::widen(const ConvSettings& s) {
   height =
       std::max(height, reach(s.height, s.out_height(), s.kernel_h, s.stride_h, s.padding_h, s.transposed));
   width = std::max(width, reach(s.width, s.out_width(), s.kernel_w, s.stride_w, s.padding_w, s.transposed));
 }
 
-Tensor phase_weights(const kernels::ConvSettings& s, const Phase& v, const Phase& h, const Variable& w) {
+// The outputs first, first + stride, ... of a transposed convolution along one axis: output first + stride t
+// sees the inputs t + base - j through the taps tap + stride j, j = taps - 1 ... 0.
+struct Phase {
+  Phase(Dim first, Dim out, Dim kernel, Dim stride, Dim padding)
+      : count((out - first + stride - 1) / stride),
+        tap((first + padding) % stride),
+        base((first + padding) / stride),
+        taps(tap < kernel ? (kernel - tap + stride - 1) / stride : 0) {}
+  Dim count, tap, base, taps;
+};
+
+// [ky][kx][cin][cout] -> the taps of these phases in the order of their inputs.
+static Tensor phase_weights(const ConvSettings& s, const Phase& v, const Phase& h, const Variable& w) {
   const Dim size = w.dim(w.rank() - 2) * w.dim(w.rank() - 1);
   Tensor out(Shape{v.taps * h.taps, size});
   real* to = out.data();
@@ -32,7 +46,10 @@ Tensor phase_weights(const kernels::ConvSettings& s, const Phase& v, const Phase
   return out;
 }
 
-Tensor with_pixels_outside(const Tensor& t, Dim outer, Dim pixels, Dim inner) {
+// The weights of a linear layer behind flatten_channels_first or before unflatten_channels_first,
+// [outer][channels][pixels][inner], take the numbers in the order in which they lie,
+// [outer][pixels][channels][inner].
+static Tensor with_pixels_outside(const Tensor& t, Dim outer, Dim pixels, Dim inner) {
   if (pixels == 1) return t.clone();
   Tensor out(t.shape());
   const Dim channels = t.size() / (outer * pixels * inner);
@@ -44,6 +61,45 @@ Tensor with_pixels_outside(const Tensor& t, Dim outer, Dim pixels, Dim inner) {
     }
   }
   return out;
+}
+
+static ProductTaps conv(const TracedOp& op, const FeatureMap& x, const FeatureMap& y) {
+  const ConvSettings& s = op.settings.conv;
+  ProductTaps taps{.height = y.height,
+                   .width = y.width,
+                   .from = {x.image(), s.stride_h * x.line(), s.stride_w * x.channels},
+                   .to = y.strides(),
+                   .length = s.kernel_w * x.channels,
+                   .w = op.inputs[1].value().clone(),
+                   .bias = op.inputs[2].value().clone()};
+  for (Dim ky = 0; ky < s.kernel_h; ++ky)
+    taps.segments.push_back((ky - s.padding_h) * x.line() - s.padding_w * x.channels);
+  return taps;
+}
+
+static std::vector<ProductTaps> transposed_conv(const TracedOp& op, const FeatureMap& x,
+                                                const FeatureMap& y) {
+  const ConvSettings& s = op.settings.conv;
+  std::vector<ProductTaps> products;
+  for (Dim top = 0; top < s.stride_h; ++top) {
+    for (Dim left = 0; left < s.stride_w; ++left) {
+      const Phase v(top, y.height, s.kernel_h, s.stride_h, s.padding_h);
+      const Phase h(left, y.width, s.kernel_w, s.stride_w, s.padding_w);
+      if (v.count == 0 || h.count == 0) continue;
+      ProductTaps taps{.height = v.count,
+                       .width = h.count,
+                       .from = x.strides(),
+                       .to = {y.image(), s.stride_h * y.line(), s.stride_w * y.channels},
+                       .length = h.taps * x.channels,
+                       .y_offset = top * y.line() + left * y.channels,
+                       .w = phase_weights(s, v, h, op.inputs[1]),
+                       .bias = op.inputs[2].value().clone()};
+      for (Dim jy = v.taps - 1; jy >= 0; --jy)
+        taps.segments.push_back((v.base - jy) * x.line() + (h.base - h.taps + 1) * x.channels);
+      products.push_back(std::move(taps));
+    }
+  }
+  return products;
 }
 
 TraceWalk::TraceWalk(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn)
@@ -65,14 +121,33 @@ TraceWalk::Id TraceWalk::owner(const Variable& x) const {
   return flattened == flattened_.end() ? x.node() : flattened->second;
 }
 
-Margin TraceWalk::margin_of(const Variable& y) const {
-  const auto found = margins_.find(y.node());
-  return found == margins_.end() ? Margin{} : found->second;
+FeatureMap TraceWalk::layout_of(const Variable& y) const {
+  const auto margin = margins_.find(y.node());
+  FeatureMap map{.channels = y.dim(y.rank() - 1)};
+  if (margin != margins_.end()) map.margin_h = margin->second.height, map.margin_w = margin->second.width;
+  if (y.rank() > 2) map.width = y.dim(y.rank() - 2);
+  if (y.rank() > 3) map.height = y.dim(1);
+  return map;
 }
 
-Dim TraceWalk::pixels_of_unflatten(const Variable& y) const {
-  const auto found = pixels_of_unflatten_.find(y.node());
-  return found == pixels_of_unflatten_.end() ? 1 : found->second;
+std::vector<ProductTaps> TraceWalk::products_of(const TracedOp& op, const FeatureMap& x,
+                                                const FeatureMap& y) const {
+  if (op.op == "linear") return {linear(op, x, y)};
+  return op.settings.conv.transposed ? transposed_conv(op, x, y) : std::vector{conv(op, x, y)};
+}
+
+ProductTaps TraceWalk::linear(const TracedOp& op, const FeatureMap& x, const FeatureMap& y) const {
+  if (x.height > 1 && x.margin_w > 0) throw std::logic_error("Prepared: a flattened picture has margins");
+  const auto unflattened = pixels_of_unflatten_.find(op.y.node());
+  const Dim pixels = unflattened == pixels_of_unflatten_.end() ? 1 : unflattened->second;
+  const Dim in = op.inputs[0].dim(1), out = op.y.dim(1);
+  const Tensor w = with_pixels_outside(op.inputs[1].value(), 1, in / x.channels, out);
+  return {.from = {x.image(), 0, 0},
+          .to = {y.image(), 0, 0},
+          .segments = {0},
+          .length = in,
+          .w = with_pixels_outside(w, in, pixels, 1),
+          .bias = with_pixels_outside(op.inputs[2].value(), 1, pixels, 1)};
 }
 
 bool TraceWalk::read_after(Id value, std::size_t op) const {

@@ -1,9 +1,11 @@
 // What plans of fp32 and of int8 share: which op reads which value, and where the taps of convolutions lie.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <vector>
 
+#include "autograd/kernels/fast/inference.h"
 #include "autograd/trace.h"
 #include "models/networks/network.h"
 
@@ -15,28 +17,52 @@ struct Margin {
   void widen(const kernels::ConvSettings& reader);
 };
 
-/// The outputs first, first + stride, ... of a transposed convolution along one axis: output first + stride t
-/// sees the inputs t + base - j through the taps tap + stride j, j = taps - 1 ... 0.
-struct Phase {
-  Phase(Dim first, Dim out, Dim kernel, Dim stride, Dim padding)
-      : count((out - first + stride - 1) / stride),
-        tap((first + padding) % stride),
-        base((first + padding) / stride),
-        taps(tap < kernel ? (kernel - tap + stride - 1) / stride : 0) {}
-  Dim count, tap, base, taps;
+/// Where a value lies in the workspace: images [height][width][channels] with a margin of zeros around.
+struct FeatureMap {
+  Dim height = 1, width = 1, channels = 1;
+  Dim margin_h = 0, margin_w = 0;
+  Dim offset = 0;  ///< of the first image, per image of a block
+
+  Dim line() const { return (width + 2 * margin_w) * channels; }
+  Dim image() const { return (height + 2 * margin_h) * line(); }
+  /// From an image's beginning to its first pixel.
+  Dim origin() const { return margin_h * line() + margin_w * channels; }
+  kernels::Strides strides() const { return {image(), line(), channels}; }
+  bool same_layout(const FeatureMap& other) const {
+    return height == other.height && width == other.width && channels == other.channels &&
+           margin_h == other.margin_h && margin_w == other.margin_w;
+  }
 };
 
-/// [ky][kx][cin][cout] -> the taps of these phases in the order of their inputs.
-Tensor phase_weights(const kernels::ConvSettings& s, const Phase& down, const Phase& across,
-                     const Variable& w);
+/// Fills the margins of so many images of a map, of which `image` is the first.
+template <class T>
+void fill_margin(const FeatureMap& map, Dim images, T value, T* image) {
+  if (map.margin_h + map.margin_w == 0) return;
+  const Dim ends = map.margin_h * map.line(), side = map.margin_w * map.channels;
+  for (T* const last = image + images * map.image(); image < last; image += map.image()) {
+    std::fill_n(image, ends, value);
+    std::fill_n(image + map.image() - ends, ends, value);
+    for (T* line = image + ends; line < image + map.image() - ends; line += map.line()) {
+      std::fill_n(line, side, value);
+      std::fill_n(line + map.line() - side, side, value);
+    }
+  }
+}
 
-/// The weights of a linear layer behind flatten_channels_first or before unflatten_channels_first,
-/// [outer][channels][pixels][inner], take the numbers in the order in which they lie,
-/// [outer][pixels][channels][inner].
-Tensor with_pixels_outside(const Tensor& t, Dim outer, Dim pixels, Dim inner);
+/// A convolution, every second pixel of a transposed one, or a linear layer as a product: w
+/// [segments * length][cout] times the runs of `length` numbers that begin `segments` behind an output's
+/// place.
+struct ProductTaps {
+  Dim height = 1, width = 1;
+  kernels::Strides from = {}, to = {};
+  std::vector<Dim> segments = {};
+  Dim length = 0;
+  Dim y_offset = 0;  ///< from the map's first pixel
+  Tensor w = {}, bias = {};
+};
 
-/// The traced ops of one inference: which op reads a value last, how wide the value's margin must be, and
-/// which map's memory it shares.
+/// The traced ops of one inference: which op reads a value last, how its map lies, and which map's memory it
+/// shares.
 class TraceWalk {
  protected:
   using Id = const detail::Node*;
@@ -45,18 +71,21 @@ class TraceWalk {
 
   /// The value itself, or the map that it is the flattened form of.
   Id owner(const Variable& x) const;
-  Margin margin_of(const Variable& y) const;
-  /// Of the map that this value is unflattened into; 1 where it is not.
-  Dim pixels_of_unflatten(const Variable& y) const;
+  /// The map that a value becomes, with the margin that its readers need; its offset is not set.
+  FeatureMap layout_of(const Variable& y) const;
+  /// Those of a convolution or linear layer, from map to map.
+  std::vector<ProductTaps> products_of(const TracedOp& op, const FeatureMap& x, const FeatureMap& y) const;
   bool read_after(Id value, std::size_t op) const;
   /// Whether it is take_runs or last_frame. Throws std::logic_error when another op reads the network's
   /// input.
   bool takes_input(const TracedOp& op) const;
 
  private:
+  ProductTaps linear(const TracedOp& op, const FeatureMap& x, const FeatureMap& y) const;
+
   Id input_;
   std::map<Id, Id> flattened_;
-  std::map<Id, Dim> pixels_of_unflatten_;
+  std::map<Id, Dim> pixels_of_unflatten_;  // of the map that a value is unflattened into
   std::map<Id, std::size_t> last_use_;
   std::map<Id, Margin> margins_;
 };
