@@ -52,19 +52,11 @@ struct Vec {
   void store_part(real* p, Dim n) const { _mm256_maskstore_ps(p, mask(n), v); }
 };
 
-#include "autograd/kernels/fast/isa/kernels.inl"
-#include "autograd/kernels/fast/isa/winograd.inl"
-
-#include "autograd/kernels/fast/isa/tiles.inl"
-
-#include "autograd/kernels/fast/isa/inference.inl"
+#include "autograd/kernels/fast/isa/set.inl"
 
 }  // namespace
 
-const IsaKernels kAvx2Kernels{"avx2",      Vectors::avx2, gather,      gather_rows, outer,
-                              filters,     filter_grads,  patches,     squares,     square_grads,
-                              transpose,   product,       map_patches, places,      filtered_places,
-                              map_squares, gate,          mean,        planes,      plane_conv};
+constinit const IsaKernels kAvx2Kernels = set_of("avx2", Vectors::avx2);
 
 }  // namespace supertac::kernels
 

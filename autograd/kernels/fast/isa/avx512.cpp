@@ -54,12 +54,7 @@ struct Vec {
   void store_part(real* p, Dim n) const { _mm512_mask_storeu_ps(p, mask(n), v); }
 };
 
-#include "autograd/kernels/fast/isa/kernels.inl"
-#include "autograd/kernels/fast/isa/winograd.inl"
-
-#include "autograd/kernels/fast/isa/tiles.inl"
-
-#include "autograd/kernels/fast/isa/inference.inl"
+#include "autograd/kernels/fast/isa/set.inl"
 
 // Few outputs by vectors of eight: half of sixteen would be idle, and masks cost more than the wider set
 // gains.
@@ -68,28 +63,17 @@ void by_width(const Job& job, Rest... rest) {
   job.cout <= Vec::kLanes / 2 ? (kAvx2Kernels.*kNarrow)(job, rest...) : kWide(job, rest...);
 }
 
+constexpr IsaKernels with_narrow_outputs(IsaKernels set) {
+  set.gather = by_width<gather, &IsaKernels::gather>;
+  set.gather_rows = by_width<gather_rows, &IsaKernels::gather_rows>;
+  set.outer = by_width<outer, &IsaKernels::outer>;
+  set.product = by_width<product, &IsaKernels::product>;
+  return set;
+}
+
 }  // namespace
 
-const IsaKernels kAvx512Kernels{"avx512",
-                                Vectors::avx512,
-                                by_width<gather, &IsaKernels::gather>,
-                                by_width<gather_rows, &IsaKernels::gather_rows>,
-                                by_width<outer, &IsaKernels::outer>,
-                                filters,
-                                filter_grads,
-                                patches,
-                                squares,
-                                square_grads,
-                                transpose,
-                                by_width<product, &IsaKernels::product>,
-                                map_patches,
-                                places,
-                                filtered_places,
-                                map_squares,
-                                gate,
-                                mean,
-                                planes,
-                                plane_conv};
+constinit const IsaKernels kAvx512Kernels = with_narrow_outputs(set_of("avx512", Vectors::avx512));
 
 }  // namespace supertac::kernels
 

@@ -45,19 +45,11 @@ struct Vec {
   }
 };
 
-#include "autograd/kernels/fast/isa/kernels.inl"
-#include "autograd/kernels/fast/isa/winograd.inl"
-
-#include "autograd/kernels/fast/isa/tiles.inl"
-
-#include "autograd/kernels/fast/isa/inference.inl"
+#include "autograd/kernels/fast/isa/set.inl"
 
 }  // namespace
 
-const IsaKernels kNeonKernels{
-    "neon",          Vectors::baseline, gather,       gather_rows, outer,   filters,     filter_grads,
-    patches,         squares,           square_grads, transpose,   product, map_patches, places,
-    filtered_places, map_squares,       gate,         mean,        planes,  plane_conv};
+constinit const IsaKernels kNeonKernels = set_of("neon", Vectors::baseline);
 
 }  // namespace supertac::kernels
 

@@ -31,25 +31,14 @@ struct Vec {
   void store_part(real* p, Dim) const { *p = v; }
 };
 
-#include "autograd/kernels/fast/isa/kernels.inl"
-#include "autograd/kernels/fast/isa/winograd.inl"
-
-#include "autograd/kernels/fast/isa/tiles.inl"
-
-#include "autograd/kernels/fast/isa/inference.inl"
+#include "autograd/kernels/fast/isa/set.inl"
 
 }  // namespace
 
 #ifdef SUPERTAC_SCALAR_FMA
-const IsaKernels kPortableFmaKernels{
-    "portable",      Vectors::baseline, gather,       gather_rows, outer,   filters,     filter_grads,
-    patches,         squares,           square_grads, transpose,   product, map_patches, places,
-    filtered_places, map_squares,       gate,         mean,        planes,  plane_conv};
+constinit const IsaKernels kPortableFmaKernels = set_of("portable", Vectors::baseline);
 #else
-const IsaKernels kPortableKernels{
-    "portable",      Vectors::baseline, gather,       gather_rows, outer,   filters,     filter_grads,
-    patches,         squares,           square_grads, transpose,   product, map_patches, places,
-    filtered_places, map_squares,       gate,         mean,        planes,  plane_conv};
+constinit const IsaKernels kPortableKernels = set_of("portable", Vectors::baseline);
 #endif
 
 }  // namespace supertac::kernels

@@ -1,0 +1,17 @@
+// All loops of an instruction set over the vector type that its source defines (kernels.inl), and their
+// table.
+
+#include "autograd/kernels/fast/isa/kernels.inl"
+#include "autograd/kernels/fast/isa/winograd.inl"
+
+#include "autograd/kernels/fast/isa/tiles.inl"
+
+#include "autograd/kernels/fast/isa/inference.inl"
+
+// A table is a constant of the program (constinit): no code of this instruction set may run before the
+// processor is known.
+constexpr IsaKernels set_of(std::string_view name, Vectors vectors) {
+  return {name,    vectors,      gather,    gather_rows, outer,       filters, filter_grads,    patches,
+          squares, square_grads, transpose, product,     map_patches, places,  filtered_places, map_squares,
+          gate,    mean,         planes,    plane_conv};
+}
