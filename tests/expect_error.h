@@ -7,6 +7,17 @@
 #include <exception>
 #include <string>
 
+/// what() of the `Error` that `action` throws.
+template <class Error>
+std::string what_of(const auto& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "nothing thrown";
+}
+
 /// `statement` throws `Type`, and `part` stands in its what(), which is one line.
 #define EXPECT_ERROR(statement, Type, part)                        \
   EXPECT_THROW(                                                    \

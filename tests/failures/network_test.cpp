@@ -5,20 +5,11 @@
 
 #include "autograd/ops/arithmetic.h"
 #include "layers/residual.h"
+#include "tests/layers/noise.h"
 #include "tests/models/support.h"
 
 namespace supertac {
 namespace {
-
-double variance(const Tensor& t) {
-  double sum = 0, squares = 0;
-  for (const real x : t.values()) {
-    sum += static_cast<double>(x);
-    squares += static_cast<double>(x) * static_cast<double>(x);
-  }
-  const double n = static_cast<double>(t.size()), mean = sum / n;
-  return squares / n - mean * mean;
-}
 
 // A constant map, doubled by random weights: the variance of the means of the four pixel phases, relative to
 // the square of the mean.

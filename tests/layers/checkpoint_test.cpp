@@ -6,6 +6,7 @@
 
 #include "layers/convolution.h"
 #include "layers/linear.h"
+#include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {
@@ -71,14 +72,11 @@ TEST_F(CheckpointTest, ListsEveryProblemAtOnceAndChangesNothing) {
                                       counting("absent", {1}, Layout::plain)};
   Variable fine = wanted[0].value;
   fine.mutable_value().fill(7);
-  try {
-    load_parameters(read_checkpoint(path("c.safetensors")), "c", wanted, {"optimizer."});
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(),
-                 "c: the tensors do not fit the model that its metadata describes: "
-                 "shape expected F32 [3,3], found F32 [3,2]; missing absent; unexpected extra");
-  }
+  EXPECT_EQ(what_of<std::runtime_error>([&] {
+              load_parameters(read_checkpoint(path("c.safetensors")), "c", wanted, {"optimizer."});
+            }),
+            "c: the tensors do not fit the model that its metadata describes: "
+            "shape expected F32 [3,3], found F32 [3,2]; missing absent; unexpected extra");
   EXPECT_EQ(fine.value().data()[0], 7);
 }
 
@@ -89,12 +87,7 @@ TEST_F(CheckpointTest, RefusesOtherFilesAndNewerVersions) {
                       {{"a", "F32", {1}, std::as_bytes(std::span(one))}});
   };
   const auto message = [&] {
-    try {
-      read_checkpoint(path("c.safetensors"));
-    } catch (const std::runtime_error& error) {
-      return std::string(error.what());
-    }
-    return std::string("no error");
+    return what_of<std::runtime_error>([&] { read_checkpoint(path("c.safetensors")); });
   };
   write({{"format", "supertac-recording"}});
   EXPECT_NE(message().find("not a SuperTac checkpoint"), std::string::npos) << message();

@@ -6,21 +6,14 @@
 #include "layers/convolution.h"
 #include "layers/linear.h"
 #include "layers/residual.h"
+#include "tests/layers/noise.h"
 
 namespace supertac {
 namespace {
 
-Tensor noise(const Shape& shape) {
-  Tensor t(shape);
-  const RandomStream random(11, 3);
-  std::uint64_t i = 0;
-  for (real& x : t.values()) x = random.normal(i++);
-  return t;
-}
-
 template <class Layer>
 void expect_right_gradients(const Layer& layer, const Shape& shape) {
-  const Variable x(noise(shape), true);
+  const Variable x(noise(shape, 11), true);
   std::vector<Variable> leaves = values_of(layer.parameters());
   leaves.push_back(x);
   std::vector<std::string> names = names_of(layer.parameters());
@@ -69,7 +62,7 @@ TEST(LayerGradients, Rirb) {
 TEST(LayerGradients, AReportNamesTheParameterAndItsElement) {
   Rng rng(9);
   const Rcab layer(8, 4, rng);
-  const Variable x(noise({1, 3, 4, 8}), true);
+  const Variable x(noise({1, 3, 4, 8}, 11), true);
   const Variable weight = layer.parameters()[2].value;
   const auto f = [&] {  // a node that spoils one entry of the gradient on its way back
     const Variable spoiled = record("spoil", weight.value(), {&weight}, [](Backward& b) {

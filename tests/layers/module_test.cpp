@@ -7,6 +7,7 @@
 #include "layers/convolution.h"
 #include "layers/linear.h"
 #include "layers/residual.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -62,15 +63,9 @@ TEST(Module, InitialisationHasTheVarianceItStates) {
 
 TEST(Module, RefusesALayerWithoutInputs) {
   Rng rng(1);
-  try {
-    Conv2d(3, 8, {.kernel = 0}, rng);
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(
-        error.what(),
-        "uniform_fan_in: expects at least one input (and a kernel of at least 1), got [0,0,3,8] with a "
-        "fan-in of 0");
-  }
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { Conv2d(3, 8, {.kernel = 0}, rng); }),
+            "uniform_fan_in: expects at least one input (and a kernel of at least 1), got [0,0,3,8] with a "
+            "fan-in of 0");
 }
 
 TEST(Module, CountsItsParameters) {

@@ -4,26 +4,11 @@
 
 #include <cmath>
 
+#include "tests/expect_error.h"
+#include "tests/layers/noise.h"
+
 namespace supertac {
 namespace {
-
-Tensor noise(const Shape& shape, std::uint64_t seed) {
-  Tensor t(shape);
-  const RandomStream random(seed, 7);
-  std::uint64_t i = 0;
-  for (real& x : t.values()) x = static_cast<real>(random.normal(i++));
-  return t;
-}
-
-double variance(const Tensor& t) {
-  double sum = 0, squares = 0;
-  for (const real x : t.values()) {
-    sum += static_cast<double>(x);
-    squares += static_cast<double>(x) * static_cast<double>(x);
-  }
-  const double n = static_cast<double>(t.size());
-  return squares / n - sum / n * (sum / n);
-}
 
 TEST(ChannelAttention, GatesStayInsideZeroAndOneAndDependOnTheMeanOnly) {
   Rng rng(3);
@@ -42,12 +27,8 @@ TEST(ChannelAttention, GatesStayInsideZeroAndOneAndDependOnTheMeanOnly) {
 
 TEST(ChannelAttention, RefusesAReductionThatLeavesNoChannel) {
   Rng rng(3);
-  try {
-    ChannelAttention(4, 8, rng);
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "ChannelAttention: reduction must be 1 to 4 (the channels), got 8");
-  }
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { ChannelAttention(4, 8, rng); }),
+            "ChannelAttention: reduction must be 1 to 4 (the channels), got 8");
 }
 
 TEST(ChannelAttention, MaySqueezeToOneChannel) {

@@ -9,20 +9,11 @@
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
 #include "tests/data/test_recordings.h"
+#include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {
 namespace {
-
-template <class Error>
-std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "nothing thrown";
-}
 
 Recording example() {
   Recording recording = make_recording({.plate = "3_Bumps", .trial = 2, .pass = 5, .frames = 7});
@@ -68,7 +59,7 @@ TEST(Recording, RefusesAnArrayThatIsNone) {
   TemporaryFolder folder;
   Recording recording = example();
   recording.metadata["array"] = "4x4";
-  EXPECT_NE(message_of<std::invalid_argument>([&] {
+  EXPECT_NE(what_of<std::invalid_argument>([&] {
               write_recording(folder.file("a"), recording);
             }).find("is a member of the recording"),
             std::string::npos);
@@ -91,7 +82,7 @@ TEST(Recording, RefusesAnArrayThatIsNone) {
   for (const auto& [array, refusal] : kArrays) {
     metadata["array"] = array;
     write_safetensors(folder.file("a"), metadata, {});
-    EXPECT_EQ(message_of<FileError>([&] { read_recording(folder.file("a")); }),
+    EXPECT_EQ(what_of<FileError>([&] { read_recording(folder.file("a")); }),
               folder.file("a") + ": " + refusal);
   }
 }
@@ -116,7 +107,7 @@ TEST(Recording, WritesNoneThatBreaksARule) {
   const auto message = [&](const std::function<void(Recording&)>& damage) {
     Recording recording = example();
     damage(recording);
-    return message_of<std::invalid_argument>([&] { write_recording(folder.file("a"), recording); });
+    return what_of<std::invalid_argument>([&] { write_recording(folder.file("a"), recording); });
   };
   EXPECT_EQ(message([](Recording& r) { r.volts.pop_back(); }),
             "write_recording: volts has 111 values, expected 112 for 7 frames");
@@ -150,7 +141,7 @@ std::string message_of_parts(const Parts& parts) {
   write_safetensors(folder.file("a"), parts.metadata,
                     {{"time_s", "F64", {parts.time_s.size()}, std::as_bytes(std::span(parts.time_s))},
                      {"volts", "F32", parts.volts_shape, std::as_bytes(std::span(parts.volts))}});
-  const std::string message = message_of<FileError>([&] { read_recording(folder.file("a")); });
+  const std::string message = what_of<FileError>([&] { read_recording(folder.file("a")); });
   const std::size_t path = folder.file("a: ").size();  // every message begins with it
   return message.starts_with(folder.file("a: ")) ? message.substr(path) : message;
 }
@@ -194,11 +185,10 @@ TEST(Recording, ReadsNoneThatBreaksARule) {
 
 TEST(Recording, ListsAFolderByName) {
   TemporaryFolder folder;
-  EXPECT_NE(message_of<FileError>([&] { list_recordings(folder.path()); }).find("has no recordings"),
+  EXPECT_NE(what_of<FileError>([&] { list_recordings(folder.path()); }).find("has no recordings"),
             std::string::npos);
-  EXPECT_NE(
-      message_of<FileError>([&] { list_recordings(folder.file("none")); }).find("cannot list the folder"),
-      std::string::npos);
+  EXPECT_NE(what_of<FileError>([&] { list_recordings(folder.file("none")); }).find("cannot list the folder"),
+            std::string::npos);
   for (const char* name : {"b.safetensors", "a.safetensors", "notes.txt"}) write_file(folder.file(name), "x");
   EXPECT_EQ(list_recordings(folder.path()),
             (std::vector<std::string>{folder.file("a.safetensors"), folder.file("b.safetensors")}));

@@ -13,6 +13,7 @@
 #include "data/registration/lost_frames.h"
 #include "data/windows/windows.h"
 #include "tests/data/registration/lossy_pass.h"
+#include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {
@@ -119,15 +120,9 @@ TEST(TextFolder, APlateOfUnknownShapeIsImportedWithoutPositions) {
   EXPECT_TRUE(imported[0].summary().ends_with("of unknown shape: no position, no truth"))
       << imported[0].summary();
   WindowSet windows((WindowSettings()));
-  try {
-    windows.add(recording);
-    ADD_FAILURE() << "there is no truth to train on";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(
-        error.what(),
-        "plate 'unknown_felt': its shape is unknown, so it has no truth to train on or score; stream its "
-        "recordings (supertac-stream --recording)");
-  }
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { windows.add(recording); }),
+            "plate 'unknown_felt': its shape is unknown, so it has no truth to train on or score; stream its "
+            "recordings (supertac-stream --recording)");
 }
 
 TEST(TextFolder, FilesThatAreNoRecordingsAreLeftOutWhenAskedTo) {
@@ -136,12 +131,8 @@ TEST(TextFolder, FilesThatAreNoRecordingsAreLeftOutWhenAskedTo) {
   EXPECT_THROW(import_all(folder.path(), {}), FileError);
   std::vector<std::string> left_out;
   const FolderImport lenient{.left_out = [&](const FileError& error) { left_out.push_back(error.what()); }};
-  try {
-    import_all(folder.path(), lenient);
-    ADD_FAILURE() << "nothing was left";
-  } catch (const FileError& error) {
-    EXPECT_EQ(std::string(error.what()), folder.path() + ": none of 1 files is a recording");
-  }
+  EXPECT_EQ(what_of<FileError>([&] { import_all(folder.path(), lenient); }),
+            folder.path() + ": none of 1 files is a recording");
   put(folder, "plain/1/2.txt", as_text(full_pass("plain", 2, 1)));
   EXPECT_EQ(import_all(folder.path(), lenient).size(), 1u);
   ASSERT_EQ(left_out.size(), 2u);
@@ -173,13 +164,8 @@ TEST(TextFolder, WhatIsNoPassIsLeftOutByName) {
 TEST(TextFolder, TwoFilesOfOnePassAreNamed) {
   const TemporaryFolder folder;
   const std::string first = put(folder, "plain/1/01.txt", ""), second = put(folder, "plain/1/1.txt", "");
-  try {
-    import_all(folder.path(), {});
-    ADD_FAILURE() << "one would replace the other";
-  } catch (const FileError& error) {
-    EXPECT_EQ(std::string(error.what()),
-              second + ": is the same trial and pass as " + first + "; rename one of them");
-  }
+  EXPECT_EQ(what_of<FileError>([&] { import_all(folder.path(), {}); }),
+            second + ": is the same trial and pass as " + first + "; rename one of them");
 }
 
 TEST(TextFolder, AFolderOfAnotherShapeIsNamed) {
@@ -202,13 +188,8 @@ TEST(TextFolder, AFolderOfAnotherShapeIsNamed) {
     }
   }
   const TemporaryFolder folder;
-  try {
-    import_all(folder.file("none"), {});
-    ADD_FAILURE();
-  } catch (const FileError& error) {
-    EXPECT_EQ(std::string(error.what()),
-              folder.file("none") + ": cannot list the folder: No such file or directory; check the name");
-  }
+  EXPECT_EQ(what_of<FileError>([&] { import_all(folder.file("none"), {}); }),
+            folder.file("none") + ": cannot list the folder: No such file or directory; check the name");
 }
 
 TEST(TextFolder, TheSummaryTellsWhatBecameOfAPass) {

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "io/files/file.h"
+#include "tests/expect_error.h"
 #include "tests/hardware/fake_sensor.h"
 #include "tests/io/temporary_folder.h"
 
@@ -30,12 +31,7 @@ std::string refusal(const std::string& key, const Json& value) {
     at->erase(name);
   else
     (*at)[name] = value;
-  try {
-    sensor_of_json(json.dump(), "mat.json");
-  } catch (const FileError& error) {
-    return error.what();
-  }
-  return "taken";
+  return what_of<FileError>([&] { sensor_of_json(json.dump(), "mat.json"); });
 }
 
 TEST(Sensor, IsReadFromAFile) {

@@ -11,6 +11,7 @@
 
 #include "data/recordings/simulator.h"
 #include "tests/data/test_recordings.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -50,12 +51,8 @@ bool disjoint(const Split& split) {
 TEST(SplitKind, HasANameBothWays) {
   for (const char* name : {"window", "pass", "trial", "texture", "group", "none"})
     EXPECT_EQ(name_of(split_kind(name)), name);
-  try {
-    split_kind("trails");
-    FAIL() << "took a name that is none";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "split: expects window, pass, trial, texture, group or none, got 'trails'");
-  }
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { split_kind("trails"); }),
+            "split: expects window, pass, trial, texture, group or none, got 'trails'");
 }
 
 TEST(Split, WindowTestsARandomFifthAndLeaks) {
@@ -110,12 +107,8 @@ TEST(Split, TextureLeavesOutTheNamedPlateAndItsLikes) {
   for (const std::size_t p : passes_of(set, split.test)) test.insert(set.passes()[p].plate);
   EXPECT_EQ(test, std::set<std::string>{"3_Bumps"});
   EXPECT_EQ(train, (std::set<std::string>{"bumps6", "4_Ridges"}));
-  try {
-    make_split(set, SplitKind::texture, 7, {"6_Blob"});
-    FAIL() << "left out a plate that is not there";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "split texture: the data has no windows of plate '6_Blob' to leave out");
-  }
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { make_split(set, SplitKind::texture, 7, {"6_Blob"}); }),
+            "split texture: the data has no windows of plate '6_Blob' to leave out");
 }
 
 // With all of them left out only passes for training only are trained on, and none that resembles any of
@@ -163,12 +156,7 @@ TEST(Split, SaysWhatTheDataLacks) {
   WindowSet set(wide_settings(16));
   set.add(make_recording({.frames = 40}));
   const auto message = [&](SplitKind kind, const std::vector<std::string>& leave_out = {}) -> std::string {
-    try {
-      make_split(set, kind, 1, leave_out);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "nothing was thrown";
+    return what_of<std::invalid_argument>([&] { make_split(set, kind, 1, leave_out); });
   };
   EXPECT_EQ(
       message(SplitKind::pass),
@@ -181,7 +169,7 @@ TEST(Split, SaysWhatTheDataLacks) {
   EXPECT_EQ(message(SplitKind::texture, {"bumps12"}),
             "split texture: no window to train on; the data has nothing unlike what is left out: train "
             "beside random plates, score with split none");
-  EXPECT_EQ(message(SplitKind::window), "nothing was thrown");
+  EXPECT_EQ(message(SplitKind::window), "nothing thrown");
 }
 
 TEST(Leakage, FindsAPassThatIsFiledTwice) {

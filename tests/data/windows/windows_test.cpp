@@ -13,18 +13,14 @@
 #include "data/recordings/simulator.h"
 #include "data/scores/baselines.h"
 #include "tests/data/test_recordings.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
 
 template <class Exception = std::invalid_argument, class Call>
 std::string message_of(Call call) {
-  try {
-    call();
-  } catch (const Exception& error) {
-    return error.what();
-  }
-  return "nothing was thrown";
+  return what_of<Exception>(call);
 }
 
 std::size_t sum_of_reasons(const WindowCounts& c) {
@@ -172,12 +168,7 @@ TEST(Windows, OfAnyArray) {
 
 TEST(Windows, RefuseRecordingsOfAnotherArray) {
   const auto message = [](WindowSet& set) -> std::string {
-    try {
-      set.add(make_recording({}));
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "no error";
+    return what_of<std::runtime_error>([&] { set.add(make_recording({})); });
   };
   WindowSettings settings = wide_settings(16);
   settings.array = TaxelArray{.rows = 6, .columns = 6, .pitch_mm = 2};
@@ -317,7 +308,7 @@ TEST(Windows, SayWhatHelpsWhenThereIsNone) {
     change(recording);
     WindowSet set(wide_settings(128));
     set.add(recording);
-    return message_of<std::runtime_error>([&] { set.check_any("here"); });
+    return what_of<std::runtime_error>([&] { set.check_any("here"); });
   };
   EXPECT_NE(message([](Recording&) {}).find("try fewer timesteps"), std::string::npos);
   EXPECT_NE(message([](Recording& r) { r.position_mm.clear(); }).find("truth needs positions"),

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/expect_error.h"
 #include "tests/models/support.h"
 
 namespace supertac {
@@ -66,12 +67,7 @@ TEST(Ensemble, AddsTheVarianceOfItsMembersToTheirSpread) {
 }
 
 void expect_refused(const std::vector<std::string>& paths, const std::string& why) {
-  try {
-    load_models(paths);
-    FAIL() << "taken in spite of: " << why;
-  } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find(why), std::string::npos) << error.what();
-  }
+  EXPECT_ERROR(load_models(paths), std::runtime_error, why);
 }
 
 TEST(Ensemble, SaysWhichModelsDoNotBelongTogether) {

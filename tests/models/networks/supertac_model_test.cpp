@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "tests/expect_error.h"
 #include "tests/models/support.h"
 
 namespace supertac {
@@ -161,13 +162,10 @@ TEST(SuperTac, ConstantWindowsGiveFinitePictures) {
 
 TEST(SuperTac, RefusesSettingsAndWindowsThatDoNotFit) {
   const auto message = [](SuperTacSettings s) -> std::string {
-    try {
+    return what_of<std::invalid_argument>([&] {
       Rng rng(1);
       SuperTac model(s, rng);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "no error";
+    });
   };
   SuperTacSettings s = small_settings();
   s.timesteps = 40;
@@ -194,12 +192,10 @@ TEST(SuperTac, RefusesSettingsAndWindowsThatDoNotFit) {
       "side");
   Rng rng(1);
   const SuperTac model(small_settings(), rng);
-  try {
-    model.infer(Tensor::zeros({1, 64, 16}));
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "SuperTac: windows expects [N,32,16], got [1,64,16]");
-  }
+  EXPECT_EQ(what_of<std::invalid_argument>([&] {
+              model.infer(Tensor::zeros({1, 64, 16}));
+            }),
+            "SuperTac: windows expects [N,32,16], got [1,64,16]");
   EXPECT_THROW(SuperTacSettings::of_preset("huge"), std::invalid_argument);
 }
 

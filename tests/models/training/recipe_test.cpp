@@ -6,6 +6,7 @@
 
 #include "models/files/model_file.h"
 #include "models/networks/cost.h"
+#include "tests/expect_error.h"
 #include "tests/models/support.h"
 
 namespace supertac {
@@ -63,12 +64,7 @@ TEST(Recipe, RefusesWhatNoTrainingHas) {
   const auto message = [](const std::function<void(Recipe&)>& spoil) -> std::string {
     Recipe recipe = Recipe::named("tiny");
     spoil(recipe);
-    try {
-      recipe.check();
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "nothing";
+    return what_of<std::invalid_argument>([&] { recipe.check(); });
   };
   EXPECT_EQ(message([](Recipe& r) { r.stride = 0; }), "recipe: expected stride from 1 to 100000, got 0");
   EXPECT_EQ(message([](Recipe& r) { r.rate_hz = 5; }), "recipe: expected rate_hz from 20 to 2000, got 5");
@@ -86,13 +82,8 @@ TEST(Recipe, AFileThatDoesNotSayItIsRefusedByName) {
   const std::string path = folder / "old.safetensors";
   Rng rng(0);
   save_model(path, SuperTac(small_settings(), rng), {}, {{"seed", "1"}});
-  try {
-    Recipe::of(load_model(path), path);
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find(path + ": metadata \"training\" is missing"), std::string::npos)
-        << error.what();
-  }
+  EXPECT_ERROR(Recipe::of(load_model(path), path), std::runtime_error,
+               path + ": metadata \"training\" is missing");
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "io/files/json.h"
 #include "io/numbers/hash.h"
 #include "models/inference/evaluation.h"
+#include "tests/expect_error.h"
 #include "tests/models/support.h"
 
 namespace supertac {
@@ -227,15 +228,12 @@ TEST(Trainer, RefusesToResumeAnotherRun) {
   trainer.train_step();
   trainer.save(folder / "state.safetensors", {{"data", "1234"}});
   const auto message = [&](const Recipe& other, const std::string& data) -> std::string {
-    try {
+    return what_of<std::runtime_error>([&] {
       Trainer(windows, all_of(windows), Objective(windows, other))
           .restore(folder / "state.safetensors", {{"data", data}});
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "no error";
+    });
   };
-  EXPECT_EQ(message(settings, "1234"), "no error");
+  EXPECT_EQ(message(settings, "1234"), "nothing thrown");
   EXPECT_NE(message(settings, "5678").find("cannot resume: its data is 1234, this run's is 5678"),
             std::string::npos);
   settings.muon = true;
@@ -283,12 +281,7 @@ TEST(Trainer, RefusesToResumeFromAModelWithoutState) {
   const WindowSet windows = small_windows(settings.model);
   Trainer trainer(windows, all_of(windows), Objective(windows, settings));
   save_model(folder / "m.safetensors", trainer.model(), {}, {{"training", training_text(settings)}});
-  try {
-    trainer.restore(folder / "m.safetensors", {});
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find("holds no training state"), std::string::npos) << error.what();
-  }
+  EXPECT_ERROR(trainer.restore(folder / "m.safetensors", {}), std::runtime_error, "holds no training state");
 }
 
 // The message of the step after `damage` has been done to the parameter of that name.
@@ -300,12 +293,7 @@ std::string stopped(const std::string& name, const std::function<void(Tensor&)>&
   for (const Parameter& p : trainer.model().parameters()) {
     if (p.name == name) damage(Variable(p.value).mutable_value());
   }
-  try {
-    trainer.train_step();
-  } catch (const TrainingStopped& error) {
-    return error.what();
-  }
-  return "no error";
+  return what_of<TrainingStopped>([&] { trainer.train_step(); });
 }
 
 TEST(Trainer, StopsWithStepLayerAndAdviceWhenAValueIsNotFinite) {
@@ -356,14 +344,10 @@ TEST(Trainer, RefusesWindowsOfAnotherFormat) {
   Recipe settings = small_training();
   const WindowSet windows = small_windows(settings.model);
   settings.model.timesteps = 48;
-  try {
-    Trainer(windows, all_of(windows), Objective(windows, settings));
-    FAIL() << "windows of 32 frames were taken for 48";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(),
-                 "the data have 32 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8, the model "
-                 "expects 48 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8");
-  }
+  EXPECT_EQ(what_of<std::invalid_argument>(
+                [&] { Trainer(windows, all_of(windows), Objective(windows, settings)); }),
+            "the data have 32 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8, the model "
+            "expects 48 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8");
   EXPECT_THROW(Trainer(windows, {}, Objective(windows, small_training())), std::invalid_argument);
 }
 
@@ -372,12 +356,8 @@ TEST(Trainer, NamesTheSettingThatIsOutOfRange) {
   const auto message = [&](const std::function<void(Recipe&)>& spoil) -> std::string {
     Recipe settings = small_training();
     spoil(settings);
-    try {
-      Trainer(windows, all_of(windows), Objective(windows, settings));
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "no error";
+    return what_of<std::invalid_argument>(
+        [&] { Trainer(windows, all_of(windows), Objective(windows, settings)); });
   };
   EXPECT_EQ(message([](auto& s) { s.epochs = 0; }), "training settings: epochs must be 1 to 100000, got 0");
   EXPECT_EQ(message([](auto& s) { s.batch = 5000; }), "training settings: batch must be 1 to 4096, got 5000");
@@ -388,7 +368,7 @@ TEST(Trainer, NamesTheSettingThatIsOutOfRange) {
   EXPECT_EQ(message([](auto& s) { s.clip_norm = -1; }),
             "training settings: clip norm must not be negative (0 = never), got -1");
   EXPECT_NE(message([](auto& s) { s.loss.beta = -1; }).find("beta = -1"), std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.augment.dropped = 17; }), "no error");
+  EXPECT_NE(message([](auto& s) { s.augment.dropped = 17; }), "nothing thrown");
   Recipe mirrored = Recipe::named("frame");
   mirrored.mirror = true;
   const WindowSet two_numbers = blobs();

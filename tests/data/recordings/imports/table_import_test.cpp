@@ -7,6 +7,7 @@
 
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
+#include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {
@@ -32,12 +33,7 @@ class TableImport : public testing::Test {
     return recording_of_table(path, read_table(path), column_map(map), sensor);
   }
   std::string refusal(const std::string& path, const std::string& map = "") {
-    try {
-      import(path, map);
-    } catch (const FileError& error) {
-      return error.what();
-    }
-    return "taken";
+    return what_of<FileError>([&] { import(path, map); });
   }
   void expect_refusal(const std::string& path, const std::string& map, const std::string& text) {
     const std::string found = refusal(path, map);
