@@ -81,7 +81,7 @@ void remove_leftovers(const std::string& path) {
   }
 }
 
-// publish() before the sync.
+// publish() without the sync.
 std::string rename_to(const std::string& finished, const OutputPath& output) {
   if (!output.when_taken) {
     if (system_calls().rename(finished.c_str(), output.path.c_str()) != 0)
@@ -103,6 +103,11 @@ std::string rename_to(const std::string& finished, const OutputPath& output) {
     if (errno != EEXIST) fail(output.path, "rename into place", errno);
   }
   throw FileError(output.path, "is taken, and so are 999 names after it; what was made is " + finished);
+}
+
+void sync_name(const std::string& name) {
+  if (!sync_folder_of(name))
+    fail(name, "sync the directory (it is written, a power cut may yet lose it)", errno);
 }
 
 }  // namespace
@@ -168,8 +173,7 @@ std::string read_text_file(const std::string& path, std::uint64_t max_bytes) {
 
 std::string publish(const std::string& finished, const OutputPath& output) {
   const std::string name = rename_to(finished, output);
-  if (!sync_folder_of(name))
-    fail(name, "sync the directory (it is written, a power cut may yet lose it)", errno);
+  sync_name(name);
   return name;
 }
 
@@ -180,17 +184,8 @@ AtomicFile::AtomicFile(const OutputPath& output)
   if (!output_.when_taken && std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
     throw FileError(path_, "exists and is not a regular file; choose another name");
   }
-  const std::string directory = directory_of(path_);
-  const int flags = O_RDONLY | O_DIRECTORY | O_CLOEXEC;
-  directory_ = retry([&] { return system_calls().open(directory.c_str(), flags, 0); });
-  if (directory_ < 0) fail(path_, "open the directory " + directory, errno);
-  try {
-    remove_leftovers(path_);
-    open_temporary();
-  } catch (...) {
-    close_all();
-    throw;
-  }
+  remove_leftovers(path_);
+  open_temporary();
 }
 
 void AtomicFile::open_temporary() {
@@ -209,13 +204,9 @@ void AtomicFile::open_temporary() {
   throw FileError(path_, "100 temporary files " + prefix + "* are in the way; remove them");
 }
 
-AtomicFile::~AtomicFile() { close_all(); }
-
-void AtomicFile::close_all() {
+AtomicFile::~AtomicFile() {
   close_quietly(file_);
-  close_quietly(directory_);
   if (!temporary_.empty()) system_calls().unlink(temporary_.c_str());
-  temporary_.clear();
 }
 
 void AtomicFile::write(std::span<const std::byte> bytes) {
@@ -235,13 +226,9 @@ void AtomicFile::commit() {
   if (retry([&] { return system_calls().fsync(file_); }) != 0) fail(path_, "sync to disk", errno);
   const int closed = system_calls().close(std::exchange(file_, -1));
   if (closed != 0 && errno != EINTR) fail(path_, "close", errno);
-  rename_to(temporary_, {path_, output_.when_taken});
+  const std::string name = rename_to(temporary_, {path_, output_.when_taken});
   temporary_.clear();
-  // EINVAL: a file system that has nothing to sync for a directory.
-  if (retry([&] { return system_calls().fsync(directory_); }) != 0 && errno != EINVAL) {
-    fail(path_, "sync the directory (the file is written, a power cut may yet lose it)", errno);
-  }
-  close_quietly(directory_);
+  sync_name(name);
 }
 
 void write_file(const OutputPath& output, std::span<const std::byte> bytes) {

@@ -95,13 +95,11 @@ class AtomicFile {
 
  private:
   void open_temporary();
-  void close_all();
 
   OutputPath output_;
   std::string path_;       // of output_, followed to the end where it is a link
   std::string temporary_;  // empty: there is none (yet, or any more)
   int file_ = -1;
-  int directory_ = -1;
 };
 
 /// AtomicFile in one call.

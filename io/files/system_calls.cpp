@@ -41,9 +41,10 @@ SystemCalls real_system_calls() {
 bool sync_folder_of(const std::string& path) {
   const std::string parent = std::filesystem::path(path).parent_path();
   const int flags = O_RDONLY | O_DIRECTORY | O_CLOEXEC;
-  const int folder = system_calls().open(parent.empty() ? "." : parent.c_str(), flags, 0);
+  int folder = -1, result = 0;
+  do folder = system_calls().open(parent.empty() ? "." : parent.c_str(), flags, 0);
+  while (folder < 0 && errno == EINTR);
   if (folder < 0) return false;
-  int result = 0;
   do result = system_calls().fsync(folder);
   while (result != 0 && errno == EINTR);
   // EINVAL: a file system that has nothing to sync for a folder.
