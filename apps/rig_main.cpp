@@ -22,8 +22,9 @@ RigSettings read_settings(const Arguments& arguments) {
   const auto seed = static_cast<std::uint64_t>(arguments.integer("seed", 0, 1'000'000'000));
   SimulatorSettings simulator;
   // The board does what it does.
-  simulator.with_adc = simulator.with_filter = simulator.with_saturation = false;
-  simulator.with_drift = false;  // grows with the clock, and a rig may run for days
+  simulator.with_adc = simulator.with_saturation = false;
+  simulator.filter_s = 0;
+  simulator.drift_volts_per_s = 0;  // grows with the clock, and a rig may run for days
   const FingerIdentity identity{.seed = seed, .trial = static_cast<int>(arguments.integer("trial", 1, 1000))};
   const Plate plate = read_option("plate", [&] { return Plate::named(arguments.text("plate")); });
   const FingerModel finger(plate, simulator, identity);

@@ -59,7 +59,7 @@ SimulatorSettings read_settings(const Arguments& arguments, const Sensor& sensor
         throw UsageError(std::string("--sensor: its file says what --") + other + " would; leave that out");
     settings.array = sensor.array;
     settings.rate_hz = sensor.rate_hz;
-    settings.with_filter = settings.with_adc = false;  // the rig's board has these
+    settings.filter_s = 0, settings.with_adc = false;  // the rig's board has these
   } else {
     settings.array = read_array(arguments);
   }

@@ -41,17 +41,25 @@ constexpr int kRows = static_cast<int>((Plate::kLengthMm + 2 * kMarginMm) / kCel
 
 struct Term {
   const char* name;
-  bool SimulatorSettings::*on;
+  void (*leave_out)(SimulatorSettings&);
 };
 constexpr Term kTerms[] = {
-    {"mount", &SimulatorSettings::with_mount},         {"pad", &SimulatorSettings::with_pad},
-    {"dome", &SimulatorSettings::with_dome},           {"edges", &SimulatorSettings::with_edges},
-    {"tilt", &SimulatorSettings::with_tilt},           {"gains", &SimulatorSettings::with_gains},
-    {"variation", &SimulatorSettings::with_variation}, {"vibration", &SimulatorSettings::with_vibration},
-    {"drift", &SimulatorSettings::with_drift},         {"emi", &SimulatorSettings::with_emi},
-    {"noise", &SimulatorSettings::with_noise},         {"adc", &SimulatorSettings::with_adc},
-    {"filter", &SimulatorSettings::with_filter},       {"saturation", &SimulatorSettings::with_saturation},
-    {"jitter", &SimulatorSettings::with_jitter},       {"loss", &SimulatorSettings::with_loss},
+    {"mount", [](SimulatorSettings& s) { s.with_mount = false; }},
+    {"pad", [](SimulatorSettings& s) { s.pad_sigma_mm = kNoPadSigmaMm; }},
+    {"dome", [](SimulatorSettings& s) { s.dome_radius_mm = INFINITY; }},
+    {"edges", [](SimulatorSettings& s) { s.with_edges = false; }},
+    {"tilt", [](SimulatorSettings& s) { s.tilt_spread = 0; }},
+    {"gains", [](SimulatorSettings& s) { s.with_gains = false; }},
+    {"variation", [](SimulatorSettings& s) { s.with_variation = false; }},
+    {"vibration", [](SimulatorSettings& s) { s.vibration_mm = 0; }},
+    {"drift", [](SimulatorSettings& s) { s.drift_volts_per_s = 0; }},
+    {"emi", [](SimulatorSettings& s) { s.emi_volts = 0; }},
+    {"noise", [](SimulatorSettings& s) { s.noise_volts = 0; }},
+    {"adc", [](SimulatorSettings& s) { s.with_adc = false; }},
+    {"filter", [](SimulatorSettings& s) { s.filter_s = 0; }},
+    {"saturation", [](SimulatorSettings& s) { s.with_saturation = false; }},
+    {"jitter", [](SimulatorSettings& s) { s.jitter_s = 0; }},
+    {"loss", [](SimulatorSettings& s) { s.lost_fraction = 0; }},
 };
 
 // As often half as twice.
@@ -105,7 +113,7 @@ const std::vector<std::string>& simulator_terms() {
 SimulatorSettings without_term(SimulatorSettings settings, const std::string& name) {
   for (const Term& term : kTerms) {
     if (name != term.name) continue;
-    settings.*term.on = false;
+    term.leave_out(settings);
     return settings;
   }
   throw std::invalid_argument("simulator: unknown term \"" + name + "\"; known are " +
@@ -123,7 +131,7 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
   const double variation = settings.with_variation ? 1 : 0;
   const double spread = variation * settings.gain_spread;
   const double common_gain = factor(spread * pass.normal(1000));
-  const double tilt_spread = settings.with_tilt ? variation * settings.tilt_spread : 0;
+  const double tilt_spread = variation * settings.tilt_spread;
   const double slope_y = tilt_spread * trial.normal(1001), slope_x = tilt_spread * trial.normal(1002);
   const bool rig = settings.array.rows == rig::kTaxelRows && settings.array.columns == rig::kTaxelColumns;
   const auto taxels = static_cast<std::uint64_t>(settings.array.taxels());
@@ -133,7 +141,7 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
     gain_.push_back((settings.with_gains && rig ? kGain[c] : kUnknownGain) * own * common_gain);
     threshold_.push_back(settings.threshold_mm * std::abs(trial.normal(kThresholds + c)));
     rest_.push_back(rig::kRestVolts + variation * kRestSpreadVolts * sensor.normal(c));
-    drift_.push_back(settings.with_drift ? settings.drift_volts_per_s * pass.normal(drifts + c) : 0);
+    drift_.push_back(settings.drift_volts_per_s * pass.normal(drifts + c));
   }
   const double press = trial.normal(1003) + pass.normal(1003);
   const double indentation = settings.indentation_mm + variation * settings.indentation_spread_mm * press;
@@ -153,7 +161,7 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
 }
 
 void FingerModel::shape_pad(double slope_x, double slope_y) {
-  const double sigma = settings_.with_pad ? settings_.pad_sigma_mm : kNoPadSigmaMm;
+  const double sigma = settings_.pad_sigma_mm;
   const auto [rows, columns, pitch, channels] = settings_.array;
   across_ = points_of(columns, pitch.x, kBeyondAcrossMm, kAcrossMm);
   along_ = points_of(rows, pitch.y, kBeyondAlongMm, kAlongMm);
@@ -161,7 +169,7 @@ void FingerModel::shape_pad(double slope_x, double slope_y) {
   along_weight_ = taxel_weights(rows, pitch.y, along_, kAlongMm, sigma);
   across_lean_ = leaning(across_weight_, columns, pitch.x, kAcrossMm, sigma);
   along_lean_ = leaning(along_weight_, rows, pitch.y, kAlongMm, sigma);
-  const double curvature = settings_.with_dome ? 1 / (2 * settings_.dome_radius_mm) : 0;
+  const double curvature = 1 / (2 * settings_.dome_radius_mm);
   double lowest = 0;
   for (int i = 0; i < across_; ++i)
     for (int j = 0; j < along_; ++j) {
@@ -236,13 +244,10 @@ std::vector<double> FingerModel::felt(const std::vector<double>& indented,
 
 std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) const {
   FingerPose shaken = pose;
-  if (settings_.with_vibration)
-    shaken.z_mm +=
-        settings_.vibration_mm * same_bits::rough_sine(settings_.vibration_hz * time_s + vibration_phase_);
+  shaken.z_mm +=
+      settings_.vibration_mm * same_bits::rough_sine(settings_.vibration_hz * time_s + vibration_phase_);
   const std::vector<double> depth = indented(shaken), load = felt(depth, across_weight_, along_weight_);
-  const double emi = settings_.with_emi
-                         ? settings_.emi_volts * same_bits::rough_sine(settings_.emi_hz * time_s + emi_phase_)
-                         : 0;
+  const double emi = settings_.emi_volts * same_bits::rough_sine(settings_.emi_hz * time_s + emi_phase_);
   const auto channels = static_cast<std::size_t>(settings_.array.channels);
   std::vector<double> volts(load.size() * channels);
   const auto disturbed = [&](std::size_t k, double drop) {
@@ -260,7 +265,7 @@ std::vector<double> FingerModel::volts(const FingerPose& pose, double time_s) co
   }
   const RandomStream noise(noise_seed_, noise_stream_);
   const auto tick = static_cast<std::uint64_t>(std::llround(std::max(0.0, time_s) * 1e6));
-  for (std::size_t s = 0; settings_.with_noise && s < volts.size(); ++s)
+  for (std::size_t s = 0; settings_.noise_volts > 0 && s < volts.size(); ++s)
     volts[s] += settings_.noise_volts * noise.normal(tick * volts.size() + s);
   return volts;
 }

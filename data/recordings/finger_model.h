@@ -9,8 +9,8 @@
 
 namespace supertac {
 
-/// What the simulated sensor does to the scene. Every term has a switch (with_...); the other numbers say how
-/// strong it is. Defaults resemble the rig's recordings; data/README.md shows what each term changes.
+/// What the simulated sensor does to the scene, and how strongly; without_term() leaves one of its terms out.
+/// Defaults resemble the rig's recordings; data/README.md shows what each term changes.
 struct SimulatorSettings {
   TaxelArray array;  ///< of one channel or three axes; gains and pad are the rig's whatever the array
   double rate_hz = 300;
@@ -21,36 +21,26 @@ struct SimulatorSettings {
 
   bool with_mount = true;       ///< the finger gives way: a bump under one row lifts the other rows
   double mount_stiffness = 15;  ///< cubic mm of indented pad per mm
-  bool with_pad = true;         ///< the elastic pad spreads an indentation to the taxels around it
-  double pad_sigma_mm = 2.27;
-  bool with_dome = true;  ///< the pad is round: it touches an element before a taxel is above it
-  double dome_radius_mm = 47;
-  bool with_edges = true;  ///< beside the plate there is nothing to touch
-  bool with_tilt = true;   ///< the finger's rear rows ride lower
-  double tilt_spread = 0.01;
-  bool with_gains = true;      ///< taxels differ: the outer columns feel most
-  bool with_variation = true;  ///< gain and indentation differ from trial to trial and pass to pass
+  double pad_sigma_mm = 2.27;   ///< the elastic pad spreads an indentation to the taxels around it
+  double dome_radius_mm = 47;   ///< the pad is round: it touches an element before a taxel is above it
+  bool with_edges = true;       ///< beside the plate there is nothing to touch
+  double tilt_spread = 0.01;    ///< the finger's rear rows ride lower
+  bool with_gains = true;       ///< taxels differ: the outer columns feel most
+  bool with_variation = true;   ///< gain and indentation differ from trial to trial and pass to pass
   double gain_spread = 0.4, indentation_spread_mm = 0.5;
-  bool with_vibration = true;  ///< of the printer, in z
-  double vibration_mm = 0.01, vibration_hz = 28;
-  bool with_drift = true;  ///< of the rest voltages
-  double drift_volts_per_s = 4e-4;
-  bool with_emi = true;  ///< mains
-  double emi_volts = 1e-3, emi_hz = 50;
-  bool with_noise = true;
+  double vibration_mm = 0.01, vibration_hz = 28;  ///< of the printer, in z
+  double drift_volts_per_s = 4e-4;                ///< of the rest voltages
+  double emi_volts = 1e-3, emi_hz = 50;           ///< mains
   double noise_volts = 1e-3;
 
-  bool with_adc = true;     ///< the board's converter
-  bool with_filter = true;  ///< moving average over rig::kFilterFrames of the board
-  double filter_s = rig::kFilterS;
-  bool with_saturation = true;  ///< recordings are cut to what the published ones were
-  bool with_jitter = true;      ///< a sample is taken a little off the time it is stamped with
-  double jitter_s = 2e-4;
-  bool with_loss = true;
+  bool with_adc = true;             ///< the board's converter
+  double filter_s = rig::kFilterS;  ///< moving average of the board
+  bool with_saturation = true;      ///< recordings are cut to what the published ones were
+  double jitter_s = 2e-4;           ///< a sample is taken a little off the time it is stamped with
   double lost_fraction = 0.002;
 };
 
-/// Names of the terms ("mount", "pad", ... "loss"), and the settings with one of them switched off.
+/// Names of the terms ("mount", "pad", ... "loss"), and the settings without one of them.
 /// Throws std::invalid_argument for an unknown term, listing the known ones.
 const std::vector<std::string>& simulator_terms();
 SimulatorSettings without_term(SimulatorSettings settings, const std::string& term);

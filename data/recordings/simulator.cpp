@@ -110,7 +110,7 @@ Recording describe(const Plate& plate, const PassSettings& pass, const Simulator
   recording.source = "simulated";
   recording.metadata["seed"] = std::to_string(seed);
   recording.metadata["rate_hz"] = format(settings.rate_hz);
-  recording.metadata["filter_s"] = format(settings.with_filter ? settings.filter_s : 0.0);
+  recording.metadata["filter_s"] = format(settings.filter_s);
   return recording;
 }
 
@@ -127,13 +127,12 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
   // another's.
   const RandomStream timing(seed, 0x7469'6d65ULL + finger.noise_stream());
   const Wander wander(settings.wander, seed, finger.noise_stream());
-  MovingAverage filter(
-      settings.with_filter ? static_cast<int>(std::lround(settings.filter_s * settings.rate_hz)) : 1);
+  MovingAverage filter(static_cast<int>(std::lround(settings.filter_s * settings.rate_hz)));
 
   Recording recording = describe(plate, pass, settings, seed);
   for (std::size_t i = 0; i < frames; ++i) {
     const double stamp = static_cast<double>(i) / settings.rate_hz;
-    const double taken = stamp + (settings.with_jitter ? settings.jitter_s * timing.normal(2 * i) : 0.0);
+    const double taken = stamp + settings.jitter_s * timing.normal(2 * i);
     FingerPose felt = pose_at(taken, pass);
     felt.z_mm += finger.slide_z_mm();
     wander.apply(felt);
@@ -141,7 +140,7 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
     if (settings.with_adc)
       for (double& v : volts) v = rig::volts_of(rig::adc_of(v));
     volts = filter(volts);
-    if (settings.with_loss && timing.uniform(2 * i + 1) < settings.lost_fraction) continue;
+    if (timing.uniform(2 * i + 1) < settings.lost_fraction) continue;
     const FingerPose pose = pose_at(stamp, pass);
     recording.time_s.push_back(stamp);
     for (const double v : volts)

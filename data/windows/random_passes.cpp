@@ -44,7 +44,6 @@ SimulatorSettings finger_of(const RandomPasses& passes, const WindowSettings& wi
   SimulatorSettings s;
   s.array = windows.array.value_or(TaxelArray{});
   s.rate_hz = std::max(kLeastRateHz, windows.rate_hz);
-  s.with_filter = passes.filter_s > 0;
   s.filter_s = passes.filter_s;
   // The board's moving average is over ten times as many samples: what it leaves of noise and of the
   // converter's steps.

@@ -32,7 +32,7 @@ inline Recording slide_of(const Recording& whole) {
 inline Recording full_pass(const std::string& plate, int pass, std::uint64_t seed) {
   SimulatorSettings settings;
   settings.rate_hz = kBoardHz;
-  settings.with_loss = false;
+  settings.lost_fraction = 0;
   return slide_of(simulate_pass(Plate::named(plate), {.pass = pass}, settings, seed));
 }
 

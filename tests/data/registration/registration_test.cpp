@@ -259,7 +259,8 @@ TEST(Registration, RealPasses) {
 Recording slide_in_counts(const TaxelArray& array, const char* plate, double rate_hz, bool filtered) {
   SimulatorSettings settings;
   settings.array = array, settings.rate_hz = rate_hz;
-  settings.with_filter = settings.with_adc = filtered;
+  settings.with_adc = filtered;
+  if (!filtered) settings.filter_s = 0;
   Recording slide = slide_of(simulate_pass(Plate::named(plate), {}, settings, 3));
   restate(slide, {.unit = "counts", .rest = 40, .span = -860});
   return slide;

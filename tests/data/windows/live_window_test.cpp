@@ -157,9 +157,9 @@ TEST(LiveWindow, OneForEveryFrameOfTheBoardWhateverThePhase) {
 
 TEST(LiveWindow, AppliesTheMovingAverageOfTraining) {
   SimulatorSettings filtered;
-  filtered.with_loss = filtered.with_saturation = false;
+  filtered.lost_fraction = 0, filtered.with_saturation = false;
   SimulatorSettings unfiltered = filtered;
-  unfiltered.with_filter = false;
+  unfiltered.filter_s = 0;
   const Plate plate = Plate::named("bumps12");
   const Recording truth = simulate_pass(plate, {.to_mm = 36}, filtered);
   const Recording raw = simulate_pass(plate, {.to_mm = 36}, unfiltered);
