@@ -133,12 +133,9 @@ Json trace(const SuperTac& model, const Tensor& input, std::vector<Array>& array
 
 // The maps of the network as programs draw it, prepared: the same numbers up to rounding, or in whole
 // numbers.
-Estimate draw(const ModelFile& file, bool in_int8, const Tensor& input, std::vector<Array>& arrays) {
-  if (in_int8 && !file.ranges)
-    throw std::runtime_error("--precision int8: the model's file holds no ranges; train it again");
-  const Prepared prepared = in_int8 ? Prepared(*file.model, *file.ranges) : Prepared(*file.model);
+Estimate draw(const ModelFile& file, Precision precision, const Tensor& input, std::vector<Array>& arrays) {
   std::size_t count = 0;
-  return prepared.watched(input, [&](const std::string& step, const Tensor& map) {
+  return prepared(file, precision).watched(input, [&](const std::string& step, const Tensor& map) {
     arrays.push_back(array("drawn." + std::to_string(1000 + count++).substr(1) + "." + step, map));
   });
 }
@@ -236,7 +233,7 @@ int run(Arguments& a) {
                             array("scaled", {t, s}, scaled)};
   arrays.push_back(array("input", input));
   const Json steps = trace(*file.model, input, arrays);
-  const Estimate drawn = draw(file, a.choice("precision", {"fp32", "int8"}) == "int8", input, arrays);
+  const Estimate drawn = draw(file, precision_of(a.choice("precision", {"fp32", "int8"})), input, arrays);
   arrays.push_back(array("picture", drawn.picture));
   if (drawn.predicted_error.defined()) arrays.push_back(array("predicted_error", drawn.predicted_error));
 

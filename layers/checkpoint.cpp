@@ -87,6 +87,12 @@ void write_checkpoint(const OutputPath& output, const std::vector<Parameter>& pa
 
 SafetensorsFile read_checkpoint(const std::string& path) {
   SafetensorsFile file = SafetensorsFile::read(path);
+  check_checkpoint(file);
+  return file;
+}
+
+void check_checkpoint(const SafetensorsFile& file) {
+  const std::string& path = file.path();
   const auto format = file.metadata().find("format");
   if (format == file.metadata().end() || format->second != "supertac-checkpoint") {
     throw std::runtime_error(path + ": not a SuperTac checkpoint: metadata \"format\" is " +
@@ -99,7 +105,6 @@ SafetensorsFile read_checkpoint(const std::string& path) {
     throw std::runtime_error(path + ": checkpoint version \"" + text + "\", this program reads 1 to " +
                              std::to_string(kCheckpointVersion) + "; use a newer SuperTac");
   }
-  return file;
 }
 
 void load_parameters(const SafetensorsFile& file, const std::string& path,

@@ -34,6 +34,8 @@ void write_checkpoint(const OutputPath& output, const std::vector<Parameter>& pa
 
 /// Reads and checks format and version. Throws std::runtime_error naming path, expected and found.
 SafetensorsFile read_checkpoint(const std::string& path);
+/// The same of a file that has been read.
+void check_checkpoint(const SafetensorsFile& file);
 
 /// Fills the parameters from the file. Other tensors are allowed when their names begin with one of `beside`.
 /// Throws std::runtime_error that lists every missing, unexpected and mismatching tensor at once; then

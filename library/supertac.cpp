@@ -1,9 +1,5 @@
 #include "library/supertac.h"
 
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -74,37 +70,12 @@ void expect_within(const char* what, double found, double least, double most) {
                               ", got " + format(found));
 }
 
-supertac_model* opened(const std::string& path, int precision) {
+supertac_model* opened(ModelFile file, int precision) {
   expect(precision == SUPERTAC_FP32 || precision == SUPERTAC_INT8,
          "precision: expected SUPERTAC_FP32 or SUPERTAC_INT8");
-  ModelFile file = load_model(path);
-  if (precision == SUPERTAC_INT8 && !file.ranges)
-    throw std::runtime_error(path + ": saved without the ranges that SUPERTAC_INT8 needs; train it anew");
-  Prepared prepared =
-      precision == SUPERTAC_INT8 ? Prepared(*file.model, *file.ranges) : Prepared(*file.model);
-  return new supertac_model{std::move(file), std::move(prepared)};
+  Prepared ready = prepared(file, precision == SUPERTAC_INT8 ? Precision::int8 : Precision::fp32);
+  return new supertac_model{std::move(file), std::move(ready)};
 }
-
-// A file without a name, which ends with this.
-class MemoryFile {
- public:
-  MemoryFile(const void* bytes, std::size_t size) : file_(memfd_create("supertac", MFD_CLOEXEC)) {
-    expect(file_ >= 0, "model in memory: the system gives no file in memory");
-    const char* from = static_cast<const char*>(bytes);
-    while (size > 0) {
-      const ssize_t written = write(file_, from, size);
-      if (written <= 0) close(file_), throw std::bad_alloc();
-      from += written, size -= static_cast<std::size_t>(written);
-    }
-  }
-  ~MemoryFile() { close(file_); }
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
-  std::string path() const { return "/proc/self/fd/" + std::to_string(file_); }
-
- private:
-  int file_;
-};
 
 // Windows in the sensor's unit to what the network takes.
 void scale(const ModelFile& file, std::span<float> windows) {
@@ -134,22 +105,15 @@ const char* supertac_error(void) { return last_error.c_str(); }
 supertac_model* supertac_open(const char* path, int precision) {
   return guarded<supertac_model*>(nullptr, [&] {
     expect(path != nullptr, "supertac_open: path is NULL");
-    return opened(path, precision);
+    return opened(load_model(path), precision);
   });
 }
 
 supertac_model* supertac_open_memory(const void* bytes, std::size_t size, int precision) {
   return guarded<supertac_model*>(nullptr, [&] {
     expect(bytes != nullptr, "supertac_open_memory: bytes is NULL");
-    const MemoryFile file(bytes, size);
-    try {
-      return opened(file.path(), precision);
-    } catch (const std::exception& error) {
-      std::string text = error.what();
-      for (std::size_t at = text.find(file.path()); at != std::string::npos; at = text.find(file.path()))
-        text.replace(at, file.path().size(), "model in memory");
-      throw std::runtime_error(text);
-    }
+    const std::span file(static_cast<const std::byte*>(bytes), size);
+    return opened(model_of(SafetensorsFile::of(file, "model in memory")), precision);
   });
 }
 

@@ -22,20 +22,22 @@ using namespace safetensors;
   throw FileError(path, "not a safetensors file that can be read: " + problem);
 }
 
-std::uint64_t read_header_length(FileReader& reader) {
-  if (reader.size() < 8) {
-    refuse(reader.path(),
-           "has " + std::to_string(reader.size()) + " bytes, expected at least 8; is it complete?");
+// Fills a span with the next bytes of the file.
+using Take = std::function<void(std::span<std::byte>)>;
+
+std::uint64_t take_header_length(const std::string& path, std::uint64_t size, const Take& take) {
+  if (size < 8) {
+    refuse(path, "has " + std::to_string(size) + " bytes, expected at least 8; is it complete?");
   }
   std::uint64_t length = 0;
-  reader.read(std::as_writable_bytes(std::span(&length, 1)));
+  take(std::as_writable_bytes(std::span(&length, 1)));
   if (length > kMaxHeaderBytes) {
-    refuse(reader.path(), "header length " + std::to_string(length) + ", expected at most " +
-                              std::to_string(kMaxHeaderBytes) + "; is it the right kind of file?");
+    refuse(path, "header length " + std::to_string(length) + ", expected at most " +
+                     std::to_string(kMaxHeaderBytes) + "; is it the right kind of file?");
   }
-  if (length > reader.size() - 8) {
-    refuse(reader.path(), "header length " + std::to_string(length) + ", but only " +
-                              std::to_string(reader.size() - 8) + " bytes follow; it is cut short");
+  if (length > size - 8) {
+    refuse(path, "header length " + std::to_string(length) + ", but only " + std::to_string(size - 8) +
+                     " bytes follow; it is cut short");
   }
   return length;
 }
@@ -158,8 +160,19 @@ void check_writable(const std::map<std::string, std::string>& metadata,
 
 SafetensorsFile SafetensorsFile::read(const std::string& path) {
   FileReader reader(path);
-  std::string text(read_header_length(reader), ' ');
-  reader.read(std::as_writable_bytes(std::span(text)));
+  return parsed(path, reader.size(), [&](std::span<std::byte> to) { reader.read(to); });
+}
+
+SafetensorsFile SafetensorsFile::of(std::span<const std::byte> bytes, const std::string& name) {
+  return parsed(name, bytes.size(), [&](std::span<std::byte> to) {
+    std::ranges::copy(bytes.first(to.size()), to.begin());
+    bytes = bytes.subspan(to.size());
+  });
+}
+
+SafetensorsFile SafetensorsFile::parsed(const std::string& path, std::uint64_t size, const Take& take) {
+  std::string text(take_header_length(path, size, take), ' ');
+  take(std::as_writable_bytes(std::span(text)));
   Header header;
   try {
     header = parse_header(text);
@@ -167,13 +180,13 @@ SafetensorsFile SafetensorsFile::read(const std::string& path) {
     refuse(path, std::string("header: ") + error.what());
   }
   check_version(path, header.metadata);
-  const std::uint64_t data_bytes = reader.size() - 8 - text.size();
+  const std::uint64_t data_bytes = size - 8 - text.size();
   check_layout(path, header.tensors, data_bytes);
 
   SafetensorsFile file;
   file.path_ = path;
   file.data_.resize(data_bytes);
-  reader.read(file.data_);
+  take(file.data_);
   file.checksum_ = check_checksum(path, header, std::move(text), file.data_);
   if (file.checksum_ == ChecksumState::ok) {
     header.metadata.erase(kFormatKey);

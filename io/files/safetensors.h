@@ -36,6 +36,8 @@ class SafetensorsFile {
   /// both. No size is believed before it has been compared with the bytes the file has. A hostile header
   /// costs less than 10 ms.
   static SafetensorsFile read(const std::string& path);
+  /// The same of a file that is in memory; `name` stands for its path.
+  static SafetensorsFile of(std::span<const std::byte> bytes, const std::string& name);
 
   const std::string& path() const { return path_; }
   /// Without the two fields of this layer.
@@ -51,6 +53,8 @@ class SafetensorsFile {
   std::vector<double> f64(const std::string& name) const;
 
  private:
+  static SafetensorsFile parsed(const std::string& path, std::uint64_t size,
+                                const std::function<void(std::span<std::byte>)>& take);
   const TensorInfo& info(const std::string& name) const;
   template <class Element>
   std::vector<Element> elements(const std::string& name, const char* dtype) const;

@@ -157,8 +157,11 @@ void set_array(SuperTacSettings& settings, const TaxelArray& array) {
   settings.in_channels = array.channels;
 }
 
-ModelFile load_model(const std::string& path) {
-  const SafetensorsFile file = read_checkpoint(path);
+ModelFile load_model(const std::string& path) { return model_of(SafetensorsFile::read(path)); }
+
+ModelFile model_of(const SafetensorsFile& file) {
+  const std::string& path = file.path();
+  check_checkpoint(file);
   refuse_other_kinds(file, path);
   const SuperTacSettings settings = read_settings({file.metadata(), path, "settings"});
   ModelFile loaded;
@@ -205,19 +208,17 @@ Precision precision_of(const std::string& name, std::span<const ModelFile> files
 
 std::string name_of(Precision precision) { return precision == Precision::int8 ? "int8" : "fp32"; }
 
+Prepared prepared(const ModelFile& file, Precision precision) {
+  if (precision == Precision::fp32) return Prepared(*file.model);
+  if (file.ranges) return Prepared(*file.model, *file.ranges);
+  throw std::runtime_error(
+      "the model was saved without the ranges of its values, which precision int8 "
+      "needs; train it anew with this version, or take precision fp32");
+}
+
 Ensemble ensemble_of(std::span<const ModelFile> files, Precision precision) {
   std::vector<Prepared> members;
-  for (const ModelFile& file : files) {
-    if (precision == Precision::fp32) {
-      members.emplace_back(*file.model);
-    } else if (file.ranges) {
-      members.emplace_back(*file.model, *file.ranges);
-    } else {
-      throw std::runtime_error(
-          "the model was saved without the ranges of its values, which precision int8 "
-          "needs; train it anew with this version, or take precision fp32");
-    }
-  }
+  for (const ModelFile& file : files) members.push_back(prepared(file, precision));
   return Ensemble(std::move(members));
 }
 

@@ -59,6 +59,8 @@ void set_array(SuperTacSettings& settings, const TaxelArray& array);
 /// Builds the model that the metadata describes, after checking every setting's range, and fills it.
 /// Throws std::runtime_error naming path, what was expected and found.
 ModelFile load_model(const std::string& path);
+/// The same of a file that has been read.
+ModelFile model_of(const SafetensorsFile& file);
 
 /// The models of an ensemble. Throws std::runtime_error, as load_model, and naming the file that differs from
 /// the first in what it takes, draws or predicts.
@@ -74,8 +76,9 @@ enum class Precision {
 Precision precision_of(const std::string& name, std::span<const ModelFile> files = {});
 std::string name_of(Precision precision);
 
-/// Of the models of these files, which must outlive it. Throws as Ensemble, and std::runtime_error when one
-/// has no ranges for int8.
+/// The model of a file, and the ensemble of several, which must outlive what draws with them. Throw as
+/// Prepared and Ensemble, and std::runtime_error when a file has no ranges for int8.
+Prepared prepared(const ModelFile& file, Precision precision);
 Ensemble ensemble_of(std::span<const ModelFile> files, Precision precision = Precision::fp32);
 
 /// Writes parameters and metadata. Throws FileError.
