@@ -1,10 +1,11 @@
 #include "models/inference/evaluation.h"
 
 #include <algorithm>
-#include <exception>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "io/numbers/parallel.h"
 
 namespace supertac {
 namespace {
@@ -15,7 +16,6 @@ struct Part {
   std::size_t first;
   Tensor inputs, outputs, targets;
   std::vector<float> predicted_errors;
-  std::exception_ptr error;
 };
 
 void compute(const Ensemble& network, const WindowSet& data, std::span<const std::uint32_t> indices,
@@ -60,21 +60,14 @@ void for_each_output(const Ensemble& network, const WindowSet& data, std::span<c
       const auto count = static_cast<Dim>(std::min(batch, end - first));
       const Shape pictures = network.first().picture_shape(count);
       parts.push_back(
-          {first, Tensor(network.first().input_shape(count)), Tensor(pictures), Tensor(pictures), {}, {}});
+          {first, Tensor(network.first().input_shape(count)), Tensor(pictures), Tensor(pictures), {}});
     }
-#pragma omp parallel for schedule(static, 1)
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-      try {
-        const auto count = static_cast<std::size_t>(parts[i].inputs.dim(0));
-        compute(network, data, indices.subspan(parts[i].first, count), parts[i]);
-      } catch (...) {  // an exception must not leave a thread
-        parts[i].error = std::current_exception();
-      }
-    }
-    for (const Part& p : parts) {
-      if (p.error) std::rethrow_exception(p.error);
+    parallel_for(parts.size(), [&](std::size_t i) {
+      const auto count = static_cast<std::size_t>(parts[i].inputs.dim(0));
+      compute(network, data, indices.subspan(parts[i].first, count), parts[i]);
+    });
+    for (const Part& p : parts)
       if (!use({p.first, p.inputs, p.outputs, p.targets, p.predicted_errors})) return;
-    }
   }
 }
 
