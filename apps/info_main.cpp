@@ -62,10 +62,7 @@ nlohmann::ordered_json card(const SafetensorsFile& file, const std::string& kind
 }
 
 void print_row(const Arguments& arguments, const std::string& name, const std::string& value) {
-  constexpr std::size_t kColumn = 28;
-  const std::string shown = printable(name);
-  arguments.print(shown + std::string(shown.size() < kColumn ? kColumn - shown.size() : 1, ' ') +
-                  printable(value, 200));
+  arguments.print(left_aligned(printable(name), 28) + printable(value, 200));
 }
 
 std::string text_of(const nlohmann::ordered_json& value) {

@@ -32,8 +32,7 @@ void print_help() {
   std::cout << "Tactile super-resolution: one program per job.\n\nUsage:\n  supertac JOB [options]\n"
                "  supertac help JOB\n  supertac help glossary   explains taxel, window, latent, SSIM and the "
                "others\n\n";
-  for (const Job& job : kJobs)
-    std::cout << "  " << job.name << std::string(12 - job.name.size(), ' ') << job.purpose << '\n';
+  for (const Job& job : kJobs) std::cout << "  " << left_aligned(job.name, 12) << job.purpose << '\n';
 }
 
 int fail(const std::string& problem, int code) {

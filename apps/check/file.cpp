@@ -39,8 +39,7 @@ int check_file(const Arguments& a) {
   a.print("content    " + result["content"].get<std::string>());
   if (provenance.empty()) a.print("provenance none: made by another program or an older version");
   for (const auto& [key, value] : provenance.items()) {
-    if (key != "parents")
-      a.print(key + std::string(key.size() < 11 ? 11 - key.size() : 1, ' ') + value.get<std::string>());
+    if (key != "parents") a.print(left_aligned(key, 11) + value.get<std::string>());
   }
   const Json parents = provenance.value("parents", Json::object());
   for (const auto& [name, hash] : parents.items())

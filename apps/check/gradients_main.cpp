@@ -8,6 +8,7 @@
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 
@@ -30,10 +31,6 @@ Json to_json(const GradientEntry& e) {
           {"relative_error", e.relative_error}};
 }
 
-std::string column(const std::string& text, std::size_t width) {
-  return text + std::string(text.size() < width ? width - text.size() : 1, ' ');
-}
-
 std::string short_text(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g", value);
@@ -45,8 +42,8 @@ std::string text_of(const GradientEntry& e) {
 }
 
 void print_row(const Arguments& a, const CheckedGradients& c) {
-  a.print(column(c.kind, 7) + column(c.name, 26) + column(std::to_string(c.entries), 9) +
-          column(short_text(c.worst.relative_error), 10) + (c.wrong() ? "WRONG  " : "ok     ") +
+  a.print(left_aligned(c.kind, 7) + left_aligned(c.name, 26) + left_aligned(std::to_string(c.entries), 9) +
+          left_aligned(short_text(c.worst.relative_error), 10) + (c.wrong() ? "WRONG  " : "ok     ") +
           text_of(c.worst));
 }
 
@@ -54,8 +51,8 @@ int check_all(const Arguments& a) {
   std::vector<GradientCase> cases = op_cases();
   for (const auto& more : {layer_cases(), loss_cases()}) cases.insert(cases.end(), more.begin(), more.end());
   const auto begin = std::chrono::steady_clock::now();
-  a.print(column("kind", 7) + column("name", 26) + column("entries", 9) + column("error", 10) +
-          "       worst entry");
+  a.print(left_aligned("kind", 7) + left_aligned("name", 26) + left_aligned("entries", 9) +
+          left_aligned("error", 10) + "       worst entry");
   Json rows = Json::array();
   std::size_t wrong = 0;
   Dim entries = 0;
@@ -103,7 +100,7 @@ void plant(const Arguments& a, const Plant& p, const std::string& input,
   const bool found = wrong.size() == 1 && wrong.front().name == p.op;
   ++tally.planted;
   tally.found += found;
-  a.print(column(input, 36) + column(name_of(p.kind), 8) +
+  a.print(left_aligned(input, 36) + left_aligned(name_of(p.kind), 8) +
           (found ? "found: " + text_of(wrong.front().worst)
                  : "NOT FOUND, " + std::to_string(wrong.size()) + " rows wrong"));
   Json row = {{"op", p.op}, {"input", input}, {"error", name_of(p.kind)}, {"found", found}};

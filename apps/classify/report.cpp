@@ -3,34 +3,29 @@
 #include <numeric>
 
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
 
-std::string cell(const std::string& text, std::size_t width) {
-  return std::string(text.size() < width ? width - text.size() : 0, ' ') + text;
-}
-std::string per_cent(double share, std::size_t width = 7) { return cell(format(100 * share, 1), width); }
-std::string label(const std::string& text, std::size_t width) {
-  return text + std::string(text.size() < width ? width - text.size() : 1, ' ');
-}
+std::string per_cent(double share, std::size_t width) { return right_aligned(format(100 * share, 1), width); }
 std::string range(const Interval& i) {
-  return cell(format(100 * i.low, 1) + "-" + format(100 * i.high, 1), 12);
+  return right_aligned(format(100 * i.low, 1) + "-" + format(100 * i.high, 1), 12);
 }
 
 constexpr std::size_t kName = 16, kColumn = 11;
 
 void add_confusion(std::vector<std::string>& lines, const ViewResult& result,
                    const std::vector<std::string>& names) {
-  std::string head = label(result.view.name(), kName);
-  for (const std::string& name : names) head += cell(name, kColumn);
+  std::string head = left_aligned(result.view.name(), kName);
+  for (const std::string& name : names) head += right_aligned(name, kColumn);
   lines.push_back(head);
   const auto classes = static_cast<std::int32_t>(names.size());
   for (std::int32_t row = 0; row < classes; ++row) {
     double total = 0;
     for (std::int32_t c = 0; c < classes; ++c)
       total += static_cast<double>(result.parts.front().count(row, c));
-    std::string line = label("  " + names[static_cast<std::size_t>(row)], kName);
+    std::string line = left_aligned("  " + names[static_cast<std::size_t>(row)], kName);
     for (std::int32_t c = 0; c < classes; ++c)
       line += per_cent(static_cast<double>(result.parts.front().count(row, c)) / total, kColumn);
     lines.push_back(line);
@@ -97,16 +92,16 @@ std::vector<std::string> tables(const std::vector<ViewResult>& results,
                                 const std::vector<std::string>& names) {
   std::string head(kName, ' '), columns = head;
   for (const char* part : kParts) {
-    head += "  |- " + label(std::string(part) + " ", 24) + "|";
+    head += "  |- " + left_aligned(std::string(part) + " ", 24) + "|";
     columns += "   right   95 % passes      p";
   }
   std::vector<std::string> lines{head, columns};
   for (const ViewResult& r : results) {
-    std::string line = label(r.view.name(), kName);
+    std::string line = left_aligned(r.view.name(), kName);
     for (std::size_t p = 0; p < r.parts.size(); ++p) {
       const bool first = &r == &results.front();
       line += per_cent(r.parts[p].accuracy(), 8) + "  " + range(r.parts[p].interval()) +
-              cell(first ? "-" : format(r.parts[p].p_against(results.front().parts[p]), 4), 7);
+              right_aligned(first ? "-" : format(r.parts[p].p_against(results.front().parts[p]), 4), 7);
     }
     lines.push_back(line);
   }

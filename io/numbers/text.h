@@ -17,6 +17,10 @@ std::string printable(std::string_view text, std::size_t longest = 60);
 /// printable() in single quotes.
 std::string in_quotes(std::string_view text);
 
+/// With blanks behind the text, one at least, or before it, up to a width.
+std::string left_aligned(std::string_view text, std::size_t width);
+std::string right_aligned(std::string_view text, std::size_t width);
+
 /// Without blanks, tabs and carriage returns at either end.
 std::string_view trimmed(std::string_view text);
 
