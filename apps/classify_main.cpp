@@ -112,8 +112,9 @@ int run(Arguments& a) {
   const std::vector<std::string> classes = classes_of(windows);
   std::vector<Exam> exams;
   for (const Candidate& model : models) exams.push_back(make_exam(windows, model, classes, stride));
-  a.note("split " + models.front().split + ": " + std::to_string(exams.front().train.size()) +
-         " training windows, " + std::to_string(exams.front().test.size()) + " test windows");
+  const std::string split = name_of(models.front().recipe.split);
+  a.note("split " + split + ": " + std::to_string(exams.front().train.size()) + " training windows, " +
+         std::to_string(exams.front().test.size()) + " test windows");
 
   const Answers given = all_answers(a, views, models, exams, windows, classes, settings);
   const auto results = count(given, views, exams, windows);
@@ -125,7 +126,7 @@ int run(Arguments& a) {
   a.write_json({{"command", a.command_line()},
                 {"commit", commit()},
                 {"data", windows.fingerprint()},
-                {"split", models.front().split},
+                {"split", split},
                 {"frames", frames},
                 {"runs", given.size() / views.size()},
                 {"views", to_json(results, classes)}});

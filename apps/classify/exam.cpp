@@ -6,43 +6,20 @@
 #include <utility>
 
 #include "data/windows/split.h"
-#include "io/numbers/numbers.h"
-#include "io/numbers/text.h"
 
 namespace supertac {
-namespace {
-
-std::string metadata_of(const ModelFile& file, const std::string& path, const std::string& key) {
-  const auto found = file.metadata.find(key);
-  if (found != file.metadata.end()) return found->second;
-  throw std::runtime_error(
-      path + ": metadata \"" + key +
-      "\" is missing, so it is unknown what the model was trained on; train it anew with "
-      "supertac-train");
-}
-
-std::int64_t number_of(const ModelFile& file, const std::string& path, const std::string& key) {
-  const std::string text = metadata_of(file, path, key);
-  if (const auto number = parse_int(text); number && *number >= 0) return *number;
-  throw std::runtime_error(path + ": metadata \"" + key + "\" must be a whole number, found " + text);
-}
-
-}  // namespace
-
 std::vector<Candidate> load_candidates(const std::vector<std::string>& paths) {
   std::vector<Candidate> all;
   for (const std::string& path : paths) {
     ModelFile file = load_model(path);
-    const std::string split = metadata_of(file, path, "split");
-    const auto seed = static_cast<std::uint64_t>(number_of(file, path, "seed"));
-    all.push_back({path, split, seed, std::move(file)});
+    const Recipe recipe = Recipe::of(file, path);
+    all.push_back({path, recipe, std::move(file)});
     const Candidate &first = all.front(), &last = all.back();
-    if (split_kind(split) == SplitKind::none) {
+    if (recipe.split == SplitKind::none) {
       throw std::runtime_error(path + ": was trained on all windows (split none), so none is left to test");
     }
     for (const char* key : {"input", "settings", "split", "stride"}) {
-      const std::string ours = metadata_of(last.file, path, key),
-                        theirs = metadata_of(first.file, first.path, key);
+      const std::string ours = value_or(last.file.metadata, key), theirs = value_or(first.file.metadata, key);
       if (ours != theirs) {
         throw std::runtime_error(path + ": its " + key + " is " + ours + ", that of " + first.path + " is " +
                                  theirs + "; give models that differ in their seeds only");
@@ -53,10 +30,9 @@ std::vector<Candidate> load_candidates(const std::vector<std::string>& paths) {
 }
 
 WindowSet exam_windows(const std::string& folder, std::vector<std::string> plates, const Candidate& first) {
-  const ModelFile& file = first.file;
-  WindowSettings w = file.windows();
-  w.stride = static_cast<int>(number_of(file, first.path, "stride"));
-  if (plates.empty()) plates = comma_list(metadata_of(file, first.path, "plates"));
+  WindowSettings w = first.file.windows();
+  w.stride = static_cast<int>(first.recipe.stride);
+  if (plates.empty()) plates = first.recipe.plates;
   return WindowSet::load(folder, plates, w);
 }
 
@@ -72,11 +48,10 @@ std::vector<std::string> classes_of(const WindowSet& windows) {
 
 Exam make_exam(const WindowSet& windows, const Candidate& model, const std::vector<std::string>& classes,
                std::int64_t stride) {
-  const SplitKind kind = split_kind(model.split);
-  Split split = make_split(windows, kind, model.seed);
+  const SplitKind kind = model.recipe.split;
+  Split split = make_split(windows, kind, model.recipe.seed);
   // Trials are what they are; other splits are drawn from the windows there are.
-  if (kind != SplitKind::trial &&
-      fingerprint(split) != metadata_of(model.file, model.path, "split_fingerprint")) {
+  if (kind != SplitKind::trial && fingerprint(split) != value_or(model.file.metadata, "split_fingerprint")) {
     throw std::runtime_error(model.path +
                              ": its split cannot be repeated on this data, and it may have seen the test "
                              "windows; give the recordings and plates it was trained on");

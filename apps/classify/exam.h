@@ -8,6 +8,7 @@
 
 #include "data/windows/windows.h"
 #include "models/files/model_file.h"
+#include "models/training/recipe.h"
 
 namespace supertac {
 
@@ -27,10 +28,10 @@ enum class Part {
 };
 inline constexpr const char* kParts[] = {"inside", "contact", "all"};
 
-/// A model, and the split it was trained with.
+/// A model, and what it was trained with.
 struct Candidate {
-  std::string path, split;
-  std::uint64_t seed = 0;  ///< of the split
+  std::string path;
+  Recipe recipe;
   ModelFile file;
 };
 
