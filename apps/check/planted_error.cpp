@@ -28,16 +28,8 @@ void spoil(Plant::Kind kind, Tensor& added) {
 }  // namespace
 
 std::string name_of(Plant::Kind kind) {
-  switch (kind) {
-    case Plant::Kind::sign:
-      return "sign";
-    case Plant::Kind::factor:
-      return "factor";
-    case Plant::Kind::term:
-      return "term";
-    default:
-      return "index";
-  }
+  static constexpr const char* kNames[] = {"sign", "factor", "term", "index"};
+  return kNames[static_cast<std::size_t>(kind)];
 }
 
 void PlantedError::reverse(const char* op, std::size_t inputs, Backward& b,

@@ -130,9 +130,7 @@ void WindowSet::add_directory(const std::string& dir, const std::vector<std::str
 }
 
 WindowSet::WindowSet(const WindowSettings& settings)
-    : settings_((check(settings), settings)), file_(std::make_shared<ScratchFile>()) {
-  array().check();
-}
+    : settings_((check(settings), settings)), file_(std::make_shared<ScratchFile>()) {}
 
 std::size_t WindowSet::plate_index(const Recording& recording, const std::string& folder) {
   const bool measured = !recording.truth.empty();
