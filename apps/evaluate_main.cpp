@@ -7,8 +7,8 @@
 #include "apps/common/output/remarks.h"
 #include "apps/common/running/measure.h"
 #include "apps/common/running/progress.h"
+#include "apps/evaluate/distance_scores.h"
 #include "apps/evaluate/exports.h"
-#include "apps/evaluate/felt.h"
 #include "apps/evaluate/page.h"
 #include "apps/evaluate/scoring.h"
 #include "apps/evaluate/trust.h"
@@ -37,21 +37,21 @@ WindowSet load_windows(const Arguments& a, const ModelFile& file) {
 std::string row(const std::string& name, const ZoneMetrics& metrics, const Latency& latency) {
   const Metrics c = metrics.contact(), all = metrics.all();
   const auto number = [](double value, int decimals) {
-    return cell(std::isfinite(value) ? format(value, decimals) : "-", 9);
+    return right_aligned(std::isfinite(value) ? format(value, decimals) : "-", 9);
   };
-  return name + std::string(name.size() < 12 ? 12 - name.size() : 0, ' ') + number(c.ssim, 3) +
-         number(c.psnr_mean_db, 2) + number(c.position_error_mm, 2) + number(all.ssim, 3) +
-         number(all.psnr_mean_db, 2) + number(latency.median_us, 1);
+  return left_aligned(name, 12) + number(c.ssim, 3) + number(c.psnr_mean_db, 2) +
+         number(c.position_error_mm, 2) + number(all.ssim, 3) + number(all.psnr_mean_db, 2) +
+         number(latency.median_us, 1);
 }
 
 /// The scores of the network and of every baseline over the same windows.
 struct RecordingScores {
   RecordingScores(const WindowSet& windows, const ModelFile& model, std::size_t methods)
-      : felt(windows), trust(windows, model) {
+      : by_distance(windows), trust(windows, model) {
     for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
   }
   std::vector<ZoneMetrics> of_method;
-  FeltScores felt;
+  DistanceScores by_distance;
   TrustScores trust;
 };
 
@@ -63,7 +63,7 @@ RecordingScores score_all(const Arguments& a, const Ensemble& network, const Mod
     const Zone zone = windows.zone(d.example);
     for (std::size_t m = 0; m < d.pictures.size(); ++m)
       scores.of_method[m].add(d.pictures[m], d.target, zone);
-    scores.felt.add(d.example, d.pictures[0], d.target);
+    scores.by_distance.add(d.example, d.pictures[0], d.target);
     scores.trust.add(d);
     if (page != nullptr) page->add(d);
     if (outputs != nullptr) outputs->add(d.input, d.pictures[0], d.target, d.predicted_error);
@@ -92,7 +92,7 @@ nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const
                               const RecordingScores& scores) {
   const ZoneMetrics& own = scores.of_method.front();
   nlohmann::ordered_json result = own.to_json();
-  result["felt"] = scores.felt.to_json();
+  result["felt"] = scores.by_distance.to_json();
   result["trust"] = scores.trust.to_json();
   a.print("split " + tested.split_name + ", seed " + std::to_string(tested.seed) + ", " +
           std::to_string(own.all().windows) + " windows, " + std::to_string(own.contact().windows) +
@@ -112,7 +112,7 @@ nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const
     result["baselines"][name] = scores.of_method[k + 1].to_json();
   }
   for (const std::string& line : silence_lines(own)) a.print(line);
-  for (const std::string& line : scores.felt.lines()) a.print(line);
+  for (const std::string& line : scores.by_distance.lines()) a.print(line);
   for (const std::string& line : scores.trust.lines()) a.print(line);
   result["latency"] = latencies;
   result["model"] = a.text("model");

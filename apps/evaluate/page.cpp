@@ -76,14 +76,14 @@ std::string by_zone(const nlohmann::ordered_json& result) {
       page_table({"zone", "windows", "SSIM", "PSNR dB", "ghosts %", "misses %"}, rows));
 }
 
-std::string by_way(const nlohmann::ordered_json& felt) {
+std::string by_distance(const nlohmann::ordered_json& parts) {
   ChartSeries series{.name = "network", .points = {}, .dots = true};
-  for (const auto& part : felt) {
+  for (const auto& part : parts) {
     series.points.emplace_back(part["from_mm"].get<double>(), part["ssim"].get<double>());
     series.labels.push_back(std::to_string(part["windows"].get<long>()) + " windows");
   }
   return page_section(
-      "By way since the first contact",
+      "By distance since the first contact",
       "a texture cannot be known before its second element is under the array; contact windows",
       chart_svg("Contact SSIM", {.label = "slid over the texture, mm", .least = 0},
                 {.label = "SSIM", .most = 1}, {series}));
@@ -264,7 +264,7 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
                         std::to_string(result["contact"]["windows"].get<long>()) + " in contact</p>";
   content +=
       by_method(result) + "<div class=\"two\">" + by_plate() + by_zone(result) + "</div>" +
-      by_way(result["felt"]) +
+      by_distance(result["felt"]) +
       shown("The worst windows", "in contact, by SSIM; no two within 3 mm of one pass", worst, pictures) +
       shown("The best windows", "of those with texture on a quarter of the picture", best, pictures);
   content += page_section(

@@ -15,9 +15,9 @@
 
 namespace supertac {
 
-/// Scores beside those of the baselines, by plate, zone and way since the first contact; the twelve worst
-/// windows in contact, and the twelve best of those with texture on a quarter of the picture, no two of them
-/// within 3 mm of one pass; a film of each pass; and what made it all.
+/// Scores beside those of the baselines, by plate, zone and distance since the first contact; the twelve
+/// worst windows in contact, and the twelve best of those with texture on a quarter of the picture, no two of
+/// them within 3 mm of one pass; a film of each pass; and what made it all.
 class EvaluationPage {
  public:
   explicit EvaluationPage(const WindowSet& windows) : windows_(windows) {}

@@ -102,8 +102,4 @@ void draw_all(const Arguments& a, const Ensemble& network, const WindowSet& wind
   stop_if_interrupted();
 }
 
-std::string cell(const std::string& text, std::size_t width) {
-  return std::string(text.size() < width ? width - text.size() : 0, ' ') + text;
-}
-
 }  // namespace supertac

@@ -44,7 +44,4 @@ void draw_all(const Arguments& a, const Ensemble& network, const WindowSet& wind
               std::span<const std::uint32_t> test, const Baselines& baselines,
               const std::function<void(const Drawn&)>& use);
 
-/// " " before the text, up to a width.
-std::string cell(const std::string& text, std::size_t width);
-
 }  // namespace supertac

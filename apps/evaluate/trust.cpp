@@ -35,7 +35,7 @@ void TrustScores::add(const Drawn& drawn) {
   if (pass != in_contact_of_) in_contact_of_ = pass, begin_mm_ = y;
   const ImageGrid grid = windows_.image();
   contact_.push_back(
-      {doubt_of(output, predicted_error, grid), mean_of(predicted_error),
+      {expected_ssim_loss(output, predicted_error, grid), mean_of(predicted_error),
        ssim(output, truth, static_cast<std::size_t>(grid.height), static_cast<std::size_t>(grid.width)),
        std::abs(y - begin_mm_)});
 }
@@ -68,7 +68,7 @@ double TrustScores::ssim_of_surest(double share) const {
 double TrustScores::width(double from_mm, double to_mm) const {
   double sum = 0, count = 0;
   for (const Window& w : contact_)
-    if (w.felt_mm >= from_mm && w.felt_mm < to_mm) sum += w.predicted_error, ++count;
+    if (w.slid_mm >= from_mm && w.slid_mm < to_mm) sum += w.predicted_error, ++count;
   return count > 0 ? sum / count : Metrics::kNone;
 }
 

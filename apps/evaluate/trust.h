@@ -29,7 +29,7 @@ class TrustScores {
 
  private:
   struct Window {
-    double doubt, predicted_error, ssim, felt_mm;
+    double doubt, predicted_error, ssim, slid_mm;
   };
   double auroc() const;
   double ssim_of_surest(double share) const;

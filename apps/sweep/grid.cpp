@@ -51,7 +51,7 @@ std::string model_name_of(const Recipe& recipe) {
          part("_c", m.channels) + part("_r", m.rcabs) + "_s" + std::to_string(recipe.seed);
 }
 
-std::vector<std::string> names_of(const std::vector<Recipe>& grid) {
+std::vector<std::string> variant_names(const std::vector<Recipe>& grid) {
   std::vector<std::string> names;
   for (const Recipe& recipe : grid) names.push_back(model_name_of(recipe));
   return names;

@@ -77,7 +77,7 @@ static fs::file_time_type last_write_in(const std::string& folder) {
 void Sweep::run(const std::vector<Recipe>& grid) {
   make_directories(a_.text("out") + "/models");
   grid_ = grid;
-  order_ = names_of(grid);
+  order_ = variant_names(grid);
   const std::vector<Recipe> trainings = longest_first(grid);
   const auto done = [&] {
     return std::all_of(order_.begin(), order_.end(), [&](const auto& name) { return table_.has(name); });

@@ -36,7 +36,7 @@ std::vector<fs::path> entries_of(const fs::path& folder, bool folders) {
   return entries;
 }
 
-int number_of(const fs::path& path, const std::string& name) {
+int index_named(const fs::path& path, const std::string& name) {
   const auto number = parse_int(name);
   if (number && *number >= 1 && *number <= 1'000'000) return static_cast<int>(*number);
   throw FileError(path.string(), "expected a number from 1 as its name: TEXT_DIR/<plate>/<trial>/<pass>.txt");
@@ -76,7 +76,7 @@ void find_passes_of(const fs::path& folder, const FolderImport& settings, std::v
   std::map<std::pair<int, int>, std::string> named;  // trial and pass
   const auto take_pass = [&](const fs::path& pass) {
     found.path = pass.string();
-    found.recording.pass = number_of(pass, pass.stem().string());
+    found.recording.pass = index_named(pass, pass.stem().string());
     const auto [first, is_new] =
         named.emplace(std::pair(found.recording.trial, found.recording.pass), found.path);
     if (!is_new)
@@ -84,7 +84,7 @@ void find_passes_of(const fs::path& folder, const FolderImport& settings, std::v
     passes.push_back(found);
   };
   const auto take_trial = [&](const fs::path& trial) {
-    found.recording.trial = number_of(trial, trial.filename().string());
+    found.recording.trial = index_named(trial, trial.filename().string());
     for (const fs::path& pass : entries_of(trial, false))
       if (pass.extension() == ".txt") take_or_leave(settings, [&] { take_pass(pass); });
   };

@@ -5,8 +5,8 @@
 
 namespace supertac {
 
-double doubt_of(std::span<const float> picture, std::span<const float> predicted_error,
-                const ImageGrid& grid) {
+double expected_ssim_loss(std::span<const float> picture, std::span<const float> predicted_error,
+                          const ImageGrid& grid) {
   constexpr double kC = 0.005;
   const int side = std::min({7, grid.height, grid.width});
   const double pixels = side * side;

@@ -21,8 +21,8 @@ inline float at_least(float predicted_error) { return std::max(predicted_error, 
 ///   1 - mean over squares of 7x7 pixels of (2 v + C) / (2 v + mean s^2 + C),   C = .005,
 /// v the picture's variance in a square: an error spoils a faint texture sooner than a strong one. picture,
 /// predicted error: [height][width] of the grid; where its shorter side is below 7, squares are of that side.
-double doubt_of(std::span<const float> picture, std::span<const float> predicted_error,
-                const ImageGrid& grid);
+double expected_ssim_loss(std::span<const float> picture, std::span<const float> predicted_error,
+                          const ImageGrid& grid);
 
 /// Half the width of the interval that holds the truth of nine pixels in ten, in units of the predicted
 /// error: the largest of those found (1.1 to 1.45) on 6_Ridges and 4_Ridges, each left out of the training

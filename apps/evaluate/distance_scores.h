@@ -1,4 +1,4 @@
-// How good pictures are by how much of the texture has been felt.
+// How good pictures are by the distance slid over the texture.
 #pragma once
 
 #include <array>
@@ -12,12 +12,12 @@
 
 namespace supertac {
 
-/// Mean SSIM and PSNR of windows in contact, by the way slid since the first of their pass. Two elements of a
-/// texture must have been felt before their distance tells a wide one from a narrow one: what is scored lower
-/// before that is not known yet.
-class FeltScores {
+/// Mean SSIM and PSNR of windows in contact, by the distance slid since the first of their pass. Two elements
+/// of a texture must have been felt before their distance tells a wide one from a narrow one: what is scored
+/// lower before that is not known yet.
+class DistanceScores {
  public:
-  explicit FeltScores(const WindowSet& windows) : windows_(windows) {}
+  explicit DistanceScores(const WindowSet& windows) : windows_(windows) {}
   /// Windows of a pass come in the order of time; those not in contact are left out.
   void add(std::uint32_t window, std::span<const float> output, std::span<const float> truth);
   /// For people: nothing when no window was in contact.

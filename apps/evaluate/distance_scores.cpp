@@ -1,4 +1,4 @@
-#include "apps/evaluate/felt.h"
+#include "apps/evaluate/distance_scores.h"
 
 #include <cmath>
 
@@ -7,24 +7,24 @@
 
 namespace supertac {
 
-void FeltScores::add(std::uint32_t window, std::span<const float> output, std::span<const float> truth) {
+void DistanceScores::add(std::uint32_t window, std::span<const float> output, std::span<const float> truth) {
   if (!windows_.contact(window)) return;
   const WindowSet::Position here = windows_.position(window);
   if (windows_.pass_of(window) != pass_) {
     pass_ = windows_.pass_of(window);
     begin_ = here;
   }
-  const double felt = std::hypot(here.x_mm - begin_.x_mm, here.y_mm - begin_.y_mm);
-  if (!std::isfinite(felt)) return;  // nobody knows where it was
+  const double slid = std::hypot(here.x_mm - begin_.x_mm, here.y_mm - begin_.y_mm);
+  if (!std::isfinite(slid)) return;  // nobody knows where it was
   std::size_t p = parts_.size() - 1;
-  while (p > 0 && felt < parts_[p].from_mm) --p;
+  while (p > 0 && slid < parts_[p].from_mm) --p;
   const ImageGrid grid = windows_.image();
   parts_[p].ssim += ssim(output, truth, grid.height, grid.width);
   parts_[p].psnr += psnr_db(mean_squared_error(output, truth));
   ++parts_[p].windows;
 }
 
-std::vector<std::string> FeltScores::lines() const {
+std::vector<std::string> DistanceScores::lines() const {
   std::vector<std::string> lines;
   for (std::size_t p = 0; p < parts_.size(); ++p) {
     if (parts_[p].windows == 0) continue;
@@ -38,7 +38,7 @@ std::vector<std::string> FeltScores::lines() const {
   return lines;
 }
 
-nlohmann::ordered_json FeltScores::to_json() const {
+nlohmann::ordered_json DistanceScores::to_json() const {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const Part& part : parts_) {
     if (part.windows == 0) continue;
