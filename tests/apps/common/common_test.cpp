@@ -28,14 +28,7 @@ Arguments parsed(std::vector<const char*> words) {
   return arguments;
 }
 
-std::string message_of(const auto& action) {
-  try {
-    action();
-  } catch (const UsageError& error) {
-    return error.what();
-  }
-  return "nothing thrown";
-}
+std::string message_of(const auto& action) { return what_of<UsageError>(action); }
 
 TEST(Arguments, DefaultsAndValues) {
   const Arguments bare = parsed({"x"});
