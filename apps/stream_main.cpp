@@ -89,6 +89,8 @@ void declare(Arguments& a) {
       .flag("probe",
             "listen to --sensor FILE, or to an address such as serial:/dev/ttyACM0@115200, udp::PORT, "
             "tcp:HOST:PORT, for --seconds (5), say what comes, and write a sensor's file to --out")
+      .flag("gain",
+            "with --probe: find the gain of each taxel as well, which you press about equally hard (30 s)")
       .flag("list-ports", "list the serial ports and end");
   declare_web(a);
 }
@@ -116,24 +118,36 @@ bool describes_sensor(const std::string& named) {
 
 /// Says what a port sends; --sensor names a sensor's file, or an address alone.
 int probe_port(const Arguments& a) {
+  if (!a.given("sensor"))
+    throw UsageError("--probe: expected --sensor with a file or an address, found none");
   const std::string& named = a.text("sensor");
   const bool described = describes_sensor(named);
   Sensor sensor;
   if (described) sensor = read_sensor(named);
   if (!described) sensor.port = named;
-  const double seconds = a.given("seconds") ? a.number("seconds", 0.1, 3600) : 5;
-  a.note("listening for " + format(seconds) + " s: press here and there, and let go");
-  const ProbeReport report = listen(sensor, described, seconds);
-  for (const std::string& line : report.says) a.print(line);
-  if (!report.draft) throw std::runtime_error(sensor.port + ": no frames of a sensor were found");
-  Sensor draft = *report.draft;
-  if (described) draft.name = sensor.name, draft.array = sensor.array;
-  if (a.given("out")) {
-    write_sensor(a.output("out"), draft);
-  } else {
-    a.print(json_of(draft).dump(2));
+  const bool gain = a.flag("gain");
+  const double seconds = a.given("seconds") ? a.number("seconds", 0.1, 3600) : gain ? 30 : 5;
+  a.note("listening for " + format(seconds) +
+         (gain ? " s: press every taxel equally hard, many at once with something flat, and let go"
+               : " s: press here and there, and let go"));
+  const std::vector<Heard> heard = listen(sensor.port, seconds);
+  const auto known = described ? std::optional(sensor) : std::nullopt;
+  ProbeReport report = gain && known ? ProbeReport{{}, known} : probe(heard, sensor.port, known);
+  if (gain && report.draft) {
+    ProbeReport found = find_gain(heard, *report.draft);
+    report.says.insert(report.says.end(), found.says.begin(), found.says.end());
+    report.draft = std::move(found.draft);
   }
-  a.write_json({{"says", report.says}, {"draft", json_of(draft)}});
+  for (const std::string& line : report.says) a.print(line);
+  if (!report.draft)
+    throw std::runtime_error(sensor.port +
+                             (gain ? ": no gains were found" : ": no frames of a sensor were found"));
+  if (a.given("out")) {
+    write_sensor(a.output("out"), *report.draft);
+  } else {
+    a.print(json_of(*report.draft).dump(2));
+  }
+  a.write_json({{"says", report.says}, {"draft", json_of(*report.draft)}});
   return kExitOk;
 }
 
@@ -142,11 +156,8 @@ int run(Arguments& a) {
     print_ports(a);
     return kExitOk;
   }
-  if (a.flag("probe")) {
-    if (!a.given("sensor"))
-      throw UsageError("--probe: expected --sensor with a file or an address, found none");
-    return probe_port(a);
-  }
+  if (a.flag("gain") && !a.flag("probe")) throw UsageError("--gain: only with --probe");
+  if (a.flag("probe")) return probe_port(a);
   const double begin = monotonic_seconds();
   const double speedup = a.number("speedup", 0.1, 100);
   StreamSettings settings{.out = a.output("out"),

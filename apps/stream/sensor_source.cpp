@@ -139,9 +139,9 @@ std::unique_ptr<SensorSource> open_board(const std::string& port, double speedup
   return std::make_unique<BoardSource>(std::move(serial), true, speedup, std::move(journal), capture);
 }
 
-ProbeReport listen(const Sensor& sensor, bool known_array, double seconds) {
+std::vector<Heard> listen(const std::string& port, double seconds) {
   constexpr std::size_t kMostBytes = std::size_t{16} << 20;
-  const OpenedPort opened = open_port(sensor.port);
+  const OpenedPort opened = open_port(port);
   std::vector<Heard> heard;
   std::vector<std::byte> buffer(65536);
   std::size_t bytes = 0;
@@ -153,19 +153,19 @@ ProbeReport listen(const Sensor& sensor, bool known_array, double seconds) {
       heard.push_back({got.time_s, {reinterpret_cast<const char*>(buffer.data()), got.count}});
       // A datagram of text is a line, as open_port() makes one of it for a sensor that is known to send text.
       std::string& text = heard.back().bytes;
-      if (sensor.port.starts_with("udp:") &&
-          std::ranges::all_of(text, [](char c) { return c >= ' ' && c <= '~'; }))
+      if (port.starts_with("udp:") && std::ranges::all_of(text, [](char c) { return c >= ' ' && c <= '~'; }))
         text += '\n';
       bytes += got.count;
     }
   } catch (const PortUnplugged&) {  // what came until then is what there is
   }
-  return probe(heard, sensor.port, known_array ? std::optional(sensor.array) : std::nullopt);
+  return heard;
 }
 
 std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup) {
   constexpr std::string_view kSerial = "serial:";
-  if (sensor.frame.kind == FrameKind::board && sensor.port.starts_with(kSerial))
+  const bool calibrated = !sensor.rest.empty() || !sensor.gain.empty();
+  if (sensor.frame.kind == FrameKind::board && sensor.port.starts_with(kSerial) && !calibrated)
     return open_board(sensor.port.substr(kSerial.size(), sensor.port.rfind('@') - kSerial.size()), speedup,
                       "");
   const bool lines = sensor.frame.kind == FrameKind::text || sensor.frame.kind == FrameKind::json;

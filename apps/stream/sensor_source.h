@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "data/recordings/recording.h"
 #include "hardware/boards/probe.h"
@@ -60,8 +61,8 @@ class SensorSource {
   std::vector<int> silent_;
 };
 
-/// What its port sends within `seconds`, and a draft that reads it. Throws as open_port().
-ProbeReport listen(const Sensor& sensor, bool known_array, double seconds);
+/// What a port sends within `seconds`. Throws as open_port().
+std::vector<Heard> listen(const std::string& port, double seconds);
 /// Any sensor at its port. Throws as open_port().
 std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup);
 

@@ -83,8 +83,11 @@ void Sensor::arrange(std::span<const float> sent, std::span<float> signals) cons
     if (from >= 0)
       std::copy_n(&sent[static_cast<std::size_t>(from) * channels], channels, &signals[k * channels]);
   }
-  for (std::size_t s = 0; s < rest.size(); ++s)
-    signals[s] = static_cast<float>(double{signals[s]} + scale.rest - double{rest[s]});
+  for (std::size_t s = 0; s < std::max(rest.size(), gain.size()); ++s) {
+    const double from = rest.empty() ? scale.rest : double{rest[s]};
+    signals[s] =
+        static_cast<float>(scale.rest + (double{signals[s]} - from) * (gain.empty() ? 1 : double{gain[s]}));
+  }
   fill_silent(signals);
 }
 
@@ -137,9 +140,12 @@ void Sensor::check() const {
   for (const int k : dead)
     expect(k >= 0 && k < array.taxels(), "dead", "taxels 0 to " + std::to_string(taxels - 1),
            std::to_string(k));
-  expect(rest.empty() || rest.size() == array.signals(), "rest",
-         "a number for each of the " + std::to_string(array.signals()) + " signals",
-         std::to_string(rest.size()));
+  for (const auto& [key, list] : {std::pair("rest", &rest), std::pair("gain", &gain)})
+    expect(list->empty() || list->size() == array.signals(), key,
+           "a number for each of the " + std::to_string(array.signals()) + " signals",
+           std::to_string(list->size()));
+  for (const float g : gain)
+    expect(g >= 0.01F && g <= 100, "gain", "numbers of 0.01 to 100", format(double{g}));
   expect(std::ranges::all_of(rest, [](float r) { return std::isfinite(r); }), "rest", "finite numbers",
          "one that is not");
   expect(silent().size() < taxels, "dead", "fewer than all taxels", std::to_string(taxels));

@@ -70,12 +70,13 @@ struct Sensor {
       {};                      ///< taxel k is the order[k]-th of a frame, -1: a place without taxel; empty: k
   std::vector<int> dead = {};  ///< taxels that say nothing
   std::vector<float> rest = {};  ///< of each signal where nothing touches; empty: scale.rest of all
+  std::vector<float> gain = {};  ///< of each signal: what it is multiplied with from rest on; empty: 1 of all
 
   /// Values in a frame: fewer than array.signals() where the array has places without taxel.
   std::size_t values() const;
   /// dead, and the places without taxel.
   std::vector<int> silent() const;
-  /// From the values of a frame to [rows][columns][channels], each moved so that it rests at scale.rest, then
+  /// From the values of a frame to [rows][columns][channels]: signal = scale.rest + (sent - rest) gain, then
   /// fill_silent(). `sent` has values() numbers, `signals` array.signals().
   void arrange(std::span<const float> sent, std::span<float> signals) const;
   /// A silent taxel gets the mean of the others around it, of all when there is none.

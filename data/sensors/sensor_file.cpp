@@ -187,6 +187,7 @@ Sensor sensor_of_json(const std::string& text, const std::string& where) {
     sensor.order = take_order(keys, sensor.array);
     sensor.dead = keys.integers("dead");
     sensor.rest = keys.numbers("rest");
+    sensor.gain = keys.numbers("gain");
     keys.no_others();
     sensor.check();
     return sensor;
@@ -228,6 +229,7 @@ Json json_of(const Sensor& sensor) {
   if (!sensor.order.empty()) json["order"] = sensor.order;
   if (!sensor.dead.empty()) json["dead"] = sensor.dead;
   for (const float rest : sensor.rest) json["rest"].push_back(rounded(double{rest}));
+  for (const float gain : sensor.gain) json["gain"].push_back(rounded(double{gain}));
   return json;
 }
 

@@ -174,38 +174,15 @@ bool is_object(std::string_view line) {
   }
 }
 
-struct Frames {
-  std::vector<std::vector<float>> values;  // [value][frame]
-  std::size_t count = 0, steps = 0;
-  double seconds = 0, frame_bytes = 0;  // of the steps in which time went on
-};
-
-Frames frames_of(const Sensor& sensor, std::span<const Heard> heard) {
-  const auto decoder = make_decoder(sensor);
-  Frames frames;
-  frames.values.resize(sensor.values());
-  double before = 0;
-  for (const Heard& chunk : heard)
-    decoder->push(std::as_bytes(std::span(chunk.bytes)), [&](const DecodedFrame& frame) {
-      const double time = frame.time_s.value_or(chunk.time_s);
-      if (frames.count++ > 0 && time >= before) ++frames.steps, frames.seconds += time - before;
-      before = time;
-      for (std::size_t k = 0; k < frame.values.size(); ++k) frames.values[k].push_back(frame.values[k]);
-    });
-  const auto counted = decoder->counters();
-  frames.frame_bytes = static_cast<double>(counted.bytes - counted.discarded_bytes);
-  return frames;
-}
-
 // Polarity, range, noise and what never moves; into the draft where they are known.
-void look_at_signals(Sensor& draft, const Frames& frames, std::vector<std::string>& says) {
+void look_at_signals(Sensor& draft, const HeardFrames& frames, std::vector<std::string>& says) {
   std::vector<double> rests, moving, noises;
   std::vector<int> still;
   double up = 0, down = 0;
   bool whole = true;
   const auto channels = static_cast<std::size_t>(draft.array.channels);
-  for (std::size_t k = 0; k < frames.values.size(); ++k) {
-    std::vector<float> values = frames.values[k];
+  for (std::size_t k = 0; k < frames.signals.size(); ++k) {
+    std::vector<float> values = frames.signals[k];
     std::vector<double> steps;
     for (std::size_t i = 1; i < values.size(); ++i)
       steps.push_back(std::abs(double{values[i]} - double{values[i - 1]}));
@@ -242,8 +219,9 @@ void look_at_signals(Sensor& draft, const Frames& frames, std::vector<std::strin
     says.push_back(std::to_string(still.size()) + " of " + std::to_string(draft.array.taxels()) +
                    " taxels did not change; press each of them while probing to find the dead ones");
   } else if (!still.empty()) {
-    draft.dead = still;
     says.push_back("stuck or dead, since they never changed: taxels " + nlohmann::json(still).dump());
+    for (const int taxel : still)
+      if (std::ranges::find(draft.dead, taxel) == draft.dead.end()) draft.dead.push_back(taxel);
   }
 }
 
@@ -253,8 +231,7 @@ std::string shown(std::string_view line) {
 
 // Says what it is where it is no sensor.
 std::optional<Candidate> candidate_of(const std::string& bytes, std::span<const Heard> heard,
-                                      const std::optional<TaxelArray>& array,
-                                      std::vector<std::string>& says) {
+                                      const std::optional<Sensor>& known, std::vector<std::string>& says) {
   std::optional<Candidate> found;
   const auto text_bytes = std::ranges::count_if(
       bytes, [](char c) { return (c >= ' ' && c <= '~') || c == '\n' || c == '\r' || c == '\t'; });
@@ -287,7 +264,7 @@ std::optional<Candidate> candidate_of(const std::string& bytes, std::span<const 
           "a log, or words: no columns of numbers, and no JSON; choose the sensor's port, or its firmware");
   } else {
     const auto binary = find_binary_format(bytes, heard.back().time_s - heard.front().time_s,
-                                           array ? std::optional(array->signals()) : std::nullopt);
+                                           known ? std::optional(known->values()) : std::nullopt);
     const auto shape = binary ? array_of(binary->values, {}) : std::nullopt;
     if (shape) found = Candidate{binary->format, *shape, ""};
     if (!found)
@@ -321,8 +298,29 @@ std::optional<double> unit_of_clock(std::span<const double> stamps, double secon
   return std::nullopt;
 }
 
-ProbeReport probe(std::span<const Heard> heard, const std::string& port,
-                  const std::optional<TaxelArray>& array) {
+HeardFrames frames_of(const Sensor& sensor, std::span<const Heard> heard) {
+  Sensor bare = sensor;
+  bare.rest.clear(), bare.gain.clear();
+  const auto decoder = make_decoder(sensor);
+  HeardFrames frames;
+  frames.signals.resize(sensor.array.signals());
+  std::vector<float> signals(sensor.array.signals());
+  double before = 0;
+  for (const Heard& chunk : heard)
+    decoder->push(std::as_bytes(std::span(chunk.bytes)), [&](const DecodedFrame& frame) {
+      bare.arrange(frame.values, signals);
+      if (!std::ranges::all_of(signals, [](float v) { return std::isfinite(v); })) return;
+      const double time = frame.time_s.value_or(chunk.time_s);
+      if (frames.count++ > 0 && time >= before) ++frames.steps, frames.seconds += time - before;
+      before = time;
+      for (std::size_t s = 0; s < signals.size(); ++s) frames.signals[s].push_back(signals[s]);
+    });
+  const auto counted = decoder->counters();
+  frames.frame_bytes = static_cast<double>(counted.bytes - counted.discarded_bytes);
+  return frames;
+}
+
+ProbeReport probe(std::span<const Heard> heard, const std::string& port, const std::optional<Sensor>& known) {
   ProbeReport report;
   std::string bytes;
   for (const Heard& chunk : heard) bytes += chunk.bytes;
@@ -335,18 +333,20 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port,
     report.draft = draft;
     return report;
   }
-  const auto found = candidate_of(bytes, heard, array, report.says);
+  const auto found = candidate_of(bytes, heard, known, report.says);
   draft.name = "probed sensor";
+  if (known) draft.name = known->name, draft.order = known->order;
+  if (known) draft.dead = known->dead, draft.gain = known->gain;
   if (!found) return report;
   const std::size_t values = found->array.signals();
-  if (array && array->signals() != values) {
+  if (known && known->values() != values) {
     report.says.push_back("frames of " + std::to_string(values) + " values, expected the " +
-                          std::to_string(array->signals()) + " of " + array->text());
+                          std::to_string(known->values()) + " of " + known->array.text());
     return report;
   }
-  draft.array = array.value_or(found->array);
+  draft.array = known ? known->array : found->array;
   draft.frame = found->format;
-  const Frames frames = frames_of(draft, heard);
+  const HeardFrames frames = frames_of(draft, heard);
   if (frames.count < 2 || frames.frame_bytes < 0.5 * static_cast<double>(bytes.size())) {
     report.says.push_back("only " + std::to_string(frames.count) +
                           " frames were whole; probe for longer (--seconds)");
@@ -363,7 +363,7 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port,
                              : ", without a time stamp"));
   if (unknown_rate)
     report.says.push_back("assumed: " + format(kAssumedHz) + " frames a second; set \"rate_hz\"");
-  if (!array)
+  if (!known)
     report.says.push_back("assumed: " + draft.array.text() +
                           "; set \"rows\", \"columns\", \"channels\" and \"pitch_mm\"");
   look_at_signals(draft, frames, report.says);

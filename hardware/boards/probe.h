@@ -21,10 +21,30 @@ struct ProbeReport {
   std::optional<Sensor> draft;    ///< reads the same frames; empty where none were found
 };
 
-/// `array`: the sensor's, where it is known; else the most nearly square one is assumed, and reported.
-/// `port`: goes into messages and draft. A format is taken when at least nine in ten bytes are frames of it.
-ProbeReport probe(std::span<const Heard> heard, const std::string& port,
-                  const std::optional<TaxelArray>& array);
+/// The frames that were heard, [signal][frame]: as Sensor::arrange() without rest and gain; without those in
+/// which a signal is no number.
+struct HeardFrames {
+  std::vector<std::vector<float>> signals;
+  std::size_t count = 0, steps = 0;
+  double seconds = 0, frame_bytes = 0;  ///< of the steps in which time went on; of all whole frames
+};
+HeardFrames frames_of(const Sensor& sensor, std::span<const Heard> heard);
+
+/// `known`: the sensor, where its file is known: the draft keeps its name, array, order and dead taxels. Else
+/// the most nearly square array is assumed, and reported. `port`: goes into messages and draft. A format is
+/// taken when at least nine in ten bytes are frames of it.
+ProbeReport probe(std::span<const Heard> heard, const std::string& port, const std::optional<Sensor>& known);
+
+/// Where each signal of `sensor` rests and its gain, found while each taxel is pressed about equally hard,
+/// one after the other or many at once under a flat plate, and let go for more than half of the time:
+///   rest    = median over time of what is sent
+///   peak_k  = what the length over the channels of (sent - rest) exceeds for 0.2 s in all; of at most one
+///             frame in 100, but at least three frames
+///   gain_k  = median of all pressed taxels' peaks / peak_k, within 0.2 to 5
+/// A taxel was pressed when its peak is over 6 times its noise (the step from frame to frame that three in
+/// four stay below) and over a fifth of the peak that nine in ten taxels stay below. The others are named and
+/// get gain 1. The draft is the sensor with these; empty where nothing was pressed or no frames came.
+ProbeReport find_gain(std::span<const Heard> heard, const Sensor& sensor);
 
 /// The binary format of `bytes`, which were heard for `seconds`: header (what stays the same from period to
 /// period), time stamp, type, byte order, checksum; and how many values a frame has. Empty where the bytes

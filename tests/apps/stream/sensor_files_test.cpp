@@ -259,6 +259,29 @@ TEST(SensorFiles, AnotherRateThanTheFileSaysIsSaid) {
   EXPECT_NE(slow.find("lost 0,"), std::string::npos) << slow;
 }
 
+// Where each taxel rests and its gain go into the file, whose other words stay.
+TEST(SensorFiles, GainsAreFoundWhilePressing) {
+  const TemporaryFolder folder;
+  Sensor sensor = example("csv_arduino");
+  const FakeDevice device(sensor);
+  sensor.port = device.port();
+  write_sensor(folder / "sensor.json", sensor);
+  const auto probed = run_process("supertac-stream", {"--sensor", folder / "sensor.json", "--probe", "--gain",
+                                                      "--seconds", "4", "--out", folder / "even.json"});
+  ASSERT_EQ(probed.code, 0) << probed.error << probed.out;
+  EXPECT_NE(probed.error.find("listening for 4 s: press every taxel equally hard"), std::string::npos);
+  EXPECT_NE(probed.out.find("not pressed, or far more weakly than the others: taxels [0,"), std::string::npos)
+      << probed.out;
+  Sensor even = read_sensor(folder / "even.json");
+  ASSERT_EQ(even.gain.size(), sensor.array.signals());
+  for (const float gain : even.gain) EXPECT_NEAR(gain, 1, 0.05);
+  for (const float rest : even.rest)
+    EXPECT_NEAR(rest, sensor.scale.rest - 0.0225 * sensor.scale.span, 0.01 * std::abs(sensor.scale.span));
+  even.gain.clear(), even.rest.clear();
+  EXPECT_EQ(even, sensor);
+  EXPECT_EQ(run_process("supertac-stream", {"--sensor", device.port(), "--gain"}).code, 2);
+}
+
 TEST(SensorFiles, OthersAtThePortAreToldApart) {
   const TemporaryFolder folder;
   std::string noise, log;

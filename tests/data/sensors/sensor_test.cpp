@@ -74,6 +74,7 @@ TEST(Sensor, WritesWhatItReads) {
   for (int kind = 1; kind < 4; ++kind) {
     sensor.frame = {.kind = static_cast<FrameKind>(kind)};
     sensor.rest.assign(12, 0.1F * static_cast<float>(kind));
+    sensor.gain.assign(12, 0.3F * static_cast<float>(kind));
     if (kind == 2) sensor.frame.values = "taxels", sensor.frame.time = FrameTime{.key = "t", .unit_s = 1e-6};
     if (kind == 3)
       sensor.frame.header = "\xAA\x55", sensor.frame.trailer = "\n", sensor.frame.type = "i16",
@@ -102,7 +103,7 @@ TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
   EXPECT_EQ(refusal("rate_hz", 0.5), "mat.json: \"rate_hz\" must be 1 to 100000, found 0.5");
   EXPECT_EQ(refusal("pich_mm", 5),
             "mat.json: knows no key 'pich_mm'; it may have name, rows, columns, channels, pitch_mm, unit, "
-            "pressed, range, rate_hz, port, frame, order, dead, rest");
+            "pressed, range, rate_hz, port, frame, order, dead, rest, gain");
   EXPECT_EQ(refusal("frame", nullptr),
             "mat.json: has no \"frame\", such as {\"kind\": \"text\"}; supertac-stream --probe finds it");
   EXPECT_EQ(refusal("frame.kind", "csv"),
@@ -129,6 +130,12 @@ TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
             "mat.json: \"rest\" must be a number for each of the 12 signals, found 2");
   EXPECT_EQ(refusal("rest", Json{"40"}), "mat.json: \"rest\" must be a list of numbers, found [\"40\"]");
   EXPECT_EQ(refusal("rest", 40), "mat.json: \"rest\" must be a list of numbers, found 40");
+  EXPECT_EQ(refusal("gain", Json{1, 1}),
+            "mat.json: \"gain\" must be a number for each of the 12 signals, found 2");
+  EXPECT_EQ(refusal("gain", 1), "mat.json: \"gain\" must be a list of numbers, found 1");
+  Json gains(12, 1);
+  gains[3] = 0;
+  EXPECT_EQ(refusal("gain", gains), "mat.json: \"gain\" must be numbers of 0.01 to 100, found 0");
   EXPECT_EQ(refusal("name", "a\nb"), "mat.json: \"name\" must be 1 to 200 printable characters, found 'a?b'");
 }
 
@@ -149,23 +156,29 @@ TEST(Sensor, ArrangesTheTaxelsAndFillsTheSilentFromTheirNeighbours) {
   EXPECT_FLOAT_EQ(signals[0], 4.0F / 3);  // the mean of 0, 1 and 3 around it
 }
 
-TEST(Sensor, TaxelsThatRestAtOtherValuesAreMadeAlike) {
+TEST(Sensor, TaxelsOfOtherRestAndGainAreMadeAlike) {
   Sensor mat = sensor_of_json(kMat, "mat.json"), offset = mat;
   for (int k = 0; k < 12; ++k) offset.rest.push_back(static_cast<float>(30 + 2 * k));
+  for (int k = 0; k < 12; ++k) offset.gain.push_back(k % 2 == 0 ? 0.5F : 4);
   std::vector<float> frame, moved, signals(12), of_moved(12);
   for (int k = 0; k < 12; ++k) frame.push_back(static_cast<float>(40 + 7 * k));
   mat.arrange(frame, signals);
   for (std::size_t k = 0; k < 12; ++k) {  // column-major
     const std::size_t place = k % 3 * 4 + k / 3;
-    moved.push_back(frame[k] - 40 + offset.rest[place]);
+    moved.push_back((frame[k] - 40) / offset.gain[place] + offset.rest[place]);
   }
   offset.arrange(moved, of_moved);
   EXPECT_EQ(of_moved, signals) << "the dead taxel as well, from its neighbours";
+  mat.gain.assign(12, 0.5F);  // from the end of the range where none says where it rests
+  mat.arrange(frame, of_moved);
+  for (std::size_t k = 0; k < 12; ++k) EXPECT_EQ(of_moved[k], 40 + (signals[k] - 40) / 2) << k;
 }
 
 TEST(Sensor, MutatedFilesAreTakenOrRefusedInOneLine) {
   std::mt19937 random(1);
-  const std::string whole = Json::parse(kMat).dump();
+  Json mat = Json::parse(kMat);
+  for (int k = 0; k < 12; ++k) mat["rest"].push_back(40 + k), mat["gain"].push_back(1 + 0.05 * k);
+  const std::string whole = mat.dump();
   std::size_t taken = 0;
   const int count = mutations(500);
   for (int n = 0; n < count; ++n) {

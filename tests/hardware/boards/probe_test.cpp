@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/numbers/median.h"
 #include "io/numbers/random.h"
 #include "tests/hardware/fake_sensor.h"
 
@@ -158,12 +159,12 @@ TEST(Probe, SaysWhatItAssumes) {
   EXPECT_NE(all(report).find("stuck or dead, since they never changed: taxels [5]"), std::string::npos);
   EXPECT_NE(all(report).find("columns that are no signal (words, or a counter) are skipped: [1]"),
             std::string::npos);
-  const ProbeReport known = probe(sent(sensor, 3), "here", sensor.array);
+  const ProbeReport known = probe(sent(sensor, 3), "here", sensor);
   ASSERT_TRUE(known.draft) << all(known);
   EXPECT_EQ(known.draft->array, sensor.array);
   EXPECT_TRUE(known.draft->scale.rises());
   EXPECT_EQ(all(known).find("assumed"), std::string::npos) << all(known);
-  const ProbeReport other = probe(sent(sensor, 3), "here", TaxelArray{.rows = 5, .columns = 5});
+  const ProbeReport other = probe(sent(sensor, 3), "here", Sensor{.array = {.rows = 5, .columns = 5}});
   EXPECT_FALSE(other.draft);
   EXPECT_NE(all(other).find("frames of 12 values, expected the 25 of 5x5 taxels"), std::string::npos)
       << all(other);
@@ -172,16 +173,104 @@ TEST(Probe, SaysWhatItAssumes) {
 TEST(Probe, WritesWhereEachTaxelRests) {
   Sensor sensor = sensor_of(R"({"rows":3,"columns":4,"pressed":"higher","range":[100,900],"rate_hz":50,
     "frame":{"kind":"text"}})");
-  const ProbeReport even = probe(sent(sensor, 3), "here", sensor.array);
+  const ProbeReport even = probe(sent(sensor, 3), "here", sensor);
   ASSERT_TRUE(even.draft) << all(even);
   EXPECT_TRUE(even.draft->rest.empty()) << all(even);
   for (int k = 0; k < 12; ++k) sensor.rest.push_back(static_cast<float>(100 + 10 * k));
-  const ProbeReport report = probe(sent(sensor, 3), "here", sensor.array);
+  const ProbeReport report = probe(sent(sensor, 3), "here", sensor);
   ASSERT_TRUE(report.draft) << all(report);
   ASSERT_EQ(report.draft->rest.size(), 12U);
   for (const std::size_t k : {0U, 1U, 4U, 6U, 11U})  // the fifth is dead; noise is 0 to 15
     EXPECT_NEAR(report.draft->rest[k], sensor.rest[k] + 0.05F * 800, 16) << k;
   EXPECT_NE(all(report).find("signals rest up to 1"), std::string::npos) << all(report);
+}
+
+// What is kept of a file: the draft says of taxels, as the file does, not of places in a frame.
+TEST(Probe, KeepsTheOrderOfItsFile) {
+  Sensor sensor = sensor_of(R"({"name":"cross","rows":3,"columns":3,"pressed":"higher","range":[100,900],
+    "rate_hz":50,"frame":{"kind":"text"},"order":[6,-1,0,1,2,3,4,5,-1],"dead":[0]})");
+  for (int k = 0; k < 9; ++k) sensor.rest.push_back(static_cast<float>(100 + 10 * k));
+  sensor.gain.assign(9, 2);
+  const ProbeReport report = probe(sent(sensor, 3), "here", sensor);
+  ASSERT_TRUE(report.draft) << all(report);
+  EXPECT_EQ(report.draft->name, "cross");
+  EXPECT_EQ(report.draft->order, sensor.order);
+  EXPECT_EQ(report.draft->gain, sensor.gain);
+  EXPECT_EQ(report.draft->dead, (std::vector{0, 7})) << "the sixth place is the stuck one";
+  ASSERT_EQ(report.draft->rest.size(), 9U);
+  for (const std::size_t place : {0U, 1U, 4U})
+    EXPECT_NEAR(report.draft->rest[place + 2], sensor.rest[place] + 0.05F * 800, 16) << place;
+}
+
+// A flat plate on one row after the other, twice; the last taxel lies under none, the first is dead.
+std::vector<Heard> pressed_by_rows(const Sensor& sensor, std::span<const double> gain, double noise) {
+  const RandomStream random(3, 4);
+  std::vector<Heard> heard;
+  const int channels = sensor.array.channels, columns = sensor.array.columns;
+  const int period = static_cast<int>(3 * sensor.rate_hz);  // of a press, of which it holds a third
+  for (int n = 0; n < 2 * sensor.array.rows * period; ++n) {
+    std::vector<double> values;
+    for (int s = 0; s < static_cast<int>(sensor.values()); ++s) {
+      const int taxel = s / channels;
+      const double along = std::clamp(5 * (1 - std::abs(3.0 * (n % period) / period - 1.5)), 0.0, 1.0);
+      const bool under =
+          n / period % sensor.array.rows == taxel / columns && taxel + 1 < sensor.array.taxels();
+      const double direction = s % channels == 1 ? -0.5 : 1, force = under ? along : 0;
+      const double change = 60 * gain[static_cast<std::size_t>(taxel)] * direction * force;
+      const double own =
+          noise * random.normal(static_cast<std::uint64_t>(n) * 1000 + static_cast<std::uint64_t>(s));
+      values.push_back(taxel == 0 ? 0 : std::round(100 + taxel % 7 + change + own));
+    }
+    heard.push_back({100 + n / sensor.rate_hz, sent_frame(sensor, values, n / sensor.rate_hz)});
+  }
+  return heard;
+}
+
+TEST(FindGain, RecoversWhatTaxelsHaveInCountsAndNoise) {
+  const RandomStream random(11, 2);
+  for (const int channels : {1, 3}) {
+    Sensor sensor = sensor_of(R"({"rows":8,"columns":8,"pressed":"higher","range":[100,200],"rate_hz":50,
+      "frame":{"kind":"text"},"dead":[0]})");
+    sensor.array.channels = channels;
+    std::vector<double> gain;
+    for (std::uint64_t k = 0; k < 64; ++k) gain.push_back(std::exp(0.3 * random.normal(k)));
+    const ProbeReport report = find_gain(pressed_by_rows(sensor, gain, 0.7), sensor);
+    ASSERT_TRUE(report.draft) << all(report);
+    const Sensor& found = *report.draft;
+    ASSERT_EQ(found.gain.size(), 64U * static_cast<std::size_t>(channels));
+    std::vector<double> product;  // alike when the gains are right
+    for (std::size_t k = 1; k < 63; ++k) {
+      const std::size_t s = k * static_cast<std::size_t>(channels);
+      product.push_back(gain[k] * double{found.gain[s]});
+      EXPECT_EQ(found.gain[s], found.gain[s + static_cast<std::size_t>(channels) - 1]);
+      EXPECT_NEAR(found.rest[s], 100 + static_cast<double>(k % 7), 1) << k;
+    }
+    const double usual = median(std::vector(product));
+    for (const double value : product) EXPECT_NEAR(value / usual, 1, 0.04);
+    EXPECT_EQ(found.gain.front(), 1);
+    EXPECT_EQ(found.gain.back(), 1);
+    EXPECT_EQ(found.dead, std::vector{0});
+    EXPECT_NE(all(report).find("taxels [63] keep gain 1; press them as hard"), std::string::npos)
+        << all(report);
+  }
+}
+
+TEST(FindGain, IsLimitedAndSaysWhenNothingWasPressed) {
+  const Sensor sensor = sensor_of(R"({"rows":4,"columns":4,"pressed":"higher","range":[100,200],"rate_hz":50,
+    "frame":{"kind":"text"},"dead":[0]})");
+  std::vector<double> gain(16, 1);
+  gain[5] = 12;
+  const ProbeReport report = find_gain(pressed_by_rows(sensor, gain, 0.7), sensor);
+  ASSERT_TRUE(report.draft) << all(report);
+  EXPECT_FLOAT_EQ(report.draft->gain[5], 0.2F);
+  EXPECT_NEAR(report.draft->gain[6], 1, 0.05);
+  for (const auto& [heard, words] : {std::pair(pressed_by_rows(sensor, std::vector<double>(16, 0), 0.7),
+                                               std::string("nothing was pressed: press every taxel")),
+                                     {std::vector<Heard>(), "0 frames to find gains from"}}) {
+    const ProbeReport none = find_gain(heard, sensor);
+    EXPECT_FALSE(none.draft);
+    EXPECT_NE(all(none).find(words), std::string::npos) << all(none);
+  }
 }
 
 TEST(Probe, OfAnythingEndsAndHasADraftThatReads) {
