@@ -88,7 +88,8 @@ void declare(Arguments& a) {
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
       .flag("probe",
             "listen to --sensor FILE, or to an address such as serial:/dev/ttyACM0@115200, udp::PORT, "
-            "tcp:HOST:PORT, for --seconds (5), say what comes, and write a sensor's file to --out")
+            "tcp:HOST:PORT, for --seconds (5), say what comes, and write a sensor's file to --out; with "
+            "--web the array is shown then: press a taxel, and see which one lights up")
       .flag("gain",
             "with --probe: find the gain of each taxel as well, which you press about equally hard (30 s)")
       .flag("list-ports", "list the serial ports and end");
@@ -116,8 +117,8 @@ bool describes_sensor(const std::string& named) {
   }
 }
 
-/// Says what a port sends; --sensor names a sensor's file, or an address alone.
-int probe_port(const Arguments& a) {
+/// Says what a port sends and keeps the draft; --sensor names a sensor's file, or an address alone.
+ProbeReport probe_port(const Arguments& a) {
   if (!a.given("sensor"))
     throw UsageError("--probe: expected --sensor with a file or an address, found none");
   const std::string& named = a.text("sensor");
@@ -147,8 +148,14 @@ int probe_port(const Arguments& a) {
   } else {
     a.print(json_of(*report.draft).dump(2));
   }
-  a.write_json({{"says", report.says}, {"draft", json_of(*report.draft)}});
-  return kExitOk;
+  return report;
+}
+
+/// Taxels that the probe took for dead are shown as they are: pressing one says whether it is.
+std::unique_ptr<SensorSource> open_draft(const Arguments& a, Sensor draft, double speedup) {
+  const std::string& named = a.text("sensor");
+  draft.dead = describes_sensor(named) ? read_sensor(named).dead : std::vector<int>();
+  return open_sensor(draft, speedup);
 }
 
 int run(Arguments& a) {
@@ -157,17 +164,27 @@ int run(Arguments& a) {
     return kExitOk;
   }
   if (a.flag("gain") && !a.flag("probe")) throw UsageError("--gain: only with --probe");
-  if (a.flag("probe")) return probe_port(a);
+  std::optional<ProbeReport> probed;
+  nlohmann::ordered_json result;
+  if (a.flag("probe")) {
+    probed = probe_port(a);
+    result = {{"says", probed->says}, {"draft", json_of(*probed->draft)}};
+  }
+  if (probed && !a.given("web")) {
+    a.write_json(result);
+    return kExitOk;
+  }
   const double begin = monotonic_seconds();
   const double speedup = a.number("speedup", 0.1, 100);
-  StreamSettings settings{.out = a.output("out"),
+  StreamSettings settings{.out = probed ? "" : a.output("out"),
                           .classifier = a.text("classifier"),
                           .mcap = a.output("mcap"),
                           .record = a.text("record"),
                           .plate = a.text("plate"),
                           .udp = a.text("udp"),
                           .view = !a.quiet() && drawable_terminal()};
-  if (a.given("seconds")) settings.seconds = a.number("seconds", 0.001, 1e9);
+  if (probed) settings.found = probed->says;
+  if (a.given("seconds") && !probed) settings.seconds = a.number("seconds", 0.001, 1e9);
   const std::string origin = source_of(a);
   settings.web = web_address(a);
   settings.badge = badge_of(a), settings.source = origin;
@@ -181,7 +198,7 @@ int run(Arguments& a) {
   settings.precision = precision_of(precision, models);
   if (drawn && precision == "auto") a.note("precision: " + name_of(settings.precision));
   if (drawn) add_model_parents(a.list("model"));
-  const auto source = open_source(a, speedup);
+  const auto source = probed ? open_draft(a, *probed->draft, speedup) : open_source(a, speedup);
   Stream stream(settings, models, *source);
   const double ready_ms = 1e3 * (monotonic_seconds() - begin);
   a.note(
@@ -201,10 +218,10 @@ int run(Arguments& a) {
     a.note(stream.summary());
   else
     a.print(stream.summary());
-  nlohmann::ordered_json result = {{"source", origin},
-                                   {"model", a.text("model")},
-                                   {"precision", name_of(settings.precision)},
-                                   {"ready_ms", ready_ms}};
+  result.update({{"source", origin},
+                 {"model", a.text("model")},
+                 {"precision", name_of(settings.precision)},
+                 {"ready_ms", ready_ms}});
   result.update(stream.result());
   a.write_json(result);
   if (error) std::rethrow_exception(error);

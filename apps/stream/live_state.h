@@ -11,14 +11,21 @@
 
 namespace supertac {
 
+/// A signal that has changed.
+struct ChangedSignal {
+  int taxel = 0, channel = 0;
+  double rest = 0, now = 0;  ///< in the sensor's unit
+};
+
 struct LiveState {
   TaxelArray array;
   int scale = 4;             ///< of the picture
   std::uint64_t number = 0;  ///< of the picture, as Seen
   double time_s = 0;
-  std::vector<float> taxels;       ///< [rows][columns] in [0,1], as RawArray; empty before the first
-  double top = 0;                  ///< what 1 is, in the sensor's unit from rest
-  std::string unit = {};           ///< of top
+  std::vector<float> taxels;  ///< [rows][columns] in [0,1], as RawArray; empty before the first
+  double top = 0;             ///< what 1 is, in the sensor's unit from rest
+  std::string unit = {};      ///< of top
+  std::optional<ChangedSignal> most_changed;
   bool draws = true;               ///< there is a model
   std::vector<float> picture;      ///< [rows * scale][columns * scale]; empty before the first
   std::vector<float> half_widths;  ///< the same, as Seen

@@ -43,6 +43,19 @@ double RawArray::pressed(std::size_t taxel) const {
   return channels == 3 ? std::sqrt(squares) : std::max(0.0, sum / static_cast<double>(channels));
 }
 
+std::optional<ChangedSignal> RawArray::most_changed() const {
+  std::optional<ChangedSignal> most;
+  double farthest = least_top_;
+  for (std::size_t s = 0; s < newest_.size(); ++s) {
+    const double change = std::abs(double{newest_[s]} - rest_[s]);
+    if (!(change > farthest)) continue;  // nor where it is no number
+    farthest = change;
+    const int signal = static_cast<int>(s);
+    most = {signal / array_.channels, signal % array_.channels, rest_[s], double{newest_[s]}};
+  }
+  return most;
+}
+
 std::vector<float> RawArray::taxels() const {
   std::vector<float> values(static_cast<std::size_t>(array_.taxels()));
   for (std::size_t k = 0; k < values.size(); ++k)

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "apps/stream/live_state.h"
 #include "apps/stream/sensor_source.h"
 
 namespace supertac {
@@ -20,6 +22,9 @@ class RawArray {
   /// What 1 stands for, in the sensor's unit: the most that was seen, which is forgotten within kForgetS; at
   /// least a twentieth of the stated range.
   double top() const { return top_; }
+  /// The signal that is farthest from its rest, either way: where the finger is, also when polarity or order
+  /// are wrong. Empty when none is a twentieth of the stated range away.
+  std::optional<ChangedSignal> most_changed() const;
 
  private:
   static constexpr double kRestS = 0.2, kForgetS = 20, kLeastTop = 0.05;

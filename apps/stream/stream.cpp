@@ -71,7 +71,7 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   web_ = std::make_unique<WebView>(
       *settings.web,
       WebSource{settings.badge, settings.source, source.array(), state_.scale, format.half_widths,
-                classifier_.has_value(), state_.unit, state_.draws, source.silent()},
+                classifier_.has_value(), state_.unit, state_.draws, source.silent(), settings.found},
       *recorder_);
 }
 
@@ -289,7 +289,8 @@ void Stream::show() {
     state_.half_widths.assign(maker_->half_widths().begin(), maker_->half_widths().end());
     state_.distance = maker_->distance();
   }
-  if (frames_ > 0) state_.taxels = raw_.taxels(), state_.top = raw_.top();
+  if (frames_ > 0)
+    state_.taxels = raw_.taxels(), state_.top = raw_.top(), state_.most_changed = raw_.most_changed();
   if (classifier_ && now - named_s_ >= kNameEveryS) named_s_ = now, name_texture();
   if (view_) view_->update(state_);
   if (web_) web_->update(state_);

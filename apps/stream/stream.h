@@ -32,6 +32,7 @@ struct StreamSettings {
   bool view = false;                    ///< draw on the terminal
   std::optional<WebAddress> web = {};   ///< serve the live page
   std::string badge = {}, source = {};  ///< for the page: what is streamed
+  std::vector<std::string> found = {};  ///< for the page: what a probe of the source found, a line each
   std::map<std::string, std::string> metadata = {};  ///< of files with pictures
 };
 

@@ -41,6 +41,8 @@ std::string WebView::hello() const {
                         {"unit", source_.unit},
                         {"draws", source_.draws},
                         {"silent", source_.silent},
+                        {"found", source_.found},
+                        {"channels", source_.array.channels},
                         {"map", colour_map_base64()}}
       .dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
 }
@@ -67,6 +69,9 @@ std::string web_event(const LiveState& state, const Recorder::Status& recorder) 
                           {"recorded_s", recorder.seconds},
                           {"files", recorder.files}};
   if (!state.taxels.empty()) event["felt"] = levels_base64(state.taxels), event["top"] = state.top;
+  if (const auto& most = state.most_changed)
+    event["most"] = {
+        {"taxel", most->taxel}, {"channel", most->channel}, {"rest", most->rest}, {"now", most->now}};
   if (!state.picture.empty()) event["picture"] = levels_base64(state.picture);
   if (!state.half_widths.empty()) event["wide"] = levels_base64(state.half_widths);
   if (state.distance) event["distance"] = *state.distance, event["unlike"] = state.unlike_training;

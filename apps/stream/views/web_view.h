@@ -19,9 +19,10 @@ struct WebSource {
   TaxelArray array;
   int scale = 4;
   bool predicts_error = false, names_textures = false;
-  std::string unit = {};         ///< of the signals
-  bool draws = false;            ///< there is a model
-  std::vector<int> silent = {};  ///< taxels that say nothing
+  std::string unit = {};                ///< of the signals
+  bool draws = false;                   ///< there is a model
+  std::vector<int> silent = {};         ///< taxels that say nothing
+  std::vector<std::string> found = {};  ///< by a probe, a line each
 };
 
 /// Serves live_page() with the newest state, 30 times a second at most, from a thread of its own.

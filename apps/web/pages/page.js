@@ -62,6 +62,9 @@ function onHello(hello) {
   element("guess-line").hidden = !hello.predicts_error;
   element("sure").hidden = !hello.predicts_error;
   element("drawn").closest("figure").hidden = !hello.draws;
+  element("most").hidden = hello.draws;
+  element("found").hidden = hello.found.length === 0;
+  element("found-text").textContent = hello.found.join("\n");
   element("profile").hidden = element("profile").previousElementSibling.hidden = !hello.draws;
   element("rate-name").textContent = hello.draws ? "pictures" : "frames";
   element("slide").hidden = true;
@@ -139,6 +142,13 @@ function drawPictures(event) {
   drawStrip(element("profile"), strips.profile, 255, rows, [[-half, 0], ["0", .5], [half, 1]], true);
 }
 
+// What corrects "order" and "dead" in a sensor's file: which taxel answers to the finger, and from where to where.
+function mostText({taxel, channel, rest, now}) {
+  const {columns, channels} = supertac.hello, digits = Math.abs(now - rest) < 10 ? 3 : 0;
+  return `taxel ${taxel}, row ${Math.floor(taxel / columns)}, column ${taxel % columns}` +
+         (channels > 1 ? `, channel ${channel}` : "") + `: ${rest.toFixed(digits)} at rest, ${now.toFixed(digits)} now`;
+}
+
 function showFigures(event) {
   const set = (id, text) => { if (element(id).textContent !== text) element(id).textContent = text; };
   set("texture", event.texture ? `${event.texture}, ${(100 * event.probability).toFixed(0)} %` : "none");
@@ -147,6 +157,7 @@ function showFigures(event) {
   set("p99", event.p99.toFixed(2) + " ms");
   set("lost", String(event.lost));
   set("dropped", String(event.dropped));
+  set("most", event.most ? mostText(event.most) : "press a taxel: its number is shown here");
   set("time", event.t.toFixed(1) + " s");
   set("place", event.x === undefined ? "unknown" : `x ${event.x.toFixed(1)}, y ${event.y.toFixed(1)} mm`);
   if (!supertac.hello.draws) setLamp("lamp", "", "no model: the array itself");

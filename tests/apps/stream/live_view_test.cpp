@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include "apps/stream/latency_histogram.h"
+#include "apps/stream/raw_array.h"
 #include "apps/stream/views/terminal_view.h"
+#include "tests/io/temporary_folder.h"
 
 namespace supertac {
 namespace {
@@ -18,6 +20,32 @@ TEST(LatencyHistogram, QuantilesAreRightToAClass) {
   histogram.add(1e7);  // beyond the last class
   EXPECT_EQ(histogram.max(), 1e7);
   EXPECT_EQ(histogram.quantile(1), histogram.max());
+}
+
+// Also against the direction that its file names, which may be wrong; noise is none.
+TEST(RawArray, SaysWhichSignalIsFarthestFromItsRest) {
+  const TemporaryFolder folder;
+  Recording recording;
+  recording.time_s = {0, 0.01}, recording.array = {.rows = 2, .columns = 2, .channels = 2};
+  recording.signal_scale = {.unit = "counts", .rest = 100, .span = -400};
+  recording.volts.assign(16, 100), recording.plate = "unknown", recording.trial = recording.pass = 1;
+  write_recording(folder / "r.safetensors", recording);
+  const auto source = open_recording(folder / "r.safetensors");
+  RawArray raw(*source);
+  EXPECT_FALSE(raw.most_changed());
+  std::vector<float> signals(8, 110);
+  for (int n = 0; n < 40; ++n) raw.push(signals);
+  signals[1] = 120, signals[2] = std::nanf("");
+  raw.push(signals);
+  EXPECT_FALSE(raw.most_changed());
+  signals[1] = 150, signals[5] = 30;
+  raw.push(signals);
+  const auto most = raw.most_changed();
+  ASSERT_TRUE(most);
+  EXPECT_EQ(most->taxel, 2);
+  EXPECT_EQ(most->channel, 1);
+  EXPECT_NEAR(most->rest, 110, 1e-9);
+  EXPECT_EQ(most->now, 30);
 }
 
 TEST(TerminalView, YGrowsUpwardsAndBothPicturesHaveTheSameSize) {

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The live page in a real Chromium, on a virtual rig whose finger slides.
+"""The live page in a real Chromium, on a virtual rig whose finger slides, and on a sensor that is probed.
 
     tests/apps/web/page_test.py BIN [SCREENSHOTS]    BIN: the folder of our programs; SCREENSHOTS: keep some in this folder
 
@@ -10,6 +10,7 @@ import contextlib
 import json
 import os
 import pathlib
+import pty
 import re
 import shutil
 import struct
@@ -223,11 +224,67 @@ def check_snapshot(browser, folder):
     assert all(png.at(x, y) in known for x, y in centres)
 
 
-def keep_screenshots(browser, folder):
+class Mat:
+    """A device on a pseudo-terminal that sends lines of 4x6 counts, 50 a second, one taxel pressed; the last never changes."""
+
+    def __init__(self):
+        self.pressed, self.sending = 0, True
+        self.end, terminal = pty.openpty()
+        tty.setraw(terminal)
+        os.set_blocking(self.end, False)
+        self.port = f"serial:{os.ttyname(terminal)}@115200"
+        self.thread = threading.Thread(target=self.send)
+        self.thread.start()
+
+    def send(self):
+        begin = time.monotonic()
+        for n in range(10**6):
+            if not self.sending:
+                return
+            time.sleep(max(0, begin + n / 50 - time.monotonic()))
+            values = [100 + 2 * k + (n + k) % 3 + 400 * (k == self.pressed) for k in range(23)] + [7]
+            with contextlib.suppress(BlockingIOError):  # nobody listens
+                os.write(self.end, (",".join(map(str, [20 * n, *values])) + "\n").encode())
+
+    def stop(self):
+        self.sending = False
+        self.thread.join()
+
+
+def check_probe(binaries, folder, browser, screenshots):
+    """What a probe found and assumed is on the page, and the number of the taxel that is pressed."""
+    mat = Mat()
+    with contextlib.ExitStack() as stack:
+        stack.callback(mat.stop)
+        command = [binaries / "supertac-stream", "--sensor", mat.port, "--probe", "--seconds", "3", "--web", "0", "--out", "mat.json"]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=folder)
+        stack.callback(process.kill)
+        time.sleep(1)
+        mat.pressed = 23  # lets go
+        url = next(m[1] for line in process.stderr if (m := re.search(r"live page: (\S+)", line)))
+        draft = json.loads((folder / "mat.json").read_text())
+        assert (draft["rows"], draft["columns"], draft["dead"]) == (4, 6, [23]), draft
+        browser.look(1280, 860)
+        browser.open(url)
+        wait_until("what was found", lambda: "assumed: 4x6 taxels at 3 mm" in text(browser, "found-text"))
+        wait_until("what to do", lambda: text(browser, "most") == "press a taxel: its number is shown here")
+        for taxel, place in ((13, "row 2, column 1"), (4, "row 0, column 4")):
+            mat.pressed = taxel
+            wait_until("its number", lambda: text(browser, "most").startswith(f"taxel {taxel}, {place}: "))  # noqa: B023
+            rest, now = map(int, re.findall(r"(\d+) at rest, (\d+) now", text(browser, "most"))[0])
+            assert 395 <= now - rest <= 405, (rest, now)
+            assert browser.js("return supertac.newest.felt.indexOf(Math.max(...supertac.newest.felt))") == taxel
+        if screenshots:
+            keep_screenshots(browser, screenshots, "probe")
+        process.terminate()
+        assert process.wait(60) == 143
+
+
+def keep_screenshots(browser, folder, page="page"):
     for name, size, dark in (("light", (1280, 860), False), ("dark", (1280, 860), True), ("phone", (400, 1400), False)):
         browser.look(*size, dark)
         time.sleep(0.4)
-        (folder / f"page_{name}.png").write_bytes(browser.screenshot())
+        (folder / f"{page}_{name}.png").write_bytes(browser.screenshot())
 
 
 def check_page(binaries, folder, browser, screenshots):
@@ -289,6 +346,7 @@ def main():
         make_lively(folder / "model.safetensors")
         with Browser(*programs, folder) as browser:
             check_page(binaries, folder, browser, screenshots)
+            check_probe(binaries, folder, browser, screenshots)
     print("the page does what it says")
     return 0
 
