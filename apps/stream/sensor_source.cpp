@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "apps/common/running/signals.h"
+#include "data/sensors/rest_tracker.h"
 #include "hardware/boards/sensor_reader.h"
 #include "hardware/collection/capture.h"
 #include "hardware/ports/errors.h"
@@ -68,12 +69,14 @@ class ReaderSource : public SensorSource {
  public:
   ReaderSource(OpenedPort opened, const Sensor& sensor)
       : SensorSource(1 / sensor.rate_hz, 0, opened.live, sensor.array, sensor.scale, sensor.silent()),
+        rest_(sensor),
         reader_(std::move(opened), sensor) {}
 
   std::optional<SensorFrame> next(double wait_s) override {
     auto frame = reader_.next(wait_s);
     if (!frame) return std::nullopt;
     frame_ = std::move(*frame);
+    rest_.follow(frame_.time_s, frame_.signals);
     return SensorFrame{.time_s = frame_.time_s, .volts = frame_.signals, .arrived_s = frame_.arrival_s};
   }
   bool ended() const override { return reader_.ended(); }
@@ -92,6 +95,7 @@ class ReaderSource : public SensorSource {
 
  private:
   ReadFrame frame_;
+  RestTracker rest_;
   SensorReader reader_;
 };
 
@@ -164,7 +168,7 @@ std::vector<Heard> listen(const std::string& port, double seconds) {
 
 std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup) {
   constexpr std::string_view kSerial = "serial:";
-  const bool calibrated = !sensor.rest.empty() || !sensor.gain.empty();
+  const bool calibrated = !sensor.rest.empty() || !sensor.gain.empty() || sensor.follow_rest_s > 0;
   if (sensor.frame.kind == FrameKind::board && sensor.port.starts_with(kSerial) && !calibrated)
     return open_board(sensor.port.substr(kSerial.size(), sensor.port.rfind('@') - kSerial.size()), speedup,
                       "");

@@ -144,6 +144,8 @@ void Sensor::check() const {
     expect(list->empty() || list->size() == array.signals(), key,
            "a number for each of the " + std::to_string(array.signals()) + " signals",
            std::to_string(list->size()));
+  expect(follow_rest_s == 0 || (follow_rest_s >= 1 && follow_rest_s <= 3600), "follow_rest_s", "1 to 3600",
+         format(follow_rest_s));
   for (const float g : gain)
     expect(g >= 0.01F && g <= 100, "gain", "numbers of 0.01 to 100", format(double{g}));
   expect(std::ranges::all_of(rest, [](float r) { return std::isfinite(r); }), "rest", "finite numbers",

@@ -71,6 +71,7 @@ struct Sensor {
   std::vector<int> dead = {};  ///< taxels that say nothing
   std::vector<float> rest = {};  ///< of each signal where nothing touches; empty: scale.rest of all
   std::vector<float> gain = {};  ///< of each signal: what it is multiplied with from rest on; empty: 1 of all
+  double follow_rest_s = 0;      ///< time constant of RestTracker (data/sensors/rest_tracker.h); 0: none
 
   /// Values in a frame: fewer than array.signals() where the array has places without taxel.
   std::size_t values() const;

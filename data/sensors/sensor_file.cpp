@@ -188,6 +188,7 @@ Sensor sensor_of_json(const std::string& text, const std::string& where) {
     sensor.dead = keys.integers("dead");
     sensor.rest = keys.numbers("rest");
     sensor.gain = keys.numbers("gain");
+    sensor.follow_rest_s = keys.number("follow_rest_s", 0);
     keys.no_others();
     sensor.check();
     return sensor;
@@ -230,6 +231,7 @@ Json json_of(const Sensor& sensor) {
   if (!sensor.dead.empty()) json["dead"] = sensor.dead;
   for (const float rest : sensor.rest) json["rest"].push_back(rounded(double{rest}));
   for (const float gain : sensor.gain) json["gain"].push_back(rounded(double{gain}));
+  if (sensor.follow_rest_s > 0) json["follow_rest_s"] = sensor.follow_rest_s;
   return json;
 }
 

@@ -336,7 +336,7 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
   const auto found = candidate_of(bytes, heard, known, report.says);
   draft.name = "probed sensor";
   if (known) draft.name = known->name, draft.order = known->order;
-  if (known) draft.dead = known->dead, draft.gain = known->gain;
+  if (known) draft.dead = known->dead, draft.gain = known->gain, draft.follow_rest_s = known->follow_rest_s;
   if (!found) return report;
   const std::size_t values = found->array.signals();
   if (known && known->values() != values) {

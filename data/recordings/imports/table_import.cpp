@@ -6,6 +6,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "data/sensors/rest_tracker.h"
 #include "io/files/file.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
@@ -235,10 +236,13 @@ Recording recording_of_table(const std::string& path, const Table& table, const 
   const std::size_t signals = sensor.array.signals();
   recording.volts.resize(table.rows() * signals);
   std::vector<float> sent(sensor.values());
+  RestTracker rest(sensor);
   for (std::size_t i = 0; i < table.rows(); ++i) {
     for (std::size_t k = 0; k < sent.size(); ++k)
       sent[k] = static_cast<float>(table.row(i)[columns.values[k]]);
-    sensor.arrange(sent, std::span(recording.volts).subspan(i * signals, signals));
+    const auto frame = std::span(recording.volts).subspan(i * signals, signals);
+    sensor.arrange(sent, frame);
+    rest.follow(recording.time_s[i], frame);
     if (columns.x == Columns::kNone) continue;
     for (const std::size_t column : {columns.x, columns.y})
       recording.position_mm.push_back(checked_mm(path, table, column, table.row(i)[column]));

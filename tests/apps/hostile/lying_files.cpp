@@ -12,6 +12,7 @@
 #include "data/recordings/imports/table_import.h"
 #include "data/recordings/recording.h"
 #include "data/scores/baselines.h"
+#include "data/sensors/rest_tracker.h"
 #include "data/windows/windows.h"
 #include "hardware/boards/sensor_decoder.h"
 #include "hardware/boards/sensor_reader.h"
@@ -173,6 +174,7 @@ void use_sensor(const RandomStream& random) {
   nlohmann::ordered_json json = nlohmann::ordered_json::parse(
       R"({"name":"mat","rows":3,"columns":4,"pitch_mm":[5,5],"channels":1,"unit":"counts","pressed":"higher",
           "range":[40,900],"rate_hz":100,"port":"udp::5005","order":[0,1,2,3,4,5,6,7,8,9,10,11],"dead":[3],
+          "rest":[1,2,3,4,5,6,7,8,9,10,11,12],"gain":[1,1,1,1,1,1,2,2,2,2,2,2],"follow_rest_s":5,
           "frame":{"kind":"binary","header":"AA55","type":"u16","endian":"big","checksum":"sum8",
                    "time":{"type":"u32","unit":"ms"}}})");
   auto value = json.begin();
@@ -187,6 +189,7 @@ void use_sensor(const RandomStream& random) {
   sensor.check();
   const auto decoder = make_decoder(sensor);
   FrameDates dates(sensor);
+  RestTracker rest(sensor);
   std::vector<float> signals(sensor.array.signals());
   Bytes noise(20'000);
   for (std::size_t i = 0; i < noise.size(); ++i)
@@ -195,7 +198,7 @@ void use_sensor(const RandomStream& random) {
                              : static_cast<std::byte>(random.bits(100 + i / 7));
   decoder->push(noise, [&](const DecodedFrame& frame) {
     sensor.arrange(frame.values, signals);
-    (void)dates.date(frame.time_s, 1);
+    rest.follow(dates.date(frame.time_s, 1).value_or(0), signals);
   });
 }
 

@@ -282,6 +282,38 @@ TEST(SensorFiles, GainsAreFoundWhilePressing) {
   EXPECT_EQ(run_process("supertac-stream", {"--sensor", device.port(), "--gain"}).code, 2);
 }
 
+// What is recorded is what the tracker makes of the frames that were sent.
+TEST(SensorFiles, ARestThatDriftsIsFollowedWhereTheFileAsks) {
+  const TemporaryFolder folder;
+  Sensor sensor = example("csv_arduino");
+  sensor.dead.clear(), sensor.follow_rest_s = 3;
+  std::string bytes;
+  const auto sent = [&](int n) {  // 40 s of drift by a tenth of the range, and a finger for the last two
+    std::vector<double> values(sensor.values(),
+                               sensor.scale.rest - sensor.scale.span * 0.0025 * n / sensor.rate_hz);
+    if (n > 38 * sensor.rate_hz) values[3] -= 0.5 * sensor.scale.span;
+    return values;
+  };
+  const int frames = static_cast<int>(40 * sensor.rate_hz);
+  for (int n = 0; n < frames; ++n) bytes += sent_frame(sensor, sent(n), n / sensor.rate_hz);
+  sensor.port = folder / "bytes";
+  write_file(sensor.port, bytes);
+  write_sensor(folder / "sensor.json", sensor);
+  const std::string kept = folder / "kept";
+  const auto streamed =
+      run_process("supertac-stream", {"--sensor", folder / "sensor.json", "--record", kept, "--quiet"});
+  ASSERT_EQ(streamed.code, 0) << streamed.error;
+  const Recording recording = read_recording(kept + "/unknown_t1_p1_v0.safetensors");
+  const std::size_t signals = sensor.array.signals(), last = recording.frames() - 1;
+  ASSERT_GT(recording.frames(), static_cast<std::size_t>(frames) * 9 / 10);
+  const auto share = [&](std::size_t frame, std::size_t k) {
+    return (sensor.scale.rest - double{recording.volts[frame * signals + k]}) / sensor.scale.span;
+  };
+  EXPECT_NEAR(share(last / 2, 0), 0, 0.01);
+  EXPECT_NEAR(share(last, 0), 0, 0.02);
+  EXPECT_NEAR(share(last, 3), 0.5, 0.02);
+}
+
 TEST(SensorFiles, OthersAtThePortAreToldApart) {
   const TemporaryFolder folder;
   std::string noise, log;

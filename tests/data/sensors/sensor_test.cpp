@@ -75,6 +75,7 @@ TEST(Sensor, WritesWhatItReads) {
     sensor.frame = {.kind = static_cast<FrameKind>(kind)};
     sensor.rest.assign(12, 0.1F * static_cast<float>(kind));
     sensor.gain.assign(12, 0.3F * static_cast<float>(kind));
+    sensor.follow_rest_s = kind == 1 ? 0 : 2.5 * kind;
     if (kind == 2) sensor.frame.values = "taxels", sensor.frame.time = FrameTime{.key = "t", .unit_s = 1e-6};
     if (kind == 3)
       sensor.frame.header = "\xAA\x55", sensor.frame.trailer = "\n", sensor.frame.type = "i16",
@@ -103,7 +104,7 @@ TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
   EXPECT_EQ(refusal("rate_hz", 0.5), "mat.json: \"rate_hz\" must be 1 to 100000, found 0.5");
   EXPECT_EQ(refusal("pich_mm", 5),
             "mat.json: knows no key 'pich_mm'; it may have name, rows, columns, channels, pitch_mm, unit, "
-            "pressed, range, rate_hz, port, frame, order, dead, rest, gain");
+            "pressed, range, rate_hz, port, frame, order, dead, rest, gain, follow_rest_s");
   EXPECT_EQ(refusal("frame", nullptr),
             "mat.json: has no \"frame\", such as {\"kind\": \"text\"}; supertac-stream --probe finds it");
   EXPECT_EQ(refusal("frame.kind", "csv"),
@@ -136,6 +137,8 @@ TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
   Json gains(12, 1);
   gains[3] = 0;
   EXPECT_EQ(refusal("gain", gains), "mat.json: \"gain\" must be numbers of 0.01 to 100, found 0");
+  EXPECT_EQ(refusal("follow_rest_s", 0.5), "mat.json: \"follow_rest_s\" must be 1 to 3600, found 0.5");
+  EXPECT_EQ(refusal("follow_rest_s", "5"), "mat.json: \"follow_rest_s\" must be a number, found \"5\"");
   EXPECT_EQ(refusal("name", "a\nb"), "mat.json: \"name\" must be 1 to 200 printable characters, found 'a?b'");
 }
 
@@ -178,6 +181,7 @@ TEST(Sensor, MutatedFilesAreTakenOrRefusedInOneLine) {
   std::mt19937 random(1);
   Json mat = Json::parse(kMat);
   for (int k = 0; k < 12; ++k) mat["rest"].push_back(40 + k), mat["gain"].push_back(1 + 0.05 * k);
+  mat["follow_rest_s"] = 12.5;
   const std::string whole = mat.dump();
   std::size_t taken = 0;
   const int count = mutations(500);

@@ -190,12 +190,13 @@ TEST(Probe, KeepsTheOrderOfItsFile) {
   Sensor sensor = sensor_of(R"({"name":"cross","rows":3,"columns":3,"pressed":"higher","range":[100,900],
     "rate_hz":50,"frame":{"kind":"text"},"order":[6,-1,0,1,2,3,4,5,-1],"dead":[0]})");
   for (int k = 0; k < 9; ++k) sensor.rest.push_back(static_cast<float>(100 + 10 * k));
-  sensor.gain.assign(9, 2);
+  sensor.gain.assign(9, 2), sensor.follow_rest_s = 7;
   const ProbeReport report = probe(sent(sensor, 3), "here", sensor);
   ASSERT_TRUE(report.draft) << all(report);
   EXPECT_EQ(report.draft->name, "cross");
   EXPECT_EQ(report.draft->order, sensor.order);
   EXPECT_EQ(report.draft->gain, sensor.gain);
+  EXPECT_EQ(report.draft->follow_rest_s, 7);
   EXPECT_EQ(report.draft->dead, (std::vector{0, 7})) << "the sixth place is the stuck one";
   ASSERT_EQ(report.draft->rest.size(), 9U);
   for (const std::size_t place : {0U, 1U, 4U})

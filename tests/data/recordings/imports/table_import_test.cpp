@@ -118,6 +118,21 @@ TEST_F(TableImport, TaxelsStandInTheSensorsOrder) {
   EXPECT_EQ(import(file(text), "", sensor).volts[0], 80.0F);
 }
 
+TEST_F(TableImport, ADriftIsTakenAwayWhereTheSensorsFileAsks) {
+  std::string text;
+  for (int i = 0; i < 6000; ++i) {  // a minute in which the first taxel rises by 60 of 860, and then a press
+    const int press = i >= 5900 ? 300 : 0;
+    text += std::to_string(40 + i / 100 + press) + ",40,40,40\n";
+  }
+  Sensor sensor = mat();
+  EXPECT_EQ(import(file(text), "", sensor).volts[4 * 5800], 98);
+  sensor.follow_rest_s = 5;
+  const Recording r = import(file(text), "", sensor);
+  for (const std::size_t i : {2000U, 4000U, 5800U}) EXPECT_NEAR(r.volts[4 * i], 40, 6) << i;
+  EXPECT_NEAR(r.volts[4 * 5999UL], 340, 6);
+  EXPECT_FLOAT_EQ(r.volts[4 * 5999UL + 1], 40);
+}
+
 TEST_F(TableImport, ACoarseClockIsSpread) {
   std::string text;
   for (int i = 0; i < 40; ++i) text += std::to_string(i / 4 * 40) + ",50,60,70,80\n";

@@ -1,0 +1,47 @@
+#include "data/sensors/rest_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace supertac {
+namespace {
+
+constexpr double kMeanS = 0.2, kFreeS = 1, kMostStepS = 1;
+constexpr double kBand = 0.03, kMostBand = 0.15, kGrowthPerS = 2e-4, kMargin = 1.25;
+
+}  // namespace
+
+RestTracker::RestTracker(const Sensor& sensor)
+    : scale_(sensor.scale),
+      either_way_(sensor.array.channels == 3),
+      time_constant_s_(sensor.follow_rest_s),
+      before_s_(std::numeric_limits<double>::quiet_NaN()),
+      band_(kMostBand),
+      mean_(sensor.array.signals(), std::numeric_limits<double>::quiet_NaN()),
+      rest_(sensor.array.signals(), sensor.scale.rest) {}
+
+void RestTracker::follow(double time_s, std::span<float> signals) {
+  if (time_constant_s_ == 0) return;
+  const double dt = std::isnan(before_s_) ? 0 : std::clamp(time_s - before_s_, 0.0, kMostStepS);
+  before_s_ = time_s;
+  double away = 0;
+  for (std::size_t s = 0; s < signals.size(); ++s) {
+    const double signal = double{signals[s]};
+    if (!std::isfinite(signal)) continue;
+    mean_[s] = std::isnan(mean_[s]) ? signal : mean_[s] + std::min(1.0, dt / kMeanS) * (signal - mean_[s]);
+    const double pressed = (rest_[s] - mean_[s]) / scale_.span;
+    away = std::max(away, either_way_ ? std::abs(pressed) : pressed);
+  }
+  free_s_ = away < band_ ? free_s_ + dt : 0;
+  if (free_s_ == 0) band_ = std::min(kMostBand, band_ + kGrowthPerS * dt);
+  if (free_s_ > kFreeS) {
+    band_ = std::max(kBand, std::min(band_, kMargin * away));
+    for (std::size_t s = 0; s < signals.size(); ++s)
+      if (!std::isnan(mean_[s])) rest_[s] += std::min(1.0, dt / time_constant_s_) * (mean_[s] - rest_[s]);
+  }
+  for (std::size_t s = 0; s < signals.size(); ++s)
+    signals[s] = static_cast<float>(double{signals[s]} - rest_[s] + scale_.rest);
+}
+
+}  // namespace supertac
