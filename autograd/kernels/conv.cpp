@@ -47,6 +47,15 @@ void for_each_meeting(const ConvSizes& s, Meet meet) {
   }
 }
 
+// Calls add(a, b, c) for each x[a], w[b] and y[c] that a meeting joins: x [p, i], w [tap, i, o], y [q, o].
+template <class Add>
+void for_each_product(const ConvSizes& s, Add add) {
+  for_each_meeting(s, [&](Dim tap, Dim p, Dim q) {
+    for (Dim i = 0; i < s.cin; ++i)
+      for (Dim o = 0; o < s.cout; ++o) add(p * s.cin + i, (tap * s.cin + i) * s.cout + o, q * s.cout + o);
+  });
+}
+
 }  // namespace
 
 // x [p, i], w [tap, i, o], bias [o], y [q, o]:   y[q, o] = f(bias[o] + sum of x[p, i] w[tap, i, o])
@@ -56,14 +65,8 @@ void conv(const ConvSizes& s, const real* x, const real* w, const real* bias, re
   for (Dim q = 0; q < pixels; ++q) {
     for (Dim o = 0; o < s.cout; ++o) y[q * s.cout + o] = bias != nullptr ? bias[o] : 0;
   }
-  for_each_meeting(s, [&](Dim tap, Dim p, Dim q) {
-    for (Dim i = 0; i < s.cin; ++i) {
-      for (Dim o = 0; o < s.cout; ++o) {
-        real& sum = y[q * s.cout + o];
-        sum = std::fma(x[p * s.cin + i], w[(tap * s.cin + i) * s.cout + o], sum);  // rounds once, as in fast/
-      }
-    }
-  });
+  // Rounds once, as in fast/.
+  for_each_product(s, [&](Dim a, Dim b, Dim c) { y[c] = std::fma(x[a], w[b], y[c]); });
   std::transform(y, y + pixels * s.cout, y, Rectifier(negative_slope));
 }
 
@@ -71,28 +74,14 @@ void conv(const ConvSizes& s, const real* x, const real* w, const real* bias, re
 void conv_grad_x(const ConvSizes& s, const real* gy, const real* w, Into into, real* gx) {
   if (!is_plain()) return fast::conv_grad_x(s, gy, w, into, gx);
   if (into == Into::overwrite) std::fill_n(gx, s.images * s.in_pixels() * s.cin, real(0));
-  for_each_meeting(s, [&](Dim tap, Dim p, Dim q) {
-    for (Dim i = 0; i < s.cin; ++i) {
-      for (Dim o = 0; o < s.cout; ++o) {
-        real& sum = gx[p * s.cin + i];
-        sum = std::fma(gy[q * s.cout + o], w[(tap * s.cin + i) * s.cout + o], sum);
-      }
-    }
-  });
+  for_each_product(s, [&](Dim a, Dim b, Dim c) { gx[a] = std::fma(gy[c], w[b], gx[a]); });
 }
 
 // gw [tap, i, o] = or += sum of x[p, i] gy[q, o]
 void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, Into into, real* gw) {
   if (!is_plain()) return fast::conv_grad_w(s, x, gy, into, gw);
   if (into == Into::overwrite) std::fill_n(gw, s.conv.taps() * s.cin * s.cout, real(0));
-  for_each_meeting(s, [&](Dim tap, Dim p, Dim q) {
-    for (Dim i = 0; i < s.cin; ++i) {
-      for (Dim o = 0; o < s.cout; ++o) {
-        real& sum = gw[(tap * s.cin + i) * s.cout + o];
-        sum = std::fma(x[p * s.cin + i], gy[q * s.cout + o], sum);
-      }
-    }
-  });
+  for_each_product(s, [&](Dim a, Dim b, Dim c) { gw[b] = std::fma(x[a], gy[c], gw[b]); });
 }
 
 void bias_grad(Dim rows, Dim cout, const real* gy, Into into, real* gb) {
