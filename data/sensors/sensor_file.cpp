@@ -103,6 +103,12 @@ FrameFormat format_of(const Json& json, const std::string& where) {
   return f;
 }
 
+std::vector<float> floats_of(JsonObject& keys, const char* name) {
+  std::vector<float> list;
+  for (const double number : keys.numbers(name)) list.push_back(static_cast<float>(number));
+  return list;
+}
+
 std::vector<int> take_order(JsonObject& keys, const TaxelArray& array) {
   const Json* value = keys.find("order");
   if (value == nullptr || *value == "row-major") return {};
@@ -186,8 +192,8 @@ Sensor sensor_of_json(const std::string& text, const std::string& where) {
     sensor.frame = format_of(*frame, where);
     sensor.order = take_order(keys, sensor.array);
     sensor.dead = keys.integers("dead");
-    sensor.rest = keys.numbers("rest");
-    sensor.gain = keys.numbers("gain");
+    sensor.rest = floats_of(keys, "rest");
+    sensor.gain = floats_of(keys, "gain");
     sensor.follow_rest_s = keys.number("follow_rest_s", 0);
     keys.no_others();
     sensor.check();

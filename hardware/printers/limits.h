@@ -4,15 +4,21 @@
 
 #include "hardware/printers/marlin_line.h"
 
-/// A box; and below kClearanceZ only over the plate, so that the finger never runs into the plate's side.
-namespace supertac::limits {
+namespace supertac {
 
-constexpr Point3 kLow{0, 0, 0}, kHigh = rig::kBed;
-constexpr double kClearanceZ = 95;  ///< lowest z (mm) that is free everywhere
+/// A box; and below clearance_z() only over the plate, so that the finger never runs into the plate's side.
+/// By default the rig's.
+struct Limits {
+  Point3 low{0, 0, 0}, high = rig::kBed;
+  Point3 plate = rig::kPlate;  ///< its corner of least x and y, at the slide's height
 
-/// Throws OutsideLimits naming the axis, the value and the limit.
-void check_target(const Point3& target);
-/// Checks both ends and the straight line between them.
-void check_path(const Point3& from, const Point3& to);
+  /// Lowest z (mm) that is free everywhere: 3.19 above the slide.
+  double clearance_z() const;
+  /// Throws OutsideLimits naming the axis, the value and the limit.
+  void check_target(const Point3& target) const;
+  /// Checks both ends and the straight line between them.
+  void check_path(const Point3& from, const Point3& to) const;
+  bool operator==(const Limits&) const = default;
+};
 
-}  // namespace supertac::limits
+}  // namespace supertac

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hardware/printers/limits.h"
-
 namespace supertac {
 namespace {
 
@@ -71,11 +69,16 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
   return legs;
 }
 
+std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here, const Limits& limits) {
+  std::vector<Leg> legs = legs_of(plan, here);
+  for (const Leg& leg : legs) limits.check_path(leg.from, leg.to);
+  return legs;
+}
+
 std::string palpation_program(const PalpationPlan& plan, const Point3& origin, const std::string& title) {
   if (title.find_first_of("\r\n") != std::string::npos)
     throw std::invalid_argument("palpation_program: the title has a line break, which would end its comment");
-  const std::vector<Leg> legs = legs_of(plan, origin);
-  for (const Leg& leg : legs) limits::check_path(leg.from, leg.to);
+  const std::vector<Leg> legs = legs_of(plan, origin, {});
   std::string text =
       "; " + title + "\n; Lengths in mm, F in mm/min. The finger is lifted before every way " +
       "to another pass.\n; Send it only with the head at " + describe(origin) +
@@ -95,12 +98,11 @@ Palpation::Palpation(Printer& printer, const PalpationPlan& plan, PalpationObser
     : printer_(printer), plan_(plan), observer_(std::move(observer)) {}
 
 PalpationOutcome Palpation::run() {
-  std::vector<Leg> legs = legs_of(plan_, printer_.target());
   if (printer_.origin() == Printer::Origin::unknown) {
     throw OriginUnknown(
         "palpation: the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
   }
-  for (const Leg& leg : legs) limits::check_path(leg.from, leg.to);
+  std::vector<Leg> legs = legs_of(plan_, printer_.target(), printer_.limits());
   for (const Leg& leg : legs) longest_leg_s_ = std::max(longest_leg_s_, ordered_s(leg));
   PalpationOutcome outcome;
   printer_.link().set_watch(observer_.check);

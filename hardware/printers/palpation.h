@@ -26,6 +26,7 @@ struct PalpationPlan {
   double speed_z = rig::kLiftMmS;
   double travel_speed = rig::kFastestMmS;
   double poll_interval_s = 0.01;
+  bool operator==(const PalpationPlan&) const = default;
 };
 
 /// One straight part of a run.
@@ -70,6 +71,8 @@ struct PalpationOutcome {
 /// All legs of the plan, from `here` and back (at lifting height or above). Palpation adds some short ones in
 /// the air where a firmware has no M114 R. Throws std::invalid_argument for a plan that makes no sense.
 std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here);
+/// The same; throws OutsideLimits where a target or the way to it is not allowed.
+std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here, const Limits& limits);
 
 /// The palpation run as G-code, for people who send it from another host: the moves of Palpation::run, in
 /// the same lines, with M400 behind each. It begins with a pause (M0) in which the operator confirms that the

@@ -62,12 +62,12 @@ void Printer::home() {
   }
   target_ = agreed_position();
   origin_ = Origin::homed;
-  const double missing = limits::kClearanceZ - target_.z;
+  const double missing = limits_.clearance_z() - target_.z;
   if (missing > 0) lift(missing);
 }
 
 void Printer::confirm_origin(const Point3& here) {
-  limits::check_target(here);
+  limits_.check_target(here);
   link_.command("M400", kHomeDeadline);
   link_.command(link_.capabilities().klipper ? "SET_KINEMATIC_POSITION X=" + format(here.x, 3) +
                                                    " Y=" + format(here.y, 3) + " Z=" + format(here.z, 3)
@@ -92,7 +92,7 @@ MarlinLink::Answer Printer::start_move(const Point3& target, double speed_mm_s) 
   }
   if (!(speed_mm_s > 0) || !std::isfinite(speed_mm_s))
     throw std::invalid_argument("printer: expected a speed above 0 mm/s, got " + format(speed_mm_s));
-  limits::check_path(target_, target);
+  limits_.check_path(target_, target);
   const double length = distance(target_, target);
   MarlinLink::Answer answer = link_.command(move_command(target, speed_mm_s));
   target_ = target;
@@ -210,7 +210,7 @@ Printer::Stop Printer::emergency_stop() {
 void Printer::lift(double mm, double speed_mm_s) {
   const Point3 here = agreed_position();
   Point3 above = here;
-  above.z = std::min(here.z + mm, limits::kHigh.z);
+  above.z = std::min(here.z + mm, limits_.high.z);
   // Not through start_move(): a lift is the way out of a position that the limits forbid.
   link_.command("G1 Z" + format(above.z, 3) + " F" + format(60 * speed_mm_s, 1));
   target_ = above;

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "hardware/printers/limits.h"
 #include "hardware/printers/marlin_link.h"
 
 namespace supertac {
@@ -29,7 +30,7 @@ class Printer {
   };
 
   /// `port` must outlive the printer.
-  explicit Printer(Port& port) : link_(port) {}
+  explicit Printer(Port& port, const Limits& limits = {}) : link_(port), limits_(limits) {}
 
   /// Finds the firmware; throws as MarlinLink::connect. The origin is unknown then: Marlin cannot tell
   /// whether its coordinates mean anything.
@@ -69,12 +70,14 @@ class Printer {
   void lift(double mm, double speed_mm_s = rig::kLiftMmS);
 
   const Point3& target() const { return target_; }
+  const Limits& limits() const { return limits_; }
   MarlinLink& link() { return link_; }
 
  private:
   bool stands_still();
 
   MarlinLink link_;
+  Limits limits_;
   Origin origin_ = Origin::unknown;
   Point3 target_;
   double expected_seconds_ = 0;  // of the moves since the last finish

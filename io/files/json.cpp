@@ -167,13 +167,13 @@ std::vector<int> JsonObject::integers(const char* name) {
   return list;
 }
 
-std::vector<float> JsonObject::numbers(const char* name) {
+std::vector<double> JsonObject::numbers(const char* name) {
   const Tree* value = find(name);
   if (value == nullptr) return {};
-  std::vector<float> list;
+  std::vector<double> list;
   for (const Tree& element : value->is_array() ? *value : Tree::array({nullptr})) {
     if (!element.is_number()) wrong(name, "a list of numbers", *value);
-    list.push_back(element.get<float>());
+    list.push_back(element.get<double>());
   }
   return list;
 }

@@ -52,7 +52,7 @@ class JsonObject {
   bool flag(const char* name, bool fallback);
   /// None when it is absent.
   std::vector<int> integers(const char* name);
-  std::vector<float> numbers(const char* name);
+  std::vector<double> numbers(const char* name);
   /// The value of one of the names of a table.
   template <class Table>
   auto one_of(const char* name, const Table& table, const std::optional<std::string>& fallback = {}) {

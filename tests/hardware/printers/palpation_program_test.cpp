@@ -65,12 +65,12 @@ TEST(PalpationProgram, IsAbsoluteWithinLimitsAndEndsLifted) {
   int slides = 0;
   for (const std::string& move : moves_in(program)) {
     const Point3 to = target_of(move);
-    EXPECT_NO_THROW(limits::check_path(here, to)) << move;
+    EXPECT_NO_THROW(Limits{}.check_path(here, to)) << move;
     const bool sideways = here.x != to.x;
     if (sideways) {
       EXPECT_GE(std::min(here.z, to.z), plan.start.z + plan.lift) << move;
     }
-    if (here.y != to.y && to.z < limits::kClearanceZ) {
+    if (here.y != to.y && to.z < Limits{}.clearance_z()) {
       ++slides;
       EXPECT_NEAR(to.y - here.y, 108, 1e-9);
       EXPECT_TRUE(move.ends_with(" F600.0")) << move;

@@ -15,18 +15,18 @@ using rig::kMounted;
 
 TEST(Limits, NameTheAxisAndCheckTheWay) {
   EXPECT_ERROR(
-      limits::check_target({500, 100, 100}), OutsideLimits,
+      Limits{}.check_target({500, 100, 100}), OutsideLimits,
       "limits: X expected 0.00 to 235.00 mm, found 500.00; nothing was sent, correct the plan or the limits");
-  EXPECT_ERROR(limits::check_target({100, -1, 100}), OutsideLimits,
+  EXPECT_ERROR(Limits{}.check_target({100, -1, 100}), OutsideLimits,
                "Y expected 0.00 to 235.00 mm, found -1.00");
-  EXPECT_ERROR(limits::check_target({100, 100, NAN}), OutsideLimits,
+  EXPECT_ERROR(Limits{}.check_target({100, 100, NAN}), OutsideLimits,
                "Z expected 0.00 to 250.00 mm, found no number");
-  EXPECT_NO_THROW(limits::check_path({99.7, 101.17, 91.81}, {99.7, 209.17, 91.81}));
+  EXPECT_NO_THROW(Limits{}.check_path({99.7, 101.17, 91.81}, {99.7, 209.17, 91.81}));
   // Both ends are allowed, the way between them runs through the plate's side.
-  EXPECT_ERROR(limits::check_path({50, 101.17, 96}, {99.7, 101.17, 91.81}), OutsideLimits,
+  EXPECT_ERROR(Limits{}.check_path({50, 101.17, 96}, {99.7, 101.17, 91.81}), OutsideLimits,
                "the way from X50.00 Y101.17 Z96.00 to X99.70 Y101.17 Z91.81 passes");
   try {
-    limits::check_target({500, 100, 100});
+    Limits{}.check_target({500, 100, 100});
   } catch (const OutsideLimits& error) {
     EXPECT_NE(std::string(error.what()).find("X expected 0.00 to 235.00 mm, found 500.00"),
               std::string::npos);
