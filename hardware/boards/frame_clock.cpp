@@ -44,9 +44,8 @@ Line least_squares(const Points& points, const std::vector<bool>& used) {
 
 }  // namespace
 
-void ClockEstimator::add(std::uint64_t index, double arrival_s) {
-  const Point point{static_cast<double>(index), arrival_s};
-  const auto lateness = [](const Point& p) { return p.arrival - rig::kFramePeriodS * p.index; };
+void ClockEstimator::add(double index, double arrival_s) {
+  const Point point{index, arrival_s};
   if (in_block_ == 0 || lateness(point) < lateness(earliest_)) earliest_ = point;
   if (++in_block_ >= block_) close_block();
 }
@@ -55,20 +54,19 @@ void ClockEstimator::close_block() {
   points_.push_back(earliest_);
   in_block_ = 0;
   if (points_.size() < kMostPoints) return;
-  const auto lateness = [](const Point& p) { return p.arrival - rig::kFramePeriodS * p.index; };
   for (std::size_t i = 0; i < points_.size() / 2; ++i) {
     points_[i] = std::min(points_[2 * i], points_[2 * i + 1],
-                          [&](const Point& a, const Point& b) { return lateness(a) < lateness(b); });
+                          [this](const Point& a, const Point& b) { return lateness(a) < lateness(b); });
   }
   points_.resize(points_.size() / 2);
   block_ *= 2;
 }
 
 ClockFit ClockEstimator::fit() const {
-  ClockFit fit;
+  ClockFit fit{.period_s = period_, .measured_s = period_};
   const auto nominal_offset = [this] {
-    double offset = earliest_.arrival - rig::kFramePeriodS * earliest_.index;
-    for (const Point& p : points_) offset = std::min(offset, p.arrival - rig::kFramePeriodS * p.index);
+    double offset = lateness(earliest_);
+    for (const Point& p : points_) offset = std::min(offset, lateness(p));
     return offset;
   };
   if (points_.size() < 8) {
@@ -89,9 +87,9 @@ ClockFit ClockEstimator::fit() const {
   fit.period_s = line.slope;
   fit.offset_s = line.intercept;
   fit.measured_s = line.slope;
-  fit.plausible = std::abs(line.slope / rig::kFramePeriodS - 1) <= 0.005;
+  fit.plausible = std::abs(line.slope / period_ - 1) <= tolerance_;
   if (!fit.plausible) {
-    fit.period_s = rig::kFramePeriodS;
+    fit.period_s = period_;
     fit.offset_s = nominal_offset();
   }
   return fit;
@@ -232,7 +230,8 @@ FrameTimeline timeline_of(std::span<const FrameArrival> arrivals) {
     ClockEstimator estimator;
     for (std::size_t i = 0; i < arrivals.size(); ++i) {
       const bool last = i + 1 == arrivals.size() || arrivals[i + 1].time_s != arrivals[i].time_s;
-      if (last && timeline.places[i].doubt == 0) estimator.add(timeline.places[i].index, arrivals[i].time_s);
+      if (last && timeline.places[i].doubt == 0)
+        estimator.add(static_cast<double>(timeline.places[i].index), arrivals[i].time_s);
     }
     timeline.missing = numbering.missing();
     timeline.clock = estimator.fit();

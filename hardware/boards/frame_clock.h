@@ -29,8 +29,11 @@ struct ClockFit {
 /// grow in number.
 class ClockEstimator {
  public:
+  /// `tolerance`: what is plausible, a share of the nominal period.
+  explicit ClockEstimator(double period_s = rig::kFramePeriodS, double tolerance = 0.005)
+      : period_(period_s), tolerance_(tolerance) {}
   /// To be called for the last frame of a read only: those before it have waited in the port.
-  void add(std::uint64_t index, double arrival_s);
+  void add(double index, double arrival_s);
   /// Before there are 8 blocks of 16 frames: the nominal period, in a line below all arrivals.
   ClockFit fit() const;
 
@@ -39,6 +42,8 @@ class ClockEstimator {
     double index, arrival;
   };
   void close_block();
+  double lateness(const Point& point) const { return point.arrival - period_ * point.index; }
+  double period_, tolerance_;
   std::vector<Point> points_;
   Point earliest_{};
   std::uint64_t in_block_ = 0, block_ = 16;

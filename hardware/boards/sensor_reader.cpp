@@ -95,6 +95,7 @@ std::optional<double> FrameDates::by_stamp(double stamp_s, double arrival_s) {
 double FrameDates::by_arrival(double arrival_s, std::size_t behind) {
   if (stored_) return count_ == 0 ? arrival_s : last_s_ + nominal_s_;
   const double waited_s = static_cast<double>(behind) * period_s_;
+  if (arrival_s - last_arrival_s_ > 0.5 * period_s_) doubt_s_ = 0;  // no longer of a burst
   ++since_sync_;
   if (count_ == 0) {
     synchronised_s_ = arrival_s, since_sync_ = 0;
@@ -109,6 +110,8 @@ double FrameDates::by_arrival(double arrival_s, std::size_t behind) {
       const double found = (arrival_s - synchronised_s_) / static_cast<double>(since_sync_);
       period_s_ = std::clamp(found, 0.1 * nominal_s_, 10 * nominal_s_);
       resynchronised_ = true;
+    } else {
+      doubt_s_ = late;  // those that were lost may be any of this burst
     }
     synchronised_s_ = arrival_s, since_sync_ = 0, in_block_ = 0;
     return arrival_s - waited_s;
@@ -125,13 +128,84 @@ double FrameDates::by_arrival(double arrival_s, std::size_t behind) {
   return late >= 0 ? due : std::max(arrival_s - waited_s, earliest);
 }
 
+ReaderCounters::operator BoardCounters() const {
+  BoardCounters counters;
+  counters.decoder = {decoder.bytes, decoder.frames, decoder.discarded_bytes};
+  counters.dropped = dropped;
+  counters.missing = missing;
+  counters.suspect = decoder.torn + damaged + late;
+  counters.clock.period_s = period_s;
+  return counters;
+}
+
+FrameReader::FrameReader(const Sensor& sensor, bool stored)
+    : sensor_(sensor), decoder_(make_decoder(sensor)), dates_(sensor, stored) {
+  frame_.signals.resize(sensor.array.signals());
+}
+
+double FrameReader::read(Port& port, bool live, const Sink& sink) {
+  std::array<std::byte, kReadBytes> buffer;
+  Received got = port.read(buffer, port.now() + kReadSlice);
+  const auto bytes = std::span(buffer).first(got.count);
+  if (decoder_->counters().frames == 0 && beginning_.size() < kShown)
+    for (const std::byte byte : bytes) beginning_ += std::to_integer<char>(byte);
+  times_read_s_.clear(), values_read_.clear();
+  const auto keep = [&](const DecodedFrame& frame) {
+    times_read_s_.push_back(frame.time_s);
+    values_read_.insert(values_read_.end(), frame.values.begin(), frame.values.end());
+  };
+  decoder_->push(bytes, keep);
+  // A host that stood still finds what waited meanwhile in several reads.
+  const bool stood_still = got.time_s - std::exchange(last_read_s_, got.time_s) > kChunkS;
+  std::exception_ptr end;  // what came before it is handed over first
+  try {
+    for (int more = 0; stood_still && live && more < kMostReads; ++more) {
+      const Received rest = port.read(buffer, port.now());
+      if (rest.count == 0) break;
+      decoder_->push(std::span(buffer).first(rest.count), keep);
+      got.time_s = rest.time_s;
+    }
+  } catch (...) {
+    end = std::current_exception();
+  }
+  const std::size_t count = times_read_s_.size(), size = sensor_.values();
+  for (std::size_t n = 0; n < count; ++n)
+    take({std::span(values_read_).subspan(n * size, size), times_read_s_[n]}, got.time_s, count - 1 - n,
+         sink);
+  if (end) std::rethrow_exception(end);
+  return got.time_s;
+}
+
+void FrameReader::finish(double time_s, const Sink& sink) {
+  const std::byte end{'\n'};
+  if (sensor_.frame.kind == FrameKind::text || sensor_.frame.kind == FrameKind::json)
+    decoder_->push({&end, 1}, [&](const DecodedFrame& frame) { take(frame, time_s, 0, sink); });
+}
+
+void FrameReader::take(const DecodedFrame& decoded, double arrival_s, std::size_t behind, const Sink& sink) {
+  sensor_.arrange(decoded.values, frame_.signals);
+  const bool damaged = !std::ranges::all_of(frame_.signals, [](float v) { return std::isfinite(v); }) ||
+                       (decoded.time_s && !std::isfinite(*decoded.time_s));
+  const auto time = damaged ? std::nullopt : dates_.date(decoded.time_s, arrival_s, behind);
+  damaged_ += damaged ? 1 : 0, late_ += !damaged && !time ? 1 : 0;
+  if (!time) return;
+  frame_.time_s = *time, frame_.arrival_s = arrival_s;
+  sink(frame_);
+}
+
+ReaderCounters FrameReader::counters() const {
+  return {.decoder = decoder_->counters(),
+          .damaged = damaged_,
+          .late = late_,
+          .missing = dates_.missing(),
+          .period_s = dates_.period_s()};
+}
+
 SensorReader::SensorReader(OpenedPort opened, const Sensor& sensor)
     : port_(std::move(opened.port)),
       live_(opened.live),
       sensor_(sensor),
-      decoder_(make_decoder(sensor)),
-      dates_(sensor, opened.stored),
-      signals_(sensor.array.signals()),
+      frames_(sensor, opened.stored),
       last_frame_s_(port_->now()),
       thread_([this] { run(); }) {}
 
@@ -147,20 +221,23 @@ void SensorReader::stop() {
 }
 
 void SensorReader::run() {
+  double time_s = last_frame_s_;
   try {
     for (bool stopped = false; !stopped;) {
-      read_once();
+      time_s = frames_.read(*port_, live_, sink_);
+      check_silence(time_s);
       const std::lock_guard lock(mutex_);
+      count();
       stopped = stop_;
     }
-  } catch (const PortEnded&) {  // nothing is wrong, and the last line may have no end
-    const std::byte end{'\n'};
-    if (sensor_.frame.kind == FrameKind::text || sensor_.frame.kind == FrameKind::json)
-      decoder_->push({&end, 1}, [&](const DecodedFrame& frame) { take(frame, port_->now(), 0); });
+  } catch (const PortEnded&) {  // nothing is wrong, but with one that was to go on
+    frames_.finish(time_s, sink_);
     const std::lock_guard lock(mutex_);
-    counters_.decoder = decoder_->counters();
+    count();
+    if (live_) error_ = std::current_exception();
   } catch (...) {
     const std::lock_guard lock(mutex_);
+    count();
     error_ = std::current_exception();
   }
   const std::lock_guard lock(mutex_);
@@ -168,52 +245,30 @@ void SensorReader::run() {
   arrived_.notify_all();
 }
 
-void SensorReader::read_once() {
-  std::array<std::byte, kReadBytes> buffer;
-  Received got = port_->read(buffer, port_->now() + kReadSlice);
-  const auto bytes = std::span(buffer).first(got.count);
-  if (decoder_->counters().frames == 0 && beginning_.size() < kShown)
-    for (const std::byte byte : bytes) beginning_ += std::to_integer<char>(byte);
-  times_read_s_.clear(), values_read_.clear();
-  const auto keep = [&](const DecodedFrame& frame) {
-    times_read_s_.push_back(frame.time_s);
-    values_read_.insert(values_read_.end(), frame.values.begin(), frame.values.end());
-  };
-  decoder_->push(bytes, keep);
-  // A host that stood still finds what waited meanwhile in several reads.
-  const bool stood_still = got.time_s - std::exchange(last_read_s_, got.time_s) > kChunkS;
-  std::exception_ptr end;  // what came before it is handed over first
-  try {
-    for (int more = 0; stood_still && live_ && more < kMostReads; ++more) {
-      const Received rest = port_->read(buffer, port_->now());
-      if (rest.count == 0) break;
-      decoder_->push(std::span(buffer).first(rest.count), keep);
-      got.time_s = rest.time_s;
-    }
-  } catch (...) {
-    end = std::current_exception();
-  }
-  const std::size_t count = times_read_s_.size(), size = sensor_.values();
-  for (std::size_t n = 0; n < count; ++n)
-    take({std::span(values_read_).subspan(n * size, size), times_read_s_[n]}, got.time_s, count - 1 - n);
-  if (end) std::rethrow_exception(end);
-  check_silence(got.time_s);
-  const std::lock_guard lock(mutex_);
-  counters_.decoder = decoder_->counters();
-  counters_.missing = dates_.missing(), counters_.period_s = dates_.period_s();
+// With mutex_ held.
+void SensorReader::count() {
+  const std::uint64_t dropped = counters_.dropped;
+  counters_ = frames_.counters();
+  counters_.dropped = dropped;
+}
+
+double SensorReader::silence_s(const Sensor& sensor) {
+  return std::max(kSilenceS, kSilentPeriods / sensor.rate_hz);
 }
 
 void SensorReader::check_silence(double time_s) {
-  const double silence_s = std::max(kSilenceS, kSilentPeriods / sensor_.rate_hz);
-  if (!live_ || time_s - last_frame_s_ < silence_s) return;
-  const SensorDecoder::Counters& counted = decoder_->counters();
+  const SensorDecoder::Counters counted = frames_.counters().decoder;
+  if (std::exchange(decoded_, counted.frames) != counted.frames) last_frame_s_ = time_s;
+  if (!live_ || time_s - last_frame_s_ < silence_s(sensor_)) return;
   const std::string at = "sensor " + sensor_.name + " at " + port_->name() + ": ";
   if (counted.frames == 0 && counted.bytes > 0)
     throw WrongDevice(at + "expected frames of " + std::to_string(sensor_.values()) + " values, found " +
                       std::to_string(counted.bytes) + " bytes without one, such as '" +
-                      printable(beginning_, kShown) + "'; supertac-stream --probe says what they are");
+                      printable(frames_.beginning(), kShown) +
+                      "'; supertac-stream --probe says what they are");
   throw BoardSilent(at + "expected " + format(sensor_.rate_hz, 0) + " frames/s, found none for " +
-                    format(silence_s, 1) + " s; see whether it is switched on and sends to this port");
+                    format(silence_s(sensor_), 1) +
+                    " s; see whether it is switched on and sends to this port");
 }
 
 // Right after the start: a clock in another unit than the file says is a thousand times too fast or too slow.
@@ -234,16 +289,10 @@ void SensorReader::check_clock(double time_s, double arrival_s) {
                     " s a second; see whether its file names the right column and unit (s, ms, us) of time");
 }
 
-void SensorReader::take(const DecodedFrame& decoded, double arrival_s, std::size_t behind) {
-  last_frame_s_ = arrival_s;
-  sensor_.arrange(decoded.values, signals_);
-  const bool damaged = !std::ranges::all_of(signals_, [](float v) { return std::isfinite(v); }) ||
-                       (decoded.time_s && !std::isfinite(*decoded.time_s));
-  const auto time = damaged ? std::nullopt : dates_.date(decoded.time_s, arrival_s, behind);
-  if (time && live_ && decoded.time_s && !clock_checked_) check_clock(*time, arrival_s);
+void SensorReader::take(const ReadFrame& frame) {
+  if (live_ && sensor_.frame.time && !clock_checked_) check_clock(frame.time_s, frame.arrival_s);
   std::unique_lock lock(mutex_);
-  counters_.damaged += damaged ? 1 : 0, counters_.late += !damaged && !time ? 1 : 0;
-  if (!time) return;
+  count();
   if (!live_) {
     taken_.wait(lock, [&] { return queue_.size() < kQueueFrames || stop_; });
     if (stop_) return;
@@ -251,7 +300,7 @@ void SensorReader::take(const DecodedFrame& decoded, double arrival_s, std::size
     queue_.pop_front();
     ++counters_.dropped;
   }
-  queue_.push_back({signals_, *time, arrival_s});
+  queue_.push_back(frame);
   arrived_.notify_one();
 }
 
@@ -266,6 +315,16 @@ std::optional<ReadFrame> SensorReader::next(double wait_s) {
   }
   if (error_) std::rethrow_exception(error_);
   return std::nullopt;
+}
+
+void SensorReader::check() {
+  const std::lock_guard lock(mutex_);
+  if (error_) std::rethrow_exception(error_);
+}
+
+void SensorReader::wait_for_end(double wait_s) {
+  std::unique_lock lock(mutex_);
+  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return ended_; });
 }
 
 bool SensorReader::ended() const {

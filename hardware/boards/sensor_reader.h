@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "hardware/boards/sensor_decoder.h"
+#include "hardware/boards/tactile_board.h"
 #include "hardware/ports/open_port.h"
 
 namespace supertac {
@@ -28,6 +29,8 @@ struct ReaderCounters {
   std::uint64_t missing = 0;  ///< frames that never arrived, by the gaps in time
   std::uint64_t dropped = 0;  ///< oldest frames of a full queue
   double period_s = 0;        ///< from frame to frame, as they came
+  /// The same, as the rig's board counts.
+  operator BoardCounters() const;
 };
 
 /// Dates frames in the order they come: by the sensor's stamps where it sends any, else by arrival. Counters
@@ -44,6 +47,8 @@ class FrameDates {
   /// `behind`: how many frames came behind it in the same burst; they are dated with the same arrival.
   std::optional<double> date(std::optional<double> stamp_s, double arrival_s, std::size_t behind = 0);
   std::uint64_t missing() const { return missing_; }
+  /// By how much the newest date may be wrong because frames were lost in its burst.
+  double doubt_s() const { return doubt_s_; }
   double period_s() const { return period_s_; }
 
  private:
@@ -52,7 +57,7 @@ class FrameDates {
   void count_missing(double step_s, bool stamped);
   bool stored_;
   double nominal_s_, period_s_, wraps_s_ = 0;
-  double offset_s_ = 0, last_s_ = 0, last_arrival_s_ = 0, least_late_s_ = 0, most_late_s_ = 0;
+  double offset_s_ = 0, last_s_ = 0, last_arrival_s_ = 0, least_late_s_ = 0, most_late_s_ = 0, doubt_s_ = 0;
   std::optional<double> jumped_s_;       // a stamp that was not believed
   double jump_step_s_ = 0, step_s_ = 0;  // from the one before that to it, and where these are always as long
   double synchronised_s_ = 0;            // when dates were set to the arrivals
@@ -63,9 +68,41 @@ class FrameDates {
   bool resynchronised_ = false;  // at this frame, and nothing was lost
 };
 
+/// Reads a port, and decodes and dates what comes. It has no thread: the same reads give the same frames.
+class FrameReader {
+ public:
+  using Sink = std::function<void(const ReadFrame&)>;
+  /// `stored` as FrameDates.
+  explicit FrameReader(const Sensor& sensor, bool stored = false);
+  /// One read, and behind a time without any what waited meanwhile (`live`). Hands over the frames that they
+  /// complete and returns when they were read; throws what the port does, after these frames.
+  double read(Port& port, bool live, const Sink& sink);
+  /// The last line of a source that has ended may lack its end.
+  void finish(double time_s, const Sink& sink);
+  ReaderCounters counters() const;
+  double doubt_s() const { return dates_.doubt_s(); }
+  /// The first bytes of what came before the first frame.
+  const std::string& beginning() const { return beginning_; }
+
+ private:
+  void take(const DecodedFrame& decoded, double arrival_s, std::size_t behind, const Sink& sink);
+
+  Sensor sensor_;
+  std::unique_ptr<SensorDecoder> decoder_;
+  FrameDates dates_;
+  ReadFrame frame_;
+  std::vector<std::optional<double>> times_read_s_;  // of frames that came at once, and their values
+  std::vector<float> values_read_;
+  double last_read_s_ = 0;
+  std::string beginning_;
+  std::uint64_t damaged_ = 0, late_ = 0;
+};
+
 class SensorReader {
  public:
   static constexpr std::size_t kQueueFrames = 4096;
+  /// How long a live sensor may say nothing (s).
+  static double silence_s(const Sensor& sensor);
 
   /// Starts to read. A full queue drops the oldest frame; from a port that is not live it waits instead.
   SensorReader(OpenedPort opened, const Sensor& sensor);
@@ -78,6 +115,10 @@ class SensorReader {
   /// (PortUnplugged, BoardSilent; WrongDevice, also of a clock in another unit than the file says) once the
   /// frames before it have been taken.
   std::optional<ReadFrame> next(double wait_s);
+  /// Rethrows what ended the reader, without waiting and without taking frames.
+  void check();
+  /// Waits at most `wait_s` of wall time for the reader to end by itself.
+  void wait_for_end(double wait_s);
   /// The source is at its end and all frames have been taken.
   bool ended() const;
   bool live() const { return live_; }
@@ -85,22 +126,18 @@ class SensorReader {
 
  private:
   void run();
-  void read_once();
-  void take(const DecodedFrame& decoded, double arrival_s, std::size_t behind);
+  void take(const ReadFrame& frame);
+  void count();
   void check_silence(double time_s);
   void check_clock(double time_s, double arrival_s);
 
   std::unique_ptr<Port> port_;
   bool live_;
   Sensor sensor_;
-  std::unique_ptr<SensorDecoder> decoder_;
-  FrameDates dates_;
-  std::vector<float> signals_;
-  std::vector<std::optional<double>> times_read_s_;  // of frames that came at once, and their values
-  std::vector<float> values_read_;
-  double last_read_s_ = 0;
-  std::string beginning_;  // of what came before the first frame
+  FrameReader frames_;
+  FrameReader::Sink sink_ = [this](const ReadFrame& frame) { take(frame); };
   double last_frame_s_;
+  std::uint64_t decoded_ = 0;
   double first_time_s_ = 0, first_arrival_s_ = 0, checked_time_s_ = 0, longest_step_s_ = 0;
   std::uint64_t checked_frames_ = 0;
   bool clock_checked_ = false;

@@ -131,7 +131,7 @@ void TactileBoard::keep_decided() {
   for (const FramePlace& place : places_) {
     const Undecided frame = undecided_.front();
     undecided_.pop_front();
-    if (frame.last && place.doubt == 0) clock_.add(place.index, frame.time_s);
+    if (frame.last && place.doubt == 0) clock_.add(static_cast<double>(place.index), frame.time_s);
   }
   places_.clear();
   counters_.missing = numbering_.missing();

@@ -34,7 +34,7 @@ ReplayPort::ReplayPort(std::vector<JournalRecord> records, std::string name)
     : records_(std::move(records)), name_(std::move(name)) {}
 
 const JournalRecord& ReplayPort::next(RecordKind expected) {
-  if (at_ >= records_.size()) throw PortUnplugged("replay " + name_ + ": the end of the recording");
+  if (at_ >= records_.size()) throw PortEnded("replay " + name_ + ": the end of the recording");
   const JournalRecord& record = records_[at_];
   if (record.kind != expected) {
     throw ReplayDiverged("replay " + name_ + ": record " + std::to_string(at_) + " is of kind " +

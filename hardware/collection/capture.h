@@ -28,7 +28,7 @@ class CapturedPort : public Port {
 
 class ReplayPort : public Port {
  public:
-  /// Throws PortUnplugged at the end of the records, ReplayDiverged when the driver does something else than
+  /// Throws PortEnded at the end of the records, ReplayDiverged when the driver does something else than
   /// was recorded.
   ReplayPort(std::vector<JournalRecord> records, std::string name);
   const std::string& name() const override { return name_; }

@@ -176,4 +176,9 @@ OpenedPort open_port(const std::string& address, bool lines, double speedup) {
   return open_file(address);
 }
 
+OpenedPort open_port(const Sensor& sensor, double speedup) {
+  const bool lines = sensor.frame.kind == FrameKind::text || sensor.frame.kind == FrameKind::json;
+  return open_port(sensor.port, lines, speedup);
+}
+
 }  // namespace supertac

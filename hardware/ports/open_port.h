@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "data/sensors/sensor.h"
 #include "hardware/ports/port.h"
 
 namespace supertac {
@@ -18,5 +19,7 @@ struct OpenedPort {
 /// at most 5 s), "-" for standard input, or the path of a file or FIFO. `lines`: a datagram ends a line.
 /// `speedup` as SerialSettings. Throws PortError and its kinds.
 OpenedPort open_port(const std::string& address, bool lines = false, double speedup = 1);
+/// The port that a sensor's file names.
+OpenedPort open_port(const Sensor& sensor, double speedup = 1);
 
 }  // namespace supertac
