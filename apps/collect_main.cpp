@@ -18,7 +18,7 @@
 #include "data/plates/plate_file.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "hardware/ports/errors.h"
-#include "hardware/ports/port_list.h"
+#include "hardware/ports/open_port.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
 #include "io/files/folder_lock.h"
@@ -28,24 +28,33 @@
 namespace supertac {
 
 void declare(Arguments& arguments) {
-  arguments.option("board", "PORT", "port of the tactile board; auto finds it by its USB number", "auto")
+  arguments
+      .option("sensor", "FILE", "what the head carries: a sensor's file, whose port is read, or rig", "rig")
+      .option("board", "PORT", "port of the rig's tactile board; auto finds it by its USB number", "auto")
       .option("printer", "PORT",
               "port of the Marlin printer; needed, as --plate and --out, but for --list-ports")
       .option("plate", "NAME",
               "plate under the finger (3_Bumps, ..., plain, kind and pitch: ridges6, or FILE.stl)")
+      .option("bed", "FILE",
+              "where the printer's plate lies, where its head waits and how it slides (docs/sensors.md); "
+              "without it as on the rig")
       .option("out", "DIR", "folder for journal, recordings and report")
-      .option("speed", "MM_PER_S", "of the slide", "10")
-      .option("passes", "N", "slides, 5 mm apart in x (at most 8)", "8")
+      .option("speed", "MM_PER_S", "of the slide, instead of what the bed's file says", "10")
+      .option("passes", "N",
+              "slides, on the rig 5 mm apart in x and at most 8, instead of what the bed's file says", "8")
       .option("trial", "N", "number of this trial, for the recordings' names", "1")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
       .flag("home", "home the printer first instead of trusting the operator's origin")
-      .flag("confirm-origin", "after a run that was cut off: the head is back at " + describe(rig::kMounted))
-      .flag("yes", "do not ask: the plate lies as planned and the head is at " + describe(rig::kMounted))
+      .flag("confirm-origin", "after a run that was cut off: the head is back at its origin, on the rig " +
+                                  describe(rig::kMounted))
+      .flag("yes", "do not ask: the plate lies as planned and the head is at its origin")
       .flag("list-ports", "list the serial ports and end");
   declare_web(arguments);
 }
 
 namespace {
+
+constexpr int kMostPasses = 1000;
 
 std::string required_text(const Arguments& arguments, const std::string& name) {
   if (!arguments.given(name))
@@ -68,14 +77,14 @@ std::string ask_operator() {
 }
 
 void confirm(const Arguments& arguments, const RecorderSettings& settings) {
-  const PalpationPlan& plan = settings.plan;
+  const PalpationPlan& plan = settings.bed.plan;
   arguments.note("plan: " + std::to_string(plan.passes) + " passes of " + format(plan.slide, 0) + " mm at " +
                  format(plan.speed, 1) + " mm/s from " + describe(plan.start) + ", lift " +
                  format(plan.lift, 0) + " mm");
   if (arguments.flag("yes")) return;
   if (isatty(STDIN_FILENO) == 0) throw UsageError("--yes: needed where nobody can be asked");
   std::cerr << (settings.home ? "Is the bed free, so that the printer can home?"
-                              : "Is the head at " + describe(settings.origin) + ", the plate below it?")
+                              : "Is the head at " + describe(settings.bed.origin) + ", the plate below it?")
             << " [yes/no] ";
   const std::string answer = ask_operator();
   if (answer != "yes" && answer != "y")
@@ -84,12 +93,20 @@ void confirm(const Arguments& arguments, const RecorderSettings& settings) {
 
 RecorderSettings read_settings(const Arguments& arguments, const std::string& out, const std::string& plate) {
   RecorderSettings settings;
-  settings.plan.speed = arguments.number("speed", 0.5, rig::kFastestMmS);
-  settings.plan.passes = static_cast<int>(arguments.integer("passes", 1, rig::kPasses));
+  settings.sensor = read_sensor(arguments.text("sensor"));
+  const bool bed_given = arguments.given("bed");
+  if (bed_given) settings.bed = read_bed(arguments.text("bed"));
+  const Bed bed = settings.bed;
+  PalpationPlan& plan = settings.bed.plan;
+  if (!bed_given || arguments.given("speed")) plan.speed = arguments.number("speed", 0.5, rig::kFastestMmS);
+  if (!bed_given || arguments.given("passes"))
+    plan.passes = static_cast<int>(arguments.integer("passes", 1, bed_given ? kMostPasses : rig::kPasses));
   settings.home = arguments.flag("home");
+  if (!settings.home)
+    (void)legs_of(plan, bed.origin, bed.limits);  // nothing is opened for one that leaves them
   const int trial = static_cast<int>(arguments.integer("trial", 1, 1000));
-  settings.header = collection_header(plate, trial, settings.plan.speed);
-  settings.journal = journal_path(out, plate, trial, settings.plan.speed);
+  settings.header = collection_header(plate, trial, plan.speed, settings.sensor, bed);
+  settings.journal = journal_path(out, plate, trial, plan.speed);
   return settings;
 }
 
@@ -130,18 +147,34 @@ RecorderReport record_marked(std::unique_ptr<Port> board, std::unique_ptr<Port> 
   }
 }
 
-void demand_origin(const Arguments& arguments, const OriginMark& mark) {
+void demand_origin(const Arguments& arguments, const OriginMark& mark, const Point3& origin) {
   if (!mark.is_set() || arguments.flag("home") || arguments.flag("confirm-origin")) return;
   throw OriginUnknown("collect: the last run on printer " + arguments.text("printer") +
-                      " was cut off, so the head's position is unknown; move it to " +
-                      describe(rig::kMounted) + " and add --confirm-origin, or use --home");
+                      " was cut off, so the head's position is unknown; move it to " + describe(origin) +
+                      " and add --confirm-origin, or use --home");
+}
+
+/// What the head carries, on the printer's clock.
+std::unique_ptr<Port> open_carried(const Arguments& arguments, Sensor sensor, double speedup) {
+  if (arguments.given("board")) {
+    if (sensor.frame.kind != FrameKind::board)
+      throw UsageError("--board: only with the rig's board; the file of --sensor names its port");
+    sensor.port = "serial:" + arguments.text("board") + "@" + std::to_string(rig::kBoardBaud);
+  }
+  if (speedup != 1 && !sensor.port.starts_with("serial:"))
+    throw UsageError("--speedup: only with a sensor at a serial port, found " + in_quotes(sensor.port));
+  OpenedPort opened = open_port(sensor, speedup);
+  if (opened.stored)
+    throw PortError("port " + sensor.port +
+                    ": is a file, whose frames were made before; expected the sensor");
+  return std::move(opened.port);
 }
 
 /// The page of --web; none without.
-std::unique_ptr<CollectView> web_view(const Arguments& arguments, const PalpationPlan& plan) {
+std::unique_ptr<CollectView> web_view(const Arguments& arguments, const Bed& bed) {
   const auto address = web_address(arguments);
   if (!address) return nullptr;
-  auto view = std::make_unique<CollectView>(*address, Plate::named(arguments.text("plate")), plan,
+  auto view = std::make_unique<CollectView>(*address, Plate::named(arguments.text("plate")), bed,
                                             arguments.number("speedup", 0.1, 100),
                                             arguments.text("printer") + ", into " + arguments.text("out"));
   arguments.note("live page: " + view->url());
@@ -150,17 +183,17 @@ std::unique_ptr<CollectView> web_view(const Arguments& arguments, const Palpatio
 
 RecorderReport collect(const Arguments& arguments, RecorderSettings settings, const OriginMark& mark) {
   const double speedup = arguments.number("speedup", 0.1, 100);
-  auto board = std::make_unique<SerialPort>(resolve_board_port(arguments.text("board")),
-                                            SerialSettings{rig::kBoardBaud, speedup});
+  auto board = open_carried(arguments, settings.sensor, speedup);
   auto printer =
-      std::make_unique<SerialPort>(arguments.text("printer"), SerialSettings{rig::kPrinterBaud, speedup});
-  demand_origin(arguments, mark);
-  const std::unique_ptr<CollectView> page = web_view(arguments, settings.plan);
+      std::make_unique<SerialPort>(arguments.text("printer"), SerialSettings{settings.bed.baud, speedup});
+  const PalpationPlan& plan = settings.bed.plan;
+  demand_origin(arguments, mark, settings.bed.origin);
+  const std::unique_ptr<CollectView> page = web_view(arguments, settings.bed);
   confirm(arguments, settings);
   settings.stop = interrupted;
-  Progress progress(arguments, "collecting", millimetres(settings.plan, settings.plan.passes, 0), "mm");
+  Progress progress(arguments, "collecting", millimetres(plan, plan.passes, 0), "mm");
   settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters& counters) {
-    progress.update(millimetres_at(settings.plan, leg, at), live_text(at, counters));
+    progress.update(millimetres_at(plan, leg, at), live_text(at, counters));
     if (page) page->update(leg, at, counters);
   };
   try {

@@ -31,11 +31,11 @@ std::string dumped(const nlohmann::json& json) {
 
 }  // namespace
 
-CollectView::CollectView(const WebAddress& address, const Plate& plate, const PalpationPlan& plan,
-                         double speedup, const std::string& source)
+CollectView::CollectView(const WebAddress& address, const Plate& plate, const Bed& bed, double speedup,
+                         const std::string& source)
     : plate_(plate),
-      plan_(plan),
-      legs_(legs_of(plan, rig::kMounted)),
+      bed_(bed),
+      legs_(legs_of(bed.plan, bed.origin)),
       speedup_(speedup),
       source_(source),
       server_(address, site()) {}
@@ -58,13 +58,14 @@ std::string CollectView::hello() const {
   for (int y = 0; y < kLength; ++y)
     for (int x = 0; x < kWidth; ++x)
       heights.push_back(static_cast<float>(truth_value(plate_, x + 0.5, y + 0.5)));
+  const PalpationPlan& plan = bed_.plan;
   std::vector<double> passes;
-  for (int pass = 0; pass < plan_.passes; ++pass)
-    passes.push_back(plan_.start.x + plan_.shift_x * pass - rig::kPlate.x);
+  for (int pass = 0; pass < plan.passes; ++pass)
+    passes.push_back(plan.start.x + plan.shift_x * pass - bed_.limits.plate.x);
   return dumped({{"plate", plate_.name()},
                  {"source", source_},
-                 {"plan", std::to_string(plan_.passes) + " passes of " + format(plan_.slide, 0) + " mm at " +
-                              format(plan_.speed, 1) + " mm/s, " + format(plan_.lift, 0) + " mm lift"},
+                 {"plan", std::to_string(plan.passes) + " passes of " + format(plan.slide, 0) + " mm at " +
+                              format(plan.speed, 1) + " mm/s, " + format(plan.lift, 0) + " mm lift"},
                  {"width", kWidth},
                  {"length", kLength},
                  {"heights", levels_base64(heights)},
@@ -90,16 +91,16 @@ std::string CollectView::news() {
   }
   if (!state) return {};
   const auto& [leg, at, board] = *state;
-  const double slid = leg.phase == Phase::slide     ? std::clamp(at.y - leg.from.y, 0.0, plan_.slide)
-                      : leg.phase >= Phase::release ? plan_.slide
+  const double slid = leg.phase == Phase::slide     ? std::clamp(at.y - leg.from.y, 0.0, bed_.plan.slide)
+                      : leg.phase >= Phase::release ? bed_.plan.slide
                                                     : 0;
   return dumped({{"pass", leg.pass},
                  {"phase", name_of(leg.phase)},
-                 {"x", at.x - rig::kPlate.x},
-                 {"y", at.y - rig::kPlate.y},
-                 {"lifted", at.z > plan_.start.z + 0.1},
+                 {"x", at.x - bed_.limits.plate.x},
+                 {"y", at.y - bed_.limits.plate.y},
+                 {"lifted", at.z > bed_.plan.start.z + 0.1},
                  {"left_s", seconds_left(*state)},
-                 {"done", (plan_.slide * (leg.pass - 1) + slid) / (plan_.slide * plan_.passes)},
+                 {"done", (bed_.plan.slide * (leg.pass - 1) + slid) / (bed_.plan.slide * bed_.plan.passes)},
                  {"frames", board.decoder.frames},
                  {"rate", board.clock.period_s > 0 ? 1 / board.clock.period_s : 0},
                  {"lost", board.missing},

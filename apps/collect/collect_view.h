@@ -17,7 +17,7 @@ namespace supertac {
 class CollectView {
  public:
   /// `source` names ports and folder. Throws as WebServer.
-  CollectView(const WebAddress& address, const Plate& plate, const PalpationPlan& plan, double speedup,
+  CollectView(const WebAddress& address, const Plate& plate, const Bed& bed, double speedup,
               const std::string& source);
 
   /// Never waits.
@@ -38,7 +38,7 @@ class CollectView {
   double seconds_left(const State& state) const;
 
   const Plate plate_;
-  PalpationPlan plan_;
+  Bed bed_;
   std::vector<Leg> legs_;
   double speedup_;
   std::string source_;

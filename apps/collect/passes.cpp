@@ -46,14 +46,18 @@ std::string damage_of(const Collection& collection) {
          format(collection.lost_s, 2) + " s, are missing";
 }
 
-Recording recording_of(const CollectedPass& pass, const Header& header, const std::string& damage) {
+Recording recording_of(const CollectedPass& pass, const Collection& collection, const Header& header,
+                       const std::string& damage) {
+  const Point3& plate = collection.bed.limits.plate;
   Recording recording;
+  recording.array = collection.sensor.array;
+  recording.signal_scale = collection.sensor.scale;
   recording.time_s = pass.time_s;
   recording.volts = pass.volts;
   for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
-    recording.position_mm.push_back(static_cast<float>(pass.position[3 * i] - rig::kPlate.x));
-    recording.position_mm.push_back(static_cast<float>(pass.position[3 * i + 1] - rig::kPlate.y));
-    recording.lift_mm.push_back(static_cast<float>(pass.position[3 * i + 2] - rig::kPlate.z));
+    recording.position_mm.push_back(static_cast<float>(pass.position[3 * i] - plate.x));
+    recording.position_mm.push_back(static_cast<float>(pass.position[3 * i + 1] - plate.y));
+    recording.lift_mm.push_back(static_cast<float>(pass.position[3 * i + 2] - plate.z));
   }
   recording.plate = header.plate;
   recording.trial = header.trial;
@@ -63,6 +67,8 @@ Recording recording_of(const CollectedPass& pass, const Header& header, const st
   recording.metadata = {{"complete", pass.complete ? "true" : "false"},
                         {"missing_frames", std::to_string(pass.missing)},
                         {"time_base", pass.positions > 0 ? "M114 R" : "modelled motion"}};
+  if (const std::vector<int> silent = collection.sensor.silent(); !silent.empty())
+    recording.metadata["silent_taxels"] = nlohmann::json(silent).dump();
   if (pass.left_out > 0) recording.metadata["left_out_frames"] = std::to_string(pass.left_out);
   if (!damage.empty()) recording.metadata["damage"] = damage;
   if (!pass.doubt.empty()) recording.metadata["doubt"] = pass.doubt;
@@ -108,9 +114,11 @@ std::string to_line(const CollectedPass& pass) {
 
 }  // namespace
 
-std::string collection_header(const std::string& plate, int trial, double speed) {
-  const nlohmann::ordered_json header{
-      {"version", 1}, {"plate", plate}, {"trial", trial}, {"speed_mm_s", speed}};
+std::string collection_header(const std::string& plate, int trial, double speed, const Sensor& sensor,
+                              const Bed& bed) {
+  nlohmann::ordered_json header{{"version", 1}, {"plate", plate}, {"trial", trial}, {"speed_mm_s", speed}};
+  if (sensor != Sensor{}) header["sensor"] = json_of(sensor);
+  if (bed != Bed{}) header["bed"] = json_of(bed);
   return header.dump();
 }
 
@@ -134,7 +142,7 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
   add_parent_file("journal", journal);
   for (const CollectedPass& pass : collection.passes) {
     if (pass.time_s.size() < 2) continue;
-    const Recording recording = recording_of(pass, header, report.damage);
+    const Recording recording = recording_of(pass, collection, header, report.damage);
     const std::string name = recording_file_name(recording);
     write_recording(folder.add(name), recording);
     arguments.print(to_line(pass));

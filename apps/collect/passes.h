@@ -8,8 +8,10 @@
 
 namespace supertac {
 
-/// The journal's header line: what is needed to make recordings of it later.
-std::string collection_header(const std::string& plate, int trial, double speed);
+/// The journal's header line: what is needed to make recordings of it later. Sensor and bed are left out
+/// where they are the rig's.
+std::string collection_header(const std::string& plate, int trial, double speed, const Sensor& sensor,
+                              const Bed& bed);
 std::string journal_path(const std::string& folder, const std::string& plate, int trial, double speed);
 
 /// What a journal held, for the reader and for --json.

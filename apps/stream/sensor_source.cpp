@@ -8,6 +8,7 @@
 #include "data/sensors/rest_tracker.h"
 #include "hardware/boards/sensor_reader.h"
 #include "hardware/collection/capture.h"
+#include "hardware/collection/collection.h"
 #include "hardware/ports/errors.h"
 #include "hardware/ports/port_list.h"
 #include "hardware/ports/serial_port.h"
@@ -80,17 +81,7 @@ class ReaderSource : public SensorSource {
     return SensorFrame{.time_s = frame_.time_s, .volts = frame_.signals, .arrived_s = frame_.arrival_s};
   }
   bool ended() const override { return reader_.ended(); }
-  BoardCounters counters() override {
-    const ReaderCounters counted = reader_.counters();
-    BoardCounters counters;
-    counters.decoder.bytes = counted.decoder.bytes, counters.decoder.frames = counted.decoder.frames;
-    counters.decoder.discarded_bytes = counted.decoder.discarded_bytes;
-    counters.dropped = counted.dropped;
-    counters.missing = counted.missing;
-    counters.suspect = counted.decoder.torn + counted.damaged + counted.late;
-    counters.clock.period_s = counted.period_s;
-    return counters;
-  }
+  BoardCounters counters() override { return reader_.counters(); }
   void finish() override { reader_.stop(); }
 
  private:
@@ -172,13 +163,15 @@ std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup) 
   if (sensor.frame.kind == FrameKind::board && sensor.port.starts_with(kSerial) && !calibrated)
     return open_board(sensor.port.substr(kSerial.size(), sensor.port.rfind('@') - kSerial.size()), speedup,
                       "");
-  const bool lines = sensor.frame.kind == FrameKind::text || sensor.frame.kind == FrameKind::json;
-  return std::make_unique<ReaderSource>(open_port(sensor.port, lines, speedup), sensor);
+  return std::make_unique<ReaderSource>(open_port(sensor, speedup), sensor);
 }
 
-std::unique_ptr<SensorSource> open_replay(const std::string& journal) {
-  return std::make_unique<BoardSource>(
-      std::make_unique<ReplayPort>(read_journal(journal).of(Stream::board), journal), false);
+std::unique_ptr<SensorSource> open_replay(const std::string& path) {
+  const Journal journal = read_journal(path);
+  const Sensor sensor = sensor_of(journal);
+  auto port = std::make_unique<ReplayPort>(journal.of(Stream::board), path);
+  if (sensor.frame.kind == FrameKind::board) return std::make_unique<BoardSource>(std::move(port), false);
+  return std::make_unique<ReaderSource>(OpenedPort{.port = std::move(port), .live = false}, sensor);
 }
 
 std::unique_ptr<SensorSource> open_recording(const std::string& path) {

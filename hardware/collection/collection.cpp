@@ -7,8 +7,10 @@
 #include <map>
 #include <optional>
 
-#include "hardware/boards/frame_decoder.h"
+#include "hardware/collection/collected_frames.h"
+#include "hardware/ports/errors.h"
 #include "hardware/printers/motion_model.h"
+#include "io/files/json.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 
@@ -93,32 +95,6 @@ std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
   return legs;
 }
 
-struct Frames {
-  std::vector<BoardFrame> frames;
-  std::vector<FrameArrival> arrivals;
-  std::vector<std::uint8_t> suspect;
-};
-
-Frames frames_in(const Journal& journal, FrameDecoder::Counters& counters) {
-  constexpr std::size_t kEarlierRead = 2048;  // journals before version 0.3 were read in such pieces
-  Frames all;
-  FrameDecoder decoder;
-  JumpDetector jumps;
-  for (const JournalRecord& record : journal.of(Stream::board)) {
-    if (record.kind != RecordKind::received) continue;
-    const bool more_waited = record.bytes.size() >= kTerminalFull || record.bytes.size() == kEarlierRead;
-    decoder.push(record.bytes, [&](const BoardFrame& frame, std::uint64_t discarded) {
-      const bool late =
-          !all.arrivals.empty() && record.time_s - all.arrivals.back().time_s > 1.5 * rig::kFramePeriodS;
-      all.suspect.push_back(discarded > 0 || late || jumps.jump(frame) ? 1 : 0);
-      all.frames.push_back(frame);
-      all.arrivals.push_back({record.time_s, damaged_frames(discarded), more_waited});
-    });
-  }
-  counters = decoder.counters();
-  return all;
-}
-
 // How far the sample is from the leg's straight line, ends included.
 double off_leg(const Leg& leg, const Point3& p) {
   const double length = distance(leg.from, leg.to);
@@ -166,18 +142,17 @@ std::vector<PositionSample> chain_of(const Leg& leg, const std::vector<PositionS
   return chain;
 }
 
-// By how much (s) the clock misses the frames first to last: of 128 frames and eight reads one at least was
-// on time.
-double clock_error(const Frames& all, const FrameTimeline& timeline, std::size_t first, std::size_t last) {
-  constexpr int kFrames = 128, kReads = 8;
+// By how much (s) the clock misses the frames first to last.
+double clock_error(const CollectedFrames& all, std::size_t first, std::size_t last) {
+  constexpr int kReads = 8;
   double worst = 0, earliest = kLargest;
   int frames = 0, reads = 0;
   for (std::size_t i = first; i < last; ++i) {
-    if (timeline.places[i].doubt > 0) continue;
-    const double time = all.arrivals[i].time_s;
-    earliest = std::min(earliest, time - timeline.clock.at(static_cast<double>(timeline.places[i].index)));
-    reads += i + 1 == all.arrivals.size() || all.arrivals[i + 1].time_s != time ? 1 : 0;
-    if (++frames < kFrames || reads < kReads) continue;
+    if (all.doubt_s[i] > 0) continue;
+    const double time = all.arrival_s[i];
+    earliest = std::min(earliest, time - all.end_s[i]);
+    reads += i + 1 == all.size() || all.arrival_s[i + 1] != time ? 1 : 0;
+    if (++frames < all.steady || reads < kReads) continue;
     worst = std::max(worst, std::abs(earliest));
     frames = reads = 0;
     earliest = kLargest;
@@ -196,36 +171,47 @@ std::string doubt_of(const ClockFit& clock, double clock_error_s, double speed, 
   return doubt.substr(0, doubt.size() - std::min<std::size_t>(2, doubt.size()));
 }
 
-CollectedPass pass_of(const Frames& all, const FrameTimeline& timeline, const PositionTrack& track,
+CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const PositionTrack& track,
                       double speed) {
   CollectedPass pass;
-  std::uint64_t first = 0, last = 0;
   std::size_t begin = 0, end = 0;
-  for (std::size_t i = 0; i < all.frames.size(); ++i) {
-    const FramePlace& place = timeline.places[i];
-    const double time = timeline.clock.at(static_cast<double>(place.index)) - 0.5 * timeline.clock.period_s;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const double time = all.end_s[i] - 0.5 * all.clock.period_s;
     if (time < track.begin() || time > track.end()) continue;
-    if (end == 0) {
-      first = place.index;
-      begin = i;
-    }
+    if (end == 0) begin = i;
     end = i + 1;
-    last = place.index;
-    if (place.doubt * timeline.clock.period_s * speed > kTrustedMm) {
+    if (all.doubt_s[i] * speed > kTrustedMm) {
       ++pass.left_out;
       continue;
     }
     pass.time_s.push_back(time - track.begin());
-    const auto volts = taxel_volts(all.frames[i]);
-    pass.volts.insert(pass.volts.end(), volts.begin(), volts.end());
+    const auto frame = std::span(all.signals).subspan(i * signals, signals);
+    pass.volts.insert(pass.volts.end(), frame.begin(), frame.end());
     const Point3 p = track.at(time);
     pass.position.insert(pass.position.end(), {p.x, p.y, p.z});
     pass.suspect.push_back(all.suspect[i]);
   }
   pass.speed = speed;
-  pass.doubt = doubt_of(timeline.clock, clock_error(all, timeline, begin, end), speed, track.doubt_mm());
-  if (end > 0) pass.missing = last - first + 1 - (end - begin);
+  pass.doubt = doubt_of(all.clock, clock_error(all, begin, end), speed, track.doubt_mm());
+  // A sensor that turns out to be slower than its file says has lost fewer than it seemed.
+  if (end > 0) pass.missing = all.missing[end - 1] - std::min(all.missing[begin], all.missing[end - 1]);
   return pass;
+}
+
+// What stands under `key` in the header, by `read`; what it is by default where nothing does.
+template <class Read>
+auto part_of_header(const Journal& journal, const char* key, const Read& read) {
+  const std::string where = std::string("the journal's header: \"") + key + "\"";
+  nlohmann::ordered_json json;
+  try {
+    json = parse_json_limited(journal.header);
+  } catch (const JsonError&) {  // not of supertac-collect, which says so where it needs more of it
+  }
+  try {
+    return json.contains(key) ? read(json[key].dump(), where) : decltype(read("", where)){};
+  } catch (const FileError& error) {
+    throw JournalError(error.what());
+  }
 }
 
 }  // namespace
@@ -329,6 +315,8 @@ Point3 PositionTrack::at(double time_s) const {
   return between(a.position, b.position, (time_s - a.time_s) / (b.time_s - a.time_s));
 }
 
+Sensor sensor_of(const Journal& journal) { return part_of_header(journal, "sensor", sensor_of_json); }
+
 Collection collection_of(const Journal& journal) {
   Collection collection;
   collection.header = journal.header;
@@ -336,15 +324,17 @@ Collection collection_of(const Journal& journal) {
   collection.lost_bytes = journal.lost_bytes;
   collection.lost_s = journal.lost_s;
   const std::vector<RecordedLeg> legs = legs_in(journal, collection.complete);
-  const Frames all = frames_in(journal, collection.decoder);
-  const FrameTimeline timeline = timeline_of(all.arrivals);
+  collection.sensor = sensor_of(journal);
+  collection.bed = part_of_header(journal, "bed", bed_of_json);
+  const CollectedFrames all = frames_in(journal, collection.sensor);
   std::vector<Leg> ended;
   for (const RecordedLeg& recorded : legs)
     if (recorded.ended) ended.push_back(recorded.leg);
   const MoveTiming timing = timing_of(ended);
-  collection.frames = all.frames.size();
-  collection.missing = timeline.missing;
-  collection.clock = timeline.clock;
+  collection.decoder = all.decoder;
+  collection.frames = all.size();
+  collection.missing = all.lost;
+  collection.clock = all.clock;
   struct Parts {
     PositionTrack track;
     double speed = 0;
@@ -362,7 +352,7 @@ Collection collection_of(const Journal& journal) {
     if (phase == Phase::release) part.complete = recorded.ended;
   }
   for (const auto& [number, part] : parts) {
-    CollectedPass pass = pass_of(all, timeline, part.track, part.speed);
+    CollectedPass pass = pass_of(all, collection.sensor.array.signals(), part.track, part.speed);
     pass.pass = number;
     pass.complete = part.complete;
     pass.positions = part.positions;

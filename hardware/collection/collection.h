@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "data/sensors/sensor.h"
 #include "hardware/boards/frame_clock.h"
 #include "hardware/boards/frame_decoder.h"
 #include "hardware/collection/journal.h"
-#include "hardware/printers/palpation.h"
+#include "hardware/printers/bed.h"
 
 namespace supertac {
 
@@ -66,7 +67,7 @@ struct CollectedPass {
   double speed = 0;
   bool complete = false;              ///< the release was verified
   std::vector<double> time_s;         ///< n
-  std::vector<float> volts;           ///< n x 16, taxel k fastest
+  std::vector<float> volts;           ///< n x array.signals(), a frame together, in the sensor's unit
   std::vector<double> position;       ///< n x 3, printer coordinates of the head (mm)
   std::vector<std::uint8_t> suspect;  ///< n; 1: may be torn, or an implausible jump
   std::uint64_t missing = 0;          ///< frames that did not arrive between the first and the last
@@ -82,6 +83,8 @@ constexpr double kTrustedMm = 0.3;
 
 struct Collection {
   std::string header;
+  Sensor sensor;  ///< as the header says; the rig's where it says nothing
+  Bed bed;
   bool complete = false;
   std::uint64_t torn_bytes = 0;  ///< of the journal's end
   std::uint64_t lost_bytes = 0;  ///< of the journal, damaged
@@ -92,6 +95,11 @@ struct Collection {
   std::vector<CollectedPass> passes;
 };
 
+/// The sensor that a journal's header names; the rig where it names none. Throws JournalError where it is
+/// none.
+Sensor sensor_of(const Journal& journal);
+
+/// Throws JournalError where the header's "sensor" or "bed" is none.
 Collection collection_of(const Journal& journal);
 
 }  // namespace supertac

@@ -1,5 +1,6 @@
 #include "hardware/collection/palpation_recorder.h"
 
+#include "hardware/boards/sensor_reader.h"
 #include "hardware/collection/collection.h"
 #include "hardware/ports/errors.h"
 
@@ -9,7 +10,7 @@ namespace {
 // Of a run whose printer says that it is busy for ever, or whose board sends more than a board can.
 double longest_run_s(const RecorderSettings& settings) {
   double planned = 0;
-  for (const Leg& leg : legs_of(settings.plan, settings.origin)) planned += ordered_s(leg);
+  for (const Leg& leg : legs_of(settings.bed.plan, settings.bed.origin)) planned += ordered_s(leg);
   return 3 * planned + 300;
 }
 
@@ -18,8 +19,8 @@ void check_stop(const RecorderSettings& settings, JournalWriter& journal) {
   journal.check();
 }
 
-PalpationObserver observer_for(const RecorderSettings& settings, JournalWriter& journal,
-                               TactileBoard& board) {
+template <class Reader>
+PalpationObserver observer_for(const RecorderSettings& settings, JournalWriter& journal, Reader& board) {
   PalpationObserver observer;
   observer.leg_started = [&](const Leg& leg) { journal.event(leg.accepted_s, event_text(leg, false)); };
   observer.leg_ended = [&](const Leg& leg) { journal.event(leg.ended_s, event_text(leg, true)); };
@@ -37,36 +38,27 @@ PalpationObserver observer_for(const RecorderSettings& settings, JournalWriter& 
 
 // Nothing moves before the board has been heard: a wrong port would otherwise be found with the finger on its
 // way. The wait is a fixed one, so that a replay waits the same.
-void hear_board(TactileBoard& board, Printer& printer, const RecorderSettings& settings,
-                JournalWriter& journal) {
-  printer.link().idle(settings.board.silence_s + 0.1);
+template <class Reader>
+void hear_board(Reader& board, Printer& printer, const RecorderSettings& settings, JournalWriter& journal) {
+  const bool rig = settings.sensor.frame.kind == FrameKind::board;
+  printer.link().idle(0.1 + (rig ? settings.board.silence_s : SensorReader::silence_s(settings.sensor)));
   if (settings.replay) return;
   for (int i = 0; i < 100 && !board.next(0.02); ++i) check_stop(settings, journal);  // throws what ended it
 }
 
-RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> printer_port,
-                      const RecorderSettings& settings, JournalWriter& journal) {
-  CapturedPort captured(std::move(printer_port), journal, Stream::printer);
-  Printer printer(captured);
-  printer.link().set_watch([&] { check_stop(settings, journal); });
-  printer.link().give_up_at(captured.now() + longest_run_s(settings));
-  printer.connect();
-  if (settings.home) {
-    printer.home();
-  } else {
-    printer.confirm_origin(settings.origin);
-  }
-  TactileBoard board(std::make_unique<CapturedPort>(std::move(board_port), journal, Stream::board),
-                     settings.board);
+/// `board`: a TactileBoard or a SensorReader.
+template <class Reader>
+RecorderReport record(Reader& board, Printer& printer, const RecorderSettings& settings,
+                      JournalWriter& journal) {
   hear_board(board, printer, settings, journal);
   RecorderReport report;
-  report.outcome = Palpation(printer, settings.plan, observer_for(settings, journal, board)).run();
+  report.outcome = Palpation(printer, settings.bed.plan, observer_for(settings, journal, board)).run();
   if (settings.replay) {
     board.wait_for_end(60);
   }
   board.stop();
   report.printer = printer.link().counters();
-  if (report.outcome.complete) journal.event(captured.now(), kRunComplete);
+  if (report.outcome.complete) journal.event(printer.link().port().now(), kRunComplete);
   try {
     journal.close();
   } catch (const JournalError&) {
@@ -76,13 +68,39 @@ RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> pr
   return report;
 }
 
+RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> printer_port,
+                      const RecorderSettings& settings, JournalWriter& journal) {
+  CapturedPort captured(std::move(printer_port), journal, Stream::printer);
+  Printer printer(captured, settings.bed.limits);
+  printer.link().set_watch([&] { check_stop(settings, journal); });
+  printer.link().give_up_at(captured.now() + longest_run_s(settings));
+  printer.connect();
+  if (settings.home) {
+    printer.home();
+  } else {
+    printer.confirm_origin(settings.bed.origin);
+  }
+  auto port = std::make_unique<CapturedPort>(std::move(board_port), journal, Stream::board);
+  if (settings.sensor.frame.kind == FrameKind::board) {
+    TactileBoard board(std::move(port), settings.board);
+    return record(board, printer, settings, journal);
+  }
+  SensorReader reader({.port = std::move(port)}, settings.sensor);
+  return record(reader, printer, settings, journal);
+}
+
 }  // namespace
 
 RecorderReport record_palpation(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
                                 const RecorderSettings& settings) {
-  constexpr double kBytesPerS = 400e3;  // of both ports, nearly twice what they have to say
+  // Of both ports: twice what the rig has to say, and a sensor's numbers as text, ten times as often as it
+  // says.
+  const double bytes_per_s = settings.sensor.frame.kind == FrameKind::board
+                                 ? 400e3
+                                 : 250e3 + 10 * settings.sensor.rate_hz *
+                                               (100 + 20.0 * static_cast<double>(settings.sensor.values()));
   JournalWriter journal(settings.journal, settings.header,
-                        static_cast<std::uint64_t>(kBytesPerS * longest_run_s(settings)));
+                        static_cast<std::uint64_t>(bytes_per_s * longest_run_s(settings)));
   try {
     return record(std::move(board), std::move(printer), settings, journal);
   } catch (...) {

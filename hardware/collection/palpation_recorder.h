@@ -6,19 +6,20 @@
 #include <memory>
 #include <string>
 
+#include "data/sensors/sensor.h"
 #include "hardware/boards/tactile_board.h"
 #include "hardware/collection/capture.h"
-#include "hardware/printers/palpation.h"
+#include "hardware/printers/bed.h"
 
 namespace supertac {
 
 struct RecorderSettings {
-  PalpationPlan plan;
-  BoardSettings board;
-  Point3 origin = rig::kMounted;  ///< where the operator confirms the head to be
-  bool home = false;              ///< home instead
-  std::string journal;            ///< path; must not exist
-  std::string header;             ///< one line that says what is collected
+  Bed bed;              ///< the plan, and where the operator confirms the head to be
+  Sensor sensor;        ///< what the head carries
+  BoardSettings board;  ///< of the rig's
+  bool home = false;    ///< home instead
+  std::string journal;  ///< path; must not exist
+  std::string header;   ///< one line that says what is collected
   /// True: lift the finger and end, by OperatorStop. Asked for every 0.02 s from the first moment on.
   std::function<bool()> stop = [] { return false; };
   /// Called with true before the finger may touch, with false when it no longer can.
@@ -37,7 +38,7 @@ struct RecorderReport {
 /// Runs the plan and journals everything, in at most three times the plan's time and five minutes. Throws
 /// while nothing has been recorded - no device, the wrong one, a plan outside the limits, a homing that
 /// failed - and then leaves no journal; later failures are in the outcome. When this returns the journal is
-/// complete on disk, or outcome.error says why not.
+/// complete on disk, or outcome.error says why not. `board` is the sensor's port, which must be live.
 RecorderReport record_palpation(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
                                 const RecorderSettings& settings);
 

@@ -32,10 +32,11 @@ inline void check_one_journal(std::span<const std::byte> input) {
   try {
     const Journal journal = parse_journal(input, "fuzz");
     if (journal.torn_bytes > input.size()) throw std::logic_error("journal: more torn bytes than bytes");
-    for (const CollectedPass& pass : collection_of(journal).passes) {
+    const Collection collection = collection_of(journal);
+    for (const CollectedPass& pass : collection.passes) {
       const std::size_t frames = pass.time_s.size();
-      if (pass.volts.size() != 16 * frames || pass.position.size() != 3 * frames ||
-          pass.suspect.size() != frames) {
+      if (pass.volts.size() != collection.sensor.array.signals() * frames ||
+          pass.position.size() != 3 * frames || pass.suspect.size() != frames) {
         throw std::logic_error("collection: a pass whose columns differ in length");
       }
     }

@@ -109,14 +109,14 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
     if (command.starts_with("G1")) numbered.push_back(command);
   });
   RecorderSettings settings;
-  settings.plan = plan;
-  settings.origin = origin;
+  settings.bed.plan = plan;
+  settings.bed.origin = origin;
   settings.journal = folder / "journal";
   settings.header = "fault run";
   settings.board.queue_frames = 16;
   settings.board.silence_s = 5;
-  const std::vector<std::string> planned = planned_moves(settings.plan, settings.origin);
-  const std::vector<Leg> legs = legs_of(settings.plan, settings.origin);
+  const std::vector<std::string> planned = planned_moves(settings.bed.plan, settings.bed.origin);
+  const std::vector<Leg> legs = legs_of(settings.bed.plan, settings.bed.origin);
   try {
     auto port = rig.printer_port();
     if (printer) port = printer(std::move(port));
@@ -136,7 +136,7 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
       verdict.broken = "false done: the head is at " + describe(head);
     }
     if (!verdict.complete && verdict.broken.empty()) {
-      verdict.broken = check_finger(report.outcome, rig, head, settings.plan.start.z);
+      verdict.broken = check_finger(report.outcome, rig, head, settings.bed.plan.start.z);
     }
     const Journal journal = read_journal(settings.journal);
     const Collection collection = collection_of(journal);

@@ -75,9 +75,9 @@ Pull pull(PtyRig& rig, Plug plug) {
 /// A collection of one pass over 20 mm that starts just above the plate.
 RecorderSettings short_run(const TemporaryFolder& folder) {
   RecorderSettings settings;
-  settings.plan.passes = 1;
-  settings.plan.slide = 20;
-  settings.origin = {99.7, 101.17, 97.81};
+  settings.bed.plan.passes = 1;
+  settings.bed.plan.slide = 20;
+  settings.bed.origin = {99.7, 101.17, 97.81};
   settings.journal = folder / "journal";
   settings.header = "unplug run";
   return settings;
@@ -166,7 +166,7 @@ UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed) {
     verdict.stall_s = stalls.longest(pulled.at_s, pulled.at_s + verdict.noticed_s);
     Point3 head;
     rig.with_world([&](RigWorld& world) { head = world.printer().head(world.now()); });
-    judge(verdict, plug, outcome, head, settings.plan.start.z);
+    judge(verdict, plug, outcome, head, settings.bed.plan.start.z);
   } catch (const std::exception& error) {
     ended = true;
     puller.join();

@@ -1,43 +1,18 @@
 // The page of supertac-collect: it shows the run and can end it, and nothing else.
 #include <gtest/gtest.h>
 
-#include "io/files/json.h"
 #include "tests/apps/rig/collect_run.h"
 #include "tests/apps/web/http_client.h"
 
 namespace supertac {
 namespace {
 
-// A port that was free a moment ago.
-int free_port() {
-  const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  sockaddr_in place{};
-  place.sin_family = AF_INET;
-  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof place;
-  EXPECT_EQ(bind(file, reinterpret_cast<sockaddr*>(&place), size), 0);
-  getsockname(file, reinterpret_cast<sockaddr*>(&place), &size);
-  close(file);
-  return ntohs(place.sin_port);
-}
-
-nlohmann::ordered_json event_after(const std::string& text, const std::string& mark) {
-  const std::size_t begin = text.find(mark) + mark.size();
-  return parse_json_limited(text.substr(begin, text.find("\n\n", begin) - begin));
-}
-
 TEST(CollectPage, ShowsTheRunAndItsButtonEndsItAsCtrlCDoes) {
   CollectRun run;
   const int port = free_port();
   const std::string number = std::to_string(port), host = "Host: 127.0.0.1:" + number + "\r\n";
   RunningProcess program("supertac-collect", run.arguments({"--web", number}));
-  std::unique_ptr<HttpClient> client;
-  for (int i = 0; !client && i < 2400; ++i, usleep(50'000)) {
-    try {
-      client = std::make_unique<HttpClient>(port);
-    } catch (const std::runtime_error&) {  // not yet
-    }
-  }
+  const std::unique_ptr<HttpClient> client = connect_when_up(port);
   ASSERT_TRUE(client);
   client->send("GET /events HTTP/1.1\r\n" + host + "\r\n");
   const auto hello = event_after(client->receive("\n\n"), "event: hello\ndata: ");

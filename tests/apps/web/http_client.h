@@ -9,9 +9,12 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+
+#include "io/files/json.h"
 
 namespace supertac {
 
@@ -63,6 +66,36 @@ inline int status_of(int port, const std::string& request) {
   client.send(request);
   const std::string answer = client.receive("\r\n");
   return answer.starts_with("HTTP/1.") ? std::stoi(answer.substr(9, 3)) : 0;
+}
+
+/// A port that was free a moment ago.
+inline int free_port() {
+  const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof place;
+  if (bind(file, reinterpret_cast<sockaddr*>(&place), size) != 0) throw std::runtime_error("no port is free");
+  getsockname(file, reinterpret_cast<sockaddr*>(&place), &size);
+  close(file);
+  return ntohs(place.sin_port);
+}
+
+/// The data of the event that begins with `mark`.
+inline nlohmann::ordered_json event_after(const std::string& text, const std::string& mark) {
+  const std::size_t begin = text.find(mark) + mark.size();
+  return parse_json_limited(text.substr(begin, text.find("\n\n", begin) - begin));
+}
+
+/// Connects to a server that may only just be starting.
+inline std::unique_ptr<HttpClient> connect_when_up(int port) {
+  for (int i = 0; i < 2400; ++i, usleep(50'000)) {
+    try {
+      return std::make_unique<HttpClient>(port);
+    } catch (const std::runtime_error&) {  // not yet
+    }
+  }
+  return nullptr;
 }
 
 }  // namespace supertac

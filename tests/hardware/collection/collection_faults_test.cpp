@@ -23,10 +23,10 @@ RigSettings low_rig() {
 /// One short collection on a simulated rig whose journal meets a fault.
 struct FaultyCollection {
   FaultyCollection() : rig(low_rig()) {
-    settings.plan.passes = 1;
-    settings.plan.slide = 2;
-    settings.plan.poll_interval_s = 0.02;
-    settings.origin = {99.7, 101.17, 97.81};
+    settings.bed.plan.passes = 1;
+    settings.bed.plan.slide = 2;
+    settings.bed.plan.poll_interval_s = 0.02;
+    settings.bed.origin = {99.7, 101.17, 97.81};
     settings.journal = folder / "journal";
     settings.header = "fault";
     // Simulated time would otherwise run away from the journal's thread, which would then write all at once.
@@ -48,7 +48,7 @@ struct FaultyCollection {
       return std::string("expected JournalError, found: ") + error.what();
     }
     const double z = rig.world().printer().head(rig.now()).z;
-    if (z < settings.plan.start.z + settings.plan.lift - 0.01)
+    if (z < settings.bed.plan.start.z + settings.bed.plan.lift - 0.01)
       return "the finger is at Z" + std::to_string(z);
     return {};
   }

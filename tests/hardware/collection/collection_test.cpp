@@ -66,9 +66,9 @@ struct CollectionBench {
   void expect_good_positions(const Collection& collection) {
     const Journal journal = read_journal(settings.journal);
     for (const CollectedPass& pass : collection.passes) {
-      const double begin = onset_of(journal, pass.pass), low = settings.plan.start.y;
+      const double begin = onset_of(journal, pass.pass), low = settings.bed.plan.start.y;
       const auto slides = [&](const TruthOfFrame& t) {
-        return t.head.y > low && t.head.y < low + settings.plan.slide;
+        return t.head.y > low && t.head.y < low + settings.bed.plan.slide;
       };
       double start = 0;
       for (const TruthOfFrame& t : truth) {
@@ -100,7 +100,7 @@ TEST(Collection, EveryFrameHasAPositionWithinFiveHundredths) {
   RigSettings rig = running_rig();
   rig.faults.lost_frame_rate = 0.01;
   CollectionBench bench(rig);
-  bench.settings.plan.passes = 2;
+  bench.settings.bed.plan.passes = 2;
   const RecorderReport report = bench.record();
   ASSERT_TRUE(report.outcome.complete);
   const Collection collection = bench.collect();
@@ -114,7 +114,7 @@ TEST(Collection, WithoutRealtimePositionsTheMotionIsModelled) {
   RigSettings rig = running_rig();
   rig.printer.realtime_position = false;
   CollectionBench bench(rig);
-  bench.settings.plan.passes = 1;
+  bench.settings.bed.plan.passes = 1;
   ASSERT_TRUE(bench.record().outcome.complete);
   const Collection collection = bench.collect();
   ASSERT_EQ(collection.passes.size(), 1U);
@@ -126,7 +126,7 @@ TEST(Collection, EveryFrameIsAccountedFor) {
   rig.faults.lost_frame_rate = 0.02;
   rig.faults.stall_rate = 0.0005;
   CollectionBench bench(rig);
-  bench.settings.plan.passes = 1;
+  bench.settings.bed.plan.passes = 1;
   ASSERT_TRUE(bench.record().outcome.complete);
   const Collection collection = bench.collect();
   std::uint64_t between = 0;  // lost between the first and the last frame that arrived
@@ -148,7 +148,7 @@ TEST(Collection, AReplayGivesTheSameFramesAndTheSameRun) {
   RigSettings rig = running_rig();
   rig.faults = {.byte_rate = 0.001, .lost_frame_rate = 0.01};
   CollectionBench bench(rig);
-  bench.settings.plan.passes = 1;
+  bench.settings.bed.plan.passes = 1;
   const RecorderReport first = bench.record();
   const Journal journal = read_journal(bench.settings.journal);
 
@@ -170,13 +170,13 @@ TEST(Collection, AReplayGivesTheSameFramesAndTheSameRun) {
 
 TEST(Collection, AReplayWithAnotherPlanIsRefused) {
   CollectionBench bench(running_rig());
-  bench.settings.plan.passes = 1;
+  bench.settings.bed.plan.passes = 1;
   bench.record();
   const Journal journal = read_journal(bench.settings.journal);
   RecorderSettings again = bench.settings;
   again.journal = bench.folder / "replayed";
   again.replay = true;
-  again.plan.speed = 5;
+  again.bed.plan.speed = 5;
   const RecorderReport second =
       record_palpation(std::make_unique<ReplayPort>(journal.of(Stream::board), "board"),
                        std::make_unique<ReplayPort>(journal.of(Stream::printer), "printer"), again);
@@ -197,7 +197,7 @@ TEST(Collection, NothingMovesBeforeTheBoardIsHeard) {
 
 TEST(Collection, ABoardThatGoesAwayInContactEndsWithTheFingerUp) {
   CollectionBench bench(running_rig());
-  bench.settings.plan.passes = 2;
+  bench.settings.bed.plan.passes = 2;
   bench.settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters&) {
     if (leg.phase == Phase::slide && at.y > 120) bench.rig.unplug_board();
   };

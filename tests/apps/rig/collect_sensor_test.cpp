@@ -1,0 +1,253 @@
+// supertac-collect with a sensor of a file, on a bed of a file: an 8x8 mat on a pseudo-terminal that feels
+// what lies under the virtual printer's head.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <thread>
+
+#include "data/recordings/finger_model.h"
+#include "data/recordings/recording.h"
+#include "hardware/collection/collection.h"
+#include "hardware/ports/serial_port.h"
+#include "io/files/file.h"
+#include "tests/apps/rig/collect_run.h"
+#include "tests/apps/web/http_client.h"
+#include "tests/hardware/fake_sensor.h"
+
+namespace supertac {
+namespace {
+
+constexpr const char* kBed = R"({"plate": [300, 310, 91.81], "origin": [310, 315, 121.81],
+  "low": [200, 200, 0], "high": [400, 420, 200], "first_x_mm": 15, "shift_mm": 3, "passes": 2,
+  "slide_mm": 80, "speed_mm_s": 20})";
+constexpr Point3 kPlate{300, 310, kSlideZ};
+
+RigSettings on_the_bed() {
+  RigSettings settings = CollectRun::running();
+  settings.printer.head = {310, 315, 121.81};
+  return settings;
+}
+
+SimulatorSettings without_disturbances() {
+  SimulatorSettings settings;
+  settings.array = {.rows = 8, .columns = 8, .pitch_mm = 2};
+  settings.with_noise = settings.with_emi = settings.with_drift = settings.with_vibration = false;
+  return settings;
+}
+
+class CollectSensor : public testing::Test {
+ protected:
+  explicit CollectSensor(bool stamped = true) : run_(5, on_the_bed()) {
+    sensor_.name = "mat";
+    sensor_.array = model_settings_.array;
+    sensor_.scale = {.unit = "counts", .rest = 40, .span = -860};
+    sensor_.rate_hz = 100;
+    sensor_.port = "serial:" + std::string(run_.disk() + "/mat") + "@115200";
+    sensor_.frame = {.kind = FrameKind::text};
+    if (stamped) sensor_.frame.time = FrameTime{.column = 0, .unit_s = 1e-3};
+    write_sensor(OutputPath(run_.disk() + "/mat.json"), sensor_);
+    write_file(run_.disk() + "/bed.json", kBed);
+    mat_ = std::make_unique<PseudoTerminal>(run_.disk() + "/mat");
+    thread_ = std::thread([this] { send(); });
+  }
+  ~CollectSensor() override {
+    stop_ = true;
+    thread_.join();
+  }
+
+  std::vector<std::string> words(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> words = {"--sensor",  run_.disk() + "/mat.json",
+                                      "--bed",     run_.disk() + "/bed.json",
+                                      "--printer", run_.printer(),
+                                      "--plate",   "ridges6",
+                                      "--out",     run_.out(),
+                                      "--speedup", "5",
+                                      "--yes",     "--quiet"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  void unplug() {
+    const std::lock_guard lock(mutex_);
+    mat_->unplug();
+  }
+  std::string journal() const { return run_.out() + "/ridges6_t1_v20.journal"; }
+
+  /// What the mat sends, at a place of its centre on the plate.
+  std::vector<double> counts(const Point3& p) const {
+    std::vector<double> values = finger_.volts({p.x, p.y, p.z + finger_.slide_z_mm()}, 0);
+    for (double& value : values) value = std::round(SignalScale{}.in(sensor_.scale, value));
+    return values;
+  }
+
+  /// How far the frames of a pass are (mean of counts) from what the mat sends `off_mm` beside their
+  /// positions.
+  double apart(const Recording& recording, double off_mm) const {
+    constexpr std::size_t kEvery = 5;
+    double sum = 0, count = 0;
+    for (std::size_t i = 0; i < recording.frames(); i += kEvery) {
+      const float* p = &recording.position_mm[2 * i];
+      const auto expected = counts({double{p[0]}, double{p[1]} + off_mm, double{recording.lift_mm[i]}});
+      for (std::size_t s = 0; s < expected.size(); ++s, ++count)
+        sum += std::abs(expected[s] - double{recording.volts[64 * i + s]});
+    }
+    return sum / count;
+  }
+  /// No place but the recorded one explains what was felt, to a few tenths of a millimetre.
+  void expect_true_positions(const Recording& recording) const {
+    double best_mm = 0;
+    for (double off_mm = -1.5; off_mm < 1.6; off_mm += 0.1)
+      if (apart(recording, off_mm) < apart(recording, best_mm)) best_mm = off_mm;
+    EXPECT_NEAR(best_mm, 0, 0.35);
+    EXPECT_LT(apart(recording, 0), 0.5 * apart(recording, 1.5)) << "shifted it would fit as well";
+    EXPECT_GT(std::ranges::max(recording.volts), 200) << "it felt the plate";
+    RecordProperty("best_mm", std::to_string(best_mm));
+  }
+
+  SimulatorSettings model_settings_ = without_disturbances();
+  FingerModel finger_{Plate::named("ridges6"), model_settings_, {}};
+  CollectRun run_;
+  Sensor sensor_;
+
+ private:
+  // 100 frames a second of the rig's clock, each of the head's place half a period before.
+  void send() {
+    const auto now = [] { return 5 * monotonic_seconds(); };
+    std::vector<double> values(64, 40);
+    for (double next = now(); !stop_; next += 0.01) {
+      while (!stop_ && now() < next - 0.005) usleep(200);
+      Point3 head = run_.head();
+      values = counts({head.x - kPlate.x, head.y - kPlate.y, head.z - kPlate.z});
+      const std::string line = sent_frame(sensor_, values, next);
+      while (!stop_ && now() < next) usleep(200);
+      const std::lock_guard lock(mutex_);
+      if (mat_->descriptor() >= 0 &&
+          write(mat_->descriptor(), line.data(), line.size()) != static_cast<ssize_t>(line.size()))
+        continue;  // nobody reads
+    }
+  }
+
+  std::unique_ptr<PseudoTerminal> mat_;
+  std::mutex mutex_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+class CollectUnstampedSensor : public CollectSensor {
+ protected:
+  CollectUnstampedSensor() : CollectSensor(false) {}
+};
+
+TEST_F(CollectSensor, ItsPassesAreRecordingsAndItsJournalGivesTheSame) {
+  const ProcessResult result = run_process("supertac-collect", words());
+  ASSERT_EQ(result.code, 0) << result.error;
+  EXPECT_EQ(run_.files(),
+            "provenance.jsonl ridges6_t1_p1_v20.safetensors ridges6_t1_p2_v20.safetensors "
+            "ridges6_t1_v20.journal");
+  EXPECT_LT(distance(run_.head(), {310, 315, 121.81}), 0.01);
+  const ProcessResult recovered =
+      run_process("supertac-import", {"--journal", journal(), "--out", run_.disk() + "/again"});
+  ASSERT_EQ(recovered.code, 0) << recovered.error;
+  for (const int pass : {1, 2}) {
+    const std::string name = "/ridges6_t1_p" + std::to_string(pass) + "_v20.safetensors";
+    const Recording recording = read_recording(run_.out() + name);
+    EXPECT_EQ(recording.array, sensor_.array);
+    EXPECT_EQ(recording.signal_scale, sensor_.scale);
+    EXPECT_EQ(recording.plate, "ridges6");
+    EXPECT_EQ(recording.source, "collected");
+    EXPECT_NEAR(recording.period_s(), 0.01, 0.002);
+    EXPECT_NEAR(recording.position_mm[0], 15 + 3 * (pass - 1), 1e-3);
+    EXPECT_NEAR(recording.position_mm[1], 0, 1e-3);
+    EXPECT_NEAR(recording.position_mm.back(), 80, 1e-3);
+    expect_true_positions(recording);
+  }
+  EXPECT_EQ(hash_of_recordings(run_.out(), {}), hash_of_recordings(run_.disk() + "/again", {}));
+  const ProcessResult trained =
+      run_process("supertac-train", {"--data", run_.out(), "--preset", "tiny", "--split", "pass", "--epochs",
+                                     "1", "--out", run_.disk() + "/model.safetensors", "--quiet"});
+  EXPECT_EQ(trained.code, 0) << trained.error;
+  // The journal replays as a stream of this sensor.
+  const ProcessResult replayed = run_process(
+      "supertac-stream", {"--replay", journal(), "--record", run_.disk() + "/streamed", "--quiet"});
+  ASSERT_EQ(replayed.code, 0) << replayed.error;
+  const Recording streamed = read_recording(list_recordings(run_.disk() + "/streamed").at(0));
+  EXPECT_EQ(streamed.array, sensor_.array);
+  EXPECT_EQ(streamed.signal_scale, sensor_.scale);
+  EXPECT_GT(streamed.frames(), 1000U);
+}
+
+TEST_F(CollectUnstampedSensor, ItsPassesHaveTruePositions) {
+  const ProcessResult result = run_process("supertac-collect", words({"--passes", "1"}));
+  ASSERT_EQ(result.code, 0) << result.error;
+  expect_true_positions(read_recording(run_.out() + "/ridges6_t1_p1_v20.safetensors"));
+}
+
+TEST_F(CollectSensor, AfterAKillTheJournalAloneIsEnough) {
+  RunningProcess program("supertac-collect", words());
+  ASSERT_TRUE(run_.wait_for_contact(3, program)) << program.wait().error;
+  program.send(SIGKILL);
+  (void)program.wait();
+  for (const char* file : {"/mat.json", "/bed.json"}) std::filesystem::remove(run_.disk() + file);
+  const ProcessResult recovered =
+      run_process("supertac-import", {"--journal", journal(), "--out", run_.disk() + "/again"});
+  EXPECT_EQ(recovered.code, 0) << recovered.error;
+  EXPECT_NE(recovered.out.find("cut off"), std::string::npos) << recovered.out;
+  const Recording recording = read_recording(run_.disk() + "/again/ridges6_t1_p1_v20.safetensors");
+  EXPECT_EQ(recording.array, sensor_.array);
+  EXPECT_GT(recording.frames(), 150U);
+  expect_true_positions(recording);
+  run_.wait_for_rest();
+}
+
+TEST_F(CollectSensor, UnpluggedInContactItLeavesTheFingerUp) {
+  const int port = free_port();
+  RunningProcess program("supertac-collect", words({"--web", std::to_string(port)}));
+  const std::unique_ptr<HttpClient> page = connect_when_up(port);
+  ASSERT_TRUE(page);
+  page->send("GET /events HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) + "\r\n\r\n");
+  const auto hello = event_after(page->receive("\n\n"), "event: hello\ndata: ");
+  EXPECT_EQ(hello["passes"].get<std::vector<double>>(), (std::vector<double>{15, 18}));
+  ASSERT_TRUE(run_.wait_for_contact(2, program)) << program.wait().error;
+  const std::string seen = page->receive("\"phase\":\"slide\"");
+  EXPECT_NE(seen.find("\"x\":15.0,\"y\":"), std::string::npos) << seen;
+  unplug();
+  const ProcessResult result = program.wait();
+  EXPECT_EQ(result.code, 1);
+  EXPECT_TRUE(is_one_line(result.error)) << result.error;
+  EXPECT_NE(result.error.find("/mat: the device is gone"), std::string::npos) << result.error;
+  EXPECT_GE(run_.head().z, kLiftedZ - 0.01);
+  EXPECT_GT(read_recording(run_.out() + "/ridges6_t1_p1_v20.safetensors").frames(), 50U);
+}
+
+TEST_F(CollectSensor, WhatCannotBeIsRefusedBeforeAnythingMoves) {
+  const Point3 before = run_.head();
+  const auto refuse = [&](const std::vector<std::string>& more, int code, const std::string& says) {
+    const ProcessResult result = run_process("supertac-collect", words(more));
+    EXPECT_EQ(result.code, code) << result.error;
+    EXPECT_TRUE(is_one_line(result.error)) << result.error;
+    EXPECT_NE(result.error.find(says), std::string::npos) << result.error;
+    EXPECT_EQ(run_.files(), "");
+  };
+  const std::string bed = run_.disk() + "/small.json";
+  std::string text = kBed;
+  write_file(bed, text.replace(text.find("420"), 3, "385"));
+  refuse({"--bed", bed}, 1, "Y expected 200.00 to 385.00 mm, found 390.00; nothing was sent");
+  refuse({"--passes", "30"}, 1, "X342.00 Y310.00 Z95.00, below Z95.00 and beside the plate");
+  write_file(bed, R"({"plate": [300, 310]})");
+  refuse({"--bed", bed}, 1, "small.json: \"plate\" must be three numbers of mm");
+  refuse({"--board", run_.board()}, 2, "--board: only with the rig's board");
+  Sensor other = sensor_;
+  const auto with_port = [&](const std::string& port) {
+    other.port = port;
+    const std::string path = run_.disk() + "/other.json";
+    write_sensor(OutputPath(path), other);
+    return path;
+  };
+  refuse({"--sensor", with_port("udp::5005")}, 2, "--speedup: only with a sensor at a serial port");
+  refuse({"--speedup", "1", "--sensor", with_port(run_.disk() + "/mat.json")}, 1, "is a file");
+  EXPECT_EQ(run_.head(), before);
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,291 @@
+// Collections with another sensor than the rig's board, on another bed: a text sensor of 100 Hz rides on the
+// simulated rig's head, and every frame carries its number.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "hardware/collection/collection.h"
+#include "hardware/collection/palpation_recorder.h"
+#include "io/files/file.h"
+#include "io/files/json.h"
+#include "tests/expect_error.h"
+#include "tests/hardware/fake_sensor.h"
+#include "tests/hardware/numbered_board.h"
+#include "tests/hardware/rig_support.h"
+
+namespace supertac {
+namespace {
+
+constexpr int kEvery = 10;  // board frames a frame of the sensor
+
+Sensor mat(bool stamped) {
+  Sensor sensor;
+  sensor.name = "mat";
+  sensor.array = {.rows = 8, .columns = 8, .pitch_mm = 2};
+  sensor.scale = {.unit = "counts", .rest = 40, .span = -860};
+  sensor.rate_hz = 100;
+  sensor.frame.kind = FrameKind::text;
+  if (stamped) sensor.frame.time = FrameTime{.column = 0, .unit_s = 1e-3};
+  for (int k = 0; k < 64; ++k) sensor.order.push_back(k % 8 * 8 + k / 8);  // column-major
+  sensor.dead = {9};
+  return sensor;
+}
+
+/// Frame n of the board, of every ten, as a line of `sensor`: sent half a period later, by a clock that is
+/// fast by three thousandths.
+class TextPort : public Port {
+ public:
+  TextPort(std::unique_ptr<Port> board, const NumberedBoard& numbers, Sensor sensor)
+      : board_(std::move(board)), numbers_(numbers), sensor_(std::move(sensor)) {}
+  const std::string& name() const override { return board_->name(); }
+  double now() override { return board_->now(); }
+  double write(std::span<const std::byte>, double) override { return now(); }
+  Received read(std::span<std::byte> buffer, double until) override {
+    // All that has arrived, as a terminal hands it on.
+    for (bool more = held_.empty(); more; until = board_->now()) {
+      std::array<std::byte, 8192> raw{};
+      const Received got = board_->read(raw, until);
+      time_s_ = got.time_s;
+      decoder_.push(std::span(raw).first(got.count),
+                    [this](const BoardFrame& frame, std::uint64_t) { take(frame); });
+      more = got.count > 0;
+    }
+    const std::size_t count = std::min(buffer.size(), held_.size());
+    std::copy_n(std::as_bytes(std::span(held_)).begin(), count, buffer.begin());
+    held_.erase(0, count);
+    return {count, time_s_};
+  }
+
+ private:
+  void take(const BoardFrame& frame) {
+    const auto numbers = numbers_.numbers_in([&](std::size_t k) { return frame.taxel(static_cast<int>(k)); });
+    if (numbers.empty() || numbers[0] / kEvery == sent_) return;
+    sent_ = numbers[0] / kEvery;
+    const std::uint64_t number = sent_ * kEvery - kEvery / 2;
+    std::vector<double> values(64, 100);
+    values[0] = static_cast<double>(number % 1000), values[1] = static_cast<double>(number / 1000);
+    held_ += sent_frame(sensor_, values, 1.003 * static_cast<double>(sent_) * kEvery * rig::kFramePeriodS);
+  }
+
+  std::unique_ptr<Port> board_;
+  const NumberedBoard& numbers_;
+  Sensor sensor_;
+  FrameDecoder decoder_;
+  std::string held_;
+  double time_s_ = 0;
+  std::uint64_t sent_ = 0;
+};
+
+std::string header_of(const Sensor& sensor, const Bed& bed) {
+  return nlohmann::ordered_json{{"version", 1}, {"sensor", json_of(sensor)}, {"bed", json_of(bed)}}.dump();
+}
+
+/// Half a metre from where the rig has it, for one slide of 60 mm.
+Bed far_bed() {
+  Bed bed;
+  bed.limits = {.low = {400, 400, 0}, .high = {700, 700, 300}, .plate = {500, 510, 20}};
+  bed.origin = {505, 500, 40};
+  bed.plan.start = {505, 510, 20};
+  bed.plan.passes = 1, bed.plan.slide = 60;
+  return bed;
+}
+
+struct CarriedSensor {
+  explicit CarriedSensor(const Sensor& sensor, RigSettings rig_settings = running_rig())
+      : numbers((rig_settings.printer.head = far_bed().origin, rig_settings)), rig(rig_settings) {
+    numbers.watch(rig.world().board());
+    settings.bed = far_bed();
+    settings.sensor = sensor;
+    settings.journal = folder / "journal";
+    settings.header = header_of(sensor, settings.bed);
+  }
+  RecorderReport record() {
+    return record_palpation(std::make_unique<TextPort>(rig.board_port(), numbers, settings.sensor),
+                            rig.printer_port(), settings);
+  }
+  Journal journal() const { return read_journal(settings.journal); }
+  /// How far (mm) the frames' positions are from where the head was in their middle, at most.
+  double worst(const CollectedPass& pass) const {
+    double worst = 0;
+    for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
+      const float* frame = &pass.volts[64 * i];
+      // The second value of a frame is that of taxel 8: row 1, column 0.
+      const auto number = static_cast<std::uint64_t>(frame[0] + 1000 * frame[8]);
+      const double* p = &pass.position[3 * i];
+      worst = std::max(worst, distance(numbers.head(number), {p[0], p[1], p[2]}));
+    }
+    return worst;
+  }
+
+  TemporaryFolder folder;
+  NumberedBoard numbers;
+  SimulatedRig rig;
+  RecorderSettings settings;
+};
+
+TEST(CarriedSensor, EveryFrameHasItsPositionWithAndWithoutTimeStamps) {
+  for (const bool stamped : {true, false}) {
+    CarriedSensor run(mat(stamped));
+    const RecorderReport report = run.record();
+    ASSERT_TRUE(report.outcome.complete) << report.outcome.note;
+    const Collection collection = collection_of(run.journal());
+    EXPECT_EQ(collection.sensor, mat(stamped));
+    EXPECT_EQ(collection.bed, far_bed());
+    ASSERT_EQ(collection.passes.size(), 1U);
+    const CollectedPass& pass = collection.passes[0];
+    EXPECT_TRUE(pass.complete);
+    EXPECT_EQ(pass.doubt, "");
+    EXPECT_EQ(pass.missing + pass.left_out, 0U);
+    EXPECT_NEAR(static_cast<double>(pass.time_s.size()), 840, 25);  // 60 mm, and up and down
+    EXPECT_LT(run.worst(pass), 0.1) << "stamped " << stamped;
+    EXPECT_EQ(pass.volts.size(), 64 * pass.time_s.size());
+    const float* first = pass.volts.data();
+    EXPECT_EQ(first[9], (first[0] + first[8] + 6 * 100) / 8) << "a dead taxel is the mean of those around";
+  }
+}
+
+TEST(CarriedSensor, LostFramesAreCountedAndCostNoPosition) {
+  for (const bool stamped : {true, false}) {
+    RigSettings rig = running_rig();
+    rig.faults.stall_rate = 0.001;  // of 20 ms: two frames
+    CarriedSensor run(mat(stamped), rig);
+    ASSERT_TRUE(run.record().outcome.complete);
+    const Collection collection = collection_of(run.journal());
+    const CollectedPass& pass = collection.passes.at(0);
+    EXPECT_GE(pass.missing, stamped ? 1U : 0U);
+    // Without time stamps a loss shows a dozen frames later.
+    EXPECT_LT(run.worst(pass), stamped ? 0.05 : pass.doubt.empty() ? 2 * kTrustedMm : 2);
+  }
+}
+
+TEST(CarriedSensor, AnotherRateThanItsFileSaysCostsNoPosition) {
+  for (const bool stamped : {true, false})
+    for (const double rate_hz : {60.0, 95.0, 300.0}) {
+      Sensor sensor = mat(stamped);
+      sensor.rate_hz = rate_hz;
+      CarriedSensor run(sensor);
+      ASSERT_TRUE(run.record().outcome.complete);
+      const Collection collection = collection_of(run.journal());
+      const CollectedPass& pass = collection.passes.at(0);
+      EXPECT_EQ(pass.doubt, "") << rate_hz;
+      EXPECT_EQ(pass.missing + pass.left_out, 0U) << rate_hz;
+      EXPECT_LT(run.worst(pass), stamped ? 0.05 : kTrustedMm) << rate_hz;
+    }
+}
+
+// The computer stands still for up to two seconds: right, left out, or said to be doubtful.
+TEST(CarriedSensor, AHostThatStandsStillMakesNothingWrongInSilence) {
+  for (const bool stamped : {true, false}) {
+    std::size_t frames = 0;
+    for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(mutations(4)); ++seed) {
+      RigSettings rig = running_rig();
+      rig.faults.host_freeze_rate = 0.0003;
+      rig.seed = seed;
+      CarriedSensor run(mat(stamped), rig);
+      (void)run.record();
+      for (const CollectedPass& pass : collection_of(run.journal()).passes) {
+        if (!pass.doubt.empty() || !pass.complete) continue;
+        frames += pass.time_s.size();
+        EXPECT_LE(run.worst(pass), kTrustedMm) << "seed " << seed << ", stamped " << stamped;
+      }
+    }
+    EXPECT_GT(frames, 700U);
+  }
+}
+
+TEST(CarriedSensor, AReplayGivesTheSameFrames) {
+  CarriedSensor run(mat(false));
+  (void)run.record();
+  const Journal journal = run.journal();
+  RecorderSettings again = run.settings;
+  again.journal = run.folder / "replayed";
+  again.replay = true;
+  const RecorderReport second =
+      record_palpation(std::make_unique<ReplayPort>(journal.of(Stream::board), "sensor"),
+                       std::make_unique<ReplayPort>(journal.of(Stream::printer), "printer"), again);
+  EXPECT_TRUE(second.outcome.complete) << second.outcome.note;
+  const CollectedPass a = collection_of(journal).passes.at(0),
+                      b = collection_of(read_journal(again.journal)).passes.at(0);
+  EXPECT_EQ(a.time_s, b.time_s);
+  EXPECT_EQ(a.volts, b.volts);
+  EXPECT_EQ(a.position, b.position);
+}
+
+TEST(CarriedSensor, ADamagedJournalCostsItsOwnFramesOnly) {
+  CarriedSensor run(mat(true));
+  (void)run.record();
+  std::string bytes = read_text_file(run.settings.journal, 1 << 30);
+  const char of_the_sensor[] = {'S', 'T', 'J', '1', 2, 0, 0, 0};
+  for (const std::size_t part : {4, 5, 6}) {
+    const std::size_t chunk = bytes.find({of_the_sensor, 8}, bytes.size() * part / 8);
+    ASSERT_NE(chunk, std::string::npos);
+    bytes[chunk + 100] ^= 1;
+  }
+  bytes.resize(bytes.size() - 1000);
+  const Journal journal = parse_journal(std::as_bytes(std::span(bytes)), "damaged");
+  EXPECT_GT(journal.lost_bytes, 0U);
+  const CollectedPass pass = collection_of(journal).passes.at(0);
+  EXPECT_GT(pass.time_s.size(), 700U);
+  EXPECT_GT(pass.missing, 3U);
+  EXPECT_LT(run.worst(pass), 0.05) << pass.doubt;
+}
+
+TEST(CarriedSensor, AHeaderWithoutASensorOrBedIsNamed) {
+  const auto collect = [](const std::string& header) {
+    const TemporaryFolder folder;
+    JournalWriter(folder / "journal", header).close();
+    return collection_of(read_journal(folder / "journal"));
+  };
+  EXPECT_EQ(collect("test").sensor, Sensor{});
+  EXPECT_EQ(collect(R"({"version":1})").bed, Bed{});
+  std::string header = header_of(mat(true), far_bed());
+  EXPECT_EQ(collect(header).sensor, mat(true));
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string text = header;
+    text.replace(text.find(from), from.size(), to);
+    return text;
+  };
+  EXPECT_ERROR(collect(changed("\"rows\":8", "\"rows\":\"8\"")), JournalError,
+               "\"sensor\": \"rows\" must be a whole number, found \"8\"");
+  EXPECT_ERROR(collect(changed("\"rows\":8", "\"rows\":80")), JournalError, "rows");
+  EXPECT_ERROR(collect(changed("\"passes\":1", "\"passes\":0")), JournalError,
+               "\"bed\": \"passes\" must be 1 to 1000, found 0");
+}
+
+TEST(CarriedSensor, NothingMovesBeforeItIsHeard) {
+  CarriedSensor run(mat(true));
+  const Sensor wrong = [] {
+    Sensor sensor = mat(true);
+    sensor.array.rows = 4, sensor.order.clear();
+    return sensor;
+  }();
+  Sensor sent = run.settings.sensor;
+  run.settings.sensor = wrong;
+  EXPECT_ERROR(record_palpation(std::make_unique<TextPort>(run.rig.board_port(), run.numbers, sent),
+                                run.rig.printer_port(), run.settings),
+               WrongDevice, "expected frames of 32 values");
+  EXPECT_TRUE(moves_of(run.rig.world().printer()).empty());
+  EXPECT_EQ(run.folder.entries(), 0U) << "a journal of nothing was left behind";
+}
+
+TEST(CarriedSensor, OneThatGoesAwayInContactEndsWithTheFingerUp) {
+  CarriedSensor run(mat(true));
+  run.settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters& counters) {
+    EXPECT_GT(counters.decoder.frames, 0U);
+    if (leg.phase == Phase::slide && at.y > 530) run.rig.unplug_board();
+  };
+  const RecorderReport report = run.record();
+  EXPECT_ERROR(std::rethrow_exception(report.outcome.error), PortUnplugged, "check the cable");
+  EXPECT_EQ(report.outcome.finger, PalpationOutcome::Finger::lifted);
+  EXPECT_GT(run.rig.world().printer().head(run.rig.now()).z, 24.9);
+}
+
+TEST(CarriedSensor, APlanThatLeavesTheBedIsRefused) {
+  CarriedSensor run(mat(true));
+  run.settings.bed.limits.high.y = 560;
+  EXPECT_ERROR((void)run.record(), OutsideLimits, "Y expected 400.00 to 560.00 mm, found 570.00");
+  EXPECT_TRUE(moves_of(run.rig.world().printer()).empty());
+}
+
+}  // namespace
+}  // namespace supertac
