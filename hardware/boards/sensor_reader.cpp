@@ -156,7 +156,7 @@ double FrameReader::read(Port& port, bool live, const Sink& sink) {
   };
   decoder_->push(bytes, keep);
   // A host that stood still finds what waited meanwhile in several reads.
-  const bool stood_still = got.time_s - std::exchange(last_read_s_, got.time_s) > kChunkS;
+  const bool stood_still = got.time_s - last_read_s_ > kChunkS;
   std::exception_ptr end;  // what came before it is handed over first
   try {
     for (int more = 0; stood_still && live && more < kMostReads; ++more) {
@@ -168,6 +168,7 @@ double FrameReader::read(Port& port, bool live, const Sink& sink) {
   } catch (...) {
     end = std::current_exception();
   }
+  last_read_s_ = got.time_s;
   const std::size_t count = times_read_s_.size(), size = sensor_.values();
   for (std::size_t n = 0; n < count; ++n)
     take({std::span(values_read_).subspan(n * size, size), times_read_s_[n]}, got.time_s, count - 1 - n,
@@ -234,7 +235,10 @@ void SensorReader::run() {
     frames_.finish(time_s, sink_);
     const std::lock_guard lock(mutex_);
     count();
-    if (live_) error_ = std::current_exception();
+    if (live_)
+      error_ = std::make_exception_ptr(PortUnplugged("sensor " + sensor_.name + " at " + port_->name() +
+                                                     ": what it sends has ended; see whether its program "
+                                                     "still runs, and start again"));
   } catch (...) {
     const std::lock_guard lock(mutex_);
     count();

@@ -15,6 +15,7 @@
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
+#include "tests/expect_error.h"
 #include "tests/hardware/fake_sensor.h"
 #include "tests/io/temporary_folder.h"
 
@@ -362,6 +363,20 @@ TEST(SensorReader, WaitsForTheWriterOfAFifo) {
   ASSERT_EQ(write(out, "1,2\n3,4\n", 8), 8);
   close(out);
   EXPECT_EQ(all_of(reader).size(), 2U);
+}
+
+TEST(SensorReader, ASourceThatWasToGoOnMayNotEnd) {
+  const TemporaryFolder folder;
+  write_file(folder / "frames", "1,2\n3,4\n");
+  const Sensor sensor = mat(1, 2, 100, R"({"kind":"text"})");
+  OpenedPort opened = open_port(folder / "frames");
+  opened.live = true;
+  SensorReader reader(std::move(opened), sensor);
+  reader.wait_for_end(10);
+  EXPECT_ERROR(reader.check(), PortUnplugged, "frames: what it sends has ended; see whether");
+  EXPECT_TRUE(reader.next(0));
+  EXPECT_TRUE(reader.next(0));
+  EXPECT_THROW(reader.next(0), PortUnplugged);
 }
 
 TEST(SensorReader, AnotherDeviceIsSaidWithWhatItSends) {
