@@ -55,7 +55,7 @@ class RecordedReads : public Port {
   double write(std::span<const std::byte>, double) override { return time_s_; }
 
   Received read(std::span<std::byte> buffer, double until) override {
-    constexpr double kAtOnceS = 0.02;
+    constexpr double kAtOnceS = 0.002;
     while (at_ < records_.size() && records_[at_].kind != RecordKind::received &&
            records_[at_].kind != RecordKind::timed_out)
       ++at_;
@@ -117,6 +117,7 @@ CollectedFrames frames_in(const Journal& journal, const Sensor& sensor) {
   all.lost = counted.missing;
   all.clock.period_s = all.clock.measured_s = counted.clock.period_s;
   all.steady = static_cast<int>(std::clamp(all.steady * rig::kFramePeriodS / all.clock.period_s, 1.0, 128.0));
+  all.follow = 2 * all.steady;
   if (sensor.frame.time) bring_to_the_port(all, 1 / sensor.rate_hz);
   return all;
 }

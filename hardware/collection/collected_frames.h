@@ -22,6 +22,7 @@ struct CollectedFrames {
   std::uint64_t lost = 0;  ///< frames
   ClockFit clock;          ///< period_s: from frame to frame
   int steady = 128;        ///< of so many frames and eight reads one at least was on time
+  int follow = 0;          ///< so many frames behind a pass tell whether its last ones were
 
   std::size_t size() const { return end_s.size(); }
 };

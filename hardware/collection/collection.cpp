@@ -192,7 +192,8 @@ CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const Pos
     pass.suspect.push_back(all.suspect[i]);
   }
   pass.speed = speed;
-  pass.doubt = doubt_of(all.clock, clock_error(all, begin, end), speed, track.doubt_mm());
+  const std::size_t checked = std::min(all.size(), end + static_cast<std::size_t>(all.follow));
+  pass.doubt = doubt_of(all.clock, clock_error(all, begin, checked), speed, track.doubt_mm());
   // A sensor that turns out to be slower than its file says has lost fewer than it seemed.
   if (end > 0) pass.missing = all.missing[end - 1] - std::min(all.missing[begin], all.missing[end - 1]);
   return pass;

@@ -11,6 +11,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kFarthest = 1e4;  // mm
+constexpr const char* kPoint = "three numbers of mm within 10000, [x, y, z] of the printer";
 constexpr int kMostPasses = 1000, kLeastBaud = 300, kMostBaud = 1'000'000;
 
 template <class Number>
@@ -23,9 +24,10 @@ Number within(JsonObject& keys, const char* name, double low, double high, Numbe
 Point3 take_point(JsonObject& keys, const char* name, const Point3* fallback) {
   const std::vector<double> numbers = keys.numbers(name);
   if (numbers.empty() && fallback != nullptr) return *fallback;
+  if (numbers.empty())
+    throw FileError(keys.where(), "has no \"" + std::string(name) + "\": expected " + kPoint);
   const auto within = [](double v) { return v >= -kFarthest && v <= kFarthest; };
-  if (numbers.size() != 3 || !std::ranges::all_of(numbers, within))
-    keys.wrong(name, "three numbers of mm within 10000, [x, y, z] of the printer", Json(numbers));
+  if (numbers.size() != 3 || !std::ranges::all_of(numbers, within)) keys.wrong(name, kPoint, Json(numbers));
   return {numbers[0], numbers[1], numbers[2]};
 }
 

@@ -40,8 +40,9 @@ TEST(Bed, AMessageNamesTheKey) {
     std::string text = kLeast;
     return bed_of_json(text.insert(1, more + ", "), "b.json");
   };
-  EXPECT_ERROR(bed_of_json("{}", "b.json"), FileError,
-               "b.json: \"plate\" must be three numbers of mm within 10000, [x, y, z] of the printer");
+  EXPECT_ERROR(
+      bed_of_json("{}", "b.json"), FileError,
+      "b.json: has no \"plate\": expected three numbers of mm within 10000, [x, y, z] of the printer");
   EXPECT_ERROR(with(R"("low": [0, 0])"), FileError, "\"low\" must be three numbers");
   EXPECT_ERROR(with(R"("low": [0, 0, 1e9])"), FileError, "\"low\" must be three numbers");
   EXPECT_ERROR(with(R"("low": 3)"), FileError, "\"low\" must be a list of numbers, found 3");
