@@ -33,7 +33,7 @@ RigSettings on_the_bed() {
 SimulatorSettings without_disturbances() {
   SimulatorSettings settings;
   settings.array = {.rows = 8, .columns = 8, .pitch_mm = 2};
-  settings.with_noise = settings.with_emi = settings.with_drift = settings.with_vibration = false;
+  settings.noise_volts = settings.emi_volts = settings.drift_volts_per_s = settings.vibration_mm = 0;
   return settings;
 }
 
