@@ -8,7 +8,7 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kMostValues = std::size_t{1} << 22;
+constexpr std::size_t kMostValues = std::size_t{1} << 22, kLeastFrames = 16, kFarthest = 64;
 constexpr double kTail = 0.005, kMostClipped = 0.05, kLeastFilled = 0.1, kMargin = 1.1;
 // The rest of some taxels lies above the common one.
 constexpr double kAboveRest = 0.25;
@@ -31,13 +31,14 @@ void SignalRange::add(const Recording& recording) {
   if (values_.empty())
     stated_ = {.rest_volts = recording.signal_scale.rest, .span_volts = recording.signal_scale.span};
   const std::size_t signals = recording.array.signals(), frames = recording.frames();
-  for (; next_ < frames; next_ += apart_)
+  const std::size_t apart = factor_ * std::clamp(frames / kLeastFrames, std::size_t{1}, kFarthest);
+  for (; next_ < frames; next_ += apart)
     for (std::size_t k = 0; k < signals; ++k) {
       const float value = recording.volts[next_ * signals + k];
       if (std::isfinite(value)) values_.push_back(value);
     }
   sorted_ = false;
-  next_ = thinned_ ? next_ - frames : 0;
+  next_ = factor_ > 1 ? next_ - frames : 0;
   while (values_.size() > kMostValues) thin_out();
 }
 
@@ -46,8 +47,7 @@ void SignalRange::thin_out() {
   values();
   for (std::size_t i = 0; 2 * i < values_.size(); ++i) values_[i] = values_[2 * i];
   values_.resize((values_.size() + 1) / 2);
-  apart_ *= 2;
-  thinned_ = true;
+  factor_ *= 2;
 }
 
 const std::vector<float>& SignalRange::values() const {

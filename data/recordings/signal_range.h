@@ -14,8 +14,8 @@ namespace supertac {
 /// throws ends the reading.
 using ReadingWatch = std::function<void(std::size_t done, std::size_t all)>;
 
-/// The signals of some recordings, an even sample of them: one frame in 64, and of more than 16 million
-/// frames fewer.
+/// The signals of some recordings, an even sample of each: 16 frames or more, of long ones a frame in 64, and
+/// of more than 16 million frames fewer.
 class SignalRange {
  public:
   /// Of a folder's recordings, only these plates when any are named. Throws as list_recordings() and
@@ -46,8 +46,9 @@ class SignalRange {
   mutable std::vector<float> values_;
   Scaling stated_;
   mutable bool sorted_ = true;
-  std::size_t apart_ = 64, next_ = 0;  // frames from one of the sample to the next, and to the first
-  bool thinned_ = false;               // until then every recording begins with one of the sample
+  // How often it was thinned out, as a power of two, and frames to the next of the sample; before the first
+  // time every recording begins with one.
+  std::size_t factor_ = 1, next_ = 0;
 };
 
 }  // namespace supertac

@@ -40,6 +40,20 @@ TEST(SignalRange, OfAnotherSensorHoldsItsSignals) {
   EXPECT_EQ(range.text(), "68.136 to 101.797");
 }
 
+// As steps and presses are recorded: the first frame of each shows nothing.
+TEST(SignalRange, SeesShortRecordingsWhole) {
+  Recording press;
+  press.signal_scale = {.unit = "kPa", .rest = 0, .span = -1};
+  for (int i = 0; i < 40; ++i) {
+    press.time_s.push_back(i / 50.0);
+    press.volts.insert(press.volts.end(), kTaxels, static_cast<float>(0.5 * std::sin(3.14 * i / 40)));
+  }
+  SignalRange range;
+  for (int i = 0; i < 100; ++i) range.add(press);
+  EXPECT_EQ(range.fitted().span_volts, -1);
+  EXPECT_GE(range.values().size(), 100U * 16 * kTaxels);
+}
+
 TEST(SignalRange, CountsBothSides) {
   SignalRange range;
   range.add(even(0, 1));
