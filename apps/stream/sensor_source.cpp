@@ -5,7 +5,6 @@
 #include <filesystem>
 
 #include "apps/common/running/signals.h"
-#include "data/sensors/rest_tracker.h"
 #include "hardware/boards/sensor_reader.h"
 #include "hardware/collection/capture.h"
 #include "hardware/collection/collection.h"
@@ -70,14 +69,12 @@ class ReaderSource : public SensorSource {
  public:
   ReaderSource(OpenedPort opened, const Sensor& sensor)
       : SensorSource(1 / sensor.rate_hz, 0, opened.live, sensor.array, sensor.scale, sensor.silent()),
-        rest_(sensor),
         reader_(std::move(opened), sensor) {}
 
   std::optional<SensorFrame> next(double wait_s) override {
     auto frame = reader_.next(wait_s);
     if (!frame) return std::nullopt;
     frame_ = std::move(*frame);
-    rest_.follow(frame_.time_s, frame_.signals);
     return SensorFrame{.time_s = frame_.time_s, .volts = frame_.signals, .arrived_s = frame_.arrival_s};
   }
   bool ended() const override { return reader_.ended(); }
@@ -86,7 +83,6 @@ class ReaderSource : public SensorSource {
 
  private:
   ReadFrame frame_;
-  RestTracker rest_;
   SensorReader reader_;
 };
 

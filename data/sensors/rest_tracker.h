@@ -10,9 +10,8 @@ namespace supertac {
 
 /// Takes a slow drift of the rest from the frames of a sensor whose file has "follow_rest_s", T below:
 ///   m_s    = mean of signal s over about 0.2 s (of one pole)
-///   away   = the farthest that any m_s is from r_s in the pressed direction (of three axes: either way), as
-///   a
-///            share of the range; the other way nothing presses
+///   away   = the farthest that any m_s is from r_s in the pressed direction (of three axes: either way),
+///            as a share of the range; the other way nothing presses
 ///   r_s   += (m_s - r_s) dt / T     while away < band, for a second already; else r_s stays
 ///   signal = signal - r_s + scale.rest
 /// r begins at scale.rest. The band is 0.03. It begins at 0.15, since the rest of a file may be old, and

@@ -139,7 +139,7 @@ ReaderCounters::operator BoardCounters() const {
 }
 
 FrameReader::FrameReader(const Sensor& sensor, bool stored)
-    : sensor_(sensor), decoder_(make_decoder(sensor)), dates_(sensor, stored) {
+    : sensor_(sensor), decoder_(make_decoder(sensor)), dates_(sensor, stored), rest_(sensor) {
   frame_.signals.resize(sensor.array.signals());
 }
 
@@ -191,6 +191,7 @@ void FrameReader::take(const DecodedFrame& decoded, double arrival_s, std::size_
   damaged_ += damaged ? 1 : 0, late_ += !damaged && !time ? 1 : 0;
   if (!time) return;
   frame_.time_s = *time, frame_.arrival_s = arrival_s;
+  rest_.follow(*time, frame_.signals);
   sink(frame_);
 }
 

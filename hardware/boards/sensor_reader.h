@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "data/sensors/rest_tracker.h"
 #include "hardware/boards/sensor_decoder.h"
 #include "hardware/boards/tactile_board.h"
 #include "hardware/ports/open_port.h"
@@ -17,7 +18,7 @@
 namespace supertac {
 
 struct ReadFrame {
-  std::vector<float> signals;  ///< as Sensor::arrange(), in the sensor's unit
+  std::vector<float> signals;  ///< as Sensor::arrange() and RestTracker::follow(), in the sensor's unit
   double time_s = 0;           ///< of the sensor, increasing; from any zero
   double arrival_s = 0;        ///< on the port's clock
 };
@@ -90,6 +91,7 @@ class FrameReader {
   Sensor sensor_;
   std::unique_ptr<SensorDecoder> decoder_;
   FrameDates dates_;
+  RestTracker rest_;
   ReadFrame frame_;
   std::vector<std::optional<double>> times_read_s_;  // of frames that came at once, and their values
   std::vector<float> values_read_;
