@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <stdexcept>
 
@@ -70,10 +71,12 @@ std::size_t Sensor::values() const {
 }
 
 std::vector<int> Sensor::silent() const {
-  std::set<int> all(dead.begin(), dead.end());
+  std::vector<int> all = dead;
   for (std::size_t k = 0; k < order.size(); ++k)
-    if (order[k] < 0) all.insert(static_cast<int>(k));
-  return {all.begin(), all.end()};
+    if (order[k] < 0) all.push_back(static_cast<int>(k));
+  std::ranges::sort(all);
+  all.erase(std::ranges::unique(all).begin(), all.end());
+  return all;
 }
 
 void Sensor::arrange(std::span<const float> sent, std::span<float> signals) const {
@@ -92,26 +95,30 @@ void Sensor::arrange(std::span<const float> sent, std::span<float> signals) cons
 }
 
 void Sensor::fill_silent(std::span<float> signals) const {
-  const auto channels = static_cast<std::size_t>(array.channels);
   const std::vector<int> silent_ = silent();
   if (silent_.empty()) return;
+  const int rows = array.rows, columns = array.columns, channels = array.channels;
   std::vector<bool> speaks(static_cast<std::size_t>(array.taxels()), true);
   for (const int k : silent_) speaks[static_cast<std::size_t>(k)] = false;
-  for (const int k : silent_) {
-    for (std::size_t c = 0; c < channels; ++c) {
-      double near = 0, all = 0;
-      int count_near = 0, count_all = 0;
-      for (int other = 0; other < array.taxels(); ++other) {
-        if (!speaks[static_cast<std::size_t>(other)]) continue;
-        const double value = double{signals[static_cast<std::size_t>(other) * channels + c]};
-        all += value, ++count_all;
-        if (std::abs(other % array.columns - k % array.columns) > 1 ||
-            std::abs(other / array.columns - k / array.columns) > 1)
-          continue;
-        near += value, ++count_near;
-      }
-      signals[static_cast<std::size_t>(k) * channels + c] =
-          static_cast<float>(count_near > 0 ? near / count_near : all / std::max(count_all, 1));
+  for (int c = 0; c < channels; ++c) {
+    // Of those that speak in [row,row_end) x [column,column_end).
+    const auto mean = [&](int row, int row_end, int column, int column_end) -> std::optional<double> {
+      double sum = 0;
+      int count = 0;
+      for (int y = std::max(row, 0); y < std::min(row_end, rows); ++y)
+        for (int x = std::max(column, 0); x < std::min(column_end, columns); ++x) {
+          const auto k = static_cast<std::size_t>(y * columns + x);
+          if (speaks[k])
+            sum += double{signals[k * static_cast<std::size_t>(channels) + static_cast<std::size_t>(c)]},
+                ++count;
+        }
+      return count > 0 ? std::optional(sum / count) : std::nullopt;
+    };
+    const double of_all = mean(0, rows, 0, columns).value_or(0);
+    for (const int k : silent_) {
+      const int y = k / columns, x = k % columns;
+      signals[static_cast<std::size_t>(k * channels + c)] =
+          static_cast<float>(mean(y - 1, y + 2, x - 1, x + 2).value_or(of_all));
     }
   }
 }

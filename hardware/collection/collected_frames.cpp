@@ -98,9 +98,18 @@ CollectedFrames frames_in(const Journal& journal, const Sensor& sensor) {
   FrameReader reader(sensor);
   RecordedReads port(journal.of(Stream::board));
   std::uint64_t before = 0;  // torn, damaged or missing
+  // A damaged header may name an array of a few taxels and thousands of places without one.
+  constexpr std::uint64_t kMostGrowth = 64, kAlways = 1 << 24;
+  std::uint64_t most_bytes = kAlways;
+  for (const JournalRecord& record : journal.of(Stream::board))
+    most_bytes += kMostGrowth * record.bytes.size();
   try {
     for (;;)
       reader.read(port, true, [&](const ReadFrame& frame) {
+        if (sizeof(float) * all.signals.size() > most_bytes)
+          throw JournalError("journal: its sensor, " + sensor.array.text() + ", makes frames of over " +
+                             std::to_string(kMostGrowth) +
+                             " times what was received; is its header damaged?");
         const BoardCounters counted = reader.counters();
         all.signals.insert(all.signals.end(), frame.signals.begin(), frame.signals.end());
         all.arrival_s.push_back(frame.arrival_s);

@@ -253,6 +253,19 @@ TEST(CarriedSensor, NoBytesOfAJournalDoHarm) {
   }
 }
 
+// A line of two bytes, a frame of 4,096 places of which one has a taxel.
+TEST(CarriedSensor, AHeaderDoesNotMakeALittleVeryLarge) {
+  const TemporaryFolder folder;
+  Sensor sensor = mat(false);
+  sensor.array = {.rows = 64, .columns = 64, .pitch_mm = 1};
+  sensor.order.assign(4096, -1), sensor.order[0] = 0, sensor.dead.clear();
+  JournalWriter writer(folder / "journal", header_of(sensor, far_bed()));
+  const std::byte line[] = {std::byte{'7'}, std::byte{'\n'}};
+  for (int n = 0; n < 3000; ++n) writer.append(Stream::board, RecordKind::received, 0.01 * n, line);
+  writer.close();
+  EXPECT_ERROR(collection_of(read_journal(folder / "journal")), JournalError, "times what was received");
+}
+
 TEST(CarriedSensor, AHeaderWithoutASensorOrBedIsNamed) {
   const auto collect = [](const std::string& header) {
     const TemporaryFolder folder;
