@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "data/sensors/rest_tracker.h"
 #include "hardware/boards/sensor_reader.h"
 #include "hardware/ports/errors.h"
 
@@ -33,10 +34,13 @@ CollectedFrames board_frames(const Journal& journal, const Sensor& sensor) {
     });
   }
   const FrameTimeline timeline = timeline_of(arrivals);
+  RestTracker rest(sensor);
   for (std::size_t i = 0; i < arrivals.size(); ++i) {
     const FramePlace& place = timeline.places[i];
     all.arrival_s.push_back(arrivals[i].time_s);
     all.end_s.push_back(timeline.clock.at(static_cast<double>(place.index)));
+    rest.follow(all.end_s.back(),
+                std::span(all.signals).subspan(i * sensor.array.signals(), sensor.array.signals()));
     all.doubt_s.push_back(place.doubt * timeline.clock.period_s);
     all.missing.push_back(place.index - i);
   }
