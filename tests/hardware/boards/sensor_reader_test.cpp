@@ -64,12 +64,7 @@ int free_port(int type) {
 }
 
 std::string refusal(const std::string& address) {
-  try {
-    open_port(address);
-  } catch (const PortError& error) {
-    return error.what();
-  }
-  return "opened";
+  return what_of<PortError>([&] { open_port(address); });
 }
 
 TEST(OpenPort, RefusesInOneLine) {
