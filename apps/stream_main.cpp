@@ -128,10 +128,11 @@ ProbeReport probe_port(const Arguments& a) {
   if (!described) sensor.port = named;
   const bool gain = a.flag("gain");
   const double seconds = a.given("seconds") ? a.number("seconds", 0.1, 3600) : gain ? 30 : 5;
+  const OpenedPort opened = open_port(sensor.port);
   a.note("listening for " + format(seconds) +
          (gain ? " s: press every taxel equally hard, many at once with something flat, and let go"
                : " s: press here and there, and let go"));
-  const std::vector<Heard> heard = listen(sensor.port, seconds);
+  const std::vector<Heard> heard = listen(opened, sensor.port, seconds);
   const auto known = described ? std::optional(sensor) : std::nullopt;
   ProbeReport report = gain && known ? ProbeReport{{}, known} : probe(heard, sensor.port, known);
   if (gain && report.draft) {

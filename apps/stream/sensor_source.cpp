@@ -130,9 +130,8 @@ std::unique_ptr<SensorSource> open_board(const std::string& port, double speedup
   return std::make_unique<BoardSource>(std::move(serial), true, speedup, std::move(journal), capture);
 }
 
-std::vector<Heard> listen(const std::string& port, double seconds) {
+std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, double seconds) {
   constexpr std::size_t kMostBytes = std::size_t{16} << 20;
-  const OpenedPort opened = open_port(port);
   std::vector<Heard> heard;
   std::vector<std::byte> buffer(65536);
   std::size_t bytes = 0;

@@ -11,6 +11,7 @@
 #include "data/recordings/recording.h"
 #include "hardware/boards/probe.h"
 #include "hardware/boards/tactile_board.h"
+#include "hardware/ports/open_port.h"
 
 namespace supertac {
 
@@ -61,8 +62,8 @@ class SensorSource {
   std::vector<int> silent_;
 };
 
-/// What a port sends within `seconds`. Throws as open_port().
-std::vector<Heard> listen(const std::string& port, double seconds);
+/// What the opened `port` sends within `seconds`.
+std::vector<Heard> listen(const OpenedPort& opened, const std::string& port, double seconds);
 /// Any sensor at its port. Throws as open_port().
 std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup);
 

@@ -19,6 +19,7 @@ RestTracker::RestTracker(const Sensor& sensor)
       before_s_(std::numeric_limits<double>::quiet_NaN()),
       band_(kMostBand),
       mean_(sensor.array.signals(), std::numeric_limits<double>::quiet_NaN()),
+      rate_(sensor.array.signals(), 0),
       rest_(sensor.array.signals(), sensor.scale.rest) {}
 
 void RestTracker::follow(double time_s, std::span<float> signals) {
@@ -34,11 +35,18 @@ void RestTracker::follow(double time_s, std::span<float> signals) {
     away = std::max(away, either_way_ ? std::abs(pressed) : pressed);
   }
   free_s_ = away < band_ ? free_s_ + dt : 0;
-  if (free_s_ == 0) band_ = std::min(kMostBand, band_ + kGrowthPerS * dt);
+  if (free_s_ == 0) band_ = std::min(kMostBand, band_ + std::max(kGrowthPerS, kMargin * fastest_) * dt);
   if (free_s_ > kFreeS) {
     band_ = std::max(kBand, std::min(band_, kMargin * away));
-    for (std::size_t s = 0; s < signals.size(); ++s)
-      if (!std::isnan(mean_[s])) rest_[s] += std::min(1.0, dt / time_constant_s_) * (mean_[s] - rest_[s]);
+    const double share = std::min(1.0, dt / time_constant_s_);
+    fastest_ = 0;
+    for (std::size_t s = 0; s < signals.size(); ++s) {
+      if (std::isnan(mean_[s])) continue;
+      const double lag = mean_[s] - rest_[s];
+      rest_[s] += share * lag;
+      rate_[s] += share * (lag / time_constant_s_ - rate_[s]);
+      fastest_ = std::max(fastest_, std::abs(rate_[s] / scale_.span));
+    }
   }
   for (std::size_t s = 0; s < signals.size(); ++s)
     signals[s] = static_cast<float>(double{signals[s]} - rest_[s] + scale_.rest);

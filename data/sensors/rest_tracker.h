@@ -13,11 +13,13 @@ namespace supertac {
 ///   away   = the farthest that any m_s is from r_s in the pressed direction (of three axes: either way),
 ///            as a share of the range; the other way nothing presses
 ///   r_s   += (m_s - r_s) dt / T     while away < band, for a second already; else r_s stays
+///   d_s   += ((m_s - r_s) / T - d_s) dt / T     at the same time: the drift in a second
 ///   signal = signal - r_s + scale.rest
 /// r begins at scale.rest. The band is 0.03. It begins at 0.15, since the rest of a file may be old, and
-/// shrinks as r follows; under a touch it grows by 2e-4 a second, up to 0.15, since what drifts then is seen
-/// only afterwards. So a touch of 0.1 of the range that does not move is absorbed after six minutes, one of
-/// over 0.15 never (normalise_window() calls less than that no press).
+/// shrinks as r follows; under a touch it grows by 2e-4 a second, or 1.25 times the fastest d_s (as a share
+/// of the range) if that is more, up to 0.15, since what drifts then is seen only afterwards. So a touch of
+/// 0.1 of the range that does not move is absorbed after six minutes, one of over 0.15 never
+/// (normalise_window() calls less than that no press).
 class RestTracker {
  public:
   explicit RestTracker(const Sensor& sensor);
@@ -28,8 +30,8 @@ class RestTracker {
  private:
   SignalScale scale_;
   bool either_way_;
-  double time_constant_s_, before_s_, free_s_ = 0, band_;
-  std::vector<double> mean_, rest_;
+  double time_constant_s_, before_s_, free_s_ = 0, band_, fastest_ = 0;
+  std::vector<double> mean_, rate_, rest_;
 };
 
 }  // namespace supertac

@@ -23,7 +23,8 @@ constexpr double kRestarted = 0.3;  // of the time at least a clock runs that st
 constexpr double kPressed = 12;     // times the noise: more than that is a finger
 constexpr double kUneven = 0.02;    // of the range: what signals may rest apart
 constexpr double kAtOnceS = 0.2, kAssumedHz = 100;
-constexpr std::size_t kFewLines = 3;  // of which nothing can be said
+constexpr std::size_t kFewLines = 3;    // of which nothing can be said
+constexpr std::size_t kManyLines = 30;  // a signal does not rise from each of them to the next
 
 struct Lines {
   std::vector<std::string_view> text;
@@ -97,12 +98,14 @@ std::optional<Candidate> columns_of(const Lines& lines) {
       const int column = static_cast<int>(c);
       const auto nan = std::ranges::count_if(columns[c], [](double v) { return std::isnan(v); });
       const auto unit = nan == 0 ? unit_of_clock(columns[c], lines.seconds) : std::nullopt;
-      bool counts_up = nan == 0;
-      for (std::size_t i = 1; i < columns[c].size(); ++i)
-        counts_up = counts_up && columns[c][i] - columns[c][i - 1] == 1;
+      bool counts_up = nan == 0, rises = nan == 0 && columns[c].size() >= kManyLines;
+      for (std::size_t i = 1; i < columns[c].size(); ++i) {
+        const double step = columns[c][i] - columns[c][i - 1];
+        counts_up = counts_up && step == 1, rises = rises && step > 0;
+      }
       if (unit && !candidate.format.time)
         candidate.format.time = FrameTime{.column = column, .unit_s = *unit};
-      else if (static_cast<double>(nan) > 0.5 * static_cast<double>(columns[c].size()) || counts_up)
+      else if (static_cast<double>(nan) > 0.5 * static_cast<double>(columns[c].size()) || counts_up || rises)
         candidate.format.skip.push_back(column);
     }
     const std::size_t values = most - candidate.format.skip.size() - (candidate.format.time ? 1 : 0);
@@ -110,8 +113,9 @@ std::optional<Candidate> columns_of(const Lines& lines) {
     if (!array) continue;
     candidate.array = *array;
     if (!candidate.format.skip.empty())
-      candidate.remark = "columns that are no signal (words, or a counter) are skipped: " +
-                         nlohmann::json(candidate.format.skip).dump();
+      candidate.remark =
+          "columns that are no signal (words, a counter, a clock of no known unit) are skipped: " +
+          nlohmann::json(candidate.format.skip).dump();
     best = candidate;
   }
   return best;
@@ -175,7 +179,9 @@ bool is_object(std::string_view line) {
 }
 
 // Polarity, range, noise and what never moves; into the draft where they are known.
-void look_at_signals(Sensor& draft, const HeardFrames& frames, std::vector<std::string>& says) {
+// What was known of a sensor stays where nothing says more than that.
+void look_at_signals(Sensor& draft, const HeardFrames& frames, const std::optional<Sensor>& known,
+                     std::vector<std::string>& says) {
   std::vector<double> rests, moving, noises;
   std::vector<int> still;
   double up = 0, down = 0;
@@ -198,21 +204,28 @@ void look_at_signals(Sensor& draft, const HeardFrames& frames, std::vector<std::
   const double rest = median(sorted), noise = std::max(median(noises), whole ? 1.0 : 1e-6 * std::abs(rest));
   const auto [lowest, highest] = std::ranges::minmax(rests);
   const double uneven = moving.empty() ? 0 : std::ranges::max(moving) - std::ranges::min(moving);
-  draft.scale.unit = whole ? "counts" : "unknown unit";
+  draft.scale.unit = known ? known->scale.unit : whole ? "counts" : "unknown unit";
   says.push_back("at rest " + format(lowest) + " to " + format(highest) + ", median " + format(rest) +
                  ", noise " + format(noise, 3) + " from frame to frame" +
-                 (whole ? "; whole numbers, called counts" : "; set \"unit\""));
+                 (known   ? ""
+                  : whole ? "; whole numbers, called counts"
+                          : "; set \"unit\""));
   const bool pressed = std::max(up, down) > kPressed * noise, rises = up >= down || !pressed;
   const double most = pressed ? 1.1 * std::max(up, down) : std::max(20 * noise, 0.1 * std::abs(rest));
-  draft.scale.rest = rest, draft.scale.span = rises ? -most : most;
-  if (pressed && uneven > kUneven * most) {
+  if (known && !pressed) {
+    draft.scale = known->scale;
+  } else {
+    draft.scale.rest = rest, draft.scale.span = rises ? -most : most;
+  }
+  if (known || (pressed && uneven > kUneven * most)) {
     draft.rest.assign(rests.begin(), rests.end());
     says.push_back("signals rest up to " + format(uneven, 3) +
                    " apart: \"rest\" moves each to the median; probe again when they have drifted");
   }
-  says.push_back(pressed
-                     ? std::string("pressing ") + (rises ? "raises" : "lowers") + " the signals, by up to " +
-                           format(std::max(up, down), 3)
+  says.push_back(pressed ? std::string("pressing ") + (rises ? "raises" : "lowers") +
+                               " the signals, by up to " + format(std::max(up, down), 3)
+                 : known
+                     ? "nothing was pressed: \"pressed\" and \"range\" stay as the file has them"
                      : "nothing was pressed: \"pressed\": \"higher\" and the range are assumed; probe again "
                        "while you press");
   if (2 * still.size() > static_cast<std::size_t>(draft.array.taxels())) {
@@ -241,7 +254,9 @@ std::optional<Candidate> candidate_of(const std::string& bytes, std::span<const 
   } else if (static_cast<double>(text_bytes) > kText * static_cast<double>(bytes.size())) {
     const Lines lines = lines_of(bytes, heard);
     if (lines.text.size() < kFewLines) {
-      says.push_back("too few lines; probe for longer (--seconds)");
+      says.push_back(bytes.find('\n') == std::string::npos
+                         ? "no line ends in this text: a sensor ends each frame with a line feed"
+                         : "too few lines; probe for longer (--seconds)");
       return found;
     }
     says.push_back(std::to_string(lines.text.size()) + " lines, such as " +
@@ -278,23 +293,25 @@ std::optional<Candidate> candidate_of(const std::string& bytes, std::span<const 
 
 std::optional<double> unit_of_clock(std::span<const double> stamps, double seconds) {
   if (stamps.size() < kFewLines) return std::nullopt;
-  // A clock may start anew while one listens, and stands still meanwhile.
-  double went = 0;
+  // A clock may start anew while one listens, and stands still meanwhile; of what waited before one listened,
+  // some may come first.
+  double went = 0, longest = 0;
   std::size_t fell = 0;
   for (std::size_t i = 1; i < stamps.size(); ++i) {
     const double step = stamps[i] - stamps[i - 1];
     if (!(step > 0) && ++fell > std::min(kMostRestarts, stamps.size() / kStepsOfRestart)) return std::nullopt;
-    went += std::max(step, 0.0);
+    went += std::max(step, 0.0), longest = std::max(longest, step);
   }
   if (seconds < kAtOnceS) {  // a file says nothing of the time it took: a clock of milliseconds, or a counter
     const bool whole = std::ranges::all_of(stamps, [](double v) { return v == std::round(v); });
     if (fell > 0 || went == static_cast<double>(stamps.size() - 1)) return std::nullopt;
     return whole ? 1e-3 : 1;
   }
-  for (const double unit : {1.0, 1e-3, 1e-6}) {
-    const double ratio = went * unit / seconds;
-    if (ratio > (fell > 0 ? kRestarted : 1 - kClock) && ratio < 1 + kClock) return unit;
-  }
+  for (const double jump : {0.0, longest})
+    for (const double unit : {1.0, 1e-3, 1e-6}) {
+      const double ratio = (went - jump) * unit / seconds;
+      if (ratio > (fell > 0 ? kRestarted : 1 - kClock) && ratio < 1 + kClock) return unit;
+    }
   return std::nullopt;
 }
 
@@ -366,7 +383,7 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
   if (!known)
     report.says.push_back("assumed: " + draft.array.text() +
                           "; set \"rows\", \"columns\", \"channels\" and \"pitch_mm\"");
-  look_at_signals(draft, frames, report.says);
+  look_at_signals(draft, frames, known, report.says);
   draft.check();
   report.draft = draft;
   return report;

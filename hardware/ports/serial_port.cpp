@@ -67,6 +67,8 @@ SerialPort::SerialPort(const std::string& path, const SerialSettings& settings)
   if (ioctl(descriptor_, TIOCEXCL) != 0) give_up(errno);
   if (const int error = set_raw_terminal(descriptor_, settings.baud)) give_up(error);
   raise_modem_lines(descriptor_);
+  // What waited until somebody opened the port is old, and would be dated as if it came now.
+  if (tcflush(descriptor_, TCIFLUSH) != 0) give_up(errno);
 }
 
 SerialPort::~SerialPort() {

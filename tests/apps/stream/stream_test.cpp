@@ -222,6 +222,16 @@ TEST_F(Streaming, NothingIsOverwrittenWithoutForce) {
   EXPECT_EQ(read_text_file(path("recording"), 1 << 26), recording);
 }
 
+TEST_F(Streaming, WithoutAPictureNothingIsReplaced) {
+  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
+  write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 32}));
+  write_file(path("out"), "mine");
+  expect_failure(
+      stream({"--recording", path("recording"), "--out", path("out"), "--force", "--seconds", "0.01"}), 1,
+      "no picture");
+  EXPECT_EQ(read_text_file(path("out"), 10), "mine");
+}
+
 TEST_F(Streaming, DrawsOnATerminalOnly) {
   write_model(model(), kTimesteps, SimulatorSettings().filter_s);
   write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 40}));

@@ -71,6 +71,19 @@ TEST(RestTracker, ATouchIsNotAbsorbed) {
   }
 }
 
+// What drifts meanwhile is found again afterwards, as fast as it went before.
+TEST(RestTracker, FollowsOnBehindALongTouchWhileAllDrifts) {
+  for (const double per_s : {2e-4, 1.7e-3}) {
+    RestTracker tracker(mat(5));
+    const auto drift = [=](double t, std::size_t s) {
+      return per_s * t + (s == 3 && t > 25 && t < 55 ? 0.6 : 0);
+    };
+    EXPECT_NEAR(after(tracker, 0, 25, drift)[0], 5 * per_s, 0.004);
+    EXPECT_NEAR(after(tracker, 25, 30, drift)[3], 0.6, 0.07) << "and it is felt";
+    for (const double share : after(tracker, 55, 40, drift)) EXPECT_NEAR(share, 5 * per_s, 0.005) << per_s;
+  }
+}
+
 TEST(RestTracker, ATouchAtTheVeryBeginningIsNoRest) {
   RestTracker tracker(mat(2));
   const auto touch = [](double, std::size_t s) { return s == 0 ? 0.3 : 0.1; };

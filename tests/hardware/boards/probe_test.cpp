@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "io/numbers/median.h"
+#include "io/numbers/numbers.h"
 #include "io/numbers/random.h"
 #include "tests/hardware/fake_sensor.h"
 
@@ -186,6 +187,47 @@ TEST(Probe, WritesWhereEachTaxelRests) {
 }
 
 // What is kept of a file: the draft says of taxels, as the file does, not of places in a frame.
+// docs/sensors.md: probe again when the rests have drifted.
+TEST(Probe, AtRestKeepsWhatItsFileSaysButTheRests) {
+  const Sensor sensor = sensor_of(
+      R"({"rows":2,"columns":4,"unit":"ohm","pressed":"lower","range":[300,900],"rate_hz":50,"dead":[5],
+    "rest":[900,910,890,900,950,900,905,900],"frame":{"kind":"text"}})");
+  Sensor drifted = sensor;
+  for (float& rest : drifted.rest) rest += 40;
+  const ProbeReport report = probe(sent(drifted, 4, false), "here", sensor);
+  ASSERT_TRUE(report.draft) << all(report);
+  EXPECT_EQ(report.draft->scale.unit, "ohm");
+  EXPECT_EQ(report.draft->scale.rest, 900);
+  EXPECT_EQ(report.draft->scale.span, 600);
+  ASSERT_EQ(report.draft->rest.size(), 8U);
+  for (const std::size_t i : {0U, 1U, 2U, 3U, 4U, 6U, 7U})
+    EXPECT_NEAR(report.draft->rest[i], drifted.rest[i] - 0.05 * 600 + 8, 3) << i;
+  EXPECT_NE(all(report).find("stay as the file has them"), std::string::npos) << all(report);
+}
+
+// A host that opens a port late may get what waited there: a jump of the clock, and of a clock in no known
+// unit a column that only rises.
+TEST(Probe, TakesNoClockForATaxel) {
+  std::vector<Heard> heard;
+  for (int n = 0; n < 100; ++n) {
+    const double ms = 20 * n + (n > 30 ? 12'000 : 0), noise = n * 7 % 5;
+    heard.push_back({100 + 0.02 * n, format(ms) + "," + format(ms * 77) + "," + format(100 + noise) + "," +
+                                         format(120 - noise) + "\n"});
+  }
+  const ProbeReport report = probe(heard, "here", {});
+  ASSERT_TRUE(report.draft) << all(report);
+  ASSERT_TRUE(report.draft->frame.time) << all(report);
+  EXPECT_EQ(report.draft->frame.time->column, 0);
+  EXPECT_EQ(report.draft->frame.time->unit_s, 1e-3);
+  EXPECT_EQ(report.draft->frame.skip, std::vector{1});
+  EXPECT_EQ(report.draft->values(), 2U);
+}
+
+TEST(Probe, SaysThatNoLineEnds) {
+  const ProbeReport report = probe(std::vector<Heard>{{1, std::string(9000, '7')}, {4, "1,2,3"}}, "here", {});
+  EXPECT_NE(all(report).find("no line ends"), std::string::npos) << all(report);
+}
+
 TEST(Probe, KeepsTheOrderOfItsFile) {
   Sensor sensor = sensor_of(R"({"name":"cross","rows":3,"columns":3,"pressed":"higher","range":[100,900],
     "rate_hz":50,"frame":{"kind":"text"},"order":[6,-1,0,1,2,3,4,5,-1],"dead":[0]})");

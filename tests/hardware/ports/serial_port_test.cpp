@@ -99,6 +99,18 @@ TEST(SerialPort, WithoutPermissionTheGroupIsNamed) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
+TEST(SerialPort, WhatCameBeforeItWasOpenedIsNotTakenForNew) {
+  const TemporaryFolder folder;
+  const PseudoTerminal terminal(folder / "port");
+  SerialPort(folder / "port");  // a pseudo-terminal keeps what comes once somebody has opened it
+  ASSERT_EQ(write(terminal.descriptor(), "old", 3), 3);
+  SerialPort port(folder / "port");
+  ASSERT_EQ(write(terminal.descriptor(), "new", 3), 3);
+  std::array<std::byte, 16> buffer{};
+  ASSERT_EQ(port.read(buffer, port.now() + 1).count, 3U);
+  EXPECT_EQ(buffer[0], std::byte{'n'});
+}
+
 TEST(SerialPort, TimeOutAndEndOfFileAreDifferent) {
   const TemporaryFolder folder;
   PseudoTerminal terminal(folder / "port");
