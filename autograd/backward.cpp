@@ -1,4 +1,4 @@
-// backward(): the chain rule.
+// backward(): the chain rule, and where reverse steps find the gradients that they add to.
 #include <algorithm>
 #include <memory>
 #include <stdexcept>
@@ -10,6 +10,21 @@
 
 namespace supertac {
 using detail::Node;
+
+Tensor* Backward::grad_of(std::size_t input) {
+  const Slot slot = slot_of(input);
+  if (slot && slot.into == Into::overwrite) slot.grad->fill(0);
+  return slot.grad;
+}
+
+Backward::Slot Backward::slot_of(std::size_t input) {
+  Node& x = *node_.inputs[input];
+  if (!x.requires_grad) return {};
+  if (x.grad.defined()) return {&x.grad, Into::add};
+  x.grad =
+      x.spare.shape() == x.value.shape() && x.spare.defined() ? std::move(x.spare) : Tensor(x.value.shape());
+  return {&x.grad, Into::overwrite};
+}
 
 static thread_local ReverseWatch* reverse_watch = nullptr;
 

@@ -34,10 +34,10 @@ double weighted_sum(const Function& f) {
 
 // The same as a node of its own, so that an op is checked by no other op.
 Variable weighted(const Variable& y) {
-  return record("weighted_sum", Tensor::zeros({}), {&y}, [](Backward& b) {
-    const Tensor r = weights_for(b.value(0).shape());
-    Tensor* gy = b.grad_of(0);
-    for (Dim i = 0; i < r.size(); ++i) gy->data()[i] += b.gy().item() * r.data()[i];
+  return record("weighted_sum", Tensor::zeros({}), {&y}, [](Backward& g) {
+    const Tensor r = weights_for(g.value(0).shape());
+    Tensor* gy = g.grad_of(0);
+    for (Dim i = 0; i < r.size(); ++i) gy->data()[i] += g.gy().item() * r.data()[i];
   });
 }
 

@@ -1,4 +1,4 @@
-// What stands behind a Variable: the nodes of the graph. Only variable.h, record.h and their sources need it.
+// What stands behind a Variable: the nodes of the graph. Whoever walks the graph itself needs it: ops do not.
 #pragma once
 
 #include <array>

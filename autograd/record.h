@@ -19,6 +19,8 @@ class Backward {
   const detail::Node& node() const { return node_; }
   const Tensor& gy() const { return node_.grad; }
   const Tensor& y() const { return node_.value; }
+  /// As it is now: who writes to an input between its forward pass and backward() gets another gradient, and
+  /// nothing notices.
   const Tensor& value(std::size_t input) const { return node_.inputs[input]->value; }
   /// The gradient of that input, zero-filled at first use; null when that input requires none. Add into it.
   Tensor* grad_of(std::size_t input);

@@ -99,17 +99,6 @@ Tensor Tensor::clone() const {
   return t;
 }
 
-Tensor Tensor::reshaped(const Shape& shape) const {
-  if (shape.elements() != size_) {
-    throw std::invalid_argument("reshape: " + shape_.text() + " has " + std::to_string(size_) +
-                                " elements, the new shape " + shape.text() + " needs " +
-                                std::to_string(shape.elements()));
-  }
-  Tensor t(*this);
-  t.shape_ = shape;
-  return t;
-}
-
 void Tensor::fill(real value) { std::fill_n(values_, size_, value); }
 
 real Tensor::item() const {

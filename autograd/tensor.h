@@ -76,8 +76,6 @@ class Tensor {
 
   /// The only deep copy.
   Tensor clone() const;
-  /// The same buffer under another shape. Throws std::invalid_argument when the element counts differ.
-  Tensor reshaped(const Shape& shape) const;
   void fill(real value);
   /// The only element. Throws std::invalid_argument for any other size.
   real item() const;

@@ -1,5 +1,6 @@
 // Trace: records which ops ran, with which inputs and settings. Prepared networks are built from it
-// (models/inference/prepared/prepared.h), opened training steps list it (models/training/opened_step.h).
+// (models/inference/prepared/prepared.h), opened training steps list it
+// (models/training/audit/opened_step.h).
 #pragma once
 
 #include <chrono>
@@ -30,7 +31,8 @@ struct TracedOp {
   double us = 0;  ///< microseconds since the op before: its time, where nothing else is done between ops
 };
 
-/// While one lives, the ops of this thread are recorded in their order, and their values stay in memory.
+/// While one lives, the ops of this thread are recorded in their order, under NoGrad too, and their values
+/// stay in memory.
 class Trace {
  public:
   /// Throws std::logic_error where this thread has one already.

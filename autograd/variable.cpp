@@ -32,21 +32,6 @@ void Variable::drop_grad() {
   if (node.grad.defined()) node.spare = std::move(node.grad);
 }
 
-Tensor* Backward::grad_of(std::size_t input) {
-  const Slot slot = slot_of(input);
-  if (slot && slot.into == Into::overwrite) slot.grad->fill(0);
-  return slot.grad;
-}
-
-Backward::Slot Backward::slot_of(std::size_t input) {
-  Node& x = *node_.inputs[input];
-  if (!x.requires_grad) return {};
-  if (x.grad.defined()) return {&x.grad, Into::add};
-  x.grad =
-      x.spare.shape() == x.value.shape() && x.spare.defined() ? std::move(x.spare) : Tensor(x.value.shape());
-  return {&x.grad, Into::overwrite};
-}
-
 std::pair<Variable, detail::ReverseStep*> make_result(const char* op, Tensor y,
                                                       std::span<const Variable* const> inputs,
                                                       const OpSettings* settings) {

@@ -29,13 +29,15 @@ class Variable {
   const char* op() const { return defined() ? node_->op : "none"; }
 
   const Tensor& value() const { return checked().value; }
-  /// What has been recorded is const; only an optimiser, an initialiser or a loader writes, through this.
+  /// For optimisers, initialisers and loaders alone. A value that an op has read may not be written to before
+  /// backward(): reverse steps read it again.
   Tensor& mutable_value() { return checked().value; }
   /// Empty until backward() has reached this variable.
   const Tensor& grad() const { return checked().grad; }
+  /// Of value()'s shape, or undefined.
   Tensor& mutable_grad() { return checked().grad; }
   /// Empties grad() but keeps its buffer for the next gradient, which overwrites it under any Tensor that
-  /// still shares it. From the pool it would go to the next forward pass, when it has long left the caches.
+  /// still shares it.
   void drop_grad();
 
   const Shape& shape() const { return value().shape(); }
@@ -62,6 +64,7 @@ class Variable {
 };
 
 /// Adds dL/dv into grad() of every leaf v that requires it, for a scalar L, and frees the graph.
+/// Threads may build graphs over the same leaves at once, but only one may run backward() into a leaf.
 /// Throws std::invalid_argument when L has not exactly one element, depends on nothing that requires a
 /// gradient, or when a part of its graph was freed by an earlier backward().
 void backward(const Variable& loss);

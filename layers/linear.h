@@ -1,3 +1,4 @@
+// A linear layer with its weights.
 #pragma once
 
 #include "autograd/ops/linear.h"

@@ -15,7 +15,7 @@ namespace supertac {
 class Rng {
  public:
   explicit Rng(std::uint64_t seed) : stream_(seed, 0) {}
-  /// Draws zeros, in no time: for layers whose values come from a file.
+  /// For layers whose values come from a file: uniform_fan_in() makes zeros, in no time.
   static Rng zeros() {
     Rng rng(0);
     rng.zeros_ = true;
@@ -23,9 +23,7 @@ class Rng {
   }
   bool draws_zeros() const { return zeros_; }
   /// Uniform in [-bound, bound).
-  real uniform(double bound) {
-    return zeros_ ? 0 : static_cast<real>(bound * (2 * stream_.uniform(counter_++) - 1));
-  }
+  real uniform(double bound) { return static_cast<real>(bound * (2 * stream_.uniform(counter_++) - 1)); }
 
  private:
   RandomStream stream_;

@@ -33,7 +33,8 @@ ChannelAttention::ChannelAttention(Dim channels, Dim reduction, Rng& rng)
 }
 
 Variable ChannelAttention::gates(const Variable& x) const {
-  return sigmoid(expand_.forward(squeeze_.forward(global_mean(x), kRelu)));
+  const Variable mean = global_mean(x);                            // [N,H,W,C] -> [N,C]
+  return sigmoid(expand_.forward(squeeze_.forward(mean, kRelu)));  // [N,C/reduction], [N,C]
 }
 
 Rcab::Rcab(Dim channels, Dim reduction, Rng& rng)
@@ -46,8 +47,8 @@ Rcab::Rcab(Dim channels, Dim reduction, Rng& rng)
 }
 
 Variable Rcab::forward(const Variable& x) const {
-  const Variable h = second_.forward(first_.forward(x, kRelu));
-  return gated_sum(x, h, attention_.gates(h));
+  const Variable h = second_.forward(first_.forward(x, kRelu));  // [N,H,W,C], as x and the result
+  return gated_sum(x, h, attention_.gates(h));                   // gates [N,C]
 }
 
 Rirb::Rirb(const RirbOptions& options, Rng& rng)
@@ -60,9 +61,9 @@ Rirb::Rirb(const RirbOptions& options, Rng& rng)
 }
 
 Variable Rirb::forward(const Variable& x) const {
-  Variable h = x;
+  Variable h = x;  // [N,H,W,C], and so is each sum
   for (const Rcab& block : blocks_) h = block.forward(h);
-  return up_.forward(x + conv_.forward(h), kLeakyRelu);
+  return up_.forward(x + conv_.forward(h), kLeakyRelu);  // [N,2H,2W,C]
 }
 
 }  // namespace supertac

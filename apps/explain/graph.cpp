@@ -13,7 +13,7 @@
 #include <map>
 
 #include "apps/common/running/signals.h"
-#include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/sums.h"
 #include "autograd/reverse_watch.h"
 #include "autograd/trace.h"
 
@@ -42,26 +42,23 @@ struct Reverse {
   double us = 0;
 };
 
-// By op and result: a reshaped result has the buffer of the one before.
-using Key = std::pair<std::string, const real*>;
-
 class Clock : public ReverseWatch {
  public:
-  void reverse(const char* op, std::size_t, Backward& b, const std::function<void()>& step) override {
-    Reverse& r = of_[{op, b.y().data()}];
+  void reverse(const char*, std::size_t, Backward& b, const std::function<void()>& step) override {
+    Reverse& r = of_[&b.node()];
     r.gradient = said("g", b.gy());
     const auto begin = std::chrono::steady_clock::now();
     step();
     r.us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count();
   }
-  const std::map<Key, Reverse>& of() const { return of_; }
+  const std::map<const detail::Node*, Reverse>& of() const { return of_; }
 
  private:
-  std::map<Key, Reverse> of_;
+  std::map<const detail::Node*, Reverse> of_;
 };
 
 std::string label(const TracedOp& op, const std::map<const real*, const Parameter*>& parameters,
-                  const std::map<Key, Reverse>& reverse) {
+                  const std::map<const detail::Node*, Reverse>& reverse) {
   // Bytes and times of single numbers say nothing.
   const bool of_numbers =
       op.y.size() == 1 && std::ranges::all_of(op.inputs, [](const Variable& x) { return x.size() == 1; });
@@ -74,7 +71,7 @@ std::string label(const TracedOp& op, const std::map<const real*, const Paramete
     if (x.grad().defined()) text += "  " + said("g", x.grad());
   }
   text += "\\n" + said("y", op.y.value());
-  const auto r = reverse.find({std::string(op.op), op.y.value().data()});
+  const auto r = reverse.find(op.y.node());
   if (r != reverse.end()) text += "  " + r->second.gradient;
   if (of_numbers) return text;
   text += "\\n" + number("%.0f us", op.us);

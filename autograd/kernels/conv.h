@@ -1,5 +1,6 @@
 // Convolution and transposed convolution over a batch, with both gradients, callable without a graph.
 // Everything is channels-last: the channels of one pixel lie side by side. "= or +=" is what `into` says.
+// Nothing is checked, and no result may overlap an input; autograd/ops/convolution.h refuses what is wrong.
 #pragma once
 
 #include <compare>

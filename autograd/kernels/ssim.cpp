@@ -64,7 +64,7 @@ class SsimImage {
   void add_gradient(const real* x, const real* target, real g, real* gx) {
     take_moments(x, target);
     const real each = g / static_cast<real>(oh_ * ow_);
-    real *by_x = map(8), *by_square = map(9), *by_product = map(10);
+    real *by_x = map(7), *by_square = map(8), *by_product = map(9);
     for (Dim i = 0; i < oh_ * ow_; ++i) {
       const Terms t = terms_at(i);
       const real s = t.value();
@@ -81,7 +81,7 @@ class SsimImage {
   }
 
  private:
-  static constexpr Dim kMaps = 12;
+  static constexpr Dim kMaps = 11;
   real* map(Dim i) { return store_.data() + i * h_ * wd_; }
 
   // Wang et al. 2004, eq. 13, at one position of the window: n1 n2 / (d1 d2).
@@ -127,7 +127,7 @@ class SsimImage {
 
   // [h, w] -> [oh, ow]: columns first, then rows
   void blur(const real* from, real* __restrict to) {
-    real* __restrict columns = map(11);
+    real* __restrict columns = map(10);
     std::fill_n(columns, oh_ * wd_, real(0));
     for (Dim y = 0; y < oh_; ++y) {
       for (Dim k = 0; k < w_.size; ++k) {
@@ -146,7 +146,7 @@ class SsimImage {
 
   // gx += factor * blur^T(from), factor per pixel (null: 1)
   void add_transposed_blur(const real* from, const real* factor, real* gx) {
-    real* __restrict columns = map(11);
+    real* __restrict columns = map(10);
     std::fill_n(columns, oh_ * wd_, real(0));
     for (Dim y = 0; y < oh_; ++y) {
       for (Dim k = 0; k < w_.size; ++k) {

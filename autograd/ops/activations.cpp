@@ -26,11 +26,11 @@ void check_slope(const char* op, real slope) {
 }
 
 // gy becomes the gradient before y = f(s), gs = y > 0 ? gy : slope gy.
-const real* before_activation(Backward& b, real slope) {
-  const real* y = b.y().data();
-  real* g = b.mutable_gy().data();
-  if (slope != kNoActivation) each(b.gy().size(), [=](Dim i) { g[i] = y[i] > 0 ? g[i] : slope * g[i]; });
-  return g;
+const real* before_activation(Backward& g, real slope) {
+  const real* y = g.y().data();
+  real* gs = g.mutable_gy().data();
+  if (slope != kNoActivation) each(g.gy().size(), [=](Dim i) { gs[i] = y[i] > 0 ? gs[i] : slope * gs[i]; });
+  return gs;
 }
 
 // y = 1 / (1 + e^-x);  gx = gy y (1 - y)

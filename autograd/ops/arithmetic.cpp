@@ -45,7 +45,7 @@ Variable operator-(real number, const Variable& x) {
 Variable sum(const Variable& x) {
   const double total = kernels::sum_of(x.size(), [from = x.value().data()](Dim i) { return from[i]; });
   return record("sum", Tensor::full({}, static_cast<real>(total)), {&x},
-                [](Backward& b) { add_to_gradient(b, 0, [gy = b.gy().item()](Dim) { return gy; }); });
+                [](Backward& g) { add_to_gradient(g, 0, [gy = g.gy().item()](Dim) { return gy; }); });
 }
 
 }  // namespace supertac

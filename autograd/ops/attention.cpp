@@ -30,7 +30,7 @@ Maps maps_of(const char* op, const Variable& x) {
 
 }  // namespace
 
-// gx[n,h,w,c] = gy[n,c] / (H W)
+// x [N,H,W,C], y [N,C] = mean over h, w;  gx[n,h,w,c] = gy[n,c] / (H W)
 Variable global_mean(const Variable& x) {
   const Maps maps = maps_of("global_mean", x);
   if (maps.pixels == 0) refuse("global_mean", "x has no pixels: " + x.shape().text());
@@ -39,13 +39,14 @@ Variable global_mean(const Variable& x) {
   real* const mean = y.data();
   each_element(maps, [=, from = x.value().data()](Dim i, Dim k) { mean[k] += from[i]; });
   each(y.size(), [=](Dim k) { mean[k] /= pixels; });
-  return record("global_mean", y, {&x}, [=](Backward& b) {
-    Tensor* const gx = b.grad_of(0);
+  return record("global_mean", y, {&x}, [=](Backward& g) {
+    Tensor* const gx = g.grad_of(0);
     if (gx == nullptr) return;
-    each_element(maps, [=, gy = b.gy().data(), to = gx->data()](Dim i, Dim k) { to[i] += gy[k] / pixels; });
+    each_element(maps, [=, gy = g.gy().data(), to = gx->data()](Dim i, Dim k) { to[i] += gy[k] / pixels; });
   });
 }
 
+// a, x, y [N,H,W,C], s [N,C];  y = a + x s
 // ga = gy     gx = gy s     gs[n,c] = sum over h, w of gy x
 Variable gated_sum(const Variable& a, const Variable& x, const Variable& s) {
   const Maps maps = maps_of("gated_sum", x);
@@ -54,15 +55,15 @@ Variable gated_sum(const Variable& a, const Variable& x, const Variable& s) {
   Tensor y(x.shape());
   each_element(maps, [to = y.data(), a = a.value().data(), x = x.value().data(), s = s.value().data()](
                          Dim i, Dim k) { to[i] = a[i] + x[i] * s[k]; });
-  return record("gated_sum", y, {&a, &x, &s}, [=](Backward& b) {
-    const real *gy = b.gy().data(), *from = b.value(1).data(), *gate = b.value(2).data();
-    put_to_gradient(b, 0, [=](Dim i) { return gy[i]; });
-    if (const Backward::Slot gx = b.slot_of(1)) {
+  return record("gated_sum", y, {&a, &x, &s}, [=](Backward& g) {
+    const real *gy = g.gy().data(), *from = g.value(1).data(), *gate = g.value(2).data();
+    put_to_gradient(g, 0, [=](Dim i) { return gy[i]; });
+    if (const Backward::Slot gx = g.slot_of(1)) {
       real* const to = gx.data();
       gx.into == Into::add ? each_element(maps, [=](Dim i, Dim k) { to[i] += gy[i] * gate[k]; })
                            : each_element(maps, [=](Dim i, Dim k) { to[i] = gy[i] * gate[k]; });
     }
-    if (Tensor* gs = b.grad_of(2))
+    if (Tensor* gs = g.grad_of(2))
       each_element(maps, [=, to = gs->data()](Dim i, Dim k) { to[k] += gy[i] * from[i]; });
   });
 }

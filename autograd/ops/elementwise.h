@@ -13,16 +13,16 @@ using kernels::each;
 
 /// gx[i] += term(i) where that input wants a gradient.
 template <class Term>
-void add_to_gradient(Backward& b, std::size_t input, Term term) {
-  Tensor* const tensor = b.grad_of(input);
+void add_to_gradient(Backward& g, std::size_t input, Term term) {
+  Tensor* const tensor = g.grad_of(input);
   if (tensor == nullptr) return;
   each(tensor->size(), [=, gx = tensor->data()](Dim i) { gx[i] += term(i); });
 }
 
 /// The same, but at first use gx[i] = term(i), without zeros being written and read again.
 template <class Term>
-void put_to_gradient(Backward& b, std::size_t input, Term term) {
-  const Backward::Slot slot = b.slot_of(input);
+void put_to_gradient(Backward& g, std::size_t input, Term term) {
+  const Backward::Slot slot = g.slot_of(input);
   if (!slot) return;
   real* const gx = slot.data();
   if (slot.into == Into::add) {
@@ -33,14 +33,16 @@ void put_to_gradient(Backward& b, std::size_t input, Term term) {
 }
 
 /// y[i] = value(x[i]);   gx[i] += gradient(gy[i], x[i], y[i])
+/// Both are copied into the node. They call nothing that the C library rounds (kernels/exp.h), and capture
+/// numbers alone: a captured tensor would be kept for as long as the graph.
 template <class Value, class Gradient>
 Variable elementwise(const char* op, const Variable& x, Value value, Gradient gradient,
                      const OpSettings& settings = {}) {
   Tensor y(x.shape());
   each(y.size(), [=, from = x.value().data(), to = y.data()](Dim i) { to[i] = value(from[i]); });
-  const auto reverse = [=](Backward& b) {
-    const real *gy = b.gy().data(), *from = b.value(0).data(), *to = b.y().data();
-    add_to_gradient(b, 0, [=](Dim i) { return gradient(gy[i], from[i], to[i]); });
+  const auto reverse = [=](Backward& g) {
+    const real *gy = g.gy().data(), *from = g.value(0).data(), *to = g.y().data();
+    add_to_gradient(g, 0, [=](Dim i) { return gradient(gy[i], from[i], to[i]); });
   };
   return record(op, std::move(y), {&x}, reverse, &settings);
 }

@@ -10,6 +10,7 @@
 
 namespace supertac {
 
+// x [N,in], w [in,out], b [out], y [N,out] = f(x w + b)
 // gs = gy f'(y)     gx = gs w^T     gw = x^T gs     gb = sum over rows gs
 Variable linear(const Variable& x, const Variable& w, const Variable& b, real negative_slope) {
   check_rank("linear", "x", x, 2);

@@ -11,7 +11,8 @@ Variable linear(const Variable& x, const Variable& w, const Variable& b, real ne
 
 namespace kernels {
 
-/// The same without a graph: x [rows, cin], w [cin, cout], y [rows, cout]; bias [cout] may be null.
+/// The same without a graph and without checks; y overlaps no input. x [rows, cin], w [cin, cout], y [rows,
+/// cout]; bias [cout] may be null.
 void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const real* bias, real negative_slope,
             real* y);
 /// gx [rows, cin] = or += gy [rows, cout] w^T, as `into` says

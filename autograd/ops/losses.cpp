@@ -10,7 +10,8 @@
 
 namespace supertac {
 
-// value = mean over the n elements of (x - target)^2;  gx = 2 g (x - target) / n,  gtarget = -gx
+// x, target of any shape [...];  value [] = mean over the n elements of (x - target)^2
+// gx = 2 gy (x - target) / n,  gtarget = -gx
 Variable l2_loss(const Variable& x, const Variable& target) {
   check_same_shape("l2_loss", "x", x, "target", target);
   const Dim n = x.size();
@@ -20,16 +21,16 @@ Variable l2_loss(const Variable& x, const Variable& target) {
     return d * d;
   });
   const auto value = static_cast<real>(total / static_cast<double>(n));
-  return record("l2_loss", Tensor::full({}, value), {&x, &target}, [n](Backward& b) {
-    const real g = 2 * b.gy().item() / static_cast<real>(n);
-    const real *from = b.value(0).data(), *to = b.value(1).data();
-    add_to_gradient(b, 0, [=](Dim i) { return g * (from[i] - to[i]); });
-    add_to_gradient(b, 1, [=](Dim i) { return g * (to[i] - from[i]); });
+  return record("l2_loss", Tensor::full({}, value), {&x, &target}, [n](Backward& g) {
+    const real each_part = 2 * g.gy().item() / static_cast<real>(n);
+    const real *from = g.value(0).data(), *to = g.value(1).data();
+    add_to_gradient(g, 0, [=](Dim i) { return each_part * (from[i] - to[i]); });
+    add_to_gradient(g, 1, [=](Dim i) { return each_part * (to[i] - from[i]); });
   });
 }
 
 // x, target [N,H,W,1];  value = mean over images and positions of SSIM (autograd/kernels/ssim.h)
-// gx = g d value / dx; the target is a constant
+// gx = gy d value / dx; the target is a constant
 Variable ssim(const Variable& x, const Tensor& target) {
   check_rank("ssim", "x", x, 4);
   if (target.shape() != x.shape()) {
@@ -41,9 +42,9 @@ Variable ssim(const Variable& x, const Tensor& target) {
   }
   const kernels::ImageSizes sizes{x.dim(0), x.dim(1), x.dim(2)};
   const double value = kernels::ssim(sizes, x.value().data(), target.data());
-  const auto reverse = [sizes, target](Backward& b) {
-    if (Tensor* gx = b.grad_of(0)) {
-      kernels::ssim_grad(sizes, b.gy().item(), b.value(0).data(), target.data(), gx->data());
+  const auto reverse = [sizes, target](Backward& g) {
+    if (Tensor* gx = g.grad_of(0)) {
+      kernels::ssim_grad(sizes, g.gy().item(), g.value(0).data(), target.data(), gx->data());
     }
   };
   const OpSettings settings{.constant = target};
@@ -63,7 +64,7 @@ static double cross_entropy(Dim classes, const real* logits, Dim label, real* re
 }
 
 // logits [N,K];  value = mean over n of -log softmax(logits[n])[label n]
-// glogits[n,k] = g (softmax(logits[n])[k] - [k = label n]) / N
+// glogits[n,k] = gy (softmax(logits[n])[k] - [k = label n]) / N
 Variable softmax_cross_entropy(const Variable& logits, std::span<const std::int32_t> labels) {
   check_rank("softmax_cross_entropy", "logits", logits, 2);
   const Dim rows = logits.dim(0), classes = logits.dim(1);
@@ -84,9 +85,9 @@ Variable softmax_cross_entropy(const Variable& logits, std::span<const std::int3
         cross_entropy(classes, logits.value().data() + n * classes, label, gradient.data() + n * classes);
   }
   const auto value = static_cast<real>(total / static_cast<double>(rows));
-  return record("softmax_cross_entropy", Tensor::full({}, value), {&logits}, [gradient, rows](Backward& b) {
-    const real g = b.gy().item() / static_cast<real>(rows);
-    add_to_gradient(b, 0, [g, rest = gradient.data()](Dim i) { return g * rest[i]; });
+  return record("softmax_cross_entropy", Tensor::full({}, value), {&logits}, [gradient, rows](Backward& g) {
+    const real each_row = g.gy().item() / static_cast<real>(rows);
+    add_to_gradient(g, 0, [each_row, rest = gradient.data()](Dim i) { return each_row * rest[i]; });
   });
 }
 

@@ -1,4 +1,5 @@
-// Losses: scalars (rank 0). All throw std::invalid_argument on shapes that do not fit or are empty.
+// Losses: scalars (rank 0). All throw std::invalid_argument on shapes that do not fit or are empty, and for a
+// label outside [0,K).
 #pragma once
 
 #include <cstdint>

@@ -33,16 +33,16 @@ void for_each_maximum(const Tensor& x, Visit visit) {
 
 }  // namespace
 
-// gx[where the largest was] += gy
+// x [N,H,W,C], y [N,H/2,W/2,C];  gx[where the largest was] += gy
 Variable max_pool2d(const Variable& x) {
   check_rank("max_pool2d", "x", x, 4);
   if (x.dim(1) < 2 || x.dim(2) < 2) refuse("max_pool2d", "x must be at least 2x2, got " + x.shape().text());
   Tensor y(Shape{x.dim(0), x.dim(1) / 2, x.dim(2) / 2, x.dim(3)});
   for_each_maximum(x.value(), [&](Dim from, Dim to) { y.data()[to] = x.value().data()[from]; });
-  return record("max_pool2d", y, {&x}, [](Backward& b) {
-    Tensor* gx = b.grad_of(0);
+  return record("max_pool2d", y, {&x}, [](Backward& g) {
+    Tensor* gx = g.grad_of(0);
     if (gx == nullptr) return;
-    for_each_maximum(b.value(0), [&](Dim from, Dim to) { gx->data()[from] += b.gy().data()[to]; });
+    for_each_maximum(g.value(0), [&](Dim from, Dim to) { gx->data()[from] += g.gy().data()[to]; });
   });
 }
 

@@ -1,3 +1,4 @@
+// The largest of two by two pixels.
 #pragma once
 
 #include "autograd/variable.h"

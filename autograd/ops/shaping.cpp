@@ -51,9 +51,9 @@ Variable transpose_inner(const char* op, const Variable& x, Dim images, Dim rows
                          const Shape& shape) {
   Tensor y(shape);
   transpose(images, rows, columns, x.value().data(), Into::overwrite, y.data());
-  return record(op, y, {&x}, [=](Backward& b) {
-    if (const Backward::Slot gx = b.slot_of(0))
-      transpose(images, columns, rows, b.gy().data(), gx.into, gx.data());
+  return record(op, y, {&x}, [=](Backward& g) {
+    if (const Backward::Slot gx = g.slot_of(0))
+      transpose(images, columns, rows, g.gy().data(), gx.into, gx.data());
   });
 }
 
@@ -84,13 +84,13 @@ Variable concat(std::span<const Variable> xs) {
   }
   return record(
       "concat", y, std::span<const Variable* const>(inputs.data(), xs.size()),
-      [rows, width, count = xs.size()](Backward& b) {
+      [rows, width, count = xs.size()](Backward& g) {
         Dim from = 0;
         for (std::size_t i = 0; i < count; ++i) {
-          const Shape& shape = b.value(i).shape();
+          const Shape& shape = g.value(i).shape();
           const Dim last = shape[shape.rank() - 1];
-          if (Tensor* gx = b.grad_of(i)) {
-            move_columns(rows, last, b.gy().data(), {width, from}, Into::add, gx->data(), {last, 0});
+          if (Tensor* gx = g.grad_of(i)) {
+            move_columns(rows, last, g.gy().data(), {width, from}, Into::add, gx->data(), {last, 0});
           }
           from += last;
         }

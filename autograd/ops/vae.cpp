@@ -8,6 +8,7 @@ namespace supertac {
 
 using kernels::exp_same_bits;
 
+// mean, log_var, eps, z [N,LD];  z = mean + e^(log_var / 2) eps
 // gmean = gz     glog_var = gz (z - mean) / 2, which is half of e^(log_var / 2) eps
 Variable sample_gaussian(const Variable& mean, const Variable& log_var, const Tensor& eps) {
   check_rank("sample_gaussian", "mean", mean, 2);
@@ -19,16 +20,17 @@ Variable sample_gaussian(const Variable& mean, const Variable& log_var, const Te
   each(z.size(), [m = mean.value().data(), v = log_var.value().data(), e = eps.data(), to = z.data()](Dim i) {
     to[i] = m[i] + exp_same_bits(v[i] / 2) * e[i];
   });
-  const auto reverse = [](Backward& b) {
-    const real *gz = b.gy().data(), *sample = b.y().data(), *m = b.value(0).data();
-    add_to_gradient(b, 0, [=](Dim i) { return gz[i]; });
-    add_to_gradient(b, 1, [=](Dim i) { return gz[i] * (sample[i] - m[i]) / 2; });
+  const auto reverse = [](Backward& g) {
+    const real *gz = g.gy().data(), *sample = g.y().data(), *m = g.value(0).data();
+    add_to_gradient(g, 0, [=](Dim i) { return gz[i]; });
+    add_to_gradient(g, 1, [=](Dim i) { return gz[i] * (sample[i] - m[i]) / 2; });
   };
   const OpSettings settings{.constant = eps};
   return record("sample_gaussian", z, {&mean, &log_var}, reverse, &settings);
 }
 
-// gmean = g mean / N     glog_var = g (exp(log_var) - 1) / (2 N)
+// mean, log_var [N,LD];  value [] = -1/2N sum of 1 + log_var - mean^2 - e^log_var
+// gmean = gy mean / N     glog_var = gy (e^log_var - 1) / (2 N)
 Variable kl_divergence(const Variable& mean, const Variable& log_var) {
   check_rank("kl_divergence", "mean", mean, 2);
   check_same_shape("kl_divergence", "mean", mean, "log_var", log_var);
@@ -39,11 +41,11 @@ Variable kl_divergence(const Variable& mean, const Variable& log_var) {
         return 1 + v[i] - m[i] * m[i] - exp_same_bits(v[i]);
       });
   const auto value = static_cast<real>(-0.5 * total / static_cast<double>(rows));
-  return record("kl_divergence", Tensor::full({}, value), {&mean, &log_var}, [rows](Backward& b) {
-    const real g = b.gy().item() / static_cast<real>(rows);
-    const real *m = b.value(0).data(), *v = b.value(1).data();
-    add_to_gradient(b, 0, [=](Dim i) { return g * m[i]; });
-    add_to_gradient(b, 1, [=](Dim i) { return g * (exp_same_bits(v[i]) - 1) / 2; });
+  return record("kl_divergence", Tensor::full({}, value), {&mean, &log_var}, [rows](Backward& g) {
+    const real each_row = g.gy().item() / static_cast<real>(rows);
+    const real *m = g.value(0).data(), *v = g.value(1).data();
+    add_to_gradient(g, 0, [=](Dim i) { return each_row * m[i]; });
+    add_to_gradient(g, 1, [=](Dim i) { return each_row * (exp_same_bits(v[i]) - 1) / 2; });
   });
 }
 

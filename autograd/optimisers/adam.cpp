@@ -7,8 +7,8 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/fast/each.h"
+#include "autograd/kernels/sums.h"
 #include "autograd/optimisers/orthogonal.h"
 #include "autograd/pool.h"
 
@@ -45,8 +45,9 @@ void move_matrix(const Shape& shape, real clip, double rate, const real* gradien
     to[i] = kMomentum * moment + kRest * g;  // Nesterov's
   });
   orthogonalise(rows, columns, to);
-  const double length = kMuonLength * rate * std::sqrt(static_cast<double>(std::max(rows, columns)));
-  kernels::add_scaled(n, static_cast<real>(-length), to, x);
+  const auto length =
+      static_cast<real>(kMuonLength * rate * std::sqrt(static_cast<double>(std::max(rows, columns))));
+  kernels::each(n, [=](Dim i) { x[i] += -length * to[i]; });
 }
 
 // The last bits of the C library's pow depend on the processor; products do not.

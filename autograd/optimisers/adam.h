@@ -30,8 +30,8 @@ bool is_matrix(const Shape& shape);
 
 class Adam {
  public:
-  /// Keeps handles to the parameters. Throws std::invalid_argument unless learning_rate, clip_norm >= 0, 0 <=
-  /// beta < 1, epsilon > 0, and every parameter requires a gradient.
+  /// Keeps handles to the parameters and sets their gradients to zero. Throws std::invalid_argument unless
+  /// learning_rate, clip_norm >= 0, 0 <= beta < 1, epsilon > 0, and every parameter requires a gradient.
   Adam(std::vector<Variable> parameters, const AdamOptions& options);
 
   /// Sets every gradient to zero; call it before backward().
@@ -42,6 +42,8 @@ class Adam {
   /// m = .95 m + .05 g;  x -= kMuonLength lr sqrt(max(R,C)) O(.95 m + .05 g)
   /// (Jordan et al. 2024; the root, which gives matrices of any shape steps of one length: Liu et al. 2025,
   /// arXiv 2502.16982, eq. 4). Its second moment stays 0.
+  ///
+  /// Every parameter must have a gradient: after Variable::drop_grad(), backward() has to reach it before.
   ///
   /// Returns the gradient's norm before clipping, infinity when the square of the clipped one overflows
   /// `real`. When it is not finite nothing is changed: check it.

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/fast/each.h"
+#include "autograd/kernels/sums.h"
 #include "autograd/ops/linear.h"
 #include "autograd/pool.h"
 

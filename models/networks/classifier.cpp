@@ -43,8 +43,9 @@ TextureClassifier::TextureClassifier(const ClassifierSettings& s, Rng& rng)
 }
 
 Variable TextureClassifier::forward(const Variable& x) const {
-  const Variable h = max_pool2d(relu(first_.forward(x)));
-  return out_.forward(flatten_channels_first(max_pool2d(relu(second_.forward(h)))));
+  const Variable fine = max_pool2d(first_.forward(x, kRelu));        // [N,H,W,channels] -> [N,H/2,W/2,16]
+  const Variable coarse = max_pool2d(second_.forward(fine, kRelu));  // [N,H/4,W/4,32]
+  return out_.forward(flatten_channels_first(coarse));               // [N,classes]
 }
 
 FeatureClassifier::FeatureClassifier(Dim features, Dim classes, Rng& rng)
@@ -54,7 +55,7 @@ FeatureClassifier::FeatureClassifier(Dim features, Dim classes, Rng& rng)
 }
 
 Variable FeatureClassifier::forward(const Variable& x) const {
-  return out_.forward(relu(hidden_.forward(x)));
+  return out_.forward(hidden_.forward(x, kRelu));
 }
 
 }  // namespace supertac

@@ -12,6 +12,9 @@ struct NetworkFormat {
   bool operator==(const NetworkFormat&) const = default;
 };
 
+/// Networks take what WindowSet::window() gives, numbers in [0,1]. Their pictures have no bounds; trained on
+/// plates they lie about in [-1,1], 0 being the plate's plane.
+///
 /// Pictures, with the predicted errors and latents of networks that have them.
 struct Estimate {
   Tensor picture;          ///< [N,rows scale,columns scale,1]

@@ -126,17 +126,18 @@ Upsampler::Upsampler(const SuperTacSettings& s, Rng& rng)
 Variable Upsampler::map_of(const Variable& latents, const Variable& windows) const {
   const Dim pixels[] = {rows_, columns_};
   Variable past, present;
-  if (fc_) past = unflatten_channels_first(fc_->forward(latents, kLeakyRelu), pixels);
+  if (fc_)
+    past = unflatten_channels_first(fc_->forward(latents, kLeakyRelu), pixels);  // [N,rows,columns,channels]
   if (last_frame_)
     present = last_frame_->forward(last_frame(windows, rows_, columns_, in_channels_), kLeakyRelu);
   if (!fc_) return present;
   return last_frame_ ? past + present : past;
 }
 
-Upsampler::Output Upsampler::forward(const Variable& latents, const Variable& windows) const {
-  Variable h = map_of(latents, windows);
-  for (const Rirb& rirb : rirbs_) h = rirb.forward(h);
-  return {out_.forward(h), predicted_error_ ? predicted_error_->forward(h) : Variable()};
+Drawing Upsampler::forward(const Variable& latents, const Variable& windows) const {
+  Variable h = map_of(latents, windows);                // [N,rows,columns,channels]
+  for (const Rirb& rirb : rirbs_) h = rirb.forward(h);  // twice as high and wide by each
+  return {out_.forward(h), predicted_error_ ? predicted_error_->forward(h) : Variable(), latents};
 }
 
 SuperTac::SuperTac(const SuperTacSettings& settings, Rng& rng)
@@ -174,12 +175,12 @@ SuperTac::Output SuperTac::forward(const Tensor& windows, std::span<const Tensor
       split(Variable(windows)), PerGroup<LatentDistribution>(groups), PerGroup<Variable>(groups), {}, {}};
   PerGroup<Variable> z(groups);
   for (std::size_t i = 0; i < z.size(); ++i) {
-    out.latent[i] = encoders_[i].forward(out.input[i]);
+    out.latent[i] = encoders_[i].forward(out.input[i]);  // [N,T,group_signals] -> [N,LD] each
     z[i] = sample_gaussian(out.latent[i].mean, out.latent[i].log_var, eps[i]);
-    out.decoded[i] = decoders_[i].forward(z[i]);
+    out.decoded[i] = decoders_[i].forward(z[i]);  // [N,LD] -> [N,T,group_signals]
   }
-  const Upsampler::Output drawn = upsampler_.forward(concat_groups(z.span()), Variable(windows));
-  out.image = drawn.picture, out.predicted_error = drawn.predicted_error;
+  const Drawing drawn = upsampler_.forward(concat_groups(z.span()), Variable(windows));  // of [N,G LD]
+  out.picture = drawn.picture, out.predicted_error = drawn.predicted_error;  // [N,rows scale,columns scale,1]
   return out;
 }
 
@@ -202,10 +203,6 @@ Tensor SuperTac::encode(const Tensor& windows) const {
   return means(Variable(windows)).value();
 }
 
-Drawing SuperTac::draw(const Variable& windows) const {
-  const Variable latents = means(windows);
-  const Upsampler::Output drawn = upsampler_.forward(latents, windows);
-  return {.picture = drawn.picture, .predicted_error = drawn.predicted_error, .latents = latents};
-}
+Drawing SuperTac::draw(const Variable& windows) const { return upsampler_.forward(means(windows), windows); }
 
 }  // namespace supertac

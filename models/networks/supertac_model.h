@@ -77,14 +77,9 @@ class PerGroup {
 /// [N,rows,columns,channels] of the latents, a convolution one of the frame; of both the sum.
 class Upsampler : public Module {
  public:
-  struct Output {
-    Variable picture;
-    Variable predicted_error;  ///< expected distance of a pixel from the truth; undefined without
-                               ///< settings.predicted_error
-  };
   Upsampler(const SuperTacSettings& settings, Rng& rng);
   /// `windows` [N,T,signals] as the network takes them; latents are undefined where there are none.
-  Output forward(const Variable& latents, const Variable& windows) const;
+  Drawing forward(const Variable& latents, const Variable& windows) const;
 
  private:
   Variable map_of(const Variable& latents, const Variable& windows) const;
@@ -105,7 +100,7 @@ class SuperTac : public Network {
     PerGroup<Variable> input;             ///< [N,T,group_signals], the windows of the groups
     PerGroup<LatentDistribution> latent;  ///< [N,LD]
     PerGroup<Variable> decoded;           ///< [N,T,group_signals]
-    Variable image;                       ///< [N,rows scale,columns scale,1]
+    Variable picture;                     ///< [N,rows scale,columns scale,1]
     Variable predicted_error;             ///< the same, or undefined
   };
   /// Training: windows [N,T,signals] in [0,1] and eps [N,LD] ~ N(0,1) for each group.

@@ -30,13 +30,13 @@ Encoder::Encoder(const VaeOptions& o, Rng& rng)
 }
 
 Variable Encoder::features(const Variable& x) const {
-  Variable h = x;
-  for (const Conv1d& conv : conv_) h = conv.forward(h, kLeakyRelu);
-  return fc_.forward(flatten_channels_first(h), kRelu);
+  Variable h = x;                                                    // [N,T,channels]
+  for (const Conv1d& conv : conv_) h = conv.forward(h, kLeakyRelu);  // [N,T/2,16], ... [N,T/16,32]
+  return fc_.forward(flatten_channels_first(h), kRelu);              // [N,64]
 }
 
 LatentDistribution Encoder::forward(const Variable& x) const {
-  const Variable h = features(x);
+  const Variable h = features(x);  // [N,64]
   return {mean_.forward(h), clamp(log_var_.forward(h), -10, 10)};
 }
 
@@ -59,9 +59,10 @@ Decoder::Decoder(const VaeOptions& o, Rng& rng)
 
 Variable Decoder::forward(const Variable& z) const {
   const Dim pixels[] = {coarse_};
-  Variable h = unflatten_channels_first(unfold_.forward(widen_.forward(z, kRelu), kRelu), pixels);
-  for (const ConvTranspose1d& conv : conv_) h = conv.forward(h, kLeakyRelu);
-  return sigmoid(out_.forward(h));
+  const Variable wide = unfold_.forward(widen_.forward(z, kRelu), kRelu);     // [N,LD], [N,64], [N,32 T/16]
+  Variable h = unflatten_channels_first(wide, pixels);                        // [N,T/16,32]
+  for (const ConvTranspose1d& conv : conv_) h = conv.forward(h, kLeakyRelu);  // [N,T/8,32], ... [N,T,16]
+  return sigmoid(out_.forward(h));                                            // [N,T,channels]
 }
 
 }  // namespace supertac

@@ -27,7 +27,7 @@ Objective::Objective(const Recipe& recipe, const InputSettings& input, const Tax
 
 BatchOutput Objective::operator()(const Batch& batch) const {
   const SuperTac::Output drawn = model_.forward(batch.inputs, eps_of(batch).span());
-  BatchOutput output{supertac_loss(drawn, batch.targets, recipe_.loss), drawn.image,
+  BatchOutput output{supertac_loss(drawn, batch.targets, recipe_.loss), drawn.picture,
                      PerGroup<Variable>(recipe_.model.groups())};
   for (std::size_t g = 0; g < output.means.size(); ++g) output.means[g] = drawn.latent[g].mean;
   return output;

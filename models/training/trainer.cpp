@@ -115,7 +115,7 @@ void Trainer::run(MicroBatch& micro_batch) const {
   const BatchOutput output = micro_batch.objective(micro_batch.batch);
   const double share =
       static_cast<double>(micro_batch.batch.inputs.dim(0)) / static_cast<double>(indices_.size());
-  micro_batch.terms = values_of(output.loss, share);
+  micro_batch.terms = terms_of(output.loss, share);
   micro_batch.variances.clear();
   micro_batch.variances.pictures.add(output.picture.value());
   micro_batch.variances.targets.add(micro_batch.batch.targets);

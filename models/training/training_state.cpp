@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/sums.h"
 #include "io/numbers/numbers.h"
 #include "layers/checkpoint.h"
 #include "models/training/loss/diagnosis.h"

@@ -50,14 +50,6 @@ TEST(Tensor, MoveLeavesNothingBehind) {
   expect_values(c, {3}, {2, 2, 2});
 }
 
-TEST(Tensor, ReshapedSharesTheBuffer) {
-  Tensor a = Tensor::of({2, 3}, {1, 2, 3, 4, 5, 6});
-  const Tensor b = a.reshaped({3, 2});
-  EXPECT_EQ(b.shape().text(), "[3,2]");
-  EXPECT_EQ(b.data(), a.data());
-  expect_refusal("reshape: [2,3] has 6 elements, the new shape [4] needs 4", [&] { (void)a.reshaped({4}); });
-}
-
 TEST(Tensor, ValuesAreAlignedForVectors) {
   for (const Dim size : {1, 3, 17, 1000}) {
     EXPECT_EQ(reinterpret_cast<std::uintptr_t>(Tensor(Shape{size}).data()) % 64, 0U);

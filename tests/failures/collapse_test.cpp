@@ -35,7 +35,7 @@ class CollapseTest : public ::testing::Test {
       return {.stopped = true};
     }
     const SuperTac::Output output = trainer.model().forward(two_windows(), zero_eps());
-    return {report.collapsed, false, report.active_latents, difference(output.image.value()),
+    return {report.collapsed, false, report.active_latents, difference(output.picture.value()),
             difference(output.decoded[3].value())};
   }
 

@@ -45,7 +45,7 @@ TEST(Failures, F8KernelThreeDrawsACheckerboardKernelFourDoesNot) {
 // for ReLU, and no attention.
 double growth(int depth, bool safeguards) {
   Rng rng(5);
-  const Tensor input = normal_eps(4 * 64, 16, 1)[0].reshaped({4, 8, 8, 16});
+  const Tensor input = Tensor::of({4, 8, 8, 16}, normal_eps(4 * 64, 16, 1)[0].values());
   Variable h(input);
   for (int i = 0; i < depth; ++i) {
     const Rcab block(16, 4, rng);

@@ -79,8 +79,8 @@ TEST(Failures, F5EvaluationDrawsNothing) {
   const SuperTac model(small_settings(), rng);
   const Tensor windows = uniform({1, 32, 16}, 2);
   const Tensor a = model.infer(windows), b = model.infer(windows);
-  const Tensor c = model.forward(windows, normal_eps(1, 3, 1)).image.value(),
-               d = model.forward(windows, normal_eps(1, 3, 2)).image.value();
+  const Tensor c = model.forward(windows, normal_eps(1, 3, 1)).picture.value(),
+               d = model.forward(windows, normal_eps(1, 3, 2)).picture.value();
   EXPECT_TRUE(std::equal(a.data(), a.data() + a.size(), b.data()));
   EXPECT_FALSE(std::equal(c.data(), c.data() + c.size(), d.data()));
 }

@@ -64,10 +64,10 @@ void run_product(const IntegerStep& s, const IntegerMap& x, const IntegerMap& y,
   job.scratch = reinterpret_cast<std::int16_t*>(m.scratch);
   if (!x.bytes) {
     job.w = s.weights.w.data();
-    return kernels::product_of_numbers(job, m.numbers(x) + s.x_offset, m.numbers(y) + s.y_offset);
+    return kernels::product_of_numbers(job, m.numbers(x), m.numbers(y) + s.y_offset);
   }
   job.w = reinterpret_cast<const std::int8_t*>(s.packed.data());
-  kernels::byte_kernels().product(job, m.bytes(x) + s.x_offset, y.bytes ? nullptr : m.numbers(y) + s.y_offset,
+  kernels::byte_kernels().product(job, m.bytes(x), y.bytes ? nullptr : m.numbers(y) + s.y_offset,
                                   y.bytes ? m.bytes(y) + s.y_offset : nullptr);
 }
 

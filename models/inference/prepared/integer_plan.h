@@ -49,7 +49,7 @@ struct IntegerStep {
   // product: `job` has all but pointers and images; offsets are from the maps' first pixels.
   kernels::ByteProductJob job = {};
   std::vector<Dim> segments = {};
-  Dim x_offset = 0, y_offset = 0;
+  Dim y_offset = 0;
   QuantisedProduct weights = {};  // [segments * length][cout]
   Tensor packed = {};             // as the kernels take the weights of bytes
   std::vector<kernels::BytePlaces> places = {};

@@ -1,5 +1,13 @@
 // From what an inference was seen to do (autograd/trace.h) to the steps of
 // models/inference/prepared/integer_plan.h.
+//
+// A value lies in memory as bytes, as numbers (int16) or as both, by who reads it:
+//
+//   input -> bytes -> product -> bytes -> product -> numbers -> mean, gates, gated sum -> numbers -> product
+//                                                        `-> bytes (to_bytes), where a product reads them
+//
+// `numbers_` and `bytes_` give the maps of a value. A map is placed in the first gap of the work area between
+// maps that are still read (`live_`), and is free behind the last op that reads it.
 #include <algorithm>
 #include <cmath>
 #include <map>

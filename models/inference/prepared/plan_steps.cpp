@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 
-#include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/exp.h"
+#include "autograd/kernels/fast/each.h"
 #include "models/inference/prepared/planner.h"
 
 namespace supertac {
@@ -137,7 +138,11 @@ static void global_mean_step(Planner& planner, const TracedOp& op) {
 static void sigmoid_step(Planner& planner, const TracedOp& op) {
   const FeatureMap x = planner.map_of(op.inputs[0]), y = planner.new_map(op.y);
   if (op.y.rank() > 2) throw std::logic_error("Prepared: a sigmoid of maps has no step");
-  planner.add_step([=](const Block& b) { kernels::sigmoid(b.images * x.image(), b.begin(x), b.begin(y)); });
+  planner.add_step([=](const Block& b) {
+    kernels::each(b.images * x.image(), [from = b.begin(x), to = b.begin(y)](Dim i) {
+      to[i] = kernels::sigmoid_same_bits(from[i]);
+    });
+  });
 }
 
 // a + gates * x, or a + x.

@@ -142,7 +142,8 @@ void Planner::conv(const TracedOp& op) {
       ConvSettings{
           .height = s.height, .width = s.width, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1};
   if (same && op.y.dim(op.y.rank() - 1) == 1) return plane_conv(op);
-  same&& is_of_tiles(op) ? winograd(op) : product(op);
+  if (same && is_of_tiles(op)) return winograd(op);
+  product(op);
 }
 
 void Planner::transposed_conv(const TracedOp& op) {
@@ -156,7 +157,8 @@ void Planner::transposed_conv(const TracedOp& op) {
                                          .padding_h = 1,
                                          .padding_w = 1,
                                          .transposed = true};
-  doubles&& is_of_tiles(op) ? transposed_winograd(op) : product(op);
+  if (doubles && is_of_tiles(op)) return transposed_winograd(op);
+  product(op);
 }
 
 void Planner::add_winograd(Winograd step) {

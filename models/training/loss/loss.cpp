@@ -31,7 +31,7 @@ std::string LossTerms::text() const {
          "L2 " + format(l2) + ", SSIM " + format(ssim) + ")";
 }
 
-LossTerms values_of(const Loss& loss, double share) {
+LossTerms terms_of(const Loss& loss, double share) {
   const auto value = [share](const Variable& term) {
     return term.defined() ? share * static_cast<double>(term.item()) : 0;
   };
@@ -69,7 +69,7 @@ static Variable error_of(const Variable& picture, const Tensor& truth) {
 }
 
 Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const LossWeights& w) {
-  Loss loss = picture_loss(output.image, truth, w.lambda);
+  Loss loss = picture_loss(output.picture, truth, w.lambda);
   for (std::size_t i = 0; i < output.decoded.size(); ++i) {
     const Variable l2 = l2_loss(output.decoded[i], output.input[i]);
     const Variable kld = kl_divergence(output.latent[i].mean, output.latent[i].log_var);
@@ -77,7 +77,7 @@ Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const Lo
     loss.kld = i == 0 ? kld : loss.kld + kld;
   }
   if (output.predicted_error.defined()) {
-    loss.predicted_error = l2_loss(output.predicted_error, error_of(output.image, truth));
+    loss.predicted_error = l2_loss(output.predicted_error, error_of(output.picture, truth));
     loss.total = loss.total + static_cast<real>(kPredictedErrorWeight) * loss.predicted_error;
   }
   if (output.decoded.size() == 0) return loss;

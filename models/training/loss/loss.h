@@ -35,7 +35,7 @@ struct LossTerms {
   std::string text() const;
 };
 /// `share` times each term.
-LossTerms values_of(const Loss& loss, double share);
+LossTerms terms_of(const Loss& loss, double share);
 
 /// How much the squared error of the predicted error counts beside that of the picture.
 inline constexpr double kPredictedErrorWeight = 0.1;

@@ -150,7 +150,7 @@ void expect_outputs(Comparison& compare, const std::string& prefix, const SuperT
     append("log_var", out.latent[i].log_var);
     append("decoded", out.decoded[i]);
   }
-  append("sr", out.image);
+  append("sr", out.picture);
   for (const auto& [name, values] : joined) compare.expect(prefix + "." + name, values);
 }
 

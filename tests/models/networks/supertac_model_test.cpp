@@ -103,7 +103,7 @@ TEST(SuperTac, GroupsOfAnyArrayHoldTheirTaxelsWithAllChannels) {
     const SuperTac::Output out = model.forward(windows, eps);
     ASSERT_EQ(out.decoded.size(), eps.size());
     EXPECT_EQ(out.decoded[1].shape(), (Shape{1, 32, by_rows ? 36 : 6}));
-    EXPECT_EQ(out.image.shape(), (Shape{1, 8, 48, 1}));
+    EXPECT_EQ(out.picture.shape(), (Shape{1, 8, 48, 1}));
     const real* second = out.input[1].value().data();
     for (Dim taxel = 0; taxel < (by_rows ? 12 : 2); ++taxel) {
       for (Dim c = 0; c < 3; ++c) {
@@ -136,7 +136,7 @@ TEST(SuperTac, EvaluationIsDeterministicAndUsesTheMean) {
   std::array<Tensor, kGroups> zero;
   for (Tensor& e : zero) e = Tensor::zeros({2, 3});
   const Tensor a = model.infer(windows), b = model.infer(windows);
-  const Tensor c = model.forward(windows, zero).image.value();
+  const Tensor c = model.forward(windows, zero).picture.value();
   for (Dim i = 0; i < a.size(); ++i) {
     EXPECT_EQ(a.data()[i], b.data()[i]);
     EXPECT_EQ(a.data()[i], c.data()[i]);

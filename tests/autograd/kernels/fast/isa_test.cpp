@@ -5,8 +5,8 @@
 #include <cstring>
 #include <limits>
 
-#include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/fast/winograd.h"
+#include "autograd/kernels/sums.h"
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/attention.h"
@@ -179,7 +179,7 @@ std::vector<Tensor> results_of_loops(Dim n) {
     for (const Tensor& x : inputs) leaves.emplace_back(x, true);
     for (int twice = 0; twice < 2; ++twice) {  // a first gradient is written, a second one added
       const Variable y = op(leaves);
-      backward(sum(y * Variable(awkward(y.size(), 8).reshaped(y.shape()))));
+      backward(sum(y * Variable(Tensor::of(y.shape(), awkward(y.size(), 8).values()))));
       rows.push_back(y.value());
     }
     for (const Variable& x : leaves) rows.push_back(x.grad());
@@ -191,8 +191,10 @@ std::vector<Tensor> results_of_loops(Dim n) {
   run({a}, [](const Leaves& in) { return 0.3F * in[0]; });
   run({a, b}, [](const Leaves& in) { return in[0] + in[1]; });
   run({a, b}, [](const Leaves& in) { return in[0] * in[1]; });
-  const Tensor row_a = a.reshaped({1, n}), row_b = b.reshaped({1, n});
-  run({row_a, row_b}, [&](const Leaves& in) { return sample_gaussian(in[0], in[1], c.reshaped({1, n})); });
+  const Shape row{1, n};
+  const Tensor row_a = Tensor::of(row, a.values()), row_b = Tensor::of(row, b.values()),
+               eps = Tensor::of(row, c.values());
+  run({row_a, row_b}, [&](const Leaves& in) { return sample_gaussian(in[0], in[1], eps); });
   run({row_a, row_b}, [](const Leaves& in) { return kl_divergence(in[0], in[1]); });
   const Tensor pixels = numbers({1, 3, 1, n}, 4), others = numbers({1, 3, 1, n}, 5);
   run({pixels}, [](const Leaves& in) { return global_mean(in[0]); });

@@ -56,7 +56,7 @@ TEST(SuperTacLoss, TheSpreadLearnsTheError) {
   const Loss loss = supertac_loss(output, truth, {});
   double expected = 0;
   for (std::size_t i = 0; i < truth.values().size(); ++i) {
-    const double error = std::abs(output.image.value().values()[i] - truth.values()[i]);
+    const double error = std::abs(output.picture.value().values()[i] - truth.values()[i]);
     expected += std::pow(output.predicted_error.value().values()[i] - error, 2) / 128;
   }
   EXPECT_NEAR(loss.predicted_error.item(), expected, 1e-6);

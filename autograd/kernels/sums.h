@@ -1,4 +1,4 @@
-// Loops over n elements that are used outside ops too, callable without a graph.
+// Sums over n elements, callable without a graph.
 #pragma once
 
 #include <span>
@@ -7,12 +7,8 @@
 
 namespace supertac::kernels {
 
-/// y = 1 / (1 + e^-x)
-void sigmoid(Dim n, const real* x, real* y);
-/// y += factor * x
-void add_scaled(Dim n, real factor, const real* x, real* y);
 /// y = the sum of all parts (at least one) as a balanced binary tree: neighbours, then pairs of pairs; -0
-/// becomes +0.
+/// becomes +0. y may be the first of the parts, and no other.
 void add_as_tree(Dim n, std::span<const real* const> parts, real* y);
 /// The sum of the squares of all elements in double precision.
 double sum_of_squares(Dim n, const real* x);

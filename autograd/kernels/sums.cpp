@@ -1,21 +1,12 @@
-#include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/sums.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
 
-#include "autograd/kernels/exp.h"
 #include "autograd/kernels/fast/each.h"
 
 namespace supertac::kernels {
-
-void sigmoid(Dim n, const real* x, real* y) {
-  each(n, [=](Dim i) { y[i] = sigmoid_same_bits(x[i]); });
-}
-
-void add_scaled(Dim n, real factor, const real* x, real* y) {
-  each(n, [=](Dim i) { y[i] += factor * x[i]; });
-}
 
 namespace {
 
