@@ -15,8 +15,8 @@
 #include "io/numbers/numbers.h"
 #include "models/files/model_file.h"
 #include "models/inference/prepared/prepared.h"
+#include "models/training/audit/opened_step.h"
 #include "models/training/loss/loss.h"
-#include "models/training/opened_step.h"
 
 namespace supertac {
 

@@ -10,7 +10,8 @@
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
-#include "models/training/opened_step.h"
+#include "models/training/audit/opened_step.h"
+#include "models/training/audit/step_difference.h"
 
 namespace supertac {
 namespace {

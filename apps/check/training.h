@@ -10,7 +10,8 @@ namespace supertac {
 /// its ledger, all arrays of the state and the batches.
 int check_training(const Arguments& a);
 
-/// `supertac-check step`: repeats a training up to one step and opens it (models/training/opened_step.h).
+/// `supertac-check step`: repeats a training up to one step and opens it
+/// (models/training/audit/opened_step.h).
 int check_step(const Arguments& a);
 
 /// `supertac-check ledgers`: the first step and array in which two ledgers differ and, with the recordings,

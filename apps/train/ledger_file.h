@@ -1,10 +1,10 @@
-// The ledger of a run (models/training/ledger.h) and the states kept beside it, in the run's folder.
+// The ledger of a run (models/training/audit/ledger.h) and the states kept beside it, in the run's folder.
 #pragma once
 
 #include <map>
 #include <string>
 
-#include "models/training/ledger.h"
+#include "models/training/audit/ledger.h"
 
 namespace supertac {
 

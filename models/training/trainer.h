@@ -46,7 +46,7 @@ struct StepReport : LossTerms {
 };
 
 /// Stands around each micro-batch of a step, on its thread: must call `run`, which fills the batch and goes
-/// forward and backward. For observers (models/training/opened_step.h).
+/// forward and backward. For observers (models/training/audit/opened_step.h).
 struct MicroBatchView {
   const Batch& batch;
   const std::vector<Parameter>& parameters;  ///< the model's values under gradients of their own
@@ -83,10 +83,12 @@ class Trainer {
   /// Throws RanksError naming rank and tensor when the processes' parameters are not the same to the bit.
   void check_same() const;
 
-  /// For a ledger (models/training/ledger.h): the batch of the last step, that of any step (from 0), and
-  /// every array of the state.
+  // For an audit (models/training/audit):
+  /// The windows of the last step.
   std::span<const std::uint32_t> batch() const { return indices_; }
+  /// Those of any step, from 0.
   void batch_of(std::int64_t step, std::span<std::uint32_t> out) const;
+  /// Every array of the state.
   void for_each_tensor(const std::function<void(const std::string&, std::span<const real>)>& visit) const {
     state_.for_each_tensor(visit);
   }

@@ -1,5 +1,5 @@
 // The ledger's file and its comparison; whole trainings are compared in tests/apps/models/check_test.cpp.
-#include "models/training/ledger.h"
+#include "models/training/audit/ledger.h"
 
 #include <gtest/gtest.h>
 

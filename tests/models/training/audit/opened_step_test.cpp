@@ -1,6 +1,7 @@
 // An opened step: it changes nothing, ends in the ledger's line, and brings whatever is planted in it down to
 // operator and entry. SUPERTAC_PLANTS=200 plants more.
-#include "models/training/opened_step.h"
+#include "models/training/audit/opened_step.h"
+#include "models/training/audit/step_difference.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +13,7 @@
 #include "autograd/kernels/conv.h"
 #include "autograd/ops/linear.h"
 #include "io/files/safetensors.h"
-#include "models/training/ledger.h"
+#include "models/training/audit/ledger.h"
 #include "tests/models/support.h"
 
 namespace supertac {

@@ -1,4 +1,4 @@
-#include "models/training/ledger.h"
+#include "models/training/audit/ledger.h"
 
 #include <algorithm>
 #include <charconv>
