@@ -11,23 +11,23 @@ using kernels::ConvSettings;
 using kernels::ConvSizes;
 
 std::string shapes(const Variable& x, const Variable& w) {
-  return " (x " + x.shape().text() + ", weight " + w.shape().text() + ")";
+  return " (x " + x.shape().text() + ", w " + w.shape().text() + ")";
 }
 
 void check_arguments(const char* op, const Variable& x, const Variable& w, const Variable& b,
                      const ConvOptions& o, int rank) {
   check_rank(op, "x", x, rank);
-  check_rank(op, "weight", w, rank);
+  check_rank(op, "w", w, rank);
   const Dim in = w.dim(rank - 2), out = w.dim(rank - 1);
   if (x.dim(rank - 1) != in) {
-    refuse(op, "weight expects " + std::to_string(in) + " input channels, x has " +
+    refuse(op, "w expects " + std::to_string(in) + " input channels, x has " +
                    std::to_string(x.dim(rank - 1)) + shapes(x, w));
   }
   if (in < 1 || in > kernels::kMaxChannels || out < 1 || out > kernels::kMaxChannels) {
     refuse(op, "channels must be 1 to " + std::to_string(kernels::kMaxChannels) + shapes(x, w));
   }
   if (w.dim(0) < 1 || w.dim(rank - 3) < 1) refuse(op, "the kernel must be at least 1 wide" + shapes(x, w));
-  check_shape(op, "bias", b, {out});
+  check_shape(op, "b", b, {out});
   check_slope(op, o.negative_slope);
   if (o.stride < 1 || o.padding < 0) {
     refuse(op, "stride must be positive and padding not negative, got " + std::to_string(o.stride) + " and " +
@@ -62,8 +62,8 @@ Variable convolve(const char* op, const Variable& x, const Variable& w, const Va
   const bool empty =
       transposed ? s.out_height() < 1 || s.out_width() < 1 : too_short_h < 0 || too_short_w < 0;
   if (empty || s.height < 1 || s.width < 1) {
-    refuse(op, "the output would be empty (x " + x.shape().text() + ", weight " + w.shape().text() +
-                   ", stride " + std::to_string(o.stride) + ", padding " + std::to_string(o.padding) + ")");
+    refuse(op, "the output would be empty (x " + x.shape().text() + ", w " + w.shape().text() + ", stride " +
+                   std::to_string(o.stride) + ", padding " + std::to_string(o.padding) + ")");
   }
   const ConvSizes sizes{s, x.dim(0), w.dim(rank - 2), w.dim(rank - 1)};
   Tensor y(rank == 3 ? Shape{x.dim(0), s.out_width(), sizes.cout}

@@ -14,13 +14,13 @@ namespace supertac {
 // gs = gy f'(y)     gx = gs w^T     gw = x^T gs     gb = sum over rows gs
 Variable linear(const Variable& x, const Variable& w, const Variable& b, real negative_slope) {
   check_rank("linear", "x", x, 2);
-  check_rank("linear", "weight", w, 2);
+  check_rank("linear", "w", w, 2);
   const Dim rows = x.dim(0), in = w.dim(0), out = w.dim(1);
   if (x.dim(1) != in) {
-    refuse("linear", "weight expects " + std::to_string(in) + " inputs, x has " + std::to_string(x.dim(1)) +
-                         " (x " + x.shape().text() + ", weight " + w.shape().text() + ")");
+    refuse("linear", "w expects " + std::to_string(in) + " inputs, x has " + std::to_string(x.dim(1)) +
+                         " (x " + x.shape().text() + ", w " + w.shape().text() + ")");
   }
-  check_shape("linear", "bias", b, {out});
+  check_shape("linear", "b", b, {out});
   check_slope("linear", negative_slope);
   Tensor y(Shape{rows, out});
   kernels::linear(rows, in, out, x.value().data(), w.value().data(), b.value().data(), negative_slope,

@@ -97,23 +97,30 @@ Variable concat(std::span<const Variable> xs) {
       });
 }
 
+static void check_runs(const Variable& x, const Runs& r) {
+  if (x.rank() < 1) refuse("take_runs", "x expects at least rank 1, got " + x.shape().text());
+  if (x.requires_grad()) refuse("take_runs", "x wants a gradient, which this op does not have");
+  if (r.first < 0 || r.run < 1 || r.step < r.run || r.width < r.run || r.width % r.run != 0) {
+    refuse("take_runs", "runs expects first >= 0, run >= 1, step >= run and width a multiple of run, got " +
+                            std::to_string(r.first) + ", " + std::to_string(r.run) + ", " +
+                            std::to_string(r.step) + " and " + std::to_string(r.width));
+  }
+  const Dim end = r.first + (r.width / r.run - 1) * r.step + r.run;
+  if (end > x.dim(x.rank() - 1)) {
+    refuse("take_runs", "x expects at least " + std::to_string(end) + " columns, got " + x.shape().text());
+  }
+}
+
 // x [...,columns] -> y [...,width]: from column `first` on `run` columns, and so on every `step` columns
 Variable take_runs(const Variable& x, const Runs& r) {
-  if (x.rank() < 1) refuse("take_runs", "x expects at least rank 1, got " + x.shape().text());
+  check_runs(x, r);
   const Dim width = x.dim(x.rank() - 1);
-  if (r.first < 0 || r.run < 1 || r.step < r.run || r.width < r.run || r.width % r.run != 0 ||
-      r.first + (r.width / r.run - 1) * r.step + r.run > width) {
-    refuse("take_runs", std::to_string(r.width / std::max<Dim>(r.run, 1)) + " runs of " +
-                            std::to_string(r.run) + " from " + std::to_string(r.first) + " leave x " +
-                            x.shape().text());
-  }
   Tensor y(with_last(x.shape(), r.width));
   const Dim rows = x.size() / width;
   for (Dim at = 0; at < r.width; at += r.run) {
     move_columns(rows, r.run, x.value().data(), {width, r.first + at / r.run * r.step}, Into::overwrite,
                  y.data(), {r.width, at});
   }
-  if (x.requires_grad()) refuse("take_runs", "x wants a gradient, which this op does not have");
   const OpSettings settings{.first = r.first, .run = r.run, .step = r.step};
   return record(
       "take_runs", y, {&x}, [](Backward&) {}, &settings);

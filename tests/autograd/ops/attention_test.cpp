@@ -1,5 +1,6 @@
 #include "autograd/ops/attention.h"
 
+#include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
 
 namespace supertac {
@@ -15,9 +16,18 @@ TEST(Attention, HandComputed) {
 }
 
 TEST(Attention, Empty) {
-  const Variable x(Tensor::zeros({0, 2, 2, 3})), s(Tensor::zeros({0, 3}));
-  EXPECT_EQ(global_mean(x).shape().text(), "[0,3]");
-  EXPECT_EQ(gated_sum(x, x, s).shape().text(), "[0,2,2,3]");
+  const Variable x = parameter(Tensor::zeros({0, 2, 2, 3})), s = parameter(Tensor::zeros({0, 3}));
+  const Variable mean = global_mean(x), y = gated_sum(x, x, s);
+  EXPECT_EQ(mean.shape().text(), "[0,3]");
+  EXPECT_EQ(y.shape().text(), "[0,2,2,3]");
+  backward(sum(mean));
+  backward(sum(y));
+  EXPECT_EQ(x.grad().shape().text(), "[0,2,2,3]");
+  EXPECT_EQ(s.grad().shape().text(), "[0,3]");
+  // No pixels, but gates: their gradients are sums of nothing.
+  const Variable flat = parameter(Tensor::zeros({2, 0, 4, 3})), gates = parameter(numbers({2, 3}));
+  backward(sum(gated_sum(flat, flat, gates)));
+  EXPECT_TRUE(same_bytes(gates.grad(), Tensor::zeros({2, 3})));
 }
 
 TEST(Attention, RefusesOtherShapes) {

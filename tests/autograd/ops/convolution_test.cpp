@@ -137,19 +137,18 @@ TEST(Conv, RefusesWithNames) {
   const Variable w3(Tensor::zeros({3, 3, 3, 16})), flat(Tensor::zeros({2, 3}));
   expect_refusal("conv2d: x expects rank 4, got [2,3]", [&] { conv2d(flat, w, b, {}); });
   expect_refusal("conv1d: x expects rank 3, got [4,40,40,3]", [&] { conv1d(x, w, b, {}); });
-  expect_refusal("conv2d: weight expects rank 4, got [2,3]", [&] { conv2d(x, flat, b, {}); });
-  expect_refusal("conv2d: weight expects 8 input channels, x has 3 (x [4,40,40,3], weight [3,3,8,16])",
+  expect_refusal("conv2d: w expects rank 4, got [2,3]", [&] { conv2d(x, flat, b, {}); });
+  expect_refusal("conv2d: w expects 8 input channels, x has 3 (x [4,40,40,3], w [3,3,8,16])",
                  [&] { conv2d(x, w, b, {}); });
-  expect_refusal(
-      "conv_transpose2d: weight expects 8 input channels, x has 3 (x [4,40,40,3], weight [3,3,8,16])",
-      [&] { conv_transpose2d(x, w, b, {}); });
-  expect_refusal("conv2d: channels must be 1 to 4096 (x [1,3,3,0], weight [3,3,0,2])", [&] {
+  expect_refusal("conv_transpose2d: w expects 8 input channels, x has 3 (x [4,40,40,3], w [3,3,8,16])",
+                 [&] { conv_transpose2d(x, w, b, {}); });
+  expect_refusal("conv2d: channels must be 1 to 4096 (x [1,3,3,0], w [3,3,0,2])", [&] {
     conv2d(Variable(Tensor::zeros({1, 3, 3, 0})), Variable(Tensor::zeros({3, 3, 0, 2})), b, {});
   });
-  expect_refusal("conv2d: the kernel must be at least 1 wide (x [4,40,40,3], weight [3,0,3,16])", [&] {
+  expect_refusal("conv2d: the kernel must be at least 1 wide (x [4,40,40,3], w [3,0,3,16])", [&] {
     conv2d(x, Variable(Tensor::zeros({3, 0, 3, 16})), b, {.padding = 1});
   });
-  expect_refusal("conv2d: bias expects [16], got [2,3]", [&] { conv2d(x, w3, flat, {}); });
+  expect_refusal("conv2d: b expects [16], got [2,3]", [&] { conv2d(x, w3, flat, {}); });
   expect_refusal("conv2d: stride must be positive and padding not negative, got 0 and 0",
                  [&] { conv2d(x, w3, b, {.stride = 0}); });
   expect_refusal("conv2d: stride must be positive and padding not negative, got 1 and -1",
@@ -158,10 +157,10 @@ TEST(Conv, RefusesWithNames) {
 
 TEST(Conv, RefusesEmptyOutputs) {
   const Variable x(Tensor::zeros({1, 2, 2, 3})), w(Tensor::zeros({3, 3, 3, 4})), b(Tensor::zeros({4}));
-  expect_refusal("conv2d: the output would be empty (x [1,2,2,3], weight [3,3,3,4], stride 1, padding 0)",
+  expect_refusal("conv2d: the output would be empty (x [1,2,2,3], w [3,3,3,4], stride 1, padding 0)",
                  [&] { conv2d(x, w, b, {}); });
   expect_refusal(
-      "conv_transpose2d: the output would be empty (x [1,2,2,3], weight [3,3,3,4], stride 1, padding 2)",
+      "conv_transpose2d: the output would be empty (x [1,2,2,3], w [3,3,3,4], stride 1, padding 2)",
       [&] { conv_transpose2d(x, w, b, {.padding = 2}); });
 }
 

@@ -26,11 +26,11 @@ TEST(Linear, Empty) {
 TEST(Linear, RefusesOtherShapes) {
   const Variable x(Tensor::zeros({2, 3})), w(Tensor::zeros({3, 5})), b(Tensor::zeros({5}));
   expect_refusal("linear: x expects rank 2, got [5]", [&] { linear(b, w, b); });
-  expect_refusal("linear: weight expects rank 2, got [5]", [&] { linear(x, b, b); });
-  expect_refusal("linear: weight expects 5 inputs, x has 3 (x [2,3], weight [5,3])", [&] {
+  expect_refusal("linear: w expects rank 2, got [5]", [&] { linear(x, b, b); });
+  expect_refusal("linear: w expects 5 inputs, x has 3 (x [2,3], w [5,3])", [&] {
     linear(x, Variable(Tensor::zeros({5, 3})), b);
   });
-  expect_refusal("linear: bias expects [5], got [3]", [&] { linear(x, w, Variable(Tensor::zeros({3}))); });
+  expect_refusal("linear: b expects [5], got [3]", [&] { linear(x, w, Variable(Tensor::zeros({3}))); });
 }
 
 #ifdef SUPERTAC_REAL_IS_DOUBLE

@@ -28,7 +28,10 @@ TEST(MaxPool, ANanComesOutWhereverItLies) {
 }
 
 TEST(MaxPool, Empty) {
-  EXPECT_EQ(max_pool2d(Variable(Tensor::zeros({0, 4, 6, 2}))).shape().text(), "[0,2,3,2]");
+  const Variable x = parameter(Tensor::zeros({0, 4, 6, 2})), y = max_pool2d(x);
+  EXPECT_EQ(y.shape().text(), "[0,2,3,2]");
+  backward(sum(y));
+  EXPECT_EQ(x.grad().shape().text(), "[0,4,6,2]");
 }
 
 TEST(MaxPool, RefusesOtherShapes) {

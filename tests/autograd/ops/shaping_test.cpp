@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "autograd/ops/arithmetic.h"
 #include "tests/autograd/check.h"
 
 namespace supertac {
@@ -38,6 +39,12 @@ TEST(Shaping, Empty) {
   EXPECT_EQ(joined({x, x}).shape().text(), "[0,3,4]");
   EXPECT_EQ(flatten_channels_first(x).shape().text(), "[0,6]");
   EXPECT_EQ(unflattened(Variable(Tensor::zeros({0, 6})), {3}).shape().text(), "[0,3,2]");
+  EXPECT_EQ(take_runs(x, {0, 1, 1, 2}).shape().text(), "[0,3,2]");
+  EXPECT_EQ(last_frame(x, 1, 2, 1).shape().text(), "[0,1,2,1]");
+  const Variable none = parameter(Tensor::zeros({2, 0})), some = parameter(numbers({2, 3}));
+  backward(sum(joined({none, some, none})));
+  EXPECT_EQ(none.grad().shape().text(), "[2,0]");
+  EXPECT_TRUE(same_bytes(some.grad(), Tensor::full({2, 3}, 1)));
 }
 
 TEST(Shaping, TakesRunsOfColumns) {
@@ -45,7 +52,16 @@ TEST(Shaping, TakesRunsOfColumns) {
   const Variable y = take_runs(x, {.first = 1, .run = 2, .step = 3, .width = 4});
   EXPECT_EQ(std::vector<real>(y.value().values().begin(), y.value().values().end()),
             (std::vector<real>{1, 2, 4, 5, 11, 12, 14, 15}));
-  expect_refusal("take_runs: 2 runs of 2 from 2 leave x [2,6]", [&] { take_runs(x, {2, 2, 3, 4}); });
+  expect_refusal("take_runs: x expects at least 7 columns, got [2,6]", [&] { take_runs(x, {2, 2, 3, 4}); });
+  const std::string runs =
+      "take_runs: runs expects first >= 0, run >= 1, step >= run and width a multiple of run, got ";
+  expect_refusal(runs + "-1, 2, 3 and 4", [&] { take_runs(x, {-1, 2, 3, 4}); });
+  expect_refusal(runs + "0, 0, 3 and 4", [&] { take_runs(x, {0, 0, 3, 4}); });
+  expect_refusal(runs + "0, 2, 1 and 4", [&] { take_runs(x, {0, 2, 1, 4}); });
+  expect_refusal(runs + "0, 2, 2 and 3", [&] { take_runs(x, {0, 2, 2, 3}); });
+  expect_refusal("take_runs: x expects at least rank 1, got []", [] {
+    take_runs(Variable(Tensor::zeros({})), {0, 1, 1, 1});
+  });
   expect_refusal("take_runs: x wants a gradient, which this op does not have", [&] {
     take_runs(Variable(Tensor::zeros({2, 6}), true), {0, 2, 2, 4});
   });
@@ -57,6 +73,9 @@ TEST(Shaping, TakesTheLastFrameOfEachWindow) {
   EXPECT_EQ(y.shape().text(), "[2,1,2,1]");
   EXPECT_EQ(std::vector<real>(y.value().values().begin(), y.value().values().end()),
             (std::vector<real>{2, 3, 12, 13}));
+  expect_refusal("last_frame: windows expects rank 3, got [2,4]", [] {
+    last_frame(Variable(Tensor::zeros({2, 4})), 1, 2, 1);
+  });
   expect_refusal("last_frame: windows expects [2,2,6], got [2,2,2]", [&] { last_frame(x, 3, 2, 1); });
   expect_refusal("last_frame: windows want a gradient, which this op does not have", [&] {
     last_frame(Variable(Tensor::zeros({1, 2, 2}), true), 1, 2, 1);
