@@ -68,14 +68,15 @@ double nearest_derivative(const Function& f, Variable& leaf, Dim index, double s
   return nearest;
 }
 
-// "name [3,0,7]"
+// "name [3,0,7] of [4,2,9]"
 std::string place_of(const GradientEntry& e, const Shape& shape, const std::vector<std::string>& names) {
   std::array<Dim, kMaxRank> at{};
   Dim rest = e.index;
   for (int i = shape.rank() - 1; i >= 0; rest /= shape[i--])
     at[static_cast<std::size_t>(i)] = rest % shape[i];
   const std::string name = e.input < names.size() ? names[e.input] : "input " + std::to_string(e.input);
-  return name + " " + Shape({at.data(), static_cast<std::size_t>(shape.rank())}).text();
+  return name + " " + Shape({at.data(), static_cast<std::size_t>(shape.rank())}).text() + " of " +
+         shape.text();
 }
 
 }  // namespace

@@ -16,8 +16,9 @@ struct GradientEntry {
   /// |analytic - numeric| / (max(|analytic|, |numeric|) + 1e-3 * the largest gradient of that input
   ///                         + 1e-5 * the largest gradient of all inputs); 1e30 when it is not finite
   double relative_error;
-  std::string
-      place;  // "encoder.2.conv.1.weight [3,0,7]": the input's name and the element's indices in memory
+  /// "encoder.2.conv.1.weight [3,0,7] of [4,2,9]": the input's name, the element's indices in memory, the
+  /// shape
+  std::string place;
 };
 
 struct GradientReport {
@@ -26,7 +27,7 @@ struct GradientReport {
   Dim entries = 0;
   std::vector<GradientEntry> all = {};  // by input and index
   /// One line per entry of `worst`, for a failing test to print:
-  /// "encoder.2.conv.1.weight [3,0,7]: analytic 0.25, numeric 0.5, relative error 0.5"
+  /// "encoder.2.conv.1.weight [3,0,7] of [4,2,9]: analytic 0.25, numeric 0.5, relative error 0.5"
   std::string text() const;
 };
 
