@@ -242,9 +242,15 @@ std::vector<GradientCase> loss_cases() {
   supertac_losses(cases, "SuperTac, 16x16 pixels", small);
   small.predicted_error = true;
   supertac_losses(cases, "SuperTac's predicted_error", small);
+  small = {.timesteps = 32, .latent = 2, .scale = 2, .channels = 8, .rcabs = 1, .last_frame_path = true};
+  supertac_losses(cases, "SuperTac's last_frame_path", small);
+  // Rows, columns and channels all differ, so that none can stand for another.
   small = {
       .rows = 3, .columns = 5, .in_channels = 2, .timesteps = 32, .latent = 2, .channels = 4, .rcabs = 1};
-  supertac_losses(cases, "SuperTac, 3x5 taxels x 2", small);
+  for (const Grouping grouping : {Grouping::horizontal, Grouping::vertical}) {
+    small.grouping = grouping;
+    supertac_losses(cases, "SuperTac, 3x5 taxels x 2", small);
+  }
   small = {.rows = 2, .columns = 5, .in_channels = 2, .timesteps = 1, .channels = 8, .rcabs = 1};
   supertac_losses(cases, "SuperTac, single frames", small);
   return cases.take();
