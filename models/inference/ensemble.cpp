@@ -9,13 +9,21 @@
 
 namespace supertac {
 
+std::string text(const NetworkFormat& f) {
+  return std::to_string(f.frames) + " frame(s) of " + std::to_string(f.rows) + "x" +
+         std::to_string(f.columns) + " taxels with " + std::to_string(f.channels) +
+         " channel(s) and pictures of " + std::to_string(f.rows * f.scale) + "x" +
+         std::to_string(f.columns * f.scale);
+}
+
 static double square(real x) { return static_cast<double>(x) * static_cast<double>(x); }
 
 Ensemble::Ensemble(std::vector<Prepared> members) : members_(std::move(members)) {
   if (members_.empty()) throw std::invalid_argument("Ensemble: expected at least one network, got none");
   for (const Prepared& member : members_)
     if (member.network().format() != first().format())
-      throw std::invalid_argument("Ensemble: expected networks that take the same inputs");
+      throw std::invalid_argument("Ensemble: expected networks of one format, got one of " +
+                                  text(first().format()) + " and one of " + text(member.network().format()));
 }
 
 Estimate Ensemble::estimate(const Tensor& inputs) const {

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "models/inference/prepared/prepared.h"
 
 namespace supertac {
+
+/// "32 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 16x16", for messages.
+std::string text(const NetworkFormat& format);
 
 /// Several networks that draw one picture, the mean of theirs: where the signals leave the picture open,
 /// networks of different seeds mostly err differently, which averages out (Lakshminarayanan et al. 2017).

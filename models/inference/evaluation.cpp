@@ -32,13 +32,6 @@ void compute(const Ensemble& network, const WindowSet& data, std::span<const std
                                estimate.predicted_error.values().end());
 }
 
-std::string text(const NetworkFormat& f) {
-  return std::to_string(f.frames) + " frame(s) of " + std::to_string(f.rows) + "x" +
-         std::to_string(f.columns) + " taxels with " + std::to_string(f.channels) +
-         " channel(s) and pictures of " + std::to_string(f.rows * f.scale) + "x" +
-         std::to_string(f.columns * f.scale);
-}
-
 }  // namespace
 
 void check_format(const WindowSet& windows, const Network& network) {

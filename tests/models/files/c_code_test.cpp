@@ -145,11 +145,16 @@ TEST(CCode, DrawsWhatLiveWindowsDraw) {
 
 TEST(CCode, RefusesWhatIsNoNameOrRateOrHasNoRanges) {
   ModelFile file = model_of(tiny(), {});
-  EXPECT_THROW(c_code_of(file, "1st", 100, ""), std::invalid_argument);
-  EXPECT_THROW(c_code_of(file, "a b", 100, ""), std::invalid_argument);
-  EXPECT_THROW(c_code_of(file, "finger", 0, ""), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { c_code_of(file, "1st", 100, ""); }),
+            "C code: the name must be an identifier of C, such as finger, got '1st'");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { c_code_of(file, "a b", 100, ""); }),
+            "C code: the name must be an identifier of C, such as finger, got 'a b'");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { c_code_of(file, "finger", 0, ""); }),
+            "C code: the sensor's rate must be 1 to 100000 Hz, got 0");
   file.ranges.reset();
-  EXPECT_THROW(c_code_of(file, "finger", 100, ""), std::runtime_error);
+  EXPECT_EQ(what_of<std::runtime_error>([&] { c_code_of(file, "finger", 100, ""); }),
+            "the model was saved without the ranges of its values, which C code in int8 needs; train it anew "
+            "with this version");
 }
 
 TEST(CCode, RefusesLayersThatItsSixteenBitsCannotCount) {

@@ -71,7 +71,8 @@ void expect_refused(const std::vector<std::string>& paths, const std::string& wh
 }
 
 TEST(Ensemble, SaysWhichModelsDoNotBelongTogether) {
-  EXPECT_THROW(Ensemble({}), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { Ensemble({}); }),
+            "Ensemble: expected at least one network, got none");
   const TemporaryFolder folder;
   const std::string one = folder / "a.safetensors", larger = folder / "b.safetensors",
                     slow = folder / "slow.safetensors", random = folder / "random.safetensors",
@@ -99,7 +100,12 @@ TEST(Ensemble, RefusesNetworksOfOtherInputs) {
   const SuperTac one = small_model(1);
   Rng rng(1);
   const SuperTac longer({.timesteps = 64, .latent = 2, .scale = 2, .channels = 8, .rcabs = 1}, rng);
-  EXPECT_THROW(Ensemble({Prepared(one), Prepared(longer)}), std::invalid_argument);
+  EXPECT_EQ(
+      what_of<std::invalid_argument>([&] {
+        Ensemble({Prepared(one), Prepared(longer)});
+      }),
+      "Ensemble: expected networks of one format, got one of 32 frame(s) of 4x4 taxels with 1 channel(s) and "
+      "pictures of 8x8 and one of 64 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8");
 }
 
 }  // namespace

@@ -66,9 +66,11 @@ TEST(Novelty, TravelsInTheModelFile) {
 }
 
 TEST(Novelty, RefusesTooFewFeatures) {
-  EXPECT_THROW(Novelty(plane(3)), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { Novelty(plane(3)); }),
+            "novelty: expects features [N,D] with N > D, got [3,3]");
   const real two[] = {0, 0};
-  EXPECT_THROW(Novelty(plane(10)).distance(two), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { Novelty(plane(10)).distance(two); }),
+            "novelty: expects 3 features, got 2");
 }
 
 // A trained model knows its own windows again, and not those of a sensor with a stuck taxel.

@@ -4,6 +4,7 @@
 
 #include "autograd/ops/losses.h"
 #include "autograd/optimisers/adam.h"
+#include "tests/expect_error.h"
 #include "tests/models/support.h"
 
 namespace supertac {
@@ -23,15 +24,23 @@ TEST(TextureClassifier, TakesFramesAndPictures) {
 
 TEST(TextureClassifier, RefusesSettingsOutOfRange) {
   Rng rng(1);
-  EXPECT_THROW(TextureClassifier({.height = 2, .width = 4, .classes = 6}, rng), std::invalid_argument);
-  EXPECT_THROW(TextureClassifier({.height = 16, .width = 16, .classes = 1}, rng), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>(
+                [&] { TextureClassifier({.height = 2, .width = 4, .classes = 6}, rng); }),
+            "TextureClassifier: expects sides of 4 to 2048, a channel or more and 2 to 1024 classes, got "
+            "2x4, 1 and 6");
+  EXPECT_EQ(what_of<std::invalid_argument>(
+                [&] { TextureClassifier({.height = 16, .width = 16, .classes = 1}, rng); }),
+            "TextureClassifier: expects sides of 4 to 2048, a channel or more and 2 to 1024 classes, got "
+            "16x16, 1 and 1");
 }
 
 TEST(FeatureClassifier, TakesNumbersAndRefusesNone) {
   Rng rng(1);
   EXPECT_EQ(FeatureClassifier(40, 4, rng).forward(Variable(uniform({3, 40}, 1))).shape(), (Shape{3, 4}));
-  EXPECT_THROW(FeatureClassifier(0, 4, rng), std::invalid_argument);
-  EXPECT_THROW(FeatureClassifier(40, 1, rng), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { FeatureClassifier(0, 4, rng); }),
+            "FeatureClassifier: expects at least 1 feature and 2 to 1024 classes, got 0 and 4");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { FeatureClassifier(40, 1, rng); }),
+            "FeatureClassifier: expects at least 1 feature and 2 to 1024 classes, got 40 and 1");
 }
 
 // Stripes along x against stripes along y.

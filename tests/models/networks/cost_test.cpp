@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/expect_error.h"
+
 namespace supertac {
 namespace {
 
@@ -53,7 +55,9 @@ TEST(Cost, AgreesWithTheWeightsOfTheModel) {
 
 TEST(Cost, OfThePresetPaperIsAboutEightMillion) {
   EXPECT_NEAR(cost_of(SuperTacSettings::of_preset("paper")).inference, 7.8e6, 0.1e6);
-  EXPECT_THROW(cost_of({.timesteps = 40}), std::invalid_argument);
+  EXPECT_EQ(
+      what_of<std::invalid_argument>([&] { cost_of({.timesteps = 40}); }),
+      "model settings: timesteps must be a multiple of 16 (the encoder halves four times) or 1, got 40");
 }
 
 TEST(Cost, OfThePresetTinyIsANinth) {

@@ -57,7 +57,8 @@ TEST(Recipe, NamedOnesSeeTwoAndAHalfSeconds) {
   EXPECT_LT(2 * tiny.rate_hz * static_cast<double>(tiny.epochs) / 9,
             paper.rate_hz * static_cast<double>(paper.epochs))
       << "half the work of a training of paper";
-  EXPECT_THROW(Recipe::named("small"), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { Recipe::named("small"); }),
+            "unknown preset \"small\"; known: paper, best, tiny, frame");
 }
 
 TEST(Recipe, RefusesWhatNoTrainingHas) {

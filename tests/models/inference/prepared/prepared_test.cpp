@@ -3,16 +3,20 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include <array>
 #include <cmath>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "autograd/kernels/fast/isa/isa.h"
 #include "autograd/ops/shaping.h"
+#include "io/files/safetensors.h"
 #include "io/numbers/random.h"
 #include "layers/convolution.h"
 #include "models/inference/prepared/planner.h"
 #include "tests/allocations.h"
+#include "tests/expect_error.h"
 #include "tests/models/support.h"
 
 namespace supertac {
@@ -103,8 +107,12 @@ class Odd : public Network {
 };
 
 TEST(Prepared, RefusesWhatNoNetworkOfOursDoes) {
-  for (const Odd::Kind kind : {Odd::joins_maps, Odd::convolves_input, Odd::takes_runs})
-    EXPECT_THROW({ const Prepared p{Odd(kind)}; }, std::logic_error) << kind;
+  const std::pair<Odd::Kind, const char*> refused[] = {
+      {Odd::joins_maps, "Prepared: a concat of maps has no step"},
+      {Odd::convolves_input, "Prepared: conv2d has a step for anything but the network's input"},
+      {Odd::takes_runs, "Prepared: take_runs has a step for the network's input only"}};
+  for (const auto& [kind, text] : refused)
+    EXPECT_EQ(what_of<std::logic_error>([&kind = kind] { const Prepared p{Odd(kind)}; }), text);
 }
 
 // All pictures of 64 windows, `batch` at a time.
@@ -263,30 +271,45 @@ TEST(Prepared, InBytesShowsItsMapsAsWhatTheyStandFor) {
   }
   EXPECT_GT(compared, 20U);
   for (const real gate : bytes.at("sigmoid")) EXPECT_TRUE(gate > 0.2F && gate < 0.8F) << gate;
-  EXPECT_THROW(in_bytes.watched(uniform(network.input_shape(2), 5), into(bytes)), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>(
+                [&] { in_bytes.watched(uniform(network.input_shape(2), 5), into(bytes)); }),
+            "Prepared: one window is watched, got [2,32,16]");
 }
 
 TEST(Prepared, RefusesTheRangesOfAnotherNetwork) {
   Rng rng(1);
   const SuperTac network(small_settings(), rng);
-  EXPECT_THROW(Prepared(network, ActivationRanges()), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { Prepared(network, ActivationRanges()); }),
+            "Prepared: the ranges are those of 0 ops, the network has 46");
 }
 
-TEST(Prepared, RefusesRangesThatAreNotFinite) {
+TEST(Prepared, RefusesRangesThatAreNotFiniteOrNoPairs) {
   const TemporaryFolder folder;
   const auto read = [&](float high) {
-    write_checkpoint(folder / "m.safetensors", {}, {}, {{"int8.ranges", {2, 2}, {0, 1, -1, high}}});
+    const std::array<float, 4> ranges{0, 1, -1, high};  // write_checkpoint() would refuse the same itself
+    write_safetensors(folder / "m.safetensors", {},
+                      {{"int8.ranges", "F32", {2, 2}, std::as_bytes(std::span(ranges))}});
     return ActivationRanges::read(SafetensorsFile::read(folder / "m.safetensors"), "m");
   };
   EXPECT_EQ(read(2)->ops(), 2U);
-  for (const float high : {-1.0F, std::numeric_limits<float>::infinity(), std::nanf("")})
-    EXPECT_THROW(read(high), std::runtime_error) << high;
+  const std::pair<float, const char*> refused[] = {
+      {-1.0F, "-1"}, {std::numeric_limits<float>::infinity(), "inf"}, {std::nanf(""), "nan"}};
+  for (const auto& [high, found] : refused)
+    EXPECT_EQ(what_of<std::runtime_error>([&, &high = high] { read(high); }),
+              std::string("m: int8.ranges expected finite ranges around 0, found -1 to ") + found);
+  write_checkpoint(folder / "flat.safetensors", {}, {}, {{"int8.ranges", {4}, {0, 1, -1, 2}}});
+  EXPECT_EQ(what_of<std::runtime_error>(
+                [&] { ActivationRanges::read(SafetensorsFile::read(folder / "flat.safetensors"), "m"); }),
+            "m: int8.ranges expected F32 [N,2], found F32 [4]");
 }
 
 TEST(Prepared, RefusesInputsOfAnotherShape) {
   Rng rng(1);
   const SuperTac network(small_settings(), rng);
-  EXPECT_THROW(Prepared(network).estimate(Tensor::zeros({1, 3, 16})), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] {
+              Prepared(network).estimate(Tensor::zeros({1, 3, 16}));
+            }),
+            "Prepared: inputs expects [0,32,16] with any first size, got [1,3,16]");
   EXPECT_EQ(Prepared(network).estimate(Tensor::zeros(network.input_shape(0))).picture.dim(0), 0);
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "autograd/ops/losses.h"
+#include "tests/expect_error.h"
 #include "tests/models/support.h"
 
 namespace supertac {
@@ -121,9 +122,20 @@ TEST(SuperTacLoss, StaysFiniteForInputsAThousandTimesTooLarge) {
 
 TEST(SuperTacLoss, RefusesTruthOfAnotherSizeAndNegativeWeights) {
   const Sample s;
-  EXPECT_THROW(supertac_loss(s.output, uniform({2, 16, 16, 1}, 3), {}), std::invalid_argument);
-  EXPECT_THROW(LossWeights{.a = 2}.check(), std::invalid_argument);
-  EXPECT_THROW(LossWeights{.beta = -1}.check(), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] {
+              supertac_loss(s.output, uniform({2, 16, 16, 1}, 3), {});
+            }),
+            "supertac_loss: truth expects [2,8,8,1], got [2,16,16,1]");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] {
+              picture_loss(s.output.image, uniform({2, 8, 1}, 3), 0.1);
+            }),
+            "picture_loss: truth expects [2,8,8,1], got [2,8,1]");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { LossWeights{.a = 2}.check(); }),
+            "loss weights: expected 0 <= a <= 1, beta >= 0, lambda >= 0, got a = 2.000000, beta = 0.001000, "
+            "lambda = 0.100000");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { LossWeights{.beta = -1}.check(); }),
+            "loss weights: expected 0 <= a <= 1, beta >= 0, lambda >= 0, got a = 0.200000, beta = -1.000000, "
+            "lambda = 0.100000");
 }
 
 }  // namespace
