@@ -166,12 +166,13 @@ std::vector<Triangle> read_stl(const std::string& path) {
 std::vector<std::byte> stl_bytes(const std::vector<Triangle>& triangles, std::string_view title) {
   if (title.starts_with("solid"))
     throw std::invalid_argument("stl_bytes: the title begins with \"solid\", which marks a text file");
-  if (kHeadBytes + kFacetBytes * triangles.size() > kMaxStlBytes)
-    throw std::invalid_argument(std::to_string(triangles.size()) + " triangles are " +
-                                std::to_string(kFacetBytes * triangles.size() >> 20) +
-                                " MiB of STL, and no program here reads more than " +
-                                std::to_string(kMaxStlBytes >> 20) + "; try a coarser resolution");
-  std::vector<std::byte> bytes(kHeadBytes + kFacetBytes * triangles.size());
+  const std::size_t size = kHeadBytes + kFacetBytes * triangles.size();
+  if (size > kMaxStlBytes)
+    throw std::invalid_argument("stl_bytes: " + std::to_string(triangles.size()) +
+                                " triangles make a file of " + std::to_string(size) +
+                                " bytes, expected at most " + std::to_string(kMaxStlBytes) +
+                                "; try a coarser resolution");
+  std::vector<std::byte> bytes(size);
   std::memcpy(bytes.data(), title.data(), std::min(title.size(), kTitleBytes));
   const auto count = static_cast<std::uint32_t>(triangles.size());
   std::memcpy(bytes.data() + kTitleBytes, &count, sizeof count);

@@ -151,7 +151,8 @@ void align_passes(std::span<const RegisteredPass> passes) {
   for (const RegisteredPass& pass : passes) {
     if (!pass.registration->reliable) continue;
     if (pass.recording->array != TaxelArray{})
-      throw std::invalid_argument("align_passes: expected recordings of the rig's 4x4 array, found another");
+      throw std::invalid_argument("align_passes: expected recordings of the rig's " + TaxelArray{}.text() +
+                                  ", got " + pass.recording->array.text());
     reliable.push_back({*pass.registration, PassSignals(*pass.recording, *pass.registration), {}});
     results.push_back(pass.registration);
   }

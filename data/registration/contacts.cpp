@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "io/numbers/numbers.h"
+
 namespace supertac {
 namespace {
 
@@ -111,7 +113,8 @@ std::vector<Contact> find_contacts(const Recording& recording, double reach_s) {
   const double duration = recording.time_s.back() - recording.time_s.front();
   if (!(duration > 0) || duration / kBinS > static_cast<double>(kMaxBins))
     throw std::invalid_argument("find_contacts: time stamps must increase and span at most " +
-                                std::to_string(static_cast<int>(kMaxBins * kBinS)) + " s");
+                                std::to_string(static_cast<int>(kMaxBins * kBinS)) + " s, got a span of " +
+                                format(duration) + " s");
   const auto bins = static_cast<std::size_t>(duration / kBinS);
   for (int k = 0; k < recording.array.taxels(); ++k)
     find_in(binned(recording, k, bins), k, recording.time_s[0], reach_s, found);

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "io/numbers/numbers.h"
 #include "io/numbers/random.h"
 
 namespace supertac {
@@ -28,9 +29,12 @@ double share(std::span<const ClusterCount> clusters) {
 }
 
 Interval bootstrap_interval(std::span<const ClusterCount> clusters) {
-  if (clusters.empty()) throw std::invalid_argument("bootstrap_interval: there is no cluster");
+  if (clusters.empty())
+    throw std::invalid_argument("bootstrap_interval: expected at least one cluster, got none");
   for (const ClusterCount& c : clusters) {
-    if (!(c.total > 0)) throw std::invalid_argument("bootstrap_interval: a cluster holds nothing");
+    if (!(c.total > 0))
+      throw std::invalid_argument("bootstrap_interval: expected clusters with a total above 0, got " +
+                                  format(c.total));
   }
   const RandomStream random(0, kBootstrapStream);
   const auto count = static_cast<double>(clusters.size());
@@ -46,10 +50,12 @@ Interval bootstrap_interval(std::span<const ClusterCount> clusters) {
 }
 
 double sign_flip_p(std::span<const double> differences) {
-  if (differences.empty()) throw std::invalid_argument("sign_flip_p: there is no difference");
+  if (differences.empty())
+    throw std::invalid_argument("sign_flip_p: expected at least one difference, got none");
   double observed = 0, size = 0;
   for (const double d : differences) {
-    if (!std::isfinite(d)) throw std::invalid_argument("sign_flip_p: a difference is not finite");
+    if (!std::isfinite(d))
+      throw std::invalid_argument("sign_flip_p: expected finite differences, got " + format(d));
     observed += d;
     size += std::abs(d);
   }

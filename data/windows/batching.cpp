@@ -54,9 +54,9 @@ Batching::Batching(std::vector<std::uint32_t> indices, std::size_t batch, std::u
 
 void Batching::batch(std::uint64_t epoch, std::uint64_t b, std::span<std::uint32_t> out) const {
   if (b >= batches_per_epoch() || out.size() != batch_)
-    throw std::invalid_argument("batching: batch " + std::to_string(b) + " of " +
-                                std::to_string(batches_per_epoch()) + " into " + std::to_string(out.size()) +
-                                " places; a batch has " + std::to_string(batch_) + " windows");
+    throw std::invalid_argument("batching: expected a batch below " + std::to_string(batches_per_epoch()) +
+                                " and room for " + std::to_string(batch_) + " windows, got batch " +
+                                std::to_string(b) + " and room for " + std::to_string(out.size()));
   const EpochOrder order(indices_.size(), seed_, epoch);
   for (std::size_t i = 0; i < batch_; ++i) out[i] = indices_[order[b * batch_ + i]];
 }

@@ -9,6 +9,7 @@
 #include "data/windows/windows.h"
 #include "io/files/file.h"
 #include "tests/data/test_recordings.h"
+#include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {
@@ -25,7 +26,8 @@ TEST(PlateFile, NamedReadsAnStlFileAndDropsItsFolder) {
   EXPECT_EQ(plate.name(), "my.stl");
   EXPECT_NEAR(plate.height(18, 39), 2.5, 1e-3);
   EXPECT_EQ(plate.crests().size(), 6u);
-  EXPECT_THROW(Plate::named(folder / "other.stl"), FileError);
+  EXPECT_EQ(what_of<FileError>([&] { Plate::named(folder / "other.stl"); }),
+            folder / "other.stl" + ": cannot open the file: No such file or directory; check the name");
 }
 
 TEST(PlateFile, IsKeptBesideTheRecordingsAndNeverReplacedByAnother) {
@@ -38,14 +40,20 @@ TEST(PlateFile, IsKeptBesideTheRecordingsAndNeverReplacedByAnother) {
   EXPECT_EQ(plate_in_folder("my.stl", folder / "out").crests().size(), 6u);
   EXPECT_EQ(plate_in_folder("3_Bumps", folder / "out").name(), "3_Bumps");
   write_plate(folder / "my.stl", "3_Bumps");
-  EXPECT_THROW(keep_plate_file(folder / "my.stl", folder / "out"), FileError);
+  EXPECT_EQ(what_of<FileError>([&] { keep_plate_file(folder / "my.stl", folder / "out"); }),
+            folder / "out/my.stl" + ": is another plate than " + folder / "my.stl" +
+                "; rename one of them or choose another folder");
 }
 
 TEST(PlateFile, ARecordingMayNotNameAFileElsewhere) {
   const TemporaryFolder folder;
   write_plate(folder / "my.stl", "6_Bumps");
-  EXPECT_THROW(plate_in_folder("../" + folder.path() + "/my.stl", folder.path()), std::invalid_argument);
-  EXPECT_THROW(plate_in_folder(folder / "my.stl", "."), std::invalid_argument);
+  const auto refused = [&](const std::string& name, const std::string& in) {
+    EXPECT_EQ(what_of<std::invalid_argument>([&] { plate_in_folder(name, in); }),
+              "plate '" + name + "': expected the name of an STL file beside the recordings, found a path");
+  };
+  refused("../" + folder.path() + "/my.stl", folder.path());
+  refused(folder / "my.stl", ".");
 }
 
 TEST(PlateFile, WindowsTakeTheirTruthFromIt) {

@@ -9,6 +9,7 @@
 
 #include "data/plates/height_map.h"
 #include "io/numbers/random.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -121,8 +122,10 @@ TEST(PlateMesh, APlateThatWasReadIsWrittenAsItIs) {
 
 TEST(PlateMesh, UniformPlatesAreSmallAndSettingsAreChecked) {
   EXPECT_LT(mesh_of(Plate::named("6_Bumps")).size(), 3000u);
-  EXPECT_THROW(mesh_of(Plate::named("plain"), {.resolution_mm = 0}), std::invalid_argument);
-  EXPECT_THROW(mesh_of(Plate::named("plain"), {.base_mm = -1}), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { mesh_of(Plate::named("plain"), {.resolution_mm = 0}); }),
+            "mesh_of: expected a resolution of 0.02 to 5 mm and a base of 0.2 to 100 mm, got 0 and 3");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { mesh_of(Plate::named("plain"), {.base_mm = -1}); }),
+            "mesh_of: expected a resolution of 0.02 to 5 mm and a base of 0.2 to 100 mm, got 0.125 and -1");
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "tests/expect_error.h"
+
 namespace supertac {
 namespace {
 
@@ -116,8 +118,15 @@ TEST(Truth, PixelsNeedNotBeSquare) {
 
 TEST(Truth, RefusesAnImageOfTheWrongSize) {
   std::vector<float> image(255);
-  EXPECT_THROW(truth_image(Plate::named("plain"), 0, 0, ImageGrid{}, image), std::invalid_argument);
-  EXPECT_THROW(truth_image(Plate::named("plain"), 0, 0, {0, 0, 1}, {}), std::invalid_argument);
+  EXPECT_EQ(
+      what_of<std::invalid_argument>([&] { truth_image(Plate::named("plain"), 0, 0, ImageGrid{}, image); }),
+      "truth_image: expected a picture of 1x1 pixels or more and room for all, got 16x16 pixels and room for "
+      "255");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] {
+              truth_image(Plate::named("plain"), 0, 0, {0, 0, 1}, {});
+            }),
+            "truth_image: expected a picture of 1x1 pixels or more and room for all, got 0x0 pixels and room "
+            "for 0");
 }
 
 }  // namespace

@@ -66,7 +66,8 @@ TEST(Recording, RefusesAnArrayThatIsNone) {
   recording = example();
   recording.array.rows = 65;
   recording.volts.resize(recording.frames() * 17 * 4);
-  EXPECT_THROW(write_recording(folder.file("a"), recording), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { write_recording(folder.file("a"), recording); }),
+            "write_recording: volts has 476 values, expected 1820 for 7 frames");
   std::map<std::string, std::string> metadata{{"kind", "recording"}, {"plate", "3_Bumps"},
                                               {"trial", "1"},        {"pass", "1"},
                                               {"speed_mm_s", "10"},  {"source", "other"}};

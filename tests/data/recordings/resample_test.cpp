@@ -141,8 +141,12 @@ TEST(Resample, RefusesTimesThatDoNotIncreaseAndSizesThatDisagree) {
   EXPECT_ERROR(resample(recording, kWide), std::runtime_error, "time stamps must increase, frame 7");
   recording = make_recording({});
   recording.volts.pop_back();
-  EXPECT_THROW(resample(recording, kWide), std::runtime_error);
-  EXPECT_THROW(resample(make_recording({}), {.rate_hz = 0}), std::invalid_argument);
+  EXPECT_EQ(what_of<std::runtime_error>([&] { resample(recording, kWide); }),
+            "recording: 100 time stamps need 1600 voltages, 0 or 200 coordinates and 0 or 100 lifts, got "
+            "1599, 200 and 0; record or import the pass again");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { resample(make_recording({}), {.rate_hz = 0}); }),
+            "resample: rate_hz and max_gap_s must be positive, span_volts not 0, got 0.000000, 0.050000 and "
+            "0.360000");
 }
 
 }  // namespace

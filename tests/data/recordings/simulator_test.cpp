@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "tests/expect_error.h"
+
 namespace supertac {
 namespace {
 
@@ -83,7 +85,9 @@ TEST(Simulator, AnyArrayFeelsTheRidgeWhereItIs) {
   for (const double load : FingerModel(plate, settings, {}).loads({.x_mm = 18, .y_mm = 54, .z_mm = -1}))
     EXPECT_TRUE(std::isfinite(load));
   settings.array.channels = 2;
-  EXPECT_THROW(simulate_pass(plate, {}, settings), std::invalid_argument);
+  EXPECT_EQ(
+      what_of<std::invalid_argument>([&] { simulate_pass(plate, {}, settings); }),
+      "simulator: expected an array of one channel or three axes, got 16x16 taxels at 5 mm with 2 channels");
 }
 
 TEST(Simulator, ThreeAxesAreWhereTheLoadLeansAndTheLoad) {
@@ -229,11 +233,20 @@ TEST(Simulator, LossLeavesGapsInTheStampsNotInTheOrder) {
 
 TEST(Simulator, RefusesImpossiblePasses) {
   const Plate plate = Plate::named("plain");
-  EXPECT_THROW(simulate_pass(plate, {.speed_mm_s = 0}), std::invalid_argument);
-  EXPECT_THROW(simulate_pass(plate, {.from_mm = 80, .to_mm = 28}), std::invalid_argument);
-  EXPECT_THROW(simulate_pass(plate, {.to_mm = 120}), std::invalid_argument);
-  EXPECT_THROW(simulate_pass(plate, {.pass = 9}), std::invalid_argument);
-  EXPECT_THROW(without_term({}, "gravity"), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { simulate_pass(plate, {.speed_mm_s = 0}); }),
+            "simulate_pass: speed and rate must be positive and the slide lie on the plate (0..108 mm); got "
+            "speed 0 mm/s, rate 300 Hz, slide from 0 to 108 mm");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { simulate_pass(plate, {.from_mm = 80, .to_mm = 28}); }),
+            "simulate_pass: speed and rate must be positive and the slide lie on the plate (0..108 mm); got "
+            "speed 10 mm/s, rate 300 Hz, slide from 80 to 28 mm");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { simulate_pass(plate, {.to_mm = 120}); }),
+            "simulate_pass: speed and rate must be positive and the slide lie on the plate (0..108 mm); got "
+            "speed 10 mm/s, rate 300 Hz, slide from 0 to 120 mm");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { simulate_pass(plate, {.pass = 9}); }),
+            "simulate_pass: expected pass 1..8 and trial >= 1, got pass 9, trial 1");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { without_term({}, "gravity"); }),
+            "simulator: unknown term \"gravity\"; known are mount, pad, dome, edges, tilt, gains, variation, "
+            "vibration, drift, emi, noise, adc, filter, saturation, jitter, loss");
 }
 
 TEST(FingerModel, TheMountLiftsTheOtherRowsOffThePlate) {

@@ -9,6 +9,7 @@
 
 #include "data/registration/lost_frames.h"
 #include "tests/data/registration/lossy_pass.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -169,7 +170,8 @@ TEST(Alignment, AFlatPassAmongOthersIsLeftAlone) {
 TEST(Alignment, AnotherArrayIsRefused) {
   std::vector<Pass> passes = simulated_passes("6_Bumps");
   passes[1].recording.array.pitch_mm = 2;
-  EXPECT_THROW(align(passes), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { align(passes); }),
+            "align_passes: expected recordings of the rig's 4x4 taxels at 3 mm, got 4x4 taxels at 2 mm");
 }
 
 }  // namespace

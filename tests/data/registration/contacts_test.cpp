@@ -6,6 +6,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "tests/expect_error.h"
+
 namespace supertac {
 namespace {
 
@@ -56,10 +58,12 @@ TEST(Contacts, IgnoresNoiseFlatSignalsAndHoles) {
 TEST(Contacts, RefusesArraysThatDoNotFit) {
   Recording recording = dips({1.5}, 0.1);
   recording.volts.pop_back();
-  EXPECT_THROW(find_contacts(recording), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { find_contacts(recording); }),
+            "find_contacts: 3000 frames need 48000 signals, got 47999");
   recording = dips({1.5}, 0.1);
   recording.time_s.back() = 1e9;
-  EXPECT_THROW(find_contacts(recording), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { find_contacts(recording); }),
+            "find_contacts: time stamps must increase and span at most 10000 s, got a span of 1e+09 s");
 }
 
 }  // namespace

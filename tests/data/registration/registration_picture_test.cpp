@@ -8,6 +8,7 @@
 
 #include "data/recordings/simulator.h"
 #include "data/registration/registration.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -53,7 +54,8 @@ TEST(RegistrationPicture, AWrongStartMovesTheSignalsOffTheElements) {
 TEST(RegistrationPicture, LeavesOutWhatIsNotKnown) {
   Recording pass = simulate_pass(Plate::named("6_Ridges"), {.pass = 4});
   pass.position_mm.clear();
-  EXPECT_THROW(registration_picture(pass, Plate::named("6_Ridges")), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { registration_picture(pass, Plate::named("6_Ridges")); }),
+            "registration_picture: the recording has no positions; register it first");
   pass.position_mm.assign(2 * pass.frames(), std::numeric_limits<float>::quiet_NaN());
   pass.position_mm[0] = 15;
   const Picture picture = registration_picture(pass, Plate::named("6_Ridges"));

@@ -98,7 +98,9 @@ TEST(TextFolder, APlateOfYourOwnLiesBesideItsFolder) {
   put(folder, "my/3/notes.md", "not looked at");
   put(folder, ".hidden/1/1.txt", "not looked at");
   put(folder, "my.stl", "solid nothing\nendsolid");
-  EXPECT_THROW(import_all(folder.path(), {}), FileError) << "a plate without a triangle";
+  EXPECT_EQ(what_of<FileError>([&] { import_all(folder.path(), {}); }),
+            folder / "my.stl" + ": holds no triangle; export the model again")
+      << "a plate without a triangle";
   std::filesystem::remove(folder.file("my.stl"));
   std::filesystem::rename(folder.file("my"), folder.file("plain"));
   const auto imported = import_all(folder.path(), {.speed_mm_s = 7});
@@ -128,7 +130,10 @@ TEST(TextFolder, APlateOfUnknownShapeIsImportedWithoutPositions) {
 TEST(TextFolder, FilesThatAreNoRecordingsAreLeftOutWhenAskedTo) {
   const TemporaryFolder folder;
   const std::string bad = put(folder, "plain/1/1.txt", "no numbers at all\n");
-  EXPECT_THROW(import_all(folder.path(), {}), FileError);
+  EXPECT_EQ(what_of<FileError>([&] { import_all(folder.path(), {}); }),
+            bad +
+                ": 1 of 1 lines are not 16 voltages from 0 to 3.3 (1 with fewer columns, 0 with more, 0 not "
+                "numeric, 0 not finite, 0 out of range), expected at most a tenth; is it a recording?");
   std::vector<std::string> left_out;
   const FolderImport lenient{.left_out = [&](const FileError& error) { left_out.push_back(error.what()); }};
   EXPECT_EQ(what_of<FileError>([&] { import_all(folder.path(), lenient); }),

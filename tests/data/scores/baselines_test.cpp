@@ -10,6 +10,7 @@
 
 #include "data/windows/split.h"
 #include "tests/data/test_recordings.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -84,10 +85,16 @@ TEST(Upsampling, TakesArraysOfAnyShape) {
 TEST(Upsampling, RefusesOtherSizes) {
   std::vector<float> out(256);
   const auto nearest = Upsampling::Kind::nearest;
-  EXPECT_THROW(Upsampling(nearest, 4, 4, 0), std::invalid_argument);
-  EXPECT_THROW(Upsampling(nearest, 0, 4, 2), std::invalid_argument);
-  EXPECT_THROW(Upsampling(nearest, 4, 4, 4)(std::vector<float>(15), out), std::invalid_argument);
-  EXPECT_THROW(Upsampling(nearest, 4, 4, 2)(std::vector<float>(16), out), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { Upsampling(nearest, 4, 4, 0); }),
+            "upsampling: rows, columns and scale must be at least 1, got 4, 4 and 0");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { Upsampling(nearest, 0, 4, 2); }),
+            "upsampling: rows, columns and scale must be at least 1, got 0, 4 and 2");
+  EXPECT_EQ(
+      what_of<std::invalid_argument>([&] { Upsampling(nearest, 4, 4, 4)(std::vector<float>(15), out); }),
+      "baseline: a frame expects 16 values, got 15");
+  EXPECT_EQ(
+      what_of<std::invalid_argument>([&] { Upsampling(nearest, 4, 4, 2)(std::vector<float>(16), out); }),
+      "baseline: the image expects 64 values, got 256");
 }
 
 // A pass whose frames show the bicubic picture's own truth, shrunk and shifted: taxel = .2 + .5 height.
@@ -182,12 +189,18 @@ TEST(Baselines, ASignalThatNeverChangesGivesTheMean) {
 
 TEST(Baselines, NeedWindowsToFitTo) {
   const WindowSet set = make_set();
-  EXPECT_THROW(fit_baselines(set, {}), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { fit_baselines(set, {}); }),
+            "baseline: there is no example to fit to");
   const auto baselines = fit_baselines(set, make_split(set, SplitKind::none, 1).train);
   std::vector<float> out(256), small(64);
   for (const auto& baseline : baselines) {
-    EXPECT_THROW(baseline->predict(std::vector<float>(15), out), std::invalid_argument);
-    EXPECT_THROW(baseline->predict(set.window(0), small), std::invalid_argument);
+    const bool ridge = baseline->name() == "ridge";
+    EXPECT_EQ(what_of<std::invalid_argument>([&] { baseline->predict(std::vector<float>(15), out); }),
+              ridge ? "ridge: expects a window [16][16] and 256 pixels, got 15 and 256 values"
+                    : "baseline: an input is [T][16], got 15 values");
+    EXPECT_EQ(what_of<std::invalid_argument>([&] { baseline->predict(set.window(0), small); }),
+              ridge ? "ridge: expects a window [16][16] and 256 pixels, got 256 and 64 values"
+                    : "baseline: the image expects 256 values, got 64");
   }
 }
 

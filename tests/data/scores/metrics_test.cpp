@@ -131,8 +131,10 @@ TEST(Ssim, AgreesWithHandComputedWindow) {
 }
 
 TEST(Ssim, RefusesImagesWithoutAValidPosition) {
-  EXPECT_THROW(ssim(flat(0, 2), flat(0, 2), 2), std::invalid_argument);
-  EXPECT_THROW(ssim(flat(0, 16), flat(0, 8), 16), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { ssim(flat(0, 2), flat(0, 2), 2); }),
+            "ssim: size must be at least 3, got 2");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { ssim(flat(0, 16), flat(0, 8), 16); }),
+            "ssim: expects 256 pixels, got 64");
 }
 
 TEST(Contact, NeedsAPixelAboveZero) {

@@ -9,6 +9,7 @@
 #include "data/windows/split.h"
 #include "io/numbers/random.h"
 #include "tests/data/test_recordings.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -68,7 +69,7 @@ TEST(Ridge, SaysHowFarItIsAndCanBeEnded) {
     const auto stop = [at](std::size_t done, std::size_t) {
       if (done == at) throw std::runtime_error("ended");
     };
-    EXPECT_THROW(Ridge(set, train, stop), std::runtime_error) << at;
+    EXPECT_EQ(what_of<std::runtime_error>([&] { Ridge(set, train, stop); }), "ended") << at;
   }
 }
 
@@ -141,11 +142,13 @@ TEST(Ridge, DoesNotDependOnTheNumberOfThreads) {
 
 TEST(Ridge, RefusesNoWindowsAndOtherSizes) {
   const WindowSet set = make_set(0.01, 1);
-  EXPECT_THROW(Ridge(set, {}), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { Ridge(set, {}); }), "ridge: there is no window to fit to");
   const Ridge ridge(set, make_split(set, SplitKind::none, 1).train);
   std::vector<float> out(256), small(64);
-  EXPECT_THROW(ridge.predict(std::vector<float>(8 * kTaxels), out), std::invalid_argument);
-  EXPECT_THROW(ridge.predict(set.window(0), small), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { ridge.predict(std::vector<float>(8 * kTaxels), out); }),
+            "ridge: expects a window [16][16] and 256 pixels, got 128 and 256 values");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { ridge.predict(set.window(0), small); }),
+            "ridge: expects a window [16][16] and 256 pixels, got 256 and 64 values");
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "io/numbers/random.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -40,8 +41,10 @@ TEST(BootstrapInterval, DoesNotShrinkWithFramesWithinAPass) {
 
 TEST(BootstrapInterval, RefusesNothing) {
   const ClusterCount empty[] = {{1, 2}, {0, 0}};
-  EXPECT_THROW(bootstrap_interval({}), std::invalid_argument);
-  EXPECT_THROW(bootstrap_interval(empty), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { bootstrap_interval({}); }),
+            "bootstrap_interval: expected at least one cluster, got none");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { bootstrap_interval(empty); }),
+            "bootstrap_interval: expected clusters with a total above 0, got 0");
 }
 
 // All eight patterns of 1, 2, 4: |sum| is 7 twice, 5 twice, 3 twice, 1 twice.
@@ -79,9 +82,12 @@ TEST(SignFlip, RejectsATrueHypothesisAsOftenAsItSays) {
 }
 
 TEST(SignFlip, RefusesNothingAndWhatIsNoNumber) {
-  EXPECT_THROW(sign_flip_p({}), std::invalid_argument);
-  EXPECT_THROW(sign_flip_p(std::vector<double>{1, std::numeric_limits<double>::infinity()}),
-               std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { sign_flip_p({}); }),
+            "sign_flip_p: expected at least one difference, got none");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] {
+              sign_flip_p(std::vector<double>{1, std::numeric_limits<double>::infinity()});
+            }),
+            "sign_flip_p: expected finite differences, got inf");
 }
 
 }  // namespace

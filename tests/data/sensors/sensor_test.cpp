@@ -59,8 +59,16 @@ TEST(Sensor, PitchMayDifferAlongARowAndAcross) {
   EXPECT_EQ(sensor.array.y_mm(3), 1.25);
   EXPECT_EQ(sensor.array.text(), "2x3 taxels at 4 x 2.5 mm");
   EXPECT_EQ(sensor_of_json(json_of(sensor).dump(), "a.json"), sensor);
-  for (const char* wrong : {"[4]", "[4, 2, 1]", "\"4\"", "[4, 0]", "[4, 200]"})
-    EXPECT_THROW(with(wrong), std::exception);
+  const std::string
+      pair = "a.json: \"pitch_mm\" must be a number, or [along a row, from row to row], found ",
+      range =
+          "a.json: array: expected 1 to 64 rows and columns, 1 to 8 channels, a pitch of 0.1 to "
+          "100 mm; got 2x3 taxels at 4 x ";
+  EXPECT_EQ(what_of<FileError>([&] { with("[4]"); }), pair + "[4]");
+  EXPECT_EQ(what_of<FileError>([&] { with("[4, 2, 1]"); }), pair + "[4,2,1]");
+  EXPECT_EQ(what_of<FileError>([&] { with("\"4\""); }), pair + "\"4\"");
+  EXPECT_EQ(what_of<FileError>([&] { with("[4, 0]"); }), range + "0 mm");
+  EXPECT_EQ(what_of<FileError>([&] { with("[4, 200]"); }), range + "200 mm");
 }
 
 TEST(Sensor, RigIsBuiltInAndItsFileGivesTheSameNumbers) {

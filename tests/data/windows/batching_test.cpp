@@ -7,6 +7,8 @@
 #include <set>
 #include <vector>
 
+#include "tests/expect_error.h"
+
 namespace supertac {
 namespace {
 
@@ -53,8 +55,10 @@ TEST(EpochOrder, Mixes) {
 }
 
 TEST(EpochOrder, RefusesNothing) {
-  EXPECT_THROW(EpochOrder(0, 1, 1), std::invalid_argument);
-  EXPECT_THROW(EpochOrder(5, 1, 1)[5], std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { EpochOrder(0, 1, 1); }),
+            "epoch order: count must be 1 to 2^32, got 0");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { EpochOrder(5, 1, 1)[5]; }),
+            "epoch order: index 5 is not below 5");
 }
 
 std::vector<std::uint32_t> hundred() {
@@ -104,12 +108,16 @@ TEST(Batching, FewerWindowsThanABatchMakeOneBatch) {
 }
 
 TEST(Batching, RefusesWhatIsNotThere) {
-  EXPECT_THROW(Batching({}, 16, 3), std::invalid_argument);
-  EXPECT_THROW(Batching(hundred(), 0, 3), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { Batching({}, 16, 3); }),
+            "batching: there is no window to train on");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { Batching(hundred(), 0, 3); }),
+            "batching: the batch size must be at least 1, got 0");
   const Batching batching(hundred(), 16, 3);
   std::vector<std::uint32_t> batch(16), small(15);
-  EXPECT_THROW(batching.batch(0, 6, batch), std::invalid_argument);
-  EXPECT_THROW(batching.batch(0, 0, small), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { batching.batch(0, 6, batch); }),
+            "batching: expected a batch below 6 and room for 16 windows, got batch 6 and room for 16");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { batching.batch(0, 0, small); }),
+            "batching: expected a batch below 6 and room for 16 windows, got batch 0 and room for 15");
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "data/windows/windows.h"
 #include "io/numbers/random.h"
 #include "tests/data/test_recordings.h"
+#include "tests/expect_error.h"
 
 namespace supertac {
 namespace {
@@ -268,13 +269,19 @@ TEST(LiveWindow, NothingBeforeTheFirstFrame) {
 }
 
 TEST(LiveWindow, RefusesSettingsOutOfRangeAndAWrongRoom) {
-  EXPECT_THROW(LiveWindow({.timesteps = 0}), std::invalid_argument);
-  EXPECT_THROW(LiveWindow({.rate_hz = 0}), std::invalid_argument);
-  EXPECT_THROW(LiveWindow({.filter_s = -1}), std::invalid_argument);
-  EXPECT_THROW(LiveWindow({.filter_s = std::nan("")}), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { LiveWindow({.timesteps = 0}); }),
+            "live window: timesteps must be at least 1, got 0");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { LiveWindow({.rate_hz = 0}); }),
+            "live window: rate_hz, frame_period_s and max_gap_s must be positive, span_volts not 0, got "
+            "0.000000, 0.003333, 0.050000 and 0.360000");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { LiveWindow({.filter_s = -1}); }),
+            "live window: filter_s must not be negative, got -1.000000");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { LiveWindow({.filter_s = std::nan("")}); }),
+            "live window: filter_s must not be negative, got nan");
   LiveWindow live(live_settings(300));
   Window small(10);
-  EXPECT_THROW((void)live.window(small), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { (void)live.window(small); }),
+            "live window: needs room for 256 values, got 10");
 }
 
 }  // namespace

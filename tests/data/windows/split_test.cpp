@@ -263,7 +263,9 @@ TEST(Split, TrialTestsAllTrialsButTheFirst) {
   EXPECT_EQ(split.train.size() + split.test.size(), set.size());
   EXPECT_TRUE(find_leakage(set, split).none());
   set.add(make_recording({.trial = 0, .pass = 7, .frames = 30}));
-  EXPECT_THROW(make_split(set, SplitKind::trial, 0), std::invalid_argument);
+  EXPECT_EQ(
+      what_of<std::invalid_argument>([&] { make_split(set, SplitKind::trial, 0); }),
+      "split trial: pass 7 over 'bumps12' has no trial; use split group or pass, or record it with one");
 }
 
 TEST(Split, GroupKeepsGroupsTogether) {
@@ -281,7 +283,9 @@ TEST(Split, GroupKeepsGroupsTogether) {
   EXPECT_EQ(test.size(), 1U);
   EXPECT_FALSE(train.contains(*test.begin()));
   set.add(make_recording({.pass = 21, .frames = 30}));
-  EXPECT_THROW(make_split(set, SplitKind::group, 3), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { make_split(set, SplitKind::group, 3); }),
+            "split group: every recording needs metadata 'group' and there must be two groups, one to train "
+            "on, one to test on; some have none: use split pass");
 }
 
 }  // namespace

@@ -215,9 +215,13 @@ TEST(Windows, APassShorterThanTheWindowGivesNone) {
 
 TEST(Windows, RefuseSettingsOutOfRange) {
   EXPECT_EQ(message_of([] { WindowSet({.scale = 3}); }), "windows: scale must be 2, 4, 8 or 16, got 3");
-  EXPECT_THROW(WindowSet({.timesteps = 0}), std::invalid_argument);
-  EXPECT_THROW(WindowSet({.stride = 0}), std::invalid_argument);
-  EXPECT_THROW(WindowSet({.rate_hz = 0}), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { WindowSet({.timesteps = 0}); }),
+            "windows: timesteps must be at least 1, got 0");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { WindowSet({.stride = 0}); }),
+            "windows: stride must be at least 1, got 0");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { WindowSet({.rate_hz = 0}); }),
+            "windows: rate_hz and max_gap_s must be positive, span_volts not 0, got 0.000000, 0.050000 and "
+            "0.360000");
 }
 
 TEST(Windows, RefuseOutputsOfAnotherSizeAndUnknownPlates) {
@@ -226,11 +230,17 @@ TEST(Windows, RefuseOutputsOfAnotherSizeAndUnknownPlates) {
   std::vector<float> small(255);
   EXPECT_EQ(message_of([&] { set.window(0, small); }),
             "windows: a window needs room for 256 values, got 255");
-  EXPECT_THROW(set.truth(0, small), std::invalid_argument);
-  EXPECT_THROW(set.add(make_recording({.plate = "carpet"})), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { set.truth(0, small); }),
+            "windows: a truth image needs room for 256 values, got 255");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { set.add(make_recording({.plate = "carpet"})); }),
+            "plate \"carpet\": unknown texture \"carpet\"; expected a rig plate such as 3_Bumps, or plain, "
+            "or ridges|bumps|waves|blobs with a pitch in mm such as bumps12 or ridges6h1.5, several joined "
+            "by +, or random and a number, or an STL file");
   Recording torn = make_recording({});
   torn.lift_mm.assign(99, 0);
-  EXPECT_THROW(set.add(torn), std::runtime_error);
+  EXPECT_EQ(what_of<std::runtime_error>([&] { set.add(torn); }),
+            "recording: 100 time stamps need 1600 voltages, 0 or 200 coordinates and 0 or 100 lifts, got "
+            "1600, 200 and 99; record or import the pass again");
   EXPECT_EQ(set.size(), 85U);
 }
 
@@ -348,7 +358,9 @@ TEST_F(WindowFiles, LoadInTheOrderOfNames) {
 }
 
 TEST_F(WindowFiles, SayWhatIsMissing) {
-  EXPECT_THROW(WindowSet::load(dir_, {}, wide_settings(16)), std::runtime_error);  // an empty folder
+  EXPECT_EQ(
+      what_of<std::runtime_error>([&] { WindowSet::load(dir_, {}, wide_settings(16)); }),
+      dir_ + ": has no recordings (*.safetensors); make some with supertac-simulate or supertac-import");
   write({}, "bumps12_t1_p1_v10");
   EXPECT_NE(message_of([&] {
               WindowSet::load(dir_, {"ridges6"}, wide_settings(16));

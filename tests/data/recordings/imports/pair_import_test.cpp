@@ -77,7 +77,11 @@ TEST(PairImport, ASensorSaysWhatTheNumbersMean) {
   EXPECT_EQ(first.signal_scale, sensor.scale);
   EXPECT_EQ(first.array, sensor.array);
   sensor.array.rows = 4;
-  EXPECT_THROW((void)import_pairs(SafetensorsFile::read(folder / "pairs.safetensors"), sensor), FileError);
+  EXPECT_EQ(what_of<FileError>(
+                [&] { (void)import_pairs(SafetensorsFile::read(folder / "pairs.safetensors"), sensor); }),
+            folder / "pairs.safetensors" +
+                ": holds frames of 3x5 taxels at 2.5 mm with 2 channels, expected those of the sensor, 4x5 "
+                "taxels at 2.5 mm with 2 channels");
 }
 
 TEST(PairImport, RefusesWhatDoesNotFitTogether) {
@@ -112,7 +116,9 @@ TEST(PairImport, RefusesWhatDoesNotFitTogether) {
   const TemporaryFolder folder;
   write_safetensors(folder / "a", {},
                     {{"input", "F32", {10, 2, 3, 5}, std::as_bytes(std::span(file.input))}});
-  EXPECT_THROW((void)import_pairs(SafetensorsFile::read(folder / "a")), FileError);
+  EXPECT_EQ(
+      what_of<FileError>([&] { (void)import_pairs(SafetensorsFile::read(folder / "a")); }),
+      folder / "a" + ": has no tensor 'target'; expected input F32 [N,C,H,W] and target F32 [N,1,sH,sW]");
 }
 
 }  // namespace

@@ -188,9 +188,12 @@ TEST_F(TableImport, ImpossibleValuesAreNamed) {
   for (int i = 0; i < 30; ++i) nan += i == 3 ? "50,60,nan,80\n" : "50,60,70,80\n";
   expect_refusal(file(nan), "", "column 2 as value 2 of the frame is nan in line 4");
   expect_refusal(file("a b\nc d\n"), "", "holds no line of numbers");
-  EXPECT_THROW(column_map("time=0:h"), std::invalid_argument);
-  EXPECT_THROW(column_map("x=0"), std::invalid_argument);
-  EXPECT_THROW(column_map("z=0"), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { column_map("time=0:h"); }),
+            "time is in 'h', expected s, ms or us");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { column_map("x=0"); }),
+            "names only one of x and y; a position has both");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { column_map("z=0"); }),
+            "found 'z=0', expected time=COLUMN[:s|ms|us], x=COLUMN, y=COLUMN, values=FIRST-LAST");
 }
 
 TEST_F(TableImport, NumpyArraysAndWhatTheyMayNotBe) {
@@ -201,7 +204,8 @@ TEST_F(TableImport, NumpyArraysAndWhatTheyMayNotBe) {
   Sensor row = mat();
   row.array.rows = 1, row.array.columns = 4;
   const std::string path = npy("a.npy", "<f4", "10, 2, 2", values);
-  EXPECT_THROW(recording_of_table(path, read_table(path), {}, row), FileError);
+  EXPECT_EQ(what_of<FileError>([&] { recording_of_table(path, read_table(path), {}, row); }),
+            path + ": holds frames of 2x2, the sensor's file says 1x4 taxels at 5 mm");
   EXPECT_EQ(import(npy("b.npy", "<f4", "10, 1, 4", values)).frames(), 10U);
   row.order = {3, 2, 1, 0};
   EXPECT_EQ(recording_of_table(path, read_table(path), {}, row).frames(), 10U);
@@ -222,9 +226,11 @@ TEST_F(TableImport, PositionsOfAnotherLogAreInterpolated) {
   EXPECT_NEAR(r.position_mm[2 * 30], 10, 1e-4);
   EXPECT_TRUE(std::isnan(r.position_mm[2 * 31]));
   const Table afar = read_table(file("0,0,0\n300,1e300,40\n", "log.csv"));
-  EXPECT_THROW(add_positions(r, "log", afar, 1e-3), FileError);
+  EXPECT_EQ(what_of<FileError>([&] { add_positions(r, "log", afar, 1e-3); }),
+            "log: column 1 as a position holds 3.3333333333333335e+298, expected mm on the plate");
   const Table other_clock = read_table(file("100000,0,0\n100001,0,0\n", "log.csv"));
-  EXPECT_THROW(add_positions(r, "log", other_clock, 1), FileError);
+  EXPECT_EQ(what_of<FileError>([&] { add_positions(r, "log", other_clock, 1); }),
+            "log: has times from 1e+05 to 100001 s, the frames from 0 to 0.49 s; are both of one clock?");
 }
 
 TEST_F(TableImport, TruthIsScaledAndCounted) {
@@ -232,15 +238,20 @@ TEST_F(TableImport, TruthIsScaledAndCounted) {
   std::vector<float> images(3 * 4 * 6, 100);
   images[0] = 300;
   const Table table = read_table(npy("t.npy", "<f4", "3, 4, 6", images));
-  EXPECT_THROW(add_truth(r, "t", table, 0, 1), FileError);
+  EXPECT_EQ(what_of<FileError>([&] { add_truth(r, "t", table, 0, 1); }),
+            "t: holds 300, expected 0 to 1: say what is 0 and what is 1 with --truth-range LOW,HIGH");
   add_truth(r, "t", table, 100, 300);
   EXPECT_EQ(r.truth_height, 4);
   EXPECT_EQ(r.truth_width, 6);
   EXPECT_EQ(r.truth[0], 1.0F);
   EXPECT_EQ(r.truth[1], 0.0F);
-  EXPECT_THROW(add_truth(r, "t", read_table(npy("t.npy", "<f4", "3, 4, 3, 2", images)), 100, 300), FileError);
-  EXPECT_THROW(add_truth(r, "t", read_table(npy("t.npy", "<f4", "2, 4, 6", std::vector<float>(48))), 0, 1),
-               FileError);
+  EXPECT_EQ(what_of<FileError>(
+                [&] { add_truth(r, "t", read_table(npy("t.npy", "<f4", "3, 4, 3, 2", images)), 100, 300); }),
+            "t: has rows of rank 3, expected images: an array [frames, height, width] in a .npy file");
+  EXPECT_EQ(what_of<FileError>([&] {
+              add_truth(r, "t", read_table(npy("t.npy", "<f4", "2, 4, 6", std::vector<float>(48))), 0, 1);
+            }),
+            "t: holds 2 images, the recording has 3 frames; expected one for each");
 }
 
 }  // namespace

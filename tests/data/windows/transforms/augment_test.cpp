@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/expect_error.h"
+
 namespace supertac {
 namespace {
 
@@ -126,12 +128,17 @@ TEST(Augment, StaysInRange) {
 }
 
 TEST(Augment, RefusesNegativeMagnitudes) {
-  for (const AugmentSettings& settings :
-       {AugmentSettings{.gain = -1}, AugmentSettings{.noise = std::numeric_limits<double>::quiet_NaN()},
-        AugmentSettings{.dropped = 17}, AugmentSettings{.dropped = -1}})
-    EXPECT_THROW(check(settings), std::invalid_argument);
+  const auto message = [](const AugmentSettings& settings) {
+    return what_of<std::invalid_argument>([&] { check(settings); });
+  };
+  EXPECT_EQ(message({.gain = -1}), "augmentation: gain must be 0 (off) or positive, got -1.000000");
+  EXPECT_EQ(message({.noise = std::numeric_limits<double>::quiet_NaN()}),
+            "augmentation: noise must be 0 (off) or positive, got nan");
+  EXPECT_EQ(message({.dropped = 17}), "augmentation: dropped must be 0 to 16 taxels, got 17");
+  EXPECT_EQ(message({.dropped = -1}), "augmentation: dropped must be 0 to 16 taxels, got -1");
   std::vector<float> window(17);
-  EXPECT_THROW(augment({.gain = 1}, 1, 1, window), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { augment({.gain = 1}, 1, 1, window); }),
+            "augment: a window of 4x4 taxels at 3 mm is [T][16], got 17 values");
   EXPECT_NO_THROW(check(AugmentSettings{}));
 }
 
@@ -156,8 +163,11 @@ TEST(Augment, AnyArray) {
   EXPECT_NEAR(static_cast<double>(dropped), 50, 20);
   EXPECT_GT(levels.size(), 1800U);  // of 2250, some of which are clipped or dropped
   std::vector<float> window(array.signals());
-  EXPECT_THROW(augment({.dropped = 16}, 1, 1, window, array), std::invalid_argument);
-  EXPECT_THROW(augment({.gain = 1}, 1, 1, std::span(window).first(44), array), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { augment({.dropped = 16}, 1, 1, window, array); }),
+            "augmentation: dropped must be 0 to 15 taxels, got 16");
+  EXPECT_EQ(
+      what_of<std::invalid_argument>([&] { augment({.gain = 1}, 1, 1, std::span(window).first(44), array); }),
+      "augment: a window of 3x5 taxels at 3 mm with 3 channels is [T][45], got 44 values");
 }
 
 }  // namespace

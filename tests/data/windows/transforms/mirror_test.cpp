@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "tests/expect_error.h"
+
 namespace supertac {
 namespace {
 
@@ -22,7 +24,8 @@ TEST(Mirror, ReversesColumnsAndRowsOfEveryFrame) {
   EXPECT_EQ(mirrored({.along_x = true, .along_y = true}),
             (std::vector<float>{6, 5, 4, 3, 2, 1, 12, 11, 10, 9, 8, 7}));
   std::vector<float> five(5);
-  EXPECT_THROW(mirror({}, five, 2, 3), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { mirror({}, five, 2, 3); }),
+            "mirror: expected frames of 2x3, got 5 values");
 }
 
 TEST(Mirror, IsDrawnFromSeedAndSample) {

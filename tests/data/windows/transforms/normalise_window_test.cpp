@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/expect_error.h"
+
 namespace supertac {
 namespace {
 
@@ -101,11 +103,16 @@ TEST(NormaliseWindow, NanStaysWhereItIs) {
 
 TEST(NormaliseWindow, RefusesWhatIsNoWindow) {
   std::vector<float> x(7);
-  EXPECT_THROW(normalise_window(x, 2), std::invalid_argument);
-  EXPECT_THROW(normalise_window(x, 0), std::invalid_argument);
-  EXPECT_THROW(normalise_window({}, 2), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { normalise_window(x, 2); }),
+            "normalise_window: a window is [T][2], T up to 60000, got 7 values");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { normalise_window(x, 0); }),
+            "normalise_window: a window is [T][0], T up to 60000, got 7 values");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { normalise_window({}, 2); }),
+            "normalise_window: a window is [T][2], T up to 60000, got 0 values");
   std::vector<float> too_long(60'001);
-  EXPECT_THROW(normalise_window(too_long, 1), std::invalid_argument) << "its counts would not fit";
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { normalise_window(too_long, 1); }),
+            "normalise_window: a window is [T][1], T up to 60000, got 60001 values")
+      << "its counts would not fit";
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "tests/expect_error.h"
+
 namespace supertac {
 namespace {
 
@@ -56,8 +58,10 @@ TEST(SignalFeatures, FollowTheArray) {
 
 TEST(SignalFeatures, RefuseAPieceOfAFrame) {
   const std::vector<float> piece(16 * 16 - 1), short_one(15 * 16);
-  EXPECT_THROW(signal_features(piece, TaxelArray{}), std::invalid_argument);
-  EXPECT_THROW(signal_features(short_one, TaxelArray{}), std::invalid_argument);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { signal_features(piece, TaxelArray{}); }),
+            "signal features: expects 16 or more frames of 16 and room for 35, got 255 and 35");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { signal_features(short_one, TaxelArray{}); }),
+            "signal features: expects 16 or more frames of 16 and room for 35, got 240 and 35");
 }
 
 }  // namespace
