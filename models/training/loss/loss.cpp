@@ -53,18 +53,14 @@ static Variable where_textured(const Variable& picture, const Tensor& truth) {
   return picture * Variable(keep) + Variable(flat);
 }
 
-static Loss picture_loss(const char* of, const Variable& picture, const Tensor& truth, double lambda) {
+Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda) {
   const Variable target(truth);
-  check_shape(of, "truth", target, picture.shape());
+  check_shape("supertac_loss", "truth", target, picture.shape());
   Loss loss;
   loss.l2 = l2_loss(picture, target);
   loss.ssim = ssim(where_textured(picture, truth), truth);
   loss.total = loss.l2 + static_cast<real>(lambda) * (1 - loss.ssim);
   return loss;
-}
-
-Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda) {
-  return picture_loss("picture_loss", picture, truth, lambda);
 }
 
 // |picture - truth|, a constant.
@@ -76,7 +72,7 @@ static Variable error_of(const Variable& picture, const Tensor& truth) {
 }
 
 Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const LossWeights& w) {
-  Loss loss = picture_loss("supertac_loss", output.picture, truth, w.lambda);
+  Loss loss = picture_loss(output.picture, truth, w.lambda);
   for (std::size_t i = 0; i < output.decoded.size(); ++i) {
     const Variable l2 = l2_loss(output.decoded[i], output.input[i]);
     const Variable kld = kl_divergence(output.latent[i].mean, output.latent[i].log_var);

@@ -48,10 +48,10 @@ inline constexpr real kLeastTexture = 0.01F;
 /// its gradient would outweigh that of all textures. Throws std::invalid_argument when they differ in shape.
 Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda);
 
-/// To the picture's loss kPredictedErrorWeight times the mean of (predicted error - |image - truth|)^2 is
-/// added, the image taken as given: the predicted error learns the error, the picture does not learn to be
+/// To the picture's loss kPredictedErrorWeight times the mean of (predicted error - |picture - truth|)^2 is
+/// added, the picture taken as given: the predicted error learns the error, the picture does not learn to be
 /// predictably wrong. truth [N,H,W,1] in [-1,1]. Throws std::invalid_argument when it does not fit the
-/// output's image.
+/// output's picture.
 Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const LossWeights& weights);
 
 }  // namespace supertac

@@ -127,9 +127,9 @@ TEST(SuperTacLoss, RefusesTruthOfAnotherSizeAndNegativeWeights) {
             }),
             "supertac_loss: truth expects [2,8,8,1], got [2,16,16,1]");
   EXPECT_EQ(what_of<std::invalid_argument>([&] {
-              picture_loss(s.output.image, uniform({2, 8, 1}, 3), 0.1);
+              picture_loss(s.output.picture, uniform({2, 8, 1}, 3), 0.1);
             }),
-            "picture_loss: truth expects [2,8,8,1], got [2,8,1]");
+            "supertac_loss: truth expects [2,8,8,1], got [2,8,1]");
   EXPECT_EQ(what_of<std::invalid_argument>([&] { LossWeights{.a = 2}.check(); }),
             "loss weights: expected 0 <= a <= 1, beta >= 0, lambda >= 0, got a = 2.000000, beta = 0.001000, "
             "lambda = 0.100000");
