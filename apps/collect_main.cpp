@@ -212,15 +212,28 @@ RecorderReport collect(const Arguments& arguments, RecorderSettings settings, co
 
 /// Recordings, quality report and --json of what was collected, complete or not. Returns what it comes to.
 std::string keep_passes(const Arguments& arguments, const std::string& journal, const std::string& out,
-                        const RecorderReport& collected) {
+                        const PalpationOutcome& outcome) {
   OutputFolder folder(arguments.output("out"));
   PassesReport report = write_passes(arguments, journal, out, folder);
-  report.json["passes_done"] = collected.outcome.passes_done;
-  report.json["note"] = collected.outcome.note;
+  report.json["passes_done"] = outcome.passes_done;
+  report.json["note"] = outcome.note;
   constexpr bool kDespiteSignals = true;
   folder.keep(kDespiteSignals);
   arguments.write_json(report.json);
   return report.total();
+}
+
+/// Where the disk is full, what ended the run would be lost behind what goes wrong with its recordings.
+[[noreturn]] void fail_to_keep(const std::exception& error, const std::string& journal,
+                               const PalpationOutcome& outcome) {
+  std::string why;
+  try {
+    if (outcome.error) std::rethrow_exception(outcome.error);
+  } catch (const std::exception& first) {
+    why = std::string(first.what()) + "; ";
+  }
+  throw std::runtime_error(why + error.what() + "; the journal " + journal +
+                           " is kept, make recordings of it with supertac-import --journal");
 }
 
 }  // namespace
@@ -238,16 +251,21 @@ int run(Arguments& arguments) {
   keep_plate_file(arguments.text("plate"), out);
   const RecorderSettings settings = read_settings(arguments, out, plate);
   const OriginMark mark(required_text(arguments, "printer"));
-  const RecorderReport report = collect(arguments, settings, mark);
-  const std::string total = keep_passes(arguments, settings.journal, out, report);
-  if (report.outcome.complete) {
-    arguments.print(std::to_string(report.outcome.passes_done) + " passes, " + total);
+  const PalpationOutcome outcome = collect(arguments, settings, mark).outcome;
+  if (!outcome.complete)
+    arguments.note("incomplete after " + std::to_string(outcome.passes_done) + " passes; " + outcome.note);
+  std::string total;
+  try {
+    total = keep_passes(arguments, settings.journal, out, outcome);
+  } catch (const std::exception& error) {
+    fail_to_keep(error, settings.journal, outcome);
+  }
+  if (outcome.complete) {
+    arguments.print(std::to_string(outcome.passes_done) + " passes, " + total);
     return kExitOk;
   }
-  arguments.note("incomplete after " + std::to_string(report.outcome.passes_done) + " passes; " +
-                 report.outcome.note);
   stop_if_interrupted();
-  std::rethrow_exception(report.outcome.error);
+  std::rethrow_exception(outcome.error);
 }
 
 }  // namespace supertac

@@ -132,6 +132,27 @@ TEST(CollectProgram, AnotherPrinterIsNotHeldUpByTheMark) {
   EXPECT_EQ(other.collect({"--speed", "50"}).code, 0);
 }
 
+// Where the finger is, what ended the run and what became of its frames, although no recording can be made.
+TEST(CollectProgram, ARunWhoseRecordingsCannotBeKeptSaysWhatItLeft) {
+  CollectRun run;
+  std::vector<std::string> words = run.arguments();
+  std::erase(words, "--quiet");
+  RunningProcess process("supertac-collect", words);
+  ASSERT_TRUE(run.wait_for_contact(3, process)) << process.wait().error;
+  std::filesystem::create_directory(run.out() + "/provenance.jsonl");
+  process.send(SIGINT);
+  const ProcessResult result = process.wait();
+  EXPECT_EQ(result.code, 130) << result.error;
+  const std::size_t finger = result.error.find("incomplete after 0 passes; the finger was lifted\n");
+  const std::size_t cause =
+      result.error.find("; stopped by the operator; " + run.out() + "/provenance.jsonl");
+  EXPECT_LT(finger, cause) << result.error;
+  EXPECT_NE(cause, std::string::npos) << result.error;
+  EXPECT_TRUE(contains(result.error, "the journal " + run.journal() + " is kept")) << result.error;
+  EXPECT_EQ(run_process("supertac-import", {"--journal", run.journal(), "--out", run.disk() + "/again"}).code,
+            0);
+}
+
 TEST(CollectProgram, AFullDiskInContactLiftsTheFinger) {
   CollectRun run;
   const ProcessResult result = run.collect({}, {.max_file_bytes = 2'500'000});
