@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 #include <optional>
 
@@ -16,6 +17,7 @@
 #include "apps/common/running/signals.h"
 #include "apps/web/web_options.h"
 #include "data/plates/plate_file.h"
+#include "data/recordings/recording.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "hardware/ports/errors.h"
 #include "hardware/ports/open_port.h"
@@ -91,6 +93,8 @@ void confirm(const Arguments& arguments, const RecorderSettings& settings) {
     throw UsageError("expected yes, found " + in_quotes(answer) + "; nothing was moved");
 }
 
+int trial_of(const Arguments& arguments) { return static_cast<int>(arguments.integer("trial", 1, 1000)); }
+
 RecorderSettings read_settings(const Arguments& arguments, const std::string& out, const std::string& plate) {
   RecorderSettings settings;
   settings.sensor = read_sensor(arguments.text("sensor"));
@@ -104,7 +108,7 @@ RecorderSettings read_settings(const Arguments& arguments, const std::string& ou
   settings.home = arguments.flag("home");
   if (!settings.home)
     (void)legs_of(plan, bed.origin, bed.limits);  // nothing is opened for one that leaves them
-  const int trial = static_cast<int>(arguments.integer("trial", 1, 1000));
+  const int trial = trial_of(arguments);
   settings.header = collection_header(plate, trial, plan.speed, settings.sensor, bed);
   settings.journal = journal_path(out, plate, trial, plan.speed);
   return settings;
@@ -181,13 +185,32 @@ std::unique_ptr<CollectView> web_view(const Arguments& arguments, const Bed& bed
   return view;
 }
 
-RecorderReport collect(const Arguments& arguments, RecorderSettings settings, const OriginMark& mark) {
-  const double speedup = arguments.number("speedup", 0.1, 100);
-  auto board = open_carried(arguments, settings.sensor, speedup);
-  auto printer =
-      std::make_unique<SerialPort>(arguments.text("printer"), SerialSettings{settings.bed.baud, speedup});
+/// What the run will write must not be there: it would be found out when all is done.
+void refuse_taken(const Arguments& arguments, const std::string& out, Recording named, int passes) {
+  const auto taken = [&](int trial) {
+    std::vector<std::string> names = {journal_path(out, named.plate, trial, named.speed_mm_s)};
+    named.trial = trial;
+    for (named.pass = 1; named.pass <= passes && !arguments.force(); ++named.pass)
+      names.push_back(out + "/" + recording_file_name(named));
+    const auto found = std::ranges::find_if(names, [](const std::string& name) {
+      std::error_code error;
+      return std::filesystem::exists(std::filesystem::symlink_status(name, error));
+    });
+    return found == names.end() ? "" : *found;
+  };
+  const std::string name = taken(named.trial);
+  if (name.empty()) return;
+  int next = named.trial + 1;
+  while (!taken(next).empty()) ++next;
+  throw FileError(name, "exists already; collect with --trial " + std::to_string(next) +
+                            (name.ends_with(".journal")
+                                 ? ", for no journal is replaced (supertac-import --journal recovers one)"
+                                 : ", or pass --force to replace it"));
+}
+
+RecorderReport collect(const Arguments& arguments, std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
+                       RecorderSettings settings, const OriginMark& mark) {
   const PalpationPlan& plan = settings.bed.plan;
-  demand_origin(arguments, mark, settings.bed.origin);
   const std::unique_ptr<CollectView> page = web_view(arguments, settings.bed);
   confirm(arguments, settings);
   settings.stop = interrupted;
@@ -218,7 +241,12 @@ std::string keep_passes(const Arguments& arguments, const std::string& journal, 
   report.json["passes_done"] = outcome.passes_done;
   report.json["note"] = outcome.note;
   constexpr bool kDespiteSignals = true;
-  folder.keep(kDespiteSignals);
+  if (report.frames + report.left_out > 0) {
+    folder.keep(kDespiteSignals);
+  } else {  // this run's own, which would be in the way of the next and could not be imported
+    std::filesystem::remove(journal);
+    report.json["journal"] = nullptr;
+  }
   arguments.write_json(report.json);
   return report.total();
 }
@@ -246,12 +274,21 @@ int run(Arguments& arguments) {
   const std::string out = required_text(arguments, "out");
   const std::string plate =
       read_option("plate", [&] { return Plate::named(required_text(arguments, "plate")).name(); });
-  make_directories(out);
-  const FolderLock alone(out);
-  keep_plate_file(arguments.text("plate"), out);
   const RecorderSettings settings = read_settings(arguments, out, plate);
   const OriginMark mark(required_text(arguments, "printer"));
-  const PalpationOutcome outcome = collect(arguments, settings, mark).outcome;
+  const double speedup = arguments.number("speedup", 0.1, 100);
+  auto board = open_carried(arguments, settings.sensor, speedup);
+  auto printer =
+      std::make_unique<SerialPort>(arguments.text("printer"), SerialSettings{settings.bed.baud, speedup});
+  demand_origin(arguments, mark, settings.bed.origin);
+  make_directories(out);
+  const FolderLock alone(out);
+  Recording named;
+  named.plate = plate, named.trial = trial_of(arguments), named.speed_mm_s = settings.bed.plan.speed;
+  refuse_taken(arguments, out, named, settings.bed.plan.passes);
+  keep_plate_file(arguments.text("plate"), out);
+  const PalpationOutcome outcome =
+      collect(arguments, std::move(board), std::move(printer), settings, mark).outcome;
   if (!outcome.complete)
     arguments.note("incomplete after " + std::to_string(outcome.passes_done) + " passes; " + outcome.note);
   std::string total;

@@ -141,6 +141,7 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
   add_parent_file("journal", journal);
   for (const CollectedPass& pass : collection.passes) {
+    report.left_out += pass.left_out;
     if (pass.time_s.size() < 2) continue;
     const Recording recording = recording_of(pass, collection, header, report.damage);
     const std::string name = recording_file_name(recording);
@@ -148,7 +149,6 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
     arguments.print(to_line(pass));
     passes.push_back(to_json(pass, name));
     report.frames += pass.time_s.size();
-    report.left_out += pass.left_out;
     report.doubtful += pass.doubt.empty() ? 0 : 1;
   }
   if (Plate::is_file(header.plate))

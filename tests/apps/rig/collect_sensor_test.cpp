@@ -227,7 +227,7 @@ TEST_F(CollectSensor, WhatCannotBeIsRefusedBeforeAnythingMoves) {
     EXPECT_EQ(result.code, code) << result.error;
     EXPECT_TRUE(is_one_line(result.error)) << result.error;
     EXPECT_NE(result.error.find(says), std::string::npos) << result.error;
-    EXPECT_EQ(run_.files(), "");
+    EXPECT_FALSE(std::filesystem::exists(run_.out()));
   };
   const std::string bed = run_.disk() + "/small.json";
   std::string text = kBed;

@@ -132,6 +132,35 @@ TEST(CollectProgram, AnotherPrinterIsNotHeldUpByTheMark) {
   EXPECT_EQ(other.collect({"--speed", "50"}).code, 0);
 }
 
+TEST(CollectProgram, WhatIsThereAlreadyIsFoundBeforeAnythingMoves) {
+  CollectRun run;
+  std::filesystem::create_directories(run.out());
+  std::filesystem::create_symlink("nowhere", run.out() + "/3_Bumps_t1_p1_v10.safetensors");
+  std::ofstream(run.out() + "/3_Bumps_t2_v10.journal") << "of another run\n";
+  const Point3 before = run.head();
+  const auto refuse = [&](const std::vector<std::string>& more, const std::string& says) {
+    const ProcessResult result = run.collect(more);
+    EXPECT_EQ(result.code, 1);
+    EXPECT_TRUE(is_one_line(result.error)) << result.error;
+    EXPECT_TRUE(contains(result.error, says)) << result.error;
+  };
+  refuse({}, "3_Bumps_t1_p1_v10.safetensors: exists already; collect with --trial 3, or pass --force");
+  refuse({"--trial", "2", "--force"},
+         "3_Bumps_t2_v10.journal: exists already; collect with --trial 3, for no");
+  EXPECT_EQ(run.head(), before);
+}
+
+TEST(CollectProgram, ARunWithoutAFrameLeavesNoJournalInTheNextOnesWay) {
+  CollectRun run;
+  RunningProcess process("supertac-collect", run.arguments());
+  while (run.head().z > 130 && !process.ended()) usleep(1000);
+  process.send(SIGINT);
+  const ProcessResult result = process.wait();
+  EXPECT_EQ(result.code, 130) << result.error;
+  EXPECT_EQ(run.files(), "");
+  run.wait_for_rest();
+}
+
 // Where the finger is, what ended the run and what became of its frames, although no recording can be made.
 TEST(CollectProgram, ARunWhoseRecordingsCannotBeKeptSaysWhatItLeft) {
   CollectRun run;
