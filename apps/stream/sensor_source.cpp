@@ -39,7 +39,7 @@ class BoardSource : public SensorSource {
       volts_ = taxel_volts(frame->frame);
       return SensorFrame{.time_s = frame->time_s,
                          .volts = volts_,
-                         .arrived_s = live() ? frame->arrival.time_s / speedup_ : monotonic_seconds(),
+                         .arrived_s = arrived_s(frame->arrival.time_s, speedup_),
                          .arrival = frame->arrival};
     } catch (const PortUnplugged&) {  // how a capture that is replayed ends
       if (live()) throw;
@@ -67,21 +67,24 @@ class BoardSource : public SensorSource {
 
 class ReaderSource : public SensorSource {
  public:
-  ReaderSource(OpenedPort opened, const Sensor& sensor)
+  ReaderSource(OpenedPort opened, const Sensor& sensor, double speedup = 1)
       : SensorSource(1 / sensor.rate_hz, 0, opened.live, sensor.array, sensor.scale, sensor.silent()),
+        speedup_(speedup),
         reader_(std::move(opened), sensor) {}
 
   std::optional<SensorFrame> next(double wait_s) override {
     auto frame = reader_.next(wait_s);
     if (!frame) return std::nullopt;
     frame_ = std::move(*frame);
-    return SensorFrame{.time_s = frame_.time_s, .volts = frame_.signals, .arrived_s = frame_.arrival_s};
+    return SensorFrame{
+        .time_s = frame_.time_s, .volts = frame_.signals, .arrived_s = arrived_s(frame_.arrival_s, speedup_)};
   }
   bool ended() const override { return reader_.ended(); }
   BoardCounters counters() override { return reader_.counters(); }
   void finish() override { reader_.stop(); }
 
  private:
+  double speedup_;
   ReadFrame frame_;
   SensorReader reader_;
 };
@@ -118,6 +121,10 @@ class RecordingSource : public SensorSource {
 };
 
 }  // namespace
+
+double SensorSource::arrived_s(double port_s, double speedup) const {
+  return live_ ? port_s / speedup : monotonic_seconds();
+}
 
 std::unique_ptr<SensorSource> open_board(const std::string& port, double speedup,
                                          const std::string& capture) {
@@ -158,13 +165,13 @@ std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup) 
   if (sensor.frame.kind == FrameKind::board && sensor.port.starts_with(kSerial) && !calibrated)
     return open_board(sensor.port.substr(kSerial.size(), sensor.port.rfind('@') - kSerial.size()), speedup,
                       "");
-  return std::make_unique<ReaderSource>(open_port(sensor, speedup), sensor);
+  return std::make_unique<ReaderSource>(open_port(sensor, speedup), sensor, speedup);
 }
 
 std::unique_ptr<SensorSource> open_replay(const std::string& path) {
   const Journal journal = read_journal(path);
   const Sensor sensor = sensor_of(journal);
-  auto port = std::make_unique<ReplayPort>(journal.of(Stream::board), path);
+  auto port = std::make_unique<ReplayPort>(journal.of(Stream::board), path, journal.lost_bytes);
   if (sensor.frame.kind == FrameKind::board) return std::make_unique<BoardSource>(std::move(port), false);
   return std::make_unique<ReaderSource>(OpenedPort{.port = std::move(port), .live = false}, sensor);
 }

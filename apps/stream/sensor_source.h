@@ -53,6 +53,8 @@ class SensorSource {
         array_(array),
         signal_scale_(signal_scale),
         silent_(std::move(silent)) {}
+  /// Of a frame of a port whose clock is `speedup` times as fast; what is not live arrives as it is taken.
+  double arrived_s(double port_s, double speedup) const;
 
  private:
   double period_s_, filter_s_;

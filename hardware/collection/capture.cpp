@@ -30,18 +30,25 @@ double CapturedPort::write(std::span<const std::byte> bytes, double until) {
   return time;
 }
 
-ReplayPort::ReplayPort(std::vector<JournalRecord> records, std::string name)
-    : records_(std::move(records)), name_(std::move(name)) {}
+ReplayPort::ReplayPort(std::vector<JournalRecord> records, std::string name, std::uint64_t lost_bytes)
+    : records_(std::move(records)), name_(std::move(name)), lost_bytes_(lost_bytes) {}
+
+void ReplayPort::diverged(const std::string& found, const std::string& done) const {
+  const std::string at = "replay " + name_ + ": record " + std::to_string(at_);
+  if (lost_bytes_ > 0)
+    throw JournalError(at + " does not follow on what stands before, for " + std::to_string(lost_bytes_) +
+                       " bytes of the journal are damaged; supertac-import --journal reads the rest of a "
+                       "collection's");
+  throw ReplayDiverged(at + " " + found + ", the driver now " + done +
+                       "; replay with the program and settings that recorded it");
+}
 
 const JournalRecord& ReplayPort::next(RecordKind expected) {
   if (at_ >= records_.size()) throw PortEnded("replay " + name_ + ": the end of the recording");
   const JournalRecord& record = records_[at_];
-  if (record.kind != expected) {
-    throw ReplayDiverged("replay " + name_ + ": record " + std::to_string(at_) + " is of kind " +
-                         std::to_string(static_cast<int>(record.kind)) + ", the driver now did " +
-                         std::to_string(static_cast<int>(expected)) +
-                         "; replay with the program and settings that recorded it");
-  }
+  if (record.kind != expected)
+    diverged("is of kind " + std::to_string(static_cast<int>(record.kind)),
+             "did " + std::to_string(static_cast<int>(expected)));
   return record;
 }
 
@@ -70,10 +77,8 @@ Received ReplayPort::read(std::span<std::byte> buffer, double) {
 
 double ReplayPort::write(std::span<const std::byte> bytes, double) {
   const JournalRecord& record = next(RecordKind::sent);
-  if (!std::equal(bytes.begin(), bytes.end(), record.bytes.begin(), record.bytes.end())) {
-    throw ReplayDiverged("replay " + name_ + ": record " + std::to_string(at_) + " sent " +
-                         in_quotes(record.text()) + ", the driver now sent something else");
-  }
+  if (!std::equal(bytes.begin(), bytes.end(), record.bytes.begin(), record.bytes.end()))
+    diverged("sent " + in_quotes(record.text()), "sent something else");
   ++at_;
   return record.time_s;
 }

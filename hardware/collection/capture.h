@@ -29,8 +29,8 @@ class CapturedPort : public Port {
 class ReplayPort : public Port {
  public:
   /// Throws PortEnded at the end of the records, ReplayDiverged when the driver does something else than
-  /// was recorded.
-  ReplayPort(std::vector<JournalRecord> records, std::string name);
+  /// was recorded, JournalError when it does because of the damage to the journal, `lost_bytes`.
+  ReplayPort(std::vector<JournalRecord> records, std::string name, std::uint64_t lost_bytes = 0);
   const std::string& name() const override { return name_; }
   double now() override;
   Received read(std::span<std::byte> buffer, double until) override;
@@ -38,8 +38,10 @@ class ReplayPort : public Port {
 
  private:
   const JournalRecord& next(RecordKind expected);
+  [[noreturn]] void diverged(const std::string& found, const std::string& done) const;
   std::vector<JournalRecord> records_;
   std::string name_;
+  std::uint64_t lost_bytes_;
   std::size_t at_ = 0;
   std::size_t taken_ = 0;  // bytes of records_[at_] already given
 };

@@ -2,6 +2,7 @@
 // simulated rig's head, and every frame carries its number.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "hardware/collection/collection.h"
@@ -233,6 +234,18 @@ TEST(CarriedSensor, ADamagedJournalCostsItsOwnFramesOnly) {
   EXPECT_GT(pass.time_s.size(), 700U);
   EXPECT_GT(pass.missing, 3U);
   EXPECT_LT(run.worst(pass), 0.05) << pass.doubt;
+}
+
+TEST(CarriedSensor, AReplayThatGoesWrongForDamageSaysSo) {
+  const std::vector<JournalRecord> records = {{RecordKind::clock, 1, {}}, {RecordKind::sent, 1, {}}};
+  std::array<std::byte, 8> buffer{};
+  ReplayPort whole(records, "whole"), damaged(records, "damaged", 5);
+  EXPECT_ERROR(whole.read(buffer, 2), ReplayDiverged, "replay with the program and settings that recorded");
+  const std::string says =
+      "5 bytes of the journal are damaged; supertac-import --journal reads the rest of a collection's";
+  EXPECT_ERROR(damaged.read(buffer, 2), JournalError, "damaged: record 0 does not follow");
+  EXPECT_EQ(damaged.now(), 1);
+  EXPECT_ERROR(damaged.write(buffer, 2), JournalError, says);
 }
 
 // Whatever its bytes say, sums put right: passes, or a JournalError.
