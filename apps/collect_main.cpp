@@ -215,8 +215,11 @@ RecorderReport collect(const Arguments& arguments, std::unique_ptr<Port> board, 
   confirm(arguments, settings);
   settings.stop = interrupted;
   Progress progress(arguments, "collecting", millimetres(plan, plan.passes, 0), "mm");
+  const std::vector<Leg> legs = legs_of(plan, settings.bed.origin);
+  const double speedup = arguments.number("speedup", 0.1, 100);
   settings.progress = [&](const Leg& leg, const Point3& at, const BoardCounters& counters) {
-    progress.update(millimetres_at(plan, leg, at), live_text(at, counters));
+    progress.update(millimetres_at(plan, leg, at), live_text(at, counters),
+                    seconds_left(legs, leg, at) / speedup);
     if (page) page->update(leg, at, counters);
   };
   try {

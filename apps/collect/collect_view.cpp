@@ -73,16 +73,6 @@ std::string CollectView::hello() const {
                  {"passes", passes}});
 }
 
-double CollectView::seconds_left(const State& state) const {
-  double seconds = distance(state.at, state.leg.to) / state.leg.speed;
-  bool later = false;
-  for (const Leg& leg : legs_) {
-    if (later) seconds += distance(leg.from, leg.to) / leg.speed;
-    later = later || (leg.pass == state.leg.pass && leg.phase == state.leg.phase);
-  }
-  return seconds / speedup_;
-}
-
 std::string CollectView::news() {
   std::optional<State> state;
   {
@@ -99,7 +89,7 @@ std::string CollectView::news() {
                  {"x", at.x - bed_.limits.plate.x},
                  {"y", at.y - bed_.limits.plate.y},
                  {"lifted", at.z > bed_.plan.start.z + 0.1},
-                 {"left_s", seconds_left(*state)},
+                 {"left_s", seconds_left(legs_, leg, at) / speedup_},
                  {"done", (bed_.plan.slide * (leg.pass - 1) + slid) / (bed_.plan.slide * bed_.plan.passes)},
                  {"frames", board.decoder.frames},
                  {"rate", board.clock.period_s > 0 ? 1 / board.clock.period_s : 0},

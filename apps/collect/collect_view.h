@@ -35,7 +35,6 @@ class CollectView {
   WebSite site();
   std::string hello() const;
   std::string news();
-  double seconds_left(const State& state) const;
 
   const Plate plate_;
   Bed bed_;

@@ -36,6 +36,20 @@ bool reachable(const Leg& leg, const PositionSample& from, const PositionSample&
 
 double ordered_s(const Leg& leg) { return distance(leg.from, leg.to) / leg.speed; }
 
+double seconds_left(const std::vector<Leg>& legs, const Leg& now, const Point3& at) {
+  const auto here = std::ranges::find_if(legs, [&](const Leg& leg) {
+    return leg.pass == now.pass && leg.phase == now.phase && leg.to == now.to;
+  });
+  // Moves that are none of the plan's are made before the first contact, or behind the last.
+  const auto onset = [](const Leg& leg) { return leg.phase == Phase::onset; };
+  auto next = here != legs.end()             ? here + 1
+              : now.phase == Phase::approach ? std::ranges::find_if(legs, onset)
+                                             : legs.end();
+  double seconds = distance(at, now.to) / now.speed;
+  for (; next != legs.end(); ++next) seconds += ordered_s(*next);
+  return seconds;
+}
+
 std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
   const auto usable = [](double value) { return value > 0 && std::isfinite(value); };
   if (plan.passes < 1 || plan.passes > 1000 || !usable(plan.slide) || !usable(plan.lift) ||

@@ -42,6 +42,8 @@ struct Leg {
 
 /// The leg's length over its speed (s).
 double ordered_s(const Leg& leg);
+/// The same for all that is left of a plan's legs, with the head at `at` in the leg `now`.
+double seconds_left(const std::vector<Leg>& legs, const Leg& now, const Point3& at);
 
 /// Whether the head can have come from the one sample to the other at the leg's speed; how long the answers
 /// took and their rounding allowed for, and 5 % for the printer's clock.

@@ -57,16 +57,17 @@ Progress::~Progress() {
   if (width_ > 0) draw("");
 }
 
-void Progress::update(std::uint64_t done, const std::string& detail) {
+void Progress::update(std::uint64_t done, const std::string& detail, double seconds_left) {
   using namespace std::chrono_literals;
   const auto now = std::chrono::steady_clock::now();
-  if (now - begin_ < 2s || now - last_ < 200ms || done <= before_) return;
+  if (now - begin_ < 2s || now - last_ < 200ms || (done <= before_ && seconds_left <= 0)) return;
   last_ = now;
   const double seconds = std::chrono::duration<double>(now - begin_).count();
-  const double rate = static_cast<double>(done - before_) / seconds;
+  const double rate = seconds_left > 0 ? static_cast<double>(total_ - done) / seconds_left
+                                       : static_cast<double>(done - before_) / seconds;
   if (!said_ && now - begin_ >= 3s) {
     const double part = static_cast<double>(total_ - before_) / rate;
-    said_ = say_how_long(whole_ * part - seconds);
+    said_ = say_how_long(seconds_left > 0 ? seconds_left : whole_ * part - seconds);
   }
   if (drawable_)
     draw(progress_line(what_, done, total_, unit_, rate, detail).substr(0, terminal_width() - 1));

@@ -27,9 +27,9 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `done` of `total` so far; `detail` is shown in place of the rate. Cheap: draws at most five times a
-  /// second, cut to the terminal's width.
-  void update(std::uint64_t done, const std::string& detail = "");
+  /// `done` of `total` so far; `detail` is shown in place of the rate. `seconds_left`: where the caller knows
+  /// better than by the rate. Cheap: draws at most five times a second, cut to the terminal's width.
+  void update(std::uint64_t done, const std::string& detail = "", double seconds_left = 0);
 
  private:
   bool say_how_long(double seconds_left);
