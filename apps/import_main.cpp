@@ -97,7 +97,7 @@ int recover(const Arguments& arguments) {
                     "holds no frame of a pass: it was cut off before the first contact");
   folder.keep();
   arguments.write_json(report.json);
-  arguments.print(report.total() + " recovered" + (report.complete ? "" : "; the collection was cut off"));
+  arguments.print(report.total(" recovered") + (report.complete ? "" : "; the collection was cut off"));
   return kExitOk;
 }
 

@@ -126,11 +126,11 @@ std::string journal_path(const std::string& folder, const std::string& plate, in
   return folder + "/" + plate + "_t" + std::to_string(trial) + "_v" + format(speed) + ".journal";
 }
 
-std::string PassesReport::total() const {
-  return std::to_string(frames) + " frames" +
+std::string PassesReport::total(const std::string& became) const {
+  return std::to_string(frames) + " frames" + became +
          (left_out > 0 ? ", " + std::to_string(left_out) + " left out, their time being uncertain" : "") +
          (doubtful > 0 ? ", " + std::to_string(doubtful) + " passes with doubtful positions" : "") +
-         (damage.empty() ? "" : ", " + damage);
+         (damage.empty() ? "" : "; " + damage);
 }
 
 PassesReport write_passes(const Arguments& arguments, const std::string& journal, const std::string& out,

@@ -22,8 +22,9 @@ struct PassesReport {
   bool complete = false;     ///< the run ended as planned
   std::string damage = {};   ///< of the journal, in words; empty: none
   nlohmann::ordered_json json = {};
-  /// ", N frames" and what is to be said of doubtful passes: the end of the last line.
-  std::string total() const;
+  /// "N frames" and what `became` of them, with what is to be said of doubtful passes and damage: the end of
+  /// the last line.
+  std::string total(const std::string& became = {}) const;
 };
 
 /// Turns a journal into one recording per pass in `folder`, with a line of quality each, and the plate's STL

@@ -147,8 +147,9 @@ double FrameReader::read(Port& port, bool live, const Sink& sink) {
   std::array<std::byte, kReadBytes> buffer;
   Received got = port.read(buffer, port.now() + kReadSlice);
   const auto bytes = std::span(buffer).first(got.count);
-  if (decoder_->counters().frames == 0 && beginning_.size() < kShown)
-    for (const std::byte byte : bytes) beginning_ += std::to_integer<char>(byte);
+  const std::uint64_t before = decoder_->counters().frames;
+  if (without_frame_.size() < kShown)
+    for (const std::byte byte : bytes) without_frame_ += std::to_integer<char>(byte);
   times_read_s_.clear(), values_read_.clear();
   const auto keep = [&](const DecodedFrame& frame) {
     times_read_s_.push_back(frame.time_s);
@@ -169,6 +170,7 @@ double FrameReader::read(Port& port, bool live, const Sink& sink) {
     end = std::current_exception();
   }
   last_read_s_ = got.time_s;
+  if (decoder_->counters().frames != before) without_frame_.clear();
   const std::size_t count = times_read_s_.size(), size = sensor_.values();
   for (std::size_t n = 0; n < count; ++n)
     take({std::span(values_read_).subspan(n * size, size), times_read_s_[n]}, got.time_s, count - 1 - n,
@@ -263,17 +265,20 @@ double SensorReader::silence_s(const Sensor& sensor) {
 
 void SensorReader::check_silence(double time_s) {
   const SensorDecoder::Counters counted = frames_.counters().decoder;
-  if (std::exchange(decoded_, counted.frames) != counted.frames) last_frame_s_ = time_s;
+  if (counted.frames != decoded_.frames) last_frame_s_ = time_s, decoded_ = counted;
   if (!live_ || time_s - last_frame_s_ < silence_s(sensor_)) return;
-  const std::string at = "sensor " + sensor_.name + " at " + port_->name() + ": ";
-  if (counted.frames == 0 && counted.bytes > 0)
-    throw WrongDevice(at + "expected frames of " + std::to_string(sensor_.values()) + " values, found " +
-                      std::to_string(counted.bytes) + " bytes without one, such as '" +
-                      printable(frames_.beginning(), kShown) +
-                      "'; supertac-stream --probe says what they are");
-  throw BoardSilent(at + "expected " + format(sensor_.rate_hz, 0) + " frames/s, found none for " +
-                    format(silence_s(sensor_), 1) +
-                    " s; see whether it is switched on and sends to this port");
+  const std::string at = "sensor " + sensor_.name + " at " + port_->name() + ": expected ";
+  const std::uint64_t bytes = counted.bytes - decoded_.bytes;
+  const std::string such = ", such as '" + printable(frames_.without_frame(), kShown) + "'; ";
+  if (counted.frames == 0 && bytes > 0)
+    throw WrongDevice(at + "frames of " + std::to_string(sensor_.values()) + " values, found " +
+                      std::to_string(bytes) + " bytes without one" + such +
+                      "supertac-stream --probe says what they are");
+  throw BoardSilent(
+      at + format(sensor_.rate_hz, 0) + " frames/s, found none for " + format(silence_s(sensor_), 1) + " s" +
+      (bytes > 0 ? " in " + std::to_string(bytes) + " bytes" + such + "see whether it was switched off or " +
+                       "now sends something else (supertac-stream --probe)"
+                 : "; see whether it is switched on and sends to this port"));
 }
 
 // Right after the start: a clock in another unit than the file says is a thousand times too fast or too slow.

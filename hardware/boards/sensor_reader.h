@@ -82,8 +82,8 @@ class FrameReader {
   void finish(double time_s, const Sink& sink);
   ReaderCounters counters() const;
   double doubt_s() const { return dates_.doubt_s(); }
-  /// The first bytes of what came before the first frame.
-  const std::string& beginning() const { return beginning_; }
+  /// The first bytes of what came behind the newest frame.
+  const std::string& without_frame() const { return without_frame_; }
 
  private:
   void take(const DecodedFrame& decoded, double arrival_s, std::size_t behind, const Sink& sink);
@@ -96,7 +96,7 @@ class FrameReader {
   std::vector<std::optional<double>> times_read_s_;  // of frames that came at once, and their values
   std::vector<float> values_read_;
   double last_read_s_ = 0;
-  std::string beginning_;
+  std::string without_frame_;
   std::uint64_t damaged_ = 0, late_ = 0;
 };
 
@@ -139,7 +139,7 @@ class SensorReader {
   FrameReader frames_;
   FrameReader::Sink sink_ = [this](const ReadFrame& frame) { take(frame); };
   double last_frame_s_;
-  std::uint64_t decoded_ = 0;
+  SensorDecoder::Counters decoded_;  // when the newest frame came
   double first_time_s_ = 0, first_arrival_s_ = 0, checked_time_s_ = 0, longest_step_s_ = 0;
   std::uint64_t checked_frames_ = 0;
   bool clock_checked_ = false;

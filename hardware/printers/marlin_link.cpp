@@ -21,6 +21,13 @@ constexpr std::size_t kKeptLines = 64;  // of the newest lines, for Resend
 constexpr std::int64_t kPlausibleLag = 4;
 constexpr std::int64_t kFarAhead = 1000;  // no firmware takes such a number for a repetition
 
+// Numbers, or an object of JSON: what Marlin says begins with a word, or is but one.
+bool is_of_a_sensor(std::string_view line) {
+  return line.starts_with('{') ||
+         (line.find_first_of("0123456789") != std::string_view::npos &&
+          line.find_first_not_of("0123456789+-.eE,;:[]{} \t") == std::string_view::npos);
+}
+
 }  // namespace
 
 struct MarlinLink::Exchange {
@@ -89,12 +96,13 @@ void MarlinLink::refuse_grbl(const std::string& line) const {
                     "), which has no line numbers and no M400; use a printer with one of the two");
 }
 
-void MarlinLink::refuse_board() const {
+void MarlinLink::refuse_sensor() const {
   constexpr std::size_t kFewFrames = 3 * rig::kFrameBytes;
-  if (lines_.bytes() <= kFewFrames || 3 * lines_.no_text() <= lines_.bytes()) return;
-  throw WrongDevice("port " + lines_.name() +
-                    ": expected a Marlin printer, found no text, as from a tactile board; exchange the two "
-                    "ports");
+  const bool no_text = 3 * lines_.no_text() > lines_.bytes(), numbers = 2 * numbers_ > heard_;
+  if (lines_.bytes() <= kFewFrames || !(no_text || numbers)) return;
+  throw WrongDevice("port " + lines_.name() + ": expected a Marlin printer, found " +
+                    (no_text ? "no text, as from a tactile board" : "numbers, as from a sensor") +
+                    (numbers ? " (" + in_quotes(complaint_) + ")" : "") + "; exchange the two ports");
 }
 
 bool MarlinLink::probe(double until) {
@@ -105,11 +113,12 @@ bool MarlinLink::probe(double until) {
     if (reply.kind == ReplyKind::fatal) check_alarm(reply);
     refuse_grbl(line);
     if (reply.kind == ReplyKind::other || reply.kind == ReplyKind::error) complaint_ = line;
+    ++heard_, numbers_ += is_of_a_sensor(line) ? 1 : 0;
     if (reply.kind != ReplyKind::ok) continue;
     settle();
     return true;
   }
-  refuse_board();
+  refuse_sensor();
   return false;
 }
 

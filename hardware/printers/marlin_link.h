@@ -83,7 +83,7 @@ class MarlinLink {
   bool probe(double until);
   [[noreturn]] void nobody_answered() const;
   void refuse_grbl(const std::string& line) const;
-  void refuse_board() const;
+  void refuse_sensor() const;
   void switch_reports_off();
   void read_capabilities();
   /// Sends the exchange's current line again.
@@ -107,6 +107,7 @@ class MarlinLink {
   std::string complaint_;         // the last echo:, // or !! since an ok; a halt's reason stands before it
   std::deque<std::string> kept_;  // lines number_ - kept_.size() + 1 ... number_
   std::int64_t number_ = 0;       // of the newest line
+  std::size_t heard_ = 0, numbers_ = 0;  // lines until it answered; of these, such as a sensor sends
   double give_up_s_ = std::numeric_limits<double>::infinity();
   bool connected_ = false;
   bool halted_ = false;

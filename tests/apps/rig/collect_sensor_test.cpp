@@ -204,6 +204,13 @@ TEST_F(CollectSensor, AfterAKillTheJournalAloneIsEnough) {
       run_process("supertac-import", {"--journal", journal(), "--out", run_.disk() + "/again"});
   EXPECT_EQ(recovered.code, 0) << recovered.error;
   EXPECT_NE(recovered.out.find("cut off"), std::string::npos) << recovered.out;
+  std::string bytes = read_text_file(journal(), 1 << 30);
+  bytes[bytes.size() / 2] ^= 1;
+  write_file(journal(), bytes);
+  const ProcessResult damaged =
+      run_process("supertac-import", {"--journal", journal(), "--out", run_.disk() + "/damaged"});
+  EXPECT_NE(damaged.out.find(" frames recovered"), std::string::npos) << damaged.out;
+  EXPECT_NE(damaged.out.find("s, are missing; the collection was cut off"), std::string::npos) << damaged.out;
   const Recording recording = read_recording(run_.disk() + "/again/ridges6_t1_p1_v20.safetensors");
   EXPECT_EQ(recording.array, sensor_.array);
   EXPECT_GT(recording.frames(), 150U);

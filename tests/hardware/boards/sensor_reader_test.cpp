@@ -374,26 +374,25 @@ TEST(SensorReader, ASourceThatWasToGoOnMayNotEnd) {
   EXPECT_THROW(reader.next(0), PortUnplugged);
 }
 
-TEST(SensorReader, AnotherDeviceIsSaidWithWhatItSends) {
+TEST(SensorReader, WhatComesWithoutAFrameIsSaid) {
   int master = -1, slave = -1;
   char name[100];
   ASSERT_EQ(openpty(&master, &slave, name, nullptr, nullptr), 0);
   const Sensor sensor = mat(2, 2, 1000, R"({"kind":"text"})");
-  SensorReader reader(open_port("serial:" + std::string(name) + "@115200"), sensor);
-  const std::string line = "echo:busy: processing\n";
-  ASSERT_EQ(write(master, line.data(), line.size()), static_cast<ssize_t>(line.size()));
-  try {
-    all_of(reader);
-    ADD_FAILURE() << "nothing was said";
-  } catch (const WrongDevice& error) {
-    EXPECT_EQ(
-        std::string(error.what()),
-        "sensor sensor at " + std::string(name) +
-            ": expected frames of 4 values, found 22 bytes without one, such as 'echo:busy: processing?'; "
-            "supertac-stream --probe says what they are");
-  }
-  close(slave);
-  close(master);
+  const auto send = [master](const std::string& line) { return write(master, line.data(), line.size()) > 0; };
+  const std::string at = "serial:" + std::string(name) + "@115200";
+  auto reader = std::make_unique<SensorReader>(open_port(at), sensor);
+  ASSERT_TRUE(send("echo:busy: processing\n"));
+  EXPECT_ERROR(all_of(*reader), WrongDevice,
+               "sensor sensor at " + std::string(name) +
+                   ": expected frames of 4 values, found 22 bytes without one, such as 'echo:busy: "
+                   "processing?'; supertac-stream --probe says what they are");
+  reader.reset();  // the port is one reader's
+  reader = std::make_unique<SensorReader>(open_port(at), sensor);
+  ASSERT_TRUE(send("1,2,3,4\n") && reader->next(10) && send("1,2,1,2,1,2"));
+  EXPECT_ERROR(all_of(*reader), BoardSilent,
+               "found none for 3.0 s in 11 bytes, such as '1,2,1,2,1,2'; see whether it was switched off or");
+  for (const int end : {slave, master}) close(end);
 }
 
 }  // namespace

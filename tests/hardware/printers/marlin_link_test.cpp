@@ -273,6 +273,20 @@ TEST(MarlinLink, AnswersWithoutProgressEnd) {
   EXPECT_LT(stranger.now(), 25);
 }
 
+TEST(MarlinLink, ASensorAtThePrintersPortIsRecognised) {
+  const std::string wide = std::string(9000, '7') + '\n';  // longer than a line of Marlin's may be
+  for (const std::string& line : {std::string("812,-70,4.5e2, 99\r\n"), std::string("[[1,2],[3,4]]\n"),
+                                  std::string("{\"t\":12,\"taxels\":[1,2]}\n"), wide}) {
+    ScriptedPrinter sensor([](const std::string&) { return ""; }, line);
+    MarlinLink link(sensor);
+    EXPECT_ERROR(link.connect(), WrongDevice, "found numbers, as from a sensor ('");
+    EXPECT_LT(sensor.now(), 6) << line;
+  }
+  ScriptedPrinter printer(connects, "T:25.0 /0.0 @:0\n12\n");
+  MarlinLink link(printer);
+  EXPECT_ERROR(link.connect(), PrinterSilent, "within 60 s") << "half of its lines are words";
+}
+
 TEST(MarlinLink, ARunHasABoundOfItsOwn) {
   ScriptedPrinter port(connects, "echo:busy: processing\n");
   MarlinLink link(port);
