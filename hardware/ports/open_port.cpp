@@ -16,6 +16,7 @@
 #include "hardware/ports/host_addresses.h"
 #include "hardware/ports/port_list.h"
 #include "hardware/ports/serial_port.h"
+#include "hardware/ports/serial_termios.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
@@ -90,7 +91,7 @@ class DescriptorPort : public Port {
 OpenedPort open_serial(const std::string& address, const std::string& rest, double speedup) {
   const std::size_t at = rest.rfind('@');
   const auto baud = at == std::string::npos ? std::nullopt : parse_uint(rest.substr(at + 1));
-  if (!baud || *baud < 50 || *baud > 100'000'000 || at == 0)
+  if (!baud || *baud < kLeastBaud || *baud > kMostBaud || at == 0)
     fail(address, "expected serial:DEVICE@BAUD, such as serial:/dev/ttyACM0@115200");
   const SerialSettings settings{.baud = static_cast<unsigned>(*baud), .speedup = speedup};
   return {std::make_unique<SerialPort>(resolve_board_port(rest.substr(0, at)), settings)};

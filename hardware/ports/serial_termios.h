@@ -4,6 +4,8 @@
 
 namespace supertac {
 
+constexpr unsigned kLeastBaud = 50, kMostBaud = 100'000'000;
+
 /// Eight bits, no parity, no flow control, no translation, `baud` in both directions.
 /// Returns 0 or the errno of the call that failed.
 int set_raw_terminal(int descriptor, unsigned baud);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "hardware/ports/serial_termios.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
 
@@ -12,7 +13,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kFarthest = 1e4;  // mm
 constexpr const char* kPoint = "three numbers of mm within 10000, [x, y, z] of the printer";
-constexpr int kMostPasses = 1000, kLeastBaud = 300, kMostBaud = 1'000'000;
+constexpr int kMostPasses = 1000;
 
 template <class Number>
 Number within(JsonObject& keys, const char* name, double low, double high, Number value) {
@@ -22,13 +23,23 @@ Number within(JsonObject& keys, const char* name, double low, double high, Numbe
 
 /// `fallback` nullptr: it has to be there.
 Point3 take_point(JsonObject& keys, const char* name, const Point3* fallback) {
+  const bool given = keys.find(name) != nullptr;
+  if (!given && fallback != nullptr) return *fallback;
+  if (!given) throw FileError(keys.where(), "has no \"" + std::string(name) + "\": expected " + kPoint);
   const std::vector<double> numbers = keys.numbers(name);
-  if (numbers.empty() && fallback != nullptr) return *fallback;
-  if (numbers.empty())
-    throw FileError(keys.where(), "has no \"" + std::string(name) + "\": expected " + kPoint);
   const auto within = [](double v) { return v >= -kFarthest && v <= kFarthest; };
   if (numbers.size() != 3 || !std::ranges::all_of(numbers, within)) keys.wrong(name, kPoint, Json(numbers));
   return {numbers[0], numbers[1], numbers[2]};
+}
+
+unsigned take_baud(JsonObject& keys, unsigned fallback) {
+  const Json* baud = keys.find("baud");
+  if (baud == nullptr) return fallback;
+  if (!baud->is_number_integer() || *baud < kLeastBaud || *baud > kMostBaud)
+    keys.wrong("baud",
+               "a whole number from " + std::to_string(kLeastBaud) + " to " + std::to_string(kMostBaud),
+               *baud);
+  return baud->get<unsigned>();
 }
 
 Json json_of(const Point3& p) { return {p.x, p.y, p.z}; }
@@ -53,8 +64,7 @@ Bed bed_of_json(const std::string& text, const std::string& where) {
     plan.slide = within(keys, "slide_mm", 1, rig::kPlateLengthMm, keys.number("slide_mm", plan.slide));
     plan.lift = within(keys, "lift_mm", 1, 100, keys.number("lift_mm", plan.lift));
     plan.speed = within(keys, "speed_mm_s", 0.5, rig::kFastestMmS, keys.number("speed_mm_s", plan.speed));
-    bed.baud = static_cast<unsigned>(
-        within(keys, "baud", kLeastBaud, kMostBaud, keys.integer("baud", static_cast<int>(bed.baud))));
+    bed.baud = take_baud(keys, bed.baud);
     keys.no_others();
   } catch (const JsonError& error) {
     throw FileError(where, error.what());
