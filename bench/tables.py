@@ -138,7 +138,8 @@ def other_sensors():
         of = chosen(found, set=name, method=method)
         optional = lambda text, column: text(of, column) if of[0][column] else ""
         figures = lambda digits: lambda of, column: f"{mean(of, column):.{digits}f}"
-        return [name, method, spans(of, "ssim", 3), spans(of, "psnr_db", 1), optional(figures(3), "contact_ssim"),
+        contact = figures(3)(of, "contact_ssim")
+        return [name, method, spans(of, "ssim", 3), figures(1)(of, "psnr_db"), contact if contact != figures(3)(of, "ssim") else "",
                 optional(figures(3), "peak_ssim"), optional(figures(1), "peak_psnr_db"), optional(percent, "coverage")]
 
     sets, methods = (dict.fromkeys(r[column] for r in found) for column in ("set", "method"))
