@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <sstream>
 
 #include "autograd/record.h"
@@ -45,14 +46,14 @@ Variable weighted(const Variable& y) {
 double derivative(const Function& f, Variable& leaf, Dim index, double step) {
   real& x = leaf.mutable_value().data()[index];
   const real original = x;
+  const auto put_back = [original](real* to) { *to = original; };  // also when f throws
+  const std::unique_ptr<real, decltype(put_back)> guard(&x, put_back);
   const double h = step * std::max(1.0, std::abs(static_cast<double>(original)));
   const auto at = [&](double offset) {
     x = static_cast<real>(static_cast<double>(original) + offset);
     return weighted_sum(f);
   };
-  const double slope = (8 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12 * h);
-  x = original;
-  return slope;
+  return (8 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12 * h);
 }
 
 bool far(double a, double b) { return std::abs(a - b) > 1e-7 * std::max(std::abs(a), std::abs(b)); }

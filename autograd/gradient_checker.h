@@ -21,6 +21,7 @@ struct GradientEntry {
   std::string place;
 };
 
+/// Of empty inputs nothing is compared: entries and max_relative_error are 0.
 struct GradientReport {
   std::vector<GradientEntry> worst;  // the largest errors first, at most ten
   double max_relative_error = 0;

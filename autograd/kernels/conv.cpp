@@ -84,6 +84,7 @@ void conv_grad_w(const ConvSizes& s, const real* x, const real* gy, Into into, r
   for_each_product(s, [&](Dim a, Dim b, Dim c) { gw[b] = std::fma(x[a], gy[c], gw[b]); });
 }
 
+// gb[o] = or += sum over rows of gy[row,o]
 void bias_grad(Dim rows, Dim cout, const real* gy, Into into, real* gb) {
   constexpr Dim kAtOnce = 16;  // sums that stay in registers
   if (into == Into::overwrite) std::fill_n(gb, cout, real(0));

@@ -81,6 +81,8 @@ class SsimImage {
   }
 
  private:
+  // 0 to 6: images and moments (below); 7 to 9: what add_gradient() makes, 8 the product in blur_product();
+  // 10: a blur along one axis.
   static constexpr Dim kMaps = 11;
   real* map(Dim i) { return store_.data() + i * h_ * wd_; }
 

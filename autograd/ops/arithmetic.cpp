@@ -36,7 +36,10 @@ Variable operator*(real factor, const Variable& x) {
       [factor](real gy, real, real) { return factor * gy; }, {.factor = factor});
 }
 
-Variable operator-(const Variable& a, const Variable& b) { return a + -1 * b; }
+Variable operator-(const Variable& a, const Variable& b) {
+  check_same_shape("subtract", "a", a, "b", b);
+  return a + -1 * b;
+}
 Variable operator-(real number, const Variable& x) {
   return Variable(Tensor::full(x.shape(), number)) + -1 * x;
 }

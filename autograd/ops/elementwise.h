@@ -33,14 +33,14 @@ void put_to_gradient(Backward& g, std::size_t input, Term term) {
 }
 
 /// y[i] = value(x[i]);   gx[i] += gradient(gy[i], x[i], y[i])
-/// Both are copied into the node. They call nothing that the C library rounds (kernels/exp.h), and capture
-/// numbers alone: a captured tensor would be kept for as long as the graph.
+/// `gradient` is copied into the node. Both call nothing that the C library rounds (kernels/exp.h), and
+/// capture numbers alone: a captured tensor would be kept for as long as the graph.
 template <class Value, class Gradient>
 Variable elementwise(const char* op, const Variable& x, Value value, Gradient gradient,
                      const OpSettings& settings = {}) {
   Tensor y(x.shape());
   each(y.size(), [=, from = x.value().data(), to = y.data()](Dim i) { to[i] = value(from[i]); });
-  const auto reverse = [=](Backward& g) {
+  const auto reverse = [gradient](Backward& g) {
     const real *gy = g.gy().data(), *from = g.value(0).data(), *to = g.y().data();
     add_to_gradient(g, 0, [=](Dim i) { return gradient(gy[i], from[i], to[i]); });
   };

@@ -15,7 +15,7 @@ namespace supertac {
 Variable l2_loss(const Variable& x, const Variable& target) {
   check_same_shape("l2_loss", "x", x, "target", target);
   const Dim n = x.size();
-  if (n == 0) refuse("l2_loss", "x is empty: " + x.shape().text());
+  if (n == 0) refuse("l2_loss", "x expects an element or more, got " + x.shape().text());
   const double total = kernels::sum_of(n, [from = x.value().data(), to = target.value().data()](Dim i) {
     const double d = static_cast<double>(from[i]) - static_cast<double>(to[i]);
     return d * d;
@@ -68,7 +68,8 @@ static double cross_entropy(Dim classes, const real* logits, Dim label, real* re
 Variable softmax_cross_entropy(const Variable& logits, std::span<const std::int32_t> labels) {
   check_rank("softmax_cross_entropy", "logits", logits, 2);
   const Dim rows = logits.dim(0), classes = logits.dim(1);
-  if (rows == 0) refuse("softmax_cross_entropy", "logits is empty: " + logits.shape().text());
+  if (rows == 0)
+    refuse("softmax_cross_entropy", "logits expects a row or more, got " + logits.shape().text());
   if (static_cast<Dim>(labels.size()) != rows) {
     refuse("softmax_cross_entropy",
            "labels expects " + std::to_string(rows) + " entries, got " + std::to_string(labels.size()));

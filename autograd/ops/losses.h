@@ -16,10 +16,12 @@ Variable l2_loss(const Variable& x, const Variable& target);
 /// .03, Gaussian 11x11 window of sigma 1.5; for images below 11 pixels a uniform one of 7x7, or of the
 /// largest odd side that fits; valid window positions only; averaged over positions and images. Any values
 /// are taken. The range is always L = 1, that of images in [0,1]: truths whose troughs reach to -1 are
-/// compared with the same C1 = (K1 L)^2 and C2 = (K2 L)^2 as all others. The gradient flows into x only.
+/// compared with the same C1 = (K1 L)^2 and C2 = (K2 L)^2 as all others. The gradient flows into x only;
+/// the graph keeps `target` itself, which may not be written to before backward().
 Variable ssim(const Variable& x, const Tensor& target);
 
-/// -1/N sum over n of log softmax(logits[n])[labels[n]].  logits [N,K], labels in [0,K).
+/// -1/N sum over n of log softmax(logits[n])[labels[n]].  logits [N,K], labels in [0,K), read at
+/// once.
 Variable softmax_cross_entropy(const Variable& logits, std::span<const std::int32_t> labels);
 
 }  // namespace supertac

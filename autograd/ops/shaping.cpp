@@ -129,6 +129,9 @@ Variable take_runs(const Variable& x, const Runs& r) {
 // windows [N,T,rows * columns * channels] -> y [N,rows,columns,channels], the last of T
 Variable last_frame(const Variable& x, Dim rows, Dim columns, Dim channels) {
   check_rank("last_frame", "windows", x, 3);
+  if (std::min({rows, columns, channels}) < 1)
+    refuse("last_frame", "rows, columns and channels must be at least 1, got " + std::to_string(rows) + ", " +
+                             std::to_string(columns) + " and " + std::to_string(channels));
   const Dim images = x.dim(0), frames = x.dim(1), signals = rows * columns * channels;
   check_shape("last_frame", "windows", x, {images, std::max<Dim>(frames, 1), signals});
   if (x.requires_grad()) refuse("last_frame", "windows want a gradient, which this op does not have");
@@ -152,8 +155,11 @@ Variable unflatten_channels_first(const Variable& x, std::span<const Dim> pixels
   if (pixels.empty() || pixels.size() > 2)
     refuse("unflatten_channels_first",
            "pixels must be {L} or {H,W}, got " + std::to_string(pixels.size()) + " sizes");
+  for (const Dim side : pixels)
+    if (side < 1)
+      refuse("unflatten_channels_first", "pixels must be at least 1 a side, got " + std::to_string(side));
   const Dim count = pixels.size() == 1 ? pixels[0] : pixels[0] * pixels[1];
-  if (count < 1 || x.dim(1) % count != 0) {
+  if (x.dim(1) % count != 0) {
     refuse("unflatten_channels_first",
            "x " + x.shape().text() + " does not divide into " + std::to_string(count) + " pixels");
   }

@@ -35,7 +35,7 @@ Variable kl_divergence(const Variable& mean, const Variable& log_var) {
   check_rank("kl_divergence", "mean", mean, 2);
   check_same_shape("kl_divergence", "mean", mean, "log_var", log_var);
   const Dim rows = mean.dim(0);
-  if (rows == 0) refuse("kl_divergence", "mean is empty: " + mean.shape().text());
+  if (rows == 0) refuse("kl_divergence", "mean expects a row or more, got " + mean.shape().text());
   const double total =
       kernels::sum_of(mean.size(), [m = mean.value().data(), v = log_var.value().data()](Dim i) {
         return 1 + v[i] - m[i] * m[i] - exp_same_bits(v[i]);

@@ -217,7 +217,7 @@ void look_at_signals(Sensor& draft, const HeardFrames& frames, const std::option
   } else {
     draft.scale.rest = rest, draft.scale.span = rises ? -most : most;
   }
-  if (known || (pressed && uneven > kUneven * most)) {
+  if (pressed ? uneven > kUneven * most : known.has_value()) {
     draft.rest.assign(rests.begin(), rests.end());
     says.push_back("signals rest up to " + format(uneven, 3) +
                    " apart: \"rest\" moves each to the median; probe again when they have drifted");

@@ -81,7 +81,8 @@ std::string name_of(Precision precision);
 Prepared prepared(const ModelFile& file, Precision precision);
 Ensemble ensemble_of(std::span<const ModelFile> files, Precision precision = Precision::fp32);
 
-/// Writes parameters and metadata. Throws FileError.
+/// Parameters and metadata, without ranges and novelty; trainings write by save_trained()
+/// (models/training/train.h). Throws FileError.
 void save_model(const std::string& path, const SuperTac& model, const InputSettings& input,
                 std::map<std::string, std::string> metadata);
 

@@ -64,6 +64,7 @@ Trainer::MicroBatch::MicroBatch(const Objective& master, Dim first_sample, Dim c
   share_values(master.network().parameters(), objective.network().parameters());
 }
 
+// The windows and truths of this step, each augmented and mirrored by the number of its sample.
 void Trainer::fill(MicroBatch& micro_batch) const {
   const auto per_epoch = static_cast<std::uint64_t>(steps_per_epoch());
   const std::uint64_t epoch = static_cast<std::uint64_t>(step()) / per_epoch;

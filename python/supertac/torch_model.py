@@ -115,14 +115,15 @@ class SuperTac(nn.Module):
         return Pictures(*self.upsample(latents, x), latents)
 
     def training_outputs(self, x, eps=None):
-        """What a training step looks at: lists over the groups, and the picture. eps [groups,N,latent]; None: z = mean."""
+        """What a training step looks at: lists over the groups, picture and predicted error (or None). eps [groups,N,latent]; None: z = mean."""
         out = {"mean": [], "log_var": [], "decoded": [], "input": [x[:, :, group] for group in self.groups]}
         latents = []
         for i, (mean, log_var) in enumerate(self.distributions(x)):
             latents.append(mean if eps is None else mean + torch.exp(log_var / 2) * eps[i])
             for key, value in (("mean", mean), ("log_var", log_var), ("decoded", self.decode(latents[i], i))):
                 out[key].append(value)
-        return out | {"picture": self.upsample(torch.cat(latents, 1) if latents else None, x)[0]}
+        picture, error = self.upsample(torch.cat(latents, 1) if latents else None, x)
+        return out | {"picture": picture, "predicted_error": error}
 
 
 def ssim(x, y):
@@ -149,12 +150,14 @@ def kl_divergence(mean, log_var):
 
 
 def loss_terms(out, truth, a=0.2, beta=1e-3, weight_ssim=0.1):
-    """Of training_outputs(): docs/network.md has the formula; here without the term of the predicted error. Without VAEs
-    the picture's part is all."""
+    """Of training_outputs(): docs/network.md has the formula. Without VAEs the picture's part is all."""
     terms = {"reconstruction": sum(F.mse_loss(d, x) for d, x in zip(out["decoded"], out["input"])),
              "kld": sum(kl_divergence(m, v) for m, v in zip(out["mean"], out["log_var"])),
              "l2": F.mse_loss(out["picture"], truth), "ssim": ssim(out["picture"], truth)}
     picture = terms["l2"] + weight_ssim * (1 - terms["ssim"])
+    if out["predicted_error"] is not None:  # it learns the error; the picture does not learn to be predictably wrong
+        terms["predicted_error"] = F.mse_loss(out["predicted_error"], (out["picture"] - truth).abs().detach())
+        picture = picture + 0.1 * terms["predicted_error"]
     if not out["decoded"]:
         return terms | {"total": picture}
     return terms | {"total": a * (terms["reconstruction"] + beta * terms["kld"]) + (1 - a) * picture}

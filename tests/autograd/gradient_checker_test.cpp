@@ -91,6 +91,22 @@ TEST(GradientChecker, FailsWhenNoGradientArrives) {
   EXPECT_GT(check_gradients(cut, {test::numbers({2}), test::numbers({2})}).max_relative_error, 0.1);
 }
 
+TEST(GradientChecker, PutsALeafBackWhenTheFunctionThrows) {
+  const Variable x(test::numbers({3}), true);
+  const Tensor before = x.value().clone();
+  int calls = 0;
+  EXPECT_EQ(what_of<std::runtime_error>([&] {
+              check_gradients(
+                  [&] {
+                    if (++calls == 3) throw std::runtime_error("of f");
+                    return x * x;
+                  },
+                  {x});
+            }),
+            "of f");
+  EXPECT_TRUE(test::same_bytes(x.value(), before));
+}
+
 TEST(GradientChecker, LeavesTheCallersTensorsAlone) {
   const Tensor x = test::numbers({5}), copy = x.clone();
   check_gradients([](const auto& in) { return in[0] * in[0]; }, {x});

@@ -44,7 +44,8 @@ def tensor(name, shape, bound=1.0):
 
 def network(T, LD, scale, grouping="horizontal"):
     """With parameters uniform within the power of two at or below 1/sqrt(elements per output), biases within 1/8."""
-    settings = {"timesteps": T, "latent": LD, "scale": scale, "channels": 32, "rcabs": 3, "grouping": grouping}
+    settings = {"timesteps": T, "latent": LD, "scale": scale, "channels": 32, "rcabs": 3, "grouping": grouping,
+                "spread": True}
     net = SuperTac(settings, {}, groups_of(settings))
     for name, parameter in net.named_parameters():
         fan_in = math.prod(parameter.shape[1:])
@@ -63,7 +64,7 @@ def sampled(name, values):
 
 def outputs(prefix, out):
     stored = {f"{prefix}.{key}": torch.stack(out[key]) for key in ("mean", "log_var", "decoded")}
-    stored[f"{prefix}.sr"] = out["picture"]
+    stored[f"{prefix}.sr"], stored[f"{prefix}.spread"] = out["picture"], out["predicted_error"]
     return {key: value.detach().numpy() for key, value in stored.items()}
 
 
@@ -130,6 +131,12 @@ def op_cases():
     case("kl_divergence", kl_divergence, mean=(3, 4), log_var=(3, 4))
     case("ssim", lambda x: ssim(x, tensor("ssim.target", (2, 16, 13)).abs()), x=(2, 16, 13))
     case("ssim8", lambda x: ssim(x, tensor("ssim8.target", (2, 8, 9)).abs()), x=(2, 8, 9))
+    case("sample_gaussian", lambda mean, log_var: mean + torch.exp(log_var / 2) * tensor("sample_gaussian.eps", (3, 4)),
+         mean=(3, 4), log_var=(3, 4))
+    case("max_pool2d", lambda x: F.max_pool2d(x, 2), x=(2, 3, 5, 4))
+    case("gated_sum", lambda a, x, s: a + x * s[:, :, None, None], a=(2, 3, 4, 5), x=(2, 3, 4, 5), s=(2, 3))
+    case("global_mean", lambda x: x.mean((2, 3)), x=(2, 3, 4, 5))
+    case("sigmoid", torch.sigmoid, input=(3, 33))
     case("softmax_cross_entropy", lambda logits: F.cross_entropy(logits, torch.tensor([2, 0, 6])), logits=(3, 7))
     return stored
 

@@ -61,8 +61,12 @@ TEST(Activations, MinusInfinityIsRectifiedToZero) {
 }
 
 TEST(Activations, Empty) {
-  const Variable x(Tensor::zeros({0, 4}));
-  for (const Variable& y : {relu(x), leaky_relu(x), sigmoid(x), clamp(x, -1, 1)}) EXPECT_EQ(y.size(), 0);
+  const Variable x = parameter(Tensor::zeros({0, 4}));
+  for (const Variable& y : {relu(x), leaky_relu(x), sigmoid(x), clamp(x, -1, 1)}) {
+    EXPECT_EQ(y.size(), 0);
+    backward(sum(y));
+    EXPECT_EQ(x.grad().shape().text(), "[0,4]");
+  }
 }
 
 TEST(Activations, RefusesBadSettings) {

@@ -40,6 +40,7 @@ TEST(Arithmetic, RefusesOtherShapes) {
   const Variable a(Tensor::zeros({2, 3})), b(Tensor::zeros({3, 2}));
   expect_refusal("add: a and b must have the same shape, got [2,3] and [3,2]", [&] { a + b; });
   expect_refusal("multiply: a and b must have the same shape, got [2,3] and [3,2]", [&] { a* b; });
+  expect_refusal("subtract: a and b must have the same shape, got [2,3] and [3,2]", [&] { a - b; });
 }
 
 #ifdef SUPERTAC_REAL_IS_DOUBLE

@@ -37,8 +37,10 @@ TEST(Shaping, OneAxisIsEnoughToJoin) {
 TEST(Shaping, Empty) {
   const Variable x(Tensor::zeros({0, 3, 2}));
   EXPECT_EQ(joined({x, x}).shape().text(), "[0,3,4]");
-  EXPECT_EQ(flatten_channels_first(x).shape().text(), "[0,6]");
-  EXPECT_EQ(unflattened(Variable(Tensor::zeros({0, 6})), {3}).shape().text(), "[0,3,2]");
+  const Variable maps = parameter(Tensor::zeros({0, 3, 2}));
+  EXPECT_EQ(flatten_channels_first(maps).shape().text(), "[0,6]");
+  backward(sum(unflattened(flatten_channels_first(maps), {3})));
+  EXPECT_EQ(maps.grad().shape().text(), "[0,3,2]");
   EXPECT_EQ(take_runs(x, {0, 1, 1, 2}).shape().text(), "[0,3,2]");
   EXPECT_EQ(last_frame(x, 1, 2, 1).shape().text(), "[0,1,2,1]");
   const Variable none = parameter(Tensor::zeros({2, 0})), some = parameter(numbers({2, 3}));
@@ -77,6 +79,8 @@ TEST(Shaping, TakesTheLastFrameOfEachWindow) {
     last_frame(Variable(Tensor::zeros({2, 4})), 1, 2, 1);
   });
   expect_refusal("last_frame: windows expects [2,2,6], got [2,2,2]", [&] { last_frame(x, 3, 2, 1); });
+  expect_refusal("last_frame: rows, columns and channels must be at least 1, got -1, -2 and 1",
+                 [&] { last_frame(x, -1, -2, 1); });
   expect_refusal("last_frame: windows want a gradient, which this op does not have", [&] {
     last_frame(Variable(Tensor::zeros({1, 2, 2}), true), 1, 2, 1);
   });
@@ -98,6 +102,9 @@ TEST(Shaping, RefusesWhatDoesNotFit) {
   });
   expect_refusal("unflatten_channels_first: x [2,3] does not divide into 2 pixels",
                  [&] { unflattened(x, {2}); });
+  expect_refusal("unflatten_channels_first: pixels must be at least 1 a side, got -3", [&] {
+    unflattened(x, {-3, -1});
+  });
 }
 
 #ifdef SUPERTAC_REAL_IS_DOUBLE

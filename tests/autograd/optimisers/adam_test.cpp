@@ -142,6 +142,14 @@ TEST(Adam, ContinuesFromSavedState) {
   EXPECT_EQ(straight.value(), resumed.value());
 }
 
+TEST(Adam, RefusesAStepWithoutAGradient) {
+  Variable x = parameter(Tensor::zeros({2, 3}));
+  Adam adam({x}, {});
+  x.drop_grad();
+  expect_refusal("Adam: a parameter [2,3] expects a gradient, got none; run backward() before step()",
+                 [&] { adam.step(); });
+}
+
 TEST(Adam, RefusesBadOptions) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const auto& [options, text] :

@@ -158,7 +158,8 @@ TEST(Probe, SaysWhatItAssumes) {
   EXPECT_NE(all(report).find("assumed: 3x4 taxels"), std::string::npos) << all(report);
   EXPECT_NE(all(report).find("nothing was pressed"), std::string::npos) << all(report);
   EXPECT_NE(all(report).find("stuck or dead, since they never changed: taxels [5]"), std::string::npos);
-  EXPECT_NE(all(report).find("columns that are no signal (words, or a counter) are skipped: [1]"),
+  EXPECT_NE(all(report).find("columns that are no signal (words, a counter, a clock of no known unit) are "
+                             "skipped: [1]"),
             std::string::npos);
   const ProbeReport known = probe(sent(sensor, 3), "here", sensor);
   ASSERT_TRUE(known.draft) << all(known);
@@ -186,7 +187,6 @@ TEST(Probe, WritesWhereEachTaxelRests) {
   EXPECT_NE(all(report).find("signals rest up to 1"), std::string::npos) << all(report);
 }
 
-// What is kept of a file: the draft says of taxels, as the file does, not of places in a frame.
 // docs/sensors.md: probe again when the rests have drifted.
 TEST(Probe, AtRestKeepsWhatItsFileSaysButTheRests) {
   const Sensor sensor = sensor_of(
@@ -228,6 +228,7 @@ TEST(Probe, SaysThatNoLineEnds) {
   EXPECT_NE(all(report).find("no line ends"), std::string::npos) << all(report);
 }
 
+// What is kept of a file: the draft says of taxels, as the file does, not of places in a frame.
 TEST(Probe, KeepsTheOrderOfItsFile) {
   Sensor sensor = sensor_of(R"({"name":"cross","rows":3,"columns":3,"pressed":"higher","range":[100,900],
     "rate_hz":50,"frame":{"kind":"text"},"order":[6,-1,0,1,2,3,4,5,-1],"dead":[0]})");

@@ -220,13 +220,13 @@ TEST(TactileBoard, AnotherDeviceIsNoBoardAndNoPrinter) {
   const PseudoTerminal device(folder / "port");
   const std::string noise(64, '\xAA'), text = "$GPGGA,123519,4807.038,N\r\n";
   {
-    ASSERT_EQ(write(device.descriptor(), noise.data(), noise.size()), static_cast<ssize_t>(noise.size()));
     TactileBoard board(std::make_unique<SerialPort>(folder / "port", SerialSettings{rig::kBoardBaud, 10}));
+    ASSERT_EQ(write(device.descriptor(), noise.data(), noise.size()), static_cast<ssize_t>(noise.size()));
     EXPECT_ERROR((void)board.next(kPatience), WrongDevice,
                  "found 64 bytes without a frame; choose the board's port (--list-ports)");
   }
-  ASSERT_EQ(write(device.descriptor(), text.data(), text.size()), static_cast<ssize_t>(text.size()));
   SerialPort port(folder / "port", {.speedup = 100});
+  ASSERT_EQ(write(device.descriptor(), text.data(), text.size()), static_cast<ssize_t>(text.size()));
   MarlinLink link(port);
   EXPECT_ERROR(link.connect(), WrongDevice,
                "expected a Marlin firmware, found 26 bytes that are no answer to M110 within 20 s; check "

@@ -4,9 +4,11 @@
 #include <functional>
 
 #include "autograd/ops/arithmetic.h"
+#include "autograd/ops/attention.h"
 #include "autograd/ops/convolution.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/losses.h"
+#include "autograd/ops/max_pool.h"
 #include "autograd/ops/vae.h"
 #include "layers/checkpoint.h"
 #include "tests/parity/parity.h"
@@ -116,6 +118,23 @@ TEST(OpsParity, TransposedConvolutions) {
 TEST(OpsParity, Linear) {
   expect_parity("linear", {{"x", {3, 33}}, {"w", {33, 17}, Order::linear_weight}, {"b", {17}}}, Order::same,
                 [](const auto& in) { return linear(in[0], in[1], in[2]); });
+}
+
+TEST(OpsParity, OfImages) {
+  constexpr Order kLast = Order::channels_last;
+  expect_parity("max_pool2d", {{"x", {2, 5, 4, 3}, kLast}}, kLast,
+                [](const auto& in) { return max_pool2d(in[0]); });
+  expect_parity("gated_sum", {{"a", {2, 4, 5, 3}, kLast}, {"x", {2, 4, 5, 3}, kLast}, {"s", {2, 3}}}, kLast,
+                [](const auto& in) { return gated_sum(in[0], in[1], in[2]); });
+  expect_parity("global_mean", {{"x", {2, 4, 5, 3}, kLast}}, Order::same,
+                [](const auto& in) { return global_mean(in[0]); });
+}
+
+TEST(OpsParity, OfElements) {
+  expect_parity("sigmoid", {{"input", {3, 33}}}, Order::same, [](const auto& in) { return sigmoid(in[0]); });
+  const Tensor eps = numbers("sample_gaussian.eps", {3, 4}, Order::same);
+  expect_parity("sample_gaussian", {{"mean", {3, 4}}, {"log_var", {3, 4}}}, Order::same,
+                [&](const auto& in) { return sample_gaussian(in[0], in[1], eps); });
 }
 
 TEST(OpsParity, Losses) {

@@ -118,7 +118,9 @@ void initialise(SuperTac& model) {
 
 SuperTac make_model(Dim timesteps, Dim latent, Grouping grouping = Grouping::horizontal) {
   Rng rng(0);
-  SuperTac model({.timesteps = timesteps, .latent = latent, .scale = 4, .grouping = grouping}, rng);
+  SuperTac model(
+      {.timesteps = timesteps, .latent = latent, .scale = 4, .grouping = grouping, .predicted_error = true},
+      rng);
   initialise(model);
   return model;
 }
@@ -151,6 +153,7 @@ void expect_outputs(Comparison& compare, const std::string& prefix, const SuperT
     append("decoded", out.decoded[i]);
   }
   append("sr", out.picture);
+  append("spread", out.predicted_error);
   for (const auto& [name, values] : joined) compare.expect(prefix + "." + name, values);
 }
 
@@ -159,11 +162,9 @@ TEST(Parity, OutputsAndLossTerms) {
   const SuperTac::Output out = make_model(kTimesteps, kLatent).forward(small_windows(), eps_of_step(0));
   expect_outputs(compare, "small", out);
   const Loss loss = loss_of(out);
-  const std::pair<const char*, Variable> terms[] = {{"total", loss.total},
-                                                    {"reconstruction", loss.reconstruction},
-                                                    {"kld", loss.kld},
-                                                    {"l2", loss.l2},
-                                                    {"ssim", loss.ssim}};
+  const std::pair<const char*, Variable> terms[] = {
+      {"total", loss.total}, {"reconstruction", loss.reconstruction},  {"kld", loss.kld}, {"l2", loss.l2},
+      {"ssim", loss.ssim},   {"predicted_error", loss.predicted_error}};
   for (const auto& [name, term] : terms)
     compare.expect(std::string("small.loss.") + name, doubles(term.value()));
 }
@@ -187,12 +188,12 @@ TEST(Parity, TheModelHasExactlyTheNamedParameters) {
 }
 
 // Adam divides each gradient by its own size, so that rounding in a gradient near zero becomes a visible
-// step, and ten steps multiply it. In fp32 PyTorch itself is 1.2e-5 from its own double precision in the
-// parameters and 5e-5 in their change; the same batch and epsilon in double precision leave no such excuse.
-// Both are compared: the parameters to 1e-5, their change - which an error of the formula cannot hide in - to
-// 1e-5 in double precision and 1e-4 in fp32.
+// step, and ten steps multiply it. In fp32 PyTorch itself is 1.9e-5 from its own double precision in the
+// parameters and 8e-5 in their change; the same batch and epsilon in double precision leave no such excuse.
+// Both are compared: the parameters to 1e-5 in double precision and 5e-5 in fp32, their change - which an
+// error of the formula cannot hide in - to 1e-5 and 3e-4.
 TEST(Parity, TenStepsOfAdam) {
-  Comparison compare, compare_change(kDouble ? 1e-5 : 1e-4);
+  Comparison compare(kDouble ? 1e-5 : 5e-5), compare_change(kDouble ? 1e-5 : 3e-4);
   const SuperTac model = make_model(kTimesteps, kLatent);
   std::vector<std::vector<double>> before;
   for (const Parameter& p : model.parameters()) before.push_back(in_file_order(p, p.value.value()));
