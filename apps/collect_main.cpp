@@ -277,8 +277,11 @@ std::string keep_passes(const Arguments& arguments, const std::string& journal, 
   } catch (const std::exception& first) {
     why = std::string(first.what()) + "; ";
   }
+  std::error_code gone;
   throw std::runtime_error(why + error.what() + "; the journal " + journal +
-                           " is kept, make recordings of it with supertac-import --journal");
+                           (std::filesystem::exists(journal, gone)
+                                ? " is kept, make recordings of it with supertac-import --journal"
+                                : " is gone: somebody removed it during the run"));
 }
 
 }  // namespace
@@ -294,6 +297,9 @@ int run(Arguments& arguments) {
   const RecorderSettings settings = read_settings(arguments, out, plate);
   const OriginMark mark(required_text(arguments, "printer"));
   const double speedup = arguments.number("speedup", 0.1, 100);
+  if (settings.sensor.port.starts_with("serial:" + arguments.text("printer") + "@"))
+    throw UsageError("--printer: expected another port than the sensor's, found " +
+                     in_quotes(arguments.text("printer")) + " for both");
   auto board = open_carried(arguments, settings.sensor, speedup);
   auto printer =
       std::make_unique<SerialPort>(arguments.text("printer"), SerialSettings{settings.bed.baud, speedup});

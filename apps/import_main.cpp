@@ -94,7 +94,7 @@ int recover(const Arguments& arguments) {
   const PassesReport report = write_passes(arguments, arguments.text("journal"), out, folder);
   if (report.frames == 0)
     throw FileError(arguments.text("journal"),
-                    "holds no frame of a pass: it was cut off before the first contact");
+                    "holds no frame of a pass, for it was cut off before the first contact; delete it");
   folder.keep();
   arguments.write_json(report.json);
   arguments.print(report.total(" recovered") + (report.complete ? "" : "; the collection was cut off"));

@@ -40,7 +40,7 @@ std::string source_of(const Arguments& a) {
 }
 
 std::unique_ptr<SensorSource> open_source(const Arguments& a, double speedup) {
-  if (a.given("replay")) return open_replay(a.text("replay"));
+  if (a.given("replay")) return open_replay(a.text("replay"), [&](const std::string& line) { a.note(line); });
   if (a.given("recording")) return open_recording(a.text("recording"));
   if (a.given("sensor")) return open_sensor(read_sensor(a.text("sensor")), speedup);
   const std::string capture = a.text("capture");

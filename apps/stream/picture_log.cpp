@@ -122,8 +122,7 @@ void PictureLog::read_back(const Spool& spool, const ByteSink& sink) {
 
 void PictureLog::write(std::map<std::string, std::string> metadata) {
   if (!problem_.empty()) throw FileError(output_.path, problem_);
-  if (count_ == 0 && std::filesystem::exists(output_.path))
-    return;  // nothing is no reason to replace what is there
+  if (count_ == 0) return;  // nothing takes no name, and replaces nothing
   if (!std::isnan(began_s_)) metadata["began_s"] = supertac::format(began_s_);
   if (count_ > 0 && arrivals_.size() == count_) {
     const std::vector<std::byte> times = dated_times();

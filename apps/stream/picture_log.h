@@ -35,6 +35,8 @@ class PictureLog {
   void write(std::map<std::string, std::string> metadata);
   /// Frames that write() left out.
   std::uint64_t left_out() const { return left_out_; }
+  /// Nothing was added, and write() makes no file.
+  bool empty() const { return count_ == 0; }
   static constexpr double kTrustedS = 0.03;  ///< in which a finger of 10 mm/s goes 0.3 mm
 
  private:

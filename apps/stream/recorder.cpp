@@ -67,6 +67,7 @@ void Recorder::complete(std::unique_ptr<PictureLog> log, std::string name, const
   taken_.clear();
   try {
     log->write(metadata_);
+    if (log->empty()) said = "no frame came: nothing was recorded";
     if (!taken_.empty()) said = taken_;
   } catch (const std::exception& error) {
     said = error.what();

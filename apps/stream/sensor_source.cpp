@@ -168,8 +168,11 @@ std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup) 
   return std::make_unique<ReaderSource>(open_port(sensor, speedup), sensor, speedup);
 }
 
-std::unique_ptr<SensorSource> open_replay(const std::string& path) {
+std::unique_ptr<SensorSource> open_replay(const std::string& path,
+                                          const std::function<void(const std::string&)>& note) {
   const Journal journal = read_journal(path);
+  if (const std::uint64_t bytes = journal.lost_bytes + journal.torn_bytes; bytes > 0)
+    note(path + ": " + std::to_string(bytes) + " damaged bytes of the journal are missing");
   const Sensor sensor = sensor_of(journal);
   auto port = std::make_unique<ReplayPort>(journal.of(Stream::board), path, journal.lost_bytes);
   if (sensor.frame.kind == FrameKind::board) return std::make_unique<BoardSource>(std::move(port), false);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -72,7 +73,8 @@ std::unique_ptr<SensorSource> open_sensor(const Sensor& sensor, double speedup);
 /// The board at `port` ("auto" finds it). With `capture` every byte also goes to a journal of that path.
 std::unique_ptr<SensorSource> open_board(const std::string& port, double speedup, const std::string& capture);
 /// The sensor's part of a journal, as fast as it is taken.
-std::unique_ptr<SensorSource> open_replay(const std::string& path);
+std::unique_ptr<SensorSource> open_replay(const std::string& path,
+                                          const std::function<void(const std::string&)>& note);
 /// A recording's frames. Throws FileError also when it has fewer than two.
 std::unique_ptr<SensorSource> open_recording(const std::string& path);
 

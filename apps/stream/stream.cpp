@@ -138,7 +138,8 @@ void Stream::complete() {
   };
   if (record_) attempt([&] { record_->write(recording_); });
   if (log_) attempt([&] { log_->write(maker_ ? settings_.metadata : recording_); });
-  if (mcap_) attempt([&] { mcap_->close(); });
+  const bool any = maker_ ? pictures() > 0 : frames_ > 0;
+  if (mcap_ && any) attempt([&] { mcap_->close(); });
   attempt([&] { source_.finish(); });
   if (first) std::rethrow_exception(first);
 }

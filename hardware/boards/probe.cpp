@@ -98,11 +98,13 @@ std::optional<Candidate> columns_of(const Lines& lines) {
       const int column = static_cast<int>(c);
       const auto nan = std::ranges::count_if(columns[c], [](double v) { return std::isnan(v); });
       const auto unit = nan == 0 ? unit_of_clock(columns[c], lines.seconds) : std::nullopt;
-      bool counts_up = nan == 0, rises = nan == 0 && columns[c].size() >= kManyLines;
+      bool counts_up = nan == 0, falls = nan > 0 || columns[c].size() < kManyLines;
+      std::size_t risen = 0;
       for (std::size_t i = 1; i < columns[c].size(); ++i) {
         const double step = columns[c][i] - columns[c][i - 1];
-        counts_up = counts_up && step == 1, rises = rises && step > 0;
+        counts_up = counts_up && step == 1, falls = falls || step<0, risen += step> 0 ? 1 : 0;
       }
+      const bool rises = !falls && 2 * risen > columns[c].size();
       if (unit && !candidate.format.time)
         candidate.format.time = FrameTime{.column = column, .unit_s = *unit};
       else if (static_cast<double>(nan) > 0.5 * static_cast<double>(columns[c].size()) || counts_up || rises)
@@ -295,13 +297,15 @@ std::optional<double> unit_of_clock(std::span<const double> stamps, double secon
   if (stamps.size() < kFewLines) return std::nullopt;
   // A clock may start anew while one listens, and stands still meanwhile; of what waited before one listened,
   // some may come first.
+  // Stamps of a clock that is coarser than the frames are the same for several.
   double went = 0, longest = 0;
-  std::size_t fell = 0;
+  std::size_t fell = 0, rose = 0;
   for (std::size_t i = 1; i < stamps.size(); ++i) {
     const double step = stamps[i] - stamps[i - 1];
-    if (!(step > 0) && ++fell > std::min(kMostRestarts, stamps.size() / kStepsOfRestart)) return std::nullopt;
-    went += std::max(step, 0.0), longest = std::max(longest, step);
+    if (step < 0 && ++fell > std::min(kMostRestarts, stamps.size() / kStepsOfRestart)) return std::nullopt;
+    if (step > 0) ++rose, went += step, longest = std::max(longest, step);
   }
+  if (2 * rose < stamps.size() - 1) return std::nullopt;
   if (seconds < kAtOnceS) {  // a file says nothing of the time it took: a clock of milliseconds, or a counter
     const bool whole = std::ranges::all_of(stamps, [](double v) { return v == std::round(v); });
     if (fell > 0 || went == static_cast<double>(stamps.size() - 1)) return std::nullopt;
@@ -350,12 +354,16 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
     report.draft = draft;
     return report;
   }
-  const auto found = candidate_of(bytes, heard, known, report.says);
+  // A description that reads what came knows more than what can be guessed.
+  const bool reads = known && !bytes.empty() &&
+                     frames_of(*known, heard).frame_bytes > kMostly * static_cast<double>(bytes.size());
+  const auto found = reads ? std::optional(Candidate{known->frame, known->array, ""})
+                           : candidate_of(bytes, heard, known, report.says);
   draft.name = "probed sensor";
   if (known) draft.name = known->name, draft.order = known->order;
   if (known) draft.dead = known->dead, draft.gain = known->gain, draft.follow_rest_s = known->follow_rest_s;
   if (!found) return report;
-  const std::size_t values = found->array.signals();
+  const std::size_t values = reads ? known->values() : found->array.signals();
   if (known && known->values() != values) {
     report.says.push_back("frames of " + std::to_string(values) + " values, expected the " +
                           std::to_string(known->values()) + " of " + known->array.text());

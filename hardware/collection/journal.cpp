@@ -168,8 +168,8 @@ void JournalWriter::failed(const std::string& what) {
   const std::string reason = strerror(errno);
   std::lock_guard lock(mutex_);
   if (!error_.empty()) return;
-  error_ = "journal " + path_ + ": " + what + ": " + reason +
-           "; make room or change the disk and start again, what was recorded so far is kept";
+  error_ =
+      "journal " + path_ + ": " + what + ": " + reason + "; make room or change the disk and start again";
 }
 
 void JournalWriter::flush() {

@@ -79,4 +79,12 @@ inline std::string sent_frame(const Sensor& sensor, std::span<const double> valu
   return f.header + bytes + f.trailer;
 }
 
+/// Counts from 0 to 1000 that rise under pressure.
+inline Sensor mat(int rows, int columns, double rate_hz, const std::string& frame) {
+  return sensor_of_json("{\"rows\":" + std::to_string(rows) + ",\"columns\":" + std::to_string(columns) +
+                            ",\"rate_hz\":" + format(rate_hz) +
+                            R"(,"pressed":"higher","range":[0,1000],"frame":)" + frame + "}",
+                        "test");
+}
+
 }  // namespace supertac

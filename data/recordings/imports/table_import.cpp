@@ -208,10 +208,13 @@ ColumnMap column_map(const std::string& text) {
       map.time_unit_s = unit_s(value.substr(colon + 1));
       value.resize(colon);
     }
-    if (key == "values")
+    if (key == "values") {
       map.values.push_back(value);
-    else
-      (key == "time" ? map.time : key == "x" ? map.x : map.y) = value;
+      continue;
+    }
+    std::string& column = key == "time" ? map.time : key == "x" ? map.x : map.y;
+    if (!column.empty()) throw std::invalid_argument("names " + key + " twice");
+    column = value;
   }
   if (map.x.empty() != map.y.empty())
     throw std::invalid_argument("names only one of x and y; a position has both");
@@ -273,10 +276,13 @@ void add_positions(Recording& recording, const std::string& path, const Table& l
     recording.position_mm[2 * i + 1] = interpolated(path, log, before, y, share);
     ++known;
   }
-  if (known == 0)
-    throw FileError(path, "has times from " + format(time_s.front()) + " to " + format(time_s.back()) +
+  if (10 * known < recording.frames())
+    throw FileError(path, "says where " + std::to_string(known) + " of " +
+                              std::to_string(recording.frames()) + " frames were: it has times from " +
+                              format(time_s.front()) + " to " + format(time_s.back()) +
                               " s, the frames from " + format(recording.time_s.front()) + " to " +
-                              format(recording.time_s.back()) + " s; are both of one clock?");
+                              format(recording.time_s.back()) +
+                              " s; are both of one clock, in the unit that --columns names?");
 }
 
 void add_truth(Recording& recording, const std::string& path, const Table& images, double low, double high) {

@@ -230,6 +230,11 @@ TEST_F(Streaming, WithoutAPictureNothingIsReplaced) {
       stream({"--recording", path("recording"), "--out", path("out"), "--force", "--seconds", "0.01"}), 1,
       "no picture");
   EXPECT_EQ(read_text_file(path("out"), 10), "mine");
+  expect_failure(stream({"--recording", path("recording"), "--mcap", path("out"), "--out", path("none"),
+                         "--force", "--seconds", "0.01"}),
+                 1, "no picture");
+  EXPECT_EQ(read_text_file(path("out"), 10), "mine");
+  EXPECT_FALSE(fs::exists(path("none")));
 }
 
 TEST_F(Streaming, DrawsOnATerminalOnly) {

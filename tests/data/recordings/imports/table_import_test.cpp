@@ -190,6 +190,7 @@ TEST_F(TableImport, ImpossibleValuesAreNamed) {
   expect_refusal(file("a b\nc d\n"), "", "holds no line of numbers");
   EXPECT_EQ(what_of<std::invalid_argument>([&] { column_map("time=0:h"); }),
             "time is in 'h', expected s, ms or us");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { column_map("time=0,x=1,y=2,time=3"); }), "names time twice");
   EXPECT_EQ(what_of<std::invalid_argument>([&] { column_map("x=0"); }),
             "names only one of x and y; a position has both");
   EXPECT_EQ(what_of<std::invalid_argument>([&] { column_map("z=0"); }),
@@ -230,7 +231,8 @@ TEST_F(TableImport, PositionsOfAnotherLogAreInterpolated) {
             "log: column 1 as a position holds 3.3333333333333335e+298, expected mm on the plate");
   const Table other_clock = read_table(file("100000,0,0\n100001,0,0\n", "log.csv"));
   EXPECT_EQ(what_of<FileError>([&] { add_positions(r, "log", other_clock, 1); }),
-            "log: has times from 1e+05 to 100001 s, the frames from 0 to 0.49 s; are both of one clock?");
+            "log: says where 0 of 50 frames were: it has times from 1e+05 to 100001 s, the frames from 0 to "
+            "0.49 s; are both of one clock, in the unit that --columns names?");
 }
 
 TEST_F(TableImport, TruthIsScaledAndCounted) {
