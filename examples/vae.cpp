@@ -24,7 +24,8 @@ namespace {
 
 constexpr Dim kSide = 16, kLatent = 4, kCoarse = kSide / 4, kMaps = 32;
 constexpr real kBeta = real(1e-3);  // of the divergence, against the squared error of a pixel
-constexpr ConvLayerOptions kHalve{.kernel = 3, .stride = 2, .padding = 1}, kDouble{4, 2, 1};
+constexpr ConvLayerOptions kHalve{.kernel = 3, .stride = 2, .padding = 1},
+    kDouble{.kernel = 4, .stride = 2, .padding = 1};
 
 class Vae : public Module {
  public:
@@ -50,16 +51,16 @@ class Vae : public Module {
   };
   // x [N,16,16,1], eps [N,4] ~ N(0,1): z = mean + exp(log_var / 2) eps
   Output forward(const Variable& x, const Tensor& eps) const {
-    const Variable h = halve2_.forward(halve1_.forward(x, kLeakyRelu), kLeakyRelu);
-    const Variable flat = flatten_channels_first(h);
+    const Variable h = halve2_.forward(halve1_.forward(x, kLeakyRelu), kLeakyRelu);  // [N,8,8,16], [N,4,4,32]
+    const Variable flat = flatten_channels_first(h);                                 // [N,512]
     Output out{mean_.forward(flat), clamp(log_var_.forward(flat), -10, 10), {}};
     out.picture = decode(sample_gaussian(out.mean, out.log_var, eps));
     return out;
   }
   Variable decode(const Variable& z) const {
     const Dim pixels[] = {kCoarse, kCoarse};
-    const Variable h = unflatten_channels_first(unfold_.forward(z, kLeakyRelu), pixels);
-    return sigmoid(double2_.forward(double1_.forward(h, kLeakyRelu)));
+    const Variable h = unflatten_channels_first(unfold_.forward(z, kLeakyRelu), pixels);  // [N,4,4,32]
+    return sigmoid(double2_.forward(double1_.forward(h, kLeakyRelu)));                    // [N,8,8,16], x
   }
 
  private:

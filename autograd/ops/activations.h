@@ -15,7 +15,7 @@ Variable relu(const Variable& x);
 Variable leaky_relu(const Variable& x, real slope = kLeakyRelu);
 /// For the ops that end in f: throws std::invalid_argument for a negative slope.
 void check_slope(const char* op, real negative_slope);
-/// Replaces b's dL/dy by dL/ds = dL/dy f'(s), f' taken from the sign of y, and returns it.
+/// For reverse steps: replaces g's dL/dy by dL/ds = dL/dy f'(s), f' taken from the sign of y, and returns it.
 const real* before_activation(Backward& g, real negative_slope);
 
 /// y = 1 / (1 + exp(-x))

@@ -30,6 +30,7 @@ Variable operator*(const Variable& a, const Variable& b) {
   });
 }
 
+// y[i] = factor x[i];  gx = factor gy
 Variable operator*(real factor, const Variable& x) {
   return elementwise(
       "scale", x, [factor](real at) { return factor * at; },

@@ -5,7 +5,8 @@
 
 namespace supertac {
 
-/// Elementwise. All throw std::invalid_argument unless the shapes are equal.
+/// y[i] = a[i] + b[i], a[i] - b[i], a[i] b[i]; nothing is broadcast. All throw std::invalid_argument unless
+/// the shapes are equal.
 Variable operator+(const Variable& a, const Variable& b);
 Variable operator-(const Variable& a, const Variable& b);
 Variable operator*(const Variable& a, const Variable& b);
@@ -13,7 +14,7 @@ Variable operator*(const Variable& a, const Variable& b);
 Variable operator*(real factor, const Variable& x);
 Variable operator-(real number, const Variable& x);
 
-/// The sum of all elements, a scalar (rank 0).
+/// The sum of all elements, a scalar (rank 0), added up in double precision; 0 of none.
 Variable sum(const Variable& x);
 
 }  // namespace supertac

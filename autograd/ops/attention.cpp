@@ -39,7 +39,7 @@ Variable global_mean(const Variable& x) {
   real* const mean = y.data();
   each_element(maps, [=, from = x.value().data()](Dim i, Dim k) { mean[k] += from[i]; });
   each(y.size(), [=](Dim k) { mean[k] /= pixels; });
-  return record("global_mean", y, {&x}, [=](Backward& g) {
+  return record("global_mean", y, {&x}, [maps, pixels](Backward& g) {
     Tensor* const gx = g.grad_of(0);
     if (gx == nullptr) return;
     each_element(maps, [=, gy = g.gy().data(), to = gx->data()](Dim i, Dim k) { to[i] += gy[k] / pixels; });
@@ -55,7 +55,7 @@ Variable gated_sum(const Variable& a, const Variable& x, const Variable& s) {
   Tensor y(x.shape());
   each_element(maps, [to = y.data(), a = a.value().data(), x = x.value().data(), s = s.value().data()](
                          Dim i, Dim k) { to[i] = a[i] + x[i] * s[k]; });
-  return record("gated_sum", y, {&a, &x, &s}, [=](Backward& g) {
+  return record("gated_sum", y, {&a, &x, &s}, [maps](Backward& g) {
     const real *gy = g.gy().data(), *from = g.value(1).data(), *gate = g.value(2).data();
     put_to_gradient(g, 0, [=](Dim i) { return gy[i]; });
     if (const Backward::Slot gx = g.slot_of(1)) {

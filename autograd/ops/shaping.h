@@ -19,8 +19,8 @@ Variable take_runs(const Variable& x, const Runs& runs);
 /// throws for windows that require one.
 Variable last_frame(const Variable& windows, Dim rows, Dim columns, Dim channels);
 
-/// [N, P..., C] -> [N, C P]: the order in which PyTorch flattens [N,C,P...], so that the weights of the
-/// following linear layer mean the same there.
+/// y[n, c P + p] = x[n,p,c], P the number of pixels: [N, P..., C] -> [N, C P], the order in which PyTorch
+/// flattens [N,C,P...], so that the weights of the following linear layer mean the same there.
 Variable flatten_channels_first(const Variable& x);
 /// The inverse: [N, C P] -> [N, P..., C] with the given pixels, {L} or {H,W}.
 Variable unflatten_channels_first(const Variable& x, std::span<const Dim> pixels);

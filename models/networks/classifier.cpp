@@ -55,7 +55,7 @@ FeatureClassifier::FeatureClassifier(Dim features, Dim classes, Rng& rng)
 }
 
 Variable FeatureClassifier::forward(const Variable& x) const {
-  return out_.forward(hidden_.forward(x, kRelu));
+  return out_.forward(hidden_.forward(x, kRelu));  // [N,features], [N,64], [N,classes]
 }
 
 }  // namespace supertac

@@ -10,7 +10,7 @@
 namespace supertac {
 
 struct VaeOptions {
-  Dim timesteps = 256;  ///< T, a multiple of 16
+  Dim timesteps = 256;  ///< T, a multiple of 16 (SuperTacSettings::check())
   Dim channels = 4;     ///< signals of the group: C below
   Dim latent = 10;      ///< LD
 };

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <span>
 #include <string>
 #include <vector>
@@ -46,6 +47,12 @@ struct Difference {
   std::string worst;  ///< the entry that differs most by its own size, and both its values
 };
 
+inline std::string digits(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.12g", x);
+  return text;
+}
+
 inline Difference difference(std::span<const double> found, std::span<const double> expected) {
   double largest = 0;
   for (const double b : expected) largest = std::max(largest, std::abs(b));
@@ -56,8 +63,8 @@ inline Difference difference(std::span<const double> found, std::span<const doub
     const double floor = std::max({std::abs(expected[i]), 1e-3 * largest, 1e-30});
     const double by_entry = std::isfinite(error) ? error / floor : 1e30;
     if (by_entry > d.by_entry || d.worst.empty())
-      d.worst = "entry " + std::to_string(i) + ": found " + std::to_string(found[i]) + ", expected " +
-                std::to_string(expected[i]);
+      d.worst =
+          "entry " + std::to_string(i) + ": found " + digits(found[i]) + ", expected " + digits(expected[i]);
     d.by_entry = std::max(d.by_entry, by_entry);
     d.by_tensor = std::isfinite(error) ? std::max(d.by_tensor, error / std::max(largest, 1e-30)) : 1e30;
   }

@@ -25,6 +25,8 @@ TEST(Linear, Empty) {
 
 TEST(Linear, RefusesOtherShapes) {
   const Variable x(Tensor::zeros({2, 3})), w(Tensor::zeros({3, 5})), b(Tensor::zeros({5}));
+  expect_refusal("linear: x expects a value, got an empty Variable",
+                 [] { linear(Variable(), Variable(), Variable()); });
   expect_refusal("linear: x expects rank 2, got [5]", [&] { linear(b, w, b); });
   expect_refusal("linear: w expects rank 2, got [5]", [&] { linear(x, b, b); });
   expect_refusal("linear: w expects 5 inputs, x has 3 (x [2,3], w [5,3])", [&] {

@@ -77,7 +77,7 @@ void expect_stored(const std::string& name, const Tensor& found, Order order) {
   }
   const test::Difference d = test::difference(values, test::stored(file, name));
   EXPECT_LE(sizeof(real) == 8 ? d.by_entry : d.by_tensor, sizeof(real) == 8 ? 1e-10 : 1e-5)
-      << name << ", " << d.worst;
+      << name << " (in PyTorch's order), " << d.worst;
 }
 
 void expect_parity(const std::string& op, const std::vector<Input>& inputs, Order y_order,

@@ -61,7 +61,9 @@ class Comparison {
   /// A gradient or change of a parameter: every 13th entry of a long one, and a weighted sum over all, which
   /// is judged against the size that such a sum of random signs has.
   void expect_sampled(const std::string& name, const std::vector<double>& values) {
-    expect(name, sampled(values));
+    const bool of_part = values.size() > kSampleAbove;
+    expect(name + (of_part ? " (every 13th element, in PyTorch's order)" : ""), sampled(values),
+           stored(reference(), name));
     const std::vector<double> weights =
         counter_numbers(name.substr(name.find('.', 6) + 1) + ".projection", values.size());
     double sum = 0, squares = 0;
