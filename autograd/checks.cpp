@@ -8,7 +8,7 @@ void refuse(const char* op, const std::string& message) {
   throw std::invalid_argument(std::string(op) + ": " + message);
 }
 
-static void check_defined(const char* op, const char* argument, const Variable& x) {
+void check_defined(const char* op, const char* argument, const Variable& x) {
   if (!x.defined()) refuse(op, std::string(argument) + " expects a value, got an empty Variable");
 }
 

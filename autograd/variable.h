@@ -19,7 +19,8 @@ namespace supertac {
 class Variable {
  public:
   Variable() = default;
-  /// A leaf. With `requires_grad` backward() accumulates into grad(). Throws std::invalid_argument for an
+  /// A leaf that shares the buffer of `value`: clone() it to keep your own. With `requires_grad` backward()
+  /// accumulates into grad(). Throws std::invalid_argument for an
   /// undefined tensor.
   explicit Variable(Tensor value, bool requires_grad = false);
 

@@ -60,7 +60,7 @@ class Vae : public Module {
   Variable decode(const Variable& z) const {
     const Dim pixels[] = {kCoarse, kCoarse};
     const Variable h = unflatten_channels_first(unfold_.forward(z, kLeakyRelu), pixels);  // [N,4,4,32]
-    return sigmoid(double2_.forward(double1_.forward(h, kLeakyRelu)));                    // [N,8,8,16], x
+    return sigmoid(double2_.forward(double1_.forward(h, kLeakyRelu)));                    // [N,16,16,1]
   }
 
  private:

@@ -9,9 +9,9 @@ namespace supertac {
 /// result, which saves a pass over memory in each direction.
 inline constexpr real kNoActivation = 1, kRelu = 0, kLeakyRelu = real(0.01);
 
-/// y = max(x, 0)
+/// y = max(x, 0). At 0 the gradient is 0.
 Variable relu(const Variable& x);
-/// y = x > 0 ? x : slope x. Throws for a negative slope.
+/// y = x > 0 ? x : slope x. At 0 the gradient is slope gy. Throws for a negative slope.
 Variable leaky_relu(const Variable& x, real slope = kLeakyRelu);
 /// For the ops that end in f: throws std::invalid_argument for a negative slope.
 void check_slope(const char* op, real negative_slope);

@@ -47,6 +47,7 @@ Variable operator-(real number, const Variable& x) {
 
 // gx = gy, everywhere
 Variable sum(const Variable& x) {
+  check_defined("sum", "x", x);
   const double total = kernels::sum_of(x.size(), [from = x.value().data()](Dim i) { return from[i]; });
   return record("sum", Tensor::full({}, static_cast<real>(total)), {&x},
                 [](Backward& g) { add_to_gradient(g, 0, [gy = g.gy().item()](Dim) { return gy; }); });

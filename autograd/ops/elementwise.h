@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "autograd/checks.h"
 #include "autograd/kernels/fast/each.h"
 #include "autograd/record.h"
 #include "autograd/trace.h"
@@ -38,6 +39,7 @@ void put_to_gradient(Backward& g, std::size_t input, Term term) {
 template <class Value, class Gradient>
 Variable elementwise(const char* op, const Variable& x, Value value, Gradient gradient,
                      const OpSettings& settings = {}) {
+  check_defined(op, "x", x);
   Tensor y(x.shape());
   each(y.size(), [=, from = x.value().data(), to = y.data()](Dim i) { to[i] = value(from[i]); });
   const auto reverse = [gradient](Backward& g) {

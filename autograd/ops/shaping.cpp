@@ -65,6 +65,8 @@ Variable concat(std::span<const Variable> xs) {
     refuse("concat",
            "takes 1 to " + std::to_string(kMaxInputs) + " inputs, got " + std::to_string(xs.size()));
   }
+  for (std::size_t i = 0; i < xs.size(); ++i)
+    check_defined("concat", ("x" + std::to_string(i)).c_str(), xs[i]);
   if (xs[0].rank() < 1) refuse("concat", "x0 expects at least rank 1, got " + xs[0].shape().text());
   std::array<const Variable*, kMaxInputs> inputs{};
   Dim width = 0;
@@ -98,6 +100,7 @@ Variable concat(std::span<const Variable> xs) {
 }
 
 static void check_runs(const Variable& x, const Runs& r) {
+  check_defined("take_runs", "x", x);
   if (x.rank() < 1) refuse("take_runs", "x expects at least rank 1, got " + x.shape().text());
   if (x.requires_grad()) refuse("take_runs", "x wants a gradient, which this op does not have");
   if (r.first < 0 || r.run < 1 || r.step < r.run || r.width < r.run || r.width % r.run != 0) {
@@ -143,6 +146,7 @@ Variable last_frame(const Variable& x, Dim rows, Dim columns, Dim channels) {
 
 // x [N,P...,C] -> y [N, C * pixels];  gx is gy the other way
 Variable flatten_channels_first(const Variable& x) {
+  check_defined("flatten_channels_first", "x", x);
   if (x.rank() < 3) refuse("flatten_channels_first", "x expects rank 3 or 4, got " + x.shape().text());
   const Dim channels = x.dim(x.rank() - 1), images = x.dim(0);
   const Dim pixels = x.rank() == 3 ? x.dim(1) : x.dim(1) * x.dim(2);

@@ -12,9 +12,6 @@ struct NetworkFormat {
   bool operator==(const NetworkFormat&) const = default;
 };
 
-/// Networks take what WindowSet::window() gives, numbers in [0,1]. Their pictures have no bounds; trained on
-/// plates they lie about in [-1,1], 0 being the plate's plane.
-///
 /// Pictures, with the predicted errors and latents of networks that have them.
 struct Estimate {
   Tensor picture;          ///< [N,rows scale,columns scale,1]
@@ -28,6 +25,8 @@ struct Drawing {
   Variable picture, predicted_error, latents;
 };
 
+/// Networks take what WindowSet::window() gives, numbers in [0,1]. Their pictures have no bounds; trained on
+/// plates they lie about in [-1,1], 0 being the plate's plane.
 class Network : public Module {
  public:
   Network() = default;

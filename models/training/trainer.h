@@ -133,7 +133,7 @@ class Trainer {
   TrainingState state_;
   Ranks& ranks_;
   std::vector<double> statistics_, of_partner_;
-  std::vector<std::uint32_t> indices_;                                 // of the batch
+  std::vector<std::uint32_t> indices_, next_;                          // of the batch, and of that behind it
   std::vector<MicroBatch> micro_batches_;                              // of this process
   std::vector<const std::vector<Parameter>*> micro_batch_parameters_;  // of these models
   std::unique_ptr<kernels::WeightForms> forms_;  // of the weights that all micro-batches share

@@ -107,6 +107,13 @@ TEST(GradientChecker, PutsALeafBackWhenTheFunctionThrows) {
   EXPECT_TRUE(test::same_bytes(x.value(), before));
 }
 
+TEST(GradientChecker, OfEmptyInputsNothingIsCompared) {
+  const auto report = check_gradients([](const auto& in) { return 2 * in[0]; }, {Tensor::zeros({0, 3})});
+  EXPECT_EQ(report.entries, 0);
+  EXPECT_EQ(report.max_relative_error, 0);
+  EXPECT_EQ(report.text(), "");
+}
+
 TEST(GradientChecker, LeavesTheCallersTensorsAlone) {
   const Tensor x = test::numbers({5}), copy = x.clone();
   check_gradients([](const auto& in) { return in[0] * in[0]; }, {x});

@@ -109,13 +109,26 @@ TEST(Backward, RefusesWhatHasNoGradient) {
                  [&] { backward(sum(Variable(Tensor::full({2}, 3)))); });
 }
 
+TEST(Backward, AStepThatThrowsLeavesTheLeavesUsable) {
+  const Variable x = parameter(Tensor::full({2}, 3));
+  const Variable y =
+      record("planted", x.value().clone(), {&x}, [](Backward&) { throw std::runtime_error("of the step"); });
+  EXPECT_EQ(what_of<std::runtime_error>([&] { backward(sum(2 * y)); }), "of the step");
+  backward(sum(2 * x));
+  expect_values(x.grad(), {2}, {2, 2});
+}
+
 TEST(Variable, RefusesToBeUsedWithoutAValue) {
   Variable empty;
-  const std::function<void()> uses[] = {
-      [&] { sum(empty); },           [&] { empty.shape(); },         [&] { empty.grad(); },
-      [&] { empty.mutable_grad(); }, [&] { empty.mutable_value(); }, [&] { empty.drop_grad(); },
-      [&] { backward(empty); },      [&] { inputs_of(empty); }};
+  const std::function<void()> uses[] = {[&] { empty.shape(); },        [&] { empty.grad(); },
+                                        [&] { empty.mutable_grad(); }, [&] { empty.mutable_value(); },
+                                        [&] { empty.drop_grad(); },    [&] { backward(empty); },
+                                        [&] { inputs_of(empty); }};
   for (const auto& use : uses) expect_refusal("Variable: used before it was given a value", use);
+  expect_refusal("sum: x expects a value, got an empty Variable", [&] { sum(empty); });
+  expect_refusal("scale: x expects a value, got an empty Variable", [&] { 2 * empty; });
+  expect_refusal("add: b expects a value, got an empty Variable",
+                 [&] { parameter(Tensor::zeros({1})) + empty; });
   expect_refusal("Variable: the tensor is undefined", [] { parameter(Tensor()); });
   EXPECT_STREQ(Variable().op(), "none");
   EXPECT_STREQ(parameter(Tensor::zeros({1})).op(), "leaf");
