@@ -46,6 +46,20 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
 /// get gain 1. The draft is the sensor with these; empty where nothing was pressed or no frames came.
 ProbeReport find_gain(std::span<const Heard> heard, const Sensor& sensor);
 
+/// A format that may be it, and the array that its frames are.
+struct FoundFormat {
+  FrameFormat format;
+  TaxelArray array;
+  std::string remark;  ///< for people
+};
+/// Columns of numbers or objects of JSON in `bytes`, which were heard for `seconds`; empty, and `says` why,
+/// where they are neither.
+std::optional<FoundFormat> find_text_format(const std::string& bytes, double seconds,
+                                            std::vector<std::string>& says);
+/// Of so many values the most nearly square array, or the one that nested lists of JSON show (`nested`: the
+/// length of each, from outside), with three channels where they are threes; empty when no array has so many.
+std::optional<TaxelArray> assumed_array(std::size_t values, std::span<const std::size_t> nested = {});
+
 /// The binary format of `bytes`, which were heard for `seconds`: header (what stays the same from period to
 /// period), time stamp, type, byte order, checksum; and how many values a frame has. Empty where the bytes
 /// have no period.
@@ -55,6 +69,9 @@ struct BinaryFinding {
 };
 std::optional<BinaryFinding> find_binary_format(const std::string& bytes, double seconds,
                                                 std::optional<std::size_t> values);
+
+/// Bytes that came within so many seconds came at once, as from a file.
+inline constexpr double kAtOnceS = 0.2;
 
 /// The unit (s) of a column of stamps, from how far it went in `seconds`: 1, 1e-3 or 1e-6; empty when it is
 /// no clock. For bytes that came at once, as from a file: milliseconds where all are whole, else seconds.
