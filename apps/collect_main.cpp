@@ -297,9 +297,6 @@ int run(Arguments& arguments) {
   const RecorderSettings settings = read_settings(arguments, out, plate);
   const OriginMark mark(required_text(arguments, "printer"));
   const double speedup = arguments.number("speedup", 0.1, 100);
-  if (settings.sensor.port.starts_with("serial:" + arguments.text("printer") + "@"))
-    throw UsageError("--printer: expected another port than the sensor's, found " +
-                     in_quotes(arguments.text("printer")) + " for both");
   auto board = open_carried(arguments, settings.sensor, speedup);
   auto printer =
       std::make_unique<SerialPort>(arguments.text("printer"), SerialSettings{settings.bed.baud, speedup});

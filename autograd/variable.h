@@ -20,8 +20,7 @@ class Variable {
  public:
   Variable() = default;
   /// A leaf that shares the buffer of `value`: clone() it to keep your own. With `requires_grad` backward()
-  /// accumulates into grad(). Throws std::invalid_argument for an
-  /// undefined tensor.
+  /// accumulates into grad(). Throws std::invalid_argument for an undefined tensor.
   explicit Variable(Tensor value, bool requires_grad = false);
 
   bool defined() const { return node_ != nullptr; }

@@ -65,14 +65,15 @@ Variable concat(std::span<const Variable> xs) {
     refuse("concat",
            "takes 1 to " + std::to_string(kMaxInputs) + " inputs, got " + std::to_string(xs.size()));
   }
-  for (std::size_t i = 0; i < xs.size(); ++i)
-    check_defined("concat", ("x" + std::to_string(i)).c_str(), xs[i]);
+  check_defined("concat", "x0", xs[0]);
   if (xs[0].rank() < 1) refuse("concat", "x0 expects at least rank 1, got " + xs[0].shape().text());
   std::array<const Variable*, kMaxInputs> inputs{};
   Dim width = 0;
   for (std::size_t i = 0; i < xs.size(); ++i) {
+    const std::string name = "x" + std::to_string(i);
+    check_defined("concat", name.c_str(), xs[i]);
     const Dim last = xs[i].rank() < 1 ? 0 : xs[i].dim(xs[i].rank() - 1);
-    check_shape("concat", ("x" + std::to_string(i)).c_str(), xs[i], with_last(xs[0].shape(), last));
+    check_shape("concat", name.c_str(), xs[i], with_last(xs[0].shape(), last));
     inputs[i] = &xs[i];
     width += last;
   }

@@ -27,8 +27,7 @@ constexpr int kMostReads = 64;  // of what waited
 FrameDates::FrameDates(const Sensor& sensor, bool stored)
     : stored_(stored), nominal_s_(1 / sensor.rate_hz), period_s_(nominal_s_) {
   if (!sensor.frame.time) return;
-  // Of a clock that gives several frames one stamp, or nearly so.
-  if (sensor.frame.time->unit_s > 0.25 * nominal_s_) unit_s_ = sensor.frame.time->unit_s;
+  if (sensor.frame.time->unit_s > 0.25 * nominal_s_) coarse_s_ = sensor.frame.time->unit_s;
   const std::string& type = sensor.frame.time->type;
   // millis() and micros() of lines and JSON have 32 bits.
   const double bits = type == "u16"                                                      ? 16
@@ -42,7 +41,7 @@ std::optional<double> FrameDates::date(std::optional<double> stamp_s, double arr
   const auto dated = stamp_s ? by_stamp(*stamp_s, arrival_s) : std::optional(by_arrival(arrival_s, behind));
   if (!dated) return std::nullopt;
   double time = *dated;
-  if (count_ > 0 && time <= last_s_ && time > last_s_ - unit_s_) time = last_s_ + 1e-3 * unit_s_;
+  if (count_ > 0 && time <= last_s_ && time > last_s_ - coarse_s_) time = last_s_ + 1e-3 * coarse_s_;
   if (count_ > 0 && time <= last_s_) return std::nullopt;
   if (count_ > 0 && !resynchronised_) count_missing(time - last_s_, stamp_s.has_value());
   ++count_;
@@ -53,8 +52,8 @@ std::optional<double> FrameDates::date(std::optional<double> stamp_s, double arr
 // Stamps that are always as far apart are a slower sensor than its file says, which loses nothing.
 void FrameDates::count_missing(double step_s, bool stamped) {
   constexpr std::uint64_t kAlways = 8;
-  const double periods =
-      (stamped ? step_s - unit_s_ / 2 : step_s) / period_s_;  // half: how far stamps are off
+  // Stamps of a coarse clock are up to half a unit off, to either side.
+  const double periods = (stamped ? step_s - coarse_s_ / 2 : step_s) / period_s_;
   const auto missing =
       periods > 1.5 ? static_cast<std::uint64_t>(std::lround(std::min(periods - 1, 1e9))) : 0;
   missing_ += missing;

@@ -57,7 +57,8 @@ class FrameDates {
   double by_arrival(double arrival_s, std::size_t behind);
   void count_missing(double step_s, bool stamped);
   bool stored_;
-  double nominal_s_, period_s_, unit_s_ = 0, wraps_s_ = 0;
+  double nominal_s_, period_s_, wraps_s_ = 0;
+  double coarse_s_ = 0;  // the unit of a clock that gives several frames one stamp, or nearly so
   double offset_s_ = 0, last_s_ = 0, last_arrival_s_ = 0, least_late_s_ = 0, most_late_s_ = 0, doubt_s_ = 0;
   std::optional<double> jumped_s_;       // a stamp that was not believed
   double jump_step_s_ = 0, step_s_ = 0;  // from the one before that to it, and where these are always as long

@@ -29,8 +29,8 @@ namespace {
     case EPERM:
       throw PortPermission(at + "permission denied; run `sudo usermod -aG dialout $USER` and log in again");
     case EBUSY:
-      throw PortBusy(at + "already open in another program; close it (see `fuser " + path +
-                     "`) and try again");
+      throw PortBusy(at + "already open, by another program (see `fuser " + path +
+                     "`) or twice by this one; close it, or name another port");
     case ENXIO:
     case ENODEV:
     case EIO:

@@ -182,6 +182,16 @@ TEST(CollectProgram, ARunWhoseRecordingsCannotBeKeptSaysWhatItLeft) {
             0);
 }
 
+TEST(CollectProgram, AJournalThatIsGoneIsNotSaidToBeKept) {
+  CollectRun run;
+  RunningProcess process("supertac-collect", run.arguments());
+  ASSERT_TRUE(run.wait_for_contact(3, process)) << process.wait().error;
+  std::filesystem::remove(run.journal());
+  process.send(SIGINT);
+  const ProcessResult result = process.wait();
+  EXPECT_TRUE(contains(result.error, "the journal " + run.journal() + " is gone")) << result.error;
+}
+
 TEST(CollectProgram, AFullDiskInContactLiftsTheFinger) {
   CollectRun run;
   const ProcessResult result = run.collect({}, {.max_file_bytes = 2'500'000});

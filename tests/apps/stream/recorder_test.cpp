@@ -66,6 +66,15 @@ TEST_F(RecorderTest, AnEndCompletesTheFile) {
   EXPECT_EQ(SafetensorsFile::read(name).f64("time_s").size(), 1U);
 }
 
+TEST_F(RecorderTest, WithoutAFrameThereIsNoFile) {
+  Recorder recorder(kFormat, {});
+  recorder.start();
+  const std::string name = recorder.status().recording;
+  EXPECT_EQ(recorder.finish(), "no frame came: nothing was recorded");
+  EXPECT_FALSE(fs::exists(name));
+  EXPECT_TRUE(recorder.status().files.empty());
+}
+
 TEST_F(RecorderTest, AFileThatAppearedMeanwhileStays) {
   std::string name;
   {

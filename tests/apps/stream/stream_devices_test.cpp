@@ -109,7 +109,7 @@ TEST_F(Streaming, PortsThatAreNotABoardAreNamed) {
   settings.printer.heartbeat = true;
   plug_in(settings);
   const SerialPort first(board());
-  expect_failure(stream({"--board", board()}), 1, "already open in another program");
+  expect_failure(stream({"--board", board()}), 1, "already open, by another program");
   const ProcessResult printer = stream({"--board", path("printer")});
   EXPECT_EQ(printer.code, 1);
   EXPECT_NE(printer.error.find("expected"), std::string::npos) << printer.error;

@@ -265,6 +265,10 @@ TEST_F(Streaming, AnOldCaptureStaysUntilTheNewOneIsComplete) {
   const ProcessResult replayed = stream({"--replay", path("capture")});
   EXPECT_EQ(replayed.code, 0) << replayed.error;
   EXPECT_FALSE(fs::exists(path("capture.new")));
+  EXPECT_EQ(replayed.error.find("damaged"), std::string::npos) << replayed.error;
+  fs::resize_file(path("capture"), fs::file_size(path("capture")) - 5);
+  const ProcessResult cut = run_process("supertac-stream", {"--model", model(), "--replay", path("capture")});
+  EXPECT_NE(cut.error.find(" damaged bytes of the journal are missing"), std::string::npos) << cut.error;
 }
 
 TEST_F(Streaming, AModelThatDrawsNoNumbersIsRefused) {

@@ -44,7 +44,7 @@ TEST(SerialPort, SecondOpenerIsRefusedEvenAsRoot) {
   {
     const SerialPort first(folder / "port");
     EXPECT_ERROR(SerialPort second(folder / "port"), PortBusy,
-                 "already open in another program; close it (see `fuser ");
+                 "already open, by another program (see `fuser ");
   }
   EXPECT_NO_THROW(SerialPort third(folder / "port"));
 }
