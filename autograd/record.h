@@ -22,9 +22,11 @@ class Backward {
   /// As it is now: who writes to an input between its forward pass and backward() gets another gradient, and
   /// nothing notices.
   const Tensor& value(std::size_t input) const { return node_.inputs[input]->value; }
-  /// The gradient of that input, zero-filled at first use; null when that input requires none. Add into it.
+  /// The gradient of that input, zero-filled at first use; null when that input requires none. For steps that
+  /// add to an element more than once (sums, maxima).
   Tensor* grad_of(std::size_t input);
-  /// The same without the zeros: at first use the contents are undefined and the step must write all of them.
+  /// The same without the zeros, for steps that take each element once: at first use the contents are
+  /// undefined and the step must write all of them. add_to_gradient() (autograd/ops/elementwise.h) does so.
   struct Slot {
     Tensor* grad = nullptr;
     Into into = Into::add;

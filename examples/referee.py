@@ -83,7 +83,7 @@ def activation(x, slope):
 
 # ---- 2. Gradients
 def adds(before, term, first=ZERO):
-    """Puts with a first of -0, to which everything adds as it is."""
+    """With a first of -0 the term itself where nothing was before: to -0 everything adds as it is."""
     return (first if before is None else before) + term
 
 
@@ -367,7 +367,7 @@ def computed(ran, arrays):
     y, gy, old = arrays[ran["y"]], arrays[ran["gy"]], [arrays[name] if name else None for name in ran["before"]]
     if op in TERMS:
         terms = [np.broadcast_to(term, of.shape) for term, of in zip(TERMS[op](s, x, y, gy), x)]
-        return [adds(before, term, -ZERO if op == "add" else ZERO) for before, term in zip(old, terms)]
+        return [adds(before, term, ZERO if "flatten" in op else -ZERO) for before, term in zip(old, terms)]
     return WHOLE.get(op, product_reverse)(s, x, y, gy, old)
 
 

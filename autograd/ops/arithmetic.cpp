@@ -5,18 +5,18 @@
 
 namespace supertac {
 
-// ga = gb = gy
+// a, b, y of one shape, here and below;  y = a + b;  ga = gb = gy
 Variable operator+(const Variable& a, const Variable& b) {
   check_same_shape("add", "a", a, "b", b);
   Tensor y(a.shape());
   each(y.size(), [a = a.value().data(), b = b.value().data(), to = y.data()](Dim i) { to[i] = a[i] + b[i]; });
   return record("add", y, {&a, &b}, [](Backward& g) {
     for (const std::size_t input : {0, 1})
-      put_to_gradient(g, input, [gy = g.gy().data()](Dim i) { return gy[i]; });
+      add_to_gradient(g, input, [gy = g.gy().data()](Dim i) { return gy[i]; });
   });
 }
 
-// ga = gy b,  gb = gy a
+// y = a b;  ga = gy b,  gb = gy a
 Variable operator*(const Variable& a, const Variable& b) {
   check_same_shape("multiply", "a", a, "b", b);
   Tensor y(a.shape());
@@ -42,10 +42,11 @@ Variable operator-(const Variable& a, const Variable& b) {
   return a + -1 * b;
 }
 Variable operator-(real number, const Variable& x) {
+  check_defined("subtract", "x", x);
   return Variable(Tensor::full(x.shape(), number)) + -1 * x;
 }
 
-// gx = gy, everywhere
+// x of any shape, y [] = the sum of its elements;  gx[i] = gy
 Variable sum(const Variable& x) {
   check_defined("sum", "x", x);
   const double total = kernels::sum_of(x.size(), [from = x.value().data()](Dim i) { return from[i]; });

@@ -10,7 +10,7 @@ namespace supertac {
 Variable operator+(const Variable& a, const Variable& b);
 Variable operator-(const Variable& a, const Variable& b);
 Variable operator*(const Variable& a, const Variable& b);
-/// y[i] = factor x[i] and y[i] = number - x[i].
+/// y[i] = factor x[i] and y[i] = number - x[i]; x of any shape.
 Variable operator*(real factor, const Variable& x);
 Variable operator-(real number, const Variable& x);
 

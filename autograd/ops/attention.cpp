@@ -23,6 +23,15 @@ void each_element(const Maps& maps, Body body) {
   });
 }
 
+// gx[i] += term(i, k), with those i and k.
+template <class Term>
+void add_to_maps(const Backward::Slot& gx, const Maps& maps, Term term) {
+  if (!gx) return;
+  real* const to = gx.data();
+  gx.into == Into::add ? each_element(maps, [=](Dim i, Dim k) { to[i] += term(i, k); })
+                       : each_element(maps, [=](Dim i, Dim k) { to[i] = term(i, k); });
+}
+
 Maps maps_of(const char* op, const Variable& x) {
   check_rank(op, "x", x, 4);
   return {x.dim(0), x.dim(1) * x.dim(2), x.dim(3)};
@@ -40,9 +49,7 @@ Variable global_mean(const Variable& x) {
   each_element(maps, [=, from = x.value().data()](Dim i, Dim k) { mean[k] += from[i]; });
   each(y.size(), [=](Dim k) { mean[k] /= pixels; });
   return record("global_mean", y, {&x}, [maps, pixels](Backward& g) {
-    Tensor* const gx = g.grad_of(0);
-    if (gx == nullptr) return;
-    each_element(maps, [=, gy = g.gy().data(), to = gx->data()](Dim i, Dim k) { to[i] += gy[k] / pixels; });
+    add_to_maps(g.slot_of(0), maps, [pixels, gy = g.gy().data()](Dim, Dim k) { return gy[k] / pixels; });
   });
 }
 
@@ -57,12 +64,8 @@ Variable gated_sum(const Variable& a, const Variable& x, const Variable& s) {
                          Dim i, Dim k) { to[i] = a[i] + x[i] * s[k]; });
   return record("gated_sum", y, {&a, &x, &s}, [maps](Backward& g) {
     const real *gy = g.gy().data(), *from = g.value(1).data(), *gate = g.value(2).data();
-    put_to_gradient(g, 0, [=](Dim i) { return gy[i]; });
-    if (const Backward::Slot gx = g.slot_of(1)) {
-      real* const to = gx.data();
-      gx.into == Into::add ? each_element(maps, [=](Dim i, Dim k) { to[i] += gy[i] * gate[k]; })
-                           : each_element(maps, [=](Dim i, Dim k) { to[i] = gy[i] * gate[k]; });
-    }
+    add_to_gradient(g, 0, [=](Dim i) { return gy[i]; });
+    add_to_maps(g.slot_of(1), maps, [=](Dim i, Dim k) { return gy[i] * gate[k]; });
     if (Tensor* gs = g.grad_of(2))
       each_element(maps, [=, to = gs->data()](Dim i, Dim k) { to[k] += gy[i] * from[i]; });
   });

@@ -11,10 +11,10 @@ namespace supertac {
 struct ConvOptions {
   Dim stride = 1;
   Dim padding = 0;                      // zeros on every side
-  real negative_slope = kNoActivation;  // of the activation, see autograd/ops/activations.h
+  real negative_slope = kNoActivation;  // of the activation f(s) = s for s > 0, else negative_slope s
 };
 
-/// y[n,l,o] = f(b[o] + sum over k, i of x[n, l stride + k - padding, i] w[k,i,o]),   f as activations.h says
+/// y[n,l,o] = f(b[o] + sum over k, i of x[n, l stride + k - padding, i] w[k,i,o])
 /// x [N,L,in], w [K,in,out], b [out]; y [N, (L + 2 padding - K) / stride + 1, out].
 /// All four throw std::invalid_argument naming the argument when a rank, a shape, a channel count (1 to
 /// 4096), an option or the output size is impossible.

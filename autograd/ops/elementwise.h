@@ -12,17 +12,10 @@ namespace supertac {
 
 using kernels::each;
 
-/// gx[i] += term(i) where that input wants a gradient.
+/// gx[i] += term(i) where that input wants a gradient; at first use gx[i] = term(i), without zeros being
+/// written and read again. Steps that do not go through gx element by element use Backward itself.
 template <class Term>
 void add_to_gradient(Backward& g, std::size_t input, Term term) {
-  Tensor* const tensor = g.grad_of(input);
-  if (tensor == nullptr) return;
-  each(tensor->size(), [=, gx = tensor->data()](Dim i) { gx[i] += term(i); });
-}
-
-/// The same, but at first use gx[i] = term(i), without zeros being written and read again.
-template <class Term>
-void put_to_gradient(Backward& g, std::size_t input, Term term) {
   const Backward::Slot slot = g.slot_of(input);
   if (!slot) return;
   real* const gx = slot.data();

@@ -85,19 +85,17 @@ Variable concat(std::span<const Variable> xs) {
     move_columns(rows, last, x.value().data(), {last, 0}, Into::overwrite, y.data(), {width, at});
     at += last;
   }
-  return record(
-      "concat", y, std::span<const Variable* const>(inputs.data(), xs.size()),
-      [rows, width, count = xs.size()](Backward& g) {
-        Dim from = 0;
-        for (std::size_t i = 0; i < count; ++i) {
-          const Shape& shape = g.value(i).shape();
-          const Dim last = shape[shape.rank() - 1];
-          if (Tensor* gx = g.grad_of(i)) {
-            move_columns(rows, last, g.gy().data(), {width, from}, Into::add, gx->data(), {last, 0});
-          }
-          from += last;
-        }
-      });
+  return record("concat", y, std::span<const Variable* const>(inputs.data(), xs.size()),
+                [rows, width, count = xs.size()](Backward& g) {
+                  Dim from = 0;
+                  for (std::size_t i = 0; i < count; ++i) {
+                    const Shape& shape = g.value(i).shape();
+                    const Dim last = shape[shape.rank() - 1];
+                    if (const Backward::Slot gx = g.slot_of(i))
+                      move_columns(rows, last, g.gy().data(), {width, from}, gx.into, gx.data(), {last, 0});
+                    from += last;
+                  }
+                });
 }
 
 static void check_runs(const Variable& x, const Runs& r) {
