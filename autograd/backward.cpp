@@ -17,10 +17,19 @@ Tensor* Backward::grad_of(std::size_t input) {
   return slot.grad;
 }
 
+static void check_gradient(const Node& x) {
+  if (x.grad.shape() == x.value.shape()) return;
+  throw std::invalid_argument("backward: the gradient of " + x.value.shape().text() +
+                              " expects that shape, got " + x.grad.shape().text());
+}
+
 Backward::Slot Backward::slot_of(std::size_t input) {
   Node& x = *node_.inputs[input];
   if (!x.requires_grad) return {};
-  if (x.grad.defined()) return {&x.grad, Into::add};
+  if (x.grad.defined()) {
+    check_gradient(x);
+    return {&x.grad, Into::add};
+  }
   x.grad =
       x.spare.shape() == x.value.shape() && x.spare.defined() ? std::move(x.spare) : Tensor(x.value.shape());
   return {&x.grad, Into::overwrite};
@@ -110,6 +119,7 @@ void backward(const Variable& loss) {
   check_loss(loss);
   Tensor& grad = loss.node()->grad;
   if (!grad.defined()) grad = Tensor::zeros(loss.shape());
+  check_gradient(*loss.node());
   grad.data()[0] += 1;                        // dL/dL
   if (loss.node()->input_count == 0) return;  // a leaf
   thread_local std::vector<Node*> memory;     // kept from step to step

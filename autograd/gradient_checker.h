@@ -14,7 +14,8 @@ struct GradientEntry {
   Dim index;          // which of its elements, in row-major order
   double analytic, numeric;
   /// |analytic - numeric| / (max(|analytic|, |numeric|) + 1e-3 * the largest gradient of that input
-  ///                         + 1e-5 * the largest gradient of all inputs); 1e30 when it is not finite
+  ///                         + 1e-5 * the largest gradient of all inputs), the denominator at least 1e-10;
+  /// 1e30 when it is not finite
   double relative_error;
   /// "encoder.2.conv.1.weight [3,0,7] of [4,2,9]": the input's name, the element's indices in memory, the
   /// shape
@@ -33,7 +34,9 @@ struct GradientReport {
 };
 
 struct GradientCheckOptions {
-  double step = 1e-3;                   // of the five-point stencil; relative to max(1, |x|)
+  /// Of the five-point stencil, relative to max(1, |x|). Where the gradients disagree two shorter steps are
+  /// tried and the nearest difference counts: a rectifier's kink between the points spoils that step alone.
+  double step = 1e-3;
   Dim max_entries_per_input = 200;      // larger inputs are sampled evenly
   std::vector<std::string> names = {};  // of the inputs; "input 0", "input 1" ... where there is none
 };
@@ -41,7 +44,8 @@ struct GradientCheckOptions {
 /// `f` computes a result of any shape from the leaves, deterministically, whenever it is called. The result
 /// is reduced to the scalar sum(y * r) with fixed weights r that differ from element to element, so that no
 /// gradient hides in a symmetry. The leaves (parameters, for example) are shifted and put back; their
-/// gradients are overwritten.
+/// gradients are overwritten, by twice the gradient: backward() runs twice, since the first is written and
+/// the second added.
 GradientReport check_gradients(const std::function<Variable()>& f, std::vector<Variable> leaves,
                                const GradientCheckOptions& options = {});
 

@@ -2,7 +2,8 @@
 //
 // A training step asks for the same few hundred buffers each time. Released blocks wait in a free
 // list of their size class and are handed out again, so that a warm step never calls the heap.
-// The lists belong to the calling thread: no locks, and a block may be released by another thread. What a
+// The lists belong to the calling thread: a warm step takes no lock, and a block may be released by another
+// thread. What a
 // warm step touches lies together in large pages, where the system has them.
 #pragma once
 
@@ -18,7 +19,8 @@ void* pool_allocate(std::size_t bytes);
 /// Gives a block back; `bytes` is the number that was asked for.
 void pool_release(void* block, std::size_t bytes) noexcept;
 
-/// How many times this thread's pool has gone to the heap so far (a warm step adds none).
+/// How many blocks this thread's pool has taken from what all threads share so far: the heap, or a thread
+/// that has ended (a warm step adds none).
 std::uint64_t pool_heap_allocations();
 
 /// Scratch memory of one function: an array of trivial values from the pool, contents undefined.

@@ -32,9 +32,10 @@ class Variable {
   /// For optimisers, initialisers and loaders alone. A value that an op has read may not be written to before
   /// backward(): reverse steps read it again.
   Tensor& mutable_value() { return checked().value; }
-  /// Empty until backward() has reached this variable.
+  /// dL/dv of a leaf, empty until backward() has reached it; of an op's result empty again behind its reverse
+  /// step.
   const Tensor& grad() const { return checked().grad; }
-  /// Of value()'s shape, or undefined.
+  /// To be replaced by one of value()'s shape alone: backward() and Adam refuse another.
   Tensor& mutable_grad() { return checked().grad; }
   /// Empties grad() but keeps its buffer for the next gradient, which overwrites it under any Tensor that
   /// still shares it.
@@ -66,7 +67,8 @@ class Variable {
 /// Adds dL/dv into grad() of every leaf v that requires it, for a scalar L, and frees the graph.
 /// Threads may build graphs over the same leaves at once, but only one may run backward() into a leaf.
 /// Throws std::invalid_argument when L has not exactly one element, depends on nothing that requires a
-/// gradient, or when a part of its graph was freed by an earlier backward().
+/// gradient, or when a part of its graph was freed by an earlier backward(). What a reverse step throws comes
+/// through, and leaves gradients half added: such a graph is of no more use.
 void backward(const Variable& loss);
 
 /// While one lives on this thread, ops compute values only: the inference mode of the same code.

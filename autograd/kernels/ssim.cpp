@@ -61,6 +61,7 @@ class SsimImage {
   //   dS/dm = 2 (mean_b n2 / (d1 d2) - mean_a S / d1),  dS/dv = -S / d2,  dS/dc = 2 n1 / (d1 d2)
   // and with blur the windowed sum, m = blur(x), v = blur(x^2) - m^2, c = blur(x target) - m blur(target):
   //   gx += blur^T(by_x) + x blur^T(by_square) + target blur^T(by_product)
+  // x, target, gx [h,w]; S, m, v, c and by_* [oh,ow]; blur^T [oh,ow] -> [h,w]
   void add_gradient(const real* x, const real* target, real g, real* gx) {
     take_moments(x, target);
     const real each = g / static_cast<real>(oh_ * ow_);

@@ -43,8 +43,8 @@ class Adam {
   /// (Jordan et al. 2024; the root, which gives matrices of any shape steps of one length: Liu et al. 2025,
   /// arXiv 2502.16982, eq. 4). Its second moment stays 0.
   ///
-  /// Throws std::invalid_argument where a parameter has no gradient: after Variable::drop_grad(), backward()
-  /// has to reach it before.
+  /// Throws std::invalid_argument where a parameter has no gradient (after Variable::drop_grad(), backward()
+  /// has to reach it before) or one of another shape.
   ///
   /// Returns the gradient's norm before clipping, infinity when the square of the clipped one overflows
   /// `real`. When it is not finite nothing is changed: check it.

@@ -131,10 +131,10 @@ Geometry build(const ConvSettings& s) {
 }  // namespace
 
 const Geometry& geometry_of(const ConvSettings& settings) {
-  // Never destroyed: a graph refers to its geometries and may outlive the thread that made it.
+  // Never destroyed: what is still computed while the program ends refers to them.
   static auto& known = *new std::map<ConvSettings, std::unique_ptr<Geometry>>;
   static std::mutex mutex;
-  const std::lock_guard lock(mutex);  // once for each convolution of a forward pass
+  const std::lock_guard lock(mutex);  // once for each convolution and each of its gradients
   std::unique_ptr<Geometry>& geometry = known[settings];
   if (geometry == nullptr) geometry = std::make_unique<Geometry>(build(settings));
   return *geometry;

@@ -11,8 +11,9 @@
 
 namespace supertac::kernels {
 
-/// Whether conv() and its gradients take this way: fewer than half as many outputs as inputs, and kernels
-/// three wide that keep the size of a map. The shapes alone decide, so that all processors agree.
+/// Whether conv() and its gradients take this way: fewer than half as many outputs as inputs, taps * outputs
+/// that fit a vector of 16, and kernels three wide and an odd number high that keep the size of a map. The
+/// shapes alone decide, so that all processors agree.
 bool is_narrow(const ConvTask& task);
 
 void narrow_conv(const ConvTask& task, const real* x, const real* w, const real* bias, real negative_slope,

@@ -11,7 +11,7 @@ namespace {
 
 constexpr Dim kPlaces = 36, kSquare = 16;
 constexpr Dim kFewestImages = 4;    // that repay the transform of the weights
-constexpr Dim kFewestTiles = 4;     // of a map: 8x8
+constexpr Dim kFewestTiles = 4;     // of a map: 8x8, 4x16
 constexpr Dim kTilesPerStrip = 8;   // these stay in the first cache from transform to transform, ...
 constexpr Dim kTilesPerPiece = 64;  // ... these in the second while their weights' gradient is summed
 constexpr Dim kPadding = 16;        // between places of weights: powers of two apart they share cache lines

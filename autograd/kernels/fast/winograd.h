@@ -10,9 +10,9 @@
 
 namespace supertac::kernels {
 
-/// Whether conv() and its gradients take this way: four images or more of 8x8 or more, sides multiples of 4,
-/// channels multiples of 16. Elsewhere the transforms cost more than the products save. The shapes alone
-/// decide, so that all processors agree.
+/// Whether conv() and its gradients take this way: four images or more, of four 4x4 squares or more (8x8,
+/// 4x16), channels multiples of 16. Elsewhere the transforms cost more than the products save. The shapes
+/// alone decide, so that all processors agree.
 bool is_winograd(const ConvTask& task);
 
 void winograd_conv(const ConvTask& task, const real* x, const real* w, const real* bias, real negative_slope,

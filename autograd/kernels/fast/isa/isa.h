@@ -97,7 +97,7 @@ struct IsaKernels {
 const IsaKernels& isa_kernels();
 /// All sets that this processor can run, the best first, kPlainKernels last.
 std::vector<const IsaKernels*> supported_sets();
-/// Replaces the choice. For tests only, which compare the sets in one process; not while kernels run.
+/// Replaces the choice, for those who compare the sets in one process; not while kernels run.
 void use_isa(const IsaKernels& set);
 
 /// No kernels of this folder at all: the plain loops of autograd/kernels/conv.cpp and autograd/ops/linear.cpp
