@@ -1,4 +1,4 @@
-// One picture from a checkpoint and 256 samples of a sensor: what a program that embeds SuperTac has to do.
+// One picture from a checkpoint and the last samples of a sensor: what a program that embeds SuperTac does.
 // It takes 0.02 s, files included; the network itself needs 0.16 ms of them.
 //
 //   load_and_draw MODEL RECORDING SECONDS PICTURE.png

@@ -91,17 +91,16 @@ Tensor normal(const RandomStream& random, std::uint64_t first, Dim n) {
   return eps;
 }
 
-void draw(const char* path, const std::vector<Tensor>& rows, int columns) {
-  constexpr int kPanel = 64, kStep = kPanel + 4;
+// One column for each picture: it, its reconstruction, and one that was dreamt up.
+void draw(const char* path, const Tensor& shown, const Tensor& decoded, const Tensor& dreamt) {
   constexpr std::size_t kPixels = kSide * kSide;
-  Picture picture(columns * kStep + 4, static_cast<int>(rows.size()) * kStep + 4);
-  Panel panel{.left = 4, .top = 4, .width = kPanel, .height = kPanel};
-  for (const Tensor& row : rows) {
-    for (std::size_t c = 0; c < row.values().size(); c += kPixels, panel.left += kStep)
-      draw_panel(picture, panel, row.values().subspan(c, kPixels), kSide, kSide);
-    panel.left = 4, panel.top += kStep;
-  }
-  write_png(path, picture);
+  std::vector<Strip> columns;
+  for (std::size_t at = 0; at < shown.values().size(); at += kPixels)
+    columns.push_back({shown.values().subspan(at, kPixels),
+                       decoded.values().subspan(at, kPixels),
+                       dreamt.values().subspan(at, kPixels),
+                       {}});
+  write_png(path, film_picture(columns, {.rows = kSide, .columns = kSide, .scale = 1, .side = 64}));
 }
 
 void train_and_draw(const char* path) {
@@ -126,7 +125,7 @@ void train_and_draw(const char* path) {
   const NoGrad only_values;
   const Tensor shown = domes(unseen, 0, kShown);
   const Variable decoded = vae.forward(Variable(shown), Tensor::zeros({kShown, kLatent})).picture;
-  draw(path, {shown, decoded.value(), vae.decode(Variable(normal(dreams, 0, kShown))).value()}, kShown);
+  draw(path, shown, decoded.value(), vae.decode(Variable(normal(dreams, 0, kShown))).value());
   std::printf("12 pictures never seen: squared error %.5f; %s\n", l2_loss(decoded, Variable(shown)).item(),
               path);
 }

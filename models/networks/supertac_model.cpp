@@ -128,8 +128,9 @@ Variable Upsampler::map_of(const Variable& latents, const Variable& windows) con
   Variable past, present;
   if (fc_)
     past = unflatten_channels_first(fc_->forward(latents, kLeakyRelu), pixels);  // [N,rows,columns,channels]
-  if (last_frame_)
+  if (last_frame_) {  // [N,T,signals] -> [N,rows,columns,in_channels] -> [N,rows,columns,channels]
     present = last_frame_->forward(last_frame(windows, rows_, columns_, in_channels_), kLeakyRelu);
+  }
   if (!fc_) return present;
   return last_frame_ ? past + present : past;
 }
@@ -161,7 +162,7 @@ PerGroup<Variable> SuperTac::split(const Variable& windows) const {
   const Dim run = s.grouping == Grouping::horizontal ? row : s.in_channels;
   PerGroup<Variable> groups(s.groups());
   for (std::size_t g = 0; g < groups.size(); ++g)
-    groups[g] = take_runs(windows, {static_cast<Dim>(g) * run, run, row, s.group_signals()});
+    groups[g] = take_runs(windows, {static_cast<Dim>(g) * run, run, row, s.group_signals()});  // [N,T,group]
   return groups;
 }
 
@@ -192,8 +193,8 @@ NetworkFormat SuperTac::format() const {
 Variable SuperTac::means(const Variable& windows) const {
   const PerGroup<Variable> groups = split(windows);
   PerGroup<Variable> means(settings_.groups());
-  for (std::size_t i = 0; i < means.size(); ++i) means[i] = encoders_[i].mean(groups[i]);
-  return concat_groups(means.span());
+  for (std::size_t i = 0; i < means.size(); ++i) means[i] = encoders_[i].mean(groups[i]);  // [N,LD] each
+  return concat_groups(means.span());                                                      // [N,G LD]
 }
 
 Tensor SuperTac::encode(const Tensor& windows) const {

@@ -18,14 +18,6 @@ constexpr std::int64_t kStepsPerComparison = 100;
 
 }  // namespace
 
-void Trainer::Variances::clear() {
-  for (BatchVariance* variance : all()) variance->clear();
-}
-
-void Trainer::Variances::add(const Variances& other) {
-  pictures.add(other.pictures), targets.add(other.targets), means.add(other.means);
-}
-
 Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, Objective objective,
                  Ranks& ranks)
     : windows_(windows),
@@ -65,7 +57,8 @@ Trainer::MicroBatch::MicroBatch(const Objective& master, Dim first_sample, Dim c
   share_values(master.network().parameters(), objective.network().parameters());
 }
 
-// The windows and truths of this step, each augmented and mirrored by the number of its sample.
+// The windows [n,T,signals] and truths [n,H,W,1] of this step, n the samples of a micro-batch, each augmented
+// and mirrored by the number of its sample.
 void Trainer::fill(MicroBatch& micro_batch) const {
   const auto per_epoch = static_cast<std::uint64_t>(steps_per_epoch());
   const std::uint64_t epoch = static_cast<std::uint64_t>(step()) / per_epoch;
@@ -75,9 +68,11 @@ void Trainer::fill(MicroBatch& micro_batch) const {
   const std::size_t target_size = micro_batch.batch.targets.values().size() / count;
   for (std::size_t n = 0; n < count; ++n) {
     const std::size_t slot = static_cast<std::size_t>(micro_batch.first) + n;
-    const std::span<float> input = micro_batch.batch.inputs.values().subspan(n * input_size, input_size);
+    const std::span<float> input =  // [T,signals]
+        micro_batch.batch.inputs.values().subspan(n * input_size, input_size);
     windows_.window(indices_[slot], input);
-    const std::span<float> target = micro_batch.batch.targets.values().subspan(n * target_size, target_size);
+    const std::span<float> target =  // [H,W,1]
+        micro_batch.batch.targets.values().subspan(n * target_size, target_size);
     windows_.truth(indices_[slot], target);
     const std::uint64_t sample = batching_.sample(epoch, b, slot);
     if (windows_.augmentable(indices_[slot])) objective_.augment(sample, input);
@@ -121,7 +116,7 @@ void Trainer::run(MicroBatch& micro_batch) const {
   micro_batch.variances.pictures.add(output.picture.value());
   micro_batch.variances.targets.add(micro_batch.batch.targets);
   std::size_t first = 0;
-  for (const Variable& mean : output.means.span()) {
+  for (const Variable& mean : output.means.span()) {  // [n,LD] of each group
     micro_batch.variances.means.add(mean.value(), first);
     first += static_cast<std::size_t>(mean.dim(1));
   }
@@ -167,55 +162,6 @@ StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMi
   report.gradient_norm = state_.apply(micro_batch_parameters_, ranks_);
   if (step() % kStepsPerComparison == 0) check_same();
   return report;
-}
-
-// Loss terms and variances of micro-batches, then of processes, as balanced binary trees; gradients are added
-// in TrainingState::apply().
-void Trainer::add_up_statistics(StepReport& report) {
-  for (std::size_t apart = 1; apart < micro_batches_.size(); apart *= 2) {
-    for (std::size_t micro_batch = 0; micro_batch + apart < micro_batches_.size(); micro_batch += 2 * apart) {
-      micro_batches_[micro_batch].terms.add(micro_batches_[micro_batch + apart].terms);
-      micro_batches_[micro_batch].variances.add(micro_batches_[micro_batch + apart].variances);
-    }
-  }
-  MicroBatch& sum = micro_batches_.front();
-  if (ranks_.size() > 1) {
-    const auto each = [&](const std::function<void(double&)>& use) {
-      for (double* term : sum.terms.all()) use(*term);
-      for (BatchVariance* variance : sum.variances.all())
-        for (double& value : variance->values()) use(value);
-    };
-    statistics_.assign(1, report.stop ? 1 : 0);
-    each([&](double& value) { statistics_.push_back(value); });
-    of_partner_.resize(statistics_.size());
-    ranks_.add_up(statistics_, of_partner_);
-    report.stop = statistics_[0] > 0;
-    std::size_t next = 1;
-    each([&](double& value) { value = statistics_[next++]; });
-  }
-  report.add(sum.terms);
-}
-
-void Trainer::check_finite(const LossTerms& t) const {
-  if (std::isfinite(t.total)) return;
-  std::string where;
-  for (const MicroBatch& micro_batch : micro_batches_) {
-    if (where.empty()) where = micro_batch.trouble;
-  }
-  for (const std::string& its : ranks_.gather(where)) {
-    where = its;
-    if (!where.empty()) break;
-  }
-  state_.stop(t.text() + (where.empty() ? "" : ": " + where));
-}
-
-void Trainer::look_for_collapse(StepReport& report) {
-  const Variances& variances = micro_batches_.front().variances;
-  if (indices_.size() < 2) return;  // nothing to compare with
-  const auto samples = static_cast<double>(indices_.size());
-  report.active_latents = active_latents(variances.means, samples);
-  const bool idle = objective_.latents() > 0 && report.active_latents == 0;
-  report.collapsed = state_.collapsed(idle || is_degenerate(variances.pictures, variances.targets, samples));
 }
 
 // Of a model file and of a saved state: the caller's, the network's and the training's, in which a state that

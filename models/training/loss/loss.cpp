@@ -39,10 +39,11 @@ LossTerms terms_of(const Loss& loss, double share) {
   return {value(loss.total), value(loss.reconstruction), value(loss.kld), value(loss.l2), value(loss.ssim)};
 }
 
-// The pictures with the truth itself in place of those whose truth is flat.
+// picture, truth [N,H,W,1] -> the pictures, with the truth itself in place of those whose truth is flat.
 static Variable where_textured(const Variable& picture, const Tensor& truth) {
   const Dim images = truth.dim(0), pixels = truth.size() / images;
-  Tensor keep(truth.shape()), flat(truth.shape());
+  Tensor keep(truth.shape()),
+      flat(truth.shape());  // 1 and 0 of a textured one, 0 and the truth of a flat one
   for (Dim n = 0; n < images; ++n) {
     const std::span<const real> values(truth.data() + n * pixels, static_cast<std::size_t>(pixels));
     const auto [least, most] = std::ranges::minmax(values);
@@ -53,9 +54,10 @@ static Variable where_textured(const Variable& picture, const Tensor& truth) {
   return picture * Variable(keep) + Variable(flat);
 }
 
+// picture, truth [N,H,W,1]; all terms scalars []
 Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda) {
   const Variable target(truth);
-  check_shape("supertac_loss", "truth", target, picture.shape());
+  check_shape("picture_loss", "truth", target, picture.shape());
   Loss loss;
   loss.l2 = l2_loss(picture, target);
   loss.ssim = ssim(where_textured(picture, truth), truth);
@@ -63,7 +65,7 @@ Loss picture_loss(const Variable& picture, const Tensor& truth, double lambda) {
   return loss;
 }
 
-// |picture - truth|, a constant.
+// |picture - truth| [N,H,W,1], a constant.
 static Variable error_of(const Variable& picture, const Tensor& truth) {
   Tensor error(truth.shape());
   for (Dim i = 0; i < error.size(); ++i)
@@ -71,6 +73,8 @@ static Variable error_of(const Variable& picture, const Tensor& truth) {
   return Variable(error);
 }
 
+// Of each group input and decoded [N,T,group_signals], mean and log_var [N,LD]; predicted_error as the
+// picture.
 Loss supertac_loss(const SuperTac::Output& output, const Tensor& truth, const LossWeights& w) {
   Loss loss = picture_loss(output.picture, truth, w.lambda);
   for (std::size_t i = 0; i < output.decoded.size(); ++i) {

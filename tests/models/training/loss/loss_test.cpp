@@ -27,7 +27,6 @@ TEST(SuperTacLoss, IsTheConvexCombinationOfItsTerms) {
   EXPECT_NEAR(loss.total.item(), expected, 1e-6);
 }
 
-// The predicted error is drawn towards the picture's error, and the picture does not notice.
 // One of two pictures has a truth to compare structure with; of the other only the squared error counts.
 TEST(PictureLoss, TheSsimOfAFlatTruthCountsAsOne) {
   const Variable picture(uniform({2, 16, 16, 1}, 1), true);
@@ -47,7 +46,8 @@ TEST(PictureLoss, TheSsimOfAFlatTruthCountsAsOne) {
   EXPECT_EQ(sum(256), 0);
 }
 
-TEST(SuperTacLoss, TheSpreadLearnsTheError) {
+// The predicted error is drawn towards the picture's error, and the picture does not notice.
+TEST(SuperTacLoss, ThePredictedErrorLearnsTheError) {
   SuperTacSettings settings = small_settings();
   settings.predicted_error = true;
   Rng rng(1);
@@ -125,11 +125,11 @@ TEST(SuperTacLoss, RefusesTruthOfAnotherSizeAndNegativeWeights) {
   EXPECT_EQ(what_of<std::invalid_argument>([&] {
               supertac_loss(s.output, uniform({2, 16, 16, 1}, 3), {});
             }),
-            "supertac_loss: truth expects [2,8,8,1], got [2,16,16,1]");
+            "picture_loss: truth expects [2,8,8,1], got [2,16,16,1]");
   EXPECT_EQ(what_of<std::invalid_argument>([&] {
               picture_loss(s.output.picture, uniform({2, 8, 1}, 3), 0.1);
             }),
-            "supertac_loss: truth expects [2,8,8,1], got [2,8,1]");
+            "picture_loss: truth expects [2,8,8,1], got [2,8,1]");
   EXPECT_EQ(what_of<std::invalid_argument>([&] { LossWeights{.a = 2}.check(); }),
             "loss weights: expected 0 <= a <= 1, beta >= 0, lambda >= 0, got a = 2.000000, beta = 0.001000, "
             "lambda = 0.100000");
