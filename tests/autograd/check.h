@@ -47,7 +47,6 @@ inline bool same_bytes(const Tensor& a, const Tensor& b) {
          std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof(real)) == 0;
 }
 
-inline Variable constant(const Tensor& t) { return Variable(t); }
 inline Variable parameter(const Tensor& t) { return Variable(t, true); }
 
 /// A line of a test; std::source_location is more than Clang 14 can do with this standard library.

@@ -1,4 +1,4 @@
-// All instruction sets give the same bytes. The tables are called directly, past the choice at run time.
+// All instruction sets give the same bytes.
 #include "autograd/kernels/fast/isa/isa.h"
 
 #include <algorithm>
@@ -27,6 +27,21 @@ std::vector<const IsaKernels*> available() {
   return sets;
 }
 
+// The results of `run` with each set chosen are the same bytes.
+template <class Run>
+void expect_same_on_all_sets(const std::string& what, Run run) {
+  const IsaKernels& chosen = isa_kernels();
+  std::vector<Tensor> first;
+  for (const IsaKernels* isa : available()) {
+    use_isa(*isa);
+    const std::vector<Tensor> found = run(*isa);
+    if (first.empty()) first = found;
+    for (std::size_t i = 0; i < found.size(); ++i)
+      EXPECT_TRUE(same_bytes(found[i], first[i])) << isa->name << ", " << what << ", result " << i;
+  }
+  use_isa(chosen);
+}
+
 const ConvSettings kSettings[] = {
     {.height = 1, .width = 17, .kernel_w = 3, .stride_w = 2, .padding_w = 1},
     {.height = 1, .width = 5, .kernel_w = 4, .stride_w = 2, .padding_w = 1, .transposed = true},
@@ -51,6 +66,8 @@ const ConvSettings kSettings[] = {
     {.height = 1, .width = 1, .kernel_h = 3, .kernel_w = 3, .padding_h = 1, .padding_w = 1}};
 constexpr Dim kChannels[] = {1, 3, 7, 8, 16, 17, 33, 64, 100};
 
+std::string channels(Dim cin, Dim cout) { return std::to_string(cin) + " to " + std::to_string(cout); }
+
 Tensor gather(const IsaKernels& isa, const std::vector<Phase>& phases, const Tensor& x, const Tensor& w,
               const Tensor* bias, Tensor y, Dim cin, Dim cout) {
   isa.gather({&phases, w.data(), bias ? bias->data() : nullptr, cin, cout,
@@ -68,14 +85,10 @@ TEST(Isa, GatherForwardAndBackward) {
                      bias = numbers({cout}, 3);
         const Tensor w = numbers({g.taps, cin, cout}, 4), wt = numbers({g.taps, cout, cin}, 5);
         const Tensor gx = numbers({g.in_pixels, cin}, 6);
-        Tensor first_y, first_gx;
-        for (const IsaKernels* isa : available()) {
-          const Tensor y = gather(*isa, g.forward, x, w, &bias, Tensor({g.out_pixels, cout}), cin, cout);
-          const Tensor grad = gather(*isa, g.backward, gy, wt, nullptr, gx.clone(), cout, cin);
-          if (!first_y.defined()) first_y = y, first_gx = grad;
-          ASSERT_TRUE(same_bytes(y, first_y)) << isa->name << " forward " << cin << " to " << cout;
-          ASSERT_TRUE(same_bytes(grad, first_gx)) << isa->name << " backward " << cin << " to " << cout;
-        }
+        expect_same_on_all_sets(channels(cin, cout), [&](const IsaKernels& isa) {
+          return std::vector{gather(isa, g.forward, x, w, &bias, Tensor({g.out_pixels, cout}), cin, cout),
+                             gather(isa, g.backward, gy, wt, nullptr, gx.clone(), cout, cin)};
+        });
       }
     }
   }
@@ -86,13 +99,12 @@ TEST(Isa, GatherRows) {
     for (const Dim cin : kChannels) {
       for (const Dim cout : kChannels) {
         const Tensor x = numbers({rows, cin}), w = numbers({cin, cout}, 2), bias = numbers({cout}, 3);
-        Tensor first;
-        for (const IsaKernels* isa : available()) {
-          Tensor y({rows, cout});
-          isa->gather_rows({nullptr, w.data(), bias.data(), cin, cout}, x.data(), y.data(), rows);
-          if (!first.defined()) first = y;
-          ASSERT_TRUE(same_bytes(y, first)) << isa->name << " rows " << rows << ", " << cin << " to " << cout;
-        }
+        expect_same_on_all_sets(
+            std::to_string(rows) + " rows, " + channels(cin, cout), [&](const IsaKernels& isa) {
+              Tensor y({rows, cout});
+              isa.gather_rows({nullptr, w.data(), bias.data(), cin, cout}, x.data(), y.data(), rows);
+              return std::vector{y};
+            });
       }
     }
   }
@@ -106,16 +118,13 @@ TEST(Isa, Outer) {
       for (const Dim cout : kChannels) {
         const Tensor x = numbers({kImages, g.in_pixels, cin}), gy = numbers({kImages, g.out_pixels, cout}, 2);
         const Tensor start = numbers({cin, cout}, 3);
-        Tensor first;
-        for (const IsaKernels* isa : available()) {
+        expect_same_on_all_sets(channels(cin, cout), [&](const IsaKernels& isa) {
           Tensor gw = start.clone();
-          for (const TapPairs& pairs : g.pairs) {
-            isa->outer(
+          for (const TapPairs& pairs : g.pairs)
+            isa.outer(
                 {&pairs, x.data(), gy.data(), gw.data(), kImages, g.in_pixels, g.out_pixels, cin, cout});
-          }
-          if (!first.defined()) first = gw;
-          ASSERT_TRUE(same_bytes(gw, first)) << isa->name << ' ' << cin << " to " << cout;
-        }
+          return std::vector{gw};
+        });
       }
     }
   }
@@ -130,12 +139,9 @@ TEST(Isa, NegativeZeroHasTheSameSignEverywhere) {
       const Dim cin = 2;
       const Tensor x = Tensor::full({g.in_pixels, cin}, real(-0.0)), bias = Tensor::full({cout}, real(-0.0));
       const Tensor w = Tensor::full({g.taps, cin, cout}, 1);
-      Tensor first;
-      for (const IsaKernels* isa : available()) {
-        const Tensor y = gather(*isa, g.forward, x, w, &bias, Tensor({g.out_pixels, cout}), cin, cout);
-        if (!first.defined()) first = y;
-        ASSERT_TRUE(same_bytes(y, first)) << isa->name << " to " << cout;
-      }
+      expect_same_on_all_sets(channels(cin, cout), [&](const IsaKernels& isa) {
+        return std::vector{gather(isa, g.forward, x, w, &bias, Tensor({g.out_pixels, cout}), cin, cout)};
+      });
     }
   }
 }
@@ -219,20 +225,9 @@ std::vector<Tensor> results_of_loops(Dim n) {
 }
 
 TEST(Isa, PlainLoops) {
-  const IsaKernels& chosen = isa_kernels();
-  for (const Dim n : {1, 5, 16, 33, 100, 257}) {
-    std::vector<Tensor> first;
-    for (const IsaKernels* isa : available()) {
-      use_isa(*isa);
-      const std::vector<Tensor> rows = results_of_loops(n);
-      if (first.empty()) first = rows;
-      for (std::size_t i = 0; i < rows.size(); ++i) {
-        EXPECT_TRUE(same_bytes(rows[i], first[i]))
-            << isa->name << ", loop " << i << " of " << n << " numbers";
-      }
-    }
-  }
-  use_isa(chosen);
+  for (const Dim n : {1, 5, 16, 33, 100, 257})
+    expect_same_on_all_sets(std::to_string(n) + " numbers",
+                            [&](const IsaKernels&) { return results_of_loops(n); });
 }
 
 TEST(Isa, Winograd) {
@@ -241,20 +236,13 @@ TEST(Isa, Winograd) {
   const ConvTask sizes{&geometry_of(map), 5, 48, 16};
   const Tensor x = numbers({5, 96, 48}), w = numbers({9, 48, 16}, 2), bias = numbers({16}, 3);
   const Tensor gy = numbers({5, 96, 16}, 4);
-  const IsaKernels& chosen = isa_kernels();
-  Tensor first_y, first_gx, first_gw;
-  for (const IsaKernels* isa : available()) {
-    use_isa(*isa);
+  expect_same_on_all_sets("y, gx, gw", [&](const IsaKernels&) {
     Tensor y(gy.shape()), gx = numbers(x.shape(), 5), gw = numbers(w.shape(), 6);
     winograd_conv(sizes, x.data(), w.data(), bias.data(), 0.25F, y.data());
     winograd_grad_x(sizes, gy.data(), w.data(), Into::add, gx.data());
     winograd_grad_w(sizes, x.data(), gy.data(), Into::add, gw.data());
-    if (!first_y.defined()) first_y = y, first_gx = gx, first_gw = gw;
-    EXPECT_TRUE(same_bytes(y, first_y)) << isa->name;
-    EXPECT_TRUE(same_bytes(gx, first_gx)) << isa->name;
-    EXPECT_TRUE(same_bytes(gw, first_gw)) << isa->name;
-  }
-  use_isa(chosen);
+    return std::vector{y, gx, gw};
+  });
 }
 
 TEST(Isa, TheChosenSetIsOneOfThem) {
