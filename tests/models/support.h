@@ -43,6 +43,11 @@ inline SuperTacSettings small_settings() {
   return s;
 }
 
+inline SuperTac random_network(const SuperTacSettings& settings = small_settings(), std::uint64_t seed = 1) {
+  Rng rng(seed);
+  return SuperTac(settings, rng);
+}
+
 inline Recipe small_training() {
   Recipe s;
   s.model = small_settings();
@@ -85,6 +90,14 @@ inline std::vector<std::uint32_t> all_of(const WindowSet& windows) {
   for (std::uint32_t i = 0; i < windows.size(); ++i) indices.push_back(i);
   return indices;
 }
+
+/// What a test trains; it may change the recipe before.
+struct SmallTraining {
+  Recipe recipe = small_training();
+  WindowSet windows = small_windows(recipe.model);
+
+  Trainer trainer() const { return {windows, all_of(windows), Objective(windows, recipe)}; }
+};
 
 inline std::string file_text(const std::string& path) {
   const std::vector<std::byte> bytes = read_file(path, 1 << 26);

@@ -1,34 +1,34 @@
-// A warm training step and a warm inference go to the heap not once.
+// A warm training step and a warm inference, prepared or not, go to the heap not once.
 #include <gtest/gtest.h>
-#include <omp.h>
 
-#include "models/inference/evaluation.h"
+#include <functional>
+
 #include "tests/allocations.h"
 #include "tests/models/support.h"
 
 namespace supertac {
 namespace {
 
-TEST(NoAllocation, WarmTrainingStep) {
-  Recipe settings = small_training();
-  settings.epochs = 4;
-  settings.augment = kStandardAugmentation;
-  const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
-  for (int i = 0; i < 3; ++i) trainer.train_step();
+long allocations_of_five(const std::function<void()>& warm) {
+  for (int i = 0; i < 3; ++i) warm();
   const long before = allocations::made;
-  for (int i = 0; i < 5; ++i) trainer.train_step();
-  EXPECT_EQ(allocations::made - before, 0);
+  for (int i = 0; i < 5; ++i) warm();
+  return allocations::made - before;
+}
+
+TEST(NoAllocation, WarmTrainingStep) {
+  SmallTraining small;
+  small.recipe.augment = kStandardAugmentation;
+  Trainer trainer = small.trainer();
+  EXPECT_EQ(allocations_of_five([&] { trainer.train_step(); }), 0);
 }
 
 TEST(NoAllocation, WarmInference) {
-  Rng rng(1);
-  const SuperTac model(SuperTacSettings::of_preset("paper"), rng);
-  const Tensor window = uniform({1, 256, 16}, 1);
-  for (int i = 0; i < 3; ++i) model.infer(window);
-  const long before = allocations::made;
-  for (int i = 0; i < 5; ++i) model.infer(window);
-  EXPECT_EQ(allocations::made - before, 0);
+  const SuperTac network = random_network(SuperTacSettings::of_preset("paper"));
+  const Prepared prepared(network);
+  const Tensor one = uniform(network.input_shape(1), 1), many = uniform(network.input_shape(9), 1);
+  EXPECT_EQ(allocations_of_five([&] { network.infer(one); }), 0);
+  EXPECT_EQ(allocations_of_five([&] { prepared.estimate(one), prepared.estimate(many); }), 0);
 }
 
 }  // namespace

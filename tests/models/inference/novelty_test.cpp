@@ -76,14 +76,13 @@ TEST(Novelty, RefusesTooFewFeatures) {
 // A trained model knows its own windows again, and not those of a sensor with a stuck taxel.
 TEST(Novelty, ComesWithATrainedModel) {
   const TemporaryFolder folder;
-  Recipe settings = small_training();
-  const WindowSet windows = small_windows(settings.model);
-  std::vector<std::uint32_t> all(windows.size());
-  for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-  Trainer trainer(windows, all, Objective(windows, settings));
+  const SmallTraining small;
+  const WindowSet& windows = small.windows;
+  Trainer trainer = small.trainer();
   while (!trainer.done()) trainer.train_step();
   save_trained(trainer, folder / "m.safetensors", {});
   const ModelFile file = load_model(folder / "m.safetensors");
+  EXPECT_TRUE(file.ranges) << "of its values, for int8";
   ASSERT_TRUE(file.novelty);
   std::vector<float> window(32 * 16);
   windows.window(windows.size() / 2, window);

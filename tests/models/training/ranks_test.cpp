@@ -5,6 +5,7 @@
 
 #include <atomic>
 
+#include "tests/expect_error.h"
 #include "tests/models/support.h"
 #include "tests/models/thread_ranks.h"
 
@@ -39,13 +40,8 @@ TEST(Ranks, OnlyNumbersThatShareTheMicroBatchesAreTaken) {
   for (const int ranks : {1, 2, 4, 8}) EXPECT_NO_THROW(check_micro_batches(ranks, 8));
   EXPECT_NO_THROW(check_micro_batches(1, 3));
   EXPECT_NO_THROW(check_micro_batches(16, 128));
-  const auto refusal = [](int ranks, std::size_t batch) -> std::string {
-    try {
-      check_micro_batches(ranks, batch);
-      return {};
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
+  const auto refusal = [](int ranks, std::size_t batch) {
+    return what_of<std::invalid_argument>([&] { check_micro_batches(ranks, batch); });
   };
   for (const int ranks : {3, 5, 6, 7, 9, 16})
     EXPECT_EQ(refusal(ranks, 64),

@@ -26,10 +26,9 @@ struct Watched : WindowSet {
 
 // Over the end of an epoch too; behind the last step nothing is read.
 TEST(ReadingAhead, AnnouncesTheWindowsOfTheNextStep) {
-  const Recipe settings = small_training();
-  const WindowSet windows = small_windows(settings.model);
-  const Watched watched(windows);
-  Trainer trainer(watched, all_of(windows), Objective(windows, settings));
+  const SmallTraining small;
+  const Watched watched(small.windows);
+  Trainer trainer(watched, all_of(watched), Objective(watched, small.recipe));
   std::multiset<std::size_t> before;
   for (; !trainer.done(); before = std::exchange(watched.announced, {})) {
     watched.read.clear();

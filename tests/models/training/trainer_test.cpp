@@ -5,8 +5,8 @@
 
 #include <cmath>
 #include <functional>
-#include <memory>
 #include <numeric>
+#include <optional>
 
 #include "autograd/kernels/fast/isa/isa.h"
 #include "data/windows/transforms/mirror.h"
@@ -20,10 +20,9 @@ namespace supertac {
 namespace {
 
 TEST(Trainer, Learns) {
-  Recipe settings = small_training();
-  settings.epochs = 30;
-  const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
+  SmallTraining small;
+  small.recipe.epochs = 30;
+  Trainer trainer = small.trainer();
   const double first = trainer.train_step().l2;
   double last = 0;
   while (!trainer.done()) last = trainer.train_step().l2;
@@ -32,31 +31,32 @@ TEST(Trainer, Learns) {
 
 // Without noise the picture of the first step is that of inference.
 TEST(Trainer, WithoutSamplingLatentsAreTheMeans) {
-  Recipe settings = small_training();
-  settings.loss.beta = 0;
-  const WindowSet windows = small_windows(settings.model);
-  settings.batch = static_cast<std::int64_t>(windows.size());
+  SmallTraining small;
+  small.recipe.loss.beta = 0;
+  small.recipe.batch = static_cast<std::int64_t>(small.windows.size());
   const auto errors = [&](bool sampling) {
-    settings.sampling = sampling;
-    Trainer trainer(windows, all_of(windows), Objective(windows, settings));
-    const ZoneMetrics scores = score(Ensemble({Prepared(trainer.model())}), windows, all_of(windows));
+    small.recipe.sampling = sampling;
+    Trainer trainer = small.trainer();
+    const ZoneMetrics scores =
+        score(Ensemble({Prepared(trainer.model())}), small.windows, all_of(small.windows));
     const double inferred = std::pow(10, -scores.all().psnr_pooled_db / 10);
     return std::abs(trainer.train_step().l2 - inferred) / inferred;
   };
   EXPECT_LT(errors(false), 1e-4);
   EXPECT_GT(errors(true), 1e-3);
-  EXPECT_EQ(parse_json_limited(training_text(settings))["beta"], 0.0);
+  EXPECT_EQ(parse_json_limited(training_text(small.recipe))["beta"], 0.0);
 }
 
 // Deleting the augmentation, or another sample's, changes the loss; it is that of windows and truths changed
 // by hand.
 TEST(Trainer, LearnsFromAugmentedAndMirroredWindows) {
-  Recipe settings = small_training();
+  SmallTraining small;
+  const WindowSet& windows = small.windows;
+  Recipe& settings = small.recipe;
   settings.augment = {.gain = 0.5, .noise = 0.05};
   settings.mirror = true;
   settings.sampling = false;
-  const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
+  Trainer trainer = small.trainer();
   const Batching batching(all_of(windows), 8, settings.seed);
   std::vector<std::uint32_t> indices(8);
   batching.batch(0, 0, indices);
@@ -73,9 +73,7 @@ TEST(Trainer, LearnsFromAugmentedAndMirroredWindows) {
   }
   const double expected = trainer.objective()(by_hand).loss.total.item();
   EXPECT_NEAR(trainer.train_step().total, expected, 1e-5 * expected);
-  const auto loss = [&] {
-    return Trainer(windows, all_of(windows), Objective(windows, settings)).train_step().total;
-  };
+  const auto loss = [&] { return small.trainer().train_step().total; };
   settings.mirror = false;
   EXPECT_GT(std::abs(loss() - expected), 1e-3 * expected);
   settings.augment = {};
@@ -142,18 +140,18 @@ TEST(Trainer, LearnsFromSingleFrames) {
   EXPECT_GT(scores.psnr_mean_db, 18);
 }
 
-using MakeTrainer = std::function<std::unique_ptr<Trainer>()>;
+using MakeTrainer = std::function<Trainer()>;
 
 std::string checkpoint_of(const MakeTrainer& make, int threads, std::int64_t interrupted_after) {
   const TemporaryFolder folder;
   const int before = omp_get_max_threads();
   omp_set_num_threads(threads);
-  std::unique_ptr<Trainer> trainer = make();
+  std::optional<Trainer> trainer(make());
   while (!trainer->done()) {
     trainer->train_step();
     if (trainer->step() == interrupted_after) {
       trainer->save(folder / "state.safetensors", {});
-      trainer = make();
+      trainer.emplace(make());
       trainer->restore(folder / "state.safetensors", {});
     }
   }
@@ -162,22 +160,20 @@ std::string checkpoint_of(const MakeTrainer& make, int threads, std::int64_t int
   return file_text(folder / "end.safetensors");
 }
 
-// Windows and single frames.
+// Windows, by Adam and by Muon, and single frames.
 class TrainerBytes : public testing::Test {
  protected:
   TrainerBytes() {
-    settings_.augment.gain = 0.5;
-    settings_.augment.noise = 0.02;
+    windows_.recipe.augment = {.gain = 0.5, .noise = 0.02};
+    muon_.recipe.muon = true, muon_.recipe.epochs = 1;  // its steps take longer
   }
   const std::vector<MakeTrainer> makers_ = {
-      [this] {
-        return std::make_unique<Trainer>(windows_, all_of(windows_), Objective(windows_, settings_));
-      },
-      [this] { return std::make_unique<Trainer>(frames_, first(32), Objective(frames_, small_frames())); }};
+      [this] { return windows_.trainer(); }, [this] { return muon_.trainer(); },
+      [this] { return Trainer(frames_, first(32), Objective(frames_, small_frames())); }};
 
  private:
-  Recipe settings_ = small_training();
-  const WindowSet windows_ = small_windows(settings_.model), frames_ = blobs();
+  SmallTraining windows_, muon_;
+  const WindowSet frames_ = blobs();
 };
 
 TEST_F(TrainerBytes, AreTheSameForAnyNumberOfThreads) {
@@ -191,7 +187,7 @@ TEST_F(TrainerBytes, AreTheSameForAnyNumberOfThreads) {
 TEST_F(TrainerBytes, AreTheSameResumedAfterAnyStep) {
   for (const MakeTrainer& make : makers_) {
     const std::string uninterrupted = checkpoint_of(make, 1, -1);
-    for (std::int64_t step = 1; step < make()->total_steps(); ++step)
+    for (std::int64_t step = 1; step < make().total_steps(); ++step)
       ASSERT_TRUE(uninterrupted == checkpoint_of(make, 1, step)) << "stopped after step " << step;
   }
 }
@@ -205,10 +201,9 @@ TEST(Trainer, PinnedBits) {
     kernels::use_isa(*set);
     for (const int threads : {1, 2, 4, 8}) {
       omp_set_num_threads(threads);
-      Recipe settings = small_training();
-      settings.augment = kStandardAugmentation;
-      const WindowSet windows = small_windows(settings.model);
-      Trainer trainer(windows, all_of(windows), Objective(windows, settings));
+      SmallTraining small;
+      small.recipe.augment = kStandardAugmentation;
+      Trainer trainer = small.trainer();
       while (!trainer.done()) trainer.train_step();
       std::uint32_t bits = 0;
       for (const Parameter& p : trainer.model().parameters())
@@ -220,75 +215,29 @@ TEST(Trainer, PinnedBits) {
   omp_set_num_threads(1);
 }
 
-TEST(Trainer, RefusesToResumeAnotherRun) {
+TEST(Trainer, RefusesToResumeAnotherRunOrAModelWithoutState) {
   const TemporaryFolder folder;
-  Recipe settings = small_training();
-  const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
+  SmallTraining small;
+  Trainer trainer = small.trainer();
   trainer.train_step();
   trainer.save(folder / "state.safetensors", {{"data", "1234"}});
-  const auto message = [&](const Recipe& other, const std::string& data) -> std::string {
+  const auto message = [&](const std::string& data) -> std::string {
     return what_of<std::runtime_error>([&] {
-      Trainer(windows, all_of(windows), Objective(windows, other))
-          .restore(folder / "state.safetensors", {{"data", data}});
+      small.trainer().restore(folder / "state.safetensors", {{"data", data}});
     });
   };
-  EXPECT_EQ(message(settings, "1234"), "nothing thrown");
-  EXPECT_NE(message(settings, "5678").find("cannot resume: its data is 1234, this run's is 5678"),
-            std::string::npos);
-  settings.muon = true;
-  EXPECT_NE(message(settings, "1234").find("cannot resume: its training is"), std::string::npos);
-}
-
-TEST(Trainer, MuonGoesOnToTheSameBitsOnAnyNumberOfThreads) {
-  const TemporaryFolder folder;
-  Recipe settings = small_training();
-  settings.muon = true;
-  const WindowSet windows = small_windows(settings.model);
-  Trainer straight(windows, all_of(windows), Objective(windows, settings)),
-      first(windows, all_of(windows), Objective(windows, settings)),
-      resumed(windows, all_of(windows), Objective(windows, settings));
-  omp_set_num_threads(4);
-  for (int step = 0; step < 5; ++step) first.train_step();
-  first.save(folder / "state.safetensors", {});
-  resumed.restore(folder / "state.safetensors", {});
-  while (!resumed.done()) resumed.train_step();
-  omp_set_num_threads(1);
-  while (!straight.done()) straight.train_step();
-  for (std::size_t i = 0; i < straight.model().parameters().size(); ++i) {
-    const Parameter &a = straight.model().parameters()[i], &b = resumed.model().parameters()[i];
-    EXPECT_EQ(crc32(std::as_bytes(std::span<const real>(a.value.value().values()))),
-              crc32(std::as_bytes(std::span<const real>(b.value.value().values()))))
-        << a.name;
-  }
-}
-
-TEST(Trainer, KeepsWithTheModelWhatBytesAndTheAlarmNeed) {
-  const TemporaryFolder folder;
-  const Recipe settings = small_training();
-  const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
-  trainer.train_step();
-  save_trained(trainer, folder / "m.safetensors", model_metadata(settings.model, input_of(windows)));
-  const ModelFile file = load_model(folder / "m.safetensors");
-  EXPECT_TRUE(file.ranges);
-  EXPECT_TRUE(file.novelty);
-}
-
-TEST(Trainer, RefusesToResumeFromAModelWithoutState) {
-  const TemporaryFolder folder;
-  const Recipe settings = small_training();
-  const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
-  save_model(folder / "m.safetensors", trainer.model(), {}, {{"training", training_text(settings)}});
+  EXPECT_EQ(message("1234"), "nothing thrown");
+  EXPECT_NE(message("5678").find("cannot resume: its data is 1234, this run's is 5678"), std::string::npos);
+  save_model(folder / "m.safetensors", trainer.model(), {}, {{"training", training_text(small.recipe)}});
   EXPECT_ERROR(trainer.restore(folder / "m.safetensors", {}), std::runtime_error, "holds no training state");
+  small.recipe.muon = true;
+  EXPECT_NE(message("1234").find("cannot resume: its training is"), std::string::npos);
 }
 
 // The message of the step after `damage` has been done to the parameter of that name.
 std::string stopped(const std::string& name, const std::function<void(Tensor&)>& damage) {
-  const Recipe settings = small_training();
-  const WindowSet windows = small_windows(settings.model);
-  Trainer trainer(windows, all_of(windows), Objective(windows, settings));
+  const SmallTraining small;
+  Trainer trainer = small.trainer();
   trainer.train_step();
   for (const Parameter& p : trainer.model().parameters()) {
     if (p.name == name) damage(Variable(p.value).mutable_value());
@@ -316,12 +265,11 @@ TEST(Trainer, StopsWithStepLayerAndAdviceWhenAValueIsNotFinite) {
 // A network whose last layer is dead draws a flat image and learns nothing any more, and one whose encoders
 // are dead draws the same one for all; the detector must say so, and must keep quiet about a healthy run.
 TEST(Trainer, ReportsPicturesThatAreTheSameForAllAndIdleLatents) {
-  Recipe settings = small_training();
-  settings.epochs = 10;
-  const WindowSet windows = small_windows(settings.model);
+  SmallTraining small;
+  small.recipe.epochs = 10;
   StepReport last;
-  const auto steps_until_reported = [&](const Recipe& s, const std::string& dead) {
-    Trainer trainer(windows, all_of(windows), Objective(windows, s));
+  const auto steps_until_reported = [&](const std::string& dead) {
+    Trainer trainer = small.trainer();
     for (const Parameter& p : trainer.model().parameters()) {
       if (p.name.find(dead) != std::string::npos) Variable(p.value).mutable_value().fill(0);
     }
@@ -331,46 +279,30 @@ TEST(Trainer, ReportsPicturesThatAreTheSameForAllAndIdleLatents) {
     }
     return std::int64_t{0};
   };
-  EXPECT_EQ(steps_until_reported(settings, "none"), 0);
+  EXPECT_EQ(steps_until_reported("none"), 0);
   EXPECT_GT(last.active_latents, 0);
-  settings.learning_rate = 1e-9;
-  settings.warm_up = 0;
-  EXPECT_EQ(steps_until_reported(settings, "upsampler.out"), 100);
-  EXPECT_EQ(steps_until_reported(settings, ".mean."), 100);
+  small.recipe.learning_rate = 1e-9;
+  small.recipe.warm_up = 0;
+  EXPECT_EQ(steps_until_reported("upsampler.out"), 100);
+  EXPECT_EQ(steps_until_reported(".mean."), 100);
   EXPECT_EQ(last.active_latents, 0);
 }
 
-TEST(Trainer, RefusesWindowsOfAnotherFormat) {
-  Recipe settings = small_training();
-  const WindowSet windows = small_windows(settings.model);
-  settings.model.timesteps = 48;
-  EXPECT_EQ(what_of<std::invalid_argument>(
-                [&] { Trainer(windows, all_of(windows), Objective(windows, settings)); }),
+TEST(Trainer, RefusesWindowsOfAnotherFormatOrNone) {
+  SmallTraining small;
+  const WindowSet& windows = small.windows;
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { Trainer(windows, {}, Objective(windows, small.recipe)); }),
+            "batching: there is no window to train on");
+  small.recipe.model.timesteps = 48;
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { small.trainer(); }),
             "the data have 32 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8, the model "
             "expects 48 frame(s) of 4x4 taxels with 1 channel(s) and pictures of 8x8");
-  EXPECT_EQ(
-      what_of<std::invalid_argument>([&] { Trainer(windows, {}, Objective(windows, small_training())); }),
-      "batching: there is no window to train on");
 }
 
-TEST(Trainer, NamesTheSettingThatIsOutOfRange) {
-  const WindowSet windows = small_windows(small_settings());
-  const auto message = [&](const std::function<void(Recipe&)>& spoil) -> std::string {
-    Recipe settings = small_training();
-    spoil(settings);
-    return what_of<std::invalid_argument>(
-        [&] { Trainer(windows, all_of(windows), Objective(windows, settings)); });
-  };
-  EXPECT_EQ(message([](auto& s) { s.epochs = 0; }), "training settings: epochs must be 1 to 100000, got 0");
-  EXPECT_EQ(message([](auto& s) { s.batch = 5000; }), "training settings: batch must be 1 to 4096, got 5000");
-  EXPECT_EQ(message([](auto& s) { s.learning_rate = 2; }),
-            "training settings: learning rate must be above 0 and at most 1, got 2");
-  EXPECT_EQ(message([](auto& s) { s.warm_up = 1; }),
-            "training settings: warm-up must be a share of all steps, 0 to below 1, got 1");
-  EXPECT_EQ(message([](auto& s) { s.clip_norm = -1; }),
-            "training settings: clip norm must not be negative (0 = never), got -1");
-  EXPECT_NE(message([](auto& s) { s.loss.beta = -1; }).find("beta = -1"), std::string::npos);
-  EXPECT_NE(message([](auto& s) { s.augment.dropped = 17; }), "nothing thrown");
+TEST(Trainer, RefusesWhatTheArrayCannotDo) {
+  SmallTraining small;
+  small.recipe.augment.dropped = 17;
+  EXPECT_NE(what_of<std::invalid_argument>([&] { small.trainer(); }), "nothing thrown");
   Recipe mirrored = Recipe::named("frame");
   mirrored.mirror = true;
   const WindowSet two_numbers = blobs();

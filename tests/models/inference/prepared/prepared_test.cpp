@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <set>
@@ -15,7 +16,6 @@
 #include "io/numbers/random.h"
 #include "layers/convolution.h"
 #include "models/inference/prepared/planner.h"
-#include "tests/allocations.h"
 #include "tests/expect_error.h"
 #include "tests/models/support.h"
 
@@ -70,18 +70,15 @@ SuperTacSettings random_settings(std::uint64_t seed) {
 TEST(Prepared, DrawsWhatTheNetworkDrawsForAnySettings) {
   for (std::uint64_t seed = 0; seed < 24; ++seed) {
     const SuperTacSettings s = random_settings(seed);
-    Rng rng(seed);
-    expect_same_estimate(SuperTac(s, rng), 1 + static_cast<Dim>(seed % 10),
+    expect_same_estimate(random_network(s, seed), 1 + static_cast<Dim>(seed % 10),
                          "seed " + std::to_string(seed) + ": " + std::to_string(s.rows) + "x" +
                              std::to_string(s.columns) + " channels " + std::to_string(s.channels));
   }
 }
 
 TEST(Prepared, DrawsWhatTheNetworkDrawsForPresets) {
-  for (const char* preset : {"paper", "tiny", "frame"}) {
-    Rng rng(1);
-    expect_same_estimate(SuperTac(SuperTacSettings::of_preset(preset), rng), 9, preset);
-  }
+  for (const char* preset : {"paper", "tiny", "frame"})
+    expect_same_estimate(random_network(SuperTacSettings::of_preset(preset)), 9, preset);
 }
 
 // No network of ours joins maps, convolves its input as it is, or takes runs of anything but that.
@@ -140,33 +137,25 @@ Prepared prepare(const Network& network, bool bytes) {
 class PreparedBits : public testing::TestWithParam<std::tuple<const char*, bool>> {};
 
 TEST_P(PreparedBits, AreOneForBatchesInstructionSetsAndThreads) {
-  const char* const preset = std::get<0>(GetParam());
-  const bool bytes = std::get<1>(GetParam());
-  {
-    Rng rng(3);
-    const SuperTac network(SuperTacSettings::of_preset(preset), rng);
-    const Tensor windows = uniform(network.input_shape(64), 1);
-    const kernels::IsaKernels& before = isa_kernels();
-    const std::vector<real> expected = [&] {
-      const Tensor t = in_batches(prepare(network, bytes), windows, 64);
-      return std::vector<real>(t.values().begin(), t.values().end());
-    }();
-    for (const kernels::IsaKernels* set : supported_sets()) {
-      if (set == &kernels::kPlainKernels || set == &kernels::kPortableKernels) continue;  // far slower
-      use_isa(*set);
-      const Prepared prepared = prepare(network, bytes);
-      for (const Dim batch : {1, 7, 8, 64}) {
-        for (const int threads : {1, 2, 4}) {
-          omp_set_num_threads(threads);
-          const Tensor pictures = in_batches(prepared, windows, batch);
-          EXPECT_TRUE(std::equal(expected.begin(), expected.end(), pictures.data()))
-              << preset << " " << set->name << ", batch " << batch << ", threads " << threads;
-        }
+  const auto [preset, bytes] = GetParam();
+  const SuperTac network = random_network(SuperTacSettings::of_preset(preset), 3);
+  const Tensor windows = uniform(network.input_shape(64), 1);
+  const kernels::IsaKernels& before = isa_kernels();
+  const Tensor expected = in_batches(prepare(network, bytes), windows, 64);
+  for (const kernels::IsaKernels* set : supported_sets()) {
+    if (set == &kernels::kPlainKernels || set == &kernels::kPortableKernels) continue;  // far slower
+    use_isa(*set);
+    const Prepared prepared = prepare(network, bytes);
+    for (const Dim batch : {1, 7, 8, 64}) {
+      for (const int threads : {1, 2, 4}) {
+        omp_set_num_threads(threads);
+        EXPECT_TRUE(std::ranges::equal(expected.values(), in_batches(prepared, windows, batch).values()))
+            << preset << " " << set->name << ", batch " << batch << ", threads " << threads;
       }
     }
-    use_isa(before);
-    omp_set_num_threads(1);
   }
+  use_isa(before);
+  omp_set_num_threads(1);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, PreparedBits,
@@ -175,8 +164,7 @@ INSTANTIATE_TEST_SUITE_P(All, PreparedBits,
 // On the second cache depend how many pictures are drawn at once and whether few have their filters
 // transformed on the way.
 TEST(Prepared, OfAnyCacheHasTheSameBits) {
-  Rng rng(4);
-  const SuperTac network(SuperTacSettings::of_preset("paper"), rng);
+  const SuperTac network = random_network(SuperTacSettings::of_preset("paper"), 4);
   std::set<bool> seen;
   for (const Dim count : {1, 2, 3, 17}) {
     const Tensor windows = uniform(network.input_shape(count), 6);
@@ -196,8 +184,7 @@ TEST(Prepared, OfAnyCacheHasTheSameBits) {
 
 TEST(Prepared, InBytesDrawsNearlyTheSame) {
   for (std::uint64_t seed = 0; seed < 12; ++seed) {
-    Rng rng(seed);
-    const SuperTac network(random_settings(seed), rng);
+    const SuperTac network = random_network(random_settings(seed), seed);
     const Tensor inputs = uniform(network.input_shape(9), 5);
     const Estimate exact = network.estimate(inputs), bytes = prepare(network, true).estimate(inputs);
     const auto [low, high] = std::ranges::minmax(exact.picture.values());
@@ -209,8 +196,7 @@ TEST(Prepared, InBytesDrawsNearlyTheSame) {
 // Each op's map, in the order of the ops; a linear layer before a map leaves its numbers pixel by pixel.
 TEST(Prepared, ShowsEveryMapOnItsWay) {
   for (const std::uint64_t seed : {1, 2, 3}) {
-    Rng rng(seed);
-    const SuperTac network(random_settings(seed), rng);
+    const SuperTac network = random_network(random_settings(seed), seed);
     const Tensor input = uniform(network.input_shape(1), 5);
     std::vector<std::pair<std::string, std::vector<real>>> ops, shown;
     {
@@ -239,8 +225,8 @@ TEST(Prepared, ShowsEveryMapOnItsWay) {
 }
 
 TEST(Prepared, InBytesShowsItsMapsAsWhatTheyStandFor) {
-  Rng rng(1);
-  const SuperTac network({.timesteps = 32, .latent = 3, .scale = 4, .channels = 8, .rcabs = 1}, rng);
+  const SuperTac network =
+      random_network({.timesteps = 32, .latent = 3, .scale = 4, .channels = 8, .rcabs = 1});
   const Tensor input = uniform(network.input_shape(1), 5);
   std::map<std::string, std::vector<real>> bytes;
   const auto into = [](auto& maps) {
@@ -277,8 +263,7 @@ TEST(Prepared, InBytesShowsItsMapsAsWhatTheyStandFor) {
 }
 
 TEST(Prepared, RefusesTheRangesOfAnotherNetwork) {
-  Rng rng(1);
-  const SuperTac network(small_settings(), rng);
+  const SuperTac network = random_network();
   EXPECT_EQ(what_of<std::invalid_argument>([&] { Prepared(network, ActivationRanges()); }),
             "Prepared: the ranges are those of 0 ops, the network has 46");
 }
@@ -304,24 +289,12 @@ TEST(Prepared, RefusesRangesThatAreNotFiniteOrNoPairs) {
 }
 
 TEST(Prepared, RefusesInputsOfAnotherShape) {
-  Rng rng(1);
-  const SuperTac network(small_settings(), rng);
+  const SuperTac network = random_network();
   EXPECT_EQ(what_of<std::invalid_argument>([&] {
               Prepared(network).estimate(Tensor::zeros({1, 3, 16}));
             }),
             "Prepared: inputs expects [0,32,16] with any first size, got [1,3,16]");
   EXPECT_EQ(Prepared(network).estimate(Tensor::zeros(network.input_shape(0))).picture.dim(0), 0);
-}
-
-TEST(Prepared, TakesNoMemoryFromTheHeapOnceWarm) {
-  Rng rng(1);
-  const SuperTac network(SuperTacSettings::of_preset("paper"), rng);
-  const Prepared prepared(network);
-  const Tensor one = uniform(network.input_shape(1), 1), many = uniform(network.input_shape(9), 1);
-  for (int i = 0; i < 2; ++i) prepared.estimate(one), prepared.estimate(many);
-  const long before = allocations::made;
-  for (int i = 0; i < 5; ++i) prepared.estimate(one), prepared.estimate(many);
-  EXPECT_EQ(allocations::made - before, 0);
 }
 
 }  // namespace

@@ -13,8 +13,7 @@ namespace {
 constexpr real kNan = std::numeric_limits<real>::quiet_NaN();
 
 struct Sample {
-  Rng rng{1};
-  SuperTac model{small_settings(), rng};
+  SuperTac model = random_network();
   Tensor windows = uniform({2, 32, 16}, 1), truth = uniform({2, 8, 8, 1}, 3);
 
   std::string where() const {

@@ -13,8 +13,7 @@ namespace supertac {
 namespace {
 
 struct Sample {
-  Rng rng{1};
-  SuperTac model{small_settings(), rng};
+  SuperTac model = random_network();
   SuperTac::Output output = model.forward(uniform({2, 32, 16}, 1), normal_eps(2, 3, 2));
   Tensor truth = uniform({2, 8, 8, 1}, 3);
 };
@@ -50,8 +49,7 @@ TEST(PictureLoss, TheSsimOfAFlatTruthCountsAsOne) {
 TEST(SuperTacLoss, ThePredictedErrorLearnsTheError) {
   SuperTacSettings settings = small_settings();
   settings.predicted_error = true;
-  Rng rng(1);
-  const SuperTac model(settings, rng);
+  const SuperTac model = random_network(settings);
   const SuperTac::Output output = model.forward(uniform({2, 32, 16}, 1), normal_eps(2, 3, 2));
   const Tensor truth = uniform({2, 8, 8, 1}, 3);
   const Loss loss = supertac_loss(output, truth, {});
@@ -108,8 +106,7 @@ TEST(SuperTacLoss, EveryTermActsOnTheGradient) {
 }
 
 TEST(SuperTacLoss, StaysFiniteForInputsAThousandTimesTooLarge) {
-  Rng rng(1);
-  const SuperTac model(small_settings(), rng);
+  const SuperTac model = random_network();
   Tensor windows = uniform({2, 32, 16}, 1);
   for (real& x : windows.values()) x *= 1000;
   const Loss loss = supertac_loss(model.forward(windows, normal_eps(2, 3, 2)), uniform({2, 8, 8, 1}, 3), {});
