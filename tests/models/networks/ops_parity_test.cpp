@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <optional>
 
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/attention.h"
@@ -17,37 +18,25 @@ namespace supertac {
 namespace {
 
 using test::counter_numbers;
-using test::doubles;
 
-// PyTorch's order of axes against ours.
-enum class Order { same, linear_weight, conv_weight, transposed_weight, channels_last };
+// How PyTorch orders our axes: as a parameter of this layout is stored, or as a map, [N,C,P...] of
+// [N,P...,C].
+using Order = std::optional<Layout>;
+constexpr Order kMap = std::nullopt;
 
 struct Input {
   std::string name;
   Shape shape;  // ours
-  Order order = Order::same;
+  Order order = Layout::plain;
 };
-
-Layout layout_of(Order order) {
-  switch (order) {
-    case Order::linear_weight:
-      return Layout::linear;
-    case Order::conv_weight:
-      return Layout::conv;
-    case Order::transposed_weight:
-      return Layout::conv_transpose;
-    default:
-      return Layout::plain;
-  }
-}
 
 // Where element i of PyTorch's order lies in ours.
 std::vector<std::size_t> places(const Shape& shape, Order order) {
   Tensor numbered(shape);
   for (Dim i = 0; i < numbered.size(); ++i) numbered.data()[i] = static_cast<real>(i);
   std::vector<std::size_t> at;
-  if (order != Order::channels_last) {
-    const Parameter p{"", Variable(numbered), layout_of(order)};
+  if (order) {
+    const Parameter p{"", Variable(numbered), *order};
     for (const float f : to_stored(p, numbered, "").values) at.push_back(static_cast<std::size_t>(f));
     return at;
   }
@@ -95,54 +84,49 @@ void expect_parity(const std::string& op, const std::vector<Input>& inputs, Orde
 constexpr ConvOptions kHalving{.stride = 2, .padding = 1};
 
 TEST(OpsParity, Convolutions) {
-  expect_parity("conv1d",
-                {{"x", {2, 9, 3}, Order::channels_last}, {"w", {3, 3, 5}, Order::conv_weight}, {"b", {5}}},
-                Order::channels_last, [](const auto& in) { return conv1d(in[0], in[1], in[2], kHalving); });
-  expect_parity(
-      "conv2d",
-      {{"x", {2, 5, 7, 3}, Order::channels_last}, {"w", {3, 3, 3, 17}, Order::conv_weight}, {"b", {17}}},
-      Order::channels_last, [](const auto& in) { return conv2d(in[0], in[1], in[2], kHalving); });
+  expect_parity("conv1d", {{"x", {2, 9, 3}, kMap}, {"w", {3, 3, 5}, Layout::conv}, {"b", {5}}}, kMap,
+                [](const auto& in) { return conv1d(in[0], in[1], in[2], kHalving); });
+  expect_parity("conv2d", {{"x", {2, 5, 7, 3}, kMap}, {"w", {3, 3, 3, 17}, Layout::conv}, {"b", {17}}}, kMap,
+                [](const auto& in) { return conv2d(in[0], in[1], in[2], kHalving); });
 }
 
 TEST(OpsParity, TransposedConvolutions) {
-  expect_parity(
-      "conv_transpose1d",
-      {{"x", {2, 5, 3}, Order::channels_last}, {"w", {4, 3, 5}, Order::transposed_weight}, {"b", {5}}},
-      Order::channels_last, [](const auto& in) { return conv_transpose1d(in[0], in[1], in[2], kHalving); });
-  expect_parity(
-      "conv_transpose2d",
-      {{"x", {2, 4, 3, 3}, Order::channels_last}, {"w", {4, 4, 3, 5}, Order::transposed_weight}, {"b", {5}}},
-      Order::channels_last, [](const auto& in) { return conv_transpose2d(in[0], in[1], in[2], kHalving); });
+  expect_parity("conv_transpose1d",
+                {{"x", {2, 5, 3}, kMap}, {"w", {4, 3, 5}, Layout::conv_transpose}, {"b", {5}}}, kMap,
+                [](const auto& in) { return conv_transpose1d(in[0], in[1], in[2], kHalving); });
+  expect_parity("conv_transpose2d",
+                {{"x", {2, 4, 3, 3}, kMap}, {"w", {4, 4, 3, 5}, Layout::conv_transpose}, {"b", {5}}}, kMap,
+                [](const auto& in) { return conv_transpose2d(in[0], in[1], in[2], kHalving); });
 }
 
 TEST(OpsParity, Linear) {
-  expect_parity("linear", {{"x", {3, 33}}, {"w", {33, 17}, Order::linear_weight}, {"b", {17}}}, Order::same,
+  expect_parity("linear", {{"x", {3, 33}}, {"w", {33, 17}, Layout::linear}, {"b", {17}}}, Layout::plain,
                 [](const auto& in) { return linear(in[0], in[1], in[2]); });
 }
 
 TEST(OpsParity, OfImages) {
-  constexpr Order kLast = Order::channels_last;
-  expect_parity("max_pool2d", {{"x", {2, 5, 4, 3}, kLast}}, kLast,
+  expect_parity("max_pool2d", {{"x", {2, 5, 4, 3}, kMap}}, kMap,
                 [](const auto& in) { return max_pool2d(in[0]); });
-  expect_parity("gated_sum", {{"a", {2, 4, 5, 3}, kLast}, {"x", {2, 4, 5, 3}, kLast}, {"s", {2, 3}}}, kLast,
+  expect_parity("gated_sum", {{"a", {2, 4, 5, 3}, kMap}, {"x", {2, 4, 5, 3}, kMap}, {"s", {2, 3}}}, kMap,
                 [](const auto& in) { return gated_sum(in[0], in[1], in[2]); });
-  expect_parity("global_mean", {{"x", {2, 4, 5, 3}, kLast}}, Order::same,
+  expect_parity("global_mean", {{"x", {2, 4, 5, 3}, kMap}}, Layout::plain,
                 [](const auto& in) { return global_mean(in[0]); });
 }
 
 TEST(OpsParity, OfElements) {
-  expect_parity("sigmoid", {{"input", {3, 33}}}, Order::same, [](const auto& in) { return sigmoid(in[0]); });
-  const Tensor eps = numbers("sample_gaussian.eps", {3, 4}, Order::same);
-  expect_parity("sample_gaussian", {{"mean", {3, 4}}, {"log_var", {3, 4}}}, Order::same,
+  expect_parity("sigmoid", {{"input", {3, 33}}}, Layout::plain,
+                [](const auto& in) { return sigmoid(in[0]); });
+  const Tensor eps = numbers("sample_gaussian.eps", {3, 4}, Layout::plain);
+  expect_parity("sample_gaussian", {{"mean", {3, 4}}, {"log_var", {3, 4}}}, Layout::plain,
                 [&](const auto& in) { return sample_gaussian(in[0], in[1], eps); });
 }
 
 TEST(OpsParity, Losses) {
-  expect_parity("l2_loss", {{"x", {2, 5, 3}}, {"target", {2, 5, 3}}}, Order::same,
+  expect_parity("l2_loss", {{"x", {2, 5, 3}}, {"target", {2, 5, 3}}}, Layout::plain,
                 [](const auto& in) { return l2_loss(in[0], in[1]); });
-  expect_parity("kl_divergence", {{"mean", {3, 4}}, {"log_var", {3, 4}}}, Order::same,
+  expect_parity("kl_divergence", {{"mean", {3, 4}}, {"log_var", {3, 4}}}, Layout::plain,
                 [](const auto& in) { return kl_divergence(in[0], in[1]); });
-  expect_parity("softmax_cross_entropy", {{"logits", {3, 7}}}, Order::same, [](const auto& in) {
+  expect_parity("softmax_cross_entropy", {{"logits", {3, 7}}}, Layout::plain, [](const auto& in) {
     const std::int32_t labels[] = {2, 0, 6};
     return softmax_cross_entropy(in[0], labels);
   });
@@ -154,9 +138,10 @@ TEST(OpsParity, Ssim) {
     Shape shape;
   } cases[] = {{"ssim", {2, 16, 13, 1}}, {"ssim8", {2, 8, 9, 1}}};
   for (const auto& c : cases) {
-    Tensor target = numbers(std::string(c.name) + ".target", c.shape, Order::same);
+    Tensor target = numbers(std::string(c.name) + ".target", c.shape, Layout::plain);
     for (real& x : target.values()) x = std::abs(x);
-    expect_parity(c.name, {{"x", c.shape}}, Order::same, [&](const auto& in) { return ssim(in[0], target); });
+    expect_parity(c.name, {{"x", c.shape}}, Layout::plain,
+                  [&](const auto& in) { return ssim(in[0], target); });
   }
 }
 

@@ -1,19 +1,20 @@
 // An opened step: it changes nothing, ends in the ledger's line, and brings whatever is planted in it down to
-// operator and entry. SUPERTAC_PLANTS=200 plants more.
+// operator and entry. SUPERTAC_PLANTS=40 plants more of each kind.
 #include "models/training/audit/opened_step.h"
 #include "models/training/audit/step_difference.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstdlib>
-#include <map>
 #include <set>
 
 #include "autograd/kernels/conv.h"
 #include "autograd/ops/linear.h"
 #include "io/files/safetensors.h"
 #include "models/training/audit/ledger.h"
+#include "tests/expect_error.h"
 #include "tests/models/support.h"
 
 namespace supertac {
@@ -66,50 +67,69 @@ Tensor in_another_order(const TracedOp& op) {
   return y;
 }
 
+using Keep = std::optional<std::string>;
+
 class OpenedSteps : public testing::Test {
  protected:
   static constexpr std::int64_t kStep = 3;
 
-  OpenedSteps() : windows_(small_windows(recipe_.model)) {
-    Trainer trainer = trainer_on(windows_);
+  OpenedSteps() {
+    Trainer trainer = small_.trainer();
     while (trainer.step() < kStep - 1) trainer.train_step();
     trainer.save(state(), {});
+    right_ = opened(small_.windows);
   }
   std::string state() const { return folder_.file("state.safetensors"); }
-  Trainer trainer_on(const WindowSet& windows) const {
-    return {windows, all_of(windows_), Objective(windows_, recipe_)};
-  }
   OpenedStep opened(const WindowSet& windows, const OpeningOptions& options = {}) const {
-    Trainer trainer = trainer_on(windows);
+    Trainer trainer(windows, all_of(windows), Objective(windows, small_.recipe));
     trainer.restore(state(), {});
     return open_step(trainer, options);
   }
-  /// The operator in which the step, opened with and without the plant, differs; and the first entry, and the
-  /// second's value.
-  struct Found {
-    OperatorDifference at;
-    Dim entry = -1;
-    real one = 0, other = 0;
-  };
-  std::optional<Found> found(const OpenedStep& right,
-                             const std::function<OpenedStep(std::optional<std::string>)>& planted,
-                             const std::function<OpenedStep(std::optional<std::string>)>& again) const {
-    const auto at = first_difference(right.operators, planted({}).operators);
-    if (!at) return std::nullopt;
-    const OpenedStep one = again(at->name), other = planted(at->name);
-    const auto x = one.arrays.find(at->one), y = other.arrays.find(at->other);
-    if (x == one.arrays.end() || y == other.arrays.end()) return Found{*at};
-    const Dim entry = first_different_entry(x->second, y->second).value_or(-1);
-    return Found{*at, entry, x->second.data()[entry], y->second.data()[entry]};
+  /// The names of those that `wants` holds of.
+  std::vector<std::string> operators(const auto& wants) const {
+    std::vector<std::string> names;
+    for (const auto& ran : right_.operators)
+      if (wants(ran)) names.push_back(ran["name"]);
+    return names;
   }
 
+  /// Where the step opened with a plant first differs from right_: the operator, the entry, and the bits of
+  /// it.
+  struct Found {
+    std::string name;
+    Dim entry;
+    std::uint32_t bits;
+  };
+  std::optional<Found> found(const std::function<OpenedStep(const Keep& keep)>& planted) const {
+    const auto at = first_difference(right_.operators, planted({}).operators);
+    if (!at) return std::nullopt;
+    const Tensor one = opened(small_.windows, {.keep = at->name}).arrays.at(at->one),
+                 other = planted(at->name).arrays.at(at->other);
+    const Dim entry = first_different_entry(one, other).value();
+    return Found{
+        at->name, entry,
+        std::bit_cast<std::uint32_t>(one.data()[entry]) ^ std::bit_cast<std::uint32_t>(other.data()[entry])};
+  }
+
+  static int plants() {
+    const char* wanted = std::getenv("SUPERTAC_PLANTS");
+    return wanted != nullptr ? std::atoi(wanted) : 2;
+  }
+  std::size_t below(std::size_t n) {
+    return static_cast<std::size_t>(random_.uniform(next_++) * static_cast<double>(n));
+  }
+  std::uint32_t random_bit() { return static_cast<std::uint32_t>(below(23)); }
+  std::string one_of(const std::vector<std::string>& names) { return names[below(names.size())]; }
+
   const TemporaryFolder folder_;
-  const Recipe recipe_ = small_training();
-  const WindowSet windows_;
+  const SmallTraining small_;
+  const RandomStream random_{11, 0};
+  std::uint64_t next_ = 0;
+  OpenedStep right_;
 };
 
 TEST_F(OpenedSteps, AreStepsLikeAnyOther) {
-  Trainer plain = trainer_on(windows_), watched = trainer_on(windows_);
+  Trainer plain = small_.trainer(), watched = small_.trainer();
   LedgerWriter of_plain(plain, 1), of_watched(watched, 1);
   for (int step = 1; step <= 3; ++step) {
     plain.train_step();
@@ -130,10 +150,9 @@ TEST_F(OpenedSteps, AreStepsLikeAnyOther) {
 }
 
 TEST_F(OpenedSteps, EveryInputWasMadeBeforeOrIsAConstant) {
-  const OpenedStep step = opened(windows_);
   std::set<std::string> made;
   std::size_t inputs = 0, constants = 0, unmade = 0;
-  for (const auto& ran : step.operators) {
+  for (const auto& ran : right_.operators) {
     if (ran.contains("inputs"))
       for (const std::string input : ran["inputs"]) ++inputs, constants += !made.contains(input);
     if (ran.contains("gy")) {
@@ -147,123 +166,101 @@ TEST_F(OpenedSteps, EveryInputWasMadeBeforeOrIsAConstant) {
   EXPECT_LE(unmade, 8U);  // dL/dL of each micro-batch, which is 1
 }
 
-TEST_F(OpenedSteps, WhatIsPlantedIsFoundWithOperatorAndEntry) {
-  const char* wanted = std::getenv("SUPERTAC_PLANTS");
-  const int plants = wanted != nullptr ? std::atoi(wanted) : 10;
-  const OpenedStep right = opened(windows_);
-  const auto plain = [&](const auto& keep) { return opened(windows_, {.keep = keep}); };
-  const RandomStream random(11, 0);
-  std::uint64_t next = 0;
-  const auto below = [&](std::size_t n) {
-    return static_cast<std::size_t>(random.uniform(next++) * static_cast<double>(n));
-  };
-  const auto operators = [&](const auto& wants) {
-    std::vector<std::string> names;
-    for (const auto& ran : right.operators)
-      if (wants(ran)) names.push_back(ran["name"]);
-    return names;
-  };
-  const auto reversed =
+// The entry is not compared: a file has another order of axes.
+TEST_F(OpenedSteps, AFlippedBitOfTheStateIsFound) {
+  const std::string kept = file_text(state());
+  for (const bool moment : {false, true}) {
+    const std::vector<std::string> tensors = operators([&](const auto& ran) {
+      return ran["op"] == "state" &&
+             ran["name"].template get<std::string>().starts_with("state/optimizer.") == moment;
+    });
+    for (int plant = 0; plant < plants(); ++plant) {
+      const std::string name = one_of(tensors), tensor = name.substr(std::string("state/").size());
+      const std::size_t entry = below(SafetensorsFile::read(state()).f32(tensor).size());
+      const std::uint32_t bit = random_bit();
+      const auto at = found([&](const Keep& keep) {
+        flip_in_file(state(), tensor, entry, bit);
+        const OpenedStep step = opened(small_.windows, {.keep = keep});
+        write_file(state(), kept);
+        return step;
+      });
+      ASSERT_TRUE(at) << name;
+      EXPECT_EQ(at->name, name);
+      EXPECT_EQ(at->bits, 1U << bit) << name;
+    }
+  }
+}
+
+TEST_F(OpenedSteps, AFlippedBitOfAGradientIsFoundWithItsEntry) {
+  const std::vector<std::string> reversed =
       operators([](const auto& ran) { return ran.contains("gy") && ran["outputs"][0] != ""; });
-  const auto products = operators([](const auto& ran) {
+  for (int plant = 0; plant < plants(); ++plant) {
+    const std::string name = one_of(reversed);
+    const std::uint32_t bit = random_bit();
+    const double where = random_.uniform(next_++);
+    Dim entry = 0;
+    const auto touch = [&](const auto& of, std::size_t index, const auto&, Tensor& result) {
+      if (of != name || index != 0) return;
+      entry = static_cast<Dim>(where * static_cast<double>(result.size()));
+      flip(result.data()[entry], bit);
+    };
+    const auto at =
+        found([&](const Keep& keep) { return opened(small_.windows, {.keep = keep, .touch = touch}); });
+    ASSERT_TRUE(at) << name;
+    EXPECT_EQ(at->name, name);
+    EXPECT_EQ(at->entry, entry) << name;
+    EXPECT_EQ(at->bits, 1U << bit) << name;
+  }
+}
+
+TEST_F(OpenedSteps, AnotherOrderOfAdditionsIsFoundWithItsFirstEntry) {
+  const std::vector<std::string> products = operators([](const auto& ran) {
     return !ran.contains("gy") &&
            (ran["op"].template get<std::string>().starts_with("conv") || ran["op"] == "linear");
   });
-  std::map<std::string, int> count;
-  for (int plant = 0; plant < plants; ++plant) {
-    const std::uint32_t bit = static_cast<std::uint32_t>(below(23));
-    const std::string kind =
-        std::array{"weight", "moment", "gradient", "sample", "order"}[static_cast<std::size_t>(plant) % 5];
-    std::string name;
-    std::size_t entry = 0;
-    std::optional<Found> at;
-    if (kind == "weight" || kind == "moment") {
-      const auto& ran = right.operators[below(3 * trainer_on(windows_).model().parameters().size())];
-      name = ran["name"];
-      if (name.starts_with("state/optimizer.") != (kind == "moment")) {
-        --plant;
-        continue;
-      }
-      const std::string tensor = name.substr(6), kept = file_text(state());
-      entry = below(SafetensorsFile::read(state()).f32(tensor).size());
-      at = found(
-          right,
-          [&](const auto& keep) {
-            flip_in_file(state(), tensor, entry, bit);
-            const OpenedStep step = opened(windows_, {.keep = keep});
-            write_file(state(), kept);
-            return step;
-          },
-          plain);
-      entry = static_cast<std::size_t>(at ? at->entry : 0);  // a file has another order of axes
-    } else if (kind == "sample") {
-      const std::vector<std::uint32_t> batch = [&] {
-        for (const auto& ran : right.operators)
-          if (ran["op"] == "batch") return ran["examples"].template get<std::vector<std::uint32_t>>();
-        return std::vector<std::uint32_t>();
-      }();
-      const std::size_t slot = below(batch.size());
-      const Exchanged other(windows_, batch[slot], static_cast<std::uint32_t>(below(windows_.size())));
-      name = std::to_string(slot) + "/windows";  // eight micro-batches of one example
-      at = found(
-          right, [&](const auto& keep) { return opened(other, {.keep = keep}); }, plain);
-      if (!at) {  // exchanged for itself
-        --plant;
-        continue;
-      }
-      entry = static_cast<std::size_t>(at->entry);
-    } else {
-      name = kind == "gradient" ? reversed[below(reversed.size())] : products[below(products.size())];
-      const double where = random.uniform(next++);
-      const auto planted = [&](const auto& keep) {
-        return opened(
-            windows_,
-            {.keep = keep, .touch = [&](const auto& of, std::size_t index, const auto& op, Tensor& result) {
-               if (of != name || index != 0) return;
-               if (kind == "gradient") {
-                 entry = static_cast<std::size_t>(where * static_cast<double>(result.size()));
-                 return flip(result.data()[entry], bit);
-               }
-               const Tensor other = in_another_order(op);
-               entry = static_cast<std::size_t>(first_different_entry(result, other).value_or(0));
-               std::copy_n(other.data(), other.size(), result.data());
-             }});
-      };
-      at = found(right, planted, plain);
-      if (!at && kind == "order") {  // a sum that comes out the same
-        --plant;
-        continue;
-      }
-    }
-    ASSERT_TRUE(at) << kind << " " << name;
-    EXPECT_EQ(at->at.name, name) << kind;
-    EXPECT_EQ(at->entry, static_cast<Dim>(entry)) << kind << " " << name;
-    EXPECT_NE(std::bit_cast<std::uint32_t>(at->one), std::bit_cast<std::uint32_t>(at->other));
-    if (kind != "order" && kind != "sample") {
-      EXPECT_EQ(std::bit_cast<std::uint32_t>(at->one) ^ std::bit_cast<std::uint32_t>(at->other), 1U << bit)
-          << kind << " " << name;
-    }
-    ++count[kind];
+  for (int plant = 0; plant < plants();) {
+    const std::string name = one_of(products);
+    Dim entry = 0;
+    const auto touch = [&](const auto& of, std::size_t, const auto& op, Tensor& result) {
+      if (of != name) return;
+      const Tensor other = in_another_order(op);
+      entry = first_different_entry(result, other).value_or(0);
+      std::copy_n(other.data(), other.size(), result.data());
+    };
+    const auto at =
+        found([&](const Keep& keep) { return opened(small_.windows, {.keep = keep, .touch = touch}); });
+    if (!at) continue;  // a sum that comes out the same
+    EXPECT_EQ(at->name, name);
+    EXPECT_EQ(at->entry, entry) << name;
+    ++plant;
   }
-  for (const auto& [kind, number] : count) RecordProperty(kind, number);
+}
+
+TEST_F(OpenedSteps, AnotherSampleIsFoundWithItsMicroBatch) {
+  const auto batch = std::ranges::find(right_.operators, "batch", [](const auto& ran) { return ran["op"]; });
+  const std::vector<std::uint32_t> examples = (*batch)["examples"];
+  for (int plant = 0; plant < plants();) {
+    const std::size_t slot = below(examples.size());
+    const Exchanged other(small_.windows, examples[slot],
+                          static_cast<std::uint32_t>(below(small_.windows.size())));
+    const auto at = found([&](const Keep& keep) { return opened(other, {.keep = keep}); });
+    if (!at) continue;                                       // exchanged for itself
+    EXPECT_EQ(at->name, std::to_string(slot) + "/windows");  // eight micro-batches of one example
+    ++plant;
+  }
 }
 
 TEST_F(OpenedSteps, OtherNetworksAreRefused) {
-  Recipe other = recipe_;
-  other.model.channels = 4;
-  Trainer trainer(windows_, all_of(windows_), Objective(windows_, other));
-  OpenedStep fewer = opened(windows_), step = open_step(trainer);
-  const auto difference = first_difference(fewer.operators, step.operators);
+  SmallTraining other;
+  other.recipe.model.channels = 4;
+  Trainer trainer = other.trainer();
+  const OpenedStep step = open_step(trainer);
+  const auto difference = first_difference(right_.operators, step.operators);
   ASSERT_TRUE(difference);
   EXPECT_EQ(difference->name, "state/encoder.0.conv.0.weight");  // of another training
-  fewer.operators.erase(fewer.operators.begin());
-  try {
-    first_difference(fewer.operators, step.operators);
-    FAIL() << "taken for the same";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_TRUE(std::string(error.what())
-                    .starts_with("opened steps: expected two of the same network and recipe, found "));
-  }
+  right_.operators.erase(right_.operators.begin());
+  EXPECT_ERROR(first_difference(right_.operators, step.operators), std::invalid_argument,
+               "opened steps: expected two of the same network and recipe, found ");
 }
 
 }  // namespace
