@@ -50,7 +50,7 @@ Bits bits_here() {
   Trainer trainer(windows, all, Objective(windows, settings));
   for (int step = 0; step < 10; ++step) trainer.train_step();
   Sha256 training;
-  trainer.for_each_tensor([&](const std::string&, std::span<const real> values) { add(training, values); });
+  trainer.for_each_tensor([&](const std::string&, const Tensor& of) { add(training, of.values()); });
 
   constexpr Dim kPictures = 12;
   Tensor inputs(trainer.model().input_shape(kPictures));

@@ -11,7 +11,6 @@
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
 #include "models/training/audit/opened_step.h"
-#include "models/training/audit/step_difference.h"
 
 namespace supertac {
 namespace {

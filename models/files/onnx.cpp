@@ -4,7 +4,6 @@
 #include <set>
 #include <stdexcept>
 
-#include "autograd/trace.h"
 #include "data/windows/transforms/normalise_window.h"
 #include "io/numbers/numbers.h"
 #include "models/files/onnx_file.h"
@@ -37,7 +36,6 @@ class Exporter {
   std::string weight(const Variable& x);
   std::string new_name(const std::string& op) { return op + "_" + std::to_string(++count_); }
   std::string activated(const std::string& y, real negative_slope);
-  void add(const TracedOp& op);
   std::string made(const TracedOp& op);
   std::string convolution(const TracedOp& op);
   std::string linear(const TracedOp& op);
@@ -228,12 +226,10 @@ void Exporter::output(const char* name, const Variable& y, const char* about) {
 std::string Exporter::picture_of(const ModelFile& file) {
   const Network& network = *file.model;
   for (const Parameter& p : network.parameters()) parameters_.emplace(p.value.node(), to_stored(p));
-  const NoGrad no_grad;
-  const Variable input(Tensor::zeros(network.input_shape(1)));
-  const Trace trace;
-  const Drawing drawn = network.draw(input);
-  names_[input.node()] = network_input(file);
-  for (const TracedOp& op : trace.ops()) names_[op.y.node()] = made(op);
+  const TracedDrawing traced(network, Tensor::zeros(network.input_shape(1)));
+  const Drawing& drawn = traced.drawn;
+  names_[traced.input.node()] = network_input(file);
+  for (const TracedOp& op : traced.trace.ops()) names_[op.y.node()] = made(op);
   output("picture", drawn.picture, "Heights over the flat plate, 0 to 1; row grows with y, column with x.");
   if (drawn.predicted_error.defined())
     output("predicted_error", drawn.predicted_error, "How far from the truth a pixel is expected to be.");

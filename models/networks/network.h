@@ -1,6 +1,7 @@
 // The interface of networks that draw pictures.
 #pragma once
 
+#include "autograd/trace.h"
 #include "layers/module.h"
 
 namespace supertac {
@@ -58,5 +59,15 @@ inline Estimate Network::estimate(const Tensor& inputs) const {
           .predicted_error = value(drawn.predicted_error),
           .latents = value(drawn.latents)};
 }
+
+/// One inference on these inputs, unrecorded, and the ops that it ran. One of a thread at a time, as Trace.
+struct TracedDrawing {
+  TracedDrawing(const Network& network, const Tensor& inputs) : input(inputs), drawn(network.draw(input)) {}
+
+  NoGrad no_grad;
+  Trace trace;
+  Variable input;
+  Drawing drawn;
+};
 
 }  // namespace supertac

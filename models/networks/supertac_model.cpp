@@ -11,6 +11,8 @@
 namespace supertac {
 namespace {
 
+constexpr Dim kMostWeights = Dim{1} << 28;
+
 void check_range(const char* name, Dim value, Dim low, Dim high) {
   if (value >= low && value <= high) return;
   throw std::invalid_argument(std::string("model settings: ") + name + " must be " + std::to_string(low) +

@@ -23,7 +23,7 @@ enum class Grouping {
 Grouping grouping_of(const std::string& name);
 std::string name_of(Grouping grouping);
 
-constexpr Dim kMostLines = 64, kMostWeights = Dim{1} << 28;
+constexpr Dim kMostLines = 64;
 
 struct SuperTacSettings {
   std::string preset = "paper";

@@ -89,7 +89,7 @@ class Trainer {
   /// Those of any step, from 0.
   void batch_of(std::int64_t step, std::span<std::uint32_t> out) const;
   /// Every array of the state.
-  void for_each_tensor(const std::function<void(const std::string&, std::span<const real>)>& visit) const {
+  void for_each_tensor(const std::function<void(const std::string&, const Tensor&)>& visit) const {
     state_.for_each_tensor(visit);
   }
 

@@ -107,11 +107,11 @@ void TrainingState::stop(const std::string& what) const {
 }
 
 void TrainingState::for_each_tensor(
-    const std::function<void(const std::string&, std::span<const real>)>& visit) const {
-  for (const Parameter& p : parameters_) visit(p.name, p.value.value().values());
+    const std::function<void(const std::string&, const Tensor&)>& visit) const {
+  for (const Parameter& p : parameters_) visit(p.name, p.value.value());
   for (std::size_t i = 0; i < parameters_.size(); ++i) {
-    visit("optimizer.m." + parameters_[i].name, std::as_const(adam_.first_moments()[i]).values());
-    visit("optimizer.v." + parameters_[i].name, std::as_const(adam_.second_moments()[i]).values());
+    visit("optimizer.m." + parameters_[i].name, adam_.first_moments()[i]);
+    visit("optimizer.v." + parameters_[i].name, adam_.second_moments()[i]);
   }
 }
 

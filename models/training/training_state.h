@@ -59,7 +59,7 @@ class TrainingState {
 
   /// Every array of the state: the parameters, then Adam's first and second moments, named as in a
   /// checkpoint.
-  void for_each_tensor(const std::function<void(const std::string&, std::span<const real>)>& visit) const;
+  void for_each_tensor(const std::function<void(const std::string&, const Tensor&)>& visit) const;
 
   /// Parameters and state, a checkpoint like any other with "optimizer." tensors besides. Throws FileError.
   void save(const std::string& path, std::map<std::string, std::string> metadata) const;

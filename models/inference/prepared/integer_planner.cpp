@@ -23,8 +23,7 @@ using Kind = IntegerStep::Kind;
 
 class IntegerPlanner : TraceWalk {
  public:
-  IntegerPlanner(const Network& network, const ActivationRanges& ranges, const Variable& input,
-                 const std::vector<TracedOp>& ops, const Drawing& drawn);
+  IntegerPlanner(const Network& network, const ActivationRanges& ranges, const TracedDrawing& traced);
   std::shared_ptr<IntegerPlan> plan() { return std::move(plan_); }
 
  private:
@@ -54,16 +53,18 @@ class IntegerPlanner : TraceWalk {
   std::map<int, Id> value_of_;
 };
 
-IntegerPlanner::IntegerPlanner(const Network& network, const ActivationRanges& ranges, const Variable& input,
-                               const std::vector<TracedOp>& ops, const Drawing& drawn)
-    : TraceWalk(input, ops, drawn) {
+IntegerPlanner::IntegerPlanner(const Network& network, const ActivationRanges& ranges,
+                               const TracedDrawing& traced)
+    : TraceWalk(traced) {
+  const std::vector<TracedOp>& ops = traced.trace.ops();
+  const Drawing& drawn = traced.drawn;
   if (ranges.ops() != ops.size())
     throw std::invalid_argument("Prepared: the ranges are those of " + std::to_string(ranges.ops()) +
                                 " ops, the network has " + std::to_string(ops.size()));
   for (const Parameter& p : network.parameters())
     layers_[p.value.node()] = p.name.substr(0, p.name.rfind('.'));
   for (std::size_t i = 0; i < ops.size(); ++i) scales_[ops[i].y.node()] = ranges.scale(i);
-  plan_->input_size = input.value().size();
+  plan_->input_size = traced.input.size();
   for (const TracedOp& op : ops) {
     if (op.op == "flatten_channels_first") continue;
     const bool of_bytes = is_of_bytes(op);
@@ -238,11 +239,8 @@ void IntegerPlanner::add_product(const TracedOp& op, int x, int y, ProductTaps t
 }  // namespace
 
 std::shared_ptr<const IntegerPlan> IntegerPlan::of(const Network& network, const ActivationRanges& ranges) {
-  const NoGrad no_grad;
-  const Variable input(Tensor::zeros(network.input_shape(1)));
-  const Trace trace;
-  const Drawing drawn = network.draw(input);
-  return IntegerPlanner(network, ranges, input, trace.ops(), drawn).plan();
+  const TracedDrawing traced(network, Tensor::zeros(network.input_shape(1)));
+  return IntegerPlanner(network, ranges, traced).plan();
 }
 
 }  // namespace supertac

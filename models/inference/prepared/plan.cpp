@@ -32,8 +32,8 @@ Estimate Plan::run(const Tensor& inputs, const StepWatch* watch) const {
   Estimate out{.picture = Tensor(Shape{count, picture_.height, picture_.width, 1}),
                .predicted_error = {},
                .latents = {}};
-  if (predicts_error_) out.predicted_error = Tensor(out.picture.shape());
-  if (has_latents_) out.latents = Tensor(Shape{count, latents_.channels});
+  if (predicted_error_) out.predicted_error = Tensor(out.picture.shape());
+  if (latents_) out.latents = Tensor(Shape{count, latents_->channels});
   const Dim images = std::min(count, block_);
   Tensor memory(Shape{scratch_ + workspace_ * images});
   real* const workspace = memory.data() + scratch_;
@@ -46,8 +46,8 @@ Estimate Plan::run(const Tensor& inputs, const StepWatch* watch) const {
       if (watch != nullptr) show(*watch, block, i + 1);
     }
     copy_out(block, picture_, out.picture, first);
-    if (predicts_error_) copy_out(block, predicted_error_, out.predicted_error, first);
-    if (has_latents_) copy_out(block, latents_, out.latents, first);
+    if (predicted_error_) copy_out(block, *predicted_error_, out.predicted_error, first);
+    if (latents_) copy_out(block, *latents_, out.latents, first);
   }
   return out;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -56,10 +57,10 @@ class Plan {
   std::vector<FeatureMap> planes_;   // those with margins inside: of one image, channel by channel
   Dim workspace_ = 0;                // numbers of an image
   Dim scratch_ = 0;                  // numbers
-  FeatureMap picture_, predicted_error_, latents_;
+  FeatureMap picture_;
+  std::optional<FeatureMap> predicted_error_, latents_;
   Dim block_ = kBlock;
   bool filters_anew_ = false;
-  bool predicts_error_ = false, has_latents_ = false;
 };
 
 }  // namespace supertac

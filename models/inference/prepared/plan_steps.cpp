@@ -1,5 +1,5 @@
 // The steps of a plan: each function packs its op's weights and adds what runs for a block of images. The
-// table at the end has one for every op that networks draw with.
+// table at the end has one for every op that networks draw with. Winograd's are in plan_winograd.cpp.
 #include <algorithm>
 #include <array>
 
@@ -99,8 +99,37 @@ void Planner::plane_conv(const TracedOp& op) {
                       {std::move(output)}});
 }
 
-// The linear layer behind it takes the map as it is.
-static void flatten_step(Planner&, const TracedOp&) {}
+// A product with its own copy of what its job points at.
+struct Product {
+  kernels::ProductJob job;
+  ProductTaps taps;
+  FeatureMap x, y;
+
+  void operator()(const Block& block) const {
+    kernels::ProductJob now = job;
+    now.images = block.images;
+    now.segments = taps.segments.data();
+    now.segment_count = static_cast<Dim>(taps.segments.size());
+    now.w = taps.w.data();
+    now.bias = taps.bias.data();
+    isa().product(now, block.first_pixel(x), block.first_pixel(y) + taps.y_offset);
+  }
+};
+
+void Planner::product(const TracedOp& op) {
+  const FeatureMap x = map_of(op.inputs[0]), y = new_map(op.y);
+  for (ProductTaps& taps : products_of(op, x, y)) {
+    weights_ += bytes_of(taps.w);
+    const kernels::ProductJob job{.height = taps.height,
+                                  .width = taps.width,
+                                  .from = taps.from,
+                                  .to = taps.to,
+                                  .length = taps.length,
+                                  .cout = taps.bias.size(),
+                                  .negative_slope = op.settings.negative_slope};
+    add_step(Product{job, std::move(taps), x, y});
+  }
+}
 
 static void unflatten_step(Planner& planner, const TracedOp& op) {
   const FeatureMap x = planner.map_of(op.inputs[0]), y = planner.new_map(op.y);
@@ -166,7 +195,7 @@ const std::map<std::string_view, Planner::Make>& Planner::makers() {
       {"conv_transpose1d", [](Planner& planner, const TracedOp& op) { planner.transposed_conv(op); }},
       {"conv_transpose2d", [](Planner& planner, const TracedOp& op) { planner.transposed_conv(op); }},
       {"linear", [](Planner& planner, const TracedOp& op) { planner.product(op); }},
-      {"flatten_channels_first", flatten_step},
+      {"flatten_channels_first", [](Planner&, const TracedOp&) {}},  // a linear layer takes the map as it is
       {"unflatten_channels_first", unflatten_step},
       {"concat", concat_step},
       {"global_mean", global_mean_step},

@@ -7,8 +7,6 @@
 
 namespace supertac {
 
-using kernels::ConvSettings;
-
 std::size_t Planner::second_cache_bytes() {
 #ifdef _SC_LEVEL2_CACHE_SIZE
   return static_cast<std::size_t>(std::max(0L, sysconf(_SC_LEVEL2_CACHE_SIZE)));
@@ -26,24 +24,20 @@ bool Planner::filters_anew(std::size_t second_cache) const {
 }
 
 std::shared_ptr<const Plan> Planner::plan(const Network& network, std::size_t second_cache) {
-  const NoGrad no_grad;
-  const Variable input(Tensor::zeros(network.input_shape(1)));
-  const Trace trace;
-  const Drawing drawn = network.draw(input);
-  Planner planner(input, trace.ops(), drawn);
+  const TracedDrawing traced(network, Tensor::zeros(network.input_shape(1)));
+  const Drawing& drawn = traced.drawn;
+  Planner planner(traced);
   Plan& plan = *planner.plan_;
   if (second_cache >= Plan::kLargeCache) plan.block_ = Plan::kLargeBlock;
   plan.filters_anew_ = planner.filters_anew(second_cache);
   plan.picture_ = planner.map_of(drawn.picture);
-  plan.predicts_error_ = drawn.predicted_error.defined();
-  if (plan.predicts_error_) plan.predicted_error_ = planner.map_of(drawn.predicted_error);
-  plan.has_latents_ = drawn.latents.defined();
-  if (plan.has_latents_) plan.latents_ = planner.map_of(drawn.latents);
+  if (drawn.predicted_error.defined()) plan.predicted_error_ = planner.map_of(drawn.predicted_error);
+  if (drawn.latents.defined()) plan.latents_ = planner.map_of(drawn.latents);
   return planner.plan_;
 }
 
-Planner::Planner(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn)
-    : TraceWalk(input, ops, drawn) {
+Planner::Planner(const TracedDrawing& traced) : TraceWalk(traced) {
+  const std::vector<TracedOp>& ops = traced.trace.ops();
   for (std::size_t i = 0; i < ops.size(); ++i) {
     const auto make = makers().find(ops[i].op);
     if (make == makers().end())

@@ -32,7 +32,7 @@ class Planner : TraceWalk {
   static std::size_t second_cache_bytes();
   static std::size_t bytes_of(const Tensor& t) { return static_cast<std::size_t>(t.size()) * sizeof(real); }
   bool filters_anew(std::size_t second_cache) const;
-  Planner(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn);
+  explicit Planner(const TracedDrawing& traced);
   /// In plan_steps.cpp: what makes the step of each op.
   static const std::map<std::string_view, Make>& makers();
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "autograd/trace.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
@@ -12,15 +11,14 @@ namespace supertac {
 static const std::string kName = "int8.ranges";
 
 void ActivationRanges::add(const Network& network, const Tensor& inputs) {
-  const NoGrad no_grad;
-  const Trace trace;
-  network.draw(Variable(inputs));
-  if (low_.empty()) low_.resize(trace.ops().size(), 0), high_ = low_;
-  if (low_.size() != trace.ops().size())
+  const TracedDrawing traced(network, inputs);
+  const std::vector<TracedOp>& ops = traced.trace.ops();
+  if (low_.empty()) low_.resize(ops.size(), 0), high_ = low_;
+  if (low_.size() != ops.size())
     throw std::invalid_argument("ActivationRanges: expected a network of " + std::to_string(low_.size()) +
-                                " ops, got " + std::to_string(trace.ops().size()));
+                                " ops, got " + std::to_string(ops.size()));
   for (std::size_t i = 0; i < low_.size(); ++i) {
-    for (const real value : trace.ops()[i].y.value().values()) {
+    for (const real value : ops[i].y.value().values()) {
       low_[i] = std::min(low_[i], static_cast<float>(value));
       high_[i] = std::max(high_[i], static_cast<float>(value));
     }

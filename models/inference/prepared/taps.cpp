@@ -102,8 +102,8 @@ static std::vector<ProductTaps> transposed_conv(const TracedOp& op, const Featur
   return products;
 }
 
-TraceWalk::TraceWalk(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn)
-    : input_(input.node()) {
+TraceWalk::TraceWalk(const TracedDrawing& traced) : input_(traced.input.node()) {
+  const std::vector<TracedOp>& ops = traced.trace.ops();
   for (std::size_t i = 0; i < ops.size(); ++i) {
     const TracedOp& op = ops[i];
     if (op.op == "flatten_channels_first") flattened_[op.y.node()] = owner(op.inputs[0]);
@@ -112,7 +112,7 @@ TraceWalk::TraceWalk(const Variable& input, const std::vector<TracedOp>& ops, co
     if (op.op.starts_with("conv")) margins_[owner(op.inputs[0])].widen(op.settings.conv);
     for (const Variable& x : op.inputs) last_use_[owner(x)] = i;
   }
-  for (const Variable* y : {&drawn.picture, &drawn.predicted_error, &drawn.latents})
+  for (const Variable* y : {&traced.drawn.picture, &traced.drawn.predicted_error, &traced.drawn.latents})
     if (y->defined()) last_use_[owner(*y)] = std::numeric_limits<std::size_t>::max();
 }
 

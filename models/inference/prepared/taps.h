@@ -67,7 +67,7 @@ class TraceWalk {
  protected:
   using Id = const detail::Node*;
 
-  TraceWalk(const Variable& input, const std::vector<TracedOp>& ops, const Drawing& drawn);
+  explicit TraceWalk(const TracedDrawing& traced);
 
   /// The value itself, or the map that it is the flattened form of.
   Id owner(const Variable& x) const;

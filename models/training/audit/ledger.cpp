@@ -98,9 +98,9 @@ std::optional<LedgerLine> Ledger::at(std::int64_t step) const {
 
 std::vector<std::string> hashes_of(const Trainer& trainer) {
   std::vector<std::string> hashes;
-  trainer.for_each_tensor([&](const std::string&, std::span<const real> values) {
+  trainer.for_each_tensor([&](const std::string&, const Tensor& values) {
     Sha256 hash;
-    hash.add(std::as_bytes(values));
+    hash.add(std::as_bytes(values.values()));
     hashes.push_back(hash.hex());
   });
   return hashes;
@@ -109,7 +109,7 @@ std::vector<std::string> hashes_of(const Trainer& trainer) {
 LedgerWriter::LedgerWriter(const Trainer& trainer, std::int64_t every, const LedgerLine* previous)
     : trainer_(trainer), every_(every) {
   std::vector<std::string> names;
-  trainer.for_each_tensor([&](const std::string& name, std::span<const real>) { names.push_back(name); });
+  trainer.for_each_tensor([&](const std::string& name, const Tensor&) { names.push_back(name); });
   header_ = Json{{"format", kFormat}, {"every", every}, {"tensors", names}}.dump();
   chain_ = previous != nullptr ? previous->chain : sha256(header_);
   // Batches between that line and a state that lies behind it.

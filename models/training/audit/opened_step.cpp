@@ -1,6 +1,7 @@
 #include "models/training/audit/opened_step.h"
 
 #include <array>
+#include <bit>
 #include <mutex>
 #include <stdexcept>
 #include <unordered_map>
@@ -21,12 +22,9 @@ std::string hash_of(std::span<const T> values) {
   return sum.hex();
 }
 // An array is referred to by hash and shape: "9f86...0a08 [3,4]".
-std::string reference_to(std::span<const real> values, const Shape& shape) {
-  return hash_of(values) + " " + shape.text();
+std::string reference_to(const Tensor& tensor) {
+  return hash_of(tensor.values()) + " " + tensor.shape().text();
 }
-std::string reference_to(const Tensor& tensor) { return reference_to(tensor.values(), tensor.shape()); }
-
-Json operator_of(const std::string& name, std::string_view op) { return {{"name", name}, {"op", op}}; }
 
 // What all micro-batches of one opening share.
 class Opening {
@@ -58,8 +56,9 @@ class MicroBatchWatch : Trace, ReverseWatch {
     Json all = Json::array();
     const auto add_input = [&](const char* what, const Tensor& values) {
       if (!values.defined()) return;
-      all.push_back(operator_of(prefix_ + what, what));
-      all.back()["outputs"] = {kept(prefix_ + what, reference_to(values), values)};
+      all.push_back({{"name", prefix_ + what},
+                     {"op", what},
+                     {"outputs", {kept(prefix_ + what, reference_to(values), values)}}});
     };
     add_input("windows", batch.inputs), add_input("truths", batch.targets), add_input("noise", batch.noise);
     for (std::size_t i = 0; i < ops().size(); ++i) all.push_back(forward(i));
@@ -101,11 +100,12 @@ class MicroBatchWatch : Trace, ReverseWatch {
 
   Json forward(std::size_t index) {
     const TracedOp& op = ops()[index];
-    Json ran = operator_of(name_of(index), op.op);
-    ran["settings"] = operator_settings(op);
-    ran["inputs"] = inputs_of(ran["name"], op);
-    ran["outputs"] = {value_of(ran["name"], op.y)};
-    return ran;
+    const std::string name = name_of(index);
+    return {{"name", name},
+            {"op", op.op},
+            {"settings", operator_settings(op)},
+            {"inputs", inputs_of(name, op)},
+            {"outputs", {value_of(name, op.y)}}};
   }
 
   void noted(TracedOp& op) override {
@@ -117,15 +117,16 @@ class MicroBatchWatch : Trace, ReverseWatch {
   void reverse(const char*, std::size_t inputs, Backward& b, const std::function<void()>& step) override {
     const std::size_t index = index_.at(&b.node());
     const TracedOp& op = ops()[index];
-    Json ran = operator_of(name_of(index) + "/reverse", op.op);
-    const std::string name = ran["name"];
-    ran["settings"] = operator_settings(op);
-    ran["inputs"] = inputs_of(name, op);
-    ran["y"] = value_of(name, op.y);
+    const std::string name = name_of(index) + "/reverse";
     std::string& gy = gradients_[&b.node()];
     if (gy.empty()) gy = reference_to(b.gy());
-    ran["gy"] = kept(name, gy, b.gy());
-    ran["before"] = Json::array();
+    Json ran = {{"name", name},
+                {"op", op.op},
+                {"settings", operator_settings(op)},
+                {"inputs", inputs_of(name, op)},
+                {"y", value_of(name, op.y)},
+                {"gy", kept(name, gy, b.gy())},
+                {"before", Json::array()}};
     for (std::size_t i = 0; i < inputs; ++i) {  // a gradient that is there is added to
       const detail::Node* x = b.node().inputs[i];
       const bool added_to = x->requires_grad && x->grad.defined();
@@ -152,14 +153,11 @@ class MicroBatchWatch : Trace, ReverseWatch {
 // The state of a training in the order of its tensors: all parameters, then the two moments of each.
 struct State {
   std::vector<std::string> names, references;
-  std::vector<std::span<const real>> values;
+  std::vector<Tensor> values;  // handles, no copies
 
   explicit State(const Trainer& trainer) {
-    const std::vector<Parameter>& parameters = trainer.model().parameters();
-    trainer.for_each_tensor([&](const std::string& name, std::span<const real> of) {
-      const std::size_t n = parameters.size(), place = names.size(), i = place < n ? place : (place - n) / 2;
-      names.push_back(name), values.push_back(of);
-      references.push_back(reference_to(of, parameters[i].value.shape()));
+    trainer.for_each_tensor([&](const std::string& name, const Tensor& of) {
+      names.push_back(name), values.push_back(of), references.push_back(reference_to(of));
     });
   }
   // Of parameter i of n and its moments.
@@ -168,39 +166,33 @@ struct State {
   }
 };
 
-Tensor tensor_of(const Shape& shape, std::span<const real> values) {
-  Tensor tensor(shape);
-  std::copy(values.begin(), values.end(), tensor.data());
-  return tensor;
-}
-
 // Behind the micro-batches: sums of their gradients, the norm over all parameters, the update.
 class Update {
  public:
   Update(Trainer& trainer, Opening& opening) : trainer_(trainer), opening_(opening), before_(trainer) {
     const std::vector<Parameter>& parameters = trainer_.model().parameters();
     for (std::size_t i = 0; i < parameters.size(); ++i) {
-      opening_.parameters[before_.values[i].data()] = before_.references[i];
+      opening_.parameters[parameters[i].value.value().data()] = before_.references[i];
       keep(i, before_);
     }
   }
   Json before() const {
     Json all = Json::array();
-    for (std::size_t i = 0; i < before_.names.size(); ++i) {
-      all.push_back(operator_of("state/" + before_.names[i], "state"));
-      all.back()["outputs"] = {before_.references[i]};
-    }
+    for (std::size_t i = 0; i < before_.names.size(); ++i)
+      all.push_back(
+          {{"name", "state/" + before_.names[i]}, {"op", "state"}, {"outputs", {before_.references[i]}}});
     return all;
   }
   Json sums(const std::function<std::vector<std::string>(std::size_t parameter)>& gradients_of) {
     Json all = Json::array();
     const std::vector<Parameter>& parameters = trainer_.model().parameters();
     for (std::size_t i = 0; i < parameters.size(); ++i) {
-      all.push_back(operator_of("sum/" + parameters[i].name, "add_as_tree"));
       const Tensor& sum = parameters[i].value.grad();
       sums_.push_back(reference_to(sum));
-      all.back()["inputs"] = gradients_of(i);
-      all.back()["outputs"] = {sums_.back()};
+      all.push_back({{"name", "sum/" + parameters[i].name},
+                     {"op", "add_as_tree"},
+                     {"inputs", gradients_of(i)},
+                     {"outputs", {sums_.back()}}});
       for (const std::string& reader :
            {"sum/" + parameters[i].name, std::string("norm"), "update/" + parameters[i].name})
         if (opening_.keeps(reader)) opening_.keep(sums_.back(), sum);
@@ -214,26 +206,27 @@ class Update {
     const AdamOptions adam;
     const double norm = report.gradient_norm;
     Json all = Json::array();
-    all.push_back(operator_of("norm", "norm"));
-    all.back()["value"] = norm;
-    all.back()["inputs"] = sums_;
-    all.back()["outputs"] = {hash_of(std::span(&norm, 1))};
+    all.push_back({{"name", "norm"},
+                   {"op", "norm"},
+                   {"value", norm},
+                   {"inputs", sums_},
+                   {"outputs", {hash_of(std::span(&norm, 1))}}});
     const Json settings = {{"norm", norm},
                            {"clip_norm", pace.clip_norm},
                            {"step", report.step},
                            {"learning_rate", report.learning_rate}};
     for (std::size_t i = 0; i < parameters.size(); ++i) {
       const bool muon = pace.muon && is_matrix(parameters[i].value.shape());
-      all.push_back(operator_of("update/" + parameters[i].name, muon ? "muon" : "adam"));
-      all.back()["settings"] = settings;
+      Json ran = {
+          {"name", "update/" + parameters[i].name}, {"op", muon ? "muon" : "adam"}, {"settings", settings}};
       if (!muon)
-        all.back()["settings"].update(
-            {{"beta1", adam.beta1}, {"beta2", adam.beta2}, {"epsilon", adam.epsilon}});
+        ran["settings"].update({{"beta1", adam.beta1}, {"beta2", adam.beta2}, {"epsilon", adam.epsilon}});
       for (const std::size_t place : State::places(i, parameters.size())) {
-        all.back()["inputs"].push_back(before_.references[place]);
-        all.back()["outputs"].push_back(after.references[place]);
+        ran["inputs"].push_back(before_.references[place]);
+        ran["outputs"].push_back(after.references[place]);
       }
-      all.back()["inputs"].push_back(sums_[i]);
+      ran["inputs"].push_back(sums_[i]);
+      all.push_back(std::move(ran));
       keep(i, after);
     }
     return all;
@@ -245,8 +238,7 @@ class Update {
     for (const std::size_t place : State::places(parameter, parameters.size()))
       if (opening_.keeps("update/" + parameters[parameter].name) ||
           opening_.keeps("state/" + state.names[place]))
-        opening_.keep(state.references[place],
-                      tensor_of(parameters[parameter].value.shape(), state.values[place]));
+        opening_.keep(state.references[place], state.values[place]);
   }
 
   Trainer& trainer_;
@@ -296,9 +288,10 @@ OpenedStep open_step(Trainer& trainer, const OpeningOptions& options) {
         for (const Parameter& p : micro_batch.parameters)
           ran[number].gradients.push_back(watch.gradient_of(p));
       });
-  opened.operators.push_back(operator_of("batch", "batch"));
-  opened.operators.back()["examples"] = trainer.batch();
-  opened.operators.back()["outputs"] = {hash_of(trainer.batch())};
+  opened.operators.push_back({{"name", "batch"},
+                              {"op", "batch"},
+                              {"examples", trainer.batch()},
+                              {"outputs", {hash_of(trainer.batch())}}});
   for (const Ran& of : ran)
     if (!of.operators.is_null()) append(of.operators);
   append(update.sums([&](std::size_t parameter) {
@@ -310,6 +303,42 @@ OpenedStep open_step(Trainer& trainer, const OpeningOptions& options) {
   }));
   append(update.applied(report));
   return opened;
+}
+
+std::optional<Dim> first_different_entry(const Tensor& one, const Tensor& other) {
+  const auto bits = [](real x) { return std::bit_cast<std::array<std::byte, sizeof(real)>>(x); };
+  for (Dim i = 0; one.size() == other.size() && i < one.size(); ++i)
+    if (bits(one.data()[i]) != bits(other.data()[i])) return i;
+  return std::nullopt;
+}
+
+std::optional<OperatorDifference> first_difference(const Json& one, const Json& other) {
+  const auto refuse = [](const std::string& what) {
+    throw std::invalid_argument("opened steps: expected two of the same network and recipe, found " + what);
+  };
+  if (one.size() != other.size())
+    refuse(std::to_string(one.size()) + " and " + std::to_string(other.size()) + " operators");
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    const Json &a = one[i], &b = other[i];
+    const std::string name = a.at("name"), op = a.at("op");
+    if (name != b.at("name")) refuse(name + " and " + b.at("name").get<std::string>());
+    const auto settings_of = [](const Json& ran) {
+      return ran.contains("settings") ? ran["settings"].dump() : "";
+    };
+    for (const char* field : {"inputs", "outputs"}) {
+      const Json none = Json::array();
+      const Json &x = a.contains(field) ? a[field] : none, &y = b.contains(field) ? b[field] : none;
+      if (x.size() != y.size()) refuse(name + " with other " + field);
+      if (field == std::string("outputs") && settings_of(a) != settings_of(b))
+        return OperatorDifference{name, op, "the settings", settings_of(a), settings_of(b)};
+      for (std::size_t k = 0; k < x.size(); ++k)
+        if (x[k] != y[k])
+          return OperatorDifference{
+              name, op, (field == std::string("inputs") ? "input " : "output ") + std::to_string(k), x[k],
+              y[k]};
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace supertac

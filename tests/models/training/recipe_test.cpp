@@ -5,7 +5,6 @@
 #include <functional>
 
 #include "models/files/model_file.h"
-#include "models/networks/cost.h"
 #include "tests/expect_error.h"
 #include "tests/models/support.h"
 

@@ -199,18 +199,15 @@ TEST(Prepared, ShowsEveryMapOnItsWay) {
     const SuperTac network = random_network(random_settings(seed), seed);
     const Tensor input = uniform(network.input_shape(1), 5);
     std::vector<std::pair<std::string, std::vector<real>>> ops, shown;
+    const auto numbers = [](const Tensor& t) { return std::vector(t.values().begin(), t.values().end()); };
     {
-      const NoGrad no_grad;
-      const Trace trace;
-      network.draw(Variable(input));
-      for (const TracedOp& op : trace.ops())
-        if (op.op != "flatten_channels_first")
-          ops.emplace_back(op.op, std::vector(op.y.value().values().begin(), op.y.value().values().end()));
+      const TracedDrawing traced(network, input);
+      for (const TracedOp& op : traced.trace.ops())
+        if (op.op != "flatten_channels_first") ops.emplace_back(op.op, numbers(op.y.value()));
     }
     const Prepared prepared(network);
-    const Estimate drawn = prepared.watched(input, [&](const std::string& step, const Tensor& map) {
-      shown.emplace_back(step, std::vector(map.values().begin(), map.values().end()));
-    });
+    const Estimate drawn = prepared.watched(
+        input, [&](const std::string& step, const Tensor& map) { shown.emplace_back(step, numbers(map)); });
     EXPECT_TRUE(std::ranges::equal(drawn.picture.values(), prepared.estimate(input).picture.values()));
     ASSERT_EQ(ops.size(), shown.size());
     for (std::size_t i = 0; i < ops.size(); ++i) {
@@ -241,10 +238,8 @@ TEST(Prepared, InBytesShowsItsMapsAsWhatTheyStandFor) {
   std::map<const void*, std::string> names;
   for (const Parameter& p : network.parameters()) names[p.value.node()] = p.name;
   std::size_t compared = 0;
-  const NoGrad no_grad;
-  const Trace trace;
-  network.draw(Variable(input));
-  for (const TracedOp& op : trace.ops()) {
+  const TracedDrawing traced(network, input);
+  for (const TracedOp& op : traced.trace.ops()) {
     std::string layer = op.inputs.size() < 2 ? "" : names[op.inputs[1].node()];
     layer = layer.substr(0, layer.rfind('.'));
     if (!bytes.contains(layer) || layer == "upsampler.fc") continue;  // whose numbers lie pixel by pixel

@@ -1,7 +1,6 @@
 // An opened step: it changes nothing, ends in the ledger's line, and brings whatever is planted in it down to
 // operator and entry. SUPERTAC_PLANTS=40 plants more of each kind.
 #include "models/training/audit/opened_step.h"
-#include "models/training/audit/step_difference.h"
 
 #include <gtest/gtest.h>
 
