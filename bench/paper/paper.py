@@ -13,7 +13,7 @@ import sys
 
 BENCH = pathlib.Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(BENCH))
-from source import source  # noqa: E402
+import source  # noqa: E402
 from tables import rows, table  # noqa: E402
 
 SPLITS = ("trial", "window")
@@ -88,13 +88,7 @@ class Study:
         return folder
 
     def keep(self, name, lines):
-        """Writes NAME.csv, each line with its command, the commit of the tree, and that of the programs if it is known."""
-        made = source()  # before the file changes the tree
-        with open(self.kept / f"{name}.csv", "w", newline="") as file:
-            out = csv.DictWriter(file, [*lines[0], "command", "commit"], lineterminator="\n")
-            out.writeheader()
-            for number, line in enumerate(lines):
-                out.writerow(line | (made if number == 0 else {"command": "", "commit": ""}))
+        source.write(self.kept / f"{name}.csv", lines)
 
     def test(self, name):
         """Tests of significance on NAME.csv, where it has several seeds; needs python3-scipy."""

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import stats
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
-from source import source  # noqa: E402
+import source  # noqa: E402
 
 SETTINGS = {"scale": "scale", "timesteps": "T", "latent": "LD"}
 
@@ -68,11 +68,7 @@ def write(path):
     splits = dict.fromkeys(row["split"] for row in rows)
     lines = [{"split": split} | line for split in splits for line in tests_of([r for r in rows if r["split"] == split])]
     if lines:
-        made = source()  # before the file changes the tree
-        with open(path.with_name(path.stem + "_tests.csv"), "w", newline="") as file:
-            table = csv.DictWriter(file, [*lines[0], "command", "commit"], lineterminator="\n")
-            table.writeheader()
-            table.writerows(line | (made if number == 0 else {}) for number, line in enumerate(lines))
+        source.write(path.with_name(path.stem + "_tests.csv"), lines)
     return lines
 
 

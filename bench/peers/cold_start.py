@@ -8,8 +8,6 @@ Python package are measured in a new interpreter each, which has imported them: 
 picture. Memory is what a process holds at its most (program), or what it holds more than after the import. Engines take
 turns. Needs what compare.py needs, and SUPERTAC_LIBRARY for the package.
 """
-import argparse
-import csv
 import pathlib
 import statistics
 import subprocess
@@ -20,7 +18,6 @@ import time
 import compare  # restarts with one thread
 import engines
 import torch
-from source import source
 
 LOAD = {
     "ours, in Python": ("import numpy, supertac", """
@@ -82,11 +79,9 @@ def starts(model, windows, folder, binaries):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = compare.arguments(__doc__, "cold_start")
     parser.add_argument("models", nargs="+", metavar="NAME=MODEL")
-    parser.add_argument("--bin", default=compare.ROOT / "build-dev/bin", help="where first_picture is (-DSUPERTAC_BENCH=ON)")
     parser.add_argument("--starts", type=int, default=31)
-    parser.add_argument("--out", default=compare.ROOT / "bench/results/speed/cold_start.csv")
     options, rows = parser.parse_args(), []
     for name, model in (word.split("=", 1) for word in options.models):
         with tempfile.TemporaryDirectory() as folder, torch.no_grad():
@@ -100,11 +95,7 @@ def main():
             rows.append({"model": name, "engine": which, "starts": len(seconds), "median_ms": f"{1e3 * statistics.median(seconds):.2f}",
                          "worst_ms": f"{1e3 * max(seconds):.2f}", "memory_mb": f"{statistics.median(held) / 1e6:.1f}"})
             print(*rows[-1].values(), sep=", ", flush=True)
-    versions = " ".join(f"{name} {version}" for name, version in engines.versions().items())
-    with open(options.out, "w", newline="") as file:
-        writer = csv.DictWriter(file, [*rows[0], "versions", *source()], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(row | {"versions": versions, **source()} for row in rows)
+    compare.keep(options.out, rows)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ machine only. `share` is of the FMA peak measured between our calls of the same 
 Needs PyTorch; what else of requirements.txt is not installed is skipped.
 """
 import argparse
-import csv
 import math
 import os
 import pathlib
@@ -37,7 +36,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / folder) for folder in ("bench", "bench/peers", "python")]
 import engines  # noqa: E402
 import supertac  # noqa: E402
-from source import source  # noqa: E402
+from source import write  # noqa: E402
 from supertac.torch_model import loss_terms  # noqa: E402
 
 TRAINING_BATCH = 64
@@ -202,24 +201,40 @@ def differences(calls, pictures):
     return found
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("model")
-    parser.add_argument("--bin", default=ROOT / "build-dev/bin", help="where peers_ours is (-DSUPERTAC_BENCH=ON)")
-    parser.add_argument("--pairs", type=int, default=15)
-    parser.add_argument("--seconds", type=float, default=0.2, help="of each turn")
-    parser.add_argument("--compile", action="store_true", help="also torch.compile, which takes minutes to get ready")
-    parser.add_argument("--out", default=ROOT / "bench/results/speed/peers.csv")
-    options = parser.parse_args()
+def arguments(about, name):
+    """A parser of what all measurements of this folder take; `name` is that of the CSV."""
+    parser = argparse.ArgumentParser(description=about.splitlines()[0])
+    parser.add_argument("--bin", default=ROOT / "build-dev/bin", help="where our programs are (-DSUPERTAC_BENCH=ON)")
+    parser.add_argument("--out", default=ROOT / f"bench/results/speed/{name}.csv")
+    return parser
+
+
+def opened(options, folder):
+    """PyTorch's network and ours, which were seen to draw the same: ours, the network, windows, multiply-adds, pictures."""
     torch.set_num_threads(1)
     torch.manual_seed(1)
     model = Drawing(options.model)
     windows = torch.rand(TRAINING_BATCH, model.settings["timesteps"], 16)
-    rows = []
+    supertac.write(f"{folder}/windows.safetensors", {"windows": windows.numpy()})
+    ours = Ours(pathlib.Path(options.bin) / "peers_ours", options.model, f"{folder}/windows.safetensors")
+    return ours, model, windows, *check_pictures(ours, model, windows, folder)
+
+
+def keep(path, rows):
+    """The rows as a CSV, with the engines' versions."""
+    versions = engines.versions()
+    write(path, [row | {"versions": versions} for row in rows])
+
+
+def main():
+    parser = arguments(__doc__, "peers")
+    parser.add_argument("model")
+    parser.add_argument("--pairs", type=int, default=15)
+    parser.add_argument("--seconds", type=float, default=0.2, help="of each turn")
+    parser.add_argument("--compile", action="store_true", help="also torch.compile, which takes minutes to get ready")
+    options, rows = parser.parse_args(), []
     with tempfile.TemporaryDirectory() as folder:
-        supertac.write(f"{folder}/windows.safetensors", {"windows": windows.numpy()})
-        ours = Ours(pathlib.Path(options.bin) / "peers_ours", options.model, f"{folder}/windows.safetensors")
-        inference, training, pictures = check_pictures(ours, model, windows, folder)
+        ours, model, windows, inference, training, pictures = opened(options, folder)
         ours(f"pictures8 {folder}/int8.safetensors")
         int8 = supertac.read(f"{folder}/int8.safetensors")[0]["pictures"]
         print(f"pictures in int8 differ by at most {np.abs(int8 - pictures).max():.1e}")
@@ -236,13 +251,7 @@ def main():
         steps = {"pytorch eager": step} | ({"torch.compile": torch.compile(step)} if options.compile else {})
         rows += pair(ours, "train 1", steps, options.pairs, options.seconds, TRAINING_BATCH * training)
         rows.append(two_threads(ours, options.pairs, options.seconds, TRAINING_BATCH * training))
-    versions = " ".join(f"{name} {version}" for name, version in engines.versions().items())
-    with open(options.out, "w", newline="") as file:
-        writer = csv.DictWriter(file, [*rows[0], "versions", *source()], lineterminator="\n")
-        writer.writeheader()
-        for row in rows:
-            shown = {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
-            writer.writerow({**shown, "versions": versions, **source()})
+    keep(options.out, rows)
     print(f"{'task':9} {'against':19} {'ours us':>9} {'peer us':>9} {'ratio':>6} {'95 % interval':>15} {'share':>6}")
     for r in rows:
         print(f"{r['task']:9} {r['peer']:19} {r['ours_us']:9.1f} {r['peer_us']:9.1f} {r['ratio']:6.2f} "

@@ -20,7 +20,7 @@ def installed(name):
 
 def versions():
     names = ("torch", "onnxruntime", "openvino", "nncf", "MNN", "ncnn", "executorch", "ai_edge_litert")
-    return {name.lower(): importlib.metadata.version(name).split("+")[0] for name in names if installed(name)}
+    return " ".join(f"{name.lower()} {importlib.metadata.version(name).split('+')[0]}" for name in names if installed(name))
 
 
 def export_onnx(model, windows, folder):

@@ -7,11 +7,9 @@ Twice: with nothing else running, and beside a compiler on the other cores. Engi
 the machine itself adds is measured by additions that need no memory and take about as long as a picture ("no network").
 Other engines are called from Python, whose collector is switched off. Needs what compare.py needs.
 """
-import argparse
-import csv
+import functools
 import gc
 import os
-import pathlib
 import resource
 import subprocess
 import sys
@@ -23,7 +21,6 @@ import engines
 import numpy as np
 import supertac
 import torch
-from source import source
 
 TURNS = 50
 WARM_UP = 100
@@ -48,29 +45,19 @@ def each(call, count):
     return seconds, page_faults() - before
 
 
-class Own:
-    def __init__(self, ours, order, folder):
-        self.ours, self.order, self.file = ours, order, f"{folder}/{order}.safetensors"
-
-    def each(self, count):
-        faults = int(self.ours(f"{self.order} {count} {self.file}")[0])
-        return supertac.read(self.file)[0]["seconds"], faults
-
-
-class Peer:
-    def __init__(self, call):
-        self.call = call
-
-    def each(self, count):
-        return each(self.call, count)
+def each_of_ours(ours, order, folder, count):
+    """The same, measured by our program."""
+    file = f"{folder}/{order}.safetensors"
+    faults = int(ours(f"{order} {count} {file}")[0])
+    return supertac.read(file)[0]["seconds"], faults
 
 
 def measured(load, what, pictures):
-    """One row for each of `what`, which take turns."""
+    """One row for each of `what`, functions of a count, which take turns."""
     found = {name: [] for name in what}
     for turn in range(TURNS):
         for name, one in what.items():
-            found[name].append(one.each(pictures // TURNS))
+            found[name].append(one(pictures // TURNS))
         print(f"\r{load}: {100 * (turn + 1) // TURNS} %", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     for name, turns in found.items():
@@ -82,28 +69,21 @@ def measured(load, what, pictures):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = compare.arguments(__doc__, "tail")
     parser.add_argument("model")
-    parser.add_argument("--bin", default=compare.ROOT / "build-dev/bin", help="where peers_ours is (-DSUPERTAC_BENCH=ON)")
     parser.add_argument("--pictures", type=int, default=1_000_000)
-    parser.add_argument("--out", default=compare.ROOT / "bench/results/speed/tail.csv")
-    options = parser.parse_args()
+    options, rows = parser.parse_args(), []
     *others, own_core = sorted(os.sched_getaffinity(0))
     if not others or options.pictures < TURNS:
         sys.exit(f"tail.py: expected two cores and at least {TURNS} pictures")
     os.sched_setaffinity(0, {own_core})
-    torch.set_num_threads(1)
-    torch.manual_seed(1)
-    model, rows = compare.Drawing(options.model), []
-    windows = torch.rand(compare.TRAINING_BATCH, model.settings["timesteps"], 16)
     with tempfile.TemporaryDirectory() as folder, torch.no_grad():
-        supertac.write(f"{folder}/windows.safetensors", {"windows": windows.numpy()})
-        ours = compare.Ours(pathlib.Path(options.bin) / "peers_ours", options.model, f"{folder}/windows.safetensors")
-        _, _, pictures = compare.check_pictures(ours, model, windows, folder)
+        ours, model, windows, _, _, pictures = compare.opened(options, folder)
         calls = engines.inference(model, windows[:1], windows, folder, False)
         compare.differences(calls, pictures[:1])
-        what = {"ours": Own(ours, "each", folder), "no network": Own(ours, "spin", folder)}
-        what |= {name: Peer(call) for name, call in calls.items() if name in ("onnx runtime", "openvino", "mnn")}
+        what = {name: functools.partial(each_of_ours, ours, order, folder)
+                for name, order in (("ours", "each"), ("no network", "spin"))}
+        what |= {name: functools.partial(each, call) for name, call in calls.items() if name in ("onnx runtime", "openvino", "mnn")}
         gc.collect()
         gc.disable()
         rows += measured("idle", what, options.pictures)
@@ -113,11 +93,7 @@ def main():
         finally:
             for compiler in compilers:
                 os.killpg(compiler.pid, 9)
-    versions = " ".join(f"{name} {version}" for name, version in engines.versions().items())
-    with open(options.out, "w", newline="") as file:
-        writer = csv.DictWriter(file, [*rows[0], "versions", *source()], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(row | {"versions": versions, **source()} for row in rows)
+    compare.keep(options.out, rows)
     for row in rows:
         print(*row.values(), sep=", ")
 

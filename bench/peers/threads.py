@@ -8,8 +8,6 @@ as many trainings on one thread each that run at the same time and share nothing
 as one alone. What they lack, cores lack that share caches, memory or an arithmetic unit. Medians over rounds, in each of
 which all take turns. The machine should do nothing else. Needs what compare.py needs.
 """
-import argparse
-import csv
 import os
 import pathlib
 import tempfile
@@ -18,7 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 import compare  # restarts with one thread
 import numpy as np
 import supertac
-from source import source
+from source import write
 
 BATCHES = (64, 128)
 
@@ -39,13 +37,11 @@ def one_round(processes, batch, counts, seconds):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = compare.arguments(__doc__, "threads")
     parser.add_argument("model")
-    parser.add_argument("--bin", default=compare.ROOT / "build-dev/bin", help="where peers_ours is (-DSUPERTAC_BENCH=ON)")
     parser.add_argument("--threads", default="1,2,4,8,16", help="those above the machine's are left out")
     parser.add_argument("--rounds", type=int, default=9)
     parser.add_argument("--seconds", type=float, default=0.5, help="of each turn")
-    parser.add_argument("--out", default=compare.ROOT / "bench/results/speed/threads.csv")
     options = parser.parse_args()
     counts = [int(word) for word in options.threads.split(",") if int(word) <= os.cpu_count()]
     samples = supertac.load_model(options.model).settings["timesteps"]
@@ -66,11 +62,7 @@ def main():
                 rows.append(row)
                 print(f"batch {batch:3}, {threads:2} threads: {row['step_ms']:7.2f} ms a step, {row['together']:5.2f} times one; "
                       f"{threads:2} trainings apart {row['apart']:5.2f} times")
-    with open(options.out, "w", newline="") as file:
-        writer = csv.DictWriter(file, [*rows[0], *source()], lineterminator="\n")
-        writer.writeheader()
-        for row in rows:
-            writer.writerow({key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()} | source())
+    write(options.out, rows)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ received here, so a time goes from before a frame is sent until after its raw pi
 is compared with its frame. Keeps a line for each array in bench/results/reliability/sensors.csv.
 """
 import binascii
-import csv
 import json
 import os
 import pathlib
@@ -25,7 +24,11 @@ import tty
 
 import numpy as np
 
-KEPT = pathlib.Path(__file__).resolve().parent.parent / "results" / "reliability" / "sensors.csv"
+BENCH = pathlib.Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(BENCH))
+from source import commit_of, keep  # noqa: E402
+
+KEPT = BENCH / "results" / "reliability" / "sensors.csv"
 COLUMNS = ("array", "port", "rate_hz", "seconds", "sent", "read", "said_lost", "shown", "unequal", "median_ms", "p99_ms", "max_ms",
            "grown_kb", "command", "commit")
 HEADER = b"\xaa\x55\x5a\xa5"
@@ -134,18 +137,12 @@ def main():
     if len(sys.argv) not in (2, 3):
         sys.exit(__doc__)
     stream, seconds = sys.argv[1], float(sys.argv[2]) if len(sys.argv) == 3 else 600
-    commit = subprocess.run([stream, "--version"], capture_output=True, text=True).stdout.split("commit")[1].split()[0]
     for kind, device in ("udp", Device(16, 16, 1000)), ("serial", Device(32, 64, 200)):
         with tempfile.TemporaryDirectory() as folder:
             row = study(stream, device, kind, seconds, pathlib.Path(folder))
-        row |= {"command": "bench/sensors/endurance.py STREAM", "commit": commit}
+        row |= {"command": "bench/sensors/endurance.py STREAM", "commit": commit_of(stream)}
         print(*row.values(), flush=True)
-        lines = list(csv.DictReader(open(KEPT))) if KEPT.exists() else []
-        lines = [line for line in lines if line["port"] != kind] + [row]
-        with open(KEPT, "w", newline="") as file:
-            writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(lines)
+        keep(KEPT, COLUMNS, ("port",), row)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ For each set and three seeds a fifth of the groups is kept away. On the others p
 frames belong together in time a window of 32 frames (`best --last-frame`) is trained as well. All methods draw the same
 frames, those kept away. What is there is not trained again; scores go to bench/results/sensors.csv.
 """
-import csv
 import json
 import pathlib
 import shutil
@@ -21,7 +20,7 @@ BENCH = pathlib.Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(BENCH), str(BENCH.parent / "python")]
 import baselines  # noqa: E402
 import sets  # noqa: E402
-from source import source  # noqa: E402
+from source import commit_of, keep, source  # noqa: E402
 from supertac import files  # noqa: E402
 
 KEPT = BENCH / "results" / "sensors.csv"
@@ -58,8 +57,7 @@ def scores(name, pictures, passes):
 class Study:
     def __init__(self, programs, folder, out):
         self.programs, self.folder, self.out = pathlib.Path(programs), pathlib.Path(folder), pathlib.Path(out)
-        told = subprocess.run([self.programs / "supertac-train", "--version"], capture_output=True, text=True).stdout
-        self.commit = told.split("commit")[1].split()[0]
+        self.commit = commit_of(self.programs / "supertac-train")
         if self.commit.endswith("-dirty"):
             sys.exit("real_sensors.py: the programs were built from a changed tree: commit, build, start again")
 
@@ -112,25 +110,6 @@ class Study:
                                          "--last-frame", "--rate", RATE[name], "--scaling", "fixed", "--augment", "none")
 
 
-def kept():
-    if not KEPT.exists():
-        return []
-    with open(KEPT, newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def keep(row):
-    """In the place of an older line of the same set, seed and method."""
-    same = lambda other: all(str(row[key]) == other[key] for key in ("set", "seed", "method"))
-    lines = [line for line in kept() if not same(line)]
-    lines.append({key: f"{value:.4f}" if isinstance(value, float) else value for key, value in row.items()})
-    with open(KEPT, "w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(lines)
-    print(*lines[-1].values(), flush=True)
-
-
 def main():
     if len(sys.argv) < 4:
         sys.exit(__doc__)
@@ -141,8 +120,11 @@ def main():
     for rows in (study.frames, study.windows):  # windows take longest
         for name in sys.argv[4:] or sets.SETS:
             for seed in SEEDS:
-                for method, row in rows(name, seed):
-                    keep({"set": name, "seed": seed, "method": method} | row | source() | {"commit": study.commit[:7]})
+                for method, figures in rows(name, seed):
+                    row = {"set": name, "seed": seed, "method": method} | source() | {"commit": study.commit[:7]}
+                    row |= {key: f"{value:.4f}" if isinstance(value, float) else value for key, value in figures.items()}
+                    keep(KEPT, COLUMNS, ("set", "seed", "method"), row)
+                    print(*row.values(), flush=True)
 
 
 if __name__ == "__main__":

@@ -8,14 +8,13 @@ SEEDS: 0,1,2,3,4. About six minutes a network on one core; what is there in OUT_
 interrupted. Writes OUT_DIR/whole_passes.csv or left_out.csv, whose lines replace those of bench/results. Choices are
 made on trial 1 (bench/README.md); this looks at trial 2.
 """
-import csv
 import json
 import pathlib
 import subprocess
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
-from source import source  # noqa: E402
+from source import write  # noqa: E402
 
 KNOWN = ("3_Bumps", "6_Bumps", "4_Ridges", "6_Ridges")
 PLATES = (*KNOWN, "4_Blob", "6_Blob", "4_Waves", "6_Waves")
@@ -67,12 +66,6 @@ class Study:
         return {figure: f"{found[part][key]:.4f}" if found.get(part, {}).get(key) is not None else ""
                 for figure, (part, key) in FIGURES.items()}
 
-    def write(self, name, lines):
-        with open(self.out / name, "w", newline="") as file:
-            table = csv.DictWriter(file, [*lines[0], "command", "commit"], lineterminator="\n")
-            table.writeheader()
-            table.writerows(line | source() for line in lines)
-
 
 def known(study):
     plates, lines = ["--plates", ",".join(KNOWN)], []
@@ -90,7 +83,7 @@ def known(study):
             score(preset, seed, [models[preset, seed]])
     for left_out in study.seeds if len(study.seeds) > 1 else ():
         score("four of best averaged", left_out, [models["best", seed] for seed in study.seeds if seed != left_out])
-    study.write("whole_passes.csv", lines)
+    write(study.out / "whole_passes.csv", lines)
 
 
 def unseen(study):
@@ -108,7 +101,7 @@ def unseen(study):
                 scores = study.scores(f"known_{name}", [others], study.trial1, "--plates", ",".join(KNOWN))
                 line["without_random_plates_ssim"] = scores["contact_ssim"]
             lines.append(line)
-    study.write("left_out.csv", lines)
+    write(study.out / "left_out.csv", lines)
 
 
 if __name__ == "__main__":
