@@ -34,8 +34,8 @@ using supertac::Variable;
 
 struct Chart {
   std::string title, across, up;
-  Array without, with;         // the safeguard
-  double first = 0, step = 1;  // across: of the first number, and from one to the next
+  double first = 0, step = 1;     // across: of the first number, and from one to the next
+  Array without = {}, with = {};  // the safeguard
 };
 
 Variable parameter(double value, Dim n = 1) { return Variable(Tensor::full({n, 1}, value), true); }
@@ -71,8 +71,11 @@ Chart all_zero() {
     }
     return path;
   };
-  return {"1: a sigmoid that has closed passes no gradient; a linear output does", "step",
-          "pixel, should be .8", pixel(true), pixel(false)};
+  return {.title = "1: a sigmoid that has closed passes no gradient; a linear output does",
+          .across = "step",
+          .up = "pixel, should be .8",
+          .without = pixel(true),
+          .with = pixel(false)};
 }
 
 // One latent number, one signal: below the threshold of beta it is used, above it the prior wins.
@@ -96,18 +99,16 @@ Chart posterior_collapse() {
     }
     return path;
   };
-  return {"2: with a large weight of the divergence (2, against .01) the latent number says nothing", "step",
-          "divergence", divergences(2), divergences(0.01)};
+  return {.title = "2: with a large weight of the divergence (2, against .01) the latent number says nothing",
+          .across = "step",
+          .up = "divergence",
+          .without = divergences(2),
+          .with = divergences(0.01)};
 }
 
 Chart log_variance() {
   Chart chart{"3: the standard deviation of a log variance that runs away, and of a clamped one",
-              "log variance",
-              "log10 of exp(log_var / 2)",
-              {},
-              {},
-              -20,
-              4};
+              "log variance", "log10 of exp(log_var / 2)", -20, 4};
   for (int log_var = -20; log_var <= 200; log_var += 4) {
     chart.without.push_back(log_var / 2.0 / std::numbers::ln10);
     chart.with.push_back(std::clamp(log_var, -10, 10) / 2.0 / std::numbers::ln10);
@@ -116,11 +117,8 @@ Chart log_variance() {
 }
 
 Chart warm_up() {
-  Chart chart{"4: a ramp that ends with a jump, and the schedule of this project",
-              "step",
-              "share of the peak rate",
-              {},
-              {}};
+  Chart chart{"4: a ramp that ends with a jump, and the schedule of this project", "step",
+              "share of the peak rate"};
   const supertac::Schedule schedule{.peak = 1, .warm_up = 50, .total = 200};
   for (int step = 0; step < 200; ++step) {
     chart.without.push_back(step < 50 ? 0.1 * step / 50 : 1);
@@ -130,13 +128,8 @@ Chart warm_up() {
 }
 
 Chart noise() {
-  Chart chart{"5: uniform noise has a third of the variance that the divergence assumes",
-              "draws",
-              "variance so far",
-              {},
-              {},
-              10,
-              10};
+  Chart chart{"5: uniform noise has a third of the variance that the divergence assumes", "draws",
+              "variance so far", 10, 10};
   const RandomStream random(1, 0);
   double uniform = 0, normal = 0;
   for (std::uint64_t n = 1; n <= 1000; ++n) {
@@ -151,12 +144,7 @@ Chart noise() {
 // How much each of two terms moves a pixel that is `distance` off a textured truth.
 Chart silent_term() {
   Chart chart{"6: SSIM with a weight of 0 does not act; with .1 it pulls beside L2",
-              "distance from the truth",
-              "length of SSIM's gradient, in thousandths",
-              {},
-              {},
-              0.02,
-              0.02};
+              "distance from the truth", "length of SSIM's gradient, in thousandths", 0.02, 0.02};
   Tensor truth(Shape{1, 8, 8, 1});
   for (Dim i = 0; i < 64; ++i) truth.data()[i] = 0.5 + 0.5 * std::sin(static_cast<double>(i / 8));
   for (int at = 1; at <= 50; ++at) {
@@ -173,12 +161,7 @@ Chart silent_term() {
 
 Chart cancelling() {
   Chart chart{"7: the variance of 49 pixels in single precision, as E[x^2] - E[x]^2 and about their mean",
-              "level of the pixels",
-              "variance, should be .0039",
-              {},
-              {},
-              0,
-              10};
+              "level of the pixels", "variance, should be .0039", 0, 10};
   for (int level = 0; level < 60; ++level) {
     std::vector<float> x;
     for (int i = 0; i < 49; ++i)
@@ -194,7 +177,7 @@ Chart cancelling() {
 
 // How many taps reach each output of a transposed convolution of stride 2.
 Chart checkerboard() {
-  Chart chart{"8: a constant doubled by kernel 3 and by kernel 4", "pixel", "value", {}, {}, 1};
+  Chart chart{"8: a constant doubled by kernel 3 and by kernel 4", "pixel", "value", 1};
   const auto doubled = [](std::size_t kernel) {
     constexpr std::size_t kLength = 16;
     Array row((kLength - 1) * 2 + kernel - 2);
@@ -210,11 +193,7 @@ Chart checkerboard() {
 
 Chart deep_stack() {
   Chart chart{"9: variance behind residual blocks with He's weights, and with those of this project",
-              "blocks",
-              "log10 of variance",
-              {},
-              {},
-              1};
+              "blocks", "log10 of variance", 1};
   const auto grow = [](double factor) {
     Rng rng(5);
     Tensor x(Shape{1, 8, 8, 16});
@@ -237,12 +216,8 @@ Chart deep_stack() {
 }
 
 Chart saturated_gate() {
-  Chart chart{"10: the gradient through a gate alone, and with the skip beside it",
-              "bias of the gate",
-              "dy / dx",
-              {},
-              {},
-              -20};
+  Chart chart{"10: the gradient through a gate alone, and with the skip beside it", "bias of the gate",
+              "dy / dx", -20};
   for (int bias = -20; bias <= 20; ++bias) {
     const double gate = 1 / (1 + std::exp(-bias));
     chart.without.push_back(gate), chart.with.push_back(1 + gate);
@@ -251,8 +226,7 @@ Chart saturated_gate() {
 }
 
 Chart silence() {
-  Chart chart{
-      "11: half a second without frames, bridged by the last sample and left out", "frame", "signal", {}, {}};
+  Chart chart{"11: half a second without frames, bridged by the last sample and left out", "frame", "signal"};
   for (int frame = 0; frame < 120; ++frame) {
     const auto signal = [](int at) { return 0.5 + 0.4 * std::sin(0.08 * at); };
     const bool lost = frame >= 40 && frame < 90;
@@ -266,11 +240,7 @@ Chart silence() {
 Chart leakage() {
   Chart chart{
       "12: tested windows that share frames with trained ones, when windows and when trials are dealt out",
-      "frames between windows",
-      "share",
-      {},
-      {},
-      1};
+      "frames between windows", "share", 1};
   const RandomStream random(1, 0);
   for (int stride = 1; stride <= 40; ++stride) {
     int tested = 0, leaked = 0;
@@ -295,8 +265,11 @@ Chart spike() {
     return descend(x, {.learning_rate = 0.02, .clip_norm = clip}, 150,
                    [&](int step) { return (step == 20 ? 1e8 : 1) * supertac::l2_loss(x, target); });
   };
-  return {"13: a gradient of 1e8 at step 20 stops Adam for good, unless it is clipped", "step",
-          "parameter, should be 1", path(0), path(1)};
+  return {.title = "13: a gradient of 1e8 at step 20 stops Adam for good, unless it is clipped",
+          .across = "step",
+          .up = "parameter, should be 1",
+          .without = path(0),
+          .with = path(1)};
 }
 
 std::string line(const Array& values, double low, double high, const char* colour) {

@@ -3,7 +3,6 @@
 #include ENGINE
 
 #include <cstdio>
-#include <exception>
 #include <memory>
 
 #include "docs/lessons/check/checker.h"
