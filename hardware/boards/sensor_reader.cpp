@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -210,57 +209,38 @@ ReaderCounters FrameReader::counters() const {
 }
 
 SensorReader::SensorReader(OpenedPort opened, const Sensor& sensor)
-    : port_(std::move(opened.port)),
+    : FrameQueue(kQueueFrames, !opened.live),
+      port_(std::move(opened.port)),
       live_(opened.live),
       sensor_(sensor),
       frames_(sensor, opened.stored),
-      last_frame_s_(port_->now()),
-      thread_([this] { run(); }) {}
-
-SensorReader::~SensorReader() { stop(); }
-
-void SensorReader::stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    stop_ = true;
-  }
-  taken_.notify_all();
-  if (thread_.joinable()) thread_.join();
+      last_frame_s_(port_->now()) {
+  thread_ = std::thread([this] { run(); });
 }
 
 void SensorReader::run() {
   double time_s = last_frame_s_;
   try {
-    for (bool stopped = false; !stopped;) {
+    do {
       time_s = frames_.read(*port_, live_, sink_);
       check_silence(time_s);
       const std::lock_guard lock(mutex_);
-      count();
-      stopped = stop_;
-    }
+      counters_ = frames_.counters();
+    } while (!asked_to_stop());
   } catch (const PortEnded&) {  // nothing is wrong, but with one that was to go on
     frames_.finish(time_s, sink_);
     const std::lock_guard lock(mutex_);
-    count();
     if (live_)
       error_ = std::make_exception_ptr(PortUnplugged("sensor " + sensor_.name + " at " + port_->name() +
                                                      ": what it sends has ended; see whether its program "
                                                      "still runs, and start again"));
   } catch (...) {
     const std::lock_guard lock(mutex_);
-    count();
     error_ = std::current_exception();
   }
   const std::lock_guard lock(mutex_);
-  ended_ = true;
-  arrived_.notify_all();
-}
-
-// With mutex_ held.
-void SensorReader::count() {
-  const std::uint64_t dropped = counters_.dropped;
   counters_ = frames_.counters();
-  counters_.dropped = dropped;
+  end();
 }
 
 double SensorReader::silence_s(const Sensor& sensor) {
@@ -306,49 +286,15 @@ void SensorReader::check_clock(double time_s, double arrival_s) {
 void SensorReader::take(const ReadFrame& frame) {
   if (live_ && sensor_.frame.time && !clock_checked_) check_clock(frame.time_s, frame.arrival_s);
   std::unique_lock lock(mutex_);
-  count();
-  if (!live_) {
-    taken_.wait(lock, [&] { return queue_.size() < kQueueFrames || stop_; });
-    if (stop_) return;
-  } else if (queue_.size() >= kQueueFrames) {
-    queue_.pop_front();
-    ++counters_.dropped;
-  }
-  queue_.push_back(frame);
-  arrived_.notify_one();
-}
-
-std::optional<ReadFrame> SensorReader::next(double wait_s) {
-  std::unique_lock lock(mutex_);
-  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return !queue_.empty() || ended_; });
-  if (!queue_.empty()) {
-    ReadFrame frame = std::move(queue_.front());
-    queue_.pop_front();
-    taken_.notify_one();
-    return frame;
-  }
-  if (error_) std::rethrow_exception(error_);
-  return std::nullopt;
-}
-
-void SensorReader::check() {
-  const std::lock_guard lock(mutex_);
-  if (error_) std::rethrow_exception(error_);
-}
-
-void SensorReader::wait_for_end(double wait_s) {
-  std::unique_lock lock(mutex_);
-  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return ended_; });
-}
-
-bool SensorReader::ended() const {
-  const std::lock_guard lock(mutex_);
-  return ended_ && queue_.empty() && !error_;
+  counters_ = frames_.counters();
+  put(lock, frame);
 }
 
 ReaderCounters SensorReader::counters() {
   const std::lock_guard lock(mutex_);
-  return counters_;
+  ReaderCounters counters = counters_;
+  counters.dropped = dropped_;
+  return counters;
 }
 
 }  // namespace supertac

@@ -1,16 +1,13 @@
 // Any sensor, live: a thread reads, decodes and dates, a bounded queue hands frames over.
 #pragma once
 
-#include <condition_variable>
-#include <deque>
-#include <exception>
 #include <memory>
-#include <mutex>
 #include <optional>
-#include <thread>
+#include <string>
 #include <vector>
 
 #include "data/sensors/rest_tracker.h"
+#include "hardware/boards/frame_queue.h"
 #include "hardware/boards/sensor_decoder.h"
 #include "hardware/boards/tactile_board.h"
 #include "hardware/ports/open_port.h"
@@ -101,7 +98,9 @@ class FrameReader {
   std::uint64_t damaged_ = 0, late_ = 0;
 };
 
-class SensorReader {
+/// What ends it is PortUnplugged, BoardSilent or WrongDevice, the last also where a clock has another unit
+/// than the file says.
+class SensorReader : public FrameQueue<ReadFrame> {
  public:
   static constexpr std::size_t kQueueFrames = 4096;
   /// How long a live sensor may say nothing (s).
@@ -109,28 +108,13 @@ class SensorReader {
 
   /// Starts to read. A full queue drops the oldest frame; from a port that is not live it waits instead.
   SensorReader(OpenedPort opened, const Sensor& sensor);
-  ~SensorReader();
-  SensorReader(const SensorReader&) = delete;
-  SensorReader& operator=(const SensorReader&) = delete;
-  void stop();
-
-  /// The next frame, oldest first; empty after `wait_s`, or at the end. Rethrows what ended the reader
-  /// (PortUnplugged, BoardSilent; WrongDevice, also of a clock in another unit than the file says) once the
-  /// frames before it have been taken.
-  std::optional<ReadFrame> next(double wait_s);
-  /// Rethrows what ended the reader, without waiting and without taking frames.
-  void check();
-  /// Waits at most `wait_s` of wall time for the reader to end by itself.
-  void wait_for_end(double wait_s);
-  /// The source is at its end and all frames have been taken.
-  bool ended() const;
+  ~SensorReader() { stop(); }
   bool live() const { return live_; }
   ReaderCounters counters();
 
  private:
   void run();
   void take(const ReadFrame& frame);
-  void count();
   void check_silence(double time_s);
   void check_clock(double time_s, double arrival_s);
 
@@ -144,14 +128,7 @@ class SensorReader {
   double first_time_s_ = 0, first_arrival_s_ = 0, checked_time_s_ = 0, longest_step_s_ = 0;
   std::uint64_t checked_frames_ = 0;
   bool clock_checked_ = false;
-
-  mutable std::mutex mutex_;
-  std::condition_variable arrived_, taken_;
-  std::deque<ReadFrame> queue_;
-  std::exception_ptr error_;
   ReaderCounters counters_;
-  bool stop_ = false, ended_ = false;
-  std::thread thread_;
 };
 
 }  // namespace supertac

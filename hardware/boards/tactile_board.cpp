@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 
 #include "hardware/ports/errors.h"
 #include "io/numbers/numbers.h"
@@ -16,28 +15,16 @@ constexpr std::size_t kReadBytes = 8192;  // twice what a terminal holds
 }  // namespace
 
 TactileBoard::TactileBoard(std::unique_ptr<Port> port, const BoardSettings& settings)
-    : port_(std::move(port)), settings_(settings), last_arrival_(port_->now()), thread_([this] { run(); }) {}
-
-TactileBoard::~TactileBoard() { stop(); }
-
-void TactileBoard::stop() {
-  {
-    std::lock_guard lock(mutex_);
-    stop_ = true;
-  }
-  taken_.notify_all();
-  if (thread_.joinable()) thread_.join();
+    : FrameQueue(settings.queue_frames, settings.wait_for_consumer),
+      port_(std::move(port)),
+      silence_s_(settings.silence_s),
+      last_arrival_(port_->now()) {
+  thread_ = std::thread([this] { run(); });
 }
 
 void TactileBoard::run() {
   try {
-    for (;;) {
-      {
-        std::lock_guard lock(mutex_);
-        if (stop_) break;
-      }
-      read_once(port_->now() + kReadSlice);
-    }
+    while (!asked_to_stop()) read_once(port_->now() + kReadSlice);
     // What had arrived when the stop was asked for still counts. Where the machine is busy more comes with
     // every read: a port holds a tenth of a second at most.
     std::uint64_t before = 0;
@@ -56,8 +43,7 @@ void TactileBoard::run() {
   numbering_.finish(places_);
   std::lock_guard lock(mutex_);
   keep_decided();
-  ended_ = true;
-  arrived_.notify_all();
+  end();
 }
 
 void TactileBoard::read_once(double until) {
@@ -78,7 +64,7 @@ void TactileBoard::read_once(double until) {
 }
 
 void TactileBoard::check_silence(double time) {
-  if (time - last_arrival_ < settings_.silence_s) return;
+  if (time - last_arrival_ < silence_s_) return;
   const std::uint64_t total = decoder_.counters().bytes;
   if (decoder_.counters().frames == 0 && total >= 2) {
     const bool text = text_bytes_ > 0.9 * static_cast<double>(total);
@@ -89,7 +75,7 @@ void TactileBoard::check_silence(double time) {
   }
   throw BoardSilent(
       "board " + port_->name() + ": expected " + format(rig::kFrameRateHz, 0) + " frames/s, found none for " +
-      format(settings_.silence_s, 1) + " s; " +
+      format(silence_s_, 1) + " s; " +
       (decoder_.counters().frames == 0 ? "is this the board's port (--list-ports)? If it is, " : "") +
       "plug the board out and in again");
 }
@@ -116,14 +102,7 @@ void TactileBoard::take(StampedFrame frame) {
   keep_decided();
   counters_.suspect += frame.suspect ? 1 : 0;
   counters_.jumps += frame.jump ? 1 : 0;
-  if (settings_.wait_for_consumer) {
-    taken_.wait(lock, [&] { return queue_.size() < settings_.queue_frames || stop_; });
-  } else if (queue_.size() >= settings_.queue_frames) {
-    queue_.pop_front();
-    ++counters_.dropped;
-  }
-  queue_.push_back(frame);
-  arrived_.notify_one();
+  put(lock, frame);
 }
 
 // With mutex_ held: the frames whose place is now certain go to the clock.
@@ -137,32 +116,10 @@ void TactileBoard::keep_decided() {
   counters_.missing = numbering_.missing();
 }
 
-std::optional<StampedFrame> TactileBoard::next(double wait_s) {
-  std::unique_lock lock(mutex_);
-  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return !queue_.empty() || ended_; });
-  if (!queue_.empty()) {
-    const StampedFrame frame = queue_.front();
-    queue_.pop_front();
-    if (settings_.wait_for_consumer) taken_.notify_one();
-    return frame;
-  }
-  if (error_) std::rethrow_exception(error_);
-  return std::nullopt;
-}
-
-void TactileBoard::check() {
-  std::lock_guard lock(mutex_);
-  if (error_) std::rethrow_exception(error_);
-}
-
-void TactileBoard::wait_for_end(double wait_s) {
-  std::unique_lock lock(mutex_);
-  arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return ended_; });
-}
-
 BoardCounters TactileBoard::counters() {
   std::lock_guard lock(mutex_);
   BoardCounters counters = counters_;
+  counters.dropped = dropped_;
   counters.clock = clock_.fit();
   return counters;
 }

@@ -2,17 +2,14 @@
 // its consumer (but for replays), so a slow consumer loses the oldest frames; a counter says how many.
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
-#include <exception>
 #include <memory>
-#include <mutex>
-#include <optional>
-#include <thread>
+#include <vector>
 
 #include "hardware/boards/frame_clock.h"
 #include "hardware/boards/frame_decoder.h"
+#include "hardware/boards/frame_queue.h"
 #include "hardware/ports/port.h"
 
 namespace supertac {
@@ -42,21 +39,13 @@ struct BoardCounters {
   ClockFit clock;
 };
 
-class TactileBoard {
+/// What ends it is PortUnplugged, BoardSilent or WrongDevice.
+class TactileBoard : public FrameQueue<StampedFrame> {
  public:
   /// Starts to read `port`.
   explicit TactileBoard(std::unique_ptr<Port> port, const BoardSettings& settings = {});
   /// Stops reading; frames that already arrived at the port are still read.
-  ~TactileBoard();
-  void stop();
-
-  /// The next frame, oldest first; empty after `wait_s` of wall time. Rethrows what ended the reader
-  /// (PortUnplugged, BoardSilent, WrongDevice) once the frames before it have been taken.
-  std::optional<StampedFrame> next(double wait_s);
-  /// Rethrows what ended the reader, without waiting and without taking frames.
-  void check();
-  /// Waits at most `wait_s` of wall time for the reader to end by itself.
-  void wait_for_end(double wait_s);
+  ~TactileBoard() { stop(); }
   BoardCounters counters();
 
  private:
@@ -68,14 +57,9 @@ class TactileBoard {
   void check_silence(double time);
 
   std::unique_ptr<Port> port_;
-  BoardSettings settings_;
-  std::mutex mutex_;
-  std::condition_variable arrived_, taken_;
-  std::deque<StampedFrame> queue_;
-  std::exception_ptr error_;
+  double silence_s_;
   BoardCounters counters_;
   ClockEstimator clock_;
-  bool stop_ = false, ended_ = false;
 
   // of the reader's thread alone
   FrameDecoder decoder_;
@@ -98,7 +82,6 @@ class TactileBoard {
   double last_arrival_ = 0;
   bool first_ = true;
   double text_bytes_ = 0;
-  std::thread thread_;
 };
 
 }  // namespace supertac

@@ -1,7 +1,6 @@
 #include "hardware/collection/collected_frames.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "data/sensors/rest_tracker.h"
 #include "hardware/boards/sensor_reader.h"

@@ -6,26 +6,20 @@
 namespace supertac {
 namespace {
 
-VirtualPrinterSettings printer_settings(const RigSettings& settings) {
-  VirtualPrinterSettings printer = settings.printer;
-  printer.faults = settings.faults;
-  printer.seed = settings.seed;
-  return printer;
-}
-
-VirtualBoardSettings board_settings(const RigSettings& settings) {
-  VirtualBoardSettings board = settings.board;
-  board.faults = settings.faults;
-  board.seed = settings.seed;
-  return board;
+/// Settings of the printer or the board, with the rig's faults and seed.
+template <class Part>
+Part part_of(const RigSettings& settings, Part part) {
+  part.faults = settings.faults;
+  part.seed = settings.seed;
+  return part;
 }
 
 }  // namespace
 
 RigWorld::RigWorld(const RigSettings& settings, double t, BoardSink sink)
     : now_(t),
-      printer_(printer_settings(settings), t, settings.printer_running),
-      board_(board_settings(settings), t),
+      printer_(part_of(settings, settings.printer), t, settings.printer_running),
+      board_(part_of(settings, settings.board), t),
       sink_(std::move(sink)),
       chunk_s_(settings.chunk_s),
       chunk_due_(t),
