@@ -53,10 +53,8 @@ double seconds_left(const std::vector<Leg>& legs, const Leg& now, const Point3& 
 std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
   const auto usable = [](double value) { return value > 0 && std::isfinite(value); };
   if (plan.passes < 1 || plan.passes > 1000 || !usable(plan.slide) || !usable(plan.lift) ||
-      !usable(plan.speed) || !usable(plan.speed_z) || plan.speed_z > rig::kLiftMmS ||
-      !usable(plan.travel_speed)) {
-    throw std::invalid_argument(
-        "palpation: expected 1 to 1000 passes, slide, lift and speeds above 0 and at most 5 mm/s in z");
+      !usable(plan.speed)) {
+    throw std::invalid_argument("palpation: expected 1 to 1000 passes, and slide, lift and speed above 0");
   }
   std::vector<Leg> legs;
   Point3 at = here;
@@ -65,20 +63,20 @@ std::vector<Leg> legs_of(const PalpationPlan& plan, const Point3& here) {
     at = to;
   };
   const double high = plan.start.z + plan.lift;
-  add(1, Phase::approach, {at.x, at.y, std::max(at.z, high)}, plan.speed_z);
+  add(1, Phase::approach, {at.x, at.y, std::max(at.z, high)}, rig::kLiftMmS);
   for (int pass = 1; pass <= plan.passes; ++pass) {
     const double x = plan.start.x + plan.shift_x * (pass - 1);
     const double y = plan.start.y, z = plan.start.z;
     const Phase travel = pass == 1 ? Phase::approach : Phase::reposition;
-    add(pass, travel, {x, y, std::max(at.z, high)}, plan.travel_speed);
-    add(pass, travel, {x, y, high}, plan.speed_z);
-    add(pass, Phase::onset, {x, y, z}, plan.speed_z);
+    add(pass, travel, {x, y, std::max(at.z, high)}, rig::kFastestMmS);
+    add(pass, travel, {x, y, high}, rig::kLiftMmS);
+    add(pass, Phase::onset, {x, y, z}, rig::kLiftMmS);
     add(pass, Phase::slide, {x, y + plan.slide, z}, plan.speed);
-    add(pass, Phase::release, {x, y + plan.slide, high}, plan.speed_z);
+    add(pass, Phase::release, {x, y + plan.slide, high}, rig::kLiftMmS);
   }
   // Back to where it began: the next run's operator confirms the same place.
-  add(plan.passes, Phase::reposition, {at.x, at.y, std::max(here.z, high)}, plan.speed_z);
-  add(plan.passes, Phase::reposition, {here.x, here.y, at.z}, plan.travel_speed);
+  add(plan.passes, Phase::reposition, {at.x, at.y, std::max(here.z, high)}, rig::kLiftMmS);
+  add(plan.passes, Phase::reposition, {here.x, here.y, at.z}, rig::kFastestMmS);
   std::erase_if(legs, [](const Leg& leg) { return leg.from == leg.to; });
   return legs;
 }
@@ -233,7 +231,7 @@ void Palpation::recover(PalpationOutcome& outcome) {
     outcome.note = stop.text;
     if (!in_contact_) return;
     if (stop.confirmed) outcome.finger = Finger::stopped;
-    printer_.lift(plan_.lift, plan_.speed_z);
+    printer_.lift(plan_.lift);
     outcome.finger = Finger::lifted;
     outcome.note = "the finger was lifted";
   } catch (const PortUnplugged&) {

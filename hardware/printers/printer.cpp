@@ -207,14 +207,14 @@ Printer::Stop Printer::emergency_stop() {
   return stop;
 }
 
-void Printer::lift(double mm, double speed_mm_s) {
+void Printer::lift(double mm) {
   const Point3 here = agreed_position();
   Point3 above = here;
   above.z = std::min(here.z + mm, limits_.high.z);
   // Not through start_move(): a lift is the way out of a position that the limits forbid.
-  link_.command("G1 Z" + format(above.z, 3) + " F" + format(60 * speed_mm_s, 1));
+  link_.command("G1 Z" + format(above.z, 3) + " F" + format(60 * rig::kLiftMmS, 1));
   target_ = above;
-  expected_seconds_ = mm / speed_mm_s + 0.5;
+  expected_seconds_ = mm / rig::kLiftMmS + 0.5;
   finish_move();
 }
 

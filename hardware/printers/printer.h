@@ -67,7 +67,7 @@ class Printer {
   /// M112: kills the firmware; afterwards only a reset helps.
   Stop emergency_stop();
   /// Raises the finger by `mm` from wherever it is, after a fault. Throws when that could not be verified.
-  void lift(double mm, double speed_mm_s = rig::kLiftMmS);
+  void lift(double mm);
 
   const Point3& target() const { return target_; }
   const Limits& limits() const { return limits_; }

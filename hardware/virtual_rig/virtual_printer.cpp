@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::size_t kCommandBuffer = 4;  // Marlin's BUFSIZE
 constexpr std::size_t kReceiveLines = 6;   // about 128 bytes
+constexpr double kReplyDelayS = 0.0003;
 
 std::int64_t integer_at(const std::string& text, std::size_t at) {
   std::int64_t value = -1;
@@ -137,7 +138,7 @@ void VirtualPrinter::accept_line(const std::string& line, double t) {
     if (halted_) return;
   }
   queue_.push_back(command);
-  if (command_due_ < 0 && !blocked_) command_due_ = t + settings_.reply_delay_s;
+  if (command_due_ < 0 && !blocked_) command_due_ = t + kReplyDelayS;
 }
 
 // The number and the checksum are passed over. M112 acts ahead of the queue; then every line is refused.
@@ -153,7 +154,7 @@ void VirtualPrinter::take_klipper_line(const std::string& line, double t) {
     return;
   }
   queue_.push_back(command);
-  if (command_due_ < 0 && !blocked_) command_due_ = t + settings_.reply_delay_s;
+  if (command_due_ < 0 && !blocked_) command_due_ = t + kReplyDelayS;
 }
 
 bool VirtualPrinter::check_numbered(const std::string& line, std::string& command) {
@@ -248,7 +249,7 @@ void VirtualPrinter::start_next(double t) {
   }
   const std::string command = front;
   queue_.pop_front();
-  command_due_ = queue_.empty() ? -1 : t + settings_.reply_delay_s;
+  command_due_ = queue_.empty() ? -1 : t + kReplyDelayS;
   wait_due_ = t + 1;
   run(command, t);
   if (!blocked_ && !halted_) reply_ok();
@@ -291,7 +292,7 @@ void VirtualPrinter::finish_block(double t) {
   blocked_ = false;
   if (!repeat_after_block_) reply_ok();
   repeat_after_block_ = false;
-  command_due_ = queue_.empty() ? -1 : t + settings_.reply_delay_s;
+  command_due_ = queue_.empty() ? -1 : t + kReplyDelayS;
   take_received(t);
 }
 

@@ -33,12 +33,11 @@ struct VirtualPrinterSettings {
   double auto_position_s = 0;  ///< M154 as an earlier host left it on a running firmware; 0: off
   bool deaf_to_m154 = false;   ///< these reports cannot be switched off
   double auto_temperature_s = 0;
-  double quick_stop_s = 1;   ///< for which M410 holds the firmware
-  double start_delay_s = 0;  ///< from ok to a move's beginning; 0: what was measured, 0.107, Klipper 0.253
-  double slowness = 1;       ///< moves take this many times as long: a starved board
-  bool keepalive = true;     ///< echo:busy every 2 s
-  bool heartbeat = false;    ///< `wait` every second when idle
-  double reply_delay_s = 0.0003;
+  double quick_stop_s = 1;     ///< for which M410 holds the firmware
+  double start_delay_s = 0;    ///< from ok to a move's beginning; 0: what was measured, 0.107, Klipper 0.253
+  double slowness = 1;         ///< moves take this many times as long: a starved board
+  bool keepalive = true;       ///< echo:busy every 2 s
+  bool heartbeat = false;      ///< `wait` every second when idle
   double boot_s = 0.4;         ///< power-on to `start`
   std::string boot_garbage{};  ///< bytes sent before the banner
   RigFaults faults{};          ///< lost ok, storms, resets, unplug, stalls; bytes are the port's matter

@@ -68,7 +68,7 @@ TEST(Palpation, TheWholeWayIsCheckedBeforeTheFirstMove) {
   EXPECT_ERROR(bench.run({.passes = 40}), OutsideLimits,
                "beside the plate; nothing was sent, lift first");  // only the last passes leave the plate
   EXPECT_ERROR(bench.run({.passes = 0}), std::invalid_argument, "expected 1 to 1000 passes");
-  EXPECT_ERROR(bench.run({.speed = INFINITY}), std::invalid_argument, "slide, lift and speeds above 0");
+  EXPECT_ERROR(bench.run({.speed = INFINITY}), std::invalid_argument, "slide, lift and speed above 0");
   EXPECT_TRUE(moves_of(bench.firmware()).empty());
 }
 
