@@ -31,7 +31,7 @@ BoardFrame VirtualBoard::sample(const Point3& head, double t) {
 
 std::vector<std::byte> VirtualBoard::make_frame(const Point3& head) {
   const double middle = next_frame() - 0.5 * settings_.period_s;
-  const std::uint64_t index = counters_.made++;
+  ++counters_.made;
   if (stalled_frames_ == 0 && dice_.hit(settings_.faults.stall_rate)) stalled_frames_ = kStallFrames;
   if (stalled_frames_ == 0 && dice_.hit(settings_.faults.freeze_rate)) {
     room_ = kHeldFrames - static_cast<int>(held_.size() / rig::kFrameBytes);
@@ -42,7 +42,7 @@ std::vector<std::byte> VirtualBoard::make_frame(const Point3& head) {
   if (held) --room_;
   if (stalled && --stalled_frames_ == 0) tear_next_ = true;
   const bool lost = (stalled && !held) || dice_.hit(settings_.faults.lost_frame_rate);
-  if (truth_) truth_(index, middle, head, !lost);
+  if (truth_) truth_(head);
   if (lost) {
     ++counters_.lost;
     return {};

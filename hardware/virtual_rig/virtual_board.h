@@ -30,7 +30,6 @@ class VirtualBoard {
   struct Counters {
     std::uint64_t made = 0, sent = 0, lost = 0, torn = 0;
   };
-  using Truth = std::function<void(std::uint64_t index, double middle_s, const Point3& head, bool sent)>;
 
   VirtualBoard(const VirtualBoardSettings& settings, double t);
 
@@ -43,7 +42,8 @@ class VirtualBoard {
   /// The host did not take the bytes: the frame vanishes, and the one after the stall is torn.
   void refuse_last();
 
-  void on_frame(Truth truth) { truth_ = std::move(truth); }
+  /// Called with the head's place for every frame that is made, lost ones too.
+  void on_frame(std::function<void(const Point3& head)> truth) { truth_ = std::move(truth); }
   const Counters& counters() const { return counters_; }
 
  private:
@@ -53,7 +53,7 @@ class VirtualBoard {
   double start_;
   Dice dice_;
   Counters counters_;
-  Truth truth_;
+  std::function<void(const Point3&)> truth_;
   BoardFrame previous_;
   int stalled_frames_ = 0, room_ = 0;
   std::vector<std::byte> held_;  // made in a freeze, to be sent at its end

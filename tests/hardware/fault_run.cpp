@@ -69,8 +69,10 @@ void judge_passes(const Collection& collection, const NumberedBoard& board, Faul
     double worst = 0;
     for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
       const double* p = pass.position.data() + 3 * i;
-      for (const std::uint64_t number : board.numbers_in(pass.volts, i))
+      const auto numbers = board.numbers_in(pass.volts, i);
+      for (const std::uint64_t number : numbers)
         worst = std::max(worst, distance(board.head(number), {p[0], p[1], p[2]}));
+      verdict.compared += numbers.empty() ? 0 : 1;
     }
     verdict.worst_mm = std::max(verdict.worst_mm, worst);
     if (!pass.doubt.empty() || !pass.complete) continue;

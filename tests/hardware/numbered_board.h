@@ -29,7 +29,7 @@ class NumberedBoard {
     };
   }
   void watch(VirtualBoard& board) {
-    board.on_frame([this](std::uint64_t, double, const Point3& head, bool) { heads_.push_back(head); });
+    board.on_frame([this](const Point3& head) { heads_.push_back(head); });
   }
   /// The numbers that three copies at least agree on: two in a torn frame. Two copies may be flipped alike.
   std::vector<std::uint64_t> numbers_in(const std::function<int(std::size_t)>& taxel) const {

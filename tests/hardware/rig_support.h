@@ -5,14 +5,13 @@
 
 #include <algorithm>
 #include <array>
-#include <filesystem>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "hardware/boards/board_frame.h"
+#include "hardware/collection/palpation_recorder.h"
 #include "hardware/printers/printer.h"
 #include "io/numbers/random.h"
 #include "tests/hardware/simulated_rig.h"
@@ -34,11 +33,9 @@ inline std::vector<std::byte> frame_bytes(const BoardFrame& frame) {
   return bytes;
 }
 
-/// A rig without faults whose firmware is already running.
-inline RigSettings running_rig() {
-  RigSettings settings;
-  settings.printer_running = true;
-  return settings;
+/// A rig whose firmware is already running; without faults unless given.
+inline RigSettings running_rig(const VirtualPrinterSettings& printer = {}, const RigFaults& faults = {}) {
+  return {.printer = printer, .printer_running = true, .faults = faults};
 }
 
 /// Damages the bytes from or to the printer once: the first occurrence of `find` becomes `replace`.
@@ -89,6 +86,13 @@ inline std::vector<std::string> moves_of(const VirtualPrinter& printer) {
     if (executed.command.starts_with("G1")) moves.push_back(executed.command);
   }
   return moves;
+}
+
+/// The run of a journal again.
+inline RecorderReport replayed(const Journal& journal, RecorderSettings settings) {
+  settings.replay = true;
+  return record_palpation(std::make_unique<ReplayPort>(journal.of(Stream::board), "board"),
+                          std::make_unique<ReplayPort>(journal.of(Stream::printer), "printer"), settings);
 }
 
 /// A connected driver on a simulated rig, and where the head really is.

@@ -17,6 +17,7 @@ namespace supertac {
 namespace {
 
 constexpr double kRunSeconds = 5.5;  // a little less than the short plan below takes
+constexpr Point3 kOrigin{99.7, 101.17, 97.81};
 
 void sleep_for(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
@@ -77,7 +78,7 @@ RecorderSettings short_run(const TemporaryFolder& folder) {
   RecorderSettings settings;
   settings.bed.plan.passes = 1;
   settings.bed.plan.slide = 20;
-  settings.bed.origin = {99.7, 101.17, 97.81};
+  settings.bed.origin = kOrigin;
   settings.journal = folder / "journal";
   settings.header = "unplug run";
   return settings;
@@ -135,9 +136,7 @@ UnplugVerdict unplug_idle(Plug plug, std::uint64_t seed) {
 
 UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed) {
   const TemporaryFolder folder;
-  RigSettings rig_settings = running_rig();
-  rig_settings.printer.head = {99.7, 101.17, 97.81};
-  PtyRig rig(rig_settings, folder / "board", folder / "printer");
+  PtyRig rig(running_rig({.head = kOrigin}), folder / "board", folder / "printer");
   UnplugVerdict verdict;
   verdict.moment_s = kRunSeconds * RandomStream(seed, 2).uniform(0);
   const RecorderSettings settings = short_run(folder);

@@ -20,10 +20,9 @@ double one_of(const double (&values)[Count], const RandomStream& random, std::ui
 
 RigSettings drawn(std::uint64_t seed, bool& only_chunks) {
   const RandomStream random(seed, 43);
-  RigSettings rig = running_rig();
+  RigSettings rig = running_rig({.firmware = seed % 2 == 0 ? Firmware::marlin : Firmware::marlin_before_2_1_2,
+                                 .realtime_position = random.bits(0) % 4 != 0});
   rig.seed = seed;
-  rig.printer.firmware = seed % 2 == 0 ? Firmware::marlin : Firmware::marlin_before_2_1_2;
-  rig.printer.realtime_position = random.bits(0) % 4 != 0;
   rig.chunk_s = one_of({0, 0.002, 0.01, 0.03, 0.1}, random, 1);
   only_chunks = seed % 10 < 2;
   if (only_chunks) return rig;
@@ -35,10 +34,8 @@ RigSettings drawn(std::uint64_t seed, bool& only_chunks) {
 
 /// 60 moves that must run once, in order, and end at X = 30.
 bool program_ends_right(std::uint64_t seed, Firmware firmware) {
-  RigSettings rig = running_rig();
+  RigSettings rig = running_rig({.firmware = firmware}, {.byte_rate = 0.002});
   rig.seed = seed;
-  rig.printer.firmware = firmware;
-  rig.faults.byte_rate = 0.002;
   SimulatedRig simulated(rig);
   const auto port = simulated.printer_port();
   std::vector<std::string> moves;

@@ -2,9 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <map>
-#include <set>
-
 #include "tests/hardware/rig_support.h"
 
 namespace supertac {

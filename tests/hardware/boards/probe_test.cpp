@@ -40,6 +40,18 @@ std::string all(const ProbeReport& report) {
   return text;
 }
 
+void expect_said(const ProbeReport& report, const std::string& words) {
+  EXPECT_NE(all(report).find(words), std::string::npos) << all(report);
+}
+
+// What a probe says that has to end with a draft.
+ProbeReport drafted(std::span<const Heard> heard, const std::optional<Sensor>& known = {}) {
+  ProbeReport report = probe(heard, "here", known);
+  EXPECT_TRUE(report.draft) << all(report);
+  if (!report.draft) report.draft = Sensor{};
+  return report;
+}
+
 TEST(Probe, FindsBinaryFormats) {
   const std::string array =
       R"({"rows":6,"columns":7,"pressed":"lower","range":[500,3900],"rate_hz":100,"frame":)";
@@ -53,8 +65,7 @@ TEST(Probe, FindsBinaryFormats) {
        R"({"kind":"binary","header":"AA55","type":"f32","endian":"big","time":{"type":"u32","unit":"us"}})",
        R"({"kind":"binary","header":"A5A5","type":"f32","time":{"type":"u32","unit":"ms"},"checksum":"sum8"})"}) {
     const Sensor sensor = sensor_of(array + frame + "}");
-    const ProbeReport report = probe(sent(sensor, 4), "here", {});
-    ASSERT_TRUE(report.draft) << frame << all(report);
+    const ProbeReport report = drafted(sent(sensor, 4));
     const Sensor& draft = *report.draft;
     EXPECT_EQ(draft.values(), 42U) << frame << all(report);
     EXPECT_EQ(draft.frame.type, sensor.frame.type) << frame;
@@ -75,8 +86,7 @@ TEST(Probe, TheBeginningMayBeDamaged) {
     "frame":{"kind":"binary","header":"C3","trailer":"0D0A","type":"f32"}})");
   std::vector<Heard> heard = sent(sensor, 3);
   for (std::size_t n = 0; n < 30; ++n) std::ranges::replace(heard[n].bytes, '\r', '\n');
-  const ProbeReport report = probe(heard, "here", {});
-  ASSERT_TRUE(report.draft) << all(report);
+  const ProbeReport report = drafted(heard);
   EXPECT_EQ(report.draft->frame.header, "\r\n\xC3");
   EXPECT_EQ(report.draft->values(), 15U);
 }
@@ -92,8 +102,7 @@ TEST(Probe, KnowsAClockThatStartsAnewMeanwhile) {
     std::vector<Heard> heard = sent(sensor, 2);
     for (Heard chunk : sent(sensor, 2))
       heard.push_back({chunk.time_s + 3, chunk.bytes});  // a second to start
-    const ProbeReport report = probe(heard, "here", {});
-    ASSERT_TRUE(report.draft) << frame << all(report);
+    const ProbeReport report = drafted(heard);
     ASSERT_TRUE(report.draft->frame.time) << frame << all(report);
     EXPECT_EQ(report.draft->frame.time->unit_s, 1e-3) << frame;
     EXPECT_EQ(report.draft->values(), 9U) << frame;
@@ -111,8 +120,7 @@ TEST(Probe, TakesNoNoiseOfFewLinesForAClock) {
         line += std::to_string(static_cast<int>(4 * random.uniform(16 * n + k))) + (k < 15 ? "\t" : "\n");
       heard.push_back({static_cast<double>(n), line});
     }
-    const ProbeReport report = probe(heard, "here", {});
-    ASSERT_TRUE(report.draft) << all(report);
+    const ProbeReport report = drafted(heard);
     EXPECT_EQ(report.draft->values(), 16U) << all(report);
   }
 }
@@ -124,8 +132,7 @@ TEST(Probe, FindsAnArrayWithinAnObject) {
     heard.push_back(
         {0.01 * n, R"({"finger":{"ms":)" + stamp + R"(,"taxels":[[1,)" + value + "],[3,4]]},\"n\":7}\n"});
   }
-  const ProbeReport report = probe(heard, "here", {});
-  ASSERT_TRUE(report.draft) << all(report);
+  const ProbeReport report = drafted(heard);
   EXPECT_EQ(report.draft->frame.values, "/finger/taxels");
   EXPECT_EQ(report.draft->frame.time->key, "/finger/ms");
   EXPECT_EQ(report.draft->array.rows, 2);
@@ -134,7 +141,7 @@ TEST(Probe, FindsAnArrayWithinAnObject) {
                   "\n";
   const ProbeReport refused = probe(heard, "here", {});
   EXPECT_FALSE(refused.draft);
-  EXPECT_NE(all(refused).find("JSON without an array"), std::string::npos) << all(refused);
+  expect_said(refused, "JSON without an array");
 }
 
 TEST(Probe, InventsNoRateForAFileWithoutClock) {
@@ -142,49 +149,42 @@ TEST(Probe, InventsNoRateForAFileWithoutClock) {
       R"({"rows":3,"columns":3,"range":[0,900],"rate_hz":100,"frame":{"kind":"text","separator":","}})");
   std::vector<Heard> heard = sent(sensor, 2);
   for (Heard& chunk : heard) chunk.time_s = 5;
-  const ProbeReport report = probe(heard, "here", {});
-  ASSERT_TRUE(report.draft) << all(report);
-  EXPECT_NE(all(report).find("assumed: 100 frames a second; set \"rate_hz\""), std::string::npos)
-      << all(report);
+  const ProbeReport report = drafted(heard);
+  expect_said(report, "assumed: 100 frames a second; set \"rate_hz\"");
 }
 
 TEST(Probe, SaysWhatItAssumes) {
   const Sensor sensor = sensor_of(R"({"rows":2,"columns":6,"pressed":"higher","range":[100,900],"rate_hz":50,
     "frame":{"kind":"text","separator":";","skip":[1],"time":{"column":0,"unit":"ms"}}})");
-  const ProbeReport report = probe(sent(sensor, 3, false), "here", {});
-  ASSERT_TRUE(report.draft) << all(report);
+  const ProbeReport report = drafted(sent(sensor, 3, false));
   EXPECT_EQ(report.draft->frame.skip, std::vector{1});
   EXPECT_EQ(report.draft->frame.time->unit_s, 1e-3);
-  EXPECT_NE(all(report).find("assumed: 3x4 taxels"), std::string::npos) << all(report);
-  EXPECT_NE(all(report).find("nothing was pressed"), std::string::npos) << all(report);
-  EXPECT_NE(all(report).find("stuck or dead, since they never changed: taxels [5]"), std::string::npos);
-  EXPECT_NE(all(report).find("columns that are no signal (words, a counter, a clock of no known unit) are "
-                             "skipped: [1]"),
-            std::string::npos);
-  const ProbeReport known = probe(sent(sensor, 3), "here", sensor);
-  ASSERT_TRUE(known.draft) << all(known);
+  expect_said(report, "assumed: 3x4 taxels");
+  expect_said(report, "nothing was pressed");
+  expect_said(report, "stuck or dead, since they never changed: taxels [5]");
+  expect_said(report,
+              "columns that are no signal (words, a counter, a clock of no known unit) are "
+              "skipped: [1]");
+  const ProbeReport known = drafted(sent(sensor, 3), sensor);
   EXPECT_EQ(known.draft->array, sensor.array);
   EXPECT_TRUE(known.draft->scale.rises());
   EXPECT_EQ(all(known).find("assumed"), std::string::npos) << all(known);
   const ProbeReport other = probe(sent(sensor, 3), "here", Sensor{.array = {.rows = 5, .columns = 5}});
   EXPECT_FALSE(other.draft);
-  EXPECT_NE(all(other).find("frames of 12 values, expected the 25 of 5x5 taxels"), std::string::npos)
-      << all(other);
+  expect_said(other, "frames of 12 values, expected the 25 of 5x5 taxels");
 }
 
 TEST(Probe, WritesWhereEachTaxelRests) {
   Sensor sensor = sensor_of(R"({"rows":3,"columns":4,"pressed":"higher","range":[100,900],"rate_hz":50,
     "frame":{"kind":"text"}})");
-  const ProbeReport even = probe(sent(sensor, 3), "here", sensor);
-  ASSERT_TRUE(even.draft) << all(even);
+  const ProbeReport even = drafted(sent(sensor, 3), sensor);
   EXPECT_TRUE(even.draft->rest.empty()) << all(even);
   for (int k = 0; k < 12; ++k) sensor.rest.push_back(static_cast<float>(100 + 10 * k));
-  const ProbeReport report = probe(sent(sensor, 3), "here", sensor);
-  ASSERT_TRUE(report.draft) << all(report);
+  const ProbeReport report = drafted(sent(sensor, 3), sensor);
   ASSERT_EQ(report.draft->rest.size(), 12U);
   for (const std::size_t k : {0U, 1U, 4U, 6U, 11U})  // the fifth is dead; noise is 0 to 15
     EXPECT_NEAR(report.draft->rest[k], sensor.rest[k] + 0.05F * 800, 16) << k;
-  EXPECT_NE(all(report).find("signals rest up to 1"), std::string::npos) << all(report);
+  expect_said(report, "signals rest up to 1");
 }
 
 // docs/sensors.md: probe again when the rests have drifted.
@@ -194,15 +194,14 @@ TEST(Probe, AtRestKeepsWhatItsFileSaysButTheRests) {
     "rest":[900,910,890,900,950,900,905,900],"frame":{"kind":"text"}})");
   Sensor drifted = sensor;
   for (float& rest : drifted.rest) rest += 40;
-  const ProbeReport report = probe(sent(drifted, 4, false), "here", sensor);
-  ASSERT_TRUE(report.draft) << all(report);
+  const ProbeReport report = drafted(sent(drifted, 4, false), sensor);
   EXPECT_EQ(report.draft->scale.unit, "ohm");
   EXPECT_EQ(report.draft->scale.rest, 900);
   EXPECT_EQ(report.draft->scale.span, 600);
   ASSERT_EQ(report.draft->rest.size(), 8U);
   for (const std::size_t i : {0U, 1U, 2U, 3U, 4U, 6U, 7U})
     EXPECT_NEAR(report.draft->rest[i], drifted.rest[i] - 0.05 * 600 + 8, 3) << i;
-  EXPECT_NE(all(report).find("stay as the file has them"), std::string::npos) << all(report);
+  expect_said(report, "stay as the file has them");
 }
 
 // A host that opens a port late may get what waited there: a jump of the clock, and of a clock in no known
@@ -215,8 +214,7 @@ TEST(Probe, TakesNoClockForATaxel) {
     heard.push_back({100 + 0.02 * n, format(ms) + "," + format(ms * 77) + "," + format(100 + noise) + "," +
                                          format(120 - noise) + "\n"});
   }
-  const ProbeReport report = probe(heard, "here", {});
-  ASSERT_TRUE(report.draft) << all(report);
+  const ProbeReport report = drafted(heard);
   ASSERT_TRUE(report.draft->frame.time) << all(report);
   EXPECT_EQ(report.draft->frame.time->column, 0);
   EXPECT_EQ(report.draft->frame.time->unit_s, 1e-3);
@@ -226,7 +224,7 @@ TEST(Probe, TakesNoClockForATaxel) {
 
 TEST(Probe, SaysThatNoLineEnds) {
   const ProbeReport report = probe(std::vector<Heard>{{1, std::string(9000, '7')}, {4, "1,2,3"}}, "here", {});
-  EXPECT_NE(all(report).find("no line ends"), std::string::npos) << all(report);
+  expect_said(report, "no line ends");
 }
 
 // What is kept of a file: the draft says of taxels, as the file does, not of places in a frame.
@@ -235,8 +233,7 @@ TEST(Probe, KeepsTheOrderOfItsFile) {
     "rate_hz":50,"frame":{"kind":"text"},"order":[6,-1,0,1,2,3,4,5,-1],"dead":[0]})");
   for (int k = 0; k < 9; ++k) sensor.rest.push_back(static_cast<float>(100 + 10 * k));
   sensor.gain.assign(9, 2), sensor.follow_rest_s = 7;
-  const ProbeReport report = probe(sent(sensor, 3), "here", sensor);
-  ASSERT_TRUE(report.draft) << all(report);
+  const ProbeReport report = drafted(sent(sensor, 3), sensor);
   EXPECT_EQ(report.draft->name, "cross");
   EXPECT_EQ(report.draft->order, sensor.order);
   EXPECT_EQ(report.draft->gain, sensor.gain);
@@ -295,8 +292,7 @@ TEST(FindGain, RecoversWhatTaxelsHaveInCountsAndNoise) {
     EXPECT_EQ(found.gain.front(), 1);
     EXPECT_EQ(found.gain.back(), 1);
     EXPECT_EQ(found.dead, std::vector{0});
-    EXPECT_NE(all(report).find("taxels [63] keep gain 1; press them as hard"), std::string::npos)
-        << all(report);
+    expect_said(report, "taxels [63] keep gain 1; press them as hard");
   }
 }
 
@@ -314,7 +310,7 @@ TEST(FindGain, IsLimitedAndSaysWhenNothingWasPressed) {
                                      {std::vector<Heard>(), "0 frames to find gains from"}}) {
     const ProbeReport none = find_gain(heard, sensor);
     EXPECT_FALSE(none.draft);
-    EXPECT_NE(all(none).find(words), std::string::npos) << all(none);
+    expect_said(none, words);
   }
 }
 

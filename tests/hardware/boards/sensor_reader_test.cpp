@@ -9,7 +9,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cmath>
 
 #include "hardware/ports/errors.h"
@@ -115,9 +114,6 @@ TEST(SensorReader, CountsWhatIsLostLateAndDamaged) {
   EXPECT_EQ(counters.missing, 6U);
 }
 
-// A damaged stamp costs its own frame; what follows is dated as if it had not been. A sensor that starts anew
-// or pauses costs one.
-// Each of its stamps is more than ten of the stated periods ahead: one frame came, and then none for ever.
 // What the reader says of a device that sends milliseconds for two seconds, which its file calls `unit`;
 // those of the first half second are `off_ms` off.
 std::string said_of_clock(const std::string& unit, long off_ms) {
@@ -148,8 +144,6 @@ TEST(SensorReader, AClockInAnotherUnitIsRefused) {
   EXPECT_EQ(said_of_clock("ms", -5'000'000), "nothing") << "it was set after half a second";
 }
 
-// Chunks of a tenth of a second, a rate that is not the stated one, and frames that were lost.
-// A sensor that its file calls faster lost frames that were never made, and no window was without a gap.
 // They were dated by the speed at which the file was read.
 TEST(SensorReader, FramesOfAFileWithoutStampsAreAPeriodApart) {
   const TemporaryFolder folder;
@@ -163,7 +157,6 @@ TEST(SensorReader, FramesOfAFileWithoutStampsAreAPeriodApart) {
   EXPECT_EQ(reader.counters().missing, 0U);
 }
 
-// The frames of a burst make up for the silence before it; of a longer silence the rest is lost.
 TEST(SensorReader, LosesNothingOfAThousandFramesOf16x16OverUdp) {
   const Sensor sensor = mat(16, 16, 1000, R"({"kind":"binary","header":"AA55","type":"u16"})");
   const int port = free_port(SOCK_DGRAM);

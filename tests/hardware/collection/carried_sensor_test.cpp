@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <cmath>
 
 #include "hardware/collection/collection.h"
 #include "hardware/collection/palpation_recorder.h"
@@ -153,9 +152,7 @@ TEST(CarriedSensor, EveryFrameHasItsPositionWithAndWithoutTimeStamps) {
 
 TEST(CarriedSensor, LostFramesAreCountedAndCostNoPosition) {
   for (const bool stamped : {true, false}) {
-    RigSettings rig = running_rig();
-    rig.faults.stall_rate = 0.001;  // of 20 ms: two frames
-    CarriedSensor run(mat(stamped), rig);
+    CarriedSensor run(mat(stamped), running_rig({}, {.stall_rate = 0.001}));  // of 20 ms: two frames
     ASSERT_TRUE(run.record().outcome.complete);
     const Collection collection = collection_of(run.journal());
     const CollectedPass& pass = collection.passes.at(0);
@@ -185,8 +182,7 @@ TEST(CarriedSensor, AHostThatStandsStillMakesNothingWrongInSilence) {
   for (const bool stamped : {true, false}) {
     std::size_t frames = 0;
     for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(mutations(4)); ++seed) {
-      RigSettings rig = running_rig();
-      rig.faults.host_freeze_rate = 0.0003;
+      RigSettings rig = running_rig({}, {.host_freeze_rate = 0.0003});
       rig.seed = seed;
       CarriedSensor run(mat(stamped), rig);
       (void)run.record();
@@ -204,15 +200,10 @@ TEST(CarriedSensor, AReplayGivesTheSameFrames) {
   CarriedSensor run(mat(false));
   (void)run.record();
   const Journal journal = run.journal();
-  RecorderSettings again = run.settings;
-  again.journal = run.folder / "replayed";
-  again.replay = true;
-  const RecorderReport second =
-      record_palpation(std::make_unique<ReplayPort>(journal.of(Stream::board), "sensor"),
-                       std::make_unique<ReplayPort>(journal.of(Stream::printer), "printer"), again);
+  run.settings.journal = run.folder / "replayed";
+  const RecorderReport second = replayed(journal, run.settings);
   EXPECT_TRUE(second.outcome.complete) << second.outcome.note;
-  const CollectedPass a = collection_of(journal).passes.at(0),
-                      b = collection_of(read_journal(again.journal)).passes.at(0);
+  const CollectedPass a = collection_of(journal).passes.at(0), b = collection_of(run.journal()).passes.at(0);
   EXPECT_EQ(a.time_s, b.time_s);
   EXPECT_EQ(a.volts, b.volts);
   EXPECT_EQ(a.position, b.position);

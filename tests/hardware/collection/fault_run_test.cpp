@@ -8,10 +8,8 @@ namespace supertac {
 namespace {
 
 RigSettings faulty(const RigFaults& faults, std::uint64_t seed, Firmware firmware = Firmware::marlin) {
-  RigSettings rig = running_rig();
-  rig.faults = faults;
+  RigSettings rig = running_rig({.firmware = firmware}, faults);
   rig.seed = seed;
-  rig.printer.firmware = firmware;
   return rig;
 }
 

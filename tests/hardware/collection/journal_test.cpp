@@ -8,28 +8,27 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <functional>
 
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
-#include "io/numbers/hash.h"
+#include "io/files/file.h"
+#include "io/numbers/clock.h"
 #include "tests/expect_error.h"
 #include "tests/hardware/rig_support.h"
 
 namespace supertac {
 namespace {
 
-std::vector<std::byte> file_bytes(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  const auto bytes = std::as_bytes(std::span(text));
-  return {bytes.begin(), bytes.end()};
-}
+std::vector<std::byte> file_bytes(const std::string& path) { return read_file(path, 1 << 30); }
 
-// Of this thread: what else the machine does is not the reader's fault.
-double processor_seconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+// The bytes of a journal that `write` was given to fill.
+std::vector<std::byte> journal_of(const std::function<void(JournalWriter&)>& write) {
+  const TemporaryFolder folder;
+  JournalWriter writer(folder / "j", "h");
+  write(writer);
+  writer.close();
+  return file_bytes(folder / "j");
 }
 
 TEST(Journal, GivesBackWhatWasWritten) {
@@ -62,13 +61,9 @@ TEST(Journal, NeverOverwritesAndSaysWhyItCannotWrite) {
 }
 
 TEST(Journal, EveryPrefixReadsAsFarAsItIsWhole) {
-  const TemporaryFolder folder;
-  {
-    JournalWriter writer(folder / "j", "h");
+  const std::vector<std::byte> whole = journal_of([](JournalWriter& writer) {
     for (int i = 0; i < 20; ++i) writer.event(1e-3 * i, "event " + std::to_string(i));
-    writer.close();
-  }
-  const std::vector<std::byte> whole = file_bytes(folder / "j");
+  });
   const std::size_t head = 24 + 13 + 1;
   for (std::size_t length = 0; length <= whole.size(); ++length) {
     const auto prefix = std::span(whole).first(length);
@@ -84,13 +79,7 @@ TEST(Journal, EveryPrefixReadsAsFarAsItIsWhole) {
 }
 
 TEST(Journal, EveryFlippedBitIsFound) {
-  const TemporaryFolder folder;
-  {
-    JournalWriter writer(folder / "j", "h");
-    writer.event(1, "first");
-    writer.close();
-  }
-  const std::vector<std::byte> whole = file_bytes(folder / "j");
+  const std::vector<std::byte> whole = journal_of([](JournalWriter& writer) { writer.event(1, "first"); });
   for (std::size_t bit = 0; bit < 8 * whole.size(); ++bit) {
     std::vector<std::byte> damaged = whole;
     damaged[bit / 8] ^= static_cast<std::byte>(1U << (bit % 8));
@@ -103,15 +92,11 @@ TEST(Journal, EveryFlippedBitIsFound) {
 }
 
 TEST(Journal, TenFlippedBitsCostTheirOwnChunksOnly) {
-  const TemporaryFolder folder;
   constexpr int kFrames = 12'000;
-  {
-    JournalWriter writer(folder / "j", "h");
+  const std::vector<std::byte> whole = journal_of([](JournalWriter& writer) {
     for (int i = 0; i < kFrames; ++i)
       writer.append(Stream::board, RecordKind::received, 100 + 1e-3 * i, frame_bytes(random_frame(1)));
-    writer.close();
-  }
-  const std::vector<std::byte> whole = file_bytes(folder / "j");
+  });
   // Two copies of 24 + 13 + 1 bytes. One bit in each would cost everything, and how long the file is, and so
   // where a random bit lies, depends on when the writer's thread woke.
   constexpr std::size_t kHeaders = 76;
@@ -136,21 +121,16 @@ TEST(Journal, TenFlippedBitsCostTheirOwnChunksOnly) {
 }
 
 TEST(Journal, BeginningsOfChunksWithoutEndTakeNoTime) {
-  const TemporaryFolder folder;
-  {
-    JournalWriter writer(folder / "j", "h");
-    writer.close();
-  }
-  std::vector<std::byte> bytes = file_bytes(folder / "j");
+  std::vector<std::byte> bytes = journal_of([](JournalWriter&) {});
   const std::vector<std::byte> head(bytes.begin(), bytes.begin() + 24);
   while (bytes.size() < (4 << 20)) {
     bytes.insert(bytes.end(), head.begin(), head.end());
     const std::uint32_t length = (2 << 20);
     memcpy(&bytes[bytes.size() - 16], &length, sizeof length);
   }
-  const double begin = processor_seconds();  // hours where every one is read to its end
+  const double begin = seconds_of(CLOCK_THREAD_CPUTIME_ID);  // hours where every one is read to its end
   EXPECT_EQ(parse_journal(bytes, "j").header, "h");
-  EXPECT_LT(processor_seconds() - begin, 20);
+  EXPECT_LT(seconds_of(CLOCK_THREAD_CPUTIME_ID) - begin, 20);
 }
 
 // ENOSPC and EFBIG look alike from here; a file size limit needs no full disk.
@@ -182,7 +162,7 @@ TEST(Journal, AFullDiskIsReportedAndWhatWasWrittenIsKept) {
   EXPECT_NO_THROW(read_journal(folder / "j"));
 }
 
-// How much of the newest a kill costs is measured by `collect_runs kill`. What was written is a whole
+// How much of the newest a kill costs is measured by `collect_runs`. What was written is a whole
 // beginning.
 TEST(Journal, WhatIsAppendedReachesTheFileByItselfAndAKillLeavesAWholeBeginning) {
   const TemporaryFolder folder;

@@ -2,8 +2,6 @@
 // that it is not. Frames are compared with the truth by the number they carry.
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "hardware/collection/collection.h"
 #include "tests/hardware/fault_run.h"
 #include "tests/hardware/rig_support.h"
@@ -20,9 +18,7 @@ FaultVerdict slide(const RigSettings& rig, double speed) {
 TEST(Stalls, WithoutAnyAllIsTrusted) {
   for (const bool realtime : {true, false}) {
     for (const double speed : {5.0, 10.0, 30.0}) {
-      RigSettings rig = running_rig();
-      rig.printer.realtime_position = realtime;
-      const FaultVerdict good = slide(rig, speed);
+      const FaultVerdict good = slide(running_rig({.realtime_position = realtime}), speed);
       EXPECT_EQ(good.doubt + good.broken + good.error, "")
           << "M114 R " << realtime << ", " << speed << " mm/s";
       EXPECT_EQ(good.realtime, realtime);
@@ -32,13 +28,24 @@ TEST(Stalls, WithoutAnyAllIsTrusted) {
   }
 }
 
+// All frames of two passes, a hundredth of which never arrives.
+TEST(Stalls, LostFramesAreCountedAndCostNoPosition) {
+  for (const bool realtime : {true, false}) {
+    const FaultVerdict lossy = run_faulty_collection(
+        running_rig({.realtime_position = realtime}, {.lost_frame_rate = 0.01}), {.passes = 2});
+    EXPECT_EQ(lossy.doubt + lossy.broken + lossy.error, "") << "M114 R " << realtime;
+    EXPECT_LT(lossy.worst_mm, 0.05) << "M114 R " << realtime;
+    EXPECT_GT(lossy.compared, 2 * 9000U);
+    EXPECT_GT(lossy.missing, 200U);
+  }
+  const RigSettings stalled = running_rig({}, {.stall_rate = 0.0005, .lost_frame_rate = 0.02});
+  EXPECT_EQ(run_faulty_collection(stalled, {.passes = 1}).broken, "");
+}
+
 // Whatever the delay of a firmware, it is measured: no number of another machine decides.
 TEST(Stalls, WithoutM114RTheStartIsMeasured) {
   for (const double delay_s : {0.02, 0.05, 0.2, 0.4}) {
-    RigSettings rig = running_rig();
-    rig.printer.realtime_position = false;
-    rig.printer.start_delay_s = delay_s;
-    const FaultVerdict good = slide(rig, 10);
+    const FaultVerdict good = slide(running_rig({.realtime_position = false, .start_delay_s = delay_s}), 10);
     EXPECT_EQ(good.doubt + good.broken + good.error, "") << delay_s;
     EXPECT_LT(good.worst_mm, 0.05) << delay_s;
   }
@@ -46,10 +53,7 @@ TEST(Stalls, WithoutM114RTheStartIsMeasured) {
 
 TEST(Stalls, AModelledSlideThatTakesTooLongIsDoubted) {
   for (const double slowness : {1.3, 1.9}) {
-    RigSettings rig = running_rig();
-    rig.printer.realtime_position = false;
-    rig.printer.slowness = slowness;
-    const FaultVerdict slow = slide(rig, 10);
+    const FaultVerdict slow = slide(running_rig({.realtime_position = false, .slowness = slowness}), 10);
     EXPECT_FALSE(slow.realtime);
     EXPECT_NE(slow.doubt.find("the head may have been"), std::string::npos) << slow.doubt;
   }
@@ -57,10 +61,8 @@ TEST(Stalls, AModelledSlideThatTakesTooLongIsDoubted) {
 
 TEST(Stalls, ReportsEveryThirteenMillisecondsChangeNothing) {
   for (const bool in_the_slide : {false, true}) {
-    RigSettings rig = running_rig();
-    rig.printer.auto_position_s = 0.013;
-    rig.printer.deaf_to_m154 = in_the_slide;
-    const FaultVerdict reported = slide(rig, 10);
+    const FaultVerdict reported =
+        slide(running_rig({.auto_position_s = 0.013, .deaf_to_m154 = in_the_slide}), 10);
     EXPECT_EQ(reported.doubt + reported.broken, "");
     EXPECT_TRUE(reported.realtime);
     EXPECT_LT(reported.worst_mm, 0.05);
@@ -81,9 +83,7 @@ TEST(Stalls, ChunksOfAnAdapterChangeNothing) {
 
 // Klipper's host answers M400 at its next look, 0.1 s apart: positions are kept, and doubted by as much.
 TEST(Stalls, KlippersCollectionIsCompleteAndSaysWhatItsM400IsWorth) {
-  RigSettings rig = running_rig();
-  rig.printer.firmware = Firmware::klipper;
-  const FaultVerdict klipper = slide(rig, 10);
+  const FaultVerdict klipper = slide(running_rig({.firmware = Firmware::klipper}), 10);
   EXPECT_TRUE(klipper.complete) << klipper.error;
   EXPECT_EQ(klipper.broken, "");
   EXPECT_NE(klipper.doubt.find("the head may have been"), std::string::npos) << klipper.doubt;
@@ -105,10 +105,9 @@ struct Tally {
 TEST(StalledCollections, OfBoardAndPrinterAreRightOrSaySo) {
   Tally tally;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
-    RigSettings rig = running_rig();
+    RigSettings rig =
+        running_rig({.realtime_position = seed % 2 == 0}, {.freeze_rate = seed % 3 == 0 ? 0.0003 : 0.001});
     rig.seed = seed;
-    rig.printer.realtime_position = seed % 2 == 0;
-    rig.faults.freeze_rate = seed % 3 == 0 ? 0.0003 : 0.001;
     tally.run(rig, seed % 4 == 3 ? 5 : 10);
   }
   EXPECT_EQ(tally.silent, 0) << "wrong and not said";
@@ -119,10 +118,9 @@ TEST(StalledCollections, OfBoardAndPrinterAreRightOrSaySo) {
 TEST(StalledCollections, OfTheHostAreRightOrSaySo) {
   Tally tally;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
-    RigSettings rig = running_rig();
+    RigSettings rig = running_rig({.realtime_position = seed % 4 != 0},
+                                  {.host_freeze_rate = seed % 3 == 0 ? 0.0003 : 0.001});
     rig.seed = seed;
-    rig.printer.realtime_position = seed % 4 != 0;
-    rig.faults.host_freeze_rate = seed % 3 == 0 ? 0.0003 : 0.001;
     rig.chunk_s = seed % 5 == 0 ? 0.016 : 0;
     tally.run(rig, 10);
   }

@@ -9,7 +9,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <thread>
@@ -65,16 +64,10 @@ TEST(PortList, ALastingNameIsThatOfTheDevice) {
 TEST(SerialPort, WhatCannotBeOpenedSaysWhy) {
   const TemporaryFolder folder;
   EXPECT_ERROR(SerialPort port(folder / "nothing"), PortNotFound,
-               "no such port; plug the device in, or run with --list-ports");
+               (folder / "nothing") + ": no such port; plug the device in, or run with --list-ports");
   std::ofstream(folder / "file") << "text";
   EXPECT_ERROR(SerialPort port(folder / "file"), NotASerialPort,
                "expected a serial port, found another kind of file; run with --list-ports");
-  try {
-    SerialPort port(folder / "nothing");
-  } catch (const PortNotFound& error) {
-    EXPECT_NE(std::string(error.what()).find("--list-ports"), std::string::npos);
-    EXPECT_NE(std::string(error.what()).find(folder / "nothing"), std::string::npos);
-  }
 }
 
 // A user without rights on the port; root first becomes nobody.

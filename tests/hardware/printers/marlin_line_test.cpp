@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "hardware/virtual_rig/virtual_printer.h"
-#include "io/numbers/numbers.h"
 #include "tests/expect_error.h"
 
 namespace supertac {

@@ -37,14 +37,11 @@ std::vector<std::string> moves_in(const std::string& program) {
 }
 
 TEST(PalpationProgram, MovesAreThoseTheRunSends) {
-  SimulatedRig rig(running_rig());
-  const auto port = rig.printer_port();
-  Printer printer(*port);
-  printer.connect();
-  printer.confirm_origin(kMounted);
+  PrinterBench bench;
+  bench.printer.confirm_origin(kMounted);
   const PalpationPlan plan{.passes = 3, .speed = 5};
-  ASSERT_TRUE(Palpation(printer, plan).run().complete);
-  EXPECT_EQ(moves_in(palpation_program(plan, kMounted, "x")), moves_of(rig.world().printer()));
+  ASSERT_TRUE(Palpation(bench.printer, plan).run().complete);
+  EXPECT_EQ(moves_in(palpation_program(plan, kMounted, "x")), moves_of(bench.firmware()));
 }
 
 TEST(PalpationProgram, IsAbsoluteWithinLimitsAndEndsLifted) {
@@ -86,34 +83,13 @@ TEST(PalpationProgram, IsAbsoluteWithinLimitsAndEndsLifted) {
 }
 
 // A default Marlin has neither display nor emergency parser and knows no M0: there the 20 s of G4 are the
-// pause, and the file says so.
-TEST(PalpationProgram, PausesBeforeTheFirstMoveAlsoWhereM0IsUnknown) {
-  RigSettings settings = running_rig();
-  settings.printer.display = settings.printer.emergency_parser = false;
-  settings.printer.head = kMounted;
-  SimulatedRig rig(settings);
-  const auto port = rig.printer_port();
-  MarlinLink link(*port);
-  link.connect();
+// pause, and the file says so. RealMarlin.TheProgramPausesOnEveryFirmware runs it.
+TEST(PalpationProgram, SaysWhatItsPauseNeeds) {
   const std::string program = palpation_program({}, kMounted, "x");
   EXPECT_NE(program.find("G4 leaves 20 s to switch it off"), std::string::npos);
   EXPECT_NE(program.find("until the host sends M108"), std::string::npos);
-  double asked_s = 0;
-  bool refused = false;
-  for (const std::string& line : lines_of(program)) {
-    if (line.starts_with("G1")) break;
-    if (line.starts_with(";")) continue;
-    if (line.starts_with("M0")) asked_s = port->now();
-    try {
-      (void)link.command(line, 60);
-    } catch (const PrinterRefused&) {
-      EXPECT_TRUE(line.starts_with("M0")) << line;
-      refused = true;
-    }
-  }
-  EXPECT_TRUE(refused) << "this printer knows M0; the test shows nothing";
-  EXPECT_GE(port->now() - asked_s, 20);
-  EXPECT_EQ(rig.world().printer().head(port->now()), kMounted);
+  EXPECT_LT(program.find("\nM0 "), program.find("\nG4 S20\n"));
+  EXPECT_LT(program.find("\nG4 S20\n"), program.find("\nG92 "));
 }
 
 TEST(PalpationProgram, RefusesWhatTheRunRefuses) {

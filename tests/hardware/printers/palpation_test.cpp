@@ -10,17 +10,13 @@ namespace {
 
 using rig::kMounted;
 
-struct PalpationBench {
-  explicit PalpationBench(RigSettings settings = running_rig())
-      : rig(settings), port(rig.printer_port()), printer(*port) {
-    printer.connect();
+struct PalpationBench : PrinterBench {
+  explicit PalpationBench(const RigSettings& settings = running_rig()) : PrinterBench(settings) {
     printer.confirm_origin(kMounted);
   }
   PalpationOutcome run(PalpationPlan plan, PalpationObserver observer = {}) {
     return Palpation(printer, plan, std::move(observer)).run();
   }
-  VirtualPrinter& firmware() { return rig.world().printer(); }
-  Point3 head() { return firmware().head(rig.now()); }
   /// Does `plant` once, when the head is in the slide of pass 1.
   PalpationObserver in_slide(std::function<void()> plant) {
     PalpationObserver observer;
@@ -32,9 +28,6 @@ struct PalpationBench {
     };
     return observer;
   }
-  SimulatedRig rig;
-  std::unique_ptr<Port> port;
-  Printer printer;
 };
 
 TEST(Palpation, EightPassesLiftBeforeTheyShift) {
@@ -118,9 +111,7 @@ TEST(Palpation, UnpluggingThePrinterSaysThatTheFingerMayBeInContact) {
 }
 
 TEST(Palpation, FirmwareWithoutRealtimePositionIsRecognised) {
-  RigSettings settings = running_rig();
-  settings.printer.realtime_position = false;
-  PalpationBench bench(settings);
+  PalpationBench bench(running_rig({.realtime_position = false}));
   const PalpationOutcome outcome = bench.run({.passes = 1});
   EXPECT_TRUE(outcome.complete);
   EXPECT_FALSE(outcome.realtime_position);

@@ -11,17 +11,8 @@
 namespace supertac {
 namespace {
 
-RigSettings rig_without(bool emergency_parser, bool display = false) {
-  RigSettings settings = running_rig();
-  settings.printer.emergency_parser = emergency_parser;
-  settings.printer.display = display;
-  return settings;
-}
-
 TEST(RealMarlin, ReportsOfAnEarlierHostAreSwitchedOff) {
-  RigSettings settings = running_rig();
-  settings.printer.auto_position_s = 0.013;
-  settings.printer.auto_temperature_s = 0.017;
+  const RigSettings settings = running_rig({.auto_position_s = 0.013, .auto_temperature_s = 0.017});
   const double begin = SimulatedRig(settings).now();
   PrinterBench bench(settings);
   bench.printer.confirm_origin(rig::kMounted);
@@ -67,24 +58,8 @@ TEST(RealMarlin, AReportTakenForAnAnswerEndsNoLegAndSwitchesNothingOff) {
   EXPECT_TRUE(port.from_printer.empty());
 }
 
-TEST(RealMarlin, AQuickStopWaitsForTheSecondThatTheFirmwareIsHeld) {
-  for (const bool parser : {true, false}) {
-    PrinterBench bench(rig_without(parser));
-    bench.printer.confirm_origin(rig::kMounted);
-    bench.printer.start_move({99.7, 201.17, 131.81}, 10);
-    bench.printer.link().idle(2);
-    const Printer::Stop stop = bench.printer.quick_stop();
-    EXPECT_TRUE(stop.confirmed) << stop.text;
-    EXPECT_EQ(bench.printer.link().counters().timeouts, 0U);
-    EXPECT_EQ(stop.text.find("behind the queue"), std::string::npos) << stop.text;
-    EXPECT_LT(bench.head().y, 125);
-  }
-}
-
 TEST(RealMarlin, TheLineBeforeAHaltIsInTheError) {
-  RigSettings settings = running_rig();
-  settings.printer.homing_fails = true;
-  PrinterBench bench(settings);
+  PrinterBench bench(running_rig({.homing_fails = true}));
   EXPECT_ERROR(bench.printer.home(), PrinterHalted,
                "the firmware halted ('echo:Homing Failed', 'Error:Printer halted. kill() called!')");
   PrinterBench hot;
@@ -99,30 +74,13 @@ TEST(RealMarlin, ACommandThatTheFirmwareDoesNotKnowIsSentOnce) {
 }
 
 TEST(RealMarlin, AdvancedOkAndTemperatureBehindTheOkAreUnderstood) {
-  RigSettings settings = running_rig();
-  settings.printer.advanced_ok = true;
-  PrinterBench bench(settings);
+  PrinterBench bench(running_rig({.advanced_ok = true}));
   bench.printer.confirm_origin(rig::kMounted);
   for (const char* code : {"G21", "M105", "M155 S0"}) bench.printer.link().command(code);
   EXPECT_EQ(bench.printer.link().counters().repeats, 0U);
 }
 
-RigSettings klipper_rig() {
-  RigSettings settings = running_rig();
-  settings.printer.firmware = Firmware::klipper;
-  return settings;
-}
-
-TEST(Klipper, IsConnectedConfirmedAndMoved) {
-  PrinterBench bench(klipper_rig());
-  EXPECT_TRUE(bench.printer.link().capabilities().klipper);
-  bench.printer.confirm_origin(rig::kMounted);
-  bench.printer.start_move({120, 110, 131.81}, 20);
-  bench.printer.finish_move();
-  EXPECT_LT(distance(bench.head(), {120, 110, 131.81}), 1e-6);
-  EXPECT_EQ(bench.printer.link().counters().repeats, 0U);
-  EXPECT_TRUE(bench.printer.quick_stop().confirmed);
-}
+RigSettings klipper_rig() { return running_rig({.firmware = Firmware::klipper}); }
 
 // It would run it again.
 TEST(Klipper, IsSentNoLineAgain) {
@@ -137,18 +95,6 @@ TEST(Klipper, IsSentNoLineAgain) {
   const std::vector<std::string> sent = {"G1 X110", "G1 X112", "G1 X114"};
   for (const std::string& move : sent) bench.printer.link().command(move);
   EXPECT_EQ(moves, sent);
-}
-
-TEST(Klipper, IsHomedWithTheFingerUp) {
-  PrinterBench bench(klipper_rig());
-  bench.printer.home();
-  const auto& executed = bench.firmware().executed();
-  const auto at = [&](const std::string& command) {
-    return std::find_if(executed.begin(), executed.end(),
-                        [&](const auto& e) { return e.command.starts_with(command); });
-  };
-  EXPECT_LT(at("G1 Z10"), at("G28"));
-  EXPECT_NE(at("G28"), executed.end());
 }
 
 TEST(Klipper, WhatItSaysReachesTheUser) {
@@ -174,7 +120,7 @@ TEST(RealMarlin, AStopWhileItHomesStopsTheHead) {
 /// Sends the program as a simple host does: line by line, each after the ok of the one before.
 struct ProgramRun {
   explicit ProgramRun(bool parser, bool display = false)
-      : rig(rig_without(parser, display)), port(rig.printer_port()) {
+      : rig(running_rig({.emergency_parser = parser, .display = display})), port(rig.printer_port()) {
     std::istringstream lines(palpation_program({.passes = 1}, rig::kMounted, "x"));
     for (std::string line; std::getline(lines, line);) {
       if (line.starts_with(';')) continue;
@@ -209,12 +155,6 @@ TEST(RealMarlin, TheProgramPausesOnEveryFirmware) {
     EXPECT_FALSE(run.waits_in.empty()) << "parser " << parser << ", display " << display;
     EXPECT_TRUE(moves_of(run.rig.world().printer()).empty()) << "moved within 15 s";
   }
-}
-
-TEST(RealMarlin, TheProgramSaysWhatItsPauseNeeds) {
-  const std::string program = palpation_program({.passes = 1}, rig::kMounted, "x");
-  EXPECT_NE(program.find("M108"), std::string::npos);
-  EXPECT_LT(program.find("\nG4 S"), program.find("\nG92"));
 }
 
 TEST(VirtualPrinter, SpeaksLikeTheRealOne) {
