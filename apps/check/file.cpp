@@ -28,7 +28,7 @@ std::string hash_of_data(const SafetensorsFile& file, const std::string& data) {
 
 int check_file(const Arguments& a) {
   const SafetensorsFile file = SafetensorsFile::read(a.text("FILE"));
-  const bool ours = file.checksum() == SafetensorsFile::ChecksumState::ok;
+  const bool ours = file.has_checksum();
   const Json provenance = provenance_in(file);
   Json result = {{"file", file.path()},
                  {"checksum", ours ? "ok" : "absent"},

@@ -37,15 +37,6 @@ const char* advice(int error) {
   throw FileError(path, "cannot " + action + ": " + std::strerror(error) + advice(error));
 }
 
-// Calls again as long as a signal interrupts.
-template <class Call>
-auto retry(Call call) {
-  for (;;) {
-    const auto result = call();
-    if (result >= 0 || errno != EINTR) return result;
-  }
-}
-
 // Not retried: on Linux the descriptor is gone even after EINTR, and may by now be somebody else's.
 void close_quietly(int& file) {
   if (file >= 0) system_calls().close(file);

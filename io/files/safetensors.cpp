@@ -87,11 +87,12 @@ void check_version(const std::string& path, const std::map<std::string, std::str
          "format version " + in_quotes(found->second) + ", expected " + kFormatVersion + "; it is damaged");
 }
 
-SafetensorsFile::ChecksumState check_checksum(const std::string& path, const Header& header, std::string text,
-                                              std::span<const std::byte> data) {
+// False when there is none.
+bool check_checksum(const std::string& path, const Header& header, std::string text,
+                    std::span<const std::byte> data) {
   const auto stored = header.metadata.find(kChecksumKey);
   if (stored == header.metadata.end()) {
-    if (!header.metadata.contains(kFormatKey)) return SafetensorsFile::ChecksumState::absent;
+    if (!header.metadata.contains(kFormatKey)) return false;
     refuse(path, "the checksum is missing; it is damaged");
   }
   if (!header.metadata.contains(kFormatKey))
@@ -104,7 +105,7 @@ SafetensorsFile::ChecksumState check_checksum(const std::string& path, const Hea
     refuse(path, "checksum " + found + ", expected " + in_quotes(stored->second) +
                      "; it is damaged, or another program changed it and kept our checksum");
   }
-  return SafetensorsFile::ChecksumState::ok;
+  return true;
 }
 
 void hand_over(const TensorToWrite& tensor, const ByteSink& sink) {
@@ -115,7 +116,7 @@ void hand_over(const TensorToWrite& tensor, const ByteSink& sink) {
   }
 }
 
-std::uint32_t checksum_of(const std::string& header, const std::vector<TensorToWrite>& tensors) {
+std::uint32_t checksum_of(const std::string& header, std::span<const TensorToWrite> tensors) {
   std::uint32_t sum = crc32(std::as_bytes(std::span(header)));
   for (const TensorToWrite& tensor : tensors) {
     std::uint64_t bytes = 0;
@@ -158,6 +159,15 @@ void check_writable(const std::map<std::string, std::string>& metadata,
 
 }  // namespace
 
+std::string safetensors::sealed_header(std::map<std::string, std::string> metadata,
+                                       std::span<const TensorToWrite> tensors) {
+  metadata[kFormatKey] = kFormatVersion;
+  metadata[kChecksumKey] = std::string(kChecksumDigits, '0');
+  std::string text = header_text(metadata, tensors);
+  text.replace(*checksum_position(text), kChecksumDigits, checksum_digits(checksum_of(text, tensors)));
+  return text;
+}
+
 SafetensorsFile SafetensorsFile::read(const std::string& path) {
   FileReader reader(path);
   return parsed(path, reader.size(), [&](std::span<std::byte> to) { reader.read(to); });
@@ -187,8 +197,8 @@ SafetensorsFile SafetensorsFile::parsed(const std::string& path, std::uint64_t s
   file.path_ = path;
   file.data_.resize(data_bytes);
   take(file.data_);
-  file.checksum_ = check_checksum(path, header, std::move(text), file.data_);
-  if (file.checksum_ == ChecksumState::ok) {
+  file.has_checksum_ = check_checksum(path, header, std::move(text), file.data_);
+  if (file.has_checksum_) {
     header.metadata.erase(kFormatKey);
     header.metadata.erase(kChecksumKey);
   }
@@ -240,11 +250,9 @@ void write_safetensors(const OutputPath& output, std::map<std::string, std::stri
                        const std::vector<TensorToWrite>& tensors) {
   if (!provenance().empty()) metadata[kProvenanceKey] = provenance();
   check_writable(metadata, tensors);
-  metadata[kFormatKey] = kFormatVersion;
-  metadata[kChecksumKey] = std::string(kChecksumDigits, '0');
   std::string text;
   try {
-    text = header_text(metadata, tensors);
+    text = sealed_header(std::move(metadata), tensors);
   } catch (const nlohmann::json::exception&) {
     throw std::invalid_argument("write_safetensors: a name or metadata field is not valid UTF-8");
   }
@@ -252,7 +260,6 @@ void write_safetensors(const OutputPath& output, std::map<std::string, std::stri
     throw std::invalid_argument("write_safetensors: the header has " + std::to_string(text.size()) +
                                 " bytes, expected at most " + std::to_string(kMaxHeaderBytes));
   }
-  text.replace(*checksum_position(text), kChecksumDigits, checksum_digits(checksum_of(text, tensors)));
 
   const std::uint64_t length = text.size();
   AtomicFile file(output);

@@ -26,8 +26,6 @@ struct TensorInfo {
 /// A file read and checked as a whole.
 class SafetensorsFile {
  public:
-  enum class ChecksumState { ok, absent };  // a wrong one does not load
-
   /// Throws FileError when the file cannot be read or breaks a rule. Rules: the header has at most 1 MiB,
   /// starts with '{' and is padded with spaces only; at most 4,096 tensors and as many metadata fields;
   /// nothing nested deeper, no key twice, no field unknown; integers without sign, fraction or overflow; each
@@ -43,8 +41,8 @@ class SafetensorsFile {
   /// Without the two fields of this layer.
   const std::map<std::string, std::string>& metadata() const { return metadata_; }
   const std::map<std::string, TensorInfo>& tensors() const { return tensors_; }
-  /// absent: written by another program; damage cannot be seen.
-  ChecksumState checksum() const { return checksum_; }
+  /// False: written by another program, damage cannot be seen. A wrong one does not load.
+  bool has_checksum() const { return has_checksum_; }
 
   /// A tensor's bytes, or its elements when it has that type. Throw FileError when there is no such tensor
   /// (the message lists those there are) or it has another type.
@@ -63,7 +61,7 @@ class SafetensorsFile {
   std::map<std::string, std::string> metadata_;
   std::map<std::string, TensorInfo> tensors_;
   std::vector<std::byte> data_;
-  ChecksumState checksum_ = ChecksumState::absent;
+  bool has_checksum_ = false;
 };
 
 /// "[2,3,40]".

@@ -35,6 +35,11 @@ Header parse_header(std::string_view text);
 std::string header_text(const std::map<std::string, std::string>& metadata,
                         std::span<const TensorToWrite> tensors);
 
+/// The same with version and checksum: what stands in the file. Throws std::invalid_argument for a tensor
+/// with other bytes than its shape and type need.
+std::string sealed_header(std::map<std::string, std::string> metadata,
+                          std::span<const TensorToWrite> tensors);
+
 /// Size of a tensor in bytes; nullopt for an unknown dtype, a rank over kMaxRank, or a product beyond 64
 /// bits.
 std::optional<std::uint64_t> tensor_bytes(const std::string& dtype, const std::vector<std::uint64_t>& shape);

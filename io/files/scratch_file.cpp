@@ -43,8 +43,7 @@ ScratchFile::~ScratchFile() { system_calls().close(file_); }
 
 std::uint64_t ScratchFile::append(std::span<const float> numbers) {
   for (auto bytes = std::as_bytes(numbers); !bytes.empty();) {
-    const ssize_t count = system_calls().write(file_, bytes.data(), bytes.size());
-    if (count < 0 && errno == EINTR) continue;
+    const ssize_t count = retry([&] { return system_calls().write(file_, bytes.data(), bytes.size()); });
     if (count <= 0) fail(folder_, "write", count < 0 ? errno : ENOSPC);
     bytes = bytes.subspan(static_cast<std::size_t>(count));
   }
@@ -56,8 +55,8 @@ std::uint64_t ScratchFile::append(std::span<const float> numbers) {
 void ScratchFile::read(std::uint64_t place, std::span<float> numbers) const {
   std::uint64_t offset = place * sizeof(float);
   for (auto bytes = std::as_writable_bytes(numbers); !bytes.empty();) {
-    const ssize_t count = system_calls().pread(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
-    if (count < 0 && errno == EINTR) continue;
+    const ssize_t count = retry(
+        [&] { return system_calls().pread(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset)); });
     if (count <= 0) fail(folder_, "read", count < 0 ? errno : EIO);
     offset += static_cast<std::uint64_t>(count);
     bytes = bytes.subspan(static_cast<std::size_t>(count));

@@ -41,12 +41,10 @@ SystemCalls real_system_calls() {
 bool sync_folder_of(const std::string& path) {
   const std::string parent = std::filesystem::path(path).parent_path();
   const int flags = O_RDONLY | O_DIRECTORY | O_CLOEXEC;
-  int folder = -1, result = 0;
-  do folder = system_calls().open(parent.empty() ? "." : parent.c_str(), flags, 0);
-  while (folder < 0 && errno == EINTR);
+  const int folder =
+      retry([&] { return system_calls().open(parent.empty() ? "." : parent.c_str(), flags, 0); });
   if (folder < 0) return false;
-  do result = system_calls().fsync(folder);
-  while (result != 0 && errno == EINTR);
+  const int result = retry([&] { return system_calls().fsync(folder); });
   // EINVAL: a file system that has nothing to sync for a folder.
   const bool synced = result == 0 || errno == EINVAL;
   const int error = errno;

@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <sys/types.h>
 
+#include <cerrno>
 #include <cstddef>
 #include <string>
 
@@ -28,6 +29,14 @@ struct SystemCalls {
 
 /// The real calls.
 SystemCalls real_system_calls();
+
+/// Calls again as long as a signal interrupts.
+auto retry(const auto& call) {
+  for (;;) {
+    const auto result = call();
+    if (result >= 0 || errno != EINTR) return result;
+  }
+}
 
 /// fsync of the folder that holds `path`, so that a power cut does not lose a new name. False with errno set.
 bool sync_folder_of(const std::string& path);

@@ -5,6 +5,7 @@
 
 #include <cstring>
 #include <ctime>
+#include <tuple>
 
 #include "io/files/file.h"
 #include "io/numbers/random.h"
@@ -54,7 +55,7 @@ TEST(Safetensors, RoundTrip) {
   TemporaryFolder folder;
   write_example(folder.file("a"), 400);
   const auto file = SafetensorsFile::read(folder.file("a"));
-  EXPECT_EQ(file.checksum(), SafetensorsFile::ChecksumState::ok);
+  EXPECT_TRUE(file.has_checksum());
   const std::map<std::string, std::string> expected = {{"kind", "example"},
                                                        {"note", "\"quoted\", \\, \xc3\xa4"}};
   EXPECT_EQ(file.metadata(), expected);
@@ -64,16 +65,9 @@ TEST(Safetensors, RoundTrip) {
   EXPECT_TRUE(file.bytes("none").empty());
 }
 
-TEST(Safetensors, SameArgumentsSameBytes) {
-  TemporaryFolder folder;
-  write_example(folder.file("a"), 1000);
-  write_example(folder.file("b"), 1000);
-  EXPECT_EQ(read_file(folder.file("a"), kPlenty), read_file(folder.file("b"), kPlenty));
-}
-
 TEST(Safetensors, GoldenFileOfVersion1IsReadForEver) {
   const auto file = SafetensorsFile::read(golden("version_1.safetensors"));
-  EXPECT_EQ(file.checksum(), SafetensorsFile::ChecksumState::ok);
+  EXPECT_TRUE(file.has_checksum());
   EXPECT_EQ(file.metadata().at("note"), "quotes \" and \xc3\xa4");
   EXPECT_EQ(file.f32("volts"), (std::vector<float>{0, 0.5, -1, 1e-3f, 2.5, 3}));
   EXPECT_EQ(file.f64("time_s"), (std::vector<double>{0.1, 1e300}));
@@ -95,10 +89,9 @@ TEST(Safetensors, WritesTheBytesOfTheGoldenFile) {
 
 TEST(Safetensors, AccessErrorsSayWhatThereIs) {
   const auto file = SafetensorsFile::read(golden("version_1.safetensors"));
-  const auto message = [&](const auto& action) -> std::string { return what_of<FileError>(action); };
-  EXPECT_EQ(message([&] { file.f32("volt"); }),
+  EXPECT_EQ(what_of<FileError>([&] { file.f32("volt"); }),
             file.path() + ": has no tensor 'volt' (it has: 'bytes', 'empty', 'time_s', 'volts')");
-  EXPECT_EQ(message([&] { file.f32("time_s"); }),
+  EXPECT_EQ(what_of<FileError>([&] { file.f32("time_s"); }),
             file.path() + ": tensor 'time_s' has type F64, expected F32");
 }
 
@@ -107,7 +100,7 @@ TEST(Safetensors, FilesOfOtherWritersLoadWithoutChecksum) {
   const std::string header = R"({"b":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}}  )";
   write_file(folder.file("a"), raw_file(header, 4));
   const auto file = SafetensorsFile::read(folder.file("a"));
-  EXPECT_EQ(file.checksum(), SafetensorsFile::ChecksumState::absent);
+  EXPECT_FALSE(file.has_checksum());
   EXPECT_EQ(file.f32("b"), std::vector<float>{0});
 }
 
@@ -225,8 +218,8 @@ TEST(SafetensorsHostile, LengthsAreComparedBeforeMemoryIsAskedFor) {
     std::string bytes(16, ' ');
     std::memcpy(bytes.data(), &length, 8);
     write_file(folder.file("a"), bytes);
-    EXPECT_NE(refusal_of(folder.file("a")).find("header length " + std::to_string(length)),
-              std::string::npos);
+    EXPECT_ERROR(SafetensorsFile::read(folder.file("a")), FileError,
+                 "header length " + std::to_string(length));
   }
   EXPECT_NE(
       message_of_header(R"({"a":{"dtype":"U8","shape":[1099511627776],"data_offsets":[0,1099511627776]}})", 4)
@@ -280,20 +273,17 @@ TEST(SafetensorsHostile, BombsCostLittle) {
 TEST(SafetensorsWrite, RefusesWhatItCouldNotReadBack) {
   TemporaryFolder folder;
   const std::vector<std::byte> data(4);
-  const auto message = [&](std::map<std::string, std::string> metadata, std::vector<TensorToWrite> tensors) {
-    return what_of<std::invalid_argument>(
-        [&] { write_safetensors(folder.file("a"), std::move(metadata), tensors); });
-  };
-  EXPECT_NE(message({}, {{"a", "F32", {2}, data}}).find("has 4 bytes, its shape and type need 8"),
-            std::string::npos);
-  EXPECT_NE(message({}, {{"a", "X", {2}, data}}).find("unknown type 'X'"), std::string::npos);
-  EXPECT_NE(message({}, {{"a", "F32", {1}, data}, {"a", "F32", {1}, data}}).find("taken"), std::string::npos);
-  EXPECT_NE(message({}, {{"__metadata__", "F32", {1}, data}}).find("taken"), std::string::npos);
-  EXPECT_NE(message({{"checksum", ""}}, {}).find("'checksum' is written by this function"),
-            std::string::npos);
-  EXPECT_NE(message({{"a", "\xff"}}, {}).find("UTF-8"), std::string::npos);
-  EXPECT_NE(message({{"a", std::string(1 << 20, 'x')}}, {}).find("expected at most 1048576"),
-            std::string::npos);
+  using Metadata = std::map<std::string, std::string>;
+  const std::tuple<Metadata, std::vector<TensorToWrite>, std::string> cases[] = {
+      {{}, {{"a", "F32", {2}, data}}, "has 4 bytes, its shape and type need 8"},
+      {{}, {{"a", "X", {2}, data}}, "unknown type 'X'"},
+      {{}, {{"a", "F32", {1}, data}, {"a", "F32", {1}, data}}, "taken"},
+      {{}, {{"__metadata__", "F32", {1}, data}}, "taken"},
+      {{{"checksum", ""}}, {}, "'checksum' is written by this function"},
+      {{{"a", "\xff"}}, {}, "UTF-8"},
+      {{{"a", std::string(1 << 20, 'x')}}, {}, "expected at most 1048576"}};
+  for (const auto& [metadata, tensors, part] : cases)
+    EXPECT_ERROR(write_safetensors(folder.file("a"), metadata, tensors), std::invalid_argument, part);
   EXPECT_EQ(folder.entries(), 0u);
 }
 
@@ -320,17 +310,13 @@ TEST(SafetensorsWrite, AFullDiskLeavesTheOldFile) {
     TemporaryFolder folder;
     write_example(folder.file("a"), 100);
     const auto before = read_file(folder.file("a"), kPlenty);
-    std::string message = "written";
+    std::string message;
     {
       FaultInjection injection(at, ENOSPC, true);
-      try {
-        write_example(folder.file("a"), 5000);
-      } catch (const FileError& error) {
-        message = error.what();
-      }
+      message = what_of<FileError>([&] { write_example(folder.file("a"), 5000); });
     }
     EXPECT_EQ(folder.entries(), 1u);
-    if (message != "written" && message.find("sync the directory") == std::string::npos) {
+    if (message != "nothing thrown" && message.find("sync the directory") == std::string::npos) {
       EXPECT_EQ(read_file(folder.file("a"), kPlenty), before) << message;
     } else {
       EXPECT_EQ(refusal_of(folder.file("a")), "nothing thrown");
@@ -344,13 +330,8 @@ TEST(Safetensors, NamesTheFirstOfManyTensors) {
   for (int i = 100; i < 200; ++i) tensors.push_back({"tensor" + std::to_string(i), "U8", {0}, {}});
   write_safetensors(folder / "many", {}, tensors);
   const SafetensorsFile file = SafetensorsFile::read(folder / "many");
-  try {
-    file.f32("volts");
-    FAIL();
-  } catch (const FileError& error) {
-    const std::string text = error.what();
-    EXPECT_TRUE(text.ends_with("'tensor114', 'tensor115', ...)")) << text;
-  }
+  const std::string text = what_of<FileError>([&] { file.f32("volts"); });
+  EXPECT_TRUE(text.ends_with("'tensor114', 'tensor115', ...)")) << text;
 }
 
 }  // namespace
