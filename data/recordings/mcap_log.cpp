@@ -42,8 +42,10 @@ uint32 stride
 class Cdr {
  public:
   Cdr& number(std::size_t value) {
-    align();
-    return bytes(static_cast<std::uint32_t>(value));
+    const auto word = static_cast<std::uint32_t>(value);
+    text_.resize((text_.size() + 3) / 4 * 4);
+    text_.append(reinterpret_cast<const char*>(&word), sizeof word);
+    return *this;
   }
   Cdr& byte(char value) {
     text_ += value;
@@ -63,11 +65,6 @@ class Cdr {
   const std::string& message() const { return text_; }
 
  private:
-  void align() { text_.resize((text_.size() + 3) / 4 * 4); }
-  Cdr& bytes(std::uint32_t value) {
-    text_.append(reinterpret_cast<const char*>(&value), sizeof value);
-    return *this;
-  }
   std::string text_{"\0\1\0\0", 4};
 };
 
@@ -112,9 +109,7 @@ std::vector<McapChannel> channels_of(const TaxelArray& array, const std::string&
   const bool drawn = image.pixels() > 0;
   const auto channel = [&](const char* name, bool picture, const std::string& of) {
     return McapChannel{std::string("/supertac/") + name,
-                       "cdr",
                        picture ? "sensor_msgs/msg/Image" : "std_msgs/msg/Float32MultiArray",
-                       "ros2msg",
                        picture ? kImage : kArray,
                        {{"unit", of},
                         {"array", array.text()},
@@ -131,7 +126,7 @@ std::vector<McapChannel> channels_of(const TaxelArray& array, const std::string&
 
 McapLog::McapLog(const OutputPath& output, const TaxelArray& array, const std::string& unit,
                  const ImageGrid& image, bool half_widths)
-    : array_(array), image_(image), file_(output, "ros2", channels_of(array, unit, image, half_widths)) {}
+    : array_(array), image_(image), file_(output, channels_of(array, unit, image, half_widths)) {}
 
 void McapLog::add(double time_s, double wall_s, std::span<const float> signals,
                   std::span<const float> picture, std::span<const float> half_widths) {

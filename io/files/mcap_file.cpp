@@ -49,18 +49,16 @@ void McapFile::Span::add(std::uint64_t time) { first = std::min(first, time), la
 
 std::string McapFile::Span::text() const { return u64(first <= last ? first : 0) + u64(last); }
 
-McapFile::McapFile(const OutputPath& output, const std::string& profile,
-                   std::span<const McapChannel> channels)
+McapFile::McapFile(const OutputPath& output, std::span<const McapChannel> channels)
     : file_(output), in_chunk_(channels.size()), counts_(channels.size()) {
   for (std::size_t i = 0; i < channels.size(); ++i) {
     const McapChannel& c = channels[i];
     std::string metadata;
     for (const auto& [key, value] : c.metadata) metadata += sized(key) + sized(value);
-    channels_ +=
-        record(kSchema, u16(i + 1) + sized(c.schema) + sized(c.schema_encoding) + sized(c.schema_text)) +
-        record(kChannel, u16(i) + u16(i + 1) + sized(c.topic) + sized(c.message_encoding) + sized(metadata));
+    channels_ += record(kSchema, u16(i + 1) + sized(c.schema) + sized("ros2msg") + sized(c.schema_text)) +
+                 record(kChannel, u16(i) + u16(i + 1) + sized(c.topic) + sized("cdr") + sized(metadata));
   }
-  write(std::string(kMagic) + record(kHeader, sized(profile) + sized("supertac")) + channels_);
+  write(std::string(kMagic) + record(kHeader, sized("ros2") + sized("supertac")) + channels_);
 }
 
 void McapFile::write(std::string_view text) {

@@ -15,20 +15,18 @@
 namespace supertac {
 
 struct McapChannel {
-  std::string topic;             ///< such as "/supertac/picture"
-  std::string message_encoding;  ///< "cdr", ...
-  std::string schema;            ///< its name, such as "sensor_msgs/msg/Image"
-  std::string schema_encoding;   ///< "ros2msg", ...
-  std::string schema_text;       ///< the definition
+  std::string topic;        ///< such as "/supertac/picture"
+  std::string schema;       ///< its name, such as "sensor_msgs/msg/Image"
+  std::string schema_text;  ///< the definition, as ROS 2 writes it
   std::map<std::string, std::string> metadata = {};
 };
 
-/// Writes one file, in chunks of uncompressed messages with an index, so that players can jump. It appears
-/// under its name at close(), complete (AtomicFile).
+/// Writes one file of ROS 2's messages (profile "ros2", encoding "cdr"), in chunks of uncompressed messages
+/// with an index, so that players can jump. It appears under its name at close(), complete (AtomicFile).
 class McapFile {
  public:
-  /// `profile`: "ros2", or "" for none. Throws FileError.
-  McapFile(const OutputPath& output, const std::string& profile, std::span<const McapChannel> channels);
+  /// Throws FileError.
+  McapFile(const OutputPath& output, std::span<const McapChannel> channels);
   /// A message of channels[channel]. Times are nanoseconds since 1970: when it was taken down, and when it
   /// was sent. Throws FileError.
   void add(std::size_t channel, std::uint64_t log_time, std::uint64_t publish_time, std::string_view message);
