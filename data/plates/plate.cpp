@@ -119,8 +119,7 @@ class Bands : public Surface {
 };
 
 std::string in_lower_case(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  std::ranges::transform(text, text.begin(), lower);
   return text;
 }
 

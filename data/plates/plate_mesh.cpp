@@ -36,19 +36,6 @@ std::vector<double> lines_along_y(const Plate& plate, double step) {
   return without_slivers(lines);
 }
 
-class Solid {
- public:
-  void triangle(const Vertex& a, const Vertex& b, const Vertex& c) { triangles_.push_back({a, b, c}); }
-  void quad(const Vertex& a, const Vertex& b, const Vertex& c, const Vertex& d) {
-    triangle(a, b, c);
-    triangle(a, c, d);
-  }
-  std::vector<Triangle> take() { return std::move(triangles_); }
-
- private:
-  std::vector<Triangle> triangles_;
-};
-
 // The top's points, row by row; xs and ys ascend.
 struct Top {
   std::vector<double> xs, ys;
@@ -98,20 +85,24 @@ std::vector<Triangle> mesh_of(const Plate& plate, const MeshSettings& settings) 
         format(settings.resolution_mm) + " and " + format(settings.base_mm));
   const Top top = top_of(plate, settings.resolution_mm);
   const auto bottom = static_cast<float>(plate.min_height() - settings.base_mm);
-  Solid solid;
+  std::vector<Triangle> solid;
+  const auto add_quad = [&](const Vertex& a, const Vertex& b, const Vertex& c, const Vertex& d) {
+    solid.push_back({a, b, c});
+    solid.push_back({a, c, d});
+  };
   for (std::size_t r = 0; r + 1 < top.ys.size(); ++r)
     for (std::size_t c = 0; c + 1 < top.xs.size(); ++c)
-      solid.quad(top.at(r, c), top.at(r, c + 1), top.at(r + 1, c + 1), top.at(r + 1, c));
+      add_quad(top.at(r, c), top.at(r, c + 1), top.at(r + 1, c + 1), top.at(r + 1, c));
   const auto outline = outline_of(top);
   const Vertex centre = {static_cast<float>(Plate::kWidthMm / 2), static_cast<float>(Plate::kLengthMm / 2),
                          bottom};
   for (std::size_t i = 0; i < outline.size(); ++i) {
     const Vertex &a = outline[i], &b = outline[(i + 1) % outline.size()];
     const Vertex below_a = {a[0], a[1], bottom}, below_b = {b[0], b[1], bottom};
-    solid.quad(a, below_a, below_b, b);
-    solid.triangle(centre, below_b, below_a);
+    add_quad(a, below_a, below_b, b);
+    solid.push_back({centre, below_b, below_a});
   }
-  return solid.take();
+  return solid;
 }
 
 }  // namespace supertac

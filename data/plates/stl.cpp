@@ -19,8 +19,6 @@ constexpr std::size_t kTitleBytes = 80, kHeadBytes = 84, kFacetBytes = 50;
 
 bool usable(double coordinate) { return std::abs(coordinate) <= double{kMaxStlCoordinateMm}; }  // no NaN
 
-std::string expected_coordinate() { return "expected a number within +-1000000 mm; export the model again"; }
-
 std::vector<Triangle> parse_binary(std::span<const std::byte> bytes, const std::string& name) {
   std::vector<Triangle> triangles((bytes.size() - kHeadBytes) / kFacetBytes);
   for (std::size_t i = 0; i < triangles.size(); ++i) {
@@ -30,14 +28,13 @@ std::vector<Triangle> parse_binary(std::span<const std::byte> bytes, const std::
       for (const float coordinate : corner) {
         if (usable(coordinate)) continue;
         throw FileError(name, "triangle " + std::to_string(i + 1) + " has the coordinate " +
-                                  format(coordinate) + ", " + expected_coordinate());
+                                  format(coordinate) +
+                                  ", expected a number within +-1000000 mm; export the model again");
       }
     }
   }
   return triangles;
 }
-
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
 // Words of the text form, with the number of their line.
 class Words {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <span>
 #include <stdexcept>
 #include <utility>
@@ -287,19 +288,14 @@ std::vector<std::string> list_recordings(const std::string& folder) {
 }
 
 std::string hash_of_recordings(const std::string& folder, const std::vector<std::string>& plates) {
-  std::vector<std::string> hashes;
+  std::multiset<std::string> hashes;
   for (const std::string& path : list_recordings(folder)) {
     const SafetensorsFile file = SafetensorsFile::read(path);
     const auto plate = file.metadata().find("plate");
     if (plate == file.metadata().end()) continue;
     if (plates.empty() || std::find(plates.begin(), plates.end(), plate->second) != plates.end())
-      hashes.push_back(content_hash(file));
+      hashes.insert(content_hash(file));
   }
-  return hash_of_contents(std::move(hashes));
-}
-
-std::string hash_of_contents(std::vector<std::string> hashes) {
-  std::sort(hashes.begin(), hashes.end());
   Sha256 sum;
   for (const std::string& hash : hashes) sum.add(hash);
   return sum.hex();

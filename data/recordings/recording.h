@@ -81,7 +81,5 @@ std::vector<std::string> list_recordings(const std::string& folder);
 /// Names the content of a folder's recordings (of these plates; all when empty), independent of windows, file
 /// names and provenance: SHA-256 over their sorted content hashes (io/files/provenance.h). Throws FileError.
 std::string hash_of_recordings(const std::string& folder, const std::vector<std::string>& plates);
-/// The same from the content hashes.
-std::string hash_of_contents(std::vector<std::string> hashes);
 
 }  // namespace supertac

@@ -91,6 +91,7 @@ Found with_loss(const PassSignals& signals, const Registration& registration, co
 }
 
 struct Aligned {
+  Registration* result;
   Registration registration;
   PassSignals signals;
   Found found;
@@ -147,27 +148,25 @@ bool find_losses(std::vector<Aligned>& passes) {
 
 void align_passes(std::span<const RegisteredPass> passes) {
   std::vector<Aligned> reliable;
-  std::vector<Registration*> results;
   for (const RegisteredPass& pass : passes) {
     if (!pass.registration->reliable) continue;
     if (pass.recording->array != TaxelArray{})
       throw std::invalid_argument("align_passes: expected recordings of the rig's " + TaxelArray{}.text() +
                                   ", got " + pass.recording->array.text());
-    reliable.push_back({*pass.registration, PassSignals(*pass.recording, *pass.registration), {}});
-    results.push_back(pass.registration);
+    reliable.push_back(
+        {pass.registration, *pass.registration, PassSignals(*pass.recording, *pass.registration), {}});
   }
   if (reliable.size() < kFewestPasses) return;
   align(reliable);
   if (find_losses(reliable)) align(reliable);
-  for (std::size_t i = 0; i < reliable.size(); ++i) {
-    const Found& found = reliable[i].found;
+  for (const auto& [result, registration, signals, found] : reliable) {
     if (found.agreement < kLeastAgreement) continue;
-    *results[i] = changed(reliable[i].registration, found.change);
-    results[i]->shift_mm = found.change.shift_mm;
-    results[i]->stretch_mm = found.change.stretch_mm;
-    results[i]->lost_at_s = found.loss.at_s;
-    results[i]->lost_s = found.loss.seconds;
-    results[i]->agreement = found.agreement;
+    *result = changed(registration, found.change);
+    result->shift_mm = found.change.shift_mm;
+    result->stretch_mm = found.change.stretch_mm;
+    result->lost_at_s = found.loss.at_s;
+    result->lost_s = found.loss.seconds;
+    result->agreement = found.agreement;
   }
 }
 

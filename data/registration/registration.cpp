@@ -44,6 +44,12 @@ struct Match {
   double weight = 0;
 };
 
+// The least distance of neighbouring crests, `most` where none is less.
+double least_pitch(const std::vector<double>& crests, double most) {
+  for (std::size_t j = 1; j < crests.size(); ++j) most = std::min(most, crests[j] - crests[j - 1]);
+  return most;
+}
+
 class Fit {
  public:
   Fit(const Recording& recording, const Plate& plate)
@@ -113,9 +119,7 @@ class Fit {
 
   Match match(const Event& event, const Line& line) const {
     const double y = line.middle_mm + line.rate * event.time + row_mm_[event.row];
-    std::size_t nearest = 0;
-    for (std::size_t j = 1; j < crests_.size(); ++j)
-      if (std::abs(crests_[j] - y) < std::abs(crests_[nearest] - y)) nearest = j;
+    const std::size_t nearest = nearest_crest(y);
     Match m{.crest = nearest, .distance_mm = crests_[nearest] - y, .weight = event.weight};
     const bool leading_alone = event.row + 1 == row_mm_.size() && nearest == 0;
     const bool trailing_alone = event.row == 0 && nearest + 1 == crests_.size();
@@ -146,11 +150,14 @@ class Fit {
   }
 
  private:
-  double pitch() const {
-    double smallest = Plate::kLengthMm;
+  double pitch() const { return least_pitch(crests_, 12); }
+
+  std::size_t nearest_crest(double y) const {
+    std::size_t nearest = 0;
+    double distance = std::abs(crests_[0] - y);
     for (std::size_t j = 1; j < crests_.size(); ++j)
-      smallest = std::min(smallest, crests_[j] - crests_[j - 1]);
-    return std::min(smallest, 12.0);
+      if (const double d = std::abs(crests_[j] - y); d < distance) distance = d, nearest = j;
+    return nearest;
   }
 
   static bool inside(const Contact& c, const Stretch& s) {
@@ -177,11 +184,8 @@ class Fit {
     double total = 0, agree = 0;
     for (const Event& event : events_) {
       const double y = middle_mm + rate * event.time + row_mm_[event.row];
-      std::size_t nearest = 0;
-      double distance = std::abs(crests_[0] - y);
-      for (std::size_t j = 1; j < crests_.size(); ++j)
-        if (const double d = std::abs(crests_[j] - y); d < distance) distance = d, nearest = j;
-      const double fit = std::max(0.0, 1 - distance / kScanReachMm);
+      const std::size_t nearest = nearest_crest(y);
+      const double fit = std::max(0.0, 1 - std::abs(crests_[nearest] - y) / kScanReachMm);
       total += event.weight, agree += event.weight * fit;
       double& best = felt[nearest * row_mm_.size() + event.row];
       best = std::max(best, fit);
@@ -240,9 +244,7 @@ std::string why_implausible(const Registration& r, const Recording& recording, c
   if (gone > texture)
     return "frames of " + format(gone, 0) + " mm were lost, the texture is " + format(texture, 0) +
            " mm long";
-  const std::vector<double> crests = plate.crests();
-  double pitch = texture;
-  for (std::size_t j = 1; j < crests.size(); ++j) pitch = std::min(pitch, crests[j] - crests[j - 1]);
+  const double pitch = least_pitch(plate.crests(), texture);
   // Beyond half a pitch the first and last elements may vanish, and what is left fits a pitch further as
   // well.
   if (recording.filter_s() * speed > 0.5 * pitch)

@@ -111,24 +111,18 @@ void read_and_register(ImportedPass& pass, double speed_mm_s) {
   pass.recording = std::move(recording);
 }
 
-/// Passes that are read and registered at a time, by all threads; an error is that of its pass.
-struct ReadPass {
-  ImportedPass pass;
-  std::exception_ptr error;
-};
-
-std::vector<ReadPass> read_and_register(std::span<const ImportedPass> found, double speed_mm_s) {
-  std::vector<ReadPass> passes;
-  for (const ImportedPass& pass : found) passes.push_back({pass, {}});
+/// On all threads; returns the error of each pass, or none.
+std::vector<std::exception_ptr> read_and_register(std::span<ImportedPass> passes, double speed_mm_s) {
+  std::vector<std::exception_ptr> errors(passes.size());
 #pragma omp parallel for schedule(dynamic)
-  for (std::size_t i = 0; i < found.size(); ++i) {
+  for (std::size_t i = 0; i < passes.size(); ++i) {
     try {
-      read_and_register(passes[i].pass, speed_mm_s);
+      read_and_register(passes[i], speed_mm_s);
     } catch (...) {  // an exception must not leave a thread
-      passes[i].error = std::current_exception();
+      errors[i] = std::current_exception();
     }
   }
-  return passes;
+  return errors;
 }
 
 void align(std::vector<ImportedPass>& plate) {
@@ -143,7 +137,7 @@ void align(std::vector<ImportedPass>& plate) {
 
 void import_text_folder(const std::string& root, const FolderImport& settings,
                         const std::function<void(std::vector<ImportedPass>)>& take) {
-  const std::vector<ImportedPass> found = find_passes(root, settings);
+  std::vector<ImportedPass> found = find_passes(root, settings);
   const auto progress = [&](std::size_t done) {
     if (settings.progress) settings.progress(done, found.size());
   };
@@ -152,15 +146,17 @@ void import_text_folder(const std::string& root, const FolderImport& settings,
   std::vector<ImportedPass> plate;
   for (std::size_t i = 0; i < found.size();) {
     progress(i);
-    const std::string& name = found[i].recording.plate;
+    const std::string name = found[i].recording.plate;
     std::size_t end = i;
     while (end < found.size() && end < i + at_a_time && found[end].recording.plate == name) ++end;
-    for (ReadPass& read : read_and_register(std::span(found).subspan(i, end - i), settings.speed_mm_s))
+    const std::vector<std::exception_ptr> errors =
+        read_and_register(std::span(found).subspan(i, end - i), settings.speed_mm_s);
+    for (const std::exception_ptr& error : errors)
       take_or_leave(settings, [&] {
-        if (read.error) std::rethrow_exception(read.error);
-        plate.push_back(std::move(read.pass));
+        ImportedPass& pass = found[i++];
+        if (error) std::rethrow_exception(error);
+        plate.push_back(std::move(pass));
       });
-    i = end;
     const bool last = end == found.size() || found[end].recording.plate != name;
     if (!last || plate.empty()) continue;
     any = true;

@@ -121,9 +121,7 @@ nlohmann::ordered_json to_json(const Metrics& metrics) {
   return json;
 }
 
-ImageScorer::ImageScorer(const ImageGrid& grid) : grid_(grid), correlator_(grid.height, grid.width) {}
-
-ImageScores ImageScorer::operator()(std::span<const float> output, std::span<const float> truth) {
+ImageScores ZoneMetrics::scores_of(std::span<const float> output, std::span<const float> truth) {
   for (std::size_t i = 0; i < output.size(); ++i)
     if (!std::isfinite(output[i]))
       throw std::invalid_argument("metrics: output pixel " + std::to_string(i) + " is not finite");
@@ -226,10 +224,15 @@ Metrics MetricsAccumulator::result() const {
 }
 
 ZoneMetrics::ZoneMetrics(const ImageGrid& grid)
-    : scorer_(grid), all_(grid), contact_(grid), flat_(grid), air_(grid) {}
+    : grid_(grid),
+      correlator_(grid.height, grid.width),
+      all_(grid),
+      contact_(grid),
+      flat_(grid),
+      air_(grid) {}
 
 void ZoneMetrics::add(std::span<const float> output, std::span<const float> truth, Zone zone) {
-  const ImageScores scores = scorer_(output, truth);
+  const ImageScores scores = scores_of(output, truth);
   all_.add(output, truth, scores);
   if (zone == Zone::contact) contact_.add(output, truth, scores);
   if (zone == Zone::flat) flat_.add(output, truth, scores);

@@ -72,19 +72,6 @@ struct Metrics {
 /// Keys are the member names, in their order.
 nlohmann::ordered_json to_json(const Metrics& metrics);
 
-/// Scores image pairs of one size. One object serves one thread.
-class ImageScorer {
- public:
-  /// Throws std::invalid_argument when a side is odd or below 4.
-  explicit ImageScorer(const ImageGrid& grid);
-  /// Throws std::invalid_argument when a size is wrong or a value of the output is not finite.
-  ImageScores operator()(std::span<const float> output, std::span<const float> truth);
-
- private:
-  ImageGrid grid_;
-  PhaseCorrelator correlator_;
-};
-
 /// Takes images one by one and gives the Metrics of all of them. For the floor it keeps a random sample of
 /// kFloorPairs windows (reservoir sampling with its own fixed seed: same windows in the same order, same
 /// bits) and pairs each output with the truth of another window.
@@ -93,7 +80,6 @@ class MetricsAccumulator {
   static constexpr std::size_t kFloorPairs = 256;
 
   explicit MetricsAccumulator(const ImageGrid& grid) : grid_(grid) {}
-  /// `scores`: what an ImageScorer gave for this pair.
   void add(std::span<const float> output, std::span<const float> truth, const ImageScores& scores);
   Metrics result() const;
 
@@ -108,11 +94,13 @@ class MetricsAccumulator {
   std::vector<float> sampled_outputs_, sampled_truths_;  // up to kFloorPairs images each
 };
 
-/// All windows, and apart those of each zone: a flat truth is easy and would flatter the mean.
+/// All windows, and apart those of each zone: a flat truth is easy and would flatter the mean. One object
+/// serves one thread.
 class ZoneMetrics {
  public:
-  /// Throws as ImageScorer.
+  /// Throws std::invalid_argument when a side is odd or below 4.
   explicit ZoneMetrics(const ImageGrid& grid);
+  /// Throws std::invalid_argument when a size is wrong or a value of the output is not finite.
   void add(std::span<const float> output, std::span<const float> truth, Zone zone);
   Metrics all() const { return all_.result(); }
   Metrics contact() const { return contact_.result(); }
@@ -122,7 +110,10 @@ class ZoneMetrics {
   nlohmann::ordered_json to_json() const;
 
  private:
-  ImageScorer scorer_;
+  ImageScores scores_of(std::span<const float> output, std::span<const float> truth);
+
+  ImageGrid grid_;
+  PhaseCorrelator correlator_;
   MetricsAccumulator all_, contact_, flat_, air_;
 };
 

@@ -2,7 +2,6 @@
 // independent unit of every figure here is the pass (the cluster), never the frame.
 #pragma once
 
-#include <cstdint>
 #include <span>
 
 namespace supertac {

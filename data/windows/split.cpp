@@ -27,13 +27,15 @@ constexpr std::array<std::pair<const char*, SplitKind>, 6> kNames{{{"window", Sp
 
 enum class Side : std::uint8_t { neither, train, test };
 
-// Numbers of the passes that have windows, by plate in alphabetical order.
-std::map<std::string, std::vector<std::size_t>> passes_by_plate(const WindowSet& windows) {
-  std::map<std::string, std::vector<std::size_t>> plates;
-  for (std::size_t p = 0; p < windows.passes().size(); ++p)
-    if (windows.passes()[p].windows > 0 && !windows.passes()[p].use.training_only)
-      plates[windows.passes()[p].plate].push_back(p);
-  return plates;
+// Numbers of the passes that have windows to test, by plate or group in alphabetical order.
+std::map<std::string, std::vector<std::size_t>> passes_by(std::string WindowSet::Pass::*key,
+                                                          const WindowSet& windows) {
+  std::map<std::string, std::vector<std::size_t>> numbers;
+  for (std::size_t p = 0; p < windows.passes().size(); ++p) {
+    const WindowSet::Pass& pass = windows.passes()[p];
+    if (pass.windows > 0 && !pass.use.training_only) numbers[pass.*key].push_back(p);
+  }
+  return numbers;
 }
 
 std::size_t test_count(std::size_t count) {
@@ -44,7 +46,7 @@ std::size_t test_count(std::size_t count) {
 std::vector<Side> split_passes(const WindowSet& windows, std::uint64_t seed) {
   std::vector<Side> sides(windows.passes().size(), Side::train);
   std::uint64_t stream = kPassStream;
-  for (const auto& [plate, passes] : passes_by_plate(windows)) {
+  for (const auto& [plate, passes] : passes_by(&WindowSet::Pass::plate, windows)) {
     if (passes.size() < 2)
       throw std::invalid_argument("split pass: plate '" + plate +
                                   "' has one pass with windows, needs two: one to train on, one to test on");
@@ -66,11 +68,7 @@ std::vector<Side> split_trials(const WindowSet& windows) {
 }
 
 std::vector<Side> split_groups(const WindowSet& windows, std::uint64_t seed) {
-  std::map<std::string, std::vector<std::size_t>> groups;
-  for (std::size_t p = 0; p < windows.passes().size(); ++p) {
-    const WindowSet::Pass& pass = windows.passes()[p];
-    if (pass.windows > 0 && !pass.use.training_only) groups[pass.group].push_back(p);
-  }
+  const auto groups = passes_by(&WindowSet::Pass::group, windows);
   if (groups.size() < 2 || groups.contains(""))
     throw std::invalid_argument(
         "split group: every recording needs metadata 'group' and there must be two groups, one to train on, "
@@ -88,7 +86,7 @@ std::vector<Side> split_groups(const WindowSet& windows, std::uint64_t seed) {
 std::vector<Side> split_plates(const WindowSet& windows, std::uint64_t seed,
                                std::vector<std::string> leave_out) {
   std::vector<Side> sides(windows.passes().size(), Side::train);
-  const auto plates = passes_by_plate(windows);
+  const auto plates = passes_by(&WindowSet::Pass::plate, windows);
   if (plates.size() < 2 && leave_out.empty())
     throw std::invalid_argument("split texture: the data has " + std::to_string(plates.size()) +
                                 " plate, needs two: one to train on, one to test on");

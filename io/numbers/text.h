@@ -17,6 +17,9 @@ std::string printable(std::string_view text, std::size_t longest = 60);
 /// printable() in single quotes.
 std::string in_quotes(std::string_view text);
 
+/// Of ASCII; what is no capital letter stays.
+constexpr char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
 /// With blanks behind the text, one at least, or before it, up to a width.
 std::string left_aligned(std::string_view text, std::size_t width);
 std::string right_aligned(std::string_view text, std::size_t width);

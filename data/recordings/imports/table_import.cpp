@@ -8,7 +8,6 @@
 
 #include "data/sensors/rest_tracker.h"
 #include "io/files/file.h"
-#include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
@@ -144,12 +143,10 @@ std::vector<double> times_of(const std::string& path, const Table& table, std::s
   return time_s;
 }
 
-void check_rate(const std::string& path, const Table& table, std::size_t column,
-                const std::vector<double>& time_s, double rate_hz) {
-  if (column == Columns::kNone || time_s.size() < 2) return;
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < time_s.size(); ++i) steps.push_back(time_s[i] - time_s[i - 1]);
-  const double found = 1 / median(steps);
+void check_rate(const std::string& path, const Table& table, std::size_t column, const Recording& recording,
+                double rate_hz) {
+  if (column == Columns::kNone || recording.frames() < 2) return;
+  const double found = 1 / recording.period_s();
   if (!(found > 0.5 * rate_hz && found < 2 * rate_hz))
     throw FileError(path, name_of(table, column) + " as time has " + format(found, 1) +
                               " frames/s, the sensor is said to send " + format(rate_hz, 1) +
@@ -233,7 +230,7 @@ Recording recording_of_table(const std::string& path, const Table& table, const 
   Recording recording;
   recording.array = sensor.array, recording.signal_scale = sensor.scale, recording.source = "imported";
   recording.time_s = times_of(path, table, columns.time, map.time_unit_s, sensor.rate_hz);
-  check_rate(path, table, columns.time, recording.time_s, sensor.rate_hz);
+  check_rate(path, table, columns.time, recording, sensor.rate_hz);
   for (std::size_t k = 0; k < columns.values.size(); ++k)
     check_taxel(path, table, columns.values[k], k, sensor.scale);
   const std::size_t signals = sensor.array.signals();
