@@ -1,8 +1,6 @@
 #pragma once
 
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "data/recordings/recording.h"
 #include "data/windows/windows.h"

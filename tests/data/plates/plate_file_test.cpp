@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "data/plates/plate_mesh.h"
-#include "data/plates/truth.h"
 #include "data/windows/windows.h"
 #include "io/files/file.h"
 #include "tests/data/test_recordings.h"

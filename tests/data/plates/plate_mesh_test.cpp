@@ -22,6 +22,10 @@ const std::vector<std::string>& plates() {
   return kNames;
 }
 
+Plate read(const std::vector<Triangle>& solid, const std::string& name) {
+  return {name, std::make_shared<const HeightMap>(solid, Plate::kWidthMm, Plate::kLengthMm, name)};
+}
+
 // Every directed edge once, and its opposite once: closed, manifold, facing one way.
 TEST(PlateMesh, EveryEdgeBelongsToTwoTriangles) {
   for (const std::string& name : plates()) {
@@ -64,8 +68,7 @@ TEST(PlateMesh, WrittenAndReadHeightsAgree) {
   const RandomStream random(11, 0);
   for (const std::string& name : plates()) {
     const Plate plate = Plate::named(name);
-    const auto read = parse_stl(stl_bytes(mesh_of(plate), name), name);
-    const Plate again(name, std::make_shared<const HeightMap>(read, Plate::kWidthMm, Plate::kLengthMm, name));
+    const Plate again = read(parse_stl(stl_bytes(mesh_of(plate), name), name), name);
     EXPECT_NEAR(again.max_height(), plate.max_height(), 0.13) << name;  // a ridge's peak between two nodes
     double squares = 0;
     const int points = 20'000;
@@ -83,8 +86,7 @@ TEST(PlateMesh, WrittenAndReadHeightsAgree) {
 TEST(PlateMesh, RigPlatesComeBackExactlyAtTheNodes) {
   for (const std::string& name : rig_plates()) {
     const Plate plate = Plate::named(name);
-    const Plate again(
-        name, std::make_shared<const HeightMap>(mesh_of(plate), Plate::kWidthMm, Plate::kLengthMm, name));
+    const Plate again = read(mesh_of(plate), name);
     EXPECT_NEAR(again.texture_begin(), plate.texture_begin(), 0.126) << name;
     EXPECT_NEAR(again.texture_end(), plate.texture_end(), 0.126) << name;
     EXPECT_EQ(again.uniform_in_x(), plate.uniform_in_x()) << name;
@@ -108,10 +110,7 @@ TEST(PlateMesh, APlateThatWasReadIsWrittenAsItIs) {
   for (const auto& top : {box(40, 50, 2, 2), box(40.05F, 50, 2, 2.04F), box(60, 108, 1, 1)}) {
     std::vector<Triangle> triangles = ground;
     triangles.insert(triangles.end(), top.begin(), top.end());
-    const auto read = [](const std::vector<Triangle>& solid) {
-      return Plate("p", std::make_shared<const HeightMap>(solid, Plate::kWidthMm, Plate::kLengthMm, "p"));
-    };
-    const Plate first = read(triangles), second = read(mesh_of(first));
+    const Plate first = read(triangles, "p"), second = read(mesh_of(first), "p");
     for (double y = 0; y <= 108; y += 0.11)
       for (double x = 0; x <= 36; x += 0.6)
         ASSERT_NEAR(second.height(x, y), first.height(x, y), 0.01) << x << " " << y;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <string>
 
 #include "tests/data/test_recordings.h"
 #include "tests/expect_error.h"

@@ -8,6 +8,7 @@
 #include "data/windows/random_passes.h"
 #include "data/windows/windows.h"
 #include "io/files/file.h"
+#include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"
 
 namespace supertac {
@@ -70,15 +71,11 @@ TEST(Units, AFolderOfTwoIsRefusedByName) {
   const TemporaryFolder folder;
   write_recording(folder / "a.safetensors", volts());
   write_recording(folder / "b.safetensors", counts());
-  try {
-    WindowSet::load(folder.path(), {}, {.timesteps = 32});
-    ADD_FAILURE() << "taken";
-  } catch (const std::runtime_error& error) {
-    EXPECT_EQ(std::string(error.what()), folder / "b.safetensors" +
-                                             ": has signals in 'counts' that rise under pressure, expected "
-                                             "'V' that fall under pressure, as in "
-                                             "the others; give recordings of one sensor");
-  }
+  EXPECT_EQ(
+      what_of<std::runtime_error>([&] { WindowSet::load(folder.path(), {}, {.timesteps = 32}); }),
+      folder / "b.safetensors" +
+          ": has signals in 'counts' that rise under pressure, expected 'V' that fall under pressure, as "
+          "in the others; give recordings of one sensor");
 }
 
 TEST(Units, RandomPassesSpeakTheSensorsLanguage) {

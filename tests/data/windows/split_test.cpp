@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -41,6 +42,12 @@ std::set<std::size_t> passes_of(const WindowSet& set, const std::vector<std::uin
   return passes;
 }
 
+std::set<std::string> plates_of(const WindowSet& set, const std::vector<std::uint32_t>& side) {
+  std::set<std::string> plates;
+  for (const std::size_t p : passes_of(set, side)) plates.insert(set.passes()[p].plate);
+  return plates;
+}
+
 bool disjoint(const Split& split) {
   std::vector<std::uint32_t> both;
   std::set_intersection(split.train.begin(), split.train.end(), split.test.begin(), split.test.end(),
@@ -70,12 +77,8 @@ TEST(Split, PassTestsUnseenPassesOfEveryPlate) {
   const auto train = passes_of(set, split.train), test = passes_of(set, split.test);
   EXPECT_EQ(test.size(), 4U);  // a fifth of 8, rounded, of each plate
   EXPECT_EQ(train.size(), 12U);
-  std::set<std::string> plates;
-  for (const std::size_t p : test) {
-    EXPECT_FALSE(train.contains(p));
-    plates.insert(set.passes()[p].plate);
-  }
-  EXPECT_EQ(plates.size(), 2U);
+  for (const std::size_t p : test) EXPECT_FALSE(train.contains(p));
+  EXPECT_EQ(plates_of(set, split.test).size(), 2U);
   EXPECT_TRUE(find_leakage(set, split).none());
 }
 
@@ -84,9 +87,7 @@ TEST(Split, TextureTestsAnUnseenPlate) {
   std::set<std::string> held_out;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const Split split = make_split(set, SplitKind::texture, seed);
-    std::set<std::string> train, test;
-    for (const std::size_t p : passes_of(set, split.train)) train.insert(set.passes()[p].plate);
-    for (const std::size_t p : passes_of(set, split.test)) test.insert(set.passes()[p].plate);
+    const auto train = plates_of(set, split.train), test = plates_of(set, split.test);
     ASSERT_EQ(test.size(), 1U);
     ASSERT_FALSE(train.contains(*test.begin()));
     held_out.insert(*test.begin());
@@ -102,11 +103,8 @@ TEST(Split, TextureLeavesOutTheNamedPlateAndItsLikes) {
         make_recording({.plate = plate, .frames = 40, .level = 1.0F + static_cast<float>(set.size()) / 100}));
   set.add(make_recording({.plate = "bumps12", .frames = 40, .level = 2.5F}), ".", kTrainingOnly);
   const Split split = make_split(set, SplitKind::texture, 7, {"3_Bumps"});
-  std::set<std::string> train, test;
-  for (const std::size_t p : passes_of(set, split.train)) train.insert(set.passes()[p].plate);
-  for (const std::size_t p : passes_of(set, split.test)) test.insert(set.passes()[p].plate);
-  EXPECT_EQ(test, std::set<std::string>{"3_Bumps"});
-  EXPECT_EQ(train, (std::set<std::string>{"bumps6", "4_Ridges"}));
+  EXPECT_EQ(plates_of(set, split.test), std::set<std::string>{"3_Bumps"});
+  EXPECT_EQ(plates_of(set, split.train), (std::set<std::string>{"bumps6", "4_Ridges"}));
   EXPECT_EQ(what_of<std::invalid_argument>([&] { make_split(set, SplitKind::texture, 7, {"6_Blob"}); }),
             "split texture: the data has no windows of plate '6_Blob' to leave out");
 }
@@ -123,11 +121,8 @@ TEST(Split, TextureLeavesOutAllPlatesThatAreNamed) {
         make_recording({.plate = plate, .frames = 40, .level = 2.0F + static_cast<float>(set.size()) / 100}),
         ".", kTrainingOnly);
   const Split split = make_split(set, SplitKind::texture, 7, {"3_Bumps", "4_Ridges", "bumps6"});
-  std::set<std::string> train, test;
-  for (const std::size_t p : passes_of(set, split.train)) train.insert(set.passes()[p].plate);
-  for (const std::size_t p : passes_of(set, split.test)) test.insert(set.passes()[p].plate);
-  EXPECT_EQ(test, (std::set<std::string>{"3_Bumps", "4_Ridges", "bumps6"}));
-  EXPECT_EQ(train, std::set<std::string>{"bumps8"});
+  EXPECT_EQ(plates_of(set, split.test), (std::set<std::string>{"3_Bumps", "4_Ridges", "bumps6"}));
+  EXPECT_EQ(plates_of(set, split.train), std::set<std::string>{"bumps8"});
 }
 
 TEST(Split, NoneTrainsAndTestsOnAll) {
@@ -155,7 +150,7 @@ TEST(Split, IsAFunctionOfTheSeed) {
 TEST(Split, SaysWhatTheDataLacks) {
   WindowSet set(wide_settings(16));
   set.add(make_recording({.frames = 40}));
-  const auto message = [&](SplitKind kind, const std::vector<std::string>& leave_out = {}) -> std::string {
+  const auto message = [&](SplitKind kind, const std::vector<std::string>& leave_out = {}) {
     return what_of<std::invalid_argument>([&] { make_split(set, kind, 1, leave_out); });
   };
   EXPECT_EQ(
@@ -174,10 +169,7 @@ TEST(Split, SaysWhatTheDataLacks) {
 
 TEST(Leakage, FindsAPassThatIsFiledTwice) {
   WindowSet set = make_set();
-  Recording copy = make_recording({.plate = "ridges6", .trial = 1, .pass = 1, .frames = 40, .level = 1.2F});
-  copy.trial = 2;
-  copy.pass = 9;
-  set.add(copy);
+  set.add(make_recording({.plate = "ridges6", .trial = 2, .pass = 9, .frames = 40, .level = 1.2F}));
   const Leakage leakage = find_leakage(set, make_split(set, SplitKind::trial, 1));
   EXPECT_EQ(leakage.overlapping, 0U);
   EXPECT_EQ(leakage.duplicated, 25U);
@@ -238,10 +230,9 @@ TEST(Split, OfSimulatedPassesAFourthOfTheWindowsWithoutContactIsKept) {
   windows.add(simulate_pass(Plate::named("plain"), {}), ".", kOneOfMany);
   windows.add(simulate_pass(Plate::named("6_Bumps"), {}));
   std::vector<std::uint32_t> all(windows.size());
-  for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-  std::size_t contact = 0, silent = 0, kept_silent = 0, kept_whole = 0;
+  std::iota(all.begin(), all.end(), 0U);
+  std::size_t contact = 0, silent = 0, kept_contact = 0, kept_silent = 0, kept_whole = 0;
   for (std::uint32_t i = 0; i < textured; ++i) ++(windows.contact(i) ? contact : silent);
-  std::size_t kept_contact = 0;
   for (const std::uint32_t i : subsample_no_contact(windows, all)) {
     if (i >= textured)
       ++kept_whole;

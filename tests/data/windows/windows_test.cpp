@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -14,14 +13,10 @@
 #include "data/scores/baselines.h"
 #include "tests/data/test_recordings.h"
 #include "tests/expect_error.h"
+#include "tests/io/temporary_folder.h"
 
 namespace supertac {
 namespace {
-
-template <class Exception = std::invalid_argument, class Call>
-std::string message_of(Call call) {
-  return what_of<Exception>(call);
-}
 
 std::size_t sum_of_reasons(const WindowCounts& c) {
   return c.unreliable + c.no_position + c.lifting + c.too_early + c.off_stride + c.windows;
@@ -167,21 +162,18 @@ TEST(Windows, OfAnyArray) {
 }
 
 TEST(Windows, RefuseRecordingsOfAnotherArray) {
-  const auto message = [](WindowSet& set) -> std::string {
-    return what_of<std::runtime_error>([&] { set.add(make_recording({})); });
-  };
   WindowSettings settings = wide_settings(16);
   settings.array = TaxelArray{.rows = 6, .columns = 6, .pitch_mm = 2};
   WindowSet for_model(settings);
   EXPECT_EQ(
-      message(for_model),
+      what_of<std::runtime_error>([&] { for_model.add(make_recording({})); }),
       "was recorded with 4x4 taxels at 3 mm, expected 6x6 taxels at 2 mm; give recordings of the array the "
       "model is for, and no others");
   WindowSet mixed(wide_settings(16));
   Recording other = make_recording({});
   other.array.pitch_mm = 2.5;
   mixed.add(other);
-  EXPECT_NE(message(mixed).find("expected 4x4 taxels at 2.5 mm"), std::string::npos);
+  EXPECT_ERROR(mixed.add(make_recording({})), std::runtime_error, "expected 4x4 taxels at 2.5 mm");
 }
 
 TEST(Windows, TruthIsTheTruthImageOfTheLastFrame) {
@@ -214,21 +206,22 @@ TEST(Windows, APassShorterThanTheWindowGivesNone) {
 }
 
 TEST(Windows, RefuseSettingsOutOfRange) {
-  EXPECT_EQ(message_of([] { WindowSet({.scale = 3}); }), "windows: scale must be 2, 4, 8 or 16, got 3");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { WindowSet({.timesteps = 0}); }),
-            "windows: timesteps must be at least 1, got 0");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { WindowSet({.stride = 0}); }),
-            "windows: stride must be at least 1, got 0");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { WindowSet({.rate_hz = 0}); }),
-            "windows: rate_hz and max_gap_s must be positive, span_volts not 0, got 0.000000, 0.050000 and "
-            "0.360000");
+  const std::pair<WindowSettings, const char*> cases[] = {
+      {{.scale = 3}, "scale must be 2, 4, 8 or 16, got 3"},
+      {{.timesteps = 0}, "timesteps must be at least 1, got 0"},
+      {{.stride = 0}, "stride must be at least 1, got 0"},
+      {{.rate_hz = 0},
+       "rate_hz and max_gap_s must be positive, span_volts not 0, got 0.000000, 0.050000 and 0.360000"}};
+  for (const auto& [settings, refusal] : cases)
+    EXPECT_EQ(what_of<std::invalid_argument>([&] { WindowSet{settings}; }),
+              std::string("windows: ") + refusal);
 }
 
 TEST(Windows, RefuseOutputsOfAnotherSizeAndUnknownPlates) {
   WindowSet set(wide_settings(16));
   set.add(make_recording({}));
   std::vector<float> small(255);
-  EXPECT_EQ(message_of([&] { set.window(0, small); }),
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { set.window(0, small); }),
             "windows: a window needs room for 256 values, got 255");
   EXPECT_EQ(what_of<std::invalid_argument>([&] { set.truth(0, small); }),
             "windows: a truth image needs room for 256 values, got 255");
@@ -294,7 +287,7 @@ TEST(Windows, HaveTheTruthThatWasMeasured) {
   EXPECT_NE(set.fingerprint(), other.fingerprint());
   Recording coarse = with_truth(100, array);
   coarse.truth_height = 4, coarse.truth_width = 6, coarse.truth.resize(100 * 24UL);
-  EXPECT_EQ(message_of<std::runtime_error>([&] { set.add(coarse); }),
+  EXPECT_EQ(what_of<std::runtime_error>([&] { set.add(coarse); }),
             "has a truth of 4x6 pixels, expected 8x12 for 2x3 taxels at 3 mm at scale 4");
 }
 
@@ -313,35 +306,26 @@ TEST(Windows, OfOneFrameAreTheRecordedFrames) {
 }
 
 TEST(Windows, SayWhatHelpsWhenThereIsNone) {
-  const auto message = [](const auto& change) {
+  const std::pair<void (*)(Recording&), const char*> cases[] = {
+      {[](Recording&) {}, "try fewer timesteps"},
+      {[](Recording& r) { r.position_mm.clear(); }, "truth needs positions"},
+      {[](Recording& r) { r.metadata["registration_reliable"] = "no"; }, "import the passes again"}};
+  for (const auto& [change, advice] : cases) {
     Recording recording = make_recording({});
     change(recording);
     WindowSet set(wide_settings(128));
     set.add(recording);
-    return what_of<std::runtime_error>([&] { set.check_any("here"); });
-  };
-  EXPECT_NE(message([](Recording&) {}).find("try fewer timesteps"), std::string::npos);
-  EXPECT_NE(message([](Recording& r) { r.position_mm.clear(); }).find("truth needs positions"),
-            std::string::npos);
-  EXPECT_NE(message([](Recording& r) {
-              r.metadata["registration_reliable"] = "no";
-            }).find("import the passes again"),
-            std::string::npos);
+    EXPECT_ERROR(set.check_any("here"), std::runtime_error, advice);
+  }
 }
 
 class WindowFiles : public ::testing::Test {
  protected:
-  void SetUp() override {
-    dir_ = ::testing::TempDir() + "supertac_windows_" +
-           ::testing::UnitTest::GetInstance()->current_test_info()->name();
-    std::filesystem::remove_all(dir_);
-    std::filesystem::create_directories(dir_);
+  void write(const PassPlan& plan, const std::string& name) const {
+    write_recording(folder_ / (name + ".safetensors"), make_recording(plan));
   }
-  void TearDown() override { std::filesystem::remove_all(dir_); }
-  void write(const PassPlan& plan, const std::string& name) {
-    write_recording(dir_ + "/" + name + ".safetensors", make_recording(plan));
-  }
-  std::string dir_;
+  TemporaryFolder folder_;
+  const std::string& dir_ = folder_.path();
 };
 
 TEST_F(WindowFiles, LoadInTheOrderOfNames) {
@@ -362,14 +346,10 @@ TEST_F(WindowFiles, SayWhatIsMissing) {
       what_of<std::runtime_error>([&] { WindowSet::load(dir_, {}, wide_settings(16)); }),
       dir_ + ": has no recordings (*.safetensors); make some with supertac-simulate or supertac-import");
   write({}, "bumps12_t1_p1_v10");
-  EXPECT_NE(message_of([&] {
-              WindowSet::load(dir_, {"ridges6"}, wide_settings(16));
-            }).find("plate 'ridges6' has no recording in " + dir_ + "; it has those of bumps12"),
-            std::string::npos);
-  EXPECT_NE(message_of<std::runtime_error>([&] {
-              WindowSet::load(dir_, {}, wide_settings(256));
-            }).find("100 too close to the start"),
-            std::string::npos);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { WindowSet::load(dir_, {"ridges6"}, wide_settings(16)); }),
+            "windows: plate 'ridges6' has no recording in " + dir_ + "; it has those of bumps12");
+  EXPECT_ERROR(WindowSet::load(dir_, {}, wide_settings(256)), std::runtime_error,
+               "100 too close to the start");
 }
 
 }  // namespace

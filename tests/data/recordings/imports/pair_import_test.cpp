@@ -85,37 +85,35 @@ TEST(PairImport, ASensorSaysWhatTheNumbersMean) {
 }
 
 TEST(PairImport, RefusesWhatDoesNotFitTogether) {
-  const auto expect_refused = [](const PairFile& file, const std::string& expected) {
-    const TemporaryFolder folder;
-    EXPECT_ERROR(import_pairs(SafetensorsFile::read(file.write(folder))), FileError, expected);
-  };
-  PairFile file;
-  file.target_shape = {10, 1, 20, 12};
-  expect_refused(file, "input [10,2,3,5], target [10,1,20,12]: expected target's height and width to be 2");
-  file = {};
-  file.target_shape = {5, 2, 12, 20};
-  expect_refused(file, "as many targets as inputs");
-  file = {};
-  file.input_shape = {10, 30, 1};
-  expect_refused(file, "tensor 'input' is F32 [10,30,1], expected F32 [N,C,H,W]");
-  file = {};
-  file.dtype = "I32";
-  expect_refused(file, "tensor 'input' is I32");
-  file = {};
-  file.input[65] = std::nanf("");
-  expect_refused(file, "input of pair 2 holds nan, expected finite values");
-  file = {};
-  file.target[0] = 1.5F;
-  expect_refused(file, "target of pair 0 holds 1.5, expected 0 to 1");
-  file = {};
-  file.input_shape = {10, 10, 3, 1};
-  expect_refused(file, "expected 1 to 8 channels");
-  file = {};
-  file.group.resize(3);
-  expect_refused(file, "tensor 'group' is I64 [3], expected I64 [10]");
+  const std::pair<void (*)(PairFile&), const char*> cases[] = {
+      {[](PairFile& f) {
+         f.target_shape = {10, 1, 20, 12};
+       },
+       "input [10,2,3,5], target [10,1,20,12]: expected target's height and width to be 2"},
+      {[](PairFile& f) {
+         f.target_shape = {5, 2, 12, 20};
+       },
+       "as many targets as inputs"},
+      {[](PairFile& f) {
+         f.input_shape = {10, 30, 1};
+       },
+       "tensor 'input' is F32 [10,30,1], expected F32 [N,C,H,W]"},
+      {[](PairFile& f) { f.dtype = "I32"; }, "tensor 'input' is I32"},
+      {[](PairFile& f) { f.input[65] = std::nanf(""); }, "input of pair 2 holds nan, expected finite values"},
+      {[](PairFile& f) { f.target[0] = 1.5F; }, "target of pair 0 holds 1.5, expected 0 to 1"},
+      {[](PairFile& f) {
+         f.input_shape = {10, 10, 3, 1};
+       },
+       "expected 1 to 8 channels"},
+      {[](PairFile& f) { f.group.resize(3); }, "tensor 'group' is I64 [3], expected I64 [10]"}};
   const TemporaryFolder folder;
-  write_safetensors(folder / "a", {},
-                    {{"input", "F32", {10, 2, 3, 5}, std::as_bytes(std::span(file.input))}});
+  for (const auto& [spoil, expected] : cases) {
+    PairFile file;
+    spoil(file);
+    EXPECT_ERROR(import_pairs(SafetensorsFile::read(file.write(folder))), FileError, expected);
+  }
+  const std::vector<float> input(10 * 2 * 3 * 5);
+  write_safetensors(folder / "a", {}, {{"input", "F32", {10, 2, 3, 5}, std::as_bytes(std::span(input))}});
   EXPECT_EQ(
       what_of<FileError>([&] { (void)import_pairs(SafetensorsFile::read(folder / "a")); }),
       folder / "a" + ": has no tensor 'target'; expected input F32 [N,C,H,W] and target F32 [N,1,sH,sW]");

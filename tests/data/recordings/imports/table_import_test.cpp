@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
 
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"

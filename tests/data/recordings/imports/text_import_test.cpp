@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <iostream>
+#include <utility>
 
 #include "io/files/file.h"
 #include "io/numbers/random.h"
@@ -70,13 +70,10 @@ TEST(TextImport, DropsAndCountsEveryKindOfBadLineAndLeavesAGap) {
   const std::string good = line_of(2.0);
   const std::string cut = good.substr(0, 30) + "\n";
   const std::string glued = good.substr(0, good.size() - 1) + good;
-  const std::string run_together = "2.12.2 " + good.substr(good.find(' ') + 1);
-  const std::string word = "x " + good.substr(good.find(' ') + 1);
-  const std::string nan = "nan " + good.substr(good.find(' ') + 1);
-  const std::string far = "24.4 " + good.substr(good.find(' ') + 1);
-  const std::string below = "-0.1 " + good.substr(good.find(' ') + 1);
-  const Result result = import_text(good_lines(50) + cut + glued + run_together + word + nan + far + below +
-                                    "\n" + good_lines(50));
+  std::string text = good_lines(50) + cut + glued;
+  for (const char* first : {"2.12.2", "x", "nan", "24.4", "-0.1"})
+    text += first + good.substr(good.find(' '));
+  const Result result = import_text(text + "\n" + good_lines(50));
   EXPECT_EQ(result.error, "");
   const ImportReport& report = result.report;
   EXPECT_EQ(report.lines, 108u);
@@ -94,12 +91,14 @@ TEST(TextImport, DropsAndCountsEveryKindOfBadLineAndLeavesAGap) {
 }
 
 TEST(TextImport, RefusesWhatIsNoRecording) {
-  EXPECT_NE(import_text("").error.find("is empty"), std::string::npos);
-  EXPECT_NE(import_text("\n \n\n").error.find("is empty"), std::string::npos);
-  EXPECT_NE(import_text("Some text\nof another kind\n").error.find("2 of 2 lines are not 16 voltages"),
-            std::string::npos);
-  EXPECT_NE(import_text(std::string(5000, '\0')).error.find("is it a recording?"), std::string::npos);
-  EXPECT_NE(import_text(good_lines(8) + "1 2 3\n").error.find("1 of 9 lines"), std::string::npos);
+  const std::pair<std::string, std::string> cases[] = {
+      {"", "is empty"},
+      {"\n \n\n", "is empty"},
+      {"Some text\nof another kind\n", "2 of 2 lines are not 16 voltages"},
+      {std::string(5000, '\0'), "is it a recording?"},
+      {good_lines(8) + "1 2 3\n", "1 of 9 lines"}};
+  for (const auto& [text, refusal] : cases)
+    EXPECT_NE(import_text(text).error.find(refusal), std::string::npos) << import_text(text).error;
   EXPECT_EQ(import_text(good_lines(9) + "1 2 3\n").error, "");
   ImportReport report;
   EXPECT_EQ(what_of<FileError>([&] { import_text_pass("/nowhere/1.txt", report); }),
@@ -134,10 +133,7 @@ TEST(TextImport, EveryPrefixAndRandomDamageEndInARecordingOrAnError) {
 
 TEST(TextImport, RealRecording) {
   const char* folder = std::getenv("SUPERTAC_RECORDINGS");
-  if (folder == nullptr) {
-    std::cout << "SUPERTAC_RECORDINGS is not set: no real recording checked\n";
-    return;
-  }
+  if (folder == nullptr) GTEST_SKIP() << "SUPERTAC_RECORDINGS is not set: no real recording checked";
   ImportReport report;
   const Recording recording = import_text_pass(std::string(folder) + "/3_Bumps/1/1.txt", report);
   EXPECT_EQ(report.lines, 9694u);

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "tests/expect_error.h"
@@ -39,11 +38,8 @@ TEST(NormaliseWindow, TakesHalfTheRestAndDividesByWhatIsLeft) {
 
 // 100 frames, each of its own bin: six samples lie at or below the rest, three at or above the top.
 TEST(NormaliseWindow, RestAndTopAreTheStatedPercentiles) {
-  std::vector<float> x;
-  for (std::size_t t = 0; t < kTimes; ++t) {
-    x.push_back(static_cast<float>(2 * t) * kStep);
-    x.push_back(0);
-  }
+  std::vector<float> x(kTimes * kChannels);
+  for (std::size_t t = 0; t < kTimes; ++t) x[t * kChannels] = static_cast<float>(2 * t) * kStep;
   normalise_window(x, kChannels);
   const float rest = 10 * kStep, top = 194 * kStep;
   for (const std::size_t t : {10U, 40U, 90U})
@@ -102,17 +98,13 @@ TEST(NormaliseWindow, NanStaysWhereItIs) {
 }
 
 TEST(NormaliseWindow, RefusesWhatIsNoWindow) {
-  std::vector<float> x(7);
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { normalise_window(x, 2); }),
-            "normalise_window: a window is [T][2], T up to 60000, got 7 values");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { normalise_window(x, 0); }),
-            "normalise_window: a window is [T][0], T up to 60000, got 7 values");
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { normalise_window({}, 2); }),
-            "normalise_window: a window is [T][2], T up to 60000, got 0 values");
-  std::vector<float> too_long(60'001);
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { normalise_window(too_long, 1); }),
-            "normalise_window: a window is [T][1], T up to 60000, got 60001 values")
-      << "its counts would not fit";
+  for (const auto& [values, taxels] :
+       {std::pair(7, 2), {7, 0}, {0, 2}, {60'001, 1}}) {  // counts would not fit
+    std::vector<float> x(static_cast<std::size_t>(values));
+    EXPECT_EQ(what_of<std::invalid_argument>([&] { normalise_window(x, static_cast<std::size_t>(taxels)); }),
+              "normalise_window: a window is [T][" + std::to_string(taxels) + "], T up to 60000, got " +
+                  std::to_string(values) + " values");
+  }
 }
 
 }  // namespace
