@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""Writes parity.safetensors and ops.safetensors: what PyTorch computes, in float64, for the preset `paper`.
+"""Writes parity.safetensors and ops.safetensors: what PyTorch computes, in float64, for single ops and for networks of
+preset `paper`: outputs at its own sizes; gradients and ten steps of Adam, clipped, at T 32 and LD 3.
 
     /usr/bin/python3 tests/parity/make_parity.py tests/parity      (Debian: python3-torch, python3-numpy)
 
@@ -23,7 +24,7 @@ from supertac.torch_model import SuperTac, kl_divergence, loss_terms, ssim  # no
 
 MASK = (1 << 64) - 1
 SAMPLE_ABOVE, SAMPLE_STRIDE = 1024, 13
-A, BETA, LAMBDA, RATE, STEPS = 0.5, 1e-3, 0.1, 1e-3, 10
+A, BETA, LAMBDA, RATE, CLIP, STEPS = 0.5, 1e-3, 0.1, 1e-3, 0.55, 10
 
 
 def counter_numbers(name, count, bound=1.0):
@@ -80,7 +81,7 @@ def small_case():
     truth = (0.5 + 0.4 * torch.sin(0.7 * y + phase) * torch.cos(0.3 * x - phase)).double().float().double()
     stored = {"small.windows": windows.numpy(), "small.eps": eps.numpy(), "small.truth": truth.numpy()}
     adam = torch.optim.Adam(net.parameters(), lr=RATE)
-    losses = []
+    losses, norms = [], []
     for step in range(STEPS):
         out = net.training_outputs(windows, eps[step])
         terms = loss_terms(out, truth, A, BETA, LAMBDA)
@@ -93,8 +94,12 @@ def small_case():
                 kept, projection = sampled(name, value.grad)
                 stored["small.grad." + name], stored[f"small.grad.{name}.projection"] = kept, projection
         losses.append(terms["total"].item())
+        norm = math.sqrt(sum(float((p.grad**2).sum()) for p in net.parameters()))
+        norms.append(norm)
+        for parameter in net.parameters():  # clip_grad_norm_ adds 1e-6 to the norm
+            parameter.grad *= min(1, CLIP / norm)
         adam.step()
-    stored["small.adam.losses"] = np.array(losses)
+    stored["small.adam.losses"], stored["small.adam.norms"] = np.array(losses), np.array(norms)
     for name, value in net.named_parameters():
         kept, projection = sampled(name, value - initial[name])
         stored["small.change." + name], stored[f"small.change.{name}.projection"] = kept, projection
@@ -126,7 +131,9 @@ def op_cases():
     case("conv2d", lambda x, w, b: F.conv2d(x, w, b, stride=2, padding=1), x=(2, 3, 5, 7), w=(17, 3, 3, 3), b=(17,))
     case("conv_transpose1d", lambda x, w, b: F.conv_transpose1d(x, w, b, stride=2, padding=1), x=(2, 3, 5), w=(3, 5, 4), b=(5,))
     case("conv_transpose2d", lambda x, w, b: F.conv_transpose2d(x, w, b, stride=2, padding=1), x=(2, 3, 4, 3), w=(3, 5, 4, 4), b=(5,))
+    case("conv2d_leaky", lambda x, w, b: F.leaky_relu(F.conv2d(x, w, b, padding=1)), x=(2, 3, 5, 7), w=(17, 3, 3, 3), b=(17,))
     case("linear", lambda x, w, b: F.linear(x, w, b), x=(3, 33), w=(17, 33), b=(17,))
+    case("linear_relu", lambda x, w, b: F.relu(F.linear(x, w, b)), x=(3, 33), w=(17, 33), b=(17,))
     case("l2_loss", lambda x, target: F.mse_loss(x, target), x=(2, 5, 3), target=(2, 5, 3))
     case("kl_divergence", kl_divergence, mean=(3, 4), log_var=(3, 4))
     case("ssim", lambda x: ssim(x, tensor("ssim.target", (2, 16, 13)).abs()), x=(2, 16, 13))
@@ -136,7 +143,18 @@ def op_cases():
     case("max_pool2d", lambda x: F.max_pool2d(x, 2), x=(2, 3, 5, 4))
     case("gated_sum", lambda a, x, s: a + x * s[:, :, None, None], a=(2, 3, 4, 5), x=(2, 3, 4, 5), s=(2, 3))
     case("global_mean", lambda x: x.mean((2, 3)), x=(2, 3, 4, 5))
-    case("sigmoid", torch.sigmoid, input=(3, 33))
+    case("sigmoid", lambda x: torch.sigmoid(x), x=(3, 33))
+    case("relu", lambda x: F.relu(x), x=(3, 33))
+    case("leaky_relu", lambda x: F.leaky_relu(x), x=(3, 33))
+    case("clamp", lambda x: x.clamp(-0.5, 0.25), x=(3, 33))
+    case("add", lambda a, b: a + b, a=(3, 33), b=(3, 33))
+    case("multiply", lambda a, b: a * b, a=(3, 33), b=(3, 33))
+    case("scale", lambda x: -3 * x, x=(3, 33))
+    case("subtract", lambda a, b: 2 - (a - b), a=(3, 33), b=(3, 33))
+    case("sum", lambda x: x.sum(), x=(3, 33))
+    case("concat", lambda x0, x1: torch.cat((x0, x1), -1), x0=(2, 3, 4), x1=(2, 3, 17))
+    case("flatten", lambda x: x.flatten(1), x=(2, 4, 3, 5))
+    case("unflatten", lambda x: x.reshape(2, 3, 2, 3), x=(2, 18))
     case("softmax_cross_entropy", lambda logits: F.cross_entropy(logits, torch.tensor([2, 0, 6])), logits=(3, 7))
     return stored
 

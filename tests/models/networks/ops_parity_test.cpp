@@ -10,6 +10,7 @@
 #include "autograd/ops/linear.h"
 #include "autograd/ops/losses.h"
 #include "autograd/ops/max_pool.h"
+#include "autograd/ops/shaping.h"
 #include "autograd/ops/vae.h"
 #include "layers/checkpoint.h"
 #include "tests/parity/parity.h"
@@ -88,6 +89,10 @@ TEST(OpsParity, Convolutions) {
                 [](const auto& in) { return conv1d(in[0], in[1], in[2], kHalving); });
   expect_parity("conv2d", {{"x", {2, 5, 7, 3}, kMap}, {"w", {3, 3, 3, 17}, Layout::conv}, {"b", {17}}}, kMap,
                 [](const auto& in) { return conv2d(in[0], in[1], in[2], kHalving); });
+  expect_parity("conv2d_leaky", {{"x", {2, 5, 7, 3}, kMap}, {"w", {3, 3, 3, 17}, Layout::conv}, {"b", {17}}},
+                kMap, [](const auto& in) {
+                  return conv2d(in[0], in[1], in[2], {.padding = 1, .negative_slope = kLeakyRelu});
+                });
 }
 
 TEST(OpsParity, TransposedConvolutions) {
@@ -102,6 +107,8 @@ TEST(OpsParity, TransposedConvolutions) {
 TEST(OpsParity, Linear) {
   expect_parity("linear", {{"x", {3, 33}}, {"w", {33, 17}, Layout::linear}, {"b", {17}}}, Layout::plain,
                 [](const auto& in) { return linear(in[0], in[1], in[2]); });
+  expect_parity("linear_relu", {{"x", {3, 33}}, {"w", {33, 17}, Layout::linear}, {"b", {17}}}, Layout::plain,
+                [](const auto& in) { return linear(in[0], in[1], in[2], kRelu); });
 }
 
 TEST(OpsParity, OfImages) {
@@ -114,11 +121,33 @@ TEST(OpsParity, OfImages) {
 }
 
 TEST(OpsParity, OfElements) {
-  expect_parity("sigmoid", {{"input", {3, 33}}}, Layout::plain,
-                [](const auto& in) { return sigmoid(in[0]); });
+  using Leaves = std::vector<Variable>;
+  const std::pair<const char*, std::function<Variable(const Leaves&)>> of_one[] = {
+      {"sigmoid", [](const Leaves& in) { return sigmoid(in[0]); }},
+      {"relu", [](const Leaves& in) { return relu(in[0]); }},
+      {"leaky_relu", [](const Leaves& in) { return leaky_relu(in[0]); }},
+      {"clamp", [](const Leaves& in) { return clamp(in[0], -0.5, 0.25); }},
+      {"scale", [](const Leaves& in) { return -3 * in[0]; }},
+      {"sum", [](const Leaves& in) { return sum(in[0]); }}};
+  for (const auto& [op, f] : of_one) expect_parity(op, {{"x", {3, 33}}}, Layout::plain, f);
+  const std::pair<const char*, std::function<Variable(const Leaves&)>> of_two[] = {
+      {"add", [](const Leaves& in) { return in[0] + in[1]; }},
+      {"multiply", [](const Leaves& in) { return in[0] * in[1]; }},
+      {"subtract", [](const Leaves& in) { return 2 - (in[0] - in[1]); }}};
+  for (const auto& [op, f] : of_two) expect_parity(op, {{"a", {3, 33}}, {"b", {3, 33}}}, Layout::plain, f);
   const Tensor eps = numbers("sample_gaussian.eps", {3, 4}, Layout::plain);
   expect_parity("sample_gaussian", {{"mean", {3, 4}}, {"log_var", {3, 4}}}, Layout::plain,
                 [&](const auto& in) { return sample_gaussian(in[0], in[1], eps); });
+}
+
+TEST(OpsParity, OfPlaces) {
+  expect_parity("concat", {{"x0", {2, 3, 4}}, {"x1", {2, 3, 17}}}, Layout::plain,
+                [](const auto& in) { return concat(in); });
+  expect_parity("flatten", {{"x", {2, 3, 5, 4}, kMap}}, Layout::plain,
+                [](const auto& in) { return flatten_channels_first(in[0]); });
+  expect_parity("unflatten", {{"x", {2, 18}}}, kMap, [](const auto& in) {
+    return unflatten_channels_first(in[0], std::array<Dim, 2>{2, 3});
+  });
 }
 
 TEST(OpsParity, Losses) {

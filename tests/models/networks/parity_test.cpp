@@ -1,5 +1,5 @@
 // The preset `paper` against PyTorch (tests/parity/make_parity.py): outputs, loss terms, every gradient and
-// ten steps of Adam. Compiled twice: with real = double every entry agrees to 1e-5 of its own size, in fp32
+// ten steps of Adam whose gradients are clipped. Compiled twice: with real = double every entry agrees to 1e-5 of its own size, in fp32
 // to 1e-5 of its tensor's largest entry (see Difference).
 #include <gtest/gtest.h>
 
@@ -102,7 +102,7 @@ std::vector<double> in_file_order(const Parameter& p, const Tensor& t) {
   return values;
 }
 
-/// The parameters of make_parity.py's initial_parameters.
+/// The parameters of make_parity.py's network().
 void initialise(SuperTac& model) {
   for (const Parameter& p : model.parameters()) {
     const std::vector<std::uint64_t> shape = to_stored(p).shape;
@@ -199,16 +199,17 @@ TEST(Parity, TenStepsOfAdam) {
   const SuperTac model = make_model(kTimesteps, kLatent);
   std::vector<std::vector<double>> before;
   for (const Parameter& p : model.parameters()) before.push_back(in_file_order(p, p.value.value()));
-  Adam adam(values_of(model.parameters()), {.learning_rate = 1e-3});
-  std::vector<double> losses;
+  Adam adam(values_of(model.parameters()), {.learning_rate = 1e-3, .clip_norm = 0.55});
+  std::vector<double> losses, norms;
   for (Dim step = 0; step < kSteps; ++step) {
     const Loss loss = loss_of(model.forward(small_windows(), eps_of_step(step)));
     losses.push_back(static_cast<double>(loss.total.item()));
     adam.zero_grad();
     backward(loss.total);
-    adam.step();
+    norms.push_back(adam.step());
   }
   compare.expect("small.adam.losses", losses);
+  compare.expect("small.adam.norms", norms);
   for (std::size_t k = 0; k < before.size(); ++k) {
     const Parameter& p = model.parameters()[k];
     const std::vector<double> after = in_file_order(p, p.value.value());
