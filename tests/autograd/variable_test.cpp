@@ -9,6 +9,8 @@
 #include "autograd/ops/convolution.h"
 #include "autograd/ops/shaping.h"
 #include "autograd/record.h"
+#include "autograd/reverse_watch.h"
+#include "autograd/trace.h"
 #include "tests/autograd/check.h"
 
 namespace supertac {
@@ -116,6 +118,26 @@ TEST(Backward, AStepThatThrowsLeavesTheLeavesUsable) {
   EXPECT_EQ(what_of<std::runtime_error>([&] { backward(sum(2 * y)); }), "of the step");
   backward(sum(2 * x));
   expect_values(x.grad(), {2}, {2, 2});
+}
+
+TEST(Backward, RefusesAGradientOfAnotherShape) {
+  Variable x = parameter(Tensor::full({2}, 3)), loss = sum(x);
+  x.mutable_grad() = Tensor::zeros({1});
+  expect_refusal("backward: the gradient of [2] expects that shape, got [1]", [&] { backward(loss); });
+  x.drop_grad();
+  loss = sum(x);
+  loss.mutable_grad() = Tensor::zeros({0});
+  expect_refusal("backward: the gradient of [] expects that shape, got [0]", [&] { backward(loss); });
+}
+
+TEST(Trace, OnePerThread) {
+  const Trace trace;
+  EXPECT_EQ(what_of<std::logic_error>([] { Trace(); }), "Trace: this thread is traced already");
+  struct Watch : ReverseWatch {
+    void reverse(const char*, std::size_t, Backward&, const std::function<void()>& step) override { step(); }
+  };
+  const Watch watch;
+  EXPECT_EQ(what_of<std::logic_error>([] { Watch(); }), "ReverseWatch: this thread is watched already");
 }
 
 TEST(Variable, RefusesToBeUsedWithoutAValue) {

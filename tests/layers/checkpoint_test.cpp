@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <limits>
 #include <numeric>
 
 #include "layers/convolution.h"
@@ -78,6 +80,15 @@ TEST_F(CheckpointTest, ListsEveryProblemAtOnceAndChangesNothing) {
             "c: the tensors do not fit the model that its metadata describes: "
             "shape expected F32 [3,3], found F32 [3,2]; missing absent; unexpected extra");
   EXPECT_EQ(fine.value().data()[0], 7);
+}
+
+TEST_F(CheckpointTest, WritesNothingThatIsNotFinite) {
+  const Parameter lost{"fc.bias", Variable(Tensor::full({2}, std::numeric_limits<real>::quiet_NaN()), true)};
+  EXPECT_EQ(what_of<FileError>([&] { write_checkpoint(path("c.safetensors"), {lost}, {}); }),
+            path("c.safetensors") +
+                ": not written: fc.bias holds values that are not finite; the training "
+                "diverged, lower its learning rate");
+  EXPECT_FALSE(std::filesystem::exists(path("c.safetensors")));
 }
 
 TEST_F(CheckpointTest, RefusesOtherFilesAndNewerVersions) {

@@ -17,6 +17,7 @@
 #include "models/inference/prepared/prepared.h"
 #include "models/training/train.h"
 #include "tests/data/test_recordings.h"
+#include "tests/expect_error.h"
 #include "tests/io/temporary_folder.h"
 #include "tests/models/support.h"
 
@@ -141,6 +142,11 @@ TEST_F(Library, TrainsWhatTheCppLibraryTrains) {
   write_recording(folder_ / "data/a.safetensors", make_recording({.frames = 3000}));
   Recipe recipe = Recipe::named("tiny");
   recipe.epochs = 2, recipe.stride = 4, recipe.seed = 5, recipe.split = SplitKind::none;
+  for (const auto& [out, why] :
+       {std::pair{folder_ / "data", ": is no name of a file to write a model to"},
+        {folder_ / "none/m.safetensors", ": cannot be written: its folder is missing"}})
+    EXPECT_EQ(what_of<FileError>([&, &out = out] { train(recipe, {.data = folder_ / "data"}, out); }),
+              out + why);
   train(recipe, {.data = folder_ / "data"}, folder_ / "cpp.safetensors");
   const supertac_training settings{
       .size = sizeof(supertac_training), .epochs = 2, .stride = 4, .seed = 5, .split = "none"};

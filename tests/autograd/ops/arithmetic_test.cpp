@@ -41,6 +41,7 @@ TEST(Arithmetic, RefusesOtherShapes) {
   expect_refusal("add: a and b must have the same shape, got [2,3] and [3,2]", [&] { a + b; });
   expect_refusal("multiply: a and b must have the same shape, got [2,3] and [3,2]", [&] { a* b; });
   expect_refusal("subtract: a and b must have the same shape, got [2,3] and [3,2]", [&] { a - b; });
+  expect_refusal("subtract: x expects a value, got an empty Variable", [] { 1 - Variable(); });
 }
 
 #ifdef SUPERTAC_REAL_IS_DOUBLE

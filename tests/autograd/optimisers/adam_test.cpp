@@ -148,6 +148,9 @@ TEST(Adam, RefusesAStepWithoutAGradient) {
   x.drop_grad();
   expect_refusal("Adam: a parameter [2,3] expects a gradient, got none; run backward() before step()",
                  [&] { adam.step(); });
+  x.mutable_grad() = Tensor::zeros({2});
+  expect_refusal("Adam: a parameter [2,3] expects a gradient, got [2]; run backward() before step()",
+                 [&] { adam.step(); });
 }
 
 TEST(Adam, RefusesBadOptions) {

@@ -153,6 +153,12 @@ TEST(SuperTac, RefusesSettingsAndWindowsThatDoNotFit) {
               model.infer(Tensor::zeros({1, 64, 16}));
             }),
             "SuperTac: windows expects [N,32,16], got [1,64,16]");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] {
+              model.forward(Tensor::zeros({1, 32, 16}), {});
+            }),
+            "SuperTac: eps expects 4 tensors, got 0");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { grouping_of("diagonal"); }),
+            "grouping must be horizontal or vertical, got \"diagonal\"");
   EXPECT_EQ(what_of<std::invalid_argument>([&] { SuperTacSettings::of_preset("huge"); }),
             "unknown preset \"huge\"; known: paper, best, tiny, frame");
 }

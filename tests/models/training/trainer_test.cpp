@@ -27,6 +27,8 @@ TEST(Trainer, Learns) {
   double last = 0;
   while (!trainer.done()) last = trainer.train_step().l2;
   EXPECT_LT(last, first / 4);
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { trainer.train_step(); }),
+            "train_step: all " + std::to_string(trainer.total_steps()) + " steps are done");
 }
 
 // Without noise the picture of the first step is that of inference.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "autograd/kernels/fast/isa/isa.h"
+#include "autograd/ops/max_pool.h"
 #include "autograd/ops/shaping.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/random.h"
@@ -81,10 +82,10 @@ TEST(Prepared, DrawsWhatTheNetworkDrawsForPresets) {
     expect_same_estimate(random_network(SuperTacSettings::of_preset(preset)), 9, preset);
 }
 
-// No network of ours joins maps, convolves its input as it is, or takes runs of anything but that.
+// No network of ours joins maps, convolves its input as it is, takes runs of anything but that, or pools.
 class Odd : public Network {
  public:
-  enum Kind { joins_maps, convolves_input, takes_runs };
+  enum Kind { joins_maps, convolves_input, takes_runs, pools };
   explicit Odd(Kind kind) : kind_(kind), a_(2, 5, kSameSize, rng_) {}
   NetworkFormat format() const override { return {.columns = 6, .channels = 2, .scale = 1}; }
   Shape input_shape(Dim count) const override {
@@ -94,6 +95,7 @@ class Odd : public Network {
     if (kind_ == convolves_input) return {a_.forward(x), {}, {}};
     const Variable frame = last_frame(x, 4, 6, 2), maps[] = {a_.forward(frame), a_.forward(frame, kRelu)};
     if (kind_ == joins_maps) return {concat(maps), {}, {}};
+    if (kind_ == pools) return {max_pool2d(maps[0]), {}, {}};
     return {take_runs(maps[0], {0, 5, 5, 5}), {}, {}};
   }
 
@@ -107,7 +109,11 @@ TEST(Prepared, RefusesWhatNoNetworkOfOursDoes) {
   const std::pair<Odd::Kind, const char*> refused[] = {
       {Odd::joins_maps, "Prepared: a concat of maps has no step"},
       {Odd::convolves_input, "Prepared: conv2d has a step for anything but the network's input"},
-      {Odd::takes_runs, "Prepared: take_runs has a step for the network's input only"}};
+      {Odd::takes_runs, "Prepared: take_runs has a step for the network's input only"},
+      {Odd::pools,
+       "Prepared: no step computes the op max_pool2d; models/inference/prepared/plan_steps.cpp lists those "
+       "that "
+       "have one"}};
   for (const auto& [kind, text] : refused)
     EXPECT_EQ(what_of<std::logic_error>([&kind = kind] { const Prepared p{Odd(kind)}; }), text);
 }
