@@ -14,8 +14,8 @@
 
 namespace supertac {
 
-/// The half of a reader that all readers share. A reader starts thread_ when it is whole, and stops it before
-/// it is no longer.
+/// The half of a reader that all readers share. A reader starts thread_ when it is whole, and its destructor
+/// calls stop().
 template <class Frame>
 class FrameQueue {
  public:
@@ -36,8 +36,7 @@ class FrameQueue {
   /// reader once the frames before it have been taken.
   std::optional<Frame> next(double wait_s) {
     std::unique_lock lock(mutex_);
-    arrived_.wait_for(lock, std::chrono::duration<double>(wait_s),
-                      [&] { return !queue_.empty() || ended_; });
+    arrived_.wait_for(lock, std::chrono::duration<double>(wait_s), [&] { return !queue_.empty() || ended_; });
     if (!queue_.empty()) {
       Frame frame = std::move(queue_.front());
       queue_.pop_front();
@@ -71,7 +70,7 @@ class FrameQueue {
   FrameQueue(std::size_t most, bool waits) : most_(most), waits_(waits) {}
   ~FrameQueue() = default;
 
-  /// The three are the thread's; `lock` holds mutex_, as the caller of end() does.
+  // For the reader's thread. `lock` holds mutex_; whoever calls end() holds it, too.
   bool asked_to_stop() {
     const std::lock_guard lock(mutex_);
     return stop_;
