@@ -10,7 +10,7 @@
 namespace supertac {
 
 /// What the simulated sensor does to the scene, and how strongly; without_term() leaves one of its terms out.
-/// Defaults resemble the rig's recordings; data/README.md shows what each term changes.
+/// Defaults resemble the rig's recordings; docs/import.md shows what each term changes.
 struct SimulatorSettings {
   TaxelArray array;  ///< of one channel or three axes; gains and pad are the rig's whatever the array
   double rate_hz = 300;
@@ -73,7 +73,7 @@ struct FingerIdentity {
 /// load,
 ///   lean_x = sum_u w(u - u_k) (u - u_k)_x / sigma d(u)   and   lean_y - 0.3 load_k;
 /// not fitted to any sensor.
-/// Radius, sigma, stiffness, slope and the linear law were fitted to the rig's recordings (data/README.md).
+/// Radius, sigma, stiffness, slope and the linear law were fitted to the rig's recordings (docs/import.md).
 class FingerModel {
  public:
   /// Throws std::invalid_argument for an array out of range or of other than one or three channels.

@@ -8,7 +8,6 @@
 #include <set>
 #include <span>
 #include <stdexcept>
-#include <utility>
 
 #include "io/files/file.h"
 #include "io/files/json.h"

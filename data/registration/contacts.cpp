@@ -88,10 +88,8 @@ void find_in(const std::vector<double>& x, int taxel, double start_s, double rea
     const double level = x[static_cast<std::size_t>(i)] - depth / 2;
     const double left = crossing(x, i, -1, level), right = crossing(x, j, 1, level);
     deepest = std::max(deepest, depth);
-    found.push_back({.taxel = taxel,
-                     .time_s = start_s + ((left + right) / 2 + 0.5) * kBinS,
-                     .depth_v = depth,
-                     .width_s = (right - left) * kBinS});
+    found.push_back(
+        {.taxel = taxel, .time_s = start_s + ((left + right) / 2 + 0.5) * kBinS, .depth_v = depth});
     i = j;
   }
   const auto shallow = [&](const Contact& c) { return c.depth_v < kMinShare * deepest; };

@@ -12,7 +12,6 @@ struct Contact {
   int taxel = 0;
   double time_s = 0;   ///< middle of the dip at half its depth, which survives saturation
   double depth_v = 0;  ///< prominence: from the deepest point up to the higher of the dip's two rims
-  double width_s = 0;  ///< at half the depth
 };
 
 /// The contacts of all taxels, by taxel and time. Rims are sought within reach_s to either side (about 0.6

@@ -222,6 +222,21 @@ class Fit {
   std::vector<Event> events_;
 };
 
+std::string why_unreliable(const Registration& r) {
+  if (r.contacts < kMinContacts)
+    return "only " + std::to_string(r.contacts) + " contacts, need " + std::to_string(kMinContacts);
+  if (r.elements < kMinElements)
+    return "only " + std::to_string(r.elements) + " elements of the texture, need " +
+           std::to_string(kMinElements);
+  if (r.matched < kMinMatched)
+    return "only " + format(100 * r.matched, 0) + " % of the contacts agree with the plate";
+  if (r.coverage < kMinCoverage)
+    return "only " + format(100 * r.coverage, 0) + " % of the plate's elements were felt";
+  if (r.residual > kMaxResidualMm) return "contacts lie " + format(r.residual, 2) + " mm (rms) off the plate";
+  if (r.margin < kMinMargin) return "another start fits as well (off by a pitch?)";
+  return "";
+}
+
 // The speed that is stated against the one that was fitted, and both against what the signals can show.
 std::string why_implausible(const Registration& r, const Recording& recording, const Plate& plate) {
   const double speed = recording.speed_mm_s > 0 ? recording.speed_mm_s : rig::kSlideMmS;
@@ -260,21 +275,6 @@ double row_contact_mm(const Recording& recording, std::size_t row) {
   const TaxelArray& array = recording.array;
   const bool of_the_rig = array == TaxelArray{} && recording.signal_scale == SignalScale{};
   return of_the_rig ? kRigMm[row] : array.y_mm(static_cast<int>(row) * array.columns);
-}
-
-std::string why_unreliable(const Registration& r) {
-  if (r.contacts < kMinContacts)
-    return "only " + std::to_string(r.contacts) + " contacts, need " + std::to_string(kMinContacts);
-  if (r.elements < kMinElements)
-    return "only " + std::to_string(r.elements) + " elements of the texture, need " +
-           std::to_string(kMinElements);
-  if (r.matched < kMinMatched)
-    return "only " + format(100 * r.matched, 0) + " % of the contacts agree with the plate";
-  if (r.coverage < kMinCoverage)
-    return "only " + format(100 * r.coverage, 0) + " % of the plate's elements were felt";
-  if (r.residual > kMaxResidualMm) return "contacts lie " + format(r.residual, 2) + " mm (rms) off the plate";
-  if (r.margin < kMinMargin) return "another start fits as well (off by a pitch?)";
-  return "";
 }
 
 void judge(Registration& r, const Recording& recording, const Plate& plate) {

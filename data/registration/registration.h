@@ -51,14 +51,12 @@ double row_contact_mm(const Recording& recording, std::size_t row);
 /// does.
 Registration register_pass(const Recording& recording, const Plate& plate);
 
-/// Why the fit is not reliable, "" when it is: fewer than 8 contacts or 3 elements, less than 0.4 matched or
-/// 0.3 covered, a residual above 0.55 mm, a margin below 0.03. Chosen on the rig's 96 passes.
-std::string why_unreliable(const Registration& registration);
-
-/// Sets reliable and reason: why_unreliable(), or one of the following. The stated speed against the fitted
-/// rate: a clock that counts lines ("time_base" nominal) may be slow by 5 % and twice the share of frames
-/// seen to be lost, and fast by 3 %; any other clock is right to 5 %. Frames lost over more than the
-/// texture's length; a moving average over more than half the least distance of two elements.
+/// Sets reliable and reason. Not reliable is a fit with fewer than 8 contacts or 3 elements, less than 0.4
+/// matched or 0.3 covered, a residual above 0.55 mm, a margin below 0.03: chosen on the rig's 96 passes; or
+/// one of the following. The stated speed against the fitted rate: a clock that counts lines ("time_base"
+/// nominal) may be slow by 5 % and twice the share of frames seen to be lost, and fast by 3 %; any other
+/// clock is right to 5 %. Frames lost over more than the texture's length; a moving average over more than
+/// half the least distance of two elements.
 void judge(Registration& registration, const Recording& recording, const Plate& plate);
 
 }  // namespace supertac

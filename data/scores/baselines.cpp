@@ -35,6 +35,25 @@ double keys_kernel(double distance) {
   return 0;
 }
 
+// Of the taxels of a line on its pixels, [pixels][taxels].
+std::vector<float> weights_of(Upsampling::Kind kind, int taxels, int scale) {
+  std::vector<float> weights(static_cast<std::size_t>(taxels) * static_cast<std::size_t>(taxels) *
+                             static_cast<std::size_t>(scale));
+  for (int p = 0; p < taxels * scale; ++p) {
+    const double u = (p + 0.5) / scale - 0.5;
+    const int left = static_cast<int>(std::floor(u));
+    float* row = &weights[static_cast<std::size_t>(p) * static_cast<std::size_t>(taxels)];
+    const auto inside = [&](int taxel) { return static_cast<std::size_t>(std::clamp(taxel, 0, taxels - 1)); };
+    if (kind == Upsampling::Kind::nearest) {
+      row[inside(static_cast<int>(std::floor(u + 0.5)))] = 1;
+    } else {
+      for (int taxel = left - 1; taxel <= left + 2; ++taxel)
+        row[inside(taxel)] += static_cast<float>(keys_kernel(u - taxel));
+    }
+  }
+  return weights;
+}
+
 }  // namespace
 
 MeanImage::MeanImage(const WindowSet& windows, std::span<const std::uint32_t> train)
@@ -54,24 +73,6 @@ void MeanImage::predict(std::span<const float> input, std::span<float> out) cons
   check_input(input, array_);
   check_size("the image", out.size(), image_.size());
   std::copy(image_.begin(), image_.end(), out.begin());
-}
-
-Upsampling::Weights Upsampling::weights_of(Kind kind, int taxels, int scale) {
-  Weights weights(static_cast<std::size_t>(taxels) * static_cast<std::size_t>(taxels) *
-                  static_cast<std::size_t>(scale));
-  for (int p = 0; p < taxels * scale; ++p) {
-    const double u = (p + 0.5) / scale - 0.5;
-    const int left = static_cast<int>(std::floor(u));
-    float* row = &weights[static_cast<std::size_t>(p) * static_cast<std::size_t>(taxels)];
-    const auto inside = [&](int taxel) { return static_cast<std::size_t>(std::clamp(taxel, 0, taxels - 1)); };
-    if (kind == Kind::nearest) {
-      row[inside(static_cast<int>(std::floor(u + 0.5)))] = 1;
-    } else {
-      for (int taxel = left - 1; taxel <= left + 2; ++taxel)
-        row[inside(taxel)] += static_cast<float>(keys_kernel(u - taxel));
-    }
-  }
-  return weights;
 }
 
 Upsampling::Upsampling(Kind kind, int rows, int columns, int scale) {

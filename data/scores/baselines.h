@@ -50,11 +50,8 @@ class Upsampling {
   void operator()(std::span<const float> frame, std::span<float> out) const;
 
  private:
-  using Weights = std::vector<float>;  // [pixels][taxels]: of the taxels of a line on its pixels
-  static Weights weights_of(Kind kind, int taxels, int scale);
-
   std::size_t rows_, columns_;
-  Weights down_, across_;
+  std::vector<float> down_, across_;  // [pixels][taxels]: weights of the taxels of a line on its pixels
 };
 
 /// Upsampling of the last frame (the mean of each taxel's channels), followed by a x + b: the line that fits

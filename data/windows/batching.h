@@ -15,7 +15,6 @@ class EpochOrder {
   EpochOrder(std::uint64_t count, std::uint64_t seed, std::uint64_t epoch);
   /// Element i of the order. Throws std::invalid_argument unless i < count.
   std::uint64_t operator[](std::uint64_t i) const;
-  std::uint64_t count() const { return count_; }
 
  private:
   static constexpr int kRounds = 4;

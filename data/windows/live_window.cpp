@@ -61,11 +61,6 @@ LiveWindow::LiveWindow(const LiveWindowSettings& settings)
       mean_(settings.signals),
       average_(settings.signals) {}
 
-bool LiveWindow::begins_anew(double time_s) const {
-  if (filtered_.count() == 0) return true;
-  return std::abs(time_s - filtered_.newest_s()) > settings_.max_gap_s;
-}
-
 void LiveWindow::push(double time_s, std::span<const float> volts) {
   if (volts.size() != settings_.signals)
     throw std::invalid_argument("live window: a frame has " + std::to_string(settings_.signals) +
@@ -75,8 +70,9 @@ void LiveWindow::push(double time_s, std::span<const float> volts) {
     ++counters_.damaged;
     return;
   }
-  if (begins_anew(time_s)) {
-    if (filtered_.count() > 0) ++counters_.gaps;
+  const bool is_first = filtered_.count() == 0;
+  if (is_first || std::abs(time_s - filtered_.newest_s()) > settings_.max_gap_s) {
+    if (!is_first) ++counters_.gaps;
     raw_.clear();
     filtered_.clear();
     run_begin_s_ = time_s;

@@ -80,7 +80,6 @@ class LiveWindow {
   };
 
   double end_s() const;
-  bool begins_anew(double time_s) const;
 
   LiveWindowSettings settings_;
   Recent raw_, filtered_;

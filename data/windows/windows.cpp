@@ -91,17 +91,15 @@ WindowSet WindowSet::load(const std::string& dir, const std::vector<std::string>
 
 void WindowSet::check_any(const std::string& dir) const {
   if (size() > 0) return;
-  const std::size_t most = std::max(
-      {counts_.unreliable, counts_.no_position, counts_.lifting, counts_.too_early, counts_.off_stride});
-  const char* advice = "give recordings that hold frames";
-  if (most > 0 && most == counts_.unreliable)
-    advice = "import the passes again with their right plate and --speed";
-  else if (most > 0 && most == counts_.no_position)
-    advice = "truth needs positions or a tensor 'truth': import or collect passes over a known plate";
-  else if (most > 0 && most == counts_.lifting)
-    advice = "give passes in which the finger slides";
-  else if (most > 0)
-    advice = most == counts_.too_early ? "try fewer timesteps or longer passes" : "try a smaller stride";
+  const std::pair<std::size_t, const char*> reasons[] = {
+      {counts_.unreliable, "import the passes again with their right plate and --speed"},
+      {counts_.no_position,
+       "truth needs positions or a tensor 'truth': import or collect passes over a known plate"},
+      {counts_.lifting, "give passes in which the finger slides"},
+      {counts_.too_early, "try fewer timesteps or longer passes"},
+      {counts_.off_stride, "try a smaller stride"}};
+  const auto [most, help] = *std::ranges::max_element(reasons, {}, [](const auto& r) { return r.first; });
+  const char* advice = most > 0 ? help : "give recordings that hold frames";
   throw std::runtime_error(dir + ": no window of " + std::to_string(settings_.timesteps) +
                            " frames: " + counts_.summary() + "; " + advice);
 }

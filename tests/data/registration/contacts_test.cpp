@@ -27,14 +27,13 @@ Recording dips(const std::vector<double>& centres, double depth, double floor = 
   return recording;
 }
 
-TEST(Contacts, FindsTimeDepthAndWidth) {
+TEST(Contacts, FindsTimeAndDepth) {
   const auto found = find_contacts(dips({1.5, 3.0}, 0.1));
   ASSERT_EQ(found.size(), 2u);
   EXPECT_EQ(found[0].taxel, 6);
   EXPECT_NEAR(found[0].time_s, 1.5, 0.003);
   EXPECT_NEAR(found[1].time_s, 3.0, 0.003);
   EXPECT_NEAR(found[0].depth_v, 0.1, 0.004);
-  EXPECT_NEAR(found[0].width_s, 0.2, 0.01);
 }
 
 TEST(Contacts, SaturationDoesNotMoveTheMiddle) {

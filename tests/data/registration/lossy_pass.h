@@ -12,6 +12,13 @@ namespace supertac {
 
 inline constexpr double kBoardHz = 1008.06;
 
+inline void append_frame(Recording& to, const Recording& from, std::size_t i, double time_s) {
+  to.time_s.push_back(time_s);
+  const std::size_t signals = from.array.signals();
+  for (std::size_t s = 0; s < signals; ++s) to.volts.push_back(from.volts[i * signals + s]);
+  for (std::size_t axis = 0; axis < 2; ++axis) to.position_mm.push_back(from.position_mm[2 * i + axis]);
+}
+
 // The rig's text files hold the slide and little of what was before and behind it: no frame of the air.
 inline Recording slide_of(const Recording& whole) {
   constexpr float kTouchingMm = 0.75F;
@@ -21,10 +28,7 @@ inline Recording slide_of(const Recording& whole) {
   for (std::size_t i = 0; i < whole.frames(); ++i) {
     if (whole.lift_mm[i] > kTouchingMm) continue;
     if (begin < 0) begin = whole.time_s[i];
-    slide.time_s.push_back(whole.time_s[i] - begin);
-    const std::size_t signals = whole.array.signals();
-    for (std::size_t k = 0; k < signals; ++k) slide.volts.push_back(whole.volts[i * signals + k]);
-    for (std::size_t axis = 0; axis < 2; ++axis) slide.position_mm.push_back(whole.position_mm[2 * i + axis]);
+    append_frame(slide, whole, i, whole.time_s[i] - begin);
   }
   return slide;
 }
@@ -39,8 +43,9 @@ inline Recording full_pass(const std::string& plate, int pass, std::uint64_t see
 // Without the frames at..at + lost - 1, and with stamps that count those that are left.
 inline void lose(Recording& r, std::size_t at, std::size_t lost) {
   const auto from = static_cast<std::ptrdiff_t>(at),
-             to = static_cast<std::ptrdiff_t>(std::min(at + lost, r.frames()));
-  r.volts.erase(r.volts.begin() + from * kTaxels, r.volts.begin() + to * kTaxels);
+             to = static_cast<std::ptrdiff_t>(std::min(at + lost, r.frames())),
+             signals = static_cast<std::ptrdiff_t>(r.array.signals());
+  r.volts.erase(r.volts.begin() + from * signals, r.volts.begin() + to * signals);
   r.position_mm.erase(r.position_mm.begin() + from * 2, r.position_mm.begin() + to * 2);
   r.time_s.resize(r.frames() - static_cast<std::size_t>(to - from));
 }
@@ -73,9 +78,7 @@ inline Recording like_the_rig(const std::string& plate, int pass, std::uint64_t 
   text.source = "imported";
   for (std::size_t i = 0; i < full.frames(); ++i) {
     if (i % 36 >= 29 || full.time_s[i] < late_s || full.time_s[i] > full.time_s.back() - early_s) continue;
-    text.time_s.push_back(static_cast<double>(text.time_s.size()) / kLineHz);
-    for (std::size_t k = 0; k < kTaxels; ++k) text.volts.push_back(full.volts[i * kTaxels + k]);
-    for (std::size_t axis = 0; axis < 2; ++axis) text.position_mm.push_back(full.position_mm[2 * i + axis]);
+    append_frame(text, full, i, static_cast<double>(text.time_s.size()) / kLineHz);
   }
   return text;
 }

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
+#include <utility>
 
 #include "data/recordings/imports/text_import.h"
 #include "data/registration/apply_registration.h"
@@ -124,17 +124,14 @@ TEST(Registration, SurvivesSaturationAndDeadTaxels) {
 }
 
 TEST(Registration, ABurstOfLostFramesCutsThePass) {
-  const Recording whole = like_the_rig("6_Bumps", 4, 6);
-  Recording cut = whole;
-  const auto at = static_cast<std::ptrdiff_t>(whole.frames() * 6 / 10), lost = std::ptrdiff_t{600};
-  cut.volts.erase(cut.volts.begin() + at * kTaxels, cut.volts.begin() + (at + lost) * kTaxels);
-  cut.position_mm.erase(cut.position_mm.begin() + at * 2, cut.position_mm.begin() + (at + lost) * 2);
-  cut.time_s.resize(cut.time_s.size() - static_cast<std::size_t>(lost));
+  Recording cut = like_the_rig("6_Bumps", 4, 6);
+  const std::size_t at = cut.frames() * 6 / 10;
+  lose(cut, at, 600);
   const Registration r = register_pass(cut, Plate::named("6_Bumps"));
-  EXPECT_NEAR(r.valid_until_s, cut.time_s[static_cast<std::size_t>(at)], 0.01);
+  EXPECT_NEAR(r.valid_until_s, cut.time_s[at], 0.01);
   Recording positioned = cut;
   apply(r, positioned);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(at); i += 100) {
+  for (std::size_t i = 0; i < at; i += 100) {
     const double y = cut.position_mm[2 * i + 1];
     if (r.reliable && y > 28) {
       EXPECT_NEAR(positioned.position_mm[2 * i + 1], y, 0.4);
@@ -160,23 +157,28 @@ TEST(Registration, FlagsWhatCannotBeFitted) {
 }
 
 TEST(Registration, WhatIsNotBelievedSaysWhy) {
-  const Registration good{
-      .residual = 0.55, .contacts = 8, .elements = 3, .matched = 0.4, .coverage = 0.3, .margin = 0.03};
-  EXPECT_EQ(why_unreliable(good), "") << "at every limit";
-  const auto reason = [&](auto change) {
+  const Registration good{.rate = 10,
+                          .residual = 0.55,
+                          .contacts = 8,
+                          .elements = 3,
+                          .matched = 0.4,
+                          .coverage = 0.3,
+                          .margin = 0.03};
+  const std::pair<void (*)(Registration&), const char*> cases[] = {
+      {[](Registration&) {}, ""},  // at every limit
+      {[](Registration& r) { r.contacts = 7; }, "only 7 contacts, need 8"},
+      {[](Registration& r) { r.elements = 2; }, "only 2 elements of the texture, need 3"},
+      {[](Registration& r) { r.matched = 0.39; }, "only 39 % of the contacts agree with the plate"},
+      {[](Registration& r) { r.coverage = 0.29; }, "only 29 % of the plate's elements were felt"},
+      {[](Registration& r) { r.residual = 0.56; }, "contacts lie 0.56 mm (rms) off the plate"},
+      {[](Registration& r) { r.margin = 0.029; }, "another start fits as well (off by a pitch?)"}};
+  for (const auto& [change, reason] : cases) {
     Registration r = good;
     change(r);
-    return why_unreliable(r);
-  };
-  EXPECT_EQ(reason([](Registration& r) { r.contacts = 7; }), "only 7 contacts, need 8");
-  EXPECT_EQ(reason([](Registration& r) { r.elements = 2; }), "only 2 elements of the texture, need 3");
-  EXPECT_EQ(reason([](Registration& r) { r.matched = 0.39; }),
-            "only 39 % of the contacts agree with the plate");
-  EXPECT_EQ(reason([](Registration& r) { r.coverage = 0.29; }),
-            "only 29 % of the plate's elements were felt");
-  EXPECT_EQ(reason([](Registration& r) { r.residual = 0.56; }), "contacts lie 0.56 mm (rms) off the plate");
-  EXPECT_EQ(reason([](Registration& r) { r.margin = 0.029; }),
-            "another start fits as well (off by a pitch?)");
+    judge(r, {}, Plate::named("3_Bumps"));
+    EXPECT_EQ(r.reason, reason);
+    EXPECT_EQ(r.reliable, r.reason.empty());
+  }
 }
 
 // The speed on the command line is believed no further than the signals bear it out.
@@ -225,10 +227,7 @@ TEST(Registration, APassThatFitsAPitchFurtherIsFlagged) {
 // The rig's own recordings: at least 92 of 96 fit, and their residuals are those of contacts, not of guesses.
 TEST(Registration, RealPasses) {
   const char* folder = std::getenv("SUPERTAC_RECORDINGS");
-  if (folder == nullptr) {
-    std::printf("SUPERTAC_RECORDINGS is not set: real passes are not checked\n");
-    return;
-  }
+  if (folder == nullptr) GTEST_SKIP() << "SUPERTAC_RECORDINGS is not set: real passes are not checked";
   int passes = 0, reliable = 0;
   double residual = 0;
   for (const auto& name : rig_plates())
@@ -283,12 +282,10 @@ TEST(Registration, FindsPassesOfAnyArray) {
 
 TEST(Registration, ABurstCutsPassesOfOtherArraysToo) {
   Recording cut = slide_in_counts({.rows = 2, .columns = 6, .pitch_mm = 2.5}, "6_Ridges", 1000, true);
-  const auto at = static_cast<std::ptrdiff_t>(cut.frames() * 6 / 10), lost = std::ptrdiff_t{630};
-  cut.volts.erase(cut.volts.begin() + at * 12, cut.volts.begin() + (at + lost) * 12);
-  cut.position_mm.erase(cut.position_mm.begin() + at * 2, cut.position_mm.begin() + (at + lost) * 2);
-  cut.time_s.resize(cut.time_s.size() - static_cast<std::size_t>(lost));
+  const std::size_t at = cut.frames() * 6 / 10;
+  lose(cut, at, 630);
   const Registration r = register_pass(cut, Plate::named("6_Ridges"));
-  EXPECT_NEAR(r.valid_until_s, cut.time_s[static_cast<std::size_t>(at)], 0.02);
+  EXPECT_NEAR(r.valid_until_s, cut.time_s[at], 0.02);
 }
 
 }  // namespace
