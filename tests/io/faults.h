@@ -19,39 +19,24 @@ class FaultInjection {
   FaultInjection(int at, int error, bool forever, Fault fault = Fault::error) {
     state() = {at, error, forever, fault, 0, {}};
     auto& calls = system_calls();
-    calls.open = [](const char* path, int flags, mode_t mode) {
-      if (hit("open")) return -1;
-      return real_system_calls().open(path, flags, mode);
+    calls.open = [](auto... a) { return hit("open") ? -1 : real_system_calls().open(a...); };
+    calls.fstat = [](auto... a) { return hit("fstat") ? -1 : real_system_calls().fstat(a...); };
+    calls.read = [](int file, void* bytes, std::size_t count) {
+      return transfer("read", real_system_calls().read, file, bytes, count);
     };
-    calls.fstat = [](int file, struct stat* status) {
-      return hit("fstat") ? -1 : real_system_calls().fstat(file, status);
+    calls.pread = [](int file, void* bytes, std::size_t count, off_t offset) {
+      return transfer("pread", real_system_calls().pread, file, bytes, count, offset);
     };
-    calls.read = [](int file, void* bytes, std::size_t count) -> ssize_t {
-      const bool now = hit("read");
-      if (now && state().fault == Fault::error) return -1;
-      return real_system_calls().read(file, bytes, now ? (count + 1) / 2 : count);
-    };
-    calls.pread = [](int file, void* bytes, std::size_t count, off_t offset) -> ssize_t {
-      const bool now = hit("pread");
-      if (now && state().fault == Fault::error) return -1;
-      return real_system_calls().pread(file, bytes, now ? (count + 1) / 2 : count, offset);
-    };
-    calls.write = [](int file, const void* bytes, std::size_t count) -> ssize_t {
-      const bool now = hit("write");
-      if (now && state().fault == Fault::error) return -1;
-      return real_system_calls().write(file, bytes, now ? (count + 1) / 2 : count);
+    calls.write = [](int file, const void* bytes, std::size_t count) {
+      return transfer("write", real_system_calls().write, file, bytes, count);
     };
     calls.fsync = [](int file) { return hit("fsync") ? -1 : real_system_calls().fsync(file); };
     calls.close = [](int file) {
       const int result = real_system_calls().close(file);  // the descriptor is gone in any case
       return hit("close") ? -1 : result;
     };
-    calls.rename = [](const char* from, const char* to) {
-      return hit("rename") ? -1 : real_system_calls().rename(from, to);
-    };
-    calls.rename_new = [](const char* from, const char* to) {
-      return hit("rename") ? -1 : real_system_calls().rename_new(from, to);
-    };
+    calls.rename = [](auto... a) { return hit("rename") ? -1 : real_system_calls().rename(a...); };
+    calls.rename_new = [](auto... a) { return hit("rename") ? -1 : real_system_calls().rename_new(a...); };
   }
   ~FaultInjection() { system_calls() = real_system_calls(); }
   FaultInjection(const FaultInjection&) = delete;
@@ -72,6 +57,12 @@ class FaultInjection {
   static State& state() {
     static State state{};
     return state;
+  }
+  /// A call that moves `count` bytes: all, none, or half of them.
+  static ssize_t transfer(const char* name, auto call, int file, auto bytes, std::size_t count, auto... at) {
+    const bool now = hit(name);
+    if (now && state().fault == Fault::error) return -1;
+    return call(file, bytes, now ? (count + 1) / 2 : count, at...);
   }
   /// Counts a call; true when it is to fail. A short count can only befall read and write.
   static bool hit(const char* name) {

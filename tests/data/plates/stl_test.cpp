@@ -97,10 +97,6 @@ TEST(Stl, DamagedBinaryNamesTheTriangleOrTheLength) {
     std::memcpy(bad.data() + 84 + 50 + 12 + 8, &value, sizeof value);
     expect_refused(bad, "triangle 2 has the coordinate");
   }
-  Bytes absurd = good;
-  const std::uint32_t count = 0xFFFF'FFFF;
-  std::memcpy(absurd.data() + 80, &count, sizeof count);
-  expect_refused(absurd, "announces 4294967295 triangles, expected 214748364834 bytes, found 184");
   expect_refused(Bytes{}, "has 0 bytes");
   expect_refused(stl_bytes({}, "empty"), "holds no triangle");
   for (std::size_t length = 0; length < good.size(); ++length)
@@ -129,7 +125,8 @@ TEST(Stl, HostileHeadersCostNothing) {
   const std::clock_t begin = std::clock();
   for (const std::uint32_t count : {1u, 1000u, 0x7FFF'FFFFu, 0xFFFF'FFFFu}) {
     std::memcpy(bytes.data() + 80, &count, sizeof count);
-    expect_refused(bytes, "announces " + std::to_string(count) + " triangles");
+    expect_refused(bytes, "announces " + std::to_string(count) + " triangles, expected " +
+                              std::to_string(84 + 50 * std::uint64_t{count}) + " bytes, found 84");
   }
   // The count must not size anything: clearing what it asks for would take many seconds.
   EXPECT_LT(std::clock() - begin, CLOCKS_PER_SEC);
@@ -145,17 +142,6 @@ TEST(Stl, FilesAreReadWithALimit) {
   std::filesystem::resize_file(folder / "huge.stl", kMaxStlBytes + 1);  // sparse
   EXPECT_EQ(what_of<FileError>([&] { read_stl(folder / "huge.stl"); }),
             folder / "huge.stl" + ": has 536870913 bytes, expected at most 536870912; is it the right file?");
-}
-
-TEST(Stl, EveryFlippedByteIsReadOrRefused) {
-  const Bytes binary = stl_bytes(two_triangles(), "title"), text = bytes_of(text_stl());
-  for (const Bytes& good : {binary, text})
-    for (std::size_t i = 0; i < good.size(); ++i)
-      for (const unsigned change : {0x01u, 0x80u, 0xFFu}) {
-        Bytes bad = good;
-        bad[i] ^= std::byte(change);
-        EXPECT_NO_THROW(check_stl(bad)) << i;
-      }
 }
 
 TEST(Stl, FuzzCorpus) { EXPECT_GE(replay("stl", check_stl), 256); }

@@ -7,8 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "data/windows/split.h"
-#include "tests/data/test_recordings.h"
+#include "tests/data/scores/surface_windows.h"
 #include "tests/expect_error.h"
 
 namespace supertac {
@@ -96,38 +95,11 @@ TEST(Upsampling, RefusesOtherSizes) {
       "baseline: the image expects 64 values, got 256");
 }
 
-// A pass whose frames show the bicubic picture's own truth, shrunk and shifted: taxel = .2 + .5 height.
-WindowSet make_set() {
-  Recording recording = make_recording({.plate = "bumps12", .frames = 900, .start_y_mm = 40});
-  const Plate plate = Plate::named("bumps12");
-  for (std::size_t i = 0; i < recording.frames(); ++i) {
-    const double y = recording.position_mm[2 * i + 1];
-    for (int k = 0; k < kTaxels; ++k) {
-      const double height = plate.height(18, y - 4.5 + 3 * (k / 4)) / plate.max_height();
-      recording.volts[i * kTaxels + static_cast<std::size_t>(k)] =
-          static_cast<float>(3 - 2 * (0.2 + 0.5 * height));
-    }
-  }
-  WindowSet set(wide_settings(16));
-  set.add(recording);
-  return set;
-}
-
-double mean_error(const WindowSet& set, const Baseline& baseline) {
-  std::vector<float> out(256), truth(256);
-  double sum = 0;
-  for (std::size_t i = 0; i < set.size(); ++i) {
-    baseline.predict(set.window(i), out);
-    set.truth(i, truth);
-    for (std::size_t p = 0; p < 256; ++p) sum += (out[p] - truth[p]) * (out[p] - truth[p]);
-  }
-  return sum / 256 / static_cast<double>(set.size());
-}
+WindowSet make_set() { return surface_windows(0.2, 0.5); }
 
 TEST(Baselines, UndoTheScaleOfTheSignal) {
   const WindowSet set = make_set();
-  const auto train = make_split(set, SplitKind::none, 1).train;
-  const UpsampledFrame bicubic(Upsampling::Kind::bicubic, set, train);
+  const UpsampledFrame bicubic(Upsampling::Kind::bicubic, set, all_of(set));
   // The least-squares line is shrunk below 1 / .5 because bicubic misses part of the shape.
   EXPECT_GT(bicubic.slope(), 1.2);
   EXPECT_LT(bicubic.slope(), 2.05);
@@ -138,15 +110,12 @@ TEST(Baselines, UndoTheScaleOfTheSignal) {
 
 TEST(Baselines, AreOrderedOnASignalThatShowsTheSurface) {
   const WindowSet set = make_set();
-  const auto train = make_split(set, SplitKind::none, 1).train;
-  const auto baselines = fit_baselines(set, train);
-  ASSERT_EQ(baselines.size(), 4U);
-  EXPECT_EQ(baselines[0]->name(), "mean_image");
-  EXPECT_EQ(baselines[1]->name(), "nearest");
-  EXPECT_EQ(baselines[2]->name(), "bicubic");
-  EXPECT_EQ(baselines[3]->name(), "ridge");
-  const double mean = mean_error(set, *baselines[0]), nearest = mean_error(set, *baselines[1]),
-               bicubic = mean_error(set, *baselines[2]);
+  const auto baselines = fit_baselines(set, all_of(set));
+  std::vector<std::string> names;
+  for (const auto& baseline : baselines) names.push_back(baseline->name());
+  ASSERT_EQ(names, (std::vector<std::string>{"mean_image", "nearest", "bicubic", "ridge"}));
+  const auto error = [&](std::size_t i) { return mean_error(set, all_of(set), *baselines[i]); };
+  const double mean = error(0), nearest = error(1), bicubic = error(2);
   EXPECT_LT(bicubic, nearest);
   EXPECT_LT(nearest, 0.5 * mean);
 }
@@ -164,7 +133,7 @@ TEST(Baselines, MeanImageIsTheMeanTruthWhateverItSees) {
 
 TEST(Baselines, AllButRidgeSeeTheLastFrameOnly) {
   const WindowSet set = make_set();
-  const auto baselines = fit_baselines(set, make_split(set, SplitKind::none, 1).train);
+  const auto baselines = fit_baselines(set, all_of(set));
   const std::vector<float> window = set.window(200);
   std::vector<float> out(256), again(256);
   for (const auto& baseline : baselines) {
@@ -181,7 +150,7 @@ TEST(Baselines, ASignalThatNeverChangesGivesTheMean) {
   std::fill(rest.volts.begin(), rest.volts.end(), 2.4F);
   WindowSet set(wide_settings(16));
   set.add(rest);
-  const UpsampledFrame bicubic(Upsampling::Kind::bicubic, set, make_split(set, SplitKind::none, 1).train);
+  const UpsampledFrame bicubic(Upsampling::Kind::bicubic, set, all_of(set));
   EXPECT_EQ(bicubic.slope(), 0);
   EXPECT_GT(bicubic.intercept(), 0);
 }
@@ -190,7 +159,7 @@ TEST(Baselines, NeedWindowsToFitTo) {
   const WindowSet set = make_set();
   EXPECT_EQ(what_of<std::invalid_argument>([&] { fit_baselines(set, {}); }),
             "baseline: there is no example to fit to");
-  const auto baselines = fit_baselines(set, make_split(set, SplitKind::none, 1).train);
+  const auto baselines = fit_baselines(set, all_of(set));
   std::vector<float> out(256), small(64);
   for (const auto& baseline : baselines) {
     const bool ridge = baseline->name() == "ridge";

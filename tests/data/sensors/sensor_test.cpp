@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 #include <random>
+#include <tuple>
 
 #include "io/files/file.h"
 #include "tests/expect_error.h"
@@ -95,59 +96,49 @@ TEST(Sensor, WritesWhatItReads) {
 }
 
 TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
-  EXPECT_EQ(
-      refusal("rows", 65),
-      "mat.json: array: expected 1 to 64 rows and columns, 1 to 8 channels, a pitch of 0.1 to 100 mm; got "
-      "65x4 taxels at 5 mm");
-  EXPECT_EQ(refusal("rows", "3"), "mat.json: \"rows\" must be a whole number, found \"3\"");
-  EXPECT_EQ(refusal("pressed", "up"), "mat.json: \"pressed\" must be one of higher, lower, found \"up\"");
-  EXPECT_EQ(refusal("range", Json{900, 40}),
-            "mat.json: \"range\" must be [low, high], the lower first, found [900,40]");
-  EXPECT_EQ(
-      refusal("range", Json{900, 900.001}),
-      "mat.json: \"range\" must be two numbers within 1e9, apart by at least 1e-5 of the larger, found 900 "
-      "to 900.001");
-  EXPECT_EQ(refusal("range", nullptr),
-            "mat.json: has no \"range\": expected [rest, pressed hard] of a signal that rises");
-  EXPECT_EQ(refusal("rate_hz", 0.5), "mat.json: \"rate_hz\" must be 1 to 100000, found 0.5");
-  EXPECT_EQ(refusal("pich_mm", 5),
-            "mat.json: knows no key 'pich_mm'; it may have name, rows, columns, channels, pitch_mm, unit, "
-            "pressed, range, rate_hz, port, frame, order, dead, rest, gain, follow_rest_s");
-  EXPECT_EQ(refusal("frame", nullptr),
-            "mat.json: has no \"frame\", such as {\"kind\": \"text\"}; supertac-stream --probe finds it");
-  EXPECT_EQ(refusal("frame.kind", "csv"),
-            "mat.json: \"frame.kind\" must be one of board, text, json, binary, found \"csv\"");
-  EXPECT_EQ(refusal("frame.kind", "board"), "mat.json: knows no key 'frame.separator'; it may have kind");
-  EXPECT_EQ(refusal("frame.separator", ", "),
-            "mat.json: \"frame.separator\" must be one character, found \", \"");
-  EXPECT_EQ(refusal("frame.skip", Json{0}),
-            "mat.json: \"frame.skip\" must be other columns than that of time, found one twice");
-  EXPECT_EQ(refusal("frame.time", Json{{"column", 0}, {"unit", "minutes"}}),
-            "mat.json: \"frame.time.unit\" must be one of s, ms, us, found \"minutes\"");
-  EXPECT_EQ(refusal("frame", Json{{"kind", "binary"}}),
-            "mat.json: \"frame.header\" must be at least a byte where there is neither trailer nor checksum, "
-            "found nothing");
-  EXPECT_EQ(
-      refusal("frame", Json{{"kind", "binary"}, {"header", "A5 5"}}),
-      "mat.json: \"frame.header\" must be bytes as hexadecimal digits, such as \"AA55\", found \"A5 5\"");
-  EXPECT_EQ(
-      refusal("order", Json{0, 1, 2}),
-      "mat.json: \"order\" must be row-major, column-major, or for each of the 12 taxels its place in the "
-      "frame, from 0 and each once, -1 where there is none, found 3 places, 3 different");
-  EXPECT_EQ(refusal("dead", Json{12}), "mat.json: \"dead\" must be taxels 0 to 11, found 12");
-  EXPECT_EQ(refusal("rest", Json{40, 41}),
-            "mat.json: \"rest\" must be a number for each of the 12 signals, found 2");
-  EXPECT_EQ(refusal("rest", Json{"40"}), "mat.json: \"rest\" must be a list of numbers, found [\"40\"]");
-  EXPECT_EQ(refusal("rest", 40), "mat.json: \"rest\" must be a list of numbers, found 40");
-  EXPECT_EQ(refusal("gain", Json{1, 1}),
-            "mat.json: \"gain\" must be a number for each of the 12 signals, found 2");
-  EXPECT_EQ(refusal("gain", 1), "mat.json: \"gain\" must be a list of numbers, found 1");
   Json gains(12, 1);
   gains[3] = 0;
-  EXPECT_EQ(refusal("gain", gains), "mat.json: \"gain\" must be numbers of 0.01 to 100, found 0");
-  EXPECT_EQ(refusal("follow_rest_s", 0.5), "mat.json: \"follow_rest_s\" must be 1 to 3600, found 0.5");
-  EXPECT_EQ(refusal("follow_rest_s", "5"), "mat.json: \"follow_rest_s\" must be a number, found \"5\"");
-  EXPECT_EQ(refusal("name", "a\nb"), "mat.json: \"name\" must be 1 to 200 printable characters, found 'a?b'");
+  const std::tuple<const char*, Json, std::string> cases[] = {
+      {"rows", 65,
+       "array: expected 1 to 64 rows and columns, 1 to 8 channels, a pitch of 0.1 to 100 mm; got 65x4 taxels "
+       "at 5 mm"},
+      {"rows", "3", "\"rows\" must be a whole number, found \"3\""},
+      {"pressed", "up", "\"pressed\" must be one of higher, lower, found \"up\""},
+      {"range", Json{900, 40}, "\"range\" must be [low, high], the lower first, found [900,40]"},
+      {"range", Json{900, 900.001},
+       "\"range\" must be two numbers within 1e9, apart by at least 1e-5 of the larger, found 900 to "
+       "900.001"},
+      {"range", nullptr, "has no \"range\": expected [rest, pressed hard] of a signal that rises"},
+      {"rate_hz", 0.5, "\"rate_hz\" must be 1 to 100000, found 0.5"},
+      {"pich_mm", 5,
+       "knows no key 'pich_mm'; it may have name, rows, columns, channels, pitch_mm, unit, pressed, range, "
+       "rate_hz, port, frame, order, dead, rest, gain, follow_rest_s"},
+      {"frame", nullptr, "has no \"frame\", such as {\"kind\": \"text\"}; supertac-stream --probe finds it"},
+      {"frame.kind", "csv", "\"frame.kind\" must be one of board, text, json, binary, found \"csv\""},
+      {"frame.kind", "board", "knows no key 'frame.separator'; it may have kind"},
+      {"frame.separator", ", ", "\"frame.separator\" must be one character, found \", \""},
+      {"frame.skip", Json{0}, "\"frame.skip\" must be other columns than that of time, found one twice"},
+      {"frame.time", Json{{"column", 0}, {"unit", "minutes"}},
+       "\"frame.time.unit\" must be one of s, ms, us, found \"minutes\""},
+      {"frame", Json{{"kind", "binary"}},
+       "\"frame.header\" must be at least a byte where there is neither trailer nor checksum, found nothing"},
+      {"frame", Json{{"kind", "binary"}, {"header", "A5 5"}},
+       "\"frame.header\" must be bytes as hexadecimal digits, such as \"AA55\", found \"A5 5\""},
+      {"order", Json{0, 1, 2},
+       "\"order\" must be row-major, column-major, or for each of the 12 taxels its place in the frame, from "
+       "0 "
+       "and each once, -1 where there is none, found 3 places, 3 different"},
+      {"dead", Json{12}, "\"dead\" must be taxels 0 to 11, found 12"},
+      {"rest", Json{40, 41}, "\"rest\" must be a number for each of the 12 signals, found 2"},
+      {"rest", Json{"40"}, "\"rest\" must be a list of numbers, found [\"40\"]"},
+      {"rest", 40, "\"rest\" must be a list of numbers, found 40"},
+      {"gain", Json{1, 1}, "\"gain\" must be a number for each of the 12 signals, found 2"},
+      {"gain", 1, "\"gain\" must be a list of numbers, found 1"},
+      {"gain", gains, "\"gain\" must be numbers of 0.01 to 100, found 0"},
+      {"follow_rest_s", 0.5, "\"follow_rest_s\" must be 1 to 3600, found 0.5"},
+      {"follow_rest_s", "5", "\"follow_rest_s\" must be a number, found \"5\""},
+      {"name", "a\nb", "\"name\" must be 1 to 200 printable characters, found 'a?b'"}};
+  for (const auto& [key, value, message] : cases) EXPECT_EQ(refusal(key, value), "mat.json: " + message);
 }
 
 TEST(Sensor, ArrangesTheTaxelsAndFillsTheSilentFromTheirNeighbours) {

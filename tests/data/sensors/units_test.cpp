@@ -24,17 +24,6 @@ Recording counts() {
   return recording;
 }
 
-TEST(Units, ARecordingKeepsThem) {
-  const TemporaryFolder folder;
-  const Recording written = counts();
-  EXPECT_GT(written.volts.front(), 0);
-  write_recording(folder / "r.safetensors", written);
-  const Recording read = read_recording(folder / "r.safetensors");
-  EXPECT_EQ(read.signal_scale, kCounts);
-  EXPECT_EQ(read.volts, written.volts);
-  EXPECT_FALSE(read.metadata.contains("signals"));
-}
-
 TEST(Units, CountsThatRiseGiveTheWindowsOfVoltsThatFall) {
   const Recording both[] = {volts(), counts()};
   std::vector<WindowSet> sets;

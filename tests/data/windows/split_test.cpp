@@ -95,34 +95,31 @@ TEST(Split, TextureTestsAnUnseenPlate) {
   EXPECT_EQ(held_out.size(), 2U);  // the seed chooses
 }
 
-// What resembles the plate left out is not trained on either, for training only or not.
-TEST(Split, TextureLeavesOutTheNamedPlateAndItsLikes) {
-  WindowSet set(wide_settings(16));
-  for (const char* plate : {"3_Bumps", "bumps6", "4_Ridges"})
-    set.add(
-        make_recording({.plate = plate, .frames = 40, .level = 1.0F + static_cast<float>(set.size()) / 100}));
-  set.add(make_recording({.plate = "bumps12", .frames = 40, .level = 2.5F}), ".", kTrainingOnly);
-  const Split split = make_split(set, SplitKind::texture, 7, {"3_Bumps"});
-  EXPECT_EQ(plates_of(set, split.test), std::set<std::string>{"3_Bumps"});
-  EXPECT_EQ(plates_of(set, split.train), (std::set<std::string>{"bumps6", "4_Ridges"}));
-  EXPECT_EQ(what_of<std::invalid_argument>([&] { make_split(set, SplitKind::texture, 7, {"6_Blob"}); }),
-            "split texture: the data has no windows of plate '6_Blob' to leave out");
-}
-
-// With all of them left out only passes for training only are trained on, and none that resembles any of
-// them.
-TEST(Split, TextureLeavesOutAllPlatesThatAreNamed) {
-  WindowSet set(wide_settings(16));
-  for (const char* plate : {"3_Bumps", "4_Ridges", "bumps6"})
-    set.add(
-        make_recording({.plate = plate, .frames = 40, .level = 1.0F + static_cast<float>(set.size()) / 100}));
-  for (const char* plate : {"bumps12", "ridges9", "bumps8"})
-    set.add(
-        make_recording({.plate = plate, .frames = 40, .level = 2.0F + static_cast<float>(set.size()) / 100}),
-        ".", kTrainingOnly);
-  const Split split = make_split(set, SplitKind::texture, 7, {"3_Bumps", "4_Ridges", "bumps6"});
-  EXPECT_EQ(plates_of(set, split.test), (std::set<std::string>{"3_Bumps", "4_Ridges", "bumps6"}));
-  EXPECT_EQ(plates_of(set, split.train), std::set<std::string>{"bumps8"});
+// What resembles a plate left out is not trained on either, for training only or not.
+TEST(Split, TextureLeavesOutTheNamedPlatesAndTheirLikes) {
+  struct Case {
+    std::vector<std::string> own, training_only, leave_out;
+    std::set<std::string> train;
+  };
+  const Case cases[] = {{{"3_Bumps", "bumps6", "4_Ridges"}, {"bumps12"}, {"3_Bumps"}, {"bumps6", "4_Ridges"}},
+                        {{"3_Bumps", "4_Ridges", "bumps6"},
+                         {"bumps12", "ridges9", "bumps8"},
+                         {"3_Bumps", "4_Ridges", "bumps6"},
+                         {"bumps8"}}};
+  for (const auto& [own, training_only, leave_out, train] : cases) {
+    WindowSet set(wide_settings(16));
+    const auto add = [&](const std::string& plate, const PassUse& use) {
+      const float level = 1.0F + static_cast<float>(set.size()) / 100;
+      set.add(make_recording({.plate = plate, .frames = 40, .level = level}), ".", use);
+    };
+    for (const std::string& plate : own) add(plate, {});
+    for (const std::string& plate : training_only) add(plate, kTrainingOnly);
+    const Split split = make_split(set, SplitKind::texture, 7, leave_out);
+    EXPECT_EQ(plates_of(set, split.test), std::set<std::string>(leave_out.begin(), leave_out.end()));
+    EXPECT_EQ(plates_of(set, split.train), train);
+    EXPECT_EQ(what_of<std::invalid_argument>([&] { make_split(set, SplitKind::texture, 7, {"6_Blob"}); }),
+              "split texture: the data has no windows of plate '6_Blob' to leave out");
+  }
 }
 
 TEST(Split, NoneTrainsAndTestsOnAll) {

@@ -33,10 +33,9 @@ std::string raw_file(const std::string& header, std::size_t data_bytes) {
   return bytes + header + std::string(data_bytes, '\0');
 }
 
-std::string message_of_header(const std::string& header, std::size_t data_bytes = 0) {
-  TemporaryFolder folder;
-  write_file(folder.file("a"), raw_file(header, data_bytes));
-  return refusal_of(folder.file("a"));
+void read_header(const std::string& header, std::size_t data_bytes = 0) {
+  const std::string bytes = raw_file(header, data_bytes);
+  SafetensorsFile::of(std::as_bytes(std::span(bytes)), "a");
 }
 
 /// Writes a file of about `bytes` bytes.
@@ -197,18 +196,16 @@ TEST(SafetensorsHostile, HeadersAreRefusedForTheirReason) {
        "malformed"},
   };
   for (const auto& [header, reason] : cases) {
-    const std::string message = message_of_header(header, 4);
-    EXPECT_NE(message.find(reason), std::string::npos) << header << "\n  gave: " << message;
-    EXPECT_EQ(message.find('\n'), std::string::npos) << header;
+    SCOPED_TRACE(header);
+    EXPECT_ERROR(read_header(header, 4), FileError, reason);
   }
 }
 
 TEST(SafetensorsHostile, AHeaderOfTheLargestSizeIsStillRead) {
   std::string header = "{}";
   header.resize(1 << 20, ' ');
-  EXPECT_EQ(message_of_header(header), "nothing thrown");
-  EXPECT_NE(message_of_header(header + " ").find("header length 1048577, expected at most 1048576"),
-            std::string::npos);
+  EXPECT_NO_THROW(read_header(header));
+  EXPECT_ERROR(read_header(header + " "), FileError, "header length 1048577, expected at most 1048576");
 }
 
 TEST(SafetensorsHostile, LengthsAreComparedBeforeMemoryIsAskedFor) {
@@ -221,10 +218,9 @@ TEST(SafetensorsHostile, LengthsAreComparedBeforeMemoryIsAskedFor) {
     EXPECT_ERROR(SafetensorsFile::read(folder.file("a")), FileError,
                  "header length " + std::to_string(length));
   }
-  EXPECT_NE(
-      message_of_header(R"({"a":{"dtype":"U8","shape":[1099511627776],"data_offsets":[0,1099511627776]}})", 4)
-          .find("cut short"),
-      std::string::npos);
+  EXPECT_ERROR(
+      read_header(R"({"a":{"dtype":"U8","shape":[1099511627776],"data_offsets":[0,1099511627776]}})", 4),
+      FileError, "cut short");
 }
 
 long peak_kilobytes() {
