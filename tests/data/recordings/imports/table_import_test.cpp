@@ -234,12 +234,11 @@ TEST_F(TableImport, TruthIsScaledAndCounted) {
   EXPECT_EQ(r.truth_width, 6);
   EXPECT_EQ(r.truth[0], 1.0F);
   EXPECT_EQ(r.truth[1], 0.0F);
-  EXPECT_EQ(what_of<FileError>(
-                [&] { add_truth(r, "t", read_table(npy("t.npy", "<f4", "3, 4, 3, 2", images)), 100, 300); }),
+  const Table rank_3 = read_table(npy("t.npy", "<f4", "3, 4, 3, 2", images));
+  EXPECT_EQ(what_of<FileError>([&] { add_truth(r, "t", rank_3, 100, 300); }),
             "t: has rows of rank 3, expected images: an array [frames, height, width] in a .npy file");
-  EXPECT_EQ(what_of<FileError>([&] {
-              add_truth(r, "t", read_table(npy("t.npy", "<f4", "2, 4, 6", std::vector<float>(48))), 0, 1);
-            }),
+  const Table two = read_table(npy("t.npy", "<f4", "2, 4, 6", std::vector<float>(48)));
+  EXPECT_EQ(what_of<FileError>([&] { add_truth(r, "t", two, 0, 1); }),
             "t: holds 2 images, the recording has 3 frames; expected one for each");
 }
 
