@@ -20,6 +20,12 @@ using Kind = IntegerStep::Kind;
 
 std::string text(Dim value) { return std::to_string(value); }
 
+std::string list(const std::vector<Dim>& values) { return joined(values, ", "); }
+
+std::string call(const std::string& function, const std::vector<std::string>& arguments) {
+  return function + "(" + joined(arguments, ", ") + ")";
+}
+
 // As C has it: 0.05, or 50.0, with all digits that tell it from its neighbours.
 std::string number(double value) {
   std::string out = format(value);
@@ -46,7 +52,6 @@ class Writer {
   std::size_t weights() const { return weights_; }  // bytes
 
  private:
-  const IntegerMap& map(int i) const { return plan_.maps[static_cast<std::size_t>(i)]; }
   static std::string at(int i) { return "&maps[" + std::to_string(i) + "]"; }
   std::string shape_of(int i) const;
   std::string product(const IntegerStep& s, const std::string& name);
@@ -58,7 +63,7 @@ class Writer {
 };
 
 std::string Writer::shape_of(int i) const {
-  const IntegerMap& m = map(i);
+  const IntegerMap& m = plan_.map(i);
   return (m.height > 1 ? "[" + text(m.height) + "]" : "") +
          (m.height * m.width > 1 ? "[" + text(m.width) + "]" : "") + "[" + text(m.channels) + "] " +
          (m.bytes ? "bytes" : "numbers");
@@ -69,10 +74,11 @@ std::string Writer::maps() const {
   for (std::size_t i = 0; i < plan_.maps.size(); ++i) {
     const IntegerMap& m = plan_.maps[i];
     const auto writer = std::ranges::find(plan_.steps, static_cast<int>(i), &IntegerStep::y);
-    out += "    {" + text(m.offset) + ", " + text(m.height) + ", " + text(m.width) + ", " + text(m.channels) +
-           ", " + text(m.margin_h) + ", " + text(m.margin_w) + ", " + (m.bytes ? "1" : "0") + ", " +
-           text(m.bytes ? m.scale.zero : 0) + "}, /* " + std::to_string(i) + ": " + writer->name + ", " +
-           shape_of(static_cast<int>(i)) + " */\n";
+    out += "    {" +
+           list({m.offset, m.height, m.width, m.channels, m.margin_h, m.margin_w, m.bytes ? 1 : 0,
+                 m.bytes ? m.scale.zero : 0}) +
+           "}, /* " + std::to_string(i) + ": " + writer->name + ", " + shape_of(static_cast<int>(i)) +
+           " */\n";
   }
   return out + "};\n";
 }
@@ -95,7 +101,7 @@ std::vector<int> in_order(const IntegerStep& s, bool bytes) {
 }
 
 std::string Writer::product(const IntegerStep& s, const std::string& name) {
-  const bool bytes = map(s.x).bytes;
+  const bool bytes = plan_.map(s.x).bytes;
   const std::vector<int> w = in_order(s, bytes);
   const QuantisedProduct& q = s.weights;
   weights_ += w.size() + 8 * q.offset.size();
@@ -114,12 +120,11 @@ std::string Writer::product(const IntegerStep& s, const std::string& name) {
   if (s.segments.size() > 4) throw std::runtime_error("C code: a kernel of over four rows is not supported");
   const kernels::ByteProductJob& job = s.job;
   out += "\n};\nstatic const struct product " + name + " = {" + name + "_weights, " + name + "_outcomes, " +
-         text(job.height) + ", " + text(job.width) + ", " + text(q.outputs) + ", " + text(job.length) + ", " +
-         std::to_string(s.segments.size()) + ", " + std::to_string(job.outcome.negative_slope) + ", " +
-         text(job.from.line) + ", " + text(job.from.pixel) + ", " + text(job.to.line) + ", " +
-         text(job.to.pixel) + ", " + text(s.y_offset) + ", {";
-  for (std::size_t i = 0; i < s.segments.size(); ++i) out += (i > 0 ? ", " : "") + text(s.segments[i]);
-  return out + "}};\n\n";
+         list({job.height, job.width, q.outputs, job.length, static_cast<Dim>(s.segments.size()),
+               job.outcome.negative_slope, job.from.line, job.from.pixel, job.to.line, job.to.pixel,
+               s.y_offset}) +
+         ", {" + list(s.segments) + "}};\n\n";
+  return out;
 }
 
 std::string Writer::products() {
@@ -137,27 +142,23 @@ std::string Writer::products() {
 }
 
 std::string Writer::call_of(const IntegerStep& s, const std::string& product) const {
-  const auto scale = [&] {
-    return text(s.scale.multiplier) + ", " + text(s.scale.offset) + ", " + text(s.scale.shift);
-  };
+  const std::string scale = list({s.scale.multiplier, s.scale.offset, s.scale.shift});
   switch (s.kind) {
     case Kind::input:
-      return "take_input(from, " + at(s.y) + ", " + text(s.first) + ", " + text(s.run) + ", " +
-             text(s.apart) + ", " + text(s.step) + ", " + scale() + ")";
+      return call("take_input", {"from", at(s.y), list({s.first, s.run, s.apart, s.step}), scale});
     case Kind::to_bytes:
-      return "to_bytes(" + at(s.x) + ", " + at(s.y) + ", " + scale() + ")";
+      return call("to_bytes", {at(s.x), at(s.y), scale});
     case Kind::product:
-      return (map(s.x).bytes ? "product_of_bytes(&" : "product_of_numbers(&") + product + ", " + at(s.x) +
-             ", " + at(s.y) + ")";
+      return call(plan_.map(s.x).bytes ? "product_of_bytes" : "product_of_numbers",
+                  {"&" + product, at(s.x), at(s.y)});
     case Kind::copy:
-      return "copy(" + at(s.x) + ", " + at(s.y) + ", " + text(s.at) + ")";
+      return call("copy", {at(s.x), at(s.y), text(s.at)});
     case Kind::mean:
-      return "mean(" + at(s.x) + ", " + at(s.y) + ")";
+      return call("mean", {at(s.x), at(s.y)});
     case Kind::gates:
-      return "gates(" + at(s.x) + ", " + at(s.y) + ")";
+      return call("gates", {at(s.x), at(s.y)});
     case Kind::gated_sum:
-      return "gated_sum(" + at(s.a) + ", " + at(s.x) + ", " + (s.gates < 0 ? "0" : at(s.gates)) + ", " +
-             at(s.y) + ")";
+      return call("gated_sum", {at(s.a), at(s.x), s.gates < 0 ? "0" : at(s.gates), at(s.y)});
   }
   return {};
 }

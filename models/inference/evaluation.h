@@ -24,14 +24,13 @@ struct EvaluatedBatch {
   std::span<const float> predicted_errors;
 
   std::size_t size() const { return static_cast<std::size_t>(inputs.dim(0)); }
-  std::span<const float> input(std::size_t n) const { return sample(inputs, n); }
-  std::span<const float> output(std::size_t n) const { return sample(outputs, n); }
-  std::span<const float> target(std::size_t n) const { return sample(targets, n); }
+  std::span<const float> input(std::size_t n) const { return sample(inputs.values(), n); }
+  std::span<const float> output(std::size_t n) const { return sample(outputs.values(), n); }
+  std::span<const float> target(std::size_t n) const { return sample(targets.values(), n); }
   /// Empty where the network has none.
   std::span<const float> predicted_error(std::size_t n) const { return sample(predicted_errors, n); }
 
  private:
-  std::span<const float> sample(const Tensor& all, std::size_t n) const { return sample(all.values(), n); }
   std::span<const float> sample(std::span<const float> all, std::size_t n) const {
     const std::size_t values = all.size() / size();
     return all.subspan(n * values, values);

@@ -1,6 +1,5 @@
 #include "autograd/tensor.h"
 
-#include <array>
 #include <utility>
 
 #include "tests/autograd/check.h"

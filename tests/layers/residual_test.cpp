@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "tests/expect_error.h"
 #include "tests/layers/noise.h"
 

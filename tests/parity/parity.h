@@ -5,12 +5,14 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <numeric>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "autograd/tensor.h"
 #include "io/files/safetensors.h"
+#include "layers/checkpoint.h"
 
 namespace supertac::test {
 
@@ -27,6 +29,14 @@ inline std::vector<double> counter_numbers(const std::string& name, std::size_t 
     values[i] = bound * (static_cast<double>(z >> 40) * 0x1p-23 - 1);
   }
   return values;
+}
+
+/// Where element i of the file's order of a parameter lies in memory.
+inline std::vector<std::size_t> places(const Shape& shape, Layout layout) {
+  Tensor numbered(shape);
+  std::iota(numbered.values().begin(), numbered.values().end(), real(0));
+  const std::vector<float> order = to_stored({"", Variable(numbered), layout}).values;
+  return {order.begin(), order.end()};
 }
 
 /// A stored array of either type.

@@ -36,7 +36,7 @@ void take_runs(const IntegerStep& s, const IntegerMap& y, const real* input, rea
 }
 
 void run_input(const IntegerStep& s, const Memory& m) {
-  const IntegerMap& y = m.plan.maps[static_cast<std::size_t>(s.y)];
+  const IntegerMap& y = m.plan.map(s.y);
   const Dim pixels = y.height * y.width, row = y.width * y.channels;
   auto* const values = reinterpret_cast<real*>(m.scratch);
   auto* const numbers = reinterpret_cast<std::int16_t*>(values + pixels * y.channels);
@@ -86,7 +86,6 @@ void run_mean(const IntegerMap& x, const IntegerMap& y, const Memory& m) {
 }
 
 void run_lines(const IntegerStep& s, const IntegerMap& x, const IntegerMap& y, const Memory& m) {
-  const auto map = [&](int i) -> const IntegerMap& { return m.plan.maps[static_cast<std::size_t>(i)]; };
   for (Dim n = 0; n < m.images; ++n)
     for (Dim line = 0; line < x.height; ++line) {
       const auto at = [&](const IntegerMap& of) { return n * of.image() + line * of.line(); };
@@ -94,18 +93,19 @@ void run_lines(const IntegerStep& s, const IntegerMap& x, const IntegerMap& y, c
         kernels::to_bytes(x.width * x.channels, m.numbers(x) + at(x), s.scale.multiplier, s.scale.offset,
                           s.scale.shift, y.scale.zero, m.bytes(y) + at(y));
       else
-        kernels::gated_sum(x.width, x.channels, m.numbers(map(s.a)) + at(map(s.a)), m.numbers(x) + at(x),
-                           s.gates < 0 ? nullptr : m.numbers(map(s.gates)) + n * map(s.gates).image(),
-                           m.numbers(y) + at(y));
+        kernels::gated_sum(
+            x.width, x.channels, m.numbers(m.plan.map(s.a)) + at(m.plan.map(s.a)), m.numbers(x) + at(x),
+            s.gates < 0 ? nullptr : m.numbers(m.plan.map(s.gates)) + n * m.plan.map(s.gates).image(),
+            m.numbers(y) + at(y));
     }
 }
 
 void run_step(const IntegerStep& s, const Memory& m) {
   using Kind = IntegerStep::Kind;
-  const IntegerMap& y = m.plan.maps[static_cast<std::size_t>(s.y)];
+  const IntegerMap& y = m.plan.map(s.y);
   if (s.writes_margin) fill_margin(y, m);
   if (s.kind == Kind::input) return run_input(s, m);
-  const IntegerMap& x = m.plan.maps[static_cast<std::size_t>(s.x)];
+  const IntegerMap& x = m.plan.map(s.x);
   switch (s.kind) {
     case Kind::product:
       return run_product(s, x, y, m);
@@ -121,7 +121,7 @@ void run_step(const IntegerStep& s, const Memory& m) {
 }
 
 void copy_out(const Memory& m, int of, Dim first, Tensor& to) {
-  const IntegerMap& map = m.plan.maps[static_cast<std::size_t>(of)];
+  const IntegerMap& map = m.plan.map(of);
   real* target = to.data() + first * map.height * map.width * map.channels;
   for (Dim n = 0; n < m.images; ++n)
     for (Dim line = 0; line < map.height; ++line)
@@ -133,7 +133,7 @@ void copy_out(const Memory& m, int of, Dim first, Tensor& to) {
 }
 
 void show(const StepWatch& watch, const Memory& m, const IntegerStep& step) {
-  const IntegerMap& y = m.plan.maps[static_cast<std::size_t>(step.y)];
+  const IntegerMap& y = m.plan.map(step.y);
   Tensor map(Shape{y.height, y.width, y.channels});
   copy_out(m, step.y, 0, map);
   if (step.kind == IntegerStep::Kind::gates)  // in 4096ths
@@ -148,10 +148,9 @@ float IntegerPlan::number_step() const { return std::ldexp(1.0F, -fraction_bits)
 Estimate IntegerPlan::run(const Tensor& inputs, const StepWatch* watch) const {
   const Dim count = inputs.dim(0), size = count == 0 ? 0 : inputs.size() / count;
   Estimate out;
-  const auto map_of = [&](int i) { return maps[static_cast<std::size_t>(i)]; };
-  out.picture = Tensor(Shape{count, map_of(picture).height, map_of(picture).width, 1});
+  out.picture = Tensor(Shape{count, map(picture).height, map(picture).width, 1});
   if (predicted_error >= 0) out.predicted_error = Tensor(out.picture.shape());
-  if (latents >= 0) out.latents = Tensor(Shape{count, map_of(latents).channels});
+  if (latents >= 0) out.latents = Tensor(Shape{count, map(latents).channels});
   const Dim bytes = scratch + work_area * std::min(count, kBlock);
   Tensor memory(Shape{bytes / static_cast<Dim>(sizeof(real)) + 1});
   auto* const begin = reinterpret_cast<std::uint8_t*>(memory.data());

@@ -62,6 +62,7 @@ struct IntegerPlan {
   /// Throws nothing; inputs as Network::estimate.
   Estimate run(const Tensor& inputs, const StepWatch* watch = nullptr) const;
   float number_step() const;
+  const IntegerMap& map(int i) const { return maps[static_cast<std::size_t>(i)]; }
 
   std::vector<IntegerMap> maps;
   std::vector<IntegerStep> steps;

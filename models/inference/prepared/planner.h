@@ -3,7 +3,7 @@
 
 #include <map>
 #include <memory>
-#include <string>
+#include <string_view>
 
 #include "autograd/kernels/fast/isa/isa.h"
 #include "models/inference/prepared/plan.h"

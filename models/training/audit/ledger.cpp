@@ -33,10 +33,6 @@ std::optional<Ledger::Line> line_in(const std::string& text) {
   return line;
 }
 
-std::string chained(const std::string& before, const std::string& content) {
-  return sha256(before + content);
-}
-
 }  // namespace
 
 std::string LedgerLine::text(bool with_chain) const {
@@ -80,7 +76,7 @@ Ledger Ledger::read(const std::string& path) {
     if (in.eof()) break;  // torn off in the middle: the run was killed as it wrote
     std::optional<Line> line = line_in(text);
     if (!line) throw FileError(path, none);
-    chain = chained(chain, text.substr(0, text.rfind(kChain)) + "}");
+    chain = sha256(chain + text.substr(0, text.rfind(kChain)) + "}");
     if (line->chain != chain)
       throw FileError(path, "step " + std::to_string(line->step) +
                                 ": the chain is broken; a line was changed after it had been written");
@@ -125,7 +121,7 @@ std::optional<LedgerLine> LedgerWriter::after_step() {
   if (trainer_.step() % every_ != 0 && !trainer_.done()) return std::nullopt;
   LedgerLine line{
       .step = trainer_.step(), .batches = batches_.hex(), .tensors = hashes_of(trainer_), .chain = {}};
-  line.chain = chain_ = chained(chain_, line.text(false));
+  line.chain = chain_ = sha256(chain_ + line.text(false));
   batches_ = {};
   return line;
 }

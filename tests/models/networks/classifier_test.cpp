@@ -24,14 +24,14 @@ TEST(TextureClassifier, TakesFramesAndPictures) {
 
 TEST(TextureClassifier, RefusesSettingsOutOfRange) {
   Rng rng(1);
-  EXPECT_EQ(what_of<std::invalid_argument>(
-                [&] { TextureClassifier({.height = 2, .width = 4, .classes = 6}, rng); }),
-            "TextureClassifier: expects sides of 4 to 2048, a channel or more and 2 to 1024 classes, got "
-            "2x4, 1 and 6");
-  EXPECT_EQ(what_of<std::invalid_argument>(
-                [&] { TextureClassifier({.height = 16, .width = 16, .classes = 1}, rng); }),
-            "TextureClassifier: expects sides of 4 to 2048, a channel or more and 2 to 1024 classes, got "
-            "16x16, 1 and 1");
+  const std::pair<ClassifierSettings, const char*> refused[] = {
+      {{.height = 2, .width = 4, .classes = 6}, "2x4, 1 and 6"},
+      {{.height = 16, .width = 16, .classes = 1}, "16x16, 1 and 1"}};
+  for (const auto& [settings, got] : refused)
+    EXPECT_EQ(what_of<std::invalid_argument>([&, &s = settings] { TextureClassifier(s, rng); }),
+              std::string("TextureClassifier: expects sides of 4 to 2048, a channel or more and 2 to 1024 "
+                          "classes, got ") +
+                  got);
 }
 
 TEST(FeatureClassifier, TakesNumbersAndRefusesNone) {

@@ -88,17 +88,10 @@ Tensor tensor(const Shape& shape, const std::vector<double>& values, std::size_t
   return t;
 }
 
-/// Where element i of the file's layout lies in memory.
-std::vector<std::size_t> memory_order(const Parameter& p) {
-  Tensor places(p.value.shape());
-  for (Dim i = 0; i < places.size(); ++i) places.data()[i] = static_cast<real>(i);
-  const std::vector<float> order = to_stored(p, places, p.name).values;
-  return {order.begin(), order.end()};
-}
-
 std::vector<double> in_file_order(const Parameter& p, const Tensor& t) {
   std::vector<double> values;
-  for (const std::size_t at : memory_order(p)) values.push_back(static_cast<double>(t.data()[at]));
+  for (const std::size_t at : test::places(p.value.shape(), p.layout))
+    values.push_back(static_cast<double>(t.data()[at]));
   return values;
 }
 
@@ -109,7 +102,7 @@ void initialise(SuperTac& model) {
     double fan_in = 1;
     for (std::size_t i = 1; i < shape.size(); ++i) fan_in *= static_cast<double>(shape[i]);
     const double bound = shape.size() == 1 ? 0.125 : std::exp2(std::floor(-std::log2(fan_in) / 2));
-    const std::vector<std::size_t> order = memory_order(p);
+    const std::vector<std::size_t> order = test::places(p.value.shape(), p.layout);
     const std::vector<double> values = counter_numbers(p.name, order.size(), bound);
     Variable handle = p.value;
     for (std::size_t i = 0; i < order.size(); ++i) {

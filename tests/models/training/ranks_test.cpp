@@ -82,11 +82,11 @@ TEST(Ranks, TheMajoritySaysWhoDisagrees) {
 class RanksTrain : public testing::Test {
  protected:
   RanksTrain() {
-    settings_.augment = {.gain = 0.5, .noise = 0.02};
-    settings_.batch = 12;  // micro-batches of one and of two samples
+    small_.recipe.augment = {.gain = 0.5, .noise = 0.02};
+    small_.recipe.batch = 12;  // micro-batches of one and of two samples
   }
   Trainer trainer(Ranks& ranks) const {
-    return {windows_, all_of(windows_), Objective(windows_, settings_), ranks};
+    return {small_.windows, all_of(small_.windows), Objective(small_.windows, small_.recipe), ranks};
   }
   /// From the state in `from` ("" = start) by `ranks` for `steps` steps; the state's file.
   std::string train(int size, const std::string& from, std::int64_t steps) {
@@ -103,8 +103,7 @@ class RanksTrain : public testing::Test {
   }
 
   TemporaryFolder folder_;
-  Recipe settings_ = small_training();
-  const WindowSet windows_ = small_windows(settings_.model);
+  SmallTraining small_;
   std::atomic<double> last_loss_ = 0;
 
  private:
@@ -124,7 +123,7 @@ TEST_F(RanksTrain, TheSameBytesForAnyNumberOfThem) {
 }
 
 TEST_F(RanksTrain, SixteenShareABatchOf128) {
-  settings_.batch = 128;
+  small_.recipe.batch = 128;
   const std::string alone = file_text(train(1, "", 2));
   EXPECT_TRUE(alone == file_text(train(16, "", 2)));
   EXPECT_TRUE(alone == file_text(train(2, "", 2)));

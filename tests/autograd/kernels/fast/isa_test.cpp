@@ -2,7 +2,6 @@
 #include "autograd/kernels/fast/isa/isa.h"
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
 
 #include "autograd/kernels/fast/winograd.h"
