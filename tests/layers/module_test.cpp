@@ -68,10 +68,5 @@ TEST(Module, RefusesALayerWithoutInputs) {
             "fan-in of 0");
 }
 
-TEST(Module, CountsItsParameters) {
-  Rng rng(1);
-  EXPECT_EQ(Linear(3, 5, rng).parameter_count(), 20);
-}
-
 }  // namespace
 }  // namespace supertac

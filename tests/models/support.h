@@ -1,6 +1,7 @@
 // Small models and windows for the tests of models/.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <string>
 
@@ -46,6 +47,12 @@ inline SuperTacSettings small_settings() {
 inline SuperTac random_network(const SuperTacSettings& settings = small_settings(), std::uint64_t seed = 1) {
   Rng rng(seed);
   return SuperTac(settings, rng);
+}
+
+/// The values of the parameter of this name, to spoil them.
+inline Tensor& weights_of(const Module& module, const std::string& name) {
+  const auto found = std::ranges::find(module.parameters(), name, &Parameter::name);
+  return Variable(found->value).mutable_value();
 }
 
 inline Recipe small_training() {

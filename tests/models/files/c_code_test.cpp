@@ -46,9 +46,8 @@ class Compiled {
 bool has_compiler() { return std::system("cc --version > /dev/null 2>&1") == 0; }
 
 ModelFile model_of(const SuperTacSettings& settings, const InputSettings& input) {
-  Rng rng(3);
   ModelFile file;
-  file.model = std::make_unique<SuperTac>(settings, rng);
+  file.model = std::make_unique<SuperTac>(random_network(settings, 3));
   file.input = input;
   file.ranges.emplace();
   file.ranges->add(*file.model, uniform(file.model->input_shape(16), 5));

@@ -22,9 +22,8 @@ ModelFile model_of(const std::string& preset, const TaxelArray& array, Grouping 
   set_array(settings, array);
   settings.grouping = grouping;
   settings.last_frame_path = last_frame;
-  Rng rng(7);
   ModelFile file;
-  file.model = std::make_unique<SuperTac>(settings, rng);
+  file.model = std::make_unique<SuperTac>(random_network(settings, 7));
   file.input.scaling.per_window = true;
   file.metadata = model_metadata(settings, file.input);
   return file;

@@ -143,9 +143,7 @@ TEST_F(RanksTrain, ADifferenceNamesRankAndTensorAndKeepsTheState) {
   const Texts errors = on_ranks(4, [&](Ranks& ranks) {
     Trainer t = trainer(ranks);
     t.restore(path, {});
-    for (const Parameter& p : t.model().parameters())
-      if (ranks.rank() == 3 && p.name == "upsampler.out.weight")
-        Variable(p.value).mutable_value().data()[5] += 1e-6F;
+    if (ranks.rank() == 3) weights_of(t.model(), "upsampler.out.weight").data()[5] += 1e-6F;
     t.train_step();
     t.save(path, {});
   });
@@ -158,8 +156,7 @@ TEST_F(RanksTrain, ADifferenceNamesRankAndTensorAndKeepsTheState) {
 TEST_F(RanksTrain, AllNameTheLayerThatIsNotFinite) {
   const Texts errors = on_ranks(2, [&](Ranks& ranks) {
     Trainer t = trainer(ranks);
-    for (const Parameter& p : t.model().parameters())
-      if (ranks.rank() == 1 && p.name == "upsampler.out.weight") Variable(p.value).mutable_value().fill(NAN);
+    if (ranks.rank() == 1) weights_of(t.model(), "upsampler.out.weight").fill(NAN);
     t.train_step();
   });
   for (const std::string& error : errors)

@@ -13,10 +13,9 @@ namespace {
 
 // What a model trained by this recipe says of itself.
 ModelFile file_of(const Recipe& recipe, const std::string& path) {
-  Rng rng(0);
   InputSettings input{.rate_hz = recipe.rate_hz, .scaling = recipe.range.value_or(Scaling())};
   input.scaling.per_window = recipe.per_window;
-  save_model(path, SuperTac(recipe.model, rng), input, metadata_of(recipe));
+  save_model(path, random_network(recipe.model), input, metadata_of(recipe));
   return load_model(path);
 }
 
@@ -89,8 +88,7 @@ TEST(Recipe, RefusesWhatNoTrainingHas) {
 TEST(Recipe, AFileThatDoesNotSayItIsRefusedByName) {
   const TemporaryFolder folder;
   const std::string path = folder / "old.safetensors";
-  Rng rng(0);
-  save_model(path, SuperTac(small_settings(), rng), {}, {{"seed", "1"}});
+  save_model(path, random_network(), {}, {{"seed", "1"}});
   EXPECT_ERROR(Recipe::of(load_model(path), path), std::runtime_error,
                path + ": metadata \"training\" is missing");
 }

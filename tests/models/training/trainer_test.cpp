@@ -241,9 +241,7 @@ std::string stopped(const std::string& name, const std::function<void(Tensor&)>&
   const SmallTraining small;
   Trainer trainer = small.trainer();
   trainer.train_step();
-  for (const Parameter& p : trainer.model().parameters()) {
-    if (p.name == name) damage(Variable(p.value).mutable_value());
-  }
+  damage(weights_of(trainer.model(), name));
   return what_of<TrainingStopped>([&] { trainer.train_step(); });
 }
 

@@ -38,14 +38,9 @@ TEST(Diagnosis, NamesTheTruth) {
 
 TEST(Diagnosis, NamesAParameterAndALayer) {
   Sample s;
-  const auto fill = [&](const std::string& name, real value) {
-    for (const Parameter& p : s.model.parameters()) {
-      if (p.name == name) Variable(p.value).mutable_value().fill(value);
-    }
-  };
-  fill("upsampler.fc.weight", real(3e38));
+  weights_of(s.model, "upsampler.fc.weight").fill(real(3e38));
   EXPECT_EQ(s.where(), "the output of linear in upsampler.fc is the first that is not finite");
-  fill("upsampler.out.bias", kNan);
+  weights_of(s.model, "upsampler.out.bias").fill(kNan);
   EXPECT_EQ(s.where(), "parameter upsampler.out.bias is not finite");
 }
 
