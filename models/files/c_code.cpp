@@ -145,7 +145,8 @@ std::string Writer::call_of(const IntegerStep& s, const std::string& product) co
   const std::string scale = list({s.scale.multiplier, s.scale.offset, s.scale.shift});
   switch (s.kind) {
     case Kind::input:
-      return call("take_input", {"from", at(s.y), list({s.first, s.run, s.apart, s.step}), scale});
+      return call("take_input",
+                  {"from", at(s.y), list({s.runs.first, s.runs.run, s.runs.apart, s.runs.step}), scale});
     case Kind::to_bytes:
       return call("to_bytes", {at(s.x), at(s.y), scale});
     case Kind::product:

@@ -29,7 +29,7 @@ void fill_margin(const IntegerMap& map, const Memory& m) {
   fill_margin(map, m.images, std::int16_t{0}, reinterpret_cast<std::int16_t*>(m.begin(map)));
 }
 
-void take_runs(const IntegerStep& s, const IntegerMap& y, const real* input, real* out) {
+void take_runs(const InputRuns& s, const IntegerMap& y, const real* input, real* out) {
   for (Dim pixel = 0; pixel < y.height * y.width; ++pixel, input += s.step)
     for (Dim k = 0; k < y.channels; k += s.run)
       out = std::copy_n(input + s.first + k / s.run * s.apart, s.run, out);
@@ -41,7 +41,7 @@ void run_input(const IntegerStep& s, const Memory& m) {
   auto* const values = reinterpret_cast<real*>(m.scratch);
   auto* const numbers = reinterpret_cast<std::int16_t*>(values + pixels * y.channels);
   for (Dim n = 0; n < m.images; ++n) {
-    take_runs(s, y, m.input + n * m.plan.input_size, values);
+    take_runs(s.runs, y, m.input + n * m.plan.input_size, values);
     kernels::to_numbers(pixels * y.channels, values, 1 / m.plan.number_step(), numbers);
     for (Dim line = 0; line < y.height; ++line) {
       const Dim at = n * y.image() + line * y.line();

@@ -28,7 +28,7 @@ struct IntegerMap : FeatureMap {
 
 struct IntegerStep {
   enum class Kind {
-    input,      ///< y = the network's input, or of it, for each pixel, runs of `run` numbers from `first` on
+    input,      ///< y = runs of the network's input
     to_bytes,   ///< y = x in another scale
     product,    ///< a convolution or linear layer, or every second pixel of a transposed convolution
     copy,       ///< y, from channel `at` on, = x without its margin
@@ -42,9 +42,8 @@ struct IntegerStep {
   bool writes_margin = false;              ///< the first step that writes y: its margin is filled before
 
   Requantise scale = {};  ///< input, to_bytes
-  Dim first = 0, run = 0, apart = 0,
-      step = 0;  ///< input; `step`: from one pixel's first number to the next's
-  Dim at = 0;    ///< copy
+  InputRuns runs = {};    ///< input
+  Dim at = 0;             ///< copy
 
   // product: `job` has all but pointers and images; offsets are from the maps' first pixels.
   kernels::ByteProductJob job = {};

@@ -180,11 +180,7 @@ void IntegerPlanner::take_input(const TracedOp& op) {
   const bool bytes = as_bytes(y.node()) && !as_numbers(y.node());
   const int to = new_map(y, bytes);
   IntegerStep& step = add(Kind::input, "input", -1, to);
-  step.run = step.step = y.dim(y.rank() - 1);
-  if (op.op == "last_frame") step.first = plan_->input_size - y.value().size();
-  if (op.op == "take_runs")
-    step.first = op.settings.first, step.run = op.settings.run, step.apart = op.settings.step,
-    step.step = op.inputs[0].dim(2);
+  step.runs = InputRuns::of(op);
   if (bytes) step.scale = requantise(plan_->number_step(), map(to).scale.step);
   const Dim values = y.size() / y.dim(0);
   plan_->scratch = std::max(plan_->scratch, (values * 6 + 63) / 64 * 64);

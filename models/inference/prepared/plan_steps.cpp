@@ -9,37 +9,24 @@
 
 namespace supertac {
 
-static void last_frame_step(Planner& planner, const TracedOp& op) {
-  const FeatureMap y = planner.new_map(op.y);
-  const Dim frame = op.inputs[0].dim(2), window = op.inputs[0].dim(1) * frame;
-  planner.add_step([=](const Block& b) {
-    for (Dim n = 0; n < b.images; ++n) {
-      const real* from = b.input + (n + 1) * window - frame;
-      real* line = b.first_pixel(y) + n * y.image();
-      for (Dim i = 0; i < y.height; ++i, line += y.line(), from += y.width * y.channels)
-        std::copy_n(from, y.width * y.channels, line);
-    }
-  });
-}
-
 template <Dim kRun>
 static void copy_runs(Dim rows, const real* from, Dim from_step, real* to, Dim to_step) {
   for (Dim r = 0; r < rows; ++r, from += from_step, to += to_step) std::copy_n(from, kRun, to);
 }
 
-static void take_runs_step(Planner& planner, const TracedOp& op) {
+static void input_step(Planner& planner, const TracedOp& op) {
   const FeatureMap y = planner.new_map(op.y);
-  const Dim width = op.inputs[0].dim(2), rows = y.width;
-  const OpSettings s = op.settings;
-  const Dim piece = s.run % 4 == 0 ? 4 : 1;  // a row of the rig's array is one move
+  const Dim size = op.inputs[0].size() / op.inputs[0].dim(0);
+  const InputRuns runs = InputRuns::of(op);
+  const Dim piece = runs.run % 4 == 0 ? 4 : 1;  // a row of the rig's array is one move
   planner.add_step([=](const Block& b) {
     for (Dim n = 0; n < b.images; ++n) {
-      const real* from = b.input + n * rows * width + s.first;
-      real* to = b.first_pixel(y) + n * y.image();
-      for (Dim k = 0; k < y.channels; k += piece) {
-        (piece == 4 ? copy_runs<4> : copy_runs<1>)(rows, from + k / s.run * s.step + k % s.run, width, to + k,
-                                                   y.channels);
-      }
+      const real* from = b.input + n * size + runs.first;
+      real* line = b.first_pixel(y) + n * y.image();
+      for (Dim i = 0; i < y.height; ++i, line += y.line(), from += y.width * runs.step)
+        for (Dim k = 0; k < y.channels; k += piece)
+          (piece == 4 ? copy_runs<4> : copy_runs<1>)(y.width, from + k / runs.run * runs.apart + k % runs.run,
+                                                     runs.step, line + k, y.channels);
     }
   });
 }
@@ -188,8 +175,8 @@ static void sum_step(Planner& planner, const TracedOp& op) {
 
 const std::map<std::string_view, Planner::Make>& Planner::makers() {
   static const std::map<std::string_view, Make> known{
-      {"take_runs", take_runs_step},
-      {"last_frame", last_frame_step},
+      {"take_runs", input_step},
+      {"last_frame", input_step},
       {"conv1d", [](Planner& planner, const TracedOp& op) { planner.conv(op); }},
       {"conv2d", [](Planner& planner, const TracedOp& op) { planner.conv(op); }},
       {"conv_transpose1d", [](Planner& planner, const TracedOp& op) { planner.transposed_conv(op); }},

@@ -102,6 +102,13 @@ static std::vector<ProductTaps> transposed_conv(const TracedOp& op, const Featur
   return products;
 }
 
+InputRuns InputRuns::of(const TracedOp& op) {
+  const OpSettings& s = op.settings;
+  if (op.op == "take_runs") return {s.first, s.run, s.step, op.inputs[0].dim(2)};
+  const Dim channels = op.y.dim(3);
+  return {(op.inputs[0].size() - op.y.size()) / op.y.dim(0), channels, 0, channels};
+}
+
 TraceWalk::TraceWalk(const TracedDrawing& traced) : input_(traced.input.node()) {
   const std::vector<TracedOp>& ops = traced.trace.ops();
   for (std::size_t i = 0; i < ops.size(); ++i) {

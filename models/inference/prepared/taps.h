@@ -49,6 +49,13 @@ void fill_margin(const FeatureMap& map, Dim images, T value, T* image) {
   }
 }
 
+/// What a map takes of the network's input: for each pixel, runs of `run` numbers from `first` on, `apart`
+/// from one to the next; a pixel's first number is `step` behind that of the one before.
+struct InputRuns {
+  Dim first = 0, run = 0, apart = 0, step = 0;
+  static InputRuns of(const TracedOp& op);  ///< take_runs or last_frame
+};
+
 /// A convolution, every second pixel of a transposed one, or a linear layer as a product: w
 /// [segments * length][cout] times the runs of `length` numbers that begin `segments` behind an output's
 /// place.
