@@ -9,6 +9,8 @@
 
 #include <csignal>
 #include <filesystem>
+#include <iterator>
+#include <sstream>
 
 #include "io/files/file.h"
 
@@ -50,6 +52,7 @@ RunningProcess::RunningProcess(const std::string& program, const std::vector<std
   redirect(STDOUT_FILENO, folder_.file("out"), O_CREAT | O_TRUNC);
   redirect(STDERR_FILENO, error, options.terminal ? O_NOCTTY : O_CREAT | O_TRUNC);
   if (options.terminal) setenv("TERM", "vt100", 1);
+  if (!options.folder.empty() && chdir(options.folder.c_str()) != 0) _exit(126);
   if (options.max_file_bytes >= 0) {
     const auto bytes = static_cast<rlim_t>(options.max_file_bytes);
     const rlimit limit{bytes, bytes};
@@ -96,14 +99,31 @@ ProcessResult RunningProcess::wait() {
   return result;
 }
 
-ProcessResult run_process(const std::string& program, const std::vector<std::string>& arguments,
-                          const ProcessOptions& options) {
-  RunningProcess process(program, arguments, options);
+static ProcessResult end_of(RunningProcess& process, const ProcessOptions& options) {
   if (options.signal != 0) {
     wait_for_file(options.signal_when);
     process.send(options.signal);
   }
   return process.wait();
+}
+
+ProcessResult run_process(const std::string& program, const std::vector<std::string>& arguments,
+                          const ProcessOptions& options) {
+  RunningProcess process(program, arguments, options);
+  return end_of(process, options);
+}
+
+RunningProcess start_in(const std::string& folder, const std::string& line, ProcessOptions options) {
+  std::istringstream text(line);
+  std::string program;
+  text >> program;
+  options.folder = folder;
+  return {program, {std::istream_iterator<std::string>(text), {}}, options};
+}
+
+ProcessResult run_in(const std::string& folder, const std::string& line, ProcessOptions options) {
+  RunningProcess process = start_in(folder, line, options);
+  return end_of(process, options);
 }
 
 static bool has_files(const std::string& folder) {

@@ -21,6 +21,7 @@ struct ProcessOptions {
   std::string signal_when{};
   long max_file_bytes = -1;  ///< limit on the size of files written; -1: none
   bool terminal = false;     ///< stderr is a terminal of 100 columns
+  std::string folder{};      ///< where it runs; empty: where the test does
 };
 
 /// A program that runs beside the test; killed when the test ends first. `program` is a path or a name in the
@@ -51,6 +52,11 @@ class RunningProcess {
 /// Starts it and waits for its end.
 ProcessResult run_process(const std::string& program, const std::vector<std::string>& arguments,
                           const ProcessOptions& options = {});
+
+/// The same of a command line such as "supertac-info m.safetensors" in a folder, whose files it names without
+/// it. Spaces separate its words, and nothing quotes.
+ProcessResult run_in(const std::string& folder, const std::string& line, ProcessOptions options = {});
+RunningProcess start_in(const std::string& folder, const std::string& line, ProcessOptions options = {});
 
 /// Waits up to two minutes, of a busy machine, for a file to appear and to have so many bytes.
 void wait_for_file(const std::string& path, std::uintmax_t bytes = 0);

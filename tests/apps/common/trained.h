@@ -1,10 +1,7 @@
 // A small training on simulated data, for tests of what becomes of it.
 #pragma once
 
-#include <algorithm>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "tests/apps/common/simulated_data.h"
 
@@ -12,18 +9,17 @@ namespace supertac {
 
 class Training : public OnSimulatedData {
  protected:
-  static std::vector<std::string> options(const std::string& out, std::vector<std::string> more = {}) {
-    std::vector<std::string> all{"--data",   path("data"), "--out",   path(out), "--timesteps", "32",
-                                 "--latent", "3",          "--scale", "2",       "--batch",     "8"};
-    if (std::find(more.begin(), more.end(), "--stride") == more.end())
-      all.insert(all.end(), {"--stride", "8"});
-    if (std::find(more.begin(), more.end(), "--epochs") == more.end())
-      all.insert(all.end(), {"--epochs", "2"});
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
+  /// Of a small model in seconds; an option that is given again replaces the one before.
+  static std::string options(const std::string& out, const std::string& more = "") {
+    return " --data data --out " + out +
+           " --timesteps 32 --latent 3 --scale 2 --batch 8 --stride 8 --epochs 2 " + more;
   }
-  static ProcessResult train(const std::string& out, std::vector<std::string> more = {}) {
-    return run_process("supertac-train", options(out, std::move(more)));
+  static ProcessResult train(const std::string& out, const std::string& more = "") {
+    return run("supertac-train" + options(out, more));
+  }
+  /// train() that has to succeed.
+  static ProcessResult trained(const std::string& out, const std::string& more = "") {
+    return succeed("supertac-train" + options(out, more));
   }
 };
 

@@ -13,7 +13,7 @@
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/sha256.h"
-#include "tests/apps/common/simulated_data.h"
+#include "tests/apps/common/trained.h"
 
 namespace supertac {
 namespace {
@@ -34,9 +34,11 @@ std::set<std::string> ops_in_sources() {
   return names;
 }
 
-TEST(CheckGradients, EveryOpOfTheSourcesIsRight) {
-  const auto result = run_process("supertac-check", {"gradients", "--json", "-"});
-  ASSERT_EQ(result.code, 0) << result.out << result.error;
+using Check = ProgramTest;
+using CheckGradients = ProgramTest;
+
+TEST_F(CheckGradients, EveryOpOfTheSourcesIsRight) {
+  const ProcessResult result = succeed("supertac-check gradients --json -");
   const auto table = nlohmann::json::parse(result.out);
   std::set<std::string> ops, kinds;
   for (const auto& row : table["rows"]) {
@@ -49,9 +51,8 @@ TEST(CheckGradients, EveryOpOfTheSourcesIsRight) {
   EXPECT_EQ(kinds, (std::set<std::string>{"op", "layer", "loss"}));
 }
 
-TEST(CheckGradients, PlantedErrorsAreFoundAndNamed) {
-  const auto result = run_process("supertac-check", {"gradients", "--break", "gated_sum", "--json", "-"});
-  ASSERT_EQ(result.code, 0) << result.out << result.error;
+TEST_F(CheckGradients, PlantedErrorsAreFoundAndNamed) {
+  const ProcessResult result = succeed("supertac-check gradients --break gated_sum --json -");
   const auto table = nlohmann::json::parse(result.out);
   EXPECT_EQ(table["planted"], 12);  // four errors in the gradients of a, x and s
   EXPECT_EQ(table["found"], 12);
@@ -62,15 +63,12 @@ TEST(CheckGradients, PlantedErrorsAreFoundAndNamed) {
   }
 }
 
-TEST(CheckGradients, AnUnknownOpIsNamed) {
-  const auto result = run_process("supertac-check", {"gradients", "--break", "gated_sums"});
-  EXPECT_EQ(result.code, 2);
-  EXPECT_NE(result.error.find("did you mean 'gated_sum'?"), std::string::npos) << result.error;
+TEST_F(CheckGradients, AnUnknownOpIsNamed) {
+  expect_exit(run("supertac-check gradients --break gated_sums"), 2, "did you mean 'gated_sum'?");
 }
 
-TEST(Check, TheBitsOfThisProcessor) {
-  const auto result = run_process("supertac-check", {"bits", "--report"});
-  EXPECT_EQ(result.code, 0) << result.out << result.error;
+TEST_F(Check, TheBitsOfThisProcessor) {
+  const ProcessResult result = succeed("supertac-check bits --report");
   // The rows of the page end in the same hashes.
   const std::string page = read_text_file(SUPERTAC_SOURCE "/docs/bits.md", 1 << 20);
   std::istringstream rows(result.out);
@@ -78,14 +76,13 @@ TEST(Check, TheBitsOfThisProcessor) {
   for (std::string row; std::getline(rows, row); ++count) {
     std::smatch hashes;
     ASSERT_TRUE(std::regex_search(row, hashes, std::regex("\\|( [0-9a-f]{16} \\|){4}$"))) << row;
-    EXPECT_NE(page.find(hashes[0]), std::string::npos) << row;
+    EXPECT_TRUE(contains(page, hashes[0].str())) << row;
   }
   EXPECT_GE(count, 1U);
 }
 
-TEST(Check, TheMachineIsDescribed) {
-  const auto result = run_process("supertac-check", {"machine", "--json", "-"});
-  ASSERT_EQ(result.code, 0) << result.error;
+TEST_F(Check, TheMachineIsDescribed) {
+  const ProcessResult result = succeed("supertac-check machine --json -");
   std::set<std::string> found;
   const auto described = nlohmann::json::parse(result.out);
   for (const auto& row : described["findings"]) found.insert(row["what"]);
@@ -94,43 +91,40 @@ TEST(Check, TheMachineIsDescribed) {
     EXPECT_TRUE(found.contains(what)) << what;
 }
 
-TEST(Check, PrintsAUdevRule) {
-  const auto result = run_process("supertac-check", {"udev"});
-  ASSERT_EQ(result.code, 0) << result.error;
+TEST_F(Check, PrintsAUdevRule) {
+  const ProcessResult result = succeed("supertac-check udev");
   int rules = 0;
   std::istringstream lines(result.out);
   for (std::string line; std::getline(lines, line);)  // a comment, or conditions and assignments
     if (!line.starts_with('#')) {
       ++rules;
       EXPECT_TRUE(line.starts_with("SUBSYSTEM==\"tty\", ")) << line;
-      EXPECT_NE(line.find("TAG+=\"uaccess\""), std::string::npos) << line;
+      EXPECT_TRUE(contains(line, "TAG+=\"uaccess\""));
     }
   EXPECT_EQ(rules, 1);
 }
 
-class Audit : public OnSimulatedData {
+class Audit : public Training {
  protected:
-  static ProcessResult train(const std::string& out, std::vector<std::string> more = {}) {
-    std::vector<std::string> all{"--data",   path("data"), "--out",    path(out), "--timesteps", "32",
-                                 "--latent", "3",          "--scale",  "2",       "--batch",     "8",
-                                 "--stride", "8",          "--epochs", "4",       "--ledger",    "2"};
-    all.insert(all.end(), more.begin(), more.end());
-    return run_process("supertac-train", all);
+  // With a ledger.
+  static void train(const std::string& out, const std::string& more = "") {
+    trained(out, "--epochs 4 --ledger 2 " + more);
   }
-  static ProcessResult audit(const std::string& model, const char* segments) {
-    return run_process("supertac-check",
-                       {"training", path(model), "--data", path("data"), "--segments", segments});
+  static ProcessResult audit(const std::string& model, const std::string& segments) {
+    return run("supertac-check training " + model + " --data data --segments " + segments);
   }
-  static void edit(const std::string& name, const std::function<void(std::string&)>& change) {
-    std::string text = bytes(name);
-    change(text);
-    write_file(path(name), text);
+  // What a program that is no one of ours says, and its status.
+  static int python(const std::string& words, const std::string& said) {
+    const std::string line =
+        "cd " + folder_->path() + " && " SUPERTAC_PYTHON " " SUPERTAC_SOURCE "/examples/" + words;
+    return std::system((line + " > " + said + " 2>&1").c_str());
   }
+  static bool has_numpy() { return std::system(SUPERTAC_PYTHON " -c 'import numpy' 2>/dev/null") == 0; }
 };
 
 TEST_F(Audit, AModelSaysWhatItWasMadeFrom) {
-  ASSERT_EQ(train("made.safetensors", {"--seed", "3", "--threads", "1"}).code, 0);
-  const auto info = run_process("supertac-info", {path("made.safetensors"), "--json", "-"});
+  train("made.safetensors", "--seed 3 --threads 1");
+  const auto info = run("supertac-info made.safetensors --json -");
   const auto card = nlohmann::json::parse(info.out);
   const auto provenance = card["metadata"]["provenance"];
   EXPECT_EQ(provenance["command"],
@@ -138,50 +132,42 @@ TEST_F(Audit, AModelSaysWhatItWasMadeFrom) {
   EXPECT_EQ(provenance["seed"], "3");
   EXPECT_EQ(provenance["parents"]["recordings"].get<std::string>().size(), 64U);
   EXPECT_GT(card["run"]["seconds"], 0);
-  const auto folder = nlohmann::json::parse(run_process("supertac-info", {path("data"), "--json", "-"}).out);
+  const auto folder = nlohmann::json::parse(run("supertac-info data --json -").out);
   EXPECT_EQ(folder["content"], provenance["parents"]["recordings"]);
-  EXPECT_NE(folder["provenance"][0]["command"].get<std::string>().find("supertac-simulate"),
-            std::string::npos);
+  EXPECT_TRUE(contains(folder["provenance"][0]["command"].get<std::string>(), "supertac-simulate"));
 
-  EXPECT_EQ(run_process("supertac-check", {"file", path("made.safetensors"), path("data")}).code, 0);
+  succeed("supertac-check file made.safetensors data");
   std::filesystem::copy(path("data"), path("fewer"));
   std::filesystem::remove(list_recordings(path("fewer")).front());
-  const auto other = run_process("supertac-check", {"file", path("made.safetensors"), path("fewer")});
+  const auto other = run("supertac-check file made.safetensors fewer");
   EXPECT_EQ(other.code, 1);
-  EXPECT_NE(other.out.find("NOT made from"), std::string::npos) << other.out;
+  EXPECT_TRUE(contains(other.out, "NOT made from"));
 }
 
 TEST_F(Audit, APartThatIsRepeatedGivesTheLedgersLines) {
-  ASSERT_EQ(train("kept.safetensors").code, 0);
-  const auto all = audit("kept.safetensors", "1000");
-  EXPECT_EQ(all.code, 0) << all.out << all.error;
-  const auto one = audit("kept.safetensors", "1");
-  EXPECT_NE(one.out.find("\n1 of "), std::string::npos) << one.out;
+  train("kept.safetensors");
+  EXPECT_EQ(audit("kept.safetensors", "1000").code, 0);
+  EXPECT_TRUE(contains(audit("kept.safetensors", "1").out, "\n1 of "));
 
   // A state is exchanged for that of another training.
-  ASSERT_EQ(train("other.safetensors", {"--learning-rate", "0.0009"}).code, 0);
-  const auto two = run_process("supertac-check",
-                               {"ledgers", path("kept.run/ledger.jsonl"), path("other.run/ledger.jsonl")});
+  train("other.safetensors", "--learning-rate 0.0009");
+  const auto two = run("supertac-check ledgers kept.run/ledger.jsonl other.run/ledger.jsonl");
   EXPECT_EQ(two.code, 1);
-  EXPECT_NE(two.out.find("differs between steps 1 and 2: encoder.0.conv.0.weight"), std::string::npos)
-      << two.out;
+  EXPECT_TRUE(contains(two.out, "differs between steps 1 and 2: encoder.0.conv.0.weight"));
   std::filesystem::copy(path("other.safetensors"), path("kept.safetensors"),
                         std::filesystem::copy_options::overwrite_existing);
-  const auto changed = audit("kept.safetensors", "1");
-  EXPECT_EQ(changed.code, 1) << changed.out;
+  EXPECT_EQ(audit("kept.safetensors", "1").code, 1);
 }
 
 TEST_F(Audit, TheGraphOfATrainingStepHasEveryParametersGradient) {
-  ASSERT_EQ(train("graphed.safetensors").code, 0);
-  const auto result = run_process(
-      "supertac-explain", {path("graphed.safetensors"), "--recording", list_recordings(path("data")).front(),
-                           "--at", "4", "--out", path("step.dot")});
-  ASSERT_EQ(result.code, 0) << result.error;
+  train("graphed.safetensors");
+  const ProcessResult result = succeed("supertac-explain graphed.safetensors --recording " +
+                                       list_recordings(path("data")).front() + " --at 4 --out step.dot");
   const std::string dot = bytes("step.dot");
-  EXPECT_NE(result.out.find("step.dot: the graph of a training step\n"), std::string::npos) << result.out;
+  EXPECT_TRUE(contains(result.out, "step.dot: the graph of a training step\n"));
   for (const char* text : {"encoder.0.conv.0.weight [3,4,16] |value| ", "upsampler.out.bias [1] value ",
                            " us forward, ", " us back", "|y| ", "|g| ", " kB"})
-    EXPECT_NE(dot.find(text), std::string::npos) << text << dot.substr(0, 2000);
+    EXPECT_TRUE(contains(dot, text));
 }
 
 TEST_F(Audit, TheGraphOfAnExpressionHasValuesAndGradients) {
@@ -193,20 +179,18 @@ TEST_F(Audit, TheGraphOfAnExpressionHasValuesAndGradients) {
   const std::string dot = bytes("expression.dot");
   for (const char* text :
        {"a [] value 2  g -3", "b [] value -3  g 2", "10 [] value 10  g 1", "relu []", "y 4  g 1"})
-    EXPECT_NE(dot.find(text), std::string::npos) << text << dot;
-  EXPECT_NE(draw("a=2; a*c").error.find("expected a number, a name that has one, relu( or sigmoid( at 'c'"),
-            std::string::npos);
-  EXPECT_NE(result.out.find("expression.dot: the graph of the expression\n"), std::string::npos)
-      << result.out;
+    EXPECT_TRUE(contains(dot, text));
+  EXPECT_TRUE(
+      contains(draw("a=2; a*c").error, "expected a number, a name that has one, relu( or sigmoid( at 'c'"));
+  EXPECT_TRUE(contains(result.out, "expression.dot: the graph of the expression\n"));
   for (const char* divided : {"a=2; a/2", "a=2; b=3; relu(a)/b"})
-    EXPECT_NE(draw(divided).error.find("expected +, -, * or the end at '/"), std::string::npos) << divided;
-  EXPECT_NE(draw("a/2").error.find("a/2 is no file, and no expression, which has one of + * ( ) ="),
-            std::string::npos);
+    EXPECT_TRUE(contains(draw(divided).error, "expected +, -, * or the end at '/")) << divided;
+  EXPECT_TRUE(contains(draw("a/2").error, "a/2 is no file, and no expression, which has one of + * ( ) ="));
   for (const char* negated : {"a=2; -a", "a=2; 3*-(a+1)"})
-    EXPECT_NE(draw(negated).error.find("a minus stands before a number, or between two parts (0 - a) at '-"),
-              std::string::npos)
+    EXPECT_TRUE(
+        contains(draw(negated).error, "a minus stands before a number, or between two parts (0 - a) at '-"))
         << negated;
-  EXPECT_NE(draw("(1+2").error.find("expected ) at ''"), std::string::npos);
+  EXPECT_TRUE(contains(draw("(1+2").error, "expected ) at ''"));
   EXPECT_EQ(draw("1 + 2 3").code, 2);
 }
 
@@ -227,96 +211,78 @@ TEST_F(Audit, TheTapeOfTheLessonIsDrawnAsToday) {
     for (std::size_t end = 0; end != std::string::npos;
          label.erase(0, end == std::string::npos ? end : end + 2)) {
       end = label.find("\\n");
-      EXPECT_NE(svg.find(">" + label.substr(0, end) + "<"), std::string::npos) << label.substr(0, end);
+      EXPECT_TRUE(contains(svg, ">" + label.substr(0, end) + "<"));
     }
   }
   EXPECT_EQ(boxes, 4U);
 }
 
 TEST_F(Audit, NamesMayHoldSpaces) {
-  const std::string plate = path("my plate.stl"), data = path("my data");
-  write_file(plate, stl_bytes(mesh_of(Plate::named("6_Bumps"), {.resolution_mm = 1}), "6_Bumps"));
-  const auto felt =
-      run_process("supertac-simulate", {"--out", data, "--plates", plate, "--speeds", "10", "--passes", "1"});
-  ASSERT_EQ(felt.code, 0) << felt.error;
-  const auto made = run_process(
-      "supertac-train", {"--data", data, "--out", path("my model.safetensors"), "--plates", "my plate.stl",
-                         "--preset", "tiny", "--stride", "64", "--epochs", "1", "--ledger", "1"});
-  ASSERT_EQ(made.code, 0) << made.error;
-  const auto checked =
-      run_process("supertac-check", {"training", path("my model.safetensors"), "--data", data});
-  EXPECT_EQ(checked.code, 0) << checked.out << checked.error;
+  write_file(path("my plate.stl"),
+             stl_bytes(mesh_of(Plate::named("6_Bumps"), {.resolution_mm = 1}), "6_Bumps"));
+  const std::vector<std::vector<std::string>> commands = {
+      {"supertac-simulate", "--out", path("my data"), "--plates", path("my plate.stl"), "--speeds", "10",
+       "--passes", "1"},
+      {"supertac-train", "--data", path("my data"), "--out", path("my model.safetensors"), "--plates",
+       "my plate.stl", "--preset", "tiny", "--stride", "64", "--epochs", "1", "--ledger", "1"},
+      {"supertac-check", "training", path("my model.safetensors"), "--data", path("my data")}};
+  for (const std::vector<std::string>& words : commands) {
+    const ProcessResult result = run_process(words[0], {words.begin() + 1, words.end()});
+    EXPECT_EQ(result.code, 0) << words[0] << ": " << result.out << result.error;
+  }
 }
 
 TEST_F(Audit, ALedgerThatWasChangedIsRefused) {
-  ASSERT_EQ(train("told.safetensors").code, 0);
-  edit("told.run/ledger.jsonl", [](std::string& text) {
-    const std::size_t at = text.find("\"batches\":\"", text.size() / 2) + 11;
-    text[at] = text[at] == '0' ? '1' : '0';
-  });
-  const auto result = audit("told.safetensors", "1");
-  EXPECT_EQ(result.code, 1);
-  EXPECT_NE(result.error.find("the chain is broken"), std::string::npos) << result.error;
+  train("told.safetensors");
+  std::string text = bytes("told.run/ledger.jsonl");
+  const std::size_t at = text.find("\"batches\":\"", text.size() / 2) + 11;
+  text[at] = text[at] == '0' ? '1' : '0';
+  write_file(path("told.run/ledger.jsonl"), text);
+  expect_exit(audit("told.safetensors", "1"), 1, "the chain is broken");
 }
 
 // Two trainings of the same recordings by recipes that differ in one number.
 TEST_F(Audit, TwoTrainingsPartAtAnOperator) {
-  ASSERT_EQ(train("first.safetensors").code, 0);
-  ASSERT_EQ(train("second.safetensors", {"--beta", "0.002"}).code, 0);
-  const auto compare = [&](std::vector<std::string> more) {
-    std::vector<std::string> words{"ledgers", path("first.run/ledger.jsonl"),
-                                   path("second.run/ledger.jsonl")};
-    words.insert(words.end(), more.begin(), more.end());
-    return run_process("supertac-check", words);
-  };
-  const auto parted = compare({"--data", path("data"), "--out", path("parted.safetensors")});
+  train("first.safetensors");
+  train("second.safetensors", "--beta 0.002");
+  const std::string compare = "supertac-check ledgers first.run/ledger.jsonl second.run/ledger.jsonl";
+  const auto parted = run(compare + " --data data --out parted.safetensors");
   EXPECT_EQ(parted.code, 1) << parted.error;
   EXPECT_TRUE(std::regex_search(parted.out, std::regex("step 1, 0/[0-9]+\\.scale, the settings")))
       << parted.out;
-  EXPECT_EQ(compare({}).code, 1);
+  EXPECT_EQ(run(compare).code, 1);
 
   // The same step of both, each opened for itself.
   for (const std::string name : {"first", "second"})
-    ASSERT_EQ(run_process("supertac-check", {"step", path(name + ".safetensors"), "--data", path("data"),
-                                             "--at", "1", "--json", path(name + ".json")})
-                  .code,
-              0);
-  const auto opened = run_process("supertac-check", {"ledgers", path("first.json"), path("second.json")});
+    succeed("supertac-check step " + name + ".safetensors --data data --at 1 --json " + name + ".json");
+  const auto opened = run("supertac-check ledgers first.json second.json");
   EXPECT_EQ(opened.code, 1);
-  EXPECT_NE(opened.out.find("scale, the settings"), std::string::npos) << opened.out;
-  const auto same = run_process("supertac-check", {"ledgers", path("first.json"), path("first.json")});
-  EXPECT_EQ(same.code, 0) << same.error;
+  EXPECT_TRUE(contains(opened.out, "scale, the settings"));
+  succeed("supertac-check ledgers first.json first.json");
 
   // A training whose machine computed otherwise: from the states that it kept another line comes out here.
   std::filesystem::copy(path("first.run"), path("faulty.run"), std::filesystem::copy_options::recursive);
   std::filesystem::copy(path("second.run/ledger.jsonl"), path("faulty.run/ledger.jsonl"),
                         std::filesystem::copy_options::overwrite_existing);
-  const auto faulty = run_process(
-      "supertac-check",
-      {"ledgers", path("first.run/ledger.jsonl"), path("faulty.run/ledger.jsonl"), "--data", path("data")});
+  const auto faulty =
+      run("supertac-check ledgers first.run/ledger.jsonl faulty.run/ledger.jsonl --data data");
   EXPECT_EQ(faulty.code, 1);
-  EXPECT_NE(faulty.out.find("faulty.run/ledger.jsonl comes out otherwise here"), std::string::npos)
-      << faulty.out;
-  EXPECT_NE(faulty.out.find("open this step there, too"), std::string::npos) << faulty.out;
+  EXPECT_TRUE(contains(faulty.out, "faulty.run/ledger.jsonl comes out otherwise here"));
+  EXPECT_TRUE(contains(faulty.out, "open this step there, too"));
 }
 
 // Every operator of a step once more by NumPy, to the bit, and one of which a bit was changed.
 TEST_F(Audit, ARefereeComputesAStepAgain) {
-  ASSERT_EQ(train("judged.safetensors", {"--batch", "32"}).code, 0);
+  train("judged.safetensors", "--batch 32");
   const auto open = [&](const std::string& name, const std::string& out) {
-    return run_process("supertac-check", {"step", path("judged.safetensors"), "--data", path("data"), "--at",
-                                          "3", "--operator", name, "--out", out});
+    return run("supertac-check step judged.safetensors --data data --at 3 --operator " + name + " --out " +
+               out);
   };
-  EXPECT_EQ(open("9/", path("none.safetensors")).code, 2);
-  if (std::system(SUPERTAC_PYTHON " -c 'import numpy' 2>/dev/null") != 0)
-    GTEST_SKIP() << "there is no Debian Python with NumPy here";
-  const auto judge = [&](const std::string& file) {
-    const std::string command = SUPERTAC_PYTHON " " SUPERTAC_SOURCE "/examples/referee.py " + file + " > " +
-                                path("judged.txt") + " 2>&1";
-    return std::system(command.c_str());
-  };
+  EXPECT_EQ(open("9/", "none.safetensors").code, 2);
+  if (!has_numpy()) GTEST_SKIP() << "there is no Debian Python with NumPy here";
+  const auto judge = [](const std::string& file) { return python("referee.py " + file, "judged.txt"); };
   for (const std::string name : {"0/", "7/", "sum/", "norm", "update/"}) {
-    const std::string file = path("judged_" + name.substr(0, 1) + ".safetensors");
+    const std::string file = "judged_" + name.substr(0, 1) + ".safetensors";
     const auto opened = open(name, file);
     ASSERT_EQ(opened.code, 0) << opened.out << opened.error;
     EXPECT_EQ(judge(file), 0) << bytes("judged.txt");
@@ -341,29 +307,21 @@ TEST_F(Audit, ARefereeComputesAStepAgain) {
     write_safetensors(path("wrong.safetensors"), {{"operators", nlohmann::json::array({wrong}).dump()}},
                       tensors);
   }
-  EXPECT_NE(judge(path("wrong.safetensors")), 0);
-  EXPECT_NE(bytes("judged.txt").find("(conv_transpose2d), output 0: 1 of "), std::string::npos)
-      << bytes("judged.txt");
-  EXPECT_NE(bytes("judged.txt").find("first [0, 0, 0, 5]"), std::string::npos) << bytes("judged.txt");
-  const std::string command = SUPERTAC_PYTHON " " SUPERTAC_SOURCE "/examples/verify_ledger.py " +
-                              path("judged.run") + " > " + path("verified.txt");
-  EXPECT_EQ(std::system(command.c_str()), 0) << bytes("verified.txt");
+  EXPECT_NE(judge("wrong.safetensors"), 0);
+  EXPECT_TRUE(contains(bytes("judged.txt"), "(conv_transpose2d), output 0: 1 of "));
+  EXPECT_TRUE(contains(bytes("judged.txt"), "first [0, 0, 0, 5]"));
+  EXPECT_EQ(python("verify_ledger.py judged.run", "verified.txt"), 0) << bytes("verified.txt");
 }
 
 // Every step from volts to pixels, once more by NumPy; without it there is nothing to compare with.
 TEST_F(Audit, AnExplainedPictureIsComputedAgain) {
-  ASSERT_EQ(train("drawn.safetensors").code, 0);
-  const std::string out = path("explained.safetensors");
-  const auto result =
-      run_process("supertac-explain", {path("drawn.safetensors"), "--recording",
-                                       list_recordings(path("data")).front(), "--at", "4", "--out", out});
-  ASSERT_EQ(result.code, 0) << result.error;
-  EXPECT_GT(SafetensorsFile::read(out).tensors().size(), 30U);
-  if (std::system(SUPERTAC_PYTHON " -c 'import numpy' 2>/dev/null") != 0)
-    GTEST_SKIP() << "there is no Debian Python with NumPy here";
-  const std::string command = SUPERTAC_PYTHON " " SUPERTAC_SOURCE "/examples/recompute.py " + out + " " +
-                              path("drawn.safetensors") + " > " + path("recomputed.txt");
-  EXPECT_EQ(std::system(command.c_str()), 0) << bytes("recomputed.txt");
+  train("drawn.safetensors");
+  succeed("supertac-explain drawn.safetensors --recording " + list_recordings(path("data")).front() +
+          " --at 4 --out explained.safetensors");
+  EXPECT_GT(SafetensorsFile::read(path("explained.safetensors")).tensors().size(), 30U);
+  if (!has_numpy()) GTEST_SKIP() << "there is no Debian Python with NumPy here";
+  EXPECT_EQ(python("recompute.py explained.safetensors drawn.safetensors", "recomputed.txt"), 0)
+      << bytes("recomputed.txt");
   std::istringstream lines(bytes("recomputed.txt"));
   for (std::string line; std::getline(lines, line);) {
     if (std::regex_search(line, std::regex("^[0-9]+\\."))) {

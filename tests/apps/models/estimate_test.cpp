@@ -6,56 +6,44 @@
 #include <regex>
 
 #include "data/recordings/recording.h"
-#include "tests/apps/common/simulated_data.h"
+#include "tests/apps/common/trained.h"
 
 namespace supertac {
 namespace {
 
-class Estimate : public OnSimulatedData {
+class Estimate : public Training {
  protected:
-  static std::vector<std::string> training(std::vector<std::string> more) {
-    std::vector<std::string> all{"--data", path("data"), "--timesteps", "32",       "--latent",
-                                 "3",      "--scale",    "2",           "--stride", "8"};
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
-  }
-
-  static void expect(const std::string& program, const std::vector<std::string>& arguments,
-                     const std::string& what) {
+  static void expect(const std::string& line, const std::string& what) {
     const std::string file = path("said");
-    std::vector<std::string> words{"-c", "exec \"$@\" 2>" + file, "sh", SUPERTAC_BIN "/" + program};
-    words.insert(words.end(), arguments.begin(), arguments.end());
     std::filesystem::remove(file);
-    RunningProcess process("/bin/sh", words);
+    RunningProcess process("/bin/sh", {"-c", "exec " SUPERTAC_BIN "/" + line + " 2>said"},
+                           {.folder = folder_->path()});
     const std::regex estimate(what + ": about [0-9.]+ (seconds|minutes|hours) to go\n");
     std::string said;
     const auto found = [&] { return std::regex_search(said, estimate); };
     for (int i = 0; i < 4000 && !found() && !process.ended(); ++i) {
       ::usleep(50'000);
-      if (std::filesystem::exists(file)) said = read_text_file(file, 1 << 20);
+      if (std::filesystem::exists(file)) said = bytes("said");
     }
     if (found()) return;
     // Who ends within these minutes never had long to go: parts that only look short are no promise broken.
-    EXPECT_TRUE(process.ended() && process.wait().code == 0) << program << ": " << said;
+    EXPECT_TRUE(process.ended() && process.wait().code == 0) << line << ": " << said;
   }
 };
 
 TEST_F(Estimate, OfATraining) {
-  expect("supertac-train", training({"--out", path("long.safetensors"), "--epochs", "5000"}), "training");
+  expect("supertac-train" + options("long.safetensors", "--epochs 5000"), "training");
 }
 
 TEST_F(Estimate, OfASweepCountsWhatFollows) {
-  expect("supertac-sweep", training({"--out", path("sweep"), "--epochs", "5000", "--seeds", "0,1"}),
-         "1 of 2 .* and what follows");
+  expect("supertac-sweep" + options("sweep", "--epochs 5000 --seeds 0,1"), "1 of 2 .* and what follows");
 }
 
-TEST_F(Estimate, OfASimulation) {
-  expect("supertac-simulate", {"--out", path("many"), "--trials", "100"}, "simulating");
-}
+TEST_F(Estimate, OfASimulation) { expect("supertac-simulate --out many --trials 100", "simulating"); }
 
 TEST_F(Estimate, OfGradientChecks) {
-  expect("supertac-check", {"gradients"}, "checking");
-  expect("supertac-check", {"gradients", "--break", "all"}, "planting");
+  expect("supertac-check gradients", "checking");
+  expect("supertac-check gradients --break all", "planting");
 }
 
 TEST_F(Estimate, OfAnImport) {
@@ -68,39 +56,26 @@ TEST_F(Estimate, OfAnImport) {
   write_file(plate + "/1/1.txt", text);
   for (int k = 2; k <= 1000; ++k)
     std::filesystem::create_hard_link(plate + "/1/1.txt", plate + "/" + std::to_string(k) + "/1.txt");
-  expect("supertac-import", {path("text"), "--out", path("imported"), "--threads", "1"}, "importing");
+  expect("supertac-import text --out imported --threads 1", "importing");
 }
 
 TEST_F(Estimate, OfAnAudit) {
-  const std::string model = path("short.safetensors");
-  const auto made =
-      run_process("supertac-train", training({"--out", model, "--epochs", "60", "--ledger", "40"}));
-  ASSERT_EQ(made.code, 0) << made.error;
-  expect("supertac-check",
-         {"training", model, "--data", path("data"), "--segments", "1000", "--threads", "1"}, "repeating");
+  trained("short.safetensors", "--epochs 60 --batch 64 --ledger 40");
+  expect("supertac-check training short.safetensors --data data --segments 1000 --threads 1", "repeating");
 }
 
 TEST_F(Estimate, OfWhatIsDoneWithAModel) {
-  const std::string data = path("two"), model = path("fine.safetensors");
-  const auto felt = run_process(
-      "supertac-simulate", {"--out", data, "--plates", "3_Bumps,6_Ridges", "--speeds", "5", "--passes", "2"});
-  ASSERT_EQ(felt.code, 0) << felt.error;
-  const auto made = run_process(
-      "supertac-train", {"--data", data, "--out", model, "--scale", "8", "--epochs", "1", "--stride", "64"});
-  ASSERT_EQ(made.code, 0) << made.error;
-  expect("supertac-classify",
-         {"--model", model, "--data", data, "--views", "frame", "--stride", "1", "--seeds", "1000"},
+  succeed("supertac-simulate --out two --plates 3_Bumps,6_Ridges --speeds 5 --passes 2");
+  succeed("supertac-train --data two --out fine.safetensors --scale 8 --epochs 1 --stride 64");
+  expect("supertac-classify --model fine.safetensors --data two --views frame --stride 1 --seeds 1000",
          "classifying");
-  expect("supertac-evaluate", {"--model", model, "--data", data, "--threads", "1"}, "evaluating");
+  expect("supertac-evaluate --model fine.safetensors --data two --threads 1", "evaluating");
 }
 
 // On a terminal the bar has epoch, loss and SSIM of the test side.
 TEST_F(Estimate, TheBarOfATrainingShowsEpochLossAndTestSsim) {
-  ProcessOptions options;
-  options.terminal = true;
-  const auto made = run_process("supertac-train",
-                                training({"--out", path("shown.safetensors"), "--epochs", "500"}), options);
-  ASSERT_EQ(made.code, 0) << made.error;
+  const ProcessResult made =
+      succeed("supertac-train" + options("shown.safetensors", "--epochs 500 --batch 64"), {.terminal = true});
   EXPECT_TRUE(std::regex_search(
       made.error,
       std::regex(

@@ -11,13 +11,12 @@
 #include <sstream>
 #include <thread>
 
-#include "tests/apps/common/simulated_data.h"
+#include "tests/apps/common/trained.h"
 
 namespace supertac {
 namespace {
 
 namespace fs = std::filesystem;
-using Words = std::vector<std::string>;
 
 std::string content_of(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
@@ -26,7 +25,7 @@ std::string content_of(const fs::path& path) {
   return text.str();
 }
 
-class Mpi : public OnSimulatedData {
+class Mpi : public Training {
  protected:
   Mpi() {  // what Open MPI asks for on two processors, and of root
     for (const char* name :
@@ -34,36 +33,19 @@ class Mpi : public OnSimulatedData {
       ::setenv(name, "1", 1);
     ::setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 1);
   }
-  static Words options(const std::string& out, const Words& more = {}) {
-    Words all{"--data",  path("data"), "--timesteps",
-              "32",      "--latent",   "3",
-              "--scale", "2",          "--batch",
-              "8",       "--stride",   "8",
-              "--out",   path(out),    "--checkpoint-every",
-              "5",       "--threads",  "1"};
-    if (std::find(more.begin(), more.end(), "--epochs") == more.end())
-      all.insert(all.end(), {"--epochs", "3"});
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
+  static std::string options(const std::string& out, const std::string& more = "") {
+    return Training::options(path(out), "--checkpoint-every 5 --threads 1 --epochs 3 " + more);
   }
-  static Words ranks(int count, const Words& arguments, const Words& before = {}) {
-    Words all{"-n", std::to_string(count)};
-    all.insert(all.end(), before.begin(), before.end());
-    all.push_back(std::string(SUPERTAC_BIN) + "/supertac-train");
-    all.insert(all.end(), arguments.begin(), arguments.end());
-    return all;
+  static std::string ranks(int count, const std::string& options, const std::string& before = "") {
+    return " -n " + std::to_string(count) + " " + before + " " SUPERTAC_BIN "/supertac-train" + options;
   }
-  static Words both(Words a, const Words& b) {
-    a.push_back(":");
-    a.insert(a.end(), b.begin(), b.end());
-    return a;
+  static ProcessResult mpirun(const std::string& ranks, const ProcessOptions& how = {}) {
+    return run(SUPERTAC_MPIRUN + ranks, how);
   }
-  static ProcessResult mpirun(const Words& words, const ProcessOptions& how = {}) {
-    return run_process(SUPERTAC_MPIRUN, words, how);
-  }
+
   /// The lines of ours: mpirun adds some of its own.
-  static Words lines(const ProcessResult& result) {
-    Words lines;
+  static std::vector<std::string> lines(const ProcessResult& result) {
+    std::vector<std::string> lines;
     std::istringstream text(result.error);
     for (std::string line; std::getline(text, line);)
       if (line.starts_with("supertac")) lines.push_back(line);
@@ -71,9 +53,9 @@ class Mpi : public OnSimulatedData {
   }
   static void expect_one_line(const ProcessResult& result, const std::string& part) {
     EXPECT_NE(result.code, 0);
-    const Words all = lines(result);
+    const std::vector<std::string> all = lines(result);
     ASSERT_EQ(all.size(), 1u) << result.error;
-    EXPECT_NE(all[0].find(part), std::string::npos) << all[0];
+    EXPECT_TRUE(contains(all[0], part));
   }
   /// The process of that rank which writes to `out`; 0 = none.
   static pid_t process_of(const std::string& out, int rank) {
@@ -91,8 +73,9 @@ class Mpi : public OnSimulatedData {
   }
   /// Does `harm` to that rank of four in mid-training; the run ends in time, and its state stays whole.
   static ProcessResult lose(int rank, const std::string& name, const std::function<void(pid_t)>& harm) {
-    RunningProcess run(SUPERTAC_MPIRUN,
-                       ranks(4, options(name + ".safetensors", {"--epochs", "400", "--deadline", "4"})));
+    RunningProcess run =
+        start_in(folder_->path(),
+                 SUPERTAC_MPIRUN + ranks(4, options(name + ".safetensors", "--epochs 400 --deadline 4")));
     const std::string state = path(name + ".run/last.safetensors");
     wait_for_file(state);
     const pid_t process = process_of(path(name), rank);
@@ -103,39 +86,34 @@ class Mpi : public OnSimulatedData {
     EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(200));
     EXPECT_NE(result.code, 0);
     EXPECT_LE(lines(result).size(), 1u) << result.error;
-    EXPECT_EQ(run_process("supertac-info", {state}).code, 0);
+    succeed("supertac-info " + state);
     return result;
   }
 };
 
 TEST_F(Mpi, TheSameBytesAsAlone) {
-  ASSERT_EQ(run_process("supertac-train", options("alone.safetensors")).code, 0);
+  succeed("supertac-train" + options("alone.safetensors"));
   const std::string alone = bytes("alone.safetensors") + bytes("alone.run/last.safetensors");
   for (const int count : {1, 2, 4}) {
     const std::string name = "by" + std::to_string(count);
-    const ProcessResult result = mpirun(ranks(count, options(name + ".safetensors")));
-    ASSERT_EQ(result.code, 0) << result.error;
+    succeed(SUPERTAC_MPIRUN + ranks(count, options(name + ".safetensors")));
     EXPECT_TRUE(alone == bytes(name + ".safetensors") + bytes(name + ".run/last.safetensors")) << count;
   }
-  const ProcessResult mixed =
-      mpirun(both(ranks(1, options("mixed.safetensors"), {"env", "SUPERTAC_ISA=portable"}),
-                  ranks(1, options("mixed.safetensors"))));
-  ASSERT_EQ(mixed.code, 0) << mixed.error;
+  const std::string mixed = options("mixed.safetensors");
+  succeed(SUPERTAC_MPIRUN + ranks(1, mixed, "env SUPERTAC_ISA=portable") + " :" + ranks(1, mixed));
   EXPECT_TRUE(alone == bytes("mixed.safetensors") + bytes("mixed.run/last.safetensors"))
       << "two instruction sets";
 }
 
 TEST_F(Mpi, StoppedByFourAndResumedByTwo) {
-  const Words longer{"--epochs", "12"};
-  ASSERT_EQ(run_process("supertac-train", options("whole.safetensors", longer)).code, 0);
+  const std::string longer = "--epochs 12";
+  succeed("supertac-train" + options("whole.safetensors", longer));
   const std::string state = path("part.run/last.safetensors");
   const ProcessResult cut =
       mpirun(ranks(4, options("part.safetensors", longer)), {.signal = SIGTERM, .signal_when = state});
   EXPECT_NE(cut.code, 0);
   EXPECT_FALSE(fs::exists(path("part.safetensors")));
-  const ProcessResult resumed =
-      mpirun(ranks(2, options("part.safetensors", {"--epochs", "12", "--resume", state})));
-  ASSERT_EQ(resumed.code, 0) << resumed.error;
+  succeed(SUPERTAC_MPIRUN + ranks(2, options("part.safetensors", longer + " --resume " + state)));
   EXPECT_TRUE(bytes("whole.safetensors") == bytes("part.safetensors"));
 }
 
@@ -146,12 +124,10 @@ TEST_F(Mpi, NumbersThatCannotShareTheLanesAreRefused) {
 }
 
 TEST_F(Mpi, ARankWithAnotherOptionIsNamed) {
-  expect_one_line(mpirun(both(ranks(1, options("odd.safetensors")),
-                              ranks(1, options("odd.safetensors", {"--beta", "0.5"})))),
+  const auto with = [](const std::string& more) { return options("odd.safetensors", more); };
+  expect_one_line(mpirun(ranks(1, with("")) + " :" + ranks(1, with("--beta 0.5"))),
                   "rank 1: its training is");
-  expect_one_line(mpirun(both(ranks(3, options("odd.safetensors")),
-                              ranks(1, options("odd.safetensors", {"--data", path("none")})))),
-                  "rank 3");
+  expect_one_line(mpirun(ranks(3, with("")) + " :" + ranks(1, with("--data none"))), "rank 3");
   EXPECT_FALSE(fs::exists(path("odd.run")));
 }
 
@@ -163,10 +139,9 @@ TEST_F(Mpi, AFrozenRankIsNamed) {
 
 // The first rank waits for the other in MPI_Init, and its own alarm reaches it when all is over.
 TEST_F(Mpi, ARankFrozenAtTheStartIsOneLine) {
-  const Words mine = options("start.safetensors", {"--deadline", "3"});
-  std::string late = "sleep 4; exec " SUPERTAC_BIN "/supertac-train";
-  for (const std::string& word : mine) late += " '" + word + "'";
-  RunningProcess run(SUPERTAC_MPIRUN, both(ranks(1, mine), {"-n", "1", "sh", "-c", late}));
+  const std::string mine = options("start.safetensors", "--deadline 3");
+  write_file(path("late.sh"), "sleep 4; exec " SUPERTAC_BIN "/supertac-train" + mine);
+  RunningProcess run = start_in(folder_->path(), SUPERTAC_MPIRUN + ranks(1, mine) + " : -n 1 sh late.sh");
   const auto begin = std::chrono::steady_clock::now();
   pid_t first = 0;
   while (first == 0 && std::chrono::steady_clock::now() - begin < std::chrono::seconds(3))
@@ -181,12 +156,11 @@ TEST_F(Mpi, ARankFrozenAtTheStartIsOneLine) {
 // The other rank has ended well, and mpirun waits for this one without a deadline.
 TEST_F(Mpi, ARankFrozenAtTheEndIsOneLine) {
   const auto begin = std::chrono::steady_clock::now();
-  const std::string preload = "LD_PRELOAD=" SUPERTAC_FREEZE_AT_END;
-  Words words = ranks(2, options("end.safetensors", {"--epochs", "1", "--deadline", "2"}));
-  words.insert(words.begin() + 2, {"env", preload});
-  expect_one_line(mpirun(words), "all is written, but a process of mpirun did not end within the deadline");
+  const std::string options_at_end = options("end.safetensors", "--epochs 1 --deadline 2");
+  expect_one_line(mpirun(ranks(2, options_at_end, "env LD_PRELOAD=" SUPERTAC_FREEZE_AT_END)),
+                  "all is written, but a process of mpirun did not end within the deadline");
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(200));
-  EXPECT_EQ(run_process("supertac-info", {path("end.safetensors")}).code, 0);
+  succeed("supertac-info end.safetensors");
 }
 
 TEST_F(Mpi, AKilledRankEndsAll) {

@@ -23,11 +23,6 @@ constexpr std::uint64_t kPlenty = 1 << 26;
 
 class RoundTrips : public Training {
  protected:
-  static void run(const std::string& program, const std::vector<std::string>& arguments) {
-    const ProcessResult result = run_process(program, arguments);
-    ASSERT_EQ(result.code, 0) << program << ": " << result.error;
-  }
-
   static void safetensors(const std::string& from, const std::string& to) {
     const SafetensorsFile file = SafetensorsFile::read(from);
     std::vector<TensorToWrite> tensors;
@@ -76,24 +71,26 @@ class RoundTrips : public Training {
       text += std::to_string(pass.volts[i]) + (i % 16 == 15 ? '\n' : ' ');
     fs::create_directories(path("text/3_Bumps/1"));
     write_file(path("text/3_Bumps/1/1.txt"), text);
-    run("supertac-import", {path("text"), "--out", path("imported"), "--pictures", path("fits")});
+    succeed("supertac-import text --out imported --pictures fits");
     fs::remove_all(path("text"));
   }
 
   // A sensor's file by the probe, recordings and journals by a virtual rig.
   static void collect_and_probe() {
     setenv("XDG_STATE_HOME", path("state").c_str(), 1);
-    RunningProcess rig("supertac-rig", {"--plate", "3_Bumps", "--board-link", path("board"), "--printer-link",
-                                        path("printer"), "--speedup", "4"});
+    RunningProcess rig =
+        start_in(folder_->path(),
+                 "supertac-rig --plate 3_Bumps --board-link board --printer-link printer --speedup 4");
     wait_for_file(path("board"));
     wait_for_file(path("printer"));
-    run("supertac-stream", {"--sensor", "serial:" + path("board") + "@115200", "--probe", "--seconds", "0.5",
-                            "--out", path("board.sensor.json"), "--quiet"});
-    run("supertac-stream", {"--board", path("board"), "--speedup", "4", "--seconds", "1", "--capture",
-                            path("stream.journal"), "--record", path("streamed"), "--quiet"});
-    run("supertac-collect",
-        {"--board", path("board"), "--printer", path("printer"), "--plate", "3_Bumps", "--passes", "1",
-         "--speed", "50", "--speedup", "4", "--yes", "--quiet", "--out", path("collected")});
+    succeed("supertac-stream --sensor serial:" + path("board") +
+            "@115200 --probe --seconds 0.5 --out board.sensor.json --quiet");
+    succeed(
+        "supertac-stream --board board --speedup 4 --seconds 1 --capture stream.journal --record streamed "
+        "--quiet");
+    succeed(
+        "supertac-collect --board board --printer printer --plate 3_Bumps --passes 1 --speed 50 --speedup 4 "
+        "--yes --quiet --out collected");
   }
 
   // How many records a chunk has is a matter of when its writer woke: the same records, not the same bytes.
@@ -133,29 +130,28 @@ class RoundTrips : public Training {
 };
 
 TEST_F(RoundTrips, OfEveryKindOfFileGiveTheSameBytes) {
-  const std::string recording = path("data/3_Bumps_t1_p1_v10.safetensors"), model = path("m.safetensors");
-  ASSERT_EQ(train("m.safetensors", {"--ledger", "1000", "--json", path("train.json")}).code, 0);
-  run("supertac-plate", {"--plate", "bumps6", "--resolution", "2", "--out", path("plate.stl"), "--gcode",
-                         path("plate.gcode"), "--json", path("plate.json")});
-  run("supertac-evaluate",
-      {"--model", model, "--data", path("data"), "--limit", "30", "--outputs", path("outputs.safetensors"),
-       "--pictures", path("pictures"), "--report", path("report.html"), "--json", path("evaluate.json")});
-  run("supertac-explain",
-      {model, "--recording", recording, "--at", "6", "--out", path("explained.safetensors")});
-  run("supertac-explain", {"a=2; b=-3; a*b", "--out", path("graph.dot")});
-  run("supertac-export", {model, "--onnx", path("m.onnx")});
-  run("supertac-export", {model, "--c99", path("c99")});
-  run("supertac-stream", {"--recording", recording, "--model", model, "--out", path("stream.safetensors"),
-                          "--json", path("stream.json"), "--quiet"});
-  run("supertac-simulate", {"--sensor", SUPERTAC_SOURCE "/examples/sensors/csv_arduino.json", "--out",
-                            path("mat"), "--plates", "plain", "--trials", "1", "--passes", "1"});
-  run("supertac-train", options("m4.safetensors", {"--scale", "4"}));
-  run("supertac-simulate", {"--out", path("two"), "--plates", "3_Bumps,6_Ridges", "--trials", "2", "--passes",
-                            "1", "--speeds", "10"});
-  run("supertac-classify",
-      {"--model", path("m4.safetensors"), "--data", path("two"), "--views", "super_resolved", "--seeds", "1",
-       "--epochs", "1", "--stride", "64", "--out", path("classes.safetensors")});
-  run("supertac-sweep", options("sweep", {"--epochs", "1", "--seeds", "0"}));
+  const std::string of_pass = " --recording data/3_Bumps_t1_p1_v10.safetensors ";
+  trained("m.safetensors", "--ledger 1000 --json train.json");
+  succeed(
+      "supertac-plate --plate bumps6 --resolution 2 --out plate.stl --gcode plate.gcode --json plate.json");
+  succeed(
+      "supertac-evaluate --model m.safetensors --data data --limit 30 --outputs outputs.safetensors "
+      "--pictures pictures --report report.html --json evaluate.json");
+  succeed("supertac-explain m.safetensors --at 6 --out explained.safetensors" + of_pass);
+  succeed("supertac-explain a=2;b=-3;a*b --out graph.dot");
+  succeed("supertac-export m.safetensors --onnx m.onnx");
+  succeed("supertac-export m.safetensors --c99 c99");
+  succeed("supertac-stream --model m.safetensors --out stream.safetensors --json stream.json --quiet" +
+          of_pass);
+  succeed("supertac-simulate --sensor " SUPERTAC_SOURCE
+          "/examples/sensors/csv_arduino.json --out mat --plates "
+          "plain --trials 1 --passes 1");
+  trained("m4.safetensors", "--scale 4");
+  succeed("supertac-simulate --out two --plates 3_Bumps,6_Ridges --trials 2 --passes 1 --speeds 10");
+  succeed(
+      "supertac-classify --model m4.safetensors --data two --views super_resolved --seeds 1 --epochs 1 "
+      "--stride 64 --out classes.safetensors");
+  succeed("supertac-sweep" + options("sweep", "--epochs 1 --seeds 0"));
   import_texts();
   collect_and_probe();
 
@@ -189,7 +185,7 @@ TEST_F(RoundTrips, OfEveryKindOfFileGiveTheSameBytes) {
     return bytes("m.run/last.safetensors") + bytes("m.run/log.csv") + bytes("m.safetensors");
   };
   const std::string before = kept();
-  ASSERT_EQ(train("m.safetensors", {"--resume", path("m.run/last.safetensors"), "--force"}).code, 0);
+  trained("m.safetensors", "--resume m.run/last.safetensors --force");
   EXPECT_EQ(kept(), before);
 }
 

@@ -1,6 +1,5 @@
 // The page of supertac-collect: it shows the run and can end it, and nothing else.
-#include <gtest/gtest.h>
-
+#include "tests/apps/common/expect.h"
 #include "tests/apps/rig/collect_run.h"
 #include "tests/apps/web/http_client.h"
 
@@ -25,7 +24,7 @@ TEST(CollectPage, ShowsTheRunAndItsButtonEndsItAsCtrlCDoes) {
                                "\r\nX-Token: " + hello["token"].get<std::string>() + "\r\n\r\n");
   };
   const std::string seen = client->receive("\"phase\":\"slide\"");
-  EXPECT_NE(seen.find("\"lifted\":false"), std::string::npos);
+  EXPECT_TRUE(contains(seen, "\"lifted\":false"));
   for (const char* action : {"start", "move", "home", "record"}) EXPECT_EQ(act(action), 404) << action;
   EXPECT_EQ(act("stop"), 200);
   act("stop");  // an impatient hand

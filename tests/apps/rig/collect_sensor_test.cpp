@@ -1,6 +1,5 @@
 // supertac-collect with a sensor of a file, on a bed of a file: an 8x8 mat on a pseudo-terminal that feels
 // what lies under the virtual printer's head.
-#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -12,6 +11,7 @@
 #include "hardware/collection/collection.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
+#include "tests/apps/common/expect.h"
 #include "tests/apps/rig/collect_run.h"
 #include "tests/apps/web/http_client.h"
 #include "tests/hardware/fake_sensor.h"
@@ -146,9 +146,7 @@ TEST_F(CollectSensor, ItsPassesAreRecordingsAndItsJournalGivesTheSame) {
             "provenance.jsonl ridges6_t1_p1_v20.safetensors ridges6_t1_p2_v20.safetensors "
             "ridges6_t1_v20.journal");
   EXPECT_LT(distance(run_.head(), {310, 315, 121.81}), 0.01);
-  const ProcessResult recovered =
-      run_process("supertac-import", {"--journal", journal(), "--out", run_.disk() + "/again"});
-  ASSERT_EQ(recovered.code, 0) << recovered.error;
+  succeed_in(run_.disk(), "supertac-import --out again --journal " + journal());
   for (const int pass : {1, 2}) {
     const std::string name = "/ridges6_t1_p" + std::to_string(pass) + "_v20.safetensors";
     const Recording recording = read_recording(run_.out() + name);
@@ -163,10 +161,9 @@ TEST_F(CollectSensor, ItsPassesAreRecordingsAndItsJournalGivesTheSame) {
     expect_true_positions(recording);
   }
   EXPECT_EQ(hash_of_recordings(run_.out(), {}), hash_of_recordings(run_.disk() + "/again", {}));
-  const ProcessResult trained =
-      run_process("supertac-train", {"--data", run_.out(), "--preset", "tiny", "--split", "pass", "--epochs",
-                                     "1", "--out", run_.disk() + "/model.safetensors", "--quiet"});
-  EXPECT_EQ(trained.code, 0) << trained.error;
+  succeed_in(
+      run_.disk(),
+      "supertac-train --data out --preset tiny --split pass --epochs 1 --out model.safetensors --quiet");
   // The journal replays as a stream of this sensor.
   const auto latency_of = [&](std::vector<std::string> words) {
     for (const char* word : {"--quiet", "--json", "-"}) words.emplace_back(word);
@@ -201,16 +198,14 @@ TEST_F(CollectSensor, AfterAKillTheJournalAloneIsEnough) {
   (void)program.wait();
   for (const char* file : {"/mat.json", "/bed.json"}) std::filesystem::remove(run_.disk() + file);
   const ProcessResult recovered =
-      run_process("supertac-import", {"--journal", journal(), "--out", run_.disk() + "/again"});
-  EXPECT_EQ(recovered.code, 0) << recovered.error;
-  EXPECT_NE(recovered.out.find("cut off"), std::string::npos) << recovered.out;
+      succeed_in(run_.disk(), "supertac-import --out again --journal " + journal());
+  EXPECT_TRUE(contains(recovered.out, "cut off"));
   std::string bytes = read_text_file(journal(), 1 << 30);
   bytes[bytes.size() / 2] ^= 1;
   write_file(journal(), bytes);
-  const ProcessResult damaged =
-      run_process("supertac-import", {"--journal", journal(), "--out", run_.disk() + "/damaged"});
-  EXPECT_NE(damaged.out.find(" frames recovered"), std::string::npos) << damaged.out;
-  EXPECT_NE(damaged.out.find("s, are missing; the collection was cut off"), std::string::npos) << damaged.out;
+  const ProcessResult damaged = run_in(run_.disk(), "supertac-import --out damaged --journal " + journal());
+  EXPECT_TRUE(contains(damaged.out, " frames recovered"));
+  EXPECT_TRUE(contains(damaged.out, "s, are missing; the collection was cut off"));
   const Recording recording = read_recording(run_.disk() + "/again/ridges6_t1_p1_v20.safetensors");
   EXPECT_EQ(recording.array, sensor_.array);
   EXPECT_GT(recording.frames(), 150U);
@@ -228,12 +223,12 @@ TEST_F(CollectSensor, UnpluggedInContactItLeavesTheFingerUp) {
   EXPECT_EQ(hello["passes"].get<std::vector<double>>(), (std::vector<double>{15, 18}));
   ASSERT_TRUE(run_.wait_for_contact(2, program)) << program.wait().error;
   const std::string seen = page->receive("\"phase\":\"slide\"");
-  EXPECT_NE(seen.find("\"x\":15.0,\"y\":"), std::string::npos) << seen;
+  EXPECT_TRUE(contains(seen, "\"x\":15.0,\"y\":"));
   unplug();
   const ProcessResult result = program.wait();
   EXPECT_EQ(result.code, 1);
   EXPECT_TRUE(is_one_line(result.error)) << result.error;
-  EXPECT_NE(result.error.find("/mat: the device is gone"), std::string::npos) << result.error;
+  EXPECT_TRUE(contains(result.error, "/mat: the device is gone"));
   EXPECT_GE(run_.head().z, kLiftedZ - 0.01);
   EXPECT_GT(read_recording(run_.out() + "/ridges6_t1_p1_v20.safetensors").frames(), 50U);
 }
@@ -244,7 +239,7 @@ TEST_F(CollectSensor, WhatCannotBeIsRefusedBeforeAnythingMoves) {
     const ProcessResult result = run_process("supertac-collect", words(more));
     EXPECT_EQ(result.code, code) << result.error;
     EXPECT_TRUE(is_one_line(result.error)) << result.error;
-    EXPECT_NE(result.error.find(says), std::string::npos) << result.error;
+    EXPECT_TRUE(contains(result.error, says));
     EXPECT_FALSE(std::filesystem::exists(run_.out()));
   };
   const std::string bed = run_.disk() + "/small.json";

@@ -1,5 +1,4 @@
 // supertac-collect as a process on a virtual rig: how it ends, what it says, where the finger is left.
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -10,6 +9,7 @@
 #include "hardware/collection/collection.h"
 #include "hardware/ports/serial_port.h"
 #include "io/files/file.h"
+#include "tests/apps/common/expect.h"
 #include "tests/apps/rig/collect_run.h"
 #include "tests/hardware/fake_sensor.h"
 #include "tests/hardware/numbered_board.h"
@@ -17,16 +17,12 @@
 namespace supertac {
 namespace {
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 TEST(CollectProgram, MakesRecordingsAndLeavesTheHeadAtItsOrigin) {
   CollectRun run;
   const ProcessResult result = run.collect();
   EXPECT_EQ(result.code, 0) << result.error;
   EXPECT_EQ(run.files(), "3_Bumps_t1_p1_v10.safetensors 3_Bumps_t1_v10.journal provenance.jsonl");
-  EXPECT_EQ(run_process("supertac-info", {run.out() + "/3_Bumps_t1_p1_v10.safetensors"}).code, 0);
+  succeed_in(run.out(), "supertac-info 3_Bumps_t1_p1_v10.safetensors");
   EXPECT_LT(distance(run.head(), {99.7, 101.17, 131.81}), 0.01);
   EXPECT_FALSE(run.origin_unknown());
 }
@@ -39,8 +35,7 @@ TEST(CollectProgram, SignalsInContactLiftTheFingerAndKeepWhatWasRecorded) {
     process.send(signal);
     process.send(signal);  // a closed terminal says so twice; the finger comes first
     const ProcessResult result = process.wait();
-    EXPECT_EQ(result.code, 128 + signal) << result.error;
-    EXPECT_TRUE(is_one_line(result.error)) << result.error;
+    expect_failure(result, 128 + signal, "");
     EXPECT_GE(run.head().z, kLiftedZ - 0.01) << "signal " << signal;
     EXPECT_EQ(run.files(), "3_Bumps_t1_p1_v10.safetensors 3_Bumps_t1_v10.journal provenance.jsonl");
     EXPECT_TRUE(run.origin_unknown());
@@ -89,8 +84,7 @@ TEST(CollectProgram, ASignalWhileItConnectsEndsItWithoutATrace) {
     wait_for_file(run.journal());
     process.send(signal);
     const ProcessResult result = process.wait();
-    EXPECT_EQ(result.code, 128 + signal) << result.error;
-    EXPECT_TRUE(is_one_line(result.error)) << result.error;
+    expect_failure(result, 128 + signal, "");
     EXPECT_EQ(run.files(), "");
   }
 }
@@ -107,16 +101,12 @@ TEST(CollectProgram, AfterAKillTheJournalIsRecoveredAndTheOriginMustBeConfirmed)
   const std::string other = run.disk() + "/other";
   const Point3 left = run.head();
   for (const std::string& out : {run.out(), other}) {
-    const ProcessResult refused = run.collect({"--out", out});
-    EXPECT_EQ(refused.code, 1);
-    EXPECT_TRUE(is_one_line(refused.error)) << refused.error;
-    EXPECT_TRUE(contains(refused.error, "--confirm-origin")) << refused.error;
+    expect_failure(run.collect({"--out", out}), 1, "--confirm-origin");
   }
   EXPECT_EQ(run.head(), left);
   const ProcessResult recovered =
-      run_process("supertac-import", {"--journal", run.journal(), "--out", run.out() + "/recovered"});
-  EXPECT_EQ(recovered.code, 0) << recovered.error;
-  EXPECT_TRUE(contains(recovered.out, "cut off")) << recovered.out;
+      succeed_in(run.disk(), "supertac-import --out again --journal " + run.journal());
+  EXPECT_TRUE(contains(recovered.out, "cut off"));
 
   const ProcessResult confirmed = run.collect({"--out", other, "--confirm-origin", "--speed", "50"});
   EXPECT_EQ(confirmed.code, 0) << confirmed.error;
@@ -139,10 +129,7 @@ TEST(CollectProgram, WhatIsThereAlreadyIsFoundBeforeAnythingMoves) {
   std::ofstream(run.out() + "/3_Bumps_t2_v10.journal") << "of another run\n";
   const Point3 before = run.head();
   const auto refuse = [&](const std::vector<std::string>& more, const std::string& says) {
-    const ProcessResult result = run.collect(more);
-    EXPECT_EQ(result.code, 1);
-    EXPECT_TRUE(is_one_line(result.error)) << result.error;
-    EXPECT_TRUE(contains(result.error, says)) << result.error;
+    expect_failure(run.collect(more), 1, says);
   };
   refuse({}, "3_Bumps_t1_p1_v10.safetensors: exists already; collect with --trial 3, or pass --force");
   refuse({"--trial", "2", "--force"},
@@ -177,9 +164,8 @@ TEST(CollectProgram, ARunWhoseRecordingsCannotBeKeptSaysWhatItLeft) {
       result.error.find("; stopped by the operator; " + run.out() + "/provenance.jsonl");
   EXPECT_LT(finger, cause) << result.error;
   EXPECT_NE(cause, std::string::npos) << result.error;
-  EXPECT_TRUE(contains(result.error, "the journal " + run.journal() + " is kept")) << result.error;
-  EXPECT_EQ(run_process("supertac-import", {"--journal", run.journal(), "--out", run.disk() + "/again"}).code,
-            0);
+  EXPECT_TRUE(contains(result.error, "the journal " + run.journal() + " is kept"));
+  succeed_in(run.disk(), "supertac-import --out again --journal " + run.journal());
 }
 
 TEST(CollectProgram, AJournalThatIsGoneIsNotSaidToBeKept) {
@@ -189,15 +175,13 @@ TEST(CollectProgram, AJournalThatIsGoneIsNotSaidToBeKept) {
   std::filesystem::remove(run.journal());
   process.send(SIGINT);
   const ProcessResult result = process.wait();
-  EXPECT_TRUE(contains(result.error, "the journal " + run.journal() + " is gone")) << result.error;
+  EXPECT_TRUE(contains(result.error, "the journal " + run.journal() + " is gone"));
 }
 
 TEST(CollectProgram, AFullDiskInContactLiftsTheFinger) {
   CollectRun run;
   const ProcessResult result = run.collect({}, {.max_file_bytes = 2'500'000});
-  EXPECT_EQ(result.code, 1);
-  EXPECT_TRUE(is_one_line(result.error)) << result.error;
-  EXPECT_TRUE(contains(result.error, "journal")) << result.error;
+  expect_failure(result, 1, "journal");
   EXPECT_GE(run.head().z, kLiftedZ - 0.01);
   EXPECT_FALSE(contains(run.files(), ".tmp"));
 }
@@ -263,12 +247,10 @@ TEST(CollectProgram, APortThatCannotBeUsedIsOneClearLine) {
       {"one port twice", {"--board", run.printer()}, {"already open"}},
   };
   for (const Refusal& refusal : refusals) {
+    SCOPED_TRACE(refusal.what);
     const ProcessResult result = run.collect(refusal.arguments);
-    EXPECT_EQ(result.code, 1) << refusal.what;
-    EXPECT_TRUE(is_one_line(result.error)) << refusal.what << ": " << result.error;
-    for (const std::string& part : refusal.says)
-      EXPECT_TRUE(contains(result.error, part)) << refusal.what << ": " << result.error;
-    EXPECT_EQ(run.files(), "") << refusal.what;
+    for (const std::string& part : refusal.says) expect_failure(result, 1, part);
+    EXPECT_EQ(run.files(), "");
   }
   EXPECT_LT(distance(run.head(), {99.7, 101.17, 131.81}), 1e-6);
   EXPECT_EQ(run.collect({"--speed", "50"}).code, 0) << "the next start, with the right ports, is not held up";

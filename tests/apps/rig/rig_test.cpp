@@ -1,58 +1,42 @@
 // supertac-rig, supertac-collect, supertac-import --journal and supertac-plate together, as on a table.
-#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <csignal>
 #include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "data/windows/windows.h"
 #include "io/files/file.h"
-#include "tests/apps/common/process.h"
+#include "tests/apps/common/expect.h"
 
 namespace supertac {
 namespace {
 
-constexpr std::uint64_t kPlenty = 1 << 26;
-
 /// A virtual rig with a printed plate, four times faster than a real one.
-class RigTest : public testing::Test {
+class RigTest : public ProgramTest {
  protected:
   RigTest() {
-    setenv("XDG_STATE_HOME", (folder_ / "state").c_str(), 1);
-    const auto made = run_process("supertac-plate", {"--plate", "ridges9", "--out", folder_ / "my.stl"});
-    if (made.code != 0) throw std::runtime_error(made.error);
-    rig_ = std::make_unique<RunningProcess>(
-        "supertac-rig",
-        std::vector<std::string>{"--plate", folder_ / "my.stl", "--board-link", folder_ / "board",
-                                 "--printer-link", folder_ / "printer", "--speedup", "4"});
-    wait_for_file(folder_ / "board");
-    wait_for_file(folder_ / "printer");
+    setenv("XDG_STATE_HOME", path("state").c_str(), 1);
+    wait_for_file(path("board"));
+    wait_for_file(path("printer"));
   }
-  std::vector<std::string> collect(const std::string& out, const std::string& speed) {
-    return {"--board",   folder_ / "board",
-            "--printer", folder_ / "printer",
-            "--plate",   folder_ / "my.stl",
-            "--passes",  "1",
-            "--speed",   speed,
-            "--out",     folder_ / out,
-            "--speedup", "4",
-            "--yes"};
-  }
-  TemporaryFolder folder_;
-  std::unique_ptr<RunningProcess> rig_;
+  // Of one pass.
+  const std::string collect_ =
+      "supertac-collect --board board --printer printer --plate my.stl --passes 1 --speedup 4 --yes --out "
+      "out ";
+
+ private:
+  ProcessResult plate_ = succeed("supertac-plate --plate ridges9 --out my.stl");
+  RunningProcess rig_ = start_in(
+      folder_.path(), "supertac-rig --plate my.stl --board-link board --printer-link printer --speedup 4");
 };
 
 TEST_F(RigTest, CollectShowsALiveLineAndReportsEveryPass) {
-  auto arguments = collect("out", "50");
-  arguments.insert(arguments.end(), {"--json", folder_ / "report.json"});
-  const ProcessResult collected = run_process("supertac-collect", arguments, {.terminal = true});
-  ASSERT_EQ(collected.code, 0) << collected.error;
-  EXPECT_NE(collected.out.find("pass 1: "), std::string::npos) << collected.out;
+  const ProcessResult collected = succeed(collect_ + "--speed 50 --json report.json", {.terminal = true});
+  EXPECT_TRUE(contains(collected.out, "pass 1: "));
   for (const char* part : {"collecting  [", " frames/s  ", " lost", "X99.7 Y"})
-    EXPECT_NE(collected.error.find(part), std::string::npos) << part << " in " << collected.error;
-  const auto report = nlohmann::json::parse(read_text_file(folder_ / "report.json", kPlenty));
+    EXPECT_TRUE(contains(collected.error, part));
+  const auto report = nlohmann::json::parse(bytes("report.json"));
   EXPECT_EQ(report["plate"], "my.stl");
   EXPECT_EQ(report["complete"], true);
   EXPECT_EQ(report["passes_done"], 1);
@@ -63,49 +47,44 @@ TEST_F(RigTest, CollectShowsALiveLineAndReportsEveryPass) {
   const double sent = pass["frames"].get<double>() - 1 + pass["missing"].get<double>();
   EXPECT_NEAR(sent / pass["seconds"].get<double>(), 1008, 504);
   EXPECT_GT(pass["positions"], 10);
-  const Recording recording = read_recording(folder_ / ("out/" + pass["file"].get<std::string>()));
+  const Recording recording = read_recording(path("out/" + pass["file"].get<std::string>()));
   EXPECT_EQ(pass["frames"], recording.frames());
   EXPECT_EQ(recording.plate, "my.stl");
   // At first the finger is in the air: at rest, however long this machine has been running.
   for (std::size_t k = 0; k < kTaxels; ++k) EXPECT_NEAR(recording.volts[k], 2.44, 0.05) << "taxel " << k;
   // The folder holds its plate: truths can be drawn wherever it is moved.
-  std::filesystem::rename(folder_ / "out", folder_ / "moved");
-  std::filesystem::remove(folder_ / "my.stl");
-  EXPECT_GT(WindowSet::load(folder_ / "moved", {}, {.timesteps = 32}).size(), 100u);
+  std::filesystem::rename(path("out"), path("moved"));
+  std::filesystem::remove(path("my.stl"));
+  EXPECT_GT(WindowSet::load(path("moved"), {}, {.timesteps = 32}).size(), 100u);
 }
 
 TEST_F(RigTest, ACollectionThatWasKilledIsRecoveredByImport) {
-  RunningProcess process("supertac-collect", collect("out", "10"));
-  const std::string journal = folder_ / "out/my.stl_t1_v10.journal";
-  wait_for_file(journal, 2'500'000);
+  RunningProcess process = start_in(folder_.path(), collect_ + "--speed 10");
+  const std::string journal = "out/my.stl_t1_v10.journal";
+  wait_for_file(path(journal), 2'500'000);
   process.send(SIGKILL);
   EXPECT_EQ(process.wait().code, 128 + SIGKILL);
   const ProcessResult recovered =
-      run_process("supertac-import",
-                  {"--journal", journal, "--out", folder_ / "saved", "--json", folder_ / "saved.json"});
-  ASSERT_EQ(recovered.code, 0) << recovered.error;
-  EXPECT_NE(recovered.out.find("the collection was cut off"), std::string::npos) << recovered.out;
-  const Recording recording = read_recording(folder_ / "saved/my.stl_t1_p1_v10.safetensors");
+      succeed("supertac-import --journal " + journal + " --out saved --json saved.json");
+  EXPECT_TRUE(contains(recovered.out, "the collection was cut off"));
+  const Recording recording = read_recording(path("saved/my.stl_t1_p1_v10.safetensors"));
   EXPECT_EQ(recording.metadata.at("complete"), "false");
-  EXPECT_EQ(read_file(folder_ / "saved/my.stl", kPlenty), read_file(folder_ / "my.stl", kPlenty));
-  const auto report = nlohmann::json::parse(read_text_file(folder_ / "saved.json", kPlenty));
+  EXPECT_EQ(bytes("saved/my.stl"), bytes("my.stl"));
+  const auto report = nlohmann::json::parse(bytes("saved.json"));
   EXPECT_EQ(report["complete"], false);
   EXPECT_EQ(report["frames"], recording.frames());
-  const auto again = run_process("supertac-import", {"--journal", journal, "--out", folder_ / "saved"});
-  EXPECT_EQ(again.code, 1);
-  EXPECT_NE(again.error.find("--force"), std::string::npos) << again.error;
+  expect_exit(run("supertac-import --journal " + journal + " --out saved"), 1, "--force");
 }
 
-TEST(ImportJournal, RefusesWhatIsNoJournalAndMixedOptions) {
-  const TemporaryFolder folder;
-  const std::string journal = folder / "a.journal", out = folder / "out";
+using ImportJournal = ProgramTest;
+
+TEST_F(ImportJournal, RefusesWhatIsNoJournalAndMixedOptions) {
+  const std::string journal = path("a.journal"), out = path("out");
   write_file(journal, std::string("not a journal"));
-  const auto wrong = run_process("supertac-import", {"--journal", journal, "--out", out});
-  EXPECT_EQ(wrong.code, 1);
-  EXPECT_NE(wrong.error.find("a.journal"), std::string::npos) << wrong.error;
+  expect_exit(run("supertac-import --journal " + journal + " --out " + out), 1, "a.journal");
   EXPECT_FALSE(std::filesystem::exists(out));
-  EXPECT_EQ(run_process("supertac-import", {folder.path(), "--journal", journal, "--out", out}).code, 2);
-  EXPECT_EQ(run_process("supertac-import", {"--out", out}).code, 2);
+  EXPECT_EQ(run("supertac-import . --journal " + journal + " --out " + out).code, 2);
+  EXPECT_EQ(run("supertac-import --out " + out).code, 2);
 }
 
 }  // namespace

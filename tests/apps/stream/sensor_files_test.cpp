@@ -1,7 +1,6 @@
 // Every file of examples/sensors/ against a device that sends such frames: probed, viewed, recorded, read
 // back. Then from simulated passes of one of them to live pictures.
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <pty.h>
 #include <sys/socket.h>
@@ -22,7 +21,7 @@
 #include "io/files/json.h"
 #include "io/numbers/random.h"
 #include "io/numbers/text.h"
-#include "tests/apps/common/process.h"
+#include "tests/apps/common/expect.h"
 #include "tests/hardware/fake_sensor.h"
 
 namespace supertac {
@@ -161,21 +160,19 @@ void expect_sent(const Recording& recording, const FakeDevice& device, const Sen
   }
 }
 
-class SensorFile : public testing::TestWithParam<const char*> {};
+using SensorFiles = ProgramTest;
+class SensorFile : public ProgramTest, public testing::WithParamInterface<const char*> {};
 
 TEST_P(SensorFile, IsProbedViewedRecordedAndReadBack) {
-  const TemporaryFolder folder;
   Sensor sensor = example(GetParam());
   const bool slow = sensor.rate_hz < 10;
   const std::string seconds = slow ? "6" : "2.5";
   const FakeDevice device(sensor);
   sensor.port = device.port();
 
-  const std::string draft_path = folder / "draft.json";
-  const auto probed = run_process("supertac-stream", {"--sensor", device.port(), "--probe", "--seconds",
-                                                      seconds, "--out", draft_path, "--quiet"});
-  ASSERT_EQ(probed.code, 0) << probed.error << probed.out;
-  Sensor draft = read_sensor(draft_path);
+  const ProcessResult probed = succeed("supertac-stream --sensor " + device.port() + " --probe --seconds " +
+                                       seconds + " --out draft.json --quiet");
+  Sensor draft = read_sensor(path("draft.json"));
   EXPECT_EQ(draft.values(), sensor.values()) << probed.out;
   EXPECT_EQ(draft.frame.kind, sensor.frame.kind);
   EXPECT_EQ(draft.scale.rises(), sensor.scale.rises()) << probed.out;
@@ -183,17 +180,15 @@ TEST_P(SensorFile, IsProbedViewedRecordedAndReadBack) {
   EXPECT_NEAR(draft.rate_hz, sensor.rate_hz, 0.2 * sensor.rate_hz) << probed.out;
 
   draft.dead.clear();
-  write_sensor(folder / "sensor.json", sensor);
-  write_sensor(draft_path, draft);
+  write_sensor(path("sensor.json"), sensor);
+  write_sensor(path("draft.json"), draft);
   for (const auto& [file, described] :
        std::map<std::string, Sensor>{{"draft.json", draft}, {"sensor.json", sensor}}) {
     SCOPED_TRACE(file);
-    const std::string kept = folder / file + ".recordings", json = folder / file + ".result";
-    const auto streamed = run_process(
-        "supertac-stream", {"--sensor", folder / file, "--record", kept, "--plate", "ridges6", "--seconds",
-                            slow ? "3.5" : "1", "--out", "-", "--json", json, "--quiet"});
-    ASSERT_EQ(streamed.code, 0) << streamed.error;
-    const Recording recording = read_recording(kept + "/ridges6_t1_p1_v0.safetensors");
+    const ProcessResult streamed = succeed("supertac-stream --sensor " + file + " --record " + file +
+                                           ".recordings --plate ridges6 --seconds " + (slow ? "3.5" : "1") +
+                                           " --out - --json " + file + ".result --quiet");
+    const Recording recording = read_recording(path(file + ".recordings/ridges6_t1_p1_v0.safetensors"));
     EXPECT_GE(recording.frames(), slow ? 3U : 20U);
     EXPECT_EQ(recording.array, described.array);
     EXPECT_EQ(recording.signal_scale, described.scale);
@@ -209,28 +204,20 @@ TEST_P(SensorFile, IsProbedViewedRecordedAndReadBack) {
 }
 
 TEST_P(SensorFile, LearnsFromSimulatedPassesAndDrawsLive) {
-  const TemporaryFolder folder;
   Sensor sensor = example(GetParam());
   const bool slow = sensor.rate_hz < 10;  // a window of 32 frames would take half a minute
-  const std::string passes = folder / "passes", model = folder / "model";
-  write_sensor(folder / "sensor.json", sensor);
-  const auto simulated =
-      run_process("supertac-simulate", {"--sensor", folder / "sensor.json", "--plates", "ridges6", "--passes",
-                                        "2", "--trials", "1", "--speeds", "10", "--out", passes});
-  ASSERT_EQ(simulated.code, 0) << simulated.error;
-  std::vector<std::string> words = {"--data",   passes, "--out",    model, "--split", "none",
-                                    "--epochs", "1",    "--stride", "16",  "--preset"};
-  words.emplace_back(slow ? "frame" : "tiny");
-  if (!slow) words.insert(words.end(), {"--timesteps", "32"});
-  const auto trained = run_process("supertac-train", words);
-  ASSERT_EQ(trained.code, 0) << trained.error;
+  write_sensor(path("sensor.json"), sensor);
+  succeed(
+      "supertac-simulate --sensor sensor.json --plates ridges6 --passes 2 --trials 1 --speeds 10 --out "
+      "passes");
+  succeed("supertac-train --data passes --out model --split none --epochs 1 --stride 16 --preset " +
+          std::string(slow ? "frame" : "tiny --timesteps 32"));
   const FakeDevice device(sensor);
   sensor.port = device.port();
-  write_sensor(folder / "sensor.json", sensor);
-  const auto streamed =
-      run_process("supertac-stream", {"--sensor", folder / "sensor.json", "--model", model, "--seconds",
-                                      slow ? "3.5" : "1.5", "--out", "-", "--quiet"});
-  ASSERT_EQ(streamed.code, 0) << streamed.error;
+  write_sensor(path("sensor.json"), sensor);
+  const ProcessResult streamed =
+      succeed("supertac-stream --sensor sensor.json --model model --out - --quiet --seconds " +
+              std::string(slow ? "3.5" : "1.5"));
   const auto line = parse_json_limited(streamed.out.substr(0, streamed.out.find('\n')));
   EXPECT_EQ(line.at("picture").size(), 16U * static_cast<std::size_t>(sensor.array.taxels()));
 }
@@ -240,51 +227,45 @@ INSTANTIATE_TEST_SUITE_P(Examples, SensorFile,
                                          "uskin_4x4x3", "anyskin", "mat_32x64"),
                          [](const auto& file) { return std::string(file.param); });
 
-TEST(SensorFiles, AnotherRateThanTheFileSaysIsSaid) {
-  const TemporaryFolder folder;
+TEST_F(SensorFiles, AnotherRateThanTheFileSaysIsSaid) {
   Sensor sensor = example("json_lines");
   sensor.rate_hz = 40;
   const FakeDevice device(sensor);
   sensor.port = device.port();
   const auto said = [&](double stated_hz) {
     sensor.rate_hz = stated_hz;
-    write_sensor(folder / "sensor.json", sensor);
-    return run_process("supertac-stream", {"--sensor", folder / "sensor.json", "--seconds", "2", "--quiet"})
-        .out;
+    write_sensor(path("sensor.json"), sensor);
+    return run("supertac-stream --sensor sensor.json --seconds 2 --quiet").out;
   };
-  EXPECT_EQ(said(40).find("is said to send"), std::string::npos);
+  EXPECT_FALSE(contains(said(40), "is said to send"));
   const std::string slow = said(100);
-  EXPECT_NE(slow.find(" frames came a second, the sensor is said to send 100.0"), std::string::npos) << slow;
-  EXPECT_NE(said(45).find("is said to send 45.0: correct rate_hz in its file"), std::string::npos);
-  EXPECT_NE(slow.find("lost 0,"), std::string::npos) << slow;
+  EXPECT_TRUE(contains(slow, " frames came a second, the sensor is said to send 100.0"));
+  EXPECT_TRUE(contains(said(45), "is said to send 45.0: correct rate_hz in its file"));
+  EXPECT_TRUE(contains(slow, "lost 0,"));
 }
 
 // Where each taxel rests and its gain go into the file, whose other words stay.
-TEST(SensorFiles, GainsAreFoundWhilePressing) {
-  const TemporaryFolder folder;
+TEST_F(SensorFiles, GainsAreFoundWhilePressing) {
   Sensor sensor = example("csv_arduino");
   const FakeDevice device(sensor);
   sensor.port = device.port();
-  write_sensor(folder / "sensor.json", sensor);
-  const auto probed = run_process("supertac-stream", {"--sensor", folder / "sensor.json", "--probe", "--gain",
-                                                      "--seconds", "4", "--out", folder / "even.json"});
-  ASSERT_EQ(probed.code, 0) << probed.error << probed.out;
-  EXPECT_NE(probed.error.find("listening for 4 s: press every taxel equally hard"), std::string::npos);
-  EXPECT_NE(probed.out.find("not pressed, or far more weakly than the others: taxels [0,"), std::string::npos)
-      << probed.out;
-  Sensor even = read_sensor(folder / "even.json");
+  write_sensor(path("sensor.json"), sensor);
+  const ProcessResult probed =
+      succeed("supertac-stream --sensor sensor.json --probe --gain --seconds 4 --out even.json");
+  EXPECT_TRUE(contains(probed.error, "listening for 4 s: press every taxel equally hard"));
+  EXPECT_TRUE(contains(probed.out, "not pressed, or far more weakly than the others: taxels [0,"));
+  Sensor even = read_sensor(path("even.json"));
   ASSERT_EQ(even.gain.size(), sensor.array.signals());
   for (const float gain : even.gain) EXPECT_NEAR(gain, 1, 0.05);
   for (const float rest : even.rest)
     EXPECT_NEAR(rest, sensor.scale.rest - 0.0225 * sensor.scale.span, 0.01 * std::abs(sensor.scale.span));
   even.gain.clear(), even.rest.clear();
   EXPECT_EQ(even, sensor);
-  EXPECT_EQ(run_process("supertac-stream", {"--sensor", device.port(), "--gain"}).code, 2);
+  EXPECT_EQ(run("supertac-stream --sensor " + device.port() + " --gain").code, 2);
 }
 
 // What is recorded is what the tracker makes of the frames that were sent.
-TEST(SensorFiles, ARestThatDriftsIsFollowedWhereTheFileAsks) {
-  const TemporaryFolder folder;
+TEST_F(SensorFiles, ARestThatDriftsIsFollowedWhereTheFileAsks) {
   Sensor sensor = example("csv_arduino");
   sensor.dead.clear(), sensor.follow_rest_s = 3;
   std::string bytes;
@@ -296,14 +277,11 @@ TEST(SensorFiles, ARestThatDriftsIsFollowedWhereTheFileAsks) {
   };
   const int frames = static_cast<int>(40 * sensor.rate_hz);
   for (int n = 0; n < frames; ++n) bytes += sent_frame(sensor, sent(n), n / sensor.rate_hz);
-  sensor.port = folder / "bytes";
+  sensor.port = path("bytes");
   write_file(sensor.port, bytes);
-  write_sensor(folder / "sensor.json", sensor);
-  const std::string kept = folder / "kept";
-  const auto streamed =
-      run_process("supertac-stream", {"--sensor", folder / "sensor.json", "--record", kept, "--quiet"});
-  ASSERT_EQ(streamed.code, 0) << streamed.error;
-  const Recording recording = read_recording(kept + "/unknown_t1_p1_v0.safetensors");
+  write_sensor(path("sensor.json"), sensor);
+  succeed("supertac-stream --sensor sensor.json --record kept --quiet");
+  const Recording recording = read_recording(path("kept/unknown_t1_p1_v0.safetensors"));
   const std::size_t signals = sensor.array.signals(), last = recording.frames() - 1;
   ASSERT_GT(recording.frames(), static_cast<std::size_t>(frames) * 9 / 10);
   const auto share = [&](std::size_t frame, std::size_t k) {
@@ -314,8 +292,7 @@ TEST(SensorFiles, ARestThatDriftsIsFollowedWhereTheFileAsks) {
   EXPECT_NEAR(share(last, 3), 0.5, 0.02);
 }
 
-TEST(SensorFiles, OthersAtThePortAreToldApart) {
-  const TemporaryFolder folder;
+TEST_F(SensorFiles, OthersAtThePortAreToldApart) {
   std::string noise, log;
   const RandomStream random(1, 2);
   for (std::size_t i = 0; i < 40'000; ++i) noise += static_cast<char>(random.bits(i));
@@ -328,31 +305,27 @@ TEST(SensorFiles, OthersAtThePortAreToldApart) {
                                                     {printer, "a printer's firmware answers here"},
                                                     {"", "nothing came"}};
   for (const auto& [bytes, words] : heard) {
-    write_file(folder / "port", bytes);
-    const auto probed = run_process("supertac-stream", {"--sensor", folder / "port", "--probe", "--quiet"});
+    write_file(path("port"), bytes);
+    const auto probed = run("supertac-stream --sensor port --probe --quiet");
     EXPECT_EQ(probed.code, 1) << words;
-    EXPECT_NE((probed.out + probed.error).find(words), std::string::npos) << probed.out << probed.error;
+    EXPECT_TRUE(contains(probed.out + probed.error, words));
   }
 }
 
 // Simulated passes of the mat train a model that draws what the mat feels; the same signals in volts that
 // fall, in another order and unit, give the same pictures.
-TEST(SensorFiles, FromSimulatedPassesToLivePictures) {
-  const TemporaryFolder folder;
+TEST_F(SensorFiles, FromSimulatedPassesToLivePictures) {
   Sensor mat = example("csv_arduino");
   mat.array.rows = mat.array.columns = 4, mat.array.pitch_mm = 3, mat.dead.clear(), mat.rate_hz = 100;
   for (int pass = 1; pass <= 2; ++pass) {
     Recording recording =
         simulate_pass(Plate::named("bumps12"), {.pass = pass}, {.array = mat.array, .rate_hz = 100});
     restate(recording, mat.scale);
-    write_recording(folder / ("p" + std::to_string(pass) + ".safetensors"), recording);
+    write_recording(path("p" + std::to_string(pass) + ".safetensors"), recording);
   }
-  const std::string model = folder / "model" + ".st";
-  const auto trained = run_process(
-      "supertac-train", {"--data", folder.path(), "--out", model, "--preset", "tiny", "--timesteps", "32",
-                         "--epochs", "1", "--stride", "20", "--split", "none"});
-  ASSERT_EQ(trained.code, 0) << trained.error;
-
+  succeed(
+      "supertac-train --data . --out model.st --preset tiny --timesteps 32 --epochs 1 --stride 20 --split "
+      "none");
   Sensor volts = mat;  // column by column, falling, in millivolts
   volts.scale = {.unit = "mV", .rest = 3300, .span = 2500};
   volts.order = {0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15};
@@ -371,14 +344,13 @@ TEST(SensorFiles, FromSimulatedPassesToLivePictures) {
       }
       bytes += sent_frame(sensor, values, 0.01 * static_cast<double>(i));
     }
-    sensor.port = folder / (sensor.scale.unit + ".bytes");
+    const std::string unit = sensor.scale.unit;
+    sensor.port = path(unit + ".bytes");
     write_file(sensor.port, bytes);
-    write_sensor(folder / (sensor.scale.unit + ".json"), sensor);
-    const std::string out = folder / (sensor.scale.unit + ".pictures");
-    const auto streamed = run_process("supertac-stream", {"--sensor", folder / (sensor.scale.unit + ".json"),
-                                                          "--model", model, "--out", out, "--quiet"});
-    ASSERT_EQ(streamed.code, 0) << streamed.error;
-    pictures.push_back(SafetensorsFile::read(out).f32("pictures"));
+    write_sensor(path(unit + ".json"), sensor);
+    succeed("supertac-stream --sensor " + unit + ".json --model model.st --quiet --out " + unit +
+            ".pictures");
+    pictures.push_back(SafetensorsFile::read(path(unit + ".pictures")).f32("pictures"));
   }
   ASSERT_EQ(pictures[0].size(), pictures[1].size());
   ASSERT_GT(pictures[0].size(), 256U * 300);

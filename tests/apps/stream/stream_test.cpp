@@ -22,11 +22,10 @@ namespace fs = std::filesystem;
 
 TEST_F(Streaming, AReplayGivesThePicturesThatLiveHad) {
   plug_in();
-  const ProcessResult live = stream({"--board", board(), "--seconds", "1.5", "--out", path("live"),
-                                     "--capture", path("capture"), "--json", path("json")});
+  const ProcessResult live =
+      stream("--board " + board() + " --seconds 1.5 --out live --capture capture --json json");
   ASSERT_EQ(live.code, 0) << live.error;
-  const ProcessResult replayed =
-      stream({"--replay", path("capture"), "--seconds", "1.5", "--out", path("replay")});
+  const ProcessResult replayed = stream("--replay capture --seconds 1.5 --out replay");
   ASSERT_EQ(replayed.code, 0) << replayed.error;
   const auto json = result("json");
   const SafetensorsFile first = kept("live"), again = kept("replay");
@@ -47,10 +46,8 @@ TEST_F(Streaming, AReplayGivesThePicturesThatLiveHad) {
 }
 
 TEST_F(Streaming, ARecordingGivesThePicturesOfItsWindows) {
-  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
-  const Recording recording = simulate_pass(Plate::named("bumps12"), {.to_mm = 40});
-  write_recording(path("recording"), recording);
-  const ProcessResult done = stream({"--recording", path("recording"), "--out", path("out")});
+  const Recording recording = record(40);
+  const ProcessResult done = stream("--recording recording --out out");
   ASSERT_EQ(done.code, 0) << done.error;
   const std::vector<float> pictures = kept("out").f32("pictures");
   const std::vector<double> times = kept("out").f64("time_s");
@@ -78,19 +75,15 @@ TEST_F(Streaming, ARecordingGivesThePicturesOfItsWindows) {
 }
 
 TEST_F(Streaming, PrecisionAutoIsFp32WithoutTheRangesOfInt8) {
-  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
-  write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 32}));
-  const ProcessResult done =
-      stream({"--recording", path("recording"), "--precision", "auto", "--json", path("json")});
+  record(32);
+  const ProcessResult done = stream("--recording recording --precision auto --json json");
   ASSERT_EQ(done.code, 0) << done.error;
   EXPECT_EQ(result("json").at("precision"), "fp32");
 }
 
 // The same without a process.
 TEST_F(Streaming, EndsWhenItsTimeIsOverAndCounts) {
-  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
-  const Recording recording = simulate_pass(Plate::named("bumps12"), {.to_mm = 40});
-  write_recording(path("recording"), recording);
+  const Recording recording = record(40);
   const std::vector<ModelFile> models = load_models(std::vector{model()});
   const auto source = open_recording(path("recording"));
   Stream stream({.seconds = 0.5, .out = path("out")}, models, *source);
@@ -139,32 +132,32 @@ TEST_F(Streaming, TakesModelsOfAnyWindowAndRefusesWhatWasFilteredOtherwise) {
   write_recording(path("recording"), recording);
   for (const Dim timesteps : {64, 256}) {
     write_model(model(), timesteps, SimulatorSettings().filter_s);
-    ASSERT_EQ(stream({"--recording", path("recording"), "--json", path("json"), "--force"}).code, 0);
+    ASSERT_EQ(stream("--recording recording --json json --force").code, 0);
     EXPECT_NEAR(result("json").at("pictures"), recording.frames() - timesteps, 5) << timesteps;
   }
   write_model(model(), kTimesteps, 0);
-  expect_failure(stream({"--recording", path("recording")}), 1, "moving average of 0.0992 s, the model was");
+  expect_failure(stream("--recording recording"), 1, "moving average of 0.0992 s, the model was");
   write_model(model(), kTimesteps, std::nullopt);
-  EXPECT_EQ(stream({"--recording", path("recording")}).code, 0);
+  EXPECT_EQ(stream("--recording recording").code, 0);
 }
 
 TEST_F(Streaming, FilesThatAreMissingOrOfAnotherKindAreNamed) {
-  expect_failure(stream({"--recording", path("none")}), 1, path("none"));
-  expect_failure(stream({"--replay", path("none")}), 1, path("none"));
-  expect_failure(stream({"--replay", model()}), 1, "expected a SuperTac journal");
-  expect_failure(stream({"--replay", "/dev/zero"}), 1, "is not a regular file");
-  expect_failure(stream({"--recording", model()}), 1, model());
+  expect_failure(stream("--recording " + path("none")), 1, path("none"));
+  expect_failure(stream("--replay " + path("none")), 1, path("none"));
+  expect_failure(stream("--replay " + model()), 1, "expected a SuperTac journal");
+  expect_failure(stream("--replay /dev/zero"), 1, "is not a regular file");
+  expect_failure(stream("--recording " + model()), 1, model());
   fs::remove(model());
-  expect_failure(stream({"--board", board()}), 1, model());
+  expect_failure(stream("--board " + board()), 1, "model: cannot open the file");
 }
 
 TEST_F(Streaming, WrongUsageIsExitCode2) {
-  expect_failure(stream({}), 2, "expected one of --sensor FILE, --board PORT");
-  expect_failure(stream({"--board", "a", "--replay", "b"}), 2, "found 2");
-  expect_failure(stream({"--replay", "a", "--capture", "b"}), 2, "--capture: only with --board");
-  expect_failure(stream({"--recording", "a", "--seconds", "0"}), 2, "--seconds");
-  expect_failure(run_process("supertac-stream", {"--board", "a"}), 1, "port a: no such port");
-  EXPECT_EQ(run_process("supertac-stream", {"--list-ports"}).code, 0);
+  expect_failure(stream(""), 2, "expected one of --sensor FILE, --board PORT");
+  expect_failure(stream("--board a --replay b"), 2, "found 2");
+  expect_failure(stream("--replay a --capture b"), 2, "--capture: only with --board");
+  expect_failure(stream("--recording a --seconds 0"), 2, "--seconds");
+  expect_failure(run("supertac-stream --board a"), 1, "port a: no such port");
+  succeed("supertac-stream --list-ports");
 }
 
 TEST_F(Streaming, TooShortASignalSaysHowMuchIsNeeded) {
@@ -173,102 +166,87 @@ TEST_F(Streaming, TooShortASignalSaysHowMuchIsNeeded) {
   recording.time_s.resize(20), recording.volts.resize(20 * kTaxels), recording.position_mm.resize(40);
   recording.lift_mm.clear();
   write_recording(path("recording"), recording);
-  expect_failure(stream({"--recording", path("recording")}), 1, "no picture, expected 0.11 s of signal");
+  expect_failure(stream("--recording recording"), 1, "no picture, expected 0.11 s of signal");
 }
 
 TEST_F(Streaming, AFullDiskIsOneLineAndLeavesNothing) {
-  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
-  write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 40}));
+  record(40);
   fs::create_directory(path("full"));
-  const ProcessResult result =
-      stream({"--recording", path("recording"), "--out", path("full/out")}, {.max_file_bytes = 20'000});
-  expect_failure(result, 1, path("full/out"));
+  const ProcessResult result = stream("--recording recording --out full/out", {.max_file_bytes = 20'000});
+  expect_failure(result, 1, "full/out");
   EXPECT_TRUE(fs::is_empty(path("full")));
 }
 
 // A real one, where the kernel lets anybody have one.
 TEST_F(Streaming, ADiskThatBecomesFullEndsTheRecordingAndKeepsIt) {
-  if (run_process("/usr/bin/unshare", {"-rm", "mount", "-t", "tmpfs", "none", "/mnt"}).code != 0)
+  if (run("/usr/bin/unshare -rm mount -t tmpfs none /mnt").code != 0)
     GTEST_SKIP() << "no file system of one's own here";
   write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.speed_mm_s = 4}));
   fs::create_directory(path("full"));
-  const std::string script =
-      "mount -t tmpfs -o size=400k none \"$0/full\" || exit 9\n"
-      "\"$1\" --recording \"$0/recording\" --record \"$0/full\" --out \"$0/full/log\" --quiet\n"
-      "code=$?; cp \"$0/full/\"*.safetensors \"$0/kept\"; exit $code";
-  const ProcessResult result =
-      run_process("/usr/bin/unshare", {"-rm", "sh", "-c", script, path(""), SUPERTAC_BIN "/supertac-stream"});
+  write_file(path("script"), "mount -t tmpfs -o size=400k none full || exit 9\n" SUPERTAC_BIN
+                             "/supertac-stream --recording recording --record full --out full/log --quiet\n"
+                             "code=$?; cp full/*.safetensors kept; exit $code");
+  const ProcessResult result = run("/usr/bin/unshare -rm sh script");
   expect_failure(result, 1, "the disk is nearly full");
   const Recording all = read_recording(path("recording")), kept = read_recording(path("kept"));
   ASSERT_LT(kept.frames(), all.frames());
-  EXPECT_NE(result.error.find("the " + std::to_string(kept.frames()) + " frames until here are kept"),
-            std::string::npos)
-      << result.error;
+  EXPECT_TRUE(contains(result.error, "the " + std::to_string(kept.frames()) + " frames until here are kept"));
   EXPECT_TRUE(std::equal(kept.volts.begin(), kept.volts.end(), all.volts.begin()));
 }
 
 TEST_F(Streaming, NothingIsOverwrittenWithoutForce) {
-  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
-  write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 32}));
+  record(32);
   write_file(path("out"), "mine");
-  expect_failure(stream({"--recording", path("recording"), "--out", path("out")}), 1, "--force");
+  expect_failure(stream("--recording recording --out out"), 1, "--force");
   EXPECT_EQ(read_text_file(path("out"), 10), "mine");
-  EXPECT_EQ(stream({"--recording", path("recording"), "--out", path("out"), "--force"}).code, 0);
+  EXPECT_EQ(stream("--recording recording --out out --force").code, 0);
   plug_in();
   write_file(path("capture"), "mine");
-  expect_failure(stream({"--board", board(), "--capture", path("capture")}), 1, "--force");
+  expect_failure(stream("--board " + board() + " --capture capture"), 1, "--force");
   const auto recording = read_text_file(path("recording"), 1 << 26);
-  EXPECT_NE(stream({"--recording", path("recording"), "--mcap", path("recording"), "--force"}).code, 0);
+  EXPECT_NE(stream("--recording recording --mcap recording --force").code, 0);
   EXPECT_EQ(read_text_file(path("recording"), 1 << 26), recording);
 }
 
 TEST_F(Streaming, WithoutAPictureNothingIsReplaced) {
-  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
-  write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 32}));
+  record(32);
   write_file(path("out"), "mine");
-  expect_failure(
-      stream({"--recording", path("recording"), "--out", path("out"), "--force", "--seconds", "0.01"}), 1,
-      "no picture");
+  expect_failure(stream("--recording recording --out out --force --seconds 0.01"), 1, "no picture");
   EXPECT_EQ(read_text_file(path("out"), 10), "mine");
-  expect_failure(stream({"--recording", path("recording"), "--mcap", path("out"), "--out", path("none"),
-                         "--force", "--seconds", "0.01"}),
-                 1, "no picture");
+  expect_failure(stream("--recording recording --mcap out --out none --force --seconds 0.01"), 1,
+                 "no picture");
   EXPECT_EQ(read_text_file(path("out"), 10), "mine");
   EXPECT_FALSE(fs::exists(path("none")));
 }
 
 TEST_F(Streaming, DrawsOnATerminalOnly) {
-  write_model(model(), kTimesteps, SimulatorSettings().filter_s);
-  write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 40}));
-  const std::vector<std::string> arguments = {"--model",         model(),     "--recording",
-                                              path("recording"), "--seconds", "1"};
+  record(40);
+  const std::string line = "supertac-stream --model model --recording recording --seconds 1";
   const double begin = monotonic_seconds();
-  const ProcessResult watched = run_process("supertac-stream", arguments, {.terminal = true});
+  const ProcessResult watched = run(line, {.terminal = true});
   EXPECT_GT(monotonic_seconds() - begin, 0.9) << "at the recording's own pace";
-  EXPECT_NE(watched.error.find("\u2580"), std::string::npos);
-  EXPECT_NE(watched.error.find("frames/s"), std::string::npos);
-  const ProcessResult script = run_process("supertac-stream", arguments);
-  EXPECT_EQ(script.error.find("\x1b"), std::string::npos);
+  EXPECT_TRUE(contains(watched.error, "\u2580"));
+  EXPECT_TRUE(contains(watched.error, "frames/s"));
+  const ProcessResult script = run(line);
+  EXPECT_FALSE(contains(script.error, "\x1b"));
 }
 
 TEST_F(Streaming, AnOldCaptureStaysUntilTheNewOneIsComplete) {
   write_file(path("capture"), "old");
-  expect_failure(stream({"--board", path("no-board"), "--capture", path("capture"), "--force"}), 1,
-                 "no-board");
+  expect_failure(stream("--board no-board --capture capture --force"), 1, "no-board");
   EXPECT_EQ(read_text_file(path("capture"), 100), "old");
   fs::create_directory(path("empty"));
-  EXPECT_NE(stream({"--board", path("no-board"), "--capture", path("empty"), "--force"}).code, 0);
+  EXPECT_NE(stream("--board no-board --capture empty --force").code, 0);
   EXPECT_TRUE(fs::exists(path("empty")));
   plug_in();
-  ASSERT_EQ(stream({"--board", board(), "--seconds", "0.5", "--capture", path("capture"), "--force"}).code,
-            0);
-  const ProcessResult replayed = stream({"--replay", path("capture")});
+  ASSERT_EQ(stream("--board " + board() + " --seconds 0.5 --capture capture --force").code, 0);
+  const ProcessResult replayed = stream("--replay capture");
   EXPECT_EQ(replayed.code, 0) << replayed.error;
   EXPECT_FALSE(fs::exists(path("capture.new")));
-  EXPECT_EQ(replayed.error.find("damaged"), std::string::npos) << replayed.error;
+  EXPECT_FALSE(contains(replayed.error, "damaged"));
   fs::resize_file(path("capture"), fs::file_size(path("capture")) - 5);
-  const ProcessResult cut = run_process("supertac-stream", {"--model", model(), "--replay", path("capture")});
-  EXPECT_NE(cut.error.find(" damaged bytes of the journal are missing"), std::string::npos) << cut.error;
+  const ProcessResult cut = run("supertac-stream --model " + model() + " --replay capture");
+  EXPECT_TRUE(contains(cut.error, " damaged bytes of the journal are missing"));
 }
 
 TEST_F(Streaming, AModelThatDrawsNoNumbersIsRefused) {
@@ -284,7 +262,7 @@ TEST_F(Streaming, AModelThatDrawsNoNumbersIsRefused) {
         {name, info.dtype, info.shape, std::as_bytes(std::span(nothing)).first(info.end - info.begin)});
   write_safetensors(model(), good.metadata(), broken);
   write_recording(path("recording"), simulate_pass(Plate::named("bumps12"), {.to_mm = 40}));
-  expect_failure(stream({"--recording", path("recording")}), 1, " holds NaN or infinity");
+  expect_failure(stream("--recording recording"), 1, " holds NaN or infinity");
 }
 
 TEST_F(Streaming, ATerminalThatIsNotReadHoldsUpNobody) {
@@ -307,9 +285,6 @@ TEST_F(Streaming, ATerminalThatIsNotReadHoldsUpNobody) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
   EXPECT_GT(kept("out").f64("time_s").size(), 0U);
 }
-
-// The board is 4x4: a model of another array cannot see through it, but it can through a recording of its
-// own.
 
 }  // namespace
 }  // namespace supertac

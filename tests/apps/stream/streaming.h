@@ -1,9 +1,6 @@
 // supertac-stream, run on a virtual rig with a model of random weights.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
@@ -11,13 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "data/recordings/simulator.h"
 #include "hardware/virtual_rig/pty_rig.h"
-#include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/files/safetensors.h"
 #include "models/files/model_file.h"
-#include "tests/apps/common/process.h"
-#include "tests/io/temporary_folder.h"
+#include "tests/apps/common/expect.h"
 
 namespace supertac {
 
@@ -44,21 +40,25 @@ inline RigSettings touching_rig() {
   return settings;
 }
 
-class Streaming : public testing::Test {
+class Streaming : public ProgramTest {
  protected:
   Streaming() { write_model(model()); }
 
-  std::string path(const std::string& name) const { return folder_ / name; }
   std::string model() const { return path("model"); }
   std::string board() const { return path("board"); }
 
-  std::vector<std::string> words(const std::vector<std::string>& more) const {
-    std::vector<std::string> all = {"--model", model(), "--quiet"};
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
+  static std::string line(const std::string& more) { return "supertac-stream --model model --quiet " + more; }
+  ProcessResult stream(const std::string& more, const ProcessOptions& options = {}) const {
+    return run(line(more), options);
   }
-  ProcessResult stream(const std::vector<std::string>& more, const ProcessOptions& options = {}) const {
-    return run_process("supertac-stream", words(more), options);
+  RunningProcess start(const std::string& more) const { return start_in(folder_.path(), line(more)); }
+
+  // A recording of the simulator up to there, and a model behind its filter.
+  Recording record(double to_mm) const {
+    const Recording recording = simulate_pass(Plate::named("bumps12"), {.to_mm = to_mm});
+    write_recording(path("recording"), recording);
+    write_model(model(), kTimesteps, SimulatorSettings().filter_s);
+    return recording;
   }
   // Starts the rig; a board that streams before anyone listens is what a program finds.
   PtyRig& plug_in(const RigSettings& settings = touching_rig()) {
@@ -66,18 +66,9 @@ class Streaming : public testing::Test {
     return *rig_;
   }
   SafetensorsFile kept(const std::string& name) const { return SafetensorsFile::read(path(name)); }
-  nlohmann::ordered_json result(const std::string& name) const {
-    return parse_json_limited(read_text_file(path(name), 1 << 20));
-  }
+  nlohmann::ordered_json result(const std::string& name) const { return parse_json_limited(bytes(name)); }
 
-  TemporaryFolder folder_;
   std::unique_ptr<PtyRig> rig_;
 };
-
-inline void expect_failure(const ProcessResult& result, int code, const std::string& part) {
-  EXPECT_EQ(result.code, code) << result.error;
-  EXPECT_NE(result.error.find(part), std::string::npos) << result.error;
-  EXPECT_EQ(std::count(result.error.begin(), result.error.end(), '\n'), 1) << result.error;
-}
 
 }  // namespace supertac

@@ -7,6 +7,7 @@
 
 #include "apps/web/result_page.h"
 #include "io/numbers/numbers.h"
+#include "tests/apps/common/expect.h"
 
 namespace supertac {
 namespace {
@@ -34,9 +35,9 @@ TEST(Chart, AxesHaveRoundNumbersWithinTheirRange) {
 TEST(Chart, AnAxisEndsWhereItsValuesDo) {
   const std::string svg = chart_svg("SSIM", {.label = "step"}, {.label = "SSIM", .most = 1},
                                     {{.name = "a", .points = {{0, .5}, {9, .99}}}});
-  EXPECT_EQ(svg.find(">1.0"), std::string::npos) << svg;
-  EXPECT_NE(svg.find(">1<"), std::string::npos) << svg;
-  EXPECT_EQ(svg.find(">1.1<"), std::string::npos) << svg;
+  EXPECT_FALSE(contains(svg, ">1.0"));
+  EXPECT_TRUE(contains(svg, ">1<"));
+  EXPECT_FALSE(contains(svg, ">1.1<"));
 }
 
 TEST(Chart, EqualFactorsAreEqualStepsOnALogarithmicAxis) {
@@ -82,14 +83,14 @@ TEST(Chart, AHeatMapHasACellForEachPairThatIsKnown) {
   for (std::size_t at = 0; (at = svg.find("<rect", at)) != std::string::npos; ++at) ++cells;
   EXPECT_EQ(cells, 5U);
   for (const char* words : {">32<", ">10<", ">0.500<", ">0.900<", ">T<", ">LD<"})
-    EXPECT_NE(svg.find(words), std::string::npos) << words;
+    EXPECT_TRUE(contains(svg, words));
   EXPECT_EQ(heat_map_svg("", {"", {"1"}}, {"", {"1"}}, {NAN}), "");
 }
 
 TEST(Chart, NamesAreNoMarkup) {
   const std::string svg = chart_svg("<b>", {.label = "<x>"}, {.label = ""},
                                     {{.name = "<a>", .points = {{0, 1}}}, {.name = "b", .points = {{1, 2}}}});
-  for (const char* raw : {"<b>", "<x>", "<a>"}) EXPECT_EQ(svg.find(raw), std::string::npos) << raw;
+  for (const char* raw : {"<b>", "<x>", "<a>"}) EXPECT_FALSE(contains(svg, raw));
   EXPECT_EQ(escaped("a<b & \"c\""), "a&lt;b &amp; &quot;c&quot;");
 }
 
@@ -102,8 +103,8 @@ TEST(Chart, NothingToShowIsNoChart) {
 TEST(ResultPage, IsWhole) {
   const std::string page = result_page("a <title>", "content");
   for (const char* left : {"<!--title", "<!--content", "<!--films", "{{", "http://", "https://"})
-    EXPECT_EQ(page.find(left), std::string::npos) << left;
-  EXPECT_NE(page.find("<title>a &lt;title></title>"), std::string::npos);
+    EXPECT_FALSE(contains(page, left));
+  EXPECT_TRUE(contains(page, "<title>a &lt;title></title>"));
 }
 
 }  // namespace

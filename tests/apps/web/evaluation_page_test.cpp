@@ -1,6 +1,4 @@
 // supertac-evaluate --report: the page holds everything, needs nothing, and says what made it.
-#include <gtest/gtest.h>
-
 #include "data/recordings/simulator.h"
 #include "io/files/json.h"
 #include "models/files/model_file.h"
@@ -27,21 +25,20 @@ TEST_F(EvaluationPage, HoldsScoresWindowsFilmsAndWhatMadeIt) {
   Rng rng(1);
   const SuperTac model({.timesteps = 32, .latent = 3, .scale = 2, .channels = 8, .rcabs = 1}, rng);
   save_model(path("<model>"), model, {300, {}, SimulatorSettings().filter_s}, {});
-  const std::vector<std::string> words = {
-      "--model", path("<model>"), "--data",   path("data"),        "--split", "none",        "--limit",
-      "2000",    "--quiet",       "--report", path("report.html"), "--json",  path("r.json")};
-  const ProcessResult result = run_process("supertac-evaluate", words);
-  ASSERT_EQ(result.code, 0) << result.error;
+  const std::string line =
+      "supertac-evaluate --model <model> --data data --split none --limit 2000 --quiet --report report.html "
+      "--json r.json";
+  succeed(line);
   const std::string page = bytes("report.html");
   EXPECT_LT(page.size(), 5'000'000U);
   for (const char* outside : {"http://", "https://", "src=\"/", "url(", "<!--content", "<!--films", "{{"})
-    EXPECT_EQ(page.find(outside), std::string::npos) << outside;
-  EXPECT_EQ(page.find("<model>"), std::string::npos);  // names are no markup
+    EXPECT_FALSE(contains(page, outside));
+  EXPECT_FALSE(contains(page, "<model>"));  // names are no markup
   const auto scores = parse_json_limited(bytes("r.json"));
   for (const std::string& text :
        {std::string("ridge"), std::string("3_Bumps"), std::string("in the air"), std::string("&lt;model>"),
         "hash " + scores["data"].get<std::string>(), std::string("--report"), std::string("commit ")})
-    EXPECT_NE(page.find(text), std::string::npos) << text;
+    EXPECT_TRUE(contains(page, text));
   for (const char* part : {"alt=\"felt, ", "alt=\"drawn, ", "alt=\"true, ", "alt=\"difference, "})
     EXPECT_EQ(count(page, part), 24U) << part;
   const auto films = nlohmann::json::parse(between(page, "type=\"application/json\">", "</script>"));
@@ -52,7 +49,7 @@ TEST_F(EvaluationPage, HoldsScoresWindowsFilmsAndWhatMadeIt) {
     for (const auto& frame : pass["frames"])  // 16 taxels, 64 pixels drawn and 64 true
       EXPECT_EQ(frame["levels"].get<std::string>().size(), 192U);
   }
-  EXPECT_EQ(run_process("supertac-evaluate", words).code, 1);  // nothing is overwritten
+  EXPECT_EQ(run(line).code, 1);  // nothing is overwritten
 }
 
 }  // namespace

@@ -16,9 +16,9 @@
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/images/images.h"
+#include "tests/apps/common/expect.h"
 #include "tests/apps/web/http_client.h"
 #include "tests/fuzz/corpus.h"
-#include "tests/io/temporary_folder.h"
 
 namespace supertac {
 namespace {
@@ -100,7 +100,7 @@ TEST_F(Web, ListensOnLoopbackOnly) {
   EXPECT_EQ(found, 1);
   std::ifstream six("/proc/net/tcp6");
   const std::string all{std::istreambuf_iterator<char>(six), {}};
-  EXPECT_EQ(all.find(std::string(hex) + " 00000000000000000000000000000000:0000 0A"), std::string::npos);
+  EXPECT_FALSE(contains(all, std::string(hex) + " 00000000000000000000000000000000:0000 0A"));
 }
 
 TEST_F(Web, AForeignHostIsMisdirected) {
@@ -148,19 +148,19 @@ TEST_F(Web, NoPathLeavesThePage) {
 TEST_F(Web, ThePageNeedsNothingFromElsewhere) {
   const std::string_view page = live_page();
   for (const char* outside : {"http://", "https://", "src=\"", "@import", "url(", "{{"})
-    EXPECT_EQ(page.find(outside), std::string_view::npos) << outside;
+    EXPECT_FALSE(contains(page, outside));
   HttpClient client(port_);
   client.send("GET / HTTP/1.1\r\n" + host() + "\r\n");
   const std::string answer = client.receive("</html>");
-  EXPECT_NE(answer.find("Content-Security-Policy: default-src 'none'"), std::string::npos);
-  EXPECT_NE(answer.find(page.substr(0, 100)), std::string::npos);
+  EXPECT_TRUE(contains(answer, "Content-Security-Policy: default-src 'none'"));
+  EXPECT_TRUE(contains(answer, page.substr(0, 100)));
 }
 
 TEST_F(Web, AReaderGetsTheHelloAndThenTheNewest) {
   HttpClient client(port_);
   client.send("GET /events HTTP/1.1\r\n" + host() + "\r\n");
   const std::string first = client.receive("data: {\"n\":");
-  EXPECT_NE(first.find("event: hello\ndata: {\"token\":\""), std::string::npos);
+  EXPECT_TRUE(contains(first, "event: hello\ndata: {\"token\":\""));
   const int begin = count_;
   const auto start = std::chrono::steady_clock::now();
   client.receive("{\"n\":" + std::to_string(begin + 15) + ",");
@@ -261,7 +261,7 @@ TEST_F(Web, AThousandSlowConnectionsLeaveRoom) {
     }
     const std::string later = "{\"n\":" + std::to_string(count_ + 10) + ",";
     if (words.ends_with("HT")) {
-      EXPECT_NE(owner.receive(later).find(later), std::string::npos) << "silent ones made a page leave";
+      EXPECT_TRUE(contains(owner.receive(later), later)) << "silent ones made a page leave";
     }
     EXPECT_FALSE(token().empty());
   }
@@ -291,7 +291,7 @@ TEST(WebServer, TheLastThatPagesHearIsWhatBecameOfTheRun) {
   std::thread goes([&] { server.reset(); });
   const std::string last = reader.receive(
       "event: end\ndata: {\"failed\":true,\"outcome\":\"the plate \\\"a\\\" was\\nlost\"}\n\n");
-  EXPECT_NE(last.find("event: end"), std::string::npos);
+  EXPECT_TRUE(contains(last, "event: end"));
   goes.join();
 }
 
@@ -311,8 +311,7 @@ TEST(WebServer, AnAddressThatCannotBeHadIsNamed) {
   EXPECT_EQ(message({.port = static_cast<std::uint16_t>(port)}),
             "web: '127.0.0.1' port " + std::to_string(port) +
                 ": Address already in use; choose another port with --web PORT");
-  EXPECT_NE(message({.port = 0, .bind = "example.org"}).find("expected a numeric address"),
-            std::string::npos);
+  EXPECT_TRUE(contains(message({.port = 0, .bind = "example.org"}), "expected a numeric address"));
 }
 
 TEST(WebView, AnEventHoldsThePictureAndWhatIsKnownOfIt) {

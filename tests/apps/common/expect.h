@@ -1,0 +1,61 @@
+// What tests expect of programs, said in one line each.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <string_view>
+
+#include "io/files/file.h"
+#include "tests/apps/common/process.h"
+
+namespace supertac {
+
+/// Whether `part` stands in `text`, whose beginning is shown where that is not as expected.
+inline testing::AssertionResult contains(std::string_view text, std::string_view part) {
+  return testing::AssertionResult(text.find(part) != text.npos)
+         << "'" << part << "' and: " << text.substr(0, 4000);
+}
+
+/// It ended with this code, and said so on stderr.
+inline void expect_exit(const ProcessResult& result, int code, std::string_view part) {
+  EXPECT_EQ(result.code, code) << result.error;
+  EXPECT_TRUE(contains(result.error, part));
+}
+
+/// The same, and that line, which begins with the program's name, was all it said. What had worked for
+/// seconds may have said before how long it would take.
+inline void expect_failure(const ProcessResult& result, int code, std::string_view part) {
+  expect_exit(result, code, part);
+  std::string_view said = result.error;
+  if (const std::size_t line = said.find('\n'); said.substr(0, line).ends_with(" to go"))
+    said.remove_prefix(line + 1);
+  EXPECT_EQ(std::ranges::count(said, '\n'), 1) << result.error;
+  EXPECT_TRUE(said.starts_with("supertac")) << result.error;
+}
+
+/// run_in() of what has to succeed.
+inline ProcessResult succeed_in(const std::string& folder, const std::string& line,
+                                const ProcessOptions& options = {}) {
+  ProcessResult result = run_in(folder, line, options);
+  EXPECT_EQ(result.code, 0) << line << ": " << result.error << result.out;
+  return result;
+}
+
+/// A test with a folder of its own, in which programs run.
+class ProgramTest : public testing::Test {
+ protected:
+  ProcessResult run(const std::string& line, const ProcessOptions& how = {}) const {
+    return run_in(folder_.path(), line, how);
+  }
+  ProcessResult succeed(const std::string& line, const ProcessOptions& how = {}) const {
+    return succeed_in(folder_.path(), line, how);
+  }
+  std::string path(const std::string& name) const { return folder_ / name; }
+  std::string bytes(const std::string& name) const { return read_text_file(path(name), 1 << 26); }
+
+  TemporaryFolder folder_;
+};
+
+}  // namespace supertac
