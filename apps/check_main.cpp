@@ -5,8 +5,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "apps/check/machine.h"
-#include "apps/check/training.h"
+#include "apps/check/check.h"
 #include "apps/common/command_line/program.h"
 #include "io/files/file.h"
 

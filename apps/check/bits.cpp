@@ -3,7 +3,7 @@
 #include <array>
 #include <fstream>
 
-#include "apps/check/machine.h"
+#include "apps/check/check.h"
 #include "apps/common/command_line/program.h"
 #include "autograd/kernels/fast/isa/isa.h"
 #include "data/recordings/simulator.h"

@@ -1,6 +1,6 @@
 #include <filesystem>
 
-#include "apps/check/machine.h"
+#include "apps/check/check.h"
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/provenance.h"
 #include "data/recordings/recording.h"

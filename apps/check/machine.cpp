@@ -1,4 +1,4 @@
-#include "apps/check/machine.h"
+#include "apps/check/check.h"
 
 #include <unistd.h>
 

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "apps/check/check.h"
 #include "apps/check/repetition.h"
-#include "apps/check/training.h"
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/progress.h"
 #include "apps/train/run_folder.h"

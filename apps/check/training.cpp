@@ -1,4 +1,4 @@
-#include "apps/check/training.h"
+#include "apps/check/check.h"
 
 #include <algorithm>
 

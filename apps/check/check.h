@@ -1,3 +1,4 @@
+// What supertac-check asks. Each returns the exit code; those of a training throw as supertac-train does.
 #pragma once
 
 #include "apps/common/command_line/arguments.h"
@@ -5,8 +6,7 @@
 namespace supertac {
 
 /// `supertac-check machine`: processor, threads, memory, disk, serial ports, who may open them and who takes
-/// them, and
-/// what to do about each.
+/// them, and what to do about each.
 int check_machine(const Arguments& a);
 /// `supertac-check udev`: the text of a file for /etc/udev/rules.d.
 int print_udev_rule(const Arguments& a);
@@ -17,5 +17,17 @@ int check_bits(const Arguments& a);
 
 /// `supertac-check file`: checksum, content hash and provenance, and whether its data are those given.
 int check_file(const Arguments& a);
+
+/// `supertac-check training`: repeats pieces of a training from its kept states and compares every line of
+/// its ledger, all arrays of the state and the batches.
+int check_training(const Arguments& a);
+
+/// `supertac-check step`: repeats a training up to one step and opens it
+/// (models/training/audit/opened_step.h).
+int check_step(const Arguments& a);
+
+/// `supertac-check ledgers`: the first step and array in which two ledgers differ and, with the recordings,
+/// the first operator and entry; or those of two opened steps.
+int check_ledgers(const Arguments& a);
 
 }  // namespace supertac
