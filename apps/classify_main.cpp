@@ -38,13 +38,8 @@ std::vector<View> views_of(const Arguments& a) {
   if (!a.given("views"))
     return {{ViewKind::frame}, {ViewKind::super_resolved}, {ViewKind::latents}, {ViewKind::history, 32}};
   std::vector<View> views;
-  for (const std::string& name : a.list("views")) {
-    try {
-      views.push_back(View::named(name));
-    } catch (const std::invalid_argument& error) {
-      throw UsageError(std::string("--views: ") + error.what());
-    }
-  }
+  for (const std::string& name : a.list("views"))
+    views.push_back(read_option("views", [&] { return View::named(name); }));
   if (views.empty()) throw UsageError("--views: expected at least one view, found none");
   return views;
 }
@@ -101,9 +96,7 @@ int run(Arguments& a) {
   }
   ExperimentSettings settings;
   settings.epochs = a.integer("epochs", 1, 10'000);
-  if (a.choice("augment", {"standard", "none"}) == "standard") {
-    settings.augment = kStandardAugmentation;
-  }
+  if (a.choice("augment", {"standard", "none"}) == "standard") settings.augment = kStandardAugmentation;
   const std::int64_t stride = a.integer("stride", 1, 100'000);
   const std::vector<Candidate> models = load_candidates(a.list("model"));
   add_model_parents(a.list("model"));

@@ -179,13 +179,7 @@ int draw_expression(const Arguments& a) {
     if (a.given(other))
       throw UsageError(std::string("--") + other + ": has no part in an expression; leave it out");
   Expression e;
-  const auto result = [&] {
-    try {
-      return (e = parse_expression(a.text("FILE"))).result;
-    } catch (const std::invalid_argument& error) {
-      throw UsageError(error.what());
-    }
-  };
+  const auto result = [&] { return as_usage([&] { return (e = parse_expression(a.text("FILE"))).result; }); };
   return write_graph_out(a, "the expression", graph_of(result, e.leaves));
 }
 

@@ -57,11 +57,7 @@ TrainingTask windows_of(const Arguments& a, const Recipe& recipe) {
 }
 
 int train(const Arguments& a, Ranks& ranks) {
-  try {
-    check_micro_batches(ranks.size(), 8);
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(error.what());
-  }
+  as_usage([&] { check_micro_batches(ranks.size(), 8); });
   return train(a, windows_of(a, recipe_of(a)), ranks);
 }
 

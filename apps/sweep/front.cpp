@@ -11,14 +11,15 @@ namespace supertac {
 std::vector<Configuration> configurations(const SweepTable& table) {
   std::vector<Configuration> all;
   for (const SweepTable::Row& row : table.rows()) {
-    const std::string& model = SweepTable::text(row, "model");
+    const std::string& model = row.front();
     const std::string name = model.substr(0, model.rfind("_s"));
-    auto found = std::find_if(all.begin(), all.end(), [&](const Configuration& c) { return c.name == name; });
+    auto found = std::ranges::find(all, name, &Configuration::name);
     if (found == all.end()) found = all.insert(all.end(), {name, 0, {}, {}});
     ++found->seeds;
     found->models.push_back(model);
-    for (const SweepColumn& column : sweep_columns())
-      if (!column.text) found->mean[column.name] += SweepTable::number(row, column.name);
+    for (std::size_t i = 0; i < row.size(); ++i)
+      if (const SweepColumn& column = sweep_columns()[i]; !column.text)
+        found->mean[column.name] += parse_double(row[i]).value_or(std::nan(""));
   }
   for (Configuration& c : all)
     for (auto& [column, sum] : c.mean) sum /= static_cast<double>(c.seeds);
@@ -26,9 +27,7 @@ std::vector<Configuration> configurations(const SweepTable& table) {
 }
 
 std::vector<Configuration> pareto_front(std::vector<Configuration> all) {
-  std::stable_sort(all.begin(), all.end(), [](const Configuration& a, const Configuration& b) {
-    return a.mean.at("median_us") < b.mean.at("median_us");
-  });
+  std::ranges::stable_sort(all, {}, [](const Configuration& c) { return c.mean.at("median_us"); });
   std::vector<Configuration> front;
   for (Configuration& c : all) {
     const double ssim = c.mean.at("ssim");
@@ -55,9 +54,8 @@ std::vector<Condition> conditions_of(const std::string& text) {
       c.comparison = part.substr(sign, value - sign);
       c.bound = parse_double(part.substr(value)).value_or(std::nan(""));
     }
-    const auto& columns = sweep_columns();
-    const bool known = std::any_of(columns.begin(), columns.end(),
-                                   [&](const SweepColumn& k) { return !k.text && k.name == c.column; });
+    const bool known = std::ranges::any_of(
+        sweep_columns(), [&](const SweepColumn& k) { return !k.text && k.name == c.column; });
     const bool comparable =
         c.comparison == ">" || c.comparison == "<" || c.comparison == ">=" || c.comparison == "<=";
     if (!known || !comparable || c.bound != c.bound) {
@@ -74,8 +72,7 @@ const Configuration* cheapest(const std::vector<Configuration>& all,
                               const std::vector<Condition>& conditions) {
   const Configuration* best = nullptr;
   for (const Configuration& c : all) {
-    const bool good =
-        std::all_of(conditions.begin(), conditions.end(), [&](const Condition& k) { return k.holds(c); });
+    const bool good = std::ranges::all_of(conditions, [&](const Condition& k) { return k.holds(c); });
     if (good && (best == nullptr || c.mean.at("median_us") < best->mean.at("median_us"))) best = &c;
   }
   return best;

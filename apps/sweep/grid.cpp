@@ -51,12 +51,6 @@ std::string model_name_of(const Recipe& recipe) {
          part("_c", m.channels) + part("_r", m.rcabs) + "_s" + std::to_string(recipe.seed);
 }
 
-std::vector<std::string> variant_names(const std::vector<Recipe>& grid) {
-  std::vector<std::string> names;
-  for (const Recipe& recipe : grid) names.push_back(model_name_of(recipe));
-  return names;
-}
-
 void declare_grid(Arguments& a) {
   a.option("preset", "A,B,...", "recipes to start from: paper, best, tiny, frame", "paper");
   a.option("timesteps", "T,...",
@@ -72,7 +66,7 @@ void declare_grid(Arguments& a) {
 
 std::vector<Recipe> grid_of(const Arguments& a) {
   std::vector<Recipe> grid;
-  try {
+  as_usage([&] {
     for (const std::string& preset : a.list("preset")) {
       Recipe recipe = recipe_of(a, Recipe::named(preset));
       expand(a, 0, recipe.model, [&](const SuperTacSettings& settings) {
@@ -84,9 +78,7 @@ std::vector<Recipe> grid_of(const Arguments& a) {
         }
       });
     }
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(error.what());
-  }
+  });
   if (grid.empty()) throw UsageError("the grid is empty: give --preset and --seeds at least one value");
   return grid;
 }

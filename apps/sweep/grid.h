@@ -11,7 +11,6 @@ namespace supertac {
 
 /// "paper_t256_l10_x4_c32_r3_s0": all but the last part is the same for all seeds.
 std::string model_name_of(const Recipe& recipe);
-std::vector<std::string> variant_names(const std::vector<Recipe>& grid);
 
 /// --preset, --timesteps, --latent, --scale, --channels, --rcabs, --seeds: comma lists.
 void declare_grid(Arguments& a);

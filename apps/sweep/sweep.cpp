@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <stdexcept>
 #include <thread>
@@ -59,10 +60,9 @@ void Sweep::check_settings() const {
   }
 }
 
-std::vector<Recipe> longest_first(std::vector<Recipe> grid) {
-  std::stable_sort(grid.begin(), grid.end(), [](const Recipe& a, const Recipe& b) {
-    return cost_of(a.model).training > cost_of(b.model).training;
-  });
+// Those of the greatest cost first; equal ones stay in their order.
+static std::vector<Recipe> longest_first(std::vector<Recipe> grid) {
+  std::ranges::stable_sort(grid, std::greater(), [](const Recipe& r) { return cost_of(r.model).training; });
   return grid;
 }
 
@@ -77,14 +77,10 @@ static fs::file_time_type last_write_in(const std::string& folder) {
 void Sweep::run(const std::vector<Recipe>& grid) {
   make_directories(a_.text("out") + "/models");
   grid_ = grid;
-  order_ = variant_names(grid);
+  for (const Recipe& recipe : grid) order_.push_back(model_name_of(recipe));
   const std::vector<Recipe> trainings = longest_first(grid);
-  const auto done = [&] {
-    return std::all_of(order_.begin(), order_.end(), [&](const auto& name) { return table_.has(name); });
-  };
-  while (!done()) {
+  while (!std::ranges::all_of(order_, [&](const auto& name) { return table_.has(name); }))
     if (!take_one(trainings)) wait_for_others();
-  }
 }
 
 // They hold what is left. A process that is frozen holds its folder too, but writes nothing.
@@ -119,7 +115,7 @@ bool Sweep::take_one(const std::vector<Recipe>& longest_first) {
     }
     table_.read_again();
     if (table_.has(name)) continue;
-    const auto number = std::find(order_.begin(), order_.end(), name) - order_.begin() + 1;
+    const auto number = std::ranges::find(order_, name) - order_.begin() + 1;
     measure(recipe, std::to_string(number) + " of " + std::to_string(order_.size()) + " " + name);
     return true;
   }

@@ -18,9 +18,6 @@ namespace supertac {
 /// --limit and --history: which test windows are scored; --deadline.
 void declare_measuring(Arguments& a);
 
-/// Those of the greatest cost first; equal ones stay in their order.
-std::vector<Recipe> longest_first(std::vector<Recipe> grid);
-
 /// How long another process of a sweep may write its table.
 inline constexpr std::chrono::seconds kLongestWriting{30};
 

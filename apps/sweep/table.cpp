@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -16,13 +15,6 @@ namespace {
 constexpr std::uint64_t kMaxBytes = 64 << 20;
 
 std::string header() { return joined(sweep_columns(), ",", &SweepColumn::name); }
-
-std::size_t index_of(const std::string& name) {
-  const auto& columns = sweep_columns();
-  for (std::size_t i = 0; i < columns.size(); ++i)
-    if (columns[i].name == name) return i;
-  throw std::invalid_argument("a sweep's table has no column \"" + name + "\"; it has " + header());
-}
 
 std::string cell(const nlohmann::ordered_json& value) {
   if (value.is_string()) return value.get<std::string>();
@@ -91,9 +83,7 @@ void SweepTable::read_line(const std::string& line, std::size_t number) {
 }
 
 bool SweepTable::has(const std::string& model) const {
-  for (const Row& row : rows_)
-    if (row[0] == model) return true;
-  return false;
+  return std::ranges::any_of(rows_, [&](const Row& row) { return row[0] == model; });
 }
 
 void SweepTable::add(const nlohmann::ordered_json& values, const std::vector<std::string>& order) {
@@ -104,24 +94,13 @@ void SweepTable::add(const nlohmann::ordered_json& values, const std::vector<std
     row.push_back(cell(values[column.name]));
   }
   const auto place = [&](const Row& r) {
-    const auto found = std::find(order.begin(), order.end(), r[0]);
+    const auto found = std::ranges::find(order, r[0]);
     return found == order.end() ? -1 : found - order.begin();
   };
-  rows_.insert(std::find_if(rows_.begin(), rows_.end(), [&](const Row& r) { return place(r) > place(row); }),
-               row);
+  rows_.insert(std::ranges::find_if(rows_, [&](const Row& r) { return place(r) > place(row); }), row);
   std::string content = header() + "\n";
   for (const Row& r : rows_) content += joined(r) + "\n";
   write_file(path_, content);
-}
-
-const std::string& SweepTable::text(const Row& row, const std::string& column) {
-  return row[index_of(column)];
-}
-
-double SweepTable::number(const Row& row, const std::string& column) {
-  const std::size_t i = index_of(column);
-  if (sweep_columns()[i].text) throw std::invalid_argument("column " + column + " holds no numbers");
-  return parse_double(row[i]).value_or(std::numeric_limits<double>::quiet_NaN());
 }
 
 }  // namespace supertac

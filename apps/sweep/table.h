@@ -40,10 +40,8 @@ class SweepTable {
   /// that order, after all others. Throws FileError, std::invalid_argument when a column is missing.
   void add(const nlohmann::ordered_json& values, const std::vector<std::string>& order);
 
+  /// Cells as sweep_columns(): texts, and numbers, which are NaN for a figure over no windows.
   const std::vector<Row>& rows() const { return rows_; }
-  static const std::string& text(const Row& row, const std::string& column);
-  /// NaN for a figure over no windows. Throws std::invalid_argument for an unknown column.
-  static double number(const Row& row, const std::string& column);
 
  private:
   void read();

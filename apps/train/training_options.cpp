@@ -145,11 +145,7 @@ Recipe recipe_of(const Arguments& a, Recipe r) {
     throw UsageError("--beta: has no part in a plain autoencoder; leave it out");
   if (a.given("beta")) r.loss.beta = a.number("beta", 0, 1e6);
   if (a.given("lambda")) r.loss.lambda = a.number("lambda", 0, 1e6);
-  try {
-    r.check();
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(error.what());
-  }
+  as_usage([&] { r.check(); });
   return r;
 }
 

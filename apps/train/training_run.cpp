@@ -33,22 +33,21 @@ Trainer make_trainer(TrainingTask& task, const TrainingTarget& target) {
 
 nlohmann::ordered_json describe(const Arguments& a, const Trainer& trainer, const TrainingTask& task) {
   using Json = nlohmann::ordered_json;
-  Json json = {{"command", a.command_line()},
-               {"version", version()},
-               {"commit", commit()},
-               {"training", Json::parse(trainer.objective().text())},
-               {"model", Json::parse(trainer.objective().metadata().at("settings"))},
-               {"parameters", trainer.model().parameter_count()},
-               {"split", task.origin.at("split")},
-               {"train_windows", task.split.train.size()},
-               {"test_windows", task.split.test.size()},
-               {"test_windows_sharing_frames", task.leakage.overlapping},
-               {"test_windows_duplicated", task.leakage.duplicated},
-               {"windows", task.counts},
-               {"data", task.origin.at("data")},
-               {"split_fingerprint", task.origin.at("split_fingerprint")},
-               {"steps", trainer.total_steps()}};
-  return json;
+  return {{"command", a.command_line()},
+          {"version", version()},
+          {"commit", commit()},
+          {"training", Json::parse(trainer.objective().text())},
+          {"model", Json::parse(trainer.objective().metadata().at("settings"))},
+          {"parameters", trainer.model().parameter_count()},
+          {"split", task.origin.at("split")},
+          {"train_windows", task.split.train.size()},
+          {"test_windows", task.split.test.size()},
+          {"test_windows_sharing_frames", task.leakage.overlapping},
+          {"test_windows_duplicated", task.leakage.duplicated},
+          {"windows", task.counts},
+          {"data", task.origin.at("data")},
+          {"split_fingerprint", task.origin.at("split_fingerprint")},
+          {"steps", trainer.total_steps()}};
 }
 
 }  // namespace

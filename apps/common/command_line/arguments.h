@@ -19,14 +19,19 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What work() returns; an std::invalid_argument of it becomes a UsageError that names the option.
+/// What work() returns; an std::invalid_argument of it becomes a UsageError with `before` in front.
 template <class Work>
-auto read_option(const std::string& option, Work work) {
+auto as_usage(Work work, const std::string& before = "") {
   try {
     return work();
   } catch (const std::invalid_argument& error) {
-    throw UsageError("--" + option + ": " + error.what());
+    throw UsageError(before + error.what());
   }
+}
+/// The same, naming the option.
+template <class Work>
+auto read_option(const std::string& option, Work work) {
+  return as_usage(work, "--" + option + ": ");
 }
 
 /// A file or folder that the command line names.
@@ -90,6 +95,7 @@ class Arguments {
   std::vector<NamedPath> paths() const;
 
   bool force() const { return flag("force"); }
+
   /// A file or folder to be written, of the option `name`: what has its name is replaced under --force only.
   /// Otherwise what was made gets another name, the user is told, and the program fails at its end.
   OutputPath output(const std::string& name) const;
