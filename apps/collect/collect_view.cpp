@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "apps/common/running/signals.h"
 #include "apps/web/encode.h"
@@ -23,10 +22,6 @@ constexpr int kWidth = static_cast<int>(rig::kPlateWidthMm), kLength = static_ca
 std::string stop_as_ctrl_c() {
   if (!interrupted()) kill(getpid(), SIGINT);
   return "the finger is lifted and the run ends; what was collected is kept";
-}
-
-std::string dumped(const nlohmann::json& json) {
-  return json.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace

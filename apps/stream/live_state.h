@@ -1,13 +1,11 @@
 // What a view shows of a stream at one moment.
 #pragma once
 
-#include <cmath>
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "data/sensors/taxel_array.h"
+#include "apps/stream/seen.h"
 
 namespace supertac {
 
@@ -39,11 +37,7 @@ struct LiveState {
   std::uint64_t lost = 0, dropped = 0;
 
   /// Mean of half_widths; 0 when unknown.
-  double doubt() const {
-    double sum = 0;
-    for (const float half : half_widths) sum += static_cast<double>(half);
-    return half_widths.empty() ? 0 : sum / static_cast<double>(half_widths.size());
-  }
+  double doubt() const { return half_widths.empty() ? 0 : mean_of(half_widths); }
 };
 
 }  // namespace supertac

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 #include <span>
 
@@ -28,5 +29,9 @@ struct Seen {
   std::optional<FrameArrival> arrival = {};  ///< of a board's frame
   std::optional<double> distance;  ///< of its window from those of training (models/inference/novelty.h)
 };
+
+inline double mean_of(std::span<const float> values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
 
 }  // namespace supertac

@@ -33,4 +33,8 @@ std::string colour_map_base64() {
   return base64(map);
 }
 
+std::string dumped(const nlohmann::json& json) {
+  return json.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+}
+
 }  // namespace supertac

@@ -1,7 +1,8 @@
-// Pictures as a page takes them.
+// Pictures and figures as a page takes them.
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <span>
 #include <string>
 
@@ -13,5 +14,7 @@ std::string base64(std::span<const std::uint8_t> bytes);
 std::string levels_base64(std::span<const float> values);
 /// base64() of the colour map, [256][3].
 std::string colour_map_base64();
+/// One line of JSON in ASCII; what is no UTF-8 is replaced.
+std::string dumped(const nlohmann::json& json);
 
 }  // namespace supertac

@@ -13,13 +13,12 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cstring>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
 #include "apps/web/encode.h"
+#include "io/numbers/clock.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
@@ -37,9 +36,7 @@ constexpr std::string_view kPolicy =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; "
     "img-src 'self' data: blob:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
-double seconds_now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double seconds_now() { return seconds_of(CLOCK_MONOTONIC); }
 
 std::string random_token() {
   std::array<std::uint8_t, 18> bytes{};
@@ -272,9 +269,7 @@ WebServer::~WebServer() {
 std::string WebServer::url() const { return "http://" + address_.bind + ":" + std::to_string(address_.port); }
 
 void WebServer::end(const std::string& outcome, bool failed) {
-  const nlohmann::json event = {{"outcome", outcome}, {"failed", failed}};
-  farewell_ =
-      "event: end\ndata: " + event.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + "\n\n";
+  farewell_ = "event: end\ndata: " + dumped({{"outcome", outcome}, {"failed", failed}}) + "\n\n";
 }
 
 std::string WebServer::first_event() const {

@@ -48,10 +48,8 @@ std::string picture_line(const Seen& seen, bool unlike_training, const std::stri
   append(line, "volts", seen.volts);
   if (!seen.picture.empty()) append(line, "picture", seen.picture);
   if (!seen.half_widths.empty()) {
-    double sum = 0;
-    for (const float half : seen.half_widths) sum += static_cast<double>(half);
     line += ",\"half_width\":";
-    append(line, sum / static_cast<double>(seen.half_widths.size()), 4);
+    append(line, mean_of(seen.half_widths), 4);
   }
   if (seen.distance) {
     line += ",\"distance\":";

@@ -1,7 +1,5 @@
 #include "apps/stream/views/web_view.h"
 
-#include <nlohmann/json.hpp>
-
 #include "apps/web/encode.h"
 #include "apps/web/pages.h"
 
@@ -30,21 +28,20 @@ void WebView::update(const LiveState& state) {
 }
 
 std::string WebView::hello() const {
-  return nlohmann::json{{"badge", source_.badge},
-                        {"source", source_.source},
-                        {"rows", source_.array.rows},
-                        {"columns", source_.array.columns},
-                        {"pitch_mm", {source_.array.pitch_mm.x, source_.array.pitch_mm.y}},
-                        {"scale", source_.scale},
-                        {"predicts_error", source_.predicts_error},
-                        {"names_textures", source_.names_textures},
-                        {"unit", source_.unit},
-                        {"draws", source_.draws},
-                        {"silent", source_.silent},
-                        {"found", source_.found},
-                        {"channels", source_.array.channels},
-                        {"map", colour_map_base64()}}
-      .dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+  return dumped({{"badge", source_.badge},
+                 {"source", source_.source},
+                 {"rows", source_.array.rows},
+                 {"columns", source_.array.columns},
+                 {"pitch_mm", {source_.array.pitch_mm.x, source_.array.pitch_mm.y}},
+                 {"scale", source_.scale},
+                 {"predicts_error", source_.predicts_error},
+                 {"names_textures", source_.names_textures},
+                 {"unit", source_.unit},
+                 {"draws", source_.draws},
+                 {"silent", source_.silent},
+                 {"found", source_.found},
+                 {"channels", source_.array.channels},
+                 {"map", colour_map_base64()}});
 }
 
 std::string WebView::news() {
@@ -78,7 +75,7 @@ std::string web_event(const LiveState& state, const Recorder::Status& recorder) 
   if (!state.texture.empty())
     event["texture"] = state.texture, event["probability"] = state.texture_probability;
   if (std::isfinite(state.x_mm)) event["x"] = state.x_mm, event["y"] = state.y_mm;
-  return event.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+  return dumped(event);
 }
 
 }  // namespace supertac

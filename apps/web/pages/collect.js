@@ -3,17 +3,8 @@ let hello = null, newest = null, alive = 0, texture = null, ended = null;
 
 // The plate's heights as an image, y to the right.
 function textureOf(h) {
-  const image = document.createElement("canvas");
-  image.width = h.length;
-  image.height = h.width;
-  const g = image.getContext("2d"), dots = g.createImageData(h.length, h.width), map = bytes(h.map), levels = bytes(h.heights);
-  for (let y = 0; y < h.length; ++y)
-    for (let x = 0; x < h.width; ++x) {
-      const at = 4 * ((h.width - 1 - x) * h.length + y), level = levels[y * h.width + x];
-      dots.data.set([map[3 * level], map[3 * level + 1], map[3 * level + 2], 255], at);
-    }
-  g.putImageData(dots, 0, 0);
-  return image;
+  const levels = bytes(h.heights), image = document.createElement("canvas");
+  return paint(image, bytes(h.map), h.width, h.length, (row, y) => levels[y * h.width + h.width - 1 - row]);
 }
 
 function draw() {

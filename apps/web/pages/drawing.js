@@ -14,19 +14,8 @@ function prepared(canvas) {
 
 // levels [rows][columns], row 0 at the bottom, as an image of one dot each.
 const scratch = document.createElement("canvas");
-function image(levels, rows, columns) {
-  scratch.width = columns;
-  scratch.height = rows;
-  const g = scratch.getContext("2d"), dots = g.createImageData(columns, rows), map = supertac.hello.map;
-  for (let r = 0; r < rows; ++r)
-    for (let c = 0; c < columns; ++c) {
-      const level = levels[(rows - 1 - r) * columns + c], at = 4 * (r * columns + c);
-      for (let k = 0; k < 3; ++k) dots.data[at + k] = map[3 * level + k];
-      dots.data[at + 3] = 255;
-    }
-  g.putImageData(dots, 0, 0);
-  return scratch;
-}
+const image = (levels, rows, columns) =>
+    paint(scratch, supertac.hello.map, rows, columns, (r, c) => levels[(rows - 1 - r) * columns + c]);
 
 function hatch(g, wide, rows, columns, box) {
   g.save();
@@ -126,20 +115,11 @@ const drawnEnds = (w) => w < 240 ? ["flat", "highest"] : ["0, flat", "1, the pla
 // values [column][row] up to `top`, oldest first, the newest at the right edge.
 function drawStrip(canvas, values, top, rows, labels, withTime) {
   const {g, w, h} = prepared(canvas), left = 30, bottom = withTime ? 18 : 0, height = h - bottom;
-  const map = supertac.hello.map;
-  scratch.width = COLUMNS;
-  scratch.height = rows;
-  const sg = scratch.getContext("2d"), dots = sg.createImageData(COLUMNS, rows);
-  for (let c = 0; c < COLUMNS; ++c) {
-    const slot = ((strips.end - COLUMNS + 1 + c) % COLUMNS + COLUMNS) % COLUMNS;
-    if (strips.times[slot] !== strips.end - COLUMNS + 1 + c) continue;
-    for (let r = 0; r < rows; ++r) {
-      const level = Math.min(255, Math.round(255 * values[slot * rows + r] / top)), at = 4 * ((rows - 1 - r) * COLUMNS + c);
-      for (let k = 0; k < 3; ++k) dots.data[at + k] = map[3 * level + k];
-      dots.data[at + 3] = 255;
-    }
-  }
-  sg.putImageData(dots, 0, 0);
+  paint(scratch, supertac.hello.map, rows, COLUMNS, (r, c) => {
+    const time = strips.end - COLUMNS + 1 + c, slot = (time % COLUMNS + COLUMNS) % COLUMNS;
+    if (strips.times[slot] !== time) return undefined;
+    return Math.min(255, Math.round(255 * values[slot * rows + rows - 1 - r] / top));
+  });
   g.imageSmoothingEnabled = false;
   g.fillStyle = style("--well");
   g.fillRect(left, 0, w - left - 6, height);

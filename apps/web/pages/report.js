@@ -1,18 +1,10 @@
 // The films of a result page, where it has some: a pass is chosen, a slider goes through it.
-const films = JSON.parse(document.getElementById("films").textContent);
+const films = JSON.parse(element("films").textContent);
 const map = bytes(films.map || "");
 let playing = 0;
 
-function draw(canvas, levels, rows, columns) {
-  canvas.width = columns;
-  canvas.height = rows;
-  const g = canvas.getContext("2d"), dots = g.createImageData(columns, rows);
-  for (let i = 0; i < levels.length; ++i) {
-    const at = 4 * ((rows - 1 - Math.floor(i / columns)) * columns + i % columns);
-    dots.data.set([map[3 * levels[i]], map[3 * levels[i] + 1], map[3 * levels[i] + 2], 255], at);
-  }
-  g.putImageData(dots, 0, 0);
-}
+const draw = (canvas, levels, rows, columns) =>
+    paint(canvas, map, rows, columns, (r, c) => levels[(rows - 1 - r) * columns + c]);
 
 function show() {
   const {rows, columns, scale} = films, pass = films.passes[element("pass").selectedIndex];
