@@ -1,8 +1,6 @@
 // supertac-simulate: recordings as the rig or another sensor would make them, without one.
 
-#include <omp.h>
-
-#include <exception>
+#include <atomic>
 #include <filesystem>
 
 #include "apps/common/command_line/program.h"
@@ -12,6 +10,7 @@
 #include "data/plates/plate_file.h"
 #include "data/recordings/simulator.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/parallel.h"
 #include "io/numbers/text.h"
 
 namespace supertac {
@@ -99,15 +98,10 @@ std::vector<Job> plan(const Arguments& arguments, const std::vector<Plate>& plat
 /// Returns frames written
 std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& settings, const Sensor& sensor,
                      std::uint64_t seed, Progress& progress) {
-  std::size_t frames = 0;
-  std::size_t done = 0;
-  std::exception_ptr failure;
-#pragma omp parallel for schedule(dynamic)
-  for (std::size_t i = 0; i < jobs.size(); ++i) {
-    bool stop = interrupted();
-#pragma omp critical
-    stop = stop || failure != nullptr;
-    if (stop) continue;
+  std::size_t frames = 0, done = 0;
+  std::atomic<bool> failed = false;
+  parallel_for(jobs.size(), [&](std::size_t i) {
+    if (failed || interrupted()) return;
     try {
       Recording recording = simulate_pass(*jobs[i].plate, jobs[i].pass, settings, seed);
       restate(recording, sensor.scale);
@@ -121,11 +115,10 @@ std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& sett
         progress.update(++done);
       }
     } catch (...) {
-#pragma omp critical
-      if (!failure) failure = std::current_exception();
+      failed = true;
+      throw;
     }
-  }
-  if (failure) std::rethrow_exception(failure);
+  });
   stop_if_interrupted();
   return frames;
 }

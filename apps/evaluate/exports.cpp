@@ -2,13 +2,12 @@
 
 #include <map>
 
+#include "apps/evaluate/scoring.h"
 #include "data/windows/split.h"
 #include "io/files/safetensors.h"
 #include "io/images/captions.h"
 #include "io/images/images.h"
 #include "io/numbers/numbers.h"
-#include "models/inference/evaluation.h"
-#include "models/inference/interval.h"
 
 namespace supertac {
 namespace {
@@ -17,46 +16,16 @@ constexpr std::size_t kStrips = 12, kFilmColumns = 24;
 
 constexpr const char* kParts[] = {"felt", "drawn", "true", "off by"};
 
-/// What is drawn of some windows, and what must outlive the strips.
-struct DrawnWindows {
-  std::vector<std::vector<float>> frames;
-  std::vector<float> outputs, truths, doubts;
-  std::vector<Strip> strips;
-  std::vector<std::string> names;  // of the windows, in two lines
-};
-
-DrawnWindows drawing_of(const Ensemble& model, double interval_factor, const WindowSet& windows,
-                        std::span<const std::uint32_t> chosen) {
-  const std::size_t pixels = windows.image().pixels();
-  DrawnWindows d;
-  for_each_output(model, windows, chosen, [&](const EvaluatedBatch& b) {
-    d.outputs.insert(d.outputs.end(), b.outputs.values().begin(), b.outputs.values().end());
-    d.truths.insert(d.truths.end(), b.targets.values().begin(), b.targets.values().end());
-    for (const float s : b.predicted_errors)
-      d.doubts.push_back(static_cast<float>(interval_factor) * at_least(s));
-    return true;
-  });
-  for (const std::uint32_t i : chosen)
-    d.frames.push_back(mean_of_channels(windows.array(), windows.last_frame(i)));
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    const auto part = [&](const std::vector<float>& all) {
-      return all.empty() ? std::span<const float>() : std::span(all).subspan(i * pixels, pixels);
-    };
-    d.strips.push_back({d.frames[i], part(d.outputs), part(d.truths), part(d.doubts)});
-    const WindowSet::Pass& pass = windows.passes()[windows.pass_of(chosen[i])];
-    d.names.push_back(pass.plate + " t" + std::to_string(pass.trial) + " p" + std::to_string(pass.pass) +
-                      "\n" + windows.place_text(chosen[i]));
-  }
-  return d;
-}
-
 // With headings, units and a colour bar. `down`: windows stand below each other, else side by side.
-Picture figure(const DrawnWindows& d, const WindowSet& windows, int side, bool down,
-               const std::string& title) {
+Picture figure(const std::vector<ShownWindow>& shown, std::span<const std::uint32_t> chosen,
+               const WindowSet& windows, int side, bool down, const std::string& title) {
   const TaxelArray array = windows.array();
   const StripLayout layout{array.rows, array.columns, windows.settings().scale, side};
-  const Picture inside = down ? strip_picture(d.strips, layout) : film_picture(d.strips, layout);
-  const auto parts = static_cast<int>(d.doubts.empty() ? 3 : 4), count = static_cast<int>(d.strips.size());
+  std::vector<Strip> strips;
+  for (const ShownWindow& w : shown) strips.push_back({w.felt, w.drawn, w.truth, w.half_widths});
+  const Picture inside = down ? strip_picture(strips, layout) : film_picture(strips, layout);
+  const int parts = shown.empty() || shown.front().half_widths.empty() ? 3 : 4,
+            count = static_cast<int>(strips.size());
   const ImageGrid image = windows.image();
   Captions captions{.title = title + "; a picture is " + format(image.width_mm()) + " x " +
                              format(image.height_mm()) + " mm",
@@ -67,10 +36,13 @@ Picture figure(const DrawnWindows& d, const WindowSet& windows, int side, bool d
     (down ? captions.columns : captions.rows)
         .push_back({middle(down ? inside.width : inside.height, parts, i), kParts[i]});
   for (int i = 0; i < count; ++i) {
-    const std::string& name = d.names[static_cast<std::size_t>(i)];
-    const std::string place = name.substr(name.find('\n') + 1);  // of a film the pass is in the title
+    const std::uint32_t window = chosen[static_cast<std::size_t>(i)];
+    const WindowSet::Pass& pass = windows.passes()[windows.pass_of(window)];
+    const std::string place = windows.place_text(window);  // of a film the pass is in the title
     if (down)
-      captions.rows.push_back({middle(inside.height, count, i), name});
+      captions.rows.push_back(
+          {middle(inside.height, count, i),
+           pass.plate + " t" + std::to_string(pass.trial) + " p" + std::to_string(pass.pass) + "\n" + place});
     else if (i % 3 == 0)
       captions.columns.push_back({middle(inside.width, count, i), place});
   }
@@ -112,19 +84,20 @@ void write_pictures(const Ensemble& model, double interval_factor, const WindowS
     if (windows.contact(i)) touching.push_back(i);
     by_pass[windows.pass_of(i)].push_back(i);
   }
-  const auto drawing = [&](std::span<const std::uint32_t> chosen) {
-    return drawing_of(model, interval_factor, windows, chosen);
+  const auto drawn = [&](const std::vector<std::uint32_t>& chosen, int side, bool down,
+                         const std::string& title) {
+    return figure(draw_again(model, windows, chosen, interval_factor), chosen, windows, side, down, title);
   };
-  const std::vector<std::uint32_t> strips = evenly_spaced(touching.empty() ? test : touching, kStrips);
-  write_png(folder.add("strips.png"), figure(drawing(strips), windows, 96, true, "Windows in contact"));
+  write_png(folder.add("strips.png"), drawn(evenly_spaced(touching.empty() ? test : touching, kStrips), 96,
+                                            true, "Windows in contact"));
   for (const auto& [pass, list] : by_pass) {
     const WindowSet::Pass& p = windows.passes()[pass];
     const std::string name = p.plate + "_t" + std::to_string(p.trial) + "_p" + std::to_string(p.pass) + "_v" +
                              std::to_string(static_cast<int>(p.speed_mm_s));
     write_png(folder.add("film_" + name + ".png"),
-              figure(drawing(evenly_spaced(list, kFilmColumns)), windows, 48, false,
-                     p.plate + ", trial " + std::to_string(p.trial) + ", pass " + std::to_string(p.pass) +
-                         ", " + format(p.speed_mm_s) + " mm/s"));
+              drawn(evenly_spaced(list, kFilmColumns), 48, false,
+                    p.plate + ", trial " + std::to_string(p.trial) + ", pass " + std::to_string(p.pass) +
+                        ", " + format(p.speed_mm_s) + " mm/s"));
   }
 }
 

@@ -10,7 +10,6 @@
 #include "data/windows/split.h"
 #include "io/images/images.h"
 #include "io/numbers/numbers.h"
-#include "models/inference/evaluation.h"
 
 namespace supertac {
 namespace {
@@ -91,7 +90,7 @@ std::string by_distance(const nlohmann::ordered_json& parts) {
 
 std::string png_of(std::span<const float> values, int rows, int columns) {
   const int longer = std::max(rows, columns);
-  supertac::Picture picture(kPanel * columns / longer, kPanel * rows / longer);
+  Picture picture(kPanel * columns / longer, kPanel * rows / longer);
   draw_panel(picture, {0, 0, picture.width, picture.height}, values, rows, columns);
   return picture_address(picture);
 }
@@ -119,9 +118,8 @@ void EvaluationPage::add(const Drawn& d) {
   const ImageGrid grid = windows_.image();
   if (!windows_.contact(d.example)) return;
   const auto texture = std::count_if(d.target.begin(), d.target.end(), [](float v) { return v > kTexture; });
-  contact_.push_back({ssim(d.pictures[0], d.target, static_cast<std::size_t>(grid.height),
-                           static_cast<std::size_t>(grid.width)),
-                      d.example, 4 * static_cast<std::size_t>(texture) >= d.target.size()});
+  contact_.push_back({ssim(d.pictures[0], d.target, grid.height, grid.width), d.example,
+                      4 * static_cast<std::size_t>(texture) >= d.target.size()});
 }
 
 std::vector<EvaluationPage::ScoredWindow> EvaluationPage::extremes(bool best) const {
@@ -140,24 +138,6 @@ std::vector<EvaluationPage::ScoredWindow> EvaluationPage::extremes(bool best) co
       chosen.push_back(one);
   }
   return chosen;
-}
-
-std::map<std::uint32_t, EvaluationPage::Picture> EvaluationPage::drawn_again(
-    const Ensemble& network, std::vector<std::uint32_t> chosen) const {
-  std::sort(chosen.begin(), chosen.end());
-  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
-  std::map<std::uint32_t, Picture> pictures;
-  for_each_output(network, windows_, chosen, [&](const EvaluatedBatch& b) {
-    for (std::size_t n = 0; n < b.size(); ++n) {
-      const std::uint32_t window = chosen[b.first + n];
-      const auto output = b.output(n), target = b.target(n);
-      pictures[window] = {mean_of_channels(windows_.array(), windows_.last_frame(window)),
-                          {output.begin(), output.end()},
-                          {target.begin(), target.end()}};
-    }
-    return true;
-  });
-  return pictures;
 }
 
 std::vector<std::uint32_t> EvaluationPage::film_frames(std::span<const std::uint32_t> test) const {
@@ -193,12 +173,12 @@ std::string EvaluationPage::by_plate() const {
 
 std::string EvaluationPage::shown(const std::string& title, const std::string& note,
                                   const std::vector<ScoredWindow>& chosen,
-                                  const std::map<std::uint32_t, Picture>& pictures) const {
+                                  const std::map<std::uint32_t, ShownWindow>& pictures) const {
   const TaxelArray array = windows_.array();
   const ImageGrid grid = windows_.image();
   std::string cards = "<div class=\"windows\">";
   for (const auto& [score, window, full] : chosen) {
-    const Picture& p = pictures.at(window);
+    const ShownWindow& p = pictures.at(window);
     std::vector<float> difference;
     for (std::size_t i = 0; i < p.drawn.size(); ++i) difference.push_back(std::abs(p.drawn[i] - p.truth[i]));
     const std::string name = name_of(window) + ", " + windows_.place_text(window);
@@ -218,7 +198,7 @@ std::string EvaluationPage::shown(const std::string& title, const std::string& n
 }
 
 std::string EvaluationPage::films(std::span<const std::uint32_t> frames,
-                                  const std::map<std::uint32_t, Picture>& pictures) const {
+                                  const std::map<std::uint32_t, ShownWindow>& pictures) const {
   const ImageGrid grid = windows_.image();
   nlohmann::json passes = nlohmann::json::array();
   std::size_t pass = SIZE_MAX;
@@ -227,23 +207,21 @@ std::string EvaluationPage::films(std::span<const std::uint32_t> frames,
       pass = windows_.pass_of(window);
       passes.push_back({{"name", name_of(window)}, {"frames", nlohmann::json::array()}});
     }
-    const Picture& p = pictures.at(window);
+    const ShownWindow& p = pictures.at(window);
     std::vector<float> all = p.felt;
     all.insert(all.end(), p.drawn.begin(), p.drawn.end());
     all.insert(all.end(), p.truth.begin(), p.truth.end());
     passes.back()["frames"].push_back({{"place", windows_.place_text(window)},
                                        {"zone", word_of(windows_.zone(window))},
-                                       {"ssim", ssim(p.drawn, p.truth, static_cast<std::size_t>(grid.height),
-                                                     static_cast<std::size_t>(grid.width))},
+                                       {"ssim", ssim(p.drawn, p.truth, grid.height, grid.width)},
                                        {"levels", levels_base64(all)}});
   }
   const TaxelArray array = windows_.array();
-  std::string text = nlohmann::json{
-      {"map", colour_map_base64()},
-      {"rows", array.rows},
-      {"columns", array.columns},
-      {"scale", windows_.settings().scale},
-      {"passes", passes}}.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+  std::string text = dumped({{"map", colour_map_base64()},
+                             {"rows", array.rows},
+                             {"columns", array.columns},
+                             {"scale", windows_.settings().scale},
+                             {"passes", passes}});
   for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos;) text.replace(at, 1, "\\u003c");
   return text;
 }
@@ -256,7 +234,11 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
   std::vector<std::uint32_t> chosen = frames;
   for (const std::vector<ScoredWindow>* some : {&best, &worst})
     for (const ScoredWindow& one : *some) chosen.push_back(one.window);
-  const std::map<std::uint32_t, Picture> pictures = drawn_again(network, chosen);
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  std::map<std::uint32_t, ShownWindow> pictures;
+  std::vector<ShownWindow> shown_again = draw_again(network, windows_, chosen, 1);
+  for (std::size_t i = 0; i < chosen.size(); ++i) pictures[chosen[i]] = std::move(shown_again[i]);
 
   std::string content = "<p class=\"quiet\">" + escaped(result["model"].get<std::string>()) + ", split " +
                         escaped(result["split"].get<std::string>()) + ", " +

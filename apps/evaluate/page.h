@@ -37,19 +37,14 @@ class EvaluationPage {
     std::uint32_t window;
     bool full;  ///< a quarter of the truth is texture
   };
-  struct Picture {
-    std::vector<float> felt, drawn, truth;
-  };
   std::vector<ScoredWindow> extremes(bool best) const;
-  std::map<std::uint32_t, Picture> drawn_again(const Ensemble& network,
-                                               std::vector<std::uint32_t> chosen) const;
   std::vector<std::uint32_t> film_frames(std::span<const std::uint32_t> test) const;
   std::string by_plate() const;
   std::string shown(const std::string& title, const std::string& note,
                     const std::vector<ScoredWindow>& chosen,
-                    const std::map<std::uint32_t, Picture>& pictures) const;
+                    const std::map<std::uint32_t, ShownWindow>& pictures) const;
   std::string films(std::span<const std::uint32_t> frames,
-                    const std::map<std::uint32_t, Picture>& pictures) const;
+                    const std::map<std::uint32_t, ShownWindow>& pictures) const;
   std::string name_of(std::uint32_t window) const;
 
   const WindowSet& windows_;

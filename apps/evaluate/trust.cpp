@@ -34,10 +34,8 @@ void TrustScores::add(const Drawn& drawn) {
   const double y = windows_.position(window).y_mm;
   if (pass != in_contact_of_) in_contact_of_ = pass, begin_mm_ = y;
   const ImageGrid grid = windows_.image();
-  contact_.push_back(
-      {expected_ssim_loss(output, predicted_error, grid), mean_of(predicted_error),
-       ssim(output, truth, static_cast<std::size_t>(grid.height), static_cast<std::size_t>(grid.width)),
-       std::abs(y - begin_mm_)});
+  contact_.push_back({expected_ssim_loss(output, predicted_error, grid), mean_of(predicted_error),
+                      ssim(output, truth, grid.height, grid.width), std::abs(y - begin_mm_)});
 }
 
 // The chance that of two windows, one good and one bad, the bad one is doubted more (Mann-Whitney).
