@@ -34,6 +34,7 @@ class Shape {
   explicit Shape(std::span<const Dim> dims);
 
   int rank() const { return rank_; }
+  /// 0 <= i < rank(), which is not checked.
   Dim operator[](int i) const { return dims_[static_cast<std::size_t>(i)]; }
   Dim elements() const;
   std::span<const Dim> dims() const { return {dims_.data(), static_cast<std::size_t>(rank_)}; }

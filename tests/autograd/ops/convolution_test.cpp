@@ -128,8 +128,17 @@ TEST(Conv, AnEmptyBatchIsFine) {
   EXPECT_EQ(wide.shape().text(), "[0,13,5]");
   backward(sum(y));
   backward(sum(wide));
+  EXPECT_EQ(x.grad().shape().text(), "[0,6,2]");
   EXPECT_TRUE(same_bytes(w.grad(), Tensor::zeros({3, 2, 5})));
   EXPECT_TRUE(same_bytes(b.grad(), Tensor::zeros({5})));
+  const Variable maps = parameter(Tensor::zeros({0, 6, 4, 2})), square = parameter(numbers({3, 3, 2, 5}));
+  for (const Variable& of :
+       {conv2d(maps, square, b, {.padding = 1}), conv_transpose2d(maps, square, b, {.padding = 1})}) {
+    EXPECT_EQ(of.shape().text(), "[0,6,4,5]");
+    backward(sum(of));
+  }
+  EXPECT_EQ(maps.grad().shape().text(), "[0,6,4,2]");
+  EXPECT_TRUE(same_bytes(square.grad(), Tensor::zeros({3, 3, 2, 5})));
 }
 
 TEST(Conv, RefusesWithNames) {
@@ -178,7 +187,7 @@ TEST(Conv, Gradients) {
 }
 
 TEST(Conv, GradientsInOneDimension) {
-  const ConvOptions halving{.stride = 2, .padding = 1};
+  const ConvOptions halving{.stride = 2, .padding = 1, .negative_slope = kLeakyRelu};
   for (const Dim channels : {1, 3, 17, 33}) {
     const std::vector<Tensor> inputs{numbers({2, 9, channels}), numbers({4, channels, 5}, 2),
                                      numbers({5}, 3)};

@@ -15,10 +15,12 @@ TEST(Linear, HandComputed) {
 }
 
 TEST(Linear, Empty) {
-  const Variable x(Tensor::zeros({0, 4})), w = parameter(numbers({4, 2})), b = parameter(numbers({2}));
+  const Variable x = parameter(Tensor::zeros({0, 4})), w = parameter(numbers({4, 2})),
+                 b = parameter(numbers({2}));
   const Variable y = linear(x, w, b);
   EXPECT_EQ(y.shape().text(), "[0,2]");
   backward(sum(y));
+  EXPECT_EQ(x.grad().shape().text(), "[0,4]");
   EXPECT_TRUE(same_bytes(w.grad(), Tensor::zeros({4, 2})));
   EXPECT_TRUE(same_bytes(b.grad(), Tensor::zeros({2})));
 }
@@ -41,8 +43,9 @@ TEST(Linear, Gradients) {
     Dim rows, in, out;
   } cases[] = {{1, 1, 1}, {2, 3, 17}, {1, 33, 3}, {19, 17, 33}, {2, 40, 512}};
   for (const auto& c : cases) {
-    expect_gradients([](const auto& in) { return linear(in[0], in[1], in[2]); },
-                     {numbers({c.rows, c.in}), numbers({c.in, c.out}, 2), numbers({c.out}, 3)});
+    for (const real slope : {kNoActivation, kRelu, kLeakyRelu})
+      expect_gradients([&](const auto& in) { return linear(in[0], in[1], in[2], slope); },
+                       {numbers({c.rows, c.in}), numbers({c.in, c.out}, 2), numbers({c.out}, 3)});
   }
 }
 #endif
