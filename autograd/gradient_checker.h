@@ -45,7 +45,7 @@ struct GradientCheckOptions {
 /// is reduced to the scalar sum(y * r) with fixed weights r that differ from element to element, so that no
 /// gradient hides in a symmetry. The leaves (parameters, for example) are shifted and put back; their
 /// gradients are overwritten, by twice the gradient: backward() runs twice, since the first is written and
-/// the second added.
+/// the second added. What f throws comes through, with the leaves put back.
 GradientReport check_gradients(const std::function<Variable()>& f, std::vector<Variable> leaves,
                                const GradientCheckOptions& options = {});
 

@@ -44,7 +44,7 @@ class ReverseStep {
   void operator()(Backward& b) { call_(storage_, &b); }
 
  private:
-  alignas(16) std::byte storage_[160];
+  alignas(16) std::byte storage_[160];        // the largest: sizes and slope of a convolution
   void (*call_)(void*, Backward*) = nullptr;  // without a Backward it destroys the step
 };
 

@@ -3,8 +3,7 @@
 // A training step asks for the same few hundred buffers each time. Released blocks wait in a free
 // list of their size class and are handed out again, so that a warm step never calls the heap.
 // The lists belong to the calling thread: a warm step takes no lock, and a block may be released by another
-// thread. What a
-// warm step touches lies together in large pages, where the system has them.
+// thread. What a warm step touches lies together in large pages, where the system has them.
 #pragma once
 
 #include <cstddef>

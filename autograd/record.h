@@ -44,7 +44,8 @@ class Backward {
 struct OpSettings;  // autograd/trace.h
 
 /// The node of an op, and where its reverse step goes: null when no input needs a gradient or recording is
-/// off. For record() only. Throws std::invalid_argument for more than kMaxInputs inputs.
+/// off. For record() only; it stands in variable.cpp. Throws std::invalid_argument for more than kMaxInputs
+/// inputs of a node that is recorded.
 std::pair<Variable, detail::ReverseStep*> make_result(const char* op, Tensor y,
                                                       std::span<const Variable* const> inputs,
                                                       const OpSettings* settings);

@@ -23,7 +23,8 @@ Shape::Shape(std::span<const Dim> dims) {
   Dim elements = 1;
   for (const Dim dim : dims) {
     if (dim < 0 || (dim > 0 && elements > kMaxElements / dim)) {
-      throw std::invalid_argument("Shape: dimension " + std::to_string(dim) + " is negative or too large");
+      throw std::invalid_argument("Shape: dimension " + std::to_string(dim) +
+                                  " is negative, or all together are above 2^40");
     }
     elements *= dim;
     dims_[static_cast<std::size_t>(rank_++)] = dim;

@@ -24,6 +24,7 @@ class ChannelAttention : public Module {
 /// x [N,H,W,C] -> same.
 class Rcab : public Module {
  public:
+  /// Throws as ChannelAttention.
   Rcab(Dim channels, Dim reduction, Rng& rng);
   Variable forward(const Variable& x) const;
 

@@ -7,7 +7,8 @@
 
 namespace supertac {
 
-// y = x > 0 ? x : slope x;  gx = y > 0 ? gy : slope gy: the sign of y is that of x for slope >= 0.
+// x, y of one shape, here and below;  y = x > 0 ? x : slope x;  gx = y > 0 ? gy : slope gy: the sign of y is
+// that of x for slope >= 0.
 static Variable rectify(const char* op, const Variable& x, real slope) {
   return elementwise(
       op, x, [f = kernels::Rectifier(slope)](real at) { return f(at); },

@@ -7,7 +7,7 @@
 namespace supertac {
 
 /// y[n,c] = mean over h, w of x[n,h,w,c].  x [N,H,W,C] -> [N,C].
-/// Both throw std::invalid_argument on other ranks or shapes.
+/// Both throw std::invalid_argument on other ranks or shapes, global_mean() for maps without a pixel.
 Variable global_mean(const Variable& x);
 /// y[n,h,w,c] = a[n,h,w,c] + x[n,h,w,c] s[n,c].  a, x [N,H,W,C], s [N,C]. One op, because every byte of
 /// these maps that is written and read again costs inference as much as ten products.

@@ -16,8 +16,8 @@ struct ConvOptions {
 
 /// y[n,l,o] = f(b[o] + sum over k, i of x[n, l stride + k - padding, i] w[k,i,o])
 /// x [N,L,in], w [K,in,out], b [out]; y [N, (L + 2 padding - K) / stride + 1, out].
-/// All four throw std::invalid_argument naming the argument when a rank, a shape, a channel count (1 to
-/// 4096), an option or the output size is impossible.
+/// All four throw std::invalid_argument with the shapes when a rank, a shape, a channel count (1 to 4096), an
+/// option or the output size is impossible, and of Shape when the output would have more than 2^40 elements.
 Variable conv1d(const Variable& x, const Variable& w, const Variable& b, const ConvOptions& options);
 /// The same over two dimensions: x [N,H,W,in], w [K,K,in,out] (the two kernel sizes may differ), b [out]; y
 /// [N,H',W',out], each side as conv1d's.

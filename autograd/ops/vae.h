@@ -6,7 +6,8 @@
 namespace supertac {
 
 /// z = mean + exp(log_var / 2) eps, with eps ~ N(0,1) drawn by the caller; all [N,LD]. No gradient flows into
-/// eps. Both throw std::invalid_argument when mean is not of rank 2 or the shapes differ.
+/// eps, which is read at once. Both throw std::invalid_argument when mean is not of rank 2 or the shapes
+/// differ.
 Variable sample_gaussian(const Variable& mean, const Variable& log_var, const Tensor& eps);
 
 /// The divergence of N(mean, exp(log_var)) from N(0,1), summed over latent dimensions, averaged over the

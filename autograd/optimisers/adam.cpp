@@ -115,11 +115,13 @@ void Adam::move_matrices(real clip) {
 }
 
 double Adam::step() {
-  for (const Variable& x : parameters_)
+  for (std::size_t k = 0; k < parameters_.size(); ++k) {
+    const Variable& x = parameters_[k];
     if (!x.grad().defined() || x.grad().shape() != x.shape())
-      throw std::invalid_argument("Adam: a parameter " + x.shape().text() + " expects a gradient, got " +
-                                  (x.grad().defined() ? x.grad().shape().text() : "none") +
-                                  "; run backward() before step()");
+      throw std::invalid_argument(
+          "Adam: parameter " + std::to_string(k) + ", " + x.shape().text() + ", expects a gradient, got " +
+          (x.grad().defined() ? x.grad().shape().text() : "none") + "; run backward() before step()");
+  }
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t k = 0; k < parameters_.size(); ++k)
     squares_[k] = kernels::sum_of_squares(parameters_[k].size(), parameters_[k].grad().data());

@@ -12,8 +12,7 @@ namespace supertac {
 
 /// How a set of windows is divided:
 ///   window   a random fifth of all windows is tested. Leaky: neighbours share nearly all frames. Kept to
-///   compare
-///            with the literature.
+///            compare with the literature.
 ///   pass     of each plate a random fifth of its passes (rounded, at least one) is tested: unseen slides.
 ///   trial    trial 1 is trained on, later trials are tested: other days. Every pass needs a trial.
 ///   texture  the named plates, or one drawn at random, are tested; the others are trained on, but for

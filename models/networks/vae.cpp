@@ -36,8 +36,8 @@ Variable Encoder::features(const Variable& x) const {
 }
 
 LatentDistribution Encoder::forward(const Variable& x) const {
-  const Variable h = features(x);  // [N,64]
-  return {mean_.forward(h), clamp(log_var_.forward(h), -10, 10)};
+  const Variable h = features(x);                                  // [N,64]
+  return {mean_.forward(h), clamp(log_var_.forward(h), -10, 10)};  // [N,LD] each
 }
 
 Variable Encoder::mean(const Variable& x) const { return mean_.forward(features(x)); }

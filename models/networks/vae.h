@@ -24,6 +24,7 @@ struct LatentDistribution {
 /// linear layer to 64, ReLU -> linear layers to mean and log variance.
 class Encoder : public Module {
  public:
+  /// The options are not checked, here and below: SuperTacSettings (supertac_model.h) has been.
   Encoder(const VaeOptions& options, Rng& rng);
   LatentDistribution forward(const Variable& x) const;
   /// The mean alone: what evaluation uses.

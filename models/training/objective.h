@@ -15,8 +15,8 @@ namespace supertac {
 /// One batch, or a micro-batch's share of it.
 struct Batch {
   Tensor inputs, targets;  ///< as Network::input_shape() and picture_shape() have it
-  Tensor
-      noise;  ///< [N,Objective::noise()], ~ N(0,1), LD columns a group; undefined without sampling: z = mean
+  /// [N,Objective::noise()], ~ N(0,1), LD columns a group; undefined without sampling: z = mean.
+  Tensor noise;
 };
 
 /// Of a batch: the loss, and what tells a collapse (models/training/loss/collapse.h).

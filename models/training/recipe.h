@@ -1,5 +1,5 @@
 // Everything that decides a trained file besides the recordings and the order of their file names: the same
-// recipe and the same recordings make the same bytes, whoever trains.
+// recipe and the same recordings make the same bytes, whoever trains (docs/determinism.md).
 #pragma once
 
 #include <map>

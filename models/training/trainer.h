@@ -123,6 +123,7 @@ class Trainer {
   void fill(MicroBatch& micro_batch) const;
   void announce_next();
   void draw_noise(MicroBatch& micro_batch) const;
+  // In step_statistics.cpp:
   void add_up_statistics(StepReport& report);
   void look_for_collapse(StepReport& report);
   void check_finite(const LossTerms& terms) const;

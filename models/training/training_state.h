@@ -51,7 +51,8 @@ class TrainingState {
 
   /// Sets the gradients to the sum of the micro-batches', which is taken as a balanced binary tree (pairs of
   /// neighbours, then pairs of pairs), then over `ranks`; applies Adam; counts the step. Returns the
-  /// gradient's norm before clipping. Throws TrainingStopped, with nothing changed, when it is not finite.
+  /// gradient's norm before clipping. Throws TrainingStopped when it is not finite; parameters, moments and
+  /// step are as they were.
   double apply(const std::vector<const std::vector<Parameter>*>& micro_batches, Ranks& ranks);
   /// Throws TrainingStopped: step, `what`, and advice.
   [[noreturn]] void stop(const std::string& what) const;

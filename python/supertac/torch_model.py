@@ -151,9 +151,11 @@ def kl_divergence(mean, log_var):
 
 def loss_terms(out, truth, a=0.2, beta=1e-3, weight_ssim=0.1):
     """Of training_outputs(): docs/network.md has the formula. Without VAEs the picture's part is all."""
+    flat = (truth.amax((-2, -1), keepdim=True) - truth.amin((-2, -1), keepdim=True)) < 0.01
+    structure = ssim(torch.where(flat, truth, out["picture"]), truth)  # a flat truth has none to compare
     terms = {"reconstruction": sum(F.mse_loss(d, x) for d, x in zip(out["decoded"], out["input"])),
              "kld": sum(kl_divergence(m, v) for m, v in zip(out["mean"], out["log_var"])),
-             "l2": F.mse_loss(out["picture"], truth), "ssim": ssim(out["picture"], truth)}
+             "l2": F.mse_loss(out["picture"], truth), "ssim": structure}
     picture = terms["l2"] + weight_ssim * (1 - terms["ssim"])
     if out["predicted_error"] is not None:  # it learns the error; the picture does not learn to be predictably wrong
         terms["predicted_error"] = F.mse_loss(out["predicted_error"], (out["picture"] - truth).abs().detach())

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "autograd/gradient_checker.h"
+#include "autograd/ops/arithmetic.h"
 #include "autograd/tensor.h"
 #include "autograd/variable.h"
 #include "tests/expect_error.h"
@@ -96,7 +97,8 @@ inline double dot(const Tensor& a, const Tensor& b) {
 }
 
 #ifdef SUPERTAC_REAL_IS_DOUBLE
-/// The gradient of every input agrees with finite differences to 1e-6.
+/// The gradient of every input agrees with finite differences to 1e-6, and is the same where all other inputs
+/// are constants.
 inline void expect_gradients(const std::function<Variable(const std::vector<Variable>&)>& f,
                              const std::vector<Tensor>& inputs, const GradientCheckOptions& options = {},
                              const Place& place = Place::current()) {
@@ -104,6 +106,15 @@ inline void expect_gradients(const std::function<Variable(const std::vector<Vari
   const GradientReport report = check_gradients(f, inputs, options);
   EXPECT_GT(report.entries, 0);
   EXPECT_LE(report.max_relative_error, 1e-6) << report.text();
+  std::vector<Variable> all;
+  for (const Tensor& t : inputs) all.push_back(parameter(t));
+  backward(sum(f(all)));
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    std::vector<Variable> one;
+    for (std::size_t k = 0; k < inputs.size(); ++k) one.emplace_back(inputs[k], k == i);
+    backward(sum(f(one)));
+    EXPECT_TRUE(same_bytes(one[i].grad(), all[i].grad())) << "input " << i << " alone";
+  }
 }
 #endif
 

@@ -7,6 +7,7 @@
 #include "autograd/ops/activations.h"
 #include "autograd/ops/arithmetic.h"
 #include "autograd/ops/convolution.h"
+#include "autograd/ops/max_pool.h"
 #include "autograd/ops/shaping.h"
 #include "autograd/record.h"
 #include "autograd/reverse_watch.h"
@@ -54,19 +55,21 @@ TEST(Backward, GradientsOfLeavesAccumulate) {
   EXPECT_EQ(x.grad().item(), 8);
 }
 
-// Ops add to a gradient (multiply) or write it (conv2d, whose first use it is).
+// At its first use a gradient is written (conv2d), or filled with zeros that are added to (max_pool2d).
 TEST(Backward, ADroppedGradientLeavesItsMemoryButNoValue) {
-  const Variable w = parameter(Tensor::of({1, 1, 1, 1}, {3}));
-  const Variable x(Tensor::of({1, 1, 1, 1}, {2}));
+  const Variable w = parameter(Tensor::full({1, 2, 2, 1}, 3)), x(Tensor::full({1, 2, 2, 1}, 2));
+  const Variable bias(Tensor::zeros({1}));
   for (const bool by_conv : {true, false, true}) {
-    backward(sum(by_conv ? conv2d(x, w, Variable(Tensor::zeros({1})), {}) : x * w));
-    ASSERT_EQ(w.grad().item(), 2);
+    // Of equal pixels the first is the largest.
+    backward(sum(by_conv ? conv2d(w, Variable(Tensor::full({1, 1, 1, 1}, 2)), bias, {}) : 8 * max_pool2d(w)));
+    ASSERT_EQ(w.grad().data()[0], by_conv ? 2 : 8);
+    ASSERT_EQ(w.grad().data()[3], by_conv ? 2 : 0);
     const real* const memory = w.grad().data();
     Variable(w).drop_grad();
     EXPECT_FALSE(w.grad().defined());
     Variable(w).drop_grad();
     backward(sum(x * w));
-    EXPECT_EQ(w.grad().item(), 2);
+    expect_values(w.grad(), {1, 2, 2, 1}, {2, 2, 2, 2});
     EXPECT_EQ(w.grad().data(), memory);
     Variable(w).drop_grad();
   }

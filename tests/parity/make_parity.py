@@ -79,6 +79,7 @@ def small_case():
     y, x = torch.meshgrid(torch.arange(16.0), torch.arange(16.0), indexing="ij")
     phase = torch.arange(float(N))[:, None, None]
     truth = (0.5 + 0.4 * torch.sin(0.7 * y + phase) * torch.cos(0.3 * x - phase)).double().float().double()
+    truth[-1] = 0.25  # a flat one, whose structure the loss leaves out
     stored = {"small.windows": windows.numpy(), "small.eps": eps.numpy(), "small.truth": truth.numpy()}
     adam = torch.optim.Adam(net.parameters(), lr=RATE)
     losses, norms = [], []
@@ -104,6 +105,7 @@ def small_case():
         kept, projection = sampled(name, value - initial[name])
         stored["small.change." + name], stored[f"small.change.{name}.projection"] = kept, projection
     with torch.no_grad():
+        stored["small.frame.sr"] = network(1, LD, scale).draw(windows[:, -1:]).picture.numpy()
         stored["small.vertical.sr"] = network(T, LD, scale, "vertical").draw(windows).picture.numpy()
     return stored
 

@@ -1,7 +1,7 @@
 // Simple loops, compiled for several instruction sets and run on the one that isa_kernels() has chosen.
 //
 // Only for loops of separate multiplications and additions (-ffp-contract=off): their bits are the same at
-// any vector width. Sums and fused multiply-adds live in isa/kernels.inl.
+// any vector width. Fused multiply-adds and sums of them live in isa/kernels.inl.
 #pragma once
 
 #include "autograd/kernels/fast/isa/isa.h"

@@ -12,7 +12,8 @@
 
 namespace supertac::kernels {
 
-/// Outputs that use the same taps. A convolution has one phase; a transposed one with stride s has s*s.
+/// Outputs that use the same taps. A convolution has one phase; a transposed one has one for each
+/// step of its strides: s * s in two dimensions, s in one.
 struct Phase {
   std::vector<std::int32_t> taps;     // ascending
   std::vector<std::int32_t> outputs;  // ascending pixel numbers

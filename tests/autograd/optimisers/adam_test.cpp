@@ -146,10 +146,10 @@ TEST(Adam, RefusesAStepWithoutAGradient) {
   Variable x = parameter(Tensor::zeros({2, 3}));
   Adam adam({x}, {});
   x.drop_grad();
-  expect_refusal("Adam: a parameter [2,3] expects a gradient, got none; run backward() before step()",
+  expect_refusal("Adam: parameter 0, [2,3], expects a gradient, got none; run backward() before step()",
                  [&] { adam.step(); });
   x.mutable_grad() = Tensor::zeros({2});
-  expect_refusal("Adam: a parameter [2,3] expects a gradient, got [2]; run backward() before step()",
+  expect_refusal("Adam: parameter 0, [2,3], expects a gradient, got [2]; run backward() before step()",
                  [&] { adam.step(); });
 }
 

@@ -1,6 +1,6 @@
-// The preset `paper` against PyTorch (tests/parity/make_parity.py): outputs, loss terms, every gradient and
-// ten steps of Adam whose gradients are clipped. Compiled twice: with real = double every entry agrees to 1e-5 of its own size, in fp32
-// to 1e-5 of its tensor's largest entry (see Difference).
+// Networks against PyTorch (tests/parity/make_parity.py): outputs, loss terms, every gradient and ten steps
+// of Adam whose gradients are clipped. Compiled twice: with real = double every entry agrees to 1e-5 of its
+// own size, in fp32 to 1e-5 of its tensor's largest entry (see Difference), but for the steps of Adam.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -213,6 +213,15 @@ TEST(Parity, TenStepsOfAdam) {
     for (std::size_t i = 0; i < moved.size(); ++i) expected[i] += moved[i];
     compare.expect("small.parameter." + p.name, sampled(after), expected);
   }
+}
+
+TEST(Parity, SingleFrames) {
+  Comparison compare;
+  const Tensor windows = small_windows();
+  Tensor frames(Shape{kBatch, 1, kTaxels});
+  for (Dim n = 0; n < kBatch; ++n)
+    std::copy_n(windows.data() + ((n + 1) * kTimesteps - 1) * kTaxels, kTaxels, frames.data() + n * kTaxels);
+  compare.expect("small.frame.sr", doubles(make_model(1, kLatent).infer(frames)));
 }
 
 TEST(Parity, VerticalGrouping) {
