@@ -85,6 +85,8 @@ std::string place_of(const GradientEntry& e, const Shape& shape, const std::vect
 std::string GradientReport::text() const {
   std::ostringstream out;
   out.precision(10);
+  if (entries > 0)
+    out << wrong << " of " << entries << " entries off by more than " << kGradientTolerance << '\n';
   for (const GradientEntry& e : worst) {
     out << e.place << ": analytic " << e.analytic << ", numeric " << e.numeric << ", relative error "
         << e.relative_error << '\n';
@@ -120,6 +122,7 @@ GradientReport check_gradients(const Function& f, std::vector<Variable> inputs,
         std::max(std::abs(e.analytic), std::abs(e.numeric)) + 1e-3 * largest[e.input] + 1e-5 * largest_of_all;
     e.relative_error = std::abs(e.analytic - e.numeric) / std::max(scale, 1e-10);
     if (!std::isfinite(e.relative_error)) e.relative_error = 1e30;
+    report.wrong += e.relative_error > kGradientTolerance;
     e.place = place_of(e, inputs[e.input].shape(), options.names);
   }
   report.worst = report.all;

@@ -9,6 +9,9 @@
 
 namespace supertac {
 
+/// The largest relative error of an entry that is right.
+inline constexpr double kGradientTolerance = 1e-6;
+
 struct GradientEntry {
   std::size_t input;  // which of the inputs
   Dim index;          // which of its elements, in row-major order
@@ -28,7 +31,9 @@ struct GradientReport {
   double max_relative_error = 0;
   Dim entries = 0;
   std::vector<GradientEntry> all = {};  // by input and index
-  /// One line per entry of `worst`, for a failing test to print:
+  Dim wrong = 0;                        // entries beyond kGradientTolerance
+  /// How many are wrong, and one line per entry of `worst`, for a failing test to print:
+  /// "1 of 72 entries off by more than 1e-06"
   /// "encoder.2.conv.1.weight [3,0,7] of [4,2,9]: analytic 0.25, numeric 0.5, relative error 0.5"
   std::string text() const;
 };

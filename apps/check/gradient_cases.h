@@ -28,8 +28,7 @@ struct CheckedGradients {
   std::string kind, name;
   Dim entries = 0;
   GradientEntry worst{};
-  bool wrong() const { return !(worst.relative_error <= kTolerance); }
-  static constexpr double kTolerance = 1e-6;
+  bool wrong() const { return !(worst.relative_error <= kGradientTolerance); }
 };
 CheckedGradients check(std::span<const GradientCase> cases_of_one_name);
 /// Splits cases into runs of one name.

@@ -74,7 +74,7 @@ int check_all(const Arguments& a) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   a.print(std::to_string(entries) + " entries in " + format(seconds, 1) + " s, " + std::to_string(wrong) +
           " of " + std::to_string(rows.size()) + " rows wrong (relative error above " +
-          format(CheckedGradients::kTolerance) + ")");
+          format(kGradientTolerance) + ")");
   a.write_json({{"rows", rows}, {"entries", entries}, {"wrong", wrong}, {"seconds", seconds}});
   return wrong == 0 ? kExitOk : kExitFailed;
 }
