@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "data/frames/probe.h"
 #include "data/recordings/recording.h"
-#include "hardware/boards/probe.h"
 #include "hardware/boards/tactile_board.h"
 #include "hardware/ports/open_port.h"
 

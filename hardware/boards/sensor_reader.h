@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "data/frames/sensor_decoder.h"
 #include "data/sensors/rest_tracker.h"
 #include "hardware/boards/frame_queue.h"
-#include "hardware/boards/sensor_decoder.h"
 #include "hardware/boards/tactile_board.h"
 #include "hardware/ports/open_port.h"
 

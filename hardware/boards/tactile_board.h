@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
+#include "data/frames/frame_decoder.h"
 #include "hardware/boards/frame_clock.h"
-#include "hardware/boards/frame_decoder.h"
 #include "hardware/boards/frame_queue.h"
 #include "hardware/ports/port.h"
 

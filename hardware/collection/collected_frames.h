@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "data/frames/frame_decoder.h"
 #include "data/sensors/sensor.h"
 #include "hardware/boards/frame_clock.h"
-#include "hardware/boards/frame_decoder.h"
 #include "hardware/collection/journal.h"
 
 namespace supertac {

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "data/frames/frame_decoder.h"
 #include "data/sensors/sensor.h"
 #include "hardware/boards/frame_clock.h"
-#include "hardware/boards/frame_decoder.h"
 #include "hardware/collection/journal.h"
 #include "hardware/printers/bed.h"
 

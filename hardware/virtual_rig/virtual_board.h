@@ -7,8 +7,8 @@
 #include <functional>
 #include <vector>
 
+#include "data/frames/board_frame.h"
 #include "data/sensors/rig.h"
-#include "hardware/boards/board_frame.h"
 #include "hardware/virtual_rig/faults.h"
 
 namespace supertac {

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "hardware/boards/frame_decoder.h"
+#include "data/frames/frame_decoder.h"
 
 namespace supertac {
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "hardware/boards/board_frame.h"
+#include "data/frames/board_frame.h"
 #include "hardware/collection/palpation_recorder.h"
 #include "hardware/printers/printer.h"
 #include "io/numbers/random.h"

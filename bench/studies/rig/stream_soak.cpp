@@ -13,7 +13,7 @@
 #include <map>
 #include <optional>
 
-#include "hardware/boards/frame_decoder.h"
+#include "data/frames/frame_decoder.h"
 #include "hardware/collection/journal.h"
 #include "hardware/ports/serial_port.h"
 #include "hardware/virtual_rig/pty_rig.h"

@@ -9,12 +9,12 @@
 #include <numeric>
 #include <typeinfo>
 
+#include "data/frames/sensor_decoder.h"
 #include "data/recordings/imports/table_import.h"
 #include "data/recordings/recording.h"
 #include "data/scores/baselines.h"
 #include "data/sensors/rest_tracker.h"
 #include "data/windows/windows.h"
-#include "hardware/boards/sensor_decoder.h"
 #include "hardware/boards/sensor_reader.h"
 #include "hardware/ports/errors.h"
 #include "io/files/file.h"

@@ -10,6 +10,7 @@
 
 #include "apps/web/pages.h"
 #include "apps/web/web_server.h"
+#include "data/frames/frame_decoder.h"
 #include "data/plates/plate.h"
 #include "data/plates/plate_mesh.h"
 #include "data/plates/stl.h"
@@ -17,7 +18,6 @@
 #include "data/recordings/imports/text_import.h"
 #include "data/recordings/recording.h"
 #include "data/recordings/simulator.h"
-#include "hardware/boards/frame_decoder.h"
 #include "hardware/collection/collection.h"
 #include "hardware/ports/errors.h"
 #include "io/files/file.h"

@@ -6,8 +6,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "hardware/boards/probe.h"
-#include "hardware/boards/sensor_decoder.h"
+#include "data/frames/probe.h"
+#include "data/frames/sensor_decoder.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "hardware/boards/board_frame.h"
+#include "data/frames/board_frame.h"
 
 namespace supertac {
 

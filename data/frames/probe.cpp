@@ -1,10 +1,10 @@
-#include "hardware/boards/probe.h"
+#include "data/frames/probe.h"
 
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "hardware/boards/sensor_decoder.h"
+#include "data/frames/sensor_decoder.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 

@@ -1,4 +1,4 @@
-#include "hardware/boards/binary_decoder.h"
+#include "data/frames/binary_decoder.h"
 
 #include <algorithm>
 #include <bit>

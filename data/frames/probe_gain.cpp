@@ -4,7 +4,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "hardware/boards/probe.h"
+#include "data/frames/probe.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 

@@ -1,4 +1,4 @@
-#include "hardware/boards/board_frame.h"
+#include "data/frames/board_frame.h"
 
 #include <bit>
 #include <cstring>

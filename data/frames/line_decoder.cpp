@@ -5,9 +5,9 @@
 #include <string_view>
 #include <vector>
 
-#include "hardware/boards/binary_decoder.h"
-#include "hardware/boards/frame_decoder.h"
-#include "hardware/boards/sensor_decoder.h"
+#include "data/frames/binary_decoder.h"
+#include "data/frames/frame_decoder.h"
+#include "data/frames/sensor_decoder.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"

@@ -1,4 +1,4 @@
-#include "hardware/boards/frame_decoder.h"
+#include "data/frames/frame_decoder.h"
 
 #include <cstring>
 

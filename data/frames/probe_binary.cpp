@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "hardware/boards/binary_decoder.h"
-#include "hardware/boards/probe.h"
+#include "data/frames/binary_decoder.h"
+#include "data/frames/probe.h"
 
 namespace supertac {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "hardware/boards/sensor_decoder.h"
+#include "data/frames/sensor_decoder.h"
 
 namespace supertac {
 

@@ -1,11 +1,11 @@
-#include "hardware/boards/sensor_decoder.h"
+#include "data/frames/sensor_decoder.h"
 
 #include <gtest/gtest.h>
 
 #include <map>
 #include <random>
 
-#include "hardware/boards/binary_decoder.h"
+#include "data/frames/binary_decoder.h"
 #include "tests/hardware/fake_sensor.h"
 
 namespace supertac {

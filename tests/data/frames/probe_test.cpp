@@ -1,4 +1,4 @@
-#include "hardware/boards/probe.h"
+#include "data/frames/probe.h"
 
 #include <gtest/gtest.h>
 
