@@ -62,17 +62,6 @@ Recording heard(const Recording& recording, double at, double max_gap_s) {
   return part;
 }
 
-// Leaves out the last sample's frames where some of them come after `at`: the window ends before it.
-void end_by(Recording& part, double at, double rate_hz) {
-  if (part.time_s.empty()) return;
-  const double start = part.time_s.front(), last = std::floor((at - start) * rate_hz - 0.5);
-  std::size_t n = part.frames();
-  while (n > 0 && (part.time_s[n - 1] - start) * rate_hz - 0.5 - kCellSlack > last) --n;
-  part.time_s.resize(n);
-  part.volts.resize(n * part.array.signals());
-  if (!part.position_mm.empty()) part.position_mm.resize(2 * n);
-}
-
 struct Array {
   std::string name, dtype;
   std::vector<std::uint64_t> shape;
@@ -201,8 +190,7 @@ int run(Arguments& a) {
                                              ", the model expects " + file.array().text());
   const WindowSettings w = file.windows();
   const double at = a.number("at", 0, 1e9), gap_s = std::max(w.max_gap_s, kGapPeriods * recording.period_s());
-  Recording part = heard(recording, at, gap_s);
-  if (w.timesteps > 1) end_by(part, at, w.rate_hz);
+  const Recording part = heard(recording, at, gap_s);
   const std::size_t signals = part.array.signals(), frames = static_cast<std::size_t>(w.timesteps);
   const Track track = part.frames() == 0 ? Track()
                                          : resample(part, {.rate_hz = w.rate_hz,

@@ -44,37 +44,23 @@ void check(const Recording& recording, const ResampleSettings& settings) {
                                "; record or import the pass again");
 }
 
-// Resamples the recorded frames first..last (indices into `usable`), which no gap interrupts.
+// Resamples the recorded frames `usable`, which no gap interrupts.
 class Segment {
  public:
   Segment(const Recording& recording, const ResampleSettings& settings, std::span<const std::size_t> usable)
-      : recording_(recording),
-        settings_(settings),
-        usable_(usable),
-        mean_(recording.array.signals()),
-        start_(time(0)) {}
+      : recording_(recording), settings_(settings), usable_(usable), start_(time(0)) {}
 
-  void append_to(Track& track) {
-    const std::size_t signals = recording_.array.signals();
-    const std::size_t frames = cell(usable_.size() - 1) + 1;
+  void append_to(Track& track) const {
+    const std::size_t samples = sample_at(time(usable_.size() - 1) - start_, settings_.rate_hz) + 1;
     // A file that claims a high rate must not decide how much memory that takes.
     constexpr std::size_t kMostPerFrame = 64;
-    if (frames > kMostPerFrame * (usable_.size() + 1))
+    if (samples > kMostPerFrame * (usable_.size() + 1))
       throw std::invalid_argument("resample: " + std::to_string(settings_.rate_hz) +
                                   " samples a second are more than " + std::to_string(kMostPerFrame) +
                                   " for each recorded frame; the model is of another sensor");
-    std::size_t next = 0, before = 0;
-    for (std::size_t j = 0; j < frames; ++j) {
-      const std::size_t first = next;
-      while (next < usable_.size() && cell(next) == j) ++next;
-      if (next > first) {
-        append_mean(track, first, next);
-      } else {
-        ++track.held;
-        const std::size_t previous =
-            track.samples.size() - signals;  // cell 0 holds the first sample: there is one
-        for (std::size_t k = 0; k < signals; ++k) track.samples.push_back(track.samples[previous + k]);
-      }
+    append_samples(track, samples);
+    std::size_t before = 0;
+    for (std::size_t j = 0; j < samples; ++j) {
       append_position(track, start_ + static_cast<double>(j) / settings_.rate_hz, before);
       track.run.push_back(static_cast<std::uint32_t>(j + 1));
     }
@@ -83,19 +69,20 @@ class Segment {
  private:
   double time(std::size_t i) const { return recording_.time_s[usable_[i]]; }
 
-  std::size_t cell(std::size_t i) const {
-    const double periods = (time(i) - start_) * settings_.rate_hz;
-    return static_cast<std::size_t>(std::max(0.0, std::ceil(periods - 0.5 - kCellSlack)));
-  }
-
-  void append_mean(Track& track, std::size_t first, std::size_t end) {
-    mean_.clear();
-    for (std::size_t i = first; i < end; ++i) mean_.add(volts_of(recording_, usable_[i]));
-    const std::size_t signals = recording_.array.signals();
-    track.samples.resize(track.samples.size() + signals);
-    const std::span<float> sample = std::span(track.samples).last(signals);
-    mean_.volts(sample);
-    if (settings_.scaling) (*settings_.scaling)(sample);
+  void append_samples(Track& track, std::size_t samples) const {
+    const std::size_t signals = recording_.array.signals(), begin = track.samples.size();
+    track.samples.resize(begin + samples * signals);
+    track.held += samples;
+    Resampler resampler(signals, settings_.rate_hz, settings_.scaling);
+    for (std::size_t i = 0; i < usable_.size(); ++i) {
+      const std::size_t had = resampler.samples();
+      resampler.add(time(i), volts_of(recording_, usable_[i]),
+                    [&](std::size_t j, std::span<const float> sample) {
+                      std::ranges::copy(
+                          sample, track.samples.begin() + static_cast<std::ptrdiff_t>(begin + j * signals));
+                    });
+      if (resampler.samples() > had) --track.held;
+    }
   }
 
   // `before` moves along with the time: the last recorded frame at or before it.
@@ -124,7 +111,6 @@ class Segment {
   const Recording& recording_;
   const ResampleSettings& settings_;
   std::span<const std::size_t> usable_;
-  FrameMean mean_;
   double start_;
 };
 
@@ -154,6 +140,10 @@ void FrameMean::add(std::span<const float> volts) {
 void FrameMean::volts(std::span<float> mean) const {
   for (std::size_t k = 0; k < sum_.size(); ++k)
     mean[k] = static_cast<float>(sum_[k] / static_cast<double>(count_));
+}
+
+std::size_t sample_at(double since_begin_s, double rate_hz) {
+  return static_cast<std::size_t>(std::max(0.0, std::ceil(since_begin_s * rate_hz - 0.5 - kCellSlack)));
 }
 
 Track resample(const Recording& recording, const ResampleSettings& settings) {

@@ -19,15 +19,13 @@ struct Scaling {
   void operator()(std::span<float> volts) const;
 };
 
-/// Mean of some frames, summed in double precision in the order they are added: what resample() and
-/// LiveWindow make a sample of, so that both give the same bits.
+/// Mean of some frames, summed in double precision in the order they are added.
 class FrameMean {
  public:
   /// `signals`: in a frame.
   explicit FrameMean(std::size_t signals) : sum_(signals) {}
   void clear();
   void add(std::span<const float> volts);
-  std::size_t count() const { return count_; }
   /// Of at least one frame.
   void volts(std::span<float> mean) const;
 
@@ -39,6 +37,48 @@ class FrameMean {
 /// Time stamps are rounded: a frame up to this share of a period past the end of a sample still belongs to
 /// it.
 constexpr double kCellSlack = 1e-6;
+
+/// Number j of the sample that a frame belongs to, `since_begin_s` after its run's first frame: the least j
+/// with since_begin_s <= (j + 1/2) / rate_hz.
+std::size_t sample_at(double since_begin_s, double rate_hz);
+
+/// From the frames of one run, which no gap interrupts, to samples on an even grid, as they come. The grid
+/// begins at the run's first frame: sample j stands for the time t_first + j / rate_hz, and is the scaled
+/// mean of the frames in (that - 1/(2 rate_hz), that + 1/(2 rate_hz)], or sample j-1 again where there are
+/// none. Training, live pictures, the exported C code and the Python package have this one definition, so
+/// what is drawn after a frame is what is drawn of a recording that ends with it.
+class Resampler {
+ public:
+  /// `scaling`: nothing leaves the samples as they come.
+  Resampler(std::size_t signals, double rate_hz, const std::optional<Scaling>& scaling)
+      : rate_hz_(rate_hz), scaling_(scaling), mean_(signals), newest_(signals) {}
+  /// The next frame begins a run.
+  void restart() { samples_ = 0; }
+  /// Samples of the run so far, the newest included, whose frames may not all have come.
+  std::size_t samples() const { return samples_; }
+  /// A frame [signals], later than those before it in its run. Calls give(j, sample), sample [signals], for
+  /// every sample that it changes, in their order: those before it without a frame, and its own as far as its
+  /// frames have come.
+  template <class Give>
+  void add(double time_s, std::span<const float> volts, const Give& give) {
+    if (samples_ == 0) begin_s_ = time_s;
+    const std::size_t j = sample_at(time_s - begin_s_, rate_hz_);
+    if (samples_ <= j) mean_.clear();
+    for (; samples_ < j; ++samples_) give(samples_, std::span<const float>(newest_));
+    samples_ = j + 1;
+    mean_.add(volts);
+    mean_.volts(newest_);
+    if (scaling_) (*scaling_)(newest_);
+    give(j, std::span<const float>(newest_));
+  }
+
+ private:
+  double rate_hz_, begin_s_ = 0;
+  std::optional<Scaling> scaling_;
+  FrameMean mean_;             // of the newest sample's frames
+  std::vector<float> newest_;  // that mean, scaled
+  std::size_t samples_ = 0;
+};
 
 /// A recording on an even time grid.
 struct Track {
@@ -57,12 +97,6 @@ struct Track {
 /// A silence of at most so many periods is never a gap, however slow the sensor.
 constexpr double kGapPeriods = 3;
 
-/// Sample rate of a window; for single frames 1000 times the sensor's, so that no two frames fall into one
-/// sample.
-inline double sample_rate_hz(int timesteps, double rate_hz, double frame_period_s) {
-  return timesteps == 1 ? 1000 / frame_period_s : rate_hz;
-}
-
 struct ResampleSettings {
   double rate_hz = 300;
   /// Longer silence between two recorded frames is a gap, never filled; at least kGapPeriods of the
@@ -72,13 +106,10 @@ struct ResampleSettings {
   std::optional<Scaling> scaling = Scaling{};  ///< empty: the samples stay as recorded
 };
 
-/// Puts a recording onto rate_hz. Between two gaps frame j stands for the time c = t_first + j / rate:
-///   samples[j]  = scaled mean of the recorded frames in (c - 1/(2 rate), c + 1/(2 rate)], or samples[j-1]
-///   when
-///                 there is none (counted in `held`)
-///   position[j] = position at c, linear between recorded frames
-/// Causal but for half a period (1.7 ms at 300 Hz): LiveWindow gives the same samples while frames arrive. A
-/// recording made at rate_hz comes out as it is.
+/// Puts a recording onto rate_hz, each run between two gaps by a Resampler; samples without a frame are
+/// counted in `held`. position[j] is the position at the time that sample j stands for, linear between
+/// recorded frames. Causal but for half a period (1.7 ms at 300 Hz). A recording made at rate_hz comes out as
+/// it is.
 /// Throws std::invalid_argument on settings that are not positive, std::runtime_error when the sizes of the
 /// recording's arrays disagree or its time stamps do not increase.
 Track resample(const Recording& recording, const ResampleSettings& settings);

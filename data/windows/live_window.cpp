@@ -10,9 +10,6 @@
 namespace supertac {
 namespace {
 
-// How far before the newest frame a window may end.
-constexpr double kLookBackS = 0.1;
-
 void check(const LiveWindowSettings& s) {
   const auto fail = [](const std::string& what) { throw std::invalid_argument("live window: " + what); };
   if (s.signals < 1) fail("a frame must have at least 1 signal");
@@ -25,39 +22,18 @@ void check(const LiveWindowSettings& s) {
   if (!(s.filter_s >= 0)) fail("filter_s must not be negative, got " + std::to_string(s.filter_s));
 }
 
-double window_s(const LiveWindowSettings& s) { return s.timesteps / s.rate_hz; }
-
 LiveWindowSettings checked(LiveWindowSettings s) {
   check(s);
   s.max_gap_s = std::max(s.max_gap_s, kGapPeriods * s.frame_period_s);
-  s.rate_hz = sample_rate_hz(s.timesteps, s.rate_hz, s.frame_period_s);
   return s;
 }
 
 }  // namespace
 
-void LiveWindow::Recent::push(double time_s, std::span<const float> volts) {
-  times_.push_back(time_s);
-  volts_.insert(volts_.end(), volts.begin(), volts.end());
-  while (times_[first_] < time_s - span_s_) ++first_;
-  if (2 * first_ < times_.size()) return;
-  times_.erase(times_.begin(), times_.begin() + static_cast<std::ptrdiff_t>(first_));
-  volts_.erase(volts_.begin(), volts_.begin() + static_cast<std::ptrdiff_t>(first_ * signals_));
-  first_ = 0;
-}
-
-void LiveWindow::Recent::clear() {
-  times_.clear();
-  volts_.clear();
-  first_ = 0;
-}
-
-// A sample without frames repeats an older one, whose frames may lie a gap and a period before the window.
 LiveWindow::LiveWindow(const LiveWindowSettings& settings)
     : settings_(checked(settings)),
-      raw_(std::max(0.0, settings.filter_s - 0.5 * settings.frame_period_s), settings.signals),
-      filtered_(window_s(settings_) + settings_.max_gap_s + 2 / settings_.rate_hz + kLookBackS,
-                settings.signals),
+      resampler_(settings.signals, settings.rate_hz, settings.scaling),
+      ring_(static_cast<std::size_t>(settings.timesteps) * settings.signals),
       mean_(settings.signals),
       average_(settings.signals) {}
 
@@ -70,73 +46,48 @@ void LiveWindow::push(double time_s, std::span<const float> volts) {
     ++counters_.damaged;
     return;
   }
-  const bool is_first = filtered_.count() == 0;
-  if (is_first || std::abs(time_s - filtered_.newest_s()) > settings_.max_gap_s) {
-    if (!is_first) ++counters_.gaps;
-    raw_.clear();
-    filtered_.clear();
-    run_begin_s_ = time_s;
-  } else if (time_s <= filtered_.newest_s()) {
+  if (!newest_s_ || std::abs(time_s - *newest_s_) > settings_.max_gap_s) {
+    if (newest_s_) ++counters_.gaps;
+    recent_s_.clear(), recent_.clear();
+    resampler_.restart();
+  } else if (time_s <= *newest_s_) {
     ++counters_.late;
     return;
   }
   ++counters_.frames;
+  newest_s_ = time_s;
   if (settings_.filter_s > 0) {
-    raw_.push(time_s, volts);
-    mean_.clear();
-    for (std::size_t i = 0; i < raw_.count(); ++i) mean_.add(raw_.volts(i));
-    mean_.volts(average_);
+    average(time_s, volts);
     volts = average_;
   }
-  filtered_.push(time_s, volts);
+  if (settings_.timesteps == 1) resampler_.restart();  // each frame as it is, as WindowSet has it
+  resampler_.add(time_s, volts, [&](std::size_t j, std::span<const float> sample) {
+    const std::size_t slot = j % static_cast<std::size_t>(settings_.timesteps);
+    std::ranges::copy(sample, ring_.begin() + static_cast<std::ptrdiff_t>(slot * settings_.signals));
+  });
 }
 
-double LiveWindow::end_s() const {
-  if (filtered_.count() == 0) return 0;
-  return filtered_.newest_s() + 0.5 * std::min(settings_.frame_period_s, 1 / settings_.rate_hz);
+void LiveWindow::average(double time_s, std::span<const float> volts) {
+  const double span_s = std::max(0.0, settings_.filter_s - 0.5 * settings_.frame_period_s);
+  const auto old = std::ranges::lower_bound(recent_s_, time_s - span_s) - recent_s_.begin();
+  recent_s_.erase(recent_s_.begin(), recent_s_.begin() + old);
+  recent_.erase(recent_.begin(), recent_.begin() + old * static_cast<std::ptrdiff_t>(volts.size()));
+  recent_s_.push_back(time_s);
+  recent_.insert(recent_.end(), volts.begin(), volts.end());
+  mean_.clear();
+  for (std::size_t at = 0; at < recent_.size(); at += volts.size())
+    mean_.add(std::span(recent_).subspan(at, volts.size()));
+  mean_.volts(average_);
 }
 
-bool LiveWindow::window_until(double end_s, std::span<float> out) {
-  const auto timesteps = static_cast<std::ptrdiff_t>(settings_.timesteps);
-  const std::size_t signals = settings_.signals, values = static_cast<std::size_t>(timesteps) * signals;
-  if (out.size() != values)
-    throw std::invalid_argument("live window: needs room for " + std::to_string(values) + " values, got " +
-                                std::to_string(out.size()));
-  const std::size_t frames = filtered_.count();
-  const double since_begin = (end_s - run_begin_s_) * settings_.rate_hz;
-  if (frames == 0 || since_begin < static_cast<double>(timesteps) - 0.5 - kCellSlack) return false;
-
-  // Sample k, counted back from the window's end, that a frame belongs to; negative: later than the window.
-  const auto sample = [&](std::size_t frame) {
-    const double periods = (end_s - filtered_.time_s(frame)) * settings_.rate_hz;
-    return static_cast<std::ptrdiff_t>(std::floor(periods + kCellSlack));
-  };
-  std::size_t at = 0;  // the first frame that is not older than the window
-  for (std::size_t end = frames; at < end;) {
-    const std::size_t middle = at + (end - at) / 2;
-    if (sample(middle) >= timesteps)
-      at = middle + 1;
-    else
-      end = middle;
-  }
-  if (at != 0 && (at == frames || sample(at) < timesteps - 1)) {
-    // The oldest sample has no frames: it repeats the last one before the window.
-    const std::ptrdiff_t before = sample(at - 1);
-    while (at != 0 && sample(at - 1) == before) --at;
-  }
-  std::vector<float>& held = average_;  // push() needs neither between two frames
-  std::fill(held.begin(), held.end(), 0.0F);
-  for (std::ptrdiff_t k = std::max(timesteps - 1, sample(at)); k >= 0; --k) {
-    mean_.clear();
-    for (; at != frames && sample(at) == k; ++at) mean_.add(filtered_.volts(at));
-    if (mean_.count() > 0) {
-      mean_.volts(held);
-      settings_.scaling(held);
-    }
-    if (k >= timesteps) continue;
-    std::copy(held.begin(), held.end(),
-              out.begin() + (timesteps - 1 - k) * static_cast<std::ptrdiff_t>(signals));
-  }
+bool LiveWindow::window(std::span<float> out) const {
+  if (out.size() != ring_.size())
+    throw std::invalid_argument("live window: needs room for " + std::to_string(ring_.size()) +
+                                " values, got " + std::to_string(out.size()));
+  const auto timesteps = static_cast<std::size_t>(settings_.timesteps);
+  if (resampler_.samples() < timesteps) return false;
+  const auto oldest = static_cast<std::ptrdiff_t>(resampler_.samples() % timesteps * settings_.signals);
+  std::ranges::rotate_copy(ring_, ring_.begin() + oldest, out.begin());
   if (settings_.scaling.per_window) normalise_window(out, settings_.signals);
   return true;
 }

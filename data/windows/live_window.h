@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -19,19 +20,15 @@ struct LiveWindowSettings {
   double max_gap_s = 0.05;            ///< longer silence is a gap no window crosses; at least kGapPeriods
 };
 
-/// From a sensor's frames to a network's window, as they come: filter, rate and scaling that training saw,
-/// nothing later than the newest frame.
+/// From a sensor's frames to a network's window, as they come: filter, rate and scaling that training saw.
 ///
 ///   filtered[n] = mean of the frames in (t_n - filter_s + period/2, t_n]
-///   sample k    = scaled mean of the filtered frames in (e - (k+1)/rate, e - k/rate], k = T-1 ... 0
+///   samples     = Resampler of the filtered frames, anew after every gap
 ///
-/// where e is the window's end. A sample without frames repeats the one before it. Without losses the average
-/// is over round(filter_s / period) frames, as in the simulator.
-///
-/// window() ends at e = t_newest + min(period, 1/rate) / 2, so a window for every frame, whatever the phase
-/// to the model's rate. window_until(c_j + 1/(2 rate)) is, bit for bit, the window of WindowSet whose last
-/// frame is j; where the sensor's rate is the model's, or an odd multiple of it, every such window is also a
-/// window(). Memory is that of the frames within T / rate_hz + 0.2 s.
+/// After every frame window() is the last T samples: bit for bit the last window of WindowSet for a recording
+/// that ends with this frame. Where several frames make a sample, it is complete with the last of them.
+/// Without losses the average is over round(filter_s / period) frames, as in the simulator. Memory is that of
+/// one window, and of the frames that the average is over.
 class LiveWindow {
  public:
   struct Counters {
@@ -51,41 +48,21 @@ class LiveWindow {
   /// The window that ends with the newest frame, [T][signals], oldest sample first. False, and `out`
   /// untouched, before a run without gap spans T samples. Throws std::invalid_argument when `out` has
   /// another size.
-  bool window(std::span<float> out) { return window_until(end_s(), out); }
-  /// The same for a window that ends at `end_s`, at most 0.1 s before the newest frame.
-  bool window_until(double end_s, std::span<float> out);
+  bool window(std::span<float> out) const;
 
   const Counters& counters() const { return counters_; }
 
  private:
-  /// The frames of the last `span_s` seconds.
-  class Recent {
-   public:
-    Recent(double span_s, std::size_t signals) : span_s_(span_s), signals_(signals) {}
-    void push(double time_s, std::span<const float> volts);
-    void clear();
-    std::size_t count() const { return times_.size() - first_; }
-    double time_s(std::size_t i) const { return times_[first_ + i]; }
-    std::span<const float> volts(std::size_t i) const {
-      return std::span(volts_).subspan((first_ + i) * signals_, signals_);
-    }
-    double newest_s() const { return times_.back(); }
-
-   private:
-    double span_s_;
-    std::size_t signals_;
-    std::vector<double> times_;
-    std::vector<float> volts_;
-    std::size_t first_ = 0;
-  };
-
-  double end_s() const;
+  void average(double time_s, std::span<const float> volts);
 
   LiveWindowSettings settings_;
-  Recent raw_, filtered_;
+  Resampler resampler_;
+  std::vector<float> ring_;  // sample j of the run stands at j modulo T
+  std::optional<double> newest_s_;
+  std::vector<double> recent_s_;  // times of the frames that the average is over
+  std::vector<float> recent_;     // and their signals
   FrameMean mean_;
-  std::vector<float> average_;  // of mean_
-  double run_begin_s_ = 0;
+  std::vector<float> average_;
   Counters counters_;
 };
 

@@ -183,22 +183,18 @@ std::string Writer::draw() const {
 
 // What stands before the network, as LiveWindow has it.
 std::string window_constants(const ModelFile& file, double sensor_hz) {
-  constexpr double kLookBackS = 0.1, kRoom = 1.25;  // frames may come a quarter faster
+  constexpr double kRoom = 1.25;  // frames may come a quarter faster
   const WindowSettings w = file.windows();
-  const double period = 1 / sensor_hz, rate = sample_rate_hz(w.timesteps, w.rate_hz, period),
-               filter = file.input.filter_s.value_or(0);
-  const double gap = std::max(w.max_gap_s, kGapPeriods * period);
-  const double span = w.timesteps / rate + gap + 2 / rate + kLookBackS;
+  const double period = 1 / sensor_hz, filter = file.input.filter_s.value_or(0);
   const double raw_span = std::max(0.0, filter - 0.5 * period);
   const auto frames = [&](double seconds) {
     return text(static_cast<Dim>(std::ceil(kRoom * seconds * sensor_hz)) + 2);
   };
-  return define("RATE_HZ", number(rate), "of the window's samples") +
+  return define("RATE_HZ", number(w.rate_hz), "of the window's samples") +
          define("PERIOD_S", number(period), "of the sensor's frames") +
-         define("HALF_PERIOD_S", "(0.5 * " + number(std::min(period, 1 / rate)) + ")") +
-         define("MAX_GAP_S", number(gap), "a longer silence begins a new window") +
+         define("MAX_GAP_S", number(std::max(w.max_gap_s, kGapPeriods * period)),
+                "a longer silence begins a new window") +
          define("CELL_SLACK", number(kCellSlack), "of a sample: time stamps are rounded") +
-         define("HISTORY_SPAN_S", number(span)) + define("HISTORY_FRAMES", frames(span)) +
          define("RAW_SPAN_S", number(raw_span), "of the moving average") +
          define("RAW_FRAMES", filter > 0 ? frames(raw_span) : "0") +
          define("REST", number(w.scaling.rest_volts), "a sample is (REST - value) / SPAN, 0 to 1") +

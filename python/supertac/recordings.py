@@ -109,34 +109,27 @@ def _runs(times, max_gap_s):
     return zip([0, *cuts], [*cuts, len(times)])
 
 
-def _window(times, volts, end_s, timesteps, rate_hz):
-    """The samples that end at end_s: means of the frames of each period; one without frames repeats the one before."""
-    age = np.floor((end_s - times) * rate_hz + SLACK).astype(int)  # of frames, in samples; falls with time
-    first = np.flatnonzero(np.r_[True, np.diff(age) != 0])
-    counts = np.diff(np.r_[first, len(age)])
-    means = (np.add.reduceat(volts, first, axis=0, dtype=np.float64) / counts[:, None]).astype(np.float32)
-    wanted = np.arange(timesteps - 1, -1, -1)
-    last_not_younger = np.searchsorted(-age[first], -wanted, side="right") - 1
-    return means[last_not_younger]
-
-
 def windows(recording: Recording, timesteps: int, rate_hz: float,
             max_gap_s: float = 0.05) -> tuple[np.ndarray, np.ndarray]:
     """Times [N] and windows [N,timesteps,S] in volts, one for each frame that has a whole window behind it: what
-    supertac-stream draws (data/windows/live_window.h)."""
+    supertac-stream draws. Sample j of a run without a gap is the mean of the frames around the run's first time plus
+    j / rate_hz, as far as they have come; one without frames repeats the one before (data/recordings/resample.h)."""
     finite = np.isfinite(recording.volts).all(axis=1) & np.isfinite(recording.time_s)
     times, volts = recording.time_s[finite], recording.volts[finite]
+    if timesteps == 1:
+        return times, volts[:, None]
     max_gap_s = max(max_gap_s, 3 * recording.period_s)  # a silence within so many periods of a slow sensor is none
-    half_s = 0.5 * min(recording.period_s, 1 / rate_hz)
-    reach_s = timesteps / rate_hz + max_gap_s + 2 / rate_hz
-    out_times, out = [], []
-    for begin, end in _runs(times, max_gap_s):
-        for i in range(begin, end):
-            end_s = times[i] + half_s
-            if (end_s - times[begin]) * rate_hz < timesteps - 0.5 - SLACK:
-                continue
-            low = max(begin, np.searchsorted(times, end_s - reach_s))
-            out.append(_window(times[low : i + 1], volts[low : i + 1], end_s, timesteps, rate_hz))
-            out_times.append(times[i])
-    shape = (0, timesteps, volts.shape[1])
-    return np.array(out_times), np.stack(out) if out else np.empty(shape, np.float32)
+    out_times, out = [np.empty(0)], [np.empty((0, timesteps, volts.shape[1]), np.float32)]
+    for begin, end in _runs(times, max_gap_s) if len(times) else ():
+        run = times[begin:end]
+        cell = np.maximum(0, np.ceil((run - run[0]) * rate_hz - 0.5 - SLACK)).astype(int)  # whose sample a frame is of
+        first = np.searchsorted(cell, cell)  # the first frame of a frame's sample
+        so_far = np.stack([volts[begin + a : begin + i + 1].sum(axis=0, dtype=np.float64) / (i + 1 - a)
+                           for i, a in enumerate(first)]).astype(np.float32)
+        last = np.searchsorted(cell, np.arange(cell[-1] + 1), side="right") - 1  # the frame that completes a sample
+        ends = np.flatnonzero(cell >= timesteps - 1)
+        chosen = last[cell[ends, None] + np.arange(1 - timesteps, 1)]
+        chosen[:, -1] = ends
+        out_times.append(run[ends])
+        out.append(so_far[chosen])
+    return np.concatenate(out_times), np.concatenate(out)

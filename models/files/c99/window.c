@@ -1,11 +1,5 @@
 /* ---- What stands before the network: moving average, resampling and scaling of the frames. ---- */
 
-static struct {
-  double time_s[HISTORY_FRAMES];
-  float values[HISTORY_FRAMES][SIGNALS];
-  int32_t first, count;
-} history; /* the filtered frames */
-
 #if RAW_FRAMES > 0
 static struct {
   double time_s[RAW_FRAMES];
@@ -15,32 +9,15 @@ static struct {
 #endif
 
 static float window[TIMESTEPS * SIGNALS];
-static double run_begin_s, newest_s;
-
-static int32_t floor_of(double x) {
-  const int32_t whole = (int32_t)x;
-  return whole - (x < (double)whole);
-}
-
-static const float *frame(int32_t i) { return history.values[(history.first + i) % HISTORY_FRAMES]; }
-static double time_of(int32_t i) { return history.time_s[(history.first + i) % HISTORY_FRAMES]; }
-
-/* The mean over `count` frames, summed in double precision in their order. */
-static void mean_of(int32_t from, int32_t count, float *mean_value) {
-  int32_t k, i;
-  for (k = 0; k < SIGNALS; ++k) {
-    double sum = 0;
-    if (count == 1) {
-      mean_value[k] = frame(from)[k];
-      continue;
-    }
-    for (i = from; i < from + count; ++i) sum += (double)frame(i)[k];
-    mean_value[k] = (float)(sum / count);
-  }
-}
+static float ring[TIMESTEPS][SIGNALS]; /* sample j since the first frame stands at j modulo TIMESTEPS */
+static float newest[SIGNALS];          /* the newest sample: the mean of its frames so far, scaled */
+static double sum[SIGNALS];            /* of these frames */
+static int32_t summed;                 /* how many they are */
+static int64_t samples;                /* since the first frame */
+static double begin_s, newest_s;       /* times of the first and the newest frame */
 
 void NAME_reset(void) {
-  history.first = history.count = 0;
+  samples = 0;
 #if RAW_FRAMES > 0
   raw.first = raw.count = 0;
 #endif
@@ -62,42 +39,56 @@ static void filter(double time_s, const float *values, float *filtered) {
 }
 #endif
 
-int NAME_push_at(double time_s, const float values[SIGNALS]) {
-  int32_t k, at;
-  if (!(time_s - time_s == 0)) return 0;
-  for (k = 0; k < SIGNALS; ++k)
-    if (!(values[k] - values[k] == 0)) return 0; /* not a number: the frame counts as lost */
-  if (history.count == 0 || time_s - newest_s > MAX_GAP_S || newest_s - time_s > MAX_GAP_S) {
-    NAME_reset();
-    run_begin_s = time_s;
-  } else if (time_s <= newest_s) {
-    return 0;
-  }
-  if (history.count == HISTORY_FRAMES) history.first = (history.first + 1) % HISTORY_FRAMES, --history.count;
-  at = (history.first + history.count++) % HISTORY_FRAMES;
-  history.time_s[at] = newest_s = time_s;
-#if RAW_FRAMES > 0
-  filter(time_s, values, history.values[at]);
-#else
-  memcpy(history.values[at], values, sizeof history.values[at]);
-#endif
-  while (history.time_s[history.first] < time_s - HISTORY_SPAN_S)
-    history.first = (history.first + 1) % HISTORY_FRAMES, --history.count;
-  return (newest_s + HALF_PERIOD_S - run_begin_s) * RATE_HZ >= (double)TIMESTEPS - 0.5 - CELL_SLACK;
-}
-
-int NAME_push(const float values[SIGNALS]) {
-  return NAME_push_at(history.count == 0 ? 0 : newest_s + PERIOD_S, values);
+/* The sample that a frame belongs to, so long after the first one. */
+static int64_t sample_at(double since_begin_s) {
+  const double periods = since_begin_s * RATE_HZ - 0.5 - CELL_SLACK;
+  const int64_t whole = (int64_t)periods;
+  return periods <= 0 ? 0 : whole + ((double)whole < periods);
 }
 
 /* 0 to 1, 1: pressed hard. */
-static void scale(float *values) {
-  int32_t k;
-  for (k = 0; k < SIGNALS; ++k) {
-    const double v = (REST - (double)values[k]) / SPAN;
-    values[k] = v < 0 ? 0.0f : v > 1 ? 1.0f : (float)v;
-  }
+static float scaled(float value) {
+  const double v = (REST - (double)value) / SPAN;
+  return v < 0 ? 0.0f : v > 1 ? 1.0f : (float)v;
 }
+
+int NAME_push_at(double time_s, const float values[SIGNALS]) {
+  int64_t j;
+  int32_t k;
+#if RAW_FRAMES > 0
+  float filtered[SIGNALS];
+#endif
+  if (!(time_s - time_s == 0)) return 0;
+  for (k = 0; k < SIGNALS; ++k)
+    if (!(values[k] - values[k] == 0)) return 0; /* not a number: the frame counts as lost */
+  if (samples == 0 || time_s - newest_s > MAX_GAP_S || newest_s - time_s > MAX_GAP_S)
+    NAME_reset();
+  else if (time_s <= newest_s)
+    return 0;
+  newest_s = time_s;
+#if RAW_FRAMES > 0
+  filter(time_s, values, filtered);
+  values = filtered;
+#endif
+  if (TIMESTEPS == 1) samples = 0; /* each frame as it is */
+  if (samples == 0) begin_s = time_s;
+  j = sample_at(time_s - begin_s);
+  if (samples <= j) {
+    for (k = 0; k < SIGNALS; ++k) sum[k] = 0;
+    summed = 0;
+  }
+  for (; samples < j; ++samples) memcpy(ring[samples % TIMESTEPS], newest, sizeof newest); /* no frame */
+  samples = j + 1;
+  ++summed;
+  for (k = 0; k < SIGNALS; ++k) {
+    sum[k] += (double)values[k];
+    newest[k] = scaled((float)(sum[k] / summed));
+  }
+  memcpy(ring[j % TIMESTEPS], newest, sizeof newest);
+  return samples >= TIMESTEPS;
+}
+
+int NAME_push(const float values[SIGNALS]) { return NAME_push_at(samples == 0 ? 0 : newest_s + PERIOD_S, values); }
 
 #if NORMALISED
 /* The window's own rest and gain: of each signal the 5th percentile and the third largest sample, in steps
@@ -129,36 +120,11 @@ static void normalise(void) {
 }
 #endif
 
-/* The sample of a frame, counted back from the window's end; negative: later than the window. */
-static int32_t sample_of(int32_t i, double end_s) { return floor_of((end_s - time_of(i)) * RATE_HZ + CELL_SLACK); }
-
 int NAME_picture(float picture[PIXELS], float predicted_error[PIXELS]) {
-  const double end_s = newest_s + HALF_PERIOD_S;
-  float held[SIGNALS] = {0};
-  int32_t low = 0, high = history.count, k;
-  if (history.count == 0 || (end_s - run_begin_s) * RATE_HZ < (double)TIMESTEPS - 0.5 - CELL_SLACK) return 0;
-  while (low < high) { /* the first frame of the window */
-    const int32_t middle = (low + high) / 2;
-    if (sample_of(middle, end_s) >= TIMESTEPS)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  if (low != 0 && (low == history.count || sample_of(low, end_s) < TIMESTEPS - 1)) {
-    /* The oldest sample has no frames: it repeats the last one before the window. */
-    const int32_t before = sample_of(low - 1, end_s);
-    while (low != 0 && sample_of(low - 1, end_s) == before) --low;
-  }
-  k = low < history.count ? sample_of(low, end_s) : 0;
-  for (k = k < TIMESTEPS - 1 ? TIMESTEPS - 1 : k; k >= 0; --k) {
-    const int32_t begin = low;
-    while (low != history.count && sample_of(low, end_s) == k) ++low;
-    if (low != begin) {
-      mean_of(begin, low - begin, held);
-      scale(held);
-    }
-    if (k < TIMESTEPS) memcpy(window + (TIMESTEPS - 1 - k) * SIGNALS, held, sizeof held);
-  }
+  const int32_t oldest = (int32_t)(samples % TIMESTEPS);
+  if (samples < TIMESTEPS) return 0;
+  memcpy(window, ring[oldest], (size_t)(TIMESTEPS - oldest) * sizeof ring[0]);
+  memcpy(window + (TIMESTEPS - oldest) * SIGNALS, ring[0], (size_t)oldest * sizeof ring[0]);
 #if NORMALISED
   normalise();
 #endif

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "data/recordings/recording.h"
+#include "data/windows/windows.h"
 #include "io/files/file.h"
 #include "io/files/safetensors.h"
 #include "io/numbers/numbers.h"
@@ -249,6 +250,53 @@ TEST_F(Array, ATableWithoutPositionsIsRegisteredAgainstItsPlate) {
                        "was recorded over 3_Bumps, --plate says 6_Bumps"));
   EXPECT_TRUE(contains(run("supertac-import slide.txt --sensor mat.json --out nowhere").out,
                        " s, no positions: name its plate (--plate)"));
+}
+
+// A recording that is replayed, frame by frame, and in evaluation: after the last frame of each sample of the
+// model's rate stream has drawn the picture that evaluate draws there.
+TEST_F(Array, LivePicturesAreThoseOfEvaluation) {
+  write_mat(5, 6, "4");
+  for (const std::string sensor : {"--array 4x4", "--sensor mat.json"})
+    for (const std::string rate : {"300", "100", "60"}) {
+      std::filesystem::remove_all(path("data"));
+      succeed("supertac-simulate --out data --plates bumps12 --speeds 20 --passes 1 --trials 1 --force " +
+              sensor);
+      succeed(
+          "supertac-train --data data --out m.safetensors --preset tiny --timesteps 32 --epochs 1 --stride "
+          "90 "
+          "--batch 8 --split none --force --rate " +
+          rate);
+      succeed(
+          "supertac-evaluate --data data --model m.safetensors --split none --outputs outputs.safetensors "
+          "--force");
+      succeed("supertac-stream --recording " + list_recordings(path("data")).front() +
+              " --model m.safetensors --out live.safetensors --quiet --force");
+      const auto live = SafetensorsFile::read(path("live.safetensors"));
+      const std::vector<float> drawn = live.f32("pictures"),
+                               wanted = SafetensorsFile::read(path("outputs.safetensors")).f32("output");
+      const ModelFile model = load_model(path("m.safetensors"));
+      WindowSettings settings = model.windows();
+      const WindowSet set = WindowSet::load(path("data"), {}, settings);
+      const std::vector<double> times = live.f64("time_s");
+      const Recording recording = first_of("data");
+      const auto pixels = static_cast<std::ptrdiff_t>(set.image().pixels());
+      ASSERT_EQ(static_cast<std::ptrdiff_t>(wanted.size()), pixels * static_cast<std::ptrdiff_t>(set.size()));
+      std::map<std::size_t, std::ptrdiff_t> newest;  // of a sample: the last picture with it
+      for (std::size_t i = 0; i < times.size(); ++i)
+        newest[sample_at(times[i] - recording.time_s.front(), settings.rate_hz)] =
+            static_cast<std::ptrdiff_t>(i);
+      std::size_t compared = 0;
+      for (std::size_t i = 0; i < set.size(); ++i) {
+        const auto picture = newest.find(set.frame_of(i));
+        if (picture == newest.end()) continue;  // the sample has no frame of its own
+        ++compared;
+        ASSERT_TRUE(std::equal(wanted.begin() + pixels * static_cast<std::ptrdiff_t>(i),
+                               wanted.begin() + pixels * static_cast<std::ptrdiff_t>(i + 1),
+                               drawn.begin() + pixels * picture->second))
+            << sensor << ", " << rate << " Hz, window " << i;
+      }
+      EXPECT_GT(compared, set.size() / 4);
+    }
 }
 
 // Tables of two days have the same names; what stands beside them is in folders of theirs.
