@@ -9,6 +9,7 @@
 #include "apps/common/running/progress.h"
 #include "apps/evaluate/distance_scores.h"
 #include "apps/evaluate/exports.h"
+#include "apps/evaluate/map_scores.h"
 #include "apps/evaluate/page.h"
 #include "apps/evaluate/scoring.h"
 #include "apps/evaluate/trust.h"
@@ -47,12 +48,13 @@ std::string row(const std::string& name, const ZoneMetrics& metrics, const Laten
 /// The scores of the network and of every baseline over the same windows.
 struct RecordingScores {
   RecordingScores(const WindowSet& windows, const ModelFile& model, std::size_t methods)
-      : by_distance(windows), trust(windows, model) {
+      : by_distance(windows), trust(windows, model), map(windows, model) {
     for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
   }
   std::vector<ZoneMetrics> of_method;
   DistanceScores by_distance;
   TrustScores trust;
+  MapScores map;
 };
 
 RecordingScores score_all(const Arguments& a, const Ensemble& network, const ModelFile& file,
@@ -65,9 +67,13 @@ RecordingScores score_all(const Arguments& a, const Ensemble& network, const Mod
       scores.of_method[m].add(d.pictures[m], d.target, zone);
     scores.by_distance.add(d.example, d.pictures[0], d.target);
     scores.trust.add(d);
+    scores.map.add(d);
     if (page != nullptr) page->add(d);
-    if (outputs != nullptr) outputs->add(d.input, d.pictures[0], d.target, d.predicted_error);
+    if (outputs != nullptr)
+      outputs->add(d.input, d.pictures[0], d.target, d.predicted_error, windows.position(d.example),
+                   windows.pass_of(d.example));
   });
+  scores.map.finish();
   return scores;
 }
 
@@ -94,6 +100,7 @@ nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const
   nlohmann::ordered_json result = own.to_json();
   result["felt"] = scores.by_distance.to_json();
   result["trust"] = scores.trust.to_json();
+  if (!scores.map.empty()) result["map"] = scores.map.to_json();
   a.print("split " + tested.split_name + ", seed " + std::to_string(tested.seed) + ", " +
           std::to_string(own.all().windows) + " windows, " + std::to_string(own.contact().windows) +
           " in contact");
@@ -114,6 +121,7 @@ nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const
   for (const std::string& line : silence_lines(own)) a.print(line);
   for (const std::string& line : scores.by_distance.lines()) a.print(line);
   for (const std::string& line : scores.trust.lines()) a.print(line);
+  for (const std::string& line : scores.map.lines()) a.print(line);
   result["latency"] = latencies;
   result["model"] = a.text("model");
   result["data"] = windows.fingerprint();
@@ -149,6 +157,10 @@ void declare(Arguments& a) {
   a.decides_nothing();
   a.option("outputs", "FILE",
            "write inputs as the network takes them, outputs, truths and predicted errors as safetensors");
+  a.option(
+      "map", "FILE",
+      "write the surfaces that were felt, of each plate and trial: .png; .safetensors, with those of each "
+      "pass beside them; or of one plate and trial .stl (docs/map.md)");
   declare_strict(a);
   a.option("plates", "A,B,...", "only recordings of these plates (default: the model's own)");
   a.option(
@@ -159,6 +171,7 @@ void declare(Arguments& a) {
 }
 
 int run(Arguments& a) {
+  if (a.given("map")) read_option("map", [&] { return check_map_path(a.text("map")), 0; });
   const std::vector<ModelFile> files = load_models(a.list("model"));
   const Ensemble network = ensemble_of(files, precision_of(a.choice("precision", {"fp32", "int8"})));
   TestSet tested = test_set_of(a, files.front());
@@ -188,6 +201,7 @@ int run(Arguments& a) {
   if (pictures)
     write_pictures(network, files.front().interval_factor(), windows, tested.split.test, *pictures);
   if (a.given("outputs")) outputs.write(a.output("outputs"));
+  if (a.given("map")) write_maps(a.output("map"), scores.map.maps(a.text("map").ends_with(".safetensors")));
   if (a.given("report"))
     write_file(a.output("report"), page.html(network, tested.split.test, result, made_by(a, windows)));
   if (pictures) pictures->keep();

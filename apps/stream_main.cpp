@@ -35,6 +35,7 @@ std::string source_of(const Arguments& a) {
   if (a.text("out") == "-" && a.text("json") == "-") throw UsageError("--out and --json: only one to stdout");
   if (a.given("plate") && !a.given("record")) throw UsageError("--plate: only with --record");
   if (!is_unknown_plate(a.text("plate"))) read_option("plate", [&] { return Plate::named(a.text("plate")); });
+  if (a.given("map")) read_option("map", [&] { return check_map_path(a.text("map")), 0; });
   if (a.given("capture") && !a.given("board")) throw UsageError("--capture: only with --board");
   return source;
 }
@@ -75,6 +76,10 @@ void declare(Arguments& a) {
               "keep taxels and pictures as ROS 2 messages in an MCAP file, which Foxglove, Rerun, "
               "PlotJuggler and "
               "ros2 bag open")
+      .option(
+          "map", "FILE",
+          "keep the surface that was felt, as far as the finger's places are known: .png, .safetensors or "
+          ".stl (docs/map.md)")
       .option("record", "DIR", "keep the signals as a recording in this folder, the next pass of its plate")
       .option("plate", "NAME", "what the recording slides over: a plate's name, or an STL file", "unknown")
       .option("udp", "HOST:PORT",
@@ -182,6 +187,7 @@ int run(Arguments& a) {
                           .mcap = a.output("mcap"),
                           .record = a.text("record"),
                           .plate = a.text("plate"),
+                          .map = a.output("map"),
                           .udp = a.text("udp"),
                           .view = !a.quiet() && drawable_terminal()};
   if (probed) settings.found = probed->says;

@@ -58,19 +58,25 @@ OutputsFile::OutputsFile(const TaxelArray& array, std::size_t timesteps, const I
       width_(static_cast<std::uint64_t>(image.width)) {}
 
 void OutputsFile::add(std::span<const float> window, std::span<const float> output,
-                      std::span<const float> truth, std::span<const float> predicted_error) {
+                      std::span<const float> truth, std::span<const float> predicted_error,
+                      const WindowSet::Position& position, std::size_t pass) {
   predicted_error_.insert(predicted_error_.end(), predicted_error.begin(), predicted_error.end());
   input_.insert(input_.end(), window.begin(), window.end());
   output_.insert(output_.end(), output.begin(), output.end());
   truth_.insert(truth_.end(), truth.begin(), truth.end());
+  position_mm_.insert(position_mm_.end(), {position.x_mm, position.y_mm});
+  pass_.push_back(static_cast<std::int64_t>(pass));
   ++count_;
 }
 
 void OutputsFile::write(const OutputPath& output) const {
   const auto bytes = [](const std::vector<float>& v) { return std::as_bytes(std::span(v)); };
-  std::vector<TensorToWrite> tensors{{"input", "F32", {count_, timesteps_, signals_}, bytes(input_)},
-                                     {"output", "F32", {count_, height_, width_}, bytes(output_)},
-                                     {"truth", "F32", {count_, height_, width_}, bytes(truth_)}};
+  std::vector<TensorToWrite> tensors{
+      {"input", "F32", {count_, timesteps_, signals_}, bytes(input_)},
+      {"output", "F32", {count_, height_, width_}, bytes(output_)},
+      {"truth", "F32", {count_, height_, width_}, bytes(truth_)},
+      {"position_mm", "F64", {count_, 2}, std::as_bytes(std::span(position_mm_))},
+      {"pass", "I64", {count_}, std::as_bytes(std::span(pass_))}};
   if (!predicted_error_.empty())
     tensors.push_back({"predicted_error", "F32", {count_, height_, width_}, bytes(predicted_error_)});
   write_safetensors(output, {{"format", "supertac-outputs"}}, tensors);

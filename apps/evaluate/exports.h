@@ -13,18 +13,21 @@ namespace supertac {
 
 /// Collects windows [N,T,signals] as the network takes them, outputs [N,H,W], truths [N,H,W] and, where the
 /// network has one, predicted errors [N,H,W], and writes them as one safetensors file with tensors "input",
-/// "output", "truth" and "predicted_error".
+/// "output", "truth" and "predicted_error"; beside them "position_mm" F64 [N,2], the finger's centre (NaN:
+/// unknown), and "pass" I64 [N], windows of one pass having the same number.
 class OutputsFile {
  public:
   OutputsFile(const TaxelArray& array, std::size_t timesteps, const ImageGrid& image);
   void add(std::span<const float> window, std::span<const float> output, std::span<const float> truth,
-           std::span<const float> predicted_error);
+           std::span<const float> predicted_error, const WindowSet::Position& position, std::size_t pass);
   /// Throws FileError.
   void write(const OutputPath& output) const;
 
  private:
   std::uint64_t timesteps_, signals_, height_, width_, count_ = 0;
   std::vector<float> input_, output_, truth_, predicted_error_;
+  std::vector<double> position_mm_;
+  std::vector<std::int64_t> pass_;
 };
 
 /// strips.png: windows in contact spread over the test windows, input | output | truth and, where

@@ -89,9 +89,7 @@ std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& wi
       ShownWindow one{.felt = mean_of_channels(windows.array(), windows.last_frame(chosen[b.first + n])),
                       .drawn = {drawn.begin(), drawn.end()},
                       .truth = {truth.begin(), truth.end()},
-                      .half_widths = {}};
-      for (const float predicted : b.predicted_error(n))
-        one.half_widths.push_back(static_cast<float>(interval_factor) * at_least(predicted));
+                      .half_widths = half_widths(interval_factor, b.predicted_error(n))};
       shown.push_back(std::move(one));
     }
     return true;

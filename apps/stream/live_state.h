@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "apps/stream/seen.h"
+#include "data/map/surface_map.h"
 
 namespace supertac {
 
@@ -32,6 +33,7 @@ struct LiveState {
   std::string texture;           ///< that the picture shows, by a classifier; empty: none, or no texture
   double texture_probability = 0;
   float x_mm = NAN, y_mm = NAN;  ///< of the finger's centre on the plate, where known
+  MapCells map;                  ///< what has changed of the surface that was felt; empty: nothing
   double frames_per_s = 0;
   double median_ms = 0, p99_ms = 0;  ///< latency
   std::uint64_t lost = 0, dropped = 0;

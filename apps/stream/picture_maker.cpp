@@ -77,11 +77,8 @@ void PictureMaker::rezero() {
 std::span<const float> PictureMaker::picture() {
   if (!window_.window(input_.values())) return {};
   output_ = network_.estimate(input_);
-  if (output_.predicted_error.defined()) {
-    half_widths_.clear();
-    for (const float predicted_error : output_.predicted_error.values())
-      half_widths_.push_back(static_cast<float>(interval_factor_) * at_least(predicted_error));
-  }
+  if (output_.predicted_error.defined())
+    half_widths_ = supertac::half_widths(interval_factor_, output_.predicted_error.values());
   if (model_.novelty) {
     signal_features(input_.values(), model_.array(), features_);
     distance_ = model_.novelty->distance(features_);

@@ -105,6 +105,7 @@ class RecordingSource : public SensorSource {
                       .wall_s = recording_.began_s() + recording_.time_s[i]};
     if (!recording_.position_mm.empty())
       frame.x_mm = recording_.position_mm[2 * i], frame.y_mm = recording_.position_mm[2 * i + 1];
+    if (!recording_.lift_mm.empty()) frame.lift_mm = recording_.lift_mm[i];
     return frame;
   }
   bool ended() const override { return at_ == recording_.frames(); }

@@ -22,6 +22,7 @@ struct SensorFrame {
   double arrived_s = 0;          ///< on this computer's clock (monotonic_seconds)
   double wall_s = NAN;           ///< of what is not live: when it arrived (s since 1970), where that is known
   float x_mm = NAN, y_mm = NAN;  ///< of the finger's centre on the plate, where known
+  float lift_mm = 0;             ///< how far it is above its slide
   std::optional<FrameArrival> arrival = {};  ///< of a board's frame: what a recording is dated by
 };
 

@@ -55,6 +55,8 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
   if (!settings.mcap.path.empty())
     mcap_ = std::make_unique<McapLog>(settings.mcap, source.array(), source.signal_scale().unit, format.image,
                                       format.half_widths);
+  if (maker_ && (settings.web || !settings.map.path.empty()))
+    map_.emplace(maker_->image(), models.front().model->settings().timesteps > 1);
   about_lines_ = about_lines(source.array(), source.signal_scale().unit, format.image);
   if (!settings.udp.empty()) udp_ = std::make_unique<UdpOutput>(settings.udp);
   if (!settings.classifier.empty()) {
@@ -140,8 +142,18 @@ void Stream::complete() {
   if (log_) attempt([&] { log_->write(maker_ ? settings_.metadata : recording_); });
   const bool any = maker_ ? pictures() > 0 : frames_ > 0;
   if (mcap_ && any) attempt([&] { mcap_->close(); });
+  if (!settings_.map.path.empty()) attempt([&] { write_map(); });
   attempt([&] { source_.finish(); });
   if (first) std::rethrow_exception(first);
+}
+
+void Stream::write_map() const {
+  if (!map_ || map_->empty())
+    throw std::runtime_error(
+        settings_.map.path +
+        ": no map, since no picture's place is known; expected --model and a --recording "
+        "with positions, which supertac-collect and supertac-import give");
+  write_maps(settings_.map, {{"surface", map_->cells(map_->felt()), map_->grid().pixel_mm}});
 }
 
 // Empty where frames come as often as the source says, to a twentieth.
@@ -259,6 +271,9 @@ void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
   unlike_ += state_.unlike_training ? 1 : 0;
   state_.picture.assign(picture.begin(), picture.end());
   state_.x_mm = frame.x_mm, state_.y_mm = frame.y_mm;
+  if (!map_ || !std::isfinite(frame.x_mm) || !std::isfinite(frame.y_mm) || frame.lift_mm > kLiftedMm) return;
+  map_->add(frame.x_mm, frame.y_mm, picture, seen.half_widths);
+  changed_ = changed_.with(map_->newest());
 }
 
 double Stream::keep_pace(double time_s) const {
@@ -294,7 +309,7 @@ void Stream::show() {
     state_.taxels = raw_.taxels(), state_.top = raw_.top(), state_.most_changed = raw_.most_changed();
   if (classifier_ && now - named_s_ >= kNameEveryS) named_s_ = now, name_texture();
   if (view_) view_->update(state_);
-  if (web_) web_->update(state_);
+  if (web_ && web_->update(state_, map_ ? &*map_ : nullptr, changed_)) changed_ = {};
 }
 
 }  // namespace supertac

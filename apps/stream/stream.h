@@ -15,6 +15,7 @@
 #include "apps/stream/views/line_output.h"
 #include "apps/stream/views/terminal_view.h"
 #include "apps/stream/views/web_view.h"
+#include "data/map/map_file.h"
 #include "data/recordings/mcap_log.h"
 #include "models/files/classifier_file.h"
 
@@ -28,6 +29,7 @@ struct StreamSettings {
   OutputPath mcap = "";                 ///< MCAP file that keeps frames and pictures; empty: none
   std::string record = {};              ///< folder that gets a recording; empty: none
   std::string plate = "unknown";        ///< of the recording: a plate's name or an STL file
+  OutputPath map = "";                  ///< file of the surface that was felt; empty: none
   std::string udp = {};                 ///< HOST:PORT that gets a line for each; empty: none
   bool view = false;                    ///< draw on the terminal
   std::optional<WebAddress> web = {};   ///< serve the live page
@@ -73,6 +75,7 @@ class Stream {
   void keep(const SensorFrame& frame, std::span<const float> picture);
   void keep_raw(const SensorFrame& frame);
   void output(const Seen& seen);
+  void write_map() const;
   void complete();
   void describe_recording();
   void show();
@@ -95,6 +98,8 @@ class Stream {
   std::unique_ptr<Recorder> recorder_;  // at the page's wish
   std::unique_ptr<WebView> web_;
   std::optional<NamedClassifier> classifier_;
+  std::optional<SurfaceMap> map_;  // where somebody wants it
+  MapRegion changed_;              // of it, since the page was told
   LatencyHistogram latency_;
   LiveState state_;
   std::uint64_t frames_ = 0, too_late_ = 0, unlike_ = 0, lines_lost_ = 0, figures_frames_ = 0;

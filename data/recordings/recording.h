@@ -10,6 +10,9 @@
 
 namespace supertac {
 
+/// Lifted further than this, a finger is in the air: a measured height is never quite that of the slide.
+inline constexpr double kLiftedMm = 0.1;
+
 /// One pass of the finger over a plate, at the rate it was recorded with.
 struct Recording {
   std::vector<double> time_s;  ///< n, strictly increasing

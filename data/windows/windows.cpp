@@ -30,10 +30,9 @@ void check(const WindowSettings& s) {
          std::to_string(s.max_gap_s) + " and " + std::to_string(s.scaling.span_volts));
 }
 
-// Lifted further than this, a finger is in the air: a measured height is never quite that of the slide.
 // Pressed as deep as rigs press it, it is clear of the plate when lifted by so much more than the highest
 // element.
-constexpr double kLiftedMm = 0.1, kClearanceMm = 1.5;
+constexpr double kClearanceMm = 1.5;
 constexpr std::size_t kFingerNumbers = 3;  // x, y, lift
 
 // Why a frame of a track can end no window: the count it adds to; null when it can.
@@ -275,7 +274,8 @@ void WindowSet::will_read(std::size_t i) const {
   const Stored& stored = stored_[place.pass];
   file_->will_read(stored.samples + (place.last + 1 - frames()) * array().signals(), input_size());
   file_->will_read(stored.fingers + place.last * kFingerNumbers, kFingerNumbers);
-  if (measured(place.pass)) file_->will_read(stored.truths + place.last * image().pixels(), image().pixels());
+  if (truth_is_measured(place.pass))
+    file_->will_read(stored.truths + place.last * image().pixels(), image().pixels());
 }
 
 std::vector<float> WindowSet::window(std::size_t i) const {
@@ -306,7 +306,8 @@ std::string WindowSet::place_text(std::size_t i) const {
 void WindowSet::truth(std::size_t i, std::span<float> out) const {
   check_size("a truth image", out.size(), image().pixels());
   const Place place = place_of(i);
-  if (measured(place.pass)) return file_->read(stored_[place.pass].truths + place.last * out.size(), out);
+  if (truth_is_measured(place.pass))
+    return file_->read(stored_[place.pass].truths + place.last * out.size(), out);
   const auto [x, y, lift] = finger(place);
   // A finger that is lifted halfway ends no window (why_none()); here it is clear of the plate, in the air.
   if (lift > kLiftedMm) return std::fill(out.begin(), out.end(), 0.0F);
@@ -315,7 +316,7 @@ void WindowSet::truth(std::size_t i, std::span<float> out) const {
 
 Zone WindowSet::zone(std::size_t i) const {
   const Place place = place_of(i);
-  if (measured(place.pass)) {
+  if (truth_is_measured(place.pass)) {
     std::vector<float> pixels(image().pixels());
     truth(i, pixels);
     return in_contact(pixels) ? Zone::contact : Zone::flat;
@@ -351,7 +352,7 @@ std::string WindowSet::fingerprint() const {
     const Track all = track(p);
     for (const auto* values : {&all.samples, &all.position_mm, &all.lift_mm})
       for (const float v : *values) hash.add(v);
-    if (!measured(p)) continue;
+    if (!truth_is_measured(p)) continue;
     std::vector<float> truth(image().pixels());
     for (std::size_t i = 0; i < all.lift_mm.size(); ++i) {
       file_->read(stored_[p].truths + i * truth.size(), truth);

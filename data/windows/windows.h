@@ -143,6 +143,7 @@ class WindowSet {
   std::size_t frame_of(std::size_t i) const { return place_of(i).last; }
   /// Frames since its pass began or since the last gap, the last frame included: at least frames().
   std::size_t history(std::size_t i) const { return place_of(i).run; }
+  bool truth_is_measured(std::size_t pass) const { return plates_[stored_[pass].plate].measured; }
   /// Samples, positions and lifts of a whole pass; none when no window ends in it.
   Track track(std::size_t pass) const;
 
@@ -177,7 +178,6 @@ class WindowSet {
   void store(const Recording& recording, const Track& track, Stored& stored);
   Place place_of(std::size_t i) const;
   std::array<float, 3> finger(const Place& place) const;
-  bool measured(std::size_t pass) const { return plates_[stored_[pass].plate].measured; }
 
   WindowSettings settings_;
   WindowCounts counts_;

@@ -29,6 +29,13 @@ double expected_ssim_loss(std::span<const float> picture, std::span<const float>
   return 1 - kept / squares;
 }
 
+std::vector<float> half_widths(double factor, std::span<const float> predicted_error) {
+  std::vector<float> widths;
+  for (const float predicted : predicted_error)
+    widths.push_back(static_cast<float>(factor) * at_least(predicted));
+  return widths;
+}
+
 void IntervalCoverage::add(std::size_t pass, std::span<const float> picture, std::span<const float> truth,
                            std::span<const float> predicted_error) {
   if (passes_.empty() || passes_.back().number != pass) passes_.push_back({.number = pass});

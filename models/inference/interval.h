@@ -29,6 +29,9 @@ double expected_ssim_loss(std::span<const float> picture, std::span<const float>
 /// (trial 1, one seed each).
 inline constexpr double kIntervalFactor = 1.45;
 
+/// The half widths of pixels whose predicted errors are these.
+std::vector<float> half_widths(double factor, std::span<const float> predicted_error);
+
 /// How many pixels' truths lie within picture +- factor * at_least(predicted error). Passes are the unit,
 /// each counts the same: windows of one pass are not exchangeable (Dunn, Wasserman, Ramdas 2018).
 class IntervalCoverage {

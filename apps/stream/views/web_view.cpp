@@ -22,12 +22,22 @@ WebSite WebView::site() {
           .file = [this](const std::string& name) { return recorder_.file(name); }};
 }
 
-void WebView::update(const LiveState& state) {
+bool WebView::update(const LiveState& state, const SurfaceMap* map, const MapRegion& changed) {
   const std::unique_lock lock(mutex_, std::try_to_lock);
-  if (lock) newest_ = state;
+  if (!lock) return false;
+  newest_ = state;
+  if (map == nullptr) return true;
+  untold_ = tell_all_ ? map->felt() : untold_.with(changed);
+  tell_all_ = false;
+  newest_->map = map->cells(untold_);
+  return true;
 }
 
-std::string WebView::hello() const {
+std::string WebView::hello() {
+  {
+    const std::lock_guard lock(mutex_);
+    tell_all_ = true;
+  }
   return dumped({{"badge", source_.badge},
                  {"source", source_.source},
                  {"rows", source_.array.rows},
@@ -49,6 +59,7 @@ std::string WebView::news() {
   {
     const std::lock_guard lock(mutex_);
     state.swap(newest_);
+    untold_ = {};
   }
   return state ? web_event(*state, recorder_.status()) : std::string();
 }
@@ -75,6 +86,15 @@ std::string web_event(const LiveState& state, const Recorder::Status& recorder) 
   if (!state.texture.empty())
     event["texture"] = state.texture, event["probability"] = state.texture_probability;
   if (std::isfinite(state.x_mm)) event["x"] = state.x_mm, event["y"] = state.y_mm;
+  if (const MapRegion& r = state.map.region; !r.empty()) {
+    std::vector<std::uint8_t> felt;
+    for (const float value : state.map.values) felt.push_back(std::isnan(value) ? 0 : 1);
+    event["map"] = {{"left", r.left},
+                    {"bottom", r.bottom},
+                    {"width", r.width},
+                    {"values", levels_base64(state.map.values)},
+                    {"felt", base64(felt)}};
+  }
   return dumped(event);
 }
 

@@ -31,8 +31,10 @@ class WebView {
   /// `recorder` must outlive this. Throws as WebServer.
   WebView(const WebAddress& address, const WebSource& source, Recorder& recorder);
 
-  /// Never waits: a state that comes while the server takes the one before is left out.
-  void update(const LiveState& state);
+  /// Never waits: a state that comes while the server takes the one before is left out, and false returned.
+  /// `changed`: region of the map (null: there is none) since the last that was taken. A page that comes
+  /// makes all of it told anew.
+  bool update(const LiveState& state, const SurfaceMap* map = nullptr, const MapRegion& changed = {});
   /// Whether somebody has wished to re-zero since the last call.
   bool take_rezero() { return rezero_.exchange(false); }
   std::string url() const { return server_.url(); }
@@ -41,7 +43,7 @@ class WebView {
 
  private:
   WebSite site();
-  std::string hello() const;
+  std::string hello();
   std::string news();
 
   WebSource source_;
@@ -49,6 +51,8 @@ class WebView {
   std::atomic<bool> rezero_{false};
   std::mutex mutex_;
   std::optional<LiveState> newest_;
+  MapRegion untold_;  // of the map
+  bool tell_all_ = true;
   WebServer server_;  // last: its thread uses the others
 };
 

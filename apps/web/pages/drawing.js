@@ -142,9 +142,9 @@ function drawStrip(canvas, values, top, rows, labels, withTime) {
 }
 
 function drawMap() {
-  if (element("slide").hidden || stitched.cells.size === 0) return;
+  if (element("slide").hidden || surface.size === 0) return;
   const canvas = element("map"), [mmX, mmY] = supertac.hello.pixel_mm, map = supertac.hello.map;
-  const at = [...stitched.cells].map(([key, cell]) => [key % 8192 - 4096, Math.floor(key / 8192) - 4096, cell[0] / cell[1]]);
+  const at = [...surface].map(([key, level]) => [...key.split(",").map(Number), level]);
   const ends = (k) => at.reduce(([low, high], one) => [Math.min(low, one[k]), Math.max(high, one[k] + 1)], [Infinity, -Infinity]);
   const [x0, x1] = ends(0), [y0, y1] = ends(1), left = 34, bottom = 32;
   const unit = Math.min((canvas.clientWidth - left - 6) / ((y1 - y0) * mmY), 160 / ((x1 - x0) * mmX));  // dots a mm
@@ -152,7 +152,7 @@ function drawMap() {
   const {g} = prepared(canvas);
   const X = (y) => left + (y - y0) * mmY * unit, Y = (x) => 4 + (x1 - x) * mmX * unit;
   for (const [x, y, value] of at) {
-    const level = 3 * Math.round(value);
+    const level = 3 * value;
     g.fillStyle = `rgb(${map[level]},${map[level + 1]},${map[level + 2]})`;
     g.fillRect(X(y), Y(x + 1), mmY * unit + 1, mmX * unit + 1);
   }

@@ -26,20 +26,12 @@ function remember(event) {
   strips.end = at;
 }
 
-// The picture lies around the finger on the plate: the mean of all that cover a place.
-const stitched = {cells: new Map(), last: null};
-function stitch(event) {
-  const {last} = stitched;
-  if (last && event.t < last.t) stitched.cells.clear();  // another run
-  if (last && event.t >= last.t && Math.hypot(event.x - last.x, event.y - last.y) < .05) return;  // it stands
-  stitched.last = event;
-  const h = supertac.hello, rows = h.rows * h.scale, columns = h.columns * h.scale, [mmX, mmY] = h.pixel_mm;
-  const left = Math.round(event.x / mmX - columns / 2), bottom = Math.round(event.y / mmY - rows / 2);
-  for (let i = 0; i < event.picture.length; ++i) {
-    const key = (bottom + Math.floor(i / columns) + 4096) * 8192 + left + i % columns + 4096;
-    const cell = stitched.cells.get(key) || [0, 0];
-    stitched.cells.set(key, [cell[0] + event.picture[i], cell[1] + 1]);
-  }
+// The surface that was felt: the level of each cell, by its place. The program sends what has changed.
+const surface = new Map();
+function mend({left, bottom, width, values, felt: mask}) {
+  const levels = bytes(values), known = bytes(mask);
+  for (let i = 0; i < levels.length; ++i)
+    if (known[i]) surface.set(`${left + i % width},${bottom + Math.floor(i / width)}`, levels[i]);
 }
 
 const sizeText = ([x, y]) => x === y ? `${x}` : `${x} × ${y}`;
@@ -69,8 +61,8 @@ function onHello(hello) {
   element("rate-name").textContent = hello.draws ? "pictures" : "frames";
   element("slide").hidden = true;
   for (const button of document.querySelectorAll("nav button")) button.disabled = false;
-  stitched.cells.clear();
-  stitched.last = ended = null;
+  surface.clear();
+  ended = null;
   const ratio = `${hello.columns * hello.pitch_mm[0]} / ${hello.rows * hello.pitch_mm[1]}`;
   for (const id of ["felt", "drawn"]) element(id).style.aspectRatio = ratio;
 }
@@ -78,9 +70,9 @@ function onHello(hello) {
 function onPicture(event) {
   for (const name of ["felt", "picture", "wide"]) event[name] = event[name] ? bytes(event[name]) : null;
   if (event.felt) remember(event);
-  if (event.picture && event.x !== undefined) {
+  if (event.map) {
     element("slide").hidden = false;
-    stitch(event);
+    mend(event.map);
   }
   supertac.newest = event;
 }

@@ -74,6 +74,31 @@ TEST_F(Streaming, ARecordingGivesThePicturesOfItsWindows) {
   EXPECT_GT(compared, recording.frames() - 2 * kTimesteps);
 }
 
+TEST_F(Streaming, TheMapOfARecordingHasTheBitsOfTheWindowsMap) {
+  const Recording recording = record(40);
+  ASSERT_EQ(stream("--recording recording --out out --map map.safetensors").code, 0);
+  const SafetensorsFile out = kept("out"), map = kept("map.safetensors");
+  const std::vector<float> pictures = out.f32("pictures");
+  const std::vector<double> times = out.f64("time_s");
+  SurfaceMap expected(load_model(model()).windows().array->picture(2));
+  for (std::size_t i = 0, frame = 0; i < times.size(); ++i) {
+    while (recording.time_s[frame] - recording.time_s[0] < times[i] - 1e-9) ++frame;
+    if (!recording.lift_mm.empty() && recording.lift_mm[frame] > kLiftedMm) continue;
+    expected.add(recording.position_mm[2 * frame], recording.position_mm[2 * frame + 1],
+                 std::span(pictures).subspan(64 * i, 64), {});
+  }
+  const MapCells cells = expected.cells(expected.felt());
+  const std::vector<float> values = map.f32("surface.values");
+  ASSERT_EQ(values.size(), cells.values.size());
+  EXPECT_GT(cells.region.height, 15);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    ASSERT_EQ(std::bit_cast<std::uint32_t>(values[i]), std::bit_cast<std::uint32_t>(cells.values[i])) << i;
+  expect_failure(stream("--recording recording --map map.npy"), 2, "written as .png, .safetensors or .stl");
+  plug_in();
+  expect_failure(stream("--board " + board() + " --seconds 0.5 --map map.png"), 1,
+                 "no picture's place is known");
+}
+
 TEST_F(Streaming, PrecisionAutoIsFp32WithoutTheRangesOfInt8) {
   record(32);
   const ProcessResult done = stream("--recording recording --precision auto --json json");

@@ -321,7 +321,7 @@ TEST(WebView, AnEventHoldsThePictureAndWhatIsKnownOfIt) {
   auto event = parse_json_limited(web_event(state, {}));
   EXPECT_EQ(event["n"], 7);
   EXPECT_EQ(event["picture"], levels_base64(state.picture));
-  for (const char* unknown : {"most", "wide", "distance", "unlike", "texture", "x"})
+  for (const char* unknown : {"map", "most", "wide", "distance", "unlike", "texture", "x"})
     EXPECT_FALSE(event.contains(unknown)) << unknown;
   state.half_widths.assign(256, 0.25F), state.distance = 2, state.unlike_training = true, state.x_mm = 3,
                                         state.y_mm = 4, state.texture = "3_Bumps",
@@ -335,6 +335,14 @@ TEST(WebView, AnEventHoldsThePictureAndWhatIsKnownOfIt) {
   EXPECT_EQ(event["probability"], .75);
   EXPECT_EQ(event["y"], 4);
   EXPECT_EQ(event["files"].size(), 2U);
+  state.map = {.region = {-2, 5, 2, 1}, .values = {1, NAN}, .errors = {}};
+  event = parse_json_limited(web_event(state, {}));
+  EXPECT_EQ(event["map"]["left"], -2);
+  EXPECT_EQ(event["map"]["bottom"], 5);
+  EXPECT_EQ(event["map"]["width"], 2);
+  const std::uint8_t mask[] = {1, 0};
+  EXPECT_EQ(event["map"]["felt"], base64(mask));
+  EXPECT_EQ(event["map"]["values"], levels_base64(state.map.values));
 }
 
 }  // namespace

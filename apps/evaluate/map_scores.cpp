@@ -1,0 +1,92 @@
+#include "apps/evaluate/map_scores.h"
+
+#include <cmath>
+
+#include "data/plates/truth.h"
+#include "io/numbers/numbers.h"
+#include "models/inference/interval.h"
+
+namespace supertac {
+
+MapScores::MapScores(const WindowSet& windows, const ModelFile& model)
+    : windows_(windows), model_(model), by_pass_(windows), by_surface_(windows) {}
+
+std::string MapScores::surface_of(std::size_t pass) const {
+  const WindowSet::Pass& p = windows_.passes()[pass];
+  return p.plate + "_t" + std::to_string(p.trial);
+}
+
+void MapScores::add(const Drawn& drawn) {
+  const auto [x, y] = windows_.position(drawn.example);
+  if (!std::isfinite(x) || !std::isfinite(y) || windows_.zone(drawn.example) == Zone::air) return;
+  const std::size_t pass = windows_.pass_of(drawn.example);
+  const SurfaceMap fresh(windows_.image(), windows_.frames() > 1);
+  const std::vector<float> widths = half_widths(model_.interval_factor(), drawn.predicted_error);
+  of_pass_.try_emplace(pass, fresh).first->second.add(x, y, drawn.pictures[0], widths);
+  of_surface_.try_emplace(surface_of(pass), fresh, pass)
+      .first->second.first.add(x, y, drawn.pictures[0], widths);
+  added_.push_back(drawn.example);
+}
+
+void MapScores::finish() {
+  std::vector<float> read(windows_.image().pixels()), truth(read.size());
+  for (const std::uint32_t window : added_) {
+    const std::size_t pass = windows_.pass_of(window);
+    const auto [x, y] = windows_.position(window);
+    windows_.truth(window, truth);
+    const auto score = [&](const SurfaceMap& map, Scored& scored) {
+      map.read(x, y, read);
+      scored.zones.add(read, truth, windows_.zone(window));
+      scored.by_distance.add(window, read, truth);
+    };
+    score(of_pass_.at(pass), by_pass_);
+    score(of_surface_.at(surface_of(pass)).first, by_surface_);
+  }
+}
+
+std::vector<std::string> MapScores::lines() const {
+  if (empty()) return {};
+  const auto text = [](const Scored& scored) {
+    const Metrics contact = scored.zones.contact();
+    return "SSIM " + format(contact.ssim, 3) + ", PSNR " + format(contact.psnr_mean_db, 2) + " dB";
+  };
+  if (by_pass_.zones.contact().windows == 0) return {};
+  return {"in contact, read back from the map of the pass: " + text(by_pass_) +
+          "; from that of all passes: " + text(by_surface_)};
+}
+
+nlohmann::ordered_json MapScores::to_json() const {
+  const auto number = [](double v) { return std::isfinite(v) ? nlohmann::ordered_json(v) : nullptr; };
+  nlohmann::ordered_json json;
+  for (const auto& [name, scored] :
+       {std::pair("of_pass", &by_pass_), std::pair("of_surface", &by_surface_)}) {
+    const Metrics contact = scored->zones.contact();
+    json[name] = {{"ssim", number(contact.ssim)},
+                  {"psnr_mean_db", number(contact.psnr_mean_db)},
+                  {"felt", scored->by_distance.to_json()}};
+  }
+  return json;
+}
+
+NamedMap MapScores::named(const std::string& name, const SurfaceMap& map, std::size_t pass) const {
+  NamedMap named{.name = name, .cells = map.cells(map.felt()), .cell_mm = map.grid().pixel_mm};
+  if (windows_.truth_is_measured(pass)) return named;
+  const MapRegion& r = named.cells.region;
+  for (std::int64_t j = 0; j < r.height; ++j)
+    for (std::int64_t i = 0; i < r.width; ++i)
+      named.truth.push_back(static_cast<float>(
+          truth_value(windows_.plate(pass), (static_cast<double>(r.left + i) + 0.5) * named.cell_mm.x,
+                      (static_cast<double>(r.bottom + j) + 0.5) * named.cell_mm.y)));
+  return named;
+}
+
+std::vector<NamedMap> MapScores::maps(bool passes) const {
+  std::vector<NamedMap> maps;
+  for (const auto& [name, map] : of_surface_) maps.push_back(named(name, map.first, map.second));
+  if (!passes) return maps;
+  for (const auto& [pass, map] : of_pass_)
+    maps.push_back(named(surface_of(pass) + "_p" + std::to_string(windows_.passes()[pass].pass), map, pass));
+  return maps;
+}
+
+}  // namespace supertac

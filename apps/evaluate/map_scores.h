@@ -1,0 +1,55 @@
+// Maps of the surfaces that were felt, and how good they are.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/evaluate/distance_scores.h"
+#include "apps/evaluate/scoring.h"
+#include "data/map/map_file.h"
+#include "data/scores/metrics.h"
+
+namespace supertac {
+
+/// Fuses the network's pictures (data/map/surface_map.h), once over each pass and once over all passes of a
+/// plate and trial, and reads each picture back from both. Windows in the air and those whose place is not
+/// known belong to no map.
+class MapScores {
+ public:
+  /// Both must outlive this.
+  MapScores(const WindowSet& windows, const ModelFile& model);
+  /// Windows of a pass come in the order of time.
+  void add(const Drawn& drawn);
+  /// When all have come: reads them back. Before the rest below.
+  void finish();
+
+  bool empty() const { return added_.empty(); }
+  /// For people: nothing when empty().
+  std::vector<std::string> lines() const;
+  /// {"of_pass": {"ssim", "psnr_mean_db", "felt": as DistanceScores}, "of_surface": the same}
+  nlohmann::ordered_json to_json() const;
+  /// PLATE_tTRIAL; with passes PLATE_tTRIAL_pPASS behind them.
+  std::vector<NamedMap> maps(bool passes) const;
+
+ private:
+  struct Scored {
+    explicit Scored(const WindowSet& windows) : zones(windows.image()), by_distance(windows) {}
+    ZoneMetrics zones;
+    DistanceScores by_distance;
+  };
+  std::string surface_of(std::size_t pass) const;
+  NamedMap named(const std::string& name, const SurfaceMap& map, std::size_t pass) const;
+
+  const WindowSet& windows_;
+  const ModelFile& model_;
+  std::map<std::size_t, SurfaceMap> of_pass_;
+  std::map<std::string, std::pair<SurfaceMap, std::size_t>> of_surface_;  // and one of its passes
+  std::vector<std::uint32_t> added_;
+  Scored by_pass_, by_surface_;
+};
+
+}  // namespace supertac

@@ -1,0 +1,162 @@
+#include "data/map/map_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "data/plates/plate_mesh.h"
+#include "data/plates/stl.h"
+#include "io/files/safetensors.h"
+#include "io/images/captions.h"
+#include "io/numbers/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr int kLongestPixels = 720, kMostCellPixels = 8, kGap = 6;
+constexpr Rgb kGrey = {200, 200, 200}, kBlack = {0, 0, 0};
+
+struct PanelOf {
+  std::string heading;
+  const NamedMap* map;
+  const std::vector<float>* values;
+};
+
+std::vector<PanelOf> panels_of(const std::vector<NamedMap>& maps) {
+  std::vector<PanelOf> panels;
+  for (const NamedMap& map : maps) {
+    panels.push_back({map.name, &map, &map.cells.values});
+    if (!map.cells.errors.empty()) panels.push_back({"off by", &map, &map.cells.errors});
+    if (!map.truth.empty()) panels.push_back({"true", &map, &map.truth});
+  }
+  return panels;
+}
+
+// y to the right, x upwards.
+void draw(Picture& picture, int top, const PanelOf& panel, int dots) {
+  const MapRegion& region = panel.map->cells.region;
+  const auto columns = static_cast<int>(region.height), rows = static_cast<int>(region.width);
+  for (int y = 0; y < rows * dots; ++y) {
+    for (int x = 0; x < columns * dots; ++x) {
+      const float value = (*panel.values)[static_cast<std::size_t>(x / dots * rows + rows - 1 - y / dots)];
+      picture.set(x, top + y, std::isnan(value) ? kGrey : colour_of(value));
+    }
+  }
+}
+
+// The longest of 1, 2, 5, 10 ... mm that is at most a quarter of the picture.
+void draw_scale(Picture& picture, int top, double dots_a_mm) {
+  double mm = 0.01;
+  for (int i = 0; i < 24; ++i) {
+    const double next = mm * (i % 3 == 1 ? 2.5 : 2);
+    if (next * dots_a_mm > picture.width / 4.0) break;
+    mm = next;
+  }
+  const int length = std::max(1, static_cast<int>(mm * dots_a_mm));
+  for (int x = 0; x < length; ++x)
+    for (int y = 0; y < 4; ++y) picture.set(x, top + y, kBlack);
+  draw_text(picture, 0, top + 8, format(mm) + " mm");
+}
+
+Picture picture_of(const std::vector<NamedMap>& maps) {
+  const std::vector<PanelOf> panels = panels_of(maps);
+  std::int64_t longest = 1, height = 0;
+  for (const PanelOf& p : panels) longest = std::max(longest, p.map->cells.region.height);
+  const auto dots = static_cast<int>(std::clamp<std::int64_t>(kLongestPixels / longest, 1, kMostCellPixels));
+  for (const PanelOf& p : panels) height += p.map->cells.region.width * dots + kGap;
+  const std::int64_t width = std::max<std::int64_t>(longest * dots, 80);
+  height += 8 + kLineHeight;
+  constexpr std::int64_t kMost = 65535;
+  Picture inside(static_cast<int>(std::min(width, kMost + 1)), static_cast<int>(std::min(height, kMost + 1)));
+  Captions captions{.title = "The surface that was felt, y to the right, x upwards",
+                    .low = "0: flat plate",
+                    .high = "1: plate's highest"};
+  int top = 0;
+  for (const PanelOf& p : panels) {
+    draw(inside, top, p, dots);
+    const int tall = static_cast<int>(p.map->cells.region.width) * dots;
+    captions.rows.push_back({top + tall / 2, p.heading});
+    top += tall + kGap;
+  }
+  draw_scale(inside, top + 2, dots / maps.front().cell_mm.y);
+  return captioned(inside, captions);
+}
+
+std::string pair_text(double x, double y) { return "[" + format(x) + "," + format(y) + "]"; }
+
+void write_tensors(const OutputPath& output, const std::vector<NamedMap>& maps) {
+  std::map<std::string, std::string> metadata = {
+      {"format", "supertac-map"}, {"cell_mm", pair_text(maps.front().cell_mm.x, maps.front().cell_mm.y)}};
+  std::vector<TensorToWrite> tensors;
+  for (const NamedMap& map : maps) {
+    const MapRegion& r = map.cells.region;
+    metadata[map.name + ".corner_mm"] =
+        pair_text(static_cast<double>(r.left) * map.cell_mm.x, static_cast<double>(r.bottom) * map.cell_mm.y);
+    const std::pair<const char*, std::span<const float>> parts[] = {
+        {".values", map.cells.values}, {".errors", map.cells.errors}, {".truth", map.truth}};
+    for (const auto& [part, cells] : parts)
+      if (!cells.empty())
+        tensors.push_back({map.name + part,
+                           "F32",
+                           {static_cast<std::uint64_t>(r.height), static_cast<std::uint64_t>(r.width)},
+                           std::as_bytes(cells)});
+  }
+  write_safetensors(output, metadata, tensors);
+}
+
+// A box whose top has a point at each cell's centre: the cells in a frame of points at the bottom, whose
+// places are those of the outermost cells.
+std::vector<Triangle> solid_of(const NamedMap& map) {
+  const MapRegion& r = map.cells.region;
+  const double bottom = -kSunkMm - MeshSettings{}.base_mm;
+  using Point = std::array<float, 3>;
+  const auto point = [&](std::int64_t row, std::int64_t column, bool top) {
+    const std::int64_t i = std::clamp<std::int64_t>(row, 0, r.height - 1),
+                       k = std::clamp<std::int64_t>(column, 0, r.width - 1);
+    const float value = map.cells.values[static_cast<std::size_t>(i * r.width + k)];
+    const double z = std::isnan(value) ? -kSunkMm : rig::kTextureHeightMm * double{value};
+    return Point{static_cast<float>((static_cast<double>(r.left + k) + 0.5) * map.cell_mm.x),
+                 static_cast<float>((static_cast<double>(r.bottom + i) + 0.5) * map.cell_mm.y),
+                 static_cast<float>(top && i == row && k == column ? std::max(z, bottom + 0.1) : bottom)};
+  };
+  std::vector<Triangle> solid;
+  for (std::int64_t i = -1; i < r.height; ++i) {
+    for (std::int64_t k = -1; k < r.width; ++k) {
+      const bool wall_y = i < 0 || i == r.height - 1, wall_x = k < 0 || k == r.width - 1;
+      if (wall_x && wall_y) continue;  // a corner of the frame has no area
+      for (const bool top : {true, false}) {
+        if (!top && (wall_x || wall_y)) continue;
+        const Point a = point(i, k, top), b = point(i, k + 1, top), c = point(i + 1, k + 1, top),
+                    d = point(i + 1, k, top);
+        solid.push_back(top ? Triangle{a, b, c} : Triangle{a, c, b});
+        solid.push_back(top ? Triangle{a, c, d} : Triangle{a, d, c});
+      }
+    }
+  }
+  return solid;
+}
+
+}  // namespace
+
+void check_map_path(const std::string& path) {
+  if (!path.ends_with(".png") && !path.ends_with(".safetensors") && !path.ends_with(".stl"))
+    throw std::invalid_argument("a map is written as .png, .safetensors or .stl, found " + path);
+}
+
+void write_maps(const OutputPath& output, const std::vector<NamedMap>& maps) {
+  check_map_path(output.path);
+  if (maps.empty()) throw std::invalid_argument("map: expected at least one, got none");
+  if (output.path.ends_with(".safetensors")) return write_tensors(output, maps);
+  AtomicFile file(output);
+  if (output.path.ends_with(".png")) {
+    file.write(encode_png(picture_of(maps)));
+  } else {
+    if (maps.size() > 1)
+      throw std::invalid_argument("map: a solid is made of one surface, found " +
+                                  std::to_string(maps.size()) + "; choose one plate, or write .safetensors");
+    file.write(stl_bytes(solid_of(maps.front()), "map " + maps.front().name));
+  }
+  file.commit();
+}
+
+}  // namespace supertac
