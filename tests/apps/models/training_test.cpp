@@ -201,7 +201,7 @@ TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
   for (const char* outside : {"http://", "https://", "<!--", "{{"}) EXPECT_FALSE(contains(page, outside));
   succeed(
       "supertac-evaluate --model scored.safetensors --data data --json scores.json --outputs "
-      "outputs.safetensors --limit 40 --pictures pictures");
+      "outputs.safetensors --limit 40 --pictures pictures --map maps.safetensors");
   const auto json = parse_json_limited(bytes("scores.json"));
   for (const auto* scores : {&json, &json["baselines"]["mean_image"], &json["baselines"]["nearest"],
                              &json["baselines"]["bicubic"]}) {
@@ -220,7 +220,15 @@ TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
   EXPECT_EQ(outputs.tensors().at("input").shape, (std::vector<std::uint64_t>{40, 32, 16}));
   EXPECT_EQ(outputs.tensors().at("output").shape, (std::vector<std::uint64_t>{40, 8, 8}));
   EXPECT_EQ(outputs.tensors().at("predicted_error").shape, (std::vector<std::uint64_t>{40, 8, 8}));
+  EXPECT_EQ(outputs.tensors().at("position_mm").shape, (std::vector<std::uint64_t>{40, 2}));
+  EXPECT_EQ(outputs.tensors().at("pass").dtype, "I64");
   EXPECT_TRUE(fs::exists(path("pictures/strips.png")));
+  const SafetensorsFile maps = SafetensorsFile::read(path("maps.safetensors"));
+  for (const auto& [name, tensor] : maps.tensors())
+    if (const std::size_t at = name.rfind("_p"); name.ends_with(".values") && at != std::string::npos)
+      EXPECT_TRUE(maps.tensors().contains(name.substr(0, at) + ".truth")) << name;
+  EXPECT_GE(maps.tensors().size(), 6U);
+  for (const char* of : {"of_pass", "of_surface"}) EXPECT_GT(json["map"][of]["psnr_mean_db"], 5) << of;
 }
 
 TEST_F(Training, BadInputIsOneLineAndLeavesNothingBehind) {
