@@ -1,14 +1,16 @@
-// supertac-classify: which plate is under the finger? Asked of single frames and of super-resolved pictures
-// (Figure 11 of the paper), and of what lies between.
+// supertac-classify: which plate is under the finger? Asked of single frames, latents and super-resolved
+// pictures (Figure 11 of the paper).
 #include <algorithm>
+#include <cmath>
 
 #include "apps/classify/experiment.h"
-#include "apps/classify/report.h"
+#include "apps/classify/tally.h"
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
-#include "io/files/file.h"
+#include "io/numbers/numbers.h"
 #include "io/numbers/parallel.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 
@@ -16,113 +18,123 @@ void declare(Arguments& a) {
   a.required("model", "FILE,...", "models by supertac-train; run i uses the i-th, and again from the first");
   a.required("data", "DIR", "recordings to train the classifiers on and to test them with");
   a.option("plates", "A,B,...", "the classes (default: the plates the first model was trained on)");
-  a.option(
-      "views", "A,B,...",
-      "what the classifiers see: frame (the last one, normalised as the network sees it), bicubic, "
-      "super_resolved, latents, historyN (the last N "
-      "frames), truth; each is compared with the first (default: frame,super_resolved,latents,history32; of "
-      "a model of single frames the first two)");
   a.option("seeds", "N", "runs: seeds 0 to N - 1 of classifier and order", "5");
   a.option("epochs", "N", "passes over the training windows", "8");
   a.option("stride", "N", "train on every N-th window in contact; tested are all", "1");
-  a.option("augment", "NAME",
-           "standard: the training windows' gains, offsets and noise vary as in supertac-train; none",
-           "standard");
   a.option("out", "FILE",
-           "keep the first run's classifier of super_resolved pictures, for supertac-stream --classifier");
+           "keep the first run's classifier of super-resolved pictures, for supertac-stream --classifier");
 }
 
 namespace {
 
-std::vector<View> views_of(const Arguments& a) {
-  if (!a.given("views"))
-    return {{ViewKind::frame}, {ViewKind::super_resolved}, {ViewKind::latents}, {ViewKind::history, 32}};
-  std::vector<View> views;
-  for (const std::string& name : a.list("views"))
-    views.push_back(read_option("views", [&] { return View::named(name); }));
-  if (views.empty()) throw UsageError("--views: expected at least one view, found none");
-  return views;
+// Which test windows are counted, each with those before it. Near the ends of a texture one element is seen
+// of any plate, and beyond them none: there no picture, not even a perfect one, tells plates apart.
+constexpr const char* kParts[] = {"inside", "contact", "all"};
+
+// The narrowest part of each test window: the whole picture lies on the texture; the truth has a pixel above
+// 0; other. Without positions all in contact are inside.
+std::vector<std::size_t> parts_of(const WindowSet& windows, const std::vector<std::uint32_t>& test) {
+  std::vector<std::size_t> parts;
+  for (const std::uint32_t i : test) {
+    const Plate& plate = windows.plate(windows.pass_of(i));
+    const double y = windows.position(i).y_mm, half = windows.image().height_mm() / 2;
+    const bool contact = windows.contact(i);
+    const bool inside =
+        std::isnan(y) ? contact : y - half >= plate.texture_begin() && y + half <= plate.texture_end();
+    parts.push_back(inside ? 0 : contact ? 1 : 2);
+  }
+  return parts;
 }
 
-// Every view in every run: independent jobs, spread over the threads.
-// Answers of run r to view v are at [r * views + v].
-using Answers = std::vector<std::vector<std::int32_t>>;
+using Parts = std::vector<Tally>;  // by kParts
 
-Answers all_answers(const Arguments& a, const std::vector<View>& views, const std::vector<Candidate>& models,
-                    const std::vector<Exam>& exams, const WindowSet& windows,
-                    const std::vector<std::string>& classes, const ExperimentSettings& same) {
-  Answers results(views.size() * static_cast<std::size_t>(a.integer("seeds", 1, 1000)));
+// Every view in every run, spread over the threads.
+std::vector<Parts> experiment(const Arguments& a, const std::vector<View>& views,
+                              const std::vector<Candidate>& models, const WindowSet& windows,
+                              const std::vector<Dataset>& data, const std::vector<std::string>& classes) {
+  const auto epochs = a.integer("epochs", 1, 10'000);
+  std::vector<std::vector<std::int32_t>> given(views.size() *
+                                               static_cast<std::size_t>(a.integer("seeds", 1, 1000)));
   std::size_t done = 0;
-  Progress progress(a, "classifying", results.size(), "classifiers");
-  parallel_for(results.size(), [&](std::size_t job) {
-    ExperimentSettings settings = same;
-    settings.seed = job / views.size();
-    const std::size_t m = settings.seed % models.size();
-    const View& view = views[job % views.size()];
-    settings.keep = settings.seed == 0 && view.kind == ViewKind::super_resolved ? a.output("out") : "";
-    results[job] = answers(view, *models[m].file.model, windows, exams[m], classes, settings);
+  Progress progress(a, "classifying", given.size(), "classifiers");
+  parallel_for(given.size(), [&](std::size_t job) {
+    ExperimentSettings s{.view = views[job % views.size()], .epochs = epochs, .seed = job / views.size()};
+    if (s.seed == 0 && s.view == View::super_resolved) s.keep = a.output("out");
+    const std::size_t m = s.seed % models.size();
+    given[job] = answers(models[m], windows, data[m], classes, s);
 #pragma omp critical
     progress.update(++done);
   });
-  return results;
-}
-
-std::vector<ViewResult> count(const Answers& given, const std::vector<View>& views,
-                              const std::vector<Exam>& exams, const WindowSet& windows) {
-  std::vector<ViewResult> results;
-  for (const View& view : views)
-    results.push_back({view, std::vector<Tally>(std::size(kParts), Tally(exams.front().classes))});
+  std::vector<Parts> results(views.size(), Parts(std::size(kParts), Tally(classes.size())));
   for (std::size_t job = 0; job < given.size(); ++job) {
-    const Exam& exam = exams[job / views.size() % exams.size()];
-    const std::vector<Part> parts = parts_of(windows, exam);
-    std::vector<Tally>& tallies = results[job % views.size()].parts;
-    for (std::size_t n = 0; n < exam.test.size(); ++n) {
-      const std::size_t pass = windows.pass_of(exam.test[n]);
-      for (auto p = static_cast<std::size_t>(parts[n]); p < tallies.size(); ++p)
-        tallies[p].add(pass, exam.label_of_pass[pass], given[job][n]);
+    const Dataset& asked = data[job / views.size() % data.size()];
+    const std::vector<std::size_t> parts = parts_of(windows, asked.test);
+    Parts& tallies = results[job % views.size()];
+    for (std::size_t n = 0; n < asked.test.size(); ++n) {
+      const std::size_t pass = windows.pass_of(asked.test[n]);
+      for (std::size_t p = parts[n]; p < tallies.size(); ++p)
+        tallies[p].add(pass, asked.label_of_pass[pass], given[job][n]);
     }
     for (Tally& tally : tallies) tally.end_run();
   }
   return results;
 }
 
+// A line for each view and part; views after the first also say how likely their difference to it is by
+// chance.
+nlohmann::ordered_json report(const Arguments& a, const std::vector<View>& views,
+                              const std::vector<Parts>& results, const std::vector<std::string>& classes) {
+  nlohmann::ordered_json json;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const std::string name = kViews[static_cast<int>(views[v])];
+    for (std::size_t p = 0; p < std::size(kParts); ++p) {
+      const Tally& tally = results[v][p];
+      auto& part = json[name][kParts[p]] = tally.to_json(classes);
+      const Interval i = tally.interval();
+      std::string line = left_aligned(name, 16) + left_aligned(kParts[p], 9) +
+                         right_aligned(format(100 * tally.accuracy(), 1), 6) + " % right, " +
+                         format(100 * i.low, 1) + "-" + format(100 * i.high, 1) + " for other passes";
+      if (v > 0) {
+        const double chance = tally.p_against(results.front()[p]);
+        part["p_against_frame"] = chance;
+        line += ", p " + format(chance, 4) + " against frame";
+      }
+      a.print(line);
+    }
+  }
+  return json;
+}
+
 }  // namespace
 
 int run(Arguments& a) {
-  std::vector<View> views = views_of(a);
-  if (a.given("out")) {
-    if (std::ranges::none_of(views, [](const View& v) { return v.kind == ViewKind::super_resolved; }))
-      throw UsageError("--out keeps the classifier of super_resolved pictures, which is not among --views");
-  }
-  ExperimentSettings settings;
-  settings.epochs = a.integer("epochs", 1, 10'000);
-  if (a.choice("augment", {"standard", "none"}) == "standard") settings.augment = kStandardAugmentation;
   const std::int64_t stride = a.integer("stride", 1, 100'000);
   const std::vector<Candidate> models = load_candidates(a.list("model"));
   add_model_parents(a.list("model"));
-  if (models.front().file.model->settings().timesteps == 1 && !a.given("views")) views.resize(2);
-  const WindowSet windows = exam_windows(a.text("data"), a.list("plates"), models.front());
+  const Candidate& first = models.front();
+  std::vector<View> views{View::frame, View::latents, View::super_resolved};
+  if (first.file.model->settings().timesteps == 1) views = {View::frame, View::super_resolved};
+  WindowSettings taken = first.file.windows();
+  taken.stride = static_cast<int>(first.recipe.stride);
+  const WindowSet windows =
+      WindowSet::load(a.text("data"), a.given("plates") ? a.list("plates") : first.recipe.plates, taken);
   const std::vector<std::string> classes = classes_of(windows);
-  std::vector<Exam> exams;
-  for (const Candidate& model : models) exams.push_back(make_exam(windows, model, classes, stride));
-  const std::string split = name_of(models.front().recipe.split);
-  a.note("split " + split + ": " + std::to_string(exams.front().train.size()) + " training windows, " +
-         std::to_string(exams.front().test.size()) + " test windows");
-
-  const Answers given = all_answers(a, views, models, exams, windows, classes, settings);
-  const auto results = count(given, views, exams, windows);
-  const std::string frames = windows.settings().scaling.per_window
-                                 ? "normalised to the window's own rest and gain"
-                                 : "scaled by the model's fixed range";
-  a.print("frame: the last frame of the window as the network sees it, " + frames + ", not the raw voltages");
-  for (const std::string& line : tables(results, classes)) a.print(line);
+  std::vector<Dataset> data;
+  for (const Candidate& model : models) data.push_back(make_dataset(windows, model, classes, stride));
+  const std::string split = name_of(first.recipe.split);
+  a.note("split " + split + ": " + std::to_string(data.front().train.size()) + " training windows, " +
+         std::to_string(data.front().test.size()) + " test windows");
+  const std::vector<Parts> results = experiment(a, views, models, windows, data, classes);
+  a.print(std::string("frame: the last frame of the window as the network sees it, ") +
+          (taken.scaling.per_window ? "normalised to the window's own rest and gain"
+                                    : "scaled by the model's fixed range") +
+          ", not the raw signals");
   a.write_json({{"command", a.command_line()},
                 {"commit", commit()},
                 {"data", windows.fingerprint()},
                 {"split", split},
-                {"frames", frames},
-                {"runs", given.size() / views.size()},
-                {"views", to_json(results, classes)}});
+                {"runs", a.integer("seeds", 1, 1000)},
+                {"views", report(a, views, results, classes)}});
   return kExitOk;
 }
 

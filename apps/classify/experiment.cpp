@@ -3,82 +3,77 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <variant>
+#include <utility>
 
 #include "apps/common/running/signals.h"
 #include "autograd/ops/losses.h"
 #include "autograd/optimisers/adam.h"
 #include "data/windows/batching.h"
+#include "data/windows/split.h"
 #include "models/files/classifier_file.h"
 #include "models/training/loss/schedule.h"
 
 namespace supertac {
 namespace {
 
-constexpr double kWarmUp = 0.05;
+constexpr std::size_t kBatch = 64;
+constexpr double kLearningRate = 1e-3, kWarmUp = 0.05;
 
-// The classifier that fits the view.
-using Classifier = std::variant<FeatureClassifier, TextureClassifier>;
-
-Classifier make_classifier(const Shape& sample, Dim classes, std::uint64_t seed) {
-  Rng rng(seed);
-  if (sample.rank() == 2) return FeatureClassifier(sample[1], classes, rng);
-  return TextureClassifier(
-      {.height = sample[1], .width = sample[2], .channels = sample[3], .classes = classes}, rng);
+Tensor gather(const WindowSet& windows, std::span<const std::uint32_t> indices) {
+  Tensor all(Shape{static_cast<Dim>(indices.size()), static_cast<Dim>(windows.frames()),
+                   static_cast<Dim>(windows.array().signals())});
+  const std::size_t size = windows.input_size();
+  for (std::size_t n = 0; n < indices.size(); ++n)
+    windows.window(indices[n], all.values().subspan(n * size, size));
+  return all;
 }
 
-Variable forward(const Classifier& classifier, const Variable& x) {
-  return std::visit([&](const auto& kind) { return kind.forward(x); }, classifier);
+// Windows [N,T,signals] -> [N,rows,columns,channels].
+Tensor last_frames(const Tensor& windows, const TaxelArray& array) {
+  const Dim count = windows.dim(0), signals = windows.dim(2), stride = windows.dim(1) * signals;
+  Tensor frames(Shape{count, array.rows, array.columns, array.channels});
+  for (Dim n = 0; n < count; ++n)
+    std::copy_n(windows.data() + (n + 1) * stride - signals, signals, frames.data() + n * signals);
+  return frames;
 }
 
-std::vector<Variable> parameters_of(const Classifier& classifier) {
-  return std::visit([](const Module& kind) { return values_of(kind.parameters()); }, classifier);
+// Windows [N,T,signals] -> [N,height,width,channels]; latents are channels of one pixel.
+Tensor show(View view, const SuperTac& model, const TaxelArray& array, const Tensor& windows) {
+  if (view == View::frame) return last_frames(windows, array);
+  if (view == View::super_resolved) return model.infer(windows);
+  const Tensor latents = model.encode(windows);
+  Tensor x(Shape{latents.dim(0), 1, 1, latents.dim(1)});
+  std::ranges::copy(latents.values(), x.data());
+  return x;
 }
 
-Tensor gather(const WindowSet& data, std::span<const std::uint32_t> indices) {
-  Tensor windows(Shape{static_cast<Dim>(indices.size()), static_cast<Dim>(data.frames()),
-                       static_cast<Dim>(data.array().signals())});
-  const std::size_t size = data.input_size();
-  for (std::size_t n = 0; n < indices.size(); ++n) {
-    data.window(indices[n], windows.values().subspan(n * size, size));
-  }
-  return windows;
-}
-
-std::vector<std::int32_t> labels_of(const WindowSet& data, const Exam& exam,
-                                    std::span<const std::uint32_t> indices) {
-  std::vector<std::int32_t> labels;
-  for (const std::uint32_t i : indices) labels.push_back(exam.label_of_pass[data.pass_of(i)]);
-  return labels;
-}
-
-void train(const Classifier& classifier, const View& view, const SuperTac& model, const WindowSet& data,
-           const Exam& exam, const ExperimentSettings& s) {
-  const Batching batching(exam.train, static_cast<std::size_t>(s.batch), s.seed);
+void train(const TextureClassifier& classifier, const Candidate& model, const WindowSet& windows,
+           const Dataset& data, const ExperimentSettings& s) {
+  const Batching batching(data.train, kBatch, s.seed);
   const auto per_epoch = static_cast<std::uint64_t>(batching.batches_per_epoch());
   const auto total = static_cast<std::int64_t>(per_epoch) * s.epochs;
-  const Schedule schedule{.peak = s.learning_rate,
+  const Schedule schedule{.peak = kLearningRate,
                           .warm_up = static_cast<std::int64_t>(kWarmUp * static_cast<double>(total)),
                           .total = total};
-  Adam adam(parameters_of(classifier), {.learning_rate = s.learning_rate, .clip_norm = 1});
+  Adam adam(values_of(classifier.parameters()), {.learning_rate = kLearningRate, .clip_norm = 1});
   std::vector<std::uint32_t> indices(batching.batch_size());
   for (std::int64_t step = 0; step < total; ++step) {
     stop_if_interrupted();
     const std::uint64_t epoch = static_cast<std::uint64_t>(step) / per_epoch;
     const std::uint64_t b = static_cast<std::uint64_t>(step) % per_epoch;
     batching.batch(epoch, b, indices);
-    Tensor windows = gather(data, indices);
-    const auto size = windows.values().size() / indices.size();
-    for (std::size_t n = 0; s.augment.any() && n < indices.size(); ++n) {
-      augment(s.augment, s.seed, batching.sample(epoch, b, n), windows.values().subspan(n * size, size),
-              data.array());
-    }
-    const Variable x(show(view, model, data, indices, windows));
-    const Variable loss = softmax_cross_entropy(forward(classifier, x), labels_of(data, exam, indices));
-    if (!std::isfinite(loss.item())) {
-      throw std::runtime_error("the classifier of view " + view.name() + " diverged at step " +
-                               std::to_string(step + 1) + "; lower --learning-rate");
-    }
+    Tensor shown = gather(windows, indices);
+    const auto size = shown.values().size() / indices.size();
+    for (std::size_t n = 0; model.recipe.augment.any() && n < indices.size(); ++n)
+      augment(model.recipe.augment, s.seed, batching.sample(epoch, b, n),
+              shown.values().subspan(n * size, size), windows.array());
+    std::vector<std::int32_t> labels;
+    for (const std::uint32_t i : indices) labels.push_back(data.label_of_pass[windows.pass_of(i)]);
+    const Variable x(show(s.view, *model.file.model, windows.array(), shown));
+    const Variable loss = softmax_cross_entropy(classifier.forward(x), labels);
+    if (!std::isfinite(loss.item()))
+      throw std::runtime_error("the classifier of " + std::string(kViews[static_cast<int>(s.view)]) +
+                               " diverged at step " + std::to_string(step + 1));
     adam.zero_grad();
     backward(loss);
     adam.set_learning_rate(schedule.at(step));
@@ -88,28 +83,78 @@ void train(const Classifier& classifier, const View& view, const SuperTac& model
 
 }  // namespace
 
-std::vector<std::int32_t> answers(const View& view, const SuperTac& model, const WindowSet& data,
-                                  const Exam& exam, const std::vector<std::string>& classes,
-                                  const ExperimentSettings& settings) {
-  const std::span<const std::uint32_t> test(exam.test), one = std::span(exam.train).first(1);
-  const Tensor sample = show(view, model, data, one, gather(data, one));
-  const Classifier classifier = make_classifier(sample.shape(), exam.classes, settings.seed);
-  train(classifier, view, model, data, exam, settings);
-  if (!settings.keep.path.empty())
-    save_classifier(settings.keep, std::get<TextureClassifier>(classifier),
-                    {.height = sample.dim(1), .width = sample.dim(2)}, classes);
-  const NoGrad no_grad;
-  const auto batch = static_cast<std::size_t>(settings.batch);
-  std::vector<std::int32_t> result;
-  for (std::size_t first = 0; first < test.size(); first += batch) {
-    stop_if_interrupted();
-    const auto indices = test.subspan(first, std::min(batch, test.size() - first));
-    const Variable x(show(view, model, data, indices, gather(data, indices)));
-    const Variable logits = forward(classifier, x);
-    for (std::size_t n = 0; n < indices.size(); ++n) {
-      const real* row = logits.value().data() + static_cast<Dim>(n) * exam.classes;
-      result.push_back(static_cast<std::int32_t>(std::max_element(row, row + exam.classes) - row));
+std::vector<Candidate> load_candidates(const std::vector<std::string>& paths) {
+  std::vector<Candidate> all;
+  for (const std::string& path : paths) {
+    ModelFile file = load_model(path);
+    const Recipe recipe = Recipe::of(file, path);
+    all.push_back({path, recipe, std::move(file)});
+    const Candidate &first = all.front(), &last = all.back();
+    if (recipe.split == SplitKind::none)
+      throw std::runtime_error(path + ": was trained on all windows (split none), so none is left to test");
+    for (const char* key : {"input", "settings", "split", "stride"}) {
+      const std::string ours = value_or(last.file.metadata, key), theirs = value_or(first.file.metadata, key);
+      if (ours != theirs)
+        throw std::runtime_error(path + ": its " + key + " is " + ours + ", that of " + first.path + " is " +
+                                 theirs + "; give models that differ in their seeds only");
     }
+  }
+  return all;
+}
+
+std::vector<std::string> classes_of(const WindowSet& windows) {
+  std::vector<std::string> names;
+  for (const WindowSet::Pass& pass : windows.passes())
+    if (std::ranges::find(names, pass.plate) == names.end()) names.push_back(pass.plate);
+  if (names.size() < 2)
+    throw std::runtime_error("the recordings are of one plate; there is nothing to tell apart");
+  return names;
+}
+
+Dataset make_dataset(const WindowSet& windows, const Candidate& model,
+                     const std::vector<std::string>& classes, std::int64_t stride) {
+  const SplitKind kind = model.recipe.split;
+  Split split = make_split(windows, kind, model.recipe.seed);
+  // Trials are what they are; other splits are drawn from the windows there are.
+  if (kind != SplitKind::trial && fingerprint(split) != value_or(model.file.metadata, "split_fingerprint"))
+    throw std::runtime_error(model.path +
+                             ": its split cannot be repeated on this data, and it may have seen the test "
+                             "windows; give the recordings and plates it was trained on");
+  Dataset data;
+  for (const WindowSet::Pass& pass : windows.passes())
+    data.label_of_pass.push_back(
+        static_cast<std::int32_t>(std::ranges::find(classes, pass.plate) - classes.begin()));
+  std::int64_t number = 0;
+  for (const std::uint32_t i : split.train)
+    if (windows.contact(i) && number++ % stride == 0) data.train.push_back(i);
+  if (data.train.empty()) throw std::runtime_error("no training window is in contact with its plate");
+  data.test = std::move(split.test);
+  return data;
+}
+
+std::vector<std::int32_t> answers(const Candidate& model, const WindowSet& windows, const Dataset& data,
+                                  const std::vector<std::string>& classes,
+                                  const ExperimentSettings& settings) {
+  const auto shown = [&](std::span<const std::uint32_t> indices) {
+    return show(settings.view, *model.file.model, windows.array(), gather(windows, indices));
+  };
+  const Tensor sample = shown(std::span(data.train).first(1));
+  const auto count = static_cast<Dim>(classes.size());
+  const ClassifierSettings network{
+      .height = sample.dim(1), .width = sample.dim(2), .channels = sample.dim(3), .classes = count};
+  Rng rng(settings.seed);
+  const TextureClassifier classifier(network, rng);
+  train(classifier, model, windows, data, settings);
+  if (!settings.keep.path.empty()) save_classifier(settings.keep, classifier, network, classes);
+  const NoGrad no_grad;
+  const std::span<const std::uint32_t> test(data.test);
+  std::vector<std::int32_t> result;
+  for (std::size_t first = 0; first < test.size(); first += kBatch) {
+    stop_if_interrupted();
+    const Variable x(shown(test.subspan(first, std::min(kBatch, test.size() - first))));
+    const Tensor logits = classifier.forward(x).value();
+    for (const real* row = logits.data(); row != logits.data() + logits.values().size(); row += count)
+      result.push_back(static_cast<std::int32_t>(std::max_element(row, row + count) - row));
   }
   return result;
 }

@@ -75,7 +75,7 @@ bool TrainingRun::train() {
   for (const std::string& note : task_.notes) a_.note(note);
   {
     Progress progress(a_, target_.label, static_cast<std::uint64_t>(trainer_.total_steps()), "steps",
-                      static_cast<std::uint64_t>(trainer_.step()), target_.whole);
+                      static_cast<std::uint64_t>(trainer_.step()));
     supertac::train(trainer_, task_, callbacks(progress));
   }
   if (folder_) write_end();

@@ -17,7 +17,6 @@ struct TrainingTarget {
   bool force = false;              ///< whether an earlier run's folder may be overwritten
   std::string resume;              ///< the checkpoint to continue from; "" = start anew
   std::string label = "training";  ///< of the progress bar
-  double whole = 1;                ///< how many times as long as this training the whole command takes
   Ranks& ranks = one_process();    ///< that train together; only the first writes
 };
 

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "apps/web/result_page.h"
-#include "io/images/images.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
@@ -200,41 +199,6 @@ std::string chart_svg(const std::string& title, const ChartAxis& x, const ChartA
     legend += 34 + 7 * static_cast<double>(s.name.size());
   }
   return svg + "</svg>\n";
-}
-
-std::string heat_map_svg(const std::string& title, const HeatMapAxis& x, const HeatMapAxis& y,
-                         const std::vector<double>& values) {
-  double low = INFINITY, high = -INFINITY;
-  for (const double v : values)
-    if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
-  if (!(low <= high)) return {};
-  constexpr double kCell = 34;
-  const double width = (kWidth - kLeft - kRight) / static_cast<double>(x.names.size());
-  const double height = kTop + kCell * static_cast<double>(y.names.size()) + kBottom;
-  std::string svg = "<svg viewBox=\"0 0 " + format(kWidth) + " " + format(height) +
-                    "\" role=\"img\" aria-label=\"" + escaped(title) + "\">" +
-                    text(kLeft, 13, "start", title, " class=\"title\"");
-  for (std::size_t r = 0; r < y.names.size(); ++r) {
-    const double top = height - kBottom - kCell * static_cast<double>(r + 1);
-    svg += text(kLeft - 6, top + kCell / 2 + 4, "end", y.names[r]);
-    for (std::size_t c = 0; c < x.names.size(); ++c) {
-      const double value = values[r * x.names.size() + c], left = kLeft + width * static_cast<double>(c);
-      if (!std::isfinite(value)) continue;
-      const auto share = static_cast<float>(high > low ? (value - low) / (high - low) : 1);
-      const Rgb colour = colour_of(share);
-      svg += "<rect x=\"" + format(left, 1) + "\" y=\"" + format(top, 1) + "\" width=\"" + format(width, 1) +
-             "\" height=\"" + format(kCell, 1) + "\" fill=\"rgb(" + std::to_string(colour[0]) + "," +
-             std::to_string(colour[1]) + "," + std::to_string(colour[2]) + ")\"/>" +
-             text(left + width / 2, top + kCell / 2 + 4, "middle", format(value, 3),
-                  share > 0.55F ? " style=\"fill:#111\"" : " style=\"fill:#fff\"");
-    }
-  }
-  for (std::size_t c = 0; c < x.names.size(); ++c)
-    svg += text(kLeft + width * (static_cast<double>(c) + 0.5), height - kBottom + 16, "middle", x.names[c]);
-  return svg + text(kLeft + (kWidth - kLeft - kRight) / 2, height - 6, "middle", x.label) +
-         text(0, 0, "middle", y.label,
-              " transform=\"translate(12 " + format((kTop + height - kBottom) / 2, 1) + ") rotate(-90)\"") +
-         "</svg>\n";
 }
 
 }  // namespace supertac

@@ -29,17 +29,6 @@ struct ChartSeries {
 std::string chart_svg(const std::string& title, const ChartAxis& x, const ChartAxis& y,
                       const std::vector<ChartSeries>& series);
 
-struct HeatMapAxis {
-  std::string label;
-  std::vector<std::string> names;
-};
-
-/// A cell for each pair of names, its value in it and its colour between the least and the most of all;
-/// values are [y][x], from the bottom. One that is not finite leaves its cell empty; without any there is no
-/// chart.
-std::string heat_map_svg(const std::string& title, const HeatMapAxis& x, const HeatMapAxis& y,
-                         const std::vector<double>& values);
-
 /// Round numbers from `low` to `high`, at most some eight: what an axis is labelled with.
 std::vector<double> round_numbers(double low, double high, bool logarithmic);
 

@@ -8,7 +8,6 @@
 #include <cerrno>
 #include <map>
 #include <mutex>
-#include <thread>
 #include <utility>
 
 #include "io/files/file.h"
@@ -35,17 +34,6 @@ FolderLock::FolderLock(const std::string& folder) {
     throw FileError(folder, "another program is writing there; wait for its end, or choose another folder");
   held_ = std::move(opened);
   known = held_;
-}
-
-FolderLock lock_within(std::chrono::seconds most, const std::string& folder) {
-  for (const auto limit = std::chrono::steady_clock::now() + most;;) {
-    try {
-      return FolderLock(folder);
-    } catch (const FileError&) {
-      if (std::chrono::steady_clock::now() > limit) throw;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
 }
 
 }  // namespace supertac

@@ -1,7 +1,6 @@
 // Two programs must not fill one folder at a time.
 #pragma once
 
-#include <chrono>
 #include <memory>
 #include <string>
 
@@ -18,8 +17,5 @@ class FolderLock {
  private:
   std::shared_ptr<const int> held_;
 };
-
-/// The lock of a folder, once nobody else holds it. Throws FileError when `most` has passed.
-FolderLock lock_within(std::chrono::seconds most, const std::string& folder);
 
 }  // namespace supertac

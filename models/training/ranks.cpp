@@ -102,7 +102,7 @@ void check_micro_batches(int ranks, std::size_t batch) {
   throw std::invalid_argument(
       std::to_string(ranks) + " processes cannot share the " + std::to_string(micro_batches) +
       " micro-batches of a batch of " + std::to_string(batch) + " evenly; start 1, 2, 4" +
-      (micro_batches > 8 ? ", 8 or 16" : " or 8") + ", or train several models at once with supertac-sweep");
+      (micro_batches > 8 ? ", 8 or 16" : " or 8") + " processes");
 }
 
 std::optional<Disagreement> find_disagreement(Ranks& ranks, const std::map<std::string, std::string>& mine) {

@@ -1,7 +1,5 @@
 #include "apps/common/running/measure.h"
 
-#include <fstream>
-#include <sstream>
 #include <vector>
 
 #include "io/numbers/clock.h"
@@ -26,18 +24,5 @@ Latency measure_latency(const std::function<void()>& make_picture) {
   }
   return {.median_us = 1e6 * median(seconds), .p99_us = 1e6 * quantile(seconds, 0.99)};
 }
-
-double peak_memory_mb() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (!line.starts_with("VmHWM:")) continue;
-    double kilobytes = 0;
-    std::istringstream(line.substr(6)) >> kilobytes;
-    return kilobytes * 1024e-6;
-  }
-  return 0;
-}
-
-void reset_peak_memory() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
 }  // namespace supertac

@@ -16,8 +16,4 @@ struct Latency {
 /// shows on an idle machine, without the turns that other programs take on a busy one.
 Latency measure_latency(const std::function<void()>& make_picture);
 
-/// The largest resident memory (MB) of this process since reset_peak_memory(); 0 where /proc does not say.
-double peak_memory_mb();
-void reset_peak_memory();
-
 }  // namespace supertac

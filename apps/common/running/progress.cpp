@@ -42,13 +42,12 @@ std::string about(double seconds) {
 }
 
 Progress::Progress(const Arguments& arguments, std::string what, std::uint64_t total, std::string unit,
-                   std::uint64_t before, double whole)
+                   std::uint64_t before)
     : arguments_(arguments),
       what_(std::move(what)),
       unit_(std::move(unit)),
       total_(total),
       before_(before),
-      whole_(whole),
       drawable_(!arguments.quiet() && drawable_terminal()),
       begin_(std::chrono::steady_clock::now()),
       last_(begin_) {}
@@ -67,7 +66,7 @@ void Progress::update(std::uint64_t done, const std::string& detail, double seco
                                        : static_cast<double>(done - before_) / seconds;
   if (!said_ && now - begin_ >= 3s) {
     const double part = static_cast<double>(total_ - before_) / rate;
-    said_ = say_how_long(seconds_left > 0 ? seconds_left : whole_ * part - seconds);
+    said_ = say_how_long(seconds_left > 0 ? seconds_left : part - seconds);
   }
   if (drawable_)
     draw(progress_line(what_, done, total_, unit_, rate, detail).substr(0, terminal_width() - 1));
@@ -78,8 +77,7 @@ bool Progress::say_how_long(double seconds_left) {
   constexpr double kShort = 5;
   if (seconds_left < kShort) return false;
   if (width_ > 0) draw("");
-  arguments_.note(what_ + (whole_ > 1 ? " and what follows" : "") + ": about " + about(seconds_left) +
-                  " to go");
+  arguments_.note(what_ + ": about " + about(seconds_left) + " to go");
   return true;
 }
 

@@ -19,9 +19,9 @@ bool drawable_terminal();
 class Progress {
  public:
   /// `unit`: what is counted, in the plural ("passes", "steps"). `before`: how many of `total` were done
-  /// earlier, by the run that is resumed. `whole`: how many times as long as this part the command takes.
+  /// earlier, by the run that is resumed.
   Progress(const Arguments& arguments, std::string what, std::uint64_t total, std::string unit,
-           std::uint64_t before = 0, double whole = 1);
+           std::uint64_t before = 0);
   /// Wipes the bar.
   ~Progress();
   Progress(const Progress&) = delete;
@@ -38,7 +38,6 @@ class Progress {
   const Arguments& arguments_;
   std::string what_, unit_;
   std::uint64_t total_, before_;
-  double whole_;
   bool drawable_, said_ = false;
   std::size_t width_ = 0;  // of what is drawn
   std::chrono::steady_clock::time_point begin_, last_;

@@ -163,7 +163,7 @@ TEST_F(Errors, AreOneClearLine) {
           {"supertac-import", "--journal", name, "--out", path("o")},
           {"supertac-plate", "--plate", name, "--out", path("p")},
           {"supertac-plate", "--plate", "plain", "--json", name},
-          {"supertac-sweep", "--out", name},
+          {"supertac-sweep", "--data", name, "--out", path("o")},
           {"supertac-evaluate", "--model", name, "--data", name},
           {"supertac-stream", "--model", name, "--recording", name},
           {"supertac-train", "--data", name, "--out", path("m")}}) {

@@ -24,7 +24,7 @@ class Classify : public OnSimulatedData {
 const std::string kClassify = "supertac-classify --data data --stride 1 --model ";
 
 TEST_F(Classify, KeepsAClassifierThatNamesTextures) {
-  succeed(kClassify + "trial --seeds 1 --epochs 2 --views super_resolved --out kept");
+  succeed(kClassify + "trial --seeds 1 --epochs 2 --out kept");
   const NamedClassifier kept = load_classifier(path("kept"));
   EXPECT_EQ(kept.names, (std::vector<std::string>{"3_Bumps", "6_Ridges"}));
   const auto answer = kept.name_of(std::vector<float>(256, 0.5F));
@@ -32,16 +32,13 @@ TEST_F(Classify, KeepsAClassifierThatNamesTextures) {
               answer.probability <= 1);
   EXPECT_THROW((void)kept.name_of(std::vector<float>(64)), std::invalid_argument);
   EXPECT_THROW((void)load_classifier(path("trial")), std::runtime_error);
-  EXPECT_EQ(run(kClassify + "trial --views frame --out no_file").code, 2);
 }
 
-TEST_F(Classify, CountsEveryTestWindowAndKnowsTheTruth) {
-  succeed(
-      kClassify +
-      "trial --seeds 2 --epochs 20 --json scores.json --views frame,super_resolved,latents,history32,truth");
+TEST_F(Classify, CountsEveryTestWindowAndTellsTexturesApart) {
+  succeed(kClassify + "trial --seeds 2 --epochs 20 --json scores.json");
   const auto json = parse_json_limited(bytes("scores.json"));
   EXPECT_EQ(json["split"], "trial");
-  for (const char* view : {"frame", "super_resolved", "latents", "history32", "truth"}) {
+  for (const char* view : {"frame", "super_resolved", "latents"}) {
     const auto& parts = json["views"][view];
     EXPECT_LT(parts["inside"]["windows"], parts["contact"]["windows"]) << view;
     EXPECT_LT(parts["contact"]["windows"], parts["all"]["windows"]) << view;
@@ -56,7 +53,8 @@ TEST_F(Classify, CountsEveryTestWindowAndKnowsTheTruth) {
     EXPECT_GE(parts["all"]["ci95_passes"][1], parts["all"]["accuracy"]);
     EXPECT_EQ(parts["all"].contains("p_against_frame"), std::string(view) != "frame");
   }
-  EXPECT_GT(json["views"]["truth"]["inside"]["accuracy"], 0.9) << "these plates differ wherever one looks";
+  EXPECT_GT(json["views"]["frame"]["inside"]["accuracy"], 0.7)
+      << "these plates differ wherever one looks";
 }
 
 TEST_F(Classify, SameBytesForOneAndTwoThreads) {
@@ -74,9 +72,7 @@ TEST_F(Classify, RefusesModelsThatMayHaveSeenTheTest) {
   } cases[] = {{"none", 1, "split none"},
                {"trial,pass", 1, "its split is pass, that of"},
                {"pass --plates 6_Ridges,3_Bumps --data other", 1, "cannot be repeated"},
-               {"trial --plates 3_Bumps", 1, "one plate"},
-               {"trial --views frame,history20", 2, "unknown view \"history20\""},
-               {"trial --views history64", 1, "longer than the 32"}};
+               {"trial --plates 3_Bumps", 1, "one plate"}};
   succeed("supertac-simulate --out other --plates 3_Bumps,6_Ridges --speeds 10 --trials 1 --passes 2");
   for (const auto& [options, code, message] : cases)
     expect_exit(run("supertac-classify --data data --epochs 1 --seeds 1 --model " + options), code, message);

@@ -35,8 +35,8 @@ TEST_F(Estimate, OfATraining) {
   expect("supertac-train" + options("long.safetensors", "--epochs 5000"), "training");
 }
 
-TEST_F(Estimate, OfASweepCountsWhatFollows) {
-  expect("supertac-sweep" + options("sweep", "--epochs 5000 --seeds 0,1"), "1 of 2 .* and what follows");
+TEST_F(Estimate, OfASweep) {
+  expect("supertac-sweep" + options("sweep", "--epochs 5000 --seeds 0,1"), "1 of 2 .*");
 }
 
 TEST_F(Estimate, OfASimulation) { expect("supertac-simulate --out many --trials 100", "simulating"); }
@@ -67,8 +67,7 @@ TEST_F(Estimate, OfAnAudit) {
 TEST_F(Estimate, OfWhatIsDoneWithAModel) {
   succeed("supertac-simulate --out two --plates 3_Bumps,6_Ridges --speeds 5 --passes 2");
   succeed("supertac-train --data two --out fine.safetensors --scale 8 --epochs 1 --stride 64");
-  expect("supertac-classify --model fine.safetensors --data two --views frame --stride 1 --seeds 1000",
-         "classifying");
+  expect("supertac-classify --model fine.safetensors --data two --stride 1 --seeds 1000", "classifying");
   expect("supertac-evaluate --model fine.safetensors --data two --threads 1", "evaluating");
 }
 

@@ -149,7 +149,7 @@ TEST_F(RoundTrips, OfEveryKindOfFileGiveTheSameBytes) {
   trained("m4.safetensors", "--scale 4");
   succeed("supertac-simulate --out two --plates 3_Bumps,6_Ridges --trials 2 --passes 1 --speeds 10");
   succeed(
-      "supertac-classify --model m4.safetensors --data two --views super_resolved --seeds 1 --epochs 1 "
+      "supertac-classify --model m4.safetensors --data two --seeds 1 --epochs 1 "
       "--stride 64 --out classes.safetensors");
   succeed("supertac-sweep" + options("sweep", "--epochs 1 --seeds 0"));
   import_texts();

@@ -76,17 +76,6 @@ TEST(Chart, LabelsOfPointsThatLieTogetherDoNotOverprint) {
           << series.labels[a] << " " << series.labels[b];
 }
 
-TEST(Chart, AHeatMapHasACellForEachPairThatIsKnown) {
-  const std::string svg =
-      heat_map_svg("SSIM", {"T", {"32", "64", "128"}}, {"LD", {"3", "10"}}, {0.5, 0.6, 0.7, NAN, 0.8, 0.9});
-  std::size_t cells = 0;
-  for (std::size_t at = 0; (at = svg.find("<rect", at)) != std::string::npos; ++at) ++cells;
-  EXPECT_EQ(cells, 5U);
-  for (const char* words : {">32<", ">10<", ">0.500<", ">0.900<", ">T<", ">LD<"})
-    EXPECT_TRUE(contains(svg, words));
-  EXPECT_EQ(heat_map_svg("", {"", {"1"}}, {"", {"1"}}, {NAN}), "");
-}
-
 TEST(Chart, NamesAreNoMarkup) {
   const std::string svg = chart_svg("<b>", {.label = "<x>"}, {.label = ""},
                                     {{.name = "<a>", .points = {{0, 1}}}, {.name = "b", .points = {{1, 2}}}});
