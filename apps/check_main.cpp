@@ -19,7 +19,9 @@ void declare(Arguments& a) {
       "USB devices; file FILE [OTHER]: checksum, provenance, and "
       "whether OTHER (recordings or a file) is what it was made from; training FILE --data DIR: repeats "
       "parts of a training that kept a ledger; step FILE --data DIR --at N: opens one step of it, with every "
-      "operator; ledgers FILE OTHER: the first difference of two, with --data down to an operator and entry; "
+      "operator; picture FILE --recording FILE --at S --out FILE: writes one picture with every array on the "
+      "way to it; "
+      "ledgers FILE OTHER: the first difference of two, with --data down to an operator and entry; "
       "or of two steps that were opened with --json");
   a.positional("FILE", "what is checked", false);
   a.positional("OTHER", "what it is compared with", false);
@@ -31,13 +33,20 @@ void declare(Arguments& a) {
   a.option("also", "DIR", "those of its --also");
   a.option("segments", "K", "training: how many of its twenty parts are repeated", "1");
   a.option("seed", "N", "training: draws them", "0");
-  a.option("at", "N", "step: which one, from 1");
+  a.option("at", "N",
+           "step: which one, from 1; picture: seconds on the recording's clock, the last window that ends by "
+           "then");
+  a.option("recording", "FILE", "picture: what was felt");
+  a.option("precision", "NAME",
+           "picture: of the maps that the programs' own drawing goes through, fp32 or int8", "fp32");
   a.option(
       "operator", "NAME",
       "step: the arrays of those whose name begins so are written to --out (3/ is the fourth micro-batch, "
       "update/ what the optimiser did)");
   a.option("out", "FILE",
-           "step, ledgers: arrays as safetensors, which examples/referee.py computes again with NumPy");
+           "step, ledgers, picture: arrays as safetensors, which examples/referee.py, or recompute.py for a "
+           "picture, computes "
+           "again with NumPy");
 }
 
 namespace {
@@ -59,21 +68,25 @@ int check_gradients(const Arguments& a) {
   throw FileError(program, std::string("cannot be run: ") + std::strerror(errno));
 }
 
-void need(const Arguments& a, const char* name) {
+void need(const Arguments& a, const std::string& name) {
   if (!a.given(name)) throw UsageError(a.text("WHAT") + ": expected " + name + ", found none");
 }
 
 }  // namespace
 
 int run(Arguments& a) {
-  const std::string what =
-      a.choice("WHAT", {"gradients", "bits", "machine", "udev", "file", "training", "step", "ledgers"});
+  const std::string what = a.choice(
+      "WHAT", {"gradients", "bits", "machine", "udev", "file", "training", "step", "picture", "ledgers"});
   if (what == "gradients") return check_gradients(a);
   if (what == "bits") return check_bits(a);
   if (what == "machine") return check_machine(a);
   if (what == "udev") return print_udev_rule(a);
   need(a, "FILE");
   if (what == "file") return check_file(a);
+  if (what == "picture") {
+    for (const char* name : {"recording", "at", "out"}) need(a, name);
+    return check_picture(a);
+  }
   need(a, what == "ledgers" ? "OTHER" : "data");
   if (what == "ledgers") return check_ledgers(a);
   if (what == "training") return check_training(a);

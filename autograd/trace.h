@@ -3,7 +3,6 @@
 // (models/training/audit/opened_step.h).
 #pragma once
 
-#include <chrono>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -28,7 +27,6 @@ struct TracedOp {
   Variable y;
   std::vector<Variable> inputs;
   OpSettings settings;
-  double us = 0;  ///< microseconds since the op before: its time, where nothing else is done between ops
 };
 
 /// While one lives, the ops of this thread are recorded in their order, under NoGrad too, and their values
@@ -53,7 +51,6 @@ class Trace {
 
  private:
   std::vector<TracedOp> ops_;
-  std::chrono::steady_clock::time_point last_;
 };
 
 }  // namespace supertac

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Does again, with NumPy alone, every step that supertac-explain wrote down, from volts to pixels.
+"""Does again, with NumPy alone, every step that supertac-check picture wrote down, from volts to pixels.
 
-    supertac-explain model.safetensors --recording pass.safetensors --at 6.2 --out explained.safetensors
+    supertac-check picture model.safetensors --recording pass.safetensors --at 6.2 --out explained.safetensors
     examples/recompute.py explained.safetensors model.safetensors
 
 Each step is computed from the arrays that it is said to have been made of, with the weights of the model's own file, and

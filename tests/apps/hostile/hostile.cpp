@@ -37,9 +37,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kPrograms[] = {"check",  "classify", "collect", "evaluate", "explain",
-                                     "export", "import",   "info",    "plate",    "simulate",
-                                     "stream", "sweep",    "train",   "rig"};
+constexpr const char* kPrograms[] = {"check", "classify", "collect", "evaluate", "export", "import", "info",
+                                     "plate", "simulate", "stream",  "sweep",    "train",  "rig"};
 // A command that works, on which evil is heaped; a later option replaces an earlier one.
 const std::map<std::string, std::vector<std::string>> kGood = {
     {"check", {"file", "model", "data"}},
@@ -47,7 +46,6 @@ const std::map<std::string, std::vector<std::string>> kGood = {
     {"collect",
      {"--printer", "/dev/null", "--board", "/dev/null", "--plate", "plain", "--out", "new", "--yes"}},
     {"evaluate", {"--model", "model", "--data", "data", "--split", "none", "--limit", "9"}},
-    {"explain", {"model", "--recording", "data/good", "--at", "2", "--out", "new.steps"}},
     {"export", {"model", "--onnx", "new.onnx"}},
     {"import", {"data", "--out", "new"}},
     {"info", {"data/good"}},

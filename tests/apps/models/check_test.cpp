@@ -159,64 +159,6 @@ TEST_F(Audit, APartThatIsRepeatedGivesTheLedgersLines) {
   EXPECT_EQ(audit("kept.safetensors", "1").code, 1);
 }
 
-TEST_F(Audit, TheGraphOfATrainingStepHasEveryParametersGradient) {
-  train("graphed.safetensors");
-  const ProcessResult result = succeed("supertac-explain graphed.safetensors --recording " +
-                                       list_recordings(path("data")).front() + " --at 4 --out step.dot");
-  const std::string dot = bytes("step.dot");
-  EXPECT_TRUE(contains(result.out, "step.dot: the graph of a training step\n"));
-  for (const char* text : {"encoder.0.conv.0.weight [3,4,16] |value| ", "upsampler.out.bias [1] value ",
-                           " us forward, ", " us back", "|y| ", "|g| ", " kB"})
-    EXPECT_TRUE(contains(dot, text));
-}
-
-TEST_F(Audit, TheGraphOfAnExpressionHasValuesAndGradients) {
-  const auto draw = [](const std::string& text) {
-    return run_process("supertac-explain", {text, "--out", path("expression.dot"), "--force"});
-  };
-  const auto result = draw("a=2; b=-3; relu(a*b+10)");
-  ASSERT_EQ(result.code, 0) << result.error;
-  const std::string dot = bytes("expression.dot");
-  for (const char* text :
-       {"a [] value 2  g -3", "b [] value -3  g 2", "10 [] value 10  g 1", "relu []", "y 4  g 1"})
-    EXPECT_TRUE(contains(dot, text));
-  EXPECT_TRUE(
-      contains(draw("a=2; a*c").error, "expected a number, a name that has one, relu( or sigmoid( at 'c'"));
-  EXPECT_TRUE(contains(result.out, "expression.dot: the graph of the expression\n"));
-  for (const char* divided : {"a=2; a/2", "a=2; b=3; relu(a)/b"})
-    EXPECT_TRUE(contains(draw(divided).error, "expected +, -, * or the end at '/")) << divided;
-  EXPECT_TRUE(contains(draw("a/2").error, "a/2 is no file, and no expression, which has one of + * ( ) ="));
-  for (const char* negated : {"a=2; -a", "a=2; 3*-(a+1)"})
-    EXPECT_TRUE(
-        contains(draw(negated).error, "a minus stands before a number, or between two parts (0 - a) at '-"))
-        << negated;
-  EXPECT_TRUE(contains(draw("(1+2").error, "expected ) at ''"));
-  EXPECT_EQ(draw("1 + 2 3").code, 2);
-}
-
-// The picture of lesson 3 was drawn by the command of its page: every line of its boxes is one of the
-// graph's.
-TEST_F(Audit, TheTapeOfTheLessonIsDrawnAsToday) {
-  const std::string page = read_text_file(SUPERTAC_SOURCE "/docs/lessons/03_chain_rule.md", 1 << 20);
-  std::string svg = read_text_file(SUPERTAC_SOURCE "/docs/pictures/tape.svg", 1 << 20);
-  svg = std::regex_replace(std::regex_replace(svg, std::regex("&#160;"), " "), std::regex("&#45;"), "-");
-  std::smatch command;
-  ASSERT_TRUE(std::regex_search(page, command, std::regex("supertac-explain \"([^\"]+)\" --out tape.svg")));
-  ASSERT_EQ(run_process("supertac-explain", {command[1], "--out", path("tape.dot")}).code, 0);
-  const std::string dot = bytes("tape.dot");
-  std::size_t boxes = 0;
-  for (std::size_t at = 0; (at = dot.find("label=\"", at)) != std::string::npos; ++boxes) {
-    at += 7;
-    std::string label = dot.substr(at, dot.find('"', at) - at);
-    for (std::size_t end = 0; end != std::string::npos;
-         label.erase(0, end == std::string::npos ? end : end + 2)) {
-      end = label.find("\\n");
-      EXPECT_TRUE(contains(svg, ">" + label.substr(0, end) + "<"));
-    }
-  }
-  EXPECT_EQ(boxes, 4U);
-}
-
 TEST_F(Audit, NamesMayHoldSpaces) {
   write_file(path("my plate.stl"),
              stl_bytes(mesh_of(Plate::named("6_Bumps"), {.resolution_mm = 1}), "6_Bumps"));
@@ -316,7 +258,7 @@ TEST_F(Audit, ARefereeComputesAStepAgain) {
 // Every step from volts to pixels, once more by NumPy; without it there is nothing to compare with.
 TEST_F(Audit, AnExplainedPictureIsComputedAgain) {
   train("drawn.safetensors");
-  succeed("supertac-explain drawn.safetensors --recording " + list_recordings(path("data")).front() +
+  succeed("supertac-check picture drawn.safetensors --recording " + list_recordings(path("data")).front() +
           " --at 4 --out explained.safetensors");
   EXPECT_GT(SafetensorsFile::read(path("explained.safetensors")).tensors().size(), 30U);
   if (!has_numpy()) GTEST_SKIP() << "there is no Debian Python with NumPy here";
