@@ -88,8 +88,7 @@ void declare(Arguments& a) {
       .option("classifier", "FILE",
               "name the texture on the page, with a classifier by supertac-classify --out")
       .option("precision", "NAME",
-              "fp32; int8: faster on processors with AVX-512 VNNI, slower on others; or auto: the faster one",
-              "fp32")
+              "fp32, or int8: the pictures of a microcontroller (supertac-export --c99), slower", "fp32")
       .option("speedup", "X", "of a virtual rig started with the same --speedup", "1")
       .flag("probe",
             "listen to --sensor FILE, or to an address such as serial:/dev/ttyACM0@115200, udp::PORT, "
@@ -201,9 +200,7 @@ int run(Arguments& a) {
   settings.metadata = {{"kind", "pictures"}, {"model", a.text("model")}, {"source", origin}};
   std::vector<ModelFile> models;
   if (drawn) models = load_models(a.list("model"));
-  const std::string precision = a.choice("precision", {"fp32", "int8", "auto"});
-  settings.precision = precision_of(precision, models);
-  if (drawn && precision == "auto") a.note("precision: " + name_of(settings.precision));
+  settings.precision = precision_of(a.choice("precision", {"fp32", "int8"}));
   if (drawn) add_model_parents(a.list("model"));
   const auto source = probed ? open_draft(a, *probed->draft, speedup) : open_source(a, speedup);
   Stream stream(settings, models, *source);

@@ -173,7 +173,7 @@ def silence():
 
 # How fast -------------------------------------------------------------------------------------------------------------
 
-TASKS = {"infer": "batch {}", "int8": "int8, batch {}", "train": "training step, {} threads"}
+TASKS = {"infer": "batch {}", "train": "training step, {} threads"}
 PACKAGES = {"pytorch": "torch", "torch.compile": "torch", "onnx": "onnxruntime", "openvino": "openvino", "mnn": "mnn",
             "litert": "ai_edge_litert", "executorch": "executorch", "ncnn": "ncnn"}
 
@@ -198,9 +198,9 @@ def with_version(r):
 
 
 def fastest():
-    """For README: the engine that comes closest, of three tasks."""
+    """For README: the engine that comes closest, of two tasks."""
     lines = []
-    for name, wanted in (("one picture", "infer 1"), ("one picture in int8", "int8 1"), ("training step of 64 windows", "train 1")):
+    for name, wanted in (("one picture", "infer 1"), ("training step of 64 windows", "train 1")):
         r = min(chosen(rows("speed/peers_avx512.csv"), task=wanted), key=lambda r: float(r["ratio"]))
         lines.append([name, duration(r["ours_us"]), f"{duration(r['peer_us'])} ({with_version(r)})", ratio(r)])
     return table(["task", "SuperTac", "fastest other engine", "times as fast (95 % interval)"], lines)
@@ -258,9 +258,8 @@ def precision():
     for network in ("tiny", "paper", "four of paper"):
         fp32, int8 = ([r for r in found if r["name"].rsplit(" ", 1)[0] == network and r["precision"] == p] for p in ("fp32", "int8"))
         lost = max(float(a["contact_ssim"]) - float(b["contact_ssim"]) for a, b in zip(fp32, int8))
-        lines.append([network, f"{mean(fp32, 'contact_ssim'):.4f}", f"{mean(int8, 'contact_ssim'):.4f}", f"{lost:.4f}",
-                      duration(mean(fp32, "median_us")), duration(mean(int8, "median_us"))])
-    return table(["network", "contact SSIM in fp32", "in int8", "most that a seed loses", "a picture in fp32", "in int8"], lines)
+        lines.append([network, f"{mean(fp32, 'contact_ssim'):.4f}", f"{mean(int8, 'contact_ssim'):.4f}", f"{lost:.4f}"])
+    return table(["network", "contact SSIM in fp32", "in int8", "most that a seed loses"], lines)
 
 
 # How reliable ---------------------------------------------------------------------------------------------------------

@@ -15,8 +15,7 @@ set lmargin 12
 measured = "< grep -v '^#\\|ours on one thread' " . csv
 of(word) = strstrt(stringcolumn(1), word) == 1 ? column(6) : NaN
 plot measured using 0:6:(0.6):xtic(stringcolumn(1) . ": " . stringcolumn(2)) every ::1 with boxes lc rgb "#bbbbbb" notitle, \
-     measured using 0:(of("infer")):(0.6) every ::1 with boxes lc rgb "#4477aa" title "pictures, fp32", \
-     measured using 0:(of("int8")):(0.6) every ::1 with boxes lc rgb "#228833" title "pictures, int8", \
+     measured using 0:(of("infer")):(0.6) every ::1 with boxes lc rgb "#4477aa" title "pictures", \
      measured using 0:(of("train")):(0.6) every ::1 with boxes lc rgb "#ccbb44" title "training", \
      measured using 0:6:7:8 every ::1 with yerrorbars lc rgb "black" pt 7 ps 0.4 notitle, \
      1 lc rgb "black" dt 2 notitle

@@ -70,8 +70,7 @@ def starts(model, windows, folder, binaries):
     first, shape = pathlib.Path(binaries) / "first_picture", windows.shape
     network = compare.Drawing(model)
     onnx = engines.export_onnx(network, windows, folder)
-    found = {f"ours, {precision} program": lambda precision=precision: program([first, model, precision])
-             for precision in ("fp32", "int8")}
+    found = {"ours, fp32 program": lambda: program([first, model])}
     paths = {"ours, in Python": model, "onnx runtime": onnx, "openvino": onnx}
     if engines.installed("MNN"):
         paths["mnn"] = engines.mnn_file(onnx, windows, folder)

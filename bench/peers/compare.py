@@ -187,16 +187,11 @@ def check_pictures(ours, model, windows, folder):
     return inference, training, pictures
 
 
-# By how much an engine's pictures may differ before it is not the same network any more. The windows are random numbers,
-# unlike those of training, where int8 is at its worst.
-TOLERANCE = {"bf16": 0.1, "int8": 1}
-
-
 def differences(calls, pictures):
     """Name -> the largest difference from our pictures."""
     found = {name: float(np.abs(np.asarray(call())[:, 0] - pictures).max()) for name, call in calls.items()}
     for name, difference in found.items():
-        if not difference < TOLERANCE.get(name.split()[-1], 1e-4):
+        if not difference < 1e-4:
             sys.exit(f"compare.py: pictures of {name} differ by up to {difference:.1e}; nothing was timed")
     return found
 
@@ -235,18 +230,12 @@ def main():
     options, rows = parser.parse_args(), []
     with tempfile.TemporaryDirectory() as folder:
         ours, model, windows, inference, training, pictures = opened(options, folder)
-        ours(f"pictures8 {folder}/int8.safetensors")
-        int8 = supertac.read(f"{folder}/int8.safetensors")[0]["pictures"]
-        print(f"pictures in int8 differ by at most {np.abs(int8 - pictures).max():.1e}")
         with torch.no_grad():
             for batch in (1, 8, 64):
-                peers = engines.inference(model, windows[:batch], windows, folder, options.compile)
+                peers = engines.inference(model, windows[:batch], folder, options.compile)
                 found = differences(peers, pictures[:batch])
-                less = {name: call for name, call in peers.items() if name.split()[-1] in TOLERANCE}
-                full = {name: call for name, call in peers.items() if name not in less}
-                for task, group in ((f"infer {batch}", full), (f"int8 {batch}", less)):
-                    for row in pair(ours, task, group, options.pairs, options.seconds, batch * inference):
-                        rows.append(row | {"difference": found[row["peer"]]})
+                for row in pair(ours, f"infer {batch}", peers, options.pairs, options.seconds, batch * inference):
+                    rows.append(row | {"difference": found[row["peer"]]})
         step = training_peer(model, windows)
         steps = {"pytorch eager": step} | ({"torch.compile": torch.compile(step)} if options.compile else {})
         rows += pair(ours, "train 1", steps, options.pairs, options.seconds, TRAINING_BATCH * training)

@@ -19,7 +19,7 @@ def installed(name):
 
 
 def versions():
-    names = ("torch", "onnxruntime", "openvino", "nncf", "MNN", "ncnn", "executorch", "ai_edge_litert")
+    names = ("torch", "onnxruntime", "openvino", "MNN", "ncnn", "executorch", "ai_edge_litert")
     return " ".join(f"{name.lower()} {importlib.metadata.version(name).split('+')[0]}" for name in names if installed(name))
 
 
@@ -39,52 +39,30 @@ def pytorch(model, windows, compiled_too):
     return calls
 
 
-def onnx_runtime(path, windows, calibration, folder):
+def onnx_runtime(path, windows):
     ort = installed("onnxruntime")
     if ort is None:
         return {}
-    from onnxruntime import quantization
-
-    class Reader(quantization.CalibrationDataReader):
-        def __init__(self):
-            self.rest = iter({"windows": part} for part in calibration.split(len(windows)))
-
-        def get_next(self):
-            part = next(self.rest, None)
-            return None if part is None or len(part["windows"]) < len(windows) else {"windows": part["windows"].numpy()}
-
-    int8 = str(pathlib.Path(folder) / "int8.onnx")
-    quantization.quantize_static(str(path), int8, Reader(), per_channel=True)
     options = ort.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
-    array, calls = windows.numpy(), {}
-    for name, file in (("onnx runtime", str(path)), ("onnx runtime int8", int8)):
-        session = ort.InferenceSession(file, options, providers=["CPUExecutionProvider"])
-        calls[name] = lambda session=session: session.run(None, {"windows": array})[0]
-    return calls
+    session, array = ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"]), windows.numpy()
+    return {"onnx runtime": lambda: session.run(None, {"windows": array})[0]}
 
 
-def open_vino(path, windows, calibration):
-    ov, nncf = installed("openvino"), installed("nncf")
+def open_vino(path, windows):
+    ov = installed("openvino")
     if ov is None:
         return {}
-    core, array, calls = ov.Core(), windows.numpy(), {}
-    network = core.read_model(path)
-    kinds = [("openvino", network, "f32"), ("openvino bf16", network, "bf16")]
-    if nncf is not None:
-        parts = [part.numpy() for part in calibration.split(len(windows)) if len(part) == len(windows)]
-        kinds.append(("openvino int8", nncf.quantize(core.read_model(path), nncf.Dataset(parts)), "f32"))
-    for name, kind, precision in kinds:
-        settings = {"INFERENCE_NUM_THREADS": 1, "NUM_STREAMS": 1, "INFERENCE_PRECISION_HINT": precision}
-        request = core.compile_model(kind, "CPU", settings).create_infer_request()
-        request.set_input_tensor(ov.Tensor(array, shared_memory=True))
+    core, array = ov.Core(), windows.numpy()
+    settings = {"INFERENCE_NUM_THREADS": 1, "NUM_STREAMS": 1, "INFERENCE_PRECISION_HINT": "f32"}
+    request = core.compile_model(core.read_model(path), "CPU", settings).create_infer_request()
+    request.set_input_tensor(ov.Tensor(array, shared_memory=True))
 
-        def call(request=request):
-            request.infer()
-            return request.get_output_tensor().data
+    def call():
+        request.infer()
+        return request.get_output_tensor().data
 
-        calls[name] = call
-    return calls
+    return {"openvino": call}
 
 
 def convert(program, *words):
@@ -192,13 +170,12 @@ def litert(program, windows, folder):
     return {"litert": call}
 
 
-def inference(model, windows, calibration, folder, compiled_too):
-    """All of them for one batch; `calibration` are windows for the quantisers."""
+def inference(model, windows, folder, compiled_too):
+    """All of them for one batch."""
     calls = pytorch(model, windows, compiled_too) | ncnn(model, windows, folder)
     program = torch.export.export(model, (windows,))
     calls |= execu_torch(program, windows) | litert(program, windows, folder)
     if installed("onnx") is None:
         return calls
     path = export_onnx(model, windows, folder)
-    return (calls | onnx_runtime(path, windows, calibration, folder) | open_vino(path, windows, calibration)
-            | mnn(path, windows, folder))
+    return calls | onnx_runtime(path, windows) | open_vino(path, windows) | mnn(path, windows, folder)

@@ -1,7 +1,7 @@
 /* A picture of a window at rest, and the most memory that was held (Linux's VmHWM): what cold_start.py starts
    again and again.
 
-     first_picture MODEL fp32|int8 */
+     first_picture MODEL */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,8 +30,8 @@ static int draw(const supertac_model* model) {
 
 int main(int argc, char** argv) {
   supertac_model* model;
-  if (argc != 3) return 2;
-  model = supertac_open(argv[1], strcmp(argv[2], "int8") == 0 ? SUPERTAC_INT8 : SUPERTAC_FP32);
+  if (argc != 2) return 2;
+  model = supertac_open(argv[1], SUPERTAC_FP32);
   if (draw(model) == 0) return tell_memory();
   fprintf(stderr, "first_picture: %s\n", supertac_error());
   return 1;

@@ -3,9 +3,8 @@
 //
 //   peers_ours MODEL WINDOWS        WINDOWS: safetensors with `windows` [N,T,16]
 //   pictures FILE          infers all windows, writes `pictures` [N,S,S]             -> done
-//   pictures8 FILE         the same in int8, with the ranges of these windows         -> done
 //   cost                   -> multiply-adds of inference, of training, per window
-//   infer|int8 BATCH SECONDS    -> median processor time, median wall time of a call (s), median FMA peak
+//   infer BATCH SECONDS    -> median processor time, median wall time of a call (s), median FMA peak
 //   (GFLOP/s) train THREADS SECONDS [BATCH]  the same for a training step of 64 windows, or so many
 //   each COUNT FILE        the wall time of so many pictures one by one, `seconds` [COUNT]  -> page faults on
 //   the way spin COUNT FILE        the same for additions that take about as long and need no memory
@@ -36,10 +35,7 @@ namespace {
 class Ours {
  public:
   Ours(const std::string& model, const std::string& windows)
-      : model_(load_model(model).model),
-        prepared_(*model_),
-        windows_(read_windows(windows)),
-        bytes_(*model_, ranges_of(*model_, windows_)) {}
+      : model_(load_model(model).model), prepared_(*model_), windows_(read_windows(windows)) {}
 
   std::string answer(const std::string& order) {
     std::istringstream words(order);
@@ -47,16 +43,15 @@ class Ours {
     int number = 0;
     double seconds = 0;
     words >> what;
-    if (what == "pictures" && words >> file) return pictures(prepared_, file);
-    if (what == "pictures8" && words >> file) return pictures(bytes_, file);
+    if (what == "pictures" && words >> file) return pictures(file);
     if (what == "cost") {
       const Cost cost = cost_of(model_->settings());
       return format(cost.inference) + " " + format(cost.training);
     }
-    if ((what == "infer" || what == "int8") && words >> number >> seconds && number <= windows_.dim(0)) {
+    if (what == "infer" && words >> number >> seconds && number <= windows_.dim(0)) {
       omp_set_num_threads(1);
       const Tensor batch = first_windows(number);
-      return timed(seconds, [&] { (what == "infer" ? prepared_ : bytes_).estimate(batch); });
+      return timed(seconds, [&] { prepared_.estimate(batch); });
     }
     if (what == "train" && words >> number >> seconds) {
       omp_set_num_threads(number);
@@ -86,11 +81,6 @@ class Ours {
                       windows_.values().first(static_cast<std::size_t>(values)));
   }
 
-  static ActivationRanges ranges_of(const SuperTac& model, const Tensor& windows) {
-    ActivationRanges ranges;
-    ranges.add(model, windows);
-    return ranges;
-  }
   static Tensor read_windows(const std::string& path) {
     const SafetensorsFile file = SafetensorsFile::read(path);
     const TensorInfo& info = file.tensors().at("windows");
@@ -98,8 +88,8 @@ class Ours {
                       file.f32("windows"));
   }
 
-  std::string pictures(const Prepared& network, const std::string& path) {
-    const Tensor pictures = network.estimate(windows_).picture;
+  std::string pictures(const std::string& path) {
+    const Tensor pictures = prepared_.estimate(windows_).picture;
     const auto height = static_cast<std::uint64_t>(model_->settings().image_height());
     const auto width = static_cast<std::uint64_t>(model_->settings().image_width());
     write_safetensors(path, {},
@@ -173,7 +163,6 @@ class Ours {
   std::unique_ptr<SuperTac> model_;
   Prepared prepared_;
   Tensor windows_;
-  Prepared bytes_;
   std::unique_ptr<WindowSet> data_;
   std::map<int, std::unique_ptr<Trainer>> trainers_;  // by batch
 };

@@ -83,26 +83,9 @@ std::string Writer::maps() const {
   return out + "};\n";
 }
 
-// The weights in the order in which the kernels of kernels.c take them.
-std::vector<int> in_order(const IntegerStep& s, bool bytes) {
-  constexpr Dim kFour = 4;
-  const QuantisedProduct& q = s.weights;
-  const auto of = [&](Dim k, Dim o) {
-    const int w = o < q.outputs ? q.w[static_cast<std::size_t>(k * q.outputs + o)] : 0;
-    return bytes ? w + 128 : w;
-  };
-  std::vector<int> out;
-  for (Dim first = 0; first < q.outputs; first += bytes ? kFour : 1) {
-    for (Dim k = 0; k < q.rows; k += bytes ? kFour : 1)
-      for (Dim o = first; o < first + (bytes ? kFour : 1); ++o)
-        for (Dim i = k; i < k + (bytes ? kFour : 1); ++i) out.push_back(of(i, o));
-  }
-  return out;
-}
-
 std::string Writer::product(const IntegerStep& s, const std::string& name) {
   const bool bytes = plan_.map(s.x).bytes;
-  const std::vector<int> w = in_order(s, bytes);
+  const std::vector<std::uint8_t>& w = s.packed;
   const QuantisedProduct& q = s.weights;
   weights_ += w.size() + 8 * q.offset.size();
   std::string out = "/* " + s.name + ": " + shape_of(s.x) + " -> " + shape_of(s.y) + ", " + text(q.rows) +
@@ -111,19 +94,18 @@ std::string Writer::product(const IntegerStep& s, const std::string& name) {
   out += std::string(bytes ? "static const uint8_t " : "static const int8_t ") + name + "_weights[" +
          std::to_string(w.size()) + "] = {";
   for (std::size_t i = 0; i < w.size(); ++i)
-    out += (i % kPerLine == 0 ? "\n    " : " ") + std::to_string(w[i]) + ",";
+    out += (i % kPerLine == 0 ? "\n    " : " ") +
+           std::to_string(bytes ? w[i] : static_cast<std::int8_t>(w[i])) + ",";
   out +=
       "\n};\nstatic const struct outcome " + name + "_outcomes[" + std::to_string(q.offset.size()) + "] = {";
   for (std::size_t o = 0; o < q.offset.size(); ++o)
     out += (o % 4 == 0 ? "\n    {" : " {") + std::to_string(q.offset[o]) + ", " +
            std::to_string(q.multiplier[o]) + ", " + std::to_string(q.shift[o]) + "},";
-  if (s.segments.size() > 4) throw std::runtime_error("C code: a kernel of over four rows is not supported");
-  const kernels::ByteProductJob& job = s.job;
+  const ProductTaps& t = s.taps;
   out += "\n};\nstatic const struct product " + name + " = {" + name + "_weights, " + name + "_outcomes, " +
-         list({job.height, job.width, q.outputs, job.length, static_cast<Dim>(s.segments.size()),
-               job.outcome.negative_slope, job.from.line, job.from.pixel, job.to.line, job.to.pixel,
-               s.y_offset}) +
-         ", {" + list(s.segments) + "}};\n\n";
+         list({t.height, t.width, q.outputs, t.length, static_cast<Dim>(t.segments.size()), s.negative_slope,
+               t.from.line, t.from.pixel, t.to.line, t.to.pixel, t.y_offset}) +
+         ", {" + list(t.segments) + "}};\n\n";
   return out;
 }
 
@@ -263,25 +245,12 @@ void check(const ModelFile& file, const std::string& name, double sensor_hz) {
         "this version");
 }
 
-// The C code counts in 16 bits, which saves flash.
-void check_sizes(const IntegerPlan& plan) {
-  constexpr Dim kMost = 32767;
-  Dim largest = 0;
-  for (const IntegerMap& m : plan.maps) largest = std::max({largest, m.height, m.width, m.channels});
-  for (const IntegerStep& s : plan.steps)
-    if (s.kind == Kind::product) largest = std::max({largest, s.weights.outputs, s.job.length});
-  if (largest > kMost)
-    throw std::runtime_error("C code: a layer has " + text(largest) + " outputs, expected at most " +
-                             text(kMost) + "; train a network of fewer channels, or for a smaller array");
-}
-
 }  // namespace
 
 CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz,
                 const std::string& written_by) {
   check(file, name, sensor_hz);
   const auto plan = IntegerPlan::of(*file.model, *file.ranges);
-  check_sizes(*plan);
   Writer writer(*plan);
   const std::string top = "/* " + name + ": tactile super-resolution, written by " + written_by + ". */\n";
   std::string products = writer.products();
@@ -295,8 +264,10 @@ CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz
       define("SIGNALS", "UPPER_SIGNALS") + define("TIMESTEPS", "UPPER_TIMESTEPS") +
       define("PIXELS", "(UPPER_HEIGHT * UPPER_WIDTH)") + define("WORK_BYTES", "UPPER_WORK_BYTES") +
       define("NUMBER_STEP", "(1.0f / " + text(Dim{1} << plan->fraction_bits) + ")") +
-      window_constants(file, sensor_hz) + "\n" + kKernels + "\n/* ---- The network. ---- */\n\n" +
-      writer.maps() + "\n" + products + writer.draw() + kWindow;
+      window_constants(file, sensor_hz) +
+      "\nstatic union {\n  int32_t aligned;\n  uint8_t bytes[WORK_BYTES];\n} work;\n" +
+      define("WORK", "work.bytes") + "\n" + kKernels + "\n/* ---- The network. ---- */\n\n" + writer.maps() +
+      "\n" + products + writer.draw() + kWindow;
   std::string upper = name;
   std::ranges::transform(upper, upper.begin(), [](unsigned char c) { return std::toupper(c); });
   const auto named = [&](const std::string& in) {

@@ -196,14 +196,10 @@ std::vector<ModelFile> load_models(std::span<const std::string> paths) {
   return files;
 }
 
-Precision precision_of(const std::string& name, std::span<const ModelFile> files) {
+Precision precision_of(const std::string& name) {
   if (name == "fp32") return Precision::fp32;
   if (name == "int8") return Precision::int8;
-  if (name != "auto")
-    throw std::invalid_argument("precision must be fp32, int8 or auto, got \"" + name + "\"");
-  const bool ranges =
-      std::ranges::all_of(files, [](const ModelFile& file) { return file.ranges.has_value(); });
-  return ranges && int8_is_faster() ? Precision::int8 : Precision::fp32;
+  throw std::invalid_argument("precision must be fp32 or int8, got \"" + name + "\"");
 }
 
 std::string name_of(Precision precision) { return precision == Precision::int8 ? "int8" : "fp32"; }

@@ -69,11 +69,11 @@ std::vector<ModelFile> load_models(std::span<const std::string> paths);
 /// The number format of a network's products.
 enum class Precision {
   fp32,
-  int8,  ///< bytes: faster, and the pictures differ a little (models/inference/prepared/prepared.h)
+  int8,  ///< bytes, as on a microcontroller: the pictures differ a little
+         ///< (models/inference/prepared/prepared.h)
 };
-/// "fp32", "int8", or "auto": int8 where all files hold its ranges and this processor draws faster so
-/// (AVX-512 VNNI, AMX; without them fp32 is faster). Throws std::invalid_argument.
-Precision precision_of(const std::string& name, std::span<const ModelFile> files = {});
+/// "fp32" or "int8". Throws std::invalid_argument.
+Precision precision_of(const std::string& name);
 std::string name_of(Precision precision);
 
 /// The model of a file, and the ensemble of several, which must outlive what draws with them. Throw as

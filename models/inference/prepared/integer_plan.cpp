@@ -1,147 +1,139 @@
 #include "models/inference/prepared/integer_plan.h"
 
+#include <string.h>
+
 #include <algorithm>
 #include <cmath>
-
-#include "autograd/kernels/fast/int8/numbers.h"
+#include <stdexcept>
 
 namespace supertac {
+
+// kernels.c, compiled for this machine. What is constant in a microcontroller's program is the thread's here.
+namespace c99 {
 namespace {
 
-constexpr Dim kBlock = 4;  // images that go through the steps together
+thread_local std::uint8_t* work = nullptr;
+thread_local float number_step = 1;
 
-struct Memory {
-  const IntegerPlan& plan;
-  const real* input;
-  Dim images;
-  std::uint8_t *scratch, *work;
+#define WORK work
+#define NUMBER_STEP number_step
+#include "models/inference/prepared/kernels.c"
+#undef WORK
+#undef NUMBER_STEP
 
-  // Of all images of a map, one behind the other.
-  std::uint8_t* begin(const IntegerMap& map) const { return work + map.offset * images; }
-  std::int16_t* numbers(const IntegerMap& map) const {
-    return reinterpret_cast<std::int16_t*>(begin(map)) + map.origin();
-  }
-  std::uint8_t* bytes(const IntegerMap& map) const { return begin(map) + map.origin(); }
+}  // namespace
+}  // namespace c99
+
+struct IntegerPlan::Compiled {
+  std::vector<c99::map> maps;
+  std::vector<std::vector<c99::outcome>> outcomes;
+  std::vector<c99::product> products;  // of each step; empty for those that are none
+
+  const c99::map* map(int i) const { return i < 0 ? nullptr : &maps[static_cast<std::size_t>(i)]; }
 };
 
-void fill_margin(const IntegerMap& map, const Memory& m) {
-  if (map.bytes) return fill_margin(map, m.images, static_cast<std::uint8_t>(map.scale.zero), m.begin(map));
-  fill_margin(map, m.images, std::int16_t{0}, reinterpret_cast<std::int16_t*>(m.begin(map)));
+namespace {
+
+template <class Whole>
+Whole narrow(Dim value) {
+  const auto whole = static_cast<Whole>(value);
+  if (static_cast<Dim>(whole) == value) return whole;
+  throw std::runtime_error("int8: a layer has a size or a distance of " + std::to_string(value) +
+                           ", expected at most " + std::to_string(std::numeric_limits<Whole>::max()) +
+                           "; train a network of fewer channels, or for a smaller array");
 }
 
-void take_runs(const InputRuns& s, const IntegerMap& y, const real* input, real* out) {
-  for (Dim pixel = 0; pixel < y.height * y.width; ++pixel, input += s.step)
-    for (Dim k = 0; k < y.channels; k += s.run)
-      out = std::copy_n(input + s.first + k / s.run * s.apart, s.run, out);
+c99::map compiled(const IntegerMap& m) {
+  return {.offset = narrow<std::int32_t>(m.offset),
+          .height = narrow<std::int16_t>(m.height),
+          .width = narrow<std::int16_t>(m.width),
+          .channels = narrow<std::int16_t>(m.channels),
+          .margin_h = narrow<std::int16_t>(m.margin_h),
+          .margin_w = narrow<std::int16_t>(m.margin_w),
+          .bytes = m.bytes,
+          .zero = static_cast<std::uint8_t>(m.bytes ? m.scale.zero : 0)};
 }
 
-void run_input(const IntegerStep& s, const Memory& m) {
-  const IntegerMap& y = m.plan.map(s.y);
-  const Dim pixels = y.height * y.width, row = y.width * y.channels;
-  auto* const values = reinterpret_cast<real*>(m.scratch);
-  auto* const numbers = reinterpret_cast<std::int16_t*>(values + pixels * y.channels);
-  for (Dim n = 0; n < m.images; ++n) {
-    take_runs(s.runs, y, m.input + n * m.plan.input_size, values);
-    kernels::to_numbers(pixels * y.channels, values, 1 / m.plan.number_step(), numbers);
-    for (Dim line = 0; line < y.height; ++line) {
-      const Dim at = n * y.image() + line * y.line();
-      if (y.bytes)
-        kernels::to_bytes(row, numbers + line * row, s.scale.multiplier, s.scale.offset, s.scale.shift,
-                          y.scale.zero, m.bytes(y) + at);
-      else
-        std::copy_n(numbers + line * row, row, m.numbers(y) + at);
-    }
-  }
+std::vector<c99::outcome> outcomes(const QuantisedProduct& q) {
+  std::vector<c99::outcome> all;
+  for (std::size_t o = 0; o < q.offset.size(); ++o)
+    all.push_back({q.offset[o], narrow<std::uint16_t>(q.multiplier[o]), narrow<std::uint16_t>(q.shift[o])});
+  return all;
 }
 
-void run_product(const IntegerStep& s, const IntegerMap& x, const IntegerMap& y, const Memory& m) {
-  kernels::ByteProductJob job = s.job;
-  job.images = m.images;
-  job.segments = s.segments.data(), job.segment_count = static_cast<Dim>(s.segments.size());
-  job.outcome.multiplier = s.weights.multiplier.data();
-  job.outcome.offset = s.weights.offset.data(), job.outcome.shift = s.weights.shift.data();
-  job.places = s.places.data(), job.place_count = static_cast<Dim>(s.places.size());
-  job.scratch = reinterpret_cast<std::int16_t*>(m.scratch);
-  if (!x.bytes) {
-    job.w = s.weights.w.data();
-    return kernels::product_of_numbers(job, m.numbers(x), m.numbers(y) + s.y_offset);
-  }
-  job.w = reinterpret_cast<const std::int8_t*>(s.packed.data());
-  kernels::byte_kernels().product(job, m.bytes(x), y.bytes ? nullptr : m.numbers(y) + s.y_offset,
-                                  y.bytes ? m.bytes(y) + s.y_offset : nullptr);
+c99::product compiled(const IntegerStep& s, const std::vector<c99::outcome>& outcomes) {
+  const ProductTaps& t = s.taps;
+  c99::product p{.weights = s.packed.data(),
+                 .outcomes = outcomes.data(),
+                 .height = narrow<std::int16_t>(t.height),
+                 .width = narrow<std::int16_t>(t.width),
+                 .outputs = narrow<std::int16_t>(s.weights.outputs),
+                 .length = narrow<std::int16_t>(t.length),
+                 .segments = narrow<std::int16_t>(static_cast<Dim>(t.segments.size())),
+                 .slope = narrow<std::int16_t>(s.negative_slope),
+                 .x_line = narrow<std::int32_t>(t.from.line),
+                 .x_pixel = narrow<std::int32_t>(t.from.pixel),
+                 .y_line = narrow<std::int32_t>(t.to.line),
+                 .y_pixel = narrow<std::int32_t>(t.to.pixel),
+                 .y_first = narrow<std::int32_t>(t.y_offset),
+                 .segment = {}};
+  if (t.segments.size() > std::size(p.segment))
+    throw std::runtime_error("int8: a kernel of over four rows is not supported");
+  std::ranges::transform(t.segments, p.segment, [](Dim at) { return narrow<std::int32_t>(at); });
+  return p;
 }
 
-void run_copy(const IntegerStep& s, const IntegerMap& x, const IntegerMap& y, const Memory& m) {
-  const Dim run = std::min(x.channels, y.width * y.channels);
-  for (Dim n = 0; n < m.images; ++n)
-    for (Dim line = 0; line < y.height; ++line)
-      std::copy_n(m.numbers(x) + n * x.image() + line * run, run,
-                  m.numbers(y) + n * y.image() + line * y.line() + s.at);
-}
-
-void run_mean(const IntegerMap& x, const IntegerMap& y, const Memory& m) {
-  for (Dim n = 0; n < m.images; ++n)
-    kernels::means(x.height, x.width, x.channels, x.line(), m.numbers(x) + n * x.image(),
-                   m.numbers(y) + n * y.image());
-}
-
-void run_lines(const IntegerStep& s, const IntegerMap& x, const IntegerMap& y, const Memory& m) {
-  for (Dim n = 0; n < m.images; ++n)
-    for (Dim line = 0; line < x.height; ++line) {
-      const auto at = [&](const IntegerMap& of) { return n * of.image() + line * of.line(); };
-      if (s.kind == IntegerStep::Kind::to_bytes)
-        kernels::to_bytes(x.width * x.channels, m.numbers(x) + at(x), s.scale.multiplier, s.scale.offset,
-                          s.scale.shift, y.scale.zero, m.bytes(y) + at(y));
-      else
-        kernels::gated_sum(
-            x.width, x.channels, m.numbers(m.plan.map(s.a)) + at(m.plan.map(s.a)), m.numbers(x) + at(x),
-            s.gates < 0 ? nullptr : m.numbers(m.plan.map(s.gates)) + n * m.plan.map(s.gates).image(),
-            m.numbers(y) + at(y));
-    }
-}
-
-void run_step(const IntegerStep& s, const Memory& m) {
+void run_step(const IntegerStep& s, const c99::product& product, const real* input, const c99::map* x,
+              const c99::map* a, const c99::map* gate, const c99::map* y) {
   using Kind = IntegerStep::Kind;
-  const IntegerMap& y = m.plan.map(s.y);
-  if (s.writes_margin) fill_margin(y, m);
-  if (s.kind == Kind::input) return run_input(s, m);
-  const IntegerMap& x = m.plan.map(s.x);
+  const auto& [multiplier, offset, shift] = s.scale;
+  const auto whole = [](Dim value) { return static_cast<std::int32_t>(value); };
+  if (s.writes_margin) c99::fill_margin(y);
   switch (s.kind) {
+    case Kind::input:
+      return c99::take_input(input, y, whole(s.runs.first), whole(s.runs.run), whole(s.runs.apart),
+                             whole(s.runs.step), multiplier, offset, shift);
+    case Kind::to_bytes:
+      return c99::to_bytes(x, y, multiplier, offset, shift);
     case Kind::product:
-      return run_product(s, x, y, m);
+      return x->bytes != 0 ? c99::product_of_bytes(&product, x, y) : c99::product_of_numbers(&product, x, y);
     case Kind::copy:
-      return run_copy(s, x, y, m);
+      return c99::copy(x, y, whole(s.at));
     case Kind::mean:
-      return run_mean(x, y, m);
+      return c99::mean(x, y);
     case Kind::gates:
-      return kernels::gates(m.images * x.image(), m.numbers(x), m.plan.number_step(), m.numbers(y));
-    default:
-      return run_lines(s, x, y, m);
+      return c99::gates(x, y);
+    case Kind::gated_sum:
+      return c99::gated_sum(a, x, gate, y);
   }
 }
 
-void copy_out(const Memory& m, int of, Dim first, Tensor& to) {
-  const IntegerMap& map = m.plan.map(of);
-  real* target = to.data() + first * map.height * map.width * map.channels;
-  for (Dim n = 0; n < m.images; ++n)
-    for (Dim line = 0; line < map.height; ++line)
-      for (Dim i = 0; i < map.width * map.channels; ++i) {
-        const Dim at = n * map.image() + line * map.line() + i;
-        *target++ = map.bytes ? static_cast<real>(map.scale.step * (m.bytes(map)[at] - map.scale.zero))
-                              : static_cast<real>(m.numbers(map)[at]) * m.plan.number_step();
-      }
-}
-
-void show(const StepWatch& watch, const Memory& m, const IntegerStep& step) {
-  const IntegerMap& y = m.plan.map(step.y);
-  Tensor map(Shape{y.height, y.width, y.channels});
-  copy_out(m, step.y, 0, map);
+// What the map of a step stands for.
+void show(const StepWatch& watch, const IntegerStep& step, const IntegerMap& of, const c99::map* y) {
+  Tensor map(Shape{of.height, of.width, of.channels});
+  if (of.bytes) {
+    const std::uint8_t* from = c99::bytes_of(y) + of.origin();
+    for (Dim line = 0, to = 0; line < of.height; ++line)
+      for (Dim i = 0; i < of.width * of.channels; ++i, ++to)
+        map.data()[to] = static_cast<real>(of.scale.step * (from[line * of.line() + i] - of.scale.zero));
+  } else {
+    c99::give(y, map.data());
+  }
   if (step.kind == IntegerStep::Kind::gates)  // in 4096ths
-    for (real& gate : map.values()) gate *= 1 / (4096 * m.plan.number_step());
+    for (real& gate : map.values()) gate *= 1 / (4096 * c99::number_step);
   watch(step.name, map);
 }
 
 }  // namespace
+
+void IntegerPlan::compile() {
+  auto all = std::make_shared<Compiled>();
+  for (const IntegerMap& m : maps) all->maps.push_back(compiled(m));
+  for (const IntegerStep& s : steps) all->outcomes.push_back(outcomes(s.weights));
+  for (std::size_t i = 0; i < steps.size(); ++i)
+    all->products.push_back(compiled(steps[i], all->outcomes[i]));
+  compiled_ = all;
+}
 
 float IntegerPlan::number_step() const { return std::ldexp(1.0F, -fraction_bits); }
 
@@ -151,22 +143,24 @@ Estimate IntegerPlan::run(const Tensor& inputs, const StepWatch* watch) const {
   out.picture = Tensor(Shape{count, map(picture).height, map(picture).width, 1});
   if (predicted_error >= 0) out.predicted_error = Tensor(out.picture.shape());
   if (latents >= 0) out.latents = Tensor(Shape{count, map(latents).channels});
-  const Dim bytes = scratch + work_area * std::min(count, kBlock);
-  Tensor memory(Shape{bytes / static_cast<Dim>(sizeof(real)) + 1});
-  auto* const begin = reinterpret_cast<std::uint8_t*>(memory.data());
-  const kernels::ByteProducts products;  // of tiles, for which a process asks the system
-  for (Dim first = 0; first < count; first += kBlock) {
-    const Memory block{*this, inputs.data() + first * size, std::min(kBlock, count - first), begin,
-                       begin + scratch};
+  Tensor memory(Shape{work_area / static_cast<Dim>(sizeof(real)) + 1});
+  c99::work = reinterpret_cast<std::uint8_t*>(memory.data());
+  c99::number_step = number_step();
+  const Compiled& all = *compiled_;
+  for (Dim n = 0; n < count; ++n) {
+    const auto give = [&](int i, Tensor& to) {
+      if (i >= 0) c99::give(all.map(i), to.data() + n * (to.size() / count));
+    };
     for (std::size_t i = 0; i < steps.size(); ++i) {
-      run_step(steps[i], block);
-      const bool complete =
-          i + 1 == steps.size() || steps[i + 1].y != steps[i].y;  // by several steps at times
-      if (watch != nullptr && complete) show(*watch, block, steps[i]);
+      const IntegerStep& s = steps[i];
+      run_step(s, all.products[i], inputs.data() + n * size, all.map(s.x), all.map(s.a), all.map(s.gates),
+               all.map(s.y));
+      const bool complete = i + 1 == steps.size() || steps[i + 1].y != s.y;  // by several steps at times
+      if (watch != nullptr && complete) show(*watch, s, map(s.y), all.map(s.y));
     }
-    copy_out(block, picture, first, out.picture);
-    if (predicted_error >= 0) copy_out(block, predicted_error, first, out.predicted_error);
-    if (latents >= 0) copy_out(block, latents, first, out.latents);
+    give(picture, out.picture);
+    give(predicted_error, out.predicted_error);
+    give(latents, out.latents);
   }
   return out;
 }

@@ -1,12 +1,12 @@
-// A network in whole numbers (int8), as data: the steps that this machine runs and that supertac-export
-// writes as C for microcontrollers (models/files/c_code.h), so that both draw the same bits.
+// A network in whole numbers (int8), as data: the steps that supertac-export writes as C for microcontrollers
+// (models/files/c_code.h). A PC runs the same C (kernels.c), so that both draw the same bits.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "autograd/kernels/fast/int8/int8.h"
 #include "models/inference/prepared/prepared.h"
 #include "models/inference/prepared/quantise.h"
 #include "models/inference/prepared/ranges.h"
@@ -45,18 +45,19 @@ struct IntegerStep {
   InputRuns runs = {};    ///< input
   Dim at = 0;             ///< copy
 
-  // product: `job` has all but pointers and images; offsets are from the maps' first pixels.
-  kernels::ByteProductJob job = {};
-  std::vector<Dim> segments = {};
-  Dim y_offset = 0;
-  QuantisedProduct weights = {};  // [segments * length][cout]
-  Tensor packed = {};             // as the kernels take the weights of bytes
-  std::vector<kernels::BytePlaces> places = {};
+  ProductTaps taps = {};                   // product: all but w and bias
+  QuantisedProduct weights = {};           // [segments * length][cout]
+  std::int32_t negative_slope = kNoSlope;  // of 4096
+  /// The weights as kernels.c takes them: of bytes w + 128, [cout / 4][rows / 4][4 outputs][4], filled up to
+  /// whole fours of outputs; of numbers [cout][rows].
+  std::vector<std::uint8_t> packed = {};
+
+  static constexpr std::int32_t kNoSlope = 4096;
 };
 
 struct IntegerPlan {
   /// Throws std::logic_error naming an op that has no step, std::invalid_argument for the ranges of another
-  /// network.
+  /// network, std::runtime_error for a layer that kernels.c cannot count in 16 bits.
   static std::shared_ptr<const IntegerPlan> of(const Network& network, const ActivationRanges& ranges);
   /// Throws nothing; inputs as Network::estimate.
   Estimate run(const Tensor& inputs, const StepWatch* watch = nullptr) const;
@@ -66,10 +67,14 @@ struct IntegerPlan {
   std::vector<IntegerMap> maps;
   std::vector<IntegerStep> steps;
   int fraction_bits = 0;
-  Dim work_area = 0;   ///< bytes of an image
-  Dim input_size = 0;  ///< numbers of the network's input
-  Dim scratch = 0;     ///< bytes of a block, for kernels that widen what they multiply
+  Dim work_area = 0;                                     ///< bytes of an image
   int picture = -1, predicted_error = -1, latents = -1;  ///< maps; -1: the network has none
+
+ private:
+  struct Compiled;  // maps and products as kernels.c has them
+  void compile();
+
+  std::shared_ptr<const Compiled> compiled_;
 };
 
 }  // namespace supertac

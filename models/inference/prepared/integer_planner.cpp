@@ -20,6 +20,7 @@ namespace supertac {
 namespace {
 
 using Kind = IntegerStep::Kind;
+constexpr Dim kFour = 4;  // bytes, and outputs, that kernels.c multiplies together
 
 class IntegerPlanner : TraceWalk {
  public:
@@ -64,7 +65,6 @@ IntegerPlanner::IntegerPlanner(const Network& network, const ActivationRanges& r
   for (const Parameter& p : network.parameters())
     layers_[p.value.node()] = p.name.substr(0, p.name.rfind('.'));
   for (std::size_t i = 0; i < ops.size(); ++i) scales_[ops[i].y.node()] = ranges.scale(i);
-  plan_->input_size = traced.input.size();
   for (const TracedOp& op : ops) {
     if (op.op == "flatten_channels_first") continue;
     const bool of_bytes = is_of_bytes(op);
@@ -96,7 +96,7 @@ void IntegerPlanner::choose_fraction_bits(const std::vector<TracedOp>& ops, cons
 bool IntegerPlanner::is_of_bytes(const TracedOp& op) const {
   if (!scales_.contains(owner(op.inputs[0]))) return false;
   if (op.op == "linear") return owner(op.inputs[0]) != op.inputs[0].node();
-  return op.op.starts_with("conv") && op.inputs[0].dim(op.inputs[0].rank() - 1) % kernels::kQuad == 0 &&
+  return op.op.starts_with("conv") && op.inputs[0].dim(op.inputs[0].rank() - 1) % kFour == 0 &&
          op.y.dim(op.y.rank() - 1) > 1;
 }
 
@@ -182,8 +182,6 @@ void IntegerPlanner::take_input(const TracedOp& op) {
   IntegerStep& step = add(Kind::input, "input", -1, to);
   step.runs = InputRuns::of(op);
   if (bytes) step.scale = requantise(plan_->number_step(), map(to).scale.step);
-  const Dim values = y.size() / y.dim(0);
-  plan_->scratch = std::max(plan_->scratch, (values * 6 + 63) / 64 * 64);
   if (!bytes) add_bytes(y);
 }
 
@@ -197,46 +195,40 @@ void IntegerPlanner::concat(const TracedOp& op, int y) {
   }
 }
 
+std::vector<std::uint8_t> packed(const QuantisedProduct& q, bool bytes) {
+  const Dim run = bytes ? kFour : 1;
+  std::vector<std::uint8_t> out;
+  for (Dim first = 0; first < q.outputs; first += run)
+    for (Dim begin = 0; begin < q.rows; begin += run)
+      for (Dim o = first; o < first + run; ++o)
+        for (Dim k = begin; k < begin + run; ++k) {
+          const int w = o < q.outputs ? q.w[static_cast<std::size_t>(k * q.outputs + o)] : 0;
+          out.push_back(static_cast<std::uint8_t>(bytes ? w + 128 : w));
+        }
+  return out;
+}
+
 void IntegerPlanner::add_product(const TracedOp& op, int x, int y, ProductTaps t) {
-  constexpr double kSlopes = kernels::Outcome::kNoSlope;
+  constexpr double kSlopes = IntegerStep::kNoSlope;
   const auto slope = static_cast<std::int32_t>(std::lrint(op.settings.negative_slope * kSlopes));
-  if (slope != kernels::Outcome::kNoSlope && (slope < 0 || slope > 63))
+  if (slope != IntegerStep::kNoSlope && (slope < 0 || slope > 63))
     throw std::logic_error("Prepared: a negative slope of " + std::to_string(op.settings.negative_slope) +
                            " has no step in whole numbers");
   IntegerStep& s = add(Kind::product, layer_of(op), x, y);
-  const Dim rows = static_cast<Dim>(t.segments.size()) * t.length, cout = t.bias.size();
+  const Dim rows = static_cast<Dim>(t.segments.size()) * t.length;
   s.weights = quantise(rows, t.w.values(), t.bias.values(), map(x).scale, map(y).scale);
-  s.segments = std::move(t.segments), s.y_offset = t.y_offset;
-  const bool bytes = map(x).bytes;
-  const Dim padded = (cout + kernels::kByteOutputs - 1) / kernels::kByteOutputs * kernels::kByteOutputs;
-  s.job = {.images = 1,
-           .height = t.height,
-           .width = t.width,
-           .from = t.from,
-           .to = t.to,
-           .length = t.length,
-           .cout = bytes ? padded : cout,
-           .kept = cout,
-           .outcome = {.negative_slope = slope, .zero = map(y).bytes ? map(y).scale.zero : 0}};
-  if (!bytes) return;
-  s.packed = Tensor::zeros(Shape{(rows * padded + 3) / 4});
-  auto* const packed = reinterpret_cast<std::int8_t*>(s.packed.data());
-  for (Dim k = 0; k < rows; ++k)
-    for (Dim o = 0; o < cout; ++o)
-      packed[(k / kernels::kQuad * padded + o) * kernels::kQuad + k % kernels::kQuad] =
-          s.weights.w[static_cast<std::size_t>(k * cout + o)];
-  s.places = places_of(s.job);
-  kernels::ByteProductJob job = s.job;
-  job.segments = s.segments.data(), job.segment_count = static_cast<Dim>(s.segments.size());
-  constexpr Dim kBlock = 4, kWide = 2;
-  plan_->scratch = std::max(plan_->scratch, (kernels::reach_of(job).count * kBlock * kWide + 63) / 64 * 64);
+  s.packed = packed(s.weights, map(x).bytes);
+  s.negative_slope = slope;
+  s.taps = std::move(t);
 }
 
 }  // namespace
 
 std::shared_ptr<const IntegerPlan> IntegerPlan::of(const Network& network, const ActivationRanges& ranges) {
   const TracedDrawing traced(network, Tensor::zeros(network.input_shape(1)));
-  return IntegerPlanner(network, ranges, traced).plan();
+  const std::shared_ptr<IntegerPlan> plan = IntegerPlanner(network, ranges, traced).plan();
+  plan->compile();
+  return plan;
 }
 
 }  // namespace supertac

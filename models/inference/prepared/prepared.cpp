@@ -2,14 +2,11 @@
 
 #include <stdexcept>
 
-#include "autograd/kernels/fast/int8/int8.h"
 #include "autograd/kernels/fast/isa/isa.h"
 #include "models/inference/prepared/integer_plan.h"
 #include "models/inference/prepared/planner.h"
 
 namespace supertac {
-
-bool int8_is_faster() { return kernels::byte_kernels().beats_floats; }
 
 Prepared::Prepared(const Network& network) : network_(&network) {
   if (!kernels::is_plain()) plan_ = Planner::plan(network);

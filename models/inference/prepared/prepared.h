@@ -19,9 +19,6 @@ struct IntegerPlan;
 /// ("conv2d", of int8 "encoder.0.conv.1"), and its values, those of int8 converted to real numbers.
 using StepWatch = std::function<void(const std::string& step, const Tensor& map)>;
 
-/// Whether this processor multiplies bytes so fast that a picture takes less time in int8 than in fp32.
-bool int8_is_faster();
-
 /// Draws the network's pictures up to rounding (1e-5 of the largest value). A picture has the same bits alone
 /// and in any batch, on every processor. Copies share their weights; any thread may call.
 class Prepared {
@@ -29,10 +26,10 @@ class Prepared {
   /// Takes the weights as they are now. The network must outlive this: with SUPERTAC_ISA=plain its own
   /// forward step draws. Throws std::logic_error naming an op that has no step.
   explicit Prepared(const Network& network);
-  /// In whole numbers (int8): products of bytes, and numbers of 16 bits where bytes would be too coarse
-  /// (models/inference/prepared/integer_plan.h). The pictures differ from fp32's by rounding to steps that
-  /// follow from the ranges. They have the same bits on every processor, a microcontroller too, and in any
-  /// batch. Throws std::invalid_argument when the ranges are another network's.
+  /// In whole numbers (int8), as on a microcontroller and no faster than it takes there: products of bytes,
+  /// and numbers of 16 bits where bytes would be too coarse (models/inference/prepared/integer_plan.h). The
+  /// pictures differ from fp32's by rounding to steps that follow from the ranges. They have the same bits on
+  /// every processor, a microcontroller too, and in any batch. Throws as IntegerPlan::of().
   Prepared(const Network& network, const ActivationRanges& ranges);
 
   const Network& network() const { return *network_; }

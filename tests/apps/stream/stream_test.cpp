@@ -99,13 +99,6 @@ TEST_F(Streaming, TheMapOfARecordingHasTheBitsOfTheWindowsMap) {
                  "no picture's place is known");
 }
 
-TEST_F(Streaming, PrecisionAutoIsFp32WithoutTheRangesOfInt8) {
-  record(32);
-  const ProcessResult done = stream("--recording recording --precision auto --json json");
-  ASSERT_EQ(done.code, 0) << done.error;
-  EXPECT_EQ(result("json").at("precision"), "fp32");
-}
-
 // The same without a process.
 TEST_F(Streaming, EndsWhenItsTimeIsOverAndCounts) {
   const Recording recording = record(40);

@@ -162,7 +162,7 @@ TEST(CCode, RefusesLayersThatItsSixteenBitsCannotCount) {
   wide.timesteps = 32;
   EXPECT_ERROR(
       c_code_of(model_of(wide, {}), "finger", 100, ""), std::runtime_error,
-      "C code: a layer has 32768 outputs, expected at most 32767; train a network of fewer channels");
+      "int8: a layer has a size or a distance of 32768, expected at most 32767; train a network of fewer channels");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-/* ---- The network's arithmetic: whole numbers, with the same bits on every processor. ---- */
+/* ---- The network's arithmetic: whole numbers, with the same bits on every processor. C99 and C++. ---- */
 
 /* A map lies in the work area: [height][width][channels] with a margin around whose value stands for 0.
    Bytes stand for (byte - zero) steps; numbers of 16 bits for steps of NUMBER_STEP. */
@@ -24,15 +24,10 @@ struct product {
   int32_t segment[4];
 };
 
-static union {
-  int32_t aligned;
-  uint8_t bytes[WORK_BYTES];
-} work;
-
 static int32_t line_of(const struct map *m) { return (m->width + 2 * m->margin_w) * m->channels; }
 static int32_t first_of(const struct map *m) { return m->margin_h * line_of(m) + m->margin_w * m->channels; }
-static uint8_t *bytes_of(const struct map *m) { return work.bytes + m->offset; }
-static int16_t *numbers_of(const struct map *m) { return (int16_t *)(void *)(work.bytes + m->offset); }
+static uint8_t *bytes_of(const struct map *m) { return WORK + m->offset; }
+static int16_t *numbers_of(const struct map *m) { return (int16_t *)(void *)(WORK + m->offset); }
 
 static int32_t clip(int32_t v, int32_t low, int32_t high) { return v < low ? low : v > high ? high : v; }
 
@@ -125,7 +120,7 @@ static void product_of_bytes(const struct product *p, const struct map *x, const
   for (line = 0; line < p->height; ++line)
     for (pixel = 0; pixel < p->width; ++pixel) {
       const uint8_t *const at = from + line * p->x_line + pixel * p->x_pixel;
-      const uint8_t *w = p->weights;
+      const uint8_t *w = (const uint8_t *)p->weights;
       const struct outcome *q = p->outcomes;
       const int32_t place = to + line * p->y_line + pixel * p->y_pixel, less = excess(p, at);
       uint8_t *byte = bytes_of(y) + place;
@@ -150,7 +145,7 @@ static void product_of_numbers(const struct product *p, const struct map *x, con
   for (line = 0; line < p->height; ++line)
     for (pixel = 0; pixel < p->width; ++pixel) {
       const int16_t *const at = from + line * p->x_line + pixel * p->x_pixel;
-      const int8_t *w = p->weights;
+      const int8_t *w = (const int8_t *)p->weights;
       for (o = 0; o < p->outputs; ++o) {
         const struct outcome *const q = p->outcomes + o;
         int32_t sum = 0, v;
