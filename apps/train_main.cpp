@@ -18,7 +18,6 @@ void declare(Arguments& a) {
   declare_strict(a);
   declare_training(a);
   declare_network(a);
-  declare_together(a);
 }
 
 namespace {

@@ -18,7 +18,7 @@ void check_agreement(const Trainer& trainer, const TrainingTask& task, Ranks& ra
   mine["step"] = std::to_string(trainer.step());
   if (const auto odd = find_disagreement(ranks, mine))
     throw RanksError("rank " + std::to_string(odd->rank) + ": its " + odd->entry + " is " + odd->its +
-                     ", that of the others is " + odd->usual +
+                     ", that of rank 0 is " + odd->of_first +
                      "; start all with the same build, data and options");
   trainer.check_same();
 }

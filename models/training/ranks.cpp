@@ -99,29 +99,21 @@ void check_micro_batches(int ranks, std::size_t batch) {
   const std::size_t micro_batches = micro_batches_of(batch);
   if (std::has_single_bit(static_cast<unsigned>(ranks)) && static_cast<std::size_t>(ranks) <= micro_batches)
     return;
-  throw std::invalid_argument(
-      std::to_string(ranks) + " processes cannot share the " + std::to_string(micro_batches) +
-      " micro-batches of a batch of " + std::to_string(batch) + " evenly; start 1, 2, 4" +
-      (micro_batches > 8 ? ", 8 or 16" : " or 8") + " processes");
+  throw std::invalid_argument(std::to_string(ranks) + " processes cannot share the " +
+                              std::to_string(micro_batches) + " micro-batches of a batch of " +
+                              std::to_string(batch) + " evenly; start 1, 2, 4" +
+                              (micro_batches > 8 ? ", 8 or 16" : " or 8") + " processes");
 }
 
 std::optional<Disagreement> find_disagreement(Ranks& ranks, const std::map<std::string, std::string>& mine) {
   std::vector<nlohmann::ordered_json> all;
   for (const std::string& text : ranks.gather(nlohmann::ordered_json(mine).dump()))
     all.push_back(parse_json_limited(text));
-  std::map<std::string, std::string> entries;  // of anybody
-  for (const auto& its : all)
-    for (const auto& [entry, value] : its.items()) entries[entry];
-  for (const auto& [entry, none] : entries) {
-    std::map<std::string, int> votes;
-    for (const auto& its : all) ++votes[value_of(its, entry)];
-    std::string usual = value_of(all[0], entry);
-    for (const auto& [value, count] : votes)
-      if (count > votes[usual]) usual = value;
-    for (std::size_t r = 0; r < all.size(); ++r)
-      if (value_of(all[r], entry) != usual)
-        return Disagreement{static_cast<int>(r), entry, value_of(all[r], entry), usual};
-  }
+  for (std::size_t r = 1; r < all.size(); ++r)
+    for (const auto& its : {all[0], all[r]})
+      for (const auto& [entry, value] : its.items())
+        if (value_of(all[r], entry) != value_of(all[0], entry))
+          return Disagreement{static_cast<int>(r), entry, value_of(all[r], entry), value_of(all[0], entry)};
   return std::nullopt;
 }
 

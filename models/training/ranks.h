@@ -14,7 +14,7 @@
 
 namespace supertac {
 
-/// The ranks cannot go on: one is lost, or they disagree. All that are left throw it with the same text.
+/// The ranks cannot go on: they disagree. All throw it with the same text.
 class RanksError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -29,8 +29,7 @@ class Ranks {
   int size() const { return size_; }
   bool first() const { return rank_ == 0; }
 
-  /// Sends `mine` and fills `theirs`; the partner calls it with sizes the other way round. Throws RanksError
-  /// when the partner does not answer.
+  /// Sends `mine` and fills `theirs`; the partner calls it with sizes the other way round.
   virtual void exchange(int partner, std::span<const std::byte> mine, std::span<std::byte> theirs) = 0;
 
   /// The texts of all ranks, by rank. For sizes that are powers of two.
@@ -57,10 +56,10 @@ constexpr std::size_t micro_batches_of(std::size_t batch) {
 /// micro_batches_of(batch), or when several share a batch below 8.
 void check_micro_batches(int ranks, std::size_t batch);
 
-/// The first entry for which a rank has another value, `its`, than most, `usual` (at a tie: than rank 0).
+/// The first entry for which a rank has another value, `its`, than rank 0.
 struct Disagreement {
   int rank = 0;
-  std::string entry, its, usual;
+  std::string entry, its, of_first;
 };
 std::optional<Disagreement> find_disagreement(Ranks& ranks, const std::map<std::string, std::string>& mine);
 

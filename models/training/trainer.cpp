@@ -185,8 +185,8 @@ void Trainer::check_same() const {
   const std::optional<Disagreement> found = find_disagreement(ranks_, sums);
   if (!found) return;
   throw RanksError("after step " + std::to_string(step()) + " rank " + std::to_string(found->rank) +
-                   " holds another " + found->entry + " than the others (CRC-32 " + found->its + ", theirs " +
-                   found->usual +
+                   " holds another " + found->entry + " than rank 0 (CRC-32 " + found->its + ", " +
+                   found->of_first +
                    "): its memory or its build is faulty; leave that machine out and continue from the last "
                    "state with --resume");
 }

@@ -5,7 +5,6 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -19,7 +18,6 @@
 
 #include "apps/common/output/outputs.h"
 #include "apps/common/output/provenance.h"
-#include "apps/common/running/launch.h"
 #include "apps/common/running/signals.h"
 #include "io/files/file.h"
 #include "io/numbers/text.h"
@@ -33,21 +31,11 @@ constexpr const char* kCompiler = "";  // it names itself
 constexpr const char* kCompiler = "GCC ";
 #endif
 
-// A mistake in the command line is made by all processes of an mpirun: when the first reports it, mpirun
-// ends the others before they do.
-std::string among_others() {
-  const int rank = launch().rank;
-  if (rank == 0) return "";
-  if (!interrupted()) std::this_thread::sleep_for(std::chrono::milliseconds(400));
-  return " (rank " + std::to_string(rank) + ")";
-}
-
 /// One line, whatever the message holds.
 int fail(const Program& program, std::string message, int code) {
-  const std::string rank = among_others();
   for (char& c : message)
     if (static_cast<unsigned char>(c) < ' ' || c == 0x7F) c = c == '\n' ? ' ' : '?';
-  std::cerr << program.name + rank + ": " + message + "\n";
+  std::cerr << program.name + ": " + message + "\n";
   return code;
 }
 

@@ -1,4 +1,4 @@
-// supertac-train under mpirun: the same bytes as alone, and an end with one line whatever happens to a rank.
+// supertac-train under mpirun: the same bytes as alone, and an end with one line when a rank ends.
 #include <signal.h>
 #include <stdlib.h>
 #include <sys/resource.h>
@@ -75,7 +75,7 @@ class Mpi : public Training {
   static ProcessResult lose(int rank, const std::string& name, const std::function<void(pid_t)>& harm) {
     RunningProcess run =
         start_in(folder_->path(),
-                 SUPERTAC_MPIRUN + ranks(4, options(name + ".safetensors", "--epochs 400 --deadline 4")));
+                 SUPERTAC_MPIRUN + ranks(4, options(name + ".safetensors", "--epochs 400")));
     const std::string state = path(name + ".run/last.safetensors");
     wait_for_file(state);
     const pid_t process = process_of(path(name), rank);
@@ -129,38 +129,6 @@ TEST_F(Mpi, ARankWithAnotherOptionIsNamed) {
                   "rank 1: its training is");
   expect_one_line(mpirun(ranks(3, with("")) + " :" + ranks(1, with("--data none"))), "rank 3");
   EXPECT_FALSE(fs::exists(path("odd.run")));
-}
-
-TEST_F(Mpi, AFrozenRankIsNamed) {
-  for (const int rank : {0, 2})
-    expect_one_line(lose(rank, "frozen" + std::to_string(rank), [](pid_t p) { kill(p, SIGSTOP); }),
-                    "rank " + std::to_string(rank) + " of 4 has not answered");
-}
-
-// The first rank waits for the other in MPI_Init, and its own alarm reaches it when all is over.
-TEST_F(Mpi, ARankFrozenAtTheStartIsOneLine) {
-  const std::string mine = options("start.safetensors", "--deadline 3");
-  write_file(path("late.sh"), "sleep 4; exec " SUPERTAC_BIN "/supertac-train" + mine);
-  RunningProcess run = start_in(folder_->path(), SUPERTAC_MPIRUN + ranks(1, mine) + " : -n 1 sh late.sh");
-  const auto begin = std::chrono::steady_clock::now();
-  pid_t first = 0;
-  while (first == 0 && std::chrono::steady_clock::now() - begin < std::chrono::seconds(3))
-    first = process_of(path("start"), 0);
-  ASSERT_GT(first, 0);
-  std::this_thread::sleep_for(std::chrono::milliseconds(500));
-  kill(first, SIGSTOP);
-  expect_one_line(run.wait(), "not all processes of mpirun came to start");
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(200));
-}
-
-// The other rank has ended well, and mpirun waits for this one without a deadline.
-TEST_F(Mpi, ARankFrozenAtTheEndIsOneLine) {
-  const auto begin = std::chrono::steady_clock::now();
-  const std::string options_at_end = options("end.safetensors", "--epochs 1 --deadline 2");
-  expect_one_line(mpirun(ranks(2, options_at_end, "env LD_PRELOAD=" SUPERTAC_FREEZE_AT_END)),
-                  "all is written, but a process of mpirun did not end within the deadline");
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(200));
-  succeed("supertac-info end.safetensors");
 }
 
 TEST_F(Mpi, AKilledRankEndsAll) {
