@@ -53,8 +53,10 @@ TEST_F(Classify, CountsEveryTestWindowAndTellsTexturesApart) {
     EXPECT_GE(parts["all"]["ci95_passes"][1], parts["all"]["accuracy"]);
     EXPECT_EQ(parts["all"].contains("p_against_frame"), std::string(view) != "frame");
   }
-  EXPECT_GT(json["views"]["frame"]["inside"]["accuracy"], 0.7)
-      << "these plates differ wherever one looks";
+
+  // Two plates that differ wherever one looks; passes of one trial.
+  succeed(kClassify + "pass --seeds 1 --epochs 30 --json pass.json");
+  EXPECT_GT(parse_json_limited(bytes("pass.json"))["views"]["frame"]["inside"]["accuracy"], 0.65);
 }
 
 TEST_F(Classify, SameBytesForOneAndTwoThreads) {
