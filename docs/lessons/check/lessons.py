@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The lessons: engines from the pieces of examples/mini_supertac.cpp, and proofs that the checks find mistakes.
 
+    lessons.py stubs                          writes the pieces with their holes (holes.txt) to yours/, where there are none
     lessons.py engine N PIECE OUT [--mine]    writes OUT: pieces 1 to N - 1 of the file, or of the reader, and PIECE
     lessons.py prove CXX ARCHIVE [N ...]      every stub fails and names an entry, every solution passes, and each
                                               mistake of planted.txt is found and named; of lessons N only. What
@@ -16,12 +17,37 @@ from concurrent.futures import ThreadPoolExecutor
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
 MINI = (ROOT / "examples/mini_supertac.cpp").read_text()
-STUBS = sorted((HERE.parent / "yours").glob("[0-9][0-9]_*.h"))
+STUBS = [HERE.parent / "yours" / (page.stem + ".h") for page in sorted(HERE.parent.glob("[0-9][0-9]_*.md"))]
 
 
 def pieces():
     marks = [m.start() for m in re.finditer(r"^// ---- \d+\.", MINI, re.M)] + [len(MINI)]
     return [MINI[a:b] for a, b in zip(marks, marks[1:])] + [(HERE / "12_break_it.h").read_text()]
+
+
+def paragraphs(name):
+    """Those of a text file here, as lines without comments."""
+    for paragraph in (HERE / name).read_text().split("\n\n"):
+        if lines := [line for line in paragraph.splitlines() if line and not line.startswith("#")]:
+            yield lines
+
+
+def stub(n):
+    """Piece n with its holes."""
+    text = pieces()[n - 1].rstrip("\n") + "\n"
+    for number, *lines in paragraphs("holes.txt"):
+        out, into = ("".join(line[1:] + "\n" for line in lines if line[0] == sign) for sign in "-+")
+        if int(number) == n:
+            if text.count(out) != 1:
+                sys.exit(f"holes.txt: piece {n} does not have once:\n{out}")
+            text = text.replace(out, into)
+    return text
+
+
+def write_stubs():
+    for n, path in enumerate(STUBS, 1):
+        if not path.exists():
+            path.write_text(stub(n))
 
 
 def engine(n, piece, out, mine=False):
@@ -58,11 +84,8 @@ int main(int, char** arguments) {{
 
 def planted():
     """(lesson, old, new, expected) of each paragraph of planted.txt."""
-    for paragraph in (HERE / "planted.txt").read_text().split("\n\n"):
-        lines = [line for line in paragraph.splitlines() if line and not line.startswith("#")]
-        if lines:
-            n, old, new, expected = lines
-            yield int(n), old, new, expected
+    for n, old, new, expected in paragraphs("planted.txt"):
+        yield int(n), old, new, expected
 
 
 def quoted(n):
@@ -77,7 +100,7 @@ def prove(compiler, archive, *only):
         if only and str(n) not in only:
             continue
         jobs[n] = [("solution", solution, 0, "passed"),
-                   ("stub", STUBS[n - 1].read_text(), 1, r"wrong: .*yours -?[0-9.e+-]+, ")]
+                   ("stub", stub(n), 1, r"wrong: .*yours -?[0-9.e+-]+, ")]
     for n, old, new, expected in planted():
         if n not in jobs:
             continue
@@ -109,6 +132,8 @@ def prove(compiler, archive, *only):
 if __name__ == "__main__":
     if len(sys.argv) in (5, 6) and sys.argv[1] == "engine":
         engine(int(sys.argv[2]), sys.argv[3], sys.argv[4], sys.argv[5:] == ["--mine"])
+    elif sys.argv[1:] == ["stubs"]:
+        write_stubs()
     elif len(sys.argv) >= 4 and sys.argv[1] == "prove":
         sys.exit(prove(*sys.argv[2:]))
     else:
