@@ -23,24 +23,13 @@ class TrustScores {
 
   /// For people: nothing for a model that says nothing of its pictures.
   std::vector<std::string> lines() const;
-  /// {"factor", "coverage", "factor_found", "sure_ssim", "auroc", "predicted_error_near",
-  /// "predicted_error_far", "unlike_training"}
+  /// {"factor", "coverage", "factor_found", "unlike_training"}
   nlohmann::ordered_json to_json() const;
 
  private:
-  struct Window {
-    double doubt, predicted_error, ssim, slid_mm;
-  };
-  double auroc() const;
-  double ssim_of_surest(double share) const;
-  double width(double from_mm, double to_mm) const;
-
   const WindowSet& windows_;
   const ModelFile& model_;
   IntervalCoverage coverage_;
-  std::vector<Window> contact_;
-  std::size_t in_contact_of_ = SIZE_MAX;
-  double begin_mm_ = 0;
   std::uint64_t judged_ = 0, unlike_ = 0;
 };
 

@@ -22,8 +22,7 @@ PRESETS = ("paper", "best", "tiny")
 RANDOM = ["--preset", "tiny", "--latent", "20", "--stride", "4", "--epochs", "12", "--random-plates", "1500"]
 FIGURES = {"contact_ssim": ("contact", "ssim"), "contact_psnr_db": ("contact", "psnr_mean_db"),
            "position_error_mm": ("contact", "position_error_mm"), "miss_rate": ("contact", "miss_rate"),
-           "flat_ghost_rate": ("flat", "ghost_rate"), "coverage": ("trust", "coverage"), "sure_ssim": ("trust", "sure_ssim"),
-           "auroc": ("trust", "auroc")}
+           "flat_ghost_rate": ("flat", "ghost_rate"), "coverage": ("trust", "coverage")}
 
 
 class Study:

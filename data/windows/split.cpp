@@ -15,7 +15,6 @@ namespace supertac {
 namespace {
 
 constexpr double kTestShare = 0.2;
-constexpr std::size_t kMostHashed = std::size_t{1} << 22;
 constexpr std::uint64_t kWindowStream = 0, kPlateStream = 1, kPassStream = 2;
 
 constexpr std::array<std::pair<const char*, SplitKind>, 6> kNames{{{"window", SplitKind::window},
@@ -142,102 +141,6 @@ Split split_by_pass(const WindowSet& windows, const std::vector<Side>& sides) {
   return split;
 }
 
-// Hash of every window of one pass in constant time each: a polynomial in kBase over the hashes of its
-// frames, modulo 2^64, as a difference of prefix sums.
-class PassHashes {
- public:
-  PassHashes(std::span<const float> samples, std::size_t signals, std::size_t timesteps)
-      : timesteps_(timesteps) {
-    const std::size_t frames = samples.size() / signals;
-    for (std::size_t t = 0; t < timesteps; ++t) power_ *= kBase;
-    prefix_.push_back(0);
-    std::uint64_t before = 0;
-    for (std::size_t f = 0; f < frames; ++f) {
-      Hash hash;
-      for (std::size_t k = 0; k < signals; ++k) hash.add(samples[f * signals + k]);
-      prefix_.push_back(prefix_.back() * kBase + hash.value());
-      equal_.push_back(f > 0 && hash.value() == before ? equal_.back() + 1 : 1);
-      before = hash.value();
-    }
-  }
-  std::uint64_t window(std::size_t last) const {
-    return prefix_[last + 1] - prefix_[last + 1 - timesteps_] * power_;
-  }
-  bool changes(std::size_t last) const { return equal_[last] < timesteps_; }
-
- private:
-  static constexpr std::uint64_t kBase = 0xd1342543de82ef95ULL;  // odd
-  std::size_t timesteps_;
-  std::uint64_t power_ = 1;
-  std::vector<std::uint64_t> prefix_;
-  std::vector<std::uint32_t> equal_;  // frames up to here that are all the same
-};
-
-struct HashedWindow {
-  std::uint64_t hash;
-  std::uint32_t window;
-};
-
-// Of the windows whose content changes, by hash and number. Of many windows only those whose hash ends with
-// some zeros: of two that are the same both or none.
-std::vector<HashedWindow> hash_windows(const WindowSet& windows, std::uint64_t every) {
-  std::vector<HashedWindow> hashed;
-  for (std::size_t p = 0; p < windows.passes().size(); ++p) {
-    const WindowSet::Pass& pass = windows.passes()[p];
-    if (pass.windows == 0) continue;
-    const PassHashes of_pass(windows.track(p).samples, windows.array().signals(), windows.frames());
-    for (std::size_t i = pass.first_window; i < pass.first_window + pass.windows; ++i) {
-      const std::size_t frame = windows.frame_of(i);
-      const std::uint64_t hash = of_pass.window(frame);
-      if (of_pass.changes(frame) && hash % every == 0)
-        hashed.push_back({hash, static_cast<std::uint32_t>(i)});
-    }
-  }
-  std::ranges::sort(hashed, {}, [](const HashedWindow& w) { return std::pair(w.hash, w.window); });
-  return hashed;
-}
-
-std::size_t count_duplicated(const WindowSet& windows, const Split& split) {
-  std::uint64_t every = 1;
-  while (windows.size() / every > kMostHashed) every *= 2;
-  const std::vector<HashedWindow> hashed = hash_windows(windows, every);
-  std::size_t count = 0;
-  for (auto first = hashed.begin(); first != hashed.end();) {
-    const auto end = std::find_if(first, hashed.end(), [&](const auto& w) { return w.hash != first->hash; });
-    const auto trained = [&](const HashedWindow& w) {
-      return std::ranges::binary_search(split.train, w.window);
-    };
-    const auto same = std::count_if(first, end, trained);
-    for (; first != end; ++first)
-      if (std::ranges::binary_search(split.test, first->window))
-        count += same - (trained(*first) ? 1 : 0) > 0 ? 1 : 0;
-  }
-  return count * every;
-}
-
-std::size_t count_overlapping(const WindowSet& windows, const Split& split) {
-  const std::size_t timesteps = windows.frames();
-  std::size_t count = 0, begin = 0, end = 0;  // windows of the pass
-  const auto touches = [&](std::uint32_t a, std::uint32_t b) {
-    if (b < begin || b >= end) return false;
-    const std::size_t fa = windows.frame_of(a), fb = windows.frame_of(b);
-    return (fa > fb ? fa - fb : fb - fa) < timesteps;
-  };
-  auto after = split.train.begin();
-  for (const std::uint32_t i : split.test) {
-    if (i >= end) {
-      const WindowSet::Pass& pass = windows.passes()[windows.pass_of(i)];
-      begin = pass.first_window, end = begin + pass.windows;
-    }
-    // Indices follow pass and time, so the nearest training windows are the neighbours in the list.
-    while (after != split.train.end() && *after < i) ++after;
-    const bool shares = (after != split.train.end() && touches(i, *after)) ||
-                        (after != split.train.begin() && touches(i, *std::prev(after)));
-    count += shares ? 1 : 0;
-  }
-  return count;
-}
-
 }  // namespace
 
 SplitKind split_kind(const std::string& name) {
@@ -311,8 +214,27 @@ std::vector<std::uint32_t> subsample_no_contact(const WindowSet& windows, std::v
   return list;
 }
 
-Leakage find_leakage(const WindowSet& windows, const Split& split) {
-  return {.overlapping = count_overlapping(windows, split), .duplicated = count_duplicated(windows, split)};
+std::size_t count_overlapping(const WindowSet& windows, const Split& split) {
+  const std::size_t timesteps = windows.frames();
+  std::size_t count = 0, begin = 0, end = 0;  // windows of the pass
+  const auto touches = [&](std::uint32_t a, std::uint32_t b) {
+    if (b < begin || b >= end) return false;
+    const std::size_t fa = windows.frame_of(a), fb = windows.frame_of(b);
+    return (fa > fb ? fa - fb : fb - fa) < timesteps;
+  };
+  auto after = split.train.begin();
+  for (const std::uint32_t i : split.test) {
+    if (i >= end) {
+      const WindowSet::Pass& pass = windows.passes()[windows.pass_of(i)];
+      begin = pass.first_window, end = begin + pass.windows;
+    }
+    // Indices follow pass and time, so the nearest training windows are the neighbours in the list.
+    while (after != split.train.end() && *after < i) ++after;
+    const bool shares = (after != split.train.end() && touches(i, *after)) ||
+                        (after != split.train.begin() && touches(i, *std::prev(after)));
+    count += shares ? 1 : 0;
+  }
+  return count;
 }
 
 std::string fingerprint(const Split& split) {

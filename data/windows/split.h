@@ -47,19 +47,8 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
 /// four plates drew ghosts on 0.8 % of the flat plate instead of 0.1 %.
 std::vector<std::uint32_t> subsample_no_contact(const WindowSet& windows, std::vector<std::uint32_t> list);
 
-/// What the test windows share with the training windows.
-struct Leakage {
-  std::size_t overlapping = 0;  ///< test windows that have a frame in common with a training window
-  std::size_t duplicated =
-      0;  ///< test windows whose content equals a training window's of another place, by hash
-  bool none() const { return overlapping == 0 && duplicated == 0; }
-};
-
-/// Compares all test with all training windows: overlap by their place, duplicates by a 64-bit hash of all
-/// T * signals values (so that a pass filed twice under two names is found). Windows that never change are no
-/// duplicates: at rest every pass looks the same. Of more than four million windows duplicates are looked for
-/// among an even share, and the count is as many times larger. Takes 16 bytes per window of these.
-Leakage find_leakage(const WindowSet& windows, const Split& split);
+/// How many test windows have a frame in common with a training window, by their places.
+std::size_t count_overlapping(const WindowSet& windows, const Split& split);
 
 /// 16 hexadecimal digits over both index lists.
 std::string fingerprint(const Split& split);

@@ -5,30 +5,6 @@
 
 namespace supertac {
 
-double expected_ssim_loss(std::span<const float> picture, std::span<const float> predicted_error,
-                          const ImageGrid& grid) {
-  constexpr double kC = 0.005;
-  const int side = std::min({7, grid.height, grid.width});
-  const double pixels = side * side;
-  double kept = 0;
-  int squares = 0;
-  for (int top = 0; top + side <= grid.height; ++top) {
-    for (int left = 0; left + side <= grid.width; ++left, ++squares) {
-      double sum = 0, sum_of_squares = 0, errors = 0;
-      for (int row = top; row < top + side; ++row) {
-        for (int column = left; column < left + side; ++column) {
-          const auto i = static_cast<std::size_t>(row * grid.width + column);
-          const double p = picture[i], s = at_least(predicted_error[i]);
-          sum += p, sum_of_squares += p * p, errors += s * s;
-        }
-      }
-      const double variance = std::max(0.0, (sum_of_squares - sum * sum / pixels) / pixels);
-      kept += (2 * variance + kC) / (2 * variance + errors / pixels + kC);
-    }
-  }
-  return 1 - kept / squares;
-}
-
 std::vector<float> half_widths(double factor, std::span<const float> predicted_error) {
   std::vector<float> widths;
   for (const float predicted : predicted_error)

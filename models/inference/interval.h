@@ -8,21 +8,11 @@
 #include <span>
 #include <vector>
 
-#include "data/sensors/taxel_array.h"
-
 namespace supertac {
 
 /// Smaller predicted errors count as this one, 2.5 of the 255 steps of an 8-bit picture.
 inline constexpr float kLeastPredictedError = 0.01F;
 inline float at_least(float predicted_error) { return std::max(predicted_error, kLeastPredictedError); }
-
-/// How far a whole picture may be off, for telling good ones from bad ones, 0 to 1: what SSIM would lose to a
-/// truth that differs from the picture by independent errors of size s,
-///   1 - mean over squares of 7x7 pixels of (2 v + C) / (2 v + mean s^2 + C),   C = .005,
-/// v the picture's variance in a square: an error spoils a faint texture sooner than a strong one. picture,
-/// predicted error: [height][width] of the grid; where its shorter side is below 7, squares are of that side.
-double expected_ssim_loss(std::span<const float> picture, std::span<const float> predicted_error,
-                          const ImageGrid& grid);
 
 /// Half the width of the interval that holds the truth of nine pixels in ten, in units of the predicted
 /// error: the largest of those found (1.1 to 1.45) on 6_Ridges and 4_Ridges, each left out of the training

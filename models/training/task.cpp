@@ -91,14 +91,13 @@ TrainingTask window_task(const Recipe& given, const RecordingFolders& folders) {
   task.origin["split_fingerprint"] = fingerprint(task.split);
   task.finds_interval_factor = recipe.split == SplitKind::group && !recipe.interval_factor;
   task.counts = windows->counts().summary();
-  task.leakage = find_leakage(*windows, task.split);
+  task.overlapping = count_overlapping(*windows, task.split);
   task.notes = std::move(notes);
-  if (recipe.split != SplitKind::none && !task.leakage.none())
+  if (recipe.split != SplitKind::none && task.overlapping > 0)
     task.notes.push_back("split " + name_of(recipe.split) + " leaks: of " +
                          std::to_string(task.split.test.size()) + " test windows " +
-                         std::to_string(task.leakage.overlapping) + " share frames with training windows, " +
-                         std::to_string(task.leakage.duplicated) +
-                         " repeat one; use --split trial for results");
+                         std::to_string(task.overlapping) +
+                         " share frames with training windows; use --split trial for results");
   if (recipe.split == SplitKind::window && recipe.model.timesteps == 1)
     task.notes.emplace_back(
         "split window leaks when frames resemble each other; use --split group for results");

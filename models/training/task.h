@@ -25,9 +25,9 @@ struct TrainingTask {
   Objective objective;
   /// What the model file says of its origin; the same whatever machine, folder or number of threads.
   std::map<std::string, std::string> origin = {};
-  std::string counts = {};             ///< where the frames of the recordings went, for people
-  bool finds_interval_factor = false;  ///< on the tested windows, after training
-  Leakage leakage = {};
+  std::string counts = {};                ///< where the frames of the recordings went, for people
+  bool finds_interval_factor = false;     ///< on the tested windows, after training
+  std::size_t overlapping = 0;            ///< count_overlapping() of the split
   std::vector<std::string> notes = {};    ///< what is to be said before training: a range that clips, a leak
   std::vector<std::string> remarks = {};  ///< remarks_on() the training windows
 };
