@@ -46,7 +46,8 @@ void declare(Arguments& a) {
   a.option("out", "FILE",
            "step, ledgers, picture: arrays as safetensors, which examples/referee.py, or recompute.py for a "
            "picture, computes "
-           "again with NumPy");
+           "again with NumPy")
+      .writes();
 }
 
 namespace {

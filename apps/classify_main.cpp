@@ -22,7 +22,8 @@ void declare(Arguments& a) {
   a.option("epochs", "N", "passes over the training windows", "8");
   a.option("stride", "N", "train on every N-th window in contact; tested are all", "1");
   a.option("out", "FILE",
-           "keep the first run's classifier of super-resolved pictures, for supertac-stream --classifier");
+           "keep the first run's classifier of super-resolved pictures, for supertac-stream --classifier")
+      .writes();
 }
 
 namespace {

@@ -41,6 +41,7 @@ void declare(Arguments& arguments) {
               "where the printer's plate lies, where its head waits and how it slides (docs/sensors.md); "
               "without it as on the rig")
       .option("out", "DIR", "folder for journal, recordings and report")
+      .writes()
       .option("speed", "MM_PER_S", "of the slide, instead of what the bed's file says", "10")
       .option("passes", "N",
               "slides, on the rig 5 mm apart in x and at most 8, instead of what the bed's file says", "8")

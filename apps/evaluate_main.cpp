@@ -156,18 +156,21 @@ void declare(Arguments& a) {
   a.option("batch", "N", "windows that are drawn at once; their pictures do not depend on it", "64");
   a.decides_nothing();
   a.option("outputs", "FILE",
-           "write inputs as the network takes them, outputs, truths and predicted errors as safetensors");
+           "write inputs as the network takes them, outputs, truths and predicted errors as safetensors")
+      .writes();
   a.option(
-      "map", "FILE",
-      "write the surfaces that were felt, of each plate and trial: .png; .safetensors, with those of each "
-      "pass beside them; or of one plate and trial .stl (docs/map.md)");
+       "map", "FILE",
+       "write the surfaces that were felt, of each plate and trial: .png; .safetensors, with those of each "
+       "pass beside them; or of one plate and trial .stl (docs/map.md)")
+      .writes();
   declare_strict(a);
   a.option("plates", "A,B,...", "only recordings of these plates (default: the model's own)");
-  a.option(
-      "pictures", "DIR",
-      "write PNG pictures: input | output | truth | how far off it may be, and a film of each test pass");
+  a.option("pictures", "DIR",
+           "write PNG pictures: input | output | truth | how far off it may be, and a film of each test pass")
+      .writes();
   a.option("report", "FILE",
-           "write one page with scores, the best and worst windows and a film of each test pass (HTML)");
+           "write one page with scores, the best and worst windows and a film of each test pass (HTML)")
+      .writes();
 }
 
 int run(Arguments& a) {

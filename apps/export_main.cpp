@@ -23,11 +23,14 @@ void declare(Arguments& arguments) {
           "a model that supertac-train wrote; with --mcap a recording, or pictures of supertac-stream "
           "--out")
       .option("onnx", "FILE", "the network as ONNX: volts in, picture out, scaling and normalisation inside")
+      .writes()
       .option("c99", "DIR",
               "the int8 network as C99 for microcontrollers, with all that stands before it when it is live: "
               "NAME.h and NAME.c")
+      .writes()
       .option("mcap", "FILE",
               "frames and pictures as ROS 2 messages, which Foxglove, Rerun, PlotJuggler and ros2 bag open")
+      .writes()
       .one_of({"onnx", "c99", "mcap"})
       .only_with("c99")
       .option("name", "NAME", "of the C files and functions", "finger")

@@ -30,10 +30,12 @@ void declare(Arguments& arguments) {
           false)
       .option("journal", "FILE", "instead of INPUT: recover a collection that was cut off")
       .required("out", "DIR", "folder for the recordings, one file per pass")
+      .writes()
       .option("speed", "MM_PER_S", "sliding speed of the passes in mm/s", "10")
       .option("pictures", "DIR",
               "write index.html: the signals of each pass of the rig's text files under the plate they were "
               "fitted to")
+      .writes()
       .flag("skip-bad", "leave out files and folders that are no recordings instead of giving up");
   declare_tables(arguments);
 }

@@ -51,9 +51,11 @@ void declare(Arguments& arguments) {
                 "a plate of the rig (6_Ridges), kind and pitch in mm (ridges5), with a height "
                 "(ridges5h1.5), several (bumps12+ridges4), or FILE.stl")
       .option("out", "FILE", "the plate as binary STL in mm, 36 x 108 in x and y, its flat part at z = 0")
+      .writes()
       .option("resolution", "MM", "distance of the points where the surface is exact", "0.125")
       .option("base", "MM", "material below the lowest point", "3")
       .option("gcode", "FILE", "the palpation run over it, for a Marlin printer and any host")
+      .writes()
       .option("speed", "MM_PER_S", "of the slides, for --gcode", "10")
       .option("passes", "N", "slides, 5 mm apart in x (at most 8), for --gcode", "8");
 }

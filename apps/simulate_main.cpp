@@ -127,6 +127,7 @@ std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& sett
 
 void declare(Arguments& arguments) {
   arguments.required("out", "DIR", "folder for the recordings, one file per pass")
+      .writes()
       .option("plates", "NAME,...",
               "plates of the rig (3_Bumps, ...), plain, kind and pitch in mm (ridges6), or FILE.stl",
               joined(default_plates()))

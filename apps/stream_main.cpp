@@ -72,19 +72,23 @@ void declare(Arguments& a) {
       .option("out", "FILE",
               "keep time, voltages and picture of every frame (safetensors, 2.2 MB/s at 16x16); '-': a line "
               "of JSON for each on stdout")
+      .writes()
       .option("mcap", "FILE",
               "keep taxels and pictures as ROS 2 messages in an MCAP file, which Foxglove, Rerun, "
               "PlotJuggler and "
               "ros2 bag open")
+      .writes()
       .option(
           "map", "FILE",
           "keep the surface that was felt, as far as the finger's places are known: .png, .safetensors or "
           ".stl (docs/map.md)")
+      .writes()
       .option("record", "DIR", "keep the signals as a recording in this folder, the next pass of its plate")
       .option("plate", "NAME", "what the recording slides over: a plate's name, or an STL file", "unknown")
       .option("udp", "HOST:PORT",
               "send a datagram of JSON for each picture, e.g. to PlotJuggler at 127.0.0.1:9870")
       .option("capture", "JOURNAL", "keep the board's raw bytes (185 kB/s), for --replay")
+      .writes()
       .option("classifier", "FILE",
               "name the texture on the page, with a classifier by supertac-classify --out")
       .option("precision", "NAME",

@@ -28,7 +28,8 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 void declare(Arguments& a) {
-  a.required("out", "DIR", "sweep.csv, chart.html and models; a sweep that was stopped goes on where it was");
+  a.required("out", "DIR", "sweep.csv, chart.html and models; a sweep that was stopped goes on where it was")
+      .writes();
   a.required("data", "DIR", "recordings to train and test on");
   a.option("preset", "A,B,...", "recipes to start from: paper, best, tiny, frame", "paper");
   a.option("timesteps", "T,...",

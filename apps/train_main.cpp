@@ -12,7 +12,8 @@ namespace supertac {
 void declare(Arguments& a) {
   a.required("data", "DIR", "recordings to train on (supertac-simulate, -import, -collect)");
   a.required("out", "FILE",
-             "the model; FILE's run folder beside it (.run) holds log, report and the state to resume");
+             "the model; FILE's run folder beside it (.run) holds log, report and the state to resume")
+      .writes();
   a.option("resume", "FILE", "continue from the last.safetensors of an interrupted run, same options");
   a.option("seed", "N", "of split, initial weights, order, noise", "0");
   declare_strict(a);

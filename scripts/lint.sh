@@ -1,5 +1,5 @@
 #!/bin/sh
-# What reads the sources without running them; any finding is an error: clang-format, shellcheck, the arrows of the
+# What reads the sources without running them; any finding is an error: clang-format, shellcheck, lines, the arrows of the
 # includes, and clang-tidy (.clang-tidy says which checks). The last needs BUILD, a folder that was configured for
 # clang with -DCMAKE_EXPORT_COMPILE_COMMANDS=ON; without it clang-tidy is left out. FILES: only these for clang-tidy.
 #   scripts/lint.sh [BUILD [FILES]]
@@ -9,6 +9,7 @@ scripts/setup.sh clang-format clang-tidy shellcheck python3
 git ls-files '*.h' '*.cpp' '*.inl' | xargs clang-format --dry-run -Werror
 git ls-files '*.sh' .ci/run | xargs shellcheck --severity=warning
 scripts/check_includes.py
+scripts/check_budget.py
 [ $# -ge 1 ] || exit 0
 build="$1"
 shift

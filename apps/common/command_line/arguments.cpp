@@ -31,18 +31,12 @@ void add(cxxopts::Options& parser, const std::string& group, const std::string& 
   }
 }
 
-// What programs write, and the values that may name a file to be read.
-constexpr std::array<std::string_view, 10> kOutputs = {"c99",  "capture", "gcode",   "json",     "mcap",
-                                                       "onnx", "out",     "outputs", "pictures", "report"};
+// The values that may name a file or folder.
 constexpr std::array<std::string_view, 5> kPathValues = {"FILE", "DIR", "JOURNAL", "INPUT", "NAME"};
 
 bool names_path(const std::string& value) {
   return std::any_of(kPathValues.begin(), kPathValues.end(),
                      [&](std::string_view kind) { return value.starts_with(kind); });
-}
-
-bool is_stdout(const std::string& name, const std::string& text) {
-  return (name == "json" || name == "out") && text == "-";
 }
 
 // Names and messages may hold what a terminal obeys.
@@ -70,12 +64,10 @@ Arguments::Arguments(std::string program, std::string purpose)
     : program_(std::move(program)), purpose_(std::move(purpose)) {
   flag("help", "print this and exit; supertac help glossary explains the words");
   flag("version", "print version, commit, compiler and exit");
-  option("json", "FILE", "also write the results as JSON; '-' is stdout");
+  option("json", "FILE", "also write the results as JSON; '-' is stdout").writes();
   flag("quiet", "no progress bar and no remarks").decides_nothing();
-  // A program that only looks at files has nothing to share out.
-  if (program_ != "supertac-info")
-    option("threads", "N", "worker threads; default OMP_NUM_THREADS, else what the machine grants")
-        .decides_nothing();
+  option("threads", "N", "worker threads; default OMP_NUM_THREADS, else what the machine grants")
+      .decides_nothing();
   flag("force", "replace existing output").decides_nothing();
 }
 
@@ -123,6 +115,11 @@ Arguments& Arguments::one_of(std::vector<std::string> names) {
 
 Arguments& Arguments::only_with(const std::string& option) {
   only_with_ = option;
+  return *this;
+}
+
+Arguments& Arguments::writes() {
+  options_.at(order_.back()).writes = true;
   return *this;
 }
 
@@ -245,11 +242,10 @@ std::vector<NamedPath> Arguments::paths() const {
   std::vector<NamedPath> paths;
   for (const auto& [name, text] : values_) {
     const Option& option = options_.at(name);
-    if (option.is_flag || !names_path(option.value) || is_stdout(name, text)) continue;
-    const bool is_output = std::find(kOutputs.begin(), kOutputs.end(), name) != kOutputs.end();
+    if (option.is_flag || !names_path(option.value) || (option.writes && text == "-")) continue;
     const bool is_folder = option.value.ends_with("DIR");
-    if (is_output || is_folder) {
-      paths.push_back({name, text, is_output, is_folder});
+    if (option.writes || is_folder) {
+      paths.push_back({name, text, option.writes, is_folder});
       continue;
     }
     for (const std::string& path : comma_list(text)) {
@@ -358,8 +354,7 @@ std::vector<double> Arguments::numbers(const std::string& name, double lowest, d
 }
 
 int Arguments::threads() const {
-  return options_.contains("threads") && given("threads") ? static_cast<int>(integer("threads", 1, 1024))
-                                                          : default_threads();
+  return given("threads") ? static_cast<int>(integer("threads", 1, 1024)) : default_threads();
 }
 
 OutputPath Arguments::output(const std::string& name) const {

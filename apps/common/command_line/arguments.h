@@ -64,6 +64,8 @@ class Arguments {
   /// The options declared from here on say something beside `option` only and are refused without it; "" ends
   /// this.
   Arguments& only_with(const std::string& option);
+  /// The option declared last names what is written; '-' is stdout.
+  Arguments& writes();
   /// The option declared last changes no byte of what is made, so its provenance does not name it.
   Arguments& decides_nothing();
   /// The options declared from here on stand under "more options" in the help: few people need them.
@@ -130,7 +132,7 @@ class Arguments {
   struct Option {
     std::string value{}, help{}, default_value{};
     bool is_flag = false, is_required = false, is_positional = false;
-    bool is_more = false, decides = true;
+    bool is_more = false, decides = true, writes = false;
     std::string only_with{}, alone{};
   };
 

@@ -11,7 +11,6 @@
 #include <iostream>
 #include <mutex>
 #include <new>
-#include <string_view>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -43,15 +42,6 @@ int fail(const Program& program, std::string message, int code) {
 void check_stack() {
   constexpr rlim_t kLeast = 1 << 20;
   rlimit stack{};
-  if (const char* wish = std::getenv("OMP_STACKSIZE")) {
-    char* unit = nullptr;
-    const auto number = std::strtoull(wish, &unit, 10);  // of kilobytes where nothing else is said
-    const bool is_number = unit != wish;                 // the runtime passes over what is none
-    while (*unit == ' ') ++unit;
-    const bool large = *unit != '\0' && std::string_view("mMgG").find(*unit) != std::string_view::npos;
-    if (is_number && !large && (*unit == 'b' || *unit == 'B' ? number >> 10 : number) < 64)
-      throw std::runtime_error("OMP_STACKSIZE is " + in_quotes(wish) + ", expected at least 64k; unset it");
-  }
   if (::getrlimit(RLIMIT_STACK, &stack) != 0 || stack.rlim_cur >= kLeast) return;
   throw std::runtime_error("the stack may hold " + std::to_string(stack.rlim_cur >> 10) + " kB, expected " +
                            std::to_string(kLeast >> 10) + "; raise the limit with ulimit -s 8192");

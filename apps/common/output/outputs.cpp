@@ -76,12 +76,6 @@ void check_outputs(const Arguments& arguments) {
     if (output.is_folder) {
       check_folder(output.path);
     } else {
-      // A run that was stopped has not written its model yet.
-      if (output.option == "out" && arguments.declares("resume") && arguments.given("resume") &&
-          !arguments.force() && fs::exists(output.path))
-        throw FileError(output.path,
-                        "exists already: the run that --resume continues has ended, or this is another "
-                        "model; pass --force to replace it, or choose another --out");
       refuse_existing(output.path, arguments.force());
       // Opens a temporary beside it and removes it: the name and the permission, tried.
       const AtomicFile trial(output.path);

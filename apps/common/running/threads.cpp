@@ -1,9 +1,8 @@
 #include "apps/common/running/threads.h"
 
-#include <sched.h>
+#include <omp.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <fstream>
 #include <string>
 
@@ -17,12 +16,6 @@ std::string first_line(const std::string& path) {
   std::string line;
   std::getline(file, line);
   return line;
-}
-
-int processors() {
-  cpu_set_t set;
-  if (sched_getaffinity(0, sizeof set, &set) != 0) return 1;
-  return std::max(1, CPU_COUNT(&set));
 }
 
 /// Version 2 of cgroups: the group's own limit and that of the root of its namespace.
@@ -48,13 +41,6 @@ std::optional<int> quota_of_cpu_max(std::string_view text) {
   return static_cast<int>(std::clamp<std::int64_t>((*limit + *period - 1) / *period, 1, 1 << 20));
 }
 
-int default_threads() {
-  if (const char* wish = std::getenv("OMP_NUM_THREADS")) {
-    const std::string_view text = wish;
-    const auto number = parse_int(text.substr(0, text.find(',')));
-    if (number && *number >= 1 && *number <= 1024) return static_cast<int>(*number);
-  }
-  return std::min(processors(), quota());
-}
+int default_threads() { return std::min(omp_get_max_threads(), quota()); }
 
 }  // namespace supertac

@@ -5,8 +5,8 @@
 
 namespace supertac {
 
-/// How many threads a program takes when none are asked for: OMP_NUM_THREADS (its first number), else the
-/// processors of the affinity mask, at most the cgroup's CPU quota rounded up. At least 1.
+/// How many threads a program takes when none are asked for: what OpenMP says (OMP_NUM_THREADS, else the
+/// processors of the affinity mask), at most the cgroup's CPU quota rounded up.
 int default_threads();
 
 /// The quota in a cgroup's cpu.max ("200000 100000", "max 100000"), in processors rounded up; nullopt when

@@ -38,7 +38,7 @@ TEST_F(Training, SaysWhyAFinishedRunIsNotResumed) {
   const std::string brief = "--epochs 1 --stride 64";
   trained("done.safetensors", brief);
   expect_exit(train("done.safetensors", brief + " --resume done.run/last.safetensors"), 1,
-              "the run that --resume continues has ended");
+              "exists already");
 }
 
 TEST_F(Training, SaysWhereItsTemporaryFileCannotBeMade) {
