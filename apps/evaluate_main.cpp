@@ -4,7 +4,6 @@
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/provenance.h"
-#include "apps/common/output/remarks.h"
 #include "apps/common/running/measure.h"
 #include "apps/common/running/progress.h"
 #include "apps/evaluate/distance_scores.h"
@@ -151,8 +150,7 @@ void declare(Arguments& a) {
            "window, pass, trial, texture, group or none (default: the model's own); its test side is scored");
   a.option("seed", "N", "of the split (default: the model's own)");
   a.option("limit", "N", "score at most N windows, evenly spread; 0 = all", "0");
-  a.option("precision", "NAME", "fp32, or int8: products of bytes, faster on processors with AVX-512 VNNI",
-           "fp32");
+  a.option("precision", "NAME", "fp32, or int8: the pictures of a microcontroller, slower", "fp32");
   a.option("batch", "N", "windows that are drawn at once; their pictures do not depend on it", "64");
   a.decides_nothing();
   a.option("outputs", "FILE",
@@ -163,7 +161,6 @@ void declare(Arguments& a) {
        "write the surfaces that were felt, of each plate and trial: .png; .safetensors, with those of each "
        "pass beside them; or of one plate and trial .stl (docs/map.md)")
       .writes();
-  declare_strict(a);
   a.option("plates", "A,B,...", "only recordings of these plates (default: the model's own)");
   a.option("pictures", "DIR",
            "write PNG pictures: input | output | truth | how far off it may be, and a film of each test pass")
@@ -181,11 +178,11 @@ int run(Arguments& a) {
   const WindowSet windows = load_windows(a, files.front());
   tested.split = make_split(windows, split_kind(tested.split_name), tested.seed, tested.leave_out);
   check_test_set(a, files, tested);
-  remark(a, remarks_on(windows, tested.split.test));
+  for (const std::string& one : remarks_on(windows, tested.split.test)) a.note("warning: " + one);
   if (windows.filter_s() && files.front().input.filter_left(*windows.filter_s()) != 0)
-    remark(a, {"the recordings' signals have gone through a moving average of " +
-               format(*windows.filter_s()) + " s, those of the training through one of " +
-               format(*files.front().input.filter_s) + " s: the network does not know such signals"});
+    a.note("warning: the recordings' signals have gone through a moving average of " +
+           format(*windows.filter_s()) + " s, those of the training through one of " +
+           format(*files.front().input.filter_s) + " s: the network does not know such signals");
   if (const int side = std::min(windows.image().height, windows.image().width); side < kSsimWindow)
     a.note("pictures of " + windows.image().text() + " pixels: SSIM's window is " +
            std::to_string((side - 1) / 2 * 2 + 1) + " pixels wide instead of " + std::to_string(kSsimWindow) +

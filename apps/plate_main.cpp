@@ -11,8 +11,7 @@ namespace {
 
 nlohmann::ordered_json write_stl(const Arguments& arguments, const Plate& plate) {
   const std::string path = arguments.text("out");
-  const auto triangles = mesh_of(plate, {.resolution_mm = arguments.number("resolution", 0.02, 5),
-                                         .base_mm = arguments.number("base", 0.2, 100)});
+  const auto triangles = mesh_of(plate, {.resolution_mm = arguments.number("resolution", 0.02, 5)});
   // Named after no file: the same plate, however it is called, gives the same bytes.
   const std::string name = Plate::is_file(plate.name()) ? "read from STL" : plate.name();
   const auto bytes =
@@ -53,7 +52,6 @@ void declare(Arguments& arguments) {
       .option("out", "FILE", "the plate as binary STL in mm, 36 x 108 in x and y, its flat part at z = 0")
       .writes()
       .option("resolution", "MM", "distance of the points where the surface is exact", "0.125")
-      .option("base", "MM", "material below the lowest point", "3")
       .option("gcode", "FILE", "the palpation run over it, for a Marlin printer and any host")
       .writes()
       .option("speed", "MM_PER_S", "of the slides, for --gcode", "10")

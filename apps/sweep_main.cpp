@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <span>
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/measure.h"
@@ -37,10 +38,6 @@ void declare(Arguments& a) {
   a.option("latent", "LD,...", "latent numbers per group of taxels (default: the preset's)");
   a.option("scale", "N,...", "pictures N times as fine as the array: 2, 4, 8, 16 (default: the preset's)");
   a.option("seeds", "N,...", "of split, initial weights, order, noise", "0");
-  a.more();
-  a.option("channels", "N,...", "of the upsampler (default: the preset's)");
-  a.option("rcabs", "N,...", "residual channel attention blocks per stage (default: the preset's)");
-  a.more(false);
   declare_training(a);
   declare_window_training(a);
   a.more().option("limit", "N", "score at most N test windows, evenly spread; 0 = all", "0");
@@ -52,8 +49,9 @@ void declare(Arguments& a) {
 
 namespace {
 
+// Settings of the network: their names, and in the name of a model. The first three are options.
 struct Axis {
-  const char* option;
+  const char* name;
   Dim SuperTacSettings::*setting;
   const char* letter;
 };
@@ -85,11 +83,11 @@ std::vector<Recipe> grid_of(const Arguments& a) {
   std::vector<Recipe> grid;
   for (const std::string& preset : a.list("preset"))
     grid.push_back(as_usage([&] { return recipe_of(a, Recipe::named(preset)); }));
-  for (const Axis& axis : kAxes) {
-    if (!a.given(axis.option)) continue;
+  for (const Axis& axis : std::span(kAxes).first(3)) {
+    if (!a.given(axis.name)) continue;
     std::vector<Recipe> finer;
     for (Recipe& recipe : grid)
-      for (const Dim value : whole_numbers(a, axis.option))
+      for (const Dim value : whole_numbers(a, axis.name))
         recipe.model.*axis.setting = value, finer.push_back(recipe);
     grid = finer;
   }
@@ -106,10 +104,9 @@ std::vector<Recipe> grid_of(const Arguments& a) {
 // Figures that cannot be compared do not mix: whatever a table's rows have in common has to stay.
 void check_settings(const Arguments& a) {
   Json settings;
-  for (const char* option :
-       {"augment",         "autoencoder", "batch",         "beta",      "epochs", "grouping",  "history",
-        "interval-factor", "lambda",      "learning-rate", "leave-out", "limit",  "optimizer", "plates",
-        "random-plates",   "range",       "rate",          "scaling",   "split",  "stride"})
+  for (const char* option : {"augment", "autoencoder", "batch", "beta", "epochs", "history",
+                             "interval-factor", "learning-rate", "leave-out", "limit", "optimizer", "plates",
+                             "random-plates", "range", "rate", "scaling", "split", "stride"})
     settings[option] = a.given(option) || !a.text(option).empty() ? a.text(option) : "the preset's";
   settings["last-frame"] = a.flag("last-frame");
   settings["data"] = hash_of_recordings(a.text("data"), a.list("plates"));
@@ -196,7 +193,7 @@ Json row_of(const Recipe& recipe, const TrainingRun& training, const ZoneMetrics
   const Prepared prepared(model);
   const Latency latency = measure_latency([&] { prepared.estimate(window); });
   Json row = {{"model", model_name_of(recipe)}, {"preset", s.preset}};
-  for (const Axis& axis : kAxes) row[axis.option] = s.*axis.setting;
+  for (const Axis& axis : kAxes) row[axis.name] = s.*axis.setting;
   row["seed"] = recipe.seed;
   row["split"] = name_of(recipe.split);
   for (const auto& [prefix, m] :

@@ -1,7 +1,6 @@
 // supertac-train: recordings in, a model out.
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/provenance.h"
-#include "apps/common/output/remarks.h"
 #include "apps/ranks/together.h"
 #include "apps/train/training_options.h"
 #include "apps/train/training_run.h"
@@ -16,7 +15,6 @@ void declare(Arguments& a) {
       .writes();
   a.option("resume", "FILE", "continue from the last.safetensors of an interrupted run, same options");
   a.option("seed", "N", "of split, initial weights, order, noise", "0");
-  declare_strict(a);
   declare_training(a);
   declare_network(a);
 }
@@ -26,12 +24,11 @@ namespace {
 int train(const Arguments& a, TrainingTask task, Ranks& ranks) {
   const std::string about = task.counts;
   const std::vector<std::string> remarks = task.remarks;
-  if (a.flag("strict")) remark(a, remarks);
   TrainingRun training(
       a, std::move(task),
       {.out = a.output("out"), .force = a.force(), .resume = a.text("resume"), .ranks = ranks});
   a.note(about);  // what ends a training before it has begun says one line only
-  remark(a, remarks);
+  for (const std::string& one : remarks) a.note("warning: " + one);
   const bool done = training.train();
   const Trainer& trainer = training.trainer();
   if (!ranks.first()) return done ? kExitOk : kExitFailed;

@@ -23,7 +23,6 @@ void declare_training(Arguments& a) {
       "adam, as in the paper; or muon: matrices of weights move by the orthogonal factor of their momentum, "
       "the rest by Adam, which learns more in as many steps, in trainings of a thousand steps and fewer with "
       "--learning-rate 0.008 (the usual one then leaves latent numbers idle) (default: the preset's)");
-  a.option("lambda", "X", "weight of 1 - SSIM", "0.1");
   a.option("checkpoint-every", "STEPS", "how often the state is saved", "500");
   a.decides_nothing();
   a.option("ledger", "N",
@@ -71,7 +70,6 @@ void declare_window_training(Arguments& a) {
            "half the width of a pixel's 90 % interval in units of its predicted error, as supertac-evaluate "
            "finds it on passes that the network has not seen; split group finds it on the tested groups",
            format(kIntervalFactor));
-  a.option("grouping", "NAME", "taxels of one VAE: horizontal (rows) or vertical (columns)", "horizontal");
   a.flag(
       "last-frame",
       "give the last frame a way of its own into the picture, beside the latents: for sensors of which one "
@@ -135,7 +133,6 @@ Recipe recipe_of(const Arguments& a, Recipe r) {
     r.mirror = name == "mirror";
   }
   if (a.given("interval-factor")) r.interval_factor = a.number("interval-factor", 0.1, 100);
-  if (a.given("grouping")) r.model.grouping = grouping_of(a.choice("grouping", {"horizontal", "vertical"}));
   if (a.flag("last-frame")) r.model.last_frame_path = true;
   if (a.given("autoencoder")) {
     r.sampling = a.choice("autoencoder", {"variational", "plain"}) == "variational";
@@ -144,7 +141,6 @@ Recipe recipe_of(const Arguments& a, Recipe r) {
   if (a.given("beta") && !r.sampling)
     throw UsageError("--beta: has no part in a plain autoencoder; leave it out");
   if (a.given("beta")) r.loss.beta = a.number("beta", 0, 1e6);
-  if (a.given("lambda")) r.loss.lambda = a.number("lambda", 0, 1e6);
   as_usage([&] { r.check(); });
   return r;
 }

@@ -107,7 +107,8 @@ TEST_F(Frames, AreStreamedToldApartExplainedAndExported) {
   ASSERT_EQ(live.size(), 12u * 16 * 24);
   // Of five recordings with twelve frames each it is the fourth by name: 096 to 100.
   EXPECT_TRUE(std::equal(live.begin(), live.end(), all.begin() + 3 * 12 * 16 * 24));
-  succeed("supertac-check picture m.safetensors --recording " + recording + " --at 6 --out explained.safetensors");
+  succeed("supertac-check picture m.safetensors --recording " + recording +
+          " --at 6 --out explained.safetensors");
   succeed("supertac-export m.safetensors --onnx m.onnx");
   succeed("supertac-classify --data data --model m.safetensors --seeds 1 --epochs 1");
 }

@@ -34,10 +34,11 @@ std::vector<std::string> column_of(const std::string& csv, const std::string& na
 
 class Sweep : public OnSimulatedData {
  protected:
-  // Of two models: T 32 and 64, x2, eight channels, one RCAB.
+  // Of two models: T 32 and 64, x2.
   static std::string line(const std::string& out, const std::string& more = "") {
     return "supertac-sweep --out " + out +
-           " --data data --latent 2 --scale 2 --timesteps 32,64 --channels 8 --rcabs 1 --batch 8 --stride 8 "
+           " --data data --preset tiny --rate 100 --latent 2 --scale 2 --timesteps 32,64 --batch 8 --stride "
+           "8 "
            "--threads 1 --limit 50 --epochs 1 " +
            more;
   }
@@ -52,8 +53,8 @@ TEST_F(Sweep, WritesARowAModelAndDoesNotRepeatIt) {
   const std::string csv = bytes("grid/sweep.csv");
   EXPECT_EQ(csv.substr(0, csv.find('\n')), kHeader);
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 3);
-  for (const char* name : {"paper_t32_l2_x2_c8_r1_s0", "paper_t64_l2_x2_c8_r1_s0"}) {
-    EXPECT_TRUE(contains(csv, std::string("\n") + name + ",paper,"));
+  for (const char* name : {"tiny_t32_l2_x2_c8_r1_s0", "tiny_t64_l2_x2_c8_r1_s0"}) {
+    EXPECT_TRUE(contains(csv, std::string("\n") + name + ",tiny,"));
     EXPECT_TRUE(fs::exists(path("grid/models/" + std::string(name) + ".safetensors")));
   }
   const std::string page = bytes("grid/chart.html");
@@ -64,7 +65,7 @@ TEST_F(Sweep, WritesARowAModelAndDoesNotRepeatIt) {
 
   const std::string beginning = "this sweep began with ";
   expect_exit(sweep("grid", "--epochs 2"), 1, beginning + "epochs \"1\", now it is \"2\"");
-  expect_exit(sweep("grid", "--rate 100"), 1, beginning + "rate \"the preset's\", now it is \"100\"");
+  expect_exit(sweep("grid", "--rate 90"), 1, beginning + "rate \"100\", now it is \"90\"");
   fs::rename(path("data"), path("before"));  // the same names, other recordings
   succeed("supertac-simulate --out data --plates 3_Bumps --speeds 10 --passes 1 --seed 2");
   const ProcessResult other = sweep("grid");
@@ -86,7 +87,7 @@ TEST_F(Sweep, HistoryJudgesModelsOnTheSameFrames) {
 // Each at its own rate, so that windows of 64 samples span 0.64 s of one and 1.28 s of the other.
 TEST_F(Sweep, PresetsOfOneTableAreTrainedAtTheirOwnRates) {
   succeed(
-      "supertac-sweep --out presets --data data --preset paper,tiny --timesteps 64 --channels 8 --rcabs 1 "
+      "supertac-sweep --out presets --data data --preset paper,tiny --timesteps 64 "
       "--scale 2 --epochs 1 --stride 8 --threads 1");
   const auto windows = column_of(bytes("presets/sweep.csv"), "all_windows");
   ASSERT_EQ(windows.size(), 2U);
@@ -100,13 +101,13 @@ TEST_F(Sweep, ACutLineIsDroppedAndItsModelMeasuredAgain) {
   succeed(line("cut"));
   const std::string mended = bytes("cut/sweep.csv");
   EXPECT_EQ(std::count(mended.begin(), mended.end(), '\n'), 3);
-  EXPECT_EQ(mended.substr(0, csv.rfind("paper_t64")), csv.substr(0, csv.rfind("paper_t64")));
+  EXPECT_EQ(mended.substr(0, csv.rfind("tiny_t64")), csv.substr(0, csv.rfind("tiny_t64")));
 }
 
 TEST_F(Sweep, AStoppedModelGoesOnToTheSameBytes) {
   const std::string often = "--epochs 8 --checkpoint-every 5";
   succeed(line("whole", often));
-  const std::string model = "/models/paper_t64_l2_x2_c8_r1_s0";  // the longest is the first
+  const std::string model = "/models/tiny_t64_l2_x2_c8_r1_s0";  // the longest is the first
   const ProcessResult stopped = sweep(
       "stopped", often, {.signal = SIGINT, .signal_when = path("stopped" + model + ".run/last.safetensors")});
   EXPECT_EQ(stopped.code, 128 + SIGINT) << stopped.error;
@@ -120,9 +121,9 @@ TEST_F(Sweep, ItsModelsAreThoseOfSupertacTrain) {
   succeed(line("whole4", "--seeds 0,1"));
   succeed(
       "supertac-train --data data --out same.safetensors --like "
-      "whole4/models/paper_t64_l2_x2_c8_r1_s1.safetensors --threads 1");
+      "whole4/models/tiny_t64_l2_x2_c8_r1_s1.safetensors --threads 1");
   EXPECT_EQ(content_hash(SafetensorsFile::read(path("same.safetensors"))),
-            content_hash(SafetensorsFile::read(path("whole4/models/paper_t64_l2_x2_c8_r1_s1.safetensors"))));
+            content_hash(SafetensorsFile::read(path("whole4/models/tiny_t64_l2_x2_c8_r1_s1.safetensors"))));
 }
 
 // Each row is of the front unless another is both faster and more accurate.
