@@ -31,7 +31,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 BLOCK = re.compile(r"(?:<!-- ((?:not )?run\b.*?) -->\n)?```([a-z+]*)\n(.*?)```\n", re.DOTALL)
 LONGEST_LINE, LONGEST_CELL, MOST_README_LINES, MOST_README_ROWS, MOST_RESULTS_WORDS = 120, 120, 120, 4, 9000
 # What a page may name although it is not in the tree: what programs make, and names that stand for others.
-MADE = re.compile(r"^(out/|build)|^(scores|sweep|model)\.|NAME|JOB")
+MADE = re.compile(r"^(out/|build|yours/\d)|^(scores|sweep|model)\.|NAME|JOB")
 FILE = re.compile(r"`([\w./+-]+\.(?:cpp|h|inl|md|py|sh|gp|cmake|csv|png|svg|txt))`|\]\(([^)#: ]+)\)")
 
 

@@ -160,9 +160,9 @@ TEST(CCode, RefusesLayersThatItsSixteenBitsCannotCount) {
   SuperTacSettings wide = tiny();
   wide.rows = wide.columns = 16, wide.channels = 128, wide.latent = 1, wide.rcabs = 0, wide.scale = 2;
   wide.timesteps = 32;
-  EXPECT_ERROR(
-      c_code_of(model_of(wide, {}), "finger", 100, ""), std::runtime_error,
-      "int8: a layer has a size or a distance of 32768, expected at most 32767; train a network of fewer channels");
+  EXPECT_ERROR(c_code_of(model_of(wide, {}), "finger", 100, ""), std::runtime_error,
+               "int8: a layer has a size or a distance of 32768, expected at most 32767; train a network of "
+               "fewer channels");
 }
 
 }  // namespace
