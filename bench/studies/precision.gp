@@ -14,6 +14,5 @@ set title "Accuracy against time, each seed"
 # A name that ends with a number above 0 is another seed of the one before.
 first(name) = strstrt("123456789", name[strlen(name):strlen(name)]) == 0 ? name : ""
 label(name) = first(name) eq "" ? "" : name[strlen(name) - 1:] eq " 0" ? name[:strlen(name) - 2] : name
-plot csv skip 1 using 5:(strcol(2) eq "fp32" ? $3 : NaN) with points pt 7 ps 1.2 lc rgb "#1f5fa8" title "fp32", \
-     "" skip 1 using 5:(strcol(2) eq "int8" ? $3 : NaN) with points pt 5 ps 1.2 lc rgb "#d2691e" title "int8", \
+plot csv skip 1 using 5:(strcol(2) eq "fp32" ? $3 : NaN) with points pt 7 ps 1.2 lc rgb "#1f5fa8" notitle, \
      "" skip 1 using 5:(strcol(2) eq "fp32" && label(strcol(1)) ne "" ? $3 : NaN):(label(strcol(1))) with labels left offset 0.8,0.8 font "sans,10" notitle
