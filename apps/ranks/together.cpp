@@ -52,7 +52,7 @@ void share_threads(const Arguments& a) {
 
 // The first rank's word comes first; where all have the same error MPI ends the others before theirs.
 [[noreturn]] void abandon(const Arguments& a, const Ranks& ranks, const std::string& why, int code) {
-  if (!ranks.first()) std::this_thread::sleep_for(std::chrono::milliseconds(600));
+  if (!ranks.first()) std::this_thread::sleep_for(std::chrono::seconds(5));
   std::cerr << a.program() + " (rank " + std::to_string(ranks.rank()) + "): " + why + "\n";
   MPI_Abort(MPI_COMM_WORLD, code);
   std::abort();
