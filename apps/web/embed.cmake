@@ -1,8 +1,11 @@
 cmake_minimum_required(VERSION 3.22)
 # Run at build time: writes OUTPUT, which defines supertac::NAME(): frame.html with TITLE, CLASS of the body, BODY, STYLES and
-# SCRIPTS in it.
+# SCRIPTS in it; a script that is BODY stands alone.
 set(folder ${CMAKE_CURRENT_LIST_DIR}/pages)
 file(READ ${folder}/frame.html page)
+if(BODY MATCHES "[.]js$")
+  set(page "{{body}}")
+endif()
 file(READ ${folder}/${BODY} body)
 foreach(kind STYLES SCRIPTS)
   foreach(file ${${kind}})

@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "apps/web/encode.h"
+#include "apps/web/pages.h"
 #include "io/numbers/clock.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
@@ -33,7 +34,7 @@ constexpr int kSendBuffer = 64 << 10;            // what a stalled page may leav
 constexpr double kStillHereS = 1;
 constexpr int kNice = 5;
 constexpr std::string_view kPolicy =
-    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; "
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; worker-src 'self'; connect-src 'self'; "
     "img-src 'self' data: blob:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
 double seconds_now() { return seconds_of(CLOCK_MONOTONIC); }
@@ -175,7 +176,8 @@ struct WebRequest {
       return text(403, "the request comes from another page");
     if (method == "POST") return act();
     if (method != "GET" && method != "HEAD") return text(405, "expected GET or POST");
-    if (path == "/") return page();
+    if (path == "/") return still("text/html; charset=utf-8", server.site_.page);
+    if (path == "/link.js") return still("text/javascript; charset=utf-8", link_script());
     if (path == "/events") return events();
     if (path.starts_with("/files/") && server.site_.file) return download(std::string(path.substr(7)));
     return text(404, "there is nothing of this name");
@@ -196,11 +198,10 @@ struct WebRequest {
     return text(200, action->second());
   }
 
-  MHD_Result page() {
-    return send(
-        200, "text/html; charset=utf-8",
-        MHD_create_response_from_buffer(server.site_.page.size(), const_cast<char*>(server.site_.page.data()),
-                                        MHD_RESPMEM_PERSISTENT));
+  MHD_Result still(const char* type, std::string_view body) {
+    return send(200, type,
+                MHD_create_response_from_buffer(body.size(), const_cast<char*>(body.data()),
+                                                MHD_RESPMEM_PERSISTENT));
   }
 
   MHD_Result events() {
@@ -239,6 +240,9 @@ struct WebRequest {
                                       {"Cross-Origin-Resource-Policy", "same-origin"},
                                       {"Content-Security-Policy", kPolicy.data()}})
       MHD_add_response_header(response, name, value);
+    // No page keeps a connection for its next wish, which a sleep would leave dead.
+    if (status != 200 || std::string_view(type) != "text/event-stream")
+      MHD_add_response_header(response, "Connection", "close");
     const MHD_Result result = MHD_queue_response(connection, status, response);
     MHD_destroy_response(response);
     return result;
@@ -284,7 +288,7 @@ void WebServer::publish() {
   const double now = seconds_now();
   if (std::string news = site_.news(); !news.empty()) {
     newest_ = "data: " + news + "\n\n";
-  } else if (newest_.empty() || now - told_s_ < kStillHereS) {
+  } else if (now - told_s_ < kStillHereS) {
     return;
   }
   ++number_;

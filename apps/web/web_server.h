@@ -20,7 +20,8 @@ namespace supertac {
 struct WebSite {
   /// GET /
   std::string_view page;
-  /// GET /events, server-sent: first an event "hello" with this JSON object, to which "token" is added ...
+  /// GET /events, server-sent: first an event "hello" with this JSON object, to which "token" is added; an
+  /// event "still" each second until there are news ...
   std::function<std::string()> hello;
   /// ... then the newest of these JSON texts, at most 30 a second; an empty text: there is nothing new.
   std::function<std::string()> news;
@@ -76,7 +77,7 @@ class WebServer {
   WebSite site_;
   std::string token_;
   MHD_Daemon* daemon_ = nullptr;
-  std::string newest_;    // as it is sent; empty before the first
+  std::string newest_ = "event: still\ndata: 1\n\n";  // as it is sent
   std::string farewell_;  // likewise; read when stop_ is set
   std::uint64_t number_ = 0;
   double told_s_ = 0;

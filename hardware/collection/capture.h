@@ -16,6 +16,7 @@ class CapturedPort : public Port {
   /// `journal` must outlive the port.
   CapturedPort(std::unique_ptr<Port> port, JournalWriter& journal, Stream stream);
   const std::string& name() const override { return port_->name(); }
+  unsigned baud() const override { return port_->baud(); }
   double now() override;
   Received read(std::span<std::byte> buffer, double until) override;
   double write(std::span<const std::byte> bytes, double until) override;

@@ -53,6 +53,7 @@ RecorderReport record(Reader& board, Printer& printer, const RecorderSettings& s
   hear_board(board, printer, settings, journal);
   RecorderReport report;
   report.outcome = Palpation(printer, settings.bed.plan, observer_for(settings, journal, board)).run();
+  printer.put_back();
   if (settings.replay) {
     board.wait_for_end(60);
   }
@@ -75,10 +76,11 @@ RecorderReport record(std::unique_ptr<Port> board_port, std::unique_ptr<Port> pr
   printer.link().set_watch([&] { check_stop(settings, journal); });
   printer.link().give_up_at(captured.now() + longest_run_s(settings));
   printer.connect();
-  if (settings.home) {
-    printer.home();
-  } else {
-    printer.confirm_origin(settings.bed.origin);
+  try {
+    settings.home ? printer.home() : printer.confirm_origin(settings.bed.origin);
+  } catch (...) {
+    printer.put_back();
+    throw;
   }
   auto port = std::make_unique<CapturedPort>(std::move(board_port), journal, Stream::board);
   if (settings.sensor.frame.kind == FrameKind::board) {

@@ -28,6 +28,9 @@ class Port {
   /// The path, for messages.
   virtual const std::string& name() const = 0;
 
+  /// Of a serial line, as the system has set it; 0 where there is none.
+  virtual unsigned baud() const { return 0; }
+
   /// Seconds on the port's monotonic clock. All deadlines below are points on it.
   virtual double now() = 0;
 

@@ -13,6 +13,7 @@
 #include <cmath>
 
 #include "hardware/ports/errors.h"
+#include "hardware/ports/port_list.h"
 #include "hardware/ports/serial_termios.h"
 #include "io/numbers/clock.h"
 
@@ -24,7 +25,8 @@ namespace {
   switch (error) {
     case ENOENT:
       throw PortNotFound(at +
-                         "no such port; plug the device in, or run with --list-ports to see what is there");
+                         "no such port; plug the device in, or run with --list-ports to see what is there "
+                         "and by which path it is found again under another number");
     case EACCES:
     case EPERM:
       throw PortPermission(at + "permission denied; run `sudo usermod -aG dialout $USER` and log in again");
@@ -51,7 +53,7 @@ void raise_modem_lines(int descriptor) {
 double monotonic_seconds() { return seconds_of(CLOCK_MONOTONIC); }
 
 SerialPort::SerialPort(const std::string& path, const SerialSettings& settings)
-    : path_(path), speedup_(settings.speedup) {
+    : path_(path), lasting_(lasting_port_name(path)), speedup_(settings.speedup) {
   descriptor_ = open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (descriptor_ < 0) open_failed(path, errno);
   const auto give_up = [&](int error) {
@@ -66,6 +68,13 @@ SerialPort::SerialPort(const std::string& path, const SerialSettings& settings)
   if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) give_up(errno == EWOULDBLOCK ? EBUSY : errno);
   if (ioctl(descriptor_, TIOCEXCL) != 0) give_up(errno);
   if (const int error = set_raw_terminal(descriptor_, settings.baud)) give_up(error);
+  constexpr double kTolerated = 0.02;  // of the rate; half a bit in a byte is lost at 5 %
+  if (const unsigned found = baud(); found > 0 && std::abs(1.0 * found / settings.baud - 1) > kTolerated) {
+    close(descriptor_);
+    throw PortError("port " + path + ": expected " + std::to_string(settings.baud) +
+                    " baud, its adapter makes " + std::to_string(found) +
+                    " of it; choose a rate that it has, in the printer's firmware and here");
+  }
   raise_modem_lines(descriptor_);
   // What waited until somebody opened the port is old, and would be dated as if it came now.
   if (tcflush(descriptor_, TCIFLUSH) != 0) give_up(errno);
@@ -75,6 +84,8 @@ SerialPort::~SerialPort() {
   (void)ioctl(descriptor_, TIOCNXCL);
   close(descriptor_);
 }
+
+unsigned SerialPort::baud() const { return terminal_baud(descriptor_); }
 
 Received SerialPort::read(std::span<std::byte> buffer, double until) {
   for (;;) {
@@ -123,7 +134,10 @@ bool SerialPort::wait_for(short events, double until) {
 
 void SerialPort::unplugged(const std::string& found) const {
   throw PortUnplugged("port " + path_ + ": the device is gone (" + found +
-                      "); check the cable and start again, nothing is resumed");
+                      "); check the cable and start again, nothing is resumed" +
+                      (lasting_.starts_with("/dev/serial/") && lasting_ != path_
+                           ? "; " + lasting_ + " names it under whatever number it comes back"
+                           : ""));
 }
 
 }  // namespace supertac

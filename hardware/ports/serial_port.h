@@ -25,13 +25,15 @@ class SerialPort : public Port {
  public:
   /// Opens `path` for this process alone: TIOCEXCL, and flock because root passes TIOCEXCL.
   /// DTR and RTS are raised where they exist. Nothing that has already arrived is thrown away.
-  /// Throws PortNotFound, PortPermission, PortBusy, NotASerialPort, PortUnplugged.
+  /// Throws PortNotFound, PortPermission, PortBusy, NotASerialPort, PortUnplugged; PortError where the system
+  /// makes another baud rate of the one that was asked for.
   explicit SerialPort(const std::string& path, const SerialSettings& settings = {});
   ~SerialPort() override;
   SerialPort(const SerialPort&) = delete;
   SerialPort& operator=(const SerialPort&) = delete;
 
   const std::string& name() const override { return path_; }
+  unsigned baud() const override;
   double now() override { return monotonic_seconds() * speedup_; }
   Received read(std::span<std::byte> buffer, double until) override;
   double write(std::span<const std::byte> bytes, double until) override;
@@ -41,7 +43,7 @@ class SerialPort : public Port {
   bool wait_for(short events, double until);
   [[noreturn]] void unplugged(const std::string& found) const;
 
-  std::string path_;
+  std::string path_, lasting_;  // lasting_: the name that it has wherever it is plugged in
   double speedup_;
   int descriptor_ = -1;
 };

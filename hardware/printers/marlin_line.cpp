@@ -1,5 +1,6 @@
 #include "hardware/printers/marlin_line.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -48,17 +49,52 @@ std::optional<Point3> position_in(std::string_view text) {
   return Point3{values[0], values[1], values[2]};
 }
 
+// What a firmware says when it runs nothing any more. A heater's error alone is none of these: the machine may
+// go on, and where it does not, it says so.
 bool is_fatal(std::string_view text) {
-  for (const std::string_view mark :
-       {"kill() called", "Printer halted", "Thermal Runaway", "THERMAL RUNAWAY", "Heating failed", "MAXTEMP",
-        "MINTEMP", "Printer stopped", "Printer is not ready", "Printer is shutdown", "Shutdown due to"}) {
+  for (const std::string_view mark : {"kill() called", "Printer halted", "system stopped", "Printer stopped",
+                                      "Printer is shutdown", "Shutdown due to"}) {
     if (contains(text, mark)) return true;
   }
   return false;
 }
 
+bool is_of_a_heater(std::string_view text) {
+  for (const std::string_view mark :
+       {"Heater", "Heating failed", "MAXTEMP", "MINTEMP", "Thermal", "THERMAL", "temperature"}) {
+    if (contains(text, mark)) return true;
+  }
+  return false;
+}
+
+// "//action:cancel", which some firmwares write with a blank: that the printer was stopped or paused.
+bool is_interruption(std::string_view line) {
+  if (!line.starts_with("//")) return false;
+  line.remove_prefix(std::min(line.size(), line.find_first_not_of(' ', 2)));
+  constexpr std::string_view kAction = "action:";
+  if (!line.starts_with(kAction)) return false;
+  line.remove_prefix(std::min(line.size(), line.find_first_not_of(' ', kAction.size())));
+  const std::string_view verb = line.substr(0, line.find(' '));
+  for (const std::string_view end :
+       {"cancel", "pause", "paused", "out_of_filament", "poweroff", "disconnect", "shutdown"}) {
+    if (verb == end) return true;
+  }
+  return false;
+}
+
+// Of a boot banner: any of its lines that no firmware in use says, for "start" itself may be lost.
+bool is_banner(std::string_view line) {
+  for (const std::string_view mark :
+       {"start", "PowerUp", "External Reset", "Brown out Reset", "Watchdog Reset", "Software Reset",
+        "// Klipper state: Ready", "// Klipper state: Disconnect"}) {
+    if (line == mark) return true;
+  }
+  return line.starts_with("Marlin ") || line.starts_with("echo:Marlin ");
+}
+
 Reply error_reply(std::string_view text) {
   if (is_fatal(text)) return {ReplyKind::fatal, {}, {}, std::string(text)};
+  if (is_of_a_heater(text)) return {ReplyKind::other, {}, {}, std::string(text)};
   const bool line_fault = contains(text, "checksum") || contains(text, "Checksum") ||
                           contains(text, "Line Number") || contains(text, "Last Line");
   return {line_fault ? ReplyKind::line_fault : ReplyKind::error,
@@ -110,7 +146,8 @@ Reply parse_reply(std::string_view line) {
     return Reply{k, number, {}, std::string(line)};
   };
   if (line == "ok" || line.starts_with("ok ")) return kind(ReplyKind::ok);
-  if (line == "start") return kind(ReplyKind::start);
+  if (is_banner(line)) return kind(ReplyKind::start);
+  if (is_interruption(line)) return kind(ReplyKind::interrupted);
   if (line == "wait") return kind(ReplyKind::wait);
   if (line.starts_with("Resend:")) return kind(ReplyKind::resend, number_after(line, "Resend:"));
   if (line.starts_with("rs ")) return kind(ReplyKind::resend, number_after(line, "rs "));
@@ -125,8 +162,9 @@ Reply parse_reply(std::string_view line) {
     return {ReplyKind::position, {}, *position, std::string(line)};
   }
   const std::size_t text = line.find_first_not_of(' ');
-  if (text != std::string_view::npos && line.substr(text).starts_with("T:"))
-    return kind(ReplyKind::temperature);
+  for (const std::string_view heater : {"T:", "T0:", "B:"})
+    if (text != std::string_view::npos && line.substr(text).starts_with(heater))
+      return kind(ReplyKind::temperature);
   return kind(ReplyKind::other);
 }
 

@@ -37,12 +37,13 @@ enum class ReplyKind {
   ok,
   resend,           ///< Resend: number
   line_fault,       ///< Error:... about checksum or line number; number = Last Line when it could be read
-  fatal,            ///< kill(), halt, thermal: nothing more may be sent
+  fatal,            ///< kill(), halt: nothing more may be sent
   error,            ///< any other Error:, and Klipper's !!
   unknown_command,  ///< acknowledged but not run
   busy,             ///< echo:busy: processing
   paused,           ///< echo:busy: paused for user
-  start,            ///< the firmware restarted
+  interrupted,      ///< //action:cancel, pause and their like: stopped at its display, or by itself
+  start,            ///< the firmware restarted: a line of its banner
   wait,             ///< heartbeat of an idle firmware
   position,         ///< M114, or M154's report of the queue's end
   temperature,      ///< M155's report

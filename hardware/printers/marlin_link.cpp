@@ -11,9 +11,9 @@ namespace {
 
 // Seconds: for a board that boots, and between two M110 N0 meanwhile; of an ordinary command (Marlin's first
 // echo:busy comes after 2 s); after echo:busy (repeated every 2 s); for one command, behind a longer deadline
-// of its own, whatever is said; of silence that ends a disturbance.
+// of its own, whatever is said; of silence that ends a disturbance; in which Klipper finds its boards.
 constexpr double kConnectDeadline = 20, kProbeInterval = 1, kOkDeadline = 2.5, kBusyDeadline = 6,
-                 kLongestWait = 60, kQuiet = 0.05;
+                 kLongestWait = 60, kQuiet = 0.05, kKlipperStarts = 60;
 constexpr int kMaxRepeats = 8;          // of one line, for any reason; four times as many while catching up
 constexpr std::size_t kKeptLines = 64;  // of the newest lines, for Resend
 // With one line in flight the firmware is never honestly more than a line or two behind. A number further
@@ -61,27 +61,35 @@ void MarlinLink::connect() {
   }
   number_ = 0;
   kept_.clear();
-  connected_ = true;
   read_capabilities();
-  switch_reports_off();
+  if (capabilities_.klipper) await_klipper();
+  connected_ = true;
 }
 
-void MarlinLink::switch_reports_off() {
-  for (const char* off : {"M154 S0", "M155 S0"}) {
+// Klipper's host answers from the moment it runs, but moves nothing before it has found its boards.
+void MarlinLink::await_klipper() {
+  const double until = lines_.port().now() + kKlipperStarts;
+  for (;;) {
     try {
-      command(off);
-    } catch (const PrinterRefused&) {  // a firmware that does not know it sends no such reports
+      command("G21");
+      return;
+    } catch (const PrinterRefused& refused) {
+      if (std::string_view(refused.what()).find("Printer is not ready") == std::string_view::npos ||
+          lines_.port().now() > until)
+        throw;
     }
+    idle(1);
   }
 }
 
-void MarlinLink::nobody_answered() const {
+void MarlinLink::nobody_answered() {
   const std::string expected = "port " + lines_.name() + ": expected a Marlin firmware, found ";
   const std::string within = " answer to M110 within " + format(kConnectDeadline, 0) + " s; ";
+  const unsigned baud = lines_.port().baud();
   if (lines_.bytes() > 0) {
     throw WrongDevice(expected + std::to_string(lines_.bytes()) + " bytes that are no" + within +
-                      "check that it is the printer's port (--list-ports) and that its baud rate is " +
-                      std::to_string(rig::kPrinterBaud) +
+                      "check that it is the printer's port (--list-ports)" +
+                      (baud > 0 ? " and that its baud rate is " + std::to_string(baud) : "") +
                       (complaint_.empty() ? "" : "; it said " + in_quotes(complaint_)));
   }
   throw PrinterSilent(expected + "no" + within + "check that the printer is on and the port is right");
@@ -112,7 +120,8 @@ bool MarlinLink::probe(double until) {
     const Reply reply = parse_reply(line);
     if (reply.kind == ReplyKind::fatal) check_alarm(reply);
     refuse_grbl(line);
-    if (reply.kind == ReplyKind::other || reply.kind == ReplyKind::error) complaint_ = line;
+    if (reply.kind == ReplyKind::other || reply.kind == ReplyKind::error || reply.kind == ReplyKind::paused)
+      complaint_ = line;
     ++heard_, numbers_ += is_of_a_sensor(line) ? 1 : 0;
     if (reply.kind != ReplyKind::ok) continue;
     settle();
@@ -128,12 +137,14 @@ void MarlinLink::read_capabilities() {
     for (const Reply& reply : command("M115").replies) {
       constexpr std::string_view kName = "FIRMWARE_NAME:";
       const std::size_t at = reply.text.find(kName);
-      if (at != std::string::npos) capabilities_.firmware = reply.text.substr(at + kName.size());
+      if (at != std::string::npos)
+        capabilities_.firmware = trimmed(std::string_view(reply.text).substr(at + kName.size()));
       known = known || reply.text.starts_with("Cap:EMERGENCY_PARSER:");
       if (reply.text == "Cap:EMERGENCY_PARSER:1") capabilities_.emergency_parser = true;
     }
     capabilities_.klipper = capabilities_.firmware.starts_with("Klipper");
-    known = known || capabilities_.klipper;
+    capabilities_.reprap = capabilities_.firmware.starts_with("RepRapFirmware");
+    known = known || !capabilities_.quick_stop();
   }
 }
 
@@ -149,6 +160,7 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
   Exchange exchange{number_, number_, deadline_s > 0 ? deadline_s : kOkDeadline};
   exchange.code = text;
   exchange.answer.sent_s = lines_.send(kept_.back());
+  unanswered_ = true;
   exchange.until = exchange.answer.sent_s + exchange.deadline_s;
   // Behind its deadline a long command may still have to be asked for.
   const double usual_s = deadline_s > kOkDeadline ? deadline_s : 0;
@@ -168,6 +180,7 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
     ++counters_.timeouts;
     ask(exchange);
   }
+  unanswered_ = false;
   finish(exchange);
   if (exchange.proven && deadline_s > kOkDeadline) {
     // Taken is not finished: the ok of a command behind it in the queue tells when a long one has ended.
@@ -212,6 +225,7 @@ void MarlinLink::repeat(Exchange& exchange, const std::string& why) {
 }
 
 void MarlinLink::ask(Exchange& exchange) {
+  if (capabilities_.reprap) return repeat(exchange, "no answer");  // targets are absolute: twice is once
   count_copy(exchange, "no answer");
   exchange.asked = !capabilities_.klipper;
   exchange.until = kOkDeadline + lines_.send("\n" + numbered_line(number_ + kFarAhead, "M105"));
@@ -227,6 +241,9 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
       on_ok(exchange);
       if (reply.text.size() > 2) exchange.answer.replies.push_back(std::move(reply));  // Klipper's M115
       break;
+    case ReplyKind::paused:
+      exchange.answer.repeated = true;  // M108, which answers it, has an ok of its own
+      [[fallthrough]];
     case ReplyKind::busy:
       exchange.until = std::max(exchange.until, lines_.arrival_s() + kBusyDeadline);
       break;
@@ -246,8 +263,8 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
       break;
     case ReplyKind::error:
       exchange.error = reply.text;
-      // Klipper complains of what it has read right, once.
-      (capabilities_.klipper ? exchange.error_stands : exchange.fault) = true;
+      // Klipper and RepRapFirmware complain of what they have read right, once.
+      (capabilities_.quick_stop() ? exchange.fault : exchange.error_stands) = true;
       break;
     case ReplyKind::wait:
     case ReplyKind::temperature:
@@ -261,8 +278,8 @@ void MarlinLink::on_reply(Exchange& exchange, Reply reply) {
 // where that came through the firmware does not know it, otherwise the line was damaged.
 void MarlinLink::on_unknown_command(Exchange& exchange, const Reply& reply) {
   const std::string word = exchange.code.substr(0, exchange.code.find(' '));
-  exchange.error_stands = reply.text.find('"' + exchange.code + '"') != std::string::npos ||
-                          reply.text.find('"' + word + '"') != std::string::npos;
+  exchange.error_stands = reply.text == "echo:Unknown command: \"" + exchange.code + '"' ||
+                          reply.text == "// Unknown command:\"" + word + '"';
   if (exchange.error_stands) {
     exchange.error = reply.text;
     return;
@@ -305,6 +322,7 @@ void MarlinLink::on_last_line(Exchange& exchange, std::int64_t last) {
     exchange.fallback = next;
     if (!believed) return;
     if (next <= 1) {
+      connected_ = false;
       throw PrinterReset("printer " + lines_.name() + ": its line number fell back from " +
                          std::to_string(exchange.number - 1) +
                          " to 0, so it restarted; its position is unknown");
@@ -320,6 +338,18 @@ void MarlinLink::on_last_line(Exchange& exchange, std::int64_t last) {
 }
 
 void MarlinLink::emergency(std::string_view code) { lines_.send("\n" + std::string(code) + "\n"); }
+
+void MarlinLink::abandon(int more, double seconds) {
+  const double until = lines_.port().now() + seconds;
+  std::string line;
+  for (int oks = more + (unanswered_ ? 1 : 0); oks > 0 && read_line(until, line);) {
+    const Reply reply = parse_reply(line);
+    check_alarm(reply);
+    oks -= reply.kind == ReplyKind::ok ? 1 : 0;
+  }
+  unanswered_ = false;
+  settle();
+}
 
 void MarlinLink::idle(double seconds) {
   const double until = lines_.port().now() + seconds;
@@ -343,24 +373,34 @@ void MarlinLink::settle() {
 
 void MarlinLink::check_alarm(const Reply& reply) {
   if (reply.kind == ReplyKind::ok) complaint_.clear();
-  for (const char* mark : {"echo:", "// ", "!! "})
-    if (reply.text.starts_with(mark) && reply.kind != ReplyKind::fatal) complaint_ = reply.text;
+  for (const char* mark : {"echo:", "// ", "!! ", "Error:"}) {
+    // Klipper says the cause first, and then at length what may be done.
+    const bool stands = complaint_.starts_with("// ") || complaint_.starts_with("!! ");
+    if (reply.text.starts_with(mark) && reply.kind != ReplyKind::fatal && !stands) complaint_ = reply.text;
+  }
   if (reply.kind == ReplyKind::fatal) {
     halted_ = true;
     throw PrinterHalted("printer " + lines_.name() + ": the firmware halted (" +
                         (complaint_.empty() ? "" : in_quotes(complaint_) + ", ") + in_quotes(reply.text) +
                         "); nothing more is sent, reset the printer and check it");
   }
-  if (reply.kind == ReplyKind::start && connected_) {
+  if (!connected_) return;
+  if (reply.kind == ReplyKind::start) {
     connected_ = false;
-    throw PrinterReset(
-        "printer " + lines_.name() +
-        ": the firmware restarted in use; its position is unknown, confirm the origin and start again");
+    throw PrinterReset("printer " + lines_.name() + ": the firmware restarted in use; its position is unknown, confirm the origin and start "
+                       "again; it said " +
+                       in_quotes(reply.text));
   }
-  if (reply.kind == ReplyKind::paused && connected_) {
-    throw PrinterPaused("printer " + lines_.name() +
-                        ": waits for its user; look at the printer's display and start again");
+  if (reply.kind != ReplyKind::paused && reply.kind != ReplyKind::interrupted) return;
+  if (answers_pauses_) {
+    if (reply.kind == ReplyKind::paused) emergency("M108");
+    return;
   }
+  throw PrinterPaused("printer " + lines_.name() + ": " +
+                      (reply.kind == ReplyKind::paused
+                           ? "waits for its user; look at the printer's display and start again"
+                           : "was stopped or paused at its display, or by itself (" + in_quotes(reply.text) +
+                                 "); look at it and start again"));
 }
 
 bool MarlinLink::read_line(double until, std::string& line) {

@@ -24,6 +24,8 @@ struct MarlinCapabilities {
   std::string firmware;           ///< the text of FIRMWARE_NAME, empty when not told
   bool emergency_parser = false;  ///< M112, M410 act ahead of the queue
   bool klipper = false;           ///< no line is ever asked for again, no M410, no M114 R
+  bool reprap = false;            ///< RepRapFirmware: drops damaged lines without a word, no M410
+  bool quick_stop() const { return !klipper && !reprap; }
 };
 
 class MarlinLink {
@@ -45,9 +47,9 @@ class MarlinLink {
   /// `port` must outlive the link.
   explicit MarlinLink(Port& port) : lines_(port) {}
 
-  /// Finds a fresh (`start` banner) or a running firmware, sets its line number to 0, reads M115, switches
-  /// off the reports that an earlier host may have left on (M154, M155). Throws PrinterSilent; WrongDevice
-  /// when what comes is no such firmware's answer (a GRBL controller is named); PrinterHalted.
+  /// Finds a fresh (`start` banner) or a running firmware, sets its line number to 0, reads M115; waits for a
+  /// Klipper that still starts. Throws PrinterSilent; WrongDevice when what comes is no such firmware's
+  /// answer (a GRBL controller is named); PrinterHalted.
   void connect();
 
   /// Runs one command and returns when the firmware has acknowledged it. `deadline_s` 0: 2.5 s;
@@ -58,6 +60,13 @@ class MarlinLink {
   /// Sends `code` (M410, M112, M108) without number, ahead of everything: only the emergency parser sees it
   /// in time.
   void emergency(std::string_view code);
+
+  /// From now on a pause ends no wait: it is answered by M108, and the wait goes on.
+  void answer_pauses() { answers_pauses_ = true; }
+
+  /// After a command that an exception interrupted, and after `more` unnumbered ones: reads until all have been
+  /// acknowledged, `seconds` at most, so that no later command takes their ok for its own.
+  void abandon(int more, double seconds);
 
   /// From this time of the port's clock on every wait throws PrinterSilent, which bounds a whole run.
   void give_up_at(double time_s) { give_up_s_ = time_s; }
@@ -75,17 +84,19 @@ class MarlinLink {
   const MarlinCapabilities& capabilities() const { return capabilities_; }
   const Counters& counters() const { return counters_; }
   bool halted() const { return halted_; }
+  /// Connected, and neither halted nor restarted since.
+  bool in_use() const { return connected_ && !halted_; }
   Port& port() { return lines_.port(); }
 
  private:
   struct Exchange;
 
   bool probe(double until);
-  [[noreturn]] void nobody_answered() const;
+  [[noreturn]] void nobody_answered();
   void refuse_grbl(const std::string& line) const;
   void refuse_sensor() const;
-  void switch_reports_off();
   void read_capabilities();
+  void await_klipper();
   /// Sends the exchange's current line again.
   void repeat(Exchange& exchange, const std::string& why);
   /// Asks for the last line taken, by one numbered far ahead.
@@ -104,13 +115,15 @@ class MarlinLink {
   LinePort lines_;
   MarlinCapabilities capabilities_;
   Counters counters_;
-  std::string complaint_;         // the last echo:, // or !! since an ok; a halt's reason stands before it
+  std::string complaint_;         // what was said since an ok; the cause of a halt stands before it
   std::deque<std::string> kept_;  // lines number_ - kept_.size() + 1 ... number_
   std::int64_t number_ = 0;       // of the newest line
   std::size_t heard_ = 0, numbers_ = 0;  // lines until it answered; of these, such as a sensor sends
   double give_up_s_ = std::numeric_limits<double>::infinity();
   bool connected_ = false;
   bool halted_ = false;
+  bool unanswered_ = false;  // the newest line
+  bool answers_pauses_ = false;
 };
 
 }  // namespace supertac

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace supertac {
 namespace {
@@ -9,6 +10,7 @@ namespace {
 constexpr double kProgressDeadline = 6;
 constexpr double kStopWithin = 1.6;  // in the air: of the 2 s in which Ctrl-C ends a program
 constexpr double kLiftWithin = 60;   // in contact
+constexpr double kLiftAgain = 0.5;   // s, behind a lift that failed
 constexpr int kMeasuredPairs = 3;    // of short moves to and fro
 constexpr int kClaims = 3;  // of having arrived at once, before a firmware is taken for one without M114 R
 
@@ -115,7 +117,12 @@ PalpationOutcome Palpation::run() {
         "palpation: the origin is neither homed nor confirmed; nothing was sent, home or confirm it");
   }
   std::vector<Leg> legs = legs_of(plan_, printer_.target(), printer_.limits());
-  for (const Leg& leg : legs) longest_leg_s_ = std::max(longest_leg_s_, ordered_s(leg));
+  std::vector<Point3> targets;
+  for (const Leg& leg : legs) {
+    longest_leg_s_ = std::max(longest_leg_s_, ordered_s(leg));
+    targets.push_back(leg.to);
+  }
+  printer_.check_soft_limits(targets);
   PalpationOutcome outcome;
   printer_.link().set_watch(observer_.check);
   try {
@@ -207,6 +214,7 @@ void Palpation::follow(const Leg& leg) {
 void Palpation::recover(PalpationOutcome& outcome) {
   using Finger = PalpationOutcome::Finger;
   outcome.finger = in_contact_ ? Finger::unknown : Finger::lifted;
+  bool pauses = false;
   try {
     std::rethrow_exception(outcome.error);
   } catch (const PrinterHalted&) {
@@ -222,25 +230,45 @@ void Palpation::recover(PalpationOutcome& outcome) {
     outcome.finger = Finger::stopped;
     outcome.note = "the firmware restarted and stands; its position is unknown, lift the finger by hand";
     return;
+  } catch (const PrinterPaused&) {
+    pauses = true;
   } catch (...) {  // everything else leaves a printer that can be talked to, or one that is gone: see below
   }
-  try {
-    MarlinLink& link = printer_.link();
-    link.give_up_at(link.port().now() + (in_contact_ ? kLiftWithin + 1.5 * longest_leg_s_ : kStopWithin));
-    const Printer::Stop stop = printer_.quick_stop();
-    outcome.note = stop.text;
-    if (!in_contact_) return;
-    if (stop.confirmed) outcome.finger = Finger::stopped;
-    printer_.lift(plan_.lift);
-    outcome.finger = Finger::lifted;
-    outcome.note = "the finger was lifted";
-  } catch (const PortUnplugged&) {
-    if (in_contact_) outcome.finger = Finger::unknown;  // it may be doing the lift
-    outcome.note = "the printer cannot be reached; the finger may be in contact, lift it by hand";
-  } catch (const std::exception& error) {
-    outcome.note += std::string("; the lift failed: ") + error.what();
-    if (outcome.finger == Finger::stopped && !printer_.quick_stop().confirmed)
-      outcome.finger = Finger::unknown;  // it may do the lift yet
+  MarlinLink& link = printer_.link();
+  for (double until = 0;;) {
+    try {
+      const double now = link.port().now();
+      if (until == 0) {
+        until = now + (in_contact_ ? kLiftWithin + 1.5 * longest_leg_s_ : kStopWithin);
+        link.give_up_at(until);
+        link.answer_pauses();
+      } else if (now >= until) {
+        return;
+      } else {
+        link.idle(kLiftAgain);
+      }
+      if (std::exchange(pauses, false)) link.emergency("M108");
+      if (!in_contact_) {
+        outcome.note = printer_.quick_stop().text;
+        return;
+      }
+      printer_.lift_out(plan_.start.z + plan_.lift);
+      outcome.finger = Finger::lifted;
+      outcome.note = "the finger was lifted";
+      return;
+    } catch (const PortUnplugged&) {
+      outcome.note = "the printer cannot be reached; the finger may be in contact, lift it by hand";
+      return;
+    } catch (const PrinterHalted&) {
+      outcome.finger = Finger::stopped;
+      outcome.note = "the firmware halted and takes no more commands; lift the finger by hand";
+      return;
+    } catch (const ReplayDiverged&) {
+      return;
+    } catch (const std::exception& error) {
+      outcome.note = std::string("the lift failed, lift the finger by hand and switch the printer off (") +
+                     error.what() + ")";
+    }
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include "hardware/printers/limits.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -38,10 +39,35 @@ std::string origin_command(const Point3& here) { return "G92" + coordinates(here
 void Printer::connect() {
   origin_ = Origin::unknown;
   link_.connect();
-  link_.command("G90");
+  state_.set(link_, false);
+}
+
+void Printer::put_back() {
+  try {
+    link_.set_watch(nullptr);  // nothing ends it but its bound
+    link_.give_up_at(link_.port().now() + kStopDeadline);
+    if (link_.in_use()) state_.put_back(link_);
+  } catch (const HardwareError&) {  // nobody is there to put it back
+  }
+}
+
+void Printer::check_soft_limits(const std::vector<Point3>& targets) {
+  if (origin_ != Origin::homed) return;
+  const std::optional<SoftLimits> soft = soft_limits_of(link_);
+  for (const Point3& p : targets) {
+    const auto inside = [](double v, double low, double high) {
+      return v > low - kToleranceMm && v < high + kToleranceMm;
+    };
+    if (soft && !(inside(p.x, soft->low.x, soft->high.x) && inside(p.y, soft->low.y, soft->high.y) &&
+                  inside(p.z, soft->low.z, soft->high.z)))
+      throw OutsideLimits("printer " + link_.port().name() + ": its soft endstops (M211) would cut the way to " +
+                          describe(p) + "; it says " + in_quotes(soft->text) +
+                          ", correct the plan or the firmware's limits");
+  }
 }
 
 void Printer::home() {
+  state_.set(link_, true);
   try {
     // Klipper moves nothing before it knows where it is: it is told a place, for the lift alone.
     if (link_.capabilities().klipper) link_.command("SET_KINEMATIC_POSITION Z=0");
@@ -49,6 +75,7 @@ void Printer::home() {
     link_.command("G1 Z10.000 F300");  // relative: wherever z is, first away from the plate
     link_.command("G90");
     link_.command("G28", kHomeDeadline);
+    state_.set(link_, true);  // which homing may undo
   } catch (const PrinterRefused&) {
     throw;  // and so it stands
   } catch (const PrinterHalted&) {
@@ -69,9 +96,10 @@ void Printer::home() {
 void Printer::confirm_origin(const Point3& here) {
   limits_.check_target(here);
   link_.command("M400", kHomeDeadline);
-  link_.command(link_.capabilities().klipper ? "SET_KINEMATIC_POSITION X=" + format(here.x, 3) +
-                                                   " Y=" + format(here.y, 3) + " Z=" + format(here.z, 3)
-                                             : origin_command(here));
+  if (link_.capabilities().klipper)
+    link_.command("SET_KINEMATIC_POSITION X=" + format(here.x, 3) + " Y=" + format(here.y, 3) +
+                  " Z=" + format(here.z, 3));
+  link_.command(origin_command(here));
   target_ = here;
   Point3 found = queue_position();
   for (int attempt = 0; attempt < 2 && distance(found, here) > kToleranceMm; ++attempt) {
@@ -95,6 +123,9 @@ MarlinLink::Answer Printer::start_move(const Point3& target, double speed_mm_s) 
   limits_.check_path(target_, target);
   const double length = distance(target_, target);
   MarlinLink::Answer answer = link_.command(move_command(target, speed_mm_s));
+  remark_.clear();
+  for (const Reply& reply : answer.replies)
+    if (reply.kind == ReplyKind::other && reply.text.starts_with("echo:")) remark_ = reply.text;
   target_ = target;
   expected_seconds_ += length / speed_mm_s + 0.5;
   return answer;
@@ -111,8 +142,11 @@ double Printer::finish_move() {
     link_.command("M400", kMoveMargin);
   }
   origin_ = Origin::unknown;
+  const std::optional<SoftLimits> soft = soft_limits_of(link_);
   throw PositionError("printer: expected the head at " + describe(target_) + ", found " + describe(found) +
-                      "; confirm the origin and start again");
+                      "; confirm the origin and start again" +
+                      (remark_.empty() ? "" : "; it said " + in_quotes(remark_)) +
+                      (soft ? "; its soft endstops (M211) are on: " + in_quotes(soft->text) : ""));
 }
 
 std::optional<PositionSample> Printer::sample_position(double deadline_s) {
@@ -161,13 +195,13 @@ bool Printer::stands_still() {
 }
 
 Printer::Stop Printer::quick_stop() {
-  const bool klipper = link_.capabilities().klipper;
+  const bool ends_its_move = !link_.capabilities().quick_stop();
   Stop stop;
   stop.ahead_of_queue = link_.capabilities().emergency_parser;
   try {
-    if (!klipper) link_.emergency("M410");
+    if (!ends_its_move) link_.emergency("M410");
     link_.settle();
-    const bool stands = klipper || stands_still();
+    const bool stands = ends_its_move || stands_still();
     // The position of the queue is that of the head only once nothing moves any more.
     link_.command("M400", stop.ahead_of_queue ? kStopDeadline : 1.5 * expected_seconds_ + kMoveMargin);
     target_ = agreed_position();
@@ -182,7 +216,7 @@ Printer::Stop Printer::quick_stop() {
   }
   stop.text = stop.confirmed ? "the head stands still"
                              : "the head could not be shown to stand still; switch the printer off";
-  if (!stop.ahead_of_queue && !klipper)
+  if (!stop.ahead_of_queue && !ends_its_move)
     stop.text +=
         " (this firmware has no emergency parser: a stop acts when its line is read, not before an M400 "
         "ends)";
@@ -216,6 +250,23 @@ void Printer::lift(double mm) {
   target_ = above;
   expected_seconds_ = mm / rig::kLiftMmS + 0.5;
   finish_move();
+}
+
+void Printer::lift_out(double z) {
+  const bool stops = link_.capabilities().quick_stop();
+  constexpr double kHeldByStop = 1.3;  // M410 holds Marlin for a second
+  if (stops) link_.emergency("M410");
+  link_.abandon(stops ? 1 : 0, stops ? kHeldByStop : 1.5 * expected_seconds_ + kMoveMargin);
+  target_.z = std::min(z, limits_.high.z);
+  link_.command("G1 Z" + format(target_.z, 3) + " F" + format(60 * rig::kLiftMmS, 1));
+  expected_seconds_ += (limits_.high.z - limits_.low.z) / rig::kLiftMmS;
+  link_.command("M400", 1.5 * expected_seconds_ + kMoveMargin);
+  const Point3 found = agreed_position();
+  if (std::abs(found.z - target_.z) > kToleranceMm)
+    throw PositionError("printer " + link_.port().name() + ": expected the finger lifted to Z" +
+                        format(target_.z, 2) + ", found it at " + describe(found));
+  target_ = found;
+  expected_seconds_ = 0;
 }
 
 }  // namespace supertac

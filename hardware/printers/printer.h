@@ -5,6 +5,7 @@
 #include <string>
 
 #include "hardware/printers/limits.h"
+#include "hardware/printers/machine_state.h"
 #include "hardware/printers/marlin_link.h"
 
 namespace supertac {
@@ -32,9 +33,13 @@ class Printer {
   /// `port` must outlive the printer.
   explicit Printer(Port& port, const Limits& limits = {}) : link_(port), limits_(limits) {}
 
-  /// Finds the firmware; throws as MarlinLink::connect. The origin is unknown then: Marlin cannot tell
-  /// whether its coordinates mean anything.
+  /// Finds the firmware and sets what another job may have left on in it; throws as MarlinLink::connect and
+  /// MachineState::set. The origin is unknown then: Marlin cannot tell whether its coordinates mean anything.
   void connect();
+  /// What connect() changed becomes as it was found, where that can be. Throws nothing.
+  void put_back();
+  /// Throws OutsideLimits where the firmware of a homed machine would cut one of these targets.
+  void check_soft_limits(const std::vector<Point3>& targets);
 
   /// Lifts, homes, and lifts again when the limits say so. Never homes x and y with z low. Whatever ends it
   /// early stops the head.
@@ -66,8 +71,11 @@ class Printer {
   Stop quick_stop();
   /// M112: kills the firmware; afterwards only a reset helps.
   Stop emergency_stop();
-  /// Raises the finger by `mm` from wherever it is, after a fault. Throws when that could not be verified.
+  /// Raises the finger by `mm` from wherever it is. Throws when that could not be verified.
   void lift(double mm);
+  /// The way out of contact: stops a firmware that has a quick stop, and raises the finger to `z` before
+  /// anything is asked. Throws when that could not be verified.
+  void lift_out(double z);
 
   const Point3& target() const { return target_; }
   const Limits& limits() const { return limits_; }
@@ -78,6 +86,8 @@ class Printer {
 
   MarlinLink link_;
   Limits limits_;
+  MachineState state_;
+  std::string remark_;  // of the firmware, on the newest move
   Origin origin_ = Origin::unknown;
   Point3 target_;
   double expected_seconds_ = 0;  // of the moves since the last finish

@@ -13,7 +13,7 @@ Point3 MotionQueue::at(double t) {
   if (blocks_.empty() || t <= blocks_.front().start) return rest_;
   const Block& block = blocks_.front();
   const double length = distance(block.from, block.to);
-  const double done = trapezoid_position(t - block.start, length, block.end - block.start, kAcceleration);
+  const double done = trapezoid_position(t - block.start, length, block.end - block.start, acceleration_);
   return between(block.from, block.to, length > 0 ? done / length : 1);
 }
 
@@ -27,7 +27,7 @@ void MotionQueue::move_to(const Point3& to, double speed_mm_s, double t) {
   const Point3 from = target();
   if (from == to) return;
   const double start = blocks_.empty() ? t + start_delay_s_ : blocks_.back().end;
-  end_ = start + slowness_ * trapezoid_duration(distance(from, to), speed_mm_s, kAcceleration);
+  end_ = start + slowness_ * trapezoid_duration(distance(from, to), speed_mm_s, acceleration_);
   blocks_.push_back({from, to, start, end_});
 }
 

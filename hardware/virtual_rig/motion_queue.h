@@ -14,8 +14,8 @@ class MotionQueue {
   static constexpr std::size_t kBlocks = 16;
 
   /// `slowness`: moves take this many times as long.
-  MotionQueue(const Point3& start, double start_delay_s, double slowness)
-      : rest_(start), start_delay_s_(start_delay_s), slowness_(slowness) {}
+  MotionQueue(const Point3& start, double start_delay_s, double slowness, double acceleration)
+      : rest_(start), start_delay_s_(start_delay_s), slowness_(slowness), acceleration_(acceleration) {}
 
   /// Where the head is at time t. Forgets moves that ended before t, so t may not go backwards.
   Point3 at(double t);
@@ -38,8 +38,7 @@ class MotionQueue {
     double start, end;
   };
   Point3 rest_;
-  static constexpr double kAcceleration = 500;
-  double start_delay_s_, slowness_;
+  double start_delay_s_, slowness_, acceleration_;
   double end_ = -1;
   std::deque<Block> blocks_;
 };

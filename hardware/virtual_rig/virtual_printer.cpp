@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "hardware/printers/marlin_line.h"
@@ -40,7 +42,7 @@ VirtualPrinter::VirtualPrinter(const VirtualPrinterSettings& settings, double t,
     : settings_(settings),
       motion_(settings.head,
               settings.start_delay_s > 0 ? settings.start_delay_s : (klipper() ? 0.253 : 0.107),
-              settings.slowness),
+              settings.slowness, settings.acceleration),
       dice_(settings.seed, 101),
       now_(t),
       boot_end_(t) {
@@ -48,6 +50,9 @@ VirtualPrinter::VirtualPrinter(const VirtualPrinterSettings& settings, double t,
   reset(t);
   if (already_running) {
     booting_ = false;
+    left_over_ = settings.left_over;
+    base_ = left_over_.offset;
+    ready_s_ = t + settings.starts_s;
     report_every(settings.auto_position_s, settings.auto_temperature_s);
     output_.clear();
     last_line_ = 357;
@@ -62,7 +67,9 @@ void VirtualPrinter::reset(double t) {
   received_.clear();
   partial_.clear();
   emergency_.clear();
-  blocked_ = repeat_after_block_ = homed_ = halted_ = relative_ = may_move_ = false;
+  blocked_ = repeat_after_block_ = homed_ = halted_ = may_move_ = false;
+  left_over_ = {};
+  base_ = {};
   command_due_ = -1;
   last_line_ = 0;
   booting_ = true;
@@ -237,7 +244,11 @@ std::string VirtualPrinter::take_output() {
   return out;
 }
 
-Point3 VirtualPrinter::head(double t) { return motion_.at(t); }
+Point3 VirtualPrinter::head(double t) {
+  Point3 p = motion_.at(t);
+  p.z += left_over_.mesh_mm * std::sin(std::numbers::pi * (p.y - rig::kPlate.y) / rig::kPlateLengthMm);
+  return p;
+}
 
 void VirtualPrinter::start_next(double t) {
   if (random_trouble(t)) return;

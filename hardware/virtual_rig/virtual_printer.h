@@ -21,6 +21,16 @@ namespace supertac {
 /// Marlin ignores a repeated line since 2.1.2; before, it complained of its number.
 enum class Firmware { marlin, marlin_before_2_1_2, klipper };
 
+/// What another job left on in a firmware that is running already.
+struct LeftOver {
+  bool inches = false, relative = false;
+  double speed_percent = 100, flow_percent = 100;
+  double mesh_mm = 0;    ///< by which mesh compensation raises the middle of the plate; 0: it is off
+  Point3 home_offset{};  ///< M206
+  Point3 offset{};       ///< Klipper's SET_GCODE_OFFSET
+  bool operator==(const LeftOver&) const = default;
+};
+
 struct VirtualPrinterSettings {
   Firmware firmware = Firmware::marlin;
   Point3 head = rig::kMounted;    ///< where the head really is at power-on; the firmware believes 0, 0, 0
@@ -30,6 +40,9 @@ struct VirtualPrinterSettings {
   bool display = false;      ///< where M0 can be answered
   bool advanced_ok = false;  ///< `ok N0 P15 B3`
   bool homing_fails = false;
+  LeftOver left_over{};
+  double acceleration = 500;   ///< of every move (mm/s^2)
+  double starts_s = 0;         ///< for which Klipper's host still looks for its boards
   double auto_position_s = 0;  ///< M154 as an earlier host left it on a running firmware; 0: off
   bool deaf_to_m154 = false;   ///< these reports cannot be switched off
   double auto_temperature_s = 0;
@@ -79,6 +92,10 @@ class VirtualPrinter {
   void report_every(double position_s, double temperature_s);
   /// A sensor beyond its range: the firmware says so and halts.
   void overheat(double t);
+  /// A pause in the middle of a move, of a display or a filament sensor: it ends, then M108 is waited for.
+  void pause_behind_move(double t);
+  /// What is left on in it now.
+  const LeftOver& left_over() const { return left_over_; }
   /// Puts raw text into the reply stream.
   void inject(const std::string& text) { output_ += text; }
 
@@ -105,6 +122,9 @@ class VirtualPrinter {
   void move(const std::string& command, double t);
   void home(double t);
   void set_position(const std::string& command);
+  bool run_state(int code, const std::string& command);
+  bool run_klipper(const std::string& command, double t);
+  Point3 origin() const { return {offset_.x + base_.x, offset_.y + base_.y, offset_.z + base_.z}; }
   void report(const Point3& physical);
   void block_until(double time, double now);
   void finish_block(double t);
@@ -118,7 +138,10 @@ class VirtualPrinter {
   VirtualPrinterSettings settings_;
   MotionQueue motion_;
   Dice dice_;
-  Point3 offset_;                     // logical = physical - offset
+  Point3 offset_, base_;              // logical = physical - offset - base; base_: Klipper's own
+  LeftOver left_over_, saved_;
+  Point3 saved_base_;
+  double ready_s_ = 0;  // of Klipper
   Point3 steps_zero_;                 // where Count is 0; G92 does not move it
   std::deque<std::string> received_;  // whole lines not yet looked at
   std::deque<std::string> queue_;     // accepted, not yet run
@@ -136,8 +159,7 @@ class VirtualPrinter {
   double feed_ = 10;
   double position_every_ = 0, position_due_ = 0, temperature_every_ = 0, temperature_due_ = 0;  // 0: off
   std::int64_t last_line_ = 0;
-  bool booting_ = false, blocked_ = false, homed_ = false, halted_ = false, unplugged_ = false,
-       relative_ = false;
+  bool booting_ = false, blocked_ = false, homed_ = false, halted_ = false, unplugged_ = false;
   bool repeat_after_block_ = false;  // what holds the firmware is no command: no ok at its end
   bool waits_for_user_ = false;
   bool may_move_ = false;  // Klipper was told a position

@@ -13,6 +13,8 @@
 namespace supertac {
 namespace {
 
+constexpr double kInch = 25.4;
+
 // The number behind a letter, as Marlin's parser reads it.
 std::optional<double> parameter(const std::string& command, const std::string& name) {
   const std::size_t at = command.find(name, 1);
@@ -32,7 +34,7 @@ void VirtualPrinter::unknown(const std::string& command) {
 }
 
 void VirtualPrinter::run(const std::string& command, double t) {
-  if (klipper() && command.starts_with("SET_KINEMATIC_POSITION")) return set_position(command);
+  if (klipper() && run_klipper(command, t)) return;
   // Klipper knows commands by their text, not by their number: M0114 is none of them.
   if (klipper() && command.size() > 2 && command[1] == '0') return unknown(command);
   int code = -1;
@@ -54,11 +56,13 @@ void VirtualPrinter::run_g(int code, const std::string& command, double t) {
                          t);
     case 28:
       return home(t);
+    case 20:
     case 21:
+      left_over_.inches = code == 20;
       return;
     case 90:
     case 91:
-      relative_ = code == 91;
+      left_over_.relative = code == 91;
       return;
     case 92:
       return set_position(command);
@@ -68,15 +72,74 @@ void VirtualPrinter::run_g(int code, const std::string& command, double t) {
   }
 }
 
+bool VirtualPrinter::run_klipper(const std::string& command, double t) {
+  if (t < ready_s_ && !command.starts_with("M11")) {
+    output_ += "// Printer is not ready\n// The klippy host software is attempting to connect.  Please\n"
+               "// retry in a few moments.\n!! Printer is not ready\n";
+    return true;
+  }
+  Point3& offset = left_over_.offset;
+  if (command.starts_with("SET_KINEMATIC_POSITION")) {
+    set_position(command);
+  } else if (command.starts_with("SAVE_GCODE_STATE")) {
+    saved_ = left_over_, saved_base_ = base_;
+  } else if (command.starts_with("RESTORE_GCODE_STATE")) {
+    left_over_ = saved_, base_ = saved_base_;
+  } else if (command.starts_with("SET_GCODE_OFFSET")) {
+    base_ = {base_.x - offset.x, base_.y - offset.y, base_.z - offset.z};
+    offset = {};
+  } else if (command == "BED_MESH_CLEAR") {
+    left_over_.mesh_mm = 0;
+  } else if (command == "GET_POSITION") {
+    output_ += "// gcode homing: X:" + format(offset.x, 6) + " Y:" + format(offset.y, 6) +
+               " Z:" + format(offset.z, 6) + "\n";
+  } else {
+    return false;
+  }
+  return true;
+}
+
+// What stays from job to job, and its reports.
+bool VirtualPrinter::run_state(int code, const std::string& command) {
+  const std::optional<double> value = parameter(command, "S");
+  const Point3& home = left_over_.home_offset;
+  if (code == 220) {
+    if (value) left_over_.speed_percent = *value;
+    if (!value) output_ += "FR:" + format(left_over_.speed_percent) + "%\n";
+  } else if (code == 221) {
+    if (value) left_over_.flow_percent = *value;
+    if (!value) output_ += "echo:E0 Flow: " + format(left_over_.flow_percent) + "%\n";
+  } else if (code == 420 && !klipper()) {
+    if (value) left_over_.mesh_mm = *value > 0 ? settings_.left_over.mesh_mm : 0;
+    output_ += std::string("echo:Bed Leveling ") + (left_over_.mesh_mm == 0 ? "OFF" : "ON") +
+               "\necho:Fade Height OFF\n";
+  } else if (code == 211 && !klipper()) {
+    output_ += "echo:Soft endstops: ON  Min: X0.00 Y0.00 Z0.00  Max: X" + format(settings_.bed.x, 2) + " Y" +
+               format(settings_.bed.y, 2) + " Z" + format(settings_.bed.z, 2) + "\n";
+  } else if (code == 503 && !klipper()) {
+    output_ += std::string("echo:; Linear Units:\necho:  ") +
+               (left_over_.inches ? "G20 ; (in)" : "G21 ; (mm)") + "\necho:; Home offset:\necho:  M206 X" +
+               format(home.x, 2) + " Y" + format(home.y, 2) + " Z" + format(home.z, 2) + "\n";
+  } else {
+    return false;
+  }
+  return true;
+}
+
 void VirtualPrinter::set_position(const std::string& command) {
   const Point3 at = motion_.target();
   const bool kinematic = command[0] == 'S';
   const auto named = [&](char axis) {
     return parameter(command, kinematic ? std::string{' ', axis, '='} : std::string{axis});
   };
-  if (const auto x = named('X')) offset_.x = at.x - *x;
-  if (const auto y = named('Y')) offset_.y = at.y - *y;
-  if (const auto z = named('Z')) offset_.z = at.z - *z;
+  const double unit = left_over_.inches && !kinematic ? kInch : 1;
+  // Klipper's G92 is an offset of its own upon the position.
+  const bool own = klipper() && !kinematic;
+  Point3& shifted = own ? base_ : offset_;
+  const Point3 from = own ? offset_ : Point3{};
+  if (const auto x = named('X')) shifted.x = at.x - from.x - unit * *x;
+  if (const auto y = named('Y')) shifted.y = at.y - from.y - unit * *y;
+  if (const auto z = named('Z')) shifted.z = at.z - from.z - unit * *z;
   may_move_ = may_move_ || kinematic;
 }
 
@@ -85,6 +148,7 @@ void VirtualPrinter::run_m(int code, const std::string& command, double t) {
       code == 0 || code == 17 || code == 108 || code == 154 || code == 155 || code == 211 || code == 410;
   if (klipper() && only_marlin) return unknown(command);
   executed_.push_back({t, command});
+  if (run_state(code, command)) return;
   switch (code) {
     case 0:
       return pause(command, t);
@@ -100,7 +164,6 @@ void VirtualPrinter::run_m(int code, const std::string& command, double t) {
     case 17:
     case 84:
     case 108:
-    case 211:
       return;
     case 112:
       return kill(t, "echo:M112 Shutdown\n");
@@ -119,6 +182,7 @@ void VirtualPrinter::run_m(int code, const std::string& command, double t) {
       return block_until(klipper() ? t + 0.1 * std::ceil((end - t) / 0.1) : end, t);
     }
     case 410:
+      if (settings_.emergency_parser) return;  // it has acted when it came
       motion_.stop(t);
       return block_until(t + settings_.quick_stop_s, t);
     default:
@@ -133,21 +197,23 @@ void VirtualPrinter::move(const std::string& command, double t) {
     output_ += "!! Must home axis first: 0.000 0.000 0.000 [0.000]\n";
     return;
   }
-  if (const auto f = parameter(command, "F"); f && *f > 0) feed_ = *f / 60;
+  const double unit = left_over_.inches ? kInch : 1;
+  if (const auto f = parameter(command, "F"); f && *f > 0) feed_ = unit * *f / 60;
   const Point3 from = motion_.target();
   const auto axis = [&](char letter, double physical, double offset, double limit) {
     const auto value = parameter(command, {letter});
     if (!value) return physical;
-    double logical = relative_ ? physical - offset + *value : *value;
+    double logical = left_over_.relative ? physical - offset + unit * *value : unit * *value;
     if (homed_) logical = std::clamp(logical, 0.0, limit);  // silently, and before homing not at all
     return logical + offset;
   };
-  const Point3 to{axis('X', from.x, offset_.x, settings_.bed.x),
-                  axis('Y', from.y, offset_.y, settings_.bed.y),
-                  axis('Z', from.z, offset_.z, settings_.bed.z)};
+  const Point3 zero = origin();
+  const Point3 to{axis('X', from.x, zero.x, settings_.bed.x), axis('Y', from.y, zero.y, settings_.bed.y),
+                  axis('Z', from.z, zero.z, settings_.bed.z)};
   const double length = distance(from, to);
   const double rise = std::abs(to.z - from.z);
-  const double speed = rise > 0 ? std::min(feed_, rig::kLiftMmS * length / rise) : feed_;
+  const double ordered = feed_ * left_over_.speed_percent / 100;
+  const double speed = rise > 0 ? std::min(ordered, rig::kLiftMmS * length / rise) : ordered;
   motion_.move_to(to, speed, t);
 }
 
@@ -158,6 +224,9 @@ void VirtualPrinter::home(double t) {
   motion_.move_to({0, 0, at.z + 5}, 50, t);
   motion_.move_to({0, 0, 0}, rig::kLiftMmS, t);
   offset_ = steps_zero_ = {};
+  base_ = left_over_.offset;
+  const Point3& shift = left_over_.home_offset;
+  offset_ = {-shift.x, -shift.y, -shift.z};
   homed_ = true;
   block_until(motion_.end_time(), t);
 }
@@ -165,7 +234,8 @@ void VirtualPrinter::home(double t) {
 void VirtualPrinter::report(const Point3& physical) {
   const int digits = klipper() ? 3 : 2;
   const auto text = [digits](double v) { return format(std::abs(v) < 0.005 ? 0.0 : v, digits); };
-  const Point3 p{physical.x - offset_.x, physical.y - offset_.y, physical.z - offset_.z};
+  const Point3 zero = origin();
+  const Point3 p{physical.x - zero.x, physical.y - zero.y, physical.z - zero.z};
   output_ += "X:" + text(p.x) + " Y:" + text(p.y) + " Z:" + text(p.z) + " E:" + text(0);
   if (klipper()) {
     output_ += "\n";
@@ -201,6 +271,12 @@ void VirtualPrinter::pause(const std::string& command, double t) {
     return;
   }
   waits_for_user_ = true;
+  block_until(kNever, t);
+}
+
+void VirtualPrinter::pause_behind_move(double t) {
+  waits_for_user_ = true;
+  if (!blocked_) repeat_after_block_ = true;  // no command: no ok at its end
   block_until(kNever, t);
 }
 

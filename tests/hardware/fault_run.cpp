@@ -31,7 +31,7 @@ std::string check_moves(std::vector<std::string> ran, std::vector<std::string> p
   for (auto* moves : {&ran, &planned})
     std::erase_if(*moves, [&](const std::string& move) { return move.ends_with(measured); });
   std::size_t count = ran.size();
-  if (!verdict.complete && count > 0 && ran.back().starts_with("G1 Z")) --count;
+  while (!verdict.complete && count > 0 && ran[count - 1].starts_with("G1 Z")) --count;
   if (count > planned.size() || (verdict.complete && count != planned.size())) {
     return "ran " + std::to_string(count) + " moves, planned " + std::to_string(planned.size());
   }
@@ -108,7 +108,7 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
   board.watch(rig.world().board());
   std::vector<std::string> numbered;
   rig.world().printer().on_line([&](std::int64_t, const std::string& command, double) {
-    if (command.starts_with("G1")) numbered.push_back(command);
+    if (command.starts_with("G1 ")) numbered.push_back(command);
   });
   RecorderSettings settings;
   settings.bed.plan = plan;

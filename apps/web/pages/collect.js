@@ -1,5 +1,5 @@
 // The page of a collection: where the finger is, and a button that does what Ctrl-C does. Nothing here moves it.
-let hello = null, newest = null, alive = 0, texture = null, ended = null;
+let hello = null, newest = null, texture = null, ended = null, stopping = false;
 
 // The plate's heights as an image, y to the right.
 function textureOf(h) {
@@ -67,12 +67,12 @@ function show() {
   element("plate").setAttribute("aria-label", `finger at x ${e.x.toFixed(0)} mm, y ${e.y.toFixed(0)} mm of the plate`);
 }
 
-function frame(now) {
+function frame() {
   requestAnimationFrame(frame);
-  const away = !ended && (!hello || now - alive > 3000), link = element("link");
+  const away = !ended && link.away(), lamp = element("link");
   document.body.classList.toggle("away", away);
-  link.className = away || ended && ended.failed ? "lamp alarm" : "lamp";
-  link.textContent = ended ? ended.outcome : away ? "no connection, trying again" : "live";
+  lamp.className = away || ended && ended.failed ? "lamp alarm" : "lamp";
+  lamp.textContent = ended ? ended.outcome : away ? "no connection, trying again" : "live";
   if (!hello || !dirty) return;
   dirty = false;
   draw();
@@ -82,25 +82,38 @@ let dirty = false;
 addEventListener("resize", () => { dirty = true; });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { dirty = true; });
 
-function connect() {
-  const source = new EventSource("/events");
-  source.addEventListener("hello", (e) => {
-    hello = JSON.parse(e.data);
+const say = (text) => { element("said").textContent = text; };
+const link = new Link({
+  hello: (h) => {
+    hello = h;
     texture = textureOf(hello);
     newest = ended = null;
+    stopping = false;
     dirty = true;
     element("badge").textContent = hello.plate;
     element("source").textContent = hello.source;
     element("plan").textContent = hello.plan;
-  });
-  source.onmessage = (e) => { alive = performance.now(); newest = JSON.parse(e.data); dirty = true; };
-  source.addEventListener("end", (e) => { ended = JSON.parse(e.data); });
-  source.onerror = () => { if (source.readyState === EventSource.CLOSED) setTimeout(connect, 1000); };
-}
-
-element("stop").addEventListener("click", async () => {
-  const answer = await fetch("/stop", {method: "POST", headers: {"X-Token": hello.token}});
-  element("said").textContent = await answer.text();
+  },
+  news: (news) => {
+    newest = news;
+    dirty = true;
+    if (stopping && news.lifted) say("the finger is lifted; the run ends");
+  },
+  end: (end) => {
+    ended = end;
+    if (stopping) say(end.outcome);
+  },
 });
-connect();
+
+// Nothing but what the machine does ends the asking.
+element("stop").addEventListener("click", async () => {
+  stopping = true;
+  say("asking the program to stop");
+  const answer = await link.act("stop", (n) => {
+    if (ended) return false;
+    say(`not heard yet, asked ${n} times; Ctrl-C in the program's terminal and the printer's switch stop it too`);
+    return true;
+  });
+  if (!ended) say(answer);
+});
 requestAnimationFrame(frame);

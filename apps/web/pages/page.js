@@ -77,23 +77,18 @@ function onPicture(event) {
   supertac.newest = event;
 }
 
-function connect() {
-  const source = new EventSource("/events");
-  source.addEventListener("hello", (e) => onHello(JSON.parse(e.data)));
-  source.onmessage = (e) => { alive = performance.now(); onPicture(JSON.parse(e.data)); };
-  source.addEventListener("end", (e) => {
-    ended = JSON.parse(e.data);
+let ended = null;
+const link = new Link({
+  hello: onHello,
+  news: onPicture,
+  end: (end) => {
+    ended = end;
     element("record").setAttribute("aria-pressed", false);
     element("record").firstChild.textContent = "Record";
     element("said").textContent = "the run has ended";
     for (const button of document.querySelectorAll("nav button")) button.disabled = button.id !== "snapshot";
-  });
-  source.onerror = () => {
-    alive = 0;
-    if (source.readyState === EventSource.CLOSED) setTimeout(connect, 1000);  // else it tries again by itself
-  };
-}
-let alive = 0, ended = null;
+  },
+});
 
 // --- What is shown -------------------------------------------------------------------------------------------
 
@@ -189,7 +184,7 @@ function showFiles(names) {
 let described = 0, figures = 0, heard = "";
 function frame(now) {
   requestAnimationFrame(frame);
-  const away = !ended && (!supertac.hello || now - alive > 3000);
+  const away = !ended && link.away();
   document.body.classList.toggle("away", away);
   if (ended) setLamp("link", ended.failed ? "alarm" : "unknown", ended.outcome);
   else setLamp("link", away ? "alarm" : supertac.paused ? "unknown" : "",
@@ -220,14 +215,7 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { re
 
 // --- What can be done ----------------------------------------------------------------------------------------
 
-async function ask(action) {
-  try {
-    const answer = await fetch("/" + action, {method: "POST", headers: {"X-Token": supertac.hello.token}});
-    element("said").textContent = (await answer.text()).trim();
-  } catch (error) {
-    element("said").textContent = "the program does not answer";
-  }
-}
+async function ask(action) { element("said").textContent = await link.act(action); }
 
 function pause() {
   supertac.paused = !supertac.paused;
@@ -299,5 +287,4 @@ addEventListener("keydown", (e) => {
   actions[keys[key]]();
 });
 
-connect();
 requestAnimationFrame(frame);
