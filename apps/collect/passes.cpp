@@ -103,13 +103,14 @@ nlohmann::ordered_json to_json(const CollectedPass& pass, const std::string& fil
           {"doubt", pass.doubt}};
 }
 
-std::string to_line(const CollectedPass& pass) {
+std::string to_line(const CollectedPass& pass, double speed, double ordered) {
   const Quality quality = quality_of(pass);
   return "pass " + std::to_string(pass.pass) + ": " + std::to_string(quality.frames) + " frames (" +
          format(quality.rate_hz, 1) + "/s), " + std::to_string(pass.missing) + " missing, " +
          (pass.left_out > 0 ? std::to_string(pass.left_out) + " left out of uncertain time, " : "") +
          std::to_string(quality.suspect) + " suspect, " + std::to_string(pass.positions) + " positions" +
-         (pass.complete ? "" : ", incomplete") + (pass.doubt.empty() ? "" : ", doubtful: " + pass.doubt);
+         (pass.complete ? "" : ", incomplete") +
+         (speed != ordered ? ", at " + format(speed) + " mm/s instead of " + format(ordered) : "") + (pass.doubt.empty() ? "" : ", doubtful: " + pass.doubt);
 }
 
 }  // namespace
@@ -143,11 +144,14 @@ PassesReport write_passes(const Arguments& arguments, const std::string& journal
   for (const CollectedPass& pass : collection.passes) {
     report.left_out += pass.left_out;
     if (pass.time_s.size() < 2) continue;
-    const Recording recording = recording_of(pass, collection, header, report.damage);
-    const std::string name = recording_file_name(recording);
+    Recording recording = recording_of(pass, collection, header, report.damage);
+    const std::string name = recording_file_name(recording);  // a trial's files are known by its order
+    recording.speed_mm_s = named_speed(pass.measured_speed, header.speed);
+    if (recording.speed_mm_s != header.speed) recording.metadata["ordered_mm_s"] = format(header.speed);
     write_recording(folder.add(name), recording);
-    arguments.print(to_line(pass));
+    arguments.print(to_line(pass, recording.speed_mm_s, header.speed));
     passes.push_back(to_json(pass, name));
+    passes.back()["speed_mm_s"] = recording.speed_mm_s;
     report.frames += pass.time_s.size();
     report.doubtful += pass.doubt.empty() ? 0 : 1;
   }

@@ -28,7 +28,7 @@ struct Recording {
   SignalScale signal_scale;                     ///< unit, polarity and range of the signals
   std::string plate;                            ///< name as Plate::named takes it
   int trial = 0, pass = 0;                      ///< from 1
-  double speed_mm_s = 0;                        ///< as commanded; 0 when unknown
+  double speed_mm_s = 0;                        ///< as measured, or commanded; 0 when unknown
   std::string source;                           ///< "simulated", "imported" or "collected"
   std::map<std::string, std::string> metadata;  ///< whatever else is worth keeping (filter, time base, ...)
 

@@ -9,16 +9,13 @@
 
 #include "hardware/collection/collected_frames.h"
 #include "hardware/ports/errors.h"
-#include "hardware/printers/motion_model.h"
 #include "io/files/json.h"
-#include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 
 namespace supertac {
 namespace {
 
 constexpr double kLargest = 1e10;   // of any number in an event: a journal may come from anywhere
-constexpr int kMostSteps = 20'000;  // of a modelled leg: 100 s every 5 ms
 
 std::string point_text(const Point3& p) {
   return format(p.x, 4) + " " + format(p.y, 4) + " " + format(p.z, 4);
@@ -95,53 +92,6 @@ std::vector<RecordedLeg> legs_in(const Journal& journal, bool& complete) {
   return legs;
 }
 
-// How far the sample is from the leg's straight line, ends included.
-double off_leg(const Leg& leg, const Point3& p) {
-  const double length = distance(leg.from, leg.to);
-  const double along =
-      ((p.x - leg.from.x) * (leg.to.x - leg.from.x) + (p.y - leg.from.y) * (leg.to.y - leg.from.y) +
-       (p.z - leg.from.z) * (leg.to.z - leg.from.z)) /
-      std::max(length * length, 1e-12);
-  return distance(p, between(leg.from, leg.to, std::clamp(along, 0.0, 1.0)));
-}
-
-double median_round_trip(const std::vector<PositionSample>& samples) {
-  std::vector<double> trips;
-  for (const PositionSample& sample : samples) trips.push_back(sample.round_trip_s);
-  return median(trips);
-}
-
-// The samples that can all be true, as many as possible. Nothing damaged is believed for its neighbours'
-// sake: what nothing else can be reached from stands alone.
-std::vector<PositionSample> chain_of(const Leg& leg, const std::vector<PositionSample>& samples) {
-  constexpr std::size_t kLookBack = 64;
-  const double slowest_answer = samples.empty() ? 0 : 3 * median_round_trip(samples) + 0.001;
-  std::vector<PositionSample> good = {{leg.sent_s, 0, leg.from}};
-  for (const PositionSample& sample : samples)
-    if (sample.round_trip_s <= slowest_answer && off_leg(leg, sample.position) < 0.05) good.push_back(sample);
-  if (leg.ended_s > 0) good.push_back({leg.ended_s, 0, leg.to});
-  const auto follows = [&](std::size_t before, std::size_t after) {
-    return reachable(leg, good[before], good[after]) &&
-           distance(leg.from, good[before].position) < distance(leg.from, good[after].position) + 0.015;
-  };
-  std::vector<std::size_t> length(good.size(), 0), from(good.size(), 0);  // 0: of no chain from the start
-  length[0] = 1;
-  std::size_t best = 0;
-  for (std::size_t i = 1; i < good.size(); ++i) {
-    const auto extend = [&](std::size_t j) {
-      if (length[j] > 0 && length[j] + 1 > length[i] && follows(j, i)) length[i] = length[j] + 1, from[i] = j;
-    };
-    for (std::size_t j = i > kLookBack ? i - kLookBack : 0; j < i; ++j) extend(j);
-    extend(0);
-    if (length[i] >= length[best]) best = i;
-  }
-  std::vector<PositionSample> chain;
-  for (std::size_t i = best; i > 0; i = from[i]) chain.push_back(good[i]);
-  std::reverse(chain.begin(), chain.end());
-  if (!chain.empty() && leg.ended_s > 0 && chain.back().time_s == leg.ended_s) chain.pop_back();
-  return chain;
-}
-
 // By how much (s) the clock misses the frames first to last.
 double clock_error(const CollectedFrames& all, std::size_t first, std::size_t last) {
   constexpr int kReads = 8;
@@ -160,19 +110,19 @@ double clock_error(const CollectedFrames& all, std::size_t first, std::size_t la
   return worst;
 }
 
-std::string doubt_of(const ClockFit& clock, double clock_error_s, double speed, double track_mm) {
+std::string doubt_of(const ClockFit& clock, double clock_error_s, double speed, const PositionTrack& track) {
   std::string doubt;
   if (!clock.plausible)
     doubt = "the board's clock says " + format(1e6 * clock.measured_s, 1) + " us a frame, the nominal " +
             format(1e6 * rig::kFramePeriodS, 0) + " are used; ";
   if (clock_error_s * speed > kTrustedMm)
     doubt += "frames are up to " + format(clock_error_s, 2) + " s off their clock; ";
-  if (track_mm > kTrustedMm) doubt += "the head may have been " + format(track_mm, 1) + " mm elsewhere; ";
-  return doubt.substr(0, doubt.size() - std::min<std::size_t>(2, doubt.size()));
+  return doubt + track.doubt(kTrustedMm);
 }
 
 CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const PositionTrack& track,
                       double speed) {
+  constexpr double kLeastKept = 0.75;
   CollectedPass pass;
   std::size_t begin = 0, end = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -193,9 +143,15 @@ CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const Pos
   }
   pass.speed = speed;
   const std::size_t checked = std::min(all.size(), end + static_cast<std::size_t>(all.follow));
-  pass.doubt = doubt_of(all.clock, clock_error(all, begin, checked), speed, track.doubt_mm());
+  pass.measured_speed = track.speed();
+  pass.doubt = doubt_of(all.clock, clock_error(all, begin, checked), speed, track);
   // A sensor that turns out to be slower than its file says has lost fewer than it seemed.
   if (end > 0) pass.missing = all.missing[end - 1] - std::min(all.missing[begin], all.missing[end - 1]);
+  const std::uint64_t kept = pass.time_s.size(), made = kept + pass.left_out + pass.missing;
+  if (static_cast<double>(kept) < kLeastKept * static_cast<double>(made))
+    pass.doubt +=
+        "only " + std::to_string(kept) + " of " + std::to_string(made) + " frames were kept; ";
+  pass.doubt.resize(pass.doubt.size() - std::min<std::size_t>(2, pass.doubt.size()));
   return pass;
 }
 
@@ -229,91 +185,11 @@ std::string event_text(const PositionSample& sample) {
          point_text(sample.position);
 }
 
-void PositionTrack::add(double time_s, const Point3& position) {
-  if (points_.empty() || time_s > points_.back().time_s) points_.push_back({time_s, position});
-}
-
-// Between two knots no head is faster than ordered: how far it can have been from the straight line in time.
-void PositionTrack::distrust(const Leg& leg) {
-  if (points_.size() < 2 || !(leg.speed > 0)) return;
-  const Knot &a = points_[points_.size() - 2], &b = points_.back();
-  const double way = distance(a.position, b.position), farthest = leg.speed * (b.time_s - a.time_s);
-  if (way < farthest) doubt_mm_ = std::max(doubt_mm_, way * (1 - way / farthest));
-}
-
-MoveTiming timing_of(std::span<const Leg> ended) {
-  constexpr std::size_t kEnough = 4, kSlides = 3;
-  constexpr double kMostSlowness = 0.02;
-  const auto took = [](const Leg& leg) { return leg.ended_s - leg.accepted_s; };
-  double slide_speed = 0;
-  for (const Leg& leg : ended) slide_speed = leg.phase == Phase::slide ? leg.speed : slide_speed;
-  std::vector<double> measured, all, slides;
-  for (const Leg& leg : ended) {
-    if (!(leg.speed > 0) || leg.from == leg.to) continue;
-    const double delay = took(leg) - trapezoid_duration(distance(leg.from, leg.to), leg.speed, kModelledMmS2);
-    all.push_back(delay);
-    if (leg.phase == Phase::approach && leg.speed == slide_speed && leg.from.z == leg.to.z)
-      measured.push_back(delay);
-  }
-  if (measured.size() < kEnough) measured = all;
-  MoveTiming timing;
-  if (measured.empty()) return timing;
-  std::sort(measured.begin(), measured.end());
-  timing.delay_s = median(measured);
-  if (measured.size() >= kEnough) timing.spread_s = measured[measured.size() - 2] - measured[1];
-  for (const Leg& leg : ended) {
-    if (leg.phase != Phase::slide || !(leg.speed > 0)) continue;
-    slides.push_back((took(leg) - timing.delay_s - leg.speed / kModelledMmS2) / ordered_s(leg));
-  }
-  if (slides.size() < kSlides) return timing;
-  const double slowness = median(slides);
-  if (std::abs(slowness - 1) < kMostSlowness) timing.slowness = slowness;
-  return timing;
-}
-
-void PositionTrack::model(const Leg& leg, const MoveTiming& timing) {
-  const double length = distance(leg.from, leg.to);
-  if (!(leg.speed > 0)) return add(leg.ended_s, leg.to);
-  // Longer or shorter than the run's other moves: nobody knows where on the way the head was slow.
-  const double off_s = leg.ended_s - leg.accepted_s - timing.delay_s -
-                       timing.slowness * trapezoid_duration(length, leg.speed, kModelledMmS2);
-  doubt_mm_ = std::max(doubt_mm_, std::min(length, (std::abs(off_s) + timing.spread_s) * leg.speed));
-  const double start = std::min(std::max(leg.accepted_s + timing.delay_s, leg.sent_s), leg.ended_s - 1e-6);
-  const double duration = leg.ended_s - start;
-  const int steps = static_cast<int>(std::clamp(duration / 0.005, 1.0, double{kMostSteps}));
-  for (int i = 0; i <= steps; ++i) {
-    const double t = duration * i / steps;
-    const double part = length > 0 ? trapezoid_position(t, length, duration, kModelledMmS2) / length : 1;
-    add(start + t, between(leg.from, leg.to, part));
-  }
-}
-
-void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& samples,
-                            const MoveTiming& timing) {
-  add(leg.sent_s, leg.from);
-  if (samples.empty() && leg.ended_s > 0) return model(leg, timing);
-  const std::vector<PositionSample> chain = chain_of(leg, samples);
-  rejected_ += samples.size() - chain.size();
-  for (const PositionSample& sample : chain) {
-    add(sample.time_s, sample.position);
-    distrust(leg);
-    doubt_mm_ = std::max(doubt_mm_, 0.5 * sample.round_trip_s * leg.speed);
-  }
-  if (leg.ended_s > 0) {
-    add(leg.ended_s, leg.to);
-    distrust(leg);
-  }
-}
-
-Point3 PositionTrack::at(double time_s) const {
-  if (points_.empty()) return {};
-  const auto after = std::lower_bound(points_.begin(), points_.end(), time_s,
-                                      [](const Knot& knot, double t) { return knot.time_s < t; });
-  if (after == points_.begin()) return points_.front().position;
-  if (after == points_.end()) return points_.back().position;
-  const Knot& a = *(after - 1);
-  const Knot& b = *after;
-  return between(a.position, b.position, (time_s - a.time_s) / (b.time_s - a.time_s));
+double named_speed(double measured, double ordered) {
+  constexpr double kAsOrdered = 0.005;
+  if (!(measured > 0 && ordered > 0) || std::abs(measured / ordered - 1) < kAsOrdered) return ordered;
+  const double digit = std::pow(10, std::floor(std::log10(measured)) - 2);
+  return digit * std::round(measured / digit);
 }
 
 Sensor sensor_of(const Journal& journal) { return part_of_header(journal, "sensor", sensor_of_json); }

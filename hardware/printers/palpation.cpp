@@ -11,7 +11,8 @@ constexpr double kProgressDeadline = 6;
 constexpr double kStopWithin = 1.6;  // in the air: of the 2 s in which Ctrl-C ends a program
 constexpr double kLiftWithin = 60;   // in contact
 constexpr double kLiftAgain = 0.5;   // s, behind a lift that failed
-constexpr int kMeasuredPairs = 3;    // of short moves to and fro
+constexpr int kMeasuredPairs = 3;    // of short moves to and fro, at the slide's speed and a slow one
+constexpr double kSlowMmS = 2;       // whose ramps take next to no time
 constexpr int kClaims = 3;  // of having arrived at once, before a firmware is taken for one without M114 R
 
 }  // namespace
@@ -31,9 +32,9 @@ const char* name_of(Phase phase) {
   }
 }
 
-bool reachable(const Leg& leg, const PositionSample& from, const PositionSample& to) {
+bool reachable(double speed, const PositionSample& from, const PositionSample& to) {
   const double seconds = 1.05 * (to.time_s - from.time_s) + 0.5 * (from.round_trip_s + to.round_trip_s);
-  return to.time_s > from.time_s && distance(from.position, to.position) < leg.speed * seconds + 0.05;
+  return to.time_s > from.time_s && distance(from.position, to.position) < speed * seconds + 0.05;
 }
 
 double ordered_s(const Leg& leg) { return distance(leg.from, leg.to) / leg.speed; }
@@ -150,19 +151,21 @@ void Palpation::touch(bool contact) {
   observer_.contact(contact);
 }
 
-// Without M114 R nothing but M400 tells where the head is in time. How long short moves at the slide's speed
-// take beyond their length over it - the delay of their start and their acceleration - holds for the slide as
-// well.
+// Without M114 R nothing but M400 tells where the head is in time. What short moves at the slide's speed take
+// beyond their length over it - the delay of their start and their ramps - holds for the slide as well; at a slow
+// speed next to nothing of it is ramps.
 void Palpation::measure_start(Leg onset) {
   // Of different lengths: a firmware that answers M400 every 0.1 s would be late by the same time at all of
   // them.
   const Point3 here = onset.from;
-  for (int pair = 0; pair < kMeasuredPairs && !(realtime_ && realtime_known_); ++pair) {
-    const double way = std::max(2.0, plan_.speed * plan_.speed / 250) + 0.035 * pair * plan_.speed;
-    const Point3 there{here.x, here.y + way, here.z};
-    for (const auto& [from, to] : {std::pair{here, there}, {there, here}}) {
-      Leg leg{onset.pass, Phase::approach, from, to, plan_.speed};
-      run_leg(leg);
+  for (const double speed : {plan_.speed, std::min(kSlowMmS, plan_.speed / 4)}) {
+    for (int pair = 0; pair < kMeasuredPairs && !(realtime_ && realtime_known_); ++pair) {
+      const double way = std::max(0.2 * speed, speed * speed / 250) + 0.5 + 0.035 * pair * speed;
+      const Point3 there{here.x, here.y + way, here.z};
+      for (const auto& [from, to] : {std::pair{here, there}, {there, here}}) {
+        Leg leg{onset.pass, Phase::approach, from, to, speed};
+        run_leg(leg);
+      }
     }
   }
 }
@@ -193,9 +196,9 @@ void Palpation::follow(const Leg& leg) {
     observer_.check();
     if (sample) {
       const bool arrived = distance(sample->position, leg.to) < 0.02;
-      const bool possible = reachable(leg, before, *sample);
-      if (!possible && arrived && !realtime_known_ && length > 1 && ++claims >= kClaims) {
-        realtime_ = false;
+      const bool possible = reachable(leg.speed, before, *sample);
+      if (!possible && arrived && length > 1 && ++claims >= kClaims) {
+        realtime_ = realtime_known_;  // else it is faster than ordered
         return;
       }
       realtime_known_ = realtime_known_ || (possible && !arrived && length > 1);

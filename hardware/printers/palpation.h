@@ -43,9 +43,9 @@ double ordered_s(const Leg& leg);
 /// The same for all that is left of a plan's legs, with the head at `at` in the leg `now`.
 double seconds_left(const std::vector<Leg>& legs, const Leg& now, const Point3& at);
 
-/// Whether the head can have come from the one sample to the other at the leg's speed; how long the answers
+/// Whether the head can have come from the one sample to the other at this speed (mm/s); how long the answers
 /// took and their rounding allowed for, and 5 % for the printer's clock.
-bool reachable(const Leg& leg, const PositionSample& from, const PositionSample& to);
+bool reachable(double speed, const PositionSample& from, const PositionSample& to);
 
 /// What a run tells while it runs. `check` may throw: the operator's Ctrl-C, a board that is gone, a full
 /// disk. `contact` is called with true before the finger may touch, with false when it no longer can, or when

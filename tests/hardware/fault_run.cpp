@@ -26,10 +26,11 @@ std::vector<std::string> planned_moves(const PalpationPlan& plan, const Point3& 
 // Numbered moves run once and in order; after a fault one lift (G1 Z...) may follow. Two faults can cancel in
 // the XOR: such a move is noted, and what came of it is judged by where the head is.
 std::string check_moves(std::vector<std::string> ran, std::vector<std::string> planned,
-                        const std::string& measured, FaultVerdict& verdict) {
+                        const std::vector<std::string>& measured, FaultVerdict& verdict) {
   // Palpation measures short moves in the air until it knows that the firmware has M114 R.
   for (auto* moves : {&ran, &planned})
-    std::erase_if(*moves, [&](const std::string& move) { return move.ends_with(measured); });
+    for (const std::string& end : measured)
+      std::erase_if(*moves, [&](const std::string& move) { return move.ends_with(end); });
   std::size_t count = ran.size();
   while (!verdict.complete && count > 0 && ran[count - 1].starts_with("G1 Z")) --count;
   if (count > planned.size() || (verdict.complete && count != planned.size())) {
@@ -129,9 +130,10 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
     if (printer) numbered.erase(std::unique(numbered.begin(), numbered.end()), numbered.end());
     verdict.realtime = report.outcome.realtime_position;
     verdict.printer = report.printer;
-    verdict.broken =
-        check_moves(numbered, planned,
-                    " Z" + format(plan.start.z + plan.lift, 3) + " F" + format(60 * plan.speed, 1), verdict);
+    const std::string high = " Z" + format(plan.start.z + plan.lift, 3) + " F";
+    verdict.broken = check_moves(
+        numbered, planned,
+        {high + format(60 * plan.speed, 1), high + format(60 * std::min(2.0, plan.speed / 4), 1)}, verdict);
     if (moves_of(rig.world().printer()).size() > numbered.size())
       verdict.altered = "a line break behind a line's number: it ran without it, and again";
     if (verdict.complete && distance(head, legs.back().to) > 0.05) {

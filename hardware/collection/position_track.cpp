@@ -1,0 +1,248 @@
+#include "hardware/collection/position_track.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "hardware/printers/motion_model.h"
+#include "io/numbers/median.h"
+#include "io/numbers/numbers.h"
+
+namespace supertac {
+namespace {
+
+constexpr int kMostSteps = 20'000;  // of a modelled leg: 100 s every 5 ms
+constexpr double kOffLeg = 0.05;    // mm, beside the leg's line, by rounding
+// More than so many samples that do not fit are not noise: a cable that damages 0.2 % of the bytes spoils 3 %.
+constexpr double kMostMisfits = 0.1;
+constexpr double kEven = 0.02;  // of the speed
+
+// How far along the leg's straight line the sample is, and how far from it, ends included.
+struct OnLeg {
+  double along, off;
+};
+OnLeg on_leg(const Leg& leg, const Point3& p) {
+  const double length = distance(leg.from, leg.to);
+  const double part =
+      ((p.x - leg.from.x) * (leg.to.x - leg.from.x) + (p.y - leg.from.y) * (leg.to.y - leg.from.y) +
+       (p.z - leg.from.z) * (leg.to.z - leg.from.z)) /
+      std::max(length * length, 1e-12);
+  const double held = std::clamp(part, 0.0, 1.0);
+  return {held * length, distance(p, between(leg.from, leg.to, held))};
+}
+
+/// Those that were answered in the usual time.
+std::vector<PositionSample> on_time(const std::vector<PositionSample>& samples) {
+  std::vector<double> trips;
+  for (const PositionSample& sample : samples) trips.push_back(sample.round_trip_s);
+  const double slowest = samples.empty() ? 0 : 3 * median(trips) + 0.001;
+  std::vector<PositionSample> kept;
+  for (const PositionSample& sample : samples)
+    if (sample.round_trip_s <= slowest) kept.push_back(sample);
+  return kept;
+}
+
+struct FittedSpeed {
+  double mm_s = 0;        // 0: too few samples
+  double unevenness = 0;  // relative, from the first half of the way to the second
+};
+
+// The median over pairs of samples some way apart, away from the leg's ramps: neither damaged samples nor a
+// machine that stood still for a while move it, and no order takes part in it.
+FittedSpeed speed_of(const Leg& leg, const std::vector<PositionSample>& samples) {
+  constexpr std::size_t kFewest = 16;
+  const double length = distance(leg.from, leg.to);
+  std::vector<std::pair<double, double>> places;  // time, way
+  for (const PositionSample& sample : samples) {
+    const OnLeg at = on_leg(leg, sample.position);
+    if (at.off < kOffLeg && at.along > 0.15 * length && at.along < 0.85 * length)
+      places.emplace_back(sample.time_s, at.along);
+  }
+  if (places.size() < kFewest) return {};
+  const std::size_t apart = places.size() / 8;
+  const auto median_of = [&](std::size_t first, std::size_t last) {
+    std::vector<double> speeds;
+    for (std::size_t i = first; i + apart < last; ++i) {
+      const double seconds = places[i + apart].first - places[i].first;
+      if (seconds > 0) speeds.push_back((places[i + apart].second - places[i].second) / seconds);
+    }
+    return speeds.empty() ? 0.0 : median(speeds);
+  };
+  const std::size_t half = places.size() / 2;
+  const double all = median_of(0, places.size());
+  const double first = median_of(0, half), second = median_of(half, places.size());
+  return {std::max(all, 0.0), all > 0 ? std::abs(second - first) / all : 0};
+}
+
+// The samples that can all be true, as many as possible. Nothing damaged is believed for its neighbours'
+// sake: what nothing else can be reached from stands alone.
+std::vector<PositionSample> chain_of(const Leg& leg, double fastest,
+                                     const std::vector<PositionSample>& samples) {
+  constexpr std::size_t kLookBack = 64;
+  std::vector<PositionSample> good = {{leg.sent_s, 0, leg.from}};
+  for (const PositionSample& sample : samples)
+    if (on_leg(leg, sample.position).off < kOffLeg) good.push_back(sample);
+  if (leg.ended_s > 0) good.push_back({leg.ended_s, 0, leg.to});
+  const auto follows = [&](std::size_t before, std::size_t after) {
+    return reachable(fastest, good[before], good[after]) &&
+           distance(leg.from, good[before].position) < distance(leg.from, good[after].position) + 0.015;
+  };
+  std::vector<std::size_t> length(good.size(), 0), from(good.size(), 0);  // 0: of no chain from the start
+  length[0] = 1;
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < good.size(); ++i) {
+    const auto extend = [&](std::size_t j) {
+      if (length[j] > 0 && length[j] + 1 > length[i] && follows(j, i)) length[i] = length[j] + 1, from[i] = j;
+    };
+    for (std::size_t j = i > kLookBack ? i - kLookBack : 0; j < i; ++j) extend(j);
+    extend(0);
+    if (length[i] >= length[best]) best = i;
+  }
+  std::vector<PositionSample> chain;
+  for (std::size_t i = best; i > 0; i = from[i]) chain.push_back(good[i]);
+  std::reverse(chain.begin(), chain.end());
+  if (!chain.empty() && leg.ended_s > 0 && chain.back().time_s == leg.ended_s) chain.pop_back();
+  return chain;
+}
+
+double took(const Leg& leg) { return leg.ended_s - leg.accepted_s; }
+
+/// Beyond its length over its speed, of each leg that `taken` takes.
+template <class Taken>
+std::vector<double> beyond(std::span<const Leg> legs, const Taken& taken) {
+  std::vector<double> seconds;
+  for (const Leg& leg : legs)
+    if (leg.speed > 0 && leg.from != leg.to && taken(leg)) seconds.push_back(took(leg) - ordered_s(leg));
+  std::sort(seconds.begin(), seconds.end());
+  return seconds;
+}
+
+}  // namespace
+
+MoveTiming timing_of(std::span<const Leg> ended) {
+  constexpr std::size_t kEnough = 4, kSlides = 3;
+  constexpr double kMostSlowness = 0.02, kFastestRamp = 1e5, kSlowestRamp = 20;
+  MoveTiming timing;
+  double speed = 0, slow = 0;
+  for (const Leg& leg : ended) speed = leg.phase == Phase::slide ? leg.speed : speed;
+  const auto in_the_air = [](const Leg& leg) {
+    return leg.phase == Phase::approach && leg.from.z == leg.to.z;
+  };
+  for (const Leg& leg : ended)
+    if (in_the_air(leg) && leg.speed < speed && (slow == 0 || leg.speed < slow)) slow = leg.speed;
+  std::vector<double> fast_s = beyond(ended, [&](const Leg& l) { return in_the_air(l) && l.speed == speed; });
+  const std::vector<double> slow_s =
+      beyond(ended, [&](const Leg& l) { return in_the_air(l) && l.speed == slow; });
+  if (fast_s.size() < kEnough) fast_s = beyond(ended, [](const Leg&) { return true; });
+  if (fast_s.empty()) return timing;
+  const auto middle_of = [](std::vector<double> s) { return median(s); };
+  const double fast_beyond = middle_of(fast_s);
+  const auto spread = [](const std::vector<double>& s) {
+    return s.size() >= kEnough ? s[s.size() - 2] - s[1] : 0;
+  };
+  double ramps = speed / timing.acceleration;
+  if (slow_s.size() >= kEnough) {
+    const double slow_beyond = middle_of(slow_s), part = slow / speed;
+    const double most = std::max(0.0, fast_beyond - slow_beyond) / (1 - part);  // ramps that grow with v
+    timing.range_s = 0.5 * part * most;
+    ramps = most - timing.range_s;
+  } else {
+    timing.range_s = ramps;
+  }
+  timing.delay_s = fast_beyond - ramps;
+  timing.acceleration = std::clamp(speed / std::max(ramps, 1e-9), kSlowestRamp, kFastestRamp);
+  timing.spread_s = std::max(spread(fast_s), spread(slow_s));
+  std::vector<double> slides;
+  for (const Leg& leg : ended)
+    if (leg.phase == Phase::slide && leg.speed > 0)
+      slides.push_back((took(leg) - timing.delay_s - leg.speed / timing.acceleration) / ordered_s(leg));
+  if (slides.size() < kSlides) return timing;
+  const double slowness = median(slides);
+  if (std::abs(slowness - 1) < kMostSlowness) timing.slowness = slowness;
+  return timing;
+}
+
+void PositionTrack::add(double time_s, const Point3& position) {
+  if (points_.empty() || time_s > points_.back().time_s) points_.push_back({time_s, position});
+}
+
+// Between two samples the head can have been away from the straight line in time, by as much as its speed
+// allows. Where it cannot even have come from the one to the other, all that lies between is guessed.
+void PositionTrack::distrust(double fastest, const PositionSample& before, const PositionSample& after) {
+  if (!(fastest > 0) || !(after.time_s > before.time_s)) return;
+  const double way = distance(before.position, after.position);
+  const double farthest = fastest * (after.time_s - before.time_s);
+  const double away = way < farthest                         ? way * (1 - way / farthest)
+                      : reachable(fastest, before, after) ? 0
+                                                             : way;
+  doubt_mm_ = std::max(doubt_mm_, away);
+}
+
+void PositionTrack::model(const Leg& leg, const MoveTiming& timing) {
+  const double length = distance(leg.from, leg.to);
+  if (!(leg.speed > 0)) return add(leg.ended_s, leg.to);
+  // Longer or shorter than the run's other moves: nobody knows where on the way the head was slow.
+  const double ramps = leg.speed / timing.acceleration;
+  const double off_s = took(leg) - timing.delay_s -
+                       timing.slowness * trapezoid_duration(length, leg.speed, timing.acceleration);
+  const double wrong_s = std::abs(off_s) + timing.spread_s + 0.5 * timing.range_s;
+  doubt_mm_ = std::max(doubt_mm_, std::min(length, wrong_s * leg.speed));
+  const double cruise_s = took(leg) - timing.delay_s - ramps;
+  if (leg.phase == Phase::slide && cruise_s > 0) speed_ = length / cruise_s;
+  const double start = std::min(std::max(leg.accepted_s + timing.delay_s, leg.sent_s), leg.ended_s - 1e-6);
+  const double duration = leg.ended_s - start;
+  const int steps = static_cast<int>(std::clamp(duration / 0.005, 1.0, double{kMostSteps}));
+  for (int i = 0; i <= steps; ++i) {
+    const double t = duration * i / steps;
+    const double part =
+        length > 0 ? trapezoid_position(t, length, duration, timing.acceleration) / length : 1;
+    add(start + t, between(leg.from, leg.to, part));
+  }
+}
+
+void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& samples,
+                            const MoveTiming& timing) {
+  constexpr std::size_t kFewest = 20;
+  add(leg.sent_s, leg.from);
+  if (samples.empty() && leg.ended_s > 0) return model(leg, timing);
+  const std::vector<PositionSample> prompt = on_time(samples);
+  const FittedSpeed fitted = speed_of(leg, prompt);
+  const double fastest = std::max(leg.speed, fitted.mm_s);
+  const std::vector<PositionSample> chain = chain_of(leg, fastest, prompt);
+  rejected_ += samples.size() - chain.size();
+  if (prompt.size() >= kFewest)
+    misfits_ = std::max(misfits_, 1 - static_cast<double>(chain.size()) / static_cast<double>(prompt.size()));
+  if (leg.phase == Phase::slide) speed_ = fitted.mm_s, unevenness_ = fitted.unevenness;
+  PositionSample before{leg.sent_s, 0, leg.from};
+  for (const PositionSample& sample : chain) {
+    add(sample.time_s, sample.position);
+    distrust(fastest, before, sample);
+    doubt_mm_ = std::max(doubt_mm_, 0.5 * sample.round_trip_s * fastest);
+    before = sample;
+  }
+  if (leg.ended_s > 0) {
+    add(leg.ended_s, leg.to);
+    distrust(fastest, before, {leg.ended_s, 0, leg.to});
+  }
+}
+
+std::string PositionTrack::doubt(double trusted_mm) const {
+  std::string doubt;
+  if (doubt_mm_ > trusted_mm) doubt += "the head may have been " + format(doubt_mm_, 1) + " mm elsewhere; ";
+  if (misfits_ > kMostMisfits) doubt += format(100 * misfits_, 0) + " % of its positions fit no way; ";
+  if (unevenness_ > kEven)
+    doubt += "its speed changed by " + format(100 * unevenness_, 0) + " % on the way; ";
+  return doubt;
+}
+
+Point3 PositionTrack::at(double time_s) const {
+  if (points_.empty()) return {};
+  const auto after = std::lower_bound(points_.begin(), points_.end(), time_s,
+                                      [](const Knot& knot, double t) { return knot.time_s < t; });
+  if (after == points_.begin()) return points_.front().position;
+  if (after == points_.end()) return points_.back().position;
+  const Knot& a = *(after - 1);
+  const Knot& b = *after;
+  return between(a.position, b.position, (time_s - a.time_s) / (b.time_s - a.time_s));
+}
+
+}  // namespace supertac
