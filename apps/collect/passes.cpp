@@ -110,7 +110,8 @@ std::string to_line(const CollectedPass& pass, double speed, double ordered) {
          (pass.left_out > 0 ? std::to_string(pass.left_out) + " left out of uncertain time, " : "") +
          std::to_string(quality.suspect) + " suspect, " + std::to_string(pass.positions) + " positions" +
          (pass.complete ? "" : ", incomplete") +
-         (speed != ordered ? ", at " + format(speed) + " mm/s instead of " + format(ordered) : "") + (pass.doubt.empty() ? "" : ", doubtful: " + pass.doubt);
+         (speed != ordered ? ", at " + format(speed) + " mm/s instead of " + format(ordered) : "") +
+         (pass.doubt.empty() ? "" : ", doubtful: " + pass.doubt);
 }
 
 }  // namespace

@@ -34,7 +34,8 @@ constexpr int kSendBuffer = 64 << 10;            // what a stalled page may leav
 constexpr double kStillHereS = 1;
 constexpr int kNice = 5;
 constexpr std::string_view kPolicy =
-    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; worker-src 'self'; connect-src 'self'; "
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; worker-src 'self'; "
+    "connect-src 'self'; "
     "img-src 'self' data: blob:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
 double seconds_now() { return seconds_of(CLOCK_MONOTONIC); }
@@ -199,9 +200,9 @@ struct WebRequest {
   }
 
   MHD_Result still(const char* type, std::string_view body) {
-    return send(200, type,
-                MHD_create_response_from_buffer(body.size(), const_cast<char*>(body.data()),
-                                                MHD_RESPMEM_PERSISTENT));
+    return send(
+        200, type,
+        MHD_create_response_from_buffer(body.size(), const_cast<char*>(body.data()), MHD_RESPMEM_PERSISTENT));
   }
 
   MHD_Result events() {

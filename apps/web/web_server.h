@@ -78,7 +78,7 @@ class WebServer {
   std::string token_;
   MHD_Daemon* daemon_ = nullptr;
   std::string newest_ = "event: still\ndata: 1\n\n";  // as it is sent
-  std::string farewell_;  // likewise; read when stop_ is set
+  std::string farewell_;                              // likewise; read when stop_ is set
   std::uint64_t number_ = 0;
   double told_s_ = 0;
   std::list<Peer> peers_;  // in the order of their coming

@@ -15,7 +15,7 @@
 namespace supertac {
 namespace {
 
-constexpr double kLargest = 1e10;   // of any number in an event: a journal may come from anywhere
+constexpr double kLargest = 1e10;  // of any number in an event: a journal may come from anywhere
 
 std::string point_text(const Point3& p) {
   return format(p.x, 4) + " " + format(p.y, 4) + " " + format(p.z, 4);
@@ -149,8 +149,7 @@ CollectedPass pass_of(const CollectedFrames& all, std::size_t signals, const Pos
   if (end > 0) pass.missing = all.missing[end - 1] - std::min(all.missing[begin], all.missing[end - 1]);
   const std::uint64_t kept = pass.time_s.size(), made = kept + pass.left_out + pass.missing;
   if (static_cast<double>(kept) < kLeastKept * static_cast<double>(made))
-    pass.doubt +=
-        "only " + std::to_string(kept) + " of " + std::to_string(made) + " frames were kept; ";
+    pass.doubt += "only " + std::to_string(kept) + " of " + std::to_string(made) + " frames were kept; ";
   pass.doubt.resize(pass.doubt.size() - std::min<std::size_t>(2, pass.doubt.size()));
   return pass;
 }

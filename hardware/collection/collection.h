@@ -24,8 +24,8 @@ constexpr const char* kRunComplete = "complete";
 /// Onset, slide and release of one pass. Times start at the onset; the middle of each frame counts.
 struct CollectedPass {
   int pass = 0;
-  double speed = 0;           ///< ordered
-  double measured_speed = 0;  ///< of the slide; 0: nothing tells
+  double speed = 0;                   ///< ordered
+  double measured_speed = 0;          ///< of the slide; 0: nothing tells
   bool complete = false;              ///< the release was verified
   std::vector<double> time_s;         ///< n
   std::vector<float> volts;           ///< n x array.signals(), a frame together, in the sensor's unit
@@ -39,7 +39,8 @@ struct CollectedPass {
   std::string doubt;  ///< why positions may be wrong by more than kTrustedMm; empty: they are not
 };
 
-/// What a recording is named by: the measured speed, to three digits, where it is another than the ordered one.
+/// What a recording is named by: the measured speed, to three digits, where it is another than the ordered
+/// one.
 double named_speed(double measured, double ordered);
 
 /// A position that may be further off is said to be doubtful: a tenth of a taxel's pitch.

@@ -12,7 +12,8 @@ namespace {
 
 constexpr int kMostSteps = 20'000;  // of a modelled leg: 100 s every 5 ms
 constexpr double kOffLeg = 0.05;    // mm, beside the leg's line, by rounding
-// More than so many samples that do not fit are not noise: a cable that damages 0.2 % of the bytes spoils 3 %.
+// More than so many samples that do not fit are not noise: a cable that damages 0.2 % of the bytes spoils 3
+// %.
 constexpr double kMostMisfits = 0.1;
 constexpr double kEven = 0.02;  // of the speed
 
@@ -171,9 +172,9 @@ void PositionTrack::distrust(double fastest, const PositionSample& before, const
   if (!(fastest > 0) || !(after.time_s > before.time_s)) return;
   const double way = distance(before.position, after.position);
   const double farthest = fastest * (after.time_s - before.time_s);
-  const double away = way < farthest                         ? way * (1 - way / farthest)
+  const double away = way < farthest                      ? way * (1 - way / farthest)
                       : reachable(fastest, before, after) ? 0
-                                                             : way;
+                                                          : way;
   doubt_mm_ = std::max(doubt_mm_, away);
 }
 

@@ -48,8 +48,8 @@ constexpr StateRule kRules[] = {
     {"mesh compensation", kMarlin, "M420 S0", "M420", "Bed Leveling ", "OFF", "M420 S1", kByHand},
     {"mesh compensation", kKlipper, "BED_MESH_CLEAR", "", "", "", "", ""},
     {"mesh compensation", kReprap, "G29 S2", "", "", "", "", ""},
-    {"offset of the coordinates", kKlipper, "SET_GCODE_OFFSET X=0 Y=0 Z=0", "GET_POSITION", "gcode homing: ",
-     "X:0.000000 Y:0.000000 Z:0.000000", "", kByHand},
+    {"offset of the coordinates", kKlipper, "SET_GCODE_OFFSET X=0 Y=0 Z=0", "GET_POSITION",
+     "gcode homing: ", "X:0.000000 Y:0.000000 Z:0.000000", "", kByHand},
     {"home offset (M206)", kMarlin, "", "M503", "M206 X", "0.00 Y0.00 Z0.00", "",
      "set it to 0 (M206 X0 Y0 Z0), or confirm the origin instead of homing", true},
 };
@@ -90,10 +90,11 @@ class Reader {
   std::optional<std::string> read(const StateRule& rule) {
     constexpr int kAttempts = 6;
     std::optional<std::string> before = value_in(answer(rule.read, false), rule.label);
-    for (int i = 0; i < kAttempts && before && !is_wanted(*before, rule); ++i) {
+    if (!before) return before;
+    for (int i = 0; i < kAttempts && !(before && is_wanted(*before, rule)); ++i) {
       const std::optional<std::string> now = value_in(answer(rule.read, true), rule.label);
-      if (now && now == before) break;
-      before = now ? now : before;
+      if (now == before) break;
+      before = now;
     }
     return before;
   }

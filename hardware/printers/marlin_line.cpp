@@ -49,8 +49,8 @@ std::optional<Point3> position_in(std::string_view text) {
   return Point3{values[0], values[1], values[2]};
 }
 
-// What a firmware says when it runs nothing any more. A heater's error alone is none of these: the machine may
-// go on, and where it does not, it says so.
+// What a firmware says when it runs nothing any more. A heater's error alone is none of these: the machine
+// may go on, and where it does not, it says so.
 bool is_fatal(std::string_view text) {
   for (const std::string_view mark : {"kill() called", "Printer halted", "system stopped", "Printer stopped",
                                       "Printer is shutdown", "Shutdown due to"}) {

@@ -9,24 +9,16 @@
 namespace supertac {
 namespace {
 
-// Seconds: for a board that boots, and between two M110 N0 meanwhile; of an ordinary command (Marlin's first
-// echo:busy comes after 2 s); after echo:busy (repeated every 2 s); for one command, behind a longer deadline
-// of its own, whatever is said; of silence that ends a disturbance; in which Klipper finds its boards.
-constexpr double kConnectDeadline = 20, kProbeInterval = 1, kOkDeadline = 2.5, kBusyDeadline = 6,
-                 kLongestWait = 60, kQuiet = 0.05, kKlipperStarts = 60;
+// Seconds: of an ordinary command (Marlin's first echo:busy comes after 2 s); after echo:busy (repeated every
+// 2 s); for one command, behind a longer deadline of its own, whatever is said; of silence that ends a
+// disturbance.
+constexpr double kOkDeadline = 2.5, kBusyDeadline = 6, kLongestWait = 60, kQuiet = 0.05;
 constexpr int kMaxRepeats = 8;          // of one line, for any reason; four times as many while catching up
 constexpr std::size_t kKeptLines = 64;  // of the newest lines, for Resend
 // With one line in flight the firmware is never honestly more than a line or two behind. A number further
 // back is damaged text, or a firmware that restarted; the second time in a row it is believed.
 constexpr std::int64_t kPlausibleLag = 4;
 constexpr std::int64_t kFarAhead = 1000;  // no firmware takes such a number for a repetition
-
-// Numbers, or an object of JSON: what Marlin says begins with a word, or is but one.
-bool is_of_a_sensor(std::string_view line) {
-  return line.starts_with('{') ||
-         (line.find_first_of("0123456789") != std::string_view::npos &&
-          line.find_first_not_of("0123456789+-.eE,;:[]{} \t") == std::string_view::npos);
-}
 
 }  // namespace
 
@@ -48,105 +40,6 @@ struct MarlinLink::Exchange {
   std::string error = {};      // unfamiliar Error: of the command itself
   bool error_stands = false;   // and the firmware did run it
 };
-
-void MarlinLink::connect() {
-  connected_ = false;
-  const double until = lines_.port().now() + kConnectDeadline;
-  // Two answers in a row: the first ok may belong to something an earlier program sent.
-  int answers = 0;
-  while (answers < 2) {
-    const double now = lines_.port().now();
-    if (now >= until) nobody_answered();
-    answers = probe(std::min(until, now + kProbeInterval)) ? answers + 1 : 0;
-  }
-  number_ = 0;
-  kept_.clear();
-  read_capabilities();
-  if (capabilities_.klipper) await_klipper();
-  connected_ = true;
-}
-
-// Klipper's host answers from the moment it runs, but moves nothing before it has found its boards.
-void MarlinLink::await_klipper() {
-  const double until = lines_.port().now() + kKlipperStarts;
-  for (;;) {
-    try {
-      command("G21");
-      return;
-    } catch (const PrinterRefused& refused) {
-      if (std::string_view(refused.what()).find("Printer is not ready") == std::string_view::npos ||
-          lines_.port().now() > until)
-        throw;
-    }
-    idle(1);
-  }
-}
-
-void MarlinLink::nobody_answered() {
-  const std::string expected = "port " + lines_.name() + ": expected a Marlin firmware, found ";
-  const std::string within = " answer to M110 within " + format(kConnectDeadline, 0) + " s; ";
-  const unsigned baud = lines_.port().baud();
-  if (lines_.bytes() > 0) {
-    throw WrongDevice(expected + std::to_string(lines_.bytes()) + " bytes that are no" + within +
-                      "check that it is the printer's port (--list-ports)" +
-                      (baud > 0 ? " and that its baud rate is " + std::to_string(baud) : "") +
-                      (complaint_.empty() ? "" : "; it said " + in_quotes(complaint_)));
-  }
-  throw PrinterSilent(expected + "no" + within + "check that the printer is on and the port is right");
-}
-
-// GRBL answers "error:20" and "ALARM:1"; Marlin's errors are words.
-void MarlinLink::refuse_grbl(const std::string& line) const {
-  const bool numbered = line.starts_with("error:") || line.starts_with("ALARM:");
-  if (!line.starts_with("Grbl ") && !(numbered && line.size() > 6 && line[6] >= '0' && line[6] <= '9'))
-    return;
-  throw WrongDevice("port " + lines_.name() + ": expected Marlin or Klipper, found GRBL (" + in_quotes(line) +
-                    "), which has no line numbers and no M400; use a printer with one of the two");
-}
-
-void MarlinLink::refuse_sensor() const {
-  constexpr std::size_t kFewFrames = 3 * rig::kFrameBytes;
-  const bool no_text = 3 * lines_.no_text() > lines_.bytes(), numbers = 2 * numbers_ > heard_;
-  if (lines_.bytes() <= kFewFrames || !(no_text || numbers)) return;
-  throw WrongDevice("port " + lines_.name() + ": expected a Marlin printer, found " +
-                    (no_text ? "no text, as from a tactile board" : "numbers, as from a sensor") +
-                    (numbers ? " (" + in_quotes(complaint_) + ")" : "") + "; exchange the two ports");
-}
-
-bool MarlinLink::probe(double until) {
-  lines_.send("\n" + numbered_line(0, "M110 N0"));
-  std::string line;
-  while (lines_.arrival_s() < until && read_line(until, line)) {
-    const Reply reply = parse_reply(line);
-    if (reply.kind == ReplyKind::fatal) check_alarm(reply);
-    refuse_grbl(line);
-    if (reply.kind == ReplyKind::other || reply.kind == ReplyKind::error || reply.kind == ReplyKind::paused)
-      complaint_ = line;
-    ++heard_, numbers_ += is_of_a_sensor(line) ? 1 : 0;
-    if (reply.kind != ReplyKind::ok) continue;
-    settle();
-    return true;
-  }
-  refuse_sensor();
-  return false;
-}
-
-void MarlinLink::read_capabilities() {
-  bool known = false;  // what it has for a parser
-  for (int attempt = 0; attempt < 2 && !known; ++attempt) {
-    for (const Reply& reply : command("M115").replies) {
-      constexpr std::string_view kName = "FIRMWARE_NAME:";
-      const std::size_t at = reply.text.find(kName);
-      if (at != std::string::npos)
-        capabilities_.firmware = trimmed(std::string_view(reply.text).substr(at + kName.size()));
-      known = known || reply.text.starts_with("Cap:EMERGENCY_PARSER:");
-      if (reply.text == "Cap:EMERGENCY_PARSER:1") capabilities_.emergency_parser = true;
-    }
-    capabilities_.klipper = capabilities_.firmware.starts_with("Klipper");
-    capabilities_.reprap = capabilities_.firmware.starts_with("RepRapFirmware");
-    known = known || !capabilities_.quick_stop();
-  }
-}
 
 MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s) {
   if (halted_) throw PrinterHalted("printer " + lines_.name() + ": halted earlier; reset it and start again");
@@ -387,9 +280,11 @@ void MarlinLink::check_alarm(const Reply& reply) {
   if (!connected_) return;
   if (reply.kind == ReplyKind::start) {
     connected_ = false;
-    throw PrinterReset("printer " + lines_.name() + ": the firmware restarted in use; its position is unknown, confirm the origin and start "
-                       "again; it said " +
-                       in_quotes(reply.text));
+    throw PrinterReset(
+        "printer " + lines_.name() +
+        ": the firmware restarted in use; its position is unknown, confirm the origin and start "
+        "again; it said " +
+        in_quotes(reply.text));
   }
   if (reply.kind != ReplyKind::paused && reply.kind != ReplyKind::interrupted) return;
   if (answers_pauses_) {

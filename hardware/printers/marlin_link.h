@@ -64,8 +64,8 @@ class MarlinLink {
   /// From now on a pause ends no wait: it is answered by M108, and the wait goes on.
   void answer_pauses() { answers_pauses_ = true; }
 
-  /// After a command that an exception interrupted, and after `more` unnumbered ones: reads until all have been
-  /// acknowledged, `seconds` at most, so that no later command takes their ok for its own.
+  /// After a command that an exception interrupted, and after `more` unnumbered ones: reads until all have
+  /// been acknowledged, `seconds` at most, so that no later command takes their ok for its own.
   void abandon(int more, double seconds);
 
   /// From this time of the port's clock on every wait throws PrinterSilent, which bounds a whole run.
@@ -115,9 +115,9 @@ class MarlinLink {
   LinePort lines_;
   MarlinCapabilities capabilities_;
   Counters counters_;
-  std::string complaint_;         // what was said since an ok; the cause of a halt stands before it
-  std::deque<std::string> kept_;  // lines number_ - kept_.size() + 1 ... number_
-  std::int64_t number_ = 0;       // of the newest line
+  std::string complaint_;                // what was said since an ok; the cause of a halt stands before it
+  std::deque<std::string> kept_;         // lines number_ - kept_.size() + 1 ... number_
+  std::int64_t number_ = 0;              // of the newest line
   std::size_t heard_ = 0, numbers_ = 0;  // lines until it answered; of these, such as a sensor sends
   double give_up_s_ = std::numeric_limits<double>::infinity();
   bool connected_ = false;

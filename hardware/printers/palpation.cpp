@@ -152,8 +152,8 @@ void Palpation::touch(bool contact) {
 }
 
 // Without M114 R nothing but M400 tells where the head is in time. What short moves at the slide's speed take
-// beyond their length over it - the delay of their start and their ramps - holds for the slide as well; at a slow
-// speed next to nothing of it is ramps.
+// beyond their length over it - the delay of their start and their ramps - holds for the slide as well; at a
+// slow speed next to nothing of it is ramps.
 void Palpation::measure_start(Leg onset) {
   // Of different lengths: a firmware that answers M400 every 0.1 s would be late by the same time at all of
   // them.

@@ -60,9 +60,9 @@ void Printer::check_soft_limits(const std::vector<Point3>& targets) {
     };
     if (soft && !(inside(p.x, soft->low.x, soft->high.x) && inside(p.y, soft->low.y, soft->high.y) &&
                   inside(p.z, soft->low.z, soft->high.z)))
-      throw OutsideLimits("printer " + link_.port().name() + ": its soft endstops (M211) would cut the way to " +
-                          describe(p) + "; it says " + in_quotes(soft->text) +
-                          ", correct the plan or the firmware's limits");
+      throw OutsideLimits("printer " + link_.port().name() +
+                          ": its soft endstops (M211) would cut the way to " + describe(p) + "; it says " +
+                          in_quotes(soft->text) + ", correct the plan or the firmware's limits");
   }
 }
 

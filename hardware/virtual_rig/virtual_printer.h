@@ -138,10 +138,10 @@ class VirtualPrinter {
   VirtualPrinterSettings settings_;
   MotionQueue motion_;
   Dice dice_;
-  Point3 offset_, base_;              // logical = physical - offset - base; base_: Klipper's own
+  Point3 offset_, base_;  // logical = physical - offset - base; base_: Klipper's own
   LeftOver left_over_, saved_;
   Point3 saved_base_;
-  double ready_s_ = 0;  // of Klipper
+  double ready_s_ = 0;                // of Klipper
   Point3 steps_zero_;                 // where Count is 0; G92 does not move it
   std::deque<std::string> received_;  // whole lines not yet looked at
   std::deque<std::string> queue_;     // accepted, not yet run

@@ -74,8 +74,9 @@ void VirtualPrinter::run_g(int code, const std::string& command, double t) {
 
 bool VirtualPrinter::run_klipper(const std::string& command, double t) {
   if (t < ready_s_ && !command.starts_with("M11")) {
-    output_ += "// Printer is not ready\n// The klippy host software is attempting to connect.  Please\n"
-               "// retry in a few moments.\n!! Printer is not ready\n";
+    output_ +=
+        "// Printer is not ready\n// The klippy host software is attempting to connect.  Please\n"
+        "// retry in a few moments.\n!! Printer is not ready\n";
     return true;
   }
   Point3& offset = left_over_.offset;

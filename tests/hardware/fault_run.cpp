@@ -1,6 +1,8 @@
 #include "tests/hardware/fault_run.h"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
 #include "hardware/collection/collection.h"
 #include "hardware/ports/errors.h"
@@ -62,8 +64,38 @@ std::string check_frames(const Journal& journal, const NumberedBoard& board, con
   return "the board made " + std::to_string(made) + " frames, " + std::to_string(told) + " are accounted for";
 }
 
+// How fast the head truly went through the middle of a slide, by the frames' numbers; 0: too little is left.
+double true_speed(const CollectedPass& pass, const NumberedBoard& board, const PalpationPlan& plan) {
+  std::optional<std::uint64_t> first, last;
+  for (std::size_t i = 0; i < pass.time_s.size(); ++i) {
+    const auto numbers = board.numbers_in(pass.volts, i);
+    const double y = pass.position[3 * i + 1] - plan.start.y;
+    if (numbers.size() != 1 || y < 0.2 * plan.slide || y > 0.8 * plan.slide) continue;
+    if (!first) first = numbers[0];
+    last = numbers[0];
+  }
+  if (!first || *last < *first + 500) return 0;
+  return (board.head(*last).y - board.head(*first).y) /
+         (rig::kFramePeriodS * static_cast<double>(*last - *first));
+}
+
+// No head was ever outside the box of the plan's targets.
+std::string check_box(const std::vector<Leg>& legs, const NumberedBoard& board, double more) {
+  Point3 low = legs[0].from, high = low;
+  for (const Leg& leg : legs) {
+    low = {std::min(low.x, leg.to.x), std::min(low.y, leg.to.y), std::min(low.z, leg.to.z)};
+    high = {std::max(high.x, leg.to.x), std::max(high.y, leg.to.y), std::max(high.z, leg.to.z)};
+  }
+  const auto out = [more](double v, double a, double b) { return v < a - more || v > b + more; };
+  for (const Point3& p : board.heads())
+    if (out(p.x, low.x, high.x) || out(p.y, low.y, high.y) || out(p.z, low.z, high.z))
+      return "the head left the plan's box: " + describe(p);
+  return {};
+}
+
 // Compares every recorded frame with the truth, by its number.
-void judge_passes(const Collection& collection, const NumberedBoard& board, FaultVerdict& verdict) {
+void judge_passes(const Collection& collection, const NumberedBoard& board, const PalpationPlan& plan,
+                  FaultVerdict& verdict) {
   for (const CollectedPass& pass : collection.passes) {
     verdict.doubt += pass.doubt + (pass.complete ? "" : "incomplete");
     verdict.left_out += pass.left_out;
@@ -76,7 +108,12 @@ void judge_passes(const Collection& collection, const NumberedBoard& board, Faul
       verdict.compared += numbers.empty() ? 0 : 1;
     }
     verdict.worst_mm = std::max(verdict.worst_mm, worst);
+    verdict.named_mm_s = named_speed(pass.measured_speed, pass.speed);
+    verdict.true_mm_s = true_speed(pass, board, plan);
     if (!pass.doubt.empty() || !pass.complete) continue;
+    if (verdict.true_mm_s > 0 && std::abs(verdict.named_mm_s / verdict.true_mm_s - 1) > 0.01)
+      verdict.broken =
+          "named " + format(verdict.named_mm_s, 2) + " mm/s, truly " + format(verdict.true_mm_s, 2);
     verdict.worst_trusted_mm = std::max(verdict.worst_trusted_mm, worst);
     if (worst > kTrustedMm && verdict.broken.empty())
       verdict.broken = "pass " + std::to_string(pass.pass) + " is wrong by " + format(worst, 2) +
@@ -95,6 +132,14 @@ std::string check_finger(const PalpationOutcome& outcome, SimulatedRig& rig, con
   if (outcome.finger == Finger::stopped && rig.world().printer().moving(rig.now()))
     return "said stopped, still moves";
   return {};
+}
+
+// What a firmware has at the end: all that it tells and takes back.
+LeftOver kept(const VirtualPrinterSettings& printer) {
+  LeftOver left = printer.left_over;
+  if (printer.firmware != Firmware::klipper) left.relative = false, left.offset = {};
+  if (printer.firmware == Firmware::klipper) left.home_offset = {};
+  return left;
 }
 
 }  // namespace
@@ -146,7 +191,13 @@ FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan
     const Collection collection = collection_of(journal);
     verdict.frames = collection.frames;
     verdict.missing = collection.missing;
-    judge_passes(collection, board, verdict);
+    judge_passes(collection, board, plan, verdict);
+    // A damaged move that passed as right goes elsewhere, and nobody can know.
+    if (verdict.altered.empty() && verdict.broken.empty())
+      verdict.broken = check_box(legs, board, 0.1 + std::abs(rig_settings.printer.left_over.mesh_mm));
+    if (verdict.complete && verdict.altered.empty() && verdict.broken.empty() &&
+        rig.world().printer().left_over() != kept(rig_settings.printer))
+      verdict.broken = "what was changed in the printer was not put back";
     // Nobody can count frames to one that waited among lost ones.
     const RigFaults& faults = rig_settings.faults;
     const bool countable =

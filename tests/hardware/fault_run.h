@@ -20,10 +20,11 @@ struct FaultVerdict {
   MarlinLink::Counters printer;
   bool realtime = true;  ///< M114 R
   std::uint64_t frames = 0, missing = 0, left_out = 0;
-  std::uint64_t compared = 0;   ///< recorded frames whose position was compared with the truth
-  std::string doubt;            ///< what the recordings say of themselves; "incomplete" where that is all
-  double worst_mm = 0;          ///< how far a recorded frame is from where it was made, at worst
-  double worst_trusted_mm = 0;  ///< the same of recordings without doubt
+  std::uint64_t compared = 0;  ///< recorded frames whose position was compared with the truth
+  std::string doubt;           ///< what the recordings say of themselves; "incomplete" where that is all
+  double named_mm_s = 0, true_mm_s = 0;  ///< of the last pass; 0: nothing tells
+  double worst_mm = 0;                   ///< how far a recorded frame is from where it was made, at worst
+  double worst_trusted_mm = 0;           ///< the same of recordings without doubt
 };
 
 /// Runs the whole plan on a rig whose frames carry their own number, by which they are compared with the

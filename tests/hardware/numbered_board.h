@@ -46,6 +46,7 @@ class NumberedBoard {
     return numbers_in([&](std::size_t k) { return rig::adc_of(double{volts[rig::kTaxels * i + k]}); });
   }
   const Point3& head(std::uint64_t number) const { return heads_[number]; }
+  const std::vector<Point3>& heads() const { return heads_; }
 
  private:
   static constexpr std::uint64_t kWord = rig::kAdcCodes;  // of a sample

@@ -1,0 +1,193 @@
+// Printers as another job, a display or a start of their own left them.
+#include "hardware/printers/machine_state.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/expect_error.h"
+#include "tests/hardware/fault_run.h"
+#include "tests/hardware/rig_support.h"
+
+namespace supertac {
+namespace {
+
+constexpr Firmware kFirmwares[] = {Firmware::marlin, Firmware::marlin_before_2_1_2, Firmware::klipper};
+constexpr Point3 kLow{99.7, 101.17, 99.81};
+
+TEST(MachineState, EachLeftoverAloneIsSetAndPutBack) {
+  const std::vector<LeftOver> marlin = {{.inches = true},       {.relative = true},      {.speed_percent = 150},
+                                        {.speed_percent = 50},  {.flow_percent = 80},    {.mesh_mm = 0.46},
+                                        {.home_offset = {1, 2, -3}}};
+  const std::vector<LeftOver> klipper = {
+      {.relative = true}, {.speed_percent = 150}, {.flow_percent = 80}, {.offset = {0, 0, -0.35}}};
+  for (const Firmware firmware : kFirmwares) {
+    for (const LeftOver& left : firmware == Firmware::klipper ? klipper : marlin) {
+      const FaultVerdict verdict = run_faulty_collection(
+          running_rig({.firmware = firmware, .left_over = left}), {.passes = 1, .slide = 20}, kLow);
+      EXPECT_TRUE(verdict.complete) << verdict.error;
+      EXPECT_EQ(verdict.broken, "") << static_cast<int>(firmware) << ", " << left.inches << left.relative
+                                    << left.speed_percent << " " << left.mesh_mm << " " << left.offset.z;
+      if (firmware != Firmware::klipper) {
+        EXPECT_EQ(verdict.doubt, "");
+        EXPECT_LT(verdict.worst_mm, 0.05);
+      }
+    }
+  }
+}
+
+TEST(MachineState, ADamagedAnswerIsNeitherRefusedNorPutBack) {
+  for (const auto& [said, damaged] : {std::pair("FR:100%", "FR:150%"), {"Bed Leveling OFF", "Bed Leveling ON"},
+                                      {"  G21 ;", "  G20 ;"}}) {
+    SimulatedRig rig(running_rig());
+    Tampering port(rig.printer_port());
+    port.from_printer = {{said, damaged}};
+    Printer printer(port);
+    printer.connect();
+    printer.put_back();
+    EXPECT_TRUE(port.from_printer.empty());
+    EXPECT_EQ(rig.world().printer().left_over(), LeftOver{}) << said;
+  }
+}
+
+TEST(MachineState, WhatStaysAnotherIsRefusedByName) {
+  SimulatedRig rig(running_rig());
+  Tampering port(rig.printer_port());
+  port.from_printer.assign(40, {"Bed Leveling OFF", "Bed Leveling ON"});
+  Printer printer(port);
+  EXPECT_ERROR(printer.connect(), PrinterRefused,
+               "expected its mesh compensation at 'OFF', found 'ON' after M420 S0; set it by hand");
+}
+
+TEST(MachineState, AHomeOffsetIsRefusedByNameWhereItShiftsTheBed) {
+  PrinterBench bench(running_rig({.left_over = {.home_offset = {0, 0, -1.25}}}));
+  EXPECT_ERROR(bench.printer.home(), PrinterRefused, "home offset (M206)");
+  EXPECT_TRUE(moves_of(bench.firmware()).empty());
+  bench.printer.confirm_origin(rig::kMounted);
+  EXPECT_EQ(bench.printer.origin(), Printer::Origin::confirmed);
+}
+
+TEST(MachineState, HomingLiftsTenMillimetresWhateverTheUnit) {
+  for (const LeftOver& left : {LeftOver{.inches = true}, LeftOver{.relative = true}}) {
+    RigSettings settings = running_rig({.left_over = left});
+    settings.printer.head = {20, 30, 15};
+    PrinterBench bench(settings);
+    double highest = 0;
+    bench.printer.link().set_watch([&] {
+      if (bench.head().x > 19.9) highest = std::max(highest, bench.head().z);
+    });
+    bench.printer.home();
+    EXPECT_GT(highest, 24.9);
+    EXPECT_LT(highest, 30.1) << "10 mm, and homing's own 5";
+  }
+}
+
+TEST(MachineState, SoftEndstopsThatWouldCutThePlanAreNamed) {
+  PrinterBench bench(running_rig({.bed = {235, 150, 250}}));
+  bench.printer.home();
+  EXPECT_ERROR(Palpation(bench.printer, {.passes = 1}).run(), OutsideLimits,
+               "its soft endstops (M211) would cut the way to X99.70 Y209.17");
+}
+
+TEST(MachineState, AKlipperThatStartsIsWaitedFor) {
+  PrinterBench bench(running_rig({.firmware = Firmware::klipper, .starts_s = 25}));
+  bench.printer.confirm_origin(rig::kMounted);
+  EXPECT_NEAR(bench.rig.now(), 1025, 3);
+  SimulatedRig rig(running_rig({.firmware = Firmware::klipper, .starts_s = 1e6}));
+  const auto port = rig.printer_port();
+  Printer printer(*port);
+  EXPECT_ERROR(printer.connect(), PrinterRefused, "!! Printer is not ready");
+  EXPECT_LT(rig.now(), 1070);
+}
+
+TEST(MachineState, TheCauseOfAShutdownIsQuoted) {
+  PrinterBench bench(running_rig({.firmware = Firmware::klipper}));
+  bench.firmware().inject(
+      "// MCU 'mcu' shutdown: Timer too close\n// This often indicates the host computer is overloaded. Check\n"
+      "// Once the underlying issue is corrected, use the\n// Printer is shutdown\n"
+      "!! MCU 'mcu' shutdown: Timer too close\nok\n");
+  EXPECT_ERROR(bench.printer.link().idle(1), PrinterHalted, "('// MCU 'mcu' shutdown: Timer too close'");
+}
+
+/// A collection into whose slide something is said, or happens, once.
+struct Interrupted {
+  explicit Interrupted(const VirtualPrinterSettings& firmware, std::function<void(PrinterBench&)> plant)
+      : bench(running_rig(firmware)) {
+    bench.printer.confirm_origin(rig::kMounted);
+    PalpationObserver observer;
+    observer.position = [this, plant = std::move(plant)](const Leg& leg, const PositionSample& sample) {
+      if (leg.phase != Phase::slide || sample.position.y < 120 || planted_s > 0) return;
+      planted_s = bench.rig.now();
+      plant(bench);
+    };
+    outcome = Palpation(bench.printer, {.passes = 2}, observer).run();
+  }
+  PrinterBench bench;
+  double planted_s = 0;
+  PalpationOutcome outcome;
+};
+
+TEST(MachineState, WhatTheDisplaySaysEndsTheRunFingerUp) {
+  for (const char* said : {"//action:cancel", "// action:cancel", "//action:pause", "//action:paused",
+                           "//  action: out_of_filament T0"}) {
+    Interrupted run({}, [said](PrinterBench& bench) { bench.firmware().inject(std::string(said) + "\n"); });
+    EXPECT_EQ(run.outcome.finger, PalpationOutcome::Finger::lifted) << run.outcome.note;
+    EXPECT_ERROR(std::rethrow_exception(run.outcome.error), PrinterPaused, "action:");
+    EXPECT_GT(run.bench.head().z, 96);
+    EXPECT_LT(run.bench.rig.now() - run.planted_s, 4) << said;
+    EXPECT_LT(run.bench.head().y, 122);
+  }
+  Interrupted other({}, [](PrinterBench& b) { b.firmware().inject("//action:notification Printing\n"); });
+  EXPECT_TRUE(other.outcome.complete);
+}
+
+TEST(MachineState, APauseInContactIsAnsweredAndTheFingerLifted) {
+  Interrupted run({}, [](PrinterBench& bench) { bench.firmware().pause_behind_move(bench.rig.now()); });
+  EXPECT_EQ(run.outcome.finger, PalpationOutcome::Finger::lifted) << run.outcome.note;
+  EXPECT_GT(run.bench.head().z, 96);
+}
+
+TEST(MachineState, AHeatersErrorEndsARunOnlyWhereTheMachineHalts) {
+  Interrupted goes_on({}, [](PrinterBench& bench) {
+    bench.firmware().inject("Error:Heater_ID: E0 temperature out of range\n T:25.00 /0.00\nB:25.00 /0.00\n");
+  });
+  EXPECT_TRUE(goes_on.outcome.complete) << goes_on.outcome.note;
+  Interrupted halts({}, [](PrinterBench& bench) { bench.firmware().overheat(bench.rig.now()); });
+  EXPECT_ERROR(std::rethrow_exception(halts.outcome.error), PrinterHalted, "MAXTEMP");
+}
+
+TEST(MachineState, AQuoteIsMatchedWhereItStands) {
+  SimulatedRig rig(running_rig());
+  Tampering port(rig.printer_port());
+  Printer printer(port);
+  printer.connect();
+  printer.confirm_origin(rig::kMounted);
+  port.from_printer = {{"ok\n", "echo:Unknown command: \"1813\"M0114 R\"\nok\n"}};
+  EXPECT_NO_THROW(printer.link().command("M114 R"));
+  EXPECT_GT(printer.link().counters().faults, 0U);
+}
+
+TEST(MachineState, AFasterOrSlowerMachineIsNamedByItsSpeed) {
+  for (const double slowness : {0.5, 0.66, 0.9, 1.1, 2.0}) {
+    const FaultVerdict verdict =
+        run_faulty_collection(running_rig({.slowness = slowness}), {.passes = 1, .slide = 60}, kLow);
+    EXPECT_EQ(verdict.broken + verdict.doubt + verdict.error, "") << slowness;
+    EXPECT_NEAR(verdict.named_mm_s * slowness, 10, 0.15) << slowness;
+    EXPECT_LT(verdict.worst_mm, 0.1) << slowness;
+  }
+}
+
+TEST(MachineState, AnotherAccelerationIsMeasured) {
+  for (const double acceleration : {150.0, 500.0, 1000.0, 3000.0})
+    for (const double speed : {5.0, 10.0, 25.0, 50.0}) {
+      const FaultVerdict verdict = run_faulty_collection(
+          running_rig({.realtime_position = false, .acceleration = acceleration}),
+          {.passes = 1, .slide = 60, .speed = speed}, kLow);
+      EXPECT_EQ(verdict.broken + verdict.error, "") << acceleration << ", " << speed;
+      EXPECT_LT(verdict.worst_mm, speed < 50 ? 0.3 : 0.5) << acceleration << ", " << speed;
+      if (speed < 25) {
+        EXPECT_EQ(verdict.doubt, "") << acceleration << ", " << speed;
+      }
+    }
+}
+
+}  // namespace
+}  // namespace supertac
