@@ -90,7 +90,6 @@ class Reader {
   std::optional<std::string> read(const StateRule& rule) {
     constexpr int kAttempts = 6;
     std::optional<std::string> before = value_in(answer(rule.read, false), rule.label);
-    if (!before) return before;
     for (int i = 0; i < kAttempts && !(before && is_wanted(*before, rule)); ++i) {
       const std::optional<std::string> now = value_in(answer(rule.read, true), rule.label);
       if (now == before) break;

@@ -15,6 +15,8 @@ struct RigFaults {
   double lost_ok_rate = 0;  ///< per ok
   double resend_storm_rate = 0;  ///< per line: the firmware complains several times about a good line
   double reset_rate = 0;         ///< per line: the firmware restarts
+  double action_rate = 0;        ///< per line: the display says //action:cancel or its like
+  double pause_rate = 0;         ///< per line: it waits for its user when the move has ended
   double unplug_rate = 0;        ///< per line: the printer's port goes away
   double stall_rate =
       0;  ///< per line: the firmware answers 50 ms late; per frame: the board sends 20 ms late

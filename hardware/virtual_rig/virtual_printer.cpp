@@ -277,6 +277,15 @@ bool VirtualPrinter::random_trouble(double t) {
     reset(t);
     return true;
   }
+  if (dice_.hit(faults.action_rate)) {
+    constexpr const char* kSaid[] = {"//action:cancel\n", "// action:cancel\n", "//action:pause\n",
+                                     "//action:paused\n"};
+    output_ += kSaid[dice_.below(4)];
+  }
+  if (dice_.hit(faults.pause_rate)) {
+    pause_behind_move(t);
+    return true;
+  }
   if (dice_.hit(faults.stall_rate)) {
     command_due_ = t + 0.05;
     return true;

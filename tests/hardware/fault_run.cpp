@@ -1,6 +1,7 @@
 #include "tests/hardware/fault_run.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -143,6 +144,42 @@ LeftOver kept(const VirtualPrinterSettings& printer) {
 }
 
 }  // namespace
+
+DrawnRun::DrawnRun(std::uint64_t seed) : only_chunks(seed % 10 < 2) {
+  const RandomStream random(seed, 43);
+  std::uint64_t at = 0;
+  const auto one_of = [&](std::initializer_list<double> values) {
+    return values.begin()[random.bits(at++) % values.size()];
+  };
+  VirtualPrinterSettings printer;
+  printer.firmware = std::array{Firmware::marlin, Firmware::marlin_before_2_1_2, Firmware::klipper}[seed % 3];
+  const bool klipper = printer.firmware == Firmware::klipper;
+  printer.realtime_position = one_of({0, 1, 1, 1}) > 0;
+  rig.chunk_s = one_of({0, 0.002, 0.01, 0.03, 0.1});
+  RigFaults faults;
+  if (!only_chunks) {
+    faults = {.byte_rate = one_of({0, 0.0002, 0.001, 0.002}),
+              .reset_rate = one_of({0, 0, 0, 0.0005}),
+              .action_rate = one_of({0, 0, 0, 0.0005}),
+              .pause_rate = klipper ? 0 : one_of({0, 0, 0, 0.0005}),
+              .freeze_rate = one_of({0, 0, 0.0003}),
+              .host_freeze_rate = one_of({0, 0.0003, 0.001})};
+    LeftOver& left = printer.left_over;
+    left.relative = one_of({0, 0, 1}) > 0;
+    left.speed_percent = one_of({100, 100, 50, 150, 300});
+    left.flow_percent = one_of({100, 80});
+    if (!klipper) left.inches = one_of({0, 0, 1}) > 0;
+    if (!klipper) left.mesh_mm = one_of({0, 0, 0.46});
+    if (klipper) left.offset = {0, 0, one_of({0, -0.35, 1.2})};
+    printer.acceleration = one_of({200, 500, 500, 3000});
+    printer.slowness = one_of({1, 1, 1, 1, 0.7, 1.4});
+    plan.speed = one_of({5, 10, 10, 25});
+  }
+  rig.printer = printer;
+  rig.printer_running = true;
+  rig.faults = faults;
+  rig.seed = seed;
+}
 
 FaultVerdict run_faulty_collection(RigSettings rig_settings, const PalpationPlan& plan, const Point3& origin,
                                    const PortBetween& printer) {

@@ -27,6 +27,17 @@ struct FaultVerdict {
   double worst_trusted_mm = 0;           ///< the same of recordings without doubt
 };
 
+/// A rig and a plan by seed: three firmwares, what another job left on, damaged bytes up to 0.2 %, boards,
+/// printers and hosts that stand still, adapters, other speeds and accelerations than ordered, displays that
+/// stop or pause, resets. A fifth of the seeds: nothing but chunks of an adapter.
+struct DrawnRun {
+  explicit DrawnRun(std::uint64_t seed);
+  bool only_chunks;
+  RigSettings rig;
+  PalpationPlan plan{.passes = 1, .slide = 40};
+  Point3 origin{99.7, 101.17, 99.81};
+};
+
 /// Runs the whole plan on a rig whose frames carry their own number, by which they are compared with the
 /// truth. Promises: complete with the head where it should be, every planned move run once and in order,
 /// every frame accounted for as received or missing; or a typed error with the finger lifted or the stop

@@ -13,7 +13,7 @@ RigSettings faulty(const RigFaults& faults, std::uint64_t seed, Firmware firmwar
   return rig;
 }
 
-// The 1,000 runs of the promise are a program of their own: rig_fault_runs.
+// The 2,000 runs of the promise are a program of their own: rig_fault_runs.
 TEST(FaultRun, TwoPassesAtTwoPerMilleOfTheBytes) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     for (const Firmware firmware : {Firmware::marlin, Firmware::marlin_before_2_1_2}) {
@@ -24,6 +24,18 @@ TEST(FaultRun, TwoPassesAtTwoPerMilleOfTheBytes) {
       EXPECT_GT(verdict.printer.faults + verdict.printer.timeouts, 10U) << "no faults were injected";
     }
   }
+}
+
+// The quick part of rig_fault_runs, by other seeds.
+TEST(FaultRun, DrawnRigsAreRightOrSaySo) {
+  int complete = 0;
+  for (std::uint64_t seed = 900'000; seed < 900'036; ++seed) {
+    const DrawnRun run(seed);
+    const FaultVerdict verdict = run_faulty_collection(run.rig, run.plan, run.origin);
+    EXPECT_EQ(verdict.broken, "") << "seed " << seed << ", " << verdict.error;
+    complete += verdict.complete ? 1 : 0;
+  }
+  EXPECT_GT(complete, 18);
 }
 
 TEST(FaultRun, EverythingAtOnceIsNeverAFalseDone) {
