@@ -1,6 +1,7 @@
 #include "data/frames/binary_decoder.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 
 namespace supertac {
@@ -11,6 +12,43 @@ std::uint64_t bits_at(const std::byte* bytes, std::size_t count, bool big_endian
   for (std::size_t i = 0; i < count; ++i)
     bits = bits << 8 | std::to_integer<std::uint64_t>(bytes[big_endian ? i : count - 1 - i]);
   return bits;
+}
+
+constexpr std::size_t kMostReturns = 8;
+
+struct Crc {
+  unsigned bits;
+  std::uint32_t polynomial, begin;
+  bool reflected;  // polynomial too: lowest bit first
+  std::uint32_t end;
+};
+constexpr Crc kCrc8{8, 0x07, 0, false, 0}, kModbus{16, 0xA001, 0xFFFF, true, 0},
+    kCcitt{16, 0x1021, 0xFFFF, false, 0}, kCrc32{32, 0xEDB88320, 0xFFFFFFFF, true, 0xFFFFFFFF};
+
+constexpr std::array<std::uint32_t, 256> table_of(const Crc& crc) {
+  std::array<std::uint32_t, 256> table{};
+  const std::uint32_t top = std::uint32_t{1} << (crc.bits - 1);
+  for (std::uint32_t byte = 0; byte < 256; ++byte) {
+    std::uint32_t sum = crc.reflected ? byte : byte << (crc.bits - 8);
+    for (int bit = 0; bit < 8; ++bit)
+      sum = crc.reflected ? sum >> 1 ^ ((sum & 1) != 0 ? crc.polynomial : 0)
+                          : sum << 1 ^ ((sum & top) != 0 ? crc.polynomial : 0);
+    table[byte] = sum & (top | (top - 1));
+  }
+  return table;
+}
+
+template <const Crc& crc>
+std::uint32_t crc_of(std::span<const std::byte> bytes) {
+  static constexpr std::array<std::uint32_t, 256> kTable = table_of(crc);
+  std::uint32_t sum = crc.begin;
+  for (const std::byte byte : bytes) {
+    const std::uint32_t at =
+        (crc.reflected ? sum : sum >> (crc.bits - 8)) ^ std::to_integer<std::uint32_t>(byte);
+    sum = kTable[at & 0xFF] ^ (crc.bits == 8 ? 0 : crc.reflected ? sum >> 8 : sum << 8);
+    if constexpr (crc.bits < 32) sum &= (1U << crc.bits) - 1;
+  }
+  return sum ^ crc.end;
 }
 
 std::span<const std::byte> bytes_in(const std::string& text) { return std::as_bytes(std::span(text)); }
@@ -27,35 +65,47 @@ double number_at(const std::byte* bytes, const std::string& type, bool big_endia
   if (type == "f64") return std::bit_cast<double>(bits);
   if (type == "i8") return static_cast<double>(static_cast<std::int8_t>(bits));
   if (type == "i16") return static_cast<double>(static_cast<std::int16_t>(bits));
+  if (type == "i32") return static_cast<double>(static_cast<std::int32_t>(bits));
   return static_cast<double>(bits);
 }
 
 std::size_t checksum_bytes(const std::string& kind) {
-  return kind == "none" ? 0 : kind.starts_with("crc16") ? 2 : 1;
+  if (kind == "none") return 0;
+  return kind == "crc32" ? 4 : kind.starts_with("crc16") || kind == "sum16" ? 2 : 1;
 }
 
 std::uint32_t checksum_of(const std::string& kind, std::span<const std::byte> bytes) {
-  std::uint32_t sum = kind.starts_with("crc16") ? 0xFFFF : 0;
+  if (kind == "crc8") return crc_of<kCrc8>(bytes);
+  if (kind == "crc16-modbus") return crc_of<kModbus>(bytes);
+  if (kind == "crc16-ccitt") return crc_of<kCcitt>(bytes);
+  if (kind == "crc32") return crc_of<kCrc32>(bytes);
+  std::uint32_t sum = 0;
   for (const std::byte b : bytes) {
     const auto byte = std::to_integer<std::uint32_t>(b);
-    if (kind == "sum8") sum = (sum + byte) & 0xFF;
-    if (kind == "xor8") sum ^= byte;
-    if (kind == "crc16-modbus") {  // polynomial 0x8005, reflected
-      sum ^= byte;
-      for (int bit = 0; bit < 8; ++bit) sum = (sum & 1) != 0 ? sum >> 1 ^ 0xA001 : sum >> 1;
-    }
-    if (kind == "crc16-ccitt") {  // polynomial 0x1021, also called CCITT-FALSE
-      sum ^= byte << 8;
-      for (int bit = 0; bit < 8; ++bit) sum = ((sum & 0x8000) != 0 ? sum << 1 ^ 0x1021 : sum << 1) & 0xFFFF;
-    }
+    sum = kind == "xor8" ? sum ^ byte : sum + byte;
   }
-  return sum;
+  return sum & (kind == "sum16" ? 0xFFFF : 0xFF);
+}
+
+BinaryLayout::BinaryLayout(const FrameFormat& format, std::size_t count) {
+  using Is = FrameField::Is;
+  std::vector<FrameField> fields = format.fields;
+  if (fields.empty() && format.time) fields.push_back({.is = Is::time});
+  if (format.fields.empty()) fields.push_back({.is = Is::values, .count = count});
+  std::size_t at = format.header.size();
+  for (const FrameField& field : fields) {
+    if (field.is == Is::values) runs.push_back({at, field.count});
+    if (field.is == Is::time) time_at = at;
+    at += field.is == Is::values ? field.count * bytes_of(format.type)
+          : field.is == Is::skip ? field.count
+                                 : bytes_of(field.is == Is::time ? format.time->type : field.type);
+  }
+  checksum_at = at;
+  size = at + checksum_bytes(format.checksum) + format.trailer.size();
 }
 
 BinaryDecoder::BinaryDecoder(const Sensor& sensor)
-    : format_(sensor.frame), count_(sensor.values()), value_bytes_(bytes_of(sensor.frame.type)) {
-  values_at_ = format_.header.size() + (format_.time ? bytes_of(format_.time->type) : 0);
-  size_ = values_at_ + count_ * value_bytes_ + checksum_bytes(format_.checksum) + format_.trailer.size();
+    : format_(sensor.frame), value_bytes_(bytes_of(sensor.frame.type)), layout_(format_, sensor.values()) {
   vague_ = format_.checksum == "none" && format_.trailer.empty();
 }
 
@@ -66,14 +116,14 @@ bool BinaryDecoder::has_header(const std::byte* start, std::size_t left) const {
 
 bool BinaryDecoder::is_frame(const std::byte* start) const {
   const auto trailer = bytes_in(format_.trailer);
-  if (!has_header(start, size_) ||
-      !std::equal(trailer.begin(), trailer.end(), start + size_ - trailer.size()))
+  if (!has_header(start, size()) ||
+      !std::equal(trailer.begin(), trailer.end(), start + size() - trailer.size()))
     return false;
   if (format_.checksum == "none") return true;
-  const std::size_t from = format_.header.size(), sum_bytes = checksum_bytes(format_.checksum);
-  const std::size_t end = size_ - trailer.size() - sum_bytes;
-  return bits_at(start + end, sum_bytes, format_.big_endian) ==
-         checksum_of(format_.checksum, {start + from, end - from});
+  const std::size_t from = format_.checksum_from.value_or(format_.header.size()), at = layout_.checksum_at;
+  return bits_at(start + at, checksum_bytes(format_.checksum),
+                 format_.checksum_big_endian.value_or(format_.big_endian)) ==
+         checksum_of(format_.checksum, {start + from, at - from});
 }
 
 // In the middle of nowhere a header and a trailer may stand a frame apart by chance, and go on doing so while
@@ -82,31 +132,68 @@ std::optional<bool> BinaryDecoder::accepts() const {
   const std::byte* start = buffer_.data() + position_;
   const std::size_t left = buffer_.size() - position_;
   if (!has_header(start, left)) return false;
-  if (left < size_) return std::nullopt;
+  if (left < size()) return std::nullopt;
   if (!is_frame(start)) return false;
-  if (ever_ && discarded_ <= 2 * size_) return true;
-  if (left < 2 * size_) return std::nullopt;
-  return is_frame(start + size_);
+  if (vague_ || (ever_ && discarded_ <= 2 * size())) return true;
+  if (left < 2 * size()) return std::nullopt;
+  return is_frame(start + size());
+}
+
+std::pair<std::size_t, bool> BinaryDecoder::returns(std::size_t place) const {
+  for (std::size_t n = 0; n < kMostReturns; ++n, place += size()) {
+    const std::size_t left = place < buffer_.size() ? buffer_.size() - place : 0;
+    if (left > 0 && !has_header(buffer_.data() + place, left)) return {n, false};
+    if (left < format_.header.size()) return {n, true};
+  }
+  return {kMostReturns, false};
+}
+
+// What cannot be told apart within kMostReturns frames is the place nearest to where a frame was expected.
+bool BinaryDecoder::search() {
+  const std::size_t window = std::min(expected_ + size(), buffer_.size() - position_);
+  std::size_t best = 0, most = 0, first_open = window, open = 0;
+  bool best_open = false;
+  const auto away = [&](std::size_t place) {
+    return place > expected_ ? place - expected_ : expected_ - place;
+  };
+  for (std::size_t place = 0; place < window; ++place) {
+    const auto [count, goes_on] = returns(position_ + place);
+    if (goes_on) first_open = std::min(first_open, place), open += count > 0 ? 1 : 0;
+    if (count > most || (count == most && away(place) < away(best)))
+      best = place, most = count, best_open = goes_on;
+  }
+  if (most > 1 && open == (best_open ? 1 : 0)) {
+    discard(best);
+    return found_ = true;
+  }
+  if (most > 1) return false;
+  discard(first_open);
+  return first_open == window && position_ < buffer_.size();
 }
 
 void BinaryDecoder::push(std::span<const std::byte> bytes, const Sink& sink) {
   // A vague frame is kept: it may turn out to have swallowed the beginning of the next.
-  const std::size_t kept = vague_ && found_ ? size_ : 0;
+  const std::size_t kept = vague_ && found_ && ever_ ? size() : 0;
   buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(position_ - kept));
   position_ = kept;
   buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
   counters_.bytes += bytes.size();
   while (position_ < buffer_.size()) {
+    if (vague_ && !found_) {
+      if (!search()) return;
+      continue;
+    }
     const std::optional<bool> accepted = accepts();
     if (!accepted) return;
     if (*accepted) {
       hand_over(buffer_.data() + position_, sink);
-      position_ += size_;
-      discarded_ = 0;
+      position_ += size();
+      discarded_ = expected_ = 0;
       found_ = ever_ = true;
-    } else if (vague_ && found_) {
+    } else if (vague_) {
       found_ = false;
-      position_ -= size_ - 1;
+      position_ -= size() - 1;
+      expected_ = size() - 1;
       discarded_ = 1;
       ++counters_.torn;
     } else {
@@ -116,22 +203,25 @@ void BinaryDecoder::push(std::span<const std::byte> bytes, const Sink& sink) {
 }
 
 void BinaryDecoder::discard(std::size_t count) {
+  if (count == 0) return;
   found_ = false;
   counters_.torn += discarded_ == 0 ? 1 : 0;
   position_ += count;
   discarded_ += count;
+  expected_ -= std::min(count, expected_);
   counters_.discarded_bytes += count;
 }
 
 void BinaryDecoder::hand_over(const std::byte* start, const Sink& sink) {
   values_.clear();
-  for (std::size_t k = 0; k < count_; ++k)
-    values_.push_back(static_cast<float>(
-        number_at(start + values_at_ + k * value_bytes_, format_.type, format_.big_endian)));
+  for (const BinaryLayout::Run& run : layout_.runs)
+    for (std::size_t k = 0; k < run.count; ++k)
+      values_.push_back(
+          static_cast<float>(number_at(start + run.at + k * value_bytes_, format_.type, format_.big_endian)));
   DecodedFrame frame{values_, std::nullopt};
   if (format_.time)
-    frame.time_s = number_at(start + format_.header.size(), format_.time->type, format_.big_endian) *
-                   format_.time->unit_s;
+    frame.time_s =
+        number_at(start + layout_.time_at, format_.time->type, format_.big_endian) * format_.time->unit_s;
   ++counters_.frames;
   sink(frame);
 }

@@ -12,7 +12,7 @@
 namespace supertac {
 namespace {
 
-constexpr std::size_t kLongestText = 200, kLongestMark = 64;
+constexpr std::size_t kLongestText = 200, kLongestMark = 64, kMostFields = 64, kMostSkipped = 65536;
 constexpr double kLargest = 1e9, kFinest = 1e-5;  // of a range, and of its share of its ends: floats hold it
 
 void expect(bool good, const std::string& key, const std::string& expected, const std::string& found) {
@@ -53,13 +53,36 @@ void check_format(const FrameFormat& f) {
          "at most 64 bytes, as frame.trailer", std::to_string(std::max(f.header.size(), f.trailer.size())));
   expect(!f.header.empty() || !f.trailer.empty() || f.checksum != "none", "frame.header",
          "at least a byte where there is neither trailer nor checksum", "nothing");
-  expect(one_of(f.type, {"u8", "i8", "u16", "i16", "u32", "f32"}), "frame.type",
-         "u8, i8, u16, i16, u32 or f32", in_quotes(f.type));
-  expect(one_of(f.checksum, {"none", "sum8", "xor8", "crc16-modbus", "crc16-ccitt"}), "frame.checksum",
-         "none, sum8, xor8, crc16-modbus or crc16-ccitt", in_quotes(f.checksum));
+  expect(one_of(f.type, {"u8", "i8", "u16", "i16", "u32", "i32", "f32"}), "frame.type",
+         "u8, i8, u16, i16, u32, i32 or f32", in_quotes(f.type));
+  expect(std::ranges::find(kChecksums, f.checksum) != std::end(kChecksums), "frame.checksum",
+         "one of " + joined(kChecksums, ", ", [](const char* kind) { return kind; }), in_quotes(f.checksum));
+  expect(f.checksum_from.value_or(0) <= f.header.size(), "frame.checksum.from",
+         "0 to " + std::to_string(f.header.size()) + ", within the header or right behind it",
+         std::to_string(f.checksum_from.value_or(0)));
   if (f.time)
     expect(one_of(f.time->type, {"u16", "u32", "u64", "f64"}), "frame.time.type", "u16, u32, u64 or f64",
            in_quotes(f.time->type));
+}
+
+// What the fields of a binary frame hold together.
+void check_fields(const FrameFormat& f, std::size_t values) {
+  if (f.fields.empty()) return;
+  std::size_t held = 0, times = 0, skipped = 0;
+  for (const FrameField& field : f.fields) {
+    if (field.is == FrameField::Is::values) held += field.count;
+    if (field.is == FrameField::Is::skip) skipped += field.count;
+    if (field.is == FrameField::Is::time) ++times;
+    if (field.is == FrameField::Is::counter)
+      expect(field.type == "u8" || field.type == "u16" || field.type == "u32", "frame.fields.counter",
+             "u8, u16 or u32", in_quotes(field.type));
+  }
+  expect(f.fields.size() <= kMostFields && skipped <= kMostSkipped, "frame.fields",
+         "at most 64 that skip at most 65536 bytes", std::to_string(f.fields.size()));
+  expect(held == values, "frame.fields", "the frame's " + std::to_string(values) + " values",
+         std::to_string(held));
+  expect(times == (f.time ? 1 : 0), "frame.fields", "time once where there is frame.time, and nowhere else",
+         std::to_string(times) + " times");
 }
 
 }  // namespace
@@ -144,6 +167,7 @@ void Sensor::check() const {
          "row-major, column-major, or for each of the " + std::to_string(taxels) +
              " taxels its place in the frame, from 0 and each once, -1 where there is none",
          std::to_string(order.size()) + " places, " + std::to_string(places.size()) + " different");
+  if (frame.kind == FrameKind::binary) check_fields(frame, values());
   for (const int k : dead)
     expect(k >= 0 && k < array.taxels(), "dead", "taxels 0 to " + std::to_string(taxels - 1),
            std::to_string(k));

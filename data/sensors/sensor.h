@@ -41,6 +41,20 @@ struct FrameTime {
 
 enum class FrameKind { board, text, json, binary };
 
+/// A part of a binary frame between header and checksum.
+struct FrameField {
+  enum class Is { values, time, counter, skip };
+  Is is = Is::values;
+  std::size_t count = 0;  ///< of values; of bytes to skip
+  std::string type = {};  ///< of a counter: "u8", "u16" or "u32"
+  bool operator==(const FrameField&) const = default;
+};
+
+/// Checksums of all bytes from FrameFormat::checksum_from to its own: sums of bytes, their exclusive or, CRCs
+/// (8: polynomial 0x07 from 0; 16: as Modbus, or CCITT-FALSE; 32: as in Ethernet).
+inline constexpr const char* kChecksums[] = {"none", "sum8",         "xor8",        "sum16",
+                                             "crc8", "crc16-modbus", "crc16-ccitt", "crc32"};
+
 /// How a frame is written. Its values stand in the order that Sensor::order names.
 struct FrameFormat {
   FrameKind kind = FrameKind::board;
@@ -50,11 +64,15 @@ struct FrameFormat {
   std::vector<int> skip = {};  ///< columns that are neither time nor values
   // json: a line a frame
   std::string values = {};  ///< key of the array, which may be nested; empty: the line is the array
-  // binary: header, time, values, checksum, trailer
+  // binary: header, fields, checksum, trailer
   std::string header = {}, trailer = {};  ///< bytes
   bool big_endian = false;
-  std::string type = "u16";       ///< "u8", "i8", "u16", "i16", "u32" or "f32"
-  std::string checksum = "none";  ///< "sum8", "xor8", "crc16-modbus", "crc16-ccitt": of time and values
+  std::string type = "u16";             ///< "u8", "i8", "u16", "i16", "u32", "i32" or "f32"
+  std::vector<FrameField> fields = {};  ///< empty: time, where there is one, and all values
+  std::string checksum = "none";        ///< one of kChecksums
+  std::optional<std::size_t> checksum_from =
+      {};  ///< the frame's first byte that it covers; else behind header
+  std::optional<bool> checksum_big_endian = {};  ///< else as big_endian
   bool operator==(const FrameFormat&) const = default;
 };
 

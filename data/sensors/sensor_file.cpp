@@ -1,4 +1,5 @@
 // A Sensor as JSON.
+#include <algorithm>
 #include <charconv>
 #include <stdexcept>
 
@@ -78,6 +79,68 @@ FrameTime time_of(const Json& json, FrameKind kind, const std::string& where) {
   return time;
 }
 
+constexpr std::pair<const char*, bool> kEndian[] = {{"little", false}, {"big", true}};
+
+// "crc16-modbus", or {"kind": "crc16-modbus", "from": 0, "endian": "little"}.
+void take_checksum(JsonObject& keys, FrameFormat& f) {
+  const Json* json = keys.find("checksum");
+  if (json == nullptr) return;
+  if (json->is_string()) {
+    f.checksum = json->get<std::string>();
+    return;
+  }
+  JsonObject inner(*json, keys.where(), "frame.checksum.");
+  f.checksum = inner.text("kind");
+  if (inner.find("from") != nullptr)
+    f.checksum_from = static_cast<std::size_t>(std::max(inner.integer("from"), 0));
+  if (inner.find("endian") != nullptr) f.checksum_big_endian = inner.one_of("endian", kEndian);
+  inner.no_others();
+}
+
+// ["time", {"counter": "u8"}, {"values": 16}, {"skip": 4}]
+std::vector<FrameField> fields_of(JsonObject& keys, const Json& json) {
+  const char* expected =
+      "a list of \"time\", {\"values\": N}, {\"skip\": BYTES} and {\"counter\": \"u8\"}, in turn";
+  std::vector<FrameField> fields;
+  if (!json.is_array() || json.empty()) keys.wrong("fields", expected, json);
+  for (const Json& entry : json) {
+    FrameField& field = fields.emplace_back();
+    if (entry == "time") {
+      field.is = FrameField::Is::time;
+      continue;
+    }
+    JsonObject inner(entry.is_object() && entry.size() == 1 ? entry : Json::object(), keys.where(),
+                     "frame.fields.");
+    if (inner.find("counter") != nullptr) {
+      field.is = FrameField::Is::counter, field.type = inner.text("counter");
+    } else if (inner.find("skip") != nullptr || inner.find("values") != nullptr) {
+      const bool skip = inner.find("skip") != nullptr;
+      const int count = inner.integer(skip ? "skip" : "values");
+      if (count < 1) keys.wrong("fields", expected, entry);
+      field.is = skip ? FrameField::Is::skip : FrameField::Is::values;
+      field.count = static_cast<std::size_t>(count);
+    } else {
+      keys.wrong("fields", expected, entry);
+    }
+    inner.no_others();
+  }
+  return fields;
+}
+
+Json json_of(const FrameField& field) {
+  switch (field.is) {
+    case FrameField::Is::counter:
+      return {{"counter", field.type}};
+    case FrameField::Is::skip:
+      return {{"skip", field.count}};
+    case FrameField::Is::values:
+      return {{"values", field.count}};
+    case FrameField::Is::time:
+      break;
+  }
+  return "time";
+}
+
 FrameFormat format_of(const Json& json, const std::string& where) {
   JsonObject keys(json, where, "frame.");
   FrameFormat f;
@@ -92,12 +155,12 @@ FrameFormat format_of(const Json& json, const std::string& where) {
   }
   if (f.kind == FrameKind::json) f.values = keys.text("values", "");
   if (f.kind == FrameKind::binary) {
-    constexpr std::pair<const char*, bool> kEndian[] = {{"little", false}, {"big", true}};
     f.header = bytes_of_hex(keys, "header");
     f.trailer = bytes_of_hex(keys, "trailer");
     f.big_endian = keys.one_of("endian", kEndian, "little");
     f.type = keys.text("type", f.type);
-    f.checksum = keys.text("checksum", f.checksum);
+    take_checksum(keys, f);
+    if (const Json* fields = keys.find("fields")) f.fields = fields_of(keys, *fields);
   }
   keys.no_others();
   return f;
@@ -142,7 +205,13 @@ Json json_of(const FrameFormat& f) {
     if (!f.header.empty()) json["header"] = hex_of_bytes(f.header);
     json["endian"] = f.big_endian ? "big" : "little";
     json["type"] = f.type;
+    for (const FrameField& field : f.fields) json["fields"].push_back(json_of(field));
     if (f.checksum != "none") json["checksum"] = f.checksum;
+    if (f.checksum_from || f.checksum_big_endian) {
+      json["checksum"] = {{"kind", f.checksum}};
+      if (f.checksum_from) json["checksum"]["from"] = *f.checksum_from;
+      if (f.checksum_big_endian) json["checksum"]["endian"] = *f.checksum_big_endian ? "big" : "little";
+    }
     if (!f.trailer.empty()) json["trailer"] = hex_of_bytes(f.trailer);
   }
   if (!f.time) return json;

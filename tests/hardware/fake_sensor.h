@@ -55,28 +55,44 @@ inline std::string sent_frame(const Sensor& sensor, std::span<const double> valu
     return (f.time ? "{\"" + f.time->key + "\":" + format(stamp) + "," : "{") + "\"" + f.values +
            "\":" + list + "}\n";
   }
-  if (f.time)
-    append_bytes(bytes, bits_of(stamp, f.time->type),
-                 f.time->type.back() == '6'   ? 2
-                 : f.time->type.back() == '2' ? 4
-                                              : 8,
-                 f.big_endian);
-  const std::size_t width = f.type.ends_with("8") ? 1 : f.type.ends_with("16") ? 2 : 4;
-  for (const double value : values) append_bytes(bytes, bits_of(value, f.type), width, f.big_endian);
-  std::uint32_t sum = 0, crossed = 0, modbus = 0xFFFF, ccitt = 0xFFFF;
-  for (const char c : bytes) {
+  const auto width_of = [](const std::string& type) { return std::stoul(type.substr(1)) / 8; };
+  std::vector<FrameField> fields = f.fields;
+  if (fields.empty() && f.time) fields.push_back({FrameField::Is::time, 0, ""});
+  if (f.fields.empty()) fields.push_back({FrameField::Is::values, values.size(), ""});
+  std::size_t next = 0;
+  bytes = f.header;
+  for (const FrameField& field : fields) {
+    if (field.is == FrameField::Is::time)
+      append_bytes(bytes, bits_of(stamp, f.time->type), width_of(f.time->type), f.big_endian);
+    if (field.is == FrameField::Is::counter)
+      append_bytes(bytes, static_cast<std::uint64_t>(std::llround(time_s * sensor.rate_hz)),
+                   width_of(field.type), f.big_endian);
+    if (field.is == FrameField::Is::skip) bytes.append(field.count, '#');
+    if (field.is == FrameField::Is::values)
+      for (const std::size_t end = next + field.count; next < end; ++next)
+        append_bytes(bytes, bits_of(values[next], f.type), width_of(f.type), f.big_endian);
+  }
+  std::uint32_t sum = 0, crossed = 0, modbus = 0xFFFF, ccitt = 0xFFFF, crc8 = 0, crc32 = 0xFFFFFFFF;
+  for (const char c : std::string_view(bytes).substr(f.checksum_from.value_or(f.header.size()))) {
     const auto byte = static_cast<unsigned char>(c);
-    sum += byte, crossed ^= byte, modbus ^= byte, ccitt ^= std::uint32_t{byte} << 8;
+    sum += byte, crossed ^= byte, modbus ^= byte, ccitt ^= std::uint32_t{byte} << 8, crc8 ^= byte;
+    crc32 ^= byte;
     for (int bit = 0; bit < 8; ++bit) {
       modbus = modbus >> 1 ^ ((modbus & 1) != 0 ? 0xA001U : 0U);
       ccitt = (ccitt << 1 ^ ((ccitt & 0x8000) != 0 ? 0x1021U : 0U)) & 0xFFFF;
+      crc8 = (crc8 << 1 ^ ((crc8 & 0x80) != 0 ? 0x07U : 0U)) & 0xFF;
+      crc32 = crc32 >> 1 ^ ((crc32 & 1) != 0 ? 0xEDB88320U : 0U);
     }
   }
-  if (f.checksum == "sum8") append_bytes(bytes, sum & 0xFF, 1, false);
-  if (f.checksum == "xor8") append_bytes(bytes, crossed, 1, false);
-  if (f.checksum == "crc16-modbus") append_bytes(bytes, modbus, 2, f.big_endian);
-  if (f.checksum == "crc16-ccitt") append_bytes(bytes, ccitt, 2, f.big_endian);
-  return f.header + bytes + f.trailer;
+  const bool big = f.checksum_big_endian.value_or(f.big_endian);
+  if (f.checksum == "sum8") append_bytes(bytes, sum & 0xFF, 1, big);
+  if (f.checksum == "xor8") append_bytes(bytes, crossed, 1, big);
+  if (f.checksum == "sum16") append_bytes(bytes, sum & 0xFFFF, 2, big);
+  if (f.checksum == "crc8") append_bytes(bytes, crc8, 1, big);
+  if (f.checksum == "crc16-modbus") append_bytes(bytes, modbus, 2, big);
+  if (f.checksum == "crc16-ccitt") append_bytes(bytes, ccitt, 2, big);
+  if (f.checksum == "crc32") append_bytes(bytes, ~crc32, 4, big);
+  return bytes + f.trailer;
 }
 
 /// Counts from 0 to 1000 that rise under pressure.

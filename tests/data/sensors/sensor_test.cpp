@@ -93,6 +93,16 @@ TEST(Sensor, WritesWhatItReads) {
     write_sensor(folder / "sensor.json", sensor);
     EXPECT_EQ(read_sensor(folder / "sensor.json"), sensor) << kind;
   }
+  using Is = FrameField::Is;
+  FrameFormat& f = sensor.frame;
+  f.fields = {{.is = Is::counter, .type = "u16"},
+              {.is = Is::values, .count = 5},
+              {.is = Is::skip, .count = 3},
+              {.is = Is::time},
+              {.is = Is::values, .count = 7}};
+  f.type = "i32", f.checksum_from = 1, f.checksum_big_endian = false;
+  write_sensor(folder / "fields.json", sensor);
+  EXPECT_EQ(read_sensor(folder / "fields.json"), sensor);
 }
 
 TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
@@ -124,6 +134,20 @@ TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
        "\"frame.header\" must be at least a byte where there is neither trailer nor checksum, found nothing"},
       {"frame", Json{{"kind", "binary"}, {"header", "A5 5"}},
        "\"frame.header\" must be bytes as hexadecimal digits, such as \"AA55\", found \"A5 5\""},
+      {"frame", Json{{"kind", "binary"}, {"header", "A5"}, {"type", "u24"}},
+       "\"frame.type\" must be u8, i8, u16, i16, u32, i32 or f32, found 'u24'"},
+      {"frame", Json{{"kind", "binary"}, {"header", "A5"}, {"checksum", "md5"}},
+       "\"frame.checksum\" must be one of none, sum8, xor8, sum16, crc8, crc16-modbus, crc16-ccitt, crc32, "
+       "found 'md5'"},
+      {"frame", Json{{"kind", "binary"}, {"header", "A5"}, {"checksum", {{"kind", "crc8"}, {"from", 2}}}},
+       "\"frame.checksum.from\" must be 0 to 1, within the header or right behind it, found 2"},
+      {"frame", Json{{"kind", "binary"}, {"header", "A5"}, {"fields", {{{"values", 8}}, "time"}}},
+       "\"frame.fields\" must be the frame's 12 values, found 8"},
+      {"frame", Json{{"kind", "binary"}, {"header", "A5"}, {"fields", {{{"values", 12}}, "time"}}},
+       "\"frame.fields\" must be time once where there is frame.time, and nowhere else, found 1 times"},
+      {"frame", Json{{"kind", "binary"}, {"header", "A5"}, {"fields", {{{"values", 12}, {"skip", 1}}}}},
+       "\"frame.fields\" must be a list of \"time\", {\"values\": N}, {\"skip\": BYTES} and "
+       "{\"counter\": \"u8\"}, in turn, found {\"values\":12,\"skip\":1}"},
       {"order", Json{0, 1, 2},
        "\"order\" must be row-major, column-major, or for each of the 12 taxels its place in the frame, from "
        "0 "
