@@ -2,12 +2,16 @@
 
 #include <atomic>
 #include <filesystem>
+#include <functional>
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/output_folder.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "data/plates/plate_file.h"
+#include "data/recordings/felt_taxels.h"
+#include "data/recordings/presses/presses.h"
+#include "data/recordings/presses/scene.h"
 #include "data/recordings/simulator.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/parallel.h"
@@ -16,9 +20,9 @@
 namespace supertac {
 namespace {
 
+/// One recording: what makes it, and its file.
 struct Job {
-  const Plate* plate;
-  PassSettings pass;
+  std::function<Recording()> simulate;
   std::string path;
 };
 
@@ -58,6 +62,7 @@ SimulatorSettings read_settings(const Arguments& arguments, const Sensor& sensor
         throw UsageError(std::string("--sensor: its file says what --") + other + " would; leave that out");
     settings.array = sensor.array;
     settings.rate_hz = sensor.rate_hz;
+    settings.body = sensor.body;
     settings.filter_s = 0, settings.with_adc = false;  // the rig's board has these
   } else {
     settings.array = read_array(arguments);
@@ -68,8 +73,10 @@ SimulatorSettings read_settings(const Arguments& arguments, const Sensor& sensor
   return settings;
 }
 
-std::vector<Job> plan(const Arguments& arguments, const std::vector<Plate>& plates, OutputFolder& folder) {
+std::vector<Job> plan_passes(const Arguments& arguments, const std::vector<Plate>& plates,
+                             const SimulatorSettings& simulator, OutputFolder& folder) {
   std::vector<Job> jobs;
+  const std::uint64_t seed = arguments.seed();
   const auto speeds = arguments.numbers("speeds", 0.5, rig::kFastestMmS);
   const int trials = static_cast<int>(arguments.integer("trials", 1, 1000));
   const int passes = static_cast<int>(arguments.integer("passes", 1, rig::kPasses));
@@ -86,7 +93,10 @@ std::vector<Job> plan(const Arguments& arguments, const std::vector<Plate>& plat
           named.speed_mm_s = speed;
           const PassSettings settings{
               .trial = trial, .pass = pass, .speed_mm_s = speed, .from_mm = from, .to_mm = to};
-          jobs.push_back({&plate, settings, folder.add(recording_file_name(named))});
+          jobs.push_back({[&plate, settings, &simulator, seed] {
+                            return simulate_pass(plate, settings, simulator, seed);
+                          },
+                          folder.add(recording_file_name(named))});
         }
       }
     }
@@ -94,16 +104,41 @@ std::vector<Job> plan(const Arguments& arguments, const std::vector<Plate>& plat
   return jobs;
 }
 
-/// Simulates and writes all passes, several at a time; each depends on its own settings and the seed only.
-/// Returns frames written
-std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& settings, const Sensor& sensor,
-                     std::uint64_t seed, Progress& progress) {
+std::vector<Job> plan_presses(const Arguments& arguments, const Sensor& sensor, OutputFolder& folder) {
+  constexpr int kPressesOfARecording = 125;
+  for (const char* other :
+       {"plates", "speeds", "trials", "passes", "from", "to", "array", "pitch", "without"})
+    if (arguments.given(other))
+      throw UsageError(std::string("--presses: nothing slides over a plate; leave --") + other + " out");
+  const int scale = std::stoi(arguments.choice("scale", {"2", "4", "8", "16"}));
+  const std::vector<std::string>& kinds = press_kinds();
+  const auto count = static_cast<std::size_t>(arguments.integer("presses", 1, 1'000'000));
+  const std::uint64_t seed = arguments.seed();
+  std::vector<Job> jobs;
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    int left = static_cast<int>((count + kinds.size() - 1 - i) / kinds.size());
+    for (Presses presses{.kind = kinds[i], .scale = scale}; left > 0; ++presses.number) {
+      presses.count = std::min(left, kPressesOfARecording);
+      left -= presses.count;
+      Recording named;
+      named.plate = presses.kind, named.trial = presses.number, named.pass = 1;
+      jobs.push_back({[&sensor, presses, seed] { return simulate_presses(sensor, presses, seed); },
+                      folder.add(recording_file_name(named))});
+    }
+  }
+  return jobs;
+}
+
+/// Simulates and writes all recordings, several at a time; each depends on its own settings and the seed
+/// only. Returns frames written
+std::size_t simulate(const std::vector<Job>& jobs, const Sensor& sensor, FeltTaxels& felt,
+                     Progress& progress) {
   std::size_t frames = 0, done = 0;
   std::atomic<bool> failed = false;
   parallel_for(jobs.size(), [&](std::size_t i) {
     if (failed || interrupted()) return;
     try {
-      Recording recording = simulate_pass(*jobs[i].plate, jobs[i].pass, settings, seed);
+      Recording recording = jobs[i].simulate();
       restate(recording, sensor.scale);
       const std::size_t signals = recording.array.signals();
       for (std::size_t f = 0; sensor.array == recording.array && f < recording.frames(); ++f)
@@ -112,6 +147,7 @@ std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& sett
 #pragma omp critical
       {
         frames += recording.frames();
+        felt.add(recording);
         progress.update(++done);
       }
     } catch (...) {
@@ -126,7 +162,7 @@ std::size_t simulate(const std::vector<Job>& jobs, const SimulatorSettings& sett
 }  // namespace
 
 void declare(Arguments& arguments) {
-  arguments.required("out", "DIR", "folder for the recordings, one file per pass")
+  arguments.required("out", "DIR", "folder for the recordings")
       .writes()
       .option("plates", "NAME,...",
               "plates of the rig (3_Bumps, ...), plain, kind and pitch in mm (ridges6), or FILE.stl",
@@ -140,6 +176,12 @@ void declare(Arguments& arguments) {
       .option("sensor", "FILE",
               "a sensor's file, or rig: its array, rate, unit, polarity and range instead of the rig's",
               "rig")
+      .option(
+          "presses", "N",
+          "instead of passes N presses of the sensor: none to four objects at a time that come, move and go, "
+          "with the pressure as truth, in groups by kind (" +
+              joined(press_kinds(), ", ") + ")")
+      .option("scale", "N", "of --presses: truth N times as fine as the array: 2, 4, 8 or 16", "4")
       .option("array", "ROWSxCOLUMNS", "taxels of the finger, 1 to 64 either way", "4x4")
       .option("pitch", "MM", "from taxel to taxel: one number, or along a row and from row to row, 3,4", "3")
       .option("without", "TERM,...", "leave out terms of the simulator: " + joined(simulator_terms(), ", "))
@@ -166,13 +208,18 @@ int run(Arguments& arguments) {
   if (arguments.list("speeds").empty()) throw UsageError("--speeds: expected at least one speed");
   const std::size_t before = recordings_in(arguments.text("out"));
   OutputFolder folder(arguments.output("out"));
-  const auto jobs = plan(arguments, plates, folder);
+  const bool presses = arguments.given("presses");
+  const auto jobs =
+      presses ? plan_presses(arguments, sensor, folder) : plan_passes(arguments, plates, settings, folder);
   std::size_t frames = 0;
+  FeltTaxels felt;
   {
-    Progress progress(arguments, "simulating", jobs.size(), "passes");
-    frames = simulate(jobs, settings, sensor, seed, progress);
+    Progress progress(arguments, "simulating", jobs.size(), "recordings");
+    frames = simulate(jobs, sensor, felt, progress);
   }
-  for (const std::string& plate : arguments.list("plates")) keep_plate_file(plate, folder.path());
+  if (!felt.text().empty()) arguments.note(felt.text());
+  for (const std::string& plate : presses ? std::vector<std::string>{} : arguments.list("plates"))
+    keep_plate_file(plate, folder.path());
   folder.keep();
   arguments.write_json({{"folder", arguments.text("out")},
                         {"recordings", jobs.size()},

@@ -52,6 +52,7 @@ Recording recording_of(const CollectedPass& pass, const Collection& collection, 
   Recording recording;
   recording.array = collection.sensor.array;
   recording.signal_scale = collection.sensor.scale;
+  recording.body = collection.sensor.body;
   recording.time_s = pass.time_s;
   recording.volts = pass.volts;
   for (std::size_t i = 0; i < pass.time_s.size(); ++i) {

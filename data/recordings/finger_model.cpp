@@ -31,6 +31,10 @@ constexpr double kBeyondAcrossMm = 3.5, kBeyondAlongMm = 6.5;  // the outermost 
 int points_of(int lines, double pitch, double beyond, double step) {
   return 2 * static_cast<int>(std::ceil(((lines - 1) / 2.0 * pitch + beyond) / step)) + 1;
 }
+int points_across(const TaxelArray& a) {
+  return points_of(a.columns, a.pitch_mm.x, kBeyondAcrossMm, kAcrossMm);
+}
+int points_along(const TaxelArray& a) { return points_of(a.rows, a.pitch_mm.y, kBeyondAlongMm, kAlongMm); }
 constexpr double kNoPadSigmaMm = 0.3;  // without a pad a taxel feels the points next to it
 
 // Grid of the plate's surface: wide enough for the rig's whole pad with its centre on the plate; beyond it
@@ -45,8 +49,8 @@ struct Term {
 };
 constexpr Term kTerms[] = {
     {"mount", [](SimulatorSettings& s) { s.with_mount = false; }},
-    {"pad", [](SimulatorSettings& s) { s.pad_sigma_mm = kNoPadSigmaMm; }},
-    {"dome", [](SimulatorSettings& s) { s.dome_radius_mm = INFINITY; }},
+    {"pad", [](SimulatorSettings& s) { s.body.skin_mm = 2 * kNoPadSigmaMm; }},
+    {"dome", [](SimulatorSettings& s) { s.body.shape = BodyShape::flat, s.body.radius_mm = 0; }},
     {"edges", [](SimulatorSettings& s) { s.with_edges = false; }},
     {"tilt", [](SimulatorSettings& s) { s.tilt_spread = 0; }},
     {"gains", [](SimulatorSettings& s) { s.with_gains = false; }},
@@ -126,6 +130,7 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
   if (settings.array.channels != 1 && settings.array.channels != 3)
     throw std::invalid_argument("simulator: expected an array of one channel or three axes, got " +
                                 settings.array.text());
+  if (settings_.body.skin_mm == 0) settings_.body.skin_mm = Body::of_rig().skin_mm;
   const RandomStream sensor(id.seed, 0), trial(id.seed, mounting_stream(plate, id.trial));
   const RandomStream pass(id.seed, pass_stream(plate, id));
   const double variation = settings.with_variation ? 1 : 0;
@@ -161,20 +166,22 @@ FingerModel::FingerModel(const Plate& plate, const SimulatorSettings& settings, 
 }
 
 void FingerModel::shape_pad(double slope_x, double slope_y) {
-  const double sigma = settings_.pad_sigma_mm;
+  const double sigma = settings_.body.sigma_mm();
   const auto [rows, columns, pitch, channels] = settings_.array;
-  across_ = points_of(columns, pitch.x, kBeyondAcrossMm, kAcrossMm);
-  along_ = points_of(rows, pitch.y, kBeyondAlongMm, kAlongMm);
+  across_ = points_across(settings_.array), along_ = points_along(settings_.array);
+  const auto points = [](const TaxelArray& a) {
+    return static_cast<double>(points_across(a) * points_along(a));
+  };
+  settings_.mount_stiffness *= points(settings_.array) / points(TaxelArray{});
   across_weight_ = taxel_weights(columns, pitch.x, across_, kAcrossMm, sigma);
   along_weight_ = taxel_weights(rows, pitch.y, along_, kAlongMm, sigma);
   across_lean_ = leaning(across_weight_, columns, pitch.x, kAcrossMm, sigma);
   along_lean_ = leaning(along_weight_, rows, pitch.y, kAlongMm, sigma);
-  const double curvature = 1 / (2 * settings_.dome_radius_mm);
   double lowest = 0;
   for (int i = 0; i < across_; ++i)
     for (int j = 0; j < along_; ++j) {
       const double x = kAcrossMm * (i - across_ / 2), y = kAlongMm * (j - along_ / 2);
-      rise_.push_back(curvature * (x * x + y * y) + slope_x * x + slope_y * y);
+      rise_.push_back(settings_.body.depth_mm(x, y) + slope_x * x + slope_y * y);
       lowest = std::min(lowest, rise_.back());
     }
   for (double& rise : rise_) rise -= lowest;

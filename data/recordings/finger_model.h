@@ -20,13 +20,13 @@ struct SimulatorSettings {
   double threshold_mm = 0;      ///< |N(0, 1)| times this is the load of which a taxel feels nothing
 
   bool with_mount = true;       ///< the finger gives way: a bump under one row lifts the other rows
-  double mount_stiffness = 15;  ///< cubic mm of indented pad per mm
-  double pad_sigma_mm = 2.27;   ///< the elastic pad spreads an indentation to the taxels around it
-  double dome_radius_mm = 47;   ///< the pad is round: it touches an element before a taxel is above it
-  bool with_edges = true;       ///< beside the plate there is nothing to touch
-  double tilt_spread = 0.01;    ///< the finger's rear rows ride lower
-  bool with_gains = true;       ///< taxels differ: the outer columns feel most
-  bool with_variation = true;   ///< gain and indentation differ from trial to trial and pass to pass
+  double mount_stiffness = 15;  ///< cubic mm of indented pad per mm, of a pad as large as the rig's
+  Body body = Body::of_rig();  ///< a skin that is not known is the rig's; its shape touches an element before
+                               ///< a taxel is above it; its skin is the pad
+  bool with_edges = true;      ///< beside the plate there is nothing to touch
+  double tilt_spread = 0.01;   ///< the finger's rear rows ride lower
+  bool with_gains = true;      ///< taxels differ: the outer columns feel most
+  bool with_variation = true;  ///< gain and indentation differ from trial to trial and pass to pass
   double gain_spread = 0.4, indentation_spread_mm = 0.5;
   double vibration_mm = 0.01, vibration_hz = 28;  ///< of the printer, in z
   double drift_volts_per_s = 4e-4;                ///< of the rest voltages
@@ -63,10 +63,10 @@ struct FingerIdentity {
 ///
 /// A point u of the pad, 2 mm apart across and 0.25 mm along the slide and up to 3.5 and 6.5 mm beyond the
 /// outermost taxels, is indented by
-///   d(u) = max(0, plate(x + u_x, y + u_y) - |u|^2 / (2 radius) - slope u - z - lift)   (mm, lowest point of
+///   d(u) = max(0, plate(x + u_x, y + u_y) - body.depth_mm(u) - slope u - z - lift)   (mm, lowest point of
 ///   the pad as it is mounted at 0),
 /// the mount yields until stiffness * lift = integral of d, and taxel k feels the mean of d around it:
-///   load_k = sum_u w(u - u_k) d(u),  w a bell of standard deviation pad_sigma, sum 1,
+///   load_k = sum_u w(u - u_k) d(u),  w a bell of standard deviation body.sigma_mm(), sum 1,
 ///   V_k = rest_k - volts_per_load * gain_k * max(0, load_k - threshold_k) + disturbances.
 /// A taxel of three axes (x, y, z) has this for z. A skin whose magnets or markers move leans away from where
 /// it is pressed, and is dragged along the slide: x and y lie in the middle of the range and have, for the

@@ -25,8 +25,8 @@ constexpr char kKind[] = "recording";
 constexpr double kFastest = 1e4, kLongestFilter = 10, kLongest = 1e10;
 constexpr int kMostTruthPixels = 1024;
 constexpr const char* kTensors[] = {"time_s", "volts", "position_mm", "lift_mm", "truth"};
-constexpr const char* kFields[] = {"kind",       "plate",  "trial", "pass",
-                                   "speed_mm_s", "source", "array", "signals"};
+constexpr const char* kFields[] = {"kind",   "plate", "trial",   "pass", "speed_mm_s",
+                                   "source", "array", "signals", "body"};
 
 std::optional<std::string> problem_of_truth(const Recording& recording) {
   const int height = recording.truth_height, width = recording.truth_width;
@@ -160,6 +160,8 @@ Recording recording_of(const SafetensorsFile& file) {
 
   recording.array = array_of(file);
   recording.signal_scale = signal_scale_of(file);
+  if (recording.metadata.contains("body")) recording.body = body_of({file.metadata(), path, "body"});
+  recording.metadata.erase("body");
   recording.metadata.erase("array"), recording.metadata.erase("signals");
 
   for (const auto& [name, tensor] : file.tensors())
@@ -258,6 +260,8 @@ std::map<std::string, std::string> metadata_of(const Recording& recording) {
   const auto of_sensor = metadata_of(array, recording.signal_scale);
   if (array != TaxelArray{}) metadata["array"] = of_sensor.at("array");
   if (recording.signal_scale != SignalScale{}) metadata["signals"] = of_sensor.at("signals");
+  if (recording.body && *recording.body != Body::usual(array))
+    metadata["body"] = json_of(*recording.body).dump();
   return metadata;
 }
 

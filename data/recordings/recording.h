@@ -26,6 +26,7 @@ struct Recording {
   int truth_height = 0, truth_width = 0;
   TaxelArray array;
   SignalScale signal_scale;                     ///< unit, polarity and range of the signals
+  std::optional<Body> body;                     ///< of the sensor; not stated: Body::usual(array)
   std::string plate;                            ///< name as Plate::named takes it
   int trial = 0, pass = 0;                      ///< from 1
   double speed_mm_s = 0;                        ///< as measured, or commanded; 0 when unknown
@@ -49,19 +50,19 @@ void restate(Recording& recording, const SignalScale& scale);
 /// signals are, {"rows": 6, "columns": 6, "pitch_mm": 2, "channels": 1}
 /// (pitch_mm may be [x, y]); without it they are the rig's 4x4
 /// taxels at 3 mm. Metadata "signals" says what they mean, {"unit": "counts", "pressed": "higher", "range":
-/// [40, 900]}; without it they are the rig's volts. Throws FileError when the file is damaged
-/// (io/files/safetensors.h), is no recording, or breaks a rule of Recording: sizes that do not match, values
-/// that are not finite (position_mm may be NaN), a truth outside [0,1], an unknown tensor, time stamps that
-/// do not increase, a speed outside 0 to 1e4 mm/s, a moving average (metadata "filter_s") outside 0 to 10 s,
-/// or a time (also metadata "began_s") beyond 1e10 s.
+/// [40, 900]}; without it they are the rig's volts. Metadata "body" is that of a sensor's file. Throws
+/// FileError when the file is damaged (io/files/safetensors.h), is no recording, or breaks a rule of
+/// Recording: sizes that do not match, values that are not finite (position_mm may be NaN), a truth outside
+/// [0,1], an unknown tensor, time stamps that do not increase, a speed outside 0 to 1e4 mm/s, a moving
+/// average (metadata "filter_s") outside 0 to 10 s, or a time (also metadata "began_s") beyond 1e10 s.
 Recording read_recording(const std::string& path);
 /// The same from a file that has been read.
 Recording recording_of(const SafetensorsFile& file);
 
 /// Writes it atomically; the same recording gives the same bytes.
 /// Throws std::invalid_argument when the recording breaks a rule read_recording() checks, or its metadata
-/// has a key this function writes (kind, plate, trial, pass, speed_mm_s, source, array, signals); FileError
-/// when it cannot be written.
+/// has a key this function writes (kind, plate, trial, pass, speed_mm_s, source, array, signals, body);
+/// FileError when it cannot be written.
 void write_recording(const std::string& path, const Recording& recording);
 
 /// The metadata of its file: its own and the members that are no tensor. Throws std::invalid_argument when

@@ -28,6 +28,7 @@ SignalRange SignalRange::of_folder(const std::string& dir, const std::vector<std
 }
 
 void SignalRange::add(const Recording& recording) {
+  felt_.add(recording);
   if (values_.empty())
     stated_ = {.rest_volts = recording.signal_scale.rest, .span_volts = recording.signal_scale.span};
   const std::size_t signals = recording.array.signals(), frames = recording.frames();

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "data/recordings/felt_taxels.h"
 #include "data/recordings/resample.h"
 
 namespace supertac {
@@ -38,6 +39,7 @@ class SignalRange {
   std::string text() const;
   /// All of the sample, in ascending order.
   const std::vector<float>& values() const;
+  const FeltTaxels& felt() const { return felt_; }
 
  private:
   double level(double share) const;
@@ -45,6 +47,7 @@ class SignalRange {
 
   mutable std::vector<float> values_;
   Scaling stated_;
+  FeltTaxels felt_;
   mutable bool sorted_ = true;
   // How often it was thinned out, as a power of two, and frames to the next of the sample; before the first
   // time every recording begins with one.

@@ -103,6 +103,7 @@ Recording describe(const Plate& plate, const PassSettings& pass, const Simulator
                    std::uint64_t seed) {
   Recording recording;
   recording.array = settings.array;
+  recording.body = settings.body;
   recording.plate = plate.name();
   recording.trial = pass.trial;
   recording.pass = pass.pass;
@@ -129,6 +130,8 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
   const Wander wander(settings.wander, seed, finger.noise_stream());
   MovingAverage filter(static_cast<int>(std::lround(settings.filter_s * settings.rate_hz)));
 
+  BodyResponse response(settings.body, settings.array);
+
   Recording recording = describe(plate, pass, settings, seed);
   for (std::size_t i = 0; i < frames; ++i) {
     const double stamp = static_cast<double>(i) / settings.rate_hz;
@@ -139,6 +142,11 @@ Recording simulate_pass(const Plate& plate, const PassSettings& pass, const Simu
     std::vector<double> volts = finger.volts(felt, taken);
     if (settings.with_adc)
       for (double& v : volts) v = rig::volts_of(rig::adc_of(v));
+    if (!response.neutral()) {
+      for (double& v : volts) v = (recording.signal_scale.rest - v) / recording.signal_scale.span;
+      response(1 / settings.rate_hz, volts);
+      for (double& v : volts) v = recording.signal_scale.rest - recording.signal_scale.span * v;
+    }
     volts = filter(volts);
     if (timing.uniform(2 * i + 1) < settings.lost_fraction) continue;
     const FingerPose pose = pose_at(stamp, pass);

@@ -150,6 +150,7 @@ void Sensor::check() const {
   expect_text("name", name);
   array.check();
   check_scale(scale);
+  body.check();
   expect(rate_hz >= 1 && rate_hz <= 100'000, "rate_hz", "1 to 100000", format(rate_hz));
   expect_text("port", port);
   check_format(frame);

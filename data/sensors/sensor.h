@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "data/sensors/body.h"
 #include "data/sensors/taxel_array.h"
 #include "io/files/file.h"
 
@@ -81,6 +82,7 @@ struct Sensor {
   std::string name = "rig";
   TaxelArray array = {};
   SignalScale scale = {};
+  Body body = Body::of_rig();
   double rate_hz = rig::kFrameRateHz;
   std::string port = "serial:auto@7372800";  ///< as open_port() takes it (hardware/ports/open_port.h)
   FrameFormat frame = {};

@@ -183,6 +183,11 @@ std::vector<int> take_order(JsonObject& keys, const TaxelArray& array) {
   return order;
 }
 
+// The board is the rig's, and so is what it sits in.
+Body usual_body(const Sensor& sensor) {
+  return sensor.frame.kind == FrameKind::board ? Body::of_rig() : Body{};
+}
+
 TaxelArray take_array(JsonObject& keys) {
   TaxelArray array;
   array.rows = keys.integer("rows", array.rows);
@@ -259,6 +264,8 @@ Sensor sensor_of_json(const std::string& text, const std::string& where) {
       throw FileError(where,
                       "has no \"frame\", such as {\"kind\": \"text\"}; supertac-stream --probe finds it");
     sensor.frame = format_of(*frame, where);
+    const Json* body = keys.find("body");
+    sensor.body = body != nullptr ? body_of({*body, where, "body."}) : usual_body(sensor);
     sensor.order = take_order(keys, sensor.array);
     sensor.dead = keys.integers("dead");
     sensor.rest = floats_of(keys, "rest");
@@ -307,6 +314,7 @@ Json json_of(const Sensor& sensor) {
   for (const float rest : sensor.rest) json["rest"].push_back(rounded(double{rest}));
   for (const float gain : sensor.gain) json["gain"].push_back(rounded(double{gain}));
   if (sensor.follow_rest_s > 0) json["follow_rest_s"] = sensor.follow_rest_s;
+  if (sensor.body != usual_body(sensor)) json["body"] = json_of(sensor.body);
   return json;
 }
 

@@ -43,6 +43,7 @@ SimulatorSettings finger_of(const RandomPasses& passes, const WindowSettings& wi
                             const RandomStream& random) {
   SimulatorSettings s;
   s.array = windows.array.value_or(TaxelArray{});
+  s.body = windows.body.value_or(Body::usual(s.array));
   s.rate_hz = std::max(kLeastRateHz, windows.rate_hz);
   s.filter_s = passes.filter_s;
   // The board's moving average is over ten times as many samples: what it leaves of noise and of the
@@ -51,9 +52,10 @@ SimulatorSettings finger_of(const RandomPasses& passes, const WindowSettings& wi
   s.with_adc = false;
   s.indentation_mm = std::lerp(kLeastIndentationMm, kMostIndentationMm, random.uniform(kIndentation));
   if (!passes.other_fingers) return s;
+  const double pad_mm = s.body.skin_mm > 0 && s.body != Body::of_rig() ? s.body.skin_mm / 2 : kPadMm;
   s.mount_stiffness = about(s.mount_stiffness, kFingerSpread, random.uniform(kMount));
-  s.dome_radius_mm = about(s.dome_radius_mm, kFingerSpread, random.uniform(kDome));
-  s.pad_sigma_mm = about(kPadMm, kPadSpread, random.uniform(kPad));
+  s.body.radius_mm = about(s.body.radius_mm, kFingerSpread, random.uniform(kDome));
+  s.body.skin_mm = 2 * about(pad_mm, kPadSpread, random.uniform(kPad));
   s.threshold_mm = kMostThresholdMm * random.uniform(kThreshold);
   s.tilt_spread = kTiltSpread;
   s.wander = kMostWander * random.uniform(kWander);

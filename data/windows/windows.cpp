@@ -141,6 +141,7 @@ std::size_t WindowSet::plate_index(const Recording& recording, const std::string
 
 void WindowSet::expect_array(const Recording& recording) {
   if (!settings_.array) settings_.array = recording.array;
+  if (!settings_.body) settings_.body = recording.body.value_or(Body::usual(recording.array));
   if (recording.array != array())
     throw std::runtime_error("was recorded with " + recording.array.text() + ", expected " + array().text() +
                              "; give recordings of the array the model is for, and no others");

@@ -58,8 +58,9 @@ WindowSet windows_of(const Recipe& recipe, const RecordingFolders& folders, std:
   w.scale = static_cast<int>(recipe.model.scale);
   w.rate_hz = recipe.rate_hz;
   w.stride = static_cast<int>(recipe.stride);
-  w.scaling =
-      scaling_of(recipe, SignalRange::of_folder(folders.data, recipe.plates, watch(folders.data)), notes);
+  const SignalRange range = SignalRange::of_folder(folders.data, recipe.plates, watch(folders.data));
+  range.felt().check();
+  w.scaling = scaling_of(recipe, range, notes);
   WindowSet windows = WindowSet::load(folders.data, recipe.plates, w, watch(folders.data));
   if (!folders.also.empty())
     windows.add_directory(folders.also, {}, {.training_only = true}, watch(folders.also));

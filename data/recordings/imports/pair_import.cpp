@@ -100,7 +100,7 @@ std::vector<Recording> import_pairs(const SafetensorsFile& file, const std::opti
   const auto [low, high] = std::ranges::minmax(inputs);
   like.signal_scale = {.unit = "1", .rest = low, .span = low < high ? double{low} - double{high} : -1};
   if (sensor) {
-    like.array.pitch_mm = sensor->array.pitch_mm, like.signal_scale = sensor->scale;
+    like.array.pitch_mm = sensor->array.pitch_mm, like.signal_scale = sensor->scale, like.body = sensor->body;
     if (like.array != sensor->array)
       throw FileError(file.path(), "holds frames of " + like.array.text() +
                                        ", expected those of the sensor, " + sensor->array.text());

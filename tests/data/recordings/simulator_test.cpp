@@ -84,7 +84,7 @@ TEST(Simulator, AnyArrayFeelsTheRidgeWhereItIs) {
 
 TEST(Simulator, ThreeAxesAreWhereTheLoadLeansAndTheLoad) {
   SimulatorSettings settings = clean();
-  settings.pad_sigma_mm = SimulatorSettings().pad_sigma_mm;
+  settings.body.skin_mm = SimulatorSettings().body.skin_mm;
   settings.array = {.rows = 3, .columns = 1, .pitch_mm = 2};
   const Plate plate("one", {{"ridges", 40, 2.5}});
   const FingerModel one(plate, settings, {});

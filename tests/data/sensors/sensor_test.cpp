@@ -122,7 +122,7 @@ TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
       {"rate_hz", 0.5, "\"rate_hz\" must be 1 to 100000, found 0.5"},
       {"pich_mm", 5,
        "knows no key 'pich_mm'; it may have name, rows, columns, channels, pitch_mm, unit, pressed, range, "
-       "rate_hz, port, frame, order, dead, rest, gain, follow_rest_s"},
+       "rate_hz, port, frame, body, order, dead, rest, gain, follow_rest_s"},
       {"frame", nullptr, "has no \"frame\", such as {\"kind\": \"text\"}; supertac-stream --probe finds it"},
       {"frame.kind", "csv", "\"frame.kind\" must be one of board, text, json, binary, found \"csv\""},
       {"frame.kind", "board", "knows no key 'frame.separator'; it may have kind"},

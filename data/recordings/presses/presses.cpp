@@ -1,0 +1,191 @@
+#include "data/recordings/presses/presses.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "data/recordings/presses/scene.h"
+#include "io/numbers/hash.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/same_bits.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kStepS = 0.05;                      // of what remembers: hysteresis and creep
+constexpr double kLeastSkin = 0.3, kMostSkin = 1.2;  // in pitches, where nobody knows
+constexpr double kLeastNoise = 0.002, kMostNoise = 0.01;
+constexpr double kStrength = 0.25, kTaxelSpread = 0.05;
+constexpr double kGive = 0.25;  // of the skin: how far a hard press goes into it
+constexpr double kMarginSigmas = 2.5;
+
+enum Draw : std::uint64_t { kSkin, kNoise, kOfStrength, kTimes = 10, kFit = 100, kTaxels = 1000 };
+constexpr std::uint64_t kSamples = 1'000'000;
+
+// What is known of the body, as far as it is known.
+Body drawn(Body body, const TaxelArray& array, const RandomStream& random) {
+  const double pitch = std::sqrt(array.pitch_mm.x * array.pitch_mm.y);
+  std::uint64_t number = kFit;
+  for (const auto& [key, of] : fitted_numbers()) {
+    ++number;
+    const auto found = body.uncertainty.find(key);
+    if (found == body.uncertainty.end() || found->second <= 0) continue;
+    double& value = of(body);
+    value = std::max(value / 4, value + found->second * random.normal(number));
+  }
+  if (body.skin_mm == 0) body.skin_mm = pitch * std::lerp(kLeastSkin, kMostSkin, random.uniform(kSkin));
+  if (body.noise == 0) body.noise = std::lerp(kLeastNoise, kMostNoise, random.uniform(kNoise));
+  return body;
+}
+
+// Weights of cells for the lines of taxels, [lines][cells], each line with sum 1; and those of a lean.
+struct Bells {
+  std::vector<double> weight, lean;
+  Bells(int lines, double pitch, int cells, double first, double step, double sigma) {
+    for (int line = 0; line < lines; ++line) {
+      const double at = (line - (lines - 1) / 2.0) * pitch;
+      std::vector<double> bell;
+      double sum = 0;
+      for (int i = 0; i < cells; ++i) {
+        bell.push_back(same_bits::bell(first + i * step - at, sigma));
+        sum += bell.back();
+      }
+      for (int i = 0; i < cells; ++i) {
+        weight.push_back(bell[static_cast<std::size_t>(i)] / sum);
+        lean.push_back(weight.back() * (first + i * step - at) / sigma);
+      }
+    }
+  }
+};
+
+// The truth's pixels, and as many around them as a taxel at the edge feels.
+Field field_of(const TaxelArray& array, int scale, double sigma_mm) {
+  const double pixel_x = array.pitch_mm.x / scale, pixel_y = array.pitch_mm.y / scale;
+  const auto beyond = [&](double pixel) {
+    return static_cast<int>(std::ceil(kMarginSigmas * sigma_mm / pixel));
+  };
+  const int rows = array.rows * scale + 2 * beyond(pixel_y),
+            columns = array.columns * scale + 2 * beyond(pixel_x);
+  return {-(columns - 1) / 2.0 * pixel_x, -(rows - 1) / 2.0 * pixel_y, pixel_x, pixel_y, rows, columns};
+}
+
+// One press of one drawn body.
+class Press {
+ public:
+  Press(const Sensor& sensor, const Presses& presses, const RandomStream& random,
+        const RandomStream& of_scene)
+      : sensor_(sensor),
+        body_(drawn(sensor.body, sensor.array, random)),
+        random_(random),
+        scene_(presses.kind, sensor.array, of_scene),
+        sigma_(std::max(body_.sigma_mm(), kMarginSigmas / 10 * sensor.array.pitch_mm.x / presses.scale)),
+        field_(field_of(sensor.array, presses.scale, sigma_)),
+        across_(sensor.array.columns, sensor.array.pitch_mm.x, field_.columns, field_.left_mm,
+                field_.cell_x_mm, sigma_),
+        along_(sensor.array.rows, sensor.array.pitch_mm.y, field_.rows, field_.top_mm, field_.cell_y_mm,
+               sigma_),
+        response_(body_, sensor.array),
+        strength_(1 + kStrength * (2 * random.uniform(kOfStrength) - 1)),
+        pressure_(field_.cells()) {}
+
+  // Times within the press are asked for in ascending order; the signals and the truth are appended.
+  void frame(double t, int scale, Recording& recording) {
+    while (!response_.neutral() && before_ + kStepS < t) show(before_ + kStepS);
+    std::vector<double> shares = show(t);
+    const auto channels = static_cast<std::size_t>(sensor_.array.channels);
+    const std::size_t from = recording.volts.size();
+    for (std::size_t s = 0; s < shares.size(); ++s) {
+      const double lean_rest = channels == 3 && s % 3 < 2 && sensor_.rest.empty() ? 0.5 : 0;
+      const double noisy = shares[s] + lean_rest + body_.noise * random_.normal(kSamples + samples_++);
+      recording.volts.push_back(static_cast<float>(
+          sensor_.scale.rest - sensor_.scale.span * std::clamp(noisy, -4 * body_.noise, 1.0)));
+    }
+    sensor_.fill_silent(std::span(recording.volts).subspan(from));
+    const int rows = sensor_.array.rows * scale, columns = sensor_.array.columns * scale;
+    const int above = (field_.rows - rows) / 2, beside = (field_.columns - columns) / 2;
+    for (int r = 0; r < rows; ++r)
+      for (int c = 0; c < columns; ++c)
+        recording.truth.push_back(static_cast<float>(
+            std::min(1.0, pressure_[static_cast<std::size_t>((r + above) * field_.columns + c + beside)])));
+  }
+
+ private:
+  std::vector<double> show(double t) {
+    scene_.pressure(t, body_, kGive * body_.skin_mm, field_, pressure_);
+    const auto taxels = static_cast<std::size_t>(sensor_.array.taxels()),
+               channels = static_cast<std::size_t>(sensor_.array.channels);
+    std::vector<double> shares(taxels * channels);
+    for (std::size_t channel = 0; channel < channels; ++channel) {
+      const std::vector<double> load = felt(channels == 3 && channel == 0 ? across_.lean : across_.weight,
+                                            channels == 3 && channel == 1 ? along_.lean : along_.weight);
+      for (std::size_t k = 0; k < taxels; ++k)
+        shares[k * channels + channel] =
+            load[k] * strength_ * (1 + kTaxelSpread * random_.normal(kTaxels + k));
+    }
+    response_(t - before_, shares);
+    before_ = t;
+    return shares;
+  }
+
+  std::vector<double> felt(const std::vector<double>& across, const std::vector<double>& along) const {
+    const auto rows = static_cast<std::size_t>(field_.rows),
+               columns = static_cast<std::size_t>(field_.columns),
+               taxel_rows = static_cast<std::size_t>(sensor_.array.rows),
+               taxel_columns = static_cast<std::size_t>(sensor_.array.columns);
+    std::vector<double> lines(taxel_rows * columns), load(taxel_rows * taxel_columns);
+    for (std::size_t y = 0; y < taxel_rows; ++y)
+      for (std::size_t r = 0; r < rows; ++r)
+        if (const double w = along[y * rows + r]; w != 0)
+          for (std::size_t c = 0; c < columns; ++c) lines[y * columns + c] += w * pressure_[r * columns + c];
+    for (std::size_t k = 0; k < load.size(); ++k)
+      for (std::size_t c = 0; c < columns; ++c)
+        load[k] += across[k % taxel_columns * columns + c] * lines[k / taxel_columns * columns + c];
+    return load;
+  }
+
+  const Sensor& sensor_;
+  Body body_;
+  RandomStream random_;
+  Scene scene_;
+  double sigma_;
+  Field field_;
+  Bells across_, along_;
+  BodyResponse response_;
+  double strength_, before_ = 0;
+  std::uint64_t samples_ = 0;
+  std::vector<double> pressure_;
+};
+
+}  // namespace
+
+Recording simulate_presses(const Sensor& sensor, const Presses& presses, std::uint64_t seed) {
+  const int scale = presses.scale;
+  if (scale != 2 && scale != 4 && scale != 8 && scale != 16)
+    throw std::invalid_argument("presses: scale must be 2, 4, 8 or 16, got " + std::to_string(scale));
+  if (sensor.array.channels != 1 && sensor.array.channels != 3)
+    throw std::invalid_argument("presses: expected an array of one channel or three axes, got " +
+                                sensor.array.text());
+  Recording recording;
+  recording.array = sensor.array, recording.body = sensor.body, recording.signal_scale = sensor.scale;
+  recording.plate = recording.metadata["group"] = presses.kind;
+  recording.trial = presses.number, recording.pass = 1, recording.source = "simulated";
+  recording.metadata["seed"] = std::to_string(seed);
+  recording.truth_height = sensor.array.rows * scale, recording.truth_width = sensor.array.columns * scale;
+  for (int i = 0; i < presses.count; ++i) {
+    const std::uint64_t stream =
+        stream_of("press/" + presses.kind + "/" + std::to_string(presses.number) + "/" + std::to_string(i));
+    const RandomStream random(seed, stream);
+    Press press(sensor, presses, random, RandomStream(seed, stream + 1));
+    std::vector<double> times;
+    for (std::uint64_t f = 0; f < kFramesOfAPress; ++f)
+      times.push_back(Scene::kSeconds * (static_cast<double>(f) + 0.1 + 0.9 * random.uniform(kTimes + f)) /
+                      kFramesOfAPress);
+    for (const double t : times) {
+      recording.time_s.push_back(i * Scene::kSeconds + t);
+      press.frame(t, scale, recording);
+    }
+  }
+  return recording;
+}
+
+}  // namespace supertac

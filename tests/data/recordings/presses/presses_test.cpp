@@ -1,0 +1,132 @@
+#include "data/recordings/presses/presses.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+
+#include "data/recordings/felt_taxels.h"
+#include "data/recordings/presses/scene.h"
+#include "tests/expect_error.h"
+
+namespace supertac {
+namespace {
+
+Sensor mat(int rows = 6, int columns = 10) {
+  Sensor sensor;
+  sensor.array = {.rows = rows, .columns = columns, .pitch_mm = 8, .channels = 1};
+  sensor.scale = {.unit = "counts", .rest = 40, .span = -860};
+  sensor.body = {.skin_mm = 6, .knee = {}, .noise = 0.002};
+  return sensor;
+}
+
+TEST(Presses, EveryKindReachesTheWholeArrayAndBitsFollowFromTheSeed) {
+  FeltTaxels felt;
+  for (const std::string& kind : press_kinds()) {
+    const Recording one = simulate_presses(mat(), {.kind = kind, .count = 40}, 3);
+    EXPECT_EQ(one.frames(), std::size_t{40} * kFramesOfAPress);
+    EXPECT_EQ(one.truth_height, 24);
+    EXPECT_EQ(one.truth_width, 40);
+    EXPECT_EQ(one.metadata.at("group"), kind);
+    EXPECT_GT(*std::ranges::max_element(one.truth), 0.5F) << kind;
+    EXPECT_EQ(one.volts, simulate_presses(mat(), {.kind = kind, .count = 40}, 3).volts);
+    EXPECT_NE(one.volts, simulate_presses(mat(), {.kind = kind, .number = 2, .count = 40}, 3).volts);
+    felt.add(one);
+  }
+  EXPECT_EQ(felt.text(), "");
+}
+
+// The load's total and its middle are those of the truth: nothing is mirrored, turned or lost.
+TEST(Presses, SignalsLieWhereTheTruthIs) {
+  Sensor sensor = mat();
+  sensor.body.noise = 1e-6;
+  const Recording r = simulate_presses(sensor, {.kind = "disc", .count = 600}, 5);
+  const std::size_t signals = 60, pixels = 960;
+  int compared = 0;
+  for (std::size_t f = 0; f < r.frames(); ++f) {
+    double load = 0, x = 0, y = 0, truth = 0, tx = 0, ty = 0, edge = 0;
+    for (std::size_t k = 0; k < signals; ++k) {
+      const double share = (r.volts[f * signals + k] - 40.0) / 860;
+      load += share, x += share * static_cast<double>(k % 10), y += share * static_cast<double>(k / 10);
+    }
+    for (std::size_t p = 0; p < pixels; ++p) {
+      const double value = double{r.truth[f * pixels + p]};
+      truth += value, tx += value * (static_cast<double>(p % 40) / 4 - 0.375),
+          ty += value * (static_cast<double>(p / 40) / 4 - 0.375);
+      if (p % 40 < 6 || p % 40 > 33 || p / 40 < 6 || p / 40 > 17) edge += value;
+    }
+    if (truth < 3 || edge > 0) continue;
+    ++compared;
+    EXPECT_NEAR(x / load, tx / truth, 0.35) << f;
+    EXPECT_NEAR(y / load, ty / truth, 0.35) << f;
+    EXPECT_NEAR(load / (truth / 16), 1, 0.45) << f;  // as strong as was drawn
+  }
+  EXPECT_GT(compared, 20);
+}
+
+TEST(Presses, TheBodyDecides) {
+  // A narrow dome is touched only where it bulges, wherever the object stands.
+  Sensor dome = mat();
+  dome.body.shape = BodyShape::dome, dome.body.radius_mm = 30;
+  const Recording flat = simulate_presses(mat(), {.kind = "edge", .count = 60}, 1),
+                  round = simulate_presses(dome, {.kind = "edge", .count = 60}, 1);
+  const auto touched = [](const Recording& r) {
+    return std::ranges::count_if(r.truth, [](float v) { return v > 0; });
+  };
+  EXPECT_LT(touched(round), touched(flat) / 2);
+  // A thicker skin spreads what one taxel felt.
+  Sensor thick = mat();
+  thick.body.skin_mm = 16;
+  const auto strongest = [](const Recording& r) { return *std::ranges::max_element(r.volts); };
+  EXPECT_LT(strongest(simulate_presses(thick, {.kind = "bar", .count = 60}, 1)),
+            strongest(simulate_presses(mat(), {.kind = "bar", .count = 60}, 1)));
+}
+
+TEST(Presses, ThreeAxesLeanAndRestInTheMiddle) {
+  Sensor tip = mat(3, 3);
+  tip.array.channels = 3;
+  const Recording r = simulate_presses(tip, {.kind = "mixed", .count = 80}, 2);
+  double low = 1, high = 0;
+  for (std::size_t i = 0; i < r.volts.size(); i += 3) {
+    const double share = (r.volts[i] - 40.0) / 860;
+    low = std::min(low, share), high = std::max(high, share);
+  }
+  EXPECT_LT(low, 0.4);
+  EXPECT_GT(high, 0.6);
+  tip.array.channels = 2;
+  EXPECT_EQ(
+      what_of<std::invalid_argument>([&] { simulate_presses(tip, {}, 1); }),
+      "presses: expected an array of one channel or three axes, got 3x3 taxels at 8 mm with 2 channels");
+  EXPECT_EQ(what_of<std::invalid_argument>([&] { simulate_presses(mat(), {.kind = "cat"}, 1); }),
+            "presses: expected a kind of object (disc, bar, ring, edge, letter, blob, fingertip, mixed), got "
+            "'cat'");
+}
+
+TEST(FeltTaxels, NamesThoseThatASimulationNeverReached) {
+  Recording r;
+  r.array = {.rows = 2, .columns = 3, .pitch_mm = 5};
+  r.signal_scale = {.unit = "counts", .rest = 0, .span = -100};
+  r.body = Body{.shape = BodyShape::dome, .radius_mm = 20, .knee = {}};
+  r.source = "simulated";
+  r.time_s = {0, 1};
+  r.volts = {0, 0, 0, 0, 0, 0, 3, 80, 9, 4, 20, 1};
+  FeltTaxels felt;
+  felt.add(r);
+  EXPECT_EQ(felt.text(), "4 of 6 taxels feel nothing: 0, 2-3, 5");
+  EXPECT_EQ(what_of<std::runtime_error>([&] { felt.check(); }),
+            "4 of 6 taxels feel nothing: 0, 2-3, 5; a network would learn that they never do. Say in the "
+            "sensor's file what shape the array has, \"body\": {\"shape\": \"flat\"}, and simulate again");
+  r.volts[8] = 30;
+  FeltTaxels half;
+  half.add(r);
+  half.check();
+  r.source = "imported", r.volts.assign(12, 0);
+  FeltTaxels real;
+  real.add(r);
+  EXPECT_EQ(real.text(), "") << "a real array may not have been pressed everywhere";
+}
+
+}  // namespace
+}  // namespace supertac
