@@ -15,7 +15,7 @@ constexpr double kOffLeg = 0.05;    // mm, beside the leg's line, by rounding
 // More than so many samples that do not fit are not noise: a cable that damages 0.2 % of the bytes spoils 3
 // %.
 constexpr double kMostMisfits = 0.1;
-constexpr double kEven = 0.02;  // of the speed
+constexpr double kEven = 0.01;  // of the speed
 
 // How far along the leg's straight line the sample is, and how far from it, ends included.
 struct OnLeg {
@@ -42,36 +42,40 @@ std::vector<PositionSample> on_time(const std::vector<PositionSample>& samples) 
   return kept;
 }
 
-struct FittedSpeed {
-  double mm_s = 0;        // 0: too few samples
-  double unevenness = 0;  // relative, from the first half of the way to the second
-};
-
-// The median over pairs of samples some way apart, away from the leg's ramps: neither damaged samples nor a
-// machine that stood still for a while move it, and no order takes part in it.
-FittedSpeed speed_of(const Leg& leg, const std::vector<PositionSample>& samples) {
-  constexpr std::size_t kFewest = 16;
+/// Times and ways along the leg, away from its ramps.
+std::vector<std::pair<double, double>> cruise_of(const Leg& leg, const std::vector<PositionSample>& samples) {
   const double length = distance(leg.from, leg.to);
-  std::vector<std::pair<double, double>> places;  // time, way
+  std::vector<std::pair<double, double>> places;
   for (const PositionSample& sample : samples) {
     const OnLeg at = on_leg(leg, sample.position);
     if (at.off < kOffLeg && at.along > 0.15 * length && at.along < 0.85 * length)
       places.emplace_back(sample.time_s, at.along);
   }
-  if (places.size() < kFewest) return {};
-  const std::size_t apart = places.size() / 8;
-  const auto median_of = [&](std::size_t first, std::size_t last) {
-    std::vector<double> speeds;
-    for (std::size_t i = first; i + apart < last; ++i) {
-      const double seconds = places[i + apart].first - places[i].first;
-      if (seconds > 0) speeds.push_back((places[i + apart].second - places[i].second) / seconds);
-    }
-    return speeds.empty() ? 0.0 : median(speeds);
-  };
-  const std::size_t half = places.size() / 2;
-  const double all = median_of(0, places.size());
-  const double first = median_of(0, half), second = median_of(half, places.size());
-  return {std::max(all, 0.0), all > 0 ? std::abs(second - first) / all : 0};
+  return places;
+}
+
+// The median over pairs of samples some way apart: neither damaged samples nor a machine that stood still for
+// a while move it, and no order takes part in it. 0 of too few.
+double speed_of(std::span<const std::pair<double, double>> places) {
+  constexpr std::size_t kFewest = 8;
+  const std::size_t apart = std::max<std::size_t>(1, places.size() / 8);
+  std::vector<double> speeds;
+  for (std::size_t i = 0; places.size() >= kFewest && i + apart < places.size(); ++i) {
+    const double seconds = places[i + apart].first - places[i].first;
+    if (seconds > 0) speeds.push_back((places[i + apart].second - places[i].second) / seconds);
+  }
+  return speeds.empty() ? 0 : std::max(0.0, median(speeds));
+}
+
+// By how much of the speed it differs from one half of the way to the other, and from its mean: the head may
+// have stood on the way.
+double unevenness_of(std::span<const std::pair<double, double>> places) {
+  const double speed = speed_of(places), half = speed_of(places.first(places.size() / 2)),
+               rest = speed_of(places.subspan(places.size() / 2));
+  if (!(speed > 0 && half > 0 && rest > 0)) return 0;
+  const double mean = (places.back().second - places.front().second) /
+                      std::max(1e-9, places.back().first - places.front().first);
+  return std::max(std::abs(half - rest), std::abs(mean - speed)) / speed;
 }
 
 // The samples that can all be true, as many as possible. Nothing damaged is believed for its neighbours'
@@ -206,13 +210,12 @@ void PositionTrack::add_leg(const Leg& leg, const std::vector<PositionSample>& s
   add(leg.sent_s, leg.from);
   if (samples.empty() && leg.ended_s > 0) return model(leg, timing);
   const std::vector<PositionSample> prompt = on_time(samples);
-  const FittedSpeed fitted = speed_of(leg, prompt);
-  const double fastest = std::max(leg.speed, fitted.mm_s);
+  const double fitted = speed_of(cruise_of(leg, prompt)), fastest = std::max(leg.speed, fitted);
   const std::vector<PositionSample> chain = chain_of(leg, fastest, prompt);
   rejected_ += samples.size() - chain.size();
   if (prompt.size() >= kFewest)
     misfits_ = std::max(misfits_, 1 - static_cast<double>(chain.size()) / static_cast<double>(prompt.size()));
-  if (leg.phase == Phase::slide) speed_ = fitted.mm_s, unevenness_ = fitted.unevenness;
+  if (leg.phase == Phase::slide) speed_ = fitted, unevenness_ = unevenness_of(cruise_of(leg, chain));
   PositionSample before{leg.sent_s, 0, leg.from};
   for (const PositionSample& sample : chain) {
     add(sample.time_s, sample.position);
@@ -230,8 +233,7 @@ std::string PositionTrack::doubt(double trusted_mm) const {
   std::string doubt;
   if (doubt_mm_ > trusted_mm) doubt += "the head may have been " + format(doubt_mm_, 1) + " mm elsewhere; ";
   if (misfits_ > kMostMisfits) doubt += format(100 * misfits_, 0) + " % of its positions fit no way; ";
-  if (unevenness_ > kEven)
-    doubt += "its speed changed by " + format(100 * unevenness_, 0) + " % on the way; ";
+  if (unevenness_ > kEven) doubt += "its speed was not even (" + format(100 * unevenness_, 0) + " %); ";
   return doubt;
 }
 

@@ -57,7 +57,7 @@ class PositionTrack {
   double speed_ = 0;
   double doubt_mm_ = 0;    // how far at() may be from the head
   double misfits_ = 0;     // the largest share of a leg's samples that fit no way of the head
-  double unevenness_ = 0;  // of the slide's speed, from its first half to its second
+  double unevenness_ = 0;  // of the slide's speed, relative
 };
 
 }  // namespace supertac

@@ -158,7 +158,8 @@ DrawnRun::DrawnRun(std::uint64_t seed) : only_chunks(seed % 10 < 2) {
   rig.chunk_s = one_of({0, 0.002, 0.01, 0.03, 0.1});
   RigFaults faults;
   if (!only_chunks) {
-    faults = {.byte_rate = one_of({0, 0.0002, 0.001, 0.002}),
+    const double byte_rate = one_of({0, 0.0002, 0.001, 0.002});
+    faults = {.byte_rate = klipper ? 0 : byte_rate,
               .reset_rate = one_of({0, 0, 0, 0.0005}),
               .action_rate = one_of({0, 0, 0, 0.0005}),
               .pause_rate = klipper ? 0 : one_of({0, 0, 0, 0.0005}),

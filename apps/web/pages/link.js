@@ -2,10 +2,10 @@
 // runs once more as a worker that all tabs share, which holds one for all that are looked at. A connection that was silent for
 // longer than the program ever is, is replaced: behind a laptop's sleep nothing says that it is dead.
 "use strict";
-const SILENT_MS = 3000, ACTION_MS = 900;
+const SILENT_MS = 3000, ACTING_MS = 1200, ACTION_MS = 3000;  // the program is never silent for longer than a second
 
-async function post(action, token) {
-  const answer = await fetch("/" + action, {method: "POST", headers: {"X-Token": token}, signal: AbortSignal.timeout(ACTION_MS)});
+async function post(action, token, limit) {
+  const answer = await fetch("/" + action, {method: "POST", headers: {"X-Token": token}, signal: AbortSignal.timeout(limit)});
   const text = (await answer.text()).trim();
   if (!answer.ok) throw new Error(text);
   return text;
@@ -14,10 +14,12 @@ async function post(action, token) {
 // Returns what a new tab's port is given to.
 function serveTabs() {
   const tabs = new Set(), told = new WeakMap(), heard = {};
-  let source = null, last = 0;
+  let source = null, last = 0, acted = -Infinity;
   const tell = (tab, kind, data) => tab.postMessage({kind, data});
   function hear(kind, data) {
     last = performance.now();
+    const same = kind === "hello" && heard.hello && heard.hello.token === data.token;
+    if (same) kind = "still";  // the same run, by a new connection
     if (kind === "hello") heard.news = heard.end = undefined;
     heard[kind] = data;
     for (const tab of tabs) tell(tab, kind, data), told.set(tab, heard.hello);
@@ -30,22 +32,24 @@ function serveTabs() {
       source.addEventListener(event, (e) => hear(kind, JSON.parse(e.data)));
   }
   function watch() {
-    if (tabs.size > 0 && (!source || performance.now() - last > SILENT_MS)) open();
+    const now = performance.now(), limit = now - acted < 10000 ? ACTING_MS : SILENT_MS;
+    if (tabs.size > 0 && (!source || now - last > limit)) open();
     if (tabs.size > 0 || !source) return;
     source.close();
     source = null;
   }
   setInterval(watch, 250);
   return (tab) => {
-    tab.onmessage = async ({data: {looked, action, token, id}}) => {
+    tab.onmessage = async ({data: {looked, action, token, limit, id}}) => {
       if (looked === false) tabs.delete(tab);
       if (looked || action) tabs.add(tab);
       watch();
       if (looked && heard.hello && told.get(tab) !== heard.hello)
         for (const kind of ["hello", "news", "end"]) if (heard[kind]) tell(tab, kind, heard[kind]), told.set(tab, heard.hello);
       if (!action) return;
+      acted = performance.now();
       try {
-        tell(tab, "answer", {id, text: await post(action, token)});
+        tell(tab, "answer", {id, text: await post(action, token, limit)});
       } catch (error) {
         tell(tab, "answer", {id, error: error.message});
       }
@@ -96,25 +100,26 @@ class Link {
   away() { return !this.hello || performance.now() - this.alive > SILENT_MS + 500; }
 
   // By the worker that all share, or by this page alone.
-  ask(action, way) {
+  ask(action, way, limit) {
     if (!this.hello) return Promise.reject(new Error("no connection"));
-    if (way === "page") return post(action, this.hello.token);
+    if (way === "page") return post(action, this.hello.token, limit);
     const id = Math.random();
     return new Promise((done, fail) => {
       this.answers.set(id, ({text, error}) => error ? fail(new Error(error)) : done(text));
-      setTimeout(() => fail(new Error("no answer")), ACTION_MS + 100);
-      this.port.postMessage({action, token: this.hello.token, id});
+      setTimeout(() => fail(new Error("no answer")), limit + 100);
+      this.port.postMessage({action, token: this.hello.token, limit, id});
     }).finally(() => this.answers.delete(id));
   }
 
-  // The program's answer, or why there is none. `wanted` (n): whether to try again, the other way, after n attempts.
-  async act(action, wanted = () => false) {
+  // The program's answer, or why there is none. `wanted` (n): whether to try again, the other way, after n attempts; the
+  // first are short, for a connection may be dead and a new one is not.
+  async act(action, wanted) {
     for (let n = 1;; ++n) {
       const begin = performance.now();
       try {
-        return await this.ask(action, n % 2 ? "worker" : "page");
+        return await this.ask(action, n % 2 ? "worker" : "page", wanted ? Math.min(ACTION_MS, 400 * n) : ACTION_MS);
       } catch (error) {
-        if (!wanted(n)) return "the program did not answer: " + error.message;
+        if (!wanted || !wanted(n)) return "the program did not answer: " + error.message;
       }
       await new Promise((done) => setTimeout(done, Math.max(0, begin + 300 - performance.now())));
     }

@@ -14,9 +14,9 @@ constexpr Firmware kFirmwares[] = {Firmware::marlin, Firmware::marlin_before_2_1
 constexpr Point3 kLow{99.7, 101.17, 99.81};
 
 TEST(MachineState, EachLeftoverAloneIsSetAndPutBack) {
-  const std::vector<LeftOver> marlin = {{.inches = true},       {.relative = true},      {.speed_percent = 150},
-                                        {.speed_percent = 50},  {.flow_percent = 80},    {.mesh_mm = 0.46},
-                                        {.home_offset = {1, 2, -3}}};
+  const std::vector<LeftOver> marlin = {
+      {.inches = true},     {.relative = true}, {.speed_percent = 150},     {.speed_percent = 50},
+      {.flow_percent = 80}, {.mesh_mm = 0.46},  {.home_offset = {1, 2, -3}}};
   const std::vector<LeftOver> klipper = {
       {.relative = true}, {.speed_percent = 150}, {.flow_percent = 80}, {.offset = {0, 0, -0.35}}};
   for (const Firmware firmware : kFirmwares) {
@@ -35,8 +35,8 @@ TEST(MachineState, EachLeftoverAloneIsSetAndPutBack) {
 }
 
 TEST(MachineState, ADamagedAnswerIsNeitherRefusedNorPutBack) {
-  for (const auto& [said, damaged] : {std::pair("FR:100%", "FR:150%"), {"Bed Leveling OFF", "Bed Leveling ON"},
-                                      {"  G21 ;", "  G20 ;"}}) {
+  for (const auto& [said, damaged] :
+       {std::pair("FR:100%", "FR:150%"), {"Bed Leveling OFF", "Bed Leveling ON"}, {"  G21 ;", "  G20 ;"}}) {
     SimulatedRig rig(running_rig());
     Tampering port(rig.printer_port());
     port.from_printer = {{said, damaged}};
@@ -101,7 +101,8 @@ TEST(MachineState, AKlipperThatStartsIsWaitedFor) {
 TEST(MachineState, TheCauseOfAShutdownIsQuoted) {
   PrinterBench bench(running_rig({.firmware = Firmware::klipper}));
   bench.firmware().inject(
-      "// MCU 'mcu' shutdown: Timer too close\n// This often indicates the host computer is overloaded. Check\n"
+      "// MCU 'mcu' shutdown: Timer too close\n// This often indicates the host computer is overloaded. "
+      "Check\n"
       "// Once the underlying issue is corrected, use the\n// Printer is shutdown\n"
       "!! MCU 'mcu' shutdown: Timer too close\nok\n");
   EXPECT_ERROR(bench.printer.link().idle(1), PrinterHalted, "('// MCU 'mcu' shutdown: Timer too close'");
@@ -178,9 +179,9 @@ TEST(MachineState, AFasterOrSlowerMachineIsNamedByItsSpeed) {
 TEST(MachineState, AnotherAccelerationIsMeasured) {
   for (const double acceleration : {150.0, 500.0, 1000.0, 3000.0})
     for (const double speed : {5.0, 10.0, 25.0, 50.0}) {
-      const FaultVerdict verdict = run_faulty_collection(
-          running_rig({.realtime_position = false, .acceleration = acceleration}),
-          {.passes = 1, .slide = 60, .speed = speed}, kLow);
+      const FaultVerdict verdict =
+          run_faulty_collection(running_rig({.realtime_position = false, .acceleration = acceleration}),
+                                {.passes = 1, .slide = 60, .speed = speed}, kLow);
       EXPECT_EQ(verdict.broken + verdict.error, "") << acceleration << ", " << speed;
       EXPECT_LT(verdict.worst_mm, speed < 50 ? 0.3 : 0.5) << acceleration << ", " << speed;
       if (speed < 25) {
