@@ -30,10 +30,19 @@ foreach(library ${libraries})
     string(APPEND links " -l${library}")
   endif()
 endforeach()
+# A relative folder is found from where the .pc file lies, wherever the prefix was moved; an absolute one stays.
 file(RELATIVE_PATH to_prefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
-set(head "prefix=\${pcfiledir}/${to_prefix}
-libdir=\${prefix}/${CMAKE_INSTALL_LIBDIR}
-includedir=\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}
+set(prefix "\${pcfiledir}/${to_prefix}")
+set(libdir "\${prefix}/${CMAKE_INSTALL_LIBDIR}")
+set(includedir "\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}")
+if(IS_ABSOLUTE "${CMAKE_INSTALL_LIBDIR}")
+  set(prefix "${CMAKE_INSTALL_PREFIX}")
+  set(libdir "${CMAKE_INSTALL_LIBDIR}")
+endif()
+if(IS_ABSOLUTE "${CMAKE_INSTALL_INCLUDEDIR}")
+  set(includedir "${CMAKE_INSTALL_INCLUDEDIR}")
+endif()
+set(head "prefix=${prefix}\nlibdir=${libdir}\nincludedir=${includedir}
 Version: ${PROJECT_VERSION}\n")
 file(WRITE ${PROJECT_BINARY_DIR}/supertac.pc "${head}Name: supertac
 Description: ${PROJECT_DESCRIPTION}: the C library

@@ -1,6 +1,7 @@
 #include "models/files/c_code.h"
 
 #include <algorithm>
+#include <bit>
 #include <cctype>
 #include <cmath>
 #include <map>
@@ -8,7 +9,9 @@
 #include <stdexcept>
 
 #include "c99_text.h"
+#include "data/windows/live_window.h"
 #include "data/windows/transforms/normalise_window.h"
+#include "io/numbers/hash.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 #include "models/inference/prepared/integer_plan.h"
@@ -114,9 +117,9 @@ std::string Writer::products() {
   std::set<std::string> taken;
   for (const IntegerStep& s : plan_.steps) {
     if (s.kind != Kind::product) continue;
-    std::string name = replaced(s.name, ".", "_");
-    for (int part = 1; !taken.insert(name).second; ++part)
-      name = replaced(s.name, ".", "_") + "_" + std::to_string(part);
+    const std::string whole = "NAME_" + replaced(s.name, ".", "_");
+    std::string name = whole;
+    for (int part = 1; !taken.insert(name).second; ++part) name = whole + "_" + std::to_string(part);
     names_[&s] = name;
     out += product(s, name);
   }
@@ -163,6 +166,72 @@ std::string Writer::draw() const {
   return out + "}\n\n";
 }
 
+// Enough for one window, and one more that is refused.
+Dim self_test_frames(const ModelFile& file, double sensor_hz) {
+  const WindowSettings w = file.windows();
+  return static_cast<Dim>(std::ceil(w.timesteps / w.rate_hz * sensor_hz)) + 3;
+}
+
+// What NAME_self_test() of window.c returns where all bits are right.
+std::uint64_t self_test_hash(const ModelFile& file, double sensor_hz) {
+  const WindowSettings w = file.windows();
+  const double period = 1 / sensor_hz;
+  LiveWindow live({.timesteps = w.timesteps,
+                   .signals = file.array().signals(),
+                   .rate_hz = w.rate_hz,
+                   .scaling = w.scaling,
+                   .filter_s = file.input.filter_s.value_or(0),
+                   .frame_period_s = period,
+                   .max_gap_s = w.max_gap_s});
+  std::uint32_t random = 1;
+  std::vector<float> frame(file.array().signals());
+  for (Dim i = 0, n = self_test_frames(file, sensor_hz); i < n; ++i) {
+    for (float& value : frame) {
+      random = random * 1664525U + 1013904223U;
+      value = static_cast<float>(w.scaling.rest_volts - w.scaling.span_volts * ((random >> 8) * 0x1p-24));
+    }
+    if (i != n / 2) live.push(static_cast<double>(i) * period, frame);
+  }
+  Tensor window(file.model->input_shape(1));
+  live.window(window.values());
+  const Estimate drawn = prepared(file, Precision::int8).estimate(window);
+  std::uint64_t hash = 14695981039346656037ULL;
+  const auto add = [&](std::span<const real> values) {
+    for (const real value : values)
+      for (int k = 0; k < 32; k += 8)
+        hash = (hash ^ (std::bit_cast<std::uint32_t>(value) >> k & 255U)) * 1099511628211ULL;
+  };
+  add(drawn.picture.values());
+  if (file.model->settings().predicted_error) add(drawn.predicted_error.values());
+  return hash;
+}
+
+// Behind the name of the model: every name of the file that is no other's business, so that several models
+// fit into one unit. The file's own text has one such name on a line that begins with static, struct or
+// union.
+struct Privacy {
+  std::string before, after;
+};
+Privacy privacy_of(const std::string& source) {
+  Privacy p;
+  std::set<std::string> taken;
+  for (std::size_t at = 0, end; at < source.size(); at = end + 1) {
+    end = std::min(source.find('\n', at), source.size());
+    const std::string line = source.substr(at, end - at);
+    if (line.starts_with("#define ")) {
+      p.after += "#undef " + line.substr(8, line.find_first_of("( ", 8) - 8) + "\n";
+    } else if (line.starts_with("static ") || line.ends_with(" {")) {
+      const std::string head = line.substr(0, line.find_first_of("[(=;{"));
+      const std::size_t last = head.find_last_not_of(' ') + 1, first = head.find_last_of(" *", last - 1) + 1;
+      const std::string name = head.substr(first, last - first);
+      if (line.starts_with(" ") || name.starts_with("NAME_") || !taken.insert(name).second) continue;
+      p.before += "#define " + name + " NAME_" + name + "\n";
+      p.after += "#undef " + name + "\n";
+    }
+  }
+  return p;
+}
+
 // What stands before the network, as LiveWindow has it.
 std::string window_constants(const ModelFile& file, double sensor_hz) {
   constexpr double kRoom = 1.25;  // frames may come a quarter faster
@@ -183,12 +252,14 @@ std::string window_constants(const ModelFile& file, double sensor_hz) {
          define("SPAN", number(w.scaling.span_volts)) +
          define("NORMALISED", w.scaling.per_window ? "1" : "0",
                 "windows are brought to their own rest and gain") +
+         define("SELF_TEST_FRAMES", text(self_test_frames(file, sensor_hz))) +
+         define("PREDICTS_ERROR", file.model->settings().predicted_error ? "1" : "0") +
          define("LEAST_GAIN", number(kLeastGain) + "f") + define("REST_REMOVED", number(kRestRemoved) + "f") +
          define("REST_SHARE", text(kRestShare)) + define("TOP_RANK", text(kTopRank));
 }
 
 std::string header_of(const ModelFile& file, const IntegerPlan& plan, std::size_t weights,
-                      const std::string& top) {
+                      std::uint64_t self_test, const std::string& top) {
   const NetworkFormat f = file.model->format();
   const std::string pixels = "UPPER_HEIGHT * UPPER_WIDTH";
   return top +
@@ -220,6 +291,14 @@ void NAME_draw(const float window[UPPER_TIMESTEPS * UPPER_SIGNALS], float pictur
 
 /* Forgets all frames. */
 void NAME_reset(void);
+
+/* Draws one window of frames that the code itself makes, and forgets all frames. Returns the hash of the picture and its
+   predicted error (FNV-1a of 64 bits): UPPER_SELF_TEST where compiler and processor draw the bits of a PC, else
+   another number, or 0. Both rooms are needed. */
+#define UPPER_SELF_TEST )" +
+         "0x" + hex_digits(self_test, 16) + R"(ull
+uint64_t NAME_self_test(float picture[)" +
+         pixels + "], float predicted_error[" + pixels + R"(]);
 
 #ifdef __cplusplus
 }
@@ -253,27 +332,26 @@ CCode c_code_of(const ModelFile& file, const std::string& name, double sensor_hz
   const auto plan = IntegerPlan::of(*file.model, *file.ranges);
   Writer writer(*plan);
   const std::string top = "/* " + name + ": tactile super-resolution, written by " + written_by + ". */\n";
-  std::string products = writer.products();
-  const std::string source =
-      top + "#include \"NAME.h\"\n\n#include <string.h>\n\n" +
-      "/* Floats are multiplied and added one after the other: the bits are then those of a PC. */\n"
-      "#if defined(__clang__)\n#pragma STDC FP_CONTRACT OFF\n#elif defined(__GNUC__)\n"
-      "#pragma GCC optimize(\"fp-contract=off\")\n"
-      "#pragma GCC diagnostic ignored \"-Wunused-function\" /* kernels that this network does not need */\n"
-      "#endif\n\n" +
+  const std::string products = writer.products();
+  const std::string body =
       define("SIGNALS", "UPPER_SIGNALS") + define("TIMESTEPS", "UPPER_TIMESTEPS") +
       define("PIXELS", "(UPPER_HEIGHT * UPPER_WIDTH)") + define("WORK_BYTES", "UPPER_WORK_BYTES") +
       define("NUMBER_STEP", "(1.0f / " + text(Dim{1} << plan->fraction_bits) + ")") +
       window_constants(file, sensor_hz) +
-      "\nstatic union {\n  int32_t aligned;\n  uint8_t bytes[WORK_BYTES];\n} work;\n" +
+      "\nunion work_area {\n  int32_t aligned;\n  uint8_t bytes[WORK_BYTES];\n};\nstatic union work_area "
+      "work;\n" +
       define("WORK", "work.bytes") + "\n" + kKernels + "\n/* ---- The network. ---- */\n\n" + writer.maps() +
       "\n" + products + writer.draw() + kWindow;
+  const Privacy names = privacy_of(body);
+  const std::string source = top + "#include \"NAME.h\"\n\n#include <string.h>\n\n" + kBegin + names.before +
+                             "\n" + body + "\n" + names.after + kEnd;
   std::string upper = name;
   std::ranges::transform(upper, upper.begin(), [](unsigned char c) { return std::toupper(c); });
   const auto named = [&](const std::string& in) {
     return replaced(replaced(in, "NAME_", name + "_"), "UPPER_", upper + "_");
   };
-  return {named(replaced(header_of(file, *plan, writer.weights(), top), "NAME.h", name + ".h")),
+  return {named(replaced(header_of(file, *plan, writer.weights(), self_test_hash(file, sensor_hz), top),
+                         "NAME.h", name + ".h")),
           named(replaced(source, "NAME.h", name + ".h")), writer.weights(),
           static_cast<std::size_t>(plan->work_area)};
 }

@@ -1,20 +1,37 @@
 /* ---- What stands before the network: moving average, resampling and scaling of the frames. ---- */
 
 #if RAW_FRAMES > 0
-static struct {
+struct raw_frames {
   double time_s[RAW_FRAMES];
   float values[RAW_FRAMES][SIGNALS];
   int32_t first, count;
-} raw; /* those that the moving average is over */
+};
+static struct raw_frames raw; /* those that the moving average is over */
 #endif
 
 static float window[TIMESTEPS * SIGNALS];
 static float ring[TIMESTEPS][SIGNALS]; /* sample j since the first frame stands at j modulo TIMESTEPS */
 static float newest[SIGNALS];          /* the newest sample: the mean of its frames so far, scaled */
-static double sum[SIGNALS];            /* of these frames */
+static double sum_of_frames[SIGNALS];  /* of these frames */
 static int32_t summed;                 /* how many they are */
 static int64_t samples;                /* since the first frame */
-static double begin_s, newest_s;       /* times of the first and the newest frame */
+static double begin_s;                 /* time of the first frame */
+static double newest_s;                /* and of the newest */
+
+/* Whether sums keep their order, products are rounded before they are added, and what is no number is told from one.
+   The bits are those of a PC only then; the values come from memory, so that this is how the rest was compiled. */
+static int arithmetic_is_kept(void) {
+  static const volatile float given[] = {100000000.0f, 1.0f, 1.000244140625f, 1.00048828125f};
+  const float large = given[0], one = given[1], x = given[2], square = given[3];
+  return (large + one) - large == 0.0f && x * x - square == 0.0f;
+}
+
+/* By its bits: a comparison may be taken for true. */
+static int is_finite(double x) {
+  uint64_t bits;
+  memcpy(&bits, &x, sizeof bits);
+  return (bits >> 52 & 0x7ff) != 0x7ff;
+}
 
 void NAME_reset(void) {
   samples = 0;
@@ -58,13 +75,15 @@ int NAME_push_at(double time_s, const float values[SIGNALS]) {
 #if RAW_FRAMES > 0
   float filtered[SIGNALS];
 #endif
-  if (!(time_s - time_s == 0)) return 0;
+  if (!is_finite(time_s)) return 0;
   for (k = 0; k < SIGNALS; ++k)
-    if (!(values[k] - values[k] == 0)) return 0; /* not a number: the frame counts as lost */
-  if (samples == 0 || time_s - newest_s > MAX_GAP_S || newest_s - time_s > MAX_GAP_S)
+    if (!is_finite((double)values[k])) return 0; /* the frame counts as lost */
+  if (samples == 0 || time_s - newest_s > MAX_GAP_S || newest_s - time_s > MAX_GAP_S) {
     NAME_reset();
-  else if (time_s <= newest_s)
+    if (!arithmetic_is_kept()) return 0;
+  } else if (time_s <= newest_s) {
     return 0;
+  }
   newest_s = time_s;
 #if RAW_FRAMES > 0
   filter(time_s, values, filtered);
@@ -74,15 +93,15 @@ int NAME_push_at(double time_s, const float values[SIGNALS]) {
   if (samples == 0) begin_s = time_s;
   j = sample_at(time_s - begin_s);
   if (samples <= j) {
-    for (k = 0; k < SIGNALS; ++k) sum[k] = 0;
+    for (k = 0; k < SIGNALS; ++k) sum_of_frames[k] = 0;
     summed = 0;
   }
   for (; samples < j; ++samples) memcpy(ring[samples % TIMESTEPS], newest, sizeof newest); /* no frame */
   samples = j + 1;
   ++summed;
   for (k = 0; k < SIGNALS; ++k) {
-    sum[k] += (double)values[k];
-    newest[k] = scaled((float)(sum[k] / summed));
+    sum_of_frames[k] += (double)values[k];
+    newest[k] = scaled((float)(sum_of_frames[k] / summed));
   }
   memcpy(ring[j % TIMESTEPS], newest, sizeof newest);
   return samples >= TIMESTEPS;
@@ -130,4 +149,38 @@ int NAME_picture(float picture[PIXELS], float predicted_error[PIXELS]) {
 #endif
   NAME_draw(window, picture, predicted_error);
   return 1;
+}
+
+/* FNV-1a over the bits, lowest byte first. */
+static uint64_t hash_of(uint64_t hash, const float *values, int32_t count) {
+  int32_t i, k;
+  for (i = 0; i < count; ++i) {
+    uint32_t bits;
+    memcpy(&bits, values + i, sizeof bits);
+    for (k = 0; k < 4; ++k, bits >>= 8) hash = (hash ^ (bits & 255)) * 1099511628211ull;
+  }
+  return hash;
+}
+
+uint64_t NAME_self_test(float picture[PIXELS], float predicted_error[PIXELS]) {
+  uint64_t hash = 14695981039346656037ull;
+  uint32_t random = 1;
+  int32_t i, k;
+  float values[SIGNALS];
+  NAME_reset();
+  for (i = 0; i < SELF_TEST_FRAMES; ++i) {
+    for (k = 0; k < SIGNALS; ++k) {
+      random = random * 1664525u + 1013904223u;
+      values[k] = (float)(REST - SPAN * ((double)(random >> 8) * (1.0 / 16777216)));
+    }
+    if (i == SELF_TEST_FRAMES / 2) { /* a frame that must be refused */
+      const uint32_t not_a_number = 0x7fc00000u;
+      memcpy(values, &not_a_number, sizeof not_a_number);
+    }
+    NAME_push_at(i * PERIOD_S, values);
+  }
+  if (!NAME_picture(picture, predicted_error)) return 0;
+  NAME_reset();
+  hash = hash_of(hash, picture, PIXELS);
+  return PREDICTS_ERROR ? hash_of(hash, predicted_error, PIXELS) : hash;
 }

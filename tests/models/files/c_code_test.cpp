@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <map>
 #include <stdexcept>
 
 #include "data/windows/live_window.h"
@@ -19,14 +20,20 @@ namespace {
 // What was written, compiled by the C compiler of this machine as somebody might who wants it fast.
 class Compiled {
  public:
-  Compiled(const CCode& code, const std::string& flags) {
+  /// `words`: compiler and flags. `more`: files beside those of `code`, and all that is compiled.
+  Compiled(const CCode& code, const std::string& words, const std::map<std::string, std::string>& more = {}) {
     write_file(folder_ / "finger.h", code.header);
     write_file(folder_ / "finger.c", code.source);
-    const std::string library = folder_ / "finger.so";
-    const std::string command = "cc -std=gnu99 -Wall -Wextra -Werror " + flags + " -shared -fPIC -o " +
-                                library + " " + (folder_ / "finger.c");
+    for (const auto& [name, text] : more) write_file(folder_ / name, text);
+    const std::string library = folder_ / "finger.so", said = folder_ / "said.txt";
+    const std::string command = words + " -std=gnu99 -Wall -Wextra -Werror -shared -fPIC -o " + library +
+                                " " + (folder_ / (more.empty() ? "finger.c" : "unit.c")) + " 2> " + said;
     if (std::system(command.c_str()) == 0) library_ = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (library_ == nullptr) throw std::runtime_error("not compiled: " + command);
+    if (library_ == nullptr) {
+      std::string text = read_text_file(said, 1 << 20);
+      std::ranges::replace(text, '\n', ' ');
+      throw std::runtime_error(text);
+    }
   }
   ~Compiled() {
     if (library_ != nullptr) dlclose(library_);
@@ -43,7 +50,15 @@ class Compiled {
   void* library_ = nullptr;
 };
 
-bool has_compiler() { return std::system("cc --version > /dev/null 2>&1") == 0; }
+bool has_compiler(const std::string& name = "cc") {
+  return std::system((name + " --version > /dev/null 2>&1").c_str()) == 0;
+}
+
+// What the header says that self_test() returns.
+std::uint64_t self_test_of(const CCode& code) {
+  return std::stoull(code.header.substr(code.header.find("SELF_TEST 0x") + 10), nullptr, 16);
+}
+using SelfTest = std::uint64_t(float*, float*);
 
 ModelFile model_of(const SuperTacSettings& settings, const InputSettings& input) {
   ModelFile file;
@@ -72,15 +87,22 @@ std::vector<SuperTacSettings> all_settings() {
 TEST(CCode, DrawsTheBitsOfAPreparedNetwork) {
   if (!has_compiler()) GTEST_SKIP() << "no C compiler";
   for (const SuperTacSettings& settings : all_settings())
-    for (const char* flags : {"-Og", "-O1", "-O2", "-Os", "-O3 -march=native",
-                              "-O1 -fsanitize=undefined -fno-sanitize-recover"}) {
+    for (const char* flags :
+         {"cc -Og", "cc -O1", "cc -O2", "cc -Os", "cc -O3 -march=native",
+          "cc -O2 -march=native -ffp-contract=fast", "clang -O2", "clang -O3 -march=native",
+          "cc -O1 -fsanitize=undefined -fno-sanitize-recover"}) {
+      if (!has_compiler(std::string(flags).substr(0, std::string(flags).find(' ')))) continue;
       const ModelFile file = model_of(settings, {});
-      const Compiled code(c_code_of(file, "finger", 100, "a test"), flags);
+      const CCode exported = c_code_of(file, "finger", 100, "a test");
+      const Compiled code(exported, flags);
       const auto draw = code.function<void(const float*, float*, float*)>("finger_draw");
       const Tensor windows = uniform(file.model->input_shape(5), 7);
       const Estimate expected = Prepared(*file.model, *file.ranges).estimate(windows);
       const auto pixels = static_cast<std::size_t>(expected.picture.size() / 5);
       std::vector<float> picture(pixels), predicted_error(pixels);
+      EXPECT_EQ(code.function<SelfTest>("finger_self_test")(picture.data(), predicted_error.data()),
+                self_test_of(exported))
+          << flags;
       for (std::size_t n = 0; n < 5; ++n) {
         draw(windows.data() + n * static_cast<std::size_t>(windows.size() / 5), picture.data(),
              predicted_error.data());
@@ -105,7 +127,8 @@ TEST(CCode, DrawsWhatLiveWindowsDraw) {
       settings.last_frame_path = timesteps == 1;
       const ModelFile file =
           model_of(settings, {.rate_hz = 50, .scaling = {.per_window = per_window}, .filter_s = filter_s});
-      const Compiled code(c_code_of(file, "finger", sensor_hz, "a test"), "-O3 -march=native");
+      const CCode exported = c_code_of(file, "finger", sensor_hz, "a test");
+      const Compiled code(exported, "cc -O3 -march=native");
       const auto push = code.function<int(double, const float*)>("finger_push_at");
       const auto draw = code.function<int(float*, float*)>("finger_picture");
       LiveWindow live({.timesteps = static_cast<int>(timesteps),
@@ -139,7 +162,51 @@ TEST(CCode, DrawsWhatLiveWindowsDraw) {
         ASSERT_TRUE(std::ranges::equal(picture, expected.picture.values())) << "frame " << i;
       }
       EXPECT_GT(pictures, 150);
+      EXPECT_EQ(code.function<SelfTest>("finger_self_test")(picture.data(), predicted_error.data()),
+                self_test_of(exported));
     }
+}
+
+// A compiler that rearranges sums gives other bits: it is refused by name, and one that does not say so when
+// it runs.
+TEST(CCode, RefusesACompilerThatRearrangesSums) {
+  if (!has_compiler()) GTEST_SKIP() << "no C compiler";
+  const CCode exported = c_code_of(model_of(tiny(), {}), "finger", 100, "a test");
+  for (const std::string words :
+       {"cc -O2 -ffast-math", "cc -Ofast", "cc -O2 -ffinite-math-only", "clang -O1 -ffast-math"}) {
+    if (!has_compiler(words.substr(0, words.find(' ')))) continue;
+    EXPECT_ERROR(Compiled(exported, words), std::runtime_error, "takes frames that are no numbers");
+  }
+  CCode quiet = exported;
+  const std::size_t error = quiet.source.find("#error");
+  quiet.source.erase(error, quiet.source.find('\n', error) - error);
+  const Compiled code(quiet, "cc -O2 -ffast-math");
+  std::vector<float> frame(16, 2.4F), picture(256), predicted_error(256);
+  EXPECT_EQ(code.function<SelfTest>("finger_self_test")(picture.data(), predicted_error.data()), 0U);
+  for (int i = 0; i < 1000; ++i) ASSERT_EQ(code.function<int(const float*)>("finger_push")(frame.data()), 0);
+}
+
+TEST(CCode, SeveralModelsFitIntoOneUnit) {
+  if (!has_compiler()) GTEST_SKIP() << "no C compiler";
+  SuperTacSettings other = tiny();
+  other.rows = 3, other.scale = 2, other.timesteps = 32;
+  const CCode finger = c_code_of(model_of(tiny(), {}), "finger", 100, "a test"),
+              palm = c_code_of(model_of(other, {.scaling = {}, .filter_s = 0.02}), "palm", 300, "a test");
+  const std::map<std::string, std::string> more = {
+      {"palm.h", palm.header},
+      {"palm.c", palm.source},
+      {"unit.c", "#include \"finger.c\"\n#include \"palm.c\"\n"}};
+  for (const std::string words : {"cc -O2", "clang -O2"}) {
+    if (!has_compiler(words.substr(0, words.find(' ')))) continue;
+    const Compiled unit(finger, words, more);
+    std::vector<float> picture(256), predicted_error(256);
+    for (int turn = 0; turn < 2; ++turn) {
+      EXPECT_EQ(unit.function<SelfTest>("finger_self_test")(picture.data(), predicted_error.data()),
+                self_test_of(finger));
+      EXPECT_EQ(unit.function<SelfTest>("palm_self_test")(picture.data(), predicted_error.data()),
+                self_test_of(palm));
+    }
+  }
 }
 
 TEST(CCode, RefusesWhatIsNoNameOrRateOrHasNoRanges) {

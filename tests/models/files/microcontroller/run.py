@@ -2,8 +2,8 @@
 
     run.py --bin build/bin [--model FILE --data DIR] [--windows N] [--frames N] [--csv FILE]
 
-Without a model a small one is simulated and trained. Exits with 77 where arm-none-eabi-gcc or qemu-system-arm is
-missing.
+Without a model a small one is simulated and trained. Parts whose compiler or emulator is missing are left out;
+exits with 77 where all are.
 """
 import argparse
 import csv
@@ -17,15 +17,22 @@ import sys
 import tempfile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-# name, qemu's machine, what the compiler is told
+ARM, RISCV = "arm-none-eabi-", "riscv64-unknown-elf-"
+# name, compiler, qemu's program and machine, what the compiler is told
 PARTS = [
-    ("Cortex-M55", "mps3-an547", "-mcpu=cortex-m55 -mfloat-abi=hard"),
-    ("Cortex-M7", "mps2-an500", "-mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard"),
-    ("Cortex-M4F", "mps2-an386", "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard"),
-    ("Cortex-M3", "mps2-an385", "-mcpu=cortex-m3"),
-    ("Cortex-M0+", "mps2-an385", "-mcpu=cortex-m0plus"),  # its code, on an M3
+    ("Cortex-M55", ARM, "arm -M mps3-an547", "-mcpu=cortex-m55 -mfloat-abi=hard"),
+    ("Cortex-M7", ARM, "arm -M mps2-an500", "-mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard"),
+    ("Cortex-M4F", ARM, "arm -M mps2-an386", "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard"),
+    ("Cortex-M3", ARM, "arm -M mps2-an385", "-mcpu=cortex-m3"),
+    ("Cortex-M0+", ARM, "arm -M mps2-an385", "-mcpu=cortex-m0plus"),  # its code, on an M3
+    ("rv32imc", RISCV, "riscv32 -M virt -bios none", "-march=rv32imc -mabi=ilp32"),
+    ("rv64gc", RISCV, "riscv64 -M virt -bios none", "-march=rv64gc -mabi=lp64d -mcmodel=medany"),
 ]
-CC = ["arm-none-eabi-gcc", "-mthumb", "-std=gnu99", "-O2", "-Wall", "-Wextra", "-Werror", "-ffunction-sections"]
+CC = ["-std=gnu99", "-O2", "-Wall", "-Wextra", "-Werror", "-ffunction-sections"]
+# How a program without a system is linked.
+LINKED = {ARM: ["-mthumb", HERE + "/startup.c", "-nostartfiles", "--specs=nano.specs", "-T", HERE + "/mps2.ld"],
+          RISCV: [HERE + "/startup_riscv.c", "-nostartfiles", "--specs=picolibc.specs", "-T", HERE + "/virt.ld",
+                  "-Wl,--no-warn-rwx-segments"]}
 
 
 def tensors_of(path):
@@ -106,14 +113,14 @@ def rate_of(recording):
     return 1 / steps[len(steps) // 2]
 
 
-def built(flags, folder, name):
+def built(tools, flags, folder, name):
     """The program, bytes of flash and RAM of the exported file alone, and of its instructions."""
-    program = folder + "/" + name + ".elf"
-    sources = [HERE + "/firmware.c", HERE + "/startup.c", folder + "/finger.c"]
-    subprocess.run(CC + flags.split() + ["-I" + folder, *sources, "-nostartfiles", "--specs=nano.specs", "-T",
-                                         HERE + "/mps2.ld", "-Wl,--gc-sections", "-o", program], check=True)
-    subprocess.run(CC + flags.split() + ["-c", folder + "/finger.c", "-o", program + ".o"], check=True)
-    size = subprocess.run(["arm-none-eabi-size", "-A", program + ".o"], check=True, capture_output=True, text=True)
+    program, compiler = folder + "/" + name + ".elf", [tools + "gcc", *CC, *flags.split(), "-I" + folder]
+    subprocess.run([*compiler, HERE + "/firmware.c", folder + "/finger.c", *LINKED[tools], "-Wl,--gc-sections", "-o", program],
+                   check=True)
+    thumb = ["-mthumb"] if tools == ARM else ["--specs=picolibc.specs"]
+    subprocess.run([*compiler, *thumb, "-c", folder + "/finger.c", "-o", program + ".o"], check=True)
+    size = subprocess.run([tools + "size", "-A", program + ".o"], check=True, capture_output=True, text=True)
     sections = [line.split() for line in size.stdout.splitlines() if line.startswith(".")]
 
     def total(*prefixes):
@@ -134,11 +141,11 @@ def sketch_compiles(folder):
 def run(machine, program, folder, given):
     with open(folder + "/input", "wb") as file:
         file.write(given)
-    ran = subprocess.run(["qemu-system-arm", "-M", machine, "-kernel", program, "-icount", "shift=0",
+    ran = subprocess.run([*("qemu-system-" + machine).split(), "-kernel", program, "-icount", "shift=0",
                           "-semihosting-config", "enable=on,target=native", "-nographic", "-monitor", "none", "-serial",
                           "none"], cwd=folder, capture_output=True, text=True, timeout=7200)
     said = dict(line.split() for line in (ran.stdout + ran.stderr).splitlines() if len(line.split()) == 2)
-    return {key: int(said[key]) for key in ("pictures", "hash", "instructions")}
+    return {key: int(said[key]) for key in ("pictures", "hash", "instructions", "self_test")}
 
 
 def main():
@@ -151,8 +158,10 @@ def main():
     parser.add_argument("--csv", help="adds a line for each part to this file")
     parser.add_argument("--preset", default="tiny", help="of the small one")
     args = parser.parse_args()
-    if shutil.which("arm-none-eabi-gcc") is None or shutil.which("qemu-system-arm") is None:
-        print("skipped: needs arm-none-eabi-gcc (gcc-arm-none-eabi, libnewlib-arm-none-eabi) and qemu-system-arm")
+    parts = [part for part in PARTS if shutil.which(part[1] + "gcc") and shutil.which("qemu-system-" + part[2].split()[0])]
+    if not parts:
+        print("skipped: needs gcc-arm-none-eabi, libnewlib-arm-none-eabi and qemu-system-arm, or gcc-riscv64-unknown-elf, "
+              "picolibc-riscv64-unknown-elf and qemu-system-misc")
         return 77
     wrong, rows = 0, []
     with tempfile.TemporaryDirectory() as folder:
@@ -164,20 +173,20 @@ def main():
         subprocess.run([args.bin + "/supertac-export", args.model, "--c99", folder, "--name", "finger", "--sensor-hz",
                         repr(rate_of(recording)), "--force"], check=True, stdout=subprocess.DEVNULL)
         given = {"windows": windows_of(args, folder), "frames": frames_of(args, folder)}
-        wrong += not sketch_compiles(folder)
-        for name, machine, flags in PARTS:
-            program, flash, ram, code = built(flags, folder, name)
+        wrong += bool(shutil.which(ARM + "g++")) and not sketch_compiles(folder)
+        for name, tools, machine, flags in parts:
+            program, flash, ram, code = built(tools, flags, folder, name)
             row = {"part": name, "flash_bytes": flash, "code_bytes": code, "ram_bytes": ram}
             for what, (data, count, expected) in given.items():
                 found = run(machine, program, folder, data)
-                same = found["hash"] == expected and found["pictures"] == count
+                same = found["hash"] == expected and found["pictures"] == count and found["self_test"] == 1
                 wrong += not same
                 row.update({what: count, what + "_hash": f"{found['hash']:016x}",
                             what + "_instructions": found["instructions"]})
-                print(f"{name}: {found['pictures']} pictures of {what}, hash {found['hash']:016x}"
+                print(f"{name}: {found['pictures']} pictures of {what}, hash {found['hash']:016x}, self-test {'good' if found['self_test'] else 'BAD'}"
                       f"{'' if same else f', expected {expected:016x} of {count}'}, "
                       f"at most {found['instructions']} instructions a picture")
-            print(f"{name}: {flash} bytes of flash, {code} of them code, {ram} of RAM with the history")
+            print(f"{name}: {flash} bytes of flash, {code} of them code, {ram} of RAM with the window")
             rows.append(row)
     if args.csv:
         commit = subprocess.run(["git", "-C", HERE, "rev-parse", "--short=12", "HEAD"], check=True, capture_output=True,
