@@ -192,7 +192,8 @@ void PositionTrack::model(const Leg& leg, const MoveTiming& timing) {
   const double wrong_s = std::abs(off_s) + timing.spread_s + 0.5 * timing.range_s;
   doubt_mm_ = std::max(doubt_mm_, std::min(length, wrong_s * leg.speed));
   const double cruise_s = took(leg) - timing.delay_s - ramps;
-  if (leg.phase == Phase::slide && cruise_s > 0) speed_ = length / cruise_s;
+  const bool as_ordered = std::abs(cruise_s - ordered_s(leg)) < timing.spread_s + timing.range_s;
+  if (leg.phase == Phase::slide && cruise_s > 0) speed_ = as_ordered ? leg.speed : length / cruise_s;
   const double start = std::min(std::max(leg.accepted_s + timing.delay_s, leg.sent_s), leg.ended_s - 1e-6);
   const double duration = leg.ended_s - start;
   const int steps = static_cast<int>(std::clamp(duration / 0.005, 1.0, double{kMostSteps}));
