@@ -1,5 +1,8 @@
 #include "library/supertac.h"
 
+#include <omp.h>
+#include <pthread.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -35,6 +38,14 @@ namespace {
 constexpr std::size_t kBatch = 32;  // windows that a thread draws at once
 
 thread_local std::string last_error;
+
+// The threads that OpenMP keeps for a thread do not survive its fork, and who waits for them waits for ever:
+// what was that thread goes on alone, to the same bits.
+thread_local bool alone = false;
+[[maybe_unused]] const int at_fork = pthread_atfork(nullptr, nullptr, [] {
+  alone = true;
+  omp_set_num_threads(1);
+});
 
 // Of an error that leaves no memory for its words the short ones remain, which take none.
 void keep(const char* text) noexcept {
@@ -159,6 +170,7 @@ int supertac_draw(const supertac_model* model, std::size_t count, const float* w
     expect(count <= std::numeric_limits<std::size_t>::max() / sizeof(float) / std::max(window, picture),
            "supertac_draw: more windows than memory can hold");
     const auto batches = static_cast<std::int64_t>((count + kBatch - 1) / kBatch);
+    if (alone) threads = 1;
     std::exception_ptr failure;
 #pragma omp parallel for schedule(dynamic) num_threads(threads) if (threads > 1 && batches > 1)
     for (std::int64_t batch = 0; batch < batches; ++batch) {

@@ -211,7 +211,13 @@ bool Stream::take(SensorFrame frame) {
   if (frames_ == 0) first_s_ = frame.time_s, begin_s_ = monotonic_seconds();
   if (frame.time_s - first_s_ >= settings_.seconds) return false;
   if ((view_ || web_ || udp_) && !source_.live()) frame.arrived_s = keep_pace(frame.time_s);
-  if (source_.live()) frame.wall_s = wall_clock_seconds() - (monotonic_seconds() - frame.arrived_s);
+  if (source_.live()) {
+    // One offset for all frames, however the system's clock is set meanwhile; only a sensor that begins anew
+    // has another.
+    if (frames_ == 0 || frame.time_s < last_s_)
+      wall_offset_s_ = wall_clock_seconds() - (monotonic_seconds() - frame.arrived_s) - frame.time_s;
+    frame.wall_s = frame.time_s + wall_offset_s_;
+  }
   ++frames_;
   last_s_ = frame.time_s;
   const bool rezero = web_ && web_->take_rezero();

@@ -104,6 +104,7 @@ class Stream {
   LiveState state_;
   std::uint64_t frames_ = 0, too_late_ = 0, unlike_ = 0, lines_lost_ = 0, figures_frames_ = 0;
   double first_s_ = 0, last_s_ = 0;  // the sensor's time
+  double wall_offset_s_ = 0;         // from the sensor's time to the wall clock's
   double begin_s_ = 0, figures_s_ = 0, shown_s_ = 0, named_s_ = 0;
 };
 

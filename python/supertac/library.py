@@ -14,6 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+VERSION = "0.2.0"  # of the package and of the library that it takes
 PRECISIONS = {"fp32": 0, "int8": 1}
 POINTER, SIZE = ctypes.c_void_p, ctypes.c_size_t
 PROGRESS = ctypes.CFUNCTYPE(ctypes.c_int, POINTER, ctypes.c_longlong, ctypes.c_double)

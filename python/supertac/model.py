@@ -86,10 +86,43 @@ class Model:
         self.map = tuple(self.settings.get(name, 4) for name in ("rows", "columns"))
         self.window = self.settings["timesteps"], self.map[0] * self.map[1] * self.settings.get("in_channels", 1)
 
+    def __repr__(self) -> str:
+        rows, columns = self.map
+        return (f"Model({rows}x{columns} taxels, {self.settings.get('in_channels', 1)} each, in {self._sensor()['unit']}; "
+                f"windows [{self.window[0]},{self.window[1]}] at {self.input['rate_hz']:g} Hz -> pictures "
+                f"[{rows * self.settings['scale']},{columns * self.settings['scale']}])")
+
+    def __call__(self, volts: np.ndarray) -> np.ndarray:
+        """predict()"""
+        return self.predict(volts)
+
+    def predict(self, volts: np.ndarray) -> np.ndarray:
+        """Pictures [N,height,width] of windows [N,T,S], or one [height,width] of [T,S], in the sensor's unit."""
+        values = np.asarray(volts)
+        return self.draw(values[None]).picture[0] if values.ndim == 2 else self.draw(values).picture
+
+    def _sensor(self) -> dict:
+        return recordings.RIG_SIGNALS | self.input.get("signals", {})
+
+    def _check(self, recording: recordings.Recording) -> None:
+        """Raises ValueError for a recording of another sensor, as the programs do."""
+        ours = (*self.map, self.settings.get("in_channels", 1))
+        theirs = tuple(recording.array[key] for key in ("rows", "columns", "channels"))
+        if theirs != ours:
+            raise ValueError(f"the recording is of {theirs[0]}x{theirs[1]} taxels with {theirs[2]} channels, the model was"
+                             f" trained on {ours[0]}x{ours[1]} with {ours[2]}; choose recordings and model of one array")
+        found, expected = recording.signals, self._sensor()
+        for key in ("unit", "pressed"):
+            if found[key] != expected[key]:
+                raise ValueError(f"the recording's signals have {key} {found[key]!r}, the model's {expected[key]!r}; "
+                                 "choose recordings and model of one sensor")
+
     def windows(self, recording: recordings.Recording) -> tuple[np.ndarray, np.ndarray]:
-        """Times and windows in volts of a recording that was filtered as the training was."""
+        """Times and windows in volts of a recording that was filtered as the training was. Raises ValueError for one of
+        another array, unit or polarity than the model's."""
+        self._check(recording)
         frames = self.settings["timesteps"]
-        return recordings.windows(recording, frames, self.input["rate_hz"] if frames > 1 else 1000 / recording.period_s)
+        return recordings.windows(recording, frames, self.input["rate_hz"])
 
     def scale(self, volts: np.ndarray) -> np.ndarray:
         """Volts [N,T,S] -> what the network takes."""
@@ -144,7 +177,7 @@ class Model:
     def _encode(self, x, name):
         for conv in self._parts(name + ".conv.{}"):
             x = leaky_relu(self._convolve(x, conv, stride=2))
-        return self._linear(relu(self._linear(x.reshape(len(x), -1), name + ".fc")), name + ".mean")
+        return self._linear(relu(self._linear(x.reshape(len(x), x.shape[1] * x.shape[2]), name + ".fc")), name + ".mean")
 
     def _rcab(self, x, name):
         h = self._convolve(relu(self._convolve(x, name + ".conv.0")), name + ".conv.1")
@@ -162,9 +195,10 @@ class Model:
         if self.groups:
             latents = np.concatenate([self._encode(x[:, :, group].swapaxes(1, 2), f"encoder.{i}")
                                       for i, group in enumerate(self.groups)], axis=1)
-            h = leaky_relu(self._linear(latents, "upsampler.fc")).reshape(len(x), -1, *self.map)
+            h = leaky_relu(self._linear(latents, "upsampler.fc"))
+            h = h.reshape(len(x), h.shape[1] // (self.map[0] * self.map[1]), *self.map)
         if self.settings.get("last_frame_path") or not self.groups:
-            frame = np.moveaxis(x[:, -1].reshape(len(x), *self.map, -1), -1, 1)
+            frame = np.moveaxis(x[:, -1].reshape(len(x), *self.map, self.settings.get("in_channels", 1)), -1, 1)
             h = h + leaky_relu(self._convolve(frame, "upsampler.last_frame"))
         for name in self._parts("upsampler.rirb.{}"):
             h = self._rirb(h, name)
@@ -194,6 +228,6 @@ def save_model(path: str | os.PathLike, module, parent: Model) -> None:
     if missing:
         raise ValueError(f"{path}: expected the tensors of the model that it came from, {sorted(missing)[0]} differs")
     digest = hashlib.sha256(b"".join(t.tobytes() for t in parent.tensors.values())).hexdigest()
-    provenance = {"command": "supertac.save_model", "version": "0.2.0", "parents": {"model": digest}}
+    provenance = {"command": "supertac.save_model", "version": library.VERSION, "parents": {"model": digest}}
     metadata = {key: value for key, value in parent.metadata.items() if key not in ("checksum", "supertac_format")}
     write(path, tensors, metadata | {"provenance": json.dumps(provenance, separators=(",", ":"))}, checksum=True)

@@ -10,6 +10,7 @@ import numpy as np
 from .files import expect, parse_json, read, write
 
 RIG = {"rows": 4, "columns": 4, "pitch_mm": 3, "channels": 1}
+RIG_SIGNALS = {"unit": "V", "pressed": "lower"}  # of a recording that does not say
 SLACK = 1e-6  # of a period: time stamps are rounded
 
 
@@ -24,6 +25,17 @@ class Recording:
     metadata: dict[str, str] = dataclasses.field(default_factory=dict)  # plate, trial, pass, signals, ...
     lift_mm: np.ndarray | None = None  # [n], of the finger above its slide
     truth: np.ndarray | None = None  # [n,H,W] in 0 to 1, what a finer sensor saw
+
+    @property
+    def signals(self) -> dict:
+        """Unit, polarity and range of the sensor."""
+        return RIG_SIGNALS | (json.loads(self.metadata["signals"]) if "signals" in self.metadata else {})
+
+    def __repr__(self) -> str:
+        array = self.array
+        return (f"Recording({len(self.time_s)} frames [{self.volts.shape[1]}] of {array['rows']}x{array['columns']} taxels, "
+                f"{array['channels']} each, in {self.signals['unit']}"
+                + (f", {self.metadata['plate']}" if "plate" in self.metadata else "") + ")")
 
     @property
     def period_s(self) -> float:

@@ -10,6 +10,7 @@ to_torch() likewise; where onnxruntime is, what supertac-export writes.
 import dataclasses
 import importlib
 import json
+import multiprocessing
 import os
 import pathlib
 import subprocess
@@ -170,6 +171,49 @@ def check_convolutions():
     return abs(one - other) < 1e-9 and by_hand.tolist() == [[[215, 326, 37]]]
 
 
+def draws(queue, path, volts):
+    queue.put(supertac.load(path).draw(volts, precision="fp32", threads=2).picture)
+
+
+def works_in_a_fork(model, volts):
+    """OpenMP's threads do not survive a fork: a child of a parent that had some draws all the same."""
+    if not LIBRARY.exists():
+        return True
+    ours = model.draw(volts, precision="fp32", threads=2).picture
+    for how in ("fork", "spawn"):
+        context = multiprocessing.get_context(how)
+        queue = context.Queue()
+        child = context.Process(target=draws, args=(queue, model.path, volts))
+        child.start()
+        try:
+            theirs = queue.get(timeout=120)
+        except Exception:  # noqa: BLE001: nothing came
+            child.kill()
+            print(f"{how}: the child draws nothing")
+            return False
+        child.join()
+        if not same_bits(f"by a child ({how})", theirs, ours):
+            return False
+    return True
+
+
+def clients(model, recording):
+    """What is refused as by the programs; empty batches, single windows, what objects say of themselves."""
+    volts = model.windows(recording)[1][:40]
+    assert model(volts).shape == (40, *model(volts[0]).shape) and model(volts[:0]).shape[0] == 0
+    assert " taxels" in repr(model) and f"{len(recording.time_s)} frames" in repr(recording)
+    counts = {"signals": json.dumps({"unit": "counts", "pressed": "lower", "range": [0, 900]})}
+    for change, words in (({"metadata": counts}, "unit 'counts', the model's 'V'"),
+                          ({"array": recording.array | {"rows": 9}}, "taxels with")):
+        try:
+            model.windows(dataclasses.replace(recording, **change))
+            print(f"not refused: {list(change)}")
+            return False
+        except ValueError as error:
+            assert words in str(error), error
+    return works_in_a_fork(model, np.concatenate([volts, volts]))
+
+
 def refuses_damage(path):
     raw = bytearray(path.read_bytes())
     raw[-5] ^= 1
@@ -194,6 +238,7 @@ def main():
             for data in (rig, other):
                 good &= compare(folder, data, preset, data / recordings[0].name)
         recording = supertac.read_recording(recordings[0])
+        good &= clients(supertac.load(folder / "tiny4x4.safetensors"), recording)
         good &= trains(folder, recording) and refuses_what_programs_refuse(folder, recording)
         if LIBRARY.exists():
             subprocess.run([sys.executable, ROOT / "examples/tour.py", rig], check=True,

@@ -95,7 +95,11 @@ UdpOutput::~UdpOutput() { close(socket_); }
 // A refused one tells that nobody listened to the datagram before: somebody may by now.
 void UdpOutput::send(const std::string& line) {
   const auto sent = [&] { return ::send(socket_, line.data(), line.size(), MSG_NOSIGNAL) >= 0; };
-  if (!sent() && !(errno == ECONNREFUSED && sent())) ++lost_;
+  if (sent() || (errno == ECONNREFUSED && sent())) return;
+  if (errno == EMSGSIZE)
+    throw std::runtime_error("--udp: a line has " + std::to_string(line.size()) +
+                             " bytes, a datagram carries at most 65507; take the lines of --out - instead");
+  ++lost_;
 }
 
 PipeOutput::PipeOutput(int file, bool patient) : file_(file), patient_(patient), thread_([this] { run(); }) {}
