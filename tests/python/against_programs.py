@@ -214,6 +214,34 @@ def clients(model, recording):
     return works_in_a_fork(model, np.concatenate([volts, volts]))
 
 
+PYLSL = """import sys, time
+class StreamInfo:
+    def __init__(self, *words): pass
+    def desc(self): return self
+    def append_child_value(self, name, value): pass
+class StreamOutlet:
+    def __init__(self, info): pass
+    def push_sample(self, values, timestamp): print(len(values), timestamp)
+local_clock = time.monotonic
+"""
+
+
+def forwards(folder, path, recording):
+    """examples/lsl_forward.py with a stand-in for pylsl: the frames' own spacing, with a model and without."""
+    (folder / "pylsl.py").write_text(PYLSL)
+    for words, size in ((["--model", path], 256), ([], 16)):
+        lines = subprocess.run([pathlib.Path(sys.argv[1]) / "supertac-stream", "--recording", recording, *words, "--out", "-",
+                                "--quiet", "--seconds", "4"], capture_output=True, check=True).stdout
+        pushed = subprocess.run([sys.executable, ROOT / "examples/lsl_forward.py"], input=lines, capture_output=True, check=True,
+                                env=os.environ | {"PYTHONPATH": str(folder)}).stdout
+        samples = np.array([line.split() for line in pushed.splitlines()], float)
+        times = [json.loads(line)["timestamp"] for line in lines.splitlines()]
+        if (samples[:, 0] != size).any() or not np.allclose(np.diff(samples[:, 1]), np.diff(times), atol=1e-6):
+            print(f"lsl_forward.py {words}: {samples[:3]}")
+            return False
+    return True
+
+
 def refuses_damage(path):
     raw = bytearray(path.read_bytes())
     raw[-5] ^= 1
@@ -239,6 +267,7 @@ def main():
                 good &= compare(folder, data, preset, data / recordings[0].name)
         recording = supertac.read_recording(recordings[0])
         good &= clients(supertac.load(folder / "tiny4x4.safetensors"), recording)
+        good &= forwards(folder, folder / "tiny4x4.safetensors", recordings[0])
         good &= trains(folder, recording) and refuses_what_programs_refuse(folder, recording)
         if LIBRARY.exists():
             subprocess.run([sys.executable, ROOT / "examples/tour.py", rig], check=True,
