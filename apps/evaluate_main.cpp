@@ -8,6 +8,7 @@
 #include "apps/common/running/progress.h"
 #include "apps/evaluate/distance_scores.h"
 #include "apps/evaluate/exports.h"
+#include "apps/evaluate/group_scores.h"
 #include "apps/evaluate/map_scores.h"
 #include "apps/evaluate/page.h"
 #include "apps/evaluate/scoring.h"
@@ -30,7 +31,9 @@ WindowSet load_windows(const Arguments& a, const ModelFile& file) {
       a.given("plates") ? a.list("plates") : comma_list(value_or(file.metadata, "plates"));
   add_model_parents(a.list("model"));
   add_parent("recordings", hash_of_recordings(a.text("data"), plates));
-  return WindowSet::load(a.text("data"), plates, file.windows(),
+  WindowSettings settings = file.windows();
+  if (a.given("contact")) settings.contact_level = static_cast<float>(a.number("contact", 0, 1));
+  return WindowSet::load(a.text("data"), plates, settings,
                          progress_of(a, "reading " + a.text("data"), "recordings"));
 }
 
@@ -47,11 +50,12 @@ std::string row(const std::string& name, const ZoneMetrics& metrics, const Laten
 /// The scores of the network and of every baseline over the same windows.
 struct RecordingScores {
   RecordingScores(const WindowSet& windows, const ModelFile& model, std::size_t methods)
-      : by_distance(windows), trust(windows, model), map(windows, model) {
+      : by_distance(windows), by_group(windows), trust(windows, model), map(windows, model) {
     for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
   }
   std::vector<ZoneMetrics> of_method;
   DistanceScores by_distance;
+  GroupScores by_group;
   TrustScores trust;
   MapScores map;
 };
@@ -63,8 +67,9 @@ RecordingScores score_all(const Arguments& a, const Ensemble& network, const Mod
   draw_all(a, network, windows, tested.split.test, baselines, [&](const Drawn& d) {
     const Zone zone = windows.zone(d.example);
     for (std::size_t m = 0; m < d.pictures.size(); ++m)
-      scores.of_method[m].add(d.pictures[m], d.target, zone);
+      scores.of_method[m].add(d.pictures[m], d.target, zone, windows.contact_level());
     scores.by_distance.add(d.example, d.pictures[0], d.target);
+    scores.by_group.add(d.example, d.pictures[0], d.target);
     scores.trust.add(d);
     scores.map.add(d);
     if (page != nullptr) page->add(d);
@@ -77,15 +82,19 @@ RecordingScores score_all(const Arguments& a, const Ensemble& network, const Mod
 }
 
 /// What was drawn where nothing is, and not drawn where something is.
-std::vector<std::string> silence_lines(const ZoneMetrics& metrics) {
+std::vector<std::string> silence_lines(const ZoneMetrics& metrics, bool measured) {
+  const std::string where_nothing_is = measured ? "at rest" : "flat";
   std::vector<std::string> lines;
   const auto add = [&](const std::string& where, const Metrics& m) {
     if (m.windows > 0)
       lines.push_back(where + ": " + format(100 * m.ghost_rate, 2) + " % of " + std::to_string(m.windows) +
                       " pictures show what is not there, PSNR " + format(m.psnr_mean_db, 1) + " dB");
   };
-  add("flat", metrics.flat());
+  add(where_nothing_is, metrics.flat());
   add("air", metrics.air());
+  if (const Metrics edge = metrics.edge(); edge.windows > 0)
+    lines.push_back("at the array's edge: SSIM " + format(edge.ssim, 3) + ", PSNR " +
+                    format(edge.psnr_mean_db, 2) + " dB, " + std::to_string(edge.windows) + " pictures");
   if (std::isfinite(metrics.contact().miss_rate))
     lines.push_back("in contact " + format(100 * metrics.contact().miss_rate, 2) +
                     " % show nothing of what is there");
@@ -98,6 +107,7 @@ nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const
   const ZoneMetrics& own = scores.of_method.front();
   nlohmann::ordered_json result = own.to_json();
   result["felt"] = scores.by_distance.to_json();
+  result["groups"] = scores.by_group.to_json();
   result["trust"] = scores.trust.to_json();
   if (!scores.map.empty()) result["map"] = scores.map.to_json();
   a.print("split " + tested.split_name + ", seed " + std::to_string(tested.seed) + ", " +
@@ -117,15 +127,22 @@ nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const
     latencies[name] = l.to_json();
     result["baselines"][name] = scores.of_method[k + 1].to_json();
   }
-  for (const std::string& line : silence_lines(own)) a.print(line);
+  for (const std::string& line : silence_lines(own, windows.contact_level().has_value())) a.print(line);
   for (const std::string& line : scores.by_distance.lines()) a.print(line);
+  for (const std::string& line : scores.by_group.lines()) a.print(line);
   for (const std::string& line : scores.trust.lines()) a.print(line);
   for (const std::string& line : scores.map.lines()) a.print(line);
+  if (const auto level = windows.contact_level()) {
+    a.print("contact: a pixel of the measured truth above " + format(*level, 3) +
+            (a.given("contact") ? "" : ", from its noise at rest"));
+    result["contact_level"] = *level;
+  }
   result["latency"] = latencies;
   result["model"] = a.text("model");
   result["data"] = windows.fingerprint();
   result["split"] = tested.split_name;
   result["seed"] = tested.seed;
+  for (const std::string& one : remarks_on_scores(result, scores.by_group)) a.note("warning: " + one);
   return result;
 }
 
@@ -151,6 +168,10 @@ void declare(Arguments& a) {
   a.option("seed", "N", "of the split (default: the model's own)");
   a.option("limit", "N", "score at most N windows, evenly spread; 0 = all", "0");
   a.option("precision", "NAME", "fp32, or int8: the pictures of a microcontroller, slower", "fp32");
+  a.option("contact", "VALUE",
+           "of a measured truth: where a pixel shows more, from 0 to 1, something is in contact (default: "
+           "from its noise "
+           "at rest)");
   a.option("batch", "N", "windows that are drawn at once; their pictures do not depend on it", "64");
   a.decides_nothing();
   a.option("outputs", "FILE",

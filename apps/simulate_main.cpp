@@ -10,6 +10,7 @@
 #include "apps/common/running/signals.h"
 #include "data/plates/plate_file.h"
 #include "data/recordings/felt_taxels.h"
+#include "data/recordings/presses/fit.h"
 #include "data/recordings/presses/presses.h"
 #include "data/recordings/presses/scene.h"
 #include "data/recordings/simulator.h"
@@ -181,6 +182,12 @@ void declare(Arguments& arguments) {
           "instead of passes N presses of the sensor: none to four objects at a time that come, move and go, "
           "with the pressure as truth, in groups by kind (" +
               joined(press_kinds(), ", ") + ")")
+      .option("fit", "RECORDING",
+              "what was recorded of the sensor while somebody pressed here and there for half a minute: what "
+              "that "
+              "tells of noise, rests, skin, response, crosstalk, hysteresis and creep is written into "
+              "--sensor FILE "
+              "first")
       .option("scale", "N", "of --presses: truth N times as fine as the array: 2, 4, 8 or 16", "4")
       .option("array", "ROWSxCOLUMNS", "taxels of the finger, 1 to 64 either way", "4x4")
       .option("pitch", "MM", "from taxel to taxel: one number, or along a row and from row to row, 3,4", "3")
@@ -200,9 +207,28 @@ std::size_t recordings_in(const std::string& folder) {
 
 }  // namespace
 
+// What the touches of --fit tell of the sensor, which its file then says.
+Sensor fitted(const Arguments& arguments, const Sensor& sensor) {
+  const std::string path = arguments.text("sensor"), given = arguments.text("fit");
+  if (!arguments.given("sensor") || path == Sensor{}.name)
+    throw UsageError("--fit: expected --sensor FILE, the file that is to say what was found");
+  const std::string file = std::filesystem::is_directory(given) ? list_recordings(given).back() : given;
+  const Recording touches = read_recording(file);
+  if (touches.array != sensor.array || touches.signal_scale != sensor.scale)
+    throw std::runtime_error(file + ": was not recorded with " + path + ", whose array is " +
+                             sensor.array.text() + "; record it again with supertac-stream --sensor " + path +
+                             " --record DIR");
+  arguments.note("simulating " + std::to_string(BodyFitter::kSimulations) + " bodies");
+  const BodyFit fit = BodyFitter(sensor, arguments.seed())(touches);
+  for (const std::string& line : fit.lines()) arguments.print(line);
+  write_sensor(path, fit.sensor);
+  return fit.sensor;
+}
+
 int run(Arguments& arguments) {
   const auto plates = read_plates(arguments);
-  const Sensor sensor = read_sensor(arguments.text("sensor"));
+  Sensor sensor = read_sensor(arguments.text("sensor"));
+  if (arguments.given("fit")) sensor = fitted(arguments, sensor);
   const auto settings = read_settings(arguments, sensor);
   const std::uint64_t seed = arguments.seed();
   if (arguments.list("speeds").empty()) throw UsageError("--speeds: expected at least one speed");

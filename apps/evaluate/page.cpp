@@ -52,7 +52,9 @@ std::string by_method(const nlohmann::ordered_json& result) {
   std::string rows = method_row("network", result, result["latency"]["network"]);
   for (const auto& [name, scores] : result["baselines"].items())
     rows += method_row(name, scores, result["latency"][name]);
-  return page_section("Scores beside the baselines", "contact windows: some texture lies under the array",
+  return page_section("Scores beside the baselines",
+                      result.contains("contact_level") ? "contact windows: something presses the array"
+                                                       : "contact windows: some texture lies under the array",
                       page_table({"method", "contact SSIM", "PSNR dB", "position mm", "all SSIM", "PSNR dB",
                                   "one picture, us"},
                                  rows)) +
@@ -62,12 +64,23 @@ std::string by_method(const nlohmann::ordered_json& result) {
 
 std::string by_zone(const nlohmann::ordered_json& result) {
   std::string rows;
-  for (const char* zone : {"contact", "flat", "air", "all"}) {
+  const bool measured = result.contains("contact_level");
+  for (const char* zone : {"contact", "edge", "flat", "air", "all"}) {
+    if (!result.contains(zone) || (measured && std::string(zone) == "air")) continue;
     const auto& m = result[zone];
-    rows += std::string("<tr><td>") + zone + "</td>" + cell_of(m["windows"], 0) + cell_of(m["ssim"], 3) +
-            cell_of(m["psnr_mean_db"], 2) + cell_of(m.value("ghost_rate", nlohmann::ordered_json()), 2, 100) +
+    rows += std::string("<tr><td>") + (measured && std::string(zone) == "flat" ? "rest" : zone) + "</td>" +
+            cell_of(m["windows"], 0) + cell_of(m["ssim"], 3) + cell_of(m["psnr_mean_db"], 2) +
+            cell_of(m.value("ghost_rate", nlohmann::ordered_json()), 2, 100) +
             cell_of(m.value("miss_rate", nlohmann::ordered_json()), 2, 100) + "</tr>";
   }
+  if (measured)
+    return page_section(
+        "Contact, edge, rest",
+        "contact: a pixel of the measured truth shows more than " +
+            format(result["contact_level"].get<double>(), 3) +
+            "; edge: it reaches the array's border; ghosts: pictures that show something at rest; "
+            "misses: pictures that show nothing of a contact",
+        page_table({"zone", "windows", "SSIM", "PSNR dB", "ghosts %", "misses %"}, rows));
   return page_section(
       "Contact, flat plate, air",
       "ghosts: pictures that show a texture where the plate is flat; misses: pictures that "
@@ -112,9 +125,6 @@ const char* word_of(Zone zone) {
 }  // namespace
 
 void EvaluationPage::add(const Drawn& d) {
-  const std::string& plate = windows_.passes()[windows_.pass_of(d.example)].plate;
-  plates_.try_emplace(plate, windows_.image())
-      .first->second.add(d.pictures[0], d.target, windows_.zone(d.example));
   const ImageGrid grid = windows_.image();
   if (!windows_.contact(d.example)) return;
   const auto texture = std::count_if(d.target.begin(), d.target.end(), [](float v) { return v > kTexture; });
@@ -159,16 +169,19 @@ std::string EvaluationPage::name_of(std::uint32_t window) const {
          (pass.speed_mm_s > 0 ? ", " + format(pass.speed_mm_s) + " mm/s" : "");
 }
 
-std::string EvaluationPage::by_plate() const {
+std::string EvaluationPage::by_group(const nlohmann::ordered_json& groups) const {
+  const bool grouped =
+      std::ranges::any_of(windows_.passes(), [](const auto& pass) { return !pass.group.empty(); });
   std::string rows;
-  for (const auto& [plate, metrics] : plates_) {
-    const nlohmann::ordered_json m = metrics.to_json();
-    rows += "<tr><td>" + escaped(plate) + "</td>" + cell_of(m["contact"]["windows"], 0) +
-            cell_of(m["contact"]["ssim"], 3) + cell_of(m["contact"]["psnr_mean_db"], 2) +
-            cell_of(m["contact"]["position_error_mm"], 2) + cell_of(m["all"]["ssim"], 3) + "</tr>";
-  }
-  return page_section("By plate", "",
-                      page_table({"plate", "contact", "SSIM", "PSNR dB", "position mm", "all SSIM"}, rows));
+  for (const auto& m : groups)
+    rows += "<tr><td>" + escaped(m["name"].get<std::string>()) + "</td>" +
+            cell_of(m["contact"]["windows"], 0) + cell_of(m["contact"]["ssim"], 3) +
+            cell_of(m["contact"]["psnr_mean_db"], 2) + cell_of(m["contact"]["position_error_mm"], 2) +
+            cell_of(m["all"]["ssim"], 3) + "</tr>";
+  return page_section(
+      grouped ? "By group" : "By plate", "the worst first",
+      page_table({grouped ? "group" : "plate", "contact", "SSIM", "PSNR dB", "position mm", "all SSIM"},
+                 rows));
 }
 
 std::string EvaluationPage::shown(const std::string& title, const std::string& note,
@@ -245,7 +258,7 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
                         std::to_string(result["all"]["windows"].get<long>()) + " windows, " +
                         std::to_string(result["contact"]["windows"].get<long>()) + " in contact</p>";
   content +=
-      by_method(result) + "<div class=\"two\">" + by_plate() + by_zone(result) + "</div>" +
+      by_method(result) + "<div class=\"two\">" + by_group(result["groups"]) + by_zone(result) + "</div>" +
       by_distance(result["felt"]) +
       shown("The worst windows", "in contact, by SSIM; no two within 3 mm of one pass", worst, pictures) +
       shown("The best windows", "of those with texture on a quarter of the picture", best, pictures);

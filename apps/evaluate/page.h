@@ -15,9 +15,9 @@
 
 namespace supertac {
 
-/// Scores beside those of the baselines, by plate, zone and distance since the first contact; the twelve
-/// worst windows in contact, and the twelve best of those with texture on a quarter of the picture, no two of
-/// them within 3 mm of one pass; a film of each pass; and what made it all.
+/// Scores beside those of the baselines, by group or plate (the worst first), zone and distance since the
+/// first contact; the twelve worst windows in contact, and the twelve best of those with texture on a quarter
+/// of the picture, no two of them within 3 mm of one pass; a film of each pass; and what made it all.
 class EvaluationPage {
  public:
   explicit EvaluationPage(const WindowSet& windows) : windows_(windows) {}
@@ -39,7 +39,7 @@ class EvaluationPage {
   };
   std::vector<ScoredWindow> extremes(bool best) const;
   std::vector<std::uint32_t> film_frames(std::span<const std::uint32_t> test) const;
-  std::string by_plate() const;
+  std::string by_group(const nlohmann::ordered_json& groups) const;
   std::string shown(const std::string& title, const std::string& note,
                     const std::vector<ScoredWindow>& chosen,
                     const std::map<std::uint32_t, ShownWindow>& pictures) const;
@@ -49,7 +49,6 @@ class EvaluationPage {
 
   const WindowSet& windows_;
   std::vector<ScoredWindow> contact_;
-  std::map<std::string, ZoneMetrics> plates_;
 };
 
 }  // namespace supertac

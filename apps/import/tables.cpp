@@ -12,6 +12,7 @@
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "data/plates/plate_file.h"
+#include "data/recordings/imports/film_truth.h"
 #include "data/recordings/imports/table_import.h"
 #include "data/registration/apply_registration.h"
 #include "data/registration/registration.h"
@@ -156,7 +157,7 @@ struct TableImport {
       add_positions(recording, log, read_table(log), map.time_unit_s);
     if (over) check_places(path, recording);
     if (const std::string images = companion(arguments, "truth", file); !images.empty())
-      add_truth(recording, images, read_table(images), truth_range[0], truth_range[1]);
+      read_truth(recording, images);
     const bool registers = plate || (over && !over->crests().empty());
     if (registers && recording.position_mm.empty() && recording.truth.empty()) {
       recording.speed_mm_s = speed_mm_s;
@@ -164,6 +165,28 @@ struct TableImport {
       apply(*fit, recording);
     }
     return recording;
+  }
+
+  /// Images for each frame, or a film with a clock of its own.
+  void read_truth(Recording& recording, const std::string& path) const {
+    constexpr double kSure = 4, kLeastS = 0.02;
+    Table film = read_table(path);
+    if (film.shape.size() == 1) {
+      const std::vector<double> times = take_film_times(path, film, recording.array);
+      const FilmClock clock = add_film(recording, path, film, times, truth_range[0], truth_range[1]);
+      arguments.note(path + ": " + clock.text());
+      return;
+    }
+    add_truth(recording, path, film, truth_range[0], truth_range[1]);
+    const auto clock = clock_of_truth(recording);
+    if (!clock || recording.time_s.empty()) return;
+    const double middle = (recording.time_s.front() + recording.time_s.back()) / 2;
+    const double lag = middle - clock->sensor_s(middle);
+    if (std::abs(lag) > std::max(kLeastS, kSure * clock->offset_deviation_s))
+      arguments.note(
+          "warning: " + path + " shows touches " + format(std::abs(lag), 3) + " +- " +
+          format(clock->offset_deviation_s, 3) + " s " + (lag > 0 ? "later" : "earlier") +
+          " than the signals; give the film as a table with a time column of its own, which moves it");
   }
 
   const Arguments& arguments;
@@ -213,8 +236,10 @@ void declare_tables(Arguments& arguments) {
               "are found from the signals, for slides towards larger y",
               "unknown")
       .option("positions", "FILE", "table of time, x and y (mm) by the same clock; or a folder of them")
-      .option("truth", "FILE",
-              "array [frames,height,width] of what a finer sensor saw (.npy); or a folder of them")
+      .option(
+          "truth", "FILE",
+          "what a finer sensor saw: an array [frames,height,width] (.npy), or a table of a time (s) and the "
+          "pixels of an image in a row, whose clock is found from the signals; or a folder of them")
       .option("truth-range", "LOW,HIGH", "what is 0 and what is 1 in --truth", "0,1")
       .option("group", "GROUP", "person, object or day, for split group; default: the folder's name")
       .only_with("");

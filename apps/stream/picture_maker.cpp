@@ -43,7 +43,7 @@ PictureMaker::PictureMaker(std::span<const ModelFile> models, const SensorSource
       source_scale_(source.signal_scale()),
       period_s_(source.period_s()),
       interval_factor_(model_.interval_factor()) {
-  features_.resize(signal_feature_count(model_.array()));
+  features_.resize(signal_feature_count(model_.array(), input_.values().size() / model_.array().signals()));
   for (const float value : output_.picture.values()) {
     if (!std::isfinite(value))
       throw std::runtime_error(

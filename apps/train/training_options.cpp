@@ -41,8 +41,10 @@ void declare_window_training(Arguments& a) {
       "also train on N simulated passes, each over a random plate (beside recordings of a real finger with a "
       "finger of its own), for plates that the network has not seen",
       "0");
-  a.option("leave-out", "A,B,...",
-           "with --split texture: the plates that are tested (default: one drawn with the seed)");
+  a.option(
+      "leave-out", "A,B,...",
+      "with --split texture the plates, with --split group the groups that are tested (default: drawn with "
+      "the seed)");
   a.more();
   a.option(
       "rate", "HZ",

@@ -48,8 +48,8 @@ Zone zone_of(const Plate& plate, double x_mm, double y_mm, const ImageGrid& grid
   return in_contact(image) ? Zone::contact : Zone::near;
 }
 
-bool in_contact(std::span<const float> truth) {
-  return std::any_of(truth.begin(), truth.end(), [](float v) { return v != 0; });
+bool in_contact(std::span<const float> truth, float level) {
+  return std::any_of(truth.begin(), truth.end(), [&](float v) { return level > 0 ? v > level : v != 0; });
 }
 
 }  // namespace supertac

@@ -33,7 +33,8 @@ enum class Zone : std::uint8_t {
 /// Of a finger on the plate at (x, y): contact, near or flat.
 Zone zone_of(const Plate& plate, double x_mm, double y_mm, const ImageGrid& grid);
 
-/// A frame is in contact when some texture lies under the array: its truth is not 0 everywhere.
-bool in_contact(std::span<const float> truth);
+/// A frame is in contact when some texture lies under the array: its truth is not 0 everywhere; of a truth
+/// that was measured, when a pixel shows more than `level`.
+bool in_contact(std::span<const float> truth, float level = 0);
 
 }  // namespace supertac

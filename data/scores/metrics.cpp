@@ -147,14 +147,14 @@ ImageScores ZoneMetrics::scores_of(std::span<const float> output, std::span<cons
 }
 
 void MetricsAccumulator::add(std::span<const float> output, std::span<const float> truth,
-                             const ImageScores& scores) {
+                             const ImageScores& scores, float silent) {
   ++windows_;
   mse_ += scores.mse;
   psnr_ += psnr_db(scores.mse);
   ssim_ += scores.ssim;
   const float there = extent(truth), drawn = extent(output);
-  silent_ += there == 0 ? 1 : 0;
-  ghosts_ += there == 0 && drawn > Metrics::kGhost ? 1 : 0;
+  silent_ += there <= silent ? 1 : 0;
+  ghosts_ += there <= silent && drawn > Metrics::kGhost ? 1 : 0;
   felt_ += there > Metrics::kFelt ? 1 : 0;
   misses_ += there > Metrics::kFelt && drawn < Metrics::kGhost ? 1 : 0;
   if (!scores.has_position) return;
@@ -229,14 +229,28 @@ ZoneMetrics::ZoneMetrics(const ImageGrid& grid)
       all_(grid),
       contact_(grid),
       flat_(grid),
-      air_(grid) {}
+      air_(grid),
+      edge_(grid) {}
 
-void ZoneMetrics::add(std::span<const float> output, std::span<const float> truth, Zone zone) {
+bool ZoneMetrics::on_edge(std::span<const float> truth, float level) const {
+  const auto height = static_cast<std::size_t>(grid_.height), width = static_cast<std::size_t>(grid_.width);
+  for (std::size_t p = 0; p < truth.size(); ++p)
+    if ((p < width || p >= (height - 1) * width || p % width == 0 || p % width == width - 1) &&
+        truth[p] > level)
+      return true;
+  return false;
+}
+
+void ZoneMetrics::add(std::span<const float> output, std::span<const float> truth, Zone zone,
+                      std::optional<float> contact_level) {
   const ImageScores scores = scores_of(output, truth);
-  all_.add(output, truth, scores);
-  if (zone == Zone::contact) contact_.add(output, truth, scores);
-  if (zone == Zone::flat) flat_.add(output, truth, scores);
-  if (zone == Zone::air) air_.add(output, truth, scores);
+  const float silent = contact_level.value_or(0);
+  all_.add(output, truth, scores, silent);
+  if (zone == Zone::contact) contact_.add(output, truth, scores, silent);
+  if (zone == Zone::flat) flat_.add(output, truth, scores, silent);
+  if (zone == Zone::air) air_.add(output, truth, scores, silent);
+  if (zone == Zone::contact && contact_level && on_edge(truth, silent))
+    edge_.add(output, truth, scores, silent);
 }
 
 nlohmann::ordered_json ZoneMetrics::to_json() const {
@@ -245,6 +259,7 @@ nlohmann::ordered_json ZoneMetrics::to_json() const {
   json["contact"] = supertac::to_json(contact());
   json["flat"] = supertac::to_json(flat());
   json["air"] = supertac::to_json(air());
+  if (edge().windows > 0) json["edge"] = supertac::to_json(edge());
   return json;
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <limits>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -80,7 +81,9 @@ class MetricsAccumulator {
   static constexpr std::size_t kFloorPairs = 256;
 
   explicit MetricsAccumulator(const ImageGrid& grid) : grid_(grid) {}
-  void add(std::span<const float> output, std::span<const float> truth, const ImageScores& scores);
+  /// A truth that stays within `silent` of 0 shows nothing.
+  void add(std::span<const float> output, std::span<const float> truth, const ImageScores& scores,
+           float silent = 0);
   Metrics result() const;
 
  private:
@@ -100,13 +103,17 @@ class ZoneMetrics {
  public:
   /// Throws std::invalid_argument when a side is odd or below 4.
   explicit ZoneMetrics(const ImageGrid& grid);
-  /// Throws std::invalid_argument when a size is wrong or a value of the output is not finite.
-  void add(std::span<const float> output, std::span<const float> truth, Zone zone);
+  /// `contact_level`: of a measured truth (WindowSet::contact_level()); what is in contact and goes beyond it
+  /// in the outermost pixels counts as edge() as well, and what stays within it shows nothing. Throws
+  /// std::invalid_argument when a size is wrong or a value of the output is not finite.
+  void add(std::span<const float> output, std::span<const float> truth, Zone zone,
+           std::optional<float> contact_level = {});
   Metrics all() const { return all_.result(); }
   Metrics contact() const { return contact_.result(); }
   Metrics flat() const { return flat_.result(); }
   Metrics air() const { return air_.result(); }
-  /// {"all": {...}, "contact": {...}, "flat": {...}, "air": {...}}
+  Metrics edge() const { return edge_.result(); }
+  /// {"all": {...}, "contact": {...}, "flat": {...}, "air": {...}}, of measured truths "edge" besides
   nlohmann::ordered_json to_json() const;
 
  private:
@@ -114,7 +121,8 @@ class ZoneMetrics {
 
   ImageGrid grid_;
   PhaseCorrelator correlator_;
-  MetricsAccumulator all_, contact_, flat_, air_;
+  bool on_edge(std::span<const float> truth, float level) const;
+  MetricsAccumulator all_, contact_, flat_, air_, edge_;
 };
 
 }  // namespace supertac

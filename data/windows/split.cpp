@@ -4,18 +4,20 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
 #include "data/plates/random_plate.h"
 #include "data/windows/batching.h"
 #include "io/numbers/hash.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
 
 constexpr double kTestShare = 0.2;
-constexpr std::uint64_t kWindowStream = 0, kPlateStream = 1, kPassStream = 2;
+constexpr std::uint64_t kWindowStream = 0, kPlateStream = 1, kPassStream = 2, kHeldOutStream = 1;
 
 constexpr std::array<std::pair<const char*, SplitKind>, 6> kNames{{{"window", SplitKind::window},
                                                                    {"pass", SplitKind::pass},
@@ -66,7 +68,8 @@ std::vector<Side> split_trials(const WindowSet& windows) {
   return sides;
 }
 
-std::vector<Side> split_groups(const WindowSet& windows, std::uint64_t seed) {
+std::vector<Side> split_groups(const WindowSet& windows, std::uint64_t seed,
+                               const std::vector<std::string>& leave_out) {
   const auto groups = passes_by(&WindowSet::Pass::group, windows);
   if (groups.size() < 2 || groups.contains(""))
     throw std::invalid_argument(
@@ -75,6 +78,13 @@ std::vector<Side> split_groups(const WindowSet& windows, std::uint64_t seed) {
         std::string(groups.contains("") ? "some have none: use split pass"
                                         : "there is one: use split window"));
   std::vector<Side> sides(windows.passes().size(), Side::train);
+  for (const std::string& name : leave_out) {
+    if (!groups.contains(name))
+      throw std::invalid_argument("split group: the data has no group '" + name + "' to leave out; it has " +
+                                  joined(groups, ", ", [](const auto& group) { return group.first; }));
+    for (const std::size_t p : groups.at(name)) sides[p] = Side::test;
+  }
+  if (!leave_out.empty()) return sides;
   const EpochOrder order(groups.size(), seed, kWindowStream);
   for (std::size_t i = 0; i < test_count(groups.size()); ++i)
     for (const std::size_t p : std::next(groups.begin(), static_cast<std::ptrdiff_t>(order[i]))->second)
@@ -173,7 +183,7 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
       split = split_by_pass(windows, split_plates(windows, seed, leave_out));
       break;
     case SplitKind::group:
-      split = split_by_pass(windows, split_groups(windows, seed));
+      split = split_by_pass(windows, split_groups(windows, seed, leave_out));
       break;
     case SplitKind::none:
       for (std::uint32_t i = 0; i < windows.size(); ++i) {
@@ -190,6 +200,21 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
                                         "plates, score with split none"
                                       : ""));
   return split;
+}
+
+std::vector<std::uint32_t> hold_out_group(const WindowSet& windows, Split& split, std::uint64_t seed) {
+  std::set<std::string> trained;
+  const auto group_of = [&](std::uint32_t i) -> const std::string& {
+    return windows.passes()[windows.pass_of(i)].group;
+  };
+  for (const std::uint32_t i : split.train) trained.insert(group_of(i));
+  if (trained.size() < 3) return {};
+  const std::string name = *std::next(
+      trained.begin(), static_cast<std::ptrdiff_t>(EpochOrder(trained.size(), seed, kHeldOutStream)[0]));
+  std::vector<std::uint32_t> train, held_out;
+  for (const std::uint32_t i : split.train) (group_of(i) == name ? held_out : train).push_back(i);
+  split.train = std::move(train);
+  return held_out;
 }
 
 std::vector<std::uint32_t> subsample_no_contact(const WindowSet& windows, std::vector<std::uint32_t> list) {

@@ -36,9 +36,14 @@ struct Split {
 /// and 2 + p for the passes of plate p; the first of the order are tested. Plates and groups are counted in
 /// alphabetical order, passes as in WindowSet::passes(); those without windows do not count. A pure function
 /// of the set, kind and seed; trial and none do not use the seed. Throws std::invalid_argument when a side
-/// would be empty, saying what the data lacks. `leave_out`: of split texture, the plates that are tested.
+/// would be empty, saying what the data lacks. `leave_out`: of split texture the plates that are tested,
+/// of split group the groups.
 Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
                  const std::vector<std::string>& leave_out = {});
+
+/// Takes the windows of a group, drawn with the seed, out of split.train and gives them back. None, where
+/// fewer than two groups would be left to train on.
+std::vector<std::uint32_t> hold_out_group(const WindowSet& windows, Split& split, std::uint64_t seed);
 
 /// Of these windows, ascending, drops 75 % of those without contact of passes that are not augmentable
 /// (simulated ones over random plates): two of three windows of a whole pass show a flat plate or the air,

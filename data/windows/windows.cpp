@@ -10,8 +10,10 @@
 #include "data/plates/height_map.h"
 #include "data/plates/plate_file.h"
 #include "data/plates/truth.h"
+#include "data/windows/contact_level.h"
 #include "data/windows/transforms/normalise_window.h"
 #include "io/numbers/hash.h"
+#include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
@@ -233,6 +235,7 @@ void WindowSet::store(const Recording& recording, const Track& track, Stored& st
     truths.insert(truths.end(), truth.begin(), truth.end());
   }
   stored.truths = file_->append(truths);
+  contact_levels_.push_back(supertac::contact_level(recording.truth, pixels));
 }
 
 WindowSet::Place WindowSet::place_of(std::size_t i) const {
@@ -320,10 +323,15 @@ Zone WindowSet::zone(std::size_t i) const {
   if (truth_is_measured(place.pass)) {
     std::vector<float> pixels(image().pixels());
     truth(i, pixels);
-    return in_contact(pixels) ? Zone::contact : Zone::flat;
+    return in_contact(pixels, *contact_level()) ? Zone::contact : Zone::flat;
   }
   const auto [x, y, lift] = finger(place);
   return lift > kLiftedMm ? Zone::air : zone_of(plate(place.pass), x, y, image());
+}
+
+std::optional<float> WindowSet::contact_level() const {
+  if (contact_levels_.empty()) return std::nullopt;
+  return settings_.contact_level ? settings_.contact_level : median(std::vector(contact_levels_));
 }
 
 std::optional<double> WindowSet::filter_s() const {

@@ -26,6 +26,7 @@ struct WindowSettings {
   std::optional<TaxelArray> array = {};  ///< that every recording must have; nothing: that of the first
   std::optional<SignalScale> signal_scale = {};  ///< likewise, its unit and polarity
   std::optional<Body> body = {};                 ///< of what is simulated beside them: that of the first
+  std::optional<float> contact_level = {};       ///< of measured truths; nothing: as contact_level() finds it
   int stride = 1;                                ///< every stride-th frame of a pass ends a window
   double max_gap_s = 0.05;                       ///< longer silence in a recording is a gap no window crosses
 };
@@ -132,11 +133,15 @@ class WindowSet {
   Position position(std::size_t i) const;
   /// "x 18.0, y 43.5 mm", or where that is unknown "frame 17".
   std::string place_text(std::size_t i) const;
-  /// What is scored together. By its measured truth alone a window is in contact or flat.
+  /// What is scored together. By its measured truth alone a window is in contact, beyond contact_level(), or
+  /// flat.
   Zone zone(std::size_t i) const;
   bool augmentable(std::size_t i) const { return passes_[pass_of(i)].use.augmentable; }
   bool in_distribution(std::size_t i) const { return passes_[pass_of(i)].use.in_distribution; }
   bool contact(std::size_t i) const { return zone(i) == Zone::contact; }
+  /// Of measured truths: as the settings say, or the median of the recordings'; nothing where none was
+  /// measured.
+  std::optional<float> contact_level() const;
   std::size_t pass_of(std::size_t i) const { return place_of(i).pass; }
   /// A hint that window i is read soon: the system may fetch it from the file.
   virtual void will_read(std::size_t i) const;
@@ -186,6 +191,7 @@ class WindowSet {
   std::vector<Pass> passes_;
   std::vector<Stored> stored_;  // per pass
   std::vector<Row> rows_;
+  std::vector<float> contact_levels_;  // of the recordings with a measured truth
   std::shared_ptr<ScratchFile> file_;  // of copies too: all append to it
 };
 

@@ -171,7 +171,9 @@ ModelFile model_of(const SafetensorsFile& file) {
     throw std::runtime_error(path +
                              ": input: a single frame has no rest and gain of its own, found levelled");
   loaded.model = build(settings, file, path);
-  loaded.novelty = Novelty::read(file, path, signal_feature_count(loaded.array()));
+  loaded.novelty = Novelty::read(
+      file, path,
+      signal_feature_count(loaded.array(), static_cast<std::size_t>(loaded.model->settings().timesteps)));
   loaded.ranges = ActivationRanges::read(file, path);
   return loaded;
 }

@@ -68,7 +68,7 @@ ZoneMetrics score(const Ensemble& network, const WindowSet& windows, std::span<c
   ZoneMetrics metrics(windows.image());
   for_each_output(network, windows, indices, [&](const EvaluatedBatch& b) {
     for (std::size_t n = 0; n < b.size(); ++n)
-      metrics.add(b.output(n), b.target(n), windows.zone(indices[b.first + n]));
+      metrics.add(b.output(n), b.target(n), windows.zone(indices[b.first + n]), windows.contact_level());
     return !stop || !stop();
   });
   return metrics;

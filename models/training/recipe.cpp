@@ -32,6 +32,7 @@ void read_training(JsonObject entry, Recipe& r) {
                .noise = entry.number("noise"),
                .dropped = entry.integer("dropped")};
   r.mirror = entry.flag("mirror", false);
+  r.keeps_best = entry.flag("keeps_best", false);
   r.sampling = entry.flag("sampling", true);
 }
 
@@ -53,8 +54,9 @@ void Recipe::check() const {
         "recipe: single frames (--timesteps 1) say nothing of their own rest and gain; give --scaling fixed, "
         "or "
         "--preset frame");
-  if (!leave_out.empty() && split != SplitKind::texture)
-    throw std::invalid_argument("--leave-out needs --split texture, found --split " + name_of(split));
+  if (!leave_out.empty() && split != SplitKind::texture && split != SplitKind::group)
+    throw std::invalid_argument("--leave-out needs --split texture or group, found --split " +
+                                name_of(split));
 }
 
 Recipe Recipe::named(const std::string& name) {
@@ -64,6 +66,7 @@ Recipe Recipe::named(const std::string& name) {
   if (name == "frame") {
     r.rate_hz = 100;  // of no meaning
     r.per_window = false;
+    r.keeps_best = true;
     r.learning_rate = 2e-3;
     return r;
   }
@@ -94,6 +97,7 @@ std::string training_text(const Recipe& r) {
                {"noise", r.augment.noise},
                {"dropped", r.augment.dropped}});
   if (r.mirror) json["mirror"] = true;
+  if (r.keeps_best) json["keeps_best"] = true;
   if (!r.sampling) json["sampling"] = false;
   return json.dump();
 }

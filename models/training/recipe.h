@@ -31,12 +31,16 @@ struct Recipe : TrainingPace {
 
   std::vector<std::string> plates;     ///< only recordings of these; none: of all
   SplitKind split = SplitKind::trial;  ///< what is kept for testing
-  std::vector<std::string> leave_out;  ///< of split texture: the plates that are tested
-  double rate_hz = 300;                ///< of the model's samples, 20 to 2000
-  std::int64_t stride = 1;             ///< every stride-th frame of a pass ends a window
-  std::optional<Scaling> range;        ///< rest and span; empty: SignalRange::fitted()
-  bool per_window = true;              ///< whether a window is brought to its own rest and gain
-  std::int64_t random_plates = 0;      ///< simulated passes besides, each over a plate of its own
+  std::vector<std::string>
+      leave_out;  ///< of split texture the plates that are tested, of split group the groups
+  /// With split group, and three groups or more to train on: one of them is held out, and the network of the
+  /// epoch that draws it best is kept. Training ends when five epochs have brought no better one.
+  bool keeps_best = false;
+  double rate_hz = 300;            ///< of the model's samples, 20 to 2000
+  std::int64_t stride = 1;         ///< every stride-th frame of a pass ends a window
+  std::optional<Scaling> range;    ///< rest and span; empty: SignalRange::fitted()
+  bool per_window = true;          ///< whether a window is brought to its own rest and gain
+  std::int64_t random_plates = 0;  ///< simulated passes besides, each over a plate of its own
   /// Half the width of a pixel's 90 % interval in units of its predicted error, for the model's file; empty:
   /// of split group found on the tested groups, else kIntervalFactor.
   std::optional<double> interval_factor;

@@ -85,6 +85,8 @@ TrainingTask window_task(const Recipe& given, const RecordingFolders& folders) {
   TrainingTask task{.windows = windows,
                     .split = make_split(*windows, recipe.split, recipe.seed, recipe.leave_out),
                     .objective = Objective(*windows, recipe)};
+  if (recipe.split == SplitKind::group && recipe.keeps_best)
+    task.held_out = hold_out_group(*windows, task.split, recipe.seed);
   task.split.train = subsample_no_contact(*windows, std::move(task.split.train));
   task.origin = metadata_of(recipe);
   task.origin.erase("training");  // the objective says it

@@ -22,6 +22,9 @@ struct RecordingFolders {
 struct TrainingTask {
   std::shared_ptr<const WindowSet> windows;
   Split split;
+  /// Neither trained on nor tested: what the best epoch is chosen by (Recipe::keeps_best). Empty: the last is
+  /// kept.
+  std::vector<std::uint32_t> held_out = {};
   Objective objective;
   /// What the model file says of its origin; the same whatever machine, folder or number of threads.
   std::map<std::string, std::string> origin = {};

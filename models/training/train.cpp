@@ -27,17 +27,24 @@ void test(const Trainer& trainer, const TrainingTask& task, const std::function<
   line.test_psnr_db = contact.psnr_mean_db;
 }
 
+// What the networks of a training are chosen by.
+double score_of(const Trainer& trainer, const TrainingTask& task, const std::function<bool()>& stop) {
+  return score(Ensemble({Prepared(trainer.model())}), *task.windows,
+               evenly_spaced(task.held_out, kTestedPerEpoch), stop)
+      .contact()
+      .ssim;
+}
+
 // Of an even sample of the training examples, as they are: augmentation hides what is to be noticed.
 std::vector<StoredTensor> novelty_of(const Trainer& trainer) {
-  constexpr std::size_t kMostSamples = 20'000;
-  if (trainer.objective().latents() == 0) return {};  // a frame alone says nothing of its sensor
+  constexpr std::size_t kMostSamples = 20'000, kMostOfAFrame = 1024;  // a matrix of their squares is kept
   const WindowSet& data = trainer.windows();
   std::vector<std::uint32_t> in_distribution;
   std::ranges::copy_if(trainer.training_side(), std::back_inserter(in_distribution),
                        [&](std::uint32_t i) { return data.in_distribution(i); });
   const std::vector<std::uint32_t> chosen = evenly_spaced(in_distribution, kMostSamples);
-  const std::size_t count = signal_feature_count(data.array());
-  if (chosen.size() <= count) return {};
+  const std::size_t count = signal_feature_count(data.array(), data.frames());
+  if (chosen.size() <= count || (data.frames() == 1 && count > kMostOfAFrame)) return {};
   Tensor features(Shape{static_cast<Dim>(chosen.size()), static_cast<Dim>(count)});
   std::vector<float> window(data.input_size());
   for (std::size_t i = 0; i < chosen.size(); ++i) {
@@ -96,10 +103,12 @@ bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& 
       callbacks.log(std::exchange(sums, {}));
       steps = 0;
     }
+    if (epoch_ends && !task.held_out.empty()) trainer.epoch_scored(score_of(trainer, task, callbacks.stop));
     if (report.step % callbacks.checkpoint_every == 0) save();
     stop = report.stop || (callbacks.stop && trainer.ranks() == 1 && callbacks.stop());
   }
   save();
+  if (trainer.done()) trainer.use_best();
   return trainer.done();
 }
 

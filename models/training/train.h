@@ -34,8 +34,9 @@ struct TrainingCallbacks {
   double seconds_before = 0;  ///< on the log's clock when this process began
 };
 
-/// Trains until the last step, or to the end of the step in which `stop` returns true; returns whether all
-/// steps are done. Throws as Trainer::train_step and Trainer::save.
+/// Trains until the last step, until TrainingState::done() where a group is held out, or to the end of the
+/// step in which `stop` returns true; returns whether all steps are done. Throws as Trainer::train_step and
+/// Trainer::save.
 bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& callbacks = {});
 
 /// What the model file says of its origin after training: task.origin, and where the recipe leaves it open
@@ -44,7 +45,7 @@ bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& 
 std::map<std::string, std::string> trained_origin(const Trainer& trainer, const TrainingTask& task);
 
 /// The model alone, ready for use: with `origin` in its metadata, the ranges of its values for int8 and,
-/// unless it takes single frames or has too few windows, its Novelty. Throws FileError.
+/// unless it has too few windows, its Novelty. Throws FileError.
 void save_trained(const Trainer& trainer, const std::string& path,
                   const std::map<std::string, std::string>& origin);
 

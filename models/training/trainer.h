@@ -68,6 +68,10 @@ class Trainer {
   std::int64_t step() const { return state_.step(); }
   std::int64_t total_steps() const { return state_.total_steps(); }
   std::int64_t steps_per_epoch() const { return static_cast<std::int64_t>(batching_.batches_per_epoch()); }
+  /// As TrainingState.
+  void epoch_scored(double score) { state_.epoch_scored(score, step() / steps_per_epoch()); }
+  void use_best() { state_.use_best(); }
+  const TrainingState& state() const { return state_; }
   const Objective& objective() const { return objective_; }
   const SuperTac& model() const { return objective_.network(); }
   const WindowSet& windows() const { return windows_; }

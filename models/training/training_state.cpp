@@ -105,6 +105,21 @@ void TrainingState::stop(const std::string& what) const {
                         ") or check the input with supertac-info");
 }
 
+void TrainingState::epoch_scored(double score, std::int64_t epoch) {
+  ++epochs_since_best_;
+  if (!best_.empty() && !(score > best_score_)) return;
+  best_.clear();
+  for (const Parameter& p : parameters_) best_.push_back(p.value.value().clone());
+  best_score_ = score, best_epoch_ = epoch, epochs_since_best_ = 0;
+}
+
+void TrainingState::use_best() {
+  for (std::size_t i = 0; i < best_.size(); ++i) {
+    Variable parameter = parameters_[i].value;
+    copy_into(parameter.mutable_value(), best_[i]);
+  }
+}
+
 void TrainingState::for_each_tensor(
     const std::function<void(const std::string&, const Tensor&)>& visit) const {
   for (const Parameter& p : parameters_) visit(p.name, p.value.value());
@@ -120,6 +135,13 @@ void TrainingState::save(const std::string& path, std::map<std::string, std::str
     const Parameter& p = parameters_[i];
     state.push_back(to_stored(p, adam_.first_moments()[i], "optimizer.m." + p.name));
     state.push_back(to_stored(p, adam_.second_moments()[i], "optimizer.v." + p.name));
+  }
+  for (std::size_t i = 0; i < best_.size(); ++i)
+    state.push_back(to_stored(parameters_[i], best_[i], "optimizer.best." + parameters_[i].name));
+  if (!best_.empty()) {
+    metadata["best_score"] = format(best_score_);
+    metadata["best_epoch"] = std::to_string(best_epoch_);
+    metadata["epochs_since_best"] = std::to_string(epochs_since_best_);
   }
   metadata["step"] = std::to_string(step_);
   metadata["flat_steps"] = std::to_string(flat_steps_);
@@ -143,7 +165,16 @@ void TrainingState::restore(const std::string& path, const std::map<std::string,
     m.push_back(load_like(file, path, "optimizer.m." + p.name, p));
     v.push_back(load_like(file, path, "optimizer.v." + p.name, p));
   }
+  std::vector<Tensor> best;
+  std::int64_t best_epoch = 0, since_best = 0;
+  if (file.metadata().contains("best_epoch")) {
+    best_epoch = integer("best_epoch"), since_best = integer("epochs_since_best");
+    for (const Parameter& p : parameters_)
+      best.push_back(load_like(file, path, "optimizer.best." + p.name, p));
+  }
   load_parameters(file, path, parameters_, {"optimizer."});
+  best_ = std::move(best), best_epoch_ = best_epoch, epochs_since_best_ = since_best;
+  best_score_ = parse_double(value_or(file.metadata(), "best_score")).value_or(0);
   for (std::size_t i = 0; i < parameters_.size(); ++i) {
     copy_into(adam_.first_moments()[i], m[i]);
     copy_into(adam_.second_moments()[i], v[i]);

@@ -43,7 +43,17 @@ class TrainingState {
 
   std::int64_t step() const { return step_; }  ///< done so far
   std::int64_t total_steps() const { return schedule_.total; }
-  bool done() const { return step_ >= schedule_.total; }
+  bool done() const { return step_ >= schedule_.total || epochs_since_best_ >= kPatience; }
+
+  /// A network is over-trained when what it was not trained on gets worse: of the scored epochs the best
+  /// network is kept, and after kPatience others the training is done.
+  static constexpr std::int64_t kPatience = 5;
+  void epoch_scored(double score, std::int64_t epoch);
+  /// Sets the parameters to those of the best epoch, where any was scored.
+  void use_best();
+  std::int64_t best_epoch() const { return best_epoch_; }  ///< from 1; 0: none was scored
+  double best_score() const { return best_score_; }
+
   double learning_rate() const { return schedule_.at(step_); }
 
   /// Counts the steps in a row that look collapsed, from the end of the warm-up on. True from the 100th on.
@@ -75,6 +85,9 @@ class TrainingState {
   Schedule schedule_;
   std::int64_t step_ = 0;
   int flat_steps_ = 0;
+  std::vector<Tensor> best_;  // the parameters of the best epoch
+  double best_score_ = 0;
+  std::int64_t best_epoch_ = 0, epochs_since_best_ = 0;
   std::vector<real> sum_, of_partner_;  // all gradients in one piece, of several processes
 };
 

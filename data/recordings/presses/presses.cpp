@@ -72,8 +72,9 @@ Field field_of(const TaxelArray& array, int scale, double sigma_mm) {
 // One press of one drawn body.
 class Press {
  public:
+  // The scene goes `pace` times as fast as usually.
   Press(const Sensor& sensor, const Presses& presses, const RandomStream& random,
-        const RandomStream& of_scene)
+        const RandomStream& of_scene, double pace = 1)
       : sensor_(sensor),
         body_(drawn(sensor.body, sensor.array, random)),
         random_(random),
@@ -86,9 +87,11 @@ class Press {
                sigma_),
         response_(body_, sensor.array),
         strength_(1 + kStrength * (2 * random.uniform(kOfStrength) - 1)),
+        pace_(pace),
         pressure_(field_.cells()) {}
 
-  // Times within the press are asked for in ascending order; the signals and the truth are appended.
+  // Times within the press are asked for in ascending order; the signals and the truth (scale 0: none) are
+  // appended.
   void frame(double t, int scale, Recording& recording) {
     while (!response_.neutral() && before_ + kStepS < t) show(before_ + kStepS);
     std::vector<double> shares = show(t);
@@ -101,6 +104,7 @@ class Press {
           sensor_.scale.rest - sensor_.scale.span * std::clamp(noisy, -4 * body_.noise, 1.0)));
     }
     sensor_.fill_silent(std::span(recording.volts).subspan(from));
+    if (scale == 0) return;
     const int rows = sensor_.array.rows * scale, columns = sensor_.array.columns * scale;
     const int above = (field_.rows - rows) / 2, beside = (field_.columns - columns) / 2;
     for (int r = 0; r < rows; ++r)
@@ -111,7 +115,7 @@ class Press {
 
  private:
   std::vector<double> show(double t) {
-    scene_.pressure(t, body_, kGive * body_.skin_mm, field_, pressure_);
+    scene_.pressure(t * pace_, body_, kGive * body_.skin_mm, field_, pressure_);
     const auto taxels = static_cast<std::size_t>(sensor_.array.taxels()),
                channels = static_cast<std::size_t>(sensor_.array.channels);
     std::vector<double> shares(taxels * channels);
@@ -151,7 +155,7 @@ class Press {
   Field field_;
   Bells across_, along_;
   BodyResponse response_;
-  double strength_, before_ = 0;
+  double strength_, pace_, before_ = 0;
   std::uint64_t samples_ = 0;
   std::vector<double> pressure_;
 };
@@ -184,6 +188,31 @@ Recording simulate_presses(const Sensor& sensor, const Presses& presses, std::ui
       recording.time_s.push_back(i * Scene::kSeconds + t);
       press.frame(t, scale, recording);
     }
+  }
+  return recording;
+}
+
+Recording simulate_touching(const Sensor& sensor, double seconds, std::uint64_t seed) {
+  constexpr double kFastestHz = 40, kShortest = 0.4, kLongest = 2.5, kLeastGap = 0.3, kMostGap = 0.8;
+  enum Draw : std::uint64_t { kLength = 90, kGap, kByHand };
+  Recording recording;
+  recording.array = sensor.array, recording.body = sensor.body, recording.signal_scale = sensor.scale;
+  recording.plate = "touched", recording.trial = recording.pass = 1, recording.source = "simulated";
+  const double period = 1 / std::min(sensor.rate_hz, kFastestHz);
+  double begin = 0;
+  for (std::uint64_t i = 0; begin < seconds; ++i) {
+    const RandomStream random(seed, stream_of("touch") + 2 * i);
+    const double length = kShortest * same_bits::pow(kLongest / kShortest, random.uniform(kLength));
+    const double end = begin + length + std::lerp(kLeastGap, kMostGap, random.uniform(kGap));
+    const Presses by{.kind = random.uniform(kByHand) < 0.5 ? "fingertip" : "mixed", .scale = 2};
+    Press press(sensor, by, random, RandomStream(seed, stream_of("touch") + 2 * i + 1),
+                Scene::kSeconds / length);
+    for (; period * static_cast<double>(recording.frames()) < std::min(end, seconds);) {
+      const double t = period * static_cast<double>(recording.frames());
+      recording.time_s.push_back(t);
+      press.frame(t - begin, 0, recording);
+    }
+    begin = end;
   }
   return recording;
 }

@@ -51,19 +51,23 @@ double lead_of(const Swings& x, std::size_t ahead, std::size_t behind, std::size
 
 }  // namespace
 
-std::size_t signal_feature_count(const TaxelArray& array) {
-  return 2 * array.signals() + static_cast<std::size_t>(array.rows - 1);
+std::size_t signal_feature_count(const TaxelArray& array, std::size_t frames) {
+  return frames == 1 ? array.signals() : 2 * array.signals() + static_cast<std::size_t>(array.rows - 1);
 }
 
 void signal_features(std::span<const float> window, const TaxelArray& array, std::span<float> out) {
   const std::size_t signals = array.signals(), rows = static_cast<std::size_t>(array.rows);
-  if (window.size() % signals != 0 || window.size() < kLeastFrames * signals ||
-      out.size() != signal_feature_count(array))
+  const std::size_t all = window.size() / signals, expected = signal_feature_count(array, all);
+  if (window.size() % signals != 0 || (all != 1 && all < kLeastFrames) || out.size() != expected)
     throw std::invalid_argument("signal features: expects " + std::to_string(kLeastFrames) +
                                 " or more frames of " + std::to_string(signals) + " and room for " +
-                                std::to_string(signal_feature_count(array)) + ", got " +
-                                std::to_string(window.size()) + " and " + std::to_string(out.size()));
-  const std::size_t all = window.size() / signals, step = std::max<std::size_t>(1, all / kFramesLookedAt);
+                                std::to_string(expected) + ", got " + std::to_string(window.size()) +
+                                " and " + std::to_string(out.size()));
+  if (all == 1) {
+    std::ranges::copy(window, out.begin());
+    return;
+  }
+  const std::size_t step = std::max<std::size_t>(1, all / kFramesLookedAt);
   const std::span<float> mean = out.first(signals), spread = out.subspan(signals, signals);
   const Swings x{.window = window, .mean = mean, .frames = all / step, .step = step};
   mean_over_time(x.frames, mean,
@@ -81,7 +85,7 @@ void signal_features(std::span<const float> window, const TaxelArray& array, std
 }
 
 std::vector<float> signal_features(std::span<const float> window, const TaxelArray& array) {
-  std::vector<float> features(signal_feature_count(array));
+  std::vector<float> features(signal_feature_count(array, window.size() / array.signals()));
   signal_features(window, array, features);
   return features;
 }

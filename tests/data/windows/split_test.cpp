@@ -240,6 +240,24 @@ TEST(Split, GroupKeepsGroupsTogether) {
   EXPECT_EQ(train.size(), 4U);
   EXPECT_EQ(test.size(), 1U);
   EXPECT_FALSE(train.contains(*test.begin()));
+  Split left = split;
+  const std::vector<std::uint32_t> held_out = hold_out_group(set, left, 3);
+  std::set<std::string> kept, taken;
+  for (const std::size_t p : passes_of(set, left.train)) kept.insert(set.passes()[p].group);
+  for (const std::size_t p : passes_of(set, held_out)) taken.insert(set.passes()[p].group);
+  EXPECT_EQ(kept.size(), 3U);
+  EXPECT_EQ(taken.size(), 1U);
+  EXPECT_FALSE(kept.contains(*taken.begin()));
+  EXPECT_EQ(left.train.size() + held_out.size(), split.train.size());
+  EXPECT_EQ(left.test, split.test);
+  const Split named = make_split(set, SplitKind::group, 3, {"person 2", "person 4"});
+  for (const std::size_t p : passes_of(set, named.test))
+    EXPECT_TRUE(set.passes()[p].group == "person 2" || set.passes()[p].group == "person 4");
+  EXPECT_EQ(named.test.size() + named.train.size(), set.size());
+  EXPECT_EQ(
+      what_of<std::invalid_argument>([&] { make_split(set, SplitKind::group, 3, {"person 9"}); }),
+      "split group: the data has no group 'person 9' to leave out; it has person 0, person 1, person 2, "
+      "person 3, person 4");
   set.add(make_recording({.pass = 21, .frames = 30}));
   EXPECT_EQ(what_of<std::invalid_argument>([&] { make_split(set, SplitKind::group, 3); }),
             "split group: every recording needs metadata 'group' and there must be two groups, one to train "

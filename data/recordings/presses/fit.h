@@ -1,0 +1,58 @@
+// What half a minute of pressing tells about a sensor's body, without any truth.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "data/recordings/recording.h"
+
+namespace supertac {
+
+/// Numbers of a recording of touches that a body decides, whatever touched it: how peaks fall to their
+/// neighbours, how that changes with the load, what rows and columns show far from a peak, how fast loads
+/// rise, fall and grow. Empty where it has fewer than 100 frames of touch.
+std::vector<double> touch_statistics(const Recording& recording);
+
+/// One number of a body: what was found, its standard deviation; or that it could not be told.
+struct FittedNumber {
+  std::string key;
+  double value = 0, deviation = 0;
+  bool told = false;
+};
+
+/// The sensor with rests, noise and body as the touches show them, and what was found.
+struct BodyFit {
+  Sensor sensor;
+  std::vector<FittedNumber> numbers;
+  double unlike = 0;  ///< how far the touches are from any simulated ones, in standard deviations of these
+  /// Lines for people: each number with its deviation, and what could not be told and why.
+  std::vector<std::string> lines() const;
+};
+
+/// Finds bodies of one sensor. Simulates kSimulations arrays like it (its shape and taxels as stated) with
+/// bodies drawn from what arrays have - skins of .2 to 1.5 pitches, knees from .18 on, crosstalk up to .5,
+/// hysteresis of .01 to 1 s, creep up to .4 within .5 to 10 s, noise of .1 to 1 % -, and regresses each
+/// number of a body on the statistics of its touches and their squares.
+class BodyFitter {
+ public:
+  static constexpr int kSimulations = 480;
+  BodyFitter(const Sensor& sensor, std::uint64_t seed);
+  ~BodyFitter();
+  BodyFitter(const BodyFitter&) = delete;
+  BodyFitter& operator=(const BodyFitter&) = delete;
+  /// Applies this to touches of the sensor. The deviation is that of the nearest simulated bodies, each left
+  /// out of its own regression; a number whose deviation is over .6 of what was drawn could not be told, and
+  /// stays as it was. Noise and rests are measured. Gains cannot be told from single touches (supertac-stream
+  /// --probe --gain). Throws std::runtime_error when there is too little touch, or one that no simulated body
+  /// shows (unlike > 6).
+  BodyFit operator()(const Recording& touches) const;
+
+ private:
+  class Regression;
+  Sensor sensor_;
+  std::unique_ptr<const Regression> regression_;
+};
+
+}  // namespace supertac

@@ -1,0 +1,68 @@
+#include "data/recordings/presses/fit.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "data/recordings/presses/presses.h"
+#include "io/numbers/random.h"
+#include "tests/expect_error.h"
+
+namespace supertac {
+namespace {
+
+Sensor mat() {
+  Sensor sensor;
+  sensor.array = {.rows = 6, .columns = 10, .pitch_mm = 8, .channels = 1};
+  sensor.scale = {.unit = "counts", .rest = 40, .span = -860};
+  sensor.rate_hz = 40;
+  sensor.body = {};
+  return sensor;
+}
+
+// Bodies that the fit has not seen: drawn by other numbers than its own.
+TEST(BodyFit, FindsKnownBodiesWithinTheStatedUncertainty) {
+  const RandomStream random(77, 1);
+  int told = 0, within = 0, farther = 0;
+  std::map<std::string, int> of;
+  const BodyFitter fitter(mat(), 1);
+  constexpr std::uint64_t kBodies = 12;
+  for (std::uint64_t i = 0; i < kBodies; ++i) {
+    Sensor truth = mat();
+    truth.body.skin_mm = 8 * std::lerp(0.4, 1.4, random.uniform(10 * i));
+    truth.body.knee = std::lerp(0.3, 3.0, random.uniform(10 * i + 1));
+    truth.body.crosstalk_rows = 0.4 * random.uniform(10 * i + 2);
+    truth.body.crosstalk_columns = 0.4 * random.uniform(10 * i + 3);
+    truth.body.hysteresis_s = std::lerp(0.02, 0.5, random.uniform(10 * i + 4));
+    truth.body.creep = 0.3 * random.uniform(10 * i + 5), truth.body.creep_s = 3;
+    truth.body.noise = 0.004;
+    const BodyFit fit = fitter(simulate_touching(truth, 30, 1000 + i));
+    EXPECT_NEAR(fit.sensor.body.noise, 0.004, 0.001);
+    EXPECT_LT(fit.unlike, 5);
+    for (const FittedNumber& number : fit.numbers) {
+      if (!number.told) continue;
+      ++told, ++of[number.key];
+      for (const auto& [key, member] : fitted_numbers())
+        if (key == number.key) {
+          const double off = std::abs(member(truth.body) - number.value) / number.deviation;
+          within += off<2, farther += off> 4;
+        }
+    }
+  }
+  EXPECT_GE(of["skin_mm"], 8);
+  EXPECT_EQ(of["crosstalk_rows"], 12);
+  EXPECT_EQ(of["crosstalk_columns"], 12);
+  EXPECT_GE(told, 44);
+  EXPECT_GE(within, 0.85 * told) << told;
+  EXPECT_LE(farther, 1);
+
+  Recording still = simulate_touching(mat(), 10, 1);
+  for (float& signal : still.volts) signal = 40;
+  EXPECT_EQ(what_of<std::runtime_error>([&] { fitter(still); }),
+            "too little was pressed: expected 100 frames or more in which a taxel shows 8 % of the range; "
+            "press here "
+            "and there for half a minute, or let the probe find the range");
+}
+
+}  // namespace
+}  // namespace supertac

@@ -1,0 +1,48 @@
+#include "data/windows/contact_level.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "io/numbers/random.h"
+
+namespace supertac {
+namespace {
+
+constexpr std::size_t kPixels = 64, kFrames = 200;
+
+// Every second frame is pressed by 0.3 and more on a quarter of the pixels.
+std::vector<float> film(double noise, double rest) {
+  const RandomStream random(1, 0);
+  std::vector<float> truth;
+  for (std::size_t f = 0; f < kFrames; ++f)
+    for (std::size_t p = 0; p < kPixels; ++p) {
+      const double pressed = f % 2 == 0 && p < kPixels / 4 ? 0.3 + 0.5 * random.uniform(f) : 0;
+      truth.push_back(static_cast<float>(
+          std::clamp(rest + pressed + noise * random.normal(1000 + f * kPixels + p), 0.0, 1.0)));
+    }
+  return truth;
+}
+
+TEST(ContactLevel, TellsTheFilmsNoiseFromATouch) {
+  for (const double rest : {0.0, 0.03}) {
+    const std::vector<float> truth = film(0.005, rest);
+    const float level = contact_level(truth, kPixels);
+    EXPECT_GT(level, 0.02F) << rest;
+    EXPECT_LT(level, 0.08F) << rest;
+    for (std::size_t f = 0; f < kFrames; ++f) {
+      const auto first = truth.begin() + static_cast<std::ptrdiff_t>(f * kPixels);
+      EXPECT_EQ(*std::max_element(first, first + kPixels) > level, f % 2 == 0) << f;
+    }
+  }
+}
+
+TEST(ContactLevel, IsZeroWhereNothingIsNoisyOrNothingRests) {
+  EXPECT_EQ(contact_level(film(0, 0), kPixels), 0);
+  EXPECT_EQ(contact_level(film(0, 0.5), kPixels), 0) << "never at rest";
+  EXPECT_EQ(contact_level(std::vector<float>(5 * kPixels, 0.02F), kPixels), 0) << "too few frames to tell";
+}
+
+}  // namespace
+}  // namespace supertac
