@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "data/map/surface_map.h"
 #include "data/windows/live_window.h"
 #include "data/windows/transforms/normalise_window.h"
 #include "io/numbers/numbers.h"
@@ -25,6 +26,11 @@ using namespace supertac;
 struct supertac_model {
   ModelFile file;
   Prepared prepared;
+};
+
+struct supertac_map {
+  const supertac_model* model;
+  SurfaceMap surface;
 };
 
 struct supertac_live {
@@ -230,6 +236,48 @@ int supertac_live_picture(supertac_live* live, float* picture, float* predicted_
     if (!live->window.window(live->input.values())) return 0;
     draw(*live->model, live->input, picture, predicted_error);
     return 1;
+  });
+}
+
+supertac_map* supertac_map_new(const supertac_model* model) {
+  return guarded<supertac_map*>(nullptr, [&] {
+    expect(model != nullptr, "supertac_map_new: a pointer is NULL");
+    const WindowSettings windows = model->file.windows();
+    return new supertac_map{model,
+                            SurfaceMap(model->file.array().picture(windows.scale), windows.timesteps > 1)};
+  });
+}
+
+void supertac_map_free(supertac_map* map) { delete map; }
+
+int supertac_map_add(supertac_map* map, double x_mm, double y_mm, const float* picture,
+                     const float* predicted_error) {
+  return guarded(-1, [&] {
+    expect(map != nullptr && picture != nullptr, "supertac_map_add: a pointer is NULL");
+    const std::size_t pixels = map->surface.grid().pixels();
+    map->surface.add(x_mm, y_mm, std::span(picture, pixels),
+                     std::span(predicted_error, predicted_error != nullptr ? pixels : 0));
+    return 0;
+  });
+}
+
+int supertac_map_cells(const supertac_map* map, int* height, int* width, double corner_mm[2], float* values,
+                       float* errors) {
+  return guarded(-1, [&] {
+    expect(map != nullptr && height != nullptr && width != nullptr && corner_mm != nullptr,
+           "supertac_map_cells: a pointer is NULL");
+    const MapRegion& felt = map->surface.felt();
+    const Pitch cell = map->surface.grid().pixel_mm;
+    *height = static_cast<int>(felt.height), *width = static_cast<int>(felt.width);
+    corner_mm[0] = static_cast<double>(felt.left) * cell.x;
+    corner_mm[1] = static_cast<double>(felt.bottom) * cell.y;
+    if (values == nullptr && errors == nullptr) return 0;
+    const MapCells cells = map->surface.cells(felt);
+    if (values != nullptr) std::ranges::copy(cells.values, values);
+    if (errors != nullptr) std::fill_n(errors, cells.values.size(), std::numeric_limits<float>::quiet_NaN());
+    if (errors != nullptr)
+      std::ranges::copy(map->model->file.interval_factors().half_widths(cells.values, cells.errors), errors);
+    return 0;
   });
 }
 

@@ -87,6 +87,23 @@ SUPERTAC_API int supertac_live_push(supertac_live* live, double time_s, const fl
    there is none yet, or a gap was just before; -1: failed. */
 SUPERTAC_API int supertac_live_picture(supertac_live* live, float* picture, float* predicted_error);
 
+/* One map of the whole surface that was felt, made of the model's pictures and of where they were; the same
+   bits as --map of the programs. `model` must outlive it. NULL on failure. */
+typedef struct supertac_map supertac_map; /* used by one thread at a time */
+SUPERTAC_API supertac_map* supertac_map_new(const supertac_model* model);
+SUPERTAC_API void supertac_map_free(supertac_map* map);
+
+/* A picture [height][width] whose centre lies at (x_mm, y_mm); a place that is not finite is left out.
+   predicted_error: the same shape, or NULL, and then always. 0, or -1. */
+SUPERTAC_API int supertac_map_add(supertac_map* map, double x_mm, double y_mm, const float* picture,
+                                  const float* predicted_error);
+
+/* All that was felt, [height][width] cells of the model's pixel_mm, NaN where nothing was. corner_mm: x and y
+   of the corner of the first cell. values, errors (half of each cell's 90 % interval; NaN where pictures had
+   none): NULL where only the size is wanted. 0, or -1. */
+SUPERTAC_API int supertac_map_cells(const supertac_map* map, int* height, int* width, double corner_mm[2],
+                                    float* values, float* errors);
+
 /* Trains a network on a folder of recordings and writes the model, in the place of an older file `out`, as
    supertac-train does: the same settings make the same content. recipe: "paper", "best", "tiny" or "frame".
    settings: NULL, or what differs from the recipe. progress: NULL, or called after every step; another result

@@ -8,6 +8,7 @@
 #include "apps/common/output/output_folder.h"
 #include "data/windows/windows.h"
 #include "models/inference/ensemble.h"
+#include "models/inference/interval.h"
 
 namespace supertac {
 
@@ -33,7 +34,7 @@ class OutputsFile {
 /// strips.png: windows in contact spread over the test windows, input | output | truth and, where
 /// the network says it, half the width of a pixel's 90 % interval; and for each test pass
 /// film_<plate>_t<trial>_p<pass>.png. Throws FileError.
-void write_pictures(const Ensemble& model, double interval_factor, const WindowSet& windows,
+void write_pictures(const Ensemble& model, const IntervalFactors& factors, const WindowSet& windows,
                     std::span<const std::uint32_t> test, OutputFolder& folder);
 
 }  // namespace supertac

@@ -4,7 +4,6 @@
 
 #include "data/plates/truth.h"
 #include "io/numbers/numbers.h"
-#include "models/inference/interval.h"
 
 namespace supertac {
 
@@ -21,10 +20,9 @@ void MapScores::add(const Drawn& drawn) {
   if (!std::isfinite(x) || !std::isfinite(y) || windows_.zone(drawn.example) == Zone::air) return;
   const std::size_t pass = windows_.pass_of(drawn.example);
   const SurfaceMap fresh(windows_.image(), windows_.frames() > 1);
-  const std::vector<float> widths = half_widths(model_.interval_factor(), drawn.predicted_error);
-  of_pass_.try_emplace(pass, fresh).first->second.add(x, y, drawn.pictures[0], widths);
+  of_pass_.try_emplace(pass, fresh).first->second.add(x, y, drawn.pictures[0], drawn.predicted_error);
   of_surface_.try_emplace(surface_of(pass), fresh, pass)
-      .first->second.first.add(x, y, drawn.pictures[0], widths);
+      .first->second.first.add(x, y, drawn.pictures[0], drawn.predicted_error);
   added_.push_back(drawn.example);
 }
 
@@ -70,6 +68,7 @@ nlohmann::ordered_json MapScores::to_json() const {
 
 NamedMap MapScores::named(const std::string& name, const SurfaceMap& map, std::size_t pass) const {
   NamedMap named{.name = name, .cells = map.cells(map.felt()), .cell_mm = map.grid().pixel_mm};
+  named.cells.errors = model_.interval_factors().half_widths(named.cells.values, named.cells.errors);
   if (windows_.truth_is_measured(pass)) return named;
   const MapRegion& r = named.cells.region;
   for (std::int64_t j = 0; j < r.height; ++j)

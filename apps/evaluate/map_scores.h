@@ -20,7 +20,7 @@ namespace supertac {
 /// known belong to no map.
 class MapScores {
  public:
-  /// Both must outlive this.
+  /// `model`: whose intervals the maps have; both must outlive this.
   MapScores(const WindowSet& windows, const ModelFile& model);
   /// Windows of a pass come in the order of time.
   void add(const Drawn& drawn);

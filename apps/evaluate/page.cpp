@@ -88,6 +88,16 @@ std::string by_zone(const nlohmann::ordered_json& result) {
       page_table({"zone", "windows", "SSIM", "PSNR dB", "ghosts %", "misses %"}, rows));
 }
 
+std::string by_height(const nlohmann::ordered_json& trust) {
+  if (!trust.contains("coverage_of")) return "";
+  std::string rows;
+  for (const auto& [name, held] : trust["coverage_of"].items())
+    rows += "<tr><td>" + name + "</td>" + cell_of(held["pixels"], 0) + cell_of(held["share"], 1, 100) +
+            cell_of(held["half_width"], 3) + "</tr>";
+  return page_section("Intervals", "nine pixels in ten of each height should lie within",
+                      page_table({"pixels", "number", "within %", "half width"}, rows));
+}
+
 std::string by_distance(const nlohmann::ordered_json& parts) {
   ChartSeries series{.name = "network", .points = {}, .dots = true};
   for (const auto& part : parts) {
@@ -250,7 +260,7 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
   std::sort(chosen.begin(), chosen.end());
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
   std::map<std::uint32_t, ShownWindow> pictures;
-  std::vector<ShownWindow> shown_again = draw_again(network, windows_, chosen, 1);
+  std::vector<ShownWindow> shown_again = draw_again(network, windows_, chosen, {});
   for (std::size_t i = 0; i < chosen.size(); ++i) pictures[chosen[i]] = std::move(shown_again[i]);
 
   std::string content = "<p class=\"quiet\">" + escaped(result["model"].get<std::string>()) + ", split " +
@@ -259,7 +269,7 @@ std::string EvaluationPage::html(const Ensemble& network, std::span<const std::u
                         std::to_string(result["contact"]["windows"].get<long>()) + " in contact</p>";
   content +=
       by_method(result) + "<div class=\"two\">" + by_group(result["groups"]) + by_zone(result) + "</div>" +
-      by_distance(result["felt"]) +
+      by_height(result["trust"]) + by_distance(result["felt"]) +
       shown("The worst windows", "in contact, by SSIM; no two within 3 mm of one pass", worst, pictures) +
       shown("The best windows", "of those with texture on a quarter of the picture", best, pictures);
   content += page_section(

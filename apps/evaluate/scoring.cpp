@@ -81,7 +81,7 @@ void check_test_set(const Arguments& a, const std::vector<ModelFile>& files, Tes
 }
 
 std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& windows,
-                                    std::span<const std::uint32_t> chosen, double interval_factor) {
+                                    std::span<const std::uint32_t> chosen, const IntervalFactors& factors) {
   std::vector<ShownWindow> shown;
   for_each_output(network, windows, chosen, [&](const EvaluatedBatch& b) {
     for (std::size_t n = 0; n < b.size(); ++n) {
@@ -89,7 +89,7 @@ std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& wi
       ShownWindow one{.felt = mean_of_channels(windows.array(), windows.last_frame(chosen[b.first + n])),
                       .drawn = {drawn.begin(), drawn.end()},
                       .truth = {truth.begin(), truth.end()},
-                      .half_widths = half_widths(interval_factor, b.predicted_error(n))};
+                      .half_widths = factors.half_widths(drawn, b.predicted_error(n))};
       shown.push_back(std::move(one));
     }
     return true;

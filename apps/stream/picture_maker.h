@@ -27,6 +27,11 @@ class PictureMaker {
   std::span<const float> picture();
   /// Of the newest picture: half the width of each pixel's 90 % interval; empty when the model does not say.
   std::span<const float> half_widths() const { return half_widths_; }
+  /// Its predicted errors; likewise.
+  std::span<const float> predicted_errors() const {
+    return output_.predicted_error.defined() ? output_.predicted_error.values() : std::span<const float>();
+  }
+  const IntervalFactors& interval_factors() const { return interval_factors_; }
   /// How far the window that it was drawn from is from those of training, and where "unlike" begins
   /// (models/inference/novelty.h); nothing when the model does not say.
   std::optional<double> distance() const { return distance_; }
@@ -53,7 +58,8 @@ class PictureMaker {
   Estimate output_;
   std::vector<float> features_;
   SignalScale source_scale_;
-  double period_s_, interval_factor_;
+  double period_s_;
+  IntervalFactors interval_factors_;
   std::vector<float> half_widths_;
   std::optional<double> distance_;
   static constexpr double kRestS = 0.2;

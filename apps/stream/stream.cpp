@@ -153,7 +153,9 @@ void Stream::write_map() const {
         settings_.map.path +
         ": no map, since no picture's place is known; expected --model and a --recording "
         "with positions, which supertac-collect and supertac-import give");
-  write_maps(settings_.map, {{"surface", map_->cells(map_->felt()), map_->grid().pixel_mm}});
+  MapCells cells = map_->cells(map_->felt());
+  cells.errors = maker_->interval_factors().half_widths(cells.values, cells.errors);
+  write_maps(settings_.map, {{"surface", cells, map_->grid().pixel_mm}});
 }
 
 // Empty where frames come as often as the source says, to a twentieth.
@@ -278,7 +280,7 @@ void Stream::keep(const SensorFrame& frame, std::span<const float> picture) {
   state_.picture.assign(picture.begin(), picture.end());
   state_.x_mm = frame.x_mm, state_.y_mm = frame.y_mm;
   if (!map_ || !std::isfinite(frame.x_mm) || !std::isfinite(frame.y_mm) || frame.lift_mm > kLiftedMm) return;
-  map_->add(frame.x_mm, frame.y_mm, picture, seen.half_widths);
+  map_->add(frame.x_mm, frame.y_mm, picture, maker_->predicted_errors());
   changed_ = changed_.with(map_->newest());
 }
 

@@ -5,6 +5,7 @@
 
 #include "apps/common/running/progress.h"
 #include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 #include "models/files/model_file.h"
 #include "models/inference/interval.h"
 
@@ -68,10 +69,13 @@ void declare_window_training(Arguments& a) {
       "frame",
       "standard");
   a.option("also", "DIR", "more recordings to train on, never tested: simulated ones, say");
-  a.option("interval-factor", "X",
-           "half the width of a pixel's 90 % interval in units of its predicted error, as supertac-evaluate "
-           "finds it on passes that the network has not seen; split group finds it on the tested groups",
-           format(kIntervalFactor));
+  a.option(
+      "interval-factor", "X,...",
+      "half the width of a pixel's 90 % interval in units of its predicted error, one for all or one each "
+      "for "
+      "pictures below 0.02, 0.05, 0.2, 0.5 and above, as supertac-evaluate finds them on passes that the "
+      "network has not seen; split group finds them on the tested groups",
+      IntervalFactors{}.text());
   a.flag(
       "last-frame",
       "give the last frame a way of its own into the picture, beside the latents: for sensors of which one "
@@ -134,7 +138,13 @@ Recipe recipe_of(const Arguments& a, Recipe r) {
     r.augment = name == "standard" ? kStandardAugmentation : AugmentSettings{};
     r.mirror = name == "mirror";
   }
-  if (a.given("interval-factor")) r.interval_factor = a.number("interval-factor", 0.1, 100);
+  if (a.given("interval-factor")) {
+    r.interval_factor = IntervalFactors::read(a.text("interval-factor"));
+    if (!r.interval_factor)
+      throw UsageError(
+          "--interval-factor: expected one number or five, separated by ',', from 0.05 to 100, found " +
+          in_quotes(a.text("interval-factor")));
+  }
   if (a.flag("last-frame")) r.model.last_frame_path = true;
   if (a.given("autoencoder")) {
     r.sampling = a.choice("autoencoder", {"variational", "plain"}) == "variational";

@@ -11,7 +11,7 @@ namespace supertac {
 
 struct NamedMap {
   std::string name;
-  MapCells cells;
+  MapCells cells;  ///< its errors as half of each cell's 90 % interval
   Pitch cell_mm;
   std::vector<float> truth = {};  ///< of the cells, where it is known
 };
@@ -23,12 +23,10 @@ void check_map_path(const std::string& path);
 ///   .png          y to the right and x upwards: each map above its error and its truth, in the same colours,
 ///                 with a scale bar; what was never felt is grey
 ///   .safetensors  for each map NAME.values, NAME.errors and NAME.truth F32 [height][width], NaN where
-///   nothing
-///                 was felt; metadata NAME.corner_mm is the place of the corner of the first cell, cell_mm
-///                 the size of a cell, [x,y] both
+///                 nothing was felt; metadata NAME.corner_mm is the place of the corner of the first cell,
+///                 cell_mm the size of a cell, [x,y] both
 ///   .stl          one map as a solid to print, 1 being rig::kTextureHeightMm high, as far above its bottom
-///   as
-///                 plate_mesh.h's; what was never felt lies kSunkMm below the plane
+///                 as plate_mesh.h's; what was never felt lies kSunkMm below the plane
 /// Throws std::invalid_argument as check_map_path(), for no map, or more than one for .stl; FileError.
 void write_maps(const OutputPath& output, const std::vector<NamedMap>& maps);
 

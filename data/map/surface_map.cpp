@@ -161,7 +161,7 @@ void SurfaceMap::add(double x_mm, double y_mm, std::span<const float> picture,
       cell->growth = cell->seen + 1 == number_ ? std::min(growth * cell->growth, most_growth_) : 1;
       cell->seen = number_;
       const double error = has_errors_ ? std::max(errors_[n], kLeastError) : 1;
-      const double weight = counts * cell->growth / std::sqrt(error);
+      const double weight = counts * cell->growth / error;
       cell->weight += weight;
       cell->value += weight * values_[n];
       cell->error += weight * error;

@@ -28,12 +28,12 @@ struct MapCells {
 
 /// A window knows more of a point the longer the point has been under the array, so a point is drawn worst
 /// when it is drawn first. The map fuses pictures k = 1, 2 ... of a cell:
-///   value = sum w v / sum w,    error = sum w e / sum w,    w = (d + 1 um) exp(s / lambda) / sqrt(e)
+///   value = sum w v / sum w,    error = sum w e / sum w,    w = (d + 1 um) exp(s / lambda) / e
 /// v, e: the picture and its error, at least .01, at the cell's centre, by Catmull-Rom and by linear
 /// interpolation (Keys 1981). d: way of the finger (mm) since the picture before, at most a pixel, so that a
 /// finger that stands counts once. s: way since the cell came under the array, at most the side of the
 /// picture L = sqrt(width height), so that what leaves the array last counts most; a cell that is touched
-/// again begins anew, and visits count alike. lambda = L / 4, and the root of e, were fitted on trial 1 with
+/// again begins anew, and visits count alike. lambda = L / 4 and the power of e were fitted on trial 1 with
 /// passes held out (docs/map.md). A step of more than half a side is a jump: it is no way, and all cells
 /// begin anew.
 ///
@@ -49,8 +49,8 @@ class SurfaceMap {
   /// frames, all of whose pictures count alike (lambda is infinite).
   explicit SurfaceMap(const ImageGrid& grid, bool grows = true);
 
-  /// A picture [height][width] whose centre lies at (x_mm, y_mm), and how far off each pixel may be (empty:
-  /// not known, and then never). A place that is not finite is left out. Throws std::invalid_argument
+  /// A picture [height][width] whose centre lies at (x_mm, y_mm), and the predicted error of each pixel
+  /// (empty: not known, and then never). A place that is not finite is left out. Throws std::invalid_argument
   /// when a size is wrong, std::runtime_error when the map would have more than kMostCells.
   void add(double x_mm, double y_mm, std::span<const float> picture, std::span<const float> errors);
   /// The picture around (x_mm, y_mm) that the map has, [height][width], by Catmull-Rom interpolation; beside

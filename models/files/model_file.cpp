@@ -125,8 +125,8 @@ std::optional<double> InputSettings::filter_left(double done_s) const {
   return done_s > 0 ? std::nullopt : std::optional(wanted_s);
 }
 
-double ModelFile::interval_factor() const {
-  return parse_double(value_or(metadata, "interval_factor")).value_or(kIntervalFactor);
+IntervalFactors ModelFile::interval_factors() const {
+  return IntervalFactors::read(value_or(metadata, "interval_factor")).value_or(IntervalFactors{});
 }
 
 TaxelArray ModelFile::array() const {

@@ -11,6 +11,7 @@
 #include "data/windows/windows.h"
 #include "layers/checkpoint.h"
 #include "models/inference/ensemble.h"
+#include "models/inference/interval.h"
 #include "models/inference/novelty.h"
 #include "models/inference/prepared/ranges.h"
 #include "models/networks/supertac_model.h"
@@ -42,8 +43,8 @@ struct ModelFile {
   std::optional<ActivationRanges> ranges;  ///< what int8 needs; empty in older files
   std::map<std::string, std::string> metadata;
 
-  /// Half the width of a pixel's interval in units of its predicted error.
-  double interval_factor() const;
+  /// What its predicted errors mean: the entry interval_factor, where there is one.
+  IntervalFactors interval_factors() const;
   /// The sensor it was trained on.
   TaxelArray array() const;
   /// The windows it takes: its array and length, picture size, rate and scaling.

@@ -46,8 +46,8 @@ void Recipe::check() const {
   require(stride >= 1 && stride <= 100'000, "stride from 1 to 100000", static_cast<double>(stride));
   require(random_plates >= 0 && random_plates <= 50'000, "random_plates from 0 to 50000",
           static_cast<double>(random_plates));
-  const double factor = interval_factor.value_or(1);
-  require(factor >= 0.1 && factor <= 100, "interval_factor from 0.1 to 100", factor);
+  for (const double factor : interval_factor.value_or(IntervalFactors{}).of_level)
+    require(factor >= 0.05 && factor <= 100, "interval_factor from 0.05 to 100", factor);
   if (range) require(std::abs(range->span_volts) > 1e-6, "a span that is not 0", range->span_volts);
   if (per_window && model.timesteps == 1)
     throw std::invalid_argument(
@@ -108,7 +108,7 @@ std::map<std::string, std::string> metadata_of(const Recipe& r) {
                                                 {"seed", std::to_string(r.seed)},
                                                 {"plates", joined(r.plates)},
                                                 {"stride", std::to_string(r.stride)}};
-  if (r.interval_factor) entries["interval_factor"] = format(*r.interval_factor);
+  if (r.interval_factor) entries["interval_factor"] = r.interval_factor->text();
   if (!r.leave_out.empty()) entries["leave_out"] = joined(r.leave_out);
   if (r.random_plates > 0) entries["random_plates"] = std::to_string(r.random_plates);
   return entries;
@@ -140,7 +140,7 @@ Recipe Recipe::of(const ModelFile& file, const std::string& path) {
   r.range = file.input.scaling;
   r.per_window = file.input.scaling.per_window;
   if (file.metadata.contains("interval_factor") && !file.metadata.contains("interval_factor_found"))
-    r.interval_factor = file.interval_factor();
+    r.interval_factor = file.interval_factors();
   try {
     r.split = split_kind(entry("split"));
     r.check();

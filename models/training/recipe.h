@@ -41,9 +41,8 @@ struct Recipe : TrainingPace {
   std::optional<Scaling> range;    ///< rest and span; empty: SignalRange::fitted()
   bool per_window = true;          ///< whether a window is brought to its own rest and gain
   std::int64_t random_plates = 0;  ///< simulated passes besides, each over a plate of its own
-  /// Half the width of a pixel's 90 % interval in units of its predicted error, for the model's file; empty:
-  /// of split group found on the tested groups, else kIntervalFactor.
-  std::optional<double> interval_factor;
+  /// Of the model's file; empty: of split group found on the tested groups, else the default ones.
+  std::optional<IntervalFactors> interval_factor;
 
   /// Throws std::invalid_argument naming the setting, its range and what was given.
   void check() const;

@@ -124,7 +124,7 @@ std::map<std::string, std::string> trained_origin(const Trainer& trainer, const 
     return true;
   });
   if (coverage.empty()) return origin;
-  origin["interval_factor"] = format(coverage.factor());
+  origin["interval_factor"] = coverage.factors().text();
   origin["interval_factor_found"] = "tested groups";
   return origin;
 }

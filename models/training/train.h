@@ -40,7 +40,7 @@ struct TrainingCallbacks {
 bool train(Trainer& trainer, const TrainingTask& task, const TrainingCallbacks& callbacks = {});
 
 /// What the model file says of its origin after training: task.origin, and where the recipe leaves it open
-/// the factor of the intervals, IntervalCoverage::factor() of at most 2,000 tested windows. A network that
+/// the factor of the intervals, IntervalCoverage::factors() of at most 2,000 tested windows. A network that
 /// draws people or objects for the first time is further off than it has learnt to say.
 std::map<std::string, std::string> trained_origin(const Trainer& trainer, const TrainingTask& task);
 

@@ -12,12 +12,12 @@ import os
 
 from .files import read, write
 from .library import VERSION as __version__
-from .library import LiveWindow, train
+from .library import LiveWindow, SurfaceMap, train
 from .model import Model, Pictures, load_model, save_model
 from .recordings import Log, Recording, read_pictures, read_recording, windows, write_recording
 
-__all__ = ["__version__", "LiveWindow", "Log", "Model", "Pictures", "Recording", "load", "load_model", "read",
-           "read_pictures", "read_recording", "save_model", "train", "windows", "write", "write_recording"]
+__all__ = ["__version__", "LiveWindow", "Log", "Model", "Pictures", "Recording", "SurfaceMap", "load", "load_model",
+           "read", "read_pictures", "read_recording", "save_model", "train", "windows", "write", "write_recording"]
 
 
 def load(path: str | os.PathLike) -> Model | Recording | Log:

@@ -27,6 +27,10 @@ SIGNATURES = {  # result, arguments
     "supertac_live_free": (None, [POINTER]),
     "supertac_live_push": (ctypes.c_int, [POINTER, ctypes.c_double, POINTER]),
     "supertac_live_picture": (ctypes.c_int, [POINTER, POINTER, POINTER]),
+    "supertac_map_new": (POINTER, [POINTER]),
+    "supertac_map_free": (None, [POINTER]),
+    "supertac_map_add": (ctypes.c_int, [POINTER, ctypes.c_double, ctypes.c_double, POINTER, POINTER]),
+    "supertac_map_cells": (ctypes.c_int, [POINTER] * 6),
     "supertac_train": (ctypes.c_int, [ctypes.c_char_p] * 3 + [POINTER, PROGRESS, POINTER]),
 }
 
@@ -127,6 +131,36 @@ class LiveWindow:
     def predicted_error(self) -> np.ndarray:
         """[height,width], of the last picture; the next one is written over it."""
         return self._predicted_error
+
+
+class SurfaceMap:
+    """One map of the whole surface that was felt, as --map of the programs: add() every picture with its place, then
+    cells() gives values and errors [height,width], NaN where nothing was felt, and (x, y) of the first cell's corner in mm.
+    """
+
+    def __init__(self, model):
+        self.drawer = model.drawer()
+        self.map = checked(library().supertac_map_new(self.drawer.model), None)
+
+    def __del__(self):
+        if getattr(self, "map", None) is not None:
+            self.drawer.library.supertac_map_free(self.map)
+
+    def add(self, x_mm: float, y_mm: float, picture: np.ndarray, predicted_error: np.ndarray | None = None) -> None:
+        maps = [None if m is None else np.ascontiguousarray(m, np.float32) for m in (picture, predicted_error)]
+        for one in maps:
+            if one is not None and one.shape != self.drawer.picture:
+                raise ValueError(f"a picture is {list(self.drawer.picture)}, got {list(one.shape)}")
+        at = [None if one is None else one.ctypes.data for one in maps]
+        checked(self.drawer.library.supertac_map_add(self.map, x_mm, y_mm, *at))
+
+    def cells(self) -> tuple[np.ndarray, np.ndarray, tuple[float, float]]:
+        height, width, corner = ctypes.c_int(), ctypes.c_int(), (ctypes.c_double * 2)()
+        size = [ctypes.addressof(one) for one in (height, width, corner)]
+        checked(self.drawer.library.supertac_map_cells(self.map, *size, None, None))
+        cells = np.empty((2, height.value, width.value), np.float32)
+        checked(self.drawer.library.supertac_map_cells(self.map, *size, cells[0].ctypes.data, cells[1].ctypes.data))
+        return cells[0], cells[1], tuple(corner)
 
 
 def train(recipe: str, folder: str | os.PathLike, out: str | os.PathLike,

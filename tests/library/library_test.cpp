@@ -1,12 +1,14 @@
 #include <gtest/gtest.h>
 #include <supertac/supertac.h>
 
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "data/map/surface_map.h"
 #include "data/recordings/recording.h"
 #include "data/windows/live_window.h"
 #include "data/windows/transforms/normalise_window.h"
@@ -135,6 +137,39 @@ TEST_F(Library, DrawsFramesAsLiveWindowsDo) {
     ASSERT_TRUE(std::ranges::equal(picture, drawn_of(input, SUPERTAC_INT8).picture.values()));
   }
   EXPECT_GT(drawn, 30);
+}
+
+TEST_F(Library, MapsAsTheCppLibraryDoes) {
+  supertac_model* model = supertac_open(path_.c_str(), SUPERTAC_FP32);
+  supertac_map* map = supertac_map_new(model);
+  ASSERT_NE(map, nullptr);
+  SurfaceMap expected(file_.array().picture(4));
+  const RandomStream random(3, 5);
+  std::vector<float> picture(256), errors(256);
+  for (std::uint64_t k = 0; k < 40; ++k) {
+    for (std::size_t p = 0; p < 256; ++p)
+      picture[p] = static_cast<float>(random.uniform(512 * k + p)),
+      errors[p] = static_cast<float>(random.uniform(512 * k + 256 + p));
+    const double y = 0.3 * static_cast<double>(k);
+    expected.add(-4, y, picture, errors);
+    ASSERT_EQ(supertac_map_add(map, -4, y, picture.data(), errors.data()), 0);
+  }
+  int height = 0, width = 0;
+  double corner[2];
+  ASSERT_EQ(supertac_map_cells(map, &height, &width, corner, nullptr, nullptr), 0);
+  const MapCells cells = expected.cells(expected.felt());
+  EXPECT_EQ(height, cells.region.height);
+  EXPECT_EQ(width, cells.region.width);
+  EXPECT_DOUBLE_EQ(corner[0], 0.75 * static_cast<double>(cells.region.left));
+  std::vector<float> values(cells.values.size()), widths(values.size());
+  ASSERT_EQ(supertac_map_cells(map, &height, &width, corner, values.data(), widths.data()), 0);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    ASSERT_EQ(std::bit_cast<std::uint32_t>(values[i]), std::bit_cast<std::uint32_t>(cells.values[i])) << i;
+  EXPECT_EQ(widths[20], file_.interval_factors().half_width(cells.values[20], cells.errors[20]));
+  EXPECT_EQ(supertac_map_add(map, 0, 0, nullptr, nullptr), -1);
+  EXPECT_STREQ(supertac_error(), "supertac_map_add: a pointer is NULL");
+  supertac_map_free(map);
+  supertac_close(model);
 }
 
 TEST_F(Library, TrainsWhatTheCppLibraryTrains) {

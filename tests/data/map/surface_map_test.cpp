@@ -63,7 +63,7 @@ TEST(SurfaceMap, WeighsByWayAndError) {
     const std::vector<float> picture(64, static_cast<float>(drawn[k])),
         off(64, static_cast<float>(errors[k]));
     map.add(10, 20 + k, picture, off);
-    const double w = ((k == 0 ? 0 : 1) + 1e-3) * std::exp(k / 2.0) / std::sqrt(errors[k]);
+    const double w = ((k == 0 ? 0 : 1) + 1e-3) * std::exp(k / 2.0) / errors[k];
     weight += w, value += w * drawn[k], error += w * errors[k];
     EXPECT_NEAR(value_at(map, 10, 20), value / weight, 1e-6) << k;
     EXPECT_NEAR(map.cells({10, 20, 1, 1}).errors.at(0), error / weight, 1e-6) << k;
