@@ -11,6 +11,7 @@
 #include "apps/evaluate/group_scores.h"
 #include "apps/evaluate/map_scores.h"
 #include "apps/evaluate/page.h"
+#include "apps/evaluate/pass_scores.h"
 #include "apps/evaluate/scoring.h"
 #include "apps/evaluate/trust.h"
 #include "data/recordings/recording.h"
@@ -50,7 +51,7 @@ std::string row(const std::string& name, const ZoneMetrics& metrics, const Laten
 /// The scores of the network and of every baseline over the same windows.
 struct RecordingScores {
   RecordingScores(const WindowSet& windows, const ModelFile& model, std::size_t methods)
-      : by_distance(windows), by_group(windows), trust(windows, model), map(windows, model) {
+      : by_distance(windows), by_group(windows), trust(windows, model), map(windows, model), by_pass(windows) {
     for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
   }
   std::vector<ZoneMetrics> of_method;
@@ -58,6 +59,7 @@ struct RecordingScores {
   GroupScores by_group;
   TrustScores trust;
   MapScores map;
+  PassScores by_pass;
 };
 
 RecordingScores score_all(const Arguments& a, const Ensemble& network, const ModelFile& file,
@@ -72,6 +74,7 @@ RecordingScores score_all(const Arguments& a, const Ensemble& network, const Mod
     scores.by_group.add(d.example, d.pictures[0], d.target);
     scores.trust.add(d);
     scores.map.add(d);
+    scores.by_pass.add(d.example, d.pictures[0], d.target);
     if (page != nullptr) page->add(d);
     if (outputs != nullptr)
       outputs->add(d.input, d.pictures[0], d.target, d.predicted_error, windows.position(d.example),
@@ -127,6 +130,9 @@ nlohmann::ordered_json report(const Arguments& a, const Ensemble& network, const
     latencies[name] = l.to_json();
     result["baselines"][name] = scores.of_method[k + 1].to_json();
   }
+  if (const std::string interval = scores.by_pass.interval_text(); !interval.empty())
+    a.print("95 % intervals of the network's contact windows over passes: " + interval);
+  result["over_passes"] = scores.by_pass.to_json();
   for (const std::string& line : silence_lines(own, windows.contact_level().has_value())) a.print(line);
   for (const std::string& line : scores.by_distance.lines()) a.print(line);
   for (const std::string& line : scores.by_group.lines()) a.print(line);

@@ -36,6 +36,7 @@ void MapScores::finish() {
       map.read(x, y, read);
       scored.zones.add(read, truth, windows_.zone(window));
       scored.by_distance.add(window, read, truth);
+      scored.by_pass.add(window, read, truth);
     };
     score(of_pass_.at(pass), by_pass_);
     score(of_surface_.at(surface_of(pass)).first, by_surface_);
@@ -46,7 +47,9 @@ std::vector<std::string> MapScores::lines() const {
   if (empty()) return {};
   const auto text = [](const Scored& scored) {
     const Metrics contact = scored.zones.contact();
-    return "SSIM " + format(contact.ssim, 3) + ", PSNR " + format(contact.psnr_mean_db, 2) + " dB";
+    const std::string interval = scored.by_pass.interval_text();
+    return "SSIM " + format(contact.ssim, 3) + ", PSNR " + format(contact.psnr_mean_db, 2) + " dB" +
+           (interval.empty() ? "" : " (95 % over passes: " + interval + ")");
   };
   if (by_pass_.zones.contact().windows == 0) return {};
   return {"in contact, read back from the map of the pass: " + text(by_pass_) +
@@ -61,7 +64,8 @@ nlohmann::ordered_json MapScores::to_json() const {
     const Metrics contact = scored->zones.contact();
     json[name] = {{"ssim", number(contact.ssim)},
                   {"psnr_mean_db", number(contact.psnr_mean_db)},
-                  {"felt", scored->by_distance.to_json()}};
+                  {"felt", scored->by_distance.to_json()},
+                  {"over_passes", scored->by_pass.to_json()}};
   }
   return json;
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/evaluate/distance_scores.h"
+#include "apps/evaluate/pass_scores.h"
 #include "apps/evaluate/scoring.h"
 #include "data/map/map_file.h"
 #include "data/scores/metrics.h"
@@ -30,16 +31,19 @@ class MapScores {
   bool empty() const { return added_.empty(); }
   /// For people: nothing when empty().
   std::vector<std::string> lines() const;
-  /// {"of_pass": {"ssim", "psnr_mean_db", "felt": as DistanceScores}, "of_surface": the same}
+  /// {"of_pass": {"ssim", "psnr_mean_db", "felt": as DistanceScores, "over_passes": as
+  /// PassScores}, "of_surface": the same}
   nlohmann::ordered_json to_json() const;
   /// PLATE_tTRIAL; with passes PLATE_tTRIAL_pPASS behind them.
   std::vector<NamedMap> maps(bool passes) const;
 
  private:
   struct Scored {
-    explicit Scored(const WindowSet& windows) : zones(windows.image()), by_distance(windows) {}
+    explicit Scored(const WindowSet& windows)
+        : zones(windows.image()), by_distance(windows), by_pass(windows) {}
     ZoneMetrics zones;
     DistanceScores by_distance;
+    PassScores by_pass;
   };
   std::string surface_of(std::size_t pass) const;
   NamedMap named(const std::string& name, const SurfaceMap& map, std::size_t pass) const;

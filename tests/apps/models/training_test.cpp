@@ -226,6 +226,12 @@ TEST_F(Training, EvaluationWritesTheAgreedJsonAndOutputs) {
   }
   EXPECT_GE(maps.tensors().size(), 6U);
   for (const char* of : {"of_pass", "of_surface"}) EXPECT_GT(json["map"][of]["psnr_mean_db"], 5) << of;
+  double ssim = 0, windows = 0;  // over passes as over windows
+  for (const auto& pass : json["over_passes"]["passes"]) {
+    ssim += pass["ssim"].get<double>() * pass["windows"].get<double>();
+    windows += pass["windows"].get<double>();
+  }
+  EXPECT_NEAR(ssim / windows, json["contact"]["ssim"], 1e-9);
 }
 
 TEST_F(Training, BadInputIsOneLineAndLeavesNothingBehind) {
