@@ -89,6 +89,14 @@ def reached():
                   "registered independently: SSIM", "PSNR dB"], lines)
 
 
+def maps():
+    columns = {"ssim": "picture", "first_15_mm_ssim": "first 15 mm", "map_ssim": "map of the pass",
+               "map_first_15_mm_ssim": "first 15 mm", "plate_map_ssim": "map of all passes", "psnr_db": "picture, PSNR dB",
+               "map_psnr_db": "map of the pass, PSNR dB"}
+    return table(["plate", *columns.values()],
+                 [[r["plate"], *(f"{float(r[c]):.{1 if 'psnr' in c else 3}f}" for c in columns)] for r in rows("accuracy/map.csv")])
+
+
 def first_contact():
     found = rows("accuracy/first_contact.csv")
     return table(["mm since the first contact"] + [r["felt_mm"] for r in found],
