@@ -147,6 +147,15 @@ std::string live_text(const Point3& at, const BoardCounters& board) {
 
 /// A run that may move the head: marked until the head is back, or until it turns out that nothing could be
 /// moved.
+std::string text_of(const std::exception_ptr& error) {
+  try {
+    if (error) std::rethrow_exception(error);
+  } catch (const std::exception& thrown) {
+    return thrown.what();
+  }
+  return "stopped";
+}
+
 RecorderReport record_marked(std::unique_ptr<Port> board, std::unique_ptr<Port> printer,
                              RecorderSettings settings, const OriginMark& mark) {
   const bool marked_before = mark.is_set();
@@ -157,7 +166,7 @@ RecorderReport record_marked(std::unique_ptr<Port> board, std::unique_ptr<Port> 
   };
   try {
     RecorderReport report = record_palpation(std::move(board), std::move(printer), settings);
-    if (report.outcome.complete) mark.clear();
+    report.outcome.complete ? mark.clear() : mark.set("ended early (" + text_of(report.outcome.error) + ")");
     return report;
   } catch (...) {
     if (!marked_before && !settings.home) mark.clear();
@@ -168,8 +177,8 @@ RecorderReport record_marked(std::unique_ptr<Port> board, std::unique_ptr<Port> 
 
 void demand_origin(const Arguments& arguments, const OriginMark& mark, const Point3& origin) {
   if (!mark.is_set() || arguments.flag("home") || arguments.flag("confirm-origin")) return;
-  throw OriginUnknown("collect: the last run on printer " + arguments.text("printer") +
-                      " was cut off, so the head's position is unknown; move it to " + describe(origin) +
+  throw OriginUnknown("collect: the last run on printer " + arguments.text("printer") + " " + mark.why() +
+                      ", so the head's position is unknown; move it to " + describe(origin) +
                       " and add --confirm-origin, or use --home");
 }
 
@@ -272,12 +281,7 @@ std::string keep_passes(const Arguments& arguments, const std::string& journal, 
 /// Where the disk is full, what ended the run would be lost behind what goes wrong with its recordings.
 [[noreturn]] void fail_to_keep(const std::exception& error, const std::string& journal,
                                const PalpationOutcome& outcome) {
-  std::string why;
-  try {
-    if (outcome.error) std::rethrow_exception(outcome.error);
-  } catch (const std::exception& first) {
-    why = std::string(first.what()) + "; ";
-  }
+  const std::string why = outcome.error ? text_of(outcome.error) + "; " : "";
   std::error_code gone;
   throw std::runtime_error(why + error.what() + "; the journal " + journal +
                            (std::filesystem::exists(journal, gone)

@@ -6,6 +6,7 @@
 
 #include "hardware/ports/port_list.h"
 #include "io/files/file.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
@@ -34,9 +35,19 @@ bool OriginMark::is_set() const {
   return found || error;  // what cannot be looked at may be there
 }
 
-void OriginMark::set() const {
+void OriginMark::set(const std::string& why) const {
   make_directories(fs::path(file_).parent_path().string());
-  write_file(file_, "the head's position is unknown until a run on this printer has ended at its origin\n");
+  write_file(file_, "the head's position is unknown until a run on this printer has ended at its origin\n" +
+                        printable(why, 300));
+}
+
+// A mark of before it said why holds its first line alone.
+std::string OriginMark::why() const {
+  constexpr std::size_t kMost = 4096;
+  const std::string text = read_text_file(file_, kMost);
+  const std::size_t line = text.find('\n');
+  const std::string found = line == std::string::npos ? "" : text.substr(line + 1);
+  return found.empty() ? "was cut off" : printable(found, kMost);
 }
 
 void OriginMark::clear() const {

@@ -12,8 +12,10 @@ class OriginMark {
   /// Throws FileError when there is no place for it.
   explicit OriginMark(const std::string& printer_port);
   bool is_set() const;
-  /// On the disk when it returns. Throws FileError
-  void set() const;
+  /// `why`: how the run ended. On the disk when it returns. Throws FileError
+  void set(const std::string& why = "was cut off") const;
+  /// That of the run that left it.
+  std::string why() const;
   /// Throws FileError
   void clear() const;
 

@@ -49,7 +49,7 @@ std::string FeltTaxels::text() const {
 }
 
 void FeltTaxels::check() const {
-  if (2 * unfelt().size() <= static_cast<std::size_t>(array_.taxels())) return;
+  if (4 * unfelt().size() <= 3 * static_cast<std::size_t>(array_.taxels())) return;
   throw std::runtime_error(text() + "; a network would learn that they never do. " +
                            (flat_
                                 ? "Simulate presses (supertac-simulate --presses N), which reach every taxel"

@@ -18,7 +18,8 @@ class FeltTaxels {
   std::vector<int> unfelt() const;
   /// "49 of 60 taxels feel nothing: 0-9, 12", or nothing where all feel something.
   std::string text() const;
-  /// Throws std::runtime_error with text() and what helps where that holds of more than half.
+  /// Throws std::runtime_error with text() and what helps where that holds of more than three quarters: a
+  /// dome that slides over one strip of a plate is felt by half of its taxels.
   void check() const;
 
  private:
