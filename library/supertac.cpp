@@ -272,11 +272,11 @@ int supertac_map_cells(const supertac_map* map, int* height, int* width, double 
     corner_mm[0] = static_cast<double>(felt.left) * cell.x;
     corner_mm[1] = static_cast<double>(felt.bottom) * cell.y;
     if (values == nullptr && errors == nullptr) return 0;
-    const MapCells cells = map->surface.cells(felt);
+    MapCells cells = map->surface.cells(felt);
     if (values != nullptr) std::ranges::copy(cells.values, values);
     if (errors != nullptr) std::fill_n(errors, cells.values.size(), std::numeric_limits<float>::quiet_NaN());
-    if (errors != nullptr)
-      std::ranges::copy(map->model->file.interval_factors().half_widths(cells.values, cells.errors), errors);
+    map->model->file.interval_factors().half_widths(cells.values, cells.errors, cells.errors);
+    if (errors != nullptr) std::ranges::copy(cells.errors, errors);
     return 0;
   });
 }

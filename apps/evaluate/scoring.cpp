@@ -89,7 +89,8 @@ std::vector<ShownWindow> draw_again(const Ensemble& network, const WindowSet& wi
       ShownWindow one{.felt = mean_of_channels(windows.array(), windows.last_frame(chosen[b.first + n])),
                       .drawn = {drawn.begin(), drawn.end()},
                       .truth = {truth.begin(), truth.end()},
-                      .half_widths = factors.half_widths(drawn, b.predicted_error(n))};
+                      .half_widths = {}};
+      factors.half_widths(drawn, b.predicted_error(n), one.half_widths);
       shown.push_back(std::move(one));
     }
     return true;

@@ -78,7 +78,7 @@ std::span<const float> PictureMaker::picture() {
   if (!window_.window(input_.values())) return {};
   output_ = network_.estimate(input_);
   if (output_.predicted_error.defined())
-    half_widths_ = interval_factors_.half_widths(output_.picture.values(), output_.predicted_error.values());
+    interval_factors_.half_widths(output_.picture.values(), output_.predicted_error.values(), half_widths_);
   if (model_.novelty) {
     signal_features(input_.values(), model_.array(), features_);
     distance_ = model_.novelty->distance(features_);

@@ -154,7 +154,7 @@ void Stream::write_map() const {
         ": no map, since no picture's place is known; expected --model and a --recording "
         "with positions, which supertac-collect and supertac-import give");
   MapCells cells = map_->cells(map_->felt());
-  cells.errors = maker_->interval_factors().half_widths(cells.values, cells.errors);
+  maker_->interval_factors().half_widths(cells.values, cells.errors, cells.errors);
   write_maps(settings_.map, {{"surface", cells, map_->grid().pixel_mm}});
 }
 

@@ -13,11 +13,10 @@ std::size_t IntervalFactors::level_of(float picture) {
       std::ranges::count_if(kEdges, [height = std::abs(picture)](float edge) { return height >= edge; }));
 }
 
-std::vector<float> IntervalFactors::half_widths(std::span<const float> picture,
-                                                std::span<const float> predicted_error) const {
-  std::vector<float> widths(predicted_error.size());
+void IntervalFactors::half_widths(std::span<const float> picture, std::span<const float> predicted_error,
+                                  std::vector<float>& widths) const {
+  widths.resize(predicted_error.size());
   for (std::size_t i = 0; i < widths.size(); ++i) widths[i] = half_width(picture[i], predicted_error[i]);
-  return widths;
 }
 
 std::string IntervalFactors::text() const {

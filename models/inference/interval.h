@@ -33,9 +33,9 @@ struct IntervalFactors {
   float half_width(float picture, float predicted_error) const {
     return static_cast<float>(of_level[level_of(picture)]) * at_least(predicted_error);
   }
-  /// Of each pixel; empty where predicted_error is.
-  std::vector<float> half_widths(std::span<const float> picture,
-                                 std::span<const float> predicted_error) const;
+  /// Of each pixel, as many as predicted_error has, which may be `widths` itself; no heap once it is large.
+  void half_widths(std::span<const float> picture, std::span<const float> predicted_error,
+                   std::vector<float>& widths) const;
 
   /// "1.45", which holds for every level, or "0.7,2.45,2.95,2.6,3.45"; back from it, or nothing for another
   /// text or a factor outside 0.05 to 100.

@@ -193,7 +193,6 @@ TEST_F(Errors, EvilValuesAreOneClearLineAtOnce) {
   for (const auto& [words, said] :
        {Evil{{"supertac-import", "--journal", path("fifo"), "--out", out}, "is not a regular file"},
         Evil{{"supertac-import", "--journal", "/dev/zero", "--out", out}, "is not a regular file"},
-        Evil{{"supertac-classify", "--model", "none", "--data", folder_.path(), "--views", ""}, "found none"},
         Evil{{"supertac-plate", "--plate", "ridges0.0000001", "--out", out}, "from 0.05 to 1000 mm"},
         Evil{{"supertac-plate", "--plate", "ridgesinf", "--out", out}, "from 0.05 to 1000 mm"},
         Evil{{"supertac-simulate", "--plates", "ridges0.0000001", "--out", out}, "from 0.05 to 1000 mm"}}) {

@@ -235,11 +235,6 @@ TEST_F(Dispatcher, HelpIsThatOfTheJobOrTheGlossary) {
   EXPECT_TRUE(contains(run("supertac --help").out, "supertac help glossary"));
 }
 
-TEST_F(Help, OffersNoThreadsWhereThereIsNothingToShareOut) {
-  EXPECT_FALSE(contains(run("supertac-info --help").out, "--threads"));
-  EXPECT_TRUE(contains(run("supertac-simulate --help").out, "--threads"));
-}
-
 TEST_F(Help, BreaksNoWords) {
   // Words of the help as declared; a line that ends within one would leave a part of it.
   const std::string help = run("supertac-train --help").out;

@@ -16,7 +16,9 @@ TEST(IntervalFactors, DependOnThePicture) {
   for (std::size_t i = 0; i < std::size(pictures); ++i)
     EXPECT_FLOAT_EQ(kRising.half_width(pictures[i], 0.1F), factors[i] * 0.1F) << pictures[i];
   EXPECT_FLOAT_EQ(kRising.half_width(1, -3), 0.05F) << "no predicted error is below .01";
-  EXPECT_TRUE(kRising.half_widths(pictures, {}).empty());
+  std::vector<float> widths(7);
+  kRising.half_widths(pictures, {}, widths);
+  EXPECT_TRUE(widths.empty());
   EXPECT_TRUE(std::isnan(kRising.half_width(NAN, NAN)));
 }
 
