@@ -51,7 +51,11 @@ std::string row(const std::string& name, const ZoneMetrics& metrics, const Laten
 /// The scores of the network and of every baseline over the same windows.
 struct RecordingScores {
   RecordingScores(const WindowSet& windows, const ModelFile& model, std::size_t methods)
-      : by_distance(windows), by_group(windows), trust(windows, model), map(windows, model), by_pass(windows) {
+      : by_distance(windows),
+        by_group(windows),
+        trust(windows, model),
+        map(windows, model),
+        by_pass(windows) {
     for (std::size_t m = 0; m < methods; ++m) of_method.emplace_back(windows.image());
   }
   std::vector<ZoneMetrics> of_method;

@@ -228,7 +228,8 @@ Recording recording_of_table(const std::string& path, const Table& table, const 
     throw FileError(path, error.what());
   }
   Recording recording;
-  recording.array = sensor.array, recording.signal_scale = sensor.scale, recording.body = sensor.body, recording.source = "imported";
+  recording.array = sensor.array, recording.signal_scale = sensor.scale, recording.body = sensor.body,
+  recording.source = "imported";
   recording.time_s = times_of(path, table, columns.time, map.time_unit_s, sensor.rate_hz);
   check_rate(path, table, columns.time, recording, sensor.rate_hz);
   for (std::size_t k = 0; k < columns.values.size(); ++k)
