@@ -1,10 +1,12 @@
 #!/bin/sh
 # The libraries installed in five layouts, and linked from each by pkg-config and by find_package: C and C++.
-#   layouts.sh SOURCE BUILD FOLDER
+#   layouts.sh SOURCE BUILD
 # BUILD has been built; its files are taken as they are, since only where they are put is the matter.
 set -eu
-source=$1 build=$2 folder=$3
-rm -rf "$folder"
+source=$1 build=$2
+# CMake refuses absolute folders within the source tree.
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
 mkdir -p "$folder/user"
 cat > "$folder/user/CMakeLists.txt" <<EOF
 cmake_minimum_required(VERSION 3.22)
@@ -20,7 +22,7 @@ try() { # NAME LIBDIR INCLUDEDIR
   prefix=$here/prefix
   cmake -S "$source" -B "$here/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DSUPERTAC_APPS=OFF -DSUPERTAC_TESTS=OFF \
     -DCMAKE_INSTALL_PREFIX="$prefix" -DCMAKE_INSTALL_LIBDIR="$libdir" -DCMAKE_INSTALL_INCLUDEDIR="$includedir" > "$here.log"
-  (cd "$build" && find . -name 'libsupertac*' \( -name '*.a' -o -name '*.so*' \) ! -path './examples/*') |
+  (cd "$build" && find . -name 'libsupertac*' \( -name '*.a' -o -name '*.so*' \)) |
     while read -r file; do
       mkdir -p "$here/build/$(dirname "$file")"
       cp -a "$build/$file" "$here/build/$file"
