@@ -339,7 +339,7 @@ def main():
         train = ["--data", "data", "--out", "model.safetensors", "--preset", "tiny", "--split", "none", "--epochs", "1"]
         subprocess.run([binaries / "supertac-train", *train, "--stride", "64", "--quiet"], **quiet)
         subprocess.run([binaries / "supertac-simulate", "--out", "two", "--plates", "6_Ridges,3_Bumps", "--passes", "1", "--speeds", "10"], **quiet)
-        model = ["--model", "other.safetensors", "--data", "two", "--views", "super_resolved", "--seeds", "1", "--epochs", "1"]
+        model = ["--model", "other.safetensors", "--data", "two", "--seeds", "1", "--epochs", "1"]
         trained = ["--data", "two", "--out", "other.safetensors", "--preset", "tiny", "--epochs", "1", "--stride", "64", "--quiet"]
         subprocess.run([binaries / "supertac-train", *trained], **quiet)
         subprocess.run([binaries / "supertac-classify", *model, "--out", "classifier.safetensors", "--quiet"], **quiet)
