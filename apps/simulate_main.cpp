@@ -243,7 +243,7 @@ int run(Arguments& arguments) {
     Progress progress(arguments, "simulating", jobs.size(), "recordings");
     frames = simulate(jobs, sensor, felt, progress);
   }
-  if (!felt.text().empty()) arguments.note(felt.text());
+  if (const std::string found = felt.complaint(); !found.empty()) arguments.note(found);
   for (const std::string& plate : presses ? std::vector<std::string>{} : arguments.list("plates"))
     keep_plate_file(plate, folder.path());
   folder.keep();

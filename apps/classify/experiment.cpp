@@ -12,6 +12,7 @@
 #include "data/windows/split.h"
 #include "models/files/classifier_file.h"
 #include "models/training/loss/schedule.h"
+#include "models/training/task.h"
 
 namespace supertac {
 namespace {
@@ -113,10 +114,11 @@ std::vector<std::string> classes_of(const WindowSet& windows) {
 
 Dataset make_dataset(const WindowSet& windows, const Candidate& model,
                      const std::vector<std::string>& classes, std::int64_t stride) {
-  const SplitKind kind = model.recipe.split;
-  Split split = make_split(windows, kind, model.recipe.seed);
+  std::vector<std::uint32_t> held_out;
+  Split split = split_of(windows, model.recipe, held_out);
   // Trials are what they are; other splits are drawn from the windows there are.
-  if (kind != SplitKind::trial && fingerprint(split) != value_or(model.file.metadata, "split_fingerprint"))
+  if (model.recipe.split != SplitKind::trial &&
+      fingerprint(split) != value_or(model.file.metadata, "split_fingerprint"))
     throw std::runtime_error(model.path +
                              ": its split cannot be repeated on this data, and it may have seen the test "
                              "windows; give the recordings and plates it was trained on");

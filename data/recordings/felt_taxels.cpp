@@ -36,25 +36,24 @@ std::vector<int> FeltTaxels::unfelt() const {
   return taxels;
 }
 
-std::string FeltTaxels::text() const {
+std::string FeltTaxels::complaint() const {
   const std::vector<int> taxels = unfelt();
-  if (taxels.empty()) return "";
+  if (4 * taxels.size() <= 3 * static_cast<std::size_t>(array_.taxels())) return "";
   std::vector<std::string> runs;
   for (std::size_t i = 0, end = 0; i < taxels.size(); i = end) {
     for (end = i + 1; end < taxels.size() && taxels[end] == taxels[end - 1] + 1;) ++end;
     runs.push_back(std::to_string(taxels[i]) + (end - i > 1 ? "-" + std::to_string(taxels[end - 1]) : ""));
   }
   return std::to_string(taxels.size()) + " of " + std::to_string(array_.taxels()) +
-         (taxels.size() == 1 ? " taxels feels nothing: " : " taxels feel nothing: ") + joined(runs, ", ");
+         (taxels.size() == 1 ? " taxels feels nothing: " : " taxels feel nothing: ") + joined(runs, ", ") +
+         "; a network would learn that they never do. " +
+         (flat_ ? "Simulate presses (supertac-simulate --presses N), which reach every taxel"
+                : "Say in the sensor's file what shape the array has, \"body\": {\"shape\": \"flat\"}, and "
+                  "simulate again");
 }
 
 void FeltTaxels::check() const {
-  if (4 * unfelt().size() <= 3 * static_cast<std::size_t>(array_.taxels())) return;
-  throw std::runtime_error(text() + "; a network would learn that they never do. " +
-                           (flat_
-                                ? "Simulate presses (supertac-simulate --presses N), which reach every taxel"
-                                : "Say in the sensor's file what shape the array has, \"body\": {\"shape\": "
-                                  "\"flat\"}, and simulate again"));
+  if (const std::string found = complaint(); !found.empty()) throw std::runtime_error(found);
 }
 
 }  // namespace supertac

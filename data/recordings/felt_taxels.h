@@ -16,10 +16,10 @@ class FeltTaxels {
   /// Of the simulated recordings, all of one array: those whose signals stay within a tenth of the range.
   /// None while nothing simulated was added.
   std::vector<int> unfelt() const;
-  /// "49 of 60 taxels feel nothing: 0-9, 12", or nothing where all feel something.
-  std::string text() const;
-  /// Throws std::runtime_error with text() and what helps where that holds of more than three quarters: a
-  /// dome that slides over one strip of a plate is felt by half of its taxels.
+  /// "49 of 60 taxels feel nothing: 0-9, 12; ..." and what helps, where that holds of more than three
+  /// quarters: of a dome that slides over one strip of a plate half of the taxels feel it. Else nothing.
+  std::string complaint() const;
+  /// Throws std::runtime_error with the complaint where there is one.
   void check() const;
 
  private:

@@ -172,7 +172,9 @@ void FingerModel::shape_pad(double slope_x, double slope_y) {
   const auto points = [](const TaxelArray& a) {
     return static_cast<double>(points_across(a) * points_along(a));
   };
-  settings_.mount_stiffness *= points(settings_.array) / points(TaxelArray{});
+  // Of a dome no more touches where the array is larger.
+  if (settings_.body.shape == BodyShape::flat)
+    settings_.mount_stiffness *= points(settings_.array) / points(TaxelArray{});
   across_weight_ = taxel_weights(columns, pitch.x, across_, kAcrossMm, sigma);
   along_weight_ = taxel_weights(rows, pitch.y, along_, kAlongMm, sigma);
   across_lean_ = leaning(across_weight_, columns, pitch.x, kAcrossMm, sigma);

@@ -20,7 +20,7 @@ struct SimulatorSettings {
   double threshold_mm = 0;      ///< |N(0, 1)| times this is the load of which a taxel feels nothing
 
   bool with_mount = true;       ///< the finger gives way: a bump under one row lifts the other rows
-  double mount_stiffness = 15;  ///< cubic mm of indented pad per mm, of a pad as large as the rig's
+  double mount_stiffness = 15;  ///< cubic mm of indented pad per mm, of a flat body as large as the rig's pad
   Body body = Body::of_rig();  ///< a skin that is not known is the rig's; its shape touches an element before
                                ///< a taxel is above it; its skin is the pad
   bool with_edges = true;      ///< beside the plate there is nothing to touch

@@ -204,15 +204,17 @@ Split make_split(const WindowSet& windows, SplitKind kind, std::uint64_t seed,
 
 std::vector<std::uint32_t> hold_out_group(const WindowSet& windows, Split& split, std::uint64_t seed) {
   std::set<std::string> trained;
-  const auto group_of = [&](std::uint32_t i) -> const std::string& {
-    return windows.passes()[windows.pass_of(i)].group;
+  const auto pass_of = [&](std::uint32_t i) -> const WindowSet::Pass& {
+    return windows.passes()[windows.pass_of(i)];
   };
-  for (const std::uint32_t i : split.train) trained.insert(group_of(i));
+  for (const std::uint32_t i : split.train)
+    if (!pass_of(i).use.training_only) trained.insert(pass_of(i).group);
   if (trained.size() < 3) return {};
   const std::string name = *std::next(
       trained.begin(), static_cast<std::ptrdiff_t>(EpochOrder(trained.size(), seed, kHeldOutStream)[0]));
   std::vector<std::uint32_t> train, held_out;
-  for (const std::uint32_t i : split.train) (group_of(i) == name ? held_out : train).push_back(i);
+  for (const std::uint32_t i : split.train)
+    (!pass_of(i).use.training_only && pass_of(i).group == name ? held_out : train).push_back(i);
   split.train = std::move(train);
   return held_out;
 }

@@ -76,17 +76,21 @@ WindowSet windows_of(const Recipe& recipe, const RecordingFolders& folders, std:
 
 }  // namespace
 
+Split split_of(const WindowSet& windows, const Recipe& recipe, std::vector<std::uint32_t>& held_out) {
+  Split split = make_split(windows, recipe.split, recipe.seed, recipe.leave_out);
+  if (recipe.split == SplitKind::group && recipe.keeps_best)
+    held_out = hold_out_group(windows, split, recipe.seed);
+  return split;
+}
+
 TrainingTask window_task(const Recipe& given, const RecordingFolders& folders) {
   given.check();
   std::vector<std::string> notes;
   const auto windows = std::make_shared<const WindowSet>(windows_of(given, folders, notes));
   Recipe recipe = given;
   set_array(recipe.model, windows->array());
-  TrainingTask task{.windows = windows,
-                    .split = make_split(*windows, recipe.split, recipe.seed, recipe.leave_out),
-                    .objective = Objective(*windows, recipe)};
-  if (recipe.split == SplitKind::group && recipe.keeps_best)
-    task.held_out = hold_out_group(*windows, task.split, recipe.seed);
+  TrainingTask task{.windows = windows, .objective = Objective(*windows, recipe)};
+  task.split = split_of(*windows, recipe, task.held_out);
   task.split.train = subsample_no_contact(*windows, std::move(task.split.train));
   task.origin = metadata_of(recipe);
   task.origin.erase("training");  // the objective says it

@@ -21,7 +21,7 @@ struct RecordingFolders {
 
 struct TrainingTask {
   std::shared_ptr<const WindowSet> windows;
-  Split split;
+  Split split = {};
   /// Neither trained on nor tested: what the best epoch is chosen by (Recipe::keeps_best). Empty: the last is
   /// kept.
   std::vector<std::uint32_t> held_out = {};
@@ -34,6 +34,9 @@ struct TrainingTask {
   std::vector<std::string> notes = {};    ///< what is to be said before training: a range that clips, a leak
   std::vector<std::string> remarks = {};  ///< remarks_on() the training windows
 };
+
+/// Both sides of the recipe's split of these windows, and what it holds out of training.
+Split split_of(const WindowSet& windows, const Recipe& recipe, std::vector<std::uint32_t>& held_out);
 
 /// Reads the recordings, adds random and silent passes, splits. Throws std::invalid_argument as
 /// Recipe::check, and when random plates are asked for though the signals rest at another level than the

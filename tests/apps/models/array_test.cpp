@@ -218,9 +218,9 @@ TEST_F(Array, AHundredTablesAreImportedTrainedAndScored) {
   EXPECT_EQ(run("supertac-import log --out none --columns time=ms").code, 2);
 }
 
-// A person slides the mat over a known plate: nothing says where it was but what it felt.
+// A person slides a round pad over a known plate: nothing says where it was but what it felt.
 TEST_F(Array, ATableWithoutPositionsIsRegisteredAgainstItsPlate) {
-  write_mat(6, 6, "2.5");
+  write_mat(6, 6, R"(2.5, "body": {"shape": "dome", "radius_mm": 47})");
   succeed("supertac-simulate --plates 3_Bumps --speeds 12 --trials 1 --passes 1 --sensor mat.json --out sim");
   const Recording truth = read_recording(list_recordings(path("sim")).front());
   std::string text;

@@ -226,6 +226,18 @@ TEST(Split, TrialTestsAllTrialsButTheFirst) {
       "split trial: pass 7 over 'bumps12' has no trial; use split group or pass, or record it with one");
 }
 
+TEST(Split, WhatIsForTrainingOnlyIsNoGroupToHoldOut) {
+  WindowSet set(wide_settings(16));
+  for (int pass = 1; pass <= 3; ++pass) {
+    Recording recording = make_recording({.pass = pass, .frames = 30});
+    recording.metadata["group"] = "person " + std::to_string(pass);
+    set.add(recording);
+  }
+  set.add(make_recording({.pass = 4, .frames = 30}), ".", {.training_only = true});
+  Split split = make_split(set, SplitKind::group, 3);
+  EXPECT_TRUE(hold_out_group(set, split, 3).empty()) << "two groups are left to train on";
+}
+
 TEST(Split, GroupKeepsGroupsTogether) {
   WindowSet set(wide_settings(16));
   for (int pass = 1; pass <= 20; ++pass) {

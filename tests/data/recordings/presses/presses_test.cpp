@@ -35,7 +35,7 @@ TEST(Presses, EveryKindReachesTheWholeArrayAndBitsFollowFromTheSeed) {
     EXPECT_NE(one.volts, simulate_presses(mat(), {.kind = kind, .number = 2, .count = 40}, 3).volts);
     felt.add(one);
   }
-  EXPECT_EQ(felt.text(), "");
+  EXPECT_TRUE(felt.unfelt().empty());
 }
 
 // The load's total and its middle are those of the truth: nothing is mirrored, turned or lost.
@@ -114,18 +114,18 @@ TEST(FeltTaxels, NamesThoseThatASimulationNeverReached) {
   r.volts = {0, 0, 0, 0, 0, 0, 3, 80, 9, 4, 9, 1};
   FeltTaxels felt;
   felt.add(r);
-  EXPECT_EQ(felt.text(), "5 of 6 taxels feel nothing: 0, 2-5");
+  EXPECT_EQ(felt.unfelt(), (std::vector<int>{0, 2, 3, 4, 5}));
   EXPECT_EQ(what_of<std::runtime_error>([&] { felt.check(); }),
             "5 of 6 taxels feel nothing: 0, 2-5; a network would learn that they never do. Say in the "
             "sensor's file what shape the array has, \"body\": {\"shape\": \"flat\"}, and simulate again");
   r.volts[8] = 30;
   FeltTaxels third;
   third.add(r);
-  third.check();  // as of one slide of the rig's dome
+  EXPECT_EQ(third.complaint(), "") << "as of one slide of the rig's dome";
   r.source = "imported", r.volts.assign(12, 0);
   FeltTaxels real;
   real.add(r);
-  EXPECT_EQ(real.text(), "") << "a real array may not have been pressed everywhere";
+  EXPECT_EQ(real.complaint(), "") << "a real array may not have been pressed everywhere";
 }
 
 }  // namespace
