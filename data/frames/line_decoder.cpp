@@ -1,5 +1,6 @@
 // Frames that are lines: columns of text, or JSON.
 #include <algorithm>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -8,6 +9,7 @@
 #include "data/frames/binary_decoder.h"
 #include "data/frames/frame_decoder.h"
 #include "data/frames/sensor_decoder.h"
+#include "data/frames/text_grammar.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
@@ -21,7 +23,8 @@ constexpr std::size_t kBytesOfNumber = 32, kBytesBesides = 4096;  // of the long
 class LineDecoder : public SensorDecoder {
  public:
   explicit LineDecoder(const Sensor& sensor) : format_(sensor.frame), count_(sensor.values()) {
-    longest_ = kBytesBesides + kBytesOfNumber * (count_ + format_.skip.size());
+    std::ranges::sort(format_.skip);
+    longest_ = kBytesBesides + 2 * kBytesOfNumber * (count_ + format_.skip.size());
   }
 
   void push(std::span<const std::byte> bytes, const Sink& sink) override {
@@ -33,53 +36,61 @@ class LineDecoder : public SensorDecoder {
         continue;
       }
       const std::size_t size = line_.size() + overlong_;
-      const std::string_view line = trimmed(line_);
       DecodedFrame frame;
       values_.clear();
-      if (overlong_ == 0 && read(line, frame) && values_.size() == count_) {
+      Line what = overlong_ > 0 ? Line::torn : read(line_, frame);
+      if (what == Line::frame && values_.size() != count_) what = Line::torn;
+      pending_ = what == Line::part ? pending_ + size + 1 : what == Line::torn ? pending_ : 0;
+      if (what == Line::frame) {
         ++counters_.frames;
         frame.values = values_;
         sink(frame);
-      } else if (!line.empty() || overlong_ > 0) {
-        ++counters_.torn, counters_.discarded_bytes += size + 1;
+      } else if (what == Line::torn && (overlong_ > 0 || !trimmed(line_).empty() || pending_ > 0)) {
+        ++counters_.torn, counters_.discarded_bytes += size + 1 + pending_;
+        pending_ = 0;
       }
       line_.clear(), overlong_ = 0;
     }
   }
 
  protected:
-  /// Fills values_ and the frame's time; false when the line is no frame.
-  virtual bool read(std::string_view line, DecodedFrame& frame) = 0;
+  enum class Line { part, frame, torn };
+  /// Fills values_ and the frame's time.
+  virtual Line read(std::string_view line, DecodedFrame& frame) = 0;
 
   FrameFormat format_;
   std::size_t count_;
   std::vector<float> values_;
 
  private:
-  std::size_t longest_, overlong_ = 0;
+  std::size_t longest_, overlong_ = 0, pending_ = 0;  // bytes; pending_: of lines that may become a frame
   std::string line_;
 };
 
 class TextDecoder : public LineDecoder {
  public:
-  using LineDecoder::LineDecoder;
+  explicit TextDecoder(const Sensor& sensor) : LineDecoder(sensor), lines_(sensor.frame) {}
 
  private:
-  bool read(std::string_view line, DecodedFrame& frame) override {
-    const std::vector<std::string_view> columns = split_line(line, format_.separator);
-    if (columns.size() != count_ + format_.skip.size() + (format_.time ? 1 : 0)) return false;
-    for (std::size_t c = 0; c < columns.size(); ++c) {
+  Line read(std::string_view line, DecodedFrame& frame) override {
+    const auto result = lines_.push(line);
+    if (result != TextFrames::Result::frame)
+      return result == TextFrames::Result::torn ? Line::torn : Line::part;
+    const std::vector<TextSlot>& slots = lines_.slots();
+    if (slots.size() != count_ + format_.skip.size() + (format_.time ? 1 : 0)) return Line::torn;
+    for (std::size_t c = 0; c < slots.size(); ++c) {
       const int column = static_cast<int>(c);
       if (std::ranges::find(format_.skip, column) != format_.skip.end()) continue;
-      const auto number = number_of(columns[c]);
-      if (!number) return false;
+      if (slots[c].words) return Line::torn;
       if (format_.time && format_.time->column == column)
-        frame.time_s = *number * format_.time->unit_s;
+        frame.time_s = slots[c].value * format_.time->unit_s;
       else
-        values_.push_back(static_cast<float>(*number));
+        values_.push_back(static_cast<float>(slots[c].value));
     }
-    return true;
+    return Line::frame;
   }
+
+  TextFrames lines_;
 };
 
 /// What stands at a key, or at a JSON Pointer (RFC 6901) such as "/finger/taxels". Throws where nothing does.
@@ -92,14 +103,20 @@ class JsonDecoder : public LineDecoder {
   using LineDecoder::LineDecoder;
 
  private:
-  bool read(std::string_view line, DecodedFrame& frame) override {
-    if (line.empty() || (line.front() != '{' && line.front() != '[')) return false;
+  Line read(std::string_view raw, DecodedFrame& frame) override {
+    const std::string clean = clean_line(raw);
+    const std::string_view line = behind_stamp(clean);
+    if (line.empty()) return Line::part;
+    if (line.front() != '{' && line.front() != '[') return Line::torn;
     try {
       const auto json = parse_json_limited(line);
       if (format_.time) frame.time_s = at(json, format_.time->key).get<double>() * format_.time->unit_s;
-      return flatten(format_.values.empty() ? json : at(json, format_.values), values_);
+      if (!flatten(format_.values.empty() ? json : at(json, format_.values), values_)) return Line::torn;
+      for (auto place = format_.skip.rbegin(); place != format_.skip.rend(); ++place)
+        if (*place < std::ssize(values_)) values_.erase(values_.begin() + *place);
+      return Line::frame;
     } catch (const std::exception&) {  // of the parser, or a key that is missing or no number
-      return false;
+      return Line::torn;
     }
   }
 };
@@ -124,8 +141,8 @@ class RigDecoder : public SensorDecoder {
 }  // namespace
 
 bool flatten(const nlohmann::ordered_json& json, std::vector<float>& numbers) {
-  if (json.is_number()) {
-    numbers.push_back(json.get<float>());
+  if (json.is_number() || json.is_null()) {
+    numbers.push_back(json.is_null() ? std::numeric_limits<float>::quiet_NaN() : json.get<float>());
     return true;
   }
   return json.is_array() && std::ranges::all_of(json, [&](const auto& e) { return flatten(e, numbers); });

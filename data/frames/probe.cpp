@@ -81,18 +81,23 @@ std::optional<FoundFormat> candidate_of(const std::string& bytes, std::span<cons
                                         const std::optional<Sensor>& known, std::vector<std::string>& says) {
   std::optional<FoundFormat> found;
   const double seconds = heard.empty() ? 0 : heard.back().time_s - heard.front().time_s;
-  const auto text_bytes = std::ranges::count_if(
-      bytes, [](char c) { return (c >= ' ' && c <= '~') || c == '\n' || c == '\r' || c == '\t'; });
+  const auto text_bytes = std::ranges::count_if(bytes, [](char c) {
+    return (c >= ' ' && c <= '~') || c == '\n' || c == '\r' || c == '\t' || c == '\x1B';
+  });
+  // UTF-16 has a NUL beside each character; some firmware sends one with each line.
+  const auto nul = static_cast<double>(std::ranges::count(bytes, '\0')),
+             all = static_cast<double>(bytes.size());
+  const bool padded = nul < 0.1 * all || (nul > 0.45 * all && nul < 0.55 * all);
   if (bytes.empty()) {
     says.push_back(
         "nothing came: see whether the sensor is switched on, and whether address and baud rate are right");
-  } else if (static_cast<double>(text_bytes) > kText * static_cast<double>(bytes.size())) {
+  } else if (static_cast<double>(text_bytes) > kText * (padded ? all - nul : all)) {
     found = find_text_format(bytes, seconds, says);
   } else {
     const auto binary =
         find_binary_format(bytes, seconds, known ? std::optional(known->values()) : std::nullopt);
     const auto shape = binary ? assumed_array(binary->values) : std::nullopt;
-    if (shape) found = FoundFormat{binary->format, *shape, ""};
+    if (shape) found = FoundFormat{binary->format, *shape, "", {}};
     if (!found)
       says.push_back(
           "binary without a period: a wrong baud rate, a checksum or type that is not known, or no sensor");
@@ -140,7 +145,7 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
   // A description that reads what came knows more than what can be guessed.
   const bool reads = known && !bytes.empty() &&
                      frames_of(*known, heard).frame_bytes > kMostly * static_cast<double>(bytes.size());
-  const auto found = reads ? std::optional(FoundFormat{known->frame, known->array, ""})
+  const auto found = reads ? std::optional(FoundFormat{known->frame, known->array, "", {}})
                            : candidate_of(bytes, heard, known, report.says);
   draft.name = "probed sensor";
   if (known) draft.name = known->name, draft.order = known->order;
@@ -154,6 +159,7 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
   }
   draft.array = known ? known->array : found->array;
   draft.frame = found->format;
+  if (!known) draft.dead = found->dead;
   const HeardFrames frames = frames_of(draft, heard);
   if (frames.count < 2 || frames.frame_bytes < 0.5 * static_cast<double>(bytes.size())) {
     report.says.push_back("only " + std::to_string(frames.count) +

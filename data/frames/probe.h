@@ -50,7 +50,8 @@ ProbeReport find_gain(std::span<const Heard> heard, const Sensor& sensor);
 struct FoundFormat {
   FrameFormat format;
   TaxelArray array;
-  std::string remark;  ///< for people
+  std::string remark;          ///< for people
+  std::vector<int> dead = {};  ///< values that say "nan", "-" or nothing only
 };
 /// Columns of numbers or objects of JSON in `bytes`, which were heard for `seconds`; empty, and `says` why,
 /// where they are neither.

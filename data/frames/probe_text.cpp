@@ -8,6 +8,7 @@
 
 #include "data/frames/probe.h"
 #include "data/frames/sensor_decoder.h"
+#include "data/frames/text_grammar.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
@@ -22,20 +23,26 @@ constexpr std::size_t kFewLines = 3;    // of which nothing can be said
 constexpr std::size_t kManyLines = 30;  // a signal does not rise from each of them to the next
 
 struct Lines {
-  std::vector<std::string_view> text;
-  double seconds = 0;  // from the first to the last
+  std::vector<std::string> text;  // clean
+  std::vector<std::string> raw;   // empty ones too
+  double seconds = 0;             // from the first to the last
 };
 
 // Whole ones: the first and the last may be torn.
 Lines lines_of(const std::string& bytes, double seconds) {
-  Lines lines{.text = {}, .seconds = seconds};
+  Lines lines{.text = {}, .raw = {}, .seconds = seconds};
   for (std::size_t at = bytes.find('\n'); at != std::string::npos;) {
     const std::size_t end = bytes.find('\n', at + 1);
     if (end == std::string::npos) break;
-    const std::string_view line = std::string_view(bytes).substr(at + 1, end - at - 1);
-    if (line.find_first_not_of(" \t\r") != std::string_view::npos) lines.text.push_back(line);
+    lines.raw.push_back(bytes.substr(at + 1, end - at - 1));
+    if (std::string clean = clean_line(lines.raw.back()); !clean.empty())
+      lines.text.push_back(std::move(clean));
     at = end;
   }
+  // What waited, and marks of Unicode, stand before the first line feed.
+  if (!lines.raw.empty() &&
+      (bytes.starts_with("\xFF\xFE") || bytes.starts_with("\xFE\xFF") || bytes.starts_with("\xEF\xBB\xBF")))
+    lines.raw.insert(lines.raw.begin(), bytes.substr(0, bytes.find('\n')));
   return lines;
 }
 
@@ -61,50 +68,85 @@ Steps steps_of(std::span<const double> values) {
   return steps;
 }
 
-std::optional<FoundFormat> columns_of(const Lines& lines) {
-  std::optional<FoundFormat> best;
-  std::size_t most = 1;
-  for (const char separator : {',', ';', '\t', '|', ' '}) {
-    std::map<std::size_t, std::size_t> counts;
-    for (const auto line : lines.text) ++counts[split_line(line, separator).size()];
-    const auto usual = std::ranges::max_element(counts, {}, [](const auto& entry) { return entry.second; });
-    if (usual->first <= most ||
-        static_cast<double>(usual->second) < 0.5 * static_cast<double>(lines.text.size()))
-      continue;
-    most = usual->first;
-    std::vector<std::vector<double>> columns(most);
-    for (const auto line : lines.text) {
-      const auto texts = split_line(line, separator);
-      if (texts.size() != most) continue;
-      for (std::size_t c = 0; c < most; ++c)
-        columns[c].push_back(number_of(texts[c]).value_or(std::numeric_limits<double>::quiet_NaN()));
-    }
-    FoundFormat candidate;
-    candidate.format = {.kind = FrameKind::text, .separator = separator};
-    for (std::size_t c = 0; c < most; ++c) {
-      const int column = static_cast<int>(c);
-      const auto nan = std::ranges::count_if(columns[c], [](double v) { return std::isnan(v); });
-      const auto unit = nan == 0 ? unit_of_clock(columns[c], lines.seconds) : std::nullopt;
-      const Steps steps = steps_of(columns[c]);
-      const bool counts_up = nan == 0 && steps.by_one + 1 == columns[c].size();
-      const bool rises = nan == 0 && columns[c].size() >= kManyLines && steps.fell == 0 &&
-                         2 * steps.rose > columns[c].size();
-      if (unit && !candidate.format.time)
-        candidate.format.time = FrameTime{.column = column, .unit_s = *unit};
-      else if (static_cast<double>(nan) > 0.5 * static_cast<double>(columns[c].size()) || counts_up || rises)
-        candidate.format.skip.push_back(column);
-    }
-    const std::size_t values = most - candidate.format.skip.size() - (candidate.format.time ? 1 : 0);
-    const auto array = assumed_array(values);
-    if (!array) continue;
-    candidate.array = *array;
-    if (!candidate.format.skip.empty())
-      candidate.remark =
-          "columns that are no signal (words, a counter, a clock of no known unit) are skipped: " +
-          nlohmann::json(candidate.format.skip).dump();
-    best = candidate;
+// A list of slots as "0 to 3, 7".
+std::string places(const std::vector<int>& slots) {
+  std::string text;
+  for (std::size_t i = 0; i < slots.size();) {
+    std::size_t end = i + 1;
+    while (end < slots.size() && slots[end] == slots[end - 1] + 1) ++end;
+    text += (text.empty() ? "" : ", ") + std::to_string(slots[i]) +
+            (end - i > 1 ? " to " + std::to_string(slots[end - 1]) : "");
+    i = end;
   }
-  return best;
+  return text;
+}
+
+// Every slot's role is said; time and skip are written from them.
+std::optional<FoundFormat> found_by_roles(TextGrammar& grammar, double seconds,
+                                          std::vector<std::string>& says) {
+  constexpr std::pair<SlotRole::Kind, const char*> kNames[] = {
+      {SlotRole::signal, "signal"},
+      {SlotRole::clock, "clock"},
+      {SlotRole::counter, "counter"},
+      {SlotRole::checksum, "checksum"},
+      {SlotRole::constant, "signal that never changes"},
+      {SlotRole::label, "label"},
+      {SlotRole::words, "words"},
+      {SlotRole::other, "no taxel"}};
+  const std::vector<SlotRole> roles = roles_of(grammar, seconds);
+  FoundFormat found{.format = grammar.format, .array = {}, .remark = {}};
+  std::vector<std::pair<std::string, std::vector<int>>> said;
+  std::size_t values = 0;
+  for (std::size_t c = 0; c < roles.size(); ++c) {
+    const int column = static_cast<int>(c);
+    const SlotRole& role = roles[c];
+    if (role.kind == SlotRole::clock && role.unit_s > 0 && !found.format.time)
+      found.format.time = FrameTime{.column = column, .unit_s = role.unit_s};
+    else if (role.kind != SlotRole::signal && role.kind != SlotRole::constant)
+      found.format.skip.push_back(column);
+    else if (++values; std::ranges::all_of(grammar.columns[c], [](double v) { return std::isnan(v); }))
+      found.dead.push_back(static_cast<int>(values) - 1);
+    const auto* name = std::ranges::find(kNames, role.kind, [](const auto& n) { return n.first; });
+    const std::string what = std::string(name->second) + ": " + role.why;
+    const auto known = std::ranges::find(said, what, [](const auto& s) { return s.first; });
+    (known == said.end() ? said.emplace_back(what, std::vector<int>{}) : *known).second.push_back(column);
+  }
+  says.insert(says.end(), grammar.says.begin(), grammar.says.end());
+  constexpr std::size_t kMostSaid = 12;
+  for (std::size_t i = 0; i < std::min(said.size(), kMostSaid); ++i)
+    says.push_back("slot" + std::string(said[i].second.size() > 1 ? "s " : " ") + places(said[i].second) +
+                   ": " + said[i].first);
+  if (said.size() > kMostSaid)
+    says.push_back("and " + std::to_string(said.size() - kMostSaid) + " more roles");
+  const auto array = values == 0 ? std::nullopt : assumed_array(values);
+  if (!grammar.doubt.empty()) {
+    says.push_back("two readings explain this alike: " + grammar.doubt +
+                   "; no draft is written: give the sensor's file, with \"lines_per_frame\" and \"skip\"");
+    return std::nullopt;
+  }
+  if (!array) return std::nullopt;
+  found.array = *array;
+  if (grammar.format.lines_per_frame > 1 &&
+      values % static_cast<std::size_t>(grammar.format.lines_per_frame) == 0) {
+    const std::size_t rows = static_cast<std::size_t>(grammar.format.lines_per_frame);
+    if (const std::size_t sides[] = {rows, values / rows}; rows <= 64 && sides[1] > 1 && sides[1] <= 64)
+      found.array = {.rows = static_cast<int>(rows), .columns = static_cast<int>(sides[1])};
+  }
+  if (grammar.format.lines_per_frame > 1)
+    found.remark = "a frame is " + std::to_string(grammar.format.lines_per_frame) + " lines, " +
+                   (grammar.format.prefix.empty() ? "behind an empty line"
+                                                  : "the first begins " + in_quotes(grammar.format.prefix));
+  if (!found.format.skip.empty()) {
+    if (!found.remark.empty()) found.remark += "; ";
+    found.remark += "columns that are no signal (words, a counter, a clock of no known unit) are skipped: " +
+                    nlohmann::json(found.format.skip).dump();
+  }
+  return found;
+}
+
+std::optional<FoundFormat> columns_of(const Lines& lines, std::vector<std::string>& says) {
+  auto grammar = find_grammar(lines.raw);
+  return grammar ? found_by_roles(*grammar, lines.seconds, says) : std::nullopt;
 }
 
 void sizes_of(const nlohmann::ordered_json& json, std::vector<std::size_t>& nested) {
@@ -113,8 +155,9 @@ void sizes_of(const nlohmann::ordered_json& json, std::vector<std::size_t>& nest
   sizes_of(json.front(), nested);
 }
 
-std::optional<FoundFormat> objects_of(const Lines& lines) {
+std::optional<FoundFormat> objects_of(const Lines& lines, std::vector<std::string>& says) {
   std::map<std::string, std::vector<double>> scalars;
+  std::map<std::string, std::vector<std::vector<double>>> arrays;
   std::vector<std::size_t> nested;
   FoundFormat candidate{.format = {.kind = FrameKind::json}, .array = {}, .remark = {}};
   std::size_t most = 0, parsed = 0;
@@ -128,19 +171,44 @@ std::optional<FoundFormat> objects_of(const Lines& lines) {
             outermost && !place.back().starts_with('/') ? place.back() : place.to_string();
         std::vector<float> numbers;
         if (value.is_number()) scalars[key].push_back(value.get<double>());
-        if (!value.is_array() || !flatten(value, numbers) || numbers.size() <= most) return;
+        if (!value.is_array() || !flatten(value, numbers)) return;
+        arrays[key].emplace_back(numbers.begin(), numbers.end());
+        if (numbers.size() <= most) return;
         most = numbers.size(), candidate.format.values = key, nested.clear();
         sizes_of(value, nested);
       };
-  for (const auto line : lines.text) try {
-      const auto json = parse_json_limited(line);
+  for (const std::string& line : lines.text) try {
+      const auto json = parse_json_limited(behind_stamp(line));
       if (json.is_structured()) look(Pointer(), json);
       ++parsed;
     } catch (const JsonError&) {  // no line of this kind
     }
   if (static_cast<double>(parsed) < 0.5 * static_cast<double>(lines.text.size()) || most == 0)
     return std::nullopt;
-  const auto array = assumed_array(most, nested);
+  // The places of a flat array are slots as well.
+  std::vector<std::vector<double>>& frames = arrays[candidate.format.values];
+  std::erase_if(frames, [&](const auto& frame) { return frame.size() != most; });
+  TextGrammar grammar{.format = candidate.format};
+  grammar.columns.resize(most), grammar.before.resize(most), grammar.sample.resize(most);
+  grammar.decimals.resize(most), grammar.words.resize(most), grammar.wall.resize(most);
+  for (std::size_t c = 0; c < most && nested.size() == 1 && !frames.empty(); ++c)
+    for (const auto& frame : frames) {
+      grammar.columns[c].push_back(frame[c]);
+      grammar.decimals[c] = std::max(grammar.decimals[c], frame[c] == std::round(frame[c]) ? 0 : 1);
+    }
+  std::optional<TaxelArray> array = assumed_array(most, nested);
+  if (nested.size() == 1) {
+    const auto found = found_by_roles(grammar, lines.seconds, says);
+    if (!found) return std::nullopt;
+    candidate = *found, array = found->array;
+    if (found->format.time) {
+      const std::string column = std::to_string(found->format.time->column);
+      const std::string of = candidate.format.values;
+      candidate.format.time->key = (of.empty() || of.starts_with('/') ? of : "/" + of) + "/" + column;
+      candidate.format.skip.push_back(found->format.time->column);
+      candidate.format.time->column = 0;
+    }
+  }
   if (!array) return std::nullopt;
   candidate.array = *array;
   // The clock beside the array rather than another.
@@ -158,7 +226,7 @@ std::optional<FoundFormat> objects_of(const Lines& lines) {
 
 bool is_object(std::string_view line) {
   try {
-    return parse_json_limited(line).is_object();
+    return parse_json_limited(behind_stamp(line)).is_object();
   } catch (const JsonError&) {
     return false;
   }
@@ -220,15 +288,16 @@ std::optional<FoundFormat> find_text_format(const std::string& bytes, double sec
     says.push_back("a printer's firmware answers here; choose the sensor's port (--list-ports)");
     return std::nullopt;
   }
-  auto found = objects_of(lines);
+  const std::size_t before = says.size();
+  auto found = objects_of(lines, says);
   if (!found && 2 * std::ranges::count_if(lines.text, is_object) > std::ssize(lines.text)) {
     says.push_back(
         "objects of JSON without an array of numbers that makes rows and columns: the sensor has to send "
         "its taxels as one, such as {\"values\": [1, 2, 3, 4]}");
     return std::nullopt;
   }
-  if (!found) found = columns_of(lines);
-  if (!found)
+  if (!found) found = columns_of(lines, says);
+  if (!found && says.size() == before)
     says.push_back(
         "a log, or words: no columns of numbers, and no JSON; choose the sensor's port, or its firmware");
   return found;

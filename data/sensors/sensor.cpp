@@ -36,17 +36,27 @@ void check_format(const FrameFormat& f) {
   const auto one_of = [](const std::string& word, std::initializer_list<const char*> words) {
     return std::ranges::find(words, word) != words.end();
   };
-  if (f.kind == FrameKind::text) {
+  const bool text = f.kind == FrameKind::text;
+  if (text || f.kind == FrameKind::json) {
     std::set<int> columns(f.skip.begin(), f.skip.end());
-    if (f.time) columns.insert(f.time->column);
-    expect(columns.size() == f.skip.size() + (f.time ? 1 : 0), "frame.skip",
+    if (text && f.time) columns.insert(f.time->column);
+    expect(columns.size() == f.skip.size() + (text && f.time ? 1 : 0), "frame.skip",
            "other columns than that of time", "one twice");
     expect(columns.empty() || (*columns.begin() >= 0 && *columns.rbegin() < 100'000), "frame.skip",
            "columns from 0 to 99999", std::to_string(columns.empty() ? 0 : *columns.begin()));
-    expect(f.separator >= ' ' ? f.separator <= '~' : f.separator == '\t', "frame.separator",
-           "one printable character or a tab", in_quotes(std::string(1, f.separator)));
-    expect(std::string("0123456789.+-eE").find(f.separator) == std::string::npos, "frame.separator",
-           "no part of a number", in_quotes(std::string(1, f.separator)));
+  }
+  if (text) {
+    expect(f.separator == 0 || (f.separator >= ' ' ? f.separator <= '~' : f.separator == '\t'),
+           "frame.separator", "one printable character or a tab", in_quotes(std::string(1, f.separator)));
+    expect(f.separator == 0 || (std::string("0123456789.+-eE").find(f.separator) == std::string::npos &&
+                                f.separator != f.decimal),
+           "frame.separator", "no part of a number", in_quotes(std::string(1, f.separator)));
+    expect(f.lines_per_frame >= 1 && f.lines_per_frame <= 300, "frame.lines_per_frame", "1 to 300",
+           std::to_string(f.lines_per_frame));
+    expect(f.prefix.size() <= kLongestMark, "frame.prefix", "at most 64 bytes",
+           std::to_string(f.prefix.size()));
+    expect(one_of(f.checksum, {"none", "hex", "sum8", "xor8", "crc16-modbus", "crc16-ccitt"}),
+           "frame.checksum", "none, hex, sum8, xor8, crc16-modbus or crc16-ccitt", in_quotes(f.checksum));
   }
   if (f.kind != FrameKind::binary) return;
   expect(f.header.size() <= kLongestMark && f.trailer.size() <= kLongestMark, "frame.header",

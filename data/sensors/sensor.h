@@ -36,7 +36,7 @@ struct FrameTime {
   int column = 0;         ///< of a line of text
   std::string key = {};   ///< of a JSON object
   std::string type = {};  ///< of a binary frame, where it follows the header: "u16", "u32", "u64", "f64"
-  double unit_s = 1;      ///< "s", "ms" or "us"
+  double unit_s = 1;      ///< "s", "ms", "us" or "ns"
   bool operator==(const FrameTime&) const = default;
 };
 
@@ -60,9 +60,12 @@ inline constexpr const char* kChecksums[] = {"none", "sum8",         "xor8",    
 struct FrameFormat {
   FrameKind kind = FrameKind::board;
   std::optional<FrameTime> time = {};
-  // text: a line a frame
-  char separator = ',';        ///< ' ': any white space
-  std::vector<int> skip = {};  ///< columns that are neither time nor values
+  // text: lines_per_frame lines a frame
+  char separator = ',';  ///< ' ': any white space; 0 ("any"): every number is a column, whatever is between
+  char decimal = '.';    ///< or ','
+  int lines_per_frame = 1;     ///< columns count through them
+  std::string prefix = {};     ///< a frame's first line begins so; empty: after an empty line, or any line
+  std::vector<int> skip = {};  ///< columns that are neither time nor values; of json: places in the array
   // json: a line a frame
   std::string values = {};  ///< key of the array, which may be nested; empty: the line is the array
   // binary: header, fields, checksum, trailer
@@ -70,7 +73,8 @@ struct FrameFormat {
   bool big_endian = false;
   std::string type = "u16";             ///< "u8", "i8", "u16", "i16", "u32", "i32" or "f32"
   std::vector<FrameField> fields = {};  ///< empty: time, where there is one, and all values
-  std::string checksum = "none";        ///< one of kChecksums
+  /// Of text: hexadecimal at the line's end, of what stands before it, or "hex", unknown.
+  std::string checksum = "none";  ///< one of kChecksums
   std::optional<std::size_t> checksum_from =
       {};  ///< the frame's first byte that it covers; else behind header
   std::optional<bool> checksum_big_endian = {};  ///< else as big_endian

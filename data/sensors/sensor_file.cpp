@@ -18,7 +18,7 @@ constexpr std::pair<const char*, FrameKind> kKinds[] = {{"board", FrameKind::boa
                                                         {"text", FrameKind::text},
                                                         {"json", FrameKind::json},
                                                         {"binary", FrameKind::binary}};
-constexpr std::pair<const char*, double> kUnits[] = {{"s", 1}, {"ms", 1e-3}, {"us", 1e-6}};
+constexpr std::pair<const char*, double> kUnits[] = {{"s", 1}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}};
 
 // So that 2.09 and 2.45 are 0.36 apart, as they are for a reader.
 double rounded(double value) {
@@ -149,10 +149,16 @@ FrameFormat format_of(const Json& json, const std::string& where) {
     f.time = time_of(*time, f.kind, where);
   if (f.kind == FrameKind::text) {
     const std::string separator = keys.text("separator", ",");
-    if (separator.size() != 1) keys.wrong("separator", "one character", Json(separator));
-    f.separator = separator.front();
-    f.skip = keys.integers("skip");
+    if (separator.size() != 1 && separator != "any")
+      keys.wrong("separator", "one character", Json(separator));
+    f.separator = separator == "any" ? '\0' : separator.front();
+    constexpr std::pair<const char*, char> kDecimals[] = {{".", '.'}, {",", ','}};
+    f.decimal = keys.one_of("decimal", kDecimals, ".");
+    f.lines_per_frame = keys.integer("lines_per_frame", 1);
+    f.prefix = keys.text("prefix", "");
+    f.checksum = keys.text("checksum", f.checksum);
   }
+  if (f.kind == FrameKind::text || f.kind == FrameKind::json) f.skip = keys.integers("skip");
   if (f.kind == FrameKind::json) f.values = keys.text("values", "");
   if (f.kind == FrameKind::binary) {
     f.header = bytes_of_hex(keys, "header");
@@ -203,8 +209,14 @@ Json json_of(const FrameFormat& f) {
   for (const auto& [word, kind] : kKinds)
     if (kind == f.kind) json["kind"] = word;
   const bool text = f.kind == FrameKind::text, object = f.kind == FrameKind::json;
-  if (text) json["separator"] = std::string(1, f.separator);
-  if (text && !f.skip.empty()) json["skip"] = f.skip;
+  if (text) {
+    json["separator"] = f.separator == 0 ? "any" : std::string(1, f.separator);
+    if (f.decimal != '.') json["decimal"] = std::string(1, f.decimal);
+    if (f.lines_per_frame != 1) json["lines_per_frame"] = f.lines_per_frame;
+    if (!f.prefix.empty()) json["prefix"] = f.prefix;
+    if (f.checksum != "none") json["checksum"] = f.checksum;
+  }
+  if ((text || object) && !f.skip.empty()) json["skip"] = f.skip;
   if (object && !f.values.empty()) json["values"] = f.values;
   if (f.kind == FrameKind::binary) {
     if (!f.header.empty()) json["header"] = hex_of_bytes(f.header);

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "data/frames/text_grammar.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
@@ -76,6 +77,7 @@ Table numpy_table(const std::string& path, FileReader& file) {
     std::string_view dim = text.substr(0, text.find(','));
     text.remove_prefix(std::min(text.size(), dim.size() + 1));
     while (dim.starts_with(' ')) dim.remove_prefix(1);
+    if (dim.size() > 1 && dim.ends_with('L')) dim.remove_suffix(1);  // Python 2's long
     if (dim.empty()) continue;
     const auto value = parse_uint(dim);
     if (!value || *value < 1 || *value > kMaxBytes)
@@ -112,20 +114,7 @@ Table numpy_table(const std::string& path, FileReader& file) {
 
 // --- text
 
-/// The first of , ; tab that the line has; else, and where a line of numbers mixes them, blanks and tabs.
-char separator_of(std::string_view line) {
-  for (const char c : {',', ';'})
-    if (line.find(c) != std::string_view::npos) return c;
-  const bool names = line.find_first_not_of("0123456789+-.eE \t\r") != std::string_view::npos;
-  return names && line.find('\t') != std::string_view::npos ? '\t' : ' ';
-}
-
-std::vector<std::string_view> cells_of(std::string_view line, char separator) {
-  std::vector<std::string_view> cells = split_line(line, separator);
-  for (std::string_view& cell : cells)
-    if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') cell = cell.substr(1, cell.size() - 2);
-  return cells;
-}
+constexpr std::size_t kLinesToLearn = 2000;
 
 /// Empty lines and remarks hold none.
 bool holds_row(std::string_view line) {
@@ -133,61 +122,51 @@ bool holds_row(std::string_view line) {
   return !content.empty() && content.front() != '#';
 }
 
-/// How many columns most of the first lines have.
-std::size_t usual_columns(std::string_view text, char separator) {
-  std::map<std::size_t, int> counts;
-  for (int i = 0; i < 1000 && !text.empty(); ++i) {
-    const std::string_view line = text.substr(0, text.find('\n'));
-    text.remove_prefix(std::min(text.size(), line.size() + 1));
-    if (holds_row(line)) ++counts[cells_of(line, separator).size()];
-  }
-  const auto most = std::ranges::max_element(counts, {}, [](const auto& c) { return c.second; });
-  return most == counts.end() ? 0 : most->first;
-}
-
-bool append_numbers(const std::vector<std::string_view>& cells, std::vector<double>& values) {
-  const std::size_t before = values.size();
-  for (const std::string_view cell : cells)
-    if (const auto value = number_of(cell)) values.push_back(*value);
-  if (values.size() == before + cells.size()) return true;
-  values.resize(before);
-  return false;
-}
-
 Table text_table(const std::string& path) {
   const std::string whole = read_text_file(path, kMaxBytes);
   std::string_view text = whole;
-  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-  Table table;
-  char separator = 0;
-  std::size_t number = 0, lines = 0;
-  while (!text.empty()) {
+  const auto next = [&] {
     const std::string_view line = text.substr(0, text.find('\n'));
-    const std::string_view rest = text.substr(std::min(text.size(), line.size() + 1));
-    ++number;
-    if (holds_row(line)) {
-      if (separator == 0) {
-        separator = separator_of(trimmed(line));
-        table.columns = usual_columns(text, separator);
-        table.shape = {table.columns};
-      }
-      const auto cells = cells_of(line, separator);
-      ++lines;
-      const bool fits = cells.size() == table.columns;
-      if (fits && append_numbers(cells, table.values)) {
-        table.lines.push_back(number), table.places.push_back(lines);
-      } else if (fits && lines == 1 &&
-                 std::ranges::none_of(cells, [](auto cell) { return number_of(cell).has_value(); })) {
-        table.names.assign(cells.begin(), cells.end());
-      } else {
-        ++table.dropped;
-      }
-    }
-    text = rest;
-  }
-  if (table.rows() == 0)
+    text.remove_prefix(std::min(text.size(), line.size() + 1));
+    return line;
+  };
+  std::vector<std::string> learnt;
+  while (!text.empty() && learnt.size() < kLinesToLearn) learnt.emplace_back(next());
+  const std::optional<TextGrammar> grammar = find_grammar(learnt);
+  if (!grammar)
     throw FileError(path,
                     "holds no line of numbers; expected a row a line, separated by commas, tabs or blanks");
+  if (!grammar->doubt.empty()) throw FileError(path, "two readings explain it alike: " + grammar->doubt);
+  Table table;
+  table.columns = grammar->columns.size(), table.shape = {table.columns};
+  const FrameFormat& format = grammar->format;
+  TextFrames frames(format);
+  std::size_t number = 0, lines = 0;
+  for (text = whole; !text.empty();) {
+    const std::string line = clean_line(next());
+    ++number;
+    if (line.starts_with('#')) continue;
+    const auto result = frames.push(line);
+    if (!holds_row(line) && result == TextFrames::Result::nothing) continue;
+    ++lines;
+    const auto& slots = frames.slots();
+    bool fits = result == TextFrames::Result::frame && slots.size() == table.columns;
+    for (std::size_t c = 0; fits && c < slots.size(); ++c) fits = slots[c].words == grammar->words[c];
+    if (fits) {
+      for (const TextSlot& slot : slots) table.values.push_back(slot.value);
+      table.lines.push_back(number), table.places.push_back(lines);
+    } else if (result == TextFrames::Result::nothing) {
+      --lines;  // of a frame of several
+    } else if (table.rows() == 0 && table.names.empty() && format.lines_per_frame == 1) {
+      const auto names = slots_of(line, format.separator == 0 ? ',' : format.separator, format.decimal);
+      if (names.size() == table.columns && std::ranges::all_of(names, &TextSlot::words))
+        for (const TextSlot& name : names) table.names.emplace_back(name.text);
+      else
+        ++table.dropped;
+    } else {
+      ++table.dropped;
+    }
+  }
   if (table.dropped * 10 > table.rows() + table.dropped)
     throw FileError(path, std::to_string(table.dropped) + " of " + std::to_string(lines) + " lines are not " +
                               std::to_string(table.columns) +

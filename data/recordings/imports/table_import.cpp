@@ -18,7 +18,8 @@ double unit_s(const std::string& unit) {
   if (unit == "s") return 1;
   if (unit == "ms") return 1e-3;
   if (unit == "us") return 1e-6;
-  throw std::invalid_argument("time is in " + in_quotes(unit) + ", expected s, ms or us");
+  if (unit == "ns") return 1e-9;
+  throw std::invalid_argument("time is in " + in_quotes(unit) + ", expected s, ms, us or ns");
 }
 
 /// The columns that "8-71", "s0-s63" or a single name stand for.
@@ -44,8 +45,20 @@ struct Columns {
   std::vector<std::size_t> values;
 };
 
-Columns columns_of(const Table& table, const ColumnMap& map, std::size_t expected) {
+Columns columns_of(const Table& table, const ColumnMap& map, const Sensor& sensor) {
   Columns columns;
+  const std::size_t expected = sensor.values();
+  const FrameFormat& frame = sensor.frame;
+  if (map.time.empty() && map.x.empty() && map.values.empty() && frame.kind == FrameKind::text &&
+      table.columns == expected + frame.skip.size() + (frame.time ? 1 : 0)) {
+    // The table is what the sensor sends, as its file describes it.
+    if (frame.time) columns.time = static_cast<std::size_t>(frame.time->column);
+    for (std::size_t c = 0; c < table.columns; ++c)
+      if (c != columns.time && std::ranges::find(frame.skip, static_cast<int>(c)) == frame.skip.end())
+        columns.values.push_back(c);
+    if (columns.values.size() == expected) return columns;
+    columns = {};
+  }
   const auto find = [&](const std::string& name) {
     return name.empty() ? Columns::kNone : table.column(name);
   };
@@ -199,8 +212,9 @@ ColumnMap column_map(const std::string& text) {
     const std::string key = entry.substr(0, equals);
     std::string value = equals == std::string::npos ? "" : entry.substr(equals + 1);
     if (value.empty() || (key != "time" && key != "x" && key != "y" && key != "values"))
-      throw std::invalid_argument("found " + in_quotes(entry) +
-                                  ", expected time=COLUMN[:s|ms|us], x=COLUMN, y=COLUMN, values=FIRST-LAST");
+      throw std::invalid_argument(
+          "found " + in_quotes(entry) +
+          ", expected time=COLUMN[:s|ms|us|ns], x=COLUMN, y=COLUMN, values=FIRST-LAST");
     if (const std::size_t colon = value.rfind(':'); key == "time" && colon != std::string::npos) {
       map.time_unit_s = unit_s(value.substr(colon + 1));
       value.resize(colon);
@@ -222,18 +236,24 @@ Recording recording_of_table(const std::string& path, const Table& table, const 
                              const Sensor& sensor) {
   Columns columns;
   try {
-    columns = columns_of(table, map, sensor.values());
+    columns = columns_of(table, map, sensor);
     if (map.values.empty()) check_shape(table, sensor);
   } catch (const std::invalid_argument& error) {
     throw FileError(path, error.what());
   }
   Recording recording;
-  recording.array = sensor.array, recording.signal_scale = sensor.scale, recording.body = sensor.body,
-  recording.source = "imported";
-  recording.time_s = times_of(path, table, columns.time, map.time_unit_s, sensor.rate_hz);
+  const double unit =
+      columns.time != Columns::kNone && map.time.empty() ? sensor.frame.time->unit_s : map.time_unit_s;
+  recording.array = sensor.array, recording.signal_scale = sensor.scale;
+  recording.body = sensor.body, recording.source = "imported";
+  recording.time_s = times_of(path, table, columns.time, unit, sensor.rate_hz);
   check_rate(path, table, columns.time, recording, sensor.rate_hz);
+  std::vector<bool> silent(columns.values.size());
+  for (const int taxel : sensor.dead)
+    for (int c = 0; c < sensor.array.channels && sensor.order.empty(); ++c)
+      silent[static_cast<std::size_t>(taxel * sensor.array.channels + c)] = true;
   for (std::size_t k = 0; k < columns.values.size(); ++k)
-    check_taxel(path, table, columns.values[k], k, sensor.scale);
+    if (!silent[k]) check_taxel(path, table, columns.values[k], k, sensor.scale);
   const std::size_t signals = sensor.array.signals();
   recording.volts.resize(table.rows() * signals);
   std::vector<float> sent(sensor.values());

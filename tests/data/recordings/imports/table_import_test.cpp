@@ -177,10 +177,10 @@ TEST_F(TableImport, ImpossibleValuesAreNamed) {
                  "column 2 as value 2 of the frame is nan in line 4");
   expect_refusal(file("a b\nc d\n"), "", "holds no line of numbers");
   for (const auto& [map, why] :
-       {std::pair("time=0:h", "time is in 'h', expected s, ms or us"),
+       {std::pair("time=0:h", "time is in 'h', expected s, ms, us or ns"),
         {"time=0,x=1,y=2,time=3", "names time twice"},
         {"x=0", "names only one of x and y; a position has both"},
-        {"z=0", "found 'z=0', expected time=COLUMN[:s|ms|us], x=COLUMN, y=COLUMN, values=FIRST-LAST"}})
+        {"z=0", "found 'z=0', expected time=COLUMN[:s|ms|us|ns], x=COLUMN, y=COLUMN, values=FIRST-LAST"}})
     EXPECT_EQ(what_of<std::invalid_argument>([&] { column_map(map); }), why);
 }
 

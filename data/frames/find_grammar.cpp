@@ -1,0 +1,349 @@
+// Reading and period of lines.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "data/frames/text_grammar.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kUsual = 0.5;     // of the lines at least are read alike
+constexpr double kPeriodic = 0.7;  // of the gaps between lines of a kind are alike
+constexpr std::size_t kMostLines = 300, kFewFrames = 3;
+constexpr double kRowsAlike = 0.9;  // of the variance stay within rows that are frames
+constexpr double kRowsDiffer =
+    0.7;  // of the variance of all: what stays within the rows, where rows are taxels
+
+std::string number(double value) { return format(value); }
+
+struct Reading {
+  char separator, decimal;
+  std::size_t slots = 0, numbers = 0;  // of the usual line: cells or numbers; of these no words
+  double share = 0;                    // of the lines, weighted by their length, that are such
+};
+
+Reading read_as(const std::vector<std::string>& lines, char separator, char decimal) {
+  std::map<std::pair<std::size_t, std::size_t>, double> counts;
+  double all = 0;
+  for (const std::string& line : lines) {
+    const auto slots = slots_of(line, separator, decimal);
+    const auto numbers =
+        slots.size() - static_cast<std::size_t>(std::ranges::count_if(slots, &TextSlot::words));
+    if (numbers == 0) continue;
+    counts[{slots.size(), numbers}] += static_cast<double>(numbers);
+    all += static_cast<double>(numbers);
+  }
+  Reading reading{.separator = separator, .decimal = decimal};
+  if (counts.empty()) return reading;
+  const auto usual = std::ranges::max_element(counts, {}, [](const auto& c) { return c.second; });
+  reading.slots = usual->first.first, reading.numbers = usual->first.second,
+  reading.share = usual->second / all;
+  return reading;
+}
+
+/// Whether commas within "1,5" are points: there are no others, and no comma is left between such numbers.
+bool commas_are_points(const std::vector<std::string>& lines) {
+  std::size_t fractions = 0, all = 0, betrayed = 0, points = 0;
+  for (const std::string& line : lines) {
+    const std::string_view content = behind_stamp(line);
+    for (std::size_t i = 1; i + 1 < content.size(); ++i)
+      if (content[i] == '.' && content[i - 1] >= '0' && content[i - 1] <= '9' && content[i + 1] >= '0' &&
+          content[i + 1] <= '9') {
+        ++points;
+        break;
+      }
+    const auto slots = slots_of(behind_stamp(line), 0, ',');
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+      if (slots[i].wall) continue;
+      ++all;
+      fractions += slots[i].text.find(',') != std::string_view::npos;
+      betrayed += (i > 0 && slots[i].before == ",") || slots[i].text.find('.') != std::string_view::npos;
+    }
+  }
+  return 5 * fractions > all && 20 * betrayed < all && 5 * points < lines.size();
+}
+
+/// What begins a line: its template before the first number.
+std::string beginning(const std::string& line, const Reading& reading) {
+  const std::string_view content = behind_stamp(line);
+  const auto slots = slots_of(content, 0, reading.decimal);
+  return std::string(
+      trimmed(slots.empty() ? content : content.substr(0, slots[0].text.data() - content.data())));
+}
+
+struct Kind {
+  std::string begins;
+  std::size_t count = 0;
+  auto operator<=>(const Kind&) const = default;
+};
+
+/// The distance from each line of a kind to the next, where most have the same.
+std::optional<std::size_t> usual_gap(const std::vector<std::size_t>& places) {
+  if (places.size() < kFewFrames) return std::nullopt;
+  std::map<std::size_t, std::size_t> gaps;
+  for (std::size_t i = 1; i < places.size(); ++i) ++gaps[places[i] - places[i - 1]];
+  const auto usual = std::ranges::max_element(gaps, {}, [](const auto& g) { return g.second; });
+  if (static_cast<double>(usual->second) < kPeriodic * static_cast<double>(places.size() - 1))
+    return std::nullopt;
+  return usual->first;
+}
+
+/// The share of the variance of each column that is left within the lines of one place in the period.
+double within_rows(const std::vector<std::vector<double>>& rows, std::size_t period, std::size_t first) {
+  struct Sums {
+    double sum = 0, squares = 0, count = 0;
+    void add(double v) { sum += v, squares += v * v, ++count; }
+    double variance() const { return count > 0 ? squares - sum * sum / count : 0; }
+  };
+  std::map<std::size_t, Sums> all;
+  std::map<std::pair<std::size_t, std::size_t>, Sums> places;
+  for (std::size_t i = first; i < rows.size(); ++i)
+    for (std::size_t c = 0; c < rows[i].size(); ++c)
+      if (std::isfinite(rows[i][c]))
+        all[c].add(rows[i][c]), places[{(i - first) % period, c}].add(rows[i][c]);
+  double within = 0, total = 0;
+  for (const auto& [c, sums] : all) total += sums.variance();
+  for (const auto& [place, sums] : places) within += sums.variance();
+  return total > 0 ? within / total : 1;
+}
+
+/// Numbers rise from line to line and do not begin anew: each line is a frame of its own.
+bool has_own_clock(const std::vector<std::vector<double>>& rows) {
+  if (rows.size() < 4) return false;
+  for (std::size_t c = 0; c < rows[0].size(); ++c) {
+    std::size_t rose = 0, fell = 0;
+    for (std::size_t i = 1; i < rows.size(); ++i)
+      rose += rows[i][c] > rows[i - 1][c], fell += rows[i][c] < rows[i - 1][c];
+    if (10 * rose > 3 * rows.size() && 50 * fell <= rows.size()) return true;
+  }
+  return false;
+}
+
+/// Fills lines_per_frame and prefix.
+void find_period(const std::vector<std::string>& lines, const Reading& reading, TextGrammar& grammar) {
+  FrameFormat& format = grammar.format;
+  std::vector<Kind> kinds;
+  std::vector<std::vector<double>> rows;  // of the usual lines, all numbers
+  std::vector<std::string> starts;        // of these
+  std::map<std::size_t, std::size_t> counts;
+  for (const std::string& line : lines) ++counts[slots_of(behind_stamp(line), 0, reading.decimal).size()];
+  std::size_t usual = 0, most = 0;
+  for (const auto& [count, of] : counts)
+    if (count * of > most) most = count * of, usual = count;
+  bool stamped = true;
+  for (const std::string& line : lines) {
+    const std::string_view content = behind_stamp(line);
+    if (content.empty()) {
+      if (!kinds.empty() && kinds.back() == Kind{}) continue;
+      kinds.emplace_back();
+      continue;
+    }
+    const auto slots = slots_of(content, 0, reading.decimal);
+    kinds.push_back({beginning(line, reading), slots.size()});
+    if (slots.size() != usual) continue;
+    stamped = stamped && content.size() != line.size() && line.find("->") == std::string::npos;
+    starts.emplace_back(content.substr(0, slots[0].text.data() + slots[0].text.size() - content.data() + 1));
+    rows.emplace_back();
+    for (const TextSlot& slot : slots) rows.back().push_back(slot.value);
+  }
+  std::map<Kind, std::vector<std::size_t>> places;
+  for (std::size_t i = 0; i < kinds.size(); ++i) places[kinds[i]].push_back(i);
+  const bool own = (stamped && !rows.empty()) || has_own_clock(rows);
+  std::size_t period = 1;
+  for (const auto& [kind, of] : places)
+    if (const auto gap = usual_gap(of);
+        gap && *gap > period && *gap <= kMostLines &&
+        static_cast<double>(of.size() * *gap) > 0.6 * static_cast<double>(kinds.size()))
+      period = *gap;
+  std::vector<Kind> anchors;
+  for (const auto& [kind, of] : places)
+    if (period > 1 && usual_gap(of) == period && 2 * of.size() * period > kinds.size())
+      anchors.push_back(kind);
+  if (!anchors.empty() && !own) {
+    if (std::ranges::find(anchors, Kind{}) != anchors.end()) {
+      format.lines_per_frame = static_cast<int>(period) - 1;
+      return;
+    }
+    // A line unlike the others begins a frame; else the first label.
+    const auto natural = [](const Kind& kind) {
+      const std::size_t number = kind.begins.find_first_of("0123456789");
+      const double value =
+          number == std::string::npos
+              ? 0
+              : parse_double(
+                    kind.begins.substr(number, kind.begins.find_first_not_of("0123456789", number) - number))
+                    .value_or(0);
+      return std::tuple(kind.count, kind.begins.substr(0, number), value, kind.begins);
+    };
+    std::vector<Kind> odd;
+    for (const Kind& kind : anchors)
+      if (kind.count != usual && !kind.begins.empty()) odd.push_back(kind);
+    const Kind first = odd.size() == 1 ? odd[0] : *std::ranges::min_element(anchors, {}, natural);
+    if (!first.begins.empty()) {
+      if (odd.size() == 1 && odd[0].count == 0 && period > 2) {
+        const double within = within_rows(rows, period - 1, 0);
+        if (within > kRowsAlike) return;  // a remark now and then
+        if (within > kRowsDiffer)
+          grammar.doubt = "a line " + in_quotes(first.begins) + " after every " + std::to_string(period - 1) +
+                          " lines, which do not differ: each line may be a frame, or all of them one";
+      }
+      format.lines_per_frame = static_cast<int>(period), format.prefix = first.begins;
+      return;
+    }
+    grammar.doubt = std::to_string(period) + " kinds of lines take turns, with " +
+                    joined(anchors, " and ", [](const Kind& kind) { return std::to_string(kind.count); }) +
+                    " numbers, and no mark says where a frame begins: they may be one quantity or several";
+  }
+  if (own || usual < 2 || rows.size() < 6) return;
+  // The first number of a line counts the rows of a frame, or the frames.
+  std::vector<double> index;
+  for (const auto& row : rows) index.push_back(row[0]);
+  const double low = std::ranges::min(index), high = std::ranges::max(index);
+  const double size = high - low + 1;
+  if (low != 0 && low != 1) return;
+  if (!(size >= 2 && size <= 64 && static_cast<double>(rows.size()) >= kFewFrames * size)) return;
+  std::size_t steps = 0;
+  for (std::size_t i = 1; i < index.size(); ++i)
+    steps += index[i] == (index[i - 1] == high ? low : index[i - 1] + 1);
+  if (10 * steps < 8 * index.size()) return;
+  std::vector<std::vector<double>> values(rows.size());
+  std::size_t first = 0;
+  while (index[first] != low) ++first;
+  for (std::size_t i = 0; i < rows.size(); ++i) values[i].assign(rows[i].begin() + 1, rows[i].end());
+  const double within = within_rows(values, static_cast<std::size_t>(size), first);
+  const std::string what =
+      "the first number of a line runs from " + number(low) + " to " + number(high) + ", ";
+  const bool named = rows.size() > first && starts[first].find("ow") != std::string::npos;
+  if (!named && usual > 2 && within > kRowsDiffer)
+    grammar.doubt =
+        what +
+        "but what follows does not differ between them: it may be a counter of frames that are a line each, "
+        "or the row of a frame of " +
+        number(size) + " lines";
+  format.lines_per_frame = static_cast<int>(size);
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    if (index[i] == low) format.prefix = trimmed(starts[i]);
+  grammar.says.push_back(what + "so a frame has " + number(size) + " lines, each with its row");
+}
+
+/// Whether most lines end in a hexadecimal checksum, and in which.
+std::string find_checksum(const std::vector<std::string>& lines) {
+  std::size_t with = 0, hex = 0, all = 0;
+  std::map<std::string, std::size_t> fits;
+  std::set<unsigned> seen;
+  for (const std::string& line : lines) {
+    if (line.empty()) continue;
+    ++all;
+    const auto sum = checksum_of(line);
+    if (!sum) continue;
+    ++with, seen.insert(sum->stated);
+    const std::string_view text = std::string_view(line).substr(sum->line.size() + 1);
+    hex += line[sum->line.size()] == '*' || text.find_first_of("abcdefABCDEF") != std::string_view::npos;
+    for (const char* kind : {"xor8", "sum8", "crc16-modbus", "crc16-ccitt"})
+      if (sum->digits == (kind[0] == 'c' ? 4U : 2U)) fits[kind] += sum->computed(kind) == sum->stated;
+  }
+  if (4 * with < 3 * all || seen.size() < 3) return "none";
+  for (const auto& [kind, count] : fits)
+    if (10 * count > 8 * with) return kind;
+  return 5 * hex > with ? "hex" : "none";
+}
+
+void say_what_was_taken_away(const std::vector<std::string>& raw, TextGrammar& grammar) {
+  bool nul = false, mark = false, wide = false, ansi = false;
+  for (const std::string& line : raw) {
+    nul = nul || line.find('\0') != std::string::npos;
+    mark = mark || line.find("\xEF\xBB\xBF") != std::string::npos;
+    wide = wide || line.find("\xFF\xFE") != std::string::npos || line.find("\xFE\xFF") != std::string::npos;
+    ansi = ansi || line.find("\x1B[") != std::string::npos;
+  }
+  std::vector<std::string> what;
+  if (wide) what.emplace_back("UTF-16");
+  if (mark) what.emplace_back("a mark of UTF-8");
+  if (nul && !wide) what.emplace_back("NUL bytes");
+  if (ansi) what.emplace_back("ANSI sequences");
+  if (!what.empty()) grammar.says.push_back("taken away: " + joined(what, ", "));
+}
+
+}  // namespace
+
+std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
+  std::vector<std::string> lines;
+  bool all_remarks = true;
+  for (const std::string& line : raw) {
+    lines.push_back(clean_line(line));
+    all_remarks = all_remarks && (lines.back().empty() || lines.back().starts_with('#'));
+  }
+  if (!all_remarks) std::erase_if(lines, [](const auto& line) { return line.starts_with('#'); });
+  TextGrammar grammar;
+  grammar.format = {.kind = FrameKind::text};
+  grammar.format.checksum = find_checksum(lines);
+  if (grammar.format.checksum != "none")
+    for (std::string& line : lines)
+      if (const auto sum = checksum_of(line)) line = std::string(trimmed(sum->line));
+  const char decimal = commas_are_points(lines) ? ',' : '.';
+  // Cells where no number is lost in them, else numbers.
+  Reading reading = read_as(lines, 0, decimal);
+  for (const char separator : {',', ';', '\t', '|', ' '}) {
+    if (separator == decimal) continue;
+    const Reading cells = read_as(lines, separator, decimal);
+    if (cells.slots < 2 || cells.numbers < reading.numbers || cells.share < reading.share - 0.1) continue;
+    reading = cells;
+    break;
+  }
+  if (reading.numbers == 0 || reading.share < kUsual) return std::nullopt;
+  grammar.format.separator = reading.separator, grammar.format.decimal = decimal;
+  find_period(lines, reading, grammar);
+  if (grammar.format.lines_per_frame > 1) grammar.format.separator = 0;
+  say_what_was_taken_away(raw, grammar);
+
+  FrameFormat read = grammar.format;
+  read.checksum = "none";  // has been taken away
+  TextFrames frames(read);
+  struct Frame {
+    std::vector<double> values;
+    std::vector<bool> words, wall;
+    std::vector<std::string> before, text;
+  };
+  std::vector<Frame> all;
+  std::map<std::vector<bool>, std::size_t> forms;  // which cells are words
+  for (const std::string& line : lines) {
+    grammar.lines += !line.empty();
+    if (frames.push(line) != TextFrames::Result::frame) continue;
+    Frame frame;
+    for (const TextSlot& slot : frames.slots()) {
+      frame.values.push_back(slot.value), frame.words.push_back(slot.words), frame.wall.push_back(slot.wall);
+      frame.before.emplace_back(slot.before), frame.text.emplace_back(slot.text);
+    }
+    if (std::ranges::count(frame.words, false) == 0) continue;
+    ++forms[frame.words];
+    all.push_back(std::move(frame));
+  }
+  if (forms.empty()) return std::nullopt;
+  const std::vector<bool> usual =
+      std::ranges::max_element(forms, {}, [](const auto& f) {
+        return f.second * static_cast<std::size_t>(std::ranges::count(f.first, false));
+      })->first;
+  std::erase_if(all, [&](const Frame& frame) { return frame.words != usual; });
+  if (all.empty() || static_cast<double>(all.size()) * grammar.format.lines_per_frame <
+                         0.4 * static_cast<double>(grammar.lines))
+    return std::nullopt;
+  const Frame& sample = all[all.size() / 2];
+  grammar.frames = all.size(), grammar.words = usual, grammar.wall = sample.wall;
+  grammar.before = sample.before, grammar.sample = sample.text;
+  grammar.columns.resize(usual.size()), grammar.decimals.resize(usual.size());
+  for (const Frame& frame : all)
+    for (std::size_t c = 0; c < usual.size(); ++c) {
+      grammar.columns[c].push_back(frame.values[c]);
+      const std::size_t point = frame.text[c].find(decimal);
+      if (point != std::string::npos)
+        grammar.decimals[c] =
+            std::max(grammar.decimals[c], static_cast<int>(frame.text[c].size() - point - 1));
+    }
+  return grammar;
+}
+
+}  // namespace supertac

@@ -1,0 +1,271 @@
+// What each slot of a frame is, by models.
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "data/frames/probe.h"
+#include "data/frames/text_grammar.h"
+#include "io/numbers/median.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kMost = 0.9;
+constexpr std::size_t kFew = 12;  // frames: of less nothing can be said
+constexpr double kModuli[] = {0, 10, 16, 32, 64, 100, 128, 256, 1000, 1024, 4096, 10000, 65536, 4294967296.0};
+
+bool whole(const std::vector<double>& v) {
+  return std::ranges::all_of(v, [](double x) { return x == std::round(x); });
+}
+bool constant(const std::vector<double>& v) {
+  return std::ranges::all_of(v, [&](double x) { return x == v[0] || (std::isnan(x) && std::isnan(v[0])); });
+}
+
+/// The steps, of numbers that begin anew at `modulus` (0: never).
+std::vector<double> steps(const std::vector<double>& v, double modulus) {
+  std::vector<double> all;
+  for (std::size_t i = 1; i < v.size(); ++i) {
+    double step = v[i] - v[i - 1];
+    if (modulus > 0 && step < 0) step += modulus;
+    all.push_back(step);
+  }
+  return all;
+}
+
+bool counts(const std::vector<double>& v) {
+  if (v.size() < kFew || !whole(v) || constant(v)) return false;
+  const double high = std::ranges::max(v), low = std::ranges::min(v);
+  for (const double modulus : kModuli) {
+    if (modulus > 0 && (high >= modulus || low < 0 || high - low < 0.5 * modulus)) continue;
+    std::size_t one = 0, few = 0;
+    for (const double step : steps(v, modulus)) one += step == 1, few += step >= 1 && step <= 20;
+    const auto all = static_cast<double>(v.size() - 1);
+    if (static_cast<double>(few) >= kMost * all && 2 * static_cast<double>(one) > all) return true;
+  }
+  return false;
+}
+
+/// Rises at a steady rate; the usual step, 0 where it does not.
+double steady_step(const std::vector<double>& v) {
+  if (v.size() < kFew || constant(v) || !std::ranges::all_of(v, [](double x) { return std::isfinite(x); }))
+    return 0;
+  for (const double modulus : {0.0, 65536.0, 4294967296.0}) {
+    std::vector<double> all = steps(v, modulus);
+    if (modulus > 0 && std::ranges::max(v) >= modulus) continue;
+    const auto rises = static_cast<double>(std::ranges::count_if(all, [](double s) { return s >= 0; }));
+    const double usual = quantile(all, 0.5), early = quantile(all, 0.1), late = quantile(all, 0.9);
+    const double mean = (v.back() - v.front()) / static_cast<double>(all.size());
+    const double fell = static_cast<double>(all.size()) - rises;
+    if (fell > std::max(1.0, 0.02 * static_cast<double>(all.size()))) continue;
+    if (usual > 0 && early > 0.2 * usual && late < 4 * usual) return usual;
+    if (modulus == 0 && fell == 0 && usual >= 0 && mean > 0 && late <= 20 * mean)
+      return mean;  // coarser than the frames
+  }
+  return 0;
+}
+
+/// The unit in which steps are those of a sensor; 0 where two are as likely.
+double unit_of_step(double step, bool whole) {
+  if (!whole && step < 1) return 1;
+  if (step < 0.9) return 1;
+  if (step <= 200) return 1e-3;
+  if (step < 1000) return 0;
+  return step < 1e6 ? 1e-6 : 1e-9;
+}
+
+bool label_behind(const TextGrammar& grammar, std::size_t slot) {
+  if (slot + 1 >= grammar.before.size() || grammar.format.separator != 0) return false;
+  const std::string behind(trimmed(grammar.before[slot + 1]));
+  return behind.starts_with(':') || behind.starts_with('=') || behind.starts_with("]:") ||
+         behind.starts_with("->");
+}
+
+/// The letters of a label before a slot, without the digits that count it.
+std::string stem(const std::string& before) {
+  std::string letters;
+  for (const char c : before)
+    if ((lower(c) >= 'a' && lower(c) <= 'z') || static_cast<unsigned char>(c) > 127) letters += c;
+  return letters;
+}
+
+/// How good an array so many values make: squares and powers of two are built, long primes are not.
+int neat(std::size_t n) {
+  if (n == 0) return 0;
+  const auto root = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(n))));
+  if (root * root == n && n >= 9) return 3;
+  if (n >= 8 && (n & (n - 1)) == 0) return 3;
+  for (std::size_t rows = 2; rows * rows <= n; ++rows)
+    if (n % rows == 0) return n % 16 == 0 && n > 16 ? 3 : 2;
+  return n <= 8 ? 2 : 1;
+}
+
+/// Sums and xors of the whole numbers before (and without) the last slot.
+std::string sum_of_values(const TextGrammar& grammar, std::size_t slot) {
+  const auto& stated = grammar.columns[slot];
+  if (stated.size() < kFew || !whole(stated) || constant(stated)) return {};
+  for (std::size_t first = 0; first < std::min<std::size_t>(slot, 3); ++first)
+    for (const double modulus : {0.0, 256.0, 65536.0, 100.0, 1000.0, -1.0}) {
+      std::size_t fits = 0;
+      for (std::size_t i = 0; i < stated.size(); ++i) {
+        double sum = 0;
+        std::int64_t crossed = 0;
+        for (std::size_t c = first; c < slot; ++c) {
+          if (grammar.words[c] || !std::isfinite(grammar.columns[c][i])) continue;
+          sum += grammar.columns[c][i];
+          if (std::abs(grammar.columns[c][i]) < 1e15)
+            crossed ^= static_cast<std::int64_t>(grammar.columns[c][i]);
+        }
+        const double made = modulus < 0   ? static_cast<double>(crossed)
+                            : modulus > 0 ? sum - modulus * std::floor(sum / modulus)
+                                          : sum;
+        fits += made == stated[i];
+      }
+      if (static_cast<double>(fits) >= kMost * static_cast<double>(stated.size()))
+        return (modulus < 0 ? "xor" : "sum") + std::string(modulus > 0 ? " modulo " + format(modulus) : "") +
+               " of slots " + std::to_string(first) + " to " + std::to_string(slot - 1) + ", computed again";
+    }
+  return {};
+}
+
+}  // namespace
+
+std::vector<SlotRole> roles_of(TextGrammar& g, double seconds) {
+  const std::size_t n = g.columns.size();
+  std::vector<SlotRole> roles(n);
+  bool clock = false;
+  for (std::size_t c = 0; c < n; ++c) {
+    const std::vector<double>& v = g.columns[c];
+    SlotRole& role = roles[c];
+    if (g.words[c]) {
+      role = {SlotRole::words, "no number, such as " + in_quotes(g.sample[c])};
+      continue;
+    }
+    const std::string sum = c >= 2 && c + 2 >= n ? sum_of_values(g, c) : "";
+    const bool finite = std::ranges::all_of(v, [](double x) { return std::isfinite(x); });
+    const double step = finite ? steady_step(v) : 0;
+    const auto unit = !finite || clock ? std::nullopt : unit_of_clock(v, seconds);
+    const bool live = seconds >= kAtOnceS;
+    if (!sum.empty()) {
+      role = {SlotRole::checksum, sum};
+    } else if (g.wall[c]) {
+      role = {SlotRole::clock, "a time of day or date", 1};
+    } else if (live && unit && v.size() >= 3) {
+      role = {SlotRole::clock, "rises as fast as time goes", *unit};
+    } else if (counts(v)) {
+      role = {SlotRole::counter, "rises by one"};
+    } else if (step > 0) {
+      // Of one that runs over, or beside another clock, and in a file, its step says the unit.
+      role = {SlotRole::clock, "rises at a steady rate, " + format(step, 3) + " a frame",
+              live && !unit && !clock ? 0 : unit_of_step(step, whole(v))};
+    } else if (constant(v) && label_behind(g, c)) {
+      role = {SlotRole::label, "never changes, and ':' or '=' stands behind it"};
+    } else if (constant(v)) {
+      role = {SlotRole::constant,
+              std::isnan(v[0]) ? "says " + in_quotes(g.sample[c]) + " only" : "is always " + format(v[0])};
+    } else {
+      role.why = "changes from frame to frame";
+      if (finite && v.size() >= 30 && std::ranges::is_sorted(v))
+        role = {SlotRole::other, "only rises, in no known unit"};
+    }
+    clock = clock || (role.kind == SlotRole::clock && role.unit_s > 0);
+  }
+  // Rows of a frame of several lines: the number that each begins with.
+  const auto lines = static_cast<std::size_t>(g.format.lines_per_frame);
+  if (lines > 1 && n % lines == 0 && n / lines > 1 && n > lines) {
+    const std::size_t width = n / lines;
+    bool rows = true;
+    for (std::size_t r = 0; r < lines; ++r)
+      rows = rows && constant(g.columns[r * width]) &&
+             (r == 0 || g.columns[r * width][0] == g.columns[(r - 1) * width][0] + 1);
+    for (std::size_t r = 0; rows && r < lines; ++r)
+      roles[r * width] = {SlotRole::label, "the row of its line"};
+  }
+  const auto candidate = [&](std::size_t c) {
+    return roles[c].kind == SlotRole::signal || roles[c].kind == SlotRole::constant;
+  };
+  std::vector<std::size_t> all;
+  for (std::size_t c = 0; c < n; ++c)
+    if (candidate(c)) all.push_back(c);
+  if (all.empty()) return roles;
+  // Numbers named otherwise than most, or written with other decimals, are no taxels of the array.
+  std::map<std::string, std::vector<std::size_t>> named;
+  std::string name;
+  if (g.format.separator == 0)
+    for (const std::size_t c : all) {
+      const std::string own = stem(g.before[c]);
+      const bool unnamed = trimmed(g.before[c]).empty() || own.empty();
+      if (!unnamed || (c > 0 && !candidate(c - 1) && lines == 1)) name = own;
+      named[name].push_back(c);
+    }
+  if (named.size() > 1) {
+    const auto& largest = *std::ranges::max_element(named, {}, [](const auto& e) { return e.second.size(); });
+    for (const auto& [label, slots] : named)
+      if (4 * slots.size() <= largest.second.size() || (slots.size() == 1 && largest.second.size() >= 4))
+        for (const std::size_t c : slots)
+          roles[c] = {SlotRole::other, "named " + in_quotes(label) + " unlike the others"};
+  }
+  std::erase_if(all, [&](std::size_t c) { return !candidate(c); });
+  std::map<bool, std::vector<std::size_t>> pointed;
+  for (const std::size_t c : all)
+    if (!std::isnan(g.columns[c][0]) || !constant(g.columns[c])) pointed[g.decimals[c] > 0].push_back(c);
+  if (pointed.size() == 2)
+    for (const bool which : {false, true})
+      if (pointed[which].size() <= 3 && pointed[!which].size() >= 4 * pointed[which].size())
+        for (const std::size_t c : pointed[which]) {
+          const bool edge = c == all.front() || c == all.back() ||
+                            (all.size() > 2 && (c == all[1] || c == all[all.size() - 2]));
+          if (edge && !(roles[c].kind == SlotRole::constant && !which))
+            roles[c] = {SlotRole::other,
+                        which ? "has decimals, the others have none" : "has no decimals, the others have"};
+        }
+  std::erase_if(all, [&](std::size_t c) { return !candidate(c); });
+  // A constant at an edge may be a version, a count or a dead taxel.
+  const auto lead = static_cast<std::size_t>(
+      std::ranges::find_if(all, [&](std::size_t c) { return roles[c].kind == SlotRole::signal; }) -
+      all.begin());
+  std::size_t trail = 0;
+  while (trail + lead < all.size() && roles[all[all.size() - 1 - trail]].kind == SlotRole::constant) ++trail;
+  const std::size_t moving = all.size() - lead - trail;
+  if (lines == 1 && moving >= 4 && (lead > 0 || trail > 0) && lead + trail <= 4) {
+    int best = -1;
+    std::vector<std::pair<std::size_t, std::size_t>> ways;
+    for (std::size_t a = 0; a <= lead; ++a)
+      for (std::size_t b = 0; b <= trail; ++b) {
+        const std::size_t values = all.size() - a - b;
+        const bool counted = a > 0 && g.columns[all[a - 1]][0] == static_cast<double>(values) && values > 4;
+        const int good = counted ? 4 : neat(values);
+        if (good > best) best = good, ways.clear();
+        if (good == best) ways.emplace_back(a, b);
+      }
+    if (ways.size() > 1 && best < 4 && ways[0] != std::pair<std::size_t, std::size_t>{0, 0})
+      g.doubt = "constants at the edge may be taxels: " +
+                std::to_string(all.size() - ways[0].first - ways[0].second) + " or " +
+                std::to_string(all.size() - ways[1].first - ways[1].second) + " values";
+    if (ways.size() > 1 && ways[0] == std::pair<std::size_t, std::size_t>{0, 0} && best == 3 &&
+        neat(all.size()) == 3)
+      ways.resize(1);
+    else if (ways.size() > 1 && best < 4)
+      g.doubt = "constants at the edge may be taxels or not: " + std::to_string(all.size()) + " or " +
+                std::to_string(all.size() - ways[1].first - ways[1].second) + " values";
+    for (std::size_t a = 0; a < ways[0].first; ++a)
+      roles[all[a]] = {SlotRole::other, "constant before the array"};
+    for (std::size_t b = 0; b < ways[0].second; ++b)
+      roles[all[all.size() - 1 - b]] = {SlotRole::other, "constant behind the array"};
+    std::erase_if(all, [&](std::size_t c) { return !candidate(c); });
+  }
+  const std::size_t values = all.size();
+  if (values > 8 && neat(values) == 1)
+    for (const std::size_t less : {1U, 2U})
+      if (g.doubt.empty() && neat(values - less) == 3)
+        g.doubt = std::to_string(values) + " values make no array but a line: all may be taxels, or " +
+                  std::to_string(values - less) + " and " + std::to_string(less) + " of another kind";
+  // Lines of different counts may be different quantities.
+  if (lines > 1 && n % lines != 0 && values < 16 && g.doubt.empty())
+    g.doubt = "a frame of " + std::to_string(lines) + " lines with different counts of numbers, " +
+              std::to_string(values) + " in all: they may be different quantities";
+  return roles;
+}
+
+}  // namespace supertac

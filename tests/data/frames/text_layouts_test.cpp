@@ -1,0 +1,184 @@
+// Layouts of text that nobody chose: drawn from a seed, probed, and read by the draft.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "data/frames/probe.h"
+#include "data/frames/sensor_decoder.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/random.h"
+
+namespace supertac {
+namespace {
+
+struct Layout {
+  std::string what;
+  std::vector<Heard> heard;
+  std::size_t values = 0;
+  std::vector<std::vector<double>> sent;  // [frame][value]; NaN: none
+};
+
+class Draws {
+ public:
+  explicit Draws(std::uint64_t seed) : random_(seed, 57) {}
+  std::size_t below(std::size_t n) {
+    return static_cast<std::size_t>(random_.uniform(at_++) * static_cast<double>(n));
+  }
+  bool often(double share) { return random_.uniform(at_++) < share; }
+  double normal() { return random_.normal(at_++); }
+
+ private:
+  RandomStream random_;
+  std::uint64_t at_ = 0;
+};
+
+std::string clock_of_day(double s) {
+  const auto two = [](int n) { return (n < 10 ? "0" : "") + std::to_string(n); };
+  const int whole = static_cast<int>(s), ms = static_cast<int>(std::lround((s - whole) * 1000)) % 1000;
+  const std::string of = std::to_string(1000 + ms);
+  return two(whole / 3600) + ":" + two(whole / 60 % 60) + ":" + two(whole % 60) + "." + of.substr(1);
+}
+
+Layout layout_of(std::uint64_t seed) {
+  Draws draw(seed);
+  constexpr std::pair<std::size_t, std::size_t> kArrays[] = {{4, 4},  {3, 3}, {8, 8},  {4, 6},
+                                                             {6, 10}, {2, 5}, {16, 16}};
+  const auto [rows, columns] = kArrays[draw.below(std::size(kArrays))];
+  const std::size_t values = rows * columns;
+  constexpr const char* kBetween[] = {",", ";", "\t", " ", ", ", " | ", "; "};
+  const std::string between = kBetween[draw.below(std::size(kBetween))];
+  const int decimals = draw.often(0.4) ? 1 + static_cast<int>(draw.below(3)) : 0;
+  const bool comma = decimals > 0 && between[0] != ',' && draw.often(0.5);
+  constexpr std::pair<const char*, const char*> kAround[] = {{"", ""},        {"(", ")"}, {"[", " ]"},
+                                                             {"/*", "*/"},    {"<", ">"}, {"data: ", ""},
+                                                             {"[INFO] ", ""}, {"", ";"},  {"$TAX,", ""}};
+  auto [open, close] = kAround[draw.below(std::size(kAround))];
+  const std::size_t stamp = draw.below(6);  // none, none, ms, us, s, monitor
+  const bool counter = draw.often(0.3), sum = decimals == 0 && draw.often(0.2), star = draw.often(0.15);
+  const std::size_t form = draw.below(10);  // 0, 1: several lines; 2: labels; 3: row: values
+  const bool several = form < 2, labelled = form == 2, by_rows = form == 3;
+  const bool dead = draw.often(0.3), none = draw.often(0.15), boot = draw.often(0.3), wide = draw.often(0.1),
+             remarks = draw.often(0.2);
+  const double base = draw.often(0.3) ? -200 : 300, apart = draw.often(0.5) ? 3 : 40;
+  Layout layout;
+  layout.values = values;
+  layout.what = "seed " + std::to_string(seed) + ", " + std::to_string(rows) + "x" + std::to_string(columns) +
+                " between '" + between + "' in " + open;
+  std::vector<double> rest;
+  for (std::size_t k = 0; k < values; ++k) rest.push_back(base + apart * draw.normal());
+  const auto written = [&](double v) {
+    std::string text = format(v, decimals);
+    if (comma) std::ranges::replace(text, '.', ',');
+    return text;
+  };
+  if (boot)
+    layout.heard.push_back(
+        {0.9, "ets Jun  8 2016 00:22:57\r\nrst:0x1 (POWERON_RESET),boot:0x13\r\nsensor v1.2.3 ready\r\n"});
+  layout.heard.push_back({0.95, "7" + between + "8\r\n"});
+  for (int n = 0; n < 240; ++n) {
+    const double t = 1 + 0.02 * n;
+    std::vector<double> now;
+    for (std::size_t k = 0; k < values; ++k) {
+      double v = rest[k] + 1.5 * draw.normal() +
+                 (k == values / 2 + static_cast<std::size_t>(n / 60) && n / 30 % 2 == 1 ? 250 : 0);
+      if (dead && k == values / 3) v = 0;
+      const double scale = std::pow(10.0, decimals);
+      now.push_back(std::round(v * scale) / scale);
+    }
+    std::string front;
+    if (stamp == 2) front = std::to_string(5000 + 20 * n) + between;
+    if (stamp == 3) front = std::to_string(123456 + 20000 * n) + between;
+    if (stamp == 4) front = format(12.5 + 0.02 * n, 3) + between;
+    if (counter) front += std::to_string(n % 256) + between;
+    std::string text;
+    double all = 0;
+    for (std::size_t k = 0; k < values; ++k) {
+      if (labelled) text += "s" + std::to_string(k) + ":";
+      text += none && k == values / 4 ? "nan" : written(now[k]);
+      all += now[k];
+      const bool ends = (several || by_rows) && (k + 1) % columns == 0;
+      if (k + 1 < values) text += ends ? "\r\n" : between;
+      if (by_rows && ends && k + 1 < values) text += "row " + std::to_string((k + 1) / columns) + ": ";
+    }
+    if (none) now[values / 4] = std::nan("");
+    if (by_rows) {
+      text = "row 0: " + text;
+    } else if (several) {
+      text += "\r\n";
+    } else {
+      if (sum && !none)
+        text += between + std::to_string(static_cast<long long>(std::fmod(std::fmod(all, 256) + 256, 256)));
+      text = open + front + text + close;
+    }
+    if (star && !several && !by_rows) {
+      unsigned crossed = 0;
+      for (const char c : text.substr(text[0] == '$' ? 1 : 0)) crossed ^= static_cast<unsigned char>(c);
+      constexpr char kHex[] = "0123456789ABCDEF";
+      text += std::string("*") + kHex[crossed >> 4] + kHex[crossed & 15];
+    }
+    if (stamp == 5 && !several && !by_rows) text = clock_of_day(84000.5 + 0.02 * n) + " -> " + text;
+    text += "\r\n";
+    if (draw.often(0.02))
+      text.erase(text.size() / 2, text.size() / 5);  // damaged
+    else
+      layout.sent.push_back(now);
+    if (remarks && n % 37 == 5 && !several && !by_rows) text += "battery low\r\n";
+    layout.heard.push_back({t, text});
+  }
+  if (wide)
+    for (Heard& chunk : layout.heard) {
+      std::string twice;
+      for (const char c : chunk.bytes) twice += c, twice += '\0';
+      chunk.bytes = twice;
+    }
+  return layout;
+}
+
+/// Right: nearly all frames that were sent, as they were sent. A frame with "nan" has the others' mean there.
+bool reads(const Layout& layout, const Sensor& draft) {
+  if (draft.values() != layout.values) return false;
+  const auto decoder = make_decoder(draft);
+  std::size_t next = 0, right = 0;
+  bool wrong = false;
+  for (const Heard& chunk : layout.heard)
+    decoder->push(std::as_bytes(std::span(chunk.bytes)), [&](const DecodedFrame& frame) {
+      const auto same = [&](const std::vector<double>& sent) {
+        for (std::size_t k = 0; k < sent.size(); ++k)
+          if (std::isfinite(sent[k]) && std::abs(double{frame.values[k]} - sent[k]) > 1e-3) return false;
+        return true;
+      };
+      for (std::size_t i = next; i < std::min(next + 9, layout.sent.size()); ++i)
+        if (same(layout.sent[i])) {
+          ++right, next = i + 1;
+          return;
+        }
+      wrong = wrong || layout.sent.empty();
+    });
+  return !wrong && right > 0.85 * static_cast<double>(layout.sent.size());
+}
+
+TEST(TextLayouts, AreDraftedRightOrRefused) {
+  int right = 0, refused = 0, silent = 0;
+  constexpr int kLayouts = 80;
+  for (std::uint64_t seed = 1; seed <= kLayouts; ++seed) {
+    const Layout layout = layout_of(seed);
+    const ProbeReport report = probe(layout.heard, "here", {});
+    std::string said;
+    for (const std::string& line : report.says) said += line + "\n";
+    if (!report.draft) {
+      ++refused;
+      EXPECT_GT(report.says.back().size(), 20U);
+      if (std::getenv("SUPERTAC_LAYOUTS") != nullptr)
+        printf("refused %s\n%s\n", layout.what.c_str(), said.c_str());
+    } else if (reads(layout, *report.draft)) {
+      ++right;
+    } else {
+      ++silent;
+      ADD_FAILURE() << layout.what << "\n" << said;
+    }
+  }
+  EXPECT_GE(right, 0.85 * kLayouts) << refused << " refused, " << silent << " wrong";
+}
+
+}  // namespace
+}  // namespace supertac
