@@ -45,26 +45,55 @@ Reading read_as(const std::vector<std::string>& lines, char separator, char deci
   return reading;
 }
 
-/// Whether commas within "1,5" are points: there are no others, and no comma is left between such numbers.
-bool commas_are_points(const std::vector<std::string>& lines) {
-  std::size_t fractions = 0, all = 0, betrayed = 0, points = 0;
+enum class Commas { lists, points, doubt };
+
+/// Whether commas glued between digits, "1,5", are points. They are not where "," also parts such numbers.
+/// What stands behind a point is digits: of fixed width they begin with 0 as often as not (a number does
+/// not), and one digit takes all ten values; of varying width they do not end in 0. What fits neither is a
+/// doubt.
+Commas commas_of(const std::vector<std::string>& lines) {
+  std::size_t all = 0, parted = 0, fractions = 0, with = 0, padded = 0, leading = 0, trailing = 0;
+  std::map<std::size_t, std::size_t> widths;
+  std::map<char, std::size_t> firsts;
   for (const std::string& line : lines) {
-    const std::string_view content = behind_stamp(line);
-    for (std::size_t i = 1; i + 1 < content.size(); ++i)
-      if (content[i] == '.' && content[i - 1] >= '0' && content[i - 1] <= '9' && content[i + 1] >= '0' &&
-          content[i + 1] <= '9') {
-        ++points;
-        break;
-      }
     const auto slots = slots_of(behind_stamp(line), 0, ',');
+    with += !slots.empty();
     for (std::size_t i = 0; i < slots.size(); ++i) {
       if (slots[i].wall) continue;
       ++all;
-      fractions += slots[i].text.find(',') != std::string_view::npos;
-      betrayed += (i > 0 && slots[i].before == ",") || slots[i].text.find('.') != std::string_view::npos;
+      std::string before(slots[i].before);
+      std::erase(before, '"');
+      parted += i > 0 && before == ",";
+      const std::size_t comma = slots[i].text.find(',');
+      if (comma == std::string::npos) continue;
+      const std::string_view whole = slots[i].text.substr(0, comma), part = slots[i].text.substr(comma + 1);
+      ++fractions, ++widths[part.size()], ++firsts[part[0]];
+      padded += whole.size() > 1 && whole[0] == '0';
+      leading += part.size() > 1 && part[0] == '0';
+      trailing += part.back() == '0';
     }
   }
-  return 5 * fractions > all && 20 * betrayed < all && 5 * points < lines.size();
+  constexpr std::size_t kTellsZeros = 40;  // of so many numbers one ends in 0 (and one digit in ten is each)
+  if (fractions == 0 || 20 * parted >= all) return Commas::lists;
+  // Damaged lines are few.
+  const auto few = [&](std::size_t count) { return 25 * count < fractions; };
+  std::erase_if(widths, [&](const auto& w) { return few(w.second); });
+  std::erase_if(firsts, [&](const auto& f) { return 100 * f.second < fractions; });
+  const bool many = fractions >= kTellsZeros;
+  Commas commas = Commas::doubt;
+  if (!few(padded) || !many)
+    commas = widths.size() > 1 && trailing > 0 && leading == 0 ? Commas::lists : Commas::doubt;
+  else if (!few(leading))
+    commas = Commas::points;
+  else if (widths.size() > 1)
+    commas = few(trailing) ? Commas::points : Commas::lists;
+  else if (widths.begin()->first > 1)
+    commas = Commas::lists;
+  else if (firsts.size() == 10)
+    commas = Commas::points;
+  // A line that is nothing else is rather two columns than one.
+  if (all == fractions && all <= with) return commas == Commas::points ? Commas::doubt : Commas::lists;
+  return commas;
 }
 
 /// What begins a line: its template before the first number.
@@ -284,7 +313,8 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
   if (grammar.format.checksum != "none")
     for (std::string& line : lines)
       if (const auto sum = checksum_of(line)) line = std::string(trimmed(sum->line));
-  const char decimal = commas_are_points(lines) ? ',' : '.';
+  const Commas commas = commas_of(lines);
+  const char decimal = commas == Commas::points ? ',' : '.';
   // Cells where no number is lost in them, else numbers.
   Reading reading = read_as(lines, 0, decimal);
   for (const char separator : {',', ';', '\t', '|', ' '}) {
@@ -297,6 +327,9 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
   if (reading.numbers == 0 || reading.share < kUsual) return std::nullopt;
   grammar.format.separator = reading.separator, grammar.format.decimal = decimal;
   find_period(lines, reading, grammar);
+  if (commas == Commas::doubt)
+    grammar.doubt = "a comma between digits, as in " + in_quotes(lines[lines.size() / 2].substr(0, 40)) +
+                    ", may be the point of one number or stand between two (\"decimal\" says which)";
   if (grammar.format.lines_per_frame > 1) grammar.format.separator = 0;
   say_what_was_taken_away(raw, grammar);
 
@@ -338,7 +371,7 @@ std::optional<TextGrammar> find_grammar(const std::vector<std::string>& raw) {
   for (const Frame& frame : all)
     for (std::size_t c = 0; c < usual.size(); ++c) {
       grammar.columns[c].push_back(frame.values[c]);
-      const std::size_t point = frame.text[c].find(decimal);
+      const std::size_t point = frame.text[c].find_first_of(decimal == ',' ? ",." : ".");
       if (point != std::string::npos)
         grammar.decimals[c] =
             std::max(grammar.decimals[c], static_cast<int>(frame.text[c].size() - point - 1));

@@ -60,8 +60,21 @@ double steady_step(const std::vector<double>& v) {
     const double fell = static_cast<double>(all.size()) - rises;
     if (fell > std::max(1.0, 0.02 * static_cast<double>(all.size()))) continue;
     if (usual > 0 && early > 0.2 * usual && late < 4 * usual) return usual;
-    if (modulus == 0 && fell == 0 && usual >= 0 && mean > 0 && late <= 20 * mean)
-      return mean;  // coarser than the frames
+    // Coarser than the frames: never more than two of its ticks from a straight line.
+    const double tick = std::ranges::max(all);
+    bool straight = modulus == 0 && fell == 0 && mean > 0;
+    for (std::size_t i = 0; straight && i < v.size(); ++i)
+      straight = std::abs(v[i] - v[0] - mean * static_cast<double>(i)) <= 2 * tick;
+    if (straight && late <= 20 * mean) return mean;
+  }
+  return 0;
+}
+
+/// The unit in which so many frames take `seconds`, to a quarter; 0: in none.
+double unit_live(double step, std::size_t frames, double seconds) {
+  for (const double unit : {1.0, 1e-3, 1e-6, 1e-9}) {
+    const double ratio = step * unit * static_cast<double>(frames - 1) / seconds;
+    if (ratio > 0.75 && ratio < 1.25) return unit;
   }
   return 0;
 }
@@ -156,9 +169,12 @@ std::vector<SlotRole> roles_of(TextGrammar& g, double seconds) {
     } else if (counts(v)) {
       role = {SlotRole::counter, "rises by one"};
     } else if (step > 0) {
-      // Of one that runs over, or beside another clock, and in a file, its step says the unit.
+      // Of one that runs over, or beside another clock, arrival says the unit; in a file its step does.
       role = {SlotRole::clock, "rises at a steady rate, " + format(step, 3) + " a frame",
-              live && !unit && !clock ? 0 : unit_of_step(step, whole(v))};
+              live ? unit_live(step, v.size(), seconds) : unit_of_step(step, whole(v))};
+      if (role.unit_s == 0 && !clock)
+        g.doubt = "slot " + std::to_string(c) + " rises by about " + format(step, 3) +
+                  " a frame, which is time in no unit (s, ms, us, ns): a clock, or a signal that only rose";
     } else if (constant(v) && label_behind(g, c)) {
       role = {SlotRole::label, "never changes, and ':' or '=' stands behind it"};
     } else if (constant(v)) {
@@ -166,8 +182,12 @@ std::vector<SlotRole> roles_of(TextGrammar& g, double seconds) {
               std::isnan(v[0]) ? "says " + in_quotes(g.sample[c]) + " only" : "is always " + format(v[0])};
     } else {
       role.why = "changes from frame to frame";
-      if (finite && v.size() >= 30 && std::ranges::is_sorted(v))
-        role = {SlotRole::other, "only rises, in no known unit"};
+      if (finite && v.size() >= kFew && std::ranges::is_sorted(v)) {
+        role = {SlotRole::other, "only rises"};
+        g.doubt =
+            "slot " + std::to_string(c) +
+            " only rises, and not steadily: a clock, or a signal that rose meanwhile; listen for longer";
+      }
     }
     clock = clock || (role.kind == SlotRole::clock && role.unit_s > 0);
   }

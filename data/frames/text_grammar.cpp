@@ -108,7 +108,9 @@ std::optional<double> number_at(std::string_view text, std::size_t& i, char deci
   };
   take();
   const bool whole = plain.size() > begin;
-  if (at(text, k) == decimal && (digit(at(text, k + 1)) || (decimal == '.' && whole))) {
+  // Where commas are points, points are too: a clock may be written with one, and the signals not.
+  const char point = at(text, k);
+  if ((point == '.' || point == decimal) && (digit(at(text, k + 1)) || (point == '.' && whole))) {
     plain += (whole ? "." : "0."), ++k;
     take();
   }
@@ -123,7 +125,9 @@ std::optional<double> number_at(std::string_view text, std::size_t& i, char deci
     }
   }
   if (plain.back() == '.') plain.pop_back();
-  if (at(text, k) == '.' && digit(at(text, k + 1))) return std::nullopt;  // 1.2.3
+  const char next = at(text, k);
+  if ((next == '.' || (next == ',' && decimal == ',' && point == '.')) && digit(at(text, k + 1)))
+    return std::nullopt;  // 1.2.3, and 1.234,5
   for (std::size_t unit = k; word(at(text, unit)); ++unit)
     if (digit(text[unit])) return std::nullopt;  // 3A7F
   const auto value = parse_double(plain);

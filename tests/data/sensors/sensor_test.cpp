@@ -129,7 +129,7 @@ TEST(Sensor, RefusalsNameTheKeyAndWhatWasFound) {
       {"frame.separator", ", ", "\"frame.separator\" must be one character, found \", \""},
       {"frame.skip", Json{0}, "\"frame.skip\" must be other columns than that of time, found one twice"},
       {"frame.time", Json{{"column", 0}, {"unit", "minutes"}},
-       "\"frame.time.unit\" must be one of s, ms, us, found \"minutes\""},
+       "\"frame.time.unit\" must be one of s, ms, us, ns, found \"minutes\""},
       {"frame", Json{{"kind", "binary"}},
        "\"frame.header\" must be at least a byte where there is neither trailer nor checksum, found nothing"},
       {"frame", Json{{"kind", "binary"}, {"header", "A5 5"}},
