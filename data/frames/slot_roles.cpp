@@ -212,6 +212,10 @@ std::vector<SlotRole> roles_of(TextGrammar& g, double seconds) {
   // Numbers named otherwise than most, or written with other decimals, are no taxels of the array.
   std::map<std::string, std::vector<std::size_t>> named;
   std::string name;
+  for (std::size_t c = 0; c < n && g.format.separator != 0; ++c) {
+    if (g.words[c] && !stem(g.sample[c]).empty()) name = stem(g.sample[c]);
+    if (candidate(c)) named[name].push_back(c);
+  }
   if (g.format.separator == 0)
     for (const std::size_t c : all) {
       const std::string own = stem(g.before[c]);
@@ -225,6 +229,10 @@ std::vector<SlotRole> roles_of(TextGrammar& g, double seconds) {
       if (4 * slots.size() <= largest.second.size() || (slots.size() == 1 && largest.second.size() >= 4))
         for (const std::size_t c : slots)
           roles[c] = {SlotRole::other, "named " + in_quotes(label) + " unlike the others"};
+      else if (slots.size() != largest.second.size())
+        g.doubt = std::to_string(slots.size()) + " numbers named " + in_quotes(label) + " beside " +
+                  std::to_string(largest.second.size()) + " named " + in_quotes(largest.first) +
+                  ": one array, or two quantities";
   }
   std::erase_if(all, [&](std::size_t c) { return !candidate(c); });
   std::map<bool, std::vector<std::size_t>> pointed;
@@ -234,11 +242,17 @@ std::vector<SlotRole> roles_of(TextGrammar& g, double seconds) {
     for (const bool which : {false, true})
       if (pointed[which].size() <= 3 && pointed[!which].size() >= 4 * pointed[which].size())
         for (const std::size_t c : pointed[which]) {
-          const bool edge = c == all.front() || c == all.back() ||
-                            (all.size() > 2 && (c == all[1] || c == all[all.size() - 2]));
-          if (edge && !(roles[c].kind == SlotRole::constant && !which))
+          if (roles[c].kind == SlotRole::constant && !which) continue;
+          // At an edge: all before it, or all behind it, are of its kind.
+          const auto alike = [&](std::size_t o) { return (g.decimals[o] > 0) == which; };
+          const auto place = std::ranges::find(all, c);
+          if (std::all_of(all.begin(), place, alike) || std::all_of(place, all.end(), alike))
             roles[c] = {SlotRole::other,
                         which ? "has decimals, the others have none" : "has no decimals, the others have"};
+          else
+            g.doubt = "slot " + std::to_string(c) +
+                      (which ? " has decimals, those" : " has no decimals as those") + " beside it " +
+                      (which ? "have none" : "have") + ": a taxel, or another quantity";
         }
   std::erase_if(all, [&](std::size_t c) { return !candidate(c); });
   // A constant at an edge may be a version, a count or a dead taxel.
