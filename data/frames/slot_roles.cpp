@@ -95,11 +95,16 @@ bool label_behind(const TextGrammar& grammar, std::size_t slot) {
          behind.starts_with("->");
 }
 
-/// The letters of a label before a slot, without the digits that count it.
+/// The letters of the last word before a slot, without the digits that count it.
 std::string stem(const std::string& before) {
   std::string letters;
-  for (const char c : before)
-    if ((lower(c) >= 'a' && lower(c) <= 'z') || static_cast<unsigned char>(c) > 127) letters += c;
+  bool ended = false;  // the word, by a blank or a mark
+  for (const char c : before) {
+    const bool letter = (lower(c) >= 'a' && lower(c) <= 'z') || static_cast<unsigned char>(c) > 127;
+    if (letter && ended) letters.clear();
+    if (letter) letters += c;
+    ended = !letter && c != '_' && (c < '0' || c > '9');
+  }
   return letters;
 }
 
