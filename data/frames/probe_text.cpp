@@ -188,7 +188,8 @@ std::optional<FoundFormat> objects_of(const Lines& lines, std::vector<std::strin
   // The places of a flat array are slots as well.
   std::vector<std::vector<double>>& frames = arrays[candidate.format.values];
   std::erase_if(frames, [&](const auto& frame) { return frame.size() != most; });
-  TextGrammar grammar{.format = candidate.format};
+  TextGrammar grammar;
+  grammar.format = candidate.format;
   grammar.columns.resize(most), grammar.before.resize(most), grammar.sample.resize(most);
   grammar.decimals.resize(most), grammar.words.resize(most), grammar.wall.resize(most);
   for (std::size_t c = 0; c < most && nested.size() == 1 && !frames.empty(); ++c)
