@@ -173,7 +173,7 @@ void find_period(const std::vector<std::string>& lines, const Reading& reading, 
     }
     const auto slots = slots_of(content, 0, reading.decimal);
     kinds.push_back({beginning(line, reading), slots.size()});
-    if (slots.size() != usual) continue;
+    if (slots.empty() || slots.size() != usual) continue;
     stamped = stamped && content.size() != line.size() && line.find("->") == std::string::npos;
     starts.emplace_back(content.substr(0, slots[0].text.data() + slots[0].text.size() - content.data() + 1));
     rows.emplace_back();
