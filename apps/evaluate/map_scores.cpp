@@ -41,6 +41,8 @@ void MapScores::finish() {
     score(of_pass_.at(pass), by_pass_);
     score(of_surface_.at(surface_of(pass)).first, by_surface_);
   }
+  for (const NamedMap& map : maps(true))
+    if (!map.truth.empty()) (of_surface_.contains(map.name) ? by_surface_ : by_pass_).elements.add(map);
 }
 
 std::vector<std::string> MapScores::lines() const {
@@ -52,8 +54,17 @@ std::vector<std::string> MapScores::lines() const {
            (interval.empty() ? "" : " (95 % over passes: " + interval + ")");
   };
   if (by_pass_.zones.contact().windows == 0) return {};
-  return {"in contact, read back from the map of the pass: " + text(by_pass_) +
-          "; from that of all passes: " + text(by_surface_)};
+  const auto found = [](const ElementScores& e) {
+    return std::to_string(e.found) + " of " + std::to_string(e.existing) + ", " + std::to_string(e.invented) +
+           " false";
+  };
+  std::vector<std::string> lines = {"in contact, read back from the map of the pass: " + text(by_pass_) +
+                                    "; from that of all passes: " + text(by_surface_)};
+  if (by_surface_.elements.existing > 0)
+    lines.push_back("elements found within " + format(ElementScores::kFoundMm) +
+                    " mm: " + found(by_pass_.elements) + " on maps of passes; " +
+                    found(by_surface_.elements) + " on those of all passes");
+  return lines;
 }
 
 nlohmann::ordered_json MapScores::to_json() const {
@@ -65,7 +76,12 @@ nlohmann::ordered_json MapScores::to_json() const {
     json[name] = {{"ssim", number(contact.ssim)},
                   {"psnr_mean_db", number(contact.psnr_mean_db)},
                   {"felt", scored->by_distance.to_json()},
-                  {"over_passes", scored->by_pass.to_json()}};
+                  {"over_passes", scored->by_pass.to_json()},
+                  {"elements",
+                   {{"existing", scored->elements.existing},
+                    {"found", scored->elements.found},
+                    {"false", scored->elements.invented},
+                    {"median_mm", number(scored->elements.median_mm())}}}};
   }
   return json;
 }

@@ -11,6 +11,7 @@
 #include "apps/evaluate/distance_scores.h"
 #include "apps/evaluate/pass_scores.h"
 #include "apps/evaluate/scoring.h"
+#include "data/map/elements.h"
 #include "data/map/map_file.h"
 #include "data/scores/metrics.h"
 
@@ -32,7 +33,7 @@ class MapScores {
   /// For people: nothing when empty().
   std::vector<std::string> lines() const;
   /// {"of_pass": {"ssim", "psnr_mean_db", "felt": as DistanceScores, "over_passes": as
-  /// PassScores}, "of_surface": the same}
+  /// PassScores, "elements": {"existing", "found", "false", "median_mm"}}, "of_surface": the same}
   nlohmann::ordered_json to_json() const;
   /// PLATE_tTRIAL; with passes PLATE_tTRIAL_pPASS behind them.
   std::vector<NamedMap> maps(bool passes) const;
@@ -44,6 +45,7 @@ class MapScores {
     ZoneMetrics zones;
     DistanceScores by_distance;
     PassScores by_pass;
+    ElementScores elements = {};
   };
   std::string surface_of(std::size_t pass) const;
   NamedMap named(const std::string& name, const SurfaceMap& map, std::size_t pass) const;

@@ -153,9 +153,13 @@ void Stream::write_map() const {
         settings_.map.path +
         ": no map, since no picture's place is known; expected --model and a --recording "
         "with positions, which supertac-collect and supertac-import give");
+  write_maps(settings_.map, {named_map()});
+}
+
+NamedMap Stream::named_map() const {
   MapCells cells = map_->cells(map_->felt());
   maker_->interval_factors().half_widths(cells.values, cells.errors, cells.errors);
-  write_maps(settings_.map, {{"surface", cells, map_->grid().pixel_mm}});
+  return {"surface", std::move(cells), map_->grid().pixel_mm};
 }
 
 // Empty where frames come as often as the source says, to a twentieth.
@@ -178,6 +182,7 @@ std::string Stream::summary() const {
          std::to_string(counters.missing) + ", dropped " + std::to_string(dropped()) +
          (lines_lost_ > 0 ? ", " + std::to_string(lines_lost_) + " lines not taken by their reader" : "") +
          (unlike_ > 0 ? ", " + std::to_string(unlike_) + " pictures of signals unlike training" : "") +
+         (map_ && !map_->empty() ? "; map of " + elements_text(elements(named_map())) : "") +
          (record_ ? "; recorded " + record_path_ : "") +
          (record_ && record_->left_out() > 0
               ? ", " + std::to_string(record_->left_out()) + " frames left out, their time being uncertain"

@@ -15,6 +15,7 @@
 #include "apps/stream/views/line_output.h"
 #include "apps/stream/views/terminal_view.h"
 #include "apps/stream/views/web_view.h"
+#include "data/map/elements.h"
 #include "data/map/map_file.h"
 #include "data/recordings/mcap_log.h"
 #include "models/files/classifier_file.h"
@@ -76,6 +77,7 @@ class Stream {
   void keep_raw(const SensorFrame& frame);
   void output(const Seen& seen);
   void write_map() const;
+  NamedMap named_map() const;
   void complete();
   void describe_recording();
   void show();

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
+#include "data/map/elements.h"
 #include "data/plates/plate_mesh.h"
 #include "data/plates/stl.h"
 #include "io/files/safetensors.h"
@@ -104,6 +106,22 @@ void write_tensors(const OutputPath& output, const std::vector<NamedMap>& maps) 
   write_safetensors(output, metadata, tensors);
 }
 
+std::string table_of(const std::vector<NamedMap>& maps) {
+  std::string table =
+      "map,element,x_mm,y_mm,x_off_mm,y_off_mm,height,height_off,length_mm,width_mm,degrees,open\n";
+  for (const NamedMap& map : maps) {
+    int number = 0;
+    for (const Element& e : elements(map)) {
+      table += map.name + "," + std::to_string(++number);
+      for (const double v : {e.x_mm, e.y_mm, e.x_off_mm, e.y_off_mm, e.height, e.height_off, e.length_mm,
+                             e.width_mm, std::atan2(e.along_y, e.along_x) * 180 / std::numbers::pi})
+        table += "," + format(v, 3);
+      table += e.open ? ",1\n" : ",0\n";
+    }
+  }
+  return table;
+}
+
 // A box whose top has a point at each cell's centre: the cells in a frame of points at the bottom, whose
 // places are those of the outermost cells.
 std::vector<Triangle> solid_of(const NamedMap& map) {
@@ -139,8 +157,9 @@ std::vector<Triangle> solid_of(const NamedMap& map) {
 }  // namespace
 
 void check_map_path(const std::string& path) {
-  if (!path.ends_with(".png") && !path.ends_with(".safetensors") && !path.ends_with(".stl"))
-    throw std::invalid_argument("a map is written as .png, .safetensors or .stl, found " + path);
+  for (const char* ending : {".png", ".safetensors", ".csv", ".stl"})
+    if (path.ends_with(ending)) return;
+  throw std::invalid_argument("a map is written as .png, .safetensors, .csv or .stl, found " + path);
 }
 
 void write_maps(const OutputPath& output, const std::vector<NamedMap>& maps) {
@@ -150,6 +169,8 @@ void write_maps(const OutputPath& output, const std::vector<NamedMap>& maps) {
   AtomicFile file(output);
   if (output.path.ends_with(".png")) {
     file.write(encode_png(picture_of(maps)));
+  } else if (output.path.ends_with(".csv")) {
+    file.write(table_of(maps));
   } else {
     if (maps.size() > 1)
       throw std::invalid_argument("map: a solid is made of one surface, found " +

@@ -25,6 +25,7 @@ void check_map_path(const std::string& path);
 ///   .safetensors  for each map NAME.values, NAME.errors and NAME.truth F32 [height][width], NaN where
 ///                 nothing was felt; metadata NAME.corner_mm is the place of the corner of the first cell,
 ///                 cell_mm the size of a cell, [x,y] both
+///   .csv          a row for each element (data/map/elements.h) of each map, lengths in mm
 ///   .stl          one map as a solid to print, 1 being rig::kTextureHeightMm high, as far above its bottom
 ///                 as plate_mesh.h's; what was never felt lies kSunkMm below the plane
 /// Throws std::invalid_argument as check_map_path(), for no map, or more than one for .stl; FileError.

@@ -67,7 +67,7 @@ TEST_F(MapFiles, APictureIsWritten) {
 
 TEST_F(MapFiles, SaysWhatIsWrong) {
   EXPECT_ERROR(write_maps(path(".npy"), {small_map()}), std::invalid_argument,
-               "a map is written as .png, .safetensors or .stl, found ");
+               "a map is written as .png, .safetensors, .csv or .stl, found ");
   EXPECT_ERROR(write_maps(path(".stl"), {small_map(), small_map()}), std::invalid_argument,
                "of one surface, found 2");
   EXPECT_ERROR(write_maps(path(".png"), {}), std::invalid_argument, "expected at least one, got none");

@@ -1,0 +1,50 @@
+// What a map shows: its hills, with their places, sizes and how sure they are.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "data/map/map_file.h"
+
+namespace supertac {
+
+/// A hill of a map: the cells around a top that are at least half as high.
+struct Element {
+  double x_mm = 0, y_mm = 0;           ///< mean of its cells, weighted by their values
+  double x_off_mm = 0, y_off_mm = 0;   ///< how far that may be off
+  double height = 0, height_off = 0;   ///< of the top; half of its 90 % interval
+  double length_mm = 0, width_mm = 0;  ///< of the bar that has the same moments
+  double along_x = 1, along_y = 0;     ///< unit vector of its length, along_x >= 0
+  bool open = false;                   ///< reaches the edge of what was felt, so may go on
+  bool line() const { return length_mm >= 2 * width_mm; }
+};
+
+/// Hills in the sense of persistence (Edelsbrunner, Letscher, Zomorodian 2002): two tops are one hill when
+/// the saddle between them is at least half as high as the lower top. Hills lower than kLowest, or lower than
+/// their own interval, are none. With cells c of values v and half widths e of intervals,
+///   centre = sum v c / sum v,   off = sum e |c - centre| / sum v,
+/// the latter for errors of the worst signs, since errors of neighbours are alike. Ordered by y, then x.
+std::vector<Element> elements(const NamedMap& map);
+inline constexpr float kLowest = 0.2F;
+
+/// The median distance of an element from its nearest neighbour (mm), of lines across the line; NaN below
+/// two.
+double pitch_mm(const std::vector<Element>& elements);
+
+/// Like: 6 elements, 5.99 mm apart
+std::string elements_text(const std::vector<Element>& elements);
+
+/// How the elements of a map stand beside those of its truth, taken in the same way: a true one is found when
+/// one that no other has taken lies within kFoundMm, of lines across the line; what is left over is false.
+struct ElementScores {
+  static constexpr double kFoundMm = 1;
+  std::size_t existing = 0, found = 0, invented = 0;
+  std::vector<double> distances_mm = {};  ///< of those found
+
+  /// A map with truth.
+  void add(const NamedMap& map);
+  /// NaN where none was found.
+  double median_mm() const;
+};
+
+}  // namespace supertac

@@ -1,0 +1,113 @@
+#include "data/map/elements.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "data/plates/truth.h"
+#include "io/numbers/random.h"
+
+namespace supertac {
+namespace {
+
+constexpr double kCellMm = 0.75;
+
+// A map of a plate from (left, bottom) on, whose truth is the plate.
+NamedMap map_of(const std::string& name, MapRegion region, float error = 0.1F) {
+  const Plate plate = Plate::named(name);
+  NamedMap map{.name = name, .cells = {.region = region, .values = {}, .errors = {}}, .cell_mm = kCellMm};
+  for (std::int64_t j = region.bottom; j < region.bottom + region.height; ++j)
+    for (std::int64_t i = region.left; i < region.left + region.width; ++i)
+      map.truth.push_back(static_cast<float>(truth_value(plate, (static_cast<double>(i) + 0.5) * kCellMm,
+                                                         (static_cast<double>(j) + 0.5) * kCellMm)));
+  map.cells.values = map.truth;
+  map.cells.errors.assign(map.truth.size(), error);
+  return map;
+}
+
+const MapRegion kPlate = {0, 0, 48, 144};
+
+TEST(Elements, OfThePlatesLieWhereTheirCrestsDo) {
+  for (const char* name : {"3_Bumps", "6_Bumps", "4_Ridges", "6_Ridges"}) {
+    const Plate plate = Plate::named(name);
+    const std::vector<Element> found = elements(map_of(name, kPlate));
+    ASSERT_EQ(found.size(), plate.crests().size()) << name;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      EXPECT_NEAR(found[i].y_mm, plate.crests()[i], 0.05) << name;
+      EXPECT_TRUE(found[i].line() && found[i].open) << name;
+      EXPECT_NEAR(found[i].length_mm, 36, 0.1);
+      EXPECT_NEAR(found[i].along_x, 1, 1e-9);
+    }
+    EXPECT_NEAR(pitch_mm(found), plate.textures()[0].pitch_mm, 0.1) << name;
+  }
+}
+
+TEST(Elements, BlobsAreRoundAndCounted) {
+  const std::vector<Element> found = elements(map_of("blobs12h3", kPlate));
+  ASSERT_EQ(found.size() % 3, 0U);
+  for (const Element& e : found) EXPECT_TRUE(!e.line() && !e.open);
+  EXPECT_NEAR(pitch_mm(found), 12, 0.3);
+  EXPECT_NEAR(found[0].width_mm, 2 * 3 * 0.75, 0.4);  // a disc as wide as half a ball at half its height
+}
+
+TEST(Elements, NoiseBelowHalfOfATopMakesNone) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const RandomStream random(seed, 0);
+    NamedMap map = map_of(seed % 2 == 0 ? "4_Ridges" : "6_Bumps", kPlate);
+    for (std::size_t c = 0; c < map.truth.size(); ++c)
+      map.cells.values[c] += 0.1F * static_cast<float>(random.uniform(c) - 0.5);
+    ElementScores scores;
+    scores.add(map);
+    EXPECT_EQ(scores.found, scores.existing);
+    EXPECT_EQ(scores.invented, 0U) << seed;
+    EXPECT_LT(scores.median_mm(), 0.1);
+  }
+}
+
+TEST(Elements, AreNoneWhereTheirIntervalReachesTheFloor) {
+  EXPECT_EQ(elements(map_of("4_Ridges", kPlate, 0.69F)).size(), 4U);
+  EXPECT_TRUE(elements(map_of("4_Ridges", kPlate, 0.71F)).empty());  // a pixel of a ridge's top has .7
+}
+
+TEST(Elements, AMoveOfAMillimetreIsFoundAndThreeAreNot) {
+  for (const std::int64_t cells : {1, 4}) {
+    NamedMap map = map_of("4_Ridges", kPlate);
+    std::ranges::rotate(map.cells.values, map.cells.values.begin() + cells * kPlate.width);
+    ElementScores scores;
+    scores.add(map);
+    EXPECT_EQ(scores.existing, 4U);
+    EXPECT_EQ(scores.found, cells == 1 ? 4U : 0U);
+    EXPECT_EQ(scores.invented, cells == 1 ? 0U : 4U);
+  }
+}
+
+TEST(Elements, WhatWasNotFeltDoesNotExist) {
+  NamedMap map = map_of("3_Bumps", kPlate);
+  for (std::size_t c = map.truth.size() / 2; c < map.truth.size(); ++c)
+    map.cells.values[c] = map.cells.errors[c] = std::numeric_limits<float>::quiet_NaN();
+  ElementScores scores;
+  scores.add(map);
+  EXPECT_EQ(scores.existing, elements(map).size());
+  EXPECT_EQ(scores.found, scores.existing);
+}
+
+TEST(Elements, OfAnEmptyOrFlatMapAreNone) {
+  EXPECT_TRUE(elements(NamedMap{.name = "", .cells = {}, .cell_mm = kCellMm}).empty());
+  const std::vector<Element> none = elements(map_of("plain", kPlate));
+  EXPECT_TRUE(none.empty());
+  EXPECT_EQ(elements_text(none), "0 elements");
+}
+
+TEST(Elements, HoldTheirPlaceWithinWhatTheySay) {
+  // Errors of neighbours are alike: a tilt across a ridge moves its middle by no more than off_mm.
+  NamedMap map = map_of("4_Ridges", kPlate, 0.3F);
+  for (std::size_t c = 0; c < map.truth.size(); ++c) map.cells.values[c] *= (c / 48) % 2 == 0 ? 1.3F : 0.7F;
+  const std::vector<Element> truth = elements(map_of("4_Ridges", kPlate)), found = elements(map);
+  ASSERT_EQ(found.size(), truth.size());
+  for (std::size_t i = 0; i < found.size(); ++i)
+    EXPECT_LE(std::abs(found[i].y_mm - truth[i].y_mm), found[i].y_off_mm);
+}
+
+}  // namespace
+}  // namespace supertac
