@@ -93,7 +93,7 @@ TEST_F(Streaming, TheMapOfARecordingHasTheBitsOfTheWindowsMap) {
   EXPECT_GT(cells.region.height, 15);
   for (std::size_t i = 0; i < values.size(); ++i)
     ASSERT_EQ(std::bit_cast<std::uint32_t>(values[i]), std::bit_cast<std::uint32_t>(cells.values[i])) << i;
-  expect_failure(stream("--recording recording --map map.npy"), 2, "written as .png, .safetensors, .csv or .stl");
+  expect_failure(stream("--recording recording --map map.npy"), 2, "written as .png, .safetensors");
   plug_in();
   expect_failure(stream("--board " + board() + " --seconds 0.5 --map map.png"), 1,
                  "no picture's place is known");
