@@ -33,7 +33,7 @@ TABLES = {
     "bench/results/sensors.md": [tables.other_sensors],
     "bench/results/sensor_faults.md": [tables.corruptions, tables.silence],
     "bench/results/speed.md": [tables.speed, tables.tail, tables.cold_start, tables.threads,
-                               tables.whole_job, tables.precision],
+                               tables.fast_parts, tables.whole_job, tables.precision],
     "bench/results/reliability.md": [tables.studies],
     "bench/results/parts.md": [tables.parts, tables.simulator_terms, tables.tried],
 }

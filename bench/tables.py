@@ -251,6 +251,17 @@ def threads():
                   for r in found if r["threads"] != "1"])
 
 
+def fast_parts():
+    """How much longer a task takes without a part."""
+    found, columns = rows("speed/fast_parts.csv"), ("paper training step", "best training step", "tiny training step",
+                                                   "paper one picture", "tiny one picture", "paper 64 pictures")
+    lines = []
+    for part in dict.fromkeys(r["part"] for r in found):
+        times = {f"{r['network']} {r['task']}": f"{100 * float(r['without']) - 100:+.0f} %" for r in chosen(found, part=part)}
+        lines.append([part, chosen(found, part=part)[0]["lines"]] + [times.get(column, "") for column in columns])
+    return table(["without", "lines", *columns], lines)
+
+
 def whole_job():
     found, lines = rows("speed/whole_job.csv"), []
     for job in dict.fromkeys(r["job"] for r in found):

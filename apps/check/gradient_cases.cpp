@@ -36,18 +36,19 @@ Tensor off_zero(const Shape& shape) {
 }
 
 using Leaves = std::vector<Variable>;
+using F = std::function<Variable(const Leaves&)>;
 
 class Cases {
  public:
   explicit Cases(std::string kind) : kind_(std::move(kind)) {}
 
   void op(const std::string& name, const std::vector<std::string>& inputs, const std::vector<Tensor>& values,
-          const std::function<Variable(const Leaves&)>& f, GradientCheckOptions options = {}) {
+          const F& f, GradientCheckOptions options = {}) {
     Leaves leaves;
     for (const Tensor& t : values) leaves.emplace_back(t, true);
     options.names = inputs;
     for (std::string& input : options.names) input = name + " " + input;
-    cases_.push_back({kind_, name, [f, leaves] { return f(leaves); }, leaves, std::move(options)});
+    cases_.push_back({kind_, name, [f, leaves] { return f(leaves); }, leaves, std::move(options), f});
   }
 
   // The parameters asked for, and x where it has a gradient.
@@ -63,7 +64,7 @@ class Cases {
     const Variable input = x ? Variable(*x, true) : Variable();
     if (x) leaves.push_back(input), options.names.push_back("x");
     for (std::string& leaf : options.names) leaf = name + " " + leaf;
-    cases_.push_back({kind_, name, [=] { return f(*m, input); }, leaves, std::move(options)});
+    cases_.push_back({kind_, name, [=] { return f(*m, input); }, leaves, std::move(options), {}});
   }
 
   template <class M>
@@ -81,62 +82,101 @@ class Cases {
 };
 
 void elementwise(Cases& cases) {
-  for (const Shape& shape : {Shape{2, 5, 3, 7}, Shape{33}}) {
-    const std::vector<Tensor> x{off_zero(shape)};
-    cases.op("relu", {"x"}, x, [](const Leaves& in) { return relu(in[0]); });
-  }
-  const std::vector<Tensor> x{off_zero({2, 5, 3, 7})};
-  cases.op("leaky_relu", {"x"}, x, [](const Leaves& in) { return leaky_relu(in[0]); });
-  cases.op("sigmoid", {"x"}, x, [](const Leaves& in) { return sigmoid(in[0]); });
-  cases.op("clamp", {"x"}, x, [](const Leaves& in) { return clamp(in[0], -0.7, 0.6); });
-  const std::vector<Tensor> two{uniform({3, 5, 2}, 1), uniform({3, 5, 2}, 2)};
+  const std::pair<const char*, F> ops[] = {
+      {"relu", [](const Leaves& in) { return relu(in[0]); }},
+      {"leaky_relu", [](const Leaves& in) { return leaky_relu(in[0]); }},
+      {"sigmoid", [](const Leaves& in) { return sigmoid(in[0]); }},
+      {"clamp", [](const Leaves& in) { return clamp(in[0], real(-0.51), real(0.72)); }}};
+  for (const auto& [name, f] : ops)
+    for (const Shape& shape : {Shape{2, 5, 3, 17}, Shape{33}, Shape{1, 1}})
+      cases.op(name, {"x"}, {off_zero(shape)}, f);
+  const std::vector<Tensor> two{uniform({3, 5, 2}, 1), uniform({3, 5, 2}, 2)}, one{uniform({17}, 1)};
   cases.op("add", {"a", "b"}, two, [](const Leaves& in) { return in[0] + in[1]; });
+  cases.op("add", {"a", "b"}, two, [](const Leaves& in) { return in[0] - in[1]; });
   cases.op("multiply", {"a", "b"}, two, [](const Leaves& in) { return in[0] * in[1]; });
-  cases.op("scale", {"x"}, {uniform({17}, 1)}, [](const Leaves& in) { return -3 * in[0]; });
+  cases.op("scale", {"x"}, one, [](const Leaves& in) { return -3 * in[0]; });
+  cases.op("scale", {"x"}, one, [](const Leaves& in) { return 1 - in[0]; });
   cases.op("sum", {"x"}, {uniform({3, 7}, 1)}, [](const Leaves& in) { return sum(in[0]); });
 }
 
+// Channels around the lengths of vectors.
+constexpr Dim kChannels[] = {1, 3, 17, 33};
+
 void attention(Cases& cases) {
-  const Tensor x = uniform({2, 3, 5, 7}, 1);
-  cases.op("global_mean", {"x"}, {x}, [](const Leaves& in) { return global_mean(in[0]); });
-  cases.op("gated_sum", {"a", "x", "s"}, {uniform({2, 3, 5, 7}, 3), x, uniform({2, 7}, 2)},
-           [](const Leaves& in) { return gated_sum(in[0], in[1], in[2]); });
+  for (const Dim channels : kChannels)
+    cases.op("global_mean", {"x"}, {uniform({2, 3, 5, channels}, 1)},
+             [](const Leaves& in) { return global_mean(in[0]); });
+  for (const Dim channels : kChannels)
+    cases.op("gated_sum", {"a", "x", "s"},
+             {uniform({2, 3, 5, channels}, 3), uniform({2, 3, 5, channels}, 1), uniform({2, channels}, 2)},
+             [](const Leaves& in) { return gated_sum(in[0], in[1], in[2]); });
 }
 
 using Convolve = Variable (*)(const Variable&, const Variable&, const Variable&, const ConvOptions&);
 
 void convolution(Cases& cases, const std::string& name, Convolve op, const Shape& x, const Shape& w,
-                 Dim most = 200) {
-  const Tensor bias = uniform({w[w.rank() - 1]}, 3);
-  for (const ConvOptions& o : {ConvOptions{.stride = 1, .padding = 1}, ConvOptions{.stride = 2, .padding = 1},
-                               ConvOptions{.stride = 1, .padding = 0, .negative_slope = kLeakyRelu}}) {
-    cases.op(name, {"x", "weight", "bias"}, {uniform(x, 1), uniform(w, 2), bias},
-             [=](const Leaves& in) { return op(in[0], in[1], in[2], o); }, {.max_entries_per_input = most});
+                 const ConvOptions& options, Dim most = 60) {
+  cases.op(name, {"x", "weight", "bias"}, {uniform(x, 1), uniform(w, 2), uniform({w[w.rank() - 1]}, 3)},
+           [=](const Leaves& in) { return op(in[0], in[1], in[2], options); },
+           {.max_entries_per_input = most});
+}
+
+// H != W, strides 2 and 3, no padding and much, a single pixel, channels around the lengths of vectors.
+struct MapCase {
+  Dim images, height, width, in, out, kernel, stride, padding;
+};
+constexpr MapCase kMaps[] = {
+    {2, 5, 7, 3, 17, 3, 1, 1}, {1, 6, 4, 1, 1, 3, 2, 1},   {2, 7, 5, 17, 3, 3, 2, 1},
+    {1, 4, 4, 33, 1, 3, 1, 1}, {2, 3, 4, 1, 33, 1, 1, 0},  {1, 5, 4, 17, 33, 2, 2, 0},
+    {2, 4, 3, 3, 5, 4, 2, 1},  {1, 9, 2, 16, 32, 3, 1, 2}, {2, 1, 1, 3, 8, 3, 1, 1},
+    {1, 8, 11, 5, 1, 4, 2, 1}, {1, 3, 3, 2, 2, 1, 3, 2}};
+
+void maps(Cases& cases, const std::string& name, Convolve op) {
+  for (const MapCase& c : kMaps) {
+    const Dim least = (std::min(c.height, c.width) - 1) * c.stride - 2 * c.padding + c.kernel;
+    if (op == conv_transpose2d && least < 1) continue;
+    convolution(cases, name, op, {c.images, c.height, c.width, c.in}, {c.kernel, c.kernel, c.in, c.out},
+                {.stride = c.stride, .padding = c.padding});
   }
 }
 
 void convolutions(Cases& cases) {
-  convolution(cases, "conv1d", conv1d, {2, 9, 3}, {4, 3, 5});
-  convolution(cases, "conv2d", conv2d, {2, 5, 4, 3}, {3, 2, 3, 5});
+  const ConvOptions halving{.stride = 2, .padding = 1, .negative_slope = kLeakyRelu};
+  for (const Dim channels : kChannels)
+    convolution(cases, "conv1d", conv1d, {2, 9, channels}, {4, channels, 5}, halving, 200);
+  for (const Dim channels : kChannels)
+    convolution(cases, "conv_transpose1d", conv_transpose1d, {2, 9, channels}, {4, channels, 5}, halving,
+                200);
+  maps(cases, "conv2d", conv2d);
+  convolution(cases, "conv2d", conv2d, {2, 5, 4, 3}, {3, 2, 3, 5}, halving);
   // Few outputs, and maps that are transformed: each is computed in a way of its own (kernels/fast).
-  convolution(cases, "conv2d", conv2d, {2, 4, 5, 7}, {3, 3, 7, 1});
-  convolution(cases, "conv2d", conv2d, {4, 8, 8, 16}, {3, 3, 16, 16}, 40);
-  convolution(cases, "conv_transpose1d", conv_transpose1d, {2, 5, 3}, {4, 3, 5});
-  convolution(cases, "conv_transpose2d", conv_transpose2d, {2, 3, 4, 3}, {4, 3, 3, 5});
-  for (const real slope : {kNoActivation, kRelu}) {
-    cases.op("linear", {"x", "weight", "bias"}, {uniform({3, 17}, 1), uniform({17, 5}, 2), uniform({5}, 3)},
-             [=](const Leaves& in) { return linear(in[0], in[1], in[2], slope); });
-  }
+  convolution(cases, "conv2d", conv2d, {2, 4, 5, 7}, {3, 3, 7, 1}, {.padding = 1});
+  convolution(cases, "conv2d", conv2d, {4, 8, 8, 16}, {3, 3, 16, 16}, {.padding = 1}, 40);
+  maps(cases, "conv_transpose2d", conv_transpose2d);
+  const struct {
+    Dim rows, in, out;
+  } matrices[] = {{1, 1, 1}, {2, 3, 17}, {1, 33, 3}, {19, 17, 33}, {2, 40, 512}};
+  for (const auto& m : matrices)
+    for (const real slope : {kNoActivation, kRelu, kLeakyRelu})
+      cases.op("linear", {"x", "weight", "bias"},
+               {uniform({m.rows, m.in}, 1), uniform({m.in, m.out}, 2), uniform({m.out}, 3)},
+               [=](const Leaves& in) { return linear(in[0], in[1], in[2], slope); });
 }
 
 void shaping(Cases& cases) {
-  // No two values closer than the steps of the differences.
-  Tensor apart({2, 5, 4, 3});
-  for (Dim i = 0; i < apart.size(); ++i) apart.data()[i] = static_cast<real>(0.05 * double(i * 7919 % 120));
-  cases.op("max_pool2d", {"x"}, {apart}, [](const Leaves& in) { return max_pool2d(in[0]); }, {.step = 1e-4});
+  for (const Dim channels : {1, 3, 17}) {
+    Tensor apart({2, 5, 4, channels});  // no two values closer than the steps of the differences
+    for (Dim i = 0; i < apart.size(); ++i)
+      apart.data()[i] = static_cast<real>(0.05 * double(i * 7919 % apart.size()));
+    cases.op("max_pool2d", {"x"}, {apart}, [](const Leaves& in) { return max_pool2d(in[0]); },
+             {.step = 1e-4});
+  }
   cases.op("concat", {"x0", "x1", "x2"},
            {uniform({2, 3, 1}, 1), uniform({2, 3, 17}, 2), uniform({2, 3, 3}, 3)},
            [](const Leaves& in) { return concat(in); });
+  cases.op("concat", {"x"}, {uniform({2, 3}, 1)}, [](const Leaves& in) {
+    return concat(std::array{in[0], in[0]});
+  });
   cases.op("flatten_channels_first", {"x"}, {uniform({2, 3, 5, 4}, 1)},
            [](const Leaves& in) { return flatten_channels_first(in[0]); });
   cases.op("unflatten_channels_first", {"x"}, {uniform({2, 18}, 1)}, [](const Leaves& in) {
@@ -145,21 +185,30 @@ void shaping(Cases& cases) {
 }
 
 void losses(Cases& cases) {
-  cases.op("l2_loss", {"x", "target"}, {uniform({2, 5, 3, 1}, 1), uniform({2, 5, 3, 1}, 2)},
-           [](const Leaves& in) { return l2_loss(in[0], in[1]); });
-  for (const Shape& shape : {Shape{2, 12, 13, 1}, Shape{1, 8, 9, 1}}) {
+  for (const Shape& shape : {Shape{2, 5, 3, 1}, Shape{1}, Shape{33, 17}})
+    cases.op("l2_loss", {"x", "target"}, {uniform(shape, 1), uniform(shape, 2)},
+             [](const Leaves& in) { return l2_loss(in[0], in[1]); });
+  for (const Shape& shape :
+       {Shape{2, 16, 13, 1}, Shape{1, 8, 9, 1}, Shape{1, 6, 10, 1}, Shape{1, 3, 4, 1}, Shape{5, 11, 11, 1}}) {
     const Tensor target = uniform(shape, 2, 0, 1);
     cases.op("ssim", {"x"}, {uniform(shape, 1, 0, 1)}, [=](const Leaves& in) { return ssim(in[0], target); });
   }
+  const Tensor opposite = uniform({1, 16, 16, 1}, 1, 1, 0);
+  cases.op("ssim", {"x"}, {uniform(opposite.shape(), 1, 0, 1)},
+           [=](const Leaves& in) { return ssim(in[0], opposite); });
   cases.op("softmax_cross_entropy", {"logits"}, {uniform({3, 7}, 1, -3, 3)}, [](const Leaves& in) {
     return softmax_cross_entropy(in[0], std::array<std::int32_t, 3>{2, 0, 6});
   });
-  const std::vector<Tensor> two{uniform({5, 33}, 1), uniform({5, 33}, 2)};
-  const Tensor eps = uniform({5, 33}, 3, -2, 2);
-  cases.op("sample_gaussian", {"mean", "log_var"}, two,
-           [=](const Leaves& in) { return sample_gaussian(in[0], in[1], eps); });
-  cases.op("kl_divergence", {"mean", "log_var"}, two,
-           [](const Leaves& in) { return kl_divergence(in[0], in[1]); });
+  const F divergence = [](const Leaves& in) { return kl_divergence(in.front(), in.back()); };
+  for (const Shape& shape : {Shape{2, 3}, Shape{1, 17}, Shape{5, 33}}) {
+    const Tensor eps = uniform(shape, 3, -2, 2);
+    cases.op("sample_gaussian", {"mean", "log_var"}, {uniform(shape, 1), uniform(shape, 2)},
+             [=](const Leaves& in) { return sample_gaussian(in[0], in[1], eps); });
+  }
+  for (const Shape& shape : {Shape{2, 3}, Shape{1, 17}, Shape{5, 33}}) {
+    cases.op("kl_divergence", {"mean", "log_var"}, {uniform(shape, 1), uniform(shape, 2)}, divergence);
+    cases.op("kl_divergence", {"mean"}, {uniform(shape, 1)}, divergence);
+  }
 }
 
 // At the initial weights the deepest gradients are 1e-10 of the loss, below what a difference of doubles

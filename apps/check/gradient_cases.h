@@ -1,4 +1,4 @@
-// What supertac-check gradients asks: every op, every layer and the whole losses, over awkward sizes.
+// What supertac-check gradients and the tests ask: every op, every layer and the whole losses, over awkward sizes.
 #pragma once
 
 #include <functional>
@@ -16,6 +16,7 @@ struct GradientCase {
   std::function<Variable()> f;
   std::vector<Variable> leaves;
   GradientCheckOptions options{};
+  std::function<Variable(const std::vector<Variable>&)> of{};  ///< of an op: f of any leaves
 };
 
 /// Cases of one name follow each other.

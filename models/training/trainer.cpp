@@ -3,7 +3,6 @@
 #include <cmath>
 #include <utility>
 
-#include "autograd/kernels/fast/weight_forms.h"
 #include "autograd/ops/arithmetic.h"
 #include "io/numbers/hash.h"
 #include "models/inference/evaluation.h"
@@ -38,13 +37,7 @@ Trainer::Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, Obj
                                 (i + 1) * n / micro_batches - i * n / micro_batches);
   for (const MicroBatch& micro_batch : micro_batches_)
     micro_batch_parameters_.push_back(&micro_batch.objective.network().parameters());
-  std::vector<Tensor> weights;
-  for (const Parameter& p : model().parameters()) weights.push_back(p.value.value());
-  forms_ = std::make_unique<kernels::WeightForms>(weights);
 }
-
-Trainer::Trainer(Trainer&&) noexcept = default;
-Trainer::~Trainer() = default;
 
 Trainer::MicroBatch::MicroBatch(const Objective& master, Dim first_sample, Dim count)
     : first(first_sample),
@@ -104,7 +97,6 @@ void Trainer::draw_noise(MicroBatch& micro_batch) const {
 // Forward, loss, backward of one micro-batch, each term weighted by its share of the batch.
 void Trainer::run(MicroBatch& micro_batch) const {
   const std::vector<Parameter>& parameters = micro_batch.objective.network().parameters();
-  const kernels::WeightForms::Use use(*forms_);
   fill(micro_batch);
   draw_noise(micro_batch);
   drop_gradients(parameters);
@@ -135,7 +127,6 @@ StepReport Trainer::train_step(const std::function<bool()>& stop, const AroundMi
     throw std::invalid_argument("train_step: all " + std::to_string(total_steps()) + " steps are done");
   announce_next();
   batch_of(step(), indices_);
-  forms_->renew();  // Adam has written the weights since, or restore()
 #pragma omp parallel for schedule(static, 1)
   for (std::size_t i = 0; i < micro_batches_.size(); ++i) {
     try {

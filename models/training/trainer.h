@@ -30,10 +30,6 @@
 
 namespace supertac {
 
-namespace kernels {
-class WeightForms;
-}
-
 struct StepReport : LossTerms {
   std::int64_t step = 0;     ///< from 1
   double gradient_norm = 0;  ///< before clipping
@@ -61,8 +57,6 @@ class Trainer {
   /// of them call train_step() and save().
   Trainer(const WindowSet& windows, std::vector<std::uint32_t> train, Objective objective,
           Ranks& ranks = one_process());
-  Trainer(Trainer&&) noexcept;
-  ~Trainer();
 
   bool done() const { return state_.done(); }
   std::int64_t step() const { return state_.step(); }
@@ -141,7 +135,6 @@ class Trainer {
   std::vector<std::uint32_t> indices_, next_;                          // of the batch, and of that behind it
   std::vector<MicroBatch> micro_batches_;                              // of this process
   std::vector<const std::vector<Parameter>*> micro_batch_parameters_;  // of these models
-  std::unique_ptr<kernels::WeightForms> forms_;  // of the weights that all micro-batches share
 };
 
 }  // namespace supertac

@@ -96,26 +96,4 @@ inline double dot(const Tensor& a, const Tensor& b) {
   return total;
 }
 
-#ifdef SUPERTAC_REAL_IS_DOUBLE
-/// The gradient of every input agrees with finite differences to kGradientTolerance, and is the same where
-/// all other inputs are constants.
-inline void expect_gradients(const std::function<Variable(const std::vector<Variable>&)>& f,
-                             const std::vector<Tensor>& inputs, const GradientCheckOptions& options = {},
-                             const Place& place = Place::current()) {
-  const At at(place);
-  const GradientReport report = check_gradients(f, inputs, options);
-  EXPECT_GT(report.entries, 0);
-  EXPECT_EQ(report.wrong, 0) << report.text();
-  std::vector<Variable> all;
-  for (const Tensor& t : inputs) all.push_back(parameter(t));
-  backward(sum(f(all)));
-  for (std::size_t i = 0; i < inputs.size(); ++i) {
-    std::vector<Variable> one;
-    for (std::size_t k = 0; k < inputs.size(); ++k) one.emplace_back(inputs[k], k == i);
-    backward(sum(f(one)));
-    EXPECT_TRUE(same_bytes(one[i].grad(), all[i].grad())) << "input " << i << " alone";
-  }
-}
-#endif
-
 }  // namespace supertac::test

@@ -1,14 +1,32 @@
-// What a report of wrong gradients says of a layer; apps/check/gradient_cases.cpp has the gradients of every
-// layer.
+// What a report of wrong gradients says of a layer, and the inputs of every op one by one; `supertac-check
+// gradients` compares all of apps/check/gradient_cases.cpp with finite differences.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "apps/check/gradient_cases.h"
 #include "autograd/gradient_checker.h"
+#include "autograd/ops/arithmetic.h"
 #include "autograd/record.h"
 #include "layers/residual.h"
 #include "tests/layers/noise.h"
 
 namespace supertac {
 namespace {
+
+TEST(OpGradients, AnInputHasTheSameOneWhereAllOthersAreConstants) {
+  for (const GradientCase& c : op_cases()) {
+    std::vector<Variable> all;
+    for (const Variable& leaf : c.leaves) all.emplace_back(leaf.value(), true);
+    backward(sum(c.of(all)));
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      std::vector<Variable> one;
+      for (std::size_t k = 0; k < all.size(); ++k) one.emplace_back(all[k].value(), k == i);
+      backward(sum(c.of(one)));
+      EXPECT_TRUE(std::ranges::equal(one[i].grad().values(), all[i].grad().values())) << c.options.names[i];
+    }
+  }
+}
 
 // The parameter's name as in a checkpoint, its indices as in memory: [kernel..., in, out].
 TEST(LayerGradients, AReportNamesTheParameterAndItsElement) {

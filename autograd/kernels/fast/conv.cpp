@@ -5,7 +5,6 @@
 #include "autograd/kernels/fast/geometry.h"
 #include "autograd/kernels/fast/isa/isa.h"
 #include "autograd/kernels/fast/narrow.h"
-#include "autograd/kernels/fast/weight_forms.h"
 #include "autograd/kernels/fast/winograd.h"
 
 namespace supertac::kernels::fast {
@@ -21,10 +20,10 @@ ConvTask task_of(const ConvSizes& s) { return {&geometry_of(s.conv), s.images, s
 }  // namespace
 
 Tensor transposed_weights(const real* weights, Dim taps, Dim cin, Dim cout) {
-  return weight_form(weights, WeightForm::transposed, {taps, cout, cin}, [=](real* to) {
-    for (Dim t = 0, at = 0; t < taps; ++t, at += cin * cout)
-      isa_kernels().transpose(cin, cout, weights + at, cout, to + at, cin);
-  });
+  Tensor transposed(Shape{taps, cout, cin});
+  for (Dim t = 0, at = 0; t < taps; ++t, at += cin * cout)
+    isa_kernels().transpose(cin, cout, weights + at, cout, transposed.data() + at, cin);
+  return transposed;
 }
 
 void conv(const ConvSizes& sizes, const real* x, const real* w, const real* bias, real negative_slope,

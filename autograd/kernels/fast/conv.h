@@ -18,7 +18,7 @@ void linear(Dim rows, Dim cin, Dim cout, const real* x, const real* w, const rea
 void linear_grad_x(Dim rows, Dim cin, Dim cout, const real* gy, const real* w, Into into, real* gx);
 void linear_grad_w(Dim rows, Dim cin, Dim cout, const real* x, const real* gy, Into into, real* gw);
 
-/// w [taps][cin][cout] -> [taps][cout][cin], once for all micro-batches of a training step (weight_forms.h).
+/// w [taps][cin][cout] -> [taps][cout][cin]
 Tensor transposed_weights(const real* w, Dim taps, Dim cin, Dim cout);
 
 }  // namespace supertac::kernels::fast

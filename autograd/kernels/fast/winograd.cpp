@@ -4,7 +4,6 @@
 
 #include "autograd/kernels/fast/conv.h"
 #include "autograd/kernels/fast/isa/isa.h"
-#include "autograd/kernels/fast/weight_forms.h"
 
 namespace supertac::kernels {
 namespace {
@@ -60,16 +59,14 @@ bool is_winograd(const ConvTask& s) {
 
 void winograd_conv(const ConvTask& s, const real* x, const real* w, const real* bias, real negative_slope,
                    real* y) {
-  const Tensor u = weight_form(w, WeightForm::filters, {kPlaces, place_of(s)}, [=](real* to) {
-    isa_kernels().filters({s.cin * s.cout, place_of(s)}, w, to);
-  });
+  Tensor u(Shape{kPlaces, place_of(s)});
+  isa_kernels().filters({s.cin * s.cout, place_of(s)}, w, u.data());
   filter(s, x, u, bias, Into::overwrite, negative_slope, y);
 }
 
 void winograd_grad_x(const ConvTask& s, const real* gy, const real* w, Into into, real* gx) {
-  const Tensor u = weight_form(w, WeightForm::turned_filters, {kPlaces, place_of(s)}, [=](real* to) {
-    isa_kernels().filters({s.cin * s.cout, place_of(s)}, turned(s.cin, s.cout, w).data(), to);
-  });
+  Tensor u(Shape{kPlaces, place_of(s)});
+  isa_kernels().filters({s.cin * s.cout, place_of(s)}, turned(s.cin, s.cout, w).data(), u.data());
   filter({s.geometry, s.images, s.cout, s.cin}, gy, u, nullptr, into, 1, gx);
 }
 

@@ -117,17 +117,5 @@ TEST(FusedActivation, RefusesANegativeSlope) {
                  [&] { conv1d(line, taps, b, {.padding = 1, .negative_slope = real(-0.5)}); });
 }
 
-#ifdef SUPERTAC_REAL_IS_DOUBLE
-TEST(Activations, Gradients) {
-  for (const Shape& shape : {Shape{2, 5, 3, 17}, Shape{33}, Shape{1, 1}}) {
-    const Tensor x = numbers_off_zero(shape);
-    expect_gradients([](const auto& in) { return relu(in[0]); }, {x});
-    expect_gradients([](const auto& in) { return leaky_relu(in[0]); }, {x});
-    expect_gradients([](const auto& in) { return sigmoid(in[0]); }, {x});
-    expect_gradients([](const auto& in) { return clamp(in[0], real(-0.51), real(0.72)); }, {x});
-  }
-}
-#endif
-
 }  // namespace
 }  // namespace supertac

@@ -44,17 +44,5 @@ TEST(Arithmetic, RefusesOtherShapes) {
   expect_refusal("subtract: x expects a value, got an empty Variable", [] { 1 - Variable(); });
 }
 
-#ifdef SUPERTAC_REAL_IS_DOUBLE
-TEST(Arithmetic, Gradients) {
-  const std::vector<Tensor> two{numbers({3, 5, 2}), numbers({3, 5, 2}, 2)};
-  expect_gradients([](const auto& in) { return in[0] + in[1]; }, two);
-  expect_gradients([](const auto& in) { return in[0] * in[1]; }, two);
-  expect_gradients([](const auto& in) { return in[0] - in[1]; }, two);
-  expect_gradients([](const auto& in) { return -3 * in[0]; }, {numbers({17})});
-  expect_gradients([](const auto& in) { return 1 - in[0]; }, {numbers({17})});
-  expect_gradients([](const auto& in) { return sum(in[0]); }, {numbers({3, 7})});
-}
-#endif
-
 }  // namespace
 }  // namespace supertac

@@ -44,16 +44,5 @@ TEST(Attention, RefusesOtherShapes) {
   });
 }
 
-#ifdef SUPERTAC_REAL_IS_DOUBLE
-TEST(Attention, Gradients) {
-  for (const Dim channels : {1, 3, 17, 33}) {
-    const Tensor x = numbers({2, 3, 5, channels}), s = numbers({2, channels}, 2);
-    expect_gradients([](const auto& in) { return global_mean(in[0]); }, {x});
-    const Tensor a = numbers({2, 3, 5, channels}, 3);
-    expect_gradients([](const auto& in) { return gated_sum(in[0], in[1], in[2]); }, {a, x, s});
-  }
-}
-#endif
-
 }  // namespace
 }  // namespace supertac

@@ -173,29 +173,5 @@ TEST(Conv, RefusesEmptyOutputs) {
       [&] { conv_transpose2d(x, w, b, {.padding = 2}); });
 }
 
-#ifdef SUPERTAC_REAL_IS_DOUBLE
-TEST(Conv, Gradients) {
-  for (const Case& c : kCases) {
-    SCOPED_TRACE(text(c));
-    const std::vector<Tensor> inputs{numbers(x_shape(c)), numbers(w_shape(c), 2), numbers({c.out}, 3)};
-    const GradientCheckOptions some{.max_entries_per_input = 60};
-    expect_gradients([&](const auto& in) { return conv2d(in[0], in[1], in[2], options(c)); }, inputs, some);
-    if ((std::min(c.height, c.width) - 1) * c.stride - 2 * c.padding + c.kernel < 1) continue;
-    expect_gradients([&](const auto& in) { return conv_transpose2d(in[0], in[1], in[2], options(c)); },
-                     inputs, some);
-  }
-}
-
-TEST(Conv, GradientsInOneDimension) {
-  const ConvOptions halving{.stride = 2, .padding = 1, .negative_slope = kLeakyRelu};
-  for (const Dim channels : {1, 3, 17, 33}) {
-    const std::vector<Tensor> inputs{numbers({2, 9, channels}), numbers({4, channels, 5}, 2),
-                                     numbers({5}, 3)};
-    expect_gradients([&](const auto& in) { return conv1d(in[0], in[1], in[2], halving); }, inputs);
-    expect_gradients([&](const auto& in) { return conv_transpose1d(in[0], in[1], in[2], halving); }, inputs);
-  }
-}
-#endif
-
 }  // namespace
 }  // namespace supertac

@@ -37,18 +37,5 @@ TEST(Linear, RefusesOtherShapes) {
   expect_refusal("linear: b expects [5], got [3]", [&] { linear(x, w, Variable(Tensor::zeros({3}))); });
 }
 
-#ifdef SUPERTAC_REAL_IS_DOUBLE
-TEST(Linear, Gradients) {
-  const struct {
-    Dim rows, in, out;
-  } cases[] = {{1, 1, 1}, {2, 3, 17}, {1, 33, 3}, {19, 17, 33}, {2, 40, 512}};
-  for (const auto& c : cases) {
-    for (const real slope : {kNoActivation, kRelu, kLeakyRelu})
-      expect_gradients([&](const auto& in) { return linear(in[0], in[1], in[2], slope); },
-                       {numbers({c.rows, c.in}), numbers({c.in, c.out}, 2), numbers({c.out}, 3)});
-  }
-}
-#endif
-
 }  // namespace
 }  // namespace supertac

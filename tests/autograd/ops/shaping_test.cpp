@@ -101,15 +101,5 @@ TEST(Shaping, RefusesWhatDoesNotFit) {
   });
 }
 
-#ifdef SUPERTAC_REAL_IS_DOUBLE
-TEST(Shaping, Gradients) {
-  expect_gradients([](const auto& in) { return joined(in); },
-                   {numbers({2, 3, 1}), numbers({2, 3, 17}, 2), numbers({2, 3, 3}, 3)});
-  expect_gradients([](const auto& in) { return joined({in[0], in[0]}); }, {numbers({2, 3})});
-  expect_gradients([](const auto& in) { return flatten_channels_first(in[0]); }, {numbers({2, 3, 5, 4})});
-  expect_gradients([](const auto& in) { return unflattened(in[0], {2, 3}); }, {numbers({2, 18})});
-}
-#endif
-
 }  // namespace
 }  // namespace supertac

@@ -134,17 +134,5 @@ TEST(Ssim, RefusesOtherShapes) {
   }
 }
 
-#ifdef SUPERTAC_REAL_IS_DOUBLE
-TEST(Ssim, Gradients) {
-  for (const Shape& shape :
-       {Shape{2, 16, 13, 1}, Shape{1, 8, 9, 1}, Shape{1, 6, 10, 1}, Shape{1, 3, 4, 1}, Shape{5, 11, 11, 1}}) {
-    const Tensor target = numbers(shape, 2, 0, 1);
-    expect_gradients([&](const auto& in) { return ssim(in[0], target); }, {numbers(shape, 1, 0, 1)});
-  }
-  const Tensor texture = textured(16);
-  expect_gradients([&](const auto& in) { return ssim(in[0], texture); }, {textured(16, 0.5, -0.3)});
-}
-#endif
-
 }  // namespace
 }  // namespace supertac
