@@ -1,4 +1,5 @@
-// What supertac-check gradients and the tests ask: every op, every layer and the whole losses, over awkward sizes.
+// What supertac-check gradients and the tests ask: every op, every layer and the whole losses, over awkward
+// sizes.
 #pragma once
 
 #include <functional>
