@@ -39,6 +39,7 @@ struct MarlinLink::Exchange {
   std::string code = {};       // as sent
   std::string error = {};      // unfamiliar Error: of the command itself
   bool error_stands = false;   // and the firmware did run it
+  bool once = false;           // never sent again, whatever became of it
 };
 
 MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s) {
@@ -52,6 +53,7 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
   ++counters_.lines;
   Exchange exchange{number_, number_, deadline_s > 0 ? deadline_s : kOkDeadline};
   exchange.code = text;
+  exchange.once = capabilities_.klipper && code.starts_with("G1 ");
   exchange.answer.sent_s = lines_.send(kept_.back());
   unanswered_ = true;
   exchange.until = exchange.answer.sent_s + exchange.deadline_s;
@@ -71,7 +73,7 @@ MarlinLink::Answer MarlinLink::command(std::string_view code, double deadline_s)
     }
     if (answered) continue;
     ++counters_.timeouts;
-    ask(exchange);
+    exchange.once ? give_back(exchange) : ask(exchange);
   }
   unanswered_ = false;
   finish(exchange);
@@ -181,10 +183,17 @@ void MarlinLink::on_unknown_command(Exchange& exchange, const Reply& reply) {
   exchange.fault = true;
 }
 
+// Klipper checks no line: a damaged move may run as another one, and only its queue's end tells.
+void MarlinLink::give_back(Exchange& exchange) {
+  exchange.done = exchange.answer.repeated = true;
+  exchange.answer.answered_s = lines_.port().now();
+}
+
 void MarlinLink::on_ok(Exchange& exchange) {
   exchange.answer.answered_s = lines_.arrival_s();
   if (exchange.done) return;
   if (exchange.asked && !exchange.fault) return;  // late, or the question's: the last line taken decides
+  if (exchange.fault && exchange.once) return give_back(exchange);
   if (exchange.fault) {
     repeat(exchange,
            exchange.error.empty() ? "the firmware reports damaged lines" : printable(exchange.error));

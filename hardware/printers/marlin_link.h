@@ -54,7 +54,8 @@ class MarlinLink {
 
   /// Runs one command and returns when the firmware has acknowledged it. `deadline_s` 0: 2.5 s;
   /// commands that take long (M400, G4, G28) need their own. Throws PrinterSilent, PrinterReset,
-  /// PrinterHalted, ResendLoop, PrinterPaused, PrinterRefused, PortUnplugged, PortTimeout.
+  /// PrinterHalted, ResendLoop, PrinterPaused, PrinterRefused, PortUnplugged, PortTimeout. A move of
+  /// Klipper's is sent once, and whoever sends it has to ask where it leads.
   Answer command(std::string_view code, double deadline_s = 0);
 
   /// Sends `code` (M410, M112, M108) without number, ahead of everything: only the emergency parser sees it
@@ -105,6 +106,7 @@ class MarlinLink {
   void count_copy(Exchange& exchange, const std::string& why);
   void on_reply(Exchange& exchange, Reply reply);
   void on_ok(Exchange& exchange);
+  void give_back(Exchange& exchange);
   void on_unknown_command(Exchange& exchange, const Reply& reply);
   void on_last_line(Exchange& exchange, std::int64_t last);
   void finish(const Exchange& exchange);

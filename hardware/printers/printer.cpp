@@ -13,7 +13,9 @@ namespace {
 constexpr double kToleranceMm = 0.05;
 constexpr double kHomeDeadline = 180, kStopDeadline = 3, kPollDeadline = 0.25;
 constexpr double kStopWithin = 1.6;  // of the 2 s in which Ctrl-C ends a program; M410 takes one of them
-constexpr double kMoveMargin = 8;    // start delay, acceleration, and a firmware that is slower than ordered
+constexpr double kPrompt = 0.1;      // of an answer, where it must come before the head starts
+constexpr double kLiftBeforeHome = 10;
+constexpr double kMoveMargin = 8;  // start delay, acceleration, and a firmware that is slower than ordered
 
 std::string coordinates(const Point3& p) {
   return " X" + format(p.x, 3) + " Y" + format(p.y, 3) + " Z" + format(p.z, 3);
@@ -71,9 +73,8 @@ void Printer::home() {
   try {
     // Klipper moves nothing before it knows where it is: it is told a place, for the lift alone.
     if (link_.capabilities().klipper) link_.command("SET_KINEMATIC_POSITION Z=0");
-    link_.command("G91");
-    link_.command("G1 Z10.000 F300");  // relative: wherever z is, first away from the plate
-    link_.command("G90");
+    const Point3 here = agreed_position();
+    raise(here, here.z + kLiftBeforeHome);  // wherever z is, first away from the plate
     link_.command("G28", kHomeDeadline);
     state_.set(link_, true);  // which homing may undo
   } catch (const PrinterRefused&) {
@@ -122,13 +123,32 @@ MarlinLink::Answer Printer::start_move(const Point3& target, double speed_mm_s) 
     throw std::invalid_argument("printer: expected a speed above 0 mm/s, got " + format(speed_mm_s));
   limits_.check_path(target_, target);
   const double length = distance(target_, target);
-  MarlinLink::Answer answer = link_.command(move_command(target, speed_mm_s));
+  MarlinLink::Answer answer = order(move_command(target, speed_mm_s), target_, target);
   remark_.clear();
   for (const Reply& reply : answer.replies)
     if (reply.kind == ReplyKind::other && reply.text.starts_with("echo:")) remark_ = reply.text;
   target_ = target;
   expected_seconds_ += length / speed_mm_s + 0.5;
   return answer;
+}
+
+// Klipper checks no line: a damaged one runs as what it has become. Where its queue ends is asked before the
+// head starts, a quarter of a second later.
+MarlinLink::Answer Printer::order(const std::string& move, const Point3& from, const Point3& to) {
+  constexpr int kAttempts = 8;
+  if (!link_.capabilities().klipper) return link_.command(move);
+  Point3 end = from;
+  for (int attempt = 0; attempt < kAttempts && distance(end, from) <= kToleranceMm; ++attempt) {
+    MarlinLink::Answer answer = link_.command(move, kPrompt);
+    end = queue_position(kPrompt);
+    if (distance(end, to) > kToleranceMm) end = agreed_position(kPrompt);
+    if (distance(end, to) <= kToleranceMm) return answer;
+  }
+  const Stop stop = emergency_stop();
+  throw PositionError("printer " + link_.port().name() + ": ordered " + describe(to) + ", but Klipper took " +
+                      describe(end) +
+                      ", for it checks no line that a cable damages; it was stopped by M112 (" + stop.text +
+                      "), check the cable");
 }
 
 double Printer::finish_move() {
@@ -157,9 +177,9 @@ std::optional<PositionSample> Printer::sample_position(double deadline_s) {
                         reply->position};
 }
 
-Point3 Printer::queue_position() {
+Point3 Printer::queue_position(double deadline_s) {
   for (int attempt = 0; attempt < 5; ++attempt) {
-    const MarlinLink::Answer answer = link_.command("M114");
+    const MarlinLink::Answer answer = link_.command("M114", deadline_s);
     if (const Reply* reply = position_in(answer)) return reply->position;
     link_.settle();
   }
@@ -167,10 +187,10 @@ Point3 Printer::queue_position() {
                       ": expected a position from M114, found none in 5 answers");
 }
 
-Point3 Printer::agreed_position() {
-  Point3 before = queue_position();
+Point3 Printer::agreed_position(double deadline_s) {
+  Point3 before = queue_position(deadline_s);
   for (int attempt = 0; attempt < 6; ++attempt) {
-    const Point3 now = queue_position();
+    const Point3 now = queue_position(deadline_s);
     if (distance(before, now) < 0.005) return now;
     before = now;
   }
@@ -228,8 +248,10 @@ Printer::Stop Printer::emergency_stop() {
   stop.ahead_of_queue = link_.capabilities().emergency_parser;
   origin_ = Origin::unknown;
   try {
-    link_.emergency("M112");
-    link_.idle(kStopDeadline);
+    for (const double until = link_.port().now() + kStopDeadline; link_.port().now() < until;) {
+      link_.emergency("M112");  // again: a damaged one is none
+      link_.idle(kPrompt);
+    }
     stop.text = "no answer to the emergency stop; switch the printer off";
   } catch (const PrinterHalted&) {
     stop.confirmed = true;
@@ -241,14 +263,16 @@ Printer::Stop Printer::emergency_stop() {
   return stop;
 }
 
+// Not through start_move(): it is the way out of a position that the limits forbid.
+void Printer::raise(const Point3& from, double z) {
+  target_ = {from.x, from.y, z};
+  order("G1 Z" + format(z, 3) + " F" + format(60 * rig::kLiftMmS, 1), from, target_);
+  expected_seconds_ += std::abs(z - from.z) / rig::kLiftMmS + 0.5;
+}
+
 void Printer::lift(double mm) {
   const Point3 here = agreed_position();
-  Point3 above = here;
-  above.z = std::min(here.z + mm, limits_.high.z);
-  // Not through start_move(): a lift is the way out of a position that the limits forbid.
-  link_.command("G1 Z" + format(above.z, 3) + " F" + format(60 * rig::kLiftMmS, 1));
-  target_ = above;
-  expected_seconds_ = mm / rig::kLiftMmS + 0.5;
+  raise(here, std::min(here.z + mm, limits_.high.z));
   finish_move();
 }
 
@@ -257,9 +281,7 @@ void Printer::lift_out(double z) {
   constexpr double kHeldByStop = 1.3;  // M410 holds Marlin for a second
   if (stops) link_.emergency("M410");
   link_.abandon(stops ? 1 : 0, stops ? kHeldByStop : 1.5 * expected_seconds_ + kMoveMargin);
-  target_.z = std::min(z, limits_.high.z);
-  link_.command("G1 Z" + format(target_.z, 3) + " F" + format(60 * rig::kLiftMmS, 1));
-  expected_seconds_ += (limits_.high.z - limits_.low.z) / rig::kLiftMmS;
+  raise(stops ? Point3{target_.x, target_.y, limits_.low.z} : agreed_position(), std::min(z, limits_.high.z));
   link_.command("M400", 1.5 * expected_seconds_ + kMoveMargin);
   const Point3 found = agreed_position();
   if (std::abs(found.z - target_.z) > kToleranceMm)

@@ -61,10 +61,10 @@ class Printer {
   /// M114 R; empty when the answer was damaged or later than `deadline_s` (0: 0.25 s).
   std::optional<PositionSample> sample_position(double deadline_s = 0);
   /// M114: the end of the queue, which is the head's position only after M400.
-  Point3 queue_position();
+  Point3 queue_position(double deadline_s = 0);
 
   /// M114 until two answers in a row agree: a lost digit must never become a target. Throws PositionError.
-  Point3 agreed_position();
+  Point3 agreed_position(double deadline_s = 0);
 
   /// M410: stops where it is; Klipper, which has none, comes to the end of its move. Never throws for a
   /// firmware that does not answer; says so in the result.
@@ -82,6 +82,8 @@ class Printer {
   MarlinLink& link() { return link_; }
 
  private:
+  MarlinLink::Answer order(const std::string& move, const Point3& from, const Point3& to);
+  void raise(const Point3& from, double z);
   bool stands_still();
 
   MarlinLink link_;

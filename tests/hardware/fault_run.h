@@ -29,8 +29,7 @@ struct FaultVerdict {
 
 /// A rig and a plan by seed: three firmwares, what another job left on, damaged bytes up to 0.2 %, boards,
 /// printers and hosts that stand still, adapters, other speeds and accelerations than ordered, displays that
-/// stop or pause, resets. Klipper's bytes are whole: its port lies within the host, and it checks none. A
-/// fifth of the seeds: nothing but chunks of an adapter.
+/// stop or pause, resets. A fifth of the seeds: nothing but chunks of an adapter.
 struct DrawnRun {
   explicit DrawnRun(std::uint64_t seed);
   bool only_chunks;

@@ -57,6 +57,37 @@ TEST(Printer, ArrivesWhereItWasSent) {
   }
 }
 
+// Klipper checks no line. The head starts 0.25 s behind its ok.
+TEST(Printer, ADamagedLineOfKlippersIsStoppedBeforeItMoves) {
+  for (const auto& [sent, came] : {std::pair("Y110.000 Z", "Y11.000 Z"), {"Z131.810 F", "Z13\n1.810 F"}}) {
+    SimulatedRig rig(running_rig({.firmware = Firmware::klipper}));
+    Tampering port(rig.printer_port());
+    Printer printer(port);
+    printer.connect();
+    printer.confirm_origin(kMounted);
+    port.to_printer = {{sent, came}};
+    EXPECT_ERROR(printer.start_move({120, 110, 131.81}, 20), PositionError,
+                 "ordered X120.00 Y110.00 Z131.81, but Klipper took X120.00 Y1");
+    rig.run_for(5);
+    EXPECT_TRUE(rig.world().printer().halted());
+    EXPECT_EQ(rig.world().printer().head(rig.now()), kMounted);
+  }
+}
+
+TEST(Printer, ALineThatKlipperDidNotRunIsSentAgain) {
+  for (const auto& [sent, came] : {std::pair("G1 X120", "P1 X120"), {"G1 X120", "G1\nX120"}}) {
+    SimulatedRig rig(running_rig({.firmware = Firmware::klipper}));
+    Tampering port(rig.printer_port());
+    Printer printer(port);
+    printer.connect();
+    printer.confirm_origin(kMounted);
+    port.to_printer = {{sent, came}};
+    printer.start_move({120, 110, 131.81}, 20);
+    printer.finish_move();
+    EXPECT_LT(distance(rig.world().printer().head(rig.now()), {120, 110, 131.81}), 1e-6);
+  }
+}
+
 TEST(Printer, PlainM114IsNotBelieved) {
   PrinterBench bench;
   bench.printer.confirm_origin(kMounted);
