@@ -63,12 +63,12 @@ void PseudoTerminal::unplug() {
   keep_open_ = master_ = -1;
 }
 
-PtyRig::PtyRig(const RigSettings& settings, const std::string& board_link, const std::string& printer_link,
-               double speedup)
-    : speedup_(speedup), adapter_(settings.chunk_s > 0), board_(board_link), printer_(printer_link) {
-  world_ = std::make_unique<RigWorld>(
-      settings, monotonic_seconds() * speedup_,
-      [this](std::span<const std::byte> bytes, double) { return send_frame(bytes); });
+double PtyRig::now(double speedup) { return monotonic_seconds() * speedup; }
+
+PtyRig::PtyRig(std::unique_ptr<RigAtPorts> rig, const std::string& board_link,
+               const std::string& printer_link, double speedup, bool adapter)
+    : speedup_(speedup), adapter_(adapter), board_(board_link), printer_(printer_link), rig_(std::move(rig)) {
+  rig_->board_sink = [this](std::span<const std::byte> bytes, double) { return send_frame(bytes); };
   thread_ = std::thread([this] { run(); });
 }
 
@@ -87,9 +87,9 @@ void PtyRig::unplug_printer() {
   printer_.unplug();
 }
 
-void PtyRig::with_world(const std::function<void(RigWorld&)>& action) {
+void PtyRig::with_rig(const std::function<void(RigAtPorts&)>& action) {
   std::lock_guard lock(mutex_);
-  action(*world_);
+  action(*rig_);
 }
 
 void PtyRig::run() {
@@ -100,7 +100,7 @@ void PtyRig::run() {
       std::lock_guard lock(mutex_);
       serve_printer();
       serve_adapter();
-      const double next = std::clamp((world_->next_event() / speedup_) - monotonic_seconds(), 1e-4, 0.01);
+      const double next = std::clamp((rig_->next_event() / speedup_) - monotonic_seconds(), 1e-4, 0.01);
       wait.tv_nsec = static_cast<long>(1e9 * next);
       printer.fd = printer_.descriptor();
     }
@@ -109,13 +109,13 @@ void PtyRig::run() {
 }
 
 void PtyRig::serve_printer() {
-  world_->advance(monotonic_seconds() * speedup_);
-  if (world_->printer().unplugged()) printer_.unplug();
+  rig_->advance(now(speedup_));
+  if (rig_->printer_unplugged()) printer_.unplug();
   if (printer_.descriptor() < 0) return;
   std::array<std::byte, 1024> buffer{};
   const ssize_t count = ::read(printer_.descriptor(), buffer.data(), buffer.size());
-  if (count > 0) world_->to_printer(std::span(buffer).first(static_cast<std::size_t>(count)));
-  const std::vector<std::byte> fresh = world_->from_printer();
+  if (count > 0) rig_->to_printer(std::span(buffer).first(static_cast<std::size_t>(count)));
+  const std::vector<std::byte> fresh = rig_->from_printer();
   printer_out_.insert(printer_out_.end(), fresh.begin(), fresh.end());
   if (printer_out_.empty()) return;
   const ssize_t sent = ::write(printer_.descriptor(), printer_out_.data(), printer_out_.size());

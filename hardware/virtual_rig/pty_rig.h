@@ -9,7 +9,7 @@
 #include <string>
 #include <thread>
 
-#include "hardware/virtual_rig/rig_world.h"
+#include "hardware/virtual_rig/virtual_rig.h"
 
 namespace supertac {
 
@@ -34,15 +34,17 @@ class PseudoTerminal {
 
 class PtyRig {
  public:
-  /// Runs at `speedup` times the wall clock until destroyed.
-  PtyRig(const RigSettings& settings, const std::string& board_link, const std::string& printer_link,
-         double speedup = 1);
+  /// Runs at `speedup` times the wall clock until destroyed. `rig` begins at now(speedup). `adapter`: between
+  /// board and host stands one with a memory of its own.
+  PtyRig(std::unique_ptr<RigAtPorts> rig, const std::string& board_link, const std::string& printer_link,
+         double speedup = 1, bool adapter = false);
+  static double now(double speedup);
   ~PtyRig();
 
   void unplug_board();
   void unplug_printer();
-  /// Runs `action` with the world held still.
-  void with_world(const std::function<void(RigWorld&)>& action);
+  /// Runs `action` with the rig held still.
+  void with_rig(const std::function<void(RigAtPorts&)>& action);
 
  private:
   void run();
@@ -51,10 +53,10 @@ class PtyRig {
   void serve_adapter();
 
   double speedup_;
-  bool adapter_;  // between board and host (RigSettings::chunk_s)
+  bool adapter_;
   std::mutex mutex_;
   PseudoTerminal board_, printer_;
-  std::unique_ptr<RigWorld> world_;
+  std::unique_ptr<RigAtPorts> rig_;
   std::vector<std::byte> printer_out_, board_out_;
   std::atomic<bool> stop_{false};
   std::thread thread_;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "hardware/printers/palpation.h"
-#include "hardware/virtual_rig/rig_world.h"
+#include "tests/hardware/virtual_rig/rig_world.h"
 
 namespace supertac {
 
@@ -17,7 +17,6 @@ namespace supertac {
 class NumberedBoard {
  public:
   explicit NumberedBoard(RigSettings& settings) {
-    settings.board.noise_adc = 0;
     settings.board.signals = [this](double, double, double, double) {
       std::array<double, rig::kTaxels> volts{};
       const std::uint64_t number = heads_.size() - 1;

@@ -115,8 +115,11 @@ SimulatedRig::SimulatedRig(const RigSettings& settings)
     : latency_(settings.seed, 303),
       freezes_(settings.seed, 304),
       freeze_rate_(settings.faults.host_freeze_rate),
-      world_(settings, 1000.0,
-             [this](std::span<const std::byte> bytes, double t) { return take_board_bytes(bytes, t); }) {}
+      world_(settings, 1000.0) {
+  world_.board_sink = [this](std::span<const std::byte> bytes, double t) {
+    return take_board_bytes(bytes, t);
+  };
+}
 
 SimulatedRig::~SimulatedRig() = default;
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "hardware/ports/port.h"
-#include "hardware/virtual_rig/rig_world.h"
+#include "tests/hardware/virtual_rig/rig_world.h"
 
 namespace supertac {
 

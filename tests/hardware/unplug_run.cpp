@@ -10,8 +10,8 @@
 #include "hardware/collection/palpation_recorder.h"
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
-#include "hardware/virtual_rig/pty_rig.h"
 #include "tests/hardware/rig_support.h"
+#include "tests/hardware/virtual_rig/rig_world.h"
 
 namespace supertac {
 namespace {
@@ -67,7 +67,7 @@ struct Pull {
   double at_s = 0, took_s = 0;
 };
 
-Pull pull(PtyRig& rig, Plug plug) {
+Pull pull(FaultyPtyRig& rig, Plug plug) {
   const double begin = monotonic_seconds();
   plug == Plug::board ? rig.unplug_board() : rig.unplug_printer();
   return {begin, monotonic_seconds() - begin};
@@ -110,7 +110,7 @@ void judge(UnplugVerdict& verdict, Plug plug, const PalpationOutcome& outcome, c
 
 UnplugVerdict unplug_idle(Plug plug, std::uint64_t seed) {
   const TemporaryFolder folder;
-  PtyRig rig(running_rig(), folder / "board", folder / "printer");
+  FaultyPtyRig rig(running_rig(), folder / "board", folder / "printer");
   SerialPort port(folder / (plug == Plug::board ? "board" : "printer"));
   UnplugVerdict verdict;
   verdict.moment_s = 0.05 * RandomStream(seed, 1).uniform(0);
@@ -136,7 +136,7 @@ UnplugVerdict unplug_idle(Plug plug, std::uint64_t seed) {
 
 UnplugVerdict unplug_in_collection(Plug plug, std::uint64_t seed) {
   const TemporaryFolder folder;
-  PtyRig rig(running_rig({.head = kOrigin}), folder / "board", folder / "printer");
+  FaultyPtyRig rig(running_rig({.head = kOrigin}), folder / "board", folder / "printer");
   UnplugVerdict verdict;
   verdict.moment_s = kRunSeconds * RandomStream(seed, 2).uniform(0);
   const RecorderSettings settings = short_run(folder);

@@ -16,11 +16,11 @@
 #include "data/frames/frame_decoder.h"
 #include "hardware/collection/journal.h"
 #include "hardware/ports/serial_port.h"
-#include "hardware/virtual_rig/pty_rig.h"
 #include "io/files/file.h"
 #include "io/files/json.h"
 #include "io/numbers/numbers.h"
 #include "tests/apps/common/process.h"
+#include "tests/hardware/virtual_rig/rig_world.h"
 
 namespace supertac {
 namespace {
@@ -148,7 +148,7 @@ class Table {
 
 bool soak(const std::string& model, double seconds, std::uint64_t seed) {
   const TemporaryFolder folder;
-  PtyRig rig(faulty_rig(seed), folder / "board", folder / "printer");
+  FaultyPtyRig rig(faulty_rig(seed), folder / "board", folder / "printer");
   RunningProcess stream("supertac-stream", {"--board", folder / "board", "--model", model, "--json",
                                             folder / "json", "--capture", folder / "capture", "--quiet"});
   wait_until_open(stream.id(), folder / "board");

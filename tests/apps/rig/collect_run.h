@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "hardware/virtual_rig/pty_rig.h"
 #include "tests/apps/common/process.h"
+#include "tests/hardware/virtual_rig/rig_world.h"
 
 namespace supertac {
 
@@ -27,7 +27,7 @@ class CollectRun {
   /// The whole collection, to its end.
   ProcessResult collect(const std::vector<std::string>& more = {}, const ProcessOptions& options = {}) const;
 
-  PtyRig& rig() { return rig_; }
+  FaultyPtyRig& rig() { return rig_; }
   Point3 head();
   /// Waits until the head has been in contact for `seconds` of the rig's clock; false when it never is, or
   /// the program that moves it has ended.
@@ -49,7 +49,7 @@ class CollectRun {
  private:
   TemporaryFolder folder_;
   double speedup_;
-  PtyRig rig_;
+  FaultyPtyRig rig_;
   std::string disk_, out_;  // a real disk where there is one, not the memory of the other temporary folders
 };
 

@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 TEST_F(Streaming, UnpluggingIsOneClearLineAndKeepsWhatWasSeen) {
-  PtyRig& rig = plug_in();
+  FaultyPtyRig& rig = plug_in();
   RunningProcess running = start("--board " + board() + " --out out --capture capture");
   wait_for_file(path("capture"), kTwoSeconds);
   rig.unplug_board();
@@ -29,7 +29,7 @@ TEST_F(Streaming, UnpluggingIsOneClearLineAndKeepsWhatWasSeen) {
 
 // A terminal holds 25 ms of frames; what the board sends beyond while nobody reads is lost.
 TEST_F(Streaming, AProgramThatWasStoppedStartsANewWindow) {
-  PtyRig& rig = plug_in();
+  FaultyPtyRig& rig = plug_in();
   RunningProcess running = start("--board " + board() + " --json json --capture capture");
   wait_for_file(path("capture"), kTwoSeconds);  // it draws by now
   running.send(SIGSTOP);
@@ -67,7 +67,7 @@ TEST_F(Streaming, StoppedForAWhileItRecordsWhatItCanDate) {
     const RandomStream draw(static_cast<std::uint64_t>(seed), 3);
     RigSettings settings = touching_rig();
     NumberedBoard numbers(settings);
-    PtyRig& rig = plug_in(settings);
+    FaultyPtyRig& rig = plug_in(settings);
     rig.with_world([&](RigWorld& world) { numbers.watch(world.board()); });
     RunningProcess running("supertac-stream",
                            {"--board", board(), "--record", path("kept"), "--capture", path("capture"),

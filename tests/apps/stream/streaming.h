@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "data/recordings/simulator.h"
-#include "hardware/virtual_rig/pty_rig.h"
 #include "io/files/json.h"
 #include "io/files/safetensors.h"
 #include "models/files/model_file.h"
 #include "tests/apps/common/expect.h"
+#include "tests/hardware/virtual_rig/rig_world.h"
 
 namespace supertac {
 
@@ -61,14 +61,14 @@ class Streaming : public ProgramTest {
     return recording;
   }
   // Starts the rig; a board that streams before anyone listens is what a program finds.
-  PtyRig& plug_in(const RigSettings& settings = touching_rig()) {
-    rig_ = std::make_unique<PtyRig>(settings, board(), path("printer"));
+  FaultyPtyRig& plug_in(const RigSettings& settings = touching_rig()) {
+    rig_ = std::make_unique<FaultyPtyRig>(settings, board(), path("printer"));
     return *rig_;
   }
   SafetensorsFile kept(const std::string& name) const { return SafetensorsFile::read(path(name)); }
   nlohmann::ordered_json result(const std::string& name) const { return parse_json_limited(bytes(name)); }
 
-  std::unique_ptr<PtyRig> rig_;
+  std::unique_ptr<FaultyPtyRig> rig_;
 };
 
 }  // namespace supertac

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "hardware/virtual_rig/faults.h"
+#include "tests/hardware/virtual_rig/faults.h"
 
 namespace supertac {
 namespace {

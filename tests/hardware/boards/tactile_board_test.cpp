@@ -7,9 +7,9 @@
 #include "hardware/ports/errors.h"
 #include "hardware/ports/serial_port.h"
 #include "hardware/printers/marlin_link.h"
-#include "hardware/virtual_rig/pty_rig.h"
 #include "tests/expect_error.h"
 #include "tests/hardware/rig_support.h"
+#include "tests/hardware/virtual_rig/rig_world.h"
 
 namespace supertac {
 namespace {
@@ -176,7 +176,7 @@ TEST(TactileBoard, UnpluggingIsATypedErrorAfterTheLastFrame) {
 
 TEST(TactileBoard, OverAPseudoTerminalAtTenTimesTheSpeed) {
   const TemporaryFolder folder;
-  PtyRig rig(running_rig(), folder / "board", folder / "printer", 10);
+  FaultyPtyRig rig(running_rig(), folder / "board", folder / "printer", 10);
   TactileBoard board(std::make_unique<SerialPort>(folder / "board", SerialSettings{rig::kBoardBaud, 10}));
   std::uint64_t frames = 0;
   const double until = monotonic_seconds() + kPatience;
@@ -192,7 +192,7 @@ TEST(TactileBoard, APrinterAtTheBoardsPortIsRecognised) {
   RigSettings settings;
   settings.printer.boot_s = 0.01;
   settings.printer.heartbeat = true;
-  PtyRig rig(settings, folder / "board", folder / "printer", 20);
+  FaultyPtyRig rig(settings, folder / "board", folder / "printer", 20);
   TactileBoard board(std::make_unique<SerialPort>(folder / "printer", SerialSettings{rig::kBoardBaud, 20}),
                      {.silence_s = 10});
   EXPECT_ERROR((void)board.next(kPatience), WrongDevice,
@@ -221,7 +221,7 @@ TEST(TactileBoard, AnotherDeviceIsNoBoardAndNoPrinter) {
 
 TEST(TactileBoard, ABoardAtThePrintersPortIsRecognised) {
   const TemporaryFolder folder;
-  PtyRig rig(running_rig(), folder / "board", folder / "printer", 5);
+  FaultyPtyRig rig(running_rig(), folder / "board", folder / "printer", 5);
   SerialPort port(folder / "board", {.speedup = 5});
   MarlinLink link(port);
   EXPECT_ERROR(link.connect(), WrongDevice, "found no text, as from a tactile board; exchange the two ports");

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "hardware/virtual_rig/virtual_printer.h"
 #include "tests/expect_error.h"
+#include "tests/hardware/virtual_rig/virtual_printer.h"
 
 namespace supertac {
 namespace {

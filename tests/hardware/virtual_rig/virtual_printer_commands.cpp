@@ -1,5 +1,5 @@
 // The commands that the virtual printer runs.
-#include "hardware/virtual_rig/virtual_printer.h"
+#include "tests/hardware/virtual_rig/virtual_printer.h"
 
 #include <algorithm>
 #include <charconv>
@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "hardware/printers/marlin_line.h"
-#include "hardware/virtual_rig/marlin_texts.h"
 #include "io/numbers/numbers.h"
+#include "tests/hardware/virtual_rig/marlin_texts.h"
 
 namespace supertac {
 namespace {

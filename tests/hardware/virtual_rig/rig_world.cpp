@@ -1,4 +1,4 @@
-#include "hardware/virtual_rig/rig_world.h"
+#include "tests/hardware/virtual_rig/rig_world.h"
 
 #include <algorithm>
 #include <utility>
@@ -16,11 +16,10 @@ Part part_of(const RigSettings& settings, Part part) {
 
 }  // namespace
 
-RigWorld::RigWorld(const RigSettings& settings, double t, BoardSink sink)
+RigWorld::RigWorld(const RigSettings& settings, double t)
     : now_(t),
       printer_(part_of(settings, settings.printer), t, settings.printer_running),
       board_(part_of(settings, settings.board), t),
-      sink_(std::move(sink)),
       chunk_s_(settings.chunk_s),
       chunk_due_(t),
       chunk_dice_(settings.seed, 14),
@@ -34,7 +33,7 @@ double RigWorld::next_event() const {
 }
 
 void RigWorld::hand_on(double t) {
-  if (!chunk_.empty() && sink_ && !sink_(chunk_, t)) board_.refuse_last();
+  if (!chunk_.empty() && board_sink && !board_sink(chunk_, t)) board_.refuse_last();
   chunk_.clear();
   chunk_due_ = t + 0.002 + (chunk_s_ - 0.002) * chunk_dice_.uniform();
 }

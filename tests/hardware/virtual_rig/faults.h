@@ -36,7 +36,6 @@ class Dice {
   /// True with probability `rate`.
   bool hit(double rate) { return rate > 0 && random_.uniform(counter_++) < rate; }
   double uniform() { return random_.uniform(counter_++); }
-  double normal() { return random_.normal(counter_++); }
   std::uint32_t below(std::uint32_t limit) { return random_.bits(counter_++) % limit; }
 
  private:

@@ -2,24 +2,18 @@
 // torn one.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <vector>
 
-#include "data/frames/board_frame.h"
-#include "data/sensors/rig.h"
-#include "hardware/virtual_rig/faults.h"
+#include "hardware/virtual_rig/virtual_rig.h"
+#include "tests/hardware/virtual_rig/faults.h"
 
 namespace supertac {
-
-/// The taxels' voltages when the finger's centre is at (x, y, z) mm of the printer at time t (s).
-using FingerSignals = std::function<std::array<double, rig::kTaxels>(double x, double y, double z, double t)>;
 
 struct VirtualBoardSettings {
   FingerSignals signals{};               ///< empty: all taxels at rest
   double period_s = rig::kFramePeriodS;  ///< the board's own crystal
-  double noise_adc = 0;                  ///< standard deviation added to every sample
   RigFaults faults{};                    ///< lost frames and stalls; bytes are the port's matter
   std::uint64_t seed = 1;
 };

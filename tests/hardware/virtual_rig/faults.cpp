@@ -1,4 +1,4 @@
-#include "hardware/virtual_rig/faults.h"
+#include "tests/hardware/virtual_rig/faults.h"
 
 namespace supertac {
 

@@ -1,4 +1,4 @@
-#include "hardware/virtual_rig/marlin_texts.h"
+#include "tests/hardware/virtual_rig/marlin_texts.h"
 
 namespace supertac {
 

@@ -1,4 +1,4 @@
-#include "hardware/virtual_rig/virtual_board.h"
+#include "tests/hardware/virtual_rig/virtual_board.h"
 
 #include <algorithm>
 #include <utility>
@@ -15,18 +15,10 @@ VirtualBoard::VirtualBoard(const VirtualBoardSettings& settings, double t)
     : settings_(settings), start_(t), dice_(settings.seed, 202) {}
 
 BoardFrame VirtualBoard::sample(const Point3& head, double t) {
-  std::array<double, rig::kTaxels> volts{};
+  TaxelVolts volts{};
   volts.fill(rig::kRestVolts);
   if (settings_.signals) volts = settings_.signals(head.x, head.y, head.z, t);
-  BoardFrame frame;
-  const auto code = [](double v) { return static_cast<std::uint16_t>(rig::adc_of(v)); };
-  frame.samples.fill(code(rig::kRestVolts));
-  frame.slip = 2048;
-  for (std::size_t k = 0; k < volts.size(); ++k) {
-    const double noise = settings_.noise_adc > 0 ? settings_.noise_adc * dice_.normal() : 0;
-    frame.samples[rig::kPatches * k] = code(volts[k] + noise * rig::volts_of(1));
-  }
-  return frame;
+  return frame_of(volts);
 }
 
 std::vector<std::byte> VirtualBoard::make_frame(const Point3& head) {

@@ -13,8 +13,8 @@
 #include <string_view>
 #include <vector>
 
-#include "hardware/virtual_rig/faults.h"
 #include "hardware/virtual_rig/motion_queue.h"
+#include "tests/hardware/virtual_rig/faults.h"
 
 namespace supertac {
 

@@ -1,4 +1,4 @@
-#include "hardware/virtual_rig/virtual_printer.h"
+#include "tests/hardware/virtual_rig/virtual_printer.h"
 
 #include <algorithm>
 #include <charconv>
@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "hardware/printers/marlin_line.h"
-#include "hardware/virtual_rig/marlin_texts.h"
+#include "tests/hardware/virtual_rig/marlin_texts.h"
 
 namespace supertac {
 namespace {

@@ -1,0 +1,72 @@
+// A rig for everyone without one: a tactile board whose finger feels what is under it, and a plain Marlin
+// that carries it. Rigs that misbehave are the tests'.
+#pragma once
+
+#include <array>
+#include <deque>
+#include <functional>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "data/frames/board_frame.h"
+#include "hardware/virtual_rig/motion_queue.h"
+
+namespace supertac {
+
+/// Printer and board in one world with one time, which its owner lets pass. No threads and no clock.
+class RigAtPorts {
+ public:
+  virtual ~RigAtPorts() = default;
+  /// Runs printer and board until time t (s), in the order of their events.
+  virtual void advance(double t) = 0;
+  /// The next time at which something happens by itself.
+  virtual double next_event() const = 0;
+  /// Bytes from the host to the printer, arriving now, and those that left the printer since.
+  virtual void to_printer(std::span<const std::byte> bytes) = 0;
+  virtual std::vector<std::byte> from_printer() = 0;
+  virtual bool printer_unplugged() const { return false; }
+
+  /// Takes the board's bytes at time t; false when the host does not take them.
+  std::function<bool(std::span<const std::byte>, double t)> board_sink;
+};
+
+/// The taxels' voltages when the finger's centre is at (x, y, z) mm of the printer at time t (s).
+using TaxelVolts = std::array<double, rig::kTaxels>;
+using FingerSignals = std::function<TaxelVolts(double x, double y, double z, double t)>;
+/// As the board sends them; the other patches are at rest.
+BoardFrame frame_of(const TaxelVolts& volts);
+
+/// The board at its nominal rate. A running Marlin with an emergency parser, the head at rig::kMounted: G0,
+/// G1, G28, G92, M112, M114 (R), M115, M400, M410, without line faults; what else it is asked for it does not
+/// know.
+class PlainRig : public RigAtPorts {
+ public:
+  PlainRig(FingerSignals signals, double t);
+  void advance(double t) override;
+  double next_event() const override;
+  void to_printer(std::span<const std::byte> bytes) override;
+  std::vector<std::byte> from_printer() override;
+
+ private:
+  void take_line(const std::string& line);
+  void run_waiting();
+  std::string answer_to(const std::string& command);
+  void move(const std::string& command);
+  void home();
+  void send_frame();
+  double next_frame() const { return start_s_ + static_cast<double>(frames_ + 1) * rig::kFramePeriodS; }
+
+  FingerSignals signals_;
+  MotionQueue motion_;
+  double start_s_, now_s_, held_until_s_ = -1;  // by the command that runs
+  Point3 zero_;                                 // logical = physical - zero
+  double feed_mm_s_ = rig::kSlideMmS;
+  std::deque<std::string> waiting_;  // commands
+  std::string partial_, output_;
+  std::uint64_t frames_ = 0;
+  bool held_ = false, halted_ = false;
+};
+
+}  // namespace supertac
