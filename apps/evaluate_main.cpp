@@ -6,16 +6,12 @@
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/measure.h"
 #include "apps/common/running/progress.h"
-#include "apps/evaluate/distance_scores.h"
 #include "apps/evaluate/exports.h"
-#include "apps/evaluate/group_scores.h"
 #include "apps/evaluate/map_scores.h"
 #include "apps/evaluate/page.h"
-#include "apps/evaluate/pass_scores.h"
+#include "apps/evaluate/score_tables.h"
 #include "apps/evaluate/scoring.h"
-#include "apps/evaluate/trust.h"
 #include "data/recordings/recording.h"
-#include "data/scores/metrics.h"
 #include "data/windows/signal_remarks.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
@@ -74,12 +70,14 @@ RecordingScores score_all(const Arguments& a, const Ensemble& network, const Mod
     const Zone zone = windows.zone(d.example);
     for (std::size_t m = 0; m < d.pictures.size(); ++m)
       scores.of_method[m].add(d.pictures[m], d.target, zone, windows.contact_level());
-    scores.by_distance.add(d.example, d.pictures[0], d.target);
     scores.by_group.add(d.example, d.pictures[0], d.target);
     scores.trust.add(d);
     scores.map.add(d);
-    scores.by_pass.add(d.example, d.pictures[0], d.target);
-    if (page != nullptr) page->add(d);
+    if (const auto one = contact_score(windows, d.example, d.pictures[0], d.target)) {
+      scores.by_distance.add(*one);
+      scores.by_pass.add(*one);
+      if (page != nullptr) page->add(d, one->ssim);
+    }
     if (outputs != nullptr)
       outputs->add(d.input, d.pictures[0], d.target, d.predicted_error, windows.position(d.example),
                    windows.pass_of(d.example));

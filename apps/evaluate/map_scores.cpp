@@ -35,8 +35,8 @@ void MapScores::finish() {
     const auto score = [&](const SurfaceMap& map, Scored& scored) {
       map.read(x, y, read);
       scored.zones.add(read, truth, windows_.zone(window));
-      scored.by_distance.add(window, read, truth);
-      scored.by_pass.add(window, read, truth);
+      if (const auto one = contact_score(windows_, window, read, truth))
+        scored.by_distance.add(*one), scored.by_pass.add(*one);
     };
     score(of_pass_.at(pass), by_pass_);
     score(of_surface_.at(surface_of(pass)).first, by_surface_);

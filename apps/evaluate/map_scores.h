@@ -8,8 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "apps/evaluate/distance_scores.h"
-#include "apps/evaluate/pass_scores.h"
+#include "apps/evaluate/score_tables.h"
 #include "apps/evaluate/scoring.h"
 #include "data/map/elements.h"
 #include "data/map/map_file.h"

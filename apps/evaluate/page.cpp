@@ -134,12 +134,9 @@ const char* word_of(Zone zone) {
 
 }  // namespace
 
-void EvaluationPage::add(const Drawn& d) {
-  const ImageGrid grid = windows_.image();
-  if (!windows_.contact(d.example)) return;
+void EvaluationPage::add(const Drawn& d, double ssim) {
   const auto texture = std::count_if(d.target.begin(), d.target.end(), [](float v) { return v > kTexture; });
-  contact_.push_back({ssim(d.pictures[0], d.target, grid.height, grid.width), d.example,
-                      4 * static_cast<std::size_t>(texture) >= d.target.size()});
+  contact_.push_back({ssim, d.example, 4 * static_cast<std::size_t>(texture) >= d.target.size()});
 }
 
 std::vector<EvaluationPage::ScoredWindow> EvaluationPage::extremes(bool best) const {

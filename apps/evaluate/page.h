@@ -21,7 +21,8 @@ namespace supertac {
 class EvaluationPage {
  public:
   explicit EvaluationPage(const WindowSet& windows) : windows_(windows) {}
-  void add(const Drawn& drawn);
+  /// A window in contact and its SSIM.
+  void add(const Drawn& drawn, double ssim);
 
   /// `result` is the evaluation's JSON; `made_by` says what to repeat it with, a name and a text each. The
   /// windows shown are drawn once more. At most kFilmFrames pictures are in the films, evenly spread.

@@ -1,0 +1,229 @@
+#include "apps/evaluate/score_tables.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "data/windows/transforms/signal_features.h"
+#include "io/numbers/numbers.h"
+
+namespace supertac {
+
+std::optional<ContactScore> contact_score(const WindowSet& windows, std::uint32_t window,
+                                          std::span<const float> picture, std::span<const float> truth) {
+  if (!windows.contact(window)) return std::nullopt;
+  const ImageGrid grid = windows.image();
+  return ContactScore{window, ssim(picture, truth, grid.height, grid.width),
+                      psnr_db(mean_squared_error(picture, truth))};
+}
+
+void DistanceScores::add(const ContactScore& one) {
+  const WindowSet::Position here = windows_.position(one.window);
+  if (windows_.pass_of(one.window) != pass_) {
+    pass_ = windows_.pass_of(one.window);
+    begin_ = here;
+  }
+  const double slid = std::hypot(here.x_mm - begin_.x_mm, here.y_mm - begin_.y_mm);
+  if (!std::isfinite(slid)) return;  // nobody knows where it was
+  std::size_t p = parts_.size() - 1;
+  while (p > 0 && slid < parts_[p].from_mm) --p;
+  parts_[p].sums.add(one);
+}
+
+std::vector<std::string> DistanceScores::lines() const {
+  std::vector<std::string> lines;
+  for (std::size_t p = 0; p < parts_.size(); ++p) {
+    const ScoreSums& sums = parts_[p].sums;
+    if (sums.windows == 0) continue;
+    const std::string to =
+        p + 1 < parts_.size() ? " to " + format(parts_[p + 1].from_mm, 0) + " mm" : " mm or more";
+    lines.push_back(format(parts_[p].from_mm, 0) + to + " after the first contact: SSIM " +
+                    format(sums.mean_ssim(), 3) + ", PSNR " + format(sums.mean_psnr(), 2) + " dB, " +
+                    std::to_string(sums.windows) + " windows");
+  }
+  return lines;
+}
+
+nlohmann::ordered_json DistanceScores::to_json() const {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const auto& [from_mm, sums] : parts_)
+    if (sums.windows > 0)
+      json.push_back({{"from_mm", from_mm},
+                      {"windows", sums.windows},
+                      {"ssim", sums.mean_ssim()},
+                      {"psnr_mean_db", sums.mean_psnr()}});
+  return json;
+}
+
+std::array<Interval, 2> PassScores::intervals() const {
+  std::vector<ClusterCount> ssims, psnrs;
+  std::vector<std::size_t> plates;
+  std::vector<std::string> names;
+  for (const auto& [pass, sums] : passes_) {
+    const std::string& plate = windows_.passes()[pass].plate;
+    auto at = std::ranges::find(names, plate);
+    if (at == names.end()) at = names.insert(names.end(), plate);
+    plates.push_back(static_cast<std::size_t>(at - names.begin()));
+    const auto count = static_cast<double>(sums.windows);
+    ssims.push_back({sums.ssim, count}), psnrs.push_back({sums.psnr, count});
+  }
+  return {bootstrap_interval({&ssims, 1}, plates), bootstrap_interval({&psnrs, 1}, plates)};
+}
+
+std::string PassScores::interval_text() const {
+  if (passes_.size() < 2) return "";
+  const auto [ssim, psnr] = intervals();
+  return "SSIM " + format(ssim.low, 3) + " to " + format(ssim.high, 3) + ", PSNR " + format(psnr.low, 2) +
+         " to " + format(psnr.high, 2) + " dB";
+}
+
+nlohmann::ordered_json PassScores::to_json() const {
+  nlohmann::ordered_json json;
+  if (passes_.size() > 1) {
+    const auto [ssim, psnr] = intervals();
+    json["ssim"] = {ssim.low, ssim.high}, json["psnr_mean_db"] = {psnr.low, psnr.high};
+  }
+  json["passes"] = nlohmann::ordered_json::array();
+  for (const auto& [pass, sums] : passes_) {
+    const WindowSet::Pass& p = windows_.passes()[pass];
+    json["passes"].push_back({{"plate", p.plate},
+                              {"trial", p.trial},
+                              {"pass", p.pass},
+                              {"windows", sums.windows},
+                              {"ssim", sums.mean_ssim()},
+                              {"psnr_mean_db", sums.mean_psnr()}});
+  }
+  return json;
+}
+
+GroupScores::GroupScores(const WindowSet& windows)
+    : windows_(windows), by_group_(std::ranges::any_of(windows.passes(), [](const WindowSet::Pass& pass) {
+        return !pass.group.empty();
+      })) {}
+
+void GroupScores::add(std::uint32_t window, std::span<const float> picture, std::span<const float> truth) {
+  const WindowSet::Pass& pass = windows_.passes()[windows_.pass_of(window)];
+  groups_.try_emplace(by_group_ ? pass.group : pass.plate, windows_.image())
+      .first->second.add(picture, truth, windows_.zone(window), windows_.contact_level());
+}
+
+std::vector<std::pair<std::string, const ZoneMetrics*>> GroupScores::worst_first() const {
+  std::vector<std::pair<std::string, const ZoneMetrics*>> order;
+  for (const auto& [name, metrics] : groups_) order.emplace_back(name, &metrics);
+  std::ranges::stable_sort(order, {}, [](const auto& group) {
+    const double ssim = group.second->contact().ssim;
+    return std::isfinite(ssim) ? ssim : 2;
+  });
+  return order;
+}
+
+std::vector<std::string> GroupScores::lines() const {
+  constexpr std::size_t kMost = 8;
+  std::vector<std::string> lines;
+  if (groups_.size() < 2) return lines;
+  for (const auto& [name, metrics] : worst_first()) {
+    const Metrics contact = metrics->contact();
+    if (lines.size() == kMost) {
+      lines.push_back("... and " + std::to_string(groups_.size() - kMost) + " more, better ones");
+      break;
+    }
+    if (contact.windows > 0)
+      lines.push_back((by_group_ ? "group " : "plate ") + name + ": contact SSIM " + format(contact.ssim, 3) +
+                      ", PSNR " + format(contact.psnr_mean_db, 2) + " dB, " +
+                      std::to_string(contact.windows) + " windows");
+  }
+  return lines;
+}
+
+nlohmann::ordered_json GroupScores::to_json() const {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const auto& [name, metrics] : worst_first())
+    json.push_back({{"name", name},
+                    {"contact", supertac::to_json(metrics->contact())},
+                    {"all", supertac::to_json(metrics->all())}});
+  return json;
+}
+
+std::vector<std::string> remarks_on_scores(const nlohmann::ordered_json& result, const GroupScores& groups) {
+  constexpr double kHardly = 0.02, kCoin = 0.5;
+  constexpr std::size_t kFew = 3;
+  std::vector<std::string> remarks;
+  const auto ssim_of = [](const nlohmann::ordered_json& scores) {
+    const auto& ssim = scores["contact"]["ssim"];
+    return ssim.is_number() ? ssim.get<double>() : Metrics::kNone;
+  };
+  const double own = ssim_of(result);
+  if (result.contains("baselines") && result["baselines"].contains("ridge"))
+    if (const double ridge = ssim_of(result["baselines"]["ridge"]); own < ridge + kHardly)
+      remarks.push_back("the network's contact SSIM, " + format(own, 3) +
+                        ", is hardly above that of ridge regression, " + format(ridge, 3) +
+                        ": more or other recordings, or longer training, would have to help");
+  if (const auto& trust = result["trust"]; trust.contains("auroc") && trust["auroc"].is_number())
+    if (const double auroc = trust["auroc"].get<double>(); auroc < kCoin)
+      remarks.push_back("predicted errors tell less than a coin which pictures are bad (AUROC " +
+                        format(auroc, 3) + "): do not rely on them here");
+  if (groups.by_group() && groups.size() < kFew)
+    remarks.push_back(std::to_string(groups.size()) + (groups.size() == 1 ? " group was" : " groups were") +
+                      " tested: others may be drawn much better or worse; --split group --leave-out NAME of "
+                      "supertac-train tests each in turn");
+  return remarks;
+}
+
+void TrustScores::add(const Drawn& drawn) {
+  const std::span<const float> predicted_error = drawn.predicted_error;
+  if (model_.novelty) {
+    ++judged_;
+    unlike_ += model_.novelty->unlike_training(signal_features(drawn.input, windows_.array())) ? 1 : 0;
+  }
+  if (!predicted_error.empty())
+    coverage_.add(windows_.pass_of(drawn.example), drawn.pictures[0], drawn.target, predicted_error);
+}
+
+std::vector<std::pair<std::string, IntervalCoverage::Held>> TrustScores::classes() const {
+  constexpr const char* kHeights[] = {"true 0", "true to 0.2", "true to 0.5", "true above 0.5"};
+  std::vector<std::pair<std::string, IntervalCoverage::Held>> classes;
+  for (std::size_t h = 0; h < IntervalCoverage::kHeights; ++h)
+    classes.emplace_back(kHeights[h], coverage_.of_height(h));
+  for (std::size_t level = 0; level < IntervalFactors::kLevels; ++level)
+    classes.emplace_back(level < IntervalFactors::kEdges.size()
+                             ? "drawn below " + format(IntervalFactors::kEdges[level], 2)
+                             : "drawn above " + format(IntervalFactors::kEdges.back(), 2),
+                         coverage_.of_level(level));
+  std::erase_if(classes, [](const auto& one) { return one.second.pixels == 0; });
+  return classes;
+}
+
+std::vector<std::string> TrustScores::lines() const {
+  std::vector<std::string> lines;
+  const auto percent = [](double share) { return format(100 * share, 1) + " %"; };
+  if (!coverage_.empty())
+    lines.push_back("intervals hold " + percent(coverage_.share()) + " of the pixels (factors " +
+                    model_.interval_factors().text() + "; " + coverage_.factors().text() + " would hold " +
+                    percent(IntervalCoverage::kCovered) + ")");
+  std::string truths;
+  for (const auto& [name, held] : classes())
+    if (name.starts_with("true"))
+      truths += (truths.empty() ? "" : ", ") + name.substr(5) + " " + percent(held.share) + " (+-" +
+                format(held.half_width, 2) + ")";
+  if (!truths.empty()) lines.push_back("intervals hold by height of the truth: " + truths);
+  if (judged_ > 0)
+    lines.push_back(percent(static_cast<double>(unlike_) / static_cast<double>(judged_)) +
+                    " of the windows are unlike training");
+  return lines;
+}
+
+nlohmann::ordered_json TrustScores::to_json() const {
+  const auto number = [](double v) { return std::isfinite(v) ? nlohmann::ordered_json(v) : nullptr; };
+  nlohmann::ordered_json json;
+  if (!coverage_.empty()) {
+    json["factor"] = model_.interval_factors().text();
+    json["coverage"] = coverage_.share();
+    json["factor_found"] = coverage_.factors().text();
+    for (const auto& [name, held] : classes())
+      json["coverage_of"][name] = {
+          {"share", number(held.share)}, {"half_width", number(held.half_width)}, {"pixels", held.pixels}};
+  }
+  if (judged_ > 0) json["unlike_training"] = static_cast<double>(unlike_) / static_cast<double>(judged_);
+  return json;
+}
+
+}  // namespace supertac

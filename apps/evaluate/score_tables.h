@@ -1,0 +1,135 @@
+// The tables of an evaluation: scores by the distance slid, by pass and by group, and what a network says of
+// its own pictures.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "apps/evaluate/scoring.h"
+#include "data/scores/metrics.h"
+#include "data/scores/statistics.h"
+#include "data/windows/windows.h"
+#include "models/files/model_file.h"
+#include "models/inference/interval.h"
+
+namespace supertac {
+
+/// How good the picture of a window in contact is.
+struct ContactScore {
+  std::uint32_t window;
+  double ssim, psnr_db;
+};
+/// Empty for a window that is not in contact.
+std::optional<ContactScore> contact_score(const WindowSet& windows, std::uint32_t window,
+                                          std::span<const float> picture, std::span<const float> truth);
+/// Over some windows in contact.
+struct ScoreSums {
+  double ssim = 0, psnr = 0;
+  std::uint64_t windows = 0;
+  void add(const ContactScore& one) { ssim += one.ssim, psnr += one.psnr_db, ++windows; }
+  double mean_ssim() const { return ssim / static_cast<double>(windows); }
+  double mean_psnr() const { return psnr / static_cast<double>(windows); }
+};
+
+/// Mean SSIM and PSNR of windows in contact, by the distance slid since the first of their pass. Two elements
+/// of a texture must have been felt before their distance tells a wide one from a narrow one: what is scored
+/// lower before that is not known yet.
+class DistanceScores {
+ public:
+  explicit DistanceScores(const WindowSet& windows) : windows_(windows) {}
+  /// Windows of a pass come in the order of time.
+  void add(const ContactScore& one);
+  /// For people: nothing when no window was in contact.
+  std::vector<std::string> lines() const;
+  /// [{"from_mm", "windows", "ssim", "psnr_mean_db"}, ...], without the parts no window fell into.
+  nlohmann::ordered_json to_json() const;
+
+ private:
+  struct Part {
+    double from_mm;
+    ScoreSums sums{};
+  };
+  const WindowSet& windows_;
+  std::array<Part, 6> parts_{{{0}, {5}, {10}, {15}, {20}, {30}}};
+  std::size_t pass_ = SIZE_MAX;
+  WindowSet::Position begin_{};
+};
+
+/// Mean SSIM and PSNR of windows in contact, by pass. Windows of one pass resemble each other, so the
+/// intervals are over passes, drawn anew within each plate: they say what other passes over these plates
+/// would give, of this one network.
+class PassScores {
+ public:
+  explicit PassScores(const WindowSet& windows) : windows_(windows) {}
+  void add(const ContactScore& one) { passes_[windows_.pass_of(one.window)].add(one); }
+  /// "SSIM 0.81 to 0.84, PSNR 20.1 to 21.0 dB", 95 %; empty where fewer than two passes were in contact.
+  std::string interval_text() const;
+  /// {"ssim": [low, high], "psnr_mean_db": [low, high], "passes": [{"plate", "trial", "pass", "windows",
+  /// "ssim", "psnr_mean_db"}, ...]}; without the intervals where they are not known
+  nlohmann::ordered_json to_json() const;
+
+ private:
+  std::array<Interval, 2> intervals() const;
+
+  const WindowSet& windows_;
+  std::map<std::size_t, ScoreSums> passes_;
+};
+
+/// By the recordings' groups; by plate where they have none.
+class GroupScores {
+ public:
+  explicit GroupScores(const WindowSet& windows);
+  void add(std::uint32_t window, std::span<const float> picture, std::span<const float> truth);
+  /// A line for each group, those with the lowest contact SSIM first, eight at most; none for a single one.
+  std::vector<std::string> lines() const;
+  /// [{"name", "contact": {...}, "all": {...}}], in the same order.
+  nlohmann::ordered_json to_json() const;
+  bool by_group() const { return by_group_; }
+  std::size_t size() const { return groups_.size(); }
+
+ private:
+  std::vector<std::pair<std::string, const ZoneMetrics*>> worst_first() const;
+
+  const WindowSet& windows_;
+  bool by_group_;
+  std::map<std::string, ZoneMetrics> groups_;
+};
+
+/// What a reader of the scores should know: `result` is the evaluation's JSON. That a network is hardly above
+/// ridge regression, that its predicted errors tell less than a coin, that few groups were tested.
+std::vector<std::string> remarks_on_scores(const nlohmann::ordered_json& result, const GroupScores& groups);
+
+/// Whether a network knows when its picture is a guess: what it says of its own pictures against what is
+/// true.
+class TrustScores {
+ public:
+  /// `model`: whose factor and novelty are judged; must outlive this, as the windows.
+  TrustScores(const WindowSet& windows, const ModelFile& model)
+      : windows_(windows), model_(model), coverage_(model.interval_factors()) {}
+  /// Windows of a pass come in the order of time. Without a predicted error nothing is counted of it.
+  void add(const Drawn& drawn);
+
+  /// For people: nothing for a model that says nothing of its pictures.
+  std::vector<std::string> lines() const;
+  /// {"factor", "coverage", "factor_found", "coverage_of": {"true 0": {"share", "half_width", "pixels"},
+  /// "true to 0.2", "true to 0.5", "true above 0.5", "drawn below 0.02" ... "drawn above 0.5"},
+  /// "unlike_training"}
+  nlohmann::ordered_json to_json() const;
+
+  /// By what is there and by what was drawn, in words; without those that no pixel belongs to.
+  std::vector<std::pair<std::string, IntervalCoverage::Held>> classes() const;
+
+ private:
+  const WindowSet& windows_;
+  const ModelFile& model_;
+  IntervalCoverage coverage_;
+  std::uint64_t judged_ = 0, unlike_ = 0;
+};
+
+}  // namespace supertac
