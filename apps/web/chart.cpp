@@ -48,46 +48,6 @@ std::string path(double x, double y, const char* way) {
   return "<path d=\"M" + format(x, 1) + " " + format(y, 1) + way + "\" stroke=\"var(--line)\"/>";
 }
 
-/// A rectangle of the chart.
-struct Box {
-  double left, top, right, bottom;
-  bool meets(const Box& o) const {
-    return left < o.right && o.left < right && top < o.bottom && o.top < bottom;
-  }
-};
-
-/// Places labels beside their points, off all points and off each other where there is room.
-class Labels {
- public:
-  void keep_off(double x, double y, double by = 4) { taken_.push_back({x - by, y - by, x + by, y + by}); }
-  void keep_off_line(std::pair<double, double> from, std::pair<double, double> to) {
-    const double steps = std::ceil(std::hypot(to.first - from.first, to.second - from.second) / 5);
-    for (double i = 1; i < steps; ++i)
-      keep_off(std::lerp(from.first, to.first, i / steps), std::lerp(from.second, to.second, i / steps), 2);
-  }
-  std::string add(double x, double y, const std::string& words) {
-    const double width = kLetter * static_cast<double>(words.size());
-    Box best{};
-    for (const double down : {-4.0, 13.0, 4.0, -16.0, 25.0, -28.0, 37.0, -40.0}) {
-      for (const double left : {x + 7, x - 7 - width}) {
-        const Box box{left, y + down - 10, left + width, y + down + 2};
-        if (box.left < kLeft || box.right > kWidth || box.top < kTop - 12 || box.bottom > kHeight - kBottom)
-          continue;
-        if (best.right == 0) best = box;
-        if (std::ranges::any_of(taken_, [&](const Box& b) { return b.meets(box); })) continue;
-        taken_.push_back(box);
-        return text(left, y + down, "start", words);
-      }
-    }
-    taken_.push_back(best);
-    return text(best.left, best.bottom - 2, "start", words);
-  }
-
- private:
-  static constexpr double kLetter = 7;
-  std::vector<Box> taken_;
-};
-
 // digits 10^exponent as the number that is written so: 3 and -1 give 0.3, which 3 * 0.1 is not.
 double shifted(double digits, double exponent) {
   return exponent < 0 ? digits / std::round(std::pow(10, -exponent))
@@ -167,15 +127,6 @@ std::string chart_svg(const std::string& title, const ChartAxis& x, const ChartA
     return std::pair(kLeft + (kWidth - kLeft - kRight) * across(point.first),
                      kHeight - kBottom - (kHeight - kTop - kBottom) * up(point.second));
   };
-  Labels labels;
-  for (const ChartSeries& s : series) {
-    const Points some = s.labels.empty() ? Points() : shown(x, y, s.points);
-    for (std::size_t k = 0; k < some.size(); ++k) {
-      const auto at = place(some[k]);
-      labels.keep_off(at.first, at.second);
-      if (s.line && k > 0) labels.keep_off_line(place(some[k - 1]), at);
-    }
-  }
   for (std::size_t i = 0; i < series.size(); ++i) {
     const ChartSeries& s = series[i];
     const std::string colour = kColours[i % std::size(kColours)];
@@ -187,7 +138,10 @@ std::string chart_svg(const std::string& title, const ChartAxis& x, const ChartA
       if (s.dots)
         marks += "<circle cx=\"" + format(px, 1) + "\" cy=\"" + format(py, 1) + "\" r=\"3.5\" fill=\"" +
                  colour + "\"/>";
-      if (k < s.labels.size()) marks += labels.add(px, py, s.labels[k]);
+      const bool first = px < kWidth - kLeft, above = k % 2 == 0;
+      if (k < s.labels.size())
+        marks +=
+            text(first ? px + 7 : px - 7, above ? py - 4 : py + 13, first ? "start" : "end", s.labels[k]);
     }
     if (s.line)
       svg +=

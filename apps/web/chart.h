@@ -22,8 +22,8 @@ struct ChartSeries {
   std::vector<std::string> labels = {};  ///< beside the points; empty, or one for each
 };
 
-/// A chart with a title, its legend under the title and off the points, labels that do not overprint while
-/// there is room, and round numbers on axes that hold the data and no more. Points that are not finite, or
+/// A chart with a title, its legend under the title and off the points, labels above and below the points in
+/// turn, and round numbers on axes that hold the data and no more. Points that are not finite, or
 /// not positive on a logarithmic axis, are left out; empty when none is left. At most four series have
 /// colours of their own.
 std::string chart_svg(const std::string& title, const ChartAxis& x, const ChartAxis& y,

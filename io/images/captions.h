@@ -8,10 +8,10 @@
 
 namespace supertac {
 
-inline constexpr int kLineHeight = 20;
+inline constexpr int kLineHeight = 24;
 
-/// Writes lines (separated by '\n') in letters of 5x7 dots from (left, top) on; letters outside ASCII become
-/// '?', and what lies outside the picture is cut.
+/// Writes lines (separated by '\n') in letters of stb_easy_font from (left, top) on; letters outside ASCII
+/// become '?', and what lies outside the picture is cut.
 void draw_text(Picture& picture, int left, int top, const std::string& text);
 /// Width of the longest line in pixels.
 int text_width(const std::string& text);

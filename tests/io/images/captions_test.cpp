@@ -28,12 +28,6 @@ TEST(Text, IsDrawnWithinItsSize) {
   EXPECT_NE(other.rgb, picture.rgb);
 }
 
-TEST(Text, EveryStrokeOfALetterIsDrawn) {
-  Picture picture(20, 20);
-  draw_text(picture, 2, 2, "E");
-  EXPECT_EQ(black(picture), 4 * (7 + 3 * 3 + 2));  // four pixels a dot
-}
-
 TEST(Text, OutsideIsCutAndForeignLettersAreQuestionMarks) {
   Picture picture(20, 10), marks(20, 10);
   draw_text(picture, -5, -3, "w\xff\xc3\xa4 and a long line");
