@@ -30,7 +30,6 @@ void declare(Arguments& a) {
            "sign, doubled, without a term, at the wrong index; each has to be found");
   a.flag("report", "bits: print the rows of docs/bits.md for this machine");
   a.option("data", "DIR", "training, step, ledgers: the recordings that the model was trained on");
-  a.option("also", "DIR", "those of its --also");
   a.option("segments", "K", "training: how many of its twenty parts are repeated", "1");
   a.option("seed", "N", "training: draws them", "0");
   a.option("at", "N",

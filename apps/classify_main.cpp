@@ -2,12 +2,18 @@
 // pictures (Figure 11 of the paper).
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <string>
+#include <vector>
 
 #include "apps/classify/experiment.h"
-#include "apps/classify/tally.h"
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/provenance.h"
 #include "apps/common/running/progress.h"
+#include "data/scores/statistics.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/parallel.h"
 #include "io/numbers/text.h"
@@ -46,6 +52,56 @@ std::vector<std::size_t> parts_of(const WindowSet& windows, const std::vector<st
   }
   return parts;
 }
+
+// What the answers of all runs about one set of windows add up to.
+class Tally {
+ public:
+  explicit Tally(std::size_t classes) : classes_(classes), confusion_(classes * classes) {}
+  // One answer of the current run.
+  void add(std::size_t pass, std::int32_t label, std::int32_t answer) {
+    ++confusion_[static_cast<std::size_t>(label) * classes_ + static_cast<std::size_t>(answer)];
+    for (ClusterCount* c : {&clusters_[pass], &run_}) c->correct += label == answer ? 1 : 0, c->total += 1;
+  }
+  void end_run() { runs_.push_back(share({&run_, 1})), run_ = {}; }
+
+  // Share of right answers over all runs.
+  double accuracy() const { return share(clusters()); }
+  // For other passes of the same plates: a bootstrap over the passes.
+  Interval interval() const { return bootstrap_interval(clusters()); }
+  // p-value of the difference to another tally of the same windows: sign flips over passes.
+  double p_against(const Tally& other) const {
+    std::vector<double> differences;
+    for (const auto& [pass, count] : clusters_)
+      differences.push_back(count.correct - other.clusters_.at(pass).correct);
+    return sign_flip_p(differences);
+  }
+  nlohmann::ordered_json to_json(const std::vector<std::string>& names) const {
+    const std::uint64_t all = std::accumulate(confusion_.begin(), confusion_.end(), std::uint64_t{0});
+    const Interval i = interval();
+    nlohmann::ordered_json json = {{"windows", all / runs_.size()},
+                                   {"passes", clusters_.size()},
+                                   {"accuracy", accuracy()},
+                                   {"ci95_passes", {i.low, i.high}},
+                                   {"accuracy_of_runs", runs_}};
+    for (std::size_t row = 0; row < classes_; ++row)
+      for (std::size_t c = 0; c < classes_; ++c)
+        json["confusion"][names[row]][names[c]] = confusion_[row * classes_ + c];
+    return json;
+  }
+
+ private:
+  std::vector<ClusterCount> clusters() const {
+    std::vector<ClusterCount> all;
+    for (const auto& [pass, count] : clusters_) all.push_back(count);
+    return all;
+  }
+
+  std::size_t classes_;
+  std::vector<std::uint64_t> confusion_;          // [label][answer]
+  std::map<std::size_t, ClusterCount> clusters_;  // by pass
+  ClusterCount run_;
+  std::vector<double> runs_;
+};
 
 using Parts = std::vector<Tally>;  // by kParts
 

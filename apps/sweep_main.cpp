@@ -104,13 +104,12 @@ std::vector<Recipe> grid_of(const Arguments& a) {
 // Figures that cannot be compared do not mix: whatever a table's rows have in common has to stay.
 void check_settings(const Arguments& a) {
   Json settings;
-  for (const char* option : {"augment", "autoencoder", "batch", "beta", "epochs", "history",
-                             "interval-factor", "learning-rate", "leave-out", "limit", "optimizer", "plates",
-                             "random-plates", "range", "rate", "scaling", "split", "stride"})
+  for (const char* option :
+       {"augment", "batch", "beta", "epochs", "history", "interval-factor", "learning-rate", "leave-out",
+        "limit", "optimizer", "plates", "random-plates", "range", "rate", "scaling", "split", "stride"})
     settings[option] = a.given(option) || !a.text(option).empty() ? a.text(option) : "the preset's";
   settings["last-frame"] = a.flag("last-frame");
   settings["data"] = hash_of_recordings(a.text("data"), a.list("plates"));
-  settings["also"] = a.given("also") ? hash_of_recordings(a.text("also"), {}) : "";
   const std::string path = a.text("out") + "/settings.json";
   if (!fs::exists(path)) return write_file(path, settings.dump(2) + "\n");
   const auto before = parse_json_limited(read_text_file(path, 1 << 20));

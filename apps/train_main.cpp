@@ -49,7 +49,6 @@ int train(const Arguments& a, TrainingTask task, Ranks& ranks) {
 TrainingTask windows_of(const Arguments& a, const Recipe& recipe) {
   TrainingTask task = window_task(recipe, folders_of(a));
   add_parent("recordings", hash_of_recordings(a.text("data"), recipe.plates));
-  if (a.given("also")) add_parent("also", hash_of_recordings(a.text("also"), {}));
   return task;
 }
 

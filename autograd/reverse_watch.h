@@ -1,5 +1,5 @@
 // ReverseWatch: stands between backward() and the reverse steps, to measure them or to plant an error that a
-// check has to notice (apps/check/planted_error.h).
+// check has to notice (apps/check/gradients_main.cpp).
 #pragma once
 
 #include <cstddef>

@@ -1,12 +1,14 @@
 // supertac-check-gradients: what `supertac-check gradients` runs, compiled with real = double.
+#include <algorithm>
 #include <chrono>
 #include <span>
+#include <string>
 
 #include "apps/check/gradient_cases.h"
-#include "apps/check/planted_error.h"
 #include "apps/common/command_line/program.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
+#include "autograd/reverse_watch.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/text.h"
 
@@ -79,6 +81,69 @@ int check_all(const Arguments& a) {
   return wrong == 0 ? kExitOk : kExitFailed;
 }
 
+// An error in the reverse step of one op, put there to see whether the check finds and names it.
+struct Plant {
+  enum class Kind { sign, factor, term, index };
+  std::string op;         // "conv2d"
+  std::size_t input = 0;  // whose gradient is spoiled
+  Kind kind = Kind::sign;
+};
+// sign: -g.  factor: 2 g.  term: one element of dL/dy is left out of g.  index: g, each element one place on.
+constexpr std::pair<Plant::Kind, const char*> kPlantKinds[] = {{Plant::Kind::sign, "sign"},
+                                                               {Plant::Kind::factor, "factor"},
+                                                               {Plant::Kind::term, "term"},
+                                                               {Plant::Kind::index, "index"}};
+
+// What the reverse step adds to the gradient of one input, as a tensor of its own; the gradient itself is put
+// back to what it was.
+Tensor added_by(const std::function<void()>& step, Tensor& gradient) {
+  const Tensor before = gradient.clone();
+  step();
+  Tensor added = gradient.clone();
+  for (Dim i = 0; i < added.size(); ++i) added.data()[i] -= before.data()[i];
+  std::copy_n(before.data(), before.size(), gradient.data());
+  return added;
+}
+
+// While it lives, what the op's reverse step adds to the gradient of that input is spoiled.
+class PlantedError : public ReverseWatch {
+ public:
+  explicit PlantedError(Plant plant) : plant_(std::move(plant)) {}
+  // Whether any gradient became another one: the same number everywhere is the same at every index.
+  bool changed() const { return changed_; }
+
+  // The step runs twice: as it is for the other inputs, then once more for this one alone.
+  void reverse(const char* op, std::size_t inputs, Backward& b, const std::function<void()>& step) override {
+    Tensor* gradient = plant_.op == op && plant_.input < inputs ? b.grad_of(plant_.input) : nullptr;
+    if (gradient == nullptr || gradient->size() == 0) return step();
+    std::vector<Tensor> others(inputs);
+    const Tensor gy = b.gy().clone();
+    const Tensor right = added_by(step, *gradient);
+    for (std::size_t i = 0; i < inputs; ++i)
+      if (const Tensor* g = b.grad_of(i); g != nullptr && g != gradient) others[i] = g->clone();
+    Tensor wrong = right.clone();
+    if (plant_.kind == Plant::Kind::term) {
+      std::copy_n(gy.data(), gy.size(), b.mutable_gy().data());
+      b.mutable_gy().data()[gy.size() / 2] = 0;
+      wrong = added_by(step, *gradient);
+    } else if (plant_.kind == Plant::Kind::index) {
+      std::rotate(wrong.data(), wrong.data() + wrong.size() - 1, wrong.data() + wrong.size());
+    } else {
+      for (real& g : wrong.values()) g *= plant_.kind == Plant::Kind::sign ? -1 : 2;
+    }
+    for (std::size_t i = 0; i < inputs; ++i)
+      if (others[i].defined()) std::copy_n(others[i].data(), others[i].size(), b.grad_of(i)->data());
+    for (Dim i = 0; i < wrong.size(); ++i) {
+      gradient->data()[i] += wrong.data()[i];
+      changed_ = changed_ || wrong.data()[i] != right.data()[i];
+    }
+  }
+
+ private:
+  Plant plant_;
+  bool changed_ = false;
+};
+
 // The ops whose rows are wrong while the error is there.
 std::vector<CheckedGradients> wrong_rows(std::span<const std::span<const GradientCase>> runs) {
   std::vector<CheckedGradients> wrong;
@@ -92,7 +157,7 @@ struct Tally {
   Json rows = Json::array();
 };
 
-void plant(const Arguments& a, const Plant& p, const std::string& input,
+void plant(const Arguments& a, const Plant& p, const char* kind, const std::string& input,
            std::span<const std::span<const GradientCase>> runs, Tally& tally) {
   PlantedError error(p);
   const std::vector<CheckedGradients> wrong = wrong_rows(runs);
@@ -100,10 +165,10 @@ void plant(const Arguments& a, const Plant& p, const std::string& input,
   const bool found = wrong.size() == 1 && wrong.front().name == p.op;
   ++tally.planted;
   tally.found += found;
-  a.print(left_aligned(input, 36) + left_aligned(name_of(p.kind), 8) +
+  a.print(left_aligned(input, 36) + left_aligned(kind, 8) +
           (found ? "found: " + text_of(wrong.front().worst)
                  : "NOT FOUND, " + std::to_string(wrong.size()) + " rows wrong"));
-  Json row = {{"op", p.op}, {"input", input}, {"error", name_of(p.kind)}, {"found", found}};
+  Json row = {{"op", p.op}, {"input", input}, {"error", kind}, {"found", found}};
   if (found) row["worst"] = to_json(wrong.front().worst);
   tally.rows.push_back(std::move(row));
 }
@@ -124,9 +189,9 @@ int break_ops(const Arguments& a, const std::string& op) {
   Progress progress(a, "planting", inputs.size(), "inputs");
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     const auto& [c, input] = inputs[i];
-    for (const Plant::Kind kind : kPlantKinds) {
+    for (const auto& [kind, name] : kPlantKinds) {
       stop_if_interrupted();
-      plant(a, {c->name, input, kind}, c->options.names[input], runs, tally);
+      plant(a, {c->name, input, kind}, name, c->options.names[input], runs, tally);
     }
     progress.update(i + 1);
   }

@@ -68,7 +68,6 @@ void declare_window_training(Arguments& a) {
       "round, left to right and top to bottom, for arrays that feel alike everywhere; none, as in preset "
       "frame",
       "standard");
-  a.option("also", "DIR", "more recordings to train on, never tested: simulated ones, say");
   a.option(
       "interval-factor", "X,...",
       "half the width of a pixel's 90 % interval in units of its predicted error, one for all or one each "
@@ -81,9 +80,6 @@ void declare_window_training(Arguments& a) {
       "give the last frame a way of its own into the picture, beside the latents: for sensors of which one "
       "frame says more than the latents keep");
   a.option("beta", "X", "weight of the KL divergence of variational autoencoders (default: 0.001)");
-  a.option("autoencoder", "NAME",
-           "variational, as in the paper; or plain: latents without noise and KL divergence (default: the "
-           "preset's)");
   a.more(false);
 }
 
@@ -146,12 +142,8 @@ Recipe recipe_of(const Arguments& a, Recipe r) {
           in_quotes(a.text("interval-factor")));
   }
   if (a.flag("last-frame")) r.model.last_frame_path = true;
-  if (a.given("autoencoder")) {
-    r.sampling = a.choice("autoencoder", {"variational", "plain"}) == "variational";
-    r.loss.beta = r.sampling ? LossWeights{}.beta : 0;
-  }
   if (a.given("beta") && !r.sampling)
-    throw UsageError("--beta: has no part in a plain autoencoder; leave it out");
+    throw UsageError("--beta: has no part in the plain autoencoders of preset best; leave it out");
   if (a.given("beta")) r.loss.beta = a.number("beta", 0, 1e6);
   as_usage([&] { r.check(); });
   return r;
@@ -174,7 +166,7 @@ Recipe recipe_of(const Arguments& a) {
 }
 
 RecordingFolders folders_of(const Arguments& a) {
-  return {.data = a.text("data"), .also = a.text("also"), .watch = [&a](const std::string& folder) {
+  return {.data = a.text("data"), .watch = [&a](const std::string& folder) {
             return progress_of(a, "reading " + folder, "recordings");
           }};
 }

@@ -20,7 +20,7 @@ Recipe recipe_of(const Arguments& a, Recipe base);
 /// UsageError, and as load_model() and Recipe::of().
 Recipe recipe_of(const Arguments& a);
 
-/// --data and --also, read with a progress bar.
+/// --data, read with a progress bar.
 RecordingFolders folders_of(const Arguments& a);
 
 }  // namespace supertac

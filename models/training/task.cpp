@@ -62,8 +62,6 @@ WindowSet windows_of(const Recipe& recipe, const RecordingFolders& folders, std:
   range.felt().check();
   w.scaling = scaling_of(recipe, range, notes);
   WindowSet windows = WindowSet::load(folders.data, recipe.plates, w, watch(folders.data));
-  if (!folders.also.empty())
-    windows.add_directory(folders.also, {}, {.training_only = true}, watch(folders.also));
   const RandomPasses random{.count = static_cast<std::size_t>(recipe.random_plates),
                             .seed = recipe.seed,
                             .speed_mm_s = common_speed(windows),

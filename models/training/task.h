@@ -13,8 +13,7 @@ namespace supertac {
 
 /// Where recordings lie.
 struct RecordingFolders {
-  std::string data;       ///< these are split
-  std::string also = {};  ///< these are only trained on; "": none
+  std::string data;
   /// Gives the watch of a folder's reading; empty: none.
   std::function<ReadingWatch(const std::string& folder)> watch = {};
 };

@@ -1,6 +1,6 @@
-// A network made ready to draw many pictures: its forward pass, traced once (autograd/trace.h), becomes a
-// list of steps on planned memory. Weights are packed and transformed once, nothing is on a graph, and a warm
-// call takes no memory from the heap and no lock.
+// A network that was compiled for drawing many pictures. Its forward pass is traced once (autograd/trace.h)
+// and becomes a list of steps on planned memory. The weights are packed and transformed once, nothing is
+// recorded on a graph, and a warm call neither takes memory from the heap nor waits for a lock.
 #pragma once
 
 #include <functional>
@@ -19,25 +19,27 @@ struct IntegerPlan;
 /// ("conv2d", of int8 "encoder.0.conv.1"), and its values, those of int8 converted to real numbers.
 using StepWatch = std::function<void(const std::string& step, const Tensor& map)>;
 
-/// Draws the network's pictures up to rounding (1e-5 of the largest value). A picture has the same bits alone
-/// and in any batch, on every processor. Copies share their weights; any thread may call.
+/// Draws the network's pictures; they differ from the network's own by rounding, at most 1e-5 of the largest
+/// value. A picture has the same bits alone and in any batch, on every processor. Copies share their weights,
+/// and any thread may call.
 class Prepared {
  public:
-  /// Takes the weights as they are now. The network must outlive this: with SUPERTAC_ISA=plain its own
-  /// forward step draws. Throws std::logic_error naming an op that has no step.
+  /// Copies the weights. The network must outlive this object, because with SUPERTAC_ISA=plain the network
+  /// itself draws. Throws std::logic_error that names the op where one has no step.
   explicit Prepared(const Network& network);
-  /// In whole numbers (int8), as on a microcontroller and no faster than it takes there: products of bytes,
-  /// and numbers of 16 bits where bytes would be too coarse (models/inference/prepared/integer_plan.h). The
-  /// pictures differ from fp32's by rounding to steps that follow from the ranges. They have the same bits on
-  /// every processor, a microcontroller too, and in any batch. Throws as IntegerPlan::of().
+  /// Computes in whole numbers (int8), by the C code of a microcontroller, which is slower here than fp32. It
+  /// multiplies bytes, and numbers of 16 bits where bytes would be too coarse
+  /// (models/inference/prepared/integer_plan.h). The pictures differ from fp32's by rounding to steps that
+  /// follow from the ranges. They have the same bits on every processor and microcontroller, and in any
+  /// batch. Throws as IntegerPlan::of().
   Prepared(const Network& network, const ActivationRanges& ranges);
 
   const Network& network() const { return *network_; }
   /// Throws as Network::draw.
   Estimate estimate(const Tensor& inputs) const;
-  /// The same of one window; `watch` sees every map on the way, which is another step's where its memory has
-  /// been reused. With SUPERTAC_ISA=plain it sees none of fp32. Throws std::invalid_argument for more windows
-  /// than one.
+  /// Estimates one window and calls `watch` with every map as soon as a step has computed it; later steps may
+  /// reuse the map's memory. In fp32 with SUPERTAC_ISA=plain there are no steps, and `watch` is not called.
+  /// Throws std::invalid_argument for more than one window.
   Estimate watched(const Tensor& input, const StepWatch& watch) const;
 
  private:

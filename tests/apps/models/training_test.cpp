@@ -164,8 +164,8 @@ TEST_F(Training, TheExampleEndsWithTheProgramsHash) {
 
 TEST_F(Training, LikeRepeatsATrainingToTheSameContent) {
   trained("first.safetensors",
-          "--preset best --seed 7 --split pass --stride 128 --epochs 1 --random-plates 2 --beta 0.002 "
-          "--autoencoder variational");
+          "--preset best --seed 7 --split pass --stride 128 --epochs 1 --random-plates 2 --interval-factor "
+          "1.5");
   const std::string like = "supertac-train --data data --like first.safetensors --out ";
   succeed(like + "again.safetensors");
   EXPECT_EQ(content_hash(SafetensorsFile::read(path("first.safetensors"))),
@@ -262,7 +262,7 @@ TEST_F(Training, BadInputIsOneLineAndLeavesNothingBehind) {
            {train + "--plates 6_Bumps", 1, "6_Bumps"},
            {train + "--leave-out 3_Bumps", 2, "--split texture"},
            {train + "--resume good.safetensors", 1, "cannot resume"},
-           {train + "--autoencoder plain --beta 1", 2, "--beta: has no part in a plain autoencoder"},
+           {train + "--preset best --beta 1", 2, "--beta: has no part in the plain autoencoders"},
            {evaluate + "damaged.safetensors", 1, "damaged.safetensors"},
            {evaluate + "cut.safetensors", 1, "cut.safetensors"},
            {evaluate + "absent", 1, "absent"},
