@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
+#include <functional>
+#include <iterator>
 #include <nlohmann/json.hpp>
-#include <numeric>
 
 #include "data/frames/sensor_decoder.h"
-#include "data/sensors/touch_rests.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 
@@ -17,13 +18,17 @@ constexpr double kMostly = 0.9, kText = 0.98;
 constexpr double kPressed = 12;   // times the noise: more than that is a finger
 constexpr double kUneven = 0.02;  // of the range: what signals may rest apart
 constexpr double kAssumedHz = 100;
+constexpr double kHeldS = 0.2, kHeldShare = 0.01;
+constexpr std::size_t kHeldFrames = 3;
+constexpr double kPressedNoise = 6, kPressedShare = 0.2, kStrong = 0.9, kLeastGain = 0.2, kMostGain = 5;
 
 // Polarity, range, noise and what never moves; into the draft where they are known.
 // What was known of a sensor stays where nothing says more than that.
 void look_at_signals(Sensor& draft, const HeardFrames& frames, const std::optional<Sensor>& known,
                      std::vector<std::string>& says) {
-  std::vector<double> noises, above, below;  // of each signal's median
+  std::vector<double> rests, moving, noises;
   std::vector<int> still;
+  double up = 0, down = 0;
   bool whole = true;
   const auto channels = static_cast<std::size_t>(draft.array.channels);
   for (std::size_t k = 0; k < frames.signals.size(); ++k) {
@@ -34,20 +39,12 @@ void look_at_signals(Sensor& draft, const HeardFrames& frames, const std::option
     whole = whole && std::ranges::all_of(values, [](float v) { return v == std::round(v); });
     const auto [low, high] = std::ranges::minmax(values);
     if (low == high && k % channels == 0) still.push_back(static_cast<int>(k / channels));
-    const float middle = median(values);
-    noises.push_back(steps.empty() ? 0 : quantile(steps, 0.75));
-    above.push_back(double{high} - double{middle}), below.push_back(double{middle} - double{low});
+    const double rest = double{median(values)};
+    if (low < high) moving.push_back(rest);
+    rests.push_back(rest), noises.push_back(steps.empty() ? 0 : quantile(steps, 0.75));
+    up = std::max(up, double{high} - rest), down = std::max(down, rest - double{low});
   }
-  // A taxel may be pressed for most of the time: the array as a whole says which way pressing goes.
-  const bool upwards = std::reduce(above.begin(), above.end()) >= std::reduce(below.begin(), below.end());
-  const std::vector<double> rests = rests_between_touches(frames.signals, draft.array.channels, upwards);
-  double strongest = 0;
-  std::vector<double> moving, sorted = rests;
-  for (std::size_t k = 0; k < rests.size(); ++k) {
-    const auto [low, high] = std::ranges::minmax(frames.signals[k]);
-    if (low < high) moving.push_back(rests[k]);
-    strongest = std::max(strongest, upwards ? double{high} - rests[k] : rests[k] - double{low});
-  }
+  std::vector<double> sorted = rests;
   const double rest = median(sorted), noise = std::max(median(noises), whole ? 1.0 : 1e-6 * std::abs(rest));
   const auto [lowest, highest] = std::ranges::minmax(rests);
   const double uneven = moving.empty() ? 0 : std::ranges::max(moving) - std::ranges::min(moving);
@@ -57,8 +54,8 @@ void look_at_signals(Sensor& draft, const HeardFrames& frames, const std::option
                  (known   ? ""
                   : whole ? "; whole numbers, called counts"
                           : "; set \"unit\""));
-  const bool pressed = strongest > kPressed * noise, rises = upwards || !pressed;
-  const double most = pressed ? 1.1 * strongest : std::max(20 * noise, 0.1 * std::abs(rest));
+  const bool pressed = std::max(up, down) > kPressed * noise, rises = up >= down || !pressed;
+  const double most = pressed ? 1.1 * std::max(up, down) : std::max(20 * noise, 0.1 * std::abs(rest));
   if (known && !pressed) {
     draft.scale = known->scale;
   } else {
@@ -70,7 +67,7 @@ void look_at_signals(Sensor& draft, const HeardFrames& frames, const std::option
                    " apart: \"rest\" moves each to the median; probe again when they have drifted");
   }
   says.push_back(pressed ? std::string("pressing ") + (rises ? "raises" : "lowers") +
-                               " the signals, by up to " + format(strongest, 3)
+                               " the signals, by up to " + format(std::max(up, down), 3)
                  : known
                      ? "nothing was pressed: \"pressed\" and \"range\" stay as the file has them"
                      : "nothing was pressed: \"pressed\": \"higher\" and the range are assumed; probe again "
@@ -100,18 +97,38 @@ std::optional<FoundFormat> candidate_of(const std::string& bytes, std::span<cons
   if (bytes.empty()) {
     says.push_back(
         "nothing came: see whether the sensor is switched on, and whether address and baud rate are right");
-  } else if (static_cast<double>(text_bytes) > kText * (padded ? all - nul : all)) {
-    found = find_text_format(bytes, seconds, says);
-  } else {
-    const auto binary =
-        find_binary_format(bytes, seconds, known ? std::optional(known->values()) : std::nullopt);
-    const auto shape = binary ? assumed_array(binary->values) : std::nullopt;
-    if (shape) found = FoundFormat{binary->format, *shape, "", {}};
-    if (!found)
-      says.push_back(
-          "binary without a period: a wrong baud rate, a checksum or type that is not known, or no sensor");
+    return found;
   }
+  const double printable = static_cast<double>(text_bytes), read = padded ? all - nul : all;
+  std::vector<std::string> of_text, of_binary;
+  bool text = printable > kText * read;
+  if (text) found = find_text_format(bytes, seconds, of_text);
+  if (!found && printable < all) {  // values of bytes may happen to be printable
+    const auto binary =
+        find_binary_format(heard, known ? std::optional(known->values()) : std::nullopt, of_binary);
+    const auto shape = binary ? assumed_array(binary->values) : std::nullopt;
+    if (shape) found = FoundFormat{binary->format, *shape, "", {}}, text = false;
+  }
+  const std::vector<std::string>& more = text ? of_text : of_binary;
+  says.insert(says.end(), more.begin(), more.end());
   return found;
+}
+
+// peak_k, or 0 where it is noise.
+double peak_of(const HeardFrames& frames, const Sensor& sensor, std::size_t taxel) {
+  const auto channels = static_cast<std::size_t>(sensor.array.channels);
+  std::vector<double> changes(frames.count), steps(frames.count - 1);
+  for (std::size_t s = taxel * channels; s < (taxel + 1) * channels; ++s) {
+    const std::vector<float>& signal = frames.signals[s];
+    for (std::size_t i = 0; i < frames.count; ++i) {
+      changes[i] = std::hypot(changes[i], double{signal[i]} - double{sensor.rest[s]});
+      if (i > 0) steps[i - 1] = std::hypot(steps[i - 1], double{signal[i]} - double{signal[i - 1]});
+    }
+  }
+  const double held = std::min(kHeldShare * static_cast<double>(frames.count), kHeldS * sensor.rate_hz);
+  std::ranges::sort(changes, std::greater());
+  const double peak = changes[std::max(static_cast<std::size_t>(held), kHeldFrames) - 1];
+  return peak > kPressedNoise * quantile(steps, 0.75) ? peak : 0;
 }
 
 }  // namespace
@@ -144,11 +161,11 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
   for (const Heard& chunk : heard) bytes += chunk.bytes;
   const double seconds = heard.empty() ? 0 : heard.back().time_s - heard.front().time_s;
   report.says.push_back("heard " + std::to_string(bytes.size()) + " bytes in " + format(seconds, 1) + " s");
-  Sensor rig;
-  rig.port = port;
-  if (!bytes.empty() && frames_of(rig, heard).frame_bytes > kMostly * static_cast<double>(bytes.size())) {
+  Sensor draft;  // the rig, until then
+  draft.port = port;
+  if (!bytes.empty() && frames_of(draft, heard).frame_bytes > kMostly * static_cast<double>(bytes.size())) {
     report.says.push_back("frames of the rig's board");
-    report.draft = rig;
+    report.draft = draft;
     return report;
   }
   // A description that reads what came knows more than what can be guessed.
@@ -156,8 +173,9 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
                      frames_of(*known, heard).frame_bytes > kMostly * static_cast<double>(bytes.size());
   const auto found = reads ? std::optional(FoundFormat{known->frame, known->array, "", {}})
                            : candidate_of(bytes, heard, known, report.says);
-  Sensor draft = known.value_or(Sensor{.name = "probed sensor", .body = {}});
-  draft.port = port, draft.rest.clear();
+  draft.name = "probed sensor";
+  if (known) draft.name = known->name, draft.order = known->order;
+  if (known) draft.dead = known->dead, draft.gain = known->gain, draft.follow_rest_s = known->follow_rest_s;
   if (!found) return report;
   const std::size_t values = reads ? known->values() : found->array.signals();
   if (known && known->values() != values) {
@@ -189,8 +207,55 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
     report.says.push_back("assumed: " + draft.array.text() +
                           "; set \"rows\", \"columns\", \"channels\" and \"pitch_mm\"");
   look_at_signals(draft, frames, known, report.says);
-  draft.check();
-  report.draft = draft;
+  try {
+    draft.check();
+    report.draft = draft;
+  } catch (const std::exception& e) {  // numbers that no sensor has: the reading is not right
+    report.says.push_back(std::string("nothing is drafted, as no sensor could be described so: ") + e.what());
+  }
+  return report;
+}
+
+ProbeReport find_gain(std::span<const Heard> heard, const Sensor& sensor) {
+  const HeardFrames frames = frames_of(sensor, heard);
+  ProbeReport report{{std::to_string(frames.count) + " frames to find gains from"}, {}};
+  if (frames.count <= kHeldFrames) return report;
+  Sensor found = sensor;
+  found.rest.clear();
+  for (std::vector<float> signal : frames.signals) found.rest.push_back(median(signal));
+  const std::vector<int> silent = sensor.silent();
+  const auto says = [&](int taxel) { return std::ranges::find(silent, taxel) == silent.end(); };
+  std::vector<double> peaks, pressed;  // of silent taxels 0
+  for (int taxel = 0; taxel < sensor.array.taxels(); ++taxel)
+    peaks.push_back(says(taxel) ? peak_of(frames, found, static_cast<std::size_t>(taxel)) : 0);
+  const double least = kPressedShare * quantile(std::vector(peaks), kStrong);
+  std::ranges::copy_if(peaks, std::back_inserter(pressed), [&](double peak) { return peak > least; });
+  if (pressed.empty()) {
+    report.says.emplace_back("nothing was pressed: press every taxel while it listens (--seconds)");
+    return report;
+  }
+  const double usual = median(pressed);
+  const auto gain_of = [&](double peak) {
+    return std::clamp(std::round(1e4 * usual / peak) / 1e4, kLeastGain, kMostGain);
+  };
+  std::vector<int> weak;
+  found.gain.clear();
+  for (int taxel = 0; taxel < sensor.array.taxels(); ++taxel) {
+    const double peak = peaks[static_cast<std::size_t>(taxel)];
+    if (peak <= least && says(taxel)) weak.push_back(taxel);
+    found.gain.insert(found.gain.end(), static_cast<std::size_t>(sensor.array.channels),
+                      peak > least ? static_cast<float>(gain_of(peak)) : 1);
+  }
+  const auto [lowest, highest] = std::ranges::minmax(pressed);
+  report.says.push_back("gains of " + std::to_string(pressed.size()) + " taxels, " +
+                        format(gain_of(highest)) + " to " + format(gain_of(lowest)) +
+                        ", from presses that changed a signal by " + format(usual, 3));
+  if (!weak.empty())
+    report.says.push_back("not pressed, or far more weakly than the others: taxels " +
+                          nlohmann::json(weak).dump() +
+                          " keep gain 1; press them as hard as the others, or name them in \"dead\"");
+  found.check();
+  report.draft = found;
   return report;
 }
 

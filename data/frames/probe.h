@@ -61,15 +61,26 @@ std::optional<FoundFormat> find_text_format(const std::string& bytes, double sec
 /// length of each, from outside), with three channels where they are threes; empty when no array has so many.
 std::optional<TaxelArray> assumed_array(std::size_t values, std::span<const std::size_t> nested = {});
 
-/// The binary format of `bytes`, which were heard for `seconds`: header (what stays the same from period to
-/// period), time stamp, type, byte order, checksum; and how many values a frame has. Empty where the bytes
-/// have no period.
-struct BinaryFinding {
+/// One way to read binary frames, and how few bits describe the bytes when they are read so.
+struct BinaryReading {
   FrameFormat format;
   std::size_t values = 0;
+  double bits = 0, explained = 0;  ///< explained = 1 - bits / bits as sent
+  bool unit_assumed = false;       ///< of the clock; a file says nothing of the time it took
+  bool unknown = false;            ///< some bytes are no value and have no meaning that is known
+  bool mixed = false;              ///< its fields have two byte orders
+  bool sign_unsure = false;        ///< signed, though no signal is below 0 at the beginning
+  std::string text() const;
 };
-std::optional<BinaryFinding> find_binary_format(const std::string& bytes, double seconds,
-                                                std::optional<std::size_t> values);
+/// Readings of the bytes, the best first, no two of which give the same numbers. Header (0 to 4 bytes),
+/// clock, counter, type, byte order, count, checksum and what it covers, and trailer are found at once, by
+/// the length of the bytes' description (binary_columns.h). `values`: how many a frame has, where that is
+/// known.
+std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::optional<std::size_t> values);
+/// The best reading, where it leads the second by 7 bits (128 to 1); else empty, and `says` names both.
+std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
+                                                std::optional<std::size_t> values,
+                                                std::vector<std::string>& says);
 
 /// Bytes that came within so many seconds came at once, as from a file.
 inline constexpr double kAtOnceS = 0.2;

@@ -1,181 +1,385 @@
-// The period of a binary stream, and what stands where in it.
+// What a binary stream is: of all readings - header, fields, values, checksum, trailer - the one that
+// describes the bytes in the fewest bits.
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <vector>
+#include <map>
+#include <tuple>
 
+#include "data/frames/binary_columns.h"
 #include "data/frames/binary_decoder.h"
 #include "data/frames/probe.h"
+#include "io/numbers/numbers.h"
+#include "io/numbers/text.h"
 
 namespace supertac {
 namespace {
 
-constexpr std::size_t kLongestPeriod = 20'000, kLeastPeriod = 4, kFewPeriods = 4, kLongestHeader = 4;
-constexpr double kAgree = 0.8;                        // some may have been torn
-constexpr std::size_t kMostCompared = 4'000'000'000;  // bytes, some seconds: megabytes that hardly change
+constexpr std::size_t kMostBytes = std::size_t{1} << 18;  // that are looked at: the last
+constexpr std::size_t kLongestHeader = 4, kLongestTrailer = 4, kFewRows = 8, kLongToSkip = 600,
+                      kMostSummed = 150'000'000;  // some tenths of a second
+constexpr double kClearLead = 7, kMostLead = 40, kPositive = 12, kLeastExplained = 0.05;
+constexpr double kNever = BinaryColumns::kNever;
 
-std::span<const std::byte> bytes_in(const std::string& text, std::size_t at, std::size_t count) {
-  return std::as_bytes(std::span(text)).subspan(at, count);
+// What people take for headers costs fewer bits than other bytes, and a byte's complement behind it fewer
+// yet.
+double bits_of_header(unsigned char byte, int before) {
+  constexpr unsigned char kOften[] = {0xAA, 0x55, 0xA5, 0x5A, 0xFF, 0xFE, 0xFA, 0xC3, 0x3C, 0x7E, 0x24, 0x02,
+                                      0xEB, 0x90, 0xBB, 0xCC, 0xDD, 0xEE, 0xFD, 0xFC, 0xF0, 0x5B, 0x7B, 0x23};
+  if (before + byte == 255) return 2;
+  return std::ranges::find(kOften, byte) != std::end(kOften) ? 4 : byte == 0 ? 12 : 8;
+}
+double bits_of_trailer(unsigned char byte, int behind) {
+  if (behind + byte == 255) return 2;
+  return byte == '\r' || byte == '\n' ? 1 : byte == 0 ? kNever : 10;
 }
 
-std::size_t occurrences(const std::string& bytes, const std::string& pattern) {
-  std::size_t count = 0;
-  for (std::size_t at = bytes.find(pattern); at != std::string::npos; at = bytes.find(pattern, at + 1))
-    ++count;
-  return count;
+// People build arrays of some sides more often than of others; kNever where no array has so many values.
+double bits_of_count(std::size_t count) {
+  const auto weight = [](std::size_t side) {
+    for (const std::size_t often : {4, 8, 16, 32, 64})
+      if (side == often) return 8.0;
+    for (const std::size_t at_times : {1, 2, 3, 5, 6, 10, 12, 20, 24, 48})
+      if (side == at_times) return 4.0;
+    return 1.0;
+  };
+  double sum = 0;
+  for (const auto& [channels, share] : {std::pair(1, 0.9), {3, 0.08}, {2, 0.02}}) {
+    if (count % static_cast<std::size_t>(channels) != 0) continue;
+    const std::size_t taxels = count / static_cast<std::size_t>(channels);
+    for (std::size_t rows = 1; rows <= 64; ++rows)
+      if (taxels % rows == 0 && taxels / rows <= 64) sum += share * weight(rows) * weight(taxels / rows);
+  }
+  return sum > 0 ? -std::log2(sum / 16641) : kNever;
 }
 
-struct Period {
-  std::size_t length = 0, at = 0, constant = 0;  // where in the bytes the longest constant run begins
+double bits_of_type(const std::string& type) {
+  return type == "u8" || type == "u16" ? 1.5 : type == "i16" || type == "f32" ? 3 : 5;
+}
+
+struct Checksum {
+  const char* kind = nullptr;
+  bool big_endian = false;
+  std::size_t from = 0;  // bytes of the header that it does not cover
 };
 
-// The longest run of bytes that stay the same from period to period and stand nowhere else; nothing when
-// there is none. A resting signal's high bytes stay the same, too, and so does a dead taxel: what is 0, or
-// stands elsewhere in the frame as well, is no part of a header.
-std::optional<Period> constant_run(const std::string& bytes, std::size_t from, std::size_t period,
-                                   std::size_t& compared) {
-  // All periods in a third of the bytes: whole values repeat themselves, too, but not over a header.
-  const std::size_t count = bytes.size() / 3 / period;
-  const auto at = [&](std::size_t phase) { return bytes[from + phase % period]; };
-  const auto constant = [&](std::size_t phase) {
-    for (std::size_t k = 1; k < count; ++k, ++compared)
-      if (bytes[from + phase % period + k * period] != at(phase)) return false;
-    return true;
+// Of one period.
+class Search {
+ public:
+  Search(Bytes bytes, const BinaryColumns& columns, std::vector<double> start_bits,
+         std::optional<std::size_t> values)
+      : columns_(columns),
+        period_(columns.stretch().period),
+        start_bits_(std::move(start_bits)),
+        wanted_(values) {
+    outside_ = 8.0 * static_cast<double>(bytes.size() - (columns.stretch().rows - 1) * period_);
+    counts_.resize(period_ + 1, -1);
+    find_checksums();
+  }
+
+  // Into `found`: the best of each kind that reads other numbers.
+  void run(std::vector<BinaryReading>& found) {
+    for (std::size_t start = 0; start < period_; ++start) {
+      double trailer_bits = 0;
+      for (std::size_t trailer = 0; trailer <= kLongestTrailer && trailer + 4 < period_; ++trailer) {
+        if (trailer > 0) {
+          const std::size_t at = start + period_ - trailer;
+          trailer_bits += columns_.constant(at) +
+                          bits_of_trailer(columns_.usual(at), trailer == 1 ? 0 : columns_.usual(at + 1)) +
+                          (trailer == 1 ? 3 : 0);
+        }
+        if (trailer_bits == kNever) break;
+        try_headers(start, trailer, trailer_bits);
+      }
+    }
+    for (auto& [key, reading] : best_) found.push_back(reading);
+  }
+
+ private:
+  using Parts = std::vector<const FieldFound*>;
+  struct Ends {
+    std::size_t header = 0, trailer = 0;
+    const Checksum* checksum = nullptr;
+    double bits = 0;
   };
-  std::array<std::size_t, 256> total{};
-  const auto count_of = [&total](char c) -> std::size_t& { return total[static_cast<unsigned char>(c)]; };
-  std::vector<bool> stays(period);
-  for (std::size_t phase = 0; phase < period; ++phase) {
-    stays[phase] = constant(phase);
-    if (stays[phase]) ++count_of(at(phase));
-  }
-  Period best{period};
-  std::size_t run = 0;
-  for (std::size_t i = 0; i <= 2 * period && run < period; ++i) {
-    if (stays[i % period]) {
-      ++run;
-      continue;
-    }
-    // The run before i has ended: what is left of it without common bytes at its ends.
-    std::size_t first = i - run, length = run;
-    for (std::size_t k = 0; k < run; ++k) --count_of(at(first + k));
-    const auto common = [&](std::size_t phase) { return at(phase) == 0 || count_of(at(phase)) > 0; };
-    while (length > 0 && common(first)) ++first, --length;
-    while (length > 0 && common(first + length - 1)) --length;
-    for (std::size_t k = 0; k < run; ++k) ++count_of(at(i - run + k));
-    if (length > best.constant) best.constant = length, best.at = from + first % period;
-    run = 0;
-  }
-  if (run >= period) return std::nullopt;  // nothing changes
-  if (best.constant == 0 || best.constant == period) return std::nullopt;
-  const std::string pattern = bytes.substr(best.at, std::min(best.constant, 2 * kLongestHeader));
-  const double expected = static_cast<double>(bytes.size()) / static_cast<double>(period);
-  const auto found = static_cast<double>(occurrences(bytes, pattern));
-  if (found < 0.8 * expected - 1 || found > 1.1 * expected + 1) return std::nullopt;
-  return best;
-}
 
-std::optional<Period> period_of(const std::string& bytes) {
-  const std::size_t longest = std::min(kLongestPeriod, bytes.size() / 3 / kFewPeriods);
-  std::size_t compared = 0;
-  for (std::size_t period = kLeastPeriod; period <= longest && compared < kMostCompared; ++period)
-    for (const std::size_t third : {1, 2, 0})  // bytes may have been lost in one of them
-      if (const auto found = constant_run(bytes, third * (bytes.size() / 3), period, compared)) return found;
-  return std::nullopt;
-}
+  void find_checksums() {
+    std::size_t summed = 0;  // bytes
+    for (std::size_t end = 0; end < period_; ++end)
+      for (const char* kind : kChecksums) {
+        const std::size_t width = checksum_bytes(kind);
+        if (width == 0 || width + 3 >= period_ || columns_.constant(end) == 0) continue;
+        // What stands between a checksum and where the next one begins stays the same.
+        for (std::size_t gap = 0; summed < kMostSummed && gap <= kLongestTrailer + kLongestHeader; ++gap) {
+          if (gap > 0 && columns_.constant(end + width + gap - 1) == kNever) break;
+          const std::size_t begin = end + width + gap, from = begin >= period_ ? begin - period_ : begin;
+          const std::size_t to = from < end ? end : end + period_;
+          summed += width > 1 ? 2 * period_ : period_;
+          for (const bool big : {false, true})
+            if ((width > 1 || !big) && columns_.is_checksum(kind, big, from, to)) {
+              const auto place = std::pair(end, gap);
+              if (!checksums_.contains(place)) checksums_[place] = {kind, big, 0};
+            }
+        }
+      }
+  }
 
-// Little or big endian by which byte of each pair moves less, where nothing has proven it; single bytes where
-// both move alike.
-void guess_type(const std::string& bytes, const Period& period, std::size_t values_at, std::size_t count,
-                std::optional<bool> big_endian, FrameFormat& f) {
-  std::array<double, 2> moved{};
-  bool negative = true, positive = false, all = true;
-  std::size_t real = 0, reals = 0;
-  const std::size_t frames = (bytes.size() - period.at) / period.length;
-  for (std::size_t n = 1; n < frames; ++n) {
-    const std::size_t at = period.at + n * period.length + values_at;
-    if (at + count > bytes.size()) break;
-    for (std::size_t i = 0; i < count; ++i) {
-      const int step = static_cast<signed char>(bytes[at + i] - bytes[at + i - period.length]);
-      moved[i % 2] += std::abs(step);
+  void try_headers(std::size_t start, std::size_t trailer, double trailer_bits) {
+    double header_bits = 0;
+    for (std::size_t header = 0; header <= kLongestHeader && header + trailer + 3 < period_; ++header) {
+      constexpr double kLengths[] = {6, 2, 1, 2.5, 2};
+      if (header == 1 && columns_.usual(start) == 0) break;  // nobody begins a frame by 0
+      if (header > 0)
+        header_bits += columns_.constant(start + header - 1) +
+                       bits_of_header(columns_.usual(start + header - 1),
+                                      header == 1 ? 0 : columns_.usual(start + header - 2));
+      if (header_bits == kNever) break;
+      Ends ends{header, trailer, nullptr,
+                outside_ + trailer_bits + header_bits + kLengths[header] + start_bits_[start]};
+      if (header + trailer > 0) try_fields(start, ends);
+      for (const std::size_t width : {1, 2, 4}) {
+        if (header + trailer + width + 2 > period_) continue;
+        const std::size_t end = (start + 2 * period_ - trailer - width) % period_;
+        for (std::size_t from = 0; from <= header; ++from) {
+          const auto at = checksums_.find({end, trailer + from});
+          if (at == checksums_.end() || checksum_bytes(at->second.kind) != width) continue;
+          Checksum sum = at->second;
+          sum.from = from;
+          ends.checksum = &sum;
+          // That all of a header is covered, or nothing of it, is usual.
+          ends.bits += from == 0 || from == header ? 6 : 10;
+          try_fields(start, ends);
+          ends.bits -= from == 0 || from == header ? 6 : 10;
+        }
+      }
     }
-    for (std::size_t i = 0; i + 4 <= count; i += 4, ++reals) {
-      const double value = number_at(bytes_in(bytes, at + i, 4).data(), "f32", big_endian.value_or(false));
-      real += value == 0 || (std::abs(value) > 1e-6 && std::abs(value) < 1e7) ? 1 : 0;
+  }
+
+  void try_fields(std::size_t start, const Ends& ends) {
+    const std::size_t begin = start + ends.header,
+                      end = start + period_ - ends.trailer -
+                            (ends.checksum != nullptr ? checksum_bytes(ends.checksum->kind) : 0);
+    Parts before, behind;
+    each_before(start, begin, end, ends, before, behind, 0);
+  }
+
+  void each_before(std::size_t start, std::size_t begin, std::size_t end, const Ends& ends, Parts& before,
+                   Parts& behind, double bits) {
+    if (begin >= end || ends.bits + bits > least_ + kMostLead) return;
+    each_behind(start, begin, end, ends, before, behind, bits);
+    if (before.size() == 2 ||
+        (!before.empty() && before.front()->field.is == FrameField::Is::skip && !before.front()->sure))
+      return;
+    for (const FieldFound& field : columns_.fields(begin)) {
+      if (!allowed(field, before)) continue;
+      before.push_back(&field);
+      each_before(start, begin + field.width, end, ends, before, behind, bits + field.bits);
+      before.pop_back();
     }
   }
-  f.type = "u8";
-  if (count % 4 == 0 && reals > 0 && static_cast<double>(real) > kAgree * static_cast<double>(reals)) {
-    f.type = "f32", f.big_endian = big_endian.value_or(false);
-    return;
+  void each_behind(std::size_t start, std::size_t begin, std::size_t end, const Ends& ends,
+                   const Parts& before, Parts& behind, double bits) {
+    if (begin >= end || ends.bits + bits > least_ + kMostLead) return;
+    try_values(start, begin, end, ends, before, behind, bits);
+    if (before.size() + behind.size() >= 2) return;
+    for (std::size_t width = 1; width <= 8 && begin + width < end; ++width)
+      for (const FieldFound& field : columns_.fields(end - width)) {
+        if (field.width != width || !allowed(field, before) || !allowed(field, behind)) continue;
+        behind.push_back(&field);
+        each_behind(start, begin, end - width, ends, before, behind, bits + field.bits);
+        behind.pop_back();
+      }
   }
-  if (count % 2 != 0 || std::max(moved[0], moved[1]) < 3 * std::min(moved[0], moved[1])) return;
-  f.type = "u16", f.big_endian = big_endian.value_or(moved[0] < moved[1]);
-  negative = false;
-  for (std::size_t i = f.big_endian ? 0 : 1; i < count; i += 2) {
-    const char high = bytes[period.at + period.length + values_at + i];
-    negative = negative || high == static_cast<char>(0xFF), positive = positive || high == 0;
-    all = all && (high == static_cast<char>(0xFF) || high == 0);
+  // One clock; bytes of no meaning once; and in long periods not at all, for there time counts.
+  bool allowed(const FieldFound& field, const Parts& others) const {
+    const bool unknown = field.field.is == FrameField::Is::skip && !field.sure;
+    if (unknown && (period_ > kLongToSkip || !others.empty())) return false;
+    return std::ranges::none_of(others, [&](const FieldFound* other) {
+      return (other->field.is == FrameField::Is::skip && field.field.is == FrameField::Is::skip) ||
+             (other->field.is == field.field.is && field.field.is == FrameField::Is::time);
+    });
   }
-  if (negative && (positive || all)) f.type = "i16";
+
+  void try_values(std::size_t start, std::size_t begin, std::size_t end, const Ends& ends,
+                  const Parts& before, const Parts& behind, double bits) {
+    for (const BinaryColumns::Values& values : columns_.values()) {
+      if ((end - begin) % values.width != 0) continue;
+      const std::size_t count = (end - begin) / values.width, at = begin % period_;
+      if (wanted_ && *wanted_ != count) continue;
+      if (counts_[count] < 0) counts_[count] = bits_of_count(count);
+      double all = ends.bits + bits + values.bits(at, count) + counts_[count] + bits_of_type(values.type);
+      if (!(all < least_ + kMostLead)) continue;
+      // A signed sensor rests below 0 somewhere, or crosses it in small steps.
+      bool sign = false, rests = false;
+      for (std::size_t k = 0; k < count && !rests; ++k) {
+        const std::size_t column = (at + k * values.width) % period_;
+        sign = sign || values.sign[column], rests = values.rests_signed[column];
+      }
+      if (values.type.front() == 'i' && sign && !rests) all += kPositive;
+      least_ = std::min(least_, all);
+      const bool is_signed = values.type.front() == 'i' && (sign || rests);
+      int clock = 0;  // two readings of the time are two readings
+      for (const Parts* parts : {&before, &behind})
+        for (const FieldFound* field : *parts)
+          if (field->field.is == FrameField::Is::time)
+            clock =
+                static_cast<int>(field->width) + (field->big_endian ? 16 : 0) + (parts == &behind ? 32 : 0);
+      const auto key = std::tuple(at, count, values.width, values.width > 1 && values.big_endian,
+                                  (values.type.front() == 'f' ? 2
+                                   : is_signed                ? 1
+                                                              : 0) +
+                                      4 * clock);
+      const auto known = best_.find(key);
+      if (known != best_.end() && known->second.bits <= all) continue;
+      best_[key] = reading(start, values, count, ends, before, behind, all);
+      best_[key].sign_unsure = values.type.front() == 'i' && sign && !rests;
+    }
+  }
+
+  BinaryReading reading(std::size_t start, const BinaryColumns::Values& values, std::size_t count,
+                        const Ends& ends, const Parts& before, const Parts& behind, double bits) const {
+    BinaryReading r;
+    FrameFormat& f = r.format;
+    f.kind = FrameKind::binary;
+    for (std::size_t i = 0; i < ends.header; ++i) f.header += static_cast<char>(columns_.usual(start + i));
+    for (std::size_t i = ends.trailer; i > 0; --i)
+      f.trailer += static_cast<char>(columns_.usual(start + period_ - i));
+    f.type = values.type, f.big_endian = values.big_endian;
+    const auto add = [&](const FieldFound& field) {
+      f.fields.push_back(field.field);
+      if (field.field.is == FrameField::Is::time) {
+        f.time = field.time, r.unit_assumed = !field.sure;
+        if (values.width == 1) f.big_endian = field.big_endian;
+        r.mixed = r.mixed || field.big_endian != f.big_endian;
+      }
+      if (field.field.is == FrameField::Is::counter && field.width > 1)
+        r.mixed = r.mixed || (field.big_endian != f.big_endian && values.width > 1);
+      r.unknown = r.unknown || field.field.is == FrameField::Is::skip;
+    };
+    for (const FieldFound* field : before) add(*field);
+    f.fields.push_back({FrameField::Is::values, count, ""});
+    for (auto field = behind.rbegin(); field != behind.rend(); ++field) add(**field);
+    const bool plain =
+        f.fields.size() == 1 || (f.fields.size() == 2 && f.fields[0].is == FrameField::Is::time);
+    if (plain) f.fields.clear();
+    if (ends.checksum != nullptr) {
+      f.checksum = ends.checksum->kind;
+      if (ends.checksum->from != ends.header) f.checksum_from = ends.checksum->from;
+      if (checksum_bytes(f.checksum) > 1 && ends.checksum->big_endian != f.big_endian)
+        f.checksum_big_endian = ends.checksum->big_endian;
+    }
+    r.values = count, r.bits = bits;
+    return r;
+  }
+
+  const BinaryColumns& columns_;
+  std::size_t period_;
+  std::vector<double> start_bits_, counts_;
+  std::optional<std::size_t> wanted_;
+  double outside_ = 0, least_ = kNever;
+  std::map<std::pair<std::size_t, std::size_t>, Checksum> checksums_;
+  std::map<std::tuple<std::size_t, std::size_t, std::size_t, bool, int>, BinaryReading> best_;
+};
+
+// What came after a pause begins a frame: cost of where the pauses ended, for each byte of the period.
+std::vector<double> bits_of_starts(std::span<const Heard> heard, std::size_t first_byte,
+                                   const Stretch& stretch, double seconds, std::size_t bytes) {
+  constexpr double kMost = 30, kPause = 0.3;
+  const std::size_t period = stretch.period;
+  std::vector<std::size_t> counts(period);
+  std::size_t all = 0, at = 0;
+  double before = -1e9;
+  const double pause = kPause * seconds * static_cast<double>(period) / static_cast<double>(bytes);
+  for (const Heard& chunk : heard) {
+    const bool within =
+        at >= first_byte + stretch.begin && at < first_byte + stretch.begin + stretch.rows * period && at > 0;
+    if (within && chunk.time_s - before > pause) ++counts[(at - first_byte - stretch.begin) % period], ++all;
+    at += chunk.bytes.size(), before = chunk.time_s;
+  }
+  std::vector<double> bits(period);
+  for (std::size_t c = 0; c < period; ++c) {
+    const auto in = static_cast<double>(counts[c]), out = static_cast<double>(all - counts[c]);
+    bits[c] = bits_of_share(in, out) + out * std::log2(static_cast<double>(period));
+  }
+  const double least = std::ranges::min(bits);
+  for (double& b : bits) b = std::min(b - least, kMost);
+  if (first_byte == 0 && stretch.begin == 0)
+    for (std::size_t c = 1; c < period; ++c) bits[c] += 2;
+  return bits;
 }
 
 }  // namespace
 
-std::optional<BinaryFinding> find_binary_format(const std::string& bytes, double seconds,
-                                                std::optional<std::size_t> values) {
-  const auto period = period_of(bytes);
-  if (!period) return std::nullopt;
-  // From where the period was found: a terminal may have changed what came before it was opened.
-  const std::size_t frames = (bytes.size() - period->at) / period->length;
-  seconds *= static_cast<double>(frames * period->length) / static_cast<double>(bytes.size());
-  const auto agrees = [&](std::size_t header, const std::string& kind, bool big) {
-    const std::size_t width = checksum_bytes(kind);
-    if (period->length <= header + width) return false;
-    std::size_t right = 0;
-    for (std::size_t n = 0; n < frames; ++n) {
-      const std::size_t at = period->at + n * period->length, end = at + period->length - width;
-      const double sent = number_at(bytes_in(bytes, end, width).data(), width == 1 ? "u8" : "u16", big);
-      right += sent == checksum_of(kind, bytes_in(bytes, at + header, end - at - header)) ? 1 : 0;
+std::string BinaryReading::text() const {
+  const FrameFormat& f = format;
+  const auto hex = [](const std::string& bytes) {
+    std::string digits;
+    for (const char c : bytes) {
+      const auto byte = static_cast<unsigned char>(c);
+      digits += "0123456789ABCDEF"[byte >> 4], digits += "0123456789ABCDEF"[byte & 15];
     }
-    return static_cast<double>(right) >= kAgree * static_cast<double>(frames) - 1 && right > 2;
+    return digits;
   };
-  BinaryFinding finding;
-  FrameFormat& f = finding.format;
-  f.kind = FrameKind::binary;
-  // A checksum that is right says where the header ends; else it is what stays the same.
-  std::size_t header = std::min(period->constant, kLongestHeader);
-  for (std::size_t h = 1; h <= std::min(period->constant, 2 * kLongestHeader) && f.checksum == "none"; ++h)
-    for (const char* kind : {"crc16-modbus", "crc16-ccitt", "sum8", "xor8"})
-      for (const bool big : {false, true})
-        if (f.checksum == "none" && agrees(h, kind, big)) header = h, f.checksum = kind, f.big_endian = big;
-  const std::size_t behind = checksum_bytes(f.checksum);
-  std::optional<bool> proven;  // by a checksum of two bytes, or a clock
-  if (behind == 2) proven = f.big_endian;
-  if (values && f.checksum == "none")
-    for (std::size_t h = header; h >= 1; --h)
-      if ((period->length - h) % *values == 0) header = h, h = 1;
-  std::size_t values_at = header;
-  for (const bool big : {false, true}) {
-    if (period->length < header + 4 + behind || f.time || big != proven.value_or(big)) continue;
-    std::vector<double> stamps;
-    for (std::size_t n = 0; n < frames; ++n)
-      stamps.push_back(
-          number_at(bytes_in(bytes, period->at + n * period->length + header, 4).data(), "u32", big));
-    if (const auto unit = unit_of_clock(stamps, seconds); unit && *unit < 1)
-      f.time = FrameTime{.type = "u32", .unit_s = *unit}, f.big_endian = big, proven = big, values_at += 4;
+  std::string text = f.header.empty() ? "no header" : "header " + hex(f.header);
+  for (const FrameField& field : f.fields) {
+    if (field.is == FrameField::Is::counter) text += ", a counter " + field.type;
+    if (field.is == FrameField::Is::skip)
+      text += ", " + std::to_string(field.count) + " bytes that are no value";
   }
-  f.header = bytes.substr(period->at, header);
-  const std::size_t count = period->length - values_at - behind;
-  guess_type(bytes, *period, values_at, count, proven, f);
-  if (values && *values > 0 && count % *values == 0) {
-    const std::size_t width = count / *values;
-    if (width != bytes_of(f.type)) f.type = width == 1 ? "u8" : width == 2 ? "u16" : "u32";
-    if (width != 1 && width != 2 && width != 4) return std::nullopt;
+  if (f.time) text += ", a clock " + f.time->type + " in " + supertac::format(f.time->unit_s) + " s";
+  text += ", " + std::to_string(values) + " values " + f.type;
+  if (f.type.back() != '8') text += f.big_endian ? " big-endian" : " little-endian";
+  if (f.checksum != "none") text += ", checksum " + f.checksum;
+  if (!f.trailer.empty()) text += ", trailer " + hex(f.trailer);
+  return text + " (explains " + supertac::format(100 * explained, 0) + " % of the bytes)";
+}
+
+std::vector<BinaryReading> binary_readings(std::span<const Heard> heard, std::optional<std::size_t> values) {
+  std::string all;
+  for (const Heard& chunk : heard) all += chunk.bytes;
+  const double seconds = heard.empty() ? 0 : heard.back().time_s - heard.front().time_s;
+  const std::size_t first = all.size() - std::min(all.size(), kMostBytes);
+  const Bytes bytes = Bytes(reinterpret_cast<const unsigned char*>(all.data()), all.size()).subspan(first);
+  std::vector<BinaryReading> found;
+  for (const std::size_t period : periods_of(bytes)) {
+    const Stretch stretch = stretch_of(bytes, period);
+    if (stretch.rows < kFewRows) continue;
+    const double share = static_cast<double>((stretch.rows - 2) * period) / static_cast<double>(all.size());
+    const BinaryColumns columns(bytes, stretch, seconds < kAtOnceS ? 0 : seconds * share);
+    Search(bytes, columns, bits_of_starts(heard, first, stretch, seconds, all.size()), values).run(found);
   }
-  finding.values = count / bytes_of(f.type);
-  if (finding.values * bytes_of(f.type) != count) return std::nullopt;
-  return finding;
+  for (BinaryReading& r : found) r.explained = 1 - r.bits / (8.0 * static_cast<double>(bytes.size()));
+  std::ranges::sort(found, {}, &BinaryReading::bits);
+  return found;
+}
+
+std::optional<BinaryReading> find_binary_format(std::span<const Heard> heard,
+                                                std::optional<std::size_t> values,
+                                                std::vector<std::string>& says) {
+  const std::vector<BinaryReading> found = binary_readings(heard, values);
+  if (found.empty() || found[0].explained < kLeastExplained) {
+    says.push_back(
+        "binary without a period: a wrong baud rate, a checksum or type that is not known, or no sensor");
+    return std::nullopt;
+  }
+  const BinaryReading& best = found[0];
+  const double lead = found.size() > 1 ? found[1].bits - best.bits : kMostLead;
+  if (lead < kClearLead || best.unknown || best.mixed || best.sign_unsure) {
+    says.push_back("it may be: " + best.text());
+    if (best.mixed) says.push_back("but its fields have two byte orders, which no sensor's file can say");
+    if (best.sign_unsure) says.push_back("but whether its numbers have a sign cannot be told");
+    if (best.unknown)
+      says.push_back("but some bytes have no meaning that is known, such as another checksum");
+    if (lead < kClearLead) says.push_back("or as well: " + found[1].text());
+    says.push_back(
+        "nothing is drafted: press many taxels while it listens, longer (--seconds), or write the file");
+    return std::nullopt;
+  }
+  says.push_back("binary: " + best.text());
+  if (found.size() > 1) says.push_back("the next best reading: " + found[1].text());
+  if (best.unit_assumed)
+    says.push_back("assumed: its clock counts units of " + format(best.format.time->unit_s) +
+                   " s; a file does not tell; set \"frame.time.unit\"");
+  return best;
 }
 
 }  // namespace supertac

@@ -1,0 +1,97 @@
+// What stands in the columns of a binary stream once it is cut into periods, in bits: the shorter a reading
+// describes the bytes, the better it explains them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "data/sensors/sensor.h"
+
+namespace supertac {
+
+using Bytes = std::span<const unsigned char>;
+
+/// Bits of which of `a + b` events were of one kind and which of the other, each as likely as those before
+/// say (Krichevsky and Trofimov): of sequences of two kinds, whatever share they have.
+double bits_of_share(double a, double b);
+
+/// The periods, in bytes, that may be frames: those after which more bytes return than after others, the
+/// likeliest first, none of them only a multiple of another.
+std::vector<std::size_t> periods_of(Bytes bytes);
+
+/// Periods in a row in which nothing was lost.
+struct Stretch {
+  std::size_t period = 0, begin = 0, rows = 0;
+};
+/// The longest one: the bytes that return a period later outweigh what returns by chance.
+Stretch stretch_of(Bytes bytes, std::size_t period);
+
+/// A field that is no value, as it may stand in a period from some byte on.
+struct FieldFound {
+  FrameField field;
+  FrameTime time = {};  ///< of a clock
+  std::size_t width = 0;
+  double bits = 0;
+  bool sure = true;  ///< false for a clock whose unit is only likely, and for bytes of no known meaning
+  bool big_endian = false;
+};
+
+/// Costs in bits of the columns of a stretch. A signal costs what its steps in time do - how large each is,
+/// by classes of powers of two as often as the column has them, and which of its class - and once how far it
+/// is from the signal before it in the frame: taxels side by side rest alike, and move smoothly. Read in
+/// another width, byte order or place they do neither.
+class BinaryColumns {
+ public:
+  /// `seconds`: what the stretch took, 0 where it came at once.
+  BinaryColumns(Bytes bytes, const Stretch& stretch, double seconds);
+
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+  static constexpr std::size_t kMostSkipped = 4;
+
+  /// As values of one type, from every byte of the period on.
+  struct Values {
+    std::string type;
+    bool big_endian = false;
+    std::size_t width = 0;
+    std::vector<double> first = {};  ///< [period] cost of the first value of an array
+    std::vector<double> behind =
+        {};  ///< [2 period] cost of each value behind another, summed in steps of width
+    std::vector<double> still = {};  ///< [2 period] values that never move, summed likewise
+    std::vector<bool> sign = {},
+                      rests_signed = {};  ///< [period] its highest bit is set at times; at the beginning
+    /// Cost of `count` values from byte `at`, below the period, on: and of how many of them never move.
+    double bits(std::size_t at, std::size_t count) const;
+  };
+  const std::vector<Values>& values() const { return values_; }
+  /// Cost of exceptions of a byte that stays the same, kNever where it does not; and its value.
+  double constant(std::size_t at) const { return constant_[at % stretch_.period]; }
+  unsigned char usual(std::size_t at) const { return usual_[at % stretch_.period]; }
+  /// Counters, clocks, constants and bytes of no known meaning that begin at a byte of the period.
+  const std::vector<FieldFound>& fields(std::size_t at) const { return fields_[at % stretch_.period]; }
+  /// Whether a checksum of this kind at byte `end` of the period is right for the bytes from `begin` on.
+  bool is_checksum(const std::string& kind, bool big_endian, std::size_t begin, std::size_t end) const;
+  const Stretch& stretch() const { return stretch_; }
+
+ private:
+  const unsigned char* at(std::size_t row, std::size_t column) const {
+    return &bytes_[stretch_.begin + row * stretch_.period + column];
+  }
+  void find_constants();
+  void find_values();
+  void find_fields(double seconds);
+  void add_counter(std::size_t column, std::size_t width, bool big_endian, double seconds);
+
+  Bytes bytes_;
+  Stretch stretch_;
+  std::size_t steps_;  // from row to row
+  std::vector<double> constant_;
+  std::vector<unsigned char> usual_;
+  std::vector<Values> values_;
+  std::vector<std::vector<FieldFound>> fields_;
+};
+
+}  // namespace supertac
