@@ -65,9 +65,9 @@ std::optional<SafetensorsFile> pairs_of(const std::string& input) {
 }
 
 int convert_pairs(const Arguments& arguments, const SafetensorsFile& file) {
-  refuse_others(
-      arguments, "a file of pairs is converted as it is",
-      {"speed", "pictures", "skip-bad", "columns", "plate", "positions", "truth", "truth-range", "group"});
+  refuse_others(arguments, "a file of pairs is converted as it is",
+                {"speed", "pictures", "skip-bad", "columns", "plate", "positions", "truth", "truth-times",
+                 "truth-range", "group"});
   std::optional<Sensor> sensor;
   if (arguments.given("sensor")) sensor = read_sensor(arguments.text("sensor"));
   const std::vector<Recording> recordings = import_pairs(file, sensor);

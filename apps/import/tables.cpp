@@ -157,7 +157,7 @@ struct TableImport {
       add_positions(recording, log, read_table(log), map.time_unit_s);
     if (over) check_places(path, recording);
     if (const std::string images = companion(arguments, "truth", file); !images.empty())
-      read_truth(recording, images);
+      read_truth(recording, images, companion(arguments, "truth-times", file));
     const bool registers = plate || (over && !over->crests().empty());
     if (registers && recording.position_mm.empty() && recording.truth.empty()) {
       recording.speed_mm_s = speed_mm_s;
@@ -168,25 +168,21 @@ struct TableImport {
   }
 
   /// Images for each frame, or a film with a clock of its own.
-  void read_truth(Recording& recording, const std::string& path) const {
-    constexpr double kSure = 4, kLeastS = 0.02;
+  void read_truth(Recording& recording, const std::string& path, const std::string& times_path) const {
     Table film = read_table(path);
-    if (film.shape.size() == 1) {
-      const std::vector<double> times = take_film_times(path, film, recording.array);
-      const FilmClock clock = add_film(recording, path, film, times, truth_range[0], truth_range[1]);
-      arguments.note(path + ": " + clock.text());
-      return;
+    const bool table = film.shape.size() == 1;
+    if (table && !times_path.empty()) throw FileError(path, "has times of its own; leave --truth-times out");
+    std::optional<FilmClock> clock;
+    if (table || !times_path.empty()) {
+      const std::vector<double> times = table ? take_film_times(path, film, recording.array)
+                                              : film_times(times_path, read_table(times_path), film);
+      clock = add_film(recording, path, film, times, truth_range[0], truth_range[1]);
+    } else {
+      add_truth(recording, path, film, truth_range[0], truth_range[1]);
+      clock = put_in_time(recording);
+      if (clock) arguments.note("warning: " + path + " shows touches at other times than the signals: moved");
     }
-    add_truth(recording, path, film, truth_range[0], truth_range[1]);
-    const auto clock = clock_of_truth(recording);
-    if (!clock || recording.time_s.empty()) return;
-    const double middle = (recording.time_s.front() + recording.time_s.back()) / 2;
-    const double lag = middle - clock->sensor_s(middle);
-    if (std::abs(lag) > std::max(kLeastS, kSure * clock->offset_deviation_s))
-      arguments.note(
-          "warning: " + path + " shows touches " + format(std::abs(lag), 3) + " +- " +
-          format(clock->offset_deviation_s, 3) + " s " + (lag > 0 ? "later" : "earlier") +
-          " than the signals; give the film as a table with a time column of its own, which moves it");
+    if (clock) arguments.note(path + ": " + clock->text());
   }
 
   const Arguments& arguments;
@@ -240,6 +236,10 @@ void declare_tables(Arguments& arguments) {
           "truth", "FILE",
           "what a finer sensor saw: an array [frames,height,width] (.npy), or a table of a time (s) and the "
           "pixels of an image in a row, whose clock is found from the signals; or a folder of them")
+      .option("truth-times", "FILE",
+              "of --truth FILE.npy: a table with the time of each image (s), by a clock of its own, which is "
+              "found "
+              "from the signals; or a folder of them")
       .option("truth-range", "LOW,HIGH", "what is 0 and what is 1 in --truth", "0,1")
       .option("group", "GROUP", "person, object or day, for split group; default: the folder's name")
       .only_with("");

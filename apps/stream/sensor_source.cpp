@@ -68,7 +68,7 @@ class BoardSource : public SensorSource {
 class ReaderSource : public SensorSource {
  public:
   ReaderSource(OpenedPort opened, const Sensor& sensor, double speedup = 1)
-      : SensorSource(1 / sensor.rate_hz, 0, opened.live, sensor.array, sensor.scale, sensor.silent()),
+      : SensorSource(1 / sensor.rate_hz, 0, opened.live, sensor),
         speedup_(speedup),
         reader_(std::move(opened), sensor) {}
 
@@ -92,8 +92,10 @@ class ReaderSource : public SensorSource {
 class RecordingSource : public SensorSource {
  public:
   explicit RecordingSource(Recording recording)
-      : SensorSource(recording.period_s(), recording.filter_s(), false, recording.array,
-                     recording.signal_scale),
+      : SensorSource(recording.period_s(), recording.filter_s(), false,
+                     {.array = recording.array,
+                      .scale = recording.signal_scale,
+                      .body = recording.body.value_or(Body::usual(recording.array))}),
         recording_(std::move(recording)) {}
 
   std::optional<SensorFrame> next(double) override {
@@ -122,6 +124,12 @@ class RecordingSource : public SensorSource {
 };
 
 }  // namespace
+
+SensorSource::SensorSource(double period_s, double filter_s, bool live)
+    : period_s_(period_s), filter_s_(filter_s), live_(live) {}
+
+SensorSource::SensorSource(double period_s, double filter_s, bool live, const Sensor& sensor)
+    : period_s_(period_s), filter_s_(filter_s), live_(live), sensor_(sensor) {}
 
 double SensorSource::arrived_s(double port_s, double speedup) const {
   return live_ ? port_s / speedup : monotonic_seconds();

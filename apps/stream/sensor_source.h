@@ -39,31 +39,26 @@ class SensorSource {
 
   double period_s() const { return period_s_; }  ///< between two frames
   double filter_s() const { return filter_s_; }  ///< moving average the frames have gone through already
-  const TaxelArray& array() const { return array_; }
-  const SignalScale& signal_scale() const { return signal_scale_; }
+  /// What sends the frames, as far as it is known: of a recording its array, scale and body.
+  const Sensor& sensor() const { return sensor_; }
+  const TaxelArray& array() const { return sensor_.array; }
+  const SignalScale& signal_scale() const { return sensor_.scale; }
   /// Taxels that say nothing: their signals are made of those around them.
-  const std::vector<int>& silent() const { return silent_; }
+  std::vector<int> silent() const { return sensor_.silent(); }
   /// It waits for nobody: when frames are not taken in time they are lost.
   bool live() const { return live_; }
 
  protected:
-  SensorSource(double period_s, double filter_s, bool live, const TaxelArray& array = {},
-               const SignalScale& signal_scale = {}, std::vector<int> silent = {})
-      : period_s_(period_s),
-        filter_s_(filter_s),
-        live_(live),
-        array_(array),
-        signal_scale_(signal_scale),
-        silent_(std::move(silent)) {}
+  /// Of the rig, or of `sensor`.
+  SensorSource(double period_s, double filter_s, bool live);
+  SensorSource(double period_s, double filter_s, bool live, const Sensor& sensor);
   /// Of a frame of a port whose clock is `speedup` times as fast; what is not live arrives as it is taken.
   double arrived_s(double port_s, double speedup) const;
 
  private:
   double period_s_, filter_s_;
   bool live_;
-  TaxelArray array_;
-  SignalScale signal_scale_;
-  std::vector<int> silent_;
+  Sensor sensor_;
 };
 
 /// What the opened `port` sends within `seconds`.

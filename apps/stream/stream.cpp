@@ -81,9 +81,11 @@ Stream::Stream(const StreamSettings& settings, std::span<const ModelFile> models
 void Stream::describe_recording() {
   Recording about;
   about.array = source_.array(), about.signal_scale = source_.signal_scale();
+  about.body = source_.sensor().body;
   about.plate = std::filesystem::path(settings_.plate).filename().string();
   about.trial = 1, about.source = "streamed";
   if (source_.filter_s() > 0) about.metadata["filter_s"] = format(source_.filter_s());
+  if (!source_.sensor().rest.empty()) about.metadata["rest"] = nlohmann::json(source_.sensor().rest).dump();
   if (!source_.silent().empty()) about.metadata["silent_taxels"] = nlohmann::json(source_.silent()).dump();
   about.metadata["origin"] = settings_.source;
   if (!settings_.record.empty()) {

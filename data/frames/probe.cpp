@@ -6,8 +6,10 @@
 #include <functional>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "data/frames/sensor_decoder.h"
+#include "data/sensors/touch_rests.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 
@@ -26,9 +28,8 @@ constexpr double kPressedNoise = 6, kPressedShare = 0.2, kStrong = 0.9, kLeastGa
 // What was known of a sensor stays where nothing says more than that.
 void look_at_signals(Sensor& draft, const HeardFrames& frames, const std::optional<Sensor>& known,
                      std::vector<std::string>& says) {
-  std::vector<double> rests, moving, noises;
+  std::vector<double> noises, above, below;  // of each signal's median
   std::vector<int> still;
-  double up = 0, down = 0;
   bool whole = true;
   const auto channels = static_cast<std::size_t>(draft.array.channels);
   for (std::size_t k = 0; k < frames.signals.size(); ++k) {
@@ -39,12 +40,20 @@ void look_at_signals(Sensor& draft, const HeardFrames& frames, const std::option
     whole = whole && std::ranges::all_of(values, [](float v) { return v == std::round(v); });
     const auto [low, high] = std::ranges::minmax(values);
     if (low == high && k % channels == 0) still.push_back(static_cast<int>(k / channels));
-    const double rest = double{median(values)};
-    if (low < high) moving.push_back(rest);
-    rests.push_back(rest), noises.push_back(steps.empty() ? 0 : quantile(steps, 0.75));
-    up = std::max(up, double{high} - rest), down = std::max(down, rest - double{low});
+    const float middle = median(values);
+    noises.push_back(steps.empty() ? 0 : quantile(steps, 0.75));
+    above.push_back(double{high} - double{middle}), below.push_back(double{middle} - double{low});
   }
-  std::vector<double> sorted = rests;
+  // A taxel may be pressed for most of the time: the array as a whole says which way pressing goes.
+  const bool upwards = std::reduce(above.begin(), above.end()) >= std::reduce(below.begin(), below.end());
+  const std::vector<double> rests = rests_between_touches(frames.signals, draft.array.channels, upwards);
+  double strongest = 0;
+  std::vector<double> moving, sorted = rests;
+  for (std::size_t k = 0; k < rests.size(); ++k) {
+    const auto [low, high] = std::ranges::minmax(frames.signals[k]);
+    if (low < high) moving.push_back(rests[k]);
+    strongest = std::max(strongest, upwards ? double{high} - rests[k] : rests[k] - double{low});
+  }
   const double rest = median(sorted), noise = std::max(median(noises), whole ? 1.0 : 1e-6 * std::abs(rest));
   const auto [lowest, highest] = std::ranges::minmax(rests);
   const double uneven = moving.empty() ? 0 : std::ranges::max(moving) - std::ranges::min(moving);
@@ -54,8 +63,8 @@ void look_at_signals(Sensor& draft, const HeardFrames& frames, const std::option
                  (known   ? ""
                   : whole ? "; whole numbers, called counts"
                           : "; set \"unit\""));
-  const bool pressed = std::max(up, down) > kPressed * noise, rises = up >= down || !pressed;
-  const double most = pressed ? 1.1 * std::max(up, down) : std::max(20 * noise, 0.1 * std::abs(rest));
+  const bool pressed = strongest > kPressed * noise, rises = upwards || !pressed;
+  const double most = pressed ? 1.1 * strongest : std::max(20 * noise, 0.1 * std::abs(rest));
   if (known && !pressed) {
     draft.scale = known->scale;
   } else {
@@ -67,7 +76,7 @@ void look_at_signals(Sensor& draft, const HeardFrames& frames, const std::option
                    " apart: \"rest\" moves each to the median; probe again when they have drifted");
   }
   says.push_back(pressed ? std::string("pressing ") + (rises ? "raises" : "lowers") +
-                               " the signals, by up to " + format(std::max(up, down), 3)
+                               " the signals, by up to " + format(strongest, 3)
                  : known
                      ? "nothing was pressed: \"pressed\" and \"range\" stay as the file has them"
                      : "nothing was pressed: \"pressed\": \"higher\" and the range are assumed; probe again "
@@ -161,11 +170,11 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
   for (const Heard& chunk : heard) bytes += chunk.bytes;
   const double seconds = heard.empty() ? 0 : heard.back().time_s - heard.front().time_s;
   report.says.push_back("heard " + std::to_string(bytes.size()) + " bytes in " + format(seconds, 1) + " s");
-  Sensor draft;  // the rig, until then
-  draft.port = port;
-  if (!bytes.empty() && frames_of(draft, heard).frame_bytes > kMostly * static_cast<double>(bytes.size())) {
+  Sensor rig;
+  rig.port = port;
+  if (!bytes.empty() && frames_of(rig, heard).frame_bytes > kMostly * static_cast<double>(bytes.size())) {
     report.says.push_back("frames of the rig's board");
-    report.draft = draft;
+    report.draft = rig;
     return report;
   }
   // A description that reads what came knows more than what can be guessed.
@@ -173,9 +182,8 @@ ProbeReport probe(std::span<const Heard> heard, const std::string& port, const s
                      frames_of(*known, heard).frame_bytes > kMostly * static_cast<double>(bytes.size());
   const auto found = reads ? std::optional(FoundFormat{known->frame, known->array, "", {}})
                            : candidate_of(bytes, heard, known, report.says);
-  draft.name = "probed sensor";
-  if (known) draft.name = known->name, draft.order = known->order;
-  if (known) draft.dead = known->dead, draft.gain = known->gain, draft.follow_rest_s = known->follow_rest_s;
+  Sensor draft = known.value_or(Sensor{.name = "probed sensor", .body = {}});
+  draft.port = port, draft.rest.clear();
   if (!found) return report;
   const std::size_t values = reads ? known->values() : found->array.signals();
   if (known && known->values() != values) {

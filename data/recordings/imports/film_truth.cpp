@@ -35,6 +35,36 @@ void keep_only(std::vector<Value>& values, std::size_t each, const std::vector<s
   values.resize(frames.size() * each);
 }
 
+void check_times(const std::string& path, std::span<const double> times) {
+  for (std::size_t r = 0; r < times.size(); ++r)
+    if (!std::isfinite(times[r]) || (r > 0 && times[r] <= times[r - 1]))
+      throw FileError(path, "has times that do not increase, in row " + std::to_string(r));
+}
+
+// Each frame's truth from the images before and after it; frames that the film did not see are left out.
+void show(const Recording& film, const FilmClock& clock, Recording& recording) {
+  const std::size_t pixels = film.truth.size() / std::max<std::size_t>(1, film.frames());
+  std::vector<std::size_t> seen;
+  recording.truth.clear();
+  recording.truth_height = film.truth_height, recording.truth_width = film.truth_width;
+  for (std::size_t i = 0; i < recording.frames(); ++i) {
+    const double t = (recording.time_s[i] - clock.offset_s) / clock.rate;
+    const auto after = std::ranges::upper_bound(film.time_s, t);
+    if (after == film.time_s.begin() || after == film.time_s.end()) continue;
+    seen.push_back(i);
+    const auto k = static_cast<std::size_t>(after - film.time_s.begin()) - 1;
+    const auto share = static_cast<float>((t - film.time_s[k]) / (film.time_s[k + 1] - film.time_s[k]));
+    for (std::size_t p = 0; p < pixels; ++p)
+      recording.truth.push_back(
+          std::lerp(film.truth[k * pixels + p], film.truth[(k + 1) * pixels + p], share));
+  }
+  keep_only(recording.volts, recording.array.signals(), seen);
+  keep_only(recording.position_mm, 2, seen);
+  keep_only(recording.lift_mm, 1, seen);
+  keep_only(recording.time_s, 1, seen);
+  recording.metadata["truth_clock"] = clock.text();
+}
+
 }  // namespace
 
 std::vector<double> take_film_times(const std::string& path, Table& film, const TaxelArray& array) {
@@ -47,11 +77,10 @@ std::vector<double> take_film_times(const std::string& path, Table& film, const 
     for (std::size_t r = 0; r < film.rows(); ++r) {
       const auto row = film.row(r);
       times.push_back(row[column]);
-      if (!std::isfinite(times.back()) || (r > 0 && times[r] <= times[r - 1]))
-        throw FileError(path, "has times that do not increase, in row " + std::to_string(r));
       for (std::size_t c = 0; c < row.size(); ++c)
         if (c != column) values.push_back(row[c]);
     }
+    check_times(path, times);
     film.values = std::move(values), film.columns = pixels;
     film.shape = {static_cast<std::size_t>(array.rows * scale),
                   static_cast<std::size_t>(array.columns * scale)};
@@ -63,47 +92,56 @@ std::vector<double> take_film_times(const std::string& path, Table& film, const 
                       array.text());
 }
 
+std::vector<double> film_times(const std::string& path, const Table& times, const Table& images) {
+  const bool named = std::ranges::find(times.names, "time") != times.names.end();
+  if (!named && times.columns != 1)
+    throw FileError(
+        path, "has " + std::to_string(times.columns) + " columns, expected one of times, or a name: time");
+  std::vector<double> film_s;
+  for (std::size_t r = 0; r < times.rows(); ++r)
+    film_s.push_back(times.row(r)[named ? times.column("time") : 0]);
+  check_times(path, film_s);
+  if (film_s.size() != images.rows())
+    throw FileError(path, "holds " + std::to_string(film_s.size()) + " times, expected one for each of " +
+                              std::to_string(images.rows()) + " images");
+  return film_s;
+}
+
 FilmClock add_film(Recording& recording, const std::string& path, const Table& images,
                    const std::vector<double>& film_s, double low, double high) {
   Recording film;
   film.time_s = film_s;
   add_truth(film, path, images, low, high);
-  FilmClock clock;
   try {
-    clock = find_film_clock({recording.time_s, loads_of(recording)}, {film_s, truth_loads_of(film)});
+    const FilmClock clock =
+        find_film_clock({recording.time_s, loads_of(recording)}, {film_s, truth_loads_of(film)});
+    show(film, clock, recording);
+    return clock;
   } catch (const std::runtime_error& error) {
     throw FileError(path, error.what());
   }
-  const std::size_t pixels = images.columns;
-  std::vector<std::size_t> seen;
-  recording.truth.clear();
-  recording.truth_height = film.truth_height, recording.truth_width = film.truth_width;
-  for (std::size_t i = 0; i < recording.frames(); ++i) {
-    const double t = (recording.time_s[i] - clock.offset_s) / clock.rate;
-    const auto after = std::ranges::upper_bound(film_s, t);
-    if (after == film_s.begin() || after == film_s.end()) continue;
-    seen.push_back(i);
-    const auto k = static_cast<std::size_t>(after - film_s.begin()) - 1;
-    const auto share = static_cast<float>((t - film_s[k]) / (film_s[k + 1] - film_s[k]));
-    for (std::size_t p = 0; p < pixels; ++p)
-      recording.truth.push_back(
-          std::lerp(film.truth[k * pixels + p], film.truth[(k + 1) * pixels + p], share));
-  }
-  keep_only(recording.volts, recording.array.signals(), seen);
-  keep_only(recording.position_mm, 2, seen);
-  keep_only(recording.lift_mm, 1, seen);
-  keep_only(recording.time_s, 1, seen);
-  recording.metadata["truth_clock"] = clock.text();
-  return clock;
 }
 
-std::optional<FilmClock> clock_of_truth(const Recording& recording) {
+std::optional<FilmClock> clock_of_truth(const Recording& recording, std::span<const double> time_s) {
   try {
-    return find_film_clock({recording.time_s, loads_of(recording)},
-                           {recording.time_s, truth_loads_of(recording)});
+    return find_film_clock({time_s, loads_of(recording)}, {time_s, truth_loads_of(recording)});
   } catch (const std::runtime_error&) {
     return std::nullopt;  // too few touches, or none that agree: nothing is known
   }
+}
+
+std::optional<FilmClock> put_in_time(Recording& recording) {
+  constexpr double kSure = 4, kLeastS = 0.02;
+  const auto clock = clock_of_truth(recording, recording.time_s);
+  if (!clock) return std::nullopt;
+  const double middle = (recording.time_s.front() + recording.time_s.back()) / 2;
+  if (std::abs(middle - clock->sensor_s(middle)) <= std::max(kLeastS, kSure * clock->offset_deviation_s))
+    return std::nullopt;
+  Recording film;
+  film.time_s = recording.time_s, film.truth = std::move(recording.truth);
+  film.truth_height = recording.truth_height, film.truth_width = recording.truth_width;
+  show(film, *clock, recording);
+  return clock;
 }
 
 }  // namespace supertac

@@ -15,6 +15,8 @@ namespace supertac {
 /// an image 2, 4, 8 or 16 times as fine as the array, row after row; the table then is of images. Throws
 /// FileError.
 std::vector<double> take_film_times(const std::string& path, Table& film, const TaxelArray& array);
+/// The times of `images` from a table of their own: its column "time", or its only one. Throws FileError.
+std::vector<double> film_times(const std::string& path, const Table& times, const Table& images);
 
 /// Sets the truth from images that were taken at `film_s` (s, ascending) by another clock than the sensor's:
 /// finds that clock (find_film_clock) from the sum of all loads against the sum of all pixels, takes each
@@ -23,8 +25,12 @@ std::vector<double> take_film_times(const std::string& path, Table& film, const 
 FilmClock add_film(Recording& recording, const std::string& path, const Table& images,
                    const std::vector<double>& film_s, double low, double high);
 
-/// Of a truth that has an image for each frame: how much later it shows what the signals show, where that can
-/// be told.
-std::optional<FilmClock> clock_of_truth(const Recording& recording);
+/// Of a truth that has an image for each frame (add_truth): how much later it shows what the signals show,
+/// with frames at `time_s`; nothing where that cannot be told.
+std::optional<FilmClock> clock_of_truth(const Recording& recording, std::span<const double> time_s);
+
+/// Moves a truth of clock_of_truth() that comes more than 20 ms, and four deviations, late or early, as
+/// add_film() would have, and returns its clock; else nothing changes.
+std::optional<FilmClock> put_in_time(Recording& recording);
 
 }  // namespace supertac

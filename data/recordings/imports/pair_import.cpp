@@ -3,6 +3,7 @@
 #include <cstring>
 #include <map>
 
+#include "data/recordings/imports/film_truth.h"
 #include "data/recordings/imports/table_import.h"
 #include "io/files/file.h"
 #include "io/numbers/numbers.h"
@@ -82,6 +83,24 @@ std::map<std::string, std::vector<std::size_t>> groups_of(const SafetensorsFile&
   return groups;
 }
 
+// Refuses targets that show touches at other frames than the inputs. How fast frames came is not known: as if
+// 50 in a second.
+void check_lag(const SafetensorsFile& file, const std::string& group, const Recording& recording) {
+  constexpr double kFrameS = 0.02, kLeastFrames = 1.5, kSure = 4;
+  std::vector<double> time_s;
+  for (std::size_t i = 0; i < recording.frames(); ++i) time_s.push_back(kFrameS * static_cast<double>(i));
+  const auto clock = clock_of_truth(recording, time_s);
+  if (!clock) return;
+  const double middle = time_s.back() / 2, frames = (middle - clock->sensor_s(middle)) / kFrameS,
+               deviation = clock->offset_deviation_s / kFrameS;
+  if (std::abs(frames) <= std::max(kLeastFrames, kSure * deviation)) return;
+  throw FileError(file.path(), (group.empty() ? "" : "group " + group + ": ") + "target shows touches " +
+                                   format(std::abs(frames), 1) + " +- " + format(deviation, 1) + " frames " +
+                                   (frames > 0 ? "later" : "earlier") +
+                                   " than input; pair each input with its own target, or import frames as a "
+                                   "table and the film with its times (--truth)");
+}
+
 }  // namespace
 
 std::vector<Recording> import_pairs(const SafetensorsFile& file, const std::optional<Sensor>& sensor) {
@@ -121,6 +140,7 @@ std::vector<Recording> import_pairs(const SafetensorsFile& file, const std::opti
       const auto truth = std::span(targets).subspan(i * pixels, pixels);
       recording.truth.insert(recording.truth.end(), truth.begin(), truth.end());
     }
+    check_lag(file, name, recording);
     recordings.push_back(std::move(recording));
   }
   return recordings;

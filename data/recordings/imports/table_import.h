@@ -49,7 +49,8 @@ void add_truth(Recording& recording, const std::string& path, const Table& image
 /// digits as the longest; without groups there is one, and its plate is "pairs". The times of the frames are
 /// unknown: they are set one second apart, and there is no trial. `sensor` says what the numbers mean;
 /// without it pressing raises them, from the lowest value of the file to the highest, and taxels are 1 mm
-/// apart. Throws FileError naming the tensor, what was expected and found.
+/// apart. Throws FileError naming the tensor, what was expected and found; also where the targets of a group
+/// show touches at other frames than its inputs do.
 std::vector<Recording> import_pairs(const SafetensorsFile& file, const std::optional<Sensor>& sensor = {});
 
 }  // namespace supertac

@@ -7,6 +7,8 @@
 #include <stdexcept>
 
 #include "data/recordings/presses/presses.h"
+#include "data/sensors/touch_rests.h"
+#include "io/files/json.h"
 #include "io/numbers/median.h"
 #include "io/numbers/numbers.h"
 #include "io/numbers/parallel.h"
@@ -17,7 +19,7 @@
 namespace supertac {
 namespace {
 
-constexpr double kSeconds = 30, kPenalty = 0.3, kMostUnlike = 6, kMostOfPrior = 0.6, kLeastNoise = 2e-4;
+constexpr double kSeconds = 30, kPenalty = 0.3, kMostUnlike = 8, kMostOfPrior = 0.6, kLeastNoise = 2e-4;
 constexpr std::size_t kNearest = 60;
 
 // A number of a body as it is regressed: drawn evenly in this form, and back.
@@ -61,23 +63,37 @@ void invert(std::vector<double>& a, std::size_t d) {
   }
 }
 
-// Rest of each signal, and the noise as a share of the range: from the level that most frames keep, and from
-// steps between neighbouring frames around it.
+// The rests that were taken away when the touches were recorded: since then the sensor's file may have got
+// those of a fit.
+std::vector<float> rests_before(const Recording& r, const Sensor& sensor) {
+  std::vector<float> rests = sensor.rest;
+  if (const auto found = r.metadata.find("rest"); found != r.metadata.end()) {
+    rests.clear();
+    for (const auto& rest : parse_json_limited(found->second))
+      if (rest.is_number()) rests.push_back(rest.get<float>());
+  }
+  if (rests.size() != sensor.array.signals())
+    rests.assign(sensor.array.signals(), static_cast<float>(sensor.scale.rest));
+  return rests;
+}
+
+// Rest of each signal between touches, and the noise as a share of the range, from the steps between
+// neighbouring frames.
 void measure(const Recording& r, Sensor& sensor) {
   const std::size_t signals = sensor.array.signals();
   std::vector<double> noises;
+  std::vector<std::vector<float>> all(signals);
+  for (std::size_t i = 0; i < r.volts.size(); ++i) all[i % signals].push_back(r.volts[i]);
+  const std::vector<double> levels = rests_between_touches(all, sensor.array.channels, sensor.scale.span < 0);
+  const std::vector<float> before = rests_before(r, sensor);
   std::vector<float> rest;
   for (std::size_t s = 0; s < signals; ++s) {
-    std::vector<double> all, steps;
-    for (std::size_t f = 0; f < r.frames(); ++f) {
-      all.push_back(double{r.volts[f * signals + s]});
-      if (f > 0) steps.push_back(std::abs(all.back() - double{r.volts[(f - 1) * signals + s]}));
-    }
+    std::vector<double> steps;
+    for (std::size_t f = 1; f < all[s].size(); ++f)
+      steps.push_back(std::abs(double{all[s][f]} - double{all[s][f - 1]}));
     noises.push_back(quantile(steps, 0.25) / (0.3186 * std::sqrt(2.0)) / std::abs(sensor.scale.span));
-    const double level = median(all);
     const double gain = sensor.gain.empty() ? 1 : double{sensor.gain[s]};
-    const double from = sensor.rest.empty() ? sensor.scale.rest : double{sensor.rest[s]};
-    rest.push_back(static_cast<float>(from + (level - sensor.scale.rest) / gain));
+    rest.push_back(static_cast<float>(double{before[s]} + (levels[s] - sensor.scale.rest) / gain));
   }
   if (sensor.array.channels == 1) sensor.rest = rest;
   sensor.body.noise = std::max(kLeastNoise, median(noises));
@@ -208,6 +224,10 @@ BodyFitter::BodyFitter(const Sensor& sensor, std::uint64_t seed) : sensor_(senso
     if (!statistics[i].empty())
       std::swap(statistics[kept], statistics[i]), std::swap(forms[kept++], forms[i]);
   statistics.resize(kept), forms.resize(kept);
+  if (4 * kept < kSimulations)
+    throw std::runtime_error("a body cannot be fitted to " + format(sensor.rate_hz) +
+                             " frames a second: of half a minute too few would be touched; leave the fit "
+                             "out, and presses are simulated of bodies as different as arrays are");
   regression_ = std::make_unique<const Regression>(statistics, forms);
 }
 
@@ -244,7 +264,6 @@ BodyFit BodyFitter::operator()(const Recording& touches) const {
   creep.told = creep_s.told = creep.told && creep_s.told;
   for (std::size_t k = 0; k < kNumbers; ++k) {
     const FittedNumber& number = fit.numbers[k];
-    if (!number.told) continue;
     kForms[k].set(fit.sensor.body, std::clamp(predicted[k], kForms[k].least, kForms[k].most), pitch);
     fit.sensor.body.uncertainty[number.key] = number.deviation;
   }

@@ -38,15 +38,17 @@ struct BodyFit {
 class BodyFitter {
  public:
   static constexpr int kSimulations = 480;
+  /// Throws std::runtime_error where half a minute of its frames has too few of a touch.
   BodyFitter(const Sensor& sensor, std::uint64_t seed);
   ~BodyFitter();
   BodyFitter(const BodyFitter&) = delete;
   BodyFitter& operator=(const BodyFitter&) = delete;
   /// Applies this to touches of the sensor. The deviation is that of the nearest simulated bodies, each left
   /// out of its own regression; a number whose deviation is over .6 of what was drawn could not be told, and
-  /// stays as it was. Noise and rests are measured. Gains cannot be told from single touches (supertac-stream
-  /// --probe --gain). Throws std::runtime_error when there is too little touch, or one that no simulated body
-  /// shows (unlike > 6).
+  /// is kept with that deviation, so that simulations vary it as arrays differ. Noise and rests are measured,
+  /// the rests from those that the recording was made with (metadata "rest"). Gains cannot be told from
+  /// single touches (supertac-stream --probe --gain). Throws std::runtime_error when there is too little
+  /// touch, or one that no simulated body shows (unlike > 8).
   BodyFit operator()(const Recording& touches) const;
 
  private:

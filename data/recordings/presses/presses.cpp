@@ -73,14 +73,14 @@ Field field_of(const TaxelArray& array, int scale, double sigma_mm) {
 class Press {
  public:
   // The scene goes `pace` times as fast as usually.
-  Press(const Sensor& sensor, const Presses& presses, const RandomStream& random,
+  Press(const Sensor& sensor, const Scene::Objects& objects, int scale, const RandomStream& random,
         const RandomStream& of_scene, double pace = 1)
       : sensor_(sensor),
         body_(drawn(sensor.body, sensor.array, random)),
         random_(random),
-        scene_(presses.kind, sensor.array, of_scene),
-        sigma_(std::max(body_.sigma_mm(), kMarginSigmas / 10 * sensor.array.pitch_mm.x / presses.scale)),
-        field_(field_of(sensor.array, presses.scale, sigma_)),
+        scene_(objects, sensor.array, of_scene),
+        sigma_(std::max(body_.sigma_mm(), kMarginSigmas / 10 * sensor.array.pitch_mm.x / scale)),
+        field_(field_of(sensor.array, scale, sigma_)),
         across_(sensor.array.columns, sensor.array.pitch_mm.x, field_.columns, field_.left_mm,
                 field_.cell_x_mm, sigma_),
         along_(sensor.array.rows, sensor.array.pitch_mm.y, field_.rows, field_.top_mm, field_.cell_y_mm,
@@ -179,7 +179,7 @@ Recording simulate_presses(const Sensor& sensor, const Presses& presses, std::ui
     const std::uint64_t stream =
         stream_of("press/" + presses.kind + "/" + std::to_string(presses.number) + "/" + std::to_string(i));
     const RandomStream random(seed, stream);
-    Press press(sensor, presses, random, RandomStream(seed, stream + 1));
+    Press press(sensor, {presses.kind}, scale, random, RandomStream(seed, stream + 1));
     std::vector<double> times;
     for (std::uint64_t f = 0; f < kFramesOfAPress; ++f)
       times.push_back(Scene::kSeconds * (static_cast<double>(f) + 0.1 + 0.9 * random.uniform(kTimes + f)) /
@@ -194,18 +194,22 @@ Recording simulate_presses(const Sensor& sensor, const Presses& presses, std::ui
 
 Recording simulate_touching(const Sensor& sensor, double seconds, std::uint64_t seed) {
   constexpr double kFastestHz = 40, kShortest = 0.4, kLongest = 2.5, kLeastGap = 0.3, kMostGap = 0.8;
+  constexpr double kMostSmallest = 0.5, kLeastRange = 0.1;
   enum Draw : std::uint64_t { kLength = 90, kGap, kByHand };
   Recording recording;
   recording.array = sensor.array, recording.body = sensor.body, recording.signal_scale = sensor.scale;
   recording.plate = "touched", recording.trial = recording.pass = 1, recording.source = "simulated";
   const double period = 1 / std::min(sensor.rate_hz, kFastestHz);
+  const RandomStream of_all(seed, stream_of("touching"));
+  Scene::Objects objects{.smallest = kMostSmallest * of_all.uniform(0)};
+  objects.largest = std::lerp(objects.smallest + kLeastRange, 1.0, of_all.uniform(1));
   double begin = 0;
   for (std::uint64_t i = 0; begin < seconds; ++i) {
     const RandomStream random(seed, stream_of("touch") + 2 * i);
     const double length = kShortest * same_bits::pow(kLongest / kShortest, random.uniform(kLength));
     const double end = begin + length + std::lerp(kLeastGap, kMostGap, random.uniform(kGap));
-    const Presses by{.kind = random.uniform(kByHand) < 0.5 ? "fingertip" : "mixed", .scale = 2};
-    Press press(sensor, by, random, RandomStream(seed, stream_of("touch") + 2 * i + 1),
+    objects.kind = random.uniform(kByHand) < 0.5 ? "fingertip" : "mixed";
+    Press press(sensor, objects, 2, random, RandomStream(seed, stream_of("touch") + 2 * i + 1),
                 Scene::kSeconds / length);
     for (; period * static_cast<double>(recording.frames()) < std::min(end, seconds);) {
       const double t = period * static_cast<double>(recording.frames());

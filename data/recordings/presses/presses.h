@@ -33,7 +33,8 @@ constexpr int kFramesOfAPress = 6;
 Recording simulate_presses(const Sensor& sensor, const Presses& presses, std::uint64_t seed);
 
 /// Somebody presses here and there for so long: scenes as of simulate_presses(), of 0.4 to 2.5 s, at the
-/// sensor's rate. No truth. Deterministic in (sensor, seconds, seed).
+/// sensor's rate, by objects of a range of sizes that is drawn once: who has thick fingers keeps them. No
+/// truth. Deterministic in (sensor, seconds, seed).
 Recording simulate_touching(const Sensor& sensor, double seconds, std::uint64_t seed);
 
 }  // namespace supertac

@@ -63,11 +63,11 @@ double distance_to_stroke(const double* stroke, double x, double y) {
 
 const std::vector<std::string>& press_kinds() { return kKinds; }
 
-Scene::Scene(const std::string& kind, const TaxelArray& array, const RandomStream& random) {
-  const auto found = std::ranges::find(kKinds, kind);
+Scene::Scene(const Objects& objects, const TaxelArray& array, const RandomStream& random) {
+  const auto found = std::ranges::find(kKinds, objects.kind);
   if (found == kKinds.end())
     throw std::invalid_argument("presses: expected a kind of object (" + joined(kKinds, ", ") + "), got " +
-                                in_quotes(kind));
+                                in_quotes(objects.kind));
   const auto named = static_cast<int>(found - kKinds.begin());
   const double u = random.uniform(kCount);
   const auto count = static_cast<std::uint64_t>(std::ranges::upper_bound(kCounts, u) - kCounts.begin());
@@ -76,12 +76,12 @@ Scene::Scene(const std::string& kind, const TaxelArray& array, const RandomStrea
     const int one = named == kMixed
                         ? static_cast<int>(random.uniform(first + kOfKind) * static_cast<int>(kMixed))
                         : named;
-    contacts_.push_back(draw(one, array, random, first));
+    contacts_.push_back(draw(one, objects, array, random, first));
   }
 }
 
-Scene::Contact Scene::draw(int kind, const TaxelArray& array, const RandomStream& random,
-                           std::uint64_t first) {
+Scene::Contact Scene::draw(int kind, const Objects& objects, const TaxelArray& array,
+                           const RandomStream& random, std::uint64_t first) {
   const auto uniform = [&](std::uint64_t number) { return random.uniform(first + number); };
   const double pitch = std::sqrt(array.pitch_mm.x * array.pitch_mm.y);
   const double width = array.columns * array.pitch_mm.x, height = array.rows * array.pitch_mm.y;
@@ -90,7 +90,8 @@ Scene::Contact Scene::draw(int kind, const TaxelArray& array, const RandomStream
   c.kind = kind;
   c.x_mm = width * (uniform(kX) - 0.5), c.y_mm = height * (uniform(kY) - 0.5);
   c.cosine = same_bits::cosine(uniform(kTurn)), c.sine = same_bits::sine(uniform(kTurn));
-  c.size_mm = std::lerp(kSmallest * pitch, largest, uniform(kSize));
+  c.size_mm =
+      std::lerp(kSmallest * pitch, largest, std::lerp(objects.smallest, objects.largest, uniform(kSize)));
   c.other_mm = std::lerp(kSmallest * pitch / 2, c.size_mm, uniform(kOther) / 2);
   if (kind == kFingertip) c.other_mm = c.size_mm * std::lerp(0.6, 1.0, uniform(kOther));
   const double middle = kind == kBar || kind == kRing || kind == kLetter ? c.other_mm / 2 : c.size_mm;

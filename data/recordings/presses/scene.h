@@ -30,8 +30,12 @@ struct Field {
 class Scene {
  public:
   static constexpr double kSeconds = 1.2;
-  /// `kind` is one of press_kinds().
-  Scene(const std::string& kind, const TaxelArray& array, const RandomStream& random);
+  /// Which objects: of one of press_kinds(), from the smallest (0) to the largest (1).
+  struct Objects {
+    std::string kind;
+    double smallest = 0, largest = 1;
+  };
+  Scene(const Objects& objects, const TaxelArray& array, const RandomStream& random);
 
   /// Pressure [rows][columns] of `field` at time `t` from 0 to kSeconds: 0 where nothing touches, 1 pressed
   /// hard. A point of a body that lies d mm behind the foremost one under an object is pressed by d / give_mm
@@ -48,7 +52,8 @@ class Scene {
     double most = 0, down_s = 0, loaded_s = 0, lifting_s = 0, up_s = 0;
     std::vector<double> shape;  // strokes of a letter, harmonics of a blob
   };
-  static Contact draw(int kind, const TaxelArray& array, const RandomStream& random, std::uint64_t first);
+  static Contact draw(int kind, const Objects& objects, const TaxelArray& array, const RandomStream& random,
+                      std::uint64_t first);
   static double inside_mm(const Contact& contact, double x_mm, double y_mm);
 
   std::vector<Contact> contacts_;

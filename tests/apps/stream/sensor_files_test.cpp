@@ -165,6 +165,7 @@ class SensorFile : public ProgramTest, public testing::WithParamInterface<const 
 
 TEST_P(SensorFile, IsProbedViewedRecordedAndReadBack) {
   Sensor sensor = example(GetParam());
+  sensor.body.skin_mm = 2, sensor.body.knee = 0.5;
   const bool slow = sensor.rate_hz < 10;
   const std::string seconds = slow ? "6" : "2.5";
   const FakeDevice device(sensor);
@@ -192,6 +193,7 @@ TEST_P(SensorFile, IsProbedViewedRecordedAndReadBack) {
     EXPECT_GE(recording.frames(), slow ? 3U : 20U);
     EXPECT_EQ(recording.array, described.array);
     EXPECT_EQ(recording.signal_scale, described.scale);
+    EXPECT_EQ(recording.body.value_or(Body::usual(recording.array)), described.body);
     EXPECT_NEAR(recording.period_s(), 1 / sensor.rate_hz, 0.3 / sensor.rate_hz);
     Sensor arranged = described;
     arranged.rate_hz = sensor.rate_hz;

@@ -188,6 +188,39 @@ TEST(Probe, WritesWhereEachTaxelRests) {
   expect_said(report, "signals rest up to 1");
 }
 
+// A mat whose taxels are each pressed for most of the time, and let go all at once for a fifth of it.
+TEST(Probe, TellsRestFromPressuresThatLastLonger) {
+  for (const double sign : {1.0, -1.0}) {
+    std::vector<Heard> heard;
+    for (int n = 0; n < 500; ++n) {
+      std::string line;
+      for (int k = 0; k < 20; ++k) {
+        const double rest = 2000 + 10 * k,
+                     noise = RandomStream(3, 1).normal(static_cast<std::uint64_t>(20 * n + k));
+        const bool pressed = n % 100 >= 20 && (n / 7 + k) % 20 < (k < 10 ? 16 : 3);
+        line += (k > 0 ? "," : "") +
+                format(std::round(rest + sign * (pressed ? 900 + 50 * (n % 9) : 0) + 4 * noise));
+      }
+      heard.push_back({100 + 0.02 * n, line + "\n"});
+    }
+    const ProbeReport report = drafted(heard);
+    EXPECT_EQ(report.draft->scale.rises(), sign > 0) << all(report);
+    ASSERT_EQ(report.draft->rest.size(), 20U) << all(report);
+    for (std::size_t k = 0; k < 20; ++k)
+      EXPECT_NEAR(double{report.draft->rest[k]}, 2000 + 10 * static_cast<double>(k), 2) << k;
+    EXPECT_NEAR(std::abs(report.draft->scale.span), 1.1 * 1300, 30);
+  }
+}
+
+// What somebody's sensor is built of nobody knows: the rig's dome is no guess. What its file says stays.
+TEST(Probe, GuessesNoBody) {
+  Sensor sensor = sensor_of(R"({"rows":3,"columns":4,"pressed":"higher","range":[100,900],"rate_hz":50,
+    "frame":{"kind":"text"}})");
+  EXPECT_EQ(drafted(sent(sensor, 3)).draft->body, Body{});
+  sensor.body = {.shape = BodyShape::cylinder, .radius_mm = 30, .skin_mm = 3, .knee = 0.7};
+  EXPECT_EQ(drafted(sent(sensor, 3), sensor).draft->body, sensor.body);
+}
+
 // docs/sensors.md: probe again when the rests have drifted.
 TEST(Probe, AtRestKeepsWhatItsFileSaysButTheRests) {
   const Sensor sensor = sensor_of(

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "data/recordings/imports/film_truth.h"
+#include "io/files/file.h"
 #include "io/numbers/random.h"
 #include "tests/expect_error.h"
 
@@ -132,9 +133,50 @@ TEST(FilmTruth, LandsOnTheFramesThatFeltIt) {
     worst = std::max(worst, std::abs(off)), squares += off * off / static_cast<double>(recording.frames());
   }
   EXPECT_LT(std::sqrt(squares), 0.04);
-  const auto again = clock_of_truth(recording);
+  const auto again = clock_of_truth(recording, recording.time_s);
   ASSERT_TRUE(again.has_value());
   EXPECT_NEAR(again->sensor_s(20), 20, 0.01) << "nothing is left of the lag";
+}
+
+// An image for each frame, by the frames' own clock, each too late or too early by so much.
+TEST(FilmTruth, OfOneClockIsPutInTimeWhereItLags) {
+  for (const double lag : {0.6, -0.11, 0.004}) {
+    const Courses c = Scene(5).recorded(-lag, 1, 0.02, 40, 100);
+    Recording recording;
+    recording.array = {.rows = 1, .columns = 1, .pitch_mm = 5};
+    recording.signal_scale = {.unit = "counts", .rest = 0, .span = -100};
+    recording.truth_height = recording.truth_width = 2;
+    for (std::size_t i = 0; i < c.film.size(); ++i) {
+      recording.time_s.push_back(c.film_s[i]);
+      recording.volts.push_back(static_cast<float>(100 * c.sensor[i]));
+      recording.truth.insert(recording.truth.end(), 4,
+                             static_cast<float>(std::clamp(c.film[i] / 40, 0.0, 1.0)));
+    }
+    const std::vector<float> before = recording.truth;
+    const auto clock = put_in_time(recording);
+    EXPECT_EQ(clock.has_value(), std::abs(lag) > 0.02) << lag;
+    if (!clock) EXPECT_EQ(recording.truth, before);
+    if (clock) EXPECT_NEAR(clock->sensor_s(20), 20 - lag, 0.01);
+    const auto again = clock_of_truth(recording, recording.time_s);
+    ASSERT_TRUE(again);
+    EXPECT_NEAR(again->sensor_s(20), 20, 0.01) << lag;
+  }
+}
+
+TEST(FilmTruth, TimesOfAnArrayStandInATableOfTheirOwn) {
+  Table images, times;
+  images.columns = 4, images.shape = {2, 2}, images.values.assign(12, 0);
+  times.columns = 2, times.shape = {2}, times.names = {"frame", "time"}, times.values = {0, 5, 1, 5.5, 2, 6};
+  EXPECT_EQ(film_times("t.csv", times, images), (std::vector<double>{5, 5.5, 6}));
+  times.names.clear();
+  EXPECT_EQ(what_of<FileError>([&] { film_times("t.csv", times, images); }),
+            "t.csv: has 2 columns, expected one of times, or a name: time");
+  times.columns = 1, times.values = {1, 2};
+  EXPECT_EQ(what_of<FileError>([&] { film_times("t.csv", times, images); }),
+            "t.csv: holds 2 times, expected one for each of 3 images");
+  times.values = {1, 2, 2};
+  EXPECT_EQ(what_of<FileError>([&] { film_times("t.csv", times, images); }),
+            "t.csv: has times that do not increase, in row 2");
 }
 
 }  // namespace

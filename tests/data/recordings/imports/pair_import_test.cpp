@@ -54,6 +54,36 @@ TEST(PairImport, ARecordingForEachGroupWithChannelsLastAndItsTruth) {
   EXPECT_EQ(read_recording(folder / "r.safetensors").truth, seven.truth);
 }
 
+// Targets of other frames than the inputs: of 400 pairs each shows what the input felt 12 pairs before.
+TEST(PairImport, RefusesTargetsThatComeLate) {
+  const TemporaryFolder folder;
+  for (const int late : {0, 12}) {
+    PairFile file;
+    file.with_group = false;
+    file.input_shape = {400, 1, 2, 2}, file.target_shape = {400, 1, 4, 4};
+    file.input.clear(), file.target.clear();
+    const auto load = [](int i) {
+      float sum = 0;
+      for (const int begin : {30, 72, 103, 180, 215, 290, 340})
+        sum +=
+            std::clamp(static_cast<float>(std::min(i - begin, begin + 11 + begin % 9 - i)) / 4, 0.0F, 0.8F);
+      return sum;
+    };
+    for (int i = 0; i < 400; ++i) {
+      file.input.insert(file.input.end(), 4, load(i));
+      file.target.insert(file.target.end(), 16, load(i - late));
+    }
+    const SafetensorsFile read = SafetensorsFile::read(file.write(folder));
+    if (late == 0) {
+      EXPECT_EQ(import_pairs(read).size(), 1u);
+      continue;
+    }
+    const std::string what = what_of<FileError>([&] { import_pairs(read); });
+    EXPECT_NE(what.find("target shows touches 12.0 +- "), std::string::npos) << what;
+    EXPECT_NE(what.find(" frames later than input; pair each input"), std::string::npos) << what;
+  }
+}
+
 TEST(PairImport, GroupsStayTogetherInASplit) {
   const TemporaryFolder folder;
   PairFile file;
