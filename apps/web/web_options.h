@@ -7,9 +7,9 @@
 
 namespace supertac {
 
-/// Declares --web and --web-bind; the last ones, since --web-bind stands beside --web only.
+/// Declares --web.
 void declare_web(Arguments& a);
-/// Where the page is served; nothing without --web. Warns when the network may see it.
+/// Where the page is served; nothing without --web. Warns when the network may see it. Throws UsageError.
 std::optional<WebAddress> web_address(const Arguments& a);
 
 }  // namespace supertac
