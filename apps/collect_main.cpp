@@ -12,7 +12,6 @@
 #include "apps/collect/origin_mark.h"
 #include "apps/collect/passes.h"
 #include "apps/common/command_line/program.h"
-#include "apps/common/running/ports.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "apps/web/web_options.h"
@@ -33,14 +32,13 @@ void declare(Arguments& arguments) {
   arguments
       .option("sensor", "FILE", "what the head carries: a sensor's file, whose port is read, or rig", "rig")
       .option("board", "PORT", "port of the rig's tactile board; auto finds it by its USB number", "auto")
-      .option("printer", "PORT",
-              "port of the Marlin printer; needed, as --plate and --out, but for --list-ports")
-      .option("plate", "NAME",
-              "plate under the finger (3_Bumps, ..., plain, kind and pitch: ridges6, or FILE.stl)")
+      .required("printer", "PORT", "port of the Marlin printer")
+      .required("plate", "NAME",
+                "plate under the finger (3_Bumps, ..., plain, kind and pitch: ridges6, or FILE.stl)")
       .option("bed", "FILE",
               "where the printer's plate lies, where its head waits and how it slides (docs/sensors.md); "
               "without it as on the rig")
-      .option("out", "DIR", "folder for journal, recordings and report")
+      .required("out", "DIR", "folder for journal, recordings and report")
       .writes()
       .option("speed", "MM_PER_S", "of the slide, instead of what the bed's file says", "10")
       .option("passes", "N",
@@ -50,20 +48,13 @@ void declare(Arguments& arguments) {
       .flag("home", "home the printer first instead of trusting the operator's origin")
       .flag("confirm-origin", "after a run that was cut off: the head is back at its origin, on the rig " +
                                   describe(rig::kMounted))
-      .flag("yes", "do not ask: the plate lies as planned and the head is at its origin")
-      .flag("list-ports", "list the serial ports and end");
+      .flag("yes", "do not ask: the plate lies as planned and the head is at its origin");
   declare_web(arguments);
 }
 
 namespace {
 
 constexpr int kMostPasses = 1000;
-
-std::string required_text(const Arguments& arguments, const std::string& name) {
-  if (!arguments.given(name))
-    throw UsageError("missing --" + name + ", which a collection needs beside --printer, --plate and --out");
-  return arguments.text(name);
-}
 
 /// A line from the terminal. std::getline goes on waiting after a signal.
 std::string ask_operator() {
@@ -292,15 +283,11 @@ std::string keep_passes(const Arguments& arguments, const std::string& journal, 
 }  // namespace
 
 int run(Arguments& arguments) {
-  if (arguments.flag("list-ports")) {
-    print_ports(arguments);
-    return kExitOk;
-  }
-  const std::string out = required_text(arguments, "out");
+  const std::string out = arguments.text("out");
   const std::string plate =
-      read_option("plate", [&] { return Plate::named(required_text(arguments, "plate")).name(); });
+      read_option("plate", [&] { return Plate::named(arguments.text("plate")).name(); });
   const RecorderSettings settings = read_settings(arguments, out, plate);
-  const OriginMark mark(required_text(arguments, "printer"));
+  const OriginMark mark(arguments.text("printer"));
   const double speedup = arguments.number("speedup", 0.1, 100);
   auto board = open_carried(arguments, settings.sensor, speedup);
   auto printer =

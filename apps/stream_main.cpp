@@ -4,7 +4,6 @@
 
 #include "apps/common/command_line/program.h"
 #include "apps/common/output/provenance.h"
-#include "apps/common/running/ports.h"
 #include "apps/common/running/progress.h"
 #include "apps/common/running/signals.h"
 #include "apps/stream/stream.h"
@@ -99,8 +98,7 @@ void declare(Arguments& a) {
             "tcp:HOST:PORT, for --seconds (5), say what comes, and write a sensor's file to --out; with "
             "--web the array is shown then: press a taxel, and see which one lights up")
       .flag("gain",
-            "with --probe: find the gain of each taxel as well, which you press about equally hard (30 s)")
-      .flag("list-ports", "list the serial ports and end");
+            "with --probe: find the gain of each taxel as well, which you press about equally hard (30 s)");
   declare_web(a);
 }
 
@@ -168,10 +166,6 @@ std::unique_ptr<SensorSource> open_draft(const Arguments& a, Sensor draft, doubl
 }
 
 int run(Arguments& a) {
-  if (a.flag("list-ports")) {
-    print_ports(a);
-    return kExitOk;
-  }
   if (a.flag("gain") && !a.flag("probe")) throw UsageError("--gain: only with --probe");
   std::optional<ProbeReport> probed;
   nlohmann::ordered_json result;

@@ -90,7 +90,10 @@ void ports(std::vector<Finding>& findings) {
   for (const PortInfo& port : list_ports()) {
     board = board || port.usb_id == rig::kBoardUsbId;
     const bool allowed = ::access(port.path.c_str(), R_OK | W_OK) == 0;
-    findings.push_back({"port " + port.path, port.product.empty() ? port.usb_id : port.product,
+    const std::string lasting = lasting_port_name(port.path);
+    findings.push_back({"port " + port.path,
+                        (port.product.empty() ? port.usb_id : port.product) +
+                            (lasting == port.path ? "" : ", also under another number " + lasting),
                         allowed ? "" : "no permission: see the serial ports' group"});
   }
   findings.push_back(

@@ -286,7 +286,7 @@ std::optional<FoundFormat> find_text_format(const std::string& bytes, double sec
   says.push_back(std::to_string(lines.text.size()) + " lines, such as " +
                  shown(lines.text[lines.text.size() / 2]));
   if (2 * static_cast<std::size_t>(std::ranges::count_if(lines.text, from_printer)) > lines.text.size()) {
-    says.push_back("a printer's firmware answers here; choose the sensor's port (--list-ports)");
+    says.push_back("a printer's firmware answers here; choose the sensor's port (supertac-check machine)");
     return std::nullopt;
   }
   const std::size_t before = says.size();

@@ -68,16 +68,18 @@ void TactileBoard::check_silence(double time) {
   const std::uint64_t total = decoder_.counters().bytes;
   if (decoder_.counters().frames == 0 && total >= 2) {
     const bool text = text_bytes_ > 0.9 * static_cast<double>(total);
-    throw WrongDevice(
-        "port " + port_->name() + ": expected a tactile board, found " +
-        (text ? "text, as from a printer; exchange the two ports"
-              : std::to_string(total) + " bytes without a frame; choose the board's port (--list-ports)"));
+    throw WrongDevice("port " + port_->name() + ": expected a tactile board, found " +
+                      (text
+                           ? "text, as from a printer; exchange the two ports"
+                           : std::to_string(total) +
+                                 " bytes without a frame; choose the board's port (supertac-check machine)"));
   }
-  throw BoardSilent(
-      "board " + port_->name() + ": expected " + format(rig::kFrameRateHz, 0) + " frames/s, found none for " +
-      format(silence_s_, 1) + " s; " +
-      (decoder_.counters().frames == 0 ? "is this the board's port (--list-ports)? If it is, " : "") +
-      "plug the board out and in again");
+  throw BoardSilent("board " + port_->name() + ": expected " + format(rig::kFrameRateHz, 0) +
+                    " frames/s, found none for " + format(silence_s_, 1) + " s; " +
+                    (decoder_.counters().frames == 0
+                         ? "is this the board's port (supertac-check machine)? If it is, "
+                         : "") +
+                    "plug the board out and in again");
 }
 
 void TactileBoard::take_batch(double time, bool more_waited) {

@@ -24,9 +24,10 @@ namespace {
   const std::string at = "port " + path + ": ";
   switch (error) {
     case ENOENT:
-      throw PortNotFound(at +
-                         "no such port; plug the device in, or run with --list-ports to see what is there "
-                         "and by which path it is found again under another number");
+      throw PortNotFound(
+          at +
+          "no such port; plug the device in, or run supertac-check machine to see what is there "
+          "and by which path it is found again under another number");
     case EACCES:
     case EPERM:
       throw PortPermission(at + "permission denied; run `sudo usermod -aG dialout $USER` and log in again");
@@ -63,7 +64,7 @@ SerialPort::SerialPort(const std::string& path, const SerialSettings& settings)
   if (isatty(descriptor_) == 0) {
     close(descriptor_);
     throw NotASerialPort("port " + path +
-                         ": expected a serial port, found another kind of file; run with --list-ports");
+                         ": expected a serial port, found another kind of file; run supertac-check machine");
   }
   if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) give_up(errno == EWOULDBLOCK ? EBUSY : errno);
   if (ioctl(descriptor_, TIOCEXCL) != 0) give_up(errno);

@@ -59,7 +59,7 @@ void MarlinLink::nobody_answered() {
   const unsigned baud = lines_.port().baud();
   if (lines_.bytes() > 0) {
     throw WrongDevice(expected + std::to_string(lines_.bytes()) + " bytes that are no" + within +
-                      "check that it is the printer's port (--list-ports)" +
+                      "check that it is the printer's port (supertac-check machine)" +
                       (baud > 0 ? " and that its baud rate is " + std::to_string(baud) : "") +
                       (complaint_.empty() ? "" : "; it said " + in_quotes(complaint_)));
   }

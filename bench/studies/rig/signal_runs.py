@@ -33,10 +33,10 @@ SENSOR = """{"rows": 4, "columns": 4, "rate_hz": 100, "pressed": "higher", "rang
 # The phases, and between which seconds after the start the signal comes: a start that is read and set up, and later.
 COLLECTING = {"silent": (0, 3), "busy": (0, 3), "question": (0, 2), "homing": (0, 4), "approach": (0, 3), "slide": (5, 8)}
 STREAMING = {f"{what} {port}": (0, 1.5) for what in ("stream", "probe") for port in ("serial", "tcp", "udp", "fifo", "mute", "far")}
-PHASES = {**COLLECTING, "collect list-ports": (0, 0.01), "stream list-ports": (0, 0.01), "check machine": (0, 0.02),
+PHASES = {**COLLECTING, "check machine": (0, 0.02),
           "stream board": (0, 1.5), "stream board all outputs": (0, 1.5), "stream printer": (0, 2), **STREAMING}
 # What ends by itself, perhaps while the signal is on its way.
-OWN_ENDS = {"collect list-ports": 0, "stream list-ports": 0, "check machine": 0, "stream printer": 1}
+OWN_ENDS = {"check machine": 0, "stream printer": 1}
 
 
 class StallWatch(threading.Thread):
@@ -196,8 +196,6 @@ def command_of(phase, programs, folder, network):
     collect = [f"{programs}/supertac-collect", "--board", f"{folder}/board", "--printer", f"{folder}/printer", "--plate",
                "6_Ridges", "--passes", "1", "--out", f"{folder}/out", "--speedup", str(SPEEDUP)]
     return {"question": collect, "homing": [*collect, "--yes", "--home"],
-            "collect list-ports": [f"{programs}/supertac-collect", "--list-ports"],
-            "stream list-ports": [f"{programs}/supertac-stream", "--list-ports"],
             "check machine": [f"{programs}/supertac-check", "machine"],
             "stream board": [*stream, f"{folder}/board"], "stream board all outputs": [*stream, f"{folder}/board", *every],
             "stream printer": [*stream, f"{folder}/printer"]}.get(phase, [*collect, "--yes"])

@@ -248,8 +248,8 @@ TEST_F(Help, BreaksNoWords) {
 
 TEST_F(Collect, SaysWhichOptionIsMissing) {
   expect_failure(run("supertac-collect --plate 6_Ridges --out c"), 2,
-                 "missing --printer, which a collection needs beside");
-  EXPECT_TRUE(contains(run("supertac-collect --help").out, "port of the Marlin printer; needed"));
+                 "missing --printer PORT: port of the Marlin printer");
+  EXPECT_TRUE(contains(run("supertac-collect --help").out, "port of the Marlin printer"));
 }
 
 TEST_F(Simulate, SaysThatAFolderHasRecordingsAlready) {

@@ -238,11 +238,13 @@ TEST(CollectProgram, APortThatCannotBeUsedIsOneClearLine) {
   const TemporaryFolder folder;
   std::ofstream(folder / "file") << "text";
   const std::vector<Refusal> refusals = {
-      {"no such port", {"--printer", folder / "none"}, {folder / "none", "no such port", "--list-ports"}},
-      {"a file", {"--printer", folder / "file"}, {"expected a serial port", "--list-ports"}},
+      {"no such port",
+       {"--printer", folder / "none"},
+       {folder / "none", "no such port", "supertac-check machine"}},
+      {"a file", {"--printer", folder / "file"}, {"expected a serial port", "supertac-check machine"}},
       {"another terminal's kind of file",
        {"--board", "/dev/null"},
-       {"expected a serial port", "--list-ports"}},
+       {"expected a serial port", "supertac-check machine"}},
       {"ports exchanged", {"--board", run.printer(), "--printer", run.board()}, {"exchange the two ports"}},
       {"one port twice", {"--board", run.printer()}, {"already open"}},
   };

@@ -208,7 +208,7 @@ TEST(TactileBoard, AnotherDeviceIsNoBoardAndNoPrinter) {
     TactileBoard board(std::make_unique<SerialPort>(folder / "port", SerialSettings{rig::kBoardBaud, 10}));
     ASSERT_EQ(write(device.descriptor(), noise.data(), noise.size()), static_cast<ssize_t>(noise.size()));
     EXPECT_ERROR((void)board.next(kPatience), WrongDevice,
-                 "found 64 bytes without a frame; choose the board's port (--list-ports)");
+                 "found 64 bytes without a frame; choose the board's port (supertac-check machine)");
   }
   SerialPort port(folder / "port", {.speedup = 100});
   ASSERT_EQ(write(device.descriptor(), text.data(), text.size()), static_cast<ssize_t>(text.size()));
@@ -216,7 +216,7 @@ TEST(TactileBoard, AnotherDeviceIsNoBoardAndNoPrinter) {
   EXPECT_ERROR(link.connect(), WrongDevice,
                "expected a Marlin firmware, found 26 bytes that are no answer to M110 within 20 s; check "
                "that it is the "
-               "printer's port (--list-ports) and that its baud rate is 115200");
+               "printer's port (supertac-check machine) and that its baud rate is 115200");
 }
 
 TEST(TactileBoard, ABoardAtThePrintersPortIsRecognised) {

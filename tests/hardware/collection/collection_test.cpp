@@ -57,10 +57,10 @@ TEST(Collection, AReplayWithAnotherPlanIsRefused) {
 
 TEST(Collection, NothingMovesBeforeTheBoardIsHeard) {
   CollectionBench bench(running_rig({}, {.lost_frame_rate = 1}));
-  EXPECT_ERROR(
-      bench.record(), BoardSilent,
-      "expected 1008 frames/s, found none for 1.0 s; is this the board's port (--list-ports)? If it is, "
-      "plug the board out and in again");
+  EXPECT_ERROR(bench.record(), BoardSilent,
+               "expected 1008 frames/s, found none for 1.0 s; is this the board's port (supertac-check "
+               "machine)? If it is, "
+               "plug the board out and in again");
   EXPECT_TRUE(moves_of(bench.rig.world().printer()).empty());
   EXPECT_EQ(bench.folder.entries(), 0U) << "a journal of nothing was left behind";
 }

@@ -64,10 +64,10 @@ TEST(PortList, ALastingNameIsThatOfTheDevice) {
 TEST(SerialPort, WhatCannotBeOpenedSaysWhy) {
   const TemporaryFolder folder;
   EXPECT_ERROR(SerialPort port(folder / "nothing"), PortNotFound,
-               (folder / "nothing") + ": no such port; plug the device in, or run with --list-ports");
+               (folder / "nothing") + ": no such port; plug the device in, or run supertac-check machine");
   std::ofstream(folder / "file") << "text";
   EXPECT_ERROR(SerialPort port(folder / "file"), NotASerialPort,
-               "expected a serial port, found another kind of file; run with --list-ports");
+               "expected a serial port, found another kind of file; run supertac-check machine");
 }
 
 // A user without rights on the port; root first becomes nobody.
