@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "autograd/pool.h"
+#include "autograd/kernels/fast/pool.h"
 
 namespace supertac {
 namespace detail {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "autograd/kernels/fast/each.h"
-#include "autograd/pool.h"
+#include "autograd/kernels/fast/pool.h"
 
 namespace supertac::kernels {
 namespace {

@@ -8,9 +8,9 @@
 #include <stdexcept>
 
 #include "autograd/kernels/fast/each.h"
+#include "autograd/kernels/fast/pool.h"
 #include "autograd/kernels/sums.h"
 #include "autograd/optimisers/orthogonal.h"
-#include "autograd/pool.h"
 
 namespace supertac {
 namespace {

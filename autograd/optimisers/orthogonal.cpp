@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "autograd/kernels/fast/each.h"
+#include "autograd/kernels/fast/pool.h"
 #include "autograd/kernels/sums.h"
 #include "autograd/ops/linear.h"
-#include "autograd/pool.h"
 
 namespace supertac {
 namespace {

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "autograd/pool.h"
+#include "autograd/kernels/fast/pool.h"
 
 namespace supertac {
 

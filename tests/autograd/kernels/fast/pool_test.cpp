@@ -1,4 +1,4 @@
-#include "autograd/pool.h"
+#include "autograd/kernels/fast/pool.h"
 
 #include <gtest/gtest.h>
 
